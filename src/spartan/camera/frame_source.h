@@ -1,0 +1,78 @@
+// Where samples come from: one interface for recordings of any layout, and for live cameras later.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spartan/camera/samples.h"
+#include "spartan/core/result.h"
+#include "spartan/rig/rig.h"
+
+namespace spartan {
+
+enum class RecordingFormat { spartan, kitti, kitti_raw, euroc };
+
+/// "spartan", "kitti", "kitti-raw", "euroc": as --format takes them.
+std::string_view name_of(RecordingFormat format);
+Result<RecordingFormat> parse_recording_format(std::string_view name);
+
+/// What was announced and what of it fits together, found when the recording is opened.
+struct SequenceReport {
+  int announced = 0;     ///< stereo shots, all pairs
+  int orphans_left = 0;  ///< left images without a right one near in time, and the reverse
+  int orphans_right = 0;
+  int reversals = 0;  ///< stamps that do not increase within a pair
+  int gaps = 0;       ///< steps longer than three times the median step
+  double median_step_s = 0;
+  double longest_gap_s = 0;
+};
+
+struct RecordingInfo {
+  std::string path;
+  RecordingFormat format = RecordingFormat::spartan;
+  std::string layout_reason;  ///< why this layout was taken: "calib.txt and image_0 found"
+  Rig rig;
+  std::string rig_source;  ///< the file the rig came from
+  bool has_imu = false;
+  SequenceReport sequence;
+  std::string truth_file;  ///< trajectory with the truth, where the recording brings one; else empty
+};
+
+/// Yields samples in the order of time.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  virtual const RecordingInfo& info() const = 0;
+
+  /// The next sample, or nothing at the end. A shot that is announced but missing, unreadable, of another size or
+  /// out of order comes as MissingFrame. An error ends the reading (a sensor file that breaks off in mid-line …).
+  virtual Result<std::optional<Sample>> next() = 0;
+
+  /// Goes to just behind the last sample with this stamp or an earlier one, without decoding any image; nothing
+  /// goes back to the start.
+  virtual Status seek_after(std::optional<Stamp> stamp) = 0;
+
+  /// Decodes one shot on request. Code `input` where there is none with this left stamp.
+  virtual Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) = 0;
+
+  /// Left stamps of all announced shots of a pair, in order.
+  virtual std::vector<Stamp> announced_stamps(const std::string& pair) const = 0;
+
+  /// IMU samples of the first `seconds` (from the first IMU stamp on); does not move the reading position.
+  virtual Result<std::vector<ImuSample>> first_imu_samples(double seconds) = 0;
+};
+
+struct OpenOptions {
+  std::optional<RecordingFormat> format;  ///< none: guess
+  std::string rig_file;                   ///< replaces the recording's own calibration; empty: its own
+  double pair_tolerance_s = 0.005;        ///< left and right stamps farther apart do not form a pair
+};
+
+/// Opens a recording. Codes: `input` (missing, empty, no layout that is known), `configuration` (calibration).
+Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, const OpenOptions& options = {});
+
+}  // namespace spartan

@@ -1,0 +1,52 @@
+// Writes Spartan recordings (docs/formats.md, "Recording").
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "spartan/camera/samples.h"
+#include "spartan/core/result.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/rig/rig.h"
+
+namespace spartan {
+
+struct RecordingOptions {
+  std::string name;
+  std::string description;
+  double gravity_m_s2 = 9.81;
+};
+
+/// Makes the folder, then takes samples in any order of kinds, each kind in the order of its stamps.
+/// Everything given is on the disk after `finish()`; a recording that was not finished has no recording.yaml.
+class RecordingWriter {
+ public:
+  /// Code `output` where the folder exists and is not empty, or cannot be made.
+  static Result<RecordingWriter> create(const std::string& folder, const Rig& believed_rig,
+                                        const RecordingOptions& options);
+  RecordingWriter(RecordingWriter&&) noexcept;
+  RecordingWriter& operator=(RecordingWriter&&) noexcept;
+  ~RecordingWriter();
+
+  Status add(const StereoFrame& frame);
+  Status add(const ImuSample& sample);
+  Status add(const WheelSample& sample);
+  Status add(const CompassSample& sample);
+  Status add(const InclinometerSample& sample);
+
+  /// Writes truth/rig.yaml and truth/poses.tum.
+  Status write_truth(const Rig& true_rig, const Trajectory& poses);
+  /// Writes truth/disparity/<pair>/<stamp>.png and truth/mask/<pair>/<stamp>.png (255 both eyes, 128 left only, 0
+  /// none).
+  Status write_truth_disparity(const std::string& pair, Stamp left_stamp, ImageView<const float> disparity,
+                               ImageView<const std::uint8_t> mask);
+
+  Status finish();
+
+ private:
+  struct State;
+  explicit RecordingWriter(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace spartan

@@ -1,0 +1,69 @@
+#include "spartan/core/archive.h"
+
+namespace spartan {
+
+void ArchiveWriter::raw(const void* data, std::size_t size) {
+  if (size == 0) return;
+  const auto* first = static_cast<const std::uint8_t*>(data);
+  bytes_.insert(bytes_.end(), first, first + size);
+}
+
+void ArchiveWriter::put(const std::string& text) {
+  put_array(text.data(), text.size());
+}
+void ArchiveWriter::put(const Eigen::Vector2d& v) {
+  raw(v.data(), sizeof(double) * 2);
+}
+void ArchiveWriter::put(const Eigen::Vector3d& v) {
+  raw(v.data(), sizeof(double) * 3);
+}
+void ArchiveWriter::put(const Pose& pose) {
+  raw(pose.rotation().coeffs().data(), sizeof(double) * 4);
+  put(pose.translation());
+}
+void ArchiveWriter::put(const Matrix6d& m) {
+  raw(m.data(), sizeof(double) * 36);
+}
+
+void ArchiveReader::raw(void* data, std::size_t size) {
+  if (size > remaining()) {
+    ok_ = false;
+    return;
+  }
+  if (size == 0) return;
+  std::memcpy(data, bytes_.data() + at_, size);
+  at_ += size;
+}
+
+std::string ArchiveReader::get_string() {
+  const std::vector<char> text = get_array<char>();
+  return {text.begin(), text.end()};
+}
+Eigen::Vector2d ArchiveReader::get_vector2() {
+  Eigen::Vector2d v = Eigen::Vector2d::Zero();
+  raw(v.data(), sizeof(double) * 2);
+  return v;
+}
+Eigen::Vector3d ArchiveReader::get_vector3() {
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  raw(v.data(), sizeof(double) * 3);
+  return v;
+}
+Pose ArchiveReader::get_pose() {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  raw(q.coeffs().data(), sizeof(double) * 4);
+  return Pose::from_unit_quaternion(q, get_vector3());
+}
+Matrix6d ArchiveReader::get_matrix6() {
+  Matrix6d m = Matrix6d::Zero();
+  raw(m.data(), sizeof(double) * 36);
+  return m;
+}
+
+Status ArchiveReader::finish(const std::string& what) const {
+  if (!ok_) return failure(ErrorCode::input, "the saved state ends early", what);
+  if (at_ != bytes_.size()) return failure(ErrorCode::input, "the saved state has bytes left over", what);
+  return {};
+}
+
+}  // namespace spartan

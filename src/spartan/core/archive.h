@@ -1,0 +1,89 @@
+// Binary values for stage memory: little-endian, versioned, checked on the way back.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "spartan/core/pose.h"
+#include "spartan/core/result.h"
+
+namespace spartan {
+
+using Bytes = std::vector<std::uint8_t>;
+
+static_assert(std::endian::native == std::endian::little, "archives are written as they lie in memory");
+
+/// Appends values to a byte string.
+class ArchiveWriter {
+ public:
+  template <class T>
+    requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void put(T value) {
+    raw(&value, sizeof value);
+  }
+  void put(const std::string& text);
+  void put(const Eigen::Vector2d& v);
+  void put(const Eigen::Vector3d& v);
+  void put(const Pose& pose);
+  void put(const Matrix6d& m);
+  /// A count, then the elements as they lie in memory.
+  template <class T>
+    requires std::is_trivially_copyable_v<T>
+  void put_array(const T* data, std::size_t count) {
+    put(static_cast<std::uint64_t>(count));
+    raw(data, count * sizeof(T));
+  }
+  Bytes take() { return std::move(bytes_); }
+
+ private:
+  void raw(const void* data, std::size_t size);
+  Bytes bytes_;
+};
+
+/// Reads what ArchiveWriter wrote, in the same order. After the first value that is not there every further
+/// one is zero; ask `finish()` at the end.
+class ArchiveReader {
+ public:
+  explicit ArchiveReader(const Bytes& bytes) : bytes_(bytes) {}
+
+  template <class T>
+    requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  T get() {
+    T value{};
+    raw(&value, sizeof value);
+    return value;
+  }
+  std::string get_string();
+  Eigen::Vector2d get_vector2();
+  Eigen::Vector3d get_vector3();
+  Pose get_pose();
+  Matrix6d get_matrix6();
+  template <class T>
+    requires std::is_trivially_copyable_v<T>
+  std::vector<T> get_array() {
+    const auto count = get<std::uint64_t>();
+    if (count > remaining() / sizeof(T)) {
+      ok_ = false;
+      return {};
+    }
+    std::vector<T> values(static_cast<std::size_t>(count));
+    raw(values.data(), values.size() * sizeof(T));
+    return values;
+  }
+
+  /// All was there and nothing is left over; else an error that names `what`.
+  Status finish(const std::string& what) const;
+
+ private:
+  std::size_t remaining() const { return ok_ ? bytes_.size() - at_ : 0; }
+  void raw(void* data, std::size_t size);
+  const Bytes& bytes_;
+  std::size_t at_ = 0;
+  bool ok_ = true;
+};
+
+}  // namespace spartan

@@ -1,0 +1,71 @@
+// A camera's image of any pixel format, owned or borrowed.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+
+#include "spartan/core/image.h"
+#include "spartan/core/pixel_format.h"
+
+namespace spartan {
+
+/// One image as a camera delivers it. Copies are cheap and share the pixels, which nobody changes.
+/// Either keeps its pixels alive, or borrows memory that the caller keeps alive.
+class FrameImage {
+ public:
+  FrameImage() = default;
+
+  /// Borrows; the caller keeps the memory alive and unchanged while any copy is in use. Throws where the
+  /// sample type does not fit the format.
+  template <class Pixel>
+  static FrameImage borrow(ImageView<const Pixel> view, PixelFormat format) {
+    check<Pixel>(format);
+    FrameImage image;
+    image.format_ = format;
+    image.size_ = view.size();
+    image.data_ = view.data();
+    image.stride_bytes_ = view.stride() * static_cast<std::ptrdiff_t>(sizeof(Pixel));
+    return image;
+  }
+  /// Takes the pixels over.
+  template <class Pixel>
+  static FrameImage own(Image<Pixel> pixels, PixelFormat format) {
+    auto owner = std::make_shared<const Image<Pixel>>(std::move(pixels));
+    FrameImage image = borrow(owner->view(), format);
+    image.owner_ = std::move(owner);
+    return image;
+  }
+
+  const PixelFormat& format() const { return format_; }
+  ImageSize size() const { return size_; }
+  int width() const { return size_.width; }
+  int height() const { return size_.height; }
+  bool empty() const { return size_.empty(); }
+
+  /// The pixels as uint8_t, uint16_t, Rgb8 or Rgb16; throws where that is not what they are.
+  template <class Pixel>
+  ImageView<const Pixel> as() const {
+    check<Pixel>(format_);
+    return {static_cast<const Pixel*>(data_), size_.width, size_.height,
+            stride_bytes_ / static_cast<std::ptrdiff_t>(sizeof(Pixel))};
+  }
+
+ private:
+  template <class Pixel>
+  static void check(PixelFormat format) {
+    constexpr bool colour = std::is_same_v<Pixel, Rgb8> || std::is_same_v<Pixel, Rgb16>;
+    constexpr int bytes = colour ? sizeof(Pixel) / 3 : sizeof(Pixel);
+    if (colour != (format.layout == PixelLayout::rgb) || bytes != format.bytes_per_sample()) {
+      throw std::invalid_argument("FrameImage: the sample type does not fit the pixel format");
+    }
+  }
+
+  PixelFormat format_;
+  ImageSize size_;
+  const void* data_ = nullptr;
+  std::ptrdiff_t stride_bytes_ = 0;
+  std::shared_ptr<const void> owner_;
+};
+
+}  // namespace spartan

@@ -1,0 +1,154 @@
+// Images that own their pixels, and views that borrow them.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+namespace spartan {
+
+/// Three interleaved channels, in the order in which they lie in memory.
+template <class T>
+struct Rgb {
+  T r{}, g{}, b{};
+  friend bool operator==(const Rgb&, const Rgb&) = default;
+};
+using Rgb8 = Rgb<std::uint8_t>;
+using Rgb16 = Rgb<std::uint16_t>;
+
+/// Width and height in pixels.
+struct ImageSize {
+  int width = 0;
+  int height = 0;
+  bool empty() const { return width <= 0 || height <= 0; }
+  friend bool operator==(const ImageSize&, const ImageSize&) = default;
+};
+
+/// A borrowed rectangle of pixels. Integer coordinates are pixel centres (docs/conventions.md).
+/// `stride` counts pixels of type T from one row to the next.
+template <class T>
+class ImageView {
+ public:
+  ImageView() = default;
+  ImageView(T* data, int width, int height, std::ptrdiff_t stride)
+      : data_(data), width_(width), height_(height), stride_(stride) {}
+  /// A view of pixels is also a view of constant pixels.
+  ImageView(const ImageView<std::remove_const_t<T>>& other)
+    requires std::is_const_v<T>
+      : data_(other.data()), width_(other.width()), height_(other.height()), stride_(other.stride()) {}
+
+  T* data() const { return data_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+  ImageSize size() const { return {width_, height_}; }
+  std::ptrdiff_t stride() const { return stride_; }
+  bool empty() const { return width_ <= 0 || height_ <= 0; }
+
+  T* row(int y) const { return data_ + y * stride_; }
+  T& operator()(int x, int y) const { return row(y)[x]; }
+  bool contains(int x, int y) const { return x >= 0 && y >= 0 && x < width_ && y < height_; }
+
+  /// The part that starts at (x, y); throws where it does not lie inside.
+  ImageView crop(int x, int y, int width, int height) const {
+    if (x < 0 || y < 0 || width < 0 || height < 0 || x + width > width_ || y + height > height_) {
+      throw std::out_of_range("ImageView::crop: the part leaves the image");
+    }
+    return {row(y) + x, width, height, stride_};
+  }
+
+ private:
+  T* data_ = nullptr;
+  int width_ = 0;
+  int height_ = 0;
+  std::ptrdiff_t stride_ = 0;
+};
+
+/// An image that owns its pixels: rows begin on 64-byte borders and are padded to whole 64-byte blocks.
+/// Moves; copies only by `clone()`.
+template <class T>
+class Image {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  static constexpr std::size_t kAlignment = 64;
+
+  Image() = default;
+  /// Pixels are value-initialised (zero).
+  Image(int width, int height) : Image(width, height, T{}) {}
+  explicit Image(ImageSize size) : Image(size.width, size.height) {}
+  Image(int width, int height, T value) : width_(width), height_(height) {
+    if (width < 0 || height < 0) throw std::invalid_argument("Image: negative size");
+    const std::size_t row_bytes =
+        (static_cast<std::size_t>(width) * sizeof(T) + kAlignment - 1) / kAlignment * kAlignment;
+    // A pixel of three bytes does not divide 64: such rows are padded to a multiple of both.
+    std::size_t padded = row_bytes;
+    while (padded % sizeof(T) != 0) padded += kAlignment;
+    stride_ = static_cast<std::ptrdiff_t>(padded / sizeof(T));
+    const std::size_t bytes = padded * static_cast<std::size_t>(height);
+    if (bytes == 0) return;
+    data_.reset(static_cast<T*>(::operator new(bytes, std::align_val_t{kAlignment})));
+    std::fill_n(data_.get(), bytes / sizeof(T), value);
+  }
+  Image(Image&& other) noexcept { swap(other); }
+  Image& operator=(Image&& other) noexcept {
+    Image moved(std::move(other));
+    swap(moved);
+    return *this;
+  }
+
+  Image clone() const {
+    Image copy(width_, height_);
+    for (int y = 0; y < height_; ++y) std::copy_n(row(y), width_, copy.row(y));
+    return copy;
+  }
+  static Image copy_of(ImageView<const T> view) {
+    Image copy(view.width(), view.height());
+    for (int y = 0; y < view.height(); ++y) std::copy_n(view.row(y), view.width(), copy.row(y));
+    return copy;
+  }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  ImageSize size() const { return {width_, height_}; }
+  std::ptrdiff_t stride() const { return stride_; }
+  bool empty() const { return width_ <= 0 || height_ <= 0; }
+  bool contains(int x, int y) const { return x >= 0 && y >= 0 && x < width_ && y < height_; }
+
+  T* data() { return data_.get(); }
+  const T* data() const { return data_.get(); }
+  T* row(int y) { return data_.get() + y * stride_; }
+  const T* row(int y) const { return data_.get() + y * stride_; }
+  T& operator()(int x, int y) { return row(y)[x]; }
+  const T& operator()(int x, int y) const { return row(y)[x]; }
+
+  ImageView<T> view() { return {data(), width_, height_, stride_}; }
+  ImageView<const T> view() const { return {data(), width_, height_, stride_}; }
+  operator ImageView<T>() { return view(); }
+  operator ImageView<const T>() const { return view(); }
+
+  void fill(T value) { std::fill_n(data_.get(), stride_ * height_, value); }
+
+ private:
+  struct Free {
+    void operator()(T* data) const { ::operator delete(data, std::align_val_t{kAlignment}); }
+  };
+  void swap(Image& other) noexcept {
+    std::swap(width_, other.width_);
+    std::swap(height_, other.height_);
+    std::swap(stride_, other.stride_);
+    std::swap(data_, other.data_);
+  }
+
+  int width_ = 0;
+  int height_ = 0;
+  std::ptrdiff_t stride_ = 0;
+  std::unique_ptr<T, Free> data_;
+};
+
+}  // namespace spartan

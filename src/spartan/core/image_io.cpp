@@ -1,0 +1,216 @@
+#include "spartan/core/image_io.h"
+
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string_view>
+#include <vector>
+
+#include "spartan/core/files.h"
+#include "spartan/core/opencv_bridge.h"
+
+namespace spartan {
+namespace {
+
+using std::string_view_literals::operator""sv;
+
+constexpr std::size_t kLargestSide = 32768;  // larger headers are taken for noise, not for pictures
+
+std::uint32_t big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char c : bytes) value = (value << 8U) | static_cast<std::uint8_t>(c);
+  return value;
+}
+
+// Decoders fill what is missing with gray and say nothing, so the container is walked first.
+// Nothing: complete. Otherwise what is wrong.
+std::string png_fault(std::string_view png) {
+  std::size_t at = 8;
+  while (at + 12 <= png.size()) {
+    const std::size_t length = big_endian(png.substr(at, 4));
+    const std::string_view type = png.substr(at + 4, 4);
+    if (length > png.size() - at - 12) return "PNG file ends early";
+    if (type == "IHDR"sv && length >= 8) {
+      const std::size_t width = big_endian(png.substr(at + 8, 4)), height = big_endian(png.substr(at + 12, 4));
+      if (width == 0 || height == 0 || width > kLargestSide || height > kLargestSide)
+        return "PNG header with a senseless size";
+    }
+    if (type == "IEND"sv) return {};
+    at += 12 + length;
+  }
+  return "PNG file ends early";
+}
+
+std::string jpeg_fault(std::string_view jpeg) {
+  std::size_t at = 2;
+  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(jpeg[i]); };
+  while (at + 4 <= jpeg.size()) {
+    if (byte(at) != 0xFF) return "JPEG file is damaged";
+    const std::uint8_t marker = byte(at + 1);
+    if (marker == 0xFF) {
+      ++at;
+      continue;
+    }
+    const std::size_t length = big_endian(jpeg.substr(at + 2, 2));
+    if (marker != 0xDA) {
+      at += 2 + length;
+      continue;
+    }
+    // Behind the scan header comes entropy-coded data; a real marker there is 0xFF followed by neither 0 (stuffing)
+    // nor a restart marker.
+    for (at += 2 + length; at + 1 < jpeg.size(); ++at) {
+      if (byte(at) != 0xFF) continue;
+      const std::uint8_t next = byte(at + 1);
+      if (next == 0xD9) return {};
+      if (next != 0 && next != 0xFF && !(next >= 0xD0 && next <= 0xD7)) break;  // a further scan or table
+    }
+  }
+  // An end marker may stand where the walk above no longer looks.
+  return at + 2 <= jpeg.size() && jpeg.substr(at, 2) == "\xFF\xD9"sv ? std::string{} : "JPEG file ends early";
+}
+
+std::string container_fault(std::string_view content) {
+  if (content.empty()) return "file is empty";
+  if (content.starts_with("\x89PNG\r\n\x1a\n"sv)) return png_fault(content);
+  if (content.starts_with("\xFF\xD8"sv)) return jpeg_fault(content);
+  return {};
+}
+
+cv::Mat decode(const std::string& content, int flags) {
+  const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8UC1, const_cast<char*>(content.data()));
+  try {
+    return cv::imdecode(bytes, flags);
+  } catch (const cv::Exception&) {
+    return {};
+  }
+}
+
+template <class Pixel>
+FrameImage own(cv::Mat& mat, PixelLayout layout) {
+  return FrameImage::own(Image<Pixel>::copy_of(as_view<Pixel>(mat)),
+                         {layout, mat.depth() == CV_16U ? 16 : 8, BitAlignment::low});
+}
+
+Status write_encoded_png(const std::string& path, const cv::Mat& mat) {
+  std::vector<std::uint8_t> png;
+  try {
+    cv::imencode(".png", mat, png);
+  } catch (const cv::Exception& e) {
+    return failure(ErrorCode::internal, "cannot be encoded: " + e.msg, path);
+  }
+  return write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
+}
+
+// "Pf\n<width> <height>\n<scale>\n": the next word of the header, its separator taken too.
+std::string_view next_word(std::string_view& rest) {
+  const std::size_t begin = rest.find_first_not_of(" \t\r\n");
+  if (begin == std::string_view::npos) return rest = {};
+  const std::size_t end = rest.find_first_of(" \t\r\n", begin);
+  if (end == std::string_view::npos) return rest = {};
+  const std::string_view word = rest.substr(begin, end - begin);
+  rest.remove_prefix(end + 1);
+  return word;
+}
+
+template <class T>
+bool parse(std::string_view word, T& value) {
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc{} && end == word.data() + word.size();
+}
+
+}  // namespace
+
+Result<FrameImage> decode_image(const std::string& content, const std::string& name) {
+  const char* const hint = "replace the file, or remove it to skip the frame";
+  if (const std::string fault = container_fault(content); !fault.empty())
+    return failure(ErrorCode::input, fault, name, hint);
+  cv::Mat mat = decode(content, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
+  if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", name, hint);
+  if (mat.channels() == 3) cv::cvtColor(mat, mat, cv::COLOR_BGR2RGB);
+  switch (mat.type()) {
+    case CV_8UC1:
+      return own<std::uint8_t>(mat, PixelLayout::gray);
+    case CV_16UC1:
+      return own<std::uint16_t>(mat, PixelLayout::gray);
+    case CV_8UC3:
+      return own<Rgb8>(mat, PixelLayout::rgb);
+    case CV_16UC3:
+      return own<Rgb16>(mat, PixelLayout::rgb);
+    default:
+      return failure(ErrorCode::input, "has neither 8 nor 16 bits a sample", name);
+  }
+}
+
+Result<FrameImage> read_image(const std::string& path) {
+  const auto content = read_file(path);
+  if (!content) return failure(content);
+  return decode_image(*content, path);
+}
+
+Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
+  const auto content = read_file(path);
+  if (!content) return failure(content);
+  if (const std::string fault = container_fault(*content); !fault.empty())
+    return failure(ErrorCode::input, fault, path);
+  const cv::Mat mat = decode(*content, cv::IMREAD_GRAYSCALE);
+  if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", path);
+  return Image<std::uint8_t>::copy_of(as_view<std::uint8_t>(mat));
+}
+
+Status write_png(const std::string& path, ImageView<const std::uint8_t> image) {
+  return write_encoded_png(path, as_mat(image));
+}
+Status write_png(const std::string& path, ImageView<const std::uint16_t> image) {
+  return write_encoded_png(path, as_mat(image));
+}
+Status write_png(const std::string& path, ImageView<const Rgb8> image) {
+  cv::Mat bgr;
+  cv::cvtColor(as_mat(image), bgr, cv::COLOR_RGB2BGR);
+  return write_encoded_png(path, bgr);
+}
+
+Status write_pfm(const std::string& path, ImageView<const float> image) {
+  std::string content = "Pf\n" + std::to_string(image.width()) + " " + std::to_string(image.height()) + "\n-1.0\n";
+  content.reserve(content.size() +
+                  sizeof(float) * static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height()));
+  for (int y = image.height() - 1; y >= 0; --y) {
+    for (int x = 0; x < image.width(); ++x) {
+      const float value = std::isnan(image(x, y)) ? std::numeric_limits<float>::infinity() : image(x, y);
+      content.append(reinterpret_cast<const char*>(&value), sizeof value);
+    }
+  }
+  return write_file_atomically(path, content);
+}
+
+Result<Image<float>> read_pfm(const std::string& path) {
+  const auto content = read_file(path);
+  if (!content) return failure(content);
+  std::string_view rest = *content;
+  const std::string_view magic = next_word(rest);
+  const std::string_view width_text = next_word(rest), height_text = next_word(rest), scale_text = next_word(rest);
+  std::size_t width = 0, height = 0;
+  double scale = 0;
+  if (magic != "Pf" || !parse(width_text, width) || !parse(height_text, height) || !parse(scale_text, scale) ||
+      width == 0 || height == 0 || width > kLargestSide || height > kLargestSide || scale == 0 ||
+      !std::isfinite(scale)) {
+    return failure(ErrorCode::input, "is not a single-channel PFM file", path);
+  }
+  if (rest.size() < width * height * sizeof(float)) return failure(ErrorCode::input, "PFM file ends early", path);
+  Image<float> image(static_cast<int>(width), static_cast<int>(height));
+  for (int y = image.height() - 1; y >= 0; --y) {
+    for (int x = 0; x < image.width(); ++x, rest.remove_prefix(sizeof(float))) {
+      std::uint32_t bits = 0;
+      std::memcpy(&bits, rest.data(), sizeof bits);
+      if (scale > 0) bits = __builtin_bswap32(bits);
+      const auto value = std::bit_cast<float>(bits);
+      image(x, y) = std::isfinite(value) ? value : std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+  return image;
+}
+
+}  // namespace spartan

@@ -1,0 +1,71 @@
+#include "spartan/core/log.h"
+
+#include <spdlog/logger.h>
+#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+
+#include <vector>
+
+namespace spartan {
+namespace {
+
+spdlog::level::level_enum to_spdlog(LogLevel level) {
+  switch (level) {
+    case LogLevel::debug:
+      return spdlog::level::debug;
+    case LogLevel::info:
+      return spdlog::level::info;
+    case LogLevel::warning:
+      return spdlog::level::warn;
+    case LogLevel::error:
+      return spdlog::level::err;
+    case LogLevel::off:
+      return spdlog::level::off;
+  }
+  return spdlog::level::info;
+}
+
+std::shared_ptr<spdlog::sinks::sink> terminal_sink(LogLevel level) {
+  auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
+  sink->set_level(to_spdlog(level));
+  sink->set_pattern("%^%l%$: %v");
+  return sink;
+}
+
+}  // namespace
+
+struct Log::Sink {
+  explicit Sink(std::vector<spdlog::sink_ptr> sinks) : logger("spartan", sinks.begin(), sinks.end()) {
+    logger.set_level(spdlog::level::debug);
+    logger.flush_on(spdlog::level::info);
+    logger.set_error_handler([](const std::string&) {});  // a full disk must not print once a message
+  }
+  spdlog::logger logger;
+};
+
+Log Log::to_terminal(LogLevel level) {
+  Log log;
+  log.sink_ = std::make_shared<Sink>(std::vector<spdlog::sink_ptr>{terminal_sink(level)});
+  return log;
+}
+
+Log Log::to_terminal_and_file(LogLevel level, const std::string& path) {
+  std::vector<spdlog::sink_ptr> sinks{terminal_sink(level)};
+  try {
+    auto file = std::make_shared<spdlog::sinks::basic_file_sink_mt>(path);
+    file->set_level(spdlog::level::info);
+    file->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l: %v");
+    sinks.push_back(std::move(file));
+  } catch (const spdlog::spdlog_ex&) {
+    // Documented: without the file the terminal has to do.
+  }
+  Log log;
+  log.sink_ = std::make_shared<Sink>(std::move(sinks));
+  return log;
+}
+
+void Log::write(LogLevel level, std::string_view text) const {
+  if (sink_) sink_->logger.log(to_spdlog(level), "{}", text);
+}
+
+}  // namespace spartan

@@ -1,0 +1,248 @@
+#include "spartan/core/options.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+namespace spartan::options_detail {
+
+// The maps that the visitor is inside of, innermost last, with the keys that were asked for in each.
+class Tree {
+ public:
+  struct Level {
+    YAML::Node map;
+    std::string prefix;
+    std::set<std::string> known;
+  };
+  std::string name;
+  std::vector<Level> levels;
+  std::vector<std::string> faults;
+
+  std::string place(const YAML::Node& node, std::string_view key) const {
+    const YAML::Mark mark = node.Mark();
+    const std::string line = mark.is_null() ? "" : fmt::format(":{}", mark.line + 1);
+    return fmt::format("{}{}: {}{}", name, line, levels.back().prefix, key);
+  }
+  void fault(const YAML::Node& node, std::string_view key, const std::string& what) {
+    faults.push_back(fmt::format("{}: {}", place(node, key), what));
+  }
+
+  // The scalar or sequence under `key`, where it is given.
+  std::optional<YAML::Node> find(std::string_view key) {
+    Level& level = levels.back();
+    level.known.insert(std::string(key));
+    const YAML::Node map = level.map;  // const: looking must not insert
+    if (!map.IsMap()) return std::nullopt;
+    const YAML::Node node = map[std::string(key)];
+    if (!node.IsDefined()) return std::nullopt;
+    return node;
+  }
+
+  void report_unknown() {
+    const Level& level = levels.back();
+    if (!level.map.IsMap()) return;
+    for (const auto& entry : level.map) {
+      const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "(not a name)";
+      if (level.known.count(key)) continue;
+      std::string known;
+      for (const std::string& k : level.known) known += (known.empty() ? "" : ", ") + k;
+      fault(entry.first, key, "unknown key; known here: " + known);
+    }
+  }
+};
+
+namespace {
+
+template <class T>
+std::optional<T> convert(const YAML::Node& node) {
+  try {
+    return node.as<T>();
+  } catch (const YAML::Exception&) {
+    return std::nullopt;
+  }
+}
+
+std::string number(double value) {
+  return fmt::format("{}", value);
+}
+
+std::string bounds_text(Bounds bounds) {
+  if (std::isfinite(bounds.low) && std::isfinite(bounds.high)) {
+    return fmt::format("between {} and {}", bounds.low, bounds.high);
+  }
+  return std::isfinite(bounds.low) ? fmt::format("at least {}", bounds.low) : fmt::format("at most {}", bounds.high);
+}
+
+bool inside(double value, Bounds bounds) {
+  return std::isfinite(value) && value >= bounds.low && value <= bounds.high;
+}
+
+}  // namespace
+
+void Reader::field(std::string_view key, bool& value, std::string_view) {
+  const auto node = tree_->find(key);
+  if (!node) return;
+  if (const auto read = convert<bool>(*node)) {
+    value = *read;
+  } else {
+    tree_->fault(*node, key, "must be true or false");
+  }
+}
+
+void Reader::field(std::string_view key, int& value, std::string_view, Bounds bounds) {
+  const auto node = tree_->find(key);
+  if (!node) return;
+  const auto read = convert<int>(*node);
+  if (!read) return tree_->fault(*node, key, "must be a whole number");
+  if (!inside(*read, bounds))
+    return tree_->fault(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
+  value = *read;
+}
+
+void Reader::field(std::string_view key, double& value, std::string_view, Bounds bounds) {
+  const auto node = tree_->find(key);
+  if (!node) return;
+  const auto read = convert<double>(*node);
+  if (!read) return tree_->fault(*node, key, "must be a number");
+  if (!std::isfinite(*read)) return tree_->fault(*node, key, "must be a finite number");
+  if (!inside(*read, bounds))
+    return tree_->fault(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
+  value = *read;
+}
+
+void Reader::field(std::string_view key, std::string& value, std::string_view,
+                   const std::vector<std::string>& choices) {
+  const auto node = tree_->find(key);
+  if (!node) return;
+  const auto read = convert<std::string>(*node);
+  if (!read) return tree_->fault(*node, key, "must be text");
+  if (!choices.empty() && std::find(choices.begin(), choices.end(), *read) == choices.end()) {
+    return tree_->fault(*node, key, fmt::format("is '{}', must be one of: {}", *read, fmt::join(choices, ", ")));
+  }
+  value = *read;
+}
+
+void Reader::field(std::string_view key, std::vector<double>& value, std::string_view, Bounds bounds) {
+  const auto node = tree_->find(key);
+  if (!node) return;
+  const auto read = convert<std::vector<double>>(*node);
+  if (!read) return tree_->fault(*node, key, "must be a list of numbers");
+  for (const double v : *read) {
+    if (!inside(v, bounds))
+      return tree_->fault(*node, key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
+  }
+  value = *read;
+}
+
+bool Reader::enter(std::string_view key) {
+  const auto node = tree_->find(key);
+  if (node && !node->IsMap() && !node->IsNull()) {
+    tree_->fault(*node, key, "must be a group of keys");
+    return false;
+  }
+  // A group that is not given is entered too, so that its keys keep their values.
+  tree_->levels.push_back({node ? *node : YAML::Node(), tree_->levels.back().prefix + std::string(key) + ".", {}});
+  return true;
+}
+
+void Reader::leave() {
+  tree_->report_unknown();
+  tree_->levels.pop_back();
+}
+
+Status Reader::finish() {
+  tree_->report_unknown();
+  if (tree_->faults.empty()) return {};
+  std::string text;
+  for (const std::string& fault : tree_->faults) text += (text.empty() ? "" : "\n") + fault;
+  return failure(ErrorCode::configuration, text, {}, "`spartan config dump` lists every option with its meaning");
+}
+
+void Lister::field(std::string_view key, const bool& value, std::string_view meaning) {
+  lines.push_back({prefix_ + std::string(key), value ? "true" : "false", std::string(meaning)});
+}
+void Lister::field(std::string_view key, const int& value, std::string_view meaning, Bounds) {
+  lines.push_back({prefix_ + std::string(key), std::to_string(value), std::string(meaning)});
+}
+void Lister::field(std::string_view key, const double& value, std::string_view meaning, Bounds) {
+  lines.push_back({prefix_ + std::string(key), number(value), std::string(meaning)});
+}
+void Lister::field(std::string_view key, const std::string& value, std::string_view meaning,
+                   const std::vector<std::string>& choices) {
+  std::string text(meaning);
+  if (!choices.empty()) text += fmt::format(" ({})", fmt::join(choices, " | "));
+  YAML::Emitter quoted;
+  quoted << YAML::DoubleQuoted << value;
+  lines.push_back({prefix_ + std::string(key), quoted.c_str(), text});
+}
+void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds) {
+  lines.push_back({prefix_ + std::string(key), fmt::format("[{}]", fmt::join(value, ", ")), std::string(meaning)});
+}
+
+Result<std::shared_ptr<Tree>> parse(const std::string& text, const std::string& name) {
+  auto tree = std::make_shared<Tree>();
+  tree->name = name;
+  try {
+    const YAML::Node root = YAML::Load(text);
+    if (!root.IsNull() && !root.IsMap()) {
+      return failure(ErrorCode::configuration, "must be a list of `key: value` lines", name + ":1");
+    }
+    tree->levels.push_back({root, "", {}});
+  } catch (const YAML::ParserException& e) {
+    return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, fmt::format("{}:{}", name, e.mark.line + 1));
+  } catch (const YAML::Exception& e) {
+    return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, name);
+  }
+  return tree;
+}
+
+Result<std::shared_ptr<Tree>> load(const std::string& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  if (file) text << file.rdbuf();
+  if (!file || !text) return failure(ErrorCode::configuration, "the file cannot be read", path);
+  return parse(text.str(), path);
+}
+
+Result<std::shared_ptr<Tree>> from_assignment(const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    return failure(ErrorCode::usage, "'" + assignment + "' is not of the form key=value", "--set");
+  }
+  // a.b.c=v → {a: {b: {c: v}}}
+  std::string text = assignment.substr(equals + 1);
+  std::string keys = assignment.substr(0, equals);
+  std::string opening, closing;
+  std::stringstream parts(keys);
+  for (std::string part; std::getline(parts, part, '.');) {
+    opening += "{\"" + part + "\": ";
+    closing += "}";
+  }
+  auto tree = parse(opening + text + closing, "--set " + assignment);
+  if (!tree) tree.error().code = ErrorCode::usage;
+  return tree;
+}
+
+std::string to_yaml(const std::vector<OptionLine>& lines) {
+  std::string text;
+  std::vector<std::string> open;
+  for (const OptionLine& line : lines) {
+    std::vector<std::string> path;
+    std::stringstream parts(line.key);
+    for (std::string part; std::getline(parts, part, '.');) path.push_back(part);
+    std::size_t same = 0;
+    while (same < open.size() && same + 1 < path.size() && open[same] == path[same]) ++same;
+    open.resize(same);
+    for (; open.size() + 1 < path.size(); open.push_back(path[open.size()])) {
+      text += std::string(2 * open.size(), ' ') + path[open.size()] + ":\n";
+    }
+    text += fmt::format("{}{}: {}  # {}\n", std::string(2 * open.size(), ' '), path.back(), line.value, line.meaning);
+  }
+  return text;
+}
+
+}  // namespace spartan::options_detail

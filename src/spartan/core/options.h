@@ -1,0 +1,156 @@
+// Option structs and their YAML files.
+//
+// A struct lists its fields once; reading, dumping and checking follow from that:
+//
+//   struct SpeckleOptions {
+//     int size_px = 100;
+//     template <class Visitor> void describe(Visitor& v) {
+//       v.field("size_px", size_px, "patches smaller than this are dropped", at_least(0));
+//     }
+//   };
+//
+// Groups nest with `v.group("speckle", speckle)`. A key carries its unit (docs/conventions.md).
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "spartan/core/result.h"
+
+namespace spartan {
+
+/// Bounds of a numeric option, both ends included. Values that are not finite are always refused.
+struct Bounds {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+};
+inline Bounds at_least(double low) {
+  return {low, std::numeric_limits<double>::infinity()};
+}
+inline Bounds between(double low, double high) {
+  return {low, high};
+}
+
+/// One line of an option listing: "reconstruction.sgm.p1", its value as YAML text, what it means.
+struct OptionLine {
+  std::string key;
+  std::string value;
+  std::string meaning;
+};
+
+namespace options_detail {
+
+// A parsed YAML tree; hides the parser from this header.
+class Tree;
+
+class Reader {
+ public:
+  explicit Reader(std::shared_ptr<Tree> tree) : tree_(std::move(tree)) {}
+
+  void field(std::string_view key, bool& value, std::string_view meaning);
+  void field(std::string_view key, int& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, double& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, std::string& value, std::string_view meaning,
+             const std::vector<std::string>& choices = {});
+  void field(std::string_view key, std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  template <class Group>
+  void group(std::string_view key, Group& value) {
+    if (enter(key)) {
+      value.describe(*this);
+      leave();
+    }
+  }
+  Status finish();
+
+ private:
+  bool enter(std::string_view key);
+  void leave();
+  std::shared_ptr<Tree> tree_;
+};
+
+class Lister {
+ public:
+  void field(std::string_view key, const bool& value, std::string_view meaning);
+  void field(std::string_view key, const int& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const double& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const std::string& value, std::string_view meaning,
+             const std::vector<std::string>& choices = {});
+  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  template <class Group>
+  void group(std::string_view key, Group& value) {
+    const std::size_t length = prefix_.size();
+    prefix_ += std::string(key) + ".";
+    value.describe(*this);
+    prefix_.resize(length);
+  }
+  std::vector<OptionLine> lines;
+
+ private:
+  std::string prefix_;
+};
+
+Result<std::shared_ptr<Tree>> parse(const std::string& text, const std::string& name);
+Result<std::shared_ptr<Tree>> load(const std::string& path);
+Result<std::shared_ptr<Tree>> from_assignment(const std::string& assignment);
+std::string to_yaml(const std::vector<OptionLine>& lines);
+
+}  // namespace options_detail
+
+/// Reads YAML text over the given values: what the text does not name keeps its value. Unknown keys, wrong
+/// types and values out of bounds are refused, all of them in one error with "name:line: key".
+template <class Options>
+Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {}) {
+  auto tree = options_detail::parse(text, name);
+  if (!tree) return failure(tree);
+  options_detail::Reader reader(*tree);
+  defaults.describe(reader);
+  if (Status status = reader.finish(); !status) return failure(status);
+  return defaults;
+}
+
+/// The same from a file.
+template <class Options>
+Result<Options> load_options(const std::string& path, Options defaults = {}) {
+  auto tree = options_detail::load(path);
+  if (!tree) return failure(tree);
+  options_detail::Reader reader(*tree);
+  defaults.describe(reader);
+  if (Status status = reader.finish(); !status) return failure(status);
+  return defaults;
+}
+
+/// Applies one "group.key=value", as given on a command line. Errors have code `usage`.
+template <class Options>
+Result<Options> set_option(Options options, const std::string& assignment) {
+  auto tree = options_detail::from_assignment(assignment);
+  if (!tree) return failure(tree);
+  options_detail::Reader reader(*tree);
+  options.describe(reader);
+  if (Status status = reader.finish(); !status) {
+    status.error().code = ErrorCode::usage;
+    return failure(status);
+  }
+  return options;
+}
+
+/// Every option with its value and meaning, in the order of description.
+template <class Options>
+std::vector<OptionLine> list_options(Options options) {
+  options_detail::Lister lister;
+  options.describe(lister);
+  return lister.lines;
+}
+
+/// YAML with the meanings as comments; parse_options() of it gives the same values, bit for bit.
+template <class Options>
+std::string dump_options(const Options& options) {
+  return options_detail::to_yaml(list_options(options));
+}
+
+}  // namespace spartan

@@ -1,0 +1,85 @@
+// Rigid transforms SE(3) and their uncertainty.
+//
+// A transform is named `a_from_b`: p_a = a_from_b * p_b. A tangent vector is ξ = (translation ρ, rotation φ),
+// and perturbations stand on the right: T ⊕ ξ = T · Exp(ξ) with the full SE(3) exponential.
+// Sources: Solà et al. 2018, appendix D; Barfoot & Furgale, "Associating uncertainty with three-dimensional
+// poses for use in estimation problems", T-RO 2014.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "spartan/core/rotation.h"
+
+namespace spartan {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// A rigid transform (metres). The quaternion is kept at unit length.
+class Pose {
+ public:
+  Pose() = default;  ///< identity
+  Pose(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation)
+      : rotation_(rotation.normalized()), translation_(translation) {}
+  /// `rotation` must be a rotation matrix; see is_rotation() and nearest_rotation() for outside data.
+  Pose(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
+      : Pose(Eigen::Quaterniond(rotation), translation) {}
+  static Pose from_rotation(const Eigen::Quaterniond& rotation) { return {rotation, Eigen::Vector3d::Zero()}; }
+  static Pose from_translation(const Eigen::Vector3d& translation) {
+    return {Eigen::Quaterniond::Identity(), translation};
+  }
+  /// Takes the quaternion as it is, bit for bit (for values that were stored); it must have unit length.
+  static Pose from_unit_quaternion(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+    Pose pose;
+    pose.rotation_ = rotation;
+    pose.translation_ = translation;
+    return pose;
+  }
+  /// The upper 3×4 part counts.
+  static Pose from_matrix(const Eigen::Matrix4d& matrix);
+
+  const Eigen::Quaterniond& rotation() const { return rotation_; }
+  const Eigen::Vector3d& translation() const { return translation_; }
+  Eigen::Matrix3d rotation_matrix() const { return rotation_.toRotationMatrix(); }
+  Eigen::Matrix4d matrix() const;
+
+  Pose inverse() const;
+  Pose operator*(const Pose& other) const;
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation_ * point + translation_; }
+
+  bool all_finite() const { return rotation_.coeffs().allFinite() && translation_.allFinite(); }
+
+ private:
+  Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
+};
+
+/// Exp: ξ = (ρ, φ) → transform with translation J_l(φ) ρ and rotation Exp(φ) (Solà eq. 172).
+Pose exp_se3(const Vector6d& tangent);
+/// Log: inverse of exp_se3 for rotation angles up to π.
+Vector6d log_se3(const Pose& pose);
+/// Ad_T with T Exp(ξ) T⁻¹ = Exp(Ad_T ξ) (Solà eq. 175).
+Matrix6d adjoint(const Pose& pose);
+/// J_r(ξ) with Exp(ξ + δ) ≈ Exp(ξ) Exp(J_r δ) (Solà eq. 179), and its inverse.
+Matrix6d right_jacobian_se3(const Vector6d& tangent);
+Matrix6d right_jacobian_inverse_se3(const Vector6d& tangent);
+
+/// The rotation angle of a pose, in [0, π] rad.
+double rotation_angle(const Pose& pose);
+
+/// Between two poses: translation by straight line, rotation by slerp; fraction 0 → a, 1 → b.
+Pose interpolate(const Pose& a, const Pose& b, double fraction);
+
+/// A transform with the covariance of its right perturbation, order (translation, rotation), m² and rad².
+struct UncertainPose {
+  Pose pose;
+  Matrix6d covariance = Matrix6d::Zero();
+};
+
+/// a_from_b ∘ b_from_c for independent errors, to first order: Σ = Ad(c_from_b) Σ_ab Adᵀ + Σ_bc.
+UncertainPose compose(const UncertainPose& a_from_b, const UncertainPose& b_from_c);
+/// b_from_a; Σ' = Ad(a_from_b) Σ Adᵀ.
+UncertainPose invert(const UncertainPose& a_from_b);
+
+}  // namespace spartan

@@ -1,0 +1,100 @@
+#include "spartan/core/pose.h"
+
+#include <gtest/gtest.h>
+
+#include "spartan/core/random.h"
+#include "spartan/testing/laws.h"
+#include "spartan/testing/numeric_jacobian.h"
+
+namespace spartan {
+namespace {
+
+std::vector<Vector6d> tricky_tangents() {
+  std::vector<Vector6d> samples;
+  Random random(7);
+  for (const Eigen::Vector3d& rotation : testing::tricky_rotation_vectors()) {
+    Vector6d tangent;
+    tangent << random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(-5, 5), rotation;
+    samples.push_back(tangent);
+  }
+  return samples;
+}
+
+TEST(Rotation, ObeysGroupLaws) {
+  testing::GroupUnderTest<Eigen::Quaterniond, 3> group{
+      exp_so3, log_so3, [](const auto& a, const auto& b) { return Eigen::Quaterniond(a * b); },
+      [](const auto& a) { return a.conjugate(); },
+      [](const auto& a, const auto& b) { return (a.toRotationMatrix() - b.toRotationMatrix()).norm(); }};
+  testing::expect_group_laws<Eigen::Quaterniond, 3>(group, testing::tricky_rotation_vectors(), 1e-9);
+}
+
+TEST(Pose, ObeysGroupLaws) {
+  testing::GroupUnderTest<Pose, 6> group{exp_se3, log_se3, [](const auto& a, const auto& b) { return a * b; },
+                                         [](const auto& a) { return a.inverse(); },
+                                         [](const auto& a, const auto& b) { return (a.matrix() - b.matrix()).norm(); }};
+  testing::expect_group_laws<Pose, 6>(group, tricky_tangents(), 2e-8);
+}
+
+TEST(Pose, AdjointMovesAPerturbationToTheOtherSide) {
+  Random random(3);
+  for (const Vector6d& tangent : tricky_tangents()) {
+    const Pose pose = exp_se3(tangent);
+    Vector6d xi;
+    for (int i = 0; i < 6; ++i) xi[i] = random.uniform(-0.5, 0.5);
+    const Pose left = pose * exp_se3(xi) * pose.inverse();
+    EXPECT_LE((left.matrix() - exp_se3(adjoint(pose) * xi).matrix()).norm(), 1e-9);
+  }
+}
+
+TEST(Pose, JacobiansMatchDifferences) {
+  for (const Vector6d& tangent : tricky_tangents()) {
+    if (tangent.tail<3>().norm() > 3.0) continue;  // differences across π compare two branches of the logarithm
+    const Pose inverse = exp_se3(tangent).inverse();
+    const auto difference = testing::numeric_jacobian<6, 6>(
+        [&](const Vector6d& delta) -> Vector6d { return log_se3(inverse * exp_se3(tangent + delta)); },
+        Vector6d::Zero(), 1e-3);
+    EXPECT_LE((right_jacobian_se3(tangent) - difference).cwiseAbs().maxCoeff(), 1e-7) << tangent.transpose();
+    EXPECT_LE((right_jacobian_inverse_se3(tangent) * right_jacobian_se3(tangent) - Matrix6d::Identity()).norm(), 1e-8);
+  }
+}
+
+// Sampling is the oracle: transported covariances must be those of transported samples.
+TEST(Pose, CovarianceTransportAgreesWithSampling) {
+  Random random(11);
+  Vector6d a_tangent, b_tangent, sigma_a, sigma_b;
+  a_tangent << 1, 2, -0.5, 0.3, -0.4, 0.8;
+  b_tangent << -2, 0.4, 1, -0.6, 0.1, 0.5;
+  sigma_a << 0.01, 0.02, 0.005, 0.004, 0.002, 0.006;
+  sigma_b << 0.004, 0.01, 0.02, 0.002, 0.005, 0.001;
+  const UncertainPose a{exp_se3(a_tangent), sigma_a.cwiseAbs2().asDiagonal()};
+  const UncertainPose b{exp_se3(b_tangent), sigma_b.cwiseAbs2().asDiagonal()};
+  const UncertainPose product = compose(a, b), inverse = invert(a);
+
+  Matrix6d sampled_product = Matrix6d::Zero(), sampled_inverse = Matrix6d::Zero();
+  const int count = 40000;
+  for (int n = 0; n < count; ++n) {
+    Vector6d xi_a, xi_b;
+    for (int i = 0; i < 6; ++i) xi_a[i] = sigma_a[i] * random.normal();
+    for (int i = 0; i < 6; ++i) xi_b[i] = sigma_b[i] * random.normal();
+    const Pose noisy_a = a.pose * exp_se3(xi_a), noisy_b = b.pose * exp_se3(xi_b);
+    const Vector6d p = log_se3(product.pose.inverse() * noisy_a * noisy_b);
+    const Vector6d i = log_se3(inverse.pose.inverse() * noisy_a.inverse());
+    sampled_product += p * p.transpose() / count;
+    sampled_inverse += i * i.transpose() / count;
+  }
+  EXPECT_LE((sampled_product - product.covariance).norm(), 0.03 * product.covariance.norm());
+  EXPECT_LE((sampled_inverse - inverse.covariance).norm(), 0.03 * inverse.covariance.norm());
+}
+
+TEST(Pose, NearestRotationMendsAMatrix) {
+  const Eigen::Matrix3d exact = exp_so3({0.2, -0.7, 1.1}).toRotationMatrix();
+  Eigen::Matrix3d rough = 1.02 * exact;
+  rough(0, 1) += 0.01;
+  EXPECT_FALSE(is_rotation(rough));
+  EXPECT_TRUE(is_rotation(nearest_rotation(rough)));
+  EXPECT_LE((nearest_rotation(1.3 * exact) - exact).norm(), 1e-12);
+  EXPECT_FALSE(is_rotation(-Eigen::Matrix3d::Identity()));
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,67 @@
+#include "spartan/core/time.h"
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+namespace spartan {
+namespace {
+
+constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
+
+tl::unexpected<Error> not_a_time(std::string_view text) {
+  return failure(ErrorCode::input, "'" + std::string(text) + "' is not a time in seconds");
+}
+
+}  // namespace
+
+Stamp Stamp::from_seconds(double seconds) {
+  return Stamp{std::llround(seconds * 1e9)};
+}
+
+std::string to_decimal_seconds(Stamp stamp) {
+  const bool negative = stamp.ns < 0;
+  const std::uint64_t magnitude =
+      negative ? 0 - static_cast<std::uint64_t>(stamp.ns) : static_cast<std::uint64_t>(stamp.ns);
+  const std::uint64_t whole = magnitude / kNanosecondsPerSecond;
+  std::string fraction = std::to_string(magnitude % kNanosecondsPerSecond);
+  fraction.insert(0, 9 - fraction.size(), '0');
+  return (negative ? "-" : "") + std::to_string(whole) + "." + fraction;
+}
+
+Result<Stamp> parse_decimal_seconds(std::string_view text) {
+  if (text.find_first_of("eE") != std::string_view::npos) {
+    double seconds = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
+    if (error != std::errc{} || end != text.data() + text.size() || !(std::abs(seconds) < 9.2e9)) {
+      return not_a_time(text);
+    }
+    return Stamp::from_seconds(seconds);
+  }
+  std::string_view digits = text;
+  const bool negative = !digits.empty() && digits.front() == '-';
+  if (!digits.empty() && (digits.front() == '-' || digits.front() == '+')) digits.remove_prefix(1);
+  std::int64_t ns = 0;
+  int decimals = -1;  // −1: before the point
+  bool any = false;
+  for (const char c : digits) {
+    if (c == '.' && decimals < 0) {
+      decimals = 0;
+      continue;
+    }
+    if (c < '0' || c > '9') return not_a_time(text);
+    any = true;
+    if (decimals >= 9) continue;  // below a nanosecond
+    if (ns > (std::numeric_limits<std::int64_t>::max() - 9) / 10) return not_a_time(text);
+    ns = ns * 10 + (c - '0');
+    if (decimals >= 0) ++decimals;
+  }
+  if (!any) return not_a_time(text);
+  for (int d = decimals < 0 ? 0 : decimals; d < 9; ++d) {
+    if (ns > std::numeric_limits<std::int64_t>::max() / 10) return not_a_time(text);
+    ns *= 10;
+  }
+  return Stamp{negative ? -ns : ns};
+}
+
+}  // namespace spartan

@@ -1,0 +1,33 @@
+// The pinhole camera.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+namespace spartan {
+
+/// A line of sight in the camera frame (x right, y down, z forward); `direction` has unit length.
+/// Central models have origin zero.
+struct Ray {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+};
+
+/// A pixel with its derivative by the point, ∂(u, v)/∂(x, y, z), in px/m.
+struct ProjectionWithJacobian {
+  Eigen::Vector2d pixel;
+  Eigen::Matrix<double, 2, 3> by_point;
+};
+
+/// u = fx x/z + cx, v = fy y/z + cy. Valid for z > 0. Pixel centres are integers.
+struct PinholeModel {
+  double fx = 1, fy = 1;  ///< px
+  double cx = 0, cy = 0;  ///< px
+
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;
+  std::optional<ProjectionWithJacobian> project_with_jacobian(const Eigen::Vector3d& point) const;
+  std::optional<Ray> unproject(const Eigen::Vector2d& pixel) const;
+  friend bool operator==(const PinholeModel&, const PinholeModel&) = default;
+};
+
+}  // namespace spartan
