@@ -1,0 +1,62 @@
+// The program `spartan`: reads the command line and hands over to a verb.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <iostream>
+#include <thread>
+
+#include "program/context.h"
+#include "program/interrupt.h"
+#include "program/verbs.h"
+#include "spartan/core/threads.h"
+
+namespace spartan::program {
+namespace {
+
+LogLevel level_of(const Context& context) {
+  if (context.quiet) return LogLevel::error;
+  return context.verbose ? LogLevel::debug : LogLevel::info;
+}
+
+void add_verbs(CLI::App& app, Context& context) {
+  add_evaluate(app, context);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Stereo vision for rovers: where the rover is, and what the ground around it looks like.", "spartan"};
+  app.set_version_flag("--version", SPARTAN_VERSION);
+  app.require_subcommand(1);
+  Context context;
+  context.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  add_verbs(app, context);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    const bool asked_for_help = app.exit(e, std::cout, std::cerr) == 0;
+    return asked_for_help ? kDone : kUsage;
+  }
+
+  context.log = Log::to_terminal(level_of(context));
+  bound_third_party_threads(context.threads);
+  listen_for_interrupts();
+  if (!context.chosen) {
+    context.log.error("this verb needs a further word; see --help");
+    return kUsage;
+  }
+  const Result<ExitCode> result = context.chosen();
+  if (result) return *result;
+  context.log.error(result.error().message());
+  return exit_code(result.error().code);
+}
+
+}  // namespace
+}  // namespace spartan::program
+
+int main(int argc, char** argv) {
+  try {
+    return spartan::program::run(argc, argv);
+  } catch (const std::exception& e) {
+    std::cerr << "error: internal fault: " << e.what() << '\n';
+    return spartan::program::kInternalFault;
+  }
+}

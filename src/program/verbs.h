@@ -1,0 +1,12 @@
+// The verbs of the program. A further verb is one file with one `add_…` function, declared here and called in main.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "program/context.h"
+
+namespace spartan::program {
+
+void add_evaluate(CLI::App& app, Context& context);
+
+}  // namespace spartan::program
