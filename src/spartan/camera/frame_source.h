@@ -52,9 +52,10 @@ class FrameSource {
   /// out of order comes as MissingFrame. An error ends the reading (a sensor file that breaks off in mid-line …).
   virtual Result<std::optional<Sample>> next() = 0;
 
-  /// Goes to just behind the last sample with this stamp or an earlier one, without decoding any image; nothing
-  /// goes back to the start.
-  virtual Status seek_after(std::optional<Stamp> stamp) = 0;
+  /// Goes to where `samples_taken` samples of any kind have been handed out by next() since the start (MissingFrame
+  /// counts too), without decoding any image: the next one is the one that an undisturbed reader would get. Stamps can
+  /// run backwards, so a count says where we are and a stamp does not.
+  virtual Status seek(std::int64_t samples_taken) = 0;
 
   /// Decodes one shot on request. Code `input` where there is none with this left stamp.
   virtual Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) = 0;
