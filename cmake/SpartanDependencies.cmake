@@ -1,15 +1,22 @@
 # Every third-party package the project links, found once. `setup` installs them.
-find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc imgcodecs)
+# The libraries' own list is handed on to those who link an installed Spartan (SpartanInstall.cmake).
+set(SPARTAN_PACKAGES
+  "Eigen3 3.4 NO_MODULE"
+  "OpenCV 4.6 COMPONENTS core imgproc imgcodecs"
+  "Ceres 2.1"
+  "hwy CONFIG"
+  "TBB"
+  "tl-expected"
+  "yaml-cpp"
+  "nlohmann_json"
+  "fmt"
+  "spdlog"
+  "SQLite3 3.40"
+  "Threads")
+foreach(package IN LISTS SPARTAN_PACKAGES)
+  separate_arguments(arguments UNIX_COMMAND "${package}")
+  find_package(${arguments} REQUIRED)
+endforeach()
 set(SPARTAN_OPENCV opencv_core opencv_imgproc opencv_imgcodecs)
-find_package(Ceres 2.1 REQUIRED)
-find_package(hwy REQUIRED CONFIG)
-find_package(TBB REQUIRED)
-find_package(tl-expected REQUIRED)
-find_package(yaml-cpp REQUIRED)
-find_package(nlohmann_json REQUIRED)
-find_package(fmt REQUIRED)
-find_package(CLI11 REQUIRED)
-find_package(spdlog REQUIRED)
-find_package(SQLite3 3.40 REQUIRED)
-find_package(Threads REQUIRED)
+
+find_package(CLI11 REQUIRED)  # the program only

@@ -47,7 +47,7 @@ class Tree {
     if (!level.map.IsMap()) return;
     for (const auto& entry : level.map) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "(not a name)";
-      if (level.known.count(key)) continue;
+      if (level.known.contains(key)) continue;
       std::string known;
       for (const std::string& k : level.known) known += (known.empty() ? "" : ", ") + k;
       fault(entry.first, key, "unknown key; known here: " + known);

@@ -1,0 +1,51 @@
+# The newcomer's door. Every target installs what it needs first (./setup, quick where nothing is missing).
+.PHONY: help demo test build bench format lint coverage clean
+
+help:
+	@echo "make demo      build, then run the main job on a short drive (or INPUT=path); results in demo_output"
+	@echo "make test      build, then run the fast tests"
+	@echo "make build     the program: build/release/bin/spartan"
+	@echo "make bench     all benchmarks; make bench-NAME: the one of bench/NAME.cpp"
+	@echo "make format    format the C++ files"
+	@echo "make lint      clang-tidy on what changed since the commit in .ci/lint-base (or LINT_BASE=commit, LINT_BASE=all)"
+	@echo "make coverage  line coverage of the fast tests"
+	@echo "make clean     remove what was built"
+
+build:
+	./setup build
+	scripts/build release
+
+demo:
+	./setup build
+	scripts/build release spartan_program spartan_synthesize_drive
+	scripts/demo
+
+test:
+	./setup build test
+	scripts/build release
+	ctest --preset release -j $$(nproc)
+
+bench:
+	./setup build develop
+	scripts/build release -DSPARTAN_BENCH=ON spartan_bench
+	scripts/bench
+
+bench-%:
+	./setup build develop
+	scripts/build release -DSPARTAN_BENCH=ON bench_$*
+	build/release/bench/$* $(ARGS)
+
+format:
+	./setup develop
+	scripts/format
+
+lint:
+	./setup
+	scripts/lint
+
+coverage:
+	./setup
+	scripts/coverage
+
+clean:
+	rm -rf build demo_output

@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+"""Fails on an include that runs up or sideways in the house (docs/architecture.md), and on CMake links that would let it.
+
+    include_graph_test.py PROJECT            checks
+    include_graph_test.py PROJECT --draw     prints the graph of modules as Mermaid
+    include_graph_test.py --self-test        shows that each rule can fail
+"""
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+# What a module may include: the modules that stand below it. `tests` stands for whatever is only there to try the rest.
+BELOW_STAGES = {"core", "rig", "camera", "imaging"}
+STAGES = BELOW_STAGES | {"reconstruction", "odometry"}
+SYSTEM = STAGES | {"slam", "localization", "eval"}
+MAY_INCLUDE = {
+    "core": set(),
+    "rig": {"core"},
+    "camera": {"core", "rig"},
+    "imaging": {"core", "rig", "camera"},
+    "reconstruction": BELOW_STAGES,
+    "odometry": BELOW_STAGES,
+    "slam": STAGES,
+    "localization": STAGES,
+    "eval": {"core"},
+    "sim": {"core", "rig", "camera"},
+    "testing": {"core", "rig", "camera"},
+    "system": SYSTEM,
+    "program": SYSTEM | {"system", "sim"},
+    "tests": SYSTEM | {"system", "sim", "testing"},
+}
+# Headers of third parties that stay out of public headers, except in headers named *_bridge.h.
+HEAVY = re.compile(r"^(opencv2|ceres|sqlite3|yaml-cpp|embree3|gdal|octomap|nlohmann|spdlog|tbb|hwy|CLI)\b")
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+MODULE_CALL = re.compile(r"^\s*spartan_module\(\s*(\w+)([^)]*)\)", re.MULTILINE)
+
+
+def cpp_files(folder):
+    return sorted(path for path in folder.rglob("*") if path.suffix in {".h", ".cpp"})
+
+
+def module_of(path, project):
+    """The module a file belongs to; tests of any module are `tests`, they may also use `testing`."""
+    parts = path.relative_to(project).parts
+    if parts[:2] == ("src", "spartan"):
+        return parts[2]
+    return "program" if parts[:2] == ("src", "program") else "tests"
+
+
+def includes(project):
+    """Every include as (file, line number, quote, included path)."""
+    for folder in ("src", "tests", "tools", "bench"):
+        for path in cpp_files(project / folder):
+            text = path.read_text(encoding="utf-8")
+            for match in INCLUDE.finditer(text):
+                yield path, text.count("\n", 0, match.start(2)) + 1, match[1], match[2]
+
+
+def declared_uses(project):
+    """USES of every spartan_module() in the top CMakeLists.txt, and what follows from them (links are public)."""
+    text = re.sub(r"#.*", "", (project / "CMakeLists.txt").read_text(encoding="utf-8"))
+    direct = {}
+    for name, arguments in MODULE_CALL.findall(text):
+        words = arguments.split()
+        used = words[words.index("USES") + 1:] if "USES" in words else []
+        end = next((i for i, word in enumerate(used) if word.isupper()), len(used))
+        direct[name] = set(used[:end])
+    closed = {}
+    for name in direct:
+        reached, todo = set(), list(direct[name])
+        while todo:
+            module = todo.pop()
+            if module not in reached:
+                reached.add(module)
+                todo.extend(direct.get(module, ()))
+        closed[name] = reached
+    return direct, closed
+
+
+def faults(project):
+    found = []
+    direct, linked = declared_uses(project)
+    if not direct:
+        found.append("CMakeLists.txt: no spartan_module() found")
+    for name, used in sorted(direct.items()):
+        if name not in MAY_INCLUDE:
+            found.append(f"CMakeLists.txt: module {name} has no place in the house (MAY_INCLUDE in include_graph_test.py)")
+        elif not linked[name] <= MAY_INCLUDE[name]:
+            found.append(f"CMakeLists.txt: {name} links {sorted(linked[name] - MAY_INCLUDE[name])}, which it may not include")
+
+    count = 0
+    for path, line, quote, included in includes(project):
+        where = f"{path.relative_to(project)}:{line}"
+        module = module_of(path, project)
+        is_test = path.stem.endswith("_test")
+        parts = included.split("/")
+        if parts[0] == "spartan" and len(parts) > 2:
+            count += 1
+            target = parts[1]
+            allowed = MAY_INCLUDE.get(module, set()) | {module} | ({"testing"} if is_test else set())
+            if not (project / "src" / included).is_file():
+                found.append(f"{where}: {included} does not exist")
+            elif target not in allowed:
+                found.append(f"{where}: {module} includes {included}, which does not stand below it")
+            elif module in linked and not is_test and target not in linked[module] | {module}:
+                found.append(f"{where}: {module} includes {included}, but CMakeLists.txt does not list {target} in its USES")
+        elif quote == '"' and path.parts[-3:-2] == ("spartan",):
+            found.append(f'{where}: "{included}": write the whole path, "spartan/<module>/…"')
+        public = path.suffix == ".h" and module not in {"program", "tests", "testing"}
+        if public and HEAVY.match(included) and not path.stem.endswith("_bridge"):
+            found.append(f"{where}: <{included}> in a public header; only headers named *_bridge.h may")
+    if count == 0:
+        found.append("no includes found: is this the project's folder?")
+    return found
+
+
+def draw(project):
+    arrows = set()
+    for path, _, _, included in includes(project):
+        parts, module = included.split("/"), module_of(path, project)
+        if parts[0] == "spartan" and not path.stem.endswith("_test") and module not in {"tests", parts[1]}:
+            arrows.add((module, parts[1]))
+    return "\n".join(["graph TD"] + [f"  {a} --> {b}" for a, b in sorted(arrows)])
+
+
+def self_test():
+    """Each file below breaks one rule; the checker must name it, and nothing else."""
+    good_cmake = "spartan_module(core)\nspartan_module(rig USES core PRIVATE fmt)\nspartan_module(eval USES core)\n"
+    cases = [
+        ("src/spartan/core/up.h", '#include "spartan/rig/rig.h"', "does not stand below"),
+        ("src/spartan/eval/sideways.cpp", '#include "spartan/rig/rig.h"', "does not stand below"),
+        ("src/spartan/rig/test_code.cpp", '#include "spartan/testing/laws.h"', "does not stand below"),
+        ("src/program/verb.cpp", '#include "spartan/testing/laws.h"', "does not stand below"),
+        ("src/spartan/rig/gone.cpp", '#include "spartan/core/gone.h"', "does not exist"),
+        ("src/spartan/rig/short.cpp", '#include "rig.h"', "whole path"),
+        ("src/spartan/rig/heavy.h", "#include <opencv2/core.hpp>", "public header"),
+        ("CMakeLists.txt", good_cmake + "spartan_module(camera USES core eval)", "may not include"),
+        ("CMakeLists.txt", "spartan_module(core)\nspartan_module(rig PRIVATE core)\n", "in its USES"),
+        ("src/spartan/rig/rig_test.cpp", '#include "spartan/testing/laws.h"', None),
+        ("src/spartan/core/opencv_bridge.h", "#include <opencv2/core.hpp>", None),
+        ("tools/tool.cpp", '#include "spartan/testing/laws.h"', None),
+    ]
+    for name, content, expected in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            project = Path(folder)
+            files = {"CMakeLists.txt": good_cmake, "src/spartan/core/pose.h": "", "src/spartan/testing/laws.h": "",
+                     "src/spartan/rig/rig.h": '#include "spartan/core/pose.h"', name: content}
+            for path, text in files.items():
+                (project / path).parent.mkdir(parents=True, exist_ok=True)
+                (project / path).write_text(text, encoding="utf-8")
+            found = faults(project)
+            if (not found) != (expected is None) or any(expected not in fault for fault in found):
+                return f"{name} with {content!r}: expected {expected!r}, found {found}"
+    return None
+
+
+def main(arguments):
+    if arguments == ["--self-test"]:
+        problem = self_test()
+        print(problem or "every rule fails where it should")
+        return 1 if problem else 0
+    project = Path(arguments[0]).resolve()
+    if "--draw" in arguments:
+        print(draw(project))
+        return 0
+    found = faults(project)
+    print("\n".join(found) or "the include graph runs downwards")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
