@@ -24,10 +24,11 @@ struct SequenceReport {
   int announced = 0;     ///< stereo shots, all pairs
   int orphans_left = 0;  ///< left images without a right one near in time, and the reverse
   int orphans_right = 0;
-  int reversals = 0;  ///< stamps that do not increase within a pair
-  int gaps = 0;       ///< steps longer than three times the median step
+  int reversals = 0;  ///< stamps that do not increase within a pair: the fewest shots that must go so that they do
+  int gaps = 0;       ///< steps between complete shots of a pair for odometry, longer than three times the median step
   double median_step_s = 0;
-  double longest_gap_s = 0;
+  double longest_gap_s = 0;          ///< the longest of these steps, 0 where there is no gap
+  std::vector<std::string> remarks;  ///< what else is odd: images that times.txt does not announce …
 };
 
 struct RecordingInfo {
@@ -35,13 +36,18 @@ struct RecordingInfo {
   RecordingFormat format = RecordingFormat::spartan;
   std::string layout_reason;  ///< why this layout was taken: "calib.txt and image_0 found"
   Rig rig;
-  std::string rig_source;  ///< the file the rig came from
+  std::string rig_source;              ///< the file the rig came from
+  std::string name;                    ///< as recording.yaml says, else the folder's name
+  std::string description;             ///< as recording.yaml says, else empty
+  std::optional<double> gravity_m_s2;  ///< as recording.yaml says
   bool has_imu = false;
   SequenceReport sequence;
   std::string truth_file;  ///< trajectory with the truth, where the recording brings one; else empty
 };
 
-/// Yields samples in the order of time.
+/// Yields samples in the order of time; at the same stamp IMU, wheels, compass, inclinometer, then shots in the order
+/// in which the recording lists them. A shot whose stamp runs backwards stays behind the shot it is listed after.
+/// Sensor samples (not shots) whose stamp does not increase within their table are left out.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;

@@ -12,14 +12,6 @@
 namespace spartan {
 namespace {
 
-tl::unexpected<Error> cannot_write(const std::string& path, int error) {
-  std::string hint = "check the permission and the space on the disk";
-  if (error == ENOSPC) hint = "free space on the disk, or choose another folder with -o";
-  if (error == EACCES || error == EROFS) hint = "choose a folder you may write to with -o";
-  if (error == EFBIG) hint = "raise the file size limit (ulimit -f)";
-  return failure(ErrorCode::output, std::string("cannot be written: ") + std::strerror(error), path, hint);
-}
-
 // 0, or errno of the first call that failed.
 int write_all(int file, std::string_view content) {
   while (!content.empty()) {
@@ -35,6 +27,14 @@ int write_all(int file, std::string_view content) {
 
 }  // namespace
 
+tl::unexpected<Error> write_failure(const std::string& path, int error) {
+  std::string hint = "check the permission and the space on the disk";
+  if (error == ENOSPC) hint = "free space on the disk, or choose another folder with -o";
+  if (error == EACCES || error == EROFS) hint = "choose a folder you may write to with -o";
+  if (error == EFBIG) hint = "raise the file size limit (ulimit -f)";
+  return failure(ErrorCode::output, std::string("cannot be written: ") + std::strerror(error), path, hint);
+}
+
 Result<std::string> read_file(const std::string& path) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return failure(ErrorCode::input, "is a folder, not a file", path);
@@ -49,13 +49,13 @@ Result<std::string> read_file(const std::string& path) {
 Status write_file_atomically(const std::string& path, std::string_view content) {
   const std::string temporary = path + ".part";
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) return cannot_write(path, errno);
+  if (file < 0) return write_failure(path, errno);
   int error = write_all(file, content);
   if (::close(file) != 0 && error == 0) error = errno;
   if (error == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
   if (error != 0) {
     ::unlink(temporary.c_str());
-    return cannot_write(path, error);
+    return write_failure(path, error);
   }
   return {};
 }
@@ -63,7 +63,7 @@ Status write_file_atomically(const std::string& path, std::string_view content) 
 Status make_folder(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error) return cannot_write(path, error.value());
+  if (error) return write_failure(path, error.value());
   return {};
 }
 

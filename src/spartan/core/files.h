@@ -15,6 +15,9 @@ Result<std::string> read_file(const std::string& path);
 /// content or the new one, never a part. Code `output` (permission, disk full, size limit) with the path.
 Status write_file_atomically(const std::string& path, std::string_view content);
 
+/// The error of code `output` for a failed write: `error_number` is what errno said.
+tl::unexpected<Error> write_failure(const std::string& path, int error_number);
+
 /// Makes the folder and its parents; code `output`.
 Status make_folder(const std::string& path);
 

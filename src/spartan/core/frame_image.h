@@ -37,6 +37,17 @@ class FrameImage {
     return image;
   }
 
+  /// The same pixels with another meaning (a Bayer phase, fewer bits); throws where the samples are of another kind.
+  FrameImage with_format(PixelFormat format) const {
+    if ((format.layout == PixelLayout::rgb) != (format_.layout == PixelLayout::rgb) ||
+        format.bytes_per_sample() != format_.bytes_per_sample()) {
+      throw std::invalid_argument("FrameImage::with_format: the samples are of another kind");
+    }
+    FrameImage image = *this;
+    image.format_ = format;
+    return image;
+  }
+
   const PixelFormat& format() const { return format_; }
   ImageSize size() const { return size_; }
   int width() const { return size_.width; }

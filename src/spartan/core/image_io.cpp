@@ -105,6 +105,12 @@ Status write_encoded_png(const std::string& path, const cv::Mat& mat) {
   return write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 
+Status write_rgb_png(const std::string& path, const cv::Mat& rgb) {
+  cv::Mat bgr;
+  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  return write_encoded_png(path, bgr);
+}
+
 // "Pf\n<width> <height>\n<scale>\n": the next word of the header, its separator taken too.
 std::string_view next_word(std::string_view& rest) {
   const std::size_t begin = rest.find_first_not_of(" \t\r\n");
@@ -168,9 +174,10 @@ Status write_png(const std::string& path, ImageView<const std::uint16_t> image) 
   return write_encoded_png(path, as_mat(image));
 }
 Status write_png(const std::string& path, ImageView<const Rgb8> image) {
-  cv::Mat bgr;
-  cv::cvtColor(as_mat(image), bgr, cv::COLOR_RGB2BGR);
-  return write_encoded_png(path, bgr);
+  return write_rgb_png(path, as_mat(image));
+}
+Status write_png(const std::string& path, ImageView<const Rgb16> image) {
+  return write_rgb_png(path, as_mat(image));
 }
 
 Status write_pfm(const std::string& path, ImageView<const float> image) {

@@ -23,6 +23,7 @@ Result<Image<std::uint8_t>> read_gray8(const std::string& path);
 Status write_png(const std::string& path, ImageView<const std::uint8_t> image);
 Status write_png(const std::string& path, ImageView<const std::uint16_t> image);
 Status write_png(const std::string& path, ImageView<const Rgb8> image);
+Status write_png(const std::string& path, ImageView<const Rgb16> image);
 
 /// Single-channel PFM ("Pf"), little endian, bottom row first; NaN is written as +inf (unknown).
 Status write_pfm(const std::string& path, ImageView<const float> image);

@@ -1,0 +1,128 @@
+#include "spartan/camera/frame_source.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+
+#include "spartan/camera/recording_index.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct FormatEntry {
+  RecordingFormat format;
+  std::string_view name;
+  Result<RecordingIndex> (*index)(const LayoutChoice&, const OpenOptions&);
+  // Where the layout lies in a folder and how it is recognised; nothing where it does not.
+  std::optional<LayoutChoice> (*recognise)(const fs::path&, const OpenOptions&);
+};
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+
+std::optional<LayoutChoice> recognise_kitti(const fs::path& folder, const OpenOptions& options) {
+  if (!is_there(folder / "image_0")) return std::nullopt;
+  if (is_there(folder / "calib.txt")) {
+    return LayoutChoice{RecordingFormat::kitti, folder.string(), "calib.txt and image_0 found"};
+  }
+  if (options.rig_file.empty()) return std::nullopt;
+  return LayoutChoice{RecordingFormat::kitti, folder.string(), "image_0 found and a rig given"};
+}
+
+std::optional<LayoutChoice> recognise_spartan(const fs::path& folder, const OpenOptions&) {
+  for (const char* file : {"recording.yaml", "frames.csv"}) {
+    if (is_there(folder / file))
+      return LayoutChoice{RecordingFormat::spartan, folder.string(), fmt::format("{} found", file)};
+  }
+  return std::nullopt;
+}
+
+std::optional<LayoutChoice> recognise_kitti_raw(const fs::path& folder, const OpenOptions&) {
+  if (!is_there(folder / "image_00")) return std::nullopt;
+  return LayoutChoice{RecordingFormat::kitti_raw, folder.string(), "image_00 found"};
+}
+
+std::optional<LayoutChoice> recognise_euroc(const fs::path& folder, const OpenOptions&) {
+  for (const fs::path& mav : {folder / "mav0", folder}) {
+    if (is_there(mav / "cam0" / "data.csv")) {
+      const std::string name = (mav == folder ? "" : "mav0/") + std::string("cam0/data.csv found");
+      return LayoutChoice{RecordingFormat::euroc, mav.string(), name};
+    }
+  }
+  return std::nullopt;
+}
+
+// In the order in which layouts are tried: a folder with calib.txt and image_0 is KITTI's, whatever lies beside.
+constexpr std::array<FormatEntry, 4> kFormats{{
+    {RecordingFormat::kitti, "kitti", index_kitti, recognise_kitti},
+    {RecordingFormat::spartan, "spartan", index_spartan, recognise_spartan},
+    {RecordingFormat::kitti_raw, "kitti-raw", index_kitti_raw, recognise_kitti_raw},
+    {RecordingFormat::euroc, "euroc", index_euroc, recognise_euroc},
+}};
+
+constexpr const char* kLookedFor =
+    "looked for calib.txt with image_0 and image_1 (KITTI odometry), image_00/data with image_00/timestamps.txt (KITTI "
+    "raw), mav0/cam0/data.csv (EuRoC) and recording.yaml (Spartan)";
+
+const FormatEntry& entry_of(RecordingFormat format) {
+  for (const FormatEntry& entry : kFormats) {
+    if (entry.format == format) return entry;
+  }
+  throw std::invalid_argument("entry_of: no such format");
+}
+
+Result<LayoutChoice> choose_layout(const std::string& path, const OpenOptions& options) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return failure(ErrorCode::input, "no such folder", path, kLookedFor);
+  if (!fs::is_directory(path, error)) return failure(ErrorCode::input, "is a file, not a recording's folder", path);
+  if (fs::directory_iterator(path, error) == fs::directory_iterator()) {
+    return failure(ErrorCode::input, error ? "the folder cannot be read" : "the folder is empty", path, kLookedFor);
+  }
+  if (options.format) {
+    auto layout = entry_of(*options.format).recognise(path, options);
+    if (!layout) layout = LayoutChoice{*options.format, path, ""};
+    layout->reason = fmt::format("{} asked for", name_of(*options.format));
+    return *layout;
+  }
+  for (const FormatEntry& entry : kFormats) {
+    if (auto layout = entry.recognise(path, options)) return *layout;
+  }
+  return failure(ErrorCode::input, "no layout of a recording that is known", path, kLookedFor);
+}
+
+}  // namespace
+
+std::string_view name_of(RecordingFormat format) {
+  return entry_of(format).name;
+}
+
+Result<RecordingFormat> parse_recording_format(std::string_view name) {
+  std::string known;
+  for (const FormatEntry& entry : kFormats) {
+    if (entry.name == name) return entry.format;
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  return failure(ErrorCode::usage, fmt::format("'{}' is no format of a recording", name), {}, "known are " + known);
+}
+
+Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, const OpenOptions& options) {
+  const auto layout = choose_layout(path, options);
+  if (!layout) return failure(layout);
+  auto index = entry_of(layout->format).index(*layout, options);
+  if (!index) return failure(index);
+  RecordingInfo& info = index->info;
+  info.path = path;
+  info.format = layout->format;
+  info.layout_reason = layout->reason + (info.layout_reason.empty() ? "" : "; " + info.layout_reason);
+  info.has_imu = static_cast<bool>(index->imu);
+  if (info.name.empty()) info.name = fs::weakly_canonical(path).filename().string();
+  if (Status status = arrange(*index, options.pair_tolerance_s); !status) return failure(status);
+  return make_indexed_source(std::move(*index));
+}
+
+}  // namespace spartan

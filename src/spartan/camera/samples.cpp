@@ -1,0 +1,33 @@
+#include "spartan/camera/samples.h"
+
+namespace spartan {
+
+std::string_view name_of(FrameFault fault) {
+  switch (fault) {
+    case FrameFault::left_missing:
+      return "left_missing";
+    case FrameFault::right_missing:
+      return "right_missing";
+    case FrameFault::unreadable:
+      return "unreadable";
+    case FrameFault::wrong_size:
+      return "wrong_size";
+    case FrameFault::stamp_reversed:
+      return "stamp_reversed";
+    case FrameFault::stamps_apart:
+      return "stamps_apart";
+  }
+  return "unreadable";
+}
+
+Stamp stamp_of(const Sample& sample) {
+  if (const auto* frame = std::get_if<StereoFrame>(&sample)) return frame->left_stamp;
+  return std::visit(
+      [](const auto& other) {
+        if constexpr (requires { other.stamp; }) return other.stamp;
+        return Stamp{};
+      },
+      sample);
+}
+
+}  // namespace spartan
