@@ -1,10 +1,11 @@
-// Any camera model. A further model is one file with the same three members and one more entry here
+// Any camera model. A further model is one file with the same members and one more entry here
 // (CONTRIBUTING.md, "A camera model").
 #pragma once
 
 #include <optional>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "spartan/rig/pinhole.h"
 #include "spartan/rig/radial_tangential.h"
@@ -26,5 +27,16 @@ inline std::optional<Ray> unproject(const CameraModel& model, const Eigen::Vecto
 
 /// The name that rig.yaml uses: "pinhole", "radial_tangential".
 std::string_view name_of(const CameraModel& model);
+
+/// What rig.yaml holds of a model: its kinds of parameters and their numbers.
+std::vector<ModelParameterKind> parameter_kinds(const CameraModel& model);
+ModelParameters parameters(const CameraModel& model);
+
+/// The model of that name with its default parameters, to ask for its kinds; none where the name is unknown.
+std::optional<CameraModel> camera_model_named(std::string_view name);
+/// The same kind of model with other numbers; their counts must be allowed ones.
+CameraModel with_parameters(const CameraModel& model, const ModelParameters& numbers);
+/// The names of all models, for messages.
+std::vector<std::string_view> camera_model_names();
 
 }  // namespace spartan

@@ -3,6 +3,9 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
+
+#include "spartan/rig/model_parameters.h"
 
 namespace spartan {
 
@@ -23,6 +26,11 @@ struct ProjectionWithJacobian {
 struct PinholeModel {
   double fx = 1, fy = 1;  ///< px
   double cx = 0, cy = 0;  ///< px
+
+  static constexpr std::string_view kName = "pinhole";
+  static std::vector<ModelParameterKind> parameter_kinds();
+  ModelParameters parameters() const;
+  static PinholeModel from_parameters(const ModelParameters& parameters);
 
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;
   std::optional<ProjectionWithJacobian> project_with_jacobian(const Eigen::Vector3d& point) const;

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "spartan/rig/pinhole.h"
 
@@ -14,8 +15,9 @@ namespace spartan {
 ///   x' = x c + 2 p1 x y + p2 (r² + 2x²),  y' = y c + p1 (r² + 2y²) + 2 p2 x y
 ///   u = fx x' + cx, v = fy y' + cy
 /// Source: OpenCV documentation, "Camera Calibration and 3D Reconstruction"; Brown 1966.
-/// Domain: z > 0 and r below the radius where the radial map stops growing (d(r c)/dr = 0); beyond it the
-/// polynomial folds back and the model has no answer.
+/// Domain: z > 0, r below the radius where the radial map r → r c stops growing (d(r c)/dr = 0) or has a pole, and
+/// the map (x, y) → (x', y') keeps its orientation (positive determinant; only strong tangential terms next to the
+/// edge break that). Beyond, the polynomial folds back and the model has no answer.
 class RadialTangentialModel {
  public:
   /// Order as OpenCV's: k1 k2 p1 p2 k3 k4 k5 k6; missing ones are 0.
@@ -23,6 +25,11 @@ class RadialTangentialModel {
 
   RadialTangentialModel() : RadialTangentialModel({}, {}) {}
   RadialTangentialModel(PinholeModel pinhole, Coefficients coefficients);
+
+  static constexpr std::string_view kName = "radial_tangential";
+  static std::vector<ModelParameterKind> parameter_kinds();
+  ModelParameters parameters() const;
+  static RadialTangentialModel from_parameters(const ModelParameters& parameters);
 
   const PinholeModel& pinhole() const { return pinhole_; }
   const Coefficients& coefficients() const { return coefficients_; }

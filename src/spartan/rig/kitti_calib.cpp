@@ -1,0 +1,165 @@
+// Readers of KITTI's calibration files (Geiger et al., "Vision meets robotics: the KITTI dataset", IJRR 2013, §IV).
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "spartan/rig/rig_files.h"
+#include "spartan/rig/text_matrices.h"
+
+namespace spartan {
+namespace {
+
+using rig_detail::TextMatrices;
+namespace fs = std::filesystem;
+
+using Projection = Eigen::Matrix<double, 3, 4>;
+
+template <class Matrix>
+Result<Matrix> read_matrix(const TextMatrices& file, const std::string& key) {
+  const auto numbers = file.numbers(key, Matrix::SizeAtCompileTime);
+  if (!numbers) return failure(numbers);
+  using RowMajor = Eigen::Matrix<double, Matrix::RowsAtCompileTime, Matrix::ColsAtCompileTime, (Matrix::ColsAtCompileTime == 1 ? Eigen::ColMajor : Eigen::RowMajor)>;
+  return Matrix(Eigen::Map<const RowMajor>(numbers->data()));
+}
+
+Result<Eigen::Matrix3d> read_rotation(const TextMatrices& file, const std::string& key) {
+  const auto matrix = read_matrix<Eigen::Matrix3d>(file, key);
+  if (!matrix) return failure(matrix);
+  // The files hold seven digits.
+  if (!is_rotation(*matrix, 1e-4)) {
+    return failure(ErrorCode::configuration, key + ": is not a rotation matrix", file.where(key));
+  }
+  return nearest_rotation(*matrix);
+}
+
+struct RectifiedEyes {
+  PinholeModel left, right;
+  double left_x_m = 0;  ///< where the left eye stands along x of the reference camera
+  double baseline_m = 0;
+};
+
+// P = K [I | t] with t = (−x, 0, 0): camera at x along the common row direction.
+Result<RectifiedEyes> read_projections(const TextMatrices& file, const std::string& left_key,
+                                       const std::string& right_key) {
+  const auto left = read_matrix<Projection>(file, left_key);
+  if (!left) return failure(left);
+  const auto right = read_matrix<Projection>(file, right_key);
+  if (!right) return failure(right);
+  const auto fault = [&](const std::string& key, const std::string& what) {
+    return failure(ErrorCode::configuration, fmt::format("{}: {}", key, what), file.where(key));
+  };
+  for (const auto& [key, p] : {std::pair{left_key, *left}, std::pair{right_key, *right}}) {
+    if (!(p(0, 0) > 0) || !(p(1, 1) > 0)) return fault(key, "the focal lengths must be above zero");
+    if (p(0, 1) != 0 || p(1, 0) != 0 || p(2, 0) != 0 || p(2, 1) != 0 || p(2, 2) != 1) {
+      return fault(key, "is not the projection of a rectified camera (fx 0 cx −fx·x; 0 fy cy 0; 0 0 1 0)");
+    }
+  }
+  const double f = (*left)(0, 0);
+  const bool same_rows =
+      std::abs((*right)(0, 0) - f) <= 1e-6 * f && std::abs((*right)(1, 1) - (*left)(1, 1)) <= 1e-6 * f &&
+      std::abs((*right)(1, 2) - (*left)(1, 2)) <= 1e-3 && std::abs((*right)(1, 3) - (*left)(1, 3)) <= 1e-3 * f &&
+      std::abs((*right)(2, 3) - (*left)(2, 3)) <= 1e-3;
+  if (!same_rows) {
+    return fault(right_key, fmt::format("does not see the rows of {}: the pair is not rectified", left_key));
+  }
+  RectifiedEyes eyes;
+  eyes.left = {(*left)(0, 0), (*left)(1, 1), (*left)(0, 2), (*left)(1, 2)};
+  eyes.right = {(*right)(0, 0), (*right)(1, 1), (*right)(0, 2), (*right)(1, 2)};
+  eyes.left_x_m = -(*left)(0, 3) / (*left)(0, 0);
+  eyes.baseline_m = -(*right)(0, 3) / (*right)(0, 0) - eyes.left_x_m;
+  if (!(eyes.baseline_m > 1e-6)) {
+    return fault(right_key, fmt::format("gives a baseline of {:.6g} m, must be above zero", eyes.baseline_m));
+  }
+  return eyes;
+}
+
+Camera camera_of(const std::string& name, ImageSize size, const PinholeModel& model) {
+  Camera camera;
+  camera.name = name;
+  camera.size = size;
+  camera.model = model;
+  return camera;
+}
+
+Result<Rig> validated(Rig rig, const std::string& where) {
+  if (const Status status = rig.validate(where); !status) return failure(status);
+  return rig;
+}
+
+// R and T of one of the files beside calib_cam_to_cam.txt.
+Result<Pose> read_transform(const std::string& path) {
+  const auto file = TextMatrices::read(path);
+  if (!file) return failure(file);
+  const auto rotation = read_rotation(*file, "R");
+  if (!rotation) return failure(rotation);
+  const auto translation = read_matrix<Eigen::Vector3d>(*file, "T");
+  if (!translation) return failure(translation);
+  return Pose(*rotation, *translation);
+}
+
+// rectified_camera_0_from_imu = R_rect_00 · velodyne to camera 0 · IMU to velodyne.
+Result<Pose> read_rectified_from_imu(const TextMatrices& file, const fs::path& folder) {
+  const auto rectified_from_camera = read_rotation(file, "R_rect_00");
+  if (!rectified_from_camera) return failure(rectified_from_camera);
+  const auto velo_from_imu = read_transform((folder / "calib_imu_to_velo.txt").string());
+  if (!velo_from_imu) return velo_from_imu;
+  const auto camera_from_velo = read_transform((folder / "calib_velo_to_cam.txt").string());
+  if (!camera_from_velo) return camera_from_velo;
+  return Pose(*rectified_from_camera, Eigen::Vector3d::Zero()) * *camera_from_velo * *velo_from_imu;
+}
+
+Result<ImageSize> read_size(const TextMatrices& file, const std::string& key) {
+  const auto size = read_matrix<Eigen::Vector2d>(file, key);
+  if (!size) return failure(size);
+  const bool whole = size->array().floor().matrix() == *size;
+  if (!whole || size->minCoeff() < 1 || size->maxCoeff() > 1e6) {
+    return failure(ErrorCode::configuration, key + ": must be two whole numbers above zero", file.where(key));
+  }
+  return ImageSize{static_cast<int>(size->x()), static_cast<int>(size->y())};
+}
+
+}  // namespace
+
+Result<Rig> read_kitti_calib(const std::string& path, ImageSize size) {
+  const auto file = TextMatrices::read(path);
+  if (!file) return failure(file);
+  const auto eyes = read_projections(*file, "P0", "P1");
+  if (!eyes) return failure(eyes);
+  if (size.empty()) {
+    return failure(ErrorCode::configuration, "the image size is not known and this file does not hold it", path,
+                   "put it beside its folder image_0");
+  }
+  return validated(rig_of_one_pair("kitti", camera_of("cam0", size, eyes->left), camera_of("cam1", size, eyes->right),
+                                   Pose::from_translation({-eyes->baseline_m, 0, 0})),
+                   path);
+}
+
+Result<Rig> read_kitti_raw_calib(const std::string& path) {
+  const auto file = TextMatrices::read(path);
+  if (!file) return failure(file);
+  const auto eyes = read_projections(*file, "P_rect_00", "P_rect_01");
+  if (!eyes) return failure(eyes);
+  const auto left_size = read_size(*file, "S_rect_00");
+  if (!left_size) return failure(left_size);
+  const auto right_size = file->has("S_rect_01") ? read_size(*file, "S_rect_01") : left_size;
+  if (!right_size) return failure(right_size);
+  Rig rig =
+      rig_of_one_pair("kitti_raw", camera_of("cam0", *left_size, eyes->left),
+                      camera_of("cam1", *right_size, eyes->right), Pose::from_translation({-eyes->baseline_m, 0, 0}));
+
+  const fs::path folder = fs::path(path).parent_path();
+  std::error_code missing;
+  if (fs::exists(folder / "calib_imu_to_velo.txt", missing) && fs::exists(folder / "calib_velo_to_cam.txt", missing)) {
+    const auto rectified_from_imu = read_rectified_from_imu(*file, folder);
+    if (!rectified_from_imu) return failure(rectified_from_imu);
+    const Pose imu_from_rectified = rectified_from_imu->inverse();
+    rig.convention = PoseConvention::body;
+    rig.cameras[0].mount_from_camera = imu_from_rectified * Pose::from_translation({eyes->left_x_m, 0, 0});
+    rig.cameras[1].mount_from_camera =
+        imu_from_rectified * Pose::from_translation({eyes->left_x_m + eyes->baseline_m, 0, 0});
+  }
+  return validated(std::move(rig), path);
+}
+
+}  // namespace spartan

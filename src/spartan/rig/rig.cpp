@@ -1,0 +1,210 @@
+#include "spartan/rig/rig.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+namespace spartan {
+namespace {
+
+bool same(const Pose& a, const Pose& b) {
+  return a.rotation().coeffs() == b.rotation().coeffs() && a.translation() == b.translation();
+}
+
+template <class T>
+const T* find_named(const std::vector<T>& all, const std::string& name) {
+  const auto found = std::find_if(all.begin(), all.end(), [&](const T& item) { return item.name == name; });
+  return found == all.end() ? nullptr : &*found;
+}
+
+// Pictures above this side cannot be addressed by the 16-bit tables of rectification.
+constexpr int kLargestSide = 32767;
+
+class FaultFinder {
+ public:
+  explicit FaultFinder(const Rig& rig) : rig_(rig) {}
+
+  std::vector<RigFault> run() && {
+    check_names("pan_tilt_units", rig_.pan_tilt_units);
+    check_names("cameras", rig_.cameras);
+    check_names("pairs", rig_.pairs);
+    if (rig_.pairs.empty()) add("pairs", "there is no stereo pair");
+    for (const PanTiltUnit& unit : rig_.pan_tilt_units) check(unit);
+    for (const Camera& camera : rig_.cameras) check(camera);
+    for (const StereoPair& pair : rig_.pairs) check(pair);
+    return std::move(faults_);
+  }
+
+ private:
+  void add(const std::string& key, const std::string& what) { faults_.push_back({key, what}); }
+
+  // Names become folders of a recording and frames of transforms.
+  template <class T>
+  void check_names(const std::string& key, const std::vector<T>& items) {
+    std::set<std::string> seen;
+    for (const T& item : items) {
+      const bool plain = std::all_of(item.name.begin(), item.name.end(), [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+      });
+      if (item.name.empty() || !plain) {
+        add(fmt::format("{}.{}", key, item.name), "a name must consist of letters, digits, _ and -");
+      } else if (!seen.insert(item.name).second) {
+        add(fmt::format("{}.{}", key, item.name), "this name was given before");
+      }
+    }
+  }
+
+  void check_pose(const std::string& key, const Pose& pose) {
+    if (!pose.all_finite()) {
+      add(key, "the place holds numbers that are not finite");
+    } else if (std::abs(pose.rotation().norm() - 1) > 1e-6) {
+      add(key, "the quaternion has no unit length");
+    }
+  }
+
+  void check(const PanTiltUnit& unit) {
+    const std::string key = "pan_tilt_units." + unit.name;
+    if (unit.name == "body") add(key, "'body' is the name of the rover's own frame");
+    check_pose(key, unit.body_from_base);
+    if (!std::isfinite(unit.rest_pan_rad) || !std::isfinite(unit.rest_tilt_rad)) {
+      add(key + ".rest_angles_rad", "must be finite");
+    }
+  }
+
+  void check(const Camera& camera) {
+    const std::string key = "cameras." + camera.name;
+    const auto [width, height] = camera.size;
+    if (width <= 0 || height <= 0 || width > kLargestSide || height > kLargestSide) {
+      add(key + ".size_px", fmt::format("is {} × {}, must be between 1 and {} each", width, height, kLargestSide));
+    }
+    const auto kinds = parameter_kinds(camera.model);
+    const ModelParameters numbers = parameters(camera.model);
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+      for (const double v : numbers[i]) {
+        if (!std::isfinite(v)) {
+          add(fmt::format("{}.{}", key, kinds[i].key), "must be finite");
+          break;
+        }
+        if (kinds[i].positive && v <= 0) {
+          add(fmt::format("{}.{}", key, kinds[i].key), fmt::format("holds {}, must be above zero", v));
+          break;
+        }
+      }
+    }
+    if (camera.pixel_format.bits < 8 || camera.pixel_format.bits > 16) {
+      add(key + ".bits", fmt::format("is {}, must be between 8 and 16", camera.pixel_format.bits));
+    }
+    if (camera.mount != "body" && !find_named(rig_.pan_tilt_units, camera.mount)) {
+      add(key + ".mount", fmt::format("'{}' is neither 'body' nor a pan-tilt unit of this rig", camera.mount));
+    }
+    check_pose(key, camera.mount_from_camera);
+  }
+
+  const Camera* check_eye(const std::string& key, const std::string& name) {
+    const Camera* camera = rig_.find_camera(name);
+    if (!camera) add(key, fmt::format("there is no camera '{}'", name));
+    return camera;
+  }
+
+  void check(const StereoPair& pair) {
+    const std::string key = "pairs." + pair.name;
+    if (!std::isfinite(pair.nearest_m) || pair.nearest_m < 0) {
+      add(key + ".nearest_m", fmt::format("is {}, must be a finite distance, or 0 for none", pair.nearest_m));
+    }
+    const Camera* left = check_eye(key + ".left", pair.left);
+    const Camera* right = check_eye(key + ".right", pair.right);
+    if (!left || !right) return;
+    if (left == right) return add(key + ".right", "both eyes are the same camera");
+    if (left->mount != right->mount) {
+      return add(key, fmt::format("the eyes sit on different mounts, '{}' and '{}'", left->mount, right->mount));
+    }
+    const double baseline = (left->mount_from_camera.translation() - right->mount_from_camera.translation()).norm();
+    if (baseline < 1e-9) add(key, "both eyes are at one place: the baseline is zero");
+  }
+
+  const Rig& rig_;
+  std::vector<RigFault> faults_;
+};
+
+}  // namespace
+
+Pose PanTiltUnit::body_from_head(double pan_rad, double tilt_rad) const {
+  return body_from_base * Pose::from_rotation(Eigen::AngleAxisd(pan_rad, Eigen::Vector3d::UnitZ()) *
+                                              Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()));
+}
+
+bool operator==(const PanTiltUnit& a, const PanTiltUnit& b) {
+  return a.name == b.name && same(a.body_from_base, b.body_from_base) && a.rest_pan_rad == b.rest_pan_rad &&
+         a.rest_tilt_rad == b.rest_tilt_rad;
+}
+
+bool operator==(const Camera& a, const Camera& b) {
+  return a.name == b.name && a.size == b.size && a.model == b.model && a.pixel_format == b.pixel_format &&
+         a.self_mask == b.self_mask && a.mount == b.mount && same(a.mount_from_camera, b.mount_from_camera);
+}
+
+const Camera* Rig::find_camera(const std::string& camera) const {
+  return find_named(cameras, camera);
+}
+
+const StereoPair* Rig::find_pair(const std::string& pair) const {
+  return find_named(pairs, pair);
+}
+
+Pose Rig::body_from_camera(const std::string& name_of_camera, double pan_rad, double tilt_rad) const {
+  const Camera* camera = find_camera(name_of_camera);
+  if (!camera) throw std::invalid_argument("Rig::body_from_camera: no camera '" + name_of_camera + "'");
+  if (camera->mount == "body") return camera->mount_from_camera;
+  const PanTiltUnit* unit = find_named(pan_tilt_units, camera->mount);
+  if (!unit) throw std::invalid_argument("Rig::body_from_camera: no mount '" + camera->mount + "'");
+  return unit->body_from_head(pan_rad, tilt_rad) * camera->mount_from_camera;
+}
+
+Pose Rig::body_from_camera(const std::string& name_of_camera) const {
+  const Camera* camera = find_camera(name_of_camera);
+  const PanTiltUnit* unit = camera ? find_named(pan_tilt_units, camera->mount) : nullptr;
+  return body_from_camera(name_of_camera, unit ? unit->rest_pan_rad : 0, unit ? unit->rest_tilt_rad : 0);
+}
+
+Pose Rig::right_from_left(const StereoPair& pair) const {
+  const Camera* left = find_camera(pair.left);
+  const Camera* right = find_camera(pair.right);
+  if (!left || !right) throw std::invalid_argument("Rig::right_from_left: pair '" + pair.name + "' misses a camera");
+  if (left->mount == right->mount) return right->mount_from_camera.inverse() * left->mount_from_camera;
+  return body_from_camera(pair.right).inverse() * body_from_camera(pair.left);
+}
+
+std::vector<RigFault> Rig::find_faults() const {
+  return FaultFinder(*this).run();
+}
+
+Status Rig::validate(const std::string& where) const {
+  const std::vector<RigFault> faults = find_faults();
+  if (faults.empty()) return {};
+  std::vector<std::string> lines;
+  for (const RigFault& fault : faults) lines.push_back(fmt::format("{}: {}: {}", where, fault.key, fault.what));
+  return failure(ErrorCode::configuration, fmt::format("{}", fmt::join(lines, "\n")));
+}
+
+Pose optical_from_forward() {
+  // x_optical = −y, y_optical = −z, z_optical = x; as a quaternion all parts are ±1/2, exact in binary.
+  return Pose::from_unit_quaternion({0.5, 0.5, -0.5, 0.5}, Eigen::Vector3d::Zero());
+}
+
+Rig rig_of_one_pair(const std::string& name, Camera left, Camera right, const Pose& right_from_left) {
+  left.mount = right.mount = "body";
+  left.mount_from_camera = optical_from_forward().inverse();
+  right.mount_from_camera = left.mount_from_camera * right_from_left.inverse();
+  Rig rig;
+  rig.name = name;
+  rig.convention = PoseConvention::left_optical;
+  rig.pairs = {{"stereo", left.name, right.name}};
+  rig.cameras = {std::move(left), std::move(right)};
+  return rig;
+}
+
+}  // namespace spartan
