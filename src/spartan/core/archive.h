@@ -48,14 +48,20 @@ class ArchiveWriter {
 /// one is zero; ask `finish()` at the end.
 class ArchiveReader {
  public:
+  /// Borrows the bytes.
   explicit ArchiveReader(const Bytes& bytes) : bytes_(bytes) {}
+  explicit ArchiveReader(Bytes&&) = delete;
 
   template <class T>
     requires std::is_arithmetic_v<T> || std::is_enum_v<T>
   T get() {
-    T value{};
-    raw(&value, sizeof value);
-    return value;
+    if constexpr (std::is_same_v<T, bool>) {
+      return get<std::uint8_t>() != 0;  // any other byte would not be a valid bool
+    } else {
+      T value{};
+      raw(&value, sizeof value);
+      return value;
+    }
   }
   std::string get_string();
   Eigen::Vector2d get_vector2();

@@ -56,7 +56,7 @@ class ImageView {
 
   /// The part that starts at (x, y); throws where it does not lie inside.
   ImageView crop(int x, int y, int width, int height) const {
-    if (x < 0 || y < 0 || width < 0 || height < 0 || x + width > width_ || y + height > height_) {
+    if (x < 0 || y < 0 || width < 0 || height < 0 || width > width_ - x || height > height_ - y) {
       throw std::out_of_range("ImageView::crop: the part leaves the image");
     }
     return {row(y) + x, width, height, stride_};

@@ -12,73 +12,10 @@
 
 #include "spartan/core/files.h"
 #include "spartan/core/opencv_bridge.h"
+#include "spartan/core/picture_file.h"
 
 namespace spartan {
 namespace {
-
-using std::string_view_literals::operator""sv;
-
-constexpr std::size_t kLargestSide = 32768;  // larger headers are taken for noise, not for pictures
-
-std::uint32_t big_endian(std::string_view bytes) {
-  std::uint32_t value = 0;
-  for (const char c : bytes) value = (value << 8U) | static_cast<std::uint8_t>(c);
-  return value;
-}
-
-// Decoders fill what is missing with gray and say nothing, so the container is walked first.
-// Nothing: complete. Otherwise what is wrong.
-std::string png_fault(std::string_view png) {
-  std::size_t at = 8;
-  while (at + 12 <= png.size()) {
-    const std::size_t length = big_endian(png.substr(at, 4));
-    const std::string_view type = png.substr(at + 4, 4);
-    if (length > png.size() - at - 12) return "PNG file ends early";
-    if (type == "IHDR"sv && length >= 8) {
-      const std::size_t width = big_endian(png.substr(at + 8, 4)), height = big_endian(png.substr(at + 12, 4));
-      if (width == 0 || height == 0 || width > kLargestSide || height > kLargestSide)
-        return "PNG header with a senseless size";
-    }
-    if (type == "IEND"sv) return {};
-    at += 12 + length;
-  }
-  return "PNG file ends early";
-}
-
-std::string jpeg_fault(std::string_view jpeg) {
-  std::size_t at = 2;
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(jpeg[i]); };
-  while (at + 4 <= jpeg.size()) {
-    if (byte(at) != 0xFF) return "JPEG file is damaged";
-    const std::uint8_t marker = byte(at + 1);
-    if (marker == 0xFF) {
-      ++at;
-      continue;
-    }
-    const std::size_t length = big_endian(jpeg.substr(at + 2, 2));
-    if (marker != 0xDA) {
-      at += 2 + length;
-      continue;
-    }
-    // Behind the scan header comes entropy-coded data; a real marker there is 0xFF followed by neither 0 (stuffing)
-    // nor a restart marker.
-    for (at += 2 + length; at + 1 < jpeg.size(); ++at) {
-      if (byte(at) != 0xFF) continue;
-      const std::uint8_t next = byte(at + 1);
-      if (next == 0xD9) return {};
-      if (next != 0 && next != 0xFF && !(next >= 0xD0 && next <= 0xD7)) break;  // a further scan or table
-    }
-  }
-  // An end marker may stand where the walk above no longer looks.
-  return at + 2 <= jpeg.size() && jpeg.substr(at, 2) == "\xFF\xD9"sv ? std::string{} : "JPEG file ends early";
-}
-
-std::string container_fault(std::string_view content) {
-  if (content.empty()) return "file is empty";
-  if (content.starts_with("\x89PNG\r\n\x1a\n"sv)) return png_fault(content);
-  if (content.starts_with("\xFF\xD8"sv)) return jpeg_fault(content);
-  return {};
-}
 
 cv::Mat decode(const std::string& content, int flags) {
   const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8UC1, const_cast<char*>(content.data()));
@@ -132,7 +69,7 @@ bool parse(std::string_view word, T& value) {
 
 Result<FrameImage> decode_image(const std::string& content, const std::string& name) {
   const char* const hint = "replace the file, or remove it to skip the frame";
-  if (const std::string fault = container_fault(content); !fault.empty())
+  if (const std::string fault = picture_file_fault(content); !fault.empty())
     return failure(ErrorCode::input, fault, name, hint);
   cv::Mat mat = decode(content, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
   if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", name, hint);
@@ -160,7 +97,7 @@ Result<FrameImage> read_image(const std::string& path) {
 Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
   const auto content = read_file(path);
   if (!content) return failure(content);
-  if (const std::string fault = container_fault(*content); !fault.empty())
+  if (const std::string fault = picture_file_fault(*content); !fault.empty())
     return failure(ErrorCode::input, fault, path);
   const cv::Mat mat = decode(*content, cv::IMREAD_GRAYSCALE);
   if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", path);
@@ -193,20 +130,18 @@ Status write_pfm(const std::string& path, ImageView<const float> image) {
   return write_file_atomically(path, content);
 }
 
-Result<Image<float>> read_pfm(const std::string& path) {
-  const auto content = read_file(path);
-  if (!content) return failure(content);
-  std::string_view rest = *content;
+Result<Image<float>> parse_pfm(const std::string& content, const std::string& name) {
+  std::string_view rest = content;
   const std::string_view magic = next_word(rest);
   const std::string_view width_text = next_word(rest), height_text = next_word(rest), scale_text = next_word(rest);
   std::size_t width = 0, height = 0;
   double scale = 0;
   if (magic != "Pf" || !parse(width_text, width) || !parse(height_text, height) || !parse(scale_text, scale) ||
-      width == 0 || height == 0 || width > kLargestSide || height > kLargestSide || scale == 0 ||
+      width == 0 || height == 0 || width > kLargestImageSide || height > kLargestImageSide || scale == 0 ||
       !std::isfinite(scale)) {
-    return failure(ErrorCode::input, "is not a single-channel PFM file", path);
+    return failure(ErrorCode::input, "is not a single-channel PFM file", name);
   }
-  if (rest.size() < width * height * sizeof(float)) return failure(ErrorCode::input, "PFM file ends early", path);
+  if (rest.size() < width * height * sizeof(float)) return failure(ErrorCode::input, "PFM file ends early", name);
   Image<float> image(static_cast<int>(width), static_cast<int>(height));
   for (int y = image.height() - 1; y >= 0; --y) {
     for (int x = 0; x < image.width(); ++x, rest.remove_prefix(sizeof(float))) {
@@ -218,6 +153,12 @@ Result<Image<float>> read_pfm(const std::string& path) {
     }
   }
   return image;
+}
+
+Result<Image<float>> read_pfm(const std::string& path) {
+  const auto content = read_file(path);
+  if (!content) return failure(content);
+  return parse_pfm(*content, path);
 }
 
 }  // namespace spartan

@@ -10,7 +10,8 @@ namespace spartan {
 
 /// Decodes a picture file into gray or RGB of 8 or 16 bits (`format.bits` is 8 or 16; a recording that knows
 /// better says so by `with_format`). A file that is missing, empty, truncated (PNG without its end chunk,
-/// JPEG that ends early) or no picture gives an error with code `input` that names the path and what is wrong.
+/// JPEG without its end marker) or no picture of these kinds gives an error with code `input` that names the path and
+/// what is wrong.
 Result<FrameImage> read_image(const std::string& path);
 
 /// The same from memory; `name` stands in errors.
@@ -29,5 +30,6 @@ Status write_png(const std::string& path, ImageView<const Rgb16> image);
 Status write_pfm(const std::string& path, ImageView<const float> image);
 /// Reads "Pf" of either byte order; +inf becomes NaN.
 Result<Image<float>> read_pfm(const std::string& path);
+Result<Image<float>> parse_pfm(const std::string& content, const std::string& name);
 
 }  // namespace spartan

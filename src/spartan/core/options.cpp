@@ -4,9 +4,10 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <fstream>
 #include <set>
 #include <sstream>
+
+#include "spartan/core/files.h"
 
 namespace spartan::options_detail {
 
@@ -19,12 +20,13 @@ class Tree {
     std::set<std::string> known;
   };
   std::string name;
+  bool has_lines = true;  // false: text of a command line
   std::vector<Level> levels;
   std::vector<std::string> faults;
 
   std::string place(const YAML::Node& node, std::string_view key) const {
     const YAML::Mark mark = node.Mark();
-    const std::string line = mark.is_null() ? "" : fmt::format(":{}", mark.line + 1);
+    const std::string line = mark.is_null() || !has_lines ? "" : fmt::format(":{}", mark.line + 1);
     return fmt::format("{}{}: {}{}", name, line, levels.back().prefix, key);
   }
   void fault(const YAML::Node& node, std::string_view key, const std::string& what) {
@@ -42,11 +44,13 @@ class Tree {
     return node;
   }
 
-  void report_unknown() {
+  void report_unknown_and_repeated() {
     const Level& level = levels.back();
     if (!level.map.IsMap()) return;
+    std::set<std::string> seen;
     for (const auto& entry : level.map) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "(not a name)";
+      if (!seen.insert(key).second) fault(entry.first, key, "is given twice");
       if (level.known.contains(key)) continue;
       std::string known;
       for (const std::string& k : level.known) known += (known.empty() ? "" : ", ") + k;
@@ -75,6 +79,14 @@ std::string bounds_text(Bounds bounds) {
     return fmt::format("between {} and {}", bounds.low, bounds.high);
   }
   return std::isfinite(bounds.low) ? fmt::format("at least {}", bounds.low) : fmt::format("at most {}", bounds.high);
+}
+
+// "a.b.c" → a, b, c
+std::vector<std::string> split_key(const std::string& key) {
+  std::vector<std::string> parts;
+  std::stringstream rest(key);
+  for (std::string part; std::getline(rest, part, '.');) parts.push_back(part);
+  return parts;
 }
 
 bool inside(double value, Bounds bounds) {
@@ -119,7 +131,7 @@ void Reader::field(std::string_view key, std::string& value, std::string_view,
   const auto node = tree_->find(key);
   if (!node) return;
   const auto read = convert<std::string>(*node);
-  if (!read) return tree_->fault(*node, key, "must be text");
+  if (!read || node->IsNull()) return tree_->fault(*node, key, "must be text");
   if (!choices.empty() && std::find(choices.begin(), choices.end(), *read) == choices.end()) {
     return tree_->fault(*node, key, fmt::format("is '{}', must be one of: {}", *read, fmt::join(choices, ", ")));
   }
@@ -150,12 +162,12 @@ bool Reader::enter(std::string_view key) {
 }
 
 void Reader::leave() {
-  tree_->report_unknown();
+  tree_->report_unknown_and_repeated();
   tree_->levels.pop_back();
 }
 
 Status Reader::finish() {
-  tree_->report_unknown();
+  tree_->report_unknown_and_repeated();
   if (tree_->faults.empty()) return {};
   std::string text;
   for (const std::string& fault : tree_->faults) text += (text.empty() ? "" : "\n") + fault;
@@ -201,29 +213,33 @@ Result<std::shared_ptr<Tree>> parse(const std::string& text, const std::string& 
 }
 
 Result<std::shared_ptr<Tree>> load(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  if (file) text << file.rdbuf();
-  if (!file || !text) return failure(ErrorCode::configuration, "the file cannot be read", path);
-  return parse(text.str(), path);
+  const auto text = read_file(path);
+  if (!text) return failure(ErrorCode::configuration, text.error().what, path);
+  return parse(*text, path);
 }
 
 Result<std::shared_ptr<Tree>> from_assignment(const std::string& assignment) {
+  const std::string name = "--set " + assignment;
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0) {
     return failure(ErrorCode::usage, "'" + assignment + "' is not of the form key=value", "--set");
   }
-  // a.b.c=v → {a: {b: {c: v}}}
-  std::string text = assignment.substr(equals + 1);
-  std::string keys = assignment.substr(0, equals);
-  std::string opening, closing;
-  std::stringstream parts(keys);
-  for (std::string part; std::getline(parts, part, '.');) {
-    opening += "{\"" + part + "\": ";
-    closing += "}";
+  auto tree = std::make_shared<Tree>();
+  tree->name = name;
+  tree->has_lines = false;
+  try {
+    // a.b.c=v → {a: {b: {c: v}}}
+    YAML::Node node = YAML::Load(assignment.substr(equals + 1));
+    const std::vector<std::string> keys = split_key(assignment.substr(0, equals));
+    for (auto key = keys.rbegin(); key != keys.rend(); ++key) {
+      YAML::Node map(YAML::NodeType::Map);
+      map[*key] = node;
+      node = map;
+    }
+    tree->levels.push_back({node, "", {}});
+  } catch (const YAML::Exception& e) {
+    return failure(ErrorCode::usage, "not a valid value: " + e.msg, name);
   }
-  auto tree = parse(opening + text + closing, "--set " + assignment);
-  if (!tree) tree.error().code = ErrorCode::usage;
   return tree;
 }
 
@@ -231,9 +247,7 @@ std::string to_yaml(const std::vector<OptionLine>& lines) {
   std::string text;
   std::vector<std::string> open;
   for (const OptionLine& line : lines) {
-    std::vector<std::string> path;
-    std::stringstream parts(line.key);
-    for (std::string part; std::getline(parts, part, '.');) path.push_back(part);
+    const std::vector<std::string> path = split_key(line.key);
     std::size_t same = 0;
     while (same < open.size() && same + 1 < path.size() && open[same] == path[same]) ++same;
     open.resize(same);

@@ -2,7 +2,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <limits>
 
 namespace spartan {
 namespace {
@@ -41,7 +40,12 @@ Result<Stamp> parse_decimal_seconds(std::string_view text) {
   std::string_view digits = text;
   const bool negative = !digits.empty() && digits.front() == '-';
   if (!digits.empty() && (digits.front() == '-' || digits.front() == '+')) digits.remove_prefix(1);
+  // Counted in the sign of the result, as the negative range is one larger.
   std::int64_t ns = 0;
+  const auto append_digit = [&](int digit) {
+    return !__builtin_mul_overflow(ns, std::int64_t{10}, &ns) &&
+           !__builtin_add_overflow(ns, static_cast<std::int64_t>(negative ? -digit : digit), &ns);
+  };
   int decimals = -1;  // −1: before the point
   bool any = false;
   for (const char c : digits) {
@@ -52,16 +56,14 @@ Result<Stamp> parse_decimal_seconds(std::string_view text) {
     if (c < '0' || c > '9') return not_a_time(text);
     any = true;
     if (decimals >= 9) continue;  // below a nanosecond
-    if (ns > (std::numeric_limits<std::int64_t>::max() - 9) / 10) return not_a_time(text);
-    ns = ns * 10 + (c - '0');
+    if (!append_digit(c - '0')) return not_a_time(text);
     if (decimals >= 0) ++decimals;
   }
   if (!any) return not_a_time(text);
   for (int d = decimals < 0 ? 0 : decimals; d < 9; ++d) {
-    if (ns > std::numeric_limits<std::int64_t>::max() / 10) return not_a_time(text);
-    ns *= 10;
+    if (!append_digit(0)) return not_a_time(text);
   }
-  return Stamp{negative ? -ns : ns};
+  return Stamp{ns};
 }
 
 }  // namespace spartan

@@ -16,6 +16,7 @@ namespace {
 struct Line {
   std::string place;  // "file:line"
   std::vector<std::string_view> words;
+  bool has_commas = false;
 };
 
 // Lines that are neither empty nor comments, split at blanks and commas.
@@ -27,7 +28,7 @@ std::vector<Line> split(std::string_view text, const std::string& name) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
-    Line parsed{fmt::format("{}:{}", name, number), {}};
+    Line parsed{fmt::format("{}:{}", name, number), {}, line.find(',') != std::string_view::npos};
     while (!line.empty()) {
       const std::size_t begin = line.find_first_not_of(" \t\r,");
       if (begin == std::string_view::npos) break;
@@ -216,8 +217,9 @@ Result<LoadedTrajectory> load_trajectory(const std::string& path) {
       if (!read) return failure(read);
       stamps = std::move(*read);
     }
+    loaded.has_stamps = !stamps.empty();
     poses = parse_kitti(*text, path, stamps);
-  } else if (text->find(',') != std::string::npos) {
+  } else if (lines.front().has_commas) {
     loaded.format = TrajectoryFormat::euroc;
     poses = parse_euroc(*text, path);
   } else {

@@ -38,6 +38,7 @@ Result<Trajectory> parse_euroc(const std::string& text, const std::string& name)
 struct LoadedTrajectory {
   Trajectory poses;
   TrajectoryFormat format = TrajectoryFormat::tum;
+  bool has_stamps = true;    ///< false: a KITTI file without `times.txt` beside it; stamps are line numbers
   bool has_rotation = true;  ///< false: all rotations are the identity, so the file knows positions only
 };
 

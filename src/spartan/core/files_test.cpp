@@ -1,0 +1,96 @@
+#include "spartan/core/files.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using testing::content_of;
+using testing::TemporaryFolder;
+
+std::size_t entries(const std::string& folder) {
+  const std::filesystem::directory_iterator begin(folder);
+  return static_cast<std::size_t>(std::distance(begin, {}));
+}
+
+TEST(Files, WriteReplacesTheWholeContent) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a.txt", "a long old content");
+  const std::string content("new\0bytes", 9);
+  ASSERT_TRUE(write_file_atomically(path, content));
+  EXPECT_EQ(content_of(path), content);
+  EXPECT_EQ(read_file(path).value(), content);
+  EXPECT_EQ(entries(folder.path()), 1U) << "no temporary file stays behind";
+}
+
+TEST(Files, EmptyFilesAreFiles) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_file_atomically(folder.file("empty"), ""));
+  EXPECT_EQ(read_file(folder.file("empty")).value(), "");
+}
+
+TEST(Files, ReadSaysWhichFileAndWhy) {
+  const TemporaryFolder folder;
+  const auto missing = read_file(folder.path() + "/none");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::input);
+  EXPECT_EQ(missing.error().where, folder.path() + "/none");
+  EXPECT_FALSE(read_file(folder.path())) << "a folder is no file";
+}
+
+TEST(Files, WriteIntoAFolderThatIsNotThere) {
+  const TemporaryFolder folder;
+  const Status status = write_file_atomically(folder.path() + "/none/a.txt", "text");
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::output);
+  EXPECT_EQ(status.error().where, folder.path() + "/none/a.txt");
+  EXPECT_FALSE(status.error().hint.empty());
+}
+
+TEST(Files, WriteWithoutPermission) {
+  // /proc refuses new files even to root.
+  const Status status = write_file_atomically("/proc/spartan_test", "text");
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::output);
+}
+
+TEST(Files, AFullDiskLeavesTheOldContent) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a.txt", "old");
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit small = before;
+  small.rlim_cur = 1000;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  const Status status = write_file_atomically(path, std::string(5000, 'x'));
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::output);
+  EXPECT_NE(status.error().hint.find("ulimit"), std::string::npos);
+  EXPECT_EQ(content_of(path), "old");
+  EXPECT_EQ(entries(folder.path()), 1U);
+}
+
+TEST(Files, MakeFolderWithParents) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(make_folder(folder.path() + "/a/b/c"));
+  EXPECT_TRUE(std::filesystem::is_directory(folder.path() + "/a/b/c"));
+  EXPECT_TRUE(make_folder(folder.path() + "/a/b/c")) << "already there";
+  const std::string file = folder.write("file", "x");
+  for (const std::string& path : {file, file + "/below"}) {
+    const Status status = make_folder(path);
+    ASSERT_FALSE(status) << path;
+    EXPECT_EQ(status.error().code, ErrorCode::output);
+  }
+}
+
+}  // namespace
+}  // namespace spartan

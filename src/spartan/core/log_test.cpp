@@ -1,0 +1,51 @@
+#include "spartan/core/log.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Log, WithoutASinkSaysNothing) {
+  ::testing::internal::CaptureStderr();
+  const Log log;
+  log.error("nobody hears this");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Log, TheFileGetsEverythingFromInfoUp) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.write("log.txt", "earlier\n");
+  ::testing::internal::CaptureStderr();
+  {
+    const Log log = Log::to_terminal_and_file(LogLevel::error, path);
+    const Log copy = log;
+    log.debug("a detail");
+    copy.info("a {brace} is no format");
+    log.warning("a warning");
+    log.error("a fault");
+  }
+  const std::string terminal = ::testing::internal::GetCapturedStderr();
+  const std::string file = testing::content_of(path);
+  EXPECT_THAT(file, HasSubstr("earlier\n"));
+  EXPECT_THAT(file, HasSubstr("info: a {brace} is no format\n"));
+  EXPECT_THAT(file, HasSubstr("warning: a warning\n"));
+  EXPECT_THAT(file, HasSubstr("error: a fault\n"));
+  EXPECT_THAT(file, Not(HasSubstr("a detail")));
+  EXPECT_THAT(terminal, HasSubstr("a fault"));
+  EXPECT_THAT(terminal, Not(HasSubstr("a warning")));
+}
+
+TEST(Log, AFileThatCannotBeOpenedIsNoFault) {
+  ::testing::internal::CaptureStderr();
+  Log::to_terminal_and_file(LogLevel::info, "/proc/none/log.txt").info("still heard");
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("still heard"));
+}
+
+}  // namespace
+}  // namespace spartan

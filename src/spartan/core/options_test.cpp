@@ -1,0 +1,195 @@
+#include "spartan/core/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <bit>
+#include <cmath>
+
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct SpeckleOptions {
+  int size_px = 100;
+  double difference_px = 1.5;
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("size_px", size_px, "patches smaller than this are dropped", at_least(0));
+    v.field("difference_px", difference_px, "largest step inside a patch", between(0, 10));
+  }
+};
+
+struct MatcherOptions {
+  bool enabled = true;
+  std::string method = "sgm";
+  std::string note;
+  std::vector<double> lengths_m{1, 2.5};
+  double gain = 0.1;
+  SpeckleOptions speckle;
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "whether to match at all");
+    v.field("method", method, "how to match", {"sgm", "block"});
+    v.field("note", note, "free text");
+    v.field("lengths_m", lengths_m, "lengths", at_least(0));
+    v.field("gain", gain, "any finite number");
+    v.group("speckle", speckle);
+  }
+};
+
+struct RunOptions {
+  MatcherOptions matcher;
+  int threads = 1;
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.group("matcher", matcher);
+    v.field("threads", threads, "how many", between(1, 64));
+  }
+};
+
+Result<RunOptions> parse(const std::string& text) {
+  return parse_options<RunOptions>(text, "run.yaml");
+}
+std::string fault_of(const std::string& text) {
+  const auto result = parse(text);
+  EXPECT_FALSE(result) << text;
+  if (result) return {};
+  EXPECT_EQ(result.error().code, ErrorCode::configuration);
+  return result.error().message();
+}
+
+TEST(Options, WhatIsNotNamedKeepsItsValue) {
+  const auto options = parse("matcher:\n  speckle:\n    size_px: 7\n");
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->matcher.speckle.size_px, 7);
+  EXPECT_EQ(options->matcher.speckle.difference_px, 1.5);
+  EXPECT_EQ(options->matcher.method, "sgm");
+  for (const char* nothing : {"", "# only a comment\n", "matcher:\n", "---\n"}) EXPECT_TRUE(parse(nothing)) << nothing;
+}
+
+TEST(Options, GroupsNest) {
+  const auto options =
+      parse("threads: 2\nmatcher: {method: block, enabled: false, lengths_m: [3, 4.5], speckle: {difference_px: 2}}");
+  ASSERT_TRUE(options) << options.error().message();
+  EXPECT_EQ(options->threads, 2);
+  EXPECT_EQ(options->matcher.method, "block");
+  EXPECT_FALSE(options->matcher.enabled);
+  EXPECT_EQ(options->matcher.lengths_m, (std::vector<double>{3, 4.5}));
+  EXPECT_EQ(options->matcher.speckle.difference_px, 2);
+}
+
+TEST(Options, UnknownKeysAreNamedWithTheirLine) {
+  const std::string fault = fault_of("threads: 2\nmatcher:\n  speckle:\n    size_pixels: 3\n");
+  EXPECT_THAT(fault, HasSubstr("run.yaml:4: matcher.speckle.size_pixels: unknown key"));
+  EXPECT_THAT(fault, HasSubstr("size_px")) << "says which keys there are";
+}
+
+TEST(Options, EveryFaultIsReportedAtOnce) {
+  const std::string fault = fault_of(
+      "threads: 99\n"
+      "matcher:\n"
+      "  enabled: perhaps\n"
+      "  method: magic\n"
+      "  lengths_m: [1, -2]\n"
+      "  gain: .nan\n"
+      "  speckle: 5\n"
+      "  extra: 1\n"
+      "depth: 3\n");
+  EXPECT_THAT(fault, HasSubstr("run.yaml:1: threads: is 99, must be between 1 and 64"));
+  EXPECT_THAT(fault, HasSubstr("run.yaml:3: matcher.enabled: must be true or false"));
+  EXPECT_THAT(fault, HasSubstr("run.yaml:4: matcher.method: is 'magic', must be one of: sgm, block"));
+  EXPECT_THAT(fault, HasSubstr("run.yaml:5: matcher.lengths_m: holds -2, must be at least 0"));
+  EXPECT_THAT(fault, HasSubstr("run.yaml:6: matcher.gain: must be a finite number"));
+  EXPECT_THAT(fault, HasSubstr("run.yaml:7: matcher.speckle: must be a group of keys"));
+  EXPECT_THAT(fault, HasSubstr("run.yaml:8: matcher.extra: unknown key"));
+  EXPECT_THAT(fault, HasSubstr("run.yaml:9: depth: unknown key"));
+}
+
+TEST(Options, WrongTypesAreRefused) {
+  EXPECT_THAT(fault_of("threads: 1.5"), HasSubstr("whole number"));
+  EXPECT_THAT(fault_of("threads: 99999999999"), HasSubstr("whole number"));
+  EXPECT_THAT(fault_of("threads:"), HasSubstr("whole number"));
+  EXPECT_THAT(fault_of("threads: [1]"), HasSubstr("whole number"));
+  EXPECT_THAT(fault_of("matcher: {gain: wide}"), HasSubstr("must be a number"));
+  EXPECT_THAT(fault_of("matcher: {note: }"), HasSubstr("must be text"));
+  EXPECT_THAT(fault_of("matcher: {lengths_m: 3}"), HasSubstr("list of numbers"));
+  EXPECT_THAT(fault_of("matcher: {speckle: {difference_px: 1e99}}"), HasSubstr("between 0 and 10"));
+  EXPECT_THAT(fault_of("matcher: {gain: 1e999}"), HasSubstr("number"));
+}
+
+TEST(Options, TextThatIsNoYaml) {
+  EXPECT_THAT(fault_of("threads: 1\nmatcher: {"), HasSubstr("run.yaml:"));
+  EXPECT_THAT(fault_of("- 1\n- 2\n"), HasSubstr("run.yaml:1"));
+  EXPECT_THAT(fault_of("just text"), HasSubstr("run.yaml:1"));
+  EXPECT_THAT(fault_of("threads: 1\nthreads: 2\n"), HasSubstr("given twice"));
+}
+
+TEST(Options, FilesAreReadToo) {
+  const testing::TemporaryFolder folder;
+  EXPECT_EQ(load_options<RunOptions>(folder.write("a.yaml", "threads: 4"))->threads, 4);
+  EXPECT_TRUE(load_options<RunOptions>(folder.write("empty.yaml", "")));
+  const auto missing = load_options<RunOptions>(folder.path() + "/none.yaml");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::configuration);
+  EXPECT_EQ(missing.error().where, folder.path() + "/none.yaml");
+}
+
+TEST(Options, OneCanBeSetOnACommandLine) {
+  auto options = set_option(RunOptions{}, "matcher.speckle.size_px=12");
+  ASSERT_TRUE(options) << options.error().message();
+  options = set_option(*options, "matcher.lengths_m=[5, 10]");
+  ASSERT_TRUE(options);
+  options = set_option(*options, "matcher.note=a = b");
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->matcher.speckle.size_px, 12);
+  EXPECT_EQ(options->matcher.lengths_m, (std::vector<double>{5, 10}));
+  EXPECT_EQ(options->matcher.note, "a = b");
+  EXPECT_EQ(options->threads, 1);
+}
+
+TEST(Options, WhatCannotBeSetIsAFaultOfUsage) {
+  for (const char* assignment : {"threads", "=3", "threads=", "threads=0", "thread=2", "matcher=3", "threads.x=1",
+                                 "matcher.note=[", "matcher.gain=1}, threads: {2", "..=1"}) {
+    const auto options = set_option(RunOptions{}, assignment);
+    ASSERT_FALSE(options) << assignment;
+    EXPECT_EQ(options.error().code, ErrorCode::usage) << assignment;
+    EXPECT_THAT(options.error().message(), HasSubstr("--set"));
+  }
+  EXPECT_THAT(set_option(RunOptions{}, "threads=0").error().message(), Not(HasSubstr("=0:1"))) << "no line numbers";
+}
+
+TEST(Options, ListsEveryOptionInOrder) {
+  const auto lines = list_options(RunOptions{});
+  ASSERT_EQ(lines.size(), 8U);
+  EXPECT_EQ(lines[0].key, "matcher.enabled");
+  EXPECT_EQ(lines[1].meaning, "how to match (sgm | block)");
+  EXPECT_EQ(lines[5].key, "matcher.speckle.size_px");
+  EXPECT_EQ(lines[5].value, "100");
+  EXPECT_EQ(lines[7].key, "threads");
+}
+
+RC_GTEST_PROP(Options, DumpsParseToTheSameBits, (double gain, bool enabled, int size)) {
+  RC_PRE(std::isfinite(gain));
+  RunOptions options;
+  options.matcher.gain = gain;
+  options.matcher.enabled = enabled;
+  options.matcher.speckle.size_px = size & 0x7FFFFFFF;
+  options.matcher.note = *rc::gen::container<std::string>(rc::gen::inRange<char>(' ', 127));
+  options.matcher.lengths_m = {std::abs(gain), std::nextafter(1.0, 2.0), 5e-324, 1.7976931348623157e308};
+  const auto back = parse(dump_options(options));
+  if (!back) RC_FAIL(back.error().message());
+  RC_ASSERT(std::bit_cast<std::uint64_t>(back->matcher.gain) == std::bit_cast<std::uint64_t>(gain));
+  RC_ASSERT(back->matcher.enabled == enabled);
+  RC_ASSERT(back->matcher.speckle.size_px == options.matcher.speckle.size_px);
+  RC_ASSERT(back->matcher.note == options.matcher.note);
+  RC_ASSERT(back->matcher.lengths_m == options.matcher.lengths_m);
+}
+
+}  // namespace
+}  // namespace spartan
