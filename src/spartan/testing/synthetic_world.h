@@ -6,19 +6,9 @@
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"
 #include "spartan/rig/rectified_stereo.h"
+#include "spartan/testing/synthetic_terrain.h"
 
 namespace spartan::testing {
-
-/// A height field z(x, y) over the world plane with a texture fixed to it; both are sums of smooth noise, so that
-/// exact intersections and sub-pixel truth exist.
-struct SyntheticWorldOptions {
-  std::uint64_t seed = 1;
-  double relief_m = 0.05;         ///< standard deviation of the height
-  double relief_size_m = 1.0;     ///< wavelength of the largest hills
-  double texture_size_m = 0.004;  ///< finest grain of the texture
-  double contrast = 0.25;         ///< standard deviation of the albedo over its mean
-  double noise_levels = 1.0;      ///< standard deviation of the image noise, gray levels
-};
 
 /// Two images and what is true about them.
 struct SyntheticShot {
@@ -31,14 +21,23 @@ class SyntheticWorld {
  public:
   explicit SyntheticWorld(const SyntheticWorldOptions& options);
 
-  /// Height of the ground, metres.
+  /// Height of the ground with its stones, and of the hills alone (where a rover would drive), metres.
   double height(double x, double y) const;
+  double relief(double x, double y) const;
   /// `world_from_left`: left optical frame (x right, y down, z forward) in the world (z up). `noise_seed` changes the
   /// image noise only.
   SyntheticShot render(const RectifiedStereo& stereo, const Pose& world_from_left, std::uint64_t noise_seed) const;
 
  private:
+  struct Eye;
+  struct Surface;
+  Image<double> measure_depth(const Eye& eye) const;
+  Image<std::uint8_t> photograph(const Eye& eye, ImageView<const double> depth, std::uint64_t noise_seed) const;
+  double gray_level(const Eye& eye, int u, int v, double depth, bool at_edge) const;
+  double reflected(const Eye& eye, const Surface& surface, double depth) const;
+
   SyntheticWorldOptions options_;
+  SyntheticTerrain terrain_;
 };
 
 }  // namespace spartan::testing

@@ -1,0 +1,53 @@
+// Smooth random functions of the plane, with their derivatives.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace spartan::testing {
+
+/// A well-mixed number from three.
+inline std::uint32_t mix(std::int32_t x, std::int32_t y, std::uint32_t seed) {
+  std::uint32_t h =
+      (static_cast<std::uint32_t>(x) * 0x8da6b343U) ^ (static_cast<std::uint32_t>(y) * 0xd8163841U) ^ seed;
+  h ^= h >> 16U;
+  h *= 0x7feb352dU;
+  h ^= h >> 15U;
+  h *= 0x846ca68bU;
+  return h ^ (h >> 16U);
+}
+
+/// A function value and its gradient.
+struct NoiseSample {
+  double value = 0;
+  double dx = 0, dy = 0;
+};
+
+/// Gradient noise on the integer lattice (Perlin, "Improving Noise", SIGGRAPH 2002: unit gradients, quintic fade):
+/// twice continuously differentiable, mean 0, standard deviation kNoiseSigma,
+/// magnitude below kNoiseHighest, slope below kNoiseSteepest, second
+/// derivatives below kNoiseMostCurved.
+NoiseSample gradient_noise(double x, double y, std::uint32_t seed);
+/// The value alone, the same bits.
+double gradient_noise_value(double x, double y, std::uint32_t seed);
+inline constexpr double kNoiseSigma = 0.216;
+inline constexpr double kNoiseHighest = 0.7072;
+inline constexpr double kNoiseSteepest = 2.1;
+inline constexpr double kNoiseMostCurved = 12;
+
+/// One octave of a sum of noise: lattice spacing `size`, turned and shifted so that lattices do not line up.
+struct Octave {
+  double size = 1;
+  double amplitude = 1;  ///< the noise is multiplied by it
+  double cosine = 1, sine = 0, shift_x = 0, shift_y = 0;
+  std::uint32_t seed = 0;
+
+  NoiseSample operator()(double x, double y) const;
+  double value(double x, double y) const;
+};
+
+/// `count` octaves of sizes `largest`, `largest`/2 …; amplitudes fall by `gain` from each to the next, and the
+/// standard deviation of the sum is `sigma`.
+std::vector<Octave> make_octaves(std::uint64_t seed, int count, double largest, double gain, double sigma);
+
+}  // namespace spartan::testing
