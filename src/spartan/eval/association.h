@@ -1,0 +1,18 @@
+// Which pose of one trajectory belongs to which of another.
+#pragma once
+
+#include "spartan/core/result.h"
+#include "spartan/core/trajectory.h"
+
+namespace spartan {
+
+/// Two trajectories of equal length whose poses correspond one to one.
+struct AssociatedTrajectories {
+  Trajectory estimate, truth;
+};
+
+/// Pairs every pose of the estimate with the truth pose nearest in time, at most `max_dt_s` (seconds) away; where
+/// several ask for the same truth pose, the nearest gets it. Code `input` where no pair is found.
+Result<AssociatedTrajectories> associate(const Trajectory& estimate, const Trajectory& truth, double max_dt_s);
+
+}  // namespace spartan
