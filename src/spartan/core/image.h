@@ -39,8 +39,9 @@ class ImageView {
   ImageView(T* data, int width, int height, std::ptrdiff_t stride)
       : data_(data), width_(width), height_(height), stride_(stride) {}
   /// A view of pixels is also a view of constant pixels.
-  ImageView(const ImageView<std::remove_const_t<T>>& other)
-    requires std::is_const_v<T>
+  template <class Other>
+    requires(std::is_const_v<T> && std::is_same_v<Other, std::remove_const_t<T>>)
+  ImageView(const ImageView<Other>& other)
       : data_(other.data()), width_(other.width()), height_(other.height()), stride_(other.stride()) {}
 
   T* data() const { return data_; }

@@ -32,8 +32,10 @@ struct ImagingOptions {
 /// frame to frame.
 class Imager {
  public:
-  /// Code `configuration` where a pair cannot be rectified (eyes that look apart, no common view).
-  static Result<Imager> create(const Rig& rig, const ImagingOptions& options, Workers workers);
+  /// Code `configuration` where a pair cannot be rectified (eyes that look apart, no common view) or a self-mask
+  /// cannot be read. `mask_folder`: the rig file's folder, which the names of self-masks are relative to.
+  static Result<Imager> create(const Rig& rig, const ImagingOptions& options, Workers workers,
+                               const std::string& mask_folder = {});
   Imager(Imager&&) noexcept;
   Imager& operator=(Imager&&) noexcept;
   ~Imager();

@@ -1,0 +1,98 @@
+#include "spartan/imaging/contrast.h"
+
+#include <gtest/gtest.h>
+
+namespace spartan {
+namespace {
+
+// A horizontal ramp from `low` to `high`, shifted up by `shift` bits.
+template <class T>
+Image<T> ramp(int low, int high, int shift = 0) {
+  const int width = high - low + 1;
+  Image<T> image(width, 4);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < width; ++x) image(x, y) = static_cast<T>((low + x) << shift);
+  }
+  return image;
+}
+
+template <class T>
+ContrastMapping stretched(PixelFormat format, ImageView<const T> left, ImageView<const T> right, double low = 0.1,
+                          double high = 99.9) {
+  GrayHistogram histogram(format);
+  histogram.add(left);
+  histogram.add(right);
+  ContrastMapping mapping(format);
+  mapping.stretch(histogram, low, high);
+  return mapping;
+}
+
+TEST(Contrast, PercentilesCountSamples) {
+  GrayHistogram histogram({});
+  histogram.add(ramp<std::uint8_t>(10, 109).view());
+  EXPECT_EQ(histogram.percentile(0), 10);
+  EXPECT_EQ(histogram.percentile(50), 60);
+  EXPECT_EQ(histogram.percentile(99.5), 109);
+  EXPECT_EQ(histogram.percentile(100), 109);
+}
+
+TEST(Contrast, AFullRangeStaysAsItIs) {
+  const auto image = ramp<std::uint8_t>(0, 255);
+  const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);
+  for (int level = 0; level < 256; ++level) EXPECT_EQ(mapping(level), level);
+}
+
+TEST(Contrast, BothEyesGetOneMapping) {
+  const auto dark = ramp<std::uint8_t>(40, 99);
+  const auto bright = ramp<std::uint8_t>(80, 139);
+  const ContrastMapping mapping = stretched<std::uint8_t>({}, dark, bright, 0, 100);
+  EXPECT_EQ(mapping(40), 0);
+  EXPECT_EQ(mapping(139), 255);
+  EXPECT_EQ(mapping(0), 0);
+  EXPECT_EQ(mapping(255), 255);
+  EXPECT_NEAR(mapping(90), 255.0 * 50 / 99, 0.5);
+}
+
+TEST(Contrast, LowAndHighAlignmentOfTwelveBitsGiveTheSame) {
+  const PixelFormat low{PixelLayout::gray, 12, BitAlignment::low}, high{PixelLayout::gray, 12, BitAlignment::high};
+  const auto stored_low = ramp<std::uint16_t>(500, 1500), stored_high = ramp<std::uint16_t>(500, 1500, 4);
+  const auto mapping_low = stretched<std::uint16_t>(low, stored_low, stored_low);
+  const auto mapping_high = stretched<std::uint16_t>(high, stored_high, stored_high);
+  Image<std::uint8_t> from_low(stored_low.size()), from_high(stored_high.size());
+  mapping_low.apply(stored_low, from_low, Workers(1));
+  mapping_high.apply(stored_high, from_high, Workers(2));
+  for (int x = 0; x < from_low.width(); ++x) EXPECT_EQ(from_low(x, 3), from_high(x, 3));
+  EXPECT_EQ(from_low(0, 0), 0);
+  EXPECT_EQ(from_low(from_low.width() - 1, 0), 255);
+}
+
+TEST(Contrast, SixteenBitsWithoutStretchAreScaled) {
+  const ContrastMapping mapping(PixelFormat{PixelLayout::gray, 16, BitAlignment::low});
+  EXPECT_EQ(mapping(0), 0);
+  EXPECT_EQ(mapping(32768), 128);
+  EXPECT_EQ(mapping(65535), 255);
+}
+
+TEST(Contrast, AConstantPictureKeepsItsLevel) {
+  const Image<std::uint8_t> image(8, 8, 77);
+  EXPECT_EQ(stretched<std::uint8_t>({}, image, image)(77), 77);
+}
+
+TEST(Contrast, NoiseIsNotBlownUp) {
+  const auto image = ramp<std::uint8_t>(100, 103);
+  const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);
+  EXPECT_LE(mapping(103) - mapping(100), 3 * 255 / ContrastMapping::kLeastLevels + 1);
+  EXPECT_NEAR((mapping(103) + mapping(100)) / 2, 127, 10);
+}
+
+TEST(Contrast, StrayBitsDoNotLeaveTheTable) {
+  const PixelFormat format{PixelLayout::gray, 10, BitAlignment::low};
+  const Image<std::uint16_t> image(4, 4, 0xffff);
+  Image<std::uint8_t> result(4, 4);
+  const ContrastMapping mapping = stretched<std::uint16_t>(format, image, image);
+  mapping.apply(image, result, Workers(1));
+  EXPECT_EQ(result(0, 0), 255);
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,162 @@
+#include "spartan/imaging/rectification.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+namespace spartan {
+namespace {
+
+constexpr double kTolerance_px = 0.02;  // of images that count as rectified
+constexpr double kLargestAngle_rad = std::numbers::pi / 3;
+
+/// The pinhole a camera is, where it has no distortion and square pixels.
+std::optional<PinholeModel> plain_pinhole(const Camera& camera) {
+  PinholeModel pinhole;
+  if (const auto* radial = std::get_if<RadialTangentialModel>(&camera.model)) {
+    for (const double k : radial->coefficients()) {
+      if (k != 0) return std::nullopt;
+    }
+    pinhole = radial->pinhole();
+  } else if (const auto* plain = std::get_if<PinholeModel>(&camera.model)) {
+    pinhole = *plain;
+  } else {
+    return std::nullopt;
+  }
+  const double skew_px = std::abs(pinhole.fx / pinhole.fy - 1) * camera.size.height;
+  return skew_px < kTolerance_px ? std::optional(pinhole) : std::nullopt;
+}
+
+/// The geometry of two cameras that need no rectification.
+std::optional<RectifiedStereo> rectified_already(const Camera& left, const Camera& right, const Pose& right_from_left) {
+  const auto l = plain_pinhole(left), r = plain_pinhole(right);
+  if (!l || !r || left.size != right.size) return std::nullopt;
+  const double larger_side = std::max(left.size.width, left.size.height);
+  const double focal_difference_px = std::abs(l->fx / r->fx - 1) * larger_side;
+  const double centre_difference_px = std::hypot(l->cx - r->cx, l->cy - r->cy);
+  const double turn_px = rotation_angle(right_from_left) * std::max(l->fx, larger_side);
+  const Eigen::Vector3d right_eye = right_from_left.inverse().translation();
+  // A baseline off by the angle a shifts rows by a · disparity; a quarter of the width is as large as those get.
+  const double slope = std::hypot(right_eye.y(), right_eye.z()) / right_eye.x();
+  const double row_shift_px = slope * left.size.width / 4;
+  if (right_eye.x() <= 0 ||
+      std::max({focal_difference_px, centre_difference_px, turn_px, row_shift_px}) >= kTolerance_px) {
+    return std::nullopt;
+  }
+  return RectifiedStereo{left.size, l->fx, {l->cx, l->cy}, right_eye.x()};
+}
+
+/// Pixels per radian on the optical axis, the geometric mean of both directions.
+std::optional<double> resolution_on_axis(const Camera& camera) {
+  const auto projection = project_with_jacobian(camera.model, Eigen::Vector3d::UnitZ());
+  if (!projection) return std::nullopt;
+  return std::sqrt(std::abs(projection->by_point.leftCols<2>().determinant()));
+}
+
+/// Where an eye's outline lies in the rectified view at focal length 1: the mean over points along the border.
+std::optional<Eigen::Vector2d> mean_outline(const Camera& camera, const Eigen::Matrix3d& camera_from_rectified) {
+  constexpr int kPerSide = 32;
+  const double last_x = camera.size.width - 1, last_y = camera.size.height - 1;
+  std::vector<Eigen::Vector2d> border;
+  for (int i = 0; i <= kPerSide; ++i) {
+    const double part = static_cast<double>(i) / kPerSide;
+    border.insert(border.end(),
+                  {{part * last_x, 0}, {part * last_x, last_y}, {0, part * last_y}, {last_x, part * last_y}});
+  }
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  int count = 0;
+  for (const Eigen::Vector2d& pixel : border) {
+    const auto ray = unproject(camera.model, pixel);
+    if (!ray) continue;
+    const Eigen::Vector3d direction = camera_from_rectified.transpose() * ray->direction;
+    if (direction.z() < 0.1) continue;
+    sum += direction.hnormalized();
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / count;
+}
+
+Status check_baseline(const Eigen::Vector3d& right_eye, const std::string& where) {
+  const auto place = fmt::format(
+      "the right eye stands {:.1f} mm to the right of the left one, {:.1f} mm below and "
+      "{:.1f} mm before it",
+      1e3 * right_eye.x(), 1e3 * right_eye.y(), 1e3 * right_eye.z());
+  const double along_x = std::abs(right_eye.x());
+  if (!(right_eye.norm() > 0) || !right_eye.allFinite()) {
+    return failure(ErrorCode::configuration, "the baseline is zero or not finite", where);
+  }
+  if (std::abs(right_eye.y()) > along_x) {
+    return failure(ErrorCode::configuration, "the baseline is more vertical than horizontal: " + place, where,
+                   "eyes above each other are not supported; check the transforms of the two cameras");
+  }
+  if (std::abs(right_eye.z()) > along_x) {
+    return failure(ErrorCode::configuration, "the eyes stand behind each other: " + place, where,
+                   "check the transforms of the two cameras");
+  }
+  if (right_eye.x() < 0) {
+    return failure(ErrorCode::configuration, "the eyes are swapped: " + place, where,
+                   "exchange left and right of the pair, or invert the transform if it was given the wrong way round");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Rectification> plan_rectification(const Camera& left, const Camera& right, const Pose& right_from_left,
+                                         const std::string& where) {
+  const Pose left_from_right = right_from_left.inverse();
+  const Eigen::Vector3d right_eye = left_from_right.translation();
+  if (Status status = check_baseline(right_eye, where); !status) return failure(status);
+
+  Rectification plan;
+  if (const auto geometry = rectified_already(left, right, right_from_left)) {
+    plan.geometry = *geometry;
+    plan.passes_through = true;
+    return plan;
+  }
+
+  const Eigen::Vector3d left_axis = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d right_axis = left_from_right.rotation() * Eigen::Vector3d::UnitZ();
+  const double apart = std::atan2(left_axis.cross(right_axis).norm(), left_axis.dot(right_axis));
+  if (apart > kLargestAngle_rad) {
+    return failure(
+        ErrorCode::configuration,
+        fmt::format("the eyes look apart: their axes are {:.1f}° from each other", apart * 180 / std::numbers::pi),
+        where, "check the transforms of the two cameras");
+  }
+  const Eigen::Vector3d x = right_eye.normalized();
+  const Eigen::Vector3d mean_axis = left_axis + right_axis;
+  const Eigen::Vector3d z = (mean_axis - mean_axis.dot(x) * x).normalized();
+  plan.left_from_rectified << x, z.cross(x), z;
+  plan.right_from_rectified = right_from_left.rotation_matrix() * plan.left_from_rectified;
+
+  const auto left_resolution = resolution_on_axis(left), right_resolution = resolution_on_axis(right);
+  const auto left_outline = mean_outline(left, plan.left_from_rectified);
+  const auto right_outline = mean_outline(right, plan.right_from_rectified);
+  if (!left_resolution || !right_resolution || !left_outline || !right_outline) {
+    return failure(ErrorCode::configuration, "the two eyes have no common view", where);
+  }
+  plan.geometry.size = left.size;
+  plan.geometry.focal_px = (*left_resolution + *right_resolution) / 2;
+  plan.geometry.baseline_m = right_eye.norm();
+  const Eigen::Vector2d middle((left.size.width - 1) / 2.0, (left.size.height - 1) / 2.0);
+  plan.geometry.centre_px = middle - plan.geometry.focal_px * (*left_outline + *right_outline) / 2;
+  return plan;
+}
+
+Rectification assume_rectified(const Camera& left, const Pose& right_from_left) {
+  Rectification plan;
+  plan.passes_through = true;
+  plan.geometry.size = left.size;
+  plan.geometry.focal_px = resolution_on_axis(left).value_or(1);
+  plan.geometry.centre_px = project(left.model, Eigen::Vector3d::UnitZ()).value_or(Eigen::Vector2d::Zero());
+  plan.geometry.baseline_m = right_from_left.translation().norm();
+  return plan;
+}
+
+}  // namespace spartan
