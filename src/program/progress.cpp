@@ -1,0 +1,55 @@
+#include "program/progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace spartan::program {
+namespace {
+
+constexpr int kBarWidth = 30;
+constexpr std::chrono::milliseconds kRedrawEvery{100};
+
+}  // namespace
+
+Progress::Progress(bool quiet)
+    : quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1), start_(std::chrono::steady_clock::now()) {}
+
+Progress::~Progress() {
+  if (line_open_) std::fputc('\n', stderr);
+}
+
+std::string Progress::time_left(int done, int total) const {
+  const int here = done - first_;
+  if (here < 1 || total <= done) return "";
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  const int left = static_cast<int>(seconds / here * (total - done) + 0.5);
+  return left >= 60 ? fmt::format(", {} min {:02d} s left", left / 60, left % 60) : fmt::format(", {} s left", left);
+}
+
+void Progress::show(int done, int total, const std::string& note) {
+  if (quiet_) return;
+  if (first_ < 0) {
+    first_ = done;
+    start_ = std::chrono::steady_clock::now();
+  }
+  if (!terminal_) {
+    const int tenth = total > 0 ? 10 * done / total : done / 100;
+    if (tenth == last_tenth_) return;
+    last_tenth_ = tenth;
+    fmt::print(stderr, "{}/{} {}{}\n", done, total, note, time_left(done, total));
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (done < total && now - last_shown_ < kRedrawEvery) return;
+  last_shown_ = now;
+  const int filled = total > 0 ? std::clamp(kBarWidth * done / total, 0, kBarWidth) : 0;
+  fmt::print(stderr, "\r[{}{}] {}/{} {}{}\033[K", std::string(static_cast<std::size_t>(filled), '#'),
+             std::string(static_cast<std::size_t>(kBarWidth - filled), '.'), done, total, note, time_left(done, total));
+  std::fflush(stderr);
+  line_open_ = true;
+}
+
+}  // namespace spartan::program

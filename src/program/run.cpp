@@ -1,0 +1,98 @@
+#include "spartan/system/run.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "program/interrupt.h"
+#include "program/progress.h"
+#include "program/run_arguments.h"
+#include "program/verbs.h"
+#include "spartan/system/run_folder.h"
+
+namespace spartan::program {
+namespace {
+
+struct RunArguments {
+  std::string input, output, rig, format, config, truth;
+  std::vector<std::string> set;
+  bool resume = false, odometry_only = false;
+  int max_frames = 0;
+};
+
+std::string summary_for_people(const std::string& summary_json, const std::string& folder) {
+  const auto s = nlohmann::json::parse(summary_json);
+  const auto& health = s["health"]["odometry"];
+  std::string text = fmt::format("{} frames, {:.2f} m in {:.1f} s ({:.1f} s of CPU), {:.0f} MB\n",
+                                 s["frames"].get<int>(), s["distance_m"].get<double>(), s["wall_seconds"].get<double>(),
+                                 s["cpu_seconds"].get<double>(), s["peak_memory_bytes"].get<double>() / 1e6);
+  text += fmt::format("odometry: {} tracking, {} degraded, {} standing, {} lost\n", health["tracking"].get<int>(),
+                      health["degraded"].get<int>(), health["standing"].get<int>(), health["lost"].get<int>());
+  for (const auto& [reason, count] : s["skipped"].items())
+    text += fmt::format("skipped: {} {}\n", count.get<int>(), reason);
+  for (const auto& span : s["lost_spans"]) {
+    text += fmt::format("lost from {} to {} ns: {}\n", span["from_ns"].get<std::int64_t>(),
+                        span["to_ns"].get<std::int64_t>(), span["reason"].get<std::string>());
+  }
+  return text + "results in " + folder + "\n";
+}
+
+Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments) {
+  RunRequest request;
+  auto options = run_options(arguments.config, arguments.set);
+  if (!options) return failure(options);
+  request.options = std::move(*options);
+  if (arguments.odometry_only) request.options.terrain.enabled = false;
+  if (!arguments.format.empty()) {
+    const auto format = parse_recording_format(arguments.format);
+    if (!format) return failure(format);
+    request.format = *format;
+  }
+  request.input = arguments.input;
+  request.output = arguments.output;
+  request.rig_file = arguments.rig;
+  request.truth_file = arguments.truth;
+  request.resume = arguments.resume;
+  request.threads = context.threads;
+  request.max_frames = arguments.max_frames;
+  request.version = SPARTAN_VERSION;
+
+  Progress progress(context.quiet);
+  RunHooks hooks;
+  hooks.log = context.log;
+  hooks.should_stop = interrupted;
+  hooks.progress = [&progress](const RunProgress& p) { progress.show(p.done, p.announced, p.status); };
+  const auto outcome = run(request, hooks);
+  if (!outcome) return failure(outcome);
+  const Status printed =
+      print(context.json ? outcome->summary_json : summary_for_people(outcome->summary_json, arguments.output));
+  if (!printed) return failure(printed);
+  if (outcome->interrupted) {
+    return failure(ErrorCode::interrupted, "stopped on request", arguments.output, "go on with --resume");
+  }
+  return outcome->lost ? kLost : kDone;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Context& context) {
+  auto a = std::make_shared<RunArguments>();
+  CLI::App* verb = add_verb(app, context, "run", "Drive through a recording: trajectory and terrain",
+                            "run $SPARTAN_DATA/kitti_06 -o run_06", [&context, a] { return run_verb(context, *a); });
+  verb->add_option("input", a->input, "the recording's folder")->required();
+  verb->add_option("-o,--output", a->output, "the run folder to make")->required();
+  verb->add_option("--rig", a->rig, "calibration to use in place of the recording's own");
+  verb->add_option("--format", a->format, "spartan, kitti, kitti-raw or euroc; guessed without it");
+  verb->add_option("--config", a->config, "YAML file with options (see `spartan config dump`)");
+  verb->add_option("--set", a->set, "one option, as group.key=value; may be given again")->allow_extra_args(false);
+  verb->add_option("--truth", a->truth, "trajectory to compare with; the figures go into the summary");
+  verb->add_flag("--resume", a->resume, "go on where an earlier run of this folder stopped");
+  verb->add_option("--max-frames", a->max_frames, "stop after so many shots")->check(CLI::NonNegativeNumber);
+  verb->add_flag("--odometry-only", a->odometry_only, "the trajectory without the terrain");
+  add_threads_option(*verb, context);
+  add_json_flag(*verb, context);
+}
+
+}  // namespace spartan::program

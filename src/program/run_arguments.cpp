@@ -1,0 +1,20 @@
+#include "program/run_arguments.h"
+
+namespace spartan::program {
+
+Result<RunOptions> run_options(const std::string& file, const std::vector<std::string>& assignments) {
+  RunOptions options;
+  if (!file.empty()) {
+    auto loaded = load_options<RunOptions>(file);
+    if (!loaded) return failure(loaded);
+    options = std::move(*loaded);
+  }
+  for (const std::string& assignment : assignments) {
+    auto changed = set_option(options, assignment);
+    if (!changed) return failure(changed);
+    options = std::move(*changed);
+  }
+  return options;
+}
+
+}  // namespace spartan::program

@@ -1,0 +1,101 @@
+#include "spartan/system/export.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "spartan/core/files.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/rig/rig_files.h"
+#include "spartan/system/run_folder.h"
+#include "spartan/system/run_store.h"
+#include "spartan/system/summary.h"
+#include "spartan/system/terrain_files.h"
+
+namespace spartan {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, ExportFormat>, 5> kFormats{{{"tum", ExportFormat::tum},
+                                                                             {"kitti", ExportFormat::kitti},
+                                                                             {"euroc", ExportFormat::euroc},
+                                                                             {"csv", ExportFormat::csv},
+                                                                             {"ply", ExportFormat::ply}}};
+
+Result<std::string> kitti_text(const RunFolder& folder, const std::vector<FrameRecord>& frames) {
+  const auto rig = read_rig_yaml(folder.rig());
+  if (!rig) return failure(rig);
+  const StereoPair* const pair = rig->find_pair(frames.front().pair);
+  if (pair == nullptr) return failure(ErrorCode::input, "does not know the pair " + frames.front().pair, folder.rig());
+  const Pose body_from_left = rig->body_from_camera(pair->left);
+  const Pose first_left_from_world = (frames.front().world_from_body.pose * body_from_left).inverse();
+  Trajectory trajectory;
+  for (const FrameRecord& frame : frames) {
+    trajectory.push_back({frame.stamp, first_left_from_world * frame.world_from_body.pose * body_from_left});
+  }
+  return to_kitti(trajectory);
+}
+
+std::string csv_text(const std::vector<FrameRecord>& frames) {
+  std::string text =
+      "frame_id,stamp_ns,status,x_m,y_m,z_m,qx,qy,qz,qw,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_rad,sigma_ry_rad,"
+      "sigma_rz_rad,matches,inliers,rms_px\n";
+  for (const FrameRecord& f : frames) {
+    const auto& t = f.world_from_body.pose.translation();
+    const auto& q = f.world_from_body.pose.rotation();
+    text += fmt::format("{},{},{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f}", f.frame_id, f.stamp.ns,
+                        f.status, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    for (int i = 0; i < 6; ++i)
+      text += fmt::format(",{:.6g}", std::sqrt(std::max(0.0, f.world_from_body.covariance(i, i))));
+    text += fmt::format(",{},{},{:.4f}\n", f.motion.matches, f.motion.inliers, f.motion.rms_px);
+  }
+  return text;
+}
+
+Result<std::string> trajectory_text(const RunFolder& folder, ExportFormat format,
+                                    const std::vector<FrameRecord>& frames) {
+  switch (format) {
+    case ExportFormat::tum:
+      return to_tum(measured_trajectory(frames));
+    case ExportFormat::euroc:
+      return to_euroc(measured_trajectory(frames));
+    case ExportFormat::kitti:
+      return kitti_text(folder, frames);
+    case ExportFormat::csv:
+      return csv_text(frames);
+    case ExportFormat::ply:
+      break;
+  }
+  return failure(ErrorCode::internal, "is not a format for trajectories", folder.path);
+}
+
+}  // namespace
+
+Result<ExportFormat> parse_export_format(std::string_view name) {
+  std::string known;
+  for (const auto& [text, format] : kFormats) {
+    if (text == name) return format;
+    known += (known.empty() ? "" : ", ") + std::string(text);
+  }
+  return failure(ErrorCode::usage, fmt::format("'{}' is not a format; known: {}", name, known), "--format");
+}
+
+Status export_run(const std::string& run_folder, ExportFormat format, const std::string& path) {
+  const RunFolder folder{run_folder};
+  auto store = RunStore::open_read_only(folder.store());
+  if (!store) return failure(store);
+  if (format == ExportFormat::ply) {
+    const auto terrain = store->terrain();
+    if (!terrain) return failure(terrain);
+    return merge_terrain_clouds(folder.terrain(), *terrain, path);
+  }
+  const auto frames = store->frames();
+  if (!frames) return failure(frames);
+  if (frames->empty()) return failure(ErrorCode::input, "holds no frames", folder.store());
+  const auto text = trajectory_text(folder, format, *frames);
+  if (!text) return failure(text);
+  return write_file_atomically(path, *text);
+}
+
+}  // namespace spartan

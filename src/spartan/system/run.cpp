@@ -1,0 +1,279 @@
+#include "spartan/system/run.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <ctime>
+#include <filesystem>
+
+#include "spartan/core/files.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/rig/rig_files.h"
+#include "spartan/system/pipeline.h"
+#include "spartan/system/run_folder.h"
+#include "spartan/system/run_store.h"
+#include "spartan/system/summary.h"
+#include "spartan/system/terrain_files.h"
+
+namespace spartan {
+namespace {
+
+constexpr double kSecondsForGravity = 1.0;
+
+// FNV-1a over what identifies a recording without reading its images: layout, pairs and announced stamps.
+std::string fingerprint(const FrameSource& source) {
+  std::uint64_t hash = 14695981039346656037ULL;
+  const auto mix = [&hash](std::string_view bytes) {
+    for (const char c : bytes) hash = (hash ^ static_cast<std::uint8_t>(c)) * 1099511628211ULL;
+  };
+  mix(name_of(source.info().format));
+  for (const StereoPair& pair : source.info().rig.pairs) {
+    mix(pair.name);
+    for (const Stamp stamp : source.announced_stamps(pair.name)) mix(std::to_string(stamp.ns));
+  }
+  return fmt::format("{:016x}", hash);
+}
+
+void report_sequence(const RecordingInfo& info, const Log& log) {
+  const SequenceReport& s = info.sequence;
+  log.info(fmt::format("{}: {} recording ({}), rig from {}, {} stereo shots", info.path, name_of(info.format),
+                       info.layout_reason, info.rig_source, s.announced));
+  if (s.orphans_left + s.orphans_right > 0) {
+    log.warning(
+        fmt::format("{} left and {} right images have no partner near in time", s.orphans_left, s.orphans_right));
+  }
+  if (s.reversals > 0) log.warning(fmt::format("{} time stamps run backwards; those shots are skipped", s.reversals));
+  if (s.gaps > 0)
+    log.warning(
+        fmt::format("{} gaps, the longest {:.2f} s (usual step {:.3f} s)", s.gaps, s.longest_gap_s, s.median_step_s));
+}
+
+// One run from its first sample to its last.
+class Drive {
+ public:
+  Drive(const RunRequest& request, const RunHooks& hooks, FrameSource& source, Pipeline pipeline, RunStore store,
+        RunFolder folder)
+      : request_(request),
+        hooks_(hooks),
+        source_(source),
+        pipeline_(std::move(pipeline)),
+        store_(std::move(store)),
+        folder_(std::move(folder)) {}
+
+  Status begin();
+  Status drive();
+  int usable() const { return usable_; }
+  bool stopped() const { return stopped_; }
+  bool gravity_measured() const { return pipeline_.gravity_measured(); }
+  std::optional<std::int64_t> resumed_from_frame() const { return resumed_from_frame_; }
+  RunStore& store() { return store_; }
+
+ private:
+  Status take(const Sample& sample);
+  Status take_frame(const StereoFrame& frame);
+  Status take_missing(const MissingFrame& missing);
+  Status commit(FrameRecord record, const std::optional<TerrainRecord>& terrain);
+
+  const RunRequest& request_;
+  const RunHooks& hooks_;
+  FrameSource& source_;
+  Pipeline pipeline_;
+  RunStore store_;
+  RunFolder folder_;
+  StageClock clock_;
+  std::int64_t samples_taken_ = 0;
+  int shots_ = 0;   // announced shots taken, missing ones too
+  int usable_ = 0;  // shots with both images
+  bool stopped_ = false;
+  bool resumed_ = false;
+  std::optional<std::int64_t> resumed_from_frame_;
+};
+
+Status Drive::begin() {
+  auto memory = store_.memory();
+  if (!memory) return failure(memory);
+  if (!*memory) {
+    const auto imu = source_.first_imu_samples(kSecondsForGravity);
+    if (!imu) return failure(imu);
+    for (const ImuSample& sample : *imu) pipeline_.add(sample);
+    return {};
+  }
+  const auto frames = store_.frames();
+  if (!frames) return failure(frames);
+  shots_ = static_cast<int>(frames->size());
+  for (const FrameRecord& frame : *frames) usable_ += frame.status != "missing";
+  if (Status status = pipeline_.restore((*memory)->stages); !status) return status;
+  samples_taken_ = (*memory)->samples_taken;
+  resumed_ = true;
+  hooks_.log.info(fmt::format("resuming behind frame {}", frames->back().frame_id));
+  return source_.seek(samples_taken_);
+}
+
+Status Drive::drive() {
+  while (request_.max_frames == 0 || shots_ < request_.max_frames) {
+    if (hooks_.should_stop && hooks_.should_stop()) {
+      stopped_ = true;
+      return {};
+    }
+    const auto sample = clock_.measure("camera", [&] { return source_.next(); });
+    if (!sample) return failure(sample);
+    if (!*sample) return {};
+    ++samples_taken_;
+    if (Status status = take(**sample); !status) return status;
+  }
+  return {};
+}
+
+Status Drive::take(const Sample& sample) {
+  if (const auto* frame = std::get_if<StereoFrame>(&sample)) return take_frame(*frame);
+  if (const auto* missing = std::get_if<MissingFrame>(&sample)) return take_missing(*missing);
+  clock_.take();  // reading a number from a table is not worth a line in the summary
+  if (const auto* imu = std::get_if<ImuSample>(&sample)) pipeline_.add(*imu);
+  if (const auto* wheels = std::get_if<WheelSample>(&sample)) pipeline_.add(*wheels);
+  if (const auto* compass = std::get_if<CompassSample>(&sample)) pipeline_.add(*compass);
+  if (const auto* inclinometer = std::get_if<InclinometerSample>(&sample)) pipeline_.add(*inclinometer);
+  return {};
+}
+
+Status Drive::take_frame(const StereoFrame& frame) {
+  auto result = pipeline_.add(frame);
+  if (!result) {
+    // The shot does not fit the rig: it is said, counted and left out.
+    if (result.error().code != ErrorCode::input) return failure(result);
+    return take_missing(
+        {frame.frame_id, frame.pair, frame.left_stamp, FrameFault::wrong_size, result.error().message()});
+  }
+  if (!*result) {
+    clock_.take();
+    return {};
+  }
+  FrameResult& shot = **result;
+  ++usable_;
+  FrameRecord record;
+  record.frame_id = shot.frame_id;
+  record.pair = shot.pair;
+  record.stamp = shot.stamp;
+  record.status = name_of(shot.motion.status);
+  record.message = shot.motion.reason;
+  record.has_pose = shot.motion.status != TrackingStatus::lost;
+  record.world_from_body = shot.world_from_body;
+  record.motion = shot.motion;
+  if (shot.motion.status == TrackingStatus::lost) {
+    hooks_.log.warning(fmt::format("frame {}: lost: {}", shot.frame_id, shot.motion.reason));
+  }
+  std::optional<TerrainRecord> terrain;
+  if (shot.terrain) {
+    auto written = clock_.measure(
+        "terrain", [&] { return write_terrain(*shot.terrain, request_.options.terrain, folder_.terrain()); });
+    if (!written) return failure(written);
+    terrain = *written;
+  }
+  record.times = clock_.take();
+  record.times.insert(record.times.end(), shot.times.begin(), shot.times.end());
+  return commit(std::move(record), terrain);
+}
+
+Status Drive::take_missing(const MissingFrame& missing) {
+  hooks_.log.warning(
+      fmt::format("frame {} skipped ({}): {}", missing.frame_id, name_of(missing.fault), missing.message));
+  clock_.take();
+  if (missing.pair != pipeline_.odometry_pair()) return {};
+  FrameRecord record;
+  record.frame_id = missing.frame_id;
+  record.pair = missing.pair;
+  record.stamp = missing.stamp;
+  record.status = "missing";
+  record.fault = name_of(missing.fault);
+  record.message = missing.message;
+  record.world_from_body.pose = pipeline_.predict(missing.stamp).value_or(Pose());
+  return commit(std::move(record), {});
+}
+
+Status Drive::commit(FrameRecord record, const std::optional<TerrainRecord>& terrain) {
+  if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = record.frame_id;
+  ++shots_;
+  const Status status = store_.commit(record, terrain, pipeline_.save(), samples_taken_);
+  if (status && hooks_.progress) hooks_.progress({shots_, source_.info().sequence.announced, record.status});
+  return status;
+}
+
+double cpu_seconds() {
+  timespec t{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+std::int64_t peak_memory_bytes() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
+}
+
+Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, const RunIdentity& identity) {
+  if (request.resume) {
+    const auto begun = RunStore::holds_a_run(folder.store());
+    if (!begun) return failure(begun);
+    if (*begun) return RunStore::resume(folder.store(), identity);
+  }
+  return RunStore::create(folder.store(), identity);
+}
+
+// Text files are made from the store alone, so a resumed run writes the same bytes.
+Result<RunOutcome> write_results(Drive& drive, const RunFolder& folder, RunFacts facts) {
+  const auto frames = drive.store().frames();
+  if (!frames) return failure(frames);
+  if (Status s = write_file_atomically(folder.odometry_trajectory(), to_tum(measured_trajectory(*frames))); !s)
+    return failure(s);
+  facts.peak_memory_bytes = peak_memory_bytes();
+  RunOutcome outcome;
+  outcome.summary_json = to_summary_json(facts, *frames);
+  outcome.lost = !lost_spans(*frames).empty();
+  outcome.interrupted = drive.stopped();
+  if (Status s = write_file_atomically(folder.summary(), outcome.summary_json); !s) return failure(s);
+  return outcome;
+}
+
+}  // namespace
+
+Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
+  const auto began = std::chrono::steady_clock::now();
+  OpenOptions open;
+  open.format = request.format;
+  open.rig_file = request.rig_file;
+  auto source = open_recording(request.input, open);
+  if (!source) return failure(source);
+  const RecordingInfo& info = (*source)->info();
+  report_sequence(info, hooks.log);
+
+  const RunFolder folder{request.output};
+  auto pipeline = Pipeline::create(info.rig, request.options, Workers(request.threads));
+  if (!pipeline) return failure(pipeline);
+  if (Status s = prepare_run_folder(folder, request.resume); !s) return failure(s);
+  const RunIdentity identity{fingerprint(**source), dump_options(request.options), to_rig_yaml(info.rig)};
+  auto store = open_store(request, folder, identity);
+  if (!store) return failure(store);
+  if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
+  if (Status s = write_file_atomically(folder.rig(), identity.rig); !s) return failure(s);
+
+  Drive drive(request, hooks, **source, std::move(*pipeline), std::move(*store), folder);
+  if (Status s = drive.begin(); !s) return failure(s);
+  if (Status s = drive.drive(); !s) return failure(s);
+  if (drive.usable() == 0 && !drive.stopped()) {
+    return failure(ErrorCode::input, "the recording has no usable frame", info.path,
+                   "the messages above name each file");
+  }
+
+  RunFacts facts;
+  facts.version = request.version;
+  facts.input = info.path;
+  facts.format = name_of(info.format);
+  facts.gravity_measured = drive.gravity_measured();
+  facts.threads = request.threads;
+  facts.resumed_from_frame = drive.resumed_from_frame();
+  facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  facts.cpu_seconds = cpu_seconds();
+  return write_results(drive, folder, facts);
+}
+
+}  // namespace spartan

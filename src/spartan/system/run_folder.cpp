@@ -1,0 +1,22 @@
+#include "spartan/system/run_folder.h"
+
+#include <filesystem>
+
+#include "spartan/core/files.h"
+
+namespace spartan {
+
+Status prepare_run_folder(const RunFolder& folder, bool resume) {
+  std::error_code error;
+  const bool exists = std::filesystem::exists(folder.path, error);
+  if (exists && !resume) {
+    return failure(ErrorCode::output, "exists already and is left as it is", folder.path,
+                   "give another folder with -o, or --resume to go on");
+  }
+  if (exists && !std::filesystem::is_directory(folder.path, error)) {
+    return failure(ErrorCode::output, "is not a folder", folder.path, "give another folder with -o");
+  }
+  return make_folder(folder.terrain());
+}
+
+}  // namespace spartan

@@ -1,0 +1,26 @@
+// The layout of a run folder (docs/formats.md, "Run folder").
+#pragma once
+
+#include <string>
+
+#include "spartan/core/result.h"
+
+namespace spartan {
+
+struct RunFolder {
+  std::string path;
+
+  std::string store() const { return path + "/run.sqlite"; }
+  std::string config() const { return path + "/config.yaml"; }
+  std::string rig() const { return path + "/rig.yaml"; }
+  std::string terrain() const { return path + "/terrain"; }
+  std::string odometry_trajectory() const { return path + "/trajectory_odometry.tum"; }
+  std::string summary() const { return path + "/summary.json"; }
+  std::string log() const { return path + "/log.txt"; }
+};
+
+/// Makes a new folder, or with `resume` accepts one that is there. Code `output` where it exists and is not to be
+/// resumed (it is left untouched), or where it cannot be made.
+Status prepare_run_folder(const RunFolder& folder, bool resume);
+
+}  // namespace spartan

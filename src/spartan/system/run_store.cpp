@@ -1,0 +1,259 @@
+#include "spartan/system/run_store.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "spartan/system/database.h"
+
+namespace spartan {
+namespace {
+
+constexpr int kApplicationId = 0x5350544E;  // "SPTN"
+constexpr int kUserVersion = 1;
+
+// Columns named wall_ms and cpu_ms are the only ones that differ from run to run.
+constexpr const char* kSchema = R"(
+CREATE TABLE identity (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE frames (
+  seq INTEGER PRIMARY KEY, frame_id INTEGER NOT NULL, pair TEXT NOT NULL, stamp_ns INTEGER NOT NULL,
+  status TEXT NOT NULL, fault TEXT NOT NULL, message TEXT NOT NULL, has_pose INTEGER NOT NULL,
+  tx REAL, ty REAL, tz REAL, qx REAL, qy REAL, qz REAL, qw REAL, covariance BLOB,
+  motion_from_ns INTEGER, motion_first INTEGER, motion BLOB, motion_covariance BLOB,
+  landmarks INTEGER, matches INTEGER, inliers INTEGER, rms_px REAL);
+CREATE TABLE stage_times (seq INTEGER NOT NULL, stage TEXT NOT NULL, wall_ms REAL NOT NULL, cpu_ms REAL NOT NULL);
+CREATE TABLE terrain (stamp_ns INTEGER PRIMARY KEY, pair TEXT NOT NULL, density_percent REAL NOT NULL, points INTEGER NOT NULL);
+CREATE TABLE memory (id INTEGER PRIMARY KEY CHECK (id = 1), samples_taken INTEGER NOT NULL, stages BLOB NOT NULL);
+)";
+
+Bytes bytes_of(const Matrix6d& m) {
+  ArchiveWriter out;
+  out.put(m);
+  return out.take();
+}
+Bytes bytes_of(const Pose& pose) {
+  ArchiveWriter out;
+  out.put(pose);
+  return out.take();
+}
+
+Result<int> pragma(Database& db, const char* name) {
+  auto statement = db.prepare(fmt::format("PRAGMA {}", name));
+  if (!statement) return failure(statement);
+  const auto row = statement->step();
+  if (!row) return failure(row);
+  return static_cast<int>(statement->integer(0));
+}
+
+Status check_version(Database& db) {
+  const auto application = pragma(db, "application_id");
+  if (!application) return failure(application);
+  const auto version = pragma(db, "user_version");
+  if (!version) return failure(version);
+  if (*application != kApplicationId) return failure(ErrorCode::input, "is not the store of a run", db.path());
+  if (*version != kUserVersion) {
+    return failure(ErrorCode::configuration,
+                   fmt::format("has version {}, this program writes {}", *version, kUserVersion), db.path(),
+                   "run again into a new folder");
+  }
+  return {};
+}
+
+Status write_identity(Database& db, const std::string& key, const std::string& value) {
+  auto insert = db.prepare("INSERT INTO identity VALUES (?, ?)");
+  if (!insert) return failure(insert);
+  return insert->bind(1, key).bind(2, value).run();
+}
+
+Status expect_identity(Database& db, const std::string& key, const std::string& value, const std::string& what) {
+  auto select = db.prepare("SELECT value FROM identity WHERE key = ?");
+  if (!select) return failure(select);
+  select->bind(1, key);
+  const auto row = select->step();
+  if (!row) return failure(row);
+  if (*row && select->text(0) == value) return {};
+  return failure(ErrorCode::configuration, "the run was made with " + what, db.path(),
+                 "resume with the same, or run into a new folder");
+}
+
+}  // namespace
+
+struct RunStore::State {
+  explicit State(Database db_in) : db(std::move(db_in)) {}
+  Database db;
+  std::optional<SqlStatement> insert_frame, insert_time, insert_terrain, replace_memory;
+
+  Status prepare();
+  Status write(const FrameRecord& frame, const std::optional<TerrainRecord>& terrain, const Bytes& memory,
+               std::int64_t samples_taken);
+};
+
+Status RunStore::State::prepare() {
+  const auto make = [&](std::optional<SqlStatement>& statement, const char* sql) -> Status {
+    auto prepared = db.prepare(sql);
+    if (!prepared) return failure(prepared);
+    statement.emplace(std::move(*prepared));
+    return {};
+  };
+  if (Status s = make(insert_frame, "INSERT INTO frames VALUES (NULL,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+      !s)
+    return s;
+  if (Status s = make(insert_time, "INSERT INTO stage_times VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s)
+    return s;
+  if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
+  return make(replace_memory, "INSERT OR REPLACE INTO memory VALUES (1,?,?)");
+}
+
+Status RunStore::State::write(const FrameRecord& frame, const std::optional<TerrainRecord>& terrain,
+                              const Bytes& memory, std::int64_t samples_taken) {
+  const Eigen::Vector3d& t = frame.world_from_body.pose.translation();
+  const Eigen::Quaterniond& q = frame.world_from_body.pose.rotation();
+  const MotionEstimate& motion = frame.motion;
+  SqlStatement& f = *insert_frame;
+  f.bind(1, frame.frame_id).bind(2, frame.pair).bind(3, frame.stamp.ns).bind(4, frame.status).bind(5, frame.fault);
+  f.bind(6, frame.message).bind(7, std::int64_t{frame.has_pose});
+  f.bind(8, t.x()).bind(9, t.y()).bind(10, t.z()).bind(11, q.x()).bind(12, q.y()).bind(13, q.z()).bind(14, q.w());
+  f.bind(15, bytes_of(frame.world_from_body.covariance));
+  f.bind(16, motion.from.ns).bind(17, std::int64_t{motion.first}).bind(18, bytes_of(motion.previous_from_current));
+  f.bind(19, bytes_of(motion.covariance)).bind(20, std::int64_t{motion.landmarks});
+  f.bind(21, std::int64_t{motion.matches}).bind(22, std::int64_t{motion.inliers}).bind(23, motion.rms_px);
+  if (Status s = f.run(); !s) return s;
+  for (const StageTime& time : frame.times) {
+    if (Status s = insert_time->bind(1, time.stage).bind(2, time.wall_ms).bind(3, time.cpu_ms).run(); !s) return s;
+  }
+  if (terrain) {
+    insert_terrain->bind(1, terrain->stamp.ns)
+        .bind(2, terrain->pair)
+        .bind(3, terrain->density_percent)
+        .bind(4, terrain->points);
+    if (Status s = insert_terrain->run(); !s) return s;
+  }
+  return replace_memory->bind(1, samples_taken).bind(2, memory).run();
+}
+
+RunStore::RunStore(std::unique_ptr<State> state) : state_(std::move(state)) {}
+RunStore::RunStore(RunStore&&) noexcept = default;
+RunStore& RunStore::operator=(RunStore&&) noexcept = default;
+RunStore::~RunStore() = default;
+
+Result<bool> RunStore::holds_a_run(const std::string& path) {
+  if (!std::filesystem::exists(path)) return false;
+  auto db = Database::open(path, Database::Mode::open);
+  if (!db) return failure(db);
+  auto tables = db->prepare("SELECT count(*) FROM sqlite_master");
+  if (!tables) return failure(tables);
+  const auto row = tables->step();
+  if (!row) return failure(row);
+  return tables->integer(0) > 0;
+}
+
+Result<RunStore> RunStore::create(const std::string& path, const RunIdentity& identity) {
+  auto db = Database::open(path, Database::Mode::create);
+  if (!db) return failure(db);
+  const std::string header =
+      fmt::format("PRAGMA application_id={}; PRAGMA user_version={};", kApplicationId, kUserVersion);
+  if (Status s = db->execute("BEGIN;" + header + kSchema); !s) return failure(s);
+  if (Status s = write_identity(*db, "input", identity.input); !s) return failure(s);
+  if (Status s = write_identity(*db, "options", identity.options); !s) return failure(s);
+  if (Status s = write_identity(*db, "rig", identity.rig); !s) return failure(s);
+  if (Status s = db->execute("COMMIT"); !s) return failure(s);
+  auto state = std::make_unique<State>(std::move(*db));
+  if (Status s = state->prepare(); !s) return failure(s);
+  return RunStore(std::move(state));
+}
+
+Result<RunStore> RunStore::resume(const std::string& path, const RunIdentity& identity) {
+  auto db = Database::open(path, Database::Mode::open);
+  if (!db) return failure(db);
+  if (Status s = check_version(*db); !s) return failure(s);
+  if (Status s = expect_identity(*db, "input", identity.input, "another input"); !s) return failure(s);
+  if (Status s = expect_identity(*db, "rig", identity.rig, "another rig"); !s) return failure(s);
+  if (Status s = expect_identity(*db, "options", identity.options, "other options"); !s) return failure(s);
+  auto state = std::make_unique<State>(std::move(*db));
+  if (Status s = state->prepare(); !s) return failure(s);
+  return RunStore(std::move(state));
+}
+
+Result<RunStore> RunStore::open_read_only(const std::string& path) {
+  if (!std::filesystem::exists(path))
+    return failure(ErrorCode::input, "is not there: this is not the folder of a run", path);
+  auto db = Database::open(path, Database::Mode::read_only);
+  if (!db) return failure(db);
+  if (Status s = check_version(*db); !s) return failure(s);
+  return RunStore(std::make_unique<State>(std::move(*db)));
+}
+
+Status RunStore::commit(const FrameRecord& frame, const std::optional<TerrainRecord>& terrain, const Bytes& memory,
+                        std::int64_t samples_taken) {
+  if (Status s = state_->db.execute("BEGIN IMMEDIATE"); !s) return s;
+  Status written = state_->write(frame, terrain, memory, samples_taken);
+  if (written) written = state_->db.execute("COMMIT");
+  if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // may fail too: SQLite has then rolled back itself
+  return written;
+}
+
+Result<std::vector<FrameRecord>> RunStore::frames() {
+  auto select = state_->db.prepare("SELECT * FROM frames ORDER BY seq");
+  if (!select) return failure(select);
+  auto times = state_->db.prepare("SELECT stage, wall_ms, cpu_ms FROM stage_times WHERE seq = ? ORDER BY rowid");
+  if (!times) return failure(times);
+  std::vector<FrameRecord> records;
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return failure(row);
+    if (!*row) return records;
+    FrameRecord r;
+    r.frame_id = select->integer(1);
+    r.pair = select->text(2);
+    r.stamp.ns = select->integer(3);
+    r.status = select->text(4);
+    r.fault = select->text(5);
+    r.message = select->text(6);
+    r.has_pose = select->integer(7) != 0;
+    const Eigen::Quaterniond q(select->real(14), select->real(11), select->real(12), select->real(13));
+    r.world_from_body.pose = Pose::from_unit_quaternion(q, {select->real(8), select->real(9), select->real(10)});
+    const Bytes covariance = select->blob(15), motion = select->blob(18), motion_covariance = select->blob(19);
+    r.world_from_body.covariance = ArchiveReader(covariance).get_matrix6();
+    r.motion.from.ns = select->integer(16);
+    r.motion.to = r.stamp;
+    r.motion.first = select->integer(17) != 0;
+    r.motion.previous_from_current = ArchiveReader(motion).get_pose();
+    r.motion.covariance = ArchiveReader(motion_covariance).get_matrix6();
+    r.motion.landmarks = static_cast<int>(select->integer(20));
+    r.motion.matches = static_cast<int>(select->integer(21));
+    r.motion.inliers = static_cast<int>(select->integer(22));
+    r.motion.rms_px = select->real(23);
+    times->bind(1, select->integer(0));
+    for (;;) {
+      const auto time = times->step();
+      if (!time) return failure(time);
+      if (!*time) break;
+      r.times.push_back({times->text(0), times->real(1), times->real(2)});
+    }
+    times->reset();
+    records.push_back(std::move(r));
+  }
+}
+
+Result<std::vector<TerrainRecord>> RunStore::terrain() {
+  auto select = state_->db.prepare("SELECT * FROM terrain ORDER BY stamp_ns");
+  if (!select) return failure(select);
+  std::vector<TerrainRecord> records;
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return failure(row);
+    if (!*row) return records;
+    records.push_back({Stamp{select->integer(0)}, select->text(1), select->real(2), select->integer(3)});
+  }
+}
+
+Result<std::optional<RunStore::Memory>> RunStore::memory() {
+  auto select = state_->db.prepare("SELECT samples_taken, stages FROM memory");
+  if (!select) return failure(select);
+  const auto row = select->step();
+  if (!row) return failure(row);
+  if (!*row) return std::nullopt;
+  return Memory{select->blob(1), select->integer(0)};
+}
+
+}  // namespace spartan

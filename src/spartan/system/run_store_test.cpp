@@ -1,0 +1,139 @@
+#include "spartan/system/run_store.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "spartan/core/random.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+const RunIdentity kIdentity{"0123", "terrain:\n  every_m: 5\n", "schema: 1\n"};
+
+FrameRecord some_frame(int i) {
+  Random random(static_cast<std::uint64_t>(i));
+  FrameRecord frame;
+  frame.frame_id = 100 + i;
+  frame.pair = "narrow";
+  frame.stamp.ns = 1'000'000'000LL * i + 7;
+  frame.status = "tracking";
+  frame.has_pose = true;
+  Vector6d tangent;
+  for (int k = 0; k < 6; ++k) tangent[k] = random.uniform(-2, 2);
+  frame.world_from_body = {exp_se3(tangent), 1e-4 * Matrix6d::Identity()};
+  frame.motion.from.ns = frame.stamp.ns - 1'000'000'000LL;
+  frame.motion.to = frame.stamp;
+  frame.motion.previous_from_current = exp_se3(0.1 * tangent);
+  frame.motion.inliers = 40 + i;
+  frame.motion.rms_px = random.uniform();
+  frame.times = {{"imaging", 1.5, 2.5}, {"odometry", 3.0, 3.0}};
+  return frame;
+}
+
+TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  {
+    auto store = RunStore::create(path, kIdentity);
+    ASSERT_TRUE(store) << store.error().message();
+    for (int i = 0; i < 5; ++i) {
+      const std::optional<TerrainRecord> terrain =
+          i == 2 ? std::optional(TerrainRecord{some_frame(i).stamp, "narrow", 91.5, 1234}) : std::nullopt;
+      ASSERT_TRUE(store->commit(some_frame(i), terrain, Bytes{1, 2, static_cast<std::uint8_t>(i)}, 10 * i));
+    }
+  }
+  auto store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  const auto frames = store->frames();
+  ASSERT_TRUE(frames);
+  ASSERT_EQ(frames->size(), 5U);
+  for (int i = 0; i < 5; ++i) {
+    const FrameRecord expected = some_frame(i), &read = (*frames)[static_cast<std::size_t>(i)];
+    EXPECT_EQ(read.frame_id, expected.frame_id);
+    EXPECT_EQ(read.stamp, expected.stamp);
+    EXPECT_EQ(read.status, expected.status);
+    EXPECT_EQ(read.world_from_body.pose.matrix(), expected.world_from_body.pose.matrix());
+    EXPECT_EQ(read.world_from_body.covariance, expected.world_from_body.covariance);
+    EXPECT_EQ(read.motion.previous_from_current.matrix(), expected.motion.previous_from_current.matrix());
+    EXPECT_EQ(read.motion.inliers, expected.motion.inliers);
+    EXPECT_EQ(read.motion.rms_px, expected.motion.rms_px);
+    ASSERT_EQ(read.times.size(), 2U);
+    EXPECT_EQ(read.times[1].stage, "odometry");
+    EXPECT_EQ(read.times[0].cpu_ms, 2.5);
+  }
+  const auto memory = store->memory();
+  ASSERT_TRUE(memory && *memory);
+  EXPECT_EQ((*memory)->stages, (Bytes{1, 2, 4})) << "only the newest is kept";
+  EXPECT_EQ((*memory)->samples_taken, 40);
+  const auto terrain = store->terrain();
+  ASSERT_TRUE(terrain);
+  ASSERT_EQ(terrain->size(), 1U);
+  EXPECT_EQ(terrain->front().points, 1234);
+}
+
+TEST(RunStore, RefusesAnotherRun) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  ASSERT_TRUE(RunStore::create(path, kIdentity));
+  for (int changed = 0; changed < 3; ++changed) {
+    RunIdentity other = kIdentity;
+    (changed == 0 ? other.input : changed == 1 ? other.options : other.rig) += "x";
+    const auto resumed = RunStore::resume(path, other);
+    ASSERT_FALSE(resumed);
+    EXPECT_EQ(resumed.error().code, ErrorCode::configuration);
+    EXPECT_NE(resumed.error().message().find(path), std::string::npos);
+  }
+  EXPECT_TRUE(RunStore::resume(path, kIdentity));
+}
+
+TEST(RunStore, TellsABegunRunFromAnEmptyFile) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  EXPECT_FALSE(RunStore::holds_a_run(path).value());
+  std::FILE* const file = std::fopen(path.c_str(), "w");
+  std::fclose(file);
+  EXPECT_FALSE(RunStore::holds_a_run(path).value());
+  ASSERT_TRUE(RunStore::create(path, kIdentity));
+  EXPECT_TRUE(RunStore::holds_a_run(path).value());
+}
+
+TEST(RunStore, RefusesWhatIsNoStore) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  EXPECT_EQ(RunStore::open_read_only(path).error().code, ErrorCode::input);
+  std::FILE* const file = std::fopen(path.c_str(), "w");
+  std::fputs("this is no database, whatever its name says; it is long enough to be looked at", file);
+  std::fclose(file);
+  const auto opened = RunStore::open_read_only(path);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::input);
+}
+
+// A process that is killed between two statements of a transaction leaves the frames before it, and nothing else.
+TEST(RunStore, LosesNothingCommittedWhenKilled) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    auto store = RunStore::create(path, kIdentity);
+    for (int i = 0; store && i < 7; ++i) {
+      if (!store->commit(some_frame(i), {}, Bytes(100'000, 1), i)) ::_exit(1);
+    }
+    ::kill(::getpid(), SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  auto store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_EQ(store->frames()->size(), 7U);
+  EXPECT_EQ((*store->memory())->samples_taken, 6);
+}
+
+}  // namespace
+}  // namespace spartan

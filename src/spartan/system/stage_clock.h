@@ -1,0 +1,54 @@
+// How long each stage took: for reports only; no result depends on it.
+#pragma once
+
+#include <ctime>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace spartan {
+
+struct StageTime {
+  std::string stage;
+  double wall_ms = 0;
+  double cpu_ms = 0;  ///< of all threads of the process
+};
+
+/// Measures stages one after the other.
+class StageClock {
+ public:
+  /// Runs `work` and notes its time under `stage`; gives back what it returns.
+  template <class Work>
+  auto measure(const char* stage, Work&& work) {
+    const Lap lap(*this, stage);
+    return std::forward<Work>(work)();
+  }
+  /// What was measured since the last call, in order.
+  std::vector<StageTime> take() { return std::exchange(times_, {}); }
+
+ private:
+  static double now_ms(clockid_t clock) {
+    timespec t{};
+    ::clock_gettime(clock, &t);
+    return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
+  }
+  class Lap {
+   public:
+    Lap(StageClock& clock, const char* stage)
+        : clock_(clock), stage_(stage), wall_(now_ms(CLOCK_MONOTONIC)), cpu_(now_ms(CLOCK_PROCESS_CPUTIME_ID)) {}
+    Lap(const Lap&) = delete;
+    Lap& operator=(const Lap&) = delete;
+    ~Lap() {
+      clock_.times_.push_back({stage_, now_ms(CLOCK_MONOTONIC) - wall_, now_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu_});
+    }
+
+   private:
+    StageClock& clock_;
+    const char* stage_;
+    double wall_, cpu_;
+  };
+
+  std::vector<StageTime> times_;
+};
+
+}  // namespace spartan

@@ -1,0 +1,97 @@
+#include "program.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <stdexcept>
+
+namespace spartan::testing {
+namespace {
+
+struct Pipe {
+  Pipe() {
+    if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe can be made");
+  }
+  std::array<int, 2> ends{};
+};
+
+[[noreturn]] void become(const std::vector<std::string>& arguments, const ProgramLimits& limits, const Pipe& out,
+                         const Pipe& err) {
+  ::dup2(out.ends[1], STDOUT_FILENO);
+  ::dup2(err.ends[1], STDERR_FILENO);
+  if (limits.largest_file_bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{*limits.largest_file_bytes, *limits.largest_file_bytes};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  std::vector<char*> words;
+  for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
+  words.push_back(nullptr);
+  ::execv(words.front(), words.data());
+  ::_exit(127);
+}
+
+using Clock = std::chrono::steady_clock;
+
+// Reads both pipes to their ends, and sends the signals that are due meanwhile.
+void listen(pid_t child, const ProgramLimits& limits, const Pipe& out, const Pipe& err, ProgramResult& result) {
+  std::optional<std::chrono::milliseconds> kill_after = limits.kill_after, interrupt_after = limits.interrupt_after;
+  const Clock::time_point start = Clock::now();
+  std::array<pollfd, 2> inputs{{{out.ends[0], POLLIN, 0}, {err.ends[0], POLLIN, 0}}};
+  int open = 2;
+  while (open > 0) {
+    ::poll(inputs.data(), inputs.size(), 5);
+    const auto elapsed = Clock::now() - start;
+    if (kill_after && elapsed >= *kill_after) {
+      ::kill(child, SIGKILL);
+      kill_after.reset();
+    }
+    if (interrupt_after && elapsed >= *interrupt_after) {
+      ::kill(child, SIGINT);
+      interrupt_after.reset();
+    }
+    for (pollfd& input : inputs) {
+      if (input.fd < 0 || (input.revents & (POLLIN | POLLHUP)) == 0) continue;
+      std::array<char, 4096> buffer{};
+      const ssize_t count = ::read(input.fd, buffer.data(), buffer.size());
+      if (count > 0) {
+        (input.fd == out.ends[0] ? result.out : result.err).append(buffer.data(), static_cast<std::size_t>(count));
+      } else {
+        input.fd = -1;
+        --open;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+ProgramResult run_program(const std::vector<std::string>& arguments, const ProgramLimits& limits) {
+  const char* const program = std::getenv("SPARTAN_PROGRAM");
+  if (program == nullptr) throw std::runtime_error("SPARTAN_PROGRAM is not set; run through ctest");
+  std::vector<std::string> words{program};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const Pipe out, err;
+  const pid_t child = ::fork();
+  if (child < 0) throw std::runtime_error("no process can be made");
+  if (child == 0) become(words, limits, out, err);
+  ::close(out.ends[1]);
+  ::close(err.ends[1]);
+  ProgramResult result;
+  listen(child, limits, out, err, result);
+  ::close(out.ends[0]);
+  ::close(err.ends[0]);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
+  if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
+  return result;
+}
+
+}  // namespace spartan::testing

@@ -1,0 +1,27 @@
+// Runs the program `spartan` as a user would.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace spartan::testing {
+
+struct ProgramResult {
+  int exit_code = -1;  ///< −1: ended by a signal
+  int signal = 0;
+  std::string out, err;
+};
+
+struct ProgramLimits {
+  std::optional<std::uint64_t> largest_file_bytes;           ///< RLIMIT_FSIZE, with SIGXFSZ ignored: a full disk
+  std::optional<std::chrono::milliseconds> kill_after;       ///< SIGKILL
+  std::optional<std::chrono::milliseconds> interrupt_after;  ///< SIGINT
+};
+
+/// The program of this build (environment variable SPARTAN_PROGRAM).
+ProgramResult run_program(const std::vector<std::string>& arguments, const ProgramLimits& limits = {});
+
+}  // namespace spartan::testing

@@ -1,0 +1,66 @@
+#include "small_drive.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "spartan/core/files.h"
+#include "spartan/core/image_io.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/rig/rig.h"
+#include "spartan/testing/synthetic_world.h"
+
+namespace spartan::testing {
+namespace {
+
+void must(const Status& status) {
+  if (!status) throw std::runtime_error(status.error().message());
+}
+
+RectifiedStereo small_camera() {
+  return {{320, 240}, 260.0, {159.5, 119.5}, 0.12};
+}
+
+// 0.5 m above the ground, looking 25° down, on a gentle curve.
+Pose world_from_left(const SmallDrive& drive, int i) {
+  const double s = drive.step_m * i, yaw = 0.02 * i;
+  const Pose body = Pose(exp_so3({0, 0, yaw}), {s, 0.5 * s * yaw, 0.5});
+  const Pose tilted = body * Pose::from_rotation(exp_so3({0, 25 * M_PI / 180, 0}));
+  return tilted * optical_from_forward().inverse();
+}
+
+std::string calib_text(const RectifiedStereo& c) {
+  const auto line = [&](int index, double shift) {
+    return fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", index, c.focal_px, c.centre_px.x(), shift, c.focal_px,
+                       c.centre_px.y());
+  };
+  return line(0, 0) + line(1, -c.focal_px * c.baseline_m);
+}
+
+}  // namespace
+
+void write_small_drive(const std::string& folder, const SmallDrive& drive) {
+  must(make_folder(folder + "/image_0"));
+  must(make_folder(folder + "/image_1"));
+  const RectifiedStereo camera = small_camera();
+  SyntheticWorldOptions options;
+  options.relief_m = 0.03;
+  const SyntheticWorld world(options);
+  std::string times;
+  Trajectory truth;
+  const Pose start = world_from_left(drive, 0);
+  for (int i = 0; i < drive.frames; ++i) {
+    const Pose pose = world_from_left(drive, i);
+    const SyntheticShot shot = world.render(camera, pose, static_cast<std::uint64_t>(i));
+    must(write_png(fmt::format("{}/image_0/{:06}.png", folder, i), shot.left));
+    must(write_png(fmt::format("{}/image_1/{:06}.png", folder, i), shot.right));
+    times += fmt::format("{:.9f}\n", drive.period_s * i);
+    truth.push_back({Stamp::from_seconds(drive.period_s * i), start.inverse() * pose});
+  }
+  must(write_file_atomically(folder + "/calib.txt", calib_text(camera)));
+  must(write_file_atomically(folder + "/times.txt", times));
+  must(write_file_atomically(folder + "/poses.txt", to_kitti(truth)));
+}
+
+}  // namespace spartan::testing

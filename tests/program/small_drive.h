@@ -1,0 +1,17 @@
+// A short drive over the synthetic world in KITTI's layout, for tests of the whole program.
+#pragma once
+
+#include <string>
+
+namespace spartan::testing {
+
+struct SmallDrive {
+  int frames = 14;
+  double step_m = 0.04;  ///< forward, each frame
+  double period_s = 0.5;
+};
+
+/// Writes calib.txt, times.txt, poses.txt (truth), image_0/ and image_1/ into a new folder.
+void write_small_drive(const std::string& folder, const SmallDrive& drive = {});
+
+}  // namespace spartan::testing
