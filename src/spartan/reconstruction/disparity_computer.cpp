@@ -1,0 +1,86 @@
+#include "spartan/reconstruction/disparity_computer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "spartan/reconstruction/disparity_filters.h"
+#include "spartan/reconstruction/disparity_options.h"
+#include "spartan/reconstruction/semi_global_matcher.h"
+
+namespace spartan {
+
+struct DisparityComputer::State {
+  State(const DisparityOptions& options_in, const Workers& workers_in)
+      : options(options_in), workers(workers_in), matcher(options_in, workers_in) {}
+  DisparityOptions options;
+  Workers workers;
+  SemiGlobalMatcher matcher;
+  SpeckleFilter speckles;
+  Image<float> checked, smoothed;
+};
+
+DisparityComputer::DisparityComputer(const DisparityOptions& options, Workers workers)
+    : state_(std::make_unique<State>(options, workers)) {}
+DisparityComputer::DisparityComputer(DisparityComputer&&) noexcept = default;
+DisparityComputer& DisparityComputer::operator=(DisparityComputer&&) noexcept = default;
+DisparityComputer::~DisparityComputer() = default;
+
+Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> left,
+                                                  ImageView<const std::uint8_t> right, DisparityRange range,
+                                                  ImageView<const std::uint8_t> left_mask,
+                                                  ImageView<const std::uint8_t> right_mask) {
+  if (left.empty() || left.size() != right.size()) {
+    return failure(ErrorCode::input,
+                   fmt::format("the left image has {}x{} pixels, the right one {}x{}", left.width(), left.height(),
+                               right.width(), right.height()),
+                   {}, "both images of a pair must have the same size");
+  }
+  const auto fits = [&](ImageView<const std::uint8_t> mask) { return mask.empty() || mask.size() == left.size(); };
+  if (!fits(left_mask) || !fits(right_mask))
+    return failure(ErrorCode::input, "a mask has another size than the images");
+  if (range.count() < 1 || range.max >= left.width() || range.min <= -left.width()) {
+    return failure(ErrorCode::input, fmt::format("the search range {} … {} px is empty or wider than the image ({} px)",
+                                                 range.min, range.max, left.width()));
+  }
+  using Clock = std::chrono::steady_clock;
+  const auto since = [](Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  };
+  const auto start = Clock::now();
+  State& s = *state_;
+  if (s.checked.size() != left.size()) {
+    s.checked = Image<float>(left.size());
+    s.smoothed = Image<float>(left.size());
+  }
+  DisparityImage result;
+  const RawDisparity& raw = s.matcher.match(left, right, range);
+  result.times = s.matcher.times();
+  const auto check_start = Clock::now();
+  drop_inconsistent(raw, s.options.left_right_px, s.workers, s.checked);
+  apply_masks(left_mask, right_mask, s.checked);
+  result.times.check = since(check_start);
+  const auto filter_start = Clock::now();
+  if (s.options.median) {
+    median_3x3(s.checked, s.workers, s.smoothed);
+  } else {
+    std::swap(s.checked, s.smoothed);
+  }
+  s.speckles.apply(s.options.speckle_size_px, s.options.speckle_step_px, s.smoothed);
+  result.times.filter = since(filter_start);
+  result.times.total = since(start);
+  result.disparity = s.smoothed.view();
+  result.buffer_bytes = s.matcher.buffer_bytes();
+  return result;
+}
+
+DisparityRange disparity_range(const RectifiedStereo& geometry, double nearest_m) {
+  const double wanted =
+      nearest_m > 0 ? geometry.focal_px * geometry.baseline_m / nearest_m : 0.25 * geometry.size.width;
+  const int count = (static_cast<int>(std::ceil(std::min(wanted, 0.75 * geometry.size.width))) + 16) / 16 * 16;
+  return {0, std::max(0, std::min(count, geometry.size.width) - 1)};
+}
+
+}  // namespace spartan

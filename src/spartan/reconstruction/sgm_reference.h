@@ -1,0 +1,15 @@
+// The kernels of sgm_kernels.h in plain C++: what the vector versions are compared with, and what a processor without
+// vectors runs.
+#pragma once
+
+#include "spartan/reconstruction/sgm_kernels.h"
+
+namespace spartan::sgm::reference {
+
+void census_row(const CensusRow& row);
+void cost_row(const CostRow& row);
+PathMinima pixel_paths(const PixelPaths& paths);
+Winner find_winner(std::uint16_t* sums, int count, int padded);
+void update_right(const std::uint16_t* sums, int padded, RightRow right);
+
+}  // namespace spartan::sgm::reference
