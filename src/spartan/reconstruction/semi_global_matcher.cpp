@@ -62,9 +62,7 @@ void SemiGlobalMatcher::resize(ImageSize size, DisparityRange range) {
     pass.minima.assign(slot_count, 0);
     pass.cost_row = Image<std::uint8_t>(w * padded_, 1);
     pass.sum_row = Image<std::uint16_t>(w * padded_, 1);
-    const auto mirrored = static_cast<std::size_t>(right_planes_.width());
-    pass.right_best.assign(mirrored, 0);
-    pass.right_index.assign(mirrored, 0);
+    pass.claim_cost.assign(static_cast<std::size_t>(w), 0);
   }
   zero_slot_.assign(static_cast<std::size_t>(padded_ + 2 * sgm::kGuard) + kVector, 0);
   raw_.left = Image<float>(w, h);
@@ -80,7 +78,7 @@ std::size_t SemiGlobalMatcher::buffer_bytes() const {
       bytes(framed_, 1) + bytes(left_planes_, 1) + bytes(right_planes_, 1) + bytes(sums_, 2) + zero_slot_.size();
   for (const Pass& pass : passes_) {
     total += pass.slots.size() + pass.minima.size() + bytes(pass.cost_row, 1) + bytes(pass.sum_row, 2) +
-             4 * pass.right_best.size();
+             2 * pass.claim_cost.size();
   }
   return total + bytes(raw_.left, 4) + bytes(raw_.unique, 1) + bytes(raw_.right, 2);
 }
@@ -223,25 +221,23 @@ void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete)
 
 void SemiGlobalMatcher::select_row(Pass& pass, int y) {
   const int w = size_.width, count = range_.count();
-  std::fill(pass.right_best.begin(), pass.right_best.end(), std::numeric_limits<std::uint16_t>::max());
+  std::fill(pass.claim_cost.begin(), pass.claim_cost.end(), std::numeric_limits<std::uint16_t>::max());
+  std::int16_t* const right = raw_.right.row(y);
+  std::fill(right, right + w, RawDisparity::kNoMatch);
   const double margin = 1.0 + options_.uniqueness_percent / 100.0;
   float* const disparity = raw_.left.row(y);
   std::uint8_t* const unique = raw_.unique.row(y);
   for (int x = 0; x < w; ++x) {
     std::uint16_t* const sums = pass.sum_row.data() + static_cast<std::ptrdiff_t>(x) * padded_;
-    // Mirrored position of the right column x − min − k.
-    const std::ptrdiff_t seen_at = mirror_pad_ + w - 1 - x + range_.min;
-    kernels_.update_right(sums, padded_, {pass.right_best.data() + seen_at, pass.right_index.data() + seen_at});
     const sgm::Winner winner = kernels_.find_winner(sums, count, padded_);
     const int d = range_.min + winner.index, seen = x - d;
     disparity[x] = seen < 0 || seen >= w ? std::numeric_limits<float>::quiet_NaN()
                                          : static_cast<float>(d) + subpixel_offset(sums, winner.index, count);
+    if (seen >= 0 && seen < w && winner.best < pass.claim_cost[static_cast<std::size_t>(seen)]) {
+      pass.claim_cost[static_cast<std::size_t>(seen)] = winner.best;
+      right[seen] = static_cast<std::int16_t>(d);
+    }
     unique[x] = options_.uniqueness_percent <= 0 || winner.runner_up >= margin * winner.best;
-  }
-  for (int x = 0; x < w; ++x) {
-    const auto j = static_cast<std::size_t>(mirror_pad_ + w - 1 - x);
-    const bool seen = pass.right_best[j] != std::numeric_limits<std::uint16_t>::max();
-    raw_.right(x, y) = seen ? static_cast<std::int16_t>(range_.min + pass.right_index[j]) : RawDisparity::kNoMatch;
   }
 }
 

@@ -24,7 +24,7 @@ namespace spartan {
 struct RawDisparity {
   Image<float> left;           ///< px, with sub-pixel part; NaN where the match leaves the right image
   Image<std::uint8_t> unique;  ///< 1 where no runner-up comes near
-  Image<std::int16_t> right;   ///< px, whole, seen from the right eye; kNoMatch where nothing is seen
+  Image<std::int16_t> right;   ///< px, whole: of the cheapest left pixel that claims it; kNoMatch: none does
   static constexpr std::int16_t kNoMatch = INT16_MIN;
 };
 
@@ -48,7 +48,7 @@ class SemiGlobalMatcher {
     std::vector<std::uint8_t> minima;  // of each slot
     Image<std::uint8_t> cost_row;      // padded · width
     Image<std::uint16_t> sum_row;      // of four or eight paths
-    std::vector<std::uint16_t> right_best, right_index;
+    std::vector<std::uint16_t> claim_cost;  // of the cheapest left pixel that claims each right pixel of the row
     double cost_ms = 0, aggregate_ms = 0, select_ms = 0;
   };
 

@@ -149,18 +149,6 @@ Winner find_winner_with(D d, std::uint16_t* sums, int count, int padded) {
   return {index, best, runner_up};
 }
 
-template <class D>
-void update_right_with(D d, const std::uint16_t* sums, int padded, RightRow right) {
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  for (int k = 0; k < padded; k += lanes) {
-    const auto sum = hn::LoadU(d, sums + k), best = hn::LoadU(d, right.best + k);
-    const auto better = hn::Lt(sum, best);
-    hn::StoreU(hn::IfThenElse(better, sum, best), d, right.best + k);
-    const auto index = hn::Iota(d, static_cast<std::uint16_t>(k));
-    hn::StoreU(hn::IfThenElse(better, index, hn::LoadU(d, right.index + k)), d, right.index + k);
-  }
-}
-
 // `padded` is a multiple of 32: the widest vectors that divide it.
 template <class Function>
 HWY_INLINE auto with_widest_bytes(int padded, Function function) {
@@ -178,10 +166,6 @@ PathMinima pixel_paths(const PixelPaths& p) {
 Winner find_winner(std::uint16_t* sums, int count, int padded) {
   return find_winner_with(hn::ScalableTag<std::uint16_t>(), sums, count, padded);
 }
-void update_right(const std::uint16_t* sums, int padded, RightRow right) {
-  update_right_with(hn::ScalableTag<std::uint16_t>(), sums, padded, right);
-}
-
 #endif  // HWY_TARGET == HWY_SCALAR
 
 }  // namespace spartan::sgm::HWY_NAMESPACE
@@ -194,12 +178,10 @@ HWY_EXPORT(census_row);
 HWY_EXPORT(cost_row);
 HWY_EXPORT(pixel_paths);
 HWY_EXPORT(find_winner);
-HWY_EXPORT(update_right);
 
 Kernels kernels_for(std::size_t target_index) {
   return {HWY_DISPATCH_TABLE(census_row)[target_index], HWY_DISPATCH_TABLE(cost_row)[target_index],
-          HWY_DISPATCH_TABLE(pixel_paths)[target_index], HWY_DISPATCH_TABLE(find_winner)[target_index],
-          HWY_DISPATCH_TABLE(update_right)[target_index]};
+          HWY_DISPATCH_TABLE(pixel_paths)[target_index], HWY_DISPATCH_TABLE(find_winner)[target_index]};
 }
 
 }  // namespace spartan::sgm

@@ -66,19 +66,11 @@ struct Winner {
   std::uint16_t best, runner_up;
 };
 
-/// The right eye's view of one row: best[j], disparity[j] at mirrored pixels. Pixel x of the left row, index k is seen
-/// at j = first + k.
-struct RightRow {
-  std::uint16_t* best;
-  std::uint16_t* index;
-};
-
 struct Kernels {
   void (*census_row)(const CensusRow&);
   void (*cost_row)(const CostRow&);
   PathMinima (*pixel_paths)(const PixelPaths&);
   Winner (*find_winner)(std::uint16_t* sums, int count, int padded);
-  void (*update_right)(const std::uint16_t* sums, int padded, RightRow right);
 };
 
 /// The kernels of one instruction set; see simd_target_index().

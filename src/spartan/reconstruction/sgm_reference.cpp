@@ -63,12 +63,4 @@ Winner find_winner(std::uint16_t* sums, int count, int padded) {
   return {index, *best, runner_up};
 }
 
-void update_right(const std::uint16_t* sums, int padded, RightRow right) {
-  for (int k = 0; k < padded; ++k) {
-    if (sums[k] >= right.best[k]) continue;
-    right.best[k] = sums[k];
-    right.index[k] = static_cast<std::uint16_t>(k);
-  }
-}
-
 }  // namespace spartan::sgm::reference

@@ -10,6 +10,5 @@ void census_row(const CensusRow& row);
 void cost_row(const CostRow& row);
 PathMinima pixel_paths(const PixelPaths& paths);
 Winner find_winner(std::uint16_t* sums, int count, int padded);
-void update_right(const std::uint16_t* sums, int padded, RightRow right);
 
 }  // namespace spartan::sgm::reference
