@@ -19,7 +19,10 @@ LogLevel level_of(const Context& context) {
 }
 
 void add_verbs(CLI::App& app, Context& context) {
+  add_run(app, context);
   add_evaluate(app, context);
+  add_config(app, context);
+  add_export(app, context);
 }
 
 int run(int argc, char** argv) {

@@ -7,6 +7,9 @@
 
 namespace spartan::program {
 
+void add_run(CLI::App& app, Context& context);
+void add_config(CLI::App& app, Context& context);
+void add_export(CLI::App& app, Context& context);
 void add_evaluate(CLI::App& app, Context& context);
 
 }  // namespace spartan::program

@@ -23,6 +23,11 @@ enum class TrackingStatus : std::uint8_t {
 };
 std::string_view name_of(TrackingStatus status);
 
+/// Milliseconds of each sub-step of one call (wall clock; for reports only, nothing depends on it).
+struct OdometryTimes {
+  double detect = 0, reconstruct = 0, match = 0, estimate = 0, total = 0;
+};
+
 /// The motion between two shots, in rectified left optical frames.
 struct MotionEstimate {
   Stamp from, to;
@@ -33,6 +38,7 @@ struct MotionEstimate {
   std::string reason;  ///< why it is not `tracking`; empty otherwise
   int landmarks = 0, matches = 0, inliers = 0;
   double rms_px = 0;  ///< of the inliers' reprojection residuals
+  OdometryTimes times;
 };
 
 struct OdometryOptions;  // odometry_options.h

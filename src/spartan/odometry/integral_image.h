@@ -1,0 +1,33 @@
+// Sums over upright rectangles in constant time.
+#pragma once
+
+#include <cstdint>
+
+#include "spartan/core/image.h"
+
+namespace spartan {
+
+/// I(x, y) = Σ of the pixels left of x and above y; one column and one row more than the image. Sums wrap at 2³²,
+/// and differences of them are right as long as the true sum fits (8-bit images up to 16 megapixels always).
+class IntegralImage {
+ public:
+  void compute(ImageView<const std::uint8_t> image);
+
+  /// Of the image that was summed.
+  int width() const { return sums_.width() - 1; }
+  int height() const { return sums_.height() - 1; }
+  const std::uint32_t* row(int y) const { return sums_.row(y); }
+
+  /// Sum over x0 ≤ x < x1, y0 ≤ y < y1; the rectangle must lie inside.
+  std::uint32_t box(int x0, int y0, int x1, int y1) const {
+    const std::uint32_t *top = row(y0), *bottom = row(y1);
+    return bottom[x1] - bottom[x0] - top[x1] + top[x0];
+  }
+  /// The same with the rectangle clipped to the image.
+  std::uint32_t clipped_box(int x0, int y0, int x1, int y1) const;
+
+ private:
+  Image<std::uint32_t> sums_;
+};
+
+}  // namespace spartan

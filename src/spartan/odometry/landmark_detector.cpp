@@ -1,0 +1,23 @@
+#include "spartan/odometry/landmark_detector.h"
+
+#include <stdexcept>
+
+#include "spartan/odometry/surf.h"
+
+namespace spartan {
+
+double squared_distance(const Descriptor& a, const Descriptor& b) {
+  int sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const int difference = a[i] - b[i];
+    sum += difference * difference;
+  }
+  return sum / (254.0 * 254.0);
+}
+
+std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions& options, Workers workers) {
+  if (options.detector == "surf") return std::make_unique<SurfDetector>(options, std::move(workers));
+  throw std::invalid_argument("unknown landmark detector: " + options.detector);
+}
+
+}  // namespace spartan

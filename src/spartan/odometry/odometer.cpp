@@ -1,0 +1,364 @@
+#include "spartan/odometry/odometer.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <chrono>
+#include <cmath>
+
+#include "spartan/odometry/feature_spread.h"
+#include "spartan/odometry/landmark_detector.h"
+#include "spartan/odometry/landmark_matching.h"
+#include "spartan/odometry/landmark_reconstruction.h"
+#include "spartan/odometry/motion_estimation.h"
+#include "spartan/odometry/odometer_memory.h"
+#include "spartan/odometry/odometry_options.h"
+#include "spartan/odometry/smoothed_image.h"
+
+namespace spartan {
+namespace {
+
+/// Standard deviations of a motion that was not measured.
+constexpr double kLostTranslation_m = 1.0, kLostRotation_rad = 0.5;
+/// A landmark is given up after so many shots in which it should have been seen.
+constexpr int kMostMissed = 2;
+/// Shared errors of view and calibration do not average out: a disparity is never known better than this.
+constexpr double kLeastDisparitySigma_px = 0.03;
+/// A coarse motion that fewer landmarks than this agree on is not trusted.
+constexpr int kLeastCoarseInliers = 10;
+
+class Stopwatch {
+ public:
+  /// Milliseconds since the last lap.
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return ms;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// Mean shift in the image that a motion means for the landmarks, pixels.
+double mean_flow(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit) {
+  const Pose current_from_previous = fit.previous_from_current.inverse();
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!fit.inlier[i]) continue;
+    const auto before = project_anchored(stereo, matches[i].point, matches[i].previous_from_anchor);
+    const auto now =
+        project_anchored(stereo, matches[i].point, current_from_previous * matches[i].previous_from_anchor);
+    if (!before || !now) continue;
+    sum += (now->measured - before->measured).head<2>().norm();
+    ++count;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+}  // namespace
+
+std::string_view name_of(TrackingStatus status) {
+  switch (status) {
+    case TrackingStatus::tracking:
+      return "tracking";
+    case TrackingStatus::degraded:
+      return "degraded";
+    case TrackingStatus::lost:
+      return "lost";
+    case TrackingStatus::standing:
+      return "standing";
+  }
+  return "unknown";
+}
+
+struct Odometer::State {
+  State(const OdometryOptions& o, Workers w)
+      : options(o),
+        workers(std::move(w)),
+        detector(make_landmark_detector(options.detection, workers)),
+        reconstruction(options.reconstruction),
+        matching(options.matching, reconstruction, workers),
+        estimation(options.motion) {}
+
+  OdometryOptions options;
+  Workers workers;
+  std::unique_ptr<LandmarkDetector> detector;
+  LandmarkReconstruction reconstruction;
+  LandmarkMatching matching;
+  MotionEstimation estimation;
+  SmoothedImage left_smooth, right_smooth;
+  std::vector<ReconstructedFeature> features;
+  OdometerMemory memory;
+
+  std::optional<std::string> refusal(const RectifiedPair& pair) const;
+  Pose predict(Stamp now) const;
+  void detect(const RectifiedPair& pair);
+  void reconstruct(const StereoImages& images);
+  void measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate, Stopwatch& watch);
+  Pose coarse_motion(const RectifiedStereo& stereo, const Pose& predicted);
+  void set_noise_floor(std::vector<LandmarkMatch>& matches) const;
+  void decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
+                     MotionEstimate& estimate) const;
+  void advance(const Pose& previous_from_current);
+  void update_landmarks(const StereoImages& images, const std::vector<LandmarkMatch>& matches, const MotionFit& fit);
+  bool renew(Landmark& landmark, const StereoImages& images, const RowAlignment& seen) const;
+  void add_landmarks(const StereoImages& images);
+};
+
+/// Why a pair cannot be used, if so.
+std::optional<std::string> Odometer::State::refusal(const RectifiedPair& pair) const {
+  if (pair.left.empty() || pair.right.empty()) return "an image is empty";
+  if (pair.left.size() != pair.right.size()) return "left and right image differ in size";
+  if (!(pair.geometry.focal_px > 0) || !(pair.geometry.baseline_m > 0)) return "the pair has no geometry";
+  return std::nullopt;
+}
+
+/// Constant velocity.
+Pose Odometer::State::predict(Stamp now) const {
+  const double span = seconds_between(memory.stamp, now);
+  if (!(memory.velocity_span_s > 0) || !(span > 0)) return {};
+  return exp_se3(memory.last_motion * (span / memory.velocity_span_s));
+}
+
+void Odometer::State::detect(const RectifiedPair& pair) {
+  features.clear();
+  for (const Feature& found : detector->detect(pair.left, pair.left_mask)) {
+    ReconstructedFeature f{found, std::nullopt};
+    features.push_back(f);
+  }
+}
+
+void Odometer::State::reconstruct(const StereoImages& images) {
+  workers.for_each_part(0, static_cast<int>(features.size()), 16, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      ReconstructedFeature& f = features[static_cast<std::size_t>(i)];
+      f.stereo = reconstruction.reconstruct(images, static_cast<int>(std::lround(f.feature.x)),
+                                            static_cast<int>(std::lround(f.feature.y)));
+    }
+  });
+}
+
+/// A first motion from descriptors; the prediction where they do not tell.
+Pose Odometer::State::coarse_motion(const RectifiedStereo& stereo, const Pose& predicted) {
+  if (!options.matching.descriptors) return predicted;
+  const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
+    const std::vector<int> feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
+    return estimation.coarse(stereo, matching.coarse_matches(memory.map, features, feature_of));
+  };
+  std::optional<MotionFit> gated = attempt(predicted.inverse());
+  if (gated && gated->inliers >= 3 * kLeastCoarseInliers) return gated->previous_from_current;
+  const std::optional<MotionFit> anywhere = attempt(std::nullopt);
+  const MotionFit* best = gated ? &*gated : nullptr;
+  if (anywhere && (!best || anywhere->inliers > best->inliers)) best = &*anywhere;
+  return best && best->inliers >= kLeastCoarseInliers ? best->previous_from_current : predicted;
+}
+
+/// What every measurement is uncertain by beyond its own residual.
+void Odometer::State::set_noise_floor(std::vector<LandmarkMatch>& matches) const {
+  const double pixel = options.motion.pixel_sigma_px, disparity = options.motion.disparity_sigma_px;
+  for (LandmarkMatch& match : matches) {
+    match.covariance.diagonal() += Eigen::Vector3d(pixel * pixel, pixel * pixel, disparity * disparity);
+  }
+}
+
+void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                                    const MotionFit& fit, MotionEstimate& estimate) const {
+  estimate.previous_from_current = fit.previous_from_current;
+  estimate.covariance = fit.covariance;
+  if (fit.inliers < options.motion.few_inliers) {
+    estimate.status = TrackingStatus::degraded;
+    estimate.reason = fmt::format("only {} landmarks agree on the motion", fit.inliers);
+    return;
+  }
+  if (2 * fit.inliers < static_cast<int>(matches.size())) {
+    estimate.status = TrackingStatus::degraded;
+    estimate.reason = fmt::format("only {} of {} matches agree on the motion", fit.inliers, matches.size());
+    return;
+  }
+  estimate.status = TrackingStatus::tracking;
+  if (!options.standing.detect) return;
+  const double flow = mean_flow(stereo, matches, fit);
+  if (flow > options.standing.max_flow_px) return;
+  // The landmarks keep their place while the rover stands, so a slow creep adds up until it is seen.
+  estimate.status = TrackingStatus::standing;
+  estimate.reason = fmt::format("the image has shifted by {:.2f} px", flow);
+  estimate.previous_from_current = Pose();
+}
+
+void Odometer::State::measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate,
+                              Stopwatch& watch) {
+  const Pose start = coarse_motion(images.geometry, predicted);
+  std::vector<LandmarkMatch> matches = matching.by_correlation(memory.map, images, start.inverse());
+  set_noise_floor(matches);
+  estimate.matches = static_cast<int>(matches.size());
+  estimate.times.match = watch.lap();
+
+  const std::optional<MotionFit> fit = estimation.fine(images.geometry, matches, start);
+  if (!fit || fit->inliers < options.motion.min_inliers) {
+    estimate.status = TrackingStatus::lost;
+    estimate.reason = fmt::format("{} landmarks, {} matches, {} agree on a motion", memory.map.landmarks.size(),
+                                  matches.size(), fit ? fit->inliers : 0);
+    estimate.times.estimate = watch.lap();
+    return;
+  }
+  estimate.inliers = fit->inliers;
+  estimate.rms_px = fit->rms_px;
+  decide_status(images.geometry, matches, *fit, estimate);
+  advance(estimate.previous_from_current);
+  update_landmarks(images, matches, *fit);
+  estimate.times.estimate = watch.lap();
+}
+
+void Odometer::State::advance(const Pose& previous_from_current) {
+  const Pose current_from_previous = previous_from_current.inverse();
+  for (Anchor& anchor : memory.map.anchors) {
+    anchor.latest_from_anchor = current_from_previous * anchor.latest_from_anchor;
+  }
+}
+
+/// Gives a landmark a new patch, cut from the current shot, which becomes its anchor.
+bool Odometer::State::renew(Landmark& landmark, const StereoImages& images, const RowAlignment& seen) const {
+  const Eigen::Vector2d whole(std::round(landmark.pixel.x()), std::round(landmark.pixel.y()));
+  const auto patch = cut_patch(images.left_smooth, static_cast<int>(whole.x()), static_cast<int>(whole.y()));
+  if (!patch) return false;
+  landmark.anchor_id = memory.map.next_anchor_id;
+  landmark.anchor_pixel = whole;
+  landmark.disparity = seen.disparity + seen.slant.dot(whole - landmark.pixel);
+  landmark.variance = seen.sigma_px * seen.sigma_px;
+  landmark.slant = seen.slant;
+  landmark.patch = *patch;
+  landmark.pixel = whole;
+  return true;
+}
+
+/// Takes what was measured into the landmarks, drops those that are gone. Anchors are at the current shot already.
+void Odometer::State::update_landmarks(const StereoImages& images, const std::vector<LandmarkMatch>& matches,
+                                       const MotionFit& fit) {
+  std::vector<Landmark>& landmarks = memory.map.landmarks;
+  const double noise = fit.noise_scale * fit.noise_scale;
+  for (Landmark& landmark : landmarks) ++landmark.missed;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!fit.inlier[i]) continue;
+    const LandmarkMatch& match = matches[i];
+    Landmark& landmark = landmarks[match.landmark];
+    const auto p =
+        project_anchored(images.geometry, match.point, memory.map.anchor(landmark.anchor_id).latest_from_anchor);
+    if (!p) continue;
+    // Scalar Kalman update of the disparity in the anchor.
+    const Eigen::Vector3d weighted = (noise * match.covariance).ldlt().solve(p->by_disparity);
+    const double variance = 1 / (1 / landmark.variance + weighted.dot(p->by_disparity));
+    landmark.disparity += variance * weighted.dot(match.measured - p->measured);
+    landmark.variance = std::max(variance, kLeastDisparitySigma_px * kLeastDisparitySigma_px);
+    landmark.pixel = match.measured.head<2>();
+    landmark.missed = 0;
+
+    const AnchoredWarp warp = warp_of(*p, landmark.slant);
+    const double grown = std::sqrt(std::abs(warp.pixels.determinant()));
+    if (grown < options.matching.max_scale_change && grown * options.matching.max_scale_change > 1) continue;
+    const double sigma = std::sqrt(variance) * std::abs(p->by_disparity.z());
+    const RowAlignment now{p->measured.z(), warp.slant, std::max(sigma, kLeastDisparitySigma_px), 1};
+    if (!renew(landmark, images, now)) landmark.missed = kMostMissed;
+  }
+  std::erase_if(landmarks, [](const Landmark& l) { return l.missed >= kMostMissed; });
+}
+
+/// Features that stand apart from all landmarks become landmarks, up to the number asked for; matched ones lend their
+/// descriptor.
+void Odometer::State::add_landmarks(const StereoImages& images) {
+  std::vector<Landmark>& landmarks = memory.map.landmarks;
+  Occupancy occupancy(images.left.size(), options.detection.spacing_px);
+  for (const Landmark& landmark : landmarks) occupancy.take(landmark.pixel.x(), landmark.pixel.y());
+  const double floor = options.motion.disparity_sigma_px * options.motion.disparity_sigma_px;
+  for (const ReconstructedFeature& f : features) {
+    if (static_cast<int>(landmarks.size()) >= options.detection.landmarks) break;
+    if (!f.stereo || !occupancy.is_free(f.feature.x, f.feature.y)) continue;
+    Landmark landmark;
+    landmark.pixel = {f.feature.x, f.feature.y};
+    const Eigen::Vector2d whole(std::round(f.feature.x), std::round(f.feature.y));
+    landmark.pixel = whole;
+    if (!renew(landmark, images, *f.stereo)) continue;
+    landmark.variance += floor;
+    landmark.scale = f.feature.scale;
+    landmark.angle = f.feature.angle;
+    landmark.sign = f.feature.sign;
+    landmark.descriptor = f.feature.descriptor;
+    occupancy.take(f.feature.x, f.feature.y);
+    landmarks.push_back(landmark);
+  }
+  memory.map.anchors.push_back({memory.map.next_anchor_id++, Pose()});
+  memory.map.drop_unused_anchors();
+}
+
+Odometer::Odometer(const OdometryOptions& options, Workers workers)
+    : state_(std::make_unique<State>(options, std::move(workers))) {}
+Odometer::Odometer(Odometer&&) noexcept = default;
+Odometer& Odometer::operator=(Odometer&&) noexcept = default;
+Odometer::~Odometer() = default;
+
+MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose>& predicted,
+                             ImageView<const float> disparity) {
+  State& s = *state_;
+  Stopwatch all, watch;
+  MotionEstimate estimate;
+  estimate.to = pair.stamp;
+  estimate.first = !s.memory.started;
+  estimate.from = s.memory.started ? s.memory.stamp : pair.stamp;
+  const Pose prediction = predicted ? *predicted : s.predict(pair.stamp);
+
+  const std::optional<std::string> refusal = s.refusal(pair);
+  if (refusal) {
+    estimate.status = TrackingStatus::lost;
+    estimate.reason = *refusal;
+  } else {
+    StereoImages images{pair.geometry, pair.left, pair.right, {}, {}, pair.right_mask, disparity};
+    s.left_smooth.compute(pair.left, s.workers);
+    s.right_smooth.compute(pair.right, s.workers);
+    images.left_smooth = s.left_smooth.view();
+    images.right_smooth = s.right_smooth.view();
+    s.detect(pair);
+    estimate.times.detect = watch.lap();
+    s.reconstruct(images);
+    estimate.times.reconstruct = watch.lap();
+    if (!estimate.first) {
+      if (s.memory.geometry == pair.geometry) {
+        s.measure(images, prediction, estimate, watch);
+      } else {
+        estimate.status = TrackingStatus::lost;
+        estimate.reason = "the geometry of the pair has changed";
+      }
+    }
+    if (estimate.status == TrackingStatus::lost) s.memory.map = {};
+    s.add_landmarks(images);
+    s.memory.geometry = pair.geometry;
+  }
+
+  estimate.landmarks = static_cast<int>(s.memory.map.landmarks.size());
+  if (estimate.status == TrackingStatus::lost && !estimate.first) {
+    estimate.previous_from_current = prediction;
+    estimate.covariance.diagonal() << Eigen::Vector3d::Constant(kLostTranslation_m * kLostTranslation_m),
+        Eigen::Vector3d::Constant(kLostRotation_rad * kLostRotation_rad);
+  } else if (!estimate.first) {
+    s.memory.last_motion = log_se3(estimate.previous_from_current);
+    s.memory.velocity_span_s = seconds_between(estimate.from, estimate.to);
+  }
+  s.memory.started = true;
+  s.memory.stamp = pair.stamp;
+  estimate.times.total = all.lap();
+  return estimate;
+}
+
+Bytes Odometer::save() const {
+  return state_->memory.save();
+}
+
+Status Odometer::restore(const Bytes& bytes) {
+  Result<OdometerMemory> memory = OdometerMemory::restore(bytes);
+  if (!memory) return failure(memory);
+  state_->memory = *std::move(memory);
+  return {};
+}
+
+}  // namespace spartan

@@ -1,0 +1,231 @@
+#include "spartan/odometry/patch_alignment.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "spartan/odometry/smoothed_image.h"
+
+namespace spartan {
+namespace {
+
+constexpr int kMaxIterations = 15;
+constexpr double kSettled_px = 0.005;
+/// Smoothing correlates the noise of neighbouring pixels: the variance of a sum over many of them is the variance of
+/// one pixel over Σ kernel² = (70/256)².
+constexpr double kNoiseCorrelation = 1.0 / ((70.0 / 256.0) * (70.0 / 256.0));
+/// Least standard deviation of a window that carries any information, gray levels.
+constexpr float kLeastDeviation = 0.5f;
+/// Prior on the slant: σ = 0.4 px/px against a noise of about 4 gray levels (before smoothing).
+constexpr double kSlantPrior = 16.0 / (0.4 * 0.4);
+
+using Window = std::array<float, kWindowArea>;
+
+/// Gaussian weights over the window, sum 1: what lies near the centre counts more.
+const Window& window_weights() {
+  static const Window weights = [] {
+    Window w{};
+    float sum = 0;
+    for (int y = 0, i = 0; y < kWindowSide; ++y) {
+      for (int x = 0; x < kWindowSide; ++x, ++i) {
+        const int dx = x - kWindowRadius, dy = y - kWindowRadius;
+        w[static_cast<std::size_t>(i)] = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2 * 4.0f * 4.0f));
+        sum += w[static_cast<std::size_t>(i)];
+      }
+    }
+    for (float& value : w) value /= sum;
+    return w;
+  }();
+  return weights;
+}
+
+/// Takes the weighted mean off and returns the weighted standard deviation.
+float normalise(Window& window) {
+  const Window& w = window_weights();
+  float mean = 0;
+  for (std::size_t i = 0; i < kWindowArea; ++i) mean += w[i] * window[i];
+  float variance = 0;
+  for (std::size_t i = 0; i < kWindowArea; ++i) {
+    window[i] -= mean;
+    variance += w[i] * window[i] * window[i];
+  }
+  return std::sqrt(variance);
+}
+
+float weighted_dot(const Window& a, const Window& b) {
+  const Window& w = window_weights();
+  float sum = 0;
+  for (std::size_t i = 0; i < kWindowArea; ++i) sum += w[i] * a[i] * b[i];
+  return sum;
+}
+
+/// Samples the image over the warped window, mean taken off; nothing where a corner leaves it.
+std::optional<Window> warped_window(ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
+                                    const Eigen::Vector2d& centre) {
+  const double reach_x = kWindowRadius * (std::abs(warp(0, 0)) + std::abs(warp(0, 1)));
+  const double reach_y = kWindowRadius * (std::abs(warp(1, 0)) + std::abs(warp(1, 1)));
+  if (!(centre.x() - reach_x >= 0 && centre.x() + reach_x < image.width() - 1.01 && centre.y() - reach_y >= 0 &&
+        centre.y() + reach_y < image.height() - 1.01)) {
+    return std::nullopt;
+  }
+  Window window;
+  const Eigen::Matrix2f a = warp.cast<float>();
+  const Eigen::Vector2f c = centre.cast<float>();
+  std::size_t i = 0;
+  for (int y = -kWindowRadius; y <= kWindowRadius; ++y) {
+    const auto fy = static_cast<float>(y);
+    for (int x = -kWindowRadius; x <= kWindowRadius; ++x, ++i) {
+      const auto fx = static_cast<float>(x);
+      window[i] = sample(image, c.x() + a(0, 0) * fx + a(0, 1) * fy, c.y() + a(1, 0) * fx + a(1, 1) * fy);
+    }
+  }
+  return window;
+}
+
+}  // namespace
+
+std::optional<ImagePatch> cut_patch(ImageView<const std::uint16_t> image, int x, int y) {
+  constexpr int r = kWindowRadius + 1;
+  if (x < r || y < r || x + r >= image.width() || y + r >= image.height()) return std::nullopt;
+  ImagePatch patch;
+  for (int j = 0; j < kPatchSide; ++j) {
+    std::copy_n(image.row(y - r + j) + x - r, kPatchSide, patch.begin() + j * kPatchSide);
+  }
+  return patch;
+}
+
+AlignmentTemplate::AlignmentTemplate(const std::array<float, kPatchSide * kPatchSide>& pixels) {
+  std::size_t i = 0;
+  for (int y = 1; y <= kWindowSide; ++y) {
+    for (int x = 1; x <= kWindowSide; ++x, ++i) {
+      const float* p = &pixels[static_cast<std::size_t>(y * kPatchSide + x)];
+      value[i] = p[0];
+      gradient_x[i] = 0.5f * (p[1] - p[-1]);
+      gradient_y[i] = 0.5f * (p[kPatchSide] - p[-kPatchSide]);
+    }
+  }
+  deviation = normalise(value);
+}
+
+AlignmentTemplate::AlignmentTemplate(const ImagePatch& patch)
+    : AlignmentTemplate([&] {
+        std::array<float, kPatchSide * kPatchSide> pixels;
+        for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<float>(patch[i]) * (1.0f / 256.0f);
+        return pixels;
+      }()) {}
+
+std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::uint16_t> image,
+                                                           const Eigen::Vector2d& centre) {
+  constexpr int r = kWindowRadius + 1;
+  if (!(centre.x() >= r && centre.y() >= r && centre.x() + r < image.width() - 1.01 &&
+        centre.y() + r < image.height() - 1.01)) {
+    return std::nullopt;
+  }
+  std::array<float, kPatchSide * kPatchSide> pixels;
+  const Eigen::Vector2f c = centre.cast<float>();
+  std::size_t i = 0;
+  for (int y = -r; y <= r; ++y)
+    for (int x = -r; x <= r; ++x, ++i)
+      pixels[i] = sample(image, c.x() + static_cast<float>(x), c.y() + static_cast<float>(y));
+  return AlignmentTemplate(pixels);
+}
+
+std::optional<Alignment> align_translation(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> image,
+                                           const Eigen::Matrix2d& warp, const Eigen::Vector2d& start, double reach_px) {
+  if (wanted.deviation < kLeastDeviation || !(std::abs(warp.determinant()) > 0.05)) return std::nullopt;
+  // ∇image = warp⁻ᵀ ∇template where the two are aligned.
+  const Eigen::Matrix2f to_image = warp.inverse().transpose().cast<float>();
+  Window jx, jy;
+  for (std::size_t i = 0; i < kWindowArea; ++i) {
+    jx[i] = to_image(0, 0) * wanted.gradient_x[i] + to_image(0, 1) * wanted.gradient_y[i];
+    jy[i] = to_image(1, 0) * wanted.gradient_x[i] + to_image(1, 1) * wanted.gradient_y[i];
+  }
+  normalise(jx);  // the unknown brightness takes the mean away
+  normalise(jy);
+  Eigen::Matrix2d information;
+  information << weighted_dot(jx, jx), weighted_dot(jx, jy), 0, weighted_dot(jy, jy);
+  information(1, 0) = information(0, 1);
+  if (!(information.determinant() > 1e-4)) return std::nullopt;
+  const Eigen::Matrix2d inverse = information.inverse();
+
+  Eigen::Vector2d position = start;
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    std::optional<Window> seen = warped_window(image, warp, position);
+    if (!seen) return std::nullopt;
+    const float deviation = normalise(*seen);
+    if (deviation < kLeastDeviation) return std::nullopt;
+    const float contrast = wanted.deviation / deviation;
+    Window residual;
+    for (std::size_t i = 0; i < kWindowArea; ++i) residual[i] = contrast * (*seen)[i] - wanted.value[i];
+    const Eigen::Vector2d step = -(inverse * Eigen::Vector2d(weighted_dot(jx, residual), weighted_dot(jy, residual)));
+    position += step;
+    if (!((position - start).norm() <= reach_px)) return std::nullopt;
+    if (step.norm() > kSettled_px) continue;
+    const double variance = weighted_dot(residual, residual);
+    Alignment found;
+    found.position = position;
+    found.correlation = weighted_dot(*seen, wanted.value) / (deviation * wanted.deviation);
+    // `information` is a weighted mean over the window, so the sum over independent pixels is larger by their number.
+    found.covariance = inverse * (variance * kNoiseCorrelation / (0.5 * kWindowArea));
+    return found;
+  }
+  return std::nullopt;
+}
+
+std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> right,
+                                            const Eigen::Vector2d& centre, const RowAlignment& start,
+                                            bool estimate_slant, double reach_px) {
+  if (wanted.deviation < kLeastDeviation) return std::nullopt;
+  // right(x − d − s·offset) ≈ template: derivative by d is −∇x, by the slant −offset ∇x.
+  std::array<Window, 3> j;
+  for (std::size_t i = 0; i < kWindowArea; ++i) {
+    j[0][i] = -wanted.gradient_x[i];
+    j[1][i] = j[0][i] * static_cast<float>(static_cast<int>(i) % kWindowSide - kWindowRadius);
+    j[2][i] = j[0][i] * static_cast<float>(static_cast<int>(i) / kWindowSide - kWindowRadius);
+  }
+  for (Window& window : j) normalise(window);
+  Eigen::Matrix3d information;
+  for (std::size_t a = 0; a < 3; ++a)
+    for (std::size_t b = 0; b < 3; ++b)
+      information(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = weighted_dot(j[a], j[b]);
+  if (!(information(0, 0) > 1e-2)) return std::nullopt;
+  const double prior = kSlantPrior * kNoiseCorrelation / (0.5 * kWindowArea);
+  information(1, 1) += prior;
+  information(2, 2) += prior;
+  if (!estimate_slant) {
+    const double alone = information(0, 0);
+    information = Eigen::Vector3d(alone, 1e12, 1e12).asDiagonal();
+  }
+  const Eigen::Matrix3d inverse = information.inverse();
+
+  Eigen::Vector3d x(start.disparity, start.slant.x(), start.slant.y());
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    Eigen::Matrix2d warp;
+    warp << 1 - x[1], -x[2], 0, 1;
+    std::optional<Window> seen = warped_window(right, warp, centre - Eigen::Vector2d(x[0], 0));
+    if (!seen) return std::nullopt;
+    const float deviation = normalise(*seen);
+    if (deviation < kLeastDeviation) return std::nullopt;
+    const float contrast = wanted.deviation / deviation;
+    Window residual;
+    for (std::size_t i = 0; i < kWindowArea; ++i) residual[i] = contrast * (*seen)[i] - wanted.value[i];
+    Eigen::Vector3d gradient(weighted_dot(j[0], residual), weighted_dot(j[1], residual), weighted_dot(j[2], residual));
+    gradient[1] += prior * (x[1] - start.slant.x());
+    gradient[2] += prior * (x[2] - start.slant.y());
+    const Eigen::Vector3d step = -(inverse * gradient);
+    x += step;
+    if (!(std::abs(x[0] - start.disparity) <= reach_px) || !(std::abs(x[1]) < 0.8) || !(std::abs(x[2]) < 1.5)) {
+      return std::nullopt;
+    }
+    if (std::abs(step[0]) + 3 * std::abs(step[1]) + 3 * std::abs(step[2]) > 2 * kSettled_px) continue;
+    RowAlignment found;
+    found.disparity = x[0];
+    found.slant = {x[1], x[2]};
+    found.correlation = weighted_dot(*seen, wanted.value) / (deviation * wanted.deviation);
+    const double variance = weighted_dot(residual, residual);
+    found.sigma_px = std::sqrt(inverse(0, 0) * variance * kNoiseCorrelation / (0.5 * kWindowArea));
+    return found;
+  }
+  return std::nullopt;
+}
+
+}  // namespace spartan

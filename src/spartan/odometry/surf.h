@@ -1,0 +1,51 @@
+// Speeded-up robust features.
+// Source: Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features (SURF)", CVIU 110 (2008) 346-359.
+#pragma once
+
+#include <vector>
+
+#include "spartan/odometry/integral_image.h"
+#include "spartan/odometry/landmark_detector.h"
+
+namespace spartan {
+
+/// Blobs as maxima of the determinant of the Hessian over place and scale, second derivatives taken with box filters
+/// on the integral image (§3), described by sums of Haar responses (§4).
+class SurfDetector final : public LandmarkDetector {
+ public:
+  SurfDetector(const DetectionOptions& options, Workers workers);
+  const std::vector<Feature>& detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask) override;
+
+ private:
+  /// det H of one filter size on the grid of an octave; 0 where the filter leaves the image.
+  struct Layer {
+    int filter_px = 0;  ///< side of the filter
+    int step_px = 1;    ///< grid pitch
+    Image<float> response;
+  };
+  void compute_layers(ImageSize size);
+  std::vector<Feature> find_maxima(ImageSize size) const;
+
+  DetectionOptions options_;
+  Workers workers_;
+  IntegralImage integral_;
+  std::vector<Layer> layers_;  ///< four an octave, filters growing
+  std::vector<Feature> features_;
+};
+
+/// Box-filter approximation of the Hessian at one pixel, over the filter's area (§3.2): lobes of filter_px/3.
+/// The filter must lie inside the image, with one pixel to spare.
+struct BoxHessian {
+  float xx = 0, yy = 0, xy = 0;
+  /// Dxx Dyy − (0.9 Dxy)² (eq. 3).
+  float determinant() const { return xx * yy - 0.81f * xy * xy; }
+};
+BoxHessian box_hessian(const IntegralImage& integral, int x, int y, int filter_px);
+
+/// Direction of the strongest Haar response in a window of π/3 that turns around the feature (§4.1), rad.
+float surf_orientation(const IntegralImage& integral, const Feature& feature);
+
+/// 4×4 squares of 5×5 Haar responses over 20 s, each summed as (Σdx, Σ|dx|, Σdy, Σ|dy|), unit length (§4.2).
+Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature);
+
+}  // namespace spartan
