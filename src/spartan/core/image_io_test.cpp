@@ -4,10 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
 #include "spartan/core/opencv_bridge.h"
+#include "spartan/core/picture_file.h"
 #include "spartan/core/random.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -250,6 +253,22 @@ TEST(ImageIo, SizesThatNobodyHasAreTakenForNoise) {
   ASSERT_NE(frame, std::string::npos);
   jpeg[frame + 5] = jpeg[frame + 7] = '\x7F';
   EXPECT_THAT(decode_image(jpeg, "a").error().what, HasSubstr("senseless size"));
+}
+
+// Pictures of many makers: cameras of rovers and cars, NASA's archive, OpenCV's examples.
+TEST(PictureFileReal, WholeFilesAreTaken) {
+  const char* const set = std::getenv("SPARTAN_DATA");
+  const char* const source = std::getenv("SPARTAN_SOURCE_DIR");
+  const std::string data = set ? set : source ? std::string(source) + "/../shared/data" : "";
+  if (!std::filesystem::is_directory(data)) GTEST_SKIP() << "no real data (SPARTAN_DATA)";
+  int count = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(data)) {
+    const std::string extension = entry.path().extension().string();
+    if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") continue;
+    EXPECT_EQ(picture_file_fault(content_of(entry.path().string())), "") << entry.path();
+    ++count;
+  }
+  EXPECT_GT(count, 0);
 }
 
 }  // namespace
