@@ -1,0 +1,223 @@
+#include "spartan/imaging/imager.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "spartan/core/image_io.h"
+#include "spartan/testing/synthetic_world.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr ImageSize kSize{64, 48};
+
+Camera camera(const std::string& name, PixelFormat format, CameraModel model = PinholeModel{60, 60, 32, 24}) {
+  Camera result;
+  result.name = name;
+  result.size = kSize;
+  result.model = std::move(model);
+  result.pixel_format = format;
+  return result;
+}
+
+Rig rig_with(const PixelFormat& format, const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
+  return rig_of_one_pair("test", camera("left", format), camera("right", format),
+                         Pose(exp_so3(turn), {0.1, 0, 0}).inverse());
+}
+
+template <class T>
+Image<T> ramp(int factor) {
+  Image<T> image(kSize);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) image(x, y) = static_cast<T>((x + y) * factor);
+  }
+  return image;
+}
+
+StereoFrame frame_of(const FrameImage& left, const FrameImage& right) {
+  StereoFrame frame;
+  frame.frame_id = 12;
+  frame.pair = "stereo";
+  frame.left_stamp = Stamp{42};
+  frame.left = left;
+  frame.right = right;
+  return frame;
+}
+
+TEST(Imager, ARectifiedPairPassesUnchanged) {
+  ImagingOptions options;
+  options.contrast = false;
+  const Rig rig = rig_with({});
+  auto imager = Imager::create(rig, options, Workers(1));
+  ASSERT_TRUE(imager) << imager.error().message();
+  const auto left = ramp<std::uint8_t>(1), right = ramp<std::uint8_t>(2);
+  const auto pair =
+      imager->process(frame_of(FrameImage::borrow(left.view(), {}), FrameImage::borrow(right.view(), {})));
+  ASSERT_TRUE(pair) << pair.error().message();
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      ASSERT_EQ(pair->left(x, y), left(x, y));
+      ASSERT_EQ(pair->right(x, y), right(x, y));
+    }
+  }
+  EXPECT_TRUE(pair->left_mask.empty());
+  EXPECT_EQ(pair->stamp, Stamp{42});
+  EXPECT_EQ(pair->geometry, imager->geometry("stereo"));
+  EXPECT_NEAR(pair->geometry.baseline_m, 0.1, 1e-12);
+  EXPECT_LT((pair->body_from_left.matrix() - optical_from_forward().inverse().matrix()).norm(), 1e-12);
+}
+
+TEST(Imager, EveryDepthAndLayoutGivesTheSameWorkingImage) {
+  // A gray world: all layouts must agree but for the interpolation at the borders of a mosaic.
+  const auto working_image = [](const PixelFormat& format, const FrameImage& image) {
+    auto imager = Imager::create(rig_with(format), {}, Workers(2));
+    EXPECT_TRUE(imager);
+    const auto pair = imager->process(frame_of(image, image));
+    EXPECT_TRUE(pair) << pair.error().message();
+    return Image<std::uint8_t>::copy_of(pair->left);
+  };
+  const PixelFormat bayer12{PixelLayout::bayer_grbg, 12, BitAlignment::high}, rgb16{PixelLayout::rgb, 16},
+      gray10{PixelLayout::gray, 10};
+  Image<Rgb16> colour(kSize);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      const auto level = static_cast<std::uint16_t>((x + y) * 300);
+      colour(x, y) = {level, level, level};
+    }
+  }
+  const auto plain = working_image({}, FrameImage::own(ramp<std::uint8_t>(2), {}));
+  const auto gray = working_image(gray10, FrameImage::own(ramp<std::uint16_t>(7), gray10));
+  const auto rgb = working_image(rgb16, FrameImage::own(std::move(colour), rgb16));
+  const auto bayer = working_image(bayer12, FrameImage::own(ramp<std::uint16_t>(30 * 16), bayer12));
+  for (int y = 1; y + 1 < kSize.height; ++y) {
+    for (int x = 1; x + 1 < kSize.width; ++x) {
+      ASSERT_NEAR(gray(x, y), plain(x, y), 1);
+      ASSERT_NEAR(rgb(x, y), plain(x, y), 1);
+      ASSERT_NEAR(bayer(x, y), plain(x, y), 3);
+    }
+  }
+}
+
+TEST(Imager, RefusesFramesThatDoNotFitTheRig) {
+  auto imager = Imager::create(rig_with({}), {}, Workers(1));
+  ASSERT_TRUE(imager);
+  const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
+  const auto refusal = [&](const StereoFrame& frame) {
+    const auto pair = imager->process(frame);
+    EXPECT_FALSE(pair);
+    EXPECT_EQ(pair.error().code, ErrorCode::input);
+    return pair.error().message();
+  };
+  const auto small = FrameImage::own(Image<std::uint8_t>(32, 48), {});
+  EXPECT_THAT(refusal(frame_of(good, small)), HasSubstr("camera 'right' is 32 × 48"));
+  EXPECT_THAT(refusal(frame_of(good, small)), HasSubstr("the rig says 64 × 48 gray of 8 bits"));
+  const PixelFormat deep{PixelLayout::gray, 12};
+  EXPECT_THAT(refusal(frame_of(FrameImage::own(ramp<std::uint16_t>(1), deep), good)),
+              HasSubstr("gray of 12 bits, low alignment"));
+  StereoFrame unknown = frame_of(good, good);
+  unknown.pair = "mast";
+  EXPECT_THAT(refusal(unknown), HasSubstr("no stereo pair 'mast'"));
+}
+
+TEST(Imager, LoadsSelfMasks) {
+  const testing::TemporaryFolder folder;
+  Image<std::uint8_t> mask(kSize.width, kSize.height, 255);
+  for (int x = 0; x < kSize.width; ++x) mask(x, 47) = 0;
+  ASSERT_TRUE(write_png(folder.file("masks/left.png"), mask.view()));
+  const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
+  for (const bool turned : {false, true}) {
+    Rig rig = rig_with({}, {0, turned ? 0.02 : 0, 0});
+    rig.cameras[0].self_mask = "masks/left.png";
+    auto imager = Imager::create(rig, {}, Workers(1), folder.path());
+    ASSERT_TRUE(imager) << imager.error().message();
+    const auto pair = imager->process(frame_of(good, good));
+    ASSERT_TRUE(pair);
+    ASSERT_FALSE(pair->left_mask.empty());
+    EXPECT_EQ(pair->left_mask(30, 47), 0);
+    EXPECT_EQ(pair->left_mask(30, 20), 255);
+    EXPECT_EQ(pair->right_mask.empty(), !turned);
+    rig.cameras[0].self_mask = "masks/missing.png";
+    const auto refused = Imager::create(rig, {}, Workers(1), folder.path());
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+    EXPECT_THAT(refused.error().message(), HasSubstr("missing.png"));
+  }
+}
+
+// A pair whose eyes are turned against each other photographs the synthetic world through distorting lenses; the
+// imager must give back what ideal eyes see.
+TEST(Imager, UndoesLensesAndTurnsOfASyntheticPair) {
+  const ImageSize size{320, 240};
+  testing::SyntheticWorldOptions world_options;
+  world_options.noise_levels = 0;
+  world_options.texture_size_m = 0.015;  // coarse, as the picture is interpolated twice
+  const testing::SyntheticWorld world(world_options);
+  Eigen::Matrix3d looking_down;
+  looking_down << 0, -0.8, 0.6, -1, 0, 0, 0, -0.6, -0.8;
+  const Pose world_from_left(looking_down, {0, 0, 0.6});
+
+  Camera left = camera("left", {}, RadialTangentialModel({250, 250, 159.5, 119.5}, {-0.2, 0.04, 0, 0}));
+  Camera right = left;
+  right.name = "right";
+  left.size = right.size = size;
+  const Rig rig = rig_of_one_pair("test", left, right, Pose(exp_so3({0.02, 0.03, -0.02}), {0.1, 0.002, 0}).inverse());
+  ImagingOptions options;
+  options.contrast = false;
+  auto imager = Imager::create(rig, options, Workers(2));
+  ASSERT_TRUE(imager) << imager.error().message();
+  const RectifiedStereo view = imager->geometry("stereo");
+
+  // The ideal view, wide enough for the lenses; the cameras' images are taken out of it.
+  const Pose left_from_rectified =
+      optical_from_forward() * imager
+                                   ->process(frame_of(FrameImage::own(Image<std::uint8_t>(size), {}),
+                                                      FrameImage::own(Image<std::uint8_t>(size), {})))
+                                   ->body_from_left;
+  const RectifiedStereo wide{{640, 480}, view.focal_px * 1.3, {319.5, 239.5}, view.baseline_m};
+  const auto truth = world.render(wide, world_from_left * left_from_rectified, 1);
+  const Pose right_from_rectified = rig.right_from_left(rig.pairs[0]) * left_from_rectified;
+  const auto through_lens = [&](const Camera& eye, const Eigen::Matrix3d& from_rectified,
+                                const Image<std::uint8_t>& ideal) {
+    Image<std::uint8_t> picture(size);
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const auto ray = unproject(eye.model, {x, y});
+        const Eigen::Vector3d p = wide.project(from_rectified.transpose() * ray->direction);
+        const int px = static_cast<int>(p.x()), py = static_cast<int>(p.y());
+        if (!(p.x() >= 0 && p.y() >= 0) || px + 1 >= 640 || py + 1 >= 480) continue;
+        const double fx = p.x() - px, fy = p.y() - py;
+        picture(x, y) =
+            static_cast<std::uint8_t>(std::lround((1 - fy) * ((1 - fx) * ideal(px, py) + fx * ideal(px + 1, py)) +
+                                                  fy * ((1 - fx) * ideal(px, py + 1) + fx * ideal(px + 1, py + 1))));
+      }
+    }
+    return picture;
+  };
+  const auto seen_left = through_lens(left, left_from_rectified.rotation_matrix(), truth.left);
+  const auto seen_right = through_lens(right, right_from_rectified.rotation_matrix(), truth.right);
+  const auto pair =
+      imager->process(frame_of(FrameImage::borrow(seen_left.view(), {}), FrameImage::borrow(seen_right.view(), {})));
+  ASSERT_TRUE(pair);
+  const auto ideal = world.render(view, world_from_left * left_from_rectified, 1);
+  double left_sum = 0, right_sum = 0, shifted_sum = 0;
+  int count = 0;
+  for (int y = 40; y < 200; ++y) {
+    for (int x = 40; x < 280; ++x) {
+      left_sum += std::abs(pair->left(x, y) - ideal.left(x, y));
+      right_sum += std::abs(pair->right(x, y) - ideal.right(x, y));
+      shifted_sum += std::abs(pair->right(x + 1, y) - ideal.right(x, y));
+      ++count;
+    }
+  }
+  EXPECT_LT(left_sum / count, 2.0);
+  EXPECT_LT(right_sum / count, 2.0);
+  EXPECT_GT(shifted_sum, 2 * right_sum);
+}
+
+}  // namespace
+}  // namespace spartan
