@@ -1,0 +1,113 @@
+// EuRoC/ASL: cam0/data.csv, cam0/data/<file>, cam1/…, imu0/data.csv, sensor.yaml in each.
+// Source: Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016.
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+
+#include "spartan/camera/recording_index.h"
+#include "spartan/camera/sensor_tables.h"
+#include "spartan/camera/stamp_order.h"
+#include "spartan/camera/table.h"
+#include "spartan/core/files.h"
+#include "spartan/rig/rig_files.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ImageList {
+  std::vector<Stamp> stamps;
+  std::vector<std::string> files;
+};
+
+Result<ImageList> read_images(const fs::path& camera) {
+  auto table = TableReader::open((camera / "data.csv").string(), {});
+  if (!table) return failure(table);
+  ImageList list;
+  for (;;) {
+    const auto row = table->next(2);
+    if (!row) return failure(row);
+    if (!*row) return list;
+    const auto stamp = parse_stamp_ns((**row)[0]);
+    if (!stamp) return table->fault("the first column is not a time in nanoseconds");
+    list.stamps.push_back(*stamp);
+    list.files.push_back((camera / "data" / std::string((**row)[1])).string());
+  }
+}
+
+// The rotation of T_BS in a sensor.yaml; the identity where there is none.
+Result<Eigen::Quaterniond> read_body_from_sensor(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return Eigen::Quaterniond::Identity();
+  auto text = read_file(path);
+  if (!text) return failure(text);
+  if (text->starts_with("%YAML:")) text->erase(0, text->find('\n'));  // OpenCV's header is no valid YAML
+  try {
+    const YAML::Node transform = YAML::Load(*text)["T_BS"];
+    if (!transform) return Eigen::Quaterniond::Identity();
+    const auto data = transform["data"].as<std::vector<double>>();
+    if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS has not 16 numbers", path);
+    Eigen::Matrix3d rotation;
+    rotation << data[0], data[1], data[2], data[4], data[5], data[6], data[8], data[9], data[10];
+    if (!is_rotation(rotation, 1e-3)) return failure(ErrorCode::configuration, "T_BS holds no rotation", path);
+    return Eigen::Quaterniond(nearest_rotation(rotation));
+  } catch (const YAML::Exception& e) {
+    return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, path);
+  }
+}
+
+Shot make_shot(const StampMatch& match, const ImageList& left, const ImageList& right) {
+  Shot shot;
+  const Stamp any = match.left ? left.stamps[*match.left] : right.stamps[*match.right];
+  shot.left_stamp = shot.right_stamp = any;
+  shot.only_right = !match.left;
+  if (match.left) shot.left_file = left.files[*match.left];
+  if (match.right) {
+    shot.right_file = right.files[*match.right];
+    shot.right_stamp = right.stamps[*match.right];
+  }
+  if (!match.left || !match.right) {
+    const bool no_left = !match.left;
+    shot.fault = no_left ? FrameFault::left_missing : FrameFault::right_missing;
+    shot.message = fmt::format("{}: no image of the {} eye near {} ns", no_left ? shot.right_file : shot.left_file,
+                               no_left ? "left" : "right", any.ns);
+  }
+  return shot;
+}
+
+}  // namespace
+
+Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions& options) {
+  const fs::path folder = layout.folder;
+  RecordingIndex index;
+  const auto left = read_images(folder / "cam0");
+  if (!left) return failure(left);
+  const auto right = read_images(folder / "cam1");
+  if (!right) return failure(right);
+  auto rig = choose_rig(options, (folder / "cam0" / "sensor.yaml").string(), {},
+                        [&] { return read_euroc_calib(folder.string()); });
+  if (!rig) return failure(rig);
+  index.info.rig = std::move(rig->rig);
+  index.info.rig_source = rig->source;
+  const std::string pair = only_pair(index.info.rig);
+  for (const StampMatch& match : match_stamps(left->stamps, right->stamps, options.pair_tolerance_s)) {
+    Shot shot = make_shot(match, *left, *right);
+    shot.frame_id = static_cast<std::int64_t>(index.shots.size());
+    shot.pair = pair;
+    index.shots.push_back(std::move(shot));
+  }
+  std::error_code error;
+  if (const fs::path truth = folder / "state_groundtruth_estimate0" / "data.csv"; fs::exists(truth, error)) {
+    index.info.truth_file = truth.string();
+  }
+  if (const fs::path imu = folder / "imu0" / "data.csv"; fs::exists(imu, error)) {
+    const auto body_from_imu = read_body_from_sensor((folder / "imu0" / "sensor.yaml").string());
+    if (!body_from_imu) return failure(body_from_imu);
+    index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(*body_from_imu));
+  }
+  return index;
+}
+
+}  // namespace spartan

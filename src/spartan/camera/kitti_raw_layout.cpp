@@ -1,0 +1,141 @@
+// KITTI raw (synchronised and rectified): image_00/data, image_01/data with timestamps.txt, oxts/, calibration in the
+// drive's folder or in the day's folder above it. Source: Geiger et al., "Vision meets robotics: the KITTI dataset",
+// IJRR 2013; the development kit's readme.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "spartan/camera/image_folder.h"
+#include "spartan/camera/recording_index.h"
+#include "spartan/camera/table.h"
+#include "spartan/core/files.h"
+#include "spartan/rig/rig_files.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+
+// "2011-09-26 13:02:25.964389445" → nanoseconds since 1970.
+std::optional<Stamp> parse_date(std::string_view date, std::string_view time) {
+  const auto number = [](std::string_view text) { return parse_number<int>(text); };
+  if (date.size() != 10 || time.size() < 8) return std::nullopt;
+  const auto year = number(date.substr(0, 4)), month = number(date.substr(5, 2)), day = number(date.substr(8, 2));
+  const auto hour = number(time.substr(0, 2)), minute = number(time.substr(3, 2));
+  const auto second = parse_decimal_seconds(time.substr(6));
+  if (!year || !month || !day || !hour || !minute || !second) return std::nullopt;
+  using namespace std::chrono;
+  const year_month_day ymd{std::chrono::year(*year), std::chrono::month(static_cast<unsigned>(*month)),
+                           std::chrono::day(static_cast<unsigned>(*day))};
+  if (!ymd.ok()) return std::nullopt;
+  const nanoseconds whole = sys_days(ymd).time_since_epoch() + hours(*hour) + minutes(*minute);
+  const Stamp stamp{whole.count() + second->ns};
+  return is_sane(stamp) ? std::optional(stamp) : std::nullopt;
+}
+
+Result<std::vector<Stamp>> read_stamps(const std::string& path) {
+  auto table = TableReader::open(path, {.separator = ' ', .header = {}, .ends_with_newline = false});
+  if (!table) return failure(table);
+  std::vector<Stamp> stamps;
+  for (;;) {
+    const auto row = table->next(2);
+    if (!row) return failure(row);
+    if (!*row) return stamps;
+    const auto stamp = parse_date((**row)[0], (**row)[1]);
+    if (!stamp) return table->fault("is not a date and a time of day");
+    stamps.push_back(*stamp);
+  }
+}
+
+// One file a sample: 30 numbers, of which 11 … 13 are the acceleration and 17 … 19 the turn rate along x, y, z of the
+// unit.
+class OxtsStream : public SampleStream {
+ public:
+  OxtsStream(fs::path folder, std::vector<Stamp> stamps) : folder_(std::move(folder)), stamps_(std::move(stamps)) {}
+
+  Result<std::optional<Sample>> next() override {
+    while (next_ < stamps_.size()) {
+      const std::size_t i = next_++;
+      const fs::path file = folder_ / fmt::format("{:010}.txt", i);
+      std::error_code error;
+      if (!fs::exists(file, error)) continue;  // a drive may lack some
+      auto table = TableReader::open(file.string(), {.separator = ' ', .header = {}, .ends_with_newline = false});
+      if (!table) return failure(table);
+      const auto row = table->next(20);
+      if (!row) return failure(row);
+      if (!*row) return table->fault("is empty");
+      std::array<double, 6> v{};
+      for (std::size_t k = 0; k < 6; ++k) {
+        const auto value = parse_number<double>((**row)[k < 3 ? 11 + k : 14 + k]);
+        if (!value) return table->fault("holds something that is not a finite number");
+        v[k] = *value;
+      }
+      return Sample(ImuSample{stamps_[i], {v[3], v[4], v[5]}, {v[0], v[1], v[2]}});
+    }
+    return std::nullopt;
+  }
+
+ private:
+  fs::path folder_;
+  std::vector<Stamp> stamps_;
+  std::size_t next_ = 0;
+};
+
+std::string find_calibration(const fs::path& drive) {
+  std::error_code error;
+  for (const fs::path& folder : {drive, fs::weakly_canonical(drive, error).parent_path()}) {
+    if (fs::exists(folder / "calib_cam_to_cam.txt", error)) return (folder / "calib_cam_to_cam.txt").string();
+  }
+  return (drive / "calib_cam_to_cam.txt").string();
+}
+
+}  // namespace
+
+Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOptions& options) {
+  const fs::path folder = layout.folder;
+  RecordingIndex index;
+  const auto left = read_stamps((folder / "image_00" / "timestamps.txt").string());
+  if (!left) return failure(left);
+  const auto right = read_stamps((folder / "image_01" / "timestamps.txt").string());
+  if (!right) return failure(right);
+  NumberedImages images =
+      number_images((folder / "image_00" / "data").string(), (folder / "image_01" / "data").string(), left->size());
+  index.info.sequence.remarks = std::move(images.remarks);
+  const auto size = common_image_size(images.shots);
+  if (!size)
+    return failure(ErrorCode::input, "holds no image that can be read", (folder / "image_00" / "data").string());
+  const std::string calib = find_calibration(folder);
+  auto rig = choose_rig(options, calib, *size, [&] { return read_kitti_raw_calib(calib); });
+  if (!rig) return failure(rig);
+  index.info.rig = std::move(rig->rig);
+  index.info.rig_source = rig->source;
+
+  for (std::size_t i = 0; i < left->size(); ++i) {
+    Shot shot;
+    shot.frame_id = static_cast<std::int64_t>(i);
+    shot.pair = only_pair(index.info.rig);
+    shot.left_stamp = (*left)[i];
+    shot.right_stamp = i < right->size() ? (*right)[i] : shot.left_stamp;
+    shot.left_file = images.shots[i].left;
+    shot.right_file = images.shots[i].right;
+    if (shot.left_file.empty() || shot.right_file.empty()) {
+      shot.fault = shot.left_file.empty() ? FrameFault::left_missing : FrameFault::right_missing;
+      shot.message = fmt::format("{}: has no image number {}", folder.string(), i);
+    }
+    index.shots.push_back(std::move(shot));
+  }
+  std::error_code error;
+  // Without the way from the IMU to the cameras the body is the left camera, and the IMU's axes are not known.
+  const bool body_is_imu = index.info.rig.convention == PoseConvention::body;
+  if (const fs::path oxts = folder / "oxts"; body_is_imu && fs::exists(oxts / "timestamps.txt", error)) {
+    index.imu = [oxts]() -> Result<std::unique_ptr<SampleStream>> {
+      auto stamps = read_stamps((oxts / "timestamps.txt").string());
+      if (!stamps) return failure(stamps);
+      return std::make_unique<OxtsStream>(oxts / "data", std::move(*stamps));
+    };
+  }
+  return index;
+}
+
+}  // namespace spartan

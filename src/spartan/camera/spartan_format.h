@@ -1,0 +1,33 @@
+// What writer and reader of Spartan recordings agree on (docs/formats.md, "Recording").
+#pragma once
+
+#include <string>
+
+#include "spartan/camera/recording_writer.h"
+#include "spartan/core/options.h"
+
+namespace spartan {
+
+inline constexpr const char* kFramesHeader =
+    "frame_id,position_id,pair,left_stamp_ns,right_stamp_ns,left,right,pan_deg,tilt_deg,exposure_us,gain,bits";
+inline constexpr const char* kImuHeader =
+    "stamp_ns,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2";
+inline constexpr const char* kWheelsHeader = "stamp_ns,left_m,right_m";
+inline constexpr const char* kCompassHeader = "stamp_ns,heading_rad,sigma_rad";
+inline constexpr const char* kInclinometerHeader = "stamp_ns,roll_rad,pitch_rad,sigma_rad";
+
+/// recording.yaml.
+struct RecordingFile {
+  int schema = 1;
+  RecordingOptions about;
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("schema", schema, "version of this format", between(1, 1));
+    v.field("name", about.name, "a name for people");
+    v.field("description", about.description, "where it comes from");
+    v.field("gravity_m_s2", about.gravity_m_s2, "where it was recorded", between(0.1, 30));
+  }
+};
+
+}  // namespace spartan
