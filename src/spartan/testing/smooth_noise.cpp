@@ -88,17 +88,17 @@ NoiseSample gradient_noise(double x, double y, std::uint32_t seed) {
 }
 
 NoiseSample Octave::operator()(double x, double y) const {
-  const double lx = (cosine * x - sine * y) / size + shift_x;
-  const double ly = (sine * x + cosine * y) / size + shift_y;
+  const double lx = (cosine * x - sine * y) * frequency + shift_x;
+  const double ly = (sine * x + cosine * y) * frequency + shift_y;
   const NoiseSample local = gradient_noise(lx, ly, seed);
-  const double slope = amplitude / size;
+  const double slope = amplitude * frequency;
   return {amplitude * local.value, slope * (cosine * local.dx + sine * local.dy),
           slope * (cosine * local.dy - sine * local.dx)};
 }
 
 double Octave::value(double x, double y) const {
-  const double lx = (cosine * x - sine * y) / size + shift_x;
-  const double ly = (sine * x + cosine * y) / size + shift_y;
+  const double lx = (cosine * x - sine * y) * frequency + shift_x;
+  const double ly = (sine * x + cosine * y) * frequency + shift_y;
   return amplitude * gradient_noise_value(lx, ly, seed);
 }
 
@@ -110,6 +110,7 @@ std::vector<Octave> make_octaves(std::uint64_t seed, int count, double largest, 
     Octave& octave = octaves[static_cast<std::size_t>(i)];
     const double angle = random.uniform(0, 2 * std::numbers::pi);
     octave.size = std::ldexp(largest, -i);
+    octave.frequency = 1 / octave.size;
     octave.amplitude = std::pow(gain, i);
     octave.cosine = std::cos(angle);
     octave.sine = std::sin(angle);

@@ -38,6 +38,7 @@ inline constexpr double kNoiseMostCurved = 12;
 /// One octave of a sum of noise: lattice spacing `size`, turned and shifted so that lattices do not line up.
 struct Octave {
   double size = 1;
+  double frequency = 1;  ///< 1 / size
   double amplitude = 1;  ///< the noise is multiplied by it
   double cosine = 1, sine = 0, shift_x = 0, shift_y = 0;
   std::uint32_t seed = 0;

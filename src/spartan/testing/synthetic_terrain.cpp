@@ -7,7 +7,7 @@
 namespace spartan::testing {
 namespace {
 
-constexpr int kReliefOctaves = 4, kTextureOctaves = 7;
+constexpr int kReliefOctaves = 3, kTextureOctaves = 7;
 constexpr double kReliefGain = 0.3;
 constexpr double kWavelengthPerLattice = 1.5;  // gradient noise has most of its power there
 constexpr double kStoneHeightPerRadius = 0.55;
@@ -141,18 +141,34 @@ double SyntheticTerrain::albedo(double x, double y, double footprint_m) const {
   return tone * std::exp(logarithm);
 }
 
+// Sphere tracing of a cone: at the distance t its rays are t · spread apart from its axis.
+double SyntheticTerrain::clear_distance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                        double spread) const {
+  constexpr double kFarEnough_m = 50, kSmallStep = 0.02;
+  const double widening = spread * (1 + steepest_);
+  const double fastest =
+      std::max(-direction.z() + std::hypot(direction.x(), direction.y()) * steepest_ + widening, 1e-3);
+  for (double t = 0; t < kFarEnough_m;) {
+    const Eigen::Vector3d p = origin + t * direction;
+    const double gap = p.z() - relief(p.x(), p.y()) - stone_top_ - t * widening;
+    if (gap < kSmallStep * fastest) return t;
+    t += gap / fastest;
+  }
+  return kFarEnough_m;
+}
+
 // Steps that cannot pass through the ground. With the gap g, its rate −g' along the ray, and bounds L of the slope
 // and K of the curvature of the hills, g stays positive for g / L (Hart, "Sphere tracing", 1996) and up to the root
 // of g + g' t − K t²/2; over a stone the first bound holds with the stone's slope, and elsewhere a step ends where
 // the next stone may begin. Newton's method makes the end exact, from either side.
 std::optional<double> SyntheticTerrain::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                                  double farthest) const {
+                                                  double farthest, double nearest) const {
   constexpr double kExact = 1e-9, kNewton_m = 2e-3;
   const double top = relief_top_ + stone_top_;
-  double t = 0;
+  double t = nearest;
   if (origin.z() > top) {
     if (direction.z() >= 0) return std::nullopt;
-    t = (origin.z() - top) / -direction.z();
+    t = std::max(t, (origin.z() - top) / -direction.z());
   }
   const double across = std::hypot(direction.x(), direction.y());
   const double fastest = std::max(-direction.z() + across * steepest_, 1e-3);

@@ -36,8 +36,11 @@ class SyntheticTerrain {
   double albedo(double x, double y, double footprint_m) const;
 
   /// Distance along the ray (unit direction) to the first point on the ground, to 1e-9 m; none within `farthest`.
-  std::optional<double> intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                  double farthest) const;
+  /// Nothing is looked for nearer than `nearest`.
+  std::optional<double> intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double farthest,
+                                  double nearest = 0) const;
+  /// A distance up to which no ray meets the ground whose unit direction differs from `direction` by at most `spread`.
+  double clear_distance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double spread) const;
 
  private:
   struct Stone;

@@ -49,16 +49,43 @@ double SyntheticWorld::relief(double x, double y) const {
   return terrain_.relief(x, y);
 }
 
+// Neighbouring rays go most of their way together: blocks of pixels share it.
 Image<double> SyntheticWorld::measure_depth(const Eye& eye) const {
+  constexpr int kBlock = 4;
   Image<double> depth(eye.size);
-  for (int v = 0; v < eye.size.height; ++v) {
-    for (int u = 0; u < eye.size.width; ++u) {
-      const Eigen::Vector3d sight = eye.sight(u, v);
-      const double length = sight.norm();
-      depth(u, v) = terrain_.intersect(eye.origin, sight / length, kFarthest_m).value_or(0) / length;
+  const auto measure_block = [&](int u0, int v0, int u1, int v1) {
+    const Eigen::Vector3d axis = eye.sight((u0 + u1) / 2.0, (v0 + v1) / 2.0).normalized();
+    double spread = 0;
+    for (const int u : {u0, u1}) {
+      for (const int v : {v0, v1}) spread = std::max(spread, (eye.sight(u, v).normalized() - axis).norm());
+    }
+    const double clear = terrain_.clear_distance(eye.origin, axis, spread);
+    for (int v = v0; v <= v1; ++v) {
+      for (int u = u0; u <= u1; ++u) {
+        const Eigen::Vector3d sight = eye.sight(u, v);
+        const double length = sight.norm();
+        depth(u, v) = terrain_.intersect(eye.origin, sight / length, kFarthest_m, clear).value_or(0) / length;
+      }
+    }
+  };
+  for (int v = 0; v < eye.size.height; v += kBlock) {
+    for (int u = 0; u < eye.size.width; u += kBlock) {
+      measure_block(u, v, std::min(u + kBlock, eye.size.width) - 1, std::min(v + kBlock, eye.size.height) - 1);
     }
   }
   return depth;
+}
+
+// What the right eye measures beside the point's place settles most cases; a ray of its own settles the rest.
+bool SyntheticWorld::right_eye_sees(const Eye& right, ImageView<const double> right_depth, double u, int v,
+                                    double depth) const {
+  if (u < 0 || u > right.size.width - 1) return false;
+  const int before = std::min(static_cast<int>(u), right.size.width - 2);
+  const double a = depth / right_depth(before, v), b = depth / right_depth(before + 1, v);
+  if (std::abs(a - 1) < 0.01 && std::abs(b - 1) < 0.01) return true;
+  if (std::min(a, b) > 1.1) return false;
+  const Eigen::Vector3d sight = right.sight(u, v);
+  return !terrain_.intersect(right.origin, sight.normalized(), depth * sight.norm() - kNear_m);
 }
 
 double SyntheticWorld::reflected(const Eye& eye, const Surface& surface, double depth) const {
@@ -128,9 +155,9 @@ SyntheticShot SyntheticWorld::render(const RectifiedStereo& stereo, const Pose& 
                   world_from_left * Eigen::Vector3d(stereo.baseline_m, 0, 0),
                   axes,
                   1};
-  const Image<double> depth = measure_depth(left);
+  const Image<double> depth = measure_depth(left), right_depth = measure_depth(right);
 
-  SyntheticShot shot{photograph(left, depth, noise_seed), photograph(right, measure_depth(right), noise_seed),
+  SyntheticShot shot{photograph(left, depth, noise_seed), photograph(right, right_depth, noise_seed),
                      Image<float>(stereo.size.width, stereo.size.height, std::numeric_limits<float>::quiet_NaN()),
                      Image<std::uint8_t>(stereo.size)};
   for (int v = 0; v < stereo.size.height; ++v) {
@@ -138,14 +165,7 @@ SyntheticShot SyntheticWorld::render(const RectifiedStereo& stereo, const Pose& 
       if (depth(u, v) <= 0) continue;
       const double disparity = stereo.focal_px * stereo.baseline_m / depth(u, v);
       shot.disparity(u, v) = static_cast<float>(disparity);
-      const double u_right = u - disparity;
-      bool both = u_right >= 0 && u_right <= stereo.size.width - 1;
-      if (both) {
-        const Eigen::Vector3d sight = right.sight(u_right, v);
-        const double range = depth(u, v) * sight.norm();
-        both = !terrain_.intersect(right.origin, sight.normalized(), range - kNear_m);
-      }
-      shot.mask(u, v) = both ? 255 : 128;
+      shot.mask(u, v) = right_eye_sees(right, right_depth, u - disparity, v, depth(u, v)) ? 255 : 128;
     }
   }
   return shot;

@@ -32,6 +32,7 @@ class SyntheticWorld {
   struct Eye;
   struct Surface;
   Image<double> measure_depth(const Eye& eye) const;
+  bool right_eye_sees(const Eye& right, ImageView<const double> right_depth, double u, int v, double depth) const;
   Image<std::uint8_t> photograph(const Eye& eye, ImageView<const double> depth, std::uint64_t noise_seed) const;
   double gray_level(const Eye& eye, int u, int v, double depth, bool at_edge) const;
   double reflected(const Eye& eye, const Surface& surface, double depth) const;

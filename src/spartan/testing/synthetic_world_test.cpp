@@ -103,6 +103,29 @@ TEST(SyntheticTerrain, RaysEndAtTheFirstPointOnTheGround) {
   EXPECT_GT(hits, 200);
 }
 
+TEST(SyntheticTerrain, NoRayOfAClearConeMeetsTheGround) {
+  const SyntheticTerrain terrain(stony());
+  Random random(4);
+  double clear_sum = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Eigen::Vector3d origin(random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(0.3, 1.0));
+    const auto somewhere = [&](double size) {
+      return Eigen::Vector3d(random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size));
+    };
+    const Eigen::Vector3d axis = (Eigen::Vector3d(0, 0, -0.5) + somewhere(0.8)).normalized();
+    const double spread = random.uniform(0.001, 0.1);
+    const double clear = terrain.clear_distance(origin, axis, spread);
+    clear_sum += clear;
+    for (int k = 0; k < 10; ++k) {
+      const Eigen::Vector3d ray = (axis + somewhere(0.5 * spread)).normalized();
+      if ((ray - axis).norm() > spread) continue;
+      const auto hit = terrain.intersect(origin, ray, 100);
+      ASSERT_GE(hit.value_or(clear), clear);
+    }
+  }
+  EXPECT_GT(clear_sum / 300, 0.3);
+}
+
 TEST(SyntheticWorld, TruthDisparityWarpsRightOntoLeft) {
   for (const auto& options : {SyntheticWorldOptions{}, stony()}) {
     const SyntheticWorld world(options);
