@@ -35,7 +35,8 @@ function(spartan_test name)
   target_include_directories(${name} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
     PROPERTIES LABELS ${A_LABEL} TIMEOUT ${A_TIMEOUT}
-    ENVIRONMENT "SPARTAN_SOURCE_DIR=${PROJECT_SOURCE_DIR};SPARTAN_PROGRAM=${CMAKE_BINARY_DIR}/bin/spartan")
+    ENVIRONMENT "SPARTAN_SOURCE_DIR=${PROJECT_SOURCE_DIR}"  # the discovery tears a list of two apart
+    ENVIRONMENT_MODIFICATION "SPARTAN_PROGRAM=set:${CMAKE_BINARY_DIR}/bin/spartan")
 endfunction()
 
 # spartan_module(NAME USES modules… PUBLIC libraries… PRIVATE libraries… TEST_LIBRARIES libraries…)

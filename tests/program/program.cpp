@@ -41,20 +41,16 @@ using Clock = std::chrono::steady_clock;
 
 // Reads both pipes to their ends, and sends the signals that are due meanwhile.
 void listen(pid_t child, const ProgramLimits& limits, const Pipe& out, const Pipe& err, ProgramResult& result) {
-  std::optional<std::chrono::milliseconds> kill_after = limits.kill_after, interrupt_after = limits.interrupt_after;
+  bool killed = false, interrupted = false;
   const Clock::time_point start = Clock::now();
   std::array<pollfd, 2> inputs{{{out.ends[0], POLLIN, 0}, {err.ends[0], POLLIN, 0}}};
   int open = 2;
   while (open > 0) {
     ::poll(inputs.data(), inputs.size(), 5);
     const auto elapsed = Clock::now() - start;
-    if (kill_after && elapsed >= *kill_after) {
-      ::kill(child, SIGKILL);
-      kill_after.reset();
-    }
-    if (interrupt_after && elapsed >= *interrupt_after) {
-      ::kill(child, SIGINT);
-      interrupt_after.reset();
+    if (limits.kill_after && !killed && elapsed >= *limits.kill_after) killed = ::kill(child, SIGKILL) == 0;
+    if (limits.interrupt_after && !interrupted && elapsed >= *limits.interrupt_after) {
+      interrupted = ::kill(child, SIGINT) == 0;
     }
     for (pollfd& input : inputs) {
       if (input.fd < 0 || (input.revents & (POLLIN | POLLHUP)) == 0) continue;
