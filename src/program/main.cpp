@@ -20,6 +20,7 @@ LogLevel level_of(const Context& context) {
 
 void add_verbs(CLI::App& app, Context& context) {
   add_run(app, context);
+  add_stereo(app, context);
   add_evaluate(app, context);
   add_config(app, context);
   add_export(app, context);

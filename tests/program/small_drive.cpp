@@ -45,7 +45,6 @@ void write_small_drive(const std::string& folder, const SmallDrive& drive) {
   must(make_folder(folder + "/image_1"));
   const RectifiedStereo camera = small_camera();
   SyntheticWorldOptions options;
-  options.relief_m = 0.03;
   const SyntheticWorld world(options);
   std::string times;
   Trajectory truth;
@@ -61,6 +60,23 @@ void write_small_drive(const std::string& folder, const SmallDrive& drive) {
   must(write_file_atomically(folder + "/calib.txt", calib_text(camera)));
   must(write_file_atomically(folder + "/times.txt", times));
   must(write_file_atomically(folder + "/poses.txt", to_kitti(truth)));
+}
+
+void write_gray_png(const std::string& path, int width, int height) {
+  must(write_png(path, Image<std::uint8_t>(width, height, 128)));
+}
+
+void turn_upside_down(const std::string& left, const std::string& right) {
+  const Image<std::uint8_t> old_left = read_gray8(left).value(), old_right = read_gray8(right).value();
+  const auto turned = [](const Image<std::uint8_t>& image) {
+    Image<std::uint8_t> result(image.size());
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) result(x, y) = image(image.width() - 1 - x, image.height() - 1 - y);
+    }
+    return result;
+  };
+  must(write_png(left, turned(old_right)));
+  must(write_png(right, turned(old_left)));
 }
 
 }  // namespace spartan::testing

@@ -1,0 +1,295 @@
+// `spartan run` from outside: good drives, bad input, full disks, kills.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "program.h"
+#include "run_results.h"
+#include "small_drive.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::byte_stable_content;
+using ::testing::HasSubstr;
+using testing::ProgramLimits;
+using testing::ProgramResult;
+using testing::run_program;
+using testing::TemporaryFolder;
+
+nlohmann::json summary_of(const std::string& run) {
+  std::ifstream file(run + "/summary.json");
+  return nlohmann::json::parse(file);
+}
+
+void cut(const std::string& path, double share) {
+  fs::resize_file(path, static_cast<std::uintmax_t>(share * static_cast<double>(fs::file_size(path))));
+}
+
+std::string number(int i) {
+  const std::string digits = std::to_string(i);
+  return std::string(6 - digits.size(), '0') + digits;
+}
+
+// One drive for all tests of this program; each test works on a copy of its own.
+class Run : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { testing::write_small_drive(shared().path() + "/drive"); }
+  static const TemporaryFolder& shared() {
+    static const TemporaryFolder folder;
+    return folder;
+  }
+  Run() { fs::copy(shared().path() + "/drive", drive(), fs::copy_options::recursive); }
+
+  std::string drive() const { return folder_.path() + "/drive"; }
+  std::string path(const std::string& name) const { return folder_.path() + "/" + name; }
+  std::string image(int eye, int i) const {
+    return drive() + "/image_" + std::to_string(eye) + "/" + number(i) + ".png";
+  }
+  ProgramResult run(const std::string& output, std::vector<std::string> more = {},
+                    const ProgramLimits& limits = {}) const {
+    std::vector<std::string> words{"run", drive(), "-o", path(output), "--set", "terrain.every_m=0.15"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_program(words, limits);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Run, LeavesTrajectoryTerrainAndSummary) {
+  const ProgramResult result = run("out", {"--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(nlohmann::json::parse(result.out), summary);
+  EXPECT_EQ(summary["schema"], 1);
+  EXPECT_EQ(summary["frames"], 14);
+  EXPECT_EQ(summary["format"], "kitti");
+  EXPECT_EQ(summary["world"]["gravity"], "assumed");
+  EXPECT_NEAR(summary["distance_m"], 0.53, 0.03);
+  EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
+  EXPECT_TRUE(summary["stages"].contains("odometry"));
+  EXPECT_TRUE(fs::exists(path("out/run.sqlite")));
+  EXPECT_FALSE(fs::exists(path("out/run.sqlite-wal"))) << "the store is closed";
+  EXPECT_TRUE(fs::exists(path("out/terrain/0.ply")));
+  EXPECT_TRUE(fs::exists(path("out/terrain/0.pfm")));
+  EXPECT_TRUE(fs::exists(path("out/terrain/0.png")));
+
+  const ProgramResult score = run_program({"evaluate", path("out"), "--truth", drive(), "--align", "first", "--json"});
+  ASSERT_EQ(score.exit_code, 0) << score.err;
+  EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.01);
+}
+
+TEST_F(Run, GivesTheSameBytesForAnyNumberOfThreads) {
+  ASSERT_EQ(run("one", {"--threads", "1"}).exit_code, 0);
+  ASSERT_EQ(run("two", {"--threads", "2"}).exit_code, 0);
+  EXPECT_EQ(byte_stable_content(path("one")), byte_stable_content(path("two")));
+}
+
+TEST_F(Run, GoesOnAfterAKillAsIfNothingHadHappened) {
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_EQ(run("whole").exit_code, 0);
+  const auto took = std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() - start);
+  const auto whole = byte_stable_content(path("whole"));
+  for (const double share : {0.02, 0.3, 0.5, 0.7, 0.9}) {
+    const std::string out = "killed_" + std::to_string(share);
+    ProgramLimits limits;
+    limits.kill_after = std::chrono::milliseconds(static_cast<int>(share * static_cast<double>(took.count())));
+    const ProgramResult killed = run(out, {}, limits);
+    EXPECT_TRUE(killed.signal == SIGKILL || killed.exit_code == 0);
+    const ProgramResult resumed = run(out, {"--resume"});
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    EXPECT_EQ(byte_stable_content(path(out)), whole) << "killed after " << share << " of the run";
+  }
+}
+
+TEST_F(Run, ResumesWithoutDecodingWhatWasCommitted) {
+  ASSERT_EQ(run("whole").exit_code, 0);
+  ASSERT_EQ(run("part", {"--max-frames", "8"}).exit_code, 0);
+  for (int i = 0; i < 8; ++i) {
+    std::ofstream(image(0, i)) << "gone";
+    std::ofstream(image(1, i)) << "gone";
+  }
+  const ProgramResult resumed = run("part", {"--resume"});
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(summary_of(path("part"))["resumed_from_frame"], 8);
+  EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("whole")));
+}
+
+TEST_F(Run, StopsCleanlyWhenInterrupted) {
+  ProgramLimits limits;
+  limits.interrupt_after = std::chrono::milliseconds(400);
+  const ProgramResult stopped = run("out", {}, limits);
+  ASSERT_TRUE(stopped.exit_code == 130 || stopped.exit_code == 0) << stopped.err;
+  const ProgramResult resumed = run("out", {"--resume"});
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  ASSERT_EQ(run("whole").exit_code, 0);
+  EXPECT_EQ(byte_stable_content(path("out")), byte_stable_content(path("whole")));
+}
+
+TEST_F(Run, KeepsWhatWasCommittedWhenTheDiskIsFull) {
+  ASSERT_EQ(run("whole").exit_code, 0);
+  ProgramLimits limits;
+  limits.largest_file_bytes = 1'500'000;  // holds some frames of the store, not all
+  const ProgramResult full = run("full", {}, limits);
+  ASSERT_EQ(full.exit_code, 5) << full.err;
+  EXPECT_THAT(full.err, HasSubstr(path("full")));
+  const ProgramResult resumed = run("full", {"--resume"});
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_GT(summary_of(path("full"))["resumed_from_frame"], 0) << "something was committed before the disk was full";
+  EXPECT_EQ(byte_stable_content(path("full")), byte_stable_content(path("whole")));
+}
+
+TEST_F(Run, LeavesAnExistingFolderAlone) {
+  ASSERT_EQ(run("out").exit_code, 0);
+  const auto before = byte_stable_content(path("out"));
+  const ProgramResult again = run("out");
+  EXPECT_EQ(again.exit_code, 5);
+  EXPECT_THAT(again.err, HasSubstr("--resume"));
+  EXPECT_EQ(byte_stable_content(path("out")), before);
+}
+
+TEST_F(Run, RefusesToResumeAnotherRun) {
+  ASSERT_EQ(run("out").exit_code, 0);
+  EXPECT_EQ(run("out", {"--resume", "--set", "terrain.every_m=2"}).exit_code, 4) << "other options";
+  std::ofstream(drive() + "/times.txt", std::ios::app) << "99.0\n";
+  EXPECT_EQ(run("out", {"--resume"}).exit_code, 4) << "another input";
+}
+
+TEST_F(Run, RefusesWhatIsNoRecording) {
+  const ProgramResult missing = run_program({"run", path("nowhere"), "-o", path("out")});
+  EXPECT_EQ(missing.exit_code, 3);
+  EXPECT_THAT(missing.err, HasSubstr(path("nowhere")));
+  fs::create_directory(path("empty"));
+  const ProgramResult empty = run_program({"run", path("empty"), "-o", path("out")});
+  EXPECT_EQ(empty.exit_code, 3);
+  EXPECT_THAT(empty.err, HasSubstr("empty"));
+  EXPECT_FALSE(fs::exists(path("out")));
+}
+
+TEST_F(Run, SkipsTruncatedImages) {
+  cut(image(0, 3), 0.6);
+  cut(image(1, 9), 0.95);
+  const ProgramResult result = run("out");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr(image(0, 3)));
+  EXPECT_THAT(result.err, HasSubstr(image(1, 9)));
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(summary["skipped"]["unreadable"], 2);
+  EXPECT_EQ(summary["frames"], 12);
+  EXPECT_EQ(summary["predicted_frames"], nlohmann::json::parse("[3, 9]"));
+}
+
+TEST_F(Run, SkipsPairsOfDifferentSize) {
+  fs::copy_file(shared().path() + "/drive/image_0/000000.png", path("keep.png"));
+  ASSERT_EQ(run_program({"stereo", image(0, 0), image(1, 0), "-o", path("stereo")}).exit_code, 0);
+  // The picture of the disparity is as good as any other picture of another layout; a smaller one is of another size.
+  testing::write_gray_png(image(1, 5), 200, 100);
+  const ProgramResult result = run("out");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(summary_of(path("out"))["skipped"]["wrong_size"], 1);
+  EXPECT_EQ(run_program({"stereo", image(0, 5), image(1, 5), "-o", path("stereo2")}).exit_code, 3);
+}
+
+TEST_F(Run, FailsWhereNoFrameIsUsable) {
+  for (int i = 0; i < 14; ++i) cut(image(1, i), 0.5);
+  const ProgramResult result = run("out");
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("no usable frame"));
+}
+
+TEST_F(Run, BridgesMissingFramesWhereTheViewsStillOverlap) {
+  for (int i = 3; i < 13; ++i) fs::remove(image(1, i));
+  const ProgramResult result = run("out");
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(summary["skipped"]["right_missing"], 10);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
+}
+
+TEST_F(Run, SaysThatItWasLostWhereTheyDoNot) {
+  // Behind the gap the world is another one: the same drive seen upside down.
+  for (int i = 3; i < 8; ++i) fs::remove(image(1, i));
+  for (int i = 8; i < 14; ++i) {
+    testing::turn_upside_down(image(0, i), image(1, i));
+  }
+  const ProgramResult result = run("out");
+  EXPECT_EQ(result.exit_code, 6) << result.err;
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(summary["lost_spans"].size(), 1U);
+  EXPECT_EQ(summary["health"]["odometry"]["lost"], 1) << "it goes on from the next frame";
+  EXPECT_THAT(summary["lost_spans"][0]["reason"].get<std::string>(), ::testing::Not(::testing::IsEmpty()));
+}
+
+TEST_F(Run, SkipsStampsThatRunBackwards) {
+  std::ifstream in(drive() + "/times.txt");
+  std::string times, line;
+  for (int i = 0; std::getline(in, line); ++i) times += (i == 6 ? std::string("0.1") : line) + "\n";
+  std::ofstream(drive() + "/times.txt") << times;
+  const ProgramResult result = run("out");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(summary_of(path("out"))["skipped"]["stamp_reversed"], 1);
+}
+
+TEST_F(Run, RefusesABrokenCalibration) {
+  std::ofstream(drive() + "/calib.txt")
+      << "P0: nan 0 160 0 0 260 120 0 0 0 1 0\nP1: 260 0 160 -30 0 260 120 0 0 0 1 0\n";
+  const ProgramResult result = run("out");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("calib.txt:1"));
+  EXPECT_FALSE(fs::exists(path("out")));
+}
+
+TEST_F(Run, RefusesUnknownOptions) {
+  std::ofstream(path("options.yaml")) << "terrain:\n  every_m: 2\n  colour: red\nodometry:\n  speed: 3\n";
+  const ProgramResult result = run("out", {"--config", path("options.yaml")});
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("options.yaml:3: terrain.colour"));
+  EXPECT_THAT(result.err, HasSubstr("options.yaml:5: odometry.speed"));
+  EXPECT_EQ(run_program({"config", "check", path("options.yaml")}).exit_code, 4);
+  EXPECT_EQ(run("out", {"--set", "terrain.every_m=-1"}).exit_code, 2);
+  EXPECT_EQ(run("out", {"--no-such-flag"}).exit_code, 2);
+  const ProgramResult dump = run_program({"config", "dump"});
+  std::ofstream(path("all.yaml")) << dump.out;
+  EXPECT_EQ(run_program({"config", "check", path("all.yaml")}).exit_code, 0);
+}
+
+TEST_F(Run, SaysWhereItCannotWrite) {
+  std::ofstream(path("file")) << "not a folder";
+  const ProgramResult result = run("file/out");
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_THAT(result.err, HasSubstr(path("file/out")));
+}
+
+TEST_F(Run, ExportsForOtherTools) {
+  cut(image(0, 3), 0.6);
+  ASSERT_EQ(run("out").exit_code, 0);
+  for (const std::string format : {"tum", "kitti", "euroc", "csv", "ply"}) {
+    const ProgramResult result = run_program({"export", path("out"), "--format", format, "-o", path("x." + format)});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  const auto lines = [&](const std::string& name) {
+    const std::string text = testing::content_of(path(name));
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  EXPECT_EQ(lines("x.tum"), 13);
+  EXPECT_EQ(lines("x.kitti"), 14) << "one line for every announced frame";
+  fs::copy_file(drive() + "/times.txt", path("times.txt"));
+  fs::rename(path("x.kitti"), path("poses.txt"));
+  const ProgramResult score =
+      run_program({"evaluate", path("poses.txt"), "--truth", drive() + "/poses.txt", "--align", "none", "--json"});
+  ASSERT_EQ(score.exit_code, 0) << score.err;
+  EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.02) << "in KITTI's own frame, without any alignment";
+  EXPECT_EQ(run_program({"export", path("out"), "--format", "xyz", "-o", path("x")}).exit_code, 2);
+  EXPECT_EQ(run_program({"export", path("nowhere"), "--format", "tum", "-o", path("x")}).exit_code, 3);
+}
+
+}  // namespace
+}  // namespace spartan
