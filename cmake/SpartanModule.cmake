@@ -21,9 +21,9 @@ if(SPARTAN_TESTS)
   find_package(rapidcheck QUIET CONFIG)
 endif()
 
-# spartan_test(NAME SOURCES … LINKS … [LABEL fast|long] [TIMEOUT s])
+# spartan_test(NAME SOURCES … LINKS … [LABEL fast|long] [TIMEOUT s] [FIXTURE name])
 function(spartan_test name)
-  cmake_parse_arguments(A "" "LABEL;TIMEOUT" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(A "" "LABEL;TIMEOUT;FIXTURE" "SOURCES;LINKS" ${ARGN})
   if(NOT A_LABEL)
     set(A_LABEL fast)
   endif()
@@ -34,7 +34,7 @@ function(spartan_test name)
   target_link_libraries(${name} PRIVATE spartan_flags ${A_LINKS} GTest::gmock GTest::gtest_main rapidcheck)
   target_include_directories(${name} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES LABELS ${A_LABEL} TIMEOUT ${A_TIMEOUT}
+    PROPERTIES LABELS ${A_LABEL} TIMEOUT ${A_TIMEOUT} FIXTURES_REQUIRED "${A_FIXTURE}"
     ENVIRONMENT "SPARTAN_SOURCE_DIR=${PROJECT_SOURCE_DIR}"  # the discovery tears a list of two apart
     ENVIRONMENT_MODIFICATION "SPARTAN_PROGRAM=set:${CMAKE_BINARY_DIR}/bin/spartan")
 endfunction()

@@ -5,7 +5,7 @@
 
 #include "spartan/core/files.h"
 #include "spartan/rig/rig_files.h"
-#include "spartan/rig/yaml_fields.h"
+#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan {
 namespace {

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "spartan/core/files.h"
-#include "spartan/rig/yaml_fields.h"
+#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan::rig_detail {
 

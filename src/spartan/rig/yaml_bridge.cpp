@@ -1,4 +1,4 @@
-#include "spartan/rig/yaml_fields.h"
+#include "spartan/rig/yaml_bridge.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
