@@ -55,7 +55,7 @@ std::vector<int> LandmarkMatching::by_descriptor(const LandmarkMemory& memory,
         second = {static_cast<int>(i), distance};
       }
     }
-    if (first.distance > most || first.distance > ratio * second.distance) return {};
+    if (first.distance > most || !(first.distance < ratio * second.distance)) return {};
     return first;
   };
   workers_.for_each_part(0, static_cast<int>(best.size()), kLandmarksPerPart, [&](int begin, int end) {

@@ -16,75 +16,108 @@ constexpr std::uint64_t kSeed = 0x5157;
 constexpr double kCauchy = 6.0;
 /// Median of the squared length of three unit normals.
 constexpr double kMedianChi3 = 2.366;
+/// Its first quartile.
+constexpr double kQuartileChi3 = 1.213;
 /// Points further than this many baselines weigh nothing in a 3D-3D fit.
 constexpr double kLeastDisparityForFit_px = 0.5;
+/// Information (px⁻²) that pins the offset where it is taken as known.
+constexpr double kCertain = 1e12;
+/// Fewer inliers than this do not fix a motion well.
+constexpr int kFewest = 6;
 constexpr int kRounds = 3, kIterations = 12;
+
+/// Unknowns: right perturbation of the motion (translation, rotation), then the disparity offset.
+using Vector7d = Eigen::Matrix<double, 7, 1>;
+using Matrix7d = Eigen::Matrix<double, 7, 7>;
+struct Guess {
+  Pose motion;
+  double offset = 0;
+};
 
 /// Residual in units of its standard deviation, squared, and what it adds to the normal equations.
 struct Term {
   double squared = std::numeric_limits<double>::infinity();
-  Eigen::Matrix<double, 6, 6> information = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
+  Matrix7d information = Matrix7d::Zero();
+  Vector7d gradient = Vector7d::Zero();
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
 };
 
-Term term_of(const RectifiedStereo& stereo, const LandmarkMatch& match, const Pose& current_from_previous) {
+Term term_of(const RectifiedStereo& stereo, const LandmarkMatch& match, const Pose& current_from_previous,
+             double offset) {
   Term term;
-  const auto p = project_anchored(stereo, match.point, current_from_previous * match.previous_from_anchor);
+  const AnchoredPoint point{match.point.pixel, match.point.disparity + offset};
+  const auto p = project_anchored(stereo, point, current_from_previous * match.previous_from_anchor);
   if (!p) return term;
   const Eigen::Matrix3d spread =
       match.covariance + match.disparity_variance * p->by_disparity * p->by_disparity.transpose();
   const Eigen::Matrix3d weight = spread.inverse();
-  term.residual = match.measured - p->measured;
+  term.residual = match.measured + Eigen::Vector3d(0, 0, offset) - p->measured;
   term.squared = term.residual.dot(weight * term.residual);
-  const Eigen::Matrix<double, 6, 3> jw = p->by_motion.transpose() * weight;
-  term.information = jw * p->by_motion;
+  Eigen::Matrix<double, 3, 7> jacobian;
+  jacobian << p->by_motion, p->by_disparity - Eigen::Vector3d(0, 0, 1);
+  const Eigen::Matrix<double, 7, 3> jw = jacobian.transpose() * weight;
+  term.information = jw * jacobian;
   term.gradient = jw * term.residual;
   return term;
 }
 
 struct Normal {
   double cost = 0;
-  Matrix6d information = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
+  Matrix7d information = Matrix7d::Zero();
+  Vector7d gradient = Vector7d::Zero();
 };
 
-Normal normal_equations(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
-                        const std::vector<bool>& used, const Pose& motion, double noise_scale, bool robust) {
+/// A robust least-squares problem in the motion and the offset.
+struct Problem {
+  const RectifiedStereo& stereo;
+  const std::vector<LandmarkMatch>& matches;
+  DisparityOffset prior;
+  bool robust;
+};
+
+double information_of(const DisparityOffset& prior) {
+  return prior.variance > 0 ? 1 / prior.variance : kCertain;
+}
+
+Normal normal_equations(const Problem& problem, const std::vector<bool>& used, const Guess& guess, double noise_scale) {
   Normal normal;
-  const Pose current_from_previous = motion.inverse();
+  const Pose current_from_previous = guess.motion.inverse();
   const double scale = 1 / (noise_scale * noise_scale);
-  for (std::size_t i = 0; i < matches.size(); ++i) {
+  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
     if (!used[i]) continue;
-    const Term term = term_of(stereo, matches[i], current_from_previous);
+    const Term term = term_of(problem.stereo, problem.matches[i], current_from_previous, guess.offset);
     if (!std::isfinite(term.squared)) {
       normal.cost += kCauchy * 10;
       continue;
     }
     const double s = term.squared * scale;
-    const double weight = robust ? 1 / (1 + s / kCauchy) : 1;
-    normal.cost += robust ? kCauchy * std::log1p(s / kCauchy) : s;
+    const double weight = problem.robust ? 1 / (1 + s / kCauchy) : 1;
+    normal.cost += problem.robust ? kCauchy * std::log1p(s / kCauchy) : s;
     normal.information += weight * scale * term.information;
     normal.gradient += weight * scale * term.gradient;
   }
+  const double known = information_of(problem.prior);
+  const double change = problem.prior.value - guess.offset;
+  normal.cost += known * change * change;
+  normal.information(6, 6) += known;
+  normal.gradient[6] += known * change;
   return normal;
 }
 
-/// Levenberg-Marquardt over the motion.
-Pose minimise(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const std::vector<bool>& used,
-              Pose motion, double noise_scale, bool robust) {
+/// Levenberg-Marquardt.
+Guess minimise(const Problem& problem, const std::vector<bool>& used, Guess guess, double noise_scale) {
   double damping = 1e-6;
-  Normal here = normal_equations(stereo, matches, used, motion, noise_scale, robust);
+  Normal here = normal_equations(problem, used, guess, noise_scale);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    Matrix6d damped = here.information;
+    Matrix7d damped = here.information;
     damped.diagonal() *= 1 + damping;
-    const Vector6d step = damped.ldlt().solve(here.gradient);
+    const Vector7d step = damped.ldlt().solve(here.gradient);
     if (!step.allFinite()) break;
-    const Pose tried = motion * exp_se3(step);
-    const Normal there = normal_equations(stereo, matches, used, tried, noise_scale, robust);
+    const Guess tried{guess.motion * exp_se3(step.head<6>()), guess.offset + step[6]};
+    const Normal there = normal_equations(problem, used, tried, noise_scale);
     if (there.cost <= here.cost) {
       const double gain = here.cost - there.cost;
-      motion = tried;
+      guess = tried;
       here = there;
       damping = std::max(damping * 0.1, 1e-9);
       if (gain <= 1e-9 * here.cost) break;
@@ -93,14 +126,50 @@ Pose minimise(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& m
       if (damping > 1e6) break;
     }
   }
-  return motion;
+  return guess;
 }
 
-double median(std::vector<double> values) {
+double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+/// By how much residuals exceed their stated standard deviations: first from the best quarter of all (right up to 75 %
+/// outliers, if careful), then from the median of those that are in use.
+double noise_scale_of(const Problem& problem, const std::vector<bool>& used, const Guess& guess, bool first) {
+  std::vector<double> squared;
+  const Pose current_from_previous = guess.motion.inverse();
+  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
+    if (!used[i]) continue;
+    squared.push_back(term_of(problem.stereo, problem.matches[i], current_from_previous, guess.offset).squared);
+  }
+  const double excess = first ? quantile(squared, 0.25) / kQuartileChi3 : quantile(squared, 0.5) / kMedianChi3;
+  return std::sqrt(std::max(1.0, std::isfinite(excess) ? excess : 1.0));
+}
+
+/// Covariance of an M-estimate, A⁻¹ B A⁻¹ (Huber 1981, §6.3): A = Σ ψ' JᵀS⁻¹J and B = Σ ψ² JᵀS⁻¹J, each residual's
+/// direction taken at random, so that with weight w(s) of s = rᵀS⁻¹r, ψ' = w + ⅔ s w'(s) and ψ² = w² s/3.
+Matrix7d covariance_of(const Problem& problem, const std::vector<bool>& used, const Guess& guess, double noise_scale) {
+  Matrix7d a = Matrix7d::Zero(), b = Matrix7d::Zero();
+  const Pose current_from_previous = guess.motion.inverse();
+  const double scale = 1 / (noise_scale * noise_scale);
+  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
+    if (!used[i]) continue;
+    const Term term = term_of(problem.stereo, problem.matches[i], current_from_previous, guess.offset);
+    if (!std::isfinite(term.squared)) continue;
+    const double s = term.squared * scale;
+    const double weight = problem.robust ? 1 / (1 + s / kCauchy) : 1;
+    const double slope = problem.robust ? -weight * weight / kCauchy : 0;
+    a += scale * (weight + 2.0 / 3.0 * s * slope) * term.information;
+    b += scale * weight * weight * s / 3 * term.information;
+  }
+  a(6, 6) += information_of(problem.prior);
+  b(6, 6) += information_of(problem.prior);
+  const Matrix7d inverse = a.ldlt().solve(Matrix7d::Identity());
+  const Matrix7d covariance = inverse * b * inverse.transpose();
+  return 0.5 * (covariance + covariance.transpose());
 }
 
 /// Fills `inlier`, `inliers` and `rms_px` for a motion.
@@ -110,7 +179,7 @@ void judge(MotionFit& fit, const RectifiedStereo& stereo, const std::vector<Land
   fit.inliers = 0;
   double sum = 0;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    const Term term = term_of(stereo, matches[i], current_from_previous);
+    const Term term = term_of(stereo, matches[i], current_from_previous, fit.offset.value);
     if (!(term.squared <= limit)) continue;
     fit.inlier[i] = true;
     ++fit.inliers;
@@ -200,30 +269,27 @@ std::optional<MotionFit> MotionEstimation::coarse(const RectifiedStereo& stereo,
 }
 
 std::optional<MotionFit> MotionEstimation::fine(const RectifiedStereo& stereo,
-                                                const std::vector<LandmarkMatch>& matches, const Pose& start) const {
+                                                const std::vector<LandmarkMatch>& matches, const Pose& start,
+                                                const DisparityOffset& offset) const {
+  const Problem problem{stereo, matches, offset, options_.robust};
   MotionFit fit;
-  fit.previous_from_current = start;
+  fit.offset = offset;
   const double limit = options_.inlier_sigmas * options_.inlier_sigmas;
   std::vector<bool> used(matches.size(), true);
+  Guess guess{start, offset.value};
   for (int round = 0; round < kRounds; ++round) {
-    fit.previous_from_current =
-        minimise(stereo, matches, used, fit.previous_from_current, fit.noise_scale, options_.robust);
-    std::vector<double> squared;
-    const Pose current_from_previous = fit.previous_from_current.inverse();
-    for (const LandmarkMatch& match : matches) {
-      const double s = term_of(stereo, match, current_from_previous).squared;
-      if (std::isfinite(s)) squared.push_back(s);
-    }
-    fit.noise_scale = std::sqrt(std::max(1.0, median(squared) / kMedianChi3));
+    guess = minimise(problem, used, guess, fit.noise_scale);
+    fit.previous_from_current = guess.motion;
+    fit.offset.value = guess.offset;
+    fit.noise_scale = noise_scale_of(problem, used, guess, round == 0);
     judge(fit, stereo, matches, limit * fit.noise_scale * fit.noise_scale);
     used = fit.inlier;
-    if (fit.inliers < 6) return std::nullopt;
+    if (fit.inliers < kFewest) return std::nullopt;
   }
-  const Normal normal =
-      normal_equations(stereo, matches, used, fit.previous_from_current, fit.noise_scale, options_.robust);
-  fit.covariance = normal.information.ldlt().solve(Matrix6d::Identity());
-  fit.covariance = (0.5 * (fit.covariance + fit.covariance.transpose())).eval();
-  if (!fit.covariance.allFinite() || !(fit.covariance.diagonal().minCoeff() > 0)) return std::nullopt;
+  const Matrix7d covariance = covariance_of(problem, used, guess, fit.noise_scale);
+  if (!covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0)) return std::nullopt;
+  fit.covariance = covariance.topLeftCorner<6, 6>();
+  fit.offset.variance = covariance(6, 6);
   return fit;
 }
 

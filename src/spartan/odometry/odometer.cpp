@@ -95,6 +95,7 @@ struct Odometer::State {
 
   std::optional<std::string> refusal(const RectifiedPair& pair) const;
   Pose predict(Stamp now) const;
+  DisparityOffset offset_now() const;
   void detect(const RectifiedPair& pair);
   void reconstruct(const StereoImages& images);
   void measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate, Stopwatch& watch);
@@ -121,6 +122,14 @@ Pose Odometer::State::predict(Stamp now) const {
   const double span = seconds_between(memory.stamp, now);
   if (!(memory.velocity_span_s > 0) || !(span > 0)) return {};
   return exp_se3(memory.last_motion * (span / memory.velocity_span_s));
+}
+
+/// What is known of the disparity offset before a shot is looked at.
+DisparityOffset Odometer::State::offset_now() const {
+  const double sigma = options.motion.offset_sigma_px, drift = options.motion.offset_drift_px;
+  if (!(sigma > 0)) return {};
+  if (!(memory.offset.variance > 0)) return {0, sigma * sigma};
+  return {memory.offset.value, std::min(memory.offset.variance + drift * drift, sigma * sigma)};
 }
 
 void Odometer::State::detect(const RectifiedPair& pair) {
@@ -196,7 +205,7 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   estimate.matches = static_cast<int>(matches.size());
   estimate.times.match = watch.lap();
 
-  const std::optional<MotionFit> fit = estimation.fine(images.geometry, matches, start);
+  const std::optional<MotionFit> fit = estimation.fine(images.geometry, matches, start, offset_now());
   if (!fit || fit->inliers < options.motion.min_inliers) {
     estimate.status = TrackingStatus::lost;
     estimate.reason = fmt::format("{} landmarks, {} matches, {} agree on a motion", memory.map.landmarks.size(),
@@ -207,6 +216,7 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   estimate.inliers = fit->inliers;
   estimate.rms_px = fit->rms_px;
   decide_status(images.geometry, matches, *fit, estimate);
+  memory.offset = fit->offset;
   advance(estimate.previous_from_current);
   update_landmarks(images, matches, *fit);
   estimate.times.estimate = watch.lap();
@@ -239,18 +249,19 @@ void Odometer::State::update_landmarks(const StereoImages& images, const std::ve
                                        const MotionFit& fit) {
   std::vector<Landmark>& landmarks = memory.map.landmarks;
   const double noise = fit.noise_scale * fit.noise_scale;
+  const Eigen::Vector3d offset(0, 0, fit.offset.value);
   for (Landmark& landmark : landmarks) ++landmark.missed;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (!fit.inlier[i]) continue;
     const LandmarkMatch& match = matches[i];
     Landmark& landmark = landmarks[match.landmark];
-    const auto p =
-        project_anchored(images.geometry, match.point, memory.map.anchor(landmark.anchor_id).latest_from_anchor);
+    const AnchoredPoint point{match.point.pixel, match.point.disparity + fit.offset.value};
+    const auto p = project_anchored(images.geometry, point, memory.map.anchor(landmark.anchor_id).latest_from_anchor);
     if (!p) continue;
     // Scalar Kalman update of the disparity in the anchor.
     const Eigen::Vector3d weighted = (noise * match.covariance).ldlt().solve(p->by_disparity);
     const double variance = 1 / (1 / landmark.variance + weighted.dot(p->by_disparity));
-    landmark.disparity += variance * weighted.dot(match.measured - p->measured);
+    landmark.disparity += variance * weighted.dot(match.measured + offset - p->measured);
     landmark.variance = std::max(variance, kLeastDisparitySigma_px * kLeastDisparitySigma_px);
     landmark.pixel = match.measured.head<2>();
     landmark.missed = 0;
@@ -259,7 +270,7 @@ void Odometer::State::update_landmarks(const StereoImages& images, const std::ve
     const double grown = std::sqrt(std::abs(warp.pixels.determinant()));
     if (grown < options.matching.max_scale_change && grown * options.matching.max_scale_change > 1) continue;
     const double sigma = std::sqrt(variance) * std::abs(p->by_disparity.z());
-    const RowAlignment now{p->measured.z(), warp.slant, std::max(sigma, kLeastDisparitySigma_px), 1};
+    const RowAlignment now{p->measured.z() - fit.offset.value, warp.slant, std::max(sigma, kLeastDisparitySigma_px), 1};
     if (!renew(landmark, images, now)) landmark.missed = kMostMissed;
   }
   std::erase_if(landmarks, [](const Landmark& l) { return l.missed >= kMostMissed; });

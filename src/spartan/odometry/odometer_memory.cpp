@@ -76,6 +76,8 @@ Bytes OdometerMemory::save() const {
   put(out, geometry);
   out.put_array(last_motion.data(), 6);
   out.put(velocity_span_s);
+  out.put(offset.value);
+  out.put(offset.variance);
   out.put(map.next_anchor_id);
   out.put(static_cast<std::uint32_t>(map.anchors.size()));
   for (const Anchor& anchor : map.anchors) {
@@ -100,6 +102,8 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   if (motion.size() != 6) return damaged("damaged");
   std::copy(motion.begin(), motion.end(), memory.last_motion.data());
   memory.velocity_span_s = in.get<double>();
+  memory.offset.value = in.get<double>();
+  memory.offset.variance = in.get<double>();
   memory.map.next_anchor_id = in.get<std::uint32_t>();
   const auto anchors = in.get<std::uint32_t>();
   if (anchors > bytes.size()) return damaged("damaged");

@@ -6,6 +6,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
 #include "spartan/odometry/landmark.h"
+#include "spartan/odometry/motion_estimation.h"
 #include "spartan/rig/rectified_stereo.h"
 
 namespace spartan {
@@ -16,6 +17,7 @@ struct OdometerMemory {
   RectifiedStereo geometry;
   Vector6d last_motion = Vector6d::Zero();  ///< Log of the latest measured previous_from_current
   double velocity_span_s = 0;               ///< time that motion took; 0: none yet
+  DisparityOffset offset;                   ///< variance 0 before the first motion
   LandmarkMemory map;
 
   Bytes save() const;

@@ -96,6 +96,8 @@ struct MotionEstimationOptions {
   double disparity_sigma_px = 0.10;
   double inlier_sigmas = 4.0;
   bool robust = true;
+  double offset_sigma_px = 0.15;
+  double offset_drift_px = 0.005;
   int min_inliers = 12;
   int few_inliers = 40;
 
@@ -107,6 +109,10 @@ struct MotionEstimationOptions {
     v.field("disparity_sigma_px", disparity_sigma_px, "least standard deviation of a disparity", between(0.001, 10));
     v.field("inlier_sigmas", inlier_sigmas, "largest normalised residual of an inlier", between(1, 100));
     v.field("robust", robust, "Cauchy weights instead of least squares");
+    v.field("offset_sigma_px", offset_sigma_px,
+            "how wrong the calibration may be in all disparities alike; estimated along with the motion; 0: right",
+            between(0, 10));
+    v.field("offset_drift_px", offset_drift_px, "by how much that may change from shot to shot", between(0, 10));
     v.field("min_inliers", min_inliers, "with fewer the rover is lost", between(6, 10000));
     v.field("few_inliers", few_inliers, "with fewer the estimate is degraded", between(6, 10000));
   }
