@@ -128,15 +128,22 @@ Image<float> opencv_disparity(const Pair& pair, int mode) {
 }
 
 struct Scores {
-  double bad_05 = 0, bad_1 = 0, bad_2 = 0, matched_bad_1 = 0, matched_bad_2 = 0, density = 0, nonocc_bad_1 = 0, rms = 0, ms = 0;
+  double bad_05 = 0, bad_1 = 0, bad_2 = 0, matched_bad_1 = 0, matched_bad_2 = 0, density = 0, nonocc_bad_1 = 0, rms = 0,
+         ms = 0;
 };
 
 Scores score(const Pair& pair, ImageView<const float> disparity, double ms) {
   const auto metrics = must(spartan::compare_disparities(disparity, pair.truth, pair.mask));
   const auto& all = metrics.all;
-  return {all.bad_0_5.value_or(0), all.bad_1.value_or(0), all.bad_2.value_or(0), all.matched_bad_1.value_or(0),
-          all.matched_bad_2.value_or(0), all.density_percent.value_or(0),
-          metrics.nonocc ? metrics.nonocc->bad_1.value_or(0) : 0, all.rms_in_1px.value_or(0), ms};
+  return {all.bad_0_5.value_or(0),
+          all.bad_1.value_or(0),
+          all.bad_2.value_or(0),
+          all.matched_bad_1.value_or(0),
+          all.matched_bad_2.value_or(0),
+          all.density_percent.value_or(0),
+          metrics.nonocc ? metrics.nonocc->bad_1.value_or(0) : 0,
+          all.rms_in_1px.value_or(0),
+          ms};
 }
 
 // The median of several runs, in milliseconds.
@@ -152,8 +159,8 @@ double time_of(int repeat, const std::function<void()>& work) {
 }
 
 void print_line(const std::string& pair, const std::string& method, const Scores& s) {
-  fmt::print("{:<16} {:<14} {:7.2f} {:7.2f} {:7.2f} {:8.2f} {:8.2f} {:8.2f} {:9.2f} {:7.3f} {:8.1f}\n", pair, method, s.bad_05, s.bad_1,
-             s.bad_2, s.matched_bad_1, s.matched_bad_2, s.density, s.nonocc_bad_1, s.rms, s.ms);
+  fmt::print("{:<16} {:<14} {:7.2f} {:7.2f} {:7.2f} {:8.2f} {:8.2f} {:8.2f} {:9.2f} {:7.3f} {:8.1f}\n", pair, method,
+             s.bad_05, s.bad_1, s.bad_2, s.matched_bad_1, s.matched_bad_2, s.density, s.nonocc_bad_1, s.rms, s.ms);
 }
 
 void write_pictures(const std::string& folder, const Pair& pair, ImageView<const float> disparity) {
@@ -161,7 +168,8 @@ void write_pictures(const std::string& folder, const Pair& pair, ImageView<const
   for (int y = 0; y < disparity.height(); ++y) {
     for (int x = 0; x < disparity.width(); ++x) {
       const auto level = [&](float d) {
-        return std::isfinite(d) ? cv::saturate_cast<std::uint8_t>(d * 255.0F / static_cast<float>(pair.disparities)) : std::uint8_t{0};
+        return std::isfinite(d) ? cv::saturate_cast<std::uint8_t>(d * 255.0F / static_cast<float>(pair.disparities))
+                                : std::uint8_t{0};
       };
       const float d = disparity(x, y), t = pair.truth(x, y);
       const std::uint8_t gray = pair.left(x, y), found = level(d), true_level = level(t);
@@ -169,7 +177,11 @@ void write_pictures(const std::string& folder, const Pair& pair, ImageView<const
       picture.at<cv::Vec3b>(y, x + disparity.width()) = {true_level, true_level, true_level};
       picture.at<cv::Vec3b>(y + disparity.height(), x) = {found, found, found};
       cv::Vec3b verdict{0, 0, 0};
-      if (std::isfinite(t)) verdict = !std::isfinite(d) ? cv::Vec3b(120, 60, 0) : std::abs(d - t) > 2 ? cv::Vec3b(0, 0, 255) : std::abs(d - t) > 1 ? cv::Vec3b(0, 160, 255) : cv::Vec3b(60, 120, 60);
+      if (std::isfinite(t))
+        verdict = !std::isfinite(d)     ? cv::Vec3b(120, 60, 0)
+                  : std::abs(d - t) > 2 ? cv::Vec3b(0, 0, 255)
+                  : std::abs(d - t) > 1 ? cv::Vec3b(0, 160, 255)
+                                        : cv::Vec3b(60, 120, 60);
       picture.at<cv::Vec3b>(y + disparity.height(), x + disparity.width()) = verdict;
     }
   }
@@ -214,7 +226,8 @@ class Means {
   void print(double count) const {
     for (const std::string& method : order_) {
       Scores s = sums_.at(method);
-      for (double* value : {&s.bad_05, &s.bad_1, &s.bad_2, &s.matched_bad_1, &s.matched_bad_2, &s.density, &s.nonocc_bad_1, &s.rms, &s.ms}) {
+      for (double* value : {&s.bad_05, &s.bad_1, &s.bad_2, &s.matched_bad_1, &s.matched_bad_2, &s.density,
+                            &s.nonocc_bad_1, &s.rms, &s.ms}) {
         *value /= count;
       }
       print_line("mean", method, s);
@@ -226,17 +239,20 @@ class Means {
   std::map<std::string, Scores> sums_;
 };
 
-Scores run_ours(const Pair& pair, const spartan::DisparityOptions& options, int threads, int repeat, const std::string& pictures) {
+Scores run_ours(const Pair& pair, const spartan::DisparityOptions& options, int threads, int repeat,
+                const std::string& pictures) {
   spartan::DisparityComputer computer(options, spartan::Workers(threads));
   spartan::DisparityImage image;
-  const double ms = time_of(repeat + 1, [&] { image = must(computer.compute(pair.left, pair.right, {0, pair.disparities - 1})); });
+  const double ms = time_of(repeat + 1, [&] {
+    image = must(computer.compute(pair.left, pair.right, {0, pair.disparities - 1}));
+  });
   if (!pictures.empty()) write_pictures(pictures, pair, image.disparity);
   return score(pair, image.disparity, ms);
 }
 
 void compare_all(const std::vector<Pair>& pairs, const Arguments& arguments) {
-  fmt::print("{:<16} {:<14} {:>7} {:>7} {:>7} {:>8} {:>8} {:>8} {:>9} {:>7} {:>8}\n", "pair", "method", "bad-0.5", "bad-1", "bad-2",
-             "m.bad-1", "m.bad-2", "density", "no.bad-1", "rms<1", "ms");
+  fmt::print("{:<16} {:<14} {:>7} {:>7} {:>7} {:>8} {:>8} {:>8} {:>9} {:>7} {:>8}\n", "pair", "method", "bad-0.5",
+             "bad-1", "bad-2", "m.bad-1", "m.bad-2", "density", "no.bad-1", "rms<1", "ms");
   Means means;
   for (const Pair& pair : pairs) {
     const auto note = [&](const std::string& method, const Scores& s) {
@@ -246,7 +262,8 @@ void compare_all(const std::vector<Pair>& pairs, const Arguments& arguments) {
     note("ours 1 thread", run_ours(pair, arguments.options, 1, arguments.repeat, arguments.pictures));
     note("ours 2 threads", run_ours(pair, arguments.options, 2, arguments.repeat, ""));
     if (!arguments.rivals) continue;
-    for (const auto& [name, mode] : {std::pair{"SGBM", cv::StereoSGBM::MODE_SGBM}, std::pair{"SGBM HH", cv::StereoSGBM::MODE_HH}}) {
+    for (const auto& [name, mode] :
+         {std::pair{"SGBM", cv::StereoSGBM::MODE_SGBM}, std::pair{"SGBM HH", cv::StereoSGBM::MODE_HH}}) {
       Image<float> disparity;
       cv::setNumThreads(1);
       const int m = mode;
@@ -262,17 +279,23 @@ void time_targets(const std::vector<Pair>& pairs, const Arguments& arguments) {
   const auto largest = std::max_element(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
     return a.left.width() * a.left.height() * a.disparities < b.left.width() * b.left.height() * b.disparities;
   });
-  fmt::print("\n{}: {}x{}, {} disparities\n", largest->name, largest->left.width(), largest->left.height(), largest->disparities);
+  fmt::print("\n{}: {}x{}, {} disparities\n", largest->name, largest->left.width(), largest->left.height(),
+             largest->disparities);
   for (const std::string& simd : spartan::available_simd_targets()) {
     for (const int threads : {1, 2}) {
       spartan::DisparityOptions options = arguments.options;
       options.simd = simd;
       spartan::DisparityComputer computer(options, spartan::Workers(threads));
       spartan::DisparityImage image;
-      const double ms = time_of(arguments.repeat + 2, [&] { image = must(computer.compute(largest->left, largest->right, {0, largest->disparities - 1})); });
+      const double ms = time_of(arguments.repeat + 2, [&] {
+        image = must(computer.compute(largest->left, largest->right, {0, largest->disparities - 1}));
+      });
       const auto& t = image.times;
-      fmt::print("{:<5} {} threads {:7.1f} ms (cost {:.1f}, aggregate {:.1f}, select {:.1f}, check {:.1f}, filter {:.1f}), {:.0f} MB\n", simd,
-                 threads, ms, t.cost, t.aggregate, t.select, t.check, t.filter, static_cast<double>(image.buffer_bytes) / 1e6);
+      fmt::print(
+          "{:<5} {} threads {:7.1f} ms (cost {:.1f}, aggregate {:.1f}, select {:.1f}, check {:.1f}, filter {:.1f}), "
+          "{:.0f} MB\n",
+          simd, threads, ms, t.cost, t.aggregate, t.select, t.check, t.filter,
+          static_cast<double>(image.buffer_bytes) / 1e6);
     }
   }
 }

@@ -19,7 +19,8 @@ template <class Matrix>
 Result<Matrix> read_matrix(const TextMatrices& file, const std::string& key) {
   const auto numbers = file.numbers(key, Matrix::SizeAtCompileTime);
   if (!numbers) return failure(numbers);
-  using RowMajor = Eigen::Matrix<double, Matrix::RowsAtCompileTime, Matrix::ColsAtCompileTime, (Matrix::ColsAtCompileTime == 1 ? Eigen::ColMajor : Eigen::RowMajor)>;
+  using RowMajor = Eigen::Matrix<double, Matrix::RowsAtCompileTime, Matrix::ColsAtCompileTime,
+                                 (Matrix::ColsAtCompileTime == 1 ? Eigen::ColMajor : Eigen::RowMajor)>;
   return Matrix(Eigen::Map<const RowMajor>(numbers->data()));
 }
 
