@@ -103,6 +103,7 @@ std::vector<Pair> load_pairs(const fs::path& data) {
     folders.insert(folders.end(), found.begin(), found.end());
   }
   std::vector<Pair> pairs;
+  pairs.reserve(folders.size());
   for (const fs::path& folder : folders) {
     pairs.push_back(fs::exists(folder / "view1.png") ? load_middlebury(folder) : load_eth3d(folder));
   }
@@ -211,7 +212,7 @@ Arguments parse(int argc, char** argv) {
 class Means {
  public:
   void add(const std::string& method, const Scores& s) {
-    if (!sums_.count(method)) order_.push_back(method);
+    if (!sums_.contains(method)) order_.push_back(method);
     Scores& t = sums_[method];
     t.bad_05 += s.bad_05;
     t.bad_1 += s.bad_1;

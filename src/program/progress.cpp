@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 namespace spartan::program {
@@ -25,7 +26,7 @@ std::string Progress::time_left(int done, int total) const {
   const int here = done - first_;
   if (here < 1 || total <= done) return "";
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  const int left = static_cast<int>(seconds / here * (total - done) + 0.5);
+  const int left = static_cast<int>(std::lround(seconds / here * (total - done)));
   return left >= 60 ? fmt::format(", {} min {:02d} s left", left / 60, left % 60) : fmt::format(", {} s left", left);
 }
 

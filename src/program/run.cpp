@@ -16,7 +16,7 @@ namespace spartan::program {
 namespace {
 
 struct RunArguments {
-  std::string input, output, rig, format, config, truth;
+  std::string input, output, rig, format, config;
   std::vector<std::string> set;
   bool resume = false, odometry_only = false;
   int max_frames = 0;
@@ -53,7 +53,6 @@ Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments)
   request.input = arguments.input;
   request.output = arguments.output;
   request.rig_file = arguments.rig;
-  request.truth_file = arguments.truth;
   request.resume = arguments.resume;
   request.threads = context.threads;
   request.max_frames = arguments.max_frames;
@@ -87,7 +86,6 @@ void add_run(CLI::App& app, Context& context) {
   verb->add_option("--format", a->format, "spartan, kitti, kitti-raw or euroc; guessed without it");
   verb->add_option("--config", a->config, "YAML file with options (see `spartan config dump`)");
   verb->add_option("--set", a->set, "one option, as group.key=value; may be given again")->allow_extra_args(false);
-  verb->add_option("--truth", a->truth, "trajectory to compare with; the figures go into the summary");
   verb->add_flag("--resume", a->resume, "go on where an earlier run of this folder stopped");
   verb->add_option("--max-frames", a->max_frames, "stop after so many shots")->check(CLI::NonNegativeNumber);
   verb->add_flag("--odometry-only", a->odometry_only, "the trajectory without the terrain");

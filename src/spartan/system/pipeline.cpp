@@ -82,7 +82,8 @@ Result<TerrainView> Pipeline::State::reconstruct(const RectifiedPair& shot) {
   return TerrainView{shot, image->disparity, world_from_left.pose};
 }
 
-Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Workers workers) {
+Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Workers workers,
+                                  const std::string& mask_folder) {
   const StereoPair* const pair = pair_for_odometry(rig, options.odometry_pair);
   if (pair == nullptr) {
     return options.odometry_pair.empty()
@@ -90,7 +91,7 @@ Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Wor
                : failure(ErrorCode::configuration, "the rig has no pair named '" + options.odometry_pair + "'",
                          "odometry_pair");
   }
-  auto imager = Imager::create(rig, options.imaging, workers);
+  auto imager = Imager::create(rig, options.imaging, workers, mask_folder);
   if (!imager) return failure(imager);
   return Pipeline(std::make_unique<State>(rig, options, std::move(*imager), *pair, workers));
 }

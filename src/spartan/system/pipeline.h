@@ -43,7 +43,9 @@ struct FrameResult {
 class Pipeline {
  public:
   /// Codes: `configuration` (rig or options that do not fit).
-  static Result<Pipeline> create(const Rig& rig, const RunOptions& options, Workers workers);
+  /// Self-masks are looked up in `mask_folder` (where the rig file lies).
+  static Result<Pipeline> create(const Rig& rig, const RunOptions& options, Workers workers,
+                                 const std::string& mask_folder = {});
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();

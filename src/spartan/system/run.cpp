@@ -247,7 +247,8 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
   report_sequence(info, hooks.log);
 
   const RunFolder folder{request.output};
-  auto pipeline = Pipeline::create(info.rig, request.options, Workers(request.threads));
+  const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
+  auto pipeline = Pipeline::create(info.rig, request.options, Workers(request.threads), mask_folder);
   if (!pipeline) return failure(pipeline);
   if (Status s = prepare_run_folder(folder, request.resume); !s) return failure(s);
   const RunIdentity identity{fingerprint(**source), dump_options(request.options), to_rig_yaml(info.rig)};

@@ -17,7 +17,6 @@ struct RunRequest {
   std::string output;
   std::string rig_file;                   ///< empty: the recording's own calibration
   std::optional<RecordingFormat> format;  ///< none: guess
-  std::string truth_file;                 ///< trajectory to compare the result with; empty: none
   RunOptions options;
   bool resume = false;
   int threads = 1;
