@@ -14,7 +14,6 @@ namespace {
 
 constexpr int kWindowColumns = 4, kWindowRows = 3;  // the census window reaches so far
 constexpr int kVector = 64;                         // bytes; room behind rows for whole vectors
-constexpr int kRow = 3;                             // the direction along the row
 
 int round_up(int value, int multiple) {
   return (value + multiple - 1) / multiple * multiple;

@@ -63,7 +63,7 @@ void cost_row_with(D d, const CostRow& r) {
 }
 
 template <class D>
-HWY_INLINE std::uint8_t smallest(D d, hn::Vec<D> v) {
+HWY_INLINE std::uint8_t smallest(D, hn::Vec<D> v) {
   // Bytes in pairs: the smaller of each pair, then the smallest of the 16-bit lanes.
   const hn::Repartition<std::uint16_t, D> d16;
   const auto pairs = hn::BitCast(d16, v);
