@@ -164,6 +164,15 @@ void print_line(const std::string& pair, const std::string& method, const Scores
              s.bad_05, s.bad_1, s.bad_2, s.matched_bad_1, s.matched_bad_2, s.density, s.nonocc_bad_1, s.rms, s.ms);
 }
 
+// Green good, orange over 1 px, red over 2 px, blue a hole, black no truth.
+cv::Vec3b verdict_on(float found, float truth) {
+  if (!std::isfinite(truth)) return {0, 0, 0};
+  if (!std::isfinite(found)) return {120, 60, 0};
+  const float error = std::abs(found - truth);
+  if (error > 2) return {0, 0, 255};
+  return error > 1 ? cv::Vec3b(0, 160, 255) : cv::Vec3b(60, 120, 60);
+}
+
 void write_pictures(const std::string& folder, const Pair& pair, ImageView<const float> disparity) {
   cv::Mat picture(pair.left.height() * 2, pair.left.width() * 2, CV_8UC3, cv::Scalar(0, 0, 0));
   for (int y = 0; y < disparity.height(); ++y) {
@@ -177,12 +186,7 @@ void write_pictures(const std::string& folder, const Pair& pair, ImageView<const
       picture.at<cv::Vec3b>(y, x) = {gray, gray, gray};
       picture.at<cv::Vec3b>(y, x + disparity.width()) = {true_level, true_level, true_level};
       picture.at<cv::Vec3b>(y + disparity.height(), x) = {found, found, found};
-      cv::Vec3b verdict{0, 0, 0};
-      if (std::isfinite(t))
-        verdict = !std::isfinite(d)     ? cv::Vec3b(120, 60, 0)
-                  : std::abs(d - t) > 2 ? cv::Vec3b(0, 0, 255)
-                  : std::abs(d - t) > 1 ? cv::Vec3b(0, 160, 255)
-                                        : cv::Vec3b(60, 120, 60);
+      const cv::Vec3b verdict = verdict_on(d, t);
       picture.at<cv::Vec3b>(y + disparity.height(), x + disparity.width()) = verdict;
     }
   }
