@@ -33,8 +33,12 @@ function(spartan_test name)
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE spartan_flags ${A_LINKS} GTest::gmock GTest::gtest_main rapidcheck)
   target_include_directories(${name} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+  set(fixture)
+  if(A_FIXTURE)
+    set(fixture FIXTURES_REQUIRED ${A_FIXTURE})
+  endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES LABELS ${A_LABEL} TIMEOUT ${A_TIMEOUT} FIXTURES_REQUIRED "${A_FIXTURE}"
+    PROPERTIES LABELS ${A_LABEL} TIMEOUT ${A_TIMEOUT} ${fixture}
     ENVIRONMENT "SPARTAN_SOURCE_DIR=${PROJECT_SOURCE_DIR}"  # the discovery tears a list of two apart
     ENVIRONMENT_MODIFICATION "SPARTAN_PROGRAM=set:${CMAKE_BINARY_DIR}/bin/spartan")
 endfunction()
