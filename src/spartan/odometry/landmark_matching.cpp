@@ -117,6 +117,9 @@ std::optional<LandmarkMatch> LandmarkMatching::correlate(const LandmarkMemory& m
   const auto found = align_translation(wanted, images.left_smooth, warp.pixels, expected->measured.head<2>(),
                                        options_.correlation_reach_px);
   if (!found || found->correlation < options_.min_correlation) return std::nullopt;
+  const int x = static_cast<int>(std::lround(found->position.x())),
+            y = static_cast<int>(std::lround(found->position.y()));
+  if (!images.left_mask.empty() && images.left_mask(x, y) == 0) return std::nullopt;
 
   RowAlignment near;
   near.disparity = expected->measured.z();
@@ -142,7 +145,7 @@ std::vector<LandmarkMatch> LandmarkMatching::by_correlation(const LandmarkMemory
   std::vector<LandmarkMatch> matches;
   for (const auto& match : found)
     if (match) matches.push_back(*match);
-  return options_.rigidity ? keep_rigid(images.geometry, std::move(matches)) : matches;
+  return matches;
 }
 
 std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector<LandmarkMatch> matches, int partners) {

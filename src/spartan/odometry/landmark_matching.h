@@ -36,7 +36,7 @@ class LandmarkMatching {
                                             const std::vector<int>& feature_of) const;
 
   /// Re-establishes each landmark by correlating its patch, warped by the predicted geometry, and measures its
-  /// disparity by a narrow search. `current_from_previous` is good to a few pixels. Then drops what is not rigid.
+  /// disparity by a narrow search. `current_from_previous` is good to a few pixels.
   std::vector<LandmarkMatch> by_correlation(const LandmarkMemory& memory, const StereoImages& images,
                                             const Pose& current_from_previous) const;
 

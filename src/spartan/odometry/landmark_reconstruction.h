@@ -16,7 +16,7 @@ struct StereoImages {
   RectifiedStereo geometry;
   ImageView<const std::uint8_t> left, right;
   ImageView<const std::uint16_t> left_smooth, right_smooth;  ///< gray levels times 256
-  ImageView<const std::uint8_t> right_mask;                  ///< 255 valid; empty: everywhere
+  ImageView<const std::uint8_t> left_mask, right_mask;       ///< 255 valid; empty: everywhere
   ImageView<const float> disparity;                          ///< dense, of the left image; may be empty
 };
 

@@ -6,10 +6,10 @@
 #include <chrono>
 #include <cmath>
 
-#include "spartan/odometry/feature_spread.h"
 #include "spartan/odometry/landmark_detector.h"
 #include "spartan/odometry/landmark_matching.h"
 #include "spartan/odometry/landmark_reconstruction.h"
+#include "spartan/odometry/landmark_upkeep.h"
 #include "spartan/odometry/motion_estimation.h"
 #include "spartan/odometry/odometer_memory.h"
 #include "spartan/odometry/odometry_options.h"
@@ -20,12 +20,10 @@ namespace {
 
 /// Standard deviations of a motion that was not measured.
 constexpr double kLostTranslation_m = 1.0, kLostRotation_rad = 0.5;
-/// A landmark is given up after so many shots in which it should have been seen.
-constexpr int kMostMissed = 2;
-/// Shared errors of view and calibration do not average out: a disparity is never known better than this.
-constexpr double kLeastDisparitySigma_px = 0.03;
 /// A coarse motion that fewer landmarks than this agree on is not trusted.
 constexpr int kLeastCoarseInliers = 10;
+/// With as many, landmarks far from where they were predicted need not be looked for.
+constexpr int kSureCoarseInliers = 30;
 
 class Stopwatch {
  public:
@@ -81,7 +79,8 @@ struct Odometer::State {
         detector(make_landmark_detector(options.detection, workers)),
         reconstruction(options.reconstruction),
         matching(options.matching, reconstruction, workers),
-        estimation(options.motion) {}
+        estimation(options.motion),
+        upkeep(options) {}
 
   OdometryOptions options;
   Workers workers;
@@ -89,6 +88,7 @@ struct Odometer::State {
   LandmarkReconstruction reconstruction;
   LandmarkMatching matching;
   MotionEstimation estimation;
+  LandmarkUpkeep upkeep;
   SmoothedImage left_smooth, right_smooth;
   std::vector<ReconstructedFeature> features;
   OdometerMemory memory;
@@ -99,14 +99,15 @@ struct Odometer::State {
   void detect(const RectifiedPair& pair);
   void reconstruct(const StereoImages& images);
   void measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate, Stopwatch& watch);
-  Pose coarse_motion(const RectifiedStereo& stereo, const Pose& predicted);
+  struct CoarseMotion {
+    Pose previous_from_current;
+    std::vector<LandmarkMatch> matches;
+    std::vector<int> feature_of;  ///< of each landmark; −1: none
+  };
+  CoarseMotion coarse_motion(const RectifiedStereo& stereo, const Pose& predicted);
   void set_noise_floor(std::vector<LandmarkMatch>& matches) const;
   void decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
                      MotionEstimate& estimate) const;
-  void advance(const Pose& previous_from_current);
-  void update_landmarks(const StereoImages& images, const std::vector<LandmarkMatch>& matches, const MotionFit& fit);
-  bool renew(Landmark& landmark, const StereoImages& images, const RowAlignment& seen) const;
-  void add_landmarks(const StereoImages& images);
 };
 
 /// Why a pair cannot be used, if so.
@@ -150,19 +151,29 @@ void Odometer::State::reconstruct(const StereoImages& images) {
   });
 }
 
-/// A first motion from descriptors; the prediction where they do not tell.
-Pose Odometer::State::coarse_motion(const RectifiedStereo& stereo, const Pose& predicted) {
-  if (!options.matching.descriptors) return predicted;
-  const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
-    const std::vector<int> feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
-    return estimation.coarse(stereo, matching.coarse_matches(memory.map, features, feature_of));
+/// A first motion from descriptors, and the matches it rests on; the prediction alone where they do not tell.
+Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedStereo& stereo, const Pose& predicted) {
+  if (!options.matching.descriptors) return {predicted, {}, {}};
+  struct Attempt {
+    std::vector<int> feature_of;
+    std::vector<LandmarkMatch> matches;
+    std::optional<MotionFit> fit;
+    int inliers() const { return fit ? fit->inliers : 0; }
   };
-  std::optional<MotionFit> gated = attempt(predicted.inverse());
-  if (gated && gated->inliers >= 3 * kLeastCoarseInliers) return gated->previous_from_current;
-  const std::optional<MotionFit> anywhere = attempt(std::nullopt);
-  const MotionFit* best = gated ? &*gated : nullptr;
-  if (anywhere && (!best || anywhere->inliers > best->inliers)) best = &*anywhere;
-  return best && best->inliers >= kLeastCoarseInliers ? best->previous_from_current : predicted;
+  const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
+    Attempt made;
+    made.feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
+    made.matches = matching.coarse_matches(memory.map, features, made.feature_of);
+    made.fit = estimation.coarse(stereo, made.matches);
+    return made;
+  };
+  Attempt best = attempt(predicted.inverse());
+  if (best.inliers() < kSureCoarseInliers) {
+    Attempt anywhere = attempt(std::nullopt);
+    if (anywhere.inliers() > best.inliers()) best = std::move(anywhere);
+  }
+  const Pose motion = best.inliers() >= kLeastCoarseInliers ? best.fit->previous_from_current : predicted;
+  return {motion, std::move(best.matches), std::move(best.feature_of)};
 }
 
 /// What every measurement is uncertain by beyond its own residual.
@@ -199,8 +210,10 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
 
 void Odometer::State::measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate,
                               Stopwatch& watch) {
-  const Pose start = coarse_motion(images.geometry, predicted);
-  std::vector<LandmarkMatch> matches = matching.by_correlation(memory.map, images, start.inverse());
+  const auto [start, coarse_matches, feature_of] = coarse_motion(images.geometry, predicted);
+  std::vector<LandmarkMatch> matches =
+      options.matching.correlation ? matching.by_correlation(memory.map, images, start.inverse()) : coarse_matches;
+  if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
   set_noise_floor(matches);
   estimate.matches = static_cast<int>(matches.size());
   estimate.times.match = watch.lap();
@@ -217,90 +230,9 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   estimate.rms_px = fit->rms_px;
   decide_status(images.geometry, matches, *fit, estimate);
   memory.offset = fit->offset;
-  advance(estimate.previous_from_current);
-  update_landmarks(images, matches, *fit);
+  move_anchors(memory.map, estimate.previous_from_current);
+  upkeep.update(memory.map, images, matches, *fit, features, feature_of);
   estimate.times.estimate = watch.lap();
-}
-
-void Odometer::State::advance(const Pose& previous_from_current) {
-  const Pose current_from_previous = previous_from_current.inverse();
-  for (Anchor& anchor : memory.map.anchors) {
-    anchor.latest_from_anchor = current_from_previous * anchor.latest_from_anchor;
-  }
-}
-
-/// Gives a landmark a new patch, cut from the current shot, which becomes its anchor.
-bool Odometer::State::renew(Landmark& landmark, const StereoImages& images, const RowAlignment& seen) const {
-  const Eigen::Vector2d whole(std::round(landmark.pixel.x()), std::round(landmark.pixel.y()));
-  const auto patch = cut_patch(images.left_smooth, static_cast<int>(whole.x()), static_cast<int>(whole.y()));
-  if (!patch) return false;
-  landmark.anchor_id = memory.map.next_anchor_id;
-  landmark.anchor_pixel = whole;
-  landmark.disparity = seen.disparity + seen.slant.dot(whole - landmark.pixel);
-  landmark.variance = seen.sigma_px * seen.sigma_px;
-  landmark.slant = seen.slant;
-  landmark.patch = *patch;
-  landmark.pixel = whole;
-  return true;
-}
-
-/// Takes what was measured into the landmarks, drops those that are gone. Anchors are at the current shot already.
-void Odometer::State::update_landmarks(const StereoImages& images, const std::vector<LandmarkMatch>& matches,
-                                       const MotionFit& fit) {
-  std::vector<Landmark>& landmarks = memory.map.landmarks;
-  const double noise = fit.noise_scale * fit.noise_scale;
-  const Eigen::Vector3d offset(0, 0, fit.offset.value);
-  for (Landmark& landmark : landmarks) ++landmark.missed;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (!fit.inlier[i]) continue;
-    const LandmarkMatch& match = matches[i];
-    Landmark& landmark = landmarks[match.landmark];
-    const AnchoredPoint point{match.point.pixel, match.point.disparity + fit.offset.value};
-    const auto p = project_anchored(images.geometry, point, memory.map.anchor(landmark.anchor_id).latest_from_anchor);
-    if (!p) continue;
-    // Scalar Kalman update of the disparity in the anchor.
-    const Eigen::Vector3d weighted = (noise * match.covariance).ldlt().solve(p->by_disparity);
-    const double variance = 1 / (1 / landmark.variance + weighted.dot(p->by_disparity));
-    landmark.disparity += variance * weighted.dot(match.measured + offset - p->measured);
-    landmark.variance = std::max(variance, kLeastDisparitySigma_px * kLeastDisparitySigma_px);
-    landmark.pixel = match.measured.head<2>();
-    landmark.missed = 0;
-
-    const AnchoredWarp warp = warp_of(*p, landmark.slant);
-    const double grown = std::sqrt(std::abs(warp.pixels.determinant()));
-    if (grown < options.matching.max_scale_change && grown * options.matching.max_scale_change > 1) continue;
-    const double sigma = std::sqrt(variance) * std::abs(p->by_disparity.z());
-    const RowAlignment now{p->measured.z() - fit.offset.value, warp.slant, std::max(sigma, kLeastDisparitySigma_px), 1};
-    if (!renew(landmark, images, now)) landmark.missed = kMostMissed;
-  }
-  std::erase_if(landmarks, [](const Landmark& l) { return l.missed >= kMostMissed; });
-}
-
-/// Features that stand apart from all landmarks become landmarks, up to the number asked for; matched ones lend their
-/// descriptor.
-void Odometer::State::add_landmarks(const StereoImages& images) {
-  std::vector<Landmark>& landmarks = memory.map.landmarks;
-  Occupancy occupancy(images.left.size(), options.detection.spacing_px);
-  for (const Landmark& landmark : landmarks) occupancy.take(landmark.pixel.x(), landmark.pixel.y());
-  const double floor = options.motion.disparity_sigma_px * options.motion.disparity_sigma_px;
-  for (const ReconstructedFeature& f : features) {
-    if (static_cast<int>(landmarks.size()) >= options.detection.landmarks) break;
-    if (!f.stereo || !occupancy.is_free(f.feature.x, f.feature.y)) continue;
-    Landmark landmark;
-    landmark.pixel = {f.feature.x, f.feature.y};
-    const Eigen::Vector2d whole(std::round(f.feature.x), std::round(f.feature.y));
-    landmark.pixel = whole;
-    if (!renew(landmark, images, *f.stereo)) continue;
-    landmark.variance += floor;
-    landmark.scale = f.feature.scale;
-    landmark.angle = f.feature.angle;
-    landmark.sign = f.feature.sign;
-    landmark.descriptor = f.feature.descriptor;
-    occupancy.take(f.feature.x, f.feature.y);
-    landmarks.push_back(landmark);
-  }
-  memory.map.anchors.push_back({memory.map.next_anchor_id++, Pose()});
-  memory.map.drop_unused_anchors();
 }
 
 Odometer::Odometer(const OdometryOptions& options, Workers workers)
@@ -324,7 +256,7 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
     estimate.status = TrackingStatus::lost;
     estimate.reason = *refusal;
   } else {
-    StereoImages images{pair.geometry, pair.left, pair.right, {}, {}, pair.right_mask, disparity};
+    StereoImages images{pair.geometry, pair.left, pair.right, {}, {}, pair.left_mask, pair.right_mask, disparity};
     s.left_smooth.compute(pair.left, s.workers);
     s.right_smooth.compute(pair.right, s.workers);
     images.left_smooth = s.left_smooth.view();
@@ -342,7 +274,7 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
       }
     }
     if (estimate.status == TrackingStatus::lost) s.memory.map = {};
-    s.add_landmarks(images);
+    s.upkeep.add(s.memory.map, images, s.features);
     s.memory.geometry = pair.geometry;
   }
 

@@ -39,7 +39,7 @@ struct LandmarkReconstructionOptions {
   std::string source = "row";
   double max_disparity_share = 0.3;
   double min_disparity_px = 0.0;
-  double min_correlation = 0.8;
+  double min_correlation = 0.7;
   double uniqueness = 0.05;
   bool left_right_check = true;
   bool slant = true;
@@ -64,7 +64,7 @@ struct LandmarkMatchingOptions {
   double max_descriptor_distance = 0.35;
   double descriptor_ratio = 0.85;
   bool correlation = true;
-  double min_correlation = 0.8;
+  double min_correlation = 0.7;
   double correlation_reach_px = 4;
   double max_scale_change = 1.35;
   double narrow_stereo_px = 3;

@@ -1,0 +1,286 @@
+#include "spartan/odometry/odometer.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <filesystem>
+
+#include "spartan/core/image_io.h"
+#include "spartan/core/random.h"
+#include "spartan/odometry/odometry_options.h"
+#include "spartan/testing/real_data.h"
+#include "spartan/testing/synthetic_world.h"
+
+namespace spartan {
+namespace {
+
+using testing::SyntheticShot;
+using testing::SyntheticWorld;
+
+const RectifiedStereo kStereo{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
+
+// Half a metre above level ground, looking 32° down, `heading_rad` to the left of world x.
+Pose camera_at(double x, double y, double heading_rad) {
+  const double s = std::sin(0.55), c = std::cos(0.55);
+  Eigen::Matrix3d body_from_optical;
+  body_from_optical << 0, -s, c, -1, 0, 0, 0, -c, -s;
+  return Pose(exp_so3({0, 0, heading_rad}), {x, y, 0.5}) * Pose(body_from_optical, {0, 0, 0});
+}
+
+// A curved drive: 4 cm and 0.8° a shot.
+Pose on_the_way(int shot) {
+  const double turned = 0.014 * shot, radius = 0.04 / 0.014;
+  return camera_at(radius * std::sin(turned), radius * (1 - std::cos(turned)), turned);
+}
+
+// Shots are rendered once for all tests.
+const SyntheticShot& shot_of(int index) {
+  static const std::vector<SyntheticShot> shots = [] {
+    const SyntheticWorld world(testing::SyntheticWorldOptions{});
+    std::vector<SyntheticShot> made;
+    for (int i = 0; i < 10; ++i) made.push_back(world.render(kStereo, on_the_way(i), static_cast<std::uint64_t>(i)));
+    return made;
+  }();
+  return shots[static_cast<std::size_t>(index)];
+}
+
+RectifiedPair pair_of(const SyntheticShot& shot, int time) {
+  RectifiedPair pair;
+  pair.stamp.ns = time * 1'000'000'000LL;
+  pair.geometry = kStereo;
+  pair.left = shot.left;
+  pair.right = shot.right;
+  return pair;
+}
+
+RectifiedPair pair_of(int index) {
+  return pair_of(shot_of(index), index);
+}
+
+RectifiedPair blank_pair(const Image<std::uint8_t>& blank, int time) {
+  RectifiedPair pair = pair_of(0);
+  pair.stamp.ns = time * 1'000'000'000LL;
+  pair.left = blank;
+  pair.right = blank;
+  return pair;
+}
+
+Image<std::uint8_t> noisy(const Image<std::uint8_t>& image, Random& random) {
+  Image<std::uint8_t> result(image.width(), image.height());
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      result(x, y) = static_cast<std::uint8_t>(std::clamp(std::lround(image(x, y) + random.normal(0, 1.5)), 0L, 255L));
+    }
+  }
+  return result;
+}
+
+Pose true_motion(int from, int to) {
+  return on_the_way(from).inverse() * on_the_way(to);
+}
+
+double translation_error(const MotionEstimate& estimate, int from, int to) {
+  return (true_motion(from, to).inverse() * estimate.previous_from_current).translation().norm();
+}
+
+double rotation_error(const MotionEstimate& estimate, int from, int to) {
+  return rotation_angle(true_motion(from, to).inverse() * estimate.previous_from_current);
+}
+
+std::vector<MotionEstimate> drive(const OdometryOptions& options, int threads = 1) {
+  Odometer odometer(options, Workers(threads));
+  std::vector<MotionEstimate> estimates;
+  for (int i = 0; i < 10; ++i) estimates.push_back(odometer.add(pair_of(i), {}, shot_of(i).disparity));
+  return estimates;
+}
+
+bool same_bits(const MotionEstimate& a, const MotionEstimate& b) {
+  return a.previous_from_current.matrix() == b.previous_from_current.matrix() && a.covariance == b.covariance &&
+         a.status == b.status && a.inliers == b.inliers && a.rms_px == b.rms_px;
+}
+
+TEST(Odometer, FollowsASyntheticDrive) {
+  const std::vector<MotionEstimate> estimates = drive({});
+  EXPECT_TRUE(estimates[0].first);
+  EXPECT_EQ(estimates[0].previous_from_current.matrix(), Eigen::Matrix4d::Identity());
+  Pose travelled;
+  double nees = 0;
+  for (int i = 1; i < 10; ++i) {
+    const MotionEstimate& e = estimates[static_cast<std::size_t>(i)];
+    EXPECT_EQ(e.status, TrackingStatus::tracking) << e.reason;
+    EXPECT_TRUE(e.reason.empty());
+    EXPECT_GT(e.inliers, 100);
+    EXPECT_LT(translation_error(e, i - 1, i), 0.0010) << i;
+    EXPECT_LT(rotation_error(e, i - 1, i), 0.0010) << i;
+    travelled = travelled * e.previous_from_current;
+    const Vector6d error = log_se3(true_motion(i - 1, i).inverse() * e.previous_from_current);
+    nees += error.dot(e.covariance.ldlt().solve(error)) / 9;
+  }
+  // 36 cm driven: a third of a percent.
+  EXPECT_LT((true_motion(0, 9).inverse() * travelled).translation().norm(), 0.0012);
+  EXPECT_GT(nees, 1);
+  EXPECT_LT(nees, 15);  // 6 in the mean; nine samples that hang together
+}
+
+TEST(Odometer, EverySubStepCanBeSwitchedOff) {
+  for (const char* switched :
+       {"detection.surf.upright=false", "reconstruction.source=dense", "reconstruction.left_right_check=false",
+        "reconstruction.slant=false", "matching.descriptors=false", "matching.correlation=false",
+        "matching.rigidity=false", "motion.robust=false", "motion.offset_sigma_px=0", "standing.detect=false"}) {
+    const Result<OdometryOptions> options = set_option(OdometryOptions{}, switched);
+    ASSERT_TRUE(options.has_value()) << options.error().message();
+    Pose travelled;
+    const bool coarse = std::string(switched) == "matching.correlation=false";
+    for (const MotionEstimate& e : drive(*options)) {
+      EXPECT_NE(e.status, TrackingStatus::lost) << switched << ": " << e.reason;
+      travelled = travelled * e.previous_from_current;
+    }
+    EXPECT_LT((true_motion(0, 9).inverse() * travelled).translation().norm(), coarse ? 0.02 : 0.004) << switched;
+  }
+}
+
+TEST(Odometer, GivesTheSameBitsForAnyNumberOfThreads) {
+  const std::vector<MotionEstimate> one = drive({}, 1), two = drive({}, 2);
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_TRUE(same_bits(one[i], two[i])) << i;
+}
+
+TEST(Odometer, GoesOnFromItsSavedStateBitForBit) {
+  Odometer whole({}, Workers(1));
+  for (int i = 0; i < 5; ++i) whole.add(pair_of(i));
+  Odometer resumed({}, Workers(1));
+  ASSERT_TRUE(resumed.restore(whole.save()).has_value());
+  for (int i = 5; i < 10; ++i) {
+    EXPECT_TRUE(same_bits(whole.add(pair_of(i)), resumed.add(pair_of(i)))) << i;
+    EXPECT_EQ(whole.save(), resumed.save());
+  }
+  const Bytes before = resumed.save();
+  EXPECT_FALSE(resumed.restore(Bytes{1, 2, 3}).has_value());
+  EXPECT_EQ(resumed.save(), before);
+}
+
+TEST(Odometer, StandsStillOnImagesThatDifferInNoiseAlone) {
+  for (const bool detect : {true, false}) {
+    Random random(1);
+    OdometryOptions options;
+    options.standing.detect = detect;
+    Odometer odometer(options, Workers(1));
+    Pose travelled;
+    for (int i = 0; i < 8; ++i) {
+      const Image<std::uint8_t> left = noisy(shot_of(0).left, random), right = noisy(shot_of(0).right, random);
+      RectifiedPair pair = pair_of(shot_of(0), i);
+      pair.left = left;
+      pair.right = right;
+      const MotionEstimate e = odometer.add(pair);
+      travelled = travelled * e.previous_from_current;
+      if (i > 0) {
+        EXPECT_EQ(e.status, detect ? TrackingStatus::standing : TrackingStatus::tracking);
+      }
+    }
+    EXPECT_LT(travelled.translation().norm(), detect ? 1e-12 : 0.0005);
+    // The next shot moves: nothing of the way is lost.
+    const MotionEstimate moved = odometer.add(pair_of(shot_of(1), 8));
+    EXPECT_EQ(moved.status, TrackingStatus::tracking);
+    EXPECT_LT(translation_error(moved, 0, 1), 0.001);
+  }
+}
+
+TEST(Odometer, CreepingIsNotTakenForStanding) {
+  // 0.3 mm a shot is 0.05 px: seen as standing at first, but it adds up until a quarter of a pixel (1.6 mm) is passed.
+  const SyntheticWorld world(testing::SyntheticWorldOptions{});
+  Odometer odometer({}, Workers(1));
+  Pose travelled;
+  int standing = 0;
+  for (int i = 0; i < 9; ++i) {
+    const SyntheticShot shot = world.render(kStereo, camera_at(0.0003 * i, 0, 0), static_cast<std::uint64_t>(200 + i));
+    const MotionEstimate e = odometer.add(pair_of(shot, i));
+    standing += e.status == TrackingStatus::standing;
+    travelled = travelled * e.previous_from_current;
+  }
+  EXPECT_GE(standing, 3);
+  EXPECT_GT(travelled.translation().norm(), 0.0014);
+  EXPECT_LT(travelled.translation().norm(), 0.0026);
+}
+
+TEST(Odometer, IsLostWithAReasonAndResumesAtTheNextShotButOne) {
+  Odometer odometer({}, Workers(1));
+  for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
+  const Image<std::uint8_t> blank(320, 240, 90);
+  const MotionEstimate lost = odometer.add(blank_pair(blank, 4));
+  EXPECT_EQ(lost.status, TrackingStatus::lost);
+  EXPECT_FALSE(lost.reason.empty());
+  // Constant velocity; the uncertainty is that of a guess.
+  EXPECT_LT(translation_error(lost, 3, 4), 0.002);
+  EXPECT_GT(lost.covariance(0, 0), 0.1);
+  EXPECT_EQ(odometer.add(pair_of(5)).status, TrackingStatus::lost);  // nothing to compare with yet
+  const MotionEstimate back = odometer.add(pair_of(6));
+  EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
+  EXPECT_LT(translation_error(back, 5, 6), 0.001);
+}
+
+TEST(Odometer, UsesAPredictionWhenThereIsOne) {
+  // Half the way at once, without descriptors: only the prediction leads there.
+  OdometryOptions options;
+  options.matching.descriptors = false;
+  Odometer led(options, Workers(1)), alone(options, Workers(1));
+  led.add(pair_of(0));
+  alone.add(pair_of(0));
+  const MotionEstimate found = led.add(pair_of(5), true_motion(0, 5));
+  EXPECT_EQ(found.status, TrackingStatus::tracking) << found.reason;
+  EXPECT_LT(translation_error(found, 0, 5), 0.004);
+  EXPECT_NE(alone.add(pair_of(5)).status, TrackingStatus::tracking);
+}
+
+TEST(Odometer, FindsALargeUnannouncedMotion) {
+  Odometer odometer({}, Workers(1));
+  odometer.add(pair_of(0));
+  const MotionEstimate found = odometer.add(pair_of(6));
+  EXPECT_EQ(found.status, TrackingStatus::tracking) << found.reason;
+  EXPECT_LT(translation_error(found, 0, 6), 0.004);
+}
+
+TEST(Odometer, RefusesPairsThatAreNoneWithoutCrashing) {
+  for (const auto& [width, height] : {std::pair(1, 1), {3, 200}, {12, 12}, {30, 20}, {64, 48}}) {
+    Odometer odometer({}, Workers(2));
+    const Image<std::uint8_t> tiny(width, height, 60);
+    RectifiedPair pair = blank_pair(tiny, 0);
+    pair.geometry.size = tiny.size();
+    EXPECT_TRUE(odometer.add(pair).first);
+    pair.stamp.ns = 1;
+    EXPECT_EQ(odometer.add(pair).status, TrackingStatus::lost);
+  }
+  Odometer odometer({}, Workers(1));
+  EXPECT_EQ(odometer.add(RectifiedPair{}).status, TrackingStatus::lost);
+  odometer.add(pair_of(0));
+  RectifiedPair uneven = pair_of(1);
+  uneven.right = uneven.right.crop(0, 0, 300, 240);
+  EXPECT_EQ(odometer.add(uneven).reason, "left and right image differ in size");
+  RectifiedPair other = pair_of(1);
+  other.geometry.focal_px = 300;
+  EXPECT_EQ(odometer.add(other).status, TrackingStatus::lost);
+}
+
+TEST(Odometer, DrivesTheFirstMetresOfKitti) {
+  const std::string folder = testing::data_folder() + "/kitti_06";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "set SPARTAN_DATA to the folder with kitti_06";
+  Odometer odometer({}, Workers(2));
+  Pose travelled;
+  for (int i = 0; i < 6; ++i) {
+    const auto left = read_gray8(folder + "/image_0/00000" + std::to_string(i) + ".png"),
+               right = read_gray8(folder + "/image_1/00000" + std::to_string(i) + ".png");
+    ASSERT_TRUE(left && right);
+    RectifiedPair pair;
+    pair.stamp = Stamp::from_seconds(0.1 * i);
+    pair.geometry = {left->size(), 707.0912, {601.8873, 183.1104}, 379.8145 / 707.0912};
+    pair.left = *left;
+    pair.right = *right;
+    const MotionEstimate e = odometer.add(pair);
+    EXPECT_EQ(e.status, TrackingStatus::tracking) << e.reason;
+    travelled = travelled * e.previous_from_current;
+  }
+  // poses.txt, line 6.
+  EXPECT_LT((travelled.translation() - Eigen::Vector3d(-0.0697, -0.1402, 5.9623)).norm(), 0.1);
+}
+
+}  // namespace
+}  // namespace spartan
