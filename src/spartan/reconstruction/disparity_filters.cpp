@@ -48,61 +48,121 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
   }
 }
 
+namespace {
+
+// Median of what is known of the 3×3 pixels around (x, y); the lower one of an even count: a value that was measured,
+// not a mean across an edge.
+float median_of_known(ImageView<const float> in, int x, int y) {
+  std::array<float, 9> values{};
+  std::size_t known = 0;
+  for (int v = std::max(0, y - 1); v <= std::min(in.height() - 1, y + 1); ++v) {
+    for (int u = std::max(0, x - 1); u <= std::min(in.width() - 1, x + 1); ++u) {
+      if (!std::isnan(in(u, v))) values[known++] = in(u, v);
+    }
+  }
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((known - 1) / 2);
+  std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(known));
+  return *middle;
+}
+
+float middle_of(float a, float b, float c) {
+  return std::max(std::min(a, b), std::min(std::max(a, b), c));
+}
+
+// Three values above each other, sorted; all NaN where one of them is.
+struct Column {
+  float low = kUnknown, middle = kUnknown, high = kUnknown;
+};
+Column column_of(float a, float b, float c) {
+  if (std::isnan(a + b + c)) return {};
+  return {std::min({a, b, c}), middle_of(a, b, c), std::max({a, b, c})};
+}
+
+// Of nine values in three sorted columns the median is that of the largest low, the middle middle and the smallest high
+// one: each column is sorted once for three pixels.
+void median_row(ImageView<const float> in, int y, ImageView<float> out) {
+  const int w = in.width();
+  const bool inside = y > 0 && y + 1 < in.height();
+  const auto column = [&](int x) {
+    return inside && x < w ? column_of(in(x, y - 1), in(x, y), in(x, y + 1)) : Column{};
+  };
+  Column left, centre = column(0);
+  for (int x = 0; x < w; ++x) {
+    const Column right = column(x + 1);
+    if (std::isnan(in(x, y))) {
+      out(x, y) = kUnknown;
+    } else if (std::isnan(left.low + centre.low + right.low)) {
+      out(x, y) = median_of_known(in, x, y);
+    } else {
+      out(x, y) =
+          middle_of(std::max({left.low, centre.low, right.low}), middle_of(left.middle, centre.middle, right.middle),
+                    std::min({left.high, centre.high, right.high}));
+    }
+    left = centre;
+    centre = right;
+  }
+}
+
+}  // namespace
+
 void median_3x3(ImageView<const float> in, const Workers& workers, ImageView<float> out) {
-  const int w = in.width(), h = in.height();
-  workers.for_each_part(0, h, kRowsAtOnce, [&](int from, int to) {
-    std::array<float, 9> values{};
-    for (int y = from; y < to; ++y) {
-      for (int x = 0; x < w; ++x) {
-        if (std::isnan(in(x, y))) {
-          out(x, y) = kUnknown;
-          continue;
-        }
-        std::size_t known = 0;
-        for (int v = std::max(0, y - 1); v <= std::min(h - 1, y + 1); ++v) {
-          for (int u = std::max(0, x - 1); u <= std::min(w - 1, x + 1); ++u) {
-            if (!std::isnan(in(u, v))) values[known++] = in(u, v);
-          }
-        }
-        // The lower one of an even count: a value that was measured, not a mean across an edge.
-        const auto middle = values.begin() + static_cast<std::ptrdiff_t>((known - 1) / 2);
-        std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(known));
-        out(x, y) = *middle;
+  workers.for_each_part(0, in.height(), kRowsAtOnce, [&](int from, int to) {
+    for (int y = from; y < to; ++y) median_row(in, y, out);
+  });
+}
+
+int SpeckleFilter::root_of(int run) {
+  const auto parent = [&](int r) -> int& { return runs_[static_cast<std::size_t>(r)].parent; };
+  while (parent(run) != run) {
+    parent(run) = parent(parent(run));
+    run = parent(run);
+  }
+  return run;
+}
+
+void SpeckleFilter::join(int one, int other) {
+  const int first = root_of(one), second = root_of(other);
+  if (first == second) return;
+  Run& kept = runs_[static_cast<std::size_t>(std::min(first, second))];
+  Run& gone = runs_[static_cast<std::size_t>(std::max(first, second))];
+  gone.parent = kept.parent;
+  kept.pixels += gone.pixels;
+}
+
+void SpeckleFilter::find_runs(float step, ImageView<const float> disparity) {
+  const int w = disparity.width();
+  runs_.clear();
+  above_.assign(static_cast<std::size_t>(w), -1);
+  here_.resize(static_cast<std::size_t>(w));
+  for (int y = 0; y < disparity.height(); ++y) {
+    for (int x = 0; x < w;) {
+      if (std::isnan(disparity(x, y))) {
+        here_[static_cast<std::size_t>(x++)] = -1;
+        continue;
+      }
+      const int run = static_cast<int>(runs_.size()), from = x;
+      do here_[static_cast<std::size_t>(x++)] = run;
+      while (x < w && std::abs(disparity(x, y) - disparity(x - 1, y)) <= step);
+      runs_.push_back({y, from, x, run, x - from});
+      int joined = -1;
+      for (int u = from; u < x; ++u) {
+        const int above = above_[static_cast<std::size_t>(u)];
+        if (above < 0 || above == joined || std::abs(disparity(u, y) - disparity(u, y - 1)) > step) continue;
+        join(run, above);
+        joined = above;
       }
     }
-  });
+    std::swap(above_, here_);
+  }
 }
 
 void SpeckleFilter::apply(int size_px, double step_px, ImageView<float> disparity) {
   if (size_px <= 0) return;
-  const int w = disparity.width(), h = disparity.height();
-  labels_.assign(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), 0);
-  const auto step = static_cast<float>(step_px);
-  int label = 0;
-  for (int y0 = 0; y0 < h; ++y0) {
-    for (int x0 = 0; x0 < w; ++x0) {
-      if (std::isnan(disparity(x0, y0)) || labels_[static_cast<std::size_t>(y0 * w + x0)] != 0) continue;
-      ++label;
-      queue_.assign(1, y0 * w + x0);
-      labels_[static_cast<std::size_t>(y0 * w + x0)] = label;
-      for (std::size_t next = 0; next < queue_.size(); ++next) {
-        const int x = queue_[next] % w, y = queue_[next] / w;
-        const float d = disparity(x, y);
-        const auto visit = [&](int u, int v) {
-          if (u < 0 || v < 0 || u >= w || v >= h) return;
-          int& mark = labels_[static_cast<std::size_t>(v * w + u)];
-          if (mark != 0 || !(std::abs(disparity(u, v) - d) <= step)) return;
-          mark = label;
-          queue_.push_back(v * w + u);
-        };
-        visit(x - 1, y);
-        visit(x + 1, y);
-        visit(x, y - 1);
-        visit(x, y + 1);
-      }
-      if (static_cast<int>(queue_.size()) >= size_px) continue;
-      for (const int at : queue_) disparity(at % w, at / w) = kUnknown;
-    }
+  find_runs(static_cast<float>(step_px), disparity);
+  for (int r = 0; r < static_cast<int>(runs_.size()); ++r) {
+    if (runs_[static_cast<std::size_t>(root_of(r))].pixels >= size_px) continue;
+    const Run& run = runs_[static_cast<std::size_t>(r)];
+    std::fill(&disparity(run.from, run.y), &disparity(run.to - 1, run.y) + 1, kUnknown);
   }
 }
 

@@ -23,13 +23,24 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
 void median_3x3(ImageView<const float> in, const Workers& workers, ImageView<float> out);
 
 /// Drops 4-connected patches of fewer than `size_px` pixels; neighbours belong together where they differ by at most
-/// `step_px`. Keeps its buffers from call to call.
+/// `step_px`. Runs of connected pixels along the rows are joined by union and find. Keeps its buffers from call to
+/// call.
 class SpeckleFilter {
  public:
   void apply(int size_px, double step_px, ImageView<float> disparity);
 
  private:
-  std::vector<int> labels_, queue_;
+  struct Run {
+    int y, from, to;  ///< pixels from … to − 1 of row y
+    int parent;       ///< index of another run of the patch; itself at the root
+    int pixels;       ///< of the whole patch, at its root
+  };
+  int root_of(int run);
+  void join(int one, int other);
+  void find_runs(float step, ImageView<const float> disparity);
+
+  std::vector<Run> runs_;
+  std::vector<int> above_, here_;  ///< run of each pixel in the row above and in this one, −1: unknown
 };
 
 }  // namespace spartan
