@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <numbers>
 #include <string>
 #include <thread>
@@ -16,9 +17,8 @@
 #include "spartan/rig/rig.h"
 #include "spartan/testing/synthetic_world.h"
 
+namespace spartan {
 namespace {
-
-using namespace spartan;
 
 constexpr double kGravity_m_s2 = 9.81;
 constexpr double kStep_m = 0.10;      // from frame to frame
@@ -183,9 +183,7 @@ Status synthesize(const Arguments& arguments) {
   return writer->finish();
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"Synthesises a short stereo drive over stony ground as a Spartan recording with truth."};
   app.add_option("OUT_DIR", arguments.folder, "folder of the recording; must not hold anything")->required();
@@ -202,4 +200,16 @@ int main(int argc, char** argv) {
     return status.error().code == ErrorCode::output ? 5 : 1;
   }
   return 0;
+}
+
+}  // namespace
+}  // namespace spartan
+
+int main(int argc, char** argv) {
+  try {
+    return spartan::run(argc, argv);
+  } catch (const std::exception& fault) {
+    std::fprintf(stderr, "synthesize_drive: %s\n", fault.what());
+    return 1;
+  }
 }

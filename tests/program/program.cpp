@@ -31,6 +31,7 @@ struct Pipe {
     ::setrlimit(RLIMIT_FSIZE, &limit);
   }
   std::vector<char*> words;
+  words.reserve(arguments.size() + 1);
   for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
   words.push_back(nullptr);
   ::execv(words.front(), words.data());

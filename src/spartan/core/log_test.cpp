@@ -24,7 +24,7 @@ TEST(Log, TheFileGetsEverythingFromInfoUp) {
   ::testing::internal::CaptureStderr();
   {
     const Log log = Log::to_terminal_and_file(LogLevel::error, path);
-    const Log copy = log;
+    const Log copy = log;  // NOLINT(performance-unnecessary-copy-initialization): that copies share the file is tested
     log.debug("a detail");
     copy.info("a {brace} is no format");
     log.warning("a warning");

@@ -230,10 +230,11 @@ Result<std::shared_ptr<Tree>> from_assignment(const std::string& assignment) {
   try {
     // a.b.c=v → {a: {b: {c: v}}}
     YAML::Node node = YAML::Load(assignment.substr(equals + 1));
-    const std::vector<std::string> keys = split_key(assignment.substr(0, equals));
-    for (auto key = keys.rbegin(); key != keys.rend(); ++key) {
+    std::vector<std::string> keys = split_key(assignment.substr(0, equals));
+    std::reverse(keys.begin(), keys.end());
+    for (const std::string& key : keys) {
       YAML::Node map(YAML::NodeType::Map);
-      map[*key] = node;
+      map[key] = node;
       node = map;
     }
     tree->levels.push_back({node, "", {}});

@@ -68,7 +68,7 @@ std::size_t end_of_scan(std::string_view jpeg, std::size_t at) {
 
 // A progressive picture has many scans, with tables between them; the end marker comes once, behind the last.
 std::string jpeg_fault(std::string_view jpeg) {
-  const std::string early = "JPEG file ends early", damaged = "JPEG file is damaged";
+  constexpr const char *early = "JPEG file ends early", *damaged = "JPEG file is damaged";
   std::size_t at = kJpegMagic.size();
   bool any_scan = false;
   while (at + 2 <= jpeg.size()) {

@@ -1,5 +1,6 @@
 #include "spartan/eval/trajectory_metrics.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -263,8 +264,8 @@ TEST(TrajectoryMetrics, AgreesWithEvo) {
       options.alignment = alignment;
       options.rpe_delta_frames = delta;
       const TrajectoryMetrics m = compare(drive, options);
-      auto evo = run_evo("'" + python + "' '" + source + "/src/spartan/eval/evo_oracle.py' " + estimate + " " + truth +
-                         " " + std::string(name_of(alignment)) + " 0.02 " + std::to_string(delta));
+      auto evo = run_evo(fmt::format("'{}' '{}/src/spartan/eval/evo_oracle.py' {} {} {} 0.02 {}", python, source,
+                                     estimate, truth, name_of(alignment), delta));
       SCOPED_TRACE(::testing::Message() << name_of(alignment) << ", delta " << delta);
       ASSERT_EQ(evo.size(), 14U);
       EXPECT_EQ(static_cast<double>(m.frames), evo["frames"]);

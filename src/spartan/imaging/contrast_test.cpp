@@ -82,7 +82,7 @@ TEST(Contrast, NoiseIsNotBlownUp) {
   const auto image = ramp<std::uint8_t>(100, 103);
   const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);
   EXPECT_LE(mapping(103) - mapping(100), 3 * 255 / ContrastMapping::kLeastLevels + 1);
-  EXPECT_NEAR((mapping(103) + mapping(100)) / 2, 127, 10);
+  EXPECT_NEAR(0.5 * (mapping(103) + mapping(100)), 127, 10);
 }
 
 TEST(Contrast, StrayBitsDoNotLeaveTheTable) {

@@ -20,7 +20,7 @@ Camera camera(const std::string& name, PixelFormat format, CameraModel model = P
   Camera result;
   result.name = name;
   result.size = kSize;
-  result.model = std::move(model);
+  result.model = model;
   result.pixel_format = format;
   return result;
 }

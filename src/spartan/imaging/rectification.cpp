@@ -110,7 +110,7 @@ Status check_baseline(const Eigen::Vector3d& right_eye, const std::string& where
 Result<Rectification> plan_rectification(const Camera& left, const Camera& right, const Pose& right_from_left,
                                          const std::string& where) {
   const Pose left_from_right = right_from_left.inverse();
-  const Eigen::Vector3d right_eye = left_from_right.translation();
+  const Eigen::Vector3d& right_eye = left_from_right.translation();
   if (Status status = check_baseline(right_eye, where); !status) return failure(status);
 
   Rectification plan;

@@ -17,7 +17,7 @@ Camera camera_with(CameraModel model) {
   Camera camera;
   camera.name = "camera";
   camera.size = {640, 480};
-  camera.model = std::move(model);
+  camera.model = model;
   return camera;
 }
 

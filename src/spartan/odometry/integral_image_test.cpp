@@ -27,11 +27,14 @@ TEST(IntegralImage, GivesTheSumsOfAllRectanglesOfOddSizes) {
     const Image<std::uint8_t> image = random_image(width, height);
     IntegralImage integral;
     integral.compute(image);
-    for (int y0 = 0; y0 <= height; ++y0)
-      for (int y1 = y0; y1 <= height; ++y1)
-        for (int x0 = 0; x0 <= width; ++x0)
+    for (int y0 = 0; y0 <= height; ++y0) {
+      for (int y1 = y0; y1 <= height; ++y1) {
+        for (int x0 = 0; x0 <= width; ++x0) {
           for (int x1 = x0; x1 <= width; ++x1)
             ASSERT_EQ(integral.box(x0, y0, x1, y1), plain_sum(image, x0, y0, x1, y1));
+        }
+      }
+    }
   }
 }
 

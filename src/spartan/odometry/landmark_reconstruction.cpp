@@ -96,9 +96,10 @@ std::optional<RowAlignment> LandmarkReconstruction::refine(const StereoImages& i
 std::optional<RowAlignment> LandmarkReconstruction::from_dense(const StereoImages& images, int x, int y) const {
   const ImageView<const float> dense = images.disparity;
   if (x < 1 || y < 1 || x + 1 >= dense.width() || y + 1 >= dense.height()) return std::nullopt;
-  for (int j = -1; j <= 1; ++j)
+  for (int j = -1; j <= 1; ++j) {
     for (int i = -1; i <= 1; ++i)
       if (!std::isfinite(dense(x + i, y + j))) return std::nullopt;
+  }
   RowAlignment found;
   found.disparity = dense(x, y);
   found.slant = {0.5 * (dense(x + 1, y) - dense(x - 1, y)), 0.5 * (dense(x, y + 1) - dense(x, y - 1))};

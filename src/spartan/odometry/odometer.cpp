@@ -297,8 +297,8 @@ Bytes Odometer::save() const {
   return state_->memory.save();
 }
 
-Status Odometer::restore(const Bytes& bytes) {
-  Result<OdometerMemory> memory = OdometerMemory::restore(bytes);
+Status Odometer::restore(const Bytes& state) {
+  Result<OdometerMemory> memory = OdometerMemory::restore(state);
   if (!memory) return failure(memory);
   state_->memory = *std::move(memory);
   return {};

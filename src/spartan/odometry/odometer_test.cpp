@@ -39,6 +39,7 @@ const SyntheticShot& shot_of(int index) {
   static const std::vector<SyntheticShot> shots = [] {
     const SyntheticWorld world(testing::SyntheticWorldOptions{});
     std::vector<SyntheticShot> made;
+    made.reserve(10);
     for (int i = 0; i < 10; ++i) made.push_back(world.render(kStereo, on_the_way(i), static_cast<std::uint64_t>(i)));
     return made;
   }();
@@ -91,6 +92,7 @@ double rotation_error(const MotionEstimate& estimate, int from, int to) {
 std::vector<MotionEstimate> drive(const OdometryOptions& options, int threads = 1) {
   Odometer odometer(options, Workers(threads));
   std::vector<MotionEstimate> estimates;
+  estimates.reserve(10);
   for (int i = 0; i < 10; ++i) estimates.push_back(odometer.add(pair_of(i), {}, shot_of(i).disparity));
   return estimates;
 }

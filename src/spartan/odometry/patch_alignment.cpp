@@ -123,9 +123,10 @@ std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::
   std::array<float, kPatchSide * kPatchSide> pixels;
   const Eigen::Vector2f c = centre.cast<float>();
   std::size_t i = 0;
-  for (int y = -r; y <= r; ++y)
+  for (int y = -r; y <= r; ++y) {
     for (int x = -r; x <= r; ++x, ++i)
       pixels[i] = sample(image, c.x() + static_cast<float>(x), c.y() + static_cast<float>(y));
+  }
   return AlignmentTemplate(pixels);
 }
 
@@ -178,15 +179,17 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, Ima
   // right(x − d − s·offset) ≈ template: derivative by d is −∇x, by the slant −offset ∇x.
   std::array<Window, 3> j;
   for (std::size_t i = 0; i < kWindowArea; ++i) {
+    const int column = static_cast<int>(i) % kWindowSide, row = static_cast<int>(i) / kWindowSide;
     j[0][i] = -wanted.gradient_x[i];
-    j[1][i] = j[0][i] * static_cast<float>(static_cast<int>(i) % kWindowSide - kWindowRadius);
-    j[2][i] = j[0][i] * static_cast<float>(static_cast<int>(i) / kWindowSide - kWindowRadius);
+    j[1][i] = j[0][i] * static_cast<float>(column - kWindowRadius);
+    j[2][i] = j[0][i] * static_cast<float>(row - kWindowRadius);
   }
   for (Window& window : j) normalise(window);
   Eigen::Matrix3d information;
-  for (std::size_t a = 0; a < 3; ++a)
+  for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t b = 0; b < 3; ++b)
       information(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = weighted_dot(j[a], j[b]);
+  }
   if (!(information(0, 0) > 1e-2)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / (0.5 * kWindowArea);
   information(1, 1) += prior;

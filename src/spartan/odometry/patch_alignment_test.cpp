@@ -55,9 +55,10 @@ TEST(SmoothedImage, IsTheBinomialFilterWithRepeatedBorders) {
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 9; ++x) {
       int sum = 0;
-      for (int j = -2; j <= 2; ++j)
+      for (int j = -2; j <= 2; ++j) {
         for (int i = -2; i <= 2; ++i)
           sum += kernel[i + 2] * kernel[j + 2] * image(std::clamp(x + i, 0, 8), std::clamp(y + j, 0, 6));
+      }
       EXPECT_EQ(smooth.view()(x, y), sum);
     }
   }

@@ -10,6 +10,7 @@ namespace {
 
 std::vector<Eigen::Vector3d> cloud(Random& random, int count) {
   std::vector<Eigen::Vector3d> points;
+  points.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     points.emplace_back(random.uniform(-2, 2), random.uniform(-1, 1), random.uniform(2, 9));
   }

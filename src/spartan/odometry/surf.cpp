@@ -75,10 +75,12 @@ struct Cube {
   /// Larger than all 26 neighbours.
   bool is_maximum() const {
     const float centre = v[1][1][1];
-    for (int s = 0; s < 3; ++s)
-      for (int y = 0; y < 3; ++y)
+    for (int s = 0; s < 3; ++s) {
+      for (int y = 0; y < 3; ++y) {
         for (int x = 0; x < 3; ++x)
           if ((s != 1 || y != 1 || x != 1) && !(centre > v[s][y][x])) return false;
+      }
+    }
     return true;
   }
 

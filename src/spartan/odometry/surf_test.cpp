@@ -12,9 +12,10 @@ namespace {
 
 Image<std::uint8_t> painted(int width, int height, const std::function<double(double, double)>& gray) {
   Image<std::uint8_t> image(width, height);
-  for (int y = 0; y < height; ++y)
+  for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x)
       image(x, y) = static_cast<std::uint8_t>(std::lround(std::clamp(gray(x, y), 0.0, 255.0)));
+  }
   return image;
 }
 

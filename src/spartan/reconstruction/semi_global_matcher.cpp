@@ -55,15 +55,15 @@ void SemiGlobalMatcher::resize(ImageSize size, DisparityRange range) {
   left_planes_ = Image<std::uint8_t>(w + kVector, h * sgm::kPlanes);
   right_planes_ = Image<std::uint8_t>(mirror_pad_ + w + std::max(0, range.min) + padded_ + kVector, h * sgm::kPlanes);
   sums_ = Image<std::uint16_t>(w * padded_, h);
-  const auto slot_count = static_cast<std::size_t>(3 * w + 1);
+  const int slot_count = 3 * w + 1, slot_size = padded_ + 2 * sgm::kGuard;
   for (Pass& pass : passes_) {
-    pass.slots.assign(slot_count * static_cast<std::size_t>(padded_ + 2 * sgm::kGuard) + kVector, sgm::kNever);
-    pass.minima.assign(slot_count, 0);
+    pass.slots = Image<std::uint8_t>(slot_size, slot_count, sgm::kNever);
+    pass.minima.assign(static_cast<std::size_t>(slot_count), 0);
     pass.cost_row = Image<std::uint8_t>(w * padded_, 1);
     pass.sum_row = Image<std::uint16_t>(w * padded_, 1);
     pass.claim_cost.assign(static_cast<std::size_t>(w), 0);
   }
-  zero_slot_.assign(static_cast<std::size_t>(padded_ + 2 * sgm::kGuard) + kVector, 0);
+  zero_slot_ = Image<std::uint8_t>(slot_size, 1);
   raw_.left = Image<float>(w, h);
   raw_.unique = Image<std::uint8_t>(w, h);
   raw_.right = Image<std::int16_t>(w, h);
@@ -74,9 +74,9 @@ std::size_t SemiGlobalMatcher::buffer_bytes() const {
     return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()) * pixel;
   };
   std::size_t total =
-      bytes(framed_, 1) + bytes(left_planes_, 1) + bytes(right_planes_, 1) + bytes(sums_, 2) + zero_slot_.size();
+      bytes(framed_, 1) + bytes(left_planes_, 1) + bytes(right_planes_, 1) + bytes(sums_, 2) + bytes(zero_slot_, 1);
   for (const Pass& pass : passes_) {
-    total += pass.slots.size() + pass.minima.size() + bytes(pass.cost_row, 1) + bytes(pass.sum_row, 2) +
+    total += bytes(pass.slots, 1) + pass.minima.size() + bytes(pass.cost_row, 1) + bytes(pass.sum_row, 2) +
              2 * pass.claim_cost.size();
   }
   return total + bytes(raw_.left, 4) + bytes(raw_.unique, 1) + bytes(raw_.right, 2);
@@ -169,10 +169,7 @@ void SemiGlobalMatcher::compute_costs(Pass& pass, int y) {
 }
 
 std::uint8_t* SemiGlobalMatcher::slot(Pass& pass, int direction, int index) const {
-  const std::size_t stride = static_cast<std::size_t>(padded_ + 2 * sgm::kGuard);
-  const auto begin = reinterpret_cast<std::uintptr_t>(pass.slots.data());
-  auto* const base = reinterpret_cast<std::uint8_t*>((begin + 63) / 64 * 64);
-  return base + (static_cast<std::size_t>(direction * size_.width + index) * stride) + sgm::kGuard;
+  return pass.slots.row(direction * size_.width + index) + sgm::kGuard;
 }
 
 // `row` counts along the sweep; column x of the sweep is column w − 1 − x of the picture in the upward pass.
@@ -182,9 +179,7 @@ void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete)
   const int flip = pass.upwards ? -1 : 1, first = pass.upwards ? w - 1 : 0;
   const std::uint8_t* const gray = gray_.row(y);
   const std::uint8_t* const before = row > 0 ? gray_.row(pass.upwards ? y + 1 : y - 1) : gray;
-  const auto aligned_zero =
-      reinterpret_cast<std::uint8_t*>((reinterpret_cast<std::uintptr_t>(zero_slot_.data()) + 63) / 64 * 64);
-  const std::uint8_t* const zero = aligned_zero + sgm::kGuard;
+  const std::uint8_t* const zero = zero_slot_.data() + sgm::kGuard;
   const auto w_index = [w](int value) { return ((value % w) + w) % w; };
   int diagonal_right = w_index(-row), diagonal_left = w_index(row);
 

@@ -44,10 +44,10 @@ class SemiGlobalMatcher {
   // What one sweep carries along.
   struct Pass {
     bool upwards = false;
-    std::vector<std::uint8_t> slots;   // path costs: one slot a pixel for each of three directions, one for the row
-    std::vector<std::uint8_t> minima;  // of each slot
-    Image<std::uint8_t> cost_row;      // padded · width
-    Image<std::uint16_t> sum_row;      // of four or eight paths
+    Image<std::uint8_t> slots;  // path costs, a slot a row: one a pixel for each of three directions, one for the row
+    std::vector<std::uint8_t> minima;       // of each slot
+    Image<std::uint8_t> cost_row;           // padded · width
+    Image<std::uint16_t> sum_row;           // of four or eight paths
     std::vector<std::uint16_t> claim_cost;  // of the cheapest left pixel that claims each right pixel of the row
     double cost_ms = 0, aggregate_ms = 0, select_ms = 0;
   };
@@ -75,7 +75,7 @@ class SemiGlobalMatcher {
   Image<std::uint8_t> left_planes_, right_planes_;  // 8 rows a row
   Image<std::uint16_t> sums_;                       // volume: row y holds width · padded sums
   std::array<Pass, 2> passes_;
-  std::vector<std::uint8_t> zero_slot_;
+  Image<std::uint8_t> zero_slot_;
   RawDisparity raw_;
   DisparityTimes times_;
 };

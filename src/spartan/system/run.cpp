@@ -44,9 +44,10 @@ void report_sequence(const RecordingInfo& info, const Log& log) {
         fmt::format("{} left and {} right images have no partner near in time", s.orphans_left, s.orphans_right));
   }
   if (s.reversals > 0) log.warning(fmt::format("{} time stamps run backwards; those shots are skipped", s.reversals));
-  if (s.gaps > 0)
+  if (s.gaps > 0) {
     log.warning(
         fmt::format("{} gaps, the longest {:.2f} s (usual step {:.3f} s)", s.gaps, s.longest_gap_s, s.median_step_s));
+  }
 }
 
 // One run from its first sample to its last.
@@ -193,7 +194,7 @@ Status Drive::take_missing(const MissingFrame& missing) {
 Status Drive::commit(FrameRecord record, const std::optional<TerrainRecord>& terrain) {
   if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = record.frame_id;
   ++shots_;
-  const Status status = store_.commit(record, terrain, pipeline_.save(), samples_taken_);
+  Status status = store_.commit(record, terrain, pipeline_.save(), samples_taken_);
   if (status && hooks_.progress) hooks_.progress({shots_, source_.info().sequence.announced, record.status});
   return status;
 }

@@ -32,7 +32,7 @@ Json stages(const std::vector<FrameRecord>& frames) {
   std::map<std::string, Series> series;
   for (const FrameRecord& frame : frames) {
     for (const StageTime& time : frame.times) {
-      if (!series.count(time.stage)) order.push_back(time.stage);
+      if (!series.contains(time.stage)) order.push_back(time.stage);
       series[time.stage].wall.push_back(time.wall_ms);
       series[time.stage].cpu.push_back(time.cpu_ms);
     }

@@ -35,7 +35,7 @@ class TemporaryFolder {
   }
   /// Writes a file and gives its path.
   std::string write(const std::string& name, std::string_view content) const {
-    const std::string path = file(name);
+    std::string path = file(name);
     std::ofstream(path, std::ios::binary) << content;
     return path;
   }
