@@ -1,5 +1,7 @@
 #include "spartan/system/pipeline.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -113,7 +115,11 @@ void Pipeline::add(const InclinometerSample&) {}
 
 Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   State& s = *state_;
-  if (frame.pair != s.pair.name) return std::nullopt;
+  if (frame.pair != s.pair.name) {
+    if (s.rig.find_pair(frame.pair) != nullptr) return std::nullopt;
+    return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair),
+                   fmt::format("frame {}", frame.frame_id), "frames carry the name of their pair in the rig");
+  }
   const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
   if (!shot) return failure(shot);
 

@@ -58,7 +58,7 @@ class Pipeline {
   void add(const InclinometerSample& sample);
 
   /// One shot. Shots of pairs that do not drive the odometry give nothing. Code `input` where the images do not fit the
-  /// rig: the frame is then left out and the pipeline goes on with the next.
+  /// rig, or it has no such pair: the frame is then left out and the pipeline goes on with the next.
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
 
   /// world_from_body at a moment without a pose: the last pose, moved on with the last motion's velocity.

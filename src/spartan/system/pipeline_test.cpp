@@ -1,0 +1,201 @@
+#include "spartan/system/pipeline.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "spartan/testing/synthetic_world.h"
+
+namespace spartan {
+namespace {
+
+using testing::SyntheticShot;
+
+const RectifiedStereo kStereo{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
+constexpr double kHeight_m = 0.5, kTilt_rad = 0.55, kStep_m = 0.05;
+
+Camera camera(const std::string& name) {
+  Camera made;
+  made.name = name;
+  made.size = kStereo.size;
+  made.model = PinholeModel{kStereo.focal_px, kStereo.focal_px, kStereo.centre_px.x(), kStereo.centre_px.y()};
+  return made;
+}
+
+// One pair that looks down by kTilt_rad from half a metre, and a second one that only looks where the rover stops.
+Rig rover() {
+  const Pose body_from_left =
+      Pose(exp_so3({0, kTilt_rad, 0}), {0.1, 0, kHeight_m}) * Pose(optical_from_forward().inverse());
+  Rig rig;
+  rig.name = "rover";
+  rig.cameras = {camera("left"), camera("right"), camera("wide_left"), camera("wide_right")};
+  for (std::size_t i = 0; i < 4; ++i) {
+    rig.cameras[i].mount_from_camera =
+        body_from_left * Pose::from_translation({i % 2 == 0 ? 0 : kStereo.baseline_m, 0, 0});
+  }
+  rig.pairs = {{"wide", "wide_left", "wide_right", 0, false}, {"narrow", "left", "right", 0.4, true}};
+  return rig;
+}
+
+Pose world_from_body(int shot) {
+  return Pose::from_translation({kStep_m * shot, 0, 0});
+}
+
+// Rendered once: the rover drives ahead over gentle ground.
+const std::vector<SyntheticShot>& shots() {
+  static const std::vector<SyntheticShot> made = [] {
+    const testing::SyntheticWorld world(testing::SyntheticWorldOptions{});
+    const Pose body_from_left = rover().body_from_camera("left");
+    std::vector<SyntheticShot> rendered;
+    rendered.reserve(5);
+    for (int i = 0; i < 5; ++i) {
+      rendered.push_back(world.render(kStereo, world_from_body(i) * body_from_left, static_cast<std::uint64_t>(i)));
+    }
+    return rendered;
+  }();
+  return made;
+}
+
+StereoFrame frame_of(int shot) {
+  StereoFrame frame;
+  frame.frame_id = shot;
+  frame.pair = "narrow";
+  frame.left_stamp = frame.right_stamp = Stamp{shot * 1'000'000'000LL};
+  const SyntheticShot& images = shots()[static_cast<std::size_t>(shot)];
+  frame.left = FrameImage::borrow(images.left.view(), {});
+  frame.right = FrameImage::borrow(images.right.view(), {});
+  return frame;
+}
+
+Pipeline pipeline_of(const RunOptions& options = {}, int threads = 1) {
+  return Pipeline::create(rover(), options, Workers(threads)).value();
+}
+
+FrameResult push(Pipeline& pipeline, int shot) {
+  return pipeline.add(frame_of(shot)).value().value();
+}
+
+TEST(Pipeline, FollowsTheRoverFromImagesInMemory) {
+  Pipeline pipeline = pipeline_of();
+  FrameResult last;
+  for (int i = 0; i < 5; ++i) last = push(pipeline, i);
+  EXPECT_EQ(last.frame_id, 4);
+  EXPECT_EQ(last.stamp.ns, 4'000'000'000LL);
+  EXPECT_LT((last.world_from_body.pose.translation() - world_from_body(4).translation()).norm(), 0.002);
+  EXPECT_LT(log_so3(last.world_from_body.pose.rotation()).norm(), 0.005);
+  EXPECT_GT(last.world_from_body.covariance.trace(), 0);
+  EXPECT_FALSE(pipeline.gravity_measured());
+}
+
+TEST(Pipeline, TheFirstFrameShowsTheGround) {
+  Pipeline pipeline = pipeline_of();
+  const FrameResult first = push(pipeline, 0);
+  ASSERT_TRUE(first.terrain);
+  int seen = 0, right = 0;
+  for (int y = 0; y < 240; y += 3) {
+    for (int x = 0; x < 320; x += 3) {
+      const float found = first.terrain->disparity(x, y);
+      if (std::isnan(found) || shots()[0].mask(x, y) != 255) continue;
+      ++seen;
+      right += std::abs(found - shots()[0].disparity(x, y)) < 1 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(seen, 5000);
+  EXPECT_GT(right, 0.95 * seen);
+  // A point of it lies on the ground.
+  const RectifiedStereo& geometry = first.terrain->pair.geometry;
+  const Eigen::Vector3d in_left = geometry.triangulate(160, 200, first.terrain->disparity(160, 200));
+  const Eigen::Vector3d point = first.terrain->world_from_left * in_left;
+  EXPECT_NEAR(point.z(), 0, 0.2);
+  EXPECT_FALSE(push(pipeline, 1).terrain) << "the next one is due five metres on";
+}
+
+TEST(Pipeline, RestoredMemoryGoesOnInTheSameWay) {
+  Pipeline straight = pipeline_of();
+  for (int i = 0; i < 3; ++i) push(straight, i);
+  Pipeline later = pipeline_of({}, 2);
+  ASSERT_TRUE(later.restore(straight.save()));
+  for (int i = 3; i < 5; ++i) {
+    const FrameResult one = push(straight, i), other = push(later, i);
+    EXPECT_EQ(one.world_from_body.pose.translation(), other.world_from_body.pose.translation());
+    EXPECT_EQ(one.world_from_body.covariance, other.world_from_body.covariance);
+    EXPECT_EQ(one.terrain.has_value(), other.terrain.has_value());
+  }
+  EXPECT_EQ(straight.save(), later.save());
+}
+
+TEST(Pipeline, RefusesMemoryOfAnotherKind) {
+  Pipeline pipeline = pipeline_of();
+  push(pipeline, 0);
+  Bytes state = pipeline.save();
+  state.resize(state.size() / 2);
+  EXPECT_FALSE(pipeline.restore(state));
+  state = pipeline.save();
+  state[0] = 99;
+  const Status refused = pipeline.restore(state);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+}
+
+TEST(Pipeline, PredictsAtTheLatestVelocity) {
+  Pipeline pipeline = pipeline_of();
+  EXPECT_FALSE(pipeline.predict({0}));
+  for (int i = 0; i < 3; ++i) push(pipeline, i);
+  const auto predicted = pipeline.predict(Stamp{2'500'000'000LL});
+  ASSERT_TRUE(predicted);
+  EXPECT_NEAR(predicted->translation().x(), 2.5 * kStep_m, 0.003);
+}
+
+TEST(Pipeline, MeasuresGravityBeforeTheFirstFrame) {
+  Pipeline pipeline = pipeline_of();
+  const double tilt = 0.1;  // nose up
+  for (int i = 0; i < 50; ++i) {
+    pipeline.add(ImuSample{{i * 10'000'000LL}, {0, 0, 0}, 9.81 * Eigen::Vector3d(std::sin(tilt), 0, std::cos(tilt))});
+  }
+  const FrameResult first = push(pipeline, 0);
+  EXPECT_TRUE(pipeline.gravity_measured());
+  EXPECT_NEAR((first.world_from_body.pose.rotation() * Eigen::Vector3d::UnitX()).z(), std::sin(tilt), 1e-9);
+}
+
+TEST(Pipeline, OtherPairsOfTheRigGiveNothing) {
+  Pipeline pipeline = pipeline_of();
+  EXPECT_EQ(pipeline.odometry_pair(), "narrow");
+  StereoFrame wide = frame_of(0);
+  wide.pair = "wide";
+  const auto result = pipeline.add(wide);
+  ASSERT_TRUE(result);
+  EXPECT_FALSE(result->has_value());
+}
+
+TEST(Pipeline, LeavesOutFramesThatDoNotFitAndGoesOn) {
+  Pipeline pipeline = pipeline_of();
+  push(pipeline, 0);
+  StereoFrame stranger = frame_of(1);
+  stranger.pair = "rear";
+  const auto unknown = pipeline.add(stranger);
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::input);
+  EXPECT_NE(unknown.error().message().find("rear"), std::string::npos);
+  StereoFrame small = frame_of(1);
+  const Image<std::uint8_t> cut(100, 100);
+  small.right = FrameImage::borrow(cut.view(), {});
+  const auto unfit = pipeline.add(small);
+  ASSERT_FALSE(unfit);
+  EXPECT_EQ(unfit.error().code, ErrorCode::input);
+  EXPECT_NEAR(push(pipeline, 1).world_from_body.pose.translation().x(), kStep_m, 0.002);
+}
+
+TEST(Pipeline, NeedsAPairForTheOdometry) {
+  RunOptions options;
+  options.odometry_pair = "rear";
+  const auto unknown = Pipeline::create(rover(), options, Workers(1));
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::configuration);
+  Rig only_wide = rover();
+  only_wide.pairs.pop_back();
+  EXPECT_FALSE(Pipeline::create(only_wide, {}, Workers(1)));
+}
+
+}  // namespace
+}  // namespace spartan
