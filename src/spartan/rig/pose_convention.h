@@ -7,9 +7,12 @@
 
 namespace spartan {
 
-/// A world_from_body pose in the recording's convention (Rig::convention): for `body` itself; for `left_optical`
-/// B⁻¹ T B with B = body_from_camera of the first pair's left camera, so that a start at the identity stays there.
-Pose in_recording_convention(const Rig& rig, const Pose& world_from_body);
+/// A trajectory of world_from_body in the recording's convention (Rig::convention): for `body` itself; for
+/// `left_optical` first_left_from_left, the left camera of the first pair seen from where it stood at the first entry,
+/// (T₀ B)⁻¹ Tᵢ B with B = body_from_left, whichever way the world's axes lie.
 Trajectory in_recording_convention(const Rig& rig, Trajectory world_from_body);
+
+/// first_left_from_left of the named pair, as KITTI's pose files have it.
+Trajectory in_left_optical_convention(const Rig& rig, const StereoPair& pair, Trajectory world_from_body);
 
 }  // namespace spartan

@@ -15,14 +15,18 @@ Rig one_pair() {
 }
 
 // A metre ahead and to the left, turned to the left: in KITTI's optical frame z is ahead, −x left, and turning to the
-// left is about −y.
+// left is about −y. Where the world lies does not matter: KITTI counts from the first left camera.
 TEST(PoseConvention, LeftOpticalIsKittis) {
-  const Pose body(exp_so3({0, 0, 0.3}), {1, 0.5, 0.2});
-  const Pose kitti = in_recording_convention(one_pair(), body);
-  EXPECT_LE((kitti.translation() - Eigen::Vector3d(-0.5, -0.2, 1)).norm(), 1e-12);
-  EXPECT_LE((log_so3(kitti.rotation()) - Eigen::Vector3d(0, -0.3, 0)).norm(), 1e-12);
-  const Pose start = in_recording_convention(one_pair(), Pose());
-  EXPECT_LE((start.matrix() - Eigen::Matrix4d::Identity()).norm(), 1e-12);
+  const Pose moved(exp_so3({0, 0, 0.3}), {1, 0.5, 0.2});
+  for (const Pose& start : {Pose(), Pose(exp_so3({0.2, -0.1, 0.4}), {5, 6, 7})}) {
+    const Trajectory kitti = in_recording_convention(one_pair(), {{Stamp{0}, start}, {Stamp{1}, start * moved}});
+    ASSERT_EQ(kitti.size(), 2u);
+    EXPECT_EQ(kitti[1].stamp.ns, 1);
+    EXPECT_LE((kitti[0].pose.matrix() - Eigen::Matrix4d::Identity()).norm(), 1e-12);
+    EXPECT_LE((kitti[1].pose.translation() - Eigen::Vector3d(-0.5, -0.2, 1)).norm(), 1e-12);
+    EXPECT_LE((log_so3(kitti[1].pose.rotation()) - Eigen::Vector3d(0, -0.3, 0)).norm(), 1e-12);
+  }
+  EXPECT_TRUE(in_recording_convention(one_pair(), {}).empty());
 }
 
 TEST(PoseConvention, BodyStaysAsItIs) {

@@ -8,6 +8,7 @@
 
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/rig/pose_convention.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
@@ -28,13 +29,10 @@ Result<std::string> kitti_text(const RunFolder& folder, const std::vector<FrameR
   if (!rig) return failure(rig);
   const StereoPair* const pair = rig->find_pair(frames.front().pair);
   if (pair == nullptr) return failure(ErrorCode::input, "does not know the pair " + frames.front().pair, folder.rig());
-  const Pose body_from_left = rig->body_from_camera(pair->left);
-  const Pose first_left_from_world = (frames.front().world_from_body.pose * body_from_left).inverse();
   Trajectory trajectory;
-  for (const FrameRecord& frame : frames) {
-    trajectory.push_back({frame.stamp, first_left_from_world * frame.world_from_body.pose * body_from_left});
-  }
-  return to_kitti(trajectory);
+  trajectory.reserve(frames.size());
+  for (const FrameRecord& frame : frames) trajectory.push_back({frame.stamp, frame.world_from_body.pose});
+  return to_kitti(in_left_optical_convention(*rig, *pair, std::move(trajectory)));
 }
 
 std::string csv_text(const std::vector<FrameRecord>& frames) {
