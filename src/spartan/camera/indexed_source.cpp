@@ -47,7 +47,7 @@ MissingFrame missing(const Shot& shot, FrameFault fault, std::string message) {
 
 // A file says how many bits a sample takes up; how many of them carry signal, and which colours they stand for, is
 // known to the rig and to the list of shots.
-FrameImage interpret(FrameImage image, const PixelFormat& camera, int bits) {
+FrameImage interpret(const FrameImage& image, const PixelFormat& camera, int bits) {
   PixelFormat format = image.format();
   if (format.layout == PixelLayout::gray && camera.layout != PixelLayout::rgb) format.layout = camera.layout;
   if (format.bits > 8) {

@@ -25,11 +25,12 @@ std::optional<Stamp> parse_date(std::string_view date, std::string_view time) {
   const auto hour = number(time.substr(0, 2)), minute = number(time.substr(3, 2));
   const auto second = parse_decimal_seconds(time.substr(6));
   if (!year || !month || !day || !hour || !minute || !second) return std::nullopt;
-  using namespace std::chrono;
-  const year_month_day ymd{std::chrono::year(*year), std::chrono::month(static_cast<unsigned>(*month)),
-                           std::chrono::day(static_cast<unsigned>(*day))};
+  namespace chrono = std::chrono;
+  const chrono::year_month_day ymd{chrono::year(*year), chrono::month(static_cast<unsigned>(*month)),
+                                   chrono::day(static_cast<unsigned>(*day))};
   if (!ymd.ok()) return std::nullopt;
-  const nanoseconds whole = sys_days(ymd).time_since_epoch() + hours(*hour) + minutes(*minute);
+  const chrono::nanoseconds whole =
+      chrono::sys_days(ymd).time_since_epoch() + chrono::hours(*hour) + chrono::minutes(*minute);
   const Stamp stamp{whole.count() + second->ns};
   return is_sane(stamp) ? std::optional(stamp) : std::nullopt;
 }

@@ -57,7 +57,8 @@ Result<Sample> read_row(const std::vector<std::string_view>& row, Make make) {
 
 }  // namespace
 
-OpenStream stream_of_table(const std::string& path, TableFormat format, std::size_t fields, RowReader read_row) {
+OpenStream stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
+                           const RowReader& read_row) {
   return [=]() -> Result<std::unique_ptr<SampleStream>> {
     auto table = TableReader::open(path, format);
     if (!table) return failure(table);

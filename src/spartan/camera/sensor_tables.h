@@ -13,7 +13,8 @@ namespace spartan {
 using RowReader = std::function<Result<Sample>(const std::vector<std::string_view>&)>;
 
 /// A stream over a table whose rows have at least `fields` fields. Errors of a row name file and line.
-OpenStream stream_of_table(const std::string& path, TableFormat format, std::size_t fields, RowReader read_row);
+OpenStream stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
+                           const RowReader& read_row);
 
 /// Row readers of stamp_ns and numbers: gyro x y z (rad/s), specific force x y z (m/s²), both turned by
 /// `body_from_imu`.

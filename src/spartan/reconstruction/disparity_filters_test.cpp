@@ -100,7 +100,7 @@ TEST(Median, IsTheMiddleOfWhatIsKnown) {
 
 TEST(Speckles, GoWhereTheyAreSmallerThanAskedFor) {
   SpeckleFilter filter;
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     for (const double holes : {0.05, 0.3}) {
       Image<float> image = patchy(83, 61, holes, seed);
       const Image<float> wanted = despeckled_by_flooding(image, 12, 1);

@@ -104,9 +104,9 @@ Result<Pose> read_rectified_from_imu(const TextMatrices& file, const fs::path& f
   const auto rectified_from_camera = read_rotation(file, "R_rect_00");
   if (!rectified_from_camera) return failure(rectified_from_camera);
   const auto velo_from_imu = read_transform((folder / "calib_imu_to_velo.txt").string());
-  if (!velo_from_imu) return velo_from_imu;
+  if (!velo_from_imu) return failure(velo_from_imu);
   const auto camera_from_velo = read_transform((folder / "calib_velo_to_cam.txt").string());
-  if (!camera_from_velo) return camera_from_velo;
+  if (!camera_from_velo) return failure(camera_from_velo);
   return Pose(*rectified_from_camera, Eigen::Vector3d::Zero()) * *camera_from_velo * *velo_from_imu;
 }
 

@@ -186,6 +186,7 @@ Status Rig::validate(const std::string& where) const {
   const std::vector<RigFault> faults = find_faults();
   if (faults.empty()) return {};
   std::vector<std::string> lines;
+  lines.reserve(faults.size());
   for (const RigFault& fault : faults) lines.push_back(fmt::format("{}: {}: {}", where, fault.key, fault.what));
   return failure(ErrorCode::configuration, fmt::format("{}", fmt::join(lines, "\n")));
 }

@@ -63,8 +63,8 @@ struct Rig {
   std::vector<Camera> cameras;
   std::vector<StereoPair> pairs;
 
-  const Camera* find_camera(const std::string& name) const;
-  const StereoPair* find_pair(const std::string& name) const;
+  const Camera* find_camera(const std::string& camera) const;
+  const StereoPair* find_pair(const std::string& pair) const;
   /// body_from_camera; the angles count for cameras on a pan-tilt unit only. Throws on an unknown name.
   Pose body_from_camera(const std::string& camera, double pan_rad, double tilt_rad) const;
   /// The same with the unit's angles of rest.

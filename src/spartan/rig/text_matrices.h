@@ -16,7 +16,7 @@ class TextMatrices {
   static Result<TextMatrices> read(const std::string& path);
   static TextMatrices parse(const std::string& text, const std::string& name);
 
-  bool has(const std::string& key) const { return lines_.count(key) > 0; }
+  bool has(const std::string& key) const { return lines_.contains(key); }
   /// Exactly `count` finite numbers; otherwise code `configuration` with "file:line" and the key.
   Result<std::vector<double>> numbers(const std::string& key, std::size_t count) const;
   /// "file:line" of a key.

@@ -194,7 +194,7 @@ std::optional<std::vector<double>> YamlMap::numbers(std::string_view key, const 
 
 void YamlMap::refuse_unknown_keys() {
   for (const auto& [name, node] : entries_) {
-    if (!known_.count(name)) fault(name, fmt::format("unknown key; known here: {}", fmt::join(known_, ", ")));
+    if (!known_.contains(name)) fault(name, fmt::format("unknown key; known here: {}", fmt::join(known_, ", ")));
   }
 }
 
