@@ -94,10 +94,11 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
     index.info.truth_file = truth.string();
 
   const fs::path sensors = folder / "sensors";
-  const auto stream = [&](const char* name, const char* header, std::size_t fields, RowReader reader) -> OpenStream {
+  const auto stream = [&](const char* name, const char* header, std::size_t fields,
+                          const RowReader& reader) -> OpenStream {
     if (!fs::exists(sensors / name, error)) return {};
     return stream_of_table((sensors / name).string(), {.separator = ',', .header = header, .ends_with_newline = true},
-                           fields, std::move(reader));
+                           fields, reader);
   };
   index.imu = stream("imu.csv", kImuHeader, 7, read_imu_row(Eigen::Quaterniond::Identity()));
   for (OpenStream other : {stream("wheels.csv", kWheelsHeader, 3, read_wheel_row),
