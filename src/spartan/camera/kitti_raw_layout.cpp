@@ -28,7 +28,7 @@ std::optional<Stamp> parse_date(std::string_view date, std::string_view time) {
   namespace chrono = std::chrono;
   const chrono::year_month_day ymd{chrono::year(*year), chrono::month(static_cast<unsigned>(*month)),
                                    chrono::day(static_cast<unsigned>(*day))};
-  if (!ymd.ok()) return std::nullopt;
+  if (!ymd.ok() || *hour < 0 || *hour > 23 || *minute < 0 || *minute > 59) return std::nullopt;
   const chrono::nanoseconds whole =
       chrono::sys_days(ymd).time_since_epoch() + chrono::hours(*hour) + chrono::minutes(*minute);
   const Stamp stamp{whole.count() + second->ns};

@@ -1,19 +1,14 @@
 // The real recordings of $SPARTAN_DATA, as far as they are there.
+#include "spartan/testing/real_data.h"
+
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 #include "spartan/camera/frame_source.h"
 
 namespace spartan {
 namespace {
-
-std::string data_folder() {
-  if (const char* given = std::getenv("SPARTAN_DATA")) return given;
-  const char* source = std::getenv("SPARTAN_SOURCE_DIR");
-  return std::string(source ? source : ".") + "/../shared/data";
-}
 
 struct Counts {
   int frames = 0, missing = 0, imu = 0;
@@ -42,7 +37,7 @@ class RealData : public ::testing::TestWithParam<Expected> {};
 
 TEST_P(RealData, HoldsWhatItsReadmeSays) {
   const Expected& expected = GetParam();
-  const std::string path = data_folder() + "/" + expected.folder;
+  const std::string path = testing::data_folder() + "/" + expected.folder;
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << expected.folder << " in $SPARTAN_DATA";
   auto source = open_recording(path);
   ASSERT_TRUE(source) << source.error().message();

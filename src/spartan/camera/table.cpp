@@ -96,7 +96,8 @@ std::optional<double> parse_degrees(std::string_view text) {
 std::string to_degrees(double radians) {
   const long double degrees = static_cast<long double>(radians) * (180 / std::numbers::pi_v<long double>);
   std::string text;
-  for (int digits = 1; digits <= 21; ++digits) {
+  // From three digits on: fewer would write 90 as 9e+01.
+  for (int digits = 3; digits <= 21; ++digits) {
     text = fmt::format("{:.{}g}", degrees, digits);
     if (parse_degrees(text) == radians) break;
   }

@@ -25,7 +25,9 @@ class Storages {
     paths_ += (paths_.empty() ? "" : " and ") + path;
     try {
       cv::FileStorage storage(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-      if (!storage.isOpened()) return failure(ErrorCode::configuration, "OpenCV cannot read this file", path);
+      if (!storage.isOpened() || !storage.root().isMap()) {
+        return failure(ErrorCode::configuration, "OpenCV cannot read this file", path);
+      }
       storages_.push_back(std::move(storage));
     } catch (const std::exception& e) {
       return failure(ErrorCode::configuration, fmt::format("OpenCV cannot read this file: {}", e.what()), path);

@@ -169,6 +169,19 @@ TEST(RigYaml, AllFaultsOfAFileAtOnce) {
   }
 }
 
+TEST(RigYaml, TextIsUtf8) {
+  const auto with_name = [](const std::string& name) {
+    return parse_rig_yaml(kGood + "name: " + name + "\n", "my.yaml");
+  };
+  for (const char* good : {"plain", "\u00fcml\u00e4ut", "\u2026", "\U0001F697"})
+    EXPECT_EQ(with_name(good).value().name, good);
+  for (const char* bad : {"\x80", "\xC3", "\xC0\xAF", "\xE0\x80\xAF", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xFF"}) {
+    const auto refused = with_name(bad);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().message(), "my.yaml:13: not valid UTF-8");
+  }
+}
+
 TEST(RigYaml, AMissingFileIsNamed) {
   const auto rig = read_rig_yaml("/nonexistent/rig.yaml");
   ASSERT_FALSE(rig);

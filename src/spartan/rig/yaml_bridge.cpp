@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 
 namespace spartan::rig_detail {
 namespace {
@@ -26,6 +27,34 @@ bool is_number_without_end(std::string_view text) {
 std::string number_fault(std::string_view text) {
   if (is_number_without_end(text)) return fmt::format("is {}, must be a finite number", text);
   return fmt::format("'{}' is not a number", text.substr(0, 40));
+}
+
+// Bytes of the character that begins at `at`; 0 where no character of UTF-8 does (RFC 3629).
+std::size_t character_length(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(text[i])); };
+  const std::uint32_t lead = byte(at);
+  if (lead < 0x80) return 1;
+  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
+  if (lead < 0xC0 || lead > 0xF4 || at + length > text.size()) return 0;
+  std::uint32_t code = lead & (0xFFU >> (length + 1));
+  for (std::size_t k = 1; k < length; ++k) {
+    if ((byte(at + k) & 0xC0) != 0x80) return 0;
+    code = code << 6 | (byte(at + k) & 0x3F);
+  }
+  constexpr std::uint32_t kLeast[] = {0x80, 0x800, 0x10000};
+  const bool surrogate = code >= 0xD800 && code < 0xE000;
+  return code < kLeast[length - 2] || code > 0x10FFFF || surrogate ? 0 : length;
+}
+
+// Where text stops being UTF-8; its size where it never does.
+std::size_t first_broken_character(std::string_view text) {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t length = character_length(text, at);
+    if (length == 0) return at;
+    at += length;
+  }
+  return at;
 }
 
 }  // namespace
@@ -66,6 +95,10 @@ Status YamlFaults::status() const {
 }
 
 Result<YAML::Node> load_yaml(const std::string& text, const std::string& name) {
+  if (const std::size_t at = first_broken_character(text); at < text.size()) {
+    const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
+    return failure(ErrorCode::configuration, "not valid UTF-8", fmt::format("{}:{}", name, line));
+  }
   try {
     return YAML::Load(text);
   } catch (const YAML::Exception& e) {

@@ -1,0 +1,308 @@
+// Recordings as others lay them out: KITTI odometry, KITTI raw, EuRoC; and which of them a folder is.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/files.h"
+#include "spartan/core/image_io.h"
+#include "spartan/rig/rig_files.h"
+#include "spartan/testing/real_data.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::TemporaryFolder;
+
+const std::string kKittiCalib = "P0: 30 0 16 0 0 30 8 0 0 0 1 0\nP1: 30 0 16 -3 0 30 8 0 0 0 1 0\n";
+
+class Layouts : public ::testing::Test {
+ protected:
+  void image(const std::string& name, int width = 32, int height = 16) {
+    Image<std::uint8_t> picture(width, height);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) picture(x, y) = static_cast<std::uint8_t>((7 * x + 31 * y) % 256);
+    }
+    ASSERT_TRUE(write_png(folder_.file(name), picture.view()));
+  }
+  std::string text_of(const std::string& name) { return read_file(folder_.path() + "/" + name).value(); }
+  void remove(const std::string& name) { ASSERT_TRUE(std::filesystem::remove_all(folder_.path() + "/" + name) > 0); }
+
+  std::unique_ptr<FrameSource> open(const OpenOptions& options = {}) {
+    auto source = open_recording(folder_.path(), options);
+    EXPECT_TRUE(source) << source.error().message();
+    return source ? std::move(*source) : nullptr;
+  }
+  std::string refusal(const OpenOptions& options = {}) {
+    const auto source = open_recording(folder_.path(), options);
+    if (source) return "opened";
+    EXPECT_EQ(source.error().code, ErrorCode::input);
+    return source.error().message();
+  }
+  // "f0 f1 right_missing …": frames by number, what is missing by reason, i: IMU.
+  std::vector<std::string> play(FrameSource& source) {
+    std::vector<std::string> seen;
+    while (true) {
+      const auto sample = source.next();
+      EXPECT_TRUE(sample) << sample.error().message();
+      if (!sample || !*sample) return seen;
+      if (const auto* frame = std::get_if<StereoFrame>(&**sample)) seen.push_back(fmt::format("f{}", frame->frame_id));
+      if (const auto* missing = std::get_if<MissingFrame>(&**sample)) seen.emplace_back(name_of(missing->fault));
+      if (std::holds_alternative<ImuSample>(**sample)) seen.emplace_back("i");
+    }
+  }
+  TemporaryFolder folder_;
+};
+
+// --- KITTI odometry ---
+
+class KittiLayout : public Layouts {
+ protected:
+  KittiLayout() {
+    folder_.write("calib.txt", kKittiCalib);
+    folder_.write("times.txt", "0.0\n1.036e-01\n2.07e-01\n0.31\n");
+    for (int i = 0; i < 4; ++i) {
+      for (const char* eye : {"image_0", "image_1"}) image(fmt::format("{}/{:06}.png", eye, i));
+    }
+  }
+};
+
+TEST_F(KittiLayout, IsRead) {
+  auto source = open();
+  EXPECT_EQ(source->info().format, RecordingFormat::kitti);
+  EXPECT_THAT(source->info().layout_reason, HasSubstr("calib.txt and image_0 found"));
+  EXPECT_EQ(source->info().truth_file, "");
+  EXPECT_FALSE(source->info().has_imu);
+  EXPECT_THAT(play(*source), ElementsAre("f0", "f1", "f2", "f3"));
+  EXPECT_THAT(source->announced_stamps("stereo"),
+              ElementsAre(Stamp{0}, Stamp{103'600'000}, Stamp{207'000'000}, Stamp{310'000'000}));
+  EXPECT_EQ(source->frame_at("stereo", {207'000'000}).value().frame_id, 2);
+  folder_.write("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  EXPECT_EQ(open()->info().truth_file, folder_.path() + "/poses.txt");
+}
+
+TEST_F(KittiLayout, GoesOnWhereAnEyeIsMissing) {
+  remove("image_1/000001.png");
+  remove("image_0/000002.png");
+  auto source = open();
+  EXPECT_THAT(play(*source), ElementsAre("f0", "right_missing", "left_missing", "f3"));
+  EXPECT_EQ(source->info().sequence.orphans_left, 1);
+  EXPECT_EQ(source->info().sequence.orphans_right, 1);
+  remove("image_1");
+  EXPECT_THAT(refusal(), HasSubstr("none of the 4 announced stereo shots is usable"));
+}
+
+TEST_F(KittiLayout, WithoutTimesTenShotsASecond) {
+  remove("times.txt");
+  auto source = open();
+  EXPECT_THAT(source->info().layout_reason, HasSubstr("no times.txt: images are taken to be 0.1 s apart"));
+  EXPECT_THAT(source->announced_stamps("stereo"),
+              ElementsAre(Stamp{0}, Stamp{100'000'000}, Stamp{200'000'000}, Stamp{300'000'000}));
+}
+
+TEST_F(KittiLayout, TimesThatMakeNoSense) {
+  folder_.write("times.txt", "0\n0.1\nnan\n0.3\n");
+  EXPECT_THAT(refusal(), HasSubstr("times.txt:3"));
+  folder_.write("times.txt", "");
+  EXPECT_THAT(refusal(), HasSubstr("it holds no time"));
+  folder_.write("times.txt", "0\n0.1\n0.05\n0.3\n");
+  auto source = open();
+  EXPECT_THAT(play(*source), ElementsAre("f0", "f1", "stamp_reversed", "f3"));
+  EXPECT_EQ(source->info().sequence.reversals, 1);
+  folder_.write("times.txt", "0\n0.1\n");
+  EXPECT_THAT(play(*open()), ElementsAre("f0", "f1"));
+  EXPECT_THAT(open()->info().sequence.remarks, ::testing::Not(IsEmpty())) << "two images stand without a time";
+}
+
+TEST_F(KittiLayout, GapsAreCounted) {
+  folder_.write("times.txt", "0\n0.1\n0.2\n1.3\n");
+  const auto source = open();
+  EXPECT_EQ(source->info().sequence.gaps, 1);
+  EXPECT_NEAR(source->info().sequence.longest_gap_s, 1.1, 1e-9);
+}
+
+TEST_F(KittiLayout, DamagedImagesAreSkipped) {
+  const std::string whole = text_of("image_0/000001.png");
+  folder_.write("image_0/000001.png", whole.substr(0, whole.size() - 20));
+  folder_.write("image_1/000002.png", "");
+  image("image_1/000003.png", 31, 16);
+  EXPECT_THAT(play(*open()), ElementsAre("f0", "unreadable", "unreadable", "wrong_size"));
+}
+
+TEST_F(KittiLayout, JpegsThatEndEarlyAreSkipped) {
+  cv::Mat picture(16, 32, CV_8U);
+  cv::randu(picture, 0, 256);
+  for (int i = 0; i < 4; ++i) {
+    for (const char* eye : {"image_0", "image_1"}) {
+      remove(fmt::format("{}/{:06}.png", eye, i));
+      cv::imwrite(folder_.file(fmt::format("{}/{:06}.jpg", eye, i)), picture);
+    }
+  }
+  EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "f2", "f3"));
+  const std::string whole = text_of("image_0/000002.jpg");
+  for (const std::size_t kept : {whole.size() - 2, whole.size() - 40, whole.size() / 2, std::size_t{3}}) {
+    folder_.write("image_0/000002.jpg", whole.substr(0, kept));
+    EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "unreadable", "f3"))
+        << kept << " of " << whole.size() << " bytes";
+  }
+}
+
+TEST_F(KittiLayout, CalibrationFaultsAreOfTheirOwnKind) {
+  folder_.write("calib.txt", "P0: nan 0 16 0 0 30 8 0 0 0 1 0\nP1: 30 0 16 -3 0 30 8 0 0 0 1 0\n");
+  const auto refused = open_recording(folder_.path());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+  // Another calibration takes its place.
+  OpenOptions options;
+  options.rig_file = folder_.write("other.txt", kKittiCalib);
+  EXPECT_EQ(open(options)->info().rig_source, options.rig_file);
+}
+
+// --- KITTI raw ---
+
+class KittiRawLayout : public Layouts {
+ protected:
+  KittiRawLayout() {
+    folder_.write("calib_cam_to_cam.txt",
+                  "S_rect_00: 32 16\nR_rect_00: 1 0 0 0 1 0 0 0 1\nP_rect_00: 30 0 16 0 0 30 8 0 0 0 1 0\n"
+                  "P_rect_01: 30 0 16 -3 0 30 8 0 0 0 1 0\n");
+    std::string times;
+    for (int i = 0; i < 3; ++i) {
+      times += fmt::format("2011-09-26 13:02:25.{}64389445\n", i);
+      for (const char* eye : {"image_00", "image_01"}) image(fmt::format("{}/data/{:010}.png", eye, i));
+      std::string oxts;
+      for (int k = 0; k < 30; ++k) oxts += fmt::format("{} ", 100 * i + k);
+      folder_.write(fmt::format("oxts/data/{:010}.txt", i), oxts + "\n");
+    }
+    for (const char* part : {"image_00", "image_01", "oxts"})
+      folder_.write(part + std::string("/timestamps.txt"), times);
+  }
+};
+
+TEST_F(KittiRawLayout, IsReadWithItsInertialUnit) {
+  folder_.write("calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n");
+  folder_.write("calib_velo_to_cam.txt", "R: 0 -1 0 0 0 -1 1 0 0\nT: 0 0 0\n");
+  auto source = open();
+  EXPECT_EQ(source->info().format, RecordingFormat::kitti_raw);
+  EXPECT_TRUE(source->info().has_imu);
+  EXPECT_THAT(play(*source), ElementsAre("i", "f0", "i", "f1", "i", "f2"));
+  // 2011-09-26 13:02:25 UTC
+  EXPECT_EQ(source->announced_stamps("stereo")[0], Stamp{1317042145'064389445LL});
+  const auto imu = source->first_imu_samples(10).value();
+  ASSERT_EQ(imu.size(), 3u);
+  EXPECT_EQ(imu[1].accel_m_s2, Eigen::Vector3d(111, 112, 113));
+  EXPECT_EQ(imu[1].gyro_rad_s, Eigen::Vector3d(117, 118, 119));
+}
+
+TEST_F(KittiRawLayout, DatesThatMakeNoSense) {
+  for (const char* bad :
+       {"2011-13-26 13:02:25.0", "2011-09-26 13:02", "2011-09-26", "yesterday noon", "2011-09-26 25:02:25.0"}) {
+    folder_.write("image_00/timestamps.txt", std::string(bad) + "\n");
+    EXPECT_THAT(refusal(), HasSubstr("image_00/timestamps.txt:1")) << bad;
+  }
+}
+
+// --- EuRoC ---
+
+class EurocLayout : public Layouts {
+ protected:
+  EurocLayout() {
+    for (const int camera : {0, 1}) {
+      folder_.write(
+          fmt::format("mav0/cam{}/sensor.yaml", camera),
+          fmt::format("T_BS: {{rows: 4, cols: 4, data: [1,0,0,{}, 0,1,0,0, 0,0,1,0, 0,0,0,1]}}\nresolution: [32, 16]\n"
+                      "camera_model: pinhole\nintrinsics: [30, 30, 16, 8]\ndistortion_model: none\n",
+                      0.1 * camera));
+      list(camera, {1000, 2000, 3000, 4000});
+    }
+  }
+  // Stamps in µs.
+  void list(int camera, const std::vector<int>& stamps) {
+    std::string table = "#timestamp [ns],filename\r\n";
+    for (const int stamp : stamps) {
+      table += fmt::format("{}000,{}000.png\r\n", stamp, stamp);
+      image(fmt::format("mav0/cam{}/data/{}000.png", camera, stamp));
+    }
+    folder_.write(fmt::format("mav0/cam{}/data.csv", camera), table);
+  }
+};
+
+TEST_F(EurocLayout, IsReadFromWhereverItIsPointedAt) {
+  EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "f2", "f3"));
+  EXPECT_EQ(open()->info().format, RecordingFormat::euroc);
+  auto source = open_recording(folder_.path() + "/mav0");
+  ASSERT_TRUE(source);
+  EXPECT_THAT(play(**source), ElementsAre("f0", "f1", "f2", "f3"));
+}
+
+TEST_F(EurocLayout, PairsAreMatchedByTheirStamps) {
+  list(1, {1002, 2998, 4001, 70000});
+  auto source = open();
+  EXPECT_THAT(play(*source), ElementsAre("f0", "right_missing", "f2", "f3", "left_missing"));
+  EXPECT_EQ(source->info().sequence.orphans_left, 1);
+  EXPECT_EQ(source->info().sequence.orphans_right, 1);
+  const auto frame = source->frame_at("stereo", {3'000'000});
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->right_stamp, Stamp{2'998'000});
+}
+
+TEST_F(EurocLayout, TheUnitsAxesAreTurnedIntoTheBody) {
+  folder_.write("mav0/imu0/sensor.yaml", "T_BS: {rows: 4, cols: 4, data: [0,-1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]}\n");
+  folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n1500000,0,0,0,0,0,0\n");
+  auto source = open();
+  EXPECT_THAT(play(*source), ElementsAre("i", "f0", "i", "f1", "f2", "f3"));
+  const auto imu = source->first_imu_samples(1).value();
+  EXPECT_LE((imu[0].gyro_rad_s - Eigen::Vector3d(-2, 1, 3)).norm(), 1e-12);
+  EXPECT_LE((imu[0].accel_m_s2 - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
+}
+
+TEST_F(EurocLayout, FaultsNameFileAndLine) {
+  folder_.write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1000000,1000000.png\nsoon,2000000.png\n");
+  EXPECT_THAT(refusal(), HasSubstr("cam1/data.csv:3: the first column is not a time in nanoseconds"));
+  folder_.write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1000000\n");
+  EXPECT_THAT(refusal(), HasSubstr("cam1/data.csv:2: 1 values where 2 are expected"));
+  remove("mav0/cam1/data.csv");
+  EXPECT_THAT(refusal(), HasSubstr("cam1/data.csv"));
+}
+
+// --- which layout ---
+
+TEST_F(Layouts, WhatIsNoRecordingIsToldWhatWasLookedFor) {
+  EXPECT_THAT(refusal(), HasSubstr("the folder is empty"));
+  folder_.write("holiday.txt", "x");
+  EXPECT_THAT(refusal(), HasSubstr("no layout of a recording that is known"));
+  EXPECT_THAT(refusal(), HasSubstr("looked for calib.txt with image_0"));
+  EXPECT_THAT(open_recording(folder_.path() + "/none").error().message(), HasSubstr("no such folder"));
+  EXPECT_THAT(open_recording(folder_.path() + "/holiday.txt").error().message(), HasSubstr("is a file"));
+}
+
+TEST_F(EurocLayout, KittiWinsWhereBothAreThere) {
+  folder_.write("calib.txt", kKittiCalib);
+  for (const char* eye : {"image_0", "image_1"}) image(std::string(eye) + "/000000.png");
+  EXPECT_EQ(open()->info().format, RecordingFormat::kitti);
+  OpenOptions options;
+  options.format = RecordingFormat::euroc;
+  EXPECT_EQ(open(options)->info().format, RecordingFormat::euroc);
+  EXPECT_THAT(open(options)->info().layout_reason, HasSubstr("euroc asked for"));
+  options.format = RecordingFormat::spartan;
+  EXPECT_THAT(refusal(options), HasSubstr("recording.yaml"));
+}
+
+TEST(RecordingFormats, HaveTheNamesOfTheCommandLine) {
+  for (const char* name : {"spartan", "kitti", "kitti-raw", "euroc"})
+    EXPECT_EQ(name_of(parse_recording_format(name).value()), name);
+  const auto unknown = parse_recording_format("tum");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::usage);
+  EXPECT_THAT(unknown.error().message(), HasSubstr("kitti-raw"));
+}
+
+}  // namespace
+}  // namespace spartan

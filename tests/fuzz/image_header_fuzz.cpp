@@ -1,0 +1,12 @@
+// Headers of PNG, JPEG and PGM/PPM files, read without decoding.
+#include <cstdint>
+
+#include "input_file.h"
+#include "spartan/camera/image_header.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const spartan::testing::InputFile input(data, size);
+  const auto found = spartan::read_image_size(input.path());
+  if (found && found->empty()) __builtin_trap();
+  return 0;
+}

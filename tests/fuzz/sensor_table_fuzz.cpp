@@ -1,0 +1,33 @@
+// Tables of IMU, wheels, compass and inclinometer.
+#include <cstdint>
+#include <variant>
+
+#include "input_file.h"
+#include "spartan/camera/sensor_tables.h"
+
+namespace {
+
+void play(const spartan::OpenStream& open) {
+  const auto stream = open();
+  if (!stream) return;
+  for (;;) {
+    const auto sample = (*stream)->next();
+    if (!sample || !*sample) return;
+    if (const auto* imu = std::get_if<spartan::ImuSample>(&**sample)) {
+      if (!imu->gyro_rad_s.allFinite() || !imu->accel_m_s2.allFinite()) __builtin_trap();
+    }
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const spartan::testing::InputFile input(data, size);
+  const spartan::TableFormat format{.separator = ',', .header = {}, .ends_with_newline = true};
+  play(spartan::stream_of_table(input.path(), format, 7, spartan::read_imu_row(Eigen::Quaterniond::Identity())));
+  play(spartan::stream_of_table(input.path(), format, 3, spartan::read_wheel_row));
+  play(spartan::stream_of_table(input.path(), format, 3, spartan::read_compass_row));
+  play(spartan::stream_of_table(input.path(), {.separator = ' ', .header = {}, .ends_with_newline = false}, 4,
+                                spartan::read_inclinometer_row));
+  return 0;
+}
