@@ -101,6 +101,13 @@ Status agree_on_stamps(LoadedTrajectory& estimate, LoadedTrajectory& truth) {
 
 }  // namespace
 
+Result<std::string> load_truth(const std::string& path) {
+  auto file = find_truth(path);
+  if (!file) return failure(file);
+  if (const auto loaded = load_trajectory(*file); !loaded) return failure(loaded);
+  return file;
+}
+
 Result<ComparedTrajectories> find_trajectories(const std::string& estimate_path, const std::string& truth_path,
                                                const std::string& kind) {
   auto estimate = load_estimate(estimate_path, kind);

@@ -23,4 +23,7 @@ struct ComparedTrajectories {
 Result<ComparedTrajectories> find_trajectories(const std::string& estimate, const std::string& truth,
                                                const std::string& kind);
 
+/// The file of a truth that is a recording or a file, read to see that it can be: the same errors before a long run.
+Result<std::string> load_truth(const std::string& path);
+
 }  // namespace spartan::program

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "program/compared_trajectories.h"
-#include "program/json.h"
+#include "program/trajectory_report.h"
 #include "program/verbs.h"
 #include "spartan/eval/trajectory_metrics.h"
 
@@ -18,87 +18,6 @@ struct Arguments {
   bool kitti = false;
   TrajectoryMetricsOptions options;
 };
-
-Json to_json(const std::optional<ErrorStatistics>& errors) {
-  if (!errors) return nullptr;
-  return {{"rmse", number(errors->rmse)},
-          {"mean", number(errors->mean)},
-          {"median", number(errors->median)},
-          {"max", number(errors->max)}};
-}
-
-Json to_json(const std::optional<std::vector<SegmentErrors>>& segments) {
-  if (!segments) return nullptr;
-  Json list = Json::array();
-  for (const SegmentErrors& segment : *segments) {
-    Json entry{{"length_m", segment.length_m},
-               {"count", segment.count},
-               {"translation_percent", number(segment.translation_percent)},
-               {"rotation_deg_per_m", number(segment.rotation_deg_per_m)}};
-    if (segment.count == 0) entry["reason"] = "the path is shorter";
-    list.push_back(std::move(entry));
-  }
-  return list;
-}
-
-Json to_json(const Similarity& similarity) {
-  const auto& t = similarity.pose.translation();
-  const auto& q = similarity.pose.rotation();
-  return {{"scale", number(similarity.scale)},
-          {"translation_m", {number(t.x()), number(t.y()), number(t.z())}},
-          {"rotation_xyzw", {number(q.x()), number(q.y()), number(q.z()), number(q.w())}}};
-}
-
-Json to_json(const TrajectoryMetrics& metrics, const ComparedTrajectories& compared) {
-  Json reasons = Json::object();
-  for (const MissingMetric& missing : metrics.missing) reasons[missing.name] = missing.reason;
-  return {{"schema", 1},
-          {"align", std::string(name_of(metrics.alignment))},
-          {"trajectory", compared.kind},
-          {"estimate", compared.estimate_path},
-          {"truth", compared.truth_path},
-          {"frames", metrics.frames},
-          {"path_length_m", number(metrics.path_length_m)},
-          {"ate_m", to_json(std::optional(metrics.ate_m))},
-          {"drift_percent", number(metrics.drift_percent)},
-          {"segments", to_json(metrics.segments)},
-          {"rpe",
-           {{"translation_m", to_json(metrics.rpe_translation_m)},
-            {"rotation_deg", to_json(metrics.rpe_rotation_deg)},
-            {"delta_frames", metrics.rpe_delta_frames}}},
-          {"truth_from_estimate", to_json(metrics.truth_from_estimate)},
-          {"reasons", std::move(reasons)}};
-}
-
-std::string line_of(const char* name, const std::optional<ErrorStatistics>& e) {
-  if (!e) return fmt::format("{:<18}{:>10}\n", name, "-");
-  return fmt::format("{:<18}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name, e->rmse, e->mean, e->median, e->max);
-}
-
-std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectories& compared) {
-  std::string text = fmt::format("estimate  {}{}\ntruth     {}\n", compared.estimate_path,
-                                 compared.kind == "file" ? "" : " (" + compared.kind + ")", compared.truth_path);
-  text += fmt::format("frames    {} of {} compared over {:.2f} m\n", metrics.frames, compared.estimate.size(),
-                      metrics.path_length_m);
-  text += fmt::format(
-      "aligned   {}{}\n\n", name_of(metrics.alignment),
-      metrics.alignment == Alignment::sim3 ? fmt::format(", scale {:.5f}", metrics.truth_from_estimate.scale) : "");
-  text += fmt::format("{:<18}{:>10}{:>10}{:>10}{:>10}\n", "error", "rmse", "mean", "median", "max");
-  text += line_of("position, m", metrics.ate_m);
-  text += line_of("step, m", metrics.rpe_translation_m);
-  text += line_of("step, deg", metrics.rpe_rotation_deg);
-  if (metrics.drift_percent) text += fmt::format("\ndrift of the end, %{:>10.3f}\n", *metrics.drift_percent);
-  if (metrics.segments) {
-    text += fmt::format("\n{:<18}{:>10}{:>15}{:>15}\n", "segments, m", "count", "translation, %", "rotation, deg/m");
-    for (const SegmentErrors& s : *metrics.segments) {
-      if (s.count == 0) continue;
-      text += fmt::format("{:<18g}{:>10}{:>15.3f}{:>15.5f}\n", s.length_m, s.count, *s.translation_percent,
-                          *s.rotation_deg_per_m);
-    }
-  }
-  for (const MissingMetric& missing : metrics.missing) text += fmt::format("no {}: {}\n", missing.name, missing.reason);
-  return text;
-}
 
 Result<ExitCode> evaluate(const Context& context, const Arguments& arguments) {
   const auto compared = find_trajectories(arguments.estimate, arguments.truth, arguments.trajectory);

@@ -6,17 +6,21 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "program/compared_trajectories.h"
 #include "program/interrupt.h"
+#include "program/json.h"
 #include "program/progress.h"
 #include "program/run_arguments.h"
+#include "program/trajectory_report.h"
 #include "program/verbs.h"
+#include "spartan/core/files.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::program {
 namespace {
 
 struct RunArguments {
-  std::string input, output, rig, format, config;
+  std::string input, output, rig, format, config, truth;
   std::vector<std::string> set;
   bool resume = false, odometry_only = false;
   int max_frames = 0;
@@ -37,6 +41,20 @@ std::string summary_for_people(const std::string& summary_json, const std::strin
                         span["to_ns"].get<std::int64_t>(), span["reason"].get<std::string>());
   }
   return text + "results in " + folder + "\n";
+}
+
+// Compares the run's trajectory with the truth; the summary gets the figures under "truth".
+Result<std::string> score(const RunArguments& arguments, RunOutcome& outcome) {
+  const auto compared = find_trajectories(arguments.output, arguments.truth, "");
+  if (!compared) return failure(compared);
+  const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
+  if (!metrics) return failure(metrics);
+  Json summary = Json::parse(outcome.summary_json);
+  summary["truth"] = to_json(*metrics, *compared);
+  outcome.summary_json = summary.dump(2) + "\n";
+  if (Status s = write_file_atomically(RunFolder{arguments.output}.summary(), outcome.summary_json); !s)
+    return failure(s);
+  return table_of(*metrics, *compared);
 }
 
 Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments) {
@@ -63,10 +81,18 @@ Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments)
   hooks.log = context.log;
   hooks.should_stop = interrupted;
   hooks.progress = [&progress](const RunProgress& p) { progress.show(p.done, p.announced, p.status); };
-  const auto outcome = run(request, hooks);
+  if (!arguments.truth.empty()) {
+    if (const auto truth = load_truth(arguments.truth); !truth) return failure(truth);
+  }
+  auto outcome = run(request, hooks);
   if (!outcome) return failure(outcome);
-  const Status printed =
-      print(context.json ? outcome->summary_json : summary_for_people(outcome->summary_json, arguments.output));
+  std::string text = summary_for_people(outcome->summary_json, arguments.output);
+  if (!arguments.truth.empty() && !outcome->interrupted) {
+    const auto table = score(arguments, *outcome);
+    if (!table) return failure(table);
+    text += "\n" + *table;
+  }
+  const Status printed = print(context.json ? outcome->summary_json : text);
   if (!printed) return failure(printed);
   if (outcome->interrupted) {
     return failure(ErrorCode::interrupted, "stopped on request", arguments.output, "go on with --resume");
@@ -86,6 +112,7 @@ void add_run(CLI::App& app, Context& context) {
   verb->add_option("--format", a->format, "spartan, kitti, kitti-raw or euroc; guessed without it");
   verb->add_option("--config", a->config, "YAML file with options (see `spartan config dump`)");
   verb->add_option("--set", a->set, "one option, as group.key=value; may be given again")->allow_extra_args(false);
+  verb->add_option("--truth", a->truth, "compare with this trajectory, or that of this recording, as `evaluate` does");
   verb->add_flag("--resume", a->resume, "go on where an earlier run of this folder stopped");
   verb->add_option("--max-frames", a->max_frames, "stop after so many shots")->check(CLI::NonNegativeNumber);
   verb->add_flag("--odometry-only", a->odometry_only, "the trajectory without the terrain");

@@ -198,6 +198,31 @@ TEST_F(Run, FailsWhereNoFrameIsUsable) {
   const ProgramResult result = run("out");
   EXPECT_EQ(result.exit_code, 3) << result.err;
   EXPECT_THAT(result.err, HasSubstr("no usable frame"));
+  EXPECT_FALSE(fs::exists(path("out"))) << "nothing is left that would be in the way of the next try";
+}
+
+TEST_F(Run, WritesWhatItSaysIntoTheLog) {
+  fs::remove(image(1, 4));
+  ASSERT_EQ(run("out", {"-q"}).exit_code, 0);
+  std::ifstream file(path("out/log.txt"));
+  const std::string log((std::istreambuf_iterator<char>(file)), {});
+  EXPECT_THAT(log, HasSubstr("kitti recording (calib.txt and image_0 found)"));
+  EXPECT_THAT(log, HasSubstr("frame 4 skipped (right_missing)"));
+}
+
+TEST_F(Run, ComparesWithTheTruth) {
+  const ProgramResult result = run("out", {"--truth", drive(), "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(nlohmann::json::parse(result.out), summary);
+  EXPECT_EQ(summary["truth"]["align"], "se3");
+  EXPECT_EQ(summary["truth"]["frames"], 14);
+  EXPECT_LT(summary["truth"]["ate_m"]["rmse"], 0.005);
+  // A truth that cannot be read is told before the drive begins.
+  const ProgramResult refused = run("other", {"--truth", path("none.txt")});
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("none.txt"));
+  EXPECT_FALSE(fs::exists(path("other")));
 }
 
 TEST_F(Run, BridgesMissingFramesWhereTheViewsStillOverlap) {

@@ -49,15 +49,16 @@ Log Log::to_terminal(LogLevel level) {
   return log;
 }
 
-Log Log::to_terminal_and_file(LogLevel level, const std::string& path) {
-  std::vector<spdlog::sink_ptr> sinks{terminal_sink(level)};
+Log Log::with_file(const std::string& path) const {
+  std::vector<spdlog::sink_ptr> sinks;
+  if (sink_) sinks = sink_->logger.sinks();
   try {
     auto file = std::make_shared<spdlog::sinks::basic_file_sink_mt>(path);
     file->set_level(spdlog::level::info);
     file->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l: %v");
     sinks.push_back(std::move(file));
   } catch (const spdlog::spdlog_ex&) {
-    // Documented: without the file the terminal has to do.
+    // Documented: without the file the other sinks have to do.
   }
   Log log;
   log.sink_ = std::make_shared<Sink>(std::move(sinks));

@@ -16,9 +16,8 @@ class Log {
   Log() = default;
   /// Messages of at least `level` to standard error.
   static Log to_terminal(LogLevel level);
-  /// The same, and everything from `info` up to the file too (appended). Where the file cannot be opened,
-  /// only the terminal is used.
-  static Log to_terminal_and_file(LogLevel level, const std::string& path);
+  /// This log, and everything from `info` up to the file too (appended). Where the file cannot be opened, this log.
+  Log with_file(const std::string& path) const;
 
   void debug(std::string_view text) const { write(LogLevel::debug, text); }
   void info(std::string_view text) const { write(LogLevel::info, text); }

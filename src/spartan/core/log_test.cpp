@@ -23,7 +23,7 @@ TEST(Log, TheFileGetsEverythingFromInfoUp) {
   const std::string path = folder.write("log.txt", "earlier\n");
   ::testing::internal::CaptureStderr();
   {
-    const Log log = Log::to_terminal_and_file(LogLevel::error, path);
+    const Log log = Log::to_terminal(LogLevel::error).with_file(path);
     const Log copy = log;  // NOLINT(performance-unnecessary-copy-initialization): that copies share the file is tested
     log.debug("a detail");
     copy.info("a {brace} is no format");
@@ -43,7 +43,7 @@ TEST(Log, TheFileGetsEverythingFromInfoUp) {
 
 TEST(Log, AFileThatCannotBeOpenedIsNoFault) {
   ::testing::internal::CaptureStderr();
-  Log::to_terminal_and_file(LogLevel::info, "/proc/none/log.txt").info("still heard");
+  Log::to_terminal(LogLevel::info).with_file("/proc/none/log.txt").info("still heard");
   EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("still heard"));
 }
 

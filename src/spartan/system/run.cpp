@@ -237,7 +237,7 @@ Result<RunOutcome> write_results(Drive& drive, const RunFolder& folder, RunFacts
 
 }  // namespace
 
-Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
+Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   const auto began = std::chrono::steady_clock::now();
   OpenOptions open;
   open.format = request.format;
@@ -245,13 +245,16 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
   auto source = open_recording(request.input, open);
   if (!source) return failure(source);
   const RecordingInfo& info = (*source)->info();
-  report_sequence(info, hooks.log);
 
   const RunFolder folder{request.output};
   const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
   auto pipeline = Pipeline::create(info.rig, request.options, Workers(request.threads), mask_folder);
   if (!pipeline) return failure(pipeline);
-  if (Status s = prepare_run_folder(folder, request.resume); !s) return failure(s);
+  const auto prepared = prepare_run_folder(folder, request.resume);
+  if (!prepared) return failure(prepared);
+  RunHooks hooks = given_hooks;
+  hooks.log = given_hooks.log.with_file(folder.log());
+  report_sequence(info, hooks.log);
   const RunIdentity identity{fingerprint(**source), dump_options(request.options), to_rig_yaml(info.rig)};
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
@@ -262,6 +265,8 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
   if (Status s = drive.begin(); !s) return failure(s);
   if (Status s = drive.drive(); !s) return failure(s);
   if (drive.usable() == 0 && !drive.stopped()) {
+    // There is nothing in it, and it would be in the way of the next try.
+    if (*prepared == FolderState::made) remove_run_folder(folder);
     return failure(ErrorCode::input, "the recording has no usable frame", info.path,
                    "the messages above name each file");
   }

@@ -6,7 +6,7 @@
 
 namespace spartan {
 
-Status prepare_run_folder(const RunFolder& folder, bool resume) {
+Result<FolderState> prepare_run_folder(const RunFolder& folder, bool resume) {
   std::error_code error;
   const bool exists = std::filesystem::exists(folder.path, error);
   if (exists && !resume) {
@@ -16,7 +16,13 @@ Status prepare_run_folder(const RunFolder& folder, bool resume) {
   if (exists && !std::filesystem::is_directory(folder.path, error)) {
     return failure(ErrorCode::output, "is not a folder", folder.path, "give another folder with -o");
   }
-  return make_folder(folder.terrain());
+  if (Status made = make_folder(folder.terrain()); !made) return failure(made);
+  return exists ? FolderState::was_there : FolderState::made;
+}
+
+void remove_run_folder(const RunFolder& folder) {
+  std::error_code ignored;
+  std::filesystem::remove_all(folder.path, ignored);
 }
 
 }  // namespace spartan

@@ -19,8 +19,13 @@ struct RunFolder {
   std::string log() const { return path + "/log.txt"; }
 };
 
+enum class FolderState { made, was_there };
+
 /// Makes a new folder, or with `resume` accepts one that is there. Code `output` where it exists and is not to be
 /// resumed (it is left untouched), or where it cannot be made.
-Status prepare_run_folder(const RunFolder& folder, bool resume);
+Result<FolderState> prepare_run_folder(const RunFolder& folder, bool resume);
+
+/// Removes a folder that was made for a run which came to nothing.
+void remove_run_folder(const RunFolder& folder);
 
 }  // namespace spartan

@@ -1,0 +1,15 @@
+// What a comparison with the truth tells: as JSON (docs/formats.md, `evaluate`) and as a table for people.
+#pragma once
+
+#include <string>
+
+#include "program/compared_trajectories.h"
+#include "program/json.h"
+#include "spartan/eval/trajectory_metrics.h"
+
+namespace spartan::program {
+
+Json to_json(const TrajectoryMetrics& metrics, const ComparedTrajectories& compared);
+std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectories& compared);
+
+}  // namespace spartan::program
