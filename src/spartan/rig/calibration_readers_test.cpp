@@ -177,8 +177,9 @@ TEST_F(EurocCalib, FaultsAreNamed) {
 // --- OpenCV ---
 
 // As the calibration samples write it.
-std::string opencv_yml(double tx, const cv::Mat& distortion = (cv::Mat_<double>(1, 5) << -0.2, 0.1, 0.001, 0, 0.02)) {
-  cv::FileStorage file("memory.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+std::string opencv_yml(double tx, const cv::Mat& distortion = (cv::Mat_<double>(1, 5) << -0.2, 0.1, 0.001, 0, 0.02),
+                       const char* name = "memory.yml") {
+  cv::FileStorage file(name, cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
   const cv::Mat k = (cv::Mat_<double>(3, 3) << 530, 0, 340, 0, 531, 235, 0, 0, 1);
   file << "M1" << k << "D1" << distortion << "M2" << k << "D2" << distortion << "R" << cv::Mat::eye(3, 3, CV_64F) << "T"
        << (cv::Mat_<double>(3, 1) << tx, 0, 0);
@@ -193,6 +194,21 @@ TEST(OpencvCalib, TIsWhereTheLeftEyeIsSeenFromTheRight) {
   EXPECT_EQ(parameters(rig->cameras[0].model)[0], (std::vector<double>{530, 531}));
   EXPECT_EQ(parameters(rig->cameras[0].model)[1], (std::vector<double>{340, 235}));
   EXPECT_EQ(parameters(rig->cameras[0].model)[2], (std::vector<double>{-0.2, 0.1, 0.001, 0, 0.02}));
+}
+
+TEST(OpencvCalib, XmlIsReadToo) {
+  const TemporaryFolder folder;
+  const cv::Mat distortion = (cv::Mat_<double>(1, 4) << -0.2, 0.1, 0, 0);
+  const auto rig = read_rig(folder.write("stereo.xml", opencv_yml(-0.12, distortion, "memory.xml")), {640, 480});
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(parameters(rig->cameras[1].model)[2], (std::vector<double>{-0.2, 0.1, 0, 0}));
+}
+
+TEST(OpencvCalib, AMatrixThatClaimsToBeHugeIsRefused) {
+  const TemporaryFolder folder;
+  const std::string text = replaced(opencv_yml(-0.12), "rows: 3", "rows: 2000000000");
+  EXPECT_THAT(complaint(read_opencv_calib(folder.write("stereo.yml", text), "", {640, 480})),
+              HasSubstr("M1: has other numbers than its rows and columns say"));
 }
 
 TEST(OpencvCalib, SizeIsTakenFromTheFileWhereItHasOne) {

@@ -3,6 +3,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <opencv2/core/persistence.hpp>
 
 #include "spartan/core/files.h"
@@ -71,22 +73,22 @@ class Storages {
     const auto fault = [&](const std::string& what) {
       return failure(ErrorCode::configuration, fmt::format("{}: {}", name, what), paths_);
     };
-    cv::Mat any;
-    try {
-      node >> any;
-    } catch (const std::exception&) {
+    // Read number by number: cv::Mat would trust rows and cols, and take any amount of memory for them.
+    if (!node.isMap() || !node["rows"].isInt() || !node["cols"].isInt() || !node["data"].isSeq())
       return fault("is not a matrix");
-    }
-    if (any.empty() || any.dims > 2 || any.channels() != 1) return fault("is not a matrix");
-    const int total = static_cast<int>(any.total());
+    const cv::FileNode data = node["data"];
+    const auto total = static_cast<std::int64_t>(data.size());
+    if (std::int64_t{static_cast<int>(node["rows"])} * static_cast<int>(node["cols"]) != total)
+      return fault("has other numbers than its rows and columns say");
     if (std::find(counts.begin(), counts.end(), total) == counts.end()) {
       return fault(fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
     }
-    cv::Mat_<double> matrix;
-    any.convertTo(matrix, CV_64F);
-    std::vector<double> values(matrix.begin(), matrix.end());
-    for (const double v : values) {
-      if (!std::isfinite(v)) return fault("holds a number that is not finite");
+    std::vector<double> values;
+    values.reserve(data.size());
+    for (const cv::FileNode& entry : data) {
+      if (!entry.isInt() && !entry.isReal()) return fault("holds something that is not a number");
+      values.push_back(static_cast<double>(entry));
+      if (!std::isfinite(values.back())) return fault("holds a number that is not finite");
     }
     return values;
   }
