@@ -4,6 +4,7 @@ set(SPARTAN_PACKAGES
   "Eigen3 3.4 NO_MODULE"
   "OpenCV 4.6 COMPONENTS core imgproc imgcodecs"
   "Ceres 2.1"
+  "libjpeg-turbo CONFIG"
   "hwy CONFIG"
   "TBB"
   "tl-expected"

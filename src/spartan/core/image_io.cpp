@@ -11,11 +11,16 @@
 #include <vector>
 
 #include "spartan/core/files.h"
+#include "spartan/core/jpeg_file.h"
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/core/picture_file.h"
 
 namespace spartan {
 namespace {
+
+bool is_jpeg(std::string_view content) {
+  return content.starts_with("\xFF\xD8");
+}
 
 cv::Mat decode(const std::string& content, int flags) {
   const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8UC1, const_cast<char*>(content.data()));
@@ -71,6 +76,11 @@ Result<FrameImage> decode_image(const std::string& content, const std::string& n
   const char* const hint = "replace the file, or remove it to skip the frame";
   if (const std::string fault = picture_file_fault(content); !fault.empty())
     return failure(ErrorCode::input, fault, name, hint);
+  if (is_jpeg(content)) {
+    auto image = decode_jpeg(content, JpegColour::as_stored);
+    if (!image) return failure(image.error().code, image.error().what, name, hint);
+    return image;
+  }
   cv::Mat mat = decode(content, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
   if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", name, hint);
   if (mat.channels() == 3) cv::cvtColor(mat, mat, cv::COLOR_BGR2RGB);
@@ -99,6 +109,11 @@ Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
   if (!content) return failure(content);
   if (const std::string fault = picture_file_fault(*content); !fault.empty())
     return failure(ErrorCode::input, fault, path);
+  if (is_jpeg(*content)) {
+    const auto image = decode_jpeg(*content, JpegColour::gray);
+    if (!image) return failure(image.error().code, image.error().what, path);
+    return Image<std::uint8_t>::copy_of(image->as<std::uint8_t>());
+  }
   const cv::Mat mat = decode(*content, cv::IMREAD_GRAYSCALE);
   if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", path);
   return Image<std::uint8_t>::copy_of(as_view<std::uint8_t>(mat));

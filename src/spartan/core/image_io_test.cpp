@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/core/picture_file.h"
@@ -202,6 +203,37 @@ TEST(PictureFileJpeg, ThumbnailInsideATableDoesNotEndThePicture) {
   const std::string with = whole.substr(0, 2) + table + thumbnail + whole.substr(2);
   EXPECT_TRUE(decode_image(with, "a"));
   EXPECT_FALSE(decode_image(with.substr(0, with.size() - 300), "a"));
+}
+
+// OpenCV's decoder, which is the same library, as an oracle for the pixels.
+TEST(PictureFileJpeg, DecodesAsOpenCvDoes) {
+  cv::Mat colour(33, 47, CV_8UC3), gray;
+  cv::randu(colour, 0, 256);
+  cv::GaussianBlur(colour, colour, {5, 5}, 2);
+  cv::cvtColor(colour, gray, cv::COLOR_BGR2GRAY);
+  const std::string rgb_file = encode(".jpg", colour), gray_file = encode(".jpg", gray);
+  const auto decoded = [](const std::string& file, int flags) {
+    return cv::imdecode(std::vector<char>(file.begin(), file.end()), flags);
+  };
+  cv::Mat rgb = decoded(rgb_file, cv::IMREAD_COLOR);
+  cv::cvtColor(rgb, rgb, cv::COLOR_BGR2RGB);
+  const FrameImage ours = decode_image(rgb_file, "a").value(), ours_gray = decode_image(gray_file, "a").value();
+  EXPECT_EQ(ours.format().layout, PixelLayout::rgb);
+  EXPECT_EQ(cv::norm(as_mat(ours.as<Rgb8>()), rgb, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(as_mat(ours_gray.as<std::uint8_t>()), decoded(gray_file, cv::IMREAD_GRAYSCALE), cv::NORM_INF), 0);
+}
+
+// The markers are all in place, the pixels between them are not.
+TEST(PictureFileJpeg, DamageBetweenTheMarkersIsNoticed) {
+  const std::string whole = encode(".jpg", as_mat(picture(64, 48)));
+  const std::size_t scan = whole.find("\xFF\xDA");
+  ASSERT_NE(scan, std::string::npos);
+  std::string cut = whole;
+  cut.erase(scan + 60, (whole.size() - scan) / 2);
+  const auto refused = decode_image(cut, "b.jpg");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::input);
+  EXPECT_THAT(refused.error().message(), HasSubstr("b.jpg: JPEG file is damaged: "));
 }
 
 TEST(PictureFileJpeg, FillBytesBeforeAMarkerAreAllowed) {

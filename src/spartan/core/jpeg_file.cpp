@@ -1,0 +1,53 @@
+#include "spartan/core/jpeg_file.h"
+
+#include <turbojpeg.h>
+
+#include <memory>
+#include <string>
+#include <type_traits>
+
+#include "spartan/core/picture_file.h"
+
+namespace spartan {
+namespace {
+
+struct Destroy {
+  void operator()(void* decoder) const { tjDestroy(decoder); }
+};
+using Decoder = std::unique_ptr<void, Destroy>;
+
+template <class Pixel>
+Result<FrameImage> decode_as(const Decoder& decoder, std::string_view content, ImageSize size, PixelLayout layout) {
+  constexpr int kFormat = std::is_same_v<Pixel, Rgb8> ? TJPF_RGB : TJPF_GRAY;
+  Image<Pixel> pixels(size);
+  const int bytes_per_row = static_cast<int>(pixels.stride() * static_cast<std::ptrdiff_t>(sizeof(Pixel)));
+  const auto* jpeg = reinterpret_cast<const unsigned char*>(content.data());
+  const int fault = tjDecompress2(decoder.get(), jpeg, content.size(), reinterpret_cast<unsigned char*>(pixels.data()),
+                                  size.width, bytes_per_row, size.height, kFormat, TJFLAG_STOPONWARNING);
+  if (fault != 0)
+    return failure(ErrorCode::input, std::string("JPEG file is damaged: ") + tjGetErrorStr2(decoder.get()));
+  return FrameImage::own(std::move(pixels), {layout, 8, BitAlignment::low});
+}
+
+}  // namespace
+
+Result<FrameImage> decode_jpeg(std::string_view content, JpegColour colour) {
+  const Decoder decoder(tjInitDecompress());
+  if (!decoder) return failure(ErrorCode::internal, "the JPEG decoder cannot be started");
+  ImageSize size;
+  int subsampling = 0, stored = 0;
+  const auto* jpeg = reinterpret_cast<const unsigned char*>(content.data());
+  if (tjDecompressHeader3(decoder.get(), jpeg, content.size(), &size.width, &size.height, &subsampling, &stored) != 0) {
+    return failure(ErrorCode::input, std::string("JPEG file is damaged: ") + tjGetErrorStr2(decoder.get()));
+  }
+  if (size.empty() || size.width > static_cast<int>(kLargestImageSide) ||
+      size.height > static_cast<int>(kLargestImageSide)) {
+    return failure(ErrorCode::input, "JPEG header with a senseless size");
+  }
+  if (colour == JpegColour::gray || stored == TJCS_GRAY) {
+    return decode_as<std::uint8_t>(decoder, content, size, PixelLayout::gray);
+  }
+  return decode_as<Rgb8>(decoder, content, size, PixelLayout::rgb);
+}
+
+}  // namespace spartan
