@@ -197,7 +197,8 @@ TEST_F(Run, FailsWhereNoFrameIsUsable) {
   for (int i = 0; i < 14; ++i) cut(image(1, i), 0.5);
   const ProgramResult result = run("out");
   EXPECT_EQ(result.exit_code, 3) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("no usable frame"));
+  EXPECT_THAT(result.err, HasSubstr("no usable frame; the first one: "));
+  EXPECT_THAT(result.err, HasSubstr("image_1/000000.png"));
   EXPECT_FALSE(fs::exists(path("out"))) << "nothing is left that would be in the way of the next try";
 }
 
@@ -295,6 +296,7 @@ TEST_F(Run, ExportsForOtherTools) {
     const ProgramResult result = run_program({"export", path("out"), "--format", format, "-o", path("x." + format)});
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
+  EXPECT_FALSE(fs::exists(path("out/run.sqlite-wal"))) << "looking leaves nothing behind";
   const auto lines = [&](const std::string& name) {
     const std::string text = testing::content_of(path(name));
     return std::count(text.begin(), text.end(), '\n');

@@ -10,8 +10,8 @@ namespace spartan {
 
 /// Decodes a picture file into gray or RGB of 8 or 16 bits (`format.bits` is 8 or 16; a recording that knows
 /// better says so by `with_format`). A file that is missing, empty, truncated (PNG without its end chunk,
-/// JPEG without its end marker, or with damage that its decoder notices) or no picture of these kinds gives an error with code `input` that names the path and
-/// what is wrong.
+/// JPEG without its end marker, or with damage that its decoder notices) or no picture of these kinds gives an error
+/// with code `input` that names the path and what is wrong.
 Result<FrameImage> read_image(const std::string& path);
 
 /// The same from memory; `name` stands in errors.

@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <filesystem>
 #include <utility>
 
 namespace spartan {
@@ -28,6 +29,13 @@ Error error_of(sqlite3* db, const std::string& path) {
     default:
       return {ErrorCode::internal, what, path, ""};
   }
+}
+
+// What has a meaning in a URI stands as %XX.
+std::string escaped(const std::string& path) {
+  std::string text;
+  for (const char c : path) text += c == '%' ? "%25" : c == '?' ? "%3f" : c == '#' ? "%23" : std::string(1, c);
+  return text;
 }
 
 }  // namespace
@@ -108,9 +116,18 @@ Bytes SqlStatement::blob(int column) const {
 Result<Database> Database::open(const std::string& path, Mode mode) {
   int flags = SQLITE_OPEN_READWRITE;
   if (mode == Mode::create) flags |= SQLITE_OPEN_CREATE;
-  if (mode == Mode::read_only) flags = SQLITE_OPEN_READONLY;
+  std::string name = path;
+  if (mode == Mode::read_only) {
+    flags = SQLITE_OPEN_READONLY;
+    // Without a write-ahead log nobody is writing. Said so, SQLite makes no files of its own beside it, and needs no
+    // permission to.
+    if (!std::filesystem::exists(path + "-wal")) {
+      flags |= SQLITE_OPEN_URI;
+      name = "file:" + escaped(path) + "?immutable=1";
+    }
+  }
   sqlite3* handle = nullptr;
-  const int code = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
+  const int code = sqlite3_open_v2(name.c_str(), &handle, flags, nullptr);
   Database db(handle, path);
   if (code != SQLITE_OK) return tl::unexpected<Error>(error_of(handle, path));
   sqlite3_busy_timeout(handle, 5000);

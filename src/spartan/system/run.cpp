@@ -65,6 +65,8 @@ class Drive {
   Status begin();
   Status drive();
   int usable() const { return usable_; }
+  /// What is wrong with the first shot that was left out.
+  const std::string& first_fault() const { return first_fault_; }
   bool stopped() const { return stopped_; }
   bool gravity_measured() const { return pipeline_.gravity_measured(); }
   std::optional<std::int64_t> resumed_from_frame() const { return resumed_from_frame_; }
@@ -86,6 +88,7 @@ class Drive {
   std::int64_t samples_taken_ = 0;
   int shots_ = 0;   // announced shots taken, missing ones too
   int usable_ = 0;  // shots with both images
+  std::string first_fault_;
   bool stopped_ = false;
   bool resumed_ = false;
   std::optional<std::int64_t> resumed_from_frame_;
@@ -179,6 +182,7 @@ Status Drive::take_missing(const MissingFrame& missing) {
   hooks_.log.warning(
       fmt::format("frame {} skipped ({}): {}", missing.frame_id, name_of(missing.fault), missing.message));
   clock_.take();
+  if (first_fault_.empty()) first_fault_ = missing.message;
   if (missing.pair != pipeline_.odometry_pair()) return {};
   FrameRecord record;
   record.frame_id = missing.frame_id;
@@ -267,8 +271,8 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   if (drive.usable() == 0 && !drive.stopped()) {
     // There is nothing in it, and it would be in the way of the next try.
     if (*prepared == FolderState::made) remove_run_folder(folder);
-    return failure(ErrorCode::input, "the recording has no usable frame", info.path,
-                   "the messages above name each file");
+    return failure(ErrorCode::input, "the recording has no usable frame; the first one: " + drive.first_fault(),
+                   info.path);
   }
 
   RunFacts facts;
