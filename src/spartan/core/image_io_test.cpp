@@ -223,6 +223,16 @@ TEST(PictureFileJpeg, DecodesAsOpenCvDoes) {
   EXPECT_EQ(cv::norm(as_mat(ours_gray.as<std::uint8_t>()), decoded(gray_file, cv::IMREAD_GRAYSCALE), cv::NORM_INF), 0);
 }
 
+TEST(PictureFileJpeg, PaddingBeforeTheEndIsAllowed) {
+  const std::string whole = encode(".jpg", as_mat(picture(64, 48)));
+  std::string padded = whole;
+  padded.insert(whole.size() - 2, "\x20\x20\x20", 3);
+  const auto image = decode_image(padded, "b.jpg");
+  ASSERT_TRUE(image) << image.error().message();
+  const auto plain = decode_image(whole, "a.jpg").value();
+  EXPECT_EQ(cv::norm(as_mat(image->as<std::uint8_t>()), as_mat(plain.as<std::uint8_t>()), cv::NORM_INF), 0);
+}
+
 // The markers are all in place, the pixels between them are not.
 TEST(PictureFileJpeg, DamageBetweenTheMarkersIsNoticed) {
   const std::string whole = encode(".jpg", as_mat(picture(64, 48)));

@@ -16,6 +16,14 @@ struct Destroy {
 };
 using Decoder = std::unique_ptr<void, Destroy>;
 
+// Some cameras pad the picture's data; that nothing but the end follows (0xd9) means that all of it was read. The
+// decoder keeps the first of its warnings.
+bool is_harmless(const Decoder& decoder) {
+  const std::string_view said = tjGetErrorStr2(decoder.get());
+  return tjGetErrorCode(decoder.get()) == TJERR_WARNING &&
+         said.find("extraneous bytes before marker 0xd9") != std::string_view::npos;
+}
+
 template <class Pixel>
 Result<FrameImage> decode_as(const Decoder& decoder, std::string_view content, ImageSize size, PixelLayout layout) {
   constexpr int kFormat = std::is_same_v<Pixel, Rgb8> ? TJPF_RGB : TJPF_GRAY;
@@ -23,9 +31,10 @@ Result<FrameImage> decode_as(const Decoder& decoder, std::string_view content, I
   const int bytes_per_row = static_cast<int>(pixels.stride() * static_cast<std::ptrdiff_t>(sizeof(Pixel)));
   const auto* jpeg = reinterpret_cast<const unsigned char*>(content.data());
   const int fault = tjDecompress2(decoder.get(), jpeg, content.size(), reinterpret_cast<unsigned char*>(pixels.data()),
-                                  size.width, bytes_per_row, size.height, kFormat, TJFLAG_STOPONWARNING);
-  if (fault != 0)
+                                  size.width, bytes_per_row, size.height, kFormat, 0);
+  if (fault != 0 && !is_harmless(decoder)) {
     return failure(ErrorCode::input, std::string("JPEG file is damaged: ") + tjGetErrorStr2(decoder.get()));
+  }
   return FrameImage::own(std::move(pixels), {layout, 8, BitAlignment::low});
 }
 
