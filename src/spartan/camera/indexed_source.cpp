@@ -179,7 +179,7 @@ class IndexedSource : public FrameSource {
                                     fmt::format("{}: is {}x{}, camera '{}' takes {}x{}", file, image->width(),
                                                 image->height(), camera.name, camera.size.width, camera.size.height)));
     }
-    return interpret(std::move(*image), camera.pixel_format, shot.bits);
+    return interpret(*image, camera.pixel_format, shot.bits);
   }
 
   RecordingIndex index_;

@@ -11,6 +11,7 @@ namespace {
 
 std::vector<Stamp> stamps(const std::vector<std::int64_t>& ns) {
   std::vector<Stamp> made;
+  made.reserve(ns.size());
   for (const std::int64_t n : ns) made.push_back({n});
   return made;
 }
