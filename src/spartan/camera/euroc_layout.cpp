@@ -7,8 +7,8 @@
 
 #include "spartan/camera/recording_index.h"
 #include "spartan/camera/sensor_tables.h"
+#include "spartan/camera/shot_tables.h"
 #include "spartan/camera/stamp_order.h"
-#include "spartan/camera/table.h"
 #include "spartan/core/files.h"
 #include "spartan/rig/rig_files.h"
 
@@ -17,24 +17,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct ImageList {
-  std::vector<Stamp> stamps;
-  std::vector<std::string> files;
-};
-
-Result<ImageList> read_images(const fs::path& camera) {
+// With whole paths in place of the names.
+Result<EurocImages> read_images(const fs::path& camera) {
   auto table = TableReader::open((camera / "data.csv").string(), {});
   if (!table) return failure(table);
-  ImageList list;
-  for (;;) {
-    const auto row = table->next(2);
-    if (!row) return failure(row);
-    if (!*row) return list;
-    const auto stamp = parse_stamp_ns((**row)[0]);
-    if (!stamp) return table->fault("the first column is not a time in nanoseconds");
-    list.stamps.push_back(*stamp);
-    list.files.push_back((camera / "data" / std::string((**row)[1])).string());
-  }
+  auto images = read_euroc_images(std::move(*table));
+  if (!images) return failure(images);
+  for (std::string& file : images->files) file = (camera / "data" / file).string();
+  return images;
 }
 
 // The rotation of T_BS in a sensor.yaml; the identity where there is none.
@@ -47,7 +37,8 @@ Result<Eigen::Quaterniond> read_body_from_sensor(const std::string& path) {
   try {
     const YAML::Node transform = YAML::Load(*text)["T_BS"];
     if (!transform) return Eigen::Quaterniond::Identity();
-    const auto data = transform["data"].as<std::vector<double>>();
+    // Both forms are in use: {rows, cols, data: […]} and the plain list.
+    const auto data = (transform.IsMap() ? transform["data"] : transform).as<std::vector<double>>();
     if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS has not 16 numbers", path);
     Eigen::Matrix3d rotation;
     rotation << data[0], data[1], data[2], data[4], data[5], data[6], data[8], data[9], data[10];
@@ -58,7 +49,7 @@ Result<Eigen::Quaterniond> read_body_from_sensor(const std::string& path) {
   }
 }
 
-Shot make_shot(const StampMatch& match, const ImageList& left, const ImageList& right) {
+Shot make_shot(const StampMatch& match, const EurocImages& left, const EurocImages& right) {
   Shot shot;
   const Stamp any = match.left ? left.stamps[*match.left] : right.stamps[*match.right];
   shot.left_stamp = shot.right_stamp = any;

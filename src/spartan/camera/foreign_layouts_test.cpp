@@ -23,7 +23,7 @@ using testing::TemporaryFolder;
 
 const std::string kKittiCalib = "P0: 30 0 16 0 0 30 8 0 0 0 1 0\nP1: 30 0 16 -3 0 30 8 0 0 0 1 0\n";
 
-class Layouts : public ::testing::Test {
+class ForeignLayouts : public ::testing::Test {
  protected:
   void image(const std::string& name, int width = 32, int height = 16) {
     Image<std::uint8_t> picture(width, height);
@@ -63,7 +63,7 @@ class Layouts : public ::testing::Test {
 
 // --- KITTI odometry ---
 
-class KittiLayout : public Layouts {
+class KittiLayout : public ForeignLayouts {
  protected:
   KittiLayout() {
     folder_.write("calib.txt", kKittiCalib);
@@ -167,7 +167,7 @@ TEST_F(KittiLayout, CalibrationFaultsAreOfTheirOwnKind) {
 
 // --- KITTI raw ---
 
-class KittiRawLayout : public Layouts {
+class KittiRawLayout : public ForeignLayouts {
  protected:
   KittiRawLayout() {
     folder_.write("calib_cam_to_cam.txt",
@@ -211,7 +211,7 @@ TEST_F(KittiRawLayout, DatesThatMakeNoSense) {
 
 // --- EuRoC ---
 
-class EurocLayout : public Layouts {
+class EurocLayout : public ForeignLayouts {
  protected:
   EurocLayout() {
     for (const int camera : {0, 1}) {
@@ -274,7 +274,7 @@ TEST_F(EurocLayout, FaultsNameFileAndLine) {
 
 // --- which layout ---
 
-TEST_F(Layouts, WhatIsNoRecordingIsToldWhatWasLookedFor) {
+TEST_F(ForeignLayouts, WhatIsNoRecordingIsToldWhatWasLookedFor) {
   EXPECT_THAT(refusal(), HasSubstr("the folder is empty"));
   folder_.write("holiday.txt", "x");
   EXPECT_THAT(refusal(), HasSubstr("no layout of a recording that is known"));

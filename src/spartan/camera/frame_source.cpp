@@ -89,10 +89,15 @@ Result<LayoutChoice> choose_layout(const std::string& path, const OpenOptions& o
     layout->reason = fmt::format("{} asked for", name_of(*options.format));
     return *layout;
   }
+  std::optional<LayoutChoice> chosen;
   for (const FormatEntry& entry : kFormats) {
-    if (auto layout = entry.recognise(path, options)) return *layout;
+    const auto layout = entry.recognise(path, options);
+    if (layout && chosen)
+      chosen->reason += fmt::format("; --format {} is possible too: {}", entry.name, layout->reason);
+    if (layout && !chosen) chosen = layout;
   }
-  return failure(ErrorCode::input, "no layout of a recording that is known", path, kLookedFor);
+  if (!chosen) return failure(ErrorCode::input, "no layout of a recording that is known", path, kLookedFor);
+  return *chosen;
 }
 
 }  // namespace

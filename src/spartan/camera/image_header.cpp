@@ -64,7 +64,10 @@ std::optional<ImageSize> read_image_size(const std::string& path) {
   std::string content(kHeaderBytes, '\0');
   file.read(content.data(), static_cast<std::streamsize>(content.size()));
   content.resize(static_cast<std::size_t>(file.gcount()));
-  const std::string_view head = content;
+  return parse_image_size(content);
+}
+
+std::optional<ImageSize> parse_image_size(std::string_view head) {
   ImageSize size;
   if (head.starts_with("\x89PNG\r\n\x1a\n"sv)) size = png_size(head);
   if (head.starts_with("\xFF\xD8"sv)) size = jpeg_size(head);

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "spartan/core/image.h"
 
@@ -10,5 +11,7 @@ namespace spartan {
 
 /// From the header of a PNG, JPEG or PGM/PPM file; nothing where there is no such header.
 std::optional<ImageSize> read_image_size(const std::string& path);
+/// The same from the first bytes of a file.
+std::optional<ImageSize> parse_image_size(std::string_view head);
 
 }  // namespace spartan

@@ -6,7 +6,7 @@
 
 #include "spartan/camera/image_folder.h"
 #include "spartan/camera/recording_index.h"
-#include "spartan/camera/table.h"
+#include "spartan/camera/shot_tables.h"
 #include "spartan/rig/rig_files.h"
 
 namespace spartan {
@@ -19,16 +19,7 @@ constexpr std::int64_t kAssumedStepNs = 100'000'000;  // KITTI's cameras ran at 
 Result<std::vector<Stamp>> read_times(const std::string& path) {
   auto table = TableReader::open(path, {});
   if (!table) return failure(table);
-  std::vector<Stamp> stamps;
-  for (;;) {
-    const auto row = table->next(1);
-    if (!row) return failure(row);
-    if (!*row) return stamps;
-    const auto stamp = parse_decimal_seconds((**row)[0]);
-    if (!stamp) return table->fault(stamp.error().what);
-    if (!is_sane(*stamp)) return table->fault("the time is out of range");
-    stamps.push_back(*stamp);
-  }
+  return read_kitti_times(std::move(*table));
 }
 
 // Beside the images, or where the original data set keeps it: poses/06.txt beside sequences/06.

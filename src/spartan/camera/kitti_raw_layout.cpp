@@ -3,13 +3,11 @@
 // IJRR 2013; the development kit's readme.
 #include <fmt/format.h>
 
-#include <chrono>
 #include <filesystem>
 
 #include "spartan/camera/image_folder.h"
 #include "spartan/camera/recording_index.h"
-#include "spartan/camera/table.h"
-#include "spartan/core/files.h"
+#include "spartan/camera/shot_tables.h"
 #include "spartan/rig/rig_files.h"
 
 namespace spartan {
@@ -17,36 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// "2011-09-26 13:02:25.964389445" → nanoseconds since 1970.
-std::optional<Stamp> parse_date(std::string_view date, std::string_view time) {
-  const auto number = [](std::string_view text) { return parse_number<int>(text); };
-  if (date.size() != 10 || time.size() < 8) return std::nullopt;
-  const auto year = number(date.substr(0, 4)), month = number(date.substr(5, 2)), day = number(date.substr(8, 2));
-  const auto hour = number(time.substr(0, 2)), minute = number(time.substr(3, 2));
-  const auto second = parse_decimal_seconds(time.substr(6));
-  if (!year || !month || !day || !hour || !minute || !second) return std::nullopt;
-  namespace chrono = std::chrono;
-  const chrono::year_month_day ymd{chrono::year(*year), chrono::month(static_cast<unsigned>(*month)),
-                                   chrono::day(static_cast<unsigned>(*day))};
-  if (!ymd.ok() || *hour < 0 || *hour > 23 || *minute < 0 || *minute > 59) return std::nullopt;
-  const chrono::nanoseconds whole =
-      chrono::sys_days(ymd).time_since_epoch() + chrono::hours(*hour) + chrono::minutes(*minute);
-  const Stamp stamp{whole.count() + second->ns};
-  return is_sane(stamp) ? std::optional(stamp) : std::nullopt;
-}
-
 Result<std::vector<Stamp>> read_stamps(const std::string& path) {
-  auto table = TableReader::open(path, {.separator = ' ', .header = {}, .ends_with_newline = false});
+  auto table = TableReader::open(path, kitti_raw_times_format());
   if (!table) return failure(table);
-  std::vector<Stamp> stamps;
-  for (;;) {
-    const auto row = table->next(2);
-    if (!row) return failure(row);
-    if (!*row) return stamps;
-    const auto stamp = parse_date((**row)[0], (**row)[1]);
-    if (!stamp) return table->fault("is not a date and a time of day");
-    stamps.push_back(*stamp);
-  }
+  return read_kitti_raw_times(std::move(*table));
 }
 
 // One file a sample: 30 numbers, of which 11 … 13 are the acceleration and 17 … 19 the turn rate along x, y, z of the
@@ -61,7 +33,7 @@ class OxtsStream : public SampleStream {
       const fs::path file = folder_ / fmt::format("{:010}.txt", i);
       std::error_code error;
       if (!fs::exists(file, error)) continue;  // a drive may lack some
-      auto table = TableReader::open(file.string(), {.separator = ' ', .header = {}, .ends_with_newline = false});
+      auto table = TableReader::open(file.string(), kitti_raw_times_format());
       if (!table) return failure(table);
       const auto row = table->next(20);
       if (!row) return failure(row);

@@ -23,7 +23,7 @@ void set_fault(Shot& shot, FrameFault fault, std::string message) {
 
 bool has_file(const std::string& path) {
   std::error_code error;
-  return !path.empty() && fs::exists(path, error);
+  return !path.empty() && fs::is_regular_file(path, error);
 }
 
 void find_missing_files(Shot& shot) {
@@ -31,8 +31,11 @@ void find_missing_files(Shot& shot) {
   const bool left = has_file(shot.left_file), right = has_file(shot.right_file);
   if (left && right) return;
   const std::string& missing = left ? shot.right_file : shot.left_file;
+  const std::string what = missing.empty()
+                               ? fmt::format("frame {} names no {} image", shot.frame_id, left ? "right" : "left")
+                               : fmt::format("{}: is missing", missing);
   set_fault(shot, left ? FrameFault::right_missing : FrameFault::left_missing,
-            fmt::format("{}: is missing{}", missing, left || right ? "" : ", and so is the right image"));
+            what + (left || right ? "" : ", and so is the right image"));
 }
 
 // Marks what runs backwards among the shots of one pair and says when each is played: at its own stamp, or at that of

@@ -2,13 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <limits>
+#include <initializer_list>
 #include <map>
+#include <optional>
 
 #include "spartan/camera/spartan_format.h"
 #include "spartan/camera/table.h"
@@ -55,11 +57,38 @@ class TableFile {
 
 Status write_image(const std::string& path, const FrameImage& image) {
   const PixelFormat& format = image.format();
-  if (format.layout == PixelLayout::rgb) {
-    if (format.bits == 8) return write_png(path, image.as<Rgb8>());
-    return failure(ErrorCode::output, "colour of more than 8 bits cannot be recorded; record the Bayer image", path);
-  }
+  if (format.layout == PixelLayout::rgb) return write_png(path, image.as<Rgb8>());
   return format.bits > 8 ? write_png(path, image.as<std::uint16_t>()) : write_png(path, image.as<std::uint8_t>());
+}
+
+// Why the image of one eye would not be read back as it is; empty where it would.
+std::string misfit(const FrameImage& image, const Camera& camera) {
+  if (image.size() != camera.size) {
+    return fmt::format("is {}x{}, camera '{}' takes {}x{}", image.width(), image.height(), camera.name,
+                       camera.size.width, camera.size.height);
+  }
+  const PixelFormat& format = image.format();
+  if (format.layout == PixelLayout::rgb) {
+    return format.bits == 8 ? "" : "has colour of more than 8 bits, which cannot be recorded; record the Bayer image";
+  }
+  const PixelLayout expected =
+      camera.pixel_format.layout == PixelLayout::rgb ? PixelLayout::gray : camera.pixel_format.layout;
+  if (format.layout != expected) {
+    return fmt::format("is {}, the rig says that camera '{}' gives {}", name_of(format.layout), camera.name,
+                       name_of(expected));
+  }
+  if (format.bits > 8 && format.alignment != camera.pixel_format.alignment) {
+    return fmt::format("has its bits at the other end than the rig says of camera '{}'", camera.name);
+  }
+  return {};
+}
+
+bool is_folder_name(const std::string& name) {
+  return !name.empty() && name.front() != '.' && name.find_first_of("/\\,\"# \t\r\n") == std::string::npos;
+}
+
+bool all_finite(std::initializer_list<double> values) {
+  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
 }  // namespace
@@ -70,8 +99,42 @@ struct RecordingWriter::State {
   Rig rig;
   std::optional<TableFile> frames;
   std::map<std::string, TableFile> sensors;
+  std::map<std::string, Stamp> last;  // of each pair and each sensor
 
-  Status append_sensor(const std::string& name, const char* header, const std::string& row) {
+  tl::unexpected<Error> refuse(const std::string& who, Stamp stamp, const std::string& why) const {
+    return failure(ErrorCode::input, fmt::format("{} at {} s {}", who, to_decimal_seconds(stamp), why), folder);
+  }
+
+  // The stamp may be the next one of `who`.
+  Status check_stamp(const std::string& who, Stamp stamp) const {
+    if (!is_sane(stamp)) return refuse(who, stamp, "is out of the range of time");
+    const auto found = last.find(who);
+    if (found == last.end() || stamp > found->second) return {};
+    return refuse(who, stamp,
+                  fmt::format("does not come after the one before it, at {} s", to_decimal_seconds(found->second)));
+  }
+
+  Status check(const StereoFrame& frame) const {
+    const StereoPair* pair = rig.find_pair(frame.pair);
+    if (!pair) return failure(ErrorCode::input, "the rig has no pair '" + frame.pair + "'", folder);
+    if (Status s = check_stamp(frame.pair, frame.left_stamp); !s) return s;
+    if (!is_sane(frame.right_stamp)) return refuse(frame.pair, frame.right_stamp, "is out of the range of time");
+    if (!all_finite({frame.pan_rad, frame.tilt_rad, frame.exposure_us, frame.gain}))
+      return refuse(frame.pair, frame.left_stamp, "has an angle, exposure or gain that is not finite");
+    for (const auto& [image, camera] : {std::pair{&frame.left, &pair->left}, std::pair{&frame.right, &pair->right}}) {
+      const std::string why = misfit(*image, *rig.find_camera(*camera));
+      if (!why.empty()) return refuse("image of '" + *camera + "'", frame.left_stamp, why);
+    }
+    if (frame.left.format().bits != frame.right.format().bits)
+      return refuse(frame.pair, frame.left_stamp, "has eyes of different bits");
+    return {};
+  }
+
+  // A row of `stamp` and the numbers.
+  Status append_sensor(const std::string& name, const char* header, Stamp stamp,
+                       std::initializer_list<double> numbers) {
+    if (Status s = check_stamp(name, stamp); !s) return s;
+    if (!all_finite(numbers)) return refuse(name, stamp, "has a number that is not finite");
     auto found = sensors.find(name);
     if (found == sensors.end()) {
       if (Status s = make_folder(folder + "/sensors"); !s) return s;
@@ -79,6 +142,9 @@ struct RecordingWriter::State {
       if (!table) return failure(table);
       found = sensors.emplace(name, std::move(*table)).first;
     }
+    std::string row = std::to_string(stamp.ns);
+    for (const double number : numbers) row += fmt::format(",{}", number);
+    last[name] = stamp;
     return found->second.append(row);
   }
 };
@@ -91,8 +157,12 @@ RecordingWriter::~RecordingWriter() = default;
 Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const Rig& believed_rig,
                                                 const RecordingOptions& options) {
   if (Status s = believed_rig.validate("rig of the recording"); !s) return failure(s);
+  for (const StereoPair& pair : believed_rig.pairs) {
+    if (is_folder_name(pair.name)) continue;
+    return failure(ErrorCode::configuration, "the name of pair '" + pair.name + "' cannot be that of a folder", folder);
+  }
   std::error_code error;
-  if (fs::exists(folder, error) && !fs::is_empty(folder, error)) {
+  if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
     return failure(ErrorCode::output, "exists already and is left as it is", folder, "give another folder");
   }
   if (Status s = make_folder(folder); !s) return failure(s);
@@ -111,12 +181,12 @@ Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const
 }
 
 Status RecordingWriter::add(const StereoFrame& frame) {
-  if (!state_->rig.find_pair(frame.pair))
-    return failure(ErrorCode::output, "the rig has no pair '" + frame.pair + "'", state_->folder);
+  if (Status s = state_->check(frame); !s) return s;
   const std::string stem = fmt::format("images/{}/{}", frame.pair, frame.left_stamp.ns);
   const std::string left = stem + "_left.png", right = stem + "_right.png";
   if (Status s = write_image(state_->folder + "/" + left, frame.left); !s) return s;
   if (Status s = write_image(state_->folder + "/" + right, frame.right); !s) return s;
+  state_->last[frame.pair] = frame.left_stamp;
   return state_->frames->append(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", frame.frame_id, frame.position_id,
                                             frame.pair, frame.left_stamp.ns, frame.right_stamp.ns, left, right,
                                             to_degrees(frame.pan_rad), to_degrees(frame.tilt_rad), frame.exposure_us,
@@ -124,20 +194,19 @@ Status RecordingWriter::add(const StereoFrame& frame) {
 }
 
 Status RecordingWriter::add(const ImuSample& s) {
-  return state_->append_sensor("imu.csv", kImuHeader,
-                               fmt::format("{},{},{},{},{},{},{}", s.stamp.ns, s.gyro_rad_s.x(), s.gyro_rad_s.y(),
-                                           s.gyro_rad_s.z(), s.accel_m_s2.x(), s.accel_m_s2.y(), s.accel_m_s2.z()));
+  const Eigen::Vector3d &gyro = s.gyro_rad_s, &accel = s.accel_m_s2;
+  return state_->append_sensor("imu.csv", kImuHeader, s.stamp,
+                               {gyro.x(), gyro.y(), gyro.z(), accel.x(), accel.y(), accel.z()});
 }
 Status RecordingWriter::add(const WheelSample& s) {
-  return state_->append_sensor("wheels.csv", kWheelsHeader, fmt::format("{},{},{}", s.stamp.ns, s.left_m, s.right_m));
+  return state_->append_sensor("wheels.csv", kWheelsHeader, s.stamp, {s.left_m, s.right_m});
 }
 Status RecordingWriter::add(const CompassSample& s) {
-  return state_->append_sensor("compass.csv", kCompassHeader,
-                               fmt::format("{},{},{}", s.stamp.ns, s.heading_rad, s.sigma_rad));
+  return state_->append_sensor("compass.csv", kCompassHeader, s.stamp, {s.heading_rad, s.sigma_rad});
 }
 Status RecordingWriter::add(const InclinometerSample& s) {
-  return state_->append_sensor("inclinometer.csv", kInclinometerHeader,
-                               fmt::format("{},{},{},{}", s.stamp.ns, s.roll_rad, s.pitch_rad, s.sigma_rad));
+  return state_->append_sensor("inclinometer.csv", kInclinometerHeader, s.stamp,
+                               {s.roll_rad, s.pitch_rad, s.sigma_rad});
 }
 
 Status RecordingWriter::write_truth(const Rig& true_rig, const Trajectory& poses) {

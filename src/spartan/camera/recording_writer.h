@@ -17,11 +17,14 @@ struct RecordingOptions {
   double gravity_m_s2 = 9.81;
 };
 
-/// Makes the folder, then takes samples in any order of kinds, each kind in the order of its stamps.
-/// Everything given is on the disk after `finish()`; a recording that was not finished has no recording.yaml.
+/// Makes the folder, then takes samples in any order of kinds, each kind (and the shots of each pair) with stamps that
+/// increase. What is written reads back bit for bit; what would not is refused with code `input`: stamps that do not
+/// increase, numbers that are not finite, images that do not fit the rig's cameras. Nothing of it is recorded then.
+/// Everything given is in the files after `finish()`; a recording that was not finished has no recording.yaml.
 class RecordingWriter {
  public:
-  /// Code `output` where the folder exists and is not empty, or cannot be made.
+  /// Code `output` where the folder exists and is not empty, or cannot be made; `configuration` for a rig that is not
+  /// valid, or has a pair whose name cannot be a folder's.
   static Result<RecordingWriter> create(const std::string& folder, const Rig& believed_rig,
                                         const RecordingOptions& options);
   RecordingWriter(RecordingWriter&&) noexcept;

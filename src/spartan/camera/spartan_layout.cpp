@@ -1,12 +1,10 @@
 // Spartan recordings: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/formats.md, "Recording").
-#include <fmt/format.h>
-
 #include <filesystem>
 
 #include "spartan/camera/recording_index.h"
 #include "spartan/camera/sensor_tables.h"
+#include "spartan/camera/shot_tables.h"
 #include "spartan/camera/spartan_format.h"
-#include "spartan/camera/table.h"
 #include "spartan/rig/rig_files.h"
 
 namespace spartan {
@@ -14,57 +12,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Row = std::vector<std::string_view>;
-
-// One row of frames.csv; an error names the column.
-Result<Shot> read_shot(const fs::path& folder, const Rig& rig, const Row& row) {
-  const auto bad = [](const char* column, std::string_view text) {
-    return failure(ErrorCode::input, fmt::format("{} is '{}'", column, text.substr(0, 40)), {}, "see docs/formats.md");
-  };
-  const auto frame = parse_number<std::int64_t>(row[0]), position = parse_number<std::int64_t>(row[1]);
-  const auto left = parse_stamp_ns(row[3]), right = parse_stamp_ns(row[4]);
-  const auto pan = parse_degrees(row[7]), tilt = parse_degrees(row[8]);
-  const auto exposure = parse_number<double>(row[9]), gain = parse_number<double>(row[10]);
-  const auto bits = parse_number<int>(row[11]);
-  if (!frame) return bad("frame_id", row[0]);
-  if (!position) return bad("position_id", row[1]);
-  if (!rig.find_pair(std::string(row[2]))) return bad("pair (which the rig does not have)", row[2]);
-  if (!left) return bad("left_stamp_ns", row[3]);
-  if (!right) return bad("right_stamp_ns", row[4]);
-  if (!pan) return bad("pan_deg", row[7]);
-  if (!tilt) return bad("tilt_deg", row[8]);
-  if (!exposure) return bad("exposure_us", row[9]);
-  if (!gain) return bad("gain", row[10]);
-  if (!bits || *bits < 8 || *bits > 16) return bad("bits", row[11]);
-  Shot shot;
-  shot.frame_id = *frame;
-  shot.position_id = *position;
-  shot.pair = std::string(row[2]);
-  shot.left_stamp = *left;
-  shot.right_stamp = *right;
-  shot.left_file = (folder / std::string(row[5])).string();
-  shot.right_file = (folder / std::string(row[6])).string();
-  shot.pan_rad = *pan;
-  shot.tilt_rad = *tilt;
-  shot.exposure_us = *exposure;
-  shot.gain = *gain;
-  shot.bits = *bits;
-  return shot;
-}
-
 Result<std::vector<Shot>> read_shots(const fs::path& folder, const Rig& rig) {
-  auto table = TableReader::open((folder / "frames.csv").string(),
-                                 {.separator = ',', .header = kFramesHeader, .ends_with_newline = true});
+  auto table = TableReader::open((folder / "frames.csv").string(), spartan_shots_format());
   if (!table) return failure(table);
-  std::vector<Shot> shots;
-  for (;;) {
-    const auto row = table->next(12);
-    if (!row) return failure(row);
-    if (!*row) return shots;
-    auto shot = read_shot(folder, rig, **row);
-    if (!shot) return table->fault(shot.error().what);
-    shots.push_back(std::move(*shot));
-  }
+  return read_spartan_shots(std::move(*table), folder.string(), rig);
 }
 
 }  // namespace

@@ -3,14 +3,17 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <numbers>
+#include <sstream>
 
 namespace spartan {
 namespace {
 
 constexpr std::int64_t kLargestStamp = std::numeric_limits<std::int64_t>::max() / 2;
 constexpr std::string_view kBlanks = " \t\r";
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 std::string_view trim(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(kBlanks);
@@ -41,30 +44,39 @@ std::string quote(std::string_view text) {
 Result<TableReader> TableReader::open(const std::string& path, TableFormat format) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return failure(ErrorCode::input, "is missing, or no file", path);
-  TableReader table(path, std::move(format));
-  table.file_.open(path, std::ios::binary);
-  if (!table.file_) return failure(ErrorCode::input, "cannot be read", path);
-  if (table.format_.header.empty()) return table;
-  std::getline(table.file_, table.line_);
-  table.line_number_ = 1;
-  if (trim(table.line_) != table.format_.header) {
-    return failure(ErrorCode::input,
-                   fmt::format("the columns are {}, expected are '{}'", quote(trim(table.line_)), table.format_.header),
-                   table.place());
+  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
+  if (!*file) return failure(ErrorCode::input, "cannot be read", path);
+  return begin(path, std::move(format), std::move(file));
+}
+
+Result<TableReader> TableReader::over(std::string text, const std::string& name, TableFormat format) {
+  return begin(name, std::move(format), std::make_unique<std::istringstream>(std::move(text)));
+}
+
+Result<TableReader> TableReader::begin(std::string path, TableFormat format, std::unique_ptr<std::istream> stream) {
+  TableReader table(std::move(path), std::move(format), std::move(stream));
+  const std::string header = table.format_.header;
+  if (header.empty()) return table;
+  const auto first = table.next();
+  if (!first) return failure(first);
+  if (!*first)
+    return failure(ErrorCode::input, fmt::format("is empty, expected are the columns '{}'", header), table.path_);
+  if (**first != split(header, table.format_.separator)) {
+    return table.fault(fmt::format("the columns are {}, expected are '{}'", quote(trim(table.line_)), header));
   }
   return table;
 }
 
 Result<std::optional<std::vector<std::string_view>>> TableReader::next() {
-  while (std::getline(file_, line_)) {
-    ++line_number_;
-    const bool broken_off = file_.eof();
+  while (std::getline(*stream_, line_)) {
+    if (++line_number_ == 1 && line_.starts_with(kByteOrderMark)) line_.erase(0, kByteOrderMark.size());
+    const bool broken_off = stream_->eof();
     const std::string_view line = trim(line_);
-    if (line.empty() || (format_.header.empty() && line.front() == '#')) continue;
+    if (line.empty() || line.front() == '#') continue;
     if (broken_off && format_.ends_with_newline) return fault("the file breaks off in this line");
     return split(line, format_.separator);
   }
-  if (file_.bad()) return failure(ErrorCode::input, "cannot be read to its end", path_);
+  if (stream_->bad()) return failure(ErrorCode::input, "cannot be read to its end", path_);
   return std::nullopt;
 }
 

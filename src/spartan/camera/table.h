@@ -4,8 +4,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <initializer_list>
+#include <istream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,15 +20,18 @@ namespace spartan {
 /// How a table is written.
 struct TableFormat {
   char separator = ',';            ///< ' ': any run of blanks
-  std::string header;              ///< must be the first line; empty: lines beginning with '#' are comments
+  std::string header;              ///< names of the columns, must be the first row; empty: there is none
   bool ends_with_newline = false;  ///< true: a last line without one was broken off
 };
 
-/// Reads rows in constant memory. Empty lines do not count; blanks around fields and carriage returns are taken off.
+/// Reads rows in constant memory. Empty lines and lines that begin with '#' do not count; blanks around fields,
+/// carriage returns and a byte-order mark are taken off.
 class TableReader {
  public:
   /// Code `input` where the file cannot be read or has another header.
   static Result<TableReader> open(const std::string& path, TableFormat format);
+  /// The same over text in memory; `name` stands in errors.
+  static Result<TableReader> over(std::string text, const std::string& name, TableFormat format);
 
   /// The fields of the next row, valid until the next call; nothing at the end.
   Result<std::optional<std::vector<std::string_view>>> next();
@@ -42,10 +45,12 @@ class TableReader {
   tl::unexpected<Error> fault(std::string what) const { return failure(ErrorCode::input, std::move(what), place()); }
 
  private:
-  TableReader(std::string path, TableFormat format) : path_(std::move(path)), format_(std::move(format)) {}
+  static Result<TableReader> begin(std::string path, TableFormat format, std::unique_ptr<std::istream> stream);
+  TableReader(std::string path, TableFormat format, std::unique_ptr<std::istream> stream)
+      : path_(std::move(path)), format_(std::move(format)), stream_(std::move(stream)) {}
   std::string path_;
   TableFormat format_;
-  std::ifstream file_;
+  std::unique_ptr<std::istream> stream_;
   std::string line_;
   int line_number_ = 0;
 };

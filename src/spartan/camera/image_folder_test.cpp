@@ -1,0 +1,106 @@
+#include "spartan/camera/image_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "spartan/testing/tiny_recordings.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Names of the files of both eyes, "-" where an eye has none.
+class ImageFolder : public ::testing::Test {
+ protected:
+  ImageFolder() {
+    std::filesystem::create_directories(folder_.path() + "/l");
+    std::filesystem::create_directories(folder_.path() + "/r");
+  }
+  void put(const std::string& left, const std::string& right) {
+    if (!left.empty()) folder_.write("l/" + left, "");
+    if (!right.empty()) folder_.write("r/" + right, "");
+  }
+  std::vector<std::string> number(std::optional<std::size_t> announced) {
+    images_ = number_images(folder_.path() + "/l", folder_.path() + "/r", announced);
+    const auto name = [](const std::string& path) {
+      return path.empty() ? std::string("-") : std::filesystem::path(path).filename().string();
+    };
+    std::vector<std::string> names;
+    for (const ImageFiles& shot : images_.shots) names.push_back(name(shot.left) + " " + name(shot.right));
+    return names;
+  }
+  testing::TemporaryFolder folder_;
+  NumberedImages images_;
+};
+
+TEST_F(ImageFolder, NumbersSayTheShot) {
+  put("000000.png", "000000.png");
+  put("000002.png", "000001.png");
+  EXPECT_THAT(number(4), ElementsAre("000000.png 000000.png", "- 000001.png", "000002.png -", "- -"));
+  EXPECT_THAT(images_.remarks, IsEmpty());
+  EXPECT_THAT(number(std::nullopt), ElementsAre("000000.png 000000.png", "- 000001.png", "000002.png -"));
+}
+
+TEST_F(ImageFolder, ImagesBeyondTheAnnouncedOnesAreSaid) {
+  put("0.png", "0.png");
+  put("5.png", "5.png");
+  EXPECT_THAT(number(2), ElementsAre("0.png 0.png", "- -"));
+  ASSERT_EQ(images_.remarks.size(), 1U);
+  EXPECT_THAT(images_.remarks[0], HasSubstr("2 images lie beyond the 2 announced shots"));
+}
+
+TEST_F(ImageFolder, APieceOfARecordingCountsFromItsFirstImage) {
+  put("000150.png", "000150.png");
+  put("000151.png", "000151.png");
+  EXPECT_THAT(number(2), ElementsAre("000150.png 000150.png", "000151.png 000151.png"));
+  EXPECT_EQ(images_.first_number, 150);
+  EXPECT_THAT(images_.remarks, ElementsAre(HasSubstr("begin at 150")));
+}
+
+TEST_F(ImageFolder, NamesThatAreNoNumbersCountInTheirOrder) {
+  put("b.png", "b.png");
+  put("a.png", "");
+  EXPECT_THAT(number(std::nullopt), ElementsAre("a.png -", "b.png b.png"));
+  EXPECT_THAT(images_.remarks, ElementsAre(HasSubstr("no numbers that count shots")));
+}
+
+// Stamps as names must not be taken for a billion missing shots.
+TEST_F(ImageFolder, StampsAsNamesAreNoNumbers) {
+  put("1403715273262142976.png", "1403715273262142976.png");
+  put("1403715273312143104.png", "1403715273312143104.png");
+  EXPECT_EQ(number(std::nullopt).size(), 2U);
+  put("7.png", "9000000.png");
+  EXPECT_EQ(number(std::nullopt).size(), 4U);
+}
+
+TEST_F(ImageFolder, OtherFilesDoNotCountAndPngComesFirst) {
+  put("0.jpg", "0.JPG");
+  put("0.png", "");
+  put("readme.txt", ".DS_Store");
+  EXPECT_THAT(number(std::nullopt), ElementsAre("0.png 0.JPG"));
+}
+
+TEST_F(ImageFolder, EmptyAndMissingFoldersHoldNoImage) {
+  EXPECT_THAT(number(std::nullopt), IsEmpty());
+  EXPECT_EQ(number_images(folder_.path() + "/none", folder_.path() + "/none", 3).shots.size(), 3U);
+}
+
+TEST_F(ImageFolder, TheSizeOfMostImagesCounts) {
+  for (int i = 0; i < 5; ++i) {
+    testing::write_tiny_png(folder_.file("l/" + std::to_string(i) + ".png"), 1,
+                            i == 0 ? ImageSize{9, 9} : ImageSize{12, 8});
+  }
+  folder_.write("l/5.png", "nonsense");
+  number(std::nullopt);
+  EXPECT_EQ(common_image_size(images_.shots), (ImageSize{12, 8}));
+  EXPECT_FALSE(common_image_size({}));
+  EXPECT_FALSE(common_image_size({{"none.png", "none.png"}}));
+}
+
+}  // namespace
+}  // namespace spartan
