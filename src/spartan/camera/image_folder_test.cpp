@@ -31,6 +31,7 @@ class ImageFolder : public ::testing::Test {
       return path.empty() ? std::string("-") : std::filesystem::path(path).filename().string();
     };
     std::vector<std::string> names;
+    names.reserve(images_.shots.size());
     for (const ImageFiles& shot : images_.shots) names.push_back(name(shot.left) + " " + name(shot.right));
     return names;
   }

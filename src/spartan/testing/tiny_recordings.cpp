@@ -131,11 +131,13 @@ Played play(FrameSource& source) {
 
 std::vector<std::int64_t> ids_of(const std::vector<StereoFrame>& frames) {
   std::vector<std::int64_t> ids;
+  ids.reserve(frames.size());
   for (const StereoFrame& frame : frames) ids.push_back(frame.frame_id);
   return ids;
 }
 std::vector<std::int64_t> ids_of(const std::vector<MissingFrame>& missing) {
   std::vector<std::int64_t> ids;
+  ids.reserve(missing.size());
   for (const MissingFrame& frame : missing) ids.push_back(frame.frame_id);
   return ids;
 }
