@@ -1,19 +1,71 @@
 #include "spartan/core/threads.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
+#include <thread>
+#include <vector>
+
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define SPARTAN_THREAD_SANITIZER 1
+#endif
+#endif
 
 namespace spartan {
 
+#ifdef SPARTAN_THREAD_SANITIZER
+
+// TBB is not built for the thread sanitizer, which so would take its tasks for races. Plain threads do the same work.
 struct Workers::Arena {
-  explicit Arena(int threads) : tasks(threads) {}
-  tbb::task_arena tasks;
+  explicit Arena(int threads) : threads_(threads) {}
+
+  void run(int parts, const std::function<void(int)>& part) const {
+    std::atomic<int> next{0};
+    std::exception_ptr fault;
+    std::mutex fault_lock;
+    const auto work = [&] {
+      for (int i = next++; i < parts; i = next++) {
+        try {
+          part(i);
+        } catch (...) {
+          const std::lock_guard lock(fault_lock);
+          fault = std::current_exception();
+        }
+      }
+    };
+    std::vector<std::thread> others;
+    others.reserve(static_cast<std::size_t>(threads_ - 1));
+    for (int i = 1; i < threads_; ++i) others.emplace_back(work);
+    work();
+    for (std::thread& other : others) other.join();
+    if (fault) std::rethrow_exception(fault);
+  }
+
+ private:
+  int threads_;
 };
+
+#else
+
+struct Workers::Arena {
+  explicit Arena(int threads) : tasks_(threads) {}
+
+  void run(int parts, const std::function<void(int)>& part) {
+    tasks_.execute([&] { tbb::parallel_for(0, parts, 1, part, tbb::simple_partitioner{}); });
+  }
+
+ private:
+  tbb::task_arena tasks_;
+};
+
+#endif
 
 Workers::Workers(int threads) : threads_(threads) {
   if (threads < 1) throw std::invalid_argument("Workers: at least one thread is needed");
@@ -32,7 +84,7 @@ void Workers::for_each_part(int begin, int end, int grain, const std::function<v
     for (int part = 0; part < parts; ++part) run_part(part);
     return;
   }
-  arena_->tasks.execute([&] { tbb::parallel_for(0, parts, 1, run_part, tbb::simple_partitioner{}); });
+  arena_->run(parts, run_part);
 }
 
 void Workers::run_both(const std::function<void()>& first, const std::function<void()>& second) const {
@@ -41,7 +93,7 @@ void Workers::run_both(const std::function<void()>& first, const std::function<v
     second();
     return;
   }
-  arena_->tasks.execute([&] { tbb::parallel_invoke(first, second); });
+  arena_->run(2, [&](int part) { part == 0 ? first() : second(); });
 }
 
 void bound_third_party_threads(int threads) {
