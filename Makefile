@@ -2,7 +2,7 @@
 .PHONY: help demo test build bench format lint coverage clean
 
 help:
-	@echo "make demo      build, then run the main job on a short drive (or INPUT=path); results in demo_output"
+	@echo "make demo      build, then a drive over a simulated Mars (or INPUT=path); demo_output/report.html shows it"
 	@echo "make test      build, then run the fast tests"
 	@echo "make build     the program: build/release/bin/spartan"
 	@echo "make bench     all benchmarks; make bench-NAME: the one of bench/NAME.cpp"
@@ -17,7 +17,7 @@ build:
 
 demo:
 	./setup build
-	scripts/build release spartan_program spartan_synthesize_drive
+	scripts/build release spartan_program
 	scripts/demo
 
 test:

@@ -20,4 +20,19 @@ foreach(package IN LISTS SPARTAN_PACKAGES)
 endforeach()
 set(SPARTAN_OPENCV opencv_core opencv_imgproc opencv_imgcodecs)
 
+
+# Optional; what needs them says so when they are absent.
+set(SPARTAN_OPTIONAL_PACKAGES "embree 3.13" "GDAL 3.6")  # the simulator; GeoTIFF
+foreach(package IN LISTS SPARTAN_OPTIONAL_PACKAGES)
+  separate_arguments(arguments UNIX_COMMAND "${package}")
+  find_package(${arguments} QUIET)
+  list(GET arguments 0 name)
+  if(${name}_FOUND)
+    list(APPEND SPARTAN_PACKAGES "${package}")
+  endif()
+endforeach()
+if(GDAL_FOUND)
+  set(SPARTAN_GDAL GDAL::GDAL)
+endif()
+
 find_package(CLI11 REQUIRED)  # the program only

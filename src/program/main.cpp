@@ -19,12 +19,14 @@ LogLevel level_of(const Context& context) {
 }
 
 void add_verbs(CLI::App& app, Context& context) {
+  add_demo(app, context);
   add_run(app, context);
   add_stereo(app, context);
   add_evaluate(app, context);
   add_rig(app, context);
   add_config(app, context);
   add_export(app, context);
+  add_simulate(app, context);
 }
 
 int run(int argc, char** argv) {

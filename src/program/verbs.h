@@ -7,11 +7,13 @@
 
 namespace spartan::program {
 
+void add_demo(CLI::App& app, Context& context);
 void add_stereo(CLI::App& app, Context& context);
 void add_run(CLI::App& app, Context& context);
 void add_rig(CLI::App& app, Context& context);
 void add_config(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
 void add_evaluate(CLI::App& app, Context& context);
+void add_simulate(CLI::App& app, Context& context);
 
 }  // namespace spartan::program

@@ -48,7 +48,9 @@ TEST(ImageHeader, NothingWhereThereIsNoHeader) {
     const std::string file = encoded(extension, 61, 43);
     for (std::size_t size = 0; size < std::min<std::size_t>(file.size(), 400); ++size) {
       const auto cut = parse_image_size(std::string_view(file).substr(0, size));
-      if (cut && extension != std::string(".pgm")) EXPECT_EQ(*cut, (ImageSize{61, 43})) << extension << " " << size;
+      if (cut && extension != std::string(".pgm")) {
+        EXPECT_EQ(*cut, (ImageSize{61, 43})) << extension << " " << size;
+      }
     }
   }
 }

@@ -11,6 +11,7 @@
 #include <initializer_list>
 #include <map>
 #include <optional>
+#include <vector>
 
 #include "spartan/camera/spartan_format.h"
 #include "spartan/camera/table.h"
@@ -83,6 +84,27 @@ std::string misfit(const FrameImage& image, const Camera& camera) {
   return {};
 }
 
+constexpr const char* kRowsBefore = "/frames.csv.before";
+
+// The whole rows of a frames.csv that may break off in its last one.
+std::map<std::string, std::string> rows_by_left_image(const std::string& table) {
+  std::map<std::string, std::string> rows;
+  constexpr std::size_t kColumns = 12, kLeft = 5;
+  for (std::size_t from = table.find('\n') + 1, to; (to = table.find('\n', from)) != std::string::npos; from = to + 1) {
+    const std::string row = table.substr(from, to - from);
+    std::vector<std::string> fields(1);
+    for (const char c : row) {
+      if (c == ',') {
+        fields.emplace_back();
+      } else {
+        fields.back() += c;
+      }
+    }
+    if (fields.size() == kColumns) rows[fields[kLeft]] = row;
+  }
+  return rows;
+}
+
 bool is_folder_name(const std::string& name) {
   return !name.empty() && name.front() != '.' && name.find_first_of("/\\,\"# \t\r\n") == std::string::npos;
 }
@@ -98,6 +120,7 @@ struct RecordingWriter::State {
   RecordingOptions options;
   Rig rig;
   std::optional<TableFile> frames;
+  std::map<std::string, std::string> rows_before;  // of a resumed recording: left image → row
   std::map<std::string, TableFile> sensors;
   std::map<std::string, Stamp> last;  // of each pair and each sensor
 
@@ -156,14 +179,41 @@ RecordingWriter::~RecordingWriter() = default;
 
 Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const Rig& believed_rig,
                                                 const RecordingOptions& options) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
+    return failure(ErrorCode::output, "exists already and is left as it is", folder, "give another folder");
+  }
+  return open(folder, believed_rig, options, {});
+}
+
+Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const Rig& believed_rig,
+                                                const RecordingOptions& options) {
+  std::error_code error;
+  std::map<std::string, std::string> rows;
+  if (const auto table = read_file(folder + "/frames.csv")) {
+    if (fs::exists(folder + "/recording.yaml", error)) {
+      return failure(ErrorCode::output, "is a whole recording and is left as it is", folder, "give another folder");
+    }
+    // A resumed recording may be cut off too: the rows it has not come to yet are kept beside.
+    rows = rows_by_left_image(*table);
+    if (const auto kept = read_file(folder + kRowsBefore)) rows.merge(rows_by_left_image(*kept));
+    std::string text = std::string(kFramesHeader) + "\n";
+    for (const auto& [image, row] : rows) text += row + "\n";
+    if (Status s = write_file_atomically(folder + kRowsBefore, text); !s) return failure(s);
+  } else if (fs::exists(folder, error) && !fs::is_empty(folder, error)) {
+    return failure(ErrorCode::output, "is no recording that was begun, and is left as it is", folder,
+                   "give another folder");
+  }
+  return open(folder, believed_rig, options, std::move(rows));
+}
+
+Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const Rig& believed_rig,
+                                              const RecordingOptions& options,
+                                              std::map<std::string, std::string> rows_before) {
   if (Status s = believed_rig.validate("rig of the recording"); !s) return failure(s);
   for (const StereoPair& pair : believed_rig.pairs) {
     if (is_folder_name(pair.name)) continue;
     return failure(ErrorCode::configuration, "the name of pair '" + pair.name + "' cannot be that of a folder", folder);
-  }
-  std::error_code error;
-  if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
-    return failure(ErrorCode::output, "exists already and is left as it is", folder, "give another folder");
   }
   if (Status s = make_folder(folder); !s) return failure(s);
   for (const StereoPair& pair : believed_rig.pairs) {
@@ -177,7 +227,23 @@ Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const
   state->options = options;
   state->rig = believed_rig;
   state->frames.emplace(std::move(*frames));
+  state->rows_before = std::move(rows_before);
   return RecordingWriter(std::move(state));
+}
+
+Result<bool> RecordingWriter::take_over(const std::string& pair, Stamp left_stamp) {
+  const std::string stem = fmt::format("images/{}/{}", pair, left_stamp.ns);
+  const auto row = state_->rows_before.find(stem + "_left.png");
+  std::error_code error;
+  if (row == state_->rows_before.end() || !fs::exists(state_->folder + "/" + stem + "_left.png", error) ||
+      !fs::exists(state_->folder + "/" + stem + "_right.png", error)) {
+    return false;
+  }
+  if (Status s = state_->check_stamp(pair, left_stamp); !s) return failure(s);
+  state_->last[pair] = left_stamp;
+  if (Status s = state_->frames->append(row->second); !s) return failure(s);
+  if (Status s = state_->frames->flush(); !s) return failure(s);
+  return true;
 }
 
 Status RecordingWriter::add(const StereoFrame& frame) {
@@ -187,10 +253,12 @@ Status RecordingWriter::add(const StereoFrame& frame) {
   if (Status s = write_image(state_->folder + "/" + left, frame.left); !s) return s;
   if (Status s = write_image(state_->folder + "/" + right, frame.right); !s) return s;
   state_->last[frame.pair] = frame.left_stamp;
-  return state_->frames->append(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", frame.frame_id, frame.position_id,
-                                            frame.pair, frame.left_stamp.ns, frame.right_stamp.ns, left, right,
-                                            to_degrees(frame.pan_rad), to_degrees(frame.tilt_rad), frame.exposure_us,
-                                            frame.gain, frame.left.format().bits));
+  const std::string row =
+      fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", frame.frame_id, frame.position_id, frame.pair,
+                  frame.left_stamp.ns, frame.right_stamp.ns, left, right, to_degrees(frame.pan_rad),
+                  to_degrees(frame.tilt_rad), frame.exposure_us, frame.gain, frame.left.format().bits);
+  if (Status s = state_->frames->append(row); !s) return s;
+  return state_->frames->flush();
 }
 
 Status RecordingWriter::add(const ImuSample& s) {
@@ -237,6 +305,8 @@ Status RecordingWriter::finish() {
   for (auto& [name, table] : state_->sensors) {
     if (Status s = table.flush(); !s) return s;
   }
+  std::error_code ignored;
+  fs::remove(state_->folder + kRowsBefore, ignored);
   const RecordingFile file{.schema = 1, .about = state_->options};
   return write_file_atomically(state_->folder + "/recording.yaml", dump_options(file));
 }

@@ -1,6 +1,7 @@
 // Writes Spartan recordings (docs/formats.md, "Recording").
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 
@@ -20,18 +21,25 @@ struct RecordingOptions {
 /// Makes the folder, then takes samples in any order of kinds, each kind (and the shots of each pair) with stamps that
 /// increase. What is written reads back bit for bit; what would not is refused with code `input`: stamps that do not
 /// increase, numbers that are not finite, images that do not fit the rig's cameras. Nothing of it is recorded then.
-/// Everything given is in the files after `finish()`; a recording that was not finished has no recording.yaml.
+/// A shot is in the files when `add` returns, everything else after `finish()`; a recording that was not finished has
+/// no recording.yaml.
 class RecordingWriter {
  public:
   /// Code `output` where the folder exists and is not empty, or cannot be made; `configuration` for a rig that is not
   /// valid, or has a pair whose name cannot be a folder's.
   static Result<RecordingWriter> create(const std::string& folder, const Rig& believed_rig,
                                         const RecordingOptions& options);
+  /// Goes on with a recording that `create` made for the same rig and that was not finished: shots whose row and
+  /// images are there can be taken over; everything else is written again. Makes the recording where there is none.
+  static Result<RecordingWriter> resume(const std::string& folder, const Rig& believed_rig,
+                                        const RecordingOptions& options);
   RecordingWriter(RecordingWriter&&) noexcept;
   RecordingWriter& operator=(RecordingWriter&&) noexcept;
   ~RecordingWriter();
 
   Status add(const StereoFrame& frame);
+  /// Takes over a shot that the resumed recording holds whole; false where it does not.
+  Result<bool> take_over(const std::string& pair, Stamp left_stamp);
   Status add(const ImuSample& sample);
   Status add(const WheelSample& sample);
   Status add(const CompassSample& sample);
@@ -49,6 +57,8 @@ class RecordingWriter {
  private:
   struct State;
   explicit RecordingWriter(std::unique_ptr<State> state);
+  static Result<RecordingWriter> open(const std::string& folder, const Rig& believed_rig,
+                                      const RecordingOptions& options, std::map<std::string, std::string> rows_before);
   std::unique_ptr<State> state_;
 };
 

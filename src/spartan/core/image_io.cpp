@@ -37,20 +37,25 @@ FrameImage own(cv::Mat& mat, PixelLayout layout) {
                          {layout, mat.depth() == CV_16U ? 16 : 8, BitAlignment::low});
 }
 
-Status write_encoded_png(const std::string& path, const cv::Mat& mat) {
+Result<std::string> png_of(const cv::Mat& mat) {
   std::vector<std::uint8_t> png;
   try {
     cv::imencode(".png", mat, png);
   } catch (const cv::Exception& e) {
-    return failure(ErrorCode::internal, "cannot be encoded: " + e.msg, path);
+    return failure(ErrorCode::internal, "a picture cannot be encoded: " + e.msg);
   }
-  return write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
+  return std::string(png.begin(), png.end());
 }
 
-Status write_rgb_png(const std::string& path, const cv::Mat& rgb) {
+Result<std::string> png_of_rgb(const cv::Mat& rgb) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  return write_encoded_png(path, bgr);
+  return png_of(bgr);
+}
+
+Status write_encoded(const std::string& path, const Result<std::string>& png) {
+  if (!png) return failure(ErrorCode::internal, png.error().what, path);
+  return write_file_atomically(path, *png);
 }
 
 // "Pf\n<width> <height>\n<scale>\n": the next word of the header, its separator taken too.
@@ -119,17 +124,24 @@ Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
   return Image<std::uint8_t>::copy_of(as_view<std::uint8_t>(mat));
 }
 
+Result<std::string> encode_png(ImageView<const std::uint8_t> image) {
+  return png_of(as_mat(image));
+}
+Result<std::string> encode_png(ImageView<const Rgb8> image) {
+  return png_of_rgb(as_mat(image));
+}
+
 Status write_png(const std::string& path, ImageView<const std::uint8_t> image) {
-  return write_encoded_png(path, as_mat(image));
+  return write_encoded(path, png_of(as_mat(image)));
 }
 Status write_png(const std::string& path, ImageView<const std::uint16_t> image) {
-  return write_encoded_png(path, as_mat(image));
+  return write_encoded(path, png_of(as_mat(image)));
 }
 Status write_png(const std::string& path, ImageView<const Rgb8> image) {
-  return write_rgb_png(path, as_mat(image));
+  return write_encoded(path, png_of_rgb(as_mat(image)));
 }
 Status write_png(const std::string& path, ImageView<const Rgb16> image) {
-  return write_rgb_png(path, as_mat(image));
+  return write_encoded(path, png_of_rgb(as_mat(image)));
 }
 
 Status write_pfm(const std::string& path, ImageView<const float> image) {

@@ -26,6 +26,10 @@ Status write_png(const std::string& path, ImageView<const std::uint16_t> image);
 Status write_png(const std::string& path, ImageView<const Rgb8> image);
 Status write_png(const std::string& path, ImageView<const Rgb16> image);
 
+/// A PNG file's content.
+Result<std::string> encode_png(ImageView<const std::uint8_t> image);
+Result<std::string> encode_png(ImageView<const Rgb8> image);
+
 /// Single-channel PFM ("Pf"), little endian, bottom row first; NaN is written as +inf (unknown).
 Status write_pfm(const std::string& path, ImageView<const float> image);
 /// Reads "Pf" of either byte order; +inf becomes NaN.

@@ -22,6 +22,7 @@ class Tree {
   std::string name;
   bool has_lines = true;  // false: text of a command line
   std::vector<Level> levels;
+  std::vector<YAML::Node> lists;  // open ones, innermost last
   std::vector<std::string> faults;
 
   std::string place(const YAML::Node& node, std::string_view key) const {
@@ -166,6 +167,33 @@ void Reader::leave() {
   tree_->levels.pop_back();
 }
 
+std::optional<std::size_t> Reader::open_list(std::string_view key) {
+  const auto node = tree_->find(key);
+  if (!node) return std::nullopt;
+  if (!node->IsSequence()) {
+    tree_->fault(*node, key, "must be a list of groups of keys");
+    return std::nullopt;
+  }
+  tree_->lists.push_back(*node);
+  return node->size();
+}
+
+bool Reader::enter_item(std::string_view key, std::size_t index) {
+  const YAML::Node list = tree_->lists.back();
+  const YAML::Node item = list[index];
+  const std::string name = fmt::format("{}[{}]", key, index);
+  if (!item.IsMap()) {
+    tree_->fault(item, name, "must be a group of keys");
+    return false;
+  }
+  tree_->levels.push_back({item, tree_->levels.back().prefix + name + ".", {}});
+  return true;
+}
+
+void Reader::close_list() {
+  tree_->lists.pop_back();
+}
+
 Status Reader::finish() {
   tree_->report_unknown_and_repeated();
   if (tree_->faults.empty()) return {};
@@ -193,6 +221,12 @@ void Lister::field(std::string_view key, const std::string& value, std::string_v
 }
 void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds) {
   lines.push_back({prefix_ + std::string(key), fmt::format("[{}]", fmt::join(value, ", ")), std::string(meaning)});
+}
+
+std::string Lister::in_flow_style(const std::vector<OptionLine>& lines) {
+  std::string text;
+  for (const OptionLine& line : lines) text += fmt::format("{}{}: {}", text.empty() ? "" : ", ", line.key, line.value);
+  return "{" + text + "}";
 }
 
 Result<std::shared_ptr<Tree>> parse(const std::string& text, const std::string& name) {
@@ -261,3 +295,24 @@ std::string to_yaml(const std::vector<OptionLine>& lines) {
 }
 
 }  // namespace spartan::options_detail
+
+namespace spartan {
+
+std::string place_of_option(const std::string& text, const std::string& name, const std::string& key) {
+  const std::string nowhere = fmt::format("{}: {}", name, key);
+  try {
+    YAML::Node node = YAML::Load(text);
+    for (const std::string& part : options_detail::split_key(key)) {
+      if (!node.IsMap()) return nowhere;
+      const YAML::Node map = node;
+      const YAML::Node inner = map[part];
+      if (!inner.IsDefined()) return nowhere;
+      node.reset(inner);
+    }
+    return fmt::format("{}:{}: {}", name, node.Mark().line + 1, key);
+  } catch (const YAML::Exception&) {
+    return nowhere;
+  }
+}
+
+}  // namespace spartan

@@ -9,7 +9,8 @@
 //     }
 //   };
 //
-// Groups nest with `v.group("speckle", speckle)`. A key carries its unit (docs/conventions.md).
+// Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. A key carries
+// its unit (docs/conventions.md).
 #pragma once
 
 #include <cmath>
@@ -66,11 +67,28 @@ class Reader {
       leave();
     }
   }
+  /// Items that are given replace the whole list.
+  template <class Group>
+  void list(std::string_view key, std::vector<Group>& values, std::string_view) {
+    const std::optional<std::size_t> count = open_list(key);
+    if (!count) return;
+    values.assign(*count, Group{});
+    for (std::size_t i = 0; i < *count; ++i) {
+      if (enter_item(key, i)) {
+        values[i].describe(*this);
+        leave();
+      }
+    }
+    close_list();
+  }
   Status finish();
 
  private:
   bool enter(std::string_view key);
   void leave();
+  std::optional<std::size_t> open_list(std::string_view key);
+  bool enter_item(std::string_view key, std::size_t index);
+  void close_list();
   std::shared_ptr<Tree> tree_;
 };
 
@@ -89,9 +107,21 @@ class Lister {
     value.describe(*this);
     prefix_.resize(length);
   }
+  /// One line: the items as YAML in flow style.
+  template <class Group>
+  void list(std::string_view key, std::vector<Group>& values, std::string_view meaning) {
+    std::string items;
+    for (Group& value : values) {
+      Lister inner;
+      value.describe(inner);
+      items += (items.empty() ? "" : ", ") + in_flow_style(inner.lines);
+    }
+    lines.push_back({prefix_ + std::string(key), "[" + items + "]", std::string(meaning)});
+  }
   std::vector<OptionLine> lines;
 
  private:
+  static std::string in_flow_style(const std::vector<OptionLine>& lines);
   std::string prefix_;
 };
 
@@ -101,6 +131,10 @@ Result<std::shared_ptr<Tree>> from_assignment(const std::string& assignment);
 std::string to_yaml(const std::vector<OptionLine>& lines);
 
 }  // namespace options_detail
+
+/// "name:line: group.key" for a key of a YAML text, for complaints that concern several keys; "name: group.key" where
+/// the text does not have the key.
+std::string place_of_option(const std::string& text, const std::string& name, const std::string& key);
 
 /// Reads YAML text over the given values: what the text does not name keeps its value. Unknown keys, wrong
 /// types and values out of bounds are refused, all of them in one error with "name:line: key".

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "spartan/core/random.h"
+#include "spartan/core/smooth_noise.h"
 #include "spartan/odometry/smoothed_image.h"
-#include "spartan/testing/smooth_noise.h"
 
 namespace spartan {
 namespace {
@@ -19,7 +19,7 @@ class Picture {
  public:
   Picture(const Eigen::Matrix2d& warp, const Eigen::Vector2d& shift, double gain = 1, double noise = 0,
           std::uint64_t seed = 1) {
-    const auto octaves = testing::make_octaves(11, 2, 9, 0.7, 35);
+    const auto octaves = make_octaves(11, 2, 9, 0.7, 35);
     Image<std::uint8_t> image(kSide, kSide);
     Random random(seed);
     const Eigen::Matrix2d back = warp.inverse();

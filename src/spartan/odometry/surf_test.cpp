@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "spartan/testing/smooth_noise.h"
+#include "spartan/core/smooth_noise.h"
 
 namespace spartan {
 namespace {
@@ -27,7 +27,7 @@ Image<std::uint8_t> blob(double x0, double y0, double sigma, double height) {
 
 // A texture under a similarity: image(x) = texture(R(−angle) (x − centre) / zoom).
 Image<std::uint8_t> texture(double angle, double zoom) {
-  const auto octaves = testing::make_octaves(3, 3, 24, 0.7, 45);
+  const auto octaves = make_octaves(3, 3, 24, 0.7, 45);
   const double c = std::cos(angle), s = std::sin(angle);
   return painted(320, 320, [=](double x, double y) {
     const double dx = (x - 159.5) / zoom, dy = (y - 159.5) / zoom;

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "spartan/testing/smooth_noise.h"
+#include "spartan/core/smooth_noise.h"
 
 namespace spartan::testing {
 

@@ -1,4 +1,4 @@
-#include "spartan/testing/smooth_noise.h"
+#include "spartan/core/smooth_noise.h"
 
 #include <array>
 #include <cmath>
@@ -6,20 +6,19 @@
 
 #include "spartan/core/random.h"
 
-namespace spartan::testing {
+namespace spartan {
 namespace {
 
-constexpr int kDirections = 64;
 struct Direction {
   double x, y;
 };
 
-const std::array<Direction, kDirections>& directions() {
+const std::array<Direction, kNoiseDirections>& directions() {
   static const auto table = [] {
-    std::array<Direction, kDirections> result{};
-    for (int i = 0; i < kDirections; ++i) {
-      const double angle = 2 * std::numbers::pi * i / kDirections;
-      result[static_cast<std::size_t>(i)] = {std::cos(angle), std::sin(angle)};
+    std::array<Direction, kNoiseDirections> result{};
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      const double angle = 2 * std::numbers::pi * static_cast<double>(i) / kNoiseDirections;
+      result[i] = {std::cos(angle), std::sin(angle)};
     }
     return result;
   }();
@@ -50,7 +49,7 @@ inline Corners corners_of(double x, double y, std::uint32_t seed) {
   const std::int32_t ix = floor_of(x), iy = floor_of(y);
   const double tx = x - ix, ty = y - iy;
   const auto& table = directions();
-  const auto at = [&](std::int32_t cx, std::int32_t cy) { return table[mix(cx, cy, seed) % kDirections]; };
+  const auto at = [&](std::int32_t cx, std::int32_t cy) { return table[mix(cx, cy, seed) % kNoiseDirections]; };
   Corners c{at(ix, iy), at(ix + 1, iy), at(ix, iy + 1), at(ix + 1, iy + 1), 0, 0, 0, 0, tx, ty};
   c.n00 = c.g00.x * tx + c.g00.y * ty;
   c.n10 = c.g10.x * (tx - 1) + c.g10.y * ty;
@@ -66,6 +65,10 @@ inline double blend(const Corners& c, double u, double v) {
 }
 
 }  // namespace
+
+const double* noise_directions() {
+  return &directions()[0].x;
+}
 
 double gradient_noise_value(double x, double y, std::uint32_t seed) {
   const Corners c = corners_of(x, y, seed);
@@ -123,4 +126,4 @@ std::vector<Octave> make_octaves(std::uint64_t seed, int count, double largest, 
   return octaves;
 }
 
-}  // namespace spartan::testing
+}  // namespace spartan

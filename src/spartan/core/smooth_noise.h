@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace spartan::testing {
+namespace spartan {
 
 /// A well-mixed number from three.
 inline std::uint32_t mix(std::int32_t x, std::int32_t y, std::uint32_t seed) {
@@ -28,6 +28,9 @@ struct NoiseSample {
 /// magnitude below kNoiseHighest, slope below kNoiseSteepest, second
 /// derivatives below kNoiseMostCurved.
 NoiseSample gradient_noise(double x, double y, std::uint32_t seed);
+/// The directions that the corners' gradients take: kNoiseDirections pairs (x, y).
+inline constexpr std::uint32_t kNoiseDirections = 64;
+const double* noise_directions();
 /// The value alone, the same bits.
 double gradient_noise_value(double x, double y, std::uint32_t seed);
 inline constexpr double kNoiseSigma = 0.216;
@@ -51,4 +54,4 @@ struct Octave {
 /// standard deviation of the sum is `sigma`.
 std::vector<Octave> make_octaves(std::uint64_t seed, int count, double largest, double gain, double sigma);
 
-}  // namespace spartan::testing
+}  // namespace spartan

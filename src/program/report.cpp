@@ -1,0 +1,231 @@
+#include "program/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "program/compared_trajectories.h"
+#include "program/html_parts.h"
+#include "program/json.h"
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/files.h"
+#include "spartan/core/geotiff.h"
+#include "spartan/eval/disparity_metrics.h"
+#include "spartan/eval/disparity_truth.h"
+#include "spartan/eval/trajectory_metrics.h"
+#include "spartan/imaging/imager.h"
+#include "spartan/reconstruction/disparity_colour.h"
+#include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/reconstruction/disparity_options.h"
+
+namespace spartan::program {
+namespace {
+
+constexpr int kDrivePictures = 6;
+constexpr double kErrorScale_px = 2;
+
+std::string section(const std::string& title, const std::string& body) {
+  return "<h2>" + html_text(title) + "</h2>\n" + body;
+}
+
+std::string percent(std::optional<double> value) {
+  return value ? fmt::format("{:.1f} %", *value) : "–";
+}
+
+// The left images along the drive.
+Result<std::string> drive_pictures(FrameSource& source, Imager& imager) {
+  std::string html;
+  for (const StereoPair& pair : source.info().rig.pairs) {
+    if (!pair.for_odometry) continue;
+    const std::vector<Stamp> stamps = source.announced_stamps(pair.name);
+    const int count = std::min<int>(kDrivePictures, static_cast<int>(stamps.size()));
+    for (int i = 0; i < count; ++i) {
+      const Stamp stamp =
+          stamps[count > 1 ? static_cast<std::size_t>(i) * (stamps.size() - 1) / static_cast<std::size_t>(count - 1)
+                           : 0];
+      const auto frame = source.frame_at(pair.name, stamp);
+      if (!frame) continue;
+      const auto view = imager.process(*frame);
+      if (!view) return failure(view);
+      html += html_picture(
+          shrunk(view->left, 360),
+          fmt::format("{} pair, left eye, after {:.0f} s", pair.name, seconds_between(stamps.front(), stamp)), 360);
+    }
+  }
+  return html;
+}
+
+Image<Rgb8> error_picture(ImageView<const float> estimate, ImageView<const float> truth) {
+  Image<Rgb8> picture(estimate.width(), estimate.height());
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      const double error = estimate(x, y) - truth(x, y);
+      picture(x, y) = std::isfinite(error) ? cold_to_hot(0.5 + 0.5 * error / kErrorScale_px) : Rgb8{40, 40, 40};
+    }
+  }
+  return picture;
+}
+
+// The first shot of a pair with true disparities: what the matcher makes of it.
+Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoPair& pair, const std::string& recording,
+                              int threads) {
+  const std::vector<Stamp> stamps = source.announced_stamps(pair.name);
+  if (stamps.empty()) return std::string();
+  const Stamp stamp = stamps[stamps.size() / 2];
+  const auto frame = source.frame_at(pair.name, stamp);
+  if (!frame) return failure(frame);
+  const std::string name = fmt::format("/{}/{}.png", pair.name, stamp.ns);
+  const auto truth = read_disparity(recording + "/truth/disparity" + name);
+  const auto mask = read_truth_mask(recording + "/truth/mask" + name);
+  if (!truth || !mask) return std::string();
+  const auto view = imager.process(*frame);
+  if (!view) return failure(view);
+  const Image<std::uint8_t> left = Image<std::uint8_t>::copy_of(view->left);
+  DisparityComputer computer(DisparityOptions{}, Workers(threads));
+  const auto image = computer.compute(view->left, view->right, disparity_range(view->geometry, pair.nearest_m),
+                                      view->left_mask, view->right_mask);
+  if (!image) return failure(image);
+  const auto scores = compare_disparities(image->disparity, *truth, *mask);
+  if (!scores) return failure(scores);
+  std::string html =
+      html_picture(shrunk(left.view(), 360), fmt::format("{} pair, left eye, rectified", pair.name), 360);
+  html += html_picture(shrunk(colour_disparity(image->disparity).view(), 360),
+                       "Disparity as matched: near is warm, far is cold, black is unknown", 360);
+  html +=
+      html_picture(shrunk(error_picture(image->disparity, *truth).view(), 360),
+                   fmt::format("Its error: white none, blue −{0} px, red +{0} px, gray unknown", kErrorScale_px), 360);
+  std::vector<std::vector<std::string>> rows{
+      {"pixels", "matched", "wrong by over 1 px", "of the matched", "RMS inside 1 px"}};
+  const auto add = [&](const std::string& what, const DisparityScores& s) {
+    rows.push_back({what, percent(s.density_percent), percent(s.bad_1), percent(s.matched_bad_1),
+                    s.rms_in_1px ? fmt::format("{:.3f} px", *s.rms_in_1px) : "–"});
+  };
+  add("all with truth", scores->all);
+  if (scores->nonocc) add("seen by both eyes", *scores->nonocc);
+  return html + html_table(rows);
+}
+
+// Heights in colour with shade from the north-west.
+std::string elevation_of(const std::string& recording, const Trajectory& truth) {
+  const auto map = read_geotiff(recording + "/truth/elevation.tif");
+  if (!map || map->bands.empty()) return "";
+  const Image<float>& z = map->bands[0];
+  std::vector<float> sorted;
+  for (int y = 0; y < z.height(); ++y) sorted.insert(sorted.end(), z.row(y), z.row(y) + z.width());
+  std::sort(sorted.begin(), sorted.end());
+  const float low = sorted[sorted.size() / 100], high = sorted[sorted.size() - 1 - sorted.size() / 100];
+  Image<Rgb8> picture(z.width(), z.height());
+  for (int y = 0; y < z.height(); ++y) {
+    for (int x = 0; x < z.width(); ++x) {
+      const float east = z(std::min(x + 1, z.width() - 1), y), south = z(x, std::min(y + 1, z.height() - 1));
+      const double shade = std::clamp(1 + 0.5 * ((east - z(x, y)) + (south - z(x, y))) / map->place.cell_m, 0.35, 1.4);
+      const Rgb8 c = cold_to_hot((z(x, y) - low) / std::max(high - low, 1e-6F));
+      const auto lit = [&](std::uint8_t v) {
+        return static_cast<std::uint8_t>(std::clamp(0.9 * shade * v, 0.0, 255.0));
+      };
+      picture(x, y) = {lit(c.r), lit(c.g), lit(c.b)};
+    }
+  }
+  for (const StampedPose& p : truth) {
+    const int x = static_cast<int>((p.pose.translation().x() - map->place.west_m) / map->place.cell_m);
+    const int y = static_cast<int>((map->place.north_m - p.pose.translation().y()) / map->place.cell_m);
+    for (int dy = -2; dy <= 2; ++dy) {
+      for (int dx = -2; dx <= 2; ++dx) {
+        if (picture.view().contains(x + dx, y + dy)) picture(x + dx, y + dy) = {20, 20, 20};
+      }
+    }
+  }
+  return html_picture(
+      shrunk(picture.view(), 720),
+      fmt::format("True elevation, {:.2f} m (blue) to {:.2f} m (red), {:.1f} m × {:.1f} m, north up; black: the frames",
+                  low, high, z.width() * map->place.cell_m, z.height() * map->place.cell_m),
+      720);
+}
+
+std::string stage_table(const Json& summary) {
+  std::vector<std::vector<std::string>> rows{{"stage", "times", "median, ms", "95 %, ms", "CPU median, ms"}};
+  for (const auto& [name, stage] : summary["stages"].items()) {
+    rows.push_back({name, std::to_string(stage["count"].get<int>()),
+                    fmt::format("{:.1f}", stage["wall_ms"]["median"].get<double>()),
+                    fmt::format("{:.1f}", stage["wall_ms"]["p95"].get<double>()),
+                    fmt::format("{:.1f}", stage["cpu_ms"]["median"].get<double>())});
+  }
+  return html_table(rows);
+}
+
+std::string figure(const std::string& value, const std::string& what) {
+  return "<div><b>" + html_text(value) + "</b>" + html_text(what) + "</div>";
+}
+
+std::string trajectory_plots(const ComparedTrajectories& compared, const TrajectoryMetrics& metrics) {
+  PlotLine truth{"truth", "#9a3b12", {}, {}}, estimate{"odometry", "#1f5fa8", {}, {}},
+      error{"error", "#1f5fa8", {}, {}};
+  for (const StampedPose& p : compared.truth) {
+    truth.x.push_back(p.pose.translation().x());
+    truth.y.push_back(p.pose.translation().y());
+  }
+  double driven = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  for (const StampedPose& p : compared.estimate) {
+    const Eigen::Vector3d at = metrics.truth_from_estimate * p.pose.translation();
+    estimate.x.push_back(at.x());
+    estimate.y.push_back(at.y());
+    const auto same =
+        std::min_element(compared.truth.begin(), compared.truth.end(), [&](const StampedPose& a, const StampedPose& b) {
+          return std::abs(a.stamp.ns - p.stamp.ns) < std::abs(b.stamp.ns - p.stamp.ns);
+        });
+    driven += error.x.empty() ? 0 : (at - before).norm();
+    before = at;
+    error.x.push_back(driven);
+    error.y.push_back(1000 * (at - same->pose.translation()).norm());
+  }
+  return svg_plot({truth, estimate}, {"x, m", "y, m", true, 560, 420}) +
+         svg_plot({error}, {"driven, m", "position error after alignment, mm", false, 560, 420});
+}
+
+}  // namespace
+
+Result<std::string> make_report(const std::string& recording, const std::string& run, int threads) {
+  const auto summary_text = read_file(run + "/summary.json");
+  if (!summary_text) return failure(summary_text);
+  const Json summary = Json::parse(*summary_text);
+  const auto compared = find_trajectories(run, recording, "");
+  if (!compared) return failure(compared);
+  const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
+  if (!metrics) return failure(metrics);
+  const auto source = open_recording(recording);
+  if (!source) return failure(source);
+  auto imager = Imager::create((*source)->info().rig, ImagingOptions(), Workers(threads));
+  if (!imager) return failure(imager);
+  const auto pictures = drive_pictures(**source, *imager);
+  if (!pictures) return failure(pictures);
+
+  std::string body = "<h1>Spartan: a drive over Mars</h1>\n<p>" + html_text((*source)->info().description) +
+                     "</p>\n<div class=\"figures\">";
+  body += figure(fmt::format("{:.2f} m", summary["distance_m"].get<double>()), "driven");
+  body += figure(fmt::format("{:.1f} mm", 1000 * metrics->ate_m.rmse), "position error, RMS");
+  if (metrics->drift_percent) body += figure(fmt::format("{:.2f} %", *metrics->drift_percent), "drift of the distance");
+  body += figure(
+      fmt::format("{} of {}", summary["health"]["odometry"]["tracking"].get<int>(), summary["frames"].get<int>()),
+      "frames tracked");
+  body += figure(fmt::format("{:.1f} s", summary["wall_seconds"].get<double>()), "for the whole run");
+  body += "</div>\n";
+  body += section("What the rover saw", *pictures);
+  body += section("Where it went", trajectory_plots(*compared, *metrics));
+  std::string stereo;
+  for (const StereoPair& pair : (*source)->info().rig.pairs) {
+    const auto html = stereo_of(**source, *imager, pair, recording, threads);
+    if (!html) return failure(html);
+    stereo += *html;
+  }
+  body += section("What the ground looks like to it", stereo);
+  body += section("The ground as it is", elevation_of(recording, compared->truth));
+  body += section("Time", stage_table(summary) + fmt::format("<p>Peak memory {:.0f} MB, {} threads.</p>\n",
+                                                             summary["peak_memory_bytes"].get<double>() / 1e6,
+                                                             summary["threads"].get<int>()));
+  return html_page("Spartan: a drive over Mars", body);
+}
+
+}  // namespace spartan::program

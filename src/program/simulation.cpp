@@ -1,0 +1,125 @@
+#include "program/simulation.h"
+
+#ifdef SPARTAN_HAS_SIM
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <utility>
+
+#include "program/interrupt.h"
+#include "program/json.h"
+#include "program/progress.h"
+#include "program/shipped_files.h"
+#include "spartan/core/files.h"
+#include "spartan/imaging/rectification.h"
+#include "spartan/rig/rig_files.h"
+#include "spartan/sim/simulator.h"
+
+namespace spartan::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Text {
+  std::string content, name;
+  bool is_file = false;
+};
+
+std::string shipped_scenario_names() {
+  std::string names;
+  for (const ShippedFile& file : shipped_files()) {
+    if (file.path.starts_with("scenarios/")) names += (names.empty() ? "" : ", ") + fs::path(file.path).stem().string();
+  }
+  return names;
+}
+
+Result<Text> find_scenario(const std::string& wanted) {
+  std::error_code error;
+  if (!fs::exists(wanted, error)) {
+    if (const auto shipped = shipped_file("scenarios/" + wanted + ".yaml"))
+      return Text{std::string(*shipped), wanted, false};
+    return failure(ErrorCode::input, "is no file and no shipped scenario", wanted,
+                   "shipped are: " + shipped_scenario_names());
+  }
+  const auto content = read_file(wanted);
+  if (!content) return failure(content);
+  return Text{*content, wanted, true};
+}
+
+// A file beside the scenario, else a shipped rig's name.
+Result<Rig> find_rig(const sim::Scenario& scenario, const Text& text) {
+  const fs::path beside = fs::path(text.name).parent_path() / scenario.rig;
+  std::error_code error;
+  if (text.is_file && fs::is_regular_file(beside, error)) return read_rig(beside.string());
+  if (const auto shipped = shipped_file("rigs/" + scenario.rig + ".yaml"))
+    return parse_rig_yaml(std::string(*shipped), scenario.rig);
+  return failure(ErrorCode::configuration,
+                 "the rig '" + scenario.rig + "' is no file beside the scenario and no shipped rig",
+                 place_of_option(text.content, text.name, "rig"));
+}
+
+Result<std::map<std::string, sim::RectifiedView>> rectified_views(const Rig& rig) {
+  std::map<std::string, sim::RectifiedView> views;
+  for (const StereoPair& pair : rig.pairs) {
+    const auto plan = plan_rectification(*rig.find_camera(pair.left), *rig.find_camera(pair.right),
+                                         rig.right_from_left(pair), "pair '" + pair.name + "'");
+    if (!plan) return failure(plan);
+    views[pair.name] = {plan->geometry, plan->left_from_rectified, plan->right_from_rectified};
+  }
+  return views;
+}
+
+}  // namespace
+
+Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments) {
+  const auto text = find_scenario(arguments.scenario);
+  if (!text) return failure(text);
+  auto scenario = sim::parse_scenario(text->content, text->name);
+  if (!scenario) return failure(scenario);
+  if (arguments.seed) scenario->seed = *arguments.seed;
+  const auto rig = find_rig(*scenario, *text);
+  if (!rig) return failure(rig);
+  auto drive = sim::plan_drive(*scenario, *rig, text->content, text->name);
+  if (!drive) return failure(drive);
+  auto views = rectified_views(sim::believed_rig(*rig, scenario->believed));
+  if (!views) return failure(views);
+
+  Progress progress(context.quiet);
+  sim::SimulationHooks hooks;
+  hooks.should_stop = interrupted;
+  hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.shots, "shots"); };
+  const auto start = std::chrono::steady_clock::now();
+  const auto report =
+      sim::simulate({*scenario, *rig, std::move(*drive), std::move(*views), arguments.output, arguments.resume}, hooks,
+                    Workers(context.threads));
+  if (!report) return failure(report);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double rate =
+      report->render_seconds > 0 ? static_cast<double>(report->rays) / report->render_seconds / context.threads : 0;
+  const Json json{
+      {"schema", 1},        {"recording", arguments.output},   {"frames", report->frames}, {"rays", report->rays},
+      {"seconds", seconds}, {"rays_per_second_per_core", rate}};
+  SimulationOutcome outcome;
+  outcome.json = json.dump(2) + "\n";
+  outcome.text = fmt::format("{} shots in {:.1f} s, {:.2f} million rays a second and core\nrecording in {}\n",
+                             report->frames, seconds, rate / 1e6, arguments.output);
+  outcome.interrupted = report->interrupted;
+  return outcome;
+}
+
+}  // namespace spartan::program
+
+#else
+
+namespace spartan::program {
+
+Result<SimulationOutcome> simulate_scenario(const Context&, const SimulationArguments&) {
+  return failure(ErrorCode::usage, "this build of Spartan has no simulator: it was built without Embree", {},
+                 "install libembree-dev and build again");
+}
+
+}  // namespace spartan::program
+
+#endif

@@ -1,0 +1,28 @@
+// Scenarios by name or file, and their simulation with progress.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "program/context.h"
+#include "spartan/core/result.h"
+
+namespace spartan::program {
+
+struct SimulationArguments {
+  std::string scenario, output;
+  std::optional<int> seed;
+  bool resume = false;
+};
+
+/// Rays cast and time, as `simulate --json` prints them.
+struct SimulationOutcome {
+  std::string json;
+  std::string text;
+  bool interrupted = false;
+};
+
+/// Reads the scenario (a shipped one's name, or a file), checks all of it, renders. Without Embree: code `usage`.
+Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments);
+
+}  // namespace spartan::program

@@ -1,0 +1,135 @@
+#include "spartan/sim/motion_sensors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "spartan/core/random.h"
+#include "spartan/core/smooth_noise.h"
+
+namespace spartan::sim {
+namespace {
+
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+constexpr std::int64_t kEpoch_ns = 1'000'000'000'000;
+
+Eigen::Vector3d normal_vector(Random& random, double sigma) {
+  return {random.normal(0, sigma), random.normal(0, sigma), random.normal(0, sigma)};
+}
+
+// Readings at the sensor's rate: `read(t, step)` is asked for each, in order; faults leave some out or repeat them.
+template <class Sample, class Read>
+std::vector<Sample> readings(const BodyMotion& motion, double rate_hz, const std::string& sensor,
+                             const SensorFaults& faults, const Read& read) {
+  std::vector<Sample> samples;
+  std::optional<Sample> last;
+  const auto count = static_cast<std::int64_t>(std::floor(motion.seconds() * rate_hz));
+  for (std::int64_t i = 0; i <= count; ++i) {
+    const double t = static_cast<double>(i) / rate_hz;
+    Sample sample = read(t);  // asked in any case: a fault changes no other reading
+    sample.stamp = stamp_at(t);
+    const auto fault = std::find_if(faults.begin(), faults.end(), [&](const SensorFault& f) {
+      return f.sensor == sensor && t >= f.from_s && t < f.to_s;
+    });
+    if (fault == faults.end()) {
+      last = sample;
+    } else if (fault->kind == "drop" || !last) {
+      continue;
+    } else {
+      sample = *last;
+      sample.stamp = stamp_at(t);
+    }
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+}  // namespace
+
+Stamp stamp_at(double time_s) {
+  return {kEpoch_ns + std::llround(time_s * 1e9)};
+}
+
+ImuSample true_imu(const BodyMotion& motion, double time_s, double gravity_m_s2) {
+  ImuSample sample;
+  sample.stamp = stamp_at(time_s);
+  sample.gyro_rad_s = motion.angular_velocity(time_s);
+  sample.accel_m_s2 = motion.world_from_body(time_s).rotation().conjugate() *
+                      (motion.acceleration(time_s) + Eigen::Vector3d(0, 0, gravity_m_s2));
+  return sample;
+}
+
+std::vector<ImuSample> measure_imu(const BodyMotion& motion, const ImuOptions& o, double gravity_m_s2,
+                                   const SensorFaults& faults, std::uint64_t seed) {
+  if (!o.enabled) return {};
+  Random random(seed, 201);
+  Eigen::Vector3d gyro_bias = normal_vector(random, o.gyro_bias_rad_s);
+  Eigen::Vector3d accel_bias = normal_vector(random, o.accel_bias_m_s2);
+  const double root_rate = std::sqrt(o.rate_hz);
+  return readings<ImuSample>(motion, o.rate_hz, "imu", faults, [&](double t) {
+    ImuSample sample = true_imu(motion, t, gravity_m_s2);
+    sample.gyro_rad_s += gyro_bias + normal_vector(random, o.gyro_noise_rad_s_sqrt_hz * root_rate);
+    sample.accel_m_s2 += accel_bias + normal_vector(random, o.accel_noise_m_s2_sqrt_hz * root_rate);
+    gyro_bias += normal_vector(random, o.gyro_walk_rad_s2_sqrt_hz / root_rate);
+    accel_bias += normal_vector(random, o.accel_walk_m_s3_sqrt_hz / root_rate);
+    return sample;
+  });
+}
+
+std::vector<WheelSample> measure_wheels(const BodyMotion& motion, const ChassisOptions& chassis, const WheelOptions& o,
+                                        const SensorFaults& faults, std::uint64_t seed) {
+  if (!o.enabled) return {};
+  Random random(seed, 202);
+  const double left_scale = 1 + random.normal(0, o.radius_error), right_scale = 1 + random.normal(0, o.radius_error);
+  const std::vector<Octave> sand = make_octaves(random.next(), 3, o.sand_size_m, 0.6, o.slip_sand);
+  double left_m = 0, right_m = 0, before = 0;
+  const auto counted = [&](double rolled) {
+    return o.resolution_m > 0 ? std::floor(rolled / o.resolution_m) * o.resolution_m : rolled;
+  };
+  return readings<WheelSample>(motion, o.rate_hz, "wheels", faults, [&](double t) {
+    // From reading to reading at the speed of its middle.
+    const double middle = 0.5 * (before + t), step = t - before;
+    const Pose pose = motion.world_from_body(middle);
+    const Eigen::Vector3d ahead = pose.rotation() * Eigen::Vector3d::UnitX();
+    const double forward = motion.velocity(middle).dot(ahead);
+    const double turning = motion.angular_velocity(middle).z() * chassis.track_m / 2;
+    double slip =
+        o.slip_level + o.slip_by_slope * ahead.z() / std::hypot(ahead.x(), ahead.y()) * (forward < 0 ? -1 : 1);
+    for (const Octave& octave : sand) slip += octave.value(pose.translation().x(), pose.translation().y());
+    const double rolled = 1 / (1 - std::clamp(slip, -0.5, 0.9));
+    left_m += (forward - turning) * rolled * left_scale * step;
+    right_m += (forward + turning) * rolled * right_scale * step;
+    before = t;
+    return WheelSample{{}, counted(left_m), counted(right_m)};
+  });
+}
+
+std::vector<CompassSample> measure_heading(const BodyMotion& motion, const CompassOptions& o,
+                                           const SensorFaults& faults, std::uint64_t seed) {
+  if (!o.enabled) return {};
+  Random random(seed, 203);
+  const double bias = random.normal(0, o.bias_deg * kRadiansPerDegree), sigma = o.sigma_deg * kRadiansPerDegree;
+  return readings<CompassSample>(motion, o.rate_hz, "compass", faults, [&](double t) {
+    const bool outlier = random.uniform() < o.outlier_share;
+    const double error = bias + random.normal(0, sigma), anywhere = random.uniform(-std::numbers::pi, std::numbers::pi);
+    const double heading = outlier ? anywhere : motion.roll_pitch_yaw(t).z() + error;
+    return CompassSample{{}, std::remainder(heading, 2 * std::numbers::pi), sigma};
+  });
+}
+
+std::vector<InclinometerSample> measure_tilt(const BodyMotion& motion, const InclinometerOptions& o,
+                                             const SensorFaults& faults, std::uint64_t seed) {
+  if (!o.enabled) return {};
+  Random random(seed, 204);
+  const double sigma = o.sigma_deg * kRadiansPerDegree;
+  const double roll_bias = random.normal(0, o.bias_deg * kRadiansPerDegree);
+  const double pitch_bias = random.normal(0, o.bias_deg * kRadiansPerDegree);
+  return readings<InclinometerSample>(motion, o.rate_hz, "inclinometer", faults, [&](double t) {
+    const Eigen::Vector3d angles = motion.roll_pitch_yaw(t);
+    const double roll = angles.x() + roll_bias + random.normal(0, sigma);
+    return InclinometerSample{{}, roll, angles.y() + pitch_bias + random.normal(0, sigma), sigma};
+  });
+}
+
+}  // namespace spartan::sim

@@ -1,0 +1,258 @@
+// `spartan simulate` from outside: small drives, impossible scenarios, kills, full disks.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "program.h"
+#include "spartan/core/geotiff.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::ProgramLimits;
+using testing::ProgramResult;
+using testing::run_program;
+
+constexpr const char* kRig = R"(schema: 1
+name: small
+pan_tilt_units:
+  mast: {translation_m: [0, 0, 0.8], rest_angles_deg: [0, 65]}
+cameras:
+  wl: {size_px: [96, 96], model: pinhole, focal_px: [130, 130], centre_px: [47.5, 47.5], mount: mast, axes: forward, translation_m: [0, 0.1, 0]}
+  wr: {size_px: [96, 96], model: pinhole, focal_px: [130, 130], centre_px: [47.5, 47.5], mount: mast, axes: forward, translation_m: [0, -0.1, 0]}
+  nl: {size_px: [96, 72], model: pinhole, focal_px: [100, 100], centre_px: [47.5, 35.5], axes: forward, translation_m: [0, 0.06, 0.3], roll_pitch_yaw_deg: [0, 60, 0]}
+  nr: {size_px: [96, 72], model: pinhole, focal_px: [100, 100], centre_px: [47.5, 35.5], axes: forward, translation_m: [0, -0.06, 0.3], roll_pitch_yaw_deg: [0, 60, 0]}
+pairs:
+  wide: {left: wl, right: wr, nearest_m: 0.6, for_odometry: false}
+  narrow: {left: nl, right: nr, nearest_m: 0.25}
+)";
+
+constexpr const char* kScenario = R"(schema: 1
+name: small
+samples: 1
+rig: small_rig.yaml
+path: {length_m: 0.3}
+shots: {stops_m: [0]}
+rocks: {share: 0.03}
+truth: {cell_m: 0.1}
+)";
+
+// Path below the folder → content.
+std::map<std::string, std::string> content_of(const std::string& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream file(entry.path(), std::ios::binary);
+    std::stringstream content;
+    content << file.rdbuf();
+    files[fs::relative(entry.path(), folder).string()] = content.str();
+  }
+  return files;
+}
+
+ProgramLimits killed_after(int ms) {
+  ProgramLimits limits;
+  limits.kill_after = std::chrono::milliseconds(ms);
+  return limits;
+}
+
+class Simulate : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    write("small_rig.yaml", kRig);
+    write("small.yaml", kScenario);
+    if (run_program({"simulate", path("nothing"), "-o", path("x")}).err.find("no simulator") != std::string::npos)
+      GTEST_SKIP() << "built without Embree";
+  }
+  std::string path(const std::string& name) const { return folder_.path() + "/" + name; }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
+  ProgramResult simulate(const std::string& output, std::vector<std::string> more = {},
+                         const ProgramLimits& limits = {}) const {
+    std::vector<std::string> words{"simulate", path("small.yaml"), "-o", path(output)};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_program(words, limits);
+  }
+  // The scenario with one more line; it must be refused with code 4, name the line and render nothing.
+  void expect_refused(const std::string& line, const std::string& complaint) const {
+    write("bad.yaml", std::string(kScenario) + line + "\n");
+    const ProgramResult result = run_program({"simulate", path("bad.yaml"), "-o", path("bad")});
+    EXPECT_EQ(result.exit_code, 4) << line << "\n" << result.err;
+    EXPECT_THAT(result.err, HasSubstr("bad.yaml:9")) << line;
+    EXPECT_THAT(result.err, HasSubstr(complaint)) << line;
+    EXPECT_FALSE(fs::exists(path("bad"))) << line;
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(Simulate, LeavesARecordingThatRunReadsWithItsTruth) {
+  const ProgramResult result = simulate("rec", {"--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json["schema"], 1);
+  EXPECT_EQ(json["frames"], 4 + 3);
+  EXPECT_GT(json["rays"], 0);
+  EXPECT_GT(json["rays_per_second_per_core"], 0);
+  for (const char* file : {"recording.yaml", "rig.yaml", "frames.csv", "sensors/imu.csv", "sensors/wheels.csv",
+                           "sensors/compass.csv", "sensors/inclinometer.csv", "truth/rig.yaml", "truth/poses.tum",
+                           "truth/rocks.csv", "truth/elevation.tif", "truth/obstacles.tif", "truth/scenario.yaml"}) {
+    EXPECT_TRUE(fs::exists(path("rec/" + std::string(file)))) << file;
+  }
+  int disparities = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(path("rec/truth/disparity")))
+    disparities += entry.is_regular_file() ? 1 : 0;
+  EXPECT_EQ(disparities, 7);
+  EXPECT_EQ(content_of(path("rec"))["rig.yaml"], content_of(path("rec"))["truth/rig.yaml"]);
+  const ProgramResult run = run_program({"run", path("rec"), "-o", path("out"), "--truth", path("rec"), "--json"});
+  ASSERT_EQ(run.exit_code == 0 || run.exit_code == 6, true) << run.err;
+  EXPECT_EQ(nlohmann::json::parse(run.out)["frames"], 4);
+}
+
+TEST_F(Simulate, ElevationIsAGeoTiffWithTheGround) {
+  ASSERT_EQ(simulate("rec").exit_code, 0);
+  const auto map = read_geotiff(path("rec/truth/elevation.tif"));
+  if (!map && map.error().code == ErrorCode::usage) GTEST_SKIP() << map.error().message();
+  ASSERT_TRUE(map) << map.error().message();
+  EXPECT_EQ(map->names, (std::vector<std::string>{"elevation_m", "ground_m"}));
+  EXPECT_NEAR(map->bands[0].width(), 103, 2);
+  EXPECT_NEAR(map->bands[0].height(), 100, 2);
+  EXPECT_NEAR(map->place.west_m, -5, 0.11);
+  EXPECT_NEAR(map->place.north_m, 5, 0.11);
+  // The body begins on the ground at height 0.
+  const int x = static_cast<int>(-map->place.west_m / map->place.cell_m),
+            y = static_cast<int>(map->place.north_m / map->place.cell_m);
+  EXPECT_NEAR(map->bands[1](x, y), 0, 0.05);
+  double rocks = 0;
+  for (int j = 0; j < map->bands[0].height(); ++j) {
+    for (int i = 0; i < map->bands[0].width(); ++i) {
+      ASSERT_GE(map->bands[0](i, j), map->bands[1](i, j) - 0.02F);
+      rocks = std::max(rocks, static_cast<double>(map->bands[0](i, j) - map->bands[1](i, j)));
+    }
+  }
+  EXPECT_GT(rocks, 0.03);
+}
+
+TEST_F(Simulate, TheSameSeedGivesTheSameBytesWhateverTheThreads) {
+  ASSERT_EQ(simulate("one", {"--threads", "1"}).exit_code, 0);
+  ASSERT_EQ(simulate("two", {"--threads", "2"}).exit_code, 0);
+  const auto one = content_of(path("one")), two = content_of(path("two"));
+  ASSERT_EQ(one.size(), two.size());
+  for (const auto& [name, content] : one) EXPECT_TRUE(two.at(name) == content) << name;
+  ASSERT_EQ(simulate("other", {"--seed", "2"}).exit_code, 0);
+  EXPECT_NE(content_of(path("other"))["truth/poses.tum"], one.at("truth/poses.tum"));
+}
+
+TEST_F(Simulate, GoesOnAfterKillsAsIfNothingHadHappened) {
+  ASSERT_EQ(simulate("whole").exit_code, 0);
+  const auto whole = content_of(path("whole"));
+  for (const int ms : {150, 300, 450, 600}) (void)simulate("killed", {"--resume"}, killed_after(ms));
+  EXPECT_TRUE(fs::exists(path("killed/frames.csv")));
+  const ProgramResult resumed =
+      fs::exists(path("killed/recording.yaml")) ? ProgramResult{0, 0, "", ""} : simulate("killed", {"--resume"});
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  const auto killed = content_of(path("killed"));
+  ASSERT_EQ(killed.size(), whole.size());
+  for (const auto& [name, content] : whole) EXPECT_TRUE(killed.contains(name) && killed.at(name) == content) << name;
+}
+
+TEST_F(Simulate, StopsCleanlyWhenInterrupted) {
+  ProgramLimits interrupted;
+  interrupted.interrupt_after = std::chrono::milliseconds(250);
+  const ProgramResult stopped = simulate("rec", {}, interrupted);
+  if (stopped.exit_code == 0) GTEST_SKIP() << "it was done before";
+  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+  EXPECT_THAT(stopped.err, HasSubstr("--resume"));
+  EXPECT_EQ(simulate("rec", {"--resume"}).exit_code, 0);
+}
+
+TEST_F(Simulate, KeepsWhatWasDoneWhenTheDiskIsFull) {
+  ProgramLimits full_disk;
+  full_disk.largest_file_bytes = 9000;
+  const ProgramResult full = simulate("rec", {}, full_disk);
+  ASSERT_EQ(full.exit_code, 5) << full.err;
+  EXPECT_THAT(full.err, HasSubstr("rec/"));
+  const auto before = content_of(path("rec"));
+  EXPECT_FALSE(before.contains("recording.yaml"));
+  ASSERT_EQ(simulate("rec", {"--resume"}).exit_code, 0);
+  ASSERT_EQ(simulate("whole").exit_code, 0);
+  const auto whole = content_of(path("whole")), after = content_of(path("rec"));
+  ASSERT_EQ(after.size(), whole.size());
+  for (const auto& [name, content] : whole) EXPECT_TRUE(after.at(name) == content) << name;
+}
+
+TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
+  expect_refused("soil: {contrast: -0.1}", "soil.contrast");
+  expect_refused("imu: {gyro_bias_rad_s: -1}", "imu.gyro_bias_rad_s");
+  expect_refused("sensor_faults: [{sensor: sonar, from_s: 1, to_s: 2}]", "'sonar'");
+  expect_refused("sensor_faults: [{sensor: imu, from_s: 2, to_s: 1}]", "ends at 1 s");
+  expect_refused("camera_faults: [{pair: rear, from_s: 1, to_s: 2}]", "no pair 'rear'");
+  expect_refused("light: {sun_lux: 0, sky_lux: 0}", "both 0");
+  expect_refused("light: {sun_lux: -5}", "light.sun_lux");
+  expect_refused("colour: red", "unknown key");
+  write("small.yaml", "schema: 1\nrig: small_rig.yaml\nsamples: 0\n");
+  ProgramResult result = simulate("bad");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:3: samples"));
+  write("small.yaml", "schema: 1\nrig: small_rig.yaml\nsamples: 3\npath:\n  length_m: 300\n");
+  result = simulate("bad");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:3: samples"));
+  write("small.yaml", "schema: 1\nrig: small_rig.yaml\npath:\n  length_m: 300\n");
+  result = simulate("bad");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:4: path"));
+  EXPECT_THAT(result.err, HasSubstr("leaves the terrain"));
+  write("small.yaml", "schema: 1\nrig: small_rig.yaml\nshots:\n  stops_m: [99]\n");
+  result = simulate("bad");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:4: shots.stops_m"));
+  write("small.yaml", "schema: 1\nrig: none.yaml\n");
+  result = simulate("bad");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:2: rig"));
+  EXPECT_FALSE(fs::exists(path("bad")));
+}
+
+TEST_F(Simulate, LeavesExistingFoldersAlone) {
+  ASSERT_EQ(simulate("rec").exit_code, 0);
+  const auto before = content_of(path("rec"));
+  EXPECT_EQ(simulate("rec").exit_code, 5);
+  EXPECT_EQ(simulate("rec", {"--resume"}).exit_code, 5) << "it is whole";
+  EXPECT_EQ(content_of(path("rec")), before);
+  fs::remove(path("rec/recording.yaml"));
+  const ProgramResult other = simulate("rec", {"--resume", "--seed", "9"});
+  EXPECT_EQ(other.exit_code, 4);
+  EXPECT_THAT(other.err, HasSubstr("another scenario or seed"));
+  fs::create_directories(path("mine"));
+  write("mine/letter.txt", "dear");
+  EXPECT_EQ(simulate("mine").exit_code, 5);
+  EXPECT_EQ(simulate("mine", {"--resume"}).exit_code, 5);
+}
+
+TEST_F(Simulate, RecordsTheRigAsItIsBelieved) {
+  write("small.yaml", std::string(kScenario) + "believed: {yaw_deg: 0.02, rows_px: 0.3, focal_percent: 0.1}\n");
+  ASSERT_EQ(simulate("rec").exit_code, 0);
+  auto files = content_of(path("rec"));
+  EXPECT_NE(files["rig.yaml"], files["truth/rig.yaml"]);
+  EXPECT_THAT(files["rig.yaml"], HasSubstr("130.13"));
+}
+
+TEST_F(Simulate, NamesTheShippedScenarios) {
+  const ProgramResult result = run_program({"simulate", "nowhere", "-o", path("x")});
+  EXPECT_EQ(result.exit_code, 3);
+  for (const char* name : {"quick", "traverse_100m", "loop", "crater_rim", "flat_featureless", "rocky_20pct",
+                           "night_edge", "diffuse_200lux", "miscalibrated", "slip"}) {
+    EXPECT_THAT(result.err, HasSubstr(name));
+  }
+}
+
+}  // namespace
+}  // namespace spartan
