@@ -1,11 +1,12 @@
 # The newcomer's door. Every target installs what it needs first (./setup, quick where nothing is missing).
-.PHONY: help demo test build bench format lint coverage clean
+.PHONY: help demo test build bench recordings format lint coverage clean
 
 help:
 	@echo "make demo      build, then a drive over a simulated Mars (or INPUT=path); demo_output/report.html shows it"
 	@echo "make test      build, then run the fast tests"
 	@echo "make build     the program: build/release/bin/spartan"
 	@echo "make bench     all benchmarks; make bench-NAME: the one of bench/NAME.cpp"
+	@echo "make recordings  the standard simulated recordings, once, into ~/.cache/spartan (an hour)"
 	@echo "make format    format the C++ files"
 	@echo "make lint      clang-tidy on what changed since the commit in .ci/lint-base (or LINT_BASE=commit, LINT_BASE=all)"
 	@echo "make coverage  line coverage of the fast tests"
@@ -34,6 +35,11 @@ bench-%:
 	./setup build develop
 	scripts/build release -DSPARTAN_BENCH=ON bench_$*
 	build/release/bench/$* $(ARGS)
+
+recordings:
+	./setup build
+	scripts/build release spartan_program
+	scripts/recordings $(ARGS)
 
 format:
 	./setup develop

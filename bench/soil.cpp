@@ -105,9 +105,10 @@ Image<float> to_float(const FrameImage& image) {
   Image<float> out(image.width(), image.height());
   const bool wide = image.format().bits > 8;
   for (int y = 0; y < out.height(); ++y) {
-    for (int x = 0; x < out.width(); ++x)
+    for (int x = 0; x < out.width(); ++x) {
       out(x, y) = wide ? static_cast<float>(image.as<std::uint16_t>()(x, y))
                        : static_cast<float>(image.as<std::uint8_t>()(x, y));
+    }
   }
   return out;
 }
@@ -188,9 +189,10 @@ cv::Mat tile(ImageView<const std::uint8_t> image, const std::string& name) {
 void write_sheet(const std::string& path, const std::vector<cv::Mat>& tiles) {
   const int rows = (static_cast<int>(tiles.size()) + kColumns - 1) / kColumns;
   cv::Mat sheet(rows * (kTileHeight + 24), kColumns * kTileWidth, CV_8U, cv::Scalar(255));
-  for (int i = 0; i < static_cast<int>(tiles.size()); ++i)
+  for (int i = 0; i < static_cast<int>(tiles.size()); ++i) {
     tiles[static_cast<std::size_t>(i)].copyTo(
         sheet(cv::Rect(i % kColumns * kTileWidth, i / kColumns * (kTileHeight + 24), kTileWidth, kTileHeight + 24)));
+  }
   cv::imwrite(path, sheet, {cv::IMWRITE_JPEG_QUALITY, 85});
 }
 
@@ -277,9 +279,10 @@ void compare(const std::vector<std::string>& words) {
   for (const std::string eye : {"NL", "NR"}) {
     const auto image =
         read_gray8(fmt::format("{}/mars/msl_navcam_sol1431/{}B_524534514EDR_F0562034NCAM00280M_.jpeg", real, eye));
-    if (image)
+    if (image) {
       tiles.push_back(
           tile(image->view().crop(0, 424, 1024, 600), "Curiosity, " + eye + "B sol 1431 (NASA/JPL-Caltech)"));
+    }
   }
   for (const fs::path& file : files) measure(file, pictures, tiles);
   if (!sheet.empty()) write_sheet(sheet, tiles);

@@ -299,7 +299,7 @@ std::string to_yaml(const std::vector<OptionLine>& lines) {
 namespace spartan {
 
 std::string place_of_option(const std::string& text, const std::string& name, const std::string& key) {
-  const std::string nowhere = fmt::format("{}: {}", name, key);
+  std::string nowhere = fmt::format("{}: {}", name, key);
   try {
     YAML::Node node = YAML::Load(text);
     for (const std::string& part : options_detail::split_key(key)) {

@@ -85,10 +85,11 @@ TEST(Drive, TakesAFrameEveryStepAndPansAtItsStops) {
     int narrow_at_stop = 0;
     for (const Shot& shot : drive->shots()) {
       if (shot.position_id != stop) continue;
-      if (shot.pair == "wide")
+      if (shot.pair == "wide") {
         pans.push_back(shot.pan_rad * 180 / std::numbers::pi);
-      else
+      } else {
         ++narrow_at_stop;
+      }
       EXPECT_NEAR(drive->at(shot.time_s - 0.4).x, drive->at(shot.time_s + 0.4).x, 1e-9)
           << "pictures at a stop are taken at rest";
     }

@@ -370,9 +370,10 @@ TEST(GroundScene, IsTheSameGroundWhereverItIsMade) {
     const double x = random.uniform(0.4, 1.9), y = random.uniform(-0.9, 0.9);
     const auto height = [&](const GroundScene& scene) {
       RayPacket rays;
-      for (int k = 0; k < kPacket; ++k)
+      for (int k = 0; k < kPacket; ++k) {
         rays.set(k, (Eigen::Vector3d(x, y, 5) - scene.origin()).cast<float>(), -Eigen::Vector3f::UnitZ(),
                  k == 0 ? 20.0F : -1.0F);
+      }
       return 5 - static_cast<double>(scene.intersect(rays).distance[0]);
     };
     EXPECT_NEAR(height(a), height(b), 2e-5);

@@ -33,9 +33,10 @@ class Complaints {
 template <class Faults>
 void check_spans(const Faults& faults, const std::string& key, Complaints& complaints) {
   for (std::size_t i = 0; i < faults.size(); ++i) {
-    if (!(faults[i].to_s > faults[i].from_s))
+    if (!(faults[i].to_s > faults[i].from_s)) {
       complaints.add(key, fmt::format("item {} ends at {} s, not after its start at {} s", i + 1, faults[i].to_s,
                                       faults[i].from_s));
+    }
   }
 }
 
@@ -54,9 +55,10 @@ Result<Scenario> parse_scenario(const std::string& text, const std::string& name
     complaints.add("samples", fmt::format("is {}, must be 1, 2, 4, 9 or 16", scenario->samples));
   if (scenario->light.sun_lux <= 0 && scenario->light.sky_lux <= 0)
     complaints.add("light", "there is none: sun_lux and sky_lux are both 0");
-  if (!(scenario->rocks.largest_m > scenario->rocks.smallest_m))
+  if (!(scenario->rocks.largest_m > scenario->rocks.smallest_m)) {
     complaints.add("rocks", fmt::format("largest_m ({}) must be above smallest_m ({})", scenario->rocks.largest_m,
                                         scenario->rocks.smallest_m));
+  }
   check_spans(scenario->sensor_faults, "sensor_faults", complaints);
   check_spans(scenario->camera_faults, "camera_faults", complaints);
   if (Status s = complaints.status(); !s) return failure(s);

@@ -73,10 +73,11 @@ Status write_maps(const SimulationRequest& request, const World& world, const Wo
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       above(x, y) = map.surface(x, y) - map.level(x, y);
-      if (map.surface(x, y) - map.ground(x, y) > truth.obstacle_m)
+      if (map.surface(x, y) - map.ground(x, y) > truth.obstacle_m) {
         kind(x, y) = 2;
-      else if (map.level(x, y) - map.surface(x, y) > truth.cavity_m)
+      } else if (map.level(x, y) - map.surface(x, y) > truth.cavity_m) {
         kind(x, y) = 3;
+      }
     }
   }
   return write_geotiff(folder + "/obstacles.tif", place, {{"class", kind.view()}, {"height_m", above.view()}});

@@ -45,9 +45,10 @@ HeightGrid look_down(const GroundScene& scene, const Region& region, double step
         const HitPacket hits = scene.intersect(rays);
         for (int cell = 0; cell < kCells && first + cell < nx; ++cell) {
           float sum = 0;
-          for (int k = 0; k < kSide * kSide; ++k)
+          for (int k = 0; k < kSide * kSide; ++k) {
             sum += static_cast<float>(kAbove_m) -
                    std::min(hits.distance[cell * kSide * kSide + k], static_cast<float>(2 * kAbove_m));
+          }
           grid.heights(first + cell, j) = sum / (kSide * kSide);
         }
       }
@@ -63,9 +64,10 @@ HeightGrid ground_around(const TerrainShape& shape, const GroundScene& scene, co
                                static_cast<int>((region.y1 - region.y0) / kFarStep_m) + 2)};
   workers.for_each_part(0, grid.heights.height(), 4, [&](int from, int to) {
     for (int j = from; j < to; ++j) {
-      for (int i = 0; i < grid.heights.width(); ++i)
+      for (int i = 0; i < grid.heights.width(); ++i) {
         grid.heights(i, j) =
             static_cast<float>(shape.height(grid.x0 + i * kFarStep_m, grid.y0 + j * kFarStep_m) - scene.origin().z());
+      }
     }
   });
   return grid;

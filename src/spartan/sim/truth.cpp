@@ -38,9 +38,10 @@ DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& believed_rig, con
       const auto recorded = project(believed_left.model, view.left_from_rectified * rectified);
       if (!recorded || !lies_in(*recorded, true_left.size)) continue;
       const auto ray = unproject(true_left.model, *recorded);
-      if (ray)
+      if (ray) {
         directions_[static_cast<std::size_t>(v) * static_cast<std::size_t>(w) + static_cast<std::size_t>(u)] =
             ray->direction.cast<float>();
+      }
     }
   }
 }

@@ -1,0 +1,179 @@
+// Disparities on simulated pairs beside OpenCV's, with the truth, by range. `make bench-mars_stereo`.
+//
+//   mars_stereo [--from FOLDER] [--pairs N] SCENARIO...      recordings as scripts/recordings makes them
+//
+// Default: 10 wide pairs (other stops and pans each) of rocky_20pct, diffuse_200lux, night_edge, flat_featureless.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <opencv2/calib3d.hpp>
+#include <string>
+#include <vector>
+
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/opencv_bridge.h"
+#include "spartan/eval/disparity_truth.h"
+#include "spartan/imaging/imager.h"
+#include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/reconstruction/disparity_options.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kTwoCentimetres_m = 0.02;
+struct RangeBin {
+  double from_m, to_m;
+};
+constexpr std::array<RangeBin, 5> kBins{RangeBin{0, 100}, RangeBin{0, 1.5}, RangeBin{1.5, 2.5}, RangeBin{2.5, 4},
+                                        RangeBin{4, 100}};
+
+// Sums over pixels that both eyes see, of one matcher and one range.
+struct Score {
+  double truth = 0, matched = 0, beyond_1_px = 0, beyond_2_cm = 0, inside = 0, squares = 0;
+  void add(double disparity, double true_disparity, double focal_times_baseline) {
+    truth += 1;
+    if (!std::isfinite(disparity) || disparity <= 0) return;
+    matched += 1;
+    const double error = disparity - true_disparity;
+    if (std::abs(error) > 1) {
+      beyond_1_px += 1;
+    } else {
+      inside += 1;
+      squares += error * error;
+    }
+    if (std::abs(focal_times_baseline / disparity - focal_times_baseline / true_disparity) > kTwoCentimetres_m)
+      beyond_2_cm += 1;
+  }
+};
+using Scores = std::map<std::string, std::array<Score, kBins.size()>>;
+
+Image<float> opencv_disparity(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, int disparities,
+                              int mode) {
+  constexpr int kBlock = 5;
+  const auto matcher = cv::StereoSGBM::create(0, disparities, kBlock, 8 * kBlock * kBlock, 32 * kBlock * kBlock, 1, 63,
+                                              10, 100, 2, mode);
+  cv::Mat l, r, d;
+  cv::copyMakeBorder(as_mat(left), l, 0, 0, disparities, 0, cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(as_mat(right), r, 0, 0, disparities, 0, cv::BORDER_REPLICATE);
+  matcher->compute(l, r, d);
+  Image<float> result(left.width(), left.height());
+  for (int y = 0; y < left.height(); ++y) {
+    for (int x = 0; x < left.width(); ++x) {
+      const short value = d.at<short>(y, x + disparities);
+      result(x, y) = value > 0 ? static_cast<float>(value) / 16 : std::nanf("");
+    }
+  }
+  return result;
+}
+
+void add_scores(ImageView<const float> estimate, ImageView<const float> truth, ImageView<const std::uint8_t> mask,
+                const RectifiedStereo& geometry, std::array<Score, kBins.size()>& scores) {
+  const double fb = geometry.focal_px * geometry.baseline_m;
+  for (int y = 0; y < truth.height(); ++y) {
+    for (int x = 0; x < truth.width(); ++x) {
+      if (mask(x, y) != 255) continue;
+      const double depth = fb / truth(x, y), u = (x - geometry.centre_px.x()) / geometry.focal_px,
+                   v = (y - geometry.centre_px.y()) / geometry.focal_px;
+      const double range = depth * std::sqrt(1 + u * u + v * v);
+      for (std::size_t b = 0; b < kBins.size(); ++b) {
+        if (range >= kBins[b].from_m && range < kBins[b].to_m) scores[b].add(estimate(x, y), truth(x, y), fb);
+      }
+    }
+  }
+}
+
+void compare_pair(FrameSource& source, Imager& imager, const StereoPair& pair, Stamp stamp,
+                  const std::string& recording, Scores& scores) {
+  const auto frame = source.frame_at(pair.name, stamp);
+  const std::string name = fmt::format("/{}/{}.png", pair.name, stamp.ns);
+  const auto truth = read_disparity(recording + "/truth/disparity" + name);
+  const auto mask = read_truth_mask(recording + "/truth/mask" + name);
+  if (!frame || !truth || !mask) return;
+  const auto view = imager.process(*frame);
+  if (!view) return;
+  const DisparityRange range = disparity_range(view->geometry, pair.nearest_m);
+  const int disparities = (range.max + 15) / 16 * 16;
+  DisparityComputer computer(DisparityOptions{}, Workers(2));
+  if (const auto ours = computer.compute(view->left, view->right, range, view->left_mask, view->right_mask))
+    add_scores(ours->disparity, *truth, *mask, view->geometry, scores["Spartan"]);
+  add_scores(opencv_disparity(view->left, view->right, disparities, cv::StereoSGBM::MODE_SGBM), *truth, *mask,
+             view->geometry, scores["SGBM"]);
+  add_scores(opencv_disparity(view->left, view->right, disparities, cv::StereoSGBM::MODE_HH), *truth, *mask,
+             view->geometry, scores["HH"]);
+}
+
+void print(const std::string& scenario, const Scores& scores) {
+  for (const auto& [matcher, bins] : scores) {
+    for (std::size_t b = 0; b < kBins.size(); ++b) {
+      const Score& s = bins[b];
+      if (s.truth < 1) continue;
+      const std::string range =
+          b == 0 ? "all" : fmt::format("{:.1f}-{:.1f} m", kBins[b].from_m, std::min(kBins[b].to_m, 9.9));
+      fmt::print("{:<18} {:<8} {:<10} {:>7.3f} {:>9.2f} {:>9.2f} {:>10.2f} {:>9.1f}\n", scenario, matcher, range,
+                 std::sqrt(s.squares / s.inside), 100 * s.beyond_1_px / s.matched, 100 * s.beyond_2_cm / s.matched,
+                 100 * (1 - s.matched / s.truth), s.truth / 1e6);
+    }
+  }
+}
+
+void compare(const std::string& folder, const std::string& scenario, int wanted) {
+  const std::string recording = folder + "/" + scenario;
+  const auto source = open_recording(recording);
+  if (!source) {
+    fmt::print("{:<18} not there; scripts/recordings makes it\n", scenario);
+    return;
+  }
+  auto imager = Imager::create((*source)->info().rig, ImagingOptions(), Workers(2));
+  if (!imager) return;
+  Scores scores;
+  for (const StereoPair& pair : (*source)->info().rig.pairs) {
+    if (pair.for_odometry) continue;
+    const std::vector<Stamp> stamps = (*source)->announced_stamps(pair.name);
+    // Spread over the stops; the step is odd, so that the pans take turns.
+    const std::size_t count = std::min<std::size_t>(static_cast<std::size_t>(wanted), stamps.size());
+    for (std::size_t i = 0; i < count; ++i)
+      compare_pair(**source, *imager, pair, stamps[i * stamps.size() / count], recording, scores);
+  }
+  print(scenario, scores);
+}
+
+void run(const std::vector<std::string>& words) {
+  const char* const home = std::getenv("HOME");
+  std::string folder = std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings";
+  int wanted = 10;
+  std::vector<std::string> scenarios;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] == "--from" && i + 1 < words.size()) {
+      folder = words[++i];
+    } else if (words[i] == "--pairs" && i + 1 < words.size()) {
+      wanted = std::stoi(words[++i]);
+    } else {
+      scenarios.push_back(words[i]);
+    }
+  }
+  if (scenarios.empty()) scenarios = {"rocky_20pct", "diffuse_200lux", "night_edge", "flat_featureless"};
+  fmt::print("{:<18} {:<8} {:<10} {:>7} {:>9} {:>9} {:>10} {:>9}\n", "scenario", "matcher", "range", "RMS px",
+             "> 1 px %", "> 2 cm %", "unmatched%", "Mpixels");
+  for (const std::string& scenario : scenarios) compare(folder, scenario, wanted);
+}
+
+}  // namespace
+}  // namespace spartan
+
+int main(int argc, char** argv) {
+  try {
+    spartan::run({argv + 1, argv + argc});
+    return 0;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "mars_stereo: %s\n", e.what());
+    return 1;
+  }
+}
