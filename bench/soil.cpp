@@ -230,7 +230,7 @@ void measure(const fs::path& file, const std::string& pictures, std::vector<cv::
     for (int y = 0; y < noisy.height(); ++y) {
       for (int x = 0; x < noisy.width(); ++x) over_black(x, y) = noisy(x, y) - static_cast<float>(black);
     }
-    fmt::print("{:28} {:8.3f} {:8.3f}  ", file.stem().string() + ", " + pair,
+    fmt::print("{:28} {:8.3f} {:8.3f}  ", fmt::format("{}, {}", file.stem().string(), pair),
                local_contrast(preview.noise_free.view(), preview.soil.view()),
                local_contrast(over_black.view(), preview.soil.view()));
     const Place place = find_soil(preview.soil.view());
@@ -243,9 +243,9 @@ void measure(const fs::path& file, const std::string& pictures, std::vector<cv::
                "", place.side, place.side, place.x, place.y, 1e3 * preview.exposure.seconds, preview.exposure.gain,
                static_cast<double>(preview.rays) / preview.seconds / 1e6);
     if (preview.recorded.format().bits == 8)
-      sheet.push_back(tile(preview.recorded.as<std::uint8_t>(), file.stem().string() + ", " + pair));
+      sheet.push_back(tile(preview.recorded.as<std::uint8_t>(), fmt::format("{}, {}", file.stem().string(), pair)));
     if (!pictures.empty()) {
-      const std::string name = pictures + "/" + file.stem().string() + "_" + pair + ".png";
+      const std::string name = fmt::format("{}/{}_{}.png", pictures, file.stem().string(), pair);
       if (preview.recorded.format().bits == 8) (void)write_png(name, preview.recorded.as<std::uint8_t>());
     }
   }
