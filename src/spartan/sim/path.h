@@ -75,13 +75,13 @@ class Motion {
   double rate_ = 0, ramp_s_ = 0, seconds_ = 0;
 };
 
-/// The curves and turns of a path in order, from options. `stops_m`: distances at which a curve is cut, so that the
-/// rover comes to rest there. Code `configuration` for waypoints that make no path.
+/// A curve to drive, a turn on the spot, or a rest.
 struct PathLeg {
   std::vector<PlanarPose> curve;  ///< empty: a turn on the spot or a rest
   double turn_rad = 0;
   double rest_s = 0;
 };
+/// The legs of a path in order. Code `configuration` for waypoints that make no path.
 Result<std::vector<PathLeg>> lay_path(const PathOptions& options);
 
 /// Length driven along a curve's points.

@@ -18,9 +18,11 @@ constexpr float kUnderneath = 0.4F;      // of what is seen over an overhang, un
 constexpr float kSameHeight_m = 0.005F;  // points of the grid that differ more from a place count less for it
 
 // Heights on a grid; point (i, j) stands at (x0 + i step, y0 + j step).
+// A cell's highest place hides the sky from others.
 struct HeightGrid {
   double x0, y0, step;
   Image<float> heights;
+  Image<float> tops = {};
 };
 
 // The scene seen from above, the mean of kSide² places a cell.
@@ -29,6 +31,7 @@ HeightGrid look_down(const GroundScene& scene, const Region& region, double step
                   Image<float>(static_cast<int>((region.x1 - region.x0) / step) + 2,
                                static_cast<int>((region.y1 - region.y0) / step) + 2)};
   const auto [nx, ny] = grid.heights.size();
+  grid.tops = Image<float>(nx, ny);
   static_assert(kPacket % (kSide * kSide) == 0);
   constexpr int kCells = kPacket / (kSide * kSide);
   workers.for_each_part(0, ny, 16, [&](int from, int to) {
@@ -44,12 +47,14 @@ HeightGrid look_down(const GroundScene& scene, const Region& region, double step
         }
         const HitPacket hits = scene.intersect(rays);
         for (int cell = 0; cell < kCells && first + cell < nx; ++cell) {
-          float sum = 0;
+          float sum = 0, top = -static_cast<float>(kAbove_m);
           for (int k = 0; k < kSide * kSide; ++k) {
-            sum += static_cast<float>(kAbove_m) -
-                   std::min(hits.distance[cell * kSide * kSide + k], static_cast<float>(2 * kAbove_m));
+            const float depth = std::min(hits.distance[cell * kSide * kSide + k], static_cast<float>(2 * kAbove_m));
+            sum += static_cast<float>(kAbove_m) - depth;
+            top = std::max(top, static_cast<float>(kAbove_m) - depth);
           }
           grid.heights(first + cell, j) = sum / (kSide * kSide);
+          grid.tops(first + cell, j) = top;
         }
       }
     }
@@ -70,6 +75,7 @@ HeightGrid ground_around(const TerrainShape& shape, const GroundScene& scene, co
       }
     }
   });
+  grid.tops = grid.heights.clone();
   return grid;
 }
 
@@ -104,13 +110,11 @@ class HorizonSweep {
     double at, height;
   };
 
-  double height_at(int along, double across) const {
+  double height_at(const Image<float>& heights, int along, double across) const {
     const int low = std::clamp(static_cast<int>(std::floor(across)), 0, minor_ - 1),
               high = std::min(low + 1, minor_ - 1);
     const double part = std::clamp(across - low, 0.0, 1.0);
-    const auto at = [&](int m) {
-      return static_cast<double>(along_x_ ? grid_.heights(along, m) : grid_.heights(m, along));
-    };
+    const auto at = [&](int m) { return static_cast<double>(along_x_ ? heights(along, m) : heights(m, along)); };
     return at(low) + part * (at(high) - at(low));
   }
 
@@ -121,12 +125,12 @@ class HorizonSweep {
       const double across = line + drift_ * along;
       const int cell = static_cast<int>(std::floor(across + 0.5));
       if (cell < 0 || cell >= minor_) continue;
-      const Point here{-pace_ * step, height_at(along, across)};
+      const Point here{-pace_ * step, height_at(grid_.heights, along, across)};
       const auto slope = [&](const Point& p) { return (p.height - here.height) / (p.at - here.at); };
       while (hull.size() >= 2 && slope(hull[hull.size() - 2]) >= slope(hull.back())) hull.pop_back();
       const auto horizon = static_cast<float>(hull.empty() ? 0.0 : std::max(slope(hull.back()), 0.0));
       (along_x_ ? result(along, cell) : result(cell, along)) = horizon;
-      hull.push_back(here);
+      hull.push_back({here.at, height_at(grid_.tops, along, across)});
     }
   }
 

@@ -87,7 +87,7 @@ TEST(SkyLight, StaysBelowTheSensorsNoise) {
   ASSERT_GT(rock.count, 100);
   EXPECT_LT(ground.rms, 0.045);
   EXPECT_LT(ground.ninth_decile, 0.02);
-  EXPECT_LT(std::abs(ground.bias), 0.015);
+  EXPECT_LT(std::abs(ground.bias), 0.01);
   EXPECT_LT(rock.rms, 0.05);
   EXPECT_LT(std::abs(rock.bias), 0.01);
 }
