@@ -15,7 +15,7 @@ constexpr std::array<double, kSpots> kSpotY{0, 0, 0, 0.7, -0.7, 0.5, 0.5, -0.5, 
 
 }  // namespace
 
-Vector6d stand_on(const TerrainShape& shape, const ChassisOptions& chassis, const PlanarPose& at) {
+Vector6d stand_on(const WheelGround& ground, const ChassisOptions& chassis, const PlanarPose& at) {
   const double c = std::cos(at.heading), s = std::sin(at.heading);
   std::array<double, 4 * kSpots> x{}, y{}, z{};
   std::array<double, 4> height{};
@@ -23,13 +23,15 @@ Vector6d stand_on(const TerrainShape& shape, const ChassisOptions& chassis, cons
   for (int wheel = 0; wheel < 4; ++wheel) {
     const double along = (wheel < 2 ? 0.5 : -0.5) * chassis.wheelbase_m,
                  aside = (wheel % 2 == 0 ? 0.5 : -0.5) * chassis.track_m;
+    height[static_cast<std::size_t>(wheel)] =
+        ground.rocks.at(at.x + c * along - s * aside, at.y + s * along + c * aside, at.heading);
     for (std::size_t k = 0; k < kSpots; ++k, ++n) {
       const double a = along + chassis.wheel_radius_m * kSpotX[k], b = aside + chassis.wheel_radius_m * kSpotY[k];
       x[n] = at.x + c * a - s * b;
       y[n] = at.y + s * a + c * b;
     }
   }
-  shape.heights(x, y, z);
+  ground.shape.heights(x, y, z);
   for (std::size_t i = 0; i < z.size(); ++i) height[i / kSpots] += z[i] / kSpots;
   // Least squares over a rectangle: each slope is the difference of the sides' means.
   const double rise_along = ((height[0] + height[1]) - (height[2] + height[3])) / (2 * chassis.wheelbase_m);
@@ -41,12 +43,12 @@ Vector6d stand_on(const TerrainShape& shape, const ChassisOptions& chassis, cons
   return result;
 }
 
-BodyMotion::BodyMotion(const Drive& drive, const TerrainShape& shape, const ChassisOptions& chassis,
+BodyMotion::BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis,
                        const Workers& workers)
     : knots_(static_cast<std::size_t>(std::ceil(drive.seconds() / kKnot_s)) + 1) {
   workers.for_each_part(0, static_cast<int>(knots_.size()), 256, [&](int from, int to) {
     for (int i = from; i < to; ++i)
-      knots_[static_cast<std::size_t>(i)] = stand_on(shape, chassis, drive.at(i * kKnot_s));
+      knots_[static_cast<std::size_t>(i)] = stand_on(ground, chassis, drive.at(i * kKnot_s));
   });
 }
 

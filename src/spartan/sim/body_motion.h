@@ -9,6 +9,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/sim/drive.h"
 #include "spartan/sim/terrain_shape.h"
+#include "spartan/sim/wheel_lift.h"
 
 namespace spartan::sim {
 
@@ -16,6 +17,7 @@ struct ChassisOptions {
   double wheelbase_m = 0.7;
   double track_m = 0.6;
   double wheel_radius_m = 0.1;
+  double wheel_width_m = 0.08;
   double clearance_m = 0.05;
 
   template <class Visitor>
@@ -24,18 +26,25 @@ struct ChassisOptions {
     v.field("track_m", track_m, "left to right wheel", between(0.05, 10));
     v.field("wheel_radius_m", wheel_radius_m, "the ground's height counts as its mean over so wide a disc",
             between(0.01, 2));
-    v.field("clearance_m", clearance_m,
-            "rocks higher than this are kept off the rover's way; lower ones give way to it", between(0, 5));
+    v.field("wheel_width_m", wheel_width_m, "of the rim that climbs rocks", between(0.005, 2));
+    v.field("clearance_m", clearance_m, "rocks higher than this are kept off the rover's way; wheels climb lower ones",
+            between(0, 5));
   }
 };
 
-/// The body stands on the plane through the ground at its four wheels (least squares). The six numbers (position; roll,
+/// The ground that wheels roll on.
+struct WheelGround {
+  const TerrainShape& shape;
+  const WheelLift& rocks;
+};
+
+/// The body stands on the plane through its four wheels' feet (least squares). The six numbers (position; roll,
 /// pitch, yaw about fixed axes in the order x, y, z) are sampled every kKnot_s and blended by uniform cubic B-splines,
 /// so that position and attitude are twice continuously differentiable: this blend is the true motion.
 class BodyMotion {
  public:
   static constexpr double kKnot_s = 0.1;
-  BodyMotion(const Drive& drive, const TerrainShape& shape, const ChassisOptions& chassis, const Workers& workers);
+  BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis, const Workers& workers);
 
   Pose world_from_body(double time_s) const;
   Eigen::Vector3d velocity(double time_s) const;          ///< m/s, world
@@ -50,6 +59,6 @@ class BodyMotion {
 };
 
 /// The body on the ground at a place, as BodyMotion samples it: x, y, z, roll, pitch, yaw.
-Vector6d stand_on(const TerrainShape& shape, const ChassisOptions& chassis, const PlanarPose& at);
+Vector6d stand_on(const WheelGround& ground, const ChassisOptions& chassis, const PlanarPose& at);
 
 }  // namespace spartan::sim

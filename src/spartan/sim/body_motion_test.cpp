@@ -20,7 +20,7 @@ struct Ride {
 Ride ride(const PathOptions& path, const TerrainShapeOptions& terrain = {}) {
   auto drive = Drive::plan(path, {}, Rig());
   TerrainShape shape(terrain, 4);
-  BodyMotion motion(*drive, shape, {}, Workers(1));
+  BodyMotion motion(*drive, {shape, WheelLift()}, {}, Workers(1));
   return {std::move(*drive), shape, motion};
 }
 
@@ -48,7 +48,7 @@ TEST(BodyMotion, StandsOnAPlaneAsItLies) {
   const TerrainShape shape(plane, 1);
   for (const double heading_deg : {0.0, 30.0, 120.0, -60.0}) {
     const double heading = heading_deg * std::numbers::pi / 180;
-    const Vector6d at = stand_on(shape, {}, {0.5, -0.2, heading});
+    const Vector6d at = stand_on({shape, WheelLift()}, {}, {0.5, -0.2, heading});
     const Eigen::Quaterniond turn = Eigen::AngleAxisd(at[5], Eigen::Vector3d::UnitZ()) *
                                     Eigen::AngleAxisd(at[4], Eigen::Vector3d::UnitY()) *
                                     Eigen::AngleAxisd(at[3], Eigen::Vector3d::UnitX());

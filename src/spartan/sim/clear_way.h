@@ -1,11 +1,10 @@
 // The strip of ground that the rover's wheels and belly need.
 #pragma once
 
-#include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 #include "spartan/sim/path.h"
+#include "spartan/sim/spatial_hash.h"
 
 namespace spartan::sim {
 
@@ -19,10 +18,8 @@ class ClearWay {
   bool blocked_by(double x, double y, double radius_m) const;
 
  private:
-  static constexpr double kCell_m = 0.5;
-
   double half_width_m_ = 0;
-  std::unordered_map<std::uint64_t, std::vector<PlanarPose>> cells_;
+  SpatialHash<PlanarPose> track_;
 };
 
 }  // namespace spartan::sim

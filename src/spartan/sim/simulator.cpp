@@ -49,13 +49,16 @@ void add_view(Region& region, const Camera& camera, const Pose& world_from_camer
   }
 }
 
+Region bounds_of(const std::vector<PlanarPose>& track) {
+  Region region{track.front().x, track.front().y, track.front().x, track.front().y};
+  for (const PlanarPose& p : track)
+    region = {std::min(region.x0, p.x), std::min(region.y0, p.y), std::max(region.x1, p.x), std::max(region.y1, p.y)};
+  return region;
+}
+
 Status write_maps(const SimulationRequest& request, const World& world, const Workers& workers) {
   const std::string folder = request.folder + "/truth";
-  Region region{0, 0, 0, 0};
-  for (const PlanarPose& p : request.drive.track()) {
-    region = {std::min(region.x0, p.x), std::min(region.y0, p.y), std::max(region.x1, p.x), std::max(region.y1, p.y)};
-  }
-  region = region.grown(kMapMargin_m);
+  const Region region = bounds_of(request.drive.track()).grown(kMapMargin_m);
   std::string rocks = "x_m,y_m,diameter_m,height_m\n";
   for (const Rock& rock : world.rocks.rocks_between(region, RockField::kLargestPebble_m))
     rocks += fmt::format("{:.4f},{:.4f},{:.4f},{:.4f}\n", rock.x, rock.y, rock.diameter_m, rock.height_m);
@@ -99,7 +102,7 @@ class Simulation {
         workers_(workers),
         scenario_(request.scenario),
         world_(make_world(request.scenario, request.drive)),
-        motion_(request.drive, world_.shape, request.scenario.chassis, workers),
+        motion_(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers),
         believed_(believed_rig(request.rig, request.scenario.believed)) {}
 
   Result<SimulationReport> run() {
@@ -336,10 +339,19 @@ class Simulation {
 
 World make_world(const Scenario& scenario, const Drive& drive) {
   const auto seed = static_cast<std::uint64_t>(scenario.seed);
-  World world{TerrainShape(scenario.terrain, seed), RockField(scenario.rocks, seed), Soil(scenario.soil, seed),
-              Sun(scenario.light), scenario.light.sky_lux};
-  world.shape.set_datum(stand_on(world.shape, scenario.chassis, drive.at(0))[2]);
-  world.rocks.keep_off(ClearWay(drive.track(), 0.5 * scenario.chassis.track_m + 0.1), scenario.chassis.clearance_m);
+  const ChassisOptions& chassis = scenario.chassis;
+  const std::vector<PlanarPose> track = drive.track();
+  World world{TerrainShape(scenario.terrain, seed),
+              RockField(scenario.rocks, seed),
+              {},
+              Soil(scenario.soil, seed),
+              Sun(scenario.light),
+              scenario.light.sky_lux};
+  world.rocks.keep_off(ClearWay(track, 0.5 * chassis.track_m + 0.1), chassis.clearance_m);
+  const double reach = std::hypot(chassis.wheelbase_m, chassis.track_m);
+  world.wheel_lift = WheelLift(world.rocks.rocks_between(bounds_of(track).grown(reach), WheelLift::kPressedIn_m),
+                               chassis.wheel_radius_m, chassis.wheel_width_m);
+  world.shape.set_datum(stand_on({world.shape, world.wheel_lift}, chassis, drive.at(0))[2]);
   return world;
 }
 

@@ -60,6 +60,7 @@ ShotPreview preview_left(const SimulationRequest& request, std::size_t shot, con
 struct World {
   TerrainShape shape;
   RockField rocks;
+  WheelLift wheel_lift;
   Soil soil;
   Sun sun;
   double sky_lux = 0;

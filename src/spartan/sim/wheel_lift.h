@@ -1,0 +1,30 @@
+// Wheels climb the rocks that they roll over.
+#pragma once
+
+#include <vector>
+
+#include "spartan/sim/rock_field.h"
+#include "spartan/sim/spatial_hash.h"
+
+namespace spartan::sim {
+
+/// A rigid wheel over rocks taken for half ellipsoids of their size. Rocks lower than kPressedIn_m give way.
+class WheelLift {
+ public:
+  static constexpr double kPressedIn_m = 0.01;
+
+  WheelLift() = default;
+  WheelLift(const std::vector<Rock>& rocks, double wheel_radius_m, double wheel_width_m);
+
+  /// How far a wheel on level ground is lifted, m: the largest, over its footprint, of the rocks' height less that of
+  /// the wheel's rim over the ground, R − √(R² − s²) at the distance s before or behind its middle.
+  double at(double x, double y, double heading) const;
+
+ private:
+  double rocks_over(double x, double y) const;
+
+  double radius_m_ = 0, width_m_ = 0, largest_reach_m_ = 0;
+  SpatialHash<Rock> rocks_;
+};
+
+}  // namespace spartan::sim

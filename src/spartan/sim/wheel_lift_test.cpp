@@ -1,0 +1,64 @@
+#include "spartan/sim/wheel_lift.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "spartan/sim/body_motion.h"
+
+namespace spartan::sim {
+namespace {
+
+Rock dome(double x, double y, double radius_m) {
+  Rock rock;
+  rock.x = x;
+  rock.y = y;
+  rock.diameter_m = 2 * radius_m;
+  rock.height_m = radius_m;
+  return rock;
+}
+
+// Two circles that touch: the wheel's middle is R + a from the dome's, so it stands √((R + a)² − d²) high.
+TEST(WheelLift, IsThatOfACircleOnACircle) {
+  constexpr double kWheel_m = 0.1, kDome_m = 0.04;
+  const WheelLift lift({dome(1, 2, kDome_m)}, kWheel_m, 0.01);
+  const double heading = 0.7, reach = std::sqrt(std::pow(kWheel_m + kDome_m, 2) - kWheel_m * kWheel_m);
+  for (double d = -0.12; d <= 0.12; d += 0.007) {
+    const double expected =
+        std::abs(d) < reach ? std::sqrt(std::pow(kWheel_m + kDome_m, 2) - d * d) - kWheel_m : 0.0;
+    EXPECT_NEAR(lift.at(1 + d * std::cos(heading), 2 + d * std::sin(heading), heading), expected, 0.0015) << d;
+  }
+}
+
+TEST(WheelLift, PebblesArePressedInAndRocksBesideTheRimDoNothing) {
+  const WheelLift lift({dome(0, 0, 0.009), dome(0, 1, 0.04)}, 0.1, 0.08);
+  EXPECT_EQ(lift.at(0, 0, 0), 0);
+  EXPECT_EQ(lift.at(0, 1 - 0.085, 0), 0);
+  EXPECT_GT(lift.at(0, 1 - 0.075, 0), 0);
+  EXPECT_GT(lift.at(0, 1 - 0.085, 1.5), 0);
+}
+
+TEST(WheelLift, ALongRockLiftsAlongItsLength) {
+  Rock rock = dome(0, 0, 0.04);
+  rock.elongation = 1.6;
+  rock.turn_rad = 1.5707963;
+  const WheelLift lift({rock}, 0.1, 0.01);
+  EXPECT_GT(lift.at(0, 0.048, 0), 0);
+  EXPECT_EQ(lift.at(0.048 + 0.09, 0, 1.5707963), 0);
+}
+
+// A rock under the left front wheel: up a quarter, nose up, left side up.
+TEST(WheelLift, TheBodyTiltsAwayFromTheRock) {
+  TerrainShapeOptions level;
+  level.relief_m = level.ripple_height_m = level.dune_height_m = 0;
+  const TerrainShape shape(level, 1);
+  const ChassisOptions chassis;
+  const WheelLift lift({dome(0.5 * chassis.wheelbase_m, 0.5 * chassis.track_m, 0.04)}, chassis.wheel_radius_m, 0.01);
+  const Vector6d flat = stand_on({shape, WheelLift()}, chassis, {}), tilted = stand_on({shape, lift}, chassis, {});
+  EXPECT_NEAR(tilted[2] - flat[2], 0.01, 1e-9);
+  EXPECT_NEAR(tilted[4] - flat[4], -std::atan(0.02 / chassis.wheelbase_m), 1e-4);
+  EXPECT_NEAR(tilted[3] - flat[3], std::atan(0.02 / chassis.track_m), 1e-4);
+}
+
+}  // namespace
+}  // namespace spartan::sim
