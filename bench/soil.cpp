@@ -1,8 +1,9 @@
 // The texture of simulated soil beside that of real ground: local contrast and power spectrum. `make bench-soil`.
 //
-//   soil [--pictures DIR] [--sheet FILE] [SCENARIO.yaml...]        without scenarios: all of config/scenarios
+//   soil [--pictures DIR] [--sheet FILE] [--plot FILE.svg] [SCENARIO.yaml...]   without scenarios: all of
+//   config/scenarios
 //
-// --sheet: a contact sheet of all scenarios beside Curiosity's pair.
+// --sheet: a contact sheet of all scenarios beside Curiosity's pair. --plot: the spectra.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,6 +25,7 @@
 #include "spartan/core/image_io.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/sim/simulator.h"
+#include "spectrum_plot.h"
 
 namespace spartan {
 namespace {
@@ -57,10 +59,8 @@ double local_contrast(ImageView<const float> image, ImageView<const std::uint8_t
   return *middle;
 }
 
-constexpr std::array<double, 6> kFrequencies{0.05, 0.1, 0.15, 0.2, 0.3, 0.4};  // cycles a pixel
-
 // Mean power in rings of width 0.03 around each frequency, over that of the first; Hann window, mean and slope removed.
-std::array<double, kFrequencies.size()> spectrum(ImageView<const float> patch) {
+Spectrum spectrum(ImageView<const float> patch) {
   const int n = std::min(patch.width(), patch.height());
   cv::Mat m(n, n, CV_64F), design(n * n, 3, CV_64F), values(n * n, 1, CV_64F), plane;
   for (int y = 0; y < n; ++y) {
@@ -81,7 +81,7 @@ std::array<double, kFrequencies.size()> spectrum(ImageView<const float> patch) {
   }
   cv::Mat f;
   cv::dft(m, f, cv::DFT_COMPLEX_OUTPUT);
-  std::array<double, kFrequencies.size()> power{};
+  Spectrum power{};
   std::array<int, kFrequencies.size()> count{};
   for (int y = 0; y < n; ++y) {
     for (int x = 0; x < n; ++x) {
@@ -113,8 +113,8 @@ Image<float> to_float(const FrameImage& image) {
   return out;
 }
 
-void print_spectrum(ImageView<const float> patch) {
-  for (const double p : spectrum(patch)) fmt::print(" {:8.4f}", p);
+void print(const Spectrum& power) {
+  for (const double p : power) fmt::print(" {:8.4f}", p);
   fmt::print("\n");
 }
 
@@ -151,7 +151,7 @@ constexpr std::array kReal{
     Patch{"Curiosity ground", "mars/msl_navcam_sol1431/NLB_524534514EDR_F0562034NCAM00280M_.jpeg", 150, 820, 96, 96},
     Patch{"Curiosity slope", "mars/msl_navcam_sol1431/NLB_524534514EDR_F0562034NCAM00280M_.jpeg", 560, 700, 80, 64}};
 
-void measure_real(const std::string& data) {
+void measure_real(const std::string& data, SpectrumPlot& plot) {
   for (const Patch& patch : kReal) {
     const auto image = read_gray8(data + "/" + patch.file);
     if (!image) {
@@ -161,7 +161,9 @@ void measure_real(const std::string& data) {
     const auto whole = to_float(FrameImage::borrow(image->view(), {}));
     const auto part = whole.view().crop(patch.x, patch.y, patch.width, patch.height);
     fmt::print("{:28} {:8} {:8.3f}  ", patch.name, "", local_contrast(part, {}));
-    print_spectrum(part);
+    const Spectrum power = spectrum(part);
+    print(power);
+    plot.add_real(patch.name, power);
   }
 }
 
@@ -214,7 +216,7 @@ std::optional<sim::SimulationRequest> load(const fs::path& file) {
   return sim::SimulationRequest{*scenario, *rig, std::move(*drive), {}, "", false};
 }
 
-void measure(const fs::path& file, const std::string& pictures, std::vector<cv::Mat>& sheet) {
+void measure(const fs::path& file, const std::string& pictures, std::vector<cv::Mat>& sheet, SpectrumPlot& plot) {
   const auto request = load(file);
   if (!request) return;
   const auto& shots = request->drive.shots();
@@ -235,7 +237,9 @@ void measure(const fs::path& file, const std::string& pictures, std::vector<cv::
                local_contrast(over_black.view(), preview.soil.view()));
     const Place place = find_soil(preview.soil.view());
     if (place.side > 0) {
-      print_spectrum(noisy.view().crop(place.x, place.y, place.side, place.side));
+      const Spectrum power = spectrum(noisy.view().crop(place.x, place.y, place.side, place.side));
+      print(power);
+      plot.add_simulated(fmt::format("{}, {}", file.stem().string(), pair), power);
     } else {
       fmt::print(" no square of soil alone\n");
     }
@@ -252,7 +256,7 @@ void measure(const fs::path& file, const std::string& pictures, std::vector<cv::
 }
 
 void compare(const std::vector<std::string>& words) {
-  std::string pictures, sheet;
+  std::string pictures, sheet, plot_file;
   std::vector<fs::path> files;
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
@@ -260,6 +264,8 @@ void compare(const std::vector<std::string>& words) {
       pictures = words[++i];
     } else if (word == "--sheet" && i + 1 < words.size()) {
       sheet = words[++i];
+    } else if (word == "--plot" && i + 1 < words.size()) {
+      plot_file = words[++i];
     } else {
       files.emplace_back(word);
     }
@@ -274,7 +280,8 @@ void compare(const std::vector<std::string>& words) {
   for (const double f : kFrequencies) fmt::print(" {:7.2f}", f);
   fmt::print(" cycles a pixel\n");
   const std::string real = data != nullptr ? data : "../shared/data";
-  measure_real(real);
+  SpectrumPlot plot;
+  measure_real(real, plot);
   std::vector<cv::Mat> tiles;
   for (const std::string eye : {"NL", "NR"}) {
     const auto image =
@@ -284,8 +291,9 @@ void compare(const std::vector<std::string>& words) {
           tile(image->view().crop(0, 424, 1024, 600), "Curiosity, " + eye + "B sol 1431 (NASA/JPL-Caltech)"));
     }
   }
-  for (const fs::path& file : files) measure(file, pictures, tiles);
+  for (const fs::path& file : files) measure(file, pictures, tiles, plot);
   if (!sheet.empty()) write_sheet(sheet, tiles);
+  if (!plot_file.empty()) (void)write_file_atomically(plot_file, plot.svg());
 }
 
 }  // namespace

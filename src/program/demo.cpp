@@ -19,10 +19,10 @@ Status say(const std::string& text) {
   return print("\n== " + text + "\n");
 }
 
-Result<ExitCode> demo(const Context& context, const std::string& folder) {
+Result<ExitCode> demo(const Context& context, const std::string& scenario, const std::string& folder) {
   const std::string recording = folder + "/recording", run_folder = folder + "/run";
-  if (Status s = say("A rover drives 4 m over a simulated Mars: " + recording); !s) return failure(s);
-  const auto simulated = simulate_scenario(context, {"quick", recording, std::nullopt, false});
+  if (Status s = say("A rover drives over a simulated Mars: " + recording); !s) return failure(s);
+  const auto simulated = simulate_scenario(context, {scenario, recording, std::nullopt, false});
   if (!simulated) return failure(simulated);
   if (simulated->interrupted) return failure(ErrorCode::interrupted, "stopped on request", folder);
   if (Status s = print(simulated->text); !s) return failure(s);
@@ -57,8 +57,11 @@ Result<ExitCode> demo(const Context& context, const std::string& folder) {
 
 void add_demo(CLI::App& app, Context& context) {
   auto folder = std::make_shared<std::string>("spartan_demo");
-  CLI::App* verb = add_verb(app, context, "demo", "A drive over a simulated Mars, start to end, with a page to look at",
-                            "demo -o spartan_demo", [&context, folder] { return demo(context, *folder); });
+  auto scenario = std::make_shared<std::string>("quick");
+  CLI::App* verb =
+      add_verb(app, context, "demo", "A drive over a simulated Mars, start to end, with a page to look at",
+               "demo -o spartan_demo", [&context, scenario, folder] { return demo(context, *scenario, *folder); });
+  verb->add_option("scenario", *scenario, "a scenario.yaml, or a shipped one's name (default quick)");
   verb->add_option("-o,--output", *folder, "the folder to make (default spartan_demo)");
   add_threads_option(*verb, context);
 }

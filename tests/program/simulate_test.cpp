@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "program.h"
+#include "small_scenario.h"
 #include "spartan/core/geotiff.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -17,33 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using testing::kSmallRig;
+using testing::kSmallScenario;
 using testing::ProgramLimits;
 using testing::ProgramResult;
 using testing::run_program;
-
-constexpr const char* kRig = R"(schema: 1
-name: small
-pan_tilt_units:
-  mast: {translation_m: [0, 0, 0.8], rest_angles_deg: [0, 65]}
-cameras:
-  wl: {size_px: [96, 96], model: pinhole, focal_px: [130, 130], centre_px: [47.5, 47.5], mount: mast, axes: forward, translation_m: [0, 0.1, 0]}
-  wr: {size_px: [96, 96], model: pinhole, focal_px: [130, 130], centre_px: [47.5, 47.5], mount: mast, axes: forward, translation_m: [0, -0.1, 0]}
-  nl: {size_px: [96, 72], model: pinhole, focal_px: [100, 100], centre_px: [47.5, 35.5], axes: forward, translation_m: [0, 0.06, 0.3], roll_pitch_yaw_deg: [0, 60, 0]}
-  nr: {size_px: [96, 72], model: pinhole, focal_px: [100, 100], centre_px: [47.5, 35.5], axes: forward, translation_m: [0, -0.06, 0.3], roll_pitch_yaw_deg: [0, 60, 0]}
-pairs:
-  wide: {left: wl, right: wr, nearest_m: 0.6, for_odometry: false}
-  narrow: {left: nl, right: nr, nearest_m: 0.25}
-)";
-
-constexpr const char* kScenario = R"(schema: 1
-name: small
-samples: 1
-rig: small_rig.yaml
-path: {length_m: 0.3}
-shots: {stops_m: [0]}
-rocks: {share: 0.03}
-truth: {cell_m: 0.1}
-)";
 
 // Path below the folder → content.
 std::map<std::string, std::string> content_of(const std::string& folder) {
@@ -67,8 +46,8 @@ ProgramLimits killed_after(int ms) {
 class Simulate : public ::testing::Test {
  protected:
   void SetUp() override {
-    write("small_rig.yaml", kRig);
-    write("small.yaml", kScenario);
+    write("small_rig.yaml", kSmallRig);
+    write("small.yaml", kSmallScenario);
     if (run_program({"simulate", path("nothing"), "-o", path("x")}).err.find("no simulator") != std::string::npos)
       GTEST_SKIP() << "built without Embree";
   }
@@ -82,7 +61,7 @@ class Simulate : public ::testing::Test {
   }
   // The scenario with one more line; it must be refused with code 4, name the line and render nothing.
   void expect_refused(const std::string& line, const std::string& complaint) const {
-    write("bad.yaml", std::string(kScenario) + line + "\n");
+    write("bad.yaml", std::string(kSmallScenario) + line + "\n");
     const ProgramResult result = run_program({"simulate", path("bad.yaml"), "-o", path("bad")});
     EXPECT_EQ(result.exit_code, 4) << line << "\n" << result.err;
     EXPECT_THAT(result.err, HasSubstr("bad.yaml:9")) << line;
@@ -165,7 +144,7 @@ TEST_F(Simulate, GoesOnAfterKillsAsIfNothingHadHappened) {
 
 TEST_F(Simulate, StopsCleanlyWhenInterrupted) {
   // Long enough not to be over before.
-  write("small.yaml", std::string(kScenario).replace(std::string(kScenario).find("0.3}"), 4, "4}"));
+  write("small.yaml", std::string(kSmallScenario).replace(std::string(kSmallScenario).find("0.3}"), 4, "4}"));
   ProgramLimits interrupted;
   interrupted.interrupt_after = std::chrono::milliseconds(250);
   const ProgramResult stopped = simulate("rec", {}, interrupted);
@@ -209,7 +188,7 @@ TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
   write("small.yaml", "schema: 1\nrig: small_rig.yaml\npath:\n  length_m: 300\n");
   result = simulate("bad");
   EXPECT_EQ(result.exit_code, 4);
-  EXPECT_THAT(result.err, HasSubstr("small.yaml:4: path"));
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:3: path:"));
   EXPECT_THAT(result.err, HasSubstr("leaves the terrain"));
   write("small.yaml", "schema: 1\nrig: small_rig.yaml\nshots:\n  stops_m: [99]\n");
   result = simulate("bad");
@@ -239,7 +218,7 @@ TEST_F(Simulate, LeavesExistingFoldersAlone) {
 }
 
 TEST_F(Simulate, RecordsTheRigAsItIsBelieved) {
-  write("small.yaml", std::string(kScenario) + "believed: {yaw_deg: 0.02, rows_px: 0.3, focal_percent: 0.1}\n");
+  write("small.yaml", std::string(kSmallScenario) + "believed: {yaw_deg: 0.02, rows_px: 0.3, focal_percent: 0.1}\n");
   ASSERT_EQ(simulate("rec").exit_code, 0);
   auto files = content_of(path("rec"));
   EXPECT_NE(files["rig.yaml"], files["truth/rig.yaml"]);

@@ -302,14 +302,19 @@ std::string place_of_option(const std::string& text, const std::string& name, co
   std::string nowhere = fmt::format("{}: {}", name, key);
   try {
     YAML::Node node = YAML::Load(text);
+    int line = 0;
     for (const std::string& part : options_detail::split_key(key)) {
       if (!node.IsMap()) return nowhere;
-      const YAML::Node map = node;
-      const YAML::Node inner = map[part];
+      YAML::Node inner(YAML::NodeType::Undefined);
+      for (const auto& entry : node) {
+        if (!entry.first.IsScalar() || entry.first.Scalar() != part) continue;
+        line = entry.first.Mark().line + 1;
+        inner.reset(entry.second);
+      }
       if (!inner.IsDefined()) return nowhere;
       node.reset(inner);
     }
-    return fmt::format("{}:{}: {}", name, node.Mark().line + 1, key);
+    return fmt::format("{}:{}: {}", name, line, key);
   } catch (const YAML::Exception&) {
     return nowhere;
   }

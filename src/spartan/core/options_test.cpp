@@ -43,6 +43,16 @@ struct MatcherOptions {
   }
 };
 
+struct MaskOptions {
+  std::string name;
+  int rows = 1;
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("name", name, "of the mask");
+    v.field("rows", rows, "masked", between(1, 9));
+  }
+};
+
 struct RunOptions {
   MatcherOptions matcher;
   int threads = 1;
@@ -172,6 +182,71 @@ TEST(Options, ListsEveryOptionInOrder) {
   EXPECT_EQ(lines[5].key, "matcher.speckle.size_px");
   EXPECT_EQ(lines[5].value, "100");
   EXPECT_EQ(lines[7].key, "threads");
+}
+
+struct MaskedOptions {
+  int before = 0;
+  std::vector<MaskOptions> masks{{"built-in", 3}};
+  int after = 0;
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("before", before, "a key before");
+    v.list("masks", masks, "what is not looked at");
+    v.field("after", after, "a key after");
+  }
+};
+
+TEST(OptionLists, ItemsThatAreGivenReplaceTheWholeList) {
+  const auto kept = parse_options<MaskedOptions>("before: 1\n", "m.yaml");
+  ASSERT_TRUE(kept);
+  ASSERT_EQ(kept->masks.size(), 1U);
+  EXPECT_EQ(kept->masks[0].name, "built-in");
+  const auto given =
+      parse_options<MaskedOptions>("masks:\n  - {name: sky, rows: 2}\n  - name: wheel\nafter: 5\n", "m.yaml");
+  ASSERT_TRUE(given) << given.error().message();
+  ASSERT_EQ(given->masks.size(), 2U);
+  EXPECT_EQ(given->masks[0].rows, 2);
+  EXPECT_EQ(given->masks[1].name, "wheel");
+  EXPECT_EQ(given->masks[1].rows, 1) << "the item's own default";
+  EXPECT_EQ(given->after, 5);
+  const auto none = parse_options<MaskedOptions>("masks: []\n", "m.yaml");
+  ASSERT_TRUE(none);
+  EXPECT_TRUE(none->masks.empty());
+}
+
+TEST(OptionLists, FaultsNameTheItemAndItsLine) {
+  const auto bad = parse_options<MaskedOptions>(
+      "masks:\n  - {name: sky, rows: 12}\n  - {nam: wheel}\n  - 3\n  - {rows: two}\n", "m.yaml");
+  ASSERT_FALSE(bad);
+  const std::string said = bad.error().message();
+  EXPECT_THAT(said, HasSubstr("m.yaml:2: masks[0].rows: is 12, must be between 1 and 9"));
+  EXPECT_THAT(said, HasSubstr("m.yaml:3: masks[1].nam: unknown key"));
+  EXPECT_THAT(said, HasSubstr("m.yaml:4: masks[2]"));
+  EXPECT_THAT(said, HasSubstr("m.yaml:5: masks[3].rows: must be a whole number"));
+  for (const char* text : {"masks: 3", "masks: {name: sky}", "masks: sky"})
+    EXPECT_THAT(parse_options<MaskedOptions>(text, "m.yaml").error().message(), HasSubstr("m.yaml:1: masks: must be"));
+}
+
+TEST(OptionLists, AreListedAsOneLineThatReadsBack) {
+  MaskedOptions options;
+  options.masks = {{"a, b: {c}", 2}, {"", 9}, {"[#\"'", 1}};
+  const auto lines = list_options(options);
+  ASSERT_EQ(lines.size(), 3U);
+  EXPECT_EQ(lines[1].key, "masks");
+  const auto back = parse_options<MaskedOptions>(dump_options(options), "m.yaml");
+  ASSERT_TRUE(back) << back.error().message();
+  ASSERT_EQ(back->masks.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(back->masks[i].name, options.masks[i].name);
+    EXPECT_EQ(back->masks[i].rows, options.masks[i].rows);
+  }
+}
+
+TEST(OptionLists, PlaceOfAnOptionIsItsLine) {
+  const std::string text = "before: 1\nmasks:\n  - {name: sky}\nmatcher:\n  speckle:\n    size_px: 3\n";
+  EXPECT_EQ(place_of_option(text, "m.yaml", "masks"), "m.yaml:2: masks");
+  EXPECT_EQ(place_of_option(text, "m.yaml", "matcher.speckle.size_px"), "m.yaml:6: matcher.speckle.size_px");
+  EXPECT_EQ(place_of_option(text, "m.yaml", "after"), "m.yaml: after");
 }
 
 RC_GTEST_PROP(Options, DumpsParseToTheSameBits, (double gain, bool enabled, int size)) {

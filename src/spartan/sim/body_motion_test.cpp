@@ -1,5 +1,6 @@
 #include "spartan/sim/body_motion.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -84,6 +85,7 @@ TEST(Imu, ReadingsWithoutErrorsIntegrateToTheTruePath) {
   }
   const double end = seconds_between(samples.front().stamp, samples.back().stamp);
   const Pose truth = r.motion.world_from_body(end);
+  fmt::print("IMU without errors: {:.2f} mm off after {:.0f} s\n", 1000 * (position - truth.translation()).norm(), end);
   EXPECT_LT((position - truth.translation()).norm(), 0.01) << "over " << end << " s";
   EXPECT_LT(rotation_angle(Pose(attitude, position).inverse() * Pose(truth.rotation(), position)), 1e-5);
 }

@@ -1,5 +1,6 @@
 #include "spartan/sim/renderer.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -80,6 +81,7 @@ TEST(Renderer, PointsOfTheWorldLieWhereOpenCvProjectsThem) {
     }
   }
   EXPECT_GT(count, 800);
+  fmt::print("projections: largest distance from OpenCV's {:.5f} px over {} points\n", worst, count);
   EXPECT_LT(worst, 0.01);
 }
 
@@ -131,6 +133,7 @@ TEST(Renderer, SlantedEdgeShowsThePointSpread) {
       }
     }
   }
+  fmt::print("point spread on a slanted edge: {:.3f} px\n", best_sigma);
   EXPECT_NEAR(best_sigma, Renderer::kPointSpread_px, 0.05 * Renderer::kPointSpread_px);
 }
 
@@ -201,6 +204,7 @@ TEST(TrueDisparity, WarpsRightOntoLeft) {
   // Noise of one eye at the mean level: shot, read, rounding. The median of |difference| of two is 0.6745 √2 of it.
   const double electrons = 0.45 * 15000, levels = 255 * (1 - 1.0 / 64) / 15000;
   const double floor = 0.6745 * std::sqrt(2 * (levels * levels * (electrons + 225) + 1.0 / 12));
+  fmt::print("right warped onto left: median difference {:.3f} gray levels, noise floor {:.3f}\n", median, floor);
   EXPECT_LT(median, 1.35 * floor);
   EXPECT_GT(median, 0.5 * floor);
 }
@@ -334,6 +338,8 @@ TEST(Renderer, AgreesWithOneThatTriesEveryTriangle) {
   }
   const double n = 28 * 36, mean = total / n;
   EXPECT_GT(mean, 100);
+  fmt::print("every triangle: mean {:+.4f} %, RMS {:.3f} %\n", 100 * sum / n / mean,
+             100 * std::sqrt(squares / n) / mean);
   EXPECT_LT(std::abs(sum / n), 0.003 * mean);
   EXPECT_LT(std::sqrt(squares / n), 0.02 * mean);
 }

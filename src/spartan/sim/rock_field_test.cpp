@@ -1,5 +1,6 @@
 #include "spartan/sim/rock_field.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -39,6 +40,7 @@ TEST(RockField, CumulativeAreaFollowsTheModel) {
         if (rock.diameter_m >= diameter) area += std::numbers::pi / 4 * rock.diameter_m * rock.diameter_m;
       }
       const double wanted = golombek_cover(k, diameter) - golombek_cover(k, 3);
+      fmt::print("k {}, {} m and more: {:+.2f} %\n", k, diameter, 100 * (area / (kSide * kSide) / wanted - 1));
       EXPECT_NEAR(area / (kSide * kSide), wanted, 0.1 * wanted) << "k " << k << ", D " << diameter;
     }
   }

@@ -1,5 +1,6 @@
 #include "spartan/sim/sensor.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -103,6 +104,8 @@ TEST(Sensor, PhotonTransferGivesTheGain) {
       sxy += means[i] * variances[i];
     }
     const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
+    fmt::print("photon transfer: {:.5f} levels an electron, set {:.5f} ({:+.2f} %)\n", slope,
+               eye.levels_per_electron(exposure), 100 * (slope / eye.levels_per_electron(exposure) - 1));
     EXPECT_NEAR(slope, eye.levels_per_electron(exposure), 0.05 * slope) << "gain " << gain;
     // Where the line meets darkness stands the read noise: (levels an electron · 15 e−)² + 1/12 of rounding.
     const double black = options.black_level * 4095, at_black = sy / n + slope * (black - sx / n);

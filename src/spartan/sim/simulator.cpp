@@ -72,18 +72,12 @@ Status write_maps(const SimulationRequest& request, const World& world, const Wo
       !s)
     return s;
   const auto [w, h] = map.surface.size();
-  Image<float> kind(w, h, 1.0F), above(w, h);
+  Image<float> above(w, h);
   for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x) {
-      above(x, y) = map.surface(x, y) - map.level(x, y);
-      if (map.surface(x, y) - map.ground(x, y) > truth.obstacle_m) {
-        kind(x, y) = 2;
-      } else if (map.level(x, y) - map.surface(x, y) > truth.cavity_m) {
-        kind(x, y) = 3;
-      }
-    }
+    for (int x = 0; x < w; ++x) above(x, y) = map.surface(x, y) - map.level(x, y);
   }
-  return write_geotiff(folder + "/obstacles.tif", place, {{"class", kind.view()}, {"height_m", above.view()}});
+  const Image<float> kinds = classify_ground(map, truth.obstacle_m, truth.cavity_m);
+  return write_geotiff(folder + "/obstacles.tif", place, {{"class", kinds.view()}, {"height_m", above.view()}});
 }
 
 // Everything that belongs to one pair of the rig.

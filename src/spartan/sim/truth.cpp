@@ -136,11 +136,12 @@ void fill_tile(const TerrainShape& shape, const GroundScene& scene, GroundMap& m
 GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Region& region, double cell_m,
                      const Workers& workers) {
   GroundMap map;
+  constexpr double kRounding = 1e-6;  // of a cell: a region that ends on the lattice gets no cell more
   map.cell_m = cell_m;
-  map.west_m = std::floor(region.x0 / cell_m) * cell_m;
-  map.north_m = std::ceil(region.y1 / cell_m) * cell_m;
-  const int width = static_cast<int>(std::ceil((region.x1 - map.west_m) / cell_m));
-  const int height = static_cast<int>(std::ceil((map.north_m - region.y0) / cell_m));
+  map.west_m = std::floor(region.x0 / cell_m + kRounding) * cell_m;
+  map.north_m = std::ceil(region.y1 / cell_m - kRounding) * cell_m;
+  const int width = static_cast<int>(std::ceil((region.x1 - map.west_m) / cell_m - kRounding));
+  const int height = static_cast<int>(std::ceil((map.north_m - region.y0) / cell_m - kRounding));
   for (Image<float>* image : {&map.surface, &map.ground, &map.level}) *image = Image<float>(width, height);
   const int tile = std::max(1, static_cast<int>(kTile_m / cell_m));
   for (int j0 = 0; j0 < height; j0 += tile) {
@@ -153,6 +154,21 @@ GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Re
     }
   }
   return map;
+}
+
+Image<float> classify_ground(const GroundMap& map, double obstacle_m, double cavity_m) {
+  const auto [w, h] = map.surface.size();
+  Image<float> kinds(w, h, 1.0F);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      if (map.surface(x, y) - map.ground(x, y) > obstacle_m) {
+        kinds(x, y) = 2;
+      } else if (map.level(x, y) - map.surface(x, y) > cavity_m) {
+        kinds(x, y) = 3;
+      }
+    }
+  }
+  return kinds;
 }
 
 }  // namespace spartan::sim

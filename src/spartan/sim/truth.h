@@ -55,4 +55,8 @@ struct GroundMap {
 GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Region& region, double cell_m,
                      const Workers& workers);
 
+/// 1 ground, 2 obstacle (its surface is more than `obstacle_m` over the ground), 3 cavity (its surface is more than
+/// `cavity_m` below the ground without cavities).
+Image<float> classify_ground(const GroundMap& map, double obstacle_m, double cavity_m);
+
 }  // namespace spartan::sim

@@ -24,8 +24,7 @@ TEST(WheelLift, IsThatOfACircleOnACircle) {
   const WheelLift lift({dome(1, 2, kDome_m)}, kWheel_m, 0.01);
   const double heading = 0.7, reach = std::sqrt(std::pow(kWheel_m + kDome_m, 2) - kWheel_m * kWheel_m);
   for (double d = -0.12; d <= 0.12; d += 0.007) {
-    const double expected =
-        std::abs(d) < reach ? std::sqrt(std::pow(kWheel_m + kDome_m, 2) - d * d) - kWheel_m : 0.0;
+    const double expected = std::abs(d) < reach ? std::sqrt(std::pow(kWheel_m + kDome_m, 2) - d * d) - kWheel_m : 0.0;
     EXPECT_NEAR(lift.at(1 + d * std::cos(heading), 2 + d * std::sin(heading), heading), expected, 0.0015) << d;
   }
 }
