@@ -97,10 +97,10 @@ TEST(GroundMap, CavitiesLieBelowTheLevel) {
   EXPECT_EQ(classed, deep);
 }
 
-// Cells of plain ground, a low and a high rock, a shallow and a deep cavity, and a high rock in a cavity.
+// Cells of plain ground, a low and a high rock, a shallow and a deep cavity, a high and a low rock in a cavity.
 TEST(GroundMap, ClassesAreByHeightOverTheGroundAndDepthBelowTheLevel) {
   GroundMap map;
-  for (Image<float>* image : {&map.surface, &map.ground, &map.level}) *image = Image<float>(6, 1);
+  for (Image<float>* image : {&map.surface, &map.ground, &map.level}) *image = Image<float>(7, 1);
   const auto cell = [&](int i, float surface, float ground, float level) {
     map.surface(i, 0) = surface;
     map.ground(i, 0) = ground;
@@ -112,9 +112,10 @@ TEST(GroundMap, ClassesAreByHeightOverTheGroundAndDepthBelowTheLevel) {
   cell(3, 4.81F, 4.81F, 5.0F);
   cell(4, 4.79F, 4.79F, 5.0F);
   cell(5, 4.91F, 4.79F, 5.0F);
+  cell(6, 4.85F, 4.79F, 5.0F);
   const Image<float> kinds = classify_ground(map, 0.1, 0.2);
-  const std::vector<float> expected{1, 1, 2, 1, 3, 2};
-  for (int i = 0; i < 6; ++i) EXPECT_EQ(kinds(i, 0), expected[static_cast<std::size_t>(i)]) << i;
+  const std::vector<float> expected{1, 1, 2, 1, 3, 2, 1};
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(kinds(i, 0), expected[static_cast<std::size_t>(i)]) << i;
 }
 
 }  // namespace
