@@ -39,18 +39,32 @@ int channel_of(PixelLayout layout, int x, int y) {
 }
 
 // Specks on the front lens, far out of focus: soft dark discs.
-float dust_transmission(std::uint64_t seed, ImageSize size, int x, int y) {
-  constexpr int kSpecks = 14;
-  Random random(seed, 404);
-  double through = 1;
-  for (int i = 0; i < kSpecks; ++i) {
-    const double cx = random.uniform(0, size.width), cy = random.uniform(0, size.height);
-    const double radius = size.width * random.uniform(0.012, 0.05), depth = random.uniform(0.15, 0.5);
-    const double away = std::hypot(x - cx, y - cy) / radius;
-    if (away < 1) through *= 1 - depth * (1 - away * away) * (1 - away * away);
+class Dust {
+ public:
+  Dust(std::uint64_t seed, ImageSize size) {
+    Random random(seed, 404);
+    for (Speck& speck : specks_) {
+      speck.x = random.uniform(0, size.width);
+      speck.y = random.uniform(0, size.height);
+      speck.radius = size.width * random.uniform(0.012, 0.05);
+      speck.depth = random.uniform(0.15, 0.5);
+    }
   }
-  return static_cast<float>(through);
-}
+  float transmission(int x, int y) const {
+    double through = 1;
+    for (const Speck& speck : specks_) {
+      const double away = std::hypot(x - speck.x, y - speck.y) / speck.radius;
+      if (away < 1) through *= 1 - speck.depth * (1 - away * away) * (1 - away * away);
+    }
+    return static_cast<float>(through);
+  }
+
+ private:
+  struct Speck {
+    double x = 0, y = 0, radius = 0, depth = 0;
+  };
+  std::array<Speck, 14> specks_;
+};
 
 }  // namespace
 
@@ -89,6 +103,7 @@ double Sensor::levels_per_electron(const Exposure& exposure) const {
 Image<float> Sensor::electrons(const Radiance& radiance, const Exposure& exposure, const EyeFault& fault) const {
   const auto per_luminance = static_cast<float>(electrons_per_second(options_) * exposure.seconds * fault.light);
   const bool colour = camera_.pixel_format.is_bayer() && radiance.split;
+  const Dust dust(fault.dust_seed, camera_.size);
   Image<float> result(camera_.size.width, camera_.size.height);
   for (int y = 0; y < result.height(); ++y) {
     for (int x = 0; x < result.width(); ++x) {
@@ -99,7 +114,7 @@ Image<float> Sensor::electrons(const Radiance& radiance, const Exposure& exposur
         for (std::size_t m = 0; m < kMaterials; ++m) luminance += radiance.by_material[m](x, y) * kTints[m].rgb[c];
       }
       result(x, y) = luminance * per_luminance * falloff_(x, y);
-      if (fault.dust) result(x, y) *= dust_transmission(fault.dust_seed, camera_.size, x, y);
+      if (fault.dust) result(x, y) *= dust.transmission(x, y);
     }
   }
   return result;
