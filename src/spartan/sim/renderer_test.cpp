@@ -85,8 +85,13 @@ TEST(Renderer, PointsOfTheWorldLieWhereOpenCvProjectsThem) {
   EXPECT_LT(worst, 0.01);
 }
 
-// The horizon seen by a rolled camera is an edge; its profile is the integral of the point spread.
-TEST(Renderer, SlantedEdgeShowsThePointSpread) {
+// The horizon seen by a rolled camera is an edge; its profile is the integral of the point spread, and it lies where
+// the camera model says.
+struct Edge {
+  double sigma_px = 0, shift_px = 0;
+};
+
+Edge edge_of_horizon(double roll_deg) {
   const Workers workers(2);
   const TerrainShape shape(flat(), 1);
   const RockField none({.share = 0, .pebbles_per_m2 = 0}, 1);
@@ -97,13 +102,13 @@ TEST(Renderer, SlantedEdgeShowsThePointSpread) {
   const Surroundings around{scene, sky, sun, soil, 5000};
   const Camera camera = pinhole(200, 200, 300);
   const Renderer renderer(camera, Sampling::of(4));
-  const Pose pose = looking_down(1, 0, 5);
+  const Pose pose = looking_down(1, 0, roll_deg);
   const Radiance picture = renderer.render(around, {pose, pose, pose, pose}, false, workers);
   // Distance of a pixel from the horizon, which is the image of directions with z = 0 … less the ground's end at 120 m.
   const double dip = std::atan2(1.0, GroundScene::kHorizon_m + 1);
   std::vector<std::pair<double, double>> profile;
   for (int y = 60; y < 140; ++y) {
-    for (int x = 20; x < 180; ++x) {
+    for (int x = 60; x < 140; ++x) {
       const Eigen::Vector3d d = pose.rotation() * Eigen::Vector3d((x - 99.5) / 300, (y - 99.5) / 300, 1);
       const double off = 300 * (std::atan2(d.z(), std::hypot(d.x(), d.y())) + dip);
       if (std::abs(off) < 4) profile.emplace_back(off, picture.total(x, y));
@@ -124,17 +129,27 @@ TEST(Renderer, SlantedEdgeShowsThePointSpread) {
     const double b = (s1 * svp - sp * sv) / (s1 * spp - sp * sp), a = (sv - b * sp) / s1;
     return svv - a * sv - b * svp;
   };
-  double best = 1e300, best_sigma = 0;
+  double best = 1e300;
+  Edge edge;
   for (double sigma = 0.3; sigma < 0.8; sigma += 0.005) {
     for (double shift = -0.5; shift < 0.5; shift += 0.02) {
       if (const double m = misfit(sigma, shift); m < best) {
         best = m;
-        best_sigma = sigma;
+        edge = {sigma, shift};
       }
     }
   }
-  fmt::print("point spread on a slanted edge: {:.3f} px\n", best_sigma);
-  EXPECT_NEAR(best_sigma, Renderer::kPointSpread_px, 0.05 * Renderer::kPointSpread_px);
+  return edge;
+}
+
+TEST(Renderer, SlantedEdgeShowsThePointSpreadWhereItBelongs) {
+  for (const double roll_deg : {5.0, 85.0, -175.0, -95.0}) {
+    const Edge edge = edge_of_horizon(roll_deg);
+    fmt::print("point spread on an edge at {} degrees: {:.3f} px, {:+.2f} px off\n", roll_deg, edge.sigma_px,
+               edge.shift_px);
+    EXPECT_NEAR(edge.sigma_px, Renderer::kPointSpread_px, 0.05 * Renderer::kPointSpread_px);
+    EXPECT_NEAR(edge.shift_px, 0, 0.05);
+  }
 }
 
 struct Stereo {

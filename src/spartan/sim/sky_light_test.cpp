@@ -76,7 +76,8 @@ Errors compare(const GroundScene& scene, const SkyLight& sky, bool rocks) {
 }
 
 // Shot noise at the exposure rule's level is 1.3 % of the signal, of which the sky gives a third in nominal scenes;
-// with sky alone, at 200 lux, all noise is 2.0 %. The largest errors are the shades of pebbles within half a centimetre.
+// with sky alone, at 200 lux, all noise is 2.0 %. The largest errors are the shades of pebbles within half a
+// centimetre.
 TEST(SkyLight, StaysBelowTheSensorsNoise) {
   const Workers workers(2);
   const TerrainShape shape({}, 5);
