@@ -1,6 +1,6 @@
 // Disparities on simulated pairs beside OpenCV's, with the truth, by range. `make bench-mars_stereo`.
 //
-//   mars_stereo [--from FOLDER] [--pairs N] SCENARIO...      recordings as scripts/recordings makes them
+//   mars_stereo [--from FOLDER] [--pairs N] [--pair NAME] SCENARIO...      recordings as scripts/recordings makes them
 //
 // Default: 10 wide pairs (other stops and pans each) of rocky_20pct, diffuse_200lux, night_edge, flat_featureless.
 #include <fmt/format.h>
@@ -124,7 +124,7 @@ void print(const std::string& scenario, const Scores& scores) {
   }
 }
 
-void compare(const std::string& folder, const std::string& scenario, int wanted) {
+void compare(const std::string& folder, const std::string& scenario, const std::string& pair_name, int wanted) {
   const std::string recording = folder + "/" + scenario;
   const auto source = open_recording(recording);
   if (!source) {
@@ -135,7 +135,7 @@ void compare(const std::string& folder, const std::string& scenario, int wanted)
   if (!imager) return;
   Scores scores;
   for (const StereoPair& pair : (*source)->info().rig.pairs) {
-    if (pair.for_odometry) continue;
+    if (pair.name != pair_name) continue;
     const std::vector<Stamp> stamps = (*source)->announced_stamps(pair.name);
     // Spread over the stops; the step is odd, so that the pans take turns.
     const std::size_t count = std::min<std::size_t>(static_cast<std::size_t>(wanted), stamps.size());
@@ -147,7 +147,7 @@ void compare(const std::string& folder, const std::string& scenario, int wanted)
 
 void run(const std::vector<std::string>& words) {
   const char* const home = std::getenv("HOME");
-  std::string folder = std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings";
+  std::string folder = std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings", pair = "wide";
   int wanted = 10;
   std::vector<std::string> scenarios;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -155,6 +155,8 @@ void run(const std::vector<std::string>& words) {
       folder = words[++i];
     } else if (words[i] == "--pairs" && i + 1 < words.size()) {
       wanted = std::stoi(words[++i]);
+    } else if (words[i] == "--pair" && i + 1 < words.size()) {
+      pair = words[++i];
     } else {
       scenarios.push_back(words[i]);
     }
@@ -162,7 +164,7 @@ void run(const std::vector<std::string>& words) {
   if (scenarios.empty()) scenarios = {"rocky_20pct", "diffuse_200lux", "night_edge", "flat_featureless"};
   fmt::print("{:<18} {:<8} {:<10} {:>7} {:>9} {:>9} {:>10} {:>9}\n", "scenario", "matcher", "range", "RMS px",
              "> 1 px %", "> 2 cm %", "unmatched%", "Mpixels");
-  for (const std::string& scenario : scenarios) compare(folder, scenario, wanted);
+  for (const std::string& scenario : scenarios) compare(folder, scenario, pair, wanted);
 }
 
 }  // namespace
