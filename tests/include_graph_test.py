@@ -105,7 +105,7 @@ def faults(project):
                 found.append(f"{where}: {module} includes {included}, which does not stand below it")
             elif module in linked and not is_test and target not in linked[module] | {module}:
                 found.append(f"{where}: {module} includes {included}, but CMakeLists.txt does not list {target} in its USES")
-        elif quote == '"' and path.parts[-3:-2] == ("spartan",):
+        elif quote == '"' and path.relative_to(project).parts[:2] == ("src", "spartan"):
             found.append(f'{where}: "{included}": write the whole path, "spartan/<module>/…"')
         public = path.suffix == ".h" and module not in {"program", "tests", "testing"}
         if public and HEAVY.match(included) and not path.stem.endswith("_bridge"):
