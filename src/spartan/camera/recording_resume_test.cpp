@@ -121,6 +121,14 @@ TEST_F(ResumedRecording, AShotThatLacksAnImageOrHalfItsRowIsMadeAgain) {
   expect_as_made_at_once(4);
 }
 
+TEST_F(ResumedRecording, MayHaveDiedBeforeItsFirstByte) {
+  folder_.write("cut/frames.csv", "");
+  RecordingWriter writer = resumed(path_);
+  EXPECT_EQ(write_shots(writer, 0, 2), 0);
+  ASSERT_TRUE(writer.finish());
+  expect_as_made_at_once(2);
+}
+
 TEST_F(ResumedRecording, WhereThereIsNoneOneIsMade) {
   RecordingWriter writer = resumed(path_);
   EXPECT_EQ(write_shots(writer, 0, 2), 0);

@@ -216,12 +216,13 @@ Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const R
     return failure(ErrorCode::configuration, "the name of pair '" + pair.name + "' cannot be that of a folder", folder);
   }
   if (Status s = make_folder(folder); !s) return failure(s);
+  // First of all files: by it resume() knows a recording that was begun, however early it was cut off.
+  auto frames = TableFile::create(folder + "/frames.csv", kFramesHeader);
+  if (!frames) return failure(frames);
   for (const StereoPair& pair : believed_rig.pairs) {
     if (Status s = make_folder(folder + "/images/" + pair.name); !s) return failure(s);
   }
   if (Status s = write_file_atomically(folder + "/rig.yaml", to_rig_yaml(believed_rig)); !s) return failure(s);
-  auto frames = TableFile::create(folder + "/frames.csv", kFramesHeader);
-  if (!frames) return failure(frames);
   auto state = std::make_unique<State>();
   state->folder = folder;
   state->options = options;
