@@ -50,9 +50,8 @@ void listen(pid_t child, const ProgramLimits& limits, const Pipe& out, const Pip
     ::poll(inputs.data(), inputs.size(), 5);
     const auto elapsed = Clock::now() - start;
     if (limits.kill_after && !killed && elapsed >= *limits.kill_after) killed = ::kill(child, SIGKILL) == 0;
-    if (limits.interrupt_after && !interrupted && elapsed >= *limits.interrupt_after) {
+    if (limits.interrupt_once_there && !interrupted && ::access(limits.interrupt_once_there->c_str(), F_OK) == 0)
       interrupted = ::kill(child, SIGINT) == 0;
-    }
     for (pollfd& input : inputs) {
       if (input.fd < 0 || (input.revents & (POLLIN | POLLHUP)) == 0) continue;
       std::array<char, 4096> buffer{};

@@ -16,9 +16,9 @@ struct ProgramResult {
 };
 
 struct ProgramLimits {
-  std::optional<std::uint64_t> largest_file_bytes;           ///< RLIMIT_FSIZE, with SIGXFSZ ignored: a full disk
-  std::optional<std::chrono::milliseconds> kill_after;       ///< SIGKILL
-  std::optional<std::chrono::milliseconds> interrupt_after;  ///< SIGINT
+  std::optional<std::uint64_t> largest_file_bytes;      ///< RLIMIT_FSIZE, with SIGXFSZ ignored: a full disk
+  std::optional<std::chrono::milliseconds> kill_after;  ///< SIGKILL
+  std::optional<std::string> interrupt_once_there;      ///< SIGINT as soon as this file has appeared
 };
 
 /// The program of this build (environment variable SPARTAN_PROGRAM).

@@ -150,7 +150,7 @@ TEST_F(Simulate, StopsCleanlyWhenInterrupted) {
   // Long enough not to be over before.
   write("small.yaml", std::string(kSmallScenario).replace(std::string(kSmallScenario).find("0.3}"), 4, "4}"));
   ProgramLimits interrupted;
-  interrupted.interrupt_after = std::chrono::milliseconds(250);
+  interrupted.interrupt_once_there = path("rec/frames.csv");
   const ProgramResult stopped = simulate("rec", {}, interrupted);
   ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
   EXPECT_THAT(stopped.err, HasSubstr("--resume"));
