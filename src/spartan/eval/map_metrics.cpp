@@ -1,0 +1,162 @@
+#include "spartan/eval/map_metrics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+namespace spartan {
+namespace {
+
+// What is truly in one cell of the map.
+struct TrueCell {
+  double mean_m = 0, lowest_m = 0, highest_m = 0;
+  double over_m = 0, under_m = 0;  // the most over the local ground, and below the level
+};
+
+struct Span {
+  int from, to;
+};
+
+// Finer cells whose middles lie in [low, low + side).
+Span finer(double low, double side, double cell) {
+  return {static_cast<int>(std::ceil(low / cell - 0.5 - 1e-9)),
+          static_cast<int>(std::ceil((low + side) / cell - 0.5 - 1e-9))};
+}
+
+std::optional<TrueCell> true_cell(const JudgedMap& map, const TrueGround& truth, int column, int row) {
+  const double side = map.place.cell_m, fine = truth.place.cell_m;
+  const Span x = finer(map.place.west_m + column * side - truth.place.west_m, side, fine);
+  const Span y = finer(truth.place.north_m - (map.place.north_m - row * side), side, fine);
+  if (x.from < 0 || y.from < 0 || x.to > truth.surface_m.width() || y.to > truth.surface_m.height() || x.to <= x.from ||
+      y.to <= y.from)
+    return std::nullopt;
+  TrueCell cell;
+  cell.lowest_m = std::numeric_limits<double>::infinity();
+  cell.highest_m = -cell.lowest_m;
+  int count = 0;
+  for (int j = y.from; j < y.to; ++j) {
+    for (int i = x.from; i < x.to; ++i) {
+      const double z = truth.surface_m(i, j);
+      cell.mean_m += z;
+      cell.lowest_m = std::min(cell.lowest_m, z);
+      cell.highest_m = std::max(cell.highest_m, z);
+      cell.over_m = std::max(cell.over_m, z - truth.ground_m(i, j));
+      cell.under_m = std::max(cell.under_m, truth.level_m(i, j) - z);
+      ++count;
+    }
+  }
+  cell.mean_m /= count;
+  return cell;
+}
+
+// Cells of the map with what is truly there: 0 outside the truth, else as JudgedMap::kind.
+struct Labels {
+  Image<std::uint8_t> kind;
+  Image<float> size;  // height or depth
+};
+
+// Cells of one kind that touch become things; `visit` says which cells count.
+template <class Visible, class Marked>
+std::vector<JudgedThing> things(const Labels& labels, std::uint8_t kind, double cell_m, double found_share,
+                                const Visible& visible, const Marked& marked) {
+  const auto [w, h] = labels.kind.size();
+  Image<std::uint8_t> done(w, h);
+  std::vector<JudgedThing> found;
+  std::vector<std::pair<int, int>> open;
+  for (int y0 = 0; y0 < h; ++y0) {
+    for (int x0 = 0; x0 < w; ++x0) {
+      if (labels.kind(x0, y0) != kind || done(x0, y0) != 0) continue;
+      JudgedThing thing;
+      int cells = 0;
+      open.assign(1, {x0, y0});
+      done(x0, y0) = 1;
+      while (!open.empty()) {
+        const auto [x, y] = open.back();
+        open.pop_back();
+        ++cells;
+        thing.height_m = std::max(thing.height_m, static_cast<double>(labels.size(x, y)));
+        if (visible(x, y)) {
+          ++thing.visible_cells;
+          thing.marked_cells += marked(x, y) ? 1 : 0;
+        }
+        for (int j = std::max(y - 1, 0); j <= std::min(y + 1, h - 1); ++j) {
+          for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
+            if (labels.kind(i, j) != kind || done(i, j) != 0) continue;
+            done(i, j) = 1;
+            open.emplace_back(i, j);
+          }
+        }
+      }
+      if (thing.visible_cells == 0) continue;
+      thing.diameter_m = std::sqrt(4 / std::numbers::pi * cells) * cell_m;
+      thing.found = thing.marked_cells >= found_share * thing.visible_cells;
+      found.push_back(thing);
+    }
+  }
+  return found;
+}
+
+bool near_obstacle(const Labels& labels, int x, int y) {
+  for (int j = y - 1; j <= y + 1; ++j) {
+    for (int i = x - 1; i <= x + 1; ++i) {
+      if (labels.kind.contains(i, j) && labels.kind(i, j) == 2) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapScoring& s) {
+  const auto [w, h] = map.elevation_m.size();
+  Labels labels{Image<std::uint8_t>(w, h), Image<float>(w, h)};
+  MapMetrics m;
+  double sum = 0, squares = 0;
+  const auto in_range = [&](int x, int y) {
+    const double range = std::hypot(map.place.west_m + (x + 0.5) * map.place.cell_m - s.eye_m.x(),
+                                    map.place.north_m - (y + 0.5) * map.place.cell_m - s.eye_m.y());
+    return range >= s.nearest_m && range < s.farthest_m;
+  };
+  const auto is_visible = [&](int x, int y) { return in_range(x, y) && map.visible(x, y) >= s.fewest_pixels; };
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const auto cell = true_cell(map, truth, x, y);
+      if (!cell) continue;
+      labels.kind(x, y) = cell->over_m > s.obstacle_m ? 2 : cell->under_m > s.cavity_m ? 3 : 1;
+      labels.size(x, y) = static_cast<float>(labels.kind(x, y) == 3 ? cell->under_m : cell->over_m);
+      const bool known = std::isfinite(map.elevation_m(x, y));
+      if (is_visible(x, y)) {
+        ++m.visible_cells;
+        m.covered_cells += known ? 1 : 0;
+      }
+      if (!known || !in_range(x, y) || cell->highest_m - cell->lowest_m >= s.flat_m) continue;
+      const double error = map.elevation_m(x, y) - cell->mean_m;
+      sum += error;
+      squares += error * error;
+      ++m.judged_cells;
+    }
+  }
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const auto kind = static_cast<std::size_t>(std::clamp(map.kind(x, y), 0.0F, 3.0F));
+      if (labels.kind(x, y) == 0 || !in_range(x, y)) continue;
+      if (is_visible(x, y)) ++m.confusion[labels.kind(x, y)][kind];
+      if (kind == 0 || labels.kind(x, y) != 1) continue;
+      ++m.free_cells;
+      m.false_cells += kind == 2 && !near_obstacle(labels, x, y) ? 1 : 0;
+    }
+  }
+  if (m.judged_cells > 0) {
+    m.bias_m = sum / m.judged_cells;
+    m.rms_m = std::sqrt(squares / m.judged_cells);
+  }
+  m.obstacles =
+      things(labels, 2, map.place.cell_m, s.found_share, is_visible, [&](int x, int y) { return map.kind(x, y) == 2; });
+  m.cavities =
+      things(labels, 3, map.place.cell_m, s.found_share, is_visible, [&](int x, int y) { return map.kind(x, y) == 3; });
+  return m;
+}
+
+}  // namespace spartan

@@ -1,0 +1,270 @@
+#include "spartan/reconstruction/disparity_merger.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+namespace spartan {
+namespace {
+
+constexpr std::size_t kMostViews = 8;
+constexpr int kClasses = 4;
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+// (u, v, d, 1) → homogeneous point in the centre's axes.
+Eigen::Matrix4d reprojection(const RectifiedStereo& g, const Pose& centre_from_left) {
+  Eigen::Matrix4d q;
+  q << 1, 0, 0, -g.centre_px.x(), 0, 1, 0, -g.centre_px.y(), 0, 0, 0, g.focal_px, 0, 0, 1 / g.baseline_m, 0;
+  return centre_from_left.matrix() * q;
+}
+
+// Standard deviation of the range from that of the disparity, σ_z = z² σ_d / (f b), along a ray that is `stretch` times
+// as long as its depth.
+double range_sigma(const RectifiedStereo& g, double disparity, double stretch, double sigma_px) {
+  const double fb = g.focal_px * g.baseline_m, depth = fb / disparity;
+  return depth * depth * sigma_px / fb * stretch;
+}
+
+}  // namespace
+
+// What one view has in each cell: the nearest surface.
+struct DisparityMerger::Layer {
+  explicit Layer(ImageSize size) : sum_range(size), sum_variance(size), sum_gray(size), count(size), votes(size) {}
+  Image<float> sum_range, sum_variance, sum_gray;
+  Image<std::uint16_t> count;
+  Image<std::uint32_t> votes;  // a byte a class, saturated
+
+  float range(int x, int y) const { return sum_range(x, y) / static_cast<float>(count(x, y)); }
+  // Neighbouring disparities err together: averaging a cell's pixels is not trusted to make it better.
+  float variance(int x, int y) const { return sum_variance(x, y) / static_cast<float>(count(x, y)); }
+
+  void add(int x, int y, float r, float variance_m2, std::uint8_t level, std::uint8_t kind, float gate) {
+    if (count(x, y) > 0) {
+      const float mean = range(x, y), reach = gate * std::sqrt(variance_m2);
+      if (r > mean + reach || count(x, y) == 0xFFFF) return;
+      if (r < mean - reach) {
+        count(x, y) = 0;
+        sum_range(x, y) = sum_variance(x, y) = sum_gray(x, y) = 0;
+        votes(x, y) = 0;
+      }
+    }
+    ++count(x, y);
+    sum_range(x, y) += r;
+    sum_variance(x, y) += variance_m2;
+    sum_gray(x, y) += level;
+    const unsigned shift = 8U * std::min<unsigned>(kind, kClasses - 1);
+    if ((votes(x, y) >> shift & 0xFFU) != 0xFFU) votes(x, y) += 1U << shift;
+  }
+};
+
+DisparityMerger::DisparityMerger(const MergingOptions& options, const Pose& body_from_centre,
+                                 std::span<const ViewGeometry> views, double nearest_m, Workers workers)
+    : options_(options), body_from_centre_(body_from_centre), workers_(std::move(workers)) {
+  if (views.size() > kMostViews) throw std::invalid_argument("DisparityMerger: more than 8 views");
+  const auto projection =
+      options.projection == "sphere" ? PanoramicCamera::Projection::sphere : PanoramicCamera::Projection::cylinder;
+  camera_ = plan_panorama(projection, options.pixels_per_degree * 180 / std::numbers::pi, body_from_centre, views,
+                          nearest_m, options.farthest_m);
+}
+
+void DisparityMerger::throw_into(const MergedView& view, Layer& layer) const {
+  const RectifiedStereo& g = view.geometry.stereo;
+  const Eigen::Matrix4d m = reprojection(g, body_from_centre_.inverse() * view.geometry.body_from_left);
+  const auto gate = static_cast<float>(options_.gate_sigmas);
+  const auto [width, height] = camera_.size();
+  for (int v = 0; v < view.disparity.height(); ++v) {
+    const double y = (v - g.centre_px.y()) / g.focal_px;
+    for (int u = 0; u < view.disparity.width(); ++u) {
+      const double d = view.disparity(u, v);
+      if (!(d > 0)) continue;
+      const Eigen::Vector4d h = m * Eigen::Vector4d(u, v, d, 1);
+      const Eigen::Vector3d p = h.head<3>() / h.w();
+      const double range = p.norm();
+      if (range > options_.farthest_m) continue;
+      const auto pixel = camera_.project(p);
+      if (!pixel) continue;
+      const int column = static_cast<int>(std::lround(pixel->x())), row = static_cast<int>(std::lround(pixel->y()));
+      if (column < 0 || row < 0 || column >= width || row >= height) continue;
+      const double x = (u - g.centre_px.x()) / g.focal_px;
+      const double sigma = range_sigma(g, d, std::sqrt(1 + x * x + y * y), options_.disparity_sigma_px);
+      layer.add(column, row, static_cast<float>(range), static_cast<float>(sigma * sigma), view.left(u, v),
+                view.classes.empty() ? std::uint8_t{0} : view.classes(u, v), gate);
+    }
+  }
+}
+
+namespace {
+
+// A view's answer for one cell.
+struct Candidate {
+  std::size_t view = 0;
+  float range = 0, variance = 0, gray = 0;
+  std::uint32_t votes = 0;
+  int count = 0;
+};
+
+// Whether a view looks through a point: it sees something clearly farther where the point would be.
+bool looks_through(const MergedView& view, const Eigen::Vector3d& point_in_body, double gate, double sigma_px) {
+  const RectifiedStereo& g = view.geometry.stereo;
+  const Eigen::Vector3d in_left = view.geometry.body_from_left.inverse() * point_in_body;
+  if (in_left.z() <= 0) return false;
+  const Eigen::Vector3d uvd = g.project(in_left);
+  const int u = static_cast<int>(std::lround(uvd.x())), v = static_cast<int>(std::lround(uvd.y()));
+  if (!view.disparity.contains(u, v)) return false;
+  const float seen = view.disparity(u, v);
+  return seen > 0 && seen < uvd.z() - gate * std::numbers::sqrt2 * sigma_px;
+}
+
+std::uint8_t most_votes(std::uint32_t votes) {
+  std::uint8_t best = 0;
+  for (std::uint8_t k = 1; k < kClasses; ++k) {
+    if ((votes >> 8U * k & 0xFFU) > (votes >> 8U * best & 0xFFU)) best = k;
+  }
+  return best;
+}
+
+}  // namespace
+
+void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row,
+                               MergedRange& merged) const {
+  const auto gate = static_cast<float>(options_.gate_sigmas);
+  std::array<Candidate, kMostViews> found;
+  for (int x = 0; x < camera_.size().width; ++x) {
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const Layer& layer = layers[k];
+      const int n = layer.count(x, row);
+      if (n == 0) continue;
+      found[count++] = {k,
+                        layer.range(x, row),
+                        layer.variance(x, row),
+                        layer.sum_gray(x, row) / static_cast<float>(n),
+                        layer.votes(x, row),
+                        n};
+    }
+    if (count == 0) continue;
+    for (std::size_t i = 1; i < count; ++i) {
+      for (std::size_t j = i; j > 0 && found[j].range < found[j - 1].range; --j) std::swap(found[j], found[j - 1]);
+    }
+    // From the nearest on: a surface stands unless more views look through it than see it.
+    std::size_t first = 0, last = 0;
+    while (true) {
+      last = first + 1;
+      while (last < count &&
+             found[last].range - found[first].range < gate * std::sqrt(found[last].variance + found[first].variance)) {
+        ++last;
+      }
+      if (last == count) break;
+      const Eigen::Vector3d place =
+          body_from_centre_ * Eigen::Vector3d(static_cast<double>(found[first].range) * camera_.direction(x, row));
+      std::size_t against = 0;
+      for (std::size_t i = last; i < count; ++i) {
+        against +=
+            looks_through(views[found[i].view], place, options_.gate_sigmas, options_.disparity_sigma_px) ? 1 : 0;
+      }
+      if (against <= last - first) break;
+      first = last;
+    }
+    float weights = 0, sum = 0, gray = 0;
+    std::uint8_t seen_by = 0;
+    const Candidate* best = &found[first];
+    for (std::size_t i = first; i < last; ++i) {
+      const Candidate& c = found[i];
+      weights += 1 / c.variance;
+      sum += c.range / c.variance;
+      gray += c.gray / c.variance;
+      seen_by = static_cast<std::uint8_t>(seen_by | 1U << c.view);
+      if (c.count > best->count) best = &c;
+    }
+    merged.range_m(x, row) = sum / weights;
+    merged.sigma_m(x, row) = std::sqrt(1 / weights);
+    merged.gray(x, row) = static_cast<std::uint8_t>(std::lround(gray / weights));
+    merged.views(x, row) = seen_by;
+    merged.classes(x, row) = most_votes(best->votes);
+  }
+}
+
+namespace {
+
+// Cells between two known ones of one surface, at most kGap away: where the virtual camera's cells are finer than a
+// view's pixels.
+constexpr int kGap = 2;
+
+void fill_gaps(MergedRange& merged, float gate, const Workers& workers) {
+  const Image<float> range = merged.range_m.clone(), sigma = merged.sigma_m.clone();
+  const Image<std::uint8_t> views = merged.views.clone(), gray = merged.gray.clone(), classes = merged.classes.clone();
+  const auto known = [&](int x, int y) { return range.contains(x, y) && std::isfinite(range(x, y)); };
+  const auto fill = [&](int x, int y) {
+    for (int gap = 2; gap <= 2 * kGap; ++gap) {
+      for (const auto& [dx, dy] : {std::pair{0, 1}, std::pair{1, 0}}) {
+        const int a = gap / 2, b = gap - a;
+        const int x0 = x - a * dx, y0 = y - a * dy, x1 = x + b * dx, y1 = y + b * dy;
+        if (!known(x0, y0) || !known(x1, y1)) continue;
+        const float reach = gate * std::max(sigma(x0, y0), sigma(x1, y1));
+        if (std::abs(range(x0, y0) - range(x1, y1)) > reach) continue;
+        const float part = static_cast<float>(a) / static_cast<float>(gap);
+        merged.range_m(x, y) = range(x0, y0) + part * (range(x1, y1) - range(x0, y0));
+        merged.sigma_m(x, y) = std::max(sigma(x0, y0), sigma(x1, y1));
+        merged.views(x, y) = views(x0, y0) | views(x1, y1);
+        merged.gray(x, y) = static_cast<std::uint8_t>((gray(x0, y0) + gray(x1, y1)) / 2);
+        merged.classes(x, y) = classes(x0, y0);
+        return;
+      }
+    }
+  };
+  workers.for_each_part(0, range.height(), 16, [&](int from, int to) {
+    for (int y = from; y < to; ++y) {
+      for (int x = 0; x < range.width(); ++x) {
+        if (!std::isfinite(range(x, y))) fill(x, y);
+      }
+    }
+  });
+}
+
+}  // namespace
+
+MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
+  const ImageSize size = camera_.size();
+  std::vector<Layer> layers;
+  layers.reserve(views.size());
+  for (std::size_t k = 0; k < views.size(); ++k) layers.emplace_back(size);
+  workers_.for_each_part(0, static_cast<int>(views.size()), 1, [&](int from, int to) {
+    for (int k = from; k < to; ++k) {
+      const MergedView& view = views[static_cast<std::size_t>(k)];
+      if (!view.disparity.empty()) throw_into(view, layers[static_cast<std::size_t>(k)]);
+    }
+  });
+  MergedRange merged{camera_,
+                     body_from_centre_,
+                     Image<float>(size.width, size.height, kNaN),
+                     Image<float>(size.width, size.height, kNaN),
+                     Image<std::uint8_t>(size),
+                     Image<std::uint8_t>(size),
+                     Image<std::uint8_t>(size)};
+  workers_.for_each_part(0, size.height, 16, [&](int from, int to) {
+    for (int row = from; row < to; ++row) fuse_row(views, layers, row, merged);
+  });
+  fill_gaps(merged, static_cast<float>(options_.gate_sigmas), workers_);
+  return merged;
+}
+
+PointCloud to_point_cloud(const MergedRange& merged) {
+  PointCloud cloud;
+  for (int y = 0; y < merged.range_m.height(); ++y) {
+    for (int x = 0; x < merged.range_m.width(); ++x) {
+      const float range = merged.range_m(x, y);
+      if (!std::isfinite(range)) continue;
+      const Eigen::Vector3d p =
+          merged.body_from_centre * Eigen::Vector3d(static_cast<double>(range) * merged.camera.direction(x, y));
+      const std::uint8_t gray = merged.gray(x, y);
+      cloud.push_back({p.cast<float>(), {gray, gray, gray}});
+    }
+  }
+  return cloud;
+}
+
+}  // namespace spartan

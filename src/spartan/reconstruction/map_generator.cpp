@@ -1,0 +1,238 @@
+#include "spartan/reconstruction/map_generator.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+namespace spartan {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr double kLeastSigma_m = 0.001;
+constexpr float kMostLogodds = 5;
+
+// What the points of a cell add up to.
+struct Cell {
+  double weights = 0, sum = 0;
+  float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
+  int count = 0, ground = 0;
+};
+
+struct Grid {
+  MapPlace place;
+  int width = 0, height = 0;
+  std::vector<Cell> cells;
+  Cell& at(int x, int y) {
+    return cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+  }
+};
+
+Grid make_grid(const MapOptions& options, const Eigen::Vector3d& middle) {
+  Grid grid;
+  const double half = 0.5 * options.extent_m, cell = options.cell_m;
+  grid.place = {std::floor((middle.x() - half) / cell) * cell, std::ceil((middle.y() + half) / cell) * cell, cell};
+  grid.width = grid.height = static_cast<int>(std::ceil(options.extent_m / cell));
+  grid.cells.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
+  return grid;
+}
+
+void throw_points(std::span<const SurfacePoint> points, const Pose& map_from_body, Grid& grid) {
+  const Eigen::Matrix3f turn = map_from_body.rotation_matrix().cast<float>();
+  const Eigen::Vector3f shift = map_from_body.translation().cast<float>();
+  for (const SurfacePoint& point : points) {
+    const Eigen::Vector3f p = turn * point.in_body + shift;
+    const GridCell at = cell_at(grid.place, p.x(), p.y());
+    if (at.column < 0 || at.row < 0 || at.column >= grid.width || at.row >= grid.height) continue;
+    const double sigma =
+        std::max(std::abs(static_cast<double>(turn.row(2).dot(point.along)) * point.sigma_m), kLeastSigma_m);
+    Cell& cell = grid.at(at.column, at.row);
+    const double weight = 1 / (sigma * sigma);
+    cell.weights += weight;
+    cell.sum += weight * p.z();
+    cell.lowest = std::min(cell.lowest, p.z());
+    cell.highest = std::max(cell.highest, p.z());
+    ++cell.count;
+    cell.ground += point.kind == GroundClass::ground ? 1 : 0;
+  }
+}
+
+void classify(const MapOptions& options, LocalMap& map) {
+  const auto [w, h] = map.size();
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      if (!(map.count(x, y) > 0)) continue;
+      const double over = map.elevation_max_m(x, y) - map.ground_m(x, y),
+                   under = map.ground_m(x, y) - map.elevation_min_m(x, y);
+      const double sigma = std::sqrt(static_cast<double>(map.variance_m2(x, y))) + kLeastSigma_m;
+      map.kind(x, y) = 1;
+      if (over > options.obstacle_m) {
+        map.kind(x, y) = 2;
+      } else if (under > options.cavity_m) {
+        map.kind(x, y) = 3;
+      }
+      // ln(p / (1 − p)) of Φ((over − threshold) / σ), by the logistic curve of the same slope.
+      const double past = std::max(over - options.obstacle_m, under - options.cavity_m) / sigma;
+      map.occupancy_logodds(x, y) = std::clamp(static_cast<float>(1.702 * past), -kMostLogodds, kMostLogodds);
+    }
+  }
+}
+
+// Slope and roughness from the plane through a wheel's surroundings, step from the neighbours.
+void measure_shape(const MapOptions& options, LocalMap& map) {
+  const auto [w, h] = map.size();
+  const int reach = std::max(1, static_cast<int>(std::lround(0.25 * options.rover.track_m / options.cell_m)));
+  const RoverLimits& rover = options.rover;
+  const double steepest = rover.steepest_deg * std::numbers::pi / 180;
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      if (!(map.count(x, y) > 0)) continue;
+      Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+      Eigen::Vector3d v = Eigen::Vector3d::Zero();
+      double squares = 0;
+      float low = map.elevation_m(x, y), high = low;
+      for (int j = std::max(y - reach, 0); j <= std::min(y + reach, h - 1); ++j) {
+        for (int i = std::max(x - reach, 0); i <= std::min(x + reach, w - 1); ++i) {
+          const float z = map.elevation_m(i, j);
+          if (!std::isfinite(z)) continue;
+          const Eigen::Vector3d row((i - x) * map.place.cell_m, (y - j) * map.place.cell_m, 1);
+          m += row * row.transpose();
+          v += static_cast<double>(z) * row;
+          squares += static_cast<double>(z) * z;
+          if (std::abs(i - x) <= 1 && std::abs(j - y) <= 1) {
+            low = std::min(low, z);
+            high = std::max(high, z);
+          }
+        }
+      }
+      map.step_m(x, y) = high - low;
+      const double n = m(2, 2);
+      if (n < 5 || m.determinant() < 1e-9) continue;
+      const Eigen::Vector3d p = m.ldlt().solve(v);
+      map.slope_rad(x, y) = static_cast<float>(std::atan(std::hypot(p.x(), p.y())));
+      map.roughness_m(x, y) = static_cast<float>(std::sqrt(std::max(0.0, squares - v.dot(p)) / n));
+      const double worst = std::max({map.slope_rad(x, y) / steepest, map.step_m(x, y) / rover.highest_step_m,
+                                     map.roughness_m(x, y) / (0.5 * rover.wheel_radius_m),
+                                     (map.elevation_max_m(x, y) - map.ground_m(x, y)) / rover.clearance_m,
+                                     map.kind(x, y) == 3 ? 1.0 : 0.0});
+      map.cost(x, y) = static_cast<float>(std::clamp(worst, 0.0, 1.0));
+    }
+  }
+}
+
+// Cells of obstacles that touch, also by a corner.
+void list_obstacles(LocalMap& map) {
+  const auto [w, h] = map.size();
+  Image<std::uint8_t> done(w, h);
+  std::vector<GridCell> open;
+  for (int y0 = 0; y0 < h; ++y0) {
+    for (int x0 = 0; x0 < w; ++x0) {
+      if (map.kind(x0, y0) != 2 || done(x0, y0) != 0) continue;
+      Eigen::Vector2d low = middle_of(map.place, x0, y0), high = low;
+      Obstacle obstacle;
+      open.assign(1, {x0, y0});
+      done(x0, y0) = 1;
+      while (!open.empty()) {
+        const auto [x, y] = open.back();
+        open.pop_back();
+        const Eigen::Vector2d at = middle_of(map.place, x, y);
+        low = low.cwiseMin(at);
+        high = high.cwiseMax(at);
+        ++obstacle.cells;
+        obstacle.height_m =
+            std::max(obstacle.height_m, static_cast<double>(map.elevation_max_m(x, y) - map.ground_m(x, y)));
+        for (int j = std::max(y - 1, 0); j <= std::min(y + 1, h - 1); ++j) {
+          for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
+            if (map.kind(i, j) != 2 || done(i, j) != 0) continue;
+            done(i, j) = 1;
+            open.push_back({i, j});
+          }
+        }
+      }
+      obstacle.middle_m = 0.5 * (low + high);
+      obstacle.width_m = high.x() - low.x() + map.place.cell_m;
+      obstacle.length_m = high.y() - low.y() + map.place.cell_m;
+      map.obstacles.push_back(obstacle);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
+  std::vector<SurfacePoint> points;
+  const Eigen::Matrix3d turn = merged.body_from_centre.rotation_matrix();
+  for (int y = 0; y < merged.range_m.height(); ++y) {
+    for (int x = 0; x < merged.range_m.width(); ++x) {
+      const float range = merged.range_m(x, y);
+      if (!std::isfinite(range)) continue;
+      const Eigen::Vector3d along = turn * merged.camera.direction(x, y);
+      const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * along;
+      points.push_back({place.cast<float>(), merged.sigma_m(x, y), along.cast<float>(),
+                        static_cast<GroundClass>(merged.classes(x, y))});
+    }
+  }
+  return points;
+}
+
+std::vector<SurfacePoint> surface_points(const MergedView& view, double disparity_sigma_px, double farthest_m) {
+  std::vector<SurfacePoint> points;
+  const RectifiedStereo& g = view.geometry.stereo;
+  for (int y = 0; y < view.disparity.height(); ++y) {
+    for (int x = 0; x < view.disparity.width(); ++x) {
+      const double d = view.disparity(x, y);
+      if (!(d > 0)) continue;
+      const Eigen::Vector3d in_left = g.triangulate(x, y, d);
+      const double range = in_left.norm();
+      if (range > farthest_m) continue;
+      const double sigma = range * disparity_sigma_px / d;  // ∂z/∂d = −z/d, along the ray
+      points.push_back({(view.geometry.body_from_left * in_left).cast<float>(), static_cast<float>(sigma),
+                        (view.geometry.body_from_left.rotation() * (in_left / range)).cast<float>(),
+                        view.classes.empty() ? GroundClass::unknown : static_cast<GroundClass>(view.classes(x, y))});
+    }
+  }
+  return points;
+}
+
+LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const {
+  Grid grid = make_grid(options_, map_from_body.translation());
+  throw_points(points, map_from_body, grid);
+  LocalMap map;
+  map.map_from_body = map_from_body;
+  map.place = grid.place;
+  const int w = grid.width, h = grid.height;
+  for (Image<float>* layer : {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2,
+                              &map.ground_m, &map.slope_rad, &map.roughness_m, &map.step_m, &map.cost})
+    *layer = Image<float>(w, h, kNaN);
+  for (Image<float>* layer : {&map.count, &map.kind, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
+  Image<std::uint8_t> starts(w, h);
+  bool any_ground = false;
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const Cell& cell = grid.at(x, y);
+      if (cell.count < options_.fewest_points) continue;
+      map.elevation_m(x, y) = static_cast<float>(cell.sum / cell.weights);
+      map.elevation_min_m(x, y) = cell.lowest;
+      map.elevation_max_m(x, y) = cell.highest;
+      map.count(x, y) = static_cast<float>(cell.count);
+      // A cell's points err together (disparities are smooth): their mean is as uncertain as one of them.
+      map.variance_m2(x, y) = static_cast<float>(cell.count / cell.weights);
+      starts(x, y) = 2 * cell.ground > cell.count ? 1 : 0;
+      any_ground = any_ground || starts(x, y) != 0;
+    }
+  }
+  if (!any_ground) {
+    for (int y = 0; y < h; ++y) {
+      for (int x = 0; x < w; ++x) starts(x, y) = map.count(x, y) > 0 ? 1 : 0;
+    }
+  }
+  map.ground_m = fit_ground(map.elevation_m, starts, options_.cell_m, options_.ground, workers_);
+  classify(options_, map);
+  measure_shape(options_, map);
+  list_obstacles(map);
+  return map;
+}
+
+}  // namespace spartan

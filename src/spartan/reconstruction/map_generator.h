@@ -1,0 +1,80 @@
+// Map generation: points on the ground become a map with obstacles, cavities and costs.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "spartan/core/options.h"
+#include "spartan/core/threads.h"
+#include "spartan/reconstruction/disparity_merger.h"
+#include "spartan/reconstruction/ground_surface.h"
+#include "spartan/reconstruction/local_map.h"
+#include "spartan/reconstruction/v_disparity.h"
+
+namespace spartan {
+
+/// The rover that a map's costs are meant for.
+struct RoverLimits {
+  double wheel_radius_m = 0.1;
+  double clearance_m = 0.1;
+  double track_m = 0.6;
+  double steepest_deg = 20;
+  double highest_step_m = 0.08;
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("wheel_radius_m", wheel_radius_m, "roughness of half of it cannot be driven on", between(0.01, 5));
+    v.field("clearance_m", clearance_m, "obstacles as high as this cannot be driven over", between(0.01, 5));
+    v.field("track_m", track_m, "left to right wheel: slopes are taken over half of it", between(0.05, 10));
+    v.field("steepest_deg", steepest_deg, "slopes as steep as this cannot be driven on", between(1, 80));
+    v.field("highest_step_m", highest_step_m, "steps as high as this cannot be climbed", between(0.005, 5));
+  }
+};
+
+struct MapOptions {
+  double extent_m = 8;
+  double cell_m = 0.05;
+  double obstacle_m = 0.1;
+  double cavity_m = 0.1;
+  int fewest_points = 2;
+  GroundSurfaceOptions ground;
+  RoverLimits rover;
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("extent_m", extent_m, "side of the map", between(0.5, 1000));
+    v.field("cell_m", cell_m, "side of a cell", between(0.005, 10));
+    v.field("obstacle_m", obstacle_m, "what stands so much over the ground is an obstacle", between(0.005, 5));
+    v.field("cavity_m", cavity_m, "what lies so much below the ground is a cavity", between(0.005, 5));
+    v.field("fewest_points", fewest_points, "a cell with fewer stays unknown", between(1, 1000));
+    v.group("ground", ground);
+    v.group("rover", rover);
+  }
+};
+
+/// A point seen.
+struct SurfacePoint {
+  Eigen::Vector3f in_body;
+  float sigma_m = 0;      ///< along the ray
+  Eigen::Vector3f along;  ///< the ray's direction, unit length, body frame
+  GroundClass kind = GroundClass::unknown;
+};
+
+std::vector<SurfacePoint> surface_points(const MergedRange& merged);
+/// Of one view, without merging.
+std::vector<SurfacePoint> surface_points(const MergedView& view, double disparity_sigma_px, double farthest_m);
+
+class MapGenerator {
+ public:
+  MapGenerator(const MapOptions& options, Workers workers) : options_(options), workers_(std::move(workers)) {}
+
+  /// `map_from_body`: gravity-aligned; the map's middle is at its origin. Cells are at whole multiples of their side.
+  LocalMap generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const;
+
+ private:
+  MapOptions options_;
+  Workers workers_;
+};
+
+}  // namespace spartan

@@ -1,0 +1,159 @@
+#include "spartan/reconstruction/map_generator.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "spartan/core/random.h"
+
+namespace spartan {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// Points of a surface z(x, y) ahead of the rover, 1 cm apart, seen from 1 m over its origin.
+template <class Height>
+std::vector<SurfacePoint> points_on(const Height& height, double noise_m = 0.002) {
+  std::vector<SurfacePoint> points;
+  Random random(3, 1);
+  for (double x = 0.5; x < 3.5; x += 0.0103) {
+    for (double y = -1.5; y < 1.5; y += 0.0107) {
+      const Eigen::Vector3d p(x, y, height(x, y) + random.normal(0, noise_m));
+      const Eigen::Vector3d along = (p - Eigen::Vector3d(0, 0, 1)).normalized();
+      points.push_back({p.cast<float>(), 0.005F, along.cast<float>(), GroundClass::ground});
+    }
+  }
+  return points;
+}
+
+float at(const LocalMap& map, const Image<float>& layer, double x, double y) {
+  const GridCell cell = cell_at(map.place, x, y);
+  return layer(cell.column, cell.row);
+}
+
+TEST(LocalMap, CellsAndTheirMiddlesAgree) {
+  const MapPlace place{-1.5, 2.0, 0.25};
+  for (int row = 0; row < 9; ++row) {
+    for (int column = 0; column < 9; ++column) {
+      const Eigen::Vector2d middle = middle_of(place, column, row);
+      EXPECT_EQ(cell_at(place, middle.x(), middle.y()).column, column);
+      EXPECT_EQ(cell_at(place, middle.x(), middle.y()).row, row);
+    }
+  }
+  EXPECT_EQ(cell_at(place, -1.4, 1.9).row, 0) << "row 0 lies in the north";
+}
+
+TEST(MapGenerator, PlainGroundIsFreeAndCheap) {
+  const auto slope = [](double x, double y) { return 0.08 * x - 0.05 * y; };
+  const LocalMap map = MapGenerator({}, Workers(1)).generate(points_on(slope), Pose());
+  int known = 0;
+  for (int row = 0; row < map.size().height; ++row) {
+    for (int column = 0; column < map.size().width; ++column) {
+      if (!(map.count(column, row) > 0)) {
+        EXPECT_EQ(map.kind(column, row), 0) << "a cell never seen is never free";
+        EXPECT_TRUE(std::isnan(map.elevation_m(column, row)));
+        EXPECT_EQ(map.occupancy_logodds(column, row), 0);
+        continue;
+      }
+      ++known;
+      const Eigen::Vector2d middle = middle_of(map.place, column, row);
+      // At the edge the points of a cell do not lie around its middle.
+      if (middle.x() < 0.6 || middle.x() > 3.4 || std::abs(middle.y()) > 1.4) continue;
+      EXPECT_NEAR(map.elevation_m(column, row), slope(middle.x(), middle.y()), 0.003);
+      EXPECT_EQ(map.kind(column, row), 1);
+      EXPECT_LT(map.occupancy_logodds(column, row), -3);
+      EXPECT_NEAR(map.slope_rad(column, row), std::atan(std::hypot(0.08, 0.05)), 0.01);
+      EXPECT_LT(map.roughness_m(column, row), 0.003);
+      EXPECT_NEAR(map.step_m(column, row), 2 * 0.05 * 0.13, 0.004);
+      EXPECT_LT(map.cost(column, row), 0.4);
+    }
+  }
+  EXPECT_NEAR(known, 60 * 60, 130);
+  EXPECT_TRUE(map.obstacles.empty());
+}
+
+TEST(MapGenerator, RocksPitsAndWhatLiesBehindThem) {
+  const auto surface = [](double x, double y) {
+    if (std::hypot(x - 2, y - 0.5) < 0.2) return 0.22 + 0.05 * x;
+    if (std::hypot(x - 1.5, y + 0.7) < 0.25) return -0.2 + 0.05 * x;
+    return 0.05 * x;
+  };
+  std::vector<SurfacePoint> points = points_on(surface);
+  std::erase_if(points, [](const SurfacePoint& p) {  // hidden behind the rock
+    return p.in_body.x() > 2.2F && p.in_body.x() < 2.5F && std::abs(p.in_body.y() - 0.5F) < 0.15F;
+  });
+  const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
+  EXPECT_EQ(at(map, map.kind, 2, 0.5), 2);
+  EXPECT_EQ(at(map, map.kind, 1.5, -0.7), 3);
+  EXPECT_EQ(at(map, map.kind, 2.35, 0.5), 0);
+  EXPECT_EQ(at(map, map.kind, 1.0, 0.5), 1);
+  EXPECT_GT(at(map, map.occupancy_logodds, 2, 0.5), 3);
+  EXPECT_EQ(at(map, map.cost, 2, 0.5), 1);
+  EXPECT_EQ(at(map, map.cost, 1.5, -0.7), 1);
+  EXPECT_NEAR(at(map, map.ground_m, 2, 0.5), 0.1, 0.02) << "the ground goes on under the rock";
+  EXPECT_NEAR(at(map, map.elevation_m, 2, 0.5), 0.32, 0.01);
+  ASSERT_EQ(map.obstacles.size(), 1U);
+  EXPECT_LT((map.obstacles[0].middle_m - Eigen::Vector2d(2, 0.5)).norm(), 0.05);
+  EXPECT_NEAR(map.obstacles[0].width_m, 0.4, 0.08);
+  EXPECT_NEAR(map.obstacles[0].height_m, 0.22, 0.03);
+}
+
+// Turning the points and the attitude that says how they are turned leaves the map as it was.
+TEST(MapGenerator, TurningRigAndWorldTogetherChangesNothing) {
+  const auto surface = [](double x, double y) {
+    return 0.05 * std::sin(3 * x) + (std::hypot(x - 2, y) < 0.2 ? 0.2 : 0.0);
+  };
+  const std::vector<SurfacePoint> points = points_on(surface);
+  const Pose turn(Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.3, -0.9, 0.1).normalized())),
+                  {0.1, 0.2, 0.3});
+  std::vector<SurfacePoint> turned = points;
+  for (SurfacePoint& p : turned) {
+    p.in_body = (turn * p.in_body.cast<double>()).cast<float>();
+    p.along = (turn.rotation() * p.along.cast<double>()).cast<float>();
+  }
+  const Pose map_from_body = Pose::from_translation({0.5, 0, 0});
+  const LocalMap a = MapGenerator({}, Workers(1)).generate(points, map_from_body);
+  // The same map frame: its middle follows the body's origin, so the place may differ, not the cells.
+  const LocalMap b = MapGenerator({}, Workers(1)).generate(turned, map_from_body * turn.inverse());
+  int same = 0, different = 0;
+  for (double x = 1.2; x < 3.8; x += 0.05) {
+    for (double y = -1.3; y < 1.3; y += 0.05) {
+      const float one = at(a, a.elevation_m, x + 0.01, y + 0.01), other = at(b, b.elevation_m, x + 0.01, y + 0.01);
+      if (std::isnan(one) || std::isnan(other)) continue;
+      // Points on the border of a cell may change sides by rounding.
+      (std::abs(one - other) < 1e-3 && at(a, a.kind, x + 0.01, y + 0.01) == at(b, b.kind, x + 0.01, y + 0.01)
+           ? same
+           : different) += 1;
+    }
+  }
+  EXPECT_GT(same, 2500);
+  EXPECT_LT(different, same / 100);
+}
+
+TEST(MapGenerator, MorePointsNeverMakeACellLessSure) {
+  const auto flat = [](double, double) { return 0.0; };
+  std::vector<SurfacePoint> points = points_on(flat);
+  const LocalMap some = MapGenerator({}, Workers(1)).generate(points, Pose());
+  std::vector<SurfacePoint> twice = points;
+  twice.insert(twice.end(), points.begin(), points.end());
+  const LocalMap more = MapGenerator({}, Workers(1)).generate(twice, Pose());
+  for (int row = 0; row < some.size().height; ++row) {
+    for (int column = 0; column < some.size().width; ++column) {
+      if (!(some.count(column, row) > 0)) continue;
+      EXPECT_LE(more.variance_m2(column, row), some.variance_m2(column, row) * 1.0001F);
+    }
+  }
+}
+
+TEST(MapGenerator, SteepGroundCostsAsMuchAsItsSlope) {
+  const double rise = std::tan(10 * kDegree);
+  const LocalMap map =
+      MapGenerator({}, Workers(1)).generate(points_on([&](double x, double) { return rise * x; }), Pose());
+  EXPECT_NEAR(at(map, map.slope_rad, 2, 0), 10 * kDegree, 0.2 * kDegree);
+  EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of 20 degrees";
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,66 @@
+#include "spartan/reconstruction/panoramic_camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace spartan {
+namespace {
+
+constexpr double kSteepest = 8;  // slope below which a cylinder ends
+
+double upness(PanoramicCamera::Projection projection, const Eigen::Vector3d& d) {
+  const double level = std::hypot(d.x(), d.y());
+  return projection == PanoramicCamera::Projection::cylinder ? d.z() / level : std::atan2(d.z(), level);
+}
+
+}  // namespace
+
+PanoramicCamera::PanoramicCamera(Projection projection, ImageSize size, double per_radian, double left_rad, double top)
+    : projection_(projection), size_(size), per_radian_(per_radian), left_rad_(left_rad), top_(top) {}
+
+std::optional<Eigen::Vector2d> PanoramicCamera::project(const Eigen::Vector3d& direction) const {
+  if (std::hypot(direction.x(), direction.y()) <= 1e-9 * std::abs(direction.z())) return std::nullopt;
+  const double azimuth = std::atan2(direction.y(), direction.x());
+  return Eigen::Vector2d(per_radian_ * (left_rad_ - azimuth), per_radian_ * (top_ - upness(projection_, direction)));
+}
+
+Eigen::Vector3d PanoramicCamera::direction(double u, double v) const {
+  const double azimuth = left_rad_ - u / per_radian_, up = top_ - v / per_radian_;
+  const double level = projection_ == Projection::cylinder ? 1 / std::hypot(1.0, up) : std::cos(up);
+  const double z = projection_ == Projection::cylinder ? up * level : std::sin(up);
+  return {level * std::cos(azimuth), level * std::sin(azimuth), z};
+}
+
+PanoramicCamera plan_panorama(PanoramicCamera::Projection projection, double per_radian, const Pose& body_from_centre,
+                              std::span<const ViewGeometry> views, double nearest_m, double farthest_m) {
+  constexpr int kSteps = 16;
+  double left = -10, right = 10, top = -1e9, bottom = 1e9;
+  for (const ViewGeometry& view : views) {
+    const Pose centre_from_left = body_from_centre.inverse() * view.body_from_left;
+    const auto [w, h] = view.stereo.size;
+    for (int j = 0; j <= kSteps; ++j) {
+      for (int i = 0; i <= kSteps; ++i) {
+        if (i != 0 && j != 0 && i != kSteps && j != kSteps) continue;
+        for (const double depth : {nearest_m, farthest_m}) {
+          const double d = view.stereo.focal_px * view.stereo.baseline_m / depth;
+          const Eigen::Vector3d p =
+              centre_from_left * view.stereo.triangulate(i * (w - 1.0) / kSteps, j * (h - 1.0) / kSteps, d);
+          const double azimuth = std::atan2(p.y(), p.x()), up = upness(projection, p);
+          left = std::max(left, azimuth);
+          right = std::min(right, azimuth);
+          top = std::max(top, up);
+          bottom = std::min(bottom, up);
+        }
+      }
+    }
+  }
+  if (projection == PanoramicCamera::Projection::cylinder) {
+    bottom = std::max(bottom, -kSteepest);
+    top = std::min(top, kSteepest);
+  }
+  const ImageSize size{static_cast<int>(std::ceil((left - right) * per_radian)) + 1,
+                       static_cast<int>(std::ceil((top - bottom) * per_radian)) + 1};
+  return {projection, size, per_radian, left, top};
+}
+
+}  // namespace spartan
