@@ -11,7 +11,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <map>
 #include <memory>
@@ -31,6 +30,7 @@
 #include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/map_generator.h"
 #include "spartan/reconstruction/v_disparity.h"
+#include "standard_recordings.h"
 
 namespace spartan {
 namespace {
@@ -236,23 +236,12 @@ void judge(const std::string& folder, const std::string& scenario, int wanted) {
 }
 
 void run(const std::vector<std::string>& words) {
-  const char* const home = std::getenv("HOME");
-  std::string folder = std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings";
-  int wanted = 10;
-  std::vector<std::string> scenarios;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (words[i] == "--from" && i + 1 < words.size()) {
-      folder = words[++i];
-    } else if (words[i] == "--stops" && i + 1 < words.size()) {
-      wanted = std::stoi(words[++i]);
-    } else {
-      scenarios.push_back(words[i]);
-    }
-  }
+  RecordingArguments arguments = read_arguments(words, {{"--stops", "10"}});
+  std::vector<std::string>& scenarios = arguments.scenarios;
   if (scenarios.empty()) scenarios = {"rocky_20pct", "crater_rim", "flat_featureless", "diffuse_200lux"};
   fmt::print("{:<18} {:<10} {:>7} {:>7} {:>9} {:>12} {:>9} {:>12}\n", "scenario", "range", "bias mm", "RMS mm",
              "covered %", "obstacles", "false %", "cavities");
-  for (const std::string& scenario : scenarios) judge(folder, scenario, wanted);
+  for (const std::string& scenario : scenarios) judge(arguments.folder, scenario, arguments.number("--stops"));
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <map>
@@ -22,6 +21,7 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
+#include "standard_recordings.h"
 
 namespace spartan {
 namespace {
@@ -146,25 +146,13 @@ void compare(const std::string& folder, const std::string& scenario, const std::
 }
 
 void run(const std::vector<std::string>& words) {
-  const char* const home = std::getenv("HOME");
-  std::string folder = std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings", pair = "wide";
-  int wanted = 10;
-  std::vector<std::string> scenarios;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (words[i] == "--from" && i + 1 < words.size()) {
-      folder = words[++i];
-    } else if (words[i] == "--pairs" && i + 1 < words.size()) {
-      wanted = std::stoi(words[++i]);
-    } else if (words[i] == "--pair" && i + 1 < words.size()) {
-      pair = words[++i];
-    } else {
-      scenarios.push_back(words[i]);
-    }
-  }
+  RecordingArguments arguments = read_arguments(words, {{"--pairs", "10"}, {"--pair", "wide"}});
+  std::vector<std::string>& scenarios = arguments.scenarios;
   if (scenarios.empty()) scenarios = {"rocky_20pct", "diffuse_200lux", "night_edge", "flat_featureless"};
   fmt::print("{:<18} {:<8} {:<10} {:>7} {:>9} {:>9} {:>10} {:>9}\n", "scenario", "matcher", "range", "RMS px",
              "> 1 px %", "> 2 cm %", "unmatched%", "Mpixels");
-  for (const std::string& scenario : scenarios) compare(folder, scenario, pair, wanted);
+  for (const std::string& scenario : scenarios)
+    compare(arguments.folder, scenario, arguments.options.at("--pair"), arguments.number("--pairs"));
 }
 
 }  // namespace

@@ -252,19 +252,4 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
   return merged;
 }
 
-PointCloud to_point_cloud(const MergedRange& merged) {
-  PointCloud cloud;
-  for (int y = 0; y < merged.range_m.height(); ++y) {
-    for (int x = 0; x < merged.range_m.width(); ++x) {
-      const float range = merged.range_m(x, y);
-      if (!std::isfinite(range)) continue;
-      const Eigen::Vector3d p =
-          merged.body_from_centre * Eigen::Vector3d(static_cast<double>(range) * merged.camera.direction(x, y));
-      const std::uint8_t gray = merged.gray(x, y);
-      cloud.push_back({p.cast<float>(), {gray, gray, gray}});
-    }
-  }
-  return cloud;
-}
-
 }  // namespace spartan

@@ -10,7 +10,6 @@
 #include "spartan/core/options.h"
 #include "spartan/core/threads.h"
 #include "spartan/reconstruction/panoramic_camera.h"
-#include "spartan/reconstruction/point_cloud.h"
 
 namespace spartan {
 
@@ -76,8 +75,5 @@ class DisparityMerger {
   PanoramicCamera camera_;
   Workers workers_;
 };
-
-/// Points in the body frame, gray.
-PointCloud to_point_cloud(const MergedRange& merged);
 
 }  // namespace spartan

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <utility>
 
 namespace spartan {
 namespace {
@@ -172,25 +171,6 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
       const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * along;
       points.push_back({place.cast<float>(), merged.sigma_m(x, y), along.cast<float>(),
                         static_cast<GroundClass>(merged.classes(x, y))});
-    }
-  }
-  return points;
-}
-
-std::vector<SurfacePoint> surface_points(const MergedView& view, double disparity_sigma_px, double farthest_m) {
-  std::vector<SurfacePoint> points;
-  const RectifiedStereo& g = view.geometry.stereo;
-  for (int y = 0; y < view.disparity.height(); ++y) {
-    for (int x = 0; x < view.disparity.width(); ++x) {
-      const double d = view.disparity(x, y);
-      if (!(d > 0)) continue;
-      const Eigen::Vector3d in_left = g.triangulate(x, y, d);
-      const double range = in_left.norm();
-      if (range > farthest_m) continue;
-      const double sigma = range * disparity_sigma_px / d;  // ∂z/∂d = −z/d, along the ray
-      points.push_back({(view.geometry.body_from_left * in_left).cast<float>(), static_cast<float>(sigma),
-                        (view.geometry.body_from_left.rotation() * (in_left / range)).cast<float>(),
-                        view.classes.empty() ? GroundClass::unknown : static_cast<GroundClass>(view.classes(x, y))});
     }
   }
   return points;

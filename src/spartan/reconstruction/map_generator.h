@@ -62,8 +62,6 @@ struct SurfacePoint {
 };
 
 std::vector<SurfacePoint> surface_points(const MergedRange& merged);
-/// Of one view, without merging.
-std::vector<SurfacePoint> surface_points(const MergedView& view, double disparity_sigma_px, double farthest_m);
 
 class MapGenerator {
  public:

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "spartan/core/random.h"
@@ -43,6 +44,18 @@ TEST(LocalMap, CellsAndTheirMiddlesAgree) {
     }
   }
   EXPECT_EQ(cell_at(place, -1.4, 1.9).row, 0) << "row 0 lies in the north";
+}
+
+TEST(LocalMap, BandsAreNamedAsTheFormatsSay) {
+  const LocalMap map = MapGenerator({}, Workers(1)).generate({}, Pose());
+  std::string names;
+  for (const MapBand& band : map.bands()) {
+    names += (names.empty() ? "" : " ") + band.name;
+    EXPECT_EQ(band.values.size(), map.size()) << band.name;
+  }
+  EXPECT_EQ(names,
+            "elevation_m elevation_min_m elevation_max_m variance_m2 count slope_rad roughness_m step_m class "
+            "occupancy_logodds cost");
 }
 
 TEST(MapGenerator, PlainGroundIsFreeAndCheap) {

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
-#include <string>
 
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"

@@ -1,0 +1,37 @@
+// What benchmarks on the standard recordings are told: where these lie, how much of each to take, which ones.
+#pragma once
+
+#include <cstdlib>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace spartan {
+
+struct RecordingArguments {
+  std::string folder;
+  std::vector<std::string> scenarios;
+  std::map<std::string, std::string> options;  // "--pairs" → "10"
+
+  int number(const std::string& option) const { return std::stoi(options.at(option)); }
+};
+
+/// `defaults`: every option with its value; each takes one word. "--from" is one always.
+inline RecordingArguments read_arguments(const std::vector<std::string>& words,
+                                         const std::map<std::string, std::string>& defaults) {
+  const char* const home = std::getenv("HOME");
+  RecordingArguments arguments{std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings", {}, defaults};
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] == "--from" && i + 1 < words.size()) {
+      arguments.folder = words[++i];
+    } else if (defaults.contains(words[i]) && i + 1 < words.size()) {
+      arguments.options[words[i]] = words[i + 1];
+      ++i;
+    } else {
+      arguments.scenarios.push_back(words[i]);
+    }
+  }
+  return arguments;
+}
+
+}  // namespace spartan
