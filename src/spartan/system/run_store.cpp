@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "spartan/system/database.h"
+#include "spartan/core/database.h"
 
 namespace spartan {
 namespace {

@@ -1,4 +1,4 @@
-#include "spartan/system/database.h"
+#include "spartan/core/database.h"
 
 #include <sqlite3.h>
 
