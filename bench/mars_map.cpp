@@ -1,6 +1,7 @@
 // Maps of simulated stops beside the truth. `make bench-mars_map`.
 //
-//   mars_map [--from FOLDER] [--stops N] SCENARIO...      recordings as scripts/recordings makes them
+//   mars_map [--from FOLDER] [--stops N] [--list 1] SCENARIO...      recordings as scripts/recordings makes them; with
+//                                                                    --list the obstacles that were missed
 //
 // Default: 10 stops each of rocky_20pct, crater_rim, flat_featureless, diffuse_200lux. Poses are the true ones: only
 // the map is judged.
@@ -12,6 +13,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -25,28 +27,11 @@
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/eval/map_metrics.h"
 #include "spartan/imaging/imager.h"
-#include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/reconstruction/disparity_merger.h"
-#include "spartan/reconstruction/disparity_options.h"
-#include "spartan/reconstruction/map_generator.h"
-#include "spartan/reconstruction/v_disparity.h"
+#include "spartan/reconstruction/position_mapper.h"
 #include "standard_recordings.h"
 
 namespace spartan {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-struct Times {
-  double disparity = 0, v_disparity = 0, merging = 0, map = 0;
-};
-
-// Adds the time since `start` and starts again.
-void lap(Clock::time_point& start, double& sum) {
-  const auto now = Clock::now();
-  sum += std::chrono::duration<double>(now - start).count();
-  start = now;
-}
 
 // A recording with its truth.
 struct Drive {
@@ -96,65 +81,49 @@ Pose true_pose(const Drive& drive, Stamp stamp) {
       ->pose;
 }
 
-// Counts, per cell of the map, the pixels of one shot that both eyes see; keeps the larger of this and what was there.
-void count_visible(const Drive& drive, const std::string& pair, Stamp stamp, const ViewGeometry& view,
-                   const Pose& world_from_body, const MapPlace& place, Image<std::uint16_t>& visible) {
+// What the eyes could see of the cells of a map.
+struct Seen {
+  explicit Seen(ImageSize size)
+      : pixels(size), lowest_m(size.width, size.height, std::numeric_limits<float>::quiet_NaN()) {}
+  Image<std::uint16_t> pixels;  // that both eyes of one pair see, the most of any pair
+  Image<float> lowest_m;        // of the true surface
+};
+
+// Adds one shot.
+void look_truly(const Drive& drive, const std::string& pair, Stamp stamp, const ViewGeometry& view,
+                const Pose& world_from_body, const MapPlace& place, Seen& seen) {
   const std::string name = fmt::format("/{}/{}.png", pair, stamp.ns);
   const auto disparity = read_disparity(drive.folder + "/truth/disparity" + name);
   const auto mask = read_truth_mask(drive.folder + "/truth/mask" + name);
   if (!disparity || !mask) return;
-  Image<std::uint16_t> counts(visible.size());
+  Image<std::uint16_t> counts(seen.pixels.size());
   for (int y = 0; y < disparity->height(); ++y) {
     for (int x = 0; x < disparity->width(); ++x) {
       if ((*mask)(x, y) != 255) continue;
       const Eigen::Vector3d p =
           world_from_body * view.body_from_left * view.stereo.triangulate(x, y, (*disparity)(x, y));
       const GridCell cell = cell_at(place, p.x(), p.y());
-      if (counts.contains(cell.column, cell.row) && counts(cell.column, cell.row) != 0xFFFF)
-        ++counts(cell.column, cell.row);
+      if (!counts.contains(cell.column, cell.row)) continue;
+      if (counts(cell.column, cell.row) != 0xFFFF) ++counts(cell.column, cell.row);
+      float& lowest = seen.lowest_m(cell.column, cell.row);
+      lowest = std::fmin(lowest, static_cast<float>(p.z()));
     }
   }
   for (int y = 0; y < counts.height(); ++y) {
-    for (int x = 0; x < counts.width(); ++x) visible(x, y) = std::max(visible(x, y), counts(x, y));
+    for (int x = 0; x < counts.width(); ++x) seen.pixels(x, y) = std::max(seen.pixels(x, y), counts(x, y));
   }
 }
 
-// The views of one stop with everything that they borrow.
-struct Stop {
-  std::vector<Image<float>> disparities;
-  std::vector<Image<std::uint8_t>> lefts, classes;
-  std::vector<ViewGeometry> geometries;
-  std::vector<MergedView> views() const {
-    std::vector<MergedView> views;
-    for (std::size_t i = 0; i < geometries.size(); ++i)
-      views.push_back({geometries[i], disparities[i], lefts[i], classes[i]});
-    return views;
-  }
-};
-
-Stop look(Drive& drive, Imager& imager, DisparityComputer& computer,
-          const std::vector<std::pair<std::string, Stamp>>& shots, Times& times) {
-  Stop stop;
+// The views of one stop, taken by the mapper.
+void look(Drive& drive, Imager& imager, PositionMapper& mapper,
+          const std::vector<std::pair<std::string, Stamp>>& shots) {
+  mapper.leave();
   for (const auto& [pair, stamp] : shots) {
     const auto frame = drive.source->frame_at(pair, stamp);
     if (!frame) continue;
     const auto shot = imager.process(*frame);
-    if (!shot) continue;
-    auto start = Clock::now();
-    const auto range = disparity_range(shot->geometry, drive.rig.find_pair(pair)->nearest_m);
-    const auto image = computer.compute(shot->left, shot->right, range, shot->left_mask, shot->right_mask);
-    if (!image) continue;
-    lap(start, times.disparity);
-    const GroundPlane expected{shot->body_from_left.rotation().conjugate() * Eigen::Vector3d::UnitZ(),
-                               shot->body_from_left.translation().z()};
-    auto seen = compute_v_disparity(image->disparity, shot->geometry, expected, {}, Workers(2));
-    lap(start, times.v_disparity);
-    stop.disparities.push_back(Image<float>::copy_of(image->disparity));
-    stop.lefts.push_back(Image<std::uint8_t>::copy_of(shot->left));
-    stop.classes.push_back(seen ? std::move(seen->classes) : Image<std::uint8_t>(shot->geometry.size));
-    stop.geometries.push_back({shot->geometry, shot->body_from_left});
+    if (shot) (void)mapper.add(*shot, drive.rig.find_pair(pair)->nearest_m);
   }
-  return stop;
 }
 
 struct Sums {
@@ -182,7 +151,17 @@ struct Sums {
 
 constexpr std::array<double, 5> kBorders_m{0, 1.5, 2.5, 4, 4};
 
-void judge(const std::string& folder, const std::string& scenario, int wanted) {
+void list_missed(std::int64_t position, const char* what, const std::vector<JudgedThing>& things) {
+  for (const JudgedThing& thing : things) {
+    if (thing.found || thing.height_m < 0.15) continue;
+    fmt::print(
+        "  {} missed at position {}: ({:.2f}, {:.2f}), {:.2f} m, diameter {:.2f} m, {} of {} visible cells marked\n",
+        what, position, thing.middle_m.x(), thing.middle_m.y(), thing.height_m, thing.diameter_m, thing.marked_cells,
+        thing.visible_cells);
+  }
+}
+
+void judge(const std::string& folder, const std::string& scenario, int wanted, bool list) {
   auto drive = open_drive(folder + "/" + scenario);
   if (!drive) {
     fmt::print("{:<18} not there; scripts/recordings makes it\n", scenario);
@@ -190,9 +169,9 @@ void judge(const std::string& folder, const std::string& scenario, int wanted) {
   }
   auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));
   if (!imager) return;
-  DisparityComputer computer(DisparityOptions{}, Workers(2));
+  PositionMapper mapper({}, {}, Workers(2));
   std::array<Sums, 4> sums;  // three bins of range, all
-  Times times;
+  double map_seconds = 0;
   int stops = 0;
   Image<float> level(drive->elevation.bands[0].size());
   for (int y = 0; y < level.height(); ++y) {
@@ -203,24 +182,27 @@ void judge(const std::string& folder, const std::string& scenario, int wanted) {
   const TrueGround truth{drive->elevation.place, drive->elevation.bands[0], drive->elevation.bands[1], level};
   for (const auto& [position, shots] : drive->stops) {
     if (stops++ == wanted) break;
-    const Stop stop = look(*drive, *imager, computer, shots, times);
-    auto start = Clock::now();
-    const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.3, Workers(2));
-    const std::vector<MergedView> views = stop.views();
-    const MergedRange merged = merger.merge(views);
-    lap(start, times.merging);
+    look(*drive, *imager, mapper, shots);
+    const MergedRange merged = mapper.merge();
     const Pose pose = true_pose(*drive, shots.front().second);
-    const LocalMap map = MapGenerator({}, Workers(2)).generate(surface_points(merged), pose);
-    lap(start, times.map);
-    Image<std::uint16_t> visible(map.size());
-    for (std::size_t i = 0; i < shots.size(); ++i)
-      count_visible(*drive, shots[i].first, shots[i].second, stop.geometries[i], pose, map.place, visible);
+    const auto start = std::chrono::steady_clock::now();
+    const LocalMap map = mapper.map(surface_points(merged), pose);
+    map_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    Seen seen(map.size());
+    for (const PositionView& view : mapper.views())
+      look_truly(*drive, view.pair, view.stamp, view.geometry, pose, map.place, seen);
     for (std::size_t bin = 0; bin < sums.size(); ++bin) {
       MapScoring scoring;
       scoring.eye_m = pose.translation().head<2>();
       scoring.nearest_m = bin < 3 ? kBorders_m[bin] : 0;
       scoring.farthest_m = kBorders_m[bin + 1];
-      sums[bin].add(judge_map({map.place, map.elevation_m, map.kind, visible}, truth, scoring));
+      const MapMetrics metrics =
+          judge_map({map.place, map.elevation_m, map.kind, seen.pixels, seen.lowest_m}, truth, scoring);
+      sums[bin].add(metrics);
+      if (list && bin == 3) {
+        list_missed(position, "obstacle", metrics.obstacles);
+        list_missed(position, "cavity", metrics.cavities);
+      }
     }
   }
   for (std::size_t bin = 0; bin < sums.size(); ++bin) {
@@ -230,18 +212,22 @@ void judge(const std::string& folder, const std::string& scenario, int wanted) {
                1000 * s.error / s.cells, 1000 * std::sqrt(s.squares / s.cells), 100 * s.covered / s.visible, s.found,
                s.obstacles, 100 * s.false_marks / s.free, s.cavities_found, s.cavities);
   }
+  const MappingTimes& times = mapper.times();
   fmt::print("{:<18} seconds a stop on two threads: disparity {:.2f}, v-disparity {:.2f}, merging {:.2f}, map {:.2f}\n",
-             "", times.disparity / stops, times.v_disparity / stops, times.merging / stops, times.map / stops);
+             "", 1e-3 * times.disparity / stops, 1e-3 * times.v_disparity / stops, 1e-3 * times.merging / stops,
+             map_seconds / stops);
   std::fflush(stdout);
 }
 
 void run(const std::vector<std::string>& words) {
-  RecordingArguments arguments = read_arguments(words, {{"--stops", "10"}});
+  RecordingArguments arguments = read_arguments(words, {{"--stops", "10"}, {"--list", "0"}});
   std::vector<std::string>& scenarios = arguments.scenarios;
   if (scenarios.empty()) scenarios = {"rocky_20pct", "crater_rim", "flat_featureless", "diffuse_200lux"};
   fmt::print("{:<18} {:<10} {:>7} {:>7} {:>9} {:>12} {:>9} {:>12}\n", "scenario", "range", "bias mm", "RMS mm",
              "covered %", "obstacles", "false %", "cavities");
-  for (const std::string& scenario : scenarios) judge(arguments.folder, scenario, arguments.number("--stops"));
+  for (const std::string& scenario : scenarios) {
+    judge(arguments.folder, scenario, arguments.number("--stops"), arguments.number("--list") != 0);
+  }
 }
 
 }  // namespace

@@ -13,6 +13,7 @@ namespace {
 struct TrueCell {
   double mean_m = 0, lowest_m = 0, highest_m = 0;
   double over_m = 0, under_m = 0;  // the most over the local ground, and below the level
+  double level_m = 0;              // mean
 };
 
 struct Span {
@@ -44,10 +45,12 @@ std::optional<TrueCell> true_cell(const JudgedMap& map, const TrueGround& truth,
       cell.highest_m = std::max(cell.highest_m, z);
       cell.over_m = std::max(cell.over_m, z - truth.ground_m(i, j));
       cell.under_m = std::max(cell.under_m, truth.level_m(i, j) - z);
+      cell.level_m += truth.level_m(i, j);
       ++count;
     }
   }
   cell.mean_m /= count;
+  cell.level_m /= count;
   return cell;
 }
 
@@ -55,12 +58,13 @@ std::optional<TrueCell> true_cell(const JudgedMap& map, const TrueGround& truth,
 struct Labels {
   Image<std::uint8_t> kind;
   Image<float> size;  // height or depth
+  Image<float> level;
 };
 
 // Cells of one kind that touch become things; `visit` says which cells count.
 template <class Visible, class Marked>
-std::vector<JudgedThing> things(const Labels& labels, std::uint8_t kind, double cell_m, double found_share,
-                                const Visible& visible, const Marked& marked) {
+std::vector<JudgedThing> things(const Labels& labels, std::uint8_t kind, const MapPlace& place, double found_share,
+                                ImageView<const float> lowest_seen, const Visible& visible, const Marked& marked) {
   const auto [w, h] = labels.kind.size();
   Image<std::uint8_t> done(w, h);
   std::vector<JudgedThing> found;
@@ -76,10 +80,14 @@ std::vector<JudgedThing> things(const Labels& labels, std::uint8_t kind, double 
         const auto [x, y] = open.back();
         open.pop_back();
         ++cells;
+        thing.middle_m +=
+            Eigen::Vector2d(place.west_m + (x + 0.5) * place.cell_m, place.north_m - (y + 0.5) * place.cell_m);
         thing.height_m = std::max(thing.height_m, static_cast<double>(labels.size(x, y)));
         if (visible(x, y)) {
           ++thing.visible_cells;
           thing.marked_cells += marked(x, y) ? 1 : 0;
+          const double depth = labels.level(x, y) - lowest_seen(x, y);
+          if (depth > thing.seen_depth_m) thing.seen_depth_m = depth;
         }
         for (int j = std::max(y - 1, 0); j <= std::min(y + 1, h - 1); ++j) {
           for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
@@ -90,7 +98,8 @@ std::vector<JudgedThing> things(const Labels& labels, std::uint8_t kind, double 
         }
       }
       if (thing.visible_cells == 0) continue;
-      thing.diameter_m = std::sqrt(4 / std::numbers::pi * cells) * cell_m;
+      thing.middle_m /= cells;
+      thing.diameter_m = std::sqrt(4 / std::numbers::pi * cells) * place.cell_m;
       thing.found = thing.marked_cells >= found_share * thing.visible_cells;
       found.push_back(thing);
     }
@@ -111,7 +120,7 @@ bool near_obstacle(const Labels& labels, int x, int y) {
 
 MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapScoring& s) {
   const auto [w, h] = map.elevation_m.size();
-  Labels labels{Image<std::uint8_t>(w, h), Image<float>(w, h)};
+  Labels labels{Image<std::uint8_t>(w, h), Image<float>(w, h), Image<float>(w, h)};
   MapMetrics m;
   double sum = 0, squares = 0;
   const auto in_range = [&](int x, int y) {
@@ -126,6 +135,7 @@ MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapSco
       if (!cell) continue;
       labels.kind(x, y) = cell->over_m > s.obstacle_m ? 2 : cell->under_m > s.cavity_m ? 3 : 1;
       labels.size(x, y) = static_cast<float>(labels.kind(x, y) == 3 ? cell->under_m : cell->over_m);
+      labels.level(x, y) = static_cast<float>(cell->level_m);
       const bool known = std::isfinite(map.elevation_m(x, y));
       if (is_visible(x, y)) {
         ++m.visible_cells;
@@ -152,10 +162,11 @@ MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapSco
     m.bias_m = sum / m.judged_cells;
     m.rms_m = std::sqrt(squares / m.judged_cells);
   }
-  m.obstacles =
-      things(labels, 2, map.place.cell_m, s.found_share, is_visible, [&](int x, int y) { return map.kind(x, y) == 2; });
-  m.cavities =
-      things(labels, 3, map.place.cell_m, s.found_share, is_visible, [&](int x, int y) { return map.kind(x, y) == 3; });
+  m.obstacles = things(labels, 2, map.place, s.found_share, map.lowest_seen_m, is_visible,
+                       [&](int x, int y) { return map.kind(x, y) == 2; });
+  m.cavities = things(labels, 3, map.place, s.found_share, map.lowest_seen_m, is_visible,
+                      [&](int x, int y) { return map.kind(x, y) == 3; });
+  std::erase_if(m.cavities, [&](const JudgedThing& thing) { return thing.seen_depth_m < s.cavity_m; });
   return m;
 }
 

@@ -25,6 +25,7 @@ struct JudgedMap {
   ImageView<const float> elevation_m;      ///< NaN unknown
   ImageView<const float> kind;             ///< 0 unknown, 1 free, 2 obstacle, 3 cavity
   ImageView<const std::uint16_t> visible;  ///< pixels that both eyes of one pair see there, the most of any pair
+  ImageView<const float> lowest_seen_m;    ///< of the true surface that any pair sees there; NaN none
 };
 
 struct MapScoring {
@@ -39,9 +40,11 @@ struct MapScoring {
 
 /// A true obstacle or cavity with what was made of it.
 struct JudgedThing {
-  double height_m = 0;    ///< or depth; the largest
-  double diameter_m = 0;  ///< of the disc of its area
+  Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();  ///< of its cells
+  double height_m = 0;                                 ///< or depth; the largest
+  double diameter_m = 0;                               ///< of the disc of its area
   int visible_cells = 0, marked_cells = 0;
+  double seen_depth_m = 0;  ///< of a cavity: how far below the level it is seen
   bool found = false;
 };
 
@@ -50,7 +53,8 @@ struct MapMetrics {
   double bias_m = 0, rms_m = 0;
   int visible_cells = 0, covered_cells = 0;
   int free_cells = 0, false_cells = 0;  ///< observed and truly free; of those marked though no true obstacle is near
-  std::vector<JudgedThing> obstacles, cavities;   ///< with a visible cell
+  std::vector<JudgedThing> obstacles;   ///< with a visible cell
+  std::vector<JudgedThing> cavities;    ///< seen at least MapScoring::cavity_m deep
   std::array<std::array<int, 4>, 4> confusion{};  ///< [true kind][kind] of visible cells; true 0: none inside the truth
 
   double coverage() const { return visible_cells > 0 ? static_cast<double>(covered_cells) / visible_cells : 0; }

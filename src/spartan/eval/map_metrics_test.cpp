@@ -14,6 +14,7 @@ struct Case {
   Image<float> surface{200, 200, 1.0F}, ground{200, 200, 1.0F}, level{200, 200, 1.0F};
   Image<float> elevation{40, 40, 1.0F}, kind{40, 40, 1.0F};
   Image<std::uint16_t> visible{40, 40, 10};
+  Image<float> lowest_seen{40, 40, 1.0F};
   MapPlace place{-2, 2, 0.1};
 
   Case() {
@@ -24,6 +25,7 @@ struct Case {
     box(elevation, 40, 0.1, -1.3, -0.7, -1.3, -0.7, 0.7F);
     box(kind, 40, 0.1, 0.8, 1.2, 0.8, 1.2, 2.0F);
     box(kind, 40, 0.1, -1.3, -0.7, -1.3, -0.7, 3.0F);
+    box(lowest_seen, 40, 0.1, -1.3, -0.7, -1.3, -0.7, 0.7F);
   }
   static void box(Image<float>& image, int side, double cell, double x0, double x1, double y0, double y1, float value) {
     for (int j = 0; j < side; ++j) {
@@ -34,7 +36,7 @@ struct Case {
     }
   }
   MapMetrics judge(const MapScoring& scoring = {}) const {
-    return judge_map({place, elevation, kind, visible}, {{-2, 2, 0.02}, surface, ground, level}, scoring);
+    return judge_map({place, elevation, kind, visible, lowest_seen}, {{-2, 2, 0.02}, surface, ground, level}, scoring);
   }
   static int column(double x) { return static_cast<int>((x + 2) / 0.1); }
   static int row(double y) { return static_cast<int>((2 - y) / 0.1); }
@@ -98,6 +100,18 @@ TEST(MapMetrics, AThirdOfAnObstacleIsFoundLessIsNot) {
     for (int i = 0; i < 4; ++i) c.visible(Case::column(0.85) + i, Case::row(1.15) + j) = 0;
   }
   EXPECT_TRUE(c.judge().obstacles.empty()) << "nobody sees it";
+}
+
+TEST(MapMetrics, ACavityCountsWhereItIsSeenTenCentimetresDeep) {
+  Case c;
+  Case::box(c.lowest_seen, 40, 0.1, -1.3, -0.7, -1.3, -0.7, 0.91F);
+  EXPECT_TRUE(c.judge().cavities.empty()) << "only its brink is seen";
+  Case::box(c.lowest_seen, 40, 0.1, -0.9, -0.7, -0.9, -0.7, 0.85F);
+  const MapMetrics m = c.judge();
+  ASSERT_EQ(m.cavities.size(), 1U);
+  EXPECT_NEAR(m.cavities[0].seen_depth_m, 0.15, 1e-6);
+  EXPECT_NEAR(m.cavities[0].middle_m.x(), -1, 1e-6);
+  EXPECT_NEAR(m.cavities[0].middle_m.y(), -1, 1e-6);
 }
 
 TEST(MapMetrics, MarksCountAsFalseTwoCellsFromAnyObstacle) {

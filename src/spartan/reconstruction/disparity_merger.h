@@ -15,8 +15,8 @@ namespace spartan {
 
 struct MergingOptions {
   std::string projection = "cylinder";
-  double pixels_per_degree = 8;
-  double farthest_m = 8;
+  double pixels_per_degree = 12;
+  double farthest_m = 6;
   double disparity_sigma_px = 0.3;
   double gate_sigmas = 3;
 
@@ -24,7 +24,7 @@ struct MergingOptions {
   void describe(Visitor& v) {
     v.field("projection", projection, "of the virtual camera", {"cylinder", "sphere"});
     v.field("pixels_per_degree", pixels_per_degree, "of the virtual camera", between(0.5, 60));
-    v.field("farthest_m", farthest_m, "points farther away are left out", between(0.5, 1000));
+    v.field("farthest_m", farthest_m, "points farther away are left out", between(0.5, 10000));
     v.field("disparity_sigma_px", disparity_sigma_px, "standard deviation of a disparity", between(0.01, 5));
     v.field("gate_sigmas", gate_sigmas, "ranges that differ by more belong to different surfaces", between(1, 10));
   }

@@ -12,18 +12,23 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr double kLeastSigma_m = 0.001;
 constexpr float kMostLogodds = 5;
+constexpr double kCut_rad = 0.5 * std::numbers::pi / 180;  // so far below the edge of the view a point is cut
 
 // What the points of a cell add up to.
 struct Cell {
   double weights = 0, sum = 0;
   float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
   int count = 0, ground = 0;
+  bool cut = false;
 };
 
 struct Grid {
   MapPlace place;
   int width = 0, height = 0;
   std::vector<Cell> cells;
+  const Cell& at(int x, int y) const {
+    return cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+  }
   Cell& at(int x, int y) {
     return cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
   }
@@ -54,11 +59,12 @@ void throw_points(std::span<const SurfacePoint> points, const Pose& map_from_bod
     cell.lowest = std::min(cell.lowest, p.z());
     cell.highest = std::max(cell.highest, p.z());
     ++cell.count;
+    cell.cut = cell.cut || point.cut;
     cell.ground += point.kind == GroundClass::ground ? 1 : 0;
   }
 }
 
-void classify(const MapOptions& options, LocalMap& map) {
+void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
   const auto [w, h] = map.size();
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
@@ -66,14 +72,15 @@ void classify(const MapOptions& options, LocalMap& map) {
       const double over = map.elevation_max_m(x, y) - map.ground_m(x, y),
                    under = map.ground_m(x, y) - map.elevation_min_m(x, y);
       const double sigma = std::sqrt(static_cast<double>(map.variance_m2(x, y))) + kLeastSigma_m;
+      const double obstacle_m = options.obstacle_m * (grid.at(x, y).cut ? options.cut_share : 1);
       map.kind(x, y) = 1;
-      if (over > options.obstacle_m) {
+      if (over > obstacle_m) {
         map.kind(x, y) = 2;
       } else if (under > options.cavity_m) {
         map.kind(x, y) = 3;
       }
       // ln(p / (1 − p)) of Φ((over − threshold) / σ), by the logistic curve of the same slope.
-      const double past = std::max(over - options.obstacle_m, under - options.cavity_m) / sigma;
+      const double past = std::max(over - obstacle_m, under - options.cavity_m) / sigma;
       map.occupancy_logodds(x, y) = std::clamp(static_cast<float>(1.702 * past), -kMostLogodds, kMostLogodds);
     }
   }
@@ -163,14 +170,18 @@ void list_obstacles(LocalMap& map) {
 std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
   std::vector<SurfacePoint> points;
   const Eigen::Matrix3d turn = merged.body_from_centre.rotation_matrix();
+  const int edge = std::max(1, static_cast<int>(std::lround(kCut_rad * merged.camera.per_radian())));
+  std::vector<int> tops(static_cast<std::size_t>(merged.range_m.width()), merged.range_m.height());
   for (int y = 0; y < merged.range_m.height(); ++y) {
     for (int x = 0; x < merged.range_m.width(); ++x) {
       const float range = merged.range_m(x, y);
       if (!std::isfinite(range)) continue;
+      int& top = tops[static_cast<std::size_t>(x)];
+      top = std::min(top, y);
       const Eigen::Vector3d along = turn * merged.camera.direction(x, y);
       const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * along;
       points.push_back({place.cast<float>(), merged.sigma_m(x, y), along.cast<float>(),
-                        static_cast<GroundClass>(merged.classes(x, y))});
+                        static_cast<GroundClass>(merged.classes(x, y)), y < top + edge});
     }
   }
   return points;
@@ -209,7 +220,7 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
     }
   }
   map.ground_m = fit_ground(map.elevation_m, starts, options_.cell_m, options_.ground, workers_);
-  classify(options_, map);
+  classify(options_, grid, map);
   measure_shape(options_, map);
   list_obstacles(map);
   return map;

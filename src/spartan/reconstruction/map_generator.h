@@ -37,7 +37,8 @@ struct MapOptions {
   double cell_m = 0.05;
   double obstacle_m = 0.1;
   double cavity_m = 0.1;
-  int fewest_points = 2;
+  double cut_share = 0.3;
+  int fewest_points = 1;
   GroundSurfaceOptions ground;
   RoverLimits rover;
 
@@ -47,6 +48,9 @@ struct MapOptions {
     v.field("cell_m", cell_m, "side of a cell", between(0.005, 10));
     v.field("obstacle_m", obstacle_m, "what stands so much over the ground is an obstacle", between(0.005, 5));
     v.field("cavity_m", cavity_m, "what lies so much below the ground is a cavity", between(0.005, 5));
+    v.field("cut_share", cut_share,
+            "what the upper edge of the view cuts off may be higher: an obstacle from this share of obstacle_m on",
+            between(0.05, 1));
     v.field("fewest_points", fewest_points, "a cell with fewer stays unknown", between(1, 1000));
     v.group("ground", ground);
     v.group("rover", rover);
@@ -59,6 +63,7 @@ struct SurfacePoint {
   float sigma_m = 0;      ///< along the ray
   Eigen::Vector3f along;  ///< the ray's direction, unit length, body frame
   GroundClass kind = GroundClass::unknown;
+  bool cut = false;  ///< nothing was seen above it
 };
 
 std::vector<SurfacePoint> surface_points(const MergedRange& merged);

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -111,6 +113,37 @@ TEST(MapGenerator, RocksPitsAndWhatLiesBehindThem) {
   EXPECT_LT((map.obstacles[0].middle_m - Eigen::Vector2d(2, 0.5)).norm(), 0.05);
   EXPECT_NEAR(map.obstacles[0].width_m, 0.4, 0.08);
   EXPECT_NEAR(map.obstacles[0].height_m, 0.22, 0.03);
+}
+
+// Of a rock whose front is all that the view still holds.
+TEST(MapGenerator, WhatTheViewCutsOffCountsAsAnObstacleEarlier) {
+  const auto surface = [](double x, double y) {
+    return x > 3.4 && std::abs(y) < 0.2 ? std::min(0.5 * (x - 3.4), 0.05) : 0.0;
+  };
+  std::vector<SurfacePoint> points = points_on(surface);
+  const LocalMap whole = MapGenerator({}, Workers(1)).generate(points, Pose());
+  EXPECT_EQ(at(whole, whole.kind, 3.47, 0), 1);
+  for (SurfacePoint& p : points) p.cut = p.in_body.x() > 3.4F;
+  const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
+  EXPECT_EQ(at(map, map.kind, 3.47, 0), 2);
+  EXPECT_EQ(at(map, map.kind, 3.2, 0), 1);
+  EXPECT_EQ(at(map, map.kind, 3.42, 0), 1) << "the ground at the edge is ground";
+}
+
+// A panorama whose columns begin lower from left to right, with a hole.
+TEST(SurfacePoints, TheTopsOfColumnsAreCut) {
+  MergedRange merged;
+  merged.camera = PanoramicCamera(PanoramicCamera::Projection::cylinder, {8, 40}, 8 * 180 / std::numbers::pi, 0, -0.2);
+  merged.range_m = Image<float>(8, 40, 3.0F);
+  merged.sigma_m = Image<float>(8, 40, 0.01F);
+  merged.classes = Image<std::uint8_t>(8, 40);
+  for (int x = 0; x < 8; ++x) {
+    for (int y = 0; y < 2 * x; ++y) merged.range_m(x, y) = std::numeric_limits<float>::quiet_NaN();
+  }
+  merged.range_m(0, 20) = std::numeric_limits<float>::quiet_NaN();
+  int cut = 0;
+  for (const SurfacePoint& p : surface_points(merged)) cut += p.cut ? 1 : 0;
+  EXPECT_EQ(cut, 8 * 4) << "half a degree is four rows; holes are no edges";
 }
 
 // Turning the points and the attitude that says how they are turned leaves the map as it was.

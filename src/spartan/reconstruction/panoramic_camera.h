@@ -23,6 +23,7 @@ class PanoramicCamera {
   PanoramicCamera(Projection projection, ImageSize size, double per_radian, double left_rad, double top);
 
   ImageSize size() const { return size_; }
+  double per_radian() const { return per_radian_; }
   /// Pixel of a direction (not zero) in this camera's axes: x forward, y left, z up. None straight up or down on a
   /// cylinder; it may lie outside the image.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& direction) const;
