@@ -22,6 +22,7 @@ void add_verbs(CLI::App& app, Context& context) {
   add_demo(app, context);
   add_run(app, context);
   add_stereo(app, context);
+  add_map(app, context);
   add_evaluate(app, context);
   add_rig(app, context);
   add_config(app, context);

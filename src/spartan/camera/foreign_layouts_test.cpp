@@ -195,7 +195,7 @@ TEST_F(KittiRawLayout, IsReadWithItsInertialUnit) {
   EXPECT_THAT(play(*source), ElementsAre("i", "f0", "i", "f1", "i", "f2"));
   // 2011-09-26 13:02:25 UTC
   EXPECT_EQ(source->announced_stamps("stereo")[0], Stamp{1317042145'064389445LL});
-  const auto imu = source->first_imu_samples(10).value();
+  const auto imu = source->imu_samples({}, 10).value();
   ASSERT_EQ(imu.size(), 3u);
   EXPECT_EQ(imu[1].accel_m_s2, Eigen::Vector3d(111, 112, 113));
   EXPECT_EQ(imu[1].gyro_rad_s, Eigen::Vector3d(117, 118, 119));
@@ -258,7 +258,7 @@ TEST_F(EurocLayout, TheUnitsAxesAreTurnedIntoTheBody) {
   folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n1500000,0,0,0,0,0,0\n");
   auto source = open();
   EXPECT_THAT(play(*source), ElementsAre("i", "f0", "i", "f1", "f2", "f3"));
-  const auto imu = source->first_imu_samples(1).value();
+  const auto imu = source->imu_samples({}, 1).value();
   EXPECT_LE((imu[0].gyro_rad_s - Eigen::Vector3d(-2, 1, 3)).norm(), 1e-12);
   EXPECT_LE((imu[0].accel_m_s2 - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
 }

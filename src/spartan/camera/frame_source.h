@@ -45,6 +45,12 @@ struct RecordingInfo {
   std::string truth_file;  ///< trajectory with the truth, where the recording brings one; else empty
 };
 
+/// What frame_at() finds a shot by.
+struct ShotName {
+  std::string pair;
+  Stamp left_stamp;
+};
+
 /// Yields samples in the order of time; at the same stamp IMU, wheels, compass, inclinometer, then shots in the order
 /// in which the recording lists them. A shot whose stamp runs backwards stays behind the shot it is listed after.
 /// Sensor samples (not shots) whose stamp does not increase within their table are left out.
@@ -69,8 +75,11 @@ class FrameSource {
   /// Left stamps of all announced shots of a pair, in order.
   virtual std::vector<Stamp> announced_stamps(const std::string& pair) const = 0;
 
-  /// IMU samples of the first `seconds` (from the first IMU stamp on); does not move the reading position.
-  virtual Result<std::vector<ImuSample>> first_imu_samples(double seconds) = 0;
+  /// Shots of one position, complete as far as can be told without decoding, in the order in which they are played.
+  virtual std::vector<ShotName> shots_at(std::int64_t position_id) const = 0;
+
+  /// IMU samples of `seconds` from a stamp on (none: from the first one on); does not move the reading position.
+  virtual Result<std::vector<ImuSample>> imu_samples(std::optional<Stamp> from, double seconds) = 0;
 };
 
 struct OpenOptions {

@@ -107,15 +107,24 @@ class IndexedSource : public FrameSource {
     return stamps;
   }
 
-  Result<std::vector<ImuSample>> first_imu_samples(double seconds) override {
+  std::vector<ShotName> shots_at(std::int64_t position_id) const override {
+    std::vector<ShotName> names;
+    for (const Shot& shot : index_.shots) {
+      if (shot.position_id == position_id && !shot.fault) names.push_back({shot.pair, shot.left_stamp});
+    }
+    return names;
+  }
+
+  Result<std::vector<ImuSample>> imu_samples(std::optional<Stamp> from, double seconds) override {
     std::vector<ImuSample> samples;
     if (!index_.imu) return samples;
     SensorHead imu(index_.imu);
     Status status = imu.rewind();
     while (status && imu.head()) {
       const auto& sample = std::get<ImuSample>(*imu.head());
-      if (!samples.empty() && seconds_between(samples.front().stamp, sample.stamp) > seconds) break;
-      samples.push_back(sample);
+      if (!from) from = sample.stamp;
+      if (seconds_between(*from, sample.stamp) > seconds) break;
+      if (sample.stamp >= *from) samples.push_back(sample);
       status = imu.advance();
     }
     if (!status) return failure(status);

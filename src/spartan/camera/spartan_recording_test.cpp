@@ -286,9 +286,26 @@ TEST_F(SpartanRecordingFaults, ShotsOnRequestByStamp) {
   EXPECT_THAT(source->frame_at("front", {7}).error().message(),
               HasSubstr("has no shot of pair 'front' at 0.000000007 s"));
   EXPECT_FALSE(source->frame_at("mast", {6'000'000'000LL}));
-  const auto imu = source->first_imu_samples(3);
+  const auto imu = source->imu_samples({}, 3);
   ASSERT_TRUE(imu);
   EXPECT_EQ(imu->size(), 3u);
+  const Stamp second = (*imu)[1].stamp;
+  const auto later = source->imu_samples(second, 1.5);
+  ASSERT_TRUE(later);
+  ASSERT_FALSE(later->empty());
+  EXPECT_EQ(later->front().stamp, second);
+}
+
+TEST_F(SpartanRecordingFaults, ShotsOfAPosition) {
+  change("frames.csv", "2,-1,front", "2,7,front");
+  change("frames.csv", "3,-1,front", "3,7,front");
+  std::filesystem::remove(path_ + "/images/front/4000000000_left.png");
+  const auto source = open_recording(path_).value();
+  const auto shots = source->shots_at(7);
+  ASSERT_EQ(shots.size(), 1u) << "the other one has no left image";
+  EXPECT_EQ(shots[0].pair, "front");
+  EXPECT_EQ(shots[0].left_stamp.ns, 6000000000);
+  EXPECT_TRUE(source->shots_at(8).empty());
 }
 
 TEST(RecordingWriter, LeavesWhatIsThereAlone) {

@@ -6,7 +6,7 @@
 namespace spartan {
 namespace {
 
-constexpr double kSteepest = 8;  // slope below which a cylinder ends
+constexpr double kSteepest = 3;  // slope below which a cylinder ends: a third of the eye's height from its foot
 
 double upness(PanoramicCamera::Projection projection, const Eigen::Vector3d& d) {
   const double level = std::hypot(d.x(), d.y());

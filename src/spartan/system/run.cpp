@@ -98,7 +98,7 @@ Status Drive::begin() {
   auto memory = store_.memory();
   if (!memory) return failure(memory);
   if (!*memory) {
-    const auto imu = source_.first_imu_samples(kSecondsForGravity);
+    const auto imu = source_.imu_samples({}, kSecondsForGravity);
     if (!imu) return failure(imu);
     for (const ImuSample& sample : *imu) pipeline_.add(sample);
     return {};

@@ -7,6 +7,7 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/odometry/odometry_options.h"
 #include "spartan/reconstruction/disparity_options.h"
+#include "spartan/reconstruction/position_mapper.h"
 
 namespace spartan {
 
@@ -33,6 +34,7 @@ struct RunOptions {
   ImagingOptions imaging;
   OdometryOptions odometry;
   DisparityOptions reconstruction;
+  MappingOptions mapping;
   TerrainOptions terrain;
 
   template <class Visitor>
@@ -43,6 +45,7 @@ struct RunOptions {
     v.group("imaging", imaging);
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);
+    v.group("mapping", mapping);
     v.group("terrain", terrain);
   }
 };

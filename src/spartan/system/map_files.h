@@ -1,0 +1,21 @@
+// What a map leaves on the disk: GeoTIFF, pictures, point cloud.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "spartan/core/result.h"
+#include "spartan/reconstruction/position_mapper.h"
+
+namespace spartan {
+
+/// `path` without ending: .tif (bands of docs/formats.md) and .png (relief with classes). Code `output`.
+Status write_local_map(const LocalMap& map, const std::string& path);
+
+/// All of a position's 3D reconstruction, into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
+/// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; of each view
+/// <pair>_<stamp_ns>_classes.png and _v_disparity.png where ground was found. Code `output`.
+Status write_position(std::span<const PositionView> views, const MergedRange& merged, const LocalMap& map,
+                      const MappingOptions& options, const std::string& folder);
+
+}  // namespace spartan

@@ -1,0 +1,114 @@
+// `spartan map` from outside.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "program.h"
+#include "small_drive.h"
+#include "spartan/core/files.h"
+#include "spartan/core/geotiff.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using testing::run_program;
+
+class MapBuild : public ::testing::Test {
+ protected:
+  void SetUp() override { testing::write_small_drive(drive_, {.frames = 1}); }
+  testing::ProgramResult build(const std::string& output, std::vector<std::string> more) const {
+    std::vector<std::string> words{"map",
+                                   "build",
+                                   drive_ + "/image_0/000000.png",
+                                   drive_ + "/image_1/000000.png",
+                                   "--rig",
+                                   drive_ + "/calib.txt",
+                                   "-o",
+                                   folder_.path() + "/" + output};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_program(words);
+  }
+  testing::TemporaryFolder folder_;
+  const std::string drive_ = folder_.path() + "/drive";
+};
+
+// The eye stands 0.5 m over level ground and looks 25° down.
+TEST_F(MapBuild, FindsHowTheEyeStandsAndMapsTheGround) {
+  const auto told = build("map", {"--extent-m", "4", "--json"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const json summary = json::parse(told.out);
+  EXPECT_EQ(summary["attitude"]["source"], "along the ground");
+  EXPECT_NEAR(summary["attitude"]["pitch_deg"], 25, 0.5);
+  EXPECT_NEAR(summary["views"][0]["ground"]["height_m"], 0.5, 0.02);
+  EXPECT_EQ(summary["columns"], 80);
+  const auto map = read_geotiff(folder_.path() + "/map/map.tif");
+  ASSERT_TRUE(map) << map.error().message();
+  EXPECT_EQ(map->names.size(), 11u);
+  double squares = 0;
+  int known = 0, free = 0;
+  for (int y = 0; y < 80; ++y) {
+    for (int x = 0; x < 80; ++x) {
+      const double z = map->bands[0](x, y);
+      if (!std::isfinite(z)) continue;
+      ++known;
+      squares += (z + 0.5) * (z + 0.5);
+      free += map->bands[8](x, y) == 1 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(known, 600);
+  EXPECT_LT(std::sqrt(squares / known), 0.05) << "half a metre below the eye";
+  EXPECT_GT(free, 0.9 * known);
+  for (const char* file : {"map.png", "obstacles.csv", "range.pfm", "range_sigma.pfm", "panorama.png", "coverage.png",
+                           "points.ply", "stereo_0_classes.png", "stereo_0_v_disparity.png"})
+    EXPECT_TRUE(std::filesystem::exists(folder_.path() + "/map/" + file)) << file;
+}
+
+TEST_F(MapBuild, TakesTheGravityThatItIsTold) {
+  const auto told = build("map", {"--gravity", "0.5,0,-0.8660254", "--json"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const json summary = json::parse(told.out);
+  EXPECT_EQ(summary["attitude"]["source"], "given");
+  EXPECT_NEAR(summary["attitude"]["pitch_deg"], 30, 1e-4) << "gravity points forward: the nose is down";
+  EXPECT_NEAR(summary["attitude"]["roll_deg"], 0, 1e-4);
+}
+
+TEST_F(MapBuild, GivesTheSameBytesForAnyNumberOfThreads) {
+  ASSERT_EQ(build("one", {"--threads", "1"}).exit_code, 0);
+  ASSERT_EQ(build("two", {"--threads", "2"}).exit_code, 0);
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path() + "/one")) {
+    const std::string name = entry.path().filename().string();
+    EXPECT_EQ(read_file(entry.path().string()).value(), read_file(folder_.path() + "/two/" + name).value()) << name;
+  }
+}
+
+TEST_F(MapBuild, WhatItCannotDoIsSaid) {
+  const auto code = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {"map", "build", "-o", folder_.path() + "/out"});
+    return run_program(words).exit_code;
+  };
+  EXPECT_EQ(code({}), 2);
+  EXPECT_EQ(code({drive_ + "/image_0/000000.png"}), 2);
+  EXPECT_EQ(code({"--recording", drive_}), 2) << "no position";
+  EXPECT_EQ(code({"--recording", folder_.path() + "/none", "--position", "1"}), 3);
+  const auto none =
+      run_program({"map", "build", "-o", folder_.path() + "/out", "--recording", drive_, "--position", "9"});
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_THAT(none.err, HasSubstr("has no shot at position 9"));
+  const auto gravity = build("out", {"--gravity", "0,0"});
+  EXPECT_EQ(gravity.exit_code, 2);
+  EXPECT_THAT(gravity.err, HasSubstr("--gravity: '0,0' is not three numbers"));
+  EXPECT_EQ(build("out", {"--gravity", "0,0,0"}).exit_code, 2);
+  EXPECT_EQ(build("out", {"--extent-m", "-1"}).exit_code, 2);
+  EXPECT_EQ(build("out", {"--set", "mapping.map.no_such=1"}).exit_code, 2);
+  folder_.write("file", "");
+  EXPECT_EQ(build("file", {}).exit_code, 5) << "a file is in the way";
+}
+
+}  // namespace
+}  // namespace spartan
