@@ -1,0 +1,91 @@
+// Compass, inclinometer and map: what is measured against the world.
+#include <algorithm>
+#include <cmath>
+
+#include "spartan/localization/error_state_filter.h"
+#include "spartan/localization/kalman_update.h"
+#include "spartan/localization/measurement_models.h"
+#include "spartan/localization/start_frame.h"
+
+namespace spartan {
+namespace {
+
+using namespace error_at;
+
+/// While a sensor is excluded its own bias takes up this share of each disagreement, so that one that has changed for
+/// good comes back.
+constexpr double kBiasShare = 0.05;
+
+}  // namespace
+
+void ErrorStateFilter::take(const CompassSample& sample) {
+  move_to(sample.stamp, nullptr);
+  const double sigma = std::max(sample.sigma_rad, options_.compass.least_sigma_rad);
+  if (!memory_.compass.offset_known) {
+    find_compass_offset(sample, sigma);
+    return;
+  }
+  const Innovation innovation = compass_innovation(memory_.belief.state, sample.heading_rad, sigma);
+  const double square = normalised_square(memory_.belief.covariance, innovation);
+  const bool use = judge(LocalizationSensor::compass, square, 1, HealthReason::disagrees);
+  if (use) {
+    correct_world(innovation);
+  } else if (memory_.judge(LocalizationSensor::compass).state == SensorState::excluded) {
+    memory_.belief.covariance(kCompassOffset, kCompassOffset) += kBiasShare * innovation.residual.squaredNorm();
+  }
+}
+
+/// A compass that starts during the drive: its offset is that on which most of the first readings agree.
+void ErrorStateFilter::find_compass_offset(const CompassSample& sample, double sigma) {
+  CompassMemory& compass = memory_.compass;
+  compass.offsets[compass.pending] = sample.heading_rad - heading_of(memory_.belief.state.world_from_body);
+  compass.sigmas[compass.pending] = sigma;
+  if (++compass.pending < CompassMemory::kPending) return;
+  std::array<CompassSample, CompassMemory::kPending> readings;
+  for (std::size_t i = 0; i < readings.size(); ++i) readings[i] = {{}, compass.offsets[i], compass.sigmas[i]};
+  const auto offset = agreed_heading(readings, options_.compass.least_sigma_rad);
+  if (!offset) {  // the oldest goes, the next one may decide
+    std::rotate(compass.offsets.begin(), compass.offsets.begin() + 1, compass.offsets.end());
+    std::rotate(compass.sigmas.begin(), compass.sigmas.begin() + 1, compass.sigmas.end());
+    --compass.pending;
+    return;
+  }
+  compass.pending = 0;
+  compass.offset_known = true;
+  NavigationState& s = memory_.belief.state;
+  s.compass_offset_rad = offset->radians;
+  correct_world(compass_innovation(s, heading_of(s.world_from_body) + offset->radians,
+                                   std::hypot(offset->sigma_rad, options_.compass.offset_sigma_rad)));
+  ++memory_.judge(LocalizationSensor::compass).used;
+}
+
+void ErrorStateFilter::take(const InclinometerSample& sample) {
+  move_to(sample.stamp, nullptr);
+  const double sigma = std::max(sample.sigma_rad, options_.inclinometer.least_sigma_rad);
+  NavigationState& s = memory_.belief.state;
+  if (!memory_.imu.levelled) {
+    const Eigen::Vector3d up = s.world_from_body.rotation() * up_of_roll_pitch(sample.roll_rad, sample.pitch_rad);
+    if (up.z() <= 0) return;
+    s.gravity_tilt_rad = tilt_of_up(up);
+    memory_.imu.levelled = true;
+  }
+  const Innovation innovation = inclinometer_innovation(s, sample.roll_rad, sample.pitch_rad, sigma);
+  const double square = normalised_square(memory_.belief.covariance, innovation);
+  const bool use = judge(LocalizationSensor::inclinometer, square, 2, HealthReason::disagrees);
+  if (use) {
+    correct_world(innovation);
+  } else if (memory_.judge(LocalizationSensor::inclinometer).state == SensorState::excluded) {
+    memory_.belief.covariance.diagonal().segment<2>(kInclinometerBias) += kBiasShare * innovation.residual.cwiseAbs2();
+  }
+}
+
+void ErrorStateFilter::take(const PoseConstraint& constraint) {
+  move_to(constraint.stamp, nullptr);
+  const Innovation innovation =
+      pose_innovation(memory_.belief.state, constraint.world_from_body, constraint.information, options_.map_factor);
+  if (innovation.rows() == 0) return;
+  const double square = normalised_square(memory_.belief.covariance, innovation);
+  if (judge(LocalizationSensor::map, square, innovation.rows(), HealthReason::disagrees)) correct_world(innovation);
+}
+
+}  // namespace spartan

@@ -1,0 +1,69 @@
+#include "spartan/localization/error_state.h"
+
+#include <cmath>
+
+namespace spartan {
+
+NavigationState add_error(const NavigationState& s, const ErrorVector& e) {
+  using namespace error_at;
+  NavigationState r = s;
+  r.world_from_body = s.world_from_body * exp_se3(e.segment<6>(kPose));
+  r.velocity_m_s += e.segment<3>(kVelocity);
+  r.gyro_bias_rad_s += e.segment<3>(kGyroBias);
+  r.accel_bias_m_s2 += e.segment<3>(kAccelBias);
+  r.gravity_tilt_rad += e.segment<2>(kGravityTilt);
+  r.wheel_scale += e[kWheelScale];
+  r.compass_offset_rad += e[kCompassOffset];
+  r.inclinometer_bias_rad += e.segment<2>(kInclinometerBias);
+  r.vision_drift += e.segment<6>(kVisionDrift);
+  r.world_from_vision_clone = s.world_from_vision_clone * exp_se3(e.segment<6>(kVisionClone));
+  r.world_from_step_clone = s.world_from_step_clone * exp_se3(e.segment<6>(kStepClone));
+  return r;
+}
+
+ErrorVector error_between(const NavigationState& a, const NavigationState& b) {
+  using namespace error_at;
+  ErrorVector e;
+  e.segment<6>(kPose) = log_se3(a.world_from_body.inverse() * b.world_from_body);
+  e.segment<3>(kVelocity) = b.velocity_m_s - a.velocity_m_s;
+  e.segment<3>(kGyroBias) = b.gyro_bias_rad_s - a.gyro_bias_rad_s;
+  e.segment<3>(kAccelBias) = b.accel_bias_m_s2 - a.accel_bias_m_s2;
+  e.segment<2>(kGravityTilt) = b.gravity_tilt_rad - a.gravity_tilt_rad;
+  e[kWheelScale] = b.wheel_scale - a.wheel_scale;
+  e[kCompassOffset] = b.compass_offset_rad - a.compass_offset_rad;
+  e.segment<2>(kInclinometerBias) = b.inclinometer_bias_rad - a.inclinometer_bias_rad;
+  e.segment<6>(kVisionDrift) = b.vision_drift - a.vision_drift;
+  e.segment<6>(kVisionClone) = log_se3(a.world_from_vision_clone.inverse() * b.world_from_vision_clone);
+  e.segment<6>(kStepClone) = log_se3(a.world_from_step_clone.inverse() * b.world_from_step_clone);
+  return e;
+}
+
+Eigen::Vector3d true_up(const Eigen::Vector2d& tilt) {
+  return exp_so3({tilt.x(), tilt.y(), 0}) * Eigen::Vector3d::UnitZ();
+}
+
+// Exp(τ + δ) z = Exp(τ) Exp(J_r δ) z, so ∂/∂δ = −Exp(τ) [z]× J_r(τ).
+Eigen::Matrix<double, 3, 2> true_up_jacobian(const Eigen::Vector2d& tilt) {
+  const Eigen::Vector3d vector(tilt.x(), tilt.y(), 0);
+  const Eigen::Matrix3d j =
+      -exp_so3(vector).toRotationMatrix() * skew(Eigen::Vector3d::UnitZ()) * left_jacobian_so3(-vector);
+  return j.leftCols<2>();
+}
+
+Eigen::Vector2d tilt_of_up(const Eigen::Vector3d& up) {
+  const Eigen::Vector2d axis(-up.y(), up.x());  // z × up
+  const double sine = axis.norm();
+  if (sine < 1e-12) return Eigen::Vector2d::Zero();
+  return axis * (std::atan2(sine, up.z()) / sine);
+}
+
+void clone_pose(Belief& belief, int index) {
+  using namespace error_at;
+  (index == kVisionClone ? belief.state.world_from_vision_clone : belief.state.world_from_step_clone) =
+      belief.state.world_from_body;
+  ErrorCovariance& p = belief.covariance;
+  p.middleRows<6>(index) = p.middleRows<6>(kPose).eval();
+  p.middleCols<6>(index) = p.middleCols<6>(kPose).eval();
+}
+
+}  // namespace spartan

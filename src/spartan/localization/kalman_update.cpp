@@ -1,0 +1,69 @@
+#include "spartan/localization/kalman_update.h"
+
+#include <Eigen/Cholesky>
+#include <limits>
+
+namespace spartan {
+namespace {
+
+using Gain = Eigen::Matrix<double, error_at::kSize, Eigen::Dynamic, 0, error_at::kSize, 6>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+
+struct Projection {
+  Gain pht;
+  Eigen::LLT<Square> s;
+};
+
+Projection project(const ErrorCovariance& p, const Innovation& innovation) {
+  const Gain pht = p * innovation.jacobian.transpose();
+  const Square s = innovation.jacobian * pht + innovation.noise;
+  return {pht, s.llt()};
+}
+
+// The error of a pose after its mean has moved by `step`.
+void carry_over(ErrorCovariance& p, const ErrorVector& step, int index) {
+  const Matrix6d reset = right_jacobian_se3(step.segment<6>(index));
+  p.middleRows<6>(index) = (reset * p.middleRows<6>(index)).eval();
+  p.middleCols<6>(index) = (p.middleCols<6>(index) * reset.transpose()).eval();
+}
+
+}  // namespace
+
+Innovation::Innovation(int rows) {
+  residual.setZero(rows);
+  jacobian.setZero(rows, error_at::kSize);
+  noise.setZero(rows, rows);
+}
+
+double normalised_square(const ErrorCovariance& covariance, const Innovation& innovation) {
+  const Projection projection = project(covariance, innovation);
+  if (projection.s.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+  const double square = innovation.residual.dot(projection.s.solve(innovation.residual));
+  return square >= 0 ? square : std::numeric_limits<double>::infinity();
+}
+
+bool correct(Belief& belief, const Innovation& innovation) {
+  const Projection projection = project(belief.covariance, innovation);
+  if (projection.s.info() != Eigen::Success) return false;
+  const Gain gain = projection.s.solve(projection.pht.transpose()).transpose();
+  const ErrorVector step = gain * innovation.residual;
+  if (!step.allFinite()) return false;
+
+  ErrorCovariance keep = ErrorCovariance::Identity();
+  keep.noalias() -= gain * innovation.jacobian;
+  ErrorCovariance half;
+  half.noalias() = keep * belief.covariance;
+  belief.covariance.noalias() = half * keep.transpose();
+  belief.covariance += gain * innovation.noise * gain.transpose();
+  for (const int pose : {error_at::kPose, error_at::kVisionClone, error_at::kStepClone})
+    carry_over(belief.covariance, step, pose);
+  symmetrise(belief.covariance);
+  belief.state = add_error(belief.state, step);
+  return true;
+}
+
+void symmetrise(ErrorCovariance& covariance) {
+  covariance = (0.5 * (covariance + covariance.transpose())).eval();
+}
+
+}  // namespace spartan

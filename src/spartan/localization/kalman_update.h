@@ -1,0 +1,33 @@
+// Gate and correction of an error-state Kalman filter.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "spartan/localization/error_state.h"
+
+namespace spartan {
+
+/// What a measurement says about the error: residual = jacobian · error + noise. At most 6 rows, nothing on the heap.
+struct Innovation {
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1> residual;
+  Eigen::Matrix<double, Eigen::Dynamic, error_at::kSize, Eigen::RowMajor, 6, error_at::kSize> jacobian;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6> noise;  ///< covariance
+
+  /// All zero.
+  explicit Innovation(int rows);
+  int rows() const { return static_cast<int>(residual.size()); }
+};
+
+/// residualᵀ S⁻¹ residual with S = H P Hᵀ + R: chi-square distributed with rows() degrees of freedom where all is as
+/// believed. Infinite where S is not positive definite.
+double normalised_square(const ErrorCovariance& covariance, const Innovation& innovation);
+
+/// Kalman correction with the covariance in Joseph's form, the mean injected by add_error, and the covariance of the
+/// poses carried over to the new mean: ξ' = J_r(ξ̂) (ξ − ξ̂) (Solà 2017, section 6.3).
+/// False, and nothing changed, where S is not positive definite.
+bool correct(Belief& belief, const Innovation& innovation);
+
+/// As independent noise of the error, nothing else changed: restores symmetry after many small sums.
+void symmetrise(ErrorCovariance& covariance);
+
+}  // namespace spartan

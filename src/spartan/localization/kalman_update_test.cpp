@@ -1,0 +1,75 @@
+#include "spartan/localization/kalman_update.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "spartan/localization/test_drive.h"
+
+namespace spartan {
+namespace {
+
+using namespace error_at;
+
+Belief random_belief(Random& random, double sigma) {
+  Belief belief;
+  belief.state = random_navigation_state(random);
+  ErrorCovariance root;
+  for (Eigen::Index i = 0; i < root.size(); ++i) root.data()[i] = random.normal(0, sigma);
+  belief.covariance = root * root.transpose();
+  return belief;
+}
+
+TEST(KalmanUpdate, IsTheInformationFormOnLinearParts) {
+  Random random(1);
+  Belief belief = random_belief(random, 0.1);
+  const Belief before = belief;
+  Innovation i(3);
+  i.residual << 0.1, -0.2, 0.3;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = kVelocity; column < kVisionClone; ++column) i.jacobian(row, column) = random.normal();
+  }
+  i.noise.diagonal() << 0.5, 0.7, 0.9;
+  ASSERT_TRUE(correct(belief, i));
+  const ErrorCovariance information =
+      before.covariance.inverse() + i.jacobian.transpose() * i.noise.inverse() * i.jacobian;
+  const ErrorCovariance expected = information.inverse();
+  const ErrorVector step = expected * (i.jacobian.transpose() * i.noise.inverse() * i.residual);
+  EXPECT_LE((error_between(before.state, belief.state) - step).norm(), 1e-7);
+  // Poses aside, whose errors are carried over to the new mean.
+  const ErrorCovariance off = belief.covariance - expected;
+  EXPECT_LE((off.block<21, 21>(kVelocity, kVelocity)).cwiseAbs().maxCoeff(), 1e-7);
+  const Matrix6d reset = right_jacobian_se3(step.head<6>());
+  const Matrix6d carried = reset * expected.topLeftCorner<6, 6>() * reset.transpose();
+  EXPECT_LE((belief.covariance.topLeftCorner<6, 6>() - carried).norm(), 1e-7);
+}
+
+TEST(KalmanUpdate, StatisticIsThatOfTheWholeCovariance) {
+  Random random(2);
+  const Belief belief = random_belief(random, 0.3);
+  Innovation i(2);
+  i.residual << 1, 2;
+  i.jacobian(0, 7) = 1;
+  i.jacobian(1, 30) = 2;
+  i.noise << 0.3, 0.1, 0.1, 0.4;
+  const Eigen::Matrix2d s = i.jacobian * belief.covariance * i.jacobian.transpose() + i.noise;
+  EXPECT_NEAR(normalised_square(belief.covariance, i), i.residual.dot(s.inverse() * i.residual), 1e-9);
+}
+
+TEST(KalmanUpdate, LeavesABeliefAloneThatItCannotCorrect) {
+  Random random(3);
+  Belief belief = random_belief(random, 0.3);
+  const Belief before = belief;
+  Innovation i(1);
+  i.residual[0] = 1;
+  i.noise(0, 0) = -1e9;
+  EXPECT_FALSE(correct(belief, i));
+  EXPECT_TRUE(std::isinf(normalised_square(belief.covariance, i)));
+  EXPECT_LE(error_between(before.state, belief.state).norm(), 1e-14);
+  EXPECT_EQ((before.covariance - belief.covariance).norm(), 0);
+}
+
+}  // namespace
+}  // namespace spartan

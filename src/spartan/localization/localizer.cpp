@@ -1,0 +1,145 @@
+#include "spartan/localization/localizer.h"
+
+#include <cmath>
+#include <limits>
+
+#include "spartan/localization/replay_filter.h"
+
+namespace spartan {
+namespace {
+
+constexpr std::uint32_t kStateVersion = 1;
+
+}  // namespace
+
+struct Localizer::State {
+  explicit State(const LocalizationOptions& o) : options(o), filter(o) {}
+
+  bool add(const Measurement& m) {
+    std::optional<Refusal> refusal;
+    const auto* motion = std::get_if<RelativeMotion>(&m);
+    if (!is_sound(m)) {
+      refusal = Refusal::not_finite;
+    } else if (motion != nullptr && motion->to <= motion->from) {
+      refusal = Refusal::reversed;
+    } else {
+      refusal = filter.add(m);
+    }
+    if (refusal) refusals[static_cast<std::size_t>(sensor_of(m))].count(*refusal);
+    return !refusal;
+  }
+
+  double timeout_s(LocalizationSensor sensor) const {
+    switch (sensor) {
+      case LocalizationSensor::vision:
+        return options.health.vision_timeout_s;
+      case LocalizationSensor::imu:
+        return options.imu.timeout_s;
+      case LocalizationSensor::wheels:
+        return options.health.wheels_timeout_s;
+      case LocalizationSensor::compass:
+        return options.health.compass_timeout_s;
+      case LocalizationSensor::inclinometer:
+        return options.health.inclinometer_timeout_s;
+      case LocalizationSensor::map:
+        break;
+    }
+    return std::numeric_limits<double>::infinity();  // the map speaks when it has something to say
+  }
+
+  LocalizationOptions options;
+  ReplayFilter filter;
+  std::array<RefusalCounts, kLocalizationSensors> refusals;
+};
+
+Localizer::Localizer(const LocalizationOptions& options) : state_(std::make_unique<State>(options)) {}
+Localizer::Localizer(Localizer&&) noexcept = default;
+Localizer& Localizer::operator=(Localizer&&) noexcept = default;
+Localizer::~Localizer() = default;
+
+void Localizer::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body) {
+  state_->filter.start(stamp, ahead_in_body);
+}
+bool Localizer::started() const {
+  return state_->filter.started();
+}
+
+bool Localizer::add(const ImuSample& sample) {
+  return state_->add(sample);
+}
+bool Localizer::add(const WheelSample& sample) {
+  return state_->add(sample);
+}
+bool Localizer::add(const CompassSample& sample) {
+  return state_->add(sample);
+}
+bool Localizer::add(const InclinometerSample& sample) {
+  return state_->add(sample);
+}
+bool Localizer::add(const RelativeMotion& motion) {
+  return state_->add(motion);
+}
+bool Localizer::add(const PoseConstraint& constraint) {
+  return state_->add(constraint);
+}
+
+LocalizationEstimate Localizer::estimate() const {
+  using namespace error_at;
+  const FilterMemory& m = state_->filter.filter().memory();
+  const NavigationState& s = m.belief.state;
+  const ErrorCovariance& p = m.belief.covariance;
+  LocalizationEstimate e;
+  e.stamp = m.stamp;
+  e.world_from_body = {s.world_from_body, p.block<6, 6>(kPose, kPose)};
+  e.odom_from_body = state_->filter.filter().odom_from_body();
+  e.world_from_odom = m.world_from_odom;
+  e.velocity_m_s = s.velocity_m_s;
+  e.velocity_covariance = p.block<3, 3>(kVelocity, kVelocity);
+  if (m.wheels.slip_known) e.slip = WheelSlip{m.wheels.slip_stamp, m.wheels.slip, m.wheels.slip_sigma};
+  e.heading.east = m.compass.heading_east;
+  if (m.compass.offset_known) {
+    e.heading.compass_offset_rad = s.compass_offset_rad;
+    e.heading.compass_offset_sigma_rad = std::sqrt(p(kCompassOffset, kCompassOffset));
+  }
+  e.gravity_measured = m.gravity_measured;
+  e.up_in_world = true_up(s.gravity_tilt_rad);
+  for (std::size_t i = 0; i < e.health.size(); ++i) {
+    const auto sensor = static_cast<LocalizationSensor>(i);
+    e.health[i] = m.judges[i].report(m.stamp, state_->timeout_s(sensor), state_->refusals[i]);
+  }
+  return e;
+}
+
+Bytes Localizer::save() const {
+  ArchiveWriter out;
+  out.put(kStateVersion);
+  for (const RefusalCounts& r : state_->refusals) {
+    out.put(r.not_finite);
+    out.put(r.too_late);
+    out.put(r.duplicates);
+    out.put(r.reversed);
+  }
+  state_->filter.put(out);
+  return out.take();
+}
+
+Status Localizer::restore(const Bytes& bytes) {
+  ArchiveReader in(bytes);
+  const std::string what = "memory of the localization";
+  if (in.get<std::uint32_t>() != kStateVersion)
+    return failure(ErrorCode::configuration, "is of another version of the program", what, "run again from the start");
+  auto state = std::make_unique<State>(state_->options);
+  for (RefusalCounts& r : state->refusals) {
+    r.not_finite = in.get<std::int64_t>();
+    r.too_late = in.get<std::int64_t>();
+    r.duplicates = in.get<std::int64_t>();
+    r.reversed = in.get<std::int64_t>();
+  }
+  const bool sensible = state->filter.get(in);
+  if (Status status = in.finish(what); !status) return status;
+  if (!sensible) return failure(ErrorCode::configuration, "makes no sense", what, "run again from the start");
+  state_ = std::move(state);
+  return {};
+}
+
+}  // namespace spartan

@@ -1,0 +1,187 @@
+#include "spartan/localization/localizer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "spartan/localization/chi_square.h"
+#include "spartan/localization/test_drive.h"
+
+namespace spartan {
+namespace {
+
+double normalised_error(const UncertainPose& estimate, const Pose& truth) {
+  const Vector6d e = log_se3(estimate.pose.inverse() * truth);
+  return e.dot(estimate.covariance.inverse() * e);
+}
+
+// The pose relative to the first one, as the world starts at the first pose.
+Pose true_pose(const TestDrive& drive, double t) {
+  return drive.at(2.5).inverse() * drive.at(t);
+}
+
+TEST(Localizer, ComposesTheMotionsOfVisionAlone) {
+  const TestDrive drive;
+  const auto motions = test_motions(drive, 100, 1, 3);
+  const Localizer localizer = driven(test_options(), motions);
+  UncertainPose expected{Pose(), 1e-12 * Matrix6d::Identity()};
+  for (const Measurement& m : motions) {
+    const auto& motion = std::get<RelativeMotion>(m);
+    expected = compose(expected, {motion.previous_from_current, motion.covariance});
+  }
+  const LocalizationEstimate e = localizer.estimate();
+  EXPECT_LE(log_se3(e.world_from_body.pose.inverse() * expected.pose).norm(), 1e-7);
+  EXPECT_LE(log_se3(e.odom_from_body.pose.inverse() * expected.pose).norm(), 1e-7);
+  EXPECT_LE((e.world_from_body.covariance - expected.covariance).norm(), 1e-4 * expected.covariance.norm());
+  EXPECT_LE((e.odom_from_body.covariance - expected.covariance).norm(), 1e-4 * expected.covariance.norm());
+  EXPECT_FALSE(e.heading.east);
+  EXPECT_FALSE(e.gravity_measured);
+  EXPECT_EQ(e.health_of(LocalizationSensor::vision).state, SensorState::ok);
+  EXPECT_EQ(e.health_of(LocalizationSensor::imu).state, SensorState::missing);
+}
+
+// Gauss-Newton over all poses with the same motions and pose constraints.
+UncertainPose batch(const std::vector<Measurement>& motions, const std::vector<PoseConstraint>& constraints) {
+  std::vector<Pose> x{Pose()};
+  for (const Measurement& m : motions) x.push_back(x.back() * std::get<RelativeMotion>(m).previous_from_current);
+  const auto n = static_cast<Eigen::Index>(x.size());
+  Eigen::MatrixXd a;
+  for (int round = 0; round < 6; ++round) {
+    a = Eigen::MatrixXd::Zero(6 * n, 6 * n);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(6 * n);
+    const auto add = [&](Eigen::Index i, const Matrix6d& ji, Eigen::Index k, const Matrix6d& jk, const Vector6d& r,
+                         const Matrix6d& w) {
+      a.block<6, 6>(6 * i, 6 * i) += ji.transpose() * w * ji;
+      b.segment<6>(6 * i) += ji.transpose() * w * r;
+      if (k == i) return;
+      a.block<6, 6>(6 * k, 6 * k) += jk.transpose() * w * jk;
+      a.block<6, 6>(6 * i, 6 * k) += ji.transpose() * w * jk;
+      a.block<6, 6>(6 * k, 6 * i) += jk.transpose() * w * ji;
+      b.segment<6>(6 * k) += jk.transpose() * w * r;
+    };
+    const Matrix6d identity = Matrix6d::Identity();
+    add(0, identity, 0, identity, log_se3(x[0].inverse()), 1e12 * identity);
+    for (Eigen::Index i = 0; i + 1 < n; ++i) {
+      const auto& m = std::get<RelativeMotion>(motions[static_cast<std::size_t>(i)]);
+      const Pose between = x[static_cast<std::size_t>(i)].inverse() * x[static_cast<std::size_t>(i + 1)];
+      const Vector6d r = log_se3(between.inverse() * m.previous_from_current);
+      const Matrix6d j = right_jacobian_se3(r);
+      add(i + 1, identity, i, -right_jacobian_inverse_se3(-r) * adjoint(between.inverse()), r,
+          j.transpose() * m.covariance.inverse() * j);
+    }
+    for (const PoseConstraint& c : constraints) {
+      for (Eigen::Index i = 1; i < n; ++i) {
+        if (std::get<RelativeMotion>(motions[static_cast<std::size_t>(i - 1)]).to != c.stamp) continue;
+        add(i, identity, i, identity, log_se3(x[static_cast<std::size_t>(i)].inverse() * c.world_from_body),
+            c.information);
+      }
+    }
+    const Eigen::VectorXd step = a.ldlt().solve(b);
+    for (Eigen::Index i = 0; i < n; ++i)
+      x[static_cast<std::size_t>(i)] = x[static_cast<std::size_t>(i)] * exp_se3(step.segment<6>(6 * i));
+  }
+  return {x.back(), a.inverse().bottomRightCorner<6, 6>()};
+}
+
+TEST(Localizer, AgreesWithBatchLeastSquares) {
+  const TestDrive drive;
+  const auto motions = test_motions(drive, 40, 1, 5);
+  std::vector<PoseConstraint> constraints;
+  Random random(9);
+  std::vector<Measurement> all = motions;
+  for (const std::size_t at : {4u, 11u, 19u}) {
+    const Stamp stamp = stamp_of_measurement(motions[at]);
+    Vector6d error;
+    for (int i = 0; i < 6; ++i) error[i] = random.normal(0, 1e-4);
+    Matrix6d information = Matrix6d::Identity() * 1e8;
+    information(2, 2) = information(3, 3) = 0;  // nothing on height and roll
+    const double t = seconds_between(test_stamp(0), stamp);
+    constraints.push_back({stamp, true_pose(drive, t) * exp_se3(error), information});
+    all.emplace_back(constraints.back());
+  }
+  std::stable_sort(all.begin(), all.end(), comes_before);
+  const LocalizationEstimate e = driven(test_options(), all).estimate();
+  const UncertainPose expected = batch(motions, constraints);
+  EXPECT_EQ(e.health_of(LocalizationSensor::map).used, 3);
+  EXPECT_LE(log_se3(e.world_from_body.pose.inverse() * expected.pose).norm(), 1e-6);
+  EXPECT_LE((e.world_from_body.covariance - expected.covariance).norm(), 1e-3 * expected.covariance.norm());
+}
+
+TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {
+  const TestDrive drive;
+  const double limit = chi_square_quantile(0.999, 6);
+  for (int mask = 0; mask < 16; ++mask) {
+    SCOPED_TRACE(mask);
+    const TestSensors with{(mask & 1) != 0, (mask & 2) != 0, (mask & 4) != 0, (mask & 8) != 0, 1};
+    const auto all = in_order(test_samples(drive, 62.6, with, 11), test_motions(drive, 62.5, 1, 12));
+    const LocalizationEstimate e = driven(test_options(), all).estimate();
+    const double t = seconds_between(test_stamp(0), e.stamp);
+    EXPECT_LE((e.world_from_body.pose.translation() - e.world_from_odom * e.odom_from_body.pose.translation()).norm(),
+              1e-9);
+    // The world's yaw and level are what the first readings said; the truth is taken from the first pose on.
+    Localizer at_start(test_options());
+    for (const Measurement& m : all) {
+      if (stamp_of_measurement(m) <= test_stamp(2.5)) add_to(at_start, m);
+    }
+    at_start.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
+    const Pose start = at_start.estimate().world_from_body.pose;
+    EXPECT_LE(normalised_error(e.world_from_body, start * true_pose(drive, t)), limit);
+    const auto state = [&](LocalizationSensor s) { return e.health_of(s).state; };
+    EXPECT_EQ(state(LocalizationSensor::imu), with.imu ? SensorState::ok : SensorState::missing);
+    EXPECT_EQ(state(LocalizationSensor::wheels), with.wheels ? SensorState::ok : SensorState::missing);
+    EXPECT_EQ(e.heading.east, with.compass);
+    EXPECT_EQ(e.gravity_measured, with.imu || with.inclinometer);
+  }
+}
+
+TEST(Localizer, LevelsTheWorldByGravityAndTurnsItEast) {
+  TestDrive drive;
+  Localizer localizer(test_options());
+  const Eigen::Quaterniond tilted = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) *
+                                    Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()) *
+                                    Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitX());
+  for (int i = 0; i < 200; ++i) {
+    localizer.add(ImuSample{test_stamp(i * 0.01), Eigen::Vector3d::Zero(),
+                            tilted.conjugate() * Eigen::Vector3d(0, 0, 3.71 + (i % 2 == 0 ? 1e-4 : -1e-4))});
+    if (i % 50 == 0) localizer.add(CompassSample{test_stamp(i * 0.01), i == 50 ? -2.0 : 0.7, 0.01});
+  }
+  localizer.start(test_stamp(2), Eigen::Vector3d::UnitX());
+  const LocalizationEstimate e = localizer.estimate();
+  EXPECT_TRUE(e.heading.east);
+  EXPECT_LE(log_so3(e.world_from_body.pose.rotation().conjugate() * tilted).norm(), 1e-6);
+  EXPECT_THROW(localizer.start(test_stamp(3), Eigen::Vector3d::UnitX()), std::logic_error);
+}
+
+TEST(Localizer, OdomDoesNotJumpWhereTheMapCorrectsTheWorld) {
+  const TestDrive drive;
+  const auto all = in_order(test_samples(drive, 62.5, {}, 21), test_motions(drive, 62.5, 1, 22));
+  Localizer with = driven(test_options(), all), without = driven(test_options(), all);
+  const LocalizationEstimate before = with.estimate();
+  const double aside = 3 * std::sqrt(before.world_from_body.covariance(1, 1));
+  const Pose seen = before.world_from_body.pose * Pose::from_translation({0, aside, 0});
+  Matrix6d side_only = Matrix6d::Zero();
+  side_only(1, 1) = 1e12;
+  ASSERT_TRUE(with.add(PoseConstraint{before.stamp, seen, side_only}));
+  const LocalizationEstimate after = with.estimate();
+  EXPECT_NEAR((before.world_from_body.pose.inverse() * after.world_from_body.pose).translation().y(), aside,
+              0.05 * aside);
+  EXPECT_LE(log_se3(after.odom_from_body.pose.inverse() * before.odom_from_body.pose).norm(), 1e-12);
+  EXPECT_LE(log_se3((after.world_from_odom * after.odom_from_body.pose).inverse() * after.world_from_body.pose).norm(),
+            1e-12);
+  // And goes on as it would have.
+  for (const Measurement& m : test_motions(drive, 71.5, 1, 22)) {
+    if (std::get<RelativeMotion>(m).from < before.stamp) continue;
+    add_to(with, m);
+    add_to(without, m);
+  }
+  const Pose a = before.odom_from_body.pose.inverse() * with.estimate().odom_from_body.pose;
+  const Pose b = before.odom_from_body.pose.inverse() * without.estimate().odom_from_body.pose;
+  EXPECT_GT(a.translation().norm(), 0.3);
+  EXPECT_LE(log_se3(a.inverse() * b).norm(), 0.05 * aside);
+}
+
+}  // namespace
+}  // namespace spartan

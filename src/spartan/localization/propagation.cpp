@@ -1,0 +1,134 @@
+#include "spartan/localization/propagation.h"
+
+namespace spartan {
+namespace {
+
+using namespace error_at;
+
+// Noise that is white in acceleration (world) and angular rate (body), integrated over the step: the double integral
+// correlates position with velocity.
+void add_white_noise(Transition& t, double accel_variance, double rate_variance, double seconds,
+                     const Eigen::Matrix3d& body_from_world) {
+  const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
+  t.noise.block<3, 3>(kPosition, kPosition) += identity * (accel_variance * seconds * seconds * seconds / 3);
+  t.noise.block<3, 3>(kPosition, kVelocity) += body_from_world * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(kVelocity, kPosition) += body_from_world.transpose() * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(kVelocity, kVelocity) += identity * (accel_variance * seconds);
+  t.noise.block<3, 3>(kAttitude, kAttitude) += identity * (rate_variance * seconds);
+}
+
+Transition blank() {
+  Transition t;
+  t.by_moving.setIdentity();
+  t.by_tilt.setZero();
+  t.noise.setZero();
+  return t;
+}
+
+struct Integrated {
+  Eigen::Vector3d turn;  // rotation vector
+  Eigen::Matrix3d before, after;
+  Eigen::Vector3d force_from, force_to;  // without bias, body
+  Eigen::Vector3d acceleration;          // world
+};
+
+Integrated integrate(const NavigationState& s, const InertialStep& step, double gravity) {
+  Integrated i;
+  i.turn = (0.5 * (step.gyro_from + step.gyro_to) - s.gyro_bias_rad_s) * step.seconds;
+  i.before = s.world_from_body.rotation_matrix();
+  i.after = i.before * exp_so3(i.turn).toRotationMatrix();
+  i.force_from = step.accel_from - s.accel_bias_m_s2;
+  i.force_to = step.accel_to - s.accel_bias_m_s2;
+  i.acceleration = 0.5 * (i.before * i.force_from + i.after * i.force_to) - gravity * true_up(s.gravity_tilt_rad);
+  return i;
+}
+
+}  // namespace
+
+NavigationState propagate(const NavigationState& s, const InertialStep& step, double gravity) {
+  const Integrated i = integrate(s, step, gravity);
+  NavigationState r = s;
+  r.world_from_body = {s.world_from_body.rotation() * exp_so3(i.turn),
+                       s.world_from_body.translation() + s.velocity_m_s * step.seconds +
+                           0.5 * step.seconds * step.seconds * i.acceleration};
+  r.velocity_m_s += i.acceleration * step.seconds;
+  return r;
+}
+
+// With δp = R ρ (to first order) and a' = a + δa:
+//   φ' = ΔRᵀ φ − J_r t δb_g
+//   δa = −½ R [f₀]× φ − ½ R' [f₁]× φ' − ½ (R + R') δb_a − g ∂up δτ
+//   ρ' = ΔRᵀ ρ + R'ᵀ (δv t + ½ δa t²),   δv' = δv + δa t
+Transition transition(const NavigationState& s, const InertialStep& step, const InertialNoise& noise, double gravity) {
+  const Integrated i = integrate(s, step, gravity);
+  const double t = step.seconds;
+  Transition r = blank();
+  const Eigen::Matrix3d back = (i.before.transpose() * i.after).transpose();
+  const Eigen::Matrix3d turn_by_bias = -t * left_jacobian_so3(-i.turn);
+
+  Eigen::Matrix<double, 3, kMoving> accel = Eigen::Matrix<double, 3, kMoving>::Zero();
+  const Eigen::Matrix3d by_turn = -0.5 * i.after * skew(i.force_to);
+  accel.middleCols<3>(kAttitude) = -0.5 * i.before * skew(i.force_from) + by_turn * back;
+  accel.middleCols<3>(kGyroBias) = by_turn * turn_by_bias;
+  accel.middleCols<3>(kAccelBias) = -0.5 * (i.before + i.after);
+  const Eigen::Matrix<double, 3, 2> accel_by_tilt = -gravity * true_up_jacobian(s.gravity_tilt_rad);
+
+  const Eigen::Matrix3d to_body = i.after.transpose();
+  r.by_moving.block<3, 3>(kAttitude, kAttitude) = back;
+  r.by_moving.block<3, 3>(kAttitude, kGyroBias) = turn_by_bias;
+  r.by_moving.middleRows<3>(kVelocity) += t * accel;
+  r.by_moving.block<3, 3>(kPosition, kPosition) = back;
+  r.by_moving.block<3, 3>(kPosition, kVelocity) += t * to_body;
+  r.by_moving.middleRows<3>(kPosition) += 0.5 * t * t * to_body * accel;
+  r.by_tilt.middleRows<3>(kVelocity) = t * accel_by_tilt;
+  r.by_tilt.middleRows<3>(kPosition) = 0.5 * t * t * to_body * accel_by_tilt;
+
+  add_white_noise(r, noise.accel * noise.accel, noise.gyro * noise.gyro, t, to_body);
+  r.noise.block<3, 3>(kGyroBias, kGyroBias).diagonal().array() += noise.gyro_walk * noise.gyro_walk * t;
+  r.noise.block<3, 3>(kAccelBias, kAccelBias).diagonal().array() += noise.accel_walk * noise.accel_walk * t;
+  return r;
+}
+
+// v' = R' Rᵀ v: the velocity turns with the body; p' = p + ½ (v + v') t.
+NavigationState propagate(const NavigationState& s, const SteadyStep& step) {
+  NavigationState r = s;
+  const Eigen::Quaterniond after = s.world_from_body.rotation() * exp_so3(step.rate_rad_s * step.seconds);
+  r.velocity_m_s = after * (s.world_from_body.rotation().conjugate() * s.velocity_m_s);
+  r.world_from_body = {after, s.world_from_body.translation() + 0.5 * step.seconds * (s.velocity_m_s + r.velocity_m_s)};
+  return r;
+}
+
+// With w = Rᵀ v: δv' = R ΔR Rᵀ δv + R (ΔR [w]× − [ΔR w]×) φ.
+Transition transition(const NavigationState& s, const SteadyStep& step, const SteadyNoise& noise) {
+  const double t = step.seconds;
+  Transition r = blank();
+  const Eigen::Matrix3d before = s.world_from_body.rotation_matrix();
+  const Eigen::Matrix3d turn = exp_so3(step.rate_rad_s * t).toRotationMatrix(), to_body = (before * turn).transpose();
+  const Eigen::Vector3d in_body = before.transpose() * s.velocity_m_s;
+  const Eigen::Matrix3d by_velocity = before * turn * before.transpose();
+  const Eigen::Matrix3d by_attitude = before * (turn * skew(in_body) - skew(turn * in_body));
+  r.by_moving.block<3, 3>(kAttitude, kAttitude) = turn.transpose();
+  r.by_moving.block<3, 3>(kVelocity, kVelocity) = by_velocity;
+  r.by_moving.block<3, 3>(kVelocity, kAttitude) = by_attitude;
+  r.by_moving.block<3, 3>(kPosition, kPosition) = turn.transpose();
+  r.by_moving.block<3, 3>(kPosition, kVelocity) = 0.5 * t * to_body * (Eigen::Matrix3d::Identity() + by_velocity);
+  r.by_moving.block<3, 3>(kPosition, kAttitude) = 0.5 * t * to_body * by_attitude;
+  add_white_noise(r, noise.velocity_m_s_sqrt_hz * noise.velocity_m_s_sqrt_hz,
+                  noise.attitude_rad_sqrt_hz * noise.attitude_rad_sqrt_hz, t, to_body);
+  return r;
+}
+
+void move_on(ErrorCovariance& p, const Transition& t) {
+  constexpr int kRest = kSize - kMoving;
+  Eigen::Matrix<double, kMoving, kSize> rows;
+  rows.noalias() = t.by_moving * p.topRows<kMoving>();
+  rows.noalias() += t.by_tilt * p.middleRows<2>(kGravityTilt);
+  Eigen::Matrix<double, kMoving, kMoving> square = rows.leftCols<kMoving>() * t.by_moving.transpose();
+  square.noalias() += rows.middleCols<2>(kGravityTilt) * t.by_tilt.transpose();
+  square += t.noise;
+  p.topLeftCorner<kMoving, kMoving>() = 0.5 * (square + square.transpose());
+  p.topRightCorner<kMoving, kRest>() = rows.rightCols<kRest>();
+  p.bottomLeftCorner<kRest, kMoving>() = rows.rightCols<kRest>().transpose();
+}
+
+}  // namespace spartan

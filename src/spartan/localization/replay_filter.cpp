@@ -1,0 +1,195 @@
+#include "spartan/localization/replay_filter.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace spartan {
+namespace {
+
+/// Snapshots stand where time crosses a multiple of this, so that they depend on the samples alone, not on their
+/// arrival.
+constexpr std::int64_t kCell_ns = 500'000'000;
+/// What is kept before the start, to level by.
+constexpr double kBeforeStart_s = 10;
+
+std::int64_t cell_of(Stamp stamp) {
+  return stamp.ns >= 0 ? stamp.ns / kCell_ns : -((-stamp.ns + kCell_ns - 1) / kCell_ns);
+}
+
+double age(const Measurement& m, Stamp newest) {
+  return seconds_between(stamp_of_measurement(m), newest);
+}
+
+// Fields as they are; kinds as their index.
+void put_measurement(ArchiveWriter& out, const Measurement& m) {
+  out.put(static_cast<std::uint8_t>(m.index()));
+  out.put(stamp_of_measurement(m).ns);
+  if (const auto* imu = std::get_if<ImuSample>(&m)) {
+    out.put(imu->gyro_rad_s);
+    out.put(imu->accel_m_s2);
+  } else if (const auto* motion = std::get_if<RelativeMotion>(&m)) {
+    out.put(motion->from.ns);
+    out.put(motion->previous_from_current);
+    out.put(motion->covariance);
+    out.put(motion->measured);
+  } else if (const auto* wheels = std::get_if<WheelSample>(&m)) {
+    out.put(wheels->left_m);
+    out.put(wheels->right_m);
+  } else if (const auto* compass = std::get_if<CompassSample>(&m)) {
+    out.put(compass->heading_rad);
+    out.put(compass->sigma_rad);
+  } else if (const auto* tilt = std::get_if<InclinometerSample>(&m)) {
+    out.put(tilt->roll_rad);
+    out.put(tilt->pitch_rad);
+    out.put(tilt->sigma_rad);
+  } else if (const auto* constraint = std::get_if<PoseConstraint>(&m)) {
+    out.put(constraint->world_from_body);
+    out.put(constraint->information);
+  }
+}
+
+std::optional<Measurement> get_measurement(ArchiveReader& in) {
+  const auto kind = in.get<std::uint8_t>();
+  const Stamp stamp{in.get<std::int64_t>()};
+  switch (kind) {
+    case 0: {
+      const Eigen::Vector3d gyro = in.get_vector3();
+      return ImuSample{stamp, gyro, in.get_vector3()};
+    }
+    case 1: {
+      RelativeMotion motion;
+      motion.to = stamp;
+      motion.from.ns = in.get<std::int64_t>();
+      motion.previous_from_current = in.get_pose();
+      motion.covariance = in.get_matrix6();
+      motion.measured = in.get<bool>();
+      return motion;
+    }
+    case 2: {
+      const auto left = in.get<double>();
+      return WheelSample{stamp, left, in.get<double>()};
+    }
+    case 3: {
+      const auto heading = in.get<double>();
+      return CompassSample{stamp, heading, in.get<double>()};
+    }
+    case 4: {
+      const auto roll = in.get<double>(), pitch = in.get<double>();
+      return InclinometerSample{stamp, roll, pitch, in.get<double>()};
+    }
+    case 5: {
+      const Pose pose = in.get_pose();
+      return PoseConstraint{stamp, pose, in.get_matrix6()};
+    }
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(options), filter_(options) {}
+
+void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body) {
+  if (started()) throw std::logic_error("the localization has started already");
+  const auto later = std::partition_point(entries_.begin(), entries_.end(),
+                                          [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
+  filter_.start(stamp, ahead_in_body, std::span(entries_.data(), static_cast<std::size_t>(later - entries_.begin())));
+  entries_.erase(entries_.begin(), later);
+  start_ = stamp;
+  newest_ = any_ ? std::max(newest_, stamp) : stamp;
+  any_ = true;
+  snapshots_ = {{0, filter_.memory()}};
+  run_from(0);
+}
+
+std::optional<Refusal> ReplayFilter::add(const Measurement& m) {
+  const Stamp stamp = stamp_of_measurement(m);
+  if (started() && (stamp < start_ || age(m, newest_) > options_.buffer_s)) return Refusal::too_late;
+  const auto place = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
+  if (place != entries_.end() && !comes_before(m, *place)) return Refusal::duplicate;
+  const auto at = static_cast<std::size_t>(place - entries_.begin());
+  entries_.insert(place, m);
+  newest_ = any_ ? std::max(newest_, stamp) : stamp;
+  any_ = true;
+  if (started()) {
+    if (at + 1 == entries_.size()) {
+      run_from(at);
+    } else {
+      replay_from(at);
+    }
+    forget_old();
+  } else {
+    const auto first = std::find_if(entries_.begin(), entries_.end(),
+                                    [&](const Measurement& e) { return age(e, newest_) <= kBeforeStart_s; });
+    entries_.erase(entries_.begin(), first);
+  }
+  return std::nullopt;
+}
+
+bool ReplayFilter::opens_cell(std::size_t entry) const {
+  if (entry == 0) return false;
+  return cell_of(stamp_of_measurement(entries_[entry])) != cell_of(stamp_of_measurement(entries_[entry - 1]));
+}
+
+void ReplayFilter::replay_from(std::size_t entry) {
+  while (snapshots_.size() > 1 && snapshots_.back().count >= entry) snapshots_.pop_back();
+  filter_.set_memory(snapshots_.back().memory);
+  const std::size_t from = snapshots_.back().count;
+  if (snapshots_.size() > 1) snapshots_.pop_back();  // run_from makes it again
+  run_from(from);
+}
+
+void ReplayFilter::run_from(std::size_t entry) {
+  for (; entry < entries_.size(); ++entry) {
+    if (opens_cell(entry)) snapshots_.push_back({entry, filter_.memory()});
+    filter_.process(entries_[entry]);
+  }
+}
+
+/// Drops what no sample that may still come can reach.
+void ReplayFilter::forget_old() {
+  std::size_t first = 0;
+  while (first + 1 < snapshots_.size() &&
+         seconds_between(snapshots_[first + 1].memory.stamp, newest_) > options_.buffer_s)
+    ++first;
+  if (first == 0) return;
+  const std::size_t gone = snapshots_[first].count;
+  entries_.erase(entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(gone));
+  snapshots_.erase(snapshots_.begin(), snapshots_.begin() + static_cast<std::ptrdiff_t>(first));
+  for (Snapshot& snapshot : snapshots_) snapshot.count -= gone;
+}
+
+void ReplayFilter::put(ArchiveWriter& out) const {
+  out.put(started());
+  out.put(any_);
+  out.put(start_.ns);
+  out.put(newest_.ns);
+  spartan::put(out, started() ? snapshots_.front().memory : FilterMemory{});
+  out.put(static_cast<std::uint64_t>(entries_.size()));
+  for (const Measurement& m : entries_) put_measurement(out, m);
+}
+
+bool ReplayFilter::get(ArchiveReader& in) {
+  const bool has_started = in.get<bool>();
+  any_ = in.get<bool>();
+  start_.ns = in.get<std::int64_t>();
+  newest_.ns = in.get<std::int64_t>();
+  const FilterMemory memory = get_filter_memory(in);
+  const auto count = in.get<std::uint64_t>();
+  entries_.clear();
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto m = get_measurement(in);
+    if (!m || !is_sound(*m)) return false;
+    if (!entries_.empty() && !comes_before(entries_.back(), *m)) return false;
+    entries_.push_back(*m);
+  }
+  filter_.set_memory(memory);
+  snapshots_.clear();
+  if (!has_started || !memory.started) return has_started == memory.started;
+  snapshots_ = {{0, memory}};
+  run_from(0);
+  return true;
+}
+
+}  // namespace spartan

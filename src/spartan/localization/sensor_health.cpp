@@ -1,0 +1,144 @@
+#include "spartan/localization/sensor_health.h"
+
+#include <fmt/format.h>
+
+namespace spartan {
+
+std::string_view name_of(LocalizationSensor sensor) {
+  switch (sensor) {
+    case LocalizationSensor::vision:
+      return "vision";
+    case LocalizationSensor::imu:
+      return "imu";
+    case LocalizationSensor::wheels:
+      return "wheels";
+    case LocalizationSensor::compass:
+      return "compass";
+    case LocalizationSensor::inclinometer:
+      return "inclinometer";
+    case LocalizationSensor::map:
+      return "map";
+  }
+  return "unknown";
+}
+
+std::string_view name_of(SensorState state) {
+  switch (state) {
+    case SensorState::ok:
+      return "ok";
+    case SensorState::suspect:
+      return "suspect";
+    case SensorState::excluded:
+      return "excluded";
+    case SensorState::missing:
+      return "missing";
+  }
+  return "unknown";
+}
+
+void RefusalCounts::count(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::not_finite:
+      ++not_finite;
+      break;
+    case Refusal::too_late:
+      ++too_late;
+      break;
+    case Refusal::duplicate:
+      ++duplicates;
+      break;
+    case Refusal::reversed:
+      ++reversed;
+      break;
+  }
+}
+
+void SensorJudge::see(Stamp stamp) {
+  seen = true;
+  last = stamp;
+}
+
+bool SensorJudge::judge(double normalised_square, double gate, HealthReason why, int excluded_after, int back_after) {
+  if (!(normalised_square <= gate)) {
+    ++rejected;
+    ++failed_in_row;
+    passed_in_row = 0;
+    reason = why;
+    square = normalised_square;
+    limit = gate;
+    state = state == SensorState::excluded || failed_in_row >= excluded_after ? SensorState::excluded
+                                                                              : SensorState::suspect;
+    return false;
+  }
+  failed_in_row = 0;
+  ++passed_in_row;
+  if (state == SensorState::excluded && passed_in_row < back_after) {
+    ++rejected;
+    return false;
+  }
+  readmit();
+  ++used;
+  return true;
+}
+
+void SensorJudge::exclude(HealthReason why) {
+  state = SensorState::excluded;
+  reason = why;
+  square = limit = 0;
+  passed_in_row = 0;
+}
+
+void SensorJudge::readmit() {
+  state = SensorState::ok;
+  reason = HealthReason::none;
+  failed_in_row = 0;
+}
+
+bool SensorJudge::missing(Stamp now, double timeout_s) const {
+  return !seen || seconds_between(last, now) > timeout_s;
+}
+
+SensorHealth SensorJudge::report(Stamp now, double timeout_s, const RefusalCounts& refusals) const {
+  SensorHealth health;
+  health.state = missing(now, timeout_s) ? SensorState::missing : state;
+  health.used = used;
+  health.rejected = rejected;
+  health.not_finite = refusals.not_finite;
+  health.too_late = refusals.too_late;
+  health.duplicates = refusals.duplicates;
+  health.reversed = refusals.reversed;
+  HealthReason why = reason;
+  if (health.state == SensorState::missing) why = seen ? HealthReason::silent : HealthReason::never_seen;
+  switch (why) {
+    case HealthReason::none:
+      break;
+    case HealthReason::disagrees:
+      health.reason =
+          fmt::format("disagrees with the other sensors: {:.1f}, at most {:.1f} is expected", square, limit);
+      break;
+    case HealthReason::slips:
+      health.reason = fmt::format("the wheels slip: {:.1f}, at most {:.1f} is expected", square, limit);
+      break;
+    case HealthReason::frozen:
+      health.reason = "gives the same reading again and again";
+      break;
+    case HealthReason::out_of_range:
+      health.reason = "gives readings that no rover can have";
+      break;
+    case HealthReason::overruled:
+      health.reason = fmt::format("vision saw another motion: {:.1f}, at most {:.1f} is expected", square, limit);
+      break;
+    case HealthReason::lost:
+      health.reason = "could not measure the last motion";
+      break;
+    case HealthReason::never_seen:
+      health.reason = "has not said anything";
+      break;
+    case HealthReason::silent:
+      health.reason = fmt::format("silent for {:.1f} s", seconds_between(last, now));
+      break;
+  }
+  return health;
+}
+
+}  // namespace spartan

@@ -1,0 +1,139 @@
+// Steps of the wheels, slip, and standing.
+#include <cmath>
+
+#include "spartan/localization/error_state_filter.h"
+#include "spartan/localization/kalman_update.h"
+#include "spartan/localization/measurement_models.h"
+
+namespace spartan {
+namespace {
+
+using namespace error_at;
+
+/// Shorter steps are not worth a measurement; over much longer ones a mean attitude says nothing.
+constexpr double kShortestStep_s = 0.2, kLongestSteps = 4;
+/// How old the last sign of the wheels, or of vision, may be to say that the rover stands.
+constexpr double kFreshWheels_s = 0.5, kFreshShot_s = 3;
+
+}  // namespace
+
+void ErrorStateFilter::take(const WheelSample& sample) {
+  move_to(sample.stamp, nullptr);
+  WheelMemory& wheels = memory_.wheels;
+  const StandingStillOptions& still = options_.standing;
+  if (!wheels.known || std::abs(sample.left_m - wheels.moved.left_m) > still.wheels_still_m ||
+      std::abs(sample.right_m - wheels.moved.right_m) > still.wheels_still_m)
+    wheels.moved = sample;
+  wheels.known = true;
+  wheels.last = sample;
+  if (memory_.step.standing) return;
+  if (!memory_.step.has_wheels) {
+    begin_step();
+    return;
+  }
+  const double seconds = seconds_between(memory_.step.from, sample.stamp);
+  const bool due = memory_.step.shot_since || seconds >= options_.wheels.longest_step_s;
+  if (!due || seconds < kShortestStep_s) return;
+  if (seconds <= kLongestSteps * options_.wheels.longest_step_s) measure_step(sample);
+  begin_step();
+}
+
+WheelStep ErrorStateFilter::step_to(const WheelSample& sample) const {
+  const WheelOdometryOptions& o = options_.wheels;
+  const double left = sample.left_m - memory_.step.wheels.left_m, right = sample.right_m - memory_.step.wheels.right_m;
+  WheelStep step;
+  step.counted_m = 0.5 * (left + right);
+  const double distance = std::abs(step.counted_m);
+  step.forward_sigma_m = std::hypot(o.floor_m, o.forward_share * distance);
+  step.side_sigma_m = std::hypot(o.floor_m, o.side_share * distance);
+  step.up_sigma_m = std::hypot(o.floor_m, o.up_share * distance);
+  if (o.track_m > 0) {
+    step.turn_known = true;
+    step.turn_rad = (right - left) / o.track_m;
+    step.turn_sigma_rad = std::hypot(std::sqrt(2.0) * step.forward_sigma_m / o.track_m, o.turn_share * step.turn_rad);
+  }
+  return step;
+}
+
+/// The step's length is judged first: where it is wrong the wheels slip, and nothing of the step counts.
+void ErrorStateFilter::measure_step(const WheelSample& sample) {
+  const WheelStep step = step_to(sample);
+  const Innovation whole = wheel_innovation(memory_.belief.state, step);
+  Innovation forward(1);
+  forward.residual[0] = whole.residual[0];
+  forward.jacobian = whole.jacobian.topRows<1>();
+  forward.noise(0, 0) = whole.noise(0, 0);
+  const double length_square = normalised_square(memory_.belief.covariance, forward);
+  const bool slips = !(length_square <= gates_[1]);
+  const double square = slips ? length_square : normalised_square(memory_.belief.covariance, whole);
+  const int rows = slips ? 1 : whole.rows();
+  if (judge(LocalizationSensor::wheels, square, rows, slips ? HealthReason::slips : HealthReason::disagrees))
+    correct_motion(whole, kStepClone);
+  state_slip(step);
+}
+
+/// 1 − travelled / counted, of the step that just ended. The count's radius is part of it.
+void ErrorStateFilter::state_slip(const WheelStep& step) {
+  WheelMemory& wheels = memory_.wheels;
+  wheels.slip_known = std::abs(step.counted_m) >= options_.wheels.least_slip_distance_m;
+  if (!wheels.slip_known) return;
+  const StepForward travelled = forward_of_step(memory_.belief.state);
+  const double variance = travelled.jacobian * memory_.belief.covariance * travelled.jacobian.transpose();
+  constexpr double kCount_m = 0.001;  // what a count is rounded by
+  wheels.slip = 1 - travelled.metres / step.counted_m;
+  wheels.slip_sigma =
+      std::sqrt(std::max(variance, 0.0) + std::pow(kCount_m * (1 - wheels.slip), 2)) / std::abs(step.counted_m);
+  wheels.slip_stamp = memory_.stamp;
+}
+
+void ErrorStateFilter::begin_step() {
+  StepMemory& step = memory_.step;
+  step.from = memory_.stamp;
+  step.odom_from_clone = memory_.world_from_odom.inverse() * memory_.belief.state.world_from_body;
+  step.has_wheels = memory_.wheels.known && seconds_between(memory_.wheels.last.stamp, memory_.stamp) < kFreshWheels_s;
+  step.wheels = memory_.wheels.last;
+  step.shot_since = false;
+  clone_pose(memory_.belief, kStepClone);
+}
+
+bool ErrorStateFilter::wheels_stand() const {
+  const WheelMemory& wheels = memory_.wheels;
+  return seconds_between(wheels.last.stamp, memory_.stamp) < kFreshWheels_s &&
+         seconds_between(wheels.moved.stamp, memory_.stamp) >= options_.standing.wheels_still_s &&
+         memory_.judge(LocalizationSensor::wheels).state == SensorState::ok;
+}
+
+/// Asked at the end of each block of IMU samples. A smooth ride looks like standing to an IMU, and a rover may slide on
+/// wheels that stand; so two witnesses are needed, and the test against the filter's own motion. While the rover stands
+/// its pose is held at the one where standing began.
+void ErrorStateFilter::hold_still(bool imu_still) {
+  StepMemory& step = memory_.step;
+  const bool wheels_speak =
+      memory_.wheels.known &&
+      !memory_.judge(LocalizationSensor::wheels).missing(memory_.stamp, options_.health.wheels_timeout_s);
+  const bool shot_says_so =
+      memory_.vision.stood && seconds_between(memory_.vision.clone_stamp, memory_.stamp) < kFreshShot_s;
+  const bool stands =
+      options_.standing.enabled && imu_still && inertial_usable() && (wheels_speak ? wheels_stand() : shot_says_so);
+  if (!stands) {
+    step.standing = false;
+    return;
+  }
+  if (!step.standing) {
+    begin_step();
+    step.standing = true;
+    return;
+  }
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal().head<3>().setConstant(std::pow(options_.standing.position_m, 2));
+  covariance.diagonal().tail<3>().setConstant(std::pow(options_.standing.attitude_rad, 2));
+  const Innovation innovation =
+      relative_motion_innovation(memory_.belief.state, kStepClone, Pose(), covariance, Vector6d::Zero());
+  if (normalised_square(memory_.belief.covariance, innovation) > gates_[6]) {
+    begin_step();
+    return;
+  }
+  correct_motion(innovation, kStepClone);
+}
+
+}  // namespace spartan
