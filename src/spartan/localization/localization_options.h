@@ -63,9 +63,9 @@ struct WheelOdometryOptions {
   double track_m = 0.6;
   double scale_sigma = 0.1;
   double scale_walk_sqrt_hz = 0.005;
-  double forward_share = 0.05;
-  double side_share = 0.1;
-  double up_share = 0.2;
+  double forward_share = 0.12;
+  double side_share = 0.2;
+  double up_share = 0.3;
   double turn_share = 0.3;
   double floor_m = 0.002;
   double longest_step_s = 2.5;
@@ -76,7 +76,7 @@ struct WheelOdometryOptions {
     v.field("track_m", track_m, "between left and right wheels; 0: turns are not taken from them", between(0, 10));
     v.field("scale_sigma", scale_sigma, "of travelled over counted distance (radius, mean slip)", between(0, 1));
     v.field("scale_walk_sqrt_hz", scale_walk_sqrt_hz, "how it changes", between(0, 1));
-    v.field("forward_share", forward_share, "slip that differs from step to step, of the distance", between(0, 1));
+    v.field("forward_share", forward_share, "slip that differs from that of the mean, of the distance", between(0, 1));
     v.field("side_share", side_share, "motion to the side, of the distance", between(0, 10));
     v.field("up_share", up_share, "motion along the body's vertical, of the distance", between(0, 10));
     v.field("turn_share", turn_share, "error of a turn, of the turn", between(0, 10));

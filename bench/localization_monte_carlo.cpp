@@ -1,0 +1,301 @@
+// Localization over drawn drives: `make bench-localization_monte_carlo`.
+//
+//   localization_monte_carlo [--seeds N] [--threads N] [--config FOLDER] [SCENARIO...]
+//
+// The rover's true motion is the simulator's; its sensors are drawn anew for each seed, and so is the odometry, from
+// the error that was measured on rendered drives (MeasuredOdometryError). Nothing is rendered. Trials are paired: all
+// subsets of sensors see the same drive, the same readings and the same odometry. Default: rocky_20pct, crater_rim,
+// loop.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <numeric>
+
+#include "localization_trial.h"
+#include "standard_recordings.h"
+
+namespace spartan {
+namespace {
+
+struct Mean {
+  double mean = 0, half_width = 0;  // of the 95 % confidence interval
+};
+
+// Student's t for n − 1 degrees of freedom, within 1 % from n = 8 on: 1.96 + 2.4 / (n − 1).
+Mean mean_of(const std::vector<double>& values) {
+  const auto n = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double squares = 0;
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return {mean, n > 1 ? (1.96 + 2.4 / (n - 1)) * std::sqrt(squares / (n - 1) / n) : 0};
+}
+
+// Quantile of chi-square over its degrees of freedom times `dof`, by Wilson and Hilferty (within 0.1 % from 90 up).
+double chi_square_mean(double normal_quantile, int dof, int trials) {
+  const double k = dof * trials, c = 2.0 / (9.0 * k);
+  return dof * std::pow(1 - c + normal_quantile * std::sqrt(c), 3);
+}
+
+struct Band {
+  double low, high;
+  bool holds(double x) const { return x >= low && x <= high; }
+};
+Band band(int dof, int trials) {
+  return {chi_square_mean(-1.959964, dof, trials), chi_square_mean(1.959964, dof, trials)};
+}
+
+template <class Value>
+std::vector<double> each(const std::vector<TrialResult>& trials, const Value& value) {
+  std::vector<double> values;
+  for (const TrialResult& t : trials) values.push_back(value(t));
+  return values;
+}
+
+using Spoil = std::function<std::vector<Arrival>(const TrueDrive&, std::uint64_t seed, const Subset&)>;
+
+std::vector<TrialResult> run_trials(const TrueDrive& drive, const Subset& subset, int seeds, const Spoil& arrivals_of,
+                                    const Workers& workers) {
+  std::vector<TrialResult> results(static_cast<std::size_t>(seeds));
+  workers.for_each_part(0, seeds, 1, [&](int from, int to) {
+    for (int i = from; i < to; ++i) {
+      const auto seed = static_cast<std::uint64_t>(i) + 1;
+      results[static_cast<std::size_t>(i)] = run_trial(drive, arrivals_of(drive, seed, subset));
+    }
+  });
+  return results;
+}
+
+std::vector<Arrival> nominal(const TrueDrive& drive, std::uint64_t seed, const Subset& subset) {
+  return arrivals(draw(drive, {}, drive.scenario.compass, seed), subset);
+}
+
+// Mean NEES over trials at every `every`th shot: the share of shots where it lies in the band.
+double share_in_band(const std::vector<TrialResult>& trials, const Band& b, double ShotError::*nees) {
+  int inside = 0, count = 0;
+  for (std::size_t i = 0; i < trials[0].shots.size(); i += 5) {
+    double sum = 0;
+    for (const TrialResult& t : trials) sum += t.shots[i].*nees;
+    inside += b.holds(sum / static_cast<double>(trials.size())) ? 1 : 0;
+    ++count;
+  }
+  return 100.0 * inside / count;
+}
+
+void table_of_subsets(const TrueDrive& drive, int seeds, const Workers& workers) {
+  const Band three = band(3, seeds), six = band(6, seeds);
+  fmt::print("\n## {}: {:.0f} m, {} shots, {} seeds\n\n", drive.scenario.name, drive.length_m, drive.poses.size(),
+             seeds);
+  fmt::print(
+      "NEES bands (95 %): position, attitude {:.2f} to {:.2f}; pose {:.2f} to {:.2f}. In brackets: share of shots "
+      "inside.\n\n",
+      three.low, three.high, six.low, six.high);
+  fmt::print(
+      "| sensors | end, % | less vision alone | ATE, mm | less vision alone | NEES position | attitude | pose |\n");
+  fmt::print("|---|---|---|---|---|---|---|---|\n");
+  std::vector<TrialResult> alone;
+  int worse = 0, outside = 0;
+  for (int mask = 0; mask < 16; ++mask) {
+    const Subset subset = Subset::of(mask);
+    const auto trials = run_trials(drive, subset, seeds, nominal, workers);
+    if (mask == 0) alone = trials;
+    std::vector<double> by_end, by_ate;
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      by_end.push_back(trials[i].final_percent - alone[i].final_percent);
+      by_ate.push_back(1e3 * (trials[i].ate_m - alone[i].ate_m));
+    }
+    const Mean end = mean_of(by_end), ate = mean_of(by_ate);
+    const auto nees = [&](double ShotError::*which) {
+      return mean_of(each(trials, [&](const TrialResult& t) { return t.shots.back().*which; })).mean;
+    };
+    const double position = nees(&ShotError::nees_position), attitude = nees(&ShotError::nees_attitude),
+                 pose = nees(&ShotError::nees_pose);
+    worse += end.mean - end.half_width > 0 || ate.mean - ate.half_width > 0 ? 1 : 0;
+    outside += three.holds(position) && three.holds(attitude) && six.holds(pose) ? 0 : 1;
+    fmt::print(
+        "| {} | {:.4f} | {:+.4f} ± {:.4f} | {:.2f} | {:+.2f} ± {:.2f} | {:.2f} ({:.0f} %) | {:.2f} ({:.0f} %) | "
+        "{:.2f} ({:.0f} %) |\n",
+        subset.name(), mean_of(each(trials, [](const auto& t) { return t.final_percent; })).mean, end.mean,
+        end.half_width, 1e3 * mean_of(each(trials, [](const auto& t) { return t.ate_m; })).mean, ate.mean,
+        ate.half_width, position, share_in_band(trials, three, &ShotError::nees_position), attitude,
+        share_in_band(trials, three, &ShotError::nees_attitude), pose,
+        share_in_band(trials, six, &ShotError::nees_pose));
+    std::fflush(stdout);
+  }
+  fmt::print("\nworse than vision alone (95 %): {} of 15; NEES at the end outside a band: {} of 16\n", worse, outside);
+}
+
+struct FaultCase {
+  std::string name;
+  LocalizationSensor sensor;
+  double from_s, to_s;
+  Spoil spoil;
+};
+
+std::vector<Arrival> without_vision(const TrueDrive& drive, std::uint64_t seed, const Subset& subset, double from_s,
+                                    double to_s) {
+  DrawnDrive d = draw(drive, {}, drive.scenario.compass, seed);
+  for (RelativeMotion& m : d.motions) {
+    const auto dark = [&](Stamp s) { return s >= sim::stamp_at(from_s) && s < sim::stamp_at(to_s); };
+    m.measured = !dark(m.from) && !dark(m.to);
+  }
+  return arrivals(d, subset);
+}
+
+// Wheels that turn five times as far as the rover goes.
+std::vector<Arrival> slipping(const TrueDrive& drive, std::uint64_t seed, const Subset& subset, double from_s,
+                              double to_s) {
+  DrawnDrive d = draw(drive, {}, drive.scenario.compass, seed);
+  double left = 0, right = 0;
+  WheelSample last = d.wheels.front();
+  for (WheelSample& w : d.wheels) {
+    const WheelSample now = w;
+    const double turns = w.stamp >= sim::stamp_at(from_s) && w.stamp < sim::stamp_at(to_s) ? 5 : 1;
+    left += turns * (now.left_m - last.left_m);
+    right += turns * (now.right_m - last.right_m);
+    w.left_m = left;
+    w.right_m = right;
+    last = now;
+  }
+  return arrivals(d, subset);
+}
+
+std::vector<Arrival> with_nans(const TrueDrive& drive, std::uint64_t seed, const Subset& subset) {
+  auto all = nominal(drive, seed, subset);
+  Random random(seed, 401);
+  for (Arrival& a : all) {
+    if (random.uniform() >= 0.05) continue;
+    const double nan = std::nan("");
+    if (auto* imu = std::get_if<ImuSample>(&a.what)) imu->accel_m_s2.y() = nan;
+    if (auto* wheels = std::get_if<WheelSample>(&a.what)) wheels->left_m = nan;
+    if (auto* compass = std::get_if<CompassSample>(&a.what)) compass->heading_rad = nan;
+    if (auto* tilt = std::get_if<InclinometerSample>(&a.what)) tilt->pitch_rad = nan;
+    if (auto* motion = std::get_if<RelativeMotion>(&a.what)) motion->covariance(2, 2) = nan;
+  }
+  return all;
+}
+
+// For a while every other sample comes 0.3 s late, behind younger ones, and one in fifty carries a stamp 20 s too old.
+std::vector<Arrival> with_stamps_reversed(const TrueDrive& drive, std::uint64_t seed, const Subset& subset,
+                                          double from_s, double to_s) {
+  auto all = nominal(drive, seed, subset);
+  Random random(seed, 402);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    Arrival& a = all[i];
+    if (a.at_ns < sim::stamp_at(from_s).ns || a.at_ns >= sim::stamp_at(to_s).ns) continue;
+    if (std::holds_alternative<RelativeMotion>(a.what)) continue;
+    if (random.uniform() < 0.02) {
+      std::visit(
+          [](auto& m) {
+            if constexpr (requires { m.stamp; }) m.stamp.ns -= 20'000'000'000;
+          },
+          a.what);
+    } else if (i % 2 == 0) {
+      a.at_ns += 300'000'000;
+    }
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Arrival& a, const Arrival& b) { return a.at_ns < b.at_ns; });
+  return all;
+}
+
+std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
+  const double from = 0.4 * drive.motion->seconds();
+  const auto drawn = [](const sim::SensorFaults& faults, double outliers) -> Spoil {
+    return [=](const TrueDrive& d, std::uint64_t seed, const Subset& subset) {
+      sim::CompassOptions compass = d.scenario.compass;
+      if (outliers > 0) compass.outlier_share = outliers;
+      return arrivals(draw(d, faults, compass, seed), subset);
+    };
+  };
+  using enum LocalizationSensor;
+  return {
+      {"camera dark 10 s", vision, from, from + 10,
+       [=](const TrueDrive& d, std::uint64_t s, const Subset& w) { return without_vision(d, s, w, from, from + 10); }},
+      {"compass outliers 30 %", compass, 0, drive.motion->seconds(), drawn({}, 0.3)},
+      {"wheel slip 80 % for 40 s", wheels, from, from + 40,
+       [=](const TrueDrive& d, std::uint64_t s, const Subset& w) { return slipping(d, s, w, from, from + 40); }},
+      {"IMU gap 10 s", imu, from, from + 10, drawn({{"imu", "drop", from, from + 10}}, 0)},
+      {"IMU frozen 10 s", imu, from, from + 10, drawn({{"imu", "freeze", from, from + 10}}, 0)},
+      {"NaN in 5 % of all samples", imu, 0, drive.motion->seconds(), with_nans},
+      {"stamps reversed for 40 s", imu, from, from + 40,
+       [=](const TrueDrive& d, std::uint64_t s, const Subset& w) {
+         return with_stamps_reversed(d, s, w, from, from + 40);
+       }},
+  };
+}
+
+// Beyond 3 σ as often as a normal error in three dimensions is by chance in 0.27 %.
+constexpr double kThreeSigma = 14.156;
+
+void table_of_faults(const TrueDrive& drive, int seeds, const Workers& workers) {
+  fmt::print("\n## {}: faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds);
+  fmt::print(
+      "\"Inside 3 σ\": trials whose position error lies inside the 99.7 % region of its covariance, 5 shots after the "
+      "fault and at the end.\n\n");
+  fmt::print(
+      "| fault | end, % | vision alone, same fault | largest error, mm | inside 3 σ after the fault | at the end | "
+      "NEES pose "
+      "at the end | excluded / missing, shots of a trial | state at the end "
+      "|\n|---|---|---|---|---|---|---|---|---|\n");
+  for (const FaultCase& fault : fault_cases(drive)) {
+    const auto trials = run_trials(drive, Subset::of(15), seeds, fault.spoil, workers);
+    const auto alone = run_trials(drive, Subset::of(0), seeds, fault.spoil, workers);
+    int inside_after = 0, inside_end = 0, well = 0;
+    double largest = 0, excluded = 0, missing = 0;
+    for (const TrialResult& t : trials) {
+      std::size_t after = 0;
+      while (after + 1 < t.shots.size() && t.shots[after].time_s < fault.to_s) ++after;
+      after = std::min(after + 5, t.shots.size() - 1);
+      inside_after += t.shots[after].nees_position < kThreeSigma ? 1 : 0;
+      inside_end += t.shots.back().nees_position < kThreeSigma ? 1 : 0;
+      for (const ShotError& s : t.shots) largest = std::max(largest, s.distance_m);
+      const auto sensor = static_cast<std::size_t>(fault.sensor);
+      excluded += t.states_s[sensor][static_cast<std::size_t>(SensorState::excluded)];
+      missing += t.states_s[sensor][static_cast<std::size_t>(SensorState::missing)];
+      well += t.last.health[sensor].state == SensorState::ok ? 1 : 0;
+    }
+    const auto end = [](const TrialResult& t) { return t.final_percent; };
+    const double n = static_cast<double>(trials.size());
+    fmt::print("| {} | {:.4f} | {:.4f} | {:.0f} | {} of {} | {} of {} | {:.2f} | {:.1f} / {:.1f} | {} of {} ok |\n",
+               fault.name, mean_of(each(trials, end)).mean, mean_of(each(alone, end)).mean, 1e3 * largest, inside_after,
+               seeds, inside_end, seeds,
+               mean_of(each(trials, [](const TrialResult& t) { return t.shots.back().nees_pose; })).mean, excluded / n,
+               missing / n, well, seeds);
+    std::fflush(stdout);
+  }
+}
+
+int run(const std::vector<std::string>& words) {
+  RecordingArguments arguments =
+      read_arguments(words, {{"--seeds", "30"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "both"}});
+  if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct", "crater_rim", "loop"};
+  const Workers workers(arguments.number("--threads"));
+  fmt::print(
+      "# Localization, Monte Carlo\n\nOdometry drawn from its measured error. End: distance of the last position from "
+      "the truth, over the way; ATE: RMS over the shots; both seen from the first pose. ±: 95 % confidence of the "
+      "paired "
+      "difference.\n");
+  for (const std::string& name : arguments.scenarios) {
+    const auto drive = open_true_drive(arguments.options.at("--config"), name);
+    if (!drive) {
+      fmt::print(stderr, "{}: no such scenario in {}\n", name, arguments.options.at("--config"));
+      return 1;
+    }
+    const std::string& tables = arguments.options.at("--tables");
+    if (tables != "faults") table_of_subsets(*drive, arguments.number("--seeds"), workers);
+    if (tables != "subsets") table_of_faults(*drive, arguments.number("--seeds"), workers);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace spartan
+
+int main(int argc, char** argv) {
+  try {
+    return spartan::run({argv + 1, argv + argc});
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s\n", e.what());
+    return 1;
+  }
+}

@@ -1,0 +1,219 @@
+// One simulated drive with drawn sensors and drawn odometry, and a localization that takes it.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spartan/core/files.h"
+#include "spartan/core/random.h"
+#include "spartan/core/threads.h"
+#include "spartan/localization/localizer.h"
+#include "spartan/localization/measurement.h"
+#include "spartan/rig/rig_files.h"
+#include "spartan/sim/motion_sensors.h"
+#include "spartan/sim/scenario.h"
+#include "spartan/sim/simulator.h"
+
+namespace spartan {
+
+/// Which sensors stand beside vision.
+struct Subset {
+  bool imu = false, wheels = false, compass = false, inclinometer = false;
+  static Subset of(int mask) { return {(mask & 1) != 0, (mask & 2) != 0, (mask & 4) != 0, (mask & 8) != 0}; }
+  std::string name() const {
+    std::string text = "vision";
+    if (imu) text += "+imu";
+    if (wheels) text += "+wheels";
+    if (compass) text += "+compass";
+    if (inclinometer) text += "+incl";
+    return text;
+  }
+};
+
+/// The true motion of a scenario and when its odometry pair takes pictures.
+struct TrueDrive {
+  sim::Scenario scenario;
+  std::unique_ptr<sim::World> world;  // the motion borrows it while it is made
+  std::unique_ptr<sim::BodyMotion> motion;
+  std::vector<double> shots_s;
+  std::vector<Pose> poses;  ///< at the shots
+  double length_m = 0;      ///< of the polyline through them
+};
+
+inline std::optional<TrueDrive> open_true_drive(const std::string& folder, const std::string& name) {
+  const std::string file = folder + "/scenarios/" + name + ".yaml";
+  const auto text = read_file(file);
+  if (!text) return std::nullopt;
+  const auto scenario = sim::parse_scenario(*text, file);
+  if (!scenario) return std::nullopt;
+  const auto rig = read_rig(folder + "/rigs/" + scenario->rig + ".yaml");
+  if (!rig) return std::nullopt;
+  const auto plan = sim::plan_drive(*scenario, *rig, *text, file);
+  if (!plan) return std::nullopt;
+  TrueDrive drive;
+  drive.scenario = *scenario;
+  drive.world = std::make_unique<sim::World>(sim::make_world(*scenario, *plan));
+  drive.motion = std::make_unique<sim::BodyMotion>(*plan, sim::WheelGround{drive.world->shape, drive.world->wheel_lift},
+                                                   scenario->chassis, Workers(2));
+  for (const sim::Shot& shot : plan->shots()) {
+    const auto pair =
+        std::find_if(rig->pairs.begin(), rig->pairs.end(), [&](const auto& p) { return p.name == shot.pair; });
+    if (pair == rig->pairs.end() || !pair->for_odometry) continue;
+    drive.shots_s.push_back(shot.time_s);
+    drive.poses.push_back(drive.motion->world_from_body(shot.time_s));
+  }
+  for (std::size_t i = 1; i < drive.poses.size(); ++i)
+    drive.length_m += (drive.poses[i].translation() - drive.poses[i - 1].translation()).norm();
+  return drive;
+}
+
+/// What a rover's sensors and its odometry say on a drive, in the order of arrival.
+struct DrawnDrive {
+  std::vector<ImuSample> imu;
+  std::vector<WheelSample> wheels;
+  std::vector<CompassSample> compass;
+  std::vector<InclinometerSample> inclinometer;
+  std::vector<RelativeMotion> motions;
+};
+
+/// The error of a visual motion as it was measured on nine rendered drives (docs/math/localization.md, "Vision"): the
+/// stated covariance (mean of rocky_20pct, body frame), white noise of 1.10 times it, and a lasting part in units of
+/// the stated standard deviations: a Gauss-Markov process that falls to 1/e in 57 shots, and a constant of the drive
+/// of 1.53 times its variance.
+struct MeasuredOdometryError {
+  Vector6d sigma = (Vector6d() << 27.0e-6, 16.7e-6, 23.1e-6, 34.5e-6, 22.5e-6, 20.9e-6).finished();
+  Vector6d lasting_variance = (Vector6d() << 0.718, 0.372, 0.104, 0.316, 0.209, 0.116).finished();
+  double white = 1.10, constant = 1.53, steps = 57;
+
+  Matrix6d stated() const {
+    Matrix6d c = Matrix6d::Identity();
+    const auto set = [&](int i, int j, double value) { c(i, j) = c(j, i) = value; };
+    set(0, 1, -0.162), set(0, 2, -0.629), set(0, 3, -0.024), set(0, 4, -0.417), set(0, 5, 0.077);
+    set(1, 2, 0.160), set(1, 3, -0.107), set(1, 4, 0.109), set(1, 5, -0.803);
+    set(2, 3, 0.021), set(2, 4, 0.839), set(2, 5, -0.076), set(3, 4, 0.031), set(3, 5, 0.006), set(4, 5, -0.063);
+    return sigma.asDiagonal() * c * sigma.asDiagonal();
+  }
+
+  std::vector<RelativeMotion> draw(const TrueDrive& drive, std::uint64_t seed) const {
+    Random random(seed, 301);
+    const auto normal6 = [&] {
+      Vector6d v;
+      for (int i = 0; i < 6; ++i) v[i] = random.normal();
+      return v;
+    };
+    const Matrix6d covariance = stated(), root = covariance.llt().matrixL();
+    const Vector6d lasting_sigma = lasting_variance.cwiseSqrt();
+    const Vector6d stays = std::sqrt(constant) * lasting_sigma.cwiseProduct(normal6());
+    Vector6d wanders = lasting_sigma.cwiseProduct(normal6());
+    const double keep = std::exp(-1 / steps);
+    std::vector<RelativeMotion> motions;
+    for (std::size_t i = 1; i < drive.poses.size(); ++i) {
+      wanders = keep * wanders + std::sqrt(1 - keep * keep) * lasting_sigma.cwiseProduct(normal6());
+      const Vector6d error = std::sqrt(white) * (root * normal6()) + sigma.cwiseProduct(stays + wanders);
+      motions.push_back({sim::stamp_at(drive.shots_s[i - 1]), sim::stamp_at(drive.shots_s[i]),
+                         drive.poses[i - 1].inverse() * drive.poses[i] * exp_se3(-error), covariance, true});
+    }
+    return motions;
+  }
+};
+
+inline DrawnDrive draw(const TrueDrive& drive, const sim::SensorFaults& faults, const sim::CompassOptions& compass,
+                       std::uint64_t seed) {
+  const sim::Scenario& s = drive.scenario;
+  DrawnDrive d;
+  d.imu = sim::measure_imu(*drive.motion, s.imu, s.gravity_m_s2, faults, seed);
+  d.wheels = sim::measure_wheels(*drive.motion, s.chassis, s.wheels, faults, seed);
+  d.compass = sim::measure_heading(*drive.motion, compass, faults, seed);
+  d.inclinometer = sim::measure_tilt(*drive.motion, s.inclinometer, faults, seed);
+  d.motions = MeasuredOdometryError().draw(drive, seed);
+  return d;
+}
+
+/// One arrival: what, and when it comes (which need not be the order of its stamps).
+struct Arrival {
+  std::int64_t at_ns = 0;
+  Measurement what;
+};
+
+inline std::vector<Arrival> arrivals(const DrawnDrive& d, const Subset& subset) {
+  std::vector<Arrival> all;
+  const auto add = [&](const auto& samples) {
+    for (const auto& s : samples) all.push_back({stamp_of_measurement(s).ns, s});
+  };
+  if (subset.imu) add(d.imu);
+  if (subset.wheels) add(d.wheels);
+  if (subset.compass) add(d.compass);
+  if (subset.inclinometer) add(d.inclinometer);
+  add(d.motions);
+  std::stable_sort(all.begin(), all.end(), [](const Arrival& a, const Arrival& b) {
+    return a.at_ns != b.at_ns ? a.at_ns < b.at_ns : a.what.index() < b.what.index();
+  });
+  return all;
+}
+
+/// How far the localization was from the truth at each shot, both seen from the first pose.
+struct ShotError {
+  double time_s = 0, distance_m = 0;  ///< distance: of the position
+  double nees_position = 0, nees_attitude = 0, nees_pose = 0;
+};
+struct TrialResult {
+  std::vector<ShotError> shots;
+  double ate_m = 0, final_percent = 0;
+  LocalizationEstimate last;
+  std::array<std::array<double, 4>, kLocalizationSensors> states_s{};  ///< shots in each state, by sensor
+};
+
+inline LocalizationOptions options_for(const TrueDrive& drive) {
+  LocalizationOptions options;
+  options.gravity_m_s2 = drive.scenario.gravity_m_s2;  // known, as recordings state it
+  return options;
+}
+
+inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {
+  Localizer localizer(options_for(drive));
+  TrialResult result;
+  Pose first;  // the localization's, which defines its world
+  const std::int64_t start_ns = sim::stamp_at(drive.shots_s.front()).ns;
+  std::size_t shot = 0;
+  double squares = 0;
+  for (const Arrival& arrival : all) {
+    if (!localizer.started() && arrival.at_ns > start_ns) {
+      localizer.start({start_ns}, Eigen::Vector3d::UnitX());
+      first = localizer.estimate().world_from_body.pose;
+    }
+    std::visit([&](const auto& m) { localizer.add(m); }, arrival.what);
+    const auto* motion = std::get_if<RelativeMotion>(&arrival.what);
+    if (motion == nullptr || ++shot >= drive.poses.size()) continue;
+    result.last = localizer.estimate();
+    const LocalizationEstimate& e = result.last;
+    for (std::size_t i = 0; i < result.states_s.size(); ++i)
+      result.states_s[i][static_cast<std::size_t>(e.health[i].state)] += 1;
+    const Pose estimate = first.inverse() * e.world_from_body.pose,
+               truth = drive.poses[0].inverse() * drive.poses[shot];
+    const Vector6d error = log_se3(estimate.inverse() * truth);
+    const Matrix6d& p = e.world_from_body.covariance;
+    ShotError s;
+    s.time_s = drive.shots_s[shot];
+    s.distance_m = (estimate.translation() - truth.translation()).norm();
+    const Eigen::Matrix3d position = p.topLeftCorner<3, 3>(), attitude = p.bottomRightCorner<3, 3>();
+    const Eigen::Vector3d rho = error.head<3>(), phi = error.tail<3>();
+    s.nees_position = rho.dot(position.ldlt().solve(rho));
+    s.nees_attitude = phi.dot(attitude.ldlt().solve(phi));
+    s.nees_pose = error.dot(p.ldlt().solve(error));
+    squares += s.distance_m * s.distance_m;
+    result.shots.push_back(s);
+  }
+  result.ate_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, result.shots.size())));
+  result.final_percent = 100 * result.shots.back().distance_m / drive.length_m;
+  return result;
+}
+
+}  // namespace spartan
