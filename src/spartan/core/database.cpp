@@ -71,6 +71,12 @@ SqlStatement& SqlStatement::bind(int index, const Bytes& blob) {
   return *this;
 }
 
+SqlStatement& SqlStatement::bind(int index, const std::optional<double>& value) {
+  if (value) return bind(index, *value);
+  sqlite3_bind_null(statement_, index);
+  return *this;
+}
+
 Result<bool> SqlStatement::step() {
   const int code = sqlite3_step(statement_);
   if (code == SQLITE_ROW) return true;
@@ -106,6 +112,9 @@ std::string SqlStatement::text(int column) const {
   const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
   return data == nullptr ? std::string{}
                          : std::string(data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column)));
+}
+bool SqlStatement::is_null(int column) const {
+  return sqlite3_column_type(statement_, column) == SQLITE_NULL;
 }
 Bytes SqlStatement::blob(int column) const {
   const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(statement_, column));

@@ -26,6 +26,7 @@ class SqlStatement {
   SqlStatement& bind(int index, double value);
   SqlStatement& bind(int index, const std::string& text);
   SqlStatement& bind(int index, const Bytes& blob);
+  SqlStatement& bind(int index, const std::optional<double>& value);  ///< NULL where there is none
 
   /// True while there is a row; code `output` where the disk is full or the file cannot be written.
   Result<bool> step();
@@ -37,6 +38,7 @@ class SqlStatement {
   double real(int column) const;
   std::string text(int column) const;
   Bytes blob(int column) const;
+  bool is_null(int column) const;
 
  private:
   sqlite3* db_ = nullptr;

@@ -173,7 +173,7 @@ struct HealthOptions {
 };
 
 struct LocalizationOptions {
-  double gravity_m_s2 = 9.81;
+  double gravity_m_s2 = 9.81;  ///< of the planet; whoever makes a Localizer knows it
   double buffer_s = 10;
   double map_factor = 1;
   InertialOptions imu;
@@ -187,7 +187,6 @@ struct LocalizationOptions {
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("gravity_m_s2", gravity_m_s2, "of the planet", between(0.1, 30));
     v.field("buffer_s", buffer_s, "samples that come later than this are refused", between(0, 600));
     v.field("map_factor", map_factor, "on the covariance of map constraints", between(0.01, 1e4));
     v.group("imu", imu);

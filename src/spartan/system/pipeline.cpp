@@ -6,13 +6,19 @@
 #include <cmath>
 
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/system/world_frame.h"
+#include "spartan/system/position_stage.h"
 
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 1;
-constexpr std::size_t kGravitySamples = 2000;  // newest ones before the first frame
+constexpr std::uint32_t kStateVersion = 2;
+constexpr double kGravityOnEarth_m_s2 = 9.81;
+
+LocalizationOptions with_gravity(const RunOptions& options) {
+  LocalizationOptions localization = options.localization;
+  localization.gravity_m_s2 = options.gravity_m_s2 > 0 ? options.gravity_m_s2 : kGravityOnEarth_m_s2;
+  return localization;
+}
 
 const StereoPair* pair_for_odometry(const Rig& rig, const std::string& wanted) {
   if (!wanted.empty()) return rig.find_pair(wanted);
@@ -29,7 +35,11 @@ struct Pipeline::State {
         pair(pair_in),
         imager(std::move(imager_in)),
         odometer(options_in.odometry, workers),
-        disparity_computer(options_in.reconstruction, workers) {}
+        disparity_computer(options_in.reconstruction, workers),
+        localizer(with_gravity(options_in)),
+        position(options_in.reconstruction, options_in.mapping, workers) {
+    maps_positions = options.maps && rig.pairs.size() > 1;
+  }
 
   Rig rig;
   RunOptions options;
@@ -37,11 +47,12 @@ struct Pipeline::State {
   Imager imager;
   Odometer odometer;
   DisparityComputer disparity_computer;
+  Localizer localizer;
+  PositionStage position;
+  bool maps_positions = false;
   StageClock clock;
 
   // The memory from frame to frame.
-  std::vector<ImuSample> samples_at_rest;
-  std::optional<Eigen::Vector3d> up_in_body;
   bool started = false;
   Stamp last_stamp;
   UncertainPose world_from_left;
@@ -52,15 +63,17 @@ struct Pipeline::State {
 
   void start(const RectifiedPair& shot);
   void advance(const MotionEstimate& motion);
+  void localize(const RectifiedPair& shot, const MotionEstimate& motion);
+  void arrive(const StereoFrame& frame, const RectifiedPair& shot);
+  Status look(const StereoFrame& frame);
+  std::optional<MappedPosition> leave_position();
   bool terrain_is_due() const;
   Result<TerrainView> reconstruct(const RectifiedPair& shot);
 };
 
 void Pipeline::State::start(const RectifiedPair& shot) {
-  up_in_body = measure_up(samples_at_rest, options.gravity_m_s2);
-  samples_at_rest.clear();
-  samples_at_rest.shrink_to_fit();
-  world_from_left = {first_world_from_body(shot.body_from_left, up_in_body) * shot.body_from_left, Matrix6d::Zero()};
+  localizer.start(shot.stamp, shot.body_from_left.rotation() * Eigen::Vector3d::UnitZ());
+  world_from_left = {localizer.estimate().world_from_body.pose * shot.body_from_left, Matrix6d::Zero()};
   started = true;
 }
 
@@ -69,6 +82,49 @@ void Pipeline::State::advance(const MotionEstimate& motion) {
   distance_m += motion.previous_from_current.translation().norm();
   const double seconds = seconds_between(motion.from, motion.to);
   if (seconds > 0) velocity = log_se3(motion.previous_from_current) / seconds;
+}
+
+// M moves the left eye: B M B⁻¹ moves the body, and B M Exp(ξ) B⁻¹ = B M B⁻¹ Exp(Ad_B ξ).
+void Pipeline::State::localize(const RectifiedPair& shot, const MotionEstimate& motion) {
+  if (motion.first) return;
+  const Pose& body_from_left = shot.body_from_left;
+  const Matrix6d turn = adjoint(body_from_left);
+  RelativeMotion moved;
+  moved.from = motion.from;
+  moved.to = motion.to;
+  moved.measured = motion.status != TrackingStatus::lost;
+  // That the rover stood is told by the exact identity.
+  if (motion.status != TrackingStatus::standing)
+    moved.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
+  moved.covariance = turn * motion.covariance * turn.transpose();
+  localizer.add(moved);
+}
+
+void Pipeline::State::arrive(const StereoFrame& frame, const RectifiedPair& shot) {
+  if (maps_positions && frame.position_id >= 0)
+    position.arrive(frame.position_id, shot, pair.nearest_m, localizer.estimate().world_from_body);
+}
+
+// A further view of the position at hand.
+Status Pipeline::State::look(const StereoFrame& frame) {
+  if (!maps_positions || frame.position_id < 0 || frame.position_id != position.position_id()) return {};
+  const auto shot = clock.measure("imaging", [&] { return imager.process(frame); });
+  if (!shot) return failure(shot);
+  return clock.measure("reconstruction",
+                       [&] { return position.look(frame.position_id, *shot, rig.find_pair(frame.pair)->nearest_m); });
+}
+
+std::optional<MappedPosition> Pipeline::State::leave_position() {
+  if (position.mapper().views().empty()) {
+    position.leave();
+    return std::nullopt;
+  }
+  return clock.measure("mapping", [&]() -> std::optional<MappedPosition> {
+    const auto survey = position.leave();
+    if (!survey) return std::nullopt;
+    LocalMap map = position.mapper().map(survey->points, survey->standing.pose);
+    return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(map)};
+  });
 }
 
 bool Pipeline::State::terrain_is_due() const {
@@ -104,29 +160,37 @@ Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
 void Pipeline::add(const ImuSample& sample) {
-  State& s = *state_;
-  if (s.started) return;
-  if (s.samples_at_rest.size() >= kGravitySamples) s.samples_at_rest.erase(s.samples_at_rest.begin());
-  s.samples_at_rest.push_back(sample);
+  state_->localizer.add(sample);
 }
-void Pipeline::add(const WheelSample&) {}
-void Pipeline::add(const CompassSample&) {}
-void Pipeline::add(const InclinometerSample&) {}
+void Pipeline::add(const WheelSample& sample) {
+  state_->localizer.add(sample);
+}
+void Pipeline::add(const CompassSample& sample) {
+  state_->localizer.add(sample);
+}
+void Pipeline::add(const InclinometerSample& sample) {
+  state_->localizer.add(sample);
+}
 
 Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   State& s = *state_;
   if (frame.pair != s.pair.name) {
-    if (s.rig.find_pair(frame.pair) != nullptr) return std::nullopt;
+    if (s.rig.find_pair(frame.pair) != nullptr) {
+      if (Status status = s.look(frame); !status) return failure(status);
+      return std::nullopt;
+    }
     return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair),
                    fmt::format("frame {}", frame.frame_id), "frames carry the name of their pair in the rig");
   }
   const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
   if (!shot) return failure(shot);
 
+  FrameResult result;
+  // Before the stages move on: the map belongs to where the rover still stands.
+  if (s.maps_positions && frame.position_id != s.position.position_id()) result.position = s.leave_position();
   if (!s.started) s.start(*shot);
   s.left_from_body = shot->body_from_left.inverse();
 
-  FrameResult result;
   result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot); });
   if (!result.motion.first) s.advance(result.motion);
   s.last_stamp = shot->stamp;
@@ -134,6 +198,10 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   result.pair = frame.pair;
   result.stamp = shot->stamp;
   result.world_from_body = compose(s.world_from_left, {s.left_from_body, Matrix6d::Zero()});
+
+  s.clock.measure("localization", [&] { s.localize(*shot, result.motion); });
+  result.localization = s.localizer.estimate();
+  s.arrive(frame, *shot);
 
   if (s.terrain_is_due()) {
     auto terrain = s.clock.measure("reconstruction", [&] { return s.reconstruct(*shot); });
@@ -151,8 +219,27 @@ std::optional<Pose> Pipeline::predict(Stamp stamp) const {
   return s.world_from_left.pose * exp_se3(s.velocity * seconds) * s.left_from_body;
 }
 
+Result<std::optional<MappedPosition>> Pipeline::leave_position() {
+  return state_->leave_position();
+}
+
+std::optional<ShotName> Pipeline::wanted_shot() const {
+  const auto stamp = state_->position.kept_stamp();
+  return stamp ? std::optional(ShotName{state_->pair.name, *stamp}) : std::nullopt;
+}
+
+Status Pipeline::recall(const StereoFrame& frame) {
+  const auto shot = state_->imager.process(frame);
+  if (!shot) return failure(shot);
+  state_->position.recall(*shot, state_->pair.nearest_m);
+  return {};
+}
+
 bool Pipeline::gravity_measured() const {
-  return state_->up_in_body.has_value();
+  return state_->localizer.estimate().gravity_measured;
+}
+bool Pipeline::heading_east() const {
+  return state_->localizer.estimate().heading.east;
 }
 const std::string& Pipeline::odometry_pair() const {
   return state_->pair.name;
@@ -162,14 +249,6 @@ Bytes Pipeline::save() const {
   const State& s = *state_;
   ArchiveWriter out;
   out.put(kStateVersion);
-  out.put(static_cast<std::uint64_t>(s.samples_at_rest.size()));
-  for (const ImuSample& sample : s.samples_at_rest) {
-    out.put(sample.stamp.ns);
-    out.put(sample.gyro_rad_s);
-    out.put(sample.accel_m_s2);
-  }
-  out.put(s.up_in_body.has_value());
-  out.put(s.up_in_body.value_or(Eigen::Vector3d::Zero()));
   out.put(s.started);
   out.put(s.last_stamp.ns);
   out.put(s.world_from_left.pose);
@@ -178,8 +257,8 @@ Bytes Pipeline::save() const {
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
-  const Bytes odometry = s.odometer.save();
-  out.put_array(odometry.data(), odometry.size());
+  s.position.save(out);
+  for (const Bytes& stage : {s.odometer.save(), s.localizer.save()}) out.put_array(stage.data(), stage.size());
   return out.take();
 }
 
@@ -190,16 +269,6 @@ Status Pipeline::restore(const Bytes& state) {
                    "run again into a new folder");
   }
   State& s = *state_;
-  const auto at_rest = std::min<std::uint64_t>(in.get<std::uint64_t>(), kGravitySamples);
-  s.samples_at_rest.clear();
-  for (std::uint64_t i = 0; i < at_rest; ++i) {
-    const Stamp stamp{in.get<std::int64_t>()};
-    const Eigen::Vector3d gyro = in.get_vector3();
-    s.samples_at_rest.push_back({stamp, gyro, in.get_vector3()});
-  }
-  const bool has_up = in.get<bool>();
-  const Eigen::Vector3d up = in.get_vector3();
-  s.up_in_body = has_up ? std::optional(up) : std::nullopt;
   s.started = in.get<bool>();
   s.last_stamp.ns = in.get<std::int64_t>();
   s.world_from_left.pose = in.get_pose();
@@ -209,9 +278,11 @@ Status Pipeline::restore(const Bytes& state) {
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get<double>();
   s.distance_of_last_terrain_m = in.get<double>();
-  const Bytes odometry = in.get_array<std::uint8_t>();
+  s.position.restore(in);
+  const Bytes odometry = in.get_array<std::uint8_t>(), localization = in.get_array<std::uint8_t>();
   if (Status status = in.finish("run.sqlite: memory of the pipeline"); !status) return status;
-  return s.odometer.restore(odometry);
+  if (Status status = s.odometer.restore(odometry); !status) return status;
+  return s.localizer.restore(localization);
 }
 
 }  // namespace spartan

@@ -7,13 +7,16 @@
 #include <string>
 #include <vector>
 
+#include "spartan/camera/frame_source.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
 #include "spartan/imaging/rectified_pair.h"
+#include "spartan/localization/localizer.h"
 #include "spartan/odometry/odometer.h"
+#include "spartan/reconstruction/local_map.h"
 #include "spartan/rig/rig.h"
 #include "spartan/system/run_options.h"
 #include "spartan/system/stage_clock.h"
@@ -27,14 +30,25 @@ struct TerrainView {
   Pose world_from_left;              ///< rectified left optical frame
 };
 
+/// What a position became when the rover left it.
+struct MappedPosition {
+  std::int64_t position_id = -1;
+  Stamp stamp;  ///< of the shot of the odometry's pair there
+  int views = 0;
+  UncertainPose world_from_body;  ///< where the map was put
+  LocalMap map;
+};
+
 /// What one stereo shot told.
 struct FrameResult {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
-  UncertainPose world_from_body;  ///< covariance grows from zero at the first frame
+  UncertainPose world_from_body;  ///< by odometry alone; covariance grows from zero at the first frame
   MotionEstimate motion;
-  std::optional<TerrainView> terrain;  ///< where one was due
+  LocalizationEstimate localization;       ///< by all sensors
+  std::optional<TerrainView> terrain;      ///< where one was due
+  std::optional<MappedPosition> position;  ///< the one that was left for this shot
   std::vector<StageTime> times;
 };
 
@@ -50,22 +64,31 @@ class Pipeline {
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
 
-  /// IMU samples that come before the first frame find the direction of gravity.
+  /// Those that come before the first frame level the world and tell where east is.
   void add(const ImuSample& sample);
-  // Taken and not used yet: the localization module will.
   void add(const WheelSample& sample);
   void add(const CompassSample& sample);
   void add(const InclinometerSample& sample);
 
-  /// One shot. Shots of pairs that do not drive the odometry give nothing. Code `input` where the images do not fit the
-  /// rig, or it has no such pair: the frame is then left out and the pipeline goes on with the next.
+  /// One shot. Those of pairs that do not drive the odometry give nothing by themselves: they are views of the position
+  /// whose id they carry, which becomes a map when the odometry's pair reports another position. Code `input` where the
+  /// images do not fit the rig, or it has no such pair: the frame is then left out and the pipeline goes on with the
+  /// next.
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
+
+  /// The position at hand, where it is a map already: at the end of a drive.
+  Result<std::optional<MappedPosition>> leave_position();
+
+  /// After restore(): the shot that must be looked at again before the next is added, and the way to hand it in.
+  std::optional<ShotName> wanted_shot() const;
+  Status recall(const StereoFrame& frame);
 
   /// world_from_body at a moment without a pose: the last pose, moved on with the last motion's velocity.
   std::optional<Pose> predict(Stamp stamp) const;
 
-  /// Whether gravity was measured (an IMU at rest before the first frame) or assumed along the start attitude.
+  /// How the world lies: whether gravity and east were measured.
   bool gravity_measured() const;
+  bool heading_east() const;
 
   /// The pair that drives the odometry.
   const std::string& odometry_pair() const;

@@ -10,6 +10,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/rig_files.h"
+#include "spartan/system/map_files.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
@@ -18,8 +19,6 @@
 
 namespace spartan {
 namespace {
-
-constexpr double kSecondsForGravity = 1.0;
 
 // FNV-1a over what identifies a recording without reading its images: layout, pairs and announced stamps.
 std::string fingerprint(const FrameSource& source) {
@@ -50,6 +49,22 @@ void report_sequence(const RecordingInfo& info, const Log& log) {
   }
 }
 
+LocalizationRecord record_of(const LocalizationEstimate& estimate) {
+  LocalizationRecord record;
+  record.world_from_body = estimate.world_from_body;
+  record.odom_from_body = estimate.odom_from_body;
+  if (estimate.slip) {
+    record.slip = estimate.slip->slip;
+    record.slip_sigma = estimate.slip->sigma;
+  }
+  for (std::size_t i = 0; i < estimate.health.size(); ++i) {
+    const SensorHealth& health = estimate.health[i];
+    record.sensors.push_back(
+        {std::string(name_of(static_cast<LocalizationSensor>(i))), std::string(name_of(health.state)), health.reason});
+  }
+  return record;
+}
+
 // One run from its first sample to its last.
 class Drive {
  public:
@@ -69,14 +84,17 @@ class Drive {
   const std::string& first_fault() const { return first_fault_; }
   bool stopped() const { return stopped_; }
   bool gravity_measured() const { return pipeline_.gravity_measured(); }
+  bool heading_east() const { return pipeline_.heading_east(); }
   std::optional<std::int64_t> resumed_from_frame() const { return resumed_from_frame_; }
   RunStore& store() { return store_; }
 
  private:
   Status take(const Sample& sample);
+  Status finish();
+  Result<MapRecord> keep(const MappedPosition& position);
   Status take_frame(const StereoFrame& frame);
   Status take_missing(const MissingFrame& missing);
-  Status commit(FrameRecord record, const std::optional<TerrainRecord>& terrain);
+  Status commit(const RunStore::Step& step);
 
   const RunRequest& request_;
   const RunHooks& hooks_;
@@ -98,9 +116,6 @@ Status Drive::begin() {
   auto memory = store_.memory();
   if (!memory) return failure(memory);
   if (!*memory) {
-    const auto imu = source_.imu_samples({}, kSecondsForGravity);
-    if (!imu) return failure(imu);
-    for (const ImuSample& sample : *imu) pipeline_.add(sample);
     return {};
   }
   const auto frames = store_.frames();
@@ -108,6 +123,11 @@ Status Drive::begin() {
   shots_ = static_cast<int>(frames->size());
   for (const FrameRecord& frame : *frames) usable_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*memory)->stages); !status) return status;
+  if (const auto wanted = pipeline_.wanted_shot()) {
+    const auto shot = source_.frame_at(wanted->pair, wanted->left_stamp);
+    if (!shot) return failure(shot);
+    if (Status status = pipeline_.recall(*shot); !status) return status;
+  }
   samples_taken_ = (*memory)->samples_taken;
   resumed_ = true;
   hooks_.log.info(fmt::format("resuming behind frame {}", frames->back().frame_id));
@@ -122,11 +142,38 @@ Status Drive::drive() {
     }
     const auto sample = clock_.measure("camera", [&] { return source_.next(); });
     if (!sample) return failure(sample);
-    if (!*sample) return {};
+    if (!*sample) return finish();
     ++samples_taken_;
     if (Status status = take(**sample); !status) return status;
   }
   return {};
+}
+
+// What is known at the end only: the map of the last position.
+Status Drive::finish() {
+  auto position = pipeline_.leave_position();
+  if (!position) return failure(position);
+  if (!*position) return {};
+  const auto map = keep(**position);
+  if (!map) return failure(map);
+  return store_.commit({{}, {}, *map}, pipeline_.save(), samples_taken_);
+}
+
+Result<MapRecord> Drive::keep(const MappedPosition& position) {
+  const LocalMap& map = position.map;
+  const Status written =
+      clock_.measure("maps", [&] { return write_local_map(map, folder_.local_map(position.stamp)); });
+  if (!written) return failure(written);
+  MapRecord record;
+  record.stamp = position.stamp;
+  record.position_id = position.position_id;
+  record.views = position.views;
+  record.world_from_body = position.world_from_body;
+  record.obstacles = static_cast<int>(map.obstacles.size());
+  for (int y = 0; y < map.size().height; ++y) {
+    for (int x = 0; x < map.size().width; ++x) record.known_cells += map.count(x, y) > 0 ? 1 : 0;
+  }
+  return record;
 }
 
 Status Drive::take(const Sample& sample) {
@@ -154,7 +201,8 @@ Status Drive::take_frame(const StereoFrame& frame) {
   }
   FrameResult& shot = **result;
   ++usable_;
-  FrameRecord record;
+  RunStore::Step step;
+  FrameRecord& record = step.frame.emplace();
   record.frame_id = shot.frame_id;
   record.pair = shot.pair;
   record.stamp = shot.stamp;
@@ -163,19 +211,24 @@ Status Drive::take_frame(const StereoFrame& frame) {
   record.has_pose = shot.motion.status != TrackingStatus::lost;
   record.world_from_body = shot.world_from_body;
   record.motion = shot.motion;
+  record.localization = record_of(shot.localization);
   if (shot.motion.status == TrackingStatus::lost) {
     hooks_.log.warning(fmt::format("frame {}: lost: {}", shot.frame_id, shot.motion.reason));
   }
-  std::optional<TerrainRecord> terrain;
   if (shot.terrain) {
     auto written = clock_.measure(
         "terrain", [&] { return write_terrain(*shot.terrain, request_.options.terrain, folder_.terrain()); });
     if (!written) return failure(written);
-    terrain = *written;
+    step.terrain = *written;
+  }
+  if (shot.position) {
+    const auto map = keep(*shot.position);
+    if (!map) return failure(map);
+    step.map = *map;
   }
   record.times = clock_.take();
   record.times.insert(record.times.end(), shot.times.begin(), shot.times.end());
-  return commit(std::move(record), terrain);
+  return commit(step);
 }
 
 Status Drive::take_missing(const MissingFrame& missing) {
@@ -184,7 +237,8 @@ Status Drive::take_missing(const MissingFrame& missing) {
   clock_.take();
   if (first_fault_.empty()) first_fault_ = missing.message;
   if (missing.pair != pipeline_.odometry_pair()) return {};
-  FrameRecord record;
+  RunStore::Step step;
+  FrameRecord& record = step.frame.emplace();
   record.frame_id = missing.frame_id;
   record.pair = missing.pair;
   record.stamp = missing.stamp;
@@ -192,14 +246,14 @@ Status Drive::take_missing(const MissingFrame& missing) {
   record.fault = name_of(missing.fault);
   record.message = missing.message;
   record.world_from_body.pose = pipeline_.predict(missing.stamp).value_or(Pose());
-  return commit(std::move(record), {});
+  return commit(step);
 }
 
-Status Drive::commit(FrameRecord record, const std::optional<TerrainRecord>& terrain) {
-  if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = record.frame_id;
+Status Drive::commit(const RunStore::Step& step) {
+  if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = step.frame->frame_id;
   ++shots_;
-  Status status = store_.commit(record, terrain, pipeline_.save(), samples_taken_);
-  if (status && hooks_.progress) hooks_.progress({shots_, source_.info().sequence.announced, record.status});
+  Status status = store_.commit(step, pipeline_.save(), samples_taken_);
+  if (status && hooks_.progress) hooks_.progress({shots_, source_.info().sequence.announced, step.frame->status});
   return status;
 }
 
@@ -230,6 +284,8 @@ Result<RunOutcome> write_results(Drive& drive, const RunFolder& folder, RunFacts
   if (!frames) return failure(frames);
   if (Status s = write_file_atomically(folder.odometry_trajectory(), to_tum(measured_trajectory(*frames))); !s)
     return failure(s);
+  if (Status s = write_file_atomically(folder.localization_trajectory(), to_tum(localized_trajectory(*frames))); !s)
+    return failure(s);
   facts.peak_memory_bytes = peak_memory_bytes();
   RunOutcome outcome;
   outcome.summary_json = to_summary_json(facts, *frames);
@@ -252,7 +308,9 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
 
   const RunFolder folder{request.output};
   const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
-  auto pipeline = Pipeline::create(info.rig, request.options, Workers(request.threads), mask_folder);
+  RunOptions options = request.options;
+  if (options.gravity_m_s2 == 0) options.gravity_m_s2 = info.gravity_m_s2.value_or(0);
+  auto pipeline = Pipeline::create(info.rig, options, Workers(request.threads), mask_folder);
   if (!pipeline) return failure(pipeline);
   const auto prepared = prepare_run_folder(folder, request.resume);
   if (!prepared) return failure(prepared);
@@ -280,6 +338,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   facts.input = info.path;
   facts.format = name_of(info.format);
   facts.gravity_measured = drive.gravity_measured();
+  facts.heading_east = drive.heading_east();
   facts.threads = request.threads;
   facts.resumed_from_frame = drive.resumed_from_frame();
   facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();

@@ -16,7 +16,9 @@ Result<FolderState> prepare_run_folder(const RunFolder& folder, bool resume) {
   if (exists && !std::filesystem::is_directory(folder.path, error)) {
     return failure(ErrorCode::output, "is not a folder", folder.path, "give another folder with -o");
   }
-  if (Status made = make_folder(folder.terrain()); !made) return failure(made);
+  for (const std::string& part : {folder.terrain(), folder.maps()}) {
+    if (Status made = make_folder(part); !made) return failure(made);
+  }
   return exists ? FolderState::was_there : FolderState::made;
 }
 

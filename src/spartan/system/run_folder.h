@@ -4,6 +4,7 @@
 #include <string>
 
 #include "spartan/core/result.h"
+#include "spartan/core/time.h"
 
 namespace spartan {
 
@@ -14,7 +15,11 @@ struct RunFolder {
   std::string config() const { return path + "/config.yaml"; }
   std::string rig() const { return path + "/rig.yaml"; }
   std::string terrain() const { return path + "/terrain"; }
+  std::string maps() const { return path + "/maps"; }
+  /// Without ending.
+  std::string local_map(Stamp stamp) const { return maps() + "/local_" + std::to_string(stamp.ns); }
   std::string odometry_trajectory() const { return path + "/trajectory_odometry.tum"; }
+  std::string localization_trajectory() const { return path + "/trajectory_localization.tum"; }
   std::string summary() const { return path + "/summary.json"; }
   std::string log() const { return path + "/log.txt"; }
 };

@@ -5,6 +5,7 @@
 
 #include "spartan/core/options.h"
 #include "spartan/imaging/imager.h"
+#include "spartan/localization/localization_options.h"
 #include "spartan/odometry/odometry_options.h"
 #include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/position_mapper.h"
@@ -29,23 +30,28 @@ struct TerrainOptions {
 };
 
 struct RunOptions {
-  double gravity_m_s2 = 9.81;
+  double gravity_m_s2 = 0;
   std::string odometry_pair;
   ImagingOptions imaging;
   OdometryOptions odometry;
   DisparityOptions reconstruction;
   MappingOptions mapping;
+  bool maps = true;
+  LocalizationOptions localization;
   TerrainOptions terrain;
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("gravity_m_s2", gravity_m_s2, "9.81 on Earth, 3.71 on Mars; the IMU's mean must agree within 5 %",
-            between(0.1, 30));
+    v.field("gravity_m_s2", gravity_m_s2,
+            "9.81 on Earth, 3.71 on Mars; the IMU's mean must agree within 5 %; 0: as the recording says, else 9.81",
+            between(0, 30));
     v.field("odometry_pair", odometry_pair, "which pair drives the odometry; empty: the rig's first one made for it");
     v.group("imaging", imaging);
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);
+    v.field("maps", maps, "a map wherever the rover stands and further pairs look around; false: none");
     v.group("mapping", mapping);
+    v.group("localization", localization);
     v.group("terrain", terrain);
   }
 };

@@ -10,7 +10,7 @@ namespace spartan {
 namespace {
 
 constexpr int kApplicationId = 0x5350544E;  // "SPTN"
-constexpr int kUserVersion = 1;
+constexpr int kUserVersion = 2;
 
 // Columns named wall_ms and cpu_ms are the only ones that differ from run to run.
 constexpr const char* kSchema = R"(
@@ -23,6 +23,14 @@ CREATE TABLE frames (
   landmarks INTEGER, matches INTEGER, inliers INTEGER, rms_px REAL);
 CREATE TABLE stage_times (seq INTEGER NOT NULL, stage TEXT NOT NULL, wall_ms REAL NOT NULL, cpu_ms REAL NOT NULL);
 CREATE TABLE terrain (stamp_ns INTEGER PRIMARY KEY, pair TEXT NOT NULL, density_percent REAL NOT NULL, points INTEGER NOT NULL);
+CREATE TABLE localization (
+  seq INTEGER PRIMARY KEY, pose BLOB NOT NULL, covariance BLOB NOT NULL, odom_pose BLOB NOT NULL,
+  odom_covariance BLOB NOT NULL, slip REAL, slip_sigma REAL);
+CREATE TABLE health (seq INTEGER NOT NULL, sensor TEXT NOT NULL, state TEXT NOT NULL, reason TEXT NOT NULL);
+CREATE INDEX health_of_frame ON health (seq);
+CREATE TABLE maps (
+  stamp_ns INTEGER PRIMARY KEY, position_id INTEGER NOT NULL, views INTEGER NOT NULL, pose BLOB NOT NULL,
+  covariance BLOB NOT NULL, known_cells INTEGER NOT NULL, obstacles INTEGER NOT NULL);
 CREATE TABLE memory (id INTEGER PRIMARY KEY CHECK (id = 1), samples_taken INTEGER NOT NULL, stages BLOB NOT NULL);
 )";
 
@@ -81,11 +89,15 @@ Status expect_identity(Database& db, const std::string& key, const std::string& 
 struct RunStore::State {
   explicit State(Database db_in) : db(std::move(db_in)) {}
   Database db;
-  std::optional<SqlStatement> insert_frame, insert_time, insert_terrain, replace_memory;
+  std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_health, insert_terrain, insert_map,
+      replace_memory;
 
   Status prepare();
-  Status write(const FrameRecord& frame, const std::optional<TerrainRecord>& terrain, const Bytes& memory,
-               std::int64_t samples_taken);
+  Status write(const Step& step, const Bytes& memory, std::int64_t samples_taken);
+  Status write(const FrameRecord& frame);
+  Status write(const LocalizationRecord& localization);
+  Status write(const TerrainRecord& terrain);
+  Status write(const MapRecord& map);
 };
 
 Status RunStore::State::prepare() {
@@ -100,12 +112,53 @@ Status RunStore::State::prepare() {
     return s;
   if (Status s = make(insert_time, "INSERT INTO stage_times VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s)
     return s;
+  if (Status s =
+          make(insert_localization, "INSERT INTO localization VALUES ((SELECT max(seq) FROM frames),?,?,?,?,?,?)");
+      !s)
+    return s;
+  if (Status s = make(insert_health, "INSERT INTO health VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s) return s;
+  if (Status s = make(insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?)"); !s) return s;
   if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
   return make(replace_memory, "INSERT OR REPLACE INTO memory VALUES (1,?,?)");
 }
 
-Status RunStore::State::write(const FrameRecord& frame, const std::optional<TerrainRecord>& terrain,
-                              const Bytes& memory, std::int64_t samples_taken) {
+Status RunStore::State::write(const Step& step, const Bytes& memory, std::int64_t samples_taken) {
+  if (step.frame) {
+    if (Status s = write(*step.frame); !s) return s;
+  }
+  if (step.terrain) {
+    if (Status s = write(*step.terrain); !s) return s;
+  }
+  if (step.map) {
+    if (Status s = write(*step.map); !s) return s;
+  }
+  return replace_memory->bind(1, samples_taken).bind(2, memory).run();
+}
+
+Status RunStore::State::write(const LocalizationRecord& l) {
+  SqlStatement& i = *insert_localization;
+  i.bind(1, bytes_of(l.world_from_body.pose)).bind(2, bytes_of(l.world_from_body.covariance));
+  i.bind(3, bytes_of(l.odom_from_body.pose)).bind(4, bytes_of(l.odom_from_body.covariance));
+  i.bind(5, l.slip).bind(6, l.slip_sigma);
+  if (Status s = i.run(); !s) return s;
+  for (const LocalizationRecord::Sensor& sensor : l.sensors) {
+    if (Status s = insert_health->bind(1, sensor.name).bind(2, sensor.state).bind(3, sensor.reason).run(); !s) return s;
+  }
+  return {};
+}
+
+Status RunStore::State::write(const TerrainRecord& t) {
+  return insert_terrain->bind(1, t.stamp.ns).bind(2, t.pair).bind(3, t.density_percent).bind(4, t.points).run();
+}
+
+Status RunStore::State::write(const MapRecord& map) {
+  SqlStatement& i = *insert_map;
+  i.bind(1, map.stamp.ns).bind(2, map.position_id).bind(3, std::int64_t{map.views});
+  i.bind(4, bytes_of(map.world_from_body.pose)).bind(5, bytes_of(map.world_from_body.covariance));
+  return i.bind(6, std::int64_t{map.known_cells}).bind(7, std::int64_t{map.obstacles}).run();
+}
+
+Status RunStore::State::write(const FrameRecord& frame) {
   const Eigen::Vector3d& t = frame.world_from_body.pose.translation();
   const Eigen::Quaterniond& q = frame.world_from_body.pose.rotation();
   const MotionEstimate& motion = frame.motion;
@@ -121,14 +174,7 @@ Status RunStore::State::write(const FrameRecord& frame, const std::optional<Terr
   for (const StageTime& time : frame.times) {
     if (Status s = insert_time->bind(1, time.stage).bind(2, time.wall_ms).bind(3, time.cpu_ms).run(); !s) return s;
   }
-  if (terrain) {
-    insert_terrain->bind(1, terrain->stamp.ns)
-        .bind(2, terrain->pair)
-        .bind(3, terrain->density_percent)
-        .bind(4, terrain->points);
-    if (Status s = insert_terrain->run(); !s) return s;
-  }
-  return replace_memory->bind(1, samples_taken).bind(2, memory).run();
+  return frame.localization ? write(*frame.localization) : Status();
 }
 
 RunStore::RunStore(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -183,20 +229,55 @@ Result<RunStore> RunStore::open_read_only(const std::string& path) {
   return RunStore(std::make_unique<State>(std::move(*db)));
 }
 
-Status RunStore::commit(const FrameRecord& frame, const std::optional<TerrainRecord>& terrain, const Bytes& memory,
-                        std::int64_t samples_taken) {
+Status RunStore::commit(const Step& step, const Bytes& memory, std::int64_t samples_taken) {
   if (Status s = state_->db.execute("BEGIN IMMEDIATE"); !s) return s;
-  Status written = state_->write(frame, terrain, memory, samples_taken);
+  Status written = state_->write(step, memory, samples_taken);
   if (written) written = state_->db.execute("COMMIT");
   if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // may fail too: SQLite has then rolled back itself
   return written;
 }
+
+namespace {
+
+Result<std::optional<LocalizationRecord>> read_localization(SqlStatement& select, SqlStatement& health,
+                                                            std::int64_t seq) {
+  select.bind(1, seq);
+  const auto row = select.step();
+  if (!row) return failure(row);
+  if (!*row) {
+    select.reset();
+    return std::nullopt;
+  }
+  LocalizationRecord l;
+  const Bytes pose = select.blob(1), covariance = select.blob(2), odom = select.blob(3),
+              odom_covariance = select.blob(4);
+  l.world_from_body = {ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()};
+  l.odom_from_body = {ArchiveReader(odom).get_pose(), ArchiveReader(odom_covariance).get_matrix6()};
+  if (!select.is_null(5)) l.slip = select.real(5);
+  if (!select.is_null(6)) l.slip_sigma = select.real(6);
+  select.reset();
+  health.bind(1, seq);
+  for (;;) {
+    const auto more = health.step();
+    if (!more) return failure(more);
+    if (!*more) break;
+    l.sensors.push_back({health.text(0), health.text(1), health.text(2)});
+  }
+  health.reset();
+  return l;
+}
+
+}  // namespace
 
 Result<std::vector<FrameRecord>> RunStore::frames() {
   auto select = state_->db.prepare("SELECT * FROM frames ORDER BY seq");
   if (!select) return failure(select);
   auto times = state_->db.prepare("SELECT stage, wall_ms, cpu_ms FROM stage_times WHERE seq = ? ORDER BY rowid");
   if (!times) return failure(times);
+  auto localization = state_->db.prepare("SELECT * FROM localization WHERE seq = ?");
+  if (!localization) return failure(localization);
+  auto health = state_->db.prepare("SELECT sensor, state, reason FROM health WHERE seq = ? ORDER BY rowid");
+  if (!health) return failure(health);
   std::vector<FrameRecord> records;
   for (;;) {
     const auto row = select->step();
@@ -231,6 +312,9 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
       r.times.push_back({times->text(0), times->real(1), times->real(2)});
     }
     times->reset();
+    auto localized = read_localization(*localization, *health, select->integer(0));
+    if (!localized) return failure(localized);
+    r.localization = std::move(*localized);
     records.push_back(std::move(r));
   }
 }
@@ -244,6 +328,24 @@ Result<std::vector<TerrainRecord>> RunStore::terrain() {
     if (!row) return failure(row);
     if (!*row) return records;
     records.push_back({Stamp{select->integer(0)}, select->text(1), select->real(2), select->integer(3)});
+  }
+}
+
+Result<std::vector<MapRecord>> RunStore::maps() {
+  auto select = state_->db.prepare("SELECT * FROM maps ORDER BY stamp_ns");
+  if (!select) return failure(select);
+  std::vector<MapRecord> records;
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return failure(row);
+    if (!*row) return records;
+    const Bytes pose = select->blob(3), covariance = select->blob(4);
+    records.push_back({Stamp{select->integer(0)},
+                       select->integer(1),
+                       static_cast<int>(select->integer(2)),
+                       {ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()},
+                       static_cast<int>(select->integer(5)),
+                       static_cast<int>(select->integer(6))});
   }
 }
 

@@ -16,6 +16,16 @@
 
 namespace spartan {
 
+/// Where all sensors together put the rover, and what each of them was worth.
+struct LocalizationRecord {
+  UncertainPose world_from_body, odom_from_body;
+  std::optional<double> slip, slip_sigma;
+  struct Sensor {
+    std::string name, state, reason;
+  };
+  std::vector<Sensor> sensors;
+};
+
 /// One row of the store: a shot that was processed, or one that was announced and is not there.
 struct FrameRecord {
   std::int64_t frame_id = 0;
@@ -27,7 +37,17 @@ struct FrameRecord {
   bool has_pose = false;  ///< false: `world_from_body` is predicted
   UncertainPose world_from_body;
   MotionEstimate motion;
+  std::optional<LocalizationRecord> localization;  ///< none where the shot is missing
   std::vector<StageTime> times;
+};
+
+/// A position's map on the disk.
+struct MapRecord {
+  Stamp stamp;
+  std::int64_t position_id = -1;
+  int views = 0;
+  UncertainPose world_from_body;
+  int known_cells = 0, obstacles = 0;
 };
 
 /// What a terrain view left on the disk.
@@ -60,13 +80,19 @@ class RunStore {
   RunStore& operator=(RunStore&&) noexcept;
   ~RunStore();
 
-  /// One transaction: the frame, its terrain, the stages' memory behind it (only the newest is kept) and how many
-  /// samples of the source were taken. All of it is in the file afterwards, or nothing.
-  Status commit(const FrameRecord& frame, const std::optional<TerrainRecord>& terrain, const Bytes& memory,
-                std::int64_t samples_taken);
+  /// What one step of the drive left behind.
+  struct Step {
+    std::optional<FrameRecord> frame;
+    std::optional<TerrainRecord> terrain;
+    std::optional<MapRecord> map;
+  };
+  /// One transaction: the step, the stages' memory behind it (only the newest is kept) and how many samples of the
+  /// source were taken. All of it is in the file afterwards, or nothing.
+  Status commit(const Step& step, const Bytes& memory, std::int64_t samples_taken);
 
   Result<std::vector<FrameRecord>> frames();
   Result<std::vector<TerrainRecord>> terrain();
+  Result<std::vector<MapRecord>> maps();
 
   struct Memory {
     Bytes stages;

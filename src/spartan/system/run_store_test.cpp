@@ -32,7 +32,25 @@ FrameRecord some_frame(int i) {
   frame.motion.inliers = 40 + i;
   frame.motion.rms_px = random.uniform();
   frame.times = {{"imaging", 1.5, 2.5}, {"odometry", 3.0, 3.0}};
+  if (i == 3) return frame;  // one that was not localized
+  LocalizationRecord& localization = frame.localization.emplace();
+  localization.world_from_body = {exp_se3(0.5 * tangent), 2e-4 * Matrix6d::Identity()};
+  localization.odom_from_body = {exp_se3(0.4 * tangent), 3e-4 * Matrix6d::Identity()};
+  if (i > 0) localization.slip = 0.01 * i;
+  if (i > 0) localization.slip_sigma = 0.02;
+  localization.sensors = {{"vision", "ok", ""}, {"imu", "excluded", "frozen since then"}};
   return frame;
+}
+
+MapRecord some_map(int i) {
+  MapRecord map;
+  map.stamp = some_frame(i).stamp;
+  map.position_id = 40 + i;
+  map.views = 4;
+  map.world_from_body = some_frame(i).world_from_body;
+  map.known_cells = 7000;
+  map.obstacles = 12;
+  return map;
 }
 
 TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
@@ -44,8 +62,10 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
     for (int i = 0; i < 5; ++i) {
       const std::optional<TerrainRecord> terrain =
           i == 2 ? std::optional(TerrainRecord{some_frame(i).stamp, "narrow", 91.5, 1234}) : std::nullopt;
-      ASSERT_TRUE(store->commit(some_frame(i), terrain, Bytes{1, 2, static_cast<std::uint8_t>(i)}, 10 * i));
+      const std::optional<MapRecord> map = i == 1 ? std::optional(some_map(i)) : std::nullopt;
+      ASSERT_TRUE(store->commit({some_frame(i), terrain, map}, Bytes{1, 2, static_cast<std::uint8_t>(i)}, 10 * i));
     }
+    ASSERT_TRUE(store->commit({{}, {}, some_map(4)}, Bytes{1, 2, 4}, 40)) << "the last position's";
   }
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
@@ -65,7 +85,29 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
     ASSERT_EQ(read.times.size(), 2U);
     EXPECT_EQ(read.times[1].stage, "odometry");
     EXPECT_EQ(read.times[0].cpu_ms, 2.5);
+    ASSERT_EQ(read.localization.has_value(), expected.localization.has_value());
+    if (!read.localization) continue;
+    const LocalizationRecord &localized = *read.localization, &wanted = *expected.localization;
+    EXPECT_EQ(localized.world_from_body.pose.matrix(), wanted.world_from_body.pose.matrix());
+    EXPECT_EQ(localized.world_from_body.covariance, wanted.world_from_body.covariance);
+    EXPECT_EQ(localized.odom_from_body.pose.matrix(), wanted.odom_from_body.pose.matrix());
+    EXPECT_EQ(localized.odom_from_body.covariance, wanted.odom_from_body.covariance);
+    EXPECT_EQ(localized.slip, wanted.slip);
+    EXPECT_EQ(localized.slip_sigma, wanted.slip_sigma);
+    ASSERT_EQ(localized.sensors.size(), 2U);
+    EXPECT_EQ(localized.sensors[1].name, "imu");
+    EXPECT_EQ(localized.sensors[1].state, "excluded");
+    EXPECT_EQ(localized.sensors[1].reason, "frozen since then");
   }
+  const auto maps = store->maps();
+  ASSERT_TRUE(maps);
+  ASSERT_EQ(maps->size(), 2U);
+  EXPECT_EQ(maps->front().position_id, 41);
+  EXPECT_EQ(maps->front().views, 4);
+  EXPECT_EQ(maps->front().known_cells, 7000);
+  EXPECT_EQ(maps->front().obstacles, 12);
+  EXPECT_EQ(maps->back().world_from_body.pose.matrix(), some_map(4).world_from_body.pose.matrix());
+  EXPECT_EQ(maps->back().world_from_body.covariance, some_map(4).world_from_body.covariance);
   const auto memory = store->memory();
   ASSERT_TRUE(memory && *memory);
   EXPECT_EQ((*memory)->stages, (Bytes{1, 2, 4})) << "only the newest is kept";
@@ -122,7 +164,7 @@ TEST(RunStore, LosesNothingCommittedWhenKilled) {
   if (child == 0) {
     auto store = RunStore::create(path, kIdentity);
     for (int i = 0; store && i < 7; ++i) {
-      if (!store->commit(some_frame(i), {}, Bytes(100'000, 1), i)) ::_exit(1);
+      if (!store->commit({some_frame(i), {}, {}}, Bytes(100'000, 1), i)) ::_exit(1);
     }
     ::kill(::getpid(), SIGKILL);
   }

@@ -76,6 +76,14 @@ Trajectory measured_trajectory(const std::vector<FrameRecord>& frames) {
   return trajectory;
 }
 
+Trajectory localized_trajectory(const std::vector<FrameRecord>& frames) {
+  Trajectory trajectory;
+  for (const FrameRecord& frame : frames) {
+    if (frame.localization) trajectory.push_back({frame.stamp, frame.localization->world_from_body.pose});
+  }
+  return trajectory;
+}
+
 std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord>& frames) {
   std::map<std::string, int> skipped;
   std::map<std::string, int> health{{"tracking", 0}, {"degraded", 0}, {"lost", 0}, {"standing", 0}};
@@ -90,6 +98,16 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
     }
     if (!frame.has_pose) predicted.push_back(frame.frame_id);
   }
+  // Frames by the state of each sensor of the localization.
+  Json sensors = Json::object();
+  for (const FrameRecord& frame : frames) {
+    if (!frame.localization) continue;
+    for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
+      Json& counts = sensors[sensor.name];
+      if (counts.is_null()) counts = {{"ok", 0}, {"suspect", 0}, {"excluded", 0}, {"missing", 0}};
+      counts[sensor.state] = counts[sensor.state].get<int>() + 1;
+    }
+  }
   Json spans = Json::array();
   for (const LostSpan& span : lost_spans(frames)) {
     spans.push_back({{"from_ns", span.from.ns}, {"to_ns", span.to.ns}, {"reason", span.reason}});
@@ -99,7 +117,9 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"version", facts.version},
       {"input", facts.input},
       {"format", facts.format},
-      {"world", {{"heading", "start"}, {"gravity", facts.gravity_measured ? "measured" : "assumed"}}},
+      {"world",
+       {{"heading", facts.heading_east ? "east" : "start"},
+        {"gravity", facts.gravity_measured ? "measured" : "assumed"}}},
       {"frames", processed},
       {"skipped", skipped},
       {"predicted_frames", predicted},
@@ -109,7 +129,7 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"peak_memory_bytes", facts.peak_memory_bytes},
       {"threads", facts.threads},
       {"stages", stages(frames)},
-      {"health", {{"odometry", health}}},
+      {"health", {{"odometry", health}, {"localization", sensors}}},
       {"lost_spans", spans},
       {"resumed_from_frame", facts.resumed_from_frame ? Json(*facts.resumed_from_frame) : Json(nullptr)},
   };

@@ -17,6 +17,7 @@ struct RunFacts {
   std::string input;
   std::string format;
   bool gravity_measured = false;
+  bool heading_east = false;
   int threads = 1;
   double wall_seconds = 0, cpu_seconds = 0;  ///< of this call of the program
   std::int64_t peak_memory_bytes = 0;
@@ -34,6 +35,9 @@ std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames);
 
 /// Poses that were measured, in the order of time.
 Trajectory measured_trajectory(const std::vector<FrameRecord>& frames);
+
+/// Where all sensors put the rover, in the order of time.
+Trajectory localized_trajectory(const std::vector<FrameRecord>& frames);
 
 /// The text of summary.json.
 std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord>& frames);

@@ -1,0 +1,72 @@
+// The rover position at hand: its shots are gathered until the rover goes on, then they become a map.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "spartan/core/archive.h"
+#include "spartan/core/pose.h"
+#include "spartan/core/result.h"
+#include "spartan/core/threads.h"
+#include "spartan/imaging/rectified_pair.h"
+#include "spartan/reconstruction/position_mapper.h"
+
+namespace spartan {
+
+/// What was seen from one position, in the body frame.
+struct PositionSurvey {
+  std::int64_t position_id = -1;
+  Stamp stamp;             ///< of the shot that drove the odometry there
+  UncertainPose standing;  ///< world_from_body at that shot
+  int views = 0;
+  MergedRange merged;
+  std::vector<SurfacePoint> points;
+};
+
+/// Shots of one position share a position_id. The pair that drives the odometry sees every position; a position is
+/// mapped where other pairs look too. The stage's memory is the shot of the odometry's pair and the pose there; the
+/// other views are looked at again after a resume.
+class PositionStage {
+ public:
+  PositionStage(const DisparityOptions& disparity, const MappingOptions& options, Workers workers)
+      : mapper_(disparity, options, std::move(workers)) {}
+
+  /// The odometry's shot at a new position, and where the body stands.
+  void arrive(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing);
+  /// The same shot again after restore(); nothing where another one is waited for.
+  void recall(const RectifiedPair& shot, double nearest_m);
+  /// A view by another pair. One of a position that nobody arrived at is left out. Code `input` as DisparityComputer.
+  Status look(std::int64_t position_id, const RectifiedPair& shot, double nearest_m);
+
+  std::int64_t position_id() const { return position_id_; }
+  /// Left stamp of the shot that arrive() kept, where there is one.
+  std::optional<Stamp> kept_stamp() const;
+
+  /// The position as it was seen, where other pairs looked; nothing is kept of it.
+  std::optional<PositionSurvey> leave();
+
+  const PositionMapper& mapper() const { return mapper_; }
+
+  void save(ArchiveWriter& out) const;
+  void restore(ArchiveReader& in);
+
+ private:
+  // A copy of a pair whose buffers belong to somebody else.
+  struct KeptShot {
+    explicit KeptShot(const RectifiedPair& shot);
+    RectifiedPair view() const;
+    RectifiedPair pair;
+    Image<std::uint8_t> left, right, left_mask, right_mask;
+  };
+  Status add(const RectifiedPair& shot, double nearest_m);
+
+  PositionMapper mapper_;
+  std::int64_t position_id_ = -1;
+  Stamp stamp_;
+  UncertainPose standing_;
+  std::optional<KeptShot> kept_;
+  double kept_nearest_m_ = 0;
+};
+
+}  // namespace spartan
