@@ -39,14 +39,25 @@ std::string dump_table(sqlite3* db, const std::string& table) {
   return text;
 }
 
+std::vector<std::string> tables_of(sqlite3* db) {
+  sqlite3_stmt* statement = nullptr;
+  if (sqlite3_prepare_v2(db, "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name", -1, &statement,
+                         nullptr) != SQLITE_OK) {
+    throw std::runtime_error(sqlite3_errmsg(db));
+  }
+  std::vector<std::string> names;
+  while (sqlite3_step(statement) == SQLITE_ROW)
+    names.emplace_back(reinterpret_cast<const char*>(sqlite3_column_text(statement, 0)));
+  sqlite3_finalize(statement);
+  return names;
+}
+
 std::string dump_database(const std::string& path) {
   sqlite3* db = nullptr;
   if (sqlite3_open_v2(path.c_str(), &db, SQLITE_OPEN_READONLY, nullptr) != SQLITE_OK)
     throw std::runtime_error("cannot open " + path);
   std::string text;
-  for (const char* table : {"identity", "frames", "stage_times", "terrain", "memory"}) {
-    text += std::string("== ") + table + "\n" + dump_table(db, table);
-  }
+  for (const std::string& table : tables_of(db)) text += "== " + table + "\n" + dump_table(db, table);
   sqlite3_close(db);
   return text;
 }
