@@ -11,75 +11,23 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <limits>
-#include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
-#include "spartan/core/files.h"
+#include "mars_stops.h"
 #include "spartan/core/geotiff.h"
-#include "spartan/core/trajectory.h"
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/eval/map_metrics.h"
-#include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/position_mapper.h"
 #include "standard_recordings.h"
 
 namespace spartan {
 namespace {
-
-// A recording with its truth.
-struct Drive {
-  std::string folder;
-  std::unique_ptr<FrameSource> source;
-  Rig rig;
-  Trajectory poses;
-  LoadedMap elevation, obstacles;
-  std::map<std::int64_t, std::vector<std::pair<std::string, Stamp>>> stops;  // position → pair, stamp of each shot
-};
-
-std::optional<Drive> open_drive(const std::string& folder) {
-  Drive drive;
-  drive.folder = folder;
-  auto source = open_recording(folder);
-  const auto poses = read_file(folder + "/truth/poses.tum");
-  auto elevation = read_geotiff(folder + "/truth/elevation.tif"),
-       obstacles = read_geotiff(folder + "/truth/obstacles.tif");
-  if (!source || !poses || !elevation || !obstacles) return std::nullopt;
-  auto trajectory = parse_tum(*poses, "truth");
-  if (!trajectory) return std::nullopt;
-  drive.source = std::move(*source);
-  drive.rig = drive.source->info().rig;
-  drive.poses = std::move(*trajectory);
-  drive.elevation = std::move(*elevation);
-  drive.obstacles = std::move(*obstacles);
-  std::map<std::int64_t, bool> panned;
-  for (const bool for_odometry : {false, true}) {
-    for (const StereoPair& pair : drive.rig.pairs) {
-      if (pair.for_odometry != for_odometry) continue;
-      for (const Stamp stamp : drive.source->announced_stamps(pair.name)) {
-        const auto frame = drive.source->frame_at(pair.name, stamp);
-        if (!frame || (for_odometry && !panned.contains(frame->position_id))) continue;
-        panned[frame->position_id] = true;
-        drive.stops[frame->position_id].emplace_back(pair.name, stamp);
-      }
-    }
-  }
-  return drive;
-}
-
-Pose true_pose(const Drive& drive, Stamp stamp) {
-  return std::min_element(drive.poses.begin(), drive.poses.end(),
-                          [&](const StampedPose& a, const StampedPose& b) {
-                            return std::abs(a.stamp.ns - stamp.ns) < std::abs(b.stamp.ns - stamp.ns);
-                          })
-      ->pose;
-}
 
 // What the eyes could see of the cells of a map.
 struct Seen {
@@ -114,18 +62,6 @@ void look_truly(const Drive& drive, const std::string& pair, Stamp stamp, const 
   }
 }
 
-// The views of one stop, taken by the mapper.
-void look(Drive& drive, Imager& imager, PositionMapper& mapper,
-          const std::vector<std::pair<std::string, Stamp>>& shots) {
-  mapper.leave();
-  for (const auto& [pair, stamp] : shots) {
-    const auto frame = drive.source->frame_at(pair, stamp);
-    if (!frame) continue;
-    const auto shot = imager.process(*frame);
-    if (shot) (void)mapper.add(*shot, drive.rig.find_pair(pair)->nearest_m);
-  }
-}
-
 struct Sums {
   double cells = 0, error = 0, squares = 0, visible = 0, covered = 0, free = 0, false_marks = 0;
   int obstacles = 0, found = 0, cavities = 0, cavities_found = 0;
@@ -149,6 +85,42 @@ struct Sums {
   }
 };
 
+// Obstacles by their height, and what became of the cells that are seen, over all scenarios.
+struct Totals {
+  static constexpr std::array<double, 5> kHeights_m{0.1, 0.15, 0.2, 0.3, 9};
+  std::array<int, 4> things{}, found{};
+  std::array<std::array<std::int64_t, 4>, 4> confusion{};
+
+  void add(const MapMetrics& m) {
+    for (const JudgedThing& thing : m.obstacles) {
+      for (std::size_t i = 0; i < things.size(); ++i) {
+        if (thing.height_m < kHeights_m[i] || thing.height_m >= kHeights_m[i + 1]) continue;
+        ++things[i];
+        found[i] += thing.found ? 1 : 0;
+      }
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < 4; ++j) confusion[i][j] += m.confusion[i][j];
+    }
+  }
+  void print() const {
+    fmt::print("\nobstacles found by height:");
+    for (std::size_t i = 0; i < things.size(); ++i)
+      fmt::print("  {} {}/{}",
+                 i + 1 < things.size() ? fmt::format("{:.2f}-{:.2f} m", kHeights_m[i], kHeights_m[i + 1])
+                                       : fmt::format("over {:.2f} m", kHeights_m[i]),
+                 found[i], things[i]);
+    constexpr std::array<const char*, 4> kNames{"unknown", "free", "obstacle", "cavity"};
+    fmt::print("\n{:<22}", "cells: true, seen as");
+    for (const char* name : kNames) fmt::print("{:>10}", name);
+    for (std::size_t i = 1; i < 4; ++i) {
+      fmt::print("\n{:<22}", kNames[i]);
+      for (const std::int64_t count : confusion[i]) fmt::print("{:>10}", count);
+    }
+    fmt::print("\n");
+  }
+};
+
 constexpr std::array<double, 5> kBorders_m{0, 1.5, 2.5, 4, 4};
 
 void list_missed(std::int64_t position, const char* what, const std::vector<JudgedThing>& things) {
@@ -161,7 +133,7 @@ void list_missed(std::int64_t position, const char* what, const std::vector<Judg
   }
 }
 
-void judge(const std::string& folder, const std::string& scenario, int wanted, bool list) {
+void judge(const std::string& folder, const std::string& scenario, int wanted, bool list, Totals& totals) {
   auto drive = open_drive(folder + "/" + scenario);
   if (!drive) {
     fmt::print("{:<18} not there; scripts/recordings makes it\n", scenario);
@@ -181,10 +153,11 @@ void judge(const std::string& folder, const std::string& scenario, int wanted, b
   }
   const TrueGround truth{drive->elevation.place, drive->elevation.bands[0], drive->elevation.bands[1], level};
   for (const auto& [position, shots] : drive->stops) {
-    if (stops++ == wanted) break;
+    if (stops == wanted) break;
+    ++stops;
     look(*drive, *imager, mapper, shots);
     const MergedRange merged = mapper.merge();
-    const Pose pose = true_pose(*drive, shots.front().second);
+    const Pose pose = true_pose(*drive, shots.front().left_stamp);
     const auto start = std::chrono::steady_clock::now();
     const LocalMap map = mapper.map(surface_points(merged), pose);
     map_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -199,6 +172,7 @@ void judge(const std::string& folder, const std::string& scenario, int wanted, b
       const MapMetrics metrics =
           judge_map({map.place, map.elevation_m, map.kind, seen.pixels, seen.lowest_m}, truth, scoring);
       sums[bin].add(metrics);
+      if (bin == 3) totals.add(metrics);
       if (list && bin == 3) {
         list_missed(position, "obstacle", metrics.obstacles);
         list_missed(position, "cavity", metrics.cavities);
@@ -225,9 +199,11 @@ void run(const std::vector<std::string>& words) {
   if (scenarios.empty()) scenarios = {"rocky_20pct", "crater_rim", "flat_featureless", "diffuse_200lux"};
   fmt::print("{:<18} {:<10} {:>7} {:>7} {:>9} {:>12} {:>9} {:>12}\n", "scenario", "range", "bias mm", "RMS mm",
              "covered %", "obstacles", "false %", "cavities");
+  Totals totals;
   for (const std::string& scenario : scenarios) {
-    judge(arguments.folder, scenario, arguments.number("--stops"), arguments.number("--list") != 0);
+    judge(arguments.folder, scenario, arguments.number("--stops"), arguments.number("--list") != 0, totals);
   }
+  totals.print();
 }
 
 }  // namespace
