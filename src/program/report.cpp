@@ -9,6 +9,8 @@
 #include "program/compared_trajectories.h"
 #include "program/html_parts.h"
 #include "program/json.h"
+#include "program/report_maps.h"
+#include "program/report_trajectories.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
 #include "spartan/core/geotiff.h"
@@ -159,32 +161,6 @@ std::string figure(const std::string& value, const std::string& what) {
   return "<div><b>" + html_text(value) + "</b>" + html_text(what) + "</div>";
 }
 
-std::string trajectory_plots(const ComparedTrajectories& compared, const TrajectoryMetrics& metrics) {
-  PlotLine truth{"truth", "#9a3b12", {}, {}}, estimate{"odometry", "#1f5fa8", {}, {}},
-      error{"error", "#1f5fa8", {}, {}};
-  for (const StampedPose& p : compared.truth) {
-    truth.x.push_back(p.pose.translation().x());
-    truth.y.push_back(p.pose.translation().y());
-  }
-  double driven = 0;
-  Eigen::Vector3d before = Eigen::Vector3d::Zero();
-  for (const StampedPose& p : compared.estimate) {
-    const Eigen::Vector3d at = metrics.truth_from_estimate * p.pose.translation();
-    estimate.x.push_back(at.x());
-    estimate.y.push_back(at.y());
-    const auto same =
-        std::min_element(compared.truth.begin(), compared.truth.end(), [&](const StampedPose& a, const StampedPose& b) {
-          return std::abs(a.stamp.ns - p.stamp.ns) < std::abs(b.stamp.ns - p.stamp.ns);
-        });
-    driven += error.x.empty() ? 0 : (at - before).norm();
-    before = at;
-    error.x.push_back(driven);
-    error.y.push_back(1000 * (at - same->pose.translation()).norm());
-  }
-  return svg_plot({truth, estimate}, {"x, m", "y, m", true, 560, 420}) +
-         svg_plot({error}, {"driven, m", "position error after alignment, mm", false, 560, 420});
-}
-
 }  // namespace
 
 Result<std::string> make_report(const std::string& recording, const std::string& run, int threads) {
@@ -213,7 +189,12 @@ Result<std::string> make_report(const std::string& recording, const std::string&
   body += figure(fmt::format("{:.1f} s", summary["wall_seconds"].get<double>()), "for the whole run");
   body += "</div>\n";
   body += section("What the rover saw", *pictures);
-  body += section("Where it went", trajectory_plots(*compared, *metrics));
+  const auto plots = trajectory_plots(recording, run);
+  if (!plots) return failure(plots);
+  body += section("Where it went", *plots + sensor_table(summary));
+  const auto maps = map_pictures(run);
+  if (!maps) return failure(maps);
+  if (!maps->empty()) body += section("Maps of where it stood", *maps);
   std::string stereo;
   for (const StereoPair& pair : (*source)->info().rig.pairs) {
     const auto html = stereo_of(**source, *imager, pair, recording, threads);

@@ -1,0 +1,116 @@
+#include "program/report_trajectories.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <vector>
+
+#include "program/compared_trajectories.h"
+#include "program/html_parts.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/system/run_folder.h"
+#include "spartan/system/run_store.h"
+
+namespace spartan::program {
+namespace {
+
+struct Kind {
+  const char* name;
+  const char* colour;
+  const char* pale;  // of its 3σ
+};
+constexpr std::array<Kind, 3> kKinds{
+    {{"odometry", "#1f5fa8", "#a9c4e2"}, {"slam", "#7a3f9d", "#d0b8de"}, {"localization", "#2c8a4a", "#aed6b9"}}};
+
+const StampedPose& nearest(const Trajectory& truth, Stamp stamp) {
+  return *std::min_element(truth.begin(), truth.end(), [&](const StampedPose& a, const StampedPose& b) {
+    return std::abs(a.stamp.ns - stamp.ns) < std::abs(b.stamp.ns - stamp.ns);
+  });
+}
+
+// 3σ of the position, in the direction in which it is known worst.
+double three_sigma(const Matrix6d& covariance) {
+  const Eigen::Matrix3d position = covariance.topLeftCorner<3, 3>();
+  return 3 * std::sqrt(std::max(0.0, position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
+}
+
+std::optional<Matrix6d> covariance_of(const FrameRecord& frame, const std::string& kind) {
+  if (kind == "odometry") return frame.has_pose ? std::optional(frame.world_from_body.covariance) : std::nullopt;
+  if (kind == "localization" && frame.localization) return frame.localization->world_from_body.covariance;
+  return std::nullopt;
+}
+
+struct Lines {
+  std::vector<PlotLine> way, errors;
+};
+
+void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vector<FrameRecord>& frames,
+          Lines& lines) {
+  PlotLine way{kind.name, kind.colour, {}, {}}, error{kind.name, kind.colour, {}, {}},
+      band{std::string(kind.name) + ", 3σ", kind.pale, {}, {}};
+  const StampedPose& first = compared.estimate.front();
+  const Pose truth_from_estimate = nearest(compared.truth, first.stamp).pose * first.pose.inverse();
+  double driven = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  auto frame = frames.begin();
+  for (const StampedPose& p : compared.estimate) {
+    const Eigen::Vector3d at = truth_from_estimate * p.pose.translation();
+    driven += way.x.empty() ? 0 : (at - before).norm();
+    before = at;
+    way.x.push_back(at.x());
+    way.y.push_back(at.y());
+    error.x.push_back(driven);
+    error.y.push_back(1000 * (at - nearest(compared.truth, p.stamp).pose.translation()).norm());
+    while (frame != frames.end() && frame->stamp < p.stamp) ++frame;
+    if (frame == frames.end() || frame->stamp != p.stamp) continue;
+    if (const auto covariance = covariance_of(*frame, kind.name)) {
+      band.x.push_back(driven);
+      band.y.push_back(1000 * three_sigma(*covariance));
+    }
+  }
+  lines.way.push_back(std::move(way));
+  if (!band.x.empty()) lines.errors.push_back(std::move(band));
+  lines.errors.push_back(std::move(error));
+}
+
+}  // namespace
+
+Result<std::string> trajectory_plots(const std::string& recording, const std::string& run) {
+  const RunFolder folder{run};
+  auto store = RunStore::open_read_only(folder.store());
+  if (!store) return failure(store);
+  const auto frames = store->frames();
+  if (!frames) return failure(frames);
+  Lines lines;
+  for (const Kind& kind : kKinds) {
+    if (!std::filesystem::exists(run + "/trajectory_" + kind.name + ".tum")) continue;
+    const auto compared = find_trajectories(run, recording, kind.name);
+    if (!compared) return failure(compared);
+    if (lines.way.empty()) {
+      PlotLine truth{"truth", "#9a3b12", {}, {}};
+      for (const StampedPose& p : compared->truth) {
+        truth.x.push_back(p.pose.translation().x());
+        truth.y.push_back(p.pose.translation().y());
+      }
+      lines.way.push_back(std::move(truth));
+    }
+    if (!compared->estimate.empty() && !compared->truth.empty()) draw(kind, *compared, *frames, lines);
+  }
+  return svg_plot(lines.way, {"x, m", "y, m", true, 560, 420}) +
+         svg_plot(lines.errors, {"driven, m", "position error, first poses aligned, mm", false, 560, 420});
+}
+
+std::string sensor_table(const Json& summary) {
+  std::vector<std::vector<std::string>> rows{{"sensor", "ok", "suspect", "excluded", "missing"}};
+  for (const auto& [sensor, frames] : summary["health"]["localization"].items()) {
+    std::vector<std::string> row{sensor};
+    for (std::size_t i = 1; i < rows.front().size(); ++i)
+      row.push_back(std::to_string(frames[rows.front()[i]].get<int>()));
+    rows.push_back(std::move(row));
+  }
+  return "<p>Frames by what each sensor of the localization was worth.</p>\n" + html_table(rows);
+}
+
+}  // namespace spartan::program
