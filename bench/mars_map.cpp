@@ -105,11 +105,12 @@ struct Totals {
   }
   void print() const {
     fmt::print("\nobstacles found by height:");
-    for (std::size_t i = 0; i < things.size(); ++i)
-      fmt::print("  {} {}/{}",
-                 i + 1 < things.size() ? fmt::format("{:.2f}-{:.2f} m", kHeights_m[i], kHeights_m[i + 1])
-                                       : fmt::format("over {:.2f} m", kHeights_m[i]),
-                 found[i], things[i]);
+    for (std::size_t i = 0; i < things.size(); ++i) {
+      const std::string heights = i + 1 < things.size()
+                                      ? fmt::format("{:.2f}-{:.2f} m", kHeights_m[i], kHeights_m[i + 1])
+                                      : fmt::format("over {:.2f} m", kHeights_m[i]);
+      fmt::print("  {} {}/{}", heights, found[i], things[i]);
+    }
     constexpr std::array<const char*, 4> kNames{"unknown", "free", "obstacle", "cavity"};
     fmt::print("\n{:<22}", "cells: true, seen as");
     for (const char* name : kNames) fmt::print("{:>10}", name);
