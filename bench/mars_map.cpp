@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -21,6 +20,7 @@
 
 #include "mars_stops.h"
 #include "spartan/core/geotiff.h"
+#include "spartan/core/process.h"
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/eval/map_metrics.h"
 #include "spartan/reconstruction/position_mapper.h"
@@ -144,7 +144,6 @@ void judge(const std::string& folder, const std::string& scenario, int wanted, b
   if (!imager) return;
   PositionMapper mapper({}, {}, Workers(2));
   std::array<Sums, 4> sums;  // three bins of range, all
-  double map_seconds = 0;
   int stops = 0;
   Image<float> level(drive->elevation.bands[0].size());
   for (int y = 0; y < level.height(); ++y) {
@@ -159,9 +158,7 @@ void judge(const std::string& folder, const std::string& scenario, int wanted, b
     look(*drive, *imager, mapper, shots);
     const MergedRange merged = mapper.merge();
     const Pose pose = true_pose(*drive, shots.front().left_stamp);
-    const auto start = std::chrono::steady_clock::now();
     const LocalMap map = mapper.map(surface_points(merged), pose);
-    map_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     Seen seen(map.size());
     for (const PositionView& view : mapper.views())
       look_truly(*drive, view.pair, view.stamp, view.geometry, pose, map.place, seen);
@@ -190,7 +187,7 @@ void judge(const std::string& folder, const std::string& scenario, int wanted, b
   const MappingTimes& times = mapper.times();
   fmt::print("{:<18} seconds a stop on two threads: disparity {:.2f}, v-disparity {:.2f}, merging {:.2f}, map {:.2f}\n",
              "", 1e-3 * times.disparity / stops, 1e-3 * times.v_disparity / stops, 1e-3 * times.merging / stops,
-             map_seconds / stops);
+             1e-3 * times.map / stops);
   std::fflush(stdout);
 }
 
@@ -205,6 +202,7 @@ void run(const std::vector<std::string>& words) {
     judge(arguments.folder, scenario, arguments.number("--stops"), arguments.number("--list") != 0, totals);
   }
   totals.print();
+  fmt::print("peak memory {:.0f} MB\n", 1e-6 * static_cast<double>(peak_memory_bytes()));
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ int known_cells(const LocalMap& map) {
 }
 
 // The map of a single view of the stop.
-int cells_of_one(const PositionView& view, const PositionMapper& mapper, const Pose& pose) {
+int cells_of_one(const PositionView& view, PositionMapper& mapper, const Pose& pose) {
   const std::vector<ViewGeometry> geometry{view.geometry};
   const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), geometry, 0.3, Workers(2));
   const std::vector<MergedView> views{{view.geometry, view.disparity, view.left, {}}};

@@ -15,6 +15,7 @@
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
+#include "spartan/core/process.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/position_mapper.h"
 #include "spartan/rig/rig_files.h"
@@ -180,7 +181,13 @@ Json to_json(const PositionMapper& mapper, const LocalMap& map, const Position& 
            {{"roll_deg", tilt.roll_rad / kDegree},
             {"pitch_deg", tilt.pitch_rad / kDegree},
             {"source", position.up_source}}},
-          {"views", views_of(mapper, up)}};
+          {"views", views_of(mapper, up)},
+          {"time_ms",
+           {{"disparity", mapper.times().disparity},
+            {"v_disparity", mapper.times().v_disparity},
+            {"merging", mapper.times().merging},
+            {"map", mapper.times().map}}},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 std::string to_text(const Json& json, const std::string& folder) {
@@ -196,6 +203,12 @@ std::string to_text(const Json& json, const std::string& folder) {
                 : fmt::format("{:.3f} m, {:.2f} deg by the ground\n", view["ground"]["height_m"].get<double>(),
                               view["ground"]["pitch_deg"].get<double>());
   }
+  const Json& time = json["time_ms"];
+  text += fmt::format(
+      "{:.0f} ms for disparities, {:.0f} ms for v-disparity, {:.0f} ms for merging, {:.0f} ms for the map; "
+      "{:.0f} MB at most\n",
+      time["disparity"].get<double>(), time["v_disparity"].get<double>(), time["merging"].get<double>(),
+      time["map"].get<double>(), 1e-6 * json["peak_memory_bytes"].get<double>());
   text += fmt::format("{} x {} cells of {} m: {} free, {} obstacle, {} cavity; {} obstacles; results in {}\n",
                       json["columns"].get<int>(), json["rows"].get<int>(), json["cell_m"].get<double>(),
                       cells["free"].get<int>(), cells["obstacle"].get<int>(), cells["cavity"].get<int>(),

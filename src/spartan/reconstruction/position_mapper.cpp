@@ -82,4 +82,11 @@ MergedRange PositionMapper::merge() {
   return merged;
 }
 
+LocalMap PositionMapper::map(std::span<const SurfacePoint> points, const Pose& map_from_body) {
+  Lap lap;
+  LocalMap map = generator_.generate(points, map_from_body);
+  times_.map += lap.milliseconds();
+  return map;
+}
+
 }  // namespace spartan

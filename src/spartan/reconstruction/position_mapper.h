@@ -42,9 +42,9 @@ struct PositionView {
   std::optional<VDisparity> ground;  ///< none where no ground was found: its pixels count as unknown
 };
 
-/// Wall-clock milliseconds, for reports only.
+/// Wall-clock milliseconds since the mapper was made, for reports only.
 struct MappingTimes {
-  double disparity = 0, v_disparity = 0, merging = 0;
+  double disparity = 0, v_disparity = 0, merging = 0, map = 0;
 };
 
 /// Disparity computation → v-disparity for each view as it comes, disparity merging when the position is complete.
@@ -63,9 +63,7 @@ class PositionMapper {
   /// upright in the body. At least one view must be there.
   MergedRange merge();
 
-  LocalMap map(std::span<const SurfacePoint> points, const Pose& map_from_body) const {
-    return generator_.generate(points, map_from_body);
-  }
+  LocalMap map(std::span<const SurfacePoint> points, const Pose& map_from_body);
 
   /// Forgets the views: the rover goes on.
   void leave() { views_.clear(); }

@@ -46,7 +46,7 @@ class PositionStage {
   /// The position as it was seen, where other pairs looked; nothing is kept of it.
   std::optional<PositionSurvey> leave();
 
-  const PositionMapper& mapper() const { return mapper_; }
+  PositionMapper& mapper() { return mapper_; }
 
   void save(ArchiveWriter& out) const;
   void restore(ArchiveReader& in);

@@ -1,13 +1,12 @@
 #include "spartan/system/run.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <chrono>
-#include <ctime>
 #include <filesystem>
 
 #include "spartan/core/files.h"
+#include "spartan/core/process.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/system/map_files.h"
@@ -255,18 +254,6 @@ Status Drive::commit(const RunStore::Step& step) {
   Status status = store_.commit(step, pipeline_.save(), samples_taken_);
   if (status && hooks_.progress) hooks_.progress({shots_, source_.info().sequence.announced, step.frame->status});
   return status;
-}
-
-double cpu_seconds() {
-  timespec t{};
-  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-std::int64_t peak_memory_bytes() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
 }
 
 Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, const RunIdentity& identity) {
