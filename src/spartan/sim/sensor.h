@@ -25,6 +25,7 @@ struct SensorOptions {
   double target_level = 0.45;
   double longest_exposure_ms = 20;
   double largest_gain = 16;
+  int noise_seed = 0;
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -40,6 +41,7 @@ struct SensorOptions {
             between(0.01, 0.9));
     v.field("longest_exposure_ms", longest_exposure_ms, "beyond it gain takes over", between(0.01, 10000));
     v.field("largest_gain", largest_gain, "1: the full well fills the range", between(1, 1000));
+    v.field("noise_seed", noise_seed, "another one gives the same world other noise", at_least(0));
   }
 };
 

@@ -24,6 +24,7 @@ constexpr double kPlace_m = 2;  // shots so near each other share a scene
 constexpr double kFarthestView_m = 6;
 constexpr double kMapMargin_m = 5;
 constexpr int kMeteredRow = 16;
+constexpr std::uint64_t kNoiseStride = 0x9E3779B97F4A7C15U;  // odd: seeds of no two noises meet
 constexpr const char* kScenarioFile = "/truth/scenario.yaml";
 
 // Places on level ground under the body that a camera sees, not farther than kFarthestView_m.
@@ -260,7 +261,8 @@ class Simulation {
     const StereoPair& pair = *request_.rig.find_pair(shot.pair);
     const Pose left_pose = camera_pose(shot, pair.left, shot.time_s);
     const Exposure exposure = choose_exposure(scenario_.sensor, tools.left.metered(around, left_pose, kMeteredRow));
-    const auto seed = static_cast<std::uint64_t>(scenario_.seed) * 1000003 + 2 * i;
+    const auto seed = static_cast<std::uint64_t>(scenario_.seed) * 1000003 + 2 * i +
+                      static_cast<std::uint64_t>(scenario_.sensor.noise_seed) * kNoiseStride;
     StereoFrame frame;
     frame.frame_id = static_cast<std::int64_t>(i);
     frame.position_id = shot.position_id;

@@ -52,6 +52,14 @@ Status write_local_map(const LocalMap& map, const std::string& path) {
   return write_png(path + ".png", draw_map(map.elevation_m, map.kind, map.place.cell_m));
 }
 
+Status write_global_map(GlobalMap& map, const std::string& path) {
+  if (map.empty()) return {};
+  const auto view = map.view(map.extent());
+  if (!view) return failure(view);
+  if (Status s = write_geotiff(path + ".tif", view->place(), view->bands()); !s) return s;
+  return write_png(path + ".png", draw_map(view->elevation_m, view->kind, view->cell_m));
+}
+
 Status write_position(std::span<const PositionView> views, const MergedRange& merged, const LocalMap& map,
                       const MappingOptions& options, const std::string& folder) {
   if (Status s = write_local_map(map, folder + "/map"); !s) return s;

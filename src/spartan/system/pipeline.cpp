@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 2;
+constexpr std::uint32_t kStateVersion = 3;
 constexpr double kGravityOnEarth_m_s2 = 9.81;
 
 LocalizationOptions with_gravity(const RunOptions& options) {
@@ -37,7 +37,8 @@ struct Pipeline::State {
         odometer(options_in.odometry, workers),
         disparity_computer(options_in.reconstruction, workers),
         localizer(with_gravity(options_in)),
-        position(options_in.reconstruction, options_in.mapping, workers) {
+        position(options_in.reconstruction, options_in.mapping, workers),
+        merger(options_in.slam, options_in.mapping.map, workers) {
     maps_positions = options.maps && rig.pairs.size() > 1;
   }
 
@@ -49,6 +50,7 @@ struct Pipeline::State {
   DisparityComputer disparity_computer;
   Localizer localizer;
   PositionStage position;
+  MapMerger merger;
   bool maps_positions = false;
   StageClock clock;
 
@@ -56,6 +58,7 @@ struct Pipeline::State {
   bool started = false;
   Stamp last_stamp;
   UncertainPose world_from_left;
+  UncertainPose slam;  // world_from_body: odometry with the latest correction by the map
   Pose left_from_body;
   Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the left frame, per second
   double distance_m = 0;
@@ -66,14 +69,15 @@ struct Pipeline::State {
   void localize(const RectifiedPair& shot, const MotionEstimate& motion);
   void arrive(const StereoFrame& frame, const RectifiedPair& shot);
   Status look(const StereoFrame& frame);
-  std::optional<MappedPosition> leave_position();
+  Result<std::optional<MappedPosition>> leave_position();
   bool terrain_is_due() const;
   Result<TerrainView> reconstruct(const RectifiedPair& shot);
 };
 
 void Pipeline::State::start(const RectifiedPair& shot) {
   localizer.start(shot.stamp, shot.body_from_left.rotation() * Eigen::Vector3d::UnitZ());
-  world_from_left = {localizer.estimate().world_from_body.pose * shot.body_from_left, Matrix6d::Zero()};
+  slam = {localizer.estimate().world_from_body.pose, Matrix6d::Zero()};
+  world_from_left = {slam.pose * shot.body_from_left, Matrix6d::Zero()};
   started = true;
 }
 
@@ -84,7 +88,8 @@ void Pipeline::State::advance(const MotionEstimate& motion) {
   if (seconds > 0) velocity = log_se3(motion.previous_from_current) / seconds;
 }
 
-// M moves the left eye: B M B⁻¹ moves the body, and B M Exp(ξ) B⁻¹ = B M B⁻¹ Exp(Ad_B ξ).
+// M moves the left eye: B M B⁻¹ moves the body, and B M Exp(ξ) B⁻¹ = B M B⁻¹ Exp(Ad_B ξ). What the map and the sensors
+// correct begins anew from there.
 void Pipeline::State::localize(const RectifiedPair& shot, const MotionEstimate& motion) {
   if (motion.first) return;
   const Pose& body_from_left = shot.body_from_left;
@@ -97,6 +102,7 @@ void Pipeline::State::localize(const RectifiedPair& shot, const MotionEstimate& 
   if (motion.status != TrackingStatus::standing)
     moved.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
   moved.covariance = turn * motion.covariance * turn.transpose();
+  slam = compose(slam, {moved.previous_from_current, moved.covariance});
   localizer.add(moved);
 }
 
@@ -114,17 +120,17 @@ Status Pipeline::State::look(const StereoFrame& frame) {
                        [&] { return position.look(frame.position_id, *shot, rig.find_pair(frame.pair)->nearest_m); });
 }
 
-std::optional<MappedPosition> Pipeline::State::leave_position() {
+Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
   if (position.mapper().views().empty()) {
     position.leave();
     return std::nullopt;
   }
-  return clock.measure("mapping", [&]() -> std::optional<MappedPosition> {
-    const auto survey = position.leave();
-    if (!survey) return std::nullopt;
-    LocalMap map = position.mapper().map(survey->points, survey->standing.pose);
-    return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(map)};
-  });
+  const auto survey = clock.measure("mapping", [&] { return position.leave(); });
+  auto merged = clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->standing); });
+  if (!merged) return failure(merged);
+  if (merged->constraint) localizer.add(*merged->constraint);
+  if (merged->decided()) slam = merged->corrected;
+  return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(*merged)};
 }
 
 bool Pipeline::State::terrain_is_due() const {
@@ -187,7 +193,11 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
 
   FrameResult result;
   // Before the stages move on: the map belongs to where the rover still stands.
-  if (s.maps_positions && frame.position_id != s.position.position_id()) result.position = s.leave_position();
+  if (s.maps_positions && frame.position_id != s.position.position_id()) {
+    auto position = s.leave_position();
+    if (!position) return failure(position);
+    result.position = std::move(*position);
+  }
   if (!s.started) s.start(*shot);
   s.left_from_body = shot->body_from_left.inverse();
 
@@ -201,6 +211,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
 
   s.clock.measure("localization", [&] { s.localize(*shot, result.motion); });
   result.localization = s.localizer.estimate();
+  result.slam = s.slam;
   s.arrive(frame, *shot);
 
   if (s.terrain_is_due()) {
@@ -221,6 +232,16 @@ std::optional<Pose> Pipeline::predict(Stamp stamp) const {
 
 Result<std::optional<MappedPosition>> Pipeline::leave_position() {
   return state_->leave_position();
+}
+
+void Pipeline::page_maps_to(TileStore& store) {
+  state_->merger.page_to(&store);
+}
+Status Pipeline::flush_maps() {
+  return state_->merger.flush();
+}
+GlobalMap& Pipeline::global_map() {
+  return state_->merger.map();
 }
 
 std::optional<ShotName> Pipeline::wanted_shot() const {
@@ -253,16 +274,19 @@ Bytes Pipeline::save() const {
   out.put(s.last_stamp.ns);
   out.put(s.world_from_left.pose);
   out.put(s.world_from_left.covariance);
+  out.put(s.slam.pose);
+  out.put(s.slam.covariance);
   out.put(s.left_from_body);
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
   s.position.save(out);
-  for (const Bytes& stage : {s.odometer.save(), s.localizer.save()}) out.put_array(stage.data(), stage.size());
+  for (const Bytes& stage : {s.odometer.save(), s.localizer.save(), s.merger.save()})
+    out.put_array(stage.data(), stage.size());
   return out.take();
 }
 
-Status Pipeline::restore(const Bytes& state) {
+Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   ArchiveReader in(state);
   if (in.get<std::uint32_t>() != kStateVersion) {
     return failure(ErrorCode::configuration, "the saved state is of another version of the program", "run.sqlite",
@@ -273,16 +297,20 @@ Status Pipeline::restore(const Bytes& state) {
   s.last_stamp.ns = in.get<std::int64_t>();
   s.world_from_left.pose = in.get_pose();
   s.world_from_left.covariance = in.get_matrix6();
+  s.slam.pose = in.get_pose();
+  s.slam.covariance = in.get_matrix6();
   s.left_from_body = in.get_pose();
   const std::vector<double> velocity = in.get_array<double>();
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get<double>();
   s.distance_of_last_terrain_m = in.get<double>();
   s.position.restore(in);
-  const Bytes odometry = in.get_array<std::uint8_t>(), localization = in.get_array<std::uint8_t>();
+  const Bytes odometry = in.get_array<std::uint8_t>(), localization = in.get_array<std::uint8_t>(),
+              slam = in.get_array<std::uint8_t>();
   if (Status status = in.finish("run.sqlite: memory of the pipeline"); !status) return status;
   if (Status status = s.odometer.restore(odometry); !status) return status;
-  return s.localizer.restore(localization);
+  if (Status status = s.localizer.restore(localization); !status) return status;
+  return s.merger.restore(slam, maps);
 }
 
 }  // namespace spartan

@@ -16,8 +16,8 @@
 #include "spartan/imaging/rectified_pair.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/odometry/odometer.h"
-#include "spartan/reconstruction/local_map.h"
 #include "spartan/rig/rig.h"
+#include "spartan/slam/map_merger.h"
 #include "spartan/system/run_options.h"
 #include "spartan/system/stage_clock.h"
 
@@ -35,8 +35,8 @@ struct MappedPosition {
   std::int64_t position_id = -1;
   Stamp stamp;  ///< of the shot of the odometry's pair there
   int views = 0;
-  UncertainPose world_from_body;  ///< where the map was put
-  LocalMap map;
+  UncertainPose believed;  ///< world_from_body before the map was looked for in the global one
+  MapMergeResult merged;   ///< where it lies there, and the local map at that place
 };
 
 /// What one stereo shot told.
@@ -46,6 +46,7 @@ struct FrameResult {
   Stamp stamp;
   UncertainPose world_from_body;  ///< by odometry alone; covariance grows from zero at the first frame
   MotionEstimate motion;
+  UncertainPose slam;                      ///< world_from_body: odometry with the latest correction by the map
   LocalizationEstimate localization;       ///< by all sensors
   std::optional<TerrainView> terrain;      ///< where one was due
   std::optional<MappedPosition> position;  ///< the one that was left for this shot
@@ -76,6 +77,12 @@ class Pipeline {
   /// next.
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
 
+  /// The global map's tiles may live in the store from now on; what has changed is written by flush_maps(), inside the
+  /// transaction that the store's database is in. Borrowed; it holds this pipeline's map or none.
+  void page_maps_to(TileStore& store);
+  Status flush_maps();
+  GlobalMap& global_map();
+
   /// The position at hand, where it is a map already: at the end of a drive.
   Result<std::optional<MappedPosition>> leave_position();
 
@@ -93,9 +100,10 @@ class Pipeline {
   /// The pair that drives the odometry.
   const std::string& odometry_pair() const;
 
-  /// All stages' memory as a versioned value.
+  /// All stages' memory as a versioned value, but for the maps that were flushed.
   Bytes save() const;
-  Status restore(const Bytes& state);
+  /// `maps`: the store as it was flushed with that memory.
+  Status restore(const Bytes& state, TileStore& maps);
 
  private:
   struct State;

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <vector>
 
+#include "spartan/core/database.h"
 #include "spartan/testing/synthetic_world.h"
+#include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
 namespace {
@@ -72,6 +74,13 @@ Pipeline pipeline_of(const RunOptions& options = {}, int threads = 1) {
   return Pipeline::create(rover(), options, Workers(threads)).value();
 }
 
+// A store without any map.
+struct EmptyMaps {
+  testing::TemporaryFolder folder;
+  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
+  TileStore tiles = TileStore::open(db).value();
+};
+
 FrameResult push(Pipeline& pipeline, int shot) {
   return pipeline.add(frame_of(shot)).value().value();
 }
@@ -115,7 +124,8 @@ TEST(Pipeline, RestoredMemoryGoesOnInTheSameWay) {
   Pipeline straight = pipeline_of();
   for (int i = 0; i < 3; ++i) push(straight, i);
   Pipeline later = pipeline_of({}, 2);
-  ASSERT_TRUE(later.restore(straight.save()));
+  EmptyMaps maps;
+  ASSERT_TRUE(later.restore(straight.save(), maps.tiles));
   for (int i = 3; i < 5; ++i) {
     const FrameResult one = push(straight, i), other = push(later, i);
     EXPECT_EQ(one.world_from_body.pose.translation(), other.world_from_body.pose.translation());
@@ -128,12 +138,13 @@ TEST(Pipeline, RestoredMemoryGoesOnInTheSameWay) {
 TEST(Pipeline, RefusesMemoryOfAnotherKind) {
   Pipeline pipeline = pipeline_of();
   push(pipeline, 0);
+  EmptyMaps maps;
   Bytes state = pipeline.save();
   state.resize(state.size() / 2);
-  EXPECT_FALSE(pipeline.restore(state));
+  EXPECT_FALSE(pipeline.restore(state, maps.tiles));
   state = pipeline.save();
   state[0] = 99;
-  const Status refused = pipeline.restore(state);
+  const Status refused = pipeline.restore(state, maps.tiles);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
 }

@@ -86,6 +86,7 @@ class Drive {
   bool heading_east() const { return pipeline_.heading_east(); }
   std::optional<std::int64_t> resumed_from_frame() const { return resumed_from_frame_; }
   RunStore& store() { return store_; }
+  GlobalMap& global_map() { return pipeline_.global_map(); }
 
  private:
   Status take(const Sample& sample);
@@ -112,6 +113,7 @@ class Drive {
 };
 
 Status Drive::begin() {
+  pipeline_.page_maps_to(store_.tiles());
   auto memory = store_.memory();
   if (!memory) return failure(memory);
   if (!*memory) {
@@ -121,7 +123,7 @@ Status Drive::begin() {
   if (!frames) return failure(frames);
   shots_ = static_cast<int>(frames->size());
   for (const FrameRecord& frame : *frames) usable_ += frame.status != "missing";
-  if (Status status = pipeline_.restore((*memory)->stages); !status) return status;
+  if (Status status = pipeline_.restore((*memory)->stages, store_.tiles()); !status) return status;
   if (const auto wanted = pipeline_.wanted_shot()) {
     const auto shot = source_.frame_at(wanted->pair, wanted->left_stamp);
     if (!shot) return failure(shot);
@@ -155,11 +157,11 @@ Status Drive::finish() {
   if (!*position) return {};
   const auto map = keep(**position);
   if (!map) return failure(map);
-  return store_.commit({{}, {}, *map}, pipeline_.save(), samples_taken_);
+  return commit({{}, {}, *map});
 }
 
 Result<MapRecord> Drive::keep(const MappedPosition& position) {
-  const LocalMap& map = position.map;
+  const LocalMap& map = position.merged.local;
   const Status written =
       clock_.measure("maps", [&] { return write_local_map(map, folder_.local_map(position.stamp)); });
   if (!written) return failure(written);
@@ -167,7 +169,10 @@ Result<MapRecord> Drive::keep(const MappedPosition& position) {
   record.stamp = position.stamp;
   record.position_id = position.position_id;
   record.views = position.views;
-  record.world_from_body = position.world_from_body;
+  record.believed = position.believed;
+  record.world_from_body = position.merged.corrected;
+  record.verdict = name_of(position.merged.match.verdict);
+  record.overlap = position.merged.match.overlap;
   record.obstacles = static_cast<int>(map.obstacles.size());
   for (int y = 0; y < map.size().height; ++y) {
     for (int x = 0; x < map.size().width; ++x) record.known_cells += map.count(x, y) > 0 ? 1 : 0;
@@ -210,6 +215,7 @@ Status Drive::take_frame(const StereoFrame& frame) {
   record.has_pose = shot.motion.status != TrackingStatus::lost;
   record.world_from_body = shot.world_from_body;
   record.motion = shot.motion;
+  record.slam = shot.slam;
   record.localization = record_of(shot.localization);
   if (shot.motion.status == TrackingStatus::lost) {
     hooks_.log.warning(fmt::format("frame {}: lost: {}", shot.frame_id, shot.motion.reason));
@@ -249,9 +255,14 @@ Status Drive::take_missing(const MissingFrame& missing) {
 }
 
 Status Drive::commit(const RunStore::Step& step) {
-  if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = step.frame->frame_id;
+  if (resumed_ && !resumed_from_frame_ && step.frame) resumed_from_frame_ = step.frame->frame_id;
+  const auto save = [&]() -> Result<Bytes> {
+    if (Status flushed = pipeline_.flush_maps(); !flushed) return failure(flushed);
+    return pipeline_.save();
+  };
+  Status status = store_.commit(step, save, samples_taken_);
+  if (!step.frame) return status;
   ++shots_;
-  Status status = store_.commit(step, pipeline_.save(), samples_taken_);
   if (status && hooks_.progress) hooks_.progress({shots_, source_.info().sequence.announced, step.frame->status});
   return status;
 }
@@ -271,8 +282,11 @@ Result<RunOutcome> write_results(Drive& drive, const RunFolder& folder, RunFacts
   if (!frames) return failure(frames);
   if (Status s = write_file_atomically(folder.odometry_trajectory(), to_tum(measured_trajectory(*frames))); !s)
     return failure(s);
+  if (Status s = write_file_atomically(folder.slam_trajectory(), to_tum(slam_trajectory(*frames))); !s)
+    return failure(s);
   if (Status s = write_file_atomically(folder.localization_trajectory(), to_tum(localized_trajectory(*frames))); !s)
     return failure(s);
+  if (Status s = write_global_map(drive.global_map(), folder.global_map()); !s) return failure(s);
   facts.peak_memory_bytes = peak_memory_bytes();
   RunOutcome outcome;
   outcome.summary_json = to_summary_json(facts, *frames);

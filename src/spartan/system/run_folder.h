@@ -18,7 +18,10 @@ struct RunFolder {
   std::string maps() const { return path + "/maps"; }
   /// Without ending.
   std::string local_map(Stamp stamp) const { return maps() + "/local_" + std::to_string(stamp.ns); }
+  /// Without ending.
+  std::string global_map() const { return maps() + "/global"; }
   std::string odometry_trajectory() const { return path + "/trajectory_odometry.tum"; }
+  std::string slam_trajectory() const { return path + "/trajectory_slam.tum"; }
   std::string localization_trajectory() const { return path + "/trajectory_localization.tum"; }
   std::string summary() const { return path + "/summary.json"; }
   std::string log() const { return path + "/log.txt"; }

@@ -9,6 +9,7 @@
 #include "spartan/odometry/odometry_options.h"
 #include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/position_mapper.h"
+#include "spartan/slam/slam_options.h"
 
 namespace spartan {
 
@@ -37,6 +38,7 @@ struct RunOptions {
   DisparityOptions reconstruction;
   MappingOptions mapping;
   bool maps = true;
+  SlamOptions slam;
   LocalizationOptions localization;
   TerrainOptions terrain;
 
@@ -51,6 +53,7 @@ struct RunOptions {
     v.group("reconstruction", reconstruction);
     v.field("maps", maps, "a map wherever the rover stands and further pairs look around; false: none");
     v.group("mapping", mapping);
+    v.group("slam", slam);
     v.group("localization", localization);
     v.group("terrain", terrain);
   }

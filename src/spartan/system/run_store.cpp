@@ -26,11 +26,13 @@ CREATE TABLE terrain (stamp_ns INTEGER PRIMARY KEY, pair TEXT NOT NULL, density_
 CREATE TABLE localization (
   seq INTEGER PRIMARY KEY, pose BLOB NOT NULL, covariance BLOB NOT NULL, odom_pose BLOB NOT NULL,
   odom_covariance BLOB NOT NULL, slip REAL, slip_sigma REAL);
+CREATE TABLE slam (seq INTEGER PRIMARY KEY, pose BLOB NOT NULL, covariance BLOB NOT NULL);
 CREATE TABLE health (seq INTEGER NOT NULL, sensor TEXT NOT NULL, state TEXT NOT NULL, reason TEXT NOT NULL);
 CREATE INDEX health_of_frame ON health (seq);
 CREATE TABLE maps (
   stamp_ns INTEGER PRIMARY KEY, position_id INTEGER NOT NULL, views INTEGER NOT NULL, pose BLOB NOT NULL,
-  covariance BLOB NOT NULL, known_cells INTEGER NOT NULL, obstacles INTEGER NOT NULL);
+  covariance BLOB NOT NULL, known_cells INTEGER NOT NULL, obstacles INTEGER NOT NULL, believed_pose BLOB NOT NULL,
+  believed_covariance BLOB NOT NULL, verdict TEXT NOT NULL, overlap REAL NOT NULL);
 CREATE TABLE memory (id INTEGER PRIMARY KEY CHECK (id = 1), samples_taken INTEGER NOT NULL, stages BLOB NOT NULL);
 )";
 
@@ -88,12 +90,13 @@ Status expect_identity(Database& db, const std::string& key, const std::string& 
 
 struct RunStore::State {
   explicit State(Database db_in) : db(std::move(db_in)) {}
+  std::optional<TileStore> tiles;
   Database db;
-  std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_health, insert_terrain, insert_map,
-      replace_memory;
+  std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health,
+      insert_terrain, insert_map, replace_memory;
 
   Status prepare();
-  Status write(const Step& step, const Bytes& memory, std::int64_t samples_taken);
+  Status write(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken);
   Status write(const FrameRecord& frame);
   Status write(const LocalizationRecord& localization);
   Status write(const TerrainRecord& terrain);
@@ -101,6 +104,9 @@ struct RunStore::State {
 };
 
 Status RunStore::State::prepare() {
+  auto opened = TileStore::open_existing(db);
+  if (!opened) return failure(opened);
+  tiles.emplace(std::move(*opened));
   const auto make = [&](std::optional<SqlStatement>& statement, const char* sql) -> Status {
     auto prepared = db.prepare(sql);
     if (!prepared) return failure(prepared);
@@ -116,13 +122,15 @@ Status RunStore::State::prepare() {
           make(insert_localization, "INSERT INTO localization VALUES ((SELECT max(seq) FROM frames),?,?,?,?,?,?)");
       !s)
     return s;
+  if (Status s = make(insert_slam, "INSERT INTO slam VALUES ((SELECT max(seq) FROM frames),?,?)"); !s) return s;
   if (Status s = make(insert_health, "INSERT INTO health VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s) return s;
-  if (Status s = make(insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?)"); !s) return s;
+  if (Status s = make(insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?,?,?,?,?)"); !s) return s;
   if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
   return make(replace_memory, "INSERT OR REPLACE INTO memory VALUES (1,?,?)");
 }
 
-Status RunStore::State::write(const Step& step, const Bytes& memory, std::int64_t samples_taken) {
+Status RunStore::State::write(const Step& step, const std::function<Result<Bytes>()>& save,
+                              std::int64_t samples_taken) {
   if (step.frame) {
     if (Status s = write(*step.frame); !s) return s;
   }
@@ -132,7 +140,9 @@ Status RunStore::State::write(const Step& step, const Bytes& memory, std::int64_
   if (step.map) {
     if (Status s = write(*step.map); !s) return s;
   }
-  return replace_memory->bind(1, samples_taken).bind(2, memory).run();
+  const auto memory = save();
+  if (!memory) return failure(memory);
+  return replace_memory->bind(1, samples_taken).bind(2, *memory).run();
 }
 
 Status RunStore::State::write(const LocalizationRecord& l) {
@@ -155,7 +165,9 @@ Status RunStore::State::write(const MapRecord& map) {
   SqlStatement& i = *insert_map;
   i.bind(1, map.stamp.ns).bind(2, map.position_id).bind(3, std::int64_t{map.views});
   i.bind(4, bytes_of(map.world_from_body.pose)).bind(5, bytes_of(map.world_from_body.covariance));
-  return i.bind(6, std::int64_t{map.known_cells}).bind(7, std::int64_t{map.obstacles}).run();
+  i.bind(6, std::int64_t{map.known_cells}).bind(7, std::int64_t{map.obstacles});
+  i.bind(8, bytes_of(map.believed.pose)).bind(9, bytes_of(map.believed.covariance));
+  return i.bind(10, map.verdict).bind(11, map.overlap).run();
 }
 
 Status RunStore::State::write(const FrameRecord& frame) {
@@ -173,6 +185,10 @@ Status RunStore::State::write(const FrameRecord& frame) {
   if (Status s = f.run(); !s) return s;
   for (const StageTime& time : frame.times) {
     if (Status s = insert_time->bind(1, time.stage).bind(2, time.wall_ms).bind(3, time.cpu_ms).run(); !s) return s;
+  }
+  if (frame.slam) {
+    insert_slam->bind(1, bytes_of(frame.slam->pose)).bind(2, bytes_of(frame.slam->covariance));
+    if (Status s = insert_slam->run(); !s) return s;
   }
   return frame.localization ? write(*frame.localization) : Status();
 }
@@ -202,6 +218,7 @@ Result<RunStore> RunStore::create(const std::string& path, const RunIdentity& id
   if (Status s = write_identity(*db, "input", identity.input); !s) return failure(s);
   if (Status s = write_identity(*db, "options", identity.options); !s) return failure(s);
   if (Status s = write_identity(*db, "rig", identity.rig); !s) return failure(s);
+  if (const auto tiles = TileStore::open(*db); !tiles) return failure(tiles);
   if (Status s = db->execute("COMMIT"); !s) return failure(s);
   auto state = std::make_unique<State>(std::move(*db));
   if (Status s = state->prepare(); !s) return failure(s);
@@ -226,12 +243,16 @@ Result<RunStore> RunStore::open_read_only(const std::string& path) {
   auto db = Database::open(path, Database::Mode::read_only);
   if (!db) return failure(db);
   if (Status s = check_version(*db); !s) return failure(s);
-  return RunStore(std::make_unique<State>(std::move(*db)));
+  auto state = std::make_unique<State>(std::move(*db));
+  auto tiles = TileStore::open_existing(state->db);
+  if (!tiles) return failure(tiles);
+  state->tiles.emplace(std::move(*tiles));
+  return RunStore(std::move(state));
 }
 
-Status RunStore::commit(const Step& step, const Bytes& memory, std::int64_t samples_taken) {
+Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken) {
   if (Status s = state_->db.execute("BEGIN IMMEDIATE"); !s) return s;
-  Status written = state_->write(step, memory, samples_taken);
+  Status written = state_->write(step, save, samples_taken);
   if (written) written = state_->db.execute("COMMIT");
   if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // may fail too: SQLite has then rolled back itself
   return written;
@@ -269,6 +290,10 @@ Result<std::optional<LocalizationRecord>> read_localization(SqlStatement& select
 
 }  // namespace
 
+TileStore& RunStore::tiles() {
+  return *state_->tiles;
+}
+
 Result<std::vector<FrameRecord>> RunStore::frames() {
   auto select = state_->db.prepare("SELECT * FROM frames ORDER BY seq");
   if (!select) return failure(select);
@@ -276,6 +301,8 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
   if (!times) return failure(times);
   auto localization = state_->db.prepare("SELECT * FROM localization WHERE seq = ?");
   if (!localization) return failure(localization);
+  auto slam = state_->db.prepare("SELECT * FROM slam WHERE seq = ?");
+  if (!slam) return failure(slam);
   auto health = state_->db.prepare("SELECT sensor, state, reason FROM health WHERE seq = ? ORDER BY rowid");
   if (!health) return failure(health);
   std::vector<FrameRecord> records;
@@ -312,6 +339,14 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
       r.times.push_back({times->text(0), times->real(1), times->real(2)});
     }
     times->reset();
+    slam->bind(1, select->integer(0));
+    const auto corrected = slam->step();
+    if (!corrected) return failure(corrected);
+    if (*corrected) {
+      const Bytes pose = slam->blob(1), slam_covariance = slam->blob(2);
+      r.slam = UncertainPose{ArchiveReader(pose).get_pose(), ArchiveReader(slam_covariance).get_matrix6()};
+    }
+    slam->reset();
     auto localized = read_localization(*localization, *health, select->integer(0));
     if (!localized) return failure(localized);
     r.localization = std::move(*localized);
@@ -339,11 +374,15 @@ Result<std::vector<MapRecord>> RunStore::maps() {
     const auto row = select->step();
     if (!row) return failure(row);
     if (!*row) return records;
-    const Bytes pose = select->blob(3), covariance = select->blob(4);
+    const Bytes pose = select->blob(3), covariance = select->blob(4), believed = select->blob(7),
+                believed_covariance = select->blob(8);
     records.push_back({Stamp{select->integer(0)},
                        select->integer(1),
                        static_cast<int>(select->integer(2)),
+                       {ArchiveReader(believed).get_pose(), ArchiveReader(believed_covariance).get_matrix6()},
                        {ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()},
+                       select->text(9),
+                       select->real(10),
                        static_cast<int>(select->integer(5)),
                        static_cast<int>(select->integer(6))});
   }

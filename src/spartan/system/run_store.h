@@ -1,6 +1,7 @@
 // The run's database: what was found frame by frame, crash-safe (docs/formats.md, "run.sqlite").
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
 #include "spartan/odometry/odometer.h"
+#include "spartan/slam/tile_store.h"
 #include "spartan/system/stage_clock.h"
 
 namespace spartan {
@@ -37,6 +39,7 @@ struct FrameRecord {
   bool has_pose = false;  ///< false: `world_from_body` is predicted
   UncertainPose world_from_body;
   MotionEstimate motion;
+  std::optional<UncertainPose> slam;               ///< odometry with the latest correction by the map; as the next
   std::optional<LocalizationRecord> localization;  ///< none where the shot is missing
   std::vector<StageTime> times;
 };
@@ -46,7 +49,10 @@ struct MapRecord {
   Stamp stamp;
   std::int64_t position_id = -1;
   int views = 0;
-  UncertainPose world_from_body;
+  UncertainPose believed;         ///< world_from_body before the map was looked for in the global one
+  UncertainPose world_from_body;  ///< where it was put
+  std::string verdict;            ///< of the match: name_of(MatchVerdict)
+  double overlap = 0;             ///< share of its cells that the global map knew
   int known_cells = 0, obstacles = 0;
 };
 
@@ -86,9 +92,13 @@ class RunStore {
     std::optional<TerrainRecord> terrain;
     std::optional<MapRecord> map;
   };
-  /// One transaction: the step, the stages' memory behind it (only the newest is kept) and how many samples of the
-  /// source were taken. All of it is in the file afterwards, or nothing.
-  Status commit(const Step& step, const Bytes& memory, std::int64_t samples_taken);
+  /// One transaction: the step, what `save` does inside it (the map's tiles) and gives back, the stages' memory behind
+  /// the step (only the newest is kept), and how many samples of the source were taken. All of it is in the file
+  /// afterwards, or nothing.
+  Status commit(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken);
+
+  /// The global map's tables.
+  TileStore& tiles();
 
   Result<std::vector<FrameRecord>> frames();
   Result<std::vector<TerrainRecord>> terrain();

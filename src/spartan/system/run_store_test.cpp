@@ -33,6 +33,7 @@ FrameRecord some_frame(int i) {
   frame.motion.rms_px = random.uniform();
   frame.times = {{"imaging", 1.5, 2.5}, {"odometry", 3.0, 3.0}};
   if (i == 3) return frame;  // one that was not localized
+  frame.slam = UncertainPose{exp_se3(0.3 * tangent), 4e-4 * Matrix6d::Identity()};
   LocalizationRecord& localization = frame.localization.emplace();
   localization.world_from_body = {exp_se3(0.5 * tangent), 2e-4 * Matrix6d::Identity()};
   localization.odom_from_body = {exp_se3(0.4 * tangent), 3e-4 * Matrix6d::Identity()};
@@ -48,6 +49,9 @@ MapRecord some_map(int i) {
   map.position_id = 40 + i;
   map.views = 4;
   map.world_from_body = some_frame(i).world_from_body;
+  map.believed = {exp_se3(Vector6d::Constant(0.01)), 5e-4 * Matrix6d::Identity()};
+  map.verdict = "decided";
+  map.overlap = 0.4;
   map.known_cells = 7000;
   map.obstacles = 12;
   return map;
@@ -63,9 +67,20 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
       const std::optional<TerrainRecord> terrain =
           i == 2 ? std::optional(TerrainRecord{some_frame(i).stamp, "narrow", 91.5, 1234}) : std::nullopt;
       const std::optional<MapRecord> map = i == 1 ? std::optional(some_map(i)) : std::nullopt;
-      ASSERT_TRUE(store->commit({some_frame(i), terrain, map}, Bytes{1, 2, static_cast<std::uint8_t>(i)}, 10 * i));
+      ASSERT_TRUE(store->commit(
+          {some_frame(i), terrain, map},
+          [&] {
+            return Bytes{1, 2, static_cast<std::uint8_t>(i)};
+          },
+          10 * i));
     }
-    ASSERT_TRUE(store->commit({{}, {}, some_map(4)}, Bytes{1, 2, 4}, 40)) << "the last position's";
+    ASSERT_TRUE(store->commit(
+        {{}, {}, some_map(4)},
+        [] {
+          return Bytes{1, 2, 4};
+        },
+        40))
+        << "the last position's";
   }
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
@@ -87,6 +102,9 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
     EXPECT_EQ(read.times[0].cpu_ms, 2.5);
     ASSERT_EQ(read.localization.has_value(), expected.localization.has_value());
     if (!read.localization) continue;
+    ASSERT_TRUE(read.slam);
+    EXPECT_EQ(read.slam->pose.matrix(), expected.slam->pose.matrix());
+    EXPECT_EQ(read.slam->covariance, expected.slam->covariance);
     const LocalizationRecord &localized = *read.localization, &wanted = *expected.localization;
     EXPECT_EQ(localized.world_from_body.pose.matrix(), wanted.world_from_body.pose.matrix());
     EXPECT_EQ(localized.world_from_body.covariance, wanted.world_from_body.covariance);
@@ -107,6 +125,10 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
   EXPECT_EQ(maps->front().known_cells, 7000);
   EXPECT_EQ(maps->front().obstacles, 12);
   EXPECT_EQ(maps->back().world_from_body.pose.matrix(), some_map(4).world_from_body.pose.matrix());
+  EXPECT_EQ(maps->back().believed.pose.matrix(), some_map(4).believed.pose.matrix());
+  EXPECT_EQ(maps->back().believed.covariance, some_map(4).believed.covariance);
+  EXPECT_EQ(maps->back().verdict, "decided");
+  EXPECT_EQ(maps->back().overlap, 0.4);
   EXPECT_EQ(maps->back().world_from_body.covariance, some_map(4).world_from_body.covariance);
   const auto memory = store->memory();
   ASSERT_TRUE(memory && *memory);
@@ -164,7 +186,9 @@ TEST(RunStore, LosesNothingCommittedWhenKilled) {
   if (child == 0) {
     auto store = RunStore::create(path, kIdentity);
     for (int i = 0; store && i < 7; ++i) {
-      if (!store->commit({some_frame(i), {}, {}}, Bytes(100'000, 1), i)) ::_exit(1);
+      if (!store->commit(
+              {some_frame(i), {}, {}}, [] { return Bytes(100'000, 1); }, i))
+        ::_exit(1);
     }
     ::kill(::getpid(), SIGKILL);
   }

@@ -76,6 +76,14 @@ Trajectory measured_trajectory(const std::vector<FrameRecord>& frames) {
   return trajectory;
 }
 
+Trajectory slam_trajectory(const std::vector<FrameRecord>& frames) {
+  Trajectory trajectory;
+  for (const FrameRecord& frame : frames) {
+    if (frame.has_pose && frame.slam) trajectory.push_back({frame.stamp, frame.slam->pose});
+  }
+  return trajectory;
+}
+
 Trajectory localized_trajectory(const std::vector<FrameRecord>& frames) {
   Trajectory trajectory;
   for (const FrameRecord& frame : frames) {

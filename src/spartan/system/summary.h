@@ -36,6 +36,9 @@ std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames);
 /// Poses that were measured, in the order of time.
 Trajectory measured_trajectory(const std::vector<FrameRecord>& frames);
 
+/// Odometry with the latest correction by the map, in the order of time.
+Trajectory slam_trajectory(const std::vector<FrameRecord>& frames);
+
 /// Where all sensors put the rover, in the order of time.
 Trajectory localized_trajectory(const std::vector<FrameRecord>& frames);
 

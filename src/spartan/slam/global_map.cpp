@@ -1,0 +1,438 @@
+#include "spartan/slam/global_map.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "spartan/slam/map_refinement.h"
+
+namespace spartan {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr int kSide = Tile::kSide;
+
+int tile_of(int cell) {
+  return cell >= 0 ? cell / kSide : -((kSide - 1 - cell) / kSide);
+}
+
+// Cells of the lattice from the world's to the submap's origin; none where the anchor is turned or off the lattice.
+struct Step {
+  int x = 0, y = 0;
+};
+std::optional<Step> step_of(const Pose& world_from_submap, double cell_m) {
+  const Eigen::Vector3d& t = world_from_submap.translation();
+  if (world_from_submap.rotation().vec().cwiseAbs().maxCoeff() > 1e-12) return std::nullopt;
+  const double x = std::round(t.x() / cell_m), y = std::round(t.y() / cell_m);
+  if (std::abs(x * cell_m - t.x()) > 1e-6 || std::abs(y * cell_m - t.y()) > 1e-6) return std::nullopt;
+  return Step{static_cast<int>(x), static_cast<int>(y)};
+}
+
+void raise(CellSurface& surface, float by) {
+  surface.elevation_m += by;
+  surface.lowest_m += by;
+  surface.highest_m += by;
+}
+
+CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6d& world_covariance,
+                       const SurfaceGrid& grid, const Eigen::Vector3d& body) {
+  CellSurface s;
+  s.elevation_m = local.elevation_m(column, row);
+  s.lowest_m = local.elevation_min_m(column, row);
+  s.highest_m = local.elevation_max_m(column, row);
+  s.count = local.count(column, row);
+  s.occupancy_logodds = local.occupancy_logodds(column, row);
+  const int kind = static_cast<int>(local.kind(column, row));
+  s.shape = static_cast<std::int16_t>(kind == 2 ? 1 : kind == 3 ? -1 : 0);
+  s.votes = 1;
+  Eigen::Vector2f slope = grid.slope(column, row);
+  if (!slope.allFinite()) slope.setZero();
+  const Eigen::Vector2d at = middle_of(local.place, column, row);
+  const Vector6d j = elevation_jacobian(slope.cast<double>(), {at.x() - body.x(), at.y() - body.y(), s.elevation_m - body.z()});
+  s.variance_m2 = static_cast<float>(local.variance_m2(column, row) + j.dot(world_covariance * j));
+  return s;
+}
+
+}  // namespace
+
+std::vector<MapBand> MapView::bands() const {
+  return {{"elevation_m", elevation_m.view()},         {"elevation_min_m", elevation_min_m.view()},
+          {"elevation_max_m", elevation_max_m.view()}, {"variance_m2", variance_m2.view()},
+          {"count", count.view()},                     {"class", kind.view()},
+          {"occupancy_logodds", occupancy_logodds.view()}};
+}
+
+SurfaceGrid MapView::grid() const {
+  SurfaceGrid grid;
+  grid.window = window;
+  grid.cell_m = cell_m;
+  grid.elevation_m = elevation_m.clone();
+  grid.variance_m2 = variance_m2.clone();
+  grid.relief_m = elevation_max_m.clone();
+  grid.evidence = Image<float>(window.width, window.height, 0.0F);
+  for (int r = 0; r < window.height; ++r) {
+    for (int c = 0; c < window.width; ++c) {
+      grid.relief_m(c, r) -= elevation_min_m(c, r);
+      if (count(c, r) > 0) grid.evidence(c, r) = std::tanh(0.5F * occupancy_logodds(c, r));
+    }
+  }
+  return grid;
+}
+
+GlobalMap::GlobalMap(const GlobalMapOptions& options, double cell_m) : options_(options), cell_m_(cell_m) {}
+
+Result<GlobalMap> GlobalMap::from_store(const GlobalMapOptions& options, double cell_m, TileStore& store) {
+  GlobalMap map(options, cell_m);
+  map.store_ = &store;
+  const auto cell = store.property("cell_m");
+  if (!cell) return failure(cell);
+  if (*cell && **cell != cell_m) {
+    return failure(ErrorCode::configuration, fmt::format("the map has cells of {} m, not {} m", **cell, cell_m), "",
+                   "set the map's cell_m");
+  }
+  auto submaps = store.submaps();
+  if (!submaps) return failure(submaps);
+  auto stops = store.stops();
+  if (!stops) return failure(stops);
+  const auto index = store.index();
+  if (!index) return failure(index);
+  map.submaps_ = std::move(*submaps);
+  map.stops_ = std::move(*stops);
+  map.submaps_stored_ = map.submaps_.size();
+  map.stops_stored_ = map.stops_.size();
+  for (const TileStore::Entry& entry : *index) map.tiles_[entry.key].revision = entry.revision;
+  return map;
+}
+
+CellFusion GlobalMap::fusion() const {
+  return {options_.gate_sigmas, options_.relief_sigma, options_.least_sigma_m * options_.least_sigma_m};
+}
+
+std::size_t GlobalMap::tiles_in_memory() const {
+  return static_cast<std::size_t>(
+      std::count_if(tiles_.begin(), tiles_.end(), [](const auto& slot) { return slot.second.tile.has_value(); }));
+}
+
+Result<Tile*> GlobalMap::load(const TileKey& key) {
+  const auto found = tiles_.find(key);
+  if (found == tiles_.end()) return nullptr;
+  Slot& slot = found->second;
+  slot.used = ++clock_;
+  if (!slot.tile) {
+    if (store_ == nullptr) throw std::logic_error("GlobalMap: a tile is in the store, but there is none");
+    auto tile = store_->read({key, slot.revision});
+    if (!tile) return failure(tile);
+    slot.tile = std::move(*tile);
+  }
+  return &*slot.tile;
+}
+
+Result<Tile*> GlobalMap::load_or_make(const TileKey& key) {
+  const auto [slot, is_new] = tiles_.try_emplace(key);
+  if (is_new) slot->second.tile.emplace();
+  auto tile = load(key);
+  if (tile) slot->second.changed = true;
+  return tile;
+}
+
+void GlobalMap::drop_surplus() {
+  const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(options_.memory_mb) * 1000000 / sizeof(Tile));
+  std::vector<Slot*> clean;
+  std::size_t there = 0;
+  for (auto& [key, slot] : tiles_) {
+    if (!slot.tile) continue;
+    ++there;
+    if (!slot.changed && slot.revision > 0) clean.push_back(&slot);
+  }
+  std::sort(clean.begin(), clean.end(), [](const Slot* a, const Slot* b) { return a->used < b->used; });
+  for (Slot* slot : clean) {
+    if (there <= most) return;
+    slot->tile.reset();
+    --there;
+  }
+}
+
+const Submap& GlobalMap::submap_for(const Eigen::Vector3d& place) {
+  const bool far = submaps_.empty() || (submaps_.back().world_from_submap.translation() - place).head<2>().norm() >
+                                           options_.submap_m;
+  if (far) {
+    const Eigen::Vector3d anchor(std::round(place.x() / cell_m_) * cell_m_, std::round(place.y() / cell_m_) * cell_m_,
+                                 place.z());
+    const std::int32_t id = submaps_.empty() ? 0 : submaps_.back().id + 1;
+    submaps_.push_back({id, Pose::from_translation(anchor)});
+  }
+  return submaps_.back();
+}
+
+Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const UncertainPose& world_from_body,
+                      const Matrix6d& relative) {
+  const Eigen::Vector3d body = world_from_body.pose.translation();
+  const std::int32_t stop = stops_.empty() ? 0 : stops_.back().id + 1;
+  stops_.push_back({stop, stamp, world_from_body});
+  const Submap submap = submap_for(body);
+  const auto step = step_of(submap.world_from_submap, cell_m_);
+  if (!step) throw std::logic_error("GlobalMap::add: the newest submap was moved off the lattice");
+  const auto down = static_cast<float>(-submap.world_from_submap.translation().z());
+  // Right perturbation → the world's axes, about the body.
+  const Matrix6d turn = [&] {
+    Matrix6d m = Matrix6d::Zero();
+    m.topLeftCorner<3, 3>() = m.bottomRightCorner<3, 3>() = world_from_body.pose.rotation_matrix();
+    return m;
+  }();
+  const Matrix6d world_covariance = turn * relative * turn.transpose();
+  const SurfaceGrid grid = grid_of(local);
+  const LatticeWindow& window = grid.window;
+  const CellFusion how = fusion();
+  for (int ty = tile_of(window.north - window.height - step->y); ty <= tile_of(window.north - 1 - step->y); ++ty) {
+    for (int tx = tile_of(window.west - step->x); tx <= tile_of(window.west + window.width - 1 - step->x); ++tx) {
+      Tile* tile = nullptr;
+      for (int y = 0; y < kSide; ++y) {
+        const int row = window.north - 1 - (ty * kSide + y + step->y);
+        if (row < 0 || row >= window.height) continue;
+        for (int x = 0; x < kSide; ++x) {
+          const int column = tx * kSide + x + step->x - window.west;
+          if (column < 0 || column >= window.width || !(local.count(column, row) > 0)) continue;
+          if (tile == nullptr) {
+            auto loaded = load_or_make({submap.id, tx, ty});
+            if (!loaded) return failure(loaded);
+            tile = *loaded;
+          }
+          CellSurface seen = surface_of(local, column, row, world_covariance, grid, body);
+          raise(seen, down);
+          seen.stop = stop;
+          MapCell& cell = tile->at(x, y);
+          cell = observed(cell, seen, how);
+        }
+      }
+    }
+  }
+  return {};
+}
+
+Status GlobalMap::merge(GlobalMap& other) {
+  const std::int32_t first_submap = submaps_.empty() ? 0 : submaps_.back().id + 1,
+                     first_stop = stops_.empty() ? 0 : stops_.back().id + 1;
+  if (other.cell_m_ != cell_m_) return failure(ErrorCode::usage, "the maps have cells of different sizes");
+  for (Submap submap : other.submaps_) {
+    submap.id += first_submap;
+    submaps_.push_back(submap);
+  }
+  for (MapStop stop : other.stops_) {
+    stop.id += first_stop;
+    stops_.push_back(stop);
+  }
+  for (auto& [key, slot] : other.tiles_) {
+    const auto theirs = other.load(key);
+    if (!theirs) return failure(theirs);
+    auto ours = load_or_make({key.submap + first_submap, key.x, key.y});
+    if (!ours) return failure(ours);
+    **ours = **theirs;
+    for (MapCell& cell : (*ours)->cells) {
+      if (cell.surface.seen()) cell.surface.stop += first_stop;
+      if (cell.rival.seen()) cell.rival.stop += first_stop;
+    }
+  }
+  return {};
+}
+
+Status GlobalMap::draw_in_step(const Submap& submap, MapView& view, std::vector<MapCell>& cells) {
+  const Step step = *step_of(submap.world_from_submap, cell_m_);
+  const LatticeWindow& w = view.window;
+  const auto up = static_cast<float>(submap.world_from_submap.translation().z());
+  const CellFusion how = fusion();
+  for (int ty = tile_of(w.north - w.height - step.y); ty <= tile_of(w.north - 1 - step.y); ++ty) {
+    for (int tx = tile_of(w.west - step.x); tx <= tile_of(w.west + w.width - 1 - step.x); ++tx) {
+      const auto tile = load({submap.id, tx, ty});
+      if (!tile) return failure(tile);
+      if (*tile == nullptr) continue;
+      for (int y = 0; y < kSide; ++y) {
+        const int row = w.north - 1 - (ty * kSide + y + step.y);
+        if (row < 0 || row >= w.height) continue;
+        for (int x = 0; x < kSide; ++x) {
+          const int column = tx * kSide + x + step.x - w.west;
+          if (column < 0 || column >= w.width) continue;
+          CellSurface surface = (*tile)->at(x, y).surface;
+          if (!surface.seen()) continue;
+          raise(surface, up);
+          MapCell& cell = cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(w.width) +
+                                static_cast<std::size_t>(column)];
+          cell = observed(cell, surface, how);
+        }
+      }
+    }
+  }
+  return {};
+}
+
+Status GlobalMap::draw_moved(const Submap& submap, MapView& view, std::vector<MapCell>& cells) {
+  const LatticeWindow& w = view.window;
+  const MapPlace place = view.place();
+  const Pose submap_from_world = submap.world_from_submap.inverse();
+  const CellFusion how = fusion();
+  for (int row = 0; row < w.height; ++row) {
+    for (int column = 0; column < w.width; ++column) {
+      const Eigen::Vector2d at = middle_of(place, column, row);
+      // Where the vertical through the cell's middle meets the submap: its height is not known beforehand.
+      double z = submap.world_from_submap.translation().z();
+      CellSurface found;
+      bool whole = false;
+      for (int round = 0; round < 3; ++round) {
+        const Eigen::Vector3d p = submap_from_world * Eigen::Vector3d(at.x(), at.y(), z);
+        const double u = p.x() / cell_m_ - 0.5, v = p.y() / cell_m_ - 0.5;
+        const int x0 = static_cast<int>(std::floor(u)), y0 = static_cast<int>(std::floor(v));
+        const double a = u - x0, b = v - y0;
+        double elevation = 0, variance = 0, logodds = 0;
+        whole = true;
+        for (int k = 0; k < 4 && whole; ++k) {
+          const int x = x0 + k % 2, y = y0 + k / 2;
+          const auto tile = load({submap.id, tile_of(x), tile_of(y)});
+          if (!tile) return failure(tile);
+          const CellSurface* s =
+              *tile == nullptr ? nullptr : &(*tile)->at(x - kSide * tile_of(x), y - kSide * tile_of(y)).surface;
+          whole = s != nullptr && s->seen();
+          if (!whole) break;
+          const double share = (k % 2 == 1 ? a : 1 - a) * (k / 2 == 1 ? b : 1 - b);
+          if (k == 0 || share >= 0.25) found = *s;
+          elevation += share * s->elevation_m;
+          variance += share * s->variance_m2;
+          logodds += share * s->occupancy_logodds;
+        }
+        if (!whole) break;
+        const Eigen::Vector3d met = submap.world_from_submap * Eigen::Vector3d(p.x(), p.y(), elevation);
+        z = met.z();
+        raise(found, static_cast<float>(z) - found.elevation_m);
+        found.variance_m2 = static_cast<float>(variance);
+        found.occupancy_logodds = static_cast<float>(logodds);
+      }
+      if (!whole) continue;
+      MapCell& cell =
+          cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(w.width) + static_cast<std::size_t>(column)];
+      cell = observed(cell, found, how);
+    }
+  }
+  return {};
+}
+
+Result<MapView> GlobalMap::view(const LatticeWindow& window) {
+  MapView view;
+  view.window = window;
+  view.cell_m = cell_m_;
+  std::vector<MapCell> cells(static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height));
+  for (const Submap& submap : submaps_) {
+    const bool in_step = step_of(submap.world_from_submap, cell_m_).has_value();
+    if (Status s = in_step ? draw_in_step(submap, view, cells) : draw_moved(submap, view, cells); !s) return failure(s);
+  }
+  for (Image<float>* layer : {&view.elevation_m, &view.elevation_min_m, &view.elevation_max_m, &view.variance_m2})
+    *layer = Image<float>(window.width, window.height, kNaN);
+  for (Image<float>* layer : {&view.count, &view.kind, &view.occupancy_logodds})
+    *layer = Image<float>(window.width, window.height, 0.0F);
+  view.stop = Image<std::int32_t>(window.width, window.height, -1);
+  std::size_t i = 0;
+  for (int row = 0; row < window.height; ++row) {
+    for (int column = 0; column < window.width; ++column, ++i) {
+      const CellSurface& s = cells[i].surface;
+      if (!s.seen()) continue;
+      view.elevation_m(column, row) = s.elevation_m;
+      view.elevation_min_m(column, row) = s.lowest_m;
+      view.elevation_max_m(column, row) = s.highest_m;
+      view.variance_m2(column, row) = s.variance_m2;
+      view.count(column, row) = s.count;
+      view.kind(column, row) = static_cast<float>(cells[i].kind());
+      view.occupancy_logodds(column, row) = s.occupancy_logodds;
+      view.stop(column, row) = s.stop;
+    }
+  }
+  drop_surplus();
+  return view;
+}
+
+LatticeWindow GlobalMap::extent() const {
+  double west = 1e300, east = -1e300, south = 1e300, north = -1e300;
+  for (const auto& [key, slot] : tiles_) {
+    const auto submap = std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
+    for (int corner = 0; corner < 4; ++corner) {
+      const Eigen::Vector3d p =
+          submap->world_from_submap * Eigen::Vector3d((key.x + corner % 2) * kSide * cell_m_,
+                                                      (key.y + corner / 2) * kSide * cell_m_, 0);
+      west = std::min(west, p.x());
+      east = std::max(east, p.x());
+      south = std::min(south, p.y());
+      north = std::max(north, p.y());
+    }
+  }
+  if (west > east) return {};
+  // A corner on the lattice stays there in spite of rounding.
+  const auto low = [&](double v) { return static_cast<int>(std::floor(v / cell_m_ + 1e-6)); };
+  const auto high = [&](double v) { return static_cast<int>(std::ceil(v / cell_m_ - 1e-6)); };
+  return {low(west), high(north), high(east) - low(west), high(north) - low(south)};
+}
+
+Result<std::optional<MapSample>> GlobalMap::at(double x_m, double y_m) {
+  const double u = x_m / cell_m_ - 0.5, v = y_m / cell_m_ - 0.5;
+  const int x0 = static_cast<int>(std::floor(u)), y0 = static_cast<int>(std::floor(v));
+  const auto around = view({x0, y0 + 2, 2, 2});
+  if (!around) return failure(around);
+  const double a = u - x0, b = v - y0;
+  MapSample sample;
+  for (int k = 0; k < 4; ++k) {
+    const int c = k % 2, r = 1 - k / 2;
+    if (!(around->count(c, r) > 0)) return std::nullopt;
+    const double share = (c == 1 ? a : 1 - a) * (r == 0 ? b : 1 - b);
+    sample.elevation_m += share * around->elevation_m(c, r);
+    sample.variance_m2 += share * around->variance_m2(c, r);
+    sample.occupancy_logodds += share * around->occupancy_logodds(c, r);
+  }
+  sample.kind = static_cast<int>(around->kind(a < 0.5 ? 0 : 1, b < 0.5 ? 1 : 0));
+  return sample;
+}
+
+Status GlobalMap::flush() {
+  if (store_ == nullptr) return {};
+  if (submaps_stored_ == 0 && !submaps_.empty()) {
+    if (Status s = store_->write_property("cell_m", cell_m_); !s) return s;
+  }
+  for (; submaps_stored_ < submaps_.size(); ++submaps_stored_) {
+    if (Status s = store_->write(submaps_[submaps_stored_]); !s) return s;
+  }
+  for (; stops_stored_ < stops_.size(); ++stops_stored_) {
+    if (Status s = store_->write(stops_[stops_stored_]); !s) return s;
+  }
+  for (auto& [key, slot] : tiles_) {
+    if (!slot.changed) continue;
+    if (Status s = store_->write({key, slot.revision + 1}, *slot.tile); !s) return s;
+    ++slot.revision;
+    slot.changed = false;
+  }
+  drop_surplus();
+  return {};
+}
+
+Status GlobalMap::copy_to(TileStore& store) {
+  if (Status s = store.write_property("cell_m", cell_m_); !s) return s;
+  for (const Submap& submap : submaps_) {
+    if (Status s = store.write(submap); !s) return s;
+  }
+  for (const MapStop& stop : stops_) {
+    if (Status s = store.write(stop); !s) return s;
+  }
+  for (const auto& [key, slot] : tiles_) {
+    const auto tile = load(key);
+    if (!tile) return failure(tile);
+    if (Status s = store.write({key, 1}, **tile); !s) return s;
+    drop_surplus();
+  }
+  return {};
+}
+
+void GlobalMap::move_submap(std::int32_t id, const Pose& world_from_submap) {
+  for (std::size_t i = 0; i < submaps_.size(); ++i) {
+    if (submaps_[i].id != id) continue;
+    submaps_[i].world_from_submap = world_from_submap;
+    submaps_stored_ = std::min(submaps_stored_, i);
+  }
+}
+
+}  // namespace spartan

@@ -1,0 +1,37 @@
+// The world's lattice of cells: corners at whole multiples of the cells' side, so that maps meet cell on cell.
+#pragma once
+
+#include <cmath>
+
+#include "spartan/core/geotiff.h"
+#include "spartan/core/image.h"
+
+namespace spartan {
+
+/// A rectangle of cells. Column c holds x in [(west + c) s, (west + c + 1) s), row r holds y in
+/// [(north − r − 1) s, (north − r) s), s the cells' side: as in files, row 0 lies in the north.
+struct LatticeWindow {
+  int west = 0, north = 0;
+  int width = 0, height = 0;
+
+  ImageSize size() const { return {width, height}; }
+  MapPlace place(double cell_m) const { return {west * cell_m, north * cell_m, cell_m}; }
+  friend bool operator==(const LatticeWindow&, const LatticeWindow&) = default;
+};
+
+/// All cells within `reach_m` of a place, measured along x and y.
+inline LatticeWindow window_around(double x_m, double y_m, double reach_m, double cell_m) {
+  const int west = static_cast<int>(std::floor((x_m - reach_m) / cell_m)),
+            east = static_cast<int>(std::ceil((x_m + reach_m) / cell_m)),
+            south = static_cast<int>(std::floor((y_m - reach_m) / cell_m)),
+            north = static_cast<int>(std::ceil((y_m + reach_m) / cell_m));
+  return {west, north, east - west, north - south};
+}
+
+/// The cells of a map that lies on the lattice.
+inline LatticeWindow window_of(const MapPlace& place, ImageSize size) {
+  return {static_cast<int>(std::lround(place.west_m / place.cell_m)),
+          static_cast<int>(std::lround(place.north_m / place.cell_m)), size.width, size.height};
+}
+
+}  // namespace spartan

@@ -1,0 +1,151 @@
+#include "spartan/slam/match_evidence.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace spartan {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kLeastVariance = 1e-4;  // of what is believed at all
+
+// Square of the lattice that a cell lies in.
+std::pair<int, int> block_of(const MatchedCell& cell, double cell_m, double block_m) {
+  const int side = std::max(1, static_cast<int>(std::lround(block_m / cell_m)));
+  return {cell.row / side, cell.column / side};
+}
+
+struct Block {
+  Matrix6d curvature = Matrix6d::Zero();
+  Vector6d score = Vector6d::Zero();
+};
+
+// In units of the largest standard deviations that are believed, so that 1 is the border everywhere.
+std::vector<Block> blocks_of(std::span<const MatchedCell> cells, double cell_m, const Vector6d& unit,
+                             const MatchOptions& options) {
+  std::map<std::pair<int, int>, Block> blocks;
+  for (const MatchedCell& cell : cells) {
+    Block& block = blocks[block_of(cell, cell_m, options.block_m)];
+    const Vector6d a = cell.by_local.cwiseProduct(unit), b = cell.by_global.cwiseProduct(unit);
+    // Of two independent slopes the product has no bias by their noise; a square would find relief on a plain.
+    const Matrix6d product = a * b.transpose();
+    block.curvature += (0.5 * cell.curvature) * (product + product.transpose());
+    block.score += (0.5 * cell.weight * cell.residual_m) * (a + b);
+  }
+  std::vector<Block> list;
+  list.reserve(blocks.size());
+  for (const auto& [place, block] : blocks) list.push_back(block);
+  return list;
+}
+
+// Scores of the residuals that a common error of the disparities makes, area by area.
+std::vector<Vector6d> common_scores(std::span<const MatchedCell> cells, double cell_m, const Vector6d& unit, double share,
+                                    const MatchOptions& options) {
+  std::map<std::pair<int, int>, Vector6d> areas;
+  for (const MatchedCell& cell : cells) {
+    Vector6d& score =
+        areas.try_emplace(block_of(cell, cell_m, options.common_reach_m), Vector6d::Zero()).first->second;
+    score += (cell.weight * share * cell.common_m) * cell.jacobian().cwiseProduct(unit);
+  }
+  std::vector<Vector6d> scores;
+  for (const auto& [place, score] : areas) scores.push_back(score);
+  return scores;
+}
+
+// Covariance in the directions of the basis: what the answer would have been without each of the blocks, to first
+// order, and what the common errors do to it. None where one block alone holds a direction.
+std::optional<Eigen::MatrixXd> jackknife(const std::vector<Block>& blocks, const std::vector<Vector6d>& common,
+                                         const Matrix6d& total, const Eigen::MatrixXd& basis) {
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
+  for (const Block& block : blocks) {
+    const Eigen::LLT<Eigen::MatrixXd> rest(basis.transpose() * (total - block.curvature) * basis);
+    if (rest.info() != Eigen::Success) return std::nullopt;
+    const Eigen::VectorXd change = rest.solve(basis.transpose() * block.score);
+    covariance += change * change.transpose();
+  }
+  const Eigen::LLT<Eigen::MatrixXd> all(basis.transpose() * total * basis);
+  for (const Vector6d& score : common) {
+    const Eigen::VectorXd change = all.solve(basis.transpose() * score);
+    covariance += change * change.transpose();
+  }
+  return covariance;
+}
+
+}  // namespace
+
+MatchEvidence weigh(std::span<const MatchedCell> cells, double cell_m, const MatchOptions& options) {
+  MatchEvidence evidence;
+  evidence.cells = static_cast<int>(cells.size());
+  evidence.misfit = misfit_of(cells);
+  evidence.sigma_m = evidence.sigma_rad = kInfinite;
+  const double largest_rad = options.largest_sigma_deg * std::numbers::pi / 180;
+  Vector6d unit;
+  unit << Eigen::Vector3d::Constant(options.largest_sigma_m), Eigen::Vector3d::Constant(largest_rad);
+  const std::vector<Block> blocks = blocks_of(cells, cell_m, unit, options);
+  evidence.blocks = static_cast<int>(blocks.size());
+  const std::vector<Vector6d> common =
+      common_scores(cells, cell_m, unit, options.common_share * evidence.misfit, options);
+  Matrix6d total = Matrix6d::Zero();
+  for (const Block& block : blocks) total += block.curvature;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(total);
+  // Directions with the least curvature are given up until none of the others hangs on a single block.
+  for (Eigen::Index lost = 0; lost < 6; ++lost) {
+    if (!(axes.eigenvalues()[lost] > 0)) continue;
+    const Eigen::MatrixXd basis = axes.eigenvectors().rightCols(6 - lost);
+    const auto covariance = jackknife(blocks, common, total, basis);
+    if (!covariance) continue;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spread(*covariance);
+    for (Eigen::Index i = 0; i < spread.eigenvalues().size(); ++i) {
+      const double variance = spread.eigenvalues()[i];
+      if (variance > 1) continue;
+      const Vector6d axis = basis * spread.eigenvectors().col(i);
+      evidence.information += axis * axis.transpose() / std::max(variance, kLeastVariance);
+      ++evidence.determined;
+    }
+    if (lost == 0) {
+      const Vector6d sigmas = (basis * *covariance * basis.transpose()).diagonal().cwiseSqrt();
+      evidence.sigma_m = sigmas.head<3>().maxCoeff() * options.largest_sigma_m;
+      evidence.sigma_rad = sigmas.tail<3>().maxCoeff() * largest_rad;
+    }
+    break;
+  }
+  const Vector6d inverse = unit.cwiseInverse();
+  evidence.information = inverse.asDiagonal() * evidence.information * inverse.asDiagonal();
+  return evidence;
+}
+
+MatchCost cost_of(std::span<const MatchedCell> cells, double cell_m, double scale, const MatchOptions& options) {
+  struct Sum {
+    double cost = 0, count = 0;
+  };
+  std::map<std::pair<int, int>, Sum> blocks;
+  Sum all;
+  for (const MatchedCell& cell : cells) {
+    const double u = cell.residual_m / (options.robust_sigmas * scale * cell.sigma_m), cost = u * u / (1 + u * u);
+    Sum& block = blocks[block_of(cell, cell_m, options.block_m)];
+    block.cost += cost;
+    block.count += 1;
+    all.cost += cost;
+    all.count += 1;
+  }
+  MatchCost result;
+  const auto n = static_cast<double>(blocks.size());
+  if (n < 2) return result;
+  result.mean = all.cost / all.count;
+  for (const auto& [place, block] : blocks) {
+    const double off = block.cost - result.mean * block.count;
+    result.variance += off * off;
+  }
+  result.variance *= n / (n - 1) / (all.count * all.count);
+  return result;
+}
+
+}  // namespace spartan

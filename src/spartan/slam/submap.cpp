@@ -1,0 +1,66 @@
+#include "spartan/slam/submap.h"
+
+namespace spartan {
+namespace {
+
+constexpr std::uint32_t kVersion = 1;
+
+void put(ArchiveWriter& out, const CellSurface& s) {
+  for (const float value : {s.elevation_m, s.variance_m2, s.lowest_m, s.highest_m, s.count, s.occupancy_logodds})
+    out.put(value);
+  out.put(s.stop);
+  out.put(s.shape);
+  out.put(s.votes);
+}
+
+CellSurface get_surface(ArchiveReader& in) {
+  CellSurface s;
+  for (float* value : {&s.elevation_m, &s.variance_m2, &s.lowest_m, &s.highest_m, &s.count, &s.occupancy_logodds})
+    *value = in.get<float>();
+  s.stop = in.get<std::int32_t>();
+  s.shape = in.get<std::int16_t>();
+  s.votes = in.get<std::uint16_t>();
+  return s;
+}
+
+}  // namespace
+
+Bytes to_bytes(const Tile& tile) {
+  ArchiveWriter out;
+  out.put(kVersion);
+  std::uint32_t seen = 0;
+  for (const MapCell& cell : tile.cells) seen += cell.surface.seen() ? 1 : 0;
+  out.put(seen);
+  for (std::size_t i = 0; i < tile.cells.size(); ++i) {
+    const MapCell& cell = tile.cells[i];
+    if (!cell.surface.seen()) continue;
+    out.put(static_cast<std::uint16_t>(i));
+    out.put(cell.rival.seen());
+    put(out, cell.surface);
+    if (cell.rival.seen()) put(out, cell.rival);
+  }
+  return out.take();
+}
+
+Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
+  ArchiveReader in(bytes);
+  const auto version = in.get<std::uint32_t>();
+  if (version != kVersion) {
+    return failure(ErrorCode::input, "version " + std::to_string(version) + " instead of " + std::to_string(kVersion),
+                   what, "make the map anew");
+  }
+  Tile tile;
+  const auto seen = in.get<std::uint32_t>();
+  if (seen > tile.cells.size()) return failure(ErrorCode::input, "damaged", what, "make the map anew");
+  for (std::uint32_t i = 0; i < seen; ++i) {
+    const auto index = in.get<std::uint16_t>();
+    if (index >= tile.cells.size()) return failure(ErrorCode::input, "damaged", what, "make the map anew");
+    const bool has_rival = in.get<bool>();
+    tile.cells[index].surface = get_surface(in);
+    if (has_rival) tile.cells[index].rival = get_surface(in);
+  }
+  if (Status status = in.finish(what); !status) return failure(status);
+  return tile;
+}
+
+}  // namespace spartan
