@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <vector>
 
 #include "program/html_parts.h"
@@ -15,10 +16,17 @@ namespace {
 
 constexpr int kMostMaps = 6;
 
+// MatchVerdict's names, for people.
+std::string in_words(std::string verdict) {
+  std::replace(verdict.begin(), verdict.end(), '_', ' ');
+  return verdict;
+}
+
 Result<std::string> picture_of(const std::string& path, const std::string& caption, int width_px) {
   const auto image = read_image(path);
   if (!image) return failure(image);
-  return html_picture(shrunk(image->as<Rgb8>(), width_px), caption, width_px);
+  const int width = std::min(width_px, image->width());
+  return html_picture(shrunk(image->as<Rgb8>(), width), caption, width);
 }
 
 }  // namespace
@@ -33,14 +41,21 @@ Result<std::string> map_pictures(const std::string& run) {
   const auto count = std::min<std::size_t>(kMostMaps, maps->size());
   for (std::size_t i = 0; i < count; ++i) {
     const MapRecord& map = (*maps)[count > 1 ? i * (maps->size() - 1) / (count - 1) : 0];
-    const auto picture = picture_of(folder.local_map(map.stamp) + ".png",
-                                    fmt::format("Position {}: {} views, {} cells known, {} obstacles (red), north up",
-                                                map.position_id, map.views, map.known_cells, map.obstacles),
-                                    360);
+    const std::string overlap = map.overlap > 0 ? fmt::format(" ({:.0f} % overlap)", 100 * map.overlap) : "";
+    const auto picture = picture_of(
+        folder.local_map(map.stamp) + ".png",
+        fmt::format("Position {}: {} views, {} cells known, {} obstacles (red), north up. In the global map: {}{}",
+                    map.position_id, map.views, map.known_cells, map.obstacles, in_words(map.verdict), overlap),
+        360);
     if (!picture) return failure(picture);
     html += *picture;
   }
-  return html;
+  if (!std::filesystem::exists(folder.global_map() + ".png")) return html;
+  const auto global =
+      picture_of(folder.global_map() + ".png",
+                 "The global map of all positions: relief, obstacles (red), cavities (blue), unknown (dark)", 1100);
+  if (!global) return failure(global);
+  return html + *global;
 }
 
 }  // namespace spartan::program

@@ -7,7 +7,7 @@
 
 namespace spartan::program {
 
-/// Pictures of the local maps, spread over the drive; empty where there are none.
+/// Pictures of the local maps, spread over the drive, and of the global one; empty where there are none.
 Result<std::string> map_pictures(const std::string& run);
 
 }  // namespace spartan::program

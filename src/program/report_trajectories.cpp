@@ -38,6 +38,7 @@ double three_sigma(const Matrix6d& covariance) {
 
 std::optional<Matrix6d> covariance_of(const FrameRecord& frame, const std::string& kind) {
   if (kind == "odometry") return frame.has_pose ? std::optional(frame.world_from_body.covariance) : std::nullopt;
+  if (kind == "slam" && frame.slam) return frame.slam->covariance;
   if (kind == "localization" && frame.localization) return frame.localization->world_from_body.covariance;
   return std::nullopt;
 }
