@@ -1,0 +1,168 @@
+// The pipeline where the rover stops and looks around.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "spartan/core/database.h"
+#include "spartan/rig/rig.h"
+#include "spartan/system/pipeline.h"
+#include "spartan/testing/synthetic_world.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+const RectifiedStereo kWide{{320, 320}, 340, {159.5, 159.5}, 0.2};
+const RectifiedStereo kNarrow{{320, 240}, 250, {159.5, 119.5}, 0.12};
+constexpr double kStep_m = 0.15;
+constexpr int kShots = 5;  // of the narrow pair; the wide one looks at the first and the last
+
+// Wide cameras on a mast, 1 m high and 35° down, narrow ones at half a metre.
+Rig rover() {
+  const auto add = [](Rig& rig, const std::string& pair, const RectifiedStereo& stereo, const Pose& body_from_left) {
+    for (const char* eye : {"left", "right"}) {
+      Camera camera;
+      camera.name = pair + "_" + eye;
+      camera.size = stereo.size;
+      camera.model = PinholeModel{stereo.focal_px, stereo.focal_px, stereo.centre_px.x(), stereo.centre_px.y()};
+      camera.mount_from_camera =
+          body_from_left * Pose::from_translation({eye == std::string("left") ? 0 : stereo.baseline_m, 0, 0});
+      rig.cameras.push_back(camera);
+    }
+  };
+  const auto looking = [](double height_m, double tilt_rad) {
+    return Pose(exp_so3({0, tilt_rad, 0}), {0, 0, height_m}) * optical_from_forward().inverse();
+  };
+  Rig rig;
+  rig.name = "rover";
+  add(rig, "wide", kWide, looking(1, 0.6));
+  add(rig, "narrow", kNarrow, looking(0.5, 0.55));
+  rig.pairs = {{"wide", "wide_left", "wide_right", 0.6, false}, {"narrow", "narrow_left", "narrow_right", 0.4, true}};
+  return rig;
+}
+
+Pose world_from_body(int shot) {
+  return Pose::from_translation({kStep_m * shot, 0, 0});
+}
+
+// Rendered when they are asked for first.
+const testing::SyntheticShot& images_of(const std::string& pair, int shot) {
+  static const testing::SyntheticWorld world = [] {
+    testing::SyntheticWorldOptions options;
+    options.relief_m = 0.03;
+    options.stones_per_m2 = 6;
+    options.stone_size_m = 0.2;
+    return testing::SyntheticWorld(options);
+  }();
+  static std::map<std::pair<std::string, int>, testing::SyntheticShot> rendered;
+  const auto key = std::pair(pair, shot);
+  const auto found = rendered.find(key);
+  if (found != rendered.end()) return found->second;
+  const Pose body_from_left = rover().body_from_camera(pair + "_left");
+  return rendered
+      .emplace(key, world.render(pair == "wide" ? kWide : kNarrow, world_from_body(shot) * body_from_left,
+                                 static_cast<std::uint64_t>(pair == "wide" ? 100 + shot : shot)))
+      .first->second;
+}
+
+StereoFrame frame_of(const testing::SyntheticShot& images, const std::string& pair, int position, double seconds) {
+  StereoFrame frame;
+  frame.frame_id = position;
+  frame.position_id = position;
+  frame.pair = pair;
+  frame.left_stamp = frame.right_stamp = Stamp::from_seconds(seconds);
+  frame.left = FrameImage::borrow(images.left.view(), {});
+  frame.right = FrameImage::borrow(images.right.view(), {});
+  return frame;
+}
+
+FrameResult drive_to(Pipeline& pipeline, int shot) {
+  return pipeline.add(frame_of(images_of("narrow", shot), "narrow", shot, 3.0 * shot)).value().value();
+}
+void look_around(Pipeline& pipeline, int shot) {
+  ASSERT_FALSE(pipeline.add(frame_of(images_of("wide", shot), "wide", shot, 3.0 * shot + 1)).value().has_value());
+}
+
+TEST(PipelineMaps, PositionsBecomeMapsThatAreFoundInEachOther) {
+  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+  EXPECT_FALSE(drive_to(pipeline, 0).position);
+  look_around(pipeline, 0);
+  const FrameResult left = drive_to(pipeline, 1);
+  ASSERT_TRUE(left.position) << "the first position is known when the rover has gone on";
+  EXPECT_EQ(left.position->position_id, 0);
+  EXPECT_EQ(left.position->views, 2) << "the narrow shot is one of its views";
+  EXPECT_EQ(left.position->merged.match.verdict, MatchVerdict::no_overlap);
+  for (int i = 2; i < kShots; ++i) EXPECT_FALSE(drive_to(pipeline, i).position) << "nobody looked around";
+  look_around(pipeline, kShots - 1);
+  const auto last = pipeline.leave_position().value();
+  ASSERT_TRUE(last);
+  ASSERT_EQ(last->merged.match.verdict, MatchVerdict::decided) << "60 cm on, most of the ground is known";
+  EXPECT_GT(last->merged.match.overlap, 0.4);
+  EXPECT_LT((last->merged.corrected.pose.translation() - world_from_body(kShots - 1).translation()).norm(), 0.015);
+  ASSERT_TRUE(last->merged.constraint);
+  EXPECT_EQ(last->merged.constraint->stamp, Stamp::from_seconds(3.0 * (kShots - 1)));
+  EXPECT_FALSE(pipeline.leave_position().value()) << "a position is left once";
+}
+
+TEST(PipelineMaps, TheMapIsHeardByTheLocalization) {
+  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+  FrameResult result = drive_to(pipeline, 0);
+  look_around(pipeline, 0);
+  for (int i = 1; i < kShots; ++i) result = drive_to(pipeline, i);
+  EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).state, SensorState::missing);
+  look_around(pipeline, kShots - 1);
+  // The next position: what the last one said comes with it.
+  StereoFrame next = frame_of(images_of("narrow", kShots - 1), "narrow", kShots, 3.0 * kShots);
+  result = pipeline.add(next).value().value();
+  ASSERT_TRUE(result.position);
+  EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).state, SensorState::ok);
+  EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).used, 1);
+  // The correction shows in the slam pose too, which else is the odometry's.
+  EXPECT_NE(result.slam.pose.translation(), result.world_from_body.pose.translation());
+  EXPECT_LT((result.slam.pose.translation() - result.position->merged.corrected.pose.translation()).norm(), 0.002);
+}
+
+// Stopped between the narrow shot and the wide one.
+TEST(PipelineMaps, AStopGoesOnFromRestoredMemory) {
+  Pipeline straight = Pipeline::create(rover(), {}, Workers(1)).value(),
+           later = Pipeline::create(rover(), {}, Workers(2)).value();
+  drive_to(straight, 0);
+  const testing::TemporaryFolder folder;
+  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
+  TileStore tiles = TileStore::open(db).value();
+  ASSERT_TRUE(later.restore(straight.save(), tiles));
+  const auto wanted = later.wanted_shot();
+  ASSERT_TRUE(wanted);
+  EXPECT_EQ(wanted->pair, "narrow");
+  ASSERT_TRUE(later.recall(frame_of(images_of("narrow", 0), "narrow", 0, wanted->left_stamp.seconds())));
+  look_around(straight, 0);
+  look_around(later, 0);
+  const FrameResult one = drive_to(straight, 1), other = drive_to(later, 1);
+  ASSERT_TRUE(one.position && other.position);
+  EXPECT_EQ(one.position->views, other.position->views);
+  const LocalMap &a = one.position->merged.local, &b = other.position->merged.local;
+  for (int y = 0; y < a.size().height; ++y) {
+    for (int x = 0; x < a.size().width; ++x) {
+      ASSERT_EQ(a.count(x, y), b.count(x, y));
+      if (!(a.count(x, y) > 0)) continue;
+      ASSERT_EQ(a.elevation_m(x, y), b.elevation_m(x, y));
+    }
+  }
+}
+
+TEST(PipelineMaps, AreSwitchedOffByOption) {
+  RunOptions options;
+  options.maps = false;
+  Pipeline pipeline = Pipeline::create(rover(), options, Workers(1)).value();
+  drive_to(pipeline, 0);
+  look_around(pipeline, 0);
+  EXPECT_FALSE(drive_to(pipeline, 1).position);
+  EXPECT_FALSE(pipeline.wanted_shot());
+}
+
+}  // namespace
+}  // namespace spartan
