@@ -17,18 +17,17 @@
 #include "spartan/core/image_io.h"
 #include "spartan/core/process.h"
 #include "spartan/imaging/imager.h"
+#include "spartan/localization/start_frame.h"
 #include "spartan/reconstruction/position_mapper.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/system/map_files.h"
-#include "spartan/system/world_frame.h"
 
 namespace spartan::program {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kRestSeconds = 1;  // of the IMU, from a position's first shot on
-constexpr double kGravity_m_s2 = 9.81;
-constexpr double kReach = 0.75;  // of the map's side: somewhat more than half of its diagonal
+constexpr double kReach = 0.75;     // of the map's side: somewhat more than half of its diagonal
 
 struct BuildArguments {
   std::string left, right, output, rig, recording, gravity, config;
@@ -113,8 +112,12 @@ Result<Position> load_position(const BuildArguments& a) {
   }
   const auto imu = (*source)->imu_samples(shots.front().left_stamp, kRestSeconds);
   if (!imu) return failure(imu);
-  position.up_in_body = measure_up(*imu, info.gravity_m_s2.value_or(kGravity_m_s2));
-  if (position.up_in_body) position.up_source = "measured by the IMU";
+  LocalizationOptions planet;
+  planet.gravity_m_s2 = info.gravity_m_s2.value_or(planet.gravity_m_s2);
+  if (const auto rest = read_rest(*imu, planet)) {
+    position.up_in_body = rest->accel_m_s2.normalized();
+    position.up_source = "measured by the IMU";
+  }
   return position;
 }
 
@@ -252,17 +255,17 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   auto imager = Imager::create(position->rig, options->imaging, workers, position->mask_folder);
   if (!imager) return failure(imager);
   PositionMapper mapper(options->reconstruction, options->mapping, workers);
-  Pose body_from_first_left;
+  Eigen::Vector3d ahead_in_body = Eigen::Vector3d::UnitX();
   for (const StereoFrame& frame : position->frames) {
     const auto shot = imager->process(frame);
     if (!shot) return failure(shot);
-    if (mapper.views().empty()) body_from_first_left = shot->body_from_left;
+    if (mapper.views().empty()) ahead_in_body = shot->body_from_left.rotation() * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d expected = position->up_in_body.value_or(Eigen::Vector3d::UnitZ());
     if (Status s = mapper.add(*shot, position->rig.find_pair(frame.pair)->nearest_m, expected); !s) return failure(s);
   }
   const Eigen::Vector3d up = choose_up(*position, mapper.views().front());
   const MergedRange merged = mapper.merge();
-  const LocalMap map = mapper.map(surface_points(merged), first_world_from_body(body_from_first_left, up));
+  const LocalMap map = mapper.map(surface_points(merged), first_pose(up, ahead_in_body, 0));
   if (Status s = make_folder(a.output); !s) return failure(s);
   if (Status s = write_position(mapper.views(), merged, map, options->mapping, a.output); !s) return failure(s);
   const Json json = to_json(mapper, map, *position, up);

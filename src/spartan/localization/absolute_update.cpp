@@ -12,15 +12,20 @@ namespace {
 
 using namespace error_at;
 
-/// While a sensor is excluded its own bias takes up this share of each disagreement, so that one that has changed for
-/// good comes back.
-constexpr double kBiasShare = 0.05;
+/// While a sensor is excluded the variance of its own bias takes up this share of each squared disagreement, so that
+/// one that has changed for good comes back: after some 30 readings (share · n · r² exceeds r² over the gate).
+constexpr double kBiasShare = 0.003;
+/// So many compass readings share the error that an unknown vertical makes.
+constexpr double kReadingsOfOneLean = 100;
 
 }  // namespace
 
 void ErrorStateFilter::take(const CompassSample& sample) {
   move_to(sample.stamp, nullptr);
-  const double sigma = std::max(sample.sigma_rad, options_.compass.least_sigma_rad);
+  // A vertical that is only known to σ² turns headings by up to ½ σ², always to the same side.
+  const double lean = 0.5 * memory_.belief.covariance.diagonal().segment<2>(kGravityTilt).sum();
+  const double sigma =
+      std::hypot(std::max(sample.sigma_rad, options_.compass.least_sigma_rad), std::sqrt(kReadingsOfOneLean) * lean);
   if (!memory_.compass.offset_known) {
     find_compass_offset(sample, sigma);
     return;
@@ -38,7 +43,7 @@ void ErrorStateFilter::take(const CompassSample& sample) {
 /// A compass that starts during the drive: its offset is that on which most of the first readings agree.
 void ErrorStateFilter::find_compass_offset(const CompassSample& sample, double sigma) {
   CompassMemory& compass = memory_.compass;
-  compass.offsets[compass.pending] = sample.heading_rad - heading_of(memory_.belief.state.world_from_body);
+  compass.offsets[compass.pending] = sample.heading_rad - heading_about_up(memory_.belief.state);
   compass.sigmas[compass.pending] = sigma;
   if (++compass.pending < CompassMemory::kPending) return;
   std::array<CompassSample, CompassMemory::kPending> readings;
@@ -54,14 +59,15 @@ void ErrorStateFilter::find_compass_offset(const CompassSample& sample, double s
   compass.offset_known = true;
   NavigationState& s = memory_.belief.state;
   s.compass_offset_rad = offset->radians;
-  correct_world(compass_innovation(s, heading_of(s.world_from_body) + offset->radians,
+  correct_world(compass_innovation(s, heading_about_up(s) + offset->radians,
                                    std::hypot(offset->sigma_rad, options_.compass.offset_sigma_rad)));
   ++memory_.judge(LocalizationSensor::compass).used;
 }
 
 void ErrorStateFilter::take(const InclinometerSample& sample) {
   move_to(sample.stamp, nullptr);
-  const double sigma = std::max(sample.sigma_rad, options_.inclinometer.least_sigma_rad);
+  const double sigma =
+      options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.least_sigma_rad);
   NavigationState& s = memory_.belief.state;
   if (!memory_.imu.levelled) {
     const Eigen::Vector3d up = s.world_from_body.rotation() * up_of_roll_pitch(sample.roll_rad, sample.pitch_rad);

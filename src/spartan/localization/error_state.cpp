@@ -16,6 +16,7 @@ NavigationState add_error(const NavigationState& s, const ErrorVector& e) {
   r.compass_offset_rad += e[kCompassOffset];
   r.inclinometer_bias_rad += e.segment<2>(kInclinometerBias);
   r.vision_drift += e.segment<6>(kVisionDrift);
+  r.vision_constant += e.segment<6>(kVisionConstant);
   r.world_from_vision_clone = s.world_from_vision_clone * exp_se3(e.segment<6>(kVisionClone));
   r.world_from_step_clone = s.world_from_step_clone * exp_se3(e.segment<6>(kStepClone));
   return r;
@@ -33,6 +34,7 @@ ErrorVector error_between(const NavigationState& a, const NavigationState& b) {
   e[kCompassOffset] = b.compass_offset_rad - a.compass_offset_rad;
   e.segment<2>(kInclinometerBias) = b.inclinometer_bias_rad - a.inclinometer_bias_rad;
   e.segment<6>(kVisionDrift) = b.vision_drift - a.vision_drift;
+  e.segment<6>(kVisionConstant) = b.vision_constant - a.vision_constant;
   e.segment<6>(kVisionClone) = log_se3(a.world_from_vision_clone.inverse() * b.world_from_vision_clone);
   e.segment<6>(kStepClone) = log_se3(a.world_from_step_clone.inverse() * b.world_from_step_clone);
   return e;

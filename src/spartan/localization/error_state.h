@@ -14,7 +14,7 @@ namespace spartan {
 namespace error_at {
 inline constexpr int kPose = 0;  ///< of world_from_body: translation, rotation
 inline constexpr int kPosition = 0, kAttitude = 3;
-inline constexpr int kVelocity = 6;    ///< m/s, world
+inline constexpr int kVelocity = 6;    ///< m/s, body
 inline constexpr int kGyroBias = 9;    ///< rad/s, body
 inline constexpr int kAccelBias = 12;  ///< m/s², body
 inline constexpr int kMoving = 15;     ///< all before this changes with time
@@ -23,9 +23,10 @@ inline constexpr int kWheelScale = 17;
 inline constexpr int kCompassOffset = 18;
 inline constexpr int kInclinometerBias = 19;
 inline constexpr int kVisionDrift = 21;
-inline constexpr int kVisionClone = 27;  ///< of the pose at the last shot
-inline constexpr int kStepClone = 33;    ///< of the pose where the present step of the wheels began
-inline constexpr int kSize = 39;
+inline constexpr int kVisionConstant = 27;
+inline constexpr int kVisionClone = 33;  ///< of the pose at the last shot
+inline constexpr int kStepClone = 39;    ///< of the pose where the present step of the wheels began
+inline constexpr int kSize = 45;
 }  // namespace error_at
 
 using ErrorVector = Eigen::Matrix<double, error_at::kSize, 1>;
@@ -33,7 +34,8 @@ using ErrorCovariance = Eigen::Matrix<double, error_at::kSize, error_at::kSize>;
 
 struct NavigationState {
   Pose world_from_body;
-  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();     ///< world
+  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();     ///< body: there vision and wheels measure it, whatever
+                                                              ///< the attitude in the world
   Eigen::Vector3d gyro_bias_rad_s = Eigen::Vector3d::Zero();  ///< body
   Eigen::Vector3d accel_bias_m_s2 = Eigen::Vector3d::Zero();  ///< body
   /// Rotation vector (x, y) that turns the world's z to the true vertical: the first pose defines the world exactly,
@@ -42,7 +44,8 @@ struct NavigationState {
   double wheel_scale = 1;                                           ///< travelled over counted distance
   double compass_offset_rad = 0;                                    ///< a reading less the heading in the world
   Eigen::Vector2d inclinometer_bias_rad = Eigen::Vector2d::Zero();  ///< roll, pitch
-  Vector6d vision_drift = Vector6d::Zero();  ///< lasting error of visual motions, in stated standard deviations
+  /// Lasting errors of visual motions, in stated standard deviations: one that changes slowly, one of the whole drive.
+  Vector6d vision_drift = Vector6d::Zero(), vision_constant = Vector6d::Zero();
   Pose world_from_vision_clone, world_from_step_clone;
 };
 

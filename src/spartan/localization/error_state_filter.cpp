@@ -26,6 +26,12 @@ void set_variance(ErrorCovariance& p, int at, int size, double sigma) {
   p.diagonal().segment(at, size).setConstant(sigma * sigma);
 }
 
+Vector6d six_of(const std::vector<double>& values) {
+  Vector6d six = Vector6d::Zero();
+  std::copy_n(values.begin(), std::min<std::size_t>(6, values.size()), six.data());
+  return six;
+}
+
 template <class T>
 std::vector<T> only(std::span<const Measurement> all) {
   std::vector<T> some;
@@ -44,15 +50,15 @@ ImuSample between(const ImuSample& a, const ImuSample& b, Stamp at) {
 }  // namespace
 
 ErrorStateFilter::ErrorStateFilter(const LocalizationOptions& options) : options_(options) {
-  drift_sigmas_.setZero();
-  for (std::size_t i = 0; i < std::min<std::size_t>(6, options.vision.drift_sigmas.size()); ++i)
-    drift_sigmas_[static_cast<Eigen::Index>(i)] = options.vision.drift_sigmas[i];
+  drift_sigmas_ = six_of(options.vision.drift_sigmas);
+  constant_sigmas_ = six_of(options.vision.constant_sigmas);
   for (int rows = 1; rows <= 6; ++rows)
     gates_[static_cast<std::size_t>(rows)] = chi_square_quantile(options.health.gate_probability, rows);
   vision_gate_ = chi_square_quantile(options.vision.gate_probability, 6);
 }
 
-void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before) {
+void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before,
+                             const std::optional<Eigen::Vector3d>& up_in_body) {
   const auto imu = only<ImuSample>(before);
   const auto wheels = only<WheelSample>(before);
   const auto rest = read_rest(imu, options_);
@@ -60,13 +66,13 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   const auto heading = agreed_heading(only<CompassSample>(before), options_.compass.least_sigma_rad);
   const Eigen::Vector3d up = rest   ? rest->accel_m_s2.normalized()
                              : tilt ? up_of_roll_pitch(tilt->roll_rad, tilt->pitch_rad)
-                                    : Eigen::Vector3d::UnitZ();
+                                    : up_in_body.value_or(Eigen::Vector3d::UnitZ());
 
   FilterMemory m;
   m.started = true;
   m.stamp = stamp;
-  m.gravity_measured = rest || tilt;
-  m.imu.levelled = m.gravity_measured;
+  m.imu.levelled = rest || tilt;  // what came from elsewhere is good to say where up is, not to integrate by
+  m.gravity_measured = m.imu.levelled || up_in_body;
   m.compass.heading_east = m.compass.offset_known = heading.has_value();
   NavigationState& s = m.belief.state;
   s.world_from_body = first_pose(up, ahead_in_body, 0);
@@ -77,12 +83,13 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   set_variance(p, kVelocity, 3, rest && rest->still ? kRestingSpeed_m_s : kUnknownSpeed_m_s);
   set_variance(p, kGyroBias, 3, std::max(options_.imu.gyro_bias_rad_s, 1e-9));
   set_variance(p, kAccelBias, 3, std::max(options_.imu.accel_bias_m_s2, 1e-9));
-  set_variance(p, kGravityTilt, 2, m.gravity_measured ? kLevelledTilt_rad : kUnknownTilt_rad);
+  set_variance(p, kGravityTilt, 2, m.imu.levelled ? kLevelledTilt_rad : kUnknownTilt_rad);
   set_variance(p, kWheelScale, 1, std::max(options_.wheels.scale_sigma, 1e-6));
   set_variance(p, kCompassOffset, 1,
                heading ? std::hypot(heading->sigma_rad, options_.compass.offset_sigma_rad) : kUnknownHeading_rad);
   set_variance(p, kInclinometerBias, 2, std::max(options_.inclinometer.bias_rad, 1e-9));
   p.diagonal().segment<6>(kVisionDrift) = drift_sigmas_.cwiseAbs2().cwiseMax(1e-12);
+  p.diagonal().segment<6>(kVisionConstant) = constant_sigmas_.cwiseAbs2().cwiseMax(1e-12);
 
   // What the means say of tilt and biases; the pose defines the world and stays.
   if (rest) {
@@ -111,7 +118,11 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   }
   if (!wheels.empty()) {
     m.wheels.known = true;
-    m.wheels.last = m.wheels.moved = wheels.back();
+    m.wheels.last = m.wheels.previous = wheels.back();
+    m.wheels.moved = *std::find_if(wheels.begin(), wheels.end(), [&](const WheelSample& w) {
+      return std::abs(w.left_m - wheels.back().left_m) <= options_.standing.wheels_still_m &&
+             std::abs(w.right_m - wheels.back().right_m) <= options_.standing.wheels_still_m;
+    });
     m.step.has_wheels = seconds_between(wheels.back().stamp, stamp) < options_.health.wheels_timeout_s;
     m.step.wheels = wheels.back();
   }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,7 +24,8 @@ class ErrorStateFilter {
 
   /// Lays the world from what the sensors said before, and stands at its origin.
   /// `before`: samples up to `stamp`, in order of time; motions and constraints among them do not count.
-  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before);
+  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before,
+             const std::optional<Eigen::Vector3d>& up_in_body = {});
 
   /// In the order of comes_before().
   void process(const Measurement& measurement);
@@ -50,6 +52,7 @@ class ErrorStateFilter {
   // Motions between shots: shot_update.cpp.
   void take(const RelativeMotion& motion);
   bool measure_motion(const RelativeMotion& motion);
+  void let_drift(int index, const Vector6d& sigmas, double steps);
   bool overrule_prediction(const Innovation& innovation, double square, const RelativeMotion& motion);
   bool wheels_confirm_prediction(const RelativeMotion& motion) const;
   void compare_gyro(const RelativeMotion& motion);
@@ -57,10 +60,12 @@ class ErrorStateFilter {
 
   // Wheels and standing: step_update.cpp.
   void take(const WheelSample& sample);
+  void end_step_at_shot(Stamp stamp);
+  std::optional<WheelSample> wheels_at(Stamp stamp) const;
   void measure_step(const WheelSample& sample);
   WheelStep step_to(const WheelSample& sample) const;
   void state_slip(const WheelStep& step);
-  void begin_step();
+  void begin_step(const std::optional<WheelSample>& wheels);
   void hold_still(bool imu_still);
   bool wheels_stand() const;
 
@@ -76,7 +81,7 @@ class ErrorStateFilter {
   bool judge(LocalizationSensor sensor, double square, int rows, HealthReason why);
 
   LocalizationOptions options_;
-  Vector6d drift_sigmas_;
+  Vector6d drift_sigmas_, constant_sigmas_;
   std::array<double, 7> gates_{};  ///< by degrees of freedom
   double vision_gate_ = 0;
   FilterMemory memory_;

@@ -47,7 +47,7 @@ template <class Each, class State>
 void visit_state(Each& each, State& s) {
   each(s.world_from_body), each(s.velocity_m_s), each(s.gyro_bias_rad_s), each(s.accel_bias_m_s2);
   each(s.gravity_tilt_rad), each(s.wheel_scale), each(s.compass_offset_rad), each(s.inclinometer_bias_rad);
-  each(s.vision_drift), each(s.world_from_vision_clone), each(s.world_from_step_clone);
+  each(s.vision_drift), each(s.vision_constant), each(s.world_from_vision_clone), each(s.world_from_step_clone);
 }
 
 template <class Each, class Wheels>
@@ -78,8 +78,9 @@ void visit(Each& each, Memory& m) {
   each(m.vision.clone_stamp), each(m.vision.odom_from_clone), each(m.vision.odom_covariance), each(m.vision.stood);
   each(m.vision.rate_rad_s), each(m.vision.unmeasured_noise), each(m.vision.unmeasured_s);
   each(m.step.from), each(m.step.odom_from_clone), each(m.step.has_wheels), visit_wheels(each, m.step.wheels);
-  each(m.step.shot_since), each(m.step.standing);
-  each(m.wheels.known), visit_wheels(each, m.wheels.last), visit_wheels(each, m.wheels.moved);
+  each(m.step.standing);
+  each(m.wheels.known), visit_wheels(each, m.wheels.last), visit_wheels(each, m.wheels.previous),
+      visit_wheels(each, m.wheels.moved);
   each(m.wheels.slip_known), each(m.wheels.slip_stamp), each(m.wheels.slip), each(m.wheels.slip_sigma);
   each(m.compass.heading_east), each(m.compass.offset_known), each(m.compass.pending);
   for (auto& offset : m.compass.offsets) each(offset);

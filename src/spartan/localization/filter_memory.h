@@ -52,13 +52,12 @@ struct StepMemory {
   Pose odom_from_clone;
   bool has_wheels = false;
   WheelSample wheels;  ///< at its start
-  bool shot_since = false;
   bool standing = false;
 };
 
 struct WheelMemory {
   bool known = false;
-  WheelSample last;
+  WheelSample last, previous;
   WheelSample moved;  ///< the reading (and since when) that the last ones do not differ from
   bool slip_known = false;
   Stamp slip_stamp;

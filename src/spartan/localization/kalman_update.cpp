@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <limits>
+#include <optional>
 
 namespace spartan {
 namespace {
@@ -27,6 +28,28 @@ void carry_over(ErrorCovariance& p, const ErrorVector& step, int index) {
   p.middleCols<6>(index) = (p.middleCols<6>(index) * reset.transpose()).eval();
 }
 
+std::optional<Gain> kalman_gain(const ErrorCovariance& p, const Innovation& innovation) {
+  const Projection projection = project(p, innovation);
+  if (projection.s.info() != Eigen::Success) return std::nullopt;
+  return projection.s.solve(projection.pht.transpose()).transpose();
+}
+
+bool correct_by(Belief& belief, const Innovation& innovation, const Gain& gain) {
+  const ErrorVector step = gain * innovation.residual;
+  if (!step.allFinite()) return false;
+  ErrorCovariance keep = ErrorCovariance::Identity();
+  keep.noalias() -= gain * innovation.jacobian;
+  ErrorCovariance half;
+  half.noalias() = keep * belief.covariance;
+  belief.covariance.noalias() = half * keep.transpose();
+  belief.covariance += gain * innovation.noise * gain.transpose();
+  for (const int pose : {error_at::kPose, error_at::kVisionClone, error_at::kStepClone})
+    carry_over(belief.covariance, step, pose);
+  symmetrise(belief.covariance);
+  belief.state = add_error(belief.state, step);
+  return true;
+}
+
 }  // namespace
 
 Innovation::Innovation(int rows) {
@@ -43,23 +66,16 @@ double normalised_square(const ErrorCovariance& covariance, const Innovation& in
 }
 
 bool correct(Belief& belief, const Innovation& innovation) {
-  const Projection projection = project(belief.covariance, innovation);
-  if (projection.s.info() != Eigen::Success) return false;
-  const Gain gain = projection.s.solve(projection.pht.transpose()).transpose();
-  const ErrorVector step = gain * innovation.residual;
-  if (!step.allFinite()) return false;
+  const std::optional<Gain> gain = kalman_gain(belief.covariance, innovation);
+  return gain && correct_by(belief, innovation, *gain);
+}
 
-  ErrorCovariance keep = ErrorCovariance::Identity();
-  keep.noalias() -= gain * innovation.jacobian;
-  ErrorCovariance half;
-  half.noalias() = keep * belief.covariance;
-  belief.covariance.noalias() = half * keep.transpose();
-  belief.covariance += gain * innovation.noise * gain.transpose();
-  for (const int pose : {error_at::kPose, error_at::kVisionClone, error_at::kStepClone})
-    carry_over(belief.covariance, step, pose);
-  symmetrise(belief.covariance);
-  belief.state = add_error(belief.state, step);
-  return true;
+bool correct_only(Belief& belief, const Innovation& innovation, int index) {
+  const std::optional<Gain> gain = kalman_gain(belief.covariance, innovation);
+  if (!gain) return false;
+  Gain partial = Gain::Zero(error_at::kSize, innovation.rows());
+  partial.row(index) = gain->row(index);
+  return correct_by(belief, innovation, partial);
 }
 
 void symmetrise(ErrorCovariance& covariance) {

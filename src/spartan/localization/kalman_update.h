@@ -27,6 +27,10 @@ double normalised_square(const ErrorCovariance& covariance, const Innovation& in
 /// False, and nothing changed, where S is not positive definite.
 bool correct(Belief& belief, const Innovation& innovation);
 
+/// The same where only the error at `index` may learn; all others are considered, not corrected (Schmidt 1966).
+/// Joseph's form holds for any gain.
+bool correct_only(Belief& belief, const Innovation& innovation, int index);
+
 /// As independent noise of the error, nothing else changed: restores symmetry after many small sums.
 void symmetrise(ErrorCovariance& covariance);
 

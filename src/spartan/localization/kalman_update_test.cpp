@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "spartan/localization/test_drive.h"
 
@@ -40,7 +41,7 @@ TEST(KalmanUpdate, IsTheInformationFormOnLinearParts) {
   EXPECT_LE((error_between(before.state, belief.state) - step).norm(), 1e-7);
   // Poses aside, whose errors are carried over to the new mean.
   const ErrorCovariance off = belief.covariance - expected;
-  EXPECT_LE((off.block<21, 21>(kVelocity, kVelocity)).cwiseAbs().maxCoeff(), 1e-7);
+  EXPECT_LE((off.block<27, 27>(kVelocity, kVelocity)).cwiseAbs().maxCoeff(), 1e-7);
   const Matrix6d reset = right_jacobian_se3(step.head<6>());
   const Matrix6d carried = reset * expected.topLeftCorner<6, 6>() * reset.transpose();
   EXPECT_LE((belief.covariance.topLeftCorner<6, 6>() - carried).norm(), 1e-7);
@@ -56,6 +57,28 @@ TEST(KalmanUpdate, StatisticIsThatOfTheWholeCovariance) {
   i.noise << 0.3, 0.1, 0.1, 0.4;
   const Eigen::Matrix2d s = i.jacobian * belief.covariance * i.jacobian.transpose() + i.noise;
   EXPECT_NEAR(normalised_square(belief.covariance, i), i.residual.dot(s.inverse() * i.residual), 1e-9);
+}
+
+TEST(KalmanUpdate, OnlyTheChosenErrorLearnsAndTheOthersAreConsidered) {
+  Random random(4);
+  Belief belief = random_belief(random, 0.1);
+  const Belief before = belief;
+  Innovation i(1);
+  i.residual[0] = 0.2;
+  i.jacobian(0, kWheelScale) = 1;
+  i.jacobian(0, kVelocity) = 2;
+  i.noise(0, 0) = 0.3;
+  ASSERT_TRUE(correct_only(belief, i, kWheelScale));
+  ErrorVector moved = error_between(before.state, belief.state);
+  EXPECT_GT(std::abs(moved[kWheelScale]), 1e-3);
+  moved[kWheelScale] = 0;
+  EXPECT_LE(moved.norm(), 1e-12);
+  // Schmidt: the variance falls by what the optimal gain of this row is worth; the others keep theirs.
+  const double s = (i.jacobian * before.covariance * i.jacobian.transpose() + i.noise)(0, 0);
+  const double with = before.covariance.row(kWheelScale).dot(i.jacobian.row(0));
+  EXPECT_NEAR(belief.covariance(kWheelScale, kWheelScale),
+              before.covariance(kWheelScale, kWheelScale) - with * with / s, 1e-9);
+  EXPECT_NEAR(belief.covariance(kVelocity, kVelocity), before.covariance(kVelocity, kVelocity), 1e-9);
 }
 
 TEST(KalmanUpdate, LeavesABeliefAloneThatItCannotCorrect) {

@@ -38,12 +38,14 @@ struct InertialOptions {
   }
 };
 
-/// The error of a visual motion is L n + D z: white noise of the stated covariance times `white_factor`, and a drift z
-/// in units of the stated standard deviations D, slowly changing (docs/math/localization.md, "Vision").
+/// The error of a visual motion is L n + D z: white noise of the stated covariance times `white_factor`, and a lasting
+/// part z in units of the stated standard deviations D, slowly changing and constant (docs/math/localization.md,
+/// "Vision").
 struct VisionOptions {
   double white_factor = 1.1;
-  std::vector<double> drift_sigmas{1.3, 0.9, 0.55, 0.8, 0.75, 0.5};
-  double drift_steps = 150;
+  std::vector<double> drift_sigmas{0.85, 0.61, 0.33, 0.57, 0.46, 0.35};
+  double drift_steps = 57;
+  std::vector<double> constant_sigmas{1.05, 0.76, 0.4, 0.7, 0.57, 0.42};
   double gate_probability = 0.999999;
 
   template <class Visitor>
@@ -51,9 +53,11 @@ struct VisionOptions {
     v.field("white_factor", white_factor, "on the stated covariance, for errors that differ from shot to shot",
             between(0.01, 1e4));
     v.field("drift_sigmas", drift_sigmas,
-            "standard deviation of the errors that stay, over the stated ones: x, y, z, about x, y, z",
+            "standard deviation of the errors that last for a while, over the stated ones: x, y, z, about x, y, z",
             between(0, 1e3));
     v.field("drift_steps", drift_steps, "after so many shots such an error has fallen to 1/e", between(1, 1e6));
+    v.field("constant_sigmas", constant_sigmas, "the same of the errors that stay for the whole drive",
+            between(0, 1e3));
     v.field("gate_probability", gate_probability, "share of good motions that the test lets pass",
             between(0.5, 1 - 1e-12));
   }
@@ -101,12 +105,15 @@ struct HeadingOptions {
 };
 
 struct TiltOptions {
+  double noise_factor = 1.5;
   double least_sigma_rad = 0.0005;
   double bias_rad = 0.0025;
   double bias_walk_rad_sqrt_hz = 1e-5;
 
   template <class Visitor>
   void describe(Visitor& v) {
+    v.field("noise_factor", noise_factor, "on the stated standard deviation: an inclinometer feels accelerations too",
+            between(0.1, 100));
     v.field("least_sigma_rad", least_sigma_rad, "of a reading, whatever it says itself", between(1e-6, 1));
     v.field("bias_rad", bias_rad, "standard deviation of the bias", between(0, 1));
     v.field("bias_walk_rad_sqrt_hz", bias_walk_rad_sqrt_hz, "random walk of the bias", between(0, 1));
@@ -138,7 +145,7 @@ struct UnmeasuredMotionOptions {
   double speed_share_sqrt_hz = 0.5;
   double speed_floor_m_s = 0.05;
   double turn_share_sqrt_hz = 0.5;
-  double turn_floor_rad_s = 0.05;
+  double turn_floor_rad_s = 0.04;
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -174,7 +181,7 @@ struct HealthOptions {
 
 struct LocalizationOptions {
   double gravity_m_s2 = 9.81;  ///< of the planet; whoever makes a Localizer knows it
-  double buffer_s = 10;
+  double buffer_s = 15;
   double map_factor = 1;
   InertialOptions imu;
   VisionOptions vision;

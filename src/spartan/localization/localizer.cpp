@@ -57,8 +57,9 @@ Localizer::Localizer(Localizer&&) noexcept = default;
 Localizer& Localizer::operator=(Localizer&&) noexcept = default;
 Localizer::~Localizer() = default;
 
-void Localizer::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body) {
-  state_->filter.start(stamp, ahead_in_body);
+void Localizer::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
+                      const std::optional<Eigen::Vector3d>& up_in_body) {
+  state_->filter.start(stamp, ahead_in_body, up_in_body);
 }
 bool Localizer::started() const {
   return state_->filter.started();
@@ -93,8 +94,14 @@ LocalizationEstimate Localizer::estimate() const {
   e.world_from_body = {s.world_from_body, p.block<6, 6>(kPose, kPose)};
   e.odom_from_body = state_->filter.filter().odom_from_body();
   e.world_from_odom = m.world_from_odom;
-  e.velocity_m_s = s.velocity_m_s;
-  e.velocity_covariance = p.block<3, 3>(kVelocity, kVelocity);
+  // v = R w, δv = R (ν − [w]× φ).
+  const Eigen::Matrix3d rotation = s.world_from_body.rotation_matrix();
+  Eigen::Matrix<double, 3, 6> by_attitude_and_velocity;
+  by_attitude_and_velocity << -rotation * skew(s.velocity_m_s), rotation;
+  static_assert(kVelocity == kAttitude + 3);
+  e.velocity_m_s = rotation * s.velocity_m_s;
+  e.velocity_covariance =
+      by_attitude_and_velocity * p.block<6, 6>(kAttitude, kAttitude) * by_attitude_and_velocity.transpose();
   if (m.wheels.slip_known) e.slip = WheelSlip{m.wheels.slip_stamp, m.wheels.slip, m.wheels.slip_sigma};
   e.heading.east = m.compass.heading_east;
   if (m.compass.offset_known) {

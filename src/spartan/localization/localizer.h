@@ -64,7 +64,8 @@ class Localizer {
 
   /// At the first shot, once. `ahead_in_body`: the first left optical axis. Samples up to `stamp` that were added
   /// before level the world and are done with; of those only the last 10 s count.
-  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body);
+  /// `up_in_body`: where it is known from elsewhere (to a degree or two); it counts where no sample says better.
+  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {});
   bool started() const;
 
   /// Each says whether the sample was taken.

@@ -54,6 +54,7 @@ Innovation relative_motion_innovation(const NavigationState& s, int clone, const
   i.jacobian = m.jacobian;
   i.jacobian.middleCols<6>(clone) = left * m.jacobian.middleCols<6>(clone);
   i.jacobian.middleCols<6>(kVisionDrift) = -right * drift_scale.asDiagonal();
+  i.jacobian.middleCols<6>(kVisionConstant) = i.jacobian.middleCols<6>(kVisionDrift);
   i.noise = right * covariance * right.transpose();
   return i;
 }
@@ -86,16 +87,24 @@ double heading_of(const Pose& world_from_body) {
   return std::atan2(ahead.y(), ahead.x());
 }
 
-// With a = R x̂: δa = −R [x̂]× φ and δψ = (a_x δa_y − a_y δa_x) / (a_x² + a_y²).
+double heading_about_up(const NavigationState& s) {
+  const Eigen::Vector3d tilt(s.gravity_tilt_rad.x(), s.gravity_tilt_rad.y(), 0);
+  return heading_of(Pose::from_rotation(exp_so3(-tilt) * s.world_from_body.rotation()));
+}
+
+// With v = R x̂, a = Exp(−τ) v: δa = Exp(−τ) (−R [x̂]× φ + [v]× J_l(τ) δτ), δψ = (a_x δa_y − a_y δa_x) / (a_x² + a_y²).
 Innovation compass_innovation(const NavigationState& s, double heading_rad, double sigma_rad) {
   const Eigen::Matrix3d r = s.world_from_body.rotation_matrix();
-  const Eigen::Vector3d ahead = r.col(0);
+  const Eigen::Vector3d tilt(s.gravity_tilt_rad.x(), s.gravity_tilt_rad.y(), 0);
+  const Eigen::Matrix3d level = exp_so3(-tilt).toRotationMatrix();
+  const Eigen::Vector3d ahead = level * r.col(0);
   const Eigen::RowVector3d by_ahead =
       Eigen::RowVector3d(-ahead.y(), ahead.x(), 0) / std::max(ahead.head<2>().squaredNorm(), 1e-6);
+  const Eigen::Matrix3d by_tilt = level * skew(r.col(0)) * left_jacobian_so3(tilt);
   Innovation i(1);
-  i.residual[0] =
-      std::remainder(heading_rad - heading_of(s.world_from_body) - s.compass_offset_rad, 2 * std::numbers::pi);
-  i.jacobian.block<1, 3>(0, kAttitude) = -by_ahead * r * skew(Eigen::Vector3d::UnitX());
+  i.residual[0] = std::remainder(heading_rad - heading_about_up(s) - s.compass_offset_rad, 2 * std::numbers::pi);
+  i.jacobian.block<1, 3>(0, kAttitude) = -by_ahead * level * r * skew(Eigen::Vector3d::UnitX());
+  i.jacobian.block<1, 2>(0, kGravityTilt) = by_ahead * by_tilt.leftCols<2>();
   i.jacobian(0, kCompassOffset) = 1;
   i.noise(0, 0) = sigma_rad * sigma_rad;
   return i;

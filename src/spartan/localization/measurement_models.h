@@ -39,7 +39,9 @@ StepForward forward_of_step(const NavigationState& state);
 
 /// Heading of body x in the world, counter-clockwise from x.
 double heading_of(const Pose& world_from_body);
-/// Reading = heading + offset; the residual is wrapped to ±π.
+/// Heading of body x about the true vertical: of Exp(−τ) R x̂ with the tilt τ.
+double heading_about_up(const NavigationState& state);
+/// Reading = heading about the true vertical + offset; the residual is wrapped to ±π.
 Innovation compass_innovation(const NavigationState& state, double heading_rad, double sigma_rad);
 
 /// Roll and pitch of the body against the true vertical: up in the body is (−sin p, sin r cos p, cos r cos p).

@@ -31,7 +31,7 @@ TEST(MeasurementModels, JacobiansMatchDifferences) {
     expect_derivative<4>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
     step.turn_known = false;
     expect_derivative<3>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
-    const double heading = heading_of(s.world_from_body) + s.compass_offset_rad + 0.1;
+    const double heading = heading_about_up(s) + s.compass_offset_rad + 0.1;
     expect_derivative<1>(s, [&](const NavigationState& x) { return compass_innovation(x, heading, 0.1); });
     const Eigen::Vector2d tilt =
         roll_pitch_of_up(s.world_from_body.rotation().conjugate() * true_up(s.gravity_tilt_rad));
@@ -63,8 +63,9 @@ TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
     const Pose mean = motion_since_clone(s, clone).clone_from_body;
     const auto seen = [&](const ErrorVector& e) -> Vector6d {
       const NavigationState truth = add_error(s, e);
-      const Pose motion = motion_since_clone(truth, clone).clone_from_body *
-                          exp_se3(-(drift_scale.array() * e.segment<6>(kVisionDrift).array()).matrix());
+      const Pose motion =
+          motion_since_clone(truth, clone).clone_from_body *
+          exp_se3(-drift_scale.cwiseProduct(e.segment<6>(kVisionDrift) + e.segment<6>(kVisionConstant)));
       return log_se3(mean.inverse() * motion);
     };
     ErrorVector at = ErrorVector::Zero();

@@ -5,14 +5,13 @@ namespace {
 
 using namespace error_at;
 
-// Noise that is white in acceleration (world) and angular rate (body), integrated over the step: the double integral
+// Noise that is white in acceleration and angular rate, integrated over the step: the double integral
 // correlates position with velocity.
-void add_white_noise(Transition& t, double accel_variance, double rate_variance, double seconds,
-                     const Eigen::Matrix3d& body_from_world) {
+void add_white_noise(Transition& t, double accel_variance, double rate_variance, double seconds) {
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
   t.noise.block<3, 3>(kPosition, kPosition) += identity * (accel_variance * seconds * seconds * seconds / 3);
-  t.noise.block<3, 3>(kPosition, kVelocity) += body_from_world * (accel_variance * seconds * seconds / 2);
-  t.noise.block<3, 3>(kVelocity, kPosition) += body_from_world.transpose() * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(kPosition, kVelocity) += identity * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(kVelocity, kPosition) += identity * (accel_variance * seconds * seconds / 2);
   t.noise.block<3, 3>(kVelocity, kVelocity) += identity * (accel_variance * seconds);
   t.noise.block<3, 3>(kAttitude, kAttitude) += identity * (rate_variance * seconds);
 }
@@ -47,74 +46,73 @@ Integrated integrate(const NavigationState& s, const InertialStep& step, double 
 
 NavigationState propagate(const NavigationState& s, const InertialStep& step, double gravity) {
   const Integrated i = integrate(s, step, gravity);
+  const Eigen::Vector3d velocity = i.before * s.velocity_m_s;  // world
   NavigationState r = s;
-  r.world_from_body = {s.world_from_body.rotation() * exp_so3(i.turn),
-                       s.world_from_body.translation() + s.velocity_m_s * step.seconds +
-                           0.5 * step.seconds * step.seconds * i.acceleration};
-  r.velocity_m_s += i.acceleration * step.seconds;
+  r.world_from_body = {
+      s.world_from_body.rotation() * exp_so3(i.turn),
+      s.world_from_body.translation() + velocity * step.seconds + 0.5 * step.seconds * step.seconds * i.acceleration};
+  r.velocity_m_s = r.world_from_body.rotation().conjugate() * (velocity + i.acceleration * step.seconds);
   return r;
 }
 
-// With δp = R ρ (to first order) and a' = a + δa:
+// With δp = R ρ (to first order), v = R w the velocity in the world, a' = a + δa:
 //   φ' = ΔRᵀ φ − J_r t δb_g
+//   δv = R (ν − [w]× φ)
 //   δa = −½ R [f₀]× φ − ½ R' [f₁]× φ' − ½ (R + R') δb_a − g ∂up δτ
-//   ρ' = ΔRᵀ ρ + R'ᵀ (δv t + ½ δa t²),   δv' = δv + δa t
+//   ρ' = ΔRᵀ ρ + R'ᵀ (δv t + ½ δa t²),   ν' = R'ᵀ (δv + δa t) + [w']× φ'
 Transition transition(const NavigationState& s, const InertialStep& step, const InertialNoise& noise, double gravity) {
   const Integrated i = integrate(s, step, gravity);
   const double t = step.seconds;
   Transition r = blank();
-  const Eigen::Matrix3d back = (i.before.transpose() * i.after).transpose();
-  const Eigen::Matrix3d turn_by_bias = -t * left_jacobian_so3(-i.turn);
+  const Eigen::Matrix3d to_body = i.after.transpose(), back = to_body * i.before;
+  const Eigen::Vector3d after = back * s.velocity_m_s + t * (to_body * i.acceleration);  // w'
 
-  Eigen::Matrix<double, 3, kMoving> accel = Eigen::Matrix<double, 3, kMoving>::Zero();
-  const Eigen::Matrix3d by_turn = -0.5 * i.after * skew(i.force_to);
-  accel.middleCols<3>(kAttitude) = -0.5 * i.before * skew(i.force_from) + by_turn * back;
-  accel.middleCols<3>(kGyroBias) = by_turn * turn_by_bias;
+  using Rows = Eigen::Matrix<double, 3, kMoving>;
+  Rows turn = Rows::Zero(), velocity = Rows::Zero(), accel = Rows::Zero();
+  turn.middleCols<3>(kAttitude) = back;
+  turn.middleCols<3>(kGyroBias) = -t * left_jacobian_so3(-i.turn);
+  velocity.middleCols<3>(kVelocity) = i.before;
+  velocity.middleCols<3>(kAttitude) = -i.before * skew(s.velocity_m_s);
+  accel = -0.5 * i.after * skew(i.force_to) * turn;
+  accel.middleCols<3>(kAttitude) -= 0.5 * i.before * skew(i.force_from);
   accel.middleCols<3>(kAccelBias) = -0.5 * (i.before + i.after);
   const Eigen::Matrix<double, 3, 2> accel_by_tilt = -gravity * true_up_jacobian(s.gravity_tilt_rad);
 
-  const Eigen::Matrix3d to_body = i.after.transpose();
-  r.by_moving.block<3, 3>(kAttitude, kAttitude) = back;
-  r.by_moving.block<3, 3>(kAttitude, kGyroBias) = turn_by_bias;
-  r.by_moving.middleRows<3>(kVelocity) += t * accel;
+  r.by_moving.middleRows<3>(kAttitude) = turn;
+  r.by_moving.middleRows<3>(kVelocity) = to_body * (velocity + t * accel) + skew(after) * turn;
+  r.by_moving.middleRows<3>(kPosition) = to_body * (t * velocity + 0.5 * t * t * accel);
   r.by_moving.block<3, 3>(kPosition, kPosition) = back;
-  r.by_moving.block<3, 3>(kPosition, kVelocity) += t * to_body;
-  r.by_moving.middleRows<3>(kPosition) += 0.5 * t * t * to_body * accel;
-  r.by_tilt.middleRows<3>(kVelocity) = t * accel_by_tilt;
+  r.by_tilt.middleRows<3>(kVelocity) = t * to_body * accel_by_tilt;
   r.by_tilt.middleRows<3>(kPosition) = 0.5 * t * t * to_body * accel_by_tilt;
 
-  add_white_noise(r, noise.accel * noise.accel, noise.gyro * noise.gyro, t, to_body);
+  add_white_noise(r, noise.accel * noise.accel, noise.gyro * noise.gyro, t);
   r.noise.block<3, 3>(kGyroBias, kGyroBias).diagonal().array() += noise.gyro_walk * noise.gyro_walk * t;
   r.noise.block<3, 3>(kAccelBias, kAccelBias).diagonal().array() += noise.accel_walk * noise.accel_walk * t;
   return r;
 }
 
-// v' = R' Rᵀ v: the velocity turns with the body; p' = p + ½ (v + v') t.
+// The velocity w stays in the body: p' = p + ½ (R + R') w t.
 NavigationState propagate(const NavigationState& s, const SteadyStep& step) {
   NavigationState r = s;
-  const Eigen::Quaterniond after = s.world_from_body.rotation() * exp_so3(step.rate_rad_s * step.seconds);
-  r.velocity_m_s = after * (s.world_from_body.rotation().conjugate() * s.velocity_m_s);
-  r.world_from_body = {after, s.world_from_body.translation() + 0.5 * step.seconds * (s.velocity_m_s + r.velocity_m_s)};
+  const Eigen::Quaterniond before = s.world_from_body.rotation(),
+                           after = before * exp_so3(step.rate_rad_s * step.seconds);
+  r.world_from_body = {
+      after, s.world_from_body.translation() + 0.5 * step.seconds * (before * s.velocity_m_s + after * s.velocity_m_s)};
   return r;
 }
 
-// With w = Rᵀ v: δv' = R ΔR Rᵀ δv + R (ΔR [w]× − [ΔR w]×) φ.
+// ρ' = ΔRᵀ ρ + ½ t (ΔRᵀ (ν − [w]× φ) + ν − [w]× φ'),   φ' = ΔRᵀ φ,   ν' = ν
 Transition transition(const NavigationState& s, const SteadyStep& step, const SteadyNoise& noise) {
   const double t = step.seconds;
   Transition r = blank();
-  const Eigen::Matrix3d before = s.world_from_body.rotation_matrix();
-  const Eigen::Matrix3d turn = exp_so3(step.rate_rad_s * t).toRotationMatrix(), to_body = (before * turn).transpose();
-  const Eigen::Vector3d in_body = before.transpose() * s.velocity_m_s;
-  const Eigen::Matrix3d by_velocity = before * turn * before.transpose();
-  const Eigen::Matrix3d by_attitude = before * (turn * skew(in_body) - skew(turn * in_body));
-  r.by_moving.block<3, 3>(kAttitude, kAttitude) = turn.transpose();
-  r.by_moving.block<3, 3>(kVelocity, kVelocity) = by_velocity;
-  r.by_moving.block<3, 3>(kVelocity, kAttitude) = by_attitude;
-  r.by_moving.block<3, 3>(kPosition, kPosition) = turn.transpose();
-  r.by_moving.block<3, 3>(kPosition, kVelocity) = 0.5 * t * to_body * (Eigen::Matrix3d::Identity() + by_velocity);
-  r.by_moving.block<3, 3>(kPosition, kAttitude) = 0.5 * t * to_body * by_attitude;
+  const Eigen::Matrix3d back = exp_so3(step.rate_rad_s * t).toRotationMatrix().transpose();
+  const Eigen::Matrix3d speed = skew(s.velocity_m_s);
+  r.by_moving.block<3, 3>(kAttitude, kAttitude) = back;
+  r.by_moving.block<3, 3>(kPosition, kPosition) = back;
+  r.by_moving.block<3, 3>(kPosition, kVelocity) = 0.5 * t * (back + Eigen::Matrix3d::Identity());
+  r.by_moving.block<3, 3>(kPosition, kAttitude) = -0.5 * t * (back * speed + speed * back);
   add_white_noise(r, noise.velocity_m_s_sqrt_hz * noise.velocity_m_s_sqrt_hz,
-                  noise.attitude_rad_sqrt_hz * noise.attitude_rad_sqrt_hz, t, to_body);
+                  noise.attitude_rad_sqrt_hz * noise.attitude_rad_sqrt_hz, t);
   return r;
 }
 

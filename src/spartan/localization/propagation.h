@@ -36,7 +36,7 @@ struct Transition {
 };
 
 /// Mid-point integration: the mean rate turns; the mean of the specific forces at both ends, each turned into the
-/// world, accelerates. p' = p + v t + ½ a t², v' = v + a t, with a = ½ (R f₀ + R' f₁) − g · up.
+/// world, accelerates. p' = p + v t + ½ a t², v' = v + a t in the world, with a = ½ (R f₀ + R' f₁) − g · up.
 NavigationState propagate(const NavigationState& state, const InertialStep& step, double gravity_m_s2);
 Transition transition(const NavigationState& state, const InertialStep& step, const InertialNoise& noise,
                       double gravity_m_s2);

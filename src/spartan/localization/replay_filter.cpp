@@ -90,11 +90,13 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
 
 ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(options), filter_(options) {}
 
-void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body) {
+void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
+                         const std::optional<Eigen::Vector3d>& up_in_body) {
   if (started()) throw std::logic_error("the localization has started already");
   const auto later = std::partition_point(entries_.begin(), entries_.end(),
                                           [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
-  filter_.start(stamp, ahead_in_body, std::span(entries_.data(), static_cast<std::size_t>(later - entries_.begin())));
+  filter_.start(stamp, ahead_in_body, std::span(entries_.data(), static_cast<std::size_t>(later - entries_.begin())),
+                up_in_body);
   entries_.erase(entries_.begin(), later);
   start_ = stamp;
   newest_ = any_ ? std::max(newest_, stamp) : stamp;

@@ -18,7 +18,7 @@ class ReplayFilter {
 
   /// Samples up to `stamp` that were added before lay the world; later ones follow at once. Throws where it has
   /// started.
-  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body);
+  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {});
   bool started() const { return filter_.memory().started; }
 
   /// Nothing where the measurement was taken; else why it was not. Whatever the order of arrival, the state is the

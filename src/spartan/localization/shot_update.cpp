@@ -16,6 +16,8 @@ using namespace error_at;
 constexpr double kUnmeasuredFactor = 99;
 /// Where vision overrules the prediction, its error is taken to be so many times what was found.
 constexpr double kOverruledFactor = 10;
+/// Even what stays for a drive is forgotten after so many shots, so that the filter never gets too sure of it.
+constexpr double kConstantSteps = 5000;
 constexpr double kLeastVariance = 1e-14;
 
 Matrix6d usable_covariance(const Matrix6d& stated, double factor) {
@@ -46,6 +48,7 @@ void ErrorStateFilter::take(const RelativeMotion& motion) {
       memory_.vision.rate_rad_s = log_so3(motion_since_clone(s, kVisionClone).clone_from_body.rotation()) / seconds;
     }
   }
+  end_step_at_shot(motion.to);
   begin_shot(motion.to);
 }
 
@@ -56,11 +59,10 @@ bool ErrorStateFilter::measure_motion(const RelativeMotion& motion) {
   const Pose& measured = motion.previous_from_current;
   vision.stood = measured.translation().isZero(1e-12) && measured.rotation().vec().isZero(1e-12);
 
-  const double stays = vision.stood ? 1 : std::exp(-1 / options_.vision.drift_steps);
-  memory_.belief.state.vision_drift *= stays;
-  p.middleRows<6>(kVisionDrift) *= stays;
-  p.middleCols<6>(kVisionDrift) *= stays;
-  p.diagonal().segment<6>(kVisionDrift) += (1 - stays * stays) * drift_sigmas_.cwiseAbs2();
+  if (!vision.stood) {
+    let_drift(kVisionDrift, drift_sigmas_, options_.vision.drift_steps);
+    let_drift(kVisionConstant, constant_sigmas_, kConstantSteps);
+  }
 
   const bool predicted = vision.unmeasured_s == 0;
   p.topLeftCorner<9, 9>() += kUnmeasuredFactor * vision.unmeasured_noise;
@@ -78,6 +80,17 @@ bool ErrorStateFilter::measure_motion(const RelativeMotion& motion) {
     return false;
   correct_motion(innovation, kVisionClone);
   return true;
+}
+
+/// One step of a Gauss-Markov process.
+void ErrorStateFilter::let_drift(int index, const Vector6d& sigmas, double steps) {
+  const double stays = std::exp(-1 / steps);
+  NavigationState& s = memory_.belief.state;
+  ErrorCovariance& p = memory_.belief.covariance;
+  (index == kVisionDrift ? s.vision_drift : s.vision_constant) *= stays;
+  p.middleRows<6>(index) *= stays;
+  p.middleCols<6>(index) *= stays;
+  p.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
 }
 
 /// Vision and prediction differ, and nothing speaks for the prediction: it is forgotten, along with the motion since
@@ -102,11 +115,10 @@ bool ErrorStateFilter::overrule_prediction(const Innovation& innovation, double 
 
 /// Wheels that agree with the prediction and not with vision: two against one.
 bool ErrorStateFilter::wheels_confirm_prediction(const RelativeMotion& motion) const {
-  const WheelMemory& wheels = memory_.wheels;
-  if (!wheels.known || !memory_.step.has_wheels || memory_.step.shot_since) return false;
+  const std::optional<WheelSample> wheels = wheels_at(motion.to);
+  if (!wheels || !memory_.step.has_wheels || memory_.step.from != motion.from) return false;
   if (memory_.judge(LocalizationSensor::wheels).state != SensorState::ok) return false;
-  if (seconds_between(wheels.last.stamp, motion.to) > 0.5) return false;
-  const WheelStep step = step_to(wheels.last);
+  const WheelStep step = step_to(*wheels);
   const double counted = memory_.belief.state.wheel_scale * step.counted_m;
   const double sigma =
       std::hypot(step.forward_sigma_m, std::sqrt(memory_.belief.covariance(kWheelScale, kWheelScale)) * step.counted_m);
@@ -150,7 +162,6 @@ void ErrorStateFilter::begin_shot(Stamp stamp) {
   memory_.imu.turn.setIdentity();
   memory_.imu.turn_s = 0;
   memory_.imu.turn_whole = memory_.imu.known;
-  memory_.step.shot_since = true;
   clone_pose(memory_.belief, kVisionClone);
 }
 

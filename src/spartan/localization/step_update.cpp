@@ -12,6 +12,9 @@ using namespace error_at;
 
 /// Shorter steps are not worth a measurement; over much longer ones a mean attitude says nothing.
 constexpr double kShortestStep_s = 0.2, kLongestSteps = 4;
+/// A step whose length is known so much better than the wheels can tell only teaches their scale: slip stays the same
+/// over many steps, and its sum would otherwise pass for an error of vision that lasts.
+constexpr double kKnownWell = 0.5;
 /// How old the last sign of the wheels, or of vision, may be to say that the rover stands.
 constexpr double kFreshWheels_s = 0.5, kFreshShot_s = 3;
 
@@ -24,18 +27,36 @@ void ErrorStateFilter::take(const WheelSample& sample) {
   if (!wheels.known || std::abs(sample.left_m - wheels.moved.left_m) > still.wheels_still_m ||
       std::abs(sample.right_m - wheels.moved.right_m) > still.wheels_still_m)
     wheels.moved = sample;
-  wheels.known = true;
+  wheels.previous = wheels.known ? wheels.last : sample;
   wheels.last = sample;
+  wheels.known = true;
   if (memory_.step.standing) return;
-  if (!memory_.step.has_wheels) {
-    begin_step();
-    return;
-  }
   const double seconds = seconds_between(memory_.step.from, sample.stamp);
-  const bool due = memory_.step.shot_since || seconds >= options_.wheels.longest_step_s;
-  if (!due || seconds < kShortestStep_s) return;
-  if (seconds <= kLongestSteps * options_.wheels.longest_step_s) measure_step(sample);
-  begin_step();
+  if (memory_.step.has_wheels && seconds < options_.wheels.longest_step_s) return;
+  if (memory_.step.has_wheels && seconds <= kLongestSteps * options_.wheels.longest_step_s) measure_step(sample);
+  begin_step(sample);
+}
+
+/// What the wheels count at a moment just behind their last sample: they go on turning as they did.
+std::optional<WheelSample> ErrorStateFilter::wheels_at(Stamp stamp) const {
+  const WheelMemory& w = memory_.wheels;
+  if (!w.known) return std::nullopt;
+  const double apart = seconds_between(w.previous.stamp, w.last.stamp), beyond = seconds_between(w.last.stamp, stamp);
+  if (beyond > kFreshWheels_s || beyond > 1.5 * apart) return std::nullopt;
+  const double part = apart > 0 ? beyond / apart : 0;
+  return WheelSample{stamp, w.last.left_m + part * (w.last.left_m - w.previous.left_m),
+                     w.last.right_m + part * (w.last.right_m - w.previous.right_m)};
+}
+
+/// Steps end with shots, so that vision and wheels speak of the same motion.
+void ErrorStateFilter::end_step_at_shot(Stamp stamp) {
+  if (memory_.step.standing) return;
+  const std::optional<WheelSample> wheels = wheels_at(stamp);
+  const double seconds = seconds_between(memory_.step.from, stamp);
+  if (wheels && memory_.step.has_wheels && seconds >= kShortestStep_s &&
+      seconds <= kLongestSteps * options_.wheels.longest_step_s)
+    measure_step(*wheels);
+  begin_step(wheels);
 }
 
 WheelStep ErrorStateFilter::step_to(const WheelSample& sample) const {
@@ -67,8 +88,15 @@ void ErrorStateFilter::measure_step(const WheelSample& sample) {
   const bool slips = !(length_square <= gates_[1]);
   const double square = slips ? length_square : normalised_square(memory_.belief.covariance, whole);
   const int rows = slips ? 1 : whole.rows();
-  if (judge(LocalizationSensor::wheels, square, rows, slips ? HealthReason::slips : HealthReason::disagrees))
-    correct_motion(whole, kStepClone);
+  if (judge(LocalizationSensor::wheels, square, rows, slips ? HealthReason::slips : HealthReason::disagrees)) {
+    const StepForward known = forward_of_step(memory_.belief.state);
+    const double variance = known.jacobian * memory_.belief.covariance * known.jacobian.transpose();
+    if (variance < std::pow(kKnownWell * step.forward_sigma_m, 2)) {
+      correct_only(memory_.belief, forward, kWheelScale);
+    } else {
+      correct_motion(whole, kStepClone);
+    }
+  }
   state_slip(step);
 }
 
@@ -86,13 +114,12 @@ void ErrorStateFilter::state_slip(const WheelStep& step) {
   wheels.slip_stamp = memory_.stamp;
 }
 
-void ErrorStateFilter::begin_step() {
+void ErrorStateFilter::begin_step(const std::optional<WheelSample>& wheels) {
   StepMemory& step = memory_.step;
   step.from = memory_.stamp;
   step.odom_from_clone = memory_.world_from_odom.inverse() * memory_.belief.state.world_from_body;
-  step.has_wheels = memory_.wheels.known && seconds_between(memory_.wheels.last.stamp, memory_.stamp) < kFreshWheels_s;
-  step.wheels = memory_.wheels.last;
-  step.shot_since = false;
+  step.has_wheels = wheels.has_value();
+  if (wheels) step.wheels = *wheels;
   clone_pose(memory_.belief, kStepClone);
 }
 
@@ -120,7 +147,7 @@ void ErrorStateFilter::hold_still(bool imu_still) {
     return;
   }
   if (!step.standing) {
-    begin_step();
+    begin_step(wheels_at(memory_.stamp));
     step.standing = true;
     return;
   }
@@ -130,7 +157,7 @@ void ErrorStateFilter::hold_still(bool imu_still) {
   const Innovation innovation =
       relative_motion_innovation(memory_.belief.state, kStepClone, Pose(), covariance, Vector6d::Zero());
   if (normalised_square(memory_.belief.covariance, innovation) > gates_[6]) {
-    begin_step();
+    begin_step(wheels_at(memory_.stamp));
     return;
   }
   correct_motion(innovation, kStepClone);

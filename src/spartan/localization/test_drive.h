@@ -155,7 +155,7 @@ inline LocalizationOptions test_options() {
   LocalizationOptions o;
   o.gravity_m_s2 = 3.71;
   o.vision.white_factor = 1;
-  o.vision.drift_sigmas = {0, 0, 0, 0, 0, 0};
+  o.vision.drift_sigmas = o.vision.constant_sigmas = {0, 0, 0, 0, 0, 0};
   return o;
 }
 
@@ -174,7 +174,7 @@ inline NavigationState random_navigation_state(Random& random) {
   s.wheel_scale = random.uniform(0.9, 1.1);
   s.compass_offset_rad = random.uniform(-3, 3);
   s.inclinometer_bias_rad = {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)};
-  for (int i = 0; i < 6; ++i) s.vision_drift[i] = random.normal();
+  for (int i = 0; i < 6; ++i) s.vision_drift[i] = random.normal(), s.vision_constant[i] = random.normal();
   s.world_from_vision_clone = s.world_from_body * exp_se3(tangent(0.3, 0.2));
   s.world_from_step_clone = s.world_from_body * exp_se3(tangent(0.3, 0.2));
   return s;

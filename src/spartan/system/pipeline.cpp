@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "spartan/localization/start_frame.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/system/position_stage.h"
 
@@ -54,6 +55,8 @@ struct Pipeline::State {
   bool maps_positions = false;
   StageClock clock;
 
+  std::optional<Eigen::Vector3d> up_in_body;  // at the start, as level() was told
+
   // The memory from frame to frame.
   bool started = false;
   Stamp last_stamp;
@@ -75,7 +78,7 @@ struct Pipeline::State {
 };
 
 void Pipeline::State::start(const RectifiedPair& shot) {
-  localizer.start(shot.stamp, shot.body_from_left.rotation() * Eigen::Vector3d::UnitZ());
+  localizer.start(shot.stamp, shot.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body);
   slam = {localizer.estimate().world_from_body.pose, Matrix6d::Zero()};
   world_from_left = {slam.pose * shot.body_from_left, Matrix6d::Zero()};
   started = true;
@@ -165,6 +168,10 @@ Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
+void Pipeline::level(std::span<const ImuSample> at_rest) {
+  if (const auto rest = read_rest(at_rest, with_gravity(state_->options)))
+    state_->up_in_body = rest->accel_m_s2.normalized();
+}
 void Pipeline::add(const ImuSample& sample) {
   state_->localizer.add(sample);
 }

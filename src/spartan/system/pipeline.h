@@ -65,6 +65,10 @@ class Pipeline {
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
 
+  /// Samples of a rover that surely rests, where they cannot be added before the first frame: they say where up is if
+  /// no other sample does.
+  void level(std::span<const ImuSample> at_rest);
+
   /// Those that come before the first frame level the world and tell where east is.
   void add(const ImuSample& sample);
   void add(const WheelSample& sample);

@@ -169,6 +169,19 @@ TEST(Pipeline, MeasuresGravityBeforeTheFirstFrame) {
   EXPECT_NEAR((first.world_from_body.pose.rotation() * Eigen::Vector3d::UnitX()).z(), std::sin(tilt), 1e-9);
 }
 
+// A recording whose IMU begins with the camera.
+TEST(Pipeline, IsLevelledByTheFirstSecondWhereNothingCameBefore) {
+  Pipeline pipeline = pipeline_of();
+  const double tilt = 0.1;
+  std::vector<ImuSample> first_second;
+  for (int i = 0; i < 50; ++i)
+    first_second.push_back({{i * 10'000'000LL}, {0, 0, 0}, 9.81 * Eigen::Vector3d(std::sin(tilt), 0, std::cos(tilt))});
+  pipeline.level(first_second);
+  const FrameResult first = push(pipeline, 0);
+  EXPECT_TRUE(pipeline.gravity_measured());
+  EXPECT_NEAR((first.world_from_body.pose.rotation() * Eigen::Vector3d::UnitX()).z(), std::sin(tilt), 1e-9);
+}
+
 TEST(Pipeline, OtherPairsOfTheRigGiveNothingByThemselves) {
   Pipeline pipeline = pipeline_of();
   EXPECT_EQ(pipeline.odometry_pair(), "narrow");

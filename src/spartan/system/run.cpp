@@ -19,6 +19,8 @@
 namespace spartan {
 namespace {
 
+constexpr double kSecondsAtRest = 1;
+
 // FNV-1a over what identifies a recording without reading its images: layout, pairs and announced stamps.
 std::string fingerprint(const FrameSource& source) {
   std::uint64_t hash = 14695981039346656037ULL;
@@ -117,6 +119,10 @@ Status Drive::begin() {
   auto memory = store_.memory();
   if (!memory) return failure(memory);
   if (!*memory) {
+    // Recordings often begin with camera and IMU together, and a rover that rests.
+    const auto imu = source_.imu_samples({}, kSecondsAtRest);
+    if (!imu) return failure(imu);
+    pipeline_.level(*imu);
     return {};
   }
   const auto frames = store_.frames();

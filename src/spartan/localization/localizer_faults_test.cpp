@@ -1,0 +1,299 @@
+// Sensors that are late, silent, broken or lie.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "spartan/localization/chi_square.h"
+#include "spartan/localization/localizer.h"
+#include "spartan/localization/test_drive.h"
+
+namespace spartan {
+namespace {
+
+using Samples = std::vector<Measurement>;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Samples whole_drive(double seconds, const TestSensors& with, std::uint64_t seed) {
+  const TestDrive drive;
+  return in_order(test_samples(drive, seconds, with, seed), test_motions(drive, seconds, 1, seed + 1));
+}
+
+bool within(const Measurement& m, double from, double to) {
+  return stamp_of_measurement(m) >= test_stamp(from) && stamp_of_measurement(m) < test_stamp(to);
+}
+
+// The world's first attitude is what the readings of the start made it.
+Pose first_pose_of(const Samples& all) {
+  Samples before;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(before),
+               [](const Measurement& m) { return stamp_of_measurement(m) <= test_stamp(2.5); });
+  Localizer localizer(test_options());
+  for (const Measurement& m : before) add_to(localizer, m);
+  localizer.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
+  return localizer.estimate().world_from_body.pose;
+}
+
+void expect_consistent(const LocalizationEstimate& e, const Samples& all) {
+  const TestDrive drive;
+  const double t = seconds_between(test_stamp(0), e.stamp);
+  const Pose truth = first_pose_of(all) * drive.at(2.5).inverse() * drive.at(t);
+  const Vector6d error = log_se3(e.world_from_body.pose.inverse() * truth);
+  EXPECT_LE(error.dot(e.world_from_body.covariance.inverse() * error), chi_square_quantile(0.9999, 6))
+      << error.transpose();
+}
+
+SensorHealth health_at(const Samples& all, double t, LocalizationSensor sensor) {
+  Samples until;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(until),
+               [&](const Measurement& m) { return stamp_of_measurement(m) <= test_stamp(t); });
+  return driven(test_options(), until).estimate().health_of(sensor);
+}
+
+TEST(LocalizerFaults, CompassThatLiesIsExcludedAndComesBack) {
+  Samples all = whole_drive(82.5, {}, 41);
+  for (Measurement& m : all) {
+    if (auto* compass = std::get_if<CompassSample>(&m); compass && within(m, 20, 35)) compass->heading_rad += 1.0;
+  }
+  const SensorHealth lying = health_at(all, 34.5, LocalizationSensor::compass);
+  EXPECT_EQ(lying.state, SensorState::excluded);
+  EXPECT_THAT(lying.reason, ::testing::HasSubstr("disagrees"));
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::compass).state, SensorState::ok);
+  EXPECT_GE(end.health_of(LocalizationSensor::compass).rejected, 15);
+  expect_consistent(end, all);
+}
+
+TEST(LocalizerFaults, CompassThatHasChangedForGoodComesBackWithAnotherOffset) {
+  Samples all = whole_drive(82.5, {}, 53);
+  for (Measurement& m : all) {
+    if (auto* compass = std::get_if<CompassSample>(&m); compass && within(m, 20, 1e3)) compass->heading_rad -= 0.5;
+  }
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::compass).state, SensorState::ok);
+  EXPECT_NEAR(*end.heading.compass_offset_rad, -0.5, 0.05);
+  expect_consistent(end, all);
+}
+
+TEST(LocalizerFaults, CompassThatStartsLateFindsItsOffset) {
+  Samples all = whole_drive(62.5, {}, 42);
+  std::erase_if(all, [](const Measurement& m) { return m.index() == 3 && within(m, 0, 20); });
+  for (Measurement& m : all) {
+    if (auto* compass = std::get_if<CompassSample>(&m)) compass->heading_rad += 2.0;
+  }
+  std::get<CompassSample>(*std::find_if(all.begin(), all.end(), [](const Measurement& m) {
+    return m.index() == 3;
+  })).heading_rad = -1;  // the very first one is an outlier
+  const LocalizationEstimate e = driven(test_options(), all).estimate();
+  EXPECT_FALSE(e.heading.east);
+  ASSERT_TRUE(e.heading.compass_offset_rad.has_value());
+  EXPECT_NEAR(*e.heading.compass_offset_rad, 2.0, 4 * e.heading.compass_offset_sigma_rad);
+  EXPECT_LT(e.heading.compass_offset_sigma_rad, 0.01);
+  EXPECT_LE(e.health_of(LocalizationSensor::compass).rejected, 2) << "the outlier did not become the offset";
+  expect_consistent(e, all);
+}
+
+TEST(LocalizerFaults, SlippingWheelsAreExcludedAndTheSlipIsStated) {
+  Samples all = whole_drive(82.5, {}, 43);
+  double slipped = 0;
+  WheelSample last{};
+  for (Measurement& m : all) {
+    auto* wheels = std::get_if<WheelSample>(&m);
+    if (wheels == nullptr) continue;
+    const WheelSample now = *wheels;
+    if (within(m, 20, 40)) slipped += 4 * (now.left_m - last.left_m);
+    last = now;
+    wheels->left_m += slipped;
+    wheels->right_m += slipped;
+  }
+  Samples until;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(until),
+               [](const Measurement& m) { return stamp_of_measurement(m) <= test_stamp(38); });
+  const LocalizationEstimate slipping = driven(test_options(), until).estimate();
+  EXPECT_EQ(slipping.health_of(LocalizationSensor::wheels).state, SensorState::excluded);
+  EXPECT_THAT(slipping.health_of(LocalizationSensor::wheels).reason, ::testing::HasSubstr("slip"));
+  ASSERT_TRUE(slipping.slip.has_value());
+  EXPECT_NEAR(slipping.slip->slip, 1 - 0.98 / 5, 4 * slipping.slip->sigma);
+  EXPECT_LT(slipping.slip->sigma, 0.05);
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::wheels).state, SensorState::ok);
+  EXPECT_NEAR(end.slip->slip, 0.02, 4 * end.slip->sigma);
+  expect_consistent(end, all);
+}
+
+TEST(LocalizerFaults, FrozenImuIsExcludedAndComesBack) {
+  Samples all = whole_drive(62.5, {}, 44);
+  ImuSample held;
+  for (Measurement& m : all) {
+    auto* imu = std::get_if<ImuSample>(&m);
+    if (imu == nullptr) continue;
+    if (!within(m, 20, 30)) {
+      held = *imu;
+    } else {
+      imu->gyro_rad_s = held.gyro_rad_s;
+      imu->accel_m_s2 = held.accel_m_s2;
+    }
+  }
+  const SensorHealth frozen = health_at(all, 25, LocalizationSensor::imu);
+  EXPECT_EQ(frozen.state, SensorState::excluded);
+  EXPECT_THAT(frozen.reason, ::testing::HasSubstr("same reading"));
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::imu).state, SensorState::ok);
+  expect_consistent(end, all);
+}
+
+TEST(LocalizerFaults, VisionOverrulesAnImuThatLies) {
+  Samples all = whole_drive(92.5, {}, 45);
+  for (Measurement& m : all) {
+    auto* imu = std::get_if<ImuSample>(&m);
+    if (imu != nullptr && within(m, 20, 40)) imu->gyro_rad_s.z() += 0.3, imu->accel_m_s2.x() += 2;
+  }
+  const SensorHealth lying = health_at(all, 35, LocalizationSensor::imu);
+  EXPECT_EQ(lying.state, SensorState::excluded);
+  EXPECT_THAT(lying.reason, ::testing::HasSubstr("vision saw another motion"));
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::imu).state, SensorState::ok);
+  EXPECT_EQ(end.health_of(LocalizationSensor::vision).state, SensorState::ok);
+  expect_consistent(end, all);
+}
+
+TEST(LocalizerFaults, VisionIsRefusedWhereImuAndWheelsAgreeAgainstIt) {
+  Samples all = whole_drive(62.5, {}, 46);
+  int spoiled = 0;
+  for (Measurement& m : all) {
+    auto* motion = std::get_if<RelativeMotion>(&m);
+    if (motion == nullptr || !within(m, 30, 33)) continue;
+    motion->previous_from_current = Pose::from_translation({0.5, 0, 0}) * motion->previous_from_current;
+    ++spoiled;
+  }
+  ASSERT_EQ(spoiled, 2);
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::vision).rejected, 2);
+  EXPECT_EQ(end.health_of(LocalizationSensor::vision).state, SensorState::ok);
+  expect_consistent(end, all);
+}
+
+TEST(LocalizerFaults, GoesOnInTheDark) {
+  for (const int mask : {0, 1, 2, 3, 15}) {
+    SCOPED_TRACE(mask);
+    Samples all = whole_drive(62.5, {(mask & 1) != 0, (mask & 2) != 0, (mask & 4) != 0, (mask & 8) != 0}, 47);
+    for (Measurement& m : all) {
+      if (auto* motion = std::get_if<RelativeMotion>(&m); motion && within(m, 30, 40)) motion->measured = false;
+    }
+    const SensorHealth dark = health_at(all, 38, LocalizationSensor::vision);
+    EXPECT_EQ(dark.state, SensorState::suspect);
+    EXPECT_THAT(dark.reason, ::testing::HasSubstr("could not measure"));
+    const LocalizationEstimate end = driven(test_options(), all).estimate();
+    EXPECT_EQ(end.health_of(LocalizationSensor::vision).state, SensorState::ok);
+    expect_consistent(end, all);
+    if (mask == 15) {
+      EXPECT_LT(end.world_from_body.covariance.diagonal().head<3>().maxCoeff(), 0.05 * 0.05);
+    }
+  }
+}
+
+TEST(LocalizerFaults, ImuThatStartsLateFindsGravity) {
+  // The rover starts on a slope without any level; its IMU wakes up after 20 s.
+  Samples all = whole_drive(72.5, {true, false, false, false}, 48);
+  const TestDrive drive;
+  std::erase_if(all, [](const Measurement& m) { return m.index() == 0 && within(m, 0, 20); });
+  const Eigen::Quaterniond slope = Eigen::Quaterniond(Eigen::AngleAxisd(0.9, Eigen::Vector3d::UnitY()));
+  for (Measurement& m : all) {
+    auto* imu = std::get_if<ImuSample>(&m);
+    if (imu == nullptr) continue;
+    const Pose pose = drive.at(seconds_between(test_stamp(0), imu->stamp));
+    const Eigen::Vector3d g(0, 0, drive.gravity_m_s2);
+    imu->accel_m_s2 += pose.rotation().conjugate() * (slope * g - g);
+  }
+  Samples until;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(until),
+               [](const Measurement& m) { return within(m, 0, 21.2); });
+  const Eigen::Vector3d soon = driven(test_options(), until).estimate().up_in_world;
+  EXPECT_LE((soon - slope * Eigen::Vector3d::UnitZ()).norm(), 0.03) << "at once, whatever the slope";
+  const LocalizationEstimate e = driven(test_options(), all).estimate();
+  EXPECT_FALSE(e.gravity_measured);
+  EXPECT_EQ(e.health_of(LocalizationSensor::imu).state, SensorState::ok);
+  EXPECT_GT(e.health_of(LocalizationSensor::imu).used, 5000);
+  EXPECT_LE((e.up_in_world - slope * Eigen::Vector3d::UnitZ()).norm(), 0.005);
+  expect_consistent(e, all);
+}
+
+TEST(LocalizerFaults, RefusesAndCountsWhatMakesNoSense) {
+  Localizer localizer(test_options());
+  localizer.add(ImuSample{test_stamp(0), {kNan, 0, 0}, {0, 0, 3.71}});
+  localizer.start(test_stamp(1), Eigen::Vector3d::UnitX());
+  EXPECT_FALSE(localizer.add(WheelSample{test_stamp(1.1), kNan, 0}));
+  EXPECT_FALSE(localizer.add(CompassSample{test_stamp(1.1), 0, kNan}));
+  EXPECT_FALSE(localizer.add(InclinometerSample{test_stamp(1.1), kNan, 0, 0.1}));
+  RelativeMotion motion{test_stamp(1), test_stamp(2), {}, Matrix6d::Identity(), true};
+  motion.covariance(1, 1) = -1;
+  EXPECT_FALSE(localizer.add(motion));
+  motion.covariance(1, 1) = kNan;
+  EXPECT_FALSE(localizer.add(motion));
+  EXPECT_FALSE(localizer.add(RelativeMotion{test_stamp(2), test_stamp(1), {}, Matrix6d::Identity(), true}));
+  EXPECT_FALSE(localizer.add(PoseConstraint{test_stamp(2), {}, kNan * Matrix6d::Identity()}));
+  EXPECT_FALSE(localizer.add(CompassSample{test_stamp(0.5), 0, 0.1}));
+  EXPECT_TRUE(localizer.add(CompassSample{test_stamp(1.5), 0, 0.1}));
+  EXPECT_FALSE(localizer.add(CompassSample{test_stamp(1.5), 0.1, 0.1}));
+  const LocalizationEstimate e = localizer.estimate();
+  EXPECT_EQ(e.health_of(LocalizationSensor::imu).not_finite, 1);
+  EXPECT_EQ(e.health_of(LocalizationSensor::vision).not_finite, 2);
+  EXPECT_EQ(e.health_of(LocalizationSensor::vision).reversed, 1);
+  EXPECT_EQ(e.health_of(LocalizationSensor::compass).duplicates, 1);
+  EXPECT_EQ(e.health_of(LocalizationSensor::compass).too_late, 1);
+  EXPECT_TRUE(e.world_from_body.pose.all_finite());
+}
+
+TEST(LocalizerFaults, HoldsStillWhileItStands) {
+  // 10 s without a shot, the IMU noisy, the wheels at rest.
+  const TestDrive drive;
+  Samples all = test_samples(drive, 2.5, {}, 49);
+  const auto later = test_samples({.speed_m_s = 0}, 12.5, {}, 49);
+  std::copy_if(later.begin(), later.end(), std::back_inserter(all),
+               [](const Measurement& m) { return stamp_of_measurement(m) > test_stamp(2.5); });
+  const LocalizationEstimate e = driven(test_options(), all).estimate();
+  const Pose moved = first_pose_of(all).inverse() * e.world_from_body.pose;
+  EXPECT_LE(moved.translation().norm(), 1.5e-3);
+  EXPECT_LE(std::sqrt(e.world_from_body.covariance(0, 0)), 1e-3);
+  LocalizationOptions o = test_options();
+  o.standing.enabled = false;
+  EXPECT_GT(std::sqrt(driven(o, all).estimate().world_from_body.covariance(0, 0)), 3e-3);
+}
+
+TEST(LocalizerFaults, WheelsThatStandDoNotLockARoverThatSlides) {
+  // Vision and IMU see the drive, the wheels never turn.
+  const TestDrive drive;
+  Samples all = test_samples(drive, 62.5, {true, false, false, false}, 50);
+  for (double t = 0; t < 62.5; t += 0.05) all.emplace_back(WheelSample{test_stamp(t), 0, 0});
+  all = in_order(all, test_motions(drive, 62.5, 1, 51));
+  const LocalizationEstimate e = driven(test_options(), all).estimate();
+  EXPECT_EQ(e.health_of(LocalizationSensor::wheels).state, SensorState::excluded);
+  EXPECT_EQ(e.health_of(LocalizationSensor::vision).state, SensorState::ok);
+  expect_consistent(e, all);
+}
+
+TEST(LocalizerFaults, SavesAndRestoresItsMemory) {
+  const Samples all = whole_drive(22.5, {}, 52);
+  const std::size_t half = all.size() / 2;
+  Localizer one = driven(test_options(), Samples(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(half)));
+  one.add(CompassSample{test_stamp(5), kNan, 0.1});
+  Localizer other(test_options());
+  ASSERT_TRUE(other.restore(one.save()).has_value());
+  EXPECT_EQ(other.save(), one.save());
+  for (std::size_t i = half; i < all.size(); ++i) {
+    add_to(one, all[i]);
+    add_to(other, all[i]);
+  }
+  EXPECT_EQ(other.save(), one.save());
+  EXPECT_EQ(other.estimate().health_of(LocalizationSensor::compass).not_finite, 1);
+  EXPECT_EQ(other.estimate().world_from_body.pose.matrix(), one.estimate().world_from_body.pose.matrix());
+  Bytes broken = one.save();
+  broken[0] = 99;
+  EXPECT_FALSE(other.restore(broken).has_value());
+  EXPECT_EQ(other.save(), one.save()) << "a refused memory changes nothing";
+}
+
+}  // namespace
+}  // namespace spartan
