@@ -1,6 +1,7 @@
 // Map merging from wrong starts, and what it does against drift. `make bench-map_matching`.
 //
-//   map_matching [--from FOLDER] [--noise FOLDER] [--scratch FOLDER] [--trials N] [--verbose 1] [PART...]
+//   map_matching [--from FOLDER] [--noise FOLDER] [--scratch FOLDER] [--trials N] [--seed N]
+//     [--set key=value,…] [--verbose 1] [PART...]
 //
 // PART: wrong_start, flat, drift (default: all). Recordings as scripts/recordings makes them; --noise: the same stops
 // under another noise seed, as scripts/recordings_with_other_noise makes them. --scratch keeps the stops' points.
@@ -68,8 +69,8 @@ int known_cells(const LocalMap& map) {
 GlobalMap build(const std::vector<const Stop3*>& stops) {
   GlobalMap map({}, 0.05);
   for (const Stop3* stop : stops)
-    static_cast<void>(map.add(stop->map, stop->points.stamp, {stop->points.world_from_body, Matrix6d::Zero()},
-                              Matrix6d::Zero()));
+    static_cast<void>(
+        map.add(stop->map, stop->points.stamp, {stop->points.world_from_body, Matrix6d::Zero()}, Matrix6d::Zero()));
   return map;
 }
 
@@ -111,7 +112,8 @@ Eigen::Vector3d in_ball(Random& random, double radius) {
 
 Matrix6d covariance_of(double radius_m, double radius_rad) {
   Matrix6d m = Matrix6d::Zero();  // of a ball: r²/5 along each axis
-  m.diagonal() << Eigen::Vector3d::Constant(radius_m * radius_m / 5), Eigen::Vector3d::Constant(radius_rad * radius_rad / 5);
+  m.diagonal() << Eigen::Vector3d::Constant(radius_m * radius_m / 5),
+      Eigen::Vector3d::Constant(radius_rad * radius_rad / 5);
   return m;
 }
 
@@ -136,12 +138,13 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
   const Vector6d xi = log_se3(o.match.world_from_body.inverse() * truth);
   o.nees = xi.dot(o.match.information * xi);
   if (verbose)
-    fmt::print("{:<16} {:>2} overlap {:.2f} {:<10} error {:6.1f} mm {:5.2f} deg sigma {:5.1f} mm {:5.2f} deg nees {:6.1f} det {} "
-               "cells {} blocks {} misfit {:.2f} lead {:.1f} cand {} {:.2f} s\n",
-               setting.scenario, setting.incoming, setting.overlap, name_of(o.match.verdict), 1000 * o.error_m,
-               o.error_deg, 1000 * o.match.sigma_m, o.match.sigma_rad / kDegree, o.nees, o.match.determined,
-               o.match.cells, o.match.blocks, o.match.misfit, o.match.lead,
-               o.match.candidates, o.seconds);
+    fmt::print(
+        "{:<16} {:>2} overlap {:.2f} {:<10} error {:6.1f} mm {:5.2f} deg sigma {:5.1f} mm {:5.2f} deg nees {:6.1f} det "
+        "{} "
+        "cells {} blocks {} misfit {:.2f} lead {:.1f} cand {} {:.2f} s\n",
+        setting.scenario, setting.incoming, setting.overlap, name_of(o.match.verdict), 1000 * o.error_m, o.error_deg,
+        1000 * o.match.sigma_m, o.match.sigma_rad / kDegree, o.nees, o.match.determined, o.match.cells, o.match.blocks,
+        o.match.misfit, o.match.lead, o.match.candidates, o.seconds);
   return o;
 }
 
@@ -203,11 +206,13 @@ void print(const std::string& name, const Tally& t) {
   for (const double n : t.nees) nees += n / static_cast<double>(t.nees.size());
   std::string verdicts;
   for (const auto& [verdict, count] : t.verdicts) verdicts += fmt::format(" {} {}", count, verdict);
-  fmt::print("| {} | {} | {} = {:.1f} % | {} | {:.1f}, {:.1f}, {:.1f} mm | {:.2f}, {:.2f}, {:.2f} deg | {:.1f} ({:.1f}) | {:.2f} s |{} |\n", name,
-             t.trials, t.recovered, 100.0 * t.recovered / std::max(t.trials, 1), t.false_success,
-             1000 * quantile(t.errors_m, 0.5), 1000 * quantile(t.errors_m, 0.95), 1000 * quantile(t.errors_m, 1),
-             quantile(t.errors_deg, 0.5), quantile(t.errors_deg, 0.95), quantile(t.errors_deg, 1), nees,
-             quantile(t.nees, 0.5), quantile(t.seconds, 0.5), verdicts);
+  fmt::print(
+      "| {} | {} | {} = {:.1f} % | {} | {:.1f}, {:.1f}, {:.1f} mm | {:.2f}, {:.2f}, {:.2f} deg | {:.1f} ({:.1f}) | "
+      "{:.2f} s |{} |\n",
+      name, t.trials, t.recovered, 100.0 * t.recovered / std::max(t.trials, 1), t.false_success,
+      1000 * quantile(t.errors_m, 0.5), 1000 * quantile(t.errors_m, 0.95), 1000 * quantile(t.errors_m, 1),
+      quantile(t.errors_deg, 0.5), quantile(t.errors_deg, 0.95), quantile(t.errors_deg, 1), nees, quantile(t.nees, 0.5),
+      quantile(t.seconds, 0.5), verdicts);
   std::fflush(stdout);
 }
 
@@ -219,7 +224,7 @@ struct Recordings {
   }
 };
 
-void wrong_start(const Recordings& recordings, int trials, bool verbose) {
+void wrong_start(const Recordings& recordings, int trials, int seed, bool verbose) {
   std::vector<Class> classes{{"15-30 %, earlier stops", 0.15, 0.30, {}},
                              {"30-46 %, earlier stops", 0.30, 0.46, {}},
                              {"46-80 %, both sides", 0.46, 0.80, {}},
@@ -235,8 +240,10 @@ void wrong_start(const Recordings& recordings, int trials, bool verbose) {
   }
   Tally all;
   std::map<std::string, Tally> by_scenario;
-  Random random(2011, 5);
-  fmt::print("| overlap | trials | recovered | success beyond 10 cm | error: median, 95 %, largest | angle | NEES mean (median) | time | verdicts |\n");
+  Random random(static_cast<std::uint64_t>(seed), 5);
+  fmt::print(
+      "| overlap | trials | recovered | success beyond 10 cm | error: median, 95 %, largest | angle | NEES mean "
+      "(median) | time | verdicts |\n");
   fmt::print("|---|---|---|---|---|---|---|---|---|\n");
   for (const Class& c : classes) {
     if (c.settings.empty()) {
@@ -317,7 +324,9 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
   sigma << Eigen::Vector3d::Constant(0.015), Eigen::Vector3d::Constant(0.5 * kDegree);
   fmt::print("loop, {:.1f} m between {} stops; odometry drawn with an ATE of 1.25 % = {:.3f} m\n", length, stops.size(),
              0.0125 * length);
-  fmt::print("| seed | odometry | map merging | cut | decided | largest error of a decided step |\n|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| seed | odometry | map merging | cut | decided | largest error of a decided step "
+      "|\n|---|---|---|---|---|---|\n");
   double sum = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
     Random random(static_cast<std::uint64_t>(seed), 7);
@@ -350,12 +359,13 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
       if (verbose) {
         const Pose off = stops[i].points.world_from_body.inverse() * result->corrected.pose;
         const Vector6d xi = log_se3(off);
-        fmt::print("  {:>2} {:<10} given off {:6.1f} mm, corrected {:6.1f} mm {:5.2f} deg, sigma {:.1f} mm, nees {:.1f}\n", i,
-                   name_of(result->match.verdict),
-                   1000 * (at.pose.translation() - stops[i].points.world_from_body.translation()).norm(),
-                   1000 * off.translation().norm(), rotation_angle(off) / kDegree,
-                   1000 * std::sqrt(result->corrected.covariance.diagonal().head<3>().maxCoeff()),
-                   i == 0 ? 0.0 : xi.dot(result->corrected.covariance.inverse() * xi));
+        fmt::print(
+            "  {:>2} {:<10} given off {:6.1f} mm, corrected {:6.1f} mm {:5.2f} deg, sigma {:.1f} mm, nees {:.1f}\n", i,
+            name_of(result->match.verdict),
+            1000 * (at.pose.translation() - stops[i].points.world_from_body.translation()).norm(),
+            1000 * off.translation().norm(), rotation_angle(off) / kDegree,
+            1000 * std::sqrt(result->corrected.covariance.diagonal().head<3>().maxCoeff()),
+            i == 0 ? 0.0 : xi.dot(result->corrected.covariance.inverse() * xi));
       }
       decided += result->decided() ? 1 : 0;
       at = result->corrected;
@@ -371,8 +381,12 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
 }
 
 void run(const std::vector<std::string>& words) {
-  RecordingArguments arguments = read_arguments(
-      words, {{"--scratch", "/tmp/spartan_map_matching"}, {"--noise", ""}, {"--trials", "300"}, {"--verbose", "0"}, {"--set", ""}});
+  RecordingArguments arguments = read_arguments(words, {{"--scratch", "/tmp/spartan_map_matching"},
+                                                        {"--noise", ""},
+                                                        {"--trials", "300"},
+                                                        {"--verbose", "0"},
+                                                        {"--set", ""},
+                                                        {"--seed", "2011"}});
   std::string sets = arguments.options.at("--set");
   while (!sets.empty()) {
     const auto comma = sets.find(',');
@@ -385,7 +399,7 @@ void run(const std::vector<std::string>& words) {
     return arguments.scenarios.empty() ||
            std::find(arguments.scenarios.begin(), arguments.scenarios.end(), part) != arguments.scenarios.end();
   };
-  if (wanted("wrong_start")) wrong_start(recordings, arguments.number("--trials"), verbose);
+  if (wanted("wrong_start")) wrong_start(recordings, arguments.number("--trials"), arguments.number("--seed"), verbose);
   if (wanted("drift")) drift(recordings, std::max(1, arguments.number("--trials") / 30), verbose);
   if (wanted("flat")) flat(recordings, arguments.number("--trials") / 10, verbose);
 }

@@ -130,6 +130,19 @@ TEST_F(Simulate, TheSameSeedGivesTheSameBytesWhateverTheThreads) {
   EXPECT_NE(content_of(path("other"))["truth/poses.tum"], one.at("truth/poses.tum"));
 }
 
+TEST_F(Simulate, AnotherNoiseSeedChangesTheImagesAlone) {
+  write("noisy.yaml", std::string(kSmallScenario) + "\nsensor: {noise_seed: 3}\n");
+  ASSERT_EQ(simulate("one").exit_code, 0);
+  ASSERT_EQ(run_program({"simulate", path("noisy.yaml"), "-o", path("other")}).exit_code, 0);
+  const auto one = content_of(path("one")), other = content_of(path("other"));
+  ASSERT_EQ(one.size(), other.size());
+  for (const auto& [name, content] : other) {
+    const bool image = name.starts_with("images/");
+    if (name == "truth/scenario.yaml") continue;
+    EXPECT_EQ(one.at(name) != content, image) << name;
+  }
+}
+
 TEST_F(Simulate, GoesOnAfterKillsAsIfNothingHadHappened) {
   ASSERT_EQ(simulate("whole").exit_code, 0);
   const auto whole = content_of(path("whole"));

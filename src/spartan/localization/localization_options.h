@@ -12,7 +12,7 @@ struct InertialOptions {
   double gyro_noise_rad_s_sqrt_hz = 1.2e-4;
   double gyro_bias_rad_s = 2e-4;
   double gyro_walk_rad_s2_sqrt_hz = 3e-6;
-  double accel_noise_m_s2_sqrt_hz = 1.2e-3;
+  double accel_noise_m_s2_sqrt_hz = 1.5e-3;
   double accel_bias_m_s2 = 0.02;
   double accel_walk_m_s3_sqrt_hz = 1e-4;
   double timeout_s = 0.25;
@@ -105,7 +105,7 @@ struct HeadingOptions {
 };
 
 struct TiltOptions {
-  double noise_factor = 1.5;
+  double noise_factor = 1.3;
   double least_sigma_rad = 0.0005;
   double bias_rad = 0.0025;
   double bias_walk_rad_sqrt_hz = 1e-5;

@@ -25,7 +25,7 @@ TEST(StartFrame, ReadsRest) {
   ASSERT_TRUE(rest.has_value());
   EXPECT_TRUE(rest->still);
   EXPECT_LE((rest->accel_m_s2 - force).norm(), 5 * 0.01 / 20);
-  EXPECT_NEAR(rest->accel_sigma_m_s2, 1.2e-3 / 2, 1e-4);
+  EXPECT_NEAR(rest->accel_sigma_m_s2, test_options().imu.accel_noise_m_s2_sqrt_hz / 2, 1e-5);
 }
 
 TEST(StartFrame, ReadsNoRestFromOtherUnitsMotionOrTooLittle) {

@@ -51,7 +51,8 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
   Eigen::Vector2f slope = grid.slope(column, row);
   if (!slope.allFinite()) slope.setZero();
   const Eigen::Vector2d at = middle_of(local.place, column, row);
-  const Vector6d j = elevation_jacobian(slope.cast<double>(), {at.x() - body.x(), at.y() - body.y(), s.elevation_m - body.z()});
+  const Vector6d j =
+      elevation_jacobian(slope.cast<double>(), {at.x() - body.x(), at.y() - body.y(), s.elevation_m - body.z()});
   s.variance_m2 = static_cast<float>(local.variance_m2(column, row) + j.dot(world_covariance * j));
   return s;
 }
@@ -59,9 +60,12 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
 }  // namespace
 
 std::vector<MapBand> MapView::bands() const {
-  return {{"elevation_m", elevation_m.view()},         {"elevation_min_m", elevation_min_m.view()},
-          {"elevation_max_m", elevation_max_m.view()}, {"variance_m2", variance_m2.view()},
-          {"count", count.view()},                     {"class", kind.view()},
+  return {{"elevation_m", elevation_m.view()},
+          {"elevation_min_m", elevation_min_m.view()},
+          {"elevation_max_m", elevation_max_m.view()},
+          {"variance_m2", variance_m2.view()},
+          {"count", count.view()},
+          {"class", kind.view()},
           {"occupancy_logodds", occupancy_logodds.view()}};
 }
 
@@ -139,7 +143,8 @@ Result<Tile*> GlobalMap::load_or_make(const TileKey& key) {
 }
 
 void GlobalMap::drop_surplus() {
-  const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(options_.memory_mb) * 1000000 / sizeof(Tile));
+  const std::size_t most =
+      std::max<std::size_t>(1, static_cast<std::size_t>(options_.memory_mb) * 1000000 / sizeof(Tile));
   std::vector<Slot*> clean;
   std::size_t there = 0;
   for (auto& [key, slot] : tiles_) {
@@ -156,8 +161,8 @@ void GlobalMap::drop_surplus() {
 }
 
 const Submap& GlobalMap::submap_for(const Eigen::Vector3d& place) {
-  const bool far = submaps_.empty() || (submaps_.back().world_from_submap.translation() - place).head<2>().norm() >
-                                           options_.submap_m;
+  const bool far = submaps_.empty() ||
+                   (submaps_.back().world_from_submap.translation() - place).head<2>().norm() > options_.submap_m;
   if (far) {
     const Eigen::Vector3d anchor(std::round(place.x() / cell_m_) * cell_m_, std::round(place.y() / cell_m_) * cell_m_,
                                  place.z());
@@ -352,11 +357,11 @@ Result<MapView> GlobalMap::view(const LatticeWindow& window) {
 LatticeWindow GlobalMap::extent() const {
   double west = 1e300, east = -1e300, south = 1e300, north = -1e300;
   for (const auto& [key, slot] : tiles_) {
-    const auto submap = std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
+    const auto submap =
+        std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
     for (int corner = 0; corner < 4; ++corner) {
-      const Eigen::Vector3d p =
-          submap->world_from_submap * Eigen::Vector3d((key.x + corner % 2) * kSide * cell_m_,
-                                                      (key.y + corner / 2) * kSide * cell_m_, 0);
+      const Eigen::Vector3d p = submap->world_from_submap * Eigen::Vector3d((key.x + corner % 2) * kSide * cell_m_,
+                                                                            (key.y + corner / 2) * kSide * cell_m_, 0);
       west = std::min(west, p.x());
       east = std::max(east, p.x());
       south = std::min(south, p.y());

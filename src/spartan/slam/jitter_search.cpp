@@ -107,8 +107,8 @@ Pose correction_of(const Eigen::Vector3d& centre, double dx, double dy, double y
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
   // (θ × q)_z = θ_x q_y − θ_y q_x must be −(p₁ q_x + p₂ q_y).
   const Eigen::Quaterniond tilt = exp_so3({-plane[2], plane[1], 0});
-  return Pose::from_translation(centre) * Pose::from_rotation(tilt) *
-         Pose(turn, Eigen::Vector3d(dx, dy, -plane[0])) * Pose::from_translation(-centre);
+  return Pose::from_translation(centre) * Pose::from_rotation(tilt) * Pose(turn, Eigen::Vector3d(dx, dy, -plane[0])) *
+         Pose::from_translation(-centre);
 }
 
 }  // namespace
@@ -185,7 +185,8 @@ std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGri
       }
     }
   }
-  std::stable_sort(peaks.begin(), peaks.end(), [](const JitterPeak& a, const JitterPeak& b) { return a.cost < b.cost; });
+  std::stable_sort(peaks.begin(), peaks.end(),
+                   [](const JitterPeak& a, const JitterPeak& b) { return a.cost < b.cost; });
   return peaks;
 }
 

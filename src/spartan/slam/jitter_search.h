@@ -20,15 +20,15 @@ SearchWindow search_window(const UncertainPose& world_from_body, const MatchOpti
 
 /// A place where the maps fit better than around it.
 struct JitterPeak {
-  Pose correction;     ///< world_from_world: apply it to the local map
-  double cost = 1;     ///< 0 all cells agree … 1 none does
+  Pose correction;       ///< world_from_world: apply it to the local map
+  double cost = 1;       ///< 0 all cells agree … 1 none does
   bool at_edge = false;  ///< of the window
 };
 
-/// All peaks, best first. `centre`: of the turns, near the middle of the local map. For every shift and turn, height and
-/// tilt are those of the plane through the elevations' differences d, found by least squares weighted anew, so that they
-/// need no search. Cost of a cell: u² / (1 + u²) (Geman-McClure), u² = d² / (blur² + variances), plus the class weight
-/// times (1 − e₁ e₂)/2 of the evidences; their mean over the cells that both maps know.
+/// All peaks, best first. `centre`: of the turns, near the middle of the local map. For every shift and turn, height
+/// and tilt are those of the plane through the elevations' differences d, found by least squares weighted anew, so that
+/// they need no search. Cost of a cell: u² / (1 + u²) (Geman-McClure), u² = d² / (blur² + variances), plus the class
+/// weight times (1 − e₁ e₂)/2 of the evidences; their mean over the cells that both maps know.
 std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGrid& global,
                                       const Eigen::Vector3d& centre, const SearchWindow& window,
                                       const MatchOptions& options, const Workers& workers);

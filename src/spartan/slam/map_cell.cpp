@@ -12,7 +12,8 @@ bool agree(const CellSurface& a, const CellSurface& b, const CellFusion& fusion)
   const double d = static_cast<double>(a.elevation_m) - b.elevation_m;
   const double relief_a = fusion.relief_sigma * (a.highest_m - a.lowest_m),
                relief_b = fusion.relief_sigma * (b.highest_m - b.lowest_m);
-  const double variance = static_cast<double>(a.variance_m2) + b.variance_m2 + relief_a * relief_a + relief_b * relief_b;
+  const double variance =
+      static_cast<double>(a.variance_m2) + b.variance_m2 + relief_a * relief_a + relief_b * relief_b;
   return d * d <= fusion.gate_sigmas * fusion.gate_sigmas * variance;
 }
 

@@ -103,15 +103,14 @@ MapMatch match_map(std::span<const SurfacePoint> points, const LocalMap& local, 
   }
   result.candidates = static_cast<int>(candidates.size());
   if (candidates.empty()) return result;
-  const Candidate& best = *std::min_element(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
-    return a.cost.mean < b.cost.mean;
-  });
+  const Candidate& best = *std::min_element(candidates.begin(), candidates.end(),
+                                            [](const auto& a, const auto& b) { return a.cost.mean < b.cost.mean; });
   const MatchEvidence evidence = weigh(best.match.cells, global.cell_m, options);
   result.lead = std::numeric_limits<double>::infinity();
   for (const Candidate& other : candidates) {
     if (same_place(best.match.world_from_body, other.match.world_from_body, evidence)) continue;
-    const double lead = (other.cost.mean - best.cost.mean) /
-                                            std::sqrt(std::max(other.cost.variance + best.cost.variance, 1e-300));
+    const double lead =
+        (other.cost.mean - best.cost.mean) / std::sqrt(std::max(other.cost.variance + best.cost.variance, 1e-300));
     result.lead = std::min(result.lead, lead);
   }
 

@@ -34,7 +34,7 @@ struct MapMatch {
   int cells = 0, blocks = 0, determined = 0;
   double misfit = 0;                  ///< of the residuals over what the variances say
   double sigma_m = 0, sigma_rad = 0;  ///< largest standard deviations of place and attitude
-  double lead = 0;  ///< sigmas by which the next best place fits worse; infinite where there is none
+  double lead = 0;                    ///< sigmas by which the next best place fits worse; infinite where there is none
   int candidates = 0;
 
   bool decided() const { return verdict == MatchVerdict::decided; }

@@ -66,7 +66,8 @@ Matrix6d MapMerger::map_covariance(const MapView& view, const LocalMap& local, c
   }
   Matrix6d mean = Matrix6d::Zero();
   for (const auto& [id, count] : cells) {
-    const auto stop = std::find_if(map_.stops().begin(), map_.stops().end(), [&](const MapStop& s) { return s.id == id; });
+    const auto stop =
+        std::find_if(map_.stops().begin(), map_.stops().end(), [&](const MapStop& s) { return s.id == id; });
     if (stop == map_.stops().end()) continue;
     const Matrix6d carry = adjoint(world_from_body.inverse() * stop->world_from_body.pose);
     mean += (static_cast<double>(count) / all) * carry * stop->world_from_body.covariance * carry.transpose();
@@ -86,8 +87,8 @@ Result<MapMergeResult> MapMerger::add(std::span<const SurfacePoint> points, cons
     const auto view =
         map_.view(window_around(at.x(), at.y(), view_reach(map_options_, options_.match), map_options_.cell_m));
     if (!view) return failure(view);
-    result.match = match_map(points, result.local, *view, world_from_body, map_options_.fewest_points, options_.match,
-                             workers_);
+    result.match =
+        match_map(points, result.local, *view, world_from_body, map_options_.fewest_points, options_.match, workers_);
     if (!result.match.information.isZero()) {
       result.corrected = moved_towards(world_from_body, result.match.world_from_body, result.match.information);
       result.local = generator_.generate(points, result.corrected.pose);

@@ -43,7 +43,8 @@ std::vector<MatchedCell> matched_cells(const SurfaceGrid& local, const SurfaceGr
       MatchedCell cell{c, r, static_cast<double>(zl) - zg};
       const double relief2 = static_cast<double>(local.relief_m(c, r)) * local.relief_m(c, r) +
                              static_cast<double>(global.relief_m(c, r)) * global.relief_m(c, r);
-      const double variance = static_cast<double>(local.variance_m2(c, r)) + global.variance_m2(c, r) + rough2 * relief2;
+      const double variance =
+          static_cast<double>(local.variance_m2(c, r)) + global.variance_m2(c, r) + rough2 * relief2;
       cell.sigma_m = std::sqrt(variance);
       const double s2 = scale.scale * scale.scale * variance + scale.blur_m * scale.blur_m,
                    u2 = cell.residual_m * cell.residual_m / (k2 * s2), robust = 1 / (1 + u2);

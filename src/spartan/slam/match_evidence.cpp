@@ -47,17 +47,28 @@ std::vector<Block> blocks_of(std::span<const MatchedCell> cells, double cell_m, 
 }
 
 // Scores of the residuals that a common error of the disparities makes, area by area.
-std::vector<Vector6d> common_scores(std::span<const MatchedCell> cells, double cell_m, const Vector6d& unit, double share,
-                                    const MatchOptions& options) {
+std::vector<Vector6d> common_scores(std::span<const MatchedCell> cells, double cell_m, const Vector6d& unit,
+                                    double share, const MatchOptions& options) {
   std::map<std::pair<int, int>, Vector6d> areas;
   for (const MatchedCell& cell : cells) {
-    Vector6d& score =
-        areas.try_emplace(block_of(cell, cell_m, options.common_reach_m), Vector6d::Zero()).first->second;
+    Vector6d& score = areas.try_emplace(block_of(cell, cell_m, options.common_reach_m), Vector6d::Zero()).first->second;
     score += (cell.weight * share * cell.common_m) * cell.jacobian().cwiseProduct(unit);
   }
   std::vector<Vector6d> scores;
   for (const auto& [place, score] : areas) scores.push_back(score);
   return scores;
+}
+
+// The curvature along an axis over its standard error, were there no relief and the blocks' parts chance (Efron 1969:
+// the self-normalized sum is about normal, whatever the parts' distribution, if it is symmetric).
+double relief_of(const std::vector<Block>& blocks, const Vector6d& axis) {
+  double sum = 0, squares = 0;
+  for (const Block& block : blocks) {
+    const double part = axis.dot(block.curvature * axis);
+    sum += part;
+    squares += part * part;
+  }
+  return squares > 0 ? sum / std::sqrt(squares) : 0;
 }
 
 // Covariance in the directions of the basis: what the answer would have been without each of the blocks, to first
@@ -96,10 +107,13 @@ MatchEvidence weigh(std::span<const MatchedCell> cells, double cell_m, const Mat
   Matrix6d total = Matrix6d::Zero();
   for (const Block& block : blocks) total += block.curvature;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(total);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    if (relief_of(blocks, axes.eigenvectors().col(k)) >= options.relief_certainty) kept.push_back(k);
+  }
   // Directions with the least curvature are given up until none of the others hangs on a single block.
-  for (Eigen::Index lost = 0; lost < 6; ++lost) {
-    if (!(axes.eigenvalues()[lost] > 0)) continue;
-    const Eigen::MatrixXd basis = axes.eigenvectors().rightCols(6 - lost);
+  for (; !kept.empty(); kept.erase(kept.begin())) {
+    const Eigen::MatrixXd basis = axes.eigenvectors()(Eigen::all, kept);
     const auto covariance = jackknife(blocks, common, total, basis);
     if (!covariance) continue;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spread(*covariance);
@@ -110,7 +124,7 @@ MatchEvidence weigh(std::span<const MatchedCell> cells, double cell_m, const Mat
       evidence.information += axis * axis.transpose() / std::max(variance, kLeastVariance);
       ++evidence.determined;
     }
-    if (lost == 0) {
+    if (kept.size() == 6) {
       const Vector6d sigmas = (basis * *covariance * basis.transpose()).diagonal().cwiseSqrt();
       evidence.sigma_m = sigmas.head<3>().maxCoeff() * options.largest_sigma_m;
       evidence.sigma_rad = sigmas.tail<3>().maxCoeff() * largest_rad;

@@ -17,13 +17,14 @@ struct MatchOptions {
   int peaks = 8;
   double relief_sigma = 0.15;
   double robust_sigmas = 3;
-  double block_m = 0.5;
+  double block_m = 0.3;
   double common_share = 1.1;
   double common_reach_m = 1.5;
   int fewest_cells = 200;
   int fewest_blocks = 12;
   double largest_sigma_m = 0.015;
   double largest_sigma_deg = 0.75;
+  double relief_certainty = 1.65;
   double lead_certainty = 3;
   double largest_misfit = 3;
 
@@ -40,12 +41,16 @@ struct MatchOptions {
     v.field("relief_sigma", relief_sigma, "uncertainty of a cell's elevation over its own relief", between(0, 1));
     v.field("robust_sigmas", robust_sigmas, "residuals so large count a quarter", between(0.5, 20));
     v.field("block_m", block_m, "cells farther apart err on their own", between(0.05, 10));
-    v.field("common_share", common_share, "error that surroundings have in common, over the residuals' own", between(0, 10));
+    v.field("common_share", common_share, "error that surroundings have in common, over the residuals' own",
+            between(0, 10));
     v.field("common_reach_m", common_reach_m, "how far those reach", between(0.1, 100));
     v.field("fewest_cells", fewest_cells, "that both maps must know", between(20, 1e6));
     v.field("fewest_blocks", fewest_blocks, "of ground that both maps must know", between(8, 1e4));
     v.field("largest_sigma_m", largest_sigma_m, "of the place found, else it is not believed", between(0.0001, 10));
-    v.field("largest_sigma_deg", largest_sigma_deg, "of the attitude found, else it is not believed", between(0.001, 45));
+    v.field("largest_sigma_deg", largest_sigma_deg, "of the attitude found, else it is not believed",
+            between(0.001, 45));
+    v.field("relief_certainty", relief_certainty, "sigmas that a direction's relief stands over chance",
+            between(0, 20));
     v.field("lead_certainty", lead_certainty, "sigmas that the best place fits better than the next", between(1, 20));
     v.field("largest_misfit", largest_misfit, "of the residuals over what the variances say", between(1, 100));
   }

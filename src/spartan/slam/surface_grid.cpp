@@ -49,8 +49,8 @@ float SurfaceGrid::elevation_at(double x_m, double y_m) const {
   return (1 - b) * ((1 - a) * above[0] + a * above[1]) + b * ((1 - a) * below[0] + a * below[1]);
 }
 
-SurfaceGrid throw_on_grid(std::span<const SurfacePoint> points, const Pose& world_from_body, const LatticeWindow& window,
-                          double cell_m, int fewest_points) {
+SurfaceGrid throw_on_grid(std::span<const SurfacePoint> points, const Pose& world_from_body,
+                          const LatticeWindow& window, double cell_m, int fewest_points) {
   struct Cell {
     double weights = 0, sum = 0;
     float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();

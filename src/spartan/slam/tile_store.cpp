@@ -79,7 +79,8 @@ Status TileStore::prepare() {
     return {};
   };
   if (Status s = make(insert_tile_, "INSERT OR REPLACE INTO map_tiles VALUES (?,?,?,?,?,?)"); !s) return s;
-  if (Status s = make(delete_older_, "DELETE FROM map_tiles WHERE submap = ? AND ix = ? AND iy = ? AND revision < ?"); !s)
+  if (Status s = make(delete_older_, "DELETE FROM map_tiles WHERE submap = ? AND ix = ? AND iy = ? AND revision < ?");
+      !s)
     return s;
   return make(select_tile_,
               "SELECT checksum, cells FROM map_tiles WHERE submap = ? AND ix = ? AND iy = ? AND revision = ?");
@@ -102,8 +103,10 @@ Result<std::vector<TileStore::Entry>> TileStore::index() {
 Status TileStore::write(const Entry& e, const Tile& tile) {
   const Bytes bytes = to_bytes(tile);
   const auto key = [&](SqlStatement& s) -> SqlStatement& {
-    return s.bind(1, std::int64_t{e.key.submap}).bind(2, std::int64_t{e.key.x}).bind(3, std::int64_t{e.key.y}).bind(
-        4, e.revision);
+    return s.bind(1, std::int64_t{e.key.submap})
+        .bind(2, std::int64_t{e.key.x})
+        .bind(3, std::int64_t{e.key.y})
+        .bind(4, e.revision);
   };
   if (Status s = key(*insert_tile_).bind(5, checksum_of(e, bytes)).bind(6, bytes).run(); !s) return s;
   return key(*delete_older_).run();

@@ -1,0 +1,149 @@
+#include "spartan/slam/map_matcher.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "spartan/slam/map_refinement.h"
+#include "spartan/slam/synthetic_stop_test.h"
+
+namespace spartan {
+namespace {
+
+using namespace testing;
+
+struct Scene {
+  Pose now;
+  std::vector<SurfacePoint> points;
+  MapView global;
+};
+
+Scene scene(const Ground& mapped, const Ground& seen, const Pose& before, const Pose& now) {
+  const Workers workers(2);
+  GlobalMap map({}, 0.05);
+  static_cast<void>(map.add(MapGenerator({}, workers).generate(points_at(mapped, before, 1), before), {}, {before, {}},
+                            Matrix6d::Zero()));
+  return {now, points_at(seen, now, 2),
+          *map.view(window_around(now.translation().x(), now.translation().y(), 5, 0.05))};
+}
+
+Scene scene(const Ground& ground) {
+  return scene(ground, ground, standing(ground, 0, 0, 0), standing(ground, 1, 0.2, 0.1));
+}
+
+Vector6d offset(double dx, double dy, double dz, double roll, double pitch, double yaw) {
+  Vector6d v;
+  v << dx, dy, dz, roll, pitch, yaw;
+  return v;
+}
+
+MapMatch match(const Scene& s, const Vector6d& off, int threads = 2) {
+  const Workers workers(threads);
+  const UncertainPose given{moved(s.now, s.now.translation(), off), covariance_of(0.08, 0.02)};
+  return match_map(s.points, MapGenerator({}, workers).generate(s.points, given.pose), s.global, given, 2, {}, workers);
+}
+
+double distance(const Pose& a, const Pose& b) {
+  return (a.inverse() * b).translation().norm();
+}
+
+TEST(MapMatcher, DecidesOnRockyGround) {
+  const Scene s = scene(rocky_ground());
+  const MapMatch m = match(s, offset(0.15, -0.1, 0.05, 0.02, -0.01, 0.04));
+  EXPECT_EQ(name_of(m.verdict), "decided");
+  EXPECT_LT(distance(s.now, m.world_from_body), 0.003);
+  EXPECT_LT(rotation_angle(s.now.inverse() * m.world_from_body), 0.002);
+  EXPECT_EQ(m.determined, 6);
+  EXPECT_GT(m.overlap, 0.3);
+  EXPECT_LT(m.sigma_m, 0.01);
+  const Vector6d error = log_se3(m.world_from_body.inverse() * s.now);
+  EXPECT_LT(error.dot(m.information * error), 22.5) << "within its own uncertainty";
+}
+
+TEST(MapMatcher, IsTheSameForAnyNumberOfThreads) {
+  const Scene s = scene(rocky_ground());
+  const Vector6d off = offset(0.1, 0.1, 0, 0, 0, 0.03);
+  const MapMatch one = match(s, off, 1), two = match(s, off, 2);
+  EXPECT_EQ(one.world_from_body.matrix(), two.world_from_body.matrix());
+  EXPECT_EQ(one.information, two.information);
+  EXPECT_EQ(one.lead, two.lead);
+}
+
+TEST(MapMatcher, CannotDecideOnAPlain) {
+  const Ground plain = [](double x, double y) { return 0.05 * x + 0.02 * y; };
+  for (const double dx : {0.0, 0.15}) {
+    const MapMatch m = match(scene(plain), offset(dx, 0.1, 0.05, 0.01, 0.01, 0.03));
+    EXPECT_FALSE(m.decided());
+    // Height and tilt it may know; where on the plain it stands it does not.
+    const Matrix6d r = m.information;
+    EXPECT_LT(r(0, 0) + r(1, 1), 1e-2 * std::max(r(2, 2), 1.0) + 3e4);
+  }
+}
+
+TEST(MapMatcher, AlongDunesOneDirectionStaysOpen) {
+  const Ground dunes = [](double x, double) { return 0.06 * std::sin(2.1 * x) + 0.03 * std::sin(5.3 * x + 1); };
+  const MapMatch m = match(scene(dunes), offset(0.1, 0.1, 0.02, 0, 0, 0.02));
+  EXPECT_EQ(name_of(m.verdict), "flat");
+  EXPECT_EQ(m.determined, 5);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(m.information);
+  EXPECT_LT(axes.eigenvalues()[0], 1e-6 * axes.eigenvalues()[5]);
+  // The open direction is along the crests, the world's y.
+  const Eigen::Vector3d open = m.world_from_body.rotation() * axes.eigenvectors().col(0).head<3>();
+  EXPECT_GT(std::abs(open.y()), 0.9);
+}
+
+TEST(MapMatcher, EggBoxIsAmbiguous) {
+  const Ground box = [](double x, double y) { return 0.02 * std::sin(21 * x) * std::sin(21 * y); };
+  const MapMatch m = match(scene(box), offset(0.1, -0.05, 0.02, 0, 0, 0.01));
+  EXPECT_EQ(name_of(m.verdict), "ambiguous");
+  EXPECT_TRUE(m.information.isZero());
+}
+
+TEST(MapMatcher, OtherGroundIsNotBelieved) {
+  for (const std::uint64_t seed : {11U, 12U, 13U}) {
+    const Ground here = rocky_ground(3), there = rocky_ground(seed);
+    const MapMatch m =
+        match(scene(there, here, standing(there, 0, 0, 0), standing(here, 1, 0.2, 0.1)), offset(0.1, 0, 0, 0, 0, 0.02));
+    EXPECT_FALSE(m.decided()) << seed;
+  }
+}
+
+TEST(MapMatcher, TooLittleOverlapIsSaid) {
+  const Ground ground = rocky_ground();
+  const MapMatch m =
+      match(scene(ground, ground, standing(ground, 0, 0, 0), standing(ground, 4.2, 0, 0)), offset(0, 0, 0, 0, 0, 0));
+  EXPECT_EQ(name_of(m.verdict), "no_overlap");
+  EXPECT_TRUE(m.information.isZero());
+}
+
+TEST(MapMatcher, AnOffsetBeyondTheWindowIsNotBelieved) {
+  const Scene s = scene(rocky_ground());
+  EXPECT_FALSE(match(s, offset(0.45, 0, 0, 0, 0, 0)).decided());  // the window ends at 3 · 8 cm
+}
+
+// The whole world, with map and rover, shifted and turned: the answer goes along.
+TEST(MapMatcher, GoesAlongWithTheWorld) {
+  const Ground ground = rocky_ground();
+  const Scene here = scene(ground);
+  const Vector6d off = offset(0.1, -0.08, 0.03, 0.01, 0, 0.02);
+  const MapMatch a = match(here, off);
+  ASSERT_TRUE(a.decided());
+  Random random(4);
+  for (int i = 0; i < 3; ++i) {
+    const Pose world = pose_at(random.uniform(-10, 10), random.uniform(-10, 10), 0.3, random.uniform(-3, 3));
+    const Ground elsewhere = [&](double u, double v) {
+      const Eigen::Vector3d p = world.inverse() * Eigen::Vector3d(u, v, 0);
+      return ground(p.x(), p.y()) + 0.3;
+    };
+    const Scene there = scene(elsewhere, elsewhere, world * standing(ground, 0, 0, 0), world * here.now);
+    const MapMatch b = match(there, off);
+    ASSERT_TRUE(b.decided());
+    const Pose apart = (world * a.world_from_body).inverse() * b.world_from_body;
+    EXPECT_LT(apart.translation().norm(), 0.003);
+    EXPECT_LT(rotation_angle(apart), 0.002);
+  }
+}
+
+}  // namespace
+}  // namespace spartan

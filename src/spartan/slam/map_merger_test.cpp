@@ -1,0 +1,172 @@
+#include "spartan/slam/map_merger.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "spartan/slam/map_refinement.h"
+#include "spartan/slam/synthetic_stop_test.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+using namespace testing;
+
+Pose off_by(const Pose& pose, double x, double y, double yaw) {
+  Vector6d eta;
+  eta << x, y, 0.02, 0.01, -0.005, yaw;
+  return moved(pose, pose.translation(), eta);
+}
+
+MapMerger merger() {
+  return {SlamOptions(), MapOptions(), Workers(2)};
+}
+
+Pose stop(const Ground& ground, int i) {
+  return standing(ground, 1.0 * i, 0.2 * i, 0.1 * i);
+}
+
+// The i-th stop of a drive, given 10 cm and more than a degree wrong.
+Result<MapMergeResult> visit(MapMerger& to, const Ground& ground, int i) {
+  const Pose at = stop(ground, i);
+  const UncertainPose given = i == 0 ? UncertainPose{at, Matrix6d::Zero()}
+                                     : UncertainPose{off_by(at, 0.08, -0.06, 0.02), covariance_of(0.08, 0.02)};
+  return to.add(points_at(ground, at, static_cast<std::uint64_t>(i) + 1), {100 + i}, given);
+}
+
+TEST(MapMerger, TheFirstStopStandsWhereItIsGiven) {
+  const Ground ground = rocky_ground();
+  MapMerger merging = merger();
+  const auto first = visit(merging, ground, 0);
+  ASSERT_TRUE(first);
+  EXPECT_FALSE(first->decided());
+  EXPECT_FALSE(first->constraint);
+  EXPECT_EQ(first->corrected.pose.matrix(), stop(ground, 0).matrix());
+  EXPECT_EQ(merging.map().stops().size(), 1U);
+}
+
+TEST(MapMerger, TheSecondIsCorrectedAndHandsOnAConstraint) {
+  const Ground ground = rocky_ground();
+  MapMerger merging = merger();
+  ASSERT_TRUE(visit(merging, ground, 0));
+  const auto second = visit(merging, ground, 1);
+  ASSERT_TRUE(second);
+  EXPECT_TRUE(second->decided());
+  const Pose wrong = stop(ground, 1).inverse() * second->corrected.pose;
+  EXPECT_LT(wrong.translation().norm(), 0.003);
+  EXPECT_LT(rotation_angle(wrong), 0.002);
+  ASSERT_TRUE(second->constraint);
+  EXPECT_EQ(second->constraint->stamp.ns, 101);
+  EXPECT_EQ(second->constraint->information, second->constraint->information.transpose());
+  // The first stop was certain: the constraint is as good as the match.
+  EXPECT_LT((second->constraint->information - second->match.information).norm(),
+            1e-6 * second->match.information.norm());
+  EXPECT_EQ(merging.map().stops()[1].world_from_body.pose.matrix(), second->corrected.pose.matrix());
+}
+
+TEST(MapMerger, AConstraintIsAsUncertainAsTheMap) {
+  const Ground ground = rocky_ground();
+  MapMerger merging = merger();
+  Matrix6d covariance = covariance_of(0.05, 0.01);
+  covariance(0, 5) = covariance(5, 0) = 2e-4;
+  const Pose a = stop(ground, 0), b = stop(ground, 1);
+  ASSERT_TRUE(merging.add(points_at(ground, a, 1), {}, {a, covariance}));
+  const auto second = merging.add(points_at(ground, b, 2), {}, {b, covariance_of(0.08, 0.02)});
+  ASSERT_TRUE(second && second->constraint);
+  // Rigidly fixed to the first stop, and the match's own uncertainty.
+  const Matrix6d carry = adjoint(second->corrected.pose.inverse() * a);
+  const Matrix6d expected = carry * covariance * carry.transpose() + second->match.information.inverse();
+  EXPECT_LT((second->constraint->information.inverse() - expected).norm(), 1e-3 * expected.norm());
+}
+
+TEST(MapMerger, WithoutADecisionTheGivenPoseStands) {
+  const Ground ground = rocky_ground(), other = rocky_ground(17);
+  MapMerger merging = merger();
+  ASSERT_TRUE(visit(merging, ground, 0));
+  const Pose at = standing(other, 1, 0.2, 0.1);
+  const auto second = merging.add(points_at(other, at, 2), {}, {at, covariance_of(0.08, 0.02)});
+  ASSERT_TRUE(second);
+  EXPECT_FALSE(second->decided());
+  EXPECT_EQ(merging.map().stops().size(), 2U) << "it is fused all the same";
+  const bool stands = second->corrected.pose.matrix() == at.matrix();
+  EXPECT_TRUE(second->constraint || stands);
+}
+
+TEST(MapMerger, UndeterminedDirectionsKeepWhatWasGiven) {
+  const Ground dunes = [](double x, double) { return 0.06 * std::sin(2.1 * x) + 0.03 * std::sin(5.3 * x + 1); };
+  MapMerger merging = merger();
+  const Pose a = standing(dunes, 0, 0, 0), b = standing(dunes, 1, 0, 0);
+  ASSERT_TRUE(merging.add(points_at(dunes, a, 1), {}, {a, Matrix6d::Zero()}));
+  const UncertainPose given{Pose::from_translation({0.1, 0.07, 0.02}) * b, covariance_of(0.08, 0.01)};
+  const auto second = merging.add(points_at(dunes, b, 2), {}, given);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(name_of(second->match.verdict), "flat");
+  const Eigen::Vector3d wrong = second->corrected.pose.translation() - b.translation();
+  EXPECT_NEAR(wrong.x(), 0, 0.005);
+  EXPECT_NEAR(wrong.y(), 0.07, 0.01);
+  EXPECT_NEAR(wrong.z(), 0, 0.005);
+  EXPECT_NEAR(std::sqrt(second->corrected.covariance(1, 1)), 0.08, 0.005);
+  EXPECT_LT(std::sqrt(second->corrected.covariance(0, 0)), 0.02);
+}
+
+// All the tables of a store.
+Bytes bytes_of(TileStore& store) {
+  ArchiveWriter out;
+  const auto index = store.index();
+  for (const TileStore::Entry& entry : *index) {
+    out.put(entry.key.submap);
+    out.put(entry.key.x);
+    out.put(entry.key.y);
+    out.put(entry.revision);
+    const Bytes tile = to_bytes(*store.read(entry));
+    out.put_array(tile.data(), tile.size());
+  }
+  const auto stops = store.stops();
+  for (const MapStop& stop : *stops) {
+    out.put(stop.world_from_body.pose);
+    out.put(stop.world_from_body.covariance);
+  }
+  return out.take();
+}
+
+TEST(MapMerger, GoesOnAfterSavingAsIfNothingHadHappened) {
+  const Ground ground = rocky_ground();
+  const TemporaryFolder folder;
+  Database straight_db = *Database::open(folder.file("straight"), Database::Mode::create),
+           db = *Database::open(folder.file("resumed"), Database::Mode::create);
+  TileStore straight_store = *TileStore::open(straight_db), store = *TileStore::open(db);
+  MapMerger straight = merger();
+  straight.page_to(&straight_store);
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(visit(straight, ground, i));
+    ASSERT_TRUE(straight.flush());
+  }
+  Bytes memory;
+  {
+    MapMerger before = merger();
+    before.page_to(&store);
+    for (int i = 0; i < 2; ++i) {
+      ASSERT_TRUE(visit(before, ground, i));
+      ASSERT_TRUE(before.flush());
+    }
+    memory = before.save();
+    ASSERT_TRUE(visit(before, ground, 2)) << "never flushed: lost";
+  }
+  MapMerger resumed = merger();
+  ASSERT_TRUE(resumed.restore(memory, store));
+  ASSERT_TRUE(visit(resumed, ground, 2));
+  ASSERT_TRUE(resumed.flush());
+  EXPECT_EQ(bytes_of(store), bytes_of(straight_store));
+  EXPECT_EQ(resumed.save(), straight.save());
+
+  EXPECT_THAT(merger().restore(memory, store).error().message(), HasSubstr("does not fit")) << "the tables went on";
+  memory[0] = 7;
+  EXPECT_THAT(merger().restore(memory, store).error().message(), HasSubstr("version 7"));
+  EXPECT_FALSE(merger().restore({}, store));
+}
+
+}  // namespace
+}  // namespace spartan
