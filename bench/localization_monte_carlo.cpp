@@ -48,6 +48,7 @@ Band band(int dof, int trials) {
 template <class Value>
 std::vector<double> each(const std::vector<TrialResult>& trials, const Value& value) {
   std::vector<double> values;
+  values.reserve(trials.size());
   for (const TrialResult& t : trials) values.push_back(value(t));
   return values;
 }

@@ -68,9 +68,10 @@ int known_cells(const LocalMap& map) {
 
 GlobalMap build(const std::vector<const Stop3*>& stops) {
   GlobalMap map({}, 0.05);
-  for (const Stop3* stop : stops)
+  for (const Stop3* stop : stops) {
     static_cast<void>(
         map.add(stop->map, stop->points.stamp, {stop->points.world_from_body, Matrix6d::Zero()}, Matrix6d::Zero()));
+  }
   return map;
 }
 
@@ -137,7 +138,7 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
   o.error_deg = rotation_angle(wrong) / kDegree;
   const Vector6d xi = log_se3(o.match.world_from_body.inverse() * truth);
   o.nees = xi.dot(o.match.information * xi);
-  if (verbose)
+  if (verbose) {
     fmt::print(
         "{:<16} {:>2} overlap {:.2f} {:<10} error {:6.1f} mm {:5.2f} deg sigma {:5.1f} mm {:5.2f} deg nees {:6.1f} det "
         "{} "
@@ -145,6 +146,7 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
         setting.scenario, setting.incoming, setting.overlap, name_of(o.match.verdict), 1000 * o.error_m, o.error_deg,
         1000 * o.match.sigma_m, o.match.sigma_rad / kDegree, o.nees, o.match.determined, o.match.cells, o.match.blocks,
         o.match.misfit, o.match.lead, o.match.candidates, o.seconds);
+  }
   return o;
 }
 

@@ -25,9 +25,10 @@ struct StopPoints {
 inline Bytes to_bytes(const StopPoints& stop) {
   std::vector<float> values;
   values.reserve(9 * stop.points.size());
-  for (const SurfacePoint& p : stop.points)
+  for (const SurfacePoint& p : stop.points) {
     values.insert(values.end(), {p.in_body.x(), p.in_body.y(), p.in_body.z(), p.sigma_m, p.along.x(), p.along.y(),
                                  p.along.z(), static_cast<float>(p.kind), p.cut ? 1.0F : 0.0F});
+  }
   ArchiveWriter out;
   out.put(stop.stamp.ns);
   out.put(stop.world_from_body);
@@ -45,12 +46,13 @@ inline std::optional<StopPoints> read_points(const std::string& path) {
   stop.world_from_body = in.get_pose();
   const std::vector<float> v = in.get_array<float>();
   if (!in.finish(path)) return std::nullopt;
-  for (std::size_t i = 0; i + 8 < v.size(); i += 9)
+  for (std::size_t i = 0; i + 8 < v.size(); i += 9) {
     stop.points.push_back({{v[i], v[i + 1], v[i + 2]},
                            v[i + 3],
                            {v[i + 4], v[i + 5], v[i + 6]},
                            static_cast<GroundClass>(static_cast<int>(v[i + 7])),
                            v[i + 8] != 0});
+  }
   return stop;
 }
 
