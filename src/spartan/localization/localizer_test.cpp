@@ -138,7 +138,6 @@ TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {
 }
 
 TEST(Localizer, LevelsTheWorldByGravityAndTurnsItEast) {
-  TestDrive drive;
   Localizer localizer(test_options());
   const Eigen::Quaterniond tilted = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) *
                                     Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()) *

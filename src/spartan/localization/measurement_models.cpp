@@ -120,7 +120,7 @@ Eigen::Vector3d up_of_roll_pitch(double roll, double pitch) {
 
 // With u = R̂ᵀ up: δu = [u]× φ + Rᵀ ∂up δτ; roll = atan2(u_y, u_z), pitch = atan2(−u_x, |u_yz|).
 Innovation inclinometer_innovation(const NavigationState& s, double roll, double pitch, double sigma) {
-  const Eigen::Matrix3d to_body = s.world_from_body.rotation_matrix().transpose();
+  const Eigen::Matrix3d to_body = s.world_from_body.rotation().conjugate().toRotationMatrix();
   const Eigen::Vector3d u = to_body * true_up(s.gravity_tilt_rad);
   const double side = std::max(std::hypot(u.y(), u.z()), 1e-3);
   Eigen::Matrix<double, 2, 3> by_up;
@@ -137,7 +137,7 @@ Innovation inclinometer_innovation(const NavigationState& s, double roll, double
 }
 
 Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean_accel, double sigma, double gravity) {
-  const Eigen::Matrix3d to_body = s.world_from_body.rotation_matrix().transpose();
+  const Eigen::Matrix3d to_body = s.world_from_body.rotation().conjugate().toRotationMatrix();
   const Eigen::Vector3d expected = gravity * (to_body * true_up(s.gravity_tilt_rad));
   Innovation i(3);
   i.residual = mean_accel - expected - s.accel_bias_m_s2;

@@ -1,0 +1,104 @@
+// Localization of rendered recordings whose odometry has been run: `make bench-localization_replay ARGS="..."`.
+//
+//   localization_replay [--from FOLDER] [--runs FOLDER] SCENARIO...
+//
+// FOLDER/SCENARIO of --from is a recording with sensors and truth; of --runs, what `spartan run --odometry-only` made
+// of it. Every subset of sensors over the same real odometry.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "localization_trial.h"
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/system/run_store.h"
+#include "standard_recordings.h"
+
+namespace spartan {
+namespace {
+
+// The recorded drive in the form of a drawn one.
+struct RecordedDrive {
+  TrueDrive truth;
+  DrawnDrive drawn;
+};
+
+std::optional<RecordedDrive> open_recorded(const std::string& recording, const std::string& run) {
+  auto source = open_recording(recording);
+  const auto poses = load_trajectory(recording + "/truth/poses.tum");
+  auto store = RunStore::open_read_only(run + "/run.sqlite");
+  if (!source || !poses || !store) return std::nullopt;
+  const auto frames = store->frames();
+  if (!frames) return std::nullopt;
+  RecordedDrive drive;
+  const RecordingInfo& info = (*source)->info();
+  drive.truth.scenario.gravity_m_s2 = info.gravity_m_s2.value_or(9.81);
+  const auto pair =
+      std::find_if(info.rig.pairs.begin(), info.rig.pairs.end(), [](const auto& p) { return p.for_odometry; });
+  if (pair == info.rig.pairs.end()) return std::nullopt;
+  const Pose body_from_left = info.rig.body_from_camera(pair->left), left_from_body = body_from_left.inverse();
+  while (true) {
+    auto sample = (*source)->next();
+    if (!sample || !*sample) break;
+    const Sample& s = **sample;
+    if (const auto* imu = std::get_if<ImuSample>(&s)) drive.drawn.imu.push_back(*imu);
+    if (const auto* wheels = std::get_if<WheelSample>(&s)) drive.drawn.wheels.push_back(*wheels);
+    if (const auto* compass = std::get_if<CompassSample>(&s)) drive.drawn.compass.push_back(*compass);
+    if (const auto* tilt = std::get_if<InclinometerSample>(&s)) drive.drawn.inclinometer.push_back(*tilt);
+  }
+  for (const FrameRecord& frame : *frames) {
+    if (!frame.fault.empty()) continue;
+    const auto truth = std::min_element(poses->poses.begin(), poses->poses.end(), [&](const auto& a, const auto& b) {
+      return std::abs(a.stamp.ns - frame.stamp.ns) < std::abs(b.stamp.ns - frame.stamp.ns);
+    });
+    drive.truth.shots_s.push_back(seconds_between(sim::stamp_at(0), frame.stamp));
+    drive.truth.poses.push_back(truth->pose);
+    if (frame.motion.first) continue;
+    const Matrix6d ad = adjoint(body_from_left);
+    drive.drawn.motions.push_back(
+        {frame.motion.from, frame.motion.to, body_from_left * frame.motion.previous_from_current * left_from_body,
+         ad * frame.motion.covariance * ad.transpose(), frame.status != name_of(TrackingStatus::lost)});
+  }
+  for (std::size_t i = 1; i < drive.truth.poses.size(); ++i)
+    drive.truth.length_m += (drive.truth.poses[i].translation() - drive.truth.poses[i - 1].translation()).norm();
+  return drive;
+}
+
+double mean_nees(const TrialResult& r, double ShotError::*which) {
+  double sum = 0;
+  for (const ShotError& s : r.shots) sum += s.*which;
+  return sum / static_cast<double>(r.shots.size());
+}
+
+int run(const std::vector<std::string>& words) {
+  const RecordingArguments arguments = read_arguments(words, {{"--runs", "runs"}});
+  fmt::print("| recording | sensors | end, % | ATE, mm | NEES over all shots: position | attitude | pose |\n");
+  fmt::print("|---|---|---|---|---|---|---|\n");
+  for (const std::string& name : arguments.scenarios) {
+    const auto drive = open_recorded(arguments.folder + "/" + name, arguments.options.at("--runs") + "/" + name);
+    if (!drive) {
+      fmt::print(stderr, "{}: no recording with truth, or no run of it\n", name);
+      return 1;
+    }
+    for (int mask = 0; mask < 16; ++mask) {
+      const TrialResult r = run_trial(drive->truth, arrivals(drive->drawn, Subset::of(mask)));
+      fmt::print("| {} | {} | {:.4f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, Subset::of(mask).name(),
+                 r.final_percent, 1e3 * r.ate_m, mean_nees(r, &ShotError::nees_position),
+                 mean_nees(r, &ShotError::nees_attitude), mean_nees(r, &ShotError::nees_pose));
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace spartan
+
+int main(int argc, char** argv) {
+  try {
+    return spartan::run({argv + 1, argv + argc});
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s\n", e.what());
+    return 1;
+  }
+}
