@@ -10,7 +10,7 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 /// While a sensor is excluded the variance of its own bias takes up this share of each squared disagreement, so that
 /// one that has changed for good comes back: after some 30 readings (share · n · r² exceeds r² over the gate).

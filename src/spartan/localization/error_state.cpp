@@ -5,7 +5,7 @@
 namespace spartan {
 
 NavigationState add_error(const NavigationState& s, const ErrorVector& e) {
-  using namespace error_at;
+  using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
   NavigationState r = s;
   r.world_from_body = s.world_from_body * exp_se3(e.segment<6>(kPose));
   r.velocity_m_s += e.segment<3>(kVelocity);
@@ -23,7 +23,7 @@ NavigationState add_error(const NavigationState& s, const ErrorVector& e) {
 }
 
 ErrorVector error_between(const NavigationState& a, const NavigationState& b) {
-  using namespace error_at;
+  using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
   ErrorVector e;
   e.segment<6>(kPose) = log_se3(a.world_from_body.inverse() * b.world_from_body);
   e.segment<3>(kVelocity) = b.velocity_m_s - a.velocity_m_s;
@@ -60,7 +60,7 @@ Eigen::Vector2d tilt_of_up(const Eigen::Vector3d& up) {
 }
 
 void clone_pose(Belief& belief, int index) {
-  using namespace error_at;
+  using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
   (index == kVisionClone ? belief.state.world_from_vision_clone : belief.state.world_from_step_clone) =
       belief.state.world_from_body;
   ErrorCovariance& p = belief.covariance;

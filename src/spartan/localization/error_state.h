@@ -56,13 +56,13 @@ struct Belief {
 };
 
 NavigationState add_error(const NavigationState& state, const ErrorVector& error);
-/// The error that leads from `estimate` to `truth`: inverse of add_error.
-ErrorVector error_between(const NavigationState& estimate, const NavigationState& truth);
+/// The error that leads from a to b: inverse of add_error.
+ErrorVector error_between(const NavigationState& a, const NavigationState& b);
 
 /// Unit vector against gravity, in the world.
-Eigen::Vector3d true_up(const Eigen::Vector2d& gravity_tilt_rad);
+Eigen::Vector3d true_up(const Eigen::Vector2d& tilt);
 /// ∂ true_up / ∂ tilt.
-Eigen::Matrix<double, 3, 2> true_up_jacobian(const Eigen::Vector2d& gravity_tilt_rad);
+Eigen::Matrix<double, 3, 2> true_up_jacobian(const Eigen::Vector2d& tilt);
 /// The tilt whose true_up has this direction; the direction must not point down.
 Eigen::Vector2d tilt_of_up(const Eigen::Vector3d& up_in_world);
 

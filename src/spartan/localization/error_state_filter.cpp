@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 constexpr double kLargestRate_rad_s = 35, kLargestForce_m_s2 = 300;
 /// Of what defines the world: only so large that nothing divides by zero.

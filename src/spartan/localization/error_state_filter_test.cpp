@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "spartan/localization/test_drive.h"
+#include "spartan/localization/drive_test.h"
 
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 ErrorStateFilter started(const LocalizationOptions& options, const TestSensors& with) {
   ErrorStateFilter filter(options);

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "spartan/localization/test_drive.h"
+#include "spartan/localization/drive_test.h"
 #include "spartan/testing/numeric_jacobian.h"
 
 namespace spartan {
@@ -15,7 +15,7 @@ TEST(ErrorState, AddedErrorIsTheOneBetween) {
   for (int round = 0; round < 20; ++round) {
     const NavigationState s = random_navigation_state(random);
     ErrorVector e;
-    for (Eigen::Index i = 0; i < e.size(); ++i) e[i] = random.uniform(-0.5, 0.5);
+    for (double& value : e) value = random.uniform(-0.5, 0.5);
     EXPECT_LE((error_between(s, add_error(s, e)) - e).cwiseAbs().maxCoeff(), 1e-12);
   }
 }
@@ -42,7 +42,7 @@ TEST(ErrorState, UpFollowsTheTilt) {
 }
 
 TEST(ErrorState, CloneHasTheCorrelationsOfThePose) {
-  using namespace error_at;
+  using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
   Random random(3);
   Belief belief;
   belief.state = random_navigation_state(random);

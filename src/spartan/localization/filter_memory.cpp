@@ -10,12 +10,10 @@ struct Put {
   ArchiveWriter& out;
   template <class T>
   void operator()(const T& value) {
-    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Pose>) {
       out.put(value);
     } else if constexpr (std::is_same_v<T, Stamp>) {
       out.put(value.ns);
-    } else if constexpr (std::is_same_v<T, Pose>) {
-      out.put(value);
     } else if constexpr (std::is_same_v<T, Eigen::Quaterniond>) {
       for (int i = 0; i < 4; ++i) out.put(value.coeffs()[i]);
     } else {

@@ -7,12 +7,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "spartan/localization/test_drive.h"
+#include "spartan/localization/drive_test.h"
 
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 Belief random_belief(Random& random, double sigma) {
   Belief belief;

@@ -85,7 +85,7 @@ bool Localizer::add(const PoseConstraint& constraint) {
 }
 
 LocalizationEstimate Localizer::estimate() const {
-  using namespace error_at;
+  using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
   const FilterMemory& m = state_->filter.filter().memory();
   const NavigationState& s = m.belief.state;
   const ErrorCovariance& p = m.belief.covariance;

@@ -82,7 +82,7 @@ class Localizer {
 
   /// The memory as a versioned value; after restore() of it all that follows is the same, bit for bit.
   Bytes save() const;
-  Status restore(const Bytes& state);
+  Status restore(const Bytes& bytes);
 
  private:
   struct State;

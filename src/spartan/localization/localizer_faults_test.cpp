@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "spartan/localization/chi_square.h"
+#include "spartan/localization/drive_test.h"
 #include "spartan/localization/localizer.h"
-#include "spartan/localization/test_drive.h"
 
 namespace spartan {
 namespace {

@@ -5,8 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "spartan/localization/drive_test.h"
 #include "spartan/localization/error_state_filter.h"
-#include "spartan/localization/test_drive.h"
 
 namespace spartan {
 namespace {
@@ -36,9 +36,10 @@ TEST(LocalizerLong, CovarianceStaysPositiveDefiniteOverAMillionSteps) {
     last = now;
     if (i % 150 == 100) {
       RelativeMotion motion = drive.motion(shot, t, test_motion_covariance());
-      for (int k = 0; k < 6; ++k)
+      for (int k = 0; k < 6; ++k) {
         motion.previous_from_current = motion.previous_from_current * exp_se3(Vector6d::Unit(k) * random.normal() *
                                                                               std::sqrt(motion.covariance(k, k)));
+      }
       motion.measured = i % 50'000 > 1000;
       filter.process(motion);
       shot = t;

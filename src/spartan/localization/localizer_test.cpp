@@ -8,7 +8,7 @@
 #include <algorithm>
 
 #include "spartan/localization/chi_square.h"
-#include "spartan/localization/test_drive.h"
+#include "spartan/localization/drive_test.h"
 
 namespace spartan {
 namespace {

@@ -7,7 +7,7 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 const Pose& clone_of(const NavigationState& s, int clone) {
   return clone == kVisionClone ? s.world_from_vision_clone : s.world_from_step_clone;

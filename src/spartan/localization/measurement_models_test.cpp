@@ -6,13 +6,13 @@
 #include <cmath>
 #include <functional>
 
-#include "spartan/localization/test_drive.h"
+#include "spartan/localization/drive_test.h"
 #include "spartan/testing/numeric_jacobian.h"
 
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 // Residual = measured − expected: its derivative by the estimate's error is −jacobian.
 template <int Rows>

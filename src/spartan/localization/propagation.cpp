@@ -3,7 +3,7 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 // Noise that is white in acceleration and angular rate, integrated over the step: the double integral
 // correlates position with velocity.

@@ -45,6 +45,6 @@ NavigationState propagate(const NavigationState& state, const SteadyStep& step);
 Transition transition(const NavigationState& state, const SteadyStep& step, const SteadyNoise& noise);
 
 /// P → F P Fᵀ + Q, touching only what changes.
-void move_on(ErrorCovariance& covariance, const Transition& transition);
+void move_on(ErrorCovariance& p, const Transition& t);
 
 }  // namespace spartan

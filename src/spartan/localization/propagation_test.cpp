@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "spartan/localization/test_drive.h"
+#include "spartan/localization/drive_test.h"
 #include "spartan/testing/numeric_jacobian.h"
 
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 using MovingVector = Eigen::Matrix<double, kMoving, 1>;
 using Full = Eigen::Matrix<double, kMoving, kSize>;
 

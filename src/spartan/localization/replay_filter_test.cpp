@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "spartan/localization/test_drive.h"
+#include "spartan/localization/drive_test.h"
 
 namespace spartan {
 namespace {

@@ -9,7 +9,7 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 /// Where vision measures, the noise of a prediction without an IMU counts (1 + this) times: the prediction is then
 /// worth nothing, and the filter composes the motions as they come.

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "spartan/localization/drive_test.h"
 #include "spartan/localization/measurement_models.h"
-#include "spartan/localization/test_drive.h"
 
 namespace spartan {
 namespace {
@@ -14,6 +14,7 @@ namespace {
 std::vector<ImuSample> resting(const Eigen::Vector3d& force, double scatter, int count) {
   Random random(1);
   std::vector<ImuSample> samples;
+  samples.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i)
     samples.push_back({test_stamp(0.01 * i), normal3(random, 1e-3), force + normal3(random, scatter)});
   return samples;

@@ -8,7 +8,7 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;
+using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
 
 /// Shorter steps are not worth a measurement; over much longer ones a mean attitude says nothing.
 constexpr double kShortestStep_s = 0.2, kLongestSteps = 4;
