@@ -13,7 +13,7 @@
 namespace spartan {
 namespace {
 
-using namespace testing;
+using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
 
 LocalMap map_of(const Ground& ground, const Pose& pose, std::uint64_t seed) {
   return MapGenerator({}, Workers(1)).generate(points_at(ground, pose, seed), pose);

@@ -7,7 +7,7 @@
 namespace spartan {
 namespace {
 
-using namespace testing;
+using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
 
 SurfaceGrid map_at(const std::vector<SurfacePoint>& points, const Pose& pose) {
   return coarser(grid_of(MapGenerator({}, Workers(1)).generate(points, pose)));

@@ -43,7 +43,7 @@ Status MapFile::save(GlobalMap& map, const std::string& path) {
   const std::string part = path + ".part";
   std::error_code ignored;
   fs::remove(part, ignored);
-  const Status status = write(map, part);
+  Status status = write(map, part);
   std::error_code error;
   if (status) fs::rename(part, path, error);
   if (!status || error) fs::remove(part, ignored);
@@ -76,7 +76,7 @@ Result<MapFile> MapFile::open(const std::string& path, const GlobalMapOptions& o
 
 Status MapFile::commit() {
   if (Status s = db_->execute("BEGIN IMMEDIATE"); !s) return s;
-  const Status status = map_->flush();
+  Status status = map_->flush();
   if (!status) {
     static_cast<void>(db_->execute("ROLLBACK"));
     return status;

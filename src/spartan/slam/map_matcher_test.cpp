@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-using namespace testing;
+using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
 
 struct Scene {
   Pose now;

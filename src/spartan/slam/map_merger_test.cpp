@@ -13,7 +13,7 @@ namespace spartan {
 namespace {
 
 using ::testing::HasSubstr;
-using namespace testing;
+using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
 
 Pose off_by(const Pose& pose, double x, double y, double yaw) {
   Vector6d eta;

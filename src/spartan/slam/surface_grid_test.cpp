@@ -9,7 +9,7 @@
 namespace spartan {
 namespace {
 
-using namespace testing;
+using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
 
 Ground plane(double a, double b) {
   return [=](double x, double y) { return 0.1 + a * x + b * y; };
