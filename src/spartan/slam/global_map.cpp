@@ -129,7 +129,7 @@ Result<Tile*> GlobalMap::load(const TileKey& key) {
     if (store_ == nullptr) throw std::logic_error("GlobalMap: a tile is in the store, but there is none");
     auto tile = store_->read({key, slot.revision});
     if (!tile) return failure(tile);
-    slot.tile = std::move(*tile);
+    slot.tile = *tile;
   }
   return &*slot.tile;
 }
@@ -360,8 +360,9 @@ LatticeWindow GlobalMap::extent() const {
     const auto submap =
         std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
     for (int corner = 0; corner < 4; ++corner) {
-      const Eigen::Vector3d p = submap->world_from_submap * Eigen::Vector3d((key.x + corner % 2) * kSide * cell_m_,
-                                                                            (key.y + corner / 2) * kSide * cell_m_, 0);
+      const Eigen::Vector3d p =
+          submap->world_from_submap * Eigen::Vector3d((key.x + corner % 2) * kSide * cell_m_,
+                                                      static_cast<double>(key.y + corner / 2) * kSide * cell_m_, 0);
       west = std::min(west, p.x());
       east = std::max(east, p.x());
       south = std::min(south, p.y());

@@ -49,9 +49,11 @@ TEST(MapRefinement, EyeIsWhereTheRaysMeet) {
 
 TEST(MapRefinement, ThinnedPointsAreMeansOfTheirSquares) {
   std::vector<SurfacePoint> points;
-  for (int i = 0; i < 4; ++i)
+  points.reserve(5);
+  for (int i = 0; i < 4; ++i) {
     points.push_back(
         {{0.001F * static_cast<float>(i), 0, 0.1F * static_cast<float>(i)}, 0.01F, {0, 0, -1}, GroundClass::ground});
+  }
   points.push_back({{1, 1, 1}, 0.02F, {0, 0, -1}, GroundClass::ground});
   const auto means = thinned(points, 0.0125);
   ASSERT_EQ(means.size(), 2U);

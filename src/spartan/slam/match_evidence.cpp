@@ -55,6 +55,7 @@ std::vector<Vector6d> common_scores(std::span<const MatchedCell> cells, double c
     score += (cell.weight * share * cell.common_m) * cell.jacobian().cwiseProduct(unit);
   }
   std::vector<Vector6d> scores;
+  scores.reserve(areas.size());
   for (const auto& [place, score] : areas) scores.push_back(score);
   return scores;
 }
