@@ -10,8 +10,6 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 /// While a sensor is excluded the variance of its own bias takes up this share of each squared disagreement, so that
 /// one that has changed for good comes back: after some 30 readings (share · n · r² exceeds r² over the gate).
 constexpr double kBiasShare = 0.003;
@@ -23,7 +21,7 @@ constexpr double kReadingsOfOneLean = 100;
 void ErrorStateFilter::take(const CompassSample& sample) {
   move_to(sample.stamp, nullptr);
   // A vertical that is only known to σ² turns headings by up to ½ σ², always to the same side.
-  const double lean = 0.5 * memory_.belief.covariance.diagonal().segment<2>(kGravityTilt).sum();
+  const double lean = 0.5 * memory_.belief.covariance.diagonal().segment<2>(error_at::kGravityTilt).sum();
   const double sigma =
       std::hypot(std::max(sample.sigma_rad, options_.compass.least_sigma_rad), std::sqrt(kReadingsOfOneLean) * lean);
   if (!memory_.compass.offset_known) {
@@ -36,7 +34,8 @@ void ErrorStateFilter::take(const CompassSample& sample) {
   if (use) {
     correct_world(innovation);
   } else if (memory_.judge(LocalizationSensor::compass).state == SensorState::excluded) {
-    memory_.belief.covariance(kCompassOffset, kCompassOffset) += kBiasShare * innovation.residual.squaredNorm();
+    memory_.belief.covariance(error_at::kCompassOffset, error_at::kCompassOffset) +=
+        kBiasShare * innovation.residual.squaredNorm();
   }
 }
 
@@ -81,7 +80,8 @@ void ErrorStateFilter::take(const InclinometerSample& sample) {
   if (use) {
     correct_world(innovation);
   } else if (memory_.judge(LocalizationSensor::inclinometer).state == SensorState::excluded) {
-    memory_.belief.covariance.diagonal().segment<2>(kInclinometerBias) += kBiasShare * innovation.residual.cwiseAbs2();
+    memory_.belief.covariance.diagonal().segment<2>(error_at::kInclinometerBias) +=
+        kBiasShare * innovation.residual.cwiseAbs2();
   }
 }
 

@@ -11,8 +11,6 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 constexpr double kLargestRate_rad_s = 35, kLargestForce_m_s2 = 300;
 /// Of what defines the world: only so large that nothing divides by zero.
 constexpr double kExact = 1e-6;
@@ -79,17 +77,17 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   if (heading) s.world_from_body = first_pose(up, ahead_in_body, heading->radians - heading_of(s.world_from_body));
 
   ErrorCovariance& p = m.belief.covariance;
-  set_variance(p, kPose, 6, kExact);
-  set_variance(p, kVelocity, 3, rest && rest->still ? kRestingSpeed_m_s : kUnknownSpeed_m_s);
-  set_variance(p, kGyroBias, 3, std::max(options_.imu.gyro_bias_rad_s, 1e-9));
-  set_variance(p, kAccelBias, 3, std::max(options_.imu.accel_bias_m_s2, 1e-9));
-  set_variance(p, kGravityTilt, 2, m.imu.levelled ? kLevelledTilt_rad : kUnknownTilt_rad);
-  set_variance(p, kWheelScale, 1, std::max(options_.wheels.scale_sigma, 1e-6));
-  set_variance(p, kCompassOffset, 1,
+  set_variance(p, error_at::kPose, 6, kExact);
+  set_variance(p, error_at::kVelocity, 3, rest && rest->still ? kRestingSpeed_m_s : kUnknownSpeed_m_s);
+  set_variance(p, error_at::kGyroBias, 3, std::max(options_.imu.gyro_bias_rad_s, 1e-9));
+  set_variance(p, error_at::kAccelBias, 3, std::max(options_.imu.accel_bias_m_s2, 1e-9));
+  set_variance(p, error_at::kGravityTilt, 2, m.imu.levelled ? kLevelledTilt_rad : kUnknownTilt_rad);
+  set_variance(p, error_at::kWheelScale, 1, std::max(options_.wheels.scale_sigma, 1e-6));
+  set_variance(p, error_at::kCompassOffset, 1,
                heading ? std::hypot(heading->sigma_rad, options_.compass.offset_sigma_rad) : kUnknownHeading_rad);
-  set_variance(p, kInclinometerBias, 2, std::max(options_.inclinometer.bias_rad, 1e-9));
-  p.diagonal().segment<6>(kVisionDrift) = drift_sigmas_.cwiseAbs2().cwiseMax(1e-12);
-  p.diagonal().segment<6>(kVisionConstant) = constant_sigmas_.cwiseAbs2().cwiseMax(1e-12);
+  set_variance(p, error_at::kInclinometerBias, 2, std::max(options_.inclinometer.bias_rad, 1e-9));
+  p.diagonal().segment<6>(error_at::kVisionDrift) = drift_sigmas_.cwiseAbs2().cwiseMax(1e-12);
+  p.diagonal().segment<6>(error_at::kVisionConstant) = constant_sigmas_.cwiseAbs2().cwiseMax(1e-12);
 
   // What the means say of tilt and biases; the pose defines the world and stays.
   if (rest) {
@@ -97,15 +95,15 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
     if (rest->still) {
       Innovation bias(3);
       bias.residual = rest->gyro_rad_s - s.gyro_bias_rad_s;
-      bias.jacobian.middleCols<3>(kGyroBias).setIdentity();
+      bias.jacobian.middleCols<3>(error_at::kGyroBias).setIdentity();
       bias.noise.diagonal().setConstant(rest->gyro_sigma_rad_s * rest->gyro_sigma_rad_s);
       correct(m.belief, bias);
     }
   }
   if (tilt) correct(m.belief, inclinometer_innovation(s, tilt->roll_rad, tilt->pitch_rad, tilt->sigma_rad));
 
-  clone_pose(m.belief, kVisionClone);
-  clone_pose(m.belief, kStepClone);
+  clone_pose(m.belief, error_at::kVisionClone);
+  clone_pose(m.belief, error_at::kStepClone);
   m.world_from_odom = Pose();
   m.vision.clone_stamp = m.step.from = stamp;
   m.vision.odom_from_clone = m.step.odom_from_clone = s.world_from_body;
@@ -183,11 +181,12 @@ void ErrorStateFilter::move_steadily(double seconds) {
 void ErrorStateFilter::walk_biases(double seconds) {
   ErrorCovariance& p = memory_.belief.covariance;
   const auto square = [](double x) { return x * x; };
-  if (p(kWheelScale, kWheelScale) < square(options_.wheels.scale_sigma))
-    p(kWheelScale, kWheelScale) += square(options_.wheels.scale_walk_sqrt_hz) * seconds;
-  p(kCompassOffset, kCompassOffset) += square(options_.compass.offset_walk_rad_sqrt_hz) * seconds;
+  if (p(error_at::kWheelScale, error_at::kWheelScale) < square(options_.wheels.scale_sigma))
+    p(error_at::kWheelScale, error_at::kWheelScale) += square(options_.wheels.scale_walk_sqrt_hz) * seconds;
+  p(error_at::kCompassOffset, error_at::kCompassOffset) += square(options_.compass.offset_walk_rad_sqrt_hz) * seconds;
   for (int i = 0; i < 2; ++i)
-    p(kInclinometerBias + i, kInclinometerBias + i) += square(options_.inclinometer.bias_walk_rad_sqrt_hz) * seconds;
+    p(error_at::kInclinometerBias + i, error_at::kInclinometerBias + i) +=
+        square(options_.inclinometer.bias_walk_rad_sqrt_hz) * seconds;
 }
 
 void ErrorStateFilter::take(const ImuSample& sample) {
@@ -294,13 +293,14 @@ void ErrorStateFilter::correct_world(const Innovation& innovation) {
 void ErrorStateFilter::correct_motion(const Innovation& innovation, int clone) {
   if (!correct(memory_.belief, innovation)) return;
   const NavigationState& s = memory_.belief.state;
-  const Pose odom_from_body = (clone == kVisionClone ? memory_.vision.odom_from_clone : memory_.step.odom_from_clone) *
-                              motion_since_clone(s, clone).clone_from_body;
+  const Pose odom_from_body =
+      (clone == error_at::kVisionClone ? memory_.vision.odom_from_clone : memory_.step.odom_from_clone) *
+      motion_since_clone(s, clone).clone_from_body;
   memory_.world_from_odom = s.world_from_body * odom_from_body.inverse();
 }
 
 UncertainPose ErrorStateFilter::odom_from_body() const {
-  const MotionSinceClone motion = motion_since_clone(memory_.belief.state, kVisionClone);
+  const MotionSinceClone motion = motion_since_clone(memory_.belief.state, error_at::kVisionClone);
   const Matrix6d covariance = motion.jacobian * memory_.belief.covariance * motion.jacobian.transpose();
   const Pose odom_from_body = memory_.world_from_odom.inverse() * memory_.belief.state.world_from_body;
   UncertainPose odom =

@@ -42,7 +42,6 @@ TEST(ErrorState, UpFollowsTheTilt) {
 }
 
 TEST(ErrorState, CloneHasTheCorrelationsOfThePose) {
-  using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
   Random random(3);
   Belief belief;
   belief.state = random_navigation_state(random);
@@ -50,12 +49,24 @@ TEST(ErrorState, CloneHasTheCorrelationsOfThePose) {
   for (Eigen::Index i = 0; i < root.size(); ++i) root.data()[i] = random.normal();
   const ErrorCovariance before = root * root.transpose();
   belief.covariance = before;
-  clone_pose(belief, kStepClone);
+  clone_pose(belief, error_at::kStepClone);
   const ErrorCovariance& p = belief.covariance;
-  EXPECT_EQ((p.block<6, 6>(kStepClone, kStepClone) - before.block<6, 6>(kPose, kPose)).norm(), 0);
-  EXPECT_EQ((p.block<6, 6>(kStepClone, kPose) - before.block<6, 6>(kPose, kPose)).norm(), 0);
-  EXPECT_EQ((p.block<6, 3>(kStepClone, kGyroBias) - before.block<6, 3>(kPose, kGyroBias)).norm(), 0);
-  EXPECT_EQ((p.block<6, 6>(kVisionClone, kStepClone) - before.block<6, 6>(kVisionClone, kPose)).norm(), 0);
+  EXPECT_EQ(
+      (p.block<6, 6>(error_at::kStepClone, error_at::kStepClone) - before.block<6, 6>(error_at::kPose, error_at::kPose))
+          .norm(),
+      0);
+  EXPECT_EQ(
+      (p.block<6, 6>(error_at::kStepClone, error_at::kPose) - before.block<6, 6>(error_at::kPose, error_at::kPose))
+          .norm(),
+      0);
+  EXPECT_EQ((p.block<6, 3>(error_at::kStepClone, error_at::kGyroBias) -
+             before.block<6, 3>(error_at::kPose, error_at::kGyroBias))
+                .norm(),
+            0);
+  EXPECT_EQ((p.block<6, 6>(error_at::kVisionClone, error_at::kStepClone) -
+             before.block<6, 6>(error_at::kVisionClone, error_at::kPose))
+                .norm(),
+            0);
   EXPECT_EQ((p - p.transpose()).norm(), 0);
   EXPECT_EQ((belief.state.world_from_step_clone.matrix() - belief.state.world_from_body.matrix()).norm(), 0);
 }

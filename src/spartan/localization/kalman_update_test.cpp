@@ -12,8 +12,6 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 Belief random_belief(Random& random, double sigma) {
   Belief belief;
   belief.state = random_navigation_state(random);
@@ -30,7 +28,8 @@ TEST(KalmanUpdate, IsTheInformationFormOnLinearParts) {
   Innovation i(3);
   i.residual << 0.1, -0.2, 0.3;
   for (int row = 0; row < 3; ++row) {
-    for (int column = kVelocity; column < kVisionClone; ++column) i.jacobian(row, column) = random.normal();
+    for (int column = error_at::kVelocity; column < error_at::kVisionClone; ++column)
+      i.jacobian(row, column) = random.normal();
   }
   i.noise.diagonal() << 0.5, 0.7, 0.9;
   ASSERT_TRUE(correct(belief, i));
@@ -41,7 +40,7 @@ TEST(KalmanUpdate, IsTheInformationFormOnLinearParts) {
   EXPECT_LE((error_between(before.state, belief.state) - step).norm(), 1e-7);
   // Poses aside, whose errors are carried over to the new mean.
   const ErrorCovariance off = belief.covariance - expected;
-  EXPECT_LE((off.block<27, 27>(kVelocity, kVelocity)).cwiseAbs().maxCoeff(), 1e-7);
+  EXPECT_LE((off.block<27, 27>(error_at::kVelocity, error_at::kVelocity)).cwiseAbs().maxCoeff(), 1e-7);
   const Matrix6d reset = right_jacobian_se3(step.head<6>());
   const Matrix6d carried = reset * expected.topLeftCorner<6, 6>() * reset.transpose();
   EXPECT_LE((belief.covariance.topLeftCorner<6, 6>() - carried).norm(), 1e-7);
@@ -65,20 +64,21 @@ TEST(KalmanUpdate, OnlyTheChosenErrorLearnsAndTheOthersAreConsidered) {
   const Belief before = belief;
   Innovation i(1);
   i.residual[0] = 0.2;
-  i.jacobian(0, kWheelScale) = 1;
-  i.jacobian(0, kVelocity) = 2;
+  i.jacobian(0, error_at::kWheelScale) = 1;
+  i.jacobian(0, error_at::kVelocity) = 2;
   i.noise(0, 0) = 0.3;
-  ASSERT_TRUE(correct_only(belief, i, kWheelScale));
+  ASSERT_TRUE(correct_only(belief, i, error_at::kWheelScale));
   ErrorVector moved = error_between(before.state, belief.state);
-  EXPECT_GT(std::abs(moved[kWheelScale]), 1e-3);
-  moved[kWheelScale] = 0;
+  EXPECT_GT(std::abs(moved[error_at::kWheelScale]), 1e-3);
+  moved[error_at::kWheelScale] = 0;
   EXPECT_LE(moved.norm(), 1e-12);
   // Schmidt: the variance falls by what the optimal gain of this row is worth; the others keep theirs.
   const double s = (i.jacobian * before.covariance * i.jacobian.transpose() + i.noise)(0, 0);
-  const double with = before.covariance.row(kWheelScale).dot(i.jacobian.row(0));
-  EXPECT_NEAR(belief.covariance(kWheelScale, kWheelScale),
-              before.covariance(kWheelScale, kWheelScale) - with * with / s, 1e-9);
-  EXPECT_NEAR(belief.covariance(kVelocity, kVelocity), before.covariance(kVelocity, kVelocity), 1e-9);
+  const double with = before.covariance.row(error_at::kWheelScale).dot(i.jacobian.row(0));
+  EXPECT_NEAR(belief.covariance(error_at::kWheelScale, error_at::kWheelScale),
+              before.covariance(error_at::kWheelScale, error_at::kWheelScale) - with * with / s, 1e-9);
+  EXPECT_NEAR(belief.covariance(error_at::kVelocity, error_at::kVelocity),
+              before.covariance(error_at::kVelocity, error_at::kVelocity), 1e-9);
 }
 
 TEST(KalmanUpdate, LeavesABeliefAloneThatItCannotCorrect) {

@@ -85,28 +85,27 @@ bool Localizer::add(const PoseConstraint& constraint) {
 }
 
 LocalizationEstimate Localizer::estimate() const {
-  using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
   const FilterMemory& m = state_->filter.filter().memory();
   const NavigationState& s = m.belief.state;
   const ErrorCovariance& p = m.belief.covariance;
   LocalizationEstimate e;
   e.stamp = m.stamp;
-  e.world_from_body = {s.world_from_body, p.block<6, 6>(kPose, kPose)};
+  e.world_from_body = {s.world_from_body, p.block<6, 6>(error_at::kPose, error_at::kPose)};
   e.odom_from_body = state_->filter.filter().odom_from_body();
   e.world_from_odom = m.world_from_odom;
   // v = R w, δv = R (ν − [w]× φ).
   const Eigen::Matrix3d rotation = s.world_from_body.rotation_matrix();
   Eigen::Matrix<double, 3, 6> by_attitude_and_velocity;
   by_attitude_and_velocity << -rotation * skew(s.velocity_m_s), rotation;
-  static_assert(kVelocity == kAttitude + 3);
+  static_assert(error_at::kVelocity == error_at::kAttitude + 3);
   e.velocity_m_s = rotation * s.velocity_m_s;
-  e.velocity_covariance =
-      by_attitude_and_velocity * p.block<6, 6>(kAttitude, kAttitude) * by_attitude_and_velocity.transpose();
+  e.velocity_covariance = by_attitude_and_velocity * p.block<6, 6>(error_at::kAttitude, error_at::kAttitude) *
+                          by_attitude_and_velocity.transpose();
   if (m.wheels.slip_known) e.slip = WheelSlip{m.wheels.slip_stamp, m.wheels.slip, m.wheels.slip_sigma};
   e.heading.east = m.compass.heading_east;
   if (m.compass.offset_known) {
     e.heading.compass_offset_rad = s.compass_offset_rad;
-    e.heading.compass_offset_sigma_rad = std::sqrt(p(kCompassOffset, kCompassOffset));
+    e.heading.compass_offset_sigma_rad = std::sqrt(p(error_at::kCompassOffset, error_at::kCompassOffset));
   }
   e.gravity_measured = m.gravity_measured;
   e.up_in_world = true_up(s.gravity_tilt_rad);

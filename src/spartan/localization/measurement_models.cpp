@@ -7,10 +7,8 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 const Pose& clone_of(const NavigationState& s, int clone) {
-  return clone == kVisionClone ? s.world_from_vision_clone : s.world_from_step_clone;
+  return clone == error_at::kVisionClone ? s.world_from_vision_clone : s.world_from_step_clone;
 }
 
 // The displacement of the step along the mean attitude, and its derivative by the motion's right perturbation:
@@ -39,7 +37,7 @@ MotionSinceClone motion_since_clone(const NavigationState& s, int clone) {
   MotionSinceClone m;
   m.clone_from_body = clone_of(s, clone).inverse() * s.world_from_body;
   m.jacobian.setZero();
-  m.jacobian.middleCols<6>(kPose).setIdentity();
+  m.jacobian.middleCols<6>(error_at::kPose).setIdentity();
   m.jacobian.middleCols<6>(clone) = -adjoint(m.clone_from_body.inverse());
   return m;
 }
@@ -53,19 +51,19 @@ Innovation relative_motion_innovation(const NavigationState& s, int clone, const
   i.residual = r;
   i.jacobian = m.jacobian;
   i.jacobian.middleCols<6>(clone) = left * m.jacobian.middleCols<6>(clone);
-  i.jacobian.middleCols<6>(kVisionDrift) = -right * drift_scale.asDiagonal();
-  i.jacobian.middleCols<6>(kVisionConstant) = i.jacobian.middleCols<6>(kVisionDrift);
+  i.jacobian.middleCols<6>(error_at::kVisionDrift) = -right * drift_scale.asDiagonal();
+  i.jacobian.middleCols<6>(error_at::kVisionConstant) = i.jacobian.middleCols<6>(error_at::kVisionDrift);
   i.noise = right * covariance * right.transpose();
   return i;
 }
 
 Innovation wheel_innovation(const NavigationState& s, const WheelStep& step) {
-  const MotionSinceClone m = motion_since_clone(s, kStepClone);
+  const MotionSinceClone m = motion_since_clone(s, error_at::kStepClone);
   const MeanStep mean = mean_step(m.clone_from_body);
   Innovation i(step.turn_known ? 4 : 3);
   i.residual.head<3>() = Eigen::Vector3d(s.wheel_scale * step.counted_m, 0, 0) - mean.displacement;
   i.jacobian.topRows<3>() = mean.displacement_by * m.jacobian;
-  i.jacobian(0, kWheelScale) = -step.counted_m;
+  i.jacobian(0, error_at::kWheelScale) = -step.counted_m;
   i.noise.diagonal().head<3>() << step.forward_sigma_m * step.forward_sigma_m, step.side_sigma_m * step.side_sigma_m,
       step.up_sigma_m * step.up_sigma_m;
   if (step.turn_known) {
@@ -77,7 +75,7 @@ Innovation wheel_innovation(const NavigationState& s, const WheelStep& step) {
 }
 
 StepForward forward_of_step(const NavigationState& s) {
-  const MotionSinceClone m = motion_since_clone(s, kStepClone);
+  const MotionSinceClone m = motion_since_clone(s, error_at::kStepClone);
   const MeanStep mean = mean_step(m.clone_from_body);
   return {mean.displacement.x(), mean.displacement_by.row(0) * m.jacobian};
 }
@@ -103,9 +101,9 @@ Innovation compass_innovation(const NavigationState& s, double heading_rad, doub
   const Eigen::Matrix3d by_tilt = level * skew(r.col(0)) * left_jacobian_so3(tilt);
   Innovation i(1);
   i.residual[0] = std::remainder(heading_rad - heading_about_up(s) - s.compass_offset_rad, 2 * std::numbers::pi);
-  i.jacobian.block<1, 3>(0, kAttitude) = -by_ahead * level * r * skew(Eigen::Vector3d::UnitX());
-  i.jacobian.block<1, 2>(0, kGravityTilt) = by_ahead * by_tilt.leftCols<2>();
-  i.jacobian(0, kCompassOffset) = 1;
+  i.jacobian.block<1, 3>(0, error_at::kAttitude) = -by_ahead * level * r * skew(Eigen::Vector3d::UnitX());
+  i.jacobian.block<1, 2>(0, error_at::kGravityTilt) = by_ahead * by_tilt.leftCols<2>();
+  i.jacobian(0, error_at::kCompassOffset) = 1;
   i.noise(0, 0) = sigma_rad * sigma_rad;
   return i;
 }
@@ -129,9 +127,9 @@ Innovation inclinometer_innovation(const NavigationState& s, double roll, double
   Innovation i(2);
   i.residual = Eigen::Vector2d(roll, pitch) - roll_pitch_of_up(u) - s.inclinometer_bias_rad;
   for (Eigen::Index k = 0; k < 2; ++k) i.residual[k] = std::remainder(i.residual[k], 2 * std::numbers::pi);
-  i.jacobian.middleCols<3>(kAttitude) = by_up * skew(u);
-  i.jacobian.middleCols<2>(kGravityTilt) = by_up * to_body * true_up_jacobian(s.gravity_tilt_rad);
-  i.jacobian.middleCols<2>(kInclinometerBias).setIdentity();
+  i.jacobian.middleCols<3>(error_at::kAttitude) = by_up * skew(u);
+  i.jacobian.middleCols<2>(error_at::kGravityTilt) = by_up * to_body * true_up_jacobian(s.gravity_tilt_rad);
+  i.jacobian.middleCols<2>(error_at::kInclinometerBias).setIdentity();
   i.noise.diagonal().setConstant(sigma * sigma);
   return i;
 }
@@ -141,9 +139,9 @@ Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean
   const Eigen::Vector3d expected = gravity * (to_body * true_up(s.gravity_tilt_rad));
   Innovation i(3);
   i.residual = mean_accel - expected - s.accel_bias_m_s2;
-  i.jacobian.middleCols<3>(kAttitude) = skew(expected);
-  i.jacobian.middleCols<2>(kGravityTilt) = gravity * to_body * true_up_jacobian(s.gravity_tilt_rad);
-  i.jacobian.middleCols<3>(kAccelBias).setIdentity();
+  i.jacobian.middleCols<3>(error_at::kAttitude) = skew(expected);
+  i.jacobian.middleCols<2>(error_at::kGravityTilt) = gravity * to_body * true_up_jacobian(s.gravity_tilt_rad);
+  i.jacobian.middleCols<3>(error_at::kAccelBias).setIdentity();
   i.noise.diagonal().setConstant(sigma * sigma);
   return i;
 }
@@ -166,7 +164,7 @@ Innovation pose_innovation(const NavigationState& s, const Pose& world_from_body
   if (rows == 0) return i;
   const auto directions = eigen.eigenvectors().rightCols(rows).transpose();
   i.residual = directions * r;
-  i.jacobian.middleCols<6>(kPose) = directions;
+  i.jacobian.middleCols<6>(error_at::kPose) = directions;
   i.noise.diagonal() = values.tail(rows).cwiseInverse();
   return i;
 }

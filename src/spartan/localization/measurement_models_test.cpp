@@ -12,12 +12,10 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 // Residual = measured − expected: its derivative by the estimate's error is −jacobian.
 template <int Rows>
 void expect_derivative(const NavigationState& s, const std::function<Innovation(const NavigationState&)>& innovation) {
-  const auto numeric = testing::numeric_jacobian<Rows, kSize>(
+  const auto numeric = testing::numeric_jacobian<Rows, error_at::kSize>(
       [&](const ErrorVector& e) -> Eigen::Matrix<double, Rows, 1> { return innovation(add_error(s, e)).residual; },
       ErrorVector::Zero(), 1e-4);
   EXPECT_LE((innovation(s).jacobian + numeric).cwiseAbs().maxCoeff(), 1e-6);
@@ -44,7 +42,7 @@ TEST(MeasurementModels, JacobiansMatchDifferences) {
 TEST(MeasurementModels, ForwardOfStepHasItsDerivative) {
   Random random(8);
   const NavigationState s = random_navigation_state(random);
-  const auto numeric = testing::numeric_jacobian<1, kSize>(
+  const auto numeric = testing::numeric_jacobian<1, error_at::kSize>(
       [&](const ErrorVector& e) -> Eigen::Matrix<double, 1, 1> {
         return Eigen::Matrix<double, 1, 1>(forward_of_step(add_error(s, e)).metres);
       },
@@ -55,7 +53,7 @@ TEST(MeasurementModels, ForwardOfStepHasItsDerivative) {
 // Far from the mean: the motion measured is that of the true state, X̂ Exp(r) over the clone Ĉ Exp(ξ_c), less the drift.
 TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
   Random random(5);
-  for (const int clone : {kVisionClone, kStepClone}) {
+  for (const int clone : {error_at::kVisionClone, error_at::kStepClone}) {
     const NavigationState s = random_navigation_state(random);
     Vector6d r, drift_scale;
     r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
@@ -63,14 +61,14 @@ TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
     const Pose mean = motion_since_clone(s, clone).clone_from_body;
     const auto seen = [&](const ErrorVector& e) -> Vector6d {
       const NavigationState truth = add_error(s, e);
-      const Pose motion =
-          motion_since_clone(truth, clone).clone_from_body *
-          exp_se3(-drift_scale.cwiseProduct(e.segment<6>(kVisionDrift) + e.segment<6>(kVisionConstant)));
+      const Pose motion = motion_since_clone(truth, clone).clone_from_body *
+                          exp_se3(-drift_scale.cwiseProduct(e.segment<6>(error_at::kVisionDrift) +
+                                                            e.segment<6>(error_at::kVisionConstant)));
       return log_se3(mean.inverse() * motion);
     };
     ErrorVector at = ErrorVector::Zero();
-    at.segment<6>(kPose) = r;
-    const auto numeric = testing::numeric_jacobian<6, kSize>(seen, at, 1e-4);
+    at.segment<6>(error_at::kPose) = r;
+    const auto numeric = testing::numeric_jacobian<6, error_at::kSize>(seen, at, 1e-4);
     const Innovation innovation =
         relative_motion_innovation(s, clone, mean * exp_se3(r), Matrix6d::Identity(), drift_scale);
     EXPECT_LE((innovation.residual - r).norm(), 1e-12);
@@ -120,7 +118,8 @@ TEST(MeasurementModels, PoseConstraintOfAnyRankMeasuresWhatItKnows) {
   ASSERT_EQ(i.rows(), 2);
   // Its information about the error is that which was handed over, carried to the mean, and halved by the factor.
   const Matrix6d jacobian = right_jacobian_se3(offset);
-  const Matrix6d information = (i.jacobian.transpose() * i.noise.inverse() * i.jacobian).block<6, 6>(kPose, kPose);
+  const Matrix6d information =
+      (i.jacobian.transpose() * i.noise.inverse() * i.jacobian).block<6, 6>(error_at::kPose, error_at::kPose);
   EXPECT_LE((information - 0.5 * jacobian.transpose() * some * jacobian).cwiseAbs().maxCoeff(), 1e-8);
   // The whole residual where all is known.
   const Innovation all = pose_innovation(s, seen, Matrix6d::Identity(), 1);

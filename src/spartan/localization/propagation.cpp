@@ -3,17 +3,16 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 // Noise that is white in acceleration and angular rate, integrated over the step: the double integral
 // correlates position with velocity.
 void add_white_noise(Transition& t, double accel_variance, double rate_variance, double seconds) {
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
-  t.noise.block<3, 3>(kPosition, kPosition) += identity * (accel_variance * seconds * seconds * seconds / 3);
-  t.noise.block<3, 3>(kPosition, kVelocity) += identity * (accel_variance * seconds * seconds / 2);
-  t.noise.block<3, 3>(kVelocity, kPosition) += identity * (accel_variance * seconds * seconds / 2);
-  t.noise.block<3, 3>(kVelocity, kVelocity) += identity * (accel_variance * seconds);
-  t.noise.block<3, 3>(kAttitude, kAttitude) += identity * (rate_variance * seconds);
+  t.noise.block<3, 3>(error_at::kPosition, error_at::kPosition) +=
+      identity * (accel_variance * seconds * seconds * seconds / 3);
+  t.noise.block<3, 3>(error_at::kPosition, error_at::kVelocity) += identity * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(error_at::kVelocity, error_at::kPosition) += identity * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(error_at::kVelocity, error_at::kVelocity) += identity * (accel_variance * seconds);
+  t.noise.block<3, 3>(error_at::kAttitude, error_at::kAttitude) += identity * (rate_variance * seconds);
 }
 
 Transition blank() {
@@ -67,27 +66,29 @@ Transition transition(const NavigationState& s, const InertialStep& step, const 
   const Eigen::Matrix3d to_body = i.after.transpose(), back = to_body * i.before;
   const Eigen::Vector3d after = back * s.velocity_m_s + t * (to_body * i.acceleration);  // w'
 
-  using Rows = Eigen::Matrix<double, 3, kMoving>;
+  using Rows = Eigen::Matrix<double, 3, error_at::kMoving>;
   Rows turn = Rows::Zero(), velocity = Rows::Zero(), accel = Rows::Zero();
-  turn.middleCols<3>(kAttitude) = back;
-  turn.middleCols<3>(kGyroBias) = -t * left_jacobian_so3(-i.turn);
-  velocity.middleCols<3>(kVelocity) = i.before;
-  velocity.middleCols<3>(kAttitude) = -i.before * skew(s.velocity_m_s);
+  turn.middleCols<3>(error_at::kAttitude) = back;
+  turn.middleCols<3>(error_at::kGyroBias) = -t * left_jacobian_so3(-i.turn);
+  velocity.middleCols<3>(error_at::kVelocity) = i.before;
+  velocity.middleCols<3>(error_at::kAttitude) = -i.before * skew(s.velocity_m_s);
   accel = -0.5 * i.after * skew(i.force_to) * turn;
-  accel.middleCols<3>(kAttitude) -= 0.5 * i.before * skew(i.force_from);
-  accel.middleCols<3>(kAccelBias) = -0.5 * (i.before + i.after);
+  accel.middleCols<3>(error_at::kAttitude) -= 0.5 * i.before * skew(i.force_from);
+  accel.middleCols<3>(error_at::kAccelBias) = -0.5 * (i.before + i.after);
   const Eigen::Matrix<double, 3, 2> accel_by_tilt = -gravity * true_up_jacobian(s.gravity_tilt_rad);
 
-  r.by_moving.middleRows<3>(kAttitude) = turn;
-  r.by_moving.middleRows<3>(kVelocity) = to_body * (velocity + t * accel) + skew(after) * turn;
-  r.by_moving.middleRows<3>(kPosition) = to_body * (t * velocity + 0.5 * t * t * accel);
-  r.by_moving.block<3, 3>(kPosition, kPosition) = back;
-  r.by_tilt.middleRows<3>(kVelocity) = t * to_body * accel_by_tilt;
-  r.by_tilt.middleRows<3>(kPosition) = 0.5 * t * t * to_body * accel_by_tilt;
+  r.by_moving.middleRows<3>(error_at::kAttitude) = turn;
+  r.by_moving.middleRows<3>(error_at::kVelocity) = to_body * (velocity + t * accel) + skew(after) * turn;
+  r.by_moving.middleRows<3>(error_at::kPosition) = to_body * (t * velocity + 0.5 * t * t * accel);
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
+  r.by_tilt.middleRows<3>(error_at::kVelocity) = t * to_body * accel_by_tilt;
+  r.by_tilt.middleRows<3>(error_at::kPosition) = 0.5 * t * t * to_body * accel_by_tilt;
 
   add_white_noise(r, noise.accel * noise.accel, noise.gyro * noise.gyro, t);
-  r.noise.block<3, 3>(kGyroBias, kGyroBias).diagonal().array() += noise.gyro_walk * noise.gyro_walk * t;
-  r.noise.block<3, 3>(kAccelBias, kAccelBias).diagonal().array() += noise.accel_walk * noise.accel_walk * t;
+  r.noise.block<3, 3>(error_at::kGyroBias, error_at::kGyroBias).diagonal().array() +=
+      noise.gyro_walk * noise.gyro_walk * t;
+  r.noise.block<3, 3>(error_at::kAccelBias, error_at::kAccelBias).diagonal().array() +=
+      noise.accel_walk * noise.accel_walk * t;
   return r;
 }
 
@@ -107,26 +108,27 @@ Transition transition(const NavigationState& s, const SteadyStep& step, const St
   Transition r = blank();
   const Eigen::Matrix3d back = exp_so3(step.rate_rad_s * t).toRotationMatrix().transpose();
   const Eigen::Matrix3d speed = skew(s.velocity_m_s);
-  r.by_moving.block<3, 3>(kAttitude, kAttitude) = back;
-  r.by_moving.block<3, 3>(kPosition, kPosition) = back;
-  r.by_moving.block<3, 3>(kPosition, kVelocity) = 0.5 * t * (back + Eigen::Matrix3d::Identity());
-  r.by_moving.block<3, 3>(kPosition, kAttitude) = -0.5 * t * (back * speed + speed * back);
+  r.by_moving.block<3, 3>(error_at::kAttitude, error_at::kAttitude) = back;
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kVelocity) = 0.5 * t * (back + Eigen::Matrix3d::Identity());
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kAttitude) = -0.5 * t * (back * speed + speed * back);
   add_white_noise(r, noise.velocity_m_s_sqrt_hz * noise.velocity_m_s_sqrt_hz,
                   noise.attitude_rad_sqrt_hz * noise.attitude_rad_sqrt_hz, t);
   return r;
 }
 
 void move_on(ErrorCovariance& p, const Transition& t) {
-  constexpr int kRest = kSize - kMoving;
-  Eigen::Matrix<double, kMoving, kSize> rows;
-  rows.noalias() = t.by_moving * p.topRows<kMoving>();
-  rows.noalias() += t.by_tilt * p.middleRows<2>(kGravityTilt);
-  Eigen::Matrix<double, kMoving, kMoving> square = rows.leftCols<kMoving>() * t.by_moving.transpose();
-  square.noalias() += rows.middleCols<2>(kGravityTilt) * t.by_tilt.transpose();
+  constexpr int kRest = error_at::kSize - error_at::kMoving;
+  Eigen::Matrix<double, error_at::kMoving, error_at::kSize> rows;
+  rows.noalias() = t.by_moving * p.topRows<error_at::kMoving>();
+  rows.noalias() += t.by_tilt * p.middleRows<2>(error_at::kGravityTilt);
+  Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> square =
+      rows.leftCols<error_at::kMoving>() * t.by_moving.transpose();
+  square.noalias() += rows.middleCols<2>(error_at::kGravityTilt) * t.by_tilt.transpose();
   square += t.noise;
-  p.topLeftCorner<kMoving, kMoving>() = 0.5 * (square + square.transpose());
-  p.topRightCorner<kMoving, kRest>() = rows.rightCols<kRest>();
-  p.bottomLeftCorner<kRest, kMoving>() = rows.rightCols<kRest>().transpose();
+  p.topLeftCorner<error_at::kMoving, error_at::kMoving>() = 0.5 * (square + square.transpose());
+  p.topRightCorner<error_at::kMoving, kRest>() = rows.rightCols<kRest>();
+  p.bottomLeftCorner<kRest, error_at::kMoving>() = rows.rightCols<kRest>().transpose();
 }
 
 }  // namespace spartan

@@ -10,25 +10,23 @@
 
 namespace spartan {
 namespace {
-
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-using MovingVector = Eigen::Matrix<double, kMoving, 1>;
-using Full = Eigen::Matrix<double, kMoving, kSize>;
+using MovingVector = Eigen::Matrix<double, error_at::kMoving, 1>;
+using Full = Eigen::Matrix<double, error_at::kMoving, error_at::kSize>;
 
 Full whole(const Transition& t) {
   Full f = Full::Zero();
-  f.leftCols<kMoving>() = t.by_moving;
-  f.middleCols<2>(kGravityTilt) = t.by_tilt;
+  f.leftCols<error_at::kMoving>() = t.by_moving;
+  f.middleCols<2>(error_at::kGravityTilt) = t.by_tilt;
   return f;
 }
 
 template <class Step>
 Full numeric(const NavigationState& s, const Step& move) {
   const NavigationState after = move(s);
-  return testing::numeric_jacobian<kMoving, kSize>(
+  return testing::numeric_jacobian<error_at::kMoving, error_at::kSize>(
       [&](const ErrorVector& e) -> MovingVector {
         const ErrorVector difference = error_between(after, move(add_error(s, e)));
-        return difference.head<kMoving>();
+        return difference.head<error_at::kMoving>();
       },
       ErrorVector::Zero(), 1e-3);
 }
@@ -101,9 +99,9 @@ TEST(Propagation, NoiseGrowsAsItsIntegrals) {
     move_on(p, transition(s, still, {0, 0.3, 0, 0}, 1));
     s = propagate(s, still, 1);
   }
-  EXPECT_NEAR(p(kPosition, kPosition), 0.09 * 8 / 3, 1e-9);
-  EXPECT_NEAR(p(kPosition, kVelocity), 0.09 * 2, 1e-9);
-  EXPECT_NEAR(p(kVelocity, kVelocity), 0.09 * 2, 1e-9);
+  EXPECT_NEAR(p(error_at::kPosition, error_at::kPosition), 0.09 * 8 / 3, 1e-9);
+  EXPECT_NEAR(p(error_at::kPosition, error_at::kVelocity), 0.09 * 2, 1e-9);
+  EXPECT_NEAR(p(error_at::kVelocity, error_at::kVelocity), 0.09 * 2, 1e-9);
 }
 
 TEST(Propagation, MovesCovarianceAsTheWholeMatrixWould) {
@@ -114,8 +112,8 @@ TEST(Propagation, MovesCovarianceAsTheWholeMatrixWould) {
   for (Eigen::Index i = 0; i < root.size(); ++i) root.data()[i] = random.normal();
   ErrorCovariance p = root * root.transpose();
   ErrorCovariance f = ErrorCovariance::Identity(), q = ErrorCovariance::Zero();
-  f.topRows<kMoving>() = whole(t);
-  q.topLeftCorner<kMoving, kMoving>() = t.noise;
+  f.topRows<error_at::kMoving>() = whole(t);
+  q.topLeftCorner<error_at::kMoving, error_at::kMoving>() = t.noise;
   const ErrorCovariance expected = f * p * f.transpose() + q;
   move_on(p, t);
   EXPECT_LE((p - expected).cwiseAbs().maxCoeff(), 1e-9);

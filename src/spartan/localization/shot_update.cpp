@@ -9,8 +9,6 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 /// Where vision measures, the noise of a prediction without an IMU counts (1 + this) times: the prediction is then
 /// worth nothing, and the filter composes the motions as they come.
 constexpr double kUnmeasuredFactor = 99;
@@ -27,7 +25,7 @@ Matrix6d usable_covariance(const Matrix6d& stated, double factor) {
 }
 
 // Position, attitude, velocity stand first among the errors.
-static_assert(kPosition == 0 && kAttitude == 3 && kVelocity == 6);
+static_assert(error_at::kPosition == 0 && error_at::kAttitude == 3 && error_at::kVelocity == 6);
 
 }  // namespace
 
@@ -45,7 +43,8 @@ void ErrorStateFilter::take(const RelativeMotion& motion) {
     if (measure_motion(motion)) {
       const NavigationState& s = memory_.belief.state;
       const double seconds = seconds_between(motion.from, motion.to);
-      memory_.vision.rate_rad_s = log_so3(motion_since_clone(s, kVisionClone).clone_from_body.rotation()) / seconds;
+      memory_.vision.rate_rad_s =
+          log_so3(motion_since_clone(s, error_at::kVisionClone).clone_from_body.rotation()) / seconds;
     }
   }
   end_step_at_shot(motion.to);
@@ -60,8 +59,8 @@ bool ErrorStateFilter::measure_motion(const RelativeMotion& motion) {
   vision.stood = measured.translation().isZero(1e-12) && measured.rotation().vec().isZero(1e-12);
 
   if (!vision.stood) {
-    let_drift(kVisionDrift, drift_sigmas_, options_.vision.drift_steps);
-    let_drift(kVisionConstant, constant_sigmas_, kConstantSteps);
+    let_drift(error_at::kVisionDrift, drift_sigmas_, options_.vision.drift_steps);
+    let_drift(error_at::kVisionConstant, constant_sigmas_, kConstantSteps);
   }
 
   const bool predicted = vision.unmeasured_s == 0;
@@ -70,7 +69,7 @@ bool ErrorStateFilter::measure_motion(const RelativeMotion& motion) {
   const Matrix6d covariance = usable_covariance(motion.covariance, options_.vision.white_factor);
   const Vector6d drift = vision.stood ? Vector6d::Zero().eval() : motion.covariance.diagonal().cwiseSqrt().eval();
   const Innovation innovation =
-      relative_motion_innovation(memory_.belief.state, kVisionClone, measured, covariance, drift);
+      relative_motion_innovation(memory_.belief.state, error_at::kVisionClone, measured, covariance, drift);
   const double square = predicted ? normalised_square(p, innovation) : 0;
   SensorJudge& judge = memory_.judge(LocalizationSensor::vision);
   const bool confirmed = square > vision_gate_ && wheels_confirm_prediction(motion);
@@ -78,7 +77,7 @@ bool ErrorStateFilter::measure_motion(const RelativeMotion& motion) {
   if (!judge.judge(square, vision_gate_, HealthReason::disagrees, options_.health.excluded_after,
                    options_.health.back_after))
     return false;
-  correct_motion(innovation, kVisionClone);
+  correct_motion(innovation, error_at::kVisionClone);
   return true;
 }
 
@@ -87,7 +86,7 @@ void ErrorStateFilter::let_drift(int index, const Vector6d& sigmas, double steps
   const double stays = std::exp(-1 / steps);
   NavigationState& s = memory_.belief.state;
   ErrorCovariance& p = memory_.belief.covariance;
-  (index == kVisionDrift ? s.vision_drift : s.vision_constant) *= stays;
+  (index == error_at::kVisionDrift ? s.vision_drift : s.vision_constant) *= stays;
   p.middleRows<6>(index) *= stays;
   p.middleCols<6>(index) *= stays;
   p.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
@@ -109,7 +108,7 @@ bool ErrorStateFilter::overrule_prediction(const Innovation& innovation, double 
       .judge(square, vision_gate_, HealthReason::overruled, options_.health.excluded_after, options_.health.back_after);
   memory_.judge(LocalizationSensor::vision)
       .judge(0, vision_gate_, HealthReason::none, options_.health.excluded_after, options_.health.back_after);
-  correct_motion(innovation, kVisionClone);
+  correct_motion(innovation, error_at::kVisionClone);
   return true;
 }
 
@@ -121,7 +120,8 @@ bool ErrorStateFilter::wheels_confirm_prediction(const RelativeMotion& motion) c
   const WheelStep step = step_to(*wheels);
   const double counted = memory_.belief.state.wheel_scale * step.counted_m;
   const double sigma =
-      std::hypot(step.forward_sigma_m, std::sqrt(memory_.belief.covariance(kWheelScale, kWheelScale)) * step.counted_m);
+      std::hypot(step.forward_sigma_m,
+                 std::sqrt(memory_.belief.covariance(error_at::kWheelScale, error_at::kWheelScale)) * step.counted_m);
   const double predicted = forward_of_step(memory_.belief.state).metres;
   return std::abs(counted - predicted) < 3 * sigma &&
          std::abs(counted - motion.previous_from_current.translation().x()) > 5 * sigma;
@@ -145,10 +145,10 @@ void ErrorStateFilter::compare_gyro(const RelativeMotion& motion) {
   if (++judge.passed_in_row < options_.health.back_after) return;
   judge.readmit();
   ErrorCovariance& p = memory_.belief.covariance;
-  p.middleRows<6>(kGyroBias).setZero();
-  p.middleCols<6>(kGyroBias).setZero();
-  p.diagonal().segment<3>(kGyroBias).setConstant(std::pow(options_.imu.gyro_bias_rad_s, 2));
-  p.diagonal().segment<3>(kAccelBias).setConstant(std::pow(options_.imu.accel_bias_m_s2, 2));
+  p.middleRows<6>(error_at::kGyroBias).setZero();
+  p.middleCols<6>(error_at::kGyroBias).setZero();
+  p.diagonal().segment<3>(error_at::kGyroBias).setConstant(std::pow(options_.imu.gyro_bias_rad_s, 2));
+  p.diagonal().segment<3>(error_at::kAccelBias).setConstant(std::pow(options_.imu.accel_bias_m_s2, 2));
 }
 
 /// The next motion will be measured from here.
@@ -162,7 +162,7 @@ void ErrorStateFilter::begin_shot(Stamp stamp) {
   memory_.imu.turn.setIdentity();
   memory_.imu.turn_s = 0;
   memory_.imu.turn_whole = memory_.imu.known;
-  clone_pose(memory_.belief, kVisionClone);
+  clone_pose(memory_.belief, error_at::kVisionClone);
 }
 
 }  // namespace spartan

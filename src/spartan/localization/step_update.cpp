@@ -8,8 +8,6 @@
 namespace spartan {
 namespace {
 
-using namespace error_at;  // NOLINT(google-build-using-namespace): names of places, of one header
-
 /// Shorter steps are not worth a measurement; over much longer ones a mean attitude says nothing.
 constexpr double kShortestStep_s = 0.2, kLongestSteps = 4;
 /// A step whose length is known so much better than the wheels can tell only teaches their scale: slip stays the same
@@ -92,9 +90,9 @@ void ErrorStateFilter::measure_step(const WheelSample& sample) {
     const StepForward known = forward_of_step(memory_.belief.state);
     const double variance = known.jacobian * memory_.belief.covariance * known.jacobian.transpose();
     if (variance < std::pow(kKnownWell * step.forward_sigma_m, 2)) {
-      correct_only(memory_.belief, forward, kWheelScale);
+      correct_only(memory_.belief, forward, error_at::kWheelScale);
     } else {
-      correct_motion(whole, kStepClone);
+      correct_motion(whole, error_at::kStepClone);
     }
   }
   state_slip(step);
@@ -120,7 +118,7 @@ void ErrorStateFilter::begin_step(const std::optional<WheelSample>& wheels) {
   step.odom_from_clone = memory_.world_from_odom.inverse() * memory_.belief.state.world_from_body;
   step.has_wheels = wheels.has_value();
   if (wheels) step.wheels = *wheels;
-  clone_pose(memory_.belief, kStepClone);
+  clone_pose(memory_.belief, error_at::kStepClone);
 }
 
 bool ErrorStateFilter::wheels_stand() const {
@@ -155,12 +153,12 @@ void ErrorStateFilter::hold_still(bool imu_still) {
   covariance.diagonal().head<3>().setConstant(std::pow(options_.standing.position_m, 2));
   covariance.diagonal().tail<3>().setConstant(std::pow(options_.standing.attitude_rad, 2));
   const Innovation innovation =
-      relative_motion_innovation(memory_.belief.state, kStepClone, Pose(), covariance, Vector6d::Zero());
+      relative_motion_innovation(memory_.belief.state, error_at::kStepClone, Pose(), covariance, Vector6d::Zero());
   if (normalised_square(memory_.belief.covariance, innovation) > gates_[6]) {
     begin_step(wheels_at(memory_.stamp));
     return;
   }
-  correct_motion(innovation, kStepClone);
+  correct_motion(innovation, error_at::kStepClone);
 }
 
 }  // namespace spartan

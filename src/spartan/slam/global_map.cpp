@@ -359,10 +359,10 @@ LatticeWindow GlobalMap::extent() const {
   for (const auto& [key, slot] : tiles_) {
     const auto submap =
         std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
-    for (int corner = 0; corner < 4; ++corner) {
+    for (const auto& [x, y] :
+         {std::pair{key.x, key.y}, {key.x + 1, key.y}, {key.x, key.y + 1}, {key.x + 1, key.y + 1}}) {
       const Eigen::Vector3d p =
-          submap->world_from_submap * Eigen::Vector3d((key.x + corner % 2) * kSide * cell_m_,
-                                                      static_cast<double>(key.y + corner / 2) * kSide * cell_m_, 0);
+          submap->world_from_submap * Eigen::Vector3d(x * kSide * cell_m_, y * kSide * cell_m_, 0);
       west = std::min(west, p.x());
       east = std::max(east, p.x());
       south = std::min(south, p.y());

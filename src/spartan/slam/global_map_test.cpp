@@ -13,7 +13,13 @@
 namespace spartan {
 namespace {
 
-using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
+using testing::covariance_of;
+using testing::Ground;
+using testing::points_at;
+using testing::pose_at;
+using testing::rocky_ground;
+using testing::standing;
+using testing::TemporaryFolder;
 
 LocalMap map_of(const Ground& ground, const Pose& pose, std::uint64_t seed) {
   return MapGenerator({}, Workers(1)).generate(points_at(ground, pose, seed), pose);

@@ -11,7 +11,12 @@
 namespace spartan {
 namespace {
 
-using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
+using testing::covariance_of;
+using testing::Ground;
+using testing::points_at;
+using testing::pose_at;
+using testing::rocky_ground;
+using testing::standing;
 
 struct Scene {
   Pose now;

@@ -12,8 +12,13 @@
 namespace spartan {
 namespace {
 
+using testing::covariance_of;
+using testing::Ground;
 using ::testing::HasSubstr;
-using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
+using testing::points_at;
+using testing::rocky_ground;
+using testing::standing;
+using testing::TemporaryFolder;
 
 Pose off_by(const Pose& pose, double x, double y, double yaw) {
   Vector6d eta;

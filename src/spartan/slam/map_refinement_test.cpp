@@ -8,7 +8,11 @@
 namespace spartan {
 namespace {
 
-using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
+using testing::Ground;
+using testing::numeric_jacobian;
+using testing::points_at;
+using testing::rocky_ground;
+using testing::standing;
 
 double hills(double x, double y) {
   return 0.1 * std::sin(1.3 * x + 0.4) * std::cos(0.9 * y) + 0.05 * x;

@@ -9,7 +9,10 @@
 namespace spartan {
 namespace {
 
-using namespace testing;  // NOLINT(google-build-using-namespace): one header of helpers
+using testing::Ground;
+using testing::points_at;
+using testing::rocky_ground;
+using testing::standing;
 
 Ground plane(double a, double b) {
   return [=](double x, double y) { return 0.1 + a * x + b * y; };

@@ -203,7 +203,7 @@ Status migrate(Database& db, const std::vector<MapMigration>& steps) {
   for (const MapMigration& step : steps) {
     if (step.to <= version) continue;
     // One text: a failure inside leaves the transaction open, so that it is taken back.
-    const Status status =
+    Status status =
         db.execute(fmt::format("BEGIN IMMEDIATE; {}; PRAGMA user_version = {}; COMMIT;", step.sql, step.to));
     if (!status) {
       static_cast<void>(db.execute("ROLLBACK"));

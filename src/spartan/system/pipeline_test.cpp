@@ -174,6 +174,7 @@ TEST(Pipeline, IsLevelledByTheFirstSecondWhereNothingCameBefore) {
   Pipeline pipeline = pipeline_of();
   const double tilt = 0.1;
   std::vector<ImuSample> first_second;
+  first_second.reserve(50);
   for (int i = 0; i < 50; ++i)
     first_second.push_back({{i * 10'000'000LL}, {0, 0, 0}, 9.81 * Eigen::Vector3d(std::sin(tilt), 0, std::cos(tilt))});
   pipeline.level(first_second);
