@@ -37,7 +37,7 @@ constexpr std::array<RangeBin, 5> kBins{RangeBin{0, 100}, RangeBin{0, 1.5}, Rang
 
 // Sums over pixels that both eyes see, of one matcher and one range.
 struct Score {
-  double truth = 0, matched = 0, beyond_1_px = 0, beyond_2_cm = 0, inside = 0, squares = 0;
+  double truth = 0, matched = 0, beyond_1_px = 0, beyond_2_cm = 0, inside = 0, sum = 0, squares = 0;
   void add(double disparity, double true_disparity, double focal_times_baseline) {
     truth += 1;
     if (!std::isfinite(disparity) || disparity <= 0) return;
@@ -47,6 +47,7 @@ struct Score {
       beyond_1_px += 1;
     } else {
       inside += 1;
+      sum += error;
       squares += error * error;
     }
     if (std::abs(focal_times_baseline / disparity - focal_times_baseline / true_disparity) > kTwoCentimetres_m)
@@ -117,9 +118,9 @@ void print(const std::string& scenario, const Scores& scores) {
       if (s.truth < 1) continue;
       const std::string range =
           b == 0 ? "all" : fmt::format("{:.1f}-{:.1f} m", kBins[b].from_m, std::min(kBins[b].to_m, 9.9));
-      fmt::print("{:<18} {:<8} {:<10} {:>7.3f} {:>9.2f} {:>9.2f} {:>10.2f} {:>9.1f}\n", scenario, matcher, range,
-                 std::sqrt(s.squares / s.inside), 100 * s.beyond_1_px / s.matched, 100 * s.beyond_2_cm / s.matched,
-                 100 * (1 - s.matched / s.truth), s.truth / 1e6);
+      fmt::print("{:<18} {:<8} {:<10} {:>7.3f} {:>7.3f} {:>9.2f} {:>9.2f} {:>10.2f} {:>9.1f}\n", scenario, matcher,
+                 range, std::sqrt(s.squares / s.inside), s.sum / s.inside, 100 * s.beyond_1_px / s.matched,
+                 100 * s.beyond_2_cm / s.matched, 100 * (1 - s.matched / s.truth), s.truth / 1e6);
     }
   }
 }
@@ -149,8 +150,8 @@ void run(const std::vector<std::string>& words) {
   RecordingArguments arguments = read_arguments(words, {{"--pairs", "10"}, {"--pair", "wide"}});
   std::vector<std::string>& scenarios = arguments.scenarios;
   if (scenarios.empty()) scenarios = {"rocky_20pct", "diffuse_200lux", "night_edge", "flat_featureless"};
-  fmt::print("{:<18} {:<8} {:<10} {:>7} {:>9} {:>9} {:>10} {:>9}\n", "scenario", "matcher", "range", "RMS px",
-             "> 1 px %", "> 2 cm %", "unmatched%", "Mpixels");
+  fmt::print("{:<18} {:<8} {:<10} {:>7} {:>7} {:>9} {:>9} {:>10} {:>9}\n", "scenario", "matcher", "range", "RMS px",
+             "mean px", "> 1 px %", "> 2 cm %", "unmatched%", "Mpixels");
   for (const std::string& scenario : scenarios)
     compare(arguments.folder, scenario, arguments.options.at("--pair"), arguments.number("--pairs"));
 }

@@ -184,9 +184,8 @@ void ErrorStateFilter::walk_biases(double seconds) {
   if (p(error_at::kWheelScale, error_at::kWheelScale) < square(options_.wheels.scale_sigma))
     p(error_at::kWheelScale, error_at::kWheelScale) += square(options_.wheels.scale_walk_sqrt_hz) * seconds;
   p(error_at::kCompassOffset, error_at::kCompassOffset) += square(options_.compass.offset_walk_rad_sqrt_hz) * seconds;
-  for (int i = 0; i < 2; ++i)
-    p(error_at::kInclinometerBias + i, error_at::kInclinometerBias + i) +=
-        square(options_.inclinometer.bias_walk_rad_sqrt_hz) * seconds;
+  p.diagonal().segment<2>(error_at::kInclinometerBias).array() +=
+      square(options_.inclinometer.bias_walk_rad_sqrt_hz) * seconds;
 }
 
 void ErrorStateFilter::take(const ImuSample& sample) {
