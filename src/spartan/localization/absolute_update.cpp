@@ -87,8 +87,7 @@ void ErrorStateFilter::take(const InclinometerSample& sample) {
 
 void ErrorStateFilter::take(const PoseConstraint& constraint) {
   move_to(constraint.stamp, nullptr);
-  const Innovation innovation =
-      pose_innovation(memory_.belief.state, constraint.world_from_body, constraint.information, options_.map_factor);
+  const Innovation innovation = map_innovation(memory_.belief, constraint, options_.map_factor);
   if (innovation.rows() == 0) return;
   const double square = normalised_square(memory_.belief.covariance, innovation);
   if (judge(LocalizationSensor::map, square, innovation.rows(), HealthReason::disagrees)) correct_world(innovation);

@@ -16,8 +16,13 @@ struct Projection {
 };
 
 Projection project(const ErrorCovariance& p, const Innovation& innovation) {
-  const Gain pht = p * innovation.jacobian.transpose();
-  const Square s = innovation.jacobian * pht + innovation.noise;
+  Gain pht = p * innovation.jacobian.transpose();
+  Square s = innovation.jacobian * pht + innovation.noise;
+  if (innovation.shared.cols() > 0) {
+    const Square both = innovation.jacobian * innovation.shared;
+    s += both + both.transpose();
+    pht += innovation.shared;
+  }
   return {pht, s.llt()};
 }
 
@@ -43,6 +48,10 @@ bool correct_by(Belief& belief, const Innovation& innovation, const Gain& gain) 
   half.noalias() = keep * belief.covariance;
   belief.covariance.noalias() = half * keep.transpose();
   belief.covariance += gain * innovation.noise * gain.transpose();
+  if (innovation.shared.cols() > 0) {
+    half.noalias() = keep * innovation.shared * gain.transpose();
+    belief.covariance -= half + half.transpose();
+  }
   for (const int pose : {error_at::kPose, error_at::kVisionClone, error_at::kStepClone})
     carry_over(belief.covariance, step, pose);
   symmetrise(belief.covariance);

@@ -46,6 +46,26 @@ TEST(KalmanUpdate, IsTheInformationFormOnLinearParts) {
   EXPECT_LE((belief.covariance.topLeftCorner<6, 6>() - carried).norm(), 1e-7);
 }
 
+// The noise as one more error beside the others: where the belief knows their covariance there is nothing shared.
+TEST(KalmanUpdate, NoiseThatSharesTheErrorIsThatOfAnAugmentedState) {
+  Random random(5);
+  Belief belief = random_belief(random, 0.1);
+  const Belief before = belief;
+  constexpr int kNoise = error_at::kWheelScale;  // plays the noise
+  Innovation augmented(1), shared(1);
+  augmented.residual[0] = shared.residual[0] = 0.2;
+  augmented.jacobian(0, error_at::kVelocity) = shared.jacobian(0, error_at::kVelocity) = 2;
+  augmented.jacobian(0, kNoise) = 1;
+  shared.noise(0, 0) = before.covariance(kNoise, kNoise);
+  shared.shared = before.covariance.col(kNoise);
+  EXPECT_NEAR(normalised_square(before.covariance, shared), normalised_square(before.covariance, augmented), 1e-9);
+  Belief expected = before;
+  ASSERT_TRUE(correct(expected, augmented));
+  ASSERT_TRUE(correct(belief, shared));
+  EXPECT_LE(error_between(expected.state, belief.state).norm(), 1e-9);
+  EXPECT_LE((expected.covariance - belief.covariance).norm(), 1e-9 * expected.covariance.norm());
+}
+
 TEST(KalmanUpdate, StatisticIsThatOfTheWholeCovariance) {
   Random random(2);
   const Belief belief = random_belief(random, 0.3);

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <optional>
 
 #include "spartan/localization/chi_square.h"
 #include "spartan/localization/drive_test.h"
@@ -43,8 +44,16 @@ TEST(Localizer, ComposesTheMotionsOfVisionAlone) {
   EXPECT_EQ(e.health_of(LocalizationSensor::imu).state, SensorState::missing);
 }
 
+// The last pose seen from that after `from` motions.
+struct Revisit {
+  Eigen::Index from = 0;
+  Pose from_last;
+  Matrix6d information;
+};
+
 // Gauss-Newton over all poses with the same motions and pose constraints.
-UncertainPose batch(const std::vector<Measurement>& motions, const std::vector<PoseConstraint>& constraints) {
+UncertainPose batch(const std::vector<Measurement>& motions, const std::vector<PoseConstraint>& constraints,
+                    const std::optional<Revisit>& revisit = {}) {
   std::vector<Pose> x{Pose()};
   for (const Measurement& m : motions) x.push_back(x.back() * std::get<RelativeMotion>(m).previous_from_current);
   const auto n = static_cast<Eigen::Index>(x.size());
@@ -79,6 +88,12 @@ UncertainPose batch(const std::vector<Measurement>& motions, const std::vector<P
             c.information);
       }
     }
+    if (revisit) {
+      const Pose between = x[static_cast<std::size_t>(revisit->from)].inverse() * x.back();
+      const Vector6d r = log_se3(between.inverse() * revisit->from_last);
+      add(n - 1, identity, revisit->from, -right_jacobian_inverse_se3(-r) * adjoint(between.inverse()), r,
+          revisit->information);
+    }
     const Eigen::VectorXd step = a.ldlt().solve(b);
     for (Eigen::Index i = 0; i < n; ++i)
       x[static_cast<std::size_t>(i)] = x[static_cast<std::size_t>(i)] * exp_se3(step.segment<6>(6 * i));
@@ -108,6 +123,31 @@ TEST(Localizer, AgreesWithBatchLeastSquares) {
   EXPECT_EQ(e.health_of(LocalizationSensor::map).used, 3);
   EXPECT_LE(log_se3(e.world_from_body.pose.inverse() * expected.pose).norm(), 1e-6);
   EXPECT_LE((e.world_from_body.covariance - expected.covariance).norm(), 1e-3 * expected.covariance.norm());
+}
+
+TEST(Localizer, AMapOfAnEarlierPoseIsAMotionSinceThen) {
+  const TestDrive drive;
+  const auto motions = test_motions(drive, 40, 1, 5);
+  constexpr std::size_t kMapped = 12;
+  const Stamp end = stamp_of_measurement(motions.back());
+  const std::vector<Measurement> until(motions.begin(), motions.begin() + kMapped);
+  const UncertainPose mapped = driven(test_options(), until).estimate().world_from_body;
+  const Pose moved = true_pose(drive, seconds_between(test_stamp(0), stamp_of_measurement(until.back()))).inverse() *
+                     true_pose(drive, seconds_between(test_stamp(0), end));
+  Vector6d error;
+  error << 2e-4, -1e-4, 1e-4, 1e-4, -2e-4, 1e-4;
+  Matrix6d information = Matrix6d::Zero();
+  information.diagonal() << 1e6, 2e6, 1e6, 2e6, 1e6, 3e6;
+  const Revisit revisit{kMapped, moved * exp_se3(error), information};
+  const Matrix6d carry = adjoint(revisit.from_last.inverse());
+  std::vector<Measurement> all = motions;
+  all.emplace_back(
+      PoseConstraint{end, mapped.pose * revisit.from_last, information, carry * mapped.covariance * carry.transpose()});
+  const LocalizationEstimate e = driven(test_options(), all).estimate();
+  const UncertainPose expected = batch(motions, {}, revisit), before = batch(motions, {});
+  EXPECT_LE(log_se3(e.world_from_body.pose.inverse() * expected.pose).norm(),
+            0.01 * log_se3(before.pose.inverse() * expected.pose).norm());
+  EXPECT_LE((e.world_from_body.covariance - expected.covariance).norm(), 0.01 * expected.covariance.norm());
 }
 
 TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {

@@ -23,7 +23,8 @@ bool sound(const RelativeMotion& m) {
          (m.covariance.diagonal().array() >= 0).all();
 }
 bool sound(const PoseConstraint& c) {
-  return c.world_from_body.all_finite() && c.information.allFinite() && (c.information.diagonal().array() >= 0).all();
+  return c.world_from_body.all_finite() && c.information.allFinite() && c.map_covariance.allFinite() &&
+         (c.information.diagonal().array() >= 0).all() && (c.map_covariance.diagonal().array() >= 0).all();
 }
 
 }  // namespace

@@ -1,6 +1,9 @@
 #include "spartan/localization/measurement_models.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -148,12 +151,11 @@ Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean
 
 // T = X̂ Exp(ξ) Exp(n): Log(X̂⁻¹ T) = ξ + J_r⁻¹(r) n. Information Λ of n becomes J_rᵀ Λ J_r; its eigenvectors with any
 // information are independent scalar measurements.
-Innovation pose_innovation(const NavigationState& s, const Pose& world_from_body, const Matrix6d& information,
-                           double covariance_factor) {
-  constexpr double kLeastInformation = 1e-6, kLeastShare = 1e-12;
-  const Vector6d r = log_se3(s.world_from_body.inverse() * world_from_body);
+Innovation map_innovation(const Belief& belief, const PoseConstraint& constraint, double covariance_factor) {
+  constexpr double kLeastInformation = 1e-6, kLeastShare = 1e-12, kLeastVariance = 1e-14;
+  const Vector6d r = log_se3(belief.state.world_from_body.inverse() * constraint.world_from_body);
   const Matrix6d jacobian = right_jacobian_se3(r);
-  const Matrix6d turned = jacobian.transpose() * information * jacobian;
+  const Matrix6d turned = jacobian.transpose() * constraint.information * jacobian;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (turned + turned.transpose()));
   const Vector6d values = eigen.eigenvalues() / covariance_factor;
   const double least = std::max(kLeastInformation, kLeastShare * values[5]);
@@ -166,6 +168,16 @@ Innovation pose_innovation(const NavigationState& s, const Pose& world_from_body
   i.residual = directions * r;
   i.jacobian.middleCols<6>(error_at::kPose) = directions;
   i.noise.diagonal() = values.tail(rows).cwiseInverse();
+
+  const Matrix6d inverse = jacobian.inverse();
+  const Matrix6d map = inverse * constraint.map_covariance * inverse.transpose();
+  i.noise += directions * map * directions.transpose();
+  const Matrix6d pose = belief.covariance.block<6, 6>(error_at::kPose, error_at::kPose);
+  // The residual is truth less belief, plus the map's error: where both err alike it is none, hence the sign.
+  const Matrix6d common = -common_covariance(pose, map);
+  const Matrix6d floor = kLeastVariance * Matrix6d::Identity();
+  i.shared =
+      belief.covariance.middleCols<6>(error_at::kPose) * (pose + floor).ldlt().solve(common) * directions.transpose();
   return i;
 }
 

@@ -53,9 +53,9 @@ Innovation inclinometer_innovation(const NavigationState& state, double roll_rad
 Innovation rest_innovation(const NavigationState& state, const Eigen::Vector3d& mean_accel_m_s2, double sigma_m_s2,
                            double gravity_m_s2);
 
-/// A pose with the information of its right perturbation, of any rank: the directions that carry information, each
-/// independent. No rows where there is none.
-Innovation pose_innovation(const NavigationState& state, const Pose& world_from_body, const Matrix6d& information,
-                           double covariance_factor);
+/// A pose by a map: the directions that carry information, each independent but for the map's error. What that has in
+/// common with the error of the belief (common_covariance) reaches the parts of the state through the pose. No rows
+/// where there is no information.
+Innovation map_innovation(const Belief& belief, const PoseConstraint& constraint, double covariance_factor);
 
 }  // namespace spartan

@@ -45,6 +45,7 @@ void put_measurement(ArchiveWriter& out, const Measurement& m) {
   } else if (const auto* constraint = std::get_if<PoseConstraint>(&m)) {
     out.put(constraint->world_from_body);
     out.put(constraint->information);
+    out.put(constraint->map_covariance);
   }
 }
 
@@ -79,7 +80,8 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
     }
     case 5: {
       const Pose pose = in.get_pose();
-      return PoseConstraint{stamp, pose, in.get_matrix6()};
+      const Matrix6d information = in.get_matrix6();
+      return PoseConstraint{stamp, pose, information, in.get_matrix6()};
     }
     default:
       return std::nullopt;

@@ -51,7 +51,8 @@ bool outside(const Pose& from, const Pose& to, const SearchWindow& window, const
 Matrix6d in_body(const Matrix6d& world_information, const Pose& world_from_body) {
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = world_from_body.rotation_matrix();
-  return turn.transpose() * world_information * turn;
+  const Matrix6d turned = turn.transpose() * world_information * turn;
+  return 0.5 * (turned + turned.transpose());
 }
 
 }  // namespace

@@ -15,26 +15,32 @@ Matrix6d symmetric(const Matrix6d& m) {
   return 0.5 * (m + m.transpose());
 }
 
-// (P⁻¹ + I)⁻¹ for covariance P and information I of any rank.
-Matrix6d posterior(const Matrix6d& covariance, const Matrix6d& information) {
-  return symmetric((Matrix6d::Identity() + covariance * information).partialPivLu().solve(covariance));
-}
-
 // Information of a measurement whose error has one more part, of covariance C.
 Matrix6d blurred(const Matrix6d& information, const Matrix6d& covariance) {
   return symmetric((Matrix6d::Identity() + information * covariance).partialPivLu().solve(information));
 }
 
-// The given pose moved towards the match, as far as their information weighs.
-UncertainPose moved_towards(const UncertainPose& given, const Pose& match, const Matrix6d& match_information) {
+struct Correction {
+  UncertainPose corrected;
+  Matrix6d relative;  // covariance of the corrected pose against the map
+};
+
+// The given pose P moved towards the match: best where the errors of pose and map (covariance M) have the part C in
+// common. Their difference has Q = P + M − 2 C, and the gain is K = (P − C)(Q + I⁻¹)⁻¹ for a match of information I.
+Correction moved_towards(const UncertainPose& given, const Pose& match, const Matrix6d& match_information,
+                         const Matrix6d& map_covariance) {
   const Vector6d offset = log_se3(given.pose.inverse() * match);
   const Matrix6d from_match = right_jacobian_se3(offset);
   // Perturbations of the match as perturbations of the given pose: log(P⁻¹ M Exp δ) = offset + J_r⁻¹ δ.
   const Matrix6d information = from_match.transpose() * match_information * from_match;
-  const Matrix6d covariance = posterior(given.covariance, information);
-  const Vector6d step = covariance * information * offset;
+  const Matrix6d own = given.covariance - common_covariance(given.covariance, map_covariance);
+  const Matrix6d apart = own + map_covariance - (given.covariance - own);
+  const Matrix6d gain = own * blurred(information, apart);
+  const Vector6d step = gain * offset;
   const Matrix6d turn = right_jacobian_se3(step);
-  return {given.pose * exp_se3(step), symmetric(turn * covariance * turn.transpose())};
+  const Matrix6d learnt = gain * own.transpose(), unlearnt = gain * apart;
+  return {{given.pose * exp_se3(step), symmetric(turn * (given.covariance - learnt) * turn.transpose())},
+          symmetric(apart - unlearnt - unlearnt.transpose() + learnt)};
 }
 
 double view_reach(const MapOptions& map, const MatchOptions& match) {
@@ -80,7 +86,7 @@ Result<MapMergeResult> MapMerger::add(std::span<const SurfacePoint> points, cons
   MapMergeResult result;
   result.corrected = world_from_body;
   result.match.world_from_body = world_from_body.pose;
-  Matrix6d relative = map_.empty() ? Matrix6d::Zero() : world_from_body.covariance;
+  Matrix6d relative = Matrix6d::Zero();
   result.local = generator_.generate(points, world_from_body.pose);
   if (!map_.empty()) {
     const Eigen::Vector3d& at = world_from_body.pose.translation();
@@ -89,14 +95,14 @@ Result<MapMergeResult> MapMerger::add(std::span<const SurfacePoint> points, cons
     if (!view) return failure(view);
     result.match =
         match_map(points, result.local, *view, world_from_body, map_options_.fewest_points, options_.match, workers_);
-    if (!result.match.information.isZero()) {
-      result.corrected = moved_towards(world_from_body, result.match.world_from_body, result.match.information);
+    const MapMatch& match = result.match;
+    const Matrix6d of_map = map_covariance(*view, result.local, match.world_from_body);
+    Correction moved = moved_towards(world_from_body, match.world_from_body, match.information, of_map);
+    relative = moved.relative;
+    if (!match.information.isZero()) {
+      result.constraint = PoseConstraint{stamp, match.world_from_body, match.information, of_map};
+      result.corrected = moved.corrected;
       result.local = generator_.generate(points, result.corrected.pose);
-      const Matrix6d of_map = map_covariance(*view, result.local, result.corrected.pose);
-      result.constraint =
-          PoseConstraint{stamp, result.match.world_from_body, blurred(result.match.information, of_map)};
-      relative = result.corrected.covariance;
-      result.corrected.covariance += of_map;
     }
   }
   if (Status s = map_.add(result.local, stamp, result.corrected, relative); !s) return failure(s);

@@ -20,7 +20,7 @@ struct MapMergeResult {
   MapMatch match;           ///< against the global map of the stop before; `no_overlap` where there was none
   UncertainPose corrected;  ///< world_from_body: the given pose, moved as far as the match says
   /// What the map alone says: none where it could not decide at all, of less than full rank where only some directions
-  /// are determined. As uncertain as the match and as the stops that the ground was mapped from.
+  /// are determined.
   std::optional<PoseConstraint> constraint;
   LocalMap local;  ///< at the corrected pose
 

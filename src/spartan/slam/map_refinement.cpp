@@ -57,7 +57,10 @@ std::vector<MatchedCell> matched_cells(const SurfaceGrid& local, const SurfaceGr
       // A surface moved along the ray by σ / |a_z|, seen at a fixed place.
       const Eigen::Vector3d ray = place_m - from.eye;
       const double noise = std::sqrt(static_cast<double>(local.variance_m2(c, r)) + global.variance_m2(c, r));
-      cell.common_m = noise * cell.jacobian().head<3>().dot(ray) / std::max(std::abs(ray.z()), kLeastDrop_m);
+      const double range_noise = noise / std::max(std::abs(ray.z()), kLeastDrop_m);
+      const Vector6d j = cell.jacobian();
+      cell.common_m = range_noise * j.head<3>().dot(ray);
+      cell.relief_common_m = range_noise * j.head<2>().dot(ray.head<2>());
       cells.push_back(cell);
     }
   }

@@ -19,6 +19,7 @@ struct MatchedCell {
   double weight = 0;      ///< ψ(r)/r of the robust cost, m⁻²
   double curvature = 0;   ///< ψ'(r), m⁻²; negative for outliers
   double common_m = 0;    ///< what the residual becomes where all disparities err in common by one standard deviation
+  double relief_common_m = 0;             ///< the same where relief alone stands off, on level ground that does not
   Vector6d by_local = Vector6d::Zero();   ///< ∂residual/∂η with the local map's slope; no slope: (0, 0, 1 …)
   Vector6d by_global = Vector6d::Zero();  ///< the same with the global map's
   Vector6d jacobian() const { return 0.5 * (by_local + by_global); }

@@ -46,16 +46,19 @@ std::vector<Block> blocks_of(std::span<const MatchedCell> cells, double cell_m, 
   return list;
 }
 
-// Scores of the residuals that a common error of the disparities makes, area by area.
+// Scores of the residuals that common errors of the disparities make: area by area, and one that all have.
 std::vector<Vector6d> common_scores(std::span<const MatchedCell> cells, double cell_m, const Vector6d& unit,
-                                    double share, const MatchOptions& options) {
+                                    double misfit, const MatchOptions& options) {
   std::map<std::pair<int, int>, Vector6d> areas;
+  Vector6d relief = Vector6d::Zero();
   for (const MatchedCell& cell : cells) {
     Vector6d& score = areas.try_emplace(block_of(cell, cell_m, options.common_reach_m), Vector6d::Zero()).first->second;
-    score += (cell.weight * share * cell.common_m) * cell.jacobian().cwiseProduct(unit);
+    const Vector6d weighted = (cell.weight * misfit) * cell.jacobian().cwiseProduct(unit);
+    score += (options.common_share * cell.common_m) * weighted;
+    relief += (options.relief_share * cell.relief_common_m) * weighted;
   }
-  std::vector<Vector6d> scores;
-  scores.reserve(areas.size());
+  std::vector<Vector6d> scores{relief};
+  scores.reserve(areas.size() + 1);
   for (const auto& [place, score] : areas) scores.push_back(score);
   return scores;
 }
@@ -103,8 +106,7 @@ MatchEvidence weigh(std::span<const MatchedCell> cells, double cell_m, const Mat
   unit << Eigen::Vector3d::Constant(options.largest_sigma_m), Eigen::Vector3d::Constant(largest_rad);
   const std::vector<Block> blocks = blocks_of(cells, cell_m, unit, options);
   evidence.blocks = static_cast<int>(blocks.size());
-  const std::vector<Vector6d> common =
-      common_scores(cells, cell_m, unit, options.common_share * evidence.misfit, options);
+  const std::vector<Vector6d> common = common_scores(cells, cell_m, unit, evidence.misfit, options);
   Matrix6d total = Matrix6d::Zero();
   for (const Block& block : blocks) total += block.curvature;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(total);

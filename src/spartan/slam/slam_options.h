@@ -20,6 +20,7 @@ struct MatchOptions {
   double block_m = 0.3;
   double common_share = 1.1;
   double common_reach_m = 1.5;
+  double relief_share = 0.7;
   int fewest_cells = 200;
   int fewest_blocks = 12;
   double largest_sigma_m = 0.015;
@@ -44,6 +45,8 @@ struct MatchOptions {
     v.field("common_share", common_share, "error that surroundings have in common, over the residuals' own",
             between(0, 10));
     v.field("common_reach_m", common_reach_m, "how far those reach", between(0.1, 100));
+    v.field("relief_share", relief_share, "error that all relief of a view has in common, over the residuals' own",
+            between(0, 10));
     v.field("fewest_cells", fewest_cells, "that both maps must know", between(20, 1e6));
     v.field("fewest_blocks", fewest_blocks, "of ground that both maps must know", between(8, 1e4));
     v.field("largest_sigma_m", largest_sigma_m, "of the place found, else it is not believed", between(0.0001, 10));

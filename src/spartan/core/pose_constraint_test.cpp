@@ -1,0 +1,50 @@
+#include "spartan/core/pose_constraint.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+
+#include "spartan/core/random.h"
+
+namespace spartan {
+namespace {
+
+Matrix6d random_covariance(Random& random) {
+  Matrix6d root;
+  for (Eigen::Index i = 0; i < root.size(); ++i) root.data()[i] = random.normal(0, 0.1);
+  return root * root.transpose();
+}
+
+double least_eigenvalue(const Matrix6d& m) {
+  return Eigen::SelfAdjointEigenSolver<Matrix6d>(m).eigenvalues()[0];
+}
+
+TEST(CommonCovariance, IsTheMapsWhereThePoseHasDriftedSince) {
+  Random random(3);
+  for (int i = 0; i < 20; ++i) {
+    const Matrix6d map = random_covariance(random), pose = map + random_covariance(random);
+    EXPECT_LE((common_covariance(pose, map) - map).norm(), 1e-9 * map.norm());
+    EXPECT_LE((common_covariance(map, pose) - map).norm(), 1e-9 * map.norm()) << "whichever came first";
+  }
+}
+
+TEST(CommonCovariance, IsNeverMoreThanEither) {
+  Random random(4);
+  for (int i = 0; i < 20; ++i) {
+    const Matrix6d map = random_covariance(random), pose = random_covariance(random),
+                   common = common_covariance(pose, map);
+    EXPECT_GE(least_eigenvalue(pose - common), -1e-10);
+    EXPECT_GE(least_eigenvalue(map - common), -1e-10);
+    EXPECT_GE(least_eigenvalue(common), -1e-10);
+  }
+}
+
+TEST(CommonCovariance, AnExactPoseOrMapHasNoError) {
+  Random random(5);
+  const Matrix6d some = random_covariance(random);
+  EXPECT_LE(common_covariance(Matrix6d::Zero(), some).norm(), 1e-12);
+  EXPECT_LE(common_covariance(some, Matrix6d::Zero()).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace spartan
