@@ -1,10 +1,11 @@
 // Map merging from wrong starts, and what it does against drift. `make bench-map_matching`.
 //
 //   map_matching [--from FOLDER] [--noise FOLDER] [--scratch FOLDER] [--trials N] [--seed N]
-//     [--set key=value,…] [--verbose 1] [PART...]
+//     [--set key=value,…] [--verbose 1] [--ground NAME,…] [PART...]
 //
-// PART: wrong_start, flat, drift (default: all). Recordings as scripts/recordings makes them; --noise: the same stops
-// under another noise seed, as scripts/recordings_with_other_noise makes them. --scratch keeps the stops' points.
+// PART: wrong_start (on the recordings of --ground), flat, drift (default: all). Recordings as scripts/recordings makes
+// them; --noise: the same stops under another noise seed, as scripts/recordings_with_other_noise makes them. --scratch
+// keeps the stops' points.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -226,12 +227,12 @@ struct Recordings {
   }
 };
 
-void wrong_start(const Recordings& recordings, int trials, int seed, bool verbose) {
+void wrong_start(const Recordings& recordings, const std::vector<std::string>& names, int trials, int seed,
+                 bool verbose) {
   std::vector<Class> classes{{"15-30 %, earlier stops", 0.15, 0.30, {}},
                              {"30-46 %, earlier stops", 0.30, 0.46, {}},
                              {"46-80 %, both sides", 0.46, 0.80, {}},
                              {"80-100 %, same stop, other noise", 0.80, 1.01, {}}};
-  const std::vector<std::string> names{"rocky_20pct", "loop", "crater_rim", "diffuse_200lux"};
   std::vector<Stops> stops, again;
   stops.reserve(names.size());
   again.reserve(names.size());
@@ -382,26 +383,35 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
   fmt::print("| mean | | | {:.1f} % | | |\n", 100 * sum / seeds);
 }
 
+std::vector<std::string> parts_of(std::string list) {
+  std::vector<std::string> parts;
+  while (!list.empty()) {
+    const auto comma = list.find(',');
+    parts.push_back(list.substr(0, comma));
+    list = comma == std::string::npos ? "" : list.substr(comma + 1);
+  }
+  return parts;
+}
+
 void run(const std::vector<std::string>& words) {
   RecordingArguments arguments = read_arguments(words, {{"--scratch", "/tmp/spartan_map_matching"},
                                                         {"--noise", ""},
                                                         {"--trials", "300"},
                                                         {"--verbose", "0"},
                                                         {"--set", ""},
+                                                        {"--ground", "rocky_20pct,loop,crater_rim,diffuse_200lux"},
                                                         {"--seed", "2011"}});
-  std::string sets = arguments.options.at("--set");
-  while (!sets.empty()) {
-    const auto comma = sets.find(',');
-    g_options = *set_option(g_options, sets.substr(0, comma));
-    sets = comma == std::string::npos ? "" : sets.substr(comma + 1);
-  }
+  for (const std::string& set : parts_of(arguments.options.at("--set"))) g_options = *set_option(g_options, set);
   const Recordings recordings{arguments.folder, arguments.options.at("--noise"), arguments.options.at("--scratch")};
   const bool verbose = arguments.number("--verbose") != 0;
   const auto wanted = [&](const std::string& part) {
     return arguments.scenarios.empty() ||
            std::find(arguments.scenarios.begin(), arguments.scenarios.end(), part) != arguments.scenarios.end();
   };
-  if (wanted("wrong_start")) wrong_start(recordings, arguments.number("--trials"), arguments.number("--seed"), verbose);
+  if (wanted("wrong_start")) {
+    wrong_start(recordings, parts_of(arguments.options.at("--ground")), arguments.number("--trials"),
+                arguments.number("--seed"), verbose);
+  }
   if (wanted("drift")) drift(recordings, std::max(1, arguments.number("--trials") / 30), verbose);
   if (wanted("flat")) flat(recordings, arguments.number("--trials") / 10, verbose);
 }

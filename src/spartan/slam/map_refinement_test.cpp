@@ -88,6 +88,7 @@ TEST(MapRefinement, WeightsAreTheDerivativesOfTheRobustCost) {
     EXPECT_NEAR(cells[0].curvature, (cost(rf + h) - 2 * cost(rf) + cost(rf - h)) / (h * h), 1e-3 * cells[0].weight);
     // The eye is 1 m up: a shift of the range by σ / |a_z| lifts level ground by σ, everywhere.
     EXPECT_NEAR(std::abs(cells[0].common_m), std::sqrt(2e-4), 2e-3);
+    EXPECT_NEAR(cells[0].relief_common_m, 0, 1e-9) << "level ground has no relief";
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,6 +17,12 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kLeastVariance = 1e-4;  // of what is believed at all
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 // Square of the lattice that a cell lies in.
 std::pair<int, int> block_of(const MatchedCell& cell, double cell_m, double block_m) {
@@ -46,37 +53,51 @@ std::vector<Block> blocks_of(std::span<const MatchedCell> cells, double cell_m, 
   return list;
 }
 
-// Scores of the residuals that common errors of the disparities make: area by area, and one that all have.
-std::vector<Vector6d> common_scores(std::span<const MatchedCell> cells, double cell_m, const Vector6d& unit,
-                                    double misfit, const MatchOptions& options) {
-  std::map<std::pair<int, int>, Vector6d> areas;
+// Scores of the residuals that common errors of the disparities make.
+struct CommonScores {
+  std::vector<Vector6d> areas;
   Vector6d relief = Vector6d::Zero();
+};
+
+CommonScores common_scores(std::span<const MatchedCell> cells, double cell_m, const Vector6d& unit, double misfit,
+                           const MatchOptions& options) {
+  std::map<std::pair<int, int>, Vector6d> areas;
+  CommonScores scores;
   for (const MatchedCell& cell : cells) {
     Vector6d& score = areas.try_emplace(block_of(cell, cell_m, options.common_reach_m), Vector6d::Zero()).first->second;
     const Vector6d weighted = (cell.weight * misfit) * cell.jacobian().cwiseProduct(unit);
     score += (options.common_share * cell.common_m) * weighted;
-    relief += (options.relief_share * cell.relief_common_m) * weighted;
+    scores.relief += (options.relief_share * cell.relief_common_m) * weighted;
   }
-  std::vector<Vector6d> scores{relief};
-  scores.reserve(areas.size() + 1);
-  for (const auto& [place, score] : areas) scores.push_back(score);
+  scores.areas.reserve(areas.size());
+  for (const auto& [place, score] : areas) scores.areas.push_back(score);
   return scores;
 }
 
 // The curvature along an axis over its standard error, were there no relief and the blocks' parts chance (Efron 1969:
-// the self-normalized sum is about normal, whatever the parts' distribution, if it is symmetric).
+// the self-normalized sum is about normal, whatever the parts' distribution, if it is symmetric). A rock is no chance:
+// parts count in the error with at most three of the others' standard deviations.
 double relief_of(const std::vector<Block>& blocks, const Vector6d& axis) {
-  double sum = 0, squares = 0;
+  constexpr double kMostSigmas = 3;
+  std::vector<double> parts, sizes;
+  parts.reserve(blocks.size());
+  sizes.reserve(blocks.size());
   for (const Block& block : blocks) {
-    const double part = axis.dot(block.curvature * axis);
+    parts.push_back(axis.dot(block.curvature * axis));
+    sizes.push_back(std::abs(parts.back()));
+  }
+  if (parts.empty()) return 0;
+  const double most = kMostSigmas * median(sizes) / 0.6745;
+  double sum = 0, squares = 0;
+  for (const double part : parts) {
     sum += part;
-    squares += part * part;
+    squares += std::min(part * part, most * most);
   }
   return squares > 0 ? sum / std::sqrt(squares) : 0;
 }
 
 // Covariance in the directions of the basis: what the answer would have been without each of the blocks, to first
-// order, and what the common errors do to it. None where one block alone holds a direction.
+// order, and what the areas' common errors do to it. None where one block alone holds a direction.
 std::optional<Eigen::MatrixXd> jackknife(const std::vector<Block>& blocks, const std::vector<Vector6d>& common,
                                          const Matrix6d& total, const Eigen::MatrixXd& basis) {
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
@@ -106,7 +127,7 @@ MatchEvidence weigh(std::span<const MatchedCell> cells, double cell_m, const Mat
   unit << Eigen::Vector3d::Constant(options.largest_sigma_m), Eigen::Vector3d::Constant(largest_rad);
   const std::vector<Block> blocks = blocks_of(cells, cell_m, unit, options);
   evidence.blocks = static_cast<int>(blocks.size());
-  const std::vector<Vector6d> common = common_scores(cells, cell_m, unit, evidence.misfit, options);
+  const CommonScores common = common_scores(cells, cell_m, unit, evidence.misfit, options);
   Matrix6d total = Matrix6d::Zero();
   for (const Block& block : blocks) total += block.curvature;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(total);
@@ -117,16 +138,18 @@ MatchEvidence weigh(std::span<const MatchedCell> cells, double cell_m, const Mat
   // Directions with the least curvature are given up until none of the others hangs on a single block.
   for (; !kept.empty(); kept.erase(kept.begin())) {
     const Eigen::MatrixXd basis = axes.eigenvectors()(Eigen::all, kept);
-    const auto covariance = jackknife(blocks, common, total, basis);
+    const auto covariance = jackknife(blocks, common.areas, total, basis);
     if (!covariance) continue;
+    // Eigenvalues rise: the determined directions are the first.
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spread(*covariance);
-    for (Eigen::Index i = 0; i < spread.eigenvalues().size(); ++i) {
-      const double variance = spread.eigenvalues()[i];
-      if (variance > 1) continue;
-      const Vector6d axis = basis * spread.eigenvectors().col(i);
-      evidence.information += axis * axis.transpose() / std::max(variance, kLeastVariance);
-      ++evidence.determined;
-    }
+    evidence.determined = static_cast<int>((spread.eigenvalues().array() <= 1).count());
+    const Eigen::MatrixXd determined = spread.eigenvectors().leftCols(evidence.determined);
+    Eigen::MatrixXd variance = spread.eigenvalues().head(evidence.determined).cwiseMax(kLeastVariance).asDiagonal();
+    // Relief that stands off moves the answer by millimetres, which decides nothing, but for good.
+    const Eigen::VectorXd moved =
+        determined.transpose() * (basis.transpose() * total * basis).llt().solve(basis.transpose() * common.relief);
+    variance += moved * moved.transpose();
+    evidence.information = basis * determined * variance.inverse() * determined.transpose() * basis.transpose();
     if (kept.size() == 6) {
       const Vector6d sigmas = (basis * *covariance * basis.transpose()).diagonal().cwiseSqrt();
       evidence.sigma_m = sigmas.head<3>().maxCoeff() * options.largest_sigma_m;

@@ -110,6 +110,35 @@ TEST(MatchEvidence, CommonErrorsWidenIt) {
   EXPECT_NEAR(std::sqrt(with.information.inverse()(2, 2)), 0.022 / 3, 0.004);
 }
 
+TEST(MatchEvidence, ReliefThatStandsOffIsUncertainAsAWhole) {
+  Random random(10);
+  Drawn drawn = draw(random, 0.1, 0);
+  // All relief 1 cm farther ahead: what the residuals of a shift along x by 1 cm are.
+  for (MatchedCell& cell : drawn.cells) cell.relief_common_m = 0.01 * cell.jacobian()[0];
+  MatchOptions options;
+  options.relief_share = 0;
+  const MatchEvidence without = weigh(drawn.cells, 0.05, options);
+  options.relief_share = 1;
+  const MatchEvidence with = weigh(drawn.cells, 0.05, options);
+  EXPECT_EQ(with.determined, without.determined) << "it decides nothing";
+  const Matrix6d more = with.information.inverse() - without.information.inverse();
+  EXPECT_NEAR(std::sqrt(more(0, 0)), 0.01, 0.001);
+  EXPECT_LT(std::sqrt(more(1, 1)), 0.001);
+}
+
+TEST(MatchEvidence, AFewUnequalStonesOnLevelGroundAreEnough) {
+  Random random(11);
+  Drawn drawn = draw(random, 0, 0.01);
+  for (MatchedCell& cell : drawn.cells) {
+    const bool steep = cell.row < 5 && cell.column < 5, low = cell.row >= 75 && (cell.column < 5 || cell.column >= 75);
+    if (!steep && !low) continue;
+    const double slope = steep ? 1 : 0.5;
+    const Eigen::Vector3d at((cell.column - 40) * 0.05 + 1, (40 - cell.row) * 0.05, 0);
+    cell.by_local = cell.by_global = elevation_jacobian({slope * random.normal(), slope * random.normal()}, at);
+  }
+  EXPECT_EQ(weigh(drawn.cells, 0.05, {}).determined, 6);
+}
+
 TEST(MatchCost, IsTheMeanOfTheCells) {
   std::vector<MatchedCell> cells(400);
   for (int i = 0; i < 400; ++i) {

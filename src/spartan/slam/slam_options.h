@@ -20,13 +20,13 @@ struct MatchOptions {
   double block_m = 0.3;
   double common_share = 1.1;
   double common_reach_m = 1.5;
-  double relief_share = 0.7;
+  double relief_share = 1;
   int fewest_cells = 200;
   int fewest_blocks = 12;
-  double largest_sigma_m = 0.015;
+  double largest_sigma_m = 0.013;
   double largest_sigma_deg = 0.75;
   double relief_certainty = 1.65;
-  double lead_certainty = 3;
+  double lead_certainty = 2.33;
   double largest_misfit = 3;
 
   template <class Visitor>
