@@ -1,6 +1,7 @@
 // Localization over drawn drives: `make bench-localization_monte_carlo`.
 //
-//   localization_monte_carlo [--seeds N] [--threads N] [--config FOLDER] [SCENARIO...]
+//   localization_monte_carlo [--seeds N] [--first SEED] [--threads N] [--tables subsets|faults] [--config FOLDER]
+//   [SCENARIO...]
 //
 // The rover's true motion is the simulator's; its sensors are drawn anew for each seed, and so is the odometry, from
 // the error that was measured on rendered drives (MeasuredOdometryError). Nothing is rendered. Trials are paired: all
@@ -55,12 +56,16 @@ std::vector<double> each(const std::vector<TrialResult>& trials, const Value& va
 
 using Spoil = std::function<std::vector<Arrival>(const TrueDrive&, std::uint64_t seed, const Subset&)>;
 
-std::vector<TrialResult> run_trials(const TrueDrive& drive, const Subset& subset, int seeds, const Spoil& arrivals_of,
-                                    const Workers& workers) {
-  std::vector<TrialResult> results(static_cast<std::size_t>(seeds));
-  workers.for_each_part(0, seeds, 1, [&](int from, int to) {
+struct Seeds {
+  int first = 1, count = 30;
+};
+
+std::vector<TrialResult> run_trials(const TrueDrive& drive, const Subset& subset, const Seeds& seeds,
+                                    const Spoil& arrivals_of, const Workers& workers) {
+  std::vector<TrialResult> results(static_cast<std::size_t>(seeds.count));
+  workers.for_each_part(0, seeds.count, 1, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
-      const auto seed = static_cast<std::uint64_t>(i) + 1;
+      const auto seed = static_cast<std::uint64_t>(seeds.first + i);
       results[static_cast<std::size_t>(i)] = run_trial(drive, arrivals_of(drive, seed, subset));
     }
   });
@@ -83,10 +88,10 @@ double share_in_band(const std::vector<TrialResult>& trials, const Band& b, doub
   return 100.0 * inside / count;
 }
 
-void table_of_subsets(const TrueDrive& drive, int seeds, const Workers& workers) {
-  const Band three = band(3, seeds), six = band(6, seeds);
+void table_of_subsets(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
+  const Band three = band(3, seeds.count), six = band(6, seeds.count);
   fmt::print("\n## {}: {:.0f} m, {} shots, {} seeds\n\n", drive.scenario.name, drive.length_m, drive.poses.size(),
-             seeds);
+             seeds.count);
   fmt::print(
       "NEES bands (95 %): position, attitude {:.2f} to {:.2f}; pose {:.2f} to {:.2f}. In brackets: share of shots "
       "inside.\n\n",
@@ -228,8 +233,8 @@ std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
 // Beyond 3 σ as often as a normal error in three dimensions is by chance in 0.27 %.
 constexpr double kThreeSigma = 14.156;
 
-void table_of_faults(const TrueDrive& drive, int seeds, const Workers& workers) {
-  fmt::print("\n## {}: faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds);
+void table_of_faults(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
+  fmt::print("\n## {}: faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds.count);
   fmt::print(
       "\"Inside 3 σ\": trials whose position error lies inside the 99.7 % region of its covariance, 5 shots after the "
       "fault and at the end.\n\n");
@@ -259,18 +264,19 @@ void table_of_faults(const TrueDrive& drive, int seeds, const Workers& workers) 
     const double n = static_cast<double>(trials.size());
     fmt::print("| {} | {:.4f} | {:.4f} | {:.0f} | {} of {} | {} of {} | {:.2f} | {:.1f} / {:.1f} | {} of {} ok |\n",
                fault.name, mean_of(each(trials, end)).mean, mean_of(each(alone, end)).mean, 1e3 * largest, inside_after,
-               seeds, inside_end, seeds,
+               seeds.count, inside_end, seeds.count,
                mean_of(each(trials, [](const TrialResult& t) { return t.shots.back().nees_pose; })).mean, excluded / n,
-               missing / n, well, seeds);
+               missing / n, well, seeds.count);
     std::fflush(stdout);
   }
 }
 
 int run(const std::vector<std::string>& words) {
-  RecordingArguments arguments =
-      read_arguments(words, {{"--seeds", "30"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "both"}});
+  RecordingArguments arguments = read_arguments(
+      words, {{"--seeds", "30"}, {"--first", "1"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "both"}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct", "crater_rim", "loop"};
   const Workers workers(arguments.number("--threads"));
+  const Seeds seeds{arguments.number("--first"), arguments.number("--seeds")};
   fmt::print(
       "# Localization, Monte Carlo\n\nOdometry drawn from its measured error. End: distance of the last position from "
       "the truth, over the way; ATE: RMS over the shots; both seen from the first pose. ±: 95 % confidence of the "
@@ -283,8 +289,8 @@ int run(const std::vector<std::string>& words) {
       return 1;
     }
     const std::string& tables = arguments.options.at("--tables");
-    if (tables != "faults") table_of_subsets(*drive, arguments.number("--seeds"), workers);
-    if (tables != "subsets") table_of_faults(*drive, arguments.number("--seeds"), workers);
+    if (tables != "faults") table_of_subsets(*drive, seeds, workers);
+    if (tables != "subsets") table_of_faults(*drive, seeds, workers);
   }
   return 0;
 }
