@@ -17,6 +17,11 @@ struct CellSurface {
   std::uint16_t votes = 0;      ///< observations
 
   bool seen() const { return count > 0; }
+  void raise(float by_m) {
+    elevation_m += by_m;
+    lowest_m += by_m;
+    highest_m += by_m;
+  }
   friend bool operator==(const CellSurface&, const CellSurface&) = default;
 };
 

@@ -1,5 +1,7 @@
 #include "spartan/slam/submap.h"
 
+#include <cmath>
+
 namespace spartan {
 namespace {
 
@@ -24,6 +26,14 @@ CellSurface get_surface(ArchiveReader& in) {
 }
 
 }  // namespace
+
+std::optional<LatticeStep> Submap::step(double cell_m) const {
+  const Eigen::Vector3d& t = world_from_submap.translation();
+  if (world_from_submap.rotation().vec().cwiseAbs().maxCoeff() > 1e-12) return std::nullopt;
+  const double x = std::round(t.x() / cell_m), y = std::round(t.y() / cell_m);
+  if (std::abs(x * cell_m - t.x()) > 1e-6 || std::abs(y * cell_m - t.y()) > 1e-6) return std::nullopt;
+  return LatticeStep{static_cast<int>(x), static_cast<int>(y)};
+}
 
 Bytes to_bytes(const Tile& tile) {
   ArchiveWriter out;
