@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <exception>
 #include <numeric>
+#include <stdexcept>
 
 #include "localization_trial.h"
 #include "standard_recordings.h"
@@ -271,7 +271,7 @@ void table_of_faults(const TrueDrive& drive, const Seeds& seeds, const Workers& 
   }
 }
 
-int run(const std::vector<std::string>& words) {
+void run(const std::vector<std::string>& words) {
   RecordingArguments arguments = read_arguments(
       words, {{"--seeds", "30"}, {"--first", "1"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "both"}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct", "crater_rim", "loop"};
@@ -284,25 +284,17 @@ int run(const std::vector<std::string>& words) {
       "difference.\n");
   for (const std::string& name : arguments.scenarios) {
     const auto drive = open_true_drive(arguments.options.at("--config"), name);
-    if (!drive) {
-      fmt::print(stderr, "{}: no such scenario in {}\n", name, arguments.options.at("--config"));
-      return 1;
-    }
+    if (!drive)
+      throw std::runtime_error(fmt::format("{}: no such scenario in {}", name, arguments.options.at("--config")));
     const std::string& tables = arguments.options.at("--tables");
     if (tables != "faults") table_of_subsets(*drive, seeds, workers);
     if (tables != "subsets") table_of_faults(*drive, seeds, workers);
   }
-  return 0;
 }
 
 }  // namespace
 }  // namespace spartan
 
 int main(int argc, char** argv) {
-  try {
-    return spartan::run({argv + 1, argv + argc});
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "%s\n", e.what());
-    return 1;
-  }
+  return spartan::run_benchmark(argc, argv, spartan::run);
 }

@@ -6,9 +6,6 @@
 // of it. Every subset of sensors over the same real odometry.
 #include <fmt/format.h>
 
-#include <cstdio>
-#include <exception>
-
 #include "localization_trial.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/trajectory.h"
@@ -71,7 +68,7 @@ double mean_nees(const TrialResult& r, double ShotError::*which) {
   return sum / static_cast<double>(r.shots.size());
 }
 
-int run(const std::vector<std::string>& words) {
+void run(const std::vector<std::string>& words) {
   const RecordingArguments arguments = read_arguments(words, {{"--runs", "runs"}});
   fmt::print("| recording | sensors | end, % | ATE, mm | NEES over all shots: position | attitude | pose |\n");
   fmt::print("|---|---|---|---|---|---|---|\n");
@@ -88,17 +85,11 @@ int run(const std::vector<std::string>& words) {
                  mean_nees(r, &ShotError::nees_attitude), mean_nees(r, &ShotError::nees_pose));
     }
   }
-  return 0;
 }
 
 }  // namespace
 }  // namespace spartan
 
 int main(int argc, char** argv) {
-  try {
-    return spartan::run({argv + 1, argv + argc});
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "%s\n", e.what());
-    return 1;
-  }
+  return spartan::run_benchmark(argc, argv, spartan::run);
 }

@@ -13,7 +13,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <map>
 #include <numbers>
 #include <string>
@@ -420,11 +419,5 @@ void run(const std::vector<std::string>& words) {
 }  // namespace spartan
 
 int main(int argc, char** argv) {
-  try {
-    spartan::run({argv + 1, argv + argc});
-    return 0;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "map_matching: %s\n", e.what());
-    return 1;
-  }
+  return spartan::run_benchmark(argc, argv, spartan::run);
 }

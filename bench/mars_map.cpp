@@ -12,7 +12,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <limits>
 #include <optional>
 #include <string>
@@ -209,11 +208,5 @@ void run(const std::vector<std::string>& words) {
 }  // namespace spartan
 
 int main(int argc, char** argv) {
-  try {
-    spartan::run({argv + 1, argv + argc});
-    return 0;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "mars_map: %s\n", e.what());
-    return 1;
-  }
+  return spartan::run_benchmark(argc, argv, spartan::run);
 }

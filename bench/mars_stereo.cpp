@@ -7,8 +7,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <map>
 #include <opencv2/calib3d.hpp>
@@ -160,11 +158,5 @@ void run(const std::vector<std::string>& words) {
 }  // namespace spartan
 
 int main(int argc, char** argv) {
-  try {
-    spartan::run({argv + 1, argv + argc});
-    return 0;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "mars_stereo: %s\n", e.what());
-    return 1;
-  }
+  return spartan::run_benchmark(argc, argv, spartan::run);
 }

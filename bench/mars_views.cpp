@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -165,11 +164,5 @@ void run(const std::vector<std::string>& words) {
 }  // namespace spartan
 
 int main(int argc, char** argv) {
-  try {
-    spartan::run({argv + 1, argv + argc});
-    return 0;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "mars_views: %s\n", e.what());
-    return 1;
-  }
+  return spartan::run_benchmark(argc, argv, spartan::run);
 }

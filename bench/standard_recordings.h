@@ -1,7 +1,9 @@
 // What benchmarks on the standard recordings are told: where these lie, how much of each to take, which ones.
 #pragma once
 
+#include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <map>
 #include <string>
 #include <vector>
@@ -32,6 +34,17 @@ inline RecordingArguments read_arguments(const std::vector<std::string>& words,
     }
   }
   return arguments;
+}
+
+/// What main() returns: 1 where the benchmark throws, and says why.
+inline int run_benchmark(int argc, char** argv, void (*run)(const std::vector<std::string>& words)) {
+  try {
+    run({argv + 1, argv + argc});
+    return 0;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s: %s\n", argv[0], e.what());
+    return 1;
+  }
 }
 
 }  // namespace spartan
