@@ -6,6 +6,8 @@
 // of it. Every subset of sensors over the same real odometry.
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "localization_trial.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/trajectory.h"
@@ -74,10 +76,7 @@ void run(const std::vector<std::string>& words) {
   fmt::print("|---|---|---|---|---|---|---|\n");
   for (const std::string& name : arguments.scenarios) {
     const auto drive = open_recorded(arguments.folder + "/" + name, arguments.options.at("--runs") + "/" + name);
-    if (!drive) {
-      fmt::print(stderr, "{}: no recording with truth, or no run of it\n", name);
-      return 1;
-    }
+    if (!drive) throw std::runtime_error(name + ": no recording with truth, or no run of it");
     for (int mask = 0; mask < 16; ++mask) {
       const TrialResult r = run_trial(drive->truth, arrivals(drive->drawn, Subset::of(mask)));
       fmt::print("| {} | {} | {:.4f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, Subset::of(mask).name(),
