@@ -33,7 +33,7 @@ bool correct(Belief& belief, const Innovation& innovation);
 /// Joseph's form holds for any gain.
 bool correct_only(Belief& belief, const Innovation& innovation, int index);
 
-/// As independent noise of the error, nothing else changed: restores symmetry after many small sums.
+/// Restores symmetry after many small sums.
 void symmetrise(ErrorCovariance& covariance);
 
 }  // namespace spartan
