@@ -17,9 +17,10 @@ struct PoseConstraint {
   Matrix6d map_covariance = Matrix6d::Zero();
 };
 
-/// What the errors of a pose and of a map made from earlier poses of the same drive have in common. Where the pose has
-/// become less certain since, it has all of the map's error; where it has become more certain, the map has all of the
-/// pose's: along common axes of both the smaller variance. Covariances of the same right perturbation.
-Matrix6d common_covariance(const Matrix6d& pose, const Matrix6d& map);
+/// What the errors of a pose and of a map made from earlier poses of the same drive have in common, as the share S of
+/// the pose's covariance P: their cross-covariance is P S. Where the pose has become less certain since, it has all of
+/// the map's error; where it has become more certain, the map has all of the pose's: along common axes of both the
+/// smaller variance. Covariances of the same right perturbation.
+Matrix6d common_share(const Matrix6d& pose, const Matrix6d& map);
 
 }  // namespace spartan

@@ -16,10 +16,14 @@ Matrix6d random_covariance(Random& random) {
 }
 
 double least_eigenvalue(const Matrix6d& m) {
-  return Eigen::SelfAdjointEigenSolver<Matrix6d>(m).eigenvalues()[0];
+  return Eigen::SelfAdjointEigenSolver<Matrix6d>(0.5 * (m + m.transpose())).eigenvalues()[0];
 }
 
-TEST(CommonCovariance, IsTheMapsWhereThePoseHasDriftedSince) {
+Matrix6d common_covariance(const Matrix6d& pose, const Matrix6d& map) {
+  return pose * common_share(pose, map);
+}
+
+TEST(CommonShare, IsTheMapsWhereThePoseHasDriftedSince) {
   Random random(3);
   for (int i = 0; i < 20; ++i) {
     const Matrix6d map = random_covariance(random), pose = map + random_covariance(random);
@@ -28,7 +32,7 @@ TEST(CommonCovariance, IsTheMapsWhereThePoseHasDriftedSince) {
   }
 }
 
-TEST(CommonCovariance, IsNeverMoreThanEither) {
+TEST(CommonShare, IsNeverMoreThanEither) {
   Random random(4);
   for (int i = 0; i < 20; ++i) {
     const Matrix6d map = random_covariance(random), pose = random_covariance(random),
@@ -39,7 +43,7 @@ TEST(CommonCovariance, IsNeverMoreThanEither) {
   }
 }
 
-TEST(CommonCovariance, AnExactPoseOrMapHasNoError) {
+TEST(CommonShare, AnExactPoseOrMapHasNoError) {
   Random random(5);
   const Matrix6d some = random_covariance(random);
   EXPECT_LE(common_covariance(Matrix6d::Zero(), some).norm(), 1e-12);

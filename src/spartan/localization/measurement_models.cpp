@@ -152,7 +152,7 @@ Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean
 // T = X̂ Exp(ξ) Exp(n): Log(X̂⁻¹ T) = ξ + J_r⁻¹(r) n. Information Λ of n becomes J_rᵀ Λ J_r; its eigenvectors with any
 // information are independent scalar measurements.
 Innovation map_innovation(const Belief& belief, const PoseConstraint& constraint, double covariance_factor) {
-  constexpr double kLeastInformation = 1e-6, kLeastShare = 1e-12, kLeastVariance = 1e-14;
+  constexpr double kLeastInformation = 1e-6, kLeastShare = 1e-12;
   const Vector6d r = log_se3(belief.state.world_from_body.inverse() * constraint.world_from_body);
   const Matrix6d jacobian = right_jacobian_se3(r);
   const Matrix6d turned = jacobian.transpose() * constraint.information * jacobian;
@@ -174,10 +174,7 @@ Innovation map_innovation(const Belief& belief, const PoseConstraint& constraint
   i.noise += directions * map * directions.transpose();
   const Matrix6d pose = belief.covariance.block<6, 6>(error_at::kPose, error_at::kPose);
   // The residual is truth less belief, plus the map's error: where both err alike it is none, hence the sign.
-  const Matrix6d common = -common_covariance(pose, map);
-  const Matrix6d floor = kLeastVariance * Matrix6d::Identity();
-  i.shared =
-      belief.covariance.middleCols<6>(error_at::kPose) * (pose + floor).ldlt().solve(common) * directions.transpose();
+  i.shared = -belief.covariance.middleCols<6>(error_at::kPose) * common_share(pose, map) * directions.transpose();
   return i;
 }
 

@@ -54,7 +54,7 @@ Innovation rest_innovation(const NavigationState& state, const Eigen::Vector3d& 
                            double gravity_m_s2);
 
 /// A pose by a map: the directions that carry information, each independent but for the map's error. What that has in
-/// common with the error of the belief (common_covariance) reaches the parts of the state through the pose. No rows
+/// common with the error of the belief (common_share) reaches the parts of the state through the pose. No rows
 /// where there is no information.
 Innovation map_innovation(const Belief& belief, const PoseConstraint& constraint, double covariance_factor);
 

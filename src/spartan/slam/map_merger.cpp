@@ -33,7 +33,8 @@ Correction moved_towards(const UncertainPose& given, const Pose& match, const Ma
   const Matrix6d from_match = right_jacobian_se3(offset);
   // Perturbations of the match as perturbations of the given pose: log(P⁻¹ M Exp δ) = offset + J_r⁻¹ δ.
   const Matrix6d information = from_match.transpose() * match_information * from_match;
-  const Matrix6d own = given.covariance - common_covariance(given.covariance, map_covariance);
+  const Matrix6d own =
+      symmetric(given.covariance * (Matrix6d::Identity() - common_share(given.covariance, map_covariance)));
   const Matrix6d apart = own + map_covariance - (given.covariance - own);
   const Matrix6d gain = own * blurred(information, apart);
   const Vector6d step = gain * offset;
