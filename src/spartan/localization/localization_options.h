@@ -105,14 +105,14 @@ struct HeadingOptions {
 };
 
 struct TiltOptions {
-  double noise_factor = 1.3;
+  double noise_factor = 1.0;
   double least_sigma_rad = 0.0005;
   double bias_rad = 0.0025;
   double bias_walk_rad_sqrt_hz = 1e-5;
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("noise_factor", noise_factor, "on the stated standard deviation: an inclinometer feels accelerations too",
+    v.field("noise_factor", noise_factor, "on the stated standard deviation, for one that feels accelerations too",
             between(0.1, 100));
     v.field("least_sigma_rad", least_sigma_rad, "of a reading, whatever it says itself", between(1e-6, 1));
     v.field("bias_rad", bias_rad, "standard deviation of the bias", between(0, 1));

@@ -49,8 +49,10 @@ Innovation relative_motion_innovation(const NavigationState& s, int clone, const
                                       const Matrix6d& covariance, const Vector6d& drift_scale) {
   const MotionSinceClone m = motion_since_clone(s, clone);
   Innovation i(6);
-  const Vector6d r = log_se3(m.clone_from_body.inverse() * measured);
-  const Matrix6d right = right_jacobian_inverse_se3(r), left = right_jacobian_inverse_se3(-r);
+  const Vector6d drift = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
+  const Vector6d r = log_se3(m.clone_from_body.inverse() * measured * exp_se3(drift));
+  const Matrix6d right = right_jacobian_inverse_se3(r) * right_jacobian_se3(drift),
+                 left = right_jacobian_inverse_se3(-r);
   i.residual = r;
   i.jacobian = m.jacobian;
   i.jacobian.middleCols<6>(clone) = left * m.jacobian.middleCols<6>(clone);

@@ -9,8 +9,9 @@
 namespace spartan {
 
 /// A motion measured from a clone (`index`: kVisionClone or kStepClone) to the present pose, M = Ĉ⁻¹ X̂ Exp(e) with
-/// noise on the right: r = Log(M̂⁻¹ M) = e − J_r⁻¹(r) (noise + D z), e = ξ_x − J_l⁻¹(r) Ad(M̂⁻¹) ξ_c. `drift_scale` is
-/// the diagonal of D (zero: the motion has no lasting error z).
+/// noise and the lasting error z on the right, M = … Exp(−D z − n). With its estimate ẑ taken off,
+///   r = Log(M̂⁻¹ M Exp(D ẑ)) = ξ_x − J_l⁻¹(r) Ad(M̂⁻¹) ξ_c − J_r⁻¹(r) J_r(D ẑ) (D δz + n).
+/// `drift_scale` is the diagonal of D (zero: the motion has no lasting error).
 Innovation relative_motion_innovation(const NavigationState& state, int clone, const Pose& measured,
                                       const Matrix6d& covariance, const Vector6d& drift_scale);
 

@@ -59,18 +59,18 @@ TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
     r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
     drift_scale << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6;
     const Pose mean = motion_since_clone(s, clone).clone_from_body;
+    const Vector6d believed = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
     const auto seen = [&](const ErrorVector& e) -> Vector6d {
       const NavigationState truth = add_error(s, e);
       const Pose motion = motion_since_clone(truth, clone).clone_from_body *
-                          exp_se3(-drift_scale.cwiseProduct(e.segment<6>(error_at::kVisionDrift) +
-                                                            e.segment<6>(error_at::kVisionConstant)));
-      return log_se3(mean.inverse() * motion);
+                          exp_se3(-drift_scale.cwiseProduct(truth.vision_drift + truth.vision_constant));
+      return log_se3(mean.inverse() * motion * exp_se3(believed));
     };
     ErrorVector at = ErrorVector::Zero();
     at.segment<6>(error_at::kPose) = r;
     const auto numeric = testing::numeric_jacobian<6, error_at::kSize>(seen, at, 1e-4);
     const Innovation innovation =
-        relative_motion_innovation(s, clone, mean * exp_se3(r), Matrix6d::Identity(), drift_scale);
+        relative_motion_innovation(s, clone, mean * exp_se3(r) * exp_se3(-believed), Matrix6d::Identity(), drift_scale);
     EXPECT_LE((innovation.residual - r).norm(), 1e-12);
     EXPECT_LE((innovation.jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
   }

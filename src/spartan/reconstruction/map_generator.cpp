@@ -1,10 +1,10 @@
 #include "spartan/reconstruction/map_generator.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace spartan {
 namespace {
@@ -86,48 +86,6 @@ void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
   }
 }
 
-// Slope and roughness from the plane through a wheel's surroundings, step from the neighbours.
-void measure_shape(const MapOptions& options, LocalMap& map) {
-  const auto [w, h] = map.size();
-  const int reach = std::max(1, static_cast<int>(std::lround(0.25 * options.rover.track_m / options.cell_m)));
-  const RoverLimits& rover = options.rover;
-  const double steepest = rover.steepest_deg * std::numbers::pi / 180;
-  for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x) {
-      if (!(map.count(x, y) > 0)) continue;
-      Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
-      Eigen::Vector3d v = Eigen::Vector3d::Zero();
-      double squares = 0;
-      float low = map.elevation_m(x, y), high = low;
-      for (int j = std::max(y - reach, 0); j <= std::min(y + reach, h - 1); ++j) {
-        for (int i = std::max(x - reach, 0); i <= std::min(x + reach, w - 1); ++i) {
-          const float z = map.elevation_m(i, j);
-          if (!std::isfinite(z)) continue;
-          const Eigen::Vector3d row((i - x) * map.place.cell_m, (y - j) * map.place.cell_m, 1);
-          m += row * row.transpose();
-          v += static_cast<double>(z) * row;
-          squares += static_cast<double>(z) * z;
-          if (std::abs(i - x) <= 1 && std::abs(j - y) <= 1) {
-            low = std::min(low, z);
-            high = std::max(high, z);
-          }
-        }
-      }
-      map.step_m(x, y) = high - low;
-      const double n = m(2, 2);
-      if (n < 5 || m.determinant() < 1e-9) continue;
-      const Eigen::Vector3d p = m.ldlt().solve(v);
-      map.slope_rad(x, y) = static_cast<float>(std::atan(std::hypot(p.x(), p.y())));
-      map.roughness_m(x, y) = static_cast<float>(std::sqrt(std::max(0.0, squares - v.dot(p)) / n));
-      const double worst = std::max({map.slope_rad(x, y) / steepest, map.step_m(x, y) / rover.highest_step_m,
-                                     map.roughness_m(x, y) / (0.5 * rover.wheel_radius_m),
-                                     (map.elevation_max_m(x, y) - map.ground_m(x, y)) / rover.clearance_m,
-                                     map.kind(x, y) == 3 ? 1.0 : 0.0});
-      map.cost(x, y) = static_cast<float>(std::clamp(worst, 0.0, 1.0));
-    }
-  }
-}
-
 // Cells of obstacles that touch, also by a corner.
 void list_obstacles(LocalMap& map) {
   const auto [w, h] = map.size();
@@ -194,8 +152,8 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
   map.map_from_body = map_from_body;
   map.place = grid.place;
   const int w = grid.width, h = grid.height;
-  for (Image<float>* layer : {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2,
-                              &map.ground_m, &map.slope_rad, &map.roughness_m, &map.step_m, &map.cost})
+  for (Image<float>* layer :
+       {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2, &map.ground_m})
     *layer = Image<float>(w, h, kNaN);
   for (Image<float>* layer : {&map.count, &map.kind, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
   Image<std::uint8_t> starts(w, h);
@@ -221,7 +179,12 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
   }
   map.ground_m = fit_ground(map.elevation_m, starts, options_.cell_m, options_.ground, workers_);
   classify(options_, grid, map);
-  measure_shape(options_, map);
+  TerrainShape shape = measure_shape({map.elevation_m, map.elevation_max_m, map.ground_m, map.kind, map.place.cell_m},
+                                     options_.rover, workers_);
+  map.slope_rad = std::move(shape.slope_rad);
+  map.roughness_m = std::move(shape.roughness_m);
+  map.step_m = std::move(shape.step_m);
+  map.cost = std::move(shape.cost);
   list_obstacles(map);
   return map;
 }

@@ -10,27 +10,10 @@
 #include "spartan/reconstruction/disparity_merger.h"
 #include "spartan/reconstruction/ground_surface.h"
 #include "spartan/reconstruction/local_map.h"
+#include "spartan/reconstruction/terrain_shape.h"
 #include "spartan/reconstruction/v_disparity.h"
 
 namespace spartan {
-
-/// The rover that a map's costs are meant for.
-struct RoverLimits {
-  double wheel_radius_m = 0.1;
-  double clearance_m = 0.1;
-  double track_m = 0.6;
-  double steepest_deg = 20;
-  double highest_step_m = 0.08;
-
-  template <class Visitor>
-  void describe(Visitor& v) {
-    v.field("wheel_radius_m", wheel_radius_m, "roughness of half of it cannot be driven on", between(0.01, 5));
-    v.field("clearance_m", clearance_m, "obstacles as high as this cannot be driven over", between(0.01, 5));
-    v.field("track_m", track_m, "left to right wheel: slopes are taken over half of it", between(0.05, 10));
-    v.field("steepest_deg", steepest_deg, "slopes as steep as this cannot be driven on", between(1, 80));
-    v.field("highest_step_m", highest_step_m, "steps as high as this cannot be climbed", between(0.005, 5));
-  }
-};
 
 struct MapOptions {
   double extent_m = 8;

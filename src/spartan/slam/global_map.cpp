@@ -35,14 +35,27 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
 
 }  // namespace
 
-std::vector<MapBand> MapView::bands() const {
+std::vector<MapBand> MapView::bands(const TerrainShape& shape) const {
   return {{"elevation_m", elevation_m.view()},
           {"elevation_min_m", elevation_min_m.view()},
           {"elevation_max_m", elevation_max_m.view()},
           {"variance_m2", variance_m2.view()},
           {"count", count.view()},
+          {"slope_rad", shape.slope_rad.view()},
+          {"roughness_m", shape.roughness_m.view()},
+          {"step_m", shape.step_m.view()},
           {"class", kind.view()},
-          {"occupancy_logodds", occupancy_logodds.view()}};
+          {"occupancy_logodds", occupancy_logodds.view()},
+          {"cost", shape.cost.view()}};
+}
+
+TerrainShape MapView::shape(const MapOptions& options, const Workers& workers) const {
+  Image<std::uint8_t> free(window.width, window.height);
+  for (int r = 0; r < window.height; ++r) {
+    for (int c = 0; c < window.width; ++c) free(c, r) = kind(c, r) == 1 ? 1 : 0;
+  }
+  const Image<float> ground_m = fit_ground(elevation_m, free, cell_m, options.ground, workers);
+  return measure_shape({elevation_m, elevation_max_m, ground_m, kind, cell_m}, options.rover, workers);
 }
 
 SurfaceGrid MapView::grid() const {

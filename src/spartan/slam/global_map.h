@@ -8,6 +8,8 @@
 
 #include "spartan/core/geotiff.h"
 #include "spartan/reconstruction/local_map.h"
+#include "spartan/reconstruction/map_generator.h"
+#include "spartan/reconstruction/terrain_shape.h"
 #include "spartan/slam/lattice.h"
 #include "spartan/slam/slam_options.h"
 #include "spartan/slam/surface_grid.h"
@@ -23,8 +25,10 @@ struct MapView {
   Image<std::int32_t> stop;  ///< the first that saw it; −1 nowhere
 
   MapPlace place() const { return window.place(cell_m); }
-  /// As files name them (docs/formats.md, "Maps").
-  std::vector<MapBand> bands() const;
+  /// As files name them (docs/formats.md, "Maps"), with the shape that goes with them.
+  std::vector<MapBand> bands(const TerrainShape& shape) const;
+  /// The ground is fitted to the free cells first: costs are of what stands over it.
+  TerrainShape shape(const MapOptions& options, const Workers& workers) const;
   SurfaceGrid grid() const;
 };
 

@@ -34,7 +34,7 @@ void add(GlobalMap& map, const Ground& ground, const Pose& pose, std::uint64_t s
 // All of a view as bytes.
 Bytes bytes_of(const MapView& view) {
   ArchiveWriter out;
-  for (const MapBand& band : view.bands()) {
+  for (const MapBand& band : view.bands({})) {
     for (int y = 0; y < band.values.height(); ++y)
       out.put_array(band.values.row(y), static_cast<std::size_t>(band.values.width()));
   }
@@ -73,7 +73,31 @@ TEST(GlobalMap, OneStopIsShownAsItsLocalMapCellByCell) {
   }
   EXPECT_GT(known, 3000);
   EXPECT_EQ(map.stops().at(0).stamp.ns, 5);
-  EXPECT_EQ(view.bands().size(), 7U);
+  EXPECT_EQ(view.bands({}).size(), local.bands().size());
+}
+
+TEST(GlobalMap, IsAsHardToDriveOverAsTheLocalMapSays) {
+  const Ground ground = rocky_ground();
+  const Pose pose = standing(ground, -17.3, 9.1, 2.2);
+  const LocalMap local = map_of(ground, pose, 1);
+  GlobalMap map({}, 0.05);
+  ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
+  const MapView view = *map.view(window_of(local.place, local.size()));
+  const TerrainShape shape = view.shape({}, Workers(2));
+  int known = 0, close = 0;
+  for (int r = 0; r < local.size().height; ++r) {
+    for (int c = 0; c < local.size().width; ++c) {
+      ASSERT_EQ(std::isnan(shape.cost(c, r)), std::isnan(local.cost(c, r)));
+      if (std::isnan(local.cost(c, r))) continue;
+      ++known;
+      ASSERT_NEAR(shape.slope_rad(c, r), local.slope_rad(c, r), 1e-4);
+      ASSERT_NEAR(shape.step_m(c, r), local.step_m(c, r), 1e-5);
+      ASSERT_NEAR(shape.roughness_m(c, r), local.roughness_m(c, r), 1e-4);
+      close += std::abs(shape.cost(c, r) - local.cost(c, r)) < 0.1F ? 1 : 0;
+    }
+  }
+  EXPECT_GT(known, 3000);
+  EXPECT_GT(close, 0.95 * known) << "the ground under the stones is fitted anew";
 }
 
 TEST(GlobalMap, ElevationBetweenCellsIsBilinear) {

@@ -14,7 +14,7 @@ namespace spartan {
 Status write_local_map(const LocalMap& map, const std::string& path);
 
 /// The same of everything that the global map knows; nothing where it is empty. Codes: those of its store, `output`.
-Status write_global_map(GlobalMap& map, const std::string& path);
+Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers& workers, const std::string& path);
 
 /// All of a position's 3D reconstruction, into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
 /// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; of each view

@@ -283,7 +283,7 @@ Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, 
 }
 
 // Text files are made from the store alone, so a resumed run writes the same bytes.
-Result<RunOutcome> write_results(Drive& drive, const RunFolder& folder, RunFacts facts) {
+Result<RunOutcome> write_results(Drive& drive, const RunRequest& request, const RunFolder& folder, RunFacts facts) {
   const auto frames = drive.store().frames();
   if (!frames) return failure(frames);
   if (Status s = write_file_atomically(folder.odometry_trajectory(), to_tum(measured_trajectory(*frames))); !s)
@@ -292,7 +292,10 @@ Result<RunOutcome> write_results(Drive& drive, const RunFolder& folder, RunFacts
     return failure(s);
   if (Status s = write_file_atomically(folder.localization_trajectory(), to_tum(localized_trajectory(*frames))); !s)
     return failure(s);
-  if (Status s = write_global_map(drive.global_map(), folder.global_map()); !s) return failure(s);
+  if (Status s = write_global_map(drive.global_map(), request.options.mapping.map, Workers(request.threads),
+                                  folder.global_map());
+      !s)
+    return failure(s);
   facts.peak_memory_bytes = peak_memory_bytes();
   RunOutcome outcome;
   outcome.summary_json = to_summary_json(facts, *frames);
@@ -350,7 +353,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   facts.resumed_from_frame = drive.resumed_from_frame();
   facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   facts.cpu_seconds = cpu_seconds();
-  return write_results(drive, folder, facts);
+  return write_results(drive, request, folder, facts);
 }
 
 }  // namespace spartan
