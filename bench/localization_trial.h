@@ -173,7 +173,9 @@ struct TrialResult {
 
 inline LocalizationOptions options_for(const TrueDrive& drive) {
   LocalizationOptions options;
-  options.gravity_m_s2 = drive.scenario.gravity_m_s2;  // known, as recordings state it
+  // Known, as recordings state it.
+  options.gravity_m_s2 = drive.scenario.gravity_m_s2;
+  options.imu = with_stated(options.imu, sim::stated_noise(drive.scenario.imu));
   return options;
 }
 

@@ -11,10 +11,15 @@ struct ExportArguments {
   std::string run, format, output, trajectory;
 };
 
-Result<ExitCode> export_verb(const ExportArguments& arguments) {
+Result<ExitCode> export_verb(const Context& context, const ExportArguments& arguments) {
   const auto format = parse_export_format(arguments.format);
   if (!format) return failure(format);
-  if (Status written = export_run(arguments.run, *format, arguments.output); !written) return failure(written);
+  const auto kind = parse_trajectory_kind(arguments.trajectory);
+  const Workers workers(context.threads);
+  if (Status s =
+          export_run(arguments.run, *format, kind.value_or(kTrajectoriesBestFirst[0]), workers, arguments.output);
+      !s)
+    return failure(s);
   return kDone;
 }
 
@@ -22,13 +27,17 @@ Result<ExitCode> export_verb(const ExportArguments& arguments) {
 
 void add_export(CLI::App& app, Context& context) {
   auto a = std::make_shared<ExportArguments>();
-  CLI::App* verb = add_verb(app, context, "export", "Write a run's results in other formats",
-                            "export run_06 --format kitti -o 06.txt", [a] { return export_verb(*a); });
+  CLI::App* verb =
+      add_verb(app, context, "export", "Write a run's results in other formats",
+               "export run_06 --format kitti -o 06.txt", [&context, a] { return export_verb(context, *a); });
   verb->add_option("run", a->run, "the run folder")->required();
-  verb->add_option("--format", a->format, "tum, kitti, euroc, csv (trajectories) or ply (terrain)")->required();
+  verb->add_option("--format", a->format,
+                   "tum, kitti, euroc, csv (trajectories), geotiff (the global map) or ply (terrain)")
+      ->required();
   verb->add_option("-o,--output", a->output, "the file to write")->required();
-  verb->add_option("--trajectory", a->trajectory, "which one; a run has one so far: odometry")
-      ->check(CLI::IsMember({"odometry"}));
+  verb->add_option("--trajectory", a->trajectory, "which one: odometry, slam or localization (default)")
+      ->check(CLI::IsMember({"odometry", "slam", "localization"}));
+  add_threads_option(*verb, context);
 }
 
 }  // namespace spartan::program

@@ -17,12 +17,13 @@ namespace spartan::program {
 namespace {
 
 struct Kind {
-  const char* name;
+  TrajectoryKind kind;
   const char* colour;
   const char* pale;  // of its 3σ
 };
-constexpr std::array<Kind, 3> kKinds{
-    {{"odometry", "#1f5fa8", "#a9c4e2"}, {"slam", "#7a3f9d", "#d0b8de"}, {"localization", "#2c8a4a", "#aed6b9"}}};
+constexpr std::array<Kind, 3> kKinds{{{TrajectoryKind::odometry, "#1f5fa8", "#a9c4e2"},
+                                      {TrajectoryKind::slam, "#7a3f9d", "#d0b8de"},
+                                      {TrajectoryKind::localization, "#2c8a4a", "#aed6b9"}}};
 
 const StampedPose& nearest(const Trajectory& truth, Stamp stamp) {
   return *std::min_element(truth.begin(), truth.end(), [&](const StampedPose& a, const StampedPose& b) {
@@ -36,21 +37,14 @@ double three_sigma(const Matrix6d& covariance) {
   return 3 * std::sqrt(std::max(0.0, position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
 }
 
-std::optional<Matrix6d> covariance_of(const FrameRecord& frame, const std::string& kind) {
-  if (kind == "odometry") return frame.has_pose ? std::optional(frame.world_from_body.covariance) : std::nullopt;
-  if (kind == "slam" && frame.slam) return frame.slam->covariance;
-  if (kind == "localization" && frame.localization) return frame.localization->world_from_body.covariance;
-  return std::nullopt;
-}
-
 struct Lines {
   std::vector<PlotLine> way, errors;
 };
 
 void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vector<FrameRecord>& frames,
           Lines& lines) {
-  PlotLine way{kind.name, kind.colour, {}, {}}, error{kind.name, kind.colour, {}, {}},
-      band{std::string(kind.name) + ", 3σ", kind.pale, {}, {}};
+  const std::string name(name_of(kind.kind));
+  PlotLine way{name, kind.colour, {}, {}}, error{name, kind.colour, {}, {}}, band{name + ", 3σ", kind.pale, {}, {}};
   const StampedPose& first = compared.estimate.front();
   const Pose truth_from_estimate = nearest(compared.truth, first.stamp).pose * first.pose.inverse();
   double driven = 0;
@@ -66,9 +60,9 @@ void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vec
     error.y.push_back(1000 * (at - nearest(compared.truth, p.stamp).pose.translation()).norm());
     while (frame != frames.end() && frame->stamp < p.stamp) ++frame;
     if (frame == frames.end() || frame->stamp != p.stamp) continue;
-    if (const auto covariance = covariance_of(*frame, kind.name)) {
+    if (const auto pose = pose_of(*frame, kind.kind)) {
       band.x.push_back(driven);
-      band.y.push_back(1000 * three_sigma(*covariance));
+      band.y.push_back(1000 * three_sigma(pose->covariance));
     }
   }
   lines.way.push_back(std::move(way));
@@ -86,8 +80,8 @@ Result<std::string> trajectory_plots(const std::string& recording, const std::st
   if (!frames) return failure(frames);
   Lines lines;
   for (const Kind& kind : kKinds) {
-    if (!std::filesystem::exists(run + "/trajectory_" + kind.name + ".tum")) continue;
-    const auto compared = find_trajectories(run, recording, kind.name);
+    if (!std::filesystem::exists(folder.trajectory(kind.kind))) continue;
+    const auto compared = find_trajectories(run, recording, std::string(name_of(kind.kind)));
     if (!compared) return failure(compared);
     if (lines.way.empty()) {
       PlotLine truth{"truth", "#9a3b12", {}, {}};

@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <filesystem>
+#include <utility>
 
 #include "spartan/camera/recording_index.h"
 #include "spartan/camera/sensor_tables.h"
@@ -27,26 +28,55 @@ Result<EurocImages> read_images(const fs::path& camera) {
   return images;
 }
 
-// The rotation of T_BS in a sensor.yaml; the identity where there is none.
-Result<Eigen::Quaterniond> read_body_from_sensor(const std::string& path) {
+struct EurocImu {
+  Eigen::Quaterniond body_from_imu = Eigen::Quaterniond::Identity();
+  ImuNoise noise;
+};
+
+// The rotation of T_BS; the identity where there is none.
+Result<Eigen::Quaterniond> rotation_of(const YAML::Node& transform, const std::string& path) {
+  if (!transform) return Eigen::Quaterniond::Identity();
+  // Both forms are in use: {rows, cols, data: […]} and the plain list.
+  const auto data = (transform.IsMap() ? transform["data"] : transform).as<std::vector<double>>();
+  if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS has not 16 numbers", path);
+  Eigen::Matrix3d rotation;
+  rotation << data[0], data[1], data[2], data[4], data[5], data[6], data[8], data[9], data[10];
+  if (!is_rotation(rotation, 1e-3)) return failure(ErrorCode::configuration, "T_BS holds no rotation", path);
+  return Eigen::Quaterniond(nearest_rotation(rotation));
+}
+
+// A noise density; 0, not stated, where it is missing.
+Result<double> density(const YAML::Node& file, const char* key, const std::string& path) {
+  const double value = file[key] ? file[key].as<double>() : 0;
+  if (!(value >= 0 && value < 10)) return failure(ErrorCode::configuration, fmt::format("{} is {}", key, value), path);
+  return value;
+}
+
+// imu0/sensor.yaml; nothing known where there is none.
+Result<EurocImu> read_imu(const std::string& path) {
+  EurocImu imu;
   std::error_code error;
-  if (!fs::exists(path, error)) return Eigen::Quaterniond::Identity();
+  if (!fs::exists(path, error)) return imu;
   auto text = read_file(path);
   if (!text) return failure(text);
   if (text->starts_with("%YAML:")) text->erase(0, text->find('\n'));  // OpenCV's header is no valid YAML
   try {
-    const YAML::Node transform = YAML::Load(*text)["T_BS"];
-    if (!transform) return Eigen::Quaterniond::Identity();
-    // Both forms are in use: {rows, cols, data: […]} and the plain list.
-    const auto data = (transform.IsMap() ? transform["data"] : transform).as<std::vector<double>>();
-    if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS has not 16 numbers", path);
-    Eigen::Matrix3d rotation;
-    rotation << data[0], data[1], data[2], data[4], data[5], data[6], data[8], data[9], data[10];
-    if (!is_rotation(rotation, 1e-3)) return failure(ErrorCode::configuration, "T_BS holds no rotation", path);
-    return Eigen::Quaterniond(nearest_rotation(rotation));
+    const YAML::Node file = YAML::Load(*text);
+    const auto rotation = rotation_of(file["T_BS"], path);
+    if (!rotation) return failure(rotation);
+    imu.body_from_imu = *rotation;
+    for (const auto& [key, noise] : {std::pair("gyroscope_noise_density", &imu.noise.gyro_noise_rad_s_sqrt_hz),
+                                     {"gyroscope_random_walk", &imu.noise.gyro_walk_rad_s2_sqrt_hz},
+                                     {"accelerometer_noise_density", &imu.noise.accel_noise_m_s2_sqrt_hz},
+                                     {"accelerometer_random_walk", &imu.noise.accel_walk_m_s3_sqrt_hz}}) {
+      const auto stated = density(file, key, path);
+      if (!stated) return failure(stated);
+      *noise = *stated;
+    }
   } catch (const YAML::Exception& e) {
     return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, path);
   }
+  return imu;
 }
 
 Shot make_shot(const StampMatch& match, const EurocImages& left, const EurocImages& right) {
@@ -94,9 +124,10 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
     index.info.truth_file = truth.string();
   }
   if (const fs::path imu = folder / "imu0" / "data.csv"; fs::exists(imu, error)) {
-    const auto body_from_imu = read_body_from_sensor((folder / "imu0" / "sensor.yaml").string());
-    if (!body_from_imu) return failure(body_from_imu);
-    index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(*body_from_imu));
+    const auto about = read_imu((folder / "imu0" / "sensor.yaml").string());
+    if (!about) return failure(about);
+    index.info.imu_noise = about->noise;
+    index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(about->body_from_imu));
   }
   return index;
 }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "spartan/camera/imu_noise.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/result.h"
 #include "spartan/core/trajectory.h"
@@ -16,6 +17,7 @@ struct RecordingOptions {
   std::string name;
   std::string description;
   double gravity_m_s2 = 9.81;
+  ImuNoise imu_noise;  ///< as it is believed
 };
 
 /// Makes the folder, then takes samples in any order of kinds, each kind (and the shots of each pair) with stamps that

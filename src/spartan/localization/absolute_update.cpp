@@ -15,6 +15,8 @@ namespace {
 constexpr double kBiasShare = 0.003;
 /// So many compass readings share the error that an unknown vertical makes.
 constexpr double kReadingsOfOneLean = 100;
+/// Squares over their degrees of freedom: 5 % of the readings are so much off, and most that is put down to rocking.
+constexpr double kSurprise = 3, kMostRocking = 15;
 
 }  // namespace
 
@@ -75,6 +77,7 @@ void ErrorStateFilter::take(const InclinometerSample& sample) {
     memory_.imu.levelled = true;
   }
   const Innovation innovation = inclinometer_innovation(s, sample.roll_rad, sample.pitch_rad, sigma);
+  allow_for_rocking(innovation);
   const double square = normalised_square(memory_.belief.covariance, innovation);
   const bool use = judge(LocalizationSensor::inclinometer, square, 2, HealthReason::disagrees);
   if (use) {
@@ -83,6 +86,18 @@ void ErrorStateFilter::take(const InclinometerSample& sample) {
     memory_.belief.covariance.diagonal().segment<2>(error_at::kInclinometerBias) +=
         kBiasShare * innovation.residual.cwiseAbs2();
   }
+}
+
+/// Between shots, without an IMU, a reading that surprises tells first of all that the rover rocks more than most
+/// times: the attitude's noise since the last shot grows until the surprise is an ordinary one.
+void ErrorStateFilter::allow_for_rocking(const Innovation& innovation) {
+  if (!(memory_.vision.unmeasured_s > 0)) return;
+  const double surprise =
+      normalised_square(memory_.belief.covariance, innovation) / static_cast<double>(innovation.rows());
+  if (surprise < kSurprise) return;
+  memory_.belief.covariance.block<3, 3>(error_at::kAttitude, error_at::kAttitude) +=
+      std::min(surprise - 1, kMostRocking) *
+      memory_.vision.unmeasured_noise.block<3, 3>(error_at::kAttitude, error_at::kAttitude);
 }
 
 void ErrorStateFilter::take(const PoseConstraint& constraint) {

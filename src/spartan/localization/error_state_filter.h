@@ -73,6 +73,7 @@ class ErrorStateFilter {
   void take(const CompassSample& sample);
   void find_compass_offset(const CompassSample& sample, double sigma_rad);
   void take(const InclinometerSample& sample);
+  void allow_for_rocking(const Innovation& innovation);
   void take(const PoseConstraint& constraint);
 
   /// Corrections that leave odom where it is, and those that tell the motion since a clone.

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "spartan/camera/imu_noise.h"
 #include "spartan/core/options.h"
 
 namespace spartan {
@@ -37,6 +38,18 @@ struct InertialOptions {
     v.field("still_accel_m_s2", still_accel_m_s2, "scatter below which the rover may be standing", between(0, 10));
   }
 };
+
+/// With what is stated of the IMU at hand in the place of the defaults.
+inline InertialOptions with_stated(InertialOptions options, const ImuNoise& stated) {
+  const auto take = [](double& value, double by_recording) { value = by_recording > 0 ? by_recording : value; };
+  take(options.gyro_noise_rad_s_sqrt_hz, stated.gyro_noise_rad_s_sqrt_hz);
+  take(options.gyro_bias_rad_s, stated.gyro_bias_rad_s);
+  take(options.gyro_walk_rad_s2_sqrt_hz, stated.gyro_walk_rad_s2_sqrt_hz);
+  take(options.accel_noise_m_s2_sqrt_hz, stated.accel_noise_m_s2_sqrt_hz);
+  take(options.accel_bias_m_s2, stated.accel_bias_m_s2);
+  take(options.accel_walk_m_s3_sqrt_hz, stated.accel_walk_m_s3_sqrt_hz);
+  return options;
+}
 
 /// The error of a visual motion is L n + D z: white noise of the stated covariance times `white_factor`, and a lasting
 /// part z in units of the stated standard deviations D, slowly changing and constant (docs/math/localization.md,
@@ -144,15 +157,15 @@ struct StandingStillOptions {
 struct UnmeasuredMotionOptions {
   double speed_share_sqrt_hz = 0.5;
   double speed_floor_m_s = 0.05;
-  double turn_share_sqrt_hz = 0.5;
-  double turn_floor_rad_s = 0.04;
+  double turn_share = 0.5;
+  double turn_floor_rad_s = 0.008;
 
   template <class Visitor>
   void describe(Visitor& v) {
     v.field("speed_share_sqrt_hz", speed_share_sqrt_hz, "change of velocity in a second, of the speed",
             between(0, 100));
     v.field("speed_floor_m_s", speed_floor_m_s, "the speed counts as so much more", between(0, 100));
-    v.field("turn_share_sqrt_hz", turn_share_sqrt_hz, "change of attitude in a second, of the rate", between(0, 100));
+    v.field("turn_share", turn_share, "error of the last rate, of the rate", between(0, 100));
     v.field("turn_floor_rad_s", turn_floor_rad_s, "the rate counts as so much more", between(0, 100));
   }
 };

@@ -1,7 +1,7 @@
 #include "spartan/reconstruction/terrain_shape.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>

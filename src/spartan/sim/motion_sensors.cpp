@@ -60,6 +60,12 @@ ImuSample true_imu(const BodyMotion& motion, double time_s, double gravity_m_s2)
   return sample;
 }
 
+ImuNoise stated_noise(const ImuOptions& o) {
+  if (!o.enabled) return {};
+  return {o.gyro_noise_rad_s_sqrt_hz, o.gyro_bias_rad_s, o.gyro_walk_rad_s2_sqrt_hz,
+          o.accel_noise_m_s2_sqrt_hz, o.accel_bias_m_s2, o.accel_walk_m_s3_sqrt_hz};
+}
+
 std::vector<ImuSample> measure_imu(const BodyMotion& motion, const ImuOptions& o, double gravity_m_s2,
                                    const SensorFaults& faults, std::uint64_t seed) {
   if (!o.enabled) return {};

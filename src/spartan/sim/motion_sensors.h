@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "spartan/camera/imu_noise.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/options.h"
 #include "spartan/sim/body_motion.h"
@@ -34,6 +35,9 @@ struct ImuOptions {
     v.field("accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz, "random walk of the bias, density", at_least(0));
   }
 };
+
+/// What a recording states of it.
+ImuNoise stated_noise(const ImuOptions& options);
 
 /// Slip: the share of the rolled distance that does not carry the rover on,
 ///   slip = level + by_slope · tan(climb) + sand · noise(x, y),  rolled = travelled / (1 − slip).

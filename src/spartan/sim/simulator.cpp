@@ -101,7 +101,8 @@ class Simulation {
         believed_(believed_rig(request.rig, request.scenario.believed)) {}
 
   Result<SimulationReport> run() {
-    const RecordingOptions about{scenario_.name, scenario_.description, scenario_.gravity_m_s2};
+    const RecordingOptions about{scenario_.name, scenario_.description, scenario_.gravity_m_s2,
+                                 stated_noise(scenario_.imu)};
     if (Status s = check_folder(); !s) return failure(s);
     auto writer = request_.resume ? RecordingWriter::resume(request_.folder, believed_, about)
                                   : RecordingWriter::create(request_.folder, believed_, about);

@@ -10,62 +10,76 @@
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/pose_convention.h"
 #include "spartan/rig/rig_files.h"
+#include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
-#include "spartan/system/summary.h"
+#include "spartan/system/saved_map.h"
 #include "spartan/system/terrain_files.h"
 
 namespace spartan {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ExportFormat>, 5> kFormats{{{"tum", ExportFormat::tum},
+constexpr std::array<std::pair<std::string_view, ExportFormat>, 6> kFormats{{{"tum", ExportFormat::tum},
                                                                              {"kitti", ExportFormat::kitti},
                                                                              {"euroc", ExportFormat::euroc},
                                                                              {"csv", ExportFormat::csv},
+                                                                             {"geotiff", ExportFormat::geotiff},
                                                                              {"ply", ExportFormat::ply}}};
 
-Result<std::string> kitti_text(const RunFolder& folder, const std::vector<FrameRecord>& frames) {
+Result<std::string> kitti_text(const RunFolder& folder, const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
   const auto rig = read_rig_yaml(folder.rig());
   if (!rig) return failure(rig);
   const StereoPair* const pair = rig->find_pair(frames.front().pair);
   if (pair == nullptr) return failure(ErrorCode::input, "does not know the pair " + frames.front().pair, folder.rig());
-  Trajectory trajectory;
-  trajectory.reserve(frames.size());
-  for (const FrameRecord& frame : frames) trajectory.push_back({frame.stamp, frame.world_from_body.pose});
-  return to_kitti(in_left_optical_convention(*rig, *pair, std::move(trajectory)));
+  return to_kitti(in_left_optical_convention(*rig, *pair, trajectory_without_gaps(frames, kind)));
 }
 
-std::string csv_text(const std::vector<FrameRecord>& frames) {
+constexpr int kPoseColumns = 13;
+
+std::string csv_text(const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
   std::string text =
       "frame_id,stamp_ns,status,x_m,y_m,z_m,qx,qy,qz,qw,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_rad,sigma_ry_rad,"
       "sigma_rz_rad,matches,inliers,rms_px\n";
   for (const FrameRecord& f : frames) {
-    const auto& t = f.world_from_body.pose.translation();
-    const auto& q = f.world_from_body.pose.rotation();
-    text += fmt::format("{},{},{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f}", f.frame_id, f.stamp.ns,
-                        f.status, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
-    for (int i = 0; i < 6; ++i)
-      text += fmt::format(",{:.6g}", std::sqrt(std::max(0.0, f.world_from_body.covariance(i, i))));
+    text += fmt::format("{},{},{}", f.frame_id, f.stamp.ns, f.status);
+    if (const auto pose = pose_of(f, kind)) {
+      const auto& t = pose->pose.translation();
+      const auto& q = pose->pose.rotation();
+      text += fmt::format(",{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f}", t.x(), t.y(), t.z(), q.x(), q.y(),
+                          q.z(), q.w());
+      for (int i = 0; i < 6; ++i) text += fmt::format(",{:.6g}", std::sqrt(std::max(0.0, pose->covariance(i, i))));
+    } else {
+      text += std::string(kPoseColumns, ',');
+    }
     text += fmt::format(",{},{},{:.4f}\n", f.motion.matches, f.motion.inliers, f.motion.rms_px);
   }
   return text;
 }
 
-Result<std::string> trajectory_text(const RunFolder& folder, ExportFormat format,
+Result<std::string> trajectory_text(const RunFolder& folder, ExportFormat format, TrajectoryKind kind,
                                     const std::vector<FrameRecord>& frames) {
   switch (format) {
     case ExportFormat::tum:
-      return to_tum(measured_trajectory(frames));
+      return to_tum(trajectory_of(frames, kind));
     case ExportFormat::euroc:
-      return to_euroc(measured_trajectory(frames));
+      return to_euroc(trajectory_of(frames, kind));
     case ExportFormat::kitti:
-      return kitti_text(folder, frames);
+      return kitti_text(folder, frames, kind);
     case ExportFormat::csv:
-      return csv_text(frames);
+      return csv_text(frames, kind);
+    case ExportFormat::geotiff:
     case ExportFormat::ply:
       break;
   }
   return failure(ErrorCode::internal, "is not a format for trajectories", folder.path);
+}
+
+Status export_map(const std::string& run_folder, const Workers& workers, const std::string& path) {
+  auto saved = SavedMap::open(run_folder);
+  if (!saved) return failure(saved);
+  const auto view = saved->map().view(saved->map().extent());
+  if (!view) return failure(view);
+  return write_map_geotiff(*view, saved->options().mapping.map, workers, path);
 }
 
 }  // namespace
@@ -79,7 +93,9 @@ Result<ExportFormat> parse_export_format(std::string_view name) {
   return failure(ErrorCode::usage, fmt::format("'{}' is not a format; known: {}", name, known), "--format");
 }
 
-Status export_run(const std::string& run_folder, ExportFormat format, const std::string& path) {
+Status export_run(const std::string& run_folder, ExportFormat format, TrajectoryKind kind, const Workers& workers,
+                  const std::string& path) {
+  if (format == ExportFormat::geotiff) return export_map(run_folder, workers, path);
   const RunFolder folder{run_folder};
   auto store = RunStore::open_read_only(folder.store());
   if (!store) return failure(store);
@@ -91,7 +107,7 @@ Status export_run(const std::string& run_folder, ExportFormat format, const std:
   const auto frames = store->frames();
   if (!frames) return failure(frames);
   if (frames->empty()) return failure(ErrorCode::input, "holds no frames", folder.store());
-  const auto text = trajectory_text(folder, format, *frames);
+  const auto text = trajectory_text(folder, format, kind, *frames);
   if (!text) return failure(text);
   return write_file_atomically(path, *text);
 }

@@ -52,12 +52,17 @@ Status write_local_map(const LocalMap& map, const std::string& path) {
   return write_png(path + ".png", draw_map(map.elevation_m, map.kind, map.place.cell_m));
 }
 
+Status write_map_geotiff(const MapView& view, const MapOptions& options, const Workers& workers,
+                         const std::string& path) {
+  const TerrainShape shape = view.shape(options, workers);
+  return write_geotiff(path, view.place(), view.bands(shape));
+}
+
 Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers& workers, const std::string& path) {
   if (map.empty()) return {};
   const auto view = map.view(map.extent());
   if (!view) return failure(view);
-  const TerrainShape shape = view->shape(options, workers);
-  if (Status s = write_geotiff(path + ".tif", view->place(), view->bands(shape)); !s) return s;
+  if (Status s = write_map_geotiff(*view, options, workers, path + ".tif"); !s) return s;
   return write_png(path + ".png", draw_map(view->elevation_m, view->kind, view->cell_m));
 }
 

@@ -16,6 +16,10 @@ Status write_local_map(const LocalMap& map, const std::string& path);
 /// The same of everything that the global map knows; nothing where it is empty. Codes: those of its store, `output`.
 Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers& workers, const std::string& path);
 
+/// A part of the global map as a GeoTIFF of all layers. Code `output`.
+Status write_map_geotiff(const MapView& view, const MapOptions& options, const Workers& workers,
+                         const std::string& path);
+
 /// All of a position's 3D reconstruction, into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
 /// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; of each view
 /// <pair>_<stamp_ns>_classes.png and _v_disparity.png where ground was found. Code `output`.

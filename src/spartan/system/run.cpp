@@ -286,12 +286,10 @@ Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, 
 Result<RunOutcome> write_results(Drive& drive, const RunRequest& request, const RunFolder& folder, RunFacts facts) {
   const auto frames = drive.store().frames();
   if (!frames) return failure(frames);
-  if (Status s = write_file_atomically(folder.odometry_trajectory(), to_tum(measured_trajectory(*frames))); !s)
-    return failure(s);
-  if (Status s = write_file_atomically(folder.slam_trajectory(), to_tum(slam_trajectory(*frames))); !s)
-    return failure(s);
-  if (Status s = write_file_atomically(folder.localization_trajectory(), to_tum(localized_trajectory(*frames))); !s)
-    return failure(s);
+  for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
+    if (Status s = write_file_atomically(folder.trajectory(kind), to_tum(trajectory_of(*frames, kind))); !s)
+      return failure(s);
+  }
   if (Status s = write_global_map(drive.global_map(), request.options.mapping.map, Workers(request.threads),
                                   folder.global_map());
       !s)
@@ -320,6 +318,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
   RunOptions options = request.options;
   if (options.gravity_m_s2 == 0) options.gravity_m_s2 = info.gravity_m_s2.value_or(0);
+  if (options.imu_as_stated) options.localization.imu = with_stated(options.localization.imu, info.imu_noise);
   auto pipeline = Pipeline::create(info.rig, options, Workers(request.threads), mask_folder);
   if (!pipeline) return failure(pipeline);
   const auto prepared = prepare_run_folder(folder, request.resume);

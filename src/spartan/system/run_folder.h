@@ -5,6 +5,7 @@
 
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
+#include "spartan/system/run_trajectory.h"
 
 namespace spartan {
 
@@ -20,9 +21,10 @@ struct RunFolder {
   std::string local_map(Stamp stamp) const { return maps() + "/local_" + std::to_string(stamp.ns); }
   /// Without ending.
   std::string global_map() const { return maps() + "/global"; }
-  std::string odometry_trajectory() const { return path + "/trajectory_odometry.tum"; }
-  std::string slam_trajectory() const { return path + "/trajectory_slam.tum"; }
-  std::string localization_trajectory() const { return path + "/trajectory_localization.tum"; }
+  std::string trajectory(TrajectoryKind kind) const {
+    return path + "/trajectory_" + std::string(name_of(kind)) + ".tum";
+  }
+  std::string report() const { return path + "/report"; }
   std::string summary() const { return path + "/summary.json"; }
   std::string log() const { return path + "/log.txt"; }
 };

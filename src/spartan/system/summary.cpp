@@ -5,6 +5,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "spartan/core/trajectory.h"
+#include "spartan/system/run_trajectory.h"
+
 namespace spartan {
 namespace {
 
@@ -68,30 +71,6 @@ std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames) {
   return spans;
 }
 
-Trajectory measured_trajectory(const std::vector<FrameRecord>& frames) {
-  Trajectory trajectory;
-  for (const FrameRecord& frame : frames) {
-    if (frame.has_pose) trajectory.push_back({frame.stamp, frame.world_from_body.pose});
-  }
-  return trajectory;
-}
-
-Trajectory slam_trajectory(const std::vector<FrameRecord>& frames) {
-  Trajectory trajectory;
-  for (const FrameRecord& frame : frames) {
-    if (frame.has_pose && frame.slam) trajectory.push_back({frame.stamp, frame.slam->pose});
-  }
-  return trajectory;
-}
-
-Trajectory localized_trajectory(const std::vector<FrameRecord>& frames) {
-  Trajectory trajectory;
-  for (const FrameRecord& frame : frames) {
-    if (frame.localization) trajectory.push_back({frame.stamp, frame.localization->world_from_body.pose});
-  }
-  return trajectory;
-}
-
 std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord>& frames) {
   std::map<std::string, int> skipped;
   std::map<std::string, int> health{{"tracking", 0}, {"degraded", 0}, {"lost", 0}, {"standing", 0}};
@@ -131,7 +110,7 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"frames", processed},
       {"skipped", skipped},
       {"predicted_frames", predicted},
-      {"distance_m", path_length(measured_trajectory(frames))},
+      {"distance_m", path_length(trajectory_of(frames, TrajectoryKind::odometry))},
       {"wall_seconds", facts.wall_seconds},
       {"cpu_seconds", facts.cpu_seconds},
       {"peak_memory_bytes", facts.peak_memory_bytes},

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/trajectory.h"
+#include "spartan/core/time.h"
 #include "spartan/system/run_store.h"
 
 namespace spartan {
@@ -32,15 +32,6 @@ struct LostSpan {
 
 /// Spans between the last pose before and the first pose after each loss (or the end of the drive).
 std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames);
-
-/// Poses that were measured, in the order of time.
-Trajectory measured_trajectory(const std::vector<FrameRecord>& frames);
-
-/// Odometry with the latest correction by the map, in the order of time.
-Trajectory slam_trajectory(const std::vector<FrameRecord>& frames);
-
-/// Where all sensors put the rover, in the order of time.
-Trajectory localized_trajectory(const std::vector<FrameRecord>& frames);
 
 /// The text of summary.json.
 std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord>& frames);

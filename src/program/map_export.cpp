@@ -1,0 +1,89 @@
+// spartan map export: a global map for other programs.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "program/map.h"
+#include "spartan/core/image_io.h"
+#include "spartan/reconstruction/map_pictures.h"
+#include "spartan/reconstruction/point_cloud.h"
+#include "spartan/system/map_files.h"
+#include "spartan/system/saved_map.h"
+
+namespace spartan::program {
+namespace {
+
+struct ExportArguments {
+  std::string map, output;
+  std::vector<double> window_m;  // west, south, east, north
+};
+
+Result<LatticeWindow> window_of(const ExportArguments& a, const GlobalMap& map) {
+  if (a.window_m.empty()) return map.extent();
+  const double west = a.window_m[0], south = a.window_m[1], east = a.window_m[2], north = a.window_m[3];
+  if (!(east > west) || !(north > south)) {
+    return failure(ErrorCode::usage, "has no area", "--window", "give west,south,east,north in metres of the world");
+  }
+  const double cell = map.cell_m();
+  const int left = static_cast<int>(std::floor(west / cell)), top = static_cast<int>(std::ceil(north / cell));
+  return LatticeWindow{left, top, static_cast<int>(std::ceil(east / cell)) - left,
+                       top - static_cast<int>(std::floor(south / cell))};
+}
+
+// The middles of the cells, in the colours of the picture.
+PointCloud cloud_of(const MapView& view) {
+  const Image<Rgb8> colours = draw_map(view.elevation_m, view.kind, view.cell_m, 1);
+  PointCloud cloud;
+  for (int r = 0; r < view.window.height; ++r) {
+    for (int c = 0; c < view.window.width; ++c) {
+      if (!(view.count(c, r) > 0)) continue;
+      const Eigen::Vector2f at = middle_of(view.place(), c, r).cast<float>();
+      cloud.push_back({{at.x(), at.y(), view.elevation_m(c, r)}, colours(c, r)});
+    }
+  }
+  return cloud;
+}
+
+Status write(SavedMap& saved, const ExportArguments& a, const Workers& workers) {
+  const std::string ending = std::filesystem::path(a.output).extension().string();
+  if (ending == ".map") {
+    if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map is whole", "--window");
+    return MapFile::save(saved.map(), a.output);
+  }
+  const auto window = window_of(a, saved.map());
+  if (!window) return failure(window);
+  const auto view = saved.map().view(*window);
+  if (!view) return failure(view);
+  if (ending == ".tif") return write_map_geotiff(*view, saved.options().mapping.map, workers, a.output);
+  if (ending == ".png") return write_png(a.output, draw_map(view->elevation_m, view->kind, view->cell_m));
+  if (ending == ".ply") return write_ply(a.output, cloud_of(*view));
+  return failure(ErrorCode::usage, "has no known ending", a.output, "known are .tif, .png, .ply and .map");
+}
+
+Result<ExitCode> export_map(const Context& context, const ExportArguments& a) {
+  auto saved = SavedMap::open(a.map);
+  if (!saved) return failure(saved);
+  if (Status s = write(*saved, a, Workers(context.threads)); !s) return failure(s);
+  return kDone;
+}
+
+}  // namespace
+
+void add_map_export(CLI::App& map, Context& context) {
+  auto a = std::make_shared<ExportArguments>();
+  CLI::App* verb = add_verb(map, context, "export", "A global map for other programs", "map export my_run -o site.tif",
+                            [&context, a] { return export_map(context, *a); });
+  verb->add_option("map", a->map, "a map file, or a run folder")->required();
+  verb->add_option("-o,--output", a->output,
+                   "by its ending: .tif (all layers), .png (a picture), .ply (the cells as points), .map (a map file)")
+      ->required();
+  verb->add_option("--window", a->window_m, "only this part: west,south,east,north in metres of the world")
+      ->delimiter(',')
+      ->expected(4);
+  add_threads_option(*verb, context);
+}
+
+}  // namespace spartan::program

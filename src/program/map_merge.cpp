@@ -1,0 +1,113 @@
+// spartan map merge: two global maps of one world become one.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "program/json.h"
+#include "program/map.h"
+#include "spartan/system/saved_map.h"
+
+namespace spartan::program {
+namespace {
+
+/// Apart by more than this many standard deviations in the middle: the maps do not share a world.
+constexpr double kSuspiciousSigmas = 3;
+constexpr double kSuspicious_m = 0.03;
+
+struct Agreement {
+  int cells = 0;  // that both know
+  double median_m = 0, spread_m = 0, sigma_m = 0;
+
+  bool suspicious() const {
+    return cells > 0 && std::abs(median_m) > std::max(kSuspicious_m, kSuspiciousSigmas * sigma_m);
+  }
+};
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Elevations of b over those of a.
+Result<Agreement> compare(GlobalMap& a, GlobalMap& b) {
+  const LatticeWindow window = a.extent();
+  const auto one = a.view(window), other = b.view(window);
+  if (!one) return failure(one);
+  if (!other) return failure(other);
+  std::vector<double> off, sigmas;
+  for (int r = 0; r < window.height; ++r) {
+    for (int c = 0; c < window.width; ++c) {
+      if (!(one->count(c, r) > 0) || !(other->count(c, r) > 0)) continue;
+      off.push_back(static_cast<double>(other->elevation_m(c, r)) - one->elevation_m(c, r));
+      sigmas.push_back(std::sqrt(static_cast<double>(one->variance_m2(c, r) + other->variance_m2(c, r))));
+    }
+  }
+  Agreement agreement;
+  if (off.empty()) return agreement;
+  agreement.cells = static_cast<int>(off.size());
+  agreement.median_m = median(off);
+  for (double& d : off) d = std::abs(d - agreement.median_m);
+  agreement.spread_m = 1.4826 * median(off);
+  agreement.sigma_m = median(sigmas);
+  return agreement;
+}
+
+struct MergeArguments {
+  std::string a, b, output;
+};
+
+Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) {
+  auto a = SavedMap::open(arguments.a);
+  if (!a) return failure(a);
+  auto b = SavedMap::open(arguments.b);
+  if (!b) return failure(b);
+  if (a->map().cell_m() != b->map().cell_m()) {
+    return failure(ErrorCode::configuration,
+                   fmt::format("has cells of {} m, {} has {} m", b->map().cell_m(), arguments.a, a->map().cell_m()),
+                   arguments.b, "maps of one cell size can be merged");
+  }
+  const auto agreement = compare(a->map(), b->map());
+  if (!agreement) return failure(agreement);
+  GlobalMap both(a->options().slam.map, a->map().cell_m());
+  for (GlobalMap* map : {&a->map(), &b->map()}) {
+    if (Status s = both.merge(*map); !s) return failure(s);
+  }
+  if (Status s = MapFile::save(both, arguments.output); !s) return failure(s);
+  if (agreement->suspicious()) {
+    context.log.warning(fmt::format("{} lies {:.0f} mm over {}: do they share a world?", arguments.b,
+                                    1e3 * agreement->median_m, arguments.a));
+  }
+  const Json json{{"schema", 1},
+                  {"stops", both.stops().size()},
+                  {"submaps", both.submaps().size()},
+                  {"tiles", both.tiles()},
+                  {"both_know_cells", agreement->cells},
+                  {"apart_m", {{"median", agreement->median_m}, {"spread", agreement->spread_m}}}};
+  const std::string text = fmt::format(
+      "{} stops, {} submaps, {} tiles in {}\n{} cells are known to both; there the second lies {:.1f} mm over the "
+      "first (spread {:.1f} mm)\n",
+      both.stops().size(), both.submaps().size(), both.tiles(), arguments.output, agreement->cells,
+      1e3 * agreement->median_m, 1e3 * agreement->spread_m);
+  if (Status s = print(context.json ? json.dump(2) + "\n" : text); !s) return failure(s);
+  return kDone;
+}
+
+}  // namespace
+
+void add_map_merge(CLI::App& map, Context& context) {
+  auto a = std::make_shared<MergeArguments>();
+  CLI::App* verb =
+      add_verb(map, context, "merge", "Two global maps of one world as one",
+               "map merge run_monday run_tuesday -o site.map", [&context, a] { return merge(context, *a); });
+  verb->add_option("a", a->a, "a map file, or a run folder")->required();
+  verb->add_option("b", a->b, "another, in the same world")->required();
+  verb->add_option("-o,--output", a->output, "the map file to write")->required();
+  add_json_flag(*verb, context);
+}
+
+}  // namespace spartan::program

@@ -1,0 +1,39 @@
+#include "spartan/system/saved_map.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "spartan/system/run_folder.h"
+
+namespace spartan {
+
+Result<SavedMap> SavedMap::open_run(const std::string& path) {
+  const RunFolder folder{path};
+  auto store = RunStore::open_read_only(folder.store());
+  if (!store) return failure(store);
+  auto options = load_options<RunOptions>(folder.config());
+  if (!options) return failure(options);
+  SavedMap saved(std::move(*options));
+  saved.run_ = std::make_unique<RunStore>(std::move(*store));
+  auto map = GlobalMap::from_store(saved.options_.slam.map, saved.options_.mapping.map.cell_m, saved.run_->tiles());
+  if (!map) return failure(map);
+  saved.of_run_ = std::make_unique<GlobalMap>(std::move(*map));
+  return saved;
+}
+
+Result<SavedMap> SavedMap::open(const std::string& path) {
+  const bool run = std::filesystem::is_directory(path);
+  auto saved = run ? open_run(path) : Result<SavedMap>(SavedMap(RunOptions()));
+  if (!saved) return failure(saved);
+  if (!run) {
+    auto file = MapFile::open(path, saved->options_.slam.map, Database::Mode::read_only);
+    if (!file) return failure(file);
+    saved->file_ = std::make_unique<MapFile>(std::move(*file));
+  }
+  if (saved->map().empty()) {
+    return failure(ErrorCode::input, "holds no map", path, "maps are made where the rover stops and looks around");
+  }
+  return saved;
+}
+
+}  // namespace spartan
