@@ -45,7 +45,12 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   if (!outcome) return failure(outcome);
   if (outcome->interrupted) return failure(ErrorCode::interrupted, "stopped on request", folder);
 
-  const auto report = make_report(recording, run_folder, context.threads);
+  ReportRequest about;
+  about.run = run_folder;
+  about.recording = about.truth = recording;
+  about.whole_truth = true;
+  about.threads = context.threads;
+  const auto report = make_report(about);
   if (!report) return failure(report);
   const std::string page = folder + "/report.html";
   if (Status s = write_file_atomically(page, *report); !s) return failure(s);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <vector>
 
 #include "program/compared_trajectories.h"
@@ -14,6 +15,7 @@
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
 #include "spartan/core/geotiff.h"
+#include "spartan/core/trajectory.h"
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/eval/trajectory_metrics.h"
@@ -21,6 +23,7 @@
 #include "spartan/reconstruction/disparity_colour.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
+#include "spartan/system/run_folder.h"
 
 namespace spartan::program {
 namespace {
@@ -161,52 +164,74 @@ std::string figure(const std::string& value, const std::string& what) {
   return "<div><b>" + html_text(value) + "</b>" + html_text(what) + "</div>";
 }
 
-}  // namespace
-
-Result<std::string> make_report(const std::string& recording, const std::string& run, int threads) {
-  const auto summary_text = read_file(run + "/summary.json");
-  if (!summary_text) return failure(summary_text);
-  const Json summary = Json::parse(*summary_text);
-  const auto compared = find_trajectories(run, recording, "");
-  if (!compared) return failure(compared);
-  const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
-  if (!metrics) return failure(metrics);
-  const auto source = open_recording(recording);
-  if (!source) return failure(source);
-  auto imager = Imager::create((*source)->info().rig, ImagingOptions(), Workers(threads));
-  if (!imager) return failure(imager);
-  const auto pictures = drive_pictures(**source, *imager);
-  if (!pictures) return failure(pictures);
-
-  std::string body = "<h1>Spartan: a drive over Mars</h1>\n<p>" + html_text((*source)->info().description) +
-                     "</p>\n<div class=\"figures\">";
-  body += figure(fmt::format("{:.2f} m", summary["distance_m"].get<double>()), "driven");
-  body += figure(fmt::format("{:.1f} mm", 1000 * metrics->ate_m.rmse), "position error, RMS");
-  if (metrics->drift_percent) body += figure(fmt::format("{:.2f} %", *metrics->drift_percent), "drift of the distance");
-  body += figure(
+Result<std::string> figures_of(const Json& summary, const ReportRequest& request) {
+  std::string html = "<div class=\"figures\">";
+  html += figure(fmt::format("{:.2f} m", summary["distance_m"].get<double>()), "driven");
+  if (!request.truth.empty()) {
+    const auto compared = find_trajectories(request.run, request.truth, "");
+    if (!compared) return failure(compared);
+    const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
+    if (!metrics) return failure(metrics);
+    html += figure(fmt::format("{:.1f} mm", 1000 * metrics->ate_m.rmse), "position error, RMS");
+    if (metrics->drift_percent)
+      html += figure(fmt::format("{:.2f} %", *metrics->drift_percent), "drift of the distance");
+  }
+  html += figure(
       fmt::format("{} of {}", summary["health"]["odometry"]["tracking"].get<int>(), summary["frames"].get<int>()),
       "frames tracked");
-  body += figure(fmt::format("{:.1f} s", summary["wall_seconds"].get<double>()), "for the whole run");
-  body += "</div>\n";
-  body += section("What the rover saw", *pictures);
-  const auto plots = trajectory_plots(recording, run);
-  if (!plots) return failure(plots);
-  body += section("Where it went", *plots + sensor_table(summary));
-  const auto maps = map_pictures(run);
-  if (!maps) return failure(maps);
-  if (!maps->empty()) body += section("Maps of where it stood", *maps);
+  html += figure(fmt::format("{:.1f} s", summary["wall_seconds"].get<double>()), "for the whole run");
+  return html + "</div>\n";
+}
+
+Result<std::string> whole_truth(FrameSource& source, Imager& imager, const ReportRequest& request) {
   std::string stereo;
-  for (const StereoPair& pair : (*source)->info().rig.pairs) {
-    const auto html = stereo_of(**source, *imager, pair, recording, threads);
+  for (const StereoPair& pair : source.info().rig.pairs) {
+    const auto html = stereo_of(source, imager, pair, request.recording, request.threads);
     if (!html) return failure(html);
     stereo += *html;
   }
-  body += section("What the ground looks like to it", stereo);
-  body += section("The ground as it is", elevation_of(recording, compared->truth));
+  const auto truth = load_trajectory(source.info().truth_file);
+  if (!truth) return failure(truth);
+  return section("What the ground looks like to it", stereo) +
+         section("The ground as it is", elevation_of(request.recording, truth->poses));
+}
+
+}  // namespace
+
+Result<std::string> make_report(const ReportRequest& request) {
+  const auto summary_text = read_file(RunFolder{request.run}.summary());
+  if (!summary_text) return failure(summary_text);
+  const Json summary = Json::parse(*summary_text);
+  const auto source = open_recording(request.recording, request.open);
+  if (!source) return failure(source);
+  const RecordingInfo& info = (*source)->info();
+  const std::string masks = std::filesystem::path(info.rig_source).parent_path().string();
+  auto imager = Imager::create(info.rig, ImagingOptions(), Workers(request.threads), masks);
+  if (!imager) return failure(imager);
+
+  std::string body =
+      "<h1>" + html_text("Spartan: " + info.name) + "</h1>\n<p>" + html_text(info.description) + "</p>\n";
+  const auto figures = figures_of(summary, request);
+  if (!figures) return failure(figures);
+  body += *figures;
+  const auto pictures = drive_pictures(**source, *imager);
+  if (!pictures) return failure(pictures);
+  body += section("What the rover saw", *pictures);
+  const auto plots = trajectory_plots(request.run, request.truth);
+  if (!plots) return failure(plots);
+  body += section("Where it went", *plots + sensor_table(summary));
+  const auto maps = map_pictures(request.run);
+  if (!maps) return failure(maps);
+  if (!maps->empty()) body += section("Maps of where it stood", *maps);
+  if (request.whole_truth) {
+    const auto truth = whole_truth(**source, *imager, request);
+    if (!truth) return failure(truth);
+    body += *truth;
+  }
   body += section("Time", stage_table(summary) + fmt::format("<p>Peak memory {:.0f} MB, {} threads.</p>\n",
                                                              summary["peak_memory_bytes"].get<double>() / 1e6,
                                                              summary["threads"].get<int>()));
-  return html_page("Spartan: a drive over Mars", body);
+  return html_page("Spartan: " + info.name, body);
 }
 
 }  // namespace spartan::program

@@ -1,13 +1,23 @@
-// The report page of a simulated drive: what was seen, where the rover went, how right it was.
+// The report page of a run: what was seen, where the rover went, what it found, how right it was.
 #pragma once
 
 #include <string>
 
+#include "spartan/camera/frame_source.h"
 #include "spartan/core/result.h"
 
 namespace spartan::program {
 
-/// One self-contained HTML page about a run of a recording with truth.
-Result<std::string> make_report(const std::string& recording, const std::string& run, int threads);
+struct ReportRequest {
+  std::string run;           ///< the run's folder
+  std::string recording;     ///< that it was made from
+  OpenOptions open;          ///< how that was opened
+  std::string truth;         ///< what `find_trajectories` takes for the truth; empty: none is known
+  bool whole_truth = false;  ///< besides, how right the matcher is and how the ground is, as a simulation knows them
+  int threads = 1;
+};
+
+/// One self-contained HTML page.
+Result<std::string> make_report(const ReportRequest& request);
 
 }  // namespace spartan::program

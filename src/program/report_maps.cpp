@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <vector>
 
@@ -10,11 +11,13 @@
 #include "spartan/core/image_io.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
+#include "spartan/system/saved_map.h"
 
 namespace spartan::program {
 namespace {
 
-constexpr int kMostMaps = 6;
+constexpr int kMostMaps = 6, kGlobalWidth_px = 1100;
+constexpr double kMostDecades = 4;  // of points in a cell
 
 // MatchVerdict's names, for people.
 std::string in_words(std::string verdict) {
@@ -27,6 +30,28 @@ Result<std::string> picture_of(const std::string& path, const std::string& capti
   if (!image) return failure(image);
   const int width = std::min(width_px, image->width());
   return html_picture(shrunk(image->as<Rgb8>(), width), caption, width);
+}
+
+// How often each cell of the global map was seen.
+Result<std::string> coverage_of(const std::string& run) {
+  auto saved = SavedMap::open(run);
+  if (!saved) return failure(saved);
+  const auto view = saved->map().view(saved->map().extent());
+  if (!view) return failure(view);
+  constexpr int kScale = 4;
+  Image<Rgb8> picture(view->count.width() * kScale, view->count.height() * kScale);
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      const float count = view->count(x / kScale, y / kScale);
+      picture(x, y) = count > 0 ? cold_to_hot(std::min(1.0, std::log10(static_cast<double>(count)) / kMostDecades))
+                                : Rgb8{30, 30, 34};
+    }
+  }
+  const int width = std::min(kGlobalWidth_px, picture.width());
+  return html_picture(shrunk(picture.view(), width),
+                      fmt::format("Its coverage: points in each cell, from one (blue) to {} (red)",
+                                  static_cast<int>(std::pow(10, kMostDecades))),
+                      width);
 }
 
 }  // namespace
@@ -51,11 +76,13 @@ Result<std::string> map_pictures(const std::string& run) {
     html += *picture;
   }
   if (!std::filesystem::exists(folder.global_map() + ".png")) return html;
-  const auto global =
-      picture_of(folder.global_map() + ".png",
-                 "The global map of all positions: relief, obstacles (red), cavities (blue), unknown (dark)", 1100);
+  const auto global = picture_of(
+      folder.global_map() + ".png",
+      "The global map of all positions: relief, obstacles (red), cavities (blue), unknown (dark)", kGlobalWidth_px);
   if (!global) return failure(global);
-  return html + *global;
+  const auto coverage = coverage_of(run);
+  if (!coverage) return failure(coverage);
+  return html + *global + *coverage;
 }
 
 }  // namespace spartan::program

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
+#include <iterator>
 #include <vector>
 
 #include "program/compared_trajectories.h"
@@ -26,9 +26,11 @@ constexpr std::array<Kind, 3> kKinds{{{TrajectoryKind::odometry, "#1f5fa8", "#a9
                                       {TrajectoryKind::localization, "#2c8a4a", "#aed6b9"}}};
 
 const StampedPose& nearest(const Trajectory& truth, Stamp stamp) {
-  return *std::min_element(truth.begin(), truth.end(), [&](const StampedPose& a, const StampedPose& b) {
-    return std::abs(a.stamp.ns - stamp.ns) < std::abs(b.stamp.ns - stamp.ns);
-  });
+  const auto after =
+      std::lower_bound(truth.begin(), truth.end(), stamp, [](const StampedPose& p, Stamp s) { return p.stamp < s; });
+  if (after == truth.begin()) return truth.front();
+  const auto before = std::prev(after);
+  return after == truth.end() || stamp.ns - before->stamp.ns <= after->stamp.ns - stamp.ns ? *before : *after;
 }
 
 // 3σ of the position, in the direction in which it is known worst.
@@ -70,9 +72,18 @@ void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vec
   lines.errors.push_back(std::move(error));
 }
 
+PlotLine seen_from_above(const Trajectory& trajectory, const std::string& name, const char* colour) {
+  PlotLine line{name, colour, {}, {}};
+  for (const StampedPose& p : trajectory) {
+    line.x.push_back(p.pose.translation().x());
+    line.y.push_back(p.pose.translation().y());
+  }
+  return line;
+}
+
 }  // namespace
 
-Result<std::string> trajectory_plots(const std::string& recording, const std::string& run) {
+Result<std::string> trajectory_plots(const std::string& run, const std::string& truth) {
   const RunFolder folder{run};
   auto store = RunStore::open_read_only(folder.store());
   if (!store) return failure(store);
@@ -80,21 +91,20 @@ Result<std::string> trajectory_plots(const std::string& recording, const std::st
   if (!frames) return failure(frames);
   Lines lines;
   for (const Kind& kind : kKinds) {
-    if (!std::filesystem::exists(folder.trajectory(kind.kind))) continue;
-    const auto compared = find_trajectories(run, recording, std::string(name_of(kind.kind)));
-    if (!compared) return failure(compared);
-    if (lines.way.empty()) {
-      PlotLine truth{"truth", "#9a3b12", {}, {}};
-      for (const StampedPose& p : compared->truth) {
-        truth.x.push_back(p.pose.translation().x());
-        truth.y.push_back(p.pose.translation().y());
-      }
-      lines.way.push_back(std::move(truth));
+    if (truth.empty()) {
+      lines.way.push_back(
+          seen_from_above(trajectory_of(*frames, kind.kind), std::string(name_of(kind.kind)), kind.colour));
+      continue;
     }
+    const auto compared = find_trajectories(run, truth, std::string(name_of(kind.kind)));
+    if (!compared) return failure(compared);
+    if (lines.way.empty()) lines.way.push_back(seen_from_above(compared->truth, "truth", "#9a3b12"));
     if (!compared->estimate.empty() && !compared->truth.empty()) draw(kind, *compared, *frames, lines);
   }
-  return svg_plot(lines.way, {"x, m", "y, m", true, 560, 420}) +
-         svg_plot(lines.errors, {"driven, m", "position error, first poses aligned, mm", false, 560, 420});
+  std::string html = svg_plot(lines.way, {"x, m", "y, m", true, 560, 420});
+  if (!lines.errors.empty())
+    html += svg_plot(lines.errors, {"driven, m", "position error, first poses aligned, mm", false, 560, 420});
+  return html;
 }
 
 std::string sensor_table(const Json& summary) {

@@ -8,8 +8,8 @@
 
 namespace spartan::program {
 
-/// Plots of each trajectory of the run, aligned by its first pose.
-Result<std::string> trajectory_plots(const std::string& recording, const std::string& run);
+/// Plots of each trajectory of the run; where the truth is known (not empty) beside it, aligned by the first pose.
+Result<std::string> trajectory_plots(const std::string& run, const std::string& truth);
 
 /// In how many frames each sensor of the localization was ok, suspect, excluded, missing. `summary`: of the run.
 std::string sensor_table(const Json& summary);

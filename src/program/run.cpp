@@ -10,9 +10,11 @@
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/progress.h"
+#include "program/report.h"
 #include "program/run_arguments.h"
 #include "program/trajectory_report.h"
 #include "program/verbs.h"
+#include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
 #include "spartan/system/run_folder.h"
 
@@ -57,6 +59,27 @@ Result<std::string> score(const RunArguments& arguments, RunOutcome& outcome) {
   return table_of(*metrics, *compared);
 }
 
+// A run is done without its page: what goes wrong with it is said and no more.
+Status write_report(const RunRequest& request, const std::string& truth) {
+  ReportRequest about;
+  about.run = request.output;
+  about.recording = request.input;
+  about.open.format = request.format;
+  about.open.rig_file = request.rig_file;
+  about.truth = truth;
+  about.threads = request.threads;
+  if (truth.empty()) {
+    const auto source = open_recording(request.input, about.open);
+    if (!source) return failure(source);
+    about.truth = (*source)->info().truth_file;
+  }
+  const auto page = make_report(about);
+  if (!page) return failure(page);
+  const RunFolder folder{request.output};
+  if (Status s = make_folder(folder.report()); !s) return s;
+  return write_file_atomically(folder.report() + "/index.html", *page);
+}
+
 Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments) {
   RunRequest request;
   auto options = run_options(arguments.config, arguments.set);
@@ -91,6 +114,9 @@ Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments)
     const auto table = score(arguments, *outcome);
     if (!table) return failure(table);
     text += "\n" + *table;
+  }
+  if (!outcome->interrupted) {
+    if (Status s = write_report(request, arguments.truth); !s) context.log.warning("no report: " + s.error().message());
   }
   const Status printed = print(context.json ? outcome->summary_json : text);
   if (!printed) return failure(printed);
