@@ -73,6 +73,66 @@ TEST_F(Positions, BecomeMapsAndAllSensorsAreHeard) {
   EXPECT_EQ(map->bands.front().width(), 160);
 }
 
+TEST_F(Positions, ArePartOfTheReport) {
+  ASSERT_TRUE(finished(run("out")));
+  const std::string page = testing::content_of(path("out/report/index.html"));
+  for (const char* part : {"What the rover saw", "truth", "localization, 3σ", "inclinometer", "The global map",
+                           "Its coverage", "position error"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+}
+
+TEST_F(Positions, TheirMapIsToldMergedAndExported) {
+  ASSERT_TRUE(finished(run("out")));
+  const ProgramResult info = run_program({"map", "info", path("out"), "--json"});
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  const auto told = nlohmann::json::parse(info.out);
+  EXPECT_EQ(told["stops"].size(), 2u);
+  EXPECT_GT(told["cells"]["free"], 0);
+  const auto tif = read_geotiff(path("out/maps/global.tif"));
+  ASSERT_TRUE(tif) << tif.error().message();
+  EXPECT_EQ(told["columns"], tif->bands.front().width());
+  EXPECT_EQ(tif->names.size(), 11u) << "as a local map's";
+
+  const ProgramResult merged =
+      run_program({"map", "merge", path("out"), path("out"), "-o", path("both.map"), "--json"});
+  ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  const auto both = nlohmann::json::parse(merged.out);
+  EXPECT_EQ(both["stops"], 4);
+  EXPECT_EQ(both["apart_m"]["median"], 0);
+  EXPECT_GT(both["both_know_cells"], 0);
+  const ProgramResult again = run_program({"map", "info", path("both.map"), "--json"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(nlohmann::json::parse(again.out)["known_m2"], told["known_m2"]) << "the same ground twice";
+
+  for (const char* file : {"x.tif", "x.png", "x.ply", "x.map"})
+    EXPECT_EQ(run_program({"map", "export", path("both.map"), "-o", path(file)}).exit_code, 0) << file;
+  EXPECT_EQ(testing::content_of(path("x.map")), testing::content_of(path("both.map")));
+  ASSERT_EQ(run_program({"map", "export", path("out"), "-o", path("part.tif"), "--window", "0,-0.5,1,0.5"}).exit_code,
+            0);
+  EXPECT_EQ(read_geotiff(path("part.tif"))->bands.front().width(), 20);
+  ASSERT_EQ(run_program({"export", path("out"), "--format", "geotiff", "-o", path("run.tif")}).exit_code, 0);
+  EXPECT_EQ(testing::content_of(path("run.tif")), testing::content_of(path("out/maps/global.tif")));
+
+  EXPECT_EQ(run_program({"map", "info", path("nowhere")}).exit_code, 3);
+  EXPECT_EQ(run_program({"map", "info", path("x.png")}).exit_code, 3);
+  EXPECT_EQ(run_program({"map", "export", path("out"), "-o", path("x.xyz")}).exit_code, 2);
+  EXPECT_EQ(run_program({"map", "export", path("out"), "-o", path("x.tif"), "--window", "1,0,0,1"}).exit_code, 2);
+  EXPECT_EQ(run_program({"map", "export", path("out"), "-o", path("no/x.tif")}).exit_code, 5);
+  EXPECT_EQ(run_program({"map", "merge", path("out"), path("out"), "-o", path("no/x.map")}).exit_code, 5);
+}
+
+TEST_F(Positions, EachTrajectoryIsExported) {
+  ASSERT_TRUE(finished(run("out")));
+  for (const std::string kind : {"odometry", "slam", "localization"}) {
+    ASSERT_EQ(run_program({"export", path("out"), "--format", "tum", "--trajectory", kind, "-o", path(kind)}).exit_code,
+              0);
+    EXPECT_EQ(testing::content_of(path(kind)), testing::content_of(path("out/trajectory_" + kind + ".tum")));
+  }
+  EXPECT_NE(testing::content_of(path("odometry")), testing::content_of(path("localization")));
+  ASSERT_EQ(run_program({"export", path("out"), "--format", "tum", "-o", path("best")}).exit_code, 0);
+  EXPECT_EQ(testing::content_of(path("best")), testing::content_of(path("localization")));
+}
+
 // The first stop's narrow shot is the last thing that was committed.
 TEST_F(Positions, AreMappedThoughTheRunStoppedInTheMiddleOfThem) {
   ASSERT_TRUE(finished(run("whole")));

@@ -263,6 +263,29 @@ TEST_F(EurocLayout, TheUnitsAxesAreTurnedIntoTheBody) {
   EXPECT_LE((imu[0].accel_m_s2 - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
 }
 
+TEST_F(EurocLayout, TheUnitsNoiseIsWhatItsFileStates) {
+  folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n");
+  EXPECT_EQ(open()->info().imu_noise.gyro_noise_rad_s_sqrt_hz, 0) << "no sensor.yaml: not stated";
+  const std::string densities =
+      "%YAML:1.0\ngyroscope_noise_density: 1.7e-4\ngyroscope_random_walk: 1.9e-5\n"
+      "accelerometer_noise_density: 2.0e-3\n";
+  folder_.write("mav0/imu0/sensor.yaml", densities);
+  const ImuNoise noise = open()->info().imu_noise;
+  EXPECT_EQ(noise.gyro_noise_rad_s_sqrt_hz, 1.7e-4);
+  EXPECT_EQ(noise.gyro_walk_rad_s2_sqrt_hz, 1.9e-5);
+  EXPECT_EQ(noise.accel_noise_m_s2_sqrt_hz, 2e-3);
+  EXPECT_EQ(noise.accel_walk_m_s3_sqrt_hz, 0) << "not stated";
+  const auto complaint = [&](const std::string& text) {
+    folder_.write("mav0/imu0/sensor.yaml", text);
+    const auto refused = open_recording(folder_.path());
+    EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+    return refused.error().message();
+  };
+  EXPECT_THAT(complaint(densities + "accelerometer_random_walk: -1\n"),
+              HasSubstr("imu0/sensor.yaml: accelerometer_random_walk is -1"));
+  EXPECT_THAT(complaint("gyroscope_noise_density: small\n"), HasSubstr("imu0/sensor.yaml: not valid YAML"));
+}
+
 TEST_F(EurocLayout, FaultsNameFileAndLine) {
   folder_.write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1000000,1000000.png\nsoon,2000000.png\n");
   EXPECT_THAT(refusal(), HasSubstr("cam1/data.csv:3: the first column is not a time in nanoseconds"));

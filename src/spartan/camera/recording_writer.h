@@ -17,7 +17,7 @@ struct RecordingOptions {
   std::string name;
   std::string description;
   double gravity_m_s2 = 9.81;
-  ImuNoise imu_noise;  ///< as it is believed
+  ImuNoise imu_noise = {};  ///< as it is believed
 };
 
 /// Makes the folder, then takes samples in any order of kinds, each kind (and the shots of each pair) with stamps that

@@ -31,14 +31,6 @@ bool same_place(const Pose& best, const Pose& other, const MatchEvidence& eviden
   return evidence.determined == 6 && tangent.dot(evidence.information * tangent) < kSameSquare;
 }
 
-int known_cells(const Image<float>& elevation) {
-  int known = 0;
-  for (int y = 0; y < elevation.height(); ++y) {
-    for (int x = 0; x < elevation.width(); ++x) known += std::isfinite(elevation(x, y)) ? 1 : 0;
-  }
-  return known;
-}
-
 // Outside of what was searched, with one step's grace.
 bool outside(const Pose& from, const Pose& to, const SearchWindow& window, const MatchOptions& options) {
   const Eigen::Vector3d moved = to.translation() - from.translation(),
@@ -118,7 +110,7 @@ MapMatch match_map(std::span<const SurfacePoint> points, const LocalMap& local, 
   result.world_from_body = best.match.world_from_body;
   result.cells = evidence.cells;
   result.blocks = evidence.blocks;
-  result.overlap = static_cast<double>(evidence.cells) / std::max(known_cells(ours.elevation_m), 1);
+  result.overlap = static_cast<double>(evidence.cells) / std::max(best.match.known_cells, 1);
   result.misfit = evidence.misfit;
   result.determined = evidence.determined;
   result.sigma_m = evidence.sigma_m;

@@ -66,6 +66,14 @@ TEST(MapMatcher, DecidesOnRockyGround) {
   EXPECT_LT(error.dot(m.information * error), 22.5) << "within its own uncertainty";
 }
 
+TEST(MapMatcher, TheSameGroundOverlapsWhollyAndNoMore) {
+  const Ground ground = rocky_ground();
+  const Pose pose = standing(ground, 0, 0, 0);
+  const MapMatch m = match(scene(ground, ground, pose, pose), offset(0.05, 0, 0, 0, 0, 0));
+  EXPECT_GT(m.overlap, 0.9);
+  EXPECT_LE(m.overlap, 1);
+}
+
 TEST(MapMatcher, IsTheSameForAnyNumberOfThreads) {
   const Scene s = scene(rocky_ground());
   const Vector6d off = offset(0.1, 0.1, 0, 0, 0, 0.03);

@@ -56,6 +56,7 @@ struct RefinedMatch {
   int iterations = 0;
   double misfit = 1;
   std::vector<MatchedCell> cells;  ///< at that pose, about the body there
+  int known_cells = 0;             ///< of the local map there, whether the global one knows them or not
 };
 
 /// Gauss-Newton; the points are thrown into the global map's cells anew at every step, so that the same ground is
