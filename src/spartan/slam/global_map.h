@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <vector>
@@ -54,7 +55,9 @@ class GlobalMap {
   /// Appends another map's submaps and stops. Where they overlap, views fuse them.
   Status merge(GlobalMap& other);
 
+  /// Codes: the store's; `usage` for more cells than kMostCells, which would take a gigabyte and more.
   Result<MapView> view(const LatticeWindow& window);
+  static constexpr std::int64_t kMostCells = 8'000'000;
   /// Everything that was seen; empty where nothing was.
   LatticeWindow extent() const;
   /// Bilinear between the middles of the cells around; none where one of those is unknown.

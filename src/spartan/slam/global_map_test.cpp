@@ -100,6 +100,12 @@ TEST(GlobalMap, IsAsHardToDriveOverAsTheLocalMapSays) {
   EXPECT_GT(close, 0.95 * known) << "the ground under the stones is fitted anew";
 }
 
+TEST(GlobalMap, MoreThanCanBeShownIsRefused) {
+  GlobalMap map({}, 0.05);
+  EXPECT_EQ(map.view({0, 0, 2000, 4001}).error().code, ErrorCode::usage);
+  EXPECT_TRUE(map.view({0, 0, 2000, 1}));
+}
+
 TEST(GlobalMap, ElevationBetweenCellsIsBilinear) {
   const Ground plane = [](double x, double y) { return 0.1 * x - 0.2 * y; };
   GlobalMap map({}, 0.05);

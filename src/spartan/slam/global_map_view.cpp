@@ -1,4 +1,6 @@
 // What the global map shows: windows drawn from its submaps, its extent, samples.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -93,6 +95,11 @@ Status GlobalMap::draw_moved(const Submap& submap, MapView& view, std::vector<Ma
 }
 
 Result<MapView> GlobalMap::view(const LatticeWindow& window) {
+  if (window.cells() > kMostCells) {
+    return failure(ErrorCode::usage,
+                   fmt::format("the map is {} x {} cells, more than can be shown at once", window.width, window.height),
+                   "", "`spartan map export --window` takes a part of it");
+  }
   MapView view;
   view.window = window;
   view.cell_m = cell_m_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "spartan/core/geotiff.h"
 #include "spartan/core/image.h"
@@ -15,6 +16,7 @@ struct LatticeWindow {
   int width = 0, height = 0;
 
   ImageSize size() const { return {width, height}; }
+  std::int64_t cells() const { return std::int64_t{width} * height; }
   MapPlace place(double cell_m) const { return {west * cell_m, north * cell_m, cell_m}; }
   friend bool operator==(const LatticeWindow&, const LatticeWindow&) = default;
 };

@@ -13,7 +13,7 @@ namespace spartan {
 /// `path` without ending: .tif (bands of docs/formats.md) and .png (relief with classes). Code `output`.
 Status write_local_map(const LocalMap& map, const std::string& path);
 
-/// The same of everything that the global map knows; nothing where it is empty. Codes: those of its store, `output`.
+/// The same of everything that the global map knows; nothing where it is empty. Codes: GlobalMap::view's, `output`.
 Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers& workers, const std::string& path);
 
 /// A part of the global map as a GeoTIFF of all layers. Code `output`.

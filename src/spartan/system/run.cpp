@@ -282,18 +282,24 @@ Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, 
   return RunStore::create(folder.store(), identity);
 }
 
+Status write_map(GlobalMap& map, const RunRequest& request, const RunFolder& folder, const Log& log) {
+  if (map.extent().cells() > GlobalMap::kMostCells) {
+    log.warning("the global map is too large for one picture; `spartan map export --window` takes a part of it");
+    return {};
+  }
+  return write_global_map(map, request.options.mapping.map, Workers(request.threads), folder.global_map());
+}
+
 // Text files are made from the store alone, so a resumed run writes the same bytes.
-Result<RunOutcome> write_results(Drive& drive, const RunRequest& request, const RunFolder& folder, RunFacts facts) {
+Result<RunOutcome> write_results(Drive& drive, const RunRequest& request, const RunFolder& folder, RunFacts facts,
+                                 const Log& log) {
   const auto frames = drive.store().frames();
   if (!frames) return failure(frames);
   for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
     if (Status s = write_file_atomically(folder.trajectory(kind), to_tum(trajectory_of(*frames, kind))); !s)
       return failure(s);
   }
-  if (Status s = write_global_map(drive.global_map(), request.options.mapping.map, Workers(request.threads),
-                                  folder.global_map());
-      !s)
-    return failure(s);
+  if (Status s = write_map(drive.global_map(), request, folder, log); !s) return failure(s);
   facts.peak_memory_bytes = peak_memory_bytes();
   RunOutcome outcome;
   outcome.summary_json = to_summary_json(facts, *frames);
@@ -352,7 +358,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   facts.resumed_from_frame = drive.resumed_from_frame();
   facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   facts.cpu_seconds = cpu_seconds();
-  return write_results(drive, request, folder, facts);
+  return write_results(drive, request, folder, facts, hooks.log);
 }
 
 }  // namespace spartan

@@ -23,7 +23,7 @@ class SavedMap {
 
  private:
   explicit SavedMap(RunOptions options) : options_(std::move(options)) {}
-  static Result<SavedMap> open_run(const std::string& folder);
+  static Result<SavedMap> open_run(const std::string& path);
 
   RunOptions options_;
   std::unique_ptr<MapFile> file_;
