@@ -105,7 +105,7 @@ void ErrorStateFilter::take(const PoseConstraint& constraint) {
   const Innovation innovation = map_innovation(memory_.belief, constraint, options_.map_factor);
   if (innovation.rows() == 0) return;
   const double square = normalised_square(memory_.belief.covariance, innovation);
-  if (judge(LocalizationSensor::map, square, innovation.rows(), HealthReason::disagrees)) correct_world(innovation);
+  if (judge(LocalizationSensor::map, square, innovation.rows(), HealthReason::disagrees)) correct_by_map(innovation);
 }
 
 }  // namespace spartan

@@ -289,6 +289,15 @@ void ErrorStateFilter::correct_world(const Innovation& innovation) {
   memory_.world_from_odom = memory_.belief.state.world_from_body * before.inverse() * memory_.world_from_odom;
 }
 
+// Matches one after the other err alike (the same rocks, seen from afar first): they are no witness of a drift that
+// vision keeps.
+void ErrorStateFilter::correct_by_map(const Innovation& innovation) {
+  const Pose before = memory_.belief.state.world_from_body;
+  constexpr int kDrift = error_at::kVisionDrift, kCount = error_at::kVisionClone - error_at::kVisionDrift;
+  if (!correct_all_but(memory_.belief, innovation, kDrift, kCount)) return;
+  memory_.world_from_odom = memory_.belief.state.world_from_body * before.inverse() * memory_.world_from_odom;
+}
+
 // odom_from_body becomes what it was at the clone, moved on by the motion as it is now believed.
 void ErrorStateFilter::correct_motion(const Innovation& innovation, int clone) {
   if (!correct(memory_.belief, innovation)) return;

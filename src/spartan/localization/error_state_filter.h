@@ -78,6 +78,7 @@ class ErrorStateFilter {
 
   /// Corrections that leave odom where it is, and those that tell the motion since a clone.
   void correct_world(const Innovation& innovation);
+  void correct_by_map(const Innovation& innovation);
   void correct_motion(const Innovation& innovation, int clone);
   bool judge(LocalizationSensor sensor, double square, int rows, HealthReason why);
 

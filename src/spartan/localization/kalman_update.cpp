@@ -87,6 +87,13 @@ bool correct_only(Belief& belief, const Innovation& innovation, int index) {
   return correct_by(belief, innovation, partial);
 }
 
+bool correct_all_but(Belief& belief, const Innovation& innovation, int first, int count) {
+  std::optional<Gain> gain = kalman_gain(belief.covariance, innovation);
+  if (!gain) return false;
+  gain->middleRows(first, count).setZero();
+  return correct_by(belief, innovation, *gain);
+}
+
 void symmetrise(ErrorCovariance& covariance) {
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
 }

@@ -33,6 +33,9 @@ bool correct(Belief& belief, const Innovation& innovation);
 /// Joseph's form holds for any gain.
 bool correct_only(Belief& belief, const Innovation& innovation, int index);
 
+/// The same where the `count` errors from `first` on are the ones that are only considered.
+bool correct_all_but(Belief& belief, const Innovation& innovation, int first, int count);
+
 /// Restores symmetry after many small sums.
 void symmetrise(ErrorCovariance& covariance);
 
