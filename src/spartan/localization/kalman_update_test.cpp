@@ -101,6 +101,23 @@ TEST(KalmanUpdate, OnlyTheChosenErrorLearnsAndTheOthersAreConsidered) {
               before.covariance(error_at::kVelocity, error_at::kVelocity), 1e-9);
 }
 
+TEST(KalmanUpdate, WhatIsOnlyConsideredStaysAndTheRestLearns) {
+  Random random(4);
+  Belief belief = random_belief(random, 0.1), whole = belief;
+  const Belief before = belief;
+  Innovation i(1);
+  i.residual[0] = 0.2;
+  i.jacobian(0, error_at::kVelocity) = 2;
+  i.noise(0, 0) = 0.3;
+  ASSERT_TRUE(correct_all_but(belief, i, error_at::kVisionDrift, 12));
+  ASSERT_TRUE(correct(whole, i));
+  const ErrorVector moved = error_between(before.state, belief.state), all = error_between(before.state, whole.state);
+  EXPECT_EQ(moved.segment(error_at::kVisionDrift, 12).norm(), 0);
+  EXPECT_GT(all.segment(error_at::kVisionDrift, 12).norm(), 1e-3);
+  EXPECT_LE((moved - all).head<error_at::kVisionDrift>().norm(), 1e-12);
+  EXPECT_GE(belief.covariance.trace(), whole.covariance.trace()) << "the optimal gain leaves least";
+}
+
 TEST(KalmanUpdate, LeavesABeliefAloneThatItCannotCorrect) {
   Random random(3);
   Belief belief = random_belief(random, 0.3);
