@@ -10,6 +10,7 @@
 #include "program/compared_trajectories.h"
 #include "program/html_parts.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/rig/rig_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
 
@@ -39,12 +40,31 @@ double three_sigma(const Matrix6d& covariance) {
   return 3 * std::sqrt(std::max(0.0, position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
 }
 
+// Seen from above. KITTI's world is the first left camera's: x to the right, z ahead.
+struct Ground {
+  PoseConvention convention = PoseConvention::body;
+  Eigen::Vector2d place(const Eigen::Vector3d& p) const {
+    return convention == PoseConvention::left_optical ? Eigen::Vector2d(p.z(), -p.x()) : Eigen::Vector2d(p.x(), p.y());
+  }
+};
+
+PlotLine seen_from_above(const Trajectory& trajectory, const Ground& ground, const std::string& name,
+                         const char* colour) {
+  PlotLine line{name, colour, {}, {}};
+  for (const StampedPose& p : trajectory) {
+    const Eigen::Vector2d at = ground.place(p.pose.translation());
+    line.x.push_back(at.x());
+    line.y.push_back(at.y());
+  }
+  return line;
+}
+
 struct Lines {
   std::vector<PlotLine> way, errors;
 };
 
 void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vector<FrameRecord>& frames,
-          Lines& lines) {
+          const Ground& ground, Lines& lines) {
   const std::string name(name_of(kind.kind));
   PlotLine way{name, kind.colour, {}, {}}, error{name, kind.colour, {}, {}}, band{name + ", 3σ", kind.pale, {}, {}};
   const StampedPose& first = compared.estimate.front();
@@ -56,8 +76,9 @@ void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vec
     const Eigen::Vector3d at = truth_from_estimate * p.pose.translation();
     driven += way.x.empty() ? 0 : (at - before).norm();
     before = at;
-    way.x.push_back(at.x());
-    way.y.push_back(at.y());
+    const Eigen::Vector2d from_above = ground.place(at);
+    way.x.push_back(from_above.x());
+    way.y.push_back(from_above.y());
     error.x.push_back(driven);
     error.y.push_back(1000 * (at - nearest(compared.truth, p.stamp).pose.translation()).norm());
     while (frame != frames.end() && frame->stamp < p.stamp) ++frame;
@@ -72,15 +93,6 @@ void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vec
   lines.errors.push_back(std::move(error));
 }
 
-PlotLine seen_from_above(const Trajectory& trajectory, const std::string& name, const char* colour) {
-  PlotLine line{name, colour, {}, {}};
-  for (const StampedPose& p : trajectory) {
-    line.x.push_back(p.pose.translation().x());
-    line.y.push_back(p.pose.translation().y());
-  }
-  return line;
-}
-
 }  // namespace
 
 Result<std::string> trajectory_plots(const std::string& run, const std::string& truth) {
@@ -89,17 +101,20 @@ Result<std::string> trajectory_plots(const std::string& run, const std::string& 
   if (!store) return failure(store);
   const auto frames = store->frames();
   if (!frames) return failure(frames);
+  const auto rig = read_rig_yaml(folder.rig());
+  if (!rig) return failure(rig);
+  const Ground ground{truth.empty() ? PoseConvention::body : rig->convention};
   Lines lines;
   for (const Kind& kind : kKinds) {
     if (truth.empty()) {
       lines.way.push_back(
-          seen_from_above(trajectory_of(*frames, kind.kind), std::string(name_of(kind.kind)), kind.colour));
+          seen_from_above(trajectory_of(*frames, kind.kind), ground, std::string(name_of(kind.kind)), kind.colour));
       continue;
     }
     const auto compared = find_trajectories(run, truth, std::string(name_of(kind.kind)));
     if (!compared) return failure(compared);
-    if (lines.way.empty()) lines.way.push_back(seen_from_above(compared->truth, "truth", "#9a3b12"));
-    if (!compared->estimate.empty() && !compared->truth.empty()) draw(kind, *compared, *frames, lines);
+    if (lines.way.empty()) lines.way.push_back(seen_from_above(compared->truth, ground, "truth", "#9a3b12"));
+    if (!compared->estimate.empty() && !compared->truth.empty()) draw(kind, *compared, *frames, ground, lines);
   }
   std::string html = svg_plot(lines.way, {"x, m", "y, m", true, 560, 420});
   if (!lines.errors.empty())
