@@ -168,7 +168,7 @@ void ErrorStateFilter::move_steadily(double seconds) {
   VisionMemory& vision = memory_.vision;
   const SteadyStep step{vision.rate_rad_s, seconds};
   const double speed = memory_.belief.state.velocity_m_s.norm(), rate = vision.rate_rad_s.norm();
-  // A rover that rocks leaves its last rate slowly: the attitude is off by σ t, var(t + dt) − var(t) = σ² (2 t + dt) dt.
+  // A rover that rocks leaves its last rate slowly: the attitude is off by σ t, and (t + dt)² − t² = (2 t + dt) dt.
   const double turn = o.turn_share * (rate + o.turn_floor_rad_s) * std::sqrt(2 * vision.unmeasured_s + seconds);
   const SteadyNoise noise{o.speed_share_sqrt_hz * (speed + o.speed_floor_m_s), turn};
   const Transition t = transition(memory_.belief.state, step, noise);
