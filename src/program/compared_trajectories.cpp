@@ -1,22 +1,15 @@
 #include "program/compared_trajectories.h"
 
-#include <array>
 #include <filesystem>
-#include <string_view>
 
 #include "spartan/rig/pose_convention.h"
 #include "spartan/rig/rig_files.h"
+#include "spartan/system/run_folder.h"
 
 namespace spartan::program {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::array<std::string_view, 3> kKinds{"localization", "slam", "odometry"};  // best first
-
-std::string file_of(std::string_view kind) {
-  return "trajectory_" + std::string(kind) + ".tum";
-}
 
 struct Estimate {
   LoadedTrajectory loaded;
@@ -25,19 +18,20 @@ struct Estimate {
 };
 
 // Which trajectory of a run folder to take.
-Result<std::string> choose_kind(const fs::path& run, const std::string& asked) {
-  if (!asked.empty()) return asked;
-  for (const std::string_view kind : kKinds) {
-    if (fs::exists(run / file_of(kind))) return std::string(kind);
+Result<TrajectoryKind> choose_kind(const RunFolder& run, const std::string& asked) {
+  if (const auto kind = parse_trajectory_kind(asked)) return *kind;
+  if (!asked.empty()) return failure(ErrorCode::usage, "is no trajectory of a run", asked);
+  for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
+    if (fs::exists(run.trajectory(kind))) return kind;
   }
-  return failure(ErrorCode::input, "holds no trajectory", run.string(),
+  return failure(ErrorCode::input, "holds no trajectory", run.path,
                  "a run folder has trajectory_odometry.tum and others");
 }
 
 // "slam" for a path ".../trajectory_slam.tum", else "file".
 std::string kind_of_file(const fs::path& path) {
-  for (const std::string_view kind : kKinds) {
-    if (path.filename() == file_of(kind)) return std::string(kind);
+  for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
+    if (path.filename() == fs::path(RunFolder{}.trajectory(kind)).filename()) return std::string(name_of(kind));
   }
   return "file";
 }
@@ -45,10 +39,11 @@ std::string kind_of_file(const fs::path& path) {
 Result<Estimate> load_estimate(const std::string& path, const std::string& kind) {
   Estimate estimate;
   if (fs::is_directory(path)) {
-    const auto chosen = choose_kind(path, kind);
+    const RunFolder run{path};
+    const auto chosen = choose_kind(run, kind);
     if (!chosen) return failure(chosen);
-    estimate.kind = *chosen;
-    estimate.path = (fs::path(path) / file_of(*chosen)).string();
+    estimate.kind = name_of(*chosen);
+    estimate.path = run.trajectory(*chosen);
   } else {
     if (!kind.empty()) {
       return failure(ErrorCode::usage, "--trajectory chooses among those of a run folder, this is a file", path);

@@ -47,7 +47,7 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
 
   ReportRequest about;
   about.run = run_folder;
-  about.recording = about.truth = recording;
+  about.recording = recording;
   about.whole_truth = true;
   about.threads = context.threads;
   const auto report = make_report(about);

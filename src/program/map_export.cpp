@@ -1,7 +1,6 @@
 // spartan map export: a global map for other programs.
 #include <fmt/format.h>
 
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -27,10 +26,7 @@ Result<LatticeWindow> window_of(const ExportArguments& a, const GlobalMap& map) 
   if (!(east > west) || !(north > south)) {
     return failure(ErrorCode::usage, "has no area", "--window", "give west,south,east,north in metres of the world");
   }
-  const double cell = map.cell_m();
-  const int left = static_cast<int>(std::floor(west / cell)), top = static_cast<int>(std::ceil(north / cell));
-  return LatticeWindow{left, top, static_cast<int>(std::ceil(east / cell)) - left,
-                       top - static_cast<int>(std::floor(south / cell))};
+  return window_between(west, south, east, north, map.cell_m());
 }
 
 // The middles of the cells, in the colours of the picture.

@@ -198,13 +198,15 @@ Result<std::string> whole_truth(FrameSource& source, Imager& imager, const Repor
 
 }  // namespace
 
-Result<std::string> make_report(const ReportRequest& request) {
+Result<std::string> make_report(const ReportRequest& given) {
+  ReportRequest request = given;
   const auto summary_text = read_file(RunFolder{request.run}.summary());
   if (!summary_text) return failure(summary_text);
   const Json summary = Json::parse(*summary_text);
   const auto source = open_recording(request.recording, request.open);
   if (!source) return failure(source);
   const RecordingInfo& info = (*source)->info();
+  if (request.truth.empty()) request.truth = info.truth_file;
   const std::string masks = std::filesystem::path(info.rig_source).parent_path().string();
   auto imager = Imager::create(info.rig, ImagingOptions(), Workers(request.threads), masks);
   if (!imager) return failure(imager);

@@ -12,7 +12,7 @@ struct ReportRequest {
   std::string run;           ///< the run's folder
   std::string recording;     ///< that it was made from
   OpenOptions open;          ///< how that was opened
-  std::string truth;         ///< what `find_trajectories` takes for the truth; empty: none is known
+  std::string truth;         ///< what `find_trajectories` takes for the truth; empty: the recording's, where it has one
   bool whole_truth = false;  ///< besides, how right the matcher is and how the ground is, as a simulation knows them
   int threads = 1;
 };

@@ -14,7 +14,6 @@
 #include "program/run_arguments.h"
 #include "program/trajectory_report.h"
 #include "program/verbs.h"
-#include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
 #include "spartan/system/run_folder.h"
 
@@ -68,11 +67,6 @@ Status write_report(const RunRequest& request, const std::string& truth) {
   about.open.rig_file = request.rig_file;
   about.truth = truth;
   about.threads = request.threads;
-  if (truth.empty()) {
-    const auto source = open_recording(request.input, about.open);
-    if (!source) return failure(source);
-    about.truth = (*source)->info().truth_file;
-  }
   const auto page = make_report(about);
   if (!page) return failure(page);
   const RunFolder folder{request.output};

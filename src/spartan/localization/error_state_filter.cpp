@@ -282,11 +282,9 @@ bool ErrorStateFilter::judge(LocalizationSensor sensor, double square, int rows,
                                      options_.health.excluded_after, options_.health.back_after);
 }
 
-// odom_from_body stays: world_from_odom takes the change.
 void ErrorStateFilter::correct_world(const Innovation& innovation) {
   const Pose before = memory_.belief.state.world_from_body;
-  if (!correct(memory_.belief, innovation)) return;
-  memory_.world_from_odom = memory_.belief.state.world_from_body * before.inverse() * memory_.world_from_odom;
+  if (correct(memory_.belief, innovation)) keep_odom(before);
 }
 
 // Matches one after the other err alike (the same rocks, seen from afar first): they are no witness of a drift that
@@ -294,8 +292,13 @@ void ErrorStateFilter::correct_world(const Innovation& innovation) {
 void ErrorStateFilter::correct_by_map(const Innovation& innovation) {
   const Pose before = memory_.belief.state.world_from_body;
   constexpr int kDrift = error_at::kVisionDrift, kCount = error_at::kVisionClone - error_at::kVisionDrift;
-  if (!correct_all_but(memory_.belief, innovation, kDrift, kCount)) return;
-  memory_.world_from_odom = memory_.belief.state.world_from_body * before.inverse() * memory_.world_from_odom;
+  if (correct_all_but(memory_.belief, innovation, kDrift, kCount)) keep_odom(before);
+}
+
+// odom_from_body stays as it was with the pose before: world_from_odom takes the change.
+void ErrorStateFilter::keep_odom(const Pose& world_from_body_before) {
+  memory_.world_from_odom =
+      memory_.belief.state.world_from_body * world_from_body_before.inverse() * memory_.world_from_odom;
 }
 
 // odom_from_body becomes what it was at the clone, moved on by the motion as it is now believed.

@@ -79,6 +79,7 @@ class ErrorStateFilter {
   /// Corrections that leave odom where it is, and those that tell the motion since a clone.
   void correct_world(const Innovation& innovation);
   void correct_by_map(const Innovation& innovation);
+  void keep_odom(const Pose& world_from_body_before);
   void correct_motion(const Innovation& innovation, int clone);
   bool judge(LocalizationSensor sensor, double square, int rows, HealthReason why);
 

@@ -21,13 +21,17 @@ struct LatticeWindow {
   friend bool operator==(const LatticeWindow&, const LatticeWindow&) = default;
 };
 
+/// All cells that a rectangle of the world touches.
+inline LatticeWindow window_between(double west_m, double south_m, double east_m, double north_m, double cell_m) {
+  const int west = static_cast<int>(std::floor(west_m / cell_m)), east = static_cast<int>(std::ceil(east_m / cell_m)),
+            south = static_cast<int>(std::floor(south_m / cell_m)),
+            north = static_cast<int>(std::ceil(north_m / cell_m));
+  return {west, north, east - west, north - south};
+}
+
 /// All cells within `reach_m` of a place, measured along x and y.
 inline LatticeWindow window_around(double x_m, double y_m, double reach_m, double cell_m) {
-  const int west = static_cast<int>(std::floor((x_m - reach_m) / cell_m)),
-            east = static_cast<int>(std::ceil((x_m + reach_m) / cell_m)),
-            south = static_cast<int>(std::floor((y_m - reach_m) / cell_m)),
-            north = static_cast<int>(std::ceil((y_m + reach_m) / cell_m));
-  return {west, north, east - west, north - south};
+  return window_between(x_m - reach_m, y_m - reach_m, x_m + reach_m, y_m + reach_m, cell_m);
 }
 
 /// The cells of a map that lies on the lattice.

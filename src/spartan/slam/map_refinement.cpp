@@ -15,6 +15,14 @@ constexpr double kLeastDrop_m = 0.05;  // of a ray from the eye to a cell
 constexpr double kLeastBlur_m = 0.002, kLeastScale = 0.1;
 constexpr double kDamping = 1e-6;  // of the mean diagonal: keeps directions without slope where they are
 
+int known_cells(const Image<float>& elevation_m) {
+  int known = 0;
+  for (int y = 0; y < elevation_m.height(); ++y) {
+    for (int x = 0; x < elevation_m.width(); ++x) known += std::isfinite(elevation_m(x, y)) ? 1 : 0;
+  }
+  return known;
+}
+
 }  // namespace
 
 Vector6d elevation_jacobian(const Eigen::Vector2d& slope, const Eigen::Vector3d& from_centre) {
@@ -126,18 +134,6 @@ std::vector<SurfacePoint> thinned(std::span<const SurfacePoint> points, double s
   return means;
 }
 
-namespace {
-
-int known_cells(const Image<float>& elevation_m) {
-  int known = 0;
-  for (int y = 0; y < elevation_m.height(); ++y) {
-    for (int x = 0; x < elevation_m.width(); ++x) known += std::isfinite(elevation_m(x, y)) ? 1 : 0;
-  }
-  return known;
-}
-
-}  // namespace
-
 std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, const SurfaceGrid& global,
                                          const Pose& world_from_body, int fewest_points, const MatchOptions& options) {
   RefinedMatch match;
@@ -148,9 +144,9 @@ std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, c
     const SurfaceGrid local = throw_on_grid(points, match.world_from_body, global.window, global.cell_m, fewest_points);
     const Viewpoint from{match.world_from_body.translation(), match.world_from_body * eye};
     match.cells = matched_cells(local, global, from, scale, options);
-    match.known_cells = known_cells(local.elevation_m);
     if (static_cast<int>(match.cells.size()) < options.fewest_cells) return std::nullopt;
     match.misfit = misfit_of(match.cells);
+    if (match.converged || match.iterations + 1 == kMostSteps) match.known_cells = known_cells(local.elevation_m);
     if (match.converged) break;  // the cells are those of the pose
     Matrix6d normal = Matrix6d::Zero();
     Vector6d gradient = Vector6d::Zero();
