@@ -198,8 +198,7 @@ Result<std::string> whole_truth(FrameSource& source, Imager& imager, const Repor
 
 }  // namespace
 
-Result<std::string> make_report(const ReportRequest& given) {
-  ReportRequest request = given;
+Result<std::string> make_report(ReportRequest request) {
   const auto summary_text = read_file(RunFolder{request.run}.summary());
   if (!summary_text) return failure(summary_text);
   const Json summary = Json::parse(*summary_text);

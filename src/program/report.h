@@ -18,6 +18,6 @@ struct ReportRequest {
 };
 
 /// One self-contained HTML page.
-Result<std::string> make_report(const ReportRequest& request);
+Result<std::string> make_report(ReportRequest request);
 
 }  // namespace spartan::program
