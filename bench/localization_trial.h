@@ -191,7 +191,7 @@ inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>&
       localizer.start({start_ns}, Eigen::Vector3d::UnitX());
       first = localizer.estimate().world_from_body.pose;
     }
-    std::visit([&](const auto& m) { localizer.add(m); }, arrival.what);
+    localizer.add(arrival.what);
     const auto* motion = std::get_if<RelativeMotion>(&arrival.what);
     if (motion == nullptr || ++shot >= drive.poses.size()) continue;
     result.last = localizer.estimate();

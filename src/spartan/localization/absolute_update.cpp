@@ -102,7 +102,16 @@ void ErrorStateFilter::allow_for_rocking(const Innovation& innovation) {
 
 void ErrorStateFilter::take(const PoseConstraint& constraint) {
   move_to(constraint.stamp, nullptr);
-  const Innovation innovation = map_innovation(memory_.belief, constraint, options_.map_factor);
+  hear_map(constraint, error_at::kPose);
+}
+
+void ErrorStateFilter::take(const LateConstraint& constraint) {
+  move_to(constraint.stamp, nullptr);
+  if (constraint.at_shot.stamp == memory_.vision.clone_stamp) hear_map(constraint.at_shot, error_at::kVisionClone);
+}
+
+void ErrorStateFilter::hear_map(const PoseConstraint& constraint, int pose) {
+  const Innovation innovation = map_innovation(memory_.belief, pose, constraint, options_.map_factor);
   if (innovation.rows() == 0) return;
   const double square = normalised_square(memory_.belief.covariance, innovation);
   if (judge(LocalizationSensor::map, square, innovation.rows(), HealthReason::disagrees)) correct_by_map(innovation);

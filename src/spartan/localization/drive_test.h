@@ -126,10 +126,6 @@ inline std::vector<Measurement> test_motions(const TestDrive& drive, double seco
   return motions;
 }
 
-inline void add_to(Localizer& localizer, const Measurement& m) {
-  std::visit([&](const auto& value) { localizer.add(value); }, m);
-}
-
 /// The whole drive, as it would come from a rover.
 inline std::vector<Measurement> in_order(std::vector<Measurement> a, const std::vector<Measurement>& b) {
   a.insert(a.end(), b.begin(), b.end());
@@ -146,7 +142,7 @@ inline Localizer driven(const LocalizationOptions& options, const std::vector<Me
       localizer.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
       started = true;
     }
-    add_to(localizer, m);
+    localizer.add(m);
   }
   return localizer;
 }

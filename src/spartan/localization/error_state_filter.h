@@ -75,6 +75,8 @@ class ErrorStateFilter {
   void take(const InclinometerSample& sample);
   void allow_for_rocking(const Innovation& innovation);
   void take(const PoseConstraint& constraint);
+  void take(const LateConstraint& constraint);
+  void hear_map(const PoseConstraint& constraint, int pose);
 
   /// Corrections that leave odom where it is, and those that tell the motion since a clone.
   void correct_world(const Innovation& innovation);

@@ -65,23 +65,8 @@ bool Localizer::started() const {
   return state_->filter.started();
 }
 
-bool Localizer::add(const ImuSample& sample) {
-  return state_->add(sample);
-}
-bool Localizer::add(const WheelSample& sample) {
-  return state_->add(sample);
-}
-bool Localizer::add(const CompassSample& sample) {
-  return state_->add(sample);
-}
-bool Localizer::add(const InclinometerSample& sample) {
-  return state_->add(sample);
-}
-bool Localizer::add(const RelativeMotion& motion) {
-  return state_->add(motion);
-}
-bool Localizer::add(const PoseConstraint& constraint) {
-  return state_->add(constraint);
+bool Localizer::add(const Measurement& measurement) {
+  return state_->add(measurement);
 }
 
 LocalizationEstimate Localizer::estimate() const {

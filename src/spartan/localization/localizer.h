@@ -5,14 +5,12 @@
 #include <memory>
 #include <optional>
 
-#include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
-#include "spartan/core/pose_constraint.h"
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
 #include "spartan/localization/localization_options.h"
-#include "spartan/localization/relative_motion.h"
+#include "spartan/localization/measurement.h"
 #include "spartan/localization/sensor_health.h"
 
 namespace spartan {
@@ -68,14 +66,9 @@ class Localizer {
   void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {});
   bool started() const;
 
-  /// Each says whether the sample was taken.
-  bool add(const ImuSample& sample);
-  bool add(const WheelSample& sample);
-  bool add(const CompassSample& sample);
-  bool add(const InclinometerSample& sample);
-  /// One for every shot after the first, measured or not; `from` must be the shot before.
-  bool add(const RelativeMotion& motion);
-  bool add(const PoseConstraint& constraint);
+  /// Whether it was taken. One RelativeMotion for every shot after the first, measured or not; `from` must be the shot
+  /// before.
+  bool add(const Measurement& measurement);
 
   /// At the newest sample; identity before the start.
   LocalizationEstimate estimate() const;

@@ -31,7 +31,7 @@ Pose first_pose_of(const Samples& all) {
   std::copy_if(all.begin(), all.end(), std::back_inserter(before),
                [](const Measurement& m) { return stamp_of_measurement(m) <= test_stamp(2.5); });
   Localizer localizer(test_options());
-  for (const Measurement& m : before) add_to(localizer, m);
+  for (const Measurement& m : before) localizer.add(m);
   localizer.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
   return localizer.estimate().world_from_body.pose;
 }
@@ -283,8 +283,8 @@ TEST(LocalizerFaults, SavesAndRestoresItsMemory) {
   ASSERT_TRUE(other.restore(one.save()).has_value());
   EXPECT_EQ(other.save(), one.save());
   for (std::size_t i = half; i < all.size(); ++i) {
-    add_to(one, all[i]);
-    add_to(other, all[i]);
+    one.add(all[i]);
+    other.add(all[i]);
   }
   EXPECT_EQ(other.save(), one.save());
   EXPECT_EQ(other.estimate().health_of(LocalizationSensor::compass).not_finite, 1);

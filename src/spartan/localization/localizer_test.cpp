@@ -150,6 +150,45 @@ TEST(Localizer, AMapOfAnEarlierPoseIsAMotionSinceThen) {
   EXPECT_LE((e.world_from_body.covariance - expected.covariance).norm(), 0.01 * expected.covariance.norm());
 }
 
+TEST(Localizer, AMapOfTheLastShotIsHeardHoweverLateItComes) {
+  const TestDrive drive;
+  LocalizationOptions short_buffer = test_options(), long_buffer = test_options();
+  short_buffer.buffer_s = 2;
+  long_buffer.buffer_s = 60;
+  for (const TestSensors& with : {TestSensors{}, TestSensors{false, true, false, false, 1}}) {
+    const auto motions = test_motions(drive, 22, 1, 22);
+    const auto all = in_order(test_samples(drive, 31, with, 21), motions);
+    const Stamp shot = stamp_of_measurement(motions.back());
+    const auto until =
+        std::find_if(all.begin(), all.end(), [&](const auto& m) { return stamp_of_measurement(m) > shot; });
+    const Localizer at_shot = driven(test_options(), {all.begin(), until});
+    Localizer late = driven(short_buffer, all), replayed = driven(long_buffer, all);
+    const Pose seen = at_shot.estimate().world_from_body.pose * Pose::from_translation({1e-4, -2e-4, 0});
+    Matrix6d information = 1e4 * Matrix6d::Identity();
+    information(1, 1) = 1e8;
+    const Pose before = late.estimate().world_from_body.pose;
+    ASSERT_TRUE(late.add(PoseConstraint{shot, seen, information}));
+    ASSERT_TRUE(replayed.add(PoseConstraint{shot, seen, information}));
+    const LocalizationEstimate a = late.estimate(), b = replayed.estimate();
+    EXPECT_EQ(a.health_of(LocalizationSensor::map).used, 1);
+    const double moved = log_se3(before.inverse() * b.world_from_body.pose).norm();
+    EXPECT_GT(moved, 1e-4);
+    EXPECT_LE(log_se3(a.world_from_body.pose.inverse() * b.world_from_body.pose).norm(), 0.05 * moved);
+    EXPECT_LE((a.world_from_body.covariance - b.world_from_body.covariance).norm(),
+              0.05 * b.world_from_body.covariance.norm());
+    // Of no other pose, and once.
+    EXPECT_FALSE(late.add(PoseConstraint{{shot.ns + 1}, seen, information}));
+    // A shot that comes later still, from before the constraint came, stands on it.
+    const auto next = drive.motion(seconds_between(test_stamp(0), shot), 30, test_motion_covariance());
+    ASSERT_TRUE(late.add(next));
+    ASSERT_TRUE(replayed.add(next));
+    EXPECT_EQ(late.estimate().health_of(LocalizationSensor::map).used, 1);
+    EXPECT_LE(log_se3(late.estimate().world_from_body.pose.inverse() * replayed.estimate().world_from_body.pose).norm(),
+              0.05 * moved);
+    EXPECT_FALSE(late.add(PoseConstraint{shot, seen, information})) << "the last shot is another one now";
+  }
+}
+
 TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {
   const TestDrive drive;
   const double limit = chi_square_quantile(0.999, 6);
@@ -164,7 +203,7 @@ TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {
     // The world's yaw and level are what the first readings said; the truth is taken from the first pose on.
     Localizer at_start(test_options());
     for (const Measurement& m : all) {
-      if (stamp_of_measurement(m) <= test_stamp(2.5)) add_to(at_start, m);
+      if (stamp_of_measurement(m) <= test_stamp(2.5)) at_start.add(m);
     }
     at_start.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
     const Pose start = at_start.estimate().world_from_body.pose;
@@ -213,8 +252,8 @@ TEST(Localizer, OdomDoesNotJumpWhereTheMapCorrectsTheWorld) {
   // And goes on as it would have.
   for (const Measurement& m : test_motions(drive, 71.5, 1, 22)) {
     if (std::get<RelativeMotion>(m).from < before.stamp) continue;
-    add_to(with, m);
-    add_to(without, m);
+    with.add(m);
+    without.add(m);
   }
   const Pose a = before.odom_from_body.pose.inverse() * with.estimate().odom_from_body.pose;
   const Pose b = before.odom_from_body.pose.inverse() * without.estimate().odom_from_body.pose;

@@ -26,13 +26,17 @@ bool sound(const PoseConstraint& c) {
   return c.world_from_body.all_finite() && c.information.allFinite() && c.map_covariance.allFinite() &&
          (c.information.diagonal().array() >= 0).all() && (c.map_covariance.diagonal().array() >= 0).all();
 }
+bool sound(const LateConstraint& c) {
+  return sound(c.at_shot);
+}
 
 }  // namespace
 
 LocalizationSensor sensor_of(const Measurement& m) {
   constexpr LocalizationSensor kOfIndex[] = {LocalizationSensor::imu,          LocalizationSensor::vision,
                                              LocalizationSensor::wheels,       LocalizationSensor::compass,
-                                             LocalizationSensor::inclinometer, LocalizationSensor::map};
+                                             LocalizationSensor::inclinometer, LocalizationSensor::map,
+                                             LocalizationSensor::map};
   return kOfIndex[m.index()];
 }
 

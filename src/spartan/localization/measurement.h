@@ -10,10 +10,17 @@
 
 namespace spartan {
 
+/// A constraint on the pose at the last shot that came when the buffer had left that shot behind (the rover stood for
+/// long, and its map is made when it goes on): taken at a later moment, by the clone of that pose.
+struct LateConstraint {
+  Stamp stamp;  ///< when it is taken
+  PoseConstraint at_shot;
+};
+
 /// Of several with one stamp the earlier kind comes first: the IMU reaches the moment, vision stands on it, the rest is
 /// judged against both.
-using Measurement =
-    std::variant<ImuSample, RelativeMotion, WheelSample, CompassSample, InclinometerSample, PoseConstraint>;
+using Measurement = std::variant<ImuSample, RelativeMotion, WheelSample, CompassSample, InclinometerSample,
+                                 PoseConstraint, LateConstraint>;
 
 inline Stamp stamp_of_measurement(const Measurement& m) {
   return std::visit(

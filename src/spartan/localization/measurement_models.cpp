@@ -14,6 +14,10 @@ const Pose& clone_of(const NavigationState& s, int clone) {
   return clone == error_at::kVisionClone ? s.world_from_vision_clone : s.world_from_step_clone;
 }
 
+const Pose& pose_of(const NavigationState& s, int pose) {
+  return pose == error_at::kPose ? s.world_from_body : clone_of(s, pose);
+}
+
 // The displacement of the step along the mean attitude, and its derivative by the motion's right perturbation:
 //   t' = t + ΔR ρ,  φ' = φ + J_r⁻¹(φ) φ_e,  t_mid = Exp(−φ/2) t
 //   ∂t_mid = Exp(φ/2) ρ_e + ½ [t_mid]× J_l(−φ/2) J_r⁻¹(φ) φ_e        (Exp(−φ/2) ΔR = Exp(φ/2))
@@ -153,9 +157,9 @@ Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean
 
 // T = X̂ Exp(ξ) Exp(n): Log(X̂⁻¹ T) = ξ + J_r⁻¹(r) n. Information Λ of n becomes J_rᵀ Λ J_r; its eigenvectors with any
 // information are independent scalar measurements.
-Innovation map_innovation(const Belief& belief, const PoseConstraint& constraint, double covariance_factor) {
+Innovation map_innovation(const Belief& belief, int pose, const PoseConstraint& constraint, double covariance_factor) {
   constexpr double kLeastInformation = 1e-6, kLeastShare = 1e-12;
-  const Vector6d r = log_se3(belief.state.world_from_body.inverse() * constraint.world_from_body);
+  const Vector6d r = log_se3(pose_of(belief.state, pose).inverse() * constraint.world_from_body);
   const Matrix6d jacobian = right_jacobian_se3(r);
   const Matrix6d turned = jacobian.transpose() * constraint.information * jacobian;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (turned + turned.transpose()));
@@ -168,15 +172,15 @@ Innovation map_innovation(const Belief& belief, const PoseConstraint& constraint
   if (rows == 0) return i;
   const auto directions = eigen.eigenvectors().rightCols(rows).transpose();
   i.residual = directions * r;
-  i.jacobian.middleCols<6>(error_at::kPose) = directions;
+  i.jacobian.middleCols<6>(pose) = directions;
   i.noise.diagonal() = values.tail(rows).cwiseInverse();
 
   const Matrix6d inverse = jacobian.inverse();
   const Matrix6d map = inverse * constraint.map_covariance * inverse.transpose();
   i.noise += directions * map * directions.transpose();
-  const Matrix6d pose = belief.covariance.block<6, 6>(error_at::kPose, error_at::kPose);
+  const Matrix6d believed = belief.covariance.block<6, 6>(pose, pose);
   // The residual is truth less belief, plus the map's error: where both err alike it is none, hence the sign.
-  i.shared = -belief.covariance.middleCols<6>(error_at::kPose) * common_share(pose, map) * directions.transpose();
+  i.shared = -belief.covariance.middleCols<6>(pose) * common_share(believed, map) * directions.transpose();
   return i;
 }
 

@@ -110,11 +110,11 @@ TEST(MeasurementModels, PoseConstraintOfAnyRankMeasuresWhatItKnows) {
   Vector6d offset;
   offset << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03;
   const Pose seen = belief.state.world_from_body * exp_se3(offset);
-  EXPECT_EQ(map_innovation(belief, {{}, seen}, 1).rows(), 0);
+  EXPECT_EQ(map_innovation(belief, error_at::kPose, {{}, seen}, 1).rows(), 0);
   Matrix6d some = Matrix6d::Zero();
   some(0, 0) = 100;
   some(5, 5) = 1e4;
-  const Innovation i = map_innovation(belief, {{}, seen, some}, 2);
+  const Innovation i = map_innovation(belief, error_at::kPose, {{}, seen, some}, 2);
   ASSERT_EQ(i.rows(), 2);
   // Its information about the error is that which was handed over, carried to the mean, and halved by the factor.
   const Matrix6d jacobian = right_jacobian_se3(offset);
@@ -122,7 +122,7 @@ TEST(MeasurementModels, PoseConstraintOfAnyRankMeasuresWhatItKnows) {
       (i.jacobian.transpose() * i.noise.inverse() * i.jacobian).block<6, 6>(error_at::kPose, error_at::kPose);
   EXPECT_LE((information - 0.5 * jacobian.transpose() * some * jacobian).cwiseAbs().maxCoeff(), 1e-8);
   // The whole residual where all is known.
-  const Innovation all = map_innovation(belief, {{}, seen, Matrix6d::Identity()}, 1);
+  const Innovation all = map_innovation(belief, error_at::kPose, {{}, seen, Matrix6d::Identity()}, 1);
   EXPECT_LE((all.jacobian.leftCols<6>().transpose() * all.residual - offset).norm(), 1e-9);
 }
 

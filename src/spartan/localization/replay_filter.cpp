@@ -20,6 +20,18 @@ double age(const Measurement& m, Stamp newest) {
   return seconds_between(stamp_of_measurement(m), newest);
 }
 
+void put_constraint(ArchiveWriter& out, const PoseConstraint& c) {
+  out.put(c.world_from_body);
+  out.put(c.information);
+  out.put(c.map_covariance);
+}
+
+PoseConstraint get_constraint(ArchiveReader& in, Stamp stamp) {
+  const Pose pose = in.get_pose();
+  const Matrix6d information = in.get_matrix6();
+  return {stamp, pose, information, in.get_matrix6()};
+}
+
 // Fields as they are; kinds as their index.
 void put_measurement(ArchiveWriter& out, const Measurement& m) {
   out.put(static_cast<std::uint8_t>(m.index()));
@@ -43,9 +55,10 @@ void put_measurement(ArchiveWriter& out, const Measurement& m) {
     out.put(tilt->pitch_rad);
     out.put(tilt->sigma_rad);
   } else if (const auto* constraint = std::get_if<PoseConstraint>(&m)) {
-    out.put(constraint->world_from_body);
-    out.put(constraint->information);
-    out.put(constraint->map_covariance);
+    put_constraint(out, *constraint);
+  } else if (const auto* late = std::get_if<LateConstraint>(&m)) {
+    out.put(late->at_shot.stamp.ns);
+    put_constraint(out, late->at_shot);
   }
 }
 
@@ -78,10 +91,11 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
       const auto roll = in.get<double>(), pitch = in.get<double>();
       return InclinometerSample{stamp, roll, pitch, in.get<double>()};
     }
-    case 5: {
-      const Pose pose = in.get_pose();
-      const Matrix6d information = in.get_matrix6();
-      return PoseConstraint{stamp, pose, information, in.get_matrix6()};
+    case 5:
+      return get_constraint(in, stamp);
+    case 6: {
+      const Stamp shot{in.get<std::int64_t>()};
+      return LateConstraint{stamp, get_constraint(in, shot)};
     }
     default:
       return std::nullopt;
@@ -109,7 +123,18 @@ void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
 
 std::optional<Refusal> ReplayFilter::add(const Measurement& m) {
   const Stamp stamp = stamp_of_measurement(m);
-  if (started() && (stamp < start_ || age(m, newest_) > options_.buffer_s)) return Refusal::too_late;
+  if (started() && (stamp < start_ || age(m, newest_) > options_.buffer_s)) {
+    const auto* constraint = std::get_if<PoseConstraint>(&m);
+    if (constraint == nullptr || stamp != filter_.memory().vision.clone_stamp) return Refusal::too_late;
+    // As early as the buffer reaches: a shot that comes late still comes after it.
+    const auto buffer_ns = static_cast<std::int64_t>(options_.buffer_s * 1e9);
+    return insert(LateConstraint{{newest_.ns - buffer_ns}, *constraint});
+  }
+  return insert(m);
+}
+
+std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
+  const Stamp stamp = stamp_of_measurement(m);
   const auto place = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
   if (place != entries_.end() && !comes_before(m, *place)) return Refusal::duplicate;
   const auto at = static_cast<std::size_t>(place - entries_.begin());

@@ -22,7 +22,9 @@ class ReplayFilter {
   bool started() const { return filter_.memory().started; }
 
   /// Nothing where the measurement was taken; else why it was not. Whatever the order of arrival, the state is the
-  /// same, bit for bit, as after all that were taken in the order of comes_before().
+  /// same, bit for bit, as after all that were taken in the order of comes_before(). A constraint on the pose at the
+  /// last shot is never too late: where that shot is older than the buffer, the constraint is taken at the buffer's far
+  /// end.
   std::optional<Refusal> add(const Measurement& measurement);
 
   const ErrorStateFilter& filter() const { return filter_; }
@@ -38,6 +40,7 @@ class ReplayFilter {
     FilterMemory memory;
   };
 
+  std::optional<Refusal> insert(const Measurement& measurement);
   bool opens_cell(std::size_t entry) const;
   void replay_from(std::size_t entry);
   void run_from(std::size_t entry);

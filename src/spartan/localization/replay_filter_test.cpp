@@ -109,6 +109,28 @@ TEST(ReplayFilter, RefusesWhatIsTooLateOrDouble) {
   EXPECT_EQ(wide.add(WheelSample{test_stamp(2.4), 0, 0}), Refusal::too_late);  // before the start
 }
 
+TEST(ReplayFilter, KeepsAConstraintThatCameAfterTheBuffer) {
+  LocalizationOptions o = test_options();
+  o.buffer_s = 0.5;
+  ReplayFilter filter = started_filter(o);
+  for (const Measurement& m : after_start()) {
+    if (stamp_of_measurement(m) < test_stamp(7)) filter.add(m);
+  }
+  const Stamp shot = filter.filter().memory().vision.clone_stamp;
+  ASSERT_GT(seconds_between(shot, test_stamp(6.9)), o.buffer_s);
+  const Pose seen = filter.filter().memory().belief.state.world_from_vision_clone;
+  ASSERT_FALSE(filter.add(PoseConstraint{shot, seen, 1e6 * Matrix6d::Identity()}));
+  const Bytes bytes = saved(filter);
+  ReplayFilter other(o);
+  ArchiveReader in(bytes);
+  ASSERT_TRUE(other.get(in));
+  ASSERT_TRUE(in.finish(""));
+  // Both take it again behind a sample that is later still.
+  for (ReplayFilter* each : {&filter, &other}) each->add(CompassSample{test_stamp(6.501), 0.01, 0.02});
+  EXPECT_EQ(saved(other), saved(filter));
+  EXPECT_EQ(other.filter().memory().judge(LocalizationSensor::map).used, 2) << "that of the drive, and this one";
+}
+
 TEST(ReplayFilter, ForgetsWhatIsOld) {
   LocalizationOptions o = test_options();
   o.buffer_s = 1;

@@ -12,7 +12,7 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 3;
+constexpr std::uint32_t kStateVersion = 4;
 constexpr double kGravityOnEarth_m_s2 = 9.81;
 
 LocalizationOptions with_gravity(const RunOptions& options) {
@@ -110,8 +110,12 @@ void Pipeline::State::localize(const RectifiedPair& shot, const MotionEstimate& 
 }
 
 void Pipeline::State::arrive(const StereoFrame& frame, const RectifiedPair& shot) {
-  if (maps_positions && frame.position_id >= 0)
+  if (!maps_positions || frame.position_id < 0) return;
+  if (frame.position_id == position.position_id()) {
+    position.stay(shot.stamp);
+  } else {
     position.arrive(frame.position_id, shot, pair.nearest_m, localizer.estimate().world_from_body);
+  }
 }
 
 // A further view of the position at hand.
@@ -119,8 +123,9 @@ Status Pipeline::State::look(const StereoFrame& frame) {
   if (!maps_positions || frame.position_id < 0 || frame.position_id != position.position_id()) return {};
   const auto shot = clock.measure("imaging", [&] { return imager.process(frame); });
   if (!shot) return failure(shot);
+  const double nearest_m = rig.find_pair(frame.pair)->nearest_m;
   return clock.measure("reconstruction",
-                       [&] { return position.look(frame.position_id, *shot, rig.find_pair(frame.pair)->nearest_m); });
+                       [&] { return position.look(frame.position_id, frame.pair, *shot, nearest_m); });
 }
 
 Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
@@ -131,7 +136,12 @@ Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
   const auto survey = clock.measure("mapping", [&] { return position.leave(); });
   auto merged = clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->standing); });
   if (!merged) return failure(merged);
-  if (merged->constraint) localizer.add(*merged->constraint);
+  if (merged->constraint) {
+    // It has stood since: of the poses there, the last one is the one that a long stop leaves in the filter.
+    PoseConstraint constraint = *merged->constraint;
+    constraint.stamp = survey->last_stamp;
+    localizer.add(constraint);
+  }
   if (merged->decided()) slam = merged->corrected;
   return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(*merged)};
 }
@@ -251,15 +261,23 @@ GlobalMap& Pipeline::global_map() {
   return state_->merger.map();
 }
 
-std::optional<ShotName> Pipeline::wanted_shot() const {
-  const auto stamp = state_->position.kept_stamp();
-  return stamp ? std::optional(ShotName{state_->pair.name, *stamp}) : std::nullopt;
+std::vector<ShotName> Pipeline::wanted_shots() const {
+  std::vector<ShotName> wanted;
+  if (const auto stamp = state_->position.wanted_arrival()) wanted.push_back({state_->pair.name, *stamp});
+  const auto& looks = state_->position.wanted_looks();
+  wanted.insert(wanted.end(), looks.begin(), looks.end());
+  return wanted;
 }
 
 Status Pipeline::recall(const StereoFrame& frame) {
-  const auto shot = state_->imager.process(frame);
+  State& s = *state_;
+  const StereoPair* const pair = s.rig.find_pair(frame.pair);
+  if (pair == nullptr)
+    return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair), "recall");
+  const auto shot = s.imager.process(frame);
   if (!shot) return failure(shot);
-  state_->position.recall(*shot, state_->pair.nearest_m);
+  if (pair->name != s.pair.name) return s.position.look(s.position.position_id(), pair->name, *shot, pair->nearest_m);
+  s.position.recall_arrival(*shot, s.pair.nearest_m);
   return {};
 }
 

@@ -90,8 +90,9 @@ class Pipeline {
   /// The position at hand, where it is a map already: at the end of a drive.
   Result<std::optional<MappedPosition>> leave_position();
 
-  /// After restore(): the shot that must be looked at again before the next is added, and the way to hand it in.
-  std::optional<ShotName> wanted_shot() const;
+  /// After restore(): the shots of the position at hand that must be looked at again before the next is added, and the
+  /// way to hand them in, one after the other.
+  std::vector<ShotName> wanted_shots() const;
   Status recall(const StereoFrame& frame);
 
   /// world_from_body at a moment without a pose: the last pose, moved on with the last motion's velocity.

@@ -24,14 +24,15 @@ void PositionStage::arrive(std::int64_t position_id, const RectifiedPair& shot, 
                            const UncertainPose& standing) {
   mapper_.leave();
   position_id_ = position_id;
-  stamp_ = shot.stamp;
+  stamp_ = last_stamp_ = shot.stamp;
+  looks_.clear();
+  wanted_.clear();
   standing_ = standing;
   kept_.emplace(shot);
   kept_nearest_m_ = nearest_m;
 }
 
-void PositionStage::recall(const RectifiedPair& shot, double nearest_m) {
-  if (kept_ || shot.stamp != stamp_) return;
+void PositionStage::recall_arrival(const RectifiedPair& shot, double nearest_m) {
   kept_.emplace(shot);
   kept_nearest_m_ = nearest_m;
 }
@@ -41,16 +42,20 @@ Status PositionStage::add(const RectifiedPair& shot, double nearest_m) {
   return mapper_.add(shot, nearest_m, up_in_body);
 }
 
-Status PositionStage::look(std::int64_t position_id, const RectifiedPair& shot, double nearest_m) {
+Status PositionStage::look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot,
+                           double nearest_m) {
   if (position_id < 0 || position_id != position_id_) return {};
   if (mapper_.views().empty() && kept_) {
     if (Status s = add(kept_->view(), kept_nearest_m_); !s) return s;
   }
-  return add(shot, nearest_m);
+  if (Status s = add(shot, nearest_m); !s) return s;
+  looks_.push_back({pair, shot.stamp});
+  std::erase_if(wanted_, [&](const ShotName& w) { return w.pair == pair && w.left_stamp == shot.stamp; });
+  return {};
 }
 
-std::optional<Stamp> PositionStage::kept_stamp() const {
-  return position_id_ < 0 ? std::nullopt : std::optional(stamp_);
+std::optional<Stamp> PositionStage::wanted_arrival() const {
+  return position_id_ < 0 || kept_ ? std::nullopt : std::optional(stamp_);
 }
 
 std::optional<PositionSurvey> PositionStage::leave() {
@@ -59,6 +64,7 @@ std::optional<PositionSurvey> PositionStage::leave() {
     survey.emplace();
     survey->position_id = position_id_;
     survey->stamp = stamp_;
+    survey->last_stamp = last_stamp_;
     survey->standing = standing_;
     survey->views = static_cast<int>(mapper_.views().size());
     survey->merged = mapper_.merge();
@@ -75,6 +81,12 @@ void PositionStage::save(ArchiveWriter& out) const {
   out.put(stamp_.ns);
   out.put(standing_.pose);
   out.put(standing_.covariance);
+  out.put(last_stamp_.ns);
+  std::vector<std::int64_t> stamps;
+  stamps.reserve(looks_.size());
+  for (const ShotName& look : looks_) stamps.push_back(look.left_stamp.ns);
+  out.put_array(stamps.data(), stamps.size());
+  for (const ShotName& look : looks_) out.put(look.pair);
 }
 
 void PositionStage::restore(ArchiveReader& in) {
@@ -82,6 +94,10 @@ void PositionStage::restore(ArchiveReader& in) {
   stamp_.ns = in.get<std::int64_t>();
   standing_.pose = in.get_pose();
   standing_.covariance = in.get_matrix6();
+  last_stamp_.ns = in.get<std::int64_t>();
+  looks_.clear();
+  wanted_.clear();
+  for (const std::int64_t stamp : in.get_array<std::int64_t>()) wanted_.push_back({in.get_string(), Stamp{stamp}});
   mapper_.leave();
   kept_.reset();
 }

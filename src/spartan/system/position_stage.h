@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "spartan/camera/frame_source.h"
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
@@ -18,6 +20,7 @@ namespace spartan {
 struct PositionSurvey {
   std::int64_t position_id = -1;
   Stamp stamp;             ///< of the shot that drove the odometry there
+  Stamp last_stamp;        ///< of the odometry's last shot there; the same where it looked once
   UncertainPose standing;  ///< world_from_body at that shot
   int views = 0;
   MergedRange merged;
@@ -25,8 +28,8 @@ struct PositionSurvey {
 };
 
 /// Shots of one position share a position_id. The pair that drives the odometry sees every position; a position is
-/// mapped where other pairs look too. The stage's memory is the shot of the odometry's pair and the pose there; the
-/// other views are looked at again after a resume.
+/// mapped where other pairs look too. The stage's memory are the names of its views and the pose there: the views are
+/// looked at again after a resume.
 class PositionStage {
  public:
   PositionStage(const DisparityOptions& disparity, const MappingOptions& options, Workers workers)
@@ -34,14 +37,18 @@ class PositionStage {
 
   /// The odometry's shot at a new position, and where the body stands.
   void arrive(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing);
-  /// The same shot again after restore(); nothing where another one is waited for.
-  void recall(const RectifiedPair& shot, double nearest_m);
-  /// A view by another pair. One of a position that nobody arrived at is left out. Code `input` as DisparityComputer.
-  Status look(std::int64_t position_id, const RectifiedPair& shot, double nearest_m);
+  /// A further shot of the odometry's pair there: it is no view, but the rover still stands.
+  void stay(Stamp stamp) { last_stamp_ = stamp; }
+  /// A view by the pair of that name. One of a position that nobody arrived at is left out. Code `input` as
+  /// DisparityComputer.
+  Status look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot, double nearest_m);
 
   std::int64_t position_id() const { return position_id_; }
-  /// Left stamp of the shot that arrive() kept, where there is one.
-  std::optional<Stamp> kept_stamp() const;
+
+  /// After restore(): the stamp of arrive()'s shot, and the looks that followed it, each to be handed in again.
+  std::optional<Stamp> wanted_arrival() const;
+  const std::vector<ShotName>& wanted_looks() const { return wanted_; }
+  void recall_arrival(const RectifiedPair& shot, double nearest_m);
 
   /// The position as it was seen, where other pairs looked; nothing is kept of it.
   std::optional<PositionSurvey> leave();
@@ -63,8 +70,9 @@ class PositionStage {
 
   PositionMapper mapper_;
   std::int64_t position_id_ = -1;
-  Stamp stamp_;
+  Stamp stamp_, last_stamp_;
   UncertainPose standing_;
+  std::vector<ShotName> looks_, wanted_;
   std::optional<KeptShot> kept_;
   double kept_nearest_m_ = 0;
 };

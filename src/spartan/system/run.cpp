@@ -130,8 +130,8 @@ Status Drive::begin() {
   shots_ = static_cast<int>(frames->size());
   for (const FrameRecord& frame : *frames) usable_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*memory)->stages, store_.tiles()); !status) return status;
-  if (const auto wanted = pipeline_.wanted_shot()) {
-    const auto shot = source_.frame_at(wanted->pair, wanted->left_stamp);
+  for (const ShotName& wanted : pipeline_.wanted_shots()) {
+    const auto shot = source_.frame_at(wanted.pair, wanted.left_stamp);
     if (!shot) return failure(shot);
     if (Status status = pipeline_.recall(*shot); !status) return status;
   }
