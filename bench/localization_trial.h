@@ -175,8 +175,8 @@ inline LocalizationOptions options_for(const TrueDrive& drive) {
   LocalizationOptions options;
   // Known, as recordings state it.
   options.gravity_m_s2 = drive.scenario.gravity_m_s2;
-  options.imu = with_stated(options.imu, sim::stated_noise(drive.scenario.imu));
-  return options;
+  const sim::Scenario& s = drive.scenario;
+  return with_stated(options, sim::stated_noise(s.imu, s.compass, s.inclinometer));
 }
 
 inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {

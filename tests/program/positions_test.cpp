@@ -133,6 +133,22 @@ TEST_F(Positions, EachTrajectoryIsExported) {
   EXPECT_EQ(testing::content_of(path("best")), testing::content_of(path("localization")));
 }
 
+TEST_F(Positions, SensorsErrAsTheRecordingStates) {
+  ASSERT_TRUE(finished(run("stated")));
+  ASSERT_TRUE(finished(run("not_stated", {"--set", "noise_as_stated=false"})));
+  const std::string about = testing::content_of(path("rec/recording.yaml"));
+  const auto noise = about.find("imu_noise:");
+  ASSERT_NE(noise, std::string::npos);
+  EXPECT_NE(about.find("inclinometer_noise:"), std::string::npos);
+  std::ofstream(path("rec/recording.yaml")) << about.substr(0, noise);
+  ASSERT_TRUE(finished(run("silent")));
+  const auto localized = [&](const std::string& output) {
+    return testing::content_of(path(output + "/trajectory_localization.tum"));
+  };
+  EXPECT_NE(localized("stated"), localized("not_stated"));
+  EXPECT_EQ(localized("silent"), localized("not_stated"));
+}
+
 // The first stop's narrow shot is the last thing that was committed.
 TEST_F(Positions, AreMappedThoughTheRunStoppedInTheMiddleOfThem) {
   ASSERT_TRUE(finished(run("whole")));

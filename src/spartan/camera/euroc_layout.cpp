@@ -126,7 +126,7 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
   if (const fs::path imu = folder / "imu0" / "data.csv"; fs::exists(imu, error)) {
     const auto about = read_imu((folder / "imu0" / "sensor.yaml").string());
     if (!about) return failure(about);
-    index.info.imu_noise = about->noise;
+    index.info.noise.imu = about->noise;
     index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(about->body_from_imu));
   }
   return index;

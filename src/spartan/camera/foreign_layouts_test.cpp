@@ -265,12 +265,12 @@ TEST_F(EurocLayout, TheUnitsAxesAreTurnedIntoTheBody) {
 
 TEST_F(EurocLayout, TheUnitsNoiseIsWhatItsFileStates) {
   folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n");
-  EXPECT_EQ(open()->info().imu_noise.gyro_noise_rad_s_sqrt_hz, 0) << "no sensor.yaml: not stated";
+  EXPECT_EQ(open()->info().noise.imu.gyro_noise_rad_s_sqrt_hz, 0) << "no sensor.yaml: not stated";
   const std::string densities =
       "%YAML:1.0\ngyroscope_noise_density: 1.7e-4\ngyroscope_random_walk: 1.9e-5\n"
       "accelerometer_noise_density: 2.0e-3\n";
   folder_.write("mav0/imu0/sensor.yaml", densities);
-  const ImuNoise noise = open()->info().imu_noise;
+  const ImuNoise noise = open()->info().noise.imu;
   EXPECT_EQ(noise.gyro_noise_rad_s_sqrt_hz, 1.7e-4);
   EXPECT_EQ(noise.gyro_walk_rad_s2_sqrt_hz, 1.9e-5);
   EXPECT_EQ(noise.accel_noise_m_s2_sqrt_hz, 2e-3);

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/imu_noise.h"
 #include "spartan/camera/samples.h"
+#include "spartan/camera/sensor_noise.h"
 #include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
 
@@ -41,7 +41,7 @@ struct RecordingInfo {
   std::string name;                    ///< as recording.yaml says, else the folder's name
   std::string description;             ///< as recording.yaml says, else empty
   std::optional<double> gravity_m_s2;  ///< as recording.yaml says
-  ImuNoise imu_noise;                  ///< as recording.yaml or imu0/sensor.yaml says
+  SensorNoise noise;                   ///< as recording.yaml or imu0/sensor.yaml says
   bool has_imu = false;
   SequenceReport sequence;
   std::string truth_file;  ///< trajectory with the truth, where the recording brings one; else empty

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "spartan/camera/imu_noise.h"
 #include "spartan/camera/samples.h"
+#include "spartan/camera/sensor_noise.h"
 #include "spartan/core/result.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/rig.h"
@@ -17,7 +17,7 @@ struct RecordingOptions {
   std::string name;
   std::string description;
   double gravity_m_s2 = 9.81;
-  ImuNoise imu_noise = {};  ///< as it is believed
+  SensorNoise noise = {};  ///< as it is believed
 };
 
 /// Makes the folder, then takes samples in any order of kinds, each kind (and the shots of each pair) with stamps that

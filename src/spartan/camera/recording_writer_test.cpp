@@ -155,7 +155,8 @@ RC_GTEST_PROP(RecordingWriter, WhatIsWrittenReadsBackBitForBit, ()) {
   const Rig rig = random_rig(random);
   const TemporaryFolder folder;
   auto writer = RecordingWriter::create(
-      folder.path(), rig, {"a name: #1", "it's \"quoted\"\nand long", 3.71, {.accel_walk_m_s3_sqrt_hz = 5e-5}});
+      folder.path(), rig,
+      {"a name: #1", "it's \"quoted\"\nand long", 3.71, {{.accel_walk_m_s3_sqrt_hz = 5e-5}, {1e-6}, {2e-3, 1e-6}}});
   RC_ASSERT(writer.has_value());
   std::vector<Sample> written;
   Stamp stamp{static_cast<std::int64_t>(random.next()) - 2'000'000'000};
@@ -177,7 +178,9 @@ RC_GTEST_PROP(RecordingWriter, WhatIsWrittenReadsBackBitForBit, ()) {
   RC_ASSERT((*source)->info().name == "a name: #1");
   RC_ASSERT((*source)->info().description == "it's \"quoted\"\nand long");
   RC_ASSERT((*source)->info().gravity_m_s2 == 3.71);
-  RC_ASSERT((*source)->info().imu_noise.accel_walk_m_s3_sqrt_hz == 5e-5);
+  RC_ASSERT((*source)->info().noise.imu.accel_walk_m_s3_sqrt_hz == 5e-5);
+  RC_ASSERT((*source)->info().noise.compass.offset_walk_rad_sqrt_hz == 1e-6);
+  RC_ASSERT((*source)->info().noise.inclinometer.bias_rad == 2e-3);
   const Played played = play(**source);
   RC_ASSERT(played.error == "");
   RC_ASSERT(played.all.size() == written.size());

@@ -27,7 +27,9 @@ struct RecordingFile {
     v.field("name", about.name, "a name for people");
     v.field("description", about.description, "where it comes from");
     v.field("gravity_m_s2", about.gravity_m_s2, "where it was recorded", between(0.1, 30));
-    v.group("imu_noise", about.imu_noise);
+    v.group("imu_noise", about.noise.imu);
+    v.group("compass_noise", about.noise.compass);
+    v.group("inclinometer_noise", about.noise.inclinometer);
   }
 };
 

@@ -33,7 +33,7 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   index.info.name = file->about.name;
   index.info.description = file->about.description;
   index.info.gravity_m_s2 = file->about.gravity_m_s2;
-  index.info.imu_noise = file->about.imu_noise;
+  index.info.noise = file->about.noise;
   const std::string rig_file = (folder / "rig.yaml").string();
   auto rig = choose_rig(options, rig_file, {}, [&] { return read_rig_yaml(rig_file); });
   if (!rig) return failure(rig);

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "spartan/camera/imu_noise.h"
+#include "spartan/camera/sensor_noise.h"
 #include "spartan/core/options.h"
 
 namespace spartan {
@@ -38,18 +38,6 @@ struct InertialOptions {
     v.field("still_accel_m_s2", still_accel_m_s2, "scatter below which the rover may be standing", between(0, 10));
   }
 };
-
-/// With what is stated of the IMU at hand in the place of the defaults.
-inline InertialOptions with_stated(InertialOptions options, const ImuNoise& stated) {
-  const auto take = [](double& value, double by_recording) { value = by_recording > 0 ? by_recording : value; };
-  take(options.gyro_noise_rad_s_sqrt_hz, stated.gyro_noise_rad_s_sqrt_hz);
-  take(options.gyro_bias_rad_s, stated.gyro_bias_rad_s);
-  take(options.gyro_walk_rad_s2_sqrt_hz, stated.gyro_walk_rad_s2_sqrt_hz);
-  take(options.accel_noise_m_s2_sqrt_hz, stated.accel_noise_m_s2_sqrt_hz);
-  take(options.accel_bias_m_s2, stated.accel_bias_m_s2);
-  take(options.accel_walk_m_s3_sqrt_hz, stated.accel_walk_m_s3_sqrt_hz);
-  return options;
-}
 
 /// The error of a visual motion is L n + D z: white noise of the stated covariance times `white_factor`, and a lasting
 /// part z in units of the stated standard deviations D, slowly changing and constant (docs/math/localization.md,
@@ -219,5 +207,20 @@ struct LocalizationOptions {
     v.group("health", health);
   }
 };
+
+/// With what is stated of the sensors at hand in the place of the defaults.
+inline LocalizationOptions with_stated(LocalizationOptions options, const SensorNoise& stated) {
+  const auto take = [](double& value, double by_recording) { value = by_recording > 0 ? by_recording : value; };
+  take(options.imu.gyro_noise_rad_s_sqrt_hz, stated.imu.gyro_noise_rad_s_sqrt_hz);
+  take(options.imu.gyro_bias_rad_s, stated.imu.gyro_bias_rad_s);
+  take(options.imu.gyro_walk_rad_s2_sqrt_hz, stated.imu.gyro_walk_rad_s2_sqrt_hz);
+  take(options.imu.accel_noise_m_s2_sqrt_hz, stated.imu.accel_noise_m_s2_sqrt_hz);
+  take(options.imu.accel_bias_m_s2, stated.imu.accel_bias_m_s2);
+  take(options.imu.accel_walk_m_s3_sqrt_hz, stated.imu.accel_walk_m_s3_sqrt_hz);
+  take(options.compass.offset_walk_rad_sqrt_hz, stated.compass.offset_walk_rad_sqrt_hz);
+  take(options.inclinometer.bias_rad, stated.inclinometer.bias_rad);
+  take(options.inclinometer.bias_walk_rad_sqrt_hz, stated.inclinometer.bias_walk_rad_sqrt_hz);
+  return options;
+}
 
 }  // namespace spartan

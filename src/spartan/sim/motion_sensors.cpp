@@ -60,10 +60,18 @@ ImuSample true_imu(const BodyMotion& motion, double time_s, double gravity_m_s2)
   return sample;
 }
 
-ImuNoise stated_noise(const ImuOptions& o) {
-  if (!o.enabled) return {};
-  return {o.gyro_noise_rad_s_sqrt_hz, o.gyro_bias_rad_s, o.gyro_walk_rad_s2_sqrt_hz,
-          o.accel_noise_m_s2_sqrt_hz, o.accel_bias_m_s2, o.accel_walk_m_s3_sqrt_hz};
+SensorNoise stated_noise(const ImuOptions& imu, const CompassOptions& compass,
+                         const InclinometerOptions& inclinometer) {
+  // Biases of a drive that do not walk: zero would say that nothing is stated.
+  constexpr double kNoWalk_rad_sqrt_hz = 1e-7;
+  SensorNoise stated;
+  if (imu.enabled) {
+    stated.imu = {imu.gyro_noise_rad_s_sqrt_hz, imu.gyro_bias_rad_s, imu.gyro_walk_rad_s2_sqrt_hz,
+                  imu.accel_noise_m_s2_sqrt_hz, imu.accel_bias_m_s2, imu.accel_walk_m_s3_sqrt_hz};
+  }
+  if (compass.enabled) stated.compass = {kNoWalk_rad_sqrt_hz};
+  if (inclinometer.enabled) stated.inclinometer = {inclinometer.bias_deg * kRadiansPerDegree, kNoWalk_rad_sqrt_hz};
+  return stated;
 }
 
 std::vector<ImuSample> measure_imu(const BodyMotion& motion, const ImuOptions& o, double gravity_m_s2,

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/imu_noise.h"
 #include "spartan/camera/samples.h"
+#include "spartan/camera/sensor_noise.h"
 #include "spartan/core/options.h"
 #include "spartan/sim/body_motion.h"
 
@@ -35,9 +35,6 @@ struct ImuOptions {
     v.field("accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz, "random walk of the bias, density", at_least(0));
   }
 };
-
-/// What a recording states of it.
-ImuNoise stated_noise(const ImuOptions& options);
 
 /// Slip: the share of the rolled distance that does not carry the rover on,
 ///   slip = level + by_slope · tan(climb) + sand · noise(x, y),  rolled = travelled / (1 − slip).
@@ -96,6 +93,9 @@ struct InclinometerOptions {
     v.field("bias_deg", bias_deg, "standard deviation of the bias of the drive", between(0, 45));
   }
 };
+
+/// What a recording states of them.
+SensorNoise stated_noise(const ImuOptions& imu, const CompassOptions& compass, const InclinometerOptions& inclinometer);
 
 /// A sensor that is silent, or repeats its last reading, for a while.
 struct SensorFault {

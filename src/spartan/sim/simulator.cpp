@@ -102,7 +102,7 @@ class Simulation {
 
   Result<SimulationReport> run() {
     const RecordingOptions about{scenario_.name, scenario_.description, scenario_.gravity_m_s2,
-                                 stated_noise(scenario_.imu)};
+                                 stated_noise(scenario_.imu, scenario_.compass, scenario_.inclinometer)};
     if (Status s = check_folder(); !s) return failure(s);
     auto writer = request_.resume ? RecordingWriter::resume(request_.folder, believed_, about)
                                   : RecordingWriter::create(request_.folder, believed_, about);

@@ -1,0 +1,27 @@
+#include "spartan/localization/localization_options.h"
+
+#include <gtest/gtest.h>
+
+namespace spartan {
+namespace {
+
+TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
+  const LocalizationOptions defaults;
+  const LocalizationOptions all = with_stated(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}});
+  EXPECT_EQ(all.imu.gyro_noise_rad_s_sqrt_hz, 1);
+  EXPECT_EQ(all.imu.gyro_bias_rad_s, 2);
+  EXPECT_EQ(all.imu.gyro_walk_rad_s2_sqrt_hz, 3);
+  EXPECT_EQ(all.imu.accel_noise_m_s2_sqrt_hz, 4);
+  EXPECT_EQ(all.imu.accel_bias_m_s2, 5);
+  EXPECT_EQ(all.imu.accel_walk_m_s3_sqrt_hz, 6);
+  EXPECT_EQ(all.compass.offset_walk_rad_sqrt_hz, 7);
+  EXPECT_EQ(all.inclinometer.bias_rad, 8);
+  EXPECT_EQ(all.inclinometer.bias_walk_rad_sqrt_hz, 9);
+  const LocalizationOptions one = with_stated(defaults, {{}, {7}, {}});
+  EXPECT_EQ(one.compass.offset_walk_rad_sqrt_hz, 7);
+  EXPECT_EQ(one.imu.gyro_bias_rad_s, defaults.imu.gyro_bias_rad_s);
+  EXPECT_EQ(one.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
+}
+
+}  // namespace
+}  // namespace spartan
