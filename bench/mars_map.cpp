@@ -136,7 +136,7 @@ void list_missed(std::int64_t position, const char* what, const std::vector<Judg
 void judge(const std::string& folder, const std::string& scenario, int wanted, bool list, Totals& totals) {
   auto drive = open_drive(folder + "/" + scenario);
   if (!drive) {
-    fmt::print("{:<18} not there; scripts/recordings makes it\n", scenario);
+    fmt::print("{:<18} left out: {} (scripts/recordings makes it)\n", scenario, drive.error().message());
     return;
   }
   auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));

@@ -127,7 +127,7 @@ void compare(const std::string& folder, const std::string& scenario, const std::
   const std::string recording = folder + "/" + scenario;
   const auto source = open_recording(recording);
   if (!source) {
-    fmt::print("{:<18} not there; scripts/recordings makes it\n", scenario);
+    fmt::print("{:<18} left out: {} (scripts/recordings makes it)\n", scenario, source.error().message());
     return;
   }
   auto imager = Imager::create((*source)->info().rig, ImagingOptions(), Workers(2));

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,16 +29,19 @@ struct Drive {
   std::map<std::int64_t, std::vector<ShotName>> stops;  // where more than one pair looked
 };
 
-inline std::optional<Drive> open_drive(const std::string& folder) {
+inline Result<Drive> open_drive(const std::string& folder) {
   Drive drive;
   drive.folder = folder;
   auto source = open_recording(folder);
   const auto poses = read_file(folder + "/truth/poses.tum");
   auto elevation = read_geotiff(folder + "/truth/elevation.tif"),
        obstacles = read_geotiff(folder + "/truth/obstacles.tif");
-  if (!source || !poses || !elevation || !obstacles) return std::nullopt;
+  if (!source) return failure(source);
+  if (!poses) return failure(poses);
+  if (!elevation) return failure(elevation);
+  if (!obstacles) return failure(obstacles);
   auto trajectory = parse_tum(*poses, "truth");
-  if (!trajectory) return std::nullopt;
+  if (!trajectory) return failure(trajectory);
   drive.source = std::move(*source);
   drive.rig = drive.source->info().rig;
   drive.poses = std::move(*trajectory);

@@ -112,7 +112,7 @@ std::vector<double> seams(const MergedRange& merged, const Drive& drive, const P
 void judge(const std::string& folder, const std::string& scenario, int wanted) {
   auto drive = open_drive(folder + "/" + scenario);
   if (!drive) {
-    fmt::print("{:<18} not there; scripts/recordings makes it\n", scenario);
+    fmt::print("{:<18} left out: {} (scripts/recordings makes it)\n", scenario, drive.error().message());
     return;
   }
   auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));
