@@ -68,6 +68,7 @@ class ErrorStateFilter {
   void begin_step(const std::optional<WheelSample>& wheels);
   void hold_still(bool imu_still);
   bool wheels_stand() const;
+  bool still_stands();
 
   // Directions and places: absolute_update.cpp.
   void take(const CompassSample& sample);

@@ -8,7 +8,7 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 1;
+constexpr std::uint32_t kStateVersion = 2;
 
 }  // namespace
 
@@ -107,6 +107,7 @@ Bytes Localizer::save() const {
   for (const RefusalCounts& r : state_->refusals) {
     out.put(r.not_finite);
     out.put(r.too_late);
+    out.put(r.too_early);
     out.put(r.duplicates);
     out.put(r.reversed);
   }
@@ -123,6 +124,7 @@ Status Localizer::restore(const Bytes& bytes) {
   for (RefusalCounts& r : state->refusals) {
     r.not_finite = in.get<std::int64_t>();
     r.too_late = in.get<std::int64_t>();
+    r.too_early = in.get<std::int64_t>();
     r.duplicates = in.get<std::int64_t>();
     r.reversed = in.get<std::int64_t>();
   }

@@ -238,12 +238,84 @@ TEST(LocalizerFaults, RefusesAndCountsWhatMakesNoSense) {
   EXPECT_TRUE(localizer.add(CompassSample{test_stamp(1.5), 0, 0.1}));
   EXPECT_FALSE(localizer.add(CompassSample{test_stamp(1.5), 0.1, 0.1}));
   const LocalizationEstimate e = localizer.estimate();
-  EXPECT_EQ(e.health_of(LocalizationSensor::imu).not_finite, 1);
-  EXPECT_EQ(e.health_of(LocalizationSensor::vision).not_finite, 2);
-  EXPECT_EQ(e.health_of(LocalizationSensor::vision).reversed, 1);
-  EXPECT_EQ(e.health_of(LocalizationSensor::compass).duplicates, 1);
-  EXPECT_EQ(e.health_of(LocalizationSensor::compass).too_late, 1);
+  EXPECT_EQ(e.health_of(LocalizationSensor::imu).refused.not_finite, 1);
+  EXPECT_EQ(e.health_of(LocalizationSensor::vision).refused.not_finite, 2);
+  EXPECT_EQ(e.health_of(LocalizationSensor::vision).refused.reversed, 1);
+  EXPECT_EQ(e.health_of(LocalizationSensor::compass).refused.duplicates, 1);
+  EXPECT_EQ(e.health_of(LocalizationSensor::compass).refused.too_late, 1);
   EXPECT_TRUE(e.world_from_body.pose.all_finite());
+}
+
+TEST(LocalizerFaults, AStampFarAheadCostsItselfAlone) {
+  const Samples all = whole_drive(42.5, {}, 53);
+  Localizer localizer(test_options());
+  // A clock that is set right after its first two samples, and one stamp far ahead just before the start.
+  for (const double t : {0.0, 1.0}) EXPECT_TRUE(localizer.add(CompassSample{{test_stamp(t).ns / 2}, 0.3, 0.1}));
+  EXPECT_FALSE(localizer.add(CompassSample{test_stamp(-0.1), 0.3, 0.1}));
+  int refused = 0;
+  for (const Measurement& m : all) {
+    if (stamp_of_measurement(m) > test_stamp(2.5) && !localizer.started()) {
+      EXPECT_FALSE(localizer.add(CompassSample{test_stamp(7200), 0.3, 0.1}));
+      localizer.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
+    }
+    EXPECT_TRUE(localizer.add(m));
+    if (stamp_of_measurement(m) == test_stamp(20)) {
+      EXPECT_FALSE(localizer.add(WheelSample{test_stamp(3600), 1, 1}));
+      ++refused;
+      EXPECT_FALSE(localizer.add(ImuSample{test_stamp(3600), Eigen::Vector3d::Zero(), Eigen::Vector3d(0, 0, 3.71)}));
+    }
+  }
+  const LocalizationEstimate e = localizer.estimate(), expected = driven(test_options(), all).estimate();
+  EXPECT_EQ(e.health_of(LocalizationSensor::wheels).refused.too_early, refused);
+  EXPECT_EQ(e.health_of(LocalizationSensor::compass).refused.too_early, 2);
+  EXPECT_EQ(e.world_from_body.pose.matrix(), expected.world_from_body.pose.matrix());
+  // A shot is believed: the rover slept.
+  EXPECT_TRUE(localizer.add(RelativeMotion{test_stamp(42.5), test_stamp(4000), {}, Matrix6d::Identity(), false}));
+  EXPECT_TRUE(localizer.add(WheelSample{test_stamp(4000.1), 1, 1}));
+}
+
+TEST(LocalizerFaults, AnImuThatDiesWhileTheRoverStandsLeavesTheWheels) {
+  // It stands for 10 s on; the IMU falls silent, the rover drives off.
+  TestDrive drive;
+  Samples all = whole_drive(62.5, {}, 54);
+  for (Measurement& m : all) {
+    std::visit(
+        [](auto& value) {
+          if constexpr (requires { value.stamp; })
+            value.stamp.ns += 10'000'000'000;
+          else
+            value.from.ns += 10'000'000'000, value.to.ns += 10'000'000'000;
+        },
+        m);
+  }
+  Samples standing = test_samples({.speed_m_s = 0}, 12.4, {}, 54);
+  std::erase_if(all,
+                [](const Measurement& m) { return m.index() == 0 || stamp_of_measurement(m) <= test_stamp(12.4); });
+  all.insert(all.begin(), standing.begin(), standing.end());
+  all.emplace_back(drive.motion(2.5, 2.5, test_motion_covariance()));
+  std::get<RelativeMotion>(all.back()).to = test_stamp(12.5);
+  std::stable_sort(all.begin(), all.end(), comes_before);
+  const LocalizationEstimate e = driven(test_options(), all).estimate();
+  EXPECT_EQ(e.health_of(LocalizationSensor::imu).state, SensorState::missing);
+  ASSERT_TRUE(e.slip) << "the wheels' steps go on";
+  EXPECT_GT(e.slip->stamp, test_stamp(70));
+  EXPECT_GT(e.health_of(LocalizationSensor::wheels).used, 20);
+}
+
+TEST(LocalizerFaults, AnImuThatFailedOnceIsBelievedAgain) {
+  // Spikes, each between two shots, with good shots between them.
+  Samples all = whole_drive(92.5, {}, 55);
+  for (Measurement& m : all) {
+    auto* imu = std::get_if<ImuSample>(&m);
+    if (imu != nullptr && (within(m, 20.2, 20.7) || within(m, 40.2, 40.7) || within(m, 60.2, 60.7)))
+      imu->gyro_rad_s.z() += 0.3;
+  }
+  EXPECT_EQ(health_at(all, 22.2, LocalizationSensor::imu).state, SensorState::suspect);
+  EXPECT_EQ(health_at(all, 24, LocalizationSensor::imu).state, SensorState::ok);
+  EXPECT_EQ(health_at(all, 62.2, LocalizationSensor::imu).state, SensorState::suspect) << "not three in a row";
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::imu).state, SensorState::ok);
+  expect_consistent(end, all);
 }
 
 TEST(LocalizerFaults, HoldsStillWhileItStands) {
@@ -287,7 +359,7 @@ TEST(LocalizerFaults, SavesAndRestoresItsMemory) {
     other.add(all[i]);
   }
   EXPECT_EQ(other.save(), one.save());
-  EXPECT_EQ(other.estimate().health_of(LocalizationSensor::compass).not_finite, 1);
+  EXPECT_EQ(other.estimate().health_of(LocalizationSensor::compass).refused.not_finite, 1);
   EXPECT_EQ(other.estimate().world_from_body.pose.matrix(), one.estimate().world_from_body.pose.matrix());
   Bytes broken = one.save();
   broken[0] = 99;

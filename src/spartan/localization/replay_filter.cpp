@@ -11,6 +11,8 @@ namespace {
 constexpr std::int64_t kCell_ns = 500'000'000;
 /// What is kept before the start, to level by.
 constexpr double kBeforeStart_s = 10;
+/// A stamp may be so far ahead of all others, or as far as the buffer is long.
+constexpr double kLeastLead_s = 5;
 
 std::int64_t cell_of(Stamp stamp) {
   return stamp.ns >= 0 ? stamp.ns / kCell_ns : -((-stamp.ns + kCell_ns - 1) / kCell_ns);
@@ -109,50 +111,74 @@ ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(option
 void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
                          const std::optional<Eigen::Vector3d>& up_in_body) {
   if (started()) throw std::logic_error("the localization has started already");
+  std::erase_if(entries_, [&](const Measurement& m) { return std::abs(age(m, stamp)) > kBeforeStart_s; });
   const auto later = std::partition_point(entries_.begin(), entries_.end(),
                                           [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
   filter_.start(stamp, ahead_in_body, std::span(entries_.data(), static_cast<std::size_t>(later - entries_.begin())),
                 up_in_body);
   entries_.erase(entries_.begin(), later);
-  start_ = stamp;
-  newest_ = any_ ? std::max(newest_, stamp) : stamp;
-  any_ = true;
+  start_ = newest_ = stamp;
+  for (const Measurement& m : entries_) newest_ = std::max(newest_, stamp_of_measurement(m));
   snapshots_ = {{0, filter_.memory()}};
   run_from(0);
 }
 
 std::optional<Refusal> ReplayFilter::add(const Measurement& m) {
+  return started() ? add_started(m) : add_before_start(m);
+}
+
+/// There is no shot yet to say what time it is: a stamp far from all others is refused, a second one beside it
+/// believed.
+std::optional<Refusal> ReplayFilter::add_before_start(const Measurement& m) {
   const Stamp stamp = stamp_of_measurement(m);
-  if (started() && (stamp < start_ || age(m, newest_) > options_.buffer_s)) {
+  const bool odd = !entries_.empty() && std::abs(age(m, newest_)) > kBeforeStart_s;
+  if (odd) {
+    const bool alone = !odd_ || std::abs(age(m, *odd_)) > kBeforeStart_s;
+    odd_ = stamp;
+    if (alone) return stamp > newest_ ? Refusal::too_early : Refusal::too_late;
+    entries_.clear();
+  }
+  odd_.reset();
+  if (const auto refusal = place(m)) return refusal;
+  newest_ = stamp_of_measurement(entries_.back());
+  std::erase_if(entries_, [&](const Measurement& e) { return age(e, newest_) > kBeforeStart_s; });
+  return std::nullopt;
+}
+
+std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
+  const Stamp stamp = stamp_of_measurement(m);
+  if (stamp < start_ || age(m, newest_) > options_.buffer_s) {
     const auto* constraint = std::get_if<PoseConstraint>(&m);
     if (constraint == nullptr || stamp != filter_.memory().vision.clone_stamp) return Refusal::too_late;
     // As early as the buffer reaches: a shot that comes late still comes after it.
     const auto buffer_ns = static_cast<std::int64_t>(options_.buffer_s * 1e9);
-    return insert(LateConstraint{{newest_.ns - buffer_ns}, *constraint});
+    return take(LateConstraint{{newest_.ns - buffer_ns}, *constraint});
   }
-  return insert(m);
+  // It would make all others too late. Only the required sensor is believed that so much time has gone by.
+  if (seconds_between(newest_, stamp) > std::max(options_.buffer_s, kLeastLead_s) &&
+      !std::holds_alternative<RelativeMotion>(m))
+    return Refusal::too_early;
+  return take(m);
 }
 
-std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
-  const Stamp stamp = stamp_of_measurement(m);
-  const auto place = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
-  if (place != entries_.end() && !comes_before(m, *place)) return Refusal::duplicate;
-  const auto at = static_cast<std::size_t>(place - entries_.begin());
-  entries_.insert(place, m);
-  newest_ = any_ ? std::max(newest_, stamp) : stamp;
-  any_ = true;
-  if (started()) {
-    if (at + 1 == entries_.size()) {
-      run_from(at);
-    } else {
-      replay_from(at);
-    }
-    forget_old();
+std::optional<Refusal> ReplayFilter::place(const Measurement& m) {
+  const auto at = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
+  if (at != entries_.end() && !comes_before(m, *at)) return Refusal::duplicate;
+  entries_.insert(at, m);
+  return std::nullopt;
+}
+
+std::optional<Refusal> ReplayFilter::take(const Measurement& m) {
+  if (const auto refusal = place(m)) return refusal;
+  newest_ = std::max(newest_, stamp_of_measurement(m));
+  const auto at =
+      static_cast<std::size_t>(std::lower_bound(entries_.begin(), entries_.end(), m, comes_before) - entries_.begin());
+  if (at + 1 == entries_.size()) {
+    run_from(at);
   } else {
-    const auto first = std::find_if(entries_.begin(), entries_.end(),
-                                    [&](const Measurement& e) { return age(e, newest_) <= kBeforeStart_s; });
-    entries_.erase(entries_.begin(), first);
+    replay_from(at);
   }
+  forget_old();
   return std::nullopt;
 }
 
@@ -191,7 +217,8 @@ void ReplayFilter::forget_old() {
 
 void ReplayFilter::put(ArchiveWriter& out) const {
   out.put(started());
-  out.put(any_);
+  out.put(odd_.has_value());
+  out.put(odd_.value_or(Stamp()).ns);
   out.put(start_.ns);
   out.put(newest_.ns);
   spartan::put(out, started() ? snapshots_.front().memory : FilterMemory{});
@@ -201,7 +228,9 @@ void ReplayFilter::put(ArchiveWriter& out) const {
 
 bool ReplayFilter::get(ArchiveReader& in) {
   const bool has_started = in.get<bool>();
-  any_ = in.get<bool>();
+  const bool odd = in.get<bool>();
+  odd_ = Stamp{in.get<std::int64_t>()};
+  if (!odd) odd_.reset();
   start_.ns = in.get<std::int64_t>();
   newest_.ns = in.get<std::int64_t>();
   const FilterMemory memory = get_filter_memory(in);

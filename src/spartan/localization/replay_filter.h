@@ -24,7 +24,7 @@ class ReplayFilter {
   /// Nothing where the measurement was taken; else why it was not. Whatever the order of arrival, the state is the
   /// same, bit for bit, as after all that were taken in the order of comes_before(). A constraint on the pose at the
   /// last shot is never too late: where that shot is older than the buffer, the constraint is taken at the buffer's far
-  /// end.
+  /// end, as that is when it comes.
   std::optional<Refusal> add(const Measurement& measurement);
 
   const ErrorStateFilter& filter() const { return filter_; }
@@ -40,7 +40,11 @@ class ReplayFilter {
     FilterMemory memory;
   };
 
-  std::optional<Refusal> insert(const Measurement& measurement);
+  std::optional<Refusal> add_before_start(const Measurement& measurement);
+  std::optional<Refusal> add_started(const Measurement& measurement);
+  /// Into the entries, and no more.
+  std::optional<Refusal> place(const Measurement& measurement);
+  std::optional<Refusal> take(const Measurement& measurement);
   bool opens_cell(std::size_t entry) const;
   void replay_from(std::size_t entry);
   void run_from(std::size_t entry);
@@ -51,7 +55,7 @@ class ReplayFilter {
   std::vector<Measurement> entries_;  ///< in order; before the start: all that came
   std::vector<Snapshot> snapshots_;
   Stamp start_, newest_;
-  bool any_ = false;
+  std::optional<Stamp> odd_;  ///< of the sample before, where that was refused for being far from all others
 };
 
 }  // namespace spartan

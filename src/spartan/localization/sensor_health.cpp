@@ -44,6 +44,9 @@ void RefusalCounts::count(Refusal refusal) {
     case Refusal::too_late:
       ++too_late;
       break;
+    case Refusal::too_early:
+      ++too_early;
+      break;
     case Refusal::duplicate:
       ++duplicates;
       break;
@@ -103,10 +106,7 @@ SensorHealth SensorJudge::report(Stamp now, double timeout_s, const RefusalCount
   health.state = missing(now, timeout_s) ? SensorState::missing : state;
   health.used = used;
   health.rejected = rejected;
-  health.not_finite = refusals.not_finite;
-  health.too_late = refusals.too_late;
-  health.duplicates = refusals.duplicates;
-  health.reversed = refusals.reversed;
+  health.refused = refusals;
   HealthReason why = reason;
   if (health.state == SensorState::missing) why = seen ? HealthReason::silent : HealthReason::never_seen;
   switch (why) {

@@ -34,20 +34,20 @@ enum class HealthReason : std::uint8_t {
 };
 
 /// What refuses samples before they reach the filter.
-enum class Refusal : std::uint8_t { not_finite, too_late, duplicate, reversed };
+enum class Refusal : std::uint8_t { not_finite, too_late, too_early, duplicate, reversed };
+
+/// Counts refusals; keeps nothing else.
+struct RefusalCounts {
+  std::int64_t not_finite = 0, too_late = 0, too_early = 0, duplicates = 0, reversed = 0;
+  void count(Refusal refusal);
+};
 
 /// For people: what a sensor is worth at a moment.
 struct SensorHealth {
   SensorState state = SensorState::missing;
-  std::string reason;                                                       ///< empty where the state is ok
-  std::int64_t used = 0, rejected = 0;                                      ///< by the filter
-  std::int64_t not_finite = 0, too_late = 0, duplicates = 0, reversed = 0;  ///< refused before
-};
-
-/// Counts refusals; keeps nothing else.
-struct RefusalCounts {
-  std::int64_t not_finite = 0, too_late = 0, duplicates = 0, reversed = 0;
-  void count(Refusal refusal);
+  std::string reason;                   ///< empty where the state is ok
+  std::int64_t used = 0, rejected = 0;  ///< by the filter
+  RefusalCounts refused;                ///< before
 };
 
 /// The memory of one sensor's judge: ok → suspect at the first refusal, excluded after `excluded_after` in a row, back

@@ -49,8 +49,8 @@ TEST(SensorJudge, ReportsWithReason) {
   refusals.count(Refusal::too_late);
   refusals.count(Refusal::too_late);
   const SensorHealth health = j.report(now, 1, refusals);
-  EXPECT_EQ(health.not_finite, 1);
-  EXPECT_EQ(health.too_late, 2);
+  EXPECT_EQ(health.refused.not_finite, 1);
+  EXPECT_EQ(health.refused.too_late, 2);
   EXPECT_EQ(health.rejected, 1);
 }
 

@@ -77,6 +77,8 @@ bool ErrorStateFilter::measure_motion(const RelativeMotion& motion) {
   if (!judge.judge(square, vision_gate_, HealthReason::disagrees, options_.health.excluded_after,
                    options_.health.back_after))
     return false;
+  SensorJudge& imu = memory_.judge(LocalizationSensor::imu);
+  if (predicted && imu.state == SensorState::suspect) imu.readmit();  // it said what vision saw
   correct_motion(innovation, error_at::kVisionClone);
   return true;
 }

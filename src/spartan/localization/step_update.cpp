@@ -28,7 +28,7 @@ void ErrorStateFilter::take(const WheelSample& sample) {
   wheels.previous = wheels.known ? wheels.last : sample;
   wheels.last = sample;
   wheels.known = true;
-  if (memory_.step.standing) return;
+  if (still_stands()) return;
   const double seconds = seconds_between(memory_.step.from, sample.stamp);
   if (memory_.step.has_wheels && seconds < options_.wheels.longest_step_s) return;
   if (memory_.step.has_wheels && seconds <= kLongestSteps * options_.wheels.longest_step_s) measure_step(sample);
@@ -48,7 +48,7 @@ std::optional<WheelSample> ErrorStateFilter::wheels_at(Stamp stamp) const {
 
 /// Steps end with shots, so that vision and wheels speak of the same motion.
 void ErrorStateFilter::end_step_at_shot(Stamp stamp) {
-  if (memory_.step.standing) return;
+  if (still_stands()) return;
   const std::optional<WheelSample> wheels = wheels_at(stamp);
   const double seconds = seconds_between(memory_.step.from, stamp);
   if (wheels && memory_.step.has_wheels && seconds >= kShortestStep_s &&
@@ -126,6 +126,14 @@ bool ErrorStateFilter::wheels_stand() const {
   return seconds_between(wheels.last.stamp, memory_.stamp) < kFreshWheels_s &&
          seconds_between(wheels.moved.stamp, memory_.stamp) >= options_.standing.wheels_still_s &&
          memory_.judge(LocalizationSensor::wheels).state == SensorState::ok;
+}
+
+/// It is the IMU that says when standing ends; of one that has gone silent, or is not believed, nothing is known.
+bool ErrorStateFilter::still_stands() {
+  bool& standing = memory_.step.standing;
+  standing =
+      standing && inertial_usable() && seconds_between(memory_.imu.last.stamp, memory_.stamp) <= options_.imu.timeout_s;
+  return standing;
 }
 
 /// Asked at the end of each block of IMU samples. A smooth ride looks like standing to an IMU, and a rover may slide on

@@ -106,7 +106,7 @@ CellFusion GlobalMap::fusion() const {
 
 std::size_t GlobalMap::tiles_in_memory() const {
   return static_cast<std::size_t>(
-      std::count_if(tiles_.begin(), tiles_.end(), [](const auto& slot) { return slot.second.tile.has_value(); }));
+      std::count_if(tiles_.begin(), tiles_.end(), [](const auto& slot) { return slot.second.tile != nullptr; }));
 }
 
 Result<Tile*> GlobalMap::load(const TileKey& key) {
@@ -118,14 +118,14 @@ Result<Tile*> GlobalMap::load(const TileKey& key) {
     if (store_ == nullptr) throw std::logic_error("GlobalMap: a tile is in the store, but there is none");
     auto tile = store_->read({key, slot.revision});
     if (!tile) return failure(tile);
-    slot.tile = *tile;
+    slot.tile = std::make_unique<Tile>(*tile);
   }
   return &*slot.tile;
 }
 
 Result<Tile*> GlobalMap::load_or_make(const TileKey& key) {
   const auto [slot, is_new] = tiles_.try_emplace(key);
-  if (is_new) slot->second.tile.emplace();
+  if (is_new) slot->second.tile = std::make_unique<Tile>();
   auto tile = load(key);
   if (tile) slot->second.changed = true;
   return tile;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -80,11 +81,12 @@ class GlobalMap {
 
  private:
   struct Slot {
-    std::int64_t revision = 0;  // 0: not in the store yet
-    std::optional<Tile> tile;
+    std::int64_t revision = 0;   // 0: not in the store yet
+    std::unique_ptr<Tile> tile;  // on its own: what is dropped is freed
     bool changed = false;
     std::uint64_t used = 0;
   };
+  static_assert(sizeof(Slot) < sizeof(Tile) / 100, "a tile that is not in memory costs next to nothing");
   Result<Tile*> load(const TileKey& key);
   Result<Tile*> load_or_make(const TileKey& key);
   void drop_surplus();

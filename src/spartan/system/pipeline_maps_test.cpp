@@ -150,7 +150,7 @@ TEST(PipelineMaps, AStopMayBeLongAndTheOdometrysPairMayLookOn) {
   EXPECT_EQ(result.position->stamp, Stamp::from_seconds(arrived));
   const SensorHealth& map = result.localization.health_of(LocalizationSensor::map);
   EXPECT_EQ(map.used, 1);
-  EXPECT_EQ(map.too_late, 0);
+  EXPECT_EQ(map.refused.too_late, 0);
 }
 
 // Stopped between two looks of the wide pair, at a shot of the narrow one.
