@@ -146,6 +146,9 @@ TEST_F(Positions, SensorsErrAsTheRecordingStates) {
     return testing::content_of(path(output + "/trajectory_localization.tum"));
   };
   EXPECT_NE(localized("stated"), localized("not_stated"));
+  const std::string used = testing::content_of(path("stated/config.yaml"));
+  for (const char* line : {"gravity_m_s2: 3.71", "offset_walk_rad_sqrt_hz: 1e-07", "bias_rad: 0.00174532"})
+    EXPECT_NE(used.find(line), std::string::npos) << line;
   EXPECT_EQ(localized("silent"), localized("not_stated"));
 }
 

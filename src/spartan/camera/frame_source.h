@@ -55,7 +55,7 @@ struct ShotName {
 
 /// Yields samples in the order of time; at the same stamp IMU, wheels, compass, inclinometer, then shots in the order
 /// in which the recording lists them. A shot whose stamp runs backwards stays behind the shot it is listed after.
-/// Sensor samples (not shots) whose stamp does not increase within their table are left out.
+/// Sensor samples (not shots) whose stamps do not increase within their table are left out, the fewest that must go.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
@@ -82,6 +82,9 @@ class FrameSource {
 
   /// IMU samples of `seconds` from a stamp on (none: from the first one on); does not move the reading position.
   virtual Result<std::vector<ImuSample>> imu_samples(std::optional<Stamp> from, double seconds) = 0;
+
+  /// Sensor samples that were left out so far because of their stamps.
+  virtual std::int64_t sensor_samples_left_out() const = 0;
 };
 
 struct OpenOptions {

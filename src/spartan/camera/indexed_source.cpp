@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "spartan/camera/increasing_stream.h"
 #include "spartan/camera/recording_index.h"
 #include "spartan/core/image_io.h"
 
@@ -17,28 +18,22 @@ class SensorHead {
   Status rewind() {
     auto stream = open_();
     if (!stream) return failure(stream);
-    stream_ = std::move(*stream);
-    head_.reset();
-    last_.reset();
+    stream_.emplace(std::move(*stream));
     return advance();
   }
-  // Goes to the next sample that is later than the one before.
   Status advance() {
-    do {
-      auto sample = stream_->next();
-      if (!sample) return failure(sample);
-      head_ = std::move(*sample);
-    } while (head_ && last_ && stamp_of(*head_) <= *last_);
-    if (head_) last_ = stamp_of(*head_);
+    auto sample = stream_->next();
+    if (!sample) return failure(sample);
+    head_ = std::move(*sample);
     return {};
   }
   const std::optional<Sample>& head() const { return head_; }
+  std::int64_t left_out() const { return stream_ ? stream_->left_out() : 0; }
 
  private:
   OpenStream open_;
-  std::unique_ptr<SampleStream> stream_;
+  std::optional<IncreasingStream> stream_;
   std::optional<Sample> head_;
-  std::optional<Stamp> last_;
 };
 
 MissingFrame missing(const Shot& shot, FrameFault fault, std::string message) {
@@ -129,6 +124,12 @@ class IndexedSource : public FrameSource {
     }
     if (!status) return failure(status);
     return samples;
+  }
+
+  std::int64_t sensor_samples_left_out() const override {
+    std::int64_t sum = 0;
+    for (const SensorHead& sensor : sensors_) sum += sensor.left_out();
+    return sum;
   }
 
  private:

@@ -208,18 +208,26 @@ struct LocalizationOptions {
   }
 };
 
-/// With what is stated of the sensors at hand in the place of the defaults.
+/// With what is stated of the sensors at hand in the place of the defaults; what somebody set stays.
 inline LocalizationOptions with_stated(LocalizationOptions options, const SensorNoise& stated) {
-  const auto take = [](double& value, double by_recording) { value = by_recording > 0 ? by_recording : value; };
-  take(options.imu.gyro_noise_rad_s_sqrt_hz, stated.imu.gyro_noise_rad_s_sqrt_hz);
-  take(options.imu.gyro_bias_rad_s, stated.imu.gyro_bias_rad_s);
-  take(options.imu.gyro_walk_rad_s2_sqrt_hz, stated.imu.gyro_walk_rad_s2_sqrt_hz);
-  take(options.imu.accel_noise_m_s2_sqrt_hz, stated.imu.accel_noise_m_s2_sqrt_hz);
-  take(options.imu.accel_bias_m_s2, stated.imu.accel_bias_m_s2);
-  take(options.imu.accel_walk_m_s3_sqrt_hz, stated.imu.accel_walk_m_s3_sqrt_hz);
-  take(options.compass.offset_walk_rad_sqrt_hz, stated.compass.offset_walk_rad_sqrt_hz);
-  take(options.inclinometer.bias_rad, stated.inclinometer.bias_rad);
-  take(options.inclinometer.bias_walk_rad_sqrt_hz, stated.inclinometer.bias_walk_rad_sqrt_hz);
+  const LocalizationOptions defaults;
+  const auto take = [](double& value, double by_default, double by_recording) {
+    if (value == by_default && by_recording > 0) value = by_recording;
+  };
+  const auto take_imu = [&](double InertialOptions::*ours, double ImuNoise::*theirs) {
+    take(options.imu.*ours, defaults.imu.*ours, stated.imu.*theirs);
+  };
+  take_imu(&InertialOptions::gyro_noise_rad_s_sqrt_hz, &ImuNoise::gyro_noise_rad_s_sqrt_hz);
+  take_imu(&InertialOptions::gyro_bias_rad_s, &ImuNoise::gyro_bias_rad_s);
+  take_imu(&InertialOptions::gyro_walk_rad_s2_sqrt_hz, &ImuNoise::gyro_walk_rad_s2_sqrt_hz);
+  take_imu(&InertialOptions::accel_noise_m_s2_sqrt_hz, &ImuNoise::accel_noise_m_s2_sqrt_hz);
+  take_imu(&InertialOptions::accel_bias_m_s2, &ImuNoise::accel_bias_m_s2);
+  take_imu(&InertialOptions::accel_walk_m_s3_sqrt_hz, &ImuNoise::accel_walk_m_s3_sqrt_hz);
+  take(options.compass.offset_walk_rad_sqrt_hz, defaults.compass.offset_walk_rad_sqrt_hz,
+       stated.compass.offset_walk_rad_sqrt_hz);
+  take(options.inclinometer.bias_rad, defaults.inclinometer.bias_rad, stated.inclinometer.bias_rad);
+  take(options.inclinometer.bias_walk_rad_sqrt_hz, defaults.inclinometer.bias_walk_rad_sqrt_hz,
+       stated.inclinometer.bias_walk_rad_sqrt_hz);
   return options;
 }
 

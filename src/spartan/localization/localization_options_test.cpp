@@ -21,6 +21,9 @@ TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
   EXPECT_EQ(one.compass.offset_walk_rad_sqrt_hz, 7);
   EXPECT_EQ(one.imu.gyro_bias_rad_s, defaults.imu.gyro_bias_rad_s);
   EXPECT_EQ(one.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
+  LocalizationOptions set;
+  set.inclinometer.bias_rad = 0.2;
+  EXPECT_EQ(with_stated(set, {{}, {}, {8, 9}}).inclinometer.bias_rad, 0.2) << "somebody wanted it";
 }
 
 }  // namespace

@@ -332,7 +332,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   RunHooks hooks = given_hooks;
   hooks.log = given_hooks.log.with_file(folder.log());
   report_sequence(info, hooks.log);
-  const RunIdentity identity{fingerprint(**source), dump_options(request.options), to_rig_yaml(info.rig)};
+  const RunIdentity identity{fingerprint(**source), dump_options(options), to_rig_yaml(info.rig)};
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
@@ -341,6 +341,8 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   Drive drive(request, hooks, **source, std::move(*pipeline), std::move(*store), folder);
   if (Status s = drive.begin(); !s) return failure(s);
   if (Status s = drive.drive(); !s) return failure(s);
+  if (const std::int64_t rows = (*source)->sensor_samples_left_out(); rows > 0)
+    hooks.log.warning(fmt::format("{} sensor samples left out: their stamps run against those around them", rows));
   if (drive.usable() == 0 && !drive.stopped()) {
     // There is nothing in it, and it would be in the way of the next try.
     if (*prepared == FolderState::made) remove_run_folder(folder);

@@ -48,8 +48,9 @@ struct RunOptions {
     v.field("gravity_m_s2", gravity_m_s2,
             "9.81 on Earth, 3.71 on Mars; the IMU's mean must agree within 5 %; 0: as the recording says, else 9.81",
             between(0, 30));
-    v.field("noise_as_stated", noise_as_stated,
-            "what the recording states of its sensors' noise and biases stands above that in localization");
+    v.field(
+        "noise_as_stated", noise_as_stated,
+        "what the recording states of its sensors' noise and biases stands in the place of localization's defaults");
     v.field("odometry_pair", odometry_pair, "which pair drives the odometry; empty: the rig's first one made for it");
     v.group("imaging", imaging);
     v.group("odometry", odometry);
