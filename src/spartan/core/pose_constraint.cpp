@@ -2,8 +2,23 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 namespace spartan {
+
+PoseConstraint carried(const PoseConstraint& constraint, const UncertainPose& motion, Stamp stamp) {
+  // T Exp(ξ) M = T M Exp(Ad(M⁻¹) ξ).
+  const Matrix6d back = adjoint(motion.pose), forth = adjoint(motion.pose.inverse());
+  return {stamp, constraint.world_from_body * motion.pose,
+          blurred(back.transpose() * constraint.information * back, motion.covariance),
+          forth * constraint.map_covariance * forth.transpose()};
+}
+
+// (Λ⁻¹ + C)⁻¹ for a Λ of any rank.
+Matrix6d blurred(const Matrix6d& information, const Matrix6d& covariance) {
+  const Matrix6d m = (Matrix6d::Identity() + information * covariance).partialPivLu().solve(information);
+  return 0.5 * (m + m.transpose());
+}
 
 Matrix6d common_share(const Matrix6d& pose, const Matrix6d& map) {
   constexpr double kLeastVariance = 1e-14;  // a pose may be exact

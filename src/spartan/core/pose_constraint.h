@@ -17,6 +17,12 @@ struct PoseConstraint {
   Matrix6d map_covariance = Matrix6d::Zero();
 };
 
+/// The same of the pose that a motion led to: `constraint.world_from_body` · `motion`, at `stamp`.
+PoseConstraint carried(const PoseConstraint& constraint, const UncertainPose& motion, Stamp stamp);
+
+/// Information of a measurement whose error gets one more, independent part.
+Matrix6d blurred(const Matrix6d& information, const Matrix6d& covariance);
+
 /// What the errors of a pose and of a map made from earlier poses of the same drive have in common, as the share S of
 /// the pose's covariance P: their cross-covariance is P S. Where the pose has become less certain since, it has all of
 /// the map's error; where it has become more certain, the map has all of the pose's: along common axes of both the

@@ -50,5 +50,34 @@ TEST(CommonShare, AnExactPoseOrMapHasNoError) {
   EXPECT_LE(common_covariance(some, Matrix6d::Zero()).norm(), 1e-12);
 }
 
+TEST(PoseConstraint, IsCarriedAlongAMotion) {
+  // Against a linear map of errors: T Exp(ξ) M Exp(n) = T M Exp(Ad(M⁻¹) ξ + n) to first order.
+  Random random(8);
+  const auto small = [&](double size) {
+    Vector6d v;
+    for (int i = 0; i < 6; ++i) v[i] = random.normal(0, size);
+    return v;
+  };
+  PoseConstraint c{{5}, exp_se3(small(1)), Matrix6d::Zero(), random_covariance(random)};
+  const Matrix6d covariance = random_covariance(random);
+  c.information = covariance.inverse();
+  const UncertainPose motion{exp_se3(small(1)), random_covariance(random)};
+  const PoseConstraint on = carried(c, motion, {9});
+  EXPECT_EQ(on.stamp, Stamp{9});
+  EXPECT_LE(log_se3(on.world_from_body.inverse() * c.world_from_body * motion.pose).norm(), 1e-12);
+  Matrix6d by_error;
+  for (int i = 0; i < 6; ++i) {
+    const Vector6d step = 1e-6 * Vector6d::Unit(i);
+    by_error.col(i) = log_se3(on.world_from_body.inverse() * c.world_from_body * exp_se3(step) * motion.pose) / 1e-6;
+  }
+  const Matrix6d expected = by_error * covariance * by_error.transpose() + motion.covariance;
+  EXPECT_LE((on.information.inverse() - expected).norm(), 1e-5 * expected.norm());
+  const Matrix6d map = by_error * c.map_covariance * by_error.transpose();
+  EXPECT_LE((on.map_covariance - map).norm(), 1e-5 * map.norm());
+  // What is not known stays unknown.
+  c.information.setZero();
+  EXPECT_EQ(carried(c, motion, {9}).information.norm(), 0);
+}
+
 }  // namespace
 }  // namespace spartan

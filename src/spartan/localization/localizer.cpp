@@ -69,6 +69,10 @@ bool Localizer::add(const Measurement& measurement) {
   return state_->add(measurement);
 }
 
+bool Localizer::reaches(Stamp stamp) const {
+  return state_->filter.reaches(stamp);
+}
+
 LocalizationEstimate Localizer::estimate() const {
   const FilterMemory& m = state_->filter.filter().memory();
   const NavigationState& s = m.belief.state;

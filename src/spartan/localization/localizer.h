@@ -69,6 +69,8 @@ class Localizer {
   /// Whether it was taken. One RelativeMotion for every shot after the first, measured or not; `from` must be the shot
   /// before.
   bool add(const Measurement& measurement);
+  /// Whether the buffer still holds that moment.
+  bool reaches(Stamp stamp) const;
 
   /// At the newest sample; identity before the start.
   LocalizationEstimate estimate() const;

@@ -123,6 +123,10 @@ void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
   run_from(0);
 }
 
+bool ReplayFilter::reaches(Stamp stamp) const {
+  return started() && stamp >= start_ && seconds_between(stamp, newest_) <= options_.buffer_s;
+}
+
 std::optional<Refusal> ReplayFilter::add(const Measurement& m) {
   return started() ? add_started(m) : add_before_start(m);
 }
@@ -147,7 +151,7 @@ std::optional<Refusal> ReplayFilter::add_before_start(const Measurement& m) {
 
 std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
   const Stamp stamp = stamp_of_measurement(m);
-  if (stamp < start_ || age(m, newest_) > options_.buffer_s) {
+  if (!reaches(stamp)) {
     const auto* constraint = std::get_if<PoseConstraint>(&m);
     if (constraint == nullptr || stamp != filter_.memory().vision.clone_stamp) return Refusal::too_late;
     // As early as the buffer reaches: a shot that comes late still comes after it.

@@ -27,6 +27,9 @@ class ReplayFilter {
   /// end, as that is when it comes.
   std::optional<Refusal> add(const Measurement& measurement);
 
+  /// Whether a sample of that moment would not be too late; only once started.
+  bool reaches(Stamp stamp) const;
+
   const ErrorStateFilter& filter() const { return filter_; }
 
   void put(ArchiveWriter& out) const;

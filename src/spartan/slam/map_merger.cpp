@@ -15,11 +15,6 @@ Matrix6d symmetric(const Matrix6d& m) {
   return 0.5 * (m + m.transpose());
 }
 
-// Information of a measurement whose error has one more part, of covariance C.
-Matrix6d blurred(const Matrix6d& information, const Matrix6d& covariance) {
-  return symmetric((Matrix6d::Identity() + information * covariance).partialPivLu().solve(information));
-}
-
 struct Correction {
   UncertainPose corrected;
   Matrix6d relative;  // covariance of the corrected pose against the map

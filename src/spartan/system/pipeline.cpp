@@ -3,16 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "spartan/localization/start_frame.h"
+#include "spartan/localization/vision_track.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/system/position_stage.h"
 
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 4;
+constexpr std::uint32_t kStateVersion = 5;
 constexpr double kGravityOnEarth_m_s2 = 9.81;
 
 LocalizationOptions with_gravity(const RunOptions& options) {
@@ -38,6 +40,8 @@ struct Pipeline::State {
         odometer(options_in.odometry, workers),
         disparity_computer(options_in.reconstruction, workers),
         localizer(with_gravity(options_in)),
+        odometry_track(with_gravity(options_in)),
+        slam_track(with_gravity(options_in)),
         position(options_in.reconstruction, options_in.mapping, workers),
         merger(options_in.slam, options_in.mapping.map, workers) {
     maps_positions = options.maps && rig.pairs.size() > 1;
@@ -50,6 +54,7 @@ struct Pipeline::State {
   Odometer odometer;
   DisparityComputer disparity_computer;
   Localizer localizer;
+  VisionTrack odometry_track, slam_track;  // the odometry's poses, without and with the map's corrections
   PositionStage position;
   MapMerger merger;
   bool maps_positions = false;
@@ -60,8 +65,7 @@ struct Pipeline::State {
   // The memory from frame to frame.
   bool started = false;
   Stamp last_stamp;
-  UncertainPose world_from_left;
-  UncertainPose slam;  // world_from_body: odometry with the latest correction by the map
+  Pose world_from_left;  // by the odometry
   Pose left_from_body;
   Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the left frame, per second
   double distance_m = 0;
@@ -69,8 +73,10 @@ struct Pipeline::State {
 
   void start(const RectifiedPair& shot);
   void advance(const MotionEstimate& motion);
-  void localize(const RectifiedPair& shot, const MotionEstimate& motion);
-  void arrive(const StereoFrame& frame, const RectifiedPair& shot);
+  RelativeMotion body_motion(const RectifiedPair& shot, const MotionEstimate& motion) const;
+  void localize(const RelativeMotion& moved);
+  Status pass(const StereoFrame& frame, const RectifiedPair& shot, const RelativeMotion& moved);
+  void hear_map(const PositionSurvey& survey, const PoseConstraint& constraint);
   Status look(const StereoFrame& frame);
   Result<std::optional<MappedPosition>> leave_position();
   bool terrain_is_due() const;
@@ -79,22 +85,22 @@ struct Pipeline::State {
 
 void Pipeline::State::start(const RectifiedPair& shot) {
   localizer.start(shot.stamp, shot.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body);
-  slam = {localizer.estimate().world_from_body.pose, Matrix6d::Zero()};
-  world_from_left = {slam.pose * shot.body_from_left, Matrix6d::Zero()};
+  const Pose first = localizer.estimate().world_from_body.pose;
+  odometry_track.start(shot.stamp, first);
+  slam_track.start(shot.stamp, first);
+  world_from_left = first * shot.body_from_left;
   started = true;
 }
 
 void Pipeline::State::advance(const MotionEstimate& motion) {
-  world_from_left = compose(world_from_left, {motion.previous_from_current, motion.covariance});
+  world_from_left = world_from_left * motion.previous_from_current;
   distance_m += motion.previous_from_current.translation().norm();
   const double seconds = seconds_between(motion.from, motion.to);
   if (seconds > 0) velocity = log_se3(motion.previous_from_current) / seconds;
 }
 
-// M moves the left eye: B M B⁻¹ moves the body, and B M Exp(ξ) B⁻¹ = B M B⁻¹ Exp(Ad_B ξ). What the map and the sensors
-// correct begins anew from there.
-void Pipeline::State::localize(const RectifiedPair& shot, const MotionEstimate& motion) {
-  if (motion.first) return;
+// M moves the left eye: B M B⁻¹ moves the body, and B M Exp(ξ) B⁻¹ = B M B⁻¹ Exp(Ad_B ξ).
+RelativeMotion Pipeline::State::body_motion(const RectifiedPair& shot, const MotionEstimate& motion) const {
   const Pose& body_from_left = shot.body_from_left;
   const Matrix6d turn = adjoint(body_from_left);
   RelativeMotion moved;
@@ -105,22 +111,24 @@ void Pipeline::State::localize(const RectifiedPair& shot, const MotionEstimate& 
   if (motion.status != TrackingStatus::standing)
     moved.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
   moved.covariance = turn * motion.covariance * turn.transpose();
-  slam = compose(slam, {moved.previous_from_current, moved.covariance});
-  localizer.add(moved);
+  return moved;
 }
 
-void Pipeline::State::arrive(const StereoFrame& frame, const RectifiedPair& shot) {
-  if (!maps_positions || frame.position_id < 0) return;
-  if (frame.position_id == position.position_id()) {
-    position.stay(shot.stamp);
-  } else {
-    position.arrive(frame.position_id, shot, pair.nearest_m, localizer.estimate().world_from_body);
-  }
+void Pipeline::State::localize(const RelativeMotion& moved) {
+  localizer.add(moved);
+  odometry_track.add(moved);
+  slam_track.add(moved);
+}
+
+Status Pipeline::State::pass(const StereoFrame& frame, const RectifiedPair& shot, const RelativeMotion& moved) {
+  if (!maps_positions) return {};
+  return position.pass(frame.position_id, shot, pair.nearest_m, localizer.estimate().world_from_body,
+                       {moved.previous_from_current, moved.covariance});
 }
 
 // A further view of the position at hand.
 Status Pipeline::State::look(const StereoFrame& frame) {
-  if (!maps_positions || frame.position_id < 0 || frame.position_id != position.position_id()) return {};
+  if (!maps_positions || frame.position_id < 0) return {};
   const auto shot = clock.measure("imaging", [&] { return imager.process(frame); });
   if (!shot) return failure(shot);
   const double nearest_m = rig.find_pair(frame.pair)->nearest_m;
@@ -136,14 +144,15 @@ Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
   const auto survey = clock.measure("mapping", [&] { return position.leave(); });
   auto merged = clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->standing); });
   if (!merged) return failure(merged);
-  if (merged->constraint) {
-    // It has stood since: of the poses there, the last one is the one that a long stop leaves in the filter.
-    PoseConstraint constraint = *merged->constraint;
-    constraint.stamp = survey->last_stamp;
-    localizer.add(constraint);
-  }
-  if (merged->decided()) slam = merged->corrected;
+  if (merged->constraint) hear_map(*survey, *merged->constraint);
   return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(*merged)};
+}
+
+// Of the poses at a stop the last one is the one that a long stop leaves in the filters.
+void Pipeline::State::hear_map(const PositionSurvey& survey, const PoseConstraint& constraint) {
+  const PoseConstraint last = carried(constraint, survey.since_arrival, survey.last_stamp);
+  localizer.add(localizer.reaches(constraint.stamp) ? constraint : last);
+  slam_track.add(slam_track.reaches(constraint.stamp) ? constraint : last);
 }
 
 bool Pipeline::State::terrain_is_due() const {
@@ -156,7 +165,7 @@ Result<TerrainView> Pipeline::State::reconstruct(const RectifiedPair& shot) {
   auto image = disparity_computer.compute(shot.left, shot.right, range, shot.left_mask, shot.right_mask);
   if (!image) return failure(image);
   distance_of_last_terrain_m = distance_m;
-  return TerrainView{shot, image->disparity, world_from_left.pose};
+  return TerrainView{shot, image->disparity, world_from_left};
 }
 
 Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Workers workers,
@@ -219,17 +228,21 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   s.left_from_body = shot->body_from_left.inverse();
 
   result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot); });
-  if (!result.motion.first) s.advance(result.motion);
+  const RelativeMotion moved = s.body_motion(*shot, result.motion);
+  s.clock.measure("localization", [&] {
+    if (!result.motion.first) {
+      s.advance(result.motion);
+      s.localize(moved);
+    }
+  });
   s.last_stamp = shot->stamp;
   result.frame_id = frame.frame_id;
   result.pair = frame.pair;
   result.stamp = shot->stamp;
-  result.world_from_body = compose(s.world_from_left, {s.left_from_body, Matrix6d::Zero()});
-
-  s.clock.measure("localization", [&] { s.localize(*shot, result.motion); });
+  result.world_from_body = {s.world_from_left * s.left_from_body, s.odometry_track.world_from_body().covariance};
   result.localization = s.localizer.estimate();
-  result.slam = s.slam;
-  s.arrive(frame, *shot);
+  result.slam = s.slam_track.world_from_body();
+  if (Status status = s.pass(frame, *shot, moved); !status) return failure(status);
 
   if (s.terrain_is_due()) {
     auto terrain = s.clock.measure("reconstruction", [&] { return s.reconstruct(*shot); });
@@ -244,7 +257,7 @@ std::optional<Pose> Pipeline::predict(Stamp stamp) const {
   const State& s = *state_;
   if (!s.started) return std::nullopt;
   const double seconds = seconds_between(s.last_stamp, stamp);
-  return s.world_from_left.pose * exp_se3(s.velocity * seconds) * s.left_from_body;
+  return s.world_from_left * exp_se3(s.velocity * seconds) * s.left_from_body;
 }
 
 Result<std::optional<MappedPosition>> Pipeline::leave_position() {
@@ -276,7 +289,7 @@ Status Pipeline::recall(const StereoFrame& frame) {
     return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair), "recall");
   const auto shot = s.imager.process(frame);
   if (!shot) return failure(shot);
-  if (pair->name != s.pair.name) return s.position.look(s.position.position_id(), pair->name, *shot, pair->nearest_m);
+  if (pair->name != s.pair.name) return s.position.look(frame.position_id, pair->name, *shot, pair->nearest_m);
   s.position.recall_arrival(*shot, s.pair.nearest_m);
   return {};
 }
@@ -297,16 +310,16 @@ Bytes Pipeline::save() const {
   out.put(kStateVersion);
   out.put(s.started);
   out.put(s.last_stamp.ns);
-  out.put(s.world_from_left.pose);
-  out.put(s.world_from_left.covariance);
-  out.put(s.slam.pose);
-  out.put(s.slam.covariance);
+  out.put(s.up_in_body.has_value());
+  out.put(s.up_in_body.value_or(Eigen::Vector3d::UnitZ()));
+  out.put(s.world_from_left);
   out.put(s.left_from_body);
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
   s.position.save(out);
-  for (const Bytes& stage : {s.odometer.save(), s.localizer.save(), s.merger.save()})
+  for (const Bytes& stage :
+       {s.odometer.save(), s.localizer.save(), s.odometry_track.save(), s.slam_track.save(), s.merger.save()})
     out.put_array(stage.data(), stage.size());
   return out.take();
 }
@@ -320,22 +333,24 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   State& s = *state_;
   s.started = in.get<bool>();
   s.last_stamp.ns = in.get<std::int64_t>();
-  s.world_from_left.pose = in.get_pose();
-  s.world_from_left.covariance = in.get_matrix6();
-  s.slam.pose = in.get_pose();
-  s.slam.covariance = in.get_matrix6();
+  const bool has_up = in.get<bool>();
+  s.up_in_body = in.get_vector3();
+  if (!has_up) s.up_in_body.reset();
+  s.world_from_left = in.get_pose();
   s.left_from_body = in.get_pose();
   const std::vector<double> velocity = in.get_array<double>();
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get<double>();
   s.distance_of_last_terrain_m = in.get<double>();
   s.position.restore(in);
-  const Bytes odometry = in.get_array<std::uint8_t>(), localization = in.get_array<std::uint8_t>(),
-              slam = in.get_array<std::uint8_t>();
+  std::array<Bytes, 5> stages;
+  for (Bytes& stage : stages) stage = in.get_array<std::uint8_t>();
   if (Status status = in.finish("run.sqlite: memory of the pipeline"); !status) return status;
-  if (Status status = s.odometer.restore(odometry); !status) return status;
-  if (Status status = s.localizer.restore(localization); !status) return status;
-  return s.merger.restore(slam, maps);
+  if (Status status = s.odometer.restore(stages[0]); !status) return status;
+  if (Status status = s.localizer.restore(stages[1]); !status) return status;
+  if (Status status = s.odometry_track.restore(stages[2]); !status) return status;
+  if (Status status = s.slam_track.restore(stages[3]); !status) return status;
+  return s.merger.restore(stages[4], maps);
 }
 
 }  // namespace spartan

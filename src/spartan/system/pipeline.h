@@ -44,9 +44,9 @@ struct FrameResult {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
-  UncertainPose world_from_body;  ///< by odometry alone; covariance grows from zero at the first frame
+  UncertainPose world_from_body;  ///< by odometry alone; the covariance tells of its lasting errors too
   MotionEstimate motion;
-  UncertainPose slam;                      ///< world_from_body: odometry with the latest correction by the map
+  UncertainPose slam;                      ///< world_from_body: odometry, corrected by the map
   LocalizationEstimate localization;       ///< by all sensors
   std::optional<TerrainView> terrain;      ///< where one was due
   std::optional<MappedPosition> position;  ///< the one that was left for this shot

@@ -20,16 +20,32 @@ RectifiedPair PositionStage::KeptShot::view() const {
   return shot;
 }
 
-void PositionStage::arrive(std::int64_t position_id, const RectifiedPair& shot, double nearest_m,
-                           const UncertainPose& standing) {
+Status PositionStage::pass(std::int64_t position_id, const RectifiedPair& shot, double nearest_m,
+                           const UncertainPose& standing, const UncertainPose& moved) {
+  std::erase_if(early_, [&](const EarlyLook& look) { return look.position_id != position_id; });
+  if (position_id < 0) return {};
+  if (position_id != position_id_) return arrive(position_id, shot, nearest_m, standing);
+  last_stamp_ = shot.stamp;
+  since_arrival_ = compose(since_arrival_, moved);
+  return {};
+}
+
+Status PositionStage::arrive(std::int64_t position_id, const RectifiedPair& shot, double nearest_m,
+                             const UncertainPose& standing) {
   mapper_.leave();
   position_id_ = position_id;
   stamp_ = last_stamp_ = shot.stamp;
+  standing_ = standing;
+  since_arrival_ = {};
   looks_.clear();
   wanted_.clear();
-  standing_ = standing;
   kept_.emplace(shot);
   kept_nearest_m_ = nearest_m;
+  const std::vector<EarlyLook> early = std::exchange(early_, {});
+  for (const EarlyLook& look : early) {
+    if (Status s = this->look(position_id, look.name.pair, look.shot.view(), look.nearest_m); !s) return s;
+  }
+  return {};
 }
 
 void PositionStage::recall_arrival(const RectifiedPair& shot, double nearest_m) {
@@ -44,13 +60,17 @@ Status PositionStage::add(const RectifiedPair& shot, double nearest_m) {
 
 Status PositionStage::look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot,
                            double nearest_m) {
-  if (position_id < 0 || position_id != position_id_) return {};
+  if (position_id < 0) return {};
+  std::erase_if(wanted_, [&](const ShotName& w) { return w.pair == pair && w.left_stamp == shot.stamp; });
+  if (position_id != position_id_) {
+    early_.push_back({position_id, {pair, shot.stamp}, KeptShot(shot), nearest_m});
+    return {};
+  }
   if (mapper_.views().empty() && kept_) {
     if (Status s = add(kept_->view(), kept_nearest_m_); !s) return s;
   }
   if (Status s = add(shot, nearest_m); !s) return s;
   looks_.push_back({pair, shot.stamp});
-  std::erase_if(wanted_, [&](const ShotName& w) { return w.pair == pair && w.left_stamp == shot.stamp; });
   return {};
 }
 
@@ -65,6 +85,7 @@ std::optional<PositionSurvey> PositionStage::leave() {
     survey->position_id = position_id_;
     survey->stamp = stamp_;
     survey->last_stamp = last_stamp_;
+    survey->since_arrival = since_arrival_;
     survey->standing = standing_;
     survey->views = static_cast<int>(mapper_.views().size());
     survey->merged = mapper_.merge();
@@ -72,6 +93,8 @@ std::optional<PositionSurvey> PositionStage::leave() {
   }
   mapper_.leave();
   kept_.reset();
+  looks_.clear();
+  wanted_.clear();
   position_id_ = -1;
   return survey;
 }
@@ -82,11 +105,15 @@ void PositionStage::save(ArchiveWriter& out) const {
   out.put(standing_.pose);
   out.put(standing_.covariance);
   out.put(last_stamp_.ns);
+  out.put(since_arrival_.pose);
+  out.put(since_arrival_.covariance);
+  std::vector<ShotName> views = looks_;
+  for (const EarlyLook& look : early_) views.push_back(look.name);
   std::vector<std::int64_t> stamps;
-  stamps.reserve(looks_.size());
-  for (const ShotName& look : looks_) stamps.push_back(look.left_stamp.ns);
+  stamps.reserve(views.size());
+  for (const ShotName& view : views) stamps.push_back(view.left_stamp.ns);
   out.put_array(stamps.data(), stamps.size());
-  for (const ShotName& look : looks_) out.put(look.pair);
+  for (const ShotName& view : views) out.put(view.pair);
 }
 
 void PositionStage::restore(ArchiveReader& in) {
@@ -95,6 +122,9 @@ void PositionStage::restore(ArchiveReader& in) {
   standing_.pose = in.get_pose();
   standing_.covariance = in.get_matrix6();
   last_stamp_.ns = in.get<std::int64_t>();
+  since_arrival_.pose = in.get_pose();
+  since_arrival_.covariance = in.get_matrix6();
+  early_.clear();
   looks_.clear();
   wanted_.clear();
   for (const std::int64_t stamp : in.get_array<std::int64_t>()) wanted_.push_back({in.get_string(), Stamp{stamp}});

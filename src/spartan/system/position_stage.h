@@ -16,36 +16,37 @@
 
 namespace spartan {
 
-/// What was seen from one position, in the body frame.
+/// What was seen from one position, in the body frame at the first shot there.
 struct PositionSurvey {
   std::int64_t position_id = -1;
-  Stamp stamp;             ///< of the shot that drove the odometry there
-  Stamp last_stamp;        ///< of the odometry's last shot there; the same where it looked once
-  UncertainPose standing;  ///< world_from_body at that shot
+  Stamp stamp;                  ///< of the odometry's first shot there
+  UncertainPose standing;       ///< world_from_body at that shot
+  Stamp last_stamp;             ///< of the odometry's last shot there
+  UncertainPose since_arrival;  ///< first_from_last: a rover that stands may sink, or be rocked by its mast
   int views = 0;
   MergedRange merged;
   std::vector<SurfacePoint> points;
 };
 
 /// Shots of one position share a position_id. The pair that drives the odometry sees every position; a position is
-/// mapped where other pairs look too. The stage's memory are the names of its views and the pose there: the views are
-/// looked at again after a resume.
+/// mapped where other pairs look too, be it before the odometry's first shot there. The stage's memory are the names of
+/// its views and the pose there: the views are looked at again after a resume.
 class PositionStage {
  public:
   PositionStage(const DisparityOptions& disparity, const MappingOptions& options, Workers workers)
       : mapper_(disparity, options, std::move(workers)) {}
 
-  /// The odometry's shot at a new position, and where the body stands.
-  void arrive(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing);
-  /// A further shot of the odometry's pair there: it is no view, but the rover still stands.
-  void stay(Stamp stamp) { last_stamp_ = stamp; }
-  /// A view by the pair of that name. One of a position that nobody arrived at is left out. Code `input` as
+  /// A shot of the odometry's pair, wherever it is: the first one at a position is a view of it. `standing`: the body
+  /// at the shot; `moved`: previous_from_current of the body since the shot before. Code `input` as look().
+  Status pass(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing,
+              const UncertainPose& moved);
+  /// A view by the pair of that name. One of a position that the odometry passes by is left out. Code `input` as
   /// DisparityComputer.
   Status look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot, double nearest_m);
 
   std::int64_t position_id() const { return position_id_; }
 
-  /// After restore(): the stamp of arrive()'s shot, and the looks that followed it, each to be handed in again.
+  /// After restore(): the stamp of the odometry's first shot, and the looks, each to be handed in again.
   std::optional<Stamp> wanted_arrival() const;
   const std::vector<ShotName>& wanted_looks() const { return wanted_; }
   void recall_arrival(const RectifiedPair& shot, double nearest_m);
@@ -66,13 +67,21 @@ class PositionStage {
     RectifiedPair pair;
     Image<std::uint8_t> left, right, left_mask, right_mask;
   };
+  struct EarlyLook {
+    std::int64_t position_id = -1;
+    ShotName name;
+    KeptShot shot;
+    double nearest_m = 0;
+  };
+  Status arrive(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing);
   Status add(const RectifiedPair& shot, double nearest_m);
 
   PositionMapper mapper_;
   std::int64_t position_id_ = -1;
   Stamp stamp_, last_stamp_;
-  UncertainPose standing_;
+  UncertainPose standing_, since_arrival_;
   std::vector<ShotName> looks_, wanted_;
+  std::vector<EarlyLook> early_;  // of a position that is still to come
   std::optional<KeptShot> kept_;
   double kept_nearest_m_ = 0;
 };
