@@ -2,14 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <vector>
 
 #include "program/json.h"
 #include "program/map.h"
+#include "spartan/slam/map_figures.h"
 #include "spartan/system/saved_map.h"
 
 namespace spartan::program {
@@ -27,36 +26,23 @@ Json stop_json(const MapStop& stop) {
           {"sigma_m", std::sqrt(std::max(0.0, variance))}};
 }
 
-Json to_json(const GlobalMap& map, const MapView& view) {
-  std::array<int, 4> cells{};  // by class
-  float least = 0, most = 0;
-  std::vector<float> variances;
-  for (int r = 0; r < view.window.height; ++r) {
-    for (int c = 0; c < view.window.width; ++c) {
-      ++cells[static_cast<std::size_t>(view.kind(c, r))];
-      if (!(view.count(c, r) > 0)) continue;
-      least = variances.empty() ? view.elevation_m(c, r) : std::min(least, view.elevation_m(c, r));
-      most = variances.empty() ? view.elevation_m(c, r) : std::max(most, view.elevation_m(c, r));
-      variances.push_back(view.variance_m2(c, r));
-    }
-  }
-  const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
-  std::nth_element(variances.begin(), middle, variances.end());
+Json to_json(const GlobalMap& map, const MapFigures& figures) {
   Json stops = Json::array();
   for (const MapStop& stop : map.stops()) stops.push_back(stop_json(stop));
-  const MapPlace place = view.place();
+  const LatticeWindow extent = map.extent();
+  const MapPlace place = extent.place(map.cell_m());
   return {{"schema", 1},
-          {"cell_m", view.cell_m},
+          {"cell_m", map.cell_m()},
           {"west_m", place.west_m},
           {"north_m", place.north_m},
-          {"columns", view.window.width},
-          {"rows", view.window.height},
+          {"columns", extent.width},
+          {"rows", extent.height},
           {"submaps", map.submaps().size()},
           {"tiles", map.tiles()},
-          {"cells", {{"free", cells[1]}, {"obstacle", cells[2]}, {"cavity", cells[3]}}},
-          {"known_m2", static_cast<double>(variances.size()) * view.cell_m * view.cell_m},
-          {"elevation_m", {{"least", least}, {"most", most}}},
-          {"sigma_m", {{"median", variances.empty() ? 0.0 : std::sqrt(static_cast<double>(*middle))}}},
+          {"cells", {{"free", figures.cells[1]}, {"obstacle", figures.cells[2]}, {"cavity", figures.cells[3]}}},
+          {"known_m2", static_cast<double>(figures.known) * map.cell_m() * map.cell_m()},
+          {"elevation_m", {{"least", figures.least_m}, {"most", figures.most_m}}},
+          {"sigma_m", {{"median", std::sqrt(static_cast<double>(figures.median_variance_m2))}}},
           {"stops", std::move(stops)}};
 }
 
@@ -69,9 +55,10 @@ std::string to_text(const Json& json) {
       "made at {} stops:\n",
       json["columns"].get<int>(), json["rows"].get<int>(), json["cell_m"].get<double>(),
       json["tiles"].get<std::size_t>(), json["submaps"].get<std::size_t>(), json["west_m"].get<double>(),
-      json["north_m"].get<double>(), json["known_m2"].get<double>(), cells["free"].get<int>(),
-      cells["obstacle"].get<int>(), cells["cavity"].get<int>(), json["elevation_m"]["least"].get<double>(),
-      json["elevation_m"]["most"].get<double>(), 1e3 * json["sigma_m"]["median"].get<double>(), json["stops"].size());
+      json["north_m"].get<double>(), json["known_m2"].get<double>(), cells["free"].get<std::int64_t>(),
+      cells["obstacle"].get<std::int64_t>(), cells["cavity"].get<std::int64_t>(),
+      json["elevation_m"]["least"].get<double>(), json["elevation_m"]["most"].get<double>(),
+      1e3 * json["sigma_m"]["median"].get<double>(), json["stops"].size());
   for (const Json& stop : json["stops"]) {
     text += fmt::format("  {} ns at {:.3f}, {:.3f}, {:.3f} m, heading {:.1f} deg, known to {:.1f} mm\n",
                         stop["stamp_ns"].get<std::int64_t>(), stop["x_m"].get<double>(), stop["y_m"].get<double>(),
@@ -83,9 +70,9 @@ std::string to_text(const Json& json) {
 Result<ExitCode> info(const Context& context, const std::string& path) {
   auto saved = SavedMap::open(path);
   if (!saved) return failure(saved);
-  const auto view = saved->map().view(saved->map().extent());
-  if (!view) return failure(view);
-  const Json json = to_json(saved->map(), *view);
+  const auto figures = figures_of(saved->map());
+  if (!figures) return failure(figures);
+  const Json json = to_json(saved->map(), *figures);
   if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json)); !s) return failure(s);
   return kDone;
 }

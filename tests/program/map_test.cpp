@@ -10,6 +10,7 @@
 #include "small_drive.h"
 #include "spartan/core/files.h"
 #include "spartan/core/geotiff.h"
+#include "spartan/slam/map_file.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
@@ -108,6 +109,41 @@ TEST_F(MapBuild, WhatItCannotDoIsSaid) {
   EXPECT_EQ(build("out", {"--set", "mapping.map.no_such=1"}).exit_code, 2);
   folder_.write("file", "");
   EXPECT_EQ(build("file", {}).exit_code, 5) << "a file is in the way";
+}
+
+// Level ground of 1 x 1 m, seen from its middle.
+LocalMap small_map(double x_m, double y_m, float elevation_m) {
+  constexpr int kSide = 20;
+  LocalMap local;
+  local.place = {x_m - 0.5, y_m + 0.5, 0.05};
+  for (Image<float>* layer : {&local.elevation_m, &local.elevation_min_m, &local.elevation_max_m})
+    *layer = Image<float>(kSide, kSide, elevation_m);
+  local.variance_m2 = Image<float>(kSide, kSide, 1e-4F);
+  local.count = Image<float>(kSide, kSide, 5);
+  local.kind = Image<float>(kSide, kSide, 1);
+  local.occupancy_logodds = Image<float>(kSide, kSide, -1);
+  return local;
+}
+
+TEST(MapInfo, TellsOfAMapOfAnySize) {
+  const testing::TemporaryFolder folder;
+  GlobalMap map({}, 0.05);
+  for (const double x : {0.0, 500.0}) {
+    const Pose pose = Pose::from_translation({x, x, 0});
+    ASSERT_TRUE(map.add(small_map(x, x, static_cast<float>(x) / 100), {}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
+  }
+  ASSERT_TRUE(MapFile::save(map, folder.file("far.map")));
+  const auto told = run_program({"map", "info", folder.file("far.map"), "--json"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const json figures = json::parse(told.out);
+  EXPECT_GT(figures["columns"], 10000);
+  EXPECT_GT(figures["rows"], 10000);
+  EXPECT_EQ(figures["cells"]["free"], 800);
+  EXPECT_NEAR(figures["known_m2"], 2, 1e-9);
+  EXPECT_EQ(figures["elevation_m"]["least"], 0);
+  EXPECT_EQ(figures["elevation_m"]["most"], 5);
+  EXPECT_NEAR(figures["sigma_m"]["median"], 0.01, 1e-6);
+  EXPECT_EQ(run_program({"map", "info", folder.file("far.map")}).exit_code, 0);
 }
 
 }  // namespace

@@ -61,6 +61,8 @@ class GlobalMap {
   static constexpr std::int64_t kMostCells = 8'000'000;
   /// Everything that was seen; empty where nothing was.
   LatticeWindow extent() const;
+  /// The parts of it where there are tiles, in windows of at most `side` by `side` cells that do not overlap.
+  std::vector<LatticeWindow> pieces(int side) const;
   /// Bilinear between the middles of the cells around; none where one of those is unknown.
   Result<std::optional<MapSample>> at(double x_m, double y_m);
 
@@ -91,6 +93,7 @@ class GlobalMap {
   Result<Tile*> load_or_make(const TileKey& key);
   void drop_surplus();
   const Submap& submap_for(const Eigen::Vector3d& place);
+  LatticeWindow window_of_tile(const TileKey& key) const;
   Status draw_in_step(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
   Status draw_moved(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
   CellFusion fusion() const;

@@ -106,6 +106,28 @@ TEST(GlobalMap, MoreThanCanBeShownIsRefused) {
   EXPECT_TRUE(map.view({0, 0, 2000, 1}));
 }
 
+TEST(GlobalMap, PiecesHoldEveryTileOnceAndNothingInBetween) {
+  const Ground ground = rocky_ground();
+  GlobalMap map({}, 0.05);
+  EXPECT_TRUE(map.pieces(64).empty());
+  add(map, ground, standing(ground, 0, 0, 0), 1);
+  add(map, ground, standing(ground, 400, -300, 1), 2);
+  const LatticeWindow all = map.extent();
+  std::int64_t cells = 0;
+  for (const int side : {64, 1000}) {
+    const std::vector<LatticeWindow> pieces = map.pieces(side);
+    EXPECT_LE(pieces.size(), 2 * map.tiles()) << "not all of the extent";
+    for (const LatticeWindow& p : pieces) {
+      EXPECT_TRUE(p.width <= side && p.height <= side);
+      EXPECT_EQ(window_around(all, p), all) << "inside";
+      EXPECT_EQ((p.west - all.west) % side, 0);
+      EXPECT_EQ((all.north - p.north) % side, 0);
+      cells += p.cells();
+    }
+  }
+  EXPECT_LT(cells, all.cells() / 10);
+}
+
 TEST(GlobalMap, ElevationBetweenCellsIsBilinear) {
   const Ground plane = [](double x, double y) { return 0.1 * x - 0.2 * y; };
   GlobalMap map({}, 0.05);

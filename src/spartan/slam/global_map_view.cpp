@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "spartan/slam/global_map.h"
@@ -132,26 +133,49 @@ Result<MapView> GlobalMap::view(const LatticeWindow& window) {
   return view;
 }
 
-LatticeWindow GlobalMap::extent() const {
+LatticeWindow GlobalMap::window_of_tile(const TileKey& key) const {
+  const auto submap =
+      std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
   double west = 1e300, east = -1e300, south = 1e300, north = -1e300;
-  for (const auto& [key, slot] : tiles_) {
-    const auto submap =
-        std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
-    for (const auto& [x, y] :
-         {std::pair{key.x, key.y}, {key.x + 1, key.y}, {key.x, key.y + 1}, {key.x + 1, key.y + 1}}) {
-      const Eigen::Vector3d p =
-          submap->world_from_submap * Eigen::Vector3d(x * kSide * cell_m_, y * kSide * cell_m_, 0);
-      west = std::min(west, p.x());
-      east = std::max(east, p.x());
-      south = std::min(south, p.y());
-      north = std::max(north, p.y());
-    }
+  for (const auto& [x, y] : {std::pair{key.x, key.y}, {key.x + 1, key.y}, {key.x, key.y + 1}, {key.x + 1, key.y + 1}}) {
+    const Eigen::Vector3d p = submap->world_from_submap * Eigen::Vector3d(x * kSide * cell_m_, y * kSide * cell_m_, 0);
+    west = std::min(west, p.x());
+    east = std::max(east, p.x());
+    south = std::min(south, p.y());
+    north = std::max(north, p.y());
   }
-  if (west > east) return {};
   // A corner on the lattice stays there in spite of rounding.
   const auto low = [&](double v) { return static_cast<int>(std::floor(v / cell_m_ + 1e-6)); };
   const auto high = [&](double v) { return static_cast<int>(std::ceil(v / cell_m_ - 1e-6)); };
   return {low(west), high(north), high(east) - low(west), high(north) - low(south)};
+}
+
+LatticeWindow GlobalMap::extent() const {
+  LatticeWindow all;
+  for (const auto& [key, slot] : tiles_) {
+    const LatticeWindow tile = window_of_tile(key);
+    all = all.cells() == 0 ? tile : window_around(all, tile);
+  }
+  return all;
+}
+
+std::vector<LatticeWindow> GlobalMap::pieces(int side) const {
+  const LatticeWindow all = extent();
+  std::set<std::pair<int, int>> touched;  // row and column of pieces, from the extent's corner
+  for (const auto& [key, slot] : tiles_) {
+    const LatticeWindow tile = window_of_tile(key);
+    const int row = all.north - tile.north, column = tile.west - all.west;
+    for (int r = row / side; r <= (row + tile.height - 1) / side; ++r) {
+      for (int c = column / side; c <= (column + tile.width - 1) / side; ++c) touched.emplace(r, c);
+    }
+  }
+  std::vector<LatticeWindow> windows;
+  windows.reserve(touched.size());
+  for (const auto& [r, c] : touched) {
+    windows.push_back({all.west + c * side, all.north - r * side, std::min(side, all.width - c * side),
+                       std::min(side, all.height - r * side)});
+  }
+  return windows;
 }
 
 Result<std::optional<MapSample>> GlobalMap::at(double x_m, double y_m) {

@@ -1,6 +1,7 @@
 // The world's lattice of cells: corners at whole multiples of the cells' side, so that maps meet cell on cell.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -32,6 +33,14 @@ inline LatticeWindow window_between(double west_m, double south_m, double east_m
 /// All cells within `reach_m` of a place, measured along x and y.
 inline LatticeWindow window_around(double x_m, double y_m, double reach_m, double cell_m) {
   return window_between(x_m - reach_m, y_m - reach_m, x_m + reach_m, y_m + reach_m, cell_m);
+}
+
+/// The smallest window that holds both.
+inline LatticeWindow window_around(const LatticeWindow& a, const LatticeWindow& b) {
+  const int west = std::min(a.west, b.west), north = std::max(a.north, b.north),
+            east = std::max(a.west + a.width, b.west + b.width),
+            south = std::min(a.north - a.height, b.north - b.height);
+  return {west, north, east - west, north - south};
 }
 
 /// The cells of a map that lies on the lattice.

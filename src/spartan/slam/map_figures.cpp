@@ -1,0 +1,70 @@
+#include "spartan/slam/map_figures.h"
+
+#include <algorithm>
+#include <bit>
+#include <vector>
+
+namespace spartan {
+namespace {
+
+constexpr std::size_t kBins = 1U << 16U;
+
+// The bits of floats that are not negative, as numbers, are in the order of the floats.
+std::uint32_t bits_of(float value) {
+  return std::bit_cast<std::uint32_t>(value);
+}
+
+struct PlaceInBin {
+  std::uint32_t bin = 0;
+  std::int64_t index = 0;  // in the bin
+};
+
+// Where the value with this index would lie if all were sorted; there are more of them.
+PlaceInBin find_index(const std::vector<std::int64_t>& counts, std::int64_t index) {
+  std::uint32_t bin = 0;
+  for (; index >= counts[bin]; ++bin) index -= counts[bin];
+  return {bin, index};
+}
+
+template <class Work>
+Status each_known_cell(GlobalMap& map, int side, const Work& work) {
+  for (const LatticeWindow& window : map.pieces(side)) {
+    const auto view = map.view(window);
+    if (!view) return failure(view);
+    for (int r = 0; r < window.height; ++r) {
+      for (int c = 0; c < window.width; ++c) {
+        if (view->count(c, r) > 0) work(*view, c, r);
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<MapFigures> figures_of(GlobalMap& map, int side) {
+  MapFigures figures;
+  std::vector<std::int64_t> upper(kBins), lower(kBins);
+  const Status counted = each_known_cell(map, side, [&](const MapView& view, int c, int r) {
+    const float z = view.elevation_m(c, r);
+    figures.least_m = figures.known == 0 ? z : std::min(figures.least_m, z);
+    figures.most_m = figures.known == 0 ? z : std::max(figures.most_m, z);
+    ++figures.known;
+    ++figures.cells[static_cast<std::size_t>(view.kind(c, r))];
+    ++upper[bits_of(view.variance_m2(c, r)) / kBins];
+  });
+  if (!counted) return failure(counted);
+  if (figures.known == 0) return figures;
+  // The variances may be too many to keep them: the middle one's upper bits first, then those below.
+  const PlaceInBin middle = find_index(upper, figures.known / 2);
+  const Status found = each_known_cell(map, side, [&](const MapView& view, int c, int r) {
+    const std::uint32_t bits = bits_of(view.variance_m2(c, r));
+    if (bits / kBins == middle.bin) ++lower[bits % kBins];
+  });
+  if (!found) return failure(found);
+  const std::uint32_t median = middle.bin * static_cast<std::uint32_t>(kBins) + find_index(lower, middle.index).bin;
+  figures.median_variance_m2 = std::bit_cast<float>(median);
+  return figures;
+}
+
+}  // namespace spartan

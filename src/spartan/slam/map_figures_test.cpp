@@ -1,0 +1,98 @@
+#include "spartan/slam/map_figures.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "spartan/slam/synthetic_stop_test.h"
+
+namespace spartan {
+namespace {
+
+using testing::points_at;
+using testing::rocky_ground;
+using testing::standing;
+
+// A stop on rocky ground, every tenth column said to be an obstacle; gives the part of the map that it may have seen.
+LatticeWindow add_stop(GlobalMap& map, double x, double y, double yaw) {
+  const auto ground = rocky_ground();
+  const Pose pose = standing(ground, x, y, yaw);
+  LocalMap local = MapGenerator({}, Workers(1)).generate(points_at(ground, pose, 1), pose);
+  for (int r = 0; r < local.size().height; ++r) {
+    for (int c = 0; c < local.size().width; c += 10) {
+      local.kind(c, r) = 2;
+      local.occupancy_logodds(c, r) = 3;
+    }
+  }
+  EXPECT_TRUE(map.add(local, {}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
+  return window_of(local.place, local.size());
+}
+
+// The same from whole views that do not overlap.
+MapFigures expected_figures(GlobalMap& map, const std::vector<LatticeWindow>& windows) {
+  MapFigures figures;
+  std::vector<float> variances, elevations;
+  for (const LatticeWindow& window : windows) {
+    const MapView view = *map.view(window);
+    for (int r = 0; r < window.height; ++r) {
+      for (int c = 0; c < window.width; ++c) {
+        if (!(view.count(c, r) > 0)) continue;
+        ++figures.cells[static_cast<std::size_t>(view.kind(c, r))];
+        elevations.push_back(view.elevation_m(c, r));
+        variances.push_back(view.variance_m2(c, r));
+      }
+    }
+  }
+  std::sort(variances.begin(), variances.end());
+  figures.known = static_cast<std::int64_t>(variances.size());
+  figures.least_m = *std::min_element(elevations.begin(), elevations.end());
+  figures.most_m = *std::max_element(elevations.begin(), elevations.end());
+  figures.median_variance_m2 = variances[variances.size() / 2];
+  return figures;
+}
+
+void expect_same(const MapFigures& a, const MapFigures& b) {
+  EXPECT_EQ(a.cells, b.cells);
+  EXPECT_EQ(a.known, b.known);
+  EXPECT_EQ(a.least_m, b.least_m);
+  EXPECT_EQ(a.most_m, b.most_m);
+  EXPECT_EQ(a.median_variance_m2, b.median_variance_m2);
+}
+
+TEST(MapFigures, AreThoseOfTheWholeViewForPiecesOfAnySize) {
+  GlobalMapOptions options;
+  options.submap_m = 2;
+  GlobalMap map(options, 0.05);
+  for (int i = 0; i < 4; ++i) add_stop(map, 1.5 * i, 0.3 * i, 0.4 * i);
+  ASSERT_GT(map.submaps().size(), 1U);
+  const MapFigures whole = expected_figures(map, {map.extent()});
+  EXPECT_GT(whole.cells[1], 3000);
+  EXPECT_GT(whole.cells[2], 100);
+  for (const int side : {37, 64, 512}) {
+    const auto figures = figures_of(map, side);
+    ASSERT_TRUE(figures);
+    SCOPED_TRACE(side);
+    expect_same(*figures, whole);
+  }
+}
+
+TEST(MapFigures, OfAMapThatIsTooLargeToBeSeenAtOnce) {
+  GlobalMap map({}, 0.05);
+  const LatticeWindow one = add_stop(map, -3, 2, 0.3), other = add_stop(map, 300, 200, 2);
+  ASSERT_GT(map.extent().cells(), GlobalMap::kMostCells);
+  ASSERT_FALSE(map.view(map.extent()));
+  const auto figures = figures_of(map);
+  ASSERT_TRUE(figures);
+  expect_same(*figures, expected_figures(map, {one, other}));
+}
+
+TEST(MapFigures, OfAnEmptyMapAreZero) {
+  GlobalMap map({}, 0.05);
+  const auto figures = figures_of(map);
+  ASSERT_TRUE(figures);
+  expect_same(*figures, {});
+}
+
+}  // namespace
+}  // namespace spartan
