@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <vector>
 
 #include "program/html_parts.h"
@@ -33,10 +32,8 @@ Result<std::string> picture_of(const std::string& path, const std::string& capti
 }
 
 // How often each cell of the global map was seen.
-Result<std::string> coverage_of(const std::string& run) {
-  auto saved = SavedMap::open(run);
-  if (!saved) return failure(saved);
-  const auto view = saved->map().view(saved->map().extent());
+Result<std::string> coverage_of(GlobalMap& map) {
+  const auto view = map.view(map.extent());
   if (!view) return failure(view);
   constexpr int kScale = 4;
   Image<Rgb8> picture(view->count.width() * kScale, view->count.height() * kScale);
@@ -52,6 +49,26 @@ Result<std::string> coverage_of(const std::string& run) {
                       fmt::format("Its coverage: points in each cell, from one (blue) to {} (red)",
                                   static_cast<int>(std::pow(10, kMostDecades))),
                       width);
+}
+
+Result<std::string> global_pictures(const std::string& run) {
+  auto saved = SavedMap::open(run);
+  if (!saved) return failure(saved);
+  GlobalMap& map = saved->map();
+  if (const LatticeWindow extent = map.extent(); extent.cells() > GlobalMap::kMostCells) {
+    return fmt::format(
+        "<p>The global map, {:.0f} m × {:.0f} m, is too large for one picture: <code>spartan map export "
+        "--window</code> "
+        "shows a part of it.</p>\n",
+        extent.width * map.cell_m(), extent.height * map.cell_m());
+  }
+  const auto picture = picture_of(
+      RunFolder{run}.global_map() + ".png",
+      "The global map of all positions: relief, obstacles (red), cavities (blue), unknown (dark)", kGlobalWidth_px);
+  if (!picture) return failure(picture);
+  const auto coverage = coverage_of(map);
+  if (!coverage) return failure(coverage);
+  return *picture + *coverage;
 }
 
 }  // namespace
@@ -75,14 +92,12 @@ Result<std::string> map_pictures(const std::string& run) {
     if (!picture) return failure(picture);
     html += *picture;
   }
-  if (!std::filesystem::exists(folder.global_map() + ".png")) return html;
-  const auto global = picture_of(
-      folder.global_map() + ".png",
-      "The global map of all positions: relief, obstacles (red), cavities (blue), unknown (dark)", kGlobalWidth_px);
+  const auto tiles = store->tiles().index();
+  if (!tiles) return failure(tiles);
+  if (tiles->empty()) return html;
+  const auto global = global_pictures(run);
   if (!global) return failure(global);
-  const auto coverage = coverage_of(run);
-  if (!coverage) return failure(coverage);
-  return html + *global + *coverage;
+  return html + *global;
 }
 
 }  // namespace spartan::program

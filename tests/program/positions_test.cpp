@@ -12,6 +12,7 @@
 #include "program.h"
 #include "run_results.h"
 #include "small_scenario.h"
+#include "spartan/core/database.h"
 #include "spartan/core/geotiff.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -119,6 +120,30 @@ TEST_F(Positions, TheirMapIsToldMergedAndExported) {
   EXPECT_EQ(run_program({"map", "export", path("out"), "-o", path("x.tif"), "--window", "1,0,0,1"}).exit_code, 2);
   EXPECT_EQ(run_program({"map", "export", path("out"), "-o", path("no/x.tif")}).exit_code, 5);
   EXPECT_EQ(run_program({"map", "merge", path("out"), path("out"), "-o", path("no/x.map")}).exit_code, 5);
+}
+
+// A tile of the map goes to a place 6 km to the east.
+void stretch_map(const std::string& run) {
+  auto db = Database::open(run + "/run.sqlite", Database::Mode::open);
+  ASSERT_TRUE(db) << db.error().message();
+  ASSERT_TRUE(
+      db->execute("UPDATE map_tiles SET ix = ix + 4000 WHERE (submap, ix, iy) = "
+                  "(SELECT submap, ix, iy FROM map_tiles ORDER BY submap, ix, iy LIMIT 1)"));
+}
+
+TEST_F(Positions, AMapTooLargeForOnePictureLeavesNoneOfBefore) {
+  ASSERT_TRUE(finished(run("out")));
+  ASSERT_TRUE(fs::exists(path("out/maps/global.tif")));
+  stretch_map(path("out"));
+  const ProgramResult resumed = run("out", {"--resume"});
+  ASSERT_TRUE(finished(resumed)) << resumed.err;
+  EXPECT_NE(resumed.err.find("too large for one picture"), std::string::npos) << resumed.err;
+  EXPECT_EQ(resumed.err.find("no report"), std::string::npos) << resumed.err;
+  EXPECT_FALSE(fs::exists(path("out/maps/global.tif")));
+  EXPECT_FALSE(fs::exists(path("out/maps/global.png")));
+  const std::string page = testing::content_of(path("out/report/index.html"));
+  EXPECT_NE(page.find("too large for one picture"), std::string::npos);
+  EXPECT_EQ(page.find("Its coverage"), std::string::npos);
 }
 
 TEST_F(Positions, EachTrajectoryIsExported) {

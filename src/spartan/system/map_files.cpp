@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "spartan/core/files.h"
 #include "spartan/core/geotiff.h"
@@ -64,6 +65,15 @@ Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers
   if (!view) return failure(view);
   if (Status s = write_map_geotiff(*view, options, workers, path + ".tif"); !s) return s;
   return write_png(path + ".png", draw_map(view->elevation_m, view->kind, view->cell_m));
+}
+
+Status remove_map_files(const std::string& path) {
+  for (const char* ending : {".tif", ".png"}) {
+    std::error_code error;
+    std::filesystem::remove(path + ending, error);
+    if (error) return failure(ErrorCode::output, "cannot be removed: " + error.message(), path + ending);
+  }
+  return {};
 }
 
 Status write_position(std::span<const PositionView> views, const MergedRange& merged, const LocalMap& map,

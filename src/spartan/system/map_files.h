@@ -16,6 +16,9 @@ Status write_local_map(const LocalMap& map, const std::string& path);
 /// The same of everything that the global map knows; nothing where it is empty. Codes: GlobalMap::view's, `output`.
 Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers& workers, const std::string& path);
 
+/// Removes what one of them wrote to `path`, where it is there. Code `output`.
+Status remove_map_files(const std::string& path);
+
 /// A part of the global map as a GeoTIFF of all layers. Code `output`.
 Status write_map_geotiff(const MapView& view, const MapOptions& options, const Workers& workers,
                          const std::string& path);

@@ -285,7 +285,7 @@ Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, 
 Status write_map(GlobalMap& map, const RunRequest& request, const RunFolder& folder, const Log& log) {
   if (map.extent().cells() > GlobalMap::kMostCells) {
     log.warning("the global map is too large for one picture; `spartan map export --window` takes a part of it");
-    return {};
+    return remove_map_files(folder.global_map());  // of an earlier part of the run
   }
   return write_global_map(map, request.options.mapping.map, Workers(request.threads), folder.global_map());
 }
