@@ -11,6 +11,7 @@
 #include "program/html_parts.h"
 #include "program/json.h"
 #include "program/report_maps.h"
+#include "program/report_sensors.h"
 #include "program/report_trajectories.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
@@ -24,6 +25,7 @@
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
 #include "spartan/system/run_folder.h"
+#include "spartan/system/run_store.h"
 
 namespace spartan::program {
 namespace {
@@ -170,9 +172,10 @@ Result<std::string> figures_of(const Json& summary, const ReportRequest& request
   if (!request.truth.empty()) {
     const auto compared = find_trajectories(request.run, request.truth, "");
     if (!compared) return failure(compared);
-    const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
+    const auto metrics = errors_of(*compared);
     if (!metrics) return failure(metrics);
-    html += figure(fmt::format("{:.1f} mm", 1000 * metrics->ate_m.rmse), "position error, RMS");
+    html += figure(fmt::format("{:.1f} mm", 1000 * metrics->ate_m.rmse),
+                   "position error, RMS, " + in_words(metrics->alignment));
     if (metrics->drift_percent)
       html += figure(fmt::format("{:.2f} %", *metrics->drift_percent), "drift of the distance");
   }
@@ -199,9 +202,14 @@ Result<std::string> whole_truth(FrameSource& source, Imager& imager, const Repor
 }  // namespace
 
 Result<std::string> make_report(ReportRequest request) {
-  const auto summary_text = read_file(RunFolder{request.run}.summary());
+  const RunFolder folder{request.run};
+  const auto summary_text = read_file(folder.summary());
   if (!summary_text) return failure(summary_text);
   const Json summary = Json::parse(*summary_text);
+  auto store = RunStore::open_read_only(folder.store());
+  if (!store) return failure(store);
+  const auto frames = store->frames();
+  if (!frames) return failure(frames);
   const auto source = open_recording(request.recording, request.open);
   if (!source) return failure(source);
   const RecordingInfo& info = (*source)->info();
@@ -218,9 +226,10 @@ Result<std::string> make_report(ReportRequest request) {
   const auto pictures = drive_pictures(**source, *imager);
   if (!pictures) return failure(pictures);
   body += section("What the rover saw", *pictures);
-  const auto plots = trajectory_plots(request.run, request.truth);
+  const auto plots = trajectory_plots(request.run, *frames, request.truth);
   if (!plots) return failure(plots);
-  body += section("Where it went", *plots + sensor_table(summary));
+  body += section("Where it went", *plots);
+  body += section("What its sensors were worth", sensor_tables(summary, *frames));
   const auto maps = map_pictures(request.run);
   if (!maps) return failure(maps);
   if (!maps->empty()) body += section("Maps of where it stood", *maps);

@@ -12,7 +12,6 @@
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/system/run_folder.h"
-#include "spartan/system/run_store.h"
 
 namespace spartan::program {
 namespace {
@@ -63,12 +62,10 @@ struct Lines {
   std::vector<PlotLine> way, errors;
 };
 
-void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vector<FrameRecord>& frames,
-          const Ground& ground, Lines& lines) {
+void draw(const Kind& kind, const ComparedTrajectories& compared, const Pose& truth_from_estimate,
+          const std::vector<FrameRecord>& frames, const Ground& ground, Lines& lines) {
   const std::string name(name_of(kind.kind));
   PlotLine way{name, kind.colour, {}, {}}, error{name, kind.colour, {}, {}}, band{name + ", 3σ", kind.pale, {}, {}};
-  const StampedPose& first = compared.estimate.front();
-  const Pose truth_from_estimate = nearest(compared.truth, first.stamp).pose * first.pose.inverse();
   double driven = 0;
   Eigen::Vector3d before = Eigen::Vector3d::Zero();
   auto frame = frames.begin();
@@ -79,8 +76,11 @@ void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vec
     const Eigen::Vector2d from_above = ground.place(at);
     way.x.push_back(from_above.x());
     way.y.push_back(from_above.y());
-    error.x.push_back(driven);
-    error.y.push_back(1000 * (at - nearest(compared.truth, p.stamp).pose.translation()).norm());
+    const StampedPose& truth = nearest(compared.truth, p.stamp);
+    if (std::abs(seconds_between(truth.stamp, p.stamp)) <= TrajectoryMetricsOptions().max_dt_s) {
+      error.x.push_back(driven);
+      error.y.push_back(1000 * (at - truth.pose.translation()).norm());
+    }
     while (frame != frames.end() && frame->stamp < p.stamp) ++frame;
     if (frame == frames.end() || frame->stamp != p.stamp) continue;
     if (const auto pose = pose_of(*frame, kind.kind)) {
@@ -95,42 +95,46 @@ void draw(const Kind& kind, const ComparedTrajectories& compared, const std::vec
 
 }  // namespace
 
-Result<std::string> trajectory_plots(const std::string& run, const std::string& truth) {
-  const RunFolder folder{run};
-  auto store = RunStore::open_read_only(folder.store());
-  if (!store) return failure(store);
-  const auto frames = store->frames();
-  if (!frames) return failure(frames);
-  const auto rig = read_rig_yaml(folder.rig());
+Result<TrajectoryMetrics> errors_of(const ComparedTrajectories& compared) {
+  TrajectoryMetricsOptions options;
+  options.alignment = Alignment::first;
+  auto metrics = compare_trajectories(compared.estimate, compared.truth, options);
+  if (metrics || metrics.error().code != ErrorCode::usage) return metrics;
+  options.alignment = Alignment::se3;  // the truth has no rotation
+  return compare_trajectories(compared.estimate, compared.truth, options);
+}
+
+std::string in_words(Alignment alignment) {
+  return alignment == Alignment::first ? "first poses aligned" : "after the best fit";
+}
+
+Result<std::string> trajectory_plots(const std::string& run, const std::vector<FrameRecord>& frames,
+                                     const std::string& truth) {
+  const auto rig = read_rig_yaml(RunFolder{run}.rig());
   if (!rig) return failure(rig);
   const Ground ground{truth.empty() ? PoseConvention::body : rig->convention};
   Lines lines;
+  std::string aligned;
   for (const Kind& kind : kKinds) {
     if (truth.empty()) {
       lines.way.push_back(
-          seen_from_above(trajectory_of(*frames, kind.kind), ground, std::string(name_of(kind.kind)), kind.colour));
+          seen_from_above(trajectory_of(frames, kind.kind), ground, std::string(name_of(kind.kind)), kind.colour));
       continue;
     }
     const auto compared = find_trajectories(run, truth, std::string(name_of(kind.kind)));
     if (!compared) return failure(compared);
     if (lines.way.empty()) lines.way.push_back(seen_from_above(compared->truth, ground, "truth", "#9a3b12"));
-    if (!compared->estimate.empty() && !compared->truth.empty()) draw(kind, *compared, *frames, ground, lines);
+    if (compared->estimate.empty() || compared->truth.empty()) continue;
+    const auto metrics = errors_of(*compared);
+    if (!metrics) return failure(metrics);
+    draw(kind, *compared, metrics->truth_from_estimate.pose, frames, ground, lines);
+    aligned = in_words(metrics->alignment);
   }
   std::string html = svg_plot(lines.way, {"x, m", "y, m", true, 560, 420});
-  if (!lines.errors.empty())
-    html += svg_plot(lines.errors, {"driven, m", "position error, first poses aligned, mm", false, 560, 420});
-  return html;
-}
-
-std::string sensor_table(const Json& summary) {
-  std::vector<std::vector<std::string>> rows{{"sensor", "ok", "suspect", "excluded", "missing"}};
-  for (const auto& [sensor, frames] : summary["health"]["localization"].items()) {
-    std::vector<std::string> row{sensor};
-    for (std::size_t i = 1; i < rows.front().size(); ++i)
-      row.push_back(std::to_string(frames[rows.front()[i]].get<int>()));
-    rows.push_back(std::move(row));
-  }
-  return "<p>Frames by what each sensor of the localization was worth.</p>\n" + html_table(rows);
+  if (lines.errors.empty()) return html;
+  html += svg_plot(lines.errors, {"driven, m", "position error, " + aligned + ", mm", false, 560, 420});
+  return html + "<p>Position errors, here and at the head of the page (there of the best trajectory): " + aligned +
+         ".</p>\n";
 }
 
 }  // namespace spartan::program

@@ -37,7 +37,7 @@ TEST(Demo, LeavesARecordingARunAndAPageWithoutErrors) {
   EXPECT_TRUE(fs::exists(out + "/run/summary.json"));
   const std::string page = content_of(out + "/report.html");
   for (const char* part : {"What the rover saw", "Where it went", "What the ground looks like to it",
-                           "The ground as it is", "Time", "position error, RMS"}) {
+                           "The ground as it is", "Time", "position error, RMS, first poses aligned"}) {
     EXPECT_THAT(page, HasSubstr(part));
   }
   const std::string check = testing::source_folder() + "/scripts/check_page " + out + "/report.html";

@@ -1,4 +1,5 @@
 // `spartan run` over a rover that stops and looks around: maps, all sensors, kills in the middle of a stop.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,8 +79,30 @@ TEST_F(Positions, ArePartOfTheReport) {
   ASSERT_TRUE(finished(run("out")));
   const std::string page = testing::content_of(path("out/report/index.html"));
   for (const char* part : {"What the rover saw", "truth", "localization, 3σ", "inclinometer", "The global map",
-                           "Its coverage", "position error"})
+                           "Its coverage", "missing: has not said anything"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
+}
+
+TEST_F(Positions, AreReportedWithOneAlignment) {
+  ASSERT_TRUE(finished(run("out")));
+  const auto headline = [&](const std::string& truth, const std::string& align, const std::string& words) {
+    const ProgramResult score = run_program({"evaluate", path("out"), "--truth", truth, "--align", align, "--json"});
+    const double error_m = nlohmann::json::parse(score.out)["ate_m"]["rmse"];
+    return fmt::format("<b>{:.1f} mm</b>position error, RMS, {}<", 1000 * error_m, words);
+  };
+  const std::string page = testing::content_of(path("out/report/index.html"));
+  EXPECT_NE(page.find(headline(path("rec"), "first", "first poses aligned")), std::string::npos);
+  EXPECT_NE(page.find(">position error, first poses aligned, mm<"), std::string::npos);
+
+  std::ifstream poses(path("rec/truth/poses.tum"));
+  std::ofstream places(path("places.tum"));
+  for (std::string stamp, x, y, z, rest; poses >> stamp >> x >> y >> z && std::getline(poses, rest);)
+    places << stamp << " " << x << " " << y << " " << z << " 0 0 0 1\n";
+  places.close();
+  ASSERT_TRUE(finished(run("out", {"--resume", "--truth", path("places.tum")})));
+  const std::string fitted = testing::content_of(path("out/report/index.html"));
+  EXPECT_NE(fitted.find(headline(path("places.tum"), "se3", "after the best fit")), std::string::npos);
+  EXPECT_NE(fitted.find(">position error, after the best fit, mm<"), std::string::npos);
 }
 
 TEST_F(Positions, TheirMapIsToldMergedAndExported) {
