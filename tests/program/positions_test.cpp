@@ -75,6 +75,27 @@ TEST_F(Positions, BecomeMapsAndAllSensorsAreHeard) {
   EXPECT_EQ(map->bands.front().width(), 160);
 }
 
+// The recording ends at the second stop: its pans are not followed by a frame.
+TEST_F(Positions, EveryShotAndStopIsTimed) {
+  std::string table = testing::content_of(path("rec/frames.csv"));
+  table.erase(table.rfind('\n', table.size() - 2) + 1);
+  std::ofstream(path("rec/frames.csv")) << table;
+  const auto shots = std::count(table.begin(), table.end(), '\n') - 1;
+  const auto times_run = [&](const std::string& output, const std::string& stage) {
+    const auto summary = nlohmann::json::parse(testing::content_of(path(output + "/summary.json")));
+    return summary["stages"][stage]["count"].get<int>();
+  };
+  ASSERT_TRUE(finished(run("out")));
+  EXPECT_EQ(times_run("out", "camera"), shots);
+  EXPECT_EQ(times_run("out", "maps"), 2) << "two stops";
+  ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
+  EXPECT_EQ(times_run("part", "maps"), 1) << "it goes on in the second stop";
+  ASSERT_TRUE(finished(run("part", {"--resume"})));
+  EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("out")));
+  ASSERT_TRUE(finished(run("no_maps", {"--set", "maps=false"})));
+  EXPECT_EQ(times_run("no_maps", "camera"), shots);
+}
+
 TEST_F(Positions, ArePartOfTheReport) {
   ASSERT_TRUE(finished(run("out")));
   const std::string page = testing::content_of(path("out/report/index.html"));

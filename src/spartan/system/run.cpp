@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <utility>
 
 #include "spartan/core/files.h"
 #include "spartan/core/process.h"
@@ -97,6 +98,7 @@ class Drive {
   Status take_frame(const StereoFrame& frame);
   Status take_missing(const MissingFrame& missing);
   Status commit(const RunStore::Step& step);
+  std::vector<StageTime> take_times();
 
   const RunRequest& request_;
   const RunHooks& hooks_;
@@ -105,6 +107,7 @@ class Drive {
   RunStore store_;
   RunFolder folder_;
   StageClock clock_;
+  std::vector<StageTime> looked_;  // of shots that were only looked at since the last frame
   std::int64_t samples_taken_ = 0;
   int shots_ = 0;   // announced shots taken, missing ones too
   int usable_ = 0;  // shots with both images
@@ -156,14 +159,27 @@ Status Drive::drive() {
   return {};
 }
 
-// What is known at the end only: the map of the last position.
+// What is known at the end only: the map of the last position, and what took its time since the last frame.
 Status Drive::finish() {
+  clock_.take();  // there was no further shot
   auto position = pipeline_.leave_position();
   if (!position) return failure(position);
-  if (!*position) return {};
-  const auto map = keep(**position);
-  if (!map) return failure(map);
-  return commit({{}, {}, *map});
+  RunStore::Step step;
+  if (*position) {
+    const auto map = keep(**position);
+    if (!map) return failure(map);
+    step.map = *map;
+  }
+  step.times = take_times();
+  if (shots_ == 0 || (!step.map && step.times.empty())) return {};
+  return commit(step);
+}
+
+std::vector<StageTime> Drive::take_times() {
+  std::vector<StageTime> times = std::exchange(looked_, {});
+  const std::vector<StageTime> measured = clock_.take();
+  times.insert(times.end(), measured.begin(), measured.end());
+  return times;
 }
 
 Result<MapRecord> Drive::keep(const MappedPosition& position) {
@@ -206,7 +222,7 @@ Status Drive::take_frame(const StereoFrame& frame) {
         {frame.frame_id, frame.pair, frame.left_stamp, FrameFault::wrong_size, result.error().message()});
   }
   if (!*result) {
-    clock_.take();
+    looked_ = take_times();
     return {};
   }
   FrameResult& shot = **result;
@@ -237,7 +253,7 @@ Status Drive::take_frame(const StereoFrame& frame) {
     if (!map) return failure(map);
     step.map = *map;
   }
-  record.times = clock_.take();
+  record.times = take_times();
   record.times.insert(record.times.end(), shot.times.begin(), shot.times.end());
   return commit(step);
 }
@@ -257,6 +273,7 @@ Status Drive::take_missing(const MissingFrame& missing) {
   record.fault = name_of(missing.fault);
   record.message = missing.message;
   record.world_from_body.pose = pipeline_.predict(missing.stamp).value_or(Pose());
+  record.times = take_times();
   return commit(step);
 }
 

@@ -101,6 +101,7 @@ struct RunStore::State {
   Status write(const LocalizationRecord& localization);
   Status write(const TerrainRecord& terrain);
   Status write(const MapRecord& map);
+  Status write(const std::vector<StageTime>& times);
 };
 
 Status RunStore::State::prepare() {
@@ -140,6 +141,7 @@ Status RunStore::State::write(const Step& step, const std::function<Result<Bytes
   if (step.map) {
     if (Status s = write(*step.map); !s) return s;
   }
+  if (Status s = write(step.times); !s) return s;
   const auto memory = save();
   if (!memory) return failure(memory);
   return replace_memory->bind(1, samples_taken).bind(2, *memory).run();
@@ -170,6 +172,14 @@ Status RunStore::State::write(const MapRecord& map) {
   return i.bind(10, map.verdict).bind(11, map.overlap).run();
 }
 
+// Of the newest frame.
+Status RunStore::State::write(const std::vector<StageTime>& times) {
+  for (const StageTime& time : times) {
+    if (Status s = insert_time->bind(1, time.stage).bind(2, time.wall_ms).bind(3, time.cpu_ms).run(); !s) return s;
+  }
+  return {};
+}
+
 Status RunStore::State::write(const FrameRecord& frame) {
   const Eigen::Vector3d& t = frame.world_from_body.pose.translation();
   const Eigen::Quaterniond& q = frame.world_from_body.pose.rotation();
@@ -183,9 +193,7 @@ Status RunStore::State::write(const FrameRecord& frame) {
   f.bind(19, bytes_of(motion.covariance)).bind(20, std::int64_t{motion.landmarks});
   f.bind(21, std::int64_t{motion.matches}).bind(22, std::int64_t{motion.inliers}).bind(23, motion.rms_px);
   if (Status s = f.run(); !s) return s;
-  for (const StageTime& time : frame.times) {
-    if (Status s = insert_time->bind(1, time.stage).bind(2, time.wall_ms).bind(3, time.cpu_ms).run(); !s) return s;
-  }
+  if (Status s = write(frame.times); !s) return s;
   if (frame.slam) {
     insert_slam->bind(1, bytes_of(frame.slam->pose)).bind(2, bytes_of(frame.slam->covariance));
     if (Status s = insert_slam->run(); !s) return s;

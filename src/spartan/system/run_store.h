@@ -91,6 +91,7 @@ class RunStore {
     std::optional<FrameRecord> frame;
     std::optional<TerrainRecord> terrain;
     std::optional<MapRecord> map;
+    std::vector<StageTime> times;  ///< since the last frame, where the step has none itself; kept with that frame
   };
   /// One transaction: the step, what `save` does inside it (the map's tiles) and gives back, the stages' memory behind
   /// the step (only the newest is kept), and how many samples of the source were taken. All of it is in the file

@@ -68,14 +68,14 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
           i == 2 ? std::optional(TerrainRecord{some_frame(i).stamp, "narrow", 91.5, 1234}) : std::nullopt;
       const std::optional<MapRecord> map = i == 1 ? std::optional(some_map(i)) : std::nullopt;
       ASSERT_TRUE(store->commit(
-          {some_frame(i), terrain, map},
+          {some_frame(i), terrain, map, {}},
           [&] {
             return Bytes{1, 2, static_cast<std::uint8_t>(i)};
           },
           10 * i));
     }
     ASSERT_TRUE(store->commit(
-        {{}, {}, some_map(4)},
+        {{}, {}, some_map(4), {{"maps", 7.0, 6.0}}},
         [] {
           return Bytes{1, 2, 4};
         },
@@ -97,7 +97,7 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
     EXPECT_EQ(read.motion.previous_from_current.matrix(), expected.motion.previous_from_current.matrix());
     EXPECT_EQ(read.motion.inliers, expected.motion.inliers);
     EXPECT_EQ(read.motion.rms_px, expected.motion.rms_px);
-    ASSERT_EQ(read.times.size(), 2U);
+    ASSERT_EQ(read.times.size(), i == 4 ? 3U : 2U) << "with the last position's";
     EXPECT_EQ(read.times[1].stage, "odometry");
     EXPECT_EQ(read.times[0].cpu_ms, 2.5);
     ASSERT_EQ(read.localization.has_value(), expected.localization.has_value());
@@ -117,6 +117,8 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
     EXPECT_EQ(localized.sensors[1].state, "excluded");
     EXPECT_EQ(localized.sensors[1].reason, "frozen since then");
   }
+  EXPECT_EQ(frames->back().times.back().stage, "maps");
+  EXPECT_EQ(frames->back().times.back().wall_ms, 7.0);
   const auto maps = store->maps();
   ASSERT_TRUE(maps);
   ASSERT_EQ(maps->size(), 2U);
@@ -187,7 +189,7 @@ TEST(RunStore, LosesNothingCommittedWhenKilled) {
     auto store = RunStore::create(path, kIdentity);
     for (int i = 0; store && i < 7; ++i) {
       if (!store->commit(
-              {some_frame(i), {}, {}}, [] { return Bytes(100'000, 1); }, i))
+              {some_frame(i), {}, {}, {}}, [] { return Bytes(100'000, 1); }, i))
         ::_exit(1);
     }
     ::kill(::getpid(), SIGKILL);
