@@ -264,6 +264,10 @@ Result<std::optional<MappedPosition>> Pipeline::leave_position() {
   return state_->leave_position();
 }
 
+std::vector<StageTime> Pipeline::take_times() {
+  return state_->clock.take();
+}
+
 void Pipeline::page_maps_to(TileStore& store) {
   state_->merger.page_to(&store);
 }

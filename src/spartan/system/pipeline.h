@@ -90,6 +90,9 @@ class Pipeline {
   /// The position at hand, where it is a map already: at the end of a drive.
   Result<std::optional<MappedPosition>> leave_position();
 
+  /// What took its time since the last result: views of a position, leaving it.
+  std::vector<StageTime> take_times();
+
   /// After restore(): the shots of the position at hand that must be looked at again before the next is added, and the
   /// way to hand them in, one after the other.
   std::vector<ShotName> wanted_shots() const;

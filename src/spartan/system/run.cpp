@@ -177,8 +177,8 @@ Status Drive::finish() {
 
 std::vector<StageTime> Drive::take_times() {
   std::vector<StageTime> times = std::exchange(looked_, {});
-  const std::vector<StageTime> measured = clock_.take();
-  times.insert(times.end(), measured.begin(), measured.end());
+  for (const std::vector<StageTime>& measured : {clock_.take(), pipeline_.take_times()})
+    times.insert(times.end(), measured.begin(), measured.end());
   return times;
 }
 
