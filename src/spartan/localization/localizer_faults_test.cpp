@@ -282,10 +282,13 @@ TEST(LocalizerFaults, AnImuThatDiesWhileTheRoverStandsLeavesTheWheels) {
   for (Measurement& m : all) {
     std::visit(
         [](auto& value) {
-          if constexpr (requires { value.stamp; })
-            value.stamp.ns += 10'000'000'000;
-          else
-            value.from.ns += 10'000'000'000, value.to.ns += 10'000'000'000;
+          constexpr std::int64_t kLater_ns = 10'000'000'000;
+          if constexpr (requires { value.stamp; }) {
+            value.stamp.ns += kLater_ns;
+          } else {
+            value.from.ns += kLater_ns;
+            value.to.ns += kLater_ns;
+          }
         },
         m);
   }
