@@ -143,7 +143,7 @@ std::optional<Refusal> ReplayFilter::add_before_start(const Measurement& m) {
     entries_.clear();
   }
   odd_.reset();
-  if (const auto refusal = place(m)) return refusal;
+  if (!place(m)) return Refusal::duplicate;
   newest_ = stamp_of_measurement(entries_.back());
   std::erase_if(entries_, [&](const Measurement& e) { return age(e, newest_) > kBeforeStart_s; });
   return std::nullopt;
@@ -165,22 +165,20 @@ std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
   return take(m);
 }
 
-std::optional<Refusal> ReplayFilter::place(const Measurement& m) {
+std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
   const auto at = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
-  if (at != entries_.end() && !comes_before(m, *at)) return Refusal::duplicate;
-  entries_.insert(at, m);
-  return std::nullopt;
+  if (at != entries_.end() && !comes_before(m, *at)) return std::nullopt;
+  return static_cast<std::size_t>(entries_.insert(at, m) - entries_.begin());
 }
 
 std::optional<Refusal> ReplayFilter::take(const Measurement& m) {
-  if (const auto refusal = place(m)) return refusal;
+  const auto at = place(m);
+  if (!at) return Refusal::duplicate;
   newest_ = std::max(newest_, stamp_of_measurement(m));
-  const auto at =
-      static_cast<std::size_t>(std::lower_bound(entries_.begin(), entries_.end(), m, comes_before) - entries_.begin());
-  if (at + 1 == entries_.size()) {
-    run_from(at);
+  if (*at + 1 == entries_.size()) {
+    run_from(*at);
   } else {
-    replay_from(at);
+    replay_from(*at);
   }
   forget_old();
   return std::nullopt;

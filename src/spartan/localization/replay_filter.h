@@ -45,8 +45,8 @@ class ReplayFilter {
 
   std::optional<Refusal> add_before_start(const Measurement& measurement);
   std::optional<Refusal> add_started(const Measurement& measurement);
-  /// Into the entries, and no more.
-  std::optional<Refusal> place(const Measurement& measurement);
+  /// Into the entries, and no more: where it stands, or nothing where it is there already.
+  std::optional<std::size_t> place(const Measurement& measurement);
   std::optional<Refusal> take(const Measurement& measurement);
   bool opens_cell(std::size_t entry) const;
   void replay_from(std::size_t entry);

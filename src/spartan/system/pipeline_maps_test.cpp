@@ -165,14 +165,17 @@ TEST(PipelineMaps, AStopMayBeLongAndTheOdometrysPairMayLookOn) {
 TEST(PipelineMaps, AViewMayComeBeforeTheOdometrysShot) {
   Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
   look_around(pipeline, 0, -1);
-  look_around(pipeline, 1, -2.5);
   look_around(pipeline, 0, -0.5);
   EXPECT_FALSE(drive_to(pipeline, 0).position);
   const FrameResult left = drive_to(pipeline, 1);
   ASSERT_TRUE(left.position);
   EXPECT_EQ(left.position->position_id, 0);
   EXPECT_EQ(left.position->views, 3) << "both looks, and the narrow shot";
-  EXPECT_FALSE(pipeline.leave_position().value()) << "the other one was of a position that was passed by then";
+  // Of a position that the odometry's next shot is not at.
+  look_around(pipeline, 3, -4.5);
+  drive_to(pipeline, 2);
+  EXPECT_FALSE(drive_to(pipeline, 3).position);
+  EXPECT_FALSE(pipeline.leave_position().value());
 }
 
 // Stopped between two looks of the wide pair, at a shot of the narrow one.
@@ -211,6 +214,21 @@ TEST(PipelineMaps, AStopGoesOnFromRestoredMemory) {
       ASSERT_EQ(a.elevation_m(x, y), b.elevation_m(x, y));
     }
   }
+}
+
+TEST(PipelineMaps, ViewsDoNotPileUpWhereTheOdometryIsDark) {
+  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value(),
+           other = Pipeline::create(rover(), {}, Workers(2)).value();
+  for (int position = 0; position < 4; ++position) {
+    const StereoFrame look = frame_of(images_of("wide", 0), "wide", position, 5.0 * (position + 1));
+    ASSERT_FALSE(pipeline.add(look).value().has_value());
+  }
+  const testing::TemporaryFolder folder;
+  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
+  TileStore tiles = TileStore::open(db).value();
+  ASSERT_TRUE(other.restore(pipeline.save(), tiles));
+  ASSERT_EQ(other.wanted_shots().size(), 1U) << "of the newest position alone";
+  EXPECT_EQ(other.wanted_shots()[0].left_stamp, Stamp::from_seconds(20));
 }
 
 TEST(PipelineMaps, AreSwitchedOffByOption) {

@@ -63,6 +63,8 @@ Status PositionStage::look(std::int64_t position_id, const std::string& pair, co
   if (position_id < 0) return {};
   std::erase_if(wanted_, [&](const ShotName& w) { return w.pair == pair && w.left_stamp == shot.stamp; });
   if (position_id != position_id_) {
+    // Of one position, so that they do not pile up where the odometry's pair has gone dark.
+    std::erase_if(early_, [&](const EarlyLook& look) { return look.position_id != position_id; });
     early_.push_back({position_id, {pair, shot.stamp}, KeptShot(shot), nearest_m});
     return {};
   }
