@@ -36,3 +36,14 @@ if(GDAL_FOUND)
 endif()
 
 find_package(CLI11 REQUIRED)  # the program only
+
+# Oracle of the camera models in tests; has no CMake package.
+find_library(SPARTAN_MRCAL_LIBRARY mrcal)
+find_path(SPARTAN_MRCAL_INCLUDE mrcal/mrcal.h)
+if(SPARTAN_MRCAL_LIBRARY AND SPARTAN_MRCAL_INCLUDE)
+  add_library(spartan_mrcal INTERFACE)
+  target_link_libraries(spartan_mrcal INTERFACE ${SPARTAN_MRCAL_LIBRARY})
+  target_include_directories(spartan_mrcal SYSTEM INTERFACE ${SPARTAN_MRCAL_INCLUDE})
+  target_compile_definitions(spartan_mrcal INTERFACE SPARTAN_HAS_MRCAL)
+  set(SPARTAN_MRCAL spartan_mrcal)
+endif()

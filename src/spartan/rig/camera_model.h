@@ -7,12 +7,18 @@
 #include <variant>
 #include <vector>
 
+#include "spartan/rig/cahv.h"
+#include "spartan/rig/cahvor.h"
+#include "spartan/rig/cahvore.h"
+#include "spartan/rig/double_sphere.h"
+#include "spartan/rig/equidistant.h"
 #include "spartan/rig/pinhole.h"
 #include "spartan/rig/radial_tangential.h"
 
 namespace spartan {
 
-using CameraModel = std::variant<PinholeModel, RadialTangentialModel>;
+using CameraModel = std::variant<PinholeModel, RadialTangentialModel, EquidistantModel, DoubleSphereModel, CahvModel,
+                                 CahvorModel, CahvoreModel>;
 
 inline std::optional<Eigen::Vector2d> project(const CameraModel& model, const Eigen::Vector3d& point) {
   return std::visit([&](const auto& m) { return m.project(point); }, model);
@@ -25,7 +31,7 @@ inline std::optional<Ray> unproject(const CameraModel& model, const Eigen::Vecto
   return std::visit([&](const auto& m) { return m.unproject(pixel); }, model);
 }
 
-/// The name that rig.yaml uses: "pinhole", "radial_tangential".
+/// The name that rig.yaml uses: "pinhole", "radial_tangential", "equidistant" ….
 std::string_view name_of(const CameraModel& model);
 
 /// What rig.yaml holds of a model: its kinds of parameters and their numbers.

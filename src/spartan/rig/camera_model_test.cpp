@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <string>
 #include <vector>
@@ -70,8 +73,158 @@ TEST(RadialTangential, AnswersOnlyWhereTheMapGrows) {
   EXPECT_FALSE(barrel.unproject({kPinhole.cx + 1.001 * farthest * kPinhole.fx, kPinhole.cy}));
 }
 
+// A narrow lens, a fisheye beyond the half space, and one whose map folds back inside the picture.
+TEST(Equidistant, ObeysTheLaws) {
+  for (const EquidistantModel::Coefficients& k :
+       {EquidistantModel::Coefficients{0, 0, 0, 0}, {-0.013, 0.032, -0.024, 0.006}, {0.05, 0.01, 0.002, 1e-4}}) {
+    const EquidistantModel model({190.9, 190.2, 367.2, 248.4}, k);
+    testing::expect_round_trips(model, kSize);
+    testing::expect_true_jacobians(model, kSize);
+    testing::expect_honest_limits(model, true);
+    testing::expect_consistent_answers(model, kSize);
+  }
+}
+
+TEST(Equidistant, AnswersOnlyWhereTheMapGrows) {
+  const PinholeModel pinhole{200, 200, 376, 240};
+  // d(θ − 0.2 θ³)/dθ = 0 at θ = 1/√0.6
+  const EquidistantModel folds(pinhole, {-0.2, 0, 0, 0});
+  EXPECT_NEAR(folds.largest_angle(), 1 / std::sqrt(0.6), 1e-12);
+  const auto at = [](double angle) { return Eigen::Vector3d(std::sin(angle), 0, std::cos(angle)); };
+  EXPECT_TRUE(folds.project(at(1.29)));
+  EXPECT_FALSE(folds.project(at(1.30)));
+  const double farthest = 200 / std::sqrt(0.6) * (1 - 0.2 / 0.6);
+  EXPECT_TRUE(folds.unproject({376 + 0.999 * farthest, 240}));
+  EXPECT_FALSE(folds.unproject({376 + 1.001 * farthest, 240}));
+  // Without coefficients all is seen but the one direction behind.
+  const EquidistantModel whole(pinhole, {});
+  EXPECT_NEAR(whole.project(at(3.0))->x(), 376 + 200 * 3.0, 1e-9);
+  EXPECT_FALSE(whole.unproject({376 + 200 * 3.15, 240}));
+  EXPECT_FALSE(whole.project({0, 0, -1}));
+}
+
+// The published examples of wide lenses (ξ, α), those without either sphere, and one of |ξ| > 1.
+const std::vector<DoubleSphereModel> kSpheres{
+    {{313.0, 313.5, 367.2, 248.4}, -0.18, 0.59}, {{190.0, 190.5, 367.2, 248.4}, -0.27, 0.55},
+    {{400.0, 401.0, 367.2, 248.4}, 0, 0},        {{300.0, 301.0, 367.2, 248.4}, 0.6, 0.3},
+    {{600.0, 601.0, 367.2, 248.4}, 1.4, 0.2},    {{300.0, 301.0, 367.2, 248.4}, 0.1, 1},
+};
+
+TEST(DoubleSphere, ObeysTheLaws) {
+  for (const DoubleSphereModel& model : kSpheres) {
+    SCOPED_TRACE(model.xi);
+    testing::expect_consistent_answers(model, kSize, 1e-8);
+    if (model.alpha == 1) continue;  // the picture's corners are beyond its fold
+    testing::expect_round_trips(model, kSize);
+    testing::expect_true_jacobians(model, kSize);
+    testing::expect_honest_limits(model, model.alpha > 0 || model.xi > 0);
+  }
+}
+
+// Both spheres away: the pinhole. The first away: the unified model x/(α d + (1 − α) z) in closed form.
+TEST(DoubleSphere, HoldsTheSimplerModels) {
+  for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 8)) {
+    const Eigen::Vector3d p = 2 * kPinhole.unproject(pixel)->direction;
+    EXPECT_LE((*DoubleSphereModel{kPinhole, 0, 0}.project(p) - pixel).norm(), 1e-10);
+    const double alpha = 0.4, denominator = alpha * p.norm() + (1 - alpha) * p.z();
+    const Eigen::Vector2d unified(kPinhole.fx * p.x() / denominator + kPinhole.cx,
+                                  kPinhole.fy * p.y() / denominator + kPinhole.cy);
+    EXPECT_LE((*DoubleSphereModel{kPinhole, 0, alpha}.project(p) - unified).norm(), 1e-10);
+  }
+}
+
+// The image radius must grow with the angle all over the domain, and no further: found by walking outwards.
+TEST(DoubleSphere, AnswersExactlyWhereTheMapGrows) {
+  for (const DoubleSphereModel& model : kSpheres) {
+    const auto radius = [&](double angle) {
+      const double d2 = std::sqrt(1 + 2 * model.xi * std::cos(angle) + model.xi * model.xi);
+      const double denominator = model.alpha * d2 + (1 - model.alpha) * (model.xi + std::cos(angle));
+      return denominator > 0 ? std::sin(angle) / denominator : std::numeric_limits<double>::infinity();
+    };
+    double end = 0;
+    while (end < 3.14 && radius(end + 1e-4) > radius(end) && std::isfinite(radius(end + 1e-4))) end += 1e-4;
+    const auto seen = [&](double angle) { return model.project({std::sin(angle), 0, std::cos(angle)}).has_value(); };
+    EXPECT_TRUE(seen(end - 1e-3)) << model.xi << " " << model.alpha;
+    EXPECT_EQ(seen(end + 1e-3), end >= 3.1399) << model.xi << " " << model.alpha;
+  }
+}
+
+TEST(Cahv, ObeysTheLaws) {
+  const CahvModel model{kPinhole, 0.37};
+  testing::expect_round_trips(model, kSize);
+  testing::expect_true_jacobians(model, kSize);
+  testing::expect_honest_limits(model);
+  // u = P·H/P·A, v = P·V/P·A with the vectors themselves.
+  const Eigen::Vector3d p(0.3, -0.2, 1.7);
+  EXPECT_LE((*model.project(p) - Eigen::Vector2d(p.dot(model.h()), p.dot(model.v())) / p.z()).norm(), 1e-12);
+}
+
+const Eigen::Vector3d kOpticalAxis = Eigen::Vector3d(0.013, -0.021, 1).normalized();
+
+TEST(Cahvor, ObeysTheLaws) {
+  for (const CahvorModel::Radial& radial :
+       {CahvorModel::Radial{0, 0, 0}, {1e-3, -0.12, 0.04}, {-4e-4, 0.2, 0.05}, {0, -0.3, 0.11}}) {
+    const CahvorModel model({kPinhole, -0.2}, kOpticalAxis, radial);
+    testing::expect_round_trips(model, kSize);
+    testing::expect_true_jacobians(model, kSize);
+    testing::expect_honest_limits(model);
+    testing::expect_consistent_answers(model, kSize, 1e-8);
+  }
+  // √τ (1 − 0.3 τ) grows to √τ = 1/√0.9.
+  EXPECT_NEAR(CahvorModel({kPinhole, 0}, kOpticalAxis, {0, -0.3, 0}).largest_radius(), 1 / std::sqrt(0.9), 1e-9);
+}
+
+TEST(Cahvore, ObeysTheLaws) {
+  const CahvModel wide{{230.5, 231.0, 367.2, 248.4}, 0.1};
+  for (const double linearity : {1.0, 0.8, 0.37, 0.0, -0.3}) {
+    SCOPED_TRACE(linearity);
+    const CahvoreModel model(wide, kOpticalAxis, {5e-4, -0.03, 0.006}, {0.004, 0.002, -3e-4}, linearity);
+    // θ/sin θ grows without bound as the line of sight turns backwards, and with it what rounding does.
+    testing::expect_consistent_answers(model, kSize, linearity < 0 ? 1e-7 : 1e-8);
+    testing::expect_true_jacobians(model, {kSize.width / 2, kSize.height});
+    testing::expect_honest_limits(model, linearity < 1);
+  }
+  // The axis itself, and beside it by next to nothing.
+  const CahvoreModel model(wide, kOpticalAxis, {5e-4, -0.03, 0.006}, {0.004, 0.002, -3e-4}, 0.2);
+  for (const double off : {0.0, 1e-12, 1e-8, 1e-5}) {
+    const Eigen::Vector3d point = 1.5 * kOpticalAxis + off * kOpticalAxis.unitOrthogonal();
+    const auto analytic = model.project_with_jacobian(point);
+    ASSERT_TRUE(analytic);
+    const Eigen::Matrix<double, 2, 3> numeric =
+        testing::numeric_jacobian<2, 3>([&](const Eigen::Vector3d& p) { return *model.project(p); }, point, 1e-4);
+    EXPECT_LE((analytic->by_point - numeric).norm(), 1e-6 * numeric.norm()) << off;
+  }
+}
+
+// The pupil moves: lines of sight do not meet in one point. Near things show it, far ones do not.
+TEST(Cahvore, IsNotCentral) {
+  const CahvoreModel model({{230.5, 231.0, 367.2, 248.4}, 0}, Eigen::Vector3d::UnitZ(), {0, 0, 0}, {0.01, 0, 0}, 0);
+  const auto ray = model.unproject({367.2 + 230.5 * 1.2, 248.4});
+  ASSERT_TRUE(ray);
+  EXPECT_NEAR(ray->origin.z(), (1.2 / std::sin(1.2) - 1) * 0.01, 1e-12);
+  EXPECT_NEAR(std::atan2(ray->direction.x(), ray->direction.z()), 1.2, 1e-12);
+}
+
+// L = 1 without a moving pupil is CAHVOR; L = 0 without one and without μ is equidistant.
+TEST(Cahvore, HoldsTheSimplerModels) {
+  const CahvorModel::Radial radial{1e-3, -0.12, 0.04};
+  const CahvoreModel perspective({kPinhole, 0}, kOpticalAxis, radial, {0, 0, 0}, 1);
+  const CahvorModel cahvor({kPinhole, 0}, kOpticalAxis, radial);
+  const PinholeModel wide{230.5, 230.5, 367.2, 248.4};
+  const CahvoreModel fisheye({wide, 0}, Eigen::Vector3d::UnitZ(), {0, 0, 0}, {0, 0, 0}, 0);
+  const EquidistantModel equidistant(wide, {});
+  for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 8)) {
+    const Eigen::Vector3d p = 2 * cahvor.unproject(pixel)->direction;
+    EXPECT_LE((*perspective.project(p) - pixel).norm(), 1e-9);
+    const auto seen = fisheye.unproject(pixel);
+    ASSERT_TRUE(seen) << pixel.transpose();
+    EXPECT_LE((*equidistant.project(seen->direction) - pixel).norm(), 1e-9);
+  }
+}
+
 TEST(CameraModel, IsKnownByItsName) {
-  EXPECT_EQ(camera_model_names(), (std::vector<std::string_view>{"pinhole", "radial_tangential"}));
+  EXPECT_EQ(camera_model_names(), (std::vector<std::string_view>{"pinhole", "radial_tangential", "equidistant",
+                                                                 "double_sphere", "cahv", "cahvor", "cahvore"}));
   EXPECT_FALSE(camera_model_named("fisheye"));
   for (const std::string_view name : camera_model_names()) EXPECT_EQ(name_of(*camera_model_named(name)), name);
 }

@@ -5,57 +5,18 @@
 #include <cmath>
 #include <limits>
 
+#include "spartan/rig/polynomial.h"
+
 namespace spartan {
 namespace {
 
+using rig_detail::derivative;
+using rig_detail::Polynomial;
+using rig_detail::product;
+using rig_detail::sign_changes;
+using rig_detail::value;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Coefficients from the constant term upwards.
-using Polynomial = std::vector<double>;
-
-double value(const Polynomial& p, double s) {
-  double sum = 0;
-  for (std::size_t i = p.size(); i-- > 0;) sum = sum * s + p[i];
-  return sum;
-}
-
-Polynomial derivative(const Polynomial& p) {
-  Polynomial d;
-  for (std::size_t i = 1; i < p.size(); ++i) d.push_back(static_cast<double>(i) * p[i]);
-  return d;
-}
-
-Polynomial product(const Polynomial& a, const Polynomial& b) {
-  Polynomial result(a.size() + b.size() - 1, 0.0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t j = 0; j < b.size(); ++j) result[i + j] += a[i] * b[j];
-  }
-  return result;
-}
-
-// The places in (low, high) where p changes its sign, ascending. Between two neighbouring sign changes of p' the
-// polynomial is monotone, so that bisection finds every one; a root that only touches zero does not count.
-std::vector<double> sign_changes(Polynomial p, double low, double high) {
-  while (!p.empty() && p.back() == 0) p.pop_back();
-  if (p.size() < 2) return {};
-  std::vector<double> borders = sign_changes(derivative(p), low, high);
-  borders.push_back(high);
-  std::vector<double> roots;
-  for (double left = low; const double right : borders) {
-    const bool rises = value(p, left) < 0;
-    if (rises == (value(p, right) < 0)) {
-      left = right;
-      continue;
-    }
-    double a = left, b = right;
-    for (double middle = 0.5 * (a + b); middle > a && middle < b; middle = 0.5 * (a + b)) {
-      ((value(p, middle) < 0) == rises ? a : b) = middle;
-    }
-    roots.push_back(a);
-    left = right;
-  }
-  return roots;
-}
 
 // With s = r² and c = N/D: d(r c)/dr = c + 2 s dc/ds = (N D + 2 s (N' D − N D')) / D². The map grows from the centre
 // to the first zero of that numerator or of D.

@@ -75,26 +75,39 @@ class FaultFinder {
     }
   }
 
+  void check_model(const std::string& key, const CameraModel& model) {
+    const std::size_t before = faults_.size();
+    const auto kinds = parameter_kinds(model);
+    const ModelParameters numbers = parameters(model);
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+      check_numbers(fmt::format("{}.{}", key, kinds[i].key), kinds[i], numbers[i]);
+    }
+    if (faults_.size() == before && !project(model, Eigen::Vector3d::UnitZ())) {
+      add(key, "with these numbers the camera sees nothing straight ahead");
+    }
+  }
+
+  void check_numbers(const std::string& key, const ModelParameterKind& kind, const std::vector<double>& numbers) {
+    for (const double v : numbers) {
+      if (!std::isfinite(v)) return add(key, "must be finite");
+      if (kind.positive && v <= 0) return add(key, fmt::format("holds {}, must be above zero", v));
+      if (v < kind.least || v > kind.most) {
+        return add(key, fmt::format("holds {}, must be between {} and {}", v, kind.least, kind.most));
+      }
+    }
+    const double length = Eigen::Map<const Eigen::VectorXd>(numbers.data(), std::ssize(numbers)).norm();
+    if (kind.unit_length && !(std::abs(length - 1) <= 1e-3)) {
+      add(key, fmt::format("has length {:.6g}, must have length 1", length));
+    }
+  }
+
   void check(const Camera& camera) {
     const std::string key = "cameras." + camera.name;
     const auto [width, height] = camera.size;
     if (width <= 0 || height <= 0 || width > kLargestSide || height > kLargestSide) {
       add(key + ".size_px", fmt::format("is {} × {}, must be between 1 and {} each", width, height, kLargestSide));
     }
-    const auto kinds = parameter_kinds(camera.model);
-    const ModelParameters numbers = parameters(camera.model);
-    for (std::size_t i = 0; i < kinds.size(); ++i) {
-      for (const double v : numbers[i]) {
-        if (!std::isfinite(v)) {
-          add(fmt::format("{}.{}", key, kinds[i].key), "must be finite");
-          break;
-        }
-        if (kinds[i].positive && v <= 0) {
-          add(fmt::format("{}.{}", key, kinds[i].key), fmt::format("holds {}, must be above zero", v));
-          break;
-        }
-      }
-    }
+    check_model(key, camera.model);
     if (camera.pixel_format.bits < 8 || camera.pixel_format.bits > 16) {
       add(key + ".bits", fmt::format("is {}, must be between 8 and 16", camera.pixel_format.bits));
     }

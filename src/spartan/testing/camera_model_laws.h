@@ -37,6 +37,23 @@ inline void expect_round_trips(const CameraModel& model, ImageSize size, double 
   }
 }
 
+/// Wherever the model answers, over the picture and far around it, pixel and line of sight belong to each other.
+/// Returns the share of the grid that has an answer.
+inline double expect_consistent_answers(const CameraModel& model, ImageSize size, double tolerance_px = 1e-9) {
+  int answers = 0, asked = 0;
+  for (const Eigen::Vector2d& pixel : picture_grid({3 * size.width, 3 * size.height}, 48)) {
+    ++asked;
+    const Eigen::Vector2d place = pixel - Eigen::Vector2d(size.width, size.height);
+    const auto ray = unproject(model, place);
+    if (!ray) continue;
+    ++answers;
+    const auto back = project(model, ray->origin + 2 * ray->direction);
+    if (!back) continue;  // within rounding of the border of its domain
+    EXPECT_LE((*back - place).norm(), tolerance_px * std::max(1.0, place.norm() / size.width)) << place.transpose();
+  }
+  return static_cast<double>(answers) / asked;
+}
+
 /// ∂pixel/∂point against central differences, relative to its size.
 inline void expect_true_jacobians(const CameraModel& model, ImageSize size, double tolerance = 1e-6) {
   for (const Eigen::Vector2d& pixel : picture_grid(size, 6)) {
@@ -54,22 +71,27 @@ inline void expect_true_jacobians(const CameraModel& model, ImageSize size, doub
   }
 }
 
-/// Points behind the camera and numbers that are none get no answer, and no answer holds a NaN.
-inline void expect_honest_limits(const CameraModel& model) {
+/// The points behind a camera that sees forward only, and numbers that are none, get no answer; no answer holds a NaN.
+inline void expect_honest_limits(const CameraModel& model, bool sees_beside = false) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
-  EXPECT_FALSE(project(model, {0, 0, -1}));
-  EXPECT_FALSE(project(model, {0.1, 0, 0}));
+  EXPECT_FALSE(project(model, {0, 0, 0}));
+  EXPECT_EQ(project(model, {0.1, 0, 0}).has_value(), sees_beside);
+  if (!sees_beside) {
+    EXPECT_FALSE(project(model, {0, 0, -1}));
+  }
   EXPECT_FALSE(project(model, {kNan, 0, 1}));
   EXPECT_FALSE(project(model, {0, 0, kNan}));
   EXPECT_FALSE(unproject(model, {kNan, 0}));
   EXPECT_FALSE(unproject(model, {0, kInfinity}));
   for (const double x : {-1e9, -1e3, -3.0, -1.0, -0.3, 0.0, 0.5, 2.0, 1e4}) {
     for (const double y : {-1e5, -1.5, 0.0, 0.7, 1e8}) {
-      if (const auto pixel = project(model, {x, y, 1})) {
-        EXPECT_TRUE(pixel->allFinite()) << x << ", " << y;
-      }
-      if (const auto both = project_with_jacobian(model, {x, y, 1})) {
-        EXPECT_TRUE(both->pixel.allFinite() && both->by_point.allFinite()) << x << ", " << y;
+      for (const double z : {1.0, 0.0, -0.2, -1e3}) {
+        if (const auto pixel = project(model, {x, y, z})) {
+          EXPECT_TRUE(pixel->allFinite()) << x << ", " << y << ", " << z;
+        }
+        if (const auto both = project_with_jacobian(model, {x, y, z})) {
+          EXPECT_TRUE(both->pixel.allFinite() && both->by_point.allFinite()) << x << ", " << y << ", " << z;
+        }
       }
       if (const auto ray = unproject(model, {500 * x, 500 * y})) {
         EXPECT_TRUE(ray->direction.allFinite() && ray->origin.allFinite()) << x << ", " << y;
