@@ -231,4 +231,59 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, Ima
   return std::nullopt;
 }
 
+std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> right,
+                                              const Eigen::Vector2d& start, double reach_px) {
+  if (wanted.deviation < kLeastDeviation) return std::nullopt;
+  // right(c + (ox − s·o, oy)) ≈ template: derivatives by c are ∇, by the slant −offset ∇x.
+  std::array<Window, 4> j;
+  for (std::size_t i = 0; i < kWindowArea; ++i) {
+    const int column = static_cast<int>(i) % kWindowSide, row = static_cast<int>(i) / kWindowSide;
+    j[0][i] = wanted.gradient_x[i];
+    j[1][i] = wanted.gradient_y[i];
+    j[2][i] = -wanted.gradient_x[i] * static_cast<float>(column - kWindowRadius);
+    j[3][i] = -wanted.gradient_x[i] * static_cast<float>(row - kWindowRadius);
+  }
+  for (Window& window : j) normalise(window);
+  Eigen::Matrix4d information;
+  for (std::size_t a = 0; a < 4; ++a) {
+    for (std::size_t b = 0; b < 4; ++b)
+      information(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = weighted_dot(j[a], j[b]);
+  }
+  if (!(information.topLeftCorner<2, 2>().determinant() > 1e-4)) return std::nullopt;
+  const double prior = kSlantPrior * kNoiseCorrelation / (0.5 * kWindowArea);
+  information(2, 2) += prior;
+  information(3, 3) += prior;
+  const Eigen::Matrix4d inverse = information.inverse();
+
+  Eigen::Vector4d x(start.x(), start.y(), 0, 0);
+  for (int iteration = 0; iteration < 2 * kMaxIterations; ++iteration) {
+    Eigen::Matrix2d warp;
+    warp << 1 - x[2], -x[3], 0, 1;
+    std::optional<Window> seen = warped_window(right, warp, x.head<2>());
+    if (!seen) return std::nullopt;
+    const float deviation = normalise(*seen);
+    if (deviation < kLeastDeviation) return std::nullopt;
+    const float contrast = wanted.deviation / deviation;
+    Window residual;
+    for (std::size_t i = 0; i < kWindowArea; ++i) residual[i] = contrast * (*seen)[i] - wanted.value[i];
+    Eigen::Vector4d gradient;
+    for (std::size_t k = 0; k < 4; ++k) gradient[static_cast<Eigen::Index>(k)] = weighted_dot(j[k], residual);
+    gradient.tail<2>() += prior * x.tail<2>();
+    const Eigen::Vector4d step = -(inverse * gradient);
+    x += step;
+    if (!((x.head<2>() - start).norm() <= reach_px) || !(std::abs(x[2]) < 0.8) || !(std::abs(x[3]) < 1.5)) {
+      return std::nullopt;
+    }
+    if (step.head<2>().norm() + 3 * step.tail<2>().norm() > 2 * kSettled_px) continue;
+    const double variance = weighted_dot(residual, residual);
+    SlantedAlignment found;
+    found.place.position = x.head<2>();
+    found.place.correlation = weighted_dot(*seen, wanted.value) / (deviation * wanted.deviation);
+    found.place.covariance = inverse.topLeftCorner<2, 2>() * (variance * kNoiseCorrelation / (0.5 * kWindowArea));
+    found.slant = x.tail<2>();
+    return found;
+  }
+  return std::nullopt;
+}
+
 }  // namespace spartan

@@ -65,4 +65,16 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, Ima
                                             const Eigen::Vector2d& centre, const RowAlignment& start,
                                             bool estimate_slant, double reach_px);
 
+/// Where a template of the left eye was found in the right one when neither row nor slant are known.
+struct SlantedAlignment {
+  Alignment place;
+  Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< ∂disparity/∂(x, y) in the left image
+};
+
+/// As align_translation with the surface's slant estimated along: right(centre + offset − (slant · offset, 0)) is like
+/// the template. Without it, slanted edges of slanted ground draw a match up or down. A weak prior holds the slant near
+/// 0.
+std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> right,
+                                              const Eigen::Vector2d& start, double reach_px);
+
 }  // namespace spartan

@@ -9,6 +9,8 @@
 #include <limits>
 #include <numbers>
 
+#include "spartan/rig/rig_findings.h"
+
 namespace spartan {
 namespace {
 
@@ -17,9 +19,6 @@ constexpr double kDisparityStep_px = 0.3;
 constexpr std::array<double, 6> kRanges_m{0.5, 1, 2, 5, 10, 20};
 // What is smaller than this is not worth a word.
 constexpr double kLeastLength_m = 0.5e-6, kLeastAngle_deg = 0.0005;
-// Beyond these a pair is more likely misread than built that way.
-constexpr double kOddBaseline_m = 3, kOddTurn_deg = 15;
-
 // "120.0 mm", and metres above one of them.
 std::string length(double metres) {
   return metres < 1 ? fmt::format("{:.1f} mm", 1000 * metres) : fmt::format("{:.3f} m", metres);
@@ -99,22 +98,6 @@ std::string describe_camera(const Rig& rig, const Camera& c) {
                      vertical_view_deg(c), focal_px(c), describe_place(rig, c));
 }
 
-// Sentences about what looks like a mistake in the file rather than a rig.
-std::vector<std::string> doubts_about(const StereoPair& pair, const Pose& left_from_right) {
-  std::vector<std::string> doubts;
-  const Eigen::Vector3d& t = left_from_right.translation();
-  const auto doubt = [&](std::string text) { doubts.push_back(fmt::format("pair {}: DOUBT: {}", pair.name, text)); };
-  if (t.x() < 0) {
-    doubt("the right camera stands to the LEFT of the left one: are the eyes swapped, or the transform inverted?");
-  }
-  if (std::abs(t.x()) < std::max(std::abs(t.y()), std::abs(t.z())))
-    doubt("the right camera does not stand beside the left one: a transform in other axes?");
-  if (t.norm() > kOddBaseline_m) doubt(fmt::format("a baseline of {:.1f} m: was it given in mm?", t.norm()));
-  const double turned = log_so3(left_from_right.rotation()).norm() * kDegreesPerRadian;
-  if (turned > kOddTurn_deg) doubt(fmt::format("the eyes are turned by {} to each other", angle(turned)));
-  return doubts;
-}
-
 void describe_pair(const Rig& rig, const StereoPair& pair, std::vector<std::string>& sentences) {
   const PairSummary summary = summarize_pair(rig, pair);
   const Pose left_from_right = rig.right_from_left(pair).inverse();
@@ -132,7 +115,9 @@ void describe_pair(const Rig& rig, const StereoPair& pair, std::vector<std::stri
                                     pair.name, pair.nearest_m, summary.focal_px * summary.baseline_m / pair.nearest_m));
   }
   if (!pair.for_odometry) sentences.push_back(fmt::format("pair {}: not for the odometry", pair.name));
-  for (std::string& doubt : doubts_about(pair, left_from_right)) sentences.push_back(std::move(doubt));
+  for (const RigFinding& doubt : find_doubts(rig, pair)) {
+    sentences.push_back(fmt::format("pair {}: DOUBT ({}): {}", pair.name, doubt.id, doubt.text));
+  }
 }
 
 }  // namespace

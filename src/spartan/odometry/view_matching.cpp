@@ -1,0 +1,93 @@
+#include "spartan/odometry/view_matching.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "spartan/odometry/landmark_detector.h"
+#include "spartan/odometry/patch_alignment.h"
+#include "spartan/odometry/smoothed_image.h"
+
+namespace spartan {
+namespace {
+
+// The nearest of `others` for each feature, and how clearly.
+struct Nearest {
+  int index = -1;
+  double distance = std::numeric_limits<double>::infinity();
+  double second = std::numeric_limits<double>::infinity();
+};
+
+std::vector<Nearest> nearest_of(const std::vector<Feature>& features, const std::vector<Feature>& others,
+                                const Workers& workers) {
+  std::vector<Nearest> result(features.size());
+  workers.for_each_part(0, static_cast<int>(features.size()), 64, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      const Feature& feature = features[static_cast<std::size_t>(i)];
+      Nearest& best = result[static_cast<std::size_t>(i)];
+      for (std::size_t k = 0; k < others.size(); ++k) {
+        if (others[k].sign != feature.sign) continue;
+        const double distance = squared_distance(feature.descriptor, others[k].descriptor);
+        if (distance < best.distance) {
+          best.second = best.distance;
+          best.distance = distance;
+          best.index = static_cast<int>(k);
+        } else {
+          best.second = std::min(best.second, distance);
+        }
+      }
+    }
+  });
+  return result;
+}
+
+std::optional<ViewMatch> align(const Feature& left, const Feature& right, ImageView<const std::uint16_t> left_smooth,
+                               ImageView<const std::uint16_t> right_smooth, const ViewMatchingOptions& options) {
+  // The left place is moved on to a whole pixel, the right one along with it.
+  const Eigen::Vector2d exact(left.x, left.y);
+  const Eigen::Vector2d place = exact.array().round();
+  const auto patch = cut_patch(left_smooth, static_cast<int>(place.x()), static_cast<int>(place.y()));
+  if (!patch) return std::nullopt;
+  const Eigen::Vector2d start = Eigen::Vector2d(right.x, right.y) + (place - exact);
+  const AlignmentTemplate wanted(*patch);
+  const auto coarse =
+      align_translation(wanted, right_smooth, Eigen::Matrix2d::Identity(), start, options.correlation_reach_px);
+  if (!coarse) return std::nullopt;
+  const auto found = align_slanted(wanted, right_smooth, coarse->position, options.correlation_reach_px);
+  if (!found || found->place.correlation < options.min_correlation) return std::nullopt;
+  return ViewMatch{place, found->place.position, std::sqrt(found->place.covariance(1, 1)), found->place.correlation};
+}
+
+}  // namespace
+
+std::vector<ViewMatch> match_views(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                   const ViewMatchingOptions& options, const Workers& workers) {
+  DetectionOptions detection;
+  detection.landmarks = options.features;
+  const auto detector = make_landmark_detector(detection, workers);
+  const std::vector<Feature> left_features = detector->detect(left, {});
+  const std::vector<Feature> right_features = detector->detect(right, {});
+  const auto from_left = nearest_of(left_features, right_features, workers);
+  const auto from_right = nearest_of(right_features, left_features, workers);
+  SmoothedImage left_smooth, right_smooth;
+  left_smooth.compute(left, workers);
+  right_smooth.compute(right, workers);
+
+  std::vector<ViewMatch> matches;
+  const double ratio = options.descriptor_ratio * options.descriptor_ratio;  // distances are squared
+  for (std::size_t i = 0; i < left_features.size(); ++i) {
+    const Nearest& best = from_left[i];
+    if (best.index < 0 || !(best.distance < ratio * best.second)) continue;
+    const auto other = static_cast<std::size_t>(best.index);
+    if (from_right[other].index != static_cast<int>(i)) continue;
+    if (const auto match =
+            align(left_features[i], right_features[other], left_smooth.view(), right_smooth.view(), options)) {
+      matches.push_back(*match);
+    }
+  }
+  return matches;
+}
+
+}  // namespace spartan

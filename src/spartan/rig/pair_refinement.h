@@ -1,0 +1,60 @@
+// How the calibration of a stereo pair must be changed so that it fits the pictures: a fit to matched places.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "spartan/core/pose.h"
+#include "spartan/rig/camera_model.h"
+
+namespace spartan {
+
+/// The same place in both pictures as taken, pixels.
+struct PixelMatch {
+  Eigen::Vector2d left, right;
+};
+
+/// What is to be changed. Turns are those of the right eye about its own axes as `describe_relative_pose` names them,
+/// left_from_right' = left_from_right · Ry(yaw) Rx(pitch) Rz(roll): to the right, up, clockwise. The baseline's
+/// direction turns by `baseline_down_rad` and `baseline_ahead_rad`. All of them small.
+struct PairCorrection {
+  double pitch_rad = 0, yaw_rad = 0, roll_rad = 0;
+  double baseline_down_rad = 0, baseline_ahead_rad = 0;
+  double focal_ratio = 1;  ///< factor of the right eye's focal length
+  /// Of a pinhole that should have been bent: r → r/(1 + k r²) straightens its rays; k is about Brown's k1. 0 where not
+  /// asked for.
+  double left_radial = 0, right_radial = 0;
+};
+
+/// left_from_right with the correction taken in.
+Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection& correction);
+
+struct PairFit {
+  PairCorrection correction, sigma;  ///< the estimate and its standard deviations (of the ratio: of its logarithm)
+  double focal_px = 0;               ///< pixels per radian of the rectified view, the mean of both eyes
+  /// For each match: signed row difference (left − right) in the rectified view, px, of the pair as given and as
+  /// corrected, and the disparity (left − right) as corrected. NaN where a model has no line of sight.
+  std::vector<double> row_error_before_px, row_error_after_px, disparity_px;
+  std::vector<bool> inlier;  ///< fits the corrected pair
+  int inliers = 0;
+  double rms_px = 0;  ///< of the inliers' row errors as corrected
+  double cost = 0;  ///< Σ min(r²/σ², 9) plus the priors, σ = match_sigma_px: to compare beliefs about the same matches
+};
+
+struct PairFitOptions {
+  bool radial = false;  ///< estimate what bends the rays of each eye too
+  /// What is thought of the errors of a calibration beforehand (standard deviations). They hold what the pictures do
+  /// not tell: the yaw of a narrow view, the baseline's direction where all is far away.
+  double turn_sigma_rad = 0.05, baseline_sigma_rad = 0.02, focal_sigma = 0.03, radial_sigma = 0.3;
+  double match_sigma_px = 0.15;  ///< least standard deviation of a row difference
+};
+
+/// Robust least squares over the row differences in the rectified view, Σ ρ(r²) plus the priors, by Levenberg-Marquardt
+/// with Cauchy weights whose scale shrinks from 20 px, so that a share of wrong matches does no harm (graduated
+/// non-convexity after Blake & Zisserman 1987). What each parameter does to a row (x, y of the rectified view at focal
+/// length 1, d the disparity): pitch 1 + y², roll x, yaw x y, baseline down d, baseline ahead y d, focal ratio y,
+/// k y (x² + y²) of each eye (docs/math/pair_check.md).
+PairFit fit_pair(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
+                 const std::vector<PixelMatch>& matches, const PairFitOptions& options = {});
+
+}  // namespace spartan

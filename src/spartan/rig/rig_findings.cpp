@@ -1,0 +1,108 @@
+#include "spartan/rig/rig_findings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace spartan {
+namespace {
+
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+// Beyond these a pair is more likely misread than built that way.
+constexpr double kLongBaseline_m = 3, kShortBaseline_m = 0.005, kLargestTurn_deg = 15;
+// How far the principal point may lie from the middle, and fx from fy, as factors.
+constexpr double kMiddle = 1.4, kAspect = 1.3;
+constexpr double kNarrowest_deg = 3, kWidestLinear_deg = 150;
+
+struct OnAxis {
+  Eigen::Vector2d centre;
+  Eigen::Matrix2d by_direction;  // ∂(u, v)/∂(x/z, y/z)
+};
+std::optional<OnAxis> look_ahead(const CameraModel& model) {
+  const auto ahead = project_with_jacobian(model, Eigen::Vector3d::UnitZ());
+  if (!ahead) return std::nullopt;
+  return OnAxis{ahead->pixel, ahead->by_point.leftCols<2>()};
+}
+
+void check_camera(const Camera& camera, ImageSize picture, std::vector<RigFinding>& findings) {
+  const auto mismatch = [&](const std::string& text, double value) {
+    findings.push_back({"size_mismatch", fmt::format("camera {}: {}", camera.name, text), value});
+  };
+  const auto [width, height] = camera.size;
+  if (!picture.empty() && picture != camera.size) {
+    return mismatch(fmt::format("the calibration is of pictures of {} x {} px, these have {} x {}", width, height,
+                                picture.width, picture.height),
+                    static_cast<double>(picture.width) / width);
+  }
+  const auto axis = look_ahead(camera.model);
+  if (!axis) return;
+  const double along = axis->centre.x() / (0.5 * (width - 1)), down = axis->centre.y() / (0.5 * (height - 1));
+  const double factor = std::sqrt(std::abs(along * down));
+  const bool alike = along > 0 && down > 0 && std::abs(std::log(along / down)) < std::log(1.3);
+  if (alike && (std::min(along, down) > kMiddle || std::max(along, down) < 1 / kMiddle)) {
+    return mismatch(
+        fmt::format("the optical axis meets the picture at ({:.0f}, {:.0f}), which would be the middle of {:.0f} "
+                    "x {:.0f} px, not of {} x {}: is the calibration that of another picture size?",
+                    axis->centre.x(), axis->centre.y(), factor * width, factor * height, width, height),
+        1 / factor);
+  }
+  const double fx = std::abs(axis->by_direction(0, 0)), fy = std::abs(axis->by_direction(1, 1));
+  if (std::abs(std::log(fx / fy)) > std::log(kAspect)) {
+    return mismatch(fmt::format("fx is {:.1f} and fy {:.1f} px: is one of them that of another picture size?", fx, fy),
+                    fx / fy);
+  }
+  const double view_deg = 2 * std::atan(0.5 * width / fx) * kDegreesPerRadian;
+  if (is_linear(camera) && !(view_deg > kNarrowest_deg && view_deg < kWidestLinear_deg)) {
+    mismatch(fmt::format("a focal length of {:.1f} px gives a view of {:.1f}° for {} px", fx, view_deg, width),
+             view_deg);
+  }
+}
+
+}  // namespace
+
+bool is_linear(const Camera& camera) {
+  const auto axis = look_ahead(camera.model);
+  if (!axis) return false;
+  const double last_x = camera.size.width - 1, last_y = camera.size.height - 1;
+  for (const Eigen::Vector2d& pixel :
+       {Eigen::Vector2d(0, 0), {last_x, 0}, {0, last_y}, {last_x, last_y}, {0.5 * last_x, 0}, {0, 0.5 * last_y}}) {
+    const auto ray = unproject(camera.model, pixel);
+    if (!ray || !(ray->direction.z() > 0)) return false;
+    const Eigen::Vector2d straight = axis->centre + axis->by_direction * ray->direction.head<2>() / ray->direction.z();
+    if (!((straight - pixel).norm() < 0.5)) return false;
+  }
+  return true;
+}
+
+std::vector<RigFinding> find_doubts(const Rig& rig, const StereoPair& pair, ImageSize picture_size) {
+  std::vector<RigFinding> findings;
+  const Pose left_from_right = rig.right_from_left(pair).inverse();
+  const Eigen::Vector3d& t = left_from_right.translation();
+  if (t.x() < 0) {
+    const std::string place =
+        fmt::format("the right camera stands to the LEFT of the left one, by {:.1f} mm", -1000 * t.x());
+    findings.push_back({"inverse_transform", place + ": is the transform the inverse of what it should be?", t.x()});
+    findings.push_back({"swapped_eyes", place + ": or are left and right exchanged?", t.x()});
+  }
+  if (std::abs(t.x()) < std::max(std::abs(t.y()), std::abs(t.z()))) {
+    findings.push_back({"not_beside", "the right camera does not stand beside the left one: a transform in other axes?",
+                        std::max(std::abs(t.y()), std::abs(t.z()))});
+  }
+  if (t.norm() > kLongBaseline_m || t.norm() < kShortBaseline_m) {
+    findings.push_back({"baseline_unit",
+                        fmt::format("a baseline of {:.4g} m: {}", t.norm(),
+                                    t.norm() > 1 ? "was it given in mm or cm?" : "was it divided by 1000 twice?"),
+                        t.norm()});
+  }
+  const double turned_deg = rotation_angle(left_from_right) * kDegreesPerRadian;
+  if (turned_deg > kLargestTurn_deg) {
+    findings.push_back(
+        {"eyes_apart", fmt::format("the eyes are turned by {:.2f}° to each other", turned_deg), turned_deg});
+  }
+  for (const std::string& name : {pair.left, pair.right}) check_camera(*rig.find_camera(name), picture_size, findings);
+  return findings;
+}
+
+}  // namespace spartan
