@@ -9,6 +9,7 @@
 #include <array>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <stdexcept>
 
 namespace spartan::testing {
@@ -88,6 +89,12 @@ ProgramResult run_program(const std::vector<std::string>& arguments, const Progr
   if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
   if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
   return result;
+}
+
+std::string small_drive_folder() {
+  const char* const program = std::getenv("SPARTAN_PROGRAM");
+  if (program == nullptr) throw std::runtime_error("SPARTAN_PROGRAM is not set; run through ctest");
+  return (std::filesystem::path(program).parent_path().parent_path() / "tests" / "small_drive").string();
 }
 
 }  // namespace spartan::testing

@@ -24,4 +24,7 @@ struct ProgramLimits {
 /// The program of this build (environment variable SPARTAN_PROGRAM).
 ProgramResult run_program(const std::vector<std::string>& arguments, const ProgramLimits& limits = {});
 
+/// The drive that make_small_drive has rendered once for all tests; not to be written to.
+std::string small_drive_folder();
+
 }  // namespace spartan::testing

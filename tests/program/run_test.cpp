@@ -41,10 +41,7 @@ std::string number(int i) {
 // Each test works on a copy of its own of the drive that make_small_drive has rendered.
 class Run : public ::testing::Test {
  protected:
-  Run() {
-    const fs::path program = std::getenv("SPARTAN_PROGRAM");
-    fs::copy(program.parent_path().parent_path() / "tests" / "small_drive", drive(), fs::copy_options::recursive);
-  }
+  Run() { fs::copy(testing::small_drive_folder(), drive(), fs::copy_options::recursive); }
 
   std::string drive() const { return folder_.path() + "/drive"; }
   std::string path(const std::string& name) const { return folder_.path() + "/" + name; }

@@ -127,6 +127,27 @@ TEST(PatchAlignment, FindsDisparityAndSlant) {
   }
 }
 
+// As along the row, with a row that is not known either.
+TEST(PatchAlignment, FindsPlaceAndSlant) {
+  const Eigen::Vector2d slant(0.05, 0.3);
+  Eigen::Matrix2d warp;
+  warp << 1 - slant.x(), -slant.y(), 0, 1;
+  for (const double d : {-0.8, -0.3, 0.0, 0.45, 1.0}) {
+    const Eigen::Vector2d shift(-d, 0.4 * d + 0.3);
+    const Picture right(warp, shift);
+    const auto found = align_slanted(reference(), right.view(), {32, 32}, 3);
+    ASSERT_TRUE(found.has_value()) << d;
+    EXPECT_LT((found->place.position - Eigen::Vector2d(32, 32) - shift).norm(), 0.05) << d;
+    EXPECT_NEAR(found->slant.x(), slant.x(), 0.03);
+    EXPECT_NEAR(found->slant.y(), slant.y(), 0.03);
+    const auto stiff = align_translation(reference(), right.view(), Eigen::Matrix2d::Identity(), {32, 32}, 3);
+    if (stiff) {
+      EXPECT_LT(stiff->correlation, found->place.correlation);
+    }
+  }
+  EXPECT_FALSE(align_slanted(reference(), Picture(Eigen::Matrix2d::Identity(), {3, 3}).view(), {32, 32}, 1));
+}
+
 TEST(PatchAlignment, RefusesBordersFlatPatchesAndFarWays) {
   const Picture picture(Eigen::Matrix2d::Identity(), {0, 0});
   EXPECT_FALSE(cut_patch(picture.view(), 6, 32).has_value());

@@ -59,22 +59,19 @@ bool inside(const Distorted& distorted) {
   return distorted.at.allFinite() && distorted.slope.determinant() > 0;
 }
 
-// The radius that the radial map alone sends to `target`, by bisection; the edge where it reaches no further.
+// The radius that the radial map r → r c alone sends to `target`; the edge where it reaches no further.
 double undistorted_radius(const RadialTangentialModel& model, double target) {
-  RadialTangentialModel::Coefficients radial = model.coefficients();
-  radial[2] = radial[3] = 0;
-  const auto reached = [&](double r) { return distort(radial, {r, 0}).at.x(); };
-  double low = 0, high = std::min(model.largest_radius(), 1.0);
-  while (high < model.largest_radius() && high < 1e6 && reached(high) < target) {
-    low = high;
-    high = std::min(2 * high, model.largest_radius());
-  }
-  // A start for Newton's method need not be exact.
-  for (int i = 0; i < 12; ++i) {
-    const double middle = 0.5 * (low + high);
-    (reached(middle) < target ? low : high) = middle;
-  }
-  return low;
+  const RadialTangentialModel::Coefficients& k = model.coefficients();
+  const auto radial = [&](double r) {
+    const double s = r * r;
+    const double n = 1 + s * (k[0] + s * (k[1] + s * k[4])), d = 1 + s * (k[5] + s * (k[6] + s * k[7]));
+    const double dn = k[0] + s * (2 * k[1] + s * 3 * k[4]), dd = k[5] + s * (2 * k[6] + s * 3 * k[7]);
+    const double c = n / d;
+    return rig_detail::Slope{r * c, c + 2 * s * (dn - c * dd) / d};
+  };
+  // Tangential terms may reach a little beyond what the radial map does.
+  return rig_detail::solve_increasing(radial, target, 0, model.largest_radius(), target)
+      .value_or(0.999 * model.largest_radius());
 }
 
 }  // namespace
@@ -133,7 +130,8 @@ std::optional<Ray> RadialTangentialModel::unproject(const Eigen::Vector2d& pixel
   Eigen::Vector2d p = length > 0 ? Eigen::Vector2d(target * (undistorted_radius(*this, length) / length)) : target;
   Distorted distorted = distort(coefficients_, p);
   double error = (distorted.at - target).norm();
-  for (int i = 0; i < 50 && error > 0; ++i) {
+  const double settled = 1e-15 * (1 + length);  // what rounding leaves
+  for (int i = 0; i < 50 && error > settled; ++i) {
     // A step that leads away (next to the edge, where the slope vanishes) is halved until it leads nearer.
     Eigen::Vector2d step = distorted.slope.inverse() * (target - distorted.at);
     bool nearer = false;

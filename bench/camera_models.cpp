@@ -1,0 +1,212 @@
+// Every camera model beside its oracle: the largest difference on a grid over the whole picture, the round trip pixel →
+// ray → pixel, the Jacobians beside central differences, and the time of a projection beside OpenCV's or mrcal's.
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/ccalib/omnidir.hpp>
+#include <string>
+#include <vector>
+
+#include "spartan/rig/camera_model.h"
+#include "spartan/testing/camera_model_laws.h"
+#ifdef SPARTAN_HAS_MRCAL
+#include "spartan/testing/mrcal_oracle.h"
+#endif
+
+namespace spartan {
+namespace {
+
+constexpr ImageSize kSize{1024, 768};
+constexpr int kGrid = 64, kPoints = 200000, kRuns = 7;
+const PinholeModel kCore{400.5, 398.25, 517.3, 379.1};
+
+using Points = std::vector<cv::Point3d>;
+using Pixels = std::vector<cv::Point2d>;
+
+struct Oracle {
+  std::string name;
+  std::function<Pixels(const Points&)> project;  // empty: none
+  double unit_distance = 0;                      // > 0: compares at this distance from the camera's origin only
+  double least_z = 0;                            // of a direction
+};
+
+struct Case {
+  std::string name;
+  CameraModel model;
+  Oracle oracle;
+};
+
+cv::Matx33d matrix() {
+  return {kCore.fx, 0, kCore.cx, 0, kCore.fy, kCore.cy, 0, 0, 1};
+}
+
+Oracle opencv(const std::vector<double>& distortion) {
+  return {"OpenCV projectPoints", [distortion](const Points& points) {
+            Pixels seen;
+            cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), matrix(), distortion, seen);
+            return seen;
+          }};
+}
+
+Oracle opencv_fisheye(const EquidistantModel::Coefficients& k) {
+  return {"OpenCV fisheye",
+          [k](const Points& points) {
+            Pixels seen;
+            cv::fisheye::projectPoints(points, seen, cv::Vec3d(), cv::Vec3d(), matrix(),
+                                       cv::Vec4d(k[0], k[1], k[2], k[3]));
+            return seen;
+          },
+          0, 0.01};
+}
+
+Oracle opencv_omnidir(double xi) {
+  return {"OpenCV omnidir", [xi](const Points& points) {
+            Pixels seen;
+            cv::omnidir::projectPoints(points, seen, cv::Vec3d(), cv::Vec3d(), matrix(), xi, cv::Vec4d());
+            return seen;
+          }};
+}
+
+#ifdef SPARTAN_HAS_MRCAL
+Oracle mrcal(const std::string& name, std::vector<double> intrinsics, double unit_distance = 0) {
+  const testing::MrcalModel model(name, std::move(intrinsics));
+  return {"mrcal",
+          [model](const Points& points) {
+            Pixels seen;
+            seen.reserve(points.size());
+            for (const cv::Point3d& p : points) {
+              const Eigen::Vector2d q = model.project({p.x, p.y, p.z});
+              seen.emplace_back(q.x(), q.y());
+            }
+            return seen;
+          },
+          unit_distance};
+}
+#else
+Oracle mrcal(const std::string&, const std::vector<double>&, double = 0) {
+  return {"mrcal is not installed", {}};
+}
+#endif
+
+std::vector<Case> cases() {
+  const RadialTangentialModel::Coefficients five{-0.28, 0.074, 2e-4, -1e-4, 0.001};
+  const RadialTangentialModel::Coefficients eight{0.3, 0.1, 0.0005, -0.0003, 0.01, 0.5, 0.15, 0.02};
+  const EquidistantModel::Coefficients fisheye{-0.012, 0.031, -0.024, 0.006};
+  const Eigen::Vector3d o = Eigen::Vector3d(0.013, -0.021, 1).normalized();
+  const double alpha = std::atan2(o.x(), o.z()), beta = std::asin(o.y());
+  const std::vector<double> core{kCore.fx, kCore.fy, kCore.cx, kCore.cy};
+  const auto with = [&](std::vector<double> more) {
+    more.insert(more.begin(), core.begin(), core.end());
+    return more;
+  };
+  return {
+      {"pinhole", kCore, opencv({})},
+      {"radial_tangential, 5", RadialTangentialModel(kCore, five), opencv({five.begin(), five.begin() + 5})},
+      {"radial_tangential, 8", RadialTangentialModel(kCore, eight), opencv({eight.begin(), eight.end()})},
+      {"equidistant", EquidistantModel(kCore, fisheye), opencv_fisheye(fisheye)},
+      {"double_sphere, alpha 0", DoubleSphereModel{kCore, 0.6, 0}, opencv_omnidir(0.6)},
+      {"double_sphere", DoubleSphereModel{kCore, -0.2, 0.57}, {"closed forms (tests)", {}}},
+      {"cahv", CahvModel{kCore, 0}, opencv({})},
+      {"cahvor", CahvorModel({kCore, 0}, o, {0.002, -0.11, 0.03}),
+       mrcal("LENSMODEL_CAHVOR", with({alpha, beta, 0.002, -0.11, 0.03}))},
+      {"cahvore, linearity 0.37", CahvoreModel({kCore, 0}, o, {0.001, -0.02, 0.004}, {0.006, 0.002, -0.0005}, 0.37),
+       mrcal("LENSMODEL_CAHVORE_linearity=0.37", with({alpha, beta, 0.001, -0.02, 0.004, 0.006, 0.002, -0.0005}), 1)},
+  };
+}
+
+// The point on the ray at that distance from the camera's origin.
+Eigen::Vector3d at_distance(const Ray& ray, double distance) {
+  const double along = ray.origin.dot(ray.direction);
+  const double way = std::sqrt(along * along - ray.origin.squaredNorm() + distance * distance) - along;
+  return ray.origin + way * ray.direction;
+}
+
+double milliseconds(const std::function<void()>& work) {
+  std::vector<double> times;
+  for (int run = 0; run < kRuns; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::nth_element(times.begin(), times.begin() + kRuns / 2, times.end());
+  return times[kRuns / 2];
+}
+
+struct Accuracy {
+  int seen = 0, asked = 0, compared = 0;
+  double oracle_px = 0, round_trip_px = 0, jacobian = 0;  // largest; the last relative
+};
+
+Accuracy judge(const Case& c) {
+  Accuracy a;
+  for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, kGrid)) {
+    ++a.asked;
+    const auto ray = unproject(c.model, pixel);
+    if (!ray) continue;
+    ++a.seen;
+    const Eigen::Vector3d point = at_distance(*ray, c.oracle.unit_distance > 0 ? c.oracle.unit_distance : 3);
+    const auto ours = project_with_jacobian(c.model, point);
+    if (!ours) continue;
+    a.round_trip_px = std::max(a.round_trip_px, (ours->pixel - pixel).norm());
+    const auto numeric = testing::numeric_jacobian<2, 3>(
+        [&](const Eigen::Vector3d& p) { return project(c.model, p).value_or(Eigen::Vector2d(NAN, NAN)); }, point, 3e-4);
+    if (numeric.allFinite()) a.jacobian = std::max(a.jacobian, (ours->by_point - numeric).norm() / numeric.norm());
+    if (!c.oracle.project || ray->direction.z() < c.oracle.least_z) continue;
+    const cv::Point2d other = c.oracle.project({{point.x(), point.y(), point.z()}}).front();
+    a.oracle_px = std::max(a.oracle_px, std::hypot(other.x - ours->pixel.x(), other.y - ours->pixel.y()));
+    ++a.compared;
+  }
+  return a;
+}
+
+void report(const Case& c) {
+  const Accuracy a = judge(c);
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<Eigen::Vector3d> points;
+  Points same;
+  const auto grid = testing::picture_grid(kSize, 96);
+  for (int i = 0; std::ssize(points) < kPoints; ++i) {
+    const Eigen::Vector2d& pixel = grid[static_cast<std::size_t>(i) % grid.size()];
+    const auto ray = unproject(c.model, pixel);
+    if (!ray || ray->direction.z() < 0.01) continue;
+    pixels.push_back(pixel);
+    points.push_back(at_distance(*ray, 1 + i % 7));
+    same.emplace_back(points.back().x(), points.back().y(), points.back().z());
+  }
+  double sum = 0;
+  const double project_ms = milliseconds([&] {
+    for (const Eigen::Vector3d& p : points) sum += project(c.model, p)->x();
+  });
+  const double jacobian_ms = milliseconds([&] {
+    for (const Eigen::Vector3d& p : points) sum += project_with_jacobian(c.model, p)->by_point(0, 0);
+  });
+  const double unproject_ms = milliseconds([&] {
+    for (const Eigen::Vector2d& p : pixels) sum += unproject(c.model, p)->direction.x();
+  });
+  const double oracle_ms = c.oracle.project ? milliseconds([&] { sum += c.oracle.project(same).front().x; }) : NAN;
+  constexpr double kPerMillion = 1e6 / kPoints;
+  fmt::print("| {} | {} | {:.0f} % | {} | {:.1e} | {:.1e} | {:.0f} | {:.0f} | {:.0f} | {} |\n", c.name, c.oracle.name,
+             100.0 * a.seen / a.asked, c.oracle.project ? fmt::format("{:.1e}", a.oracle_px) : "-", a.round_trip_px,
+             a.jacobian, project_ms * kPerMillion, jacobian_ms * kPerMillion, unproject_ms * kPerMillion,
+             c.oracle.project ? fmt::format("{:.0f}", oracle_ms * kPerMillion) : "-");
+  if (!std::isfinite(sum)) fmt::print("not finite\n");
+}
+
+}  // namespace
+}  // namespace spartan
+
+int main() {
+  cv::setNumThreads(1);
+  fmt::print(
+      "Grid of {0} x {0} places over {1} x {2} px; ms per million, medians of {3} runs on one thread.\n"
+      "| model | oracle | seen | oracle, px | round trip, px | Jacobian, relative | project | with Jacobian | "
+      "unproject | "
+      "oracle's project |\n|---|---|---|---|---|---|---|---|---|---|\n",
+      spartan::kGrid + 1, spartan::kSize.width, spartan::kSize.height, spartan::kRuns);
+  for (const spartan::Case& c : spartan::cases()) spartan::report(c);
+}

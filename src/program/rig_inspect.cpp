@@ -1,0 +1,291 @@
+#include "program/rig_inspect.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include "program/json.h"
+#include "program/rig_inspect_picture.h"
+#include "program/rig_pictures.h"
+#include "spartan/core/files.h"
+#include "spartan/core/image_io.h"
+#include "spartan/odometry/view_matching.h"
+#include "spartan/rig/describe.h"
+#include "spartan/rig/pair_check.h"
+#include "spartan/rig/rig_files.h"
+
+namespace spartan::program {
+namespace {
+
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+
+struct InspectArguments {
+  std::string rig, left, right, recording, pair, apply, picture;
+  int shots = 12;
+};
+
+// What the pictures said about one pair, with the shot that is drawn.
+struct Inspected {
+  StereoPair pair;
+  PairCheck check;
+  std::string shot;
+  Image<std::uint8_t> left, right;
+  std::vector<PixelMatch> matches;
+};
+
+Inspected inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<PicturePair> pictures,
+                       const Workers& workers) {
+  std::vector<PixelMatch> all;
+  Inspected result;
+  result.pair = pair;
+  for (PicturePair& picture : pictures) {
+    std::vector<PixelMatch> matches;
+    for (const ViewMatch& match : match_views(std::as_const(picture.left).view(), std::as_const(picture.right).view(),
+                                              ViewMatchingOptions(), workers)) {
+      matches.push_back({match.left, match.right});
+    }
+    all.insert(all.end(), matches.begin(), matches.end());
+    // The shot that shows most is drawn.
+    if (result.shot.empty() || matches.size() > result.matches.size()) {
+      result.shot = picture.name;
+      result.left = std::move(picture.left);
+      result.right = std::move(picture.right);
+      result.matches = std::move(matches);
+    }
+  }
+  result.check = check_pair(rig, pair, std::move(all), result.left.size());
+  return result;
+}
+
+Json rows_json(const RowErrors& rows) {
+  return {{"mean", number(rows.mean_px)}, {"p95", number(rows.p95_px)}, {"median", number(rows.median_px)}};
+}
+
+Json corrections_json(const PairCorrection& c, double focal_ratio) {
+  return {{"pitch_deg", number(c.pitch_rad * kDegreesPerRadian)},
+          {"roll_deg", number(c.roll_rad * kDegreesPerRadian)},
+          {"yaw_deg", number(c.yaw_rad * kDegreesPerRadian)},
+          {"focal_ratio", number(focal_ratio)}};
+}
+
+Json findings_json(const std::vector<RigFinding>& findings) {
+  Json list = Json::array();
+  for (const RigFinding& f : findings) list.push_back({{"id", f.id}, {"text", f.text}, {"value", number(f.value)}});
+  return list;
+}
+
+Json to_json(const Rig& rig, const std::vector<Inspected>& inspected) {
+  Json pairs = Json::object();
+  for (const StereoPair& pair : rig.pairs) {
+    const PairSummary summary = summarize_pair(rig, pair);
+    pairs[pair.name] = {{"baseline_m", number(summary.baseline_m)},
+                        {"focal_px", number(summary.focal_px)},
+                        {"hfov_deg", number(summary.hfov_deg)},
+                        {"vfov_deg", number(summary.vfov_deg)},
+                        {"findings", findings_json(find_doubts(rig, pair))}};
+  }
+  for (const Inspected& one : inspected) {
+    const PairCheck& check = one.check;
+    Json& pair = pairs[one.pair.name];
+    pair["findings"] = findings_json(check.findings);
+    pair["verdict"] = name_of(check.verdict);
+    pair["matches"] = check.matches;
+    pair["inliers"] = check.inliers;
+    pair["row_error_px"] = {{"before", rows_json(check.as_taken)},
+                            {"after", rows_json(check.as_given)},
+                            {"corrected", rows_json(check.as_corrected)}};
+    pair["corrections"] = corrections_json(check.correction, check.correction.focal_ratio);
+    pair["corrections"]["sigma"] = corrections_json(check.sigma, check.sigma.focal_ratio);
+    Json map = Json::array();
+    for (const RowErrorCell& cell : check.map) {
+      map.push_back({{"x_px", number(cell.centre_px.x())},
+                     {"y_px", number(cell.centre_px.y())},
+                     {"matches", cell.matches},
+                     {"median_px", number(cell.median_px)}});
+    }
+    pair["row_error_map"] = std::move(map);
+  }
+  return {{"schema", 1}, {"pairs", std::move(pairs)}};
+}
+
+std::string turned(double radians, double sigma, const char* above, const char* below) {
+  return fmt::format("{:.3f}° ± {:.3f}° {}", std::abs(radians) * kDegreesPerRadian, sigma * kDegreesPerRadian,
+                     radians > 0 ? above : below);
+}
+
+std::string in_words(const Inspected& one) {
+  const PairCheck& check = one.check;
+  const auto rows = [](const RowErrors& e) {
+    return fmt::format("{:.2f} px, 95 % below {:.2f} px", e.mean_px, e.p95_px);
+  };
+  std::string text = fmt::format(
+      "pair {}: {} matches, {} of them agree\n"
+      "pair {}: rows differ as taken by {}; rectified as given by {}; corrected by {}\n",
+      one.pair.name, check.matches, check.inliers, one.pair.name, rows(check.as_taken), rows(check.as_given),
+      rows(check.as_corrected));
+  const PairCorrection &c = check.correction, &s = check.sigma;
+  text += fmt::format(
+      "pair {}: the pictures want the right eye turned {}, {}, {}; its focal length {:+.2f} % ± {:.2f} %\n",
+      one.pair.name, turned(c.pitch_rad, s.pitch_rad, "up", "down"),
+      turned(c.yaw_rad, s.yaw_rad, "to the right", "to the left"),
+      turned(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"), 100 * (c.focal_ratio - 1), 100 * s.focal_ratio);
+  for (const RigFinding& f : check.findings)
+    text += fmt::format("pair {}: FOUND {}: {}\n", one.pair.name, f.id, f.text);
+  return text + fmt::format("pair {}: verdict: {}\n", one.pair.name, name_of(check.verdict));
+}
+
+// The pairs that are asked for, with their pictures.
+Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, Rig& rig, const Workers& workers) {
+  std::vector<Inspected> inspected;
+  const auto wanted = [&](const StereoPair& pair) { return a.pair.empty() || pair.name == a.pair; };
+  if (!a.pair.empty() && !rig.find_pair(a.pair)) {
+    return failure(ErrorCode::usage, fmt::format("the rig has no pair '{}'", a.pair), "--pair");
+  }
+  if (!a.recording.empty()) {
+    auto source = open_recording(a.recording);
+    if (!source) return failure(source);
+    for (const StereoPair& pair : rig.pairs) {
+      if (!wanted(pair) || !(*source)->info().rig.find_pair(pair.name)) continue;
+      auto pictures = load_shots(**source, pair.name, a.shots, workers);
+      if (!pictures) return failure(pictures);
+      inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), workers));
+    }
+    if (inspected.empty()) return failure(ErrorCode::input, "has none of the rig's pairs", a.recording);
+    return inspected;
+  }
+  auto pictures = load_pictures(a.left, a.right, a.shots);
+  if (!pictures) return failure(pictures);
+  if (rig.pairs.empty()) rig = guessed_rig(pictures->front().left.size());
+  for (const StereoPair& pair : rig.pairs) {
+    if (!wanted(pair)) continue;
+    inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), workers));
+    break;
+  }
+  return inspected;
+}
+
+Result<Rig> load_rig(const InspectArguments& a) {
+  if (a.rig == "-") return Rig{};  // guessed from the pictures' size
+  std::error_code error;
+  if (!std::filesystem::exists(a.rig.substr(0, a.rig.find(',')), error)) {
+    return failure(ErrorCode::input, "no such file or folder", a.rig, "a calibration file, or a folder that holds one");
+  }
+  ImageSize size;
+  if (!a.left.empty()) {
+    auto pictures = load_pictures(a.left, a.right, 1);
+    if (!pictures) return failure(pictures);
+    size = pictures->front().left.size();
+  }
+  return read_rig(a.rig, size);
+}
+
+// The rig with the cameras and the pair of that name as `other` has them.
+Rig with_pair_of(Rig rig, const Rig& other, const std::string& name) {
+  for (StereoPair& pair : rig.pairs) {
+    if (pair.name == name) pair = *other.find_pair(name);
+  }
+  const StereoPair& pair = *rig.find_pair(name);
+  for (Camera& camera : rig.cameras) {
+    if (camera.name == pair.left || camera.name == pair.right) camera = *other.find_camera(camera.name);
+  }
+  return rig;
+}
+
+// Self-masks are named from the rig file's folder, and that changes.
+Status write_rig(Rig rig, const std::string& old_path, const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path from = fs::is_directory(old_path, error) ? fs::path(old_path) : fs::path(old_path).parent_path();
+  for (Camera& camera : rig.cameras) {
+    if (camera.self_mask.empty() || fs::path(camera.self_mask).is_absolute()) continue;
+    camera.self_mask =
+        fs::proximate(fs::absolute(from / camera.self_mask), fs::absolute(fs::path(path)).parent_path(), error)
+            .string();
+  }
+  return write_file_atomically(path, to_rig_yaml(rig));
+}
+
+Status check_usage(const InspectArguments& a) {
+  const bool files = !a.left.empty(), recording = !a.recording.empty();
+  if (files && a.right.empty())
+    return failure(ErrorCode::usage, "RIGHT is missing: pictures come in pairs", "rig inspect");
+  if (files && recording) return failure(ErrorCode::usage, "give LEFT and RIGHT, or --recording", "rig inspect");
+  if (!files && a.rig == "-") {
+    return failure(ErrorCode::usage, "without a calibration (-) there must be pictures", "rig inspect");
+  }
+  if (!files && !recording && (!a.apply.empty() || !a.picture.empty())) {
+    return failure(ErrorCode::usage, "--apply and --picture need pictures", "rig inspect");
+  }
+  return {};
+}
+
+Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
+  if (Status usage = check_usage(a); !usage) return failure(usage);
+  auto rig = load_rig(a);
+  if (!rig) return failure(rig);
+  const Workers workers(context.threads);
+  std::vector<Inspected> inspected;
+  if (!a.left.empty() || !a.recording.empty()) {
+    auto result = inspect_pictures(a, *rig, workers);
+    if (!result) return failure(result);
+    inspected = std::move(*result);
+  }
+  if (!a.picture.empty()) {
+    const Inspected& one = inspected.front();
+    const auto picture = draw_pair_check(*rig, one.pair, one.check, std::as_const(one.left).view(),
+                                         std::as_const(one.right).view(), one.matches, workers);
+    if (!picture) return failure(picture);
+    if (Status written = write_png(a.picture, std::as_const(*picture).view()); !written) return failure(written);
+  }
+  if (!a.apply.empty()) {
+    Rig corrected = *rig;
+    for (const Inspected& one : inspected) corrected = with_pair_of(corrected, one.check.corrected, one.pair.name);
+    if (Status written = write_rig(corrected, a.rig, a.apply); !written) return failure(written);
+  }
+  std::string text;
+  if (context.json) {
+    text = to_json(*rig, inspected).dump(2) + "\n";
+  } else {
+    if (a.rig == "-") {
+      text += fmt::format(
+          "no calibration: two pinholes side by side are guessed, of {:.0f} px focal length; the length of the "
+          "baseline is not known\n",
+          summarize_pair(*rig, rig->pairs.front()).focal_px);
+    } else {
+      for (const std::string& sentence : describe_rig(*rig)) text += sentence + "\n";
+    }
+    for (const Inspected& one : inspected) text += in_words(one);
+    if (!a.apply.empty()) text += fmt::format("the corrected rig: {}\n", a.apply);
+  }
+  if (Status printed = print(text); !printed) return failure(printed);
+  return kDone;
+}
+
+}  // namespace
+
+void add_rig_inspect(CLI::App& rig, Context& context) {
+  const auto a = std::make_shared<InspectArguments>();
+  CLI::App* verb =
+      add_verb(rig, context, "inspect", "A calibration in words, and what pictures of the pair say about it",
+               "rig inspect rig.yaml left.png right.png --picture rows.png --apply corrected.yaml",
+               [&context, a] { return inspect(context, *a); });
+  verb->add_option("rig", a->rig, "any calibration that is read (docs/formats.md), or - for none: the pictures alone")
+      ->required()
+      ->option_text("RIG");
+  verb->add_option("left", a->left, "left picture, a folder of them, or a quoted pattern (\"left*.jpg\")")
+      ->option_text("LEFT");
+  verb->add_option("right", a->right, "the right ones")->option_text("RIGHT");
+  verb->add_option("--recording", a->recording, "take the pictures from a recording, for every pair of the rig");
+  verb->add_option("--pair", a->pair, "only this pair of the rig (with LEFT and RIGHT: the first one)");
+  verb->add_option("--shots", a->shots, "at most so many shots of a pair, spread over all of them (default 12)")
+      ->check(CLI::Range(1, 1000));
+  verb->add_option("--apply", a->apply, "write the rig with all corrections taken in, as rig.yaml");
+  verb->add_option("--picture", a->picture, "draw the rows of the first pair, PNG");
+  add_threads_option(*verb, context);
+  add_json_flag(*verb, context);
+}
+
+}  // namespace spartan::program

@@ -1,0 +1,135 @@
+#include "program/rig_inspect_picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "spartan/core/opencv_bridge.h"
+#include "spartan/imaging/imager.h"
+#include "spartan/imaging/rectification.h"
+
+namespace spartan::program {
+namespace {
+
+constexpr int kWidest_px = 640, kLines = 12, kHeading_px = 22;
+
+// One line of the picture: two views, with the places of matches in them.
+struct Strip {
+  std::string heading;
+  Image<std::uint8_t> left, right;
+  std::vector<PixelMatch> matches;
+};
+
+Image<std::uint8_t> copy_of(ImageView<const std::uint8_t> view) {
+  Image<std::uint8_t> image(view.size());
+  for (int y = 0; y < view.height(); ++y) std::copy_n(view.row(y), view.width(), image.row(y));
+  return image;
+}
+
+std::string in_words(const RowErrors& rows) {
+  return fmt::format("rows differ by {:.2f} px, 95 %: {:.2f} px", rows.mean_px, rows.p95_px);
+}
+
+// Green where rows agree to half a pixel, then yellow, red from 3 px on.
+cv::Scalar colour_of(double error_px) {
+  const double t = std::clamp((std::abs(error_px) - 0.5) / 2.5, 0.0, 1.0);
+  return {255 * std::min(1.0, 2 * t), 255 * std::min(1.0, 2 - 2 * t), 40};
+}
+
+std::optional<Strip> rectified(const Rig& rig, const StereoPair& pair, const Strip& taken, const Workers& workers) {
+  const Camera *left = rig.find_camera(pair.left), *right = rig.find_camera(pair.right);
+  const auto plan = plan_rectification(*left, *right, rig.right_from_left(pair), pair.name);
+  auto imager = Imager::create(rig, {}, workers);
+  if (!plan || !imager) return std::nullopt;
+  StereoFrame frame;
+  frame.pair = pair.name;
+  frame.left = FrameImage::borrow(std::as_const(taken.left).view(), {});
+  frame.right = FrameImage::borrow(std::as_const(taken.right).view(), {});
+  const auto views = imager->process(frame);
+  if (!views) return std::nullopt;
+  Strip strip{{}, copy_of(views->left), copy_of(views->right), {}};
+  const auto place = [&](const Camera& camera, const Eigen::Matrix3d& from_rectified, const Eigen::Vector2d& pixel) {
+    const auto ray = unproject(camera.model, pixel);
+    if (!ray) return Eigen::Vector2d(NAN, NAN);
+    const Eigen::Vector3d seen = from_rectified.transpose() * ray->direction;
+    return Eigen::Vector2d(plan->geometry.focal_px * seen.head<2>() / seen.z() + plan->geometry.centre_px);
+  };
+  strip.matches.reserve(taken.matches.size());
+  for (const PixelMatch& match : taken.matches) {
+    strip.matches.push_back(
+        {place(*left, plan->left_from_rectified, match.left), place(*right, plan->right_from_rectified, match.right)});
+  }
+  return strip;
+}
+
+// A rig whose images hold what the strip holds: gray of 8 bits, without masks.
+Rig plain(Rig rig) {
+  for (Camera& camera : rig.cameras) {
+    camera.pixel_format = {};
+    camera.self_mask.clear();
+  }
+  return rig;
+}
+
+void draw(const Strip& strip, cv::Mat canvas, double scale) {
+  const int width = canvas.cols / 2, height = canvas.rows - kHeading_px;
+  canvas.setTo(cv::Scalar(24, 24, 24));
+  for (const bool second : {false, true}) {
+    cv::Mat small, colour;
+    const cv::Rect place(second ? width : 0, kHeading_px, width, height);
+    cv::resize(as_mat(second ? strip.right : strip.left), small, place.size(), 0, 0, cv::INTER_AREA);
+    cv::cvtColor(small, colour, cv::COLOR_GRAY2RGB);
+    colour.copyTo(canvas(place));
+  }
+  for (int line = 1; line < kLines; ++line) {
+    const int y = kHeading_px + line * height / kLines;
+    cv::line(canvas, {0, y}, {canvas.cols - 1, y}, {70, 130, 220}, 1);
+  }
+  const auto at = [&](const Eigen::Vector2d& p, int shift) {
+    return cv::Point(static_cast<int>(std::lround((p.x() + 0.5) * scale)) + shift,
+                     static_cast<int>(std::lround((p.y() + 0.5) * scale)) + kHeading_px);
+  };
+  for (const PixelMatch& match : strip.matches) {
+    if (!match.left.allFinite() || !match.right.allFinite()) continue;
+    const double error_px = match.right.y() - match.left.y();
+    const cv::Point from = at(match.left, 0), other = at(match.right, width);
+    if (from.x < 0 || from.x >= width || other.x < width || other.x >= 2 * width) continue;
+    const cv::Point to = from + cv::Point(0, static_cast<int>(std::lround(kArrowScale * error_px * scale)));
+    cv::arrowedLine(canvas, from, to, colour_of(error_px), 1, cv::LINE_AA, 0, 0.25);
+    cv::circle(canvas, other, 2, colour_of(error_px), cv::FILLED, cv::LINE_AA);
+  }
+  cv::putText(canvas, strip.heading, {6, 15}, cv::FONT_HERSHEY_SIMPLEX, 0.45, {235, 235, 235}, 1, cv::LINE_AA);
+}
+
+}  // namespace
+
+Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, const PairCheck& check,
+                                    ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                    const std::vector<PixelMatch>& matches, const Workers& workers) {
+  std::vector<Strip> strips;
+  strips.push_back({"as taken: " + in_words(check.as_taken), copy_of(left), copy_of(right), matches});
+  if (auto given = rectified(plain(rig), pair, strips.front(), workers)) {
+    given->heading = "rectified as given: " + in_words(check.as_given);
+    strips.push_back(std::move(*given));
+  }
+  const StereoPair* corrected_pair = check.corrected.find_pair(pair.name);
+  if (auto corrected = rectified(plain(check.corrected), *corrected_pair, strips.front(), workers)) {
+    corrected->heading =
+        fmt::format("corrected: {} (arrows are {} times as long)", in_words(check.as_corrected), kArrowScale);
+    strips.push_back(std::move(*corrected));
+  }
+  const double scale = std::min(1.0, static_cast<double>(kWidest_px) / left.width());
+  const int width = static_cast<int>(left.width() * scale),
+            height = static_cast<int>(left.height() * scale) + kHeading_px;
+  Image<Rgb8> picture(2 * width, height * static_cast<int>(strips.size()));
+  cv::Mat canvas = as_mat(picture);
+  for (std::size_t i = 0; i < strips.size(); ++i) {
+    draw(strips[i], canvas(cv::Rect(0, static_cast<int>(i) * height, 2 * width, height)), scale);
+  }
+  return picture;
+}
+
+}  // namespace spartan::program

@@ -1,0 +1,115 @@
+#include "program/rig_pictures.h"
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "spartan/core/image_io.h"
+#include "spartan/imaging/imager.h"
+
+namespace spartan::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_picture(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? c + 32 : c; });
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".pgm" || ending == ".ppm";
+}
+
+// The files that an argument names, in the order of their names.
+Result<std::vector<std::string>> files_of(const std::string& argument) {
+  std::error_code error;
+  const fs::path path(argument);
+  const bool folder = fs::is_directory(path, error);
+  const std::string pattern = folder ? "*" : path.filename().string();
+  if (!folder && pattern.find_first_of("*?[") == std::string::npos) return std::vector<std::string>{argument};
+  const fs::path where = folder ? path : path.parent_path().empty() ? fs::path(".") : path.parent_path();
+  std::vector<std::string> files;
+  for (const auto& entry : fs::directory_iterator(where, error)) {
+    if (!is_picture(entry.path())) continue;
+    if (::fnmatch(pattern.c_str(), entry.path().filename().c_str(), 0) == 0) files.push_back(entry.path().string());
+  }
+  if (files.empty()) return failure(ErrorCode::input, "no picture is named so (png, jpg, pgm, ppm)", argument);
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// `most` places of 0 … count − 1, evenly spread, the first and the last among them.
+std::vector<std::size_t> spread(std::size_t count, int most) {
+  std::vector<std::size_t> places;
+  const std::size_t wanted = std::min(count, static_cast<std::size_t>(std::max(most, 1)));
+  places.reserve(wanted);
+  for (std::size_t i = 0; i < wanted; ++i) places.push_back(wanted > 1 ? i * (count - 1) / (wanted - 1) : 0);
+  return places;
+}
+
+Image<std::uint8_t> copy_of(ImageView<const std::uint8_t> view) {
+  Image<std::uint8_t> image(view.size());
+  for (int y = 0; y < view.height(); ++y) std::copy_n(view.row(y), view.width(), image.row(y));
+  return image;
+}
+
+}  // namespace
+
+Result<std::vector<PicturePair>> load_pictures(const std::string& left, const std::string& right, int most) {
+  const auto left_files = files_of(left);
+  if (!left_files) return failure(left_files);
+  const auto right_files = files_of(right);
+  if (!right_files) return failure(right_files);
+  if (left_files->size() != right_files->size()) {
+    return failure(ErrorCode::input,
+                   fmt::format("{} left and {} right pictures", left_files->size(), right_files->size()),
+                   left + ", " + right, "every left picture needs its right one");
+  }
+  std::vector<PicturePair> pairs;
+  for (const std::size_t i : spread(left_files->size(), most)) {
+    const std::string &l = (*left_files)[i], &r = (*right_files)[i];
+    auto left_picture = read_gray8(l);
+    if (!left_picture) return failure(left_picture);
+    auto right_picture = read_gray8(r);
+    if (!right_picture) return failure(right_picture);
+    for (const auto& [path, size] : {std::pair{l, left_picture->size()}, std::pair{r, right_picture->size()}}) {
+      const ImageSize first = pairs.empty() ? left_picture->size() : pairs.front().left.size();
+      if (size == first) continue;
+      return failure(ErrorCode::input,
+                     fmt::format("is {} x {} px, {} {} x {}", size.width, size.height,
+                                 pairs.empty() ? l : pairs.front().name, first.width, first.height),
+                     path);
+    }
+    pairs.push_back({l, std::move(*left_picture), std::move(*right_picture)});
+  }
+  return pairs;
+}
+
+Result<std::vector<PicturePair>> load_shots(FrameSource& source, const std::string& pair, int most,
+                                            const Workers& workers) {
+  ImagingOptions options;
+  options.rectify = false;
+  auto imager = Imager::create(source.info().rig, options, workers);
+  if (!imager) return failure(imager);
+  const std::vector<Stamp> stamps = source.announced_stamps(pair);
+  std::vector<PicturePair> pairs;
+  std::string reason = "it has no shot of this pair";
+  for (const std::size_t i : spread(stamps.size(), most)) {
+    auto frame = source.frame_at(pair, stamps[i]);
+    if (!frame) {
+      reason = frame.error().message();
+      continue;
+    }
+    const auto taken = imager->process(*frame);
+    if (!taken) {
+      reason = taken.error().message();
+      continue;
+    }
+    pairs.push_back({fmt::format("frame {}", frame->frame_id), copy_of(taken->left), copy_of(taken->right)});
+  }
+  if (pairs.empty()) return failure(ErrorCode::input, fmt::format("pair {}: {}", pair, reason), source.info().path);
+  return pairs;
+}
+
+}  // namespace spartan::program
