@@ -36,7 +36,7 @@ struct Inspected {
   std::vector<PixelMatch> matches;
 };
 
-Inspected inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<PicturePair> pictures,
+Inspected inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<PicturePair> pictures, bool guessed,
                        const Workers& workers) {
   std::vector<PixelMatch> all;
   Inspected result;
@@ -56,7 +56,8 @@ Inspected inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<Pictu
       result.matches = std::move(matches);
     }
   }
-  result.check = check_pair(rig, pair, std::move(all), result.left.size());
+  result.check = guessed ? check_pictures(std::move(all), result.left.size())
+                         : check_pair(rig, pair, std::move(all), result.left.size());
   return result;
 }
 
@@ -116,16 +117,16 @@ std::string turned(double radians, double sigma, const char* above, const char* 
                      radians > 0 ? above : below);
 }
 
-std::string in_words(const Inspected& one) {
+std::string in_words(const Inspected& one, bool guessed) {
   const PairCheck& check = one.check;
   const auto rows = [](const RowErrors& e) {
     return fmt::format("{:.2f} px, 95 % below {:.2f} px", e.mean_px, e.p95_px);
   };
   std::string text = fmt::format(
       "pair {}: {} matches, {} of them agree\n"
-      "pair {}: rows differ as taken by {}; rectified as given by {}; corrected by {}\n",
-      one.pair.name, check.matches, check.inliers, one.pair.name, rows(check.as_taken), rows(check.as_given),
-      rows(check.as_corrected));
+      "pair {}: rows differ as taken by {}{}; corrected by {}\n",
+      one.pair.name, check.matches, check.inliers, one.pair.name, rows(check.as_taken),
+      guessed ? "" : "; rectified as given by " + rows(check.as_given), rows(check.as_corrected));
   const PairCorrection &c = check.correction, &s = check.sigma;
   text += fmt::format(
       "pair {}: the pictures want the right eye turned {}, {}, {}; its focal length {:+.2f} % ± {:.2f} %\n",
@@ -151,17 +152,17 @@ Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, Rig& 
       if (!wanted(pair) || !(*source)->info().rig.find_pair(pair.name)) continue;
       auto pictures = load_shots(**source, pair.name, a.shots, workers);
       if (!pictures) return failure(pictures);
-      inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), workers));
+      inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), a.rig == "-", workers));
     }
     if (inspected.empty()) return failure(ErrorCode::input, "has none of the rig's pairs", a.recording);
     return inspected;
   }
   auto pictures = load_pictures(a.left, a.right, a.shots);
   if (!pictures) return failure(pictures);
-  if (rig.pairs.empty()) rig = guessed_rig(pictures->front().left.size());
+  if (a.rig == "-") rig = guessed_rig(pictures->front().left.size());
   for (const StereoPair& pair : rig.pairs) {
     if (!wanted(pair)) continue;
-    inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), workers));
+    inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), a.rig == "-", workers));
     break;
   }
   return inspected;
@@ -214,7 +215,7 @@ Status check_usage(const InspectArguments& a) {
     return failure(ErrorCode::usage, "RIGHT is missing: pictures come in pairs", "rig inspect");
   if (files && recording) return failure(ErrorCode::usage, "give LEFT and RIGHT, or --recording", "rig inspect");
   if (!files && a.rig == "-") {
-    return failure(ErrorCode::usage, "without a calibration (-) there must be pictures", "rig inspect");
+    return failure(ErrorCode::usage, "without a calibration (-) give LEFT and RIGHT", "rig inspect");
   }
   if (!files && !recording && (!a.apply.empty() || !a.picture.empty())) {
     return failure(ErrorCode::usage, "--apply and --picture need pictures", "rig inspect");
@@ -257,7 +258,7 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
     } else {
       for (const std::string& sentence : describe_rig(*rig)) text += sentence + "\n";
     }
-    for (const Inspected& one : inspected) text += in_words(one);
+    for (const Inspected& one : inspected) text += in_words(one, a.rig == "-");
     if (!a.apply.empty()) text += fmt::format("the corrected rig: {}\n", a.apply);
   }
   if (Status printed = print(text); !printed) return failure(printed);

@@ -93,8 +93,8 @@ CameraModel with_radial(const CameraModel& model, double k) {
 // The pair as it is now believed, with all that was found so far taken in.
 class Checker {
  public:
-  Checker(const Rig& rig, const StereoPair& pair, std::vector<PixelMatch> matches, ImageSize picture_size)
-      : rig_(rig), pair_(pair), matches_(std::move(matches)), picture_(picture_size) {
+  Checker(const Rig& rig, const StereoPair& pair, std::vector<PixelMatch> matches, ImageSize picture_size, bool guessed)
+      : rig_(rig), pair_(pair), matches_(std::move(matches)), picture_(picture_size), guessed_(guessed) {
     check_.matches = static_cast<int>(matches_.size());
     check_.findings = find_doubts(rig, pair, picture_size);
     believe(*rig.find_camera(pair.left), *rig.find_camera(pair.right), rig.right_from_left(pair).inverse());
@@ -125,9 +125,10 @@ class Checker {
   }
   void add(const char* id, std::string text, double value) { check_.findings.push_back({id, std::move(text), value}); }
 
-  PairFit fit_of(const CameraModel& left, const CameraModel& right, bool radial) const {
+  PairFit fit_of(const CameraModel& left, const CameraModel& right, bool radial, bool yaw = true) const {
     PairFitOptions options;
     options.radial = radial;
+    options.yaw = yaw;
     return fit_pair(left, right, left_from_right_, matches_, options);
   }
   void fit() { fit_ = fit_of(left_.model, right_.model, false); }
@@ -147,9 +148,10 @@ class Checker {
   StereoPair pair_;
   std::vector<PixelMatch> matches_;
   ImageSize picture_;
+  bool guessed_ = false;
   Camera left_, right_;
   Pose left_from_right_;
-  PairFit fit_;
+  PairFit fit_, applied_;   // the second one is what the corrected rig has
   bool exchanged_ = false;  // the rig's eyes have changed their names
   bool moved_ = false;      // left_from_right_ is not the rig's
   PairCheck check_;
@@ -274,7 +276,7 @@ void Checker::settle_distortion() {
     return;
   }
   add("distortion_ignored",
-      fmt::format("the rig says pinhole, but the rows bend, as with a k1 of about {:.3f}; rows then agree to {:.2f} px "
+      fmt::format("taken for pinholes, but the rows bend, as with a k1 of about {:.3f}; rows then agree to {:.2f} px "
                   "in the place "
                   "of {:.2f} px",
                   radial, bent.rms_px, fit_.rms_px),
@@ -301,6 +303,7 @@ void Checker::judge_yaw() {
 }
 
 void Checker::judge_fit() {
+  applied_ = fit_;
   check_.inliers = fit_.inliers;
   check_.correction = fit_.correction;
   check_.sigma = fit_.sigma;
@@ -311,7 +314,6 @@ void Checker::judge_fit() {
   for (const PixelMatch& match : check_.matched) taken.push_back(match.left.y() - match.right.y());
   check_.as_taken = row_errors(taken);
   check_.as_given = row_errors(check_.row_error_px);
-  check_.as_corrected = row_errors(chosen(fit_.row_error_after_px, fit_.inlier));
   map_errors();
   const bool spread = 4 * std::ssize(check_.map) >= kColumns * kRows;
   if (check_.inliers < kLeastMatches || !spread) {
@@ -322,6 +324,10 @@ void Checker::judge_fit() {
     return;
   }
   judge_yaw();
+  // What is put right leaves a yaw alone that may be the lens's.
+  if (!guessed_ && !found("yaw_offset"))
+    applied_ = fit_of(left_.model, right_.model, found("distortion_ignored"), false);
+  check_.as_corrected = row_errors(chosen(applied_.row_error_after_px, fit_.inlier));
   if (std::abs(check_.as_given.median_px) > kRowOffset_px) {
     add("row_offset",
         fmt::format("rows of the left picture lie {:.2f} px {} those of the right one",
@@ -383,8 +389,7 @@ Rig Checker::corrected_rig() const {
   Pose left_from_right = left_from_right_;
   bool moved = moved_;
   if (!found("not_enough_texture") && check_.inliers >= kLeastMatches) {
-    PairCorrection correction = check_.correction;
-    if (!found("yaw_offset")) correction.yaw_rad = 0;
+    const PairCorrection& correction = applied_.correction;
     left_from_right = corrected_left_from_right(left_from_right, correction);
     moved = true;
     right.model = with_focal_times(right.model, correction.focal_ratio);
@@ -424,7 +429,12 @@ std::string_view name_of(PairVerdict verdict) {
 }
 
 PairCheck check_pair(const Rig& rig, const StereoPair& pair, std::vector<PixelMatch> matches, ImageSize picture_size) {
-  return Checker(rig, pair, std::move(matches), picture_size).run();
+  return Checker(rig, pair, std::move(matches), picture_size, false).run();
+}
+
+PairCheck check_pictures(std::vector<PixelMatch> matches, ImageSize picture_size) {
+  const Rig rig = guessed_rig(picture_size);
+  return Checker(rig, rig.pairs.front(), std::move(matches), picture_size, true).run();
 }
 
 Rig guessed_rig(ImageSize picture_size) {

@@ -34,7 +34,7 @@ std::string_view name_of(PairVerdict verdict);
 struct PairCheck {
   int matches = 0, inliers = 0;  ///< inliers fit the corrected pair
   /// Of the inliers: rows in the pictures as taken; in the rectified view of the pair as given (but for eyes, transform
-  /// and picture size that were found wrong: with those no row means anything); of the corrected one.
+  /// and picture size that were found wrong: with those no row means anything); of the corrected one (`corrected`).
   RowErrors as_taken, as_given, as_corrected;
   std::vector<RowErrorCell> map;     ///< 8 x 6 cells over the left picture, those with at least 3 matches
   PairCorrection correction, sigma;  ///< sigma of yaw: with what a lens can do that looks like it (0.3°)
@@ -54,6 +54,10 @@ struct PairCheck {
 /// disparities that it explains), `focal_ratio` (above 0.3 %), `not_enough_texture` (fewer than 40 matches, or in fewer
 /// than a quarter of the picture's parts). The rows tell a yaw by the pattern x y only, which the lens can imitate.
 PairCheck check_pair(const Rig& rig, const StereoPair& pair, std::vector<PixelMatch> matches, ImageSize picture_size);
+
+/// The same for pictures without a calibration, with guessed_rig(). No lens is given that the rows could be blamed on:
+/// the yaw is always taken in.
+PairCheck check_pictures(std::vector<PixelMatch> matches, ImageSize picture_size);
 
 /// For pictures without a calibration: two equal pinholes side by side, 1 m apart, of 1.2 times the larger side as
 /// focal length. What it says about rows, pitch and roll holds for any focal length near that.

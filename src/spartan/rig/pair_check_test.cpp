@@ -272,7 +272,7 @@ TEST(PairCheck, SaysWhenThereIsTooLittleToSee) {
 }
 
 TEST(PairCheck, WithoutACalibrationThePicturesSpeak) {
-  const PairCheck result = check(guessed_rig(kSize), look(straight_rig()));
+  const PairCheck result = check_pictures(look(straight_rig()), kSize);
   EXPECT_NEAR(result.correction.roll_rad, 0.003, 0.001);
   EXPECT_LT(result.as_corrected.mean_px, 0.2);
 }

@@ -108,9 +108,11 @@ class Fitter {
  public:
   Fitter(std::vector<RayMatch> rays, const Pose& left_from_right, double focal_px, const PairFitOptions& options)
       : rays_(std::move(rays)), left_from_right_(left_from_right), focal_px_(focal_px) {
+    constexpr double kStays = 1e-9;
     const double turn = options.turn_sigma_rad, baseline = options.baseline_sigma_rad;
     Parameters sigma;
-    sigma << turn, turn, turn, options.focal_sigma, baseline, baseline, options.radial_sigma, options.radial_sigma;
+    sigma << turn, options.yaw ? turn : kStays, turn, options.focal_sigma, baseline, baseline, options.radial_sigma,
+        options.radial_sigma;
     all_ = options.radial ? kParameters : kWithoutRadial;
     prior_ = sigma.cwiseInverse().cwiseAbs2();
     least_sigma_px_ = options.match_sigma_px;

@@ -42,6 +42,7 @@ struct PairFit {
 };
 
 struct PairFitOptions {
+  bool yaw = true;      ///< estimate the yaw; false: it is as given
   bool radial = false;  ///< estimate what bends the rays of each eye too
   /// What is thought of the errors of a calibration beforehand (standard deviations). They hold what the pictures do
   /// not tell: the yaw of a narrow view, the baseline's direction where all is far away.
