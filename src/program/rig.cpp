@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "program/json.h"
+#include "program/rig_design.h"
 #include "program/verbs.h"
 #include "spartan/rig/describe.h"
 #include "spartan/rig/rig_files.h"
@@ -43,7 +44,7 @@ Result<ExitCode> inspect(const Context& context, const std::string& path) {
 }  // namespace
 
 void add_rig(CLI::App& app, Context& context) {
-  CLI::App* rig = app.add_subcommand("rig", "Calibrations: say in words what was understood");
+  CLI::App* rig = app.add_subcommand("rig", "Calibrations and stereo pairs: what was understood, what to build");
   rig->require_subcommand(1);
   const auto path = std::make_shared<std::string>();
   CLI::App* verb =
@@ -53,6 +54,7 @@ void add_rig(CLI::App& app, Context& context) {
       ->required()
       ->option_text("RIG");
   add_json_flag(*verb, context);
+  add_rig_design(*rig, context);
 }
 
 }  // namespace spartan::program
