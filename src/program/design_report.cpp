@@ -60,8 +60,8 @@ Json pair_json(const PairDesign& design, bool whole_set) {
 // --- text ---
 
 constexpr const char* kHead =
-    "            b [m]  d_min [m]   F [deg]  w [px]  s [um]  f [mm]  range [m]  stereo [deg]  search [%]  pans [%]  "
-    "tilt [deg]  ground [m]\n";
+    "                b [m]  d_min [m]   F [deg]  w [px]  s [um]  f [mm]  range [m]  stereo [deg]  search [%]  "
+    "pans [%]  tilt [deg]  ground [m]\n";
 
 std::string percent_or_dash(double value) {
   return std::isnan(value) ? "-" : fmt::format("{:.1f}", value);
@@ -69,7 +69,7 @@ std::string percent_or_dash(double value) {
 
 std::string row(const std::string& name, const PairFigures& pair) {
   return fmt::format(
-      "{:>10}  {:>5}  {:>9}  {:>8}  {:>6}  {:>6}  {:6.2f}  {:9.3f}  {:12.2f}  {:10.2f}  {:>8}  {:>10}  {:.3f} - "
+      "{:>14}  {:>5}  {:>9}  {:>8}  {:>6}  {:>6}  {:6.2f}  {:9.3f}  {:12.2f}  {:10.2f}  {:>8}  {:>10}  {:.3f} - "
       "{:.3f}\n",
       name, pair.shape.baseline_m, pair.shape.nearest_m, pair.shape.hfov_deg, pair.shape.width_px,
       pair.shape.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg, pair.search_percent,
@@ -120,9 +120,10 @@ std::string pair_text(const std::string& name, const PairRequirements& asked, co
   const std::size_t listed = std::min(rows, design.feasible.size());
   for (std::size_t i = 0; i < listed; ++i) text += row(fmt::format("{}.", i + 1), design.feasible[i]);
   if (listed < design.feasible.size()) {
-    text += fmt::format("{:>10}  {} more; --all lists them, -o writes them\n", "...", design.feasible.size() - listed);
+    text += fmt::format("{:>14}  {} more; --all lists them, -o writes them\n", "...", design.feasible.size() - listed);
   }
-  if (design.best_with_pan_overlap) text += row("overlap", *design.best_with_pan_overlap);
+  if (const PairFigures* best = design.best()) text += row("best", *best);
+  if (design.best_with_pan_overlap) text += row("best + overlap", *design.best_with_pan_overlap);
   if (design.published) text += row("published", *design.published);
   if (const PairFigures* best = design.best()) text += "margins of the best: " + margins_of(*best) + "\n";
   if (design.best_with_pan_overlap) {

@@ -17,6 +17,7 @@ using Points = Drawing::Points;
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr int kWidth_px = 1200;
 constexpr double kMargin_px = 40;
+constexpr double kLabels_px = 270;  // a column for words beside the side view
 
 // Colours that people tell apart who see no red or no green (after Okabe and Ito), lighter for what fewer eyes see.
 constexpr Rgb8 kInk{30, 30, 30}, kFaint{150, 150, 150}, kSoil{120, 100, 80}, kUnseen{222, 222, 222};
@@ -45,6 +46,16 @@ struct Scale {
 
 std::string metres(double value) {
   return fmt::format("{:.2f} m", value);
+}
+
+// The marks of a scale up to `to_m`: round steps that leave room for words.
+std::vector<double> marks(double px_per_m, double to_m) {
+  constexpr double kRoom_px = 110;
+  double step = 1e-6;
+  for (int i = 0; step * px_per_m < kRoom_px; ++i) step *= i % 3 == 1 ? 2.5 : 2;
+  std::vector<double> places(static_cast<std::size_t>(std::max(0.0, to_m) / step) + 1);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = static_cast<double>(i) * step;
+  return places;
 }
 
 // --- from the side ---
@@ -76,7 +87,7 @@ void draw_bar(Drawing& drawing, const Scale& at, double y_px, const DrawnPair& p
   bar(held, far, 0.3);
   const double asked = at(pair.requirements.range_m, 0).x();
   drawing.line({{asked, y_px - 3}, {asked, y_px + 15}}, {kInk, 2.5});
-  drawing.text({at(0, 0).x() - 22, y_px + 11}, fmt::format("{}: {:.3f} to {:.3f} m", pair.name, near, far),
+  drawing.text({kLabels_px - 22, y_px + 11}, fmt::format("{}: {:.3f} to {:.3f} m", pair.name, near, far),
                {pair.colour, 14, Anchor::end});
 }
 
@@ -84,7 +95,7 @@ void draw_plain_bar(Drawing& drawing, const Scale& at, double y_px, double from_
                     const std::string& words) {
   const double from = at(from_m, 0).x(), to = at(to_m, 0).x();
   drawing.fill({{from, y_px}, {to, y_px}, {to, y_px + 12}, {from, y_px + 12}}, {colour, 0.9});
-  drawing.text({at(0, 0).x() - 22, y_px + 11}, words, {kInk, 14, Anchor::end});
+  drawing.text({kLabels_px - 22, y_px + 11}, words, {kInk, 14, Anchor::end});
 }
 
 void draw_bars(Drawing& drawing, const Scale& at, double y_px, const std::vector<DrawnPair>& pairs,
@@ -113,7 +124,7 @@ double draw_side(Drawing& drawing, double top_px, const std::vector<DrawnPair>& 
     nearest = std::min(nearest, pair.figures.view_near_m);
     highest = std::max(highest, pair.requirements.height_m);
   }
-  constexpr double kLabels_px = 270, kTallest_px = 330;
+  constexpr double kTallest_px = 330;
   const double scale =
       std::min((kWidth_px - kLabels_px - kMargin_px) / (1.02 * (farthest - nearest)), kTallest_px / highest);
   const double ground_px = top_px + 20 + scale * highest;
@@ -122,10 +133,9 @@ double draw_side(Drawing& drawing, double top_px, const std::vector<DrawnPair>& 
   drawing.line({at(0, 0), at(0, highest)}, {kInk, 4});
   for (const DrawnPair& pair : pairs) draw_pair_from_side(drawing, at, pair);
   drawing.line({at(std::min(nearest, -0.05), 0), at(1.02 * farthest, 0)}, {kSoil, 3});
-  const double step = farthest > 20 ? std::ceil(farthest / 10) : 1;
-  for (double x = 0; x <= 1.02 * farthest; x += step) {
+  for (const double x : marks(scale, 1.02 * farthest)) {
     drawing.line({at(x, 0), at(x, 0) + Point(0, 8)}, {kSoil, 1.5});
-    drawing.text(at(x, 0) + Point(0, 24), fmt::format("{} m", x), {kInk, 13, Anchor::middle});
+    drawing.text(at(x, 0) + Point(0, 24), fmt::format("{:.3g} m", x), {kInk, 13, Anchor::middle});
   }
   draw_bars(drawing, at, ground_px + 40, pairs, shared_m);
   return ground_px + 40 + 24.0 * static_cast<double>(pairs.size() + 2) + 30;
@@ -190,10 +200,10 @@ void draw_views(Drawing& drawing, const Plan& plan, const Views& views) {
 }
 
 void draw_rings(Drawing& drawing, const Plan& plan, double radius_m, double half_deg) {
-  const double step = radius_m > 20 ? std::ceil(radius_m / 10) : 1;
-  for (double r = step; r <= radius_m; r += step) {
+  for (const double r : marks(plan.at.px_per_m, radius_m)) {
+    if (!(r > 0)) continue;
     drawing.line(plan.arc(r, -half_deg, half_deg), {kFaint, 0.8, 3});
-    drawing.text(plan.polar(r, -half_deg) + Point(8, 14), fmt::format("{} m", r), {kInk, 13});
+    drawing.text(plan.polar(r, -half_deg) + Point(8, 14), fmt::format("{:.3g} m", r), {kInk, 13});
   }
 }
 
@@ -215,8 +225,9 @@ void draw_span(Drawing& drawing, const Plan& plan, double radius_m, double span_
 void draw_azimuths(Drawing& drawing, const Plan& plan, double radius_m, const PanRequirements& asked,
                    const PanFigures& seen) {
   const double half = asked.azimuth_deg / 2, gap = 26 / plan.at.px_per_m;
-  for (const double end : {-half, half})
+  for (const double end : {-half, half}) {
     drawing.line({plan.polar(0, 0), plan.polar(radius_m + 3.4 * gap, end)}, {kInk, 1.2, 7});
+  }
   draw_span(drawing, plan, radius_m + gap, seen.azimuth_far_stereo_deg, kWide,
             fmt::format("far edge, both eyes: {:.1f}°", seen.azimuth_far_stereo_deg));
   draw_span(drawing, plan, radius_m + 2 * gap, seen.azimuth_far_deg, kWideTwice,
@@ -228,7 +239,7 @@ void draw_azimuths(Drawing& drawing, const Plan& plan, double radius_m, const Pa
     drawing.line({mark + Point(-7, 0), mark + Point(7, 0)}, {kInk, 3});
     drawing.text(mark + Point(-14, 5),
                  fmt::format("both eyes see {}° up to here, {:.2f} m", asked.azimuth_deg, seen.azimuth_held_to_m),
-                 {kInk, 14, Anchor::end});
+                 {kInk, 14, Anchor::end, true});
   }
 }
 
@@ -273,28 +284,47 @@ void draw_legend(Drawing& drawing, double y_px, bool pans, bool narrow) {
 }
 
 // Gives the plan's lower end, px.
-double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs, const RigDesign& design) {
-  const DrawnPair& wide = pairs.front();
-  const Views views = views_of(wide);
-  const bool asked = wide.requirements.pans && design.pans;
+// What there is to see from above, in metres, and how it lies in the picture.
+struct PlanLayout {
+  Plan plan;
+  double radius_m, half_deg;
+  double lower_end_px;
+};
+
+PlanLayout lay_out_plan(double top_px, const DrawnPair& wide, const Views& views,
+                        const std::optional<PanFigures>& pans) {
+  constexpr double kTallest_px = 700, kSpans_px = 92;  // the arcs of draw_azimuths() stand outside of the ground
   const double radius = std::max(farthest_corner_m(views.both_eyes), wide.requirements.range_m);
-  const double half_deg = asked ? wide.requirements.pans->azimuth_deg / 2 : wide.figures.shape.hfov_deg / 2;
-  constexpr double kTallest_px = 700, kSpans_px = 100;
-  const Plan unit{{{0, 0}, 1}};
-  Points sector = unit.arc(wide.requirements.range_m, -half_deg, half_deg);
-  sector.emplace_back(0, 0);
+  const double half_deg = pans ? wide.requirements.pans->azimuth_deg / 2 : wide.figures.shape.hfov_deg / 2;
+  const double widest_deg = pans ? std::max(half_deg, pans->azimuth_far_deg / 2) : half_deg;
+  const double outside_px = pans ? kSpans_px : 0;
 
   Extent extent;
   for (const GroundPolygon& polygon : views.one_eye) extent.add(polygon);
-  for (const Point& p : unit.arc(radius, -half_deg, half_deg)) extent.add({Point(-p.y(), -p.x())});
+  GroundPolygon arc;
+  for (double a = -widest_deg; a <= widest_deg; a += 1) {
+    arc.emplace_back(radius * std::cos(a * kRadiansPerDegree), radius * std::sin(a * kRadiansPerDegree));
+  }
+  extent.add(arc);
   const double aside = std::max(extent.high.y(), -extent.low.y());
+  const double outside_aside_px = outside_px * std::sin(std::min(widest_deg, 90.0) * kRadiansPerDegree);
   const double scale =
-      std::min((kWidth_px / 2 - kMargin_px - 40) / aside, kTallest_px / (extent.high.x() - extent.low.x()));
-  const double origin_px = top_px + kSpans_px + scale * std::max(extent.high.x(), radius);
-  const Plan plan{{{kWidth_px / 2.0, origin_px}, scale}};
+      std::min((kWidth_px / 2.0 - 20 - outside_aside_px) / aside, kTallest_px / (extent.high.x() - extent.low.x()));
+  const double below_px = std::max(34.0, -outside_px * std::cos(std::min(widest_deg, 180.0) * kRadiansPerDegree));
+  const double origin_px = top_px + 20 + outside_px + scale * extent.high.x();
+  return {{{{kWidth_px / 2.0, origin_px}, scale}}, radius, half_deg, origin_px - scale * extent.low.x() + below_px};
+}
 
-  if (asked) {
-    Points asked_for = plan.arc(wide.requirements.range_m, -half_deg, half_deg);
+// Gives the plan's lower end, px.
+double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs,
+                 const std::optional<PanFigures>& pans) {
+  const DrawnPair& wide = pairs.front();
+  const Views views = views_of(wide);
+  const PlanLayout layout = lay_out_plan(top_px, wide, views, pans);
+  const Plan& plan = layout.plan;
+
+  if (pans) {
+    Points asked_for = plan.arc(wide.requirements.range_m, -layout.half_deg, layout.half_deg);
     asked_for.push_back(plan.polar(0, 0));
     drawing.fill(asked_for, {kUnseen});
   }
@@ -305,20 +335,20 @@ double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& 
     drawing.line(closed(plan(narrow)), {kNarrow, 1.5});
     drawing.text(plan.polar(0.85 * pairs[1].figures.view_far_m, 0), "narrow pair", {kInk, 15, Anchor::middle, true});
   }
-  draw_rings(drawing, plan, radius, half_deg);
-  if (asked) {
-    draw_azimuths(drawing, plan, radius, *wide.requirements.pans, *design.pans);
+  draw_rings(drawing, plan, layout.radius_m, layout.half_deg);
+  if (pans) {
+    draw_azimuths(drawing, plan, layout.radius_m, *wide.requirements.pans, *pans);
     for (const double pan : wide.requirements.pans->angles_deg) {
       drawing.text(plan.polar(0.85 * wide.figures.view_far_m, pan), fmt::format("pan {}°", pan),
                    {kInk, 15, Anchor::middle, true});
     }
   }
+  const Point rover = plan.polar(0, 0);
   if (wide.figures.view_near_m > 0) {
-    drawing.text(plan.polar(0, 0) + Point(18, 14), "blind before the rover", {kInk, 14});
+    drawing.text(rover + Point(18, 14), "blind before the rover", {kInk, 14, Anchor::start, true});
   }
-  drawing.fill({plan.polar(0, 0) + Point(-7, 7), plan.polar(0, 0) + Point(7, 7), plan.polar(0, 0) + Point(0, -8)},
-               {kInk});
-  return origin_px - scale * extent.low.x() + 20;
+  drawing.fill({rover + Point(-7, 7), rover + Point(7, 7), rover + Point(0, -8)}, {kInk});
+  return layout.lower_end_px;
 }
 
 std::string caption(const DrawnPair& pair) {
@@ -343,7 +373,7 @@ std::optional<Drawing> draw_ground(const RigRequirements& requirements, const Ri
     double y = 40;
     for (const DrawnPair& pair : pairs) drawing.text({kMargin_px, y += 22}, caption(pair), {pair.colour, 14});
     y = draw_side(drawing, y + 10, pairs, design.view_overlap_m);
-    y = draw_plan(drawing, y, pairs, design);
+    y = draw_plan(drawing, y, pairs, design.pans);
     if (design.pans && std::isfinite(design.pans->overlap_percent)) {
       drawing.text(
           {kMargin_px, y += 16},

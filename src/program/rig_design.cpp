@@ -58,7 +58,8 @@ void add_rig_design(CLI::App& rig, Context& context) {
       ->required()
       ->option_text("REQ");
   verb->add_option("-o,--output", a->output, "a folder for ground.svg, ground.png and feasible.csv");
-  verb->add_option("--rows", a->rows, "how many feasible combinations are listed (default 10)");
+  verb->add_option("--rows", a->rows, "how many feasible combinations are listed (default 10)")
+      ->check(CLI::Range(0, 2'000'000));
   verb->add_flag("--all", a->all, "list the whole feasible set, with --json too");
   add_json_flag(*verb, context);
 }

@@ -164,10 +164,10 @@ void warn_of_near_ground(const Case& c, const PairFigures& pair) {
   const StereoShape shape{pair.shape.baseline_m, static_cast<double>(pair.shape.width_px), hfov_rad};
   const double largest_px = disparity_px(shape, depth_m), searched_px = disparity_px(shape, pair.shape.nearest_m);
   if (largest_px > searched_px * (1 + kRounded)) {
-    c.warn("largest_disparity", largest_px,
-           fmt::format(
-               "the ground there has disparities up to about {:.0f} px (square pixels); d_min stands for {:.0f} px",
-               largest_px, searched_px));
+    c.warn(
+        "largest_disparity", largest_px,
+        fmt::format("the lowest row has disparities up to about {:.0f} px (square pixels); d_min stands for {:.0f} px",
+                    largest_px, searched_px));
   }
 }
 

@@ -208,7 +208,7 @@ PanFigures pan_figures(const PairFigures& pair, const PairRequirements& requirem
   figures.far_overlap_percent = turns ? far_overlap(one_eye, step_rad) : kNone;
   figures.far_overlap_stereo_percent = turns ? far_overlap(both_eyes, step_rad) : kNone;
   const auto spanned = [&](std::optional<double> half) {
-    return half ? turned_deg + 2 * *half / kRadiansPerDegree : kNone;
+    return half ? std::min(360.0, turned_deg + 2 * *half / kRadiansPerDegree) : kNone;
   };
   figures.azimuth_far_deg = spanned(one_eye);
   figures.azimuth_far_stereo_deg = spanned(both_eyes);
