@@ -111,9 +111,9 @@ std::string pair_text(const std::string& name, const PairRequirements& asked, co
   }
   text += fmt::format(
       "\nasked for: {} m resolution to {} m at c = {} px, stereo angle at most {} deg, search range at most "
-      "{} %, baseline at least {} m\n",
+      "{} %, baseline at least {} m, eyes at least {} m high (they are {} m high)\n",
       asked.range_resolution_m, asked.range_m, asked.disparity_accuracy_px, asked.largest_stereo_angle_deg,
-      asked.largest_search_percent, asked.smallest_baseline_m);
+      asked.largest_search_percent, asked.smallest_baseline_m, asked.smallest_height_m, asked.height_m);
   text += fmt::format("order: {}; what is equal stands in the order of the lists ({} are as good as the best)\n",
                       fmt::join(order, ", then "), design.equally_good);
   text += kHead;

@@ -35,7 +35,8 @@ Pose body_from(const std::string& camera, double pan_rad) {
 Eigen::Vector2d on_ground(const std::string& camera, double pan_rad, const Eigen::Vector2d& pixel) {
   const Pose body_from_camera = body_from(camera, pan_rad);
   const Ray ray = unproject(rover().find_camera(camera)->model, pixel).value();
-  const Eigen::Vector3d d = body_from_camera.rotation() * ray.direction, from = body_from_camera.translation();
+  const Eigen::Vector3d d = body_from_camera.rotation() * ray.direction;
+  const Eigen::Vector3d& from = body_from_camera.translation();
   return (from - d * (from.z() / d.z())).head<2>();
 }
 
@@ -51,7 +52,8 @@ double inside_px(const std::string& camera, double pan_rad, const Eigen::Vector2
 
 bool holds(const GroundPolygon& polygon, const Eigen::Vector2d& p) {
   for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Eigen::Vector2d a = polygon[i], u = polygon[(i + 1) % polygon.size()] - a, v = p - a;
+    const Eigen::Vector2d& a = polygon[i];
+    const Eigen::Vector2d u = polygon[(i + 1) % polygon.size()] - a, v = p - a;
     if (u.x() * v.y() - u.y() * v.x() < 0) return false;
   }
   return !polygon.empty();
