@@ -1,0 +1,209 @@
+#include "program/design_report.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+namespace spartan::program {
+namespace {
+
+// --- JSON ---
+
+Json figures_json(const PairFigures& pair) {
+  const PairMargins& margins = pair.margins;
+  return {{"baseline_m", number(pair.shape.baseline_m)},
+          {"nearest_m", number(pair.shape.nearest_m)},
+          {"hfov_deg", number(pair.shape.hfov_deg)},
+          {"width_px", pair.shape.width_px},
+          {"pixel_size_um", number(pair.shape.pixel_size_um)},
+          {"range_m", number(pair.range_m)},
+          {"focal_length_mm", number(pair.focal_length_mm)},
+          {"stereo_angle_deg", number(pair.stereo_angle_deg)},
+          {"search_percent", number(pair.search_percent)},
+          {"pan_overlap_percent", number(pair.pan_overlap_percent)},
+          {"vfov_deg", number(pair.vfov_deg)},
+          {"tilt_deg", number(pair.tilt_deg)},
+          {"view_near_m", number(pair.view_near_m)},
+          {"view_far_m", number(pair.view_far_m)},
+          {"margins",
+           {{"range_m", number(margins.range_m)},
+            {"stereo_angle_deg", number(margins.stereo_angle_deg)},
+            {"search_percent", number(margins.search_percent)},
+            {"baseline_m", number(margins.baseline_m)},
+            {"pan_overlap_percent", number(margins.pan_overlap_percent)}}}};
+}
+
+Json published_json(const PairDesign& design) {
+  if (!design.published) return nullptr;
+  Json json = {{"feasible", design.published->feasible}, {"on_offer", design.published_on_offer}};
+  json.update(figures_json(*design.published));
+  return json;
+}
+
+Json pair_json(const PairDesign& design, bool whole_set) {
+  const auto or_null = [](const PairFigures* pair) { return pair ? figures_json(*pair) : Json(nullptr); };
+  Json json = {{"combinations", design.combinations}, {"feasible_count", design.feasible.size()}};
+  json["with_pan_overlap_count"] = design.with_pan_overlap_count ? Json(*design.with_pan_overlap_count) : Json(nullptr);
+  json["best"] = or_null(design.best());
+  json["equally_good"] = design.equally_good;
+  json["best_with_pan_overlap"] = or_null(design.best_with_pan_overlap ? &*design.best_with_pan_overlap : nullptr);
+  json["published"] = published_json(design);
+  json["nearest_to_a_limit"] = number(design.nearest_to_a_limit);
+  if (whole_set) {
+    json["feasible"] = Json::array();
+    for (const PairFigures& pair : design.feasible) json["feasible"].push_back(figures_json(pair));
+  }
+  return json;
+}
+
+// --- text ---
+
+constexpr const char* kHead =
+    "                b [m]  d_min [m]   F [deg]  w [px]  s [um]  f [mm]  range [m]  stereo [deg]  search [%]  "
+    "pans [%]  tilt [deg]  ground [m]\n";
+
+std::string percent_or_dash(double value) {
+  return std::isnan(value) ? "-" : fmt::format("{:.1f}", value);
+}
+
+std::string row(const std::string& name, const PairFigures& pair) {
+  return fmt::format(
+      "{:>14}  {:>5}  {:>9}  {:>8}  {:>6}  {:>6}  {:6.2f}  {:9.3f}  {:12.2f}  {:10.2f}  {:>8}  {:>10}  {:.3f} - "
+      "{:.3f}\n",
+      name, pair.shape.baseline_m, pair.shape.nearest_m, pair.shape.hfov_deg, pair.shape.width_px,
+      pair.shape.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg, pair.search_percent,
+      percent_or_dash(pair.pan_overlap_percent), pair.tilt_deg, pair.view_near_m, pair.view_far_m);
+}
+
+std::string margins_of(const PairFigures& pair) {
+  const PairMargins& margins = pair.margins;
+  std::string text =
+      fmt::format("range {:+.3f} m, stereo angle {:+.2f} deg, search range {:+.2f} %, baseline {:+.2f} m",
+                  margins.range_m, margins.stereo_angle_deg, margins.search_percent, margins.baseline_m);
+  if (!std::isnan(margins.pan_overlap_percent))
+    text += fmt::format(", pan overlap {:+.1f} %", margins.pan_overlap_percent);
+  return text;
+}
+
+std::string name_of(DesignCriterion criterion) {
+  switch (criterion) {
+    case DesignCriterion::range_margin:
+      return "larger margin in range";
+    case DesignCriterion::pan_overlap:
+      return "larger overlap of the pans";
+    case DesignCriterion::shorter_baseline:
+      return "shorter baseline";
+  }
+  return "";
+}
+
+std::string pair_text(const std::string& name, const PairRequirements& asked, const PairDesign& design,
+                      std::size_t rows) {
+  std::vector<std::string> order;
+  order.reserve(asked.order.size());
+  for (const DesignCriterion criterion : asked.order) order.push_back(name_of(criterion));
+  std::string text =
+      fmt::format("{} pair: {} of {} combinations are feasible", name, design.feasible.size(), design.combinations);
+  if (design.with_pan_overlap_count) {
+    text += fmt::format("; with neighbouring pans that overlap by at least {} %: {}",
+                        asked.pans->smallest_overlap_percent, *design.with_pan_overlap_count);
+  }
+  text += fmt::format(
+      "\nasked for: {} m resolution to {} m at c = {} px, stereo angle at most {} deg, search range at most "
+      "{} %, baseline at least {} m, eyes at least {} m high (they are {} m high)\n",
+      asked.range_resolution_m, asked.range_m, asked.disparity_accuracy_px, asked.largest_stereo_angle_deg,
+      asked.largest_search_percent, asked.smallest_baseline_m, asked.smallest_height_m, asked.height_m);
+  text += fmt::format("order: {}; what is equal stands in the order of the lists ({} are as good as the best)\n",
+                      fmt::join(order, ", then "), design.equally_good);
+  text += kHead;
+  const std::size_t listed = std::min(rows, design.feasible.size());
+  for (std::size_t i = 0; i < listed; ++i) text += row(fmt::format("{}.", i + 1), design.feasible[i]);
+  if (listed < design.feasible.size()) {
+    text += fmt::format("{:>14}  {} more; --all lists them, -o writes them\n", "...", design.feasible.size() - listed);
+  }
+  if (const PairFigures* best = design.best()) text += row("best", *best);
+  if (design.best_with_pan_overlap) text += row("best + overlap", *design.best_with_pan_overlap);
+  if (design.published) text += row("published", *design.published);
+  if (const PairFigures* best = design.best()) text += "margins of the best: " + margins_of(*best) + "\n";
+  if (design.best_with_pan_overlap) {
+    text += "margins of the best with enough overlap: " + margins_of(*design.best_with_pan_overlap) + "\n";
+  }
+  if (design.published) {
+    text += fmt::format(
+        "published pair ({}, {}): margins: {}\n", design.published->feasible ? "feasible" : "not feasible",
+        design.published_on_offer ? "on offer" : "not among the combinations", margins_of(*design.published));
+  }
+  return text + "\n";
+}
+
+std::string ground_text(const RigDesign& design) {
+  std::string text;
+  if (design.view_overlap_m)
+    text += fmt::format("ground seen by both pairs, middle column: {:.2f} m\n", *design.view_overlap_m);
+  if (!design.pans) return text;
+  const PanFigures& pans = *design.pans;
+  if (std::isfinite(pans.overlap_percent)) {
+    text += fmt::format(
+        "overlap of neighbouring pans: {:.1f} % of the view; at the far edge {:.1f} % (one eye), {:.1f} % (both "
+        "eyes)\n",
+        pans.overlap_percent, pans.far_overlap_percent, pans.far_overlap_stereo_percent);
+  }
+  return text + fmt::format("azimuth of all pans at the far edge: {:.1f} deg (one eye), {:.1f} deg (both eyes)\n",
+                            pans.azimuth_far_deg, pans.azimuth_far_stereo_deg);
+}
+
+}  // namespace
+
+std::string design_text(const RigRequirements& requirements, const RigDesign& design, std::size_t rows) {
+  std::string text = pair_text("wide", requirements.wide, design.wide, rows);
+  if (design.narrow) text += pair_text("narrow", *requirements.narrow, *design.narrow, rows);
+  text += ground_text(design);
+  if (!design.warnings.empty()) text += "\nwarnings:\n";
+  for (const DesignWarning& warning : design.warnings) text += fmt::format("  {}: {}\n", warning.id, warning.text);
+  return text;
+}
+
+Json design_json(const RigDesign& design, bool whole_set) {
+  Json json = {{"schema", 1}, {"wide", pair_json(design.wide, whole_set)}};
+  json["narrow"] = design.narrow ? pair_json(*design.narrow, whole_set) : Json(nullptr);
+  json["view_overlap_m"] = number(design.view_overlap_m);
+  const auto of_pans = [&](double PanFigures::*figure) {
+    return design.pans ? number((*design.pans).*figure) : Json(nullptr);
+  };
+  json["pan_overlap_percent"] = of_pans(&PanFigures::overlap_percent);
+  json["pan_overlap_far_percent"] = of_pans(&PanFigures::far_overlap_percent);
+  json["pan_overlap_far_stereo_percent"] = of_pans(&PanFigures::far_overlap_stereo_percent);
+  json["azimuth_far_deg"] = of_pans(&PanFigures::azimuth_far_deg);
+  json["azimuth_far_stereo_deg"] = of_pans(&PanFigures::azimuth_far_stereo_deg);
+  json["azimuth_held_to_m"] = of_pans(&PanFigures::azimuth_held_to_m);
+  json["warnings"] = Json::array();
+  for (const DesignWarning& warning : design.warnings) {
+    json["warnings"].push_back(
+        {{"id", warning.id}, {"pair", warning.pair}, {"text", warning.text}, {"value", number(warning.value)}});
+  }
+  return json;
+}
+
+std::string design_csv(const RigDesign& design) {
+  std::string text =
+      "pair,rank,baseline_m,nearest_m,hfov_deg,width_px,pixel_size_um,focal_length_mm,range_m,stereo_angle_deg,search_"
+      "percent,"
+      "pan_overlap_percent,enough_pan_overlap,tilt_deg,view_near_m,view_far_m\n";
+  const auto add = [&](const char* name, const PairDesign& pairs) {
+    std::size_t rank = 0;
+    for (const PairFigures& pair : pairs.feasible) {
+      text += fmt::format("{},{},{},{},{},{},{},{:.4f},{:.6f},{:.5f},{:.5f},{},{},{},{:.5f},{:.5f}\n", name, ++rank,
+                          pair.shape.baseline_m, pair.shape.nearest_m, pair.shape.hfov_deg, pair.shape.width_px,
+                          pair.shape.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg,
+                          pair.search_percent,
+                          std::isnan(pair.pan_overlap_percent) ? "" : fmt::format("{:.5f}", pair.pan_overlap_percent),
+                          pair.with_pan_overlap ? 1 : 0, pair.tilt_deg, pair.view_near_m, pair.view_far_m);
+    }
+  };
+  add("wide", design.wide);
+  if (design.narrow) add("narrow", *design.narrow);
+  return text;
+}
+
+}  // namespace spartan::program

@@ -1,0 +1,67 @@
+// A technical drawing, described once, put out as SVG or as pixels.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "spartan/core/image.h"
+
+namespace spartan::program {
+
+struct Paint {
+  Rgb8 colour;
+  double opacity = 1;
+};
+struct Pen {
+  Rgb8 colour;
+  double width_px = 1;
+  double dash_px = 0;  ///< length of dashes and gaps; 0: a whole line
+};
+enum class Anchor { start, middle, end };
+struct Lettering {
+  Rgb8 colour;
+  double size_px = 14;
+  Anchor anchor = Anchor::start;
+  bool halo = false;  ///< a white rim, for letters on colours
+};
+
+/// x to the right, y down, in pixels of the finished picture. What is drawn later lies on top.
+class Drawing {
+ public:
+  using Points = std::vector<Eigen::Vector2d>;
+
+  Drawing(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
+
+  void fill(Points corners, const Paint& paint) { parts_.emplace_back(Area{std::move(corners), paint}); }
+  void line(Points points, const Pen& pen) { parts_.emplace_back(Line{std::move(points), pen}); }
+  /// One line of letters that begins, has its middle or ends at `foot`. ASCII and the sign for degrees.
+  void text(const Eigen::Vector2d& foot, const std::string& words, const Lettering& lettering) {
+    parts_.emplace_back(Words{foot, words, lettering});
+  }
+
+  std::string to_svg() const;
+  Image<Rgb8> to_image() const;
+
+ private:
+  struct Area {
+    Points corners;
+    Paint paint;
+  };
+  struct Line {
+    Points points;
+    Pen pen;
+  };
+  struct Words {
+    Eigen::Vector2d foot;
+    std::string words;
+    Lettering lettering;
+  };
+  using Part = std::variant<Area, Line, Words>;
+
+  int width_px_, height_px_;
+  std::vector<Part> parts_;
+};
+
+}  // namespace spartan::program

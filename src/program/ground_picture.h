@@ -1,0 +1,14 @@
+// A picture of the ground that a rig's pairs see: from the side, and from above with the pans.
+#pragma once
+
+#include <optional>
+
+#include "program/drawing.h"
+#include "spartan/rig/rig_designer.h"
+
+namespace spartan::program {
+
+/// Of the chosen pairs (PairDesign::chosen); none where there is no wide pair to draw.
+std::optional<Drawing> draw_ground(const RigRequirements& requirements, const RigDesign& design);
+
+}  // namespace spartan::program

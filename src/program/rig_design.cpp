@@ -1,0 +1,67 @@
+// spartan rig design: which stereo pairs meet a rover's requirements.
+#include "program/rig_design.h"
+
+#include <limits>
+#include <memory>
+
+#include "program/design_report.h"
+#include "program/ground_picture.h"
+#include "spartan/core/files.h"
+#include "spartan/core/image_io.h"
+#include "spartan/rig/rig_designer.h"
+
+namespace spartan::program {
+namespace {
+
+struct DesignArguments {
+  std::string requirements;
+  std::string output;
+  std::size_t rows = 10;
+  bool all = false;
+};
+
+Status write_files(const Context& context, const std::string& folder, const RigRequirements& requirements,
+                   const RigDesign& design) {
+  if (Status s = make_folder(folder); !s) return s;
+  if (Status s = write_file_atomically(folder + "/feasible.csv", design_csv(design)); !s) return s;
+  const auto drawing = draw_ground(requirements, design);
+  if (!drawing) {
+    context.log.warning("no wide pair is feasible or published: there is no ground to draw");
+    return {};
+  }
+  if (Status s = write_file_atomically(folder + "/ground.svg", drawing->to_svg()); !s) return s;
+  return write_png(folder + "/ground.png", drawing->to_image());
+}
+
+Result<ExitCode> design_verb(const Context& context, const DesignArguments& a) {
+  const auto requirements = read_requirements(a.requirements);
+  if (!requirements) return failure(requirements);
+  const RigDesign design = design_rig(*requirements);
+  if (!a.output.empty()) {
+    if (Status s = write_files(context, a.output, *requirements, design); !s) return failure(s);
+  }
+  const std::size_t rows = a.all ? std::numeric_limits<std::size_t>::max() : a.rows;
+  const std::string text =
+      context.json ? design_json(design, a.all).dump(2) + "\n" : design_text(*requirements, design, rows);
+  if (Status s = print(text); !s) return failure(s);
+  return kDone;
+}
+
+}  // namespace
+
+void add_rig_design(CLI::App& rig, Context& context) {
+  auto a = std::make_shared<DesignArguments>();
+  CLI::App* verb = add_verb(rig, context, "design", "Which stereo pairs meet a rover's requirements, and what they see",
+                            "rig design config/requirements/rover.yaml -o rover_design",
+                            [&context, a] { return design_verb(context, *a); });
+  verb->add_option("requirements", a->requirements, "requirements of a rig (docs/formats.md)")
+      ->required()
+      ->option_text("REQ");
+  verb->add_option("-o,--output", a->output, "a folder for ground.svg, ground.png and feasible.csv");
+  verb->add_option("--rows", a->rows, "how many feasible combinations are listed (default 10)")
+      ->check(CLI::Range(0, 2'000'000));
+  verb->add_flag("--all", a->all, "list the whole feasible set, with --json too");
+  add_json_flag(*verb, context);
+}
+
+}  // namespace spartan::program

@@ -1,0 +1,182 @@
+// `spartan rig design` from outside.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "program.h"
+#include "spartan/core/image_io.h"
+#include "spartan/testing/real_data.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::run_program;
+
+const std::string& rover() {
+  static const std::string path = testing::source_folder() + "/config/requirements/rover.yaml";
+  return path;
+}
+std::string rover_text() {
+  return testing::content_of(rover());
+}
+std::string replaced(std::string text, const std::string& what, const std::string& with) {
+  const std::size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return at == std::string::npos ? text : text.replace(at, what.size(), with);
+}
+std::size_t lines_of(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// The keys that scripts rely on (docs/formats.md, "JSON").
+TEST(RigDesign, JsonHoldsThePublishedFigures) {
+  const auto told = run_program({"rig", "design", rover(), "--json"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const json design = json::parse(told.out);
+  EXPECT_EQ(design["schema"], 1);
+  const json& wide = design["wide"];
+  EXPECT_EQ(wide["combinations"], 128960);
+  EXPECT_EQ(wide["feasible_count"], 12592);
+  EXPECT_EQ(wide["with_pan_overlap_count"], 8876);
+  EXPECT_EQ(wide["published"]["feasible"], true);
+  EXPECT_NEAR(wide["published"]["range_m"], 4.00, 0.005);
+  EXPECT_NEAR(wide["published"]["focal_length_mm"], 6.6, 0.05);
+  EXPECT_NEAR(wide["published"]["stereo_angle_deg"], 11.4, 0.05);
+  EXPECT_NEAR(wide["published"]["search_percent"], 22.8, 0.05);
+  EXPECT_NEAR(wide["published"]["view_near_m"], 0.488, 0.0005);
+  EXPECT_NEAR(wide["published"]["view_far_m"], 4.011, 0.0005);
+  EXPECT_TRUE(wide["best"].is_object());
+  const json& narrow = design["narrow"];
+  EXPECT_EQ(narrow["published"]["feasible"], false);
+  EXPECT_NEAR(narrow["published"]["range_m"], 1.99, 0.005);
+  EXPECT_NEAR(narrow["published"]["view_near_m"], 0.200, 0.0005);
+  EXPECT_NEAR(narrow["published"]["view_far_m"], 2.516, 0.0005);
+  EXPECT_NEAR(design["view_overlap_m"], 2.03, 0.005);
+  EXPECT_NEAR(design["pan_overlap_percent"], 30, 1e-9);
+  EXPECT_NEAR(design["pan_overlap_far_percent"], 25.6, 0.05);
+  EXPECT_NEAR(design["pan_overlap_far_stereo_percent"], 21.6, 0.05);
+  EXPECT_NEAR(design["azimuth_far_deg"], 117.1, 0.05);
+  EXPECT_NEAR(design["azimuth_far_stereo_deg"], 114.6, 0.05);
+  EXPECT_GE(design["warnings"].size(), 16u);
+  for (const json& warning : design["warnings"]) {
+    EXPECT_TRUE(warning["id"].is_string() && warning["text"].is_string() && warning["value"].is_number()) << warning;
+  }
+  EXPECT_FALSE(wide.contains("feasible"));
+  EXPECT_EQ(run_program({"rig", "design", rover(), "--json"}).out, told.out) << "the same in every run";
+}
+
+TEST(RigDesign, ListsTheFeasibleSet) {
+  const auto some = run_program({"rig", "design", rover()});
+  ASSERT_EQ(some.exit_code, 0) << some.err;
+  EXPECT_THAT(some.out, HasSubstr("12592 of 128960 combinations are feasible"));
+  EXPECT_THAT(some.out, HasSubstr("12591 other combinations"));
+  EXPECT_THAT(some.out, HasSubstr("12582 more"));
+  EXPECT_THAT(some.out, HasSubstr("margins of the best: range +1.521 m"));
+  EXPECT_LT(lines_of(some.out), 70u);
+  const auto all = run_program({"rig", "design", rover(), "--all"});
+  EXPECT_EQ(all.exit_code, 0);
+  EXPECT_GT(lines_of(all.out), 12592u);
+  EXPECT_THAT(all.out, HasSubstr(" 12592.  "));
+  EXPECT_THAT(all.out, Not(HasSubstr(" more;")));
+  const json whole = json::parse(run_program({"rig", "design", rover(), "--all", "--json"}).out);
+  ASSERT_EQ(whole["wide"]["feasible"].size(), 12592u);
+  EXPECT_EQ(whole["wide"]["feasible"][0], whole["wide"]["best"]);
+  const auto published =
+      std::find_if(whole["wide"]["feasible"].begin(), whole["wide"]["feasible"].end(), [](const json& pair) {
+        return pair["baseline_m"] == 0.2 && pair["nearest_m"] == 1.0 && pair["hfov_deg"] == 50.0 &&
+               pair["pixel_size_um"] == 5.5 && pair["width_px"] == 1120;
+      });
+  ASSERT_NE(published, whole["wide"]["feasible"].end());
+  EXPECT_NEAR((*published)["focal_length_mm"], 6.6, 0.05);
+}
+
+TEST(RigDesign, DrawsTheGround) {
+  const testing::TemporaryFolder folder;
+  const std::string out = folder.path() + "/deep/design";
+  ASSERT_EQ(run_program({"rig", "design", rover(), "-o", out, "-q"}).exit_code, 0);
+  EXPECT_EQ(lines_of(testing::content_of(out + "/feasible.csv")), 1u + 12592 + 1);
+  const std::string svg = testing::content_of(out + "/ground.svg");
+  EXPECT_THAT(svg, ::testing::StartsWith("<svg"));
+  EXPECT_THAT(svg, ::testing::EndsWith("</svg>\n"));
+  for (const char* label :
+       {"wide: 0.488 to 4.011 m", "narrow: 0.200 to 2.516 m", "both: 2.03 m", "far edge, one eye: 117.1°",
+        "far edge, both eyes: 114.6°", "asked for: 120°", "pan -35°", "pan 0°", "pan 35°", "blind: up to 0.200 m",
+        "by 25.6 % (one eye) and 21.6 % (both eyes)"}) {
+    EXPECT_THAT(svg, HasSubstr(label));
+  }
+  const auto png = read_image(out + "/ground.png");
+  ASSERT_TRUE(png) << png.error().message();
+  EXPECT_EQ(png->size().width, 1200);
+  EXPECT_THAT(svg, HasSubstr("height=\"" + std::to_string(png->size().height) + "\""));
+}
+
+// Pairs of other kinds are drawn too: no pans, no narrow pair, nothing published, many pans, high masts.
+TEST(RigDesign, DrawsWhatIsAskedOfOthers) {
+  const testing::TemporaryFolder folder;
+  const std::string text = rover_text();
+  const std::string wide_only = text.substr(0, text.find("# At the mast's foot"));
+  const std::string unpublished = wide_only.substr(0, wide_only.find("  published:"));
+  const std::string without_pans =
+      replaced(unpublished,
+               "  pans:\n    angles_deg: [-35, 0, 35]\n    azimuth_deg: 120\n    smallest_overlap_percent: 25\n", "");
+  const std::string all_round = replaced(unpublished, "[-35, 0, 35]\n    azimuth_deg: 120",
+                                         "{from: -180, to: 150, step: 30}\n    azimuth_deg: 360");
+  for (const std::string& asked :
+       {wide_only, unpublished, without_pans, all_round,
+        replaced(replaced(unpublished, "  height_m: 1.0", "  height_m: 30"), "range_m: 4", "range_m: 3")}) {
+    const auto told = run_program({"rig", "design", folder.write("asked.yaml", asked), "-o", folder.path() + "/out"});
+    EXPECT_EQ(told.exit_code, 0) << told.err;
+    EXPECT_TRUE(read_image(folder.path() + "/out/ground.png"));
+    EXPECT_THAT(testing::content_of(folder.path() + "/out/ground.svg"), Not(HasSubstr("nan")));
+  }
+  // Nothing to draw is said, and no fault.
+  const auto none =
+      run_program({"rig", "design", folder.write("none.yaml", replaced(unpublished, "range_m: 4.0", "range_m: 12")),
+                   "-o", folder.path() + "/none"});
+  EXPECT_EQ(none.exit_code, 0);
+  EXPECT_THAT(none.out, HasSubstr("none of the 128960 combinations is feasible"));
+  EXPECT_THAT(none.err, HasSubstr("no ground to draw"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() + "/none/ground.svg"));
+  EXPECT_EQ(json::parse(run_program({"rig", "design", folder.path() + "/none.yaml", "--json"}).out)["wide"]["best"],
+            nullptr);
+}
+
+TEST(RigDesign, BadInputIsNamed) {
+  const testing::TemporaryFolder folder;
+  EXPECT_EQ(run_program({"rig", "design"}).exit_code, 2);
+  EXPECT_EQ(run_program({"rig", "design", rover(), "--rows", "-3"}).exit_code, 2);
+  const auto missing = run_program({"rig", "design", folder.path() + "/none.yaml"});
+  EXPECT_EQ(missing.exit_code, 3);
+  EXPECT_THAT(missing.err, HasSubstr("none.yaml"));
+  const std::string wrong =
+      replaced(replaced(rover_text(), "range_m: 4.0", "range_m: far"), "widths_px: [780,", "widths_px: [-780,");
+  const auto refused =
+      run_program({"rig", "design", folder.write("wrong.yaml", wrong), "-o", folder.path() + "/out", "--json"});
+  EXPECT_EQ(refused.exit_code, 4);
+  EXPECT_EQ(refused.out, "");
+  EXPECT_THAT(refused.err, HasSubstr("wide.range_m: 'far' is not a number"));
+  EXPECT_THAT(refused.err, HasSubstr("wide.candidates.widths_px: holds -780"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() + "/out"));
+}
+
+TEST(RigDesign, AnOutputThatCannotBeWrittenIsSaid) {
+  const testing::TemporaryFolder folder;
+  const std::string in_the_way = folder.write("file", "");
+  EXPECT_EQ(run_program({"rig", "design", rover(), "-o", in_the_way}).exit_code, 5);
+  testing::ProgramLimits disk;
+  disk.largest_file_bytes = 4096;
+  const auto full = run_program({"rig", "design", rover(), "-o", folder.path() + "/full"}, disk);
+  EXPECT_EQ(full.exit_code, 5) << full.err;
+  EXPECT_FALSE(std::filesystem::exists(folder.path() + "/full/feasible.csv"));
+}
+
+}  // namespace
+}  // namespace spartan
