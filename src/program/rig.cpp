@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 
 #include "program/json.h"
+#include "program/rig_convert.h"
 #include "program/verbs.h"
 #include "spartan/rig/describe.h"
 #include "spartan/rig/rig_files.h"
@@ -24,17 +24,16 @@ Json to_json(const Rig& rig) {
 }
 
 Result<ExitCode> inspect(const Context& context, const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) {
-    return failure(ErrorCode::input, "no such file or folder", path, "a calibration file, or a folder that holds one");
-  }
-  const auto rig = read_rig(path);
-  if (!rig) return failure(rig);
+  if (const Status there = calibration_is_there(path); !there) return failure(there);
+  const auto read = read_calibration(path);
+  if (!read) return failure(read);
+  const Rig* rig = &read->rig;
   std::string text;
   if (context.json) {
     text = to_json(*rig).dump(2) + "\n";
   } else {
     for (const std::string& sentence : describe_rig(*rig)) text += sentence + "\n";
+    for (const std::string& note : read->notes) text += note + "\n";
   }
   if (Status printed = print(text); !printed) return failure(printed);
   return kDone;
@@ -43,16 +42,17 @@ Result<ExitCode> inspect(const Context& context, const std::string& path) {
 }  // namespace
 
 void add_rig(CLI::App& app, Context& context) {
-  CLI::App* rig = app.add_subcommand("rig", "Calibrations: say in words what was understood");
+  CLI::App* rig = app.add_subcommand("rig", "Calibrations: say in words what was understood, convert");
   rig->require_subcommand(1);
   const auto path = std::make_shared<std::string>();
   CLI::App* verb =
       add_verb(*rig, context, "inspect", "Every camera, pair and transform of a calibration in words",
                "rig inspect $SPARTAN_DATA/kitti_06/calib.txt", [&context, path] { return inspect(context, *path); });
-  verb->add_option("rig", *path, "rig.yaml, KITTI calib.txt or calib_cam_to_cam.txt, EuRoC sensor.yaml, OpenCV yml")
+  verb->add_option("rig", *path, "any calibration: a file, LEFT,RIGHT, or a folder that holds one")
       ->required()
       ->option_text("RIG");
   add_json_flag(*verb, context);
+  add_rig_convert(*rig, context);
 }
 
 }  // namespace spartan::program

@@ -161,8 +161,8 @@ TEST_F(EurocCalib, FaultsAreNamed) {
   EXPECT_THAT(said("intrinsics: [458, ", "intrinsics: [.nan, "), HasSubstr("cam0/sensor.yaml:14: intrinsics"));
   EXPECT_THAT(said("intrinsics: [458, ", "intrinsics: ["), HasSubstr("must be a list of 4 numbers"));
   EXPECT_THAT(said("intrinsics: [458, ", "intrinsics: [0, "), HasSubstr("above zero"));
-  EXPECT_THAT(said("camera_model: pinhole", "camera_model: omni"), HasSubstr("sensor.yaml:13: camera_model"));
-  EXPECT_THAT(said("radial-tangential", "equidistant"), HasSubstr("sensor.yaml:15: distortion_model"));
+  EXPECT_THAT(said("camera_model: pinhole", "camera_model: fov"), HasSubstr("sensor.yaml:13: camera_model"));
+  EXPECT_THAT(said("radial-tangential", "fov"), HasSubstr("sensor.yaml:15: distortion_model"));
   EXPECT_THAT(said("data: [0, 0, 1, 0.1", "data: [0, 0, 2, 0.1"), HasSubstr("T_BS: is not a rigid transform"));
   EXPECT_THAT(said("resolution: [752, 480]", "resolution: [752, 0]"), HasSubstr("sensor.yaml:12: resolution"));
   EXPECT_THAT(said("T_BS:", "T_SB:"), HasSubstr("T_BS"));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/rig/text_matrices.h"
 
@@ -11,6 +12,7 @@ namespace spartan {
 namespace {
 
 using rig_detail::TextMatrices;
+using rig_detail::validated;
 namespace fs = std::filesystem;
 
 using Projection = Eigen::Matrix<double, 3, 4>;
@@ -81,11 +83,6 @@ Camera camera_of(const std::string& name, ImageSize size, const PinholeModel& mo
   camera.size = size;
   camera.model = model;
   return camera;
-}
-
-Result<Rig> validated(Rig rig, const std::string& where) {
-  if (const Status status = rig.validate(where); !status) return failure(status);
-  return rig;
 }
 
 // R and T of one of the files beside calib_cam_to_cam.txt.

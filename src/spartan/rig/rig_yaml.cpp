@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "spartan/core/files.h"
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/rig/yaml_bridge.h"
 
@@ -249,11 +249,8 @@ Result<Rig> parse_rig_yaml(const std::string& text, const std::string& name) {
 }
 
 Result<Rig> read_rig_yaml(const std::string& path) {
-  auto text = read_file(path);
-  if (!text) {
-    text.error().code = ErrorCode::configuration;
-    return failure(text);
-  }
+  const auto text = rig_detail::read_calibration_text(path);
+  if (!text) return failure(text);
   return parse_rig_yaml(*text, path);
 }
 
