@@ -25,6 +25,10 @@ Result<Eigen::Vector3d> read_vector(const TextMatrices& file, const char* key) {
   return Eigen::Vector3d((*v)[0], (*v)[1], (*v)[2]);
 }
 
+// Files hold nine digits or more: less skew than this, by the focal length, is their rounding. OpenCV's models have
+// none, so that beside them the rounding of shorter files passes too.
+constexpr double kNoSkew = 1e-9, kNoSkewBesideOpencv = 1e-5;
+
 struct PlacedCahv {
   CahvModel cahv;
   Pose file_from_camera;
@@ -54,8 +58,7 @@ Result<PlacedCahv> read_cahv(const TextMatrices& file) {
   const Eigen::Vector3d along_h = axes.transpose() * *h / length, along_v = axes.transpose() * *v / length;
   const PinholeModel core{along_h.x(), along_v.y(), along_h.z(), along_v.z()};
   if (!(core.fy > 0)) return file.fault("V", "the focal length must be above zero: V must point down the picture");
-  // What is less than rounding is no skew.
-  const double skew = std::abs(along_v.x()) <= 1e-12 * core.fy ? 0 : along_v.x();
+  const double skew = std::abs(along_v.x()) <= kNoSkew * core.fy ? 0 : along_v.x();
   return PlacedCahv{{core, skew}, Pose(axes, *c)};
 }
 
@@ -132,7 +135,8 @@ Result<CameraModel> read_model(const TextMatrices& file, const PlacedCahv& place
   auto by_opencv = read_opencv_line(file, placed.cahv.core);
   if (!by_opencv) return failure(std::move(by_opencv));
   if (*by_opencv) {
-    if (placed.cahv.skew_px != 0) return file.fault("V", "has a skew, which OpenCV's distortion does not go with");
+    if (std::abs(placed.cahv.skew_px) > kNoSkewBesideOpencv * placed.cahv.core.fy)
+      return file.fault("V", "has a skew, which OpenCV's distortion does not go with");
     return **by_opencv;
   }
   const auto kind = read_kind(file);

@@ -3,131 +3,63 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <opencv2/core/persistence.hpp>
 
 #include "spartan/rig/calibration_text.h"
+#include "spartan/rig/opencv_storage.h"
 #include "spartan/rig/rig_files.h"
 
 namespace spartan {
 namespace {
 
+using rig_detail::OpencvStorage;
 using Names = std::vector<std::string>;
 
-// OpenCV's parser goes down with every opened bracket, tag, dash and indentation, and trusts the stack for it.
-bool nests_too_deep(const std::string& text) {
-  constexpr int kDeepest = 64;
-  int open = 0, dashes = 0, indented = 0;
-  bool at_start = true;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i], next = i + 1 < text.size() ? text[i + 1] : '\n';
-    if (c == '[' || c == '{' || (c == '<' && next != '/' && next != '!' && next != '?')) ++open;
-    if (c == ']' || c == '}' || (c == '<' && next == '/') || (c == '/' && next == '>')) open = std::max(0, open - 1);
-    if (c == '\n') {
-      at_start = true;
-      dashes = indented = 0;
-    } else if (at_start) {
-      dashes += c == '-' ? 1 : 0;
-      ++indented;
-      at_start = c == '-' || c == ' ' || c == '\t';
-    }
-    if (open > kDeepest || dashes > kDeepest || (at_start && indented > 4 * kDeepest)) return true;
-  }
-  return false;
-}
-
-// One or two storages, asked in turn for a key under any of its usual names.
+// One or two files, asked in turn for a key under any of its usual names.
 class Storages {
  public:
   Status open(const std::string& path) {
-    const auto text = rig_detail::read_calibration_text(path);
-    if (!text) return failure(text);
-    if (nests_too_deep(*text)) {
-      return failure(ErrorCode::configuration, "is nested deeper than any calibration", path);
-    }
+    auto storage = OpencvStorage::read(path);
+    if (!storage) return failure(std::move(storage));
     paths_ += (paths_.empty() ? "" : " and ") + path;
-    try {
-      cv::FileStorage storage(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-      if (!storage.isOpened() || !storage.root().isMap()) {
-        return failure(ErrorCode::configuration, "OpenCV cannot read this file", path);
-      }
-      storages_.push_back(std::move(storage));
-    } catch (const std::exception& e) {
-      return failure(ErrorCode::configuration, fmt::format("OpenCV cannot read this file: {}", e.what()), path);
-    }
+    storages_.push_back(std::move(*storage));
     return {};
   }
 
-  /// The matrix as doubles, row by row, with `counts` elements; a key that is missing is a fault unless optional.
+  /// The matrix as doubles, row by row, with `counts` elements.
   Result<std::vector<double>> matrix(const Names& names, const std::vector<int>& counts) const {
-    for (const cv::FileStorage& storage : storages_) {
+    for (const OpencvStorage& storage : storages_) {
       for (const std::string& name : names) {
-        const cv::FileNode node = storage[name];
-        if (!node.empty()) return read(node, name, counts);
+        if (storage.has(name)) return storage.matrix(name, counts);
       }
     }
     return failure(ErrorCode::configuration, fmt::format("the key {} is missing", fmt::join(names, " or ")), paths_);
   }
 
-  bool has(const std::string& name) const {
-    return std::any_of(storages_.begin(), storages_.end(), [&](const auto& s) { return !s[name].empty(); });
-  }
-
-  std::string text(const std::string& name) const {
-    for (const cv::FileStorage& storage : storages_) {
-      const cv::FileNode node = storage[name];
-      if (node.isString()) return static_cast<std::string>(node);
-    }
-    return "";
-  }
-
+  bool has(const std::string& name) const { return holder(name) != nullptr; }
+  std::string text(const std::string& name) const { return has(name) ? holder(name)->text(name) : ""; }
   std::optional<int> integer(const std::string& name) const {
-    for (const cv::FileStorage& storage : storages_) {
-      const cv::FileNode node = storage[name];
-      if (!node.empty() && node.isInt()) return static_cast<int>(node);
-    }
-    return std::nullopt;
+    return has(name) ? holder(name)->integer(name) : std::nullopt;
   }
-
   std::optional<ImageSize> size(const std::string& name) const {
-    for (const cv::FileStorage& storage : storages_) {
-      const cv::FileNode node = storage[name];
-      if (node.isSeq() && node.size() == 2 && node[0].isInt() && node[1].isInt()) {
-        return ImageSize{static_cast<int>(node[0]), static_cast<int>(node[1])};
-      }
+    return has(name) ? holder(name)->size(name) : std::nullopt;
+  }
+  /// "key: what" at the line of the first of the names that is there.
+  tl::unexpected<Error> fault(const Names& names, const std::string& what) const {
+    for (const std::string& name : names) {
+      if (has(name)) return holder(name)->fault(name, what);
     }
-    return std::nullopt;
+    return failure(ErrorCode::configuration, what, paths_);
   }
   const std::string& paths() const { return paths_; }
 
  private:
-  Result<std::vector<double>> read(const cv::FileNode& node, const std::string& name,
-                                   const std::vector<int>& counts) const {
-    const auto fault = [&](const std::string& what) {
-      return failure(ErrorCode::configuration, fmt::format("{}: {}", name, what), paths_);
-    };
-    // Read number by number: cv::Mat would trust rows and cols, and take any amount of memory for them.
-    if (!node.isMap() || !node["rows"].isInt() || !node["cols"].isInt() || !node["data"].isSeq())
-      return fault("is not a matrix");
-    const cv::FileNode data = node["data"];
-    const auto total = static_cast<std::int64_t>(data.size());
-    if (std::int64_t{static_cast<int>(node["rows"])} * static_cast<int>(node["cols"]) != total)
-      return fault("has other numbers than its rows and columns say");
-    if (std::find(counts.begin(), counts.end(), total) == counts.end()) {
-      return fault(fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
-    }
-    std::vector<double> values;
-    values.reserve(data.size());
-    for (const cv::FileNode& entry : data) {
-      if (!entry.isInt() && !entry.isReal()) return fault("holds something that is not a number");
-      values.push_back(static_cast<double>(entry));
-      if (!std::isfinite(values.back())) return fault("holds a number that is not finite");
-    }
-    return values;
+  const OpencvStorage* holder(const std::string& name) const {
+    const auto found =
+        std::find_if(storages_.begin(), storages_.end(), [&](const OpencvStorage& s) { return s.has(name); });
+    return found == storages_.end() ? nullptr : &*found;
   }
 
-  std::vector<cv::FileStorage> storages_;
+  std::vector<OpencvStorage> storages_;
   std::string paths_;
 };
 
@@ -143,8 +75,7 @@ Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& name
   if (!held) return failure(held);
   const auto& m = *held;
   if (!(m[0] > 0 && m[4] > 0) || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
-    return failure(ErrorCode::configuration,
-                   fmt::format("{}: is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)", names.front()), files.paths());
+    return files.fault(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
   }
   return PinholeModel{m[0], m[4], m[2], m[5]};
 }
@@ -166,9 +97,7 @@ Result<CameraModel> read_model(const Storages& files, const std::string& number)
     if (i < coefficients.size()) {
       coefficients[i] = (*d)[i];
     } else if ((*d)[i] != 0) {
-      return failure(ErrorCode::configuration,
-                     fmt::format("D{}: thin-prism and tilt coefficients (the 9th and on) are not supported", number),
-                     files.paths());
+      return files.fault(names, "thin-prism and tilt coefficients (the 9th and on) are not supported");
     }
   }
   return RadialTangentialModel(*pinhole, coefficients);
@@ -177,17 +106,14 @@ Result<CameraModel> read_model(const Storages& files, const std::string& number)
 Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::string& name) {
   const auto r = files.matrix({name}, {3, 9});
   if (!r) return failure(r);
-  const auto fault = [&](const char* what) {
-    return failure(ErrorCode::configuration, fmt::format("{}: {}", name, what), files.paths());
-  };
   if (r->size() == 3) {
     const Eigen::Vector3d turn((*r)[0], (*r)[1], (*r)[2]);
     // A rotation vector that goes round many times has lost its digits.
-    if (turn.norm() > 1e3) return fault("is not a rotation");
+    if (turn.norm() > 1e3) return files.fault({name}, "is not a rotation");
     return exp_so3(turn);
   }
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
-  if (!is_rotation(rotation, 1e-4)) return fault("is not a rotation matrix");
+  if (!is_rotation(rotation, 1e-4)) return files.fault({name}, "is not a rotation matrix");
   return Eigen::Quaterniond(nearest_rotation(rotation));
 }
 
@@ -203,10 +129,7 @@ Result<RectifiedEye> read_projection(const Storages& files, const std::string& n
   const bool rectified =
       p[0] > 0 && p[5] > 0 && p[1] == 0 && p[4] == 0 && p[8] == 0 && p[9] == 0 && p[10] == 1 && p[11] == 0;
   if (!rectified) {
-    return failure(
-        ErrorCode::configuration,
-        fmt::format("{}: is not the projection of a rectified camera (fx 0 cx tx; 0 fy cy ty; 0 0 1 0)", name),
-        files.paths());
+    return files.fault({name}, "is not the projection of a rectified camera (fx 0 cx tx; 0 fy cy ty; 0 0 1 0)");
   }
   return RectifiedEye{{p[0], p[5], p[2], p[6]}, {-p[3] / p[0], -p[7] / p[5], 0}};
 }
