@@ -30,9 +30,10 @@ std::string complaint(const Result<ReadRig>& read) {
   return read.error().message();
 }
 
-// Where the body's point is seen.
+// Where the body's point is seen, brought to 1 m from the camera: mrcal does so before it looks, and only CAHVORE,
+// which is not central, sees a difference.
 Eigen::Vector2d seen(const Rig& rig, const char* camera, const Eigen::Vector3d& point) {
-  return project(rig.find_camera(camera)->model, rig.body_from_camera(camera).inverse() * point).value();
+  return project(rig.find_camera(camera)->model, (rig.body_from_camera(camera).inverse() * point).normalized()).value();
 }
 
 Eigen::Vector3d right_in_left(const Rig& rig) {
@@ -398,8 +399,13 @@ TEST_F(TsaiCalib, DistortionAndPitchAreAsTheProjectHasThem) {
   // Picture axes that are not those of the camera: u to the camera's y, v to its −x.
   const std::string turned = replaced(replaced(kTsai, "u_direction = 1 0 0", "u_direction = 0 1 0"),
                                       "v_direction = 0 1 0", "v_direction = -1 0 0");
-  const Pose straight = read(kTsai)->rig.body_from_camera("left"), lying = read(turned)->rig.body_from_camera("right");
-  EXPECT_NEAR(rotation_angle(straight.inverse() * lying), 0, 1e-9) << "only the left one was turned, the body is not";
+  const auto right_from_left = [&](const std::string& text) {
+    const Rig rig = read(text)->rig;
+    return rig.right_from_left(rig.pairs[0]);
+  };
+  const Pose straight = right_from_left(kTsai), lying = right_from_left(turned);
+  EXPECT_LE((lying * Eigen::Vector3d(1, 0, 2) - straight * Eigen::Vector3d(0, 1, 2)).norm(), 1e-9);
+  EXPECT_LE((lying * Eigen::Vector3d(0, 1, 2) - straight * Eigen::Vector3d(-1, 0, 2)).norm(), 1e-9);
 }
 
 TEST_F(TsaiCalib, FaultsAreNamed) {

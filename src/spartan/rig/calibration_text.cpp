@@ -39,8 +39,9 @@ Result<Rig> validated(Rig rig, const std::string& where) {
 }
 
 tl::unexpected<Error> unknown_size(const std::string& where) {
-  return failure(ErrorCode::configuration, "the image size is not known and this file does not hold it", where,
-                 "lay it beside its pictures, all of one size, or convert it with --size-px 640,480");
+  return failure(
+      ErrorCode::configuration, "the image size is not known and this file does not hold it", where,
+      "lay it beside its pictures, all of one size (KITTI: beside image_0), or convert it with --size-px 640,480");
 }
 
 std::string list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers, const char* separator) {

@@ -125,8 +125,7 @@ Result<Rig> read_kitti_calib(const std::string& path, ImageSize size) {
   const auto eyes = read_projections(*file, "P0", "P1");
   if (!eyes) return failure(eyes);
   if (size.empty()) {
-    return failure(ErrorCode::configuration, "the image size is not known and this file does not hold it", path,
-                   "put it beside its folder image_0");
+    return rig_detail::unknown_size(path);
   }
   return validated(rig_of_one_pair("kitti", camera_of("cam0", size, eyes->left), camera_of("cam1", size, eyes->right),
                                    Pose::from_translation({-eyes->baseline_m, 0, 0})),

@@ -18,7 +18,9 @@ struct RectifiedPinholes {
   double baseline_m = 0;
 };
 
-// Two pinholes with the same rows and the same scale, side by side; the distance of rounding is let through.
+constexpr double kRounding = 1e-9;
+
+// Two pinholes with the same rows and the same scale, side by side.
 Result<RectifiedPinholes> rectified_pinholes(const Rig& rig, CalibrationFormat format) {
   const auto eyes = only_pair(rig, format);
   if (!eyes) return failure(eyes);
@@ -32,13 +34,14 @@ Result<RectifiedPinholes> rectified_pinholes(const Rig& rig, CalibrationFormat f
   const Pose left_from_right = rig.right_from_left(*eyes->pair).inverse();
   const Eigen::Vector3d& t = left_from_right.translation();
   const double turned = rotation_angle(left_from_right);
-  if (turned > 1e-9 || t.tail<2>().norm() > 1e-9 * t.norm() || t.x() <= 0) {
+  if (turned > kRounding || t.tail<2>().norm() > kRounding * t.norm() || t.x() <= 0) {
     return cannot_hold(*eyes->right,
                        fmt::format("{} holds rectified pairs only; this camera is turned by {:.3g} rad and stands "
                                    "({:.6g}, {:.6g}, {:.6g}) m from the left one",
                                    name_of(format), turned, t.x(), t.y(), t.z()));
   }
-  if (left->fx != right->fx || left->fy != right->fy || left->cy != right->cy) {
+  const auto differ = [&](double a, double b) { return std::abs(a - b) > kRounding * left->fx; };
+  if (differ(left->fx, right->fx) || differ(left->fy, right->fy) || differ(left->cy, right->cy)) {
     return cannot_hold(*eyes->right,
                        fmt::format("{} holds rectified pairs only; this camera has other focal lengths or "
                                    "another middle row than the left one",

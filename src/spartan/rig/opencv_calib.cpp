@@ -205,8 +205,7 @@ Result<Rig> read_opencv_calib(const std::string& intrinsics_path, const std::str
   }
   const ImageSize known = size_in(files, size);
   if (known.empty()) {
-    return failure(ErrorCode::configuration, "the image size is not known: image_width and image_height are missing",
-                   files.paths());
+    return rig_detail::unknown_size(files.paths());
   }
   const bool raw = files.has("M1") || files.has("K1") || files.has("cameraMatrix1") || files.has("camera_matrix_1");
   auto rig = raw || !files.has("P1") ? read_unrectified(files, known) : read_rectified(files, known);

@@ -58,6 +58,7 @@ Result<ReadRig> read_opencv(const fs::path& file, ImageSize size_hint) {
   const bool apart =
       (file.stem() == "intrinsics" || file.stem() == "extrinsics") && is_there(intrinsics) && is_there(extrinsics);
   const fs::path& first = apart ? intrinsics : file;
+  if (size_hint.empty()) size_hint = size_of_pictures_beside(file);
   std::vector<std::string> files{first.string()};
   if (apart) files.push_back(extrinsics.string());
   return with_body_note(read_opencv_calib(first.string(), apart ? extrinsics.string() : "", size_hint),

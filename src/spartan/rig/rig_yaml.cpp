@@ -17,6 +17,7 @@ using rig_detail::YamlFaults;
 using rig_detail::YamlMap;
 
 constexpr int kSchema = 1;
+constexpr std::size_t kMostEntries = 1000;  // no rig has more cameras
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr PixelLayout kLayouts[] = {PixelLayout::gray,       PixelLayout::rgb,        PixelLayout::bayer_rggb,
                                     PixelLayout::bayer_grbg, PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr};
@@ -163,6 +164,10 @@ std::vector<T> read_group(YamlMap& root, const char* key, bool required, Read re
   const auto node = required ? root.node(key) : root.optional_node(key);
   if (!node) return items;
   YamlMap group(*node, key, root.faults());
+  if (group.entries().size() > kMostEntries) {
+    root.fault(key, fmt::format("has {} entries, more than {}", group.entries().size(), kMostEntries));
+    return items;
+  }
   for (const auto& [name, entry] : group.entries()) {
     items.push_back(read(name, YamlMap(entry, group.path(name), root.faults())));
   }
