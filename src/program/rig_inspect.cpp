@@ -9,6 +9,7 @@
 
 #include "program/json.h"
 #include "program/rig_inspect_picture.h"
+#include "program/rig_convert.h"
 #include "program/rig_pictures.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
@@ -168,19 +169,16 @@ Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, Rig& 
   return inspected;
 }
 
-Result<Rig> load_rig(const InspectArguments& a) {
-  if (a.rig == "-") return Rig{};  // guessed from the pictures' size
-  std::error_code error;
-  if (!std::filesystem::exists(a.rig.substr(0, a.rig.find(',')), error)) {
-    return failure(ErrorCode::input, "no such file or folder", a.rig, "a calibration file, or a folder that holds one");
-  }
+Result<ReadRig> load_rig(const InspectArguments& a) {
+  if (a.rig == "-") return ReadRig{};  // guessed from the pictures' size
+  if (Status there = calibration_is_there(a.rig); !there) return failure(there);
   ImageSize size;
   if (!a.left.empty()) {
     auto pictures = load_pictures(a.left, a.right, 1);
     if (!pictures) return failure(pictures);
     size = pictures->front().left.size();
   }
-  return read_rig(a.rig, size);
+  return read_calibration(a.rig, size);
 }
 
 // The rig with the cameras and the pair of that name as `other` has them.
@@ -223,44 +221,52 @@ Status check_usage(const InspectArguments& a) {
   return {};
 }
 
-Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
-  if (Status usage = check_usage(a); !usage) return failure(usage);
-  auto rig = load_rig(a);
-  if (!rig) return failure(rig);
-  const Workers workers(context.threads);
-  std::vector<Inspected> inspected;
-  if (!a.left.empty() || !a.recording.empty()) {
-    auto result = inspect_pictures(a, *rig, workers);
-    if (!result) return failure(result);
-    inspected = std::move(*result);
-  }
+// What goes into files.
+Status write_results(const InspectArguments& a, const Rig& rig, const std::vector<Inspected>& inspected,
+                     const Workers& workers) {
   if (!a.picture.empty()) {
     const Inspected& one = inspected.front();
-    const auto picture = draw_pair_check(*rig, one.pair, one.check, std::as_const(one.left).view(),
+    const auto picture = draw_pair_check(rig, one.pair, one.check, std::as_const(one.left).view(),
                                          std::as_const(one.right).view(), one.matches, workers);
     if (!picture) return failure(picture);
     if (Status written = write_png(a.picture, std::as_const(*picture).view()); !written) return failure(written);
   }
-  if (!a.apply.empty()) {
-    Rig corrected = *rig;
-    for (const Inspected& one : inspected) corrected = with_pair_of(corrected, one.check.corrected, one.pair.name);
-    if (Status written = write_rig(corrected, a.rig, a.apply); !written) return failure(written);
-  }
+  if (a.apply.empty()) return {};
+  Rig corrected = rig;
+  for (const Inspected& one : inspected) corrected = with_pair_of(corrected, one.check.corrected, one.pair.name);
+  return write_rig(corrected, a.rig, a.apply);
+}
+
+std::string in_words(const InspectArguments& a, const ReadRig& read, const std::vector<Inspected>& inspected) {
+  const bool guessed = a.rig == "-";
   std::string text;
-  if (context.json) {
-    text = to_json(*rig, inspected).dump(2) + "\n";
+  if (guessed) {
+    text = fmt::format("no calibration: two pinholes side by side are guessed, of {:.0f} px focal length; the length of the "
+                       "baseline is not known\n",
+                       summarize_pair(read.rig, read.rig.pairs.front()).focal_px);
   } else {
-    if (a.rig == "-") {
-      text += fmt::format(
-          "no calibration: two pinholes side by side are guessed, of {:.0f} px focal length; the length of the "
-          "baseline is not known\n",
-          summarize_pair(*rig, rig->pairs.front()).focal_px);
-    } else {
-      for (const std::string& sentence : describe_rig(*rig)) text += sentence + "\n";
-    }
-    for (const Inspected& one : inspected) text += in_words(one, a.rig == "-");
-    if (!a.apply.empty()) text += fmt::format("the corrected rig: {}\n", a.apply);
+    for (const std::string& sentence : describe_rig(read.rig)) text += sentence + "\n";
+    for (const std::string& note : read.notes) text += note + "\n";
   }
+  for (const Inspected& one : inspected) text += in_words(one, guessed);
+  if (!a.apply.empty()) text += fmt::format("the corrected rig: {}\n", a.apply);
+  return text;
+}
+
+Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
+  if (Status usage = check_usage(a); !usage) return failure(usage);
+  auto read = load_rig(a);
+  if (!read) return failure(read);
+  const Workers workers(context.threads);
+  std::vector<Inspected> inspected;
+  if (!a.left.empty() || !a.recording.empty()) {
+    auto result = inspect_pictures(a, read->rig, workers);
+    if (!result) return failure(result);
+    inspected = std::move(*result);
+  }
+  if (Status written = write_results(a, read->rig, inspected, workers); !written) return failure(written);
+  const std::string text =
+      context.json ? to_json(read->rig, inspected).dump(2) + "\n" : in_words(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
   return kDone;
 }

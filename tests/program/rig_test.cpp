@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "program.h"
 #include "small_drive.h"
+#include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
@@ -177,6 +181,63 @@ TEST(RigInspect, JudgesRealPairs) {
     EXPECT_EQ(pair["verdict"], "good") << name << pair["findings"];
   }
   EXPECT_EQ(verdict({data + "/euroc_v101", "--recording", data + "/euroc_v101", "--shots", "4"})["verdict"], "good");
+
+  const std::string left = data + "/k10_pair/left4.png", right = data + "/k10_pair/right4.png";
+  const std::string rigs = testing::source_folder() + "/config/rigs/";
+  const json given = verdict({rigs + "k10.yaml", left, right});
+  EXPECT_EQ(given["verdict"], "bad");
+  std::vector<std::string> found;
+  for (const json& finding : given["findings"]) found.push_back(finding["id"]);
+  EXPECT_THAT(found, ::testing::UnorderedElementsAre("yaw_offset", "row_offset"));
+  EXPECT_NEAR(given["corrections"]["yaw_deg"], -1, 0.15);
+  EXPECT_NEAR(given["row_error_px"]["after"]["median"], -0.9, 0.2);
+  EXPECT_NEAR(given["row_error_px"]["before"]["mean"], 14.6, 1);
+  const json corrected = verdict({rigs + "k10_corrected.yaml", left, right});
+  EXPECT_EQ(corrected["verdict"], "good") << corrected["findings"];
+  EXPECT_LT(corrected["row_error_px"]["after"]["mean"], 0.5);
+
+  const std::string boards = data + "/opencv_chessboard/";
+  EXPECT_EQ(verdict({rigs + "opencv_chessboard.yaml", boards + "left*.jpg", boards + "right*.jpg"})["verdict"], "good");
+  // Curiosity's pictures alone: not rectified, rows up to 5 px apart (pairs.md).
+  const std::string mars = data + "/mars/msl_navcam_sol1431/";
+  const json navcam = verdict({"-", mars + "NLB*.jpeg", mars + "NRB*.jpeg"});
+  EXPECT_EQ(navcam["verdict"], "bad");
+  EXPECT_LT(navcam["row_error_px"]["corrected"]["mean"], 0.2);
+}
+
+// The corrected rig of K10 gives flat ground with its three mock rocks on it.
+TEST(RigInspect, CorrectedK10SeesFlatGroundAndRocks) {
+  const std::string data = testing::data_folder() + "/k10_pair";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "no k10_pair; SPARTAN_DATA says where it is";
+  const testing::TemporaryFolder folder;
+  const auto build = [&](const std::string& rig) {
+    const auto told = run_program({"map", "build", data + "/left4.png", data + "/right4.png", "--rig",
+                                   testing::source_folder() + "/config/rigs/" + rig + ".yaml", "-o",
+                                   folder.path() + "/" + rig, "--extent-m", "9", "--json"});
+    EXPECT_EQ(told.exit_code, 0) << told.err;
+    return json::parse(told.out);
+  };
+  const json given = build("k10"), corrected = build("k10_corrected");
+  EXPECT_LT(corrected["cells"]["obstacle"], 0.5 * given["cells"]["obstacle"].get<double>());
+  EXPECT_GT(corrected["cells"]["free"], given["cells"]["free"]);
+  EXPECT_LT(corrected["cells"]["cavity"], 60);
+  // Of all obstacles with ten cells and more, three stand in a row before the rover; anything else is the rover itself.
+  const auto table = read_file(folder.path() + "/k10_corrected/obstacles.csv");
+  ASSERT_TRUE(table);
+  int rocks = 0;
+  std::istringstream lines(*table);
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line)) {
+    double x = 0, y = 0, width = 0, length = 0, height = 0;
+    int cells = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf,%lf,%d", &x, &y, &width, &length, &height, &cells), 6) << line;
+    if (cells < 10 || x < 0.6) continue;
+    ++rocks;
+    EXPECT_LT(std::abs(y), 0.7) << line;
+    EXPECT_NEAR(height, 0.38, 0.12) << line;
+  }
+  EXPECT_EQ(rocks, 3) << *table;
 }
 
 TEST(RigInspect, ReadsWhatOthersWrite) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/rig/text_matrices.h"
 
@@ -11,6 +12,7 @@ namespace spartan {
 namespace {
 
 using rig_detail::TextMatrices;
+using rig_detail::validated;
 namespace fs = std::filesystem;
 
 using Projection = Eigen::Matrix<double, 3, 4>;
@@ -83,11 +85,6 @@ Camera camera_of(const std::string& name, ImageSize size, const PinholeModel& mo
   return camera;
 }
 
-Result<Rig> validated(Rig rig, const std::string& where) {
-  if (const Status status = rig.validate(where); !status) return failure(status);
-  return rig;
-}
-
 // R and T of one of the files beside calib_cam_to_cam.txt.
 Result<Pose> read_transform(const std::string& path) {
   const auto file = TextMatrices::read(path);
@@ -128,8 +125,7 @@ Result<Rig> read_kitti_calib(const std::string& path, ImageSize size) {
   const auto eyes = read_projections(*file, "P0", "P1");
   if (!eyes) return failure(eyes);
   if (size.empty()) {
-    return failure(ErrorCode::configuration, "the image size is not known and this file does not hold it", path,
-                   "put it beside its folder image_0");
+    return rig_detail::unknown_size(path);
   }
   return validated(rig_of_one_pair("kitti", camera_of("cam0", size, eyes->left), camera_of("cam1", size, eyes->right),
                                    Pose::from_translation({-eyes->baseline_m, 0, 0})),

@@ -3,140 +3,188 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <opencv2/core/persistence.hpp>
 
-#include "spartan/core/files.h"
+#include "spartan/rig/calibration_text.h"
+#include "spartan/rig/opencv_storage.h"
 #include "spartan/rig/rig_files.h"
 
 namespace spartan {
 namespace {
 
+using rig_detail::OpencvStorage;
 using Names = std::vector<std::string>;
 
-// One or two storages, asked in turn for a key under any of its usual names.
+// One or two files, asked in turn for a key under any of its usual names.
 class Storages {
  public:
   Status open(const std::string& path) {
-    auto text = read_file(path);
-    if (!text) {
-      text.error().code = ErrorCode::configuration;
-      return failure(text);
-    }
+    auto storage = OpencvStorage::read(path);
+    if (!storage) return failure(std::move(storage));
     paths_ += (paths_.empty() ? "" : " and ") + path;
-    try {
-      cv::FileStorage storage(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-      if (!storage.isOpened() || !storage.root().isMap()) {
-        return failure(ErrorCode::configuration, "OpenCV cannot read this file", path);
-      }
-      storages_.push_back(std::move(storage));
-    } catch (const std::exception& e) {
-      return failure(ErrorCode::configuration, fmt::format("OpenCV cannot read this file: {}", e.what()), path);
-    }
+    storages_.push_back(std::move(*storage));
     return {};
   }
 
-  /// The matrix as doubles, row by row, with `counts` elements; a key that is missing is a fault unless optional.
+  /// The matrix as doubles, row by row, with `counts` elements.
   Result<std::vector<double>> matrix(const Names& names, const std::vector<int>& counts) const {
-    for (const cv::FileStorage& storage : storages_) {
+    for (const OpencvStorage& storage : storages_) {
       for (const std::string& name : names) {
-        const cv::FileNode node = storage[name];
-        if (!node.empty()) return read(node, name, counts);
+        if (storage.has(name)) return storage.matrix(name, counts);
       }
     }
     return failure(ErrorCode::configuration, fmt::format("the key {} is missing", fmt::join(names, " or ")), paths_);
   }
 
+  bool has(const std::string& name) const { return holder(name) != nullptr; }
+  std::string text(const std::string& name) const { return has(name) ? holder(name)->text(name) : ""; }
   std::optional<int> integer(const std::string& name) const {
-    for (const cv::FileStorage& storage : storages_) {
-      const cv::FileNode node = storage[name];
-      if (!node.empty() && node.isInt()) return static_cast<int>(node);
-    }
-    return std::nullopt;
+    return has(name) ? holder(name)->integer(name) : std::nullopt;
   }
-
   std::optional<ImageSize> size(const std::string& name) const {
-    for (const cv::FileStorage& storage : storages_) {
-      const cv::FileNode node = storage[name];
-      if (node.isSeq() && node.size() == 2 && node[0].isInt() && node[1].isInt()) {
-        return ImageSize{static_cast<int>(node[0]), static_cast<int>(node[1])};
-      }
+    return has(name) ? holder(name)->size(name) : std::nullopt;
+  }
+  /// "key: what" at the line of the first of the names that is there.
+  tl::unexpected<Error> fault(const Names& names, const std::string& what) const {
+    for (const std::string& name : names) {
+      if (has(name)) return holder(name)->fault(name, what);
     }
-    return std::nullopt;
+    return failure(ErrorCode::configuration, what, paths_);
   }
   const std::string& paths() const { return paths_; }
 
  private:
-  Result<std::vector<double>> read(const cv::FileNode& node, const std::string& name,
-                                   const std::vector<int>& counts) const {
-    const auto fault = [&](const std::string& what) {
-      return failure(ErrorCode::configuration, fmt::format("{}: {}", name, what), paths_);
-    };
-    // Read number by number: cv::Mat would trust rows and cols, and take any amount of memory for them.
-    if (!node.isMap() || !node["rows"].isInt() || !node["cols"].isInt() || !node["data"].isSeq())
-      return fault("is not a matrix");
-    const cv::FileNode data = node["data"];
-    const auto total = static_cast<std::int64_t>(data.size());
-    if (std::int64_t{static_cast<int>(node["rows"])} * static_cast<int>(node["cols"]) != total)
-      return fault("has other numbers than its rows and columns say");
-    if (std::find(counts.begin(), counts.end(), total) == counts.end()) {
-      return fault(fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
-    }
-    std::vector<double> values;
-    values.reserve(data.size());
-    for (const cv::FileNode& entry : data) {
-      if (!entry.isInt() && !entry.isReal()) return fault("holds something that is not a number");
-      values.push_back(static_cast<double>(entry));
-      if (!std::isfinite(values.back())) return fault("holds a number that is not finite");
-    }
-    return values;
+  const OpencvStorage* holder(const std::string& name) const {
+    const auto found =
+        std::find_if(storages_.begin(), storages_.end(), [&](const OpencvStorage& s) { return s.has(name); });
+    return found == storages_.end() ? nullptr : &*found;
   }
 
-  std::vector<cv::FileStorage> storages_;
+  std::vector<OpencvStorage> storages_;
   std::string paths_;
 };
 
-Result<Camera> read_eye(const Storages& files, const std::string& number, const std::string& name, ImageSize size) {
-  const auto k = files.matrix({"M" + number, "K" + number, "cameraMatrix" + number, "camera_matrix_" + number}, {9});
-  if (!k) return failure(k);
-  const auto d = files.matrix({"D" + number, "distCoeffs" + number, "dist_coeffs_" + number}, {4, 5, 8, 12, 14});
-  if (!d) return failure(d);
-  const auto& m = *k;
+// Four coefficients may be those of either model: a file of cv::fisheye has to say it.
+bool is_fisheye(const Storages& files) {
+  const std::string said = files.text("camera_model") + files.text("distortion_model");
+  return files.integer("fisheye_model").value_or(0) != 0 || said.find("fisheye") != std::string::npos ||
+         said.find("equidistant") != std::string::npos;
+}
+
+Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& names) {
+  const auto held = files.matrix(names, {9});
+  if (!held) return failure(held);
+  const auto& m = *held;
   if (!(m[0] > 0 && m[4] > 0) || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
-    return failure(ErrorCode::configuration,
-                   fmt::format("M{}: is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)", number), files.paths());
+    return files.fault(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
   }
+  return PinholeModel{m[0], m[4], m[2], m[5]};
+}
+
+Result<CameraModel> read_model(const Storages& files, const std::string& number) {
+  const auto pinhole =
+      read_camera_matrix(files, {"M" + number, "K" + number, "cameraMatrix" + number, "camera_matrix_" + number});
+  if (!pinhole) return failure(pinhole);
+  const Names names{"D" + number, "distCoeffs" + number, "dist_coeffs_" + number};
+  if (is_fisheye(files)) {
+    const auto d = files.matrix(names, {4});
+    if (!d) return failure(d);
+    return EquidistantModel(*pinhole, {(*d)[0], (*d)[1], (*d)[2], (*d)[3]});
+  }
+  const auto d = files.matrix(names, {4, 5, 8, 12, 14});
+  if (!d) return failure(d);
   RadialTangentialModel::Coefficients coefficients{};
   for (std::size_t i = 0; i < d->size(); ++i) {
     if (i < coefficients.size()) {
       coefficients[i] = (*d)[i];
     } else if ((*d)[i] != 0) {
-      return failure(ErrorCode::configuration,
-                     fmt::format("D{}: thin-prism and tilt coefficients (the 9th and on) are not supported", number),
-                     files.paths());
+      return files.fault(names, "thin-prism and tilt coefficients (the 9th and on) are not supported");
     }
   }
+  return RadialTangentialModel(*pinhole, coefficients);
+}
+
+Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::string& name) {
+  const auto r = files.matrix({name}, {3, 9});
+  if (!r) return failure(r);
+  if (r->size() == 3) {
+    const Eigen::Vector3d turn((*r)[0], (*r)[1], (*r)[2]);
+    // A rotation vector that goes round many times has lost its digits.
+    if (turn.norm() > 1e3) return files.fault({name}, "is not a rotation");
+    return exp_so3(turn);
+  }
+  const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
+  if (!is_rotation(rotation, 1e-4)) return files.fault({name}, "is not a rotation matrix");
+  return Eigen::Quaterniond(nearest_rotation(rotation));
+}
+
+// A rectified eye: its pinhole, and where it stands in the rectified frame.
+struct RectifiedEye {
+  PinholeModel pinhole;
+  Eigen::Vector3d place_m;
+};
+Result<RectifiedEye> read_projection(const Storages& files, const std::string& name) {
+  const auto held = files.matrix({name}, {12});
+  if (!held) return failure(held);
+  const auto& p = *held;
+  const bool rectified =
+      p[0] > 0 && p[5] > 0 && p[1] == 0 && p[4] == 0 && p[8] == 0 && p[9] == 0 && p[10] == 1 && p[11] == 0;
+  if (!rectified) {
+    return files.fault({name}, "is not the projection of a rectified camera (fx 0 cx tx; 0 fy cy ty; 0 0 1 0)");
+  }
+  return RectifiedEye{{p[0], p[5], p[2], p[6]}, {-p[3] / p[0], -p[7] / p[5], 0}};
+}
+
+// How the right eye stands in the rectified frame, seen from the left one.
+Result<Eigen::Vector3d> read_rectified_baseline(const Storages& files) {
+  const auto left = read_projection(files, "P1"), right = read_projection(files, "P2");
+  if (!left) return failure(left);
+  if (!right) return failure(right);
+  return Eigen::Vector3d(right->place_m - left->place_m);
+}
+
+// X_right = R X_left + T; or by the rectification, R2 X_right = R1 X_left − baseline.
+Result<Pose> read_right_from_left(const Storages& files) {
+  if (files.has("R") || files.has("T") || !files.has("P2")) {
+    const auto rotation = read_rotation(files, "R");
+    if (!rotation) return failure(rotation);
+    const auto t = files.matrix({"T"}, {3});
+    if (!t) return failure(t);
+    return Pose(*rotation, {(*t)[0], (*t)[1], (*t)[2]});
+  }
+  const auto left = read_rotation(files, "R1"), right = read_rotation(files, "R2");
+  if (!left) return failure(left);
+  if (!right) return failure(right);
+  const auto baseline = read_rectified_baseline(files);
+  if (!baseline) return failure(baseline);
+  return Pose(right->conjugate() * *left, right->conjugate() * -*baseline);
+}
+
+Camera camera_of(const char* name, ImageSize size, CameraModel model) {
   Camera camera;
   camera.name = name;
   camera.size = size;
-  camera.model = RadialTangentialModel({m[0], m[4], m[2], m[5]}, coefficients);
+  camera.model = std::move(model);
   return camera;
 }
 
-// X_right = R X_left + T.
-Result<Pose> read_right_from_left(const Storages& files) {
-  const auto r = files.matrix({"R"}, {3, 9});
-  if (!r) return failure(r);
-  const auto t = files.matrix({"T"}, {3});
-  if (!t) return failure(t);
-  const Eigen::Vector3d translation((*t)[0], (*t)[1], (*t)[2]);
-  if (r->size() == 3) return Pose(exp_so3({(*r)[0], (*r)[1], (*r)[2]}), translation);
-  const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
-  if (!is_rotation(rotation, 1e-4)) {
-    return failure(ErrorCode::configuration, "R: is not a rotation matrix", files.paths());
-  }
-  return Pose(nearest_rotation(rotation), translation);
+Result<Rig> read_unrectified(const Storages& files, ImageSize size) {
+  auto left = read_model(files, "1");
+  if (!left) return failure(std::move(left));
+  auto right = read_model(files, "2");
+  if (!right) return failure(std::move(right));
+  const auto right_from_left = read_right_from_left(files);
+  if (!right_from_left) return failure(right_from_left);
+  return rig_of_one_pair("opencv", camera_of("left", size, std::move(*left)),
+                         camera_of("right", size, std::move(*right)), *right_from_left);
+}
+
+// A file that holds P1 and P2 but no camera matrices describes the rectified pictures.
+Result<Rig> read_rectified(const Storages& files, ImageSize size) {
+  const auto left = read_projection(files, "P1"), right = read_projection(files, "P2");
+  if (!left) return failure(left);
+  if (!right) return failure(right);
+  return rig_of_one_pair("opencv", camera_of("left", size, left->pinhole), camera_of("right", size, right->pinhole),
+                         Pose::from_translation(left->place_m - right->place_m));
 }
 
 ImageSize size_in(const Storages& files, ImageSize otherwise) {
@@ -157,18 +205,12 @@ Result<Rig> read_opencv_calib(const std::string& intrinsics_path, const std::str
   }
   const ImageSize known = size_in(files, size);
   if (known.empty()) {
-    return failure(ErrorCode::configuration, "the image size is not known: image_width and image_height are missing",
-                   files.paths());
+    return rig_detail::unknown_size(files.paths());
   }
-  auto left = read_eye(files, "1", "left", known);
-  if (!left) return failure(left);
-  auto right = read_eye(files, "2", "right", known);
-  if (!right) return failure(right);
-  const auto right_from_left = read_right_from_left(files);
-  if (!right_from_left) return failure(right_from_left);
-  Rig rig = rig_of_one_pair("opencv", std::move(*left), std::move(*right), *right_from_left);
-  if (const Status status = rig.validate(files.paths()); !status) return failure(status);
-  return rig;
+  const bool raw = files.has("M1") || files.has("K1") || files.has("cameraMatrix1") || files.has("camera_matrix_1");
+  auto rig = raw || !files.has("P1") ? read_unrectified(files, known) : read_rectified(files, known);
+  if (!rig) return failure(std::move(rig));
+  return rig_detail::validated(std::move(*rig), files.paths());
 }
 
 }  // namespace spartan

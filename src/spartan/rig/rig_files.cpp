@@ -1,11 +1,14 @@
-// Which reader a calibration file belongs to.
+// Which reader a calibration belongs to.
 #include "spartan/rig/rig_files.h"
 
-#include <filesystem>
-#include <vector>
+#include <fmt/format.h>
 
-#include "spartan/core/files.h"
+#include <algorithm>
+#include <filesystem>
+
 #include "spartan/core/image_io.h"
+#include "spartan/rig/calibration_text.h"
+#include "spartan/rig/pair_of_files.h"
 
 namespace spartan {
 namespace {
@@ -17,12 +20,8 @@ bool is_there(const fs::path& path) {
   return fs::exists(path, error);
 }
 
-bool has_line(const std::string& text, const std::string& start) {
-  return text.starts_with(start) || text.find("\n" + start) != std::string::npos;
-}
-
 // The first picture of image_0 (KITTI odometry) or image_00/data (KITTI raw) beside the file.
-ImageSize size_of_pictures_beside(const fs::path& file) {
+ImageSize size_of_recording_beside(const fs::path& file) {
   for (const char* folder : {"image_0", "image_00/data", "../image_0"}) {
     std::error_code error;
     fs::path first;
@@ -37,43 +36,133 @@ ImageSize size_of_pictures_beside(const fs::path& file) {
   return {};
 }
 
-Result<Rig> read_rig_of_folder(const fs::path& folder, ImageSize size_hint) {
-  for (const char* name : {"rig.yaml", "calib.txt", "calib_cam_to_cam.txt"}) {
-    if (is_there(folder / name)) return read_rig((folder / name).string(), size_hint);
+ImageSize size_of_pictures_beside(const fs::path& file) {
+  const fs::path folder = file.parent_path();
+  return rig_detail::size_of_pictures_in(folder.empty() ? "." : folder.string());
+}
+
+// What is known of a rig whose format leaves no choice of the body.
+Result<ReadRig> with_body_note(Result<Rig> rig, CalibrationFormat format, std::vector<std::string> files,
+                               const char* body) {
+  if (!rig) return failure(std::move(rig));
+  ReadRig read{std::move(*rig), format, std::move(files), {}};
+  const bool left = read.rig.convention == PoseConvention::left_optical;
+  read.notes = {left ? "body: the left camera, turned to x forward, y left, z up" : fmt::format("body: {}", body)};
+  return read;
+}
+
+Result<ReadRig> read_opencv(const fs::path& file, ImageSize size_hint) {
+  const std::string ending = file.extension().string();
+  const fs::path intrinsics = file.parent_path() / ("intrinsics" + ending);
+  const fs::path extrinsics = file.parent_path() / ("extrinsics" + ending);
+  const bool apart =
+      (file.stem() == "intrinsics" || file.stem() == "extrinsics") && is_there(intrinsics) && is_there(extrinsics);
+  const fs::path& first = apart ? intrinsics : file;
+  if (size_hint.empty()) size_hint = size_of_pictures_beside(file);
+  std::vector<std::string> files{first.string()};
+  if (apart) files.push_back(extrinsics.string());
+  return with_body_note(read_opencv_calib(first.string(), apart ? extrinsics.string() : "", size_hint),
+                        CalibrationFormat::opencv, std::move(files), "");
+}
+
+Result<ReadRig> read_file_per_eye(CalibrationFormat format, const std::string& path, ImageSize size) {
+  const auto pair = rig_detail::find_pair_of_files(path);
+  if (!pair) return failure(pair);
+  if (format == CalibrationFormat::ros) return read_ros_calib(pair->left, pair->right);
+  if (format == CalibrationFormat::mrcal) return read_mrcal_calib(pair->left, pair->right);
+  if (size.empty()) size = size_of_pictures_beside(pair->left);
+  if (format == CalibrationFormat::tsai) return read_tsai_calib(pair->left, pair->right, size);
+  return read_cahvor_calib(pair->left, pair->right, size);
+}
+
+Result<ReadRig> read_as(CalibrationFormat format, const std::string& path, ImageSize size_hint) {
+  const fs::path file(path);
+  switch (format) {
+    case CalibrationFormat::rig_yaml: {
+      auto rig = read_rig_yaml(path);
+      if (!rig) return failure(std::move(rig));
+      return ReadRig{std::move(*rig), format, {path}, {}};
+    }
+    case CalibrationFormat::kitti:
+      return with_body_note(read_kitti_calib(path, size_hint.empty() ? size_of_recording_beside(file) : size_hint),
+                            format, {path}, "");
+    case CalibrationFormat::kitti_raw:
+      return with_body_note(read_kitti_raw_calib(path), format, {path}, "the IMU of calib_imu_to_velo.txt");
+    case CalibrationFormat::euroc: {
+      const std::string folder = fs::absolute(file).parent_path().parent_path().string();
+      return with_body_note(read_euroc_calib(folder), format, {folder}, "that of T_BS");
+    }
+    case CalibrationFormat::kalibr:
+      return read_kalibr_calib(path);
+    case CalibrationFormat::opencv:
+      return read_opencv(file, size_hint);
+    default:
+      return read_file_per_eye(format, path, size_hint);
   }
-  if (is_there(folder / "cam0" / "sensor.yaml")) return read_euroc_calib(folder.string());
-  if (is_there(folder / "mav0")) return read_euroc_calib((folder / "mav0").string());
+}
+
+// The calibration in a folder: the files that recordings have, else what can be the only one.
+Result<std::string> find_in_folder(const fs::path& folder) {
+  for (const char* name : {"rig.yaml", "calib.txt", "calib_cam_to_cam.txt", "cam0/sensor.yaml", "mav0/cam0/sensor.yaml",
+                           "intrinsics.yml", "intrinsics.xml"}) {
+    if (is_there(folder / name)) return (folder / name).string();
+  }
+  std::vector<std::string> candidates;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string(), ending = entry.path().extension().string();
+    const bool of_an_eye = ending == ".tsai" || ending == ".cahv" || ending == ".cahvor" || ending == ".cahvore" ||
+                           ending == ".cameramodel";
+    const bool whole = ending == ".yaml" && name.find("camchain") != std::string::npos;
+    const bool of_ros = name == "left.yaml" && is_there(folder / "right.yaml");
+    if (of_an_eye || whole || of_ros) candidates.push_back(entry.path().string());
+  }
+  std::sort(candidates.begin(), candidates.end());
+  if (candidates.size() == 1) return candidates.front();
+  if (candidates.size() == 2) {
+    const auto pair = rig_detail::find_pair_of_files(candidates.front());
+    if (pair) return pair->left + "," + pair->right;
+  }
+  if (!candidates.empty()) {
+    return failure(ErrorCode::configuration, "holds more than one calibration", folder.string(), "name the file");
+  }
   return failure(ErrorCode::configuration,
-                 "no calibration here: neither rig.yaml, calib.txt, calib_cam_to_cam.txt nor cam0/sensor.yaml",
+                 "no calibration here: neither rig.yaml, calib.txt, calib_cam_to_cam.txt, cam0/sensor.yaml, a camchain "
+                 "nor files of two eyes",
                  folder.string());
 }
 
 }  // namespace
 
-Result<Rig> read_rig(const std::string& path, ImageSize size_hint) {
-  const fs::path file(path);
+Result<ReadRig> read_calibration(const std::string& path, ImageSize size_hint) {
   std::error_code error;
-  if (fs::is_directory(file, error)) return read_rig_of_folder(file, size_hint);
-  auto text = read_file(path);
-  if (!text) {
-    text.error().code = ErrorCode::configuration;
-    return failure(text);
+  if (fs::is_directory(path, error)) {
+    const auto inside = find_in_folder(path);
+    if (!inside) return failure(inside);
+    return read_calibration(*inside, size_hint);
   }
-  const std::string extension = file.extension().string();
-  if (has_line(*text, "P_rect_00:")) return read_kitti_raw_calib(path);
-  if (has_line(*text, "P0:")) {
-    return read_kitti_calib(path, size_hint.empty() ? size_of_pictures_beside(file) : size_hint);
+  // Of "LEFT,RIGHT" the first one tells the format; a file whose own name has a comma is that file.
+  std::string first = path;
+  if (!is_there(path) && path.find(',') != std::string::npos) first.resize(path.find(','));
+  const auto text = rig_detail::read_calibration_text(first, rig_detail::kLargestModelFile_bytes);
+  if (!text) return failure(text);
+  const auto format = guess_format(first, *text);
+  if (!format) {
+    return failure(ErrorCode::configuration, "this is no calibration that Spartan reads", first,
+                   "known: rig.yaml, KITTI calib.txt and calib_cam_to_cam.txt, EuRoC sensor.yaml, Kalibr camchain, "
+                   "OpenCV yml or xml, ROS camera_info, mrcal .cameramodel, Ames .tsai, JPL .cahvor");
   }
-  if (has_line(*text, "T_BS:")) return read_euroc_calib((fs::absolute(file).parent_path().parent_path()).string());
-  if (has_line(*text, "schema:")) return parse_rig_yaml(*text, path);
-  if (extension == ".xml" || text->find("opencv-matrix") != std::string::npos) {
-    const fs::path extrinsics = file.parent_path() / ("extrinsics" + extension);
-    const bool apart = file.stem() == "intrinsics" && is_there(extrinsics);
-    return read_opencv_calib(path, apart ? extrinsics.string() : "", size_hint);
+  if (first != path && !has_a_file_per_eye(*format)) {
+    return failure(ErrorCode::configuration, fmt::format("{} does not have a file for each eye", name_of(*format)),
+                   path, "name one file");
   }
-  if (extension == ".yaml" || extension == ".yml") return parse_rig_yaml(*text, path);
-  return failure(ErrorCode::configuration, "this is no calibration that Spartan reads", path,
-                 "known: rig.yaml, KITTI calib.txt, KITTI calib_cam_to_cam.txt, EuRoC sensor.yaml, OpenCV yml or xml");
+  return read_as(*format, path, size_hint);
+}
+
+Result<Rig> read_rig(const std::string& path, ImageSize size_hint) {
+  auto read = read_calibration(path, size_hint);
+  if (!read) return failure(std::move(read));
+  return std::move(read->rig);
 }
 
 }  // namespace spartan

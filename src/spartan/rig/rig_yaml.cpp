@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "spartan/core/files.h"
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/rig/yaml_bridge.h"
 
@@ -17,6 +17,7 @@ using rig_detail::YamlFaults;
 using rig_detail::YamlMap;
 
 constexpr int kSchema = 1;
+constexpr std::size_t kMostEntries = 1000;  // no rig has more cameras
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr PixelLayout kLayouts[] = {PixelLayout::gray,       PixelLayout::rgb,        PixelLayout::bayer_rggb,
                                     PixelLayout::bayer_grbg, PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr};
@@ -163,6 +164,10 @@ std::vector<T> read_group(YamlMap& root, const char* key, bool required, Read re
   const auto node = required ? root.node(key) : root.optional_node(key);
   if (!node) return items;
   YamlMap group(*node, key, root.faults());
+  if (group.entries().size() > kMostEntries) {
+    root.fault(key, fmt::format("has {} entries, more than {}", group.entries().size(), kMostEntries));
+    return items;
+  }
   for (const auto& [name, entry] : group.entries()) {
     items.push_back(read(name, YamlMap(entry, group.path(name), root.faults())));
   }
@@ -249,11 +254,8 @@ Result<Rig> parse_rig_yaml(const std::string& text, const std::string& name) {
 }
 
 Result<Rig> read_rig_yaml(const std::string& path) {
-  auto text = read_file(path);
-  if (!text) {
-    text.error().code = ErrorCode::configuration;
-    return failure(text);
-  }
+  const auto text = rig_detail::read_calibration_text(path);
+  if (!text) return failure(text);
   return parse_rig_yaml(*text, path);
 }
 

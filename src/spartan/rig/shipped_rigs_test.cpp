@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "spartan/rig/describe.h"
+#include "spartan/rig/rig_differences.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/testing/real_data.h"
 
@@ -66,6 +67,19 @@ TEST(ShippedRigs, TheMastTurnsTheWidePair) {
   EXPECT_NEAR(std::asin(-look.z()), tilt, 1e-12);
   EXPECT_EQ(rig.body_from_camera("narrow_left", pan, tilt).translation(),
             rig.body_from_camera("narrow_left").translation());
+}
+
+TEST(ShippedRigs, RealRigsAreThoseOfTheirFiles) {
+  const std::string data = testing::data_folder();
+  if (!std::filesystem::exists(data + "/k10_pair"))
+    GTEST_SKIP() << "no real recordings; SPARTAN_DATA says where they are";
+  for (const auto& [name, source] : {std::pair{"kitti", "kitti_06"}, {"euroc", "euroc_v101"}, {"k10", "k10_pair"}}) {
+    const auto read = read_rig(data + "/" + source);
+    ASSERT_TRUE(read) << read.error().message();
+    for (const RigDifference& each : describe_differences(shipped(name), *read)) {
+      EXPECT_EQ(each.key, "name") << each.text << " in " << name;
+    }
+  }
 }
 
 TEST(ShippedRigs, EveryShippedRigIsRead) {

@@ -1,4 +1,4 @@
-// The "key: number number …" files of KITTI. Internal to rig.
+// The "key: number number …" files of KITTI, and the "key = number number …" files of JPL and Ames. Internal to rig.
 #pragma once
 
 #include <map>
@@ -12,15 +12,28 @@ namespace spartan::rig_detail {
 /// The lines of such a file. What a key holds is looked at only when it is asked for: other lines may say anything.
 class TextMatrices {
  public:
+  /// A line without a key, blanks at its ends removed.
+  struct Word {
+    int line = 0;
+    std::string text;
+  };
+
   /// Code `configuration` where the file cannot be read.
-  static Result<TextMatrices> read(const std::string& path);
-  static TextMatrices parse(const std::string& text, const std::string& name);
+  static Result<TextMatrices> read(const std::string& path, char separator = ':');
+  static TextMatrices parse(const std::string& text, const std::string& name, char separator = ':');
 
   bool has(const std::string& key) const { return lines_.contains(key); }
   /// Exactly `count` finite numbers; otherwise code `configuration` with "file:line" and the key.
   Result<std::vector<double>> numbers(const std::string& key, std::size_t count) const;
+  /// What stands behind the separator, blanks at its ends removed.
+  Result<std::string> text(const std::string& key) const;
+  /// The lines that hold no separator, comments (#) and empty ones left out.
+  const std::vector<Word>& words() const { return words_; }
   /// "file:line" of a key.
   std::string where(const std::string& key) const;
+  const std::string& name() const { return name_; }
+  /// "key: what" at the key's line, code `configuration`.
+  tl::unexpected<Error> fault(const std::string& key, const std::string& what) const;
 
  private:
   struct Line {
@@ -29,7 +42,9 @@ class TextMatrices {
     bool twice = false;
   };
   std::string name_;
+  char separator_ = ':';
   std::map<std::string, Line> lines_;
+  std::vector<Word> words_;
 };
 
 }  // namespace spartan::rig_detail

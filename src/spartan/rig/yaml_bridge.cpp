@@ -11,6 +11,9 @@
 namespace spartan::rig_detail {
 namespace {
 
+// A file with more faults than this is read no further by anybody.
+constexpr std::size_t kMostTold = 50;
+
 bool starts_with_key(const std::string& key, const std::string& group) {
   return group.empty() || key == group ||
          (key.size() > group.size() && key.starts_with(group) && key[group.size()] == '.');
@@ -90,7 +93,9 @@ Status YamlFaults::status() const {
   std::vector<Line> sorted = faults_;
   std::stable_sort(sorted.begin(), sorted.end(), [](const Line& a, const Line& b) { return a.number < b.number; });
   std::string text;
-  for (const Line& line : sorted) text += (text.empty() ? "" : "\n") + line.text;
+  const std::size_t told = std::min(sorted.size(), kMostTold);
+  for (std::size_t i = 0; i < told; ++i) text += (text.empty() ? "" : "\n") + sorted[i].text;
+  if (told < sorted.size()) text += fmt::format("\n{}: and {} faults more", name_, sorted.size() - told);
   return failure(ErrorCode::configuration, text);
 }
 
@@ -120,11 +125,12 @@ YamlMap::YamlMap(const YAML::Node& node, std::string key, YamlFaults& faults) : 
     faults_.add(key_, "must be a group of `key: value` lines");
     return;
   }
+  std::set<std::string> seen;
   for (const auto& entry : node) {
     faults_.saw(entry.first.IsScalar() ? path(entry.first.Scalar()) : key_, entry.first);
     if (!entry.first.IsScalar()) {
       faults_.add(key_, "a key must be a word; quote it if it reads as something else");
-    } else if (has(entry.first.Scalar())) {
+    } else if (!seen.insert(entry.first.Scalar()).second) {
       faults_.add(path(entry.first.Scalar()),
                   fmt::format("given a second time in line {}", entry.first.Mark().line + 1));
     } else {

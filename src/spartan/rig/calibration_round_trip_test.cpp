@@ -1,0 +1,231 @@
+// Random rigs through every format that can hold them, and through two in a row: nothing is lost.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+
+#include "spartan/rig/model_equivalents.h"
+#include "spartan/rig/rig_differences.h"
+#include "spartan/rig/rig_files.h"
+#include "spartan/rig/rig_writing.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using testing::TemporaryFolder;
+using Format = CalibrationFormat;
+
+struct Holder {
+  Format format;
+  const char* path;
+  std::vector<const char*> models;  // kinds below
+  bool body, left_camera;           // which frames it can say: a body of its own, the left camera's
+};
+const std::vector<Holder> kHolders{
+    {Format::rig_yaml,
+     "rig.yaml",
+     {"pinhole", "radtan4", "radtan5", "radtan8", "equidistant", "two_terms", "double_sphere", "cahv", "cahvor",
+      "cahvore"},
+     true,
+     true},
+    {Format::kitti, "calib.txt", {"pinhole"}, false, true},
+    {Format::kitti_raw, "calib_cam_to_cam.txt", {"pinhole"}, true, true},
+    {Format::euroc, "mav0", {"pinhole", "radtan4", "two_terms", "equidistant", "double_sphere"}, true, false},
+    {Format::kalibr, "camchain.yaml", {"pinhole", "radtan4", "two_terms", "equidistant", "double_sphere"}, true, true},
+    {Format::opencv,
+     "stereo.yml",
+     {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "equidistant"},
+     false,
+     true},
+    {Format::opencv,
+     "stereo.xml",
+     {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "equidistant"},
+     false,
+     true},
+    {Format::ros,
+     "camera_info.yaml",
+     {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "equidistant"},
+     false,
+     true},
+    {Format::mrcal,
+     "pair.cameramodel",
+     {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "cahvor", "cahvore"},
+     true,
+     true},
+    {Format::tsai, "pair.tsai", {"pinhole", "radtan4", "two_terms", "radtan5"}, true, true},
+    {Format::cahvor,
+     "pair.cahvor",
+     {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "cahv", "cahvor", "cahvore"},
+     true,
+     true},
+};
+
+double between(double low, double high) {
+  constexpr int kSteps = 1 << 30;
+  return low + (high - low) * *rc::gen::inRange(0, kSteps) / kSteps;
+}
+
+Eigen::Vector3d any_vector(double most) {
+  return {between(-most, most), between(-most, most), between(-most, most)};
+}
+
+// A skew for models that may have one is given by the kind "cahv" only: mrcal's files have none.
+CameraModel any_model(const std::string& kind) {
+  const PinholeModel pinhole{between(300, 1500), between(300, 1500), between(0, 1300), between(0, 1000)};
+  const auto k = [] { return between(-0.1, 0.1); };
+  const Eigen::Vector3d axis = Eigen::Vector3d(between(-0.05, 0.05), between(-0.05, 0.05), 1).normalized();
+  if (kind == "radtan4") return RadialTangentialModel(pinhole, {k(), k(), k() / 10, k() / 10});
+  if (kind == "two_terms") return RadialTangentialModel(pinhole, {k(), k()});
+  if (kind == "radtan5") return RadialTangentialModel(pinhole, {k(), k(), k() / 10, k() / 10, k()});
+  if (kind == "radtan8") return RadialTangentialModel(pinhole, {k(), k(), k() / 10, k() / 10, k(), k(), k(), k()});
+  if (kind == "equidistant") return EquidistantModel(pinhole, {k(), k(), k(), k()});
+  if (kind == "double_sphere") return DoubleSphereModel{pinhole, between(-0.5, 0.9), between(0, 1)};
+  if (kind == "cahv") return CahvModel{pinhole, between(0.001, 2)};
+  if (kind == "cahvor") return CahvorModel({pinhole, 0}, axis, {k(), k(), k()});
+  if (kind == "cahvore") {
+    const double linearity = *rc::gen::element(1.0, 0.0, between(-1, 1));
+    return CahvoreModel({pinhole, 0}, axis, {k(), k(), k()}, {k() / 10, k() / 10, k() / 10}, linearity);
+  }
+  return pinhole;
+}
+
+Camera any_camera(const char* name, const std::string& kind, ImageSize size) {
+  Camera camera;
+  camera.name = name;
+  camera.size = size;
+  camera.model = any_model(kind);
+  return camera;
+}
+
+// One pair; rectified where asked for. The body sees the left camera look forward within what REP-103 frames allow.
+Rig any_rig(const std::string& kind, bool body, bool rectified) {
+  const ImageSize size{*rc::gen::inRange(1, 5000), *rc::gen::inRange(1, 5000)};
+  Camera left = any_camera("left", kind, size), right = any_camera("right", kind, size);
+  Pose right_from_left = Pose::from_translation({-between(0.01, 2), 0, 0});
+  if (rectified) {
+    const auto of_right = std::get<PinholeModel>(right.model);
+    auto same_rows = std::get<PinholeModel>(left.model);
+    same_rows.cx = of_right.cx;
+    right.model = same_rows;
+  } else {
+    right_from_left =
+        Pose(exp_so3(any_vector(0.3)), {right_from_left.translation().x(), between(-1, 1), between(-1, 1)});
+  }
+  Rig rig = rig_of_one_pair("any", left, right, right_from_left);
+  if (!body) return rig;
+  const Pose moved(exp_so3(any_vector(0.4)), any_vector(3));
+  for (Camera& camera : rig.cameras) camera.mount_from_camera = moved * camera.mount_from_camera;
+  rig.convention = PoseConvention::body;
+  return rig;
+}
+
+Result<ReadRig> there_and_back(const Rig& rig, const Holder& holder, const TemporaryFolder& folder) {
+  const auto files = to_calibration_files(rig, holder.format, folder.path() + "/" + holder.path);
+  if (!files) return failure(files);
+  for (const CalibrationFile& file : *files) folder.write(file.path.substr(folder.path().size() + 1), file.content);
+  const bool two = has_a_file_per_eye(holder.format);
+  const std::string path = two ? (*files)[0].path + "," + (*files)[1].path : (*files)[0].path;
+  return read_calibration(path, rig.cameras[0].size);
+}
+
+std::string told(const Rig& wanted, const Rig& got) {
+  std::string text;
+  for (const RigDifference& each : describe_differences(wanted, got)) {
+    if (each.key.ends_with("name")) continue;
+    text += each.key + ": " + each.text + "\n";
+  }
+  return text;
+}
+
+// Apart from describe_differences(): the pair's geometry, and the numbers of the models.
+void expect_same(const Rig& wanted, const Rig& got) {
+  const Pose was = wanted.right_from_left(wanted.pairs[0]), is = got.right_from_left(got.pairs[0]);
+  RC_ASSERT((was.translation() - is.translation()).norm() <= 1e-12);
+  RC_ASSERT(rotation_angle(was.inverse() * is) <= 1e-12);
+  const std::vector<std::pair<std::string, std::string>> eyes{{wanted.pairs[0].left, got.pairs[0].left},
+                                                              {wanted.pairs[0].right, got.pairs[0].right}};
+  for (const auto& [a, b] : eyes) {
+    const ModelParameters numbers = parameters(plainest(wanted.find_camera(a)->model));
+    const ModelParameters others = parameters(plainest(got.find_camera(b)->model));
+    RC_ASSERT(numbers.size() == others.size());
+    for (std::size_t list = 0; list < numbers.size(); ++list) {
+      for (std::size_t i = 0; i < std::max(numbers[list].size(), others[list].size()); ++i) {
+        const double x = i < numbers[list].size() ? numbers[list][i] : 0;
+        const double y = i < others[list].size() ? others[list][i] : 0;
+        // H and V hold centre, focal length and skew together: pixels round as the longest of them.
+        const double scale = list < 3 && numbers[0][0] > 100 ? 2000 : 1;
+        RC_ASSERT(std::abs(x - y) <= 1e-12 * scale);
+      }
+    }
+  }
+}
+
+RC_GTEST_PROP(CalibrationRoundTrip, EveryFormatHoldsWhatItSaysItHolds, ()) {
+  const Holder holder = *rc::gen::elementOf(kHolders);
+  const std::string kind = *rc::gen::elementOf(holder.models);
+  const bool body = holder.body && (!holder.left_camera || *rc::gen::arbitrary<bool>());
+  const bool rectified = holder.format == Format::kitti || holder.format == Format::kitti_raw;
+  const Rig rig = any_rig(kind, body, rectified);
+  RC_PRE(rig.find_faults().empty());
+  RC_CLASSIFY(true, std::string(holder.path) + " " + kind);
+  const TemporaryFolder folder;
+  const auto read = there_and_back(rig, holder, folder);
+  if (!read) RC_FAIL(std::string(holder.path) + ", " + kind + ": " + read.error().message());
+  RC_ASSERT(read->format == holder.format);
+  const std::string lost = told(rig, read->rig);
+  if (!lost.empty()) RC_FAIL(std::string(holder.path) + ", " + kind + ": " + lost);
+  expect_same(rig, read->rig);
+}
+
+// A → B → A, where both hold the model and the frame.
+RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
+  const Holder a = *rc::gen::elementOf(kHolders), b = *rc::gen::elementOf(kHolders);
+  const std::string kind = *rc::gen::elementOf(a.models);
+  const bool held = std::any_of(b.models.begin(), b.models.end(), [&](const char* m) { return kind == m; });
+  const bool by_body = a.body && b.body, by_left = a.left_camera && b.left_camera;
+  RC_PRE(held && (by_body || by_left));
+  const auto is_kitti = [](const Holder& h) { return h.format == Format::kitti || h.format == Format::kitti_raw; };
+  const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()), is_kitti(a) || is_kitti(b));
+  RC_PRE(rig.find_faults().empty());
+  const TemporaryFolder first, second, third;
+  const auto of_a = there_and_back(rig, a, first);
+  if (!of_a) RC_FAIL(of_a.error().message());
+  const auto of_b = there_and_back(of_a->rig, b, second);
+  if (!of_b) RC_FAIL(of_b.error().message());
+  const auto again = there_and_back(of_b->rig, a, third);
+  if (!again) RC_FAIL(again.error().message());
+  const std::string lost = told(of_a->rig, again->rig);
+  if (!lost.empty()) RC_FAIL(std::string(a.path) + " → " + b.path + ", " + kind + ": " + lost);
+  expect_same(of_a->rig, again->rig);
+}
+
+// Formats without an end of cameras keep all of them.
+RC_GTEST_PROP(CalibrationRoundTrip, FurtherCamerasAreKept, ()) {
+  const Holder holder = *rc::gen::elementOf(std::vector<Holder>{kHolders[0], kHolders[3], kHolders[4]});
+  Rig rig = any_rig("radtan4", true, false);
+  const int more = *rc::gen::inRange(1, 4);
+  for (int i = 0; i < more; ++i) {
+    Camera camera = any_camera(("more" + std::to_string(i)).c_str(), "equidistant", {640, 480});
+    camera.mount_from_camera = Pose(exp_so3(any_vector(2)), any_vector(3));
+    rig.cameras.insert(rig.cameras.begin(), camera);  // in front of the pair
+  }
+  RC_PRE(rig.find_faults().empty());
+  const TemporaryFolder folder;
+  const auto read = there_and_back(rig, holder, folder);
+  if (!read) RC_FAIL(read.error().message());
+  RC_ASSERT(read->rig.cameras.size() == rig.cameras.size());
+  // Their order is that of the files: the pair first.
+  for (std::size_t i = 0; i < rig.cameras.size() && holder.format != Format::rig_yaml; ++i) {
+    const std::size_t at = (i + static_cast<std::size_t>(more)) % rig.cameras.size();
+    const Camera& camera = rig.cameras[at];
+    const Camera& kept = read->rig.cameras[i < 2 ? i : 2 + (at + 0)];
+    RC_ASSERT(kept.size == camera.size);
+    const Pose apart = camera.mount_from_camera.inverse() * kept.mount_from_camera;
+    RC_ASSERT(apart.translation().norm() <= 1e-11);
+    RC_ASSERT(rotation_angle(apart) <= 1e-11);
+  }
+}
+
+}  // namespace
+}  // namespace spartan

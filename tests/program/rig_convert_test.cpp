@@ -1,0 +1,128 @@
+// `spartan rig convert` from outside.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "program.h"
+#include "spartan/testing/real_data.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using nlohmann::json;
+using testing::content_of;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::run_program;
+
+const std::string kKitti = "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 -60 0 500 240 0 0 0 1 0\n";
+
+std::string rover() {
+  return testing::source_folder() + "/config/rigs/rover.yaml";
+}
+
+std::vector<std::string> keys_of(const json& told) {
+  std::vector<std::string> keys;
+  for (const json& each : told["lost"]) keys.push_back(each["key"]);
+  return keys;
+}
+
+TEST(RigConvert, NothingIsLostWhereNothingIs) {
+  const testing::TemporaryFolder folder;
+  const std::string kitti = folder.write("calib.txt", kKitti);
+  const auto told = run_program({"rig", "convert", kitti, folder.path() + "/rig.yaml", "--size-px", "640,480"});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.out, HasSubstr("read kitti: " + kitti));
+  EXPECT_THAT(told.out, HasSubstr("body: the left camera"));
+  EXPECT_THAT(told.out, HasSubstr("wrote rig.yaml: " + folder.path() + "/rig.yaml\nnothing lost\n"));
+  // On through a format with a file for each eye, and back.
+  const auto there = run_program({"rig", "convert", folder.path() + "/rig.yaml", folder.path() + "/pair.cahvor"});
+  EXPECT_EQ(there.exit_code, 0) << there.err;
+  EXPECT_TRUE(std::filesystem::exists(folder.path() + "/pair_left.cahvor"));
+  const auto back =
+      run_program({"rig", "convert", folder.path() + "/pair_right.cahvor", folder.path() + "/again/calib.txt"});
+  EXPECT_EQ(back.exit_code, 0) << back.err;
+  EXPECT_EQ(content_of(folder.path() + "/again/calib.txt"), kKitti);
+}
+
+TEST(RigConvert, WhatIsLostIsSaid) {
+  const testing::TemporaryFolder folder;
+  const std::string to = folder.path() + "/cameras";
+  const auto told = run_program({"rig", "convert", rover(), to, "--to", "kalibr", "--json"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const json all = json::parse(told.out);
+  EXPECT_EQ(all["schema"], 1);
+  EXPECT_EQ(all["format"], "kalibr");
+  EXPECT_EQ(all["files"], json::array({to}));
+  const auto keys = keys_of(all);
+  EXPECT_THAT(keys, ::testing::Contains("pan_tilt_units.mast"));
+  EXPECT_THAT(keys, ::testing::Contains("pairs.narrow"));
+  EXPECT_THAT(keys, ::testing::Contains("cameras.wide_left.name"));
+  EXPECT_THAT(keys, Not(::testing::Contains("cameras.wide_right.place"))) << "at the angles of rest";
+  EXPECT_THAT(keys, Not(::testing::Contains("body")));
+}
+
+TEST(RigConvert, OnePairOfMany) {
+  const testing::TemporaryFolder folder;
+  const std::string to = folder.path() + "/narrow.yml";
+  const auto all = run_program({"rig", "convert", rover(), to});
+  EXPECT_EQ(all.exit_code, 4);
+  EXPECT_THAT(all.err, HasSubstr("opencv holds one pair, this rig has 2 (choose one with --pair)"));
+  EXPECT_FALSE(std::filesystem::exists(to));
+  const auto one = run_program({"rig", "convert", rover(), to, "--pair", "narrow"});
+  EXPECT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_THAT(one.out, HasSubstr("pairs.wide: left out, as --pair says"));
+  EXPECT_EQ(run_program({"rig", "convert", rover(), to, "--pair", "top", "--force"}).exit_code, 2);
+}
+
+TEST(RigConvert, FilesThatAreThereAreKept) {
+  const testing::TemporaryFolder folder;
+  const std::string kitti = folder.write("calib.txt", kKitti), to = folder.write("rig.yaml", "mine");
+  const auto kept = run_program({"rig", "convert", kitti, to, "--size-px", "640,480"});
+  EXPECT_EQ(kept.exit_code, 5);
+  EXPECT_THAT(kept.err, HasSubstr("rig.yaml: is there already (--force writes over it)"));
+  EXPECT_EQ(content_of(to), "mine");
+  EXPECT_EQ(run_program({"rig", "convert", kitti, to, "--size-px", "640,480", "--force"}).exit_code, 0);
+  EXPECT_NE(content_of(to), "mine");
+}
+
+TEST(RigConvert, ExitCodesAsDocumented) {
+  const testing::TemporaryFolder folder;
+  const std::string kitti = folder.write("calib.txt", kKitti), to = folder.path() + "/out.yaml";
+  EXPECT_EQ(run_program({"rig", "convert", folder.path() + "/none.yaml", to}).exit_code, 3);
+  EXPECT_EQ(run_program({"rig", "convert", kitti + "," + folder.path() + "/none.tsai", to}).exit_code, 3);
+  EXPECT_EQ(run_program({"rig", "convert", kitti}).exit_code, 2);
+  EXPECT_EQ(run_program({"rig", "convert", kitti, folder.path() + "/x.odd", "--size-px", "640,480"}).exit_code, 2);
+  const auto no_size = run_program({"rig", "convert", kitti, to});
+  EXPECT_EQ(no_size.exit_code, 4);
+  EXPECT_THAT(no_size.err, HasSubstr("--size-px"));
+  const auto noise = run_program({"rig", "convert", folder.write("x.cahvor", "noise"), to});
+  EXPECT_EQ(noise.exit_code, 4);
+  EXPECT_THAT(noise.err, HasSubstr("x.cahvor"));
+  const auto unwritable = run_program({"rig", "convert", kitti, "/proc/none/rig.yaml", "--size-px", "640,480"});
+  EXPECT_EQ(unwritable.exit_code, 5) << unwritable.err;
+  testing::ProgramLimits full_disk;
+  full_disk.largest_file_bytes = 100;
+  const auto full = run_program({"rig", "convert", kitti, to, "--size-px", "640,480"}, full_disk);
+  EXPECT_EQ(full.exit_code, 5) << full.err;
+  EXPECT_FALSE(std::filesystem::exists(to));
+}
+
+TEST(RigConvert, RealCalibrations) {
+  const std::string data = testing::data_folder();
+  if (!std::filesystem::exists(data + "/k10_pair"))
+    GTEST_SKIP() << "no real recordings; SPARTAN_DATA says where they are";
+  const testing::TemporaryFolder folder;
+  for (const char* from : {"k10_pair", "kitti_06", "kitti_0013/calib_cam_to_cam.txt", "euroc_v101"}) {
+    const std::string to = folder.path() + "/" + std::filesystem::path(from).stem().string() + "_camchain.yaml";
+    const auto told = run_program({"rig", "convert", data + "/" + from, to});
+    EXPECT_EQ(told.exit_code, 0) << told.err;
+    EXPECT_THAT(told.out, HasSubstr("nothing lost"));
+  }
+}
+
+}  // namespace
+}  // namespace spartan
