@@ -19,12 +19,12 @@
 
 #include "spartan/core/image_io.h"
 #include "spartan/core/opencv_bridge.h"
+#include "spartan/core/simd_target.h"
 #include "spartan/core/threads.h"
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
-#include "spartan/reconstruction/simd_target.h"
 
 namespace {
 
