@@ -36,7 +36,8 @@ void reduce_to_luma(ImageView<const Rgb<T>> colour, ImageView<T> gray, const Wor
 /// One eye: its buffers, its table, and the steps on its way from the sensor to the rectified view.
 class EyeStage {
  public:
-  EyeStage(const Camera& camera, ImageSize result_size) : camera_(camera), mapped_(camera.size), result_(result_size) {
+  EyeStage(const Camera& camera, ImageSize result_size, DebayerMethod method)
+      : camera_(camera), debayerer_(method), mapped_(camera.size), result_(result_size) {
     const bool is_gray = camera.pixel_format.layout == PixelLayout::gray;
     if (!is_gray && camera.pixel_format.bits > 8) gray16_ = Image<std::uint16_t>(camera.size);
     if (!is_gray && camera.pixel_format.bits <= 8) gray8_ = Image<std::uint8_t>(camera.size);
@@ -84,12 +85,13 @@ class EyeStage {
     if (layout == PixelLayout::rgb) {
       reduce_to_luma<T>(image.as<Rgb<T>>(), buffer, workers);
     } else {
-      debayer(image.as<T>(), layout, buffer.view(), workers);
+      debayerer_.apply(image.as<T>(), layout, buffer.view(), workers);
     }
     return buffer;
   }
 
   Camera camera_;
+  Debayerer debayerer_;
   Image<std::uint8_t> gray8_, mapped_, result_, self_mask_;
   Image<std::uint16_t> gray16_;
   ImageView<const std::uint8_t> gray8_view_;
@@ -127,15 +129,15 @@ Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::stri
 }
 
 Result<EyeStage> make_eye(const Camera& camera, const Rectification& plan, const Eigen::Matrix3d& camera_from_rectified,
-                          const std::string& mask_folder, const Workers& workers) {
+                          const std::string& mask_folder, DebayerMethod method, const Workers& workers) {
   auto mask = load_self_mask(camera, mask_folder);
   if (!mask) return failure(mask);
   if (plan.passes_through) {
-    EyeStage eye(camera, {});
+    EyeStage eye(camera, {}, method);
     eye.set_mask(std::move(*mask));
     return eye;
   }
-  EyeStage eye(camera, plan.geometry.size);
+  EyeStage eye(camera, plan.geometry.size, method);
   eye.set_table({camera.model, camera.size, plan.geometry, camera_from_rectified, *mask, workers});
   return eye;
 }
@@ -163,9 +165,10 @@ struct Imager::State {
     if (plan->passes_through && left.size != right.size) {
       return failure(ErrorCode::configuration, "images of different size cannot be rectified already", where);
     }
-    auto left_eye = make_eye(left, *plan, plan->left_from_rectified, mask_folder, workers);
+    const auto method = options.debayer == "bilinear" ? DebayerMethod::bilinear : DebayerMethod::edge_aware;
+    auto left_eye = make_eye(left, *plan, plan->left_from_rectified, mask_folder, method, workers);
     if (!left_eye) return failure(left_eye);
-    auto right_eye = make_eye(right, *plan, plan->right_from_rectified, mask_folder, workers);
+    auto right_eye = make_eye(right, *plan, plan->right_from_rectified, mask_folder, method, workers);
     if (!right_eye) return failure(right_eye);
     pairs.emplace(pair.name, PairStage{pair, *plan, std::move(*left_eye), std::move(*right_eye),
                                        GrayHistogram(left.pixel_format), ContrastMapping(left.pixel_format)});

@@ -14,6 +14,7 @@
 namespace spartan {
 
 struct ImagingOptions {
+  std::string debayer = "bilinear";
   bool contrast = true;
   double contrast_low_percent = 0.1;
   double contrast_high_percent = 99.9;
@@ -21,6 +22,7 @@ struct ImagingOptions {
 
   template <class Visitor>
   void describe(Visitor& v) {
+    v.field("debayer", debayer, "colours out of Bayer mosaics", {"bilinear", "edge_aware"});
     v.field("contrast", contrast, "stretch the gray levels, the same way for both eyes");
     v.field("contrast_low_percent", contrast_low_percent, "share of pixels that may become black", between(0, 50));
     v.field("contrast_high_percent", contrast_high_percent, "share of pixels below white", between(50, 100));
