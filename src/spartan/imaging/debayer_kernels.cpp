@@ -136,6 +136,11 @@ void sums_of_nine(const ConstRow rows[3], int margin, int width, Row HWY_RESTRIC
   }
 }
 
+/// `chosen` where all bits of the mask are set, else `other`.
+HWY_INLINE int select(int mask, int chosen, int other) {
+  return other ^ ((other ^ chosen) & mask);
+}
+
 HWY_INLINE int rounded(float value) {
   return static_cast<int>(value + (value < 0 ? -0.5F : 0.5F));
 }
@@ -165,7 +170,7 @@ void greens(const GreenRows& r, ConstRow green, float scale, int largest, int ma
                        to_east * static_cast<float>(r.across[x] + r.across[x + 1]));
     const int own = r.mosaic[x];
     const int level = std::min(std::max(own + rounded(sum / (2 * total)), 0), largest);
-    green_out[x] = green[x] != 0 ? own : level;
+    green_out[x] = select(green[x], own, level);
     difference[x] = level - own;
   }
 }
@@ -204,18 +209,20 @@ struct ColourRows {
 };
 
 template <class T>
-void colours(const ColourRows& r, ConstRow green, float scale, int begin, int count, Colours<T>& out) {
+void colours(const ColourRows& rows, ConstRow green, float scale, int begin, int count, T* HWY_RESTRICT red_out,
+             T* HWY_RESTRICT green_out, T* HWY_RESTRICT blue_out) {
+  const ColourRows r = rows;
   for (int i = 0; i < count; ++i) {
-    const int x = begin + i, own = r.green[1][x];
+    const int x = begin + i, own = r.green[1][x], own_red = r.to_red[1][x], own_blue = r.to_blue[1][x];
     const int upright = bend(r.green[0][x], own, r.green[2][x]);
     const int beside = bend(r.green[1][x - 1], own, r.green[1][x + 1]);
-    const int red =
-        between_pairs(r.to_red[0][x], r.to_red[2][x], r.to_red[1][x - 1], r.to_red[1][x + 1], upright, beside, scale);
+    const int red = between_pairs(r.to_red[0][x], r.to_red[2][x], r.to_red[1][x - 1], r.to_red[1][x + 1], upright,
+                                  beside, scale);
     const int blue = between_pairs(r.to_blue[0][x], r.to_blue[2][x], r.to_blue[1][x - 1], r.to_blue[1][x + 1], upright,
                                    beside, scale);
-    out.r[i] = level_of<T>(own - (green[x] != 0 ? red : r.to_red[1][x]));
-    out.g[i] = level_of<T>(own);
-    out.b[i] = level_of<T>(own - (green[x] != 0 ? blue : r.to_blue[1][x]));
+    red_out[i] = level_of<T>(own - select(green[x], red, own_red));
+    green_out[i] = level_of<T>(own);
+    blue_out[i] = level_of<T>(own - select(green[x], blue, own_blue));
   }
 }
 
@@ -266,7 +273,7 @@ void edge_aware(const Band<T, Pixel>& band, BandMemory& memory) {
     Colours<T> chunk;
     for (int x = 0; x < width; x += kChunk) {
       const int count = std::min(kChunk, width - x);
-      colours(r, green(y), scale, x, count, chunk);
+      colours(r, green(y), scale, x, count, chunk.r, chunk.g, chunk.b);
       store(chunk, count, band.result.row(y) + x);
     }
   }
