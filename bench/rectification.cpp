@@ -133,7 +133,7 @@ void compare(const Scene& scene, const char* kind, const std::string& simd, int 
   using Sample = std::conditional_t<sizeof(Pixel) / kChannels == 1, std::uint8_t, std::uint16_t>;
   const spartan::Workers one(1);
   const Maps maps = maps_of(scene);
-  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.turn, {}, one, simd);
+  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.turn, {}, one, 1, simd);
   auto source = picture<Pixel, kChannels>(scene.size, sizeof(Sample) == 1 ? 255 : 65535);
   Image<Pixel> ours(scene.view.size), theirs(scene.view.size);
   const cv::Mat from = spartan::as_mat(source);

@@ -216,8 +216,8 @@ void colours(const ColourRows& rows, ConstRow green, float scale, int begin, int
     const int x = begin + i, own = r.green[1][x], own_red = r.to_red[1][x], own_blue = r.to_blue[1][x];
     const int upright = bend(r.green[0][x], own, r.green[2][x]);
     const int beside = bend(r.green[1][x - 1], own, r.green[1][x + 1]);
-    const int red = between_pairs(r.to_red[0][x], r.to_red[2][x], r.to_red[1][x - 1], r.to_red[1][x + 1], upright,
-                                  beside, scale);
+    const int red =
+        between_pairs(r.to_red[0][x], r.to_red[2][x], r.to_red[1][x - 1], r.to_red[1][x + 1], upright, beside, scale);
     const int blue = between_pairs(r.to_blue[0][x], r.to_blue[2][x], r.to_blue[1][x - 1], r.to_blue[1][x + 1], upright,
                                    beside, scale);
     red_out[i] = level_of<T>(own - select(green[x], red, own_red));

@@ -47,7 +47,7 @@ Pixel sample(ImageView<const Pixel> source, Place place, int part_x, int part_y)
 
 RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
                        const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
-                       const Workers& workers, const std::string& simd)
+                       const Workers& workers, double depth_m, const std::string& simd)
     : source_size_(source_size),
       kernel_(remap::row_kernel_for(simd_target_index(simd))),
       cells_((view.size.width + kCell - 1) / kCell, view.size.height),
@@ -77,7 +77,7 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
         for (int i = 0, x = left; i < kCell && x < view.size.width; ++i, ++x) {
           const Eigen::Vector3d direction((x - view.centre_px.x()) / view.focal_px,
                                           (y - view.centre_px.y()) / view.focal_px, 1);
-          const auto place = project(camera, camera_from_rectified * direction);
+          const auto place = project(camera, camera_from_rectified * (depth_m * direction));
           Entry& entry = entries[static_cast<std::size_t>(i)];
           if (place && on_sensor(*place)) entry = entry_of(*place);
           entry.seen = entry.seen && !masked(entry.place);

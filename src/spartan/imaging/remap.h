@@ -23,10 +23,11 @@ class RemapTable {
  public:
   /// What the view sees of the camera. `self_mask` (0: the rover itself) has the source's size or is empty.
   /// Pixels that look past the sensor, out of the model's domain or onto the masked part are invalid.
+  /// `depth_m`: of the surface for which the table is right; only cameras whose rays do not meet in one point care.
   /// `simd`: see simd_target_index(); the result is the same, bit for bit.
   RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
              const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
-             const Workers& workers, const std::string& simd = "auto");
+             const Workers& workers, double depth_m = 1, const std::string& simd = "auto");
 
   ImageSize size() const { return mask_.size(); }
   ImageSize source_size() const { return source_size_; }

@@ -149,7 +149,7 @@ CameraModel lens_for(const Case& c) {
 
 RemapTable table_for(const Case& c, const std::string& simd) {
   const RectifiedStereo view{c.view, c.focal_px, {(c.view.width - 1) / 2.0, (c.view.height - 1) / 2.0}, 0.1};
-  return {lens_for(c), c.source, view, exp_so3(c.turn).toRotationMatrix(), {}, Workers(2), simd};
+  return {lens_for(c), c.source, view, exp_so3(c.turn).toRotationMatrix(), {}, Workers(2), 1, simd};
 }
 
 TEST(RemapTable, EveryTargetGivesTheBytesOfThePlainFormula) {
