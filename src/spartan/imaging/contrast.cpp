@@ -99,7 +99,8 @@ double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
   if (ratios.size() < 5) return 1;
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
-  return std::clamp(*middle, 0.5, 2.0);
+  constexpr double kLeastDifference = 0.05;  // less comes from what only one eye sees
+  return std::abs(*middle - 1) < kLeastDifference ? 1 : std::clamp(*middle, 0.5, 2.0);
 }
 
 int GrayHistogram::percentile(double percent) const {

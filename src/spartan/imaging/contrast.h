@@ -38,8 +38,8 @@ class GrayHistogram {
 
 /// By what factor the right eye's gray levels are to be multiplied to be as bright as the left one's: the median, over
 /// the percentiles 10 … 90, of the left level over the right one. Both eyes see the same ground but for a strip at the
-/// sides, so their histograms differ by exposure and gain above all. 1 where the levels are too few or too low to tell,
-/// never outside ½ … 2. Histograms of the same depth.
+/// sides, so their histograms differ by exposure and gain above all. 1 where it is within 5 % of that or the levels are
+/// too few or too low to tell, never outside ½ … 2. Histograms of the same depth.
 double gain_between(const GrayHistogram& left, const GrayHistogram& right);
 
 /// A table from stored samples to 8-bit gray levels. Levels from `low` to `high` go linearly to 0 … 255.

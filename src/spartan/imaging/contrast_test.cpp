@@ -109,6 +109,7 @@ TEST(Contrast, TheGainBetweenTheEyesIsFound) {
   EXPECT_NEAR(gain_between(histogram_of(1), histogram_of(0.7)), 1 / 0.7, 0.01);
   EXPECT_NEAR(gain_between(histogram_of(0.7), histogram_of(1)), 0.7, 0.005);
   EXPECT_EQ(gain_between(histogram_of(1), histogram_of(1)), 1);
+  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.97)), 1) << "too little to mean anything";
   EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.4)), 2) << "no more than twice";
   EXPECT_EQ(gain_between(histogram_of(0.05), histogram_of(0.1)), 1) << "too dark to tell";
 }

@@ -41,10 +41,8 @@ void choose_mappings(PairStage& stage, const ImagingOptions& options) {
   stage.left.count(stage.left_histogram);
   stage.right.count(stage.right_histogram);
   const double gain = options.balance ? gain_between(stage.left_histogram, stage.right_histogram) : 1;
-  if (options.contrast) {
-    stage.left_histogram.add(stage.right_histogram, gain);
-    stage.left_mapping.stretch(stage.left_histogram, options.contrast_low_percent, options.contrast_high_percent);
-  }
+  stage.left_histogram.add(stage.right_histogram, gain);
+  stage.left_mapping.stretch(stage.left_histogram, options.contrast_low_percent, options.contrast_high_percent);
   stage.right_mapping.follow(stage.left_mapping, gain);
 }
 
@@ -103,7 +101,7 @@ struct Imager::State {
       right.correct_light(workers);
     });
     step("imaging.contrast", true, [&] {
-      if (options.contrast || options.balance) choose_mappings(stage, options);
+      if (options.contrast) choose_mappings(stage, options);
       left.map(stage.left_mapping, workers);
       right.map(stage.right_mapping, workers);
     });

@@ -172,7 +172,7 @@ TEST(Imager, ChoosesTheViewThatIsAskedFor) {
 TEST(Imager, UndoesTheVignettingOfTheRig) {
   Rig rig = rig_with({});
   ImagingOptions options;
-  options.contrast = false;
+  options.contrast = options.balance = false;
   const auto flat = FrameImage::own(Image<std::uint8_t>(kSize.width, kSize.height, 100), {});
   const auto corner = [&](bool undo) -> int {
     options.vignetting = undo;

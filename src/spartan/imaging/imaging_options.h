@@ -45,10 +45,10 @@ struct ViewOptions {
 };
 
 struct ImagingOptions {
-  std::string debayer = "bilinear";
+  std::string debayer = "edge_aware";
   bool vignetting = true;
-  bool balance = false;
   bool contrast = true;
+  bool balance = true;
   double contrast_low_percent = 0.1;
   double contrast_high_percent = 99.9;
   LocalContrastOptions local_contrast;
@@ -59,8 +59,9 @@ struct ImagingOptions {
   void describe(Visitor& v) {
     v.field("debayer", debayer, "how colours are made of Bayer mosaics", {"bilinear", "edge_aware"});
     v.field("vignetting", vignetting, "undo the fall-off of light that the rig states");
-    v.field("balance", balance, "scale the right eye's gray levels to the left one's, by their histograms");
     v.field("contrast", contrast, "stretch the gray levels, the same way for both eyes");
+    v.field("balance", balance,
+            "before that, scale the right eye's levels to the left one's where the histograms differ by more than 5 %");
     v.field("contrast_low_percent", contrast_low_percent, "share of pixels that may become black", between(0, 50));
     v.field("contrast_high_percent", contrast_high_percent, "share of pixels below white", between(50, 100));
     v.group("local_contrast", local_contrast);

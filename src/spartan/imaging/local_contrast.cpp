@@ -56,7 +56,7 @@ void LocalContrast::make_mapping(ImageView<const std::uint8_t> image, ImageSize 
   std::int64_t below = 0;
   for (std::size_t level = 0; level < 256; ++level) {
     below += counts[level];
-    // Ties go to the even level, so that a mapping is not brighter than the next one for the way that it is rounded.
+    // Ties go to the even level, as OpenCV rounds.
     const std::int64_t whole = 255 * below / area, twice_rest = 2 * (255 * below % area);
     const bool up = twice_rest > area || (twice_rest == area && whole % 2 == 1);
     out[level] = static_cast<std::uint8_t>(whole + (up ? 1 : 0));
@@ -80,13 +80,13 @@ void LocalContrast::apply(ImageView<const std::uint8_t> image, ImageView<std::ui
       const Between rows = tiles_around(y, tile.height);
       const std::uint8_t* const in = image.row(y);
       std::uint8_t* const out = result.row(y);
+      const std::uint8_t* const mappings[2] = {mapping(0, rows.first), mapping(0, rows.second)};
       for (int x = 0; x < image.width(); ++x) {
         const Between columns = columns_[static_cast<std::size_t>(x)];
-        const auto level = [&](int tile_x, int tile_y) { return static_cast<int>(mapping(tile_x, tile_y)[in[x]]); };
-        const int above = (kOne - columns.share) * level(columns.first, rows.first) +
-                          columns.share * level(columns.second, rows.first);
-        const int below = (kOne - columns.share) * level(columns.first, rows.second) +
-                          columns.share * level(columns.second, rows.second);
+        const int above = (kOne - columns.share) * mappings[0][256 * columns.first + in[x]] +
+                          columns.share * mappings[0][256 * columns.second + in[x]];
+        const int below = (kOne - columns.share) * mappings[1][256 * columns.first + in[x]] +
+                          columns.share * mappings[1][256 * columns.second + in[x]];
         out[x] =
             static_cast<std::uint8_t>(((kOne - rows.share) * above + rows.share * below + kHalf) >> (2 * kWeightBits));
       }
