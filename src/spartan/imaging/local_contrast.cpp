@@ -37,9 +37,11 @@ LocalContrast::LocalContrast(int tiles, double clip)
 
 void LocalContrast::make_mapping(ImageView<const std::uint8_t> image, ImageSize tile, int tile_x, int tile_y) {
   std::array<int, 256> counts{};
+  const int left = tile_x * tile.width, right = left + tile.width, inside = std::min(right, image.width());
   for (int j = 0; j < tile.height; ++j) {
     const std::uint8_t* const row = image.row(mirrored(tile_y * tile.height + j, image.height()));
-    for (int i = 0; i < tile.width; ++i) ++counts[row[mirrored(tile_x * tile.width + i, image.width())]];
+    for (int x = left; x < inside; ++x) ++counts[row[x]];
+    for (int x = std::max(left, inside); x < right; ++x) ++counts[row[mirrored(x, image.width())]];
   }
   const int area = tile.width * tile.height;
   const int most = std::max(1, static_cast<int>(clip_ * area / 256));
@@ -81,8 +83,9 @@ void LocalContrast::apply(ImageView<const std::uint8_t> image, ImageView<std::ui
       const std::uint8_t* const in = image.row(y);
       std::uint8_t* const out = result.row(y);
       const std::uint8_t* const mappings[2] = {mapping(0, rows.first), mapping(0, rows.second)};
-      for (int x = 0; x < image.width(); ++x) {
-        const Between columns = columns_[static_cast<std::size_t>(x)];
+      const Between* const around = columns_.data();
+      for (int x = 0, width = image.width(); x < width; ++x) {
+        const Between columns = around[x];
         const int above = (kOne - columns.share) * mappings[0][256 * columns.first + in[x]] +
                           columns.share * mappings[0][256 * columns.second + in[x]];
         const int below = (kOne - columns.share) * mappings[1][256 * columns.first + in[x]] +

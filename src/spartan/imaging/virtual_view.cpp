@@ -61,7 +61,7 @@ class EyeOnPlane {
 
   // The edge of the model's domain on the way from the image's middle to a pixel of its border.
   std::optional<Vector3d> outermost(const Vector2d& pixel) const {
-    if (const auto whole = direction_of(pixel)) return whole;
+    if (auto whole = direction_of(pixel)) return whole;
     const Vector2d middle((camera_.size.width - 1) / 2.0, (camera_.size.height - 1) / 2.0);
     auto found = direction_of(middle);
     double known = 0, unknown = 1;

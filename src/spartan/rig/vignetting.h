@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -19,7 +20,7 @@ struct Vignetting {
 
   double light_at(double rho_squared) const {
     double sum = 0;
-    for (auto a = coefficients.rbegin(); a != coefficients.rend(); ++a) sum = (sum + *a) * rho_squared;
+    for (std::size_t i = coefficients.size(); i-- > 0;) sum = (sum + coefficients[i]) * rho_squared;
     return 1 + sum;
   }
   friend bool operator==(const Vignetting&, const Vignetting&) = default;
