@@ -17,14 +17,13 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/image_io.h"
 #include "spartan/core/opencv_bridge.h"
+#include "spartan/core/simd_target.h"
 #include "spartan/core/threads.h"
 #include "spartan/eval/disparity_metrics.h"
-#include "spartan/eval/disparity_truth.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
-#include "spartan/reconstruction/simd_target.h"
+#include "stereo_pairs.h"
 
 namespace {
 
@@ -32,83 +31,8 @@ using spartan::Image;
 using spartan::ImageView;
 namespace fs = std::filesystem;
 
-struct Pair {
-  std::string name;
-  Image<std::uint8_t> left, right;
-  Image<float> truth;
-  Image<std::uint8_t> mask;
-  int disparities = 0;  // the search range: largest truth + 8, rounded up to a multiple of 16
-};
-
-template <class T>
-T must(spartan::Result<T> result) {
-  if (result) return std::move(*result);
-  fmt::print(stderr, "{}\n", result.error().message());
-  std::exit(3);
-}
-
-void set_search_range(Pair& pair) {
-  float largest = 0;
-  for (int y = 0; y < pair.truth.height(); ++y) {
-    for (int x = 0; x < pair.truth.width(); ++x) {
-      if (std::isfinite(pair.truth(x, y))) largest = std::max(largest, pair.truth(x, y));
-    }
-  }
-  pair.disparities = (static_cast<int>(std::ceil(largest)) + 8 + 15) / 16 * 16;
-}
-
-Pair load_middlebury(const fs::path& folder) {
-  Pair pair;
-  pair.name = folder.filename().string();
-  pair.left = must(spartan::read_gray8((folder / "view1.png").string()));
-  pair.right = must(spartan::read_gray8((folder / "view5.png").string()));
-  pair.truth = must(spartan::read_disparity((folder / "disp1.png").string(), 3));
-  const auto other = must(spartan::read_disparity((folder / "disp5.png").string(), 3));
-  pair.mask = Image<std::uint8_t>(pair.truth.size());
-  for (int y = 0; y < pair.truth.height(); ++y) {
-    for (int x = 0; x < pair.truth.width(); ++x) {
-      const float d = pair.truth(x, y);
-      if (!std::isfinite(d)) continue;
-      const int seen = x - static_cast<int>(std::lround(d));
-      const bool both = seen >= 0 && std::abs(other(seen, y) - d) <= 1.0F;
-      pair.mask(x, y) = both ? spartan::kMaskSeenByBoth : spartan::kMaskOccluded;
-    }
-  }
-  set_search_range(pair);
-  return pair;
-}
-
-Pair load_eth3d(const fs::path& folder) {
-  Pair pair;
-  pair.name = folder.filename().string();
-  pair.left = must(spartan::read_gray8((folder / "im0.png").string()));
-  pair.right = must(spartan::read_gray8((folder / "im1.png").string()));
-  pair.truth = must(spartan::read_pfm((folder / "disp0GT.pfm").string()));
-  pair.mask = must(spartan::read_truth_mask((folder / "mask0nocc.png").string()));
-  set_search_range(pair);
-  return pair;
-}
-
-std::vector<Pair> load_pairs(const fs::path& data) {
-  std::vector<fs::path> folders;
-  for (const char* set : {"middlebury", "eth3d"}) {
-    std::vector<fs::path> found;
-    for (const auto& entry : fs::directory_iterator(data / set)) {
-      if (entry.is_directory() && !fs::is_empty(entry.path()) &&
-          (fs::exists(entry.path() / "view1.png") || fs::exists(entry.path() / "im0.png"))) {
-        found.push_back(entry.path());
-      }
-    }
-    std::sort(found.begin(), found.end());
-    folders.insert(folders.end(), found.begin(), found.end());
-  }
-  std::vector<Pair> pairs;
-  pairs.reserve(folders.size());
-  for (const fs::path& folder : folders) {
-    pairs.push_back(fs::exists(folder / "view1.png") ? load_middlebury(folder) : load_eth3d(folder));
-  }
-  return pairs;
-}
+using spartan::must;
+using spartan::Pair;
 
 // OpenCV leaves the columns out whose search range leaves the picture, so it gets a border on the left.
 Image<float> opencv_disparity(const Pair& pair, int mode) {
@@ -315,7 +239,7 @@ int main(int argc, char** argv) {
     fmt::print("no stereo pairs: SPARTAN_DATA does not name the data folder\n");
     return 0;
   }
-  const std::vector<Pair> pairs = load_pairs(folder);
+  const std::vector<Pair> pairs = spartan::load_stereo_pairs(folder);
   compare_all(pairs, arguments);
   time_targets(pairs, arguments);
   return 0;

@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 
 #include "program/disparity_scores.h"
 #include "program/json.h"
+#include "program/run_arguments.h"
 #include "program/verbs.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
@@ -25,6 +27,8 @@ struct StereoArguments {
   std::string left, right, output, rig, calib, truth, mask;
   std::optional<int> min_disparity, max_disparity;
   double truth_scale = 1;
+  std::string config;
+  std::vector<std::string> set;
 };
 
 // A pair with common rows, and what is known about its cameras.
@@ -58,14 +62,14 @@ Result<Shot> load_rectified(const StereoArguments& a) {
   return shot;
 }
 
-Result<Shot> load_and_rectify(const StereoArguments& a, int threads) {
+Result<Shot> load_and_rectify(const StereoArguments& a, const ImagingOptions& options, int threads) {
   auto left = read_image(a.left);
   if (!left) return failure(left);
   auto right = read_image(a.right);
   if (!right) return failure(right);
   const auto rig = read_rig(a.rig, left->size());
   if (!rig) return failure(rig);
-  auto imager = Imager::create(*rig, ImagingOptions(), Workers(threads));
+  auto imager = Imager::create(*rig, options, Workers(threads), std::filesystem::path(a.rig).parent_path().string());
   if (!imager) return failure(imager);
   StereoFrame frame;
   frame.pair = rig->pairs.front().name;
@@ -146,9 +150,11 @@ Result<std::optional<DisparityMetrics>> score(const StereoArguments& a, ImageVie
 }
 
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
-  auto shot = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, context.threads);
+  const auto options = run_options(a.config, a.set);
+  if (!options) return failure(options);
+  auto shot = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!shot) return failure(shot);
-  DisparityComputer computer(DisparityOptions(), Workers(context.threads));
+  DisparityComputer computer(options->reconstruction, Workers(context.threads));
   const auto image =
       computer.compute(shot->left, shot->right, search_range(a, *shot), shot->left_mask, shot->right_mask);
   if (!image) {
@@ -195,6 +201,9 @@ void add_stereo(CLI::App& app, Context& context) {
   verb->add_option("--truth", a->truth, "true disparities (PFM, or PNG) to score against");
   verb->add_option("--truth-scale", a->truth_scale, "8-bit truth is divided by this");
   verb->add_option("--mask", a->mask, "255 scored and seen by both eyes, 128 occluded, 0 no truth");
+  verb->add_option("--config", a->config, "options that differ from the defaults, as for run: imaging, reconstruction");
+  verb->add_option("--set", a->set, "one option, like imaging.view.policy=all_valid; may be given again")
+      ->allow_extra_args(false);
   add_threads_option(*verb, context);
   add_json_flag(*verb, context);
 }

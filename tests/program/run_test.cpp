@@ -70,6 +70,8 @@ TEST_F(Run, LeavesTrajectoryTerrainAndSummary) {
   EXPECT_NEAR(summary["distance_m"], 0.53, 0.03);
   EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
   EXPECT_TRUE(summary["stages"].contains("odometry"));
+  EXPECT_EQ(summary["stages"]["imaging.contrast"]["count"], summary["stages"]["imaging"]["count"]);
+  EXPECT_FALSE(summary["stages"].contains("imaging.rectify")) << "the images are rectified already";
   EXPECT_TRUE(fs::exists(path("out/run.sqlite")));
   EXPECT_FALSE(fs::exists(path("out/run.sqlite-wal"))) << "the store is closed";
   EXPECT_TRUE(fs::exists(path("out/terrain/0.ply")));
@@ -188,6 +190,24 @@ TEST_F(Run, SkipsPairsOfDifferentSize) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(summary_of(path("out"))["skipped"]["wrong_size"], 1);
   EXPECT_EQ(run_program({"stereo", image(0, 5), image(1, 5), "-o", path("stereo2")}).exit_code, 3);
+}
+
+TEST_F(Run, StereoShowsTheViewThatIsAskedFor) {
+  const auto stereo = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"stereo",       image(0, 0), image(1, 0),           "-o",
+                                   path("stereo"), "--rig",     drive() + "/calib.txt"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_program(words);
+  };
+  const ProgramResult chosen =
+      stereo({"--json", "--set", "imaging.view.width_px=200", "--set", "imaging.view.policy=all_valid"});
+  ASSERT_EQ(chosen.exit_code, 0) << chosen.err;
+  EXPECT_EQ(nlohmann::json::parse(chosen.out)["width"], 200);
+  const ProgramResult impossible =
+      stereo({"--set", "imaging.view.focal_px=90000", "--set", "imaging.view.policy=whole_view"});
+  EXPECT_EQ(impossible.exit_code, 4) << impossible.err;
+  EXPECT_THAT(impossible.err, HasSubstr("not all that the eyes see fits"));
+  EXPECT_EQ(stereo({"--set", "imaging.view.policy=any"}).exit_code, 2);
 }
 
 TEST_F(Run, FailsWhereNoFrameIsUsable) {

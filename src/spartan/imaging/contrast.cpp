@@ -1,6 +1,7 @@
 #include "spartan/imaging/contrast.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace spartan {
@@ -65,6 +66,43 @@ void GrayHistogram::add(ImageView<const std::uint16_t> image) {
   total_ += area(image.size());
 }
 
+void GrayHistogram::add(const GrayHistogram& other, double gain) {
+  if (other.counts_.size() != counts_.size()) throw std::invalid_argument("contrast: the histogram has another depth");
+  const double last = static_cast<double>(counts_.size() - 1);
+  for (std::size_t level = 0; level < counts_.size(); ++level) {
+    const double scaled = std::min(static_cast<double>(level) * gain, last);
+    counts_[static_cast<std::size_t>(std::lround(scaled))] += other.counts_[level];
+  }
+  total_ += other.total_;
+}
+
+double GrayHistogram::quantile(double percent) const {
+  const double wanted = static_cast<double>(total_) * percent / 100;
+  double below = 0;
+  for (std::size_t level = 0; level < counts_.size(); ++level) {
+    const auto count = static_cast<double>(counts_[level]);
+    if (count > 0 && below + count >= wanted) return static_cast<double>(level) - 0.5 + (wanted - below) / count;
+    below += count;
+  }
+  return 0;
+}
+
+double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
+  // Below this the level of black, which nobody states, would decide.
+  const double least = left.levels() / 32.0, most = left.levels() - 1.5;
+  std::vector<double> ratios;
+  ratios.reserve(17);
+  for (int percent = 10; percent <= 90; percent += 5) {
+    const double l = left.quantile(percent), r = right.quantile(percent);
+    if (l >= least && r >= least && l < most && r < most) ratios.push_back(l / r);
+  }
+  if (ratios.size() < 5) return 1;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  constexpr double kLeastDifference = 0.05;  // less comes from what only one eye sees
+  return std::abs(*middle - 1) < kLeastDifference ? 1 : std::clamp(*middle, 0.5, 2.0);
+}
+
 int GrayHistogram::percentile(double percent) const {
   const double wanted = static_cast<double>(total_) * percent / 100;
   std::uint64_t below = 0;
@@ -97,11 +135,22 @@ void ContrastMapping::stretch(const GrayHistogram& histogram, double low_percent
   set_range(low, high);
 }
 
-void ContrastMapping::set_range(int low, int high) {
-  const int span = high - low;
-  for (int level = 0; level < static_cast<int>(table_.size()); ++level) {
-    const int inside = std::clamp(level - low, 0, span);
-    table_[static_cast<std::size_t>(level)] = static_cast<std::uint8_t>((255 * inside + span / 2) / span);
+void ContrastMapping::follow(const ContrastMapping& other, double gain) {
+  if (other.table_.size() != table_.size()) throw std::invalid_argument("contrast: the mapping has another depth");
+  set_range(other.low_, other.high_, gain);
+}
+
+void ContrastMapping::set_range(int low, int high, double gain) {
+  // In 1/256 of a level, so that a gain does not round twice.
+  constexpr int kUnit = 256;
+  low_ = low;
+  high_ = high;
+  const std::int64_t span = std::int64_t{kUnit} * (high - low);
+  for (std::size_t level = 0; level < table_.size(); ++level) {
+    const auto whole = static_cast<std::int64_t>(level) * kUnit;
+    const std::int64_t scaled = gain == 1 ? whole : std::llround(static_cast<double>(whole) * gain);
+    const std::int64_t inside = std::clamp<std::int64_t>(scaled - std::int64_t{kUnit} * low, 0, span);
+    table_[level] = static_cast<std::uint8_t>((255 * inside + span / 2) / span);
   }
 }
 

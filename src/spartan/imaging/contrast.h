@@ -10,7 +10,7 @@
 
 namespace spartan {
 
-/// How often each gray level occurs. One histogram takes both eyes of a pair, so that both are mapped alike.
+/// How often each gray level occurs. The sum of both eyes' histograms maps both alike.
 class GrayHistogram {
  public:
   /// Throws where `format` has not 8 to 16 bits.
@@ -21,8 +21,13 @@ class GrayHistogram {
   void add(ImageView<const std::uint8_t> image);
   void add(ImageView<const std::uint16_t> image);
 
+  /// All samples of another histogram of the same depth, their levels times `gain`.
+  void add(const GrayHistogram& other, double gain);
+
   /// The smallest level with more than `percent` of all samples at or below it (the largest that occurs for 100).
   int percentile(double percent) const;
+  /// The same between the levels: a level's samples fill the interval of half a level to either side evenly.
+  double quantile(double percent) const;
   int levels() const { return static_cast<int>(counts_.size()); }
 
  private:
@@ -30,6 +35,12 @@ class GrayHistogram {
   std::uint64_t total_ = 0;
   std::vector<std::uint64_t> counts_;
 };
+
+/// By what factor the right eye's gray levels are to be multiplied to be as bright as the left one's: the median, over
+/// the percentiles 10 … 90, of the left level over the right one. Both eyes see the same ground but for a strip at the
+/// sides, so their histograms differ by exposure and gain above all. 1 where it is within 5 % of that or the levels are
+/// too few or too low to tell, never outside ½ … 2. Histograms of the same depth.
+double gain_between(const GrayHistogram& left, const GrayHistogram& right);
 
 /// A table from stored samples to 8-bit gray levels. Levels from `low` to `high` go linearly to 0 … 255.
 class ContrastMapping {
@@ -41,6 +52,9 @@ class ContrastMapping {
   /// level is only scaled, and the range is never fewer than kLeastLevels levels: noise does not become a picture.
   void stretch(const GrayHistogram& histogram, double low_percent, double high_percent);
 
+  /// What `other` does, of samples that are multiplied by `gain` first.
+  void follow(const ContrastMapping& other, double gain);
+
   std::uint8_t operator()(int stored) const { return table_[static_cast<std::size_t>(stored >> shift_)]; }
   /// `result` has the size of `image`; rows are shared among the workers.
   void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
@@ -49,9 +63,10 @@ class ContrastMapping {
   static constexpr int kLeastLevels = 16;
 
  private:
-  void set_range(int low, int high);
+  void set_range(int low, int high, double gain = 1);
 
   int shift_ = 0;
+  int low_ = 0, high_ = 0;
   std::vector<std::uint8_t> table_;  ///< indexed by the sample, shifted down to its `bits`
 };
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace spartan {
 namespace {
 
@@ -83,6 +85,46 @@ TEST(Contrast, NoiseIsNotBlownUp) {
   const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);
   EXPECT_LE(mapping(103) - mapping(100), 3 * 255 / ContrastMapping::kLeastLevels + 1);
   EXPECT_NEAR(0.5 * (mapping(103) + mapping(100)), 127, 10);
+}
+
+TEST(Contrast, QuantilesLieBetweenLevels) {
+  GrayHistogram histogram({});
+  histogram.add(ramp<std::uint8_t>(10, 109).view());
+  EXPECT_NEAR(histogram.quantile(50), 59.5, 1e-9);
+  EXPECT_NEAR(histogram.quantile(0), 9.5, 1e-9);
+  EXPECT_NEAR(histogram.quantile(100), 109.5, 1e-9);
+}
+
+TEST(Contrast, TheGainBetweenTheEyesIsFound) {
+  const PixelFormat format{PixelLayout::gray, 12};
+  const auto histogram_of = [&](double factor) {
+    Image<std::uint16_t> image(100, 40);
+    for (int y = 0; y < 40; ++y) {
+      for (int x = 0; x < 100; ++x) image(x, y) = static_cast<std::uint16_t>((600 + 12 * x + 7 * y) * factor);
+    }
+    GrayHistogram histogram(format);
+    histogram.add(image);
+    return histogram;
+  };
+  EXPECT_NEAR(gain_between(histogram_of(1), histogram_of(0.7)), 1 / 0.7, 0.01);
+  EXPECT_NEAR(gain_between(histogram_of(0.7), histogram_of(1)), 0.7, 0.005);
+  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(1)), 1);
+  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.97)), 1) << "too little to mean anything";
+  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.4)), 2) << "no more than twice";
+  EXPECT_EQ(gain_between(histogram_of(0.05), histogram_of(0.1)), 1) << "too dark to tell";
+}
+
+TEST(Contrast, AFollowingMappingDoesTheSameToScaledSamples) {
+  const PixelFormat format{PixelLayout::gray, 12};
+  const auto left = ramp<std::uint16_t>(800, 2400);
+  ContrastMapping mapping = stretched<std::uint16_t>(format, left, left), follower(format);
+  follower.follow(mapping, 1.25);
+  for (int level = 0; level < 4096; ++level) {
+    if (level * 1.25 > 4095) break;
+    ASSERT_NEAR(follower(level), mapping(static_cast<int>(std::lround(level * 1.25))), 1) << level;
+  }
+  follower.follow(mapping, 1);
+  for (int level = 0; level < 4096; ++level) ASSERT_EQ(follower(level), mapping(level));
 }
 
 TEST(Contrast, StrayBitsDoNotLeaveTheTable) {

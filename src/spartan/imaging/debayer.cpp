@@ -1,106 +1,129 @@
 #include "spartan/imaging/debayer.h"
 
+#include <mutex>
 #include <stdexcept>
+#include <vector>
+
+#include "spartan/core/simd_target.h"
+#include "spartan/imaging/debayer_kernels.h"
 
 namespace spartan {
 namespace {
 
 constexpr int kRowsPerPart = 32;
+constexpr int kRowsPerBand = 64;  // a band computes up to seven rows beyond its own
 
-template <class T>
-void store(Rgb<T>& pixel, const Rgb<T>& colour) {
-  pixel = colour;
-}
-template <class T>
-void store(T& pixel, const Rgb<T>& colour) {
-  pixel = luma(colour);
-}
-
-/// Where red stands in the top-left 2×2 block.
-struct RedPlace {
-  int x, y;
-};
-
-RedPlace red_place(PixelLayout layout) {
-  switch (layout) {
-    case PixelLayout::bayer_rggb:
-      return {0, 0};
-    case PixelLayout::bayer_grbg:
-      return {1, 0};
-    case PixelLayout::bayer_gbrg:
-      return {0, 1};
-    case PixelLayout::bayer_bggr:
-      return {1, 1};
-    case PixelLayout::gray:
-    case PixelLayout::rgb:
-      break;
-  }
-  throw std::invalid_argument("debayer: the layout is no Bayer pattern");
-}
-
-template <class T>
-T mean(unsigned a, unsigned b) {
-  return static_cast<T>((a + b + 1) / 2);
-}
-template <class T>
-T mean(unsigned a, unsigned b, unsigned c, unsigned d) {
-  return static_cast<T>((a + b + c + d + 2) / 4);
-}
-
-/// One row of the mosaic between its neighbours; `red_row` tells red rows from blue ones.
-template <class T>
-struct MosaicRow {
-  const T *above, *here, *below;
-  bool red_row;
-  int red_or_blue_x;  ///< 0 or 1: the columns of the sample that is not green
-
-  Rgb<T> colour(int left, int x, int right) const {
-    if ((x & 1) == red_or_blue_x) {
-      const T own = here[x];
-      const T green = mean<T>(above[x], below[x], here[left], here[right]);
-      const T other = mean<T>(above[left], above[right], below[left], below[right]);
-      return red_row ? Rgb<T>{own, green, other} : Rgb<T>{other, green, own};
+/// Memory of bands that nobody works in at present: as many as there are threads, made once.
+class MemoryPool {
+ public:
+  std::unique_ptr<bayer::BandMemory> take(int width) {
+    const std::lock_guard lock(mutex_);
+    while (!free_.empty()) {
+      auto memory = std::move(free_.back());
+      free_.pop_back();
+      if (memory->width() == width) return memory;
     }
-    const T beside = mean<T>(here[left], here[right]), upright = mean<T>(above[x], below[x]);
-    return red_row ? Rgb<T>{beside, here[x], upright} : Rgb<T>{upright, here[x], beside};
+    return std::make_unique<bayer::BandMemory>(width);
   }
+  void give_back(std::unique_ptr<bayer::BandMemory> memory) {
+    const std::lock_guard lock(mutex_);
+    free_.push_back(std::move(memory));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<bayer::BandMemory>> free_;
 };
 
-template <class T, class Pixel>
-void debayer_any(ImageView<const T> mosaic, PixelLayout layout, ImageView<Pixel> result, const Workers& workers) {
-  const RedPlace red = red_place(layout);
-  if (mosaic.size() != result.size()) throw std::invalid_argument("debayer: the sizes differ");
-  const int width = mosaic.width(), height = mosaic.height();
-  if (width < 2 || height < 2) throw std::invalid_argument("debayer: a mosaic has at least 2 × 2 samples");
+template <class T>
+void run_bilinear(ImageView<const T> mosaic, RedPlace red, const bayer::Kernels<T>& kernels, auto result,
+                  const Workers& workers) {
+  const int height = mosaic.height();
   workers.for_each_part(0, height, kRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
-      const bool red_row = (y & 1) == red.y;
-      const MosaicRow<T> row{mosaic.row(y > 0 ? y - 1 : 1), mosaic.row(y), mosaic.row(y + 1 < height ? y + 1 : y - 1),
-                             red_row, red_row ? red.x : 1 - red.x};
-      Pixel* out = result.row(y);
-      store(out[0], row.colour(1, 0, 1));
-      for (int x = 1; x + 1 < width; ++x) store(out[x], row.colour(x - 1, x, x + 1));
-      store(out[width - 1], row.colour(width - 2, width - 1, width - 2));
+      const bayer::BilinearRow<T> row{mosaic.row(y > 0 ? y - 1 : 1),
+                                      mosaic.row(y),
+                                      mosaic.row(y + 1 < height ? y + 1 : y - 1),
+                                      mosaic.width(),
+                                      red.is_red_row(y),
+                                      red.is_green(0, y)};
+      if constexpr (std::is_same_v<decltype(result), ImageView<T>>) {
+        kernels.bilinear_luma(row, result.row(y));
+      } else {
+        kernels.bilinear_colour(row, result.row(y));
+      }
     }
+  });
+}
+
+template <class T, class Pixel>
+void run_edge_aware(ImageView<const T> mosaic, RedPlace red, const bayer::Kernels<T>& kernels, ImageView<Pixel> result,
+                    MemoryPool& pool, const Workers& workers) {
+  workers.for_each_part(0, mosaic.height(), kRowsPerBand, [&](int begin, int end) {
+    auto memory = pool.take(mosaic.width());
+    const bayer::Band<T, Pixel> band{mosaic, red, result, begin, end};
+    if constexpr (std::is_same_v<Pixel, T>) {
+      kernels.edge_aware_luma(band, *memory);
+    } else {
+      kernels.edge_aware_colour(band, *memory);
+    }
+    pool.give_back(std::move(memory));
   });
 }
 
 }  // namespace
 
-void debayer(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<Rgb8> result, const Workers& workers) {
-  debayer_any(mosaic, layout, result, workers);
+struct Debayerer::State {
+  DebayerMethod method;
+  bayer::Kernels<std::uint8_t> kernels8;
+  bayer::Kernels<std::uint16_t> kernels16;
+  MemoryPool pool;
+
+  template <class T, class Pixel>
+  void run(ImageView<const T> mosaic, PixelLayout layout, ImageView<Pixel> result, const Workers& workers) {
+    const RedPlace red = red_place(layout);
+    if (mosaic.size() != result.size()) throw std::invalid_argument("debayer: the sizes differ");
+    if (mosaic.width() < 2 || mosaic.height() < 2) {
+      throw std::invalid_argument("debayer: a mosaic has at least 2 × 2 samples");
+    }
+    const auto& kernels = [this]() -> const bayer::Kernels<T>& {
+      if constexpr (sizeof(T) == 1) {
+        return kernels8;
+      } else {
+        return kernels16;
+      }
+    }();
+    if (method == DebayerMethod::bilinear) return run_bilinear(mosaic, red, kernels, result, workers);
+    run_edge_aware(mosaic, red, kernels, result, pool, workers);
+  }
+};
+
+Debayerer::Debayerer(DebayerMethod method, const std::string& simd) : state_(std::make_unique<State>()) {
+  const std::size_t target = simd_target_index(simd);
+  state_->method = method;
+  state_->kernels8 = bayer::kernels_for<std::uint8_t>(target);
+  state_->kernels16 = bayer::kernels_for<std::uint16_t>(target);
 }
-void debayer(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<Rgb16> result,
-             const Workers& workers) {
-  debayer_any(mosaic, layout, result, workers);
+
+Debayerer::Debayerer(Debayerer&&) noexcept = default;
+Debayerer& Debayerer::operator=(Debayerer&&) noexcept = default;
+Debayerer::~Debayerer() = default;
+
+void Debayerer::apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<Rgb8> result,
+                      const Workers& workers) const {
+  state_->run(mosaic, layout, result, workers);
 }
-void debayer(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<std::uint8_t> result,
-             const Workers& workers) {
-  debayer_any(mosaic, layout, result, workers);
+void Debayerer::apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<Rgb16> result,
+                      const Workers& workers) const {
+  state_->run(mosaic, layout, result, workers);
 }
-void debayer(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<std::uint16_t> result,
-             const Workers& workers) {
-  debayer_any(mosaic, layout, result, workers);
+void Debayerer::apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<std::uint8_t> result,
+                      const Workers& workers) const {
+  state_->run(mosaic, layout, result, workers);
+}
+void Debayerer::apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<std::uint16_t> result,
+                      const Workers& workers) const {
+  state_->run(mosaic, layout, result, workers);
 }
 
 }  // namespace spartan

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <string>
 
 #include "spartan/core/image.h"
 #include "spartan/core/pixel_format.h"
@@ -9,18 +11,39 @@
 
 namespace spartan {
 
-/// Bilinear: a missing colour is the rounded mean of its two or four nearest samples; at the borders the mosaic is
-/// mirrored about its outermost samples, which keeps its phase. `result` has the size of `mosaic` (at least 2 × 2) and
-/// the same scale. Throws where sizes differ or `layout` is no Bayer pattern.
-void debayer(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<Rgb8> result, const Workers& workers);
-void debayer(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<Rgb16> result,
-             const Workers& workers);
+enum class DebayerMethod : std::uint8_t {
+  /// A missing colour is the rounded mean of its two or four nearest samples.
+  bilinear,
+  /// Green minus red or blue is interpolated along rows and along columns and mixed by how little it changes to either
+  /// side (docs/math/imaging.md); red and blue follow from green along the straighter of two directions.
+  edge_aware,
+};
 
-/// The luma of the colours that debayer() gives, without storing them.
-void debayer(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<std::uint8_t> result,
-             const Workers& workers);
-void debayer(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<std::uint16_t> result,
-             const Workers& workers);
+/// Makes colours, or the luma of the same colours, of mosaics of 8 to 16 bits. Keeps the memory that it works in; one
+/// object may serve several threads at once. At the borders the mosaic is mirrored about its outermost samples, which
+/// keeps its phase. `result` has the size of `mosaic` (at least 2 × 2) and the same scale. Throws where sizes differ or
+/// `layout` is no Bayer pattern.
+class Debayerer {
+ public:
+  /// `simd`: see simd_target_index(); the result is the same, bit for bit.
+  explicit Debayerer(DebayerMethod method = DebayerMethod::bilinear, const std::string& simd = "auto");
+  Debayerer(Debayerer&&) noexcept;
+  Debayerer& operator=(Debayerer&&) noexcept;
+  ~Debayerer();
+
+  void apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<Rgb8> result,
+             const Workers& workers) const;
+  void apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<Rgb16> result,
+             const Workers& workers) const;
+  void apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<std::uint8_t> result,
+             const Workers& workers) const;
+  void apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<std::uint16_t> result,
+             const Workers& workers) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// Luma of a colour (ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B) in 16-bit fixed point, rounded.
 template <class T>

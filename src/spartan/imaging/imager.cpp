@@ -2,142 +2,48 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <map>
-#include <optional>
 #include <stdexcept>
 
-#include "spartan/core/image_io.h"
 #include "spartan/imaging/contrast.h"
-#include "spartan/imaging/debayer.h"
+#include "spartan/imaging/eye_stage.h"
 #include "spartan/imaging/rectification.h"
-#include "spartan/imaging/remap.h"
 
 namespace spartan {
 namespace {
-
-constexpr int kRowsPerPart = 64;
-
-std::string describe(ImageSize size, const PixelFormat& format) {
-  std::string text = fmt::format("{} × {} {} of {} bits", size.width, size.height, name_of(format.layout), format.bits);
-  if (format.bits > 8) text += format.alignment == BitAlignment::high ? ", high alignment" : ", low alignment";
-  return text;
-}
-
-template <class T>
-void reduce_to_luma(ImageView<const Rgb<T>> colour, ImageView<T> gray, const Workers& workers) {
-  workers.for_each_part(0, colour.height(), kRowsPerPart, [&](int begin, int end) {
-    for (int y = begin; y < end; ++y) {
-      for (int x = 0; x < colour.width(); ++x) gray(x, y) = luma(colour(x, y));
-    }
-  });
-}
-
-/// One eye: its buffers, its table, and the steps on its way from the sensor to the rectified view.
-class EyeStage {
- public:
-  EyeStage(const Camera& camera, ImageSize result_size) : camera_(camera), mapped_(camera.size), result_(result_size) {
-    const bool is_gray = camera.pixel_format.layout == PixelLayout::gray;
-    if (!is_gray && camera.pixel_format.bits > 8) gray16_ = Image<std::uint16_t>(camera.size);
-    if (!is_gray && camera.pixel_format.bits <= 8) gray8_ = Image<std::uint8_t>(camera.size);
-  }
-
-  void set_table(RemapTable table) { table_ = std::move(table); }
-  void set_mask(Image<std::uint8_t> mask) { self_mask_ = std::move(mask); }
-  ImageView<const std::uint8_t> mask() const { return table_ ? table_->mask() : self_mask_.view(); }
-  ImageView<const std::uint8_t> result() const { return table_ ? result_.view() : mapped_.view(); }
-
-  Status check(const FrameImage& image, const std::string& where) const {
-    if (image.size() == camera_.size && image.format() == camera_.pixel_format) return {};
-    return failure(ErrorCode::input,
-                   fmt::format("the image of camera '{}' is {}, the rig says {}", camera_.name,
-                               describe(image.size(), image.format()), describe(camera_.size, camera_.pixel_format)),
-                   where, "correct size_px and the pixel format in the rig, or take images that fit");
-  }
-
-  /// Sensor → gray of the same depth, counted into the histogram.
-  void debayer_and_count(const FrameImage& image, GrayHistogram* histogram, const Workers& workers) {
-    if (camera_.pixel_format.bits > 8) {
-      gray16_view_ = to_gray<std::uint16_t>(image, gray16_, workers);
-      if (histogram) histogram->add(gray16_view_);
-    } else {
-      gray8_view_ = to_gray<std::uint8_t>(image, gray8_, workers);
-      if (histogram) histogram->add(gray8_view_);
-    }
-  }
-
-  /// Gray → 8-bit working image → rectified view.
-  void map_and_rectify(const ContrastMapping& mapping, const Workers& workers) {
-    if (camera_.pixel_format.bits > 8) {
-      mapping.apply(gray16_view_, mapped_, workers);
-    } else {
-      mapping.apply(gray8_view_, mapped_, workers);
-    }
-    if (table_) table_->apply(mapped_, result_, workers);
-  }
-
- private:
-  template <class T>
-  ImageView<const T> to_gray(const FrameImage& image, Image<T>& buffer, const Workers& workers) const {
-    const PixelLayout layout = camera_.pixel_format.layout;
-    if (layout == PixelLayout::gray) return image.as<T>();
-    if (layout == PixelLayout::rgb) {
-      reduce_to_luma<T>(image.as<Rgb<T>>(), buffer, workers);
-    } else {
-      debayer(image.as<T>(), layout, buffer.view(), workers);
-    }
-    return buffer;
-  }
-
-  Camera camera_;
-  Image<std::uint8_t> gray8_, mapped_, result_, self_mask_;
-  Image<std::uint16_t> gray16_;
-  ImageView<const std::uint8_t> gray8_view_;
-  ImageView<const std::uint16_t> gray16_view_;
-  std::optional<RemapTable> table_;
-};
 
 /// Everything that belongs to one stereo pair.
 struct PairStage {
   StereoPair pair;
   Rectification plan;
   EyeStage left, right;
-  GrayHistogram histogram;
-  ContrastMapping mapping;
+  GrayHistogram left_histogram, right_histogram;
+  ContrastMapping left_mapping, right_mapping;
 };
 
-Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::string& folder) {
-  if (camera.self_mask.empty()) return Image<std::uint8_t>();
-  const std::string path = (std::filesystem::path(folder) / camera.self_mask).string();
-  auto mask = read_gray8(path);
-  if (!mask) {
-    mask.error().code = ErrorCode::configuration;
-    return failure(mask);
+VirtualView virtual_view(const ViewOptions& options, const Camera& left) {
+  VirtualView view;
+  if (options.policy == "all_valid") view.policy = ViewPolicy::all_valid;
+  if (options.policy == "whole_view") view.policy = ViewPolicy::whole_view;
+  if (options.width_px > 0 || options.height_px > 0) {
+    view.size = {options.width_px > 0 ? options.width_px : left.size.width,
+                 options.height_px > 0 ? options.height_px : left.size.height};
   }
-  if (mask->size() != camera.size) {
-    return failure(ErrorCode::configuration,
-                   fmt::format("the self-mask is {} × {}, the camera '{}' has {} × {}", mask->width(), mask->height(),
-                               camera.name, camera.size.width, camera.size.height),
-                   path);
-  }
-  for (int y = 0; y < mask->height(); ++y) {
-    for (int x = 0; x < mask->width(); ++x) (*mask)(x, y) = (*mask)(x, y) == 0 ? 0 : 255;
-  }
-  return mask;
+  view.focal_px = options.focal_px;
+  view.depth_m = options.depth_m;
+  return view;
 }
 
-Result<EyeStage> make_eye(const Camera& camera, const Rectification& plan, const Eigen::Matrix3d& camera_from_rectified,
-                          const std::string& mask_folder, const Workers& workers) {
-  auto mask = load_self_mask(camera, mask_folder);
-  if (!mask) return failure(mask);
-  if (plan.passes_through) {
-    EyeStage eye(camera, {});
-    eye.set_mask(std::move(*mask));
-    return eye;
-  }
-  EyeStage eye(camera, plan.geometry.size);
-  eye.set_table({camera.model, camera.size, plan.geometry, camera_from_rectified, *mask, workers});
-  return eye;
+/// One mapping for both eyes, behind the factor that makes the right one as bright as the left one.
+void choose_mappings(PairStage& stage, const ImagingOptions& options) {
+  stage.left_histogram.clear();
+  stage.right_histogram.clear();
+  stage.left.count(stage.left_histogram);
+  stage.right.count(stage.right_histogram);
+  const double gain = options.balance ? gain_between(stage.left_histogram, stage.right_histogram) : 1;
+  stage.left_histogram.add(stage.right_histogram, gain);
+  stage.left_mapping.stretch(stage.left_histogram, options.contrast_low_percent, options.contrast_high_percent);
+  stage.right_mapping.follow(stage.left_mapping, gain);
 }
 
 }  // namespace
@@ -147,6 +53,7 @@ struct Imager::State {
   ImagingOptions options;
   Workers workers;
   std::map<std::string, PairStage> pairs;
+  StageClock clock;
 
   Status add_pair(const StereoPair& pair, const std::string& mask_folder) {
     const Camera& left = *rig.find_camera(pair.left);
@@ -157,26 +64,62 @@ struct Imager::State {
         left.pixel_format.alignment != right.pixel_format.alignment) {
       return failure(ErrorCode::configuration, "the two eyes have pixels of different depth", where);
     }
-    Result<Rectification> plan = options.rectify ? plan_rectification(left, right, right_from_left, where)
-                                                 : assume_rectified(left, right_from_left);
+    Result<Rectification> plan =
+        options.rectify ? plan_rectification(left, right, right_from_left, where, virtual_view(options.view, left))
+                        : assume_rectified(left, right_from_left);
     if (!plan) return failure(plan);
     if (plan->passes_through && left.size != right.size) {
       return failure(ErrorCode::configuration, "images of different size cannot be rectified already", where);
     }
-    auto left_eye = make_eye(left, *plan, plan->left_from_rectified, mask_folder, workers);
+    auto left_eye = EyeStage::create(left, *plan, plan->left_from_rectified, options, mask_folder, workers);
     if (!left_eye) return failure(left_eye);
-    auto right_eye = make_eye(right, *plan, plan->right_from_rectified, mask_folder, workers);
+    auto right_eye = EyeStage::create(right, *plan, plan->right_from_rectified, options, mask_folder, workers);
     if (!right_eye) return failure(right_eye);
-    pairs.emplace(pair.name, PairStage{pair, *plan, std::move(*left_eye), std::move(*right_eye),
-                                       GrayHistogram(left.pixel_format), ContrastMapping(left.pixel_format)});
+    const GrayHistogram histogram(left.pixel_format);
+    const ContrastMapping mapping(left.pixel_format);
+    pairs.emplace(pair.name, PairStage{pair, *plan, std::move(*left_eye), std::move(*right_eye), histogram, histogram,
+                                       mapping, mapping});
     return {};
+  }
+
+  /// The images of both eyes, step by step.
+  void process(PairStage& stage, const StereoFrame& frame) {
+    EyeStage &left = stage.left, &right = stage.right;
+    const auto step = [&](const char* name, bool wanted, auto work) {
+      if (wanted) clock.measure(name, work);
+    };
+    const auto make_gray = [&] {
+      left.make_gray(frame.left, workers);
+      right.make_gray(frame.right, workers);
+    };
+    // A gray image only has to be pointed at.
+    const bool has_colours = left.has_colours() || right.has_colours();
+    step("imaging.debayer", has_colours, make_gray);
+    if (!has_colours) make_gray();
+    step("imaging.vignetting", left.has_vignetting() || right.has_vignetting(), [&] {
+      left.correct_light(workers);
+      right.correct_light(workers);
+    });
+    step("imaging.contrast", true, [&] {
+      if (options.contrast) choose_mappings(stage, options);
+      left.map(stage.left_mapping, workers);
+      right.map(stage.right_mapping, workers);
+    });
+    step("imaging.local_contrast", left.has_local_contrast(), [&] {
+      left.equalise(workers);
+      right.equalise(workers);
+    });
+    step("imaging.rectify", left.is_resampled(), [&] {
+      left.rectify(workers);
+      right.rectify(workers);
+    });
   }
 };
 
 Result<Imager> Imager::create(const Rig& rig, const ImagingOptions& options, Workers workers,
                               const std::string& mask_folder) {
   if (Status status = rig.validate(rig.name); !status) return failure(status);
-  auto state = std::make_unique<State>(State{rig, options, std::move(workers), {}});
+  auto state = std::make_unique<State>(State{rig, options, std::move(workers), {}, {}});
   for (const StereoPair& pair : state->rig.pairs) {
     if (Status status = state->add_pair(pair, mask_folder); !status) return failure(status);
   }
@@ -197,24 +140,18 @@ Result<RectifiedPair> Imager::process(const StereoFrame& frame) {
   PairStage& stage = found->second;
   if (Status status = stage.left.check(frame.left, where); !status) return failure(status);
   if (Status status = stage.right.check(frame.right, where); !status) return failure(status);
-
-  const Workers& workers = state_->workers;
-  GrayHistogram* histogram = state_->options.contrast ? &stage.histogram : nullptr;
-  stage.histogram.clear();
-  stage.left.debayer_and_count(frame.left, histogram, workers);
-  stage.right.debayer_and_count(frame.right, histogram, workers);
-  if (histogram) {
-    stage.mapping.stretch(stage.histogram, state_->options.contrast_low_percent, state_->options.contrast_high_percent);
-  }
-  stage.left.map_and_rectify(stage.mapping, workers);
-  stage.right.map_and_rectify(stage.mapping, workers);
+  state_->process(stage, frame);
 
   const Pose body_from_camera = state_->rig.body_from_camera(stage.pair.left, frame.pan_rad, frame.tilt_rad);
-  return RectifiedPair{
-      stage.pair.name,      frame.left_stamp,
-      stage.plan.geometry,  stage.left.result(),
-      stage.right.result(), stage.left.mask(),
-      stage.right.mask(),   body_from_camera * Pose(stage.plan.left_from_rectified, Eigen::Vector3d::Zero())};
+  return RectifiedPair{stage.pair.name,
+                       frame.left_stamp,
+                       stage.plan.geometry,
+                       stage.left.result(),
+                       stage.right.result(),
+                       stage.left.mask(),
+                       stage.right.mask(),
+                       state_->clock.take(),
+                       body_from_camera * Pose(stage.plan.left_from_rectified, Eigen::Vector3d::Zero())};
 }
 
 RectifiedStereo Imager::geometry(const std::string& pair) const {

@@ -149,6 +149,99 @@ TEST(Imager, LoadsSelfMasks) {
   }
 }
 
+TEST(Imager, ChoosesTheViewThatIsAskedFor) {
+  const Rig rig = rig_with({}, {0, 0.02, 0});
+  const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
+  ImagingOptions options;
+  options.view.policy = "all_valid";
+  options.view.width_px = 100;
+  options.view.height_px = 50;
+  auto imager = Imager::create(rig, options, Workers(1));
+  ASSERT_TRUE(imager) << imager.error().message();
+  const auto pair = imager->process(frame_of(good, good));
+  ASSERT_TRUE(pair);
+  EXPECT_EQ(pair->left.size(), (ImageSize{100, 50}));
+  EXPECT_TRUE(pair->left_mask.empty());
+  EXPECT_TRUE(pair->right_mask.empty());
+  options.view.focal_px = 10;
+  const auto refused = Imager::create(rig, options, Workers(1));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+}
+
+TEST(Imager, UndoesTheVignettingOfTheRig) {
+  Rig rig = rig_with({});
+  ImagingOptions options;
+  options.contrast = options.balance = false;
+  const auto flat = FrameImage::own(Image<std::uint8_t>(kSize.width, kSize.height, 100), {});
+  const auto corner = [&](bool undo) -> int {
+    options.vignetting = undo;
+    auto imager = Imager::create(rig, options, Workers(2));
+    EXPECT_TRUE(imager);
+    const auto pair = imager->process(frame_of(flat, flat));
+    EXPECT_EQ(pair->right(0, 0), 100) << "the right eye has none";
+    EXPECT_EQ(pair->left(32, 24), 100);
+    return pair->left(0, 0);
+  };
+  rig.cameras[0].vignetting.coefficients = {-0.5};
+  EXPECT_EQ(corner(false), 100);
+  EXPECT_NEAR(corner(true), 200, 2);
+  rig.cameras[0].vignetting.coefficients = {-2};
+  EXPECT_FALSE(Imager::create(rig, options, Workers(1)));
+}
+
+TEST(Imager, BalancesTheEyes) {
+  const PixelFormat format{PixelLayout::gray, 12};
+  ImagingOptions options;
+  for (const bool balance : {false, true}) {
+    options.balance = balance;
+    auto imager = Imager::create(rig_with(format), options, Workers(2));
+    ASSERT_TRUE(imager);
+    const auto pair = imager->process(
+        frame_of(FrameImage::own(ramp<std::uint16_t>(30), format), FrameImage::own(ramp<std::uint16_t>(20), format)));
+    ASSERT_TRUE(pair);
+    const int difference = std::abs(pair->left(50, 30) - pair->right(50, 30));
+    EXPECT_TRUE(balance ? difference <= 1 : difference > 30) << difference;
+  }
+}
+
+TEST(Imager, EqualisesLocallyAfterTheStretch) {
+  ImagingOptions options;
+  const auto image = FrameImage::own(ramp<std::uint8_t>(1), {});
+  const auto result = [&](bool local, double clip) {
+    options.local_contrast = {local, 4, clip};
+    auto imager = Imager::create(rig_with({}), options, Workers(2));
+    EXPECT_TRUE(imager);
+    return Image<std::uint8_t>::copy_of(imager->process(frame_of(image, image))->left);
+  };
+  const auto plain = result(false, 2), equalised = result(true, 40);
+  EXPECT_GT(equalised(8, 11) - equalised(4, 4), plain(8, 11) - plain(4, 4));
+}
+
+TEST(Imager, TimesWhatItDid) {
+  const PixelFormat bayer{PixelLayout::bayer_grbg, 8};
+  const auto stages = [](const Rig& rig, const FrameImage& image, const ImagingOptions& options) {
+    auto imager = Imager::create(rig, options, Workers(1));
+    EXPECT_TRUE(imager);
+    std::vector<std::string> names;
+    for (int i = 0; i < 2; ++i) {
+      names.clear();
+      const auto pair = imager->process(frame_of(image, image));
+      for (const StageTime& time : pair->times) names.push_back(time.stage);
+    }
+    return names;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(stages(rig_with({}), FrameImage::own(ramp<std::uint8_t>(1), {}), {}), Names{"imaging.contrast"});
+  Rig rig = rig_with(bayer, {0, 0.02, 0});
+  rig.cameras[0].vignetting.coefficients = {-0.1};
+  ImagingOptions options;
+  options.local_contrast.enabled = true;
+  EXPECT_EQ(stages(rig, FrameImage::own(ramp<std::uint8_t>(1), bayer), options),
+            (Names{"imaging.debayer", "imaging.vignetting", "imaging.contrast", "imaging.local_contrast",
+                   "imaging.rectify"}));
+}
+
 // A pair whose eyes are turned against each other photographs the synthetic world through distorting lenses; the
 // imager must give back what ideal eyes see.
 TEST(Imager, UndoesLensesAndTurnsOfASyntheticPair) {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <vector>
 
 namespace spartan {
 namespace {
@@ -50,37 +49,6 @@ std::optional<RectifiedStereo> rectified_already(const Camera& left, const Camer
   return RectifiedStereo{left.size, l->fx, {l->cx, l->cy}, right_eye.x()};
 }
 
-/// Pixels per radian on the optical axis, the geometric mean of both directions.
-std::optional<double> resolution_on_axis(const Camera& camera) {
-  const auto projection = project_with_jacobian(camera.model, Eigen::Vector3d::UnitZ());
-  if (!projection) return std::nullopt;
-  return std::sqrt(std::abs(projection->by_point.leftCols<2>().determinant()));
-}
-
-/// Where an eye's outline lies in the rectified view at focal length 1: the mean over points along the border.
-std::optional<Eigen::Vector2d> mean_outline(const Camera& camera, const Eigen::Matrix3d& camera_from_rectified) {
-  constexpr int kPerSide = 32;
-  const double last_x = camera.size.width - 1, last_y = camera.size.height - 1;
-  std::vector<Eigen::Vector2d> border;
-  for (int i = 0; i <= kPerSide; ++i) {
-    const double part = static_cast<double>(i) / kPerSide;
-    border.insert(border.end(),
-                  {{part * last_x, 0}, {part * last_x, last_y}, {0, part * last_y}, {last_x, part * last_y}});
-  }
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  int count = 0;
-  for (const Eigen::Vector2d& pixel : border) {
-    const auto ray = unproject(camera.model, pixel);
-    if (!ray) continue;
-    const Eigen::Vector3d direction = camera_from_rectified.transpose() * ray->direction;
-    if (direction.z() < 0.1) continue;
-    sum += direction.hnormalized();
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  return sum / count;
-}
-
 Status check_baseline(const Eigen::Vector3d& right_eye, const std::string& where) {
   const auto place = fmt::format(
       "the right eye stands {:.1f} mm to the right of the left one, {:.1f} mm below and "
@@ -108,13 +76,14 @@ Status check_baseline(const Eigen::Vector3d& right_eye, const std::string& where
 }  // namespace
 
 Result<Rectification> plan_rectification(const Camera& left, const Camera& right, const Pose& right_from_left,
-                                         const std::string& where) {
+                                         const std::string& where, const VirtualView& view) {
   const Pose left_from_right = right_from_left.inverse();
   const Eigen::Vector3d& right_eye = left_from_right.translation();
   if (Status status = check_baseline(right_eye, where); !status) return failure(status);
 
   Rectification plan;
-  if (const auto geometry = rectified_already(left, right, right_from_left)) {
+  plan.depth_m = depth_of(view);
+  if (const auto geometry = rectified_already(left, right, right_from_left); geometry && !view.is_chosen()) {
     plan.geometry = *geometry;
     plan.passes_through = true;
     return plan;
@@ -135,17 +104,10 @@ Result<Rectification> plan_rectification(const Camera& left, const Camera& right
   plan.left_from_rectified << x, z.cross(x), z;
   plan.right_from_rectified = right_from_left.rotation_matrix() * plan.left_from_rectified;
 
-  const auto left_resolution = resolution_on_axis(left), right_resolution = resolution_on_axis(right);
-  const auto left_outline = mean_outline(left, plan.left_from_rectified);
-  const auto right_outline = mean_outline(right, plan.right_from_rectified);
-  if (!left_resolution || !right_resolution || !left_outline || !right_outline) {
-    return failure(ErrorCode::configuration, "the two eyes have no common view", where);
-  }
-  plan.geometry.size = left.size;
-  plan.geometry.focal_px = (*left_resolution + *right_resolution) / 2;
+  auto geometry = choose_view({left, plan.left_from_rectified}, {right, plan.right_from_rectified}, view, where);
+  if (!geometry) return failure(geometry);
+  plan.geometry = *geometry;
   plan.geometry.baseline_m = right_eye.norm();
-  const Eigen::Vector2d middle((left.size.width - 1) / 2.0, (left.size.height - 1) / 2.0);
-  plan.geometry.centre_px = middle - plan.geometry.focal_px * (*left_outline + *right_outline) / 2;
   return plan;
 }
 

@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"
+#include "spartan/core/stage_clock.h"
 #include "spartan/core/time.h"
 #include "spartan/rig/rectified_stereo.h"
 
@@ -20,7 +22,8 @@ struct RectifiedPair {
   ImageView<const std::uint8_t> left, right;
   /// 255 where a camera has really looked and does not see the rover itself; empty: everywhere.
   ImageView<const std::uint8_t> left_mask, right_mask;
-  Pose body_from_left;  ///< rectified left optical frame at this shot's pan and tilt
+  std::vector<StageTime> times;  ///< "imaging.debayer" …, of what was done; for reports only
+  Pose body_from_left;           ///< rectified left optical frame at this shot's pan and tilt
 };
 
 }  // namespace spartan

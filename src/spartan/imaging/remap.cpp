@@ -6,18 +6,53 @@
 #include <limits>
 #include <stdexcept>
 
+#include "spartan/core/simd_target.h"
+
 namespace spartan {
 namespace {
 
+using remap::Cell;
+using remap::kBlock;
+using remap::kCell;
+using remap::kOne;
+using remap::Place;
+
 constexpr int kRowsPerPart = 16;
-constexpr int kOne = 1 << RemapTable::kFractionBits;
+
+template <class T>
+T between(const T& s00, const T& s10, const T& s01, const T& s11, int part_x, int part_y) {
+  return static_cast<T>(remap::interpolate(s00, s10, s01, s11, part_x, part_y));
+}
+template <class T>
+Rgb<T> between(const Rgb<T>& s00, const Rgb<T>& s10, const Rgb<T>& s01, const Rgb<T>& s11, int part_x, int part_y) {
+  return {between(s00.r, s10.r, s01.r, s11.r, part_x, part_y), between(s00.g, s10.g, s01.g, s11.g, part_x, part_y),
+          between(s00.b, s10.b, s01.b, s11.b, part_x, part_y)};
+}
+
+/// Of a pixel that is not in a scattered block.
+Place place_of(const Cell& cell, int at) {
+  const Place corner = cell.corners[at / kBlock];
+  return {static_cast<std::int16_t>(corner.x + (cell.codes[at] & 15)),
+          static_cast<std::int16_t>(corner.y + (cell.codes[at] >> 4))};
+}
+
+template <class Pixel>
+Pixel sample(ImageView<const Pixel> source, Place place, int part_x, int part_y) {
+  const Pixel* const p = source.row(place.y) + place.x;
+  const Pixel* const q = place.y + 1 < source.height() ? p + source.stride() : p;
+  return between(p[0], p[1], q[0], q[1], part_x, part_y);
+}
 
 }  // namespace
 
 RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
                        const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
-                       const Workers& workers)
-    : source_size_(source_size), entries_(view.size), mask_(view.size) {
+                       const Workers& workers, double depth_m, const std::string& simd)
+    : source_size_(source_size),
+      kernel_(remap::row_kernel_for(simd_target_index(simd))),
+      cells_((view.size.width + kCell - 1) / kCell, view.size.height),
+      scattered_(static_cast<std::size_t>(view.size.height)),
+      mask_(view.size) {
   constexpr int kLargest = std::numeric_limits<std::int16_t>::max();
   if (source_size.width < 2 || source_size.height < 2 || std::max(source_size.width, source_size.height) > kLargest) {
     throw std::invalid_argument("RemapTable: the source must be between 2 × 2 and 32767 × 32767 pixels");
@@ -25,26 +60,33 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
   if (!self_mask.empty() && self_mask.size() != source_size) {
     throw std::invalid_argument("RemapTable: the self-mask has another size than the source");
   }
-  const auto seen = [&](const Eigen::Vector2d& place) {
+  const auto on_sensor = [&](const Eigen::Vector2d& place) {
     return place.x() >= 0 && place.y() >= 0 && place.x() <= source_size.width - 1 &&
            place.y() <= source_size.height - 1;
   };
-  const auto masked = [&](const Entry& e) {
-    return !self_mask.empty() && (self_mask(e.x, e.y) == 0 || self_mask(e.x + 1, e.y) == 0 ||
-                                  self_mask(e.x, e.y + 1) == 0 || self_mask(e.x + 1, e.y + 1) == 0);
+  const auto masked = [&](Place p) {
+    const int below = std::min(p.y + 1, source_size.height - 1);
+    return !self_mask.empty() && (self_mask(p.x, p.y) == 0 || self_mask(p.x + 1, p.y) == 0 ||
+                                  self_mask(p.x, below) == 0 || self_mask(p.x + 1, below) == 0);
   };
   std::atomic<bool> all_valid = true;
   workers.for_each_part(0, view.size.height, kRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
-      for (int x = 0; x < view.size.width; ++x) {
-        const Eigen::Vector3d direction((x - view.centre_px.x()) / view.focal_px,
-                                        (y - view.centre_px.y()) / view.focal_px, 1);
-        const auto place = project(camera, camera_from_rectified * direction);
-        if (place && seen(*place)) {
-          entries_(x, y) = entry_of(*place);
-          mask_(x, y) = masked(entries_(x, y)) ? 0 : 255;
+      for (int left = 0; left < view.size.width; left += kCell) {
+        CellEntries entries{};
+        for (int i = 0, x = left; i < kCell && x < view.size.width; ++i, ++x) {
+          const Eigen::Vector3d direction((x - view.centre_px.x()) / view.focal_px,
+                                          (y - view.centre_px.y()) / view.focal_px, 1);
+          const auto place = project(camera, camera_from_rectified * (depth_m * direction));
+          Entry& entry = entries[static_cast<std::size_t>(i)];
+          if (place && on_sensor(*place)) entry = entry_of(*place);
+          entry.seen = entry.seen && !masked(entry.place);
+          mask_(x, y) = entry.seen ? 255 : 0;
+          if (!entry.seen) all_valid = false;
         }
-        if (mask_(x, y) == 0) all_valid = false;
+        for (int i = 0; i < kCell; i += kBlock) {
+          store_block(left + i, y, std::span(entries).subspan(static_cast<std::size_t>(i), kBlock));
+        }
       }
     }
   });
@@ -54,39 +96,113 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
 RemapTable::Entry RemapTable::entry_of(const Eigen::Vector2d& place) const {
   const int fixed_x = static_cast<int>(std::lround(place.x() * kOne));
   const int fixed_y = static_cast<int>(std::lround(place.y() * kOne));
-  // The last column is the whole way from the one before: the four neighbours then always exist.
-  const int x = std::min(fixed_x / kOne, source_size_.width - 2), y = std::min(fixed_y / kOne, source_size_.height - 2);
-  return {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), static_cast<std::uint8_t>(fixed_x - x * kOne),
-          static_cast<std::uint8_t>(fixed_y - y * kOne)};
+  // The last column is the whole way from the one before: the neighbour then always exists.
+  const int x = std::min(fixed_x / kOne, source_size_.width - 2), y = fixed_y / kOne;
+  return {{static_cast<std::int16_t>(x), static_cast<std::int16_t>(y)},
+          static_cast<std::uint8_t>(fixed_x - x * kOne),
+          static_cast<std::uint8_t>(fixed_y - y * kOne),
+          true};
+}
+
+void RemapTable::store_block(int x, int y, std::span<const Entry> entries) {
+  int left = source_size_.width, right = -1, first = source_size_.height, last = -1;
+  for (const Entry& e : entries) {
+    if (!e.seen) continue;
+    left = std::min<int>(left, e.place.x);
+    right = std::max<int>(right, e.place.x);
+    first = std::min<int>(first, e.place.y);
+    last = std::max<int>(last, e.place.y);
+  }
+  const bool any = right >= 0;
+  // Every load stays inside its row.
+  const int corner_x = any ? std::clamp(left, 0, std::max(0, source_size_.width - remap::kLoad)) : 0;
+  const int corner_y = any ? first : 0;
+  const bool scattered =
+      source_size_.width < remap::kLoad || right - corner_x > remap::kLoad - 2 || last - corner_y > remap::kLargestStep;
+  Cell& cell = cells_(x / kCell, y);
+  const int block = x % kCell / kBlock;
+  cell.corners[block] = {static_cast<std::int16_t>(corner_x), static_cast<std::int16_t>(corner_y)};
+  cell.kinds[block] = scattered ? remap::kScattered : static_cast<std::uint8_t>(std::max(0, last - corner_y - 1));
+  Scattered far{x, {}};
+  for (int i = 0; i < kBlock; ++i) {
+    const Entry& e = entries[static_cast<std::size_t>(i)];
+    const int at = x % kCell + i;
+    const int code = scattered ? 0 : 16 * (e.place.y - corner_y) + e.place.x - corner_x;
+    cell.codes[at] = e.seen ? static_cast<std::uint8_t>(code) : remap::kUnseen;
+    cell.part_x[at] = e.part_x;
+    cell.part_y[at] = e.part_y;
+    far.places[static_cast<std::size_t>(i)] = e.place;
+  }
+  if (scattered) scattered_[static_cast<std::size_t>(y)].push_back(far);
 }
 
 Eigen::Vector2d RemapTable::source_of(int x, int y) const {
-  const Entry& e = entries_(x, y);
-  return {e.x + e.part_x / static_cast<double>(kOne), e.y + e.part_y / static_cast<double>(kOne)};
+  const Cell& cell = cells_(x / kCell, y);
+  const int at = x % kCell, block = at / kBlock;
+  Place place = place_of(cell, at);
+  if (cell.kinds[block] == remap::kScattered) {
+    const auto& far = scattered_[static_cast<std::size_t>(y)];
+    place = std::find_if(far.begin(), far.end(), [&](const Scattered& s) {
+              return s.x == x / kBlock * kBlock;
+            })->places[static_cast<std::size_t>(x % kBlock)];
+  }
+  return {place.x + cell.part_x[at] / static_cast<double>(kOne), place.y + cell.part_y[at] / static_cast<double>(kOne)};
+}
+
+std::size_t RemapTable::bytes() const {
+  std::size_t count = static_cast<std::size_t>(cells_.stride() * cells_.height()) * sizeof(Cell);
+  for (const auto& of_row : scattered_) count += of_row.size() * sizeof(Scattered);
+  return count;
+}
+
+template <class Pixel>
+void RemapTable::apply_row(int y, ImageView<const Pixel> source, Pixel* out) const {
+  const Cell* const cells = cells_.row(y);
+  if constexpr (std::is_same_v<Pixel, std::uint8_t>) {
+    kernel_(cells, size().width, {source.data(), source.stride(), source.height()}, out);
+  } else {
+    for (int x = 0; x < size().width; ++x) {
+      const Cell& cell = cells[x / kCell];
+      const int at = x % kCell;
+      if (cell.kinds[at / kBlock] == remap::kScattered) continue;
+      out[x] = cell.codes[at] == remap::kUnseen ? Pixel{}
+                                                : sample(source, place_of(cell, at), cell.part_x[at], cell.part_y[at]);
+    }
+  }
+  for (const Scattered& far : scattered_[static_cast<std::size_t>(y)]) {
+    for (int i = 0; i < kBlock && far.x + i < size().width; ++i) {
+      const Cell& cell = cells[far.x / kCell];
+      const int at = far.x % kCell + i;
+      out[far.x + i] = cell.codes[at] == remap::kUnseen
+                           ? Pixel{}
+                           : sample(source, far.places[static_cast<std::size_t>(i)], cell.part_x[at], cell.part_y[at]);
+    }
+  }
+}
+
+template <class Pixel>
+void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> result, const Workers& workers) const {
+  if (source.size() != source_size_ || result.size() != size()) {
+    throw std::invalid_argument("RemapTable: the images have other sizes than the table");
+  }
+  workers.for_each_part(0, result.height(), kRowsPerPart, [&](int begin, int end) {
+    for (int y = begin; y < end; ++y) apply_row(y, source, result.row(y));
+  });
 }
 
 void RemapTable::apply(ImageView<const std::uint8_t> source, ImageView<std::uint8_t> result,
                        const Workers& workers) const {
-  if (source.size() != source_size_ || result.size() != size()) {
-    throw std::invalid_argument("RemapTable: the images have other sizes than the table");
-  }
-  constexpr int kShift = 2 * kFractionBits, kHalf = 1 << (kShift - 1);
-  const std::ptrdiff_t stride = source.stride();
-  workers.for_each_part(0, result.height(), kRowsPerPart, [&](int begin, int end) {
-    for (int y = begin; y < end; ++y) {
-      const Entry* entries = entries_.row(y);
-      const std::uint8_t* mask = mask_.row(y);
-      std::uint8_t* out = result.row(y);
-      for (int x = 0; x < result.width(); ++x) {
-        const Entry e = entries[x];
-        const std::uint8_t* p = source.data() + e.y * stride + e.x;
-        const int above = (kOne - e.part_x) * p[0] + e.part_x * p[1];
-        const int below = (kOne - e.part_x) * p[stride] + e.part_x * p[stride + 1];
-        const int level = ((kOne - e.part_y) * above + e.part_y * below + kHalf) >> kShift;
-        out[x] = static_cast<std::uint8_t>(level & mask[x]);
-      }
-    }
-  });
+  apply_any(source, result, workers);
+}
+void RemapTable::apply(ImageView<const std::uint16_t> source, ImageView<std::uint16_t> result,
+                       const Workers& workers) const {
+  apply_any(source, result, workers);
+}
+void RemapTable::apply(ImageView<const Rgb8> source, ImageView<Rgb8> result, const Workers& workers) const {
+  apply_any(source, result, workers);
+}
+void RemapTable::apply(ImageView<const Rgb16> source, ImageView<Rgb16> result, const Workers& workers) const {
+  apply_any(source, result, workers);
 }
 
 }  // namespace spartan

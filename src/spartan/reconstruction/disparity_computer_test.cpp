@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "spartan/core/random.h"
+#include "spartan/core/simd_target.h"
 #include "spartan/reconstruction/disparity_options.h"
-#include "spartan/reconstruction/simd_target.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/synthetic_world.h"
 

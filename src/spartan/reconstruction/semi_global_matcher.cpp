@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "spartan/reconstruction/simd_target.h"
+#include "spartan/core/simd_target.h"
 #include "spartan/reconstruction/subpixel.h"
 
 namespace spartan {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "spartan/core/random.h"
+#include "spartan/core/simd_target.h"
 #include "spartan/reconstruction/sgm_reference.h"
-#include "spartan/reconstruction/simd_target.h"
 
 namespace spartan::sgm {
 namespace {

@@ -92,6 +92,7 @@ std::string describe_place(const Rig& rig, const Camera& camera) {
 std::string describe_camera(const Rig& rig, const Camera& c) {
   std::string pixels{name_of(c.pixel_format.layout)};
   if (c.pixel_format.bits != 8) pixels += fmt::format(" of {} bits", c.pixel_format.bits);
+  if (!c.vignetting.coefficients.empty()) pixels += ", with vignetting";
   if (!c.self_mask.empty()) pixels += ", with a self-mask";
   return fmt::format("camera {}: {}, {} x {} px, {}; view {:.2f}° x {:.2f}°, {:.1f} px per radian in the middle; {}",
                      c.name, name_of(c.model), c.size.width, c.size.height, pixels, horizontal_view_deg(c),

@@ -111,6 +111,12 @@ class FaultFinder {
     if (camera.pixel_format.bits < 8 || camera.pixel_format.bits > 16) {
       add(key + ".bits", fmt::format("is {}, must be between 8 and 16", camera.pixel_format.bits));
     }
+    for (const double v : camera.vignetting.coefficients) {
+      if (!std::isfinite(v)) add(key + ".vignetting", "must be finite");
+    }
+    if (camera.vignetting.centre_px && !camera.vignetting.centre_px->allFinite()) {
+      add(key + ".vignetting_centre_px", "must be finite");
+    }
     if (camera.mount != "body" && !find_named(rig_.pan_tilt_units, camera.mount)) {
       add(key + ".mount", fmt::format("'{}' is neither 'body' nor a pan-tilt unit of this rig", camera.mount));
     }
@@ -157,7 +163,8 @@ bool operator==(const PanTiltUnit& a, const PanTiltUnit& b) {
 
 bool operator==(const Camera& a, const Camera& b) {
   return a.name == b.name && a.size == b.size && a.model == b.model && a.pixel_format == b.pixel_format &&
-         a.self_mask == b.self_mask && a.mount == b.mount && same(a.mount_from_camera, b.mount_from_camera);
+         a.vignetting == b.vignetting && a.self_mask == b.self_mask && a.mount == b.mount &&
+         same(a.mount_from_camera, b.mount_from_camera);
 }
 
 const Camera* Rig::find_camera(const std::string& camera) const {

@@ -10,6 +10,7 @@
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
 #include "spartan/rig/camera_model.h"
+#include "spartan/rig/vignetting.h"
 
 namespace spartan {
 
@@ -30,6 +31,7 @@ struct Camera {
   ImageSize size;
   CameraModel model;
   PixelFormat pixel_format;    ///< what its images hold; `gray` of 8 bits unless the rig says otherwise
+  Vignetting vignetting;       ///< undone by imaging
   std::string self_mask;       ///< picture file, 0 where the rover sees itself; empty: none. Relative to the rig file
   std::string mount = "body";  ///< "body" or the name of a pan-tilt unit
   Pose mount_from_camera;      ///< camera: optical frame (x right, y down, z forward)

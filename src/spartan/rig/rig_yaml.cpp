@@ -134,9 +134,16 @@ Camera read_camera(const std::string& name, YamlMap map) {
   }
   camera.model = read_model(map);
   camera.pixel_format = read_pixel_format(map);
+  if (map.has("vignetting")) {
+    camera.vignetting.coefficients = map.numbers("vignetting", {1, 2, 3}).value_or(std::vector<double>());
+  }
+  if (map.has("vignetting_centre_px")) {
+    const auto centre = map.numbers("vignetting_centre_px", {2});
+    if (centre) camera.vignetting.centre_px = Eigen::Vector2d((*centre)[0], (*centre)[1]);
+  }
   if (map.has("self_mask")) camera.self_mask = map.text("self_mask").value_or("");
   if (map.has("mount")) camera.mount = map.text("mount").value_or(camera.mount);
-  for (const char* key : {"self_mask", "mount"}) (void)map.optional_node(key);
+  for (const char* key : {"vignetting", "vignetting_centre_px", "self_mask", "mount"}) (void)map.optional_node(key);
   // Which way an unturned camera looks is said, never guessed.
   const auto axes = map.choice("axes", {"optical", "forward"});
   camera.mount_from_camera = read_pose(map);
@@ -231,6 +238,12 @@ std::string camera_lines(const Camera& camera) {
   text +=
       fmt::format("    pixel_layout: {}\n    bits: {}\n    bit_alignment: {}\n", name_of(camera.pixel_format.layout),
                   camera.pixel_format.bits, camera.pixel_format.alignment == BitAlignment::high ? "high" : "low");
+  if (!camera.vignetting.coefficients.empty()) {
+    text += fmt::format("    vignetting: [{}]\n", fmt::join(camera.vignetting.coefficients, ", "));
+  }
+  if (camera.vignetting.centre_px) {
+    text += fmt::format("    vignetting_centre_px: {}\n", list(*camera.vignetting.centre_px));
+  }
   if (!camera.self_mask.empty()) text += fmt::format("    self_mask: {}\n", quoted(camera.self_mask));
   return text + fmt::format("    mount: {}\n    axes: optical\n{}", quoted(camera.mount),
                             pose_lines(camera.mount_from_camera));

@@ -44,6 +44,17 @@ std::string complaint(const std::string& what, const std::string& with) {
   return rig.error().message();
 }
 
+TEST(RigYaml, ReadsVignetting) {
+  const auto rig = parse_rig_yaml(
+      replaced(kGood, "axes: optical, ", "vignetting: [-0.3, 0.05], vignetting_centre_px: [30, 20.5], axes: optical, "),
+      "my.yaml");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->cameras[0].vignetting, (Vignetting{{-0.3, 0.05}, Eigen::Vector2d(30, 20.5)}));
+  EXPECT_EQ(rig->cameras[1].vignetting, Vignetting());
+  EXPECT_THAT(complaint("axes: optical, ", "vignetting: [], axes: optical, "), HasSubstr("cameras.l.vignetting"));
+  EXPECT_THAT(complaint("axes: optical, ", "vignetting: [.nan], axes: optical, "), HasSubstr("cameras.l.vignetting"));
+}
+
 TEST(RigYaml, ReadsTheShortestFile) {
   const auto rig = parse_rig_yaml(kGood, "some/my.yaml");
   ASSERT_TRUE(rig) << rig.error().message();
@@ -100,6 +111,8 @@ TEST(RigYaml, TheDocumentNamesEveryKey) {
                           "pixel_layout",
                           "bits",
                           "bit_alignment",
+                          "vignetting",
+                          "vignetting_centre_px",
                           "self_mask",
                           "mount",
                           "axes",
@@ -217,6 +230,8 @@ Camera any_camera(const std::string& name, bool on_mast) {
                         PixelLayout::bayer_bggr, PixelLayout::bayer_grbg);
   camera.pixel_format.bits = *rc::gen::inRange(8, 17);
   camera.pixel_format.alignment = *rc::gen::element(BitAlignment::low, BitAlignment::high);
+  camera.vignetting = *rc::gen::element(Vignetting(), Vignetting{{-0.3}, std::nullopt},
+                                        Vignetting{{-0.3, 0.1 / 3, 1e-5}, Eigen::Vector2d(30.1, 1.0 / 3)});
   camera.self_mask = *rc::gen::element<std::string>("", "mask.png", "a \"b\": #c\n\\");
   camera.mount = on_mast ? "mast" : "body";
   camera.mount_from_camera = any_pose();

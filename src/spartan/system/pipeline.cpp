@@ -131,6 +131,7 @@ Status Pipeline::State::look(const StereoFrame& frame) {
   if (!maps_positions || frame.position_id < 0) return {};
   const auto shot = clock.measure("imaging", [&] { return imager.process(frame); });
   if (!shot) return failure(shot);
+  clock.add(shot->times);
   const double nearest_m = rig.find_pair(frame.pair)->nearest_m;
   return clock.measure("reconstruction",
                        [&] { return position.look(frame.position_id, frame.pair, *shot, nearest_m); });
@@ -216,6 +217,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   }
   const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
   if (!shot) return failure(shot);
+  s.clock.add(shot->times);
 
   FrameResult result;
   // Before the stages move on: the map belongs to where the rover still stands.

@@ -12,6 +12,7 @@
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
+#include "spartan/core/stage_clock.h"
 #include "spartan/core/threads.h"
 #include "spartan/imaging/rectified_pair.h"
 #include "spartan/localization/localizer.h"
@@ -19,7 +20,6 @@
 #include "spartan/rig/rig.h"
 #include "spartan/slam/map_merger.h"
 #include "spartan/system/run_options.h"
-#include "spartan/system/stage_clock.h"
 
 namespace spartan {
 

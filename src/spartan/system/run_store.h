@@ -11,10 +11,10 @@
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
+#include "spartan/core/stage_clock.h"
 #include "spartan/core/time.h"
 #include "spartan/odometry/odometer.h"
 #include "spartan/slam/tile_store.h"
-#include "spartan/system/stage_clock.h"
 
 namespace spartan {
 

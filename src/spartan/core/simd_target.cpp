@@ -1,4 +1,4 @@
-#include "spartan/reconstruction/simd_target.h"
+#include "spartan/core/simd_target.h"
 
 #include <hwy/highway.h>
 #include <hwy/targets.h>

@@ -23,6 +23,8 @@ class StageClock {
     const Lap lap(*this, stage);
     return std::forward<Work>(work)();
   }
+  /// Times that another clock took.
+  void add(const std::vector<StageTime>& times) { times_.insert(times_.end(), times.begin(), times.end()); }
   /// What was measured since the last call, in order.
   std::vector<StageTime> take() { return std::exchange(times_, {}); }
 

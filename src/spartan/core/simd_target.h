@@ -1,4 +1,4 @@
-// Choosing the instruction set of the matcher's kernels by name, without any global state.
+// Choosing the instruction set of a kernel by name, without any global state.
 #pragma once
 
 #include <cstddef>

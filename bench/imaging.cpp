@@ -1,0 +1,221 @@
+// What the imaging options do to stereo on the real pairs with truth, and what they cost. `make bench-imaging`.
+//
+//   imaging [--threads N]
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "spartan/core/image_io.h"
+#include "spartan/core/opencv_bridge.h"
+#include "spartan/imaging/debayer.h"
+#include "spartan/imaging/imager.h"
+#include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/reconstruction/disparity_options.h"
+#include "stereo_pairs.h"
+
+namespace {
+
+using namespace spartan;  // NOLINT(google-build-using-namespace): a program
+
+struct Variant {
+  std::string name;
+  ImagingOptions options;
+};
+
+ImagingOptions with(bool balance, bool contrast, double local_clip = 0) {
+  ImagingOptions options;
+  options.balance = balance;
+  options.contrast = contrast;
+  if (local_clip > 0) options.local_contrast = {true, 8, local_clip};
+  return options;
+}
+
+const std::vector<Variant> kGrayVariants = {
+    {"no contrast", with(false, false)},        {"stretch", with(false, true)},
+    {"stretch, balance", with(true, true)},     {"stretch, local 2", with(false, true, 2)},
+    {"stretch, local 4", with(false, true, 4)}, {"all three, local 2", with(true, true, 2)}};
+
+/// Two images as they come from the cameras.
+struct Shot {
+  FrameImage left, right;
+  std::vector<double> vignetting;  ///< that the rig states of both eyes
+};
+
+struct Scores {
+  double bad_2 = 0, matched_bad_2 = 0, density = 0, ms = 0;
+  void add(const Scores& other) {
+    bad_2 += other.bad_2;
+    matched_bad_2 += other.matched_bad_2;
+    density += other.density;
+    ms += other.ms;
+  }
+};
+
+Scores score(const Pair& pair, const Shot& shot, const ImagingOptions& options, int threads) {
+  Camera eye;
+  eye.name = "left";
+  eye.size = shot.left.size();
+  eye.pixel_format = shot.left.format();
+  eye.model = PinholeModel{1000, 1000, (eye.size.width - 1) / 2.0, (eye.size.height - 1) / 2.0};
+  eye.vignetting.coefficients = shot.vignetting;
+  Camera right = eye;
+  right.name = "right";
+  const Rig rig = rig_of_one_pair(pair.name, eye, right, Pose(Eigen::Quaterniond::Identity(), {-0.1, 0, 0}));
+  auto imager = must(Imager::create(rig, options, Workers(threads)));
+  StereoFrame frame;
+  frame.pair = rig.pairs.front().name;
+  frame.left = shot.left;
+  frame.right = shot.right;
+  std::vector<double> times;
+  RectifiedPair rectified;
+  for (int i = 0; i < 5; ++i) {
+    rectified = must(imager.process(frame));
+    double sum = 0;
+    for (const StageTime& t : rectified.times) sum += t.wall_ms;
+    times.push_back(sum);
+  }
+  DisparityComputer computer(DisparityOptions{}, Workers(threads));
+  const auto image = must(computer.compute(rectified.left, rectified.right, {0, pair.disparities - 1}));
+  const auto all = must(compare_disparities(image.disparity, pair.truth, pair.mask)).all;
+  return {all.bad_2.value_or(0), all.matched_bad_2.value_or(0), all.density_percent.value_or(0),
+          *std::min_element(times.begin(), times.end())};
+}
+
+/// The picture as another eye might have taken it: levels times `gain` and the light at each pixel, 12 bits.
+FrameImage taken_with(ImageView<const std::uint8_t> image, double gain, const std::vector<double>& vignetting) {
+  const PixelFormat format{PixelLayout::gray, 12};
+  const Vignetting lens{vignetting, {}};
+  Image<std::uint16_t> taken(image.size());
+  const double cx = (image.width() - 1) / 2.0, cy = (image.height() - 1) / 2.0;
+  const double diagonal_squared = image.width() * image.width() + image.height() * image.height();
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      const double rho2 = 4 * ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / diagonal_squared;
+      taken(x, y) = static_cast<std::uint16_t>(std::min(4095.0, image(x, y) * 16 * gain * lens.light_at(rho2)));
+    }
+  }
+  return FrameImage::own(std::move(taken), format);
+}
+
+Image<Rgb8> read_colours(const std::filesystem::path& path) {
+  cv::Mat colours;
+  cv::cvtColor(cv::imread(path.string()), colours, cv::COLOR_BGR2RGB);
+  return Image<Rgb8>::copy_of(as_view<Rgb8>(colours));
+}
+
+FrameImage mosaic_of(const Image<Rgb8>& colours) {
+  Image<std::uint8_t> mosaic(colours.size());
+  for (int y = 0; y < mosaic.height(); ++y) {
+    for (int x = 0; x < mosaic.width(); ++x) {
+      const Rgb8 c = colours(x, y);
+      mosaic(x, y) = (x & 1) != (y & 1) ? c.g : (y & 1) == 0 ? c.r : c.b;
+    }
+  }
+  return FrameImage::own(std::move(mosaic), PixelFormat{PixelLayout::bayer_rggb, 8});
+}
+
+class Table {
+ public:
+  explicit Table(const std::string& title) {
+    fmt::print("\n{}\n{:<18} {:<26} {:>7} {:>9} {:>8} {:>9}\n", title, "pair", "variant", "bad-2", "of match.",
+               "density", "imaging ms");
+  }
+  void note(const std::string& pair, const std::string& variant_name, const Scores& s) {
+    print(pair, variant_name, s);
+    if (!sums_.contains(variant_name)) order_.push_back(variant_name);
+    sums_[variant_name].add(s);
+    ++counts_[variant_name];
+  }
+  ~Table() {
+    for (const std::string& name : order_) {
+      Scores s = sums_[name];
+      const double n = counts_[name];
+      print("mean", name, {s.bad_2 / n, s.matched_bad_2 / n, s.density / n, s.ms / n});
+    }
+  }
+  Table(const Table&) = delete;
+  Table& operator=(const Table&) = delete;
+
+ private:
+  static void print(const std::string& pair, const std::string& variant_name, const Scores& s) {
+    fmt::print("{:<18} {:<26} {:7.2f} {:9.2f} {:8.2f} {:9.3f}\n", pair, variant_name, s.bad_2, s.matched_bad_2,
+               s.density, s.ms);
+  }
+  std::vector<std::string> order_;
+  std::map<std::string, Scores> sums_;
+  std::map<std::string, int> counts_;
+};
+
+void compare_contrast(const std::vector<Pair>& pairs, int threads) {
+  Table table("Gray pairs as they are");
+  for (const Pair& pair : pairs) {
+    const Shot shot{FrameImage::borrow(pair.left.view(), {}), FrameImage::borrow(pair.right.view(), {}), {}};
+    for (const Variant& v : kGrayVariants) table.note(pair.name, v.name, score(pair, shot, v.options, threads));
+  }
+}
+
+void compare_lenses(const std::vector<Pair>& pairs, int threads) {
+  Table table("12 bits; the right eye at 0.6 of the light, then both eyes with 0.4 of the light in the corners");
+  for (const Pair& pair : pairs) {
+    const Shot dark{taken_with(pair.left, 1, {}), taken_with(pair.right, 0.6, {}), {}};
+    for (const bool balance : {false, true}) {
+      ImagingOptions options;
+      options.balance = balance;
+      table.note(pair.name, balance ? "dark right, balance" : "dark right", score(pair, dark, options, threads));
+    }
+    const std::vector<double> lens{-0.6};
+    const Shot shaded{taken_with(pair.left, 1, lens), taken_with(pair.right, 1, lens), lens};
+    for (const bool undo : {false, true}) {
+      ImagingOptions options;
+      options.vignetting = undo;
+      table.note(pair.name, undo ? "shaded, undone" : "shaded", score(pair, shaded, options, threads));
+    }
+  }
+}
+
+void compare_debayering(const std::vector<Pair>& pairs, int threads) {
+  Table table("Colour pairs as mosaics");
+  for (const Pair& pair : pairs) {
+    if (!std::filesystem::exists(pair.folder / "view5.png")) continue;
+    const auto left = read_colours(pair.folder / "view1.png"), right = read_colours(pair.folder / "view5.png");
+    const PixelFormat rgb{PixelLayout::rgb, 8};
+    const Shot full{FrameImage::borrow(left.view(), rgb), FrameImage::borrow(right.view(), rgb), {}};
+    table.note(pair.name, "full colour", score(pair, full, {}, threads));
+    const Shot mosaics{mosaic_of(left), mosaic_of(right), {}};
+    for (const char* method : {"bilinear", "edge_aware"}) {
+      ImagingOptions options;
+      options.debayer = method;
+      table.note(pair.name, method, score(pair, mosaics, options, threads));
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int threads = 1;
+  for (int i = 1; i + 1 < argc; ++i) {
+    if (std::strcmp(argv[i], "--threads") == 0) threads = std::max(1, std::atoi(argv[i + 1]));
+  }
+  const char* const data = std::getenv("SPARTAN_DATA");
+  const std::filesystem::path folder = data != nullptr ? data : "../shared/data";
+  if (!std::filesystem::exists(folder / "middlebury")) {
+    fmt::print("no stereo pairs: SPARTAN_DATA does not name the data folder\n");
+    return 0;
+  }
+  const std::vector<Pair> pairs = load_stereo_pairs(folder);
+  compare_contrast(pairs, threads);
+  compare_lenses(pairs, threads);
+  compare_debayering(pairs, threads);
+  return 0;
+}

@@ -1,0 +1,36 @@
+// Where the colours stand in a Bayer mosaic.
+#pragma once
+
+#include <stdexcept>
+
+#include "spartan/core/pixel_format.h"
+
+namespace spartan {
+
+/// Where red stands in the top-left 2×2 block. Blue stands diagonally to it, green on the other two.
+struct RedPlace {
+  int x, y;
+
+  bool is_green(int column, int row) const { return ((column + x + row + y) & 1) != 0; }
+  bool is_red_row(int row) const { return ((row + y) & 1) == 0; }
+};
+
+/// Throws where `layout` is no Bayer pattern.
+inline RedPlace red_place(PixelLayout layout) {
+  switch (layout) {
+    case PixelLayout::bayer_rggb:
+      return {0, 0};
+    case PixelLayout::bayer_grbg:
+      return {1, 0};
+    case PixelLayout::bayer_gbrg:
+      return {0, 1};
+    case PixelLayout::bayer_bggr:
+      return {1, 1};
+    case PixelLayout::gray:
+    case PixelLayout::rgb:
+      break;
+  }
+  throw std::invalid_argument("debayer: the layout is no Bayer pattern");
+}
+
+}  // namespace spartan

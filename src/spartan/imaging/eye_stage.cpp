@@ -1,0 +1,145 @@
+#include "spartan/imaging/eye_stage.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "spartan/core/image_io.h"
+
+namespace spartan {
+namespace {
+
+constexpr int kRowsPerPart = 64;
+
+std::string describe(ImageSize size, const PixelFormat& format) {
+  std::string text = fmt::format("{} × {} {} of {} bits", size.width, size.height, name_of(format.layout), format.bits);
+  if (format.bits > 8) text += format.alignment == BitAlignment::high ? ", high alignment" : ", low alignment";
+  return text;
+}
+
+template <class T>
+void reduce_to_luma(ImageView<const Rgb<T>> colour, ImageView<T> gray, const Workers& workers) {
+  workers.for_each_part(0, colour.height(), kRowsPerPart, [&](int begin, int end) {
+    for (int y = begin; y < end; ++y) {
+      const Rgb<T>* const in = colour.row(y);
+      T* const out = gray.row(y);
+      for (int x = 0; x < colour.width(); ++x) out[x] = luma(in[x]);
+    }
+  });
+}
+
+Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::string& folder) {
+  if (camera.self_mask.empty()) return Image<std::uint8_t>();
+  const std::string path = (std::filesystem::path(folder) / camera.self_mask).string();
+  auto mask = read_gray8(path);
+  if (!mask) {
+    mask.error().code = ErrorCode::configuration;
+    return failure(mask);
+  }
+  if (mask->size() != camera.size) {
+    return failure(ErrorCode::configuration,
+                   fmt::format("the self-mask is {} × {}, the camera '{}' has {} × {}", mask->width(), mask->height(),
+                               camera.name, camera.size.width, camera.size.height),
+                   path);
+  }
+  for (int y = 0; y < mask->height(); ++y) {
+    for (int x = 0; x < mask->width(); ++x) (*mask)(x, y) = (*mask)(x, y) == 0 ? 0 : 255;
+  }
+  return mask;
+}
+
+}  // namespace
+
+EyeStage::EyeStage(const Camera& camera, const ImagingOptions& options)
+    : camera_(camera),
+      debayerer_(options.debayer == "bilinear" ? DebayerMethod::bilinear : DebayerMethod::edge_aware),
+      mapped_(camera.size) {
+  if (options.local_contrast.enabled) {
+    local_.emplace(options.local_contrast.tiles, options.local_contrast.clip);
+    equalised_ = Image<std::uint8_t>(camera.size);
+  }
+}
+
+Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& plan,
+                                  const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
+                                  const std::string& mask_folder, const Workers& workers) {
+  auto mask = load_self_mask(camera, mask_folder);
+  if (!mask) return failure(mask);
+  EyeStage eye(camera, options);
+  if (options.vignetting && !camera.vignetting.coefficients.empty()) {
+    auto light = LightCorrection::create(camera, workers);
+    if (!light) return failure(light);
+    eye.light_ = std::move(*light);
+  }
+  // A gray image as it came is not copied.
+  if (eye.has_colours() || eye.light_) {
+    if (eye.is_deep()) eye.gray16_ = Image<std::uint16_t>(camera.size);
+    if (!eye.is_deep()) eye.gray8_ = Image<std::uint8_t>(camera.size);
+  }
+  if (plan.passes_through) {
+    eye.self_mask_ = std::move(*mask);
+    return eye;
+  }
+  eye.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, *mask, workers, plan.depth_m);
+  eye.result_ = Image<std::uint8_t>(plan.geometry.size);
+  return eye;
+}
+
+Status EyeStage::check(const FrameImage& image, const std::string& where) const {
+  if (image.size() == camera_.size && image.format() == camera_.pixel_format) return {};
+  return failure(ErrorCode::input,
+                 fmt::format("the image of camera '{}' is {}, the rig says {}", camera_.name,
+                             describe(image.size(), image.format()), describe(camera_.size, camera_.pixel_format)),
+                 where, "correct size_px and the pixel format in the rig, or take images that fit");
+}
+
+template <class T>
+ImageView<const T> EyeStage::to_gray(const FrameImage& image, Image<T>& buffer, const Workers& workers) const {
+  const PixelLayout layout = camera_.pixel_format.layout;
+  if (layout == PixelLayout::gray) return image.as<T>();
+  if (layout == PixelLayout::rgb) {
+    reduce_to_luma<T>(image.as<Rgb<T>>(), buffer, workers);
+  } else {
+    debayerer_.apply(image.as<T>(), layout, buffer, workers);
+  }
+  return buffer;
+}
+
+void EyeStage::make_gray(const FrameImage& image, const Workers& workers) {
+  if (is_deep()) {
+    gray16_view_ = to_gray<std::uint16_t>(image, gray16_, workers);
+  } else {
+    gray8_view_ = to_gray<std::uint8_t>(image, gray8_, workers);
+  }
+}
+
+void EyeStage::correct_light(const Workers& workers) {
+  if (!light_) return;
+  if (is_deep()) {
+    light_->apply(gray16_view_, gray16_, workers);
+    gray16_view_ = gray16_;
+  } else {
+    light_->apply(gray8_view_, gray8_, workers);
+    gray8_view_ = gray8_;
+  }
+}
+
+void EyeStage::count(GrayHistogram& histogram) const {
+  if (is_deep()) return histogram.add(gray16_view_);
+  histogram.add(gray8_view_);
+}
+
+void EyeStage::map(const ContrastMapping& mapping, const Workers& workers) {
+  if (is_deep()) return mapping.apply(gray16_view_, mapped_, workers);
+  mapping.apply(gray8_view_, mapped_, workers);
+}
+
+void EyeStage::equalise(const Workers& workers) {
+  if (local_) local_->apply(mapped_, equalised_, workers);
+}
+
+void EyeStage::rectify(const Workers& workers) {
+  if (table_) table_->apply(working(), result_, workers);
+}
+
+}  // namespace spartan

@@ -1,0 +1,77 @@
+#include "spartan/imaging/light_correction.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace spartan {
+namespace {
+
+constexpr int kRowsPerPart = 32;
+
+}  // namespace
+
+Result<LightCorrection> LightCorrection::create(const Camera& camera, const Workers& workers) {
+  const Eigen::Vector2d middle((camera.size.width - 1) / 2.0, (camera.size.height - 1) / 2.0);
+  const Eigen::Vector2d centre =
+      camera.vignetting.centre_px.value_or(project(camera.model, Eigen::Vector3d::UnitZ()).value_or(middle));
+  const double half_diagonal = std::hypot(camera.size.width, camera.size.height) / 2;
+  const auto light = [&](int x, int y) {
+    return camera.vignetting.light_at((Eigen::Vector2d(x, y) - centre).squaredNorm() / (half_diagonal * half_diagonal));
+  };
+  Image<std::uint16_t> factors(camera.size);
+  workers.for_each_part(0, camera.size.height, kRowsPerPart, [&](int begin, int end) {
+    for (int y = begin; y < end; ++y) {
+      for (int x = 0; x < camera.size.width; ++x) {
+        const double factor = (1 << kFractionBits) / light(x, y);
+        // 0 stands for too little light.
+        const bool fits = light(x, y) > Vignetting::kLeast && factor >= 1;
+        factors(x, y) = fits ? static_cast<std::uint16_t>(std::lround(factor)) : std::uint16_t{0};
+      }
+    }
+  });
+  for (int y = 0; y < camera.size.height; ++y) {
+    for (int x = 0; x < camera.size.width; ++x) {
+      if (factors(x, y) != 0) continue;
+      return failure(ErrorCode::configuration,
+                     fmt::format("the vignetting of camera '{}' leaves {:.3g} of the light at pixel {}, {}; it must be "
+                                 "between {} and {}",
+                                 camera.name, light(x, y), x, y, Vignetting::kLeast, 1 << kFractionBits),
+                     "cameras." + camera.name + ".vignetting");
+    }
+  }
+  return LightCorrection(std::move(factors), camera.pixel_format.full_scale());
+}
+
+template <class T>
+void LightCorrection::apply_any(ImageView<const T> image, ImageView<T> result, const Workers& workers) const {
+  if (image.size() != factors_.size() || result.size() != factors_.size()) {
+    throw std::invalid_argument("LightCorrection: the images have another size than the camera");
+  }
+  const auto full_scale = static_cast<std::uint32_t>(full_scale_);
+  workers.for_each_part(0, image.height(), kRowsPerPart, [&](int begin, int end) {
+    constexpr std::uint32_t kHalf = 1U << (kFractionBits - 1);
+    for (int y = begin; y < end; ++y) {
+      const T* const in = image.row(y);
+      const std::uint16_t* const factors = factors_.row(y);
+      T* const out = result.row(y);
+      for (int x = 0; x < image.width(); ++x) {
+        const std::uint32_t level = (in[x] * std::uint32_t{factors[x]} + kHalf) >> kFractionBits;
+        out[x] = static_cast<T>(std::min(level, full_scale));
+      }
+    }
+  });
+}
+
+void LightCorrection::apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result,
+                            const Workers& workers) const {
+  apply_any(image, result, workers);
+}
+void LightCorrection::apply(ImageView<const std::uint16_t> image, ImageView<std::uint16_t> result,
+                            const Workers& workers) const {
+  apply_any(image, result, workers);
+}
+
+}  // namespace spartan

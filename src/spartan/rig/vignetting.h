@@ -1,0 +1,29 @@
+// How a lens loses light towards the edge of the image.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "spartan/core/image.h"
+
+namespace spartan {
+
+/// Light at a pixel over light at the centre: 1 + a1 ρ² + a2 ρ⁴ + a3 ρ⁶, where ρ is the distance from the centre over
+/// half the image's diagonal. No coefficients: no fall-off.
+struct Vignetting {
+  std::vector<double> coefficients;          ///< a1, a2, a3; missing ones are 0
+  std::optional<Eigen::Vector2d> centre_px;  ///< none: where the camera sees its optical axis
+
+  static constexpr double kLeast = 0.125;  ///< a pixel that gets less light holds no picture worth amplifying
+
+  double light_at(double rho_squared) const {
+    double sum = 0;
+    for (std::size_t i = coefficients.size(); i-- > 0;) sum = (sum + coefficients[i]) * rho_squared;
+    return 1 + sum;
+  }
+  friend bool operator==(const Vignetting&, const Vignetting&) = default;
+};
+
+}  // namespace spartan
