@@ -7,6 +7,8 @@
 #include <numbers>
 #include <optional>
 
+#include "spartan/rig/rectifying_axes.h"
+
 namespace spartan {
 namespace {
 
@@ -98,11 +100,9 @@ Result<Rectification> plan_rectification(const Camera& left, const Camera& right
         fmt::format("the eyes look apart: their axes are {:.1f}° from each other", apart * 180 / std::numbers::pi),
         where, "check the transforms of the two cameras");
   }
-  const Eigen::Vector3d x = right_eye.normalized();
-  const Eigen::Vector3d mean_axis = left_axis + right_axis;
-  const Eigen::Vector3d z = (mean_axis - mean_axis.dot(x) * x).normalized();
-  plan.left_from_rectified << x, z.cross(x), z;
-  plan.right_from_rectified = right_from_left.rotation_matrix() * plan.left_from_rectified;
+  const RectifyingAxes axes = rectifying_axes(right_from_left);
+  plan.left_from_rectified = axes.left_from_rectified;
+  plan.right_from_rectified = axes.right_from_rectified;
 
   auto geometry = choose_view({left, plan.left_from_rectified}, {right, plan.right_from_rectified}, view, where);
   if (!geometry) return failure(geometry);

@@ -22,9 +22,7 @@ struct Rectification {
   bool passes_through = false;  ///< the images are rectified already: nothing is resampled
 };
 
-/// Axes: x along the baseline; z the mean of the two optical axes made orthogonal to it; y = z × x (after Fusiello,
-/// Trucco, Verri, "A compact algorithm for rectification of stereo pairs", 2000, with the mean axis in the place of
-/// the old left one, so that both eyes turn equally).
+/// Axes: rectifying_axes().
 /// Focal length, centre and size: choose_view(). By default the view keeps resolution and centre, and pixels that look
 /// past a sensor are masked; a zoom to valid pixels only would cost resolution or view on every pair with strong
 /// distortion.
