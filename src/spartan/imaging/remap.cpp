@@ -19,28 +19,12 @@ using remap::Place;
 
 constexpr int kRowsPerPart = 16;
 
-template <class T>
-T between(const T& s00, const T& s10, const T& s01, const T& s11, int part_x, int part_y) {
-  return static_cast<T>(remap::interpolate(s00, s10, s01, s11, part_x, part_y));
-}
-template <class T>
-Rgb<T> between(const Rgb<T>& s00, const Rgb<T>& s10, const Rgb<T>& s01, const Rgb<T>& s11, int part_x, int part_y) {
-  return {between(s00.r, s10.r, s01.r, s11.r, part_x, part_y), between(s00.g, s10.g, s01.g, s11.g, part_x, part_y),
-          between(s00.b, s10.b, s01.b, s11.b, part_x, part_y)};
-}
-
-/// Of a pixel that is not in a scattered block.
-Place place_of(const Cell& cell, int at) {
-  const Place corner = cell.corners[at / kBlock];
-  return {static_cast<std::int16_t>(corner.x + (cell.codes[at] & 15)),
-          static_cast<std::int16_t>(corner.y + (cell.codes[at] >> 4))};
-}
-
 template <class Pixel>
-Pixel sample(ImageView<const Pixel> source, Place place, int part_x, int part_y) {
-  const Pixel* const p = source.row(place.y) + place.x;
-  const Pixel* const q = place.y + 1 < source.height() ? p + source.stride() : p;
-  return between(p[0], p[1], q[0], q[1], part_x, part_y);
+auto kernel_of(const remap::Kernels& kernels) {
+  if constexpr (std::is_same_v<Pixel, std::uint8_t>) return kernels.gray8;
+  if constexpr (std::is_same_v<Pixel, std::uint16_t>) return kernels.gray16;
+  if constexpr (std::is_same_v<Pixel, Rgb8>) return kernels.colour8;
+  if constexpr (std::is_same_v<Pixel, Rgb16>) return kernels.colour16;
 }
 
 }  // namespace
@@ -49,7 +33,7 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
                        const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
                        const Workers& workers, double depth_m, const std::string& simd)
     : source_size_(source_size),
-      kernel_(remap::row_kernel_for(simd_target_index(simd))),
+      kernels_(remap::kernels_for(simd_target_index(simd))),
       cells_((view.size.width + kCell - 1) / kCell, view.size.height),
       scattered_(static_cast<std::size_t>(view.size.height)),
       mask_(view.size) {
@@ -139,7 +123,7 @@ void RemapTable::store_block(int x, int y, std::span<const Entry> entries) {
 Eigen::Vector2d RemapTable::source_of(int x, int y) const {
   const Cell& cell = cells_(x / kCell, y);
   const int at = x % kCell, block = at / kBlock;
-  Place place = place_of(cell, at);
+  Place place = remap::place_of(cell, at);
   if (cell.kinds[block] == remap::kScattered) {
     const auto& far = scattered_[static_cast<std::size_t>(y)];
     place = std::find_if(far.begin(), far.end(), [&](const Scattered& s) {
@@ -156,37 +140,25 @@ std::size_t RemapTable::bytes() const {
 }
 
 template <class Pixel>
-void RemapTable::apply_row(int y, ImageView<const Pixel> source, Pixel* out) const {
-  const Cell* const cells = cells_.row(y);
-  if constexpr (std::is_same_v<Pixel, std::uint8_t>) {
-    kernel_(cells, size().width, {source.data(), source.stride(), source.height()}, out);
-  } else {
-    for (int x = 0; x < size().width; ++x) {
-      const Cell& cell = cells[x / kCell];
-      const int at = x % kCell;
-      if (cell.kinds[at / kBlock] == remap::kScattered) continue;
-      out[x] = cell.codes[at] == remap::kUnseen ? Pixel{}
-                                                : sample(source, place_of(cell, at), cell.part_x[at], cell.part_y[at]);
-    }
-  }
-  for (const Scattered& far : scattered_[static_cast<std::size_t>(y)]) {
-    for (int i = 0; i < kBlock && far.x + i < size().width; ++i) {
-      const Cell& cell = cells[far.x / kCell];
-      const int at = far.x % kCell + i;
-      out[far.x + i] = cell.codes[at] == remap::kUnseen
-                           ? Pixel{}
-                           : sample(source, far.places[static_cast<std::size_t>(i)], cell.part_x[at], cell.part_y[at]);
-    }
-  }
-}
-
-template <class Pixel>
 void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> result, const Workers& workers) const {
   if (source.size() != source_size_ || result.size() != size()) {
     throw std::invalid_argument("RemapTable: the images have other sizes than the table");
   }
   workers.for_each_part(0, result.height(), kRowsPerPart, [&](int begin, int end) {
-    for (int y = begin; y < end; ++y) apply_row(y, source, result.row(y));
+    const remap::Source<Pixel> from{source.data(), source.stride(), source.width(), source.height()};
+    for (int y = begin; y < end; ++y) {
+      Pixel* const out = result.row(y);
+      kernel_of<Pixel>(kernels_)(cells_.row(y), size().width, from, out);
+      for (const Scattered& far : scattered_[static_cast<std::size_t>(y)]) {
+        for (int i = 0; i < kBlock && far.x + i < size().width; ++i) {
+          const Cell& cell = cells_(far.x / kCell, y);
+          const int at = far.x % kCell + i;
+          if (cell.codes[at] == remap::kUnseen) continue;
+          out[far.x + i] =
+              remap::sample(from, far.places[static_cast<std::size_t>(i)], cell.part_x[at], cell.part_y[at]);
+        }
+      }
+    }
   });
 }
 

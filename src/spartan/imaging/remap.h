@@ -39,7 +39,7 @@ class RemapTable {
   std::size_t bytes() const;
 
   /// Bilinear interpolation in integers (remap::interpolate), each channel for itself; invalid pixels become 0. Throws
-  /// where sizes differ from the table's. 8-bit gray goes through SIMD.
+  /// where sizes differ from the table's.
   void apply(ImageView<const std::uint8_t> source, ImageView<std::uint8_t> result, const Workers& workers) const;
   void apply(ImageView<const std::uint16_t> source, ImageView<std::uint16_t> result, const Workers& workers) const;
   void apply(ImageView<const Rgb8> source, ImageView<Rgb8> result, const Workers& workers) const;
@@ -63,12 +63,10 @@ class RemapTable {
   Entry entry_of(const Eigen::Vector2d& place) const;
   void store_block(int x, int y, std::span<const Entry> entries);
   template <class Pixel>
-  void apply_row(int y, ImageView<const Pixel> source, Pixel* out) const;
-  template <class Pixel>
   void apply_any(ImageView<const Pixel> source, ImageView<Pixel> result, const Workers& workers) const;
 
   ImageSize source_size_;
-  remap::RowKernel kernel_;
+  remap::Kernels kernels_;
   Image<remap::Cell> cells_;
   std::vector<std::vector<Scattered>> scattered_;  ///< of each row, from left to right
   Image<std::uint8_t> mask_;

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "spartan/core/image.h"
+
 namespace spartan::remap {
 
 inline constexpr int kFractionBits = 7;
@@ -35,10 +37,11 @@ struct Cell {
   std::uint8_t unused[12];
 };
 
+template <class Pixel>
 struct Source {
-  const std::uint8_t* data;
+  const Pixel* data;
   std::ptrdiff_t stride;
-  int height;
+  int width, height;
 };
 
 /// From four samples:
@@ -51,10 +54,41 @@ inline std::int32_t interpolate(std::int32_t s00, std::int32_t s10, std::int32_t
   return (top + ((part_y * (bottom - top) + kHalf) >> kFractionBits) + kHalf) >> kFractionBits;
 }
 
-/// Fills `width` pixels of a row of the result; those of scattered blocks become 0.
-using RowKernel = void (*)(const Cell* cells, int width, const Source& source, std::uint8_t* out);
+template <class T>
+T between(const T& s00, const T& s10, const T& s01, const T& s11, int part_x, int part_y) {
+  return static_cast<T>(interpolate(s00, s10, s01, s11, part_x, part_y));
+}
+template <class T>
+Rgb<T> between(const Rgb<T>& s00, const Rgb<T>& s10, const Rgb<T>& s01, const Rgb<T>& s11, int part_x, int part_y) {
+  return {between(s00.r, s10.r, s01.r, s11.r, part_x, part_y), between(s00.g, s10.g, s01.g, s11.g, part_x, part_y),
+          between(s00.b, s10.b, s01.b, s11.b, part_x, part_y)};
+}
 
-/// The kernel of one instruction set; see simd_target_index().
-RowKernel row_kernel_for(std::size_t target_index);
+/// The plain way: between the four samples at a place.
+template <class Pixel>
+Pixel sample(const Source<Pixel>& source, Place place, int part_x, int part_y) {
+  const Pixel* const p = source.data + place.y * source.stride + place.x;
+  const Pixel* const q = place.y + 1 < source.height ? p + source.stride : p;
+  return between(p[0], p[1], q[0], q[1], part_x, part_y);
+}
+
+/// Of a pixel that is seen and not in a scattered block.
+inline Place place_of(const Cell& cell, int at) {
+  const Place corner = cell.corners[at / kBlock];
+  return {static_cast<std::int16_t>(corner.x + (cell.codes[at] & 15)),
+          static_cast<std::int16_t>(corner.y + (cell.codes[at] >> 4))};
+}
+
+/// Fill `width` pixels of a row of the result; those of scattered blocks become 0. Colours go pixel by pixel, all
+/// channels and both columns in one load.
+struct Kernels {
+  void (*gray8)(const Cell* cells, int width, const Source<std::uint8_t>& source, std::uint8_t* out);
+  void (*gray16)(const Cell* cells, int width, const Source<std::uint16_t>& source, std::uint16_t* out);
+  void (*colour8)(const Cell* cells, int width, const Source<Rgb8>& source, Rgb8* out);
+  void (*colour16)(const Cell* cells, int width, const Source<Rgb16>& source, Rgb16* out);
+};
+
+/// The kernels of one instruction set; see simd_target_index().
+Kernels kernels_for(std::size_t target_index);
 
 }  // namespace spartan::remap

@@ -186,10 +186,10 @@ TEST(RemapTable, WritesNoFurtherThanTheResult) {
 }
 
 template <class T>
-void expect_channels_go_like_gray() {
+void expect_channels_go_like_gray(const std::string& simd) {
   for (const Case& c : kCases) {
-    SCOPED_TRACE(c.what);
-    const RemapTable table = table_for(c, "auto");
+    SCOPED_TRACE(std::string(c.what) + ", " + simd);
+    const RemapTable table = table_for(c, simd);
     Random random(3);
     Image<T> gray(c.source);
     Image<Rgb<T>> colour(c.source);
@@ -216,11 +216,11 @@ void expect_channels_go_like_gray() {
 }
 
 TEST(RemapTable, OneTableServesGrayAndColourOf8Bits) {
-  expect_channels_go_like_gray<std::uint8_t>();
+  for (const std::string& simd : available_simd_targets()) expect_channels_go_like_gray<std::uint8_t>(simd);
 }
 
 TEST(RemapTable, OneTableServesGrayAndColourOf16Bits) {
-  expect_channels_go_like_gray<std::uint16_t>();
+  for (const std::string& simd : available_simd_targets()) expect_channels_go_like_gray<std::uint16_t>(simd);
 }
 
 TEST(RemapTable, AConstantPictureStaysConstant) {
