@@ -34,9 +34,20 @@ Result<Rig> chosen_rig(const ReadRig& read, const std::string& pair) {
   if (pair.empty()) return read.rig;
   if (const StereoPair* chosen = read.rig.find_pair(pair)) return rig_of_pair(read.rig, *chosen);
   std::vector<std::string> names;
+  names.reserve(read.rig.pairs.size());
   for (const StereoPair& each : read.rig.pairs) names.push_back(each.name);
   return failure(ErrorCode::usage, fmt::format("there is no pair '{}', only {}", pair, fmt::join(names, ", ")),
                  "--pair");
+}
+
+// A mask's path counts from its rig file, and has to be found from the new one too.
+void move_masks(Rig& rig, const std::string& from, const std::string& to) {
+  for (Camera& camera : rig.cameras) {
+    if (camera.self_mask.empty() || fs::path(camera.self_mask).is_absolute()) continue;
+    const fs::path mask = fs::absolute(from).parent_path() / camera.self_mask;
+    camera.self_mask =
+        mask.lexically_normal().lexically_relative(fs::absolute(to).parent_path().lexically_normal()).string();
+  }
 }
 
 Status write_all(const CalibrationFiles& files, bool force) {
@@ -114,8 +125,9 @@ Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {
   if (!format) return failure(format);
   const auto read = read_calibration(a.from, a.size_px.empty() ? ImageSize{} : ImageSize{a.size_px[0], a.size_px[1]});
   if (!read) return failure(read);
-  const auto rig = chosen_rig(*read, a.pair);
+  auto rig = chosen_rig(*read, a.pair);
   if (!rig) return failure(rig);
+  if (*format == CalibrationFormat::rig_yaml) move_masks(*rig, read->files.front(), a.to);
   const auto files = to_calibration_files(*rig, *format, a.to);
   if (!files) return failure(files);
   if (const Status written = write_all(*files, a.force); !written) return failure(written);

@@ -65,6 +65,17 @@ TEST(RigConvert, WhatIsLostIsSaid) {
   EXPECT_THAT(keys, Not(::testing::Contains("body")));
 }
 
+TEST(RigConvert, AMaskIsFoundFromTheNewFileToo) {
+  const testing::TemporaryFolder folder;
+  std::string text = content_of(testing::source_folder() + "/config/rigs/generic_pair.yaml");
+  text.replace(text.find("    axes:"), 0, "    self_mask: masks/left.png\n");
+  const std::string from = folder.write("a/rig.yaml", text), to = folder.path() + "/b/c/rig.yaml";
+  const auto told = run_program({"rig", "convert", from, to});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.out, HasSubstr("nothing lost"));
+  EXPECT_THAT(content_of(to), HasSubstr("self_mask: \"../../a/masks/left.png\""));
+}
+
 TEST(RigConvert, OnePairOfMany) {
   const testing::TemporaryFolder folder;
   const std::string to = folder.path() + "/narrow.yml";

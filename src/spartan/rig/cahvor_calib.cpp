@@ -120,10 +120,11 @@ Result<std::optional<CameraModel>> read_opencv_line(const TextMatrices& file, co
       if (!held) return failure(held);
       RadialTangentialModel::Coefficients k{};
       for (std::size_t i = 0; i < count; ++i) {
-        if (i < k.size())
+        if (i < k.size()) {
           k[i] = (*held)[i];
-        else if ((*held)[i] != 0)
+        } else if ((*held)[i] != 0) {
           return file.fault(key, "thin-prism coefficients are not supported");
+        }
       }
       return CameraModel(RadialTangentialModel(core, k));
     }

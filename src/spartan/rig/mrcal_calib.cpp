@@ -57,10 +57,11 @@ Result<CameraModel> read_model(const PythonDict& file) {
   if (model.starts_with("OPENCV")) {
     RadialTangentialModel::Coefficients coefficients{};
     for (std::size_t i = 4; i < k.size(); ++i) {
-      if (i < 12)
+      if (i < 12) {
         coefficients[i - 4] = k[i];
-      else if (k[i] != 0)
+      } else if (k[i] != 0) {
         return file.fault("intrinsics", "thin-prism coefficients are not supported");
+      }
     }
     return RadialTangentialModel(pinhole, coefficients);
   }

@@ -30,7 +30,7 @@ Result<Lens> lens_of(const Camera& camera, bool fisheye) {
 }
 
 // Read back with all digits: OpenCV writes 17 of them.
-cv::Mat matrix(std::vector<double> numbers, int rows) {
+cv::Mat matrix(const std::vector<double>& numbers, int rows) {
   return cv::Mat(numbers, true).reshape(1, rows);
 }
 

@@ -49,10 +49,11 @@ class Reader {
         at_ = std::min(text_.find('\n', at_), text_.size());
         if (at_ == text_.size()) return;
       }
-      if (text_[at_] == '\n')
+      if (text_[at_] == '\n') {
         ++line_;
-      else if (c != ' ' && c != '\t' && c != '\r')
+      } else if (c != ' ' && c != '\t' && c != '\r') {
         return;
+      }
     }
   }
 
@@ -74,10 +75,11 @@ class Reader {
     const char quote = text_[at_++];
     const std::size_t begin = at_;
     for (; at_ < text_.size() && text_[at_] != '\n'; ++at_) {
-      if (text_[at_] == '\\')
+      if (text_[at_] == '\\') {
         ++at_;
-      else if (text_[at_] == quote)
+      } else if (text_[at_] == quote) {
         return std::string(text_.substr(begin, at_++ - begin));
+      }
     }
     return std::nullopt;
   }

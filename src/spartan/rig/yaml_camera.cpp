@@ -128,7 +128,8 @@ std::optional<Pose> read_rigid(YamlMap& map, std::string_view key, const std::ve
   return Pose(nearest_rotation(matrix.topLeftCorner<3, 3>()), matrix.topRightCorner<3, 1>());
 }
 
-std::optional<PinholeModel> read_camera_matrix(YamlMap& map, std::string_view key, const std::vector<double>& m) {
+std::optional<PinholeModel> read_camera_matrix(YamlMap& map, std::string_view key, const std::vector<double>& rows) {
+  const auto& m = rows;
   if (m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
     map.fault(key, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
     return std::nullopt;
