@@ -5,17 +5,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
-#include <initializer_list>
 #include <numbers>
 #include <optional>
 #include <utility>
+
+#include "spartan/rig/model_changes.h"
 
 namespace spartan {
 namespace {
 
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
-constexpr int kColumns = 8, kRows = 6, kLeastMatches = 40, kLeastInCell = 3;
+constexpr int kLeastMatches = 40;
 // Beside the verdict's limits (PairVerdict).
 constexpr double kRowOffset_px = 0.5, kFocalRatio = 0.003, kGoodMean_px = 0.5, kGoodP95_px = 1.5, kUsableMean_px = 1,
                  kUsableP95_px = 3;
@@ -24,26 +24,6 @@ constexpr double kRowOffset_px = 0.5, kFocalRatio = 0.003, kGoodMean_px = 0.5, k
 constexpr double kYawOfLens_rad = 2 * 0.002 * std::numbers::sqrt2;
 constexpr double kYawSigmas = 2.6;
 constexpr double kBeyondInfinity_px = -1.5, kBeyondShare = 0.02;
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-RowErrors row_errors(const std::vector<double>& signed_px) {
-  if (signed_px.empty()) return {};
-  RowErrors errors;
-  errors.median_px = median_of(signed_px);
-  std::vector<double> absolute;
-  absolute.reserve(signed_px.size());
-  for (const double v : signed_px) absolute.push_back(std::abs(v));
-  std::sort(absolute.begin(), absolute.end());
-  for (const double v : absolute) errors.mean_px += v / static_cast<double>(absolute.size());
-  errors.p95_px = absolute[(absolute.size() * 95) / 100];
-  return errors;
-}
 
 template <class T>
 std::vector<T> chosen(const std::vector<T>& values, const std::vector<bool>& which) {
@@ -57,37 +37,6 @@ std::vector<T> chosen(const std::vector<T>& values, const std::vector<bool>& whi
 double share_below(const std::vector<double>& values, double limit) {
   const auto below = std::count_if(values.begin(), values.end(), [&](double v) { return v < limit; });
   return values.empty() ? 0 : static_cast<double>(below) / static_cast<double>(values.size());
-}
-
-// The numbers of a model with those of the named keys changed.
-CameraModel with_changed(const CameraModel& model, std::initializer_list<std::string_view> keys,
-                         const std::function<double(double)>& change) {
-  const auto kinds = parameter_kinds(model);
-  ModelParameters numbers = parameters(model);
-  for (std::size_t i = 0; i < kinds.size(); ++i) {
-    if (std::find(keys.begin(), keys.end(), kinds[i].key) == keys.end()) continue;
-    for (double& v : numbers[i]) v = change(v);
-  }
-  return with_parameters(model, numbers);
-}
-
-CameraModel with_focal_times(const CameraModel& model, double factor) {
-  return with_changed(model, {"focal_px", "skew_px"}, [&](double v) { return v * factor; });
-}
-
-// The model for pictures that are `factor` times as large; their corner stays.
-CameraModel resized(const CameraModel& model, double factor) {
-  return with_changed(with_focal_times(model, factor), {"centre_px"},
-                      [&](double v) { return (v + 0.5) * factor - 0.5; });
-}
-
-// A pinhole with the distortion that it lacks; other models stay as they are.
-CameraModel with_radial(const CameraModel& model, double k) {
-  const auto* pinhole = std::get_if<PinholeModel>(&model);
-  const auto* radial = std::get_if<RadialTangentialModel>(&model);
-  if (!pinhole && !radial) return model;
-  // r_u = r_d/(1 + k r_d²) gives r_d = r_u (1 + k r_u² + 2 k² r_u⁴ + …).
-  return RadialTangentialModel(pinhole ? *pinhole : radial->pinhole(), {k, 2 * k * k});
 }
 
 // The pair as it is now believed, with all that was found so far taken in.
@@ -139,7 +88,6 @@ class Checker {
   void settle_distortion();
   void judge_fit();
   void judge_yaw();
-  void map_errors();
   PairVerdict verdict() const;
   Rig corrected_rig() const;
   PairCheck finish();
@@ -314,12 +262,12 @@ void Checker::judge_fit() {
   for (const PixelMatch& match : check_.matched) taken.push_back(match.left.y() - match.right.y());
   check_.as_taken = row_errors(taken);
   check_.as_given = row_errors(check_.row_error_px);
-  map_errors();
-  const bool spread = 4 * std::ssize(check_.map) >= kColumns * kRows;
+  check_.map = map_row_errors(check_.matched, check_.row_error_px, picture_);
+  const bool spread = 4 * std::ssize(check_.map) >= kRowErrorCells;
   if (check_.inliers < kLeastMatches || !spread) {
     add("not_enough_texture",
         fmt::format("only {} of {} matches agree, in {} of {} parts of the picture: too little to judge by",
-                    check_.inliers, check_.matches, check_.map.size(), kColumns * kRows),
+                    check_.inliers, check_.matches, check_.map.size(), kRowErrorCells),
         check_.inliers);
     return;
   }
@@ -340,24 +288,6 @@ void Checker::judge_fit() {
         fmt::format("the right eye's focal length is {:.2f} % {} than the rig says, beside the left one's",
                     100 * std::abs(ratio), ratio > 0 ? "larger" : "smaller"),
         check_.correction.focal_ratio);
-  }
-}
-
-void Checker::map_errors() {
-  if (picture_.empty()) return;
-  std::vector<std::vector<double>> cells(kColumns * kRows);
-  for (std::size_t i = 0; i < check_.matched.size(); ++i) {
-    const Eigen::Vector2d& p = check_.matched[i].left;
-    const int column = std::clamp(static_cast<int>(p.x() * kColumns / picture_.width), 0, kColumns - 1);
-    const int row = std::clamp(static_cast<int>(p.y() * kRows / picture_.height), 0, kRows - 1);
-    cells[static_cast<std::size_t>(row * kColumns + column)].push_back(check_.row_error_px[i]);
-  }
-  for (int k = 0; k < kColumns * kRows; ++k) {
-    std::vector<double>& errors = cells[static_cast<std::size_t>(k)];
-    if (std::ssize(errors) < kLeastInCell) continue;
-    const double x = (k % kColumns + 0.5) * picture_.width / kColumns,
-                 y = (k / kColumns + 0.5) * picture_.height / kRows;
-    check_.map.push_back({{x, y}, static_cast<int>(errors.size()), median_of(std::move(errors))});
   }
 }
 

@@ -8,21 +8,9 @@
 #include "spartan/rig/pair_refinement.h"
 #include "spartan/rig/rig.h"
 #include "spartan/rig/rig_findings.h"
+#include "spartan/rig/row_errors.h"
 
 namespace spartan {
-
-/// Row differences (left − right) of matches, pixels.
-struct RowErrors {
-  double mean_px = 0, p95_px = 0;  ///< of their absolute values
-  double median_px = 0;            ///< signed
-};
-
-/// A part of the left picture.
-struct RowErrorCell {
-  Eigen::Vector2d centre_px;
-  int matches = 0;
-  double median_px = 0;  ///< signed row difference of the pair as given, in the rectified view
-};
 
 enum class PairVerdict {
   good,    ///< rows agree to 0.5 px in the mean and 1.5 px for 95 %, and nothing is found

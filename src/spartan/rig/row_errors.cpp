@@ -1,0 +1,58 @@
+#include "spartan/rig/row_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace spartan {
+namespace {
+
+constexpr int kColumns = 8, kRows = 6, kLeastInCell = 3;
+static_assert(kColumns * kRows == kRowErrorCells);
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+RowErrors row_errors(const std::vector<double>& signed_px) {
+  if (signed_px.empty()) return {};
+  RowErrors errors;
+  errors.median_px = median_of(signed_px);
+  std::vector<double> absolute;
+  absolute.reserve(signed_px.size());
+  for (const double v : signed_px) absolute.push_back(std::abs(v));
+  std::sort(absolute.begin(), absolute.end());
+  for (const double v : absolute) errors.mean_px += v / static_cast<double>(absolute.size());
+  errors.p95_px = absolute[(absolute.size() * 95) / 100];
+  return errors;
+}
+
+std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches, const std::vector<double>& signed_px,
+                                         ImageSize picture) {
+  if (picture.empty()) return {};
+  std::vector<std::vector<double>> cells(kRowErrorCells);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const Eigen::Vector2d& p = matches[i].left;
+    const int column = std::clamp(static_cast<int>(p.x() * kColumns / picture.width), 0, kColumns - 1);
+    const int row = std::clamp(static_cast<int>(p.y() * kRows / picture.height), 0, kRows - 1);
+    cells[static_cast<std::size_t>(row * kColumns + column)].push_back(signed_px[i]);
+  }
+  std::vector<RowErrorCell> map;
+  for (int k = 0; k < kRowErrorCells; ++k) {
+    std::vector<double>& errors = cells[static_cast<std::size_t>(k)];
+    const int count = static_cast<int>(errors.size());
+    if (count < kLeastInCell) continue;
+    const int column = k % kColumns, row = k / kColumns;
+    map.push_back({{(column + 0.5) * picture.width / kColumns, (row + 0.5) * picture.height / kRows},
+                   count,
+                   median_of(std::move(errors))});
+  }
+  return map;
+}
+
+}  // namespace spartan

@@ -1,0 +1,33 @@
+// How far the rows of two eyes are apart.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "spartan/core/image.h"
+#include "spartan/rig/pair_refinement.h"
+
+namespace spartan {
+
+/// Row differences (left − right) of matches, pixels.
+struct RowErrors {
+  double mean_px = 0, p95_px = 0;  ///< of their absolute values
+  double median_px = 0;            ///< signed
+};
+
+/// A part of the left picture.
+struct RowErrorCell {
+  Eigen::Vector2d centre_px;
+  int matches = 0;
+  double median_px = 0;  ///< signed row difference of the pair as given, in the rectified view
+};
+
+/// All zero without any.
+RowErrors row_errors(const std::vector<double>& signed_px);
+
+/// The picture in 8 × 6 parts; those with at least 3 matches, row by row. Empty where the size is not known.
+std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches, const std::vector<double>& signed_px,
+                                         ImageSize picture);
+inline constexpr int kRowErrorCells = 8 * 6;
+
+}  // namespace spartan
