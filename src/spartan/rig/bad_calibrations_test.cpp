@@ -116,6 +116,10 @@ TEST(BadCalibrations, CutOffAnywhere) {
       EXPECT_NE(files.outcome(), "accepted") << file.path;
       files.put(file, file.content.substr(0, file.content.size() / 2));
       EXPECT_NE(files.outcome(), "accepted") << file.path;
+      if (std::string(each.path).ends_with(".xml")) {
+        files.put(file, file.content.substr(0, file.content.rfind('<')));
+        EXPECT_THAT(files.outcome(), HasSubstr("ends before </opencv_storage>"));
+      }
       files.put_back();
     }
   }

@@ -82,8 +82,8 @@ std::optional<CalibrationFormat> guess_format(const std::string& path, const std
   if (has_line(text, "schema:")) return CalibrationFormat::rig_yaml;
   if (text.find("opencv-matrix") != std::string::npos) return CalibrationFormat::opencv;
   if (has_line(text, "cam0:")) return CalibrationFormat::kalibr;
-  if (has_line(text, "projection_matrix:") || has_line(text, "P:") || has_line(text, "p:"))
-    return CalibrationFormat::ros;
+  const bool message = (has_line(text, "K:") && has_line(text, "P:")) || (has_line(text, "k:") && has_line(text, "p:"));
+  if (message || has_line(text, "projection_matrix:")) return CalibrationFormat::ros;
   if (text.find("LENSMODEL_") != std::string::npos && has_line(text, "{")) return CalibrationFormat::mrcal;
   if (has_line(text, "u_direction")) return CalibrationFormat::tsai;
   if (has_line(text, "Dimensions")) return CalibrationFormat::cahvor;

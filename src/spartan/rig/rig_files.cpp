@@ -144,7 +144,9 @@ Result<ReadRig> read_calibration(const std::string& path, ImageSize size_hint) {
   // Of "LEFT,RIGHT" the first one tells the format; a file whose own name has a comma is that file.
   std::string first = path;
   if (!is_there(path) && path.find(',') != std::string::npos) first.resize(path.find(','));
-  const auto text = rig_detail::read_calibration_text(first, rig_detail::kLargestModelFile_bytes);
+  const bool of_mrcal = fs::path(first).extension() == ".cameramodel";
+  const auto text = rig_detail::read_calibration_text(
+      first, of_mrcal ? rig_detail::kLargestModelFile_bytes : rig_detail::kLargestCalibration_bytes);
   if (!text) return failure(text);
   const auto format = guess_format(first, *text);
   if (!format) {
