@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "program/json.h"
-#include "program/rig_inspect_picture.h"
 #include "program/rig_convert.h"
+#include "program/rig_inspect_picture.h"
 #include "program/rig_pictures.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
@@ -241,9 +241,10 @@ std::string in_words(const InspectArguments& a, const ReadRig& read, const std::
   const bool guessed = a.rig == "-";
   std::string text;
   if (guessed) {
-    text = fmt::format("no calibration: two pinholes side by side are guessed, of {:.0f} px focal length; the length of the "
-                       "baseline is not known\n",
-                       summarize_pair(read.rig, read.rig.pairs.front()).focal_px);
+    text = fmt::format(
+        "no calibration: two pinholes side by side are guessed, of {:.0f} px focal length; the length of the "
+        "baseline is not known\n",
+        summarize_pair(read.rig, read.rig.pairs.front()).focal_px);
   } else {
     for (const std::string& sentence : describe_rig(read.rig)) text += sentence + "\n";
     for (const std::string& note : read.notes) text += note + "\n";
@@ -265,8 +266,7 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
     inspected = std::move(*result);
   }
   if (Status written = write_results(a, read->rig, inspected, workers); !written) return failure(written);
-  const std::string text =
-      context.json ? to_json(read->rig, inspected).dump(2) + "\n" : in_words(a, *read, inspected);
+  const std::string text = context.json ? to_json(read->rig, inspected).dump(2) + "\n" : in_words(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
   return kDone;
 }

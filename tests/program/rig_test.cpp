@@ -212,9 +212,10 @@ TEST(RigInspect, CorrectedK10SeesFlatGroundAndRocks) {
   const testing::TemporaryFolder folder;
   // Level is where the ground is: the rover leans forward by 6.8° to it.
   const auto build = [&](const std::string& rig) {
-    const auto told = run_program({"map", "build", data + "/left4.png", data + "/right4.png", "--rig",
-                                   testing::source_folder() + "/config/rigs/" + rig + ".yaml", "-o",
-                                   folder.path() + "/" + rig, "--extent-m", "9", "--gravity", "0.118,0,-0.993", "--json"});
+    const auto told =
+        run_program({"map", "build", data + "/left4.png", data + "/right4.png", "--rig",
+                     testing::source_folder() + "/config/rigs/" + rig + ".yaml", "-o", folder.path() + "/" + rig,
+                     "--extent-m", "9", "--gravity", "0.118,0,-0.993", "--json"});
     EXPECT_EQ(told.exit_code, 0) << told.err;
     return json::parse(told.out);
   };

@@ -168,7 +168,9 @@ std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
 std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
   const auto at = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
   if (at != entries_.end() && !comes_before(m, *at)) return std::nullopt;
-  return static_cast<std::size_t>(entries_.insert(at, m) - entries_.begin());
+  const auto index = static_cast<std::size_t>(at - entries_.begin());  // the insertion may move all of them
+  entries_.insert(at, m);
+  return index;
 }
 
 std::optional<Refusal> ReplayFilter::take(const Measurement& m) {

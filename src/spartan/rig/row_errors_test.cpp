@@ -22,9 +22,9 @@ TEST(RowErrors, AreMappedOverThePicture) {
     matches.push_back({{x, y}, {x, y}});
     errors.push_back(error);
   };
-  for (const double error : {1.0, 2.0, 9.0}) add(5, 5, error);       // the first cell
+  for (const double error : {1.0, 2.0, 9.0}) add(5, 5, error);         // the first cell
   for (const double error : {-3.0, -3.0, -3.0}) add(799, 599, error);  // the last one
-  for (const double error : {7.0, 7.0}) add(400, 300, error);        // too few
+  for (const double error : {7.0, 7.0}) add(400, 300, error);          // too few
   const auto map = map_row_errors(matches, errors, {800, 600});
   ASSERT_EQ(map.size(), 2u);
   EXPECT_EQ(map[0].median_px, 2);
