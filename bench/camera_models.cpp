@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <exception>
 #include <functional>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/ccalib/omnidir.hpp>
@@ -200,7 +202,7 @@ void report(const Case& c) {
 }  // namespace
 }  // namespace spartan
 
-int main() {
+int main() try {
   cv::setNumThreads(1);
   fmt::print(
       "Grid of {0} x {0} places over {1} x {2} px; ms per million, medians of {3} runs on one thread.\n"
@@ -209,4 +211,7 @@ int main() {
       "oracle's project |\n|---|---|---|---|---|---|---|---|---|---|\n",
       spartan::kGrid + 1, spartan::kSize.width, spartan::kSize.height, spartan::kRuns);
   for (const spartan::Case& c : spartan::cases()) spartan::report(c);
+} catch (const std::exception& e) {
+  std::fputs(e.what(), stderr);
+  return 1;
 }

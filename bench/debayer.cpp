@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -140,6 +142,7 @@ void compare(const std::vector<fs::path>& files, int repeat) {
       for (std::size_t i = 0; i < all.size(); ++i) {
         cv::Mat result;
         std::vector<double> runs;
+        runs.reserve(static_cast<std::size_t>(repeat));
         for (int r = 0; r < repeat; ++r) runs.push_back(milliseconds([&] { all[i].run(mosaic, pattern, result); }));
         times[i].push_back(median(runs));
         const double value = psnr(colours, result, all[i].rows_down);
@@ -183,6 +186,7 @@ void time_targets(int repeat) {
   const spartan::Workers one(1);
   const auto time = [&](const Debayerer& d, const auto& mosaic, auto& result) {
     std::vector<double> runs;
+    runs.reserve(static_cast<std::size_t>(repeat));
     for (int r = 0; r < repeat; ++r) {
       runs.push_back(milliseconds([&] { d.apply(mosaic.view(), PixelLayout::bayer_grbg, result.view(), one); }));
     }
@@ -200,6 +204,7 @@ void time_targets(int repeat) {
   for (const auto& [name, code] :
        {std::pair{"OpenCV", &Pattern::bilinear}, {"OpenCV VNG", &Pattern::vng}, {"OpenCV EA", &Pattern::edge_aware}}) {
     std::vector<double> runs;
+    runs.reserve(static_cast<std::size_t>(repeat));
     cv::Mat result;
     for (int r = 0; r < repeat; ++r) {
       runs.push_back(milliseconds([&] { cv::cvtColor(spartan::as_mat(mosaic8), result, kPatterns[1].*code); }));
@@ -210,7 +215,7 @@ void time_targets(int repeat) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   int repeat = 9;
   for (int i = 1; i + 1 < argc; ++i) {
     if (std::strcmp(argv[i], "--repeat") == 0) repeat = std::max(1, std::atoi(argv[i + 1]));
@@ -225,4 +230,7 @@ int main(int argc, char** argv) {
   }
   time_targets(repeat);
   return 0;
+} catch (const std::exception& e) {
+  std::fputs(e.what(), stderr);
+  return 1;
 }

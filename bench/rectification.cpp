@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <functional>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
@@ -173,7 +175,7 @@ void print_limit(const Scene& scene, int repeat) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   int repeat = 201;
   for (int i = 1; i + 1 < argc; ++i) {
     if (std::strcmp(argv[i], "--repeat") == 0) repeat = std::max(1, std::atoi(argv[i + 1]));
@@ -192,4 +194,7 @@ int main(int argc, char** argv) {
     print_limit(scene, repeat);
   }
   return 0;
+} catch (const std::exception& e) {
+  std::fputs(e.what(), stderr);
+  return 1;
 }
