@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 
 constexpr ImageSize kSize{64, 48};
 
-Camera camera(const std::string& name, PixelFormat format, CameraModel model = PinholeModel{60, 60, 32, 24}) {
+Camera camera(const std::string& name, PixelFormat format, const CameraModel& model = PinholeModel{60, 60, 32, 24}) {
   Camera result;
   result.name = name;
   result.size = kSize;

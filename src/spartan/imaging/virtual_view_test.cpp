@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 
 constexpr ImageSize kSize{160, 120};
 
-Camera camera_with(CameraModel model) {
+Camera camera_with(const CameraModel& model) {
   Camera camera;
   camera.name = "camera";
   camera.size = kSize;
