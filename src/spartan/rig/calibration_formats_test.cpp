@@ -426,7 +426,7 @@ TEST_F(TsaiCalib, FaultsAreNamed) {
 
 // --- OpenCV ---
 
-cv::Mat row(std::vector<double> numbers, int rows = 1) {
+cv::Mat row(const std::vector<double>& numbers, int rows = 1) {
   return cv::Mat(numbers, true).reshape(1, rows);
 }
 

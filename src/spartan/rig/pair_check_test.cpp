@@ -74,6 +74,7 @@ PairCheck check(const Rig& believed, const std::vector<PixelMatch>& matches) {
 
 std::vector<std::string> ids(const PairCheck& result) {
   std::vector<std::string> names;
+  names.reserve(result.findings.size());
   for (const RigFinding& finding : result.findings) names.push_back(finding.id);
   return names;
 }
