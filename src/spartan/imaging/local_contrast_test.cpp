@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
@@ -18,7 +19,7 @@ Image<std::uint8_t> picture(ImageSize size) {
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const double level = 90 + 60 * std::sin(0.02 * x) + 20 * std::cos(0.3 * y) + random.uniform(-15, 15);
-      image(x, y) = static_cast<std::uint8_t>(level);
+      image(x, y) = static_cast<std::uint8_t>(std::max(level, 0.0));
     }
   }
   return image;
