@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -16,6 +15,7 @@
 
 #include "spartan/rig/camera_model.h"
 #include "spartan/testing/camera_model_laws.h"
+#include "timing.h"
 #ifdef SPARTAN_HAS_MRCAL
 #include "spartan/testing/mrcal_oracle.h"
 #endif
@@ -128,17 +128,6 @@ Eigen::Vector3d at_distance(const Ray& ray, double distance) {
   return ray.origin + way * ray.direction;
 }
 
-double milliseconds(const std::function<void()>& work) {
-  std::vector<double> times;
-  for (int run = 0; run < kRuns; ++run) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-  }
-  std::nth_element(times.begin(), times.begin() + kRuns / 2, times.end());
-  return times[kRuns / 2];
-}
-
 struct Accuracy {
   int seen = 0, asked = 0, compared = 0;
   double oracle_px = 0, round_trip_px = 0, jacobian = 0;  // largest; the last relative
@@ -181,16 +170,17 @@ void report(const Case& c) {
     same.emplace_back(points.back().x(), points.back().y(), points.back().z());
   }
   double sum = 0;
-  const double project_ms = milliseconds([&] {
+  const double project_ms = median_milliseconds(kRuns, [&] {
     for (const Eigen::Vector3d& p : points) sum += project(c.model, p)->x();
   });
-  const double jacobian_ms = milliseconds([&] {
+  const double jacobian_ms = median_milliseconds(kRuns, [&] {
     for (const Eigen::Vector3d& p : points) sum += project_with_jacobian(c.model, p)->by_point(0, 0);
   });
-  const double unproject_ms = milliseconds([&] {
+  const double unproject_ms = median_milliseconds(kRuns, [&] {
     for (const Eigen::Vector2d& p : pixels) sum += unproject(c.model, p)->direction.x();
   });
-  const double oracle_ms = c.oracle.project ? milliseconds([&] { sum += c.oracle.project(same).front().x; }) : NAN;
+  const double oracle_ms =
+      c.oracle.project ? median_milliseconds(kRuns, [&] { sum += c.oracle.project(same).front().x; }) : NAN;
   constexpr double kPerMillion = 1e6 / kPoints;
   fmt::print("| {} | {} | {:.0f} % | {} | {:.1e} | {:.1e} | {:.0f} | {:.0f} | {:.0f} | {} |\n", c.name, c.oracle.name,
              100.0 * a.seen / a.asked, c.oracle.project ? fmt::format("{:.1e}", a.oracle_px) : "-", a.round_trip_px,

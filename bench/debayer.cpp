@@ -24,6 +24,7 @@
 
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/core/simd_target.h"
+#include "timing.h"
 
 namespace {
 
@@ -36,16 +37,8 @@ namespace fs = std::filesystem;
 
 constexpr int kBorder = 8;  // left out on every side, for all methods
 
-double milliseconds(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
+using spartan::median;
+using spartan::milliseconds;
 
 struct Pattern {
   PixelLayout layout;

@@ -25,9 +25,8 @@
 #include "spartan/reconstruction/disparity_options.h"
 #include "stereo_pairs.h"
 
+namespace spartan {
 namespace {
-
-using namespace spartan;  // NOLINT(google-build-using-namespace): a program
 
 struct Variant {
   std::string name;
@@ -202,23 +201,28 @@ void compare_debayering(const std::vector<Pair>& pairs, int threads) {
   }
 }
 
+void run(int threads) {
+  const char* const data = std::getenv("SPARTAN_DATA");
+  const std::filesystem::path folder = data != nullptr ? data : "../shared/data";
+  if (!std::filesystem::exists(folder / "middlebury")) {
+    fmt::print("no stereo pairs: SPARTAN_DATA does not name the data folder\n");
+    return;
+  }
+  const std::vector<Pair> pairs = load_stereo_pairs(folder);
+  compare_contrast(pairs, threads);
+  compare_lenses(pairs, threads);
+  compare_debayering(pairs, threads);
+}
+
 }  // namespace
+}  // namespace spartan
 
 int main(int argc, char** argv) try {
   int threads = 1;
   for (int i = 1; i + 1 < argc; ++i) {
     if (std::strcmp(argv[i], "--threads") == 0) threads = std::max(1, std::atoi(argv[i + 1]));
   }
-  const char* const data = std::getenv("SPARTAN_DATA");
-  const std::filesystem::path folder = data != nullptr ? data : "../shared/data";
-  if (!std::filesystem::exists(folder / "middlebury")) {
-    fmt::print("no stereo pairs: SPARTAN_DATA does not name the data folder\n");
-    return 0;
-  }
-  const std::vector<Pair> pairs = load_stereo_pairs(folder);
-  compare_contrast(pairs, threads);
-  compare_lenses(pairs, threads);
-  compare_debayering(pairs, threads);
+  spartan::run(threads);
   return 0;
 } catch (const std::exception& e) {
   std::fputs(e.what(), stderr);

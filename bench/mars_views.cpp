@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "mars_stops.h"
+#include "spartan/core/median.h"
 #include "spartan/eval/disparity_truth.h"
 #include "standard_recordings.h"
 
@@ -71,12 +72,6 @@ int cells_of_one(const PositionView& view, PositionMapper& mapper, const Pose& p
   const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), geometry, 0.3, Workers(2));
   const std::vector<MergedView> views{{view.geometry, view.disparity, view.left, {}}};
   return known_cells(mapper.map(surface_points(merger.merge(views)), pose));
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Error of the height of a pixel of the merged view.

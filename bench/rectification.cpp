@@ -22,22 +22,15 @@
 #include "spartan/core/rotation.h"
 #include "spartan/core/simd_target.h"
 #include "spartan/imaging/remap.h"
+#include "timing.h"
 
 namespace {
 
 using spartan::Image;
 using spartan::ImageSize;
 
-double milliseconds(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
+using spartan::median;
+using spartan::milliseconds;
 
 // A picture with detail down to a pixel, smooth enough that interpolation means something.
 template <class Pixel, int kChannels>

@@ -9,6 +9,7 @@
 
 #include "program/json.h"
 #include "program/map.h"
+#include "spartan/core/median.h"
 #include "spartan/system/saved_map.h"
 
 namespace spartan::program {
@@ -26,12 +27,6 @@ struct Agreement {
     return cells > 0 && std::abs(median_m) > std::max(kSuspicious_m, kSuspiciousSigmas * sigma_m);
   }
 };
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Elevations of b over those of a.
 Result<Agreement> compare(GlobalMap& a, GlobalMap& b) {

@@ -23,12 +23,6 @@ struct Strip {
   std::vector<PixelMatch> matches;
 };
 
-Image<std::uint8_t> copy_of(ImageView<const std::uint8_t> view) {
-  Image<std::uint8_t> image(view.size());
-  for (int y = 0; y < view.height(); ++y) std::copy_n(view.row(y), view.width(), image.row(y));
-  return image;
-}
-
 std::string in_words(const RowErrors& rows) {
   return fmt::format("rows differ by {:.2f} px, 95 %: {:.2f} px", rows.mean_px, rows.p95_px);
 }
@@ -50,7 +44,7 @@ std::optional<Strip> rectified(const Rig& rig, const StereoPair& pair, const Str
   frame.right = FrameImage::borrow(std::as_const(taken.right).view(), {});
   const auto views = imager->process(frame);
   if (!views) return std::nullopt;
-  Strip strip{{}, copy_of(views->left), copy_of(views->right), {}};
+  Strip strip{{}, Image<std::uint8_t>::copy_of(views->left), Image<std::uint8_t>::copy_of(views->right), {}};
   const auto place = [&](const Camera& camera, const Eigen::Matrix3d& from_rectified, const Eigen::Vector2d& pixel) {
     const auto ray = unproject(camera.model, pixel);
     if (!ray) return Eigen::Vector2d(NAN, NAN);
@@ -110,7 +104,8 @@ Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, cons
                                     ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                     const std::vector<PixelMatch>& matches, const Workers& workers) {
   std::vector<Strip> strips;
-  strips.push_back({"as taken: " + in_words(check.as_taken), copy_of(left), copy_of(right), matches});
+  strips.push_back({"as taken: " + in_words(check.as_taken), Image<std::uint8_t>::copy_of(left),
+                    Image<std::uint8_t>::copy_of(right), matches});
   if (auto given = rectified(plain(rig), pair, strips.front(), workers)) {
     given->heading = "rectified as given: " + in_words(check.as_given);
     strips.push_back(std::move(*given));

@@ -48,12 +48,6 @@ std::vector<std::size_t> spread(std::size_t count, int most) {
   return places;
 }
 
-Image<std::uint8_t> copy_of(ImageView<const std::uint8_t> view) {
-  Image<std::uint8_t> image(view.size());
-  for (int y = 0; y < view.height(); ++y) std::copy_n(view.row(y), view.width(), image.row(y));
-  return image;
-}
-
 }  // namespace
 
 Result<std::vector<PicturePair>> load_pictures(const std::string& left, const std::string& right, int most) {
@@ -106,7 +100,8 @@ Result<std::vector<PicturePair>> load_shots(FrameSource& source, const std::stri
       reason = taken.error().message();
       continue;
     }
-    pairs.push_back({fmt::format("frame {}", frame->frame_id), copy_of(taken->left), copy_of(taken->right)});
+    pairs.push_back({fmt::format("frame {}", frame->frame_id), Image<std::uint8_t>::copy_of(taken->left),
+                     Image<std::uint8_t>::copy_of(taken->right)});
   }
   if (pairs.empty()) return failure(ErrorCode::input, fmt::format("pair {}: {}", pair, reason), source.info().path);
   return pairs;

@@ -11,6 +11,7 @@
 #include "spartan/core/image_io.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
@@ -18,6 +19,7 @@ namespace {
 using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using testing::replaced;
 using testing::run_program;
 
 const std::string& rover() {
@@ -26,11 +28,6 @@ const std::string& rover() {
 }
 std::string rover_text() {
   return testing::content_of(rover());
-}
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), with);
 }
 std::size_t lines_of(const std::string& text) {
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));

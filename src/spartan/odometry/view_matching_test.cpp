@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "spartan/core/median.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/synthetic_world.h"
 
@@ -18,11 +19,6 @@ testing::SyntheticShot shot() {
   const testing::SyntheticWorld world{testing::SyntheticWorldOptions()};
   const Pose tilted = Pose(exp_so3({0, 0.4, 0}), {0, 0, 0.5});
   return world.render(kStereo, tilted * optical_from_forward().inverse(), 1);
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + std::ssize(values) / 2, values.end());
-  return values[values.size() / 2];
 }
 
 // On a rectified pair of a world without noise rows are known, though nothing presumes them.

@@ -8,24 +8,15 @@
 #include "spartan/rig/rig_files.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
 
+using testing::complaint;
 using ::testing::HasSubstr;
+using testing::replaced;
 using testing::TemporaryFolder;
-
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), with);
-}
-
-std::string complaint(const Result<Rig>& rig) {
-  if (rig) return "nothing";
-  EXPECT_EQ(rig.error().code, ErrorCode::configuration);
-  return rig.error().message();
-}
 
 Eigen::Vector3d right_in_left(const Rig& rig) {
   return rig.right_from_left(rig.pairs[0]).inverse().translation();

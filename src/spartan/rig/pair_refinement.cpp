@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "spartan/core/median.h"
 #include "spartan/rig/rectifying_axes.h"
 
 namespace spartan {
@@ -90,13 +91,6 @@ class CorrectedPair {
   RectifyingAxes axes_;
 };
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::vector<double> finite_only(const std::vector<double>& values) {
   std::vector<double> result;
   std::copy_if(values.begin(), values.end(), std::back_inserter(result), [](double v) { return std::isfinite(v); });
@@ -121,7 +115,7 @@ class Fitter {
   void run() {
     leverage_ = bounded_leverage();
     // The median row difference is a pitch; from there on the rest is small.
-    at_[0] = std::atan(median_of(finite_only(residuals(at_))) / focal_px_);
+    at_[0] = std::atan(median(finite_only(residuals(at_))) / focal_px_);
     if (median_absolute(at_) > median_absolute(Parameters::Zero())) at_.setZero();
     // A wrong match may have any disparity, and a large one pulls hard at the baseline's direction: that stays until
     // wrong matches count little.
@@ -186,7 +180,7 @@ class Fitter {
   double median_absolute(const Parameters& p) const {
     std::vector<double> values = finite_only(residuals(p));
     for (double& v : values) v = std::abs(v);
-    return median_of(std::move(values));
+    return median(std::move(values));
   }
 
   // Weights are inverse variances; the derivatives by forward differences, exact enough for so smooth a function.
@@ -223,9 +217,9 @@ class Fitter {
   std::vector<double> bounded_leverage() const {
     constexpr double kSpreads = 5, kLeastSpread_px = 4;
     std::vector<double> values = disparities(at_);
-    const double middle = median_of(finite_only(values));
+    const double middle = median(finite_only(values));
     for (double& v : values) v = std::abs(v - middle);
-    const double reach = kSpreads * std::max(1.4826 * median_of(finite_only(values)), kLeastSpread_px);
+    const double reach = kSpreads * std::max(1.4826 * median(finite_only(values)), kLeastSpread_px);
     for (double& v : values) v = std::isfinite(v) ? 1 / (1 + v * v * v * v / (reach * reach * reach * reach)) : 0;
     return values;
   }
@@ -321,7 +315,7 @@ PairFit fit_pair(const CameraModel& left, const CameraModel& right, const Pose& 
 
   std::vector<double> absolute = finite_only(fit.row_error_after_px);
   for (double& v : absolute) v = std::abs(v);
-  const double spread_px = std::max(1.4826 * median_of(absolute), options.match_sigma_px);
+  const double spread_px = std::max(1.4826 * median(absolute), options.match_sigma_px);
   double sum = 0;
   for (const double error : fit.row_error_after_px) {
     const bool fits = std::abs(error) <= 4 * spread_px;

@@ -10,12 +10,14 @@
 #include "spartan/rig/rig_designer.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using testing::replaced;
 
 const std::string kGood = R"(schema: 1
 wide:
@@ -35,17 +37,8 @@ wide:
   order: [range_margin]
 )";
 
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), with);
-}
-
 std::string complaint(const std::string& what, const std::string& with) {
-  const auto requirements = parse_requirements(replaced(kGood, what, with), "my.yaml");
-  if (requirements) return "nothing";
-  EXPECT_EQ(requirements.error().code, ErrorCode::configuration);
-  return requirements.error().message();
+  return testing::complaint(parse_requirements(replaced(kGood, what, with), "my.yaml"));
 }
 
 TEST(Requirements, ReadsTheShortestFile) {

@@ -8,11 +8,13 @@
 #include "spartan/rig/rig_files.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::replaced;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -30,18 +32,9 @@ pairs:
   p: {left: l, right: r}
 )";
 
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), with);
-}
-
 // What is said about the good file after a change.
 std::string complaint(const std::string& what, const std::string& with) {
-  const auto rig = parse_rig_yaml(replaced(kGood, what, with), "my.yaml");
-  if (rig) return "nothing";
-  EXPECT_EQ(rig.error().code, ErrorCode::configuration);
-  return rig.error().message();
+  return testing::complaint(parse_rig_yaml(replaced(kGood, what, with), "my.yaml"));
 }
 
 TEST(RigYaml, ReadsVignetting) {

@@ -4,25 +4,20 @@
 #include <cmath>
 #include <utility>
 
+#include "spartan/core/median.h"
+
 namespace spartan {
 namespace {
 
 constexpr int kColumns = 8, kRows = 6, kLeastInCell = 3;
 static_assert(kColumns * kRows == kRowErrorCells);
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 RowErrors row_errors(const std::vector<double>& signed_px) {
   if (signed_px.empty()) return {};
   RowErrors errors;
-  errors.median_px = median_of(signed_px);
+  errors.median_px = median(signed_px);
   std::vector<double> absolute;
   absolute.reserve(signed_px.size());
   for (const double v : signed_px) absolute.push_back(std::abs(v));
@@ -50,7 +45,7 @@ std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches,
     const int column = k % kColumns, row = k / kColumns;
     map.push_back({{(column + 0.5) * picture.width / kColumns, (row + 0.5) * picture.height / kRows},
                    count,
-                   median_of(std::move(errors))});
+                   median(std::move(errors))});
   }
   return map;
 }

@@ -12,17 +12,13 @@
 #include <utility>
 #include <vector>
 
+#include "spartan/core/median.h"
+
 namespace spartan {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kLeastVariance = 1e-4;  // of what is believed at all
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Square of the lattice that a cell lies in.
 std::pair<int, int> block_of(const MatchedCell& cell, double cell_m, double block_m) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "spartan/core/median.h"
 #include "spartan/core/random.h"
 
 namespace spartan::testing {
@@ -28,11 +29,6 @@ Pose looking_down(double height_m, double tilt_rad, double x = 0, double y = 0) 
 double sample(const Image<std::uint8_t>& image, double x, int y) {
   const int left = std::min(static_cast<int>(x), image.width() - 2);
   return image(left, y) + (x - left) * (image(left + 1, y) - image(left, y));
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
 }
 
 // Median |left − right warped onto it| with the truth shifted by `error_px`.

@@ -1,0 +1,179 @@
+// mrcal and JPL: files that mrcal 2.2 wrote, and where it says that the point (3, 0.4, 0.2) is seen.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "spartan/rig/rig_files.h"
+#include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
+
+namespace spartan {
+namespace {
+
+using testing::complaint;
+using ::testing::HasSubstr;
+using testing::replaced;
+using testing::TemporaryFolder;
+
+// Where the body's point is seen, brought to 1 m from the camera: mrcal does so before it looks, and only CAHVORE,
+// which is not central, sees a difference.
+Eigen::Vector2d seen(const Rig& rig, const char* camera, const Eigen::Vector3d& point) {
+  return project(rig.find_camera(camera)->model, (rig.body_from_camera(camera).inverse() * point).normalized()).value();
+}
+
+Eigen::Vector3d right_in_left(const Rig& rig) {
+  return rig.right_from_left(rig.pairs[0]).inverse().translation();
+}
+
+struct OfMrcal {
+  const char *name, *numbers, *cahvor_model, *cahvor_lines;
+  Eigen::Vector2d left, right;
+};
+const OfMrcal kOfMrcal[] = {
+    {"PINHOLE", "", "CAHV = perspective, linear", "", {565.30695802, 282.08847828}, {525.33661675, 272.78024447}},
+    {"OPENCV4",
+     " -0.1, 0.02, 0.0004, -0.0007,",
+     "CAHV = perspective, linear",
+     "LENSMODEL_OPENCV4 =   -0.1000000000    0.0200000000    0.0004000000   -0.0007000000\n",
+     {565.46936326, 282.27740384},
+     {525.78603331, 273.15118749}},
+    {"OPENCV8",
+     " 0.1, -0.2, 0.0004, -0.0007, 0.05, 0.3, -0.15, 0.04,",
+     "CAHV = perspective, linear",
+     "LENSMODEL_OPENCV8 =    0.1000000000   -0.2000000000    0.0004000000   -0.0007000000    0.0500000000    "
+     "0.3000000000   -0.1500000000    0.0400000000\n",
+     {565.64935205, 282.4657228},
+     {526.2776815, 273.52648981}},
+    {"CAHVOR",
+     " 0.01, -0.02, 0.001, -0.1, 0.02,",
+     "CAHVOR = perspective, distortion",
+     "O =    {}\nR =    0.0010000000   -0.1000000000    0.0200000000\n",
+     {565.40525174, 282.165703},
+     {525.71437322, 273.00856851}},
+    {"CAHVORE_linearity=0.40",
+     " 0.01, -0.02, 0.001, -0.1, 0.02, 0.002, -0.001, 0.0003,",
+     "CAHVORE3,0.40 = general",
+     "O =    {}\nR =    0.0010000000   -0.1000000000    0.0200000000\n"
+     "E =    0.0020000000   -0.0010000000    0.0003000000\n",
+     {565.90303118, 282.55678472},
+     {527.07792514, 273.83272829}},
+};
+
+std::string cameramodel(const OfMrcal& of, bool left) {
+  const char* place = left ? "1.450793522, -1.465374484, 1.00454599, 0.07658262933, 0.8785734014, 0.214111838"
+                           : "1.472013065, -1.472013065, 1.028903554, -0.06777136222, 0.8771103171, 0.2229002783";
+  return fmt::format(
+      "# a note\n{{\n    'lensmodel':  'LENSMODEL_{}',\n\n    # intrinsics are "
+      "fx,fy,cx,cy,distortion0,distortion1,....\n"
+      "    'intrinsics': [ 700, 701.5, 640.25, 360.5,{}],\n\n    'valid_intrinsics_region': [\n    [ 0, 0 ],\n    [ "
+      "10, 0 "
+      "],\n    [ 10, 10 ],\n    [ 0, 0 ],\n],\n\n    # extrinsics are rt_fromref\n    'extrinsics': [ {},],\n\n"
+      "    'imagersize': [ 1280, 720,],\n\n    'icam_intrinsics': 0,\n\n    'optimization_inputs': "
+      "b'P)h>@6aWYS2ml*O00{{xUS#u{{1d',\n}}\n",
+      of.name, of.numbers, place);
+}
+
+std::string cahvor(const OfMrcal& of, bool left) {
+  const std::string o =
+      left ? "0.9459821133   -0.0009361639   -0.3242174655" : "0.9425976388   -0.0192241307   -0.3333768501";
+  std::string lines = of.cahvor_lines;
+  if (const std::size_t at = lines.find("{}"); at != std::string::npos) lines.replace(at, 2, o);
+  return fmt::format(
+      "Dimensions = 1280 720\nModel = {}\n{}{}"
+      "VALID_INTRINSICS_REGION = 0.00 0.00 10.00 0.00 10.00 10.00 0.00 0.00 \nHs = 700.0\nHc = 640.25\n"
+      "Vs = 701.5\nVc = 360.5\n# this is hard-coded\nTheta = -1.5707963267948966 (-90.0 deg)\n",
+      of.cahvor_model,
+      left
+          ? "C =    0.1000000000    0.0600000000    0.9000000000\nA =    0.9393257446    0.0093935706   -0.3428978075\n"
+            "H =  603.6017821237 -693.8587800951 -232.6906624729\nV =   98.0039622846   15.0098384600 -782.4528280516\n"
+          : "C =    0.1000000000   -0.0600000000    0.9000000000\nA =    0.9358500292   -0.0093588123   -0.3522742333\n"
+            "H =  594.6442031113 -705.9466402538 -218.9924092760\nV =   90.2081244458   -7.9173451577 "
+            "-783.4936565982\n",
+      lines);
+}
+
+TEST(MrcalCalib, SeesWhatMrcalSees) {
+  for (const OfMrcal& of : kOfMrcal) {
+    SCOPED_TRACE(of.name);
+    const TemporaryFolder folder;
+    folder.write("right.cameramodel", cameramodel(of, false));
+    const auto read = read_calibration(folder.write("left.cameramodel", cameramodel(of, true)));
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_EQ(read->rig.convention, PoseConvention::body);
+    // The files hold ten digits.
+    EXPECT_LE((seen(read->rig, "left", {3, 0.4, 0.2}) - of.left).norm(), 1e-5);
+    EXPECT_LE((seen(read->rig, "right", {3, 0.4, 0.2}) - of.right).norm(), 1e-5);
+    EXPECT_EQ(read->rig.cameras[0].size, (ImageSize{1280, 720}));
+  }
+}
+
+TEST(CahvorCalib, SeesWhatMrcalSees) {
+  for (const OfMrcal& of : kOfMrcal) {
+    SCOPED_TRACE(of.name);
+    const TemporaryFolder folder;
+    folder.write("right.cahvor", cahvor(of, false));
+    const auto read = read_calibration(folder.write("left.cahvor", cahvor(of, true)));
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_LE((seen(read->rig, "left", {3, 0.4, 0.2}) - of.left).norm(), 1e-5);
+    EXPECT_LE((seen(read->rig, "right", {3, 0.4, 0.2}) - of.right).norm(), 1e-5);
+  }
+}
+
+TEST(MrcalCalib, OtherModelsAreRefusedByName) {
+  const TemporaryFolder folder;
+  folder.write("right.cameramodel", cameramodel(kOfMrcal[0], false));
+  const auto said = [&](const std::string& what, const std::string& with) {
+    return complaint(
+        read_calibration(folder.write("left.cameramodel", replaced(cameramodel(kOfMrcal[0], true), what, with))));
+  };
+  EXPECT_THAT(said("LENSMODEL_PINHOLE", "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3"),
+              HasSubstr("left.cameramodel:3: lensmodel: LENSMODEL_SPLINED_STEREOGRAPHIC_order=3 is not supported"));
+  EXPECT_THAT(said("LENSMODEL_PINHOLE", "LENSMODEL_LATLON"), HasSubstr("LATLON is not supported"));
+  EXPECT_THAT(said("LENSMODEL_PINHOLE", "DISTORTION_PINHOLE"), HasSubstr("nothing"));
+  EXPECT_THAT(said("360.5,", "360.5, 1,"), HasSubstr("left.cameramodel:6: intrinsics: has 5 numbers, must have 4"));
+}
+
+// What JPL's and Ames' own programs write beside that.
+TEST(CahvorCalib, EveryWayToSayALinearityIsKnown) {
+  const auto linearity = [](const std::string& model, const std::string& further) {
+    const TemporaryFolder folder;
+    OfMrcal of = kOfMrcal[4];
+    of.cahvor_model = model.c_str();
+    const auto text = [&](bool left) { return cahvor(of, left) + further; };
+    folder.write("r.cahvore", text(false));
+    const auto read = read_calibration(folder.write("l.cahvore", text(true)));
+    if (!read) return complaint(read);
+    return fmt::format("{}", std::get<CahvoreModel>(read->rig.cameras[0].model).linearity());
+  };
+  EXPECT_EQ(linearity("CAHVORE1 = perspective, distortion, pupil", ""), "1");
+  EXPECT_EQ(linearity("CAHVORE2 = fish-eye", ""), "0");
+  EXPECT_EQ(linearity("CAHVORE3,0.25 = general", ""), "0.25");
+  EXPECT_EQ(linearity("CAHVORE3,-0.25 = general", ""), "-0.25");
+  EXPECT_EQ(linearity("CAHVORE", "T = 2\nP = 0\n"), "0");
+  EXPECT_EQ(linearity("CAHVORE", "T = 3\nP = 0.5\n"), "0.5");
+  EXPECT_THAT(linearity("CAHVORE3 = general", ""), HasSubstr("l.cahvore:2: Model: must be CAHVORE of type"));
+  EXPECT_THAT(linearity("CAHVORE3,2 = general", ""), HasSubstr("Model"));
+  EXPECT_THAT(linearity("CAHVORE4 = odd", ""), HasSubstr("Model"));
+  EXPECT_THAT(linearity("CAHVORE", ""), HasSubstr("E: a CAHVORE must say its type"));
+  EXPECT_THAT(linearity("RPC = odd", ""), HasSubstr("Model: RPC is not supported"));
+}
+
+TEST(CahvorCalib, ASkewIsKept) {
+  const TemporaryFolder folder;
+  // A = z, H = (fx, 0, cx), V = (skew, fy, cy).
+  const auto text = [](double x) {
+    return fmt::format(
+        "Model = CAHV = perspective, linear\nDimensions = 640 480\nC = {} 0 0\nA = 0 0 1\nH = 500 0 320\n"
+        "V = 0.25 501 240\n",
+        x);
+  };
+  folder.write("right.cahv", text(0.1));
+  const auto read = read_calibration(folder.write("left.cahv", text(0)));
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(read->rig.cameras[0].model, CameraModel(CahvModel{{500, 501, 320, 240}, 0.25}));
+  EXPECT_EQ(read->rig.convention, PoseConvention::left_optical) << "no frame that REP-103 knows";
+  EXPECT_LE((right_in_left(read->rig) - Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-15);
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,27 @@
+// What tests of file readers ask again and again: a good text made bad, and what is said about it.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "spartan/core/result.h"
+
+namespace spartan::testing {
+
+/// The text with the first `what` replaced; the test fails where there is none.
+inline std::string replaced(std::string text, const std::string& what, const std::string& with) {
+  const std::size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return at == std::string::npos ? text : text.replace(at, what.size(), with);
+}
+
+/// The message of an error, whose code must be `configuration`; "nothing" where there is none.
+template <class T>
+std::string complaint(const Result<T>& read) {
+  if (read) return "nothing";
+  EXPECT_EQ(read.error().code, ErrorCode::configuration);
+  return read.error().message();
+}
+
+}  // namespace spartan::testing
