@@ -52,7 +52,6 @@ class Checker {
   PairCheck run() && {
     if (found("not_beside")) return finish();
     settle_stated_size();
-    fit();
     settle_eyes();
     search_size();
     settle_distortion();
@@ -80,7 +79,6 @@ class Checker {
     options.yaw = yaw;
     return fit_pair(left, right, left_from_right_, matches_, options);
   }
-  void fit() { fit_ = fit_of(left_.model, right_.model, false); }
 
   void settle_stated_size();
   void search_size();
@@ -182,6 +180,7 @@ void Checker::settle_eyes() {
   Belief same = judged({left_, right_, on_the_left ? inverse : left_from_right_, matches_, {}, 1});
   Belief other = judged(on_the_left ? Belief{right_, left_, inverse, exchanged, {}, 1}
                                     : Belief{left_, right_, left_from_right_, exchanged, {}, 1});
+  fit_ = same.fit;
   if (std::max(same.fit.inliers, other.fit.inliers) < kLeastMatches) return;
   const bool same_fails = same.wrong_share > 0.5, other_fails = other.wrong_share > 0.5;
   const bool exchange = !other_fails && (same_fails || other.fit.cost < kClearlyBetter * same.fit.cost);
