@@ -94,12 +94,13 @@ Vector2d on_plane(const Vector3d& direction) {
   return direction.head<2>().normalized() * kLargestTangent;
 }
 
-/// The mean of an eye's outline on the plane at depth 1.
-std::optional<Vector2d> mean_outline(const EyeOnPlane& eye) {
+/// The mean of an eye's outline on the plane at depth 1. What lies beyond `reach` has no more say than what lies there:
+/// a fisheye's picture ends at 84° on one side and 86° on the other, and they are as far apart as 0° and 67°.
+std::optional<Vector2d> mean_outline(const EyeOnPlane& eye, const Vector2d& reach) {
   Vector2d sum = Vector2d::Zero();
   int count = 0;
   for (const Vector3d& direction : eye.outline()) {
-    sum += on_plane(direction);
+    sum += on_plane(direction).cwiseMax(-reach).cwiseMin(reach);
     ++count;
   }
   if (count == 0) return std::nullopt;
@@ -229,18 +230,17 @@ Result<RectifiedStereo> choose_view(const TurnedEye& left, const TurnedEye& righ
   const ImageSize size = view.size.empty() ? left.camera.size : view.size;
   if (view.policy == ViewPolicy::whole_view) return show_what_either_sees(eyes, size, view.focal_px, where);
 
-  const auto left_outline = mean_outline(eyes.left), right_outline = mean_outline(eyes.right);
+  const auto left_resolution = resolution_on_axis(left.camera, depth);
+  const auto right_resolution = resolution_on_axis(right.camera, depth);
+  if (!left_resolution || !right_resolution) return failure(ErrorCode::configuration, kNoCommonView, where);
+  const double natural_focal = (*left_resolution + *right_resolution) / 2;
+  // Ordinary lenses end within twice what a pinhole of their focal length would see.
+  const Vector2d reach = 2 * middle_of(left.camera.size) / natural_focal;
+  const auto left_outline = mean_outline(eyes.left, reach), right_outline = mean_outline(eyes.right, reach);
   if (!left_outline || !right_outline) return failure(ErrorCode::configuration, kNoCommonView, where);
   const Vector2d centre = (*left_outline + *right_outline) / 2;
   if (view.policy == ViewPolicy::all_valid) return show_what_both_see(eyes, centre, size, view.focal_px, where);
-
-  double focal = view.focal_px;
-  if (!(focal > 0)) {
-    const auto left_resolution = resolution_on_axis(left.camera, depth);
-    const auto right_resolution = resolution_on_axis(right.camera, depth);
-    if (!left_resolution || !right_resolution) return failure(ErrorCode::configuration, kNoCommonView, where);
-    focal = (*left_resolution + *right_resolution) / 2;
-  }
+  const double focal = view.focal_px > 0 ? view.focal_px : natural_focal;
   return RectifiedStereo{size, focal, middle_of(size) - focal * centre, 0};
 }
 
