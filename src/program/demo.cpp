@@ -48,6 +48,7 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   ReportRequest about;
   about.run = run_folder;
   about.recording = recording;
+  about.options = request.options;
   about.whole_truth = true;
   about.threads = context.threads;
   const auto report = make_report(about);

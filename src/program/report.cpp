@@ -23,7 +23,6 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_colour.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/reconstruction/disparity_options.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
 
@@ -76,21 +75,21 @@ Image<Rgb8> error_picture(ImageView<const float> estimate, ImageView<const float
 }
 
 // The first shot of a pair with true disparities: what the matcher makes of it.
-Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoPair& pair, const std::string& recording,
-                              int threads) {
+Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoPair& pair,
+                              const ReportRequest& request) {
   const std::vector<Stamp> stamps = source.announced_stamps(pair.name);
   if (stamps.empty()) return std::string();
   const Stamp stamp = stamps[stamps.size() / 2];
   const auto frame = source.frame_at(pair.name, stamp);
   if (!frame) return failure(frame);
   const std::string name = fmt::format("/{}/{}.png", pair.name, stamp.ns);
-  const auto truth = read_disparity(recording + "/truth/disparity" + name);
-  const auto mask = read_truth_mask(recording + "/truth/mask" + name);
+  const auto truth = read_disparity(request.recording + "/truth/disparity" + name);
+  const auto mask = read_truth_mask(request.recording + "/truth/mask" + name);
   if (!truth || !mask) return std::string();
   const auto view = imager.process(*frame);
   if (!view) return failure(view);
   const Image<std::uint8_t> left = Image<std::uint8_t>::copy_of(view->left);
-  DisparityComputer computer(DisparityOptions{}, Workers(threads));
+  DisparityComputer computer(request.options.reconstruction, Workers(request.threads));
   const auto image = computer.compute(view->left, view->right, disparity_range(view->geometry, pair.nearest_m),
                                       view->left_mask, view->right_mask);
   if (!image) return failure(image);
@@ -189,7 +188,7 @@ Result<std::string> figures_of(const Json& summary, const ReportRequest& request
 Result<std::string> whole_truth(FrameSource& source, Imager& imager, const ReportRequest& request) {
   std::string stereo;
   for (const StereoPair& pair : source.info().rig.pairs) {
-    const auto html = stereo_of(source, imager, pair, request.recording, request.threads);
+    const auto html = stereo_of(source, imager, pair, request);
     if (!html) return failure(html);
     stereo += *html;
   }
@@ -215,7 +214,7 @@ Result<std::string> make_report(ReportRequest request) {
   const RecordingInfo& info = (*source)->info();
   if (request.truth.empty()) request.truth = info.truth_file;
   const std::string masks = std::filesystem::path(info.rig_source).parent_path().string();
-  auto imager = Imager::create(info.rig, ImagingOptions(), Workers(request.threads), masks);
+  auto imager = Imager::create(info.rig, request.options.imaging, Workers(request.threads), masks);
   if (!imager) return failure(imager);
 
   std::string body =

@@ -5,6 +5,7 @@
 
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/result.h"
+#include "spartan/system/run_options.h"
 
 namespace spartan::program {
 
@@ -12,6 +13,7 @@ struct ReportRequest {
   std::string run;           ///< the run's folder
   std::string recording;     ///< that it was made from
   OpenOptions open;          ///< how that was opened
+  RunOptions options;        ///< that the run was made with
   std::string truth;         ///< what `find_trajectories` takes for the truth; empty: the recording's, where it has one
   bool whole_truth = false;  ///< besides, how right the matcher is and how the ground is, as a simulation knows them
   int threads = 1;

@@ -65,6 +65,7 @@ Status write_report(const RunRequest& request, const std::string& truth) {
   about.recording = request.input;
   about.open.format = request.format;
   about.open.rig_file = request.rig_file;
+  about.options = request.options;
   about.truth = truth;
   about.threads = request.threads;
   const auto page = make_report(about);
