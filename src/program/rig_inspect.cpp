@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <numbers>
@@ -139,8 +140,9 @@ std::string in_words(const Inspected& one, bool guessed) {
   return text + fmt::format("pair {}: verdict: {}\n", one.pair.name, name_of(check.verdict));
 }
 
-// The pairs that are asked for, with their pictures.
-Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, Rig& rig, const Workers& workers) {
+// The pairs that are asked for, with the recording's pictures or else those given, which are of one pair.
+Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, const Rig& rig,
+                                                std::vector<PicturePair> given, const Workers& workers) {
   std::vector<Inspected> inspected;
   const auto wanted = [&](const StereoPair& pair) { return a.pair.empty() || pair.name == a.pair; };
   if (!a.pair.empty() && !rig.find_pair(a.pair)) {
@@ -158,27 +160,17 @@ Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, Rig& 
     if (inspected.empty()) return failure(ErrorCode::input, "has none of the rig's pairs", a.recording);
     return inspected;
   }
-  auto pictures = load_pictures(a.left, a.right, a.shots);
-  if (!pictures) return failure(pictures);
-  if (a.rig == "-") rig = guessed_rig(pictures->front().left.size());
-  for (const StereoPair& pair : rig.pairs) {
-    if (!wanted(pair)) continue;
-    inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), a.rig == "-", workers));
-    break;
-  }
+  const auto pair = std::find_if(rig.pairs.begin(), rig.pairs.end(), wanted);
+  inspected.push_back(inspect_pair(rig, *pair, std::move(given), a.rig == "-", workers));
   return inspected;
 }
 
-Result<ReadRig> load_rig(const InspectArguments& a) {
-  if (a.rig == "-") return ReadRig{};  // guessed from the pictures' size
-  if (Status there = calibration_is_there(a.rig); !there) return failure(there);
-  ImageSize size;
-  if (!a.left.empty()) {
-    auto pictures = load_pictures(a.left, a.right, 1);
-    if (!pictures) return failure(pictures);
-    size = pictures->front().left.size();
-  }
-  return read_calibration(a.rig, size);
+// The size of the pictures is what formats that leave it out, and a guess, have to go by.
+Result<ReadRig> read_or_guess(const std::string& rig, ImageSize size) {
+  if (rig != "-") return read_calibration(rig, size);
+  ReadRig guess;
+  guess.rig = guessed_rig(size);
+  return guess;
 }
 
 // The rig with the cameras and the pair of that name as `other` has them.
@@ -256,12 +248,20 @@ std::string in_words(const InspectArguments& a, const ReadRig& read, const std::
 
 Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   if (Status usage = check_usage(a); !usage) return failure(usage);
-  auto read = load_rig(a);
+  if (Status there = a.rig == "-" ? Status() : calibration_is_there(a.rig); !there) return failure(there);
+  std::vector<PicturePair> pictures;
+  if (!a.left.empty()) {
+    auto loaded = load_pictures(a.left, a.right, a.shots);
+    if (!loaded) return failure(loaded);
+    pictures = std::move(*loaded);
+  }
+  const ImageSize size = pictures.empty() ? ImageSize() : pictures.front().left.size();
+  const auto read = read_or_guess(a.rig, size);
   if (!read) return failure(read);
   const Workers workers(context.threads);
   std::vector<Inspected> inspected;
   if (!a.left.empty() || !a.recording.empty()) {
-    auto result = inspect_pictures(a, read->rig, workers);
+    auto result = inspect_pictures(a, read->rig, std::move(pictures), workers);
     if (!result) return failure(result);
     inspected = std::move(*result);
   }
