@@ -81,6 +81,51 @@ std::optional<Window> warped_window(ImageView<const std::uint16_t> image, const 
   return window;
 }
 
+/// How an image differs from a template, its contrast brought to the template's.
+struct WindowDifference {
+  Window seen, residual;
+  float deviation;
+  double correlation(const AlignmentTemplate& wanted) const {
+    return weighted_dot(seen, wanted.value) / (deviation * wanted.deviation);
+  }
+  double variance() const { return weighted_dot(residual, residual); }
+};
+
+/// Nothing where the window leaves the image or sees nothing.
+std::optional<WindowDifference> difference_from(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> image,
+                                                const Eigen::Matrix2d& warp, const Eigen::Vector2d& centre) {
+  const std::optional<Window> seen = warped_window(image, warp, centre);
+  if (!seen) return std::nullopt;
+  WindowDifference difference{*seen, {}, 0};
+  difference.deviation = normalise(difference.seen);
+  if (difference.deviation < kLeastDeviation) return std::nullopt;
+  const float contrast = wanted.deviation / difference.deviation;
+  for (std::size_t i = 0; i < kWindowArea; ++i)
+    difference.residual[i] = contrast * difference.seen[i] - wanted.value[i];
+  return difference;
+}
+
+/// J Jᵀ, a weighted mean over the window.
+template <std::size_t Unknowns>
+Eigen::Matrix<double, Unknowns, Unknowns> information_of(const std::array<Window, Unknowns>& j) {
+  Eigen::Matrix<double, Unknowns, Unknowns> information;
+  for (std::size_t a = 0; a < Unknowns; ++a) {
+    for (std::size_t b = a; b < Unknowns; ++b) {
+      const auto row = static_cast<Eigen::Index>(a), column = static_cast<Eigen::Index>(b);
+      information(row, column) = information(column, row) = weighted_dot(j[a], j[b]);
+    }
+  }
+  return information;
+}
+
+/// J r.
+template <std::size_t Unknowns>
+Eigen::Matrix<double, Unknowns, 1> gradient_of(const std::array<Window, Unknowns>& j, const Window& residual) {
+  Eigen::Matrix<double, Unknowns, 1> gradient;
+  for (std::size_t a = 0; a < Unknowns; ++a) gradient[static_cast<Eigen::Index>(a)] = weighted_dot(j[a], residual);
+  return gradient;
+}
+
 }  // namespace
 
 std::optional<ImagePatch> cut_patch(ImageView<const std::uint16_t> image, int x, int y) {
@@ -135,36 +180,28 @@ std::optional<Alignment> align_translation(const AlignmentTemplate& wanted, Imag
   if (wanted.deviation < kLeastDeviation || !(std::abs(warp.determinant()) > 0.05)) return std::nullopt;
   // ∇image = warp⁻ᵀ ∇template where the two are aligned.
   const Eigen::Matrix2f to_image = warp.inverse().transpose().cast<float>();
-  Window jx, jy;
+  std::array<Window, 2> j;
   for (std::size_t i = 0; i < kWindowArea; ++i) {
-    jx[i] = to_image(0, 0) * wanted.gradient_x[i] + to_image(0, 1) * wanted.gradient_y[i];
-    jy[i] = to_image(1, 0) * wanted.gradient_x[i] + to_image(1, 1) * wanted.gradient_y[i];
+    j[0][i] = to_image(0, 0) * wanted.gradient_x[i] + to_image(0, 1) * wanted.gradient_y[i];
+    j[1][i] = to_image(1, 0) * wanted.gradient_x[i] + to_image(1, 1) * wanted.gradient_y[i];
   }
-  normalise(jx);  // the unknown brightness takes the mean away
-  normalise(jy);
-  Eigen::Matrix2d information;
-  information << weighted_dot(jx, jx), weighted_dot(jx, jy), 0, weighted_dot(jy, jy);
-  information(1, 0) = information(0, 1);
+  for (Window& window : j) normalise(window);  // the unknown brightness takes the mean away
+  const Eigen::Matrix2d information = information_of(j);
   if (!(information.determinant() > 1e-4)) return std::nullopt;
   const Eigen::Matrix2d inverse = information.inverse();
 
   Eigen::Vector2d position = start;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    std::optional<Window> seen = warped_window(image, warp, position);
-    if (!seen) return std::nullopt;
-    const float deviation = normalise(*seen);
-    if (deviation < kLeastDeviation) return std::nullopt;
-    const float contrast = wanted.deviation / deviation;
-    Window residual;
-    for (std::size_t i = 0; i < kWindowArea; ++i) residual[i] = contrast * (*seen)[i] - wanted.value[i];
-    const Eigen::Vector2d step = -(inverse * Eigen::Vector2d(weighted_dot(jx, residual), weighted_dot(jy, residual)));
+    const auto difference = difference_from(wanted, image, warp, position);
+    if (!difference) return std::nullopt;
+    const Eigen::Vector2d step = -(inverse * gradient_of(j, difference->residual));
     position += step;
     if (!((position - start).norm() <= reach_px)) return std::nullopt;
     if (step.norm() > kSettled_px) continue;
-    const double variance = weighted_dot(residual, residual);
+    const double variance = difference->variance();
     Alignment found;
     found.position = position;
-    found.correlation = weighted_dot(*seen, wanted.value) / (deviation * wanted.deviation);
+    found.correlation = difference->correlation(wanted);
     // `information` is a weighted mean over the window, so the sum over independent pixels is larger by their number.
     found.covariance = inverse * (variance * kNoiseCorrelation / (0.5 * kWindowArea));
     return found;
@@ -185,11 +222,7 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, Ima
     j[2][i] = j[0][i] * static_cast<float>(row - kWindowRadius);
   }
   for (Window& window : j) normalise(window);
-  Eigen::Matrix3d information;
-  for (std::size_t a = 0; a < 3; ++a) {
-    for (std::size_t b = 0; b < 3; ++b)
-      information(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = weighted_dot(j[a], j[b]);
-  }
+  Eigen::Matrix3d information = information_of(j);
   if (!(information(0, 0) > 1e-2)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / (0.5 * kWindowArea);
   information(1, 1) += prior;
@@ -204,14 +237,9 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, Ima
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     Eigen::Matrix2d warp;
     warp << 1 - x[1], -x[2], 0, 1;
-    std::optional<Window> seen = warped_window(right, warp, centre - Eigen::Vector2d(x[0], 0));
-    if (!seen) return std::nullopt;
-    const float deviation = normalise(*seen);
-    if (deviation < kLeastDeviation) return std::nullopt;
-    const float contrast = wanted.deviation / deviation;
-    Window residual;
-    for (std::size_t i = 0; i < kWindowArea; ++i) residual[i] = contrast * (*seen)[i] - wanted.value[i];
-    Eigen::Vector3d gradient(weighted_dot(j[0], residual), weighted_dot(j[1], residual), weighted_dot(j[2], residual));
+    const auto difference = difference_from(wanted, right, warp, centre - Eigen::Vector2d(x[0], 0));
+    if (!difference) return std::nullopt;
+    Eigen::Vector3d gradient = gradient_of(j, difference->residual);
     gradient[1] += prior * (x[1] - start.slant.x());
     gradient[2] += prior * (x[2] - start.slant.y());
     const Eigen::Vector3d step = -(inverse * gradient);
@@ -223,8 +251,8 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, Ima
     RowAlignment found;
     found.disparity = x[0];
     found.slant = {x[1], x[2]};
-    found.correlation = weighted_dot(*seen, wanted.value) / (deviation * wanted.deviation);
-    const double variance = weighted_dot(residual, residual);
+    found.correlation = difference->correlation(wanted);
+    const double variance = difference->variance();
     found.sigma_px = std::sqrt(inverse(0, 0) * variance * kNoiseCorrelation / (0.5 * kWindowArea));
     return found;
   }
@@ -244,11 +272,7 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, I
     j[3][i] = -wanted.gradient_x[i] * static_cast<float>(row - kWindowRadius);
   }
   for (Window& window : j) normalise(window);
-  Eigen::Matrix4d information;
-  for (std::size_t a = 0; a < 4; ++a) {
-    for (std::size_t b = 0; b < 4; ++b)
-      information(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = weighted_dot(j[a], j[b]);
-  }
+  Eigen::Matrix4d information = information_of(j);
   if (!(information.topLeftCorner<2, 2>().determinant() > 1e-4)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / (0.5 * kWindowArea);
   information(2, 2) += prior;
@@ -259,15 +283,9 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, I
   for (int iteration = 0; iteration < 2 * kMaxIterations; ++iteration) {
     Eigen::Matrix2d warp;
     warp << 1 - x[2], -x[3], 0, 1;
-    std::optional<Window> seen = warped_window(right, warp, x.head<2>());
-    if (!seen) return std::nullopt;
-    const float deviation = normalise(*seen);
-    if (deviation < kLeastDeviation) return std::nullopt;
-    const float contrast = wanted.deviation / deviation;
-    Window residual;
-    for (std::size_t i = 0; i < kWindowArea; ++i) residual[i] = contrast * (*seen)[i] - wanted.value[i];
-    Eigen::Vector4d gradient;
-    for (std::size_t k = 0; k < 4; ++k) gradient[static_cast<Eigen::Index>(k)] = weighted_dot(j[k], residual);
+    const auto difference = difference_from(wanted, right, warp, x.head<2>());
+    if (!difference) return std::nullopt;
+    Eigen::Vector4d gradient = gradient_of(j, difference->residual);
     gradient.tail<2>() += prior * x.tail<2>();
     const Eigen::Vector4d step = -(inverse * gradient);
     x += step;
@@ -275,10 +293,10 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, I
       return std::nullopt;
     }
     if (step.head<2>().norm() + 3 * step.tail<2>().norm() > 2 * kSettled_px) continue;
-    const double variance = weighted_dot(residual, residual);
+    const double variance = difference->variance();
     SlantedAlignment found;
     found.place.position = x.head<2>();
-    found.place.correlation = weighted_dot(*seen, wanted.value) / (deviation * wanted.deviation);
+    found.place.correlation = difference->correlation(wanted);
     found.place.covariance = inverse.topLeftCorner<2, 2>() * (variance * kNoiseCorrelation / (0.5 * kWindowArea));
     found.slant = x.tail<2>();
     return found;
