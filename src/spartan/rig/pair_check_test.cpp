@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "spartan/core/random.h"
+#include "spartan/rig/model_changes.h"
 
 namespace spartan {
 namespace {
@@ -245,6 +246,32 @@ TEST(PlantedFault, PicturesOfAnotherSize) {
   const PairCheck again = check_pair(result.corrected, result.corrected.pairs[0], halved(look(truth, 700, 2)), half);
   EXPECT_THAT(ids(again), IsEmpty());
   EXPECT_EQ(again.verdict, PairVerdict::good);
+}
+
+// Of the right eye only: the left one's numbers are sound.
+TEST(PlantedFault, OneCalibrationOfAnotherSize) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  rig.cameras[1].model = resized(rig.cameras[1].model, 0.5);
+  rig.cameras[1].size = {376, 240};
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("size_mismatch"));
+  EXPECT_EQ(result.corrected.cameras[0].model, truth.cameras[0].model);
+  expect_mended(truth, result);
+}
+
+// A focal length that is none (millimetres), or one of its two numbers: the view in degrees and fx/fy are no factors.
+TEST(PlantedFault, FocalLengthsThatCannotBe) {
+  const Rig truth = straight_rig();
+  for (const PinholeModel& odd : {PinholeModel{3, 3, 367.2, 248.4}, PinholeModel{458, 229, 367.2, 248.4}}) {
+    Rig rig = truth;
+    rig.cameras[0].model = odd;
+    const PairCheck result = check(rig, look(truth));
+    EXPECT_THAT(ids(result), Contains("size_mismatch"));
+    EXPECT_EQ(result.verdict, PairVerdict::bad);
+    const auto seen_ahead = [](const Rig& r) { return *project(r.cameras[0].model, Eigen::Vector3d::UnitZ()); };
+    EXPECT_EQ(seen_ahead(result.corrected), seen_ahead(rig)) << "the picture is no larger";
+  }
 }
 
 TEST(PlantedFault, RowsOffByTwoPixels) {
