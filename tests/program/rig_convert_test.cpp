@@ -1,4 +1,5 @@
 // `spartan rig convert` from outside.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -38,14 +39,18 @@ TEST(RigConvert, NothingIsLostWhereNothingIs) {
   EXPECT_THAT(told.out, HasSubstr("read kitti: " + kitti));
   EXPECT_THAT(told.out, HasSubstr("body: the left camera"));
   EXPECT_THAT(told.out, HasSubstr("wrote rig.yaml: " + folder.path() + "/rig.yaml\nnothing lost\n"));
+  EXPECT_THAT(content_of(folder.path() + "/rig.yaml"), HasSubstr("size_px: [640, 480]"));
   // On through a format with a file for each eye, and back.
   const auto there = run_program({"rig", "convert", folder.path() + "/rig.yaml", folder.path() + "/pair.cahvor"});
   EXPECT_EQ(there.exit_code, 0) << there.err;
+  EXPECT_THAT(there.out,
+              HasSubstr(fmt::format("wrote cahvor: {0}/pair_left.cahvor {0}/pair_right.cahvor\n", folder.path())));
   EXPECT_TRUE(std::filesystem::exists(folder.path() + "/pair_left.cahvor"));
   const auto back =
       run_program({"rig", "convert", folder.path() + "/pair_right.cahvor", folder.path() + "/again/calib.txt"});
   EXPECT_EQ(back.exit_code, 0) << back.err;
   EXPECT_EQ(content_of(folder.path() + "/again/calib.txt"), kKitti);
+  EXPECT_THAT(back.out, HasSubstr("lost:\n  size_px: these files do not hold the image size, 640 x 480\n"));
 }
 
 TEST(RigConvert, WhatIsLostIsSaid) {
@@ -63,6 +68,13 @@ TEST(RigConvert, WhatIsLostIsSaid) {
   EXPECT_THAT(keys, ::testing::Contains("cameras.wide_left.name"));
   EXPECT_THAT(keys, Not(::testing::Contains("cameras.wide_right.place"))) << "at the angles of rest";
   EXPECT_THAT(keys, Not(::testing::Contains("body")));
+  const json gone = {{"key", "pairs.narrow"}, {"text", "the pair is gone"}};
+  EXPECT_THAT(all["lost"], ::testing::Contains(gone));
+  // Files of both eyes are both named.
+  const auto two = run_program({"rig", "convert", rover(), folder.path() + "/pair.tsai", "--pair", "wide", "--json"});
+  ASSERT_EQ(two.exit_code, 0) << two.err;
+  EXPECT_EQ(json::parse(two.out)["files"],
+            json::array({folder.path() + "/pair_left.tsai", folder.path() + "/pair_right.tsai"}));
 }
 
 TEST(RigConvert, AMaskIsFoundFromTheNewFileToo) {
@@ -74,6 +86,10 @@ TEST(RigConvert, AMaskIsFoundFromTheNewFileToo) {
   EXPECT_EQ(told.exit_code, 0) << told.err;
   EXPECT_THAT(told.out, HasSubstr("nothing lost"));
   EXPECT_THAT(content_of(to), HasSubstr("self_mask: \"../../a/masks/left.png\""));
+  // One that is named from the root stays.
+  text.replace(text.find("masks/left.png"), 0, "/from/the/root/");
+  EXPECT_EQ(run_program({"rig", "convert", folder.write("a/rig.yaml", text), to, "--force"}).exit_code, 0);
+  EXPECT_THAT(content_of(to), HasSubstr("self_mask: \"/from/the/root/masks/left.png\""));
 }
 
 TEST(RigConvert, OnePairOfMany) {
@@ -86,6 +102,7 @@ TEST(RigConvert, OnePairOfMany) {
   const auto one = run_program({"rig", "convert", rover(), to, "--pair", "narrow"});
   EXPECT_EQ(one.exit_code, 0) << one.err;
   EXPECT_THAT(one.out, HasSubstr("pairs.wide: left out, as --pair says"));
+  EXPECT_THAT(one.out, HasSubstr("cameras.wide_left: left out, as --pair says"));
   EXPECT_EQ(run_program({"rig", "convert", rover(), to, "--pair", "top", "--force"}).exit_code, 2);
 }
 
@@ -98,6 +115,11 @@ TEST(RigConvert, FilesThatAreThereAreKept) {
   EXPECT_EQ(content_of(to), "mine");
   EXPECT_EQ(run_program({"rig", "convert", kitti, to, "--size-px", "640,480", "--force"}).exit_code, 0);
   EXPECT_NE(content_of(to), "mine");
+  // Of two files the second one is there: the first one is not written either.
+  const std::string right = folder.write("pair_right.tsai", "mine");
+  EXPECT_EQ(run_program({"rig", "convert", to, folder.path() + "/pair.tsai"}).exit_code, 5);
+  EXPECT_FALSE(std::filesystem::exists(folder.path() + "/pair_left.tsai"));
+  EXPECT_EQ(content_of(right), "mine");
 }
 
 TEST(RigConvert, ExitCodesAsDocumented) {

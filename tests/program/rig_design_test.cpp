@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
 
 #include "program.h"
 #include "spartan/core/image_io.h"
@@ -50,7 +53,12 @@ TEST(RigDesign, JsonHoldsThePublishedFigures) {
   EXPECT_NEAR(wide["published"]["search_percent"], 22.8, 0.05);
   EXPECT_NEAR(wide["published"]["view_near_m"], 0.488, 0.0005);
   EXPECT_NEAR(wide["published"]["view_far_m"], 4.011, 0.0005);
-  EXPECT_TRUE(wide["best"].is_object());
+  EXPECT_NEAR(wide["published"]["margins"]["stereo_angle_deg"], 15 - 11.42, 0.005);
+  EXPECT_NEAR(wide["published"]["margins"]["search_percent"], 25 - 22.84, 0.005);
+  EXPECT_NEAR(wide["published"]["margins"]["pan_overlap_percent"], 5, 1e-9);
+  EXPECT_EQ(wide["published"]["on_offer"], true);
+  EXPECT_LT(wide["best"]["pan_overlap_percent"], 25);
+  EXPECT_GE(wide["best_with_pan_overlap"]["pan_overlap_percent"], 25);
   const json& narrow = design["narrow"];
   EXPECT_EQ(narrow["published"]["feasible"], false);
   EXPECT_NEAR(narrow["published"]["range_m"], 1.99, 0.005);
@@ -62,9 +70,12 @@ TEST(RigDesign, JsonHoldsThePublishedFigures) {
   EXPECT_NEAR(design["pan_overlap_far_stereo_percent"], 21.6, 0.05);
   EXPECT_NEAR(design["azimuth_far_deg"], 117.1, 0.05);
   EXPECT_NEAR(design["azimuth_far_stereo_deg"], 114.6, 0.05);
+  EXPECT_NEAR(design["azimuth_held_to_m"], 2.05, 0.005);
   EXPECT_GE(design["warnings"].size(), 16u);
   for (const json& warning : design["warnings"]) {
     EXPECT_TRUE(warning["id"].is_string() && warning["text"].is_string() && warning["value"].is_number()) << warning;
+    EXPECT_TRUE(warning["text"].get<std::string>().starts_with(warning["pair"].get<std::string>() + ": ")) << warning;
+    EXPECT_THAT(warning["pair"], ::testing::AnyOf("wide", "narrow"));
   }
   EXPECT_FALSE(wide.contains("feasible"));
   EXPECT_EQ(run_program({"rig", "design", rover(), "--json"}).out, told.out) << "the same in every run";
@@ -77,7 +88,13 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_THAT(some.out, HasSubstr("12591 other combinations"));
   EXPECT_THAT(some.out, HasSubstr("12582 more"));
   EXPECT_THAT(some.out, HasSubstr("margins of the best: range +1.521 m"));
+  EXPECT_THAT(some.out, HasSubstr("\nnarrow pair: 1 of 2 combinations are feasible"));
+  EXPECT_THAT(some.out, HasSubstr("published pair (feasible, on offer): margins: range +0.002 m"));
+  EXPECT_THAT(some.out, HasSubstr("published pair (not feasible, on offer): margins: range -0.515 m"));
+  EXPECT_THAT(some.out, HasSubstr("ground seen by both pairs, middle column: 2.03 m\n"));
+  EXPECT_THAT(some.out, HasSubstr("at the far edge: 117.1 deg (one eye), 114.6 deg (both eyes)\n"));
   EXPECT_LT(lines_of(some.out), 70u);
+  EXPECT_THAT(run_program({"rig", "design", rover(), "--rows", "3"}).out, HasSubstr("...  12589 more;"));
   const auto all = run_program({"rig", "design", rover(), "--all"});
   EXPECT_EQ(all.exit_code, 0);
   EXPECT_GT(lines_of(all.out), 12592u);
@@ -99,7 +116,11 @@ TEST(RigDesign, DrawsTheGround) {
   const testing::TemporaryFolder folder;
   const std::string out = folder.path() + "/deep/design";
   ASSERT_EQ(run_program({"rig", "design", rover(), "-o", out, "-q"}).exit_code, 0);
-  EXPECT_EQ(lines_of(testing::content_of(out + "/feasible.csv")), 1u + 12592 + 1);
+  const std::string csv = testing::content_of(out + "/feasible.csv");
+  EXPECT_EQ(lines_of(csv), 1u + 12592 + 1);
+  EXPECT_THAT(csv, HasSubstr("enough_pan_overlap,tilt_deg,view_near_m,view_far_m\nwide,1,"));
+  EXPECT_THAT(csv, HasSubstr("\nwide,12592,"));
+  EXPECT_THAT(csv, ::testing::EndsWith(",,0,32.8,0.18191,2.50422\n")) << "no pans, tilt, near and far edge";
   const std::string svg = testing::content_of(out + "/ground.svg");
   EXPECT_THAT(svg, ::testing::StartsWith("<svg"));
   EXPECT_THAT(svg, ::testing::EndsWith("</svg>\n"));
@@ -113,6 +134,77 @@ TEST(RigDesign, DrawsTheGround) {
   ASSERT_TRUE(png) << png.error().message();
   EXPECT_EQ(png->size().width, 1200);
   EXPECT_THAT(svg, HasSubstr("height=\"" + std::to_string(png->size().height) + "\""));
+}
+
+using Corners = std::vector<std::pair<double, double>>;
+
+// The areas of that colour and opacity.
+std::vector<Corners> areas_of(const std::string& svg, const std::string& fill, const std::string& opacity) {
+  const std::regex area("<polygon points=\"([^\"]*)\" fill=\"" + fill + "\" fill-opacity=\"" + opacity + "\"/>");
+  std::vector<Corners> areas;
+  for (std::sregex_iterator found(svg.begin(), svg.end(), area), end; found != end; ++found) {
+    std::istringstream numbers((*found)[1]);
+    Corners corners;
+    double x = 0, y = 0;
+    char comma = 0;
+    while (numbers >> x >> comma >> y) corners.emplace_back(x, y);
+    areas.push_back(corners);
+  }
+  return areas;
+}
+double wide_px(const Corners& bar) {
+  return bar.at(1).first - bar.at(0).first;
+}
+// Where the words stand.
+double x_of(const std::string& svg, const std::string& words) {
+  const std::size_t end = svg.find(">" + words + "<");
+  return end == std::string::npos ? NAN : std::stod(svg.substr(svg.rfind("x=\"", end) + 3));
+}
+
+// Left is left, lengths are to scale, and every kind of ground has its colour.
+TEST(RigDesign, TheGroundIsDrawnToScale) {
+  const testing::TemporaryFolder folder;
+  const std::string asked = folder.write("asked.yaml", replaced(rover_text(), "name: ", "name: a<b "));
+  ASSERT_EQ(run_program({"rig", "design", asked, "-o", folder.path(), "-q"}).exit_code, 0);
+  const std::string svg = testing::content_of(folder.path() + "/ground.svg");
+  EXPECT_THAT(svg, HasSubstr("a&lt;b"));
+  EXPECT_LT(x_of(svg, "pan 35°"), x_of(svg, "pan 0°"));
+  EXPECT_LT(x_of(svg, "pan 0°"), x_of(svg, "pan -35°"));
+  // The narrow pair's bar: 2 cm hold from 0.200 to 1.985 m, from there on to 2.516 m they do not.
+  const auto held = areas_of(svg, "#d55e00", "0.9"), beyond = areas_of(svg, "#d55e00", "0.3");
+  ASSERT_EQ(held.size(), 1u);
+  ASSERT_EQ(beyond.size(), 1u);
+  EXPECT_NEAR(wide_px(held[0]) / wide_px(beyond[0]), (1.985 - 0.200) / (2.516 - 1.985), 0.02);
+  // It looks ahead: its ground lies alike on both sides of the rover. The legend has its colour too.
+  const auto narrow = areas_of(svg, "#d55e00", "0.45");
+  ASSERT_EQ(narrow.size(), 2u);
+  double sum = 0;
+  for (const auto& [x, y] : narrow[0]) sum += x - 600;
+  EXPECT_NEAR(sum, 0, 0.1);
+  EXPECT_EQ(areas_of(svg, "#c8e2f3", "1").size(), 6u + 1) << "one eye, at three pans";
+  EXPECT_EQ(areas_of(svg, "#86bbde", "1").size(), 3u + 1) << "both eyes";
+  EXPECT_EQ(areas_of(svg, "#3a86bc", "1").size(), 2u + 1) << "two pans";
+  EXPECT_EQ(areas_of(svg, "#dedede", "1").size(), 1u + 1) << "asked for, not seen";
+  EXPECT_EQ(areas_of(svg, "#969696", "0.9").size(), 1u) << "blind";
+}
+
+// The pixels show what the SVG says: words in the title's line, the colours of both pairs.
+TEST(RigDesign, ThePixelsAreThoseOfTheDrawing) {
+  const testing::TemporaryFolder folder;
+  ASSERT_EQ(run_program({"rig", "design", rover(), "-o", folder.path(), "-q"}).exit_code, 0);
+  const auto read = read_image(folder.path() + "/ground.png");
+  ASSERT_TRUE(read) << read.error().message();
+  const auto pixels = read->as<Rgb8>();
+  const auto count = [&](Rgb8 colour, int rows) {
+    int found = 0;
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < pixels.width(); ++x) found += pixels(x, y) == colour ? 1 : 0;
+    }
+    return found;
+  };
+  EXPECT_GT(count({30, 30, 30}, 60), 100) << "the title";
+  EXPECT_GT(count({134, 187, 222}, pixels.height()), 10000) << "seen by both eyes of the wide pair";
+  EXPECT_GT(count({222, 222, 222}, pixels.height()), 1000) << "asked for, not seen";
 }
 
 // Pairs of other kinds are drawn too: no pans, no narrow pair, nothing published, many pans, high masts.
@@ -134,6 +226,9 @@ TEST(RigDesign, DrawsWhatIsAskedOfOthers) {
     EXPECT_TRUE(read_image(folder.path() + "/out/ground.png"));
     EXPECT_THAT(testing::content_of(folder.path() + "/out/ground.svg"), Not(HasSubstr("nan")));
   }
+  const auto off = run_program(
+      {"rig", "design", folder.write("off.yaml", replaced(wide_only, "hfov_deg: 50", "hfov_deg: 50.5")), "--json"});
+  EXPECT_EQ(json::parse(off.out)["wide"]["published"]["on_offer"], false) << off.out;
   // Nothing to draw is said, and no fault.
   const auto none =
       run_program({"rig", "design", folder.write("none.yaml", replaced(unpublished, "range_m: 4.0", "range_m: 12")),

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -20,6 +21,7 @@ namespace spartan {
 namespace {
 
 using nlohmann::json;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using testing::run_program;
 
@@ -40,6 +42,22 @@ TEST(RigInspect, JsonHoldsTheFiguresOfEveryPair) {
   EXPECT_NEAR(summary["pairs"]["wide"]["focal_px"], 1200.92, 0.01);
   EXPECT_NEAR(summary["pairs"]["narrow"]["hfov_deg"], 66, 0.001);
   EXPECT_NEAR(summary["pairs"]["narrow"]["vfov_deg"], 49.5, 0.001);
+}
+
+// Without pictures: what was read, and doubts by the numbers alone.
+TEST(RigInspect, TellsWhatWasReadAndDoubtsIt) {
+  const testing::TemporaryFolder folder;
+  const std::string long_one =
+      folder.write("calib.txt", "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 -60000 0 500 240 0 0 0 1 0\n");
+  testing::write_gray_png(folder.file("image_0/000000.png"), 640, 480);
+  const auto told = run_program({"rig", "inspect", long_one});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.out, HasSubstr("\nbody: the left camera"));
+  const json pair = json::parse(run_program({"rig", "inspect", long_one, "--json"}).out)["pairs"].front();
+  ASSERT_EQ(pair["findings"].size(), 1u);
+  EXPECT_EQ(pair["findings"][0]["id"], "baseline_unit");
+  EXPECT_EQ(pair["findings"][0]["value"], 120);
+  EXPECT_FALSE(pair.contains("verdict"));
 }
 
 TEST(RigInspect, BadFilesAreNamed) {
@@ -131,6 +149,119 @@ TEST_F(RigInspectPictures, WithoutACalibration) {
   EXPECT_EQ(ids(json::parse(swapped.out)["pairs"].front()), std::vector<std::string>{"swapped_eyes"});
 }
 
+// The right eye is said to be turned 0.5° up and 1° clockwise, with a focal length 1 % too large: the pictures want it
+// back.
+TEST_F(RigInspectPictures, SaysHowTheEyeWantsToBeTurned) {
+  std::string text = fmt::format(kRig, 0.12);
+  text.replace(text.rfind("axes: optical"), 0, "roll_pitch_yaw_deg: [0.5, 0, 1], ");
+  text.replace(text.rfind("[260, 260]"), 10, "[262.6, 262.6]");
+  const std::string rig = folder_.write("rig.yaml", text);
+  const auto told = inspect(rig, {picture(0), picture(1), "--json"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const json pair = json::parse(told.out)["pairs"]["stereo"];
+  EXPECT_NEAR(pair["corrections"]["pitch_deg"], -0.5, 0.1);
+  EXPECT_NEAR(pair["corrections"]["roll_deg"], -1, 0.1);
+  EXPECT_NEAR(pair["corrections"]["focal_ratio"], 1 / 1.01, 0.002);
+  for (const char* key : {"pitch_deg", "roll_deg", "yaw_deg", "focal_ratio"}) {
+    EXPECT_GT(pair["corrections"]["sigma"][key], 0) << key;
+    EXPECT_LT(pair["corrections"]["sigma"][key], 0.5) << key;
+  }
+  const json& rows = pair["row_error_px"];
+  EXPECT_LT(rows["before"]["mean"], 0.2) << "the pictures are rectified";
+  EXPECT_GT(rows["after"]["mean"], 1.5);
+  EXPECT_LT(rows["corrected"]["mean"], 0.2);
+  double right_px = 0, low_px = 0;
+  for (const json& cell : pair["row_error_map"]) {
+    right_px = std::max<double>(right_px, cell["x_px"]);
+    low_px = std::max<double>(low_px, cell["y_px"]);
+  }
+  EXPECT_EQ(right_px, 300) << "eight cells over 320 px";
+  EXPECT_EQ(low_px, 220) << "six over 240 px";
+
+  const std::string words = inspect(rig, {picture(0), picture(1)}).out;
+  const std::string figure = "[0-9.]+° ± [0-9.]+° ";
+  EXPECT_THAT(words, ContainsRegex("rows differ as taken by 0\\.[01]"));
+  EXPECT_THAT(words, ContainsRegex("turned 0\\.[45]" + figure + "down, "));
+  EXPECT_THAT(words, ContainsRegex(", [01]\\." + figure +
+                                   "counter-clockwise; its focal length -(0\\.[89]|1\\.[01])[0-9]* % ± 0"));
+  for (const std::string& id : ids(pair)) EXPECT_THAT(words, HasSubstr("pair stereo: FOUND " + id + ": "));
+}
+
+TEST_F(RigInspectPictures, LooksAtThePairAndTheShotsThatAreAskedFor) {
+  const auto matches = [&](const std::vector<std::string>& words) {
+    const auto told = inspect(drive_ + "/calib.txt", words);
+    EXPECT_EQ(told.exit_code, 0) << told.err;
+    return json::parse(told.out)["pairs"].front()["matches"].get<int>();
+  };
+  const auto shots = [&](const char* most) {
+    return matches({drive_ + "/image_0", drive_ + "/image_1", "--shots", most, "--json"});
+  };
+  const int first = matches({picture(0), picture(1), "--json"});
+  const int last = matches({drive_ + "/image_0/000013.png", drive_ + "/image_1/000013.png", "--json"});
+  EXPECT_EQ(shots("1"), first);
+  EXPECT_EQ(shots("2"), first + last);
+  EXPECT_NEAR(matches({"--recording", drive_, "--shots", "1", "--json"}), first, 0.05 * first);
+
+  const std::string rig = folder_.write("rig.yaml", fmt::format(kRig, 0.12) + "  second: {left: left, right: right}\n");
+  const json pairs = json::parse(inspect(rig, {picture(0), picture(1), "--pair", "second", "--json"}).out)["pairs"];
+  EXPECT_TRUE(pairs["second"].contains("verdict"));
+  EXPECT_FALSE(pairs["stereo"].contains("verdict"));
+}
+
+// The eyes of the rig are exchanged, and so are the pictures; masks are found from the new file too.
+TEST_F(RigInspectPictures, AppliesExchangedEyes) {
+  std::string text = fmt::format(kRig, 0.12);
+  text.replace(text.find("{left: left, right: right}"), 26, "{left: right, right: left}");
+  text.replace(text.find("axes: optical"), 0, "self_mask: masks/left.png, ");
+  const std::string rig = folder_.write("a/rig.yaml", text), mended = folder_.path() + "/mended.yaml";
+  const auto told = inspect(rig, {picture(1), picture(0), "--apply", mended, "--json"});
+  EXPECT_EQ(ids(json::parse(told.out)["pairs"]["stereo"]), std::vector<std::string>{"swapped_eyes"});
+  const auto again = inspect(mended, {picture(0), picture(1), "--json"});
+  EXPECT_EQ(json::parse(again.out)["pairs"]["stereo"]["verdict"], "good") << again.out;
+  EXPECT_THAT(testing::content_of(mended), HasSubstr("self_mask: \"a/masks/left.png\""));
+}
+
+// Three pairs of pictures on top of each other: as taken, rectified as given, corrected. The one of two shots is drawn
+// that shows more.
+TEST_F(RigInspectPictures, DrawsTheRowsOfBothEyes) {
+  std::string text = fmt::format(kRig, 0.12);
+  text.replace(text.rfind("axes: optical"), 0, "roll_pitch_yaw_deg: [1, 0, 2], ");
+  for (const int eye : {0, 1}) {
+    const std::string name = fmt::format("eye_{}/", eye);
+    testing::write_gray_png(folder_.file(name + "a.png"), 320, 240);
+    folder_.write(name + "b.png", testing::content_of(picture(eye)));
+    testing::write_gray_png(folder_.file(name + "c.png"), 320, 240);
+  }
+  const std::string drawn = folder_.path() + "/rows.png", rig = folder_.write("rig.yaml", text);
+  ASSERT_EQ(inspect(rig, {folder_.path() + "/eye_0", folder_.path() + "/eye_1", "--picture", drawn}).exit_code, 0);
+  const auto read = read_image(drawn);
+  ASSERT_TRUE(read) << read.error().message();
+  ASSERT_EQ(read->size(), (ImageSize{640, 3 * (240 + 22)}));
+  const auto pixels = read->as<Rgb8>();
+  // How far the gray of a strip's eye is from its picture, and how much of it is red: rows 3 px apart.
+  const auto compare = [&](int strip, int eye) {
+    const auto taken = read_gray8(picture(eye)).value();
+    double difference = 0;
+    int gray = 0, red = 0;
+    for (int y = 0; y < 240; ++y) {
+      for (int x = 0; x < 320; ++x) {
+        const Rgb8 p = pixels(320 * eye + x, 262 * strip + 22 + y);
+        red += p.r > 200 && p.g < 50 ? 1 : 0;
+        if (p.r != p.g || p.g != p.b) continue;
+        difference += std::abs(p.r - taken(x, y));
+        ++gray;
+      }
+    }
+    return std::pair{difference / gray, red};
+  };
+  EXPECT_GT(compare(1, 0).second, 3000) << "arrows";
+  for (const int eye : {0, 1}) {
+    EXPECT_EQ(compare(0, eye).first, 0) << eye;
+    EXPECT_GT(compare(1, eye).second, 5 * compare(0, eye).second) << eye;
+    EXPECT_GT(compare(1, eye).second, 5 * compare(2, eye).second) << eye;
+  }
+}
+
 TEST_F(RigInspectPictures, NamesPlantedFaultsAndMendsThem) {
   EXPECT_EQ(ids(pair_with_right_eye_at(0.12)), std::vector<std::string>());
   EXPECT_EQ(ids(pair_with_right_eye_at(-0.12)), std::vector<std::string>{"inverse_transform"});
@@ -157,6 +288,11 @@ TEST_F(RigInspectPictures, BadInputIsNamed) {
   EXPECT_EQ(uneven.exit_code, 3);
   EXPECT_THAT(uneven.err, HasSubstr("14 left and 1 right"));
   EXPECT_EQ(inspect(rig, {"--recording", folder_.path() + "/none"}).exit_code, 3);
+  EXPECT_EQ(inspect(rig, {picture(0), picture(1), "--recording", drive_}).exit_code, 2);
+  testing::write_gray_png(folder_.path() + "/small.png", 160, 120);
+  const auto odd = inspect(rig, {picture(0), folder_.path() + "/small.png"});
+  EXPECT_EQ(odd.exit_code, 3);
+  EXPECT_THAT(odd.err, HasSubstr("small.png: is 160 x 120 px"));
   EXPECT_EQ(inspect(rig, {picture(0), picture(1), "--apply", folder_.path() + "/no/such/x.yaml"}).exit_code, 5);
   testing::write_gray_png(folder_.path() + "/gray.png", 320, 240);
   const auto gray = inspect(rig, {folder_.path() + "/gray.png", folder_.path() + "/gray.png", "--json"});

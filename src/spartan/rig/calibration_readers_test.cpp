@@ -242,6 +242,35 @@ TEST(ReadRig, KnowsTheFormatByItsContent) {
   EXPECT_THAT(complaint(read_rig(folder.path() + "/none")), HasSubstr("/none"));
 }
 
+// Whatever the file is called.
+TEST(CalibrationFormats, AreKnownByTheirText) {
+  using Format = CalibrationFormat;
+  EXPECT_EQ(guess_format("x.txt", "{\n  'lensmodel': 'LENSMODEL_PINHOLE',\n}\n"), Format::mrcal);
+  EXPECT_EQ(guess_format("x.txt", "VERSION_4\nPINHOLE\nfu = 1\nu_direction = 1 0 0\n"), Format::tsai);
+  EXPECT_EQ(guess_format("x.txt", "Model = CAHV = perspective, linear\nDimensions = 640 480\n"), Format::cahvor);
+  EXPECT_EQ(guess_format("x.txt", "roses are red\n"), std::nullopt);
+}
+
+TEST(CalibrationFormats, AreWrittenByTheirNames) {
+  using Format = CalibrationFormat;
+  const std::pair<const char*, Format> known[] = {{"a.cahv", Format::cahvor},
+                                                  {"a.cahvore", Format::cahvor},
+                                                  {"a.tsai", Format::tsai},
+                                                  {"l.tsai,r.tsai", Format::tsai},
+                                                  {"a.cameramodel", Format::mrcal},
+                                                  {"a.xml", Format::opencv},
+                                                  {"a.yml", Format::opencv},
+                                                  {"l.yaml,r.yaml", Format::ros},
+                                                  {"left_camera_info.yaml", Format::ros},
+                                                  {"my_camchain.yaml", Format::kalibr},
+                                                  {"a/calib.txt", Format::kitti},
+                                                  {"a/calib_cam_to_cam.txt", Format::kitti_raw},
+                                                  {"a/mav0", Format::euroc},
+                                                  {"a.yaml", Format::rig_yaml}};
+  for (const auto& [name, format] : known) EXPECT_EQ(format_for_name(name).value(), format) << name;
+  EXPECT_EQ(format_for_name("a.odd").error().code, ErrorCode::usage);
+}
+
 TEST(ReadRig, RealCalibrations) {
   const std::string data = testing::data_folder();
   if (!std::filesystem::exists(data + "/kitti_06"))

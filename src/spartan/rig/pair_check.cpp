@@ -103,17 +103,22 @@ class Checker {
   PairCheck check_;
 };
 
-// The calibration of another picture size, told by the pictures themselves or by the principal point.
+// The calibration of another picture size, told by the pictures themselves, of each camera by itself, or by a principal
+// point, of both alike. Other size_mismatch (a view, fx beside fy) tell no factor.
 void Checker::settle_stated_size() {
-  for (const RigFinding& finding : check_.findings) {
-    if (finding.id != "size_mismatch") continue;
-    const bool by_pictures = !picture_.empty() && picture_ != left_.size;
-    const double factor = by_pictures ? static_cast<double>(picture_.width) / left_.size.width : finding.value;
-    left_.model = resized(left_.model, factor);
-    right_.model = resized(right_.model, factor);
-    if (!picture_.empty()) left_.size = right_.size = picture_;
-    return;
+  bool by_pictures = false;
+  for (Camera* camera : {&left_, &right_}) {
+    if (picture_.empty() || picture_ == camera->size) continue;
+    camera->model = resized(camera->model, static_cast<double>(picture_.width) / camera->size.width);
+    camera->size = picture_;
+    by_pictures = true;
   }
+  if (by_pictures) return;
+  auto factor = size_factor_by_centre(left_);
+  if (!factor) factor = size_factor_by_centre(right_);
+  if (!factor) return;
+  left_.model = resized(left_.model, *factor);
+  right_.model = resized(right_.model, *factor);
 }
 
 // The calibration of another size, told by rows that agree with that one only.

@@ -9,12 +9,14 @@
 #include <vector>
 
 #include "spartan/core/random.h"
+#include "spartan/rig/model_changes.h"
 
 namespace spartan {
 namespace {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -104,6 +106,7 @@ TEST(PairCheck, SoundRigsAreGood) {
     EXPECT_EQ(result.verdict, PairVerdict::good);
     EXPECT_NEAR(result.as_given.mean_px, 0.12, 0.03);  // 0.15 √(2/π)
     EXPECT_NEAR(result.as_given.p95_px, 0.30, 0.1);
+    EXPECT_NEAR(result.as_taken.median_px, 248.4 - 255.2, 4) << "the right principal point lies lower";
     EXPECT_GE(result.inliers, 600);
     EXPECT_LE(result.inliers, 660);
     expect_mended(rig, result);
@@ -142,6 +145,20 @@ TEST(PairCheck, CorrectionsAreThoseOfTheWorld) {
   for (int k = 0; k < 4; ++k) EXPECT_NEAR(square[k] / kTrials, 1, 0.7) << k;
 }
 
+// x right, y down, z ahead.
+TEST(PairCheck, TurnsAndSwingsAreThoseSaid) {
+  const auto corrected = [](const PairCorrection& c) {
+    return corrected_left_from_right(Pose::from_translation({1, 0, 0}), c);
+  };
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), z = Eigen::Vector3d::UnitZ();
+  EXPECT_LT((corrected({.pitch_rad = 0.01}).rotation() * z).y(), -0.009) << "up";
+  EXPECT_GT((corrected({.yaw_rad = 0.01}).rotation() * z).x(), 0.009) << "to the right";
+  EXPECT_GT((corrected({.roll_rad = 0.01}).rotation() * x).y(), 0.009) << "clockwise";
+  const Eigen::Vector3d swung = corrected({.baseline_down_rad = 0.01, .baseline_ahead_rad = 0.02}).translation();
+  EXPECT_LT((swung - Eigen::Vector3d(1, 0.01, 0.02)).norm(), 1e-3);
+  EXPECT_NEAR(swung.norm(), 1, 1e-12);
+}
+
 // --- faults that people plant in calibrations, each known by its name ---
 
 TEST(PlantedFault, InverseTransform) {
@@ -174,14 +191,24 @@ TEST(PlantedFault, SwappedEyesOfTheRig) {
   expect_mended(truth, result);
 }
 
-TEST(PlantedFault, BaselineInMillimetres) {
+// In millimetres, in centimetres, in metres that were taken for millimetres.
+TEST(PlantedFault, BaselineInOtherUnits) {
   const Rig truth = true_rig();
   const Pose pose = left_from_right(truth);
-  const PairCheck result = check(with_pose(truth, {pose.rotation(), 1000 * pose.translation()}), look(truth));
-  EXPECT_THAT(ids(result), ElementsAre("baseline_unit"));
+  for (const double factor : {1000.0, 100.0, 0.001}) {
+    const PairCheck result = check(with_pose(truth, {pose.rotation(), factor * pose.translation()}), look(truth));
+    EXPECT_THAT(ids(result), ElementsAre("baseline_unit")) << factor;
+    EXPECT_EQ(result.verdict, PairVerdict::bad);
+    EXPECT_NEAR(left_from_right(result.corrected).translation().norm(), 0.11, 0.001) << factor;
+    expect_mended(truth, result);
+  }
+}
+
+TEST(PlantedFault, EyesApart) {
+  const Rig truth = true_rig();
+  const PairCheck result = check(with_pose(truth, Pose(exp_so3({0, 20 * kDegree, 0}), {0.11, 0, 0})), {});
+  EXPECT_THAT(ids(result), ElementsAre("eyes_apart", "not_enough_texture"));
   EXPECT_EQ(result.verdict, PairVerdict::bad);
-  EXPECT_NEAR(left_from_right(result.corrected).translation().norm(), 0.11, 0.001);
-  expect_mended(truth, result);
 }
 
 // The calibration of pictures twice as large: centre and focal length, or the focal length alone.
@@ -206,8 +233,45 @@ TEST(PlantedFault, FocalLengthOfAnotherSize) {
 
 TEST(PlantedFault, PicturesOfAnotherSize) {
   const Rig truth = true_rig();
-  const PairCheck result = check_pair(truth, truth.pairs[0], look(truth), {376, 240});
-  EXPECT_THAT(ids(result), Contains("size_mismatch"));
+  const auto halved = [](std::vector<PixelMatch> matches) {
+    for (PixelMatch& m : matches) {
+      for (Eigen::Vector2d* p : {&m.left, &m.right}) *p = ((p->array() + 0.5) / 2 - 0.5).matrix();
+    }
+    return matches;
+  };
+  const ImageSize half{376, 240};
+  const PairCheck result = check_pair(truth, truth.pairs[0], halved(look(truth)), half);
+  EXPECT_THAT(ids(result), ElementsAre("size_mismatch", "size_mismatch")) << "both cameras";
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  const PairCheck again = check_pair(result.corrected, result.corrected.pairs[0], halved(look(truth, 700, 2)), half);
+  EXPECT_THAT(ids(again), IsEmpty());
+  EXPECT_EQ(again.verdict, PairVerdict::good);
+}
+
+// Of the right eye only: the left one's numbers are sound.
+TEST(PlantedFault, OneCalibrationOfAnotherSize) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  rig.cameras[1].model = resized(rig.cameras[1].model, 0.5);
+  rig.cameras[1].size = {376, 240};
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("size_mismatch"));
+  EXPECT_EQ(result.corrected.cameras[0].model, truth.cameras[0].model);
+  expect_mended(truth, result);
+}
+
+// A focal length that is none (millimetres), or one of its two numbers: the view in degrees and fx/fy are no factors.
+TEST(PlantedFault, FocalLengthsThatCannotBe) {
+  const Rig truth = straight_rig();
+  for (const PinholeModel& odd : {PinholeModel{3, 3, 367.2, 248.4}, PinholeModel{458, 229, 367.2, 248.4}}) {
+    Rig rig = truth;
+    rig.cameras[0].model = odd;
+    const PairCheck result = check(rig, look(truth));
+    EXPECT_THAT(ids(result), Contains("size_mismatch"));
+    EXPECT_EQ(result.verdict, PairVerdict::bad);
+    const auto seen_ahead = [](const Rig& r) { return *project(r.cameras[0].model, Eigen::Vector3d::UnitZ()); };
+    EXPECT_EQ(seen_ahead(result.corrected), seen_ahead(rig)) << "the picture is no larger";
+  }
 }
 
 TEST(PlantedFault, RowsOffByTwoPixels) {
@@ -218,9 +282,27 @@ TEST(PlantedFault, RowsOffByTwoPixels) {
   rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
   const PairCheck result = check(rig, look(truth));
   EXPECT_THAT(ids(result), ElementsAre("row_offset"));
-  EXPECT_NEAR(std::abs(result.as_given.median_px), 2, 0.5);  // a little more where the lens is straightened
+  EXPECT_NEAR(result.as_given.median_px, 2, 0.5);  // a little more where the lens is straightened
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("px below those of the right one"));
   EXPECT_EQ(result.verdict, PairVerdict::bad);
   expect_mended(truth, result, 0.4);  // two rows are 0.25°
+}
+
+// Rows alone make a pair usable or bad.
+TEST(PlantedFault, RowsDecideTheVerdict) {
+  const Rig truth = true_rig();
+  const auto off_by = [&](double rows_px) {
+    Rig rig = truth;
+    auto numbers = parameters(rig.cameras[1].model);
+    numbers[1][1] += rows_px;
+    rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
+    return check(rig, look(truth));
+  };
+  EXPECT_EQ(off_by(0.3).verdict, PairVerdict::good);
+  EXPECT_EQ(off_by(0.7).verdict, PairVerdict::usable);
+  const PairCheck bad = off_by(1.4);
+  EXPECT_EQ(bad.verdict, PairVerdict::bad);
+  EXPECT_LT(bad.as_given.p95_px, 3) << "by the mean";
 }
 
 TEST(PlantedFault, YawOfADegree) {
@@ -232,10 +314,30 @@ TEST(PlantedFault, YawOfADegree) {
           check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), look(truth));
       EXPECT_THAT(ids(result), ElementsAre("yaw_offset")) << yaw_deg;
       EXPECT_NEAR(result.correction.yaw_rad / kDegree, -yaw_deg, 0.1);
+      EXPECT_NEAR(result.findings.at(0).value, -yaw_deg, 0.1);
+      EXPECT_THAT(result.findings.at(0).text, HasSubstr(yaw_deg > 0 ? "further to the left" : "further to the right"));
       EXPECT_EQ(result.verdict, PairVerdict::bad);
       expect_mended(truth, result);
     }
   }
+}
+
+// Half a degree may be the lens's, and stays; but not where the far hills would be beyond infinity.
+TEST(PlantedFault, YawOfHalfADegree) {
+  const Rig truth = true_rig();
+  const auto planted = [&](double yaw_deg) {
+    PairCorrection off;
+    off.yaw_rad = yaw_deg * kDegree;
+    return check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), look(truth));
+  };
+  const PairCheck stays = planted(-0.5);
+  EXPECT_THAT(ids(stays), IsEmpty());
+  const Pose apart = left_from_right(truth).inverse() * left_from_right(stays.corrected);
+  EXPECT_NEAR(rotation_angle(apart) / kDegree, 0.5, 0.1);
+  const PairCheck told = planted(0.5);
+  EXPECT_THAT(ids(told), ElementsAre("yaw_offset"));
+  EXPECT_THAT(told.findings.at(0).text, HasSubstr("beyond infinity"));
+  expect_mended(truth, told);
 }
 
 TEST(PlantedFault, DistortionIgnored) {
@@ -256,6 +358,7 @@ TEST(PlantedFault, FocalRatio) {
   const PairCheck result = check(rig, look(truth));
   EXPECT_THAT(ids(result), Contains("focal_ratio"));
   EXPECT_NEAR(result.correction.focal_ratio, 1 / 0.99, 0.001);
+  EXPECT_THAT(result.findings.back().text, HasSubstr("% larger than the rig says"));
   expect_mended(truth, result);
 }
 
@@ -274,6 +377,7 @@ TEST(PairCheck, SaysWhenThereIsTooLittleToSee) {
 
 TEST(PairCheck, WithoutACalibrationThePicturesSpeak) {
   const PairCheck result = check_pictures(look(straight_rig()), kSize);
+  EXPECT_THAT(ids(result), ::testing::Not(Contains("inverse_transform")));
   EXPECT_NEAR(result.correction.roll_rad, 0.003, 0.001);
   EXPECT_LT(result.as_corrected.mean_px, 0.2);
 }

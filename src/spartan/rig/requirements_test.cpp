@@ -63,6 +63,25 @@ TEST(Requirements, StepsAreTheDecimalsThemselves) {
   EXPECT_THAT(lists.nearest_m, ElementsAre(0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5));
 }
 
+TEST(Requirements, PansMayStandInAnyOrder) {
+  const auto read = parse_requirements(
+      kGood + "  pans: {angles_deg: [10, -50, 0], azimuth_deg: 90, smallest_overlap_percent: 5}\n", "my.yaml");
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_THAT(read->wide.pans->angles_deg, ElementsAre(-50, 0, 10));
+  EXPECT_EQ(read->wide.pans->widest_step_deg(), 50);
+}
+
+TEST(Requirements, RowsOfThePublishedPair) {
+  const std::string published =
+      "  rows_per_column: 0.5\n"
+      "  published: {baseline_m: 0.2, nearest_m: 1, hfov_deg: 50, pixel_size_um: 5.5, width_px: 1000}\n";
+  const auto rows = [](const std::string& text) {
+    return parse_requirements(text, "my.yaml").value().wide.published_rows_per_column();
+  };
+  EXPECT_EQ(rows(kGood + published), 0.5);
+  EXPECT_EQ(rows(kGood + replaced(published, "width_px: 1000", "width_px: 1000, height_px: 800")), 0.8);
+}
+
 TEST(Requirements, ShippedOnesAreThePublishedLists) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(testing::source_folder() + "/config/requirements")) {

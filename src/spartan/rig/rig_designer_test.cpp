@@ -180,6 +180,7 @@ TEST(RigDesigner, WhatLiesOnALimitPassesAndIsSaid) {
 TEST(RigDesigner, WarnsOfEveryTensionOfThePublishedNumbers) {
   const RigDesign& design = rover_design();
   expect_warning(design, "not_unique", 12591, 0);
+  EXPECT_NE(find_warning(design, "not_unique")->text.find("8875 of them with enough overlap"), std::string::npos);
   expect_warning(design, "pixel_size_never_binds", 3148, 0);
   expect_warning(design, "baseline_limit_never_binds", 0.14, 1e-12);
   expect_warning(design, "stereo_angle_limits_disagree", 11.4, 0.05);
@@ -196,6 +197,8 @@ TEST(RigDesigner, WarnsOfEveryTensionOfThePublishedNumbers) {
   expect_warning(design, "focal_length_misfit", 3.65, 0.005);
   expect_warning(design, "vertical_view_misfit", 51.9, 0.05);
   EXPECT_EQ(design.warnings.size(), 16u) << "and of nothing else";
+  EXPECT_EQ(find_warning(design, "azimuth_far")->pair, "wide");
+  EXPECT_EQ(find_warning(design, "range_short")->pair, "narrow");
 }
 
 // What is mended is no longer told.
@@ -230,6 +233,59 @@ TEST(RigDesigner, WarningsFollowTheRequirements) {
   }
   EXPECT_FALSE(broken.wide.published_on_offer);
   EXPECT_EQ(broken.wide.best(), nullptr);
+}
+
+TEST(RigDesigner, OnOfferIsWhatEveryListHolds) {
+  const PairShape published = rover().wide.published->shape;
+  PairShape others[] = {published, published, published, published, published};
+  others[0].baseline_m = 0.205;
+  others[1].nearest_m = 1.05;
+  others[2].hfov_deg = 50.5;
+  others[3].pixel_size_um = 5.6;
+  others[4].width_px = 1100;
+  for (const PairShape& shape : others) {
+    const RigDesign design = design_after([&](RigRequirements& r) {
+      r.wide.lists = {{0.2}, {1}, {50}, {5.5}, {1120}};
+      r.wide.published->shape = shape;
+    });
+    EXPECT_FALSE(design.wide.published_on_offer);
+  }
+}
+
+// The published tilt is taken, not that of the rule; straight down is the lowest that a row can look.
+TEST(RigDesigner, ThePublishedTiltIsLookedAlong) {
+  const RigDesign steep = design_after([](RigRequirements& r) { r.narrow->published->tilt_deg = 70; });
+  const PairFigures& narrow = *steep.narrow->published;
+  EXPECT_EQ(narrow.tilt_deg, 70);
+  EXPECT_NEAR(narrow.view_far_m, 0.3 / std::tan((70 - 49.5 / 2) * std::numbers::pi / 180), 1e-9);
+  EXPECT_LT(narrow.view_near_m, 0) << "behind the eyes";
+  expect_warning(steep, "nearest_row", 0.3, 1e-12);
+  // It no longer reaches the ground of the wide pair.
+  EXPECT_EQ(steep.view_overlap_m, 0.0);
+  EXPECT_NE(find_warning(steep, "views_apart"), nullptr);
+  EXPECT_EQ(find_warning(rover_design(), "views_apart"), nullptr);
+}
+
+TEST(RigDesigner, PansAllRoundAndTooFew) {
+  const RigDesign round = design_after([](RigRequirements& r) {
+    r.wide.pans->angles_deg = {-180, -150, -120, -90, -60, -30, 0, 30, 60, 90, 120, 150};
+    r.wide.pans->azimuth_deg = 360;
+  });
+  EXPECT_EQ(round.pans->azimuth_far_deg, 360);
+  EXPECT_EQ(round.pans->azimuth_far_stereo_deg, 360);
+  const RigDesign few = design_after([](RigRequirements& r) { r.wide.pans->azimuth_deg = 200; });
+  EXPECT_EQ(few.pans->azimuth_held_to_m, 0);
+  const RigDesign uneven = design_after([](RigRequirements& r) { r.wide.pans->angles_deg = {-35, 0, 20}; });
+  EXPECT_NEAR(uneven.pans->overlap_percent, 30, 1e-9) << "by the widest step";
+}
+
+// Parts of the limits: overlap of 30 % in place of 25 % is nearest, by 5 of 100.
+TEST(RigDesigner, TheNearestLimitIsThatOfTheOverlap) {
+  const RigDesign design = design_after([](RigRequirements& r) {
+    r.wide.lists = {{0.2}, {1}, {50}, {5.5}, {1120}};
+    r.wide.range_m = 3;
+  });
+  EXPECT_NEAR(design.wide.nearest_to_a_limit, 0.05, 1e-9);
 }
 
 TEST(RigDesigner, WithoutAPublishedPairTheBestIsLookedAt) {

@@ -63,6 +63,10 @@ TEST(RigDifferences, EveryFieldIsLookedAt) {
     c.mount_from_camera = Pose::from_translation({1e-9, 0, 0}) * c.mount_from_camera;
   };
   EXPECT_EQ(differences([&](Rig& r) { moved(r.cameras[1]); }), "cameras.right.place;");
+  EXPECT_EQ(differences([](Rig& r) {
+              r.cameras[1].mount_from_camera = r.cameras[1].mount_from_camera * Pose(exp_so3({0, 1e-9, 0}), {0, 0, 0});
+            }),
+            "cameras.right.place;");
   EXPECT_EQ(differences([&](Rig& r) {
               for (Camera& c : r.cameras) moved(c);
             }),
@@ -71,6 +75,20 @@ TEST(RigDifferences, EveryFieldIsLookedAt) {
   EXPECT_EQ(differences([](Rig& r) { r.pairs[0].nearest_m = 0; }), "pairs.front.nearest_m;");
   EXPECT_EQ(differences([](Rig& r) { r.pairs[0].for_odometry = false; }), "pairs.front.for_odometry;");
   EXPECT_EQ(differences([](Rig& r) { r.pairs.clear(); }), "pairs.front;");
+}
+
+TEST(RigDifferences, AnEyeMayBeAnotherCamera) {
+  Rig wanted = rover();
+  wanted.pairs.push_back({"side", "left", "third", 0.3, true});
+  Rig got = wanted;
+  got.pairs[1].left = "right";
+  auto found = describe_differences(wanted, got);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].key, "pairs.side.left");
+  got.pairs[1] = {"side", "left", "right", 0.3, true};
+  found = describe_differences(wanted, got);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].key, "pairs.side.right");
 }
 
 TEST(RigDifferences, RoundingIsNone) {
@@ -90,6 +108,20 @@ TEST(RigDifferences, SayWhatWasAndWhatIs) {
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].text, "the image size: 640 x 480, now 1 x 2");
   EXPECT_THAT(found[1].text, HasSubstr("seen from left: 200.0 mm to the left; not turned, now 700.0 mm to the left"));
+  const auto text = [](const auto& change) {
+    Rig changed = rover();
+    change(changed);
+    return describe_differences(rover(), changed).at(0).text;
+  };
+  EXPECT_EQ(text([](Rig& r) { std::get<PinholeModel>(r.cameras[0].model).cx = 321; }), "[320, 240], now [321, 240]");
+  EXPECT_THAT(text([](Rig& r) { r.pan_tilt_units[0].rest_pan_rad = 0; }), HasSubstr("stands elsewhere"));
+  EXPECT_THAT(text([](Rig& r) { r.pan_tilt_units.clear(); }), HasSubstr("is gone"));
+  // The cameras stand 1 m further ahead in the new body's frame, and so does the old body.
+  EXPECT_THAT(text([](Rig& r) {
+                for (Camera& c : r.cameras)
+                  c.mount_from_camera = Pose::from_translation({1, 0, 0}) * c.mount_from_camera;
+              }),
+              HasSubstr("the old one is 1.000 m ahead"));
 }
 
 // --- model_equivalents.h ---

@@ -38,15 +38,12 @@ void check_camera(const Camera& camera, ImageSize picture, std::vector<RigFindin
   }
   const auto axis = look_ahead(camera.model);
   if (!axis) return;
-  const double along = axis->centre.x() / (0.5 * (width - 1)), down = axis->centre.y() / (0.5 * (height - 1));
-  const double factor = std::sqrt(std::abs(along * down));
-  const bool alike = along > 0 && down > 0 && std::abs(std::log(along / down)) < std::log(1.3);
-  if (alike && (std::min(along, down) > kMiddle || std::max(along, down) < 1 / kMiddle)) {
+  if (const auto factor = size_factor_by_centre(camera)) {
     return mismatch(
         fmt::format("the optical axis meets the picture at ({:.0f}, {:.0f}), which would be the middle of {:.0f} "
                     "x {:.0f} px, not of {} x {}: is the calibration that of another picture size?",
-                    axis->centre.x(), axis->centre.y(), factor * width, factor * height, width, height),
-        1 / factor);
+                    axis->centre.x(), axis->centre.y(), width / *factor, height / *factor, width, height),
+        *factor);
   }
   const double fx = std::abs(axis->by_direction(0, 0)), fy = std::abs(axis->by_direction(1, 1));
   if (std::abs(std::log(fx / fy)) > std::log(kAspect)) {
@@ -61,6 +58,16 @@ void check_camera(const Camera& camera, ImageSize picture, std::vector<RigFindin
 }
 
 }  // namespace
+
+std::optional<double> size_factor_by_centre(const Camera& camera) {
+  const auto axis = look_ahead(camera.model);
+  if (!axis) return std::nullopt;
+  const double along = axis->centre.x() / (0.5 * (camera.size.width - 1)),
+               down = axis->centre.y() / (0.5 * (camera.size.height - 1));
+  const bool alike = along > 0 && down > 0 && std::abs(std::log(along / down)) < std::log(1.3);
+  const bool aside = std::min(along, down) > kMiddle || std::max(along, down) < 1 / kMiddle;
+  return alike && aside ? std::optional(1 / std::sqrt(along * down)) : std::nullopt;
+}
 
 bool is_linear(const Camera& camera) {
   const auto axis = look_ahead(camera.model);
