@@ -1,6 +1,8 @@
 #include "spartan/rig/model_changes.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <initializer_list>
 
@@ -30,12 +32,38 @@ CameraModel resized(const CameraModel& model, double factor) {
                       [&](double v) { return (v + 0.5) * factor - 0.5; });
 }
 
-CameraModel with_radial(const CameraModel& model, double k) {
-  const auto* pinhole = std::get_if<PinholeModel>(&model);
+CameraModel with_square_pixels(const CameraModel& model, bool by_x) {
+  const auto kinds = parameter_kinds(model);
+  ModelParameters numbers = parameters(model);
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    if (kinds[i].key == "focal_px") numbers[i].assign(numbers[i].size(), by_x ? numbers[i].front() : numbers[i].back());
+  }
+  return with_parameters(model, numbers);
+}
+
+CameraModel with_radial(const CameraModel& model, double k, ImageSize size) {
+  const auto* plain = std::get_if<PinholeModel>(&model);
   const auto* radial = std::get_if<RadialTangentialModel>(&model);
-  if (!pinhole && !radial) return model;
-  // r_u = r_d/(1 + k r_d²) gives r_d = r_u (1 + k r_u² + 2 k² r_u⁴ + …).
-  return RadialTangentialModel(pinhole ? *pinhole : radial->pinhole(), {k, 2 * k * k});
+  if (!plain && !radial) return model;
+  const PinholeModel pinhole = plain ? *plain : radial->pinhole();
+  const double across = std::max(pinhole.cx, size.width - 1 - pinhole.cx) / pinhole.fx,
+               down = std::max(pinhole.cy, size.height - 1 - pinhole.cy) / pinhole.fy;
+  // Far out a negative k would turn the rays round: there is nothing to fit there.
+  constexpr int kRadii = 100;
+  constexpr double kLeastShrink = 0.3;
+  const double corner = std::hypot(across, down);
+  const double last = k < 0 ? std::min(corner, std::sqrt((1 - kLeastShrink) / -k)) : corner;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
+  for (int i = 1; i <= kRadii; ++i) {
+    const double distorted = last * i / kRadii, straight = distorted / (1 + k * distorted * distorted);
+    const double s = straight * straight;
+    const Eigen::Vector3d by_k = straight * Eigen::Vector3d(s, s * s, s * s * s);
+    normal += by_k * by_k.transpose();
+    right_side += by_k * (distorted - straight);
+  }
+  const Eigen::Vector3d brown = normal.ldlt().solve(right_side);
+  return RadialTangentialModel(pinhole, {brown[0], brown[1], 0, 0, brown[2]});
 }
 
 }  // namespace spartan

@@ -22,8 +22,8 @@ struct RowErrorCell {
   double median_px = 0;  ///< signed row difference of the pair as given, in the rectified view
 };
 
-/// All zero without any.
-RowErrors row_errors(const std::vector<double>& signed_px);
+/// What is no number (no line of sight) does not count; NaN without any that is.
+RowErrors row_errors(std::vector<double> signed_px);
 
 /// The picture in 8 × 6 parts; those with at least 3 matches, row by row. Empty where the size is not known.
 std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches, const std::vector<double>& signed_px,
