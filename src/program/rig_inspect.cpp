@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <numbers>
@@ -58,8 +59,7 @@ Inspected inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<Pictu
       result.matches = std::move(matches);
     }
   }
-  result.check = guessed ? check_pictures(std::move(all), result.left.size())
-                         : check_pair(rig, pair, std::move(all), result.left.size());
+  result.check = guessed ? check_pictures(all, result.left.size()) : check_pair(rig, pair, all, result.left.size());
   return result;
 }
 
@@ -80,14 +80,16 @@ Json findings_json(const std::vector<RigFinding>& findings) {
   return list;
 }
 
-Json to_json(const Rig& rig, const std::vector<Inspected>& inspected) {
+// Of a guess (no calibration) nothing is said that the pictures did not.
+Json to_json(const Rig& rig, const std::vector<Inspected>& inspected, bool guessed) {
   Json pairs = Json::object();
   for (const StereoPair& pair : rig.pairs) {
     const PairSummary summary = summarize_pair(rig, pair);
-    pairs[pair.name] = {{"baseline_m", number(summary.baseline_m)},
-                        {"focal_px", number(summary.focal_px)},
-                        {"hfov_deg", number(summary.hfov_deg)},
-                        {"vfov_deg", number(summary.vfov_deg)},
+    const auto known = [&](double value) { return guessed ? Json(nullptr) : number(value); };
+    pairs[pair.name] = {{"baseline_m", known(summary.baseline_m)},
+                        {"focal_px", known(summary.focal_px)},
+                        {"hfov_deg", known(summary.hfov_deg)},
+                        {"vfov_deg", known(summary.vfov_deg)},
                         {"findings", findings_json(find_doubts(rig, pair))}};
   }
   for (const Inspected& one : inspected) {
@@ -102,6 +104,7 @@ Json to_json(const Rig& rig, const std::vector<Inspected>& inspected) {
                             {"corrected", rows_json(check.as_corrected)}};
     pair["corrections"] = corrections_json(check.correction, check.correction.focal_ratio);
     pair["corrections"]["sigma"] = corrections_json(check.sigma, check.sigma.focal_ratio);
+    pair["yaw_doubt_px"] = number(check.yaw_doubt_px);
     Json map = Json::array();
     for (const RowErrorCell& cell : check.map) {
       map.push_back({{"x_px", number(cell.centre_px.x())},
@@ -121,23 +124,31 @@ std::string turned(double radians, double sigma, const char* above, const char* 
 
 std::string in_words(const Inspected& one, bool guessed) {
   const PairCheck& check = one.check;
-  const auto rows = [](const RowErrors& e) {
-    return fmt::format("{:.2f} px, 95 % below {:.2f} px", e.mean_px, e.p95_px);
+  const std::string pair = fmt::format("pair {}: ", one.pair.name);
+  std::string text = fmt::format("{}{} matches, {} of them agree\n", pair, check.matches, check.inliers);
+  std::vector<std::string> rows;
+  const auto add_rows = [&](const char* what, const RowErrors& e) {
+    if (std::isfinite(e.mean_px))
+      rows.push_back(fmt::format("{} {:.2f} px, 95 % below {:.2f} px", what, e.mean_px, e.p95_px));
   };
-  std::string text = fmt::format(
-      "pair {}: {} matches, {} of them agree\n"
-      "pair {}: rows differ as taken by {}{}; corrected by {}\n",
-      one.pair.name, check.matches, check.inliers, one.pair.name, rows(check.as_taken),
-      guessed ? "" : "; rectified as given by " + rows(check.as_given), rows(check.as_corrected));
+  add_rows("as taken by", check.as_taken);
+  if (!guessed) add_rows("rectified as given by", check.as_given);
+  add_rows("corrected by", check.as_corrected);
+  if (!rows.empty()) text += fmt::format("{}rows differ {}\n", pair, fmt::join(rows, "; "));
   const PairCorrection &c = check.correction, &s = check.sigma;
-  text += fmt::format(
-      "pair {}: the pictures want the right eye turned {}, {}, {}; its focal length {:+.2f} % ± {:.2f} %\n",
-      one.pair.name, turned(c.pitch_rad, s.pitch_rad, "up", "down"),
-      turned(c.yaw_rad, s.yaw_rad, "to the right", "to the left"),
-      turned(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"), 100 * (c.focal_ratio - 1), 100 * s.focal_ratio);
-  for (const RigFinding& f : check.findings)
-    text += fmt::format("pair {}: FOUND {}: {}\n", one.pair.name, f.id, f.text);
-  return text + fmt::format("pair {}: verdict: {}\n", one.pair.name, name_of(check.verdict));
+  if (std::isfinite(c.pitch_rad)) {
+    text += fmt::format("{}the pictures want the right eye turned {}, {}, {}; its focal length {:+.2f} % ± {:.2f} %\n",
+                        pair, turned(c.pitch_rad, s.pitch_rad, "up", "down"),
+                        turned(c.yaw_rad, s.yaw_rad, "to the right", "to the left"),
+                        turned(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"), 100 * (c.focal_ratio - 1),
+                        100 * s.focal_ratio);
+    text += fmt::format(
+        "{}rows cannot tell a yaw from a lens to better than that ±: it is worth ±{:.1f} px of disparity, so they say "
+        "little of far ranges\n",
+        pair, check.yaw_doubt_px);
+  }
+  for (const RigFinding& f : check.findings) text += fmt::format("{}FOUND {}: {}\n", pair, f.id, f.text);
+  return text + fmt::format("{}verdict: {}\n", pair, name_of(check.verdict));
 }
 
 // The pairs that are asked for, with the recording's pictures or else those given, which are of one pair.
@@ -187,6 +198,7 @@ Rig with_pair_of(Rig rig, const Rig& other, const std::string& name) {
 
 // Self-masks are named from the rig file's folder, and that changes.
 Status write_rig(Rig rig, const std::string& old_path, const std::string& path) {
+  const bool guessed = old_path == "-";
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::path from = fs::is_directory(old_path, error) ? fs::path(old_path) : fs::path(old_path).parent_path();
@@ -196,7 +208,9 @@ Status write_rig(Rig rig, const std::string& old_path, const std::string& path) 
         fs::proximate(fs::absolute(from / camera.self_mask), fs::absolute(fs::path(path)).parent_path(), error)
             .string();
   }
-  return write_file_atomically(path, to_rig_yaml(rig));
+  const std::string remark =
+      guessed ? "# Made of pictures alone: the focal length is a guess, and the baseline of 1 m none at all.\n" : "";
+  return write_file_atomically(path, remark + to_rig_yaml(rig));
 }
 
 Status check_usage(const InspectArguments& a) {
@@ -209,6 +223,9 @@ Status check_usage(const InspectArguments& a) {
   }
   if (!files && !recording && (!a.apply.empty() || !a.picture.empty())) {
     return failure(ErrorCode::usage, "--apply and --picture need pictures", "rig inspect");
+  }
+  if (!a.picture.empty() && std::filesystem::path(a.picture).extension() != ".png") {
+    return failure(ErrorCode::usage, "the picture is a PNG: give it a name that ends in .png", "--picture");
   }
   return {};
 }
@@ -225,7 +242,16 @@ Status write_results(const InspectArguments& a, const Rig& rig, const std::vecto
   }
   if (a.apply.empty()) return {};
   Rig corrected = rig;
-  for (const Inspected& one : inspected) corrected = with_pair_of(corrected, one.check.corrected, one.pair.name);
+  for (const Inspected& one : inspected) {
+    if (!one.check.corrected) {
+      return failure(ErrorCode::input,
+                     fmt::format("is not written: nothing explains the pictures of pair {}, so there is nothing to "
+                                 "put right",
+                                 one.pair.name),
+                     a.apply, "look at the pictures, or run without --apply for the figures");
+    }
+    corrected = with_pair_of(corrected, *one.check.corrected, one.pair.name);
+  }
   return write_rig(corrected, a.rig, a.apply);
 }
 
@@ -239,10 +265,15 @@ std::string in_words(const InspectArguments& a, const ReadRig& read, const std::
         summarize_pair(read.rig, read.rig.pairs.front()).focal_px);
   } else {
     for (const std::string& sentence : describe_rig(read.rig)) text += sentence + "\n";
+    for (const StereoPair& pair : read.rig.pairs) {
+      const bool judged = std::any_of(inspected.begin(), inspected.end(),
+                                      [&](const Inspected& one) { return one.pair.name == pair.name; });
+      if (judged) continue;  // the pictures say more
+      for (const std::string& doubt : describe_doubts(read.rig, pair)) text += doubt + "\n";
+    }
     for (const std::string& note : read.notes) text += note + "\n";
   }
   for (const Inspected& one : inspected) text += in_words(one, guessed);
-  if (!a.apply.empty()) text += fmt::format("the corrected rig: {}\n", a.apply);
   return text;
 }
 
@@ -265,9 +296,15 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
     if (!result) return failure(result);
     inspected = std::move(*result);
   }
-  if (Status written = write_results(a, read->rig, inspected, workers); !written) return failure(written);
-  const std::string text = context.json ? to_json(read->rig, inspected).dump(2) + "\n" : in_words(a, *read, inspected);
+  const std::string text =
+      context.json ? to_json(read->rig, inspected, a.rig == "-").dump(2) + "\n" : in_words(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
+  if (Status written = write_results(a, read->rig, inspected, workers); !written) return failure(written);
+  if (context.json || a.apply.empty()) return kDone;
+  const bool changed =
+      std::any_of(inspected.begin(), inspected.end(), [](const Inspected& i) { return !i.check.findings.empty(); });
+  const char* what = changed ? "the corrected rig" : "the rig as it was, for nothing is to be put right";
+  if (Status printed = print(fmt::format("{}: {}\n", what, a.apply)); !printed) return failure(printed);
   return kDone;
 }
 

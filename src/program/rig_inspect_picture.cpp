@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kWidest_px = 640, kLines = 12, kHeading_px = 22;
 
-// One line of the picture: two views, with the places of matches in them.
+// One line of the picture: two views, with the places of matches in them; without views, the heading alone.
 struct Strip {
   std::string heading;
   Image<std::uint8_t> left, right;
@@ -24,6 +24,7 @@ struct Strip {
 };
 
 std::string in_words(const RowErrors& rows) {
+  if (!std::isfinite(rows.mean_px)) return "too little to tell";
   return fmt::format("rows differ by {:.2f} px, 95 %: {:.2f} px", rows.mean_px, rows.p95_px);
 }
 
@@ -68,34 +69,69 @@ Rig plain(Rig rig) {
   return rig;
 }
 
-void draw(const Strip& strip, cv::Mat canvas, double scale) {
-  const int width = canvas.cols / 2, height = canvas.rows - kHeading_px;
-  canvas.setTo(cv::Scalar(24, 24, 24));
-  for (const bool second : {false, true}) {
-    cv::Mat small, colour;
-    const cv::Rect place(second ? width : 0, kHeading_px, width, height);
-    cv::resize(as_mat(second ? strip.right : strip.left), small, place.size(), 0, 0, cv::INTER_AREA);
-    cv::cvtColor(small, colour, cv::COLOR_GRAY2RGB);
-    colour.copyTo(canvas(place));
-  }
-  for (int line = 1; line < kLines; ++line) {
-    const int y = kHeading_px + line * height / kLines;
-    cv::line(canvas, {0, y}, {canvas.cols - 1, y}, {70, 130, 220}, 1);
-  }
+constexpr std::uint8_t kGround = 24;
+const cv::Scalar kWrongMatch{110, 110, 110};
+
+// `wrong`: matches that do not fit the corrected pair, which say nothing about its rows.
+void draw_matches(const Strip& strip, const std::vector<bool>& wrong, cv::Mat views, double scale) {
+  const int width = views.cols / 2;
   const auto at = [&](const Eigen::Vector2d& p, int shift) {
     return cv::Point(static_cast<int>(std::lround((p.x() + 0.5) * scale)) + shift,
-                     static_cast<int>(std::lround((p.y() + 0.5) * scale)) + kHeading_px);
+                     static_cast<int>(std::lround((p.y() + 0.5) * scale)));
   };
-  for (const PixelMatch& match : strip.matches) {
+  for (std::size_t i = 0; i < strip.matches.size(); ++i) {
+    const PixelMatch& match = strip.matches[i];
     if (!match.left.allFinite() || !match.right.allFinite()) continue;
     const double error_px = match.right.y() - match.left.y();
     const cv::Point from = at(match.left, 0), other = at(match.right, width);
     if (from.x < 0 || from.x >= width || other.x < width || other.x >= 2 * width) continue;
-    const cv::Point to = from + cv::Point(0, static_cast<int>(std::lround(kArrowScale * error_px * scale)));
-    cv::arrowedLine(canvas, from, to, colour_of(error_px), 1, cv::LINE_AA, 0, 0.25);
-    cv::circle(canvas, other, 2, colour_of(error_px), cv::FILLED, cv::LINE_AA);
+    const cv::Scalar colour = wrong[i] ? kWrongMatch : colour_of(error_px);
+    if (wrong[i]) {
+      cv::circle(views, from, 2, colour, 1, cv::LINE_AA);
+    } else {
+      const cv::Point to = from + cv::Point(0, static_cast<int>(std::lround(kArrowScale * error_px * scale)));
+      cv::arrowedLine(views, from, to, colour, 1, cv::LINE_AA, 0, 0.25);
+    }
+    cv::circle(views, other, 2, colour, wrong[i] ? 1 : cv::FILLED, cv::LINE_AA);
   }
+}
+
+void draw(const Strip& strip, const std::vector<bool>& wrong, cv::Mat canvas, double scale) {
+  const int width = canvas.cols / 2, height = canvas.rows - kHeading_px;
+  canvas.setTo(cv::Scalar::all(kGround));
   cv::putText(canvas, strip.heading, {6, 15}, cv::FONT_HERSHEY_SIMPLEX, 0.45, {235, 235, 235}, 1, cv::LINE_AA);
+  if (strip.left.empty()) return;
+  const cv::Mat views = canvas(cv::Rect(0, kHeading_px, canvas.cols, height));
+  for (const bool second : {false, true}) {
+    cv::Mat small, colour;
+    const cv::Rect place(second ? width : 0, 0, width, height);
+    cv::resize(as_mat(second ? strip.right : strip.left), small, place.size(), 0, 0, cv::INTER_AREA);
+    cv::cvtColor(small, colour, cv::COLOR_GRAY2RGB);
+    colour.copyTo(views(place));
+  }
+  for (int line = 1; line < kLines; ++line) {
+    const int y = line * height / kLines;
+    cv::line(views, {0, y}, {views.cols - 1, y}, {70, 130, 220}, 1);
+  }
+  draw_matches(strip, wrong, views, scale);
+}
+
+std::vector<bool> wrong_matches(const Strip& corrected, double limit_px) {
+  std::vector<bool> wrong;
+  wrong.reserve(corrected.matches.size());
+  for (const PixelMatch& match : corrected.matches)
+    wrong.push_back(!(std::abs(match.left.y() - match.right.y()) <= limit_px));
+  return wrong;
+}
+
+// What is drawn of the pair as given.
+Strip as_given(const Rig& rig, const StereoPair& pair, const PairCheck& check, const Strip& taken,
+               const Workers& workers) {
+  auto given = check.structure_found ? std::nullopt : rectified(plain(rig), pair, taken, workers);
+  if (!given)
+    return {"as given the eyes, their sides or sizes are wrong: there is no view with common rows", {}, {}, {}};
+  given->heading = "rectified as given: " + in_words(check.as_given);
+  return std::move(*given);
 }
 
 }  // namespace
@@ -103,18 +139,23 @@ void draw(const Strip& strip, cv::Mat canvas, double scale) {
 Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, const PairCheck& check,
                                     ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                     const std::vector<PixelMatch>& matches, const Workers& workers) {
+  const auto copy = [](ImageView<const std::uint8_t> view) { return Image<std::uint8_t>::copy_of(view); };
   std::vector<Strip> strips;
-  strips.push_back({"as taken: " + in_words(check.as_taken), Image<std::uint8_t>::copy_of(left),
-                    Image<std::uint8_t>::copy_of(right), matches});
-  if (auto given = rectified(plain(rig), pair, strips.front(), workers)) {
-    given->heading = "rectified as given: " + in_words(check.as_given);
-    strips.push_back(std::move(*given));
-  }
-  const StereoPair* corrected_pair = check.corrected.find_pair(pair.name);
-  if (auto corrected = rectified(plain(check.corrected), *corrected_pair, strips.front(), workers)) {
-    corrected->heading =
-        fmt::format("corrected: {} (arrows are {} times as long)", in_words(check.as_corrected), kArrowScale);
-    strips.push_back(std::move(*corrected));
+  strips.push_back({"as taken: " + in_words(check.as_taken), copy(left), copy(right), matches});
+  strips.push_back(as_given(rig, pair, check, strips.front(), workers));
+  std::vector<bool> wrong(matches.size(), false);
+  if (check.corrected) {
+    const bool exchanged = check.pictures_exchanged;
+    Strip taken{{}, copy(exchanged ? right : left), copy(exchanged ? left : right), matches};
+    for (PixelMatch& match : taken.matches) {
+      if (exchanged) std::swap(match.left, match.right);
+    }
+    if (auto corrected = rectified(plain(*check.corrected), *check.corrected->find_pair(pair.name), taken, workers)) {
+      corrected->heading =
+          fmt::format("corrected: {} (arrows are {} times as long)", in_words(check.as_corrected), kArrowScale);
+      if (check.inlier_limit_px > 0) wrong = wrong_matches(*corrected, check.inlier_limit_px);
+      strips.push_back(std::move(*corrected));
+    }
   }
   const double scale = std::min(1.0, static_cast<double>(kWidest_px) / left.width());
   const int width = static_cast<int>(left.width() * scale),
@@ -122,7 +163,7 @@ Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, cons
   Image<Rgb8> picture(2 * width, height * static_cast<int>(strips.size()));
   cv::Mat canvas = as_mat(picture);
   for (std::size_t i = 0; i < strips.size(); ++i) {
-    draw(strips[i], canvas(cv::Rect(0, static_cast<int>(i) * height, 2 * width, height)), scale);
+    draw(strips[i], wrong, canvas(cv::Rect(0, static_cast<int>(i) * height, 2 * width, height)), scale);
   }
   return picture;
 }

@@ -116,12 +116,16 @@ void describe_pair(const Rig& rig, const StereoPair& pair, std::vector<std::stri
                                     pair.name, pair.nearest_m, summary.focal_px * summary.baseline_m / pair.nearest_m));
   }
   if (!pair.for_odometry) sentences.push_back(fmt::format("pair {}: not for the odometry", pair.name));
-  for (const RigFinding& doubt : find_doubts(rig, pair)) {
-    sentences.push_back(fmt::format("pair {}: DOUBT ({}): {}", pair.name, doubt.id, doubt.text));
-  }
 }
 
 }  // namespace
+
+std::vector<std::string> describe_doubts(const Rig& rig, const StereoPair& pair) {
+  std::vector<std::string> sentences;
+  for (const RigFinding& doubt : find_doubts(rig, pair))
+    sentences.push_back(fmt::format("pair {}: DOUBT ({}): {}", pair.name, doubt.id, doubt.text));
+  return sentences;
+}
 
 std::string describe_relative_pose(const Pose& first_from_second) {
   const Eigen::Vector3d& t = first_from_second.translation();

@@ -26,4 +26,7 @@ PairSummary summarize_pair(const Rig& rig, const StereoPair& pair);
 /// to the left one, the range resolution at 0.5 … 20 m for a disparity step of 0.3 px (Δz = z² c / (f b)).
 std::vector<std::string> describe_rig(const Rig& rig);
 
+/// What looks wrong with a pair by its numbers alone (find_doubts), a sentence each.
+std::vector<std::string> describe_doubts(const Rig& rig, const StereoPair& pair);
+
 }  // namespace spartan

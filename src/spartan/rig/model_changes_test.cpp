@@ -21,14 +21,20 @@ TEST(ModelChanges, LargerPicturesSeeTheSame) {
   }
 }
 
-// r_u = r_d/(1 + k r_d²)
+// r_u = r_d/(1 + k r_d²), from the middle to the corner.
 TEST(ModelChanges, APinholeIsBent) {
-  constexpr double k = -0.1, r_d = 0.4;
-  const CameraModel bent = with_radial(kPinhole, k);
-  const Eigen::Vector2d seen = *project(bent, {r_d / (1 + k * r_d * r_d), 0, 1});
-  EXPECT_NEAR(seen.x(), 320 + 500 * r_d, 0.02);
+  constexpr ImageSize kSize{640, 480};
+  for (const double k : {-0.6, -0.3, -0.1, 0.1, 0.4}) {
+    const CameraModel bent = with_radial(kPinhole, k, kSize);
+    for (double r_d = 0; r_d < 0.8; r_d += 0.05) {
+      const auto seen = project(bent, {r_d / (1 + k * r_d * r_d), 0, 1});
+      ASSERT_TRUE(seen) << k << " " << r_d;
+      EXPECT_NEAR(seen->x(), 320 + 500 * r_d, 0.01) << k << " " << r_d;
+    }
+  }
+  constexpr double k = -0.1;
   const CameraModel fisheye = EquidistantModel(kPinhole, {});
-  EXPECT_EQ(with_radial(fisheye, k), fisheye);
+  EXPECT_EQ(with_radial(fisheye, k, kSize), fisheye);
 }
 
 }  // namespace

@@ -5,24 +5,26 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <utility>
 
 #include "spartan/rig/model_changes.h"
+#include "spartan/rig/pair_belief.h"
 
 namespace spartan {
 namespace {
 
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 constexpr int kLeastMatches = 40;
 // Beside the verdict's limits (PairVerdict).
-constexpr double kRowOffset_px = 0.5, kFocalRatio = 0.003, kGoodMean_px = 0.5, kGoodP95_px = 1.5, kUsableMean_px = 1,
-                 kUsableP95_px = 3;
+constexpr double kRowOffset_px = 0.5, kRollOffset_px = 0.5, kFocalRatio = 0.003, kUsableMean_px = 1, kUsableP95_px = 3;
 // Brown's decentering p2 of a lens may be wrong by 0.002 in each eye; its rows 2 p2 x y are those of a yaw twice as
 // large.
 constexpr double kYawOfLens_rad = 2 * 0.002 * std::numbers::sqrt2;
-constexpr double kYawSigmas = 2.6;
+constexpr double kYawSigmas = 2.6, kSigmas = 5;
 constexpr double kBeyondInfinity_px = -1.5, kBeyondShare = 0.02;
 
 template <class T>
@@ -39,32 +41,49 @@ double share_below(const std::vector<double>& values, double limit) {
   return values.empty() ? 0 : static_cast<double>(below) / static_cast<double>(values.size());
 }
 
-// The pair as it is now believed, with all that was found so far taken in.
+constexpr RowErrors kNoRows{kNan, kNan, kNan};
+constexpr PairCorrection kNoCorrection{kNan, kNan, kNan, kNan, kNan, kNan, kNan, kNan};
+
+// What a baseline that is no rover's was divided or multiplied by: millimetres and centimetres are usual.
+double unit_factor(double baseline_m) {
+  if (baseline_m >= 30) return 0.001;
+  if (baseline_m >= 10) return 0.01;
+  return baseline_m < 0.005 ? 1000 : 1;
+}
+
 class Checker {
  public:
-  Checker(const Rig& rig, const StereoPair& pair, std::vector<PixelMatch> matches, ImageSize picture_size, bool guessed)
-      : rig_(rig), pair_(pair), matches_(std::move(matches)), picture_(picture_size), guessed_(guessed) {
-    check_.matches = static_cast<int>(matches_.size());
+  Checker(const Rig& rig, const StereoPair& pair, const std::vector<PixelMatch>& matches, ImageSize picture_size,
+          bool guessed)
+      : rig_(rig), pair_(pair), picture_(picture_size), guessed_(guessed) {
+    check_.matches = static_cast<int>(matches.size());
     check_.findings = find_doubts(rig, pair, picture_size);
-    believe(*rig.find_camera(pair.left), *rig.find_camera(pair.right), rig.right_from_left(pair).inverse());
+    if (found("not_beside") || too_few(check_.matches)) return;
+    believed_ = believe_pair(*rig.find_camera(pair.left), *rig.find_camera(pair.right),
+                             rig.right_from_left(pair).inverse(), matches, picture_size, !guessed);
   }
 
   PairCheck run() && {
-    if (found("not_beside")) return finish();
-    settle_stated_size();
-    settle_eyes();
-    search_size();
-    settle_distortion();
-    judge_fit();
+    if (found("not_beside") || too_few(check_.matches)) return without_figures();
+    take_figures();
+    if (looks_twice_at_one_picture()) {
+      add("same_picture", "both pictures are the same: nothing is nearer or farther", check_.inliers);
+      return without_figures();
+    }
+    if (!believed_.explains) {
+      if (too_few(check_.inliers)) return without_figures();
+      return unexplained();
+    }
+    name_beliefs();
+    if (too_few(check_.inliers)) return without_figures();
+    judge_yaw();
+    judge_rows();
+    judge_focal_ratio();
+    correct();
     return finish();
   }
 
  private:
-  void believe(const Camera& left, const Camera& right, const Pose& left_from_right) {
-    left_ = left;
-    right_ = right;
-    left_from_right_ = left_from_right;
-  }
   bool found(std::string_view id) const {
     return std::any_of(check_.findings.begin(), check_.findings.end(), [&](const RigFinding& f) { return f.id == id; });
   }
@@ -72,179 +91,177 @@ class Checker {
     std::erase_if(check_.findings, [&](const RigFinding& f) { return f.id == id; });
   }
   void add(const char* id, std::string text, double value) { check_.findings.push_back({id, std::move(text), value}); }
+  const PairFit& fit() const { return believed_.fit; }
 
-  PairFit fit_of(const CameraModel& left, const CameraModel& right, bool radial, bool yaw = true) const {
-    PairFitOptions options;
-    options.radial = radial;
-    options.yaw = yaw;
-    return fit_pair(left, right, left_from_right_, matches_, options);
+  bool too_few(int matches) {
+    const bool spread = check_.map.empty() || 4 * std::ssize(check_.map) >= kRowErrorCells;
+    if (matches >= kLeastMatches && spread) return false;
+    if (found("not_enough_texture")) return true;
+    add("not_enough_texture",
+        check_.map.empty()
+            ? fmt::format("only {} matches: too little to judge by", matches)
+            : fmt::format("only {} of {} matches agree, in {} of {} parts of the picture: too little to judge by",
+                          matches, check_.matches, check_.map.size(), kRowErrorCells),
+        matches);
+    return true;
   }
 
-  void settle_stated_size();
-  void search_size();
-  void settle_eyes();
-  void settle_distortion();
-  void judge_fit();
+  PairCheck without_figures();
+  PairCheck unexplained();
+  void take_figures();
+  bool looks_twice_at_one_picture() const;
+  void name_beliefs();
+  void name_eyes();
+  void name_size();
+  void name_distortion();
   void judge_yaw();
+  void judge_rows();
+  void judge_focal_ratio();
+  bool needs_correction() const;
+  PairFitOptions needed_corrections() const;
+  void correct();
+  void name_rows_apart();
+  Rig corrected_rig(const PairCorrection& correction) const;
   PairVerdict verdict() const;
-  Rig corrected_rig() const;
   PairCheck finish();
 
   const Rig& rig_;
   StereoPair pair_;
-  std::vector<PixelMatch> matches_;
   ImageSize picture_;
   bool guessed_ = false;
-  Camera left_, right_;
-  Pose left_from_right_;
-  PairFit fit_, applied_;   // the second one is what the corrected rig has
-  bool exchanged_ = false;  // the rig's eyes have changed their names
-  bool moved_ = false;      // left_from_right_ is not the rig's
+  BelievedPair believed_;
   PairCheck check_;
 };
 
-// The calibration of another picture size, told by the pictures themselves, of each camera by itself, or by a principal
-// point, of both alike. Other size_mismatch (a view, fx beside fy) tell no factor.
-void Checker::settle_stated_size() {
-  bool by_pictures = false;
-  for (Camera* camera : {&left_, &right_}) {
-    if (picture_.empty() || picture_ == camera->size) continue;
-    camera->model = resized(camera->model, static_cast<double>(picture_.width) / camera->size.width);
-    camera->size = picture_;
-    by_pictures = true;
-  }
-  if (by_pictures) return;
-  auto factor = size_factor_by_centre(left_);
-  if (!factor) factor = size_factor_by_centre(right_);
-  if (!factor) return;
-  left_.model = resized(left_.model, *factor);
-  right_.model = resized(right_.model, *factor);
+// Where there is nothing to tell by: no figure is made up.
+PairCheck Checker::without_figures() {
+  check_.correction = check_.sigma = kNoCorrection;
+  check_.yaw_doubt_px = kNan;
+  check_.as_given = check_.as_corrected = kNoRows;
+  if (check_.inliers == 0) check_.as_taken = kNoRows;
+  check_.verdict = PairVerdict::bad;
+  check_.corrected = rig_;
+  return std::move(check_);
 }
 
-// The calibration of another size, told by rows that agree with that one only.
-void Checker::search_size() {
-  if (found("size_mismatch")) return;
-  constexpr std::array<double, 8> kFactors{1 / 3.0, 0.5, 2 / 3.0, 0.75, 4 / 3.0, 1.5, 2, 3};
-  constexpr double kWorthALook_px = 0.3, kClearlyBetter = 0.5;
-  if (fit_.inliers < kLeastMatches || fit_.rms_px < kWorthALook_px) return;
-  struct Other {
-    CameraModel left, right;
-    double factor = 1;
-    PairFit fit;
-  };
-  std::optional<Other> best;
-  double limit_px = kClearlyBetter * fit_.rms_px;
-  for (const double factor : kFactors) {
-    for (const auto& changed : {resized, with_focal_times}) {
-      Other other{changed(left_.model, factor), changed(right_.model, factor), factor, {}};
-      other.fit = fit_of(other.left, other.right, false);
-      if (other.fit.inliers < fit_.inliers || other.fit.rms_px >= limit_px) continue;
-      limit_px = other.fit.rms_px;
-      best = other;
-    }
-  }
-  if (!best) return;
-  add("size_mismatch",
-      fmt::format(
-          "with a focal length {:.3g} times as large the rows agree to {:.2f} px in the place of {:.2f} px: is the "
-          "calibration that of another picture size?",
-          best->factor, limit_px, fit_.rms_px),
-      best->factor);
-  left_.model = best->left;
-  right_.model = best->right;
-  fit_ = best->fit;
+PairCheck Checker::unexplained() {
+  std::string text = fmt::format(
+      "no mistake that is known here explains the pictures: {} of {} matches agree, to {:.2f} px at best. Are they of "
+      "one moment, and of this rig?",
+      check_.inliers, check_.matches, fit().rms_px);
+  add("not_explained", std::move(text), fit().rms_px);
+  check_.correction = check_.sigma = kNoCorrection;
+  check_.yaw_doubt_px = kNan;
+  check_.as_corrected = kNoRows;
+  check_.verdict = PairVerdict::bad;
+  check_.corrected.reset();
+  return std::move(check_);
 }
 
-// Which eye took which picture, and on which side the right one stands. Disparities are positive: a belief that makes
-// most of them negative is wrong. Where both beliefs pass (eyes that are turned in, other principal points), the one
-// whose rows agree counts; the rig as given has the benefit of the doubt.
-void Checker::settle_eyes() {
-  constexpr double kClearlyBetter = 0.7;
-  struct Belief {
-    Camera left, right;
-    Pose left_from_right;
-    std::vector<PixelMatch> matches;
-    PairFit fit;
-    double wrong_share = 1;  // of the disparities
-  };
-  const auto judged = [&](Belief belief) {
-    std::swap(matches_, belief.matches);
-    std::swap(left_from_right_, belief.left_from_right);
-    belief.fit = fit_of(belief.left.model, belief.right.model, false);
-    std::swap(left_from_right_, belief.left_from_right);
-    std::swap(matches_, belief.matches);
-    belief.wrong_share = share_below(chosen(belief.fit.disparity_px, belief.fit.inlier), 0);
-    return belief;
-  };
-  std::vector<PixelMatch> exchanged = matches_;
-  for (PixelMatch& match : exchanged) std::swap(match.left, match.right);
-  const bool on_the_left = left_from_right_.translation().x() < 0;
-  const Pose inverse = left_from_right_.inverse();
-  // As given, or with the transform turned round; the other belief exchanges the pictures, and the eyes if they need
-  // it.
-  Belief same = judged({left_, right_, on_the_left ? inverse : left_from_right_, matches_, {}, 1});
-  Belief other = judged(on_the_left ? Belief{right_, left_, inverse, exchanged, {}, 1}
-                                    : Belief{left_, right_, left_from_right_, exchanged, {}, 1});
-  fit_ = same.fit;
-  if (std::max(same.fit.inliers, other.fit.inliers) < kLeastMatches) return;
-  const bool same_fails = same.wrong_share > 0.5, other_fails = other.wrong_share > 0.5;
-  const bool exchange = !other_fails && (same_fails || other.fit.cost < kClearlyBetter * same.fit.cost);
-  if (!exchange && !on_the_left) return;
+void Checker::take_figures() {
+  const PairBelief& belief = believed_.belief;
+  check_.inliers = fit().inliers;
+  check_.correction = fit().correction;
+  check_.sigma = fit().sigma;
+  check_.matched = chosen(believed_.matches, fit().inlier);
+  check_.inlier_limit_px = fit().inlier_limit_px;
+  check_.pictures_exchanged = belief.pictures_exchanged;
+  check_.row_error_px =
+      rectify_matches(belief.left.model, belief.right.model, belief.left_from_right, check_.matched).row_error_px;
+  std::vector<double> taken;
+  taken.reserve(check_.matched.size());
+  for (const PixelMatch& match : check_.matched) taken.push_back(match.left.y() - match.right.y());
+  check_.as_taken = row_errors(taken);
+  check_.as_given = row_errors(check_.row_error_px);
+  check_.map = map_row_errors(check_.matched, check_.row_error_px, picture_);
+}
+
+bool Checker::looks_twice_at_one_picture() const {
+  constexpr double kSame_px = 0.2, kNearlyAll = 0.95;
+  const auto same = std::count_if(believed_.matches.begin(), believed_.matches.end(),
+                                  [](const PixelMatch& m) { return (m.left - m.right).norm() < kSame_px; });
+  return static_cast<double>(same) > kNearlyAll * static_cast<double>(believed_.matches.size());
+}
+
+void Checker::name_beliefs() {
+  name_eyes();
+  name_size();
+  if (!guessed_) name_distortion();
+  check_.structure_found = found("inverse_transform") || found("swapped_eyes") || found("size_mismatch");
+}
+
+void Checker::name_eyes() {
+  const PairBelief& b = believed_.belief;
   drop("inverse_transform");
   drop("swapped_eyes");
-  const Belief& chosen_one = exchange ? other : same;
-  const double share = 100 * (1 - chosen_one.wrong_share);
-  if (exchange) {
-    add("swapped_eyes",
-        fmt::format("what is called left was taken by the right eye{}: {:.0f} % of the disparities are then positive",
-                    on_the_left ? ", and the rig says so too" : " (the rig itself is not exchanged)", share),
-        share);
-  } else {
+  const double share = 100 * (1 - believed_.wrong_side);
+  const std::string proof = fmt::format("{:.0f} % of the disparities are then positive", share);
+  if (b.inverted) {
     add("inverse_transform",
-        fmt::format(
-            "the rig has the right camera on the left, but with the inverse transform {:.0f} % of the disparities "
-            "are positive",
-            share),
+        fmt::format("the rig has the right camera on the left; with the inverse transform the rows agree, and {}{}",
+                    proof,
+                    believed_.eyes_told ? "" : ". With two so equal eyes left and right may as well be exchanged"),
         share);
   }
-  exchanged_ = exchange && on_the_left;
-  moved_ = on_the_left;
-  left_ = chosen_one.left;
-  right_ = chosen_one.right;
-  left_from_right_ = chosen_one.left_from_right;
-  matches_ = chosen_one.matches;
-  fit_ = chosen_one.fit;
+  if (b.eyes_exchanged || !believed_.eyes_told) {
+    add("swapped_eyes",
+        fmt::format("what the rig calls left stands on the right{}: {}{}",
+                    b.pictures_exchanged ? ", and what is called the left picture was taken there" : "", proof,
+                    believed_.eyes_told ? "" : ". Or the transform is inverted: two so equal eyes do not tell"),
+        share);
+  } else if (b.lenses_exchanged) {
+    add("swapped_eyes",
+        fmt::format("the two eyes have each other's lenses{}: rows then agree to {:.2f} px in the place of {:.2f} px",
+                    b.pictures_exchanged ? ", and each other's pictures" : "", fit().rms_px, believed_.rms_as_given_px),
+        share);
+  } else if (b.pictures_exchanged) {
+    add("swapped_eyes", fmt::format("what is called the left picture was taken by the right eye: {}", proof), share);
+  }
 }
 
-void Checker::settle_distortion() {
-  constexpr double kLeastRadial = 0.02, kClearlyBetter = 0.8, kSigmas = 6;
-  if (fit_.inliers < kLeastMatches || !is_linear(left_) || !is_linear(right_)) return;
-  const PairFit bent = fit_of(left_.model, right_.model, true);
-  const double radial = 0.5 * (bent.correction.left_radial + bent.correction.right_radial);
-  const bool sure = std::abs(bent.correction.left_radial) > kSigmas * bent.sigma.left_radial ||
-                    std::abs(bent.correction.right_radial) > kSigmas * bent.sigma.right_radial;
-  if (!sure || std::abs(radial) < kLeastRadial || bent.rms_px > kClearlyBetter * fit_.rms_px ||
-      bent.inliers < 0.9 * fit_.inliers) {
-    return;
-  }
+void Checker::name_size() {
+  const SizeChange& size = believed_.belief.size;
+  // Off-centre, and the pictures are content with it.
+  const bool of_the_pictures = picture_.empty() || picture_ == rig_.find_camera(pair_.left)->size;
+  const bool off_centre = size_told_by_centre(believed_.belief.left) || size_told_by_centre(believed_.belief.right);
+  if (size.any() || (off_centre && of_the_pictures && !believed_.belief.stated_size)) drop("size_mismatch");
+  if (!size.any()) return;
+  const char* eye = size.left && size.right ? "" : size.left ? " of the left eye" : " of the right eye";
+  add("size_mismatch",
+      fmt::format("with a focal length{} {:.3g} times as large the rows agree to {:.2f} px in the place of {:.2f} px: "
+                  "is the calibration that of another picture size?",
+                  eye, size.factor, fit().rms_px, believed_.rms_as_given_px),
+      size.factor);
+}
+
+void Checker::name_distortion() {
+  constexpr double kLeastRadial = 0.02, kSure = 6;
+  PairBelief& b = believed_.belief;
+  const PairCorrection &c = fit().correction, &s = fit().sigma;
+  const bool left = b.left_bends && std::abs(c.left_radial) > std::max(kLeastRadial, kSure * s.left_radial);
+  const bool right = b.right_bends && std::abs(c.right_radial) > std::max(kLeastRadial, kSure * s.right_radial);
+  if (!left && !right) return;
+  const double radial = left && right ? 0.5 * (c.left_radial + c.right_radial) : left ? c.left_radial : c.right_radial;
+  const char* who = left && right ? "the eyes are" : left ? "the left eye is" : "the right eye is";
   add("distortion_ignored",
-      fmt::format("taken for pinholes, but the rows bend, as with a k1 of about {:.3f}; rows then agree to {:.2f} px "
-                  "in the place "
-                  "of {:.2f} px",
-                  radial, bent.rms_px, fit_.rms_px),
+      fmt::format("{} taken for {}, but the rows bend, as with a k1 of about {:.3f}; they then agree to {:.2f} px in "
+                  "the place of {:.2f} px",
+                  who, left && right ? "pinholes" : "a pinhole", radial, fit().rms_px, believed_.rms_as_given_px),
       radial);
-  fit_ = bent;
 }
 
 void Checker::judge_yaw() {
-  const double sigma = std::hypot(fit_.sigma.yaw_rad, kYawOfLens_rad), yaw = fit_.correction.yaw_rad;
+  const double sigma = std::hypot(fit().sigma.yaw_rad, kYawOfLens_rad), yaw = fit().correction.yaw_rad;
   check_.sigma.yaw_rad = sigma;
+  check_.yaw_doubt_px = sigma * fit().rows.focal_px;
+  if (guessed_) return;
   // Disparities as given are those as corrected without the yaw: on the axis it shifts them by f times itself.
-  std::vector<double> given = chosen(fit_.disparity_px, fit_.inlier);
-  for (double& d : given) d += fit_.focal_px * yaw;
+  const std::vector<double> corrected = chosen(fit().rows.disparity_px, fit().inlier);
+  std::vector<double> given = corrected;
+  for (double& d : given) d += fit().rows.focal_px * yaw;
   const double beyond = share_below(given, kBeyondInfinity_px);
-  const bool told_by_infinity = yaw < 0 && beyond > kBeyondShare && -yaw > 5 * fit_.sigma.yaw_rad &&
-                                share_below(chosen(fit_.disparity_px, fit_.inlier), kBeyondInfinity_px) < 0.3 * beyond;
+  const bool told_by_infinity = yaw < 0 && beyond > kBeyondShare && -yaw > kSigmas * fit().sigma.yaw_rad &&
+                                share_below(corrected, kBeyondInfinity_px) < 0.3 * beyond;
   if (!told_by_infinity && std::abs(yaw) < kYawSigmas * sigma) return;
   add("yaw_offset",
       fmt::format(
@@ -254,45 +271,114 @@ void Checker::judge_yaw() {
       yaw * kDegreesPerRadian);
 }
 
-void Checker::judge_fit() {
-  applied_ = fit_;
-  check_.inliers = fit_.inliers;
-  check_.correction = fit_.correction;
-  check_.sigma = fit_.sigma;
-  check_.matched = chosen(matches_, fit_.inlier);
-  check_.row_error_px = chosen(fit_.row_error_before_px, fit_.inlier);
-  std::vector<double> taken;
-  taken.reserve(check_.matched.size());
-  for (const PixelMatch& match : check_.matched) taken.push_back(match.left.y() - match.right.y());
-  check_.as_taken = row_errors(taken);
-  check_.as_given = row_errors(check_.row_error_px);
-  check_.map = map_row_errors(check_.matched, check_.row_error_px, picture_);
-  const bool spread = 4 * std::ssize(check_.map) >= kRowErrorCells;
-  if (check_.inliers < kLeastMatches || !spread) {
-    add("not_enough_texture",
-        fmt::format("only {} of {} matches agree, in {} of {} parts of the picture: too little to judge by",
-                    check_.inliers, check_.matches, check_.map.size(), kRowErrorCells),
-        check_.inliers);
+void Checker::judge_rows() {
+  const RowErrors& rows = check_.as_given;
+  if (std::abs(rows.median_px) > kRowOffset_px) {
+    add("row_offset",
+        fmt::format("rows of the left picture lie {:.2f} px {} those of the right one", std::abs(rows.median_px),
+                    rows.median_px > 0 ? "below" : "above"),
+        rows.median_px);
+  }
+  const double roll = check_.correction.roll_rad, across_px = 0.5 * picture_.width * std::abs(roll);
+  if (across_px > kRollOffset_px && std::abs(roll) > kSigmas * check_.sigma.roll_rad && !are_good(rows)) {
+    add("roll_offset",
+        fmt::format("the right eye is turned {:.3f}° {} about its axis: {:.1f} px at the sides of the picture",
+                    std::abs(roll) * kDegreesPerRadian, roll > 0 ? "clockwise" : "counter-clockwise", across_px),
+        roll * kDegreesPerRadian);
+  }
+}
+
+void Checker::judge_focal_ratio() {
+  const SizeChange& size = believed_.belief.size;
+  const bool of_one_eye = size.left != size.right;
+  const double found_ratio = check_.correction.focal_ratio;
+  if (of_one_eye) {
+    // Both say so: the one eye's calibration is of another size, and the eyes do not go together.
+    const double whole = found_ratio * (size.right ? size.factor : 1 / size.factor);
+    check_.correction.focal_ratio = whole;
+  }
+  if (guessed_) return;
+  const double ratio = check_.correction.focal_ratio - 1;
+  if (std::abs(ratio) <= std::max(kFocalRatio, kSigmas * check_.sigma.focal_ratio)) return;
+  add("focal_ratio",
+      fmt::format("the right eye's focal length is {:.2f} % {} than the rig says, beside the left one's",
+                  100 * std::abs(ratio), ratio > 0 ? "larger" : "smaller"),
+      check_.correction.focal_ratio);
+}
+
+// What the corrected rig may differ in beside pitch and roll. What the rows hardly tell costs range where it is wrong:
+// a baseline's direction, and beside rays that bend a yaw and a focal ratio, are touched where the rows need it.
+PairFitOptions Checker::needed_corrections() const {
+  constexpr double kCheaper = 0.9, kLeastGain = 25;
+  PairFitOptions options = fit_options(believed_.belief);
+  const bool bends = found("distortion_ignored");
+  options.yaw = guessed_ || found("yaw_offset");
+  options.focal = guessed_ || found("focal_ratio");
+  options.baseline = false;
+  const PairBelief& b = believed_.belief;
+  const auto cost = [&] {
+    return fit_pair(b.left.model, b.right.model, b.left_from_right, believed_.matches, options).cost;
+  };
+  double held = cost();
+  const auto free_if_needed = [&](bool& option) {
+    if (option) return;
+    option = true;
+    const double free = cost();
+    option = free < kCheaper * held && free < held - kLeastGain;
+    if (option) held = free;
+  };
+  if (bends) free_if_needed(options.focal);
+  if (bends) free_if_needed(options.yaw);
+  free_if_needed(options.baseline);
+  return options;
+}
+
+// Where eyes, unit or size were all that was wrong, the rest of the calibration is right.
+bool Checker::needs_correction() const {
+  return !are_good(check_.as_given) || found("yaw_offset") || found("row_offset") || found("focal_ratio") ||
+         found("distortion_ignored");
+}
+
+void Checker::correct() {
+  if (check_.findings.empty() && !needs_correction()) {
+    check_.corrected = rig_;
+    check_.as_corrected = check_.as_given;
     return;
   }
-  judge_yaw();
-  // What is put right leaves a yaw alone that may be the lens's.
-  if (!guessed_ && !found("yaw_offset"))
-    applied_ = fit_of(left_.model, right_.model, found("distortion_ignored"), false);
-  check_.as_corrected = row_errors(chosen(applied_.row_error_after_px, fit_.inlier));
-  if (std::abs(check_.as_given.median_px) > kRowOffset_px) {
-    add("row_offset",
-        fmt::format("rows of the left picture lie {:.2f} px {} those of the right one",
-                    std::abs(check_.as_given.median_px), check_.as_given.median_px > 0 ? "below" : "above"),
-        check_.as_given.median_px);
+  const PairBelief& b = believed_.belief;
+  PairCorrection correction;
+  if (needs_correction())
+    correction =
+        fit_pair(b.left.model, b.right.model, b.left_from_right, believed_.matches, needed_corrections()).correction;
+  check_.corrected = corrected_rig(correction);
+  const StereoPair& pair = *check_.corrected->find_pair(pair_.name);
+  const RectifiedMatches seen =
+      rectify_matches(check_.corrected->find_camera(pair.left)->model, check_.corrected->find_camera(pair.right)->model,
+                      check_.corrected->right_from_left(pair).inverse(), check_.matched);
+  check_.as_corrected = row_errors(seen.row_error_px);
+  if (check_.findings.empty()) name_rows_apart();
+}
+
+// Rows that nothing above has named.
+void Checker::name_rows_apart() {
+  constexpr double kMended = 0.7;
+  const RowErrors fitted = row_errors(chosen(fit().rows.row_error_px, fit().inlier));
+  std::string why;
+  if (check_.as_corrected.mean_px < kMended * check_.as_given.mean_px) {
+    why = "; turns and the baseline's direction mend that";
+  } else if (fitted.mean_px < kMended * check_.as_given.mean_px) {
+    why = fmt::format(
+        "; the right eye turned {:.2f}° to the {} would mend that, and so would decentering of a lens: rows do not "
+        "tell "
+        "which, and it is left alone",
+        std::abs(fit().correction.yaw_rad) * kDegreesPerRadian, fit().correction.yaw_rad > 0 ? "right" : "left");
+  } else {
+    why = ", and no small correction mends that: another lens model, or pictures that move within themselves?";
   }
-  const double ratio = check_.correction.focal_ratio - 1;
-  if (std::abs(ratio) > std::max(kFocalRatio, 5 * check_.sigma.focal_ratio)) {
-    add("focal_ratio",
-        fmt::format("the right eye's focal length is {:.2f} % {} than the rig says, beside the left one's",
-                    100 * std::abs(ratio), ratio > 0 ? "larger" : "smaller"),
-        check_.correction.focal_ratio);
-  }
+  add("rows_apart",
+      fmt::format("rows differ by {:.2f} px, 95 % below {:.2f} px{}", check_.as_given.mean_px, check_.as_given.p95_px,
+                  why),
+      check_.as_given.mean_px);
 }
 
 PairVerdict Checker::verdict() const {
@@ -300,51 +386,38 @@ PairVerdict Checker::verdict() const {
                          "distortion_ignored", "yaw_offset", "eyes_apart"}) {
     if (found(id)) return PairVerdict::bad;
   }
-  if (found("not_enough_texture")) return PairVerdict::usable;
   const RowErrors& rows = check_.as_given;
   if (rows.mean_px > kUsableMean_px || rows.p95_px > kUsableP95_px) return PairVerdict::bad;
-  const bool good = rows.mean_px <= kGoodMean_px && rows.p95_px <= kGoodP95_px && check_.findings.empty();
-  return good ? PairVerdict::good : PairVerdict::usable;
+  return check_.findings.empty() ? PairVerdict::good : PairVerdict::usable;
 }
 
-Rig Checker::corrected_rig() const {
+Rig Checker::corrected_rig(const PairCorrection& correction) const {
   Rig rig = rig_;
   const auto camera_of = [&](const std::string& name) -> Camera& {
     return *std::find_if(rig.cameras.begin(), rig.cameras.end(), [&](const Camera& c) { return c.name == name; });
   };
   StereoPair& pair =
       *std::find_if(rig.pairs.begin(), rig.pairs.end(), [&](const auto& p) { return p.name == pair_.name; });
-  if (exchanged_) std::swap(pair.left, pair.right);
+  const PairBelief& b = believed_.belief;
+  if (b.eyes_exchanged) std::swap(pair.left, pair.right);
   Camera &left = camera_of(pair.left), &right = camera_of(pair.right);
-  left.model = left_.model;
-  left.size = left_.size;
-  right.model = right_.model;
-  right.size = right_.size;
-  Pose left_from_right = left_from_right_;
-  bool moved = moved_;
-  if (!found("not_enough_texture") && check_.inliers >= kLeastMatches) {
-    const PairCorrection& correction = applied_.correction;
-    left_from_right = corrected_left_from_right(left_from_right, correction);
-    moved = true;
-    right.model = with_focal_times(right.model, correction.focal_ratio);
-    if (found("distortion_ignored")) {
-      left.model = with_radial(left.model, correction.left_radial);
-      right.model = with_radial(right.model, correction.right_radial);
-    }
-  }
+  left.size = b.left.size;
+  right.size = b.right.size;
+  left.model = b.left_bends ? with_radial(b.left.model, correction.left_radial, left.size) : b.left.model;
+  right.model =
+      with_focal_times(b.right_bends ? with_radial(b.right.model, correction.right_radial, right.size) : b.right.model,
+                       correction.focal_ratio);
+  Pose left_from_right = corrected_left_from_right(b.left_from_right, correction);
   if (found("baseline_unit")) {
-    const double length = left_from_right.translation().norm();
-    const double factor = length < 1 ? 1000 : length > 30 ? 0.001 : 0.01;
+    const double factor = unit_factor(left_from_right.translation().norm());
     left_from_right = Pose(left_from_right.rotation(), factor * left_from_right.translation());
-    moved = true;
   }
-  if (moved) right.mount_from_camera = left.mount_from_camera * left_from_right;
+  right.mount_from_camera = left.mount_from_camera * left_from_right;
   return rig;
 }
 
 PairCheck Checker::finish() {
   check_.verdict = verdict();
-  check_.corrected = corrected_rig();
   return std::move(check_);
 }
 
@@ -362,13 +435,14 @@ std::string_view name_of(PairVerdict verdict) {
   return "bad";
 }
 
-PairCheck check_pair(const Rig& rig, const StereoPair& pair, std::vector<PixelMatch> matches, ImageSize picture_size) {
-  return Checker(rig, pair, std::move(matches), picture_size, false).run();
+PairCheck check_pair(const Rig& rig, const StereoPair& pair, const std::vector<PixelMatch>& matches,
+                     ImageSize picture_size) {
+  return Checker(rig, pair, matches, picture_size, false).run();
 }
 
-PairCheck check_pictures(std::vector<PixelMatch> matches, ImageSize picture_size) {
+PairCheck check_pictures(const std::vector<PixelMatch>& matches, ImageSize picture_size) {
   const Rig rig = guessed_rig(picture_size);
-  return Checker(rig, rig.pairs.front(), std::move(matches), picture_size, true).run();
+  return Checker(rig, rig.pairs.front(), matches, picture_size, true).run();
 }
 
 Rig guessed_rig(ImageSize picture_size) {

@@ -16,6 +16,8 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kParameters = 8, kWithoutBaseline = 4, kWithoutRadial = 6;
 constexpr int kStepsPerScale = 6, kLastSteps = 20, kLastScales = 3;
+// Row differences are compared between beliefs in units of this, and count no more from three of them on.
+constexpr double kRowUnit_px = 0.3;
 using Parameters = Eigen::Matrix<double, kParameters, 1>;
 
 // pitch, yaw, roll, ln(focal ratio); baseline down, baseline ahead; bend left, bend right.
@@ -30,11 +32,11 @@ PairCorrection to_correction(const Parameters& p) {
           .right_radial = p[7]};
 }
 
-// The line of sight of one eye for its focal length times 1/(1 + h), 1, 1/(1 − h): in between by the parabola through
-// them. So a lens bends its rays as the corrected focal length says, without asking it again in every step.
+// The line of sight of one eye for its focal length times 1 − h, 1, 1 + h: in between by the parabola through them. So
+// a lens bends its rays as the corrected focal length says, without asking it again in every step.
 constexpr double kFocalStep = 0.02;
 struct Sight {
-  Eigen::Vector3d less, here, more;  // directions in the eye's own frame; for focal lengths times 1 − h, 1, 1 + h
+  Eigen::Vector3d less, here, more;  // directions in the eye's own frame
   Eigen::Vector3d at(double focal_ratio) const {
     const double s = (focal_ratio - 1) / kFocalStep;
     return here + 0.5 * s * (more - less) + 0.5 * s * s * (more - 2 * here + less);
@@ -50,12 +52,6 @@ Eigen::Vector3d direction_or_nan(const CameraModel& model, const Eigen::Vector2d
   return ray ? ray->direction : Eigen::Vector3d::Constant(kNan);
 }
 
-// A larger focal length sees a pixel nearer to the axis.
-Sight sight_of(const CameraModel& model, const Eigen::Vector2d& pixel, const Eigen::Vector2d& centre) {
-  const auto scaled = [&](double ratio) { return direction_or_nan(model, centre + (pixel - centre) / ratio); };
-  return {scaled(1 - kFocalStep), scaled(1), scaled(1 + kFocalStep)};
-}
-
 // Where both eyes see a match in the rectified view at focal length 1; NaN beside or behind it.
 struct Seen {
   Eigen::Vector2d left, right;
@@ -63,16 +59,17 @@ struct Seen {
   double disparity() const { return left.x() - right.x(); }
 };
 
-// The view of a pair with a correction.
+// The view of a pair with a correction. `known_ratio`: for which the sights of the right eye were made.
 class CorrectedPair {
  public:
-  CorrectedPair(const Pose& left_from_right, const Parameters& p)
+  CorrectedPair(const Pose& left_from_right, const Parameters& p, double known_ratio = 1)
       : correction_(to_correction(p)),
-        axes_(rectifying_axes(corrected_left_from_right(left_from_right, correction_).inverse())) {}
+        axes_(rectifying_axes(corrected_left_from_right(left_from_right, correction_).inverse())),
+        further_ratio_(correction_.focal_ratio / known_ratio) {}
 
   Seen look(const RayMatch& match) const {
     return {place(match.left, axes_.left_from_rectified, 1, correction_.left_radial),
-            place(match.right, axes_.right_from_rectified, correction_.focal_ratio, correction_.right_radial)};
+            place(match.right, axes_.right_from_rectified, further_ratio_, correction_.right_radial)};
   }
 
  private:
@@ -89,6 +86,7 @@ class CorrectedPair {
   }
   PairCorrection correction_;
   RectifyingAxes axes_;
+  double further_ratio_;
 };
 
 std::vector<double> finite_only(const std::vector<double>& values) {
@@ -97,25 +95,89 @@ std::vector<double> finite_only(const std::vector<double>& values) {
   return result;
 }
 
+// What a pair looks like to its models: the places of matches for any correction.
+class PairOfLenses {
+ public:
+  PairOfLenses(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
+               const std::vector<PixelMatch>& matches)
+      : right_(right), left_from_right_(left_from_right), matches_(matches) {
+    const Eigen::Vector2d left_centre = centre_of(left);
+    rays_.resize(matches.size());
+    for (std::size_t i = 0; i < matches.size(); ++i) rays_[i].left = sight_of(left, matches[i].left, left_centre, 1);
+    aim(1);
+    focal_px_ = 0.5 * (focal_of(left) + focal_of(right));
+  }
+
+  /// The right eye's lines of sight are made anew where the focal length is so far from what they were made for that
+  /// the parabola would show.
+  void keep_aimed(double focal_ratio) {
+    if (std::abs(focal_ratio / known_ratio_ - 1) > 0.5 * kFocalStep) aim(focal_ratio);
+  }
+  std::size_t count() const { return rays_.size(); }
+  double focal_px() const { return focal_px_; }
+  std::vector<double> row_errors(const Parameters& p) const { return look(p, &Seen::row_error); }
+  std::vector<double> disparities(const Parameters& p) const { return look(p, &Seen::disparity); }
+
+ private:
+  static Eigen::Vector2d centre_of(const CameraModel& model) {
+    return project(model, Eigen::Vector3d::UnitZ()).value_or(Eigen::Vector2d::Zero());
+  }
+  static double focal_of(const CameraModel& model) {
+    const auto ahead = project_with_jacobian(model, Eigen::Vector3d::UnitZ());
+    return ahead ? std::sqrt(std::abs(ahead->by_point.leftCols<2>().determinant())) : 0;
+  }
+  // A larger focal length sees a pixel nearer to the axis.
+  static Sight sight_of(const CameraModel& model, const Eigen::Vector2d& pixel, const Eigen::Vector2d& centre,
+                        double focal_ratio) {
+    const auto scaled = [&](double ratio) {
+      return direction_or_nan(model, centre + (pixel - centre) / (ratio * focal_ratio));
+    };
+    return {scaled(1 - kFocalStep), scaled(1), scaled(1 + kFocalStep)};
+  }
+  void aim(double focal_ratio) {
+    const Eigen::Vector2d centre = centre_of(right_);
+    for (std::size_t i = 0; i < rays_.size(); ++i)
+      rays_[i].right = sight_of(right_, matches_[i].right, centre, focal_ratio);
+    known_ratio_ = focal_ratio;
+  }
+  std::vector<double> look(const Parameters& p, double (Seen::*figure)() const) const {
+    const CorrectedPair pair(left_from_right_, p, known_ratio_);
+    std::vector<double> result;
+    result.reserve(rays_.size());
+    for (const RayMatch& ray : rays_) result.push_back(focal_px_ * (pair.look(ray).*figure)());
+    return result;
+  }
+
+  const CameraModel& right_;
+  const Pose& left_from_right_;
+  const std::vector<PixelMatch>& matches_;
+  std::vector<RayMatch> rays_;
+  double known_ratio_ = 1, focal_px_ = 0;
+};
+
+Parameters sigmas_beforehand(const PairFitOptions& o) {
+  constexpr double kStays = 1e-9;
+  const auto if_free = [](bool free, double sigma) { return free ? sigma : kStays; };
+  Parameters sigma;
+  sigma << o.turn_sigma_rad, if_free(o.yaw, o.turn_sigma_rad), o.turn_sigma_rad, if_free(o.focal, o.focal_sigma),
+      if_free(o.baseline, o.baseline_sigma_rad), if_free(o.baseline, o.baseline_sigma_rad),
+      if_free(o.left_radial, o.radial_sigma), if_free(o.right_radial, o.radial_sigma);
+  return sigma;
+}
+
 // Gauss-Newton on the row differences, in pixels.
 class Fitter {
  public:
-  Fitter(std::vector<RayMatch> rays, const Pose& left_from_right, double focal_px, const PairFitOptions& options)
-      : rays_(std::move(rays)), left_from_right_(left_from_right), focal_px_(focal_px) {
-    constexpr double kStays = 1e-9;
-    const double turn = options.turn_sigma_rad, baseline = options.baseline_sigma_rad;
-    Parameters sigma;
-    sigma << turn, options.yaw ? turn : kStays, turn, options.focal_sigma, baseline, baseline, options.radial_sigma,
-        options.radial_sigma;
-    all_ = options.radial ? kParameters : kWithoutRadial;
-    prior_ = sigma.cwiseInverse().cwiseAbs2();
-    least_sigma_px_ = options.match_sigma_px;
-  }
+  Fitter(PairOfLenses lenses, const PairFitOptions& options)
+      : lenses_(std::move(lenses)),
+        all_(options.left_radial || options.right_radial ? kParameters : kWithoutRadial),
+        prior_(sigmas_beforehand(options).cwiseInverse().cwiseAbs2()),
+        least_sigma_px_(options.match_sigma_px) {}
 
   void run() {
     leverage_ = bounded_leverage();
     // The median row difference is a pitch; from there on the rest is small.
-    at_[0] = std::atan(median(finite_only(residuals(at_))) / focal_px_);
+    at_[0] = std::atan(median(finite_only(residuals(at_))) / lenses_.focal_px());
     if (median_absolute(at_) > median_absolute(Parameters::Zero())) at_.setZero();
     // A wrong match may have any disparity, and a large one pulls hard at the baseline's direction: that stays until
     // wrong matches count little.
@@ -140,22 +202,16 @@ class Fitter {
   }
 
   const Parameters& at() const { return at_; }
-  std::vector<double> residuals(const Parameters& p) const { return look(p, &Seen::row_error); }
-  std::vector<double> disparities(const Parameters& p) const { return look(p, &Seen::disparity); }
+  const PairOfLenses& lenses() const { return lenses_; }
+  std::vector<double> residuals(const Parameters& p) const { return lenses_.row_errors(p); }
 
   double cost() const {
-    constexpr double kMost = 9;
-    double sum = (prior_.array() * at_.array().square()).head(free_).sum();
-    for (const double row : residuals(at_)) {
-      const double square = row * row / (least_sigma_px_ * least_sigma_px_);
-      sum += square < kMost ? square : kMost;
-    }
-    return sum;
+    return cost_of_rows(residuals(at_)) + (prior_.array() * at_.array().square()).head(free_).sum();
   }
   /// Of the parameters, when the inliers' row differences have this standard deviation.
   Parameters sigmas(double sigma_px, const std::vector<bool>& inlier) const {
-    std::vector<double> weights(rays_.size());
-    for (std::size_t i = 0; i < rays_.size(); ++i) weights[i] = inlier[i] ? 1 / (sigma_px * sigma_px) : 0;
+    std::vector<double> weights(lenses_.count());
+    for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = inlier[i] ? 1 / (sigma_px * sigma_px) : 0;
     const Normal normal = normal_equations(weights);
     const auto inverse = normal.matrix.topLeftCorner(free_, free_).inverse();
     Parameters result = Parameters::Zero();
@@ -168,14 +224,6 @@ class Fitter {
     Eigen::Matrix<double, kParameters, kParameters> matrix;
     Parameters right_side;
   };
-
-  std::vector<double> look(const Parameters& p, double (Seen::*figure)() const) const {
-    const CorrectedPair pair(left_from_right_, p);
-    std::vector<double> result;
-    result.reserve(rays_.size());
-    for (const RayMatch& ray : rays_) result.push_back(focal_px_ * (pair.look(ray).*figure)());
-    return result;
-  }
 
   double median_absolute(const Parameters& p) const {
     std::vector<double> values = finite_only(residuals(p));
@@ -216,7 +264,7 @@ class Fitter {
   // a few wrong matches could buy it. Such a match counts by how far out it stands.
   std::vector<double> bounded_leverage() const {
     constexpr double kSpreads = 5, kLeastSpread_px = 4;
-    std::vector<double> values = disparities(at_);
+    std::vector<double> values = lenses_.disparities(at_);
     const double middle = median(finite_only(values));
     for (double& v : values) v = std::abs(v - middle);
     const double reach = kSpreads * std::max(1.4826 * median(finite_only(values)), kLeastSpread_px);
@@ -262,24 +310,19 @@ class Fitter {
         better = after < before;
         damping = better ? 0.1 * damping : 10 * damping;
         if (better) at_ = moved;
+        if (better) lenses_.keep_aimed(std::exp(at_[3]));
         if (better && before - after < 1e-7 * before) return;
       }
       if (!better) return;
     }
   }
 
-  std::vector<RayMatch> rays_;
+  PairOfLenses lenses_;
   std::vector<double> leverage_;  // a weight for each match
-  Pose left_from_right_;
-  double focal_px_, least_sigma_px_ = 0;
-  int all_ = kParameters, free_ = kParameters;  // the first so many parameters are estimated, in the end and now
+  int all_, free_ = kParameters;  // the first so many parameters are estimated, in the end and now
   Parameters prior_, at_ = Parameters::Zero();
+  double least_sigma_px_;
 };
-
-double focal_of(const CameraModel& model) {
-  const auto ahead = project_with_jacobian(model, Eigen::Vector3d::UnitZ());
-  return ahead ? std::sqrt(std::abs(ahead->by_point.leftCols<2>().determinant())) : kNan;
-}
 
 }  // namespace
 
@@ -293,32 +336,37 @@ Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection
   return {left_from_right.rotation() * turn, swing * left_from_right.translation()};
 }
 
+double cost_of_rows(const std::vector<double>& row_error_px) {
+  constexpr double kMost = 9;
+  double sum = 0;
+  for (const double row : row_error_px) {
+    const double square = row * row / (kRowUnit_px * kRowUnit_px);
+    sum += square < kMost ? square : kMost;
+  }
+  return sum;
+}
+
+RectifiedMatches rectify_matches(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
+                                 const std::vector<PixelMatch>& matches) {
+  const PairOfLenses lenses(left, right, left_from_right, matches);
+  return {lenses.focal_px(), lenses.row_errors(Parameters::Zero()), lenses.disparities(Parameters::Zero())};
+}
+
 PairFit fit_pair(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
                  const std::vector<PixelMatch>& matches, const PairFitOptions& options) {
-  std::vector<RayMatch> rays;
-  rays.reserve(matches.size());
-  const auto centre_of = [](const CameraModel& model) {
-    return project(model, Eigen::Vector3d::UnitZ()).value_or(Eigen::Vector2d::Zero());
-  };
-  const Eigen::Vector2d left_centre = centre_of(left), right_centre = centre_of(right);
-  for (const PixelMatch& match : matches) {
-    rays.push_back({sight_of(left, match.left, left_centre), sight_of(right, match.right, right_centre)});
-  }
-  PairFit fit;
-  fit.focal_px = 0.5 * (focal_of(left) + focal_of(right));
-  Fitter fitter(std::move(rays), left_from_right, fit.focal_px, options);
+  Fitter fitter(PairOfLenses(left, right, left_from_right, matches), options);
   fitter.run();
+  PairFit fit;
   fit.correction = to_correction(fitter.at());
-  fit.row_error_before_px = fitter.residuals(Parameters::Zero());
-  fit.row_error_after_px = fitter.residuals(fitter.at());
-  fit.disparity_px = fitter.disparities(fitter.at());
+  fit.rows = {fitter.lenses().focal_px(), fitter.residuals(fitter.at()), fitter.lenses().disparities(fitter.at())};
 
-  std::vector<double> absolute = finite_only(fit.row_error_after_px);
+  std::vector<double> absolute = finite_only(fit.rows.row_error_px);
   for (double& v : absolute) v = std::abs(v);
   const double spread_px = std::max(1.4826 * median(absolute), options.match_sigma_px);
+  fit.inlier_limit_px = std::min(4 * spread_px, kLargestInlier_px);
   double sum = 0;
-  for (const double error : fit.row_error_after_px) {
-    const bool fits = std::abs(error) <= 4 * spread_px;
+  for (const double error : fit.rows.row_error_px) {
+    const bool fits = std::abs(error) <= fit.inlier_limit_px;
     fit.inlier.push_back(fits);
     fit.inliers += fits ? 1 : 0;
     sum += fits ? error * error : 0;

@@ -29,21 +29,32 @@ struct PairCorrection {
 /// left_from_right with the correction taken in.
 Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection& correction);
 
+/// Where matches lie in the rectified view of a pair, at the scale of `focal_px`. NaN where a model has no line of
+/// sight.
+struct RectifiedMatches {
+  double focal_px = 0;                             ///< pixels per radian of that view, the mean of both eyes
+  std::vector<double> row_error_px, disparity_px;  ///< of each match: left − right
+};
+/// To compare beliefs about the same matches: Σ min(r²/σ², 9), σ = 0.3 px; a row that is no number counts 9.
+double cost_of_rows(const std::vector<double>& row_error_px);
+RectifiedMatches rectify_matches(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
+                                 const std::vector<PixelMatch>& matches);
+
 struct PairFit {
   PairCorrection correction, sigma;  ///< the estimate and its standard deviations (of the ratio: of its logarithm)
-  double focal_px = 0;               ///< pixels per radian of the rectified view, the mean of both eyes
-  /// For each match: signed row difference (left − right) in the rectified view, px, of the pair as given and as
-  /// corrected, and the disparity (left − right) as corrected. NaN where a model has no line of sight.
-  std::vector<double> row_error_before_px, row_error_after_px, disparity_px;
-  std::vector<bool> inlier;  ///< fits the corrected pair
+  RectifiedMatches rows;             ///< as corrected
+  double inlier_limit_px = 0;        ///< four times the spread of the rows, at most kLargestInlier_px
+  std::vector<bool> inlier;          ///< fits the corrected pair
   int inliers = 0;
   double rms_px = 0;  ///< of the inliers' row errors as corrected
-  double cost = 0;  ///< Σ min(r²/σ², 9) plus the priors, σ = match_sigma_px: to compare beliefs about the same matches
+  double cost = 0;    ///< cost_of_rows() plus the priors
 };
+inline constexpr double kLargestInlier_px = 3;
 
 struct PairFitOptions {
-  bool yaw = true;      ///< estimate the yaw; false: it is as given
-  bool radial = false;  ///< estimate what bends the rays of each eye too
+  /// What is estimated beside pitch and roll; the rest is as given.
+  bool yaw = true, focal = true, baseline = true;
+  bool left_radial = false, right_radial = false;
   /// What is thought of the errors of a calibration beforehand (standard deviations). They hold what the pictures do
   /// not tell: the yaw of a narrow view, the baseline's direction where all is far away.
   double turn_sigma_rad = 0.05, baseline_sigma_rad = 0.02, focal_sigma = 0.03, radial_sigma = 0.3;

@@ -13,7 +13,7 @@ constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 // Beyond these a pair is more likely misread than built that way.
 constexpr double kLongBaseline_m = 3, kShortBaseline_m = 0.005, kLargestTurn_deg = 15;
 // How far the principal point may lie from the middle, and fx from fy, as factors.
-constexpr double kMiddle = 1.4, kAspect = 1.3;
+constexpr double kMiddle = 1.4, kAspect = 1.3, kAspectToAsk = 1.05;
 constexpr double kNarrowest_deg = 3, kWidestLinear_deg = 150;
 
 struct OnAxis {
@@ -26,29 +26,44 @@ std::optional<OnAxis> look_ahead(const CameraModel& model) {
   return OnAxis{ahead->pixel, ahead->by_point.leftCols<2>()};
 }
 
+// The factor of a picture whose middle the principal point would be.
+std::optional<double> middle_factor(const Camera& camera, const OnAxis& axis) {
+  const double along = axis.centre.x() / (0.5 * (camera.size.width - 1)),
+               down = axis.centre.y() / (0.5 * (camera.size.height - 1));
+  const bool alike = along > 0 && down > 0 && std::abs(std::log(along / down)) < std::log(1.3);
+  if (!alike || (std::min(along, down) <= kMiddle && std::max(along, down) >= 1 / kMiddle)) return std::nullopt;
+  return std::sqrt(along * down);
+}
+
+double aspect_of(const OnAxis& axis) {
+  return std::abs(axis.by_direction(0, 0) / axis.by_direction(1, 1));
+}
+
 void check_camera(const Camera& camera, ImageSize picture, std::vector<RigFinding>& findings) {
   const auto mismatch = [&](const std::string& text, double value) {
     findings.push_back({"size_mismatch", fmt::format("camera {}: {}", camera.name, text), value});
   };
   const auto [width, height] = camera.size;
   if (!picture.empty() && picture != camera.size) {
-    return mismatch(fmt::format("the calibration is of pictures of {} x {} px, these have {} x {}", width, height,
-                                picture.width, picture.height),
-                    static_cast<double>(picture.width) / width);
+    const auto factor = size_factor(camera.size, picture);
+    return mismatch(
+        fmt::format("the calibration is of pictures of {} x {} px, these have {} x {}{}", width, height, picture.width,
+                    picture.height, factor ? "" : ": no enlargement, but a part of them or other pictures"),
+        factor.value_or(static_cast<double>(picture.width) / width));
   }
   const auto axis = look_ahead(camera.model);
   if (!axis) return;
-  if (const auto factor = size_factor_by_centre(camera)) {
+  if (const auto factor = middle_factor(camera, *axis)) {
     return mismatch(
         fmt::format("the optical axis meets the picture at ({:.0f}, {:.0f}), which would be the middle of {:.0f} "
                     "x {:.0f} px, not of {} x {}: is the calibration that of another picture size?",
-                    axis->centre.x(), axis->centre.y(), width / *factor, height / *factor, width, height),
-        *factor);
+                    axis->centre.x(), axis->centre.y(), *factor * width, *factor * height, width, height),
+        1 / *factor);
   }
   const double fx = std::abs(axis->by_direction(0, 0)), fy = std::abs(axis->by_direction(1, 1));
-  if (std::abs(std::log(fx / fy)) > std::log(kAspect)) {
+  if (std::abs(std::log(aspect_of(*axis))) > std::log(kAspectToAsk)) {
     return mismatch(fmt::format("fx is {:.1f} and fy {:.1f} px: is one of them that of another picture size?", fx, fy),
-                    fx / fy);
+                    aspect_of(*axis));
   }
   const double view_deg = 2 * std::atan(0.5 * width / fx) * kDegreesPerRadian;
   if (is_linear(camera) && !(view_deg > kNarrowest_deg && view_deg < kWidestLinear_deg)) {
@@ -59,14 +74,24 @@ void check_camera(const Camera& camera, ImageSize picture, std::vector<RigFindin
 
 }  // namespace
 
-std::optional<double> size_factor_by_centre(const Camera& camera) {
+std::optional<double> size_factor(ImageSize calibration, ImageSize picture) {
+  const double across = static_cast<double>(picture.width) / calibration.width,
+               down = static_cast<double>(picture.height) / calibration.height;
+  if (!(std::abs(std::log(across / down)) < 0.01)) return std::nullopt;
+  return across;
+}
+
+std::optional<double> size_told_by_centre(const Camera& camera) {
   const auto axis = look_ahead(camera.model);
-  if (!axis) return std::nullopt;
-  const double along = axis->centre.x() / (0.5 * (camera.size.width - 1)),
-               down = axis->centre.y() / (0.5 * (camera.size.height - 1));
-  const bool alike = along > 0 && down > 0 && std::abs(std::log(along / down)) < std::log(1.3);
-  const bool aside = std::min(along, down) > kMiddle || std::max(along, down) < 1 / kMiddle;
-  return alike && aside ? std::optional(1 / std::sqrt(along * down)) : std::nullopt;
+  const auto factor = axis ? middle_factor(camera, *axis) : std::nullopt;
+  return factor ? std::optional(1 / *factor) : std::nullopt;
+}
+
+AspectDoubt doubt_of_aspect(const Camera& camera) {
+  const auto axis = look_ahead(camera.model);
+  const double difference = axis ? std::abs(std::log(aspect_of(*axis))) : 0;
+  if (difference > std::log(kAspect)) return AspectDoubt::strong;
+  return difference > std::log(kAspectToAsk) ? AspectDoubt::some : AspectDoubt::none;
 }
 
 bool is_linear(const Camera& camera) {

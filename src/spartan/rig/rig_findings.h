@@ -17,13 +17,19 @@ struct RigFinding {
 };
 
 /// From the numbers alone: `inverse_transform` and `swapped_eyes` together where the right eye stands on the left (only
-/// pictures tell which), `baseline_unit`, `size_mismatch` (principal point, focal lengths, and the pictures' size where
-/// that is known), `not_beside`, `eyes_apart`.
+/// pictures tell which), `baseline_unit`, `size_mismatch` (principal point, view, fx and fy more than 5 % apart, and
+/// the pictures' size where that is known), `not_beside`, `eyes_apart`.
 std::vector<RigFinding> find_doubts(const Rig& rig, const StereoPair& pair, ImageSize picture_size = {});
 
-/// How many times as large the camera's pictures are as those of its calibration, by a principal point that would be
-/// the middle of those; none where it lies about the middle of the camera's own.
-std::optional<double> size_factor_by_centre(const Camera& camera);
+/// How much larger pictures are than those of the calibration; none where their shapes differ (by more than 1 %).
+std::optional<double> size_factor(ImageSize calibration, ImageSize picture);
+
+/// What to multiply the model's size by where its principal point would be the middle of other pictures.
+std::optional<double> size_told_by_centre(const Camera& camera);
+
+/// fx and fy that differ by more than most pixels' shape (5 %), or than any (30 %).
+enum class AspectDoubt { none, some, strong };
+AspectDoubt doubt_of_aspect(const Camera& camera);
 
 /// Whether the camera is a pinhole within 0.5 px all over its picture.
 bool is_linear(const Camera& camera);

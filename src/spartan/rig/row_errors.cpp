@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "spartan/core/median.h"
@@ -9,13 +10,15 @@
 namespace spartan {
 namespace {
 
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kColumns = 8, kRows = 6, kLeastInCell = 3;
 static_assert(kColumns * kRows == kRowErrorCells);
 
 }  // namespace
 
-RowErrors row_errors(const std::vector<double>& signed_px) {
-  if (signed_px.empty()) return {};
+RowErrors row_errors(std::vector<double> signed_px) {
+  std::erase_if(signed_px, [](double v) { return !std::isfinite(v); });
+  if (signed_px.empty()) return {kNan, kNan, kNan};
   RowErrors errors;
   errors.median_px = median(signed_px);
   std::vector<double> absolute;
@@ -32,6 +35,7 @@ std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches,
   if (picture.empty()) return {};
   std::vector<std::vector<double>> cells(kRowErrorCells);
   for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!std::isfinite(signed_px[i])) continue;
     const Eigen::Vector2d& p = matches[i].left;
     const int column = std::clamp(static_cast<int>(p.x() * kColumns / picture.width), 0, kColumns - 1);
     const int row = std::clamp(static_cast<int>(p.y() * kRows / picture.height), 0, kRows - 1);

@@ -15,6 +15,12 @@ struct RowErrors {
   double median_px = 0;            ///< signed
 };
 
+/// What stereo needs: 0.5 px in the mean, 1.5 px for 95 %.
+inline constexpr double kGoodRowsMean_px = 0.5, kGoodRowsP95_px = 1.5;
+inline bool are_good(const RowErrors& rows) {
+  return rows.mean_px <= kGoodRowsMean_px && rows.p95_px <= kGoodRowsP95_px;
+}
+
 /// A part of the left picture.
 struct RowErrorCell {
   Eigen::Vector2d centre_px;
@@ -22,8 +28,8 @@ struct RowErrorCell {
   double median_px = 0;  ///< signed row difference of the pair as given, in the rectified view
 };
 
-/// All zero without any.
-RowErrors row_errors(const std::vector<double>& signed_px);
+/// What is no number (no line of sight) does not count; NaN without any that is.
+RowErrors row_errors(std::vector<double> signed_px);
 
 /// The picture in 8 × 6 parts; those with at least 3 matches, row by row. Empty where the size is not known.
 std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches, const std::vector<double>& signed_px,

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace spartan {
 namespace {
 
@@ -12,7 +14,9 @@ TEST(RowErrors, CountAbsoluteValuesAndASignedMedian) {
   EXPECT_NEAR(rows.mean_px, 0.505, 1e-12);
   EXPECT_NEAR(rows.p95_px, 0.96, 1e-12);
   EXPECT_NEAR(rows.median_px, -0.10, 0.011);
-  EXPECT_EQ(row_errors({}).mean_px, 0);
+  errors.push_back(std::nan(""));
+  EXPECT_EQ(row_errors(errors).p95_px, rows.p95_px) << "what is no number does not count";
+  EXPECT_TRUE(std::isnan(row_errors({}).mean_px));
 }
 
 TEST(RowErrors, AreMappedOverThePicture) {
