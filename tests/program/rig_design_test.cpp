@@ -103,7 +103,7 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_NEAR((*published)["focal_length_mm"], 6.6, 0.05);
   // Nothing but the sets comes with --all, and the text is laid out like that of any other JSON.
   nlohmann::ordered_json without = nlohmann::ordered_json::parse(told.out);
-  EXPECT_EQ(without.dump(2) + "\n", told.out);
+  EXPECT_TRUE(without.dump(2) + "\n" == told.out);  // too long to be shown side by side
   for (const char* pair : {"wide", "narrow"}) without[pair].erase("feasible");
   EXPECT_EQ(without.dump(2) + "\n", run_program({"rig", "design", rover(), "--json"}).out);
 }
