@@ -5,59 +5,10 @@
 
 #include <cmath>
 
+#include "spartan/rig/pan_words.h"
+
 namespace spartan::program {
 namespace {
-
-// --- JSON ---
-
-Json figures_json(const PairFigures& pair) {
-  const PairMargins& margins = pair.margins;
-  return {{"baseline_m", number(pair.shape.baseline_m)},
-          {"nearest_m", number(pair.shape.nearest_m)},
-          {"hfov_deg", number(pair.shape.hfov_deg)},
-          {"width_px", pair.shape.width_px},
-          {"pixel_size_um", number(pair.shape.pixel_size_um)},
-          {"range_m", number(pair.range_m)},
-          {"focal_length_mm", number(pair.focal_length_mm)},
-          {"stereo_angle_deg", number(pair.stereo_angle_deg)},
-          {"search_percent", number(pair.search_percent)},
-          {"pan_overlap_percent", number(pair.pan_overlap_percent)},
-          {"vfov_deg", number(pair.vfov_deg)},
-          {"tilt_deg", number(pair.tilt_deg)},
-          {"view_near_m", number(pair.view_near_m)},
-          {"view_far_m", number(pair.view_far_m)},
-          {"margins",
-           {{"range_m", number(margins.range_m)},
-            {"stereo_angle_deg", number(margins.stereo_angle_deg)},
-            {"search_percent", number(margins.search_percent)},
-            {"baseline_m", number(margins.baseline_m)},
-            {"pan_overlap_percent", number(margins.pan_overlap_percent)}}}};
-}
-
-Json published_json(const PairDesign& design) {
-  if (!design.published) return nullptr;
-  Json json = {{"feasible", design.published->feasible}, {"on_offer", design.published_on_offer}};
-  json.update(figures_json(*design.published));
-  return json;
-}
-
-Json pair_json(const PairDesign& design, bool whole_set) {
-  const auto or_null = [](const PairFigures* pair) { return pair ? figures_json(*pair) : Json(nullptr); };
-  Json json = {{"combinations", design.combinations}, {"feasible_count", design.feasible.size()}};
-  json["with_pan_overlap_count"] = design.with_pan_overlap_count ? Json(*design.with_pan_overlap_count) : Json(nullptr);
-  json["best"] = or_null(design.best());
-  json["equally_good"] = design.equally_good;
-  json["best_with_pan_overlap"] = or_null(design.best_with_pan_overlap ? &*design.best_with_pan_overlap : nullptr);
-  json["published"] = published_json(design);
-  json["nearest_to_a_limit"] = number(design.nearest_to_a_limit);
-  if (whole_set) {
-    json["feasible"] = Json::array();
-    for (const PairFigures& pair : design.feasible) json["feasible"].push_back(figures_json(pair));
-  }
-  return json;
-}
-
-// --- text ---
 
 constexpr const char* kHead =
     "                b [m]  d_min [m]   F [deg]  w [px]  s [um]  f [mm]  range [m]  stereo [deg]  search [%]  "
@@ -143,14 +94,13 @@ std::string ground_text(const RigDesign& design) {
     text += fmt::format("ground seen by both pairs, middle column: {:.2f} m\n", *design.view_overlap_m);
   if (!design.pans) return text;
   const PanFigures& pans = *design.pans;
-  if (std::isfinite(pans.overlap_percent)) {
-    text += fmt::format(
-        "overlap of neighbouring pans: {:.1f} % of the view; at the far edge {:.1f} % (one eye), {:.1f} % (both "
-        "eyes)\n",
-        pans.overlap_percent, pans.far_overlap_percent, pans.far_overlap_stereo_percent);
-  }
-  return text + fmt::format("azimuth of all pans at the far edge: {:.1f} deg (one eye), {:.1f} deg (both eyes)\n",
-                            pans.azimuth_far_deg, pans.azimuth_far_stereo_deg);
+  if (pans.overlap) text += overlaps_in_words(pans) + "\n";
+  text +=
+      fmt::format("of the asked azimuth the pans see at the far edge: {:.1f} deg (one eye), {:.1f} deg (both eyes)\n",
+                  pans.azimuth_far.width_deg(), pans.azimuth_far_stereo.width_deg());
+  if (!pans.azimuth_held) return text + "both eyes see all of it at no distance\n";
+  return text + fmt::format("both eyes see all of it from {:.2f} m to {:.2f} m\n", pans.azimuth_held->from_m,
+                            pans.azimuth_held->to_m);
 }
 
 }  // namespace
@@ -162,27 +112,6 @@ std::string design_text(const RigRequirements& requirements, const RigDesign& de
   if (!design.warnings.empty()) text += "\nwarnings:\n";
   for (const DesignWarning& warning : design.warnings) text += fmt::format("  {}: {}\n", warning.id, warning.text);
   return text;
-}
-
-Json design_json(const RigDesign& design, bool whole_set) {
-  Json json = {{"schema", 1}, {"wide", pair_json(design.wide, whole_set)}};
-  json["narrow"] = design.narrow ? pair_json(*design.narrow, whole_set) : Json(nullptr);
-  json["view_overlap_m"] = number(design.view_overlap_m);
-  const auto of_pans = [&](double PanFigures::*figure) {
-    return design.pans ? number((*design.pans).*figure) : Json(nullptr);
-  };
-  json["pan_overlap_percent"] = of_pans(&PanFigures::overlap_percent);
-  json["pan_overlap_far_percent"] = of_pans(&PanFigures::far_overlap_percent);
-  json["pan_overlap_far_stereo_percent"] = of_pans(&PanFigures::far_overlap_stereo_percent);
-  json["azimuth_far_deg"] = of_pans(&PanFigures::azimuth_far_deg);
-  json["azimuth_far_stereo_deg"] = of_pans(&PanFigures::azimuth_far_stereo_deg);
-  json["azimuth_held_to_m"] = of_pans(&PanFigures::azimuth_held_to_m);
-  json["warnings"] = Json::array();
-  for (const DesignWarning& warning : design.warnings) {
-    json["warnings"].push_back(
-        {{"id", warning.id}, {"pair", warning.pair}, {"text", warning.text}, {"value", number(warning.value)}});
-  }
-  return json;
 }
 
 std::string design_csv(const RigDesign& design) {

@@ -1,17 +1,20 @@
 // A rig design in words, as JSON and as a table.
 #pragma once
 
+#include <functional>
 #include <string>
 
-#include "program/json.h"
+#include "spartan/core/result.h"
 #include "spartan/rig/rig_designer.h"
 
 namespace spartan::program {
 
 /// `rows` of each pair's feasible set are listed.
 std::string design_text(const RigRequirements& requirements, const RigDesign& design, std::size_t rows);
-/// docs/formats.md, "JSON". With `whole_set` each pair also holds its `feasible` set, the best first.
-Json design_json(const RigDesign& design, bool whole_set);
+/// docs/formats.md, "JSON", handed over in pieces: a feasible set is never held as text, however long it is. With
+/// `whole_set` each pair also holds its `feasible` set, the best first. Ends with the first piece that is refused.
+Status write_design_json(const RigDesign& design, bool whole_set,
+                         const std::function<Status(const std::string&)>& write);
 /// The feasible sets of all pairs, the best of each first.
 std::string design_csv(const RigDesign& design);
 

@@ -40,10 +40,12 @@ Result<ExitCode> design_verb(const Context& context, const DesignArguments& a) {
   if (!a.output.empty()) {
     if (Status s = write_files(context, a.output, *requirements, design); !s) return failure(s);
   }
+  if (context.json) {
+    if (Status s = write_design_json(design, a.all, print); !s) return failure(s);
+    return kDone;
+  }
   const std::size_t rows = a.all ? std::numeric_limits<std::size_t>::max() : a.rows;
-  const std::string text =
-      context.json ? design_json(design, a.all).dump(2) + "\n" : design_text(*requirements, design, rows);
-  if (Status s = print(text); !s) return failure(s);
+  if (Status s = print(design_text(*requirements, design, rows)); !s) return failure(s);
   return kDone;
 }
 

@@ -70,7 +70,12 @@ TEST(RigDesign, JsonHoldsThePublishedFigures) {
   EXPECT_NEAR(design["pan_overlap_far_stereo_percent"], 21.6, 0.05);
   EXPECT_NEAR(design["azimuth_far_deg"], 117.1, 0.05);
   EXPECT_NEAR(design["azimuth_far_stereo_deg"], 114.6, 0.05);
+  EXPECT_NEAR(design["azimuth_held_from_m"], 0.54, 0.005);
   EXPECT_NEAR(design["azimuth_held_to_m"], 2.05, 0.005);
+  ASSERT_EQ(design["azimuth_far_sectors_deg"].size(), 1u);
+  EXPECT_NEAR(design["azimuth_far_sectors_deg"][0][1], 117.07 / 2, 0.005);
+  EXPECT_NEAR(design["azimuth_far_stereo_sectors_deg"][0][0], -114.65 / 2, 0.005);
+  EXPECT_TRUE(design["reasons"].empty());
   EXPECT_GE(design["warnings"].size(), 16u);
   for (const json& warning : design["warnings"]) {
     EXPECT_TRUE(warning["id"].is_string() && warning["text"].is_string() && warning["value"].is_number()) << warning;
@@ -100,7 +105,9 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_GT(lines_of(all.out), 12592u);
   EXPECT_THAT(all.out, HasSubstr(" 12592.  "));
   EXPECT_THAT(all.out, Not(HasSubstr(" more;")));
-  const json whole = json::parse(run_program({"rig", "design", rover(), "--all", "--json"}).out);
+  const auto told = run_program({"rig", "design", rover(), "--all", "--json"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const json whole = json::parse(told.out);
   ASSERT_EQ(whole["wide"]["feasible"].size(), 12592u);
   EXPECT_EQ(whole["wide"]["feasible"][0], whole["wide"]["best"]);
   const auto published =
@@ -110,6 +117,11 @@ TEST(RigDesign, ListsTheFeasibleSet) {
       });
   ASSERT_NE(published, whole["wide"]["feasible"].end());
   EXPECT_NEAR((*published)["focal_length_mm"], 6.6, 0.05);
+  // Nothing but the sets comes with --all, and the text is laid out like that of any other JSON.
+  nlohmann::ordered_json without = nlohmann::ordered_json::parse(told.out);
+  EXPECT_TRUE(without.dump(2) + "\n" == told.out);  // too long to be shown side by side
+  for (const char* pair : {"wide", "narrow"}) without[pair].erase("feasible");
+  EXPECT_EQ(without.dump(2) + "\n", run_program({"rig", "design", rover(), "--json"}).out);
 }
 
 TEST(RigDesign, DrawsTheGround) {
@@ -239,6 +251,52 @@ TEST(RigDesign, DrawsWhatIsAskedOfOthers) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() + "/none/ground.svg"));
   EXPECT_EQ(json::parse(run_program({"rig", "design", folder.path() + "/none.yaml", "--json"}).out)["wide"]["best"],
             nullptr);
+}
+
+// The words of a picture of the ground.
+std::string drawn(const testing::TemporaryFolder& folder, const std::string& asked) {
+  const auto told = run_program({"rig", "design", folder.write("asked.yaml", asked), "-o", folder.path() + "/out"});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.out, Not(HasSubstr("nan")));
+  const std::string svg = testing::content_of(folder.path() + "/out/ground.svg");
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(svg, Not(HasSubstr("inf")));
+  return svg;
+}
+
+TEST(RigDesign, DrawsWhatPansWithGapsOrToOneSideSee) {
+  const testing::TemporaryFolder folder;
+  const auto asked = [](const std::string& angles, int azimuth_deg) {
+    return replaced(replaced(rover_text(), "[-35, 0, 35]", angles), "azimuth_deg: 120",
+                    "azimuth_deg: " + std::to_string(azimuth_deg));
+  };
+  struct {
+    std::string angles;
+    int azimuth_deg;
+    std::vector<std::string> words;
+  } const cases[] = {
+      {"[-80, 0, 80]", 120, {"far edge, one eye: 54.1°", "all 120° at no distance", "leave a gap of 30.0°"}},
+      {"[0, 35, 70]", 120, {"far edge, both eyes: 82.3°", "all 120° at no distance", "by 25.6 % (one eye)"}},
+      {"[-60, -35, 35]", 120, {"far edge, one eye: 95.6°", "all 120°: 0.60 to 0.70 m", "leave a gap of 20.0°"}},
+      {"[-35, 0, 35]", 10, {"asked for: 10°", "far edge, one eye: 10.0°", "all 10°: 0.49 to 4.01 m"}},
+      {"[-180, -90, 0, 90, 180]", 360, {"far edge, one eye: 188.3°", "all 360° at no distance"}},
+      {"{from: -180, to: 150, step: 30}", 360, {"far edge, both eyes: 360.0°", "all 360°: 0.50 to 4.01 m"}}};
+  for (const auto& c : cases) {
+    const std::string svg = drawn(folder, asked(c.angles, c.azimuth_deg));
+    for (const std::string& words : c.words) EXPECT_THAT(svg, HasSubstr(words)) << c.angles;
+  }
+}
+
+TEST(RigDesign, EyesThatShareNothingHaveNoNan) {
+  const testing::TemporaryFolder folder;
+  const std::string apart = replaced(rover_text(), "    baseline_m: 0.20", "    baseline_m: 20");
+  EXPECT_THAT(drawn(folder, apart), HasSubstr("both eyes share nothing"));
+  const json design = json::parse(run_program({"rig", "design", folder.path() + "/asked.yaml", "--json"}).out);
+  EXPECT_EQ(design["azimuth_far_stereo_deg"], 0);
+  EXPECT_EQ(design["pan_overlap_far_stereo_percent"], nullptr);
+  EXPECT_THAT(design["reasons"]["pan_overlap_far_stereo_percent"], "both eyes share no ground");
+  EXPECT_EQ(design["reasons"].size(), 1u);
+  for (const json& warning : design["warnings"]) EXPECT_TRUE(warning["value"].is_number()) << warning;
 }
 
 TEST(RigDesign, BadInputIsNamed) {

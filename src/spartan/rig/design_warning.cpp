@@ -7,6 +7,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "spartan/rig/pan_words.h"
 #include "spartan/rig/rig_designer.h"
 #include "spartan/rig/stereo_relations.h"
 
@@ -192,37 +193,42 @@ void warn_of_optics(const Case& c, const PairFigures& pair) {
 // --- the pans ---
 
 void warn_of_azimuth(const Case& c, const PanFigures& pans) {
-  const double asked_deg = c.requirements.pans->azimuth_deg;
-  if (pans.azimuth_far_deg < asked_deg - kSame) {
-    c.warn(
-        "azimuth_far", pans.azimuth_far_deg,
-        fmt::format("the pans span {:.1f} deg at the far edge (one eye, corners of the top row), {} deg are asked for",
-                    pans.azimuth_far_deg, asked_deg));
+  const AzimuthSet asked = asked_azimuth(*c.requirements.pans);
+  if (!pans.azimuth_far.covers(asked)) {
+    const double seen_deg = pans.azimuth_far.width_deg();
+    c.warn("azimuth_far", seen_deg,
+           fmt::format("at the far edge the pans see {:.1f} of the {} deg asked for (one eye, corners of the top row): "
+                       "{}",
+                       seen_deg, asked.width_deg(), in_words(pans.azimuth_far)));
   }
-  if (!(pans.azimuth_far_stereo_deg >= asked_deg - kSame)) {
-    c.warn("azimuth_far_stereo", pans.azimuth_far_stereo_deg,
-           fmt::format("both eyes span {:.1f} deg at the far edge", pans.azimuth_far_stereo_deg));
-    c.warn("azimuth_held_to", pans.azimuth_held_to_m,
-           fmt::format("both eyes see the {} deg only inside {:.2f} m", asked_deg, pans.azimuth_held_to_m));
-  }
+  if (pans.azimuth_far_stereo.covers(asked)) return;
+  const double seen_deg = pans.azimuth_far_stereo.width_deg();
+  c.warn("azimuth_far_stereo", seen_deg,
+         fmt::format("at the far edge both eyes see {:.1f} of the {} deg: {}", seen_deg, asked.width_deg(),
+                     in_words(pans.azimuth_far_stereo)));
+  const std::string where = pans.azimuth_held ? fmt::format("only from {:.2f} m to {:.2f} m", pans.azimuth_held->from_m,
+                                                            pans.azimuth_held->to_m)
+                                              : "at no distance";
+  c.warn("azimuth_held_to", pans.azimuth_held ? pans.azimuth_held->to_m : 0,
+         fmt::format("both eyes see all of the {} deg {}", asked.width_deg(), where));
 }
 
 void warn_of_overlap(const Case& c, const PanFigures& pans) {
-  const double asked_percent = c.requirements.pans->smallest_overlap_percent;
-  if (pans.overlap_percent < asked_percent - kSame) {
-    c.warn("pan_overlap", pans.overlap_percent,
-           fmt::format("neighbouring pans overlap by {:.1f} % of the view, {} % are asked for", pans.overlap_percent,
-                       asked_percent));
+  if (!pans.overlap) return;
+  const double asked_percent = c.requirements.pans->smallest_overlap_percent, percent = pans.overlap->percent();
+  if (percent < asked_percent - kSame) {
+    c.warn("pan_overlap", percent,
+           fmt::format("neighbouring pans {}{}, an overlap by {} % is asked for", in_words(*pans.overlap),
+                       percent >= 0 ? " of the view" : "", asked_percent));
   }
-  const auto at_far_edge = [&](const char* id, const char* who, double percent) {
-    if (!(percent < pans.overlap_percent - 1)) return;
-    c.warn(id, percent,
-           fmt::format("neighbouring pans overlap by {:.0f} % of the view nominally, by {:.1f} % at the top row ({}); "
-                       "{} % are asked for",
-                       pans.overlap_percent, percent, who, asked_percent));
+  const auto at_far_edge = [&](const char* id, const char* who, const std::optional<PanOverlap>& far) {
+    if (!far || !(far->percent() < percent - 1)) return;
+    c.warn(id, far->percent(),
+           fmt::format("neighbouring pans {} nominally, at the top row they {} ({}); an overlap by {} % is asked for",
+                       in_words(*pans.overlap), in_words(*far), who, asked_percent));
   };
-  at_far_edge("pan_overlap_far", "one eye", pans.far_overlap_percent);
-  at_far_edge("pan_overlap_far_stereo", "both eyes", pans.far_overlap_stereo_percent);
+  at_far_edge("pan_overlap_far", "one eye", pans.far_overlap);
+  at_far_edge("pan_overlap_far_stereo", "both eyes", pans.far_overlap_stereo);
 }
 
 void add_warnings(const Case& c) {

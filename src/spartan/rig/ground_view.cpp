@@ -3,13 +3,15 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numbers>
 #include <stdexcept>
 
 #include "spartan/rig/stereo_relations.h"
 
 namespace spartan {
 namespace {
+
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 // Twice the area of the triangle o, a, b; positive where it turns to the left.
 double turn(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -84,24 +86,24 @@ std::optional<double> far_half_azimuth_rad(const GroundPolygon& polygon) {
   return half;
 }
 
-std::optional<RaySpan> span_along(const GroundPolygon& polygon, double azimuth_rad) {
-  if (polygon.empty()) return std::nullopt;
-  const Eigen::Vector2d direction(std::cos(azimuth_rad), std::sin(azimuth_rad));
-  RaySpan span{0, std::numeric_limits<double>::infinity()};
+AzimuthSet azimuths_at(const GroundPolygon& polygon, double distance_m) {
+  if (polygon.empty()) return {};
+  double size = 0;
+  for (const Eigen::Vector2d& corner : polygon) size = std::max(size, corner.norm());
+  AzimuthSet seen = AzimuthSet::all();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    // The ray is inside of this side where at_origin + distance · slope ≥ 0.
-    const double at_origin = turn(a, b, {0, 0}), slope = turn({0, 0}, b - a, direction);
-    if (slope > 0) {
-      span.from_m = std::max(span.from_m, -at_origin / slope);
-    } else if (slope < 0) {
-      span.to_m = std::min(span.to_m, at_origin / -slope);
-    } else if (at_origin < 0) {
-      return std::nullopt;
-    }
+    const Eigen::Vector2d along = b - a;
+    if (along.norm() <= 1e-12 * size) continue;  // a corner that stands there twice has no side
+    // Inside of this side is what lies at least so far towards its inner normal.
+    const Eigen::Vector2d inward = Eigen::Vector2d(-along.y(), along.x()).normalized();
+    const double least_m = inward.dot(a);
+    if (least_m <= -distance_m) continue;
+    if (least_m >= distance_m) return {};
+    seen = seen.within(AzimuthSet::around(std::atan2(inward.y(), inward.x()) * kDegreesPerRadian,
+                                          std::acos(least_m / distance_m) * kDegreesPerRadian));
   }
-  if (!(span.from_m < span.to_m)) return std::nullopt;
-  return span;
+  return seen;
 }
 
 }  // namespace spartan

@@ -5,6 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "spartan/rig/azimuth_set.h"
+
 namespace spartan {
 
 /// A pair over level ground: both eyes at one height, half a baseline left and right of the axis of pan, looking
@@ -40,11 +42,7 @@ double area_m2(const GroundPolygon& polygon);
 /// Half of the angle over which the far edge of a footprint at pan 0 is seen from the origin, rad; none where it is
 /// empty.
 std::optional<double> far_half_azimuth_rad(const GroundPolygon& polygon);
-/// Between which distances from the origin the ray in that direction (positive to the left) lies in a convex polygon,
-/// m.
-struct RaySpan {
-  double from_m = 0, to_m = 0;
-};
-std::optional<RaySpan> span_along(const GroundPolygon& polygon, double azimuth_rad);
+/// The directions in which a convex polygon has ground at a distance from the origin, of the circle around it.
+AzimuthSet azimuths_at(const GroundPolygon& polygon, double distance_m);
 
 }  // namespace spartan

@@ -100,19 +100,6 @@ TEST(GroundView, ThePublishedFiguresOfTheFarEdge) {
   EXPECT_NEAR(far_half_azimuth_rad(both).value(), std::atan2(corner.y(), corner.x()), 1e-6);
 }
 
-// Walking out along the last pan's border of 120 degrees, asking both cameras on the way.
-TEST(GroundView, TheAskedAzimuthIsHeldAsFarAsTheCamerasSay) {
-  const double azimuth = 60 * kDegree, pan = 35 * kDegree;
-  double seen_to = 0;
-  for (double r = 0.5; r < 6; r += 1e-4) {
-    const Eigen::Vector2d p(r * std::cos(azimuth), r * std::sin(azimuth));
-    if (std::min(inside_px("wide_left", pan, p), inside_px("wide_right", pan, p)) > 0) seen_to = r;
-  }
-  EXPECT_NEAR(span_along(common_footprint(kWide, pan), azimuth).value().to_m, seen_to, 2e-4);
-  EXPECT_NEAR(span_along(common_footprint(kWide, 0), azimuth - pan).value().to_m, seen_to, 2e-4);
-  EXPECT_NEAR(seen_to, 2, 0.1);
-}
-
 GroundPolygon rectangle(double x0, double y0, double x1, double y1) {
   return {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
 }
@@ -143,13 +130,26 @@ RC_GTEST_PROP(GroundView, WhatTwoPansShareLiesInBoth, ()) {
   RC_ASSERT(holds(common, p) == (holds(a, p) && holds(b, p)));
 }
 
-RC_GTEST_PROP(GroundView, ARayIsInsideBetweenTheEndsOfItsSpan, ()) {
-  const GroundPolygon polygon = common_footprint(kWide, some(-60, 60) * kDegree);
+// Footprints before the rover, around it (the lowest row looks behind) and of many corners.
+RC_GTEST_PROP(GroundView, ADirectionIsSeenWhereItsPointLiesInThePolygon, (bool around)) {
+  GroundView view = kWide;
+  if (around) view.tilt_rad = some(70, 90) * kDegree;
+  GroundPolygon polygon = common_footprint(view, some(-180, 180) * kDegree);
+  if (!around) polygon = intersection(polygon, common_footprint(view, some(-180, 180) * kDegree));
   const double azimuth = some(-180, 180) * kDegree, r = some(0, 6);
-  const auto span = span_along(polygon, azimuth);
-  const Eigen::Vector2d p(r * std::cos(azimuth), r * std::sin(azimuth));
-  if (span) RC_PRE(std::min(std::abs(r - span->from_m), std::abs(r - span->to_m)) > 1e-9);
-  RC_ASSERT(holds(polygon, p) == (span && r > span->from_m && r < span->to_m));
+  const auto at = [&](double a) { return Eigen::Vector2d(r * std::cos(a), r * std::sin(a)); };
+  RC_PRE(holds(polygon, at(azimuth - 1e-9)) == holds(polygon, at(azimuth + 1e-9)));  // not on a border
+  RC_ASSERT(azimuths_at(polygon, r).contains(azimuth / kDegree) == holds(polygon, at(azimuth)));
+}
+
+TEST(GroundView, AnArcLeavesARectangleAndComesBack) {
+  const GroundPolygon room = rectangle(-1, -2, 3, 2);
+  EXPECT_EQ(azimuths_at(room, 0).width_deg(), 360) << "it stands inside";
+  EXPECT_EQ(azimuths_at(room, 0.999).width_deg(), 360);
+  EXPECT_NEAR(azimuths_at(room, 2).width_deg(), 240, 1e-9) << "the wall behind is 60 degrees to either side";
+  EXPECT_EQ(azimuths_at(room, 2.1).sectors().size(), 3u) << "ahead, and a corner to either side";
+  EXPECT_EQ(azimuths_at(room, 3.5).sectors().size(), 2u) << "the corners far ahead";
+  EXPECT_TRUE(azimuths_at(room, std::hypot(3, 2) + 1e-6).empty());
 }
 
 TEST(GroundView, EyesTooFarApartShareNothing) {
@@ -157,7 +157,7 @@ TEST(GroundView, EyesTooFarApartShareNothing) {
   apart.baseline_m = 10;
   EXPECT_TRUE(common_footprint(apart, 0).empty());
   EXPECT_FALSE(far_half_azimuth_rad({}));
-  EXPECT_FALSE(span_along({}, 0));
+  EXPECT_TRUE(azimuths_at({}, 1).empty());
 }
 
 TEST(GroundView, AHorizonHasNoFootprint) {

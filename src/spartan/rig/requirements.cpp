@@ -265,6 +265,9 @@ std::size_t ShapeLists::combinations() const {
 double PanRequirements::widest_step_deg() const {
   double widest = 0;
   for (std::size_t i = 1; i < angles_deg.size(); ++i) widest = std::max(widest, angles_deg[i] - angles_deg[i - 1]);
+  if (angles_deg.size() > 1 && azimuth_deg >= 360) {
+    widest = std::max(widest, 360 - (angles_deg.back() - angles_deg.front()));
+  }
   return widest;
 }
 

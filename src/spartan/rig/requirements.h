@@ -34,9 +34,10 @@ enum class DesignCriterion { range_margin, pan_overlap, shorter_baseline };
 /// A pair on a pan unit that looks around at stops.
 struct PanRequirements {
   std::vector<double> angles_deg;  ///< rising
-  double azimuth_deg = 0;          ///< asked for, over all pans
+  double azimuth_deg = 0;          ///< asked for, over all pans; straight ahead is its middle
   double smallest_overlap_percent = 0;
-  double widest_step_deg() const;  ///< between neighbours; 0 for a single pan
+  /// Between neighbours; 0 for a single pan. Where all around is asked for, the last and the first are neighbours too.
+  double widest_step_deg() const;
 };
 
 /// A pair that was chosen by others, as they describe it.

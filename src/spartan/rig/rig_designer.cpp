@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "spartan/rig/stereo_relations.h"
 
@@ -102,34 +105,67 @@ void search(const PairRequirements& requirements, PairDesign& design) {
   });
 }
 
-// The larger, the better; whole multiples of 10⁻⁹, so that equal is equal whatever the rounding.
-std::vector<double> rank_of(const PairFigures& pair, const std::vector<DesignCriterion>& order) {
-  std::vector<double> rank;
-  rank.reserve(order.size());
-  for (const DesignCriterion criterion : order) {
-    const double value = criterion == DesignCriterion::range_margin  ? pair.margins.range_m
-                         : criterion == DesignCriterion::pan_overlap ? pair.pan_overlap_percent
-                                                                     : -pair.shape.baseline_m;
-    rank.push_back(std::isnan(value) ? 0 : std::round(value / kSame));
+double value_of(const PairFigures& pair, DesignCriterion criterion) {
+  switch (criterion) {
+    case DesignCriterion::range_margin:
+      return pair.margins.range_m;
+    case DesignCriterion::pan_overlap:
+      return std::isnan(pair.pan_overlap_percent) ? 0 : pair.pan_overlap_percent;
+    case DesignCriterion::shorter_baseline:
+      return -pair.shape.baseline_m;
   }
-  return rank;
+  return 0;
+}
+
+// The place of each pair by one criterion, the best has 0. Values that are the same as their neighbour in size share a
+// place, so two that are the same always do.
+std::vector<std::uint32_t> places_by(DesignCriterion criterion, const std::vector<PairFigures>& pairs) {
+  std::vector<std::pair<double, std::uint32_t>> falling;
+  falling.reserve(pairs.size());
+  for (const PairFigures& pair : pairs) {
+    falling.emplace_back(value_of(pair, criterion), static_cast<std::uint32_t>(falling.size()));
+  }
+  std::sort(falling.begin(), falling.end(), std::greater<>());
+  std::vector<std::uint32_t> places(pairs.size());
+  std::uint32_t place = 0;
+  for (std::size_t i = 0; i < falling.size(); ++i) {
+    if (i > 0 && falling[i - 1].first - falling[i].first >= kSame) ++place;
+    places[falling[i].second] = place;
+  }
+  return places;
+}
+
+// Puts at each place the pair that `from` names for it, in the memory that is there.
+void permute(std::vector<PairFigures>& pairs, std::vector<std::uint32_t> from) {
+  for (std::uint32_t start = 0; start < from.size(); ++start) {
+    const PairFigures first = pairs[start];
+    std::uint32_t place = start;
+    while (from[place] != start) {
+      pairs[place] = pairs[from[place]];
+      place = std::exchange(from[place], place);
+    }
+    pairs[place] = first;
+    from[place] = place;
+  }
 }
 
 // The best first; what is equally good stays in the order of the lists.
 void put_in_order(PairDesign& design, const std::vector<DesignCriterion>& order) {
-  std::vector<std::vector<double>> ranks;
-  ranks.reserve(design.feasible.size());
-  for (const PairFigures& pair : design.feasible) ranks.push_back(rank_of(pair, order));
-  std::vector<std::size_t> places(design.feasible.size());
-  std::iota(places.begin(), places.end(), std::size_t{0});
-  std::stable_sort(places.begin(), places.end(), [&](std::size_t a, std::size_t b) { return ranks[a] > ranks[b]; });
-  std::vector<PairFigures> sorted;
-  sorted.reserve(places.size());
-  for (const std::size_t place : places) {
-    sorted.push_back(design.feasible[place]);
-    if (ranks[place] == ranks[places.front()]) ++design.equally_good;
-  }
-  design.feasible = std::move(sorted);
+  std::vector<std::vector<std::uint32_t>> places;
+  places.reserve(order.size());
+  for (const DesignCriterion criterion : order) places.push_back(places_by(criterion, design.feasible));
+  const auto better = [&](std::uint32_t a, std::uint32_t b) {
+    for (const auto& by_criterion : places) {
+      if (by_criterion[a] != by_criterion[b]) return by_criterion[a] < by_criterion[b];
+    }
+    return false;
+  };
+  std::vector<std::uint32_t> sorted(design.feasible.size());
+  std::iota(sorted.begin(), sorted.end(), 0u);
+  std::stable_sort(sorted.begin(), sorted.end(), better);
+  design.equally_good = static_cast<std::size_t>(
+      std::count_if(sorted.begin(), sorted.end(), [&](std::uint32_t pair) { return !better(sorted.front(), pair); }));
+  permute(design.feasible, std::move(sorted));
 }
 
 template <class Value>
@@ -161,9 +197,9 @@ PairDesign design_pair(const PairRequirements& requirements) {
   return design;
 }
 
-// What two pans share at the far edge, where each of them spans twice the half.
-double far_overlap(std::optional<double> half_rad, double step_rad) {
-  return half_rad ? overlap_percent(2 * *half_rad, step_rad) : kNone;
+// Whether there is ground that both of its eyes see.
+bool shares_ground(const PairFigures& pair, const PairRequirements& requirements) {
+  return !common_footprint(ground_view(pair, requirements), 0).empty();
 }
 
 }  // namespace
@@ -194,29 +230,6 @@ GroundView ground_view(const PairFigures& pair, const PairRequirements& requirem
           pair.vfov_deg * kRadiansPerDegree, pair.shape.baseline_m};
 }
 
-PanFigures pan_figures(const PairFigures& pair, const PairRequirements& requirements) {
-  const PanRequirements& pans = requirements.pans.value();
-  const GroundView view = ground_view(pair, requirements);
-  const GroundPolygon common = common_footprint(view, 0);
-  const auto one_eye = far_half_azimuth_rad(footprint(view, 0, 0)), both_eyes = far_half_azimuth_rad(common);
-  const double turned_deg = pans.angles_deg.back() - pans.angles_deg.front();
-  const double step_rad = pans.widest_step_deg() * kRadiansPerDegree;
-  const bool turns = pans.angles_deg.size() > 1;
-
-  PanFigures figures;
-  figures.overlap_percent = pair.pan_overlap_percent;
-  figures.far_overlap_percent = turns ? far_overlap(one_eye, step_rad) : kNone;
-  figures.far_overlap_stereo_percent = turns ? far_overlap(both_eyes, step_rad) : kNone;
-  const auto spanned = [&](std::optional<double> half) {
-    return half ? std::min(360.0, turned_deg + 2 * *half / kRadiansPerDegree) : kNone;
-  };
-  figures.azimuth_far_deg = spanned(one_eye);
-  figures.azimuth_far_stereo_deg = spanned(both_eyes);
-  const auto held = span_along(common, (pans.azimuth_deg - turned_deg) / 2 * kRadiansPerDegree);
-  figures.azimuth_held_to_m = held ? held->to_m : 0;
-  return figures;
-}
-
 std::size_t count_feasible(const PairRequirements& requirements) {
   std::size_t count = 0;
   for_every_shape(requirements.lists,
@@ -230,10 +243,14 @@ RigDesign design_rig(const RigRequirements& requirements) {
   if (requirements.narrow) design.narrow = design_pair(*requirements.narrow);
   const PairFigures* wide = design.wide.chosen();
   const PairFigures* narrow = design.narrow ? design.narrow->chosen() : nullptr;
-  if (wide && requirements.wide.pans) design.pans = pan_figures(*wide, requirements.wide);
+  if (wide && requirements.wide.pans) {
+    design.pans = pan_figures(ground_view(*wide, requirements.wide), *requirements.wide.pans);
+  }
   if (wide && narrow) {
-    design.view_overlap_m = std::max(
-        0.0, std::min(wide->view_far_m, narrow->view_far_m) - std::max(wide->view_near_m, narrow->view_near_m));
+    const bool both_see = shares_ground(*wide, requirements.wide) && shares_ground(*narrow, *requirements.narrow);
+    const double from_m = std::max(wide->view_near_m, narrow->view_near_m);
+    const double to_m = std::min(wide->view_far_m, narrow->view_far_m);
+    design.view_overlap_m = both_see ? std::max(0.0, to_m - from_m) : 0;
   }
   design.warnings = find_design_warnings(requirements, design);
   return design;

@@ -8,6 +8,7 @@
 
 #include "spartan/rig/design_warning.h"
 #include "spartan/rig/ground_view.h"
+#include "spartan/rig/pan_view.h"
 #include "spartan/rig/requirements.h"
 
 namespace spartan {
@@ -52,20 +53,10 @@ struct PairDesign {
   const PairFigures* chosen() const;
 };
 
-/// What the pans of the chosen wide pair see together. NaN: no such figure (a single pan; both eyes share nothing).
-struct PanFigures {
-  double overlap_percent = 0;             ///< nominal: of the view's angle
-  double far_overlap_percent = 0;         ///< at the top row, one eye
-  double far_overlap_stereo_percent = 0;  ///< at the top row, what both eyes see
-  double azimuth_far_deg = 0;             ///< from end to end at the top row, one eye
-  double azimuth_far_stereo_deg = 0;
-  double azimuth_held_to_m = 0;  ///< the asked azimuth is seen by both eyes up to this distance; 0: nowhere
-};
-
 struct RigDesign {
   PairDesign wide;
   std::optional<PairDesign> narrow;
-  std::optional<PanFigures> pans;
+  std::optional<PanFigures> pans;        ///< of the chosen wide pair
   std::optional<double> view_overlap_m;  ///< ground that both chosen pairs see, middle column
   std::vector<DesignWarning> warnings;
 };
@@ -83,6 +74,5 @@ std::size_t count_feasible(const PairRequirements& requirements);
 
 /// The ground that a pair sees.
 GroundView ground_view(const PairFigures& pair, const PairRequirements& requirements);
-PanFigures pan_figures(const PairFigures& pair, const PairRequirements& requirements);
 
 }  // namespace spartan

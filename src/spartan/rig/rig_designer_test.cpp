@@ -1,6 +1,7 @@
 #include "spartan/rig/rig_designer.h"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -164,6 +165,19 @@ TEST(RigDesigner, WhatIsEqualIsDecidedByWhatComesNext) {
   EXPECT_EQ(whole(by_overlap.wide.best()->shape), (Whole{15, 15, 50, 1040, 550}));
 }
 
+// Two values next to a multiple of 1e-9, one to either side, are the same; so are the ends of a chain of them.
+TEST(RigDesigner, ValuesThatDifferByLessThanOneInABillionAreEqual) {
+  const RigDesign design = design_after([](RigRequirements& r) {
+    r.wide.lists = {{0.2, 0.2000000005 - 1e-13, 0.2000000005 + 1e-13, 0.2000000011, 0.21}, {1.5}, {45}, {5.5}, {1120}};
+    r.wide.order = {DesignCriterion::shorter_baseline};
+    r.wide.range_m = 3;
+  });
+  ASSERT_EQ(design.wide.feasible.size(), 5u);
+  EXPECT_EQ(design.wide.equally_good, 4u);
+  EXPECT_EQ(design.wide.best()->shape.baseline_m, 0.2) << "in the order of the list";
+  EXPECT_EQ(design.wide.feasible.back().shape.baseline_m, 0.21);
+}
+
 TEST(RigDesigner, WhatLiesOnALimitPassesAndIsSaid) {
   const RigDesign design = design_after([](RigRequirements& r) {
     r.wide.lists = {{0.2}, {1}, {60}, {5.5}, {1120}};
@@ -186,7 +200,7 @@ TEST(RigDesigner, WarnsOfEveryTensionOfThePublishedNumbers) {
   expect_warning(design, "stereo_angle_limits_disagree", 11.4, 0.05);
   expect_warning(design, "azimuth_far", 117.1, 0.05);
   expect_warning(design, "azimuth_far_stereo", 114.6, 0.05);
-  expect_warning(design, "azimuth_held_to", 2, 0.1);
+  expect_warning(design, "azimuth_held_to", 2.05, 0.005);
   expect_warning(design, "pan_overlap_far", 25.6, 0.05);
   expect_warning(design, "pan_overlap_far_stereo", 21.6, 0.05);
   expect_warning(design, "range_short", 1.99, 0.005);
@@ -296,13 +310,44 @@ TEST(RigDesigner, WithoutAPublishedPairTheBestIsLookedAt) {
   EXPECT_EQ(design.wide.chosen()->shape, rover_design().wide.best_with_pan_overlap->shape);
   EXPECT_FALSE(design.view_overlap_m);
   ASSERT_TRUE(design.pans);
-  EXPECT_GE(design.pans->overlap_percent, 25);
+  EXPECT_GE(design.pans->overlap->percent(), 25);
   const RigDesign ahead_only = design_after([](RigRequirements& r) { r.wide.pans.reset(); });
   EXPECT_FALSE(ahead_only.pans);
   EXPECT_EQ(ahead_only.wide.feasible.size(), 12592u);
   const RigDesign one_pan = design_after([](RigRequirements& r) { r.wide.pans->angles_deg = {10}; });
-  EXPECT_TRUE(std::isnan(one_pan.pans->overlap_percent));
-  EXPECT_NEAR(one_pan.pans->azimuth_far_deg, 2 * 23.54, 0.01);
+  EXPECT_FALSE(one_pan.pans->overlap || one_pan.pans->far_overlap || one_pan.pans->far_overlap_stereo);
+  EXPECT_NEAR(one_pan.pans->azimuth_far.width_deg(), 2 * 23.54, 0.01);
+}
+
+// Eyes 20 m apart: every figure is one, every text is words.
+TEST(RigDesigner, EyesThatShareNothingAreSaidInWords) {
+  const RigDesign design = design_after([](RigRequirements& r) { r.wide.published->shape.baseline_m = 20; });
+  EXPECT_TRUE(design.pans->azimuth_far_stereo.empty());
+  EXPECT_FALSE(design.pans->azimuth_held);
+  EXPECT_FALSE(design.pans->far_overlap_stereo);
+  EXPECT_EQ(design.view_overlap_m, 0) << "nothing that the wide pair sees";
+  expect_warning(design, "azimuth_far_stereo", 0, 0);
+  expect_warning(design, "azimuth_held_to", 0, 0);
+  EXPECT_EQ(find_warning(design, "pan_overlap_far_stereo"), nullptr);
+  EXPECT_NE(find_warning(design, "views_apart"), nullptr);
+}
+
+RC_GTEST_PROP(RigDesigner, NoWarningIsWithoutAFigure, ()) {
+  const auto one_of = [](std::initializer_list<double> values) { return *rc::gen::elementOf(std::vector(values)); };
+  RigRequirements r = rover();
+  r.wide.lists = r.narrow->lists = {{0.1, 0.2}, {1}, {50}, {5.5}, {1120}};
+  const std::size_t count = *rc::gen::inRange<std::size_t>(1, 6);
+  r.wide.pans->angles_deg.clear();
+  for (std::size_t i = 0; i < count; ++i) r.wide.pans->angles_deg.push_back(*rc::gen::inRange(-36, 37) * 5);
+  std::sort(r.wide.pans->angles_deg.begin(), r.wide.pans->angles_deg.end());
+  r.wide.pans->azimuth_deg = one_of({1e-6, 10, 120, 359, 360});
+  r.wide.published->shape.baseline_m = one_of({1e-6, 0.2, 1, 20, 1e6});
+  r.wide.published->shape.hfov_deg = one_of({0.1, 50, 120, 179});
+  r.wide.published->tilt_deg = one_of({25.5, 39, 70, 90});
+  for (const DesignWarning& warning : design_rig(r).warnings) {
+    RC_ASSERT(std::isfinite(warning.value));
+    RC_ASSERT(warning.text.find("nan") == std::string::npos && warning.text.find("inf ") == std::string::npos);
+  }
 }
 
 // Every candidate's tilt lets the top row reach the range, and one step more would not.

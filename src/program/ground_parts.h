@@ -1,0 +1,47 @@
+// What the parts of the picture of the ground have in common.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "program/drawing.h"
+#include "spartan/rig/rig_designer.h"
+
+namespace spartan::program {
+
+using Point = Eigen::Vector2d;
+using Points = Drawing::Points;
+
+constexpr int kWidth_px = 1200;
+constexpr double kMargin_px = 40;
+
+/// Colours that people tell apart who see no red or no green (after Okabe and Ito), lighter for what fewer eyes see.
+inline constexpr Rgb8 kInk{30, 30, 30}, kFaint{150, 150, 150}, kSoil{120, 100, 80}, kUnseen{222, 222, 222};
+inline constexpr Rgb8 kWide{0, 114, 178}, kWideOneEye{200, 226, 243}, kWideBoth{134, 187, 222},
+    kWideTwice{58, 134, 188};
+inline constexpr Rgb8 kNarrow{213, 94, 0}, kShared{0, 158, 115};
+
+/// One pair as it is drawn.
+struct DrawnPair {
+  std::string name;
+  Rgb8 colour;
+  const PairRequirements& requirements;
+  const PairFigures& figures;
+  GroundView view() const { return ground_view(figures, requirements); }
+};
+
+/// Metres of a plane into pixels: `right` and `up` of the plane's axes.
+struct Scale {
+  Point origin;
+  double px_per_m;
+  Point operator()(double right_m, double up_m) const {
+    return {origin.x() + right_m * px_per_m, origin.y() - up_m * px_per_m};
+  }
+};
+
+/// The marks of a scale up to `to_m`: round steps that leave room for words.
+std::vector<double> marks(double px_per_m, double to_m);
+/// The way around, back to the first point.
+Points closed(Points points);
+
+}  // namespace spartan::program

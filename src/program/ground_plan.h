@@ -1,0 +1,15 @@
+// The ground that pairs see, from above, with the pans and the azimuth that they see together.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "program/ground_parts.h"
+
+namespace spartan::program {
+
+/// The first pair is the wide one, `pans` its figures. Gives the row, px, below which nothing is drawn.
+double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs,
+                 const std::optional<PanFigures>& pans);
+
+}  // namespace spartan::program
