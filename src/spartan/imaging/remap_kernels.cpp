@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
+#include <limits>
 
 // Compiled once per instruction set: Highway includes this file again for each.
 #undef HWY_TARGET_INCLUDE
@@ -110,116 +112,209 @@ HWY_INLINE void remap_cell(const Cell& cell, const Source<std::uint8_t>& source,
   }
 }
 
-/// `interpolate` in lanes of 32 bits.
-template <class D, class V = hn::Vec<D> >
-HWY_INLINE V between_lanes(D d, V s00, V s10, V s01, V s11, V part_x, V part_y) {
-  const auto half = hn::Set(d, kOne / 2);
-  const auto top = hn::Add(hn::ShiftLeft<kFractionBits>(s00), hn::Mul(part_x, hn::Sub(s10, s00)));
-  const auto bottom = hn::Add(hn::ShiftLeft<kFractionBits>(s01), hn::Mul(part_x, hn::Sub(s11, s01)));
-  const auto share = hn::ShiftRight<kFractionBits>(hn::Add(hn::Mul(part_y, hn::Sub(bottom, top)), half));
-  return hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), half));
-}
+// The other kinds of pixels: one load a row brings both columns of a pixel with all its channels (a piece), for 8 pixels
+// at once.
 
-#if HWY_TARGET <= HWY_AVX2  // the targets that have a gather, from AVX2 up
+/// For every byte of a vector of pieces, what a byte shuffle within 16 bytes takes for it; kNone stands for 0.
+constexpr std::uint8_t kNone = 0x80;
+using Shuffle = std::array<std::uint8_t, kBlocks * kLoad>;
 
-/// A block at a time: both columns of a pixel are the halves of one 32-bit lane.
-HWY_INLINE void remap_block16(const Cell& cell, const Source<std::uint16_t>& source, int block, std::uint16_t* out) {
-  const hn::CappedTag<std::int32_t, kBlock> d;
-  const hn::RebindToUnsigned<decltype(d)> u32;
-  const hn::Rebind<std::uint8_t, decltype(d)> bytes;
-  const hn::Rebind<std::uint16_t, decltype(d)> words;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  const Place corner = cell.corners[block];
-  const auto* const base = reinterpret_cast<const std::int32_t*>(source.data + corner.y * source.stride + corner.x);
-  const auto stride = hn::Set(d, static_cast<std::int32_t>(source.stride) * 2);
-  for (int at = block * kBlock; at < (block + 1) * kBlock; at += lanes) {
-    const auto code = hn::PromoteTo(d, hn::LoadU(bytes, cell.codes + at));
-    const auto seen = hn::Lt(code, hn::Set(d, kUnseen));
-    const auto row = hn::And(hn::ShiftRight<4>(code), hn::Set(d, kLargestStep));
-    const auto column = hn::And(code, hn::Set(d, 15));
-    const auto place = hn::Add(hn::Mul(row, stride), hn::ShiftLeft<1>(column));
-    const auto below = hn::Lt(row, hn::Set(d, source.height - 1 - corner.y));
-    const auto p = hn::GatherOffset(d, base, place);
-    const auto q = hn::GatherOffset(d, base, hn::Add(place, hn::IfThenElseZero(below, stride)));
-    const auto first = [&](auto pair) HWY_ATTR { return hn::And(pair, hn::Set(d, 0xFFFF)); };
-    const auto second = [&](auto pair) HWY_ATTR { return hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(u32, pair))); };
-    const auto level =
-        between_lanes(d, first(p), second(p), first(q), second(q), hn::PromoteTo(d, hn::LoadU(bytes, cell.part_x + at)),
-                      hn::PromoteTo(d, hn::LoadU(bytes, cell.part_y + at)));
-    hn::StoreU(hn::DemoteTo(words, hn::IfThenElseZero(seen, level)), words, out + at);
+/// The i-th piece's own number, in the lowest byte of each of its lanes.
+constexpr Shuffle number_of_piece(std::size_t piece_bytes, std::size_t lane_bytes) {
+  Shuffle result{};
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    result[i] = i % lane_bytes == 0 ? static_cast<std::uint8_t>(i / piece_bytes) : kNone;
   }
+  return result;
 }
 
-#else
-
-HWY_INLINE void remap_block16(const Cell& cell, const Source<std::uint16_t>& source, int block, std::uint16_t* out) {
-  for (int at = block * kBlock; at < (block + 1) * kBlock; ++at) remap_pixel(cell, at, source, out);
-}
-
-#endif  // HWY_TARGET <= HWY_AVX2
-
-void remap_cell(const Cell& cell, const Source<std::uint16_t>& source, std::uint16_t* out) {
-  for (int b = 0; b < kBlocks; ++b) {
-    if (cell.kinds[b] != kScattered) {
-      remap_block16(cell, source, b, out);
-    } else {
-      std::fill_n(out + b * kBlock, kBlock, std::uint16_t{0});
-    }
+/// The same for each group of bytes.
+template <std::size_t kBytes>
+constexpr Shuffle in_each(const std::array<std::uint8_t, kBytes>& group) {
+  Shuffle result{};
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const std::uint8_t from = group[i % kBytes];
+    result[i] = from == kNone ? kNone : static_cast<std::uint8_t>(from + i % kLoad / kBytes * kBytes);
   }
+  return result;
 }
 
-/// One pixel with all its channels: r g b of one column, then of the next. Writes four samples.
-HWY_INLINE void remap_colour(const std::uint8_t* p, const std::uint8_t* q, int part_x, int part_y, std::uint8_t* out) {
-  const hn::FixedTag<std::int16_t, 8> d;
-  const hn::Rebind<std::uint8_t, decltype(d)> bytes;
-  const auto across = [&](const std::uint8_t* from) HWY_ATTR {
-    const auto left = hn::PromoteTo(d, hn::LoadU(bytes, from));
-    const auto right = hn::ShiftRightBytes<6>(d, left);
-    return hn::Add(hn::ShiftLeft<kFractionBits>(left),
-                   hn::Mul(hn::Set(d, static_cast<std::int16_t>(part_x)), hn::Sub(right, left)));
+template <class D>
+HWY_INLINE hn::Vec<D> load_shuffle(D d, const Shuffle& shuffle) {
+  return hn::LoadU(d, shuffle.data());
+}
+
+/// `interpolate` for samples of 16 bits: both columns of a sample share a lane of 32 bits.
+template <class D>
+HWY_INLINE auto level16(D d, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+  const hn::Repartition<std::int32_t, D> d32;
+  const hn::Repartition<std::int16_t, D> d16;
+  const hn::Rebind<std::int16_t, decltype(d32)> half16;
+  const hn::RebindToUnsigned<decltype(half16)> words;
+  const auto x = hn::BitCast(d32, part_x), y = hn::BitCast(d32, part_y);
+  const auto shares = hn::BitCast(d16, hn::Add(hn::ShiftLeft<16>(x), hn::Sub(hn::Set(d32, kOne), x)));
+  // The multiplication knows signed numbers only: 2¹⁵ less on the way, which no difference sees.
+  const auto across = [&](auto pairs) HWY_ATTR {
+    const auto samples = hn::Xor(hn::BitCast(d16, pairs), hn::Set(d16, std::numeric_limits<std::int16_t>::min()));
+    auto odd = hn::Zero(d32);
+    const auto even = hn::ReorderWidenMulAccumulate(d32, samples, shares, hn::Zero(d32), odd);
+    return hn::RearrangeToOddPlusEven(even, odd);
   };
-  const auto top = across(p), bottom = across(q);
-  const auto share = hn::MulFixedPoint15(hn::Sub(bottom, top), hn::Set(d, static_cast<std::int16_t>(part_y << 8)));
-  const auto level = hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), hn::Set(d, kOne / 2)));
-  const hn::FixedTag<std::uint8_t, 4> four;
-  const hn::FixedTag<std::uint8_t, 8> eight;
-  hn::StoreU(hn::LowerHalf(four, hn::DemoteTo(eight, level)), four, out);
-}
-HWY_INLINE void remap_colour(const std::uint16_t* p, const std::uint16_t* q, int part_x, int part_y,
-                             std::uint16_t* out) {
-  const hn::FixedTag<std::int32_t, 4> d;
-  const hn::Rebind<std::uint16_t, decltype(d)> words;
-  const auto of = [&](const std::uint16_t* from) HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(words, from)); };
-  const auto level = between_lanes(d, of(p), of(p + 3), of(q), of(q + 3), hn::Set(d, part_x), hn::Set(d, part_y));
-  hn::StoreU(hn::DemoteTo(words, level), words, out);
+  const auto top = across(top_pairs), bottom = across(bottom_pairs);
+  const auto half = hn::Set(d32, kOne / 2);
+  const auto share = hn::ShiftRight<kFractionBits>(hn::Add(hn::Mul(y, hn::Sub(bottom, top)), half));
+  const auto level = hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), half));
+  const auto biased = hn::BitCast(words, hn::DemoteTo(half16, level));
+  return hn::Xor(biased, hn::Set(words, std::uint16_t{1} << 15));
 }
 
-template <class T>
-HWY_INLINE void remap_cell(const Cell& cell, const Source<Rgb<T> >& source, Rgb<T>* out) {
-  // Loads and stores reach a pixel further than they need: the last ones go the plain way.
-  const int last_column = source.width - 4;
-  for (int at = 0; at < kCell - 1; ++at) {
-    const int code = cell.codes[at];
-    const Place corner = cell.corners[at / kBlock];
-    const int x = corner.x + (code & 15), y = corner.y + (code >> 4);
-    if (code == kUnseen || cell.kinds[at / kBlock] == kScattered || x > last_column) {
-      remap_pixel(cell, at, source, out);
-      continue;
-    }
-    const Rgb<T>* const p = source.data + y * source.stride + x;
-    const Rgb<T>* const q = p + (y + 1 < source.height ? source.stride : 0);
-    remap_colour(&p->r, &q->r, cell.part_x[at], cell.part_y[at], &out[at].r);
+/// What differs from one kind of pixel to the next: a piece's bytes, of which a load takes `kPiece`, in lanes of `kLane`
+/// bytes; and the level of as many pieces as a vector holds, a sample in each lane's lower half.
+template <class Pixel>
+struct Kind;
+
+template <>
+struct Kind<std::uint16_t> {
+  static constexpr std::size_t kPiece = 4, kLane = 4;
+  template <class D>
+  static HWY_INLINE auto level(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+    return level16(d, top, bottom, part_x, part_y);
   }
-  remap_pixel(cell, kCell - 1, source, out);
+};
+
+template <>
+struct Kind<Rgb16> {
+  static constexpr std::size_t kPiece = 16, kLane = 4;
+  template <class D>
+  static HWY_INLINE auto level(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+    static constexpr Shuffle kPairs = in_each<16>({0, 1, 6, 7, 2, 3, 8, 9, 4, 5, 10, 11, kNone, kNone, kNone, kNone});
+    const auto pairs = load_shuffle(d, kPairs);
+    const auto rgb0 = level16(d, hn::TableLookupBytesOr0(top, pairs), hn::TableLookupBytesOr0(bottom, pairs), part_x,
+                              part_y);
+    static constexpr Shuffle kClose =
+        in_each<16>({0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, kNone, kNone, kNone, kNone});
+    const hn::Half<D> half;
+    return hn::TableLookupBytes(hn::BitCast(half, rgb0), load_shuffle(half, kClose));
+  }
+};
+
+template <>
+struct Kind<Rgb8> {
+  static constexpr std::size_t kPiece = 8, kLane = 2;
+  template <class D>
+  static HWY_INLINE auto level(D d, hn::Vec<D> top_pieces, hn::Vec<D> bottom_pieces, hn::Vec<D> part_x,
+                               hn::Vec<D> part_y) {
+    const hn::Repartition<std::int16_t, D> d16;
+    const hn::Half<D> half;
+    static constexpr Shuffle kLeft = in_each<8>({0, kNone, 1, kNone, 2, kNone, kNone, kNone});
+    static constexpr Shuffle kRight = in_each<8>({3, kNone, 4, kNone, 5, kNone, kNone, kNone});
+    const auto across = [&](auto pieces) HWY_ATTR {
+      const auto left = hn::BitCast(d16, hn::TableLookupBytesOr0(pieces, load_shuffle(d, kLeft)));
+      const auto right = hn::BitCast(d16, hn::TableLookupBytesOr0(pieces, load_shuffle(d, kRight)));
+      return hn::Add(hn::ShiftLeft<kFractionBits>(left), hn::Mul(hn::BitCast(d16, part_x), hn::Sub(right, left)));
+    };
+    const auto top = across(top_pieces), bottom = across(bottom_pieces);
+    const auto share = hn::MulFixedPoint15(hn::Sub(bottom, top), hn::ShiftLeft<8>(hn::BitCast(d16, part_y)));
+    const auto level = hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), hn::Set(d16, kOne / 2)));
+    static constexpr Shuffle kClose = in_each<16>({0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, kNone, kNone, kNone, kNone});
+    return hn::TableLookupBytes(hn::DemoteTo(half, level), load_shuffle(half, kClose));
+  }
+};
+
+/// A piece of each pixel; `from` in bytes.
+template <std::size_t kPiece, class D>
+HWY_INLINE hn::Vec<D> load_pieces(D d, const std::uint8_t* from, const std::int32_t* offsets) {
+  constexpr std::size_t kPieces = hn::MaxLanes(D()) / kPiece;
+  if constexpr (kPieces > 1) {
+    const hn::Half<D> half;
+    const auto low = load_pieces<kPiece>(half, from, offsets);
+    return hn::Combine(d, load_pieces<kPiece>(half, from, offsets + kPieces / 2), low);
+  } else {
+    return hn::LoadU(d, from + *offsets);
+  }
+}
+
+/// The `kPixels` pixels of each 16 bytes, one after the other; may spoil the pixel behind the last one.
+template <int kPixels, class D, class Pixel>
+HWY_INLINE void store_pixels(D d, hn::Vec<D> pixels, Pixel* out) {
+  if constexpr (hn::MaxLanes(D()) > static_cast<std::size_t>(kLoad)) {
+    const hn::Half<D> half;
+    store_pixels<kPixels>(half, hn::LowerHalf(half, pixels), out);
+    store_pixels<kPixels>(half, hn::UpperHalf(half, pixels), out + kPixels);
+  } else {
+    hn::StoreU(pixels, d, reinterpret_cast<std::uint8_t*>(out));
+  }
+}
+
+/// A block that is not scattered and, with a row to spare, does not reach the last source row: loads may go a little
+/// beyond a row's end.
+template <class Pixel>
+HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, int block, Pixel* out) {
+  using K = Kind<Pixel>;
+  constexpr std::size_t kBytes = kBlock * K::kPiece;
+#if HWY_HAVE_SCALABLE
+  const hn::FixedTag<std::uint8_t, kLoad> d;
+#else
+  const hn::CappedTag<std::uint8_t, std::min<std::size_t>(kBytes, kBlocks * kLoad)> d;
+#endif
+  constexpr int kAtOnce = static_cast<int>(hn::MaxLanes(d) / K::kPiece);
+
+  const hn::CappedTag<std::int32_t, kBlock> d32;
+  const hn::Rebind<std::uint8_t, decltype(d32)> bytes;
+  const Place corner = cell.corners[block];
+  const auto* const top = reinterpret_cast<const std::uint8_t*>(source.data + corner.y * source.stride + corner.x);
+  const std::ptrdiff_t stride = source.stride * static_cast<std::ptrdiff_t>(sizeof(Pixel));
+  alignas(64) std::array<std::int32_t, kBlock> offsets;
+  for (std::size_t i = 0; i < kBlock; i += hn::Lanes(d32)) {
+    const auto code = hn::PromoteTo(d32, hn::LoadU(bytes, cell.codes + static_cast<std::size_t>(block) * kBlock + i));
+    const auto row = hn::And(hn::ShiftRight<4>(code), hn::Set(d32, kLargestStep));  // 0 of unseen ones
+    const auto column = hn::And(code, hn::Set(d32, 15));
+    hn::StoreU(hn::Add(hn::Mul(row, hn::Set(d32, static_cast<std::int32_t>(stride))),
+                       hn::Mul(column, hn::Set(d32, static_cast<std::int32_t>(sizeof(Pixel))))),
+               d32, offsets.data() + i);
+  }
+
+  static constexpr Shuffle kNumbers = number_of_piece(K::kPiece, K::kLane);
+  const int half_cell = block / 2 * kLoad;
+  const auto parts_x = hn::LoadDup128(d, cell.part_x + half_cell), parts_y = hn::LoadDup128(d, cell.part_y + half_cell);
+  for (int i = 0; i < kBlock; i += kAtOnce) {
+    const auto first = static_cast<std::uint8_t>(block % 2 * kBlock + i);
+    const auto numbers = hn::Add(load_shuffle(d, kNumbers), hn::Set(d, first));
+    const auto pixels =
+        K::level(d, load_pieces<K::kPiece>(d, top, offsets.data() + i),
+                 load_pieces<K::kPiece>(d, top + stride, offsets.data() + i), hn::TableLookupBytesOr0(parts_x, numbers),
+                 hn::TableLookupBytesOr0(parts_y, numbers));
+    const hn::Half<decltype(d)> half;
+    store_pixels<static_cast<int>(2 * kLoad / K::kPiece)>(half, hn::BitCast(half, pixels), out + block * kBlock + i);
+  }
+}
+
+/// May spoil the pixel behind the cell.
+template <class Pixel>
+HWY_INLINE void remap_cell(const Cell& cell, const Source<Pixel>& source, Pixel* out) {
+  for (int b = 0; b < kBlocks; ++b) {
+    std::uint64_t codes;
+    std::memcpy(&codes, cell.codes + b * kBlock, sizeof codes);
+    constexpr std::uint64_t kAllUnseen = 0x8080808080808080;
+    if (cell.kinds[b] == kScattered || codes == kAllUnseen) {
+      std::fill_n(out + b * kBlock, kBlock, Pixel{});
+    } else if (cell.corners[b].y + cell.kinds[b] + 3 < source.height) {
+      remap_block(cell, source, b, out);
+      for (int at = b * kBlock; (codes & kAllUnseen) != 0 && at < (b + 1) * kBlock; ++at) {
+        if (cell.codes[at] == kUnseen) out[at] = Pixel{};
+      }
+    } else {
+      for (int at = b * kBlock; at < (b + 1) * kBlock; ++at) remap_pixel(cell, at, source, out);
+    }
+  }
 }
 
 #endif  // HWY_TARGET == HWY_SCALAR
 
 template <class Pixel>
 HWY_INLINE void remap_row(const Cell* cells, int width, const Source<Pixel>& source, Pixel* out) {
-  for (; width >= kCell; width -= kCell, out += kCell) remap_cell(*cells++, source, out);
-  if (width == 0) return;
-  std::array<Pixel, kCell> last;
+  for (; width > kCell; width -= kCell, out += kCell) remap_cell(*cells++, source, out);
+  std::array<Pixel, kCell + 1> last;
   remap_cell(*cells, source, last.data());
   std::copy_n(last.data(), width, out);
 }
