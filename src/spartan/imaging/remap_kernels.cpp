@@ -223,7 +223,7 @@ struct Kind<Rgb8> {
 
 /// A piece of each pixel; `from` in bytes.
 template <std::size_t kPiece, class D>
-HWY_INLINE hn::Vec<D> load_pieces(D d, const std::uint8_t* from, const std::int32_t* offsets) {
+HWY_INLINE hn::Vec<D> load_pieces(D d, const std::uint8_t* from, const std::uint32_t* offsets) {
   constexpr std::size_t kPieces = hn::MaxLanes(D()) / kPiece;
   if constexpr (kPieces > 1) {
     const hn::Half<D> half;
@@ -246,10 +246,27 @@ HWY_INLINE void store_pixels(D d, hn::Vec<D> pixels, Pixel* out) {
   }
 }
 
+/// How many bytes behind its block's corner each pixel of a cell begins; 0 of unseen ones.
+template <class Pixel>
+HWY_INLINE std::array<std::uint32_t, kCell> offsets_in(const Cell& cell, const Source<Pixel>& source) {
+  const hn::CappedTag<std::uint32_t, kCell> d;
+  const hn::Rebind<std::uint8_t, decltype(d)> bytes;
+  const auto row_bytes = hn::Set(d, static_cast<std::uint32_t>(source.stride) * static_cast<std::uint32_t>(sizeof(Pixel)));
+  std::array<std::uint32_t, kCell> offsets;
+  for (std::size_t i = 0; i < offsets.size(); i += hn::Lanes(d)) {
+    const auto code = hn::PromoteTo(d, hn::LoadU(bytes, cell.codes + i));
+    const auto row = hn::And(hn::ShiftRight<4>(code), hn::Set(d, kLargestStep));
+    const auto column = hn::And(code, hn::Set(d, 15));
+    hn::StoreU(hn::Add(hn::Mul(row, row_bytes), hn::Mul(column, hn::Set(d, sizeof(Pixel)))), d, offsets.data() + i);
+  }
+  return offsets;
+}
+
 /// A block that is not scattered and, with a row to spare, does not reach the last source row: loads may go a little
 /// beyond a row's end.
 template <class Pixel>
-HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, int block, Pixel* out) {
+HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, const std::uint32_t* offsets, int block,
+                            Pixel* out) {
   using K = Kind<Pixel>;
   constexpr std::size_t kBytes = kBlock * K::kPiece;
 #if HWY_HAVE_SCALABLE
@@ -259,20 +276,9 @@ HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, int b
 #endif
   constexpr int kAtOnce = static_cast<int>(hn::MaxLanes(d) / K::kPiece);
 
-  const hn::CappedTag<std::int32_t, kBlock> d32;
-  const hn::Rebind<std::uint8_t, decltype(d32)> bytes;
   const Place corner = cell.corners[block];
   const auto* const top = reinterpret_cast<const std::uint8_t*>(source.data + corner.y * source.stride + corner.x);
-  const std::ptrdiff_t stride = source.stride * static_cast<std::ptrdiff_t>(sizeof(Pixel));
-  alignas(64) std::array<std::int32_t, kBlock> offsets;
-  for (std::size_t i = 0; i < kBlock; i += hn::Lanes(d32)) {
-    const auto code = hn::PromoteTo(d32, hn::LoadU(bytes, cell.codes + static_cast<std::size_t>(block) * kBlock + i));
-    const auto row = hn::And(hn::ShiftRight<4>(code), hn::Set(d32, kLargestStep));  // 0 of unseen ones
-    const auto column = hn::And(code, hn::Set(d32, 15));
-    hn::StoreU(hn::Add(hn::Mul(row, hn::Set(d32, static_cast<std::int32_t>(stride))),
-                       hn::Mul(column, hn::Set(d32, static_cast<std::int32_t>(sizeof(Pixel))))),
-               d32, offsets.data() + i);
-  }
+  const auto* const bottom = top + source.stride * static_cast<std::ptrdiff_t>(sizeof(Pixel));
 
   static constexpr Shuffle kNumbers = number_of_piece(K::kPiece, K::kLane);
   const int half_cell = block / 2 * kLoad;
@@ -281,8 +287,7 @@ HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, int b
     const auto first = static_cast<std::uint8_t>(block % 2 * kBlock + i);
     const auto numbers = hn::Add(load_shuffle(d, kNumbers), hn::Set(d, first));
     const auto pixels =
-        K::level(d, load_pieces<K::kPiece>(d, top, offsets.data() + i),
-                 load_pieces<K::kPiece>(d, top + stride, offsets.data() + i), hn::TableLookupBytesOr0(parts_x, numbers),
+        K::level(d, load_pieces<K::kPiece>(d, top, offsets + i), load_pieces<K::kPiece>(d, bottom, offsets + i), hn::TableLookupBytesOr0(parts_x, numbers),
                  hn::TableLookupBytesOr0(parts_y, numbers));
     const hn::Half<decltype(d)> half;
     store_pixels<static_cast<int>(2 * kLoad / K::kPiece)>(half, hn::BitCast(half, pixels), out + block * kBlock + i);
@@ -292,6 +297,7 @@ HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, int b
 /// May spoil the pixel behind the cell.
 template <class Pixel>
 HWY_INLINE void remap_cell(const Cell& cell, const Source<Pixel>& source, Pixel* out) {
+  const auto offsets = offsets_in(cell, source);
   for (int b = 0; b < kBlocks; ++b) {
     std::uint64_t codes;
     std::memcpy(&codes, cell.codes + b * kBlock, sizeof codes);
@@ -299,7 +305,7 @@ HWY_INLINE void remap_cell(const Cell& cell, const Source<Pixel>& source, Pixel*
     if (cell.kinds[b] == kScattered || codes == kAllUnseen) {
       std::fill_n(out + b * kBlock, kBlock, Pixel{});
     } else if (cell.corners[b].y + cell.kinds[b] + 3 < source.height) {
-      remap_block(cell, source, b, out);
+      remap_block(cell, source, offsets.data() + b * kBlock, b, out);
       for (int at = b * kBlock; (codes & kAllUnseen) != 0 && at < (b + 1) * kBlock; ++at) {
         if (cell.codes[at] == kUnseen) out[at] = Pixel{};
       }
