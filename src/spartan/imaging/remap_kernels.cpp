@@ -1,5 +1,7 @@
 #include "spartan/imaging/remap_kernels.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -14,6 +16,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace spartan::remap::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kSpoiled = 2;  // pixels behind a cell's last, of which the widest store may write four bytes
 
 /// Pixel `at` of a cell in the plain way.
 template <class Pixel>
@@ -112,8 +116,8 @@ HWY_INLINE void remap_cell(const Cell& cell, const Source<std::uint8_t>& source,
   }
 }
 
-// The other kinds of pixels: one load a row brings both columns of a pixel with all its channels (a piece), for 8 pixels
-// at once.
+// The other formats: one load a row brings both columns of a pixel with all its channels (a piece), and eight pixels go
+// together.
 
 /// For every byte of a vector of pieces, what a byte shuffle within 16 bytes takes for it; kNone stands for 0.
 constexpr std::uint8_t kNone = 0x80;
@@ -146,7 +150,7 @@ HWY_INLINE hn::Vec<D> load_shuffle(D d, const Shuffle& shuffle) {
 
 /// `interpolate` for samples of 16 bits: both columns of a sample share a lane of 32 bits.
 template <class D>
-HWY_INLINE auto level16(D d, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+HWY_INLINE auto levels16(D d, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::Vec<D> part_x, hn::Vec<D> part_y) {
   const hn::Repartition<std::int32_t, D> d32;
   const hn::Repartition<std::int16_t, D> d16;
   const hn::Rebind<std::int16_t, decltype(d32)> half16;
@@ -156,9 +160,9 @@ HWY_INLINE auto level16(D d, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::
   // The multiplication knows signed numbers only: 2¹⁵ less on the way, which no difference sees.
   const auto across = [&](auto pairs) HWY_ATTR {
     const auto samples = hn::Xor(hn::BitCast(d16, pairs), hn::Set(d16, std::numeric_limits<std::int16_t>::min()));
-    auto odd = hn::Zero(d32);
-    const auto even = hn::ReorderWidenMulAccumulate(d32, samples, shares, hn::Zero(d32), odd);
-    return hn::RearrangeToOddPlusEven(even, odd);
+    auto rest = hn::Zero(d32);
+    const auto sums = hn::ReorderWidenMulAccumulate(d32, samples, shares, hn::Zero(d32), rest);
+    return hn::RearrangeToOddPlusEven(sums, rest);
   };
   const auto top = across(top_pairs), bottom = across(bottom_pairs);
   const auto half = hn::Set(d32, kOne / 2);
@@ -168,42 +172,41 @@ HWY_INLINE auto level16(D d, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::
   return hn::Xor(biased, hn::Set(words, std::uint16_t{1} << 15));
 }
 
-/// What differs from one kind of pixel to the next: a piece's bytes, of which a load takes `kPiece`, in lanes of `kLane`
-/// bytes; and the level of as many pieces as a vector holds, a sample in each lane's lower half.
+/// What differs from one format to the next: the bytes that a load takes for a piece (at times more than it has), those
+/// of a lane of the calculation, and the levels of as many pieces as a vector holds, close together in each 16 bytes.
 template <class Pixel>
-struct Kind;
+struct Format;
 
 template <>
-struct Kind<std::uint16_t> {
+struct Format<std::uint16_t> {
   static constexpr std::size_t kPiece = 4, kLane = 4;
   template <class D>
-  static HWY_INLINE auto level(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
-    return level16(d, top, bottom, part_x, part_y);
+  static HWY_INLINE auto levels(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+    return levels16(d, top, bottom, part_x, part_y);
   }
 };
 
 template <>
-struct Kind<Rgb16> {
+struct Format<Rgb16> {
   static constexpr std::size_t kPiece = 16, kLane = 4;
   template <class D>
-  static HWY_INLINE auto level(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+  static HWY_INLINE auto levels(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
     static constexpr Shuffle kPairs = in_each<16>({0, 1, 6, 7, 2, 3, 8, 9, 4, 5, 10, 11, kNone, kNone, kNone, kNone});
     const auto pairs = load_shuffle(d, kPairs);
-    const auto rgb0 = level16(d, hn::TableLookupBytesOr0(top, pairs), hn::TableLookupBytesOr0(bottom, pairs), part_x,
-                              part_y);
-    static constexpr Shuffle kClose =
-        in_each<16>({0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, kNone, kNone, kNone, kNone});
+    const auto rgb0 =
+        levels16(d, hn::TableLookupBytesOr0(top, pairs), hn::TableLookupBytesOr0(bottom, pairs), part_x, part_y);
+    static constexpr Shuffle kClose = in_each<16>({0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, kNone, kNone, kNone, kNone});
     const hn::Half<D> half;
     return hn::TableLookupBytes(hn::BitCast(half, rgb0), load_shuffle(half, kClose));
   }
 };
 
 template <>
-struct Kind<Rgb8> {
+struct Format<Rgb8> {
   static constexpr std::size_t kPiece = 8, kLane = 2;
   template <class D>
-  static HWY_INLINE auto level(D d, hn::Vec<D> top_pieces, hn::Vec<D> bottom_pieces, hn::Vec<D> part_x,
-                               hn::Vec<D> part_y) {
+  static HWY_INLINE auto levels(D d, hn::Vec<D> top_pieces, hn::Vec<D> bottom_pieces, hn::Vec<D> part_x,
+                                hn::Vec<D> part_y) {
     const hn::Repartition<std::int16_t, D> d16;
     const hn::Half<D> half;
     static constexpr Shuffle kLeft = in_each<8>({0, kNone, 1, kNone, 2, kNone, kNone, kNone});
@@ -223,7 +226,7 @@ struct Kind<Rgb8> {
 
 /// A piece of each pixel; `from` in bytes.
 template <std::size_t kPiece, class D>
-HWY_INLINE hn::Vec<D> load_pieces(D d, const std::uint8_t* from, const std::uint32_t* offsets) {
+HWY_INLINE hn::Vec<D> load_pieces(D d, const std::uint8_t* from, const std::int32_t* offsets) {
   constexpr std::size_t kPieces = hn::MaxLanes(D()) / kPiece;
   if constexpr (kPieces > 1) {
     const hn::Half<D> half;
@@ -234,7 +237,7 @@ HWY_INLINE hn::Vec<D> load_pieces(D d, const std::uint8_t* from, const std::uint
   }
 }
 
-/// The `kPixels` pixels of each 16 bytes, one after the other; may spoil the pixel behind the last one.
+/// The `kPixels` pixels of each 16 bytes, one after the other; may spoil `kSpoiled` behind the last.
 template <int kPixels, class D, class Pixel>
 HWY_INLINE void store_pixels(D d, hn::Vec<D> pixels, Pixel* out) {
   if constexpr (hn::MaxLanes(D()) > static_cast<std::size_t>(kLoad)) {
@@ -248,11 +251,12 @@ HWY_INLINE void store_pixels(D d, hn::Vec<D> pixels, Pixel* out) {
 
 /// How many bytes behind its block's corner each pixel of a cell begins; 0 of unseen ones.
 template <class Pixel>
-HWY_INLINE std::array<std::uint32_t, kCell> offsets_in(const Cell& cell, const Source<Pixel>& source) {
-  const hn::CappedTag<std::uint32_t, kCell> d;
+HWY_INLINE std::array<std::int32_t, kCell> offsets_in(const Cell& cell, const Source<Pixel>& source) {
+  const hn::CappedTag<std::int32_t, kCell> d;
   const hn::Rebind<std::uint8_t, decltype(d)> bytes;
-  const auto row_bytes = hn::Set(d, static_cast<std::uint32_t>(source.stride) * static_cast<std::uint32_t>(sizeof(Pixel)));
-  std::array<std::uint32_t, kCell> offsets;
+  const auto row_bytes =
+      hn::Set(d, static_cast<std::int32_t>(source.stride) * static_cast<std::int32_t>(sizeof(Pixel)));
+  std::array<std::int32_t, kCell> offsets;
   for (std::size_t i = 0; i < offsets.size(); i += hn::Lanes(d)) {
     const auto code = hn::PromoteTo(d, hn::LoadU(bytes, cell.codes + i));
     const auto row = hn::And(hn::ShiftRight<4>(code), hn::Set(d, kLargestStep));
@@ -265,36 +269,36 @@ HWY_INLINE std::array<std::uint32_t, kCell> offsets_in(const Cell& cell, const S
 /// A block that is not scattered and, with a row to spare, does not reach the last source row: loads may go a little
 /// beyond a row's end.
 template <class Pixel>
-HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, const std::uint32_t* offsets, int block,
+HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, const std::int32_t* offsets, int block,
                             Pixel* out) {
-  using K = Kind<Pixel>;
-  constexpr std::size_t kBytes = kBlock * K::kPiece;
+  using F = Format<Pixel>;
+  constexpr std::size_t kBytes = kBlock * F::kPiece;
 #if HWY_HAVE_SCALABLE
   const hn::FixedTag<std::uint8_t, kLoad> d;
 #else
   const hn::CappedTag<std::uint8_t, std::min<std::size_t>(kBytes, kBlocks * kLoad)> d;
 #endif
-  constexpr int kAtOnce = static_cast<int>(hn::MaxLanes(d) / K::kPiece);
+  constexpr int kAtOnce = static_cast<int>(hn::MaxLanes(d) / F::kPiece);
 
   const Place corner = cell.corners[block];
   const auto* const top = reinterpret_cast<const std::uint8_t*>(source.data + corner.y * source.stride + corner.x);
   const auto* const bottom = top + source.stride * static_cast<std::ptrdiff_t>(sizeof(Pixel));
 
-  static constexpr Shuffle kNumbers = number_of_piece(K::kPiece, K::kLane);
+  static constexpr Shuffle kNumbers = number_of_piece(F::kPiece, F::kLane);
   const int half_cell = block / 2 * kLoad;
   const auto parts_x = hn::LoadDup128(d, cell.part_x + half_cell), parts_y = hn::LoadDup128(d, cell.part_y + half_cell);
   for (int i = 0; i < kBlock; i += kAtOnce) {
     const auto first = static_cast<std::uint8_t>(block % 2 * kBlock + i);
     const auto numbers = hn::Add(load_shuffle(d, kNumbers), hn::Set(d, first));
     const auto pixels =
-        K::level(d, load_pieces<K::kPiece>(d, top, offsets + i), load_pieces<K::kPiece>(d, bottom, offsets + i), hn::TableLookupBytesOr0(parts_x, numbers),
-                 hn::TableLookupBytesOr0(parts_y, numbers));
+        F::levels(d, load_pieces<F::kPiece>(d, top, offsets + i), load_pieces<F::kPiece>(d, bottom, offsets + i),
+                  hn::TableLookupBytesOr0(parts_x, numbers), hn::TableLookupBytesOr0(parts_y, numbers));
     const hn::Half<decltype(d)> half;
-    store_pixels<static_cast<int>(2 * kLoad / K::kPiece)>(half, hn::BitCast(half, pixels), out + block * kBlock + i);
+    store_pixels<static_cast<int>(2 * kLoad / F::kPiece)>(half, hn::BitCast(half, pixels), out + block * kBlock + i);
   }
 }
 
-/// May spoil the pixel behind the cell.
+/// May spoil `kSpoiled` pixels behind the cell.
 template <class Pixel>
 HWY_INLINE void remap_cell(const Cell& cell, const Source<Pixel>& source, Pixel* out) {
   const auto offsets = offsets_in(cell, source);
@@ -317,26 +321,42 @@ HWY_INLINE void remap_cell(const Cell& cell, const Source<Pixel>& source, Pixel*
 
 #endif  // HWY_TARGET == HWY_SCALAR
 
+/// Asks the memory for the source row that the pixels of a cell are the first to look at, once a cache line.
 template <class Pixel>
-HWY_INLINE void remap_row(const Cell* cells, int width, const Source<Pixel>& source, Pixel* out) {
-  for (; width > kCell; width -= kCell, out += kCell) remap_cell(*cells++, source, out);
-  std::array<Pixel, kCell + 1> last;
-  remap_cell(*cells, source, last.data());
-  std::copy_n(last.data(), width, out);
+HWY_INLINE void fetch(const Cell& cell, const Source<Pixel>& source) {
+  constexpr int kBlocksALine = std::clamp(static_cast<int>(64 / sizeof(Pixel)) / kBlock, 1, kBlocks);
+  for (int b = 0; b < kBlocks; b += kBlocksALine) {
+    const Place corner = cell.corners[b];
+    hwy::Prefetch(source.data + std::min(corner.y + 2, source.height - 1) * source.stride + corner.x);
+  }
+}
+
+template <class Pixel>
+HWY_INLINE void remap_row(const Cell* cells, const Cell* ahead, int width, const Source<Pixel>& source, Pixel* out) {
+  for (; width >= kCell + kSpoiled; width -= kCell, out += kCell) {
+    fetch(*ahead++, source);
+    remap_cell(*cells++, source, out);
+  }
+  for (; width > 0; width -= kCell, out += kCell) {
+    fetch(*ahead++, source);
+    std::array<Pixel, kCell + kSpoiled> last;
+    remap_cell(*cells++, source, last.data());
+    std::copy_n(last.data(), std::min(width, kCell), out);
+  }
 }
 
 // Names without templates, for the dispatch tables.
-void gray8(const Cell* cells, int width, const Source<std::uint8_t>& source, std::uint8_t* out) {
-  remap_row(cells, width, source, out);
+void gray8(const Cell* cells, const Cell* ahead, int width, const Source<std::uint8_t>& source, std::uint8_t* out) {
+  remap_row(cells, ahead, width, source, out);
 }
-void gray16(const Cell* cells, int width, const Source<std::uint16_t>& source, std::uint16_t* out) {
-  remap_row(cells, width, source, out);
+void gray16(const Cell* cells, const Cell* ahead, int width, const Source<std::uint16_t>& source, std::uint16_t* out) {
+  remap_row(cells, ahead, width, source, out);
 }
-void colour8(const Cell* cells, int width, const Source<Rgb8>& source, Rgb8* out) {
-  remap_row(cells, width, source, out);
+void colour8(const Cell* cells, const Cell* ahead, int width, const Source<Rgb8>& source, Rgb8* out) {
+  remap_row(cells, ahead, width, source, out);
 }
-void colour16(const Cell* cells, int width, const Source<Rgb16>& source, Rgb16* out) {
-  remap_row(cells, width, source, out);
+void colour16(const Cell* cells, const Cell* ahead, int width, const Source<Rgb16>& source, Rgb16* out) {
+  remap_row(cells, ahead, width, source, out);
 }
 
 }  // namespace spartan::remap::HWY_NAMESPACE
