@@ -168,6 +168,7 @@ const Case kCases[] = {{"smooth", {160, 120}, {149, 113}, 128, {0.01, -0.02, 0.0
                        {"minified", {160, 120}, {101, 64}, 50, {0, 0, 0.1}},
                        {"a narrow view", {160, 120}, {5, 3}, 128, {0, 0, 0}},
                        {"past every border", {67, 45}, {96, 64}, 130, {0, 0, 0}},
+                       {"past every border, turned", {67, 45}, {96, 64}, 130, {0, 0, 0.1}},
                        {"a source as wide as a load", {16, 20}, {33, 21}, 130, {0, 0, 0}},
                        {"an odd source, magnified", {19, 20}, {64, 70}, 500, {0, 0, 0}},
                        {"a narrow source", {15, 20}, {33, 21}, 130, {0, 0, 0}},
@@ -189,10 +190,10 @@ void expect_plain_formula(const RemapTable& table) {
   const auto [width, height] = table.source_size();
   const auto noise = noise_picture<Pixel>({width + 3, height});
   std::vector<Pixel> pixels;
-  pixels.reserve(static_cast<std::size_t>((width + 3) * height));
-  for (int y = 0; y < height; ++y) pixels.insert(pixels.end(), noise.row(y), noise.row(y) + width + 3);
-  pixels.resize(pixels.size() - 3);
-  pixels.shrink_to_fit();
+  pixels.reserve(static_cast<std::size_t>((width + 3) * height - 3));
+  for (int y = 0; y < height; ++y) {
+    pixels.insert(pixels.end(), noise.row(y), noise.row(y) + width + (y + 1 < height ? 3 : 0));
+  }
   const ImageView<const Pixel> source(pixels.data(), width, height, width + 3);
 
   const Pixel untouched = source(0, 0);
