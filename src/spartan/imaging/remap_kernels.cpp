@@ -150,7 +150,7 @@ HWY_INLINE hn::Vec<D> load_shuffle(D d, const Shuffle& shuffle) {
 
 /// `interpolate` for samples of 16 bits: both columns of a sample share a lane of 32 bits.
 template <class D>
-HWY_INLINE auto levels16(D d, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+HWY_INLINE auto levels16(D /*d*/, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::Vec<D> part_x, hn::Vec<D> part_y) {
   const hn::Repartition<std::int32_t, D> d32;
   const hn::Repartition<std::int16_t, D> d16;
   const hn::Rebind<std::int16_t, decltype(d32)> half16;
