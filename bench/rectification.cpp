@@ -150,20 +150,21 @@ void compare(const Scene& scene, const char* kind, const std::string& simd, int 
              b.largest);
 }
 
-// What the memory alone allows: as many bytes as the rectification of gray moves (table, source, result), read and
-// written by memcpy halves.
-void print_limit(const Scene& scene, int repeat) {
+// What the memory alone allows: as many bytes as the rectification moves (table, source, result), read and written by
+// memcpy halves.
+void print_limit(const Scene& scene, const char* kind, std::size_t pixel_bytes, int repeat) {
   const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.turn, {}, spartan::Workers(1));
   const auto pixels = static_cast<std::size_t>(scene.size.width) * static_cast<std::size_t>(scene.size.height);
-  const std::size_t bytes = table.bytes() + 2 * pixels;
+  const std::size_t bytes = table.bytes() + 2 * pixel_bytes * pixels;
   std::vector<std::uint8_t> from(bytes / 2, 1), to(bytes / 2);
   std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(repeat));
   for (int i = 0; i < repeat; ++i) {
     times.push_back(milliseconds([&] { std::memcpy(to.data(), from.data(), to.size()); }));
     from[static_cast<std::size_t>(i) % from.size()] = to[to.size() / 2];
   }
-  fmt::print("{:>4} x {:<4} {:.2f} bytes moved a pixel; memcpy moves as many in {:.3f} ms\n", scene.size.width,
-             scene.size.height, static_cast<double>(bytes) / static_cast<double>(pixels), median(times));
+  fmt::print("{:>4} x {:<4} {:<8} {:.2f} bytes moved a pixel; memcpy moves as many in {:.3f} ms\n", scene.size.width,
+             scene.size.height, kind, static_cast<double>(bytes) / static_cast<double>(pixels), median(times));
 }
 
 }  // namespace
@@ -180,11 +181,14 @@ int main(int argc, char** argv) try {
   for (const Scene& scene : {small, large}) {
     for (const std::string& simd : spartan::available_simd_targets()) {
       compare<std::uint8_t, 1>(scene, "gray 8", simd, repeat);
+      compare<std::uint16_t, 1>(scene, "gray 16", simd, repeat);
+      compare<spartan::Rgb8, 3>(scene, "RGB 8", simd, repeat);
+      compare<spartan::Rgb16, 3>(scene, "RGB 16", simd, repeat);
     }
-    compare<std::uint16_t, 1>(scene, "gray 16", "auto", repeat);
-    compare<spartan::Rgb8, 3>(scene, "RGB 8", "auto", repeat);
-    compare<spartan::Rgb16, 3>(scene, "RGB 16", "auto", repeat);
-    print_limit(scene, repeat);
+    print_limit(scene, "gray 8", sizeof(std::uint8_t), repeat);
+    print_limit(scene, "gray 16", sizeof(std::uint16_t), repeat);
+    print_limit(scene, "RGB 8", sizeof(spartan::Rgb8), repeat);
+    print_limit(scene, "RGB 16", sizeof(spartan::Rgb16), repeat);
   }
   return 0;
 } catch (const std::exception& e) {

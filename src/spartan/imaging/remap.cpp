@@ -18,6 +18,7 @@ using remap::kOne;
 using remap::Place;
 
 constexpr int kRowsPerPart = 16;
+constexpr int kRowsAhead = 4;  // the memory has their time to bring the source
 
 template <class Pixel>
 auto kernel_of(const remap::Kernels& kernels) {
@@ -148,7 +149,8 @@ void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> resul
     const remap::Source<Pixel> from{source.data(), source.stride(), source.width(), source.height()};
     for (int y = begin; y < end; ++y) {
       Pixel* const out = result.row(y);
-      kernel_of<Pixel>(kernels_)(cells_.row(y), size().width, from, out);
+      const Cell* const ahead = cells_.row(std::min(y + kRowsAhead, result.height() - 1));
+      kernel_of<Pixel>(kernels_)(cells_.row(y), ahead, size().width, from, out);
       for (const Scattered& far : scattered_[static_cast<std::size_t>(y)]) {
         for (int i = 0; i < kBlock && far.x + i < size().width; ++i) {
           const Cell& cell = cells_(far.x / kCell, y);

@@ -1,7 +1,11 @@
 #include "spartan/imaging/remap_kernels.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <array>
+#include <cstring>
+#include <limits>
 
 // Compiled once per instruction set: Highway includes this file again for each.
 #undef HWY_TARGET_INCLUDE
@@ -12,6 +16,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace spartan::remap::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kSpoiled = 2;  // pixels behind a cell's last, of which the widest store may write four bytes
 
 /// Pixel `at` of a cell in the plain way.
 template <class Pixel>
@@ -110,132 +116,247 @@ HWY_INLINE void remap_cell(const Cell& cell, const Source<std::uint8_t>& source,
   }
 }
 
-/// `interpolate` in lanes of 32 bits.
-template <class D, class V = hn::Vec<D> >
-HWY_INLINE V between_lanes(D d, V s00, V s10, V s01, V s11, V part_x, V part_y) {
-  const auto half = hn::Set(d, kOne / 2);
-  const auto top = hn::Add(hn::ShiftLeft<kFractionBits>(s00), hn::Mul(part_x, hn::Sub(s10, s00)));
-  const auto bottom = hn::Add(hn::ShiftLeft<kFractionBits>(s01), hn::Mul(part_x, hn::Sub(s11, s01)));
-  const auto share = hn::ShiftRight<kFractionBits>(hn::Add(hn::Mul(part_y, hn::Sub(bottom, top)), half));
-  return hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), half));
+// The other formats: one load a row brings both columns of a pixel with all its channels (a piece), and eight pixels go
+// together.
+
+/// For every byte of a vector of pieces, what a byte shuffle within 16 bytes takes for it; kNone stands for 0.
+constexpr std::uint8_t kNone = 0x80;
+using Shuffle = std::array<std::uint8_t, kBlocks * kLoad>;
+
+/// The i-th piece's own number, in the lowest byte of each of its lanes.
+constexpr Shuffle number_of_piece(std::size_t piece_bytes, std::size_t lane_bytes) {
+  Shuffle result{};
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    result[i] = i % lane_bytes == 0 ? static_cast<std::uint8_t>(i / piece_bytes) : kNone;
+  }
+  return result;
 }
 
-#if HWY_TARGET <= HWY_AVX2  // the targets that have a gather, from AVX2 up
+/// The same for each group of bytes.
+template <std::size_t kBytes>
+constexpr Shuffle in_each(const std::array<std::uint8_t, kBytes>& group) {
+  Shuffle result{};
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const std::uint8_t from = group[i % kBytes];
+    result[i] = from == kNone ? kNone : static_cast<std::uint8_t>(from + i % kLoad / kBytes * kBytes);
+  }
+  return result;
+}
 
-/// A block at a time: both columns of a pixel are the halves of one 32-bit lane.
-HWY_INLINE void remap_block16(const Cell& cell, const Source<std::uint16_t>& source, int block, std::uint16_t* out) {
-  const hn::CappedTag<std::int32_t, kBlock> d;
-  const hn::RebindToUnsigned<decltype(d)> u32;
+template <class D>
+HWY_INLINE hn::Vec<D> load_shuffle(D d, const Shuffle& shuffle) {
+  return hn::LoadU(d, shuffle.data());
+}
+
+/// `interpolate` for samples of 16 bits: both columns of a sample share a lane of 32 bits.
+template <class D>
+HWY_INLINE auto levels16(D /*d*/, hn::Vec<D> top_pairs, hn::Vec<D> bottom_pairs, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+  const hn::Repartition<std::int32_t, D> d32;
+  const hn::Repartition<std::int16_t, D> d16;
+  const hn::Rebind<std::int16_t, decltype(d32)> half16;
+  const hn::RebindToUnsigned<decltype(half16)> words;
+  const auto x = hn::BitCast(d32, part_x), y = hn::BitCast(d32, part_y);
+  const auto shares = hn::BitCast(d16, hn::Add(hn::ShiftLeft<16>(x), hn::Sub(hn::Set(d32, kOne), x)));
+  // The multiplication knows signed numbers only: 2¹⁵ less on the way, which no difference sees.
+  const auto across = [&](auto pairs) HWY_ATTR {
+    const auto samples = hn::Xor(hn::BitCast(d16, pairs), hn::Set(d16, std::numeric_limits<std::int16_t>::min()));
+    auto rest = hn::Zero(d32);
+    const auto sums = hn::ReorderWidenMulAccumulate(d32, samples, shares, hn::Zero(d32), rest);
+    return hn::RearrangeToOddPlusEven(sums, rest);
+  };
+  const auto top = across(top_pairs), bottom = across(bottom_pairs);
+  const auto half = hn::Set(d32, kOne / 2);
+  const auto share = hn::ShiftRight<kFractionBits>(hn::Add(hn::Mul(y, hn::Sub(bottom, top)), half));
+  const auto level = hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), half));
+  const auto biased = hn::BitCast(words, hn::DemoteTo(half16, level));
+  return hn::Xor(biased, hn::Set(words, std::uint16_t{1} << 15));
+}
+
+/// What differs from one format to the next: the bytes that a load takes for a piece (at times more than it has), those
+/// of a lane of the calculation, and the levels of as many pieces as a vector holds, close together in each 16 bytes.
+template <class Pixel>
+struct Format;
+
+template <>
+struct Format<std::uint16_t> {
+  static constexpr std::size_t kPiece = 4, kLane = 4;
+  template <class D>
+  static HWY_INLINE auto levels(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+    return levels16(d, top, bottom, part_x, part_y);
+  }
+};
+
+template <>
+struct Format<Rgb16> {
+  static constexpr std::size_t kPiece = 16, kLane = 4;
+  template <class D>
+  static HWY_INLINE auto levels(D d, hn::Vec<D> top, hn::Vec<D> bottom, hn::Vec<D> part_x, hn::Vec<D> part_y) {
+    static constexpr Shuffle kPairs = in_each<16>({0, 1, 6, 7, 2, 3, 8, 9, 4, 5, 10, 11, kNone, kNone, kNone, kNone});
+    const auto pairs = load_shuffle(d, kPairs);
+    const auto rgb0 =
+        levels16(d, hn::TableLookupBytesOr0(top, pairs), hn::TableLookupBytesOr0(bottom, pairs), part_x, part_y);
+    static constexpr Shuffle kClose = in_each<16>({0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, kNone, kNone, kNone, kNone});
+    const hn::Half<D> half;
+    return hn::TableLookupBytes(hn::BitCast(half, rgb0), load_shuffle(half, kClose));
+  }
+};
+
+template <>
+struct Format<Rgb8> {
+  static constexpr std::size_t kPiece = 8, kLane = 2;
+  template <class D>
+  static HWY_INLINE auto levels(D d, hn::Vec<D> top_pieces, hn::Vec<D> bottom_pieces, hn::Vec<D> part_x,
+                                hn::Vec<D> part_y) {
+    const hn::Repartition<std::int16_t, D> d16;
+    const hn::Half<D> half;
+    static constexpr Shuffle kLeft = in_each<8>({0, kNone, 1, kNone, 2, kNone, kNone, kNone});
+    static constexpr Shuffle kRight = in_each<8>({3, kNone, 4, kNone, 5, kNone, kNone, kNone});
+    const auto across = [&](auto pieces) HWY_ATTR {
+      const auto left = hn::BitCast(d16, hn::TableLookupBytesOr0(pieces, load_shuffle(d, kLeft)));
+      const auto right = hn::BitCast(d16, hn::TableLookupBytesOr0(pieces, load_shuffle(d, kRight)));
+      return hn::Add(hn::ShiftLeft<kFractionBits>(left), hn::Mul(hn::BitCast(d16, part_x), hn::Sub(right, left)));
+    };
+    const auto top = across(top_pieces), bottom = across(bottom_pieces);
+    const auto share = hn::MulFixedPoint15(hn::Sub(bottom, top), hn::ShiftLeft<8>(hn::BitCast(d16, part_y)));
+    const auto level = hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), hn::Set(d16, kOne / 2)));
+    static constexpr Shuffle kClose = in_each<16>({0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, kNone, kNone, kNone, kNone});
+    return hn::TableLookupBytes(hn::DemoteTo(half, level), load_shuffle(half, kClose));
+  }
+};
+
+/// A piece of each pixel; `from` in bytes.
+template <std::size_t kPiece, class D>
+HWY_INLINE hn::Vec<D> load_pieces(D d, const std::uint8_t* from, const std::int32_t* offsets) {
+  constexpr std::size_t kPieces = hn::MaxLanes(D()) / kPiece;
+  if constexpr (kPieces > 1) {
+    const hn::Half<D> half;
+    const auto low = load_pieces<kPiece>(half, from, offsets);
+    return hn::Combine(d, load_pieces<kPiece>(half, from, offsets + kPieces / 2), low);
+  } else {
+    return hn::LoadU(d, from + *offsets);
+  }
+}
+
+/// The `kPixels` pixels of each 16 bytes, one after the other; may spoil `kSpoiled` behind the last.
+template <int kPixels, class D, class Pixel>
+HWY_INLINE void store_pixels(D d, hn::Vec<D> pixels, Pixel* out) {
+  if constexpr (hn::MaxLanes(D()) > static_cast<std::size_t>(kLoad)) {
+    const hn::Half<D> half;
+    store_pixels<kPixels>(half, hn::LowerHalf(half, pixels), out);
+    store_pixels<kPixels>(half, hn::UpperHalf(half, pixels), out + kPixels);
+  } else {
+    hn::StoreU(pixels, d, reinterpret_cast<std::uint8_t*>(out));
+  }
+}
+
+/// How many bytes behind its block's corner each pixel of a cell begins; 0 of unseen ones.
+template <class Pixel>
+HWY_INLINE std::array<std::int32_t, kCell> offsets_in(const Cell& cell, const Source<Pixel>& source) {
+  const hn::CappedTag<std::int32_t, kCell> d;
   const hn::Rebind<std::uint8_t, decltype(d)> bytes;
-  const hn::Rebind<std::uint16_t, decltype(d)> words;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  const Place corner = cell.corners[block];
-  const auto* const base = reinterpret_cast<const std::int32_t*>(source.data + corner.y * source.stride + corner.x);
-  const auto stride = hn::Set(d, static_cast<std::int32_t>(source.stride) * 2);
-  for (int at = block * kBlock; at < (block + 1) * kBlock; at += lanes) {
-    const auto code = hn::PromoteTo(d, hn::LoadU(bytes, cell.codes + at));
-    const auto seen = hn::Lt(code, hn::Set(d, kUnseen));
+  const auto row_bytes =
+      hn::Set(d, static_cast<std::int32_t>(source.stride) * static_cast<std::int32_t>(sizeof(Pixel)));
+  std::array<std::int32_t, kCell> offsets;
+  for (std::size_t i = 0; i < offsets.size(); i += hn::Lanes(d)) {
+    const auto code = hn::PromoteTo(d, hn::LoadU(bytes, cell.codes + i));
     const auto row = hn::And(hn::ShiftRight<4>(code), hn::Set(d, kLargestStep));
     const auto column = hn::And(code, hn::Set(d, 15));
-    const auto place = hn::Add(hn::Mul(row, stride), hn::ShiftLeft<1>(column));
-    const auto below = hn::Lt(row, hn::Set(d, source.height - 1 - corner.y));
-    const auto p = hn::GatherOffset(d, base, place);
-    const auto q = hn::GatherOffset(d, base, hn::Add(place, hn::IfThenElseZero(below, stride)));
-    const auto first = [&](auto pair) HWY_ATTR { return hn::And(pair, hn::Set(d, 0xFFFF)); };
-    const auto second = [&](auto pair) HWY_ATTR { return hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(u32, pair))); };
-    const auto level =
-        between_lanes(d, first(p), second(p), first(q), second(q), hn::PromoteTo(d, hn::LoadU(bytes, cell.part_x + at)),
-                      hn::PromoteTo(d, hn::LoadU(bytes, cell.part_y + at)));
-    hn::StoreU(hn::DemoteTo(words, hn::IfThenElseZero(seen, level)), words, out + at);
+    hn::StoreU(hn::Add(hn::Mul(row, row_bytes), hn::Mul(column, hn::Set(d, sizeof(Pixel)))), d, offsets.data() + i);
   }
+  return offsets;
 }
 
+/// A block that is not scattered and, with a row to spare, does not reach the last source row: loads may go a little
+/// beyond a row's end.
+template <class Pixel>
+HWY_INLINE void remap_block(const Cell& cell, const Source<Pixel>& source, const std::int32_t* offsets, int block,
+                            Pixel* out) {
+  using F = Format<Pixel>;
+  constexpr std::size_t kBytes = kBlock * F::kPiece;
+#if HWY_HAVE_SCALABLE
+  const hn::FixedTag<std::uint8_t, kLoad> d;
 #else
+  const hn::CappedTag<std::uint8_t, std::min<std::size_t>(kBytes, kBlocks * kLoad)> d;
+#endif
+  constexpr int kAtOnce = static_cast<int>(hn::MaxLanes(d) / F::kPiece);
 
-HWY_INLINE void remap_block16(const Cell& cell, const Source<std::uint16_t>& source, int block, std::uint16_t* out) {
-  for (int at = block * kBlock; at < (block + 1) * kBlock; ++at) remap_pixel(cell, at, source, out);
+  const Place corner = cell.corners[block];
+  const auto* const top = reinterpret_cast<const std::uint8_t*>(source.data + corner.y * source.stride + corner.x);
+  const auto* const bottom = top + source.stride * static_cast<std::ptrdiff_t>(sizeof(Pixel));
+
+  static constexpr Shuffle kNumbers = number_of_piece(F::kPiece, F::kLane);
+  const int half_cell = block / 2 * kLoad;
+  const auto parts_x = hn::LoadDup128(d, cell.part_x + half_cell), parts_y = hn::LoadDup128(d, cell.part_y + half_cell);
+  for (int i = 0; i < kBlock; i += kAtOnce) {
+    const auto first = static_cast<std::uint8_t>(block % 2 * kBlock + i);
+    const auto numbers = hn::Add(load_shuffle(d, kNumbers), hn::Set(d, first));
+    const auto pixels =
+        F::levels(d, load_pieces<F::kPiece>(d, top, offsets + i), load_pieces<F::kPiece>(d, bottom, offsets + i),
+                  hn::TableLookupBytesOr0(parts_x, numbers), hn::TableLookupBytesOr0(parts_y, numbers));
+    const hn::Half<decltype(d)> half;
+    store_pixels<static_cast<int>(2 * kLoad / F::kPiece)>(half, hn::BitCast(half, pixels), out + block * kBlock + i);
+  }
 }
 
-#endif  // HWY_TARGET <= HWY_AVX2
-
-void remap_cell(const Cell& cell, const Source<std::uint16_t>& source, std::uint16_t* out) {
+/// May spoil `kSpoiled` pixels behind the cell.
+template <class Pixel>
+HWY_INLINE void remap_cell(const Cell& cell, const Source<Pixel>& source, Pixel* out) {
+  const auto offsets = offsets_in(cell, source);
   for (int b = 0; b < kBlocks; ++b) {
-    if (cell.kinds[b] != kScattered) {
-      remap_block16(cell, source, b, out);
+    std::uint64_t codes;
+    std::memcpy(&codes, cell.codes + b * kBlock, sizeof codes);
+    constexpr std::uint64_t kAllUnseen = 0x8080808080808080;
+    if (cell.kinds[b] == kScattered || codes == kAllUnseen) {
+      std::fill_n(out + b * kBlock, kBlock, Pixel{});
+    } else if (cell.corners[b].y + cell.kinds[b] + 3 < source.height) {
+      remap_block(cell, source, offsets.data() + b * kBlock, b, out);
+      for (int at = b * kBlock; (codes & kAllUnseen) != 0 && at < (b + 1) * kBlock; ++at) {
+        if (cell.codes[at] == kUnseen) out[at] = Pixel{};
+      }
     } else {
-      std::fill_n(out + b * kBlock, kBlock, std::uint16_t{0});
+      for (int at = b * kBlock; at < (b + 1) * kBlock; ++at) remap_pixel(cell, at, source, out);
     }
   }
-}
-
-/// One pixel with all its channels: r g b of one column, then of the next. Writes four samples.
-HWY_INLINE void remap_colour(const std::uint8_t* p, const std::uint8_t* q, int part_x, int part_y, std::uint8_t* out) {
-  const hn::FixedTag<std::int16_t, 8> d;
-  const hn::Rebind<std::uint8_t, decltype(d)> bytes;
-  const auto across = [&](const std::uint8_t* from) HWY_ATTR {
-    const auto left = hn::PromoteTo(d, hn::LoadU(bytes, from));
-    const auto right = hn::ShiftRightBytes<6>(d, left);
-    return hn::Add(hn::ShiftLeft<kFractionBits>(left),
-                   hn::Mul(hn::Set(d, static_cast<std::int16_t>(part_x)), hn::Sub(right, left)));
-  };
-  const auto top = across(p), bottom = across(q);
-  const auto share = hn::MulFixedPoint15(hn::Sub(bottom, top), hn::Set(d, static_cast<std::int16_t>(part_y << 8)));
-  const auto level = hn::ShiftRight<kFractionBits>(hn::Add(hn::Add(top, share), hn::Set(d, kOne / 2)));
-  const hn::FixedTag<std::uint8_t, 4> four;
-  const hn::FixedTag<std::uint8_t, 8> eight;
-  hn::StoreU(hn::LowerHalf(four, hn::DemoteTo(eight, level)), four, out);
-}
-HWY_INLINE void remap_colour(const std::uint16_t* p, const std::uint16_t* q, int part_x, int part_y,
-                             std::uint16_t* out) {
-  const hn::FixedTag<std::int32_t, 4> d;
-  const hn::Rebind<std::uint16_t, decltype(d)> words;
-  const auto of = [&](const std::uint16_t* from) HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(words, from)); };
-  const auto level = between_lanes(d, of(p), of(p + 3), of(q), of(q + 3), hn::Set(d, part_x), hn::Set(d, part_y));
-  hn::StoreU(hn::DemoteTo(words, level), words, out);
-}
-
-template <class T>
-HWY_INLINE void remap_cell(const Cell& cell, const Source<Rgb<T> >& source, Rgb<T>* out) {
-  // Loads and stores reach a pixel further than they need: the last ones go the plain way.
-  const int last_column = source.width - 4;
-  for (int at = 0; at < kCell - 1; ++at) {
-    const int code = cell.codes[at];
-    const Place corner = cell.corners[at / kBlock];
-    const int x = corner.x + (code & 15), y = corner.y + (code >> 4);
-    if (code == kUnseen || cell.kinds[at / kBlock] == kScattered || x > last_column) {
-      remap_pixel(cell, at, source, out);
-      continue;
-    }
-    const Rgb<T>* const p = source.data + y * source.stride + x;
-    const Rgb<T>* const q = p + (y + 1 < source.height ? source.stride : 0);
-    remap_colour(&p->r, &q->r, cell.part_x[at], cell.part_y[at], &out[at].r);
-  }
-  remap_pixel(cell, kCell - 1, source, out);
 }
 
 #endif  // HWY_TARGET == HWY_SCALAR
 
+/// Asks the memory for the source row that the pixels of a cell are the first to look at, once a cache line.
 template <class Pixel>
-HWY_INLINE void remap_row(const Cell* cells, int width, const Source<Pixel>& source, Pixel* out) {
-  for (; width >= kCell; width -= kCell, out += kCell) remap_cell(*cells++, source, out);
-  if (width == 0) return;
-  std::array<Pixel, kCell> last;
-  remap_cell(*cells, source, last.data());
-  std::copy_n(last.data(), width, out);
+HWY_INLINE void fetch(const Cell& cell, const Source<Pixel>& source) {
+  constexpr int kBlocksALine = std::clamp(static_cast<int>(64 / sizeof(Pixel)) / kBlock, 1, kBlocks);
+  for (int b = 0; b < kBlocks; b += kBlocksALine) {
+    const Place corner = cell.corners[b];
+    hwy::Prefetch(source.data + std::min(corner.y + 2, source.height - 1) * source.stride + corner.x);
+  }
+}
+
+template <class Pixel>
+HWY_INLINE void remap_row(const Cell* cells, const Cell* ahead, int width, const Source<Pixel>& source, Pixel* out) {
+  for (; width >= kCell + kSpoiled; width -= kCell, out += kCell) {
+    fetch(*ahead++, source);
+    remap_cell(*cells++, source, out);
+  }
+  for (; width > 0; width -= kCell, out += kCell) {
+    fetch(*ahead++, source);
+    std::array<Pixel, kCell + kSpoiled> last;
+    remap_cell(*cells++, source, last.data());
+    std::copy_n(last.data(), std::min(width, kCell), out);
+  }
 }
 
 // Names without templates, for the dispatch tables.
-void gray8(const Cell* cells, int width, const Source<std::uint8_t>& source, std::uint8_t* out) {
-  remap_row(cells, width, source, out);
+void gray8(const Cell* cells, const Cell* ahead, int width, const Source<std::uint8_t>& source, std::uint8_t* out) {
+  remap_row(cells, ahead, width, source, out);
 }
-void gray16(const Cell* cells, int width, const Source<std::uint16_t>& source, std::uint16_t* out) {
-  remap_row(cells, width, source, out);
+void gray16(const Cell* cells, const Cell* ahead, int width, const Source<std::uint16_t>& source, std::uint16_t* out) {
+  remap_row(cells, ahead, width, source, out);
 }
-void colour8(const Cell* cells, int width, const Source<Rgb8>& source, Rgb8* out) {
-  remap_row(cells, width, source, out);
+void colour8(const Cell* cells, const Cell* ahead, int width, const Source<Rgb8>& source, Rgb8* out) {
+  remap_row(cells, ahead, width, source, out);
 }
-void colour16(const Cell* cells, int width, const Source<Rgb16>& source, Rgb16* out) {
-  remap_row(cells, width, source, out);
+void colour16(const Cell* cells, const Cell* ahead, int width, const Source<Rgb16>& source, Rgb16* out) {
+  remap_row(cells, ahead, width, source, out);
 }
 
 }  // namespace spartan::remap::HWY_NAMESPACE

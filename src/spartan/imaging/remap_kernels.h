@@ -1,7 +1,8 @@
 // The inner loop of the rectification, one version per instruction set.
 //
 // Neighbours in the rectified view look at neighbours in the source. So eight pixels of a row share a block: they are
-// fetched by one 16-byte load a source row and a byte shuffle, where a gather would take sixteen loads.
+// fetched by one 16-byte load a source row and a byte shuffle, where a gather would take sixteen loads. That is for
+// gray of 8 bits; of the other kinds of pixels a load brings two neighbours with all their channels.
 #pragma once
 
 #include <cstddef>
@@ -79,13 +80,15 @@ inline Place place_of(const Cell& cell, int at) {
           static_cast<std::int16_t>(corner.y + (cell.codes[at] >> 4))};
 }
 
-/// Fill `width` pixels of a row of the result; those of scattered blocks become 0. Colours go pixel by pixel, all
-/// channels and both columns in one load.
+/// Fill `width` pixels of a row of the result from the cells of the table's row; those of scattered blocks become 0.
+/// `ahead`: the cells of a row that comes soon, whose source is asked of the memory meanwhile. A view that is turned
+/// goes from source row to source row, which the processor does not foresee.
 struct Kernels {
-  void (*gray8)(const Cell* cells, int width, const Source<std::uint8_t>& source, std::uint8_t* out);
-  void (*gray16)(const Cell* cells, int width, const Source<std::uint16_t>& source, std::uint16_t* out);
-  void (*colour8)(const Cell* cells, int width, const Source<Rgb8>& source, Rgb8* out);
-  void (*colour16)(const Cell* cells, int width, const Source<Rgb16>& source, Rgb16* out);
+  void (*gray8)(const Cell* cells, const Cell* ahead, int width, const Source<std::uint8_t>& source, std::uint8_t* out);
+  void (*gray16)(const Cell* cells, const Cell* ahead, int width, const Source<std::uint16_t>& source,
+                 std::uint16_t* out);
+  void (*colour8)(const Cell* cells, const Cell* ahead, int width, const Source<Rgb8>& source, Rgb8* out);
+  void (*colour16)(const Cell* cells, const Cell* ahead, int width, const Source<Rgb16>& source, Rgb16* out);
 };
 
 /// The kernels of one instruction set; see simd_target_index().
