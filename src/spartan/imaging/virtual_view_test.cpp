@@ -36,6 +36,16 @@ RemapTable table_of(const Camera& camera, const Rectification& plan, const Eigen
   return {camera.model, camera.size, plan.geometry, turn, {}, Workers(2), plan.depth_m};
 }
 
+double seen_share(const RemapTable& table) {
+  const auto mask = table.mask();
+  if (mask.empty()) return 1;
+  int seen = 0;
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) seen += mask(x, y) != 0 ? 1 : 0;
+  }
+  return static_cast<double>(seen) / (mask.width() * mask.height());
+}
+
 bool all_seen(const Rectification& plan) {
   return table_of(kLeft, plan, plan.left_from_rectified).mask().empty() &&
          table_of(kRight, plan, plan.right_from_rectified).mask().empty();
@@ -130,6 +140,32 @@ TEST(VirtualView, KeepResolutionTakesSizeAndFocalLengthAsTheyAre) {
   EXPECT_NEAR(larger->geometry.centre_px.x() - natural->geometry.centre_px.x(), 70, 1e-9);
   EXPECT_NEAR(larger->geometry.centre_px.y() - natural->geometry.centre_px.y(), 40, 1e-9);
   EXPECT_EQ(planned({ViewPolicy::keep_resolution, {}, 99})->geometry.focal_px, 99);
+}
+
+// An eye that stands before the other one turns the common axes away from where both look.
+TEST(VirtualView, EyesThatLeanTheSameWayKeepTheirView) {
+  struct Leaning {
+    double focal_px, ahead_m;
+  };
+  for (const auto& [focal_px, ahead_m] : {Leaning{300, 0.05}, {300, 0.08}, {450, 0.08}, {900, 0.014}, {900, 0.03}}) {
+    SCOPED_TRACE(::testing::Message() << "f " << focal_px << " px, " << ahead_m << " m ahead");
+    const Camera eye = camera_with(PinholeModel{focal_px, focal_px, 79.5, 59.5});
+    const auto plan =
+        plan_rectification(eye, eye, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, ahead_m}).inverse(), "pair", {});
+    ASSERT_TRUE(plan) << plan.error().message();
+    for (const auto& turn : {plan->left_from_rectified, plan->right_from_rectified}) {
+      EXPECT_GT(seen_share(table_of(eye, *plan, turn)), 0.99);
+    }
+  }
+}
+
+// A sensor beside its lens' axis, as of a shifted lens or a cut-out picture.
+TEST(VirtualView, APictureBesideItsLensAxisIsShown) {
+  const Camera eye = camera_with(PinholeModel{300, 300, 500, 60});
+  const auto plan =
+      plan_rectification(eye, eye, Pose(exp_so3({0, 0.01, 0}), {0.1, 0, 0}).inverse(), "pair", VirtualView{});
+  ASSERT_TRUE(plan) << plan.error().message();
+  EXPECT_GT(seen_share(table_of(eye, *plan, plan->left_from_rectified)), 0.9);
 }
 
 TEST(VirtualView, RectifiedImagesPassUnlessAViewIsChosen) {
