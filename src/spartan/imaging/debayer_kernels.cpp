@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "spartan/imaging/debayer.h"
+#include "spartan/core/luma.h"
 
 // Compiled once per instruction set: Highway includes this file again for each.
 #undef HWY_TARGET_INCLUDE

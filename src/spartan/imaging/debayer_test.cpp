@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
+#include "spartan/core/luma.h"
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/core/random.h"
 #include "spartan/core/simd_target.h"

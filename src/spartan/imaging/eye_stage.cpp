@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "spartan/core/image_io.h"
+#include "spartan/core/luma.h"
 
 namespace spartan {
 namespace {
@@ -72,10 +73,7 @@ Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& pla
     eye.light_ = std::move(*light);
   }
   // A gray image as it came is not copied.
-  if (eye.has_colours() || eye.light_) {
-    if (eye.is_deep()) eye.gray16_ = Image<std::uint16_t>(camera.size);
-    if (!eye.is_deep()) eye.gray8_ = Image<std::uint8_t>(camera.size);
-  }
+  if (camera.pixel_format.layout != PixelLayout::gray || eye.light_) eye.make_gray_buffer();
   if (plan.passes_through) {
     eye.self_mask_ = std::move(*mask);
     return eye;
@@ -85,8 +83,17 @@ Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& pla
   return eye;
 }
 
+void EyeStage::make_gray_buffer() {
+  if (is_deep() && gray16_.empty()) gray16_ = Image<std::uint16_t>(camera_.size);
+  if (!is_deep() && gray8_.empty()) gray8_ = Image<std::uint8_t>(camera_.size);
+}
+
 Status EyeStage::check(const FrameImage& image, const std::string& where) const {
-  if (image.size() == camera_.size && image.format() == camera_.pixel_format) return {};
+  PixelFormat taken = image.format();
+  // Of many calibration files nobody can say that the pictures have colours.
+  const bool reduced = taken.layout == PixelLayout::rgb && camera_.pixel_format.layout == PixelLayout::gray;
+  if (reduced) taken.layout = PixelLayout::gray;
+  if (image.size() == camera_.size && taken == camera_.pixel_format) return {};
   return failure(ErrorCode::input,
                  fmt::format("the image of camera '{}' is {}, the rig says {}", camera_.name,
                              describe(image.size(), image.format()), describe(camera_.size, camera_.pixel_format)),
@@ -95,7 +102,7 @@ Status EyeStage::check(const FrameImage& image, const std::string& where) const 
 
 template <class T>
 ImageView<const T> EyeStage::to_gray(const FrameImage& image, Image<T>& buffer, const Workers& workers) const {
-  const PixelLayout layout = camera_.pixel_format.layout;
+  const PixelLayout layout = image.format().layout;
   if (layout == PixelLayout::gray) return image.as<T>();
   if (layout == PixelLayout::rgb) {
     reduce_to_luma<T>(image.as<Rgb<T>>(), buffer, workers);
@@ -106,6 +113,7 @@ ImageView<const T> EyeStage::to_gray(const FrameImage& image, Image<T>& buffer, 
 }
 
 void EyeStage::make_gray(const FrameImage& image, const Workers& workers) {
+  if (image.format().layout != PixelLayout::gray) make_gray_buffer();
   if (is_deep()) {
     gray16_view_ = to_gray<std::uint16_t>(image, gray16_, workers);
   } else {

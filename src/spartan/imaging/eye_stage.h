@@ -29,10 +29,9 @@ class EyeStage {
                                  const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
                                  const std::string& mask_folder, const Workers& workers);
 
-  /// Code `input` where the image has another size or format than the camera.
+  /// Code `input` where the image has another size or format than the camera. A gray camera's image may be RGB.
   Status check(const FrameImage& image, const std::string& where) const;
 
-  bool has_colours() const { return camera_.pixel_format.layout != PixelLayout::gray; }
   bool has_vignetting() const { return light_.has_value(); }
   bool has_local_contrast() const { return local_.has_value(); }
   bool is_resampled() const { return table_.has_value(); }
@@ -51,6 +50,7 @@ class EyeStage {
 
  private:
   EyeStage(const Camera& camera, const ImagingOptions& options);
+  void make_gray_buffer();
   bool is_deep() const { return camera_.pixel_format.bits > 8; }
   ImageView<const std::uint8_t> working() const { return local_ ? equalised_.view() : mapped_.view(); }
   template <class T>

@@ -93,7 +93,8 @@ struct Imager::State {
       right.make_gray(frame.right, workers);
     };
     // A gray image only has to be pointed at.
-    const bool has_colours = left.has_colours() || right.has_colours();
+    const bool has_colours =
+        frame.left.format().layout != PixelLayout::gray || frame.right.format().layout != PixelLayout::gray;
     step("imaging.debayer", has_colours, make_gray);
     if (!has_colours) make_gray();
     step("imaging.vignetting", left.has_vignetting() || right.has_vignetting(), [&] {

@@ -27,7 +27,7 @@ class Imager {
   ~Imager();
 
   /// The views in the result are valid until the next call for the same pair. Code `input` where the frame's pair
-  /// is unknown or its images have another size or format than the rig says.
+  /// is unknown or its images have another size or format than the rig says. RGB images of a gray camera become gray.
   Result<RectifiedPair> process(const StereoFrame& frame);
 
   /// Geometry of a pair's rectified view. Throws on an unknown name.

@@ -124,6 +124,28 @@ TEST(Imager, RefusesFramesThatDoNotFitTheRig) {
   EXPECT_THAT(refusal(unknown), HasSubstr("no stereo pair 'mast'"));
 }
 
+TEST(Imager, ColoursOfAGrayCameraAreReduced) {
+  auto imager = Imager::create(rig_with({}), {}, Workers(1));
+  ASSERT_TRUE(imager);
+  const auto gray = ramp<std::uint8_t>(2);
+  Image<Rgb8> colour(kSize);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) colour(x, y) = {gray(x, y), gray(x, y), gray(x, y)};
+  }
+  const auto from_gray =
+      imager->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::borrow(gray.view(), {})));
+  const auto expected = Image<std::uint8_t>::copy_of(from_gray->left);
+  const PixelFormat rgb{PixelLayout::rgb, 8};
+  const auto from_colour =
+      imager->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::own(std::move(colour), rgb)));
+  ASSERT_TRUE(from_colour) << from_colour.error().message();
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) ASSERT_EQ(from_colour->right(x, y), expected(x, y));
+  }
+  EXPECT_FALSE(Imager::create(rig_with(rgb), {}, Workers(1))
+                   ->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::borrow(gray.view(), {}))));
+}
+
 TEST(Imager, LoadsSelfMasks) {
   const testing::TemporaryFolder folder;
   Image<std::uint8_t> mask(kSize.width, kSize.height, 255);
