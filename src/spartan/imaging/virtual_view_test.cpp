@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "spartan/imaging/rectification.h"
@@ -107,6 +108,17 @@ TEST(VirtualView, WholeViewHoldsEveryBorderPixelOfBothSensors) {
       }
     }
     EXPECT_LT(nearest_to_border, 0.1) << "no larger than needed";
+  }
+}
+
+TEST(VirtualView, WholeViewOfEqualEyesMasksNothing) {
+  for (const auto& [f, x, y] : {std::array{125.0, 79.5, 59.5}, {125.325, 77.675, 61.275}, {114.6635, 91.80375, 62.1}}) {
+    const Camera eye = camera_with(PinholeModel{f, f, x, y});
+    const auto plan = plan_rectification(eye, eye, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse(), "pair",
+                                         {ViewPolicy::whole_view, kSize});
+    ASSERT_TRUE(plan && !plan->passes_through);
+    EXPECT_TRUE(table_of(eye, *plan, plan->left_from_rectified).mask().empty()) << f;
+    EXPECT_TRUE(table_of(eye, *plan, plan->right_from_rectified).mask().empty()) << f;
   }
 }
 
