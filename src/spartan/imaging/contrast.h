@@ -17,9 +17,10 @@ class GrayHistogram {
   explicit GrayHistogram(PixelFormat format);
 
   void clear();
-  /// Samples as the format stores them (low or high alignment).
-  void add(ImageView<const std::uint8_t> image);
-  void add(ImageView<const std::uint16_t> image);
+  /// Samples as the format stores them (low or high alignment), where `mask` (of the image's size, or empty) is not 0.
+  /// Throws where the sizes differ.
+  void add(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask = {});
+  void add(ImageView<const std::uint16_t> image, ImageView<const std::uint8_t> mask = {});
 
   /// All samples of another histogram of the same depth, their levels times `gain`.
   void add(const GrayHistogram& other, double gain);
@@ -28,6 +29,7 @@ class GrayHistogram {
   int percentile(double percent) const;
   /// The same between the levels: a level's samples fill the interval of half a level to either side evenly.
   double quantile(double percent) const;
+  bool empty() const { return total_ == 0; }
   int levels() const { return static_cast<int>(counts_.size()); }
 
  private:
@@ -48,8 +50,9 @@ class ContrastMapping {
   /// The whole range of the format to 0 … 255; for 8 bits the identity.
   explicit ContrastMapping(PixelFormat format);
 
-  /// Makes the percentiles black and white. A picture that fills the range already stays as it is, one of a single
-  /// level is only scaled, and the range is never fewer than kLeastLevels levels: noise does not become a picture.
+  /// Makes the percentiles black and white; an empty histogram only scales. A picture that fills the range already
+  /// stays as it is, one of a single level is only scaled, and the range is never fewer than kLeastLevels levels: noise
+  /// does not become a picture.
   void stretch(const GrayHistogram& histogram, double low_percent, double high_percent);
 
   /// What `other` does, of samples that are multiplied by `gain` first.

@@ -38,6 +38,19 @@ TEST(Contrast, PercentilesCountSamples) {
   EXPECT_EQ(histogram.percentile(100), 109);
 }
 
+TEST(Contrast, OnlyWhatTheMaskShowsIsCounted) {
+  const auto image = ramp<std::uint8_t>(10, 109);
+  Image<std::uint8_t> mask(image.size());
+  for (int x = 50; x < 100; ++x) mask(x, 2) = 1;
+  GrayHistogram histogram({});
+  EXPECT_TRUE(histogram.empty());
+  histogram.add(image, mask);
+  EXPECT_EQ(histogram.percentile(0), 60);
+  EXPECT_EQ(histogram.percentile(50), 85);
+  EXPECT_EQ(histogram.percentile(100), 109);
+  EXPECT_THROW(histogram.add(image, mask.view().crop(0, 0, 5, 4)), std::invalid_argument);
+}
+
 TEST(Contrast, AFullRangeStaysAsItIs) {
   const auto image = ramp<std::uint8_t>(0, 255);
   const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);

@@ -6,6 +6,7 @@
 
 #include "spartan/core/image_io.h"
 #include "spartan/core/luma.h"
+#include "spartan/imaging/view_footprint.h"
 
 namespace spartan {
 namespace {
@@ -27,6 +28,12 @@ void reduce_to_luma(ImageView<const Rgb<T>> colour, ImageView<T> gray, const Wor
       for (int x = 0; x < colour.width(); ++x) out[x] = luma(in[x]);
     }
   });
+}
+
+void keep_where(ImageView<std::uint8_t> pixels, ImageView<const std::uint8_t> mask) {
+  for (int y = 0; y < pixels.height(); ++y) {
+    for (int x = 0; x < pixels.width(); ++x) pixels(x, y) &= mask(x, y);
+  }
 }
 
 Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::string& folder) {
@@ -74,12 +81,13 @@ Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& pla
   }
   // A gray image as it came is not copied.
   if (camera.pixel_format.layout != PixelLayout::gray || eye.light_) eye.make_gray_buffer();
-  if (plan.passes_through) {
-    eye.self_mask_ = std::move(*mask);
-    return eye;
-  }
-  eye.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, *mask, workers, plan.depth_m);
+  eye.self_mask_ = std::move(*mask);
+  if (plan.passes_through) return eye;
+  eye.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, eye.self_mask_, workers,
+                     plan.depth_m);
   eye.result_ = Image<std::uint8_t>(plan.geometry.size);
+  eye.counted_ = view_footprint(camera, plan.geometry, camera_from_rectified, plan.depth_m);
+  if (!eye.self_mask_.empty()) keep_where(eye.counted_, eye.self_mask_);
   return eye;
 }
 
@@ -133,8 +141,9 @@ void EyeStage::correct_light(const Workers& workers) {
 }
 
 void EyeStage::count(GrayHistogram& histogram) const {
-  if (is_deep()) return histogram.add(gray16_view_);
-  histogram.add(gray8_view_);
+  const auto where = counted_.empty() ? self_mask_.view() : counted_.view();
+  if (is_deep()) return histogram.add(gray16_view_, where);
+  histogram.add(gray8_view_, where);
 }
 
 void EyeStage::map(const ContrastMapping& mapping, const Workers& workers) {

@@ -39,6 +39,8 @@ class EyeStage {
   /// Sensor → gray of the same depth.
   void make_gray(const FrameImage& image, const Workers& workers);
   void correct_light(const Workers& workers);
+  /// The gray levels of what the view shows and is not the rover itself: neither its body nor the black around a
+  /// fisheye's picture says how bright the ground is.
   void count(GrayHistogram& histogram) const;
   /// Gray → 8-bit working image.
   void map(const ContrastMapping& mapping, const Workers& workers);
@@ -61,7 +63,8 @@ class EyeStage {
   std::optional<LightCorrection> light_;
   std::optional<LocalContrast> local_;
   std::optional<RemapTable> table_;
-  Image<std::uint8_t> gray8_, mapped_, equalised_, result_, self_mask_;
+  Image<std::uint8_t> gray8_, mapped_, equalised_, result_;
+  Image<std::uint8_t> self_mask_, counted_;  ///< of the sensor, 0 where not; empty: everything
   Image<std::uint16_t> gray16_;
   ImageView<const std::uint8_t> gray8_view_;
   ImageView<const std::uint16_t> gray16_view_;

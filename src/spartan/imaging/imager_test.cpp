@@ -171,6 +171,59 @@ TEST(Imager, LoadsSelfMasks) {
   }
 }
 
+// Both eyes see the same, but for the rover's body at the lower border of the right one.
+TEST(Imager, TheRoverItselfDoesNotChangeTheBalance) {
+  const testing::TemporaryFolder folder;
+  Image<std::uint8_t> scene(kSize), with_body(kSize), mask(kSize.width, kSize.height, 255);
+  for (const double share : {0.1, 0.2, 0.3}) {
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        const bool body = y >= (1 - share) * kSize.height;
+        scene(x, y) = static_cast<std::uint8_t>(90 + (x * 37 + y * 11) % 101);
+        with_body(x, y) = body ? 25 : scene(x, y);
+        mask(x, y) = body ? 0 : 255;
+      }
+    }
+    ASSERT_TRUE(write_png(folder.file("body.png"), mask.view()));
+    for (const double turn : {0.0, 0.002}) {
+      Rig rig = rig_with({}, {0, turn, 0});
+      rig.cameras[1].self_mask = "body.png";
+      auto imager = Imager::create(rig, {}, Workers(1), folder.path());
+      ASSERT_TRUE(imager) << imager.error().message();
+      const auto pair =
+          imager->process(frame_of(FrameImage::own(scene.clone(), {}), FrameImage::own(with_body.clone(), {})));
+      ASSERT_TRUE(pair);
+      double sum = 0;
+      for (int y = 2; y < 30; ++y) {
+        for (int x = 2; x < 60; ++x) sum += pair->right(x, y) - pair->left(x, y);
+      }
+      EXPECT_NEAR(sum / (28 * 58), 0, 1) << share << " of the eye, turned by " << turn;
+    }
+  }
+}
+
+TEST(Imager, WhatTheViewDoesNotShowDoesNotChangeItsLevels) {
+  const CameraModel fisheye = EquidistantModel({20, 20, 31.5, 23.5}, {});  // 88° at 31 px
+  const Rig rig = rig_of_one_pair("test", camera("left", {}, fisheye), camera("right", {}, fisheye),
+                                  Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse());
+  auto imager = Imager::create(rig, {}, Workers(1));
+  ASSERT_TRUE(imager) << imager.error().message();
+  const auto seen_with = [&](int surround) {
+    auto picture = ramp<std::uint8_t>(1);
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        if (std::hypot(x - 31.5, y - 23.5) > 33) picture(x, y) = static_cast<std::uint8_t>(surround);
+      }
+    }
+    const auto image = FrameImage::own(std::move(picture), {});
+    return Image<std::uint8_t>::copy_of(imager->process(frame_of(image, image))->left);
+  };
+  const auto black = seen_with(0), white = seen_with(255);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) ASSERT_EQ(black(x, y), white(x, y)) << x << ", " << y;
+  }
+}
+
 TEST(Imager, ChoosesTheViewThatIsAskedFor) {
   const Rig rig = rig_with({}, {0, 0.02, 0});
   const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
