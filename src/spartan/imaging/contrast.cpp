@@ -132,10 +132,10 @@ void ContrastMapping::stretch(const GrayHistogram& histogram, double low_percent
   if (histogram.empty()) return set_range(0, last);
   int low = histogram.percentile(low_percent);
   int high = std::max(histogram.percentile(high_percent), low);
-  if (low == high) return set_range(0, last);
-  if (high - low < kLeastLevels) {
-    low = std::clamp((low + high - kLeastLevels) / 2, 0, last - kLeastLevels);
-    high = low + kLeastLevels;
+  const int least = std::max(16, histogram.levels() / 16);
+  if (high - low < least) {
+    low = std::clamp((low + high - least) / 2, 0, last - least);
+    high = low + least;
   }
   set_range(low, high);
 }

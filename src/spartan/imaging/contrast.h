@@ -51,8 +51,8 @@ class ContrastMapping {
   explicit ContrastMapping(PixelFormat format);
 
   /// Makes the percentiles black and white; an empty histogram only scales. A picture that fills the range already
-  /// stays as it is, one of a single level is only scaled, and the range is never fewer than kLeastLevels levels: noise
-  /// does not become a picture.
+  /// stays as it is, and the range is never less than a sixteenth of the format's, with the percentiles in its middle:
+  /// noise does not become a picture.
   void stretch(const GrayHistogram& histogram, double low_percent, double high_percent);
 
   /// What `other` does, of samples that are multiplied by `gain` first.
@@ -62,8 +62,6 @@ class ContrastMapping {
   /// `result` has the size of `image`; rows are shared among the workers.
   void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
   void apply(ImageView<const std::uint16_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
-
-  static constexpr int kLeastLevels = 16;
 
  private:
   void set_range(int low, int high, double gain = 1);

@@ -88,16 +88,35 @@ TEST(Contrast, SixteenBitsWithoutStretchAreScaled) {
   EXPECT_EQ(mapping(65535), 255);
 }
 
-TEST(Contrast, AConstantPictureKeepsItsLevel) {
-  const Image<std::uint8_t> image(8, 8, 77);
-  EXPECT_EQ(stretched<std::uint8_t>({}, image, image)(77), 77);
+// One grain of noise more or less must not change the whole picture.
+TEST(Contrast, AConstantPictureIsMappedLikeANearlyConstantOne) {
+  for (const int level : {0, 3, 77, 250, 254}) {
+    SCOPED_TRACE(level);
+    Image<std::uint8_t> image(40, 50, static_cast<std::uint8_t>(level));
+    const int constant = stretched<std::uint8_t>({}, image, image)(level);
+    for (int x = 0; x < 4; ++x) image(x, 7) = static_cast<std::uint8_t>(level + 1);  // 0.2 %
+    EXPECT_NEAR(stretched<std::uint8_t>({}, image, image)(level), constant, 8) << "half of a level, stretched";
+  }
+  const Image<std::uint8_t> black(8, 8, 0), white(8, 8, 255);
+  EXPECT_EQ(stretched<std::uint8_t>({}, black, black)(0), 0);
+  EXPECT_EQ(stretched<std::uint8_t>({}, white, white)(255), 255);
 }
 
 TEST(Contrast, NoiseIsNotBlownUp) {
-  const auto image = ramp<std::uint8_t>(100, 103);
-  const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);
-  EXPECT_LE(mapping(103) - mapping(100), 3 * 255 / ContrastMapping::kLeastLevels + 1);
-  EXPECT_NEAR(0.5 * (mapping(103) + mapping(100)), 127, 10);
+  // The same flat picture at any depth: ± 0.3 % of the scale.
+  for (const int bits : {8, 10, 12, 14, 16}) {
+    SCOPED_TRACE(bits);
+    const PixelFormat format{PixelLayout::gray, bits};
+    const int middle = (2000 << bits) >> 12, spread = std::max(1, (12 << bits) >> 12);
+    const auto image = ramp<std::uint16_t>(middle - spread, middle + spread);
+    GrayHistogram histogram(format);
+    histogram.add(image);
+    ContrastMapping mapping(format);
+    mapping.stretch(histogram, 0.1, 99.9);
+    EXPECT_NEAR(mapping(middle), 127.5, 8);
+    EXPECT_LE(mapping(middle + spread) - mapping(middle - spread), 33);
+    EXPECT_GE(mapping(middle + spread) - mapping(middle - spread), 20);
+  }
 }
 
 TEST(Contrast, QuantilesLieBetweenLevels) {
