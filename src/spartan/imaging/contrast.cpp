@@ -91,7 +91,7 @@ double GrayHistogram::quantile(double percent) const {
   return 0;
 }
 
-double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
+double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right) {
   // Below this the level of black, which nobody states, would decide.
   const double least = left.levels() / 32.0, most = left.levels() - 1.5;
   std::vector<double> ratios;
@@ -103,8 +103,16 @@ double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
   if (ratios.size() < 5) return 1;
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
-  constexpr double kLeastDifference = 0.05;  // less comes from what only one eye sees
-  return std::abs(*middle - 1) < kLeastDifference ? 1 : std::clamp(*middle, 0.5, 2.0);
+  return *middle;
+}
+
+double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
+  constexpr double kDoubt = 0.05;  // as much may come from what only one eye sees
+  const double ratio = brightness_ratio(left, right);
+  const double difference = std::max(ratio, 1 / ratio) - 1;
+  if (difference <= kDoubt) return 1;
+  const double gain = std::min(1 + difference - kDoubt * kDoubt / difference, 2.0);
+  return ratio > 1 ? gain : 1 / gain;
 }
 
 int GrayHistogram::percentile(double percent) const {

@@ -38,10 +38,16 @@ class GrayHistogram {
   std::vector<std::uint64_t> counts_;
 };
 
-/// By what factor the right eye's gray levels are to be multiplied to be as bright as the left one's: the median, over
-/// the percentiles 10 … 90, of the left level over the right one. Both eyes see the same ground but for a strip at the
-/// sides, so their histograms differ by exposure and gain above all. 1 where it is within 5 % of that or the levels are
-/// too few or too low to tell, never outside ½ … 2. Histograms of the same depth.
+/// How much brighter the left eye is: the median, over the percentiles 10 … 90, of the left level over the right one.
+/// Both eyes see the same ground but for strips at the sides, so their histograms differ by exposure and gain above
+/// all; the strips make it up to 5 % wrong. 1 where the levels are too few or too low to tell. Histograms of the same
+/// depth.
+double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right);
+
+/// By what factor the right eye's gray levels are to be multiplied to be as bright as the left one's. With the ratio
+/// 1 + r (or its inverse, whichever is larger) it is 1 + r − 0.05²/r, and 1 where r < 0.05: what may come from the
+/// strips is not believed, and there is no jump between frames whose ratios are alike (the non-negative garrote:
+/// Breiman, "Better subset regression using the nonnegative garrote", Technometrics 1995). Never outside ½ … 2.
 double gain_between(const GrayHistogram& left, const GrayHistogram& right);
 
 /// A table from stored samples to 8-bit gray levels. Levels from `low` to `high` go linearly to 0 … 255.

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "spartan/core/random.h"
 
 namespace spartan {
 namespace {
@@ -144,6 +147,38 @@ TEST(Contrast, TheGainBetweenTheEyesIsFound) {
   EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.97)), 1) << "too little to mean anything";
   EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.4)), 2) << "no more than twice";
   EXPECT_EQ(gain_between(histogram_of(0.05), histogram_of(0.1)), 1) << "too dark to tell";
+}
+
+GrayHistogram noisy_ramp(double factor, std::uint64_t seed) {
+  Random random(seed);
+  Image<std::uint8_t> image(160, 100);
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      image(x, y) = static_cast<std::uint8_t>(std::lround(factor * (40 + x) + 2 * random.normal()));
+    }
+  }
+  GrayHistogram histogram({});
+  histogram.add(image);
+  return histogram;
+}
+
+// Frames of a still scene must not flicker, wherever the true ratio lies.
+TEST(Contrast, TheGainFollowsTheRatioWithoutJumps) {
+  for (const double ratio : {0.93, 0.95, 1.0, 1.04, 1.05, 1.06, 1.1}) {
+    double low = 2, high = 0, low_ratio = 2, high_ratio = 0;
+    for (std::uint64_t frame = 0; frame < 8; ++frame) {
+      const auto left = noisy_ramp(ratio, 2 * frame), right = noisy_ramp(1, 2 * frame + 1);
+      const double gain = gain_between(left, right), estimate = brightness_ratio(left, right);
+      EXPECT_NEAR(estimate, ratio, 0.006);
+      EXPECT_NEAR(gain * gain_between(right, left), 1, 1e-12) << "neither eye is preferred";
+      EXPECT_LE(std::abs(gain - 1), std::abs(estimate - 1));
+      low = std::min(low, gain);
+      high = std::max(high, gain);
+      low_ratio = std::min(low_ratio, estimate);
+      high_ratio = std::max(high_ratio, estimate);
+    }
+    EXPECT_LE(high - low, 2.2 * (high_ratio - low_ratio)) << ratio;
+  }
 }
 
 TEST(Contrast, AFollowingMappingDoesTheSameToScaledSamples) {
