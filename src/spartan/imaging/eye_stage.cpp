@@ -70,7 +70,7 @@ EyeStage::EyeStage(const Camera& camera, const ImagingOptions& options)
 
 Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& plan,
                                   const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
-                                  const std::string& mask_folder, const Workers& workers) {
+                                  const std::string& mask_folder, const Workers& workers, const std::string& where) {
   auto mask = load_self_mask(camera, mask_folder);
   if (!mask) return failure(mask);
   EyeStage eye(camera, options);
@@ -82,13 +82,32 @@ Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& pla
   // A gray image as it came is not copied.
   if (camera.pixel_format.layout != PixelLayout::gray || eye.light_) eye.make_gray_buffer();
   eye.self_mask_ = std::move(*mask);
-  if (plan.passes_through) return eye;
+  if (plan.passes_through) {
+    if (Status status = eye.check_mask(where); !status) return failure(status);
+    return eye;
+  }
   eye.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, eye.self_mask_, workers,
                      plan.depth_m);
+  if (Status status = eye.check_mask(where); !status) return failure(status);
   eye.result_ = Image<std::uint8_t>(plan.geometry.size);
   eye.counted_ = view_footprint(camera, plan.geometry, camera_from_rectified, plan.depth_m);
   if (!eye.self_mask_.empty()) keep_where(eye.counted_, eye.self_mask_);
   return eye;
+}
+
+Status EyeStage::check_mask(const std::string& where) const {
+  constexpr double kLeastPercent = 1;
+  const auto seen = mask();
+  if (seen.empty()) return {};
+  std::int64_t count = 0;
+  for (int y = 0; y < seen.height(); ++y) {
+    for (int x = 0; x < seen.width(); ++x) count += seen(x, y) != 0 ? 1 : 0;
+  }
+  const double percent = 100 * static_cast<double>(count) / (static_cast<double>(seen.width()) * seen.height());
+  if (percent >= kLeastPercent) return {};
+  return failure(ErrorCode::configuration, fmt::format("camera '{}' sees {:.1f} % of the view", camera_.name, percent),
+                 where,
+                 "check the transforms of the two cameras and the self-masks, or choose another view (imaging.view)");
 }
 
 void EyeStage::make_gray_buffer() {

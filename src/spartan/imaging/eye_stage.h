@@ -24,10 +24,11 @@ namespace spartan {
 /// leave are valid until the next image.
 class EyeStage {
  public:
-  /// Code `configuration` where the self-mask cannot be read or the vignetting leaves no light.
+  /// Code `configuration` where the self-mask cannot be read, the vignetting leaves no light or the eye sees less than
+  /// 1 % of the view. `where` names the pair in the last of these.
   static Result<EyeStage> create(const Camera& camera, const Rectification& plan,
                                  const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
-                                 const std::string& mask_folder, const Workers& workers);
+                                 const std::string& mask_folder, const Workers& workers, const std::string& where);
 
   /// Code `input` where the image has another size or format than the camera. A gray camera's image may be RGB.
   Status check(const FrameImage& image, const std::string& where) const;
@@ -52,6 +53,7 @@ class EyeStage {
 
  private:
   EyeStage(const Camera& camera, const ImagingOptions& options);
+  Status check_mask(const std::string& where) const;
   void make_gray_buffer();
   bool is_deep() const { return camera_.pixel_format.bits > 8; }
   ImageView<const std::uint8_t> working() const { return local_ ? equalised_.view() : mapped_.view(); }

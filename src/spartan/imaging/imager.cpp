@@ -71,9 +71,9 @@ struct Imager::State {
     if (plan->passes_through && left.size != right.size) {
       return failure(ErrorCode::configuration, "images of different size cannot be rectified already", where);
     }
-    auto left_eye = EyeStage::create(left, *plan, plan->left_from_rectified, options, mask_folder, workers);
+    auto left_eye = EyeStage::create(left, *plan, plan->left_from_rectified, options, mask_folder, workers, where);
     if (!left_eye) return failure(left_eye);
-    auto right_eye = EyeStage::create(right, *plan, plan->right_from_rectified, options, mask_folder, workers);
+    auto right_eye = EyeStage::create(right, *plan, plan->right_from_rectified, options, mask_folder, workers, where);
     if (!right_eye) return failure(right_eye);
     const GrayHistogram histogram(left.pixel_format);
     const ContrastMapping mapping(left.pixel_format);

@@ -244,6 +244,34 @@ TEST(Imager, ChoosesTheViewThatIsAskedFor) {
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
 }
 
+TEST(Imager, RefusesAViewThatAnEyeSeesNothingOf) {
+  const auto refusal = [](const Rig& rig, const ImagingOptions& options, const std::string& mask_folder = {}) {
+    const auto imager = Imager::create(rig, options, Workers(1), mask_folder);
+    EXPECT_FALSE(imager);
+    if (imager) return std::string();
+    EXPECT_EQ(imager.error().code, ErrorCode::configuration);
+    return imager.error().message();
+  };
+  ImagingOptions options;
+  options.view.focal_px = 1e-9;
+  EXPECT_THAT(refusal(rig_with({}, {0, 0.02, 0}), options), HasSubstr("camera 'left' sees 0.0 % of the view"));
+  const PinholeModel narrow{360, 360, 31.5, 23.5};  // toed in by more than they see
+  EXPECT_THAT(refusal(rig_of_one_pair("test", camera("left", {}, narrow), camera("right", {}, narrow),
+                                      Pose(exp_so3({0, -0.4, 0}), {0.1, 0, 0}).inverse()),
+                      {}),
+              HasSubstr("camera 'left' sees 0.0 % of the view"));
+  const testing::TemporaryFolder folder;
+  ASSERT_TRUE(write_png(folder.file("all.png"), Image<std::uint8_t>(kSize).view()));
+  for (const double turn : {0.0, 0.02}) {
+    Rig rig = rig_with({}, {0, turn, 0});
+    rig.cameras[1].self_mask = "all.png";
+    EXPECT_THAT(refusal(rig, {}, folder.path()), HasSubstr("camera 'right' sees 0.0 % of the view"));
+  }
+  // A wide view around a narrow eye is allowed.
+  options.view.focal_px = 15;
+  EXPECT_TRUE(Imager::create(rig_with({}, {0, 0.02, 0}), options, Workers(1)));
+}
+
 TEST(Imager, UndoesTheVignettingOfTheRig) {
   Rig rig = rig_with({});
   ImagingOptions options;
