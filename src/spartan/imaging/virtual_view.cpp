@@ -214,6 +214,24 @@ Result<RectifiedStereo> show_what_either_sees(const Eyes& eyes, ImageSize size, 
   return RectifiedStereo{size, focal, middle_of(size) - focal * (low + high) / 2, 0};
 }
 
+/// What no policy can make a view of. Tables and images of a pair take 12 bytes a pixel of the view.
+Status check_numbers(ImageSize size, const VirtualView& view, const std::string& where) {
+  constexpr std::int64_t kLargestArea = 1 << 26;
+  if (size.width < 2 || size.height < 2 || std::int64_t{size.width} * size.height > kLargestArea) {
+    return failure(ErrorCode::configuration,
+                   fmt::format("a view of {} × {} px cannot be made: at least 2 × 2 px, at most {} in all", size.width,
+                               size.height, kLargestArea),
+                   where, "choose another size (imaging.view.width_px, height_px)");
+  }
+  if (!(view.focal_px >= 0) || !std::isfinite(view.focal_px)) {
+    return failure(ErrorCode::configuration, fmt::format("a view has no focal length of {} px", view.focal_px), where);
+  }
+  if (!(view.depth_m >= 0) || !std::isfinite(view.depth_m)) {
+    return failure(ErrorCode::configuration, fmt::format("a view has no depth of {} m", view.depth_m), where);
+  }
+  return {};
+}
+
 }  // namespace
 
 double depth_of(const VirtualView& view) {
@@ -231,6 +249,7 @@ Result<RectifiedStereo> choose_view(const TurnedEye& left, const TurnedEye& righ
   const double depth = depth_of(view);
   const Eyes eyes{{left, depth}, {right, depth}};
   const ImageSize size = view.size.empty() ? left.camera.size : view.size;
+  if (Status status = check_numbers(size, view, where); !status) return failure(status);
   if (view.policy == ViewPolicy::whole_view) return show_what_either_sees(eyes, size, view.focal_px, where);
 
   const auto left_resolution = resolution_on_axis(left.camera, depth);

@@ -135,6 +135,27 @@ TEST(VirtualView, WholeViewRefusesWhatNoPlaneShows) {
   EXPECT_TRUE(planned({ViewPolicy::keep_resolution}, wide, wide));
 }
 
+TEST(VirtualView, SizesAndNumbersThatMakeNoViewAreRefused) {
+  const auto refusal = [](const VirtualView& view) {
+    const auto plan = planned(view);
+    EXPECT_FALSE(plan) << plan->geometry.focal_px;
+    if (plan) return std::string();
+    EXPECT_EQ(plan.error().code, ErrorCode::configuration);
+    return plan.error().message();
+  };
+  for (const ViewPolicy policy : {ViewPolicy::keep_resolution, ViewPolicy::all_valid, ViewPolicy::whole_view}) {
+    EXPECT_THAT(refusal({policy, {1, 100}}), HasSubstr("1 × 100"));
+    EXPECT_THAT(refusal({policy, {100, 1}}), HasSubstr("at least 2 × 2"));
+    EXPECT_THAT(refusal({policy, {32767, 32767}}), HasSubstr("at most 67108864 in all"));
+    EXPECT_THAT(refusal({policy, {}, std::nan("")}), HasSubstr("focal length"));
+    EXPECT_THAT(refusal({policy, {}, -100}), HasSubstr("focal length"));
+    EXPECT_THAT(refusal({policy, {}, 0, std::nan("")}), HasSubstr("depth"));
+  }
+  const Camera pinhole = camera_with(PinholeModel{130, 130, 80, 60});
+  const Pose straight = Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse();
+  EXPECT_FALSE(plan_rectification(pinhole, pinhole, straight, "pair", {ViewPolicy::all_valid, {}, std::nan("")}));
+}
+
 TEST(VirtualView, AllValidRefusesEyesThatSeeNothingInCommon) {
   const Camera narrow = camera_with(PinholeModel{5000, 5000, 80, 60});
   const auto plan = plan_rectification(narrow, narrow, Pose(exp_so3({0.2, 0, 0}), {0.1, 0, 0}).inverse(), "pair",
