@@ -134,7 +134,7 @@ ImageView<const T> EyeStage::to_gray(const FrameImage& image, Image<T>& buffer, 
   if (layout == PixelLayout::rgb) {
     reduce_to_luma<T>(image.as<Rgb<T>>(), buffer, workers);
   } else {
-    debayerer_.apply(image.as<T>(), layout, buffer, workers);
+    debayerer_.apply(image.as<T>(), image.format(), buffer, workers);
   }
   return buffer;
 }
