@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "spartan/core/luma.h"
+#include "spartan/imaging/mirrored.h"
 
 // Compiled once per instruction set: Highway includes this file again for each.
 #undef HWY_TARGET_INCLUDE
@@ -93,13 +94,6 @@ void bilinear_row(const BilinearRow<T>& row, Pixel* out) {
 using Row = std::int32_t*;
 using ConstRow = const std::int32_t*;
 constexpr int kUnitBits = 5, kUnit = 1 << kUnitBits;
-
-/// 0, 1, 2 … last, last − 1 …: mirrored about the outermost samples.
-int mirrored(int i, int size) {
-  const int period = 2 * (size - 1);
-  i = (i % period + period) % period;
-  return i < size ? i : period - i;
-}
 
 template <class T>
 void load(ImageView<const T> mosaic, int y, Row out) {
