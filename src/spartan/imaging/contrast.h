@@ -40,8 +40,8 @@ class GrayHistogram {
 
 /// How much brighter the left eye is: the median, over the percentiles 10 … 90, of the left level over the right one.
 /// Both eyes see the same ground but for strips at the sides, so their histograms differ by exposure and gain above
-/// all; the strips make it up to 5 % wrong. 1 where the levels are too few or too low to tell. Histograms of the same
-/// depth.
+/// all; the strips make it some percent wrong (docs/results.md). 1 where the levels are too few or too low to tell.
+/// Histograms of the same depth.
 double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right);
 
 /// By what factor the right eye's gray levels are to be multiplied to be as bright as the left one's. With the ratio
