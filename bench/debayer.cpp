@@ -86,8 +86,8 @@ Method ours(const std::string& name, DebayerMethod method, const std::string& si
   auto debayerer = std::make_shared<Debayerer>(method, simd);
   return {name, [debayerer](const cv::Mat& mosaic, const Pattern& pattern, cv::Mat& result) {
             result.create(mosaic.size(), CV_8UC3);
-            debayerer->apply(spartan::as_view<std::uint8_t>(mosaic), pattern.layout, spartan::as_view<Rgb8>(result),
-                             spartan::Workers(1));
+            debayerer->apply(spartan::as_view<std::uint8_t>(mosaic), {pattern.layout, 8},
+                             spartan::as_view<Rgb8>(result), spartan::Workers(1));
           }};
 }
 
@@ -178,10 +178,13 @@ void time_targets(int repeat) {
   fmt::print("\n{} x {}, ms: {:>12} {:>8} {:>8} {:>8}\n", kSide, kSide, "RGB 8", "luma 8", "RGB 16", "luma 16");
   const spartan::Workers one(1);
   const auto time = [&](const Debayerer& d, const auto& mosaic, auto& result) {
+    const int bits = 8 * static_cast<int>(sizeof(mosaic(0, 0)));
     std::vector<double> runs;
     runs.reserve(static_cast<std::size_t>(repeat));
     for (int r = 0; r < repeat; ++r) {
-      runs.push_back(milliseconds([&] { d.apply(mosaic.view(), PixelLayout::bayer_grbg, result.view(), one); }));
+      runs.push_back(milliseconds([&] {
+        d.apply(mosaic.view(), {PixelLayout::bayer_grbg, bits}, result.view(), one);
+      }));
     }
     return median(runs);
   };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -17,13 +18,17 @@
 #include <utility>
 #include <vector>
 
+#include "spartan/camera/frame_source.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/opencv_bridge.h"
+#include "spartan/core/random.h"
+#include "spartan/imaging/contrast.h"
 #include "spartan/imaging/debayer.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
 #include "stereo_pairs.h"
+#include "timing.h"
 
 namespace spartan {
 namespace {
@@ -201,6 +206,58 @@ void compare_debayering(const std::vector<Pair>& pairs, int threads) {
   }
 }
 
+/// The median of left level / right level over pixels that stereo matches.
+double matched_ratio(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, int threads) {
+  DisparityComputer computer(DisparityOptions{}, Workers(threads));
+  const auto image = must(computer.compute(left, right, {0, 127}));
+  Random random(1);
+  std::vector<double> ratios;
+  for (int y = 0; y < left.height(); ++y) {
+    for (int x = 0; x < left.width(); ++x) {
+      const float d = image.disparity(x, y);
+      const int there = std::isnan(d) ? -1 : x - static_cast<int>(std::lround(d));
+      if (there < 0 || left(x, y) < 8 || right(there, y) < 8 || left(x, y) > 254 || right(there, y) > 254) continue;
+      // Levels are whole: spread evenly, so that the median of their ratios lies between them.
+      ratios.push_back((left(x, y) + random.uniform(-0.5, 0.5)) / right(there, y));
+    }
+  }
+  return median(std::move(ratios));
+}
+
+/// What the histograms say about the brightness of the eyes, frame by frame, against the pixels that stereo matches.
+void compare_gains(const std::filesystem::path& folder, int threads) {
+  fmt::print("\n{:<14} {:>6} {:>11} {:>9} {:>13} {:>11}\n", "recording", "frames", "RMS error", "largest",
+             "largest step", "of the gain");
+  for (const char* name : {"kitti_06", "kitti_0013", "rover_sandbox"}) {
+    if (!std::filesystem::exists(folder / name)) continue;
+    auto source = must(open_recording((folder / name).string()));
+    double squares = 0, largest = 0, step_of_ratio = 0, step_of_gain = 0, ratio_before = 0, gain_before = 0;
+    int frames = 0;
+    for (auto sample = must(source->next()); sample; sample = must(source->next())) {
+      const auto* frame = std::get_if<StereoFrame>(&*sample);
+      if (frame == nullptr) continue;
+      const auto left = frame->left.as<std::uint8_t>(), right = frame->right.as<std::uint8_t>();
+      GrayHistogram left_histogram({}), right_histogram({});
+      left_histogram.add(left);
+      right_histogram.add(right);
+      const double ratio = brightness_ratio(left_histogram, right_histogram);
+      const double gain = gain_between(left_histogram, right_histogram);
+      const double error = ratio / matched_ratio(left, right, threads) - 1;
+      squares += error * error;
+      largest = std::max(largest, std::abs(error));
+      if (frames > 0) {
+        step_of_ratio = std::max(step_of_ratio, std::abs(ratio - ratio_before));
+        step_of_gain = std::max(step_of_gain, std::abs(gain - gain_before));
+      }
+      ratio_before = ratio;
+      gain_before = gain;
+      ++frames;
+    }
+    fmt::print("{:<14} {:6} {:11.3f} {:9.3f} {:13.3f} {:11.3f}\n", name, frames, std::sqrt(squares / frames), largest,
+               step_of_ratio, step_of_gain);
+  }
+}
+
 void run(int threads) {
   const char* const data = std::getenv("SPARTAN_DATA");
   const std::filesystem::path folder = data != nullptr ? data : "../shared/data";
@@ -212,6 +269,7 @@ void run(int threads) {
   compare_contrast(pairs, threads);
   compare_lenses(pairs, threads);
   compare_debayering(pairs, threads);
+  compare_gains(folder, threads);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "program/map.h"
 #include "program/run_arguments.h"
 #include "spartan/camera/frame_source.h"
+#include "spartan/camera/interpretation.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/process.h"
@@ -79,10 +80,11 @@ Result<Position> load_pair(const BuildArguments& a) {
   Position position;
   position.mask_folder = std::filesystem::path(a.rig).parent_path().string();
   StereoFrame frame;
-  frame.pair = rig->pairs.front().name;
-  frame.left = std::move(*left);
-  frame.right = std::move(*right);
-  const Camera& camera = *rig->find_camera(rig->pairs.front().left);
+  const StereoPair& pair = rig->pairs.front();
+  const Camera& camera = *rig->find_camera(pair.left);
+  frame.pair = pair.name;
+  frame.left = interpret(*left, camera.pixel_format);
+  frame.right = interpret(*right, rig->find_camera(pair.right)->pixel_format);
   for (const PanTiltUnit& unit : rig->pan_tilt_units) {
     if (unit.name != camera.mount) continue;
     frame.pan_rad = unit.rest_pan_rad;

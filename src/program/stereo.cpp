@@ -9,6 +9,7 @@
 #include "program/json.h"
 #include "program/run_arguments.h"
 #include "program/verbs.h"
+#include "spartan/camera/interpretation.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/eval/disparity_metrics.h"
@@ -72,9 +73,10 @@ Result<Shot> load_and_rectify(const StereoArguments& a, const ImagingOptions& op
   auto imager = Imager::create(*rig, options, Workers(threads), std::filesystem::path(a.rig).parent_path().string());
   if (!imager) return failure(imager);
   StereoFrame frame;
-  frame.pair = rig->pairs.front().name;
-  frame.left = *left;
-  frame.right = *right;
+  const StereoPair& pair = rig->pairs.front();
+  frame.pair = pair.name;
+  frame.left = interpret(*left, rig->find_camera(pair.left)->pixel_format);
+  frame.right = interpret(*right, rig->find_camera(pair.right)->pixel_format);
   const auto rectified = imager->process(frame);
   if (!rectified) return failure(rectified);
   Shot shot;
@@ -83,7 +85,7 @@ Result<Shot> load_and_rectify(const StereoArguments& a, const ImagingOptions& op
   shot.left_mask = Image<std::uint8_t>::copy_of(rectified->left_mask);
   shot.right_mask = Image<std::uint8_t>::copy_of(rectified->right_mask);
   shot.geometry = rectified->geometry;
-  shot.nearest_m = rig->pairs.front().nearest_m;
+  shot.nearest_m = pair.nearest_m;
   return shot;
 }
 

@@ -208,6 +208,10 @@ TEST_F(Run, StereoShowsTheViewThatIsAskedFor) {
   EXPECT_EQ(impossible.exit_code, 4) << impossible.err;
   EXPECT_THAT(impossible.err, HasSubstr("not all that the eyes see fits"));
   EXPECT_EQ(stereo({"--set", "imaging.view.policy=any"}).exit_code, 2);
+  EXPECT_EQ(stereo({"--set", "imaging.view.width_px=1", "--set", "imaging.view.policy=whole_view"}).exit_code, 4);
+  const std::string all = "32767";
+  EXPECT_EQ(stereo({"--set", "imaging.view.width_px=" + all, "--set", "imaging.view.height_px=" + all}).exit_code, 4);
+  EXPECT_EQ(stereo({"--set", "imaging.view.focal_px=1e-9"}).exit_code, 4);
 }
 
 TEST_F(Run, FailsWhereNoFrameIsUsable) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "spartan/camera/increasing_stream.h"
+#include "spartan/camera/interpretation.h"
 #include "spartan/camera/recording_index.h"
 #include "spartan/core/image_io.h"
 
@@ -38,19 +39,6 @@ class SensorHead {
 
 MissingFrame missing(const Shot& shot, FrameFault fault, std::string message) {
   return {shot.frame_id, shot.pair, shot.left_stamp, fault, std::move(message)};
-}
-
-// A file says how many bits a sample takes up; how many of them carry signal, and which colours they stand for, is
-// known to the rig and to the list of shots.
-FrameImage interpret(const FrameImage& image, const PixelFormat& camera, int bits) {
-  PixelFormat format = image.format();
-  if (format.layout == PixelLayout::gray && camera.layout != PixelLayout::rgb) format.layout = camera.layout;
-  if (format.bits > 8) {
-    if (bits == 0) bits = camera.bits;
-    if (bits > 8) format.bits = bits;
-    format.alignment = camera.alignment;
-  }
-  return image.with_format(format);
 }
 
 class IndexedSource : public FrameSource {

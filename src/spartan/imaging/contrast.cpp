@@ -33,17 +33,23 @@ void map_rows(ImageView<const T> image, ImageView<std::uint8_t> result, const Wo
   });
 }
 
+/// How many samples were counted.
 template <class T>
-void count_rows(ImageView<const T> image, std::vector<std::uint64_t>& counts, int shift) {
+std::uint64_t count_rows(ImageView<const T> image, ImageView<const std::uint8_t> mask,
+                         std::vector<std::uint64_t>& counts, int shift) {
+  if (!mask.empty() && mask.size() != image.size()) throw std::invalid_argument("contrast: the mask has another size");
   const unsigned last = static_cast<unsigned>(counts.size()) - 1;
+  std::uint64_t count = 0;
   for (int y = 0; y < image.height(); ++y) {
-    const T* in = image.row(y);
-    for (int x = 0; x < image.width(); ++x) ++counts[std::min<unsigned>(in[x] >> shift, last)];
+    const T* const in = image.row(y);
+    const std::uint8_t* const wanted = mask.empty() ? nullptr : mask.row(y);
+    for (int x = 0; x < image.width(); ++x) {
+      if (wanted != nullptr && wanted[x] == 0) continue;
+      ++counts[std::min<unsigned>(in[x] >> shift, last)];
+      ++count;
+    }
   }
-}
-
-std::uint64_t area(ImageSize size) {
-  return static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height);
+  return count;
 }
 
 }  // namespace
@@ -56,14 +62,12 @@ void GrayHistogram::clear() {
   total_ = 0;
 }
 
-void GrayHistogram::add(ImageView<const std::uint8_t> image) {
-  count_rows(image, counts_, shift_);
-  total_ += area(image.size());
+void GrayHistogram::add(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask) {
+  total_ += count_rows(image, mask, counts_, shift_);
 }
 
-void GrayHistogram::add(ImageView<const std::uint16_t> image) {
-  count_rows(image, counts_, shift_);
-  total_ += area(image.size());
+void GrayHistogram::add(ImageView<const std::uint16_t> image, ImageView<const std::uint8_t> mask) {
+  total_ += count_rows(image, mask, counts_, shift_);
 }
 
 void GrayHistogram::add(const GrayHistogram& other, double gain) {
@@ -87,7 +91,7 @@ double GrayHistogram::quantile(double percent) const {
   return 0;
 }
 
-double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
+double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right) {
   // Below this the level of black, which nobody states, would decide.
   const double least = left.levels() / 32.0, most = left.levels() - 1.5;
   std::vector<double> ratios;
@@ -99,8 +103,16 @@ double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
   if (ratios.size() < 5) return 1;
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
-  constexpr double kLeastDifference = 0.05;  // less comes from what only one eye sees
-  return std::abs(*middle - 1) < kLeastDifference ? 1 : std::clamp(*middle, 0.5, 2.0);
+  return *middle;
+}
+
+double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
+  constexpr double kDoubt = 0.05;  // as much may come from what only one eye sees
+  const double ratio = brightness_ratio(left, right);
+  const double difference = std::max(ratio, 1 / ratio) - 1;
+  if (difference <= kDoubt) return 1;
+  const double gain = std::min(1 + difference - kDoubt * kDoubt / difference, 2.0);
+  return ratio > 1 ? gain : 1 / gain;
 }
 
 int GrayHistogram::percentile(double percent) const {
@@ -125,12 +137,13 @@ ContrastMapping::ContrastMapping(PixelFormat format)
 void ContrastMapping::stretch(const GrayHistogram& histogram, double low_percent, double high_percent) {
   const int last = static_cast<int>(table_.size()) - 1;
   if (histogram.levels() != last + 1) throw std::invalid_argument("contrast: the histogram has another depth");
+  if (histogram.empty()) return set_range(0, last);
   int low = histogram.percentile(low_percent);
   int high = std::max(histogram.percentile(high_percent), low);
-  if (low == high) return set_range(0, last);
-  if (high - low < kLeastLevels) {
-    low = std::clamp((low + high - kLeastLevels) / 2, 0, last - kLeastLevels);
-    high = low + kLeastLevels;
+  const int least = std::max(16, histogram.levels() / 16);
+  if (high - low < least) {
+    low = std::clamp((low + high - least) / 2, 0, last - least);
+    high = low + least;
   }
   set_range(low, high);
 }

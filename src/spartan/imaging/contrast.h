@@ -17,9 +17,10 @@ class GrayHistogram {
   explicit GrayHistogram(PixelFormat format);
 
   void clear();
-  /// Samples as the format stores them (low or high alignment).
-  void add(ImageView<const std::uint8_t> image);
-  void add(ImageView<const std::uint16_t> image);
+  /// Samples as the format stores them (low or high alignment), where `mask` (of the image's size, or empty) is not 0.
+  /// Throws where the sizes differ.
+  void add(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask = {});
+  void add(ImageView<const std::uint16_t> image, ImageView<const std::uint8_t> mask = {});
 
   /// All samples of another histogram of the same depth, their levels times `gain`.
   void add(const GrayHistogram& other, double gain);
@@ -28,6 +29,7 @@ class GrayHistogram {
   int percentile(double percent) const;
   /// The same between the levels: a level's samples fill the interval of half a level to either side evenly.
   double quantile(double percent) const;
+  bool empty() const { return total_ == 0; }
   int levels() const { return static_cast<int>(counts_.size()); }
 
  private:
@@ -36,10 +38,16 @@ class GrayHistogram {
   std::vector<std::uint64_t> counts_;
 };
 
-/// By what factor the right eye's gray levels are to be multiplied to be as bright as the left one's: the median, over
-/// the percentiles 10 … 90, of the left level over the right one. Both eyes see the same ground but for a strip at the
-/// sides, so their histograms differ by exposure and gain above all. 1 where it is within 5 % of that or the levels are
-/// too few or too low to tell, never outside ½ … 2. Histograms of the same depth.
+/// How much brighter the left eye is: the median, over the percentiles 10 … 90, of the left level over the right one.
+/// Both eyes see the same ground but for strips at the sides, so their histograms differ by exposure and gain above
+/// all; the strips make it some percent wrong (docs/results.md). 1 where the levels are too few or too low to tell.
+/// Histograms of the same depth.
+double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right);
+
+/// By what factor the right eye's gray levels are to be multiplied to be as bright as the left one's. With the ratio
+/// 1 + r (or its inverse, whichever is larger) it is 1 + r − 0.05²/r, and 1 where r < 0.05: what may come from the
+/// strips is not believed, and there is no jump between frames whose ratios are alike (the non-negative garrote:
+/// Breiman, "Better subset regression using the nonnegative garrote", Technometrics 1995). Never outside ½ … 2.
 double gain_between(const GrayHistogram& left, const GrayHistogram& right);
 
 /// A table from stored samples to 8-bit gray levels. Levels from `low` to `high` go linearly to 0 … 255.
@@ -48,8 +56,9 @@ class ContrastMapping {
   /// The whole range of the format to 0 … 255; for 8 bits the identity.
   explicit ContrastMapping(PixelFormat format);
 
-  /// Makes the percentiles black and white. A picture that fills the range already stays as it is, one of a single
-  /// level is only scaled, and the range is never fewer than kLeastLevels levels: noise does not become a picture.
+  /// Makes the percentiles black and white; an empty histogram only scales. A picture that fills the range already
+  /// stays as it is, and the range is never less than a sixteenth of the format's, with the percentiles in its middle:
+  /// noise does not become a picture.
   void stretch(const GrayHistogram& histogram, double low_percent, double high_percent);
 
   /// What `other` does, of samples that are multiplied by `gain` first.
@@ -59,8 +68,6 @@ class ContrastMapping {
   /// `result` has the size of `image`; rows are shared among the workers.
   void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
   void apply(ImageView<const std::uint16_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
-
-  static constexpr int kLeastLevels = 16;
 
  private:
   void set_range(int low, int high, double gain = 1);

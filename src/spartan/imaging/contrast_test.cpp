@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "spartan/core/random.h"
 
 namespace spartan {
 namespace {
@@ -36,6 +39,19 @@ TEST(Contrast, PercentilesCountSamples) {
   EXPECT_EQ(histogram.percentile(50), 60);
   EXPECT_EQ(histogram.percentile(99.5), 109);
   EXPECT_EQ(histogram.percentile(100), 109);
+}
+
+TEST(Contrast, OnlyWhatTheMaskShowsIsCounted) {
+  const auto image = ramp<std::uint8_t>(10, 109);
+  Image<std::uint8_t> mask(image.size());
+  for (int x = 50; x < 100; ++x) mask(x, 2) = 1;
+  GrayHistogram histogram({});
+  EXPECT_TRUE(histogram.empty());
+  histogram.add(image, mask);
+  EXPECT_EQ(histogram.percentile(0), 60);
+  EXPECT_EQ(histogram.percentile(50), 85);
+  EXPECT_EQ(histogram.percentile(100), 109);
+  EXPECT_THROW(histogram.add(image, mask.view().crop(0, 0, 5, 4)), std::invalid_argument);
 }
 
 TEST(Contrast, AFullRangeStaysAsItIs) {
@@ -75,16 +91,35 @@ TEST(Contrast, SixteenBitsWithoutStretchAreScaled) {
   EXPECT_EQ(mapping(65535), 255);
 }
 
-TEST(Contrast, AConstantPictureKeepsItsLevel) {
-  const Image<std::uint8_t> image(8, 8, 77);
-  EXPECT_EQ(stretched<std::uint8_t>({}, image, image)(77), 77);
+// One grain of noise more or less must not change the whole picture.
+TEST(Contrast, AConstantPictureIsMappedLikeANearlyConstantOne) {
+  for (const int level : {0, 3, 77, 250, 254}) {
+    SCOPED_TRACE(level);
+    Image<std::uint8_t> image(40, 50, static_cast<std::uint8_t>(level));
+    const int constant = stretched<std::uint8_t>({}, image, image)(level);
+    for (int x = 0; x < 4; ++x) image(x, 7) = static_cast<std::uint8_t>(level + 1);  // 0.2 %
+    EXPECT_NEAR(stretched<std::uint8_t>({}, image, image)(level), constant, 8) << "half of a level, stretched";
+  }
+  const Image<std::uint8_t> black(8, 8, 0), white(8, 8, 255);
+  EXPECT_EQ(stretched<std::uint8_t>({}, black, black)(0), 0);
+  EXPECT_EQ(stretched<std::uint8_t>({}, white, white)(255), 255);
 }
 
 TEST(Contrast, NoiseIsNotBlownUp) {
-  const auto image = ramp<std::uint8_t>(100, 103);
-  const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);
-  EXPECT_LE(mapping(103) - mapping(100), 3 * 255 / ContrastMapping::kLeastLevels + 1);
-  EXPECT_NEAR(0.5 * (mapping(103) + mapping(100)), 127, 10);
+  // The same flat picture at any depth: ± 0.3 % of the scale.
+  for (const int bits : {8, 10, 12, 14, 16}) {
+    SCOPED_TRACE(bits);
+    const PixelFormat format{PixelLayout::gray, bits};
+    const int middle = (2000 << bits) >> 12, spread = std::max(1, (12 << bits) >> 12);
+    const auto image = ramp<std::uint16_t>(middle - spread, middle + spread);
+    GrayHistogram histogram(format);
+    histogram.add(image);
+    ContrastMapping mapping(format);
+    mapping.stretch(histogram, 0.1, 99.9);
+    EXPECT_NEAR(mapping(middle), 127.5, 8);
+    EXPECT_LE(mapping(middle + spread) - mapping(middle - spread), 33);
+    EXPECT_GE(mapping(middle + spread) - mapping(middle - spread), 20);
+  }
 }
 
 TEST(Contrast, QuantilesLieBetweenLevels) {
@@ -112,6 +147,38 @@ TEST(Contrast, TheGainBetweenTheEyesIsFound) {
   EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.97)), 1) << "too little to mean anything";
   EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.4)), 2) << "no more than twice";
   EXPECT_EQ(gain_between(histogram_of(0.05), histogram_of(0.1)), 1) << "too dark to tell";
+}
+
+GrayHistogram noisy_ramp(double factor, std::uint64_t seed) {
+  Random random(seed);
+  Image<std::uint8_t> image(160, 100);
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      image(x, y) = static_cast<std::uint8_t>(std::lround(factor * (40 + x) + 2 * random.normal()));
+    }
+  }
+  GrayHistogram histogram({});
+  histogram.add(image);
+  return histogram;
+}
+
+// Frames of a still scene must not flicker, wherever the true ratio lies.
+TEST(Contrast, TheGainFollowsTheRatioWithoutJumps) {
+  for (const double ratio : {0.93, 0.95, 1.0, 1.04, 1.05, 1.06, 1.1}) {
+    double low = 2, high = 0, low_ratio = 2, high_ratio = 0;
+    for (std::uint64_t frame = 0; frame < 8; ++frame) {
+      const auto left = noisy_ramp(ratio, 2 * frame), right = noisy_ramp(1, 2 * frame + 1);
+      const double gain = gain_between(left, right), estimate = brightness_ratio(left, right);
+      EXPECT_NEAR(estimate, ratio, 0.006);
+      EXPECT_NEAR(gain * gain_between(right, left), 1, 1e-12) << "neither eye is preferred";
+      EXPECT_LE(std::abs(gain - 1), std::abs(estimate - 1));
+      low = std::min(low, gain);
+      high = std::max(high, gain);
+      low_ratio = std::min(low_ratio, estimate);
+      high_ratio = std::max(high_ratio, estimate);
+    }
+    EXPECT_LE(high - low, 2.2 * (high_ratio - low_ratio)) << ratio;
+  }
 }
 
 TEST(Contrast, AFollowingMappingDoesTheSameToScaledSamples) {

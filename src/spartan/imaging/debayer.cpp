@@ -57,11 +57,12 @@ void run_bilinear(ImageView<const T> mosaic, RedPlace red, const bayer::Kernels<
 }
 
 template <class T, class Pixel>
-void run_edge_aware(ImageView<const T> mosaic, RedPlace red, const bayer::Kernels<T>& kernels, ImageView<Pixel> result,
-                    MemoryPool& pool, const Workers& workers) {
+void run_edge_aware(ImageView<const T> mosaic, RedPlace red, const PixelFormat& format,
+                    const bayer::Kernels<T>& kernels, ImageView<Pixel> result, MemoryPool& pool,
+                    const Workers& workers) {
   workers.for_each_part(0, mosaic.height(), kRowsPerBand, [&](int begin, int end) {
     auto memory = pool.take(mosaic.width());
-    const bayer::Band<T, Pixel> band{mosaic, red, result, begin, end};
+    const bayer::Band<T, Pixel> band{mosaic, red, format.full_scale(), result, begin, end};
     if constexpr (std::is_same_v<Pixel, T>) {
       kernels.edge_aware_luma(band, *memory);
     } else {
@@ -80,8 +81,9 @@ struct Debayerer::State {
   MemoryPool pool;
 
   template <class T, class Pixel>
-  void run(ImageView<const T> mosaic, PixelLayout layout, ImageView<Pixel> result, const Workers& workers) {
-    const RedPlace red = red_place(layout);
+  void run(ImageView<const T> mosaic, const PixelFormat& format, ImageView<Pixel> result, const Workers& workers) {
+    const RedPlace red = red_place(format.layout);
+    if (format.bytes_per_sample() != sizeof(T)) throw std::invalid_argument("debayer: the samples are of another kind");
     if (mosaic.size() != result.size()) throw std::invalid_argument("debayer: the sizes differ");
     if (mosaic.width() < 2 || mosaic.height() < 2) {
       throw std::invalid_argument("debayer: a mosaic has at least 2 × 2 samples");
@@ -94,7 +96,7 @@ struct Debayerer::State {
       }
     }();
     if (method == DebayerMethod::bilinear) return run_bilinear(mosaic, red, kernels, result, workers);
-    run_edge_aware(mosaic, red, kernels, result, pool, workers);
+    run_edge_aware(mosaic, red, format, kernels, result, pool, workers);
   }
 };
 
@@ -109,21 +111,21 @@ Debayerer::Debayerer(Debayerer&&) noexcept = default;
 Debayerer& Debayerer::operator=(Debayerer&&) noexcept = default;
 Debayerer::~Debayerer() = default;
 
-void Debayerer::apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<Rgb8> result,
+void Debayerer::apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<Rgb8> result,
                       const Workers& workers) const {
-  state_->run(mosaic, layout, result, workers);
+  state_->run(mosaic, format, result, workers);
 }
-void Debayerer::apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<Rgb16> result,
+void Debayerer::apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<Rgb16> result,
                       const Workers& workers) const {
-  state_->run(mosaic, layout, result, workers);
+  state_->run(mosaic, format, result, workers);
 }
-void Debayerer::apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<std::uint8_t> result,
+void Debayerer::apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<std::uint8_t> result,
                       const Workers& workers) const {
-  state_->run(mosaic, layout, result, workers);
+  state_->run(mosaic, format, result, workers);
 }
-void Debayerer::apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<std::uint16_t> result,
+void Debayerer::apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<std::uint16_t> result,
                       const Workers& workers) const {
-  state_->run(mosaic, layout, result, workers);
+  state_->run(mosaic, format, result, workers);
 }
 
 }  // namespace spartan

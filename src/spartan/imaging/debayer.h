@@ -21,8 +21,9 @@ enum class DebayerMethod : std::uint8_t {
 
 /// Makes colours, or the luma of the same colours, of mosaics of 8 to 16 bits. Keeps the memory that it works in; one
 /// object may serve several threads at once. At the borders the mosaic is mirrored about its outermost samples, which
-/// keeps its phase. `result` has the size of `mosaic` (at least 2 × 2) and the same scale. Throws where sizes differ or
-/// `layout` is no Bayer pattern.
+/// keeps its phase. `result` has the size of `mosaic` (at least 2 × 2) and the same scale. A mosaic of any depth and
+/// alignment gives the same picture, but for rounding. Throws where sizes differ, `format` is no Bayer pattern or has
+/// samples of another kind.
 class Debayerer {
  public:
   /// `simd`: see simd_target_index(); the result is the same, bit for bit.
@@ -31,24 +32,18 @@ class Debayerer {
   Debayerer& operator=(Debayerer&&) noexcept;
   ~Debayerer();
 
-  void apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<Rgb8> result,
+  void apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<Rgb8> result,
              const Workers& workers) const;
-  void apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<Rgb16> result,
+  void apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<Rgb16> result,
              const Workers& workers) const;
-  void apply(ImageView<const std::uint8_t> mosaic, PixelLayout layout, ImageView<std::uint8_t> result,
+  void apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<std::uint8_t> result,
              const Workers& workers) const;
-  void apply(ImageView<const std::uint16_t> mosaic, PixelLayout layout, ImageView<std::uint16_t> result,
+  void apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<std::uint16_t> result,
              const Workers& workers) const;
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// Luma of a colour (ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B) in 16-bit fixed point, rounded.
-template <class T>
-T luma(const Rgb<T>& colour) {
-  return static_cast<T>((19595U * colour.r + 38470U * colour.g + 7471U * colour.b + 32768U) >> 16U);
-}
 
 }  // namespace spartan

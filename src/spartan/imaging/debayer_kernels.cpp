@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <limits>
 
-#include "spartan/imaging/debayer.h"
+#include "spartan/core/luma.h"
+#include "spartan/imaging/mirrored.h"
 
 // Compiled once per instruction set: Highway includes this file again for each.
 #undef HWY_TARGET_INCLUDE
@@ -94,13 +94,6 @@ void bilinear_row(const BilinearRow<T>& row, Pixel* out) {
 using Row = std::int32_t*;
 using ConstRow = const std::int32_t*;
 constexpr int kUnitBits = 5, kUnit = 1 << kUnitBits;
-
-/// 0, 1, 2 … last, last − 1 …: mirrored about the outermost samples.
-int mirrored(int i, int size) {
-  const int period = 2 * (size - 1);
-  i = (i % period + period) % period;
-  return i < size ? i : period - i;
-}
 
 template <class T>
 void load(ImageView<const T> mosaic, int y, Row out) {
@@ -199,9 +192,8 @@ void opposite_colour(const ConstRow green[3], const ConstRow difference[3], floa
 }
 
 template <class T>
-HWY_INLINE T level_of(int value) {
-  const int level = (value + kUnit / 2) >> kUnitBits;
-  return static_cast<T>(std::min(std::max(level, 0), static_cast<int>(std::numeric_limits<T>::max())));
+HWY_INLINE T level_of(int value, int largest) {
+  return static_cast<T>((std::min(std::max(value, 0), largest) + kUnit / 2) >> kUnitBits);
 }
 
 struct ColourRows {
@@ -209,8 +201,8 @@ struct ColourRows {
 };
 
 template <class T>
-void colours(const ColourRows& rows, ConstRow green, float scale, int begin, int count, T* HWY_RESTRICT red_out,
-             T* HWY_RESTRICT green_out, T* HWY_RESTRICT blue_out) {
+void colours(const ColourRows& rows, ConstRow green, float scale, int largest, int begin, int count,
+             T* HWY_RESTRICT red_out, T* HWY_RESTRICT green_out, T* HWY_RESTRICT blue_out) {
   const ColourRows r = rows;
   for (int i = 0; i < count; ++i) {
     const int x = begin + i, own = r.green[1][x], own_red = r.to_red[1][x], own_blue = r.to_blue[1][x];
@@ -220,9 +212,9 @@ void colours(const ColourRows& rows, ConstRow green, float scale, int begin, int
         between_pairs(r.to_red[0][x], r.to_red[2][x], r.to_red[1][x - 1], r.to_red[1][x + 1], upright, beside, scale);
     const int blue = between_pairs(r.to_blue[0][x], r.to_blue[2][x], r.to_blue[1][x - 1], r.to_blue[1][x + 1], upright,
                                    beside, scale);
-    red_out[i] = level_of<T>(own - select(green[x], red, own_red));
-    green_out[i] = level_of<T>(own);
-    blue_out[i] = level_of<T>(own - select(green[x], blue, own_blue));
+    red_out[i] = level_of<T>(own - select(green[x], red, own_red), largest);
+    green_out[i] = level_of<T>(own, largest);
+    blue_out[i] = level_of<T>(own - select(green[x], blue, own_blue), largest);
   }
 }
 
@@ -230,9 +222,10 @@ template <class T, class Pixel>
 void edge_aware(const Band<T, Pixel>& band, BandMemory& memory) {
   using M = BandMemory;
   const int width = band.mosaic.width();
-  const int largest = kUnit * std::numeric_limits<T>::max();
-  // Steps count in levels of 8 or 12 bits: of 16 bits their products would leave the range of a float.
-  const float scale = sizeof(T) == 1 ? 1.0F / kUnit : 1.0F / (kUnit * 16);
+  const int largest = kUnit * band.full_scale;
+  // Steps count in levels of 8 bits whatever the depth: the picture is the same, and their products stay within the
+  // range of a float. Full scales are a step below a power of two, so the quotient is one.
+  const float scale = 1.0F / static_cast<float>(kUnit * (band.full_scale / 256 + 1));
   const auto green = [&](int y) HWY_ATTR { return memory.columns(band.red.is_green(0, y)); };
   const auto row = [&](M::Plane plane, int y) HWY_ATTR { return memory.row(plane, y); };
   // Each step follows the one before it by the rows that it needs around its own.
@@ -273,7 +266,7 @@ void edge_aware(const Band<T, Pixel>& band, BandMemory& memory) {
     Colours<T> chunk;
     for (int x = 0; x < width; x += kChunk) {
       const int count = std::min(kChunk, width - x);
-      colours(r, green(y), scale, x, count, chunk.r, chunk.g, chunk.b);
+      colours(r, green(y), scale, largest, x, count, chunk.r, chunk.g, chunk.b);
       store(chunk, count, band.result.row(y) + x);
     }
   }

@@ -64,6 +64,7 @@ template <class T, class Pixel>
 struct Band {
   ImageView<const T> mosaic;
   RedPlace red;
+  int full_scale;  ///< the largest sample that the format has
   ImageView<Pixel> result;
   int begin, end;
 };

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
+#include "spartan/core/luma.h"
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/core/random.h"
 #include "spartan/core/simd_target.h"
@@ -35,6 +36,12 @@ Image<T> random_mosaic(int width, int height, int largest) {
   return mosaic;
 }
 
+// Of samples that fill their container.
+template <class T>
+PixelFormat format_of(PixelLayout layout) {
+  return {layout, 8 * static_cast<int>(sizeof(T))};
+}
+
 template <class T>
 void expect_as_opencv(int largest) {
   for (const ImageSize size : {ImageSize{64, 48}, ImageSize{37, 21}}) {
@@ -42,7 +49,7 @@ void expect_as_opencv(int largest) {
     for (const Pattern& pattern : kPatterns) {
       SCOPED_TRACE(name_of(pattern.layout));
       Image<Rgb<T>> ours(size);
-      Debayerer().apply(mosaic, pattern.layout, ours, Workers(2));
+      Debayerer().apply(mosaic, format_of<T>(pattern.layout), ours, Workers(2));
       cv::Mat theirs;
       cv::cvtColor(as_mat(mosaic), theirs, pattern.opencv_code);
       const auto reference = as_view<Rgb<T>>(theirs);
@@ -88,7 +95,7 @@ template <class T>
 Image<Rgb<T>> debayered(DebayerMethod method, ImageView<const T> mosaic, PixelLayout layout, int threads = 1,
                         const std::string& simd = "auto") {
   Image<Rgb<T>> result(mosaic.size());
-  Debayerer(method, simd).apply(mosaic, layout, result, Workers(threads));
+  Debayerer(method, simd).apply(mosaic, format_of<T>(layout), result, Workers(threads));
   return result;
 }
 
@@ -110,7 +117,7 @@ void expect_uniform_colours_back(Rgb<T> colour) {
         const auto mosaic = mosaic_of<T>(uniform, pattern.layout);
         expect_same<Rgb<T>>(debayered<T>(method, mosaic, pattern.layout), uniform);
         Image<T> gray(size);
-        Debayerer(method).apply(mosaic, pattern.layout, gray, Workers(1));
+        Debayerer(method).apply(mosaic, format_of<T>(pattern.layout), gray, Workers(1));
         expect_same<T>(gray, Image<T>(size.width, size.height, luma(colour)));
       }
     }
@@ -174,7 +181,7 @@ void expect_same_bytes_everywhere(int largest) {
       for (const std::string& simd : available_simd_targets()) {
         SCOPED_TRACE(simd);
         expect_same<Rgb<T>>(debayered<T>(method, mosaic, PixelLayout::bayer_gbrg, 2, simd), expected);
-        Debayerer(method, simd).apply(mosaic, PixelLayout::bayer_gbrg, gray, Workers(2));
+        Debayerer(method, simd).apply(mosaic, format_of<T>(PixelLayout::bayer_gbrg), gray, Workers(2));
         expect_same<T>(gray, expected_gray);
       }
     }
@@ -187,15 +194,18 @@ TEST(Debayer, ThreadsAndTargetsGiveTheSameBytes) {
   expect_same_bytes_everywhere<std::uint16_t>(4095);
 }
 
-// The edge-aware method once more, pixel by pixel and in double precision (docs/math/imaging.md).
+// The edge-aware method once more, pixel by pixel and in double precision (docs/math/imaging.md). Its results are
+// levels of 8 bits; `unit` is one of these.
+template <class T>
 class PlainEdgeAware {
  public:
-  PlainEdgeAware(ImageView<const std::uint8_t> mosaic, PixelLayout layout) : mosaic_(mosaic), layout_(layout) {}
+  PlainEdgeAware(ImageView<const T> mosaic, const PixelFormat& format, double unit)
+      : mosaic_(mosaic), layout_(format.layout), unit_(unit), largest_(format.full_scale() / unit) {}
 
   double red(int x, int y) const { return other(x, y, 'r'); }
   double blue(int x, int y) const { return other(x, y, 'b'); }
   double green(int x, int y) const {
-    return is(x, y, 'g') ? level(x, y) : std::clamp(level(x, y) + mixed_difference(x, y), 0.0, 255.0);
+    return is(x, y, 'g') ? level(x, y) : std::clamp(level(x, y) + mixed_difference(x, y), 0.0, largest_);
   }
 
  private:
@@ -206,7 +216,7 @@ class PlainEdgeAware {
   bool is(int x, int y, char colour) const {
     return sample_at(layout_, mirror(x, mosaic_.width()), mirror(y, mosaic_.height())) == colour;
   }
-  double level(int x, int y) const { return mosaic_(mirror(x, mosaic_.width()), mirror(y, mosaic_.height())); }
+  double level(int x, int y) const { return mosaic_(mirror(x, mosaic_.width()), mirror(y, mosaic_.height())) / unit_; }
   double difference(int x, int y, int dx, int dy) const {
     const double missing = (level(x - dx, y - dy) + level(x + dx, y + dy)) / 2 +
                            5.0 / 32 * (2 * level(x, y) - level(x - 2 * dx, y - 2 * dy) - level(x + 2 * dx, y + 2 * dy));
@@ -248,26 +258,43 @@ class PlainEdgeAware {
     if (is(x, y, colour)) return green(x, y) - level(x, y);
     return is(x, y, 'g') ? between(x, y, colour, 0, 1, 1, 0) : between(x, y, colour, 1, 1, -1, 1);
   }
-  double other(int x, int y, char colour) const { return std::clamp(green(x, y) - minus(x, y, colour), 0.0, 255.0); }
+  double other(int x, int y, char colour) const { return std::clamp(green(x, y) - minus(x, y, colour), 0.0, largest_); }
 
-  ImageView<const std::uint8_t> mosaic_;
+  ImageView<const T> mosaic_;
   PixelLayout layout_;
+  double unit_, largest_;
 };
 
+template <class T>
+void expect_as_the_formula(const PixelFormat& format, double unit) {
+  SCOPED_TRACE(::testing::Message() << name_of(format.layout) << " of " << format.bits << " bits");
+  auto mosaic = random_mosaic<T>(23, 17, (1 << format.bits) - 1);
+  const int shift = format.alignment == BitAlignment::high ? 16 - format.bits : 0;
+  for (int y = 0; y < mosaic.height(); ++y) {
+    for (int x = 0; x < mosaic.width(); ++x) mosaic(x, y) = static_cast<T>(mosaic(x, y) << shift);
+  }
+  Image<Rgb<T>> result(mosaic.size());
+  Debayerer(DebayerMethod::edge_aware).apply(mosaic, format, result, Workers(1));
+  const PlainEdgeAware<T> plain(mosaic, format, unit);
+  // Half a level of rounding and the rounded differences; single precision.
+  const double tolerance = 0.65 / unit + 1e-3;
+  for (int y = 0; y < mosaic.height(); ++y) {
+    for (int x = 0; x < mosaic.width(); ++x) {
+      ASSERT_NEAR(result(x, y).r / unit, plain.red(x, y), tolerance) << x << ", " << y;
+      ASSERT_NEAR(result(x, y).g / unit, plain.green(x, y), tolerance) << x << ", " << y;
+      ASSERT_NEAR(result(x, y).b / unit, plain.blue(x, y), tolerance) << x << ", " << y;
+    }
+  }
+}
+
+// Whatever the depth and the alignment, steps count in 1/256 of the scale.
 TEST(Debayer, EdgeAwareFollowsItsFormula) {
   for (const Pattern& pattern : kPatterns) {
-    SCOPED_TRACE(name_of(pattern.layout));
-    const auto mosaic = random_mosaic<std::uint8_t>(23, 17, 255);
-    const auto result = debayered<std::uint8_t>(DebayerMethod::edge_aware, mosaic, pattern.layout);
-    const PlainEdgeAware plain(mosaic, pattern.layout);
-    for (int y = 0; y < mosaic.height(); ++y) {
-      for (int x = 0; x < mosaic.width(); ++x) {
-        // Half a level of rounding and the rounded differences.
-        ASSERT_NEAR(result(x, y).r, plain.red(x, y), 0.65) << x << ", " << y;
-        ASSERT_NEAR(result(x, y).g, plain.green(x, y), 0.6) << x << ", " << y;
-        ASSERT_NEAR(result(x, y).b, plain.blue(x, y), 0.65) << x << ", " << y;
-      }
-    }
+    expect_as_the_formula<std::uint8_t>({pattern.layout, 8}, 1);
+    expect_as_the_formula<std::uint16_t>({pattern.layout, 10, BitAlignment::low}, 4);
+    expect_as_the_formula<std::uint16_t>({pattern.layout, 12, BitAlignment::low}, 16);
+    expect_as_the_formula<std::uint16_t>({pattern.layout, 12, BitAlignment::high}, 256);
+    expect_as_the_formula<std::uint16_t>({pattern.layout, 16}, 256);
   }
 }
 
@@ -279,8 +306,12 @@ TEST(Debayer, LumaHasTheFullRange) {
 
 TEST(Debayer, RefusesWhatIsNoMosaic) {
   Image<std::uint8_t> image(4, 4), other(5, 4);
-  EXPECT_THROW(Debayerer().apply(image, PixelLayout::gray, image, Workers(1)), std::invalid_argument);
-  EXPECT_THROW(Debayerer().apply(image, PixelLayout::bayer_rggb, other, Workers(1)), std::invalid_argument);
+  const auto refuses = [&](PixelFormat format, const Image<std::uint8_t>& mosaic) {
+    EXPECT_THROW(Debayerer().apply(mosaic, format, image, Workers(1)), std::invalid_argument);
+  };
+  refuses({PixelLayout::gray, 8}, image);
+  refuses({PixelLayout::bayer_rggb, 8}, other);
+  refuses({PixelLayout::bayer_rggb, 12}, image);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <filesystem>
 
 #include "spartan/core/image_io.h"
+#include "spartan/core/luma.h"
+#include "spartan/imaging/view_footprint.h"
 
 namespace spartan {
 namespace {
@@ -26,6 +28,12 @@ void reduce_to_luma(ImageView<const Rgb<T>> colour, ImageView<T> gray, const Wor
       for (int x = 0; x < colour.width(); ++x) out[x] = luma(in[x]);
     }
   });
+}
+
+void keep_where(ImageView<std::uint8_t> pixels, ImageView<const std::uint8_t> mask) {
+  for (int y = 0; y < pixels.height(); ++y) {
+    for (int x = 0; x < pixels.width(); ++x) pixels(x, y) &= mask(x, y);
+  }
 }
 
 Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::string& folder) {
@@ -62,7 +70,7 @@ EyeStage::EyeStage(const Camera& camera, const ImagingOptions& options)
 
 Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& plan,
                                   const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
-                                  const std::string& mask_folder, const Workers& workers) {
+                                  const std::string& mask_folder, const Workers& workers, const std::string& where) {
   auto mask = load_self_mask(camera, mask_folder);
   if (!mask) return failure(mask);
   EyeStage eye(camera, options);
@@ -72,21 +80,47 @@ Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& pla
     eye.light_ = std::move(*light);
   }
   // A gray image as it came is not copied.
-  if (eye.has_colours() || eye.light_) {
-    if (eye.is_deep()) eye.gray16_ = Image<std::uint16_t>(camera.size);
-    if (!eye.is_deep()) eye.gray8_ = Image<std::uint8_t>(camera.size);
-  }
+  if (camera.pixel_format.layout != PixelLayout::gray || eye.light_) eye.make_gray_buffer();
+  eye.self_mask_ = std::move(*mask);
   if (plan.passes_through) {
-    eye.self_mask_ = std::move(*mask);
+    if (Status status = eye.check_mask(where); !status) return failure(status);
     return eye;
   }
-  eye.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, *mask, workers, plan.depth_m);
+  eye.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, eye.self_mask_, workers,
+                     plan.depth_m);
+  if (Status status = eye.check_mask(where); !status) return failure(status);
   eye.result_ = Image<std::uint8_t>(plan.geometry.size);
+  eye.counted_ = view_footprint(camera, plan.geometry, camera_from_rectified, plan.depth_m);
+  if (!eye.self_mask_.empty()) keep_where(eye.counted_, eye.self_mask_);
   return eye;
 }
 
+Status EyeStage::check_mask(const std::string& where) const {
+  constexpr double kLeastPercent = 1;
+  const auto seen = mask();
+  if (seen.empty()) return {};
+  std::int64_t count = 0;
+  for (int y = 0; y < seen.height(); ++y) {
+    for (int x = 0; x < seen.width(); ++x) count += seen(x, y) != 0 ? 1 : 0;
+  }
+  const double percent = 100 * static_cast<double>(count) / (static_cast<double>(seen.width()) * seen.height());
+  if (percent >= kLeastPercent) return {};
+  return failure(ErrorCode::configuration, fmt::format("camera '{}' sees {:.1f} % of the view", camera_.name, percent),
+                 where,
+                 "check the transforms of the two cameras and the self-masks, or choose another view (imaging.view)");
+}
+
+void EyeStage::make_gray_buffer() {
+  if (is_deep() && gray16_.empty()) gray16_ = Image<std::uint16_t>(camera_.size);
+  if (!is_deep() && gray8_.empty()) gray8_ = Image<std::uint8_t>(camera_.size);
+}
+
 Status EyeStage::check(const FrameImage& image, const std::string& where) const {
-  if (image.size() == camera_.size && image.format() == camera_.pixel_format) return {};
+  PixelFormat taken = image.format();
+  // Of many calibration files nobody can say that the pictures have colours.
+  const bool reduced = taken.layout == PixelLayout::rgb && camera_.pixel_format.layout == PixelLayout::gray;
+  if (reduced) taken.layout = PixelLayout::gray;
+  if (image.size() == camera_.size && taken == camera_.pixel_format) return {};
   return failure(ErrorCode::input,
                  fmt::format("the image of camera '{}' is {}, the rig says {}", camera_.name,
                              describe(image.size(), image.format()), describe(camera_.size, camera_.pixel_format)),
@@ -95,17 +129,18 @@ Status EyeStage::check(const FrameImage& image, const std::string& where) const 
 
 template <class T>
 ImageView<const T> EyeStage::to_gray(const FrameImage& image, Image<T>& buffer, const Workers& workers) const {
-  const PixelLayout layout = camera_.pixel_format.layout;
+  const PixelLayout layout = image.format().layout;
   if (layout == PixelLayout::gray) return image.as<T>();
   if (layout == PixelLayout::rgb) {
     reduce_to_luma<T>(image.as<Rgb<T>>(), buffer, workers);
   } else {
-    debayerer_.apply(image.as<T>(), layout, buffer, workers);
+    debayerer_.apply(image.as<T>(), image.format(), buffer, workers);
   }
   return buffer;
 }
 
 void EyeStage::make_gray(const FrameImage& image, const Workers& workers) {
+  if (image.format().layout != PixelLayout::gray) make_gray_buffer();
   if (is_deep()) {
     gray16_view_ = to_gray<std::uint16_t>(image, gray16_, workers);
   } else {
@@ -125,8 +160,9 @@ void EyeStage::correct_light(const Workers& workers) {
 }
 
 void EyeStage::count(GrayHistogram& histogram) const {
-  if (is_deep()) return histogram.add(gray16_view_);
-  histogram.add(gray8_view_);
+  const auto where = counted_.empty() ? self_mask_.view() : counted_.view();
+  if (is_deep()) return histogram.add(gray16_view_, where);
+  histogram.add(gray8_view_, where);
 }
 
 void EyeStage::map(const ContrastMapping& mapping, const Workers& workers) {

@@ -24,15 +24,15 @@ namespace spartan {
 /// leave are valid until the next image.
 class EyeStage {
  public:
-  /// Code `configuration` where the self-mask cannot be read or the vignetting leaves no light.
+  /// Code `configuration` where the self-mask cannot be read, the vignetting leaves no light or the eye sees less than
+  /// 1 % of the view. `where` names the pair in the last of these.
   static Result<EyeStage> create(const Camera& camera, const Rectification& plan,
                                  const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
-                                 const std::string& mask_folder, const Workers& workers);
+                                 const std::string& mask_folder, const Workers& workers, const std::string& where);
 
-  /// Code `input` where the image has another size or format than the camera.
+  /// Code `input` where the image has another size or format than the camera. A gray camera's image may be RGB.
   Status check(const FrameImage& image, const std::string& where) const;
 
-  bool has_colours() const { return camera_.pixel_format.layout != PixelLayout::gray; }
   bool has_vignetting() const { return light_.has_value(); }
   bool has_local_contrast() const { return local_.has_value(); }
   bool is_resampled() const { return table_.has_value(); }
@@ -40,6 +40,8 @@ class EyeStage {
   /// Sensor → gray of the same depth.
   void make_gray(const FrameImage& image, const Workers& workers);
   void correct_light(const Workers& workers);
+  /// The gray levels of what the view shows and is not the rover itself: neither its body nor the black around a
+  /// fisheye's picture says how bright the ground is.
   void count(GrayHistogram& histogram) const;
   /// Gray → 8-bit working image.
   void map(const ContrastMapping& mapping, const Workers& workers);
@@ -51,6 +53,8 @@ class EyeStage {
 
  private:
   EyeStage(const Camera& camera, const ImagingOptions& options);
+  Status check_mask(const std::string& where) const;
+  void make_gray_buffer();
   bool is_deep() const { return camera_.pixel_format.bits > 8; }
   ImageView<const std::uint8_t> working() const { return local_ ? equalised_.view() : mapped_.view(); }
   template <class T>
@@ -61,7 +65,8 @@ class EyeStage {
   std::optional<LightCorrection> light_;
   std::optional<LocalContrast> local_;
   std::optional<RemapTable> table_;
-  Image<std::uint8_t> gray8_, mapped_, equalised_, result_, self_mask_;
+  Image<std::uint8_t> gray8_, mapped_, equalised_, result_;
+  Image<std::uint8_t> self_mask_, counted_;  ///< of the sensor, 0 where not; empty: everything
   Image<std::uint16_t> gray16_;
   ImageView<const std::uint8_t> gray8_view_;
   ImageView<const std::uint16_t> gray16_view_;

@@ -71,9 +71,9 @@ struct Imager::State {
     if (plan->passes_through && left.size != right.size) {
       return failure(ErrorCode::configuration, "images of different size cannot be rectified already", where);
     }
-    auto left_eye = EyeStage::create(left, *plan, plan->left_from_rectified, options, mask_folder, workers);
+    auto left_eye = EyeStage::create(left, *plan, plan->left_from_rectified, options, mask_folder, workers, where);
     if (!left_eye) return failure(left_eye);
-    auto right_eye = EyeStage::create(right, *plan, plan->right_from_rectified, options, mask_folder, workers);
+    auto right_eye = EyeStage::create(right, *plan, plan->right_from_rectified, options, mask_folder, workers, where);
     if (!right_eye) return failure(right_eye);
     const GrayHistogram histogram(left.pixel_format);
     const ContrastMapping mapping(left.pixel_format);
@@ -93,7 +93,8 @@ struct Imager::State {
       right.make_gray(frame.right, workers);
     };
     // A gray image only has to be pointed at.
-    const bool has_colours = left.has_colours() || right.has_colours();
+    const bool has_colours =
+        frame.left.format().layout != PixelLayout::gray || frame.right.format().layout != PixelLayout::gray;
     step("imaging.debayer", has_colours, make_gray);
     if (!has_colours) make_gray();
     step("imaging.vignetting", left.has_vignetting() || right.has_vignetting(), [&] {

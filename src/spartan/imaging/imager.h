@@ -17,9 +17,9 @@ namespace spartan {
 /// frame to frame.
 class Imager {
  public:
-  /// Code `configuration` where a pair cannot be rectified (eyes that look apart, no view as asked for), a self-mask
-  /// cannot be read or a vignetting leaves no light. `mask_folder`: the rig file's folder, which the names of
-  /// self-masks are relative to.
+  /// Code `configuration` where a pair cannot be rectified (eyes that look apart, no view as asked for, an eye that
+  /// sees less than 1 % of it), a self-mask cannot be read or a vignetting leaves no light. `mask_folder`: the rig
+  /// file's folder, which the names of self-masks are relative to.
   static Result<Imager> create(const Rig& rig, const ImagingOptions& options, Workers workers,
                                const std::string& mask_folder = {});
   Imager(Imager&&) noexcept;
@@ -27,7 +27,7 @@ class Imager {
   ~Imager();
 
   /// The views in the result are valid until the next call for the same pair. Code `input` where the frame's pair
-  /// is unknown or its images have another size or format than the rig says.
+  /// is unknown or its images have another size or format than the rig says. RGB images of a gray camera become gray.
   Result<RectifiedPair> process(const StereoFrame& frame);
 
   /// Geometry of a pair's rectified view. Throws on an unknown name.

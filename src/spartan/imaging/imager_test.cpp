@@ -124,6 +124,28 @@ TEST(Imager, RefusesFramesThatDoNotFitTheRig) {
   EXPECT_THAT(refusal(unknown), HasSubstr("no stereo pair 'mast'"));
 }
 
+TEST(Imager, ColoursOfAGrayCameraAreReduced) {
+  auto imager = Imager::create(rig_with({}), {}, Workers(1));
+  ASSERT_TRUE(imager);
+  const auto gray = ramp<std::uint8_t>(2);
+  Image<Rgb8> colour(kSize);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) colour(x, y) = {gray(x, y), gray(x, y), gray(x, y)};
+  }
+  const auto from_gray =
+      imager->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::borrow(gray.view(), {})));
+  const auto expected = Image<std::uint8_t>::copy_of(from_gray->left);
+  const PixelFormat rgb{PixelLayout::rgb, 8};
+  const auto from_colour =
+      imager->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::own(std::move(colour), rgb)));
+  ASSERT_TRUE(from_colour) << from_colour.error().message();
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) ASSERT_EQ(from_colour->right(x, y), expected(x, y));
+  }
+  EXPECT_FALSE(Imager::create(rig_with(rgb), {}, Workers(1))
+                   ->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::borrow(gray.view(), {}))));
+}
+
 TEST(Imager, LoadsSelfMasks) {
   const testing::TemporaryFolder folder;
   Image<std::uint8_t> mask(kSize.width, kSize.height, 255);
@@ -149,6 +171,59 @@ TEST(Imager, LoadsSelfMasks) {
   }
 }
 
+// Both eyes see the same, but for the rover's body at the lower border of the right one.
+TEST(Imager, TheRoverItselfDoesNotChangeTheBalance) {
+  const testing::TemporaryFolder folder;
+  Image<std::uint8_t> scene(kSize), with_body(kSize), mask(kSize.width, kSize.height, 255);
+  for (const double share : {0.1, 0.2, 0.3}) {
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        const bool body = y >= (1 - share) * kSize.height;
+        scene(x, y) = static_cast<std::uint8_t>(90 + (x * 37 + y * 11) % 101);
+        with_body(x, y) = body ? 25 : scene(x, y);
+        mask(x, y) = body ? 0 : 255;
+      }
+    }
+    ASSERT_TRUE(write_png(folder.file("body.png"), mask.view()));
+    for (const double turn : {0.0, 0.002}) {
+      Rig rig = rig_with({}, {0, turn, 0});
+      rig.cameras[1].self_mask = "body.png";
+      auto imager = Imager::create(rig, {}, Workers(1), folder.path());
+      ASSERT_TRUE(imager) << imager.error().message();
+      const auto pair =
+          imager->process(frame_of(FrameImage::own(scene.clone(), {}), FrameImage::own(with_body.clone(), {})));
+      ASSERT_TRUE(pair);
+      double sum = 0;
+      for (int y = 2; y < 30; ++y) {
+        for (int x = 2; x < 60; ++x) sum += pair->right(x, y) - pair->left(x, y);
+      }
+      EXPECT_NEAR(sum / (28 * 58), 0, 1) << share << " of the eye, turned by " << turn;
+    }
+  }
+}
+
+TEST(Imager, WhatTheViewDoesNotShowDoesNotChangeItsLevels) {
+  const CameraModel fisheye = EquidistantModel({20, 20, 31.5, 23.5}, {});  // 88° at 31 px
+  const Rig rig = rig_of_one_pair("test", camera("left", {}, fisheye), camera("right", {}, fisheye),
+                                  Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse());
+  auto imager = Imager::create(rig, {}, Workers(1));
+  ASSERT_TRUE(imager) << imager.error().message();
+  const auto seen_with = [&](int surround) {
+    auto picture = ramp<std::uint8_t>(1);
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        if (std::hypot(x - 31.5, y - 23.5) > 33) picture(x, y) = static_cast<std::uint8_t>(surround);
+      }
+    }
+    const auto image = FrameImage::own(std::move(picture), {});
+    return Image<std::uint8_t>::copy_of(imager->process(frame_of(image, image))->left);
+  };
+  const auto black = seen_with(0), white = seen_with(255);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) ASSERT_EQ(black(x, y), white(x, y)) << x << ", " << y;
+  }
+}
+
 TEST(Imager, ChoosesTheViewThatIsAskedFor) {
   const Rig rig = rig_with({}, {0, 0.02, 0});
   const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
@@ -167,6 +242,34 @@ TEST(Imager, ChoosesTheViewThatIsAskedFor) {
   const auto refused = Imager::create(rig, options, Workers(1));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+}
+
+TEST(Imager, RefusesAViewThatAnEyeSeesNothingOf) {
+  const auto refusal = [](const Rig& rig, const ImagingOptions& options, const std::string& mask_folder = {}) {
+    const auto imager = Imager::create(rig, options, Workers(1), mask_folder);
+    EXPECT_FALSE(imager);
+    if (imager) return std::string();
+    EXPECT_EQ(imager.error().code, ErrorCode::configuration);
+    return imager.error().message();
+  };
+  ImagingOptions options;
+  options.view.focal_px = 1e-9;
+  EXPECT_THAT(refusal(rig_with({}, {0, 0.02, 0}), options), HasSubstr("camera 'left' sees 0.0 % of the view"));
+  const PinholeModel narrow{360, 360, 31.5, 23.5};  // toed in by more than they see
+  EXPECT_THAT(refusal(rig_of_one_pair("test", camera("left", {}, narrow), camera("right", {}, narrow),
+                                      Pose(exp_so3({0, -0.4, 0}), {0.1, 0, 0}).inverse()),
+                      {}),
+              HasSubstr("camera 'left' sees 0.0 % of the view"));
+  const testing::TemporaryFolder folder;
+  ASSERT_TRUE(write_png(folder.file("all.png"), Image<std::uint8_t>(kSize).view()));
+  for (const double turn : {0.0, 0.02}) {
+    Rig rig = rig_with({}, {0, turn, 0});
+    rig.cameras[1].self_mask = "all.png";
+    EXPECT_THAT(refusal(rig, {}, folder.path()), HasSubstr("camera 'right' sees 0.0 % of the view"));
+  }
+  // A wide view around a narrow eye is allowed.
+  options.view.focal_px = 15;
+  EXPECT_TRUE(Imager::create(rig_with({}, {0, 0.02, 0}), options, Workers(1)));
 }
 
 TEST(Imager, UndoesTheVignettingOfTheRig) {

@@ -59,7 +59,7 @@ struct ImagingOptions {
   void describe(Visitor& v) {
     v.field("debayer", debayer, "how colours are made of Bayer mosaics", {"bilinear", "edge_aware"});
     v.field("vignetting", vignetting, "undo the fall-off of light that the rig states");
-    v.field("contrast", contrast, "stretch the gray levels, the same way for both eyes");
+    v.field("contrast", contrast, "stretch the gray levels, the same way for both eyes; false: no balance either");
     v.field("balance", balance,
             "before that, scale the right eye's levels to the left one's where the histograms differ by more than 5 %");
     v.field("contrast_low_percent", contrast_low_percent, "share of pixels that may become black", between(0, 50));

@@ -4,19 +4,13 @@
 #include <array>
 #include <stdexcept>
 
+#include "spartan/imaging/mirrored.h"
+
 namespace spartan {
 namespace {
 
 constexpr int kRowsPerPart = 32;
 constexpr int kWeightBits = 11;
-
-/// 0 … size − 1, then back again.
-int mirrored(int i, int size) {
-  if (size == 1) return 0;
-  const int period = 2 * (size - 1);
-  i %= period;
-  return i < size ? i : period - i;
-}
 
 }  // namespace
 

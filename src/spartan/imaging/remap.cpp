@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "spartan/core/simd_target.h"
@@ -45,9 +46,13 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
   if (!self_mask.empty() && self_mask.size() != source_size) {
     throw std::invalid_argument("RemapTable: the self-mask has another size than the source");
   }
-  const auto on_sensor = [&](const Eigen::Vector2d& place) {
-    return place.x() >= 0 && place.y() >= 0 && place.x() <= source_size.width - 1 &&
-           place.y() <= source_size.height - 1;
+  // A place beside the border by no more than places are rounded lies on it: else rounding errors would mask borders.
+  const Eigen::Vector2d last(source_size.width - 1, source_size.height - 1);
+  const auto on_sensor = [&](const Eigen::Vector2d& place) -> std::optional<Eigen::Vector2d> {
+    constexpr double kBeside = 0.5 / kOne;
+    const Eigen::Vector2d nearest = place.cwiseMax(0).cwiseMin(last);
+    if (!((place - nearest).array().abs() <= kBeside).all()) return std::nullopt;
+    return nearest;
   };
   const auto masked = [&](Place p) {
     const int below = std::min(p.y + 1, source_size.height - 1);
@@ -64,7 +69,8 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
                                           (y - view.centre_px.y()) / view.focal_px, 1);
           const auto place = project(camera, camera_from_rectified * (depth_m * direction));
           Entry& entry = entries[static_cast<std::size_t>(i)];
-          if (place && on_sensor(*place)) entry = entry_of(*place);
+          const auto seen = place ? on_sensor(*place) : std::nullopt;
+          if (seen) entry = entry_of(*seen);
           entry.seen = entry.seen && !masked(entry.place);
           mask_(x, y) = entry.seen ? 255 : 0;
           if (!entry.seen) all_valid = false;

@@ -22,9 +22,9 @@ namespace spartan {
 class RemapTable {
  public:
   /// What the view sees of the camera. `self_mask` (0: the rover itself) has the source's size or is empty.
-  /// Pixels that look past the sensor, out of the model's domain or onto the masked part are invalid.
-  /// `depth_m`: of the surface for which the table is right; only cameras whose rays do not meet in one point care.
-  /// `simd`: see simd_target_index(); the result is the same, bit for bit.
+  /// Pixels that look past the sensor (by more than the 1/256 px that places are rounded by), out of the model's domain
+  /// or onto the masked part are invalid. `depth_m`: of the surface for which the table is right; only cameras whose
+  /// rays do not meet in one point care. `simd`: see simd_target_index(); the result is the same, bit for bit.
   RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
              const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
              const Workers& workers, double depth_m = 1, const std::string& simd = "auto");

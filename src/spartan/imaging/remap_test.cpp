@@ -109,6 +109,31 @@ TEST(RemapTable, TheIdentityGivesTheImageBackToItsLastPixel) {
   expect_back<Rgb16>(table);
 }
 
+// Focal lengths and centres without an end in binary: places on the border come out a rounding error beside it.
+TEST(RemapTable, RoundingMasksNoBorder) {
+  const auto picture = noise_picture(kSource);
+  struct View {
+    double focal_px, x, y;
+  };
+  for (const auto& [f, x, y] : {View{125, 79.5, 59.5}, {125.325, 77.675, 61.275}, {114.6635, 91.80375, 62.09375}}) {
+    const RectifiedStereo view{kSource, f, {x, y}, 0.1};
+    for (const double off : {0.0, 0.003, -0.003}) {
+      const RemapTable table(PinholeModel{f, f, x + off, y - off}, kSource, view, Eigen::Matrix3d::Identity(), {},
+                             Workers(1));
+      ASSERT_TRUE(table.mask().empty()) << f << ", off by " << off;
+      Image<std::uint8_t> result(kSource);
+      table.apply(picture, result, Workers(1));
+      for (int j = 0; j < kSource.height; ++j) {
+        for (int i = 0; i < kSource.width; ++i) ASSERT_EQ(result(i, j), picture(i, j)) << i << ", " << j;
+      }
+    }
+    const RemapTable beside(PinholeModel{f, f, x + 0.005, y}, kSource, view, Eigen::Matrix3d::Identity(), {},
+                            Workers(1));
+    EXPECT_EQ(beside.mask()(kSource.width - 1, 7), 0) << "further than a place is rounded";
+    EXPECT_EQ(beside.mask()(0, 7), 255);
+  }
+}
+
 TEST(RemapTable, WarpsTheSelfMaskAlong) {
   const RectifiedStereo view{kSource, 100, {80, 60}, 0.1};
   Image<std::uint8_t> self_mask(kSource.width, kSource.height, 255);

@@ -18,6 +18,8 @@ using Eigen::Vector3d;
 constexpr double kFar_m = 1 << 20;
 // cos 85°: beyond, a plane would have to be eleven times as wide as far.
 constexpr double kLeastCosine = 0.0871557, kLargestTangent = 11.430052;
+// tan 70°: beyond, a plane stretches what is seen to more than eight times its size.
+constexpr double kFarthestTangent = 2.747477;
 
 constexpr const char* kNoCommonView = "the two eyes have no common view";
 
@@ -88,19 +90,20 @@ Vector2d middle_of(ImageSize size) {
   return {(size.width - 1) / 2.0, (size.height - 1) / 2.0};
 }
 
-/// Where a direction meets the plane at depth 1, or the edge of what a plane can show on the way there.
+/// Where a direction meets the plane at depth 1; at most 70° from the plane's axis.
 Vector2d on_plane(const Vector3d& direction) {
-  if (direction.z() >= kLeastCosine) return direction.hnormalized();
-  return direction.head<2>().normalized() * kLargestTangent;
+  const double length = direction.head<2>().norm();
+  if (length < kFarthestTangent * direction.z()) return direction.hnormalized();
+  return direction.head<2>() * (kFarthestTangent / length);
 }
 
-/// The mean of an eye's outline on the plane at depth 1. What lies beyond `reach` has no more say than what lies there:
-/// a fisheye's picture ends at 84° on one side and 86° on the other, and they are as far apart as 0° and 67°.
-std::optional<Vector2d> mean_outline(const EyeOnPlane& eye, const Vector2d& reach) {
+/// The mean of an eye's outline on the plane at depth 1. What lies far from the axis has no more say than what lies at
+/// 70°: a fisheye's picture ends at 84° on one side and 86° on the other, and they are as far apart as 0° and 67°.
+std::optional<Vector2d> mean_outline(const EyeOnPlane& eye) {
   Vector2d sum = Vector2d::Zero();
   int count = 0;
   for (const Vector3d& direction : eye.outline()) {
-    sum += on_plane(direction).cwiseMax(-reach).cwiseMin(reach);
+    sum += on_plane(direction);
     ++count;
   }
   if (count == 0) return std::nullopt;
@@ -211,6 +214,24 @@ Result<RectifiedStereo> show_what_either_sees(const Eyes& eyes, ImageSize size, 
   return RectifiedStereo{size, focal, middle_of(size) - focal * (low + high) / 2, 0};
 }
 
+/// What no policy can make a view of. Tables and images of a pair take 12 bytes a pixel of the view.
+Status check_numbers(ImageSize size, const VirtualView& view, const std::string& where) {
+  constexpr std::int64_t kLargestArea = 1 << 26;
+  if (size.width < 2 || size.height < 2 || std::int64_t{size.width} * size.height > kLargestArea) {
+    return failure(ErrorCode::configuration,
+                   fmt::format("a view of {} × {} px cannot be made: at least 2 × 2 px, at most {} in all", size.width,
+                               size.height, kLargestArea),
+                   where, "choose another size (imaging.view.width_px, height_px)");
+  }
+  if (!(view.focal_px >= 0) || !std::isfinite(view.focal_px)) {
+    return failure(ErrorCode::configuration, fmt::format("a view has no focal length of {} px", view.focal_px), where);
+  }
+  if (!(view.depth_m >= 0) || !std::isfinite(view.depth_m)) {
+    return failure(ErrorCode::configuration, fmt::format("a view has no depth of {} m", view.depth_m), where);
+  }
+  return {};
+}
+
 }  // namespace
 
 double depth_of(const VirtualView& view) {
@@ -228,15 +249,14 @@ Result<RectifiedStereo> choose_view(const TurnedEye& left, const TurnedEye& righ
   const double depth = depth_of(view);
   const Eyes eyes{{left, depth}, {right, depth}};
   const ImageSize size = view.size.empty() ? left.camera.size : view.size;
+  if (Status status = check_numbers(size, view, where); !status) return failure(status);
   if (view.policy == ViewPolicy::whole_view) return show_what_either_sees(eyes, size, view.focal_px, where);
 
   const auto left_resolution = resolution_on_axis(left.camera, depth);
   const auto right_resolution = resolution_on_axis(right.camera, depth);
   if (!left_resolution || !right_resolution) return failure(ErrorCode::configuration, kNoCommonView, where);
   const double natural_focal = (*left_resolution + *right_resolution) / 2;
-  // Ordinary lenses end within twice what a pinhole of their focal length would see.
-  const Vector2d reach = 2 * middle_of(left.camera.size) / natural_focal;
-  const auto left_outline = mean_outline(eyes.left, reach), right_outline = mean_outline(eyes.right, reach);
+  const auto left_outline = mean_outline(eyes.left), right_outline = mean_outline(eyes.right);
   if (!left_outline || !right_outline) return failure(ErrorCode::configuration, kNoCommonView, where);
   const Vector2d centre = (*left_outline + *right_outline) / 2;
   if (view.policy == ViewPolicy::all_valid) return show_what_both_see(eyes, centre, size, view.focal_px, where);

@@ -27,7 +27,7 @@ struct VirtualView {
   /// not meet in one point.
   double depth_m = 0;
 
-  bool is_chosen() const { return !size.empty() || focal_px > 0; }
+  bool is_chosen() const { return !size.empty() || focal_px != 0; }
 };
 
 /// The depth to put into projections: `depth_m`, or one where no camera's offsets matter.
@@ -41,7 +41,8 @@ struct TurnedEye {
 
 /// Focal length, centre and size (not the baseline). The centre: keep_resolution, the mean outline of what the two eyes
 /// see stands in the middle; all_valid, where the view is largest; whole_view, what the eyes see is in the middle.
-/// Code `configuration` where there is no such view: an eye sees more than 85° from the view's axis (whole_view), the
+/// Code `configuration` where there is no such view: a size below 2 × 2 px or above 2²⁶ px in all, a focal length or a
+/// depth that is negative or not finite, an eye sees more than 85° from the view's axis (whole_view), the
 /// eyes have no rectangle in common or the chosen focal length is too short for it (all_valid), or too long for all to
 /// fit into the size (whole_view).
 Result<RectifiedStereo> choose_view(const TurnedEye& left, const TurnedEye& right, const VirtualView& view,

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "spartan/imaging/rectification.h"
@@ -34,6 +35,16 @@ Result<Rectification> planned(const VirtualView& view, const Camera& left = kLef
 
 RemapTable table_of(const Camera& camera, const Rectification& plan, const Eigen::Matrix3d& turn) {
   return {camera.model, camera.size, plan.geometry, turn, {}, Workers(2), plan.depth_m};
+}
+
+double seen_share(const RemapTable& table) {
+  const auto mask = table.mask();
+  if (mask.empty()) return 1;
+  int seen = 0;
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) seen += mask(x, y) != 0 ? 1 : 0;
+  }
+  return static_cast<double>(seen) / (mask.width() * mask.height());
 }
 
 bool all_seen(const Rectification& plan) {
@@ -100,6 +111,17 @@ TEST(VirtualView, WholeViewHoldsEveryBorderPixelOfBothSensors) {
   }
 }
 
+TEST(VirtualView, WholeViewOfEqualEyesMasksNothing) {
+  for (const auto& [f, x, y] : {std::array{125.0, 79.5, 59.5}, {125.325, 77.675, 61.275}, {114.6635, 91.80375, 62.1}}) {
+    const Camera eye = camera_with(PinholeModel{f, f, x, y});
+    const auto plan = plan_rectification(eye, eye, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse(), "pair",
+                                         {ViewPolicy::whole_view, kSize});
+    ASSERT_TRUE(plan && !plan->passes_through);
+    EXPECT_TRUE(table_of(eye, *plan, plan->left_from_rectified).mask().empty()) << f;
+    EXPECT_TRUE(table_of(eye, *plan, plan->right_from_rectified).mask().empty()) << f;
+  }
+}
+
 TEST(VirtualView, WholeViewRefusesWhatNoPlaneShows) {
   const auto too_long = planned({ViewPolicy::whole_view, {}, 500});
   ASSERT_FALSE(too_long);
@@ -111,6 +133,27 @@ TEST(VirtualView, WholeViewRefusesWhatNoPlaneShows) {
   EXPECT_EQ(too_wide.error().code, ErrorCode::configuration);
   EXPECT_THAT(too_wide.error().message(), HasSubstr("more than 85°"));
   EXPECT_TRUE(planned({ViewPolicy::keep_resolution}, wide, wide));
+}
+
+TEST(VirtualView, SizesAndNumbersThatMakeNoViewAreRefused) {
+  const auto refusal = [](const VirtualView& view) {
+    const auto plan = planned(view);
+    EXPECT_FALSE(plan) << plan->geometry.focal_px;
+    if (plan) return std::string();
+    EXPECT_EQ(plan.error().code, ErrorCode::configuration);
+    return plan.error().message();
+  };
+  for (const ViewPolicy policy : {ViewPolicy::keep_resolution, ViewPolicy::all_valid, ViewPolicy::whole_view}) {
+    EXPECT_THAT(refusal({policy, {1, 100}}), HasSubstr("1 × 100"));
+    EXPECT_THAT(refusal({policy, {100, 1}}), HasSubstr("at least 2 × 2"));
+    EXPECT_THAT(refusal({policy, {32767, 32767}}), HasSubstr("at most 67108864 in all"));
+    EXPECT_THAT(refusal({policy, {}, std::nan("")}), HasSubstr("focal length"));
+    EXPECT_THAT(refusal({policy, {}, -100}), HasSubstr("focal length"));
+    EXPECT_THAT(refusal({policy, {}, 0, std::nan("")}), HasSubstr("depth"));
+  }
+  const Camera pinhole = camera_with(PinholeModel{130, 130, 80, 60});
+  const Pose straight = Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse();
+  EXPECT_FALSE(plan_rectification(pinhole, pinhole, straight, "pair", {ViewPolicy::all_valid, {}, std::nan("")}));
 }
 
 TEST(VirtualView, AllValidRefusesEyesThatSeeNothingInCommon) {
@@ -130,6 +173,32 @@ TEST(VirtualView, KeepResolutionTakesSizeAndFocalLengthAsTheyAre) {
   EXPECT_NEAR(larger->geometry.centre_px.x() - natural->geometry.centre_px.x(), 70, 1e-9);
   EXPECT_NEAR(larger->geometry.centre_px.y() - natural->geometry.centre_px.y(), 40, 1e-9);
   EXPECT_EQ(planned({ViewPolicy::keep_resolution, {}, 99})->geometry.focal_px, 99);
+}
+
+// An eye that stands before the other one turns the common axes away from where both look.
+TEST(VirtualView, EyesThatLeanTheSameWayKeepTheirView) {
+  struct Leaning {
+    double focal_px, ahead_m;
+  };
+  for (const auto& [focal_px, ahead_m] : {Leaning{300, 0.05}, {300, 0.08}, {450, 0.08}, {900, 0.014}, {900, 0.03}}) {
+    SCOPED_TRACE(::testing::Message() << "f " << focal_px << " px, " << ahead_m << " m ahead");
+    const Camera eye = camera_with(PinholeModel{focal_px, focal_px, 79.5, 59.5});
+    const auto plan =
+        plan_rectification(eye, eye, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, ahead_m}).inverse(), "pair", {});
+    ASSERT_TRUE(plan) << plan.error().message();
+    for (const auto& turn : {plan->left_from_rectified, plan->right_from_rectified}) {
+      EXPECT_GT(seen_share(table_of(eye, *plan, turn)), 0.99);
+    }
+  }
+}
+
+// A sensor beside its lens' axis, as of a shifted lens or a cut-out picture.
+TEST(VirtualView, APictureBesideItsLensAxisIsShown) {
+  const Camera eye = camera_with(PinholeModel{300, 300, 500, 60});
+  const auto plan =
+      plan_rectification(eye, eye, Pose(exp_so3({0, 0.01, 0}), {0.1, 0, 0}).inverse(), "pair", VirtualView{});
+  ASSERT_TRUE(plan) << plan.error().message();
+  EXPECT_GT(seen_share(table_of(eye, *plan, plan->left_from_rectified)), 0.9);
 }
 
 TEST(VirtualView, RectifiedImagesPassUnlessAViewIsChosen) {

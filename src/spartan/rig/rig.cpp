@@ -21,8 +21,8 @@ const T* find_named(const std::vector<T>& all, const std::string& name) {
   return found == all.end() ? nullptr : &*found;
 }
 
-// Pictures above this side cannot be addressed by the 16-bit tables of rectification.
-constexpr int kLargestSide = 32767;
+// Between two pixels one can interpolate; larger pictures cannot be addressed by the 16-bit tables of rectification.
+constexpr int kSmallestSide = 2, kLargestSide = 32767;
 
 class FaultFinder {
  public:
@@ -104,8 +104,9 @@ class FaultFinder {
   void check(const Camera& camera) {
     const std::string key = "cameras." + camera.name;
     const auto [width, height] = camera.size;
-    if (width <= 0 || height <= 0 || width > kLargestSide || height > kLargestSide) {
-      add(key + ".size_px", fmt::format("is {} × {}, must be between 1 and {} each", width, height, kLargestSide));
+    if (std::min(width, height) < kSmallestSide || std::max(width, height) > kLargestSide) {
+      add(key + ".size_px",
+          fmt::format("is {} × {}, must be between {} and {} each", width, height, kSmallestSide, kLargestSide));
     }
     check_model(key, camera.model);
     if (camera.pixel_format.bits < 8 || camera.pixel_format.bits > 16) {

@@ -60,6 +60,9 @@ TEST(Rig, EveryKindOfFaultIsFound) {
   EXPECT_EQ(faults_after([](Rig& r) { r.cameras[1].mount_from_camera = r.cameras[0].mount_from_camera; }),
             Keys{"pairs.wide"});
   EXPECT_EQ(faults_after([](Rig& r) { r.cameras[0].size = {0, 480}; }), Keys{"cameras.left.size_px"});
+  EXPECT_EQ(faults_after([](Rig& r) { r.cameras[0].size = {1, 480}; }), Keys{"cameras.left.size_px"});
+  EXPECT_EQ(faults_after([](Rig& r) { r.cameras[0].size = {640, 1}; }), Keys{"cameras.left.size_px"});
+  EXPECT_EQ(faults_after([](Rig& r) { r.cameras[0].size = {2, 2}; }), Keys{});
   EXPECT_EQ(faults_after([](Rig& r) { r.cameras[0].size = {40000, 480}; }), Keys{"cameras.left.size_px"});
   EXPECT_EQ(faults_after([](Rig& r) {
               r.cameras[0].model = PinholeModel{0, 500, 0, 0};
