@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
+#include <set>
 
 #include "spartan/core/random.h"
 #include "spartan/rig/rig_files.h"
@@ -144,25 +146,48 @@ std::vector<std::pair<std::size_t, std::size_t>> numbers_in(const std::string& t
   return places;
 }
 
-// Every number in turn: most files need all of theirs, and none may be taken for another.
+// The key that a place of the text belongs to: the nearest one before it, of "key:", "key =", "'key':" or "<key>".
+std::string key_before(const std::string& text, std::size_t at) {
+  const std::string in_key = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789";
+  for (std::size_t end = at;;) {
+    const std::size_t begin = end == 0 ? 0 : text.rfind('\n', end - 1) + 1;
+    const std::size_t first = text.find_first_not_of(" -'<", begin);
+    const std::size_t behind = std::min(text.find_first_not_of(in_key, first), text.size());
+    const std::size_t sign = text.find_first_not_of("' ", behind);
+    const bool closed = sign < end && std::string(":=>t").find(text[sign]) != std::string::npos;
+    if (first < behind && closed) return text.substr(first, behind - first);
+    if (begin == 0) return "";
+    end = begin - 1;
+  }
+}
+
+// What a file says for other programs or twice, and the image size where it was given by the one who asked.
+const std::map<Format, std::set<std::string>> kUnread{
+    {Format::kitti_raw, {"S_00", "K_00", "D_00", "R_00", "T_00", "S_01", "K_01", "D_01", "R_01", "T_01", "R_rect_01"}},
+    {Format::euroc, {"rows", "cols"}},
+    {Format::ros, {"rows", "cols"}},
+    {Format::opencv, {"image_width", "image_height"}},
+    {Format::cahvor, {"T", "P"}},
+};
+
+// Every number in turn: none of those that are read may be taken for another.
 TEST(BadCalibrations, NumbersThatAreNone) {
   for (const Case& each : cases()) {
     SCOPED_TRACE(each.path);
     const Files files(each);
+    const auto found = kUnread.find(each.format);
+    const std::set<std::string> unread = found == kUnread.end() ? std::set<std::string>() : found->second;
     for (const CalibrationFile& file : files.all()) {
-      int refused = 0, tried = 0;
       for (const auto& [at, length] : numbers_in(file.content)) {
+        const std::string key = key_before(file.content, at);
         for (const char* odd : {"nan", "-.inf", "1e999", "twelve", "-1e308"}) {
           std::string text = file.content;
           files.put(file, text.replace(at, length, odd));
-          const bool finite = std::string(odd) == "-1e308";
           const std::string said = files.outcome();
-          tried += finite ? 0 : 1;
-          refused += !finite && said != "accepted" ? 1 : 0;
+          if (std::string(odd) == "-1e308" || unread.contains(key)) continue;
+          EXPECT_NE(said, "accepted") << file.path << ": " << key << " as " << odd;
         }
       }
-      // Left over: keys that are not asked for (KITTI raw's unrectified cameras, theta, P at T = 1).
-      EXPECT_GE(refused, tried / 3) << file.path;
       files.put_back();
     }
   }

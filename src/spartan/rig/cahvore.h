@@ -18,8 +18,9 @@ namespace spartan {
 /// L = 1 with e = 0 is CAHVOR; L = 0 is equidistant.
 /// Source: Gennery, "Generalized camera calibration including fish-eye lenses", IJCV 2006; JPL's file types 1, 2 and 3
 /// are L = 1, L = 0 and L as given. Frame as in cahv.h.
-/// Domain: θ below π, below π/(2|L|), and below the angle where χ (1 + μ) stops growing; P farther than the moving
-/// pupil (one θ only leads through it); P' before the camera (z > 0).
+/// Domain: θ below π, below π/(2|L|), below the angle where χ (1 + μ) stops growing, and below the one where the
+/// pupil goes astray (five times as far as within 90°); P farther from C than all places where lines of sight cross
+/// (nearest_m()), so that one θ only leads through it (docs/math/camera_models.md); P' before the camera (z > 0).
 class CahvoreModel {
  public:
   using Radial = CahvorModel::Radial;
@@ -41,6 +42,8 @@ class CahvoreModel {
   const Entrance& entrance_m() const { return entrance_; }
   double linearity() const { return linearity_; }
   double largest_angle() const { return largest_angle_; }  ///< largest valid θ, rad
+  /// No point is seen that is as near to C as this: lines of sight cross there. Zero where the pupil does not move.
+  double nearest_m() const { return nearest_; }
 
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;
   std::optional<ProjectionWithJacobian> project_with_jacobian(const Eigen::Vector3d& point) const;
@@ -60,7 +63,7 @@ class CahvoreModel {
   Radial radial_{};
   Entrance entrance_{};
   double linearity_ = 1;
-  double largest_angle_ = 0;
+  double largest_angle_ = 0, nearest_ = 0;
 };
 
 }  // namespace spartan

@@ -3,6 +3,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "spartan/rig/model_equivalents.h"
 #include "spartan/rig/rig_differences.h"
@@ -21,6 +22,7 @@ struct Holder {
   const char* path;
   std::vector<const char*> models;  // kinds below
   bool body, left_camera;           // which frames it can say: a body of its own, the left camera's
+  bool sizes;                       // an image size for each eye
 };
 const std::vector<Holder> kHolders{
     {Format::rig_yaml,
@@ -28,35 +30,46 @@ const std::vector<Holder> kHolders{
      {"pinhole", "radtan4", "radtan5", "radtan8", "equidistant", "two_terms", "double_sphere", "cahv", "cahvor",
       "cahvore"},
      true,
+     true,
      true},
-    {Format::kitti, "calib.txt", {"pinhole"}, false, true},
-    {Format::kitti_raw, "calib_cam_to_cam.txt", {"pinhole"}, true, true},
-    {Format::euroc, "mav0", {"pinhole", "radtan4", "two_terms", "equidistant", "double_sphere"}, true, false},
-    {Format::kalibr, "camchain.yaml", {"pinhole", "radtan4", "two_terms", "equidistant", "double_sphere"}, true, true},
+    {Format::kitti, "calib.txt", {"pinhole"}, false, true, false},
+    {Format::kitti_raw, "calib_cam_to_cam.txt", {"pinhole"}, true, true, false},
+    {Format::euroc, "mav0", {"pinhole", "radtan4", "two_terms", "equidistant", "double_sphere"}, true, false, true},
+    {Format::kalibr,
+     "camchain.yaml",
+     {"pinhole", "radtan4", "two_terms", "equidistant", "double_sphere"},
+     true,
+     true,
+     true},
     {Format::opencv,
      "stereo.yml",
      {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "equidistant"},
      false,
-     true},
+     true,
+     false},
     {Format::opencv,
      "stereo.xml",
      {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "equidistant"},
      false,
-     true},
+     true,
+     false},
     {Format::ros,
      "camera_info.yaml",
      {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "equidistant"},
      false,
+     true,
      true},
     {Format::mrcal,
      "pair.cameramodel",
      {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "cahvor", "cahvore"},
      true,
+     true,
      true},
-    {Format::tsai, "pair.tsai", {"pinhole", "radtan4", "two_terms", "radtan5"}, true, true},
+    {Format::tsai, "pair.tsai", {"pinhole", "radtan4", "two_terms", "radtan5"}, true, true, false},
     {Format::cahvor,
      "pair.cahvor",
      {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "cahv", "cahvor", "cahvore"},
+     true,
      true,
      true},
 };
@@ -98,10 +111,14 @@ Camera any_camera(const char* name, const std::string& kind, ImageSize size) {
   return camera;
 }
 
+ImageSize any_size() {
+  return {*rc::gen::inRange(1, 5000), *rc::gen::inRange(1, 5000)};
+}
+
 // One pair; rectified where asked for. The body sees the left camera look forward within what REP-103 frames allow.
-Rig any_rig(const std::string& kind, bool body, bool rectified) {
-  const ImageSize size{*rc::gen::inRange(1, 5000), *rc::gen::inRange(1, 5000)};
-  Camera left = any_camera("left", kind, size), right = any_camera("right", kind, size);
+Rig any_rig(const std::string& kind, bool body, bool rectified, bool sizes) {
+  const ImageSize size = any_size();
+  Camera left = any_camera("left", kind, size), right = any_camera("right", kind, sizes ? any_size() : size);
   Pose right_from_left = Pose::from_translation({-between(0.01, 2), 0, 0});
   if (rectified) {
     const auto of_right = std::get<PinholeModel>(right.model);
@@ -166,7 +183,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, EveryFormatHoldsWhatItSaysItHolds, ()) {
   const std::string kind = *rc::gen::elementOf(holder.models);
   const bool body = holder.body && (!holder.left_camera || *rc::gen::arbitrary<bool>());
   const bool rectified = holder.format == Format::kitti || holder.format == Format::kitti_raw;
-  const Rig rig = any_rig(kind, body, rectified);
+  const Rig rig = any_rig(kind, body, rectified, holder.sizes);
   RC_PRE(rig.find_faults().empty());
   RC_CLASSIFY(true, std::string(holder.path) + " " + kind);
   const TemporaryFolder folder;
@@ -186,7 +203,8 @@ RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
   const bool by_body = a.body && b.body, by_left = a.left_camera && b.left_camera;
   RC_PRE(held && (by_body || by_left));
   const auto is_kitti = [](const Holder& h) { return h.format == Format::kitti || h.format == Format::kitti_raw; };
-  const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()), is_kitti(a) || is_kitti(b));
+  const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()), is_kitti(a) || is_kitti(b),
+                          a.sizes && b.sizes);
   RC_PRE(rig.find_faults().empty());
   const TemporaryFolder first, second, third;
   const auto of_a = there_and_back(rig, a, first);
@@ -200,10 +218,90 @@ RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
   expect_same(of_a->rig, again->rig);
 }
 
+PixelFormat any_pixel_format() {
+  PixelFormat format;
+  format.layout = *rc::gen::element(PixelLayout::gray, PixelLayout::rgb, PixelLayout::bayer_rggb,
+                                    PixelLayout::bayer_grbg, PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr);
+  format.bits = *rc::gen::inRange(8, 17);
+  if (format.bits > 8 && *rc::gen::arbitrary<bool>()) format.alignment = BitAlignment::high;
+  return format;
+}
+
+// The pair stands on a mast, its pixels are anything, and it need not be for odometry.
+void put_on_mast(Rig& rig) {
+  PanTiltUnit mast;
+  mast.body_from_base = Pose(exp_so3(any_vector(0.1)), any_vector(1));
+  mast.rest_pan_rad = between(-0.2, 0.2);
+  mast.rest_tilt_rad = between(-0.2, 0.2);
+  rig.pan_tilt_units.push_back(mast);
+  for (Camera& camera : rig.cameras) {
+    camera.mount = mast.name;
+    camera.pixel_format = any_pixel_format();
+    camera.self_mask = *rc::gen::element("", "masks/one.png");
+  }
+  rig.pairs[0].nearest_m = between(0, 3);
+  rig.pairs[0].for_odometry = *rc::gen::arbitrary<bool>();
+}
+
+// All that a rig can be, bit for bit.
+RC_GTEST_PROP(CalibrationRoundTrip, RigYamlHoldsEverything, ()) {
+  Rig rig = any_rig(*rc::gen::elementOf(kHolders[0].models), true, false, true);
+  put_on_mast(rig);
+  for (const char* name : {"below_left", "below_right"}) {
+    Camera camera = any_camera(name, *rc::gen::elementOf(kHolders[0].models), any_size());
+    camera.mount_from_camera = Pose(exp_so3(any_vector(2)), any_vector(3));
+    camera.pixel_format = any_pixel_format();
+    camera.vignetting.coefficients = {between(-0.3, 0), between(-0.1, 0.1)};
+    if (*rc::gen::arbitrary<bool>()) {
+      camera.vignetting.centre_px =
+          Eigen::Vector2d(between(0, camera.size.width - 1), between(0, camera.size.height - 1));
+    }
+    rig.cameras.push_back(camera);
+  }
+  rig.pairs.push_back({"below", "below_left", "below_right", between(0, 1), *rc::gen::arbitrary<bool>()});
+  RC_PRE(rig.find_faults().empty());
+  const TemporaryFolder folder;
+  const auto read = there_and_back(rig, kHolders[0], folder);
+  if (!read) RC_FAIL(read.error().message());
+  RC_ASSERT(read->rig == rig);
+}
+
+// A mast, pixels and distances have no place in other formats: they are dropped, which is told; the cameras stand as
+// at rest.
+RC_GTEST_PROP(CalibrationRoundTrip, WhatIsDroppedIsToldAndNothingElseChanges, ()) {
+  const Holder holder = kHolders[*rc::gen::inRange<std::size_t>(1, kHolders.size())];
+  const std::string kind = *rc::gen::elementOf(holder.models);
+  const bool rectified = holder.format == Format::kitti || holder.format == Format::kitti_raw;
+  const Rig plain = any_rig(kind, true, rectified, holder.sizes);
+  Rig rig = plain;
+  put_on_mast(rig);
+  RC_PRE(rig.find_faults().empty());
+  const TemporaryFolder folder;
+  const auto read = there_and_back(rig, holder, folder);
+  if (!read) RC_FAIL(std::string(holder.path) + ", " + kind + ": " + read.error().message());
+  std::set<std::string> lost;
+  for (const RigDifference& each : describe_differences(rig, read->rig)) lost.insert(each.key);
+  std::set<std::string> wanted{"pan_tilt_units.mast"};
+  for (const Camera& camera : rig.cameras) {
+    const std::string key = "cameras." + camera.name + ".";
+    if (camera.pixel_format.layout != PixelLayout::gray) wanted.insert(key + "pixel_layout");
+    if (camera.pixel_format.bits != 8) wanted.insert(key + "bits");
+    if (camera.pixel_format.alignment != BitAlignment::low) wanted.insert(key + "bit_alignment");
+    if (!camera.self_mask.empty()) wanted.insert(key + "self_mask");
+  }
+  const std::string pair = "pairs." + rig.pairs[0].name + ".";
+  if (rig.pairs[0].nearest_m != 0) wanted.insert(pair + "nearest_m");
+  if (!rig.pairs[0].for_odometry) wanted.insert(pair + "for_odometry");
+  if (!holder.body) wanted.insert({"body", "pose_convention"});
+  std::erase_if(lost, [](const std::string& key) { return key.ends_with("name"); });
+  RC_ASSERT(lost == wanted);
+  expect_same(rig, read->rig);
+}
+
 // Formats without an end of cameras keep all of them.
 RC_GTEST_PROP(CalibrationRoundTrip, FurtherCamerasAreKept, ()) {
   const Holder holder = *rc::gen::elementOf(std::vector<Holder>{kHolders[0], kHolders[3], kHolders[4]});
-  Rig rig = any_rig("radtan4", true, false);
+  Rig rig = any_rig("radtan4", true, false, true);
   const int more = *rc::gen::inRange(1, 4);
   for (int i = 0; i < more; ++i) {
     Camera camera = any_camera(("more" + std::to_string(i)).c_str(), "equidistant", {640, 480});

@@ -75,13 +75,14 @@ TEST(RadialTangential, AnswersOnlyWhereTheMapGrows) {
 
 // A narrow lens, a fisheye beyond the half space, and one whose map folds back inside the picture.
 TEST(Equidistant, ObeysTheLaws) {
-  for (const EquidistantModel::Coefficients& k :
-       {EquidistantModel::Coefficients{0, 0, 0, 0}, {-0.013, 0.032, -0.024, 0.006}, {0.05, 0.01, 0.002, 1e-4}}) {
+  const std::vector<std::pair<EquidistantModel::Coefficients, double>> lenses{
+      {{0, 0, 0, 0}, 0.33}, {{-0.013, 0.032, -0.024, 0.006}, 1}, {{0.05, 0.01, 0.002, 1e-4}, 1}};
+  for (const auto& [k, share] : lenses) {
     const EquidistantModel model({190.9, 190.2, 367.2, 248.4}, k);
     testing::expect_round_trips(model, kSize);
     testing::expect_true_jacobians(model, kSize);
     testing::expect_honest_limits(model, true);
-    testing::expect_consistent_answers(model, kSize);
+    EXPECT_GE(testing::expect_consistent_answers(model, kSize), share);
   }
 }
 
@@ -111,9 +112,12 @@ const std::vector<DoubleSphereModel> kSpheres{
 };
 
 TEST(DoubleSphere, ObeysTheLaws) {
-  for (const DoubleSphereModel& model : kSpheres) {
+  const std::vector<double> shares{0.5, 0.33, 1, 1, 0.29, 0.08};
+  ASSERT_EQ(shares.size(), kSpheres.size());
+  for (std::size_t i = 0; i < kSpheres.size(); ++i) {
+    const DoubleSphereModel& model = kSpheres[i];
     SCOPED_TRACE(model.xi);
-    testing::expect_consistent_answers(model, kSize, 1e-8);
+    EXPECT_GE(testing::expect_consistent_answers(model, kSize), shares[i]);
     if (model.alpha == 1) continue;  // the picture's corners are beyond its fold
     testing::expect_round_trips(model, kSize);
     testing::expect_true_jacobians(model, kSize);
@@ -168,7 +172,7 @@ TEST(Cahvor, ObeysTheLaws) {
     testing::expect_round_trips(model, kSize);
     testing::expect_true_jacobians(model, kSize);
     testing::expect_honest_limits(model);
-    testing::expect_consistent_answers(model, kSize, 1e-8);
+    EXPECT_EQ(testing::expect_consistent_answers(model, kSize), 1);
   }
   // √τ (1 − 0.3 τ) grows to √τ = 1/√0.9.
   EXPECT_NEAR(CahvorModel({kPinhole, 0}, kOpticalAxis, {0, -0.3, 0}).largest_radius(), 1 / std::sqrt(0.9), 1e-9);
@@ -176,12 +180,13 @@ TEST(Cahvor, ObeysTheLaws) {
 
 TEST(Cahvore, ObeysTheLaws) {
   const CahvModel wide{{230.5, 231.0, 367.2, 248.4}, 0.1};
-  for (const double linearity : {1.0, 0.8, 0.37, 0.0, -0.3}) {
+  const std::vector<std::pair<double, double>> linearities{{1.0, 1}, {0.8, 1}, {0.37, 1}, {0.0, 0.6}, {-0.3, 0.39}};
+  for (const auto& [linearity, share] : linearities) {
     SCOPED_TRACE(linearity);
     const CahvoreModel model(wide, kOpticalAxis, {5e-4, -0.03, 0.006}, {0.004, 0.002, -3e-4}, linearity);
-    // θ/sin θ grows without bound as the line of sight turns backwards, and with it what rounding does.
-    testing::expect_consistent_answers(model, kSize, linearity < 0 ? 1e-7 : 1e-8);
-    testing::expect_true_jacobians(model, {kSize.width / 2, kSize.height});
+    testing::expect_round_trips(model, kSize, 1e-9, 0.02);
+    EXPECT_GE(testing::expect_consistent_answers(model, kSize), share);
+    testing::expect_true_jacobians(model, kSize);
     testing::expect_honest_limits(model, linearity < 1);
   }
   // The axis itself, and beside it by next to nothing.
@@ -203,6 +208,35 @@ TEST(Cahvore, IsNotCentral) {
   ASSERT_TRUE(ray);
   EXPECT_NEAR(ray->origin.z(), (1.2 / std::sin(1.2) - 1) * 0.01, 1e-12);
   EXPECT_NEAR(std::atan2(ray->direction.x(), ray->direction.z()), 1.2, 1e-12);
+}
+
+// Near the pupil several lines of sight lead through one point: no pixel of them is the right one.
+TEST(Cahvore, SeesNothingWhereLinesOfSightCross) {
+  const CahvModel wide{{230.5, 231.0, 367.2, 248.4}, 0.1};
+  const CahvoreModel model(wide, kOpticalAxis, {5e-4, -0.03, 0.006}, {0.004, 0.002, -3e-4}, 0);
+  EXPECT_GT(model.nearest_m(), 0.005);
+  EXPECT_LT(model.nearest_m(), 0.02);
+  // Every line of sight of a fine grid at every depth: none or its own pixel.
+  int none = 0, own = 0;
+  for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 40)) {
+    const auto ray = model.unproject(pixel);
+    ASSERT_TRUE(ray);
+    for (double depth = 1e-4; depth < 0.03; depth *= 1.1) {
+      const auto back = model.project(ray->origin + depth * ray->direction);
+      (back ? own : none) += 1;
+      if (back) {
+        EXPECT_LE((*back - pixel).norm(), 1e-9) << pixel.transpose() << " at " << depth << " m";
+      }
+    }
+  }
+  EXPECT_GT(own, none / 10);
+  // θ/sin θ has no end: the lines of sight far behind the camera must not take the near points from all others.
+  const CahvoreModel plain(wide, kOpticalAxis, {0, 0, 0}, {0.004, 0, 0}, 0);
+  EXPECT_LT(plain.nearest_m(), 0.03);
+  EXPECT_GT(plain.largest_angle(), 2.5);
+  EXPECT_TRUE(plain.project(0.03 * kOpticalAxis));
+  // A pupil that moves backwards parts the lines of sight.
+  EXPECT_EQ(CahvoreModel(wide, kOpticalAxis, {0, 0, 0}, {-0.004, 0, 0}, 1).nearest_m(), 0);
 }
 
 // L = 1 without a moving pupil is CAHVOR; L = 0 without one and without μ is equidistant.

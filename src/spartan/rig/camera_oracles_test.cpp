@@ -85,18 +85,15 @@ TEST(Cahvore, ProjectsAsMrcal) {
     const testing::MrcalModel oracle("LENSMODEL_CAHVORE_linearity=" + std::to_string(linearity),
                                      {kCore.fx, kCore.fy, kCore.cx, kCore.cy, std::atan2(o.x(), o.z()),
                                       std::asin(o.y()), 0.001, -0.02, 0.004, 0.006, 0.002, -0.0005});
-    int compared = 0;
     for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 24)) {
       const auto ray = model.unproject(pixel);
-      if (!ray) continue;
+      ASSERT_TRUE(ray) << pixel.transpose() << " linearity " << linearity;
       // mrcal brings every point to the distance 1 from C before it looks, so only such points can be compared.
       const double along = ray->origin.dot(ray->direction);
       const double range = std::sqrt(along * along - ray->origin.squaredNorm() + 1) - along;
       EXPECT_LE((oracle.project(ray->origin + range * ray->direction) - pixel).norm(), 1e-9)
           << pixel.transpose() << " linearity " << linearity;
-      ++compared;
     }
-    EXPECT_GT(compared, 400) << linearity;
   }
 }
 
