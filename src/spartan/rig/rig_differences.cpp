@@ -113,8 +113,20 @@ class Comparison {
       return std::string(c.pixel_format.alignment == BitAlignment::high ? "high" : "low");
     };
     compare(field("bit_alignment"), "their end of the sample", alignment(camera), alignment(*other));
+    compare_vignetting(key, camera.vignetting, other->vignetting);
     compare(field("self_mask"), "the self-mask", camera.self_mask, other->self_mask);
     compare_place(key, camera, *other);
+  }
+
+  void compare_vignetting(const std::string& key, const Vignetting& wanted, const Vignetting& got) {
+    const auto list = [](const std::vector<double>& numbers) {
+      return numbers.empty() ? std::string() : fmt::format("[{}]", fmt::join(numbers, ", "));
+    };
+    const auto centre = [&](const Vignetting& v) {
+      return v.centre_px ? list({v.centre_px->x(), v.centre_px->y()}) : std::string();
+    };
+    compare(key + ".vignetting", "the fall-off of light", list(wanted.coefficients), list(got.coefficients));
+    compare(key + ".vignetting_centre_px", "its centre", centre(wanted), centre(got));
   }
 
   void compare_place(const std::string& key, const Camera& camera, const Camera& other) {
