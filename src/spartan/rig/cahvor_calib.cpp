@@ -17,6 +17,7 @@
 namespace spartan {
 namespace {
 
+using rig_detail::EyeOfFile;
 using rig_detail::TextMatrices;
 
 Result<Eigen::Vector3d> read_vector(const TextMatrices& file, const char* key) {
@@ -163,7 +164,7 @@ Result<CameraModel> read_model(const TextMatrices& file, const PlacedCahv& place
   return CahvoreModel(placed.cahv, axis, radial, {e->x(), e->y(), e->z()}, kind->linearity);
 }
 
-Result<Camera> read_eye(const std::string& path, const std::string& name, ImageSize size) {
+Result<EyeOfFile> read_eye(const std::string& path, const std::string& name, ImageSize size) {
   const auto file = TextMatrices::read(path, '=');
   if (!file) return failure(file);
   Camera camera;
@@ -186,7 +187,7 @@ Result<Camera> read_eye(const std::string& path, const std::string& name, ImageS
     camera.size = {static_cast<int>((*sides)[0]), static_cast<int>((*sides)[1])};
   }
   if (camera.size.empty()) return rig_detail::unknown_size(path);
-  return camera;
+  return EyeOfFile{std::move(camera)};
 }
 
 // --- writing ---
@@ -214,17 +215,11 @@ Result<std::string> text_of(const Camera& camera, const Pose& pose) {
     if (expressed_as<CahvorModel>(camera.model)) {
       return core_lines(camera, "CAHVOR = perspective, distortion", m->cahv(), pose) + radial_lines(*m, pose);
     }
+    // Types 1 and 2 are those of L = 1 and 0, but mrcal reads none but the third.
     const double l = m->linearity();
-    const std::string kind = l == 1   ? "CAHVORE1 = perspective, distortion, pupil"
-                             : l == 0 ? "CAHVORE2 = fish-eye"
-                                      : fmt::format("CAHVORE3,{} = general", l);
-    return core_lines(camera, kind, m->cahv(), pose) + radial_lines(*m, pose) +
+    return core_lines(camera, fmt::format("CAHVORE3,{} = general", l), m->cahv(), pose) + radial_lines(*m, pose) +
            vector_line("E", {m->entrance_m()[0], m->entrance_m()[1], m->entrance_m()[2]}) +
-           fmt::format("T = {}\nP = {}\n",
-                       l == 1   ? 1
-                       : l == 0 ? 2
-                                : 3,
-                       l);
+           fmt::format("T = 3\nP = {}\n", l);
   }
   if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     return "# The distortion is in the line LENSMODEL_OPENCV8, as mrcal reads it; other programs see a CAHV without "

@@ -21,6 +21,11 @@ Result<std::string> read_calibration_text(const std::string& path, std::size_t l
   const auto fault = [&](const std::string& what) { return failure(ErrorCode::configuration, what, path); };
   std::error_code error;
   if (fs::is_directory(path, error)) return fault("is a folder, not a file");
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
+    return fault("is no file: a calibration is read more than once, which a pipe cannot be");
+  }
+  const std::uintmax_t bytes = fs::file_size(path, error);
+  if (!error && bytes > largest) return fault(fmt::format("is larger than {} MB: no calibration", largest >> 20U));
   std::ifstream file(path, std::ios::binary);
   if (!file) return fault(std::string("cannot be read: ") + std::strerror(errno));
   std::string content;
@@ -30,6 +35,8 @@ Result<std::string> read_calibration_text(const std::string& path, std::size_t l
     if (content.size() > largest) return fault(fmt::format("is larger than {} MB: no calibration", largest >> 20U));
   }
   if (file.bad()) return fault("cannot be read to its end");
+  // Some editors begin a file with the mark of UTF-8.
+  if (content.starts_with("\xEF\xBB\xBF")) content.erase(0, 3);
   return content;
 }
 

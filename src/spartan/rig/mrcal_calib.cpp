@@ -3,7 +3,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/calibration_writers.h"
@@ -16,7 +18,13 @@
 namespace spartan {
 namespace {
 
+using rig_detail::EyeOfFile;
 using rig_detail::PythonDict;
+
+// What else mrcal keeps in its files.
+constexpr std::array<std::pair<const char*, const char*>, 2> kPassedOver{
+    {{"valid_intrinsics_region", "where the lens is known well is not kept"},
+     {"optimization_inputs", "the optimisation that the camera comes from is not kept"}}};
 
 constexpr std::string_view kCahvore = "CAHVORE_linearity=";
 
@@ -72,7 +80,7 @@ Result<CameraModel> read_model(const PythonDict& file) {
   return CahvoreModel({pinhole, 0}, axis, {k[6], k[7], k[8]}, {k[9], k[10], k[11]}, *linearity);
 }
 
-Result<Camera> read_eye(const std::string& path, const std::string& name) {
+Result<EyeOfFile> read_eye(const std::string& path, const std::string& name) {
   const auto text = rig_detail::read_calibration_text(path, rig_detail::kLargestModelFile_bytes);
   if (!text) return failure(text);
   const auto file = PythonDict::parse(*text, path);
@@ -96,7 +104,11 @@ Result<Camera> read_eye(const std::string& path, const std::string& name) {
   const Eigen::Vector3d turn((*e)[0], (*e)[1], (*e)[2]);
   if (turn.norm() > 1e3) return file->fault("extrinsics", "its first three numbers are not a rotation");
   camera.mount_from_camera = Pose(exp_so3(turn), {(*e)[3], (*e)[4], (*e)[5]}).inverse();
-  return camera;
+  EyeOfFile eye{std::move(camera)};
+  for (const auto& [key, what] : kPassedOver) {
+    if (file->has(key)) eye.left_out.push_back({fmt::format("{}.{}", name, key), what});
+  }
+  return eye;
 }
 
 struct Lens {
@@ -127,7 +139,6 @@ Result<Lens> lens_of(const Camera& camera) {
     return lens;
   }
   if (const auto m = expressed_as<CahvoreModel>(camera.model)) {
-    if (m->cahv().skew_px != 0) return rig_detail::cannot_hold(camera, "mrcal's cameras have no skew");
     Lens lens{fmt::format("{}{}", kCahvore, m->linearity()), core(m->cahv().core)};
     append_cahvor(lens.numbers, m->optical_axis(), m->radial());
     if (expressed_as<CahvorModel>(camera.model)) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "spartan/rig/calibration_readers.h"
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/opencv_storage.h"
 #include "spartan/rig/rig_files.h"
@@ -187,30 +188,64 @@ Result<Rig> read_rectified(const Storages& files, ImageSize size) {
                          Pose::from_translation(left->place_m - right->place_m));
 }
 
-ImageSize size_in(const Storages& files, ImageSize otherwise) {
+Result<int> read_side(const Storages& files, const char* key, const char* other) {
+  const auto pixels = files.integer(key);
+  if (!pixels || *pixels < 1) return files.fault({key}, "must be a whole number above zero");
+  if (!files.has(other)) return files.fault({key}, fmt::format("without {}", other));
+  return *pixels;
+}
+
+// What the file says, which must be sound; `otherwise` where it says nothing.
+Result<ImageSize> size_in(const Storages& files, ImageSize otherwise) {
   for (const char* key : {"image_size", "imageSize"}) {
-    if (const auto size = files.size(key)) return *size;
+    if (!files.has(key)) continue;
+    const auto size = files.size(key);
+    if (!size || size->empty()) return files.fault({key}, "must be two whole numbers above zero");
+    return *size;
   }
-  const auto width = files.integer("image_width"), height = files.integer("image_height");
-  return width && height ? ImageSize{*width, *height} : otherwise;
+  const char *width_key = "image_width", *height_key = "image_height";
+  if (!files.has(width_key) && !files.has(height_key)) return otherwise;
+  const auto width = read_side(files, files.has(width_key) ? width_key : height_key, height_key);
+  const auto height = read_side(files, files.has(height_key) ? height_key : width_key, width_key);
+  if (!width) return failure(width);
+  if (!height) return failure(height);
+  return ImageSize{*width, *height};
+}
+
+// The rectified view that the file chose: a rig has no place for it. Of rectified pictures P1 and P2 are the cameras.
+std::vector<RigDifference> rectification_in(const Storages& files, bool raw) {
+  std::vector<RigDifference> left_out;
+  for (const char* key : raw ? std::vector{"R1", "R2", "P1", "P2", "Q"} : std::vector{"R1", "R2"}) {
+    if (files.has(key)) left_out.push_back({key, "the rectified view of the file is not kept"});
+  }
+  return left_out;
 }
 
 }  // namespace
 
 Result<Rig> read_opencv_calib(const std::string& intrinsics_path, const std::string& extrinsics_path, ImageSize size) {
+  return rig_detail::rig_of(rig_detail::read_opencv(intrinsics_path, extrinsics_path, size));
+}
+
+Result<ReadRig> rig_detail::read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path,
+                                        ImageSize size) {
   Storages files;
   for (const std::string& path : {intrinsics_path, extrinsics_path}) {
     if (path.empty()) continue;
     if (const Status status = files.open(path); !status) return failure(status);
   }
-  const ImageSize known = size_in(files, size);
-  if (known.empty()) {
-    return rig_detail::unknown_size(files.paths());
-  }
+  const auto known = size_in(files, size);
+  if (!known) return failure(known);
+  if (known->empty()) return unknown_size(files.paths());
   const bool raw = files.has("M1") || files.has("K1") || files.has("cameraMatrix1") || files.has("camera_matrix_1");
-  auto rig = raw || !files.has("P1") ? read_unrectified(files, known) : read_rectified(files, known);
+  auto rig = raw || !files.has("P1") ? read_unrectified(files, *known) : read_rectified(files, *known);
   if (!rig) return failure(std::move(rig));
-  return rig_detail::validated(std::move(*rig), files.paths());
+  auto sound = validated(std::move(*rig), files.paths());
+  if (!sound) return failure(std::move(sound));
+  std::vector<std::string> paths{intrinsics_path};
+  if (!extrinsics_path.empty()) paths.push_back(extrinsics_path);
+  return ReadRig{std::move(*sound), CalibrationFormat::opencv,   std::move(paths), {},
+                 kBodyIsLeftCamera, rectification_in(files, raw)};
 }
 
 }  // namespace spartan

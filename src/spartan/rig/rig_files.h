@@ -7,6 +7,7 @@
 #include "spartan/core/result.h"
 #include "spartan/rig/calibration_format.h"
 #include "spartan/rig/rig.h"
+#include "spartan/rig/rig_differences.h"
 
 namespace spartan {
 
@@ -19,13 +20,17 @@ struct ReadRig {
   Rig rig;
   CalibrationFormat format = CalibrationFormat::rig_yaml;
   std::vector<std::string> files;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;       ///< what had to be decided, in sentences; "body: …" first
+  std::string body;                     ///< which frame the body is; empty where the file itself says it
+  std::vector<RigDifference> left_out;  ///< what a rig has no place for; keys as in rig.yaml, or those of the file
 };
 
 /// Any calibration: the format is guessed from name and content; of a folder, from what lies in it. Formats with a
 /// file for each eye take "LEFT,RIGHT", or one of the two where the other one lies beside it under the name of the
 /// other eye. `size_hint` counts for formats that do not hold the image size; without it, pictures beside tell it.
 Result<ReadRig> read_calibration(const std::string& path, ImageSize size_hint = {});
+/// The same of a known format, which nothing is guessed for; `path` is a file, or "LEFT,RIGHT".
+Result<ReadRig> read_calibration_as(CalibrationFormat format, const std::string& path, ImageSize size_hint = {});
 /// The rig of it.
 Result<Rig> read_rig(const std::string& path, ImageSize size_hint = {});
 

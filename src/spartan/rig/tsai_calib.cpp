@@ -14,6 +14,7 @@
 namespace spartan {
 namespace {
 
+using rig_detail::EyeOfFile;
 using rig_detail::TextMatrices;
 
 // One line with numbers, once in the file.
@@ -98,7 +99,7 @@ Result<CameraModel> read_model(const TextMatrices& file) {
   return RadialTangentialModel(pinhole, k);
 }
 
-Result<Camera> read_eye(const std::string& path, const std::string& name, ImageSize size) {
+Result<EyeOfFile> read_eye(const std::string& path, const std::string& name, ImageSize size) {
   const auto file = TextMatrices::read(path, '=');
   if (!file) return failure(file);
   auto model = read_model(*file);
@@ -111,7 +112,7 @@ Result<Camera> read_eye(const std::string& path, const std::string& name, ImageS
   camera.size = size;
   camera.model = std::move(*model);
   camera.mount_from_camera = *pose;
-  return camera;
+  return EyeOfFile{std::move(camera)};
 }
 
 Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
