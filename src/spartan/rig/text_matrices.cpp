@@ -59,7 +59,7 @@ Result<std::vector<double>> TextMatrices::numbers(const std::string& key, std::s
   if (!held) return failure(held);
   std::vector<double> values;
   std::istringstream words(*held);
-  for (std::string word; words >> word;) {
+  for (std::string word; words >> word && !word.starts_with('#');) {
     const auto value = parse_number(word);
     if (!value) return fault(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
     values.push_back(*value);

@@ -23,7 +23,8 @@ class TextMatrices {
   static TextMatrices parse(const std::string& text, const std::string& name, char separator = ':');
 
   bool has(const std::string& key) const { return lines_.contains(key); }
-  /// Exactly `count` finite numbers; otherwise code `configuration` with "file:line" and the key.
+  /// Exactly `count` finite numbers, with a comment (#) behind them or none; otherwise code `configuration` with
+  /// "file:line" and the key.
   Result<std::vector<double>> numbers(const std::string& key, std::size_t count) const;
   /// What stands behind the separator, blanks at its ends removed.
   Result<std::string> text(const std::string& key) const;
