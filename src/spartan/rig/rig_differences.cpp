@@ -32,6 +32,7 @@ class Comparison {
     compare_body();
     for (const Camera& camera : wanted_.cameras) compare_camera(camera);
     for (std::size_t i = 0; i < wanted_.pairs.size(); ++i) compare_pair(i);
+    find_surplus();
     return std::move(differences_);
   }
 
@@ -141,7 +142,13 @@ class Comparison {
   }
 
   void compare_model(const std::string& key, const CameraModel& wanted, const CameraModel& got) {
-    const CameraModel was = plainest(wanted), is = plainest(got);
+    CameraModel was = plainest(wanted);
+    const CameraModel is = plainest(got);
+    // A skew that is gone is no other kind of camera.
+    if (skew_px(was) != 0 && skew_px(is) == 0) {
+      add(key + ".skew_px", fmt::format("[{}], now none", skew_px(was)));
+      was = plainest(without_skew(was));
+    }
     if (name_of(was) != name_of(is)) {
       return add(key + ".model", fmt::format("the camera model: {}, now {}", name_of(was), name_of(is)));
     }
@@ -182,6 +189,23 @@ class Comparison {
     if (right && right->name != other.right) add(key + ".right", "another camera is the right eye");
     compare(key + ".nearest_m", "the nearest depth", pair.nearest_m, other.nearest_m);
     compare(key + ".for_odometry", "for odometry", pair.for_odometry, other.for_odometry);
+  }
+
+  // What nobody wanted: files that lay there already.
+  void find_surplus() {
+    for (const PanTiltUnit& unit : got_.pan_tilt_units) {
+      const bool wanted = std::any_of(wanted_.pan_tilt_units.begin(), wanted_.pan_tilt_units.end(),
+                                      [&](const PanTiltUnit& other) { return other.name == unit.name; });
+      if (!wanted) add("pan_tilt_units." + unit.name, "a pan-tilt unit that was not there before");
+    }
+    for (const Camera& camera : got_.cameras) {
+      const bool wanted =
+          std::any_of(partner_.begin(), partner_.end(), [&](const auto& entry) { return entry.second == camera.name; });
+      if (!wanted) add("cameras." + camera.name, "a camera that was not there before");
+    }
+    for (std::size_t i = wanted_.pairs.size(); i < got_.pairs.size(); ++i) {
+      add("pairs." + got_.pairs[i].name, "a pair that was not there before");
+    }
   }
 
   const Rig& wanted_;

@@ -78,6 +78,16 @@ TEST(RigDifferences, EveryFieldIsLookedAt) {
   EXPECT_EQ(differences([](Rig& r) { r.pairs.clear(); }), "pairs.front;");
 }
 
+TEST(RigDifferences, WhatNobodyWantedIsTold) {
+  EXPECT_EQ(differences([](Rig& r) {
+              r.cameras.push_back(r.cameras[2]);
+              r.cameras[3].name = "fourth";
+              r.pairs.push_back({"back", "third", "fourth"});
+              r.pan_tilt_units.push_back({"arm", Pose(), 0, 0});
+            }),
+            "pan_tilt_units.arm;cameras.fourth;pairs.back;");
+}
+
 TEST(RigDifferences, RoundingIsNone) {
   EXPECT_EQ(differences([](Rig& r) { std::get<PinholeModel>(r.cameras[0].model).cx += 1e-13; }), "");
   EXPECT_EQ(differences([](Rig& r) { r.cameras[0].model = RadialTangentialModel(kPinhole, {}); }), "");
