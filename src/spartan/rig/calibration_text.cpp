@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -49,6 +50,24 @@ tl::unexpected<Error> unknown_size(const std::string& where) {
   return failure(
       ErrorCode::configuration, "the image size is not known and this file does not hold it", where,
       "lay it beside its pictures, all of one size (KITTI: beside image_0), or convert it with --size-px 640,480");
+}
+
+std::optional<ImageSize> whole_size(double width, double height) {
+  constexpr double kMost = 1e6;
+  for (const double side : {width, height}) {
+    if (!(side >= 1 && side <= kMost && std::floor(side) == side)) return std::nullopt;
+  }
+  return ImageSize{static_cast<int>(width), static_cast<int>(height)};
+}
+
+std::optional<PinholeModel> pinhole_of_rows(const std::vector<double>& m) {
+  if (m.size() != 9 || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) return std::nullopt;
+  return PinholeModel{m[0], m[4], m[2], m[5]};
+}
+
+std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& turn) {
+  if (!(turn.norm() <= 1e3)) return std::nullopt;
+  return exp_so3(turn);
 }
 
 std::string list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers, const char* separator) {

@@ -122,11 +122,9 @@ Result<Pose> read_rectified_from_imu(const TextMatrices& file, const fs::path& f
 Result<ImageSize> read_size(const TextMatrices& file, const std::string& key) {
   const auto size = read_matrix<Eigen::Vector2d>(file, key);
   if (!size) return failure(size);
-  const bool whole = size->array().floor().matrix() == *size;
-  if (!whole || size->minCoeff() < 1 || size->maxCoeff() > 1e6) {
-    return failure(ErrorCode::configuration, key + ": must be two whole numbers above zero", file.where(key));
-  }
-  return ImageSize{static_cast<int>(size->x()), static_cast<int>(size->y())};
+  const auto known = rig_detail::whole_size(size->x(), size->y());
+  if (!known) return file.fault(key, "must be two whole numbers above zero");
+  return *known;
 }
 
 // Lines that no rig has a place for. They must hold sound numbers all the same: a file with one NaN is not trusted.

@@ -68,6 +68,11 @@ CameraModel plainest(const CameraModel& model) {
   return std::visit([](const auto& m) { return plainest(m); }, model);
 }
 
+bool is_rational(const RadialTangentialModel& model) {
+  const auto& k = model.coefficients();
+  return k[5] != 0 || k[6] != 0 || k[7] != 0;
+}
+
 double skew_px(const CameraModel& model) {
   if (const auto* m = std::get_if<CahvModel>(&model)) return m->skew_px;
   if (const auto* m = std::get_if<CahvorModel>(&model)) return m->cahv().skew_px;

@@ -74,11 +74,11 @@ bool is_fisheye(const Storages& files) {
 Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& names) {
   const auto held = files.matrix(names, {9});
   if (!held) return failure(held);
-  const auto& m = *held;
-  if (!(m[0] > 0 && m[4] > 0) || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
+  const auto pinhole = rig_detail::pinhole_of_rows(*held);
+  if (!pinhole || !(pinhole->fx > 0 && pinhole->fy > 0)) {
     return files.fault(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
   }
-  return PinholeModel{m[0], m[4], m[2], m[5]};
+  return *pinhole;
 }
 
 Result<CameraModel> read_model(const Storages& files, const std::string& number) {
@@ -108,10 +108,9 @@ Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::strin
   const auto r = files.matrix({name}, {3, 9});
   if (!r) return failure(r);
   if (r->size() == 3) {
-    const Eigen::Vector3d turn((*r)[0], (*r)[1], (*r)[2]);
-    // A rotation vector that goes round many times has lost its digits.
-    if (turn.norm() > 1e3) return files.fault({name}, "is not a rotation");
-    return exp_so3(turn);
+    const auto turn = rig_detail::rotation_of_vector({(*r)[0], (*r)[1], (*r)[2]});
+    if (!turn) return files.fault({name}, "is not a rotation");
+    return *turn;
   }
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
   if (!is_rotation(rotation, 1e-4)) return files.fault({name}, "is not a rotation matrix");

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "spartan/core/image_io.h"
 #include "spartan/rig/calibration_readers.h"
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/pair_of_files.h"
@@ -22,18 +21,11 @@ bool is_there(const fs::path& path) {
   return fs::exists(path, error);
 }
 
-// The first picture of image_0 (KITTI odometry) or image_00/data (KITTI raw) beside the file.
+// The pictures of image_0 (KITTI odometry) or image_00/data (KITTI raw) beside the file.
 ImageSize size_of_recording_beside(const fs::path& file) {
   for (const char* folder : {"image_0", "image_00/data", "../image_0"}) {
-    std::error_code error;
-    fs::path first;
-    for (const auto& entry : fs::directory_iterator(file.parent_path() / folder, error)) {
-      const std::string extension = entry.path().extension().string();
-      if (extension != ".png" && extension != ".jpg" && extension != ".pgm") continue;
-      if (first.empty() || entry.path() < first) first = entry.path();
-    }
-    if (first.empty()) continue;
-    if (const auto image = read_image(first.string())) return image->size();
+    const ImageSize size = rig_detail::size_of_pictures_in((file.parent_path() / folder).string());
+    if (!size.empty()) return size;
   }
   return {};
 }

@@ -52,7 +52,7 @@ Result<Rig> read_kitti_raw_calib(const std::string& path);
 Result<Rig> read_euroc_calib(const std::string& mav0_folder);
 
 /// Kalibr's camchain: pinhole with radtan, equidistant or no distortion, omni without distortion, ds, eucm with β = 1.
-/// Body is the IMU where the file knows it (T_cam_imu), otherwise the left camera, turned. The first two cameras are
+/// Body is the IMU where a camera knows it (T_cam_imu, T_imu_cam), otherwise the left camera, turned. The first two are
 /// the pair.
 Result<ReadRig> read_kalibr_calib(const std::string& path);
 

@@ -199,8 +199,7 @@ struct Lens {
 Result<Lens> lens_of(const Camera& camera) {
   if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
-    const bool rational = std::any_of(k.begin() + 5, k.end(), [](double v) { return v != 0; });
-    if (rational) return Lens{m->pinhole(), "rational_polynomial", {k.begin(), k.end()}};
+    if (is_rational(*m)) return Lens{m->pinhole(), "rational_polynomial", {k.begin(), k.end()}};
     return Lens{m->pinhole(), "plumb_bob", {k.begin(), k.begin() + 5}};
   }
   if (const auto m = expressed_as<EquidistantModel>(camera.model)) {

@@ -68,6 +68,12 @@ Result<std::vector<double>> TextMatrices::numbers(const std::string& key, std::s
   return values;
 }
 
+Result<Eigen::Vector3d> TextMatrices::vector(const std::string& key) const {
+  const auto v = numbers(key, 3);
+  if (!v) return failure(v);
+  return Eigen::Vector3d((*v)[0], (*v)[1], (*v)[2]);
+}
+
 std::string TextMatrices::where(const std::string& key) const {
   const auto found = lines_.find(key);
   return found == lines_.end() ? name_ : fmt::format("{}:{}", name_, found->second.number);
