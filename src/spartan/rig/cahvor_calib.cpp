@@ -20,8 +20,9 @@ namespace {
 using rig_detail::EyeOfFile;
 using rig_detail::TextMatrices;
 
-// Of files with nine digits or more less skew than this, by the focal length, is their rounding; what shorter ones leave
-// is kept, and formats without a skew drop it (rig_writing.h). OpenCV's models have none, so that beside them it passes.
+// Of files with nine digits or more less skew than this, by the focal length, is their rounding; what shorter ones
+// leave is kept, and formats without a skew drop it (rig_writing.h). OpenCV's models have none, so that beside them it
+// passes.
 constexpr double kNoSkew = 1e-9, kNoSkewBesideOpencv = 1e-5;
 
 struct PlacedCahv {

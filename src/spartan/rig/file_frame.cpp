@@ -38,11 +38,11 @@ std::optional<Stance> stance_in_rover(const Pose& file_from_camera) {
 // The body is the left camera; where that stands in its files is lost, unless they are in its own frame.
 ReadRig rig_in_frame_of_camera(CalibrationFormat format, Camera left, Camera right) {
   ReadRig read;
-  read.body = std::string(kBodyIsLeftCamera) + " (the files' frame is none of a rover that it looks along)";
+  read.body = std::string(kBodyIsLeftCamera) + " (in the files' frame it does not stand as on a rover)";
   const Pose place = left.mount_from_camera;
   if (place.translation().norm() > 1e-12 || rotation_angle(place) > 1e-12) {
-    read.left_out = {{"body", fmt::format("the files' frame is not kept; the left camera stands there at ({:.6g}, "
-                                          "{:.6g}, {:.6g}), turned by {:.6g} degrees",
+    read.left_out = {{"body", fmt::format("the files' frame is not kept; the left camera stands there at ({:.10g}, "
+                                          "{:.10g}, {:.10g}), turned by {:.6g} degrees",
                                           place.translation().x(), place.translation().y(), place.translation().z(),
                                           rotation_angle(place) * 180 / std::numbers::pi)}};
   }
