@@ -46,8 +46,10 @@ std::vector<fs::path> read_along(CalibrationFormat format, const fs::path& file)
     case CalibrationFormat::opencv:
       return {"intrinsics" + file.extension().string(), "extrinsics" + file.extension().string()};
     case CalibrationFormat::euroc: {
+      constexpr int kMostCameras = 100;
       std::vector<fs::path> cameras;
-      for (int i = 0; i < 100; ++i) cameras.push_back(fs::path(fmt::format("cam{}", i)) / "sensor.yaml");
+      cameras.reserve(kMostCameras);
+      for (int i = 0; i < kMostCameras; ++i) cameras.push_back(fs::path(fmt::format("cam{}", i)) / "sensor.yaml");
       return cameras;
     }
     default:
