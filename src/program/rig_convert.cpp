@@ -9,6 +9,7 @@
 
 #include "program/json.h"
 #include "spartan/core/files.h"
+#include "spartan/rig/read_back.h"
 #include "spartan/rig/rig_differences.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/rig/rig_writing.h"
@@ -40,28 +41,61 @@ Result<Rig> chosen_rig(const ReadRig& read, const std::string& pair) {
                  "--pair");
 }
 
-// A mask's path counts from its rig file, and has to be found from the new one too.
-void move_masks(Rig& rig, const std::string& from, const std::string& to) {
-  for (Camera& camera : rig.cameras) {
-    if (camera.self_mask.empty() || fs::path(camera.self_mask).is_absolute()) continue;
-    const fs::path mask = fs::absolute(from).parent_path() / camera.self_mask;
-    camera.self_mask =
-        mask.lexically_normal().lexically_relative(fs::absolute(to).parent_path().lexically_normal()).string();
-  }
+// The folder as ".." leads out of it: without links.
+fs::path real_folder_of(const fs::path& file) {
+  std::error_code error;
+  const fs::path folder = fs::absolute(file).parent_path();
+  const fs::path real = fs::weakly_canonical(folder, error);
+  return error ? folder.lexically_normal() : real;
 }
 
-Status write_all(const CalibrationFiles& files, bool force) {
+// A size given beside files that hold another.
+Status check_size(const Rig& rig, ImageSize given) {
+  for (const Camera& camera : rig.cameras) {
+    if (given.empty() || camera.size == given) continue;
+    return failure(
+        ErrorCode::usage,
+        fmt::format("the files say that the camera {} has {} x {}", camera.name, camera.size.width, camera.size.height),
+        "--size-px", "leave it out");
+  }
+  return {};
+}
+
+// A name that reads as another format, or as no pair of files, would be read as such ever after.
+Status check_names(const CalibrationFiles& files, CalibrationFormat format, const std::string& to) {
+  const CalibrationFile& first = files.front();
+  if (const auto guess = guess_format(first.path, first.content); guess != format) {
+    return failure(ErrorCode::usage,
+                   fmt::format("files of this name are read as {}, not as {}", guess ? name_of(*guess) : "nothing",
+                               name_of(format)),
+                   first.path, "choose another ending");
+  }
+  if (!has_a_file_per_eye(format)) return {};
+  if (first.path == files.at(1).path) return failure(ErrorCode::usage, "is the name of both eyes' files", to);
+  if (first.path.find(',') != std::string::npos) {
+    return failure(ErrorCode::usage, "is neither one name nor LEFT,RIGHT", to, "names of such files have no comma");
+  }
+  return {};
+}
+
+Status check_places(const CalibrationFiles& files, bool force) {
   for (const CalibrationFile& file : files) {
     if (!force && is_there(file.path)) {
       return failure(ErrorCode::output, "is there already", file.path, "--force writes over it");
     }
   }
+  return {};
+}
+
+Status write_all(const CalibrationFiles& files) {
+  std::vector<NewFile> contents;
+  contents.reserve(files.size());
   for (const CalibrationFile& file : files) {
     const std::string folder = fs::path(file.path).parent_path().string();
     if (Status made = folder.empty() ? Status() : make_folder(folder); !made) return made;
-    if (Status written = write_file_atomically(file.path, file.content); !written) return written;
+    contents.push_back({file.path, file.content});
   }
-  return {};
+  return write_files_atomically(contents);
 }
 
 // Names of cameras, pairs and rigs that a reader invents cannot be lost.
@@ -70,7 +104,7 @@ bool is_a_name(const RigDifference& difference) {
 }
 
 // What --pair left out.
-std::vector<RigDifference> left_out(const Rig& source, const Rig& chosen) {
+std::vector<RigDifference> not_chosen(const Rig& source, const Rig& chosen) {
   std::vector<RigDifference> out;
   for (const Camera& camera : source.cameras) {
     if (!chosen.find_camera(camera.name)) out.push_back({"cameras." + camera.name, "left out, as --pair says"});
@@ -81,17 +115,20 @@ std::vector<RigDifference> left_out(const Rig& source, const Rig& chosen) {
   return out;
 }
 
-// What the files do not say of the rig: they are read again.
+// What was not taken from the source, and what the files do not say of the rig: they are read as they will be.
 Result<std::vector<RigDifference>> losses(const ReadRig& source, const Rig& written, CalibrationFormat format,
-                                          const std::string& path) {
+                                          const CalibrationFiles& files) {
   const ImageSize size = written.find_camera(written.pairs.front().left)->size;
-  const auto again = read_calibration(path, size);
+  const auto again = read_back(files, format, size);
+  if (!again && again.error().code == ErrorCode::output) return failure(again);
   if (!again) {
-    return failure(ErrorCode::internal, "what was written cannot be read: " + again.error().message(), path);
+    return failure(ErrorCode::internal, "nothing is written, for it could not be read: " + again.error().message());
   }
-  std::vector<RigDifference> lost = left_out(source.rig, written);
-  for (RigDifference& each : describe_differences(written, again->rig)) lost.push_back(std::move(each));
-  if (source.format != CalibrationFormat::rig_yaml) std::erase_if(lost, is_a_name);
+  std::vector<RigDifference> differences = describe_differences(written, again->rig);
+  if (source.format != CalibrationFormat::rig_yaml) std::erase_if(differences, is_a_name);
+  std::vector<RigDifference> lost = source.left_out;
+  for (RigDifference& each : not_chosen(source.rig, written)) lost.push_back(std::move(each));
+  for (RigDifference& each : differences) lost.push_back(std::move(each));
   if (!holds_image_size(format)) {
     lost.push_back(
         {"size_px", fmt::format("these files do not hold the image size, {} x {}", size.width, size.height)});
@@ -110,11 +147,14 @@ std::string in_words(const ReadRig& read, CalibrationFormat format, const Calibr
   return text;
 }
 
-std::string in_json(CalibrationFormat format, const CalibrationFiles& files, const std::vector<RigDifference>& lost) {
+std::string in_json(const ReadRig& read, CalibrationFormat format, const CalibrationFiles& files,
+                    const std::vector<RigDifference>& lost) {
   Json paths = Json::array(), losses = Json::array();
   for (const CalibrationFile& file : files) paths.push_back(file.path);
   for (const RigDifference& each : lost) losses.push_back({{"key", each.key}, {"text", each.text}});
-  const Json all = {{"schema", 1}, {"format", name_of(format)}, {"files", paths}, {"lost", losses}};
+  const Json all = {{"schema", 1},         {"format", name_of(format)},
+                    {"files", paths},      {"body", read.body.empty() ? Json(nullptr) : Json(read.body)},
+                    {"notes", read.notes}, {"lost", losses}};
   return all.dump(2) + "\n";
 }
 
@@ -123,25 +163,37 @@ Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {
   const auto named = calibration_format_named(a.format);
   const auto format = named ? Result<CalibrationFormat>(*named) : format_for_name(a.to);
   if (!format) return failure(format);
-  const auto read = read_calibration(a.from, a.size_px.empty() ? ImageSize{} : ImageSize{a.size_px[0], a.size_px[1]});
+  const ImageSize size = a.size_px.empty() ? ImageSize{} : ImageSize{a.size_px[0], a.size_px[1]};
+  const auto read = read_calibration(a.from, size);
   if (!read) return failure(read);
+  if (const Status sized = check_size(read->rig, size); !sized) return failure(sized);
   auto rig = chosen_rig(*read, a.pair);
   if (!rig) return failure(rig);
-  if (*format == CalibrationFormat::rig_yaml) move_masks(*rig, read->files.front(), a.to);
+  if (*format == CalibrationFormat::rig_yaml) rig = with_masks_moved(std::move(*rig), read->files.front(), a.to);
   const auto files = to_calibration_files(*rig, *format, a.to);
   if (!files) return failure(files);
-  if (const Status written = write_all(*files, a.force); !written) return failure(written);
-  // Formats with a file for each eye are read by both names, others by the first: EuRoC's finds its folder.
-  const std::string to_read =
-      has_a_file_per_eye(*format) ? (*files)[0].path + "," + (*files)[1].path : (*files)[0].path;
-  const auto lost = losses(*read, *rig, *format, to_read);
+  if (const Status names = check_names(*files, *format, a.to); !names) return failure(names);
+  if (const Status places = check_places(*files, a.force); !places) return failure(places);
+  const auto lost = losses(*read, *rig, *format, *files);
   if (!lost) return failure(lost);
-  const std::string told = context.json ? in_json(*format, *files, *lost) : in_words(*read, *format, *files, *lost);
+  if (const Status written = write_all(*files); !written) return failure(written);
+  const std::string told =
+      context.json ? in_json(*read, *format, *files, *lost) : in_words(*read, *format, *files, *lost);
   if (Status printed = print(told); !printed) return failure(printed);
   return kDone;
 }
 
 }  // namespace
+
+Rig with_masks_moved(Rig rig, const std::string& from_file, const std::string& to_file) {
+  const fs::path from = real_folder_of(from_file), to = real_folder_of(to_file);
+  for (Camera& camera : rig.cameras) {
+    if (camera.self_mask.empty() || fs::path(camera.self_mask).is_absolute()) continue;
+    const fs::path mask = from / camera.self_mask;
+    camera.self_mask = (real_folder_of(mask) / mask.filename()).lexically_relative(to).string();
+  }
+  return rig;
+}
 
 Status calibration_is_there(const std::string& path) {
   const std::size_t comma = path.find(',');

@@ -47,15 +47,28 @@ Result<std::string> read_file(const std::string& path) {
 }
 
 Status write_file_atomically(const std::string& path, std::string_view content) {
-  const std::string temporary = path + ".part";
-  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) return write_failure(path, errno);
-  int error = write_all(file, content);
-  if (::close(file) != 0 && error == 0) error = errno;
-  if (error == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary.c_str());
+  return write_files_atomically({{path, content}});
+}
+
+Status write_files_atomically(const std::vector<NewFile>& files) {
+  std::vector<std::string> temporaries;
+  const auto give_up = [&](const std::string& path, int error) {
+    for (const std::string& temporary : temporaries) ::unlink(temporary.c_str());
     return write_failure(path, error);
+  };
+  for (const NewFile& file : files) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(file.path, ignored)) return give_up(file.path, EISDIR);
+    const std::string temporary = file.path + ".part";
+    const int opened = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (opened < 0) return give_up(file.path, errno);
+    temporaries.push_back(temporary);
+    int error = write_all(opened, file.content);
+    if (::close(opened) != 0 && error == 0) error = errno;
+    if (error != 0) return give_up(file.path, error);
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (::rename(temporaries[i].c_str(), files[i].path.c_str()) != 0) return give_up(files[i].path, errno);
   }
   return {};
 }

@@ -35,6 +35,23 @@ TEST(Files, EmptyFilesAreFiles) {
   EXPECT_EQ(read_file(folder.file("empty")).value(), "");
 }
 
+TEST(Files, SeveralAreWrittenAllOrNone) {
+  const TemporaryFolder folder;
+  const std::string first = folder.write("first", "old"), second = folder.file("second");
+  std::filesystem::create_directory(second);
+  const Status status = write_files_atomically({{first, "new"}, {second, "new"}});
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::output);
+  EXPECT_EQ(status.error().where, second);
+  EXPECT_EQ(content_of(first), "old");
+  EXPECT_FALSE(write_files_atomically({{first, "new"}, {folder.path() + "/none/third", "new"}}));
+  EXPECT_EQ(content_of(first), "old");
+  EXPECT_EQ(entries(folder.path()), 2U);
+  std::filesystem::remove(second);
+  ASSERT_TRUE(write_files_atomically({{first, "new"}, {second, "newer"}}));
+  EXPECT_EQ(content_of(first) + content_of(second), "newnewer");
+}
+
 TEST(Files, ReadSaysWhichFileAndWhy) {
   const TemporaryFolder folder;
   const auto missing = read_file(folder.path() + "/none");

@@ -274,9 +274,41 @@ TEST(BadCalibrations, ManyFaultsAreToldInShort) {
   ASSERT_FALSE(read);
   EXPECT_LE(read.error().message().size(), 10000u);
   EXPECT_THAT(read.error().message(), HasSubstr("faults more"));
-  for (int i = 900; i < 100000; ++i) text += fmt::format("  c{}: {{}}\n", i);
+  for (int i = 900; i < 10000; ++i) text += fmt::format("  c{}: {{}}\n", i);
   EXPECT_THAT(parse_rig_yaml(text, "rig.yaml").error().message(),
-              HasSubstr("rig.yaml:2: cameras: has 100000 entries, more than 1000"));
+              HasSubstr("rig.yaml:2: cameras: has 10000 entries, more than 1000"));
+}
+
+// A value of YAML takes hundreds of times its place in the file.
+TEST(BadCalibrations, ListsWithoutAnEndAreNotParsed) {
+  const std::string list = repeated("a,", 3U << 20U);
+  const TemporaryFolder folder;
+  for (const std::string& text :
+       {"schema: [" + list + "a]\n", "cam0: {a: [" + list + "a]}\n",
+        "%YAML:1.0\n---\nM1: !!opencv-matrix\n  rows: 1\n  cols: 1\n  data: [" + list + "a]\n",
+        "schema:\n" + repeated("- a\n", 3U << 20U)}) {
+    const auto read = read_calibration(folder.write("x.yaml", text), kSize);
+    ASSERT_FALSE(read);
+    EXPECT_THAT(read.error().message(), HasSubstr("x.yaml: holds more than 100000 values: no calibration"));
+  }
+}
+
+// What no lens has, and what no printed number is for.
+TEST(BadCalibrations, NumbersBeyondAllCamerasAreRefused) {
+  const Files files(cases()[0]);
+  const CalibrationFile& file = files.all()[0];
+  const auto said = [&](const std::string& what, const std::string& with) {
+    std::string text = file.content;
+    files.put(file, text.replace(text.find(what), what.size(), with));
+    return files.outcome();
+  };
+  EXPECT_THAT(said("focal_px: [500", "focal_px: [1e308"),
+              HasSubstr("cameras.left.focal_px: holds 1e+308, must be above zero and at most 10000000"));
+  EXPECT_THAT(said("centre_px: [320", "centre_px: [-1e9"),
+              HasSubstr("cameras.left.centre_px: holds -1000000000, must be between -10000000 and 10000000"));
+  EXPECT_THAT(said("translation_m: [0", "translation_m: [1e300"),
+              HasSubstr(": the place is farther than 1000000000 m from the mount"));
+  EXPECT_EQ(said("focal_px: [500", "focal_px: [1e6"), "accepted");
 }
 
 // --- what is said of certain faults ---

@@ -17,16 +17,12 @@
 namespace spartan {
 namespace {
 
+using rig_detail::EyeOfFile;
 using rig_detail::TextMatrices;
 
-Result<Eigen::Vector3d> read_vector(const TextMatrices& file, const char* key) {
-  const auto v = file.numbers(key, 3);
-  if (!v) return failure(v);
-  return Eigen::Vector3d((*v)[0], (*v)[1], (*v)[2]);
-}
-
-// Files hold nine digits or more: less skew than this, by the focal length, is their rounding. OpenCV's models have
-// none, so that beside them the rounding of shorter files passes too.
+// Of files with nine digits or more less skew than this, by the focal length, is their rounding; what shorter ones
+// leave is kept, and formats without a skew drop it (rig_writing.h). OpenCV's models have none, so that beside them it
+// passes.
 constexpr double kNoSkew = 1e-9, kNoSkewBesideOpencv = 1e-5;
 
 struct PlacedCahv {
@@ -36,13 +32,13 @@ struct PlacedCahv {
 
 // C, A, H, V: z along A, x along the part of H across A. An A that is not quite of length 1 scales H and V.
 Result<PlacedCahv> read_cahv(const TextMatrices& file) {
-  const auto c = read_vector(file, "C");
+  const auto c = file.vector("C");
   if (!c) return failure(c);
-  const auto a = read_vector(file, "A");
+  const auto a = file.vector("A");
   if (!a) return failure(a);
-  const auto h = read_vector(file, "H");
+  const auto h = file.vector("H");
   if (!h) return failure(h);
-  const auto v = read_vector(file, "V");
+  const auto v = file.vector("V");
   if (!v) return failure(v);
   const double length = a->norm();
   if (!(std::abs(length - 1) <= 1e-3))
@@ -146,7 +142,7 @@ Result<CameraModel> read_model(const TextMatrices& file, const PlacedCahv& place
     if (placed.cahv.skew_px != 0) return placed.cahv;
     return placed.cahv.core;
   }
-  const auto o = read_vector(file, "O");
+  const auto o = file.vector("O");
   if (!o) return failure(o);
   if (!(std::abs(o->norm() - 1) <= 1e-3)) {
     return file.fault("O", fmt::format("has length {:.6g}, must have length 1", o->norm()));
@@ -154,16 +150,16 @@ Result<CameraModel> read_model(const TextMatrices& file, const PlacedCahv& place
   Eigen::Vector3d axis = placed.file_from_camera.rotation().conjugate() * *o;
   // Along A to rounding is along A.
   if ((axis - Eigen::Vector3d::UnitZ()).norm() <= 1e-14) axis = Eigen::Vector3d::UnitZ();
-  const auto r = read_vector(file, "R");
+  const auto r = file.vector("R");
   if (!r) return failure(r);
   const CahvorModel::Radial radial{r->x(), r->y(), r->z()};
   if (!kind->cahvore) return CahvorModel(placed.cahv, axis, radial);
-  const auto e = read_vector(file, "E");
+  const auto e = file.vector("E");
   if (!e) return failure(e);
   return CahvoreModel(placed.cahv, axis, radial, {e->x(), e->y(), e->z()}, kind->linearity);
 }
 
-Result<Camera> read_eye(const std::string& path, const std::string& name, ImageSize size) {
+Result<EyeOfFile> read_eye(const std::string& path, const std::string& name, ImageSize size) {
   const auto file = TextMatrices::read(path, '=');
   if (!file) return failure(file);
   Camera camera;
@@ -178,15 +174,12 @@ Result<Camera> read_eye(const std::string& path, const std::string& name, ImageS
   if (file->has("Dimensions")) {
     const auto sides = file->numbers("Dimensions", 2);
     if (!sides) return failure(sides);
-    for (const double side : *sides) {
-      if (!(side >= 1 && side <= 1e6 && std::floor(side) == side)) {
-        return file->fault("Dimensions", "must be two whole numbers above zero");
-      }
-    }
-    camera.size = {static_cast<int>((*sides)[0]), static_cast<int>((*sides)[1])};
+    const auto known = rig_detail::whole_size((*sides)[0], (*sides)[1]);
+    if (!known) return file->fault("Dimensions", "must be two whole numbers above zero");
+    camera.size = *known;
   }
   if (camera.size.empty()) return rig_detail::unknown_size(path);
-  return camera;
+  return EyeOfFile{std::move(camera)};
 }
 
 // --- writing ---
@@ -214,17 +207,11 @@ Result<std::string> text_of(const Camera& camera, const Pose& pose) {
     if (expressed_as<CahvorModel>(camera.model)) {
       return core_lines(camera, "CAHVOR = perspective, distortion", m->cahv(), pose) + radial_lines(*m, pose);
     }
+    // Types 1 and 2 are those of L = 1 and 0, but mrcal reads none but the third.
     const double l = m->linearity();
-    const std::string kind = l == 1   ? "CAHVORE1 = perspective, distortion, pupil"
-                             : l == 0 ? "CAHVORE2 = fish-eye"
-                                      : fmt::format("CAHVORE3,{} = general", l);
-    return core_lines(camera, kind, m->cahv(), pose) + radial_lines(*m, pose) +
+    return core_lines(camera, fmt::format("CAHVORE3,{} = general", l), m->cahv(), pose) + radial_lines(*m, pose) +
            vector_line("E", {m->entrance_m()[0], m->entrance_m()[1], m->entrance_m()[2]}) +
-           fmt::format("T = {}\nP = {}\n",
-                       l == 1   ? 1
-                       : l == 0 ? 2
-                                : 3,
-                       l);
+           fmt::format("T = 3\nP = {}\n", l);
   }
   if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     return "# The distortion is in the line LENSMODEL_OPENCV8, as mrcal reads it; other programs see a CAHV without "

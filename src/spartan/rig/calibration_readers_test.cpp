@@ -1,6 +1,7 @@
 // Readers of what other projects use: KITTI, KITTI raw, EuRoC, OpenCV.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <opencv2/core/persistence.hpp>
@@ -57,6 +58,27 @@ TEST(KittiCalib, FaultsAreNamed) {
   EXPECT_THAT(complaint(read_kitti_calib(folder.write("empty.txt", ""), {1240, 376})), HasSubstr("empty.txt"));
 }
 
+// A NaN anywhere is a file that is not to be trusted; what else is there is left out, and said.
+TEST(KittiCalib, OtherCamerasAreLeftOutButSound) {
+  const TemporaryFolder folder;
+  const auto read = [&](const std::string& what, const std::string& with) {
+    return read_calibration(folder.write("calib.txt", replaced(kKitti, what, with) + "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n"),
+                            {1240, 376});
+  };
+  EXPECT_THAT(complaint(read("P2: 700", "P2: nan")), HasSubstr("calib.txt:3: P2: 'nan' is not a finite number"));
+  EXPECT_THAT(complaint(read("P2: 700", "Tr: nan")), HasSubstr("calib.txt:3: Tr"));
+  EXPECT_THAT(complaint(read("P2: 700", "P3: 1 700")), HasSubstr("calib.txt:3: P3: has 13 numbers, must have 12"));
+  const auto told = [](const Result<ReadRig>& of) {
+    std::string all;
+    for (const RigDifference& each : of.value().left_out) all += each.key + ": " + each.text + "\n";
+    return all;
+  };
+  EXPECT_EQ(told(read("P0", "P0")),
+            "P2: a colour camera, which is not read\nTr: the place of the laser scanner, which is not read\n");
+  EXPECT_THAT(told(read("-378 0 700 180 0 0 0 1 0", "-378 0 700 180 0.5 0 0 1 0.0009")),
+              HasSubstr("P1: the last numbers of its rows 2 and 3, 0.5 and 0.0009, are taken as 0"));
+}
+
 // --- KITTI raw ---
 
 const std::string kRaw =
@@ -88,6 +110,21 @@ TEST(KittiRawCalib, TheImuIsTheBodyWhereItIsKnown) {
   EXPECT_LE((body_from_left.translation() - Eigen::Vector3d(0.27 + 0.8, -0.3, 0.8 - 0.07)).norm(), 1e-12);
   EXPECT_LE((body_from_left.rotation() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-12);
   EXPECT_NEAR(right_in_left(*rig).x(), 387.377 / 721, 1e-12);
+}
+
+TEST(KittiRawCalib, TheCamerasBeforeRectificationAreLeftOut) {
+  const TemporaryFolder folder;
+  const auto keys = [&](const std::string& more) {
+    std::string all;
+    const ReadRig read = read_calibration(folder.write("calib_cam_to_cam.txt", kRaw + more)).value();
+    for (const RigDifference& each : read.left_out) all += each.key + ";";
+    return all;
+  };
+  EXPECT_EQ(keys(""), "");
+  EXPECT_EQ(keys("K_00: 721 0 609 0 721 172 0 0 1\nD_00: 0 0 0 0 0\n"), "") << "it is the rectified one";
+  EXPECT_EQ(keys("K_00: 721 0 609 0 721 172 0 0 1\nD_00: 0.1 0 0 0 0\n"), "K_00;");
+  EXPECT_EQ(keys("K_01: 720 0 609 0 721 172 0 0 1\nD_01: 0 0 0 0 0\nP_rect_02: 1 0 0 0 0 1 0 0 0 0 1 0\n"),
+            "P_rect_02;K_01;");
 }
 
 TEST(KittiRawCalib, FaultsAreNamed) {
@@ -269,6 +306,38 @@ TEST(CalibrationFormats, AreWrittenByTheirNames) {
                                                   {"a.yaml", Format::rig_yaml}};
   for (const auto& [name, format] : known) EXPECT_EQ(format_for_name(name).value(), format) << name;
   EXPECT_EQ(format_for_name("a.odd").error().code, ErrorCode::usage);
+}
+
+TEST(ReadRig, AMarkOfUtf8IsNoText) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(complaint(read_calibration(folder.write("calib.txt", "\xEF\xBB\xBF" + kKitti), {1240, 376})), "nothing");
+  EXPECT_EQ(complaint(read_calibration(folder.write("s.yml", "\xEF\xBB\xBF" + opencv_yml(-0.1)), {640, 480})),
+            "nothing");
+}
+
+// A calibration is read more than once; a pipe gives its text once only, or never.
+TEST(ReadRig, OnlyFilesAreRead) {
+  const TemporaryFolder folder;
+  const std::string pipe = folder.path() + "/pipe.yaml";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT(complaint(read_calibration(pipe)), HasSubstr("pipe.yaml: is no file"));
+  EXPECT_THAT(complaint(read_rig_yaml(pipe)), HasSubstr("pipe.yaml: is no file"));
+}
+
+TEST(ReadRig, AFolderStandsForTheOneCalibrationInIt) {
+  const TemporaryFolder folder;
+  const auto name = [&](const std::string& path) {
+    return read_rig(folder.path() + "/" + path, {640, 480}).value().name;
+  };
+  folder.write("yml/settings.yml", "%YAML:1.0\n---\nthreshold: 3\n");
+  folder.write("yml/anything.yml", opencv_yml(-0.1));
+  EXPECT_EQ(name("yml"), "opencv");
+  folder.write("xml/stereo.xml", opencv_yml(-0.1, (cv::Mat_<double>(1, 4) << 0, 0, 0, 0), "memory.xml"));
+  folder.write("xml/other.xml", "<settings/>");
+  EXPECT_EQ(name("xml"), "opencv");
+  folder.write("two/a.yml", opencv_yml(-0.1));
+  folder.write("two/b.yml", opencv_yml(-0.2));
+  EXPECT_THAT(complaint(read_rig(folder.path() + "/two")), HasSubstr("holds more than one calibration"));
 }
 
 TEST(ReadRig, RealCalibrations) {

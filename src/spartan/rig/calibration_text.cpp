@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -21,6 +22,11 @@ Result<std::string> read_calibration_text(const std::string& path, std::size_t l
   const auto fault = [&](const std::string& what) { return failure(ErrorCode::configuration, what, path); };
   std::error_code error;
   if (fs::is_directory(path, error)) return fault("is a folder, not a file");
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
+    return fault("is no file: a calibration is read more than once, which a pipe cannot be");
+  }
+  const std::uintmax_t bytes = fs::file_size(path, error);
+  if (!error && bytes > largest) return fault(fmt::format("is larger than {} MB: no calibration", largest >> 20U));
   std::ifstream file(path, std::ios::binary);
   if (!file) return fault(std::string("cannot be read: ") + std::strerror(errno));
   std::string content;
@@ -30,6 +36,8 @@ Result<std::string> read_calibration_text(const std::string& path, std::size_t l
     if (content.size() > largest) return fault(fmt::format("is larger than {} MB: no calibration", largest >> 20U));
   }
   if (file.bad()) return fault("cannot be read to its end");
+  // Some editors begin a file with the mark of UTF-8.
+  if (content.starts_with("\xEF\xBB\xBF")) content.erase(0, 3);
   return content;
 }
 
@@ -42,6 +50,24 @@ tl::unexpected<Error> unknown_size(const std::string& where) {
   return failure(
       ErrorCode::configuration, "the image size is not known and this file does not hold it", where,
       "lay it beside its pictures, all of one size (KITTI: beside image_0), or convert it with --size-px 640,480");
+}
+
+std::optional<ImageSize> whole_size(double width, double height) {
+  constexpr double kMost = 1e6;
+  for (const double side : {width, height}) {
+    if (!(side >= 1 && side <= kMost && std::floor(side) == side)) return std::nullopt;
+  }
+  return ImageSize{static_cast<int>(width), static_cast<int>(height)};
+}
+
+std::optional<PinholeModel> pinhole_of_rows(const std::vector<double>& m) {
+  if (m.size() != 9 || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) return std::nullopt;
+  return PinholeModel{m[0], m[4], m[2], m[5]};
+}
+
+std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& turn) {
+  if (!(turn.norm() <= 1e3)) return std::nullopt;
+  return exp_so3(turn);
 }
 
 std::string list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers, const char* separator) {

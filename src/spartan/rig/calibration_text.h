@@ -2,7 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
@@ -23,6 +26,14 @@ Result<Rig> validated(Rig rig, const std::string& where);
 
 /// The error of a file that does not hold the image size where nothing else tells it.
 tl::unexpected<Error> unknown_size(const std::string& where);
+
+/// Width and height where they are whole numbers above zero, and no more than a picture can have.
+std::optional<ImageSize> whole_size(double width, double height);
+/// The pinhole of a camera matrix in nine numbers, row by row; none where it has another form than fx 0 cx; 0 fy cy;
+/// 0 0 1. Focal lengths are not looked at.
+std::optional<PinholeModel> pinhole_of_rows(const std::vector<double>& rows);
+/// The rotation of a rotation vector, rad; none where it goes round so often that its digits are lost.
+std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& turn);
 
 /// Numbers with all their digits, separated; of a matrix row by row.
 std::string list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers, const char* separator = " ");

@@ -10,15 +10,22 @@
 namespace spartan::rig_detail {
 
 /// A rig of two cameras whose `mount_from_camera` is the pose in the frame of their files. The body is
-///  - that frame, where the left camera looks along it as REP-103 has it: its right axis mostly along −y, its down
-///    axis mostly along −z;
-///  - that frame turned by 180° about x, where it is forward-right-down: right mostly +y, down mostly +z;
-///  - the left camera turned to x forward, y left, z up (rig_of_one_pair) in any other frame.
-/// "Mostly" is the axis with the largest part. A note says which. The pair is named `stereo`.
+///  - that frame, where the left camera stands in it as on a rover with x forward, y left, z up (REP-103): its right
+///  axis
+///    mostly along −y (it looks ahead) or +y (it looks back), its down axis with −z, both eyes within 100 m;
+///  - that frame turned by 180° about x, where it is forward-right-down: the same with down along +z;
+///  - the left camera turned to x forward, y left, z up (rig_of_one_pair) in any other frame, with `left_out` saying
+///  so.
+/// "Mostly" is the axis with the largest part: any tilt but within a degree of straight up or down will do. `body` says
+/// which. The pair is named `stereo`.
 ReadRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera right);
 
-/// Reads a file; the camera's `mount_from_camera` is its pose in the file's frame.
-using EyeReader = std::function<Result<Camera>(const std::string& path, const std::string& name)>;
+/// A camera whose `mount_from_camera` is its pose in the file's frame, and what the file holds besides.
+struct EyeOfFile {
+  Camera camera;
+  std::vector<RigDifference> left_out = {};
+};
+using EyeReader = std::function<Result<EyeOfFile>(const std::string& path, const std::string& name)>;
 /// The cameras `left` and `right` of two such files, validated.
 Result<ReadRig> read_two_files(CalibrationFormat format, const std::string& left_path, const std::string& right_path,
                                const EyeReader& read_eye);

@@ -3,7 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <regex>
+
+#include "spartan/rig/read_back.h"
+#include "spartan/rig/rig_differences.h"
 #include "spartan/rig/rig_files.h"
+#include "spartan/rig/rig_writing.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
@@ -156,6 +161,98 @@ TEST(CahvorCalib, EveryWayToSayALinearityIsKnown) {
   EXPECT_THAT(linearity("CAHVORE4 = odd", ""), HasSubstr("Model"));
   EXPECT_THAT(linearity("CAHVORE", ""), HasSubstr("E: a CAHVORE must say its type"));
   EXPECT_THAT(linearity("RPC = odd", ""), HasSubstr("Model: RPC is not supported"));
+}
+
+// mrcal knows a CAHVORE by "CAHVORE3,<linearity> = general" alone.
+TEST(CahvorCalib, MrcalKnowsEveryLinearityThatIsWritten) {
+  const std::regex of_mrcal("Model = CAHVORE3,([0-9.e-]+)\\s*=\\s*general");
+  for (const double linearity : {1.0, 0.0, 0.37, -0.4, 1e-5}) {
+    Camera left, right;
+    left.name = "left";
+    right.name = "right";
+    left.size = right.size = {640, 480};
+    left.model = right.model =
+        CahvoreModel({{500, 501, 320, 240}, 0}, Eigen::Vector3d::UnitZ(), {0.01, 0.02, 0.03}, {0.001, 0, 0}, linearity);
+    const Rig rig = rig_of_one_pair("r", left, right, Pose::from_translation({-0.12, 0, 0}));
+    const auto files = to_calibration_files(rig, CalibrationFormat::cahvor, "p.cahvore").value();
+    std::smatch found;
+    ASSERT_TRUE(std::regex_search(files[0].content, found, of_mrcal)) << files[0].content;
+    EXPECT_EQ(std::stod(found[1]), linearity);
+    EXPECT_THAT(files[0].content, HasSubstr(fmt::format("\nT = 3\nP = {}\n", linearity)));
+  }
+}
+
+// Six decimals leave a skew of some 1e-4 px. It must not keep a rig from formats that have none.
+TEST(CahvorCalib, TheRoundingOfShortFilesIsNoSkew) {
+  const TemporaryFolder folder;
+  const auto text = [](double y, double skew) {
+    return fmt::format(
+        "Model = CAHV = perspective, linear\nDimensions = 1024 1024\nC = 0 {} 0\nA = 1 0 0\n"
+        "H = 512.5 -1200 0\nV = 511.5 {} -1201\n",
+        y, -skew);
+  };
+  const auto rig = [&](double skew) {
+    folder.write("right.cahv", text(-0.1, skew));
+    return read_rig(folder.write("left.cahv", text(0.1, skew))).value();
+  };
+  const Rig rounded = rig(0.0003);
+  EXPECT_EQ(name_of(rounded.cameras[0].model), "cahv");
+  for (const auto& [format, name] : {std::pair{CalibrationFormat::mrcal, "p.cameramodel"},
+                                     {CalibrationFormat::opencv, "p.yml"},
+                                     {CalibrationFormat::ros, "p.yaml"},
+                                     {CalibrationFormat::tsai, "p.tsai"},
+                                     {CalibrationFormat::kalibr, "camchain.yaml"}}) {
+    const auto files = to_calibration_files(rounded, format, name);
+    ASSERT_TRUE(files) << name << ": " << files.error().message();
+    const auto again = read_back(*files, format, {1024, 1024});
+    ASSERT_TRUE(again) << again.error().message();
+    const auto lost = describe_differences(rounded, again->rig);
+    std::string keys, texts;
+    for (const RigDifference& each : lost) {
+      if (each.key.ends_with("name")) continue;
+      if (each.key == "body" || each.key == "pose_convention") continue;
+      keys += each.key + ";";
+      texts += each.text + "\n";
+    }
+    EXPECT_EQ(keys, "cameras.left.skew_px;cameras.right.skew_px;") << name << "\n" << texts;
+    EXPECT_THAT(texts, HasSubstr("[0.0003"));
+    const std::string refused = to_calibration_files(rig(0.5), format, name).error().message();
+    EXPECT_THAT(refused, HasSubstr("cameras.left: "));
+    EXPECT_THAT(refused, HasSubstr("has no skew, this camera's is 0.5 px: 0.427 px across the picture"));
+  }
+  EXPECT_TRUE(to_calibration_files(rig(0.5), CalibrationFormat::cahvor, "p.cahv"));
+}
+
+TEST(CahvorCalib, CommentsMayStandBehindNumbers) {
+  const TemporaryFolder folder;
+  const std::string right = cahvor(kOfMrcal[0], false);
+  folder.write("right.cahvor", right);
+  const std::string text = replaced(cahvor(kOfMrcal[0], true), "Dimensions = 1280 720", "Dimensions = 1280 720 # px");
+  EXPECT_EQ(complaint(read_calibration(folder.write("left.cahvor", text))), "nothing");
+  EXPECT_THAT(complaint(read_calibration(folder.write("left.cahvor", replaced(text, "720 # px", "# 720")))),
+              HasSubstr("left.cahvor:1: Dimensions: has 1 numbers, must have 2"));
+}
+
+TEST(MrcalCalib, WhatElseMrcalKeepsIsLeftOut) {
+  const TemporaryFolder folder;
+  folder.write("right.cameramodel", cameramodel(kOfMrcal[0], false));
+  const auto read = read_calibration(folder.write("left.cameramodel", cameramodel(kOfMrcal[0], true))).value();
+  std::string keys;
+  for (const RigDifference& each : read.left_out) keys += each.key + ";";
+  EXPECT_EQ(keys,
+            "left.valid_intrinsics_region;left.optimization_inputs;right.valid_intrinsics_region;"
+            "right.optimization_inputs;");
+}
+
+// With the optimisation in it a file is large, whatever its name.
+TEST(MrcalCalib, LargeFilesAreReadUnderAnyName) {
+  const TemporaryFolder folder;
+  std::string left = cameramodel(kOfMrcal[0], true);
+  left.insert(left.find("b'P)h") + 2, std::string(5U << 20U, 'x'));
+  folder.write("right.txt", cameramodel(kOfMrcal[0], false));
+  const auto read = read_calibration(folder.write("left.txt", left));
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(read->format, CalibrationFormat::mrcal);
 }
 
 TEST(CahvorCalib, ASkewIsKept) {

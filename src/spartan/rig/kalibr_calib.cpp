@@ -1,6 +1,7 @@
 // Kalibr's camchain.yaml and camchain-imucam.yaml (Furgale et al.; the project's wiki, "Yaml formats").
 #include <fmt/format.h>
 
+#include "spartan/rig/calibration_readers.h"
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/calibration_writers.h"
 #include "spartan/rig/file_frame.h"
@@ -44,29 +45,52 @@ std::optional<Pose> read_transform(YamlMap& camera, std::string_view key) {
 struct Chain {
   std::vector<Camera> cameras;
   std::optional<Pose> first_from_imu;
-  std::vector<std::string> notes;
+  std::string imu_key;  // where it stands
+  std::vector<RigDifference> left_out;
 };
 
+bool same(const Pose& a, const Pose& b) {
+  const Pose apart = a.inverse() * b;
+  return apart.translation().norm() <= kSame && rotation_angle(apart) <= kSame;
+}
+
+// Kalibr writes T_cam_imu; OpenVINS' files have the inverse.
+struct ImuOfCamera {
+  std::string key;
+  Pose camera_from_imu;
+};
+std::optional<ImuOfCamera> read_imu(YamlMap& entry) {
+  std::optional<ImuOfCamera> imu;
+  for (const char* key : {"T_imu_cam", "T_cam_imu"}) {
+    if (!entry.has(key)) continue;
+    const auto pose = read_transform(entry, key);
+    if (!pose) return std::nullopt;
+    const Pose camera_from_imu = key == std::string("T_cam_imu") ? *pose : pose->inverse();
+    if (imu && !same(imu->camera_from_imu, camera_from_imu)) entry.fault(key, "contradicts T_imu_cam");
+    imu = {key, camera_from_imu};
+  }
+  return imu;
+}
+
+// The first camera that knows the IMU tells all of them; what the others say must be the same.
 void read_link(YamlMap& entry, Chain& chain, Camera& camera) {
-  std::optional<Pose> camera_from_imu;
-  if (entry.has("T_cam_imu")) camera_from_imu = read_transform(entry, "T_cam_imu");
-  if (chain.cameras.empty()) {
-    chain.first_from_imu = camera_from_imu;
-    return;
+  const auto imu = read_imu(entry);
+  if (!chain.cameras.empty()) {
+    if (!entry.has("T_cn_cnm1") && imu && chain.first_from_imu) {
+      camera.mount_from_camera = *chain.first_from_imu * imu->camera_from_imu.inverse();
+      return;
+    }
+    const auto link = read_transform(entry, "T_cn_cnm1");
+    if (!link) return;
+    camera.mount_from_camera = chain.cameras.back().mount_from_camera * link->inverse();
   }
-  std::optional<Pose> by_imu;
-  if (camera_from_imu && chain.first_from_imu) by_imu = *chain.first_from_imu * camera_from_imu->inverse();
-  if (!entry.has("T_cn_cnm1") && by_imu) {
-    camera.mount_from_camera = *by_imu;
-    return;
-  }
-  const auto link = read_transform(entry, "T_cn_cnm1");
-  if (!link) return;
-  camera.mount_from_camera = chain.cameras.back().mount_from_camera * link->inverse();
-  if (!by_imu) return;
-  const Pose apart = by_imu->inverse() * camera.mount_from_camera;
-  if (apart.translation().norm() > kSame || rotation_angle(apart) > kSame) {
-    entry.fault("T_cam_imu", "contradicts T_cn_cnm1");
+  if (!imu) return;
+  const Pose first_from_imu = camera.mount_from_camera * imu->camera_from_imu;
+  if (!chain.first_from_imu) {
+    chain.first_from_imu = first_from_imu;
+    chain.imu_key = imu->key;
+  } else if (!same(first_from_imu, *chain.first_from_imu)) {
+    entry.fault(imu->key, "contradicts T_cn_cnm1");
   }
 }
 
@@ -84,7 +108,8 @@ Chain read_chain(YamlMap& root) {
     if (entry.has("timeshift_cam_imu")) {
       const auto shift = entry.number("timeshift_cam_imu");
       if (shift && *shift != 0) {
-        chain.notes.push_back(fmt::format("{}: timeshift_cam_imu, {} s, is not used", camera.name, *shift));
+        chain.left_out.push_back(
+            {camera.name + ".timeshift_cam_imu", fmt::format("the camera's clock is {} s off the IMU's", *shift)});
       }
     }
     read_link(entry, chain, camera);
@@ -122,9 +147,12 @@ Result<ReadRig> read_kalibr_calib(const std::string& path) {
   rig.pairs = {{"stereo", camera_key(0), camera_key(1)}};
   auto sound = rig_detail::validated(std::move(rig), path);
   if (!sound) return failure(std::move(sound));
-  chain.notes.insert(chain.notes.begin(), has_imu ? "body: the IMU of T_cam_imu"
-                                                  : "body: the left camera, turned to x forward, y left, z up");
-  return ReadRig{std::move(*sound), CalibrationFormat::kalibr, {path}, std::move(chain.notes)};
+  return ReadRig{std::move(*sound),
+                 CalibrationFormat::kalibr,
+                 {path},
+                 {},
+                 has_imu ? "the IMU of " + chain.imu_key : rig_detail::kBodyIsLeftCamera,
+                 std::move(chain.left_out)};
 }
 
 Result<CalibrationFiles> rig_detail::write_kalibr_calib(const Rig& rig, const std::string& path) {

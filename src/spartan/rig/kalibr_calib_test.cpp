@@ -1,4 +1,5 @@
 // Kalibr: its documented examples, and values by hand.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -86,13 +87,63 @@ TEST(KalibrCalib, TheImuIsTheBodyWhereItIsKnown) {
   const Pose body_from_camera = read->rig.body_from_camera("cam0");
   EXPECT_LE((body_from_camera.translation() - Eigen::Vector3d(-0.004, 0.07, -0.01)).norm(), 1e-15);
   EXPECT_LE((right_in_left(read->rig) - Eigen::Vector3d(0.11, -0.002, -0.001)).norm(), 1e-15);
-  ASSERT_EQ(read->notes.size(), 2u);
-  EXPECT_THAT(read->notes[0], HasSubstr("IMU"));
-  EXPECT_THAT(read->notes[1], HasSubstr("cam0: timeshift_cam_imu, -8.121e-05 s, is not used"));
+  EXPECT_EQ(read->body, "the IMU of T_cam_imu");
+  EXPECT_THAT(read->notes, ::testing::ElementsAre("body: the IMU of T_cam_imu"));
+  ASSERT_EQ(read->left_out.size(), 1u);
+  EXPECT_EQ(read->left_out[0].key, "cam0.timeshift_cam_imu");
+  EXPECT_EQ(read->left_out[0].text, "the camera's clock is -8.121e-05 s off the IMU's");
   const std::string other = replaced(imu, "0.07", "0.09");
   const std::string both = replaced(replaced(kCamchain, "  rostopic: /cam0/image_raw\n", imu),
                                     "  resolution: [640, 400]\n", other + "  resolution: [640, 400]\n");
   EXPECT_THAT(complaint(read_calibration(folder.write("camchain.yaml", both))), HasSubstr("contradicts T_cn_cnm1"));
+}
+
+// The IMU's place may be said of any camera, and either way round (OpenVINS: T_imu_cam).
+TEST(KalibrCalib, AnyCameraMayKnowTheImu) {
+  const TemporaryFolder folder;
+  const std::string cam_imu =
+      "  T_cam_imu:\n  - [0, -1, 0, 0.07]\n  - [0, 0, -1, -0.01]\n  - [1, 0, 0, 0.004]\n  - [0, 0, 0, 1]\n";
+  const std::string imu_cam =
+      "  T_imu_cam:\n  - [0, 0, 1, -0.004]\n  - [-1, 0, 0, 0.07]\n  - [0, -1, 0, -0.01]\n  - [0, 0, 0, 1]\n";
+  const auto with = [&](int camera, const std::string& text) {
+    const std::string at = fmt::format("cam{}:\n", camera);
+    return read_calibration(folder.write("camchain.yaml", replaced(kCamchain, at, at + text)));
+  };
+  const Eigen::Vector3d place(-0.004, 0.07, -0.01);
+  for (const std::string& text : {cam_imu, imu_cam, cam_imu + imu_cam}) {
+    for (const int camera : {0, 1, 2}) {
+      const auto read = with(camera, text);
+      ASSERT_TRUE(read) << read.error().message();
+      const std::string name = fmt::format("cam{}", camera);
+      EXPECT_LE((read->rig.body_from_camera(name).translation() - place).norm(), 1e-14) << name;
+      EXPECT_LE(
+          (read->rig.body_from_camera(name).rotation() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(),
+          1e-14)
+          << name;
+      EXPECT_LE((right_in_left(read->rig) - Eigen::Vector3d(0.11, -0.002, -0.001)).norm(), 1e-14);
+      EXPECT_EQ(read->rig.convention, PoseConvention::body);
+      EXPECT_EQ(read->body, text == imu_cam ? "the IMU of T_imu_cam" : "the IMU of T_cam_imu");
+    }
+  }
+  EXPECT_THAT(complaint(with(1, cam_imu + replaced(imu_cam, "0.07", "0.09"))),
+              HasSubstr("cam1.T_cam_imu: contradicts T_imu_cam"));
+}
+
+// Both cameras by the IMU alone, without a chain between them.
+TEST(KalibrCalib, TheImuIsAChainToo) {
+  const TemporaryFolder folder;
+  std::string text = kCamchain.substr(0, kCamchain.find("cam2:"));
+  const std::string link =
+      text.substr(text.find("  T_cn_cnm1"), text.find("  resolution: [640") - text.find("  T_cn_cnm1"));
+  const auto pose = [](double y) {
+    return fmt::format("  T_imu_cam:\n  - [0, 0, 1, 0]\n  - [-1, 0, 0, {}]\n  - [0, -1, 0, 0]\n  - [0, 0, 0, 1]\n", y);
+  };
+  text = replaced(replaced(text, link, ""), "cam1:\n", "cam1:\n" + pose(-0.05));
+  EXPECT_THAT(complaint(read_calibration(folder.write("camchain.yaml", text))),
+              HasSubstr("cam1.T_cn_cnm1: is missing"));
+  const auto read = read_calibration(folder.write("camchain.yaml", replaced(text, "cam0:\n", "cam0:\n" + pose(0.05))));
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_LE((right_in_left(read->rig) - Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-15);
 }
 
 TEST(KalibrCalib, WhatIsNotOursIsRefusedByName) {

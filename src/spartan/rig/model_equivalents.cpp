@@ -68,6 +68,29 @@ CameraModel plainest(const CameraModel& model) {
   return std::visit([](const auto& m) { return plainest(m); }, model);
 }
 
+bool is_rational(const RadialTangentialModel& model) {
+  const auto& k = model.coefficients();
+  return k[5] != 0 || k[6] != 0 || k[7] != 0;
+}
+
+double skew_px(const CameraModel& model) {
+  if (const auto* m = std::get_if<CahvModel>(&model)) return m->skew_px;
+  if (const auto* m = std::get_if<CahvorModel>(&model)) return m->cahv().skew_px;
+  if (const auto* m = std::get_if<CahvoreModel>(&model)) return m->cahv().skew_px;
+  return 0;
+}
+
+CameraModel without_skew(const CameraModel& model) {
+  if (const auto* m = std::get_if<CahvModel>(&model)) return CahvModel{m->core, 0};
+  if (const auto* m = std::get_if<CahvorModel>(&model)) {
+    return CahvorModel({m->cahv().core, 0}, m->optical_axis(), m->radial());
+  }
+  if (const auto* m = std::get_if<CahvoreModel>(&model)) {
+    return CahvoreModel({m->cahv().core, 0}, m->optical_axis(), m->radial(), m->entrance_m(), m->linearity());
+  }
+  return model;
+}
+
 template <>
 std::optional<PinholeModel> expressed_as(const CameraModel& model) {
   return held<PinholeModel>(plainest(model));

@@ -13,6 +13,14 @@ namespace spartan {
 ///   cahvore with L = 1, e = 0 → cahvor;  with L = 0, e = 0 about z with r0 = 0, without skew     → equidistant
 CameraModel plainest(const CameraModel& model);
 
+/// Whether k4, k5 or k6 counts: what many formats have no place for.
+bool is_rational(const RadialTangentialModel& model);
+
+/// The skew of cahv, cahvor and cahvore, in pixels; 0 of models that have none.
+double skew_px(const CameraModel& model);
+/// The same model with rows and columns at right angles.
+CameraModel without_skew(const CameraModel& model);
+
 /// The same camera as a model of the wanted kind; none where that kind cannot say it.
 template <class Model>
 std::optional<Model> expressed_as(const CameraModel& model);

@@ -3,7 +3,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/calibration_writers.h"
@@ -16,7 +18,13 @@
 namespace spartan {
 namespace {
 
+using rig_detail::EyeOfFile;
 using rig_detail::PythonDict;
+
+// What else mrcal keeps in its files.
+constexpr std::array<std::pair<const char*, const char*>, 2> kPassedOver{
+    {{"valid_intrinsics_region", "where the lens is known well is not kept"},
+     {"optimization_inputs", "the optimisation that the camera comes from is not kept"}}};
 
 constexpr std::string_view kCahvore = "CAHVORE_linearity=";
 
@@ -72,7 +80,7 @@ Result<CameraModel> read_model(const PythonDict& file) {
   return CahvoreModel({pinhole, 0}, axis, {k[6], k[7], k[8]}, {k[9], k[10], k[11]}, *linearity);
 }
 
-Result<Camera> read_eye(const std::string& path, const std::string& name) {
+Result<EyeOfFile> read_eye(const std::string& path, const std::string& name) {
   const auto text = rig_detail::read_calibration_text(path, rig_detail::kLargestModelFile_bytes);
   if (!text) return failure(text);
   const auto file = PythonDict::parse(*text, path);
@@ -84,19 +92,19 @@ Result<Camera> read_eye(const std::string& path, const std::string& name) {
   camera.model = std::move(*model);
   const auto size = file->numbers("imagersize", 2);
   if (!size) return failure(size);
-  for (const double side : *size) {
-    if (!(side >= 1 && side <= 1e6 && std::floor(side) == side)) {
-      return file->fault("imagersize", "must be two whole numbers above zero");
-    }
-  }
-  camera.size = {static_cast<int>((*size)[0]), static_cast<int>((*size)[1])};
+  const auto known = rig_detail::whole_size((*size)[0], (*size)[1]);
+  if (!known) return file->fault("imagersize", "must be two whole numbers above zero");
+  camera.size = *known;
   const auto e = file->numbers("extrinsics", 6);
   if (!e) return failure(e);
-  // A rotation vector that goes round many times has lost its digits.
-  const Eigen::Vector3d turn((*e)[0], (*e)[1], (*e)[2]);
-  if (turn.norm() > 1e3) return file->fault("extrinsics", "its first three numbers are not a rotation");
-  camera.mount_from_camera = Pose(exp_so3(turn), {(*e)[3], (*e)[4], (*e)[5]}).inverse();
-  return camera;
+  const auto turn = rig_detail::rotation_of_vector({(*e)[0], (*e)[1], (*e)[2]});
+  if (!turn) return file->fault("extrinsics", "its first three numbers are not a rotation");
+  camera.mount_from_camera = Pose(*turn, {(*e)[3], (*e)[4], (*e)[5]}).inverse();
+  EyeOfFile eye{std::move(camera)};
+  for (const auto& [key, what] : kPassedOver) {
+    if (file->has(key)) eye.left_out.push_back({fmt::format("{}.{}", name, key), what});
+  }
+  return eye;
 }
 
 struct Lens {
@@ -120,14 +128,12 @@ Result<Lens> lens_of(const Camera& camera) {
   if (const auto m = expressed_as<PinholeModel>(camera.model)) return Lens{"PINHOLE", core(*m)};
   if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
-    const bool eight = std::any_of(k.begin() + 5, k.end(), [](double v) { return v != 0; });
-    const std::size_t count = eight ? 8 : k[4] != 0 ? 5 : 4;
+    const std::size_t count = is_rational(*m) ? 8 : k[4] != 0 ? 5 : 4;
     Lens lens{fmt::format("OPENCV{}", count), core(m->pinhole())};
     append(lens.numbers, k, count);
     return lens;
   }
   if (const auto m = expressed_as<CahvoreModel>(camera.model)) {
-    if (m->cahv().skew_px != 0) return rig_detail::cannot_hold(camera, "mrcal's cameras have no skew");
     Lens lens{fmt::format("{}{}", kCahvore, m->linearity()), core(m->cahv().core)};
     append_cahvor(lens.numbers, m->optical_axis(), m->radial());
     if (expressed_as<CahvorModel>(camera.model)) {

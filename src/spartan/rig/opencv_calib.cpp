@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "spartan/rig/calibration_readers.h"
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/opencv_storage.h"
 #include "spartan/rig/rig_files.h"
@@ -73,11 +74,11 @@ bool is_fisheye(const Storages& files) {
 Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& names) {
   const auto held = files.matrix(names, {9});
   if (!held) return failure(held);
-  const auto& m = *held;
-  if (!(m[0] > 0 && m[4] > 0) || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
+  const auto pinhole = rig_detail::pinhole_of_rows(*held);
+  if (!pinhole || !(pinhole->fx > 0 && pinhole->fy > 0)) {
     return files.fault(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
   }
-  return PinholeModel{m[0], m[4], m[2], m[5]};
+  return *pinhole;
 }
 
 Result<CameraModel> read_model(const Storages& files, const std::string& number) {
@@ -107,10 +108,9 @@ Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::strin
   const auto r = files.matrix({name}, {3, 9});
   if (!r) return failure(r);
   if (r->size() == 3) {
-    const Eigen::Vector3d turn((*r)[0], (*r)[1], (*r)[2]);
-    // A rotation vector that goes round many times has lost its digits.
-    if (turn.norm() > 1e3) return files.fault({name}, "is not a rotation");
-    return exp_so3(turn);
+    const auto turn = rig_detail::rotation_of_vector({(*r)[0], (*r)[1], (*r)[2]});
+    if (!turn) return files.fault({name}, "is not a rotation");
+    return *turn;
   }
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
   if (!is_rotation(rotation, 1e-4)) return files.fault({name}, "is not a rotation matrix");
@@ -187,30 +187,64 @@ Result<Rig> read_rectified(const Storages& files, ImageSize size) {
                          Pose::from_translation(left->place_m - right->place_m));
 }
 
-ImageSize size_in(const Storages& files, ImageSize otherwise) {
+Result<int> read_side(const Storages& files, const char* key, const char* other) {
+  const auto pixels = files.integer(key);
+  if (!pixels || *pixels < 1) return files.fault({key}, "must be a whole number above zero");
+  if (!files.has(other)) return files.fault({key}, fmt::format("without {}", other));
+  return *pixels;
+}
+
+// What the file says, which must be sound; `otherwise` where it says nothing.
+Result<ImageSize> size_in(const Storages& files, ImageSize otherwise) {
   for (const char* key : {"image_size", "imageSize"}) {
-    if (const auto size = files.size(key)) return *size;
+    if (!files.has(key)) continue;
+    const auto size = files.size(key);
+    if (!size || size->empty()) return files.fault({key}, "must be two whole numbers above zero");
+    return *size;
   }
-  const auto width = files.integer("image_width"), height = files.integer("image_height");
-  return width && height ? ImageSize{*width, *height} : otherwise;
+  const char *width_key = "image_width", *height_key = "image_height";
+  if (!files.has(width_key) && !files.has(height_key)) return otherwise;
+  const auto width = read_side(files, files.has(width_key) ? width_key : height_key, height_key);
+  const auto height = read_side(files, files.has(height_key) ? height_key : width_key, width_key);
+  if (!width) return failure(width);
+  if (!height) return failure(height);
+  return ImageSize{*width, *height};
+}
+
+// The rectified view that the file chose: a rig has no place for it. Of rectified pictures P1 and P2 are the cameras.
+std::vector<RigDifference> rectification_in(const Storages& files, bool raw) {
+  std::vector<RigDifference> left_out;
+  for (const char* key : raw ? std::vector{"R1", "R2", "P1", "P2", "Q"} : std::vector{"R1", "R2"}) {
+    if (files.has(key)) left_out.push_back({key, "the rectified view of the file is not kept"});
+  }
+  return left_out;
 }
 
 }  // namespace
 
 Result<Rig> read_opencv_calib(const std::string& intrinsics_path, const std::string& extrinsics_path, ImageSize size) {
+  return rig_detail::rig_of(rig_detail::read_opencv(intrinsics_path, extrinsics_path, size));
+}
+
+Result<ReadRig> rig_detail::read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path,
+                                        ImageSize size) {
   Storages files;
   for (const std::string& path : {intrinsics_path, extrinsics_path}) {
     if (path.empty()) continue;
     if (const Status status = files.open(path); !status) return failure(status);
   }
-  const ImageSize known = size_in(files, size);
-  if (known.empty()) {
-    return rig_detail::unknown_size(files.paths());
-  }
+  const auto known = size_in(files, size);
+  if (!known) return failure(known);
+  if (known->empty()) return unknown_size(files.paths());
   const bool raw = files.has("M1") || files.has("K1") || files.has("cameraMatrix1") || files.has("camera_matrix_1");
-  auto rig = raw || !files.has("P1") ? read_unrectified(files, known) : read_rectified(files, known);
+  auto rig = raw || !files.has("P1") ? read_unrectified(files, *known) : read_rectified(files, *known);
   if (!rig) return failure(std::move(rig));
-  return rig_detail::validated(std::move(*rig), files.paths());
+  auto sound = validated(std::move(*rig), files.paths());
+  if (!sound) return failure(std::move(sound));
+  std::vector<std::string> paths{intrinsics_path};
+  if (!extrinsics_path.empty()) paths.push_back(extrinsics_path);
+  return ReadRig{std::move(*sound), CalibrationFormat::opencv,   std::move(paths), {},
+                 kBodyIsLeftCamera, rectification_in(files, raw)};
 }
 
 }  // namespace spartan

@@ -14,6 +14,7 @@ namespace {
 
 using testing::complaint;
 using ::testing::HasSubstr;
+using testing::replaced;
 using testing::TemporaryFolder;
 
 Eigen::Vector3d right_in_left(const Rig& rig) {
@@ -85,6 +86,65 @@ TEST(OpencvFiles, TheRectificationTellsThePairToo) {
   EXPECT_EQ(rectified->cameras[0].model, CameraModel(PinholeModel{290, 290, 310, 230}));
   EXPECT_LE((right_in_left(*rectified) - Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-15);
   EXPECT_LE(rotation_angle(rectified->right_from_left(rectified->pairs[0])), 1e-15);
+}
+
+// A size that cannot be read is not one that is absent.
+TEST(OpencvFiles, ABadSizeIsNamed) {
+  const TemporaryFolder folder;
+  const std::string text = opencv_file([&](cv::FileStorage& file) {
+    for (const char* eye : {"1", "2"}) {
+      file << std::string("M") + eye << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
+      file << std::string("D") + eye << row({0.1, 0, 0, 0, 0});
+    }
+    file << "R" << row({1, 0, 0, 0, 1, 0, 0, 0, 1}, 3) << "T" << row({-0.1, 0, 0}, 3);
+  });
+  const auto said = [&](const std::string& what, const std::string& with) {
+    return complaint(read_calibration(folder.write("s.yml", replaced(text, what, with)), {111, 222}));
+  };
+  for (const char* bad : {"abc", "1e300", "0", "-640", "640.5", "[640, 480]"}) {
+    EXPECT_THAT(said("image_width: 640", std::string("image_width: ") + bad),
+                HasSubstr("s.yml:3: image_width: must be a whole number above zero"))
+        << bad;
+  }
+  EXPECT_THAT(said("image_height: 480\n", ""), HasSubstr("s.yml:3: image_width: without image_height"));
+  const std::string both = "image_width: 640\nimage_height: 480\n";
+  EXPECT_THAT(said(both, "image_size: [640, x]\n"), HasSubstr("s.yml:3: image_size: must be two whole numbers above"));
+  EXPECT_EQ(said(both, "image_size: [640, 480]\n"), "nothing");
+  EXPECT_EQ(said(both, ""), "nothing") << "then the size that is given counts";
+}
+
+TEST(OpencvFiles, RowsAndColumnsAreCounts) {
+  const TemporaryFolder folder;
+  const std::string text = opencv_file([&](cv::FileStorage& file) {
+    file << "P1" << row({290, 0, 310, 0, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
+    file << "P2" << row({290, 0, 310, -29, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
+  });
+  const std::string odd = replaced(replaced(text, "rows: 3", "rows: -3"), "cols: 4", "cols: -4");
+  EXPECT_THAT(complaint(read_calibration(folder.write("s.yml", odd))), HasSubstr("s.yml:5: P1: is not a matrix"));
+  EXPECT_EQ(complaint(read_calibration(folder.write("s.yml", text))), "nothing");
+}
+
+TEST(OpencvFiles, TheRectifiedViewIsLeftOut) {
+  const TemporaryFolder folder;
+  const auto left_out = [&](bool with_eyes) {
+    const std::string text = opencv_file([&](cv::FileStorage& file) {
+      const cv::Mat p = row({290, 0, 310, 0, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
+      cv::Mat right = p.clone();
+      right.at<double>(0, 3) = -29;
+      file << "R1" << row({0, 0, 0}) << "R2" << row({0, 0, 0}) << "P1" << p << "P2" << right;
+      if (!with_eyes) return;
+      for (const char* eye : {"1", "2"}) {
+        file << std::string("M") + eye << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
+        file << std::string("D") + eye << row({0.1, 0, 0, 0, 0});
+      }
+    });
+    std::string keys;
+    const ReadRig read = read_calibration(folder.write("s.yml", text)).value();
+    for (const RigDifference& each : read.left_out) keys += each.key;
+    return keys;
+  };
+  EXPECT_EQ(left_out(true), "R1R2P1P2");
+  EXPECT_EQ(left_out(false), "R1R2");
 }
 
 TEST(OpencvFiles, ThinPrismsMustBeZero) {

@@ -90,7 +90,7 @@ Result<std::vector<double>> OpencvStorage::matrix(const std::string& key, const 
   if (found == entries_.end()) return fault(key, "is missing");
   const Entry& entry = found->second;
   const auto rows = whole(entry.rows), columns = whole(entry.columns);
-  if (!rows || !columns) return fault(key, "is not a matrix");
+  if (!rows || !columns || *rows < 1 || *columns < 1) return fault(key, "is not a matrix");
   const auto total = std::ssize(entry.words);
   if (std::int64_t{*rows} * *columns != total) return fault(key, "has other numbers than its rows and columns say");
   if (std::find(counts.begin(), counts.end(), total) == counts.end()) {

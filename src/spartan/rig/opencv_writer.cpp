@@ -1,7 +1,6 @@
 // Writer of OpenCV's stereo calibration files.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <opencv2/core/persistence.hpp>
 
 #include "spartan/rig/calibration_writers.h"
@@ -22,8 +21,7 @@ Result<Lens> lens_of(const Camera& camera, bool fisheye) {
     }
   } else if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
-    const bool eight = std::any_of(k.begin() + 5, k.end(), [](double v) { return v != 0; });
-    return Lens{m->pinhole(), {k.begin(), k.begin() + (eight ? 8 : 5)}};
+    return Lens{m->pinhole(), {k.begin(), k.begin() + (is_rational(*m) ? 8 : 5)}};
   }
   if (fisheye) return cannot_hold(camera, fmt::format("one eye is a fisheye, this one is {}", name_of(camera.model)));
   return cannot_hold(camera, fmt::format("OpenCV has no model like {}", name_of(camera.model)));

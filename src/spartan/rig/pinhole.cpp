@@ -3,7 +3,10 @@
 namespace spartan {
 
 std::vector<ModelParameterKind> PinholeModel::parameter_kinds() {
-  return {{"focal_px", {2}, true}, {"centre_px", {2}}};
+  // No lens has more; numbers beyond say that a file is damaged.
+  constexpr double kMost_px = 1e7;
+  return {{.key = "focal_px", .counts = {2}, .positive = true, .most = kMost_px},
+          {.key = "centre_px", .counts = {2}, .least = -kMost_px, .most = kMost_px}};
 }
 
 ModelParameters PinholeModel::parameters() const {

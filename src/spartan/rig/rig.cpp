@@ -23,6 +23,8 @@ const T* find_named(const std::vector<T>& all, const std::string& name) {
 
 // Between two pixels one can interpolate; larger pictures cannot be addressed by the 16-bit tables of rectification.
 constexpr int kSmallestSide = 2, kLargestSide = 32767;
+// Frames of the Earth's centre are nearer; numbers beyond say that a file is damaged.
+constexpr double kFarthest_m = 1e9;
 
 class FaultFinder {
  public:
@@ -61,6 +63,8 @@ class FaultFinder {
   void check_pose(const std::string& key, const Pose& pose) {
     if (!pose.all_finite()) {
       add(key, "the place holds numbers that are not finite");
+    } else if (!(pose.translation().norm() <= kFarthest_m)) {
+      add(key, fmt::format("the place is farther than {} m from the mount", kFarthest_m));
     } else if (std::abs(pose.rotation().norm() - 1) > 1e-6) {
       add(key, "the quaternion has no unit length");
     }
@@ -91,6 +95,9 @@ class FaultFinder {
     for (const double v : numbers) {
       if (!std::isfinite(v)) return add(key, "must be finite");
       if (kind.positive && v <= 0) return add(key, fmt::format("holds {}, must be above zero", v));
+      if (kind.positive && v > kind.most) {
+        return add(key, fmt::format("holds {}, must be above zero and at most {}", v, kind.most));
+      }
       if (v < kind.least || v > kind.most) {
         return add(key, fmt::format("holds {}, must be between {} and {}", v, kind.least, kind.most));
       }

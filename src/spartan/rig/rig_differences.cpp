@@ -32,6 +32,7 @@ class Comparison {
     compare_body();
     for (const Camera& camera : wanted_.cameras) compare_camera(camera);
     for (std::size_t i = 0; i < wanted_.pairs.size(); ++i) compare_pair(i);
+    find_surplus();
     return std::move(differences_);
   }
 
@@ -113,8 +114,20 @@ class Comparison {
       return std::string(c.pixel_format.alignment == BitAlignment::high ? "high" : "low");
     };
     compare(field("bit_alignment"), "their end of the sample", alignment(camera), alignment(*other));
+    compare_vignetting(key, camera.vignetting, other->vignetting);
     compare(field("self_mask"), "the self-mask", camera.self_mask, other->self_mask);
     compare_place(key, camera, *other);
+  }
+
+  void compare_vignetting(const std::string& key, const Vignetting& wanted, const Vignetting& got) {
+    const auto list = [](const std::vector<double>& numbers) {
+      return numbers.empty() ? std::string() : fmt::format("[{}]", fmt::join(numbers, ", "));
+    };
+    const auto centre = [&](const Vignetting& v) {
+      return v.centre_px ? list({v.centre_px->x(), v.centre_px->y()}) : std::string();
+    };
+    compare(key + ".vignetting", "the fall-off of light", list(wanted.coefficients), list(got.coefficients));
+    compare(key + ".vignetting_centre_px", "its centre", centre(wanted), centre(got));
   }
 
   void compare_place(const std::string& key, const Camera& camera, const Camera& other) {
@@ -129,7 +142,13 @@ class Comparison {
   }
 
   void compare_model(const std::string& key, const CameraModel& wanted, const CameraModel& got) {
-    const CameraModel was = plainest(wanted), is = plainest(got);
+    CameraModel was = plainest(wanted);
+    const CameraModel is = plainest(got);
+    // A skew that is gone is no other kind of camera.
+    if (skew_px(was) != 0 && skew_px(is) == 0) {
+      add(key + ".skew_px", fmt::format("[{}], now none", skew_px(was)));
+      was = plainest(without_skew(was));
+    }
     if (name_of(was) != name_of(is)) {
       return add(key + ".model", fmt::format("the camera model: {}, now {}", name_of(was), name_of(is)));
     }
@@ -170,6 +189,23 @@ class Comparison {
     if (right && right->name != other.right) add(key + ".right", "another camera is the right eye");
     compare(key + ".nearest_m", "the nearest depth", pair.nearest_m, other.nearest_m);
     compare(key + ".for_odometry", "for odometry", pair.for_odometry, other.for_odometry);
+  }
+
+  // What nobody wanted: files that lay there already.
+  void find_surplus() {
+    for (const PanTiltUnit& unit : got_.pan_tilt_units) {
+      const bool wanted = std::any_of(wanted_.pan_tilt_units.begin(), wanted_.pan_tilt_units.end(),
+                                      [&](const PanTiltUnit& other) { return other.name == unit.name; });
+      if (!wanted) add("pan_tilt_units." + unit.name, "a pan-tilt unit that was not there before");
+    }
+    for (const Camera& camera : got_.cameras) {
+      const bool wanted =
+          std::any_of(partner_.begin(), partner_.end(), [&](const auto& entry) { return entry.second == camera.name; });
+      if (!wanted) add("cameras." + camera.name, "a camera that was not there before");
+    }
+    for (std::size_t i = wanted_.pairs.size(); i < got_.pairs.size(); ++i) {
+      add("pairs." + got_.pairs[i].name, "a pair that was not there before");
+    }
   }
 
   const Rig& wanted_;

@@ -58,6 +58,11 @@ TEST(RigDifferences, EveryFieldIsLookedAt) {
   EXPECT_EQ(differences([](Rig& r) { r.cameras[1].pixel_format.bits = 12; }), "cameras.right.bits;");
   EXPECT_EQ(differences([](Rig& r) { r.cameras[1].pixel_format.alignment = BitAlignment::high; }),
             "cameras.right.bit_alignment;");
+  EXPECT_EQ(differences([](Rig& r) { r.cameras[1].vignetting.coefficients = {-0.3}; }), "cameras.right.vignetting;");
+  EXPECT_EQ(differences([](Rig& r) {
+              r.cameras[1].vignetting.centre_px = {320, 240};
+            }),
+            "cameras.right.vignetting_centre_px;");
   EXPECT_EQ(differences([](Rig& r) { r.cameras[1].self_mask = "m.png"; }), "cameras.right.self_mask;");
   const auto moved = [](Camera& c) {
     c.mount_from_camera = Pose::from_translation({1e-9, 0, 0}) * c.mount_from_camera;
@@ -89,6 +94,16 @@ TEST(RigDifferences, AnEyeMayBeAnotherCamera) {
   found = describe_differences(wanted, got);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].key, "pairs.side.right");
+}
+
+TEST(RigDifferences, WhatNobodyWantedIsTold) {
+  EXPECT_EQ(differences([](Rig& r) {
+              r.cameras.push_back(r.cameras[2]);
+              r.cameras[3].name = "fourth";
+              r.pairs.push_back({"back", "third", "fourth"});
+              r.pan_tilt_units.push_back({"arm", Pose(), 0, 0});
+            }),
+            "pan_tilt_units.arm;cameras.fourth;pairs.back;");
 }
 
 TEST(RigDifferences, RoundingIsNone) {

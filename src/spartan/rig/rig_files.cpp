@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
-#include "spartan/core/image_io.h"
+#include "spartan/rig/calibration_readers.h"
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/pair_of_files.h"
 
@@ -20,18 +21,11 @@ bool is_there(const fs::path& path) {
   return fs::exists(path, error);
 }
 
-// The first picture of image_0 (KITTI odometry) or image_00/data (KITTI raw) beside the file.
+// The pictures of image_0 (KITTI odometry) or image_00/data (KITTI raw) beside the file.
 ImageSize size_of_recording_beside(const fs::path& file) {
   for (const char* folder : {"image_0", "image_00/data", "../image_0"}) {
-    std::error_code error;
-    fs::path first;
-    for (const auto& entry : fs::directory_iterator(file.parent_path() / folder, error)) {
-      const std::string extension = entry.path().extension().string();
-      if (extension != ".png" && extension != ".jpg" && extension != ".pgm") continue;
-      if (first.empty() || entry.path() < first) first = entry.path();
-    }
-    if (first.empty()) continue;
-    if (const auto image = read_image(first.string())) return image->size();
+    const ImageSize size = rig_detail::size_of_pictures_in((file.parent_path() / folder).string());
+    if (!size.empty()) return size;
   }
   return {};
 }
@@ -41,13 +35,14 @@ ImageSize size_of_pictures_beside(const fs::path& file) {
   return rig_detail::size_of_pictures_in(folder.empty() ? "." : folder.string());
 }
 
-// What is known of a rig whose format leaves no choice of the body.
-Result<ReadRig> with_body_note(Result<Rig> rig, CalibrationFormat format, std::vector<std::string> files,
-                               const char* body) {
+// A rig of which its reader left nothing out.
+Result<ReadRig> whole(Result<Rig> rig, CalibrationFormat format, const std::string& file, const char* body) {
   if (!rig) return failure(std::move(rig));
-  ReadRig read{std::move(*rig), format, std::move(files), {}};
-  const bool left = read.rig.convention == PoseConvention::left_optical;
-  read.notes = {left ? "body: the left camera, turned to x forward, y left, z up" : fmt::format("body: {}", body)};
+  ReadRig read;
+  read.rig = std::move(*rig);
+  read.format = format;
+  read.files = {file};
+  read.body = body;
   return read;
 }
 
@@ -59,10 +54,7 @@ Result<ReadRig> read_opencv(const fs::path& file, ImageSize size_hint) {
       (file.stem() == "intrinsics" || file.stem() == "extrinsics") && is_there(intrinsics) && is_there(extrinsics);
   const fs::path& first = apart ? intrinsics : file;
   if (size_hint.empty()) size_hint = size_of_pictures_beside(file);
-  std::vector<std::string> files{first.string()};
-  if (apart) files.push_back(extrinsics.string());
-  return with_body_note(read_opencv_calib(first.string(), apart ? extrinsics.string() : "", size_hint),
-                        CalibrationFormat::opencv, std::move(files), "");
+  return rig_detail::read_opencv(first.string(), apart ? extrinsics.string() : "", size_hint);
 }
 
 Result<ReadRig> read_file_per_eye(CalibrationFormat format, const std::string& path, ImageSize size) {
@@ -78,19 +70,15 @@ Result<ReadRig> read_file_per_eye(CalibrationFormat format, const std::string& p
 Result<ReadRig> read_as(CalibrationFormat format, const std::string& path, ImageSize size_hint) {
   const fs::path file(path);
   switch (format) {
-    case CalibrationFormat::rig_yaml: {
-      auto rig = read_rig_yaml(path);
-      if (!rig) return failure(std::move(rig));
-      return ReadRig{std::move(*rig), format, {path}, {}};
-    }
+    case CalibrationFormat::rig_yaml:
+      return whole(read_rig_yaml(path), format, path, "");
     case CalibrationFormat::kitti:
-      return with_body_note(read_kitti_calib(path, size_hint.empty() ? size_of_recording_beside(file) : size_hint),
-                            format, {path}, "");
+      return rig_detail::read_kitti(path, size_hint.empty() ? size_of_recording_beside(file) : size_hint);
     case CalibrationFormat::kitti_raw:
-      return with_body_note(read_kitti_raw_calib(path), format, {path}, "the IMU of calib_imu_to_velo.txt");
+      return rig_detail::read_kitti_raw(path);
     case CalibrationFormat::euroc: {
       const std::string folder = fs::absolute(file).parent_path().parent_path().string();
-      return with_body_note(read_euroc_calib(folder), format, {folder}, "that of T_BS");
+      return whole(read_euroc_calib(folder), format, folder, "that of T_BS");
     }
     case CalibrationFormat::kalibr:
       return read_kalibr_calib(path);
@@ -99,6 +87,15 @@ Result<ReadRig> read_as(CalibrationFormat format, const std::string& path, Image
     default:
       return read_file_per_eye(format, path, size_hint);
   }
+}
+
+// Matrices under a name that tells nothing: settings and results of other programs have it too.
+bool is_of_opencv(const fs::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending != ".yml" && ending != ".xml") return false;
+  const auto text = rig_detail::read_calibration_text(file.string());
+  return text && text->find("opencv-matrix") != std::string::npos &&
+         guess_format(file.string(), *text) == CalibrationFormat::opencv;
 }
 
 // The calibration in a folder: the files that recordings have, else what can be the only one.
@@ -113,9 +110,10 @@ Result<std::string> find_in_folder(const fs::path& folder) {
     const std::string name = entry.path().filename().string(), ending = entry.path().extension().string();
     const bool of_an_eye = ending == ".tsai" || ending == ".cahv" || ending == ".cahvor" || ending == ".cahvore" ||
                            ending == ".cameramodel";
-    const bool whole = ending == ".yaml" && name.find("camchain") != std::string::npos;
+    const bool yaml = ending == ".yaml" || ending == ".yml";
+    const bool whole = yaml && name.find("camchain") != std::string::npos;
     const bool of_ros = name == "left.yaml" && is_there(folder / "right.yaml");
-    if (of_an_eye || whole || of_ros) candidates.push_back(entry.path().string());
+    if (of_an_eye || whole || of_ros || is_of_opencv(entry.path())) candidates.push_back(entry.path().string());
   }
   std::sort(candidates.begin(), candidates.end());
   if (candidates.size() == 1) return candidates.front();
@@ -126,10 +124,22 @@ Result<std::string> find_in_folder(const fs::path& folder) {
   if (!candidates.empty()) {
     return failure(ErrorCode::configuration, "holds more than one calibration", folder.string(), "name the file");
   }
-  return failure(ErrorCode::configuration,
-                 "no calibration here: neither rig.yaml, calib.txt, calib_cam_to_cam.txt, cam0/sensor.yaml, a camchain "
-                 "nor files of two eyes",
-                 folder.string());
+  return failure(
+      ErrorCode::configuration,
+      "no calibration here: neither rig.yaml, calib.txt, calib_cam_to_cam.txt, cam0/sensor.yaml, a camchain, "
+      "OpenCV's matrices nor files of two eyes",
+      folder.string());
+}
+
+// mrcal's files may be large, under any name; what they are stands at their beginning.
+bool begins_as_mrcal(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return false;
+  std::string beginning(65536, ' ');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  beginning.resize(static_cast<std::size_t>(stream.gcount()));
+  return guess_format(file.string(), beginning) == CalibrationFormat::mrcal;
 }
 
 }  // namespace
@@ -144,9 +154,8 @@ Result<ReadRig> read_calibration(const std::string& path, ImageSize size_hint) {
   // Of "LEFT,RIGHT" the first one tells the format; a file whose own name has a comma is that file.
   std::string first = path;
   if (!is_there(path) && path.find(',') != std::string::npos) first.resize(path.find(','));
-  const bool of_mrcal = fs::path(first).extension() == ".cameramodel";
   const auto text = rig_detail::read_calibration_text(
-      first, of_mrcal ? rig_detail::kLargestModelFile_bytes : rig_detail::kLargestCalibration_bytes);
+      first, begins_as_mrcal(first) ? rig_detail::kLargestModelFile_bytes : rig_detail::kLargestCalibration_bytes);
   if (!text) return failure(text);
   const auto format = guess_format(first, *text);
   if (!format) {
@@ -158,11 +167,20 @@ Result<ReadRig> read_calibration(const std::string& path, ImageSize size_hint) {
     return failure(ErrorCode::configuration, fmt::format("{} does not have a file for each eye", name_of(*format)),
                    path, "name one file");
   }
-  return read_as(*format, path, size_hint);
+  return read_calibration_as(*format, path, size_hint);
+}
+
+Result<ReadRig> read_calibration_as(CalibrationFormat format, const std::string& path, ImageSize size_hint) {
+  auto read = read_as(format, path, size_hint);
+  if (read && !read->body.empty()) read->notes.insert(read->notes.begin(), "body: " + read->body);
+  return read;
 }
 
 Result<Rig> read_rig(const std::string& path, ImageSize size_hint) {
-  auto read = read_calibration(path, size_hint);
+  return rig_detail::rig_of(read_calibration(path, size_hint));
+}
+
+Result<Rig> rig_detail::rig_of(Result<ReadRig> read) {
   if (!read) return failure(std::move(read));
   return std::move(read->rig);
 }

@@ -7,6 +7,7 @@
 #include "spartan/core/result.h"
 #include "spartan/rig/calibration_format.h"
 #include "spartan/rig/rig.h"
+#include "spartan/rig/rig_differences.h"
 
 namespace spartan {
 
@@ -19,13 +20,17 @@ struct ReadRig {
   Rig rig;
   CalibrationFormat format = CalibrationFormat::rig_yaml;
   std::vector<std::string> files;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;       ///< what had to be decided, in sentences; "body: …" first
+  std::string body;                     ///< which frame the body is; empty where the file itself says it
+  std::vector<RigDifference> left_out;  ///< what a rig has no place for; keys as in rig.yaml, or those of the file
 };
 
 /// Any calibration: the format is guessed from name and content; of a folder, from what lies in it. Formats with a
 /// file for each eye take "LEFT,RIGHT", or one of the two where the other one lies beside it under the name of the
 /// other eye. `size_hint` counts for formats that do not hold the image size; without it, pictures beside tell it.
 Result<ReadRig> read_calibration(const std::string& path, ImageSize size_hint = {});
+/// The same of a known format, which nothing is guessed for; `path` is a file, or "LEFT,RIGHT".
+Result<ReadRig> read_calibration_as(CalibrationFormat format, const std::string& path, ImageSize size_hint = {});
 /// The rig of it.
 Result<Rig> read_rig(const std::string& path, ImageSize size_hint = {});
 
@@ -47,7 +52,7 @@ Result<Rig> read_kitti_raw_calib(const std::string& path);
 Result<Rig> read_euroc_calib(const std::string& mav0_folder);
 
 /// Kalibr's camchain: pinhole with radtan, equidistant or no distortion, omni without distortion, ds, eucm with β = 1.
-/// Body is the IMU where the file knows it (T_cam_imu), otherwise the left camera, turned. The first two cameras are
+/// Body is the IMU where a camera knows it (T_cam_imu, T_imu_cam), otherwise the left camera, turned. The first two are
 /// the pair.
 Result<ReadRig> read_kalibr_calib(const std::string& path);
 

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "spartan/rig/calibration_writers.h"
+#include "spartan/rig/model_equivalents.h"
 #include "spartan/rig/rig_files.h"
 
 namespace spartan {
@@ -40,6 +42,57 @@ std::vector<const Camera*> pair_first(const Rig& rig) {
   return cameras;
 }
 
+namespace {
+
+// Vectors of six decimals leave a skew that moves no pixel of the picture by this much. Most formats have none.
+constexpr double kRoundingSkew_px = 0.01;
+
+// By how much the skew moves rows from one side of the picture to the other.
+double skew_across_px(const Camera& camera) {
+  return std::abs(skew_px(camera.model)) * camera.size.width / parameters(camera.model).front().front();
+}
+
+// The rig as a format says it that has no skew.
+Result<Rig> without_skews(Rig rig, CalibrationFormat format) {
+  for (Camera& camera : rig.cameras) {
+    const double across = skew_across_px(camera);
+    if (across > kRoundingSkew_px) {
+      return cannot_hold(camera, fmt::format("{} has no skew, this camera's is {:.6g} px: {:.3g} px across the picture",
+                                             name_of(format), skew_px(camera.model), across));
+    }
+    camera.model = without_skew(camera.model);
+  }
+  return rig;
+}
+
+Result<CalibrationFiles> write_as(const Rig& rig, CalibrationFormat format, const std::string& path) {
+  switch (format) {
+    case CalibrationFormat::rig_yaml:
+      return CalibrationFiles{{path, to_rig_yaml(rig)}};
+    case CalibrationFormat::kitti:
+      return write_kitti_calib(rig, path);
+    case CalibrationFormat::kitti_raw:
+      return write_kitti_raw_calib(rig, path);
+    case CalibrationFormat::euroc:
+      return write_euroc_calib(rig, path);
+    case CalibrationFormat::kalibr:
+      return write_kalibr_calib(rig, path);
+    case CalibrationFormat::opencv:
+      return write_opencv_calib(rig, path);
+    case CalibrationFormat::ros:
+      return write_ros_calib(rig, path);
+    case CalibrationFormat::mrcal:
+      return write_mrcal_calib(rig, path);
+    case CalibrationFormat::tsai:
+      return write_tsai_calib(rig, path);
+    case CalibrationFormat::cahvor:
+      return write_cahvor_calib(rig, path);
+  }
+  return failure(ErrorCode::internal, "an unknown format");
+}
+
+}  // namespace
+
 }  // namespace rig_detail
 
 Rig rig_of_pair(const Rig& rig, const StereoPair& pair) {
@@ -55,29 +108,12 @@ Rig rig_of_pair(const Rig& rig, const StereoPair& pair) {
 
 Result<CalibrationFiles> to_calibration_files(const Rig& rig, CalibrationFormat format, const std::string& path) {
   if (Status sound = rig.validate("the rig"); !sound) return failure(std::move(sound));
-  switch (format) {
-    case CalibrationFormat::rig_yaml:
-      return CalibrationFiles{{path, to_rig_yaml(rig)}};
-    case CalibrationFormat::kitti:
-      return rig_detail::write_kitti_calib(rig, path);
-    case CalibrationFormat::kitti_raw:
-      return rig_detail::write_kitti_raw_calib(rig, path);
-    case CalibrationFormat::euroc:
-      return rig_detail::write_euroc_calib(rig, path);
-    case CalibrationFormat::kalibr:
-      return rig_detail::write_kalibr_calib(rig, path);
-    case CalibrationFormat::opencv:
-      return rig_detail::write_opencv_calib(rig, path);
-    case CalibrationFormat::ros:
-      return rig_detail::write_ros_calib(rig, path);
-    case CalibrationFormat::mrcal:
-      return rig_detail::write_mrcal_calib(rig, path);
-    case CalibrationFormat::tsai:
-      return rig_detail::write_tsai_calib(rig, path);
-    case CalibrationFormat::cahvor:
-      return rig_detail::write_cahvor_calib(rig, path);
+  if (format == CalibrationFormat::rig_yaml || format == CalibrationFormat::cahvor) {
+    return rig_detail::write_as(rig, format, path);
   }
-  return failure(ErrorCode::internal, "an unknown format");
+  const auto straight = rig_detail::without_skews(rig, format);
+  if (!straight) return failure(straight);
+  return rig_detail::write_as(*straight, format, path);
 }
 
 }  // namespace spartan

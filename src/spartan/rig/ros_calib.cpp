@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "spartan/rig/calibration_readers.h"
 #include "spartan/rig/calibration_text.h"
 #include "spartan/rig/calibration_writers.h"
 #include "spartan/rig/model_equivalents.h"
@@ -18,11 +19,12 @@ namespace {
 using rig_detail::YamlFaults;
 using rig_detail::YamlMap;
 
-// One file: the camera, its turn into the rectified frame, and its place there.
+// One file: the camera, its turn into the rectified frame, its place there, and what the rectified picture is.
 struct Eye {
   Camera camera;
   Eigen::Quaterniond rectified_from_camera = Eigen::Quaterniond::Identity();
   Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
+  PinholeModel rectified;
 };
 
 // The key under which this file has a thing: that of a calibration file, or of a message (of ROS 1, of ROS 2).
@@ -62,9 +64,20 @@ CameraModel read_model(YamlMap& root) {
   if (const auto k = numbers(root, k_key, {9})) {
     pinhole = rig_detail::read_camera_matrix(root, k_key, *k).value_or(PinholeModel{});
   }
-  const auto kind = root.choice("distortion_model",
-                                {"plumb_bob", "rational_polynomial", "equidistant", "fisheye", "radtan", "none", ""});
-  if (!kind || *kind == "none" || kind->empty()) return pinhole;
+  // Messages of cameras without a distortion leave its name empty.
+  const auto named = root.optional_node("distortion_model");
+  const bool unnamed = named && named->IsScalar() && named->Scalar().empty();
+  const auto kind = unnamed ? std::optional<std::string>("none")
+                            : root.choice("distortion_model", {"plumb_bob", "rational_polynomial", "equidistant",
+                                                               "fisheye", "radtan", "none"});
+  if (!kind) return pinhole;
+  if (*kind == "none") {
+    const auto d = root.has(d_key) ? numbers(root, d_key, {0, 4, 5, 8, 12, 14}) : std::nullopt;
+    if (d && std::any_of(d->begin(), d->end(), [](double v) { return v != 0; })) {
+      root.fault(d_key, "are not zero, but distortion_model knows none");
+    }
+    return pinhole;
+  }
   if (*kind == "equidistant" || *kind == "fisheye") {
     const auto d = numbers(root, d_key, {4});
     return d ? EquidistantModel(pinhole, {(*d)[0], (*d)[1], (*d)[2], (*d)[3]}) : EquidistantModel(pinhole, {});
@@ -73,6 +86,22 @@ CameraModel read_model(YamlMap& root) {
   const auto d = numbers(root, d_key, *kind == "rational_polynomial" ? std::vector{8} : std::vector{4, 5});
   if (d) std::copy(d->begin(), d->end(), coefficients.begin());
   return RadialTangentialModel(pinhole, coefficients);
+}
+
+// A part of the sensor, or pixels taken together, have other numbers than those that the file states.
+void refuse_parts(YamlMap& root, ImageSize size) {
+  for (const char* key : {"binning_x", "binning_y"}) {
+    if (root.has(key) && root.integer(key).value_or(0) > 1) root.fault(key, "binned pictures are not supported");
+  }
+  const auto node = root.optional_node("roi");
+  if (!node) return;
+  YamlMap roi(*node, root.path("roi"), root.faults());
+  if (!node->IsMap()) return;
+  const auto number = [&](const char* key) { return roi.has(key) ? roi.integer(key).value_or(0) : 0; };
+  const int x = number("x_offset"), y = number("y_offset"), width = number("width"), height = number("height");
+  // Zeros stand for the whole picture.
+  const bool whole = x == 0 && y == 0 && (width == 0 || width == size.width) && (height == 0 || height == size.height);
+  if (!whole) root.fault("roi", "is a part of the picture, which is not supported");
 }
 
 void read_rectification(YamlMap& root, Eye& eye) {
@@ -89,6 +118,7 @@ void read_rectification(YamlMap& root, Eye& eye) {
     if (!((*p)[0] > 0 && (*p)[5] > 0)) return root.fault(p_key, "the focal lengths must be above zero");
     if ((*p)[11] != 0) return root.fault(p_key, "its last number must be 0: eyes side by side, or one above the other");
     eye.place_m = {-(*p)[3] / (*p)[0], -(*p)[7] / (*p)[5], 0};
+    eye.rectified = {(*p)[0], (*p)[5], (*p)[2], (*p)[6]};
   }
 }
 
@@ -102,11 +132,56 @@ Result<Eye> read_eye(const std::string& path, const std::string& name) {
   eye.camera.size = read_size(root);
   eye.camera.model = read_model(root);
   read_rectification(root, eye);
-  for (const char* key : {"binning_x", "binning_y"}) {
-    if (root.has(key) && root.integer(key).value_or(0) > 1) root.fault(key, "binned pictures are not supported");
-  }
+  refuse_parts(root, eye.camera.size);
   if (const Status status = faults.status(); !status) return failure(status);
   return eye;
+}
+
+// The rectified view that goes with a pair, where Spartan chooses it. Rows lie along the baseline, the line of sight
+// between those of the eyes; the pictures look like the mean of both.
+struct RectifiedView {
+  PinholeModel pinhole;
+  Eigen::Matrix3d from_left, from_right;
+  double baseline_m = 0;  // below zero where the right eye stands to the left
+};
+
+RectifiedView rectified_view(const PinholeModel& left, const PinholeModel& right, const Pose& left_from_right) {
+  const Eigen::Vector3d& t = left_from_right.translation();
+  const double sign = t.x() < 0 ? -1 : 1;
+  const Eigen::Vector3d x = sign * t.normalized();
+  const Eigen::Vector3d ahead = Eigen::Vector3d::UnitZ() + left_from_right.rotation() * Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d y = ahead.cross(x);
+  if (y.norm() < 1e-3) y = x.unitOrthogonal();
+  y.normalize();
+  RectifiedView view;
+  view.from_left << x.transpose(), y.transpose(), x.cross(y).transpose();
+  view.from_right = view.from_left * left_from_right.rotation_matrix();
+  view.baseline_m = sign * t.norm();
+  view.pinhole = {0.5 * (left.fx + right.fx), 0.5 * (left.fy + right.fy), 0.5 * (left.cx + right.cx),
+                  0.5 * (left.cy + right.cy)};
+  return view;
+}
+
+PinholeModel pinhole_of(const CameraModel& model) {
+  const ModelParameters numbers = parameters(model);
+  return PinholeModel::from_parameters(numbers);
+}
+
+// A rig has no place for a rectified view. It is lost, unless it is the one that would be written again.
+std::vector<RigDifference> lost_view(const Eye& left, const Eye& right, const Pose& left_from_right) {
+  constexpr double kSame = 1e-9;
+  const RectifiedView own =
+      rectified_view(pinhole_of(left.camera.model), pinhole_of(right.camera.model), left_from_right);
+  const auto same = [&](const Eye& eye, const Eigen::Matrix3d& turn) {
+    const PinholeModel &a = eye.rectified, &b = own.pinhole;
+    const Eigen::Vector4d apart(a.fx - b.fx, a.fy - b.fy, a.cx - b.cx, a.cy - b.cy);
+    return apart.norm() <= kSame * b.fx && (eye.rectified_from_camera.toRotationMatrix() - turn).norm() <= kSame;
+  };
+  if (same(left, own.from_left) && same(right, own.from_right) && left.place_m.norm() <= kSame) return {};
+  return {{"projection_matrix",
+           fmt::format("the rectified view of the files, R and P (fx {:.6g}, cx {:.6g}; right {:.6g}, {:.6g}), is not "
+                       "kept, only how the eyes stand",
+                       left.rectified.fx, left.rectified.cx, right.rectified.fx, right.rectified.cx)}};
 }
 
 // --- writing ---
@@ -124,32 +199,13 @@ struct Lens {
 Result<Lens> lens_of(const Camera& camera) {
   if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
-    const bool rational = std::any_of(k.begin() + 5, k.end(), [](double v) { return v != 0; });
-    if (rational) return Lens{m->pinhole(), "rational_polynomial", {k.begin(), k.end()}};
+    if (is_rational(*m)) return Lens{m->pinhole(), "rational_polynomial", {k.begin(), k.end()}};
     return Lens{m->pinhole(), "plumb_bob", {k.begin(), k.begin() + 5}};
   }
   if (const auto m = expressed_as<EquidistantModel>(camera.model)) {
     return Lens{m->pinhole(), "equidistant", {m->coefficients().begin(), m->coefficients().end()}};
   }
   return rig_detail::cannot_hold(camera, fmt::format("ROS has no model like {}", name_of(camera.model)));
-}
-
-// Rows along the baseline, the line of sight between those of the eyes: turns into the rectified frame.
-struct Rectification {
-  Eigen::Matrix3d rectified_from_left;
-  double baseline_m;  // below zero where the right eye stands to the left
-};
-Rectification rectify(const Pose& left_from_right) {
-  const Eigen::Vector3d& t = left_from_right.translation();
-  const double sign = t.x() < 0 ? -1 : 1;
-  const Eigen::Vector3d x = sign * t.normalized();
-  Eigen::Vector3d ahead = Eigen::Vector3d::UnitZ() + left_from_right.rotation() * Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d y = ahead.cross(x);
-  if (y.norm() < 1e-3) y = x.unitOrthogonal();
-  y.normalize();
-  Eigen::Matrix3d rows;
-  rows << x.transpose(), y.transpose(), x.cross(y).transpose();
-  return {rows, sign * t.norm()};
 }
 
 }  // namespace
@@ -168,13 +224,14 @@ Result<ReadRig> read_ros_calib(const std::string& left_path, const std::string& 
   }
   const Eigen::Quaterniond right_from_rectified = right->rectified_from_camera.conjugate();
   const Pose right_from_left(right_from_rectified * left->rectified_from_camera, right_from_rectified * -apart);
-  auto rig = rig_detail::validated(
-      rig_of_one_pair("ros", std::move(left->camera), std::move(right->camera), right_from_left), right_path);
+  auto rig = rig_detail::validated(rig_of_one_pair("ros", left->camera, right->camera, right_from_left), right_path);
   if (!rig) return failure(std::move(rig));
   return ReadRig{std::move(*rig),
                  CalibrationFormat::ros,
                  {left_path, right_path},
-                 {"body: the left camera, turned to x forward, y left, z up"}};
+                 {},
+                 rig_detail::kBodyIsLeftCamera,
+                 lost_view(*left, *right, right_from_left.inverse())};
 }
 
 Result<CalibrationFiles> rig_detail::write_ros_calib(const Rig& rig, const std::string& path) {
@@ -184,10 +241,8 @@ Result<CalibrationFiles> rig_detail::write_ros_calib(const Rig& rig, const std::
   if (!left) return failure(left);
   if (!right) return failure(right);
   const Pose left_from_right = rig.right_from_left(*eyes->pair).inverse();
-  const Rectification rectified = rectify(left_from_right);
-  // The rectified pictures look like the mean of both.
-  const double fx = 0.5 * (left->pinhole.fx + right->pinhole.fx), fy = 0.5 * (left->pinhole.fy + right->pinhole.fy);
-  const double cx = 0.5 * (left->pinhole.cx + right->pinhole.cx), cy = 0.5 * (left->pinhole.cy + right->pinhole.cy);
+  const RectifiedView view = rectified_view(left->pinhole, right->pinhole, left_from_right);
+  const PinholeModel& p = view.pinhole;
   const auto text = [&](const Camera& camera, const Lens& lens, const Eigen::Matrix3d& r, double x_m) {
     const PinholeModel& k = lens.pinhole;
     const int count = static_cast<int>(lens.coefficients.size());
@@ -198,12 +253,11 @@ Result<CalibrationFiles> rig_detail::write_ros_calib(const Rig& rig, const std::
            matrix_lines("distortion_coefficients", 1, count, fmt::format("{}", fmt::join(lens.coefficients, ", "))) +
            matrix_lines("rectification_matrix", 3, 3, rows_of(r, ", ")) +
            matrix_lines("projection_matrix", 3, 4,
-                        fmt::format("{}, 0, {}, {}, 0, {}, {}, 0, 0, 0, 1, 0", fx, cx, 0 - fx * x_m, fy, cy));
+                        fmt::format("{}, 0, {}, {}, 0, {}, {}, 0, 0, 0, 1, 0", p.fx, p.cx, 0 - p.fx * x_m, p.fy, p.cy));
   };
   const PairOfFiles names = names_of_pair(path);
-  const Eigen::Matrix3d rectified_from_right = rectified.rectified_from_left * left_from_right.rotation_matrix();
-  return CalibrationFiles{{names.left, text(*eyes->left, *left, rectified.rectified_from_left, 0)},
-                          {names.right, text(*eyes->right, *right, rectified_from_right, rectified.baseline_m)}};
+  return CalibrationFiles{{names.left, text(*eyes->left, *left, view.from_left, 0)},
+                          {names.right, text(*eyes->right, *right, view.from_right, view.baseline_m)}};
 }
 
 }  // namespace spartan

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "spartan/rig/rig_files.h"
+#include "spartan/rig/rig_writing.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
@@ -66,6 +67,53 @@ TEST(RosCalib, MessagesAreReadToo) {
   }
   const auto binned = replaced(message(true, 0), "binning_x: 0", "binning_x: 2");
   EXPECT_THAT(complaint(read_calibration(folder.write("l.yaml", binned))), HasSubstr("l.yaml:10: binning_x"));
+}
+
+// A part of the sensor has another centre and size than the calibration says.
+TEST(RosCalib, APartOfTheSensorIsRefused) {
+  const TemporaryFolder folder;
+  folder.write("right.yaml", camera_info("right", -48));
+  const auto said = [&](const std::string& roi) {
+    return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0) + roi)));
+  };
+  EXPECT_THAT(said("roi: {x_offset: 100, y_offset: 50, width: 300, height: 200}\n"),
+              HasSubstr("left.yaml:21: roi: is a part of the picture"));
+  EXPECT_THAT(said("roi: {x_offset: 0, y_offset: 50, width: 0, height: 0}\n"), HasSubstr("left.yaml:21: roi"));
+  EXPECT_THAT(said("roi: {x_offset: 0, y_offset: 0, width: 640, height: 200}\n"), HasSubstr("left.yaml:21: roi"));
+  EXPECT_THAT(said("roi: {x_offset: nan, y_offset: 0, width: 0, height: 0}\n"), HasSubstr("roi.x_offset: is nan"));
+  EXPECT_THAT(said("roi: none\n"), HasSubstr("roi: must be a group"));
+  EXPECT_EQ(said("roi:\n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: false\n"), "nothing");
+  EXPECT_EQ(said("roi: {x_offset: 0, y_offset: 0, width: 640, height: 480}\n"), "nothing");
+}
+
+TEST(RosCalib, NoDistortionHasNoCoefficients) {
+  const TemporaryFolder folder;
+  folder.write("right.yaml", camera_info("right", -48));
+  const auto said = [&](const char* model, const char* d) {
+    return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0, model, d))));
+  };
+  for (const char* model : {"none", "''"}) {
+    EXPECT_EQ(said(model, "0, 0, 0, 0, 0"), "nothing");
+    EXPECT_EQ(said(model, ""), "nothing");
+    EXPECT_THAT(said(model, "-0.2, 0, 0, 0, 0"),
+                HasSubstr("left.yaml:9: distortion_coefficients: are not zero, but distortion_model knows none"));
+  }
+  EXPECT_THAT(said("fov", "0, 0, 0, 0, 0"), ::testing::EndsWith("equidistant, fisheye, radtan, none"));
+}
+
+// R and P choose a rectified view; a rig has no place for it.
+TEST(RosCalib, AnotherRectifiedViewIsLeftOut) {
+  const TemporaryFolder folder;
+  const auto left_out = [&](const std::string& left, const std::string& right) {
+    folder.write("right.yaml", right);
+    return read_calibration(folder.write("left.yaml", left)).value();
+  };
+  const ReadRig read = left_out(camera_info("left", 0), camera_info("right", -48));
+  ASSERT_EQ(read.left_out.size(), 1u);
+  EXPECT_EQ(read.left_out[0].key, "projection_matrix");
+  EXPECT_THAT(read.left_out[0].text, HasSubstr("(fx 400, cx 310; right 400, 310)"));
+  const auto own = to_calibration_files(read.rig, CalibrationFormat::ros, "left.yaml,right.yaml").value();
+  EXPECT_TRUE(left_out(own[0].content, own[1].content).left_out.empty()) << "it would be written again";
 }
 
 TEST(RosCalib, KindsAndFaultsAreNamed) {

@@ -59,13 +59,19 @@ Result<std::vector<double>> TextMatrices::numbers(const std::string& key, std::s
   if (!held) return failure(held);
   std::vector<double> values;
   std::istringstream words(*held);
-  for (std::string word; words >> word;) {
+  for (std::string word; words >> word && !word.starts_with('#');) {
     const auto value = parse_number(word);
     if (!value) return fault(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
     values.push_back(*value);
   }
   if (values.size() != count) return fault(key, fmt::format("has {} numbers, must have {}", values.size(), count));
   return values;
+}
+
+Result<Eigen::Vector3d> TextMatrices::vector(const std::string& key) const {
+  const auto v = numbers(key, 3);
+  if (!v) return failure(v);
+  return Eigen::Vector3d((*v)[0], (*v)[1], (*v)[2]);
 }
 
 std::string TextMatrices::where(const std::string& key) const {

@@ -1,6 +1,7 @@
 // The "key: number number …" files of KITTI, and the "key = number number …" files of JPL and Ames. Internal to rig.
 #pragma once
 
+#include <Eigen/Core>
 #include <map>
 #include <string>
 #include <vector>
@@ -23,8 +24,11 @@ class TextMatrices {
   static TextMatrices parse(const std::string& text, const std::string& name, char separator = ':');
 
   bool has(const std::string& key) const { return lines_.contains(key); }
-  /// Exactly `count` finite numbers; otherwise code `configuration` with "file:line" and the key.
+  /// Exactly `count` finite numbers, with a comment (#) behind them or none; otherwise code `configuration` with
+  /// "file:line" and the key.
   Result<std::vector<double>> numbers(const std::string& key, std::size_t count) const;
+  /// The same, three of them.
+  Result<Eigen::Vector3d> vector(const std::string& key) const;
   /// What stands behind the separator, blanks at its ends removed.
   Result<std::string> text(const std::string& key) const;
   /// The lines that hold no separator, comments (#) and empty ones left out.

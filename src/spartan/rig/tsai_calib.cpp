@@ -14,14 +14,8 @@
 namespace spartan {
 namespace {
 
+using rig_detail::EyeOfFile;
 using rig_detail::TextMatrices;
-
-// One line with numbers, once in the file.
-Result<Eigen::Vector3d> read_vector(const TextMatrices& file, const char* key) {
-  const auto v = file.numbers(key, 3);
-  if (!v) return failure(v);
-  return Eigen::Vector3d((*v)[0], (*v)[1], (*v)[2]);
-}
 
 Result<Eigen::Matrix3d> rotation_or_fault(const TextMatrices& file, const char* key, const Eigen::Matrix3d& matrix) {
   if (!is_rotation(matrix, 1e-4)) return file.fault(key, "is not a rotation matrix");
@@ -35,11 +29,11 @@ Result<Pose> read_pose(const TextMatrices& file) {
   const auto world_from_camera =
       rotation_or_fault(file, "R", Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data()));
   if (!world_from_camera) return failure(world_from_camera);
-  const auto centre = read_vector(file, "C");
+  const auto centre = file.vector("C");
   if (!centre) return failure(centre);
   Eigen::Matrix3d rows;
   for (const auto& [row, key] : {std::pair{0, "u_direction"}, {1, "v_direction"}, {2, "w_direction"}}) {
-    const auto axis = read_vector(file, key);
+    const auto axis = file.vector(key);
     if (!axis) return failure(axis);
     rows.row(row) = axis->transpose();
   }
@@ -98,7 +92,7 @@ Result<CameraModel> read_model(const TextMatrices& file) {
   return RadialTangentialModel(pinhole, k);
 }
 
-Result<Camera> read_eye(const std::string& path, const std::string& name, ImageSize size) {
+Result<EyeOfFile> read_eye(const std::string& path, const std::string& name, ImageSize size) {
   const auto file = TextMatrices::read(path, '=');
   if (!file) return failure(file);
   auto model = read_model(*file);
@@ -111,7 +105,7 @@ Result<Camera> read_eye(const std::string& path, const std::string& name, ImageS
   camera.size = size;
   camera.model = std::move(*model);
   camera.mount_from_camera = *pose;
-  return camera;
+  return EyeOfFile{std::move(camera)};
 }
 
 Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
@@ -120,7 +114,7 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
     return rig_detail::cannot_hold(camera, fmt::format(".tsai has no model like {}", name_of(camera.model)));
   }
   const auto& k = model->coefficients();
-  if (std::any_of(k.begin() + 5, k.end(), [](double v) { return v != 0; })) {
+  if (is_rational(*model)) {
     return rig_detail::cannot_hold(camera, ".tsai has no coefficients k4, k5, k6");
   }
   const PinholeModel& p = model->pinhole();

@@ -72,6 +72,11 @@ TEST_F(TsaiCalib, DistortionAndPitchAreAsTheProjectHasThem) {
   EXPECT_LE((lying * Eigen::Vector3d(0, 1, 2) - straight * Eigen::Vector3d(-1, 0, 2)).norm(), 1e-9);
 }
 
+TEST_F(TsaiCalib, CommentsMayStandBehindNumbers) {
+  EXPECT_EQ(complaint(read(replaced(kTsai, "C = 0.0751 -0.065 -0.902", "C = 0.0751 -0.065 -0.902 # centre"))),
+            "nothing");
+}
+
 TEST_F(TsaiCalib, FaultsAreNamed) {
   const auto said = [&](const std::string& what, const std::string& with) {
     return complaint(read(replaced(kTsai, what, with)));

@@ -11,6 +11,14 @@
 namespace spartan::rig_detail {
 namespace {
 
+// A value takes hundreds of times its place in the file: of more, none is looked at.
+constexpr std::ptrdiff_t kMostValues = 100000;
+
+// What begins values, no fewer than there are.
+std::ptrdiff_t values_at_most(const std::string& text) {
+  return std::count_if(text.begin(), text.end(), [](char c) { return c == ',' || c == '\n' || c == '[' || c == '{'; });
+}
+
 // A file with more faults than this is read no further by anybody.
 constexpr std::size_t kMostTold = 50;
 
@@ -103,6 +111,10 @@ Result<YAML::Node> load_yaml(const std::string& text, const std::string& name) {
   if (const std::size_t at = first_broken_character(text); at < text.size()) {
     const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
     return failure(ErrorCode::configuration, "not valid UTF-8", fmt::format("{}:{}", name, line));
+  }
+  if (values_at_most(text) > kMostValues) {
+    return failure(ErrorCode::configuration, fmt::format("holds more than {} values: no calibration", kMostValues),
+                   name);
   }
   try {
     return YAML::Load(text);

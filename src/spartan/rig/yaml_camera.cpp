@@ -74,12 +74,9 @@ Result<YAML::Node> load_yaml_file(const std::string& path) {
 ImageSize read_resolution(YamlMap& map, std::string_view key) {
   const auto size = map.numbers(key, {2});
   if (!size) return {};
-  for (const double side : *size) {
-    if (side >= 1 && side <= 1e6 && std::floor(side) == side) continue;
-    map.fault(key, "must be two whole numbers above zero");
-    return {};
-  }
-  return {static_cast<int>((*size)[0]), static_cast<int>((*size)[1])};
+  const auto known = whole_size((*size)[0], (*size)[1]);
+  if (!known) map.fault(key, "must be two whole numbers above zero");
+  return known.value_or(ImageSize{});
 }
 
 CameraModel read_kalibr_model(YamlMap& map, std::string_view distortion_key) {
@@ -129,13 +126,13 @@ std::optional<Pose> read_rigid(YamlMap& map, std::string_view key, const std::ve
 }
 
 std::optional<PinholeModel> read_camera_matrix(YamlMap& map, std::string_view key, const std::vector<double>& rows) {
-  const auto& m = rows;
-  if (m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
+  const auto pinhole = pinhole_of_rows(rows);
+  if (!pinhole) {
     map.fault(key, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
     return std::nullopt;
   }
-  if (!positive_focal_lengths(map, key, m[0], m[4])) return std::nullopt;
-  return PinholeModel{m[0], m[4], m[2], m[5]};
+  if (!positive_focal_lengths(map, key, pinhole->fx, pinhole->fy)) return std::nullopt;
+  return pinhole;
 }
 
 }  // namespace spartan::rig_detail
