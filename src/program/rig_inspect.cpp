@@ -81,7 +81,8 @@ Json findings_json(const std::vector<RigFinding>& findings) {
 }
 
 // Of a guess (no calibration) nothing is said that the pictures did not.
-Json to_json(const Rig& rig, const std::vector<Inspected>& inspected, bool guessed) {
+Json to_json(const ReadRig& read, const std::vector<Inspected>& inspected, bool guessed) {
+  const Rig& rig = read.rig;
   Json pairs = Json::object();
   for (const StereoPair& pair : rig.pairs) {
     const PairSummary summary = summarize_pair(rig, pair);
@@ -114,7 +115,13 @@ Json to_json(const Rig& rig, const std::vector<Inspected>& inspected, bool guess
     }
     pair["row_error_map"] = std::move(map);
   }
-  return {{"schema", 1}, {"pairs", std::move(pairs)}};
+  Json left_out = Json::array();
+  for (const RigDifference& d : read.left_out) left_out.push_back({{"key", d.key}, {"text", d.text}});
+  return {{"schema", 1},
+          {"body", read.body.empty() ? Json(nullptr) : Json(read.body)},
+          {"notes", read.notes},
+          {"left_out", std::move(left_out)},
+          {"pairs", std::move(pairs)}};
 }
 
 std::string turned(double radians, double sigma, const char* above, const char* below) {
@@ -172,6 +179,12 @@ Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, const
     return inspected;
   }
   const auto pair = std::find_if(rig.pairs.begin(), rig.pairs.end(), wanted);
+  const Camera &left = *rig.find_camera(pair->left), &right = *rig.find_camera(pair->right);
+  if (left.pixel_format != PixelFormat() || right.pixel_format != PixelFormat()) {
+    auto meant = load_pictures_of(left, right, a.left, a.right, a.shots, workers);
+    if (!meant) return failure(meant);
+    given = std::move(*meant);
+  }
   inspected.push_back(inspect_pair(rig, *pair, std::move(given), a.rig == "-", workers));
   return inspected;
 }
@@ -196,21 +209,12 @@ Rig with_pair_of(Rig rig, const Rig& other, const std::string& name) {
   return rig;
 }
 
-// Self-masks are named from the rig file's folder, and that changes.
-Status write_rig(Rig rig, const std::string& old_path, const std::string& path) {
-  const bool guessed = old_path == "-";
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::path from = fs::is_directory(old_path, error) ? fs::path(old_path) : fs::path(old_path).parent_path();
-  for (Camera& camera : rig.cameras) {
-    if (camera.self_mask.empty() || fs::path(camera.self_mask).is_absolute()) continue;
-    camera.self_mask =
-        fs::proximate(fs::absolute(from / camera.self_mask), fs::absolute(fs::path(path)).parent_path(), error)
-            .string();
-  }
+Status write_rig(const Rig& rig, const ReadRig& read, const std::string& path) {
+  const bool guessed = read.files.empty();
   const std::string remark =
       guessed ? "# Made of pictures alone: the focal length is a guess, and the baseline of 1 m none at all.\n" : "";
-  return write_file_atomically(path, remark + to_rig_yaml(rig));
+  const Rig moved = guessed ? rig : with_masks_moved(rig, read.files.front(), path);
+  return write_file_atomically(path, remark + to_rig_yaml(moved));
 }
 
 Status check_usage(const InspectArguments& a) {
@@ -231,8 +235,9 @@ Status check_usage(const InspectArguments& a) {
 }
 
 // What goes into files.
-Status write_results(const InspectArguments& a, const Rig& rig, const std::vector<Inspected>& inspected,
+Status write_results(const InspectArguments& a, const ReadRig& read, const std::vector<Inspected>& inspected,
                      const Workers& workers) {
+  const Rig& rig = read.rig;
   if (!a.picture.empty()) {
     const Inspected& one = inspected.front();
     const auto picture = draw_pair_check(rig, one.pair, one.check, std::as_const(one.left).view(),
@@ -252,7 +257,7 @@ Status write_results(const InspectArguments& a, const Rig& rig, const std::vecto
     }
     corrected = with_pair_of(corrected, *one.check.corrected, one.pair.name);
   }
-  return write_rig(corrected, a.rig, a.apply);
+  return write_rig(corrected, read, a.apply);
 }
 
 std::string in_words(const InspectArguments& a, const ReadRig& read, const std::vector<Inspected>& inspected) {
@@ -272,6 +277,7 @@ std::string in_words(const InspectArguments& a, const ReadRig& read, const std::
       for (const std::string& doubt : describe_doubts(read.rig, pair)) text += doubt + "\n";
     }
     for (const std::string& note : read.notes) text += note + "\n";
+    for (const RigDifference& d : read.left_out) text += fmt::format("not used: {}: {}\n", d.key, d.text);
   }
   for (const Inspected& one : inspected) text += in_words(one, guessed);
   return text;
@@ -297,9 +303,9 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
     inspected = std::move(*result);
   }
   const std::string text =
-      context.json ? to_json(read->rig, inspected, a.rig == "-").dump(2) + "\n" : in_words(a, *read, inspected);
+      context.json ? to_json(*read, inspected, a.rig == "-").dump(2) + "\n" : in_words(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
-  if (Status written = write_results(a, read->rig, inspected, workers); !written) return failure(written);
+  if (Status written = write_results(a, *read, inspected, workers); !written) return failure(written);
   if (context.json || a.apply.empty()) return kDone;
   const bool changed =
       std::any_of(inspected.begin(), inspected.end(), [](const Inspected& i) { return !i.check.findings.empty(); });

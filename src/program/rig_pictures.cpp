@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
+#include "spartan/camera/interpretation.h"
 #include "spartan/core/image_io.h"
 #include "spartan/imaging/imager.h"
 
@@ -48,9 +50,9 @@ std::vector<std::size_t> spread(std::size_t count, int most) {
   return places;
 }
 
-}  // namespace
-
-Result<std::vector<PicturePair>> load_pictures(const std::string& left, const std::string& right, int most) {
+// At most `most` pairs, spread over all that the two arguments name.
+Result<std::vector<std::pair<std::string, std::string>>> pairs_of_files(const std::string& left,
+                                                                        const std::string& right, int most) {
   const auto left_files = files_of(left);
   if (!left_files) return failure(left_files);
   const auto right_files = files_of(right);
@@ -60,9 +62,37 @@ Result<std::vector<PicturePair>> load_pictures(const std::string& left, const st
                    fmt::format("{} left and {} right pictures", left_files->size(), right_files->size()),
                    left + ", " + right, "every left picture needs its right one");
   }
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const std::size_t i : spread(left_files->size(), most)) pairs.emplace_back((*left_files)[i], (*right_files)[i]);
+  return pairs;
+}
+
+// What the pictures are judged by must not be needed to see them: sizes are those of the pictures, and the lenses any.
+Result<Imager> imager_without_geometry(const Camera& left, const Camera& right, ImageSize size,
+                                       const Workers& workers) {
+  const auto plain = [&](const char* name, const PixelFormat& format) {
+    Camera camera;
+    camera.name = name;
+    camera.size = size;
+    camera.pixel_format = format;
+    const double focal_px = std::max(size.width, size.height);
+    camera.model = PinholeModel{focal_px, focal_px, 0.5 * size.width, 0.5 * size.height};
+    return camera;
+  };
+  ImagingOptions options;
+  options.rectify = false;
+  return Imager::create(rig_of_one_pair("pair", plain("left", left.pixel_format), plain("right", right.pixel_format),
+                                        Pose::from_translation({-0.1, 0, 0})),
+                        options, workers);
+}
+
+}  // namespace
+
+Result<std::vector<PicturePair>> load_pictures(const std::string& left, const std::string& right, int most) {
+  const auto names = pairs_of_files(left, right, most);
+  if (!names) return failure(names);
   std::vector<PicturePair> pairs;
-  for (const std::size_t i : spread(left_files->size(), most)) {
-    const std::string &l = (*left_files)[i], &r = (*right_files)[i];
+  for (const auto& [l, r] : *names) {
     auto left_picture = read_gray8(l);
     if (!left_picture) return failure(left_picture);
     auto right_picture = read_gray8(r);
@@ -76,6 +106,33 @@ Result<std::vector<PicturePair>> load_pictures(const std::string& left, const st
                      path);
     }
     pairs.push_back({l, std::move(*left_picture), std::move(*right_picture)});
+  }
+  return pairs;
+}
+
+Result<std::vector<PicturePair>> load_pictures_of(const Camera& left_camera, const Camera& right_camera,
+                                                  const std::string& left, const std::string& right, int most,
+                                                  const Workers& workers) {
+  const auto names = pairs_of_files(left, right, most);
+  if (!names) return failure(names);
+  std::vector<PicturePair> pairs;
+  std::optional<Imager> imager;
+  for (const auto& [l, r] : *names) {
+    const auto left_file = read_image(l), right_file = read_image(r);
+    if (!left_file) return failure(left_file);
+    if (!right_file) return failure(right_file);
+    StereoFrame frame;
+    frame.left = interpret(*left_file, left_camera.pixel_format);
+    frame.right = interpret(*right_file, right_camera.pixel_format);
+    frame.pair = "pair";
+    if (!imager) {
+      auto made = imager_without_geometry(left_camera, right_camera, left_file->size(), workers);
+      if (!made) return failure(made);
+      imager.emplace(std::move(*made));
+    }
+    const auto taken = imager->process(frame);
+    if (!taken) return failure(taken);
+    pairs.push_back({l, Image<std::uint8_t>::copy_of(taken->left), Image<std::uint8_t>::copy_of(taken->right)});
   }
   return pairs;
 }

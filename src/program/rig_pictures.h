@@ -8,6 +8,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
+#include "spartan/rig/rig.h"
 
 namespace spartan::program {
 
@@ -21,6 +22,12 @@ struct PicturePair {
 /// the order of their names. At most `most` pairs, spread over all of them. Code `input` where there are none, where
 /// their numbers differ, or where sizes do.
 Result<std::vector<PicturePair>> load_pictures(const std::string& left, const std::string& right, int most);
+
+/// The same pictures where the cameras' samples mean something else than gray of 8 bits: a mosaic, deep samples.
+/// Through imaging without rectification, as a recording's are.
+Result<std::vector<PicturePair>> load_pictures_of(const Camera& left_camera, const Camera& right_camera,
+                                                  const std::string& left, const std::string& right, int most,
+                                                  const Workers& workers);
 
 /// Shots of one pair of a recording, spread over it; those that cannot be read are left out. Code `input` without any.
 Result<std::vector<PicturePair>> load_shots(FrameSource& source, const std::string& pair, int most,

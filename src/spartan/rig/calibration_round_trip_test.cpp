@@ -307,14 +307,8 @@ RC_GTEST_PROP(CalibrationRoundTrip, WhatIsDroppedIsToldAndNothingElseChanges, ()
   if (!read) RC_FAIL(std::string(holder.path) + ", " + kind + ": " + read.error().message());
   std::set<std::string> lost;
   for (const RigDifference& each : describe_differences(rig, read->rig)) lost.insert(each.key);
-  std::set<std::string> wanted{"pan_tilt_units.mast"};
-  for (const Camera& camera : rig.cameras) {
-    const std::string key = "cameras." + camera.name + ".";
-    if (camera.pixel_format.layout != PixelLayout::gray) wanted.insert(key + "pixel_layout");
-    if (camera.pixel_format.bits != 8) wanted.insert(key + "bits");
-    if (camera.pixel_format.alignment != BitAlignment::low) wanted.insert(key + "bit_alignment");
-    if (!camera.self_mask.empty()) wanted.insert(key + "self_mask");
-  }
+  std::set<std::string> wanted = keys_of_pictures(rig);
+  wanted.insert("pan_tilt_units.mast");
   const std::string pair = "pairs." + rig.pairs[0].name + ".";
   if (rig.pairs[0].nearest_m != 0) wanted.insert(pair + "nearest_m");
   if (!rig.pairs[0].for_odometry) wanted.insert(pair + "for_odometry");

@@ -285,12 +285,12 @@ TEST(RigDesigner, PansAllRoundAndTooFew) {
     r.wide.pans->angles_deg = {-180, -150, -120, -90, -60, -30, 0, 30, 60, 90, 120, 150};
     r.wide.pans->azimuth_deg = 360;
   });
-  EXPECT_EQ(round.pans->azimuth_far_deg, 360);
-  EXPECT_EQ(round.pans->azimuth_far_stereo_deg, 360);
+  EXPECT_EQ(round.pans->azimuth_far.width_deg(), 360);
+  EXPECT_EQ(round.pans->azimuth_far_stereo.width_deg(), 360);
   const RigDesign few = design_after([](RigRequirements& r) { r.wide.pans->azimuth_deg = 200; });
-  EXPECT_EQ(few.pans->azimuth_held_to_m, 0);
+  EXPECT_FALSE(few.pans->azimuth_held);
   const RigDesign uneven = design_after([](RigRequirements& r) { r.wide.pans->angles_deg = {-35, 0, 20}; });
-  EXPECT_NEAR(uneven.pans->overlap_percent, 30, 1e-9) << "by the widest step";
+  EXPECT_NEAR(uneven.pans->overlap->percent(), 30, 1e-9) << "by the widest step";
 }
 
 // Parts of the limits: overlap of 30 % in place of 25 % is nearest, by 5 of 100.
