@@ -21,6 +21,8 @@ namespace {
 
 using nlohmann::json;
 using ::testing::Contains;
+using testing::run_program;
+using testing::TemporaryFolder;
 
 // The first picture of a folder.
 std::string first_of(const std::string& folder) {

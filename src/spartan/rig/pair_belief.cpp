@@ -18,6 +18,8 @@ namespace {
 // brings the eyes to their sides.
 constexpr double kClearlyCheaper = 0.6, kClearlyDearer = 1.4, kMuchDearer = 3;
 constexpr double kCorrected = 0.5;
+// As in cost_of_rows().
+constexpr double kMostOfARow = 9, kLostRow_px = 0.9;
 constexpr int kMostMistakes = 3;
 constexpr double kGoodRows_px = 0.25, kUsableRows_px = 1.25, kLeastShare = 0.5;
 // Farther than this nobody's calibration is off without another mistake; a fraction of it needs no explanation.
@@ -76,12 +78,14 @@ BelievedPair fitted(PairBelief belief, const std::vector<PixelMatch>& matches) {
                cost_corrected = pair.fit.cost + kCorrected * static_cast<double>(matches.size());
   pair.as_it_is = cost_given <= cost_corrected;
   pair.cost = std::min(cost_given, cost_corrected);
+  for (const double row : pair.as_it_is ? given.row_error_px : pair.fit.rows.row_error_px)
+    pair.lost += std::abs(row) < kLostRow_px ? 0 : 1;
   pair.wrong_side = pair.as_it_is
                         ? share_on_the_wrong_side(pair.fit, given.disparity_px, 0)
                         : share_on_the_wrong_side(pair.fit, pair.fit.rows.disparity_px, pair.fit.correction.yaw_rad);
   const bool agree = pair.fit.inliers >= kLeastShare * static_cast<double>(matches.size()) && pair.wrong_side <= 0.5;
-  pair.explains =
-      agree && pair.fit.rms_px <= kUsableRows_px && (pair.as_it_is || strangeness(pair.fit.correction) <= 1);
+  pair.agrees = agree && pair.fit.rms_px <= kUsableRows_px;
+  pair.explains = pair.agrees && (pair.as_it_is || strangeness(pair.fit.correction) <= 1);
   return pair;
 }
 
@@ -281,11 +285,14 @@ std::vector<PairBelief> coarse_sizes(const PairBelief& belief, const std::vector
   return mistakes;
 }
 
-// What a belief has to cost less than to be believed instead: a mistake without which bad rows agree as they are needs
-// to be no more than cheaper, and one that puts the eyes on their sides not even that.
-double cost_to_beat(const BelievedPair& now, const BelievedPair& other, double cost) {
-  if (!passes(now)) return kMuchDearer * cost;
-  return other.as_it_is && !now.as_it_is && !now.good_rows ? cost : kClearlyCheaper * cost;
+// Whether another belief is believed instead: a mistake without which bad rows agree as they are needs to be no more
+// than cheaper, and one that puts the eyes on their sides not even that. What both do not explain (matches that are
+// none) says nothing about either.
+bool is_believed_instead(const BelievedPair& other, const BelievedPair& now, const BelievedPair& now_by_same_matches) {
+  const double both_lose = kMostOfARow * std::min(other.lost, now_by_same_matches.lost);
+  const double cost = other.cost - both_lose, cost_now = now_by_same_matches.cost - both_lose;
+  if (!passes(now)) return cost < kMuchDearer * cost_now;
+  return cost < (other.as_it_is && !now.as_it_is && !now.good_rows ? 1 : kClearlyCheaper) * cost_now;
 }
 
 // The simpler one has the same advantage among several.
@@ -304,7 +311,7 @@ std::optional<BelievedPair> with_next_mistake(const BelievedPair& now, const std
   const auto try_all = [&](std::vector<PairBelief> mistakes) {
     for (PairBelief& mistake : mistakes) {
       BelievedPair tried = fitted(std::move(mistake), few);
-      if (passes(tried) && tried.cost < cost_to_beat(now, tried, now_by_few.cost)) likely.push_back(std::move(tried));
+      if (passes(tried) && is_believed_instead(tried, now, now_by_few)) likely.push_back(std::move(tried));
     }
   };
   try_all(further_mistakes(now.belief, few, calibrated));
@@ -317,7 +324,7 @@ std::optional<BelievedPair> with_next_mistake(const BelievedPair& now, const std
     const PairBelief& belief = likely[i].belief;
     const bool sized = belief.size.any() && !now.belief.size.any();
     BelievedPair asked = sized ? refined_size(now.belief, belief.size, matches) : fitted(belief, matches);
-    if (!(asked.cost < cost_to_beat(now, asked, now.cost))) continue;
+    if (!is_believed_instead(asked, now, now)) continue;
     if (!best || weighed_cost(asked) < weighed_cost(*best)) best = std::move(asked);
   }
   return best;
@@ -396,6 +403,7 @@ BelievedPair believe_pair(const Camera& left, const Camera& right, const Pose& l
     best = std::move(*next);
   }
   if (calibrated) best = with_size_of_one_eye(best, matches);
+  if (!calibrated) best.explains = best.agrees;  // of a guess anything may be far off
   best.eyes_told = told || !best.belief.inverted;
   best.rms_as_given_px = rms_px;
   return best;

@@ -37,8 +37,10 @@ struct BelievedPair {
   bool good_rows = false;           ///< without the corrections of the fit
   bool as_it_is = false;            ///< the rows agree as well without the corrections of the fit
   double cost = 0;                  ///< of the rows as they are, or corrected and then so much a match
+  int lost = 0;                     ///< matches that cost as much as one can
   double wrong_side = 0;            ///< share of the inliers whose disparity is negative with at most a small yaw
-  /// The rows agree and nothing about it is far-fetched. Where not, no mistake that is known here explains the
+  bool agrees = false;              ///< most rows do, on the right side
+  /// They agree, and nothing about it is far-fetched. Where not, no mistake that is known here explains the
   /// pictures.
   bool explains = false;
   bool eyes_told = true;       ///< false: two equal eyes; an inverted transform and exchanged eyes are the same thing
