@@ -158,12 +158,16 @@ Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, cons
     }
   }
   const double scale = std::min(1.0, static_cast<double>(kWidest_px) / left.width());
-  const int width = static_cast<int>(left.width() * scale),
-            height = static_cast<int>(left.height() * scale) + kHeading_px;
-  Image<Rgb8> picture(2 * width, height * static_cast<int>(strips.size()));
+  const int width = static_cast<int>(left.width() * scale), height = static_cast<int>(left.height() * scale);
+  const auto height_of = [&](const Strip& strip) { return kHeading_px + (strip.left.empty() ? 0 : height); };
+  int whole = 0;
+  for (const Strip& strip : strips) whole += height_of(strip);
+  Image<Rgb8> picture(2 * width, whole);
   cv::Mat canvas = as_mat(picture);
-  for (std::size_t i = 0; i < strips.size(); ++i) {
-    draw(strips[i], wrong, canvas(cv::Rect(0, static_cast<int>(i) * height, 2 * width, height)), scale);
+  int top = 0;
+  for (const Strip& strip : strips) {
+    draw(strip, wrong, canvas(cv::Rect(0, top, 2 * width, height_of(strip))), scale);
+    top += height_of(strip);
   }
   return picture;
 }
