@@ -256,7 +256,7 @@ TEST_F(RigInspectPictures, DrawsTheRowsOfBothEyes) {
   };
   EXPECT_GT(compare(1, 0).second, 3000) << "arrows";
   for (const int eye : {0, 1}) {
-    EXPECT_EQ(compare(0, eye).first, 0) << eye;
+    EXPECT_LT(compare(0, eye).first, 0.01) << eye;  // rings at wrong matches are gray too
     EXPECT_GT(compare(1, eye).second, 5 * compare(0, eye).second) << eye;
     EXPECT_GT(compare(1, eye).second, 5 * compare(2, eye).second) << eye;
   }

@@ -60,9 +60,10 @@ std::optional<ImageSize> whole_size(double width, double height) {
   return ImageSize{static_cast<int>(width), static_cast<int>(height)};
 }
 
-std::optional<PinholeModel> pinhole_of_rows(const std::vector<double>& m) {
-  if (m.size() != 9 || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) return std::nullopt;
-  return PinholeModel{m[0], m[4], m[2], m[5]};
+std::optional<PinholeModel> pinhole_of_rows(const std::vector<double>& rows) {
+  const bool plain = rows.size() == 9 && rows[1] == 0 && rows[3] == 0 && rows[6] == 0 && rows[7] == 0 && rows[8] == 1;
+  if (!plain) return std::nullopt;
+  return PinholeModel{rows[0], rows[4], rows[2], rows[5]};
 }
 
 std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& turn) {

@@ -404,6 +404,9 @@ BelievedPair believe_pair(const Camera& left, const Camera& right, const Pose& l
   }
   if (calibrated) best = with_size_of_one_eye(best, matches);
   if (!calibrated) best.explains = best.agrees;  // of a guess anything may be far off
+  // Names and pictures exchanged are one mistake, an inverse transform and exchanged pictures two.
+  if (!told && best.belief.inverted && best.belief.pictures_exchanged)
+    best = fitted(with_other_eyes(best.belief), matches);
   best.eyes_told = told || !best.belief.inverted;
   best.rms_as_given_px = rms_px;
   return best;
