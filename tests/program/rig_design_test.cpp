@@ -258,7 +258,7 @@ std::string drawn(const testing::TemporaryFolder& folder, const std::string& ask
   const auto told = run_program({"rig", "design", folder.write("asked.yaml", asked), "-o", folder.path() + "/out"});
   EXPECT_EQ(told.exit_code, 0) << told.err;
   EXPECT_THAT(told.out, Not(HasSubstr("nan")));
-  const std::string svg = testing::content_of(folder.path() + "/out/ground.svg");
+  std::string svg = testing::content_of(folder.path() + "/out/ground.svg");
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
   return svg;

@@ -367,7 +367,7 @@ BelievedPair with_size_of_one_eye(const BelievedPair& now, const std::vector<Pix
       if (!best || tried.cost < 0.9 * best->cost) best = std::move(tried);
     }
   }
-  return best->cost < now.cost ? std::move(*best) : now;
+  return best->cost < now.cost ? *best : now;
 }
 
 }  // namespace

@@ -347,9 +347,10 @@ void Checker::correct() {
   }
   const PairBelief& b = believed_.belief;
   PairCorrection correction;
-  if (needs_correction())
+  if (needs_correction()) {
     correction =
         fit_pair(b.left.model, b.right.model, b.left_from_right, believed_.matches, needed_corrections()).correction;
+  }
   check_.corrected = corrected_rig(correction);
   const StereoPair& pair = *check_.corrected->find_pair(pair_.name);
   const RectifiedMatches seen =
