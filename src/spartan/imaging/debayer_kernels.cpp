@@ -225,8 +225,8 @@ void edge_aware(const Band<T, Pixel>& band, BandMemory& memory) {
   const int largest = kUnit * band.full_scale;
   // Steps count in levels of 8 bits whatever the depth: the picture is the same, and their products stay within the
   // range of a float. Full scales are a step below a power of two, so the quotient is one.
-  const int step = band.full_scale / 256 + 1;
-  const float scale = 1.0F / static_cast<float>(kUnit * step);
+  const int level = band.full_scale / 256 + 1;
+  const float scale = 1.0F / static_cast<float>(kUnit * level);
   const auto green = [&](int y) HWY_ATTR { return memory.columns(band.red.is_green(0, y)); };
   const auto row = [&](M::Plane plane, int y) HWY_ATTR { return memory.row(plane, y); };
   // Each step follows the one before it by the rows that it needs around its own.
