@@ -10,8 +10,8 @@
 #include <optional>
 #include <utility>
 
-#include "spartan/rig/model_changes.h"
 #include "spartan/rig/pair_belief.h"
+#include "spartan/rig/pair_mending.h"
 
 namespace spartan {
 namespace {
@@ -43,13 +43,6 @@ double share_below(const std::vector<double>& values, double limit) {
 
 constexpr RowErrors kNoRows{kNan, kNan, kNan};
 constexpr PairCorrection kNoCorrection{kNan, kNan, kNan, kNan, kNan, kNan, kNan, kNan};
-
-// What a baseline that is no rover's was divided or multiplied by: millimetres and centimetres are usual.
-double unit_factor(double baseline_m) {
-  if (baseline_m >= 30) return 0.001;
-  if (baseline_m >= 10) return 0.01;
-  return baseline_m < 0.005 ? 1000 : 1;
-}
 
 class Checker {
  public:
@@ -118,10 +111,8 @@ class Checker {
   void judge_rows();
   void judge_focal_ratio();
   bool needs_correction() const;
-  PairFitOptions needed_corrections() const;
   void correct();
   void name_rows_apart();
-  Rig corrected_rig(const PairCorrection& correction) const;
   PairVerdict verdict() const;
   PairCheck finish();
 
@@ -306,33 +297,6 @@ void Checker::judge_focal_ratio() {
       check_.correction.focal_ratio);
 }
 
-// What the corrected rig may differ in beside pitch and roll. What the rows hardly tell costs range where it is wrong:
-// a baseline's direction, and beside rays that bend a yaw and a focal ratio, are touched where the rows need it.
-PairFitOptions Checker::needed_corrections() const {
-  constexpr double kCheaper = 0.9, kLeastGain = 25;
-  PairFitOptions options = fit_options(believed_.belief);
-  const bool bends = found("distortion_ignored");
-  options.yaw = guessed_ || found("yaw_offset");
-  options.focal = guessed_ || found("focal_ratio");
-  options.baseline = false;
-  const PairBelief& b = believed_.belief;
-  const auto cost = [&] {
-    return fit_pair(b.left.model, b.right.model, b.left_from_right, believed_.matches, options).cost;
-  };
-  double held = cost();
-  const auto free_if_needed = [&](bool& option) {
-    if (option) return;
-    option = true;
-    const double free = cost();
-    option = free < kCheaper * held && free < held - kLeastGain;
-    if (option) held = free;
-  };
-  if (bends) free_if_needed(options.focal);
-  if (bends) free_if_needed(options.yaw);
-  free_if_needed(options.baseline);
-  return options;
-}
-
 // Where eyes, unit or size were all that was wrong, the rest of the calibration is right.
 bool Checker::needs_correction() const {
   return !are_good(check_.as_given) || found("yaw_offset") || found("row_offset") || found("focal_ratio") ||
@@ -345,13 +309,13 @@ void Checker::correct() {
     check_.as_corrected = check_.as_given;
     return;
   }
-  const PairBelief& b = believed_.belief;
   PairCorrection correction;
   if (needs_correction()) {
-    correction =
-        fit_pair(b.left.model, b.right.model, b.left_from_right, believed_.matches, needed_corrections()).correction;
+    correction = needed_correction(believed_, {.yaw = guessed_ || found("yaw_offset"),
+                                               .focal_ratio = guessed_ || found("focal_ratio"),
+                                               .distortion = found("distortion_ignored")});
   }
-  check_.corrected = corrected_rig(correction);
+  check_.corrected = mended_rig(rig_, pair_, believed_.belief, correction, found("baseline_unit"));
   const StereoPair& pair = *check_.corrected->find_pair(pair_.name);
   const RectifiedMatches seen =
       rectify_matches(check_.corrected->find_camera(pair.left)->model, check_.corrected->find_camera(pair.right)->model,
@@ -390,31 +354,6 @@ PairVerdict Checker::verdict() const {
   const RowErrors& rows = check_.as_given;
   if (rows.mean_px > kUsableMean_px || rows.p95_px > kUsableP95_px) return PairVerdict::bad;
   return check_.findings.empty() ? PairVerdict::good : PairVerdict::usable;
-}
-
-Rig Checker::corrected_rig(const PairCorrection& correction) const {
-  Rig rig = rig_;
-  const auto camera_of = [&](const std::string& name) -> Camera& {
-    return *std::find_if(rig.cameras.begin(), rig.cameras.end(), [&](const Camera& c) { return c.name == name; });
-  };
-  StereoPair& pair =
-      *std::find_if(rig.pairs.begin(), rig.pairs.end(), [&](const auto& p) { return p.name == pair_.name; });
-  const PairBelief& b = believed_.belief;
-  if (b.eyes_exchanged) std::swap(pair.left, pair.right);
-  Camera &left = camera_of(pair.left), &right = camera_of(pair.right);
-  left.size = b.left.size;
-  right.size = b.right.size;
-  left.model = b.left_bends ? with_radial(b.left.model, correction.left_radial, left.size) : b.left.model;
-  right.model =
-      with_focal_times(b.right_bends ? with_radial(b.right.model, correction.right_radial, right.size) : b.right.model,
-                       correction.focal_ratio);
-  Pose left_from_right = corrected_left_from_right(b.left_from_right, correction);
-  if (found("baseline_unit")) {
-    const double factor = unit_factor(left_from_right.translation().norm());
-    left_from_right = Pose(left_from_right.rotation(), factor * left_from_right.translation());
-  }
-  right.mount_from_camera = left.mount_from_camera * left_from_right;
-  return rig;
 }
 
 PairCheck Checker::finish() {

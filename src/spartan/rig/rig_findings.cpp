@@ -123,10 +123,13 @@ std::vector<RigFinding> find_doubts(const Rig& rig, const StereoPair& pair, Imag
                         std::max(std::abs(t.y()), std::abs(t.z()))});
   }
   if (t.norm() > kLongBaseline_m || t.norm() < kShortBaseline_m) {
-    findings.push_back({"baseline_unit",
-                        fmt::format("a baseline of {:.4g} m: {}", t.norm(),
-                                    t.norm() > 1 ? "was it given in mm or cm?" : "was it divided by 1000 twice?"),
-                        t.norm()});
+    findings.push_back(
+        {"baseline_unit",
+         fmt::format("a baseline of {:.4g} m: {}", t.norm(),
+                     t.norm() > 1 ? fmt::format("was it given in mm or cm? It would be {:.4g} m or {:.4g} m",
+                                                0.001 * t.norm(), 0.01 * t.norm())
+                                  : "was it divided by 1000 twice?"),
+         t.norm()});
   }
   const double turned_deg = rotation_angle(left_from_right) * kDegreesPerRadian;
   if (turned_deg > kLargestTurn_deg) {
