@@ -21,7 +21,7 @@ constexpr double kCorrected = 0.5;
 // As in cost_of_rows().
 constexpr double kMostOfARow = 9, kLostRow_px = 0.9;
 constexpr int kMostMistakes = 3;
-constexpr double kGoodRows_px = 0.25, kUsableRows_px = 1.25, kLeastShare = 0.5;
+constexpr double kGoodRows_px = 0.5, kUsableRows_px = 1.25, kLeastShare = 0.5;
 // Farther than this nobody's calibration is off without another mistake; a fraction of it needs no explanation.
 constexpr double kLargestTurn_rad = 12 * std::numbers::pi / 180, kLargestRadial = 1, kLargestFocal = 0.1;
 constexpr double kUsual = 0.25;
@@ -93,9 +93,13 @@ bool passes(const BelievedPair& pair) {
   return pair.wrong_side <= 0.5;
 }
 
+// Good rows by a correction as calibrations need it.
+bool has_ordinary_fit(const BelievedPair& pair) {
+  return pair.explains && pair.fit.rms_px <= kGoodRows_px && strangeness(pair.fit.correction) <= kUsual;
+}
+
 bool is_beyond_doubt(const BelievedPair& pair) {
-  return pair.explains && pair.as_it_is && pair.fit.rms_px <= kGoodRows_px &&
-         strangeness(pair.fit.correction) <= kUsual;
+  return has_ordinary_fit(pair) && pair.as_it_is && passes(pair);
 }
 
 // --- which eye is which ---
@@ -316,7 +320,8 @@ std::optional<BelievedPair> with_next_mistake(const BelievedPair& now, const std
   };
   try_all(further_mistakes(now.belief, few, calibrated));
   const bool simple = std::any_of(likely.begin(), likely.end(), [](const BelievedPair& p) { return p.as_it_is; });
-  if (calibrated && !simple) try_all(coarse_sizes(now.belief, few));
+  const bool ordinary = passes(now) && has_ordinary_fit(now);
+  if (calibrated && !simple && !ordinary) try_all(coarse_sizes(now.belief, few));
   std::stable_sort(likely.begin(), likely.end(),
                    [](const auto& a, const auto& b) { return weighed_cost(a) < weighed_cost(b); });
   std::optional<BelievedPair> best;

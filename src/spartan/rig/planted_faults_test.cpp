@@ -233,7 +233,7 @@ TEST(PlantedFault, FocalRatio) {
 // What is wrong in one eye only, and what looks like something else at first sight.
 TEST(PlantedFault, FocalLengthOfAnotherSizeInOneEye) {
   const Rig truth = true_rig();
-  for (const double factor : {0.5, 0.75, 1.5, 2.0}) {
+  for (const double factor : {0.5, 1.5}) {
     Rig rig = truth;
     rig.cameras[1].model = with_focal_times(rig.cameras[1].model, factor);
     const PairCheck result = check(rig, look(truth));
