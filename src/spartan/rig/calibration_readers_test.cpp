@@ -7,6 +7,7 @@
 #include <opencv2/core/persistence.hpp>
 
 #include "spartan/rig/rig_files.h"
+#include "spartan/testing/first_pair.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
@@ -17,11 +18,8 @@ namespace {
 using testing::complaint;
 using ::testing::HasSubstr;
 using testing::replaced;
+using testing::right_in_left;
 using testing::TemporaryFolder;
-
-Eigen::Vector3d right_in_left(const Rig& rig) {
-  return rig.right_from_left(rig.pairs[0]).inverse().translation();
-}
 
 // --- KITTI odometry ---
 

@@ -9,6 +9,7 @@
 #include "spartan/rig/rig_differences.h"
 #include "spartan/rig/rig_files.h"
 #include "spartan/rig/rig_writing.h"
+#include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
@@ -18,16 +19,13 @@ namespace {
 using testing::complaint;
 using ::testing::HasSubstr;
 using testing::replaced;
+using testing::right_in_left;
 using testing::TemporaryFolder;
 
 // Where the body's point is seen, brought to 1 m from the camera: mrcal does so before it looks, and only CAHVORE,
 // which is not central, sees a difference.
 Eigen::Vector2d seen(const Rig& rig, const char* camera, const Eigen::Vector3d& point) {
   return project(rig.find_camera(camera)->model, (rig.body_from_camera(camera).inverse() * point).normalized()).value();
-}
-
-Eigen::Vector3d right_in_left(const Rig& rig) {
-  return rig.right_from_left(rig.pairs[0]).inverse().translation();
 }
 
 struct OfMrcal {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "spartan/rig/rig_files.h"
+#include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
@@ -13,11 +14,8 @@ namespace {
 using testing::complaint;
 using ::testing::HasSubstr;
 using testing::replaced;
+using testing::right_in_left;
 using testing::TemporaryFolder;
-
-Eigen::Vector3d right_in_left(const Rig& rig) {
-  return rig.right_from_left(rig.pairs[0]).inverse().translation();
-}
 
 // The example of the project's wiki, with a third camera.
 const std::string kCamchain = R"(cam0:

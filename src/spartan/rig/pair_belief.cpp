@@ -18,8 +18,6 @@ namespace {
 // brings the eyes to their sides.
 constexpr double kClearlyCheaper = 0.6, kClearlyDearer = 1.4, kMuchDearer = 3;
 constexpr double kCorrected = 0.5;
-// As in cost_of_rows().
-constexpr double kMostOfARow = 9, kLostRow_px = 0.9;
 constexpr int kMostMistakes = 3;
 constexpr double kGoodRows_px = 0.5, kUsableRows_px = 1.25, kLeastShare = 0.5;
 // Farther than this nobody's calibration is off without another mistake; a fraction of it needs no explanation.
@@ -51,14 +49,6 @@ std::vector<PixelMatch> some_of(const std::vector<PixelMatch>& matches) {
   return some;
 }
 
-std::vector<double> inliers_of(const std::vector<double>& values, const std::vector<bool>& inlier) {
-  std::vector<double> result;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (inlier[i]) result.push_back(values[i]);
-  }
-  return result;
-}
-
 // A fitted yaw shifts all disparities: more than a small one must not decide on which side an eye stands.
 double share_on_the_wrong_side(const PairFit& fit, const std::vector<double>& disparity_px, double yaw_rad) {
   const double excess_px = fit.rows.focal_px * (yaw_rad - std::clamp(yaw_rad, -kLargestYaw_rad, kLargestYaw_rad));
@@ -67,30 +57,30 @@ double share_on_the_wrong_side(const PairFit& fit, const std::vector<double>& di
   return fit.inliers > 0 ? static_cast<double>(wrong) / fit.inliers : 0;
 }
 
+bool passes(const BelievedPair& pair) {
+  return pair.wrong_side <= 0.5;
+}
+
 BelievedPair fitted(PairBelief belief, const std::vector<PixelMatch>& matches) {
   BelievedPair pair{std::move(belief), {}, {}};
   const PairBelief& b = pair.belief;
   pair.matches = b.pictures_exchanged ? exchanged(matches) : matches;
   pair.fit = fit_pair(b.left.model, b.right.model, b.left_from_right, pair.matches, fit_options(b));
-  const RectifiedMatches given = rectify_matches(b.left.model, b.right.model, b.left_from_right, pair.matches);
+  const RectifiedMatches& given = pair.fit.given;
   pair.good_rows = are_good(row_errors(inliers_of(given.row_error_px, pair.fit.inlier)));
   const double cost_given = cost_of_rows(given.row_error_px),
                cost_corrected = pair.fit.cost + kCorrected * static_cast<double>(matches.size());
   pair.as_it_is = cost_given <= cost_corrected;
   pair.cost = std::min(cost_given, cost_corrected);
   for (const double row : pair.as_it_is ? given.row_error_px : pair.fit.rows.row_error_px)
-    pair.lost += std::abs(row) < kLostRow_px ? 0 : 1;
+    pair.lost += row * row < kMostOfARow * kRowUnit_px * kRowUnit_px ? 0 : 1;
   pair.wrong_side = pair.as_it_is
                         ? share_on_the_wrong_side(pair.fit, given.disparity_px, 0)
                         : share_on_the_wrong_side(pair.fit, pair.fit.rows.disparity_px, pair.fit.correction.yaw_rad);
-  const bool agree = pair.fit.inliers >= kLeastShare * static_cast<double>(matches.size()) && pair.wrong_side <= 0.5;
+  const bool agree = pair.fit.inliers >= kLeastShare * static_cast<double>(matches.size()) && passes(pair);
   pair.agrees = agree && pair.fit.rms_px <= kUsableRows_px;
   pair.explains = pair.agrees && (pair.as_it_is || strangeness(pair.fit.correction) <= 1);
   return pair;
-}
-
-bool passes(const BelievedPair& pair) {
-  return pair.wrong_side <= 0.5;
 }
 
 // Good rows by a correction as calibrations need it.
@@ -99,7 +89,7 @@ bool has_ordinary_fit(const BelievedPair& pair) {
 }
 
 bool is_beyond_doubt(const BelievedPair& pair) {
-  return has_ordinary_fit(pair) && pair.as_it_is && passes(pair);
+  return has_ordinary_fit(pair) && pair.as_it_is;
 }
 
 // --- which eye is which ---
@@ -320,8 +310,7 @@ std::optional<BelievedPair> with_next_mistake(const BelievedPair& now, const std
   };
   try_all(further_mistakes(now.belief, few, calibrated));
   const bool simple = std::any_of(likely.begin(), likely.end(), [](const BelievedPair& p) { return p.as_it_is; });
-  const bool ordinary = passes(now) && has_ordinary_fit(now);
-  if (calibrated && !simple && !ordinary) try_all(coarse_sizes(now.belief, few));
+  if (calibrated && !simple && !has_ordinary_fit(now)) try_all(coarse_sizes(now.belief, few));
   std::stable_sort(likely.begin(), likely.end(),
                    [](const auto& a, const auto& b) { return weighed_cost(a) < weighed_cost(b); });
   std::optional<BelievedPair> best;

@@ -27,15 +27,6 @@ constexpr double kYawOfLens_rad = 2 * 0.002 * std::numbers::sqrt2;
 constexpr double kYawSigmas = 2.6, kSigmas = 5;
 constexpr double kBeyondInfinity_px = -1.5, kBeyondShare = 0.02;
 
-template <class T>
-std::vector<T> chosen(const std::vector<T>& values, const std::vector<bool>& which) {
-  std::vector<T> result;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (which[i]) result.push_back(values[i]);
-  }
-  return result;
-}
-
 double share_below(const std::vector<double>& values, double limit) {
   const auto below = std::count_if(values.begin(), values.end(), [&](double v) { return v < limit; });
   return values.empty() ? 0 : static_cast<double>(below) / static_cast<double>(values.size());
@@ -154,11 +145,10 @@ void Checker::take_figures() {
   check_.inliers = fit().inliers;
   check_.correction = fit().correction;
   check_.sigma = fit().sigma;
-  check_.matched = chosen(believed_.matches, fit().inlier);
+  check_.matched = inliers_of(believed_.matches, fit().inlier);
   check_.inlier_limit_px = fit().inlier_limit_px;
   check_.pictures_exchanged = belief.pictures_exchanged;
-  check_.row_error_px =
-      rectify_matches(belief.left.model, belief.right.model, belief.left_from_right, check_.matched).row_error_px;
+  check_.row_error_px = inliers_of(fit().given.row_error_px, fit().inlier);
   std::vector<double> taken;
   taken.reserve(check_.matched.size());
   for (const PixelMatch& match : check_.matched) taken.push_back(match.left.y() - match.right.y());
@@ -247,7 +237,7 @@ void Checker::judge_yaw() {
   check_.yaw_doubt_px = sigma * fit().rows.focal_px;
   if (guessed_) return;
   // Disparities as given are those as corrected without the yaw: on the axis it shifts them by f times itself.
-  const std::vector<double> corrected = chosen(fit().rows.disparity_px, fit().inlier);
+  const std::vector<double> corrected = inliers_of(fit().rows.disparity_px, fit().inlier);
   std::vector<double> given = corrected;
   for (double& d : given) d += fit().rows.focal_px * yaw;
   const double beyond = share_below(given, kBeyondInfinity_px);
@@ -327,7 +317,7 @@ void Checker::correct() {
 // Rows that nothing above has named.
 void Checker::name_rows_apart() {
   constexpr double kMended = 0.7;
-  const RowErrors fitted = row_errors(chosen(fit().rows.row_error_px, fit().inlier));
+  const RowErrors fitted = row_errors(inliers_of(fit().rows.row_error_px, fit().inlier));
   std::string why;
   if (check_.as_corrected.mean_px < kMended * check_.as_given.mean_px) {
     why = "; turns and the baseline's direction mend that";

@@ -16,8 +16,6 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kParameters = 8, kWithoutBaseline = 4, kWithoutRadial = 6;
 constexpr int kStepsPerScale = 6, kLastSteps = 20, kLastScales = 3;
-// Row differences are compared between beliefs in units of this, and count no more from three of them on.
-constexpr double kRowUnit_px = 0.3;
 using Parameters = Eigen::Matrix<double, kParameters, 1>;
 
 // pitch, yaw, roll, ln(focal ratio); baseline down, baseline ahead; bend left, bend right.
@@ -117,6 +115,7 @@ class PairOfLenses {
   double focal_px() const { return focal_px_; }
   std::vector<double> row_errors(const Parameters& p) const { return look(p, &Seen::row_error); }
   std::vector<double> disparities(const Parameters& p) const { return look(p, &Seen::disparity); }
+  RectifiedMatches rectified(const Parameters& p) const { return {focal_px_, row_errors(p), disparities(p)}; }
 
  private:
   static Eigen::Vector2d centre_of(const CameraModel& model) {
@@ -337,11 +336,10 @@ Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection
 }
 
 double cost_of_rows(const std::vector<double>& row_error_px) {
-  constexpr double kMost = 9;
   double sum = 0;
   for (const double row : row_error_px) {
     const double square = row * row / (kRowUnit_px * kRowUnit_px);
-    sum += square < kMost ? square : kMost;
+    sum += square < kMostOfARow ? square : kMostOfARow;
   }
   return sum;
 }
@@ -349,16 +347,17 @@ double cost_of_rows(const std::vector<double>& row_error_px) {
 RectifiedMatches rectify_matches(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
                                  const std::vector<PixelMatch>& matches) {
   const PairOfLenses lenses(left, right, left_from_right, matches);
-  return {lenses.focal_px(), lenses.row_errors(Parameters::Zero()), lenses.disparities(Parameters::Zero())};
+  return lenses.rectified(Parameters::Zero());
 }
 
 PairFit fit_pair(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
                  const std::vector<PixelMatch>& matches, const PairFitOptions& options) {
   Fitter fitter(PairOfLenses(left, right, left_from_right, matches), options);
-  fitter.run();
   PairFit fit;
+  fit.given = fitter.lenses().rectified(Parameters::Zero());
+  fitter.run();
   fit.correction = to_correction(fitter.at());
-  fit.rows = {fitter.lenses().focal_px(), fitter.residuals(fitter.at()), fitter.lenses().disparities(fitter.at())};
+  fit.rows = fitter.lenses().rectified(fitter.at());
 
   std::vector<double> absolute = finite_only(fit.rows.row_error_px);
   for (double& v : absolute) v = std::abs(v);

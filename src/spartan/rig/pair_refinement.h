@@ -36,13 +36,14 @@ struct RectifiedMatches {
   std::vector<double> row_error_px, disparity_px;  ///< of each match: left − right
 };
 /// To compare beliefs about the same matches: Σ min(r²/σ², 9), σ = 0.3 px; a row that is no number counts 9.
+inline constexpr double kRowUnit_px = 0.3, kMostOfARow = 9;
 double cost_of_rows(const std::vector<double>& row_error_px);
 RectifiedMatches rectify_matches(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
                                  const std::vector<PixelMatch>& matches);
 
 struct PairFit {
   PairCorrection correction, sigma;  ///< the estimate and its standard deviations (of the ratio: of its logarithm)
-  RectifiedMatches rows;             ///< as corrected
+  RectifiedMatches given, rows;      ///< as given, and as corrected
   double inlier_limit_px = 0;        ///< four times the spread of the rows, at most kLargestInlier_px
   std::vector<bool> inlier;          ///< fits the corrected pair
   int inliers = 0;
@@ -50,6 +51,16 @@ struct PairFit {
   double cost = 0;    ///< cost_of_rows() plus the priors
 };
 inline constexpr double kLargestInlier_px = 3;
+
+/// What belongs to the inliers, of what there is of every match.
+template <class T>
+std::vector<T> inliers_of(const std::vector<T>& values, const std::vector<bool>& inlier) {
+  std::vector<T> result;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (inlier[i]) result.push_back(values[i]);
+  }
+  return result;
+}
 
 struct PairFitOptions {
   /// What is estimated beside pitch and roll; the rest is as given.

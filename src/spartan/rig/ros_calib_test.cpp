@@ -5,6 +5,7 @@
 
 #include "spartan/rig/rig_files.h"
 #include "spartan/rig/rig_writing.h"
+#include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
@@ -14,11 +15,8 @@ namespace {
 using testing::complaint;
 using ::testing::HasSubstr;
 using testing::replaced;
+using testing::right_in_left;
 using testing::TemporaryFolder;
-
-Eigen::Vector3d right_in_left(const Rig& rig) {
-  return rig.right_from_left(rig.pairs[0]).inverse().translation();
-}
 
 // The structure of camera_calibration_parsers; R turns each eye by the same 0.1 rad about y, P has fx' = 400.
 std::string camera_info(const char* name, double tx, const char* model = "plumb_bob",
