@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/rig/camera_model.h"
+#include "spartan/rig/models/camera_model.h"
 #include "spartan/testing/camera_model_laws.h"
 #include "timing.h"
 #ifdef SPARTAN_HAS_MRCAL

@@ -17,7 +17,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/localization/measurement.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/sim/motion_sensors.h"
 #include "spartan/sim/scenario.h"
 #include "spartan/sim/simulator.h"

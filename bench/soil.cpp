@@ -23,7 +23,7 @@
 
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/sim/simulator.h"
 #include "spectrum_plot.h"
 

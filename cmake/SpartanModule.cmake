@@ -44,12 +44,12 @@ function(spartan_test name)
 endfunction()
 
 # spartan_module(NAME USES modules… PUBLIC libraries… PRIVATE libraries… TEST_LIBRARIES libraries…)
-# Sources are all x.cpp of src/spartan/NAME; x_test.cpp beside them become the tests of the module.
+# Sources are all x.cpp of src/spartan/NAME and its folders; x_test.cpp beside them become the tests of the module.
 # Files named x_long_test.cpp carry the label `long` and run by request only.
 function(spartan_module name)
   cmake_parse_arguments(A "" "" "USES;PUBLIC;PRIVATE;TEST_LIBRARIES" ${ARGN})
   set(folder ${PROJECT_SOURCE_DIR}/src/spartan/${name})
-  file(GLOB all CONFIGURE_DEPENDS ${folder}/*.cpp)
+  file(GLOB_RECURSE all CONFIGURE_DEPENDS ${folder}/*.cpp)
   set(sources ${all})
   list(FILTER sources EXCLUDE REGEX "_test\\.cpp$")
   set(tests ${all})

@@ -30,6 +30,16 @@ MAY_INCLUDE = {
     "program": SYSTEM | {"system", "sim"},
     "tests": SYSTEM | {"system", "sim", "testing"},
 }
+# A module with several rooms is a folder of folders; what each room may include of its own module ("." is the module's own folder).
+ROOMS = {
+    "rig": {
+        "models": set(),
+        ".": {"models"},
+        "formats": {".", "models"},
+        "inspection": {".", "models"},
+        "design": {"."},
+    },
+}
 # Headers of third parties that stay out of public headers, except in headers named *_bridge.h.
 HEAVY = re.compile(r"^(opencv2|ceres|sqlite3|yaml-cpp|embree3|gdal|octomap|nlohmann|spdlog|tbb|hwy|CLI)\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
@@ -46,6 +56,22 @@ def module_of(path, project):
     if parts[:2] == ("src", "spartan"):
         return parts[2]
     return "program" if parts[:2] == ("src", "program") else "tests"
+
+
+def room_of(parts):
+    """The room within the module, of the parts of a path that starts with the module's folder."""
+    return parts[1] if len(parts) > 2 else "."
+
+
+def fault_of_rooms(path, included, project):
+    """What is wrong with an include from one room of a module into another, or None."""
+    parts, target = path.relative_to(project / "src/spartan").parts, included.split("/")[1:]
+    rooms, own, other = ROOMS.get(parts[0], {".": set()}), room_of(parts), room_of(target)
+    if own not in rooms:
+        return f"{parts[0]}/{own} has no place in the house (ROOMS in include_graph_test.py)"
+    if other != own and other not in rooms[own]:
+        return f"{parts[0]}/{own} includes {included}, which does not stand below it"
+    return None
 
 
 def includes(project):
@@ -103,6 +129,8 @@ def faults(project):
                 found.append(f"{where}: {included} does not exist")
             elif target not in allowed:
                 found.append(f"{where}: {module} includes {included}, which does not stand below it")
+            elif target == module and not is_test and (fault := fault_of_rooms(path, included, project)):
+                found.append(f"{where}: {fault}")
             elif module in linked and not is_test and target not in linked[module] | {module}:
                 found.append(f"{where}: {module} includes {included}, but CMakeLists.txt does not list {target} in its USES")
         elif quote == '"' and path.relative_to(project).parts[:2] == ("src", "spartan"):
@@ -135,9 +163,13 @@ def self_test():
         ("src/spartan/rig/gone.cpp", '#include "spartan/core/gone.h"', "does not exist"),
         ("src/spartan/rig/short.cpp", '#include "rig.h"', "whole path"),
         ("src/spartan/rig/heavy.h", "#include <opencv2/core.hpp>", "public header"),
+        ("src/spartan/rig/models/up.cpp", '#include "spartan/rig/rig.h"', "does not stand below"),
+        ("src/spartan/rig/attic/new.cpp", '#include "spartan/rig/rig.h"', "no place in the house"),
         ("CMakeLists.txt", good_cmake + "spartan_module(camera USES core eval)", "may not include"),
         ("CMakeLists.txt", "spartan_module(core)\nspartan_module(rig PRIVATE core)\n", "in its USES"),
         ("src/spartan/rig/rig_test.cpp", '#include "spartan/testing/laws.h"', None),
+        ("src/spartan/rig/formats/down.cpp", '#include "spartan/rig/rig.h"', None),
+        ("src/spartan/rig/models/up_test.cpp", '#include "spartan/rig/rig.h"', None),
         ("src/spartan/core/opencv_bridge.h", "#include <opencv2/core.hpp>", None),
         ("tools/tool.cpp", '#include "spartan/testing/laws.h"', None),
     ]

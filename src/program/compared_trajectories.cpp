@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/pose_convention.h"
-#include "spartan/rig/rig_files.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::program {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "spartan/rig/pan_words.h"
+#include "spartan/rig/design/pan_words.h"
 
 namespace spartan::program {
 namespace {

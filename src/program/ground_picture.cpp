@@ -6,7 +6,7 @@
 
 #include "program/ground_plan.h"
 #include "program/ground_side.h"
-#include "spartan/rig/pan_words.h"
+#include "spartan/rig/design/pan_words.h"
 
 namespace spartan::program {
 namespace {

@@ -20,7 +20,7 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/localization/start_frame.h"
 #include "spartan/reconstruction/position_mapper.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/system/map_files.h"
 
 namespace spartan::program {

@@ -9,10 +9,10 @@
 
 #include "program/json.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/read_back.h"
+#include "spartan/rig/formats/read_back.h"
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/rig_writing.h"
 #include "spartan/rig/rig_differences.h"
-#include "spartan/rig/rig_files.h"
-#include "spartan/rig/rig_writing.h"
 
 namespace spartan::program {
 namespace {

@@ -8,7 +8,7 @@
 #include "program/ground_picture.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/rig/rig_designer.h"
+#include "spartan/rig/design/rig_designer.h"
 
 namespace spartan::program {
 namespace {

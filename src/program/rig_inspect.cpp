@@ -17,8 +17,8 @@
 #include "spartan/core/image_io.h"
 #include "spartan/odometry/view_matching.h"
 #include "spartan/rig/describe.h"
-#include "spartan/rig/pair_check.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/inspection/pair_check.h"
 
 namespace spartan::program {
 namespace {

@@ -19,7 +19,7 @@
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/point_cloud.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 
 namespace spartan::program {
 namespace {

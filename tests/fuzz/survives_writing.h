@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <string>
 
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/rig_writing.h"
 #include "spartan/rig/rig_differences.h"
-#include "spartan/rig/rig_files.h"
-#include "spartan/rig/rig_writing.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan::testing {

@@ -9,8 +9,8 @@
 
 #include "program.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/pose_convention.h"
-#include "spartan/rig/rig_files.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

@@ -11,8 +11,8 @@
 
 #include "program.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/model_changes.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/models/model_changes.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 

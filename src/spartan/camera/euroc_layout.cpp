@@ -11,7 +11,7 @@
 #include "spartan/camera/shot_tables.h"
 #include "spartan/camera/stamp_order.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 
 namespace spartan {
 namespace {

@@ -7,7 +7,7 @@
 #include "spartan/camera/image_folder.h"
 #include "spartan/camera/recording_index.h"
 #include "spartan/camera/shot_tables.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 
 namespace spartan {
 namespace {

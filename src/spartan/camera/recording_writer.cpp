@@ -18,7 +18,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/options.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 
 namespace spartan {
 namespace {

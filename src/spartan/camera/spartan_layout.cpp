@@ -5,7 +5,7 @@
 #include "spartan/camera/sensor_tables.h"
 #include "spartan/camera/shot_tables.h"
 #include "spartan/camera/spartan_format.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 
 namespace spartan {
 namespace {

@@ -12,7 +12,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/random.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
 

@@ -13,7 +13,7 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/imaging/rectification.h"
 #include "spartan/imaging/remap.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {

@@ -11,7 +11,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/threads.h"
 #include "spartan/imaging/remap_kernels.h"
-#include "spartan/rig/camera_model.h"
+#include "spartan/rig/models/camera_model.h"
 #include "spartan/rig/rectified_stereo.h"
 
 namespace spartan {

@@ -9,7 +9,7 @@
 #include "spartan/core/pixel_format.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
-#include "spartan/rig/camera_model.h"
+#include "spartan/rig/models/camera_model.h"
 #include "spartan/rig/vignetting.h"
 
 namespace spartan {

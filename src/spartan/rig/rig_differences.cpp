@@ -8,7 +8,7 @@
 #include <map>
 
 #include "spartan/rig/describe.h"
-#include "spartan/rig/model_equivalents.h"
+#include "spartan/rig/models/model_equivalents.h"
 
 namespace spartan {
 namespace {

@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/rig/model_equivalents.h"
-#include "spartan/rig/pair_of_files.h"
+#include "spartan/rig/formats/pair_of_files.h"
+#include "spartan/rig/models/model_equivalents.h"
 #include "spartan/testing/camera_model_laws.h"
 #include "spartan/testing/temporary_folder.h"
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <set>
 
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/sim/scenario.h"
 
 namespace spartan::sim {

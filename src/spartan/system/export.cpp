@@ -8,8 +8,8 @@
 
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/pose_convention.h"
-#include "spartan/rig/rig_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"

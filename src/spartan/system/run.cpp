@@ -9,7 +9,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/process.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/rig_files.h"
+#include "spartan/rig/formats/rig_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run_folder.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "spartan/core/image.h"
-#include "spartan/rig/camera_model.h"
+#include "spartan/rig/models/camera_model.h"
 #include "spartan/testing/numeric_jacobian.h"
 
 namespace spartan::testing {

@@ -1,0 +1,259 @@
+#include "spartan/rig/design/rig_designer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "spartan/rig/design/stereo_relations.h"
+
+namespace spartan {
+namespace {
+
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+// A value on its limit passes, and values this near to each other are equal: more than rounding, less than any meaning.
+constexpr double kSame = 1e-9;
+
+bool holds(double margin) {
+  return margin >= -kSame;
+}
+
+DepthAccuracy accuracy_of(const PairRequirements& requirements) {
+  return {requirements.range_resolution_m, requirements.disparity_accuracy_px};
+}
+
+double tilt_for_range_deg(double vfov_deg, const PairRequirements& requirements) {
+  const double reaching_deg =
+      tilt_to_reach_rad(requirements.height_m, requirements.range_m, vfov_deg * kRadiansPerDegree) / kRadiansPerDegree;
+  const double steps = std::floor(reaching_deg / requirements.tilt_step_deg + kSame);
+  return std::min(90.0, std::round(steps * requirements.tilt_step_deg * 1e9) / 1e9);
+}
+
+// Everything but the figures of the view.
+PairFigures stereo_figures(const PairShape& shape, const PairRequirements& requirements) {
+  const double hfov_rad = shape.hfov_deg * kRadiansPerDegree;
+  const double angle_rad = stereo_angle_rad(shape.baseline_m, shape.nearest_m);
+  PairFigures pair;
+  pair.shape = shape;
+  pair.range_m = reach_m({shape.baseline_m, static_cast<double>(shape.width_px), hfov_rad}, accuracy_of(requirements));
+  pair.focal_length_mm = focal_length_mm(shape.pixel_size_um, shape.width_px, hfov_rad);
+  pair.stereo_angle_deg = angle_rad / kRadiansPerDegree;
+  pair.search_percent = search_percent(angle_rad, hfov_rad);
+  const bool turns = requirements.pans && requirements.pans->angles_deg.size() > 1;
+  pair.pan_overlap_percent =
+      turns ? overlap_percent(hfov_rad, requirements.pans->widest_step_deg() * kRadiansPerDegree) : kNone;
+  pair.margins = {pair.range_m - requirements.range_m, requirements.largest_stereo_angle_deg - pair.stereo_angle_deg,
+                  requirements.largest_search_percent - pair.search_percent,
+                  shape.baseline_m - requirements.smallest_baseline_m,
+                  turns ? pair.pan_overlap_percent - requirements.pans->smallest_overlap_percent : kNone};
+  const PairMargins& margins = pair.margins;
+  pair.feasible = holds(margins.range_m) && holds(margins.stereo_angle_deg) && holds(margins.search_percent) &&
+                  holds(margins.baseline_m);
+  pair.with_pan_overlap = pair.feasible && turns && holds(margins.pan_overlap_percent);
+  return pair;
+}
+
+void add_view(PairFigures& pair, double vfov_deg, double tilt_deg, const PairRequirements& requirements) {
+  pair.vfov_deg = vfov_deg;
+  pair.tilt_deg = tilt_deg;
+  const GroundView view = ground_view(pair, requirements);
+  pair.view_near_m = near_edge_m(view);
+  pair.view_far_m = far_edge_m(view);
+}
+
+double square_pixel_view_deg(double hfov_deg, double rows_per_column) {
+  return vertical_view_rad(hfov_deg * kRadiansPerDegree, rows_per_column) / kRadiansPerDegree;
+}
+
+// visit(shape) of every combination, in the order of the lists.
+template <class Visit>
+void for_every_shape(const ShapeLists& lists, const Visit& visit) {
+  for (const double baseline_m : lists.baselines_m) {
+    for (const double nearest_m : lists.nearest_m) {
+      for (const double hfov_deg : lists.hfov_deg) {
+        for (const double pixel_size_um : lists.pixel_sizes_um) {
+          for (const int width_px : lists.widths_px) {
+            visit(PairShape{baseline_m, nearest_m, hfov_deg, pixel_size_um, width_px});
+          }
+        }
+      }
+    }
+  }
+}
+
+// How near the closest of the computed figures is to its limit, as a part of that limit. A baseline is not computed.
+double distance_to_limits(const PairFigures& pair, const PairRequirements& requirements) {
+  const PairMargins& margins = pair.margins;
+  double nearest = std::min({std::abs(margins.range_m) / requirements.range_m,
+                             std::abs(margins.stereo_angle_deg) / requirements.largest_stereo_angle_deg,
+                             std::abs(margins.search_percent) / requirements.largest_search_percent});
+  if (!std::isnan(margins.pan_overlap_percent))
+    nearest = std::min(nearest, std::abs(margins.pan_overlap_percent) / 100);
+  return nearest;
+}
+
+void search(const PairRequirements& requirements, PairDesign& design) {
+  for_every_shape(requirements.lists, [&](const PairShape& shape) {
+    const PairFigures pair = stereo_figures(shape, requirements);
+    design.nearest_to_a_limit = std::min(design.nearest_to_a_limit, distance_to_limits(pair, requirements));
+    if (pair.feasible) design.feasible.push_back(figures_of(shape, requirements));
+  });
+}
+
+double value_of(const PairFigures& pair, DesignCriterion criterion) {
+  switch (criterion) {
+    case DesignCriterion::range_margin:
+      return pair.margins.range_m;
+    case DesignCriterion::pan_overlap:
+      return std::isnan(pair.pan_overlap_percent) ? 0 : pair.pan_overlap_percent;
+    case DesignCriterion::shorter_baseline:
+      return -pair.shape.baseline_m;
+  }
+  return 0;
+}
+
+// The place of each pair by one criterion, the best has 0. Values that are the same as their neighbour in size share a
+// place, so two that are the same always do.
+std::vector<std::uint32_t> places_by(DesignCriterion criterion, const std::vector<PairFigures>& pairs) {
+  std::vector<std::pair<double, std::uint32_t>> falling;
+  falling.reserve(pairs.size());
+  for (const PairFigures& pair : pairs) {
+    falling.emplace_back(value_of(pair, criterion), static_cast<std::uint32_t>(falling.size()));
+  }
+  std::sort(falling.begin(), falling.end(), std::greater<>());
+  std::vector<std::uint32_t> places(pairs.size());
+  std::uint32_t place = 0;
+  for (std::size_t i = 0; i < falling.size(); ++i) {
+    if (i > 0 && falling[i - 1].first - falling[i].first >= kSame) ++place;
+    places[falling[i].second] = place;
+  }
+  return places;
+}
+
+// Puts at each place the pair that `from` names for it, in the memory that is there.
+void permute(std::vector<PairFigures>& pairs, std::vector<std::uint32_t> from) {
+  for (std::uint32_t start = 0; start < from.size(); ++start) {
+    const PairFigures first = pairs[start];
+    std::uint32_t place = start;
+    while (from[place] != start) {
+      pairs[place] = pairs[from[place]];
+      place = std::exchange(from[place], place);
+    }
+    pairs[place] = first;
+    from[place] = place;
+  }
+}
+
+// The best first; what is equally good stays in the order of the lists.
+void put_in_order(PairDesign& design, const std::vector<DesignCriterion>& order) {
+  std::vector<std::vector<std::uint32_t>> places;
+  places.reserve(order.size());
+  for (const DesignCriterion criterion : order) places.push_back(places_by(criterion, design.feasible));
+  const auto better = [&](std::uint32_t a, std::uint32_t b) {
+    for (const auto& by_criterion : places) {
+      if (by_criterion[a] != by_criterion[b]) return by_criterion[a] < by_criterion[b];
+    }
+    return false;
+  };
+  std::vector<std::uint32_t> sorted(design.feasible.size());
+  std::iota(sorted.begin(), sorted.end(), 0u);
+  std::stable_sort(sorted.begin(), sorted.end(), better);
+  design.equally_good = static_cast<std::size_t>(
+      std::count_if(sorted.begin(), sorted.end(), [&](std::uint32_t pair) { return !better(sorted.front(), pair); }));
+  permute(design.feasible, std::move(sorted));
+}
+
+template <class Value>
+bool holds_value(const std::vector<Value>& list, Value value) {
+  return std::any_of(list.begin(), list.end(), [&](Value listed) { return std::abs(listed - value) < kSame; });
+}
+
+bool on_offer(const PairShape& shape, const ShapeLists& lists) {
+  return holds_value(lists.baselines_m, shape.baseline_m) && holds_value(lists.nearest_m, shape.nearest_m) &&
+         holds_value(lists.hfov_deg, shape.hfov_deg) && holds_value(lists.pixel_sizes_um, shape.pixel_size_um) &&
+         holds_value(lists.widths_px, shape.width_px);
+}
+
+PairDesign design_pair(const PairRequirements& requirements) {
+  PairDesign design;
+  design.combinations = requirements.lists.combinations();
+  search(requirements, design);
+  put_in_order(design, requirements.order);
+  if (requirements.pans && requirements.pans->angles_deg.size() > 1) {
+    const auto overlaps = [](const PairFigures& pair) { return pair.with_pan_overlap; };
+    design.with_pan_overlap_count = std::count_if(design.feasible.begin(), design.feasible.end(), overlaps);
+    const auto best = std::find_if(design.feasible.begin(), design.feasible.end(), overlaps);
+    if (best != design.feasible.end()) design.best_with_pan_overlap = *best;
+  }
+  if (requirements.published) {
+    design.published = published_figures(requirements);
+    design.published_on_offer = on_offer(requirements.published->shape, requirements.lists);
+  }
+  return design;
+}
+
+// Whether there is ground that both of its eyes see.
+bool shares_ground(const PairFigures& pair, const PairRequirements& requirements) {
+  return !common_footprint(ground_view(pair, requirements), 0).empty();
+}
+
+}  // namespace
+
+const PairFigures* PairDesign::chosen() const {
+  if (published) return &*published;
+  return best_with_pan_overlap ? &*best_with_pan_overlap : best();
+}
+
+PairFigures figures_of(const PairShape& shape, const PairRequirements& requirements) {
+  PairFigures pair = stereo_figures(shape, requirements);
+  const double vfov_deg = square_pixel_view_deg(shape.hfov_deg, requirements.rows_per_column);
+  add_view(pair, vfov_deg, tilt_for_range_deg(vfov_deg, requirements), requirements);
+  return pair;
+}
+
+PairFigures published_figures(const PairRequirements& requirements) {
+  const PublishedPair& published = requirements.published.value();
+  PairFigures pair = stereo_figures(published.shape, requirements);
+  const double vfov_deg = published.vfov_deg.value_or(
+      square_pixel_view_deg(published.shape.hfov_deg, requirements.published_rows_per_column()));
+  add_view(pair, vfov_deg, published.tilt_deg.value_or(tilt_for_range_deg(vfov_deg, requirements)), requirements);
+  return pair;
+}
+
+GroundView ground_view(const PairFigures& pair, const PairRequirements& requirements) {
+  return {requirements.height_m, pair.tilt_deg * kRadiansPerDegree, pair.shape.hfov_deg * kRadiansPerDegree,
+          pair.vfov_deg * kRadiansPerDegree, pair.shape.baseline_m};
+}
+
+std::size_t count_feasible(const PairRequirements& requirements) {
+  std::size_t count = 0;
+  for_every_shape(requirements.lists,
+                  [&](const PairShape& shape) { count += stereo_figures(shape, requirements).feasible ? 1 : 0; });
+  return count;
+}
+
+RigDesign design_rig(const RigRequirements& requirements) {
+  RigDesign design;
+  design.wide = design_pair(requirements.wide);
+  if (requirements.narrow) design.narrow = design_pair(*requirements.narrow);
+  const PairFigures* wide = design.wide.chosen();
+  const PairFigures* narrow = design.narrow ? design.narrow->chosen() : nullptr;
+  if (wide && requirements.wide.pans) {
+    design.pans = pan_figures(ground_view(*wide, requirements.wide), *requirements.wide.pans);
+  }
+  if (wide && narrow) {
+    const bool both_see = shares_ground(*wide, requirements.wide) && shares_ground(*narrow, *requirements.narrow);
+    const double from_m = std::max(wide->view_near_m, narrow->view_near_m);
+    const double to_m = std::min(wide->view_far_m, narrow->view_far_m);
+    design.view_overlap_m = both_see ? std::max(0.0, to_m - from_m) : 0;
+  }
+  design.warnings = find_design_warnings(requirements, design);
+  return design;
+}
+
+}  // namespace spartan

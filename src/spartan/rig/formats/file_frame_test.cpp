@@ -1,0 +1,109 @@
+// Which frame of two cameras' files is the body.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::TemporaryFolder;
+
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+
+// Two pinholes in a frame with x forward, y left, z up, turned by yaw and looking down by pitch.
+Rig pair_in_body(double yaw_deg, double pitch_deg, const Eigen::Vector3d& place) {
+  const Pose looks(Eigen::Quaterniond(Eigen::AngleAxisd(yaw_deg * kRadiansPerDegree, Eigen::Vector3d::UnitZ()) *
+                                      Eigen::AngleAxisd(pitch_deg * kRadiansPerDegree, Eigen::Vector3d::UnitY())),
+                   place);
+  Rig rig;
+  rig.name = "r";
+  rig.pairs = {{"stereo", "left", "right"}};
+  for (const auto& [name, side] : {std::pair{"left", 0.06}, {"right", -0.06}}) {
+    Camera camera;
+    camera.name = name;
+    camera.size = {640, 480};
+    camera.model = PinholeModel{500, 500, 320, 240};
+    camera.mount_from_camera = looks * Pose::from_translation({0, side, 0}) * optical_from_forward().inverse();
+    rig.cameras.push_back(camera);
+  }
+  return rig;
+}
+
+// The rig with both cameras in another frame.
+Rig seen_from(const Pose& frame_from_body, Rig rig) {
+  for (Camera& camera : rig.cameras) camera.mount_from_camera = frame_from_body * camera.mount_from_camera;
+  return rig;
+}
+
+// What is read where the files' frame is the body of `rig`.
+ReadRig through_files(const Rig& rig, const char* name = "pair.cahvor") {
+  const TemporaryFolder folder;
+  const auto files = to_calibration_files(rig, format_for_name(name).value(), folder.path() + "/" + name).value();
+  for (const CalibrationFile& file : files) folder.write(file.path.substr(folder.path().size() + 1), file.content);
+  return read_calibration(files[0].path + "," + files[1].path, {640, 480}).value();
+}
+
+double apart(const Rig& a, const Rig& b) {
+  const Pose off = a.body_from_camera("left").inverse() * b.body_from_camera("left");
+  return off.translation().norm() + rotation_angle(off);
+}
+
+// x forward, y left, z up turned to x forward, y right, z down.
+const Pose kDown = Pose::from_unit_quaternion({0, 1, 0, 0}, Eigen::Vector3d::Zero());
+
+TEST(FileFrame, CamerasMayLookDownAndUpSteeply) {
+  for (const char* name : {"pair.cahvor", "pair.tsai", "pair.cameramodel"}) {
+    for (const double pitch : {-85, -50, -20, 0, 20, 44, 50, 70, 85}) {
+      const Rig rig = pair_in_body(10, pitch, {1, 0.06, 1});
+      const ReadRig kept = through_files(rig, name);
+      EXPECT_LE(apart(rig, kept.rig), 1e-9) << name << ", " << pitch;
+      EXPECT_TRUE(kept.left_out.empty());
+      // The same files in a frame with z down.
+      const ReadRig turned = through_files(seen_from(kDown, rig), name);
+      EXPECT_LE(apart(rig, turned.rig), 1e-9) << name << ", " << pitch;
+      EXPECT_THAT(turned.body, HasSubstr("forward-right-down"));
+    }
+  }
+}
+
+// Both pairs of one rover have one body.
+TEST(FileFrame, PairsThatLookBackKeepTheRoversFrame) {
+  for (const double yaw : {180, 165, -170}) {
+    for (const double pitch : {-30, 0, 37, 60}) {
+      const Rig rig = pair_in_body(yaw, pitch, {-0.7, 0.08, 0.5});
+      const ReadRig up = through_files(rig), down = through_files(seen_from(kDown, rig));
+      EXPECT_LE(apart(rig, up.rig), 1e-9) << yaw << ", " << pitch;
+      EXPECT_LE(apart(rig, down.rig), 1e-9) << yaw << ", " << pitch;
+      EXPECT_THAT(up.body, HasSubstr("looks back"));
+      EXPECT_THAT(down.body, HasSubstr("looks back"));
+    }
+  }
+}
+
+TEST(FileFrame, AFrameThatIsNoRoversIsSaidToBeLost) {
+  // The centre of the Earth; a camera's own frame that is not the left one's; straight down; to the side.
+  const Rig on_earth = pair_in_body(0, 30, {-2665990.6, -3838640.2, 4312790.1});
+  const Rig of_camera = seen_from(optical_from_forward(), pair_in_body(0, 0, {0, 0.5, 0}));
+  for (const Rig& rig : {on_earth, of_camera, pair_in_body(0, 90, {1, 0, 1}), pair_in_body(90, 10, {1, 0, 1})}) {
+    const ReadRig read = through_files(rig);
+    EXPECT_THAT(read.body, HasSubstr("the left camera"));
+    EXPECT_LE((optical_from_forward() * read.rig.body_from_camera("left")).translation().norm(), 1e-12);
+    ASSERT_EQ(read.left_out.size(), 1u);
+    EXPECT_EQ(read.left_out[0].key, "body");
+    EXPECT_THAT(read.left_out[0].text, HasSubstr("the files' frame is not kept; the left camera stands there at ("));
+  }
+  // The left camera's own frame says no more than the body that is the left camera.
+  const Rig own =
+      seen_from(optical_from_forward() * Pose::from_translation({0, -0.06, 0}), pair_in_body(0, 0, {0, 0, 0}));
+  EXPECT_TRUE(through_files(own).left_out.empty());
+}
+
+}  // namespace
+}  // namespace spartan

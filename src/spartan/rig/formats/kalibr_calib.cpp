@@ -1,0 +1,178 @@
+// Kalibr's camchain.yaml and camchain-imucam.yaml (Furgale et al.; the project's wiki, "Yaml formats").
+#include <fmt/format.h>
+
+#include "spartan/rig/formats/calibration_readers.h"
+#include "spartan/rig/formats/calibration_text.h"
+#include "spartan/rig/formats/calibration_writers.h"
+#include "spartan/rig/formats/file_frame.h"
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/yaml_camera.h"
+
+namespace spartan {
+namespace {
+
+using rig_detail::YamlFaults;
+using rig_detail::YamlMap;
+
+// The chain and the IMU's transforms are results of one calibration: more than this apart they are not.
+constexpr double kSame = 1e-3;
+constexpr std::size_t kMostCameras = 100;
+
+std::string camera_key(std::size_t i) {
+  return fmt::format("cam{}", i);
+}
+
+// A list of four lists of four.
+std::optional<Pose> read_transform(YamlMap& camera, std::string_view key) {
+  const auto node = camera.node(key);
+  if (!node) return std::nullopt;
+  std::vector<double> rows;
+  if (node->IsSequence() && node->size() == 4) {
+    for (const YAML::Node& row : *node) {
+      if (!row.IsSequence() || row.size() != 4) break;
+      for (const YAML::Node& entry : row) {
+        const auto value = entry.IsScalar() ? rig_detail::parse_number(entry.Scalar()) : std::nullopt;
+        if (value) rows.push_back(*value);
+      }
+    }
+  }
+  if (rows.size() == 16) return rig_detail::read_rigid(camera, key, rows);
+  camera.fault(key, "must be four rows of four finite numbers");
+  return std::nullopt;
+}
+
+// The cameras of a chain: `mount_from_camera` is the pose in the frame of cam0 until all are read.
+struct Chain {
+  std::vector<Camera> cameras;
+  std::optional<Pose> first_from_imu;
+  std::string imu_key;  // where it stands
+  std::vector<RigDifference> left_out;
+};
+
+bool same(const Pose& a, const Pose& b) {
+  const Pose apart = a.inverse() * b;
+  return apart.translation().norm() <= kSame && rotation_angle(apart) <= kSame;
+}
+
+// Kalibr writes T_cam_imu; OpenVINS' files have the inverse.
+struct ImuOfCamera {
+  std::string key;
+  Pose camera_from_imu;
+};
+std::optional<ImuOfCamera> read_imu(YamlMap& entry) {
+  std::optional<ImuOfCamera> imu;
+  for (const char* key : {"T_imu_cam", "T_cam_imu"}) {
+    if (!entry.has(key)) continue;
+    const auto pose = read_transform(entry, key);
+    if (!pose) return std::nullopt;
+    const Pose camera_from_imu = key == std::string("T_cam_imu") ? *pose : pose->inverse();
+    if (imu && !same(imu->camera_from_imu, camera_from_imu)) entry.fault(key, "contradicts T_imu_cam");
+    imu = {key, camera_from_imu};
+  }
+  return imu;
+}
+
+// The first camera that knows the IMU tells all of them; what the others say must be the same.
+void read_link(YamlMap& entry, Chain& chain, Camera& camera) {
+  const auto imu = read_imu(entry);
+  if (!chain.cameras.empty()) {
+    if (!entry.has("T_cn_cnm1") && imu && chain.first_from_imu) {
+      camera.mount_from_camera = *chain.first_from_imu * imu->camera_from_imu.inverse();
+      return;
+    }
+    const auto link = read_transform(entry, "T_cn_cnm1");
+    if (!link) return;
+    camera.mount_from_camera = chain.cameras.back().mount_from_camera * link->inverse();
+  }
+  if (!imu) return;
+  const Pose first_from_imu = camera.mount_from_camera * imu->camera_from_imu;
+  if (!chain.first_from_imu) {
+    chain.first_from_imu = first_from_imu;
+    chain.imu_key = imu->key;
+  } else if (!same(first_from_imu, *chain.first_from_imu)) {
+    entry.fault(imu->key, "contradicts T_cn_cnm1");
+  }
+}
+
+Chain read_chain(YamlMap& root) {
+  Chain chain;
+  // A missing cam1 is a fault; a pair needs two.
+  for (std::size_t i = 0; i < kMostCameras && (i < 2 || root.has(camera_key(i))); ++i) {
+    const auto node = root.node(camera_key(i));
+    if (!node) continue;
+    YamlMap entry(*node, root.path(camera_key(i)), root.faults());
+    Camera camera;
+    camera.name = camera_key(i);
+    camera.size = rig_detail::read_resolution(entry, "resolution");
+    camera.model = rig_detail::read_kalibr_model(entry, "distortion_coeffs");
+    if (entry.has("timeshift_cam_imu")) {
+      const auto shift = entry.number("timeshift_cam_imu");
+      if (shift && *shift != 0) {
+        chain.left_out.push_back(
+            {camera.name + ".timeshift_cam_imu", fmt::format("the camera's clock is {} s off the IMU's", *shift)});
+      }
+    }
+    read_link(entry, chain, camera);
+    chain.cameras.push_back(std::move(camera));
+  }
+  return chain;
+}
+
+std::string transform_lines(const char* key, const Pose& pose) {
+  std::string text = fmt::format("  {}:\n", key);
+  const Eigen::Matrix4d matrix = pose.matrix();
+  for (int row = 0; row < 4; ++row) {
+    text += fmt::format("  - [{}]\n", rig_detail::list_of(matrix.row(row).transpose(), ", "));
+  }
+  return text;
+}
+
+}  // namespace
+
+Result<ReadRig> read_kalibr_calib(const std::string& path) {
+  const auto loaded = rig_detail::load_yaml_file(path);
+  if (!loaded) return failure(loaded);
+  YamlFaults faults(path);
+  YamlMap root(*loaded, "", faults);
+  Chain chain = read_chain(root);
+  if (const Status status = faults.status(); !status) return failure(status);
+
+  const bool has_imu = chain.first_from_imu.has_value();
+  const Pose body_from_first = has_imu ? chain.first_from_imu->inverse() : optical_from_forward().inverse();
+  for (Camera& camera : chain.cameras) camera.mount_from_camera = body_from_first * camera.mount_from_camera;
+  Rig rig;
+  rig.name = "kalibr";
+  rig.convention = has_imu ? PoseConvention::body : PoseConvention::left_optical;
+  rig.cameras = std::move(chain.cameras);
+  rig.pairs = {{"stereo", camera_key(0), camera_key(1)}};
+  auto sound = rig_detail::validated(std::move(rig), path);
+  if (!sound) return failure(std::move(sound));
+  return ReadRig{std::move(*sound),
+                 CalibrationFormat::kalibr,
+                 {path},
+                 {},
+                 has_imu ? "the IMU of " + chain.imu_key : rig_detail::kBodyIsLeftCamera,
+                 std::move(chain.left_out)};
+}
+
+Result<CalibrationFiles> rig_detail::write_kalibr_calib(const Rig& rig, const std::string& path) {
+  const bool with_body = !body_is_left_camera(rig, rig.pairs.front());
+  std::string text;
+  Pose body_from_previous;
+  const auto cameras = pair_first(rig);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const auto model = kalibr_model_lines(*cameras[i], "distortion_coeffs", "  ");
+    if (!model) return failure(model);
+    const Pose body_from_camera = rig.body_from_camera(cameras[i]->name);
+    text += fmt::format("{}:\n", camera_key(i));
+    if (with_body) text += transform_lines("T_cam_imu", body_from_camera.inverse());
+    if (i > 0) text += transform_lines("T_cn_cnm1", body_from_camera.inverse() * body_from_previous);
+    text += *model + fmt::format("  resolution: [{}, {}]\n  rostopic: /{}/image_raw\n", cameras[i]->size.width,
+                                 cameras[i]->size.height, camera_key(i));
+    if (with_body) text += "  timeshift_cam_imu: 0\n";
+    body_from_previous = body_from_camera;
+  }
+  return CalibrationFiles{{path, text}};
+}
+
+}  // namespace spartan

@@ -1,0 +1,250 @@
+// Reader of OpenCV's stereo calibration files.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "spartan/rig/formats/calibration_readers.h"
+#include "spartan/rig/formats/calibration_text.h"
+#include "spartan/rig/formats/opencv_storage.h"
+#include "spartan/rig/formats/rig_files.h"
+
+namespace spartan {
+namespace {
+
+using rig_detail::OpencvStorage;
+using Names = std::vector<std::string>;
+
+// One or two files, asked in turn for a key under any of its usual names.
+class Storages {
+ public:
+  Status open(const std::string& path) {
+    auto storage = OpencvStorage::read(path);
+    if (!storage) return failure(std::move(storage));
+    paths_ += (paths_.empty() ? "" : " and ") + path;
+    storages_.push_back(std::move(*storage));
+    return {};
+  }
+
+  /// The matrix as doubles, row by row, with `counts` elements.
+  Result<std::vector<double>> matrix(const Names& names, const std::vector<int>& counts) const {
+    for (const OpencvStorage& storage : storages_) {
+      for (const std::string& name : names) {
+        if (storage.has(name)) return storage.matrix(name, counts);
+      }
+    }
+    return failure(ErrorCode::configuration, fmt::format("the key {} is missing", fmt::join(names, " or ")), paths_);
+  }
+
+  bool has(const std::string& name) const { return holder(name) != nullptr; }
+  std::string text(const std::string& name) const { return has(name) ? holder(name)->text(name) : ""; }
+  std::optional<int> integer(const std::string& name) const {
+    return has(name) ? holder(name)->integer(name) : std::nullopt;
+  }
+  std::optional<ImageSize> size(const std::string& name) const {
+    return has(name) ? holder(name)->size(name) : std::nullopt;
+  }
+  /// "key: what" at the line of the first of the names that is there.
+  tl::unexpected<Error> fault(const Names& names, const std::string& what) const {
+    for (const std::string& name : names) {
+      if (has(name)) return holder(name)->fault(name, what);
+    }
+    return failure(ErrorCode::configuration, what, paths_);
+  }
+  const std::string& paths() const { return paths_; }
+
+ private:
+  const OpencvStorage* holder(const std::string& name) const {
+    const auto found =
+        std::find_if(storages_.begin(), storages_.end(), [&](const OpencvStorage& s) { return s.has(name); });
+    return found == storages_.end() ? nullptr : &*found;
+  }
+
+  std::vector<OpencvStorage> storages_;
+  std::string paths_;
+};
+
+// Four coefficients may be those of either model: a file of cv::fisheye has to say it.
+bool is_fisheye(const Storages& files) {
+  const std::string said = files.text("camera_model") + files.text("distortion_model");
+  return files.integer("fisheye_model").value_or(0) != 0 || said.find("fisheye") != std::string::npos ||
+         said.find("equidistant") != std::string::npos;
+}
+
+Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& names) {
+  const auto held = files.matrix(names, {9});
+  if (!held) return failure(held);
+  const auto pinhole = rig_detail::pinhole_of_rows(*held);
+  if (!pinhole || !(pinhole->fx > 0 && pinhole->fy > 0)) {
+    return files.fault(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
+  }
+  return *pinhole;
+}
+
+Result<CameraModel> read_model(const Storages& files, const std::string& number) {
+  const auto pinhole =
+      read_camera_matrix(files, {"M" + number, "K" + number, "cameraMatrix" + number, "camera_matrix_" + number});
+  if (!pinhole) return failure(pinhole);
+  const Names names{"D" + number, "distCoeffs" + number, "dist_coeffs_" + number};
+  if (is_fisheye(files)) {
+    const auto d = files.matrix(names, {4});
+    if (!d) return failure(d);
+    return EquidistantModel(*pinhole, {(*d)[0], (*d)[1], (*d)[2], (*d)[3]});
+  }
+  const auto d = files.matrix(names, {4, 5, 8, 12, 14});
+  if (!d) return failure(d);
+  RadialTangentialModel::Coefficients coefficients{};
+  for (std::size_t i = 0; i < d->size(); ++i) {
+    if (i < coefficients.size()) {
+      coefficients[i] = (*d)[i];
+    } else if ((*d)[i] != 0) {
+      return files.fault(names, "thin-prism and tilt coefficients (the 9th and on) are not supported");
+    }
+  }
+  return RadialTangentialModel(*pinhole, coefficients);
+}
+
+Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::string& name) {
+  const auto r = files.matrix({name}, {3, 9});
+  if (!r) return failure(r);
+  if (r->size() == 3) {
+    const auto turn = rig_detail::rotation_of_vector({(*r)[0], (*r)[1], (*r)[2]});
+    if (!turn) return files.fault({name}, "is not a rotation");
+    return *turn;
+  }
+  const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
+  if (!is_rotation(rotation, 1e-4)) return files.fault({name}, "is not a rotation matrix");
+  return Eigen::Quaterniond(nearest_rotation(rotation));
+}
+
+// A rectified eye: its pinhole, and where it stands in the rectified frame.
+struct RectifiedEye {
+  PinholeModel pinhole;
+  Eigen::Vector3d place_m;
+};
+Result<RectifiedEye> read_projection(const Storages& files, const std::string& name) {
+  const auto held = files.matrix({name}, {12});
+  if (!held) return failure(held);
+  const auto& p = *held;
+  const bool rectified =
+      p[0] > 0 && p[5] > 0 && p[1] == 0 && p[4] == 0 && p[8] == 0 && p[9] == 0 && p[10] == 1 && p[11] == 0;
+  if (!rectified) {
+    return files.fault({name}, "is not the projection of a rectified camera (fx 0 cx tx; 0 fy cy ty; 0 0 1 0)");
+  }
+  return RectifiedEye{{p[0], p[5], p[2], p[6]}, {-p[3] / p[0], -p[7] / p[5], 0}};
+}
+
+// How the right eye stands in the rectified frame, seen from the left one.
+Result<Eigen::Vector3d> read_rectified_baseline(const Storages& files) {
+  const auto left = read_projection(files, "P1"), right = read_projection(files, "P2");
+  if (!left) return failure(left);
+  if (!right) return failure(right);
+  return Eigen::Vector3d(right->place_m - left->place_m);
+}
+
+// X_right = R X_left + T; or by the rectification, R2 X_right = R1 X_left − baseline.
+Result<Pose> read_right_from_left(const Storages& files) {
+  if (files.has("R") || files.has("T") || !files.has("P2")) {
+    const auto rotation = read_rotation(files, "R");
+    if (!rotation) return failure(rotation);
+    const auto t = files.matrix({"T"}, {3});
+    if (!t) return failure(t);
+    return Pose(*rotation, {(*t)[0], (*t)[1], (*t)[2]});
+  }
+  const auto left = read_rotation(files, "R1"), right = read_rotation(files, "R2");
+  if (!left) return failure(left);
+  if (!right) return failure(right);
+  const auto baseline = read_rectified_baseline(files);
+  if (!baseline) return failure(baseline);
+  return Pose(right->conjugate() * *left, right->conjugate() * -*baseline);
+}
+
+Camera camera_of(const char* name, ImageSize size, CameraModel model) {
+  Camera camera;
+  camera.name = name;
+  camera.size = size;
+  camera.model = std::move(model);
+  return camera;
+}
+
+Result<Rig> read_unrectified(const Storages& files, ImageSize size) {
+  auto left = read_model(files, "1");
+  if (!left) return failure(std::move(left));
+  auto right = read_model(files, "2");
+  if (!right) return failure(std::move(right));
+  const auto right_from_left = read_right_from_left(files);
+  if (!right_from_left) return failure(right_from_left);
+  return rig_of_one_pair("opencv", camera_of("left", size, std::move(*left)),
+                         camera_of("right", size, std::move(*right)), *right_from_left);
+}
+
+// A file that holds P1 and P2 but no camera matrices describes the rectified pictures.
+Result<Rig> read_rectified(const Storages& files, ImageSize size) {
+  const auto left = read_projection(files, "P1"), right = read_projection(files, "P2");
+  if (!left) return failure(left);
+  if (!right) return failure(right);
+  return rig_of_one_pair("opencv", camera_of("left", size, left->pinhole), camera_of("right", size, right->pinhole),
+                         Pose::from_translation(left->place_m - right->place_m));
+}
+
+Result<int> read_side(const Storages& files, const char* key, const char* other) {
+  const auto pixels = files.integer(key);
+  if (!pixels || *pixels < 1) return files.fault({key}, "must be a whole number above zero");
+  if (!files.has(other)) return files.fault({key}, fmt::format("without {}", other));
+  return *pixels;
+}
+
+// What the file says, which must be sound; `otherwise` where it says nothing.
+Result<ImageSize> size_in(const Storages& files, ImageSize otherwise) {
+  for (const char* key : {"image_size", "imageSize"}) {
+    if (!files.has(key)) continue;
+    const auto size = files.size(key);
+    if (!size || size->empty()) return files.fault({key}, "must be two whole numbers above zero");
+    return *size;
+  }
+  const char *width_key = "image_width", *height_key = "image_height";
+  if (!files.has(width_key) && !files.has(height_key)) return otherwise;
+  const auto width = read_side(files, files.has(width_key) ? width_key : height_key, height_key);
+  const auto height = read_side(files, files.has(height_key) ? height_key : width_key, width_key);
+  if (!width) return failure(width);
+  if (!height) return failure(height);
+  return ImageSize{*width, *height};
+}
+
+// The rectified view that the file chose: a rig has no place for it. Of rectified pictures P1 and P2 are the cameras.
+std::vector<RigDifference> rectification_in(const Storages& files, bool raw) {
+  std::vector<RigDifference> left_out;
+  for (const char* key : raw ? std::vector{"R1", "R2", "P1", "P2", "Q"} : std::vector{"R1", "R2"}) {
+    if (files.has(key)) left_out.push_back({key, "the rectified view of the file is not kept"});
+  }
+  return left_out;
+}
+
+}  // namespace
+
+Result<Rig> read_opencv_calib(const std::string& intrinsics_path, const std::string& extrinsics_path, ImageSize size) {
+  return rig_detail::rig_of(rig_detail::read_opencv(intrinsics_path, extrinsics_path, size));
+}
+
+Result<ReadRig> rig_detail::read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path,
+                                        ImageSize size) {
+  Storages files;
+  for (const std::string& path : {intrinsics_path, extrinsics_path}) {
+    if (path.empty()) continue;
+    if (const Status status = files.open(path); !status) return failure(status);
+  }
+  const auto known = size_in(files, size);
+  if (!known) return failure(known);
+  if (known->empty()) return unknown_size(files.paths());
+  const bool raw = files.has("M1") || files.has("K1") || files.has("cameraMatrix1") || files.has("camera_matrix_1");
+  auto rig = raw || !files.has("P1") ? read_unrectified(files, *known) : read_rectified(files, *known);
+  if (!rig) return failure(std::move(rig));
+  auto sound = validated(std::move(*rig), files.paths());
+  if (!sound) return failure(std::move(sound));
+  std::vector<std::string> paths{intrinsics_path};
+  if (!extrinsics_path.empty()) paths.push_back(extrinsics_path);
+  return ReadRig{std::move(*sound), CalibrationFormat::opencv,   std::move(paths), {},
+                 kBodyIsLeftCamera, rectification_in(files, raw)};
+}
+
+}  // namespace spartan

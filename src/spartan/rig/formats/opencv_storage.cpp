@@ -1,0 +1,127 @@
+#include "spartan/rig/formats/opencv_storage.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "spartan/rig/formats/calibration_text.h"
+#include "spartan/rig/yaml_bridge.h"
+
+namespace spartan::rig_detail {
+namespace {
+
+using Entry = OpencvStorage::Entry;
+
+std::optional<int> whole(const std::string& word) {
+  const auto value = parse_number(word);
+  if (!value || *value != static_cast<double>(static_cast<long>(std::clamp(*value, -1e9, 1e9)))) return std::nullopt;
+  return static_cast<int>(*value);
+}
+
+std::vector<std::string> words_of(const YAML::Node& node) {
+  std::vector<std::string> words;
+  if (node.IsScalar()) words.push_back(node.Scalar());
+  if (!node.IsSequence()) return words;
+  words.reserve(node.size());
+  for (const YAML::Node& entry : node) words.push_back(entry.IsScalar() ? entry.Scalar() : "[");
+  return words;
+}
+
+// A matrix, a list, a text; of other groups nothing is known.
+Entry entry_of(const YAML::Node& node, int line) {
+  Entry entry;
+  entry.line = line;
+  if (!node.IsMap()) {
+    entry.words = words_of(node);
+    return entry;
+  }
+  for (const auto& part : node) {
+    if (!part.first.IsScalar()) continue;
+    const std::string& key = part.first.Scalar();
+    if (key == "rows" && part.second.IsScalar()) entry.rows = part.second.Scalar();
+    if (key == "cols" && part.second.IsScalar()) entry.columns = part.second.Scalar();
+    if (key == "data") entry.words = words_of(part.second);
+  }
+  return entry;
+}
+
+Result<std::map<std::string, Entry>> parse_yaml(std::string text, const std::string& name) {
+  // OpenCV's "%YAML:1.0" is no directive of YAML; as a comment it keeps its line.
+  if (text.starts_with("%YAML")) text.front() = '#';
+  const auto loaded = load_yaml(text, name);
+  if (!loaded) return failure(loaded);
+  if (!loaded->IsMap()) return failure(ErrorCode::configuration, "is no OpenCV file: there are no keys", name);
+  std::map<std::string, Entry> entries;
+  for (const auto& entry : *loaded) {
+    if (!entry.first.IsScalar()) continue;
+    const int line = entry.first.Mark().line + 1;
+    if (!entries.try_emplace(entry.first.Scalar(), entry_of(entry.second, line)).second) {
+      return failure(ErrorCode::configuration, entry.first.Scalar() + ": given a second time",
+                     fmt::format("{}:{}", name, line));
+    }
+  }
+  return entries;
+}
+
+}  // namespace
+
+Result<OpencvStorage> OpencvStorage::read(const std::string& path) {
+  const auto text = read_calibration_text(path);
+  if (!text) return failure(text);
+  const std::size_t first = text->find_first_not_of(" \t\r\n");
+  const bool xml = first != std::string::npos && (*text)[first] == '<';
+  auto entries = xml ? parse_opencv_xml(*text, path) : parse_yaml(*text, path);
+  if (!entries) return failure(std::move(entries));
+  OpencvStorage storage;
+  storage.name_ = path;
+  storage.entries_ = std::move(*entries);
+  return storage;
+}
+
+tl::unexpected<Error> OpencvStorage::fault(const std::string& key, const std::string& what) const {
+  const auto found = entries_.find(key);
+  const std::string where = found == entries_.end() ? name_ : fmt::format("{}:{}", name_, found->second.line);
+  return failure(ErrorCode::configuration, fmt::format("{}: {}", key, what), where);
+}
+
+Result<std::vector<double>> OpencvStorage::matrix(const std::string& key, const std::vector<int>& counts) const {
+  const auto found = entries_.find(key);
+  if (found == entries_.end()) return fault(key, "is missing");
+  const Entry& entry = found->second;
+  const auto rows = whole(entry.rows), columns = whole(entry.columns);
+  if (!rows || !columns || *rows < 1 || *columns < 1) return fault(key, "is not a matrix");
+  const auto total = std::ssize(entry.words);
+  if (std::int64_t{*rows} * *columns != total) return fault(key, "has other numbers than its rows and columns say");
+  if (std::find(counts.begin(), counts.end(), total) == counts.end()) {
+    return fault(key, fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
+  }
+  std::vector<double> values;
+  values.reserve(entry.words.size());
+  for (const std::string& word : entry.words) {
+    const auto value = parse_number(word);
+    if (!value) return fault(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
+    values.push_back(*value);
+  }
+  return values;
+}
+
+std::optional<int> OpencvStorage::integer(const std::string& key) const {
+  const auto found = entries_.find(key);
+  if (found == entries_.end() || found->second.words.size() != 1) return std::nullopt;
+  return whole(found->second.words.front());
+}
+
+std::optional<ImageSize> OpencvStorage::size(const std::string& key) const {
+  const auto found = entries_.find(key);
+  if (found == entries_.end() || found->second.words.size() != 2) return std::nullopt;
+  const auto width = whole(found->second.words[0]), height = whole(found->second.words[1]);
+  return width && height ? std::optional(ImageSize{*width, *height}) : std::nullopt;
+}
+
+std::string OpencvStorage::text(const std::string& key) const {
+  const auto found = entries_.find(key);
+  return found == entries_.end() || found->second.words.empty() ? "" : found->second.words.front();
+}
+
+}  // namespace spartan::rig_detail

@@ -1,0 +1,119 @@
+#include "spartan/rig/formats/rig_writing.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "spartan/rig/formats/calibration_writers.h"
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/models/model_equivalents.h"
+
+namespace spartan {
+
+namespace rig_detail {
+
+tl::unexpected<Error> cannot_hold(const Camera& camera, const std::string& why) {
+  return failure(ErrorCode::configuration, why, "cameras." + camera.name);
+}
+
+Result<Eyes> only_pair(const Rig& rig, CalibrationFormat format) {
+  if (rig.pairs.size() != 1) {
+    return failure(ErrorCode::configuration,
+                   fmt::format("{} holds one pair, this rig has {}", name_of(format), rig.pairs.size()), "pairs",
+                   "choose one with --pair");
+  }
+  const StereoPair& pair = rig.pairs.front();
+  for (const Camera& camera : rig.cameras) {
+    if (camera.name == pair.left || camera.name == pair.right) continue;
+    return failure(ErrorCode::configuration,
+                   fmt::format("{} holds two cameras, this rig has {}", name_of(format), rig.cameras.size()),
+                   "cameras." + camera.name, "leave it out with --pair " + pair.name);
+  }
+  return Eyes{rig.find_camera(pair.left), rig.find_camera(pair.right), &pair};
+}
+
+std::vector<const Camera*> pair_first(const Rig& rig) {
+  const StereoPair& pair = rig.pairs.front();
+  std::vector<const Camera*> cameras{rig.find_camera(pair.left), rig.find_camera(pair.right)};
+  for (const Camera& camera : rig.cameras) {
+    if (camera.name != pair.left && camera.name != pair.right) cameras.push_back(&camera);
+  }
+  return cameras;
+}
+
+namespace {
+
+// Vectors of six decimals leave a skew that moves no pixel of the picture by this much. Most formats have none.
+constexpr double kRoundingSkew_px = 0.01;
+
+// By how much the skew moves rows from one side of the picture to the other.
+double skew_across_px(const Camera& camera) {
+  return std::abs(skew_px(camera.model)) * camera.size.width / parameters(camera.model).front().front();
+}
+
+// The rig as a format says it that has no skew.
+Result<Rig> without_skews(Rig rig, CalibrationFormat format) {
+  for (Camera& camera : rig.cameras) {
+    const double across = skew_across_px(camera);
+    if (across > kRoundingSkew_px) {
+      return cannot_hold(camera, fmt::format("{} has no skew, this camera's is {:.6g} px: {:.3g} px across the picture",
+                                             name_of(format), skew_px(camera.model), across));
+    }
+    camera.model = without_skew(camera.model);
+  }
+  return rig;
+}
+
+Result<CalibrationFiles> write_as(const Rig& rig, CalibrationFormat format, const std::string& path) {
+  switch (format) {
+    case CalibrationFormat::rig_yaml:
+      return CalibrationFiles{{path, to_rig_yaml(rig)}};
+    case CalibrationFormat::kitti:
+      return write_kitti_calib(rig, path);
+    case CalibrationFormat::kitti_raw:
+      return write_kitti_raw_calib(rig, path);
+    case CalibrationFormat::euroc:
+      return write_euroc_calib(rig, path);
+    case CalibrationFormat::kalibr:
+      return write_kalibr_calib(rig, path);
+    case CalibrationFormat::opencv:
+      return write_opencv_calib(rig, path);
+    case CalibrationFormat::ros:
+      return write_ros_calib(rig, path);
+    case CalibrationFormat::mrcal:
+      return write_mrcal_calib(rig, path);
+    case CalibrationFormat::tsai:
+      return write_tsai_calib(rig, path);
+    case CalibrationFormat::cahvor:
+      return write_cahvor_calib(rig, path);
+  }
+  return failure(ErrorCode::internal, "an unknown format");
+}
+
+}  // namespace
+
+}  // namespace rig_detail
+
+Rig rig_of_pair(const Rig& rig, const StereoPair& pair) {
+  Rig only = rig;
+  std::erase_if(only.cameras, [&](const Camera& c) { return c.name != pair.left && c.name != pair.right; });
+  std::erase_if(only.pairs, [&](const StereoPair& p) { return p.name != pair.name; });
+  std::erase_if(only.pan_tilt_units, [&](const PanTiltUnit& unit) {
+    return std::none_of(only.cameras.begin(), only.cameras.end(),
+                        [&](const Camera& c) { return c.mount == unit.name; });
+  });
+  return only;
+}
+
+Result<CalibrationFiles> to_calibration_files(const Rig& rig, CalibrationFormat format, const std::string& path) {
+  if (Status sound = rig.validate("the rig"); !sound) return failure(std::move(sound));
+  if (format == CalibrationFormat::rig_yaml || format == CalibrationFormat::cahvor) {
+    return rig_detail::write_as(rig, format, path);
+  }
+  const auto straight = rig_detail::without_skews(rig, format);
+  if (!straight) return failure(straight);
+  return rig_detail::write_as(*straight, format, path);
+}
+
+}  // namespace spartan

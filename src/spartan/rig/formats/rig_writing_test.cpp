@@ -1,0 +1,60 @@
+// What formats cannot hold is refused by name.
+#include "spartan/rig/formats/rig_writing.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "spartan/rig/formats/rig_files.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(CalibrationWriting, WhatAFormatCannotHoldIsRefusedByCamera) {
+  Camera left, right;
+  left.name = "left";
+  right.name = "right";
+  left.size = right.size = {640, 480};
+  const auto refusal = [&](const CameraModel& model, CalibrationFormat format, const char* path) {
+    left.model = right.model = model;
+    const Rig rig = rig_of_one_pair("r", left, right, Pose::from_translation({-0.1, 0, 0}));
+    const auto files = to_calibration_files(rig, format, path);
+    return files ? std::string("nothing") : files.error().message();
+  };
+  const PinholeModel pinhole{500, 500, 320, 240};
+  const EquidistantModel fisheye(pinhole, {0.1, 0.1, 0.1, 0.1});
+  const RadialTangentialModel rational(pinhole, {0.1, 0, 0, 0, 0, 0.1, 0, 0});
+  const CahvModel skewed{pinhole, 0.5};
+  EXPECT_THAT(refusal(fisheye, CalibrationFormat::kitti, "calib.txt"),
+              HasSubstr("cameras.left: kitti holds rectified"));
+  EXPECT_THAT(refusal(fisheye, CalibrationFormat::tsai, "a.tsai"),
+              HasSubstr("cameras.left: .tsai has no model like equi"));
+  EXPECT_THAT(refusal(fisheye, CalibrationFormat::mrcal, "a.cameramodel"),
+              HasSubstr("cameras.left: mrcal's files have no"));
+  EXPECT_THAT(refusal(fisheye, CalibrationFormat::cahvor, "a.cahvor"), HasSubstr("cameras.left: .cahvor has no model"));
+  EXPECT_THAT(refusal(rational, CalibrationFormat::kalibr, "a.yaml"), HasSubstr("cameras.left: this format has four"));
+  EXPECT_THAT(refusal(rational, CalibrationFormat::tsai, "a.tsai"), HasSubstr("no coefficients k4, k5, k6"));
+  EXPECT_THAT(refusal(skewed, CalibrationFormat::mrcal, "a.cameramodel"),
+              HasSubstr("cameras.left: mrcal has no skew, this camera's is 0.5 px: 0.64 px"));
+  EXPECT_THAT(refusal(skewed, CalibrationFormat::ros, "a.yaml"), HasSubstr("cameras.left: ros has no skew"));
+  EXPECT_THAT(refusal(skewed, CalibrationFormat::opencv, "a.yml"), HasSubstr("cameras.left: opencv has no skew"));
+  EXPECT_THAT(refusal(skewed, CalibrationFormat::euroc, "a"), HasSubstr("cameras.left: euroc has no skew"));
+  EXPECT_EQ(refusal(skewed, CalibrationFormat::cahvor, "a.cahvor"), "nothing");
+
+  left.model = right.model = pinhole;
+  const Rig turned = rig_of_one_pair("r", left, right, Pose(exp_so3({0, 0.01, 0}), {-0.1, 0, 0}));
+  EXPECT_THAT(to_calibration_files(turned, CalibrationFormat::kitti, "calib.txt").error().message(),
+              HasSubstr("cameras.right: kitti holds rectified pairs only; this camera is turned by 0.01 rad"));
+  Rig three = turned;
+  three.cameras.push_back(left);
+  three.cameras.back().name = "third";
+  for (const auto format : {CalibrationFormat::ros, CalibrationFormat::opencv, CalibrationFormat::tsai}) {
+    EXPECT_THAT(to_calibration_files(three, format, "x").error().message(), HasSubstr("cameras.third: "));
+  }
+  EXPECT_TRUE(to_calibration_files(three, CalibrationFormat::kalibr, "x.yaml"));
+  EXPECT_EQ(to_calibration_files(three, CalibrationFormat::euroc, "x")->size(), 3u);
+}
+
+}  // namespace
+}  // namespace spartan

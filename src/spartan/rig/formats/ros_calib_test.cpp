@@ -1,0 +1,132 @@
+// camera_info of ROS: its documented examples, and values by hand.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/testing/first_pair.h"
+#include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
+
+namespace spartan {
+namespace {
+
+using testing::complaint;
+using ::testing::HasSubstr;
+using testing::replaced;
+using testing::right_in_left;
+using testing::TemporaryFolder;
+
+// The structure of camera_calibration_parsers; R turns each eye by the same 0.1 rad about y, P has fx' = 400.
+std::string camera_info(const char* name, double tx, const char* model = "plumb_bob",
+                        const char* d = "-0.2, 0.1, 0.001, -0.002, 0.02") {
+  const double c = std::cos(0.1), s = std::sin(0.1);
+  return fmt::format(
+      "image_width: 640\nimage_height: 480\ncamera_name: narrow_stereo/{}\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+      "  data: [430, 0, 320.5, 0, 431, 240.5, 0, 0, 1]\ndistortion_model: {}\ndistortion_coefficients:\n  rows: 1\n"
+      "  cols: 5\n  data: [{}]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [{}, 0, {}, 0, 1, 0, {}, 0, {}]\n"
+      "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [400, 0, 310, {}, 0, 400, 230, 0, 0, 0, 1, 0]\n",
+      name, model, d, c, s, -s, c, tx);
+}
+
+TEST(RosCalib, TheBaselineIsInTheRightProjection) {
+  const TemporaryFolder folder;
+  folder.write("right.yaml", camera_info("right", -48));
+  const auto read = read_calibration(folder.write("left.yaml", camera_info("left", 0)));
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(read->format, CalibrationFormat::ros);
+  // 0.12 m along x of the rectified frame, which is Rᵀ (0.12, 0, 0) in the camera.
+  const Eigen::Vector3d expected(0.12 * std::cos(0.1), 0, 0.12 * std::sin(0.1));
+  EXPECT_LE((right_in_left(read->rig) - expected).norm(), 1e-15);
+  EXPECT_LE(rotation_angle(read->rig.right_from_left(read->rig.pairs[0])), 1e-15);
+  EXPECT_EQ(read->rig.cameras[0].model,
+            CameraModel(RadialTangentialModel({430, 431, 320.5, 240.5}, {-0.2, 0.1, 0.001, -0.002, 0.02})));
+  EXPECT_EQ(read->rig.cameras[1].size, (ImageSize{640, 480}));
+}
+
+TEST(RosCalib, MessagesAreReadToo) {
+  const TemporaryFolder folder;
+  const auto message = [](bool ros2, double tx) {
+    const char* names = ros2 ? "dkrp" : "DKRP";
+    return fmt::format(
+        "header:\n  frame_id: x\nheight: 480\nwidth: 640\ndistortion_model: rational_polynomial\n"
+        "{}: [0.1, 0.2, 0, 0, 0.01, 0.3, 0.1, 0.02]\n{}: [430.0, 0.0, 320.5, 0.0, 431.0, 240.5, 0.0, 0.0, 1.0]\n"
+        "{}: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n"
+        "{}: [400.0, 0.0, 310.0, {}, 0.0, 400.0, 230.0, 0.0, 0.0, 0.0, 1.0, 0.0]\nbinning_x: 0\nbinning_y: 0\n---\n",
+        names[0], names[1], names[2], names[3], tx);
+  };
+  for (const bool ros2 : {false, true}) {
+    const auto both = folder.write("l.yaml", message(ros2, 0)) + "," + folder.write("r.yaml", message(ros2, -40));
+    const auto read = read_calibration(both);
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_NEAR(right_in_left(read->rig).x(), 0.1, 1e-15);
+    EXPECT_EQ(parameters(read->rig.cameras[0].model)[2].size(), 8u);
+  }
+  const auto binned = replaced(message(true, 0), "binning_x: 0", "binning_x: 2");
+  EXPECT_THAT(complaint(read_calibration(folder.write("l.yaml", binned))), HasSubstr("l.yaml:10: binning_x"));
+}
+
+// A part of the sensor has another centre and size than the calibration says.
+TEST(RosCalib, APartOfTheSensorIsRefused) {
+  const TemporaryFolder folder;
+  folder.write("right.yaml", camera_info("right", -48));
+  const auto said = [&](const std::string& roi) {
+    return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0) + roi)));
+  };
+  EXPECT_THAT(said("roi: {x_offset: 100, y_offset: 50, width: 300, height: 200}\n"),
+              HasSubstr("left.yaml:21: roi: is a part of the picture"));
+  EXPECT_THAT(said("roi: {x_offset: 0, y_offset: 50, width: 0, height: 0}\n"), HasSubstr("left.yaml:21: roi"));
+  EXPECT_THAT(said("roi: {x_offset: 0, y_offset: 0, width: 640, height: 200}\n"), HasSubstr("left.yaml:21: roi"));
+  EXPECT_THAT(said("roi: {x_offset: nan, y_offset: 0, width: 0, height: 0}\n"), HasSubstr("roi.x_offset: is nan"));
+  EXPECT_THAT(said("roi: none\n"), HasSubstr("roi: must be a group"));
+  EXPECT_EQ(said("roi:\n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: false\n"), "nothing");
+  EXPECT_EQ(said("roi: {x_offset: 0, y_offset: 0, width: 640, height: 480}\n"), "nothing");
+}
+
+TEST(RosCalib, NoDistortionHasNoCoefficients) {
+  const TemporaryFolder folder;
+  folder.write("right.yaml", camera_info("right", -48));
+  const auto said = [&](const char* model, const char* d) {
+    return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0, model, d))));
+  };
+  for (const char* model : {"none", "''"}) {
+    EXPECT_EQ(said(model, "0, 0, 0, 0, 0"), "nothing");
+    EXPECT_EQ(said(model, ""), "nothing");
+    EXPECT_THAT(said(model, "-0.2, 0, 0, 0, 0"),
+                HasSubstr("left.yaml:9: distortion_coefficients: are not zero, but distortion_model knows none"));
+  }
+  EXPECT_THAT(said("fov", "0, 0, 0, 0, 0"), ::testing::EndsWith("equidistant, fisheye, radtan, none"));
+}
+
+// R and P choose a rectified view; a rig has no place for it.
+TEST(RosCalib, AnotherRectifiedViewIsLeftOut) {
+  const TemporaryFolder folder;
+  const auto left_out = [&](const std::string& left, const std::string& right) {
+    folder.write("right.yaml", right);
+    return read_calibration(folder.write("left.yaml", left)).value();
+  };
+  const ReadRig read = left_out(camera_info("left", 0), camera_info("right", -48));
+  ASSERT_EQ(read.left_out.size(), 1u);
+  EXPECT_EQ(read.left_out[0].key, "projection_matrix");
+  EXPECT_THAT(read.left_out[0].text, HasSubstr("(fx 400, cx 310; right 400, 310)"));
+  const auto own = to_calibration_files(read.rig, CalibrationFormat::ros, "left.yaml,right.yaml").value();
+  EXPECT_TRUE(left_out(own[0].content, own[1].content).left_out.empty()) << "it would be written again";
+}
+
+TEST(RosCalib, KindsAndFaultsAreNamed) {
+  const TemporaryFolder folder;
+  folder.write("right.yaml", camera_info("right", -48, "equidistant", "0.1, 0.02, 0.003, 0.004"));
+  const auto said = [&](const std::string& text) {
+    return complaint(read_calibration(folder.write("left.yaml", text)));
+  };
+  EXPECT_EQ(said(camera_info("left", 0, "equidistant", "0.1, 0.02, 0.003, 0.004")), "nothing");
+  EXPECT_EQ(read_rig(folder.path() + "/left.yaml")->cameras[0].model,
+            CameraModel(EquidistantModel({430, 431, 320.5, 240.5}, {0.1, 0.02, 0.003, 0.004})));
+  EXPECT_THAT(said(camera_info("left", 0, "thin_prism")), HasSubstr("left.yaml:8: distortion_model: is 'thin_prism'"));
+  EXPECT_THAT(said(camera_info("left", -48)), HasSubstr("right.yaml: projection_matrix: Tx is that of the left file"));
+  EXPECT_THAT(said(replaced(camera_info("left", 0), "data: [430, 0,", "data: [430, 3,")), HasSubstr("camera_matrix"));
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,103 @@
+#include "spartan/rig/inspection/pair_check.h"
+
+#include "spartan/testing/seen_pair.h"
+
+namespace spartan {
+namespace {
+
+using testing::check;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using testing::expect_mended;
+using testing::ids;
+using ::testing::IsEmpty;
+using testing::kSize;
+using testing::left_from_right;
+using testing::look;
+using testing::straight_rig;
+using testing::true_rig;
+using testing::with_pose;
+
+TEST(PairCheck, SoundRigsAreGood) {
+  for (const Rig& rig : {true_rig(), straight_rig()}) {
+    const PairCheck result = check(rig, look(rig));
+    EXPECT_THAT(ids(result), IsEmpty());
+    EXPECT_EQ(result.verdict, PairVerdict::good);
+    EXPECT_NEAR(result.as_given.mean_px, 0.12, 0.03);  // 0.15 √(2/π)
+    EXPECT_NEAR(result.as_given.p95_px, 0.30, 0.1);
+    EXPECT_NEAR(result.as_taken.median_px, 248.4 - 255.2, 4) << "the right principal point lies lower";
+    EXPECT_GE(result.inliers, 600);
+    EXPECT_LE(result.inliers, 660);
+    expect_mended(rig, result);
+  }
+}
+
+// The errors are found to what is said about them.
+TEST(PairCheck, CorrectionsAreThoseOfTheWorld) {
+  const Rig truth = true_rig();
+  Eigen::Vector4d square = Eigen::Vector4d::Zero();
+  constexpr int kTrials = 40;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Random random(100 + static_cast<std::uint64_t>(trial));
+    PairCorrection wanted;
+    wanted.pitch_rad = 0.01 * random.normal();
+    wanted.roll_rad = 0.01 * random.normal();
+    wanted.yaw_rad = 0.005 * random.normal();
+    wanted.focal_ratio = 1 + 0.01 * random.normal();
+    // The believed rig is the true one before the correction.
+    Pose believed = left_from_right(truth);
+    const Eigen::Quaterniond turn = corrected_left_from_right(Pose(), wanted).rotation();
+    believed = Pose(believed.rotation() * turn.conjugate(), believed.translation());
+    Rig rig = with_pose(truth, believed);
+    auto numbers = parameters(rig.cameras[1].model);
+    for (double& f : numbers[0]) f /= wanted.focal_ratio;
+    rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
+    const PairFit fit = fit_pair(rig.cameras[0].model, rig.cameras[1].model, left_from_right(rig),
+                                 look(truth, 700, static_cast<std::uint64_t>(trial)));
+    const Eigen::Vector4d error((fit.correction.pitch_rad - wanted.pitch_rad) / fit.sigma.pitch_rad,
+                                (fit.correction.roll_rad - wanted.roll_rad) / fit.sigma.roll_rad,
+                                (fit.correction.yaw_rad - wanted.yaw_rad) / fit.sigma.yaw_rad,
+                                (fit.correction.focal_ratio - wanted.focal_ratio) / fit.sigma.focal_ratio);
+    square += error.cwiseAbs2();
+  }
+  // Mean normalized squares of 40 trials: 1 ± 0.22.
+  for (int k = 0; k < 4; ++k) EXPECT_NEAR(square[k] / kTrials, 1, 0.7) << k;
+}
+
+// x right, y down, z ahead.
+TEST(PairCheck, TurnsAndSwingsAreThoseSaid) {
+  const auto corrected = [](const PairCorrection& c) {
+    return corrected_left_from_right(Pose::from_translation({1, 0, 0}), c);
+  };
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), z = Eigen::Vector3d::UnitZ();
+  EXPECT_LT((corrected({.pitch_rad = 0.01}).rotation() * z).y(), -0.009) << "up";
+  EXPECT_GT((corrected({.yaw_rad = 0.01}).rotation() * z).x(), 0.009) << "to the right";
+  EXPECT_GT((corrected({.roll_rad = 0.01}).rotation() * x).y(), 0.009) << "clockwise";
+  const Eigen::Vector3d swung = corrected({.baseline_down_rad = 0.01, .baseline_ahead_rad = 0.02}).translation();
+  EXPECT_LT((swung - Eigen::Vector3d(1, 0.01, 0.02)).norm(), 1e-3);
+  EXPECT_NEAR(swung.norm(), 1, 1e-12);
+}
+
+TEST(PairCheck, SaysWhenThereIsTooLittleToSee) {
+  const Rig truth = true_rig();
+  const PairCheck few = check(truth, look(truth, 30));
+  EXPECT_THAT(ids(few), ElementsAre("not_enough_texture"));
+  EXPECT_EQ(few.verdict, PairVerdict::bad);
+  EXPECT_TRUE(std::isnan(few.correction.yaw_rad) && std::isnan(few.as_given.mean_px)) << "no figure is made up";
+  EXPECT_EQ(*few.corrected, truth);
+  EXPECT_THAT(ids(check(truth, {})), ElementsAre("not_enough_texture"));
+  // Many, but in one corner.
+  std::vector<PixelMatch> corner = look(truth, 4000);
+  std::erase_if(corner, [](const PixelMatch& m) { return m.left.x() > 180 || m.left.y() > 160; });
+  EXPECT_THAT(ids(check(truth, corner)), ElementsAre("not_enough_texture"));
+}
+
+TEST(PairCheck, WithoutACalibrationThePicturesSpeak) {
+  const PairCheck result = check_pictures(look(straight_rig()), kSize);
+  EXPECT_THAT(ids(result), ::testing::Not(Contains("inverse_transform")));
+  EXPECT_NEAR(result.correction.roll_rad, 0.003, 0.001);
+  EXPECT_LT(result.as_corrected.mean_px, 0.2);
+}
+
+}  // namespace
+}  // namespace spartan

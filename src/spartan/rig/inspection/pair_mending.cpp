@@ -1,0 +1,68 @@
+#include "spartan/rig/inspection/pair_mending.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "spartan/rig/models/model_changes.h"
+
+namespace spartan {
+namespace {
+
+// Freed where the rows cost so much less with it.
+constexpr double kCheaper = 0.9, kLeastGain = 25;
+
+double unit_factor(double baseline_m) {
+  if (baseline_m >= 30) return 0.001;
+  if (baseline_m >= 10) return 0.01;
+  return baseline_m < 0.005 ? 1000 : 1;
+}
+
+}  // namespace
+
+PairCorrection needed_correction(const BelievedPair& believed, const FoundWrong& found) {
+  const PairBelief& b = believed.belief;
+  PairFitOptions options = fit_options(b);
+  options.yaw = found.yaw;
+  options.focal = found.focal_ratio;
+  options.baseline = false;
+  const auto fit = [&] { return fit_pair(b.left.model, b.right.model, b.left_from_right, believed.matches, options); };
+  PairFit best = fit();
+  const auto free_if_needed = [&](bool& option) {
+    if (option) return;
+    option = true;
+    PairFit freed = fit();
+    option = freed.cost < kCheaper * best.cost && freed.cost < best.cost - kLeastGain;
+    if (option) best = std::move(freed);
+  };
+  if (found.distortion) free_if_needed(options.focal);
+  if (found.distortion) free_if_needed(options.yaw);
+  free_if_needed(options.baseline);
+  return best.correction;
+}
+
+Rig mended_rig(Rig rig, const StereoPair& pair, const PairBelief& belief, const PairCorrection& correction,
+               bool wrong_unit) {
+  const auto camera_of = [&](const std::string& name) -> Camera& {
+    return *std::find_if(rig.cameras.begin(), rig.cameras.end(), [&](const Camera& c) { return c.name == name; });
+  };
+  StereoPair& mended =
+      *std::find_if(rig.pairs.begin(), rig.pairs.end(), [&](const auto& p) { return p.name == pair.name; });
+  if (belief.eyes_exchanged) std::swap(mended.left, mended.right);
+  Camera &left = camera_of(mended.left), &right = camera_of(mended.right);
+  left.size = belief.left.size;
+  right.size = belief.right.size;
+  left.model =
+      belief.left_bends ? with_radial(belief.left.model, correction.left_radial, left.size) : belief.left.model;
+  right.model = with_focal_times(
+      belief.right_bends ? with_radial(belief.right.model, correction.right_radial, right.size) : belief.right.model,
+      correction.focal_ratio);
+  Pose left_from_right = corrected_left_from_right(belief.left_from_right, correction);
+  if (wrong_unit) {
+    const double factor = unit_factor(left_from_right.translation().norm());
+    left_from_right = Pose(left_from_right.rotation(), factor * left_from_right.translation());
+  }
+  right.mount_from_camera = left.mount_from_camera * left_from_right;
+  return rig;
+}
+
+}  // namespace spartan

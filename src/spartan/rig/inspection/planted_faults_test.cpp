@@ -1,0 +1,350 @@
+// Faults that people plant in calibrations, each known by its name and put right.
+#include "spartan/rig/inspection/pair_check.h"
+#include "spartan/rig/models/model_changes.h"
+#include "spartan/testing/seen_pair.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::AnyOf;
+using testing::check;
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::ElementsAre;
+using testing::expect_mended;
+using ::testing::HasSubstr;
+using testing::ids;
+using ::testing::IsEmpty;
+using testing::kDegree;
+using testing::left_from_right;
+using testing::look;
+using ::testing::Not;
+using testing::straight_rig;
+using testing::true_rig;
+using testing::with_pose;
+
+double resolution(const Rig& rig) {
+  return project_with_jacobian(rig.cameras[0].model, Eigen::Vector3d::UnitZ())->by_point(0, 0);
+}
+
+TEST(PlantedFault, InverseTransform) {
+  const Rig truth = true_rig();
+  const PairCheck result = check(with_pose(truth, left_from_right(truth).inverse()), look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("inverse_transform"));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  expect_mended(truth, result);
+}
+
+TEST(PlantedFault, SwappedPictures) {
+  const Rig truth = true_rig();
+  std::vector<PixelMatch> matches = look(truth);
+  for (PixelMatch& match : matches) std::swap(match.left, match.right);
+  const PairCheck result = check(truth, matches);
+  EXPECT_THAT(ids(result), ElementsAre("swapped_eyes"));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  expect_mended(truth, result);
+}
+
+TEST(PlantedFault, SwappedEyesOfTheRig) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  std::swap(rig.pairs[0].left, rig.pairs[0].right);
+  std::vector<PixelMatch> matches = look(truth);
+  for (PixelMatch& match : matches) std::swap(match.left, match.right);
+  const PairCheck result = check(rig, matches);
+  EXPECT_THAT(ids(result), ElementsAre("swapped_eyes"));
+  EXPECT_EQ(result.corrected->pairs[0].left, "left");
+  expect_mended(truth, result);
+}
+
+// In millimetres, in centimetres, in metres that were taken for millimetres.
+TEST(PlantedFault, BaselineInOtherUnits) {
+  const Rig truth = true_rig();
+  const Pose pose = left_from_right(truth);
+  for (const double factor : {1000.0, 100.0, 0.001}) {
+    const PairCheck result = check(with_pose(truth, {pose.rotation(), factor * pose.translation()}), look(truth));
+    EXPECT_THAT(ids(result), ElementsAre("baseline_unit")) << factor;
+    EXPECT_EQ(result.verdict, PairVerdict::bad);
+    EXPECT_NEAR(left_from_right(*result.corrected).translation().norm(), 0.11, 0.001) << factor;
+    expect_mended(truth, result);
+  }
+}
+
+TEST(PlantedFault, EyesApart) {
+  const Rig truth = true_rig();
+  const PairCheck result = check(with_pose(truth, Pose(exp_so3({0, 20 * kDegree, 0}), {0.11, 0, 0})), {});
+  EXPECT_THAT(ids(result), ElementsAre("eyes_apart", "not_enough_texture"));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+}
+
+// The calibration of pictures twice as large: centre and focal length, or the focal length alone.
+TEST(PlantedFault, FocalLengthOfAnotherSize) {
+  const Rig truth = true_rig();
+  for (const bool centre_too : {true, false}) {
+    Rig rig = truth;
+    for (Camera& c : rig.cameras) {
+      auto numbers = parameters(c.model);
+      for (double& f : numbers[0]) f *= 2;
+      if (centre_too) {
+        for (double& v : numbers[1]) v = (v + 0.5) * 2 - 0.5;
+      }
+      c.model = with_parameters(c.model, numbers);
+    }
+    const PairCheck result = check(rig, look(truth));
+    EXPECT_THAT(ids(result), Contains("size_mismatch")) << centre_too;
+    EXPECT_EQ(result.verdict, PairVerdict::bad);
+    expect_mended(truth, result, 0.3);
+  }
+}
+
+TEST(PlantedFault, PicturesOfAnotherSize) {
+  const Rig truth = true_rig();
+  const auto halved = [](std::vector<PixelMatch> matches) {
+    for (PixelMatch& m : matches) {
+      for (Eigen::Vector2d* p : {&m.left, &m.right}) *p = ((p->array() + 0.5) / 2 - 0.5).matrix();
+    }
+    return matches;
+  };
+  const ImageSize half{376, 240};
+  const PairCheck result = check_pair(truth, truth.pairs[0], halved(look(truth)), half);
+  EXPECT_THAT(ids(result), ElementsAre("size_mismatch", "size_mismatch")) << "both cameras";
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  const PairCheck again = check_pair(*result.corrected, result.corrected->pairs[0], halved(look(truth, 700, 2)), half);
+  EXPECT_THAT(ids(again), IsEmpty());
+  EXPECT_EQ(again.verdict, PairVerdict::good);
+}
+
+// Of the right eye only: the left one's numbers are sound.
+TEST(PlantedFault, OneCalibrationOfAnotherSize) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  rig.cameras[1].model = resized(rig.cameras[1].model, 0.5);
+  rig.cameras[1].size = {376, 240};
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("size_mismatch"));
+  EXPECT_EQ(result.corrected->cameras[0].model, truth.cameras[0].model);
+  expect_mended(truth, result);
+}
+
+// A focal length that is none (millimetres), or one of its two numbers: the view in degrees and fx/fy are no factors.
+TEST(PlantedFault, FocalLengthsThatCannotBe) {
+  const Rig truth = straight_rig();
+  for (const PinholeModel& odd : {PinholeModel{3, 3, 367.2, 248.4}, PinholeModel{458, 229, 367.2, 248.4}}) {
+    Rig rig = truth;
+    rig.cameras[0].model = odd;
+    const PairCheck result = check(rig, look(truth));
+    EXPECT_THAT(ids(result), Contains("size_mismatch"));
+    EXPECT_EQ(result.verdict, PairVerdict::bad);
+    const auto seen_ahead = [](const Rig& r) { return *project(r.cameras[0].model, Eigen::Vector3d::UnitZ()); };
+    EXPECT_EQ(seen_ahead(*result.corrected), seen_ahead(rig)) << "the picture is no larger";
+  }
+}
+
+TEST(PlantedFault, RowsOffByTwoPixels) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  auto numbers = parameters(rig.cameras[1].model);
+  numbers[1][1] += 2;
+  rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("row_offset"));
+  EXPECT_NEAR(result.as_given.median_px, 2, 0.5);  // a little more where the lens is straightened
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("px below those of the right one"));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  expect_mended(truth, result, 0.4);  // two rows are 0.25°
+}
+
+// Rows alone make a pair usable or bad.
+TEST(PlantedFault, RowsDecideTheVerdict) {
+  const Rig truth = true_rig();
+  const auto off_by = [&](double rows_px) {
+    Rig rig = truth;
+    auto numbers = parameters(rig.cameras[1].model);
+    numbers[1][1] += rows_px;
+    rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
+    return check(rig, look(truth));
+  };
+  EXPECT_EQ(off_by(0.3).verdict, PairVerdict::good);
+  EXPECT_EQ(off_by(0.7).verdict, PairVerdict::usable);
+  const PairCheck bad = off_by(1.4);
+  EXPECT_EQ(bad.verdict, PairVerdict::bad);
+  EXPECT_LT(bad.as_given.p95_px, 3) << "by the mean";
+}
+
+TEST(PlantedFault, YawOfADegree) {
+  for (const Rig& truth : {true_rig(), straight_rig()}) {
+    for (const double yaw_deg : {1.0, -1.0}) {
+      PairCorrection off;
+      off.yaw_rad = yaw_deg * kDegree;
+      const PairCheck result =
+          check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), look(truth));
+      EXPECT_THAT(ids(result), ElementsAre("yaw_offset")) << yaw_deg;
+      EXPECT_NEAR(result.correction.yaw_rad / kDegree, -yaw_deg, 0.1);
+      EXPECT_NEAR(result.findings.at(0).value, -yaw_deg, 0.1);
+      EXPECT_THAT(result.findings.at(0).text, HasSubstr(yaw_deg > 0 ? "further to the left" : "further to the right"));
+      EXPECT_EQ(result.verdict, PairVerdict::bad);
+      expect_mended(truth, result);
+    }
+  }
+}
+
+// Half a degree may be the lens's, and stays; but not where the far hills would be beyond infinity.
+TEST(PlantedFault, YawOfHalfADegree) {
+  const Rig truth = true_rig();
+  const auto planted = [&](double yaw_deg) {
+    PairCorrection off;
+    off.yaw_rad = yaw_deg * kDegree;
+    return check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), look(truth));
+  };
+  const PairCheck stays = planted(-0.5);
+  EXPECT_THAT(ids(stays), ElementsAre("rows_apart"));
+  EXPECT_THAT(stays.findings.at(0).text, HasSubstr("rows do not tell which"));
+  EXPECT_EQ(stays.verdict, PairVerdict::usable);
+  const Pose apart = left_from_right(truth).inverse() * left_from_right(*stays.corrected);
+  EXPECT_NEAR(rotation_angle(apart) / kDegree, 0.5, 0.1);
+  const PairCheck told = planted(0.5);
+  EXPECT_THAT(ids(told), ElementsAre("yaw_offset"));
+  EXPECT_THAT(told.findings.at(0).text, HasSubstr("beyond infinity"));
+  expect_mended(truth, told);
+}
+
+TEST(PlantedFault, DistortionIgnored) {
+  Rig rig = true_rig();
+  for (Camera& c : rig.cameras) c.model = std::get<RadialTangentialModel>(c.model).pinhole();
+  const PairCheck result = check(rig, look(true_rig()));
+  EXPECT_THAT(ids(result), Contains("distortion_ignored"));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  EXPECT_LT(check(*result.corrected, look(true_rig())).as_given.mean_px, 0.6 * result.as_given.mean_px);
+}
+
+TEST(PlantedFault, FocalRatio) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  auto numbers = parameters(rig.cameras[1].model);
+  for (double& f : numbers[0]) f *= 0.99;
+  rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), Contains("focal_ratio"));
+  EXPECT_NEAR(result.correction.focal_ratio, 1 / 0.99, 0.001);
+  EXPECT_THAT(result.findings.back().text, HasSubstr("% larger than the rig says"));
+  expect_mended(truth, result);
+}
+
+// What is wrong in one eye only, and what looks like something else at first sight.
+TEST(PlantedFault, FocalLengthOfAnotherSizeInOneEye) {
+  const Rig truth = true_rig();
+  for (const double factor : {0.5, 1.5}) {
+    Rig rig = truth;
+    rig.cameras[1].model = with_focal_times(rig.cameras[1].model, factor);
+    const PairCheck result = check(rig, look(truth));
+    EXPECT_THAT(ids(result), Contains("size_mismatch")) << factor;
+    EXPECT_THAT(ids(result), Not(Contains("swapped_eyes"))) << factor;
+    EXPECT_NEAR(result.correction.focal_ratio, 1 / factor, 0.005 / factor);
+    EXPECT_EQ(result.corrected->cameras[0].model, truth.cameras[0].model);
+    expect_mended(truth, result);
+  }
+}
+
+TEST(PlantedFault, FxAlone) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  for (Camera& c : rig.cameras) {
+    auto numbers = parameters(c.model);
+    numbers[0][0] *= 2;
+    c.model = with_parameters(c.model, numbers);
+  }
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), Each(std::string("size_mismatch")));
+  EXPECT_NEAR(resolution(*result.corrected), resolution(truth), 2);
+  expect_mended(truth, result);
+}
+
+// Pictures right, the names of the eyes exchanged: not the inverse transform, which has other lenses.
+TEST(PlantedFault, SwappedNamesOfTheEyes) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  std::swap(rig.pairs[0].left, rig.pairs[0].right);
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("swapped_eyes"));
+  EXPECT_EQ(result.corrected->pairs[0].left, "left");
+  expect_mended(truth, result);
+}
+
+TEST(PlantedFault, SwappedLenses) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  std::swap(rig.cameras[0].model, rig.cameras[1].model);
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("swapped_eyes"));
+  EXPECT_EQ(result.corrected->cameras[0].model, truth.cameras[0].model);
+  expect_mended(truth, result);
+}
+
+// Two eyes that are the same: pictures do not tell an inverse transform from exchanged names, and it is said.
+TEST(PlantedFault, EqualEyesOnTheWrongSide) {
+  Rig truth = straight_rig();
+  truth.cameras[1].model = truth.cameras[0].model;
+  truth = with_pose(truth, Pose::from_translation({0.11, 0, 0}));
+  const PairCheck result = check(with_pose(truth, Pose::from_translation({-0.11, 0, 0})), look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("inverse_transform", "swapped_eyes"));
+  expect_mended(truth, result);
+}
+
+TEST(PlantedFault, DistortionIgnoredInOneEye) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  rig.cameras[1].model = std::get<RadialTangentialModel>(truth.cameras[1].model).pinhole();
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), Contains("distortion_ignored"));
+  EXPECT_THAT(ids(result), Not(Contains("size_mismatch")));
+  EXPECT_EQ(result.corrected->cameras[0].model, truth.cameras[0].model);
+  EXPECT_LT(check(*result.corrected, look(truth, 700, 2)).as_given.mean_px, 0.3);
+}
+
+TEST(PlantedFault, RollOfADegree) {
+  const Rig truth = true_rig();
+  PairCorrection off;
+  off.roll_rad = kDegree;
+  const PairCheck result = check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("roll_offset"));
+  EXPECT_NEAR(result.findings.at(0).value, -1, 0.05);
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  expect_mended(truth, result);
+}
+
+TEST(PlantedFault, BaselineInAnotherDirection) {
+  const Rig truth = true_rig();
+  Pose pose = left_from_right(truth);
+  pose = Pose(pose.rotation(), pose.translation() + Eigen::Vector3d(0, 0.01, 0.01));
+  const PairCheck result = check(with_pose(truth, pose), look(truth));
+  EXPECT_NE(result.verdict, PairVerdict::good);
+  expect_mended(truth, result);
+}
+
+// Other moments, other rigs: nothing is named that is not there, and no rig is made of it.
+TEST(PlantedFault, PicturesThatDoNotBelongTogether) {
+  std::vector<PixelMatch> matches = look(true_rig());
+  Random random(5);
+  for (PixelMatch& match : matches) match.right.y() += random.uniform(-60, 60);
+  const PairCheck result = check(true_rig(), matches);
+  EXPECT_THAT(ids(result), ElementsAre(AnyOf("not_explained", "not_enough_texture")));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  EXPECT_TRUE(std::isnan(result.correction.yaw_rad) && std::isnan(result.as_corrected.mean_px));
+}
+
+TEST(PlantedFault, OnePictureTwice) {
+  std::vector<PixelMatch> matches = look(straight_rig());
+  for (PixelMatch& match : matches) match.right = match.left;
+  EXPECT_THAT(ids(check(straight_rig(), matches)), ElementsAre("same_picture"));
+}
+
+// A sound rig comes back as it was: corrections within their errors would cost range.
+TEST(PlantedFault, NoneIsMended) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Rig truth = true_rig();
+    EXPECT_EQ(*check(truth, look(truth, 300, seed)).corrected, truth) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace spartan

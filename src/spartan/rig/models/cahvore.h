@@ -1,0 +1,69 @@
+// CAHVOR for fisheye lenses, whose entrance pupil moves along the axis: not central.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "spartan/rig/models/cahvor.h"
+
+namespace spartan {
+
+/// With P seen from C, ω = P·O, λ = P − ω O: the line of sight leaves the axis O at the distance
+///   s(θ) = (θ/sin θ − 1)(e0 + e1 θ² + e2 θ⁴)
+/// from C, at the angle θ that leads through P: (ω − s) sin θ = |λ| cos θ. With the linearity L
+///   χ = tan(L θ)/L for L > 0, θ for L = 0, sin(L θ)/L for L < 0
+///   μ = r0 + r1 χ² + r2 χ⁴,  P' = (|λ|/χ) O + (1 + μ) λ,  (u, v) = CAHV of P'
+/// L = 1 with e = 0 is CAHVOR; L = 0 is equidistant.
+/// Source: Gennery, "Generalized camera calibration including fish-eye lenses", IJCV 2006; JPL's file types 1, 2 and 3
+/// are L = 1, L = 0 and L as given. Frame as in cahv.h.
+/// Domain: θ below π, below π/(2|L|), below the angle where χ (1 + μ) stops growing, and below the one where the
+/// pupil goes astray (five times as far as within 90°); P farther from C than all places where lines of sight cross
+/// (nearest_m()), so that one θ only leads through it (docs/math/camera_models.md); P' before the camera (z > 0).
+class CahvoreModel {
+ public:
+  using Radial = CahvorModel::Radial;
+  using Entrance = std::array<double, 3>;
+
+  CahvoreModel() : CahvoreModel({}, Eigen::Vector3d::UnitZ(), {}, {}, 1) {}
+  /// `optical_axis`: O in the camera frame, of unit length. `entrance_m`: e0, e1, e2. `linearity` within [-1, 1].
+  CahvoreModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, Radial radial, Entrance entrance_m,
+               double linearity);
+
+  static constexpr std::string_view kName = "cahvore";
+  static std::vector<ModelParameterKind> parameter_kinds();
+  ModelParameters parameters() const;
+  static CahvoreModel from_parameters(const ModelParameters& parameters);
+
+  const CahvModel& cahv() const { return cahv_; }
+  const Eigen::Vector3d& optical_axis() const { return given_axis_; }  ///< as given
+  const Radial& radial() const { return radial_; }
+  const Entrance& entrance_m() const { return entrance_; }
+  double linearity() const { return linearity_; }
+  double largest_angle() const { return largest_angle_; }  ///< largest valid θ, rad
+  /// No point is seen that is as near to C as this: lines of sight cross there. Zero where the pupil does not move.
+  double nearest_m() const { return nearest_; }
+
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;
+  std::optional<ProjectionWithJacobian> project_with_jacobian(const Eigen::Vector3d& point) const;
+  /// The ray starts where the line of sight leaves the optical axis.
+  std::optional<Ray> unproject(const Eigen::Vector2d& pixel) const;
+  friend bool operator==(const CahvoreModel& a, const CahvoreModel& b) {
+    return a.cahv_ == b.cahv_ && a.given_axis_ == b.given_axis_ && a.radial_ == b.radial_ &&
+           a.entrance_ == b.entrance_ && a.linearity_ == b.linearity_;
+  }
+
+ private:
+  struct Sight;  // where a point lies about the axis, and the angle of its line of sight
+  std::optional<Sight> sight_of(const Eigen::Vector3d& point) const;
+
+  CahvModel cahv_;
+  Eigen::Vector3d given_axis_, axis_;  ///< O as given, and of length 1 to the last digit
+  Radial radial_{};
+  Entrance entrance_{};
+  double linearity_ = 1;
+  double largest_angle_ = 0, nearest_ = 0;
+};
+
+}  // namespace spartan

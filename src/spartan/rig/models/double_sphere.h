@@ -1,0 +1,35 @@
+// The double-sphere camera, for wide and fisheye lenses.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "spartan/rig/models/pinhole.h"
+
+namespace spartan {
+
+/// With d1 = |p|, h = ξ d1 + Z, d2 = √(X² + Y² + h²):
+///   u = fx X/(α d2 + (1 − α) h) + cx, v = fy Y/(α d2 + (1 − α) h) + cy
+/// Source: Usenko, Demmel, Cremers, "The double sphere camera model", 3DV 2018, eq. 40–52. ξ = 0 is the unified model
+/// with α, α = 0 that of Mei with ξ, both 0 the pinhole.
+/// Domain: h > −w d2 with w = α/(1 − α) for α ≤ ½ and (1 − α)/α above, and d1 + ξ Z > 0 (only for |ξ| > 1 a limit).
+/// That is where the image radius grows with the angle off the axis (docs/math/camera_models.md); the bound on Z in
+/// eq. 43–45 of the paper is the same for ξ = 0 and for α = ½, and narrower otherwise.
+struct DoubleSphereModel {
+  PinholeModel pinhole;
+  double xi = 0;
+  double alpha = 0;  ///< in [0, 1]
+
+  static constexpr std::string_view kName = "double_sphere";
+  static std::vector<ModelParameterKind> parameter_kinds();
+  ModelParameters parameters() const;
+  static DoubleSphereModel from_parameters(const ModelParameters& parameters);
+
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;
+  std::optional<ProjectionWithJacobian> project_with_jacobian(const Eigen::Vector3d& point) const;
+  std::optional<Ray> unproject(const Eigen::Vector2d& pixel) const;
+  friend bool operator==(const DoubleSphereModel&, const DoubleSphereModel&) = default;
+};
+
+}  // namespace spartan

@@ -1,0 +1,71 @@
+#include "spartan/rig/models/model_changes.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <initializer_list>
+
+namespace spartan {
+namespace {
+
+// The numbers of a model with those of the named keys changed.
+CameraModel with_changed(const CameraModel& model, std::initializer_list<std::string_view> keys,
+                         const std::function<double(double)>& change) {
+  const auto kinds = parameter_kinds(model);
+  ModelParameters numbers = parameters(model);
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    if (std::find(keys.begin(), keys.end(), kinds[i].key) == keys.end()) continue;
+    for (double& v : numbers[i]) v = change(v);
+  }
+  return with_parameters(model, numbers);
+}
+
+}  // namespace
+
+CameraModel with_focal_times(const CameraModel& model, double factor) {
+  return with_changed(model, {"focal_px", "skew_px"}, [&](double v) { return v * factor; });
+}
+
+CameraModel resized(const CameraModel& model, double factor) {
+  return with_changed(with_focal_times(model, factor), {"centre_px"},
+                      [&](double v) { return (v + 0.5) * factor - 0.5; });
+}
+
+CameraModel with_square_pixels(const CameraModel& model, bool by_x) {
+  const auto kinds = parameter_kinds(model);
+  ModelParameters numbers = parameters(model);
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    if (kinds[i].key == "focal_px") numbers[i].assign(numbers[i].size(), by_x ? numbers[i].front() : numbers[i].back());
+  }
+  return with_parameters(model, numbers);
+}
+
+CameraModel with_radial(const CameraModel& model, double k, ImageSize size) {
+  const auto* plain = std::get_if<PinholeModel>(&model);
+  const auto* radial = std::get_if<RadialTangentialModel>(&model);
+  if (!plain && !radial) return model;
+  const PinholeModel pinhole = plain ? *plain : radial->pinhole();
+  const double across = std::max(pinhole.cx, size.width - 1 - pinhole.cx) / pinhole.fx,
+               down = std::max(pinhole.cy, size.height - 1 - pinhole.cy) / pinhole.fy;
+  // Far out a negative k would turn the rays round: there is nothing to fit there.
+  constexpr int kRadii = 100;
+  constexpr double kLeastShrink = 0.3;
+  const auto straight = [&](double distorted) { return distorted / (1 + k * distorted * distorted); };
+  const double corner = std::hypot(across, down);
+  const double last = k < 0 ? std::min(corner, std::sqrt((1 - kLeastShrink) / -k)) : corner;
+  const double reach = straight(last) * straight(last);
+  // g = r_d/r_u ≈ (1 + k1 s + k2 s²)/(1 + k4 s + k5 s²), s = r_u², times the denominator: linear in what is sought.
+  Eigen::Matrix<double, kRadii, 4> by_coefficient;
+  Eigen::Matrix<double, kRadii, 1> wanted;
+  for (int i = 0; i < kRadii; ++i) {
+    const double distorted = last * (i + 1) / kRadii, r = straight(distorted), g = distorted / r, s = r * r / reach;
+    by_coefficient.row(i) = r * Eigen::RowVector4d(s, s * s, -g * s, -g * s * s);
+    wanted[i] = r * (g - 1);
+  }
+  const Eigen::Vector4d c = by_coefficient.colPivHouseholderQr().solve(wanted);
+  return RadialTangentialModel(
+      pinhole, {c[0] / reach, c[1] / (reach * reach), 0, 0, 0, c[2] / reach, c[3] / (reach * reach), 0});
+}
+
+}  // namespace spartan

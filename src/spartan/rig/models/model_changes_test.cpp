@@ -1,0 +1,41 @@
+#include "spartan/rig/models/model_changes.h"
+
+#include <gtest/gtest.h>
+
+namespace spartan {
+namespace {
+
+constexpr PinholeModel kPinhole{500, 510, 320, 240};
+const Eigen::Vector3d kPoint(0.3, -0.2, 0.9);
+
+// The corner of the picture, half a pixel beside the first one's middle, stays where it is.
+TEST(ModelChanges, LargerPicturesSeeTheSame) {
+  for (const CameraModel& model : {CameraModel(kPinhole), CameraModel(CahvModel{kPinhole, 3}),
+                                   CameraModel(RadialTangentialModel(kPinhole, {-0.2, 0.05, 1e-3, 2e-3}))}) {
+    for (const double factor : {0.5, 2.0}) {
+      const Eigen::Vector2d before = *project(model, kPoint), after = *project(resized(model, factor), kPoint);
+      EXPECT_LT(((before.array() + 0.5) * factor - 0.5 - after.array()).matrix().norm(), 1e-9) << name_of(model);
+      const Eigen::Vector2d centre(320, 240), longer = *project(with_focal_times(model, factor), kPoint);
+      EXPECT_LT((longer - centre - factor * (before - centre)).norm(), 1e-9) << name_of(model);
+    }
+  }
+}
+
+// r_u = r_d/(1 + k r_d²), from the middle to the corner.
+TEST(ModelChanges, APinholeIsBent) {
+  constexpr ImageSize kSize{640, 480};
+  for (const double k : {-0.6, -0.3, -0.1, 0.1, 0.4}) {
+    const CameraModel bent = with_radial(kPinhole, k, kSize);
+    for (double r_d = 0; r_d < 0.8; r_d += 0.05) {
+      const auto seen = project(bent, {r_d / (1 + k * r_d * r_d), 0, 1});
+      ASSERT_TRUE(seen) << k << " " << r_d;
+      EXPECT_NEAR(seen->x(), 320 + 500 * r_d, 0.01) << k << " " << r_d;
+    }
+  }
+  constexpr double k = -0.1;
+  const CameraModel fisheye = EquidistantModel(kPinhole, {});
+  EXPECT_EQ(with_radial(fisheye, k, kSize), fisheye);
+}
+
+}  // namespace
+}  // namespace spartan
