@@ -79,7 +79,7 @@ BelievedPair fitted(PairBelief belief, const std::vector<PixelMatch>& matches) {
                         : share_on_the_wrong_side(pair.fit, pair.fit.rows.disparity_px, pair.fit.correction.yaw_rad);
   const bool agree = pair.fit.inliers >= kLeastShare * static_cast<double>(matches.size()) && passes(pair);
   pair.agrees = agree && pair.fit.rms_px <= kUsableRows_px;
-  pair.explains = pair.agrees && (pair.as_it_is || strangeness(pair.fit.correction) <= 1);
+  pair.explains = pair.agrees && ((pair.as_it_is && pair.good_rows) || strangeness(pair.fit.correction) <= 1);
   return pair;
 }
 
@@ -318,7 +318,8 @@ std::optional<BelievedPair> with_next_mistake(const BelievedPair& now, const std
     const PairBelief& belief = likely[i].belief;
     const bool sized = belief.size.any() && !now.belief.size.any();
     BelievedPair asked = sized ? refined_size(now.belief, belief.size, matches) : fitted(belief, matches);
-    if (!is_believed_instead(asked, now, now)) continue;
+    if (sized && std::abs(std::log(asked.belief.size.factor)) < kLeastLogFactor) continue;
+    if (!passes(asked) || !is_believed_instead(asked, now, now)) continue;
     if (!best || weighed_cost(asked) < weighed_cost(*best)) best = std::move(asked);
   }
   return best;
