@@ -24,6 +24,8 @@ constexpr double kGoodRows_px = 0.5, kUsableRows_px = 1.25, kLeastShare = 0.5;
 constexpr double kLargestTurn_rad = 12 * std::numbers::pi / 180, kLargestRadial = 1, kLargestFocal = 0.1;
 constexpr double kUsual = 0.25;
 constexpr double kLargestYaw_rad = 3 * std::numbers::pi / 180;
+// What is far away lies on both sides of infinity where a yaw is off by little.
+constexpr double kBeyondInfinity_px = -1.5;
 constexpr std::ptrdiff_t kSearchMatches = 250;
 
 // 1: as large as a correction may be.
@@ -53,7 +55,8 @@ std::vector<PixelMatch> some_of(const std::vector<PixelMatch>& matches) {
 double share_on_the_wrong_side(const PairFit& fit, const std::vector<double>& disparity_px, double yaw_rad) {
   const double excess_px = fit.rows.focal_px * (yaw_rad - std::clamp(yaw_rad, -kLargestYaw_rad, kLargestYaw_rad));
   int wrong = 0;
-  for (std::size_t i = 0; i < fit.inlier.size(); ++i) wrong += fit.inlier[i] && disparity_px[i] + excess_px < 0 ? 1 : 0;
+  for (std::size_t i = 0; i < fit.inlier.size(); ++i)
+    wrong += fit.inlier[i] && disparity_px[i] + excess_px < kBeyondInfinity_px ? 1 : 0;
   return fit.inliers > 0 ? static_cast<double>(wrong) / fit.inliers : 0;
 }
 

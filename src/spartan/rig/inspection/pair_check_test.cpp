@@ -92,6 +92,27 @@ TEST(PairCheck, SaysWhenThereIsTooLittleToSee) {
   EXPECT_THAT(ids(check(truth, corner)), ElementsAre("not_enough_texture"));
 }
 
+// Hills from 60 m on: a yaw within its error puts most of them beyond infinity, and says nothing about the eyes.
+TEST(PairCheck, FarViewsDoNotTellTheEyes) {
+  const Rig truth = true_rig();
+  Random random(1);
+  std::vector<PixelMatch> far;
+  while (far.size() < 600) {
+    const Eigen::Vector2d pixel(random.uniform(0, kSize.width - 1), random.uniform(0, kSize.height - 1));
+    const auto ray = unproject(truth.cameras[0].model, pixel);
+    if (!ray) continue;
+    const double depth = std::exp(random.uniform(std::log(60.0), std::log(1000.0)));
+    const auto seen = project(truth.cameras[1].model, truth.right_from_left(truth.pairs[0]) * (depth * ray->direction));
+    if (seen) far.push_back({pixel, *seen + 0.15 * Eigen::Vector2d(random.normal(), random.normal())});
+  }
+  for (const double yaw_deg : {0.0, 0.05, 0.1}) {
+    PairCorrection off;
+    off.yaw_rad = yaw_deg * testing::kDegree;
+    const PairCheck result = check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), far);
+    EXPECT_THAT(ids(result), IsEmpty()) << yaw_deg;
+  }
+}
+
 TEST(PairCheck, WithoutACalibrationThePicturesSpeak) {
   const PairCheck result = check_pictures(look(straight_rig()), kSize);
   EXPECT_THAT(ids(result), ::testing::Not(Contains("inverse_transform")));
