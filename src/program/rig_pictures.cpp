@@ -81,8 +81,8 @@ Result<Imager> imager_without_geometry(const Camera& left, const Camera& right, 
   };
   ImagingOptions options;
   options.rectify = false;
-  return Imager::create(rig_of_one_pair("pair", plain("left", left.pixel_format), plain("right", right.pixel_format),
-                                        Pose::from_translation({-0.1, 0, 0})),
+  return Imager::create(rig_of_one_pair("pictures", plain("left", left.pixel_format),
+                                        plain("right", right.pixel_format), Pose::from_translation({-0.1, 0, 0})),
                         options, workers);
 }
 
@@ -124,7 +124,7 @@ Result<std::vector<PicturePair>> load_pictures_of(const Camera& left_camera, con
     StereoFrame frame;
     frame.left = interpret(*left_file, left_camera.pixel_format);
     frame.right = interpret(*right_file, right_camera.pixel_format);
-    frame.pair = "pair";
+    frame.pair = "stereo";  // the only one (rig_of_one_pair)
     if (!imager) {
       auto made = imager_without_geometry(left_camera, right_camera, left_file->size(), workers);
       if (!made) return failure(made);
