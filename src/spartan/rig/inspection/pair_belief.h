@@ -1,10 +1,11 @@
-// What a calibration that does not fit its pictures may really mean.
+// What a calibration that does not fit its pictures may really mean, one mistake at a time.
 #pragma once
 
 #include <vector>
 
 #include "spartan/rig/inspection/pair_refinement.h"
 #include "spartan/rig/rig.h"
+#include "spartan/rig/rig_findings.h"
 
 namespace spartan {
 
@@ -26,37 +27,40 @@ struct PairBelief {
   bool pictures_exchanged = false;  ///< the picture given as the left one was taken by the right eye
   bool stated_size = false;         ///< put right where the calibration's own numbers look wrong (find_doubts)
   SizeChange size;                  ///< found by the pictures
+  double rows_lower_px = 0;         ///< the right picture shows everything so much lower than the calibration says
   bool left_bends = false, right_bends = false;  ///< a pinhole that is none: its distortion is fitted too
 };
 
-/// A belief fitted to the pictures.
-struct BelievedPair {
-  PairBelief belief;
-  std::vector<PixelMatch> matches;  ///< exchanged where the pictures are
-  PairFit fit;                      ///< of everything that the belief leaves open
-  bool good_rows = false;           ///< without the corrections of the fit
-  bool as_it_is = false;            ///< the rows agree as well without the corrections of the fit
-  double cost = 0;                  ///< of the rows as they are, or corrected and then so much a match
-  int lost = 0;                     ///< matches that cost as much as one can
-  double wrong_side = 0;            ///< share of the inliers whose disparity is negative with at most a small yaw
-  bool agrees = false;              ///< most rows do, on the right side
-  /// They agree, and nothing about it is far-fetched. Where not, no mistake that is known here explains the
-  /// pictures.
-  bool explains = false;
-  bool eyes_told = true;       ///< false: two equal eyes; an inverted transform and exchanged eyes are the same thing
-  double rms_as_given_px = 0;  ///< what the calibration's own belief comes to, corrected
-};
+/// The calibration as given, each eye's brought to this size of the pictures where it is of another one of the same
+/// shape. An empty size is not known.
+PairBelief belief_as_given(const Camera& left, const Camera& right, const Pose& left_from_right, ImageSize picture);
 
-/// Tries the calibration as given (with sizes brought to those of the pictures where these are known); where rows or
-/// signs disagree, the transform inverted, eyes, lenses or pictures exchanged, focal lengths of another picture size
-/// for one eye or both, pinholes that bend. All are fitted to the same matches; the cheapest counts where it costs
-/// clearly less than a simpler one. A belief with which the rows agree as they are is simpler than one that needs
-/// corrections: those cost kCorrected a match. Disparities are positive: a belief that makes most of them negative is
-/// out.
-/// `calibrated`: false where the lenses are a guess, of which no size can be wrong.
-BelievedPair believe_pair(const Camera& left, const Camera& right, const Pose& left_from_right,
-                          const std::vector<PixelMatch>& matches, ImageSize picture, bool calibrated = true);
+/// With the right eye on the right: the inverse of the transform as given where it is not.
+PairBelief with_eyes_in_place(PairBelief belief);
 
-PairFitOptions fit_options(const PairBelief& belief);
+/// The eyes have each other's places. Where the transform has the right one on the left, that is another way to read
+/// it; where it does not, only the lenses can be exchanged.
+PairBelief with_other_eyes(PairBelief belief);
+
+PairBelief with_other_pictures(PairBelief belief);
+
+/// The matches as the belief has their pictures.
+std::vector<PixelMatch> as_believed(const PairBelief& belief, const std::vector<PixelMatch>& matches);
+
+/// A crop that nobody told the calibration of: the right eye's centre moved until the median row agrees, over what was
+/// moved before. A lens that bends does so about its centre, which no pitch can imitate. `matches` as given.
+PairBelief with_rows_moved(PairBelief belief, const std::vector<PixelMatch>& matches);
+
+/// The same with the rows where the calibration has them.
+PairBelief with_rows_as_given(PairBelief belief);
+
+/// With another size; rows that were moved are moved anew. `matches` as given.
+PairBelief with_size(PairBelief belief, const SizeChange& size, const std::vector<PixelMatch>& matches);
+
+/// With square pixels where fx and fy are apart: by fx, and by fy.
+std::vector<PairBelief> with_square_eyes(const PairBelief& belief, AspectDoubt least);
+
+/// Whether lenses have such views: focal lengths between 0.15 times and 30 times the picture's larger side.
+bool has_possible_views(const PairBelief& belief);
 
 }  // namespace spartan

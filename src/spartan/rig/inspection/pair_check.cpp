@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-#include "spartan/rig/inspection/pair_belief.h"
+#include "spartan/rig/inspection/belief_search.h"
 #include "spartan/rig/inspection/pair_mending.h"
 
 namespace spartan {
@@ -56,7 +56,7 @@ class Checker {
     }
     if (!believed_.explains) {
       if (too_few(check_.inliers)) return without_figures();
-      return unexplained();
+      return unexplained(fit().rms_px);
     }
     name_beliefs();
     if (too_few(check_.inliers)) return without_figures();
@@ -64,6 +64,8 @@ class Checker {
     judge_rows();
     judge_focal_ratio();
     correct();
+    if (is_worthless(check_.as_corrected) && check_.as_corrected.mean_px > 0.9 * check_.as_given.mean_px)
+      return unexplained(check_.as_corrected.mean_px);
     return finish();
   }
 
@@ -91,10 +93,11 @@ class Checker {
   }
 
   PairCheck without_figures();
-  PairCheck unexplained();
+  PairCheck unexplained(double rows_at_best_px);
   void take_figures();
   bool looks_twice_at_one_picture() const;
   void name_beliefs();
+  std::string what_the_rows_say() const;
   void name_eyes();
   void name_size();
   void name_distortion();
@@ -104,6 +107,7 @@ class Checker {
   bool needs_correction() const;
   void correct();
   void name_rows_apart();
+  static bool is_worthless(const RowErrors& rows);
   PairVerdict verdict() const;
   PairCheck finish();
 
@@ -126,12 +130,12 @@ PairCheck Checker::without_figures() {
   return std::move(check_);
 }
 
-PairCheck Checker::unexplained() {
+PairCheck Checker::unexplained(double rows_at_best_px) {
   std::string text = fmt::format(
       "no mistake that is known here explains the pictures: {} of {} matches agree, to {:.2f} px at best. Are they of "
       "one moment, and of this rig?",
-      check_.inliers, check_.matches, fit().rms_px);
-  add("not_explained", std::move(text), fit().rms_px);
+      check_.inliers, check_.matches, rows_at_best_px);
+  add("not_explained", std::move(text), rows_at_best_px);
   check_.correction = check_.sigma = kNoCorrection;
   check_.yaw_doubt_px = kNan;
   check_.as_corrected = kNoRows;
@@ -148,7 +152,9 @@ void Checker::take_figures() {
   check_.matched = inliers_of(believed_.matches, fit().inlier);
   check_.inlier_limit_px = fit().inlier_limit_px;
   check_.pictures_exchanged = belief.pictures_exchanged;
-  check_.row_error_px = inliers_of(fit().given.row_error_px, fit().inlier);
+  const PairBelief given = with_rows_as_given(belief);
+  check_.row_error_px =
+      rectify_matches(given.left.model, given.right.model, given.left_from_right, check_.matched).row_error_px;
   std::vector<double> taken;
   taken.reserve(check_.matched.size());
   for (const PixelMatch& match : check_.matched) taken.push_back(match.left.y() - match.right.y());
@@ -169,6 +175,13 @@ void Checker::name_beliefs() {
   name_size();
   if (!guessed_) name_distortion();
   check_.structure_found = found("inverse_transform") || found("swapped_eyes") || found("size_mismatch");
+}
+
+std::string Checker::what_the_rows_say() const {
+  std::string text = fmt::format("the rows then agree to {:.2f} px", believed_.rows_px);
+  if (std::isfinite(believed_.rows_given_px))
+    text += fmt::format(" in the place of {:.2f} px", believed_.rows_given_px);
+  return text;
 }
 
 void Checker::name_eyes() {
@@ -192,8 +205,8 @@ void Checker::name_eyes() {
         share);
   } else if (b.lenses_exchanged) {
     add("swapped_eyes",
-        fmt::format("the two eyes have each other's lenses{}: rows then agree to {:.2f} px in the place of {:.2f} px",
-                    b.pictures_exchanged ? ", and each other's pictures" : "", fit().rms_px, believed_.rms_as_given_px),
+        fmt::format("the two eyes have each other's lenses{}: {}",
+                    b.pictures_exchanged ? ", and each other's pictures" : "", what_the_rows_say()),
         share);
   } else if (b.pictures_exchanged) {
     add("swapped_eyes", fmt::format("what is called the left picture was taken by the right eye: {}", proof), share);
@@ -207,12 +220,18 @@ void Checker::name_size() {
   const bool off_centre = size_told_by_centre(believed_.belief.left) || size_told_by_centre(believed_.belief.right);
   if (size.any() || (off_centre && of_the_pictures && !believed_.belief.stated_size)) drop("size_mismatch");
   if (!size.any()) return;
-  const char* eye = size.left && size.right ? "" : size.left ? " of the left eye" : " of the right eye";
-  add("size_mismatch",
-      fmt::format("with a focal length{} {:.3g} times as large the rows agree to {:.2f} px in the place of {:.2f} px: "
-                  "is the calibration that of another picture size?",
-                  eye, size.factor, fit().rms_px, believed_.rms_as_given_px),
-      size.factor);
+  const auto other_size = [](bool left, bool right, double factor) {
+    return fmt::format("a focal length{} {:.3g} times as large",
+                       left && right ? ""
+                       : left        ? " of the left eye"
+                                     : " of the right eye",
+                       factor);
+  };
+  std::string text = fmt::format("with {} {}: is the calibration that of another picture size?",
+                                 other_size(size.left, size.right, size.factor), what_the_rows_say());
+  if (!believed_.size_told)
+    text += fmt::format(" Or with {}: rows do not tell which", other_size(!size.left, !size.right, 1 / size.factor));
+  add("size_mismatch", std::move(text), size.factor);
 }
 
 void Checker::name_distortion() {
@@ -225,9 +244,8 @@ void Checker::name_distortion() {
   const double radial = left && right ? 0.5 * (c.left_radial + c.right_radial) : left ? c.left_radial : c.right_radial;
   const char* who = left && right ? "the eyes are" : left ? "the left eye is" : "the right eye is";
   add("distortion_ignored",
-      fmt::format("{} taken for {}, but the rows bend, as with a k1 of about {:.3f}; they then agree to {:.2f} px in "
-                  "the place of {:.2f} px",
-                  who, left && right ? "pinholes" : "a pinhole", radial, fit().rms_px, believed_.rms_as_given_px),
+      fmt::format("{} taken for {}, but the rows bend, as with a k1 of about {:.3f}: {}", who,
+                  left && right ? "pinholes" : "a pinhole", radial, what_the_rows_say()),
       radial);
 }
 
@@ -256,12 +274,15 @@ void Checker::judge_rows() {
   const RowErrors& rows = check_.as_given;
   if (std::abs(rows.median_px) > kRowOffset_px) {
     add("row_offset",
-        fmt::format("rows of the left picture lie {:.2f} px {} those of the right one", std::abs(rows.median_px),
-                    rows.median_px > 0 ? "below" : "above"),
+        fmt::format("rows of the left picture lie {:.2f} px {} those of the right one{}", std::abs(rows.median_px),
+                    rows.median_px > 0 ? "below" : "above",
+                    believed_.belief.rows_lower_px != 0
+                        ? ": a turn does not do that to such lenses, a picture that was moved or cropped does"
+                        : ""),
         rows.median_px);
   }
   const double roll = check_.correction.roll_rad, across_px = 0.5 * picture_.width * std::abs(roll);
-  if (across_px > kRollOffset_px && std::abs(roll) > kSigmas * check_.sigma.roll_rad && !are_good(rows)) {
+  if (across_px > kRollOffset_px && std::abs(roll) > kSigmas * check_.sigma.roll_rad && !believed_.good_rows) {
     add("roll_offset",
         fmt::format("the right eye is turned {:.3f}° {} about its axis: {:.1f} px at the sides of the picture",
                     std::abs(roll) * kDegreesPerRadian, roll > 0 ? "clockwise" : "counter-clockwise", across_px),
@@ -287,10 +308,10 @@ void Checker::judge_focal_ratio() {
       check_.correction.focal_ratio);
 }
 
-// Where eyes, unit or size were all that was wrong, the rest of the calibration is right.
+// Where eyes, unit, size or moved rows were all that was wrong, the rest of the calibration is right.
 bool Checker::needs_correction() const {
-  return !are_good(check_.as_given) || found("yaw_offset") || found("row_offset") || found("focal_ratio") ||
-         found("distortion_ignored");
+  const bool turned = found("row_offset") && believed_.belief.rows_lower_px == 0;
+  return !believed_.good_rows || turned || found("yaw_offset") || found("focal_ratio") || found("distortion_ignored");
 }
 
 void Checker::correct() {
@@ -336,13 +357,17 @@ void Checker::name_rows_apart() {
       check_.as_given.mean_px);
 }
 
+// Rows with which stereo does not work.
+bool Checker::is_worthless(const RowErrors& rows) {
+  return !(rows.mean_px <= kUsableMean_px && rows.p95_px <= kUsableP95_px);
+}
+
 PairVerdict Checker::verdict() const {
   for (const char* id : {"not_beside", "inverse_transform", "swapped_eyes", "baseline_unit", "size_mismatch",
                          "distortion_ignored", "yaw_offset", "eyes_apart"}) {
     if (found(id)) return PairVerdict::bad;
   }
-  const RowErrors& rows = check_.as_given;
-  if (rows.mean_px > kUsableMean_px || rows.p95_px > kUsableP95_px) return PairVerdict::bad;
+  if (is_worthless(check_.as_given)) return PairVerdict::bad;
   return check_.findings.empty() ? PairVerdict::good : PairVerdict::usable;
 }
 

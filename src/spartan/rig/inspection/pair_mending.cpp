@@ -24,7 +24,7 @@ PairCorrection needed_correction(const BelievedPair& believed, const FoundWrong&
   PairFitOptions options = fit_options(b);
   options.yaw = found.yaw;
   options.focal = found.focal_ratio;
-  options.baseline = false;
+  options.baseline = found.focal_ratio;  // as it was when that was found
   const auto fit = [&] { return fit_pair(b.left.model, b.right.model, b.left_from_right, believed.matches, options); };
   PairFit best = fit();
   const auto free_if_needed = [&](bool& option) {

@@ -1,7 +1,7 @@
 // Putting a rig right by what its pictures said.
 #pragma once
 
-#include "spartan/rig/inspection/pair_belief.h"
+#include "spartan/rig/inspection/belief_search.h"
 #include "spartan/rig/rig.h"
 
 namespace spartan {

@@ -32,6 +32,15 @@ CameraModel resized(const CameraModel& model, double factor) {
                       [&](double v) { return (v + 0.5) * factor - 0.5; });
 }
 
+CameraModel with_rows_lower(const CameraModel& model, double rows_px) {
+  const auto kinds = parameter_kinds(model);
+  ModelParameters numbers = parameters(model);
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    if (kinds[i].key == "centre_px") numbers[i].back() += rows_px;
+  }
+  return with_parameters(model, numbers);
+}
+
 CameraModel with_square_pixels(const CameraModel& model, bool by_x) {
   const auto kinds = parameter_kinds(model);
   ModelParameters numbers = parameters(model);

@@ -12,6 +12,9 @@ CameraModel with_focal_times(const CameraModel& model, double factor);
 /// The model for pictures that are `factor` times as large; their corner stays.
 CameraModel resized(const CameraModel& model, double factor);
 
+/// The model for pictures that show everything `rows_px` lower.
+CameraModel with_rows_lower(const CameraModel& model, double rows_px);
+
 /// fx and fy both what the one of them is.
 CameraModel with_square_pixels(const CameraModel& model, bool by_x);
 
