@@ -237,6 +237,7 @@ std::optional<BelievedPair> with_next_mistake(const BelievedPair& now, const std
   };
   try_all(further_mistakes(now.belief, few, calibrated));
   if (calibrated) try_all(beliefs_of_sizes(now.belief, few, false));
+  // A turn is likelier than moved rows, as long as it is small.
   if (calibrated && now.belief.rows_lower_px == 0 && !has_ordinary_fit(now))
     try_all({with_rows_moved(now.belief, few)});
   const bool simple = std::any_of(likely.begin(), likely.end(), [](const BelievedPair& p) { return p.as_it_is; });
@@ -306,6 +307,21 @@ bool is_size_told(const BelievedPair& best, const std::vector<PixelMatch>& match
          kClearlyDearer * best.cost;
 }
 
+// Whichever costs clearly less: an inverse transform, or eyes that are exchanged. Where neither does: names and
+// pictures exchanged are one mistake, an inverse transform and exchanged pictures two.
+BelievedPair with_eyes_told(BelievedPair inverted, const std::vector<PixelMatch>& matches) {
+  PairBelief exchanged = with_other_eyes(with_rows_as_given(inverted.belief));
+  if (inverted.belief.rows_lower_px != 0) exchanged = with_rows_moved(std::move(exchanged), matches);
+  BelievedPair other = fitted(std::move(exchanged), matches);
+  const auto [less, more] = std::minmax(inverted.cost, other.cost);
+  const bool told = less < kClearlyCheaper * more;
+  const bool take_other = told ? other.cost == less : inverted.belief.pictures_exchanged;
+  inverted.eyes_told = told;
+  if (!take_other) return inverted;
+  other.eyes_told = true;
+  return other;
+}
+
 }  // namespace
 
 PairFitOptions fit_options(const PairBelief& belief) {
@@ -319,13 +335,8 @@ BelievedPair believe_pair(const Camera& left, const Camera& right, const Pose& l
                           const std::vector<PixelMatch>& matches, ImageSize picture, bool calibrated) {
   const PairBelief given = belief_as_given(left, right, left_from_right, picture);
   BelievedPair best = fitted(with_eyes_in_place(given), matches);
-  bool told = true;
-  if (best.belief.inverted) {
-    BelievedPair other = fitted(with_other_eyes(best.belief), matches);
-    const auto [less, more] = std::minmax(best.cost, other.cost);
-    told = less < kClearlyCheaper * more;
-    if (told && other.cost == less) best = std::move(other);
-  }
+  if (best.belief.inverted) best = with_eyes_told(std::move(best), matches);
+  const bool told = best.eyes_told;
   const std::vector<double> rows_given_px = best.fit.given.row_error_px;
   best = with_stated_size(best, matches);
   for (int mistakes = 0; mistakes < kMostMistakes && !is_beyond_doubt(best); ++mistakes) {
@@ -335,10 +346,8 @@ BelievedPair believe_pair(const Camera& left, const Camera& right, const Pose& l
   }
   if (calibrated) best = with_size_of_one_eye(best, matches);
   if (!calibrated) best.explains = best.agrees;  // of a guess anything may be far off
-  // Names and pictures exchanged are one mistake, an inverse transform and exchanged pictures two.
-  if (!told && best.belief.inverted && best.belief.pictures_exchanged)
-    best = fitted(with_other_eyes(best.belief), matches);
-  best.eyes_told = told || !best.belief.inverted;
+  // What was wrong besides may have hidden it.
+  if (!told && best.belief.inverted) best = with_eyes_told(std::move(best), matches);
   best.size_told = is_size_told(best, matches);
   best.rows_given_px = row_errors(inliers_of(rows_given_px, best.fit.inlier)).mean_px;
   const RectifiedMatches& believed = best.as_it_is ? best.fit.given : best.fit.rows;

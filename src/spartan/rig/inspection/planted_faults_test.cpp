@@ -140,18 +140,34 @@ TEST(PlantedFault, FocalLengthsThatCannotBe) {
   }
 }
 
-TEST(PlantedFault, RowsOffByTwoPixels) {
+// By a crop that the calibration does not know of: down and up, by little and by much. The rest of the calibration is
+// right.
+TEST(PlantedFault, RowsOff) {
   const Rig truth = true_rig();
-  Rig rig = truth;
-  auto numbers = parameters(rig.cameras[1].model);
-  numbers[1][1] += 2;
-  rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
+  for (const double rows_px : {2.0, -2.0, -5.0, 20.0, -20.0}) {
+    Rig rig = truth;
+    rig.cameras[1].model = with_rows_lower(rig.cameras[1].model, rows_px);
+    const PairCheck result = check(rig, look(truth));
+    EXPECT_THAT(ids(result), ElementsAre("row_offset")) << rows_px;
+    EXPECT_NEAR(result.as_given.median_px / rows_px, 1, 0.25) << "a little more where the lens is straightened";
+    EXPECT_NEAR(result.findings.at(0).value, result.as_given.median_px, 1e-9);
+    EXPECT_THAT(result.findings.at(0).text,
+                HasSubstr(rows_px > 0 ? "px below those of the right one" : "px above those of the right one"));
+    EXPECT_EQ(result.verdict, PairVerdict::bad);
+    EXPECT_NEAR(resolution(*result.corrected), resolution(truth), 1e-9);
+    // As long as the rows agree it may as well be a pitch: two rows are 0.25°.
+    expect_mended(truth, result, std::max(0.4, std::abs(rows_px) / resolution(truth) / kDegree + 0.15));
+  }
+}
+
+TEST(PlantedFault, RowsOffAndTheInverseTransform) {
+  const Rig truth = true_rig();
+  Rig rig = with_pose(truth, left_from_right(truth).inverse());
+  rig.cameras[1].model = with_rows_lower(rig.cameras[1].model, -8);
   const PairCheck result = check(rig, look(truth));
-  EXPECT_THAT(ids(result), ElementsAre("row_offset"));
-  EXPECT_NEAR(result.as_given.median_px, 2, 0.5);  // a little more where the lens is straightened
-  EXPECT_THAT(result.findings.at(0).text, HasSubstr("px below those of the right one"));
-  EXPECT_EQ(result.verdict, PairVerdict::bad);
-  expect_mended(truth, result, 0.4);  // two rows are 0.25°
+  EXPECT_THAT(ids(result), Contains("inverse_transform"));
+  EXPECT_THAT(ids(result), Contains("row_offset"));
+  expect_mended(truth, result, 0.4);
 }
 
 // Rows alone make a pair usable or bad.
@@ -159,9 +175,7 @@ TEST(PlantedFault, RowsDecideTheVerdict) {
   const Rig truth = true_rig();
   const auto off_by = [&](double rows_px) {
     Rig rig = truth;
-    auto numbers = parameters(rig.cameras[1].model);
-    numbers[1][1] += rows_px;
-    rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
+    rig.cameras[1].model = with_rows_lower(rig.cameras[1].model, rows_px);
     return check(rig, look(truth));
   };
   EXPECT_EQ(off_by(0.3).verdict, PairVerdict::good);
@@ -240,9 +254,38 @@ TEST(PlantedFault, FocalLengthOfAnotherSizeInOneEye) {
     EXPECT_THAT(ids(result), Contains("size_mismatch")) << factor;
     EXPECT_THAT(ids(result), Not(Contains("swapped_eyes"))) << factor;
     EXPECT_NEAR(result.correction.focal_ratio, 1 / factor, 0.005 / factor);
+    EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the right eye")) << factor;
+    EXPECT_THAT(result.findings.at(0).text, Not(HasSubstr("do not tell"))) << factor;
+    EXPECT_TRUE(result.structure_found);
     EXPECT_EQ(result.corrected->cameras[0].model, truth.cameras[0].model);
     expect_mended(truth, result);
   }
+}
+
+// Of two equal pinholes it may as well be the other one's.
+TEST(PlantedFault, FocalLengthOfAnotherSizeInOneOfTwoPinholes) {
+  Rig truth = straight_rig();
+  truth.cameras[1].model = truth.cameras[0].model;
+  truth = with_pose(truth, Pose::from_translation({0.11, 0, 0}));
+  Rig rig = truth;
+  rig.cameras[1].model = with_focal_times(rig.cameras[1].model, 2);
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), Contains("size_mismatch"));
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the left eye 2 times as large"));
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the right eye 0.5 times as large"));
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("rows do not tell which"));
+}
+
+// Pictures exchanged and a yaw: no size is told that is none.
+TEST(PlantedFault, SwappedPicturesAndAYaw) {
+  const Rig truth = straight_rig();
+  std::vector<PixelMatch> matches = look(truth);
+  for (PixelMatch& match : matches) std::swap(match.left, match.right);
+  PairCorrection off;
+  off.yaw_rad = kDegree;
+  const PairCheck result = check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), matches);
+  EXPECT_THAT(ids(result), Contains("swapped_eyes"));
+  EXPECT_THAT(ids(result), Not(Contains("size_mismatch")));
 }
 
 TEST(PlantedFault, FxAlone) {
@@ -319,6 +362,30 @@ TEST(PlantedFault, BaselineInAnotherDirection) {
   const PairCheck result = check(with_pose(truth, pose), look(truth));
   EXPECT_NE(result.verdict, PairVerdict::good);
   expect_mended(truth, result);
+}
+
+// What would have to be turned by half a circle is no calibration with an error.
+TEST(PlantedFault, AnEyeUpsideDown) {
+  const Rig truth = true_rig();
+  PairCorrection off;
+  off.roll_rad = 180 * kDegree;
+  const Rig rig = with_pose(truth, corrected_left_from_right(left_from_right(truth), off));
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  EXPECT_TRUE(!result.corrected || *result.corrected == rig);
+}
+
+// Millimetres in the place of pixels: whatever is said, no lens without a view comes of it.
+TEST(PlantedFault, FocalLengthsInMillimetres) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  for (Camera& c : rig.cameras) c.model = with_focal_times(c.model, 3 / resolution(truth));
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_EQ(result.verdict, PairVerdict::bad);
+  EXPECT_THAT(ids(result), Contains("size_mismatch"));
+  if (result.corrected) {
+    EXPECT_GE(resolution(*result.corrected), 3);
+  }
 }
 
 // Other moments, other rigs: nothing is named that is not there, and no rig is made of it.

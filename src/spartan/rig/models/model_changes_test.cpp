@@ -21,6 +21,14 @@ TEST(ModelChanges, LargerPicturesSeeTheSame) {
   }
 }
 
+TEST(ModelChanges, LowerRowsSeeTheSameFurtherDown) {
+  for (const CameraModel& model : {CameraModel(kPinhole), CameraModel(CahvModel{kPinhole, 3}),
+                                   CameraModel(RadialTangentialModel(kPinhole, {-0.2, 0.05, 1e-3, 2e-3}))}) {
+    const Eigen::Vector2d before = *project(model, kPoint), after = *project(with_rows_lower(model, 7), kPoint);
+    EXPECT_LT((after - before - Eigen::Vector2d(0, 7)).norm(), 1e-9) << name_of(model);
+  }
+}
+
 // r_u = r_d/(1 + k r_d²), from the middle to the corner.
 TEST(ModelChanges, APinholeIsBent) {
   constexpr ImageSize kSize{640, 480};
