@@ -267,6 +267,39 @@ TEST_F(RigInspectPictures, TellsOfMasksOfAnotherSize) {
   EXPECT_THAT(said(), Not(HasSubstr(sentence)));
 }
 
+// Two pairs of a recording with the right camera in common. The rig has the first one's left eye 0.5° too far up; the
+// second pair is sound, and both are when that is mended.
+TEST_F(RigInspectPictures, MendsPairsThatShareACamera) {
+  const char* camera =
+      "  {}: {{size_px: [320, 240], model: pinhole, focal_px: [260, 260], centre_px: [159.5, 119.5], axes: optical, "
+      "roll_pitch_yaw_deg: [{}, 0, 0], translation_m: [{}, 0, 0]}}\n";
+  const auto rig = [&](double left_up_deg) {
+    return "schema: 1\ncameras:\n" + fmt::format(fmt::runtime(camera), "left", left_up_deg, 0) +
+           fmt::format(fmt::runtime(camera), "other", 0, 0) + fmt::format(fmt::runtime(camera), "right", 0, 0.12) +
+           "pairs:\n  first: {left: left, right: right}\n  second: {left: other, right: right, for_odometry: false}\n";
+  };
+  folder_.write("recording/rig.yaml", rig(0));
+  folder_.write("recording/recording.yaml", "schema: 1\n");
+  folder_.write("recording/frames.csv",
+                "frame_id,position_id,pair,left_stamp_ns,right_stamp_ns,left,right,pan_deg,tilt_deg,exposure_us,gain,"
+                "bits\n0,0,first,1000,1000,l.png,r.png,0,0,0,0,8\n1,0,second,1000,1000,l.png,r.png,0,0,0,0,8\n");
+  folder_.write("recording/l.png", testing::content_of(picture(0)));
+  folder_.write("recording/r.png", testing::content_of(picture(1)));
+  const std::string recording = folder_.path() + "/recording", mended = folder_.path() + "/mended.yaml";
+  const auto pairs = [&](const std::string& of, std::vector<std::string> more) {
+    more.insert(more.end(), {"--recording", recording, "--json"});
+    const auto told = inspect(of, std::move(more));
+    EXPECT_EQ(told.exit_code, 0) << told.err;
+    return json::parse(told.out)["pairs"];
+  };
+  const json found = pairs(folder_.write("off.yaml", rig(0.5)), {"--apply", mended});
+  EXPECT_EQ(ids(found["first"]), std::vector<std::string>{"row_offset"});
+  EXPECT_EQ(found["second"]["verdict"], "good");
+  const json again = pairs(mended, {});
+  EXPECT_EQ(again["first"]["verdict"], "good") << again["first"]["findings"];
+  EXPECT_EQ(again["second"]["verdict"], "good") << again["second"]["findings"];
+}
+
 // Lines in a pipe, as the other verbs have them; a single shot takes no time worth telling.
 TEST_F(RigInspectPictures, ShowsItsProgress) {
   const auto shown = [&](std::vector<std::string> words) {

@@ -1,6 +1,7 @@
 #include "spartan/rig/inspection/pair_mending.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "spartan/rig/models/model_changes.h"
@@ -12,9 +13,13 @@ namespace {
 // Freed where the rows cost so much less with it.
 constexpr double kCheaper = 0.9, kLeastGain = 25;
 
-// What the vignetting is measured from, in pictures that are `factor` times as large.
-void resize(Vignetting& vignetting, double factor) {
-  if (vignetting.centre_px) vignetting.centre_px = ((vignetting.centre_px->array() + 0.5) * factor - 0.5).matrix();
+constexpr double kRounding = 1e-12;
+
+// What the vignetting is measured from, in pictures that are `factor` times as large and then show everything lower.
+void move_centre(Vignetting& vignetting, double factor, double lower_px) {
+  if (!vignetting.centre_px) return;
+  vignetting.centre_px = ((vignetting.centre_px->array() + 0.5) * factor - 0.5).matrix();
+  vignetting.centre_px->y() += lower_px;
 }
 
 // How much larger the pictures of an eye are than those that the calibration counts its pixels in.
@@ -55,15 +60,18 @@ Rig mended_rig(Rig rig, const StereoPair& pair, const PairBelief& belief, const 
       *std::find_if(rig.pairs.begin(), rig.pairs.end(), [&](const auto& p) { return p.name == pair.name; });
   if (belief.eyes_exchanged) std::swap(mended.left, mended.right);
   Camera &left = camera_of(mended.left), &right = camera_of(mended.right);
-  resize(left.vignetting, enlargement(left.size, belief.left.size, belief.size, belief.size.left));
-  resize(right.vignetting, enlargement(right.size, belief.right.size, belief.size, belief.size.right));
+  move_centre(left.vignetting, enlargement(left.size, belief.left.size, belief.size, belief.size.left), 0);
+  move_centre(right.vignetting, enlargement(right.size, belief.right.size, belief.size, belief.size.right),
+              belief.rows_lower_px);
   left.size = belief.left.size;
   right.size = belief.right.size;
   left.model =
       belief.left_bends ? with_radial(belief.left.model, correction.left_radial, left.size) : belief.left.model;
-  right.model = with_focal_times(
-      belief.right_bends ? with_radial(belief.right.model, correction.right_radial, right.size) : belief.right.model,
-      correction.focal_ratio);
+  right.model =
+      belief.right_bends ? with_radial(belief.right.model, correction.right_radial, right.size) : belief.right.model;
+  // A ratio that was not asked for is one but for rounding: such a camera stays bit for bit as it was.
+  if (std::abs(correction.focal_ratio - 1) > kRounding)
+    right.model = with_focal_times(right.model, correction.focal_ratio);
   Pose left_from_right = corrected_left_from_right(belief.left_from_right, correction);
   if (wrong_unit) {
     const auto unit = likelier_unit(left_from_right.translation().norm());

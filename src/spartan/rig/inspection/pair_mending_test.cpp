@@ -46,5 +46,19 @@ TEST(PairMending, VignettingGoesWithTheSize) {
   EXPECT_EQ(mended_left(rig, {640, 480}, {false, true, true, 2}).vignetting, rig.cameras[0].vignetting);
 }
 
+// The right picture was cut: everything in it lies higher.
+TEST(PairMending, VignettingGoesWithMovedRows) {
+  Rig rig = rig_with_vignetting();
+  rig.cameras[1].vignetting = rig.cameras[0].vignetting;
+  PairBelief belief;
+  belief.left = rig.cameras[0];
+  belief.right = rig.cameras[1];
+  belief.left_from_right = rig.right_from_left(rig.pairs[0]).inverse();
+  belief.rows_lower_px = -7;
+  const Rig mended = mended_rig(rig, rig.pairs[0], belief, {}, false);
+  EXPECT_EQ(mended.cameras[0].vignetting, rig.cameras[0].vignetting);
+  EXPECT_EQ(mended.cameras[1].vignetting.centre_px, Eigen::Vector2d(300.5, 252.5));
+}
+
 }  // namespace
 }  // namespace spartan
