@@ -9,11 +9,13 @@
 #include <numbers>
 #include <optional>
 
+#include "program/inspected_pair.h"
 #include "program/json.h"
+#include "program/progress.h"
 #include "program/rig_convert.h"
+#include "program/rig_inspect_apply.h"
 #include "program/rig_inspect_picture.h"
 #include "program/rig_pictures.h"
-#include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/odometry/view_matching.h"
 #include "spartan/rig/describe.h"
@@ -30,21 +32,16 @@ struct InspectArguments {
   int shots = 12;
 };
 
-// What the pictures said about one pair, with the shot that is drawn.
-struct Inspected {
-  StereoPair pair;
-  PairCheck check;
-  std::string shot;
-  Image<std::uint8_t> left, right;
-  std::vector<PixelMatch> matches;
-};
-
-Inspected inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<PicturePair> pictures, bool guessed,
-                       const Workers& workers) {
+InspectedPair inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<PicturePair> pictures, bool guessed,
+                           const Workers& workers, bool quiet) {
   std::vector<PixelMatch> all;
-  Inspected result;
+  InspectedPair result;
   result.pair = pair;
-  for (PicturePair& picture : pictures) {
+  const int shots = static_cast<int>(pictures.size());
+  Progress progress(quiet || shots == 1);
+  for (int shot = 0; shot < shots; ++shot) {
+    progress.show(shot, shots, fmt::format("shots of pair {}", pair.name));
+    PicturePair& picture = pictures[static_cast<std::size_t>(shot)];
     std::vector<PixelMatch> matches;
     for (const ViewMatch& match : match_views(std::as_const(picture.left).view(), std::as_const(picture.right).view(),
                                               ViewMatchingOptions(), workers)) {
@@ -59,6 +56,7 @@ Inspected inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<Pictu
       result.matches = std::move(matches);
     }
   }
+  progress.show(shots, shots, fmt::format("shots of pair {} matched: judging", pair.name));
   result.check = guessed ? check_pictures(all, result.left.size()) : check_pair(rig, pair, all, result.left.size());
   return result;
 }
@@ -81,7 +79,7 @@ Json findings_json(const std::vector<RigFinding>& findings) {
 }
 
 // Of a guess (no calibration) nothing is said that the pictures did not.
-Json to_json(const ReadRig& read, const std::vector<Inspected>& inspected, bool guessed) {
+Json to_json(const ReadRig& read, const std::vector<InspectedPair>& inspected, bool guessed) {
   const Rig& rig = read.rig;
   Json pairs = Json::object();
   for (const StereoPair& pair : rig.pairs) {
@@ -93,7 +91,7 @@ Json to_json(const ReadRig& read, const std::vector<Inspected>& inspected, bool 
                         {"vfov_deg", known(summary.vfov_deg)},
                         {"findings", findings_json(find_doubts(rig, pair))}};
   }
-  for (const Inspected& one : inspected) {
+  for (const InspectedPair& one : inspected) {
     const PairCheck& check = one.check;
     Json& pair = pairs[one.pair.name];
     pair["findings"] = findings_json(check.findings);
@@ -124,12 +122,17 @@ Json to_json(const ReadRig& read, const std::vector<Inspected>& inspected, bool 
           {"pairs", std::move(pairs)}};
 }
 
+// Rounded to what is printed, so that there is no "-0.00".
+double hundredths(double value) {
+  return std::round(100 * value) / 100 + 0.0;
+}
+
 std::string turned(double radians, double sigma, const char* above, const char* below) {
   return fmt::format("{:.3f}° ± {:.3f}° {}", std::abs(radians) * kDegreesPerRadian, sigma * kDegreesPerRadian,
                      radians > 0 ? above : below);
 }
 
-std::string in_words(const Inspected& one, bool guessed) {
+std::string in_words(const InspectedPair& one, bool guessed) {
   const PairCheck& check = one.check;
   const std::string pair = fmt::format("pair {}: ", one.pair.name);
   std::string text = fmt::format("{}{} matches, {} of them agree\n", pair, check.matches, check.inliers);
@@ -147,8 +150,8 @@ std::string in_words(const Inspected& one, bool guessed) {
     text += fmt::format("{}the pictures want the right eye turned {}, {}, {}; its focal length {:+.2f} % ± {:.2f} %\n",
                         pair, turned(c.pitch_rad, s.pitch_rad, "up", "down"),
                         turned(c.yaw_rad, s.yaw_rad, "to the right", "to the left"),
-                        turned(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"), 100 * (c.focal_ratio - 1),
-                        100 * s.focal_ratio);
+                        turned(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"),
+                        hundredths(100 * (c.focal_ratio - 1)), 100 * s.focal_ratio);
     text += fmt::format(
         "{}rows cannot tell a yaw from a lens to better than that ±: it is worth ±{:.1f} px of disparity, so they say "
         "little of far ranges\n",
@@ -159,9 +162,10 @@ std::string in_words(const Inspected& one, bool guessed) {
 }
 
 // The pairs that are asked for, with the recording's pictures or else those given, which are of one pair.
-Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, const Rig& rig,
-                                                std::vector<PicturePair> given, const Workers& workers) {
-  std::vector<Inspected> inspected;
+Result<std::vector<InspectedPair>> inspect_pictures(const InspectArguments& a, const Rig& rig,
+                                                    std::vector<PicturePair> given, const Workers& workers,
+                                                    bool quiet) {
+  std::vector<InspectedPair> inspected;
   const auto wanted = [&](const StereoPair& pair) { return a.pair.empty() || pair.name == a.pair; };
   if (!a.pair.empty() && !rig.find_pair(a.pair)) {
     return failure(ErrorCode::usage, fmt::format("the rig has no pair '{}'", a.pair), "--pair");
@@ -173,7 +177,7 @@ Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, const
       if (!wanted(pair) || !(*source)->info().rig.find_pair(pair.name)) continue;
       auto pictures = load_shots(**source, pair.name, a.shots, workers);
       if (!pictures) return failure(pictures);
-      inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), a.rig == "-", workers));
+      inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), a.rig == "-", workers, quiet));
     }
     if (inspected.empty()) return failure(ErrorCode::input, "has none of the rig's pairs", a.recording);
     return inspected;
@@ -185,7 +189,7 @@ Result<std::vector<Inspected>> inspect_pictures(const InspectArguments& a, const
     if (!meant) return failure(meant);
     given = std::move(*meant);
   }
-  inspected.push_back(inspect_pair(rig, *pair, std::move(given), a.rig == "-", workers));
+  inspected.push_back(inspect_pair(rig, *pair, std::move(given), a.rig == "-", workers, quiet));
   return inspected;
 }
 
@@ -195,26 +199,6 @@ Result<ReadRig> read_or_guess(const std::string& rig, ImageSize size) {
   ReadRig guess;
   guess.rig = guessed_rig(size);
   return guess;
-}
-
-// The rig with the cameras and the pair of that name as `other` has them.
-Rig with_pair_of(Rig rig, const Rig& other, const std::string& name) {
-  for (StereoPair& pair : rig.pairs) {
-    if (pair.name == name) pair = *other.find_pair(name);
-  }
-  const StereoPair& pair = *rig.find_pair(name);
-  for (Camera& camera : rig.cameras) {
-    if (camera.name == pair.left || camera.name == pair.right) camera = *other.find_camera(camera.name);
-  }
-  return rig;
-}
-
-Status write_rig(const Rig& rig, const ReadRig& read, const std::string& path) {
-  const bool guessed = read.files.empty();
-  const std::string remark =
-      guessed ? "# Made of pictures alone: the focal length is a guess, and the baseline of 1 m none at all.\n" : "";
-  const Rig moved = guessed ? rig : with_masks_moved(rig, read.files.front(), path);
-  return write_file_atomically(path, remark + to_rig_yaml(moved));
 }
 
 Status check_usage(const InspectArguments& a) {
@@ -234,33 +218,14 @@ Status check_usage(const InspectArguments& a) {
   return {};
 }
 
-// What goes into files.
-Status write_results(const InspectArguments& a, const ReadRig& read, const std::vector<Inspected>& inspected,
-                     const Workers& workers) {
-  const Rig& rig = read.rig;
-  if (!a.picture.empty()) {
-    const Inspected& one = inspected.front();
-    const auto picture = draw_pair_check(rig, one.pair, one.check, std::as_const(one.left).view(),
-                                         std::as_const(one.right).view(), one.matches, workers);
-    if (!picture) return failure(picture);
-    if (Status written = write_png(a.picture, std::as_const(*picture).view()); !written) return failure(written);
-  }
-  if (a.apply.empty()) return {};
-  Rig corrected = rig;
-  for (const Inspected& one : inspected) {
-    if (!one.check.corrected) {
-      return failure(ErrorCode::input,
-                     fmt::format("is not written: nothing explains the pictures of pair {}, so there is nothing to "
-                                 "put right",
-                                 one.pair.name),
-                     a.apply, "look at the pictures, or run without --apply for the figures");
-    }
-    corrected = with_pair_of(corrected, *one.check.corrected, one.pair.name);
-  }
-  return write_rig(corrected, read, a.apply);
+Status write_picture(const std::string& path, const Rig& rig, const InspectedPair& one, const Workers& workers) {
+  const auto picture = draw_pair_check(rig, one.pair, one.check, std::as_const(one.left).view(),
+                                       std::as_const(one.right).view(), one.matches, workers);
+  if (!picture) return failure(picture);
+  return write_png(path, std::as_const(*picture).view());
 }
 
-std::string in_words(const InspectArguments& a, const ReadRig& read, const std::vector<Inspected>& inspected) {
+std::string in_words(const InspectArguments& a, const ReadRig& read, const std::vector<InspectedPair>& inspected) {
   const bool guessed = a.rig == "-";
   std::string text;
   if (guessed) {
@@ -272,14 +237,14 @@ std::string in_words(const InspectArguments& a, const ReadRig& read, const std::
     for (const std::string& sentence : describe_rig(read.rig)) text += sentence + "\n";
     for (const StereoPair& pair : read.rig.pairs) {
       const bool judged = std::any_of(inspected.begin(), inspected.end(),
-                                      [&](const Inspected& one) { return one.pair.name == pair.name; });
+                                      [&](const InspectedPair& one) { return one.pair.name == pair.name; });
       if (judged) continue;  // the pictures say more
       for (const std::string& doubt : describe_doubts(read.rig, pair)) text += doubt + "\n";
     }
     for (const std::string& note : read.notes) text += note + "\n";
     for (const RigDifference& d : read.left_out) text += fmt::format("not used: {}: {}\n", d.key, d.text);
   }
-  for (const Inspected& one : inspected) text += in_words(one, guessed);
+  for (const InspectedPair& one : inspected) text += in_words(one, guessed);
   return text;
 }
 
@@ -296,21 +261,23 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   const auto read = read_or_guess(a.rig, size);
   if (!read) return failure(read);
   const Workers workers(context.threads);
-  std::vector<Inspected> inspected;
+  std::vector<InspectedPair> inspected;
   if (!a.left.empty() || !a.recording.empty()) {
-    auto result = inspect_pictures(a, read->rig, std::move(pictures), workers);
+    auto result = inspect_pictures(a, read->rig, std::move(pictures), workers, context.quiet);
     if (!result) return failure(result);
     inspected = std::move(*result);
   }
   const std::string text =
       context.json ? to_json(*read, inspected, a.rig == "-").dump(2) + "\n" : in_words(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
-  if (Status written = write_results(a, *read, inspected, workers); !written) return failure(written);
-  if (context.json || a.apply.empty()) return kDone;
-  const bool changed =
-      std::any_of(inspected.begin(), inspected.end(), [](const Inspected& i) { return !i.check.findings.empty(); });
-  const char* what = changed ? "the corrected rig" : "the rig as it was, for nothing is to be put right";
-  if (Status printed = print(fmt::format("{}: {}\n", what, a.apply)); !printed) return failure(printed);
+  if (!a.picture.empty()) {
+    if (Status drawn = write_picture(a.picture, read->rig, inspected.front(), workers); !drawn) return failure(drawn);
+  }
+  if (a.apply.empty()) return kDone;
+  const auto sentences = write_corrected_rig(*read, inspected, a.apply);
+  if (!sentences) return failure(sentences);
+  if (context.json) return kDone;
+  if (Status printed = print(fmt::format("{}\n", fmt::join(*sentences, "\n"))); !printed) return failure(printed);
   return kDone;
 }
 
@@ -332,7 +299,8 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
   verb->add_option("--pair", a->pair, "only this pair of the rig (with LEFT and RIGHT: the first one)");
   verb->add_option("--shots", a->shots, "at most so many shots of a pair, spread over all of them (default 12)")
       ->check(CLI::Range(1, 1000));
-  verb->add_option("--apply", a->apply, "write the rig with all corrections taken in, as rig.yaml");
+  verb->add_option("--apply", a->apply,
+                   "write the rig with what was found put right and no more than is needed, as rig.yaml");
   verb->add_option("--picture", a->picture, "draw the rows of the first pair, PNG");
   add_threads_option(*verb, context);
   add_json_flag(*verb, context);

@@ -1,9 +1,10 @@
-// `spartan stereo` and `spartan map build` with picture files whose meaning only the rig knows.
+// `spartan stereo`, `spartan map build` and `spartan rig inspect` with picture files whose meaning only the rig knows.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <type_traits>
 
 #include "program.h"
 #include "spartan/core/image_io.h"
@@ -28,14 +29,20 @@ class PictureFiles : public ::testing::Test {
       const auto gray = seen_by(eye);
       Image<Pixel> picture(gray.size());
       for (int y = 0; y < gray.height(); ++y) {
-        for (int x = 0; x < gray.width(); ++x) picture(x, y) = pixel_of(gray(x, y));
+        for (int x = 0; x < gray.width(); ++x) {
+          if constexpr (std::is_invocable_v<decltype(pixel_of), int>) {
+            picture(x, y) = pixel_of(gray(x, y));
+          } else {
+            picture(x, y) = pixel_of(gray(x, y), x, y);
+          }
+        }
       }
       ASSERT_TRUE(write_png(eye_file(eye), picture.view()));
     }
   }
   std::string eye_file(int eye) const { return folder_.file(eye == 0 ? "left.png" : "right.png"); }
 
-  testing::ProgramResult run(std::vector<std::string> words, const std::string& format) const {
+  std::string rig_file(const std::string& format) const {
     constexpr const char* kRig =
         "schema: 1\n"
         "cameras:\n"
@@ -44,8 +51,11 @@ class PictureFiles : public ::testing::Test {
         "  right: {{size_px: [320, 240], model: pinhole, focal_px: [260, 260], centre_px: [159.5, 119.5], axes: "
         "optical, translation_m: [0.12, 0, 0]{0}}}\n"
         "pairs:\n  stereo: {{left: left, right: right}}\n";
-    const std::string rig = folder_.write("rig.yaml", fmt::format(kRig, format));
-    const std::vector<std::string> rest{eye_file(0), eye_file(1), "--rig", rig, "-o", folder_.file("out"), "--json"};
+    return folder_.write("rig.yaml", fmt::format(kRig, format));
+  }
+  testing::ProgramResult run(std::vector<std::string> words, const std::string& format) const {
+    const std::vector<std::string> rest{eye_file(0), eye_file(1),         "--rig", rig_file(format),
+                                        "-o",        folder_.file("out"), "--json"};
     words.insert(words.end(), rest.begin(), rest.end());
     return run_program(words);
   }
@@ -58,6 +68,17 @@ class PictureFiles : public ::testing::Test {
   void expect_a_map(const std::string& format) const {
     const auto told = run({"map", "build", "--gravity", "0,0,-1"}, format);
     EXPECT_EQ(told.exit_code, 0) << told.err;
+  }
+
+  // Of `rig inspect`, whose rig is right to the last digit.
+  void expect_judged_good(const std::string& format) const {
+    SCOPED_TRACE(format);
+    const auto told = run_program({"rig", "inspect", rig_file(format), eye_file(0), eye_file(1), "--json"});
+    ASSERT_EQ(told.exit_code, 0) << told.err;
+    const json pair = json::parse(told.out)["pairs"]["stereo"];
+    EXPECT_EQ(pair["verdict"], "good") << pair["findings"];
+    EXPECT_GT(pair["inliers"], 80);
+    EXPECT_LT(pair["row_error_px"]["after"]["mean"], 0.3);
   }
 
   testing::TemporaryFolder folder_;
@@ -74,6 +95,27 @@ TEST_F(PictureFiles, MosaicsAndDeepSamples) {
   expect_a_map(", pixel_layout: bayer_rggb, bits: 12");
   write_eyes<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 256); });
   EXPECT_NEAR(density(", bits: 12, bit_alignment: high"), gray, 2);
+}
+
+// A yellowish world: a mosaic that is taken for gray is full of checks.
+int coloured(int level, int x, int y) {
+  const bool red = x % 2 == 0 && y % 2 == 0, blue = x % 2 == 1 && y % 2 == 1;
+  return blue ? level / 3 : red ? level : level * 4 / 5;
+}
+
+TEST_F(PictureFiles, CalibrationsAreJudgedByThem) {
+  write_eyes<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 16); });
+  expect_judged_good(", bits: 12");
+  write_eyes<std::uint8_t>([](int level, int x, int y) { return static_cast<std::uint8_t>(coloured(level, x, y)); });
+  expect_judged_good(", pixel_layout: bayer_rggb");
+  write_eyes<std::uint16_t>(
+      [](int level, int x, int y) { return static_cast<std::uint16_t>(16 * coloured(level, x, y)); });
+  expect_judged_good(", pixel_layout: bayer_rggb, bits: 12");
+  write_eyes<Rgb8>([](int level) {
+    return Rgb8{static_cast<std::uint8_t>(level), static_cast<std::uint8_t>(level * 4 / 5),
+                static_cast<std::uint8_t>(level / 3)};
+  });
+  expect_judged_good(", pixel_layout: rgb");
 }
 
 TEST_F(PictureFiles, ColoursOfAGrayRigAreReduced) {

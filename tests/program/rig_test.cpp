@@ -23,6 +23,7 @@ namespace {
 using nlohmann::json;
 using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::run_program;
 
 TEST(RigInspect, TellsThePublishedRover) {
@@ -219,6 +220,95 @@ TEST_F(RigInspectPictures, AppliesExchangedEyes) {
   const auto again = inspect(mended, {picture(0), picture(1), "--json"});
   EXPECT_EQ(json::parse(again.out)["pairs"]["stereo"]["verdict"], "good") << again.out;
   EXPECT_THAT(testing::content_of(mended), HasSubstr("self_mask: \"a/masks/left.png\""));
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+  return text;
+}
+
+TEST_F(RigInspectPictures, SaysWhatTheWrittenFileIs) {
+  const std::string mended = folder_.path() + "/mended.yaml";
+  const auto applied = [&](const std::string& rig, const std::string& left, const std::string& right) {
+    const auto told = inspect(rig, {left, right, "--apply", mended});
+    EXPECT_EQ(told.exit_code, 0) << told.err;
+    return told.out;
+  };
+  const std::string rig = folder_.write("rig.yaml", fmt::format(kRig, 0.12));
+  EXPECT_THAT(applied(rig, picture(0), picture(1)),
+              HasSubstr("\nnothing is to be put right: " + mended + " is the rig as given\n"));
+  testing::write_gray_png(folder_.path() + "/gray.png", 320, 240);
+  const std::string gray = folder_.path() + "/gray.png";
+  EXPECT_THAT(applied(rig, gray, gray), HasSubstr("\nnothing could be judged: " + mended + " is the rig as given\n"));
+  EXPECT_THAT(applied("-", gray, gray), HasSubstr("\nnothing could be judged: " + mended + " is the rig as guessed\n"));
+  const std::string above = replaced(fmt::format(kRig, 0.5), "[0.5, 0, 0]", "[0, 0.12, 0]");
+  EXPECT_THAT(applied(folder_.write("above.yaml", above), picture(0), picture(1)),
+              HasSubstr("\nnothing could be judged: "));
+  const std::string large = folder_.write("large.yaml", fmt::format(kRig, 4.2));
+  EXPECT_THAT(applied(large, picture(0), picture(1)),
+              HasSubstr("\nnothing of what was found can be put right: " + mended + " is the rig as given\n"));
+  const std::string inverse = folder_.write("inverse.yaml", fmt::format(kRig, -0.12));
+  EXPECT_THAT(applied(inverse, picture(0), picture(1)), HasSubstr("\nthe corrected rig: " + mended + "\n"));
+}
+
+// A calibration of pictures twice as large, with a mask of that size.
+TEST_F(RigInspectPictures, TellsOfMasksOfAnotherSize) {
+  std::string text = replaced(fmt::format(kRig, 0.12), "[320, 240]", "[640, 480]");
+  text = replaced(replaced(text, "[260, 260]", "[520, 520]"), "[159.5, 119.5]", "[319.5, 239.5]");
+  text.replace(text.find("axes: optical"), 0, "self_mask: mask.png, ");
+  const std::string rig = folder_.write("rig.yaml", text), mended = folder_.path() + "/mended.yaml";
+  const auto said = [&] { return inspect(rig, {picture(0), picture(1), "--apply", mended}).out; };
+  const std::string sentence =
+      "\ncamera left: its self-mask mask.png is still that of the other size: it must be 320 x 240 px\n";
+  testing::write_gray_png(folder_.path() + "/mask.png", 640, 480);
+  EXPECT_THAT(said(), HasSubstr(sentence));
+  testing::write_gray_png(folder_.path() + "/mask.png", 320, 240);
+  EXPECT_THAT(said(), Not(HasSubstr(sentence)));
+}
+
+// Two pairs of a recording with the right camera in common. The rig has the first one's left eye 0.5° too far up; the
+// second pair is sound, and both are when that is mended.
+TEST_F(RigInspectPictures, MendsPairsThatShareACamera) {
+  const char* camera =
+      "  {}: {{size_px: [320, 240], model: pinhole, focal_px: [260, 260], centre_px: [159.5, 119.5], axes: optical, "
+      "roll_pitch_yaw_deg: [{}, 0, 0], translation_m: [{}, 0, 0]}}\n";
+  const auto rig = [&](double left_up_deg) {
+    return "schema: 1\ncameras:\n" + fmt::format(fmt::runtime(camera), "left", left_up_deg, 0) +
+           fmt::format(fmt::runtime(camera), "other", 0, 0) + fmt::format(fmt::runtime(camera), "right", 0, 0.12) +
+           "pairs:\n  first: {left: left, right: right}\n  second: {left: other, right: right, for_odometry: false}\n";
+  };
+  folder_.write("recording/rig.yaml", rig(0));
+  folder_.write("recording/recording.yaml", "schema: 1\n");
+  folder_.write("recording/frames.csv",
+                "frame_id,position_id,pair,left_stamp_ns,right_stamp_ns,left,right,pan_deg,tilt_deg,exposure_us,gain,"
+                "bits\n0,0,first,1000,1000,l.png,r.png,0,0,0,0,8\n1,0,second,1000,1000,l.png,r.png,0,0,0,0,8\n");
+  folder_.write("recording/l.png", testing::content_of(picture(0)));
+  folder_.write("recording/r.png", testing::content_of(picture(1)));
+  const std::string recording = folder_.path() + "/recording", mended = folder_.path() + "/mended.yaml";
+  const auto pairs = [&](const std::string& of, std::vector<std::string> more) {
+    more.insert(more.end(), {"--recording", recording, "--json"});
+    const auto told = inspect(of, std::move(more));
+    EXPECT_EQ(told.exit_code, 0) << told.err;
+    return json::parse(told.out)["pairs"];
+  };
+  const json found = pairs(folder_.write("off.yaml", rig(0.5)), {"--apply", mended});
+  EXPECT_EQ(ids(found["first"]), std::vector<std::string>{"row_offset"});
+  EXPECT_EQ(found["second"]["verdict"], "good");
+  const json again = pairs(mended, {});
+  EXPECT_EQ(again["first"]["verdict"], "good") << again["first"]["findings"];
+  EXPECT_EQ(again["second"]["verdict"], "good") << again["second"]["findings"];
+}
+
+// Lines in a pipe, as the other verbs have them; a single shot takes no time worth telling.
+TEST_F(RigInspectPictures, ShowsItsProgress) {
+  const auto shown = [&](std::vector<std::string> words) {
+    return inspect(drive_ + "/calib.txt", std::move(words)).err;
+  };
+  EXPECT_THAT(shown({"--recording", drive_, "--shots", "3"}),
+              ContainsRegex("0/3 shots of pair .*3/3 shots of pair .* matched: judging"));
+  EXPECT_EQ(shown({"--recording", drive_, "--shots", "3", "-q"}), "");
+  EXPECT_EQ(shown({picture(0), picture(1)}), "");
 }
 
 // Three pairs of pictures on top of each other: as taken, rectified as given, corrected. The one of two shots is drawn

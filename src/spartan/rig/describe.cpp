@@ -20,10 +20,6 @@ constexpr std::array<double, 6> kRanges_m{0.5, 1, 2, 5, 10, 20};
 // What is smaller than this is not worth a word.
 constexpr double kLeastLength_m = 0.5e-6, kLeastAngle_deg = 0.0005;
 // "120.0 mm", and metres above one of them.
-std::string length(double metres) {
-  return metres < 1 ? fmt::format("{:.1f} mm", 1000 * metres) : fmt::format("{:.3f} m", metres);
-}
-
 // "0.020°": angles of a calibration are small, those of a mast are not.
 std::string angle(double degrees) {
   return std::abs(degrees) < 1 ? fmt::format("{:.3f}°", degrees) : fmt::format("{:.2f}°", degrees);
@@ -76,9 +72,9 @@ std::string describe_place(const Rig& rig, const Camera& camera) {
   const Eigen::Vector3d& t = body_from_camera.translation();
   const Eigen::Vector3d look = body_from_camera.rotation() * Eigen::Vector3d::UnitZ();
   std::vector<std::string> place, turn;
-  add_part(place, t.x(), kLeastLength_m, length(std::abs(t.x())), "ahead", "behind");
-  add_part(place, t.y(), kLeastLength_m, length(std::abs(t.y())), "to the left", "to the right");
-  add_part(place, t.z(), kLeastLength_m, length(std::abs(t.z())), "above", "below");
+  add_part(place, t.x(), kLeastLength_m, describe_length(std::abs(t.x())), "ahead", "behind");
+  add_part(place, t.y(), kLeastLength_m, describe_length(std::abs(t.y())), "to the left", "to the right");
+  add_part(place, t.z(), kLeastLength_m, describe_length(std::abs(t.z())), "above", "below");
   const double side = std::atan2(look.y(), look.x()) * kDegreesPerRadian;
   const double down = std::asin(std::clamp(-look.z(), -1.0, 1.0)) * kDegreesPerRadian;
   add_part(turn, side, kLeastAngle_deg, angle(std::abs(side)), "to the left", "to the right");
@@ -103,11 +99,11 @@ void describe_pair(const Rig& rig, const StereoPair& pair, std::vector<std::stri
   const PairSummary summary = summarize_pair(rig, pair);
   const Pose left_from_right = rig.right_from_left(pair).inverse();
   sentences.push_back(fmt::format("pair {}: baseline {}; seen from the left camera, the right one is {}", pair.name,
-                                  length(summary.baseline_m), describe_relative_pose(left_from_right)));
+                                  describe_length(summary.baseline_m), describe_relative_pose(left_from_right)));
   std::vector<std::string> table;
   for (const double z : kRanges_m) {
     const double step_m = z * z * kDisparityStep_px / (summary.focal_px * summary.baseline_m);
-    table.push_back(fmt::format("{} at {:g} m", length(step_m), z));
+    table.push_back(fmt::format("{} at {:g} m", describe_length(step_m), z));
   }
   sentences.push_back(
       fmt::format("pair {}: {:g} px of disparity are {}", pair.name, kDisparityStep_px, fmt::join(table, ", ")));
@@ -127,12 +123,16 @@ std::vector<std::string> describe_doubts(const Rig& rig, const StereoPair& pair)
   return sentences;
 }
 
+std::string describe_length(double metres) {
+  return metres < 1 ? fmt::format("{:.1f} mm", 1000 * metres) : fmt::format("{:.3f} m", metres);
+}
+
 std::string describe_relative_pose(const Pose& first_from_second) {
   const Eigen::Vector3d& t = first_from_second.translation();
   std::vector<std::string> place, turn;
-  add_part(place, t.x(), kLeastLength_m, length(std::abs(t.x())), "to the right", "to the left");
-  add_part(place, t.y(), kLeastLength_m, length(std::abs(t.y())), "down", "up");
-  add_part(place, t.z(), kLeastLength_m, length(std::abs(t.z())), "ahead", "back");
+  add_part(place, t.x(), kLeastLength_m, describe_length(std::abs(t.x())), "to the right", "to the left");
+  add_part(place, t.y(), kLeastLength_m, describe_length(std::abs(t.y())), "down", "up");
+  add_part(place, t.z(), kLeastLength_m, describe_length(std::abs(t.z())), "ahead", "back");
   const Turns turns = turns_of(first_from_second.rotation().toRotationMatrix());
   add_part(turn, turns.right_deg, kLeastAngle_deg, angle(std::abs(turns.right_deg)), "to the right", "to the left");
   add_part(turn, turns.up_deg, kLeastAngle_deg, angle(std::abs(turns.up_deg)), "up", "down");

@@ -9,6 +9,9 @@
 
 namespace spartan {
 
+/// "120.0 mm", "1.200 m".
+std::string describe_length(double metres);
+
 /// "120.0 mm to the right, 0.3 mm up, 0.1 mm back; turned 0.020° to the left, …" for a camera's pose seen from
 /// another optical frame.
 std::string describe_relative_pose(const Pose& first_from_second);

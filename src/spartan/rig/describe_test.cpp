@@ -78,7 +78,7 @@ TEST(Describe, MistakesAreDoubted) {
     return text;
   };
   EXPECT_THAT(doubts(Pose::from_translation({-0.12, 0, 0})), HasSubstr("LEFT of the left one"));
-  EXPECT_THAT(doubts(Pose::from_translation({120, 0, 0})), HasSubstr("given in mm or cm"));
+  EXPECT_THAT(doubts(Pose::from_translation({120, 0, 0})), HasSubstr("given in millimetres? It would be 120.0 mm"));
   EXPECT_THAT(doubts(Pose::from_translation({0.001, 0.12, 0})), HasSubstr("in other axes"));
   EXPECT_THAT(doubts(turned(0, 20, 0, {0.12, 0, 0})), HasSubstr("turned by 20.00°"));
 }

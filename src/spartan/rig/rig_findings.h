@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "spartan/rig/rig.h"
@@ -17,9 +18,18 @@ struct RigFinding {
 };
 
 /// From the numbers alone: `inverse_transform` and `swapped_eyes` together where the right eye stands on the left (only
-/// pictures tell which), `baseline_unit`, `size_mismatch` (principal point, view, fx and fy more than 5 % apart, and
-/// the pictures' size where that is known), `not_beside`, `eyes_apart`.
+/// pictures tell which), `baseline_unit` (beyond 3 m or below 5 mm), `size_mismatch` (principal point, view, fx and fy
+/// more than 5 % apart, and the pictures' size where that is known; once for two equal eyes), `not_beside` (then
+/// nothing is said about sides), `eyes_apart`.
 std::vector<RigFinding> find_doubts(const Rig& rig, const StereoPair& pair, ImageSize picture_size = {});
+
+/// The unit that a baseline which was read as metres more likely had: millimetres (30 and more), centimetres (10 and
+/// more), kilometres (below 0.005: divided by 1000 twice). Between these nothing is sure.
+struct BaselineUnit {
+  std::string_view name;
+  double metres = 1;
+};
+std::optional<BaselineUnit> likelier_unit(double baseline_m);
 
 /// How much larger pictures are than those of the calibration; none where their shapes differ (by more than 1 %).
 std::optional<double> size_factor(ImageSize calibration, ImageSize picture);

@@ -1,5 +1,6 @@
 #include "spartan/rig/rig_findings.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +8,9 @@
 
 namespace spartan {
 namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr PinholeModel kPinhole{500, 500, 319.5, 239.5};
@@ -35,6 +39,9 @@ TEST(RigFindings, PlacesOfTheEyes) {
   EXPECT_TRUE(doubts(rig_with(Pose::from_translation({0.12, 0.01, -0.02}))).empty());
   expect_doubt(rig_with(Pose::from_translation({0.01, 0.12, 0})), "not_beside", 0.12);
   expect_doubt(rig_with(Pose::from_translation({0.01, 0, -0.12})), "not_beside", 0.12);
+  // An eye above or ahead has no side to be on the wrong one of.
+  expect_doubt(rig_with(Pose::from_translation({-1e-18, 0.12, 0})), "not_beside", 0.12);
+  expect_doubt(rig_with(Pose::from_translation({-0.01, 0, 0.12})), "not_beside", 0.12);
   expect_doubt(rig_with(Pose::from_translation({120, 0, 0})), "baseline_unit", 120);
   expect_doubt(rig_with(Pose::from_translation({0.00012, 0, 0})), "baseline_unit", 0.00012);
   expect_doubt(rig_with({exp_so3({0, 16 * kDegree, 0}), {0.12, 0, 0}}), "eyes_apart", 16);
@@ -58,8 +65,65 @@ TEST(RigFindings, NumbersOfAnotherPictureSize) {
   EXPECT_TRUE(doubts(rig_with(beside, PinholeModel{500, 500, 400, 180})).empty());
   EXPECT_TRUE(doubts(rig_with(beside, PinholeModel{600, 600, 319.5, 239.5})).empty());
   const auto of_pictures = doubts(rig_with(beside), {320, 240});
-  ASSERT_EQ(of_pictures.size(), 2u);
-  EXPECT_EQ(of_pictures[1].value, 0.5);
+  ASSERT_EQ(of_pictures.size(), 1u) << "of both, for they are equal";
+  EXPECT_EQ(of_pictures[0].value, 0.5);
+}
+
+// Two eyes by their names, two equal ones at once.
+TEST(RigFindings, EqualEyesAreDoubtedOnce) {
+  Rig rig = rig_with(Pose::from_translation({0.12, 0, 0}));
+  for (Camera& c : rig.cameras) c.model = PinholeModel{492.8, 520.6, 319.5, 239.5};
+  const auto equal = doubts(rig);
+  ASSERT_EQ(equal.size(), 1u);
+  EXPECT_THAT(equal[0].text, HasSubstr("cameras left and right: fx is 492.8 and fy 520.6 px"));
+  rig.cameras[1].model = PinholeModel{492.8, 520.7, 319.5, 239.5};
+  const auto unequal = doubts(rig);
+  ASSERT_EQ(unequal.size(), 2u);
+  EXPECT_THAT(unequal[0].text, HasSubstr("camera left: fx is"));
+  EXPECT_THAT(unequal[1].text, HasSubstr("camera right: fx is"));
+}
+
+// A picture that was cut out has its axis aside; one that has it in the corner or beyond the border is doubted.
+TEST(RigFindings, PrincipalPointsOutsideOfThePicture) {
+  const auto of_centre = [](double cx, double cy) {
+    return doubts(rig_with(Pose::from_translation({0.12, 0, 0}), PinholeModel{500, 500, cx, cy}));
+  };
+  for (const auto& [cx, cy] : {std::pair{-2000., -3000.},
+                               {0., 0.},
+                               {-0.5, -0.5},
+                               {-1., -1.},
+                               {320., -1.},
+                               {640., 240.},
+                               {1500., 240.},
+                               {320., 480.},
+                               {0., 900.}}) {
+    const auto found = of_centre(cx, cy);
+    ASSERT_EQ(found.size(), 1u) << cx << ' ' << cy;
+    EXPECT_EQ(found[0].id, "size_mismatch");
+    EXPECT_NEAR(found[0].value, std::hypot(cx - 319.5, cy - 239.5), 1e-9);
+    EXPECT_THAT(found[0].text, HasSubstr("camera right: the optical axis meets the picture at ("));
+    EXPECT_THAT(found[0].text, HasSubstr("the middle of 640 x 480 px"));
+    EXPECT_THAT(found[0].text, Not(HasSubstr("(-0, ")));
+    EXPECT_THAT(found[0].text, HasSubstr(std::abs(cx) + std::abs(cy) < 3 ? "its corner" : "outside of it"));
+  }
+  for (const auto& [cx, cy] : {std::pair{0., 240.}, {639., 240.}, {500., 3.}, {2., 479.}})
+    EXPECT_TRUE(of_centre(cx, cy).empty()) << cx << ' ' << cy;
+}
+
+// What it would be in which unit; the one that is named first is the one that is taken.
+TEST(RigFindings, UnitsOfBaselines) {
+  const auto text = [](double metres) { return doubts(rig_with(Pose::from_translation({metres, 0, 0})))[0].text; };
+  EXPECT_EQ(text(120),
+            "a baseline of 120 m: was it given in millimetres? It would be 120.0 mm (in centimetres 1.200 m)");
+  EXPECT_EQ(text(12), "a baseline of 12 m: was it given in centimetres? It would be 120.0 mm (in millimetres 12.0 mm)");
+  EXPECT_EQ(text(0.00012), "a baseline of 0.00012 m: was it divided by 1000 twice? It would be 120.0 mm");
+  EXPECT_THAT(text(4.2), HasSubstr("In centimetres it would be 42.0 mm, in millimetres 4.2 mm"));
+  EXPECT_THAT(text(4.2), HasSubstr("left as it is"));
+  EXPECT_EQ(likelier_unit(30)->metres, 0.001);
+  EXPECT_EQ(likelier_unit(29.9)->metres, 0.01);
+  EXPECT_EQ(likelier_unit(10)->metres, 0.01);
+  EXPECT_EQ(likelier_unit(0.0049)->metres, 1000);
+  for (const double sound : {9.9, 0.005, 0.12}) EXPECT_FALSE(likelier_unit(sound)) << sound;
 }
 
 }  // namespace

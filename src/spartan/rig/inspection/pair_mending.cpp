@@ -1,9 +1,11 @@
 #include "spartan/rig/inspection/pair_mending.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "spartan/rig/models/model_changes.h"
+#include "spartan/rig/rig_findings.h"
 
 namespace spartan {
 namespace {
@@ -11,10 +13,19 @@ namespace {
 // Freed where the rows cost so much less with it.
 constexpr double kCheaper = 0.9, kLeastGain = 25;
 
-double unit_factor(double baseline_m) {
-  if (baseline_m >= 30) return 0.001;
-  if (baseline_m >= 10) return 0.01;
-  return baseline_m < 0.005 ? 1000 : 1;
+constexpr double kRounding = 1e-12;
+
+// What the vignetting is measured from, in pictures that are `factor` times as large and then show everything lower.
+void move_centre(Vignetting& vignetting, double factor, double lower_px) {
+  if (!vignetting.centre_px) return;
+  vignetting.centre_px = ((vignetting.centre_px->array() + 0.5) * factor - 0.5).matrix();
+  vignetting.centre_px->y() += lower_px;
+}
+
+// How much larger the pictures of an eye are than those that the calibration counts its pixels in.
+double enlargement(ImageSize given, ImageSize believed, const SizeChange& size, bool of_this_eye) {
+  const double stated = given == believed ? 1 : size_factor(given, believed).value_or(1);
+  return of_this_eye && size.centre_too ? stated * size.factor : stated;
 }
 
 }  // namespace
@@ -49,17 +60,23 @@ Rig mended_rig(Rig rig, const StereoPair& pair, const PairBelief& belief, const 
       *std::find_if(rig.pairs.begin(), rig.pairs.end(), [&](const auto& p) { return p.name == pair.name; });
   if (belief.eyes_exchanged) std::swap(mended.left, mended.right);
   Camera &left = camera_of(mended.left), &right = camera_of(mended.right);
+  move_centre(left.vignetting, enlargement(left.size, belief.left.size, belief.size, belief.size.left), 0);
+  move_centre(right.vignetting, enlargement(right.size, belief.right.size, belief.size, belief.size.right),
+              belief.rows_lower_px);
   left.size = belief.left.size;
   right.size = belief.right.size;
   left.model =
       belief.left_bends ? with_radial(belief.left.model, correction.left_radial, left.size) : belief.left.model;
-  right.model = with_focal_times(
-      belief.right_bends ? with_radial(belief.right.model, correction.right_radial, right.size) : belief.right.model,
-      correction.focal_ratio);
+  right.model =
+      belief.right_bends ? with_radial(belief.right.model, correction.right_radial, right.size) : belief.right.model;
+  // A ratio that was not asked for is one but for rounding: such a camera stays bit for bit as it was.
+  if (std::abs(correction.focal_ratio - 1) > kRounding)
+    right.model = with_focal_times(right.model, correction.focal_ratio);
   Pose left_from_right = corrected_left_from_right(belief.left_from_right, correction);
   if (wrong_unit) {
-    const double factor = unit_factor(left_from_right.translation().norm());
-    left_from_right = Pose(left_from_right.rotation(), factor * left_from_right.translation());
+    const auto unit = likelier_unit(left_from_right.translation().norm());
+    const double metres = unit ? unit->metres : 1;
+    left_from_right = Pose(left_from_right.rotation(), metres * left_from_right.translation());
   }
   right.mount_from_camera = left.mount_from_camera * left_from_right;
   return rig;

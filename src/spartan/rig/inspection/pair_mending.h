@@ -15,9 +15,9 @@ struct FoundWrong {
 /// without. Rows tell a yaw, a focal ratio and the baseline's direction with little force, and a wrong one costs range.
 PairCorrection needed_correction(const BelievedPair& believed, const FoundWrong& found);
 
-/// The rig with the pair as it is believed and corrected. `wrong_unit`: the baseline is brought to metres, from
-/// millimetres (30 and more), centimetres (10 and more), or where it was divided by 1000 twice (below 0.005); between
-/// these nothing is sure, and it stays.
+/// The rig with the pair as it is believed and corrected. `wrong_unit`: the baseline is brought to metres from its
+/// likelier_unit(), where there is one. The vignetting's centre goes with the size and the principal point; a self-mask
+/// stays the file that it was.
 Rig mended_rig(Rig rig, const StereoPair& pair, const PairBelief& belief, const PairCorrection& correction,
                bool wrong_unit);
 
