@@ -245,6 +245,10 @@ std::string in_words(const InspectArguments& a, const ReadRig& read, const std::
     for (const RigDifference& d : read.left_out) text += fmt::format("not used: {}: {}\n", d.key, d.text);
   }
   for (const InspectedPair& one : inspected) text += in_words(one, guessed);
+  const bool mendable = std::any_of(inspected.begin(), inspected.end(), [&](const InspectedPair& one) {
+    return one.judged() && one.check.corrected && *one.check.corrected != read.rig;
+  });
+  if (mendable && !guessed && a.apply.empty()) text += "--apply FILE writes the rig with that put right\n";
   return text;
 }
 

@@ -97,6 +97,12 @@ void check_camera(const std::string& who, const Camera& camera, ImageSize pictur
     return mismatch(fmt::format("fx is {:.1f} and fy {:.1f} px: is one of them that of another picture size?", fx, fy),
                     aspect_of(*axis));
   }
+  if (!has_possible_focal(camera)) {
+    return mismatch(fmt::format("a focal length of {:.3g} px for pictures of {} px: no lens has such a view. Is it in "
+                                "millimetres? In pixels it is that divided by the size of a pixel",
+                                fx, width),
+                    fx);
+  }
   const double view_deg = 2 * std::atan(0.5 * width / fx) * kDegreesPerRadian;
   if (is_linear(camera) && !(view_deg > kNarrowest_deg && view_deg < kWidestLinear_deg)) {
     mismatch(fmt::format("a focal length of {:.1f} px gives a view of {:.1f}° for {} px", fx, view_deg, width),
@@ -143,6 +149,13 @@ AspectDoubt doubt_of_aspect(const Camera& camera) {
   const double difference = axis ? std::abs(std::log(aspect_of(*axis))) : 0;
   if (difference > std::log(kAspect)) return AspectDoubt::strong;
   return difference > std::log(kAspectToAsk) ? AspectDoubt::some : AspectDoubt::none;
+}
+
+bool has_possible_focal(const Camera& camera) {
+  constexpr double kLeast = 0.1, kMost = 20;
+  const auto axis = look_ahead(camera.model);
+  const double focal_px = axis ? std::sqrt(std::abs(axis->by_direction.determinant())) : 0;
+  return focal_px > kLeast * camera.size.width && focal_px < kMost * camera.size.width;
 }
 
 bool is_linear(const Camera& camera) {

@@ -41,6 +41,9 @@ std::optional<double> size_told_by_centre(const Camera& camera);
 enum class AspectDoubt { none, some, strong };
 AspectDoubt doubt_of_aspect(const Camera& camera);
 
+/// Whether there are lenses of such a view: a focal length between 0.1 and 20 times the picture's width.
+bool has_possible_focal(const Camera& camera);
+
 /// Whether the camera is a pinhole within 0.5 px all over its picture.
 bool is_linear(const Camera& camera);
 

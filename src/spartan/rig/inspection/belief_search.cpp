@@ -55,6 +55,10 @@ double share_on_the_wrong_side(const PairFit& fit, const std::vector<double>& di
   return fit.inliers > 0 ? static_cast<double>(wrong) / fit.inliers : 0;
 }
 
+bool has_possible_views(const PairBelief& belief) {
+  return has_possible_focal(belief.left) && has_possible_focal(belief.right);
+}
+
 bool passes(const BelievedPair& pair) {
   return pair.wrong_side <= 0.5;
 }
@@ -75,7 +79,8 @@ BelievedPair fitted(PairBelief belief, const std::vector<PixelMatch>& matches) {
   pair.wrong_side = pair.as_it_is
                         ? share_on_the_wrong_side(pair.fit, given.disparity_px, 0)
                         : share_on_the_wrong_side(pair.fit, pair.fit.rows.disparity_px, pair.fit.correction.yaw_rad);
-  const bool agree = pair.fit.inliers >= kLeastShare * static_cast<double>(matches.size()) && passes(pair);
+  const bool agree =
+      pair.fit.inliers >= kLeastShare * static_cast<double>(matches.size()) && passes(pair) && has_possible_views(b);
   pair.agrees = agree && pair.fit.rms_px <= kUsableRows_px;
   pair.explains = pair.agrees && ((pair.as_it_is && pair.good_rows) || strangeness(pair.fit.correction) <= 1);
   return pair;

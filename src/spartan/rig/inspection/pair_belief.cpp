@@ -108,13 +108,4 @@ std::vector<PairBelief> with_square_eyes(const PairBelief& belief, AspectDoubt l
   return beliefs;
 }
 
-bool has_possible_views(const PairBelief& belief) {
-  constexpr double kLeast = 0.15, kMost = 30;
-  const auto possible = [&](const Camera& camera) {
-    const double across = middle_focal_px(camera.model) / std::max(camera.size.width, camera.size.height);
-    return across > kLeast && across < kMost;
-  };
-  return possible(belief.left) && possible(belief.right);
-}
-
 }  // namespace spartan

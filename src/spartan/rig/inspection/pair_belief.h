@@ -60,7 +60,4 @@ PairBelief with_size(PairBelief belief, const SizeChange& size, const std::vecto
 /// With square pixels where fx and fy are apart: by fx, and by fy.
 std::vector<PairBelief> with_square_eyes(const PairBelief& belief, AspectDoubt least);
 
-/// Whether lenses have such views: focal lengths between 0.15 times and 30 times the picture's larger side.
-bool has_possible_views(const PairBelief& belief);
-
 }  // namespace spartan

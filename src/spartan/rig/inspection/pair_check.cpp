@@ -51,7 +51,8 @@ class Checker {
     if (found("not_beside") || too_few(check_.matches)) return without_figures();
     take_figures();
     if (looks_twice_at_one_picture()) {
-      add("same_picture", "both pictures are the same: nothing is nearer or farther", check_.inliers);
+      add("same_picture", "both pictures are the same, nothing is nearer or farther: is one of them the other eye's?",
+          check_.inliers);
       return without_figures();
     }
     if (!believed_.explains) {
@@ -85,9 +86,11 @@ class Checker {
     if (found("not_enough_texture")) return true;
     add("not_enough_texture",
         check_.map.empty()
-            ? fmt::format("only {} matches: too little to judge by", matches)
-            : fmt::format("only {} of {} matches agree, in {} of {} parts of the picture: too little to judge by",
-                          matches, check_.matches, check_.map.size(), kRowErrorCells),
+            ? fmt::format("only {} matches: too little to judge by; more shots tell more", matches)
+            : fmt::format(
+                  "only {} of {} matches agree, in {} of {} parts of the picture: too little to judge by; more shots "
+                  "tell more",
+                  matches, check_.matches, check_.map.size(), kRowErrorCells),
         matches);
     return true;
   }
@@ -363,10 +366,13 @@ bool Checker::is_worthless(const RowErrors& rows) {
 }
 
 PairVerdict Checker::verdict() const {
-  for (const char* id : {"not_beside", "inverse_transform", "swapped_eyes", "baseline_unit", "size_mismatch",
-                         "distortion_ignored", "yaw_offset", "eyes_apart"}) {
+  for (const char* id :
+       {"not_beside", "inverse_transform", "swapped_eyes", "size_mismatch", "distortion_ignored", "yaw_offset"}) {
     if (found(id)) return PairVerdict::bad;
   }
+  // Large rigs have baselines of metres.
+  const double baseline_m = rig_.right_from_left(pair_).translation().norm();
+  if (found("baseline_unit") && likelier_unit(baseline_m)) return PairVerdict::bad;
   if (is_worthless(check_.as_given)) return PairVerdict::bad;
   return check_.findings.empty() ? PairVerdict::good : PairVerdict::usable;
 }

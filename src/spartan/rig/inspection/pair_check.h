@@ -14,8 +14,8 @@ namespace spartan {
 
 enum class PairVerdict {
   good,    ///< rows agree to 0.5 px in the mean and 1.5 px for 95 %, and nothing is found
-  usable,  ///< to 1 px and 3 px: stereo works and loses some; or the pictures show too little to judge
-  bad,
+  usable,  ///< to 1 px and 3 px: stereo works and loses some; or nothing worse is found than a doubt
+  bad,     ///< what is found spoils the ranges or the rows; or the pictures show too little to judge
 };
 std::string_view name_of(PairVerdict verdict);
 

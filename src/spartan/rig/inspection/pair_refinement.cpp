@@ -103,7 +103,7 @@ class PairOfLenses {
     rays_.resize(matches.size());
     for (std::size_t i = 0; i < matches.size(); ++i) rays_[i].left = sight_of(left, matches[i].left, left_centre, 1);
     aim(1);
-    focal_px_ = 0.5 * (middle_focal_px(left) + middle_focal_px(right));
+    focal_px_ = 0.5 * (focal_of(left) + focal_of(right));
   }
 
   /// The right eye's lines of sight are made anew where the focal length is so far from what they were made for that
@@ -120,6 +120,10 @@ class PairOfLenses {
  private:
   static Eigen::Vector2d centre_of(const CameraModel& model) {
     return project(model, Eigen::Vector3d::UnitZ()).value_or(Eigen::Vector2d::Zero());
+  }
+  static double focal_of(const CameraModel& model) {
+    const auto ahead = project_with_jacobian(model, Eigen::Vector3d::UnitZ());
+    return ahead ? std::sqrt(std::abs(ahead->by_point.leftCols<2>().determinant())) : 0;
   }
   // A larger focal length sees a pixel nearer to the axis.
   static Sight sight_of(const CameraModel& model, const Eigen::Vector2d& pixel, const Eigen::Vector2d& centre,
@@ -329,11 +333,6 @@ Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection
   const Eigen::Quaterniond swing = Eigen::AngleAxisd(c.baseline_down_rad, Eigen::Vector3d::UnitZ()) *
                                    Eigen::AngleAxisd(-c.baseline_ahead_rad, Eigen::Vector3d::UnitY());
   return {left_from_right.rotation() * turn, swing * left_from_right.translation()};
-}
-
-double middle_focal_px(const CameraModel& model) {
-  const auto ahead = project_with_jacobian(model, Eigen::Vector3d::UnitZ());
-  return ahead ? std::sqrt(std::abs(ahead->by_point.leftCols<2>().determinant())) : 0;
 }
 
 double cost_of_rows(const std::vector<double>& row_error_px) {

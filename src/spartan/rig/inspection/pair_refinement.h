@@ -29,9 +29,6 @@ struct PairCorrection {
 /// left_from_right with the correction taken in.
 Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection& correction);
 
-/// Pixels per radian in the middle of the view; 0 where the model sees nothing straight ahead.
-double middle_focal_px(const CameraModel& model);
-
 /// Where matches lie in the rectified view of a pair, at the scale of `focal_px`. NaN where a model has no line of
 /// sight.
 struct RectifiedMatches {
