@@ -280,7 +280,11 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   if (a.apply.empty()) return kDone;
   const auto sentences = write_corrected_rig(*read, inspected, a.apply);
   if (!sentences) return failure(sentences);
-  if (context.json) return kDone;
+  if (context.json) {
+    // The findings tell the first; the rest is to be known.
+    for (std::size_t i = 1; i < sentences->size(); ++i) context.log.warning((*sentences)[i]);
+    return kDone;
+  }
   if (Status printed = print(fmt::format("{}\n", fmt::join(*sentences, "\n"))); !printed) return failure(printed);
   return kDone;
 }

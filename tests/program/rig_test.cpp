@@ -263,6 +263,8 @@ TEST_F(RigInspectPictures, TellsOfMasksOfAnotherSize) {
       "\ncamera left: its self-mask mask.png is still that of the other size: it must be 320 x 240 px\n";
   testing::write_gray_png(folder_.path() + "/mask.png", 640, 480);
   EXPECT_THAT(said(), HasSubstr(sentence));
+  EXPECT_THAT(inspect(rig, {picture(0), picture(1), "--apply", mended, "--json"}).err,
+              HasSubstr("camera left: its self-mask mask.png"));
   testing::write_gray_png(folder_.path() + "/mask.png", 320, 240);
   EXPECT_THAT(said(), Not(HasSubstr(sentence)));
 }
