@@ -146,14 +146,12 @@ TEST_P(PlantedCalibrationFaults, Sizes) {
 }
 
 TEST_P(PlantedCalibrationFaults, RowsAndLenses) {
-  expect_named(
-      "row_offset",
-      [&](Rig& rig) {
-        auto numbers = parameters(eye(rig, true).model);
-        numbers[1][1] += 2;
-        eye(rig, true).model = with_parameters(eye(rig, true).model, numbers);
-      },
-      0.005, 0.4);
+  for (const double rows_px : {2, -2, -5, 20}) {
+    SCOPED_TRACE(rows_px);
+    expect_named(
+        "row_offset", [&](Rig& rig) { eye(rig, true).model = with_rows_lower(eye(rig, true).model, rows_px); }, 0.005,
+        0.4);
+  }
   const auto pinhole = [&](Rig& rig, bool right) {
     eye(rig, right).model = std::get<RadialTangentialModel>(eye(rig, right).model).pinhole();
   };

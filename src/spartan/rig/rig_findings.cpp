@@ -58,6 +58,8 @@ double whole(double value) {
   return std::round(value) + 0.0;
 }
 
+constexpr const char* kMillimetres = ": is it in millimetres? In pixels it is that over the size of a pixel";
+
 // `who`: "camera left", or both where they are equal.
 void check_camera(const std::string& who, const Camera& camera, ImageSize picture, std::vector<RigFinding>& findings) {
   const auto mismatch = [&](const std::string& text, double value) {
@@ -97,16 +99,16 @@ void check_camera(const std::string& who, const Camera& camera, ImageSize pictur
     return mismatch(fmt::format("fx is {:.1f} and fy {:.1f} px: is one of them that of another picture size?", fx, fy),
                     aspect_of(*axis));
   }
-  if (!has_possible_focal(camera)) {
-    return mismatch(fmt::format("a focal length of {:.3g} px for pictures of {} px: no lens has such a view. Is it in "
-                                "millimetres? In pixels it is that divided by the size of a pixel",
-                                fx, width),
-                    fx);
-  }
   const double view_deg = 2 * std::atan(0.5 * width / fx) * kDegreesPerRadian;
   if (is_linear(camera) && !(view_deg > kNarrowest_deg && view_deg < kWidestLinear_deg)) {
-    mismatch(fmt::format("a focal length of {:.1f} px gives a view of {:.1f}° for {} px", fx, view_deg, width),
-             view_deg);
+    return mismatch(fmt::format("a focal length of {:.1f} px gives a view of {:.1f}° for {} px{}", fx, view_deg, width,
+                                fx < width ? kMillimetres : ""),
+                    view_deg);
+  }
+  if (!has_possible_focal(camera)) {
+    mismatch(fmt::format("a focal length of {:.1f} px is that of no lens for pictures of {} px{}", fx, width,
+                         fx < width ? kMillimetres : ""),
+             fx);
   }
 }
 

@@ -61,6 +61,7 @@ TEST(RigFindings, NumbersOfAnotherPictureSize) {
   expect_doubt(rig_with(beside, PinholeModel{20, 20, 319.5, 239.5}), "size_mismatch", 2 * std::atan(16) / kDegree);
   expect_doubt(rig_with(beside, PinholeModel{20000, 20000, 319.5, 239.5}), "size_mismatch",
                2 * std::atan(0.016) / kDegree);
+  expect_doubt(rig_with(beside, RadialTangentialModel({6, 6, 319.5, 239.5}, {-0.28, 0.07})), "size_mismatch", 6);
   // An axis that lies aside, or another lens, is no other size.
   EXPECT_TRUE(doubts(rig_with(beside, PinholeModel{500, 500, 400, 180})).empty());
   EXPECT_TRUE(doubts(rig_with(beside, PinholeModel{600, 600, 319.5, 239.5})).empty());

@@ -85,7 +85,7 @@ class Checker {
     if (matches >= kLeastMatches && spread) return false;
     if (found("not_enough_texture")) return true;
     add("not_enough_texture",
-        check_.map.empty()
+        matches == check_.matches
             ? fmt::format("only {} matches: too little to judge by; more shots tell more", matches)
             : fmt::format(
                   "only {} of {} matches agree, in {} of {} parts of the picture: too little to judge by; more shots "
