@@ -1,5 +1,8 @@
 #include "spartan/rig/inspection/pair_check.h"
 
+#include <algorithm>
+
+#include "spartan/rig/models/model_changes.h"
 #include "spartan/testing/seen_pair.h"
 
 namespace spartan {
@@ -110,6 +113,35 @@ TEST(PairCheck, FarViewsDoNotTellTheEyes) {
     off.yaw_rad = yaw_deg * testing::kDegree;
     const PairCheck result = check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), far);
     EXPECT_THAT(ids(result), IsEmpty()) << yaw_deg;
+  }
+}
+
+// On either side of each limit of check_pair(). Rows are off besides, so that there is something to put right.
+TEST(PairCheck, FindingsBeginAtTheirLimits) {
+  const Rig truth = true_rig();
+  const auto with = [&](const PairCorrection& off, double rows_px) {
+    Rig rig = with_pose(truth, corrected_left_from_right(left_from_right(truth), off));
+    rig.cameras[1].model = with_rows_lower(with_focal_times(rig.cameras[1].model, off.focal_ratio), rows_px);
+    return ids(check(rig, look(truth, 1500)));
+  };
+  constexpr double kDegree = testing::kDegree;
+  EXPECT_THAT(with({}, 0.4), IsEmpty());
+  EXPECT_THAT(with({}, 0.5), ElementsAre("row_offset")) << "0.57 px where the lens is straightened";
+  EXPECT_THAT(with({.roll_rad = 0.05 * kDegree}, 0.8), ElementsAre("row_offset")) << "0.33 px at the sides";
+  EXPECT_THAT(with({.roll_rad = 0.10 * kDegree}, 0.8), ElementsAre("row_offset", "roll_offset")) << "0.66 px";
+  EXPECT_THAT(with({.focal_ratio = 1.0022}, 0), IsEmpty());
+  EXPECT_THAT(with({.focal_ratio = 1.0040}, 0), ElementsAre("focal_ratio"));
+  EXPECT_THAT(with({.yaw_rad = -0.75 * kDegree}, 0), ElementsAre("rows_apart")) << "the lens may be it";
+  EXPECT_THAT(with({.yaw_rad = -0.95 * kDegree}, 0), ElementsAre("yaw_offset"));
+}
+
+// So little distortion is no pinhole's mistake.
+TEST(PairCheck, DistortionIsNamedWhereItShows) {
+  for (const double k1 : {-0.015, -0.04}) {
+    Rig truth = straight_rig();
+    truth.cameras[1].model = RadialTangentialModel({457.6, 456.1, 379.9, 255.2}, {k1, 0});
+    const std::vector<std::string> found = ids(check(straight_rig(), look(truth, 1500)));
+    EXPECT_EQ(std::count(found.begin(), found.end(), "distortion_ignored"), k1 < -0.02 ? 1 : 0) << k1;
   }
 }
 
