@@ -70,15 +70,15 @@ PairBelief with_rows_as_given(PairBelief belief) {
 PairBelief with_rows_moved(PairBelief belief, const std::vector<PixelMatch>& matches) {
   constexpr int kRounds = 4;  // rows of the rectified view are nearly those of the picture
   const std::vector<PixelMatch> seen = as_believed(belief, matches);
-  const PairBelief given = with_rows_as_given(std::move(belief));
+  belief = with_rows_as_given(std::move(belief));
   double lower_px = 0;
-  PairBelief moved = given;
+  PairBelief moved = belief;
   for (int round = 0; round < kRounds; ++round) {
     const RectifiedMatches rows = rectify_matches(moved.left.model, moved.right.model, moved.left_from_right, seen);
     const double higher_px = row_errors(rows.row_error_px).median_px;
-    if (!std::isfinite(higher_px)) return given;
+    if (!std::isfinite(higher_px)) return belief;
     lower_px -= higher_px;
-    moved.right.model = with_rows_lower(given.right.model, lower_px);
+    moved.right.model = with_rows_lower(belief.right.model, lower_px);
   }
   moved.rows_lower_px = lower_px;
   return moved;

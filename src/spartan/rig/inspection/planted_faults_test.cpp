@@ -262,6 +262,27 @@ TEST(PlantedFault, FocalLengthOfAnotherSizeInOneEye) {
   }
 }
 
+// By less than sizes usually differ, which looks like an error of the lens at first.
+TEST(PlantedFault, FocalLengthOfALittleOtherSizeInOneEye) {
+  const Rig truth = true_rig();
+  Rig rig = truth;
+  rig.cameras[1].model = with_focal_times(rig.cameras[1].model, 1.25);
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), ElementsAre("size_mismatch", "focal_ratio"));
+  EXPECT_NEAR(result.findings.at(0).value, 0.8, 0.005);
+  expect_mended(truth, result);
+}
+
+// Rows of pinholes do not tell a size that both have; a centre that is none does.
+TEST(PlantedFault, SizeOfTwoPinholes) {
+  const Rig truth = straight_rig();
+  Rig rig = truth;
+  for (Camera& c : rig.cameras) c.model = resized(c.model, 2);
+  const PairCheck result = check(rig, look(truth));
+  EXPECT_THAT(ids(result), Each(std::string("size_mismatch")));
+  EXPECT_NEAR(resolution(*result.corrected), resolution(truth), 1);
+}
+
 // Of two equal pinholes it may as well be the other one's.
 TEST(PlantedFault, FocalLengthOfAnotherSizeInOneOfTwoPinholes) {
   Rig truth = straight_rig();
