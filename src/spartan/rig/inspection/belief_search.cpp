@@ -24,8 +24,6 @@ constexpr double kGoodRows_px = 0.5, kUsableRows_px = 1.25, kLeastShare = 0.5;
 constexpr double kLargestTurn_rad = 12 * std::numbers::pi / 180, kLargestRadial = 1, kLargestFocal = 0.1;
 constexpr double kUsual = 0.25;
 constexpr double kLargestYaw_rad = 3 * std::numbers::pi / 180;
-// What is far away lies on both sides of infinity where a yaw is off by little.
-constexpr double kBeyondInfinity_px = -1.5;
 constexpr std::ptrdiff_t kSearchMatches = 250;
 
 // 1: as large as a correction may be.

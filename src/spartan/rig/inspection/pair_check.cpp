@@ -25,7 +25,7 @@ constexpr double kRowOffset_px = 0.5, kRollOffset_px = 0.5, kFocalRatio = 0.003,
 // large.
 constexpr double kYawOfLens_rad = 2 * 0.002 * std::numbers::sqrt2;
 constexpr double kYawSigmas = 2.6, kSigmas = 5;
-constexpr double kBeyondInfinity_px = -1.5, kBeyondShare = 0.02;
+constexpr double kBeyondShare = 0.02;  // of the matches
 
 double share_below(const std::vector<double>& values, double limit) {
   const auto below = std::count_if(values.begin(), values.end(), [&](double v) { return v < limit; });

@@ -38,6 +38,8 @@ struct RectifiedMatches {
 /// To compare beliefs about the same matches: Σ min(r²/σ², 9), σ = 0.3 px; a row that is no number counts 9.
 inline constexpr double kRowUnit_px = 0.3, kMostOfARow = 9;
 double cost_of_rows(const std::vector<double>& row_error_px);
+/// Nothing is beyond infinity; but what is far away lies on both sides of it where a yaw is off by little.
+inline constexpr double kBeyondInfinity_px = -1.5;
 RectifiedMatches rectify_matches(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
                                  const std::vector<PixelMatch>& matches);
 
