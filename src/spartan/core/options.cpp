@@ -24,6 +24,7 @@ class Tree {
   std::vector<Level> levels;
   std::vector<YAML::Node> lists;  // open ones, innermost last
   std::vector<std::string> faults;
+  std::vector<std::string> warnings;
 
   std::string place(const YAML::Node& node, std::string_view key) const {
     const YAML::Mark mark = node.Mark();
@@ -151,6 +152,20 @@ void Reader::field(std::string_view key, std::vector<double>& value, std::string
   value = *read;
 }
 
+void Reader::renamed(std::string_view old_key, std::string_view key) {
+  const auto former = tree_->find(old_key);
+  Tree::Level& level = tree_->levels.back();
+  level.known.erase(std::string(old_key));
+  if (!former) return;
+  if (tree_->find(key)) {
+    return tree_->fault(*former, old_key, fmt::format("is the former name of {}, which is given too", key));
+  }
+  tree_->warnings.push_back(fmt::format("{} is now called {}; the former name is accepted for this version only",
+                                        tree_->place(*former, old_key), key));
+  level.map[std::string(key)] = *former;
+  level.map.remove(std::string(old_key));
+}
+
 bool Reader::enter(std::string_view key) {
   const auto node = tree_->find(key);
   if (node && !node->IsMap() && !node->IsNull()) {
@@ -200,6 +215,36 @@ Status Reader::finish() {
   std::string text;
   for (const std::string& fault : tree_->faults) text += (text.empty() ? "" : "\n") + fault;
   return failure(ErrorCode::configuration, text, {}, "`spartan config dump` lists every option with its meaning");
+}
+
+std::vector<std::string> Reader::warnings() const {
+  return tree_->warnings;
+}
+
+void Validator::fault(std::string_view key, std::string_view what) {
+  faults_ += fmt::format("{}{}{} {}", faults_.empty() ? "" : "\n", prefix_, key, what);
+}
+void Validator::field(std::string_view key, const int& value, std::string_view, Bounds bounds) {
+  if (!inside(value, bounds)) fault(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
+}
+void Validator::field(std::string_view key, const double& value, std::string_view, Bounds bounds) {
+  if (!std::isfinite(value)) return fault(key, "must be a finite number");
+  if (!inside(value, bounds)) fault(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
+}
+void Validator::field(std::string_view key, const std::string& value, std::string_view,
+                      const std::vector<std::string>& choices) {
+  if (choices.empty() || std::find(choices.begin(), choices.end(), value) != choices.end()) return;
+  fault(key, fmt::format("is '{}', must be one of: {}", value, fmt::join(choices, ", ")));
+}
+void Validator::field(std::string_view key, const std::vector<double>& value, std::string_view, Bounds bounds) {
+  for (const double v : value) {
+    if (!inside(v, bounds)) return fault(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
+  }
+}
+Status Validator::finish(std::string_view name) const {
+  if (faults_.empty()) return {};
+  return failure(ErrorCode::configuration, faults_, std::string(name),
+                 "`spartan config dump` lists every option with its meaning");
 }
 
 void Lister::field(std::string_view key, const bool& value, std::string_view meaning) {

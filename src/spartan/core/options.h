@@ -9,10 +9,12 @@
 //     }
 //   };
 //
-// Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. A key carries
-// its unit (docs/conventions.md).
+// Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. An enum is a field
+// where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field or a
+// group accepts the key's former name, with a warning. A key carries its unit (docs/conventions.md).
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -38,6 +40,38 @@ inline Bounds between(double low, double high) {
   return {low, high};
 }
 
+/// The name of an enum's value in files. A function beside the enum lists them, found by the enum's namespace:
+///
+///   enum class Order { rows, columns };
+///   constexpr auto enum_names(Order) {
+///     return std::array{EnumName{Order::rows, "rows"}, EnumName{Order::columns, "columns"}};
+///   }
+template <class Enum>
+struct EnumName {
+  Enum value;
+  const char* name;
+};
+
+/// The name of a value that `enum_names` lists.
+template <class Enum>
+  requires std::is_enum_v<Enum>
+constexpr std::string_view name_of(Enum value) {
+  for (const auto& entry : enum_names(value)) {
+    if (entry.value == value) return entry.name;
+  }
+  return {};
+}
+
+/// The value with that name, if there is one.
+template <class Enum>
+  requires std::is_enum_v<Enum>
+constexpr std::optional<Enum> value_named(std::string_view name) {
+  for (const auto& entry : enum_names(Enum{})) {
+    if (name == entry.name) return entry.value;
+  }
+  return std::nullopt;
+}
+
 /// One line of an option listing: "reconstruction.sgm.p1", its value as YAML text, what it means.
 struct OptionLine {
   std::string key;
@@ -50,6 +84,13 @@ namespace options_detail {
 // A parsed YAML tree; hides the parser from this header.
 class Tree;
 
+template <class Enum>
+std::vector<std::string> choices_of() {
+  std::vector<std::string> names;
+  for (const auto& entry : enum_names(Enum{})) names.emplace_back(entry.name);
+  return names;
+}
+
 class Reader {
  public:
   explicit Reader(std::shared_ptr<Tree> tree) : tree_(std::move(tree)) {}
@@ -60,6 +101,14 @@ class Reader {
   void field(std::string_view key, std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
   void field(std::string_view key, std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  template <class Enum>
+    requires std::is_enum_v<Enum>
+  void field(std::string_view key, Enum& value, std::string_view meaning) {
+    std::string name(name_of(value));
+    field(key, name, meaning, choices_of<Enum>());
+    value = value_named<Enum>(name).value_or(value);
+  }
+  void renamed(std::string_view old_key, std::string_view key);
   template <class Group>
   void group(std::string_view key, Group& value) {
     if (enter(key)) {
@@ -81,7 +130,10 @@ class Reader {
     }
     close_list();
   }
+  /// All faults in one error.
   Status finish();
+  /// Warnings of former names that were used.
+  std::vector<std::string> warnings() const;
 
  private:
   bool enter(std::string_view key);
@@ -100,6 +152,12 @@ class Lister {
   void field(std::string_view key, const std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
   void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  template <class Enum>
+    requires std::is_enum_v<Enum>
+  void field(std::string_view key, const Enum& value, std::string_view meaning) {
+    field(key, std::string(name_of(value)), meaning, choices_of<Enum>());
+  }
+  void renamed(std::string_view, std::string_view) {}
   template <class Group>
   void group(std::string_view key, Group& value) {
     const std::size_t length = prefix_.size();
@@ -123,6 +181,40 @@ class Lister {
  private:
   static std::string in_flow_style(const std::vector<OptionLine>& lines);
   std::string prefix_;
+};
+
+class Validator {
+ public:
+  void field(std::string_view, const bool&, std::string_view) {}
+  void field(std::string_view key, const int& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const double& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const std::string& value, std::string_view meaning,
+             const std::vector<std::string>& choices = {});
+  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  template <class Enum>
+    requires std::is_enum_v<Enum>
+  void field(std::string_view key, const Enum& value, std::string_view) {
+    if (name_of(value).empty()) fault(key, "is not one of the values of its enum");
+  }
+  void renamed(std::string_view, std::string_view) {}
+  template <class Group>
+  void group(std::string_view key, Group& value) {
+    const std::size_t length = prefix_.size();
+    prefix_ += std::string(key) + ".";
+    value.describe(*this);
+    prefix_.resize(length);
+  }
+  template <class Group>
+  void list(std::string_view key, std::vector<Group>& values, std::string_view) {
+    for (std::size_t i = 0; i < values.size(); ++i) group(std::string(key) + "[" + std::to_string(i) + "]", values[i]);
+  }
+  /// All faults in one error.
+  Status finish(std::string_view name) const;
+
+ private:
+  void fault(std::string_view key, std::string_view what);
+  std::string prefix_;
+  std::string faults_;
 };
 
 Result<std::shared_ptr<Tree>> parse(const std::string& text, const std::string& name);
@@ -171,6 +263,36 @@ Result<Options> set_option(Options options, const std::string& assignment) {
     return failure(status);
   }
   return options;
+}
+
+/// Checks values that were set in code against the bounds and choices of their description. `name` is what the options
+/// are of ("odometry options"); the error (code `configuration`) names every field that is wrong, its value and bound.
+template <class Options>
+Status validate(Options options, std::string_view name) {
+  options_detail::Validator validator;
+  options.describe(validator);
+  return validator.finish(name);
+}
+
+/// "name:line: group.old is now called new" for each former name of an option that the text uses; parse_options() accepts
+/// them for one version. Empty where the text cannot be parsed.
+template <class Options>
+std::vector<std::string> renamed_options(const std::string& text, const std::string& name, Options options = {}) {
+  auto tree = options_detail::parse(text, name);
+  if (!tree) return {};
+  options_detail::Reader reader(*tree);
+  options.describe(reader);
+  return reader.warnings();
+}
+
+/// The same for one "group.key=value".
+template <class Options>
+std::vector<std::string> renamed_options(const std::string& assignment, Options options = {}) {
+  auto tree = options_detail::from_assignment(assignment);
+  if (!tree) return {};
+  options_detail::Reader reader(*tree);
+  options.describe(reader);
+  return reader.warnings();
 }
 
 /// Every option with its value and meaning, in the order of description.
