@@ -3,7 +3,6 @@
 set(SPARTAN_PACKAGES
   "Eigen3 3.4 NO_MODULE"
   "OpenCV 4.6 COMPONENTS core imgproc imgcodecs"
-  "Ceres 2.1"
   "libjpeg-turbo CONFIG"
   "hwy CONFIG"
   "TBB"
