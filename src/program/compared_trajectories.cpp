@@ -18,13 +18,13 @@ struct Estimate {
 };
 
 // Which trajectory of a run folder to take.
-Result<TrajectoryKind> choose_kind(const RunFolder& run, const std::string& asked) {
-  if (const auto kind = parse_trajectory_kind(asked)) return *kind;
-  if (!asked.empty()) return failure(ErrorCode::usage, "is no trajectory of a run", asked);
+Result<TrajectoryKind> choose_kind(const RunFolder& run, const std::string& requested) {
+  if (const auto kind = parse_trajectory_kind(requested)) return *kind;
+  if (!requested.empty()) return failure(ErrorCode::usage, "is not a trajectory of a run", requested);
   for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
     if (fs::exists(run.trajectory(kind))) return kind;
   }
-  return failure(ErrorCode::input, "holds no trajectory", run.path,
+  return failure(ErrorCode::input, "contains no trajectory", run.path,
                  "a run folder has trajectory_odometry.tum and others");
 }
 
@@ -46,7 +46,7 @@ Result<Estimate> load_estimate(const std::string& path, const std::string& kind)
     estimate.path = run.trajectory(*chosen);
   } else {
     if (!kind.empty()) {
-      return failure(ErrorCode::usage, "--trajectory chooses among those of a run folder, this is a file", path);
+      return failure(ErrorCode::usage, "--trajectory selects one of a run folder, but this is a file", path);
     }
     estimate.kind = kind_of_file(path);
     estimate.path = path;
@@ -54,7 +54,7 @@ Result<Estimate> load_estimate(const std::string& path, const std::string& kind)
   auto loaded = load_trajectory(estimate.path);
   if (!loaded) return failure(loaded);
   estimate.loaded = std::move(*loaded);
-  // A trajectory of a run means the body, and the run's rig knows what the recording's truth means.
+  // Trajectories of a run are poses of the body; the rig states which frame the truth of the recording uses.
   const fs::path rig_path = fs::path(estimate.path).parent_path() / "rig.yaml";
   if (estimate.kind != "file" && fs::exists(rig_path)) {
     const auto rig = read_rig_yaml(rig_path.string());
@@ -70,26 +70,26 @@ Result<std::string> find_truth(const std::string& path) {
                            "state_groundtruth_estimate0/data.csv"}) {
     if (fs::exists(fs::path(path) / name)) return (fs::path(path) / name).string();
   }
-  return failure(ErrorCode::input, "is a folder without a true trajectory", path,
-                 "known are truth/poses.tum, poses.txt and mav0/state_groundtruth_estimate0/data.csv");
+  return failure(ErrorCode::input, "is a folder without a ground-truth trajectory", path,
+                 "expected truth/poses.tum, poses.txt and mav0/state_groundtruth_estimate0/data.csv");
 }
 
-void take_stamps_over(Trajectory& to, const Trajectory& from) {
+void copy_stamps(Trajectory& to, const Trajectory& from) {
   for (std::size_t i = 0; i < to.size(); ++i) to[i].stamp = from[i].stamp;
 }
 
-// A KITTI file without times.txt has a pose for every frame, and so has its counterpart.
-Status agree_on_stamps(LoadedTrajectory& estimate, LoadedTrajectory& truth) {
+// A KITTI file without times.txt has one pose per frame, and so must the other file.
+Status align_stamps(LoadedTrajectory& estimate, LoadedTrajectory& truth) {
   if (estimate.has_stamps == truth.has_stamps) return {};
   if (estimate.poses.size() != truth.poses.size()) {
     return failure(ErrorCode::input,
-                   "a KITTI pose file without times.txt beside it cannot be compared with one of "
-                   "another number of poses");
+                   "a KITTI pose file without times.txt beside it cannot be compared with a file "
+                   "that has another number of poses");
   }
   if (estimate.has_stamps) {
-    take_stamps_over(truth.poses, estimate.poses);
+    copy_stamps(truth.poses, estimate.poses);
   } else {
-    take_stamps_over(estimate.poses, truth.poses);
+    copy_stamps(estimate.poses, truth.poses);
   }
   return {};
 }
@@ -111,7 +111,7 @@ Result<ComparedTrajectories> find_trajectories(const std::string& estimate_path,
   if (!truth_file) return failure(truth_file);
   auto truth = load_trajectory(*truth_file);
   if (!truth) return failure(truth);
-  if (const Status status = agree_on_stamps(estimate->loaded, *truth); !status) return failure(status);
+  if (const Status status = align_stamps(estimate->loaded, *truth); !status) return failure(status);
   return ComparedTrajectories{std::move(estimate->loaded.poses), std::move(truth->poses), estimate->path, *truth_file,
                               estimate->kind};
 }

@@ -18,8 +18,8 @@ struct ComparedTrajectories {
 /// `truth`: a trajectory file or a recording with truth. Poses of a run are turned into the convention that its
 /// rig.yaml states. Where only one side knows its time stamps and both have a pose for every frame (KITTI), the other
 /// one takes them over line by line.
-/// Errors: `input` for what is missing or unreadable, `usage` for a kind asked of a plain file, `configuration` for a
-/// run whose rig is invalid.
+/// Errors: `input` for what is missing or unreadable, `usage` for a kind requested of a plain file, `configuration` for
+/// a run whose rig is invalid.
 Result<ComparedTrajectories> find_trajectories(const std::string& estimate, const std::string& truth,
                                                const std::string& kind);
 

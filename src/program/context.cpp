@@ -24,28 +24,31 @@ ExitCode exit_code(ErrorCode code) {
   return kInternalFault;
 }
 
-CLI::App* add_verb(CLI::App& app, Context& context, const std::string& name, const std::string& summary,
-                   const std::string& example, VerbBody body) {
-  CLI::App* verb = app.add_subcommand(name, summary);
-  verb->footer("Example:\n  spartan " + example);
-  auto* quiet = verb->add_flag("-q,--quiet", context.quiet, "say only what went wrong");
-  verb->add_flag("-v,--verbose", context.verbose, "say more")->excludes(quiet);
-  verb->callback([&context, body = std::move(body)] { context.chosen = body; });
-  return verb;
+CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, const std::string& summary,
+                      const std::string& example, CommandBody body) {
+  CLI::App* command = app.add_subcommand(name, summary);
+  command->footer("Example:\n  spartan " + example);
+  auto* quiet = command->add_flag("-q,--quiet", context.quiet, "Print errors only.");
+  command->add_flag("-v,--verbose", context.verbose, "Print debug messages, too.")->excludes(quiet);
+  command->callback([&context, body = std::move(body)] { context.chosen = body; });
+  return command;
 }
 
-void add_json_flag(CLI::App& verb, Context& context) {
-  verb.add_flag("--json", context.json, "print JSON, and nothing else, to standard output");
+void add_json_flag(CLI::App& command, Context& context) {
+  command.add_flag("--json", context.json,
+                   "Print one JSON object to standard output and nothing else; messages go to standard error.");
 }
 
-void add_threads_option(CLI::App& verb, Context& context) {
-  verb.add_option("--threads", context.threads, "how many threads may work (default: one per core)")
+void add_threads_option(CLI::App& command, Context& context) {
+  command
+      .add_option("--threads", context.threads,
+                  "Maximum number of threads (default: number of cores). Results do not depend on it.")
       ->check(CLI::Range(1, 1024));
 }
 
 Status print(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
-    return failure(ErrorCode::output, std::string("cannot be written: ") + std::strerror(errno), "standard output");
+    return failure(ErrorCode::output, std::string("cannot write: ") + std::strerror(errno), "standard output");
   }
   return {};
 }

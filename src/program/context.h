@@ -1,9 +1,10 @@
-// What all verbs share: where messages go, the common flags, exit codes.
+// What all commands share: the log, the common flags, the exit codes.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
@@ -23,24 +24,37 @@ enum ExitCode : int {
 };
 ExitCode exit_code(ErrorCode code);
 
-/// What a verb does once its options are read: an exit code (kDone, kLost), or an error that main prints.
-using VerbBody = std::function<Result<ExitCode>()>;
+/// The body of a command, called after its options were parsed. Returns an exit code (kDone, kLost), or an error that
+/// main prints.
+using CommandBody = std::function<Result<ExitCode>()>;
 
 struct Context {
-  Log log;            ///< ready when a VerbBody runs
+  Log log;            ///< ready when a CommandBody runs
   int threads = 1;    ///< `--threads`; all cores without it
   bool json = false;  ///< `--json`: only JSON goes to standard output
   bool quiet = false, verbose = false;
-  VerbBody chosen;  ///< the body of the verb that was given
+  CommandBody chosen;                 ///< body of the selected command
+  std::vector<std::string> warnings;  ///< printed before the body runs: former names of flags
 };
 
-/// Adds a verb with `-q` and `-v`. `example` is shown at the end of its help, without the word `spartan`.
-CLI::App* add_verb(CLI::App& app, Context& context, const std::string& name, const std::string& summary,
-                   const std::string& example, VerbBody body);
-/// `--json`, for verbs that have it.
-void add_json_flag(CLI::App& verb, Context& context);
-/// `--threads N`, for verbs that have it.
-void add_threads_option(CLI::App& verb, Context& context);
+/// Adds a command with `-q` and `-v`. `example` is shown at the end of its help; it starts after the word `spartan`.
+CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, const std::string& summary,
+                      const std::string& example, CommandBody body);
+/// `--json`, for commands that have it.
+void add_json_flag(CLI::App& command, Context& context);
+/// `--threads N`, for commands that have it.
+void add_threads_option(CLI::App& command, Context& context);
+
+/// Accepts the former name of an option for one version, with a warning; help does not show it.
+template <class T>
+void add_former_name(CLI::App& command, Context& context, const std::string& former, const std::string& name,
+                     T& value) {
+  const auto warn = [&context, former, name](const std::string&) {
+    context.warnings.push_back(former + " is now called " + name +
+                               "; the former name is accepted for this version only");
+  };
+  command.add_option(former, value)->group("")->each(warn);
+}
 
 /// Writes to standard output and flushes; code `output` where that fails (a full disk behind a pipe).
 Status print(const std::string& text);

@@ -69,7 +69,7 @@ class GroundJson {
     for (const char* key : {"pan_overlap_percent", "pan_overlap_far_percent", "pan_overlap_far_stereo_percent",
                             "azimuth_far_deg", "azimuth_far_stereo_deg", "azimuth_held_from_m", "azimuth_held_to_m",
                             "azimuth_far_sectors_deg", "azimuth_far_stereo_sectors_deg"}) {
-      add(key, nullptr, no_pair ? no_pair : "no pans are asked for");
+      add(key, nullptr, no_pair ? no_pair : "no pans are required");
     }
   }
   const Json& figures() const { return figures_; }
@@ -85,7 +85,7 @@ class GroundJson {
     add("pan_overlap_percent", percent(pans.overlap), single);
     add("pan_overlap_far_percent", percent(pans.far_overlap), single);
     add("pan_overlap_far_stereo_percent", percent(pans.far_overlap_stereo),
-        pans.overlap ? "both eyes share no ground" : single);
+        pans.overlap ? "the two cameras share no ground" : single);
     add("azimuth_far_deg", number(pans.azimuth_far.width_deg()));
     add("azimuth_far_stereo_deg", number(pans.azimuth_far_stereo.width_deg()));
     add("azimuth_held_from_m", number(held.from_m));
@@ -139,7 +139,7 @@ class Pieces {
   Status status_;
 };
 
-// The text of a value that stands so many levels deep. Line ends inside of its strings are escaped.
+// The text of a value nested `levels` deep. Line ends inside its strings are escaped.
 std::string dump_inside(const Json& json, std::size_t levels) {
   std::string text;
   for (const char letter : json.dump(2)) {

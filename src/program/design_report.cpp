@@ -49,23 +49,23 @@ std::string name_of(DesignCriterion criterion) {
   return "";
 }
 
-std::string pair_text(const std::string& name, const PairRequirements& asked, const PairDesign& design,
+std::string pair_text(const std::string& name, const PairRequirements& required, const PairDesign& design,
                       std::size_t rows) {
   std::vector<std::string> order;
-  order.reserve(asked.order.size());
-  for (const DesignCriterion criterion : asked.order) order.push_back(name_of(criterion));
+  order.reserve(required.order.size());
+  for (const DesignCriterion criterion : required.order) order.push_back(name_of(criterion));
   std::string text =
       fmt::format("{} pair: {} of {} combinations are feasible", name, design.feasible.size(), design.combinations);
   if (design.with_pan_overlap_count) {
     text += fmt::format("; with neighbouring pans that overlap by at least {} %: {}",
-                        asked.pans->smallest_overlap_percent, *design.with_pan_overlap_count);
+                        required.pans->smallest_overlap_percent, *design.with_pan_overlap_count);
   }
   text += fmt::format(
-      "\nasked for: {} m resolution to {} m at c = {} px, stereo angle at most {} deg, search range at most "
-      "{} %, baseline at least {} m, eyes at least {} m high (they are {} m high)\n",
-      asked.range_resolution_m, asked.range_m, asked.disparity_accuracy_px, asked.largest_stereo_angle_deg,
-      asked.largest_search_percent, asked.smallest_baseline_m, asked.smallest_height_m, asked.height_m);
-  text += fmt::format("order: {}; what is equal stands in the order of the lists ({} are as good as the best)\n",
+      "\nrequired: {} m resolution to {} m at c = {} px, stereo angle at most {} deg, search range at most "
+      "{} %, baseline at least {} m, camera height at least {} m (it is {} m)\n",
+      required.range_resolution_m, required.range_m, required.disparity_accuracy_px, required.largest_stereo_angle_deg,
+      required.largest_search_percent, required.smallest_baseline_m, required.smallest_height_m, required.height_m);
+  text += fmt::format("order: {}; ties keep the order of the lists ({} tie with the best)\n",
                       fmt::join(order, ", then "), design.equally_good);
   text += kHead;
   const std::size_t listed = std::min(rows, design.feasible.size());
@@ -81,9 +81,9 @@ std::string pair_text(const std::string& name, const PairRequirements& asked, co
     text += "margins of the best with enough overlap: " + margins_of(*design.best_with_pan_overlap) + "\n";
   }
   if (design.published) {
-    text += fmt::format(
-        "published pair ({}, {}): margins: {}\n", design.published->feasible ? "feasible" : "not feasible",
-        design.published_on_offer ? "on offer" : "not among the combinations", margins_of(*design.published));
+    text +=
+        fmt::format("published pair ({}, {}): margins: {}\n", design.published->feasible ? "feasible" : "not feasible",
+                    design.published_on_offer ? "in the lists" : "not in the lists", margins_of(*design.published));
   }
   return text + "\n";
 }
@@ -95,11 +95,11 @@ std::string ground_text(const RigDesign& design) {
   if (!design.pans) return text;
   const PanFigures& pans = *design.pans;
   if (pans.overlap) text += overlaps_in_words(pans) + "\n";
-  text +=
-      fmt::format("of the asked azimuth the pans see at the far edge: {:.1f} deg (one eye), {:.1f} deg (both eyes)\n",
-                  pans.azimuth_far.width_deg(), pans.azimuth_far_stereo.width_deg());
-  if (!pans.azimuth_held) return text + "both eyes see all of it at no distance\n";
-  return text + fmt::format("both eyes see all of it from {:.2f} m to {:.2f} m\n", pans.azimuth_held->from_m,
+  text += fmt::format(
+      "azimuth seen by the pans at the far edge, of the required one: {:.1f} deg (one camera), {:.1f} deg (both)\n",
+      pans.azimuth_far.width_deg(), pans.azimuth_far_stereo.width_deg());
+  if (!pans.azimuth_held) return text + "both cameras see all of it at no distance\n";
+  return text + fmt::format("both cameras see all of it from {:.2f} m to {:.2f} m\n", pans.azimuth_held->from_m,
                             pans.azimuth_held->to_m);
 }
 

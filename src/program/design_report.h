@@ -1,4 +1,4 @@
-// A rig design in words, as JSON and as a table.
+// A rig design as JSON, CSV and text.
 #pragma once
 
 #include <functional>

@@ -40,7 +40,7 @@ Json to_json(const DisparityMetrics& metrics) {
   if (metrics.nonocc) {
     json["nonocc"] = to_json(*metrics.nonocc);
   } else {
-    json["reasons"] = {{"nonocc", "no mask tells occluded pixels from others"}};
+    json["reasons"] = {{"nonocc", "no mask that marks occluded pixels was given"}};
   }
   return json;
 }

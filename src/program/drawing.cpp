@@ -92,18 +92,18 @@ void paint_line(cv::Mat& canvas, const Points& points, const Pen& pen) {
 
 // Writes with the stroke font, which has no sign for degrees: that is a ring. Gives the width; paints where `canvas`
 // is.
-double stroke_words(cv::Mat* canvas, const Eigen::Vector2d& foot, const std::string& words, double scale, int thickness,
-                    const cv::Scalar& colour) {
+double stroke_text(cv::Mat* canvas, const Eigen::Vector2d& foot, const std::string& text, double scale, int thickness,
+                   const cv::Scalar& colour) {
   double x = foot.x();
-  for (std::size_t from = 0; from <= words.size();) {
-    const std::size_t sign = std::min(words.find(kDegreeSign, from), words.size());
-    const std::string piece = words.substr(from, sign - from);
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t sign = std::min(text.find(kDegreeSign, from), text.size());
+    const std::string piece = text.substr(from, sign - from);
     int baseline = 0;
     if (canvas && !piece.empty()) {
       cv::putText(*canvas, piece, {cvRound(x), cvRound(foot.y())}, kFont, scale, colour, thickness, cv::LINE_AA);
     }
     if (!piece.empty()) x += cv::getTextSize(piece, kFont, scale, 1, &baseline).width;  // a halo's pen moves nothing
-    if (sign < words.size()) {
+    if (sign < text.size()) {
       const double radius = 3.2 * scale;
       if (canvas) {
         cv::circle(*canvas, {cvRound(x + radius), cvRound(foot.y() - kCapitals_px * scale + radius)}, cvRound(radius),
@@ -116,14 +116,14 @@ double stroke_words(cv::Mat* canvas, const Eigen::Vector2d& foot, const std::str
   return x - foot.x();
 }
 
-void paint_words(cv::Mat& canvas, const Eigen::Vector2d& foot, const std::string& words, const Lettering& lettering) {
+void paint_text(cv::Mat& canvas, const Eigen::Vector2d& foot, const std::string& text, const Lettering& lettering) {
   const double scale = kOversampling * lettering.size_px * kCapitalsOfSize / kCapitals_px;
   const int thickness = std::max(1, cvRound(kOversampling * lettering.size_px / 13));
-  const double width = stroke_words(nullptr, {0, 0}, words, scale, thickness, {});
+  const double width = stroke_text(nullptr, {0, 0}, text, scale, thickness, {});
   const double part = lettering.anchor == Anchor::start ? 0 : lettering.anchor == Anchor::middle ? 0.5 : 1;
   const Eigen::Vector2d start = kOversampling * foot - Eigen::Vector2d(part * width, 0);
-  if (lettering.halo) stroke_words(&canvas, start, words, scale, thickness + 4 * kOversampling, cv::Scalar::all(255));
-  stroke_words(&canvas, start, words, scale, thickness, scalar(lettering.colour));
+  if (lettering.halo) stroke_text(&canvas, start, text, scale, thickness + 4 * kOversampling, cv::Scalar::all(255));
+  stroke_text(&canvas, start, text, scale, thickness, scalar(lettering.colour));
 }
 
 }  // namespace
@@ -139,7 +139,7 @@ std::string Drawing::to_svg() const {
       return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"{}/>\n",
                          svg_points(l.points), hex(l.pen.colour), l.pen.width_px, dash);
     }
-    std::string operator()(const Words& w) const {
+    std::string operator()(const Text& w) const {
       const char* const anchors[] = {"start", "middle", "end"};
       const char* halo = w.lettering.halo
                              ? " stroke=\"#ffffff\" stroke-width=\"4\" stroke-linejoin=\"round\" paint-order=\"stroke\""
@@ -147,7 +147,7 @@ std::string Drawing::to_svg() const {
       return fmt::format(
           "<text x=\"{:.2f}\" y=\"{:.2f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\"{}>{}</text>\n", w.foot.x(),
           w.foot.y(), w.lettering.size_px, anchors[static_cast<int>(w.lettering.anchor)], hex(w.lettering.colour), halo,
-          html_text(w.words));
+          html_text(w.text));
     }
   };
   std::string text = fmt::format(
@@ -164,7 +164,7 @@ Image<Rgb8> Drawing::to_image() const {
     cv::Mat& canvas;
     void operator()(const Area& a) const { paint_area(canvas, a.corners, a.paint); }
     void operator()(const Line& l) const { paint_line(canvas, l.points, l.pen); }
-    void operator()(const Words& w) const { paint_words(canvas, w.foot, w.words, w.lettering); }
+    void operator()(const Text& w) const { paint_text(canvas, w.foot, w.text, w.lettering); }
   };
   for (const Part& part : parts_) std::visit(PaintPart{canvas}, part);
   Image<Rgb8> image(width_px_, height_px_);

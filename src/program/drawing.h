@@ -1,4 +1,4 @@
-// A technical drawing, described once, put out as SVG or as pixels.
+// A vector drawing that can be written as SVG or rendered to pixels.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,17 +17,17 @@ struct Paint {
 struct Pen {
   Rgb8 colour;
   double width_px = 1;
-  double dash_px = 0;  ///< length of dashes and gaps; 0: a whole line
+  double dash_px = 0;  ///< length of dashes and gaps; 0: a solid line
 };
 enum class Anchor { start, middle, end };
 struct Lettering {
   Rgb8 colour;
   double size_px = 14;
   Anchor anchor = Anchor::start;
-  bool halo = false;  ///< a white rim, for letters on colours
+  bool halo = false;  ///< white outline, for text on colors
 };
 
-/// x to the right, y down, in pixels of the finished picture. What is drawn later lies on top.
+/// Coordinates in pixels of the result, x right, y down. Later parts cover earlier ones.
 class Drawing {
  public:
   using Points = std::vector<Eigen::Vector2d>;
@@ -36,9 +36,9 @@ class Drawing {
 
   void fill(Points corners, const Paint& paint) { parts_.emplace_back(Area{std::move(corners), paint}); }
   void line(Points points, const Pen& pen) { parts_.emplace_back(Line{std::move(points), pen}); }
-  /// One line of letters that begins, has its middle or ends at `foot`. ASCII and the sign for degrees.
-  void text(const Eigen::Vector2d& foot, const std::string& words, const Lettering& lettering) {
-    parts_.emplace_back(Words{foot, words, lettering});
+  /// One line of text, anchored at `foot` on its baseline. ASCII and the degree sign.
+  void text(const Eigen::Vector2d& foot, const std::string& text, const Lettering& lettering) {
+    parts_.emplace_back(Text{foot, text, lettering});
   }
 
   std::string to_svg() const;
@@ -53,12 +53,12 @@ class Drawing {
     Points points;
     Pen pen;
   };
-  struct Words {
+  struct Text {
     Eigen::Vector2d foot;
-    std::string words;
+    std::string text;
     Lettering lettering;
   };
-  using Part = std::variant<Area, Line, Words>;
+  using Part = std::variant<Area, Line, Text>;
 
   int width_px_, height_px_;
   std::vector<Part> parts_;

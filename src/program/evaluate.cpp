@@ -1,11 +1,11 @@
-// spartan evaluate: compares a trajectory with the truth.
+// spartan evaluate: compares a trajectory with ground truth.
 #include <fmt/format.h>
 
 #include <memory>
 
+#include "program/commands.h"
 #include "program/compared_trajectories.h"
 #include "program/trajectory_report.h"
-#include "program/verbs.h"
 #include "spartan/eval/trajectory_metrics.h"
 
 namespace spartan::program {
@@ -37,33 +37,50 @@ Result<ExitCode> evaluate(const Context& context, const Arguments& arguments) {
 
 void add_evaluate(CLI::App& app, Context& context) {
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb = add_verb(app, context, "evaluate", "Compare a trajectory with the truth",
-                            "evaluate run_06 --truth $SPARTAN_DATA/kitti_06 --align se3",
-                            [&context, arguments] { return evaluate(context, *arguments); });
-  verb->add_option("estimate", arguments->estimate, "a run folder or a trajectory file")
+  CLI::App* command =
+      add_command(app, context, "evaluate", "Compare a trajectory with ground truth: ATE, RPE, drift, segment errors",
+                  "evaluate run_06 --truth $SPARTAN_DATA/kitti_06 --align se3",
+                  [&context, arguments] { return evaluate(context, *arguments); });
+  command
+      ->add_option("estimate", arguments->estimate,
+                   "Estimated trajectory: a run folder, or a file (TUM, KITTI, EuRoC csv).")
       ->required()
       ->option_text("EST");
-  verb->add_option("--truth", arguments->truth, "a trajectory file (TUM, KITTI, EuRoC csv) or a recording with truth")
+  command
+      ->add_option("--truth", arguments->truth,
+                   "Ground truth: a trajectory file (TUM, KITTI, EuRoC csv), or a recording that has one.")
       ->required()
       ->option_text("GT");
-  verb->add_option("--align", arguments->align,
-                   "what is fitted before comparing: none, first, yaw, se3 (default), sim3")
+  command
+      ->add_option("--align", arguments->align,
+                   "Alignment of the estimate before comparing: none, first (first pose), yaw (yaw and translation), "
+                   "se3 (default), "
+                   "sim3 (with scale).")
       ->check(CLI::IsMember({"none", "first", "yaw", "se3", "sim3"}))
       ->option_text("HOW");
-  verb->add_option("--trajectory", arguments->trajectory,
-                   "which one of a run: odometry, slam or localization (default: the best there is)")
+  command
+      ->add_option(
+          "--trajectory", arguments->trajectory,
+          "Trajectory of the run folder: odometry, slam or localization (default: the last of these that exists).")
       ->check(CLI::IsMember({"odometry", "slam", "localization"}))
       ->option_text("WHICH");
-  auto* segments = verb->add_option("--segments", arguments->options.segment_lengths_m,
-                                    "lengths in metres, as 5,10,20 (default: 1,2,5,10,20,40,100)")
+  auto* segments = command
+                       ->add_option("--segments", arguments->options.segment_lengths_m,
+                                    "Lengths in metres of the segments over which relative errors are averaged "
+                                    "(default: 1,2,5,10,20,40,100).")
                        ->delimiter(',')
                        ->check(CLI::PositiveNumber)
                        ->option_text("M,M,…");
-  verb->add_flag("--kitti", arguments->kitti, "segments of 100, 200 … 800 m from every 10th frame")->excludes(segments);
-  verb->add_option("--max-dt", arguments->options.max_dt_s, "largest time between poses that are compared, s (0.02)")
+  command
+      ->add_flag("--kitti", arguments->kitti,
+                 "Use the segments of the KITTI benchmark: 100, 200 … 800 m, starting at every 10th frame.")
+      ->excludes(segments);
+  command
+      ->add_option("--max-dt", arguments->options.max_dt_s,
+                   "Maximum time difference in seconds of two poses that are compared (default 0.02).")
       ->check(CLI::NonNegativeNumber)
       ->option_text("S");
-  add_json_flag(*verb, context);
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

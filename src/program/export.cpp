@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "program/verbs.h"
+#include "program/commands.h"
 
 namespace spartan::program {
 namespace {
@@ -11,7 +11,7 @@ struct ExportArguments {
   std::string run, format, output, trajectory;
 };
 
-Result<ExitCode> export_verb(const Context& context, const ExportArguments& arguments) {
+Result<ExitCode> export_command(const Context& context, const ExportArguments& arguments) {
   const auto format = parse_export_format(arguments.format);
   if (!format) return failure(format);
   const auto kind = parse_trajectory_kind(arguments.trajectory);
@@ -27,17 +27,18 @@ Result<ExitCode> export_verb(const Context& context, const ExportArguments& argu
 
 void add_export(CLI::App& app, Context& context) {
   auto a = std::make_shared<ExportArguments>();
-  CLI::App* verb =
-      add_verb(app, context, "export", "Write a run's results in other formats",
-               "export run_06 --format kitti -o 06.txt", [&context, a] { return export_verb(context, *a); });
-  verb->add_option("run", a->run, "the run folder")->required();
-  verb->add_option("--format", a->format,
-                   "tum, kitti, euroc, csv (trajectories), geotiff (the global map) or ply (terrain)")
+  CLI::App* command =
+      add_command(app, context, "export", "Export a run's trajectory, map or point cloud in other formats",
+                  "export run_06 --format kitti -o 06.txt", [&context, a] { return export_command(context, *a); });
+  command->add_option("run", a->run, "Run folder.")->required();
+  command
+      ->add_option("--format", a->format,
+                   "Format: tum, kitti, euroc or csv (trajectory), geotiff (global map), ply (terrain point cloud).")
       ->required();
-  verb->add_option("-o,--output", a->output, "the file to write")->required();
-  verb->add_option("--trajectory", a->trajectory, "which one: odometry, slam or localization (default)")
+  command->add_option("-o,--output", a->output, "File to write.")->required();
+  command->add_option("--trajectory", a->trajectory, "Trajectory: odometry, slam or localization (default).")
       ->check(CLI::IsMember({"odometry", "slam", "localization"}));
-  add_threads_option(*verb, context);
+  add_threads_option(*command, context);
 }
 
 }  // namespace spartan::program

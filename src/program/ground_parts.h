@@ -1,4 +1,4 @@
-// What the parts of the picture of the ground have in common.
+// What the parts of the ground figure share.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ using Points = Drawing::Points;
 constexpr int kWidth_px = 1200;
 constexpr double kMargin_px = 40;
 
-/// Colours that people tell apart who see no red or no green (after Okabe and Ito), lighter for what fewer eyes see.
+/// Colors for color-blind readers (Okabe and Ito), lighter where fewer cameras see.
 inline constexpr Rgb8 kInk{30, 30, 30}, kFaint{150, 150, 150}, kSoil{120, 100, 80}, kUnseen{222, 222, 222};
 inline constexpr Rgb8 kWide{0, 114, 178}, kWideOneEye{200, 226, 243}, kWideBoth{134, 187, 222},
     kWideTwice{58, 134, 188};
@@ -39,7 +39,7 @@ struct Scale {
   }
 };
 
-/// The marks of a scale up to `to_m`: round steps that leave room for words.
+/// Ticks of a scale up to `to_m`, in round steps that leave room for labels.
 std::vector<double> marks(double px_per_m, double to_m);
 /// The way around, back to the first point.
 Points closed(Points points);

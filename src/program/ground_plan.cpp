@@ -96,28 +96,29 @@ double farthest_corner_m(const std::vector<GroundPolygon>& polygons) {
 // A line of the plan and what it means.
 struct Meaning {
   Pen pen;
-  std::string words;
+  std::string text;
 };
 
-constexpr Pen kAskedPen{kInk, 1.8}, kOneEyePen{kWide, 1.8, 5}, kBothEyesPen{kWide, 1.8}, kHeldPen{kInk, 3};
-constexpr double kArcs_px = 92;  // how far outside of the ground the arcs of azimuths stand
+constexpr Pen kRequiredPen{kInk, 1.8}, kOneEyePen{kWide, 1.8, 5}, kBothEyesPen{kWide, 1.8}, kHeldPen{kInk, 3};
+constexpr double kArcs_px = 92;  // distance of the azimuth arcs from the ground
 constexpr double kMeanings_px = 44;
 
-std::vector<Meaning> meanings_of(const PanRequirements& asked, const PanFigures& seen) {
+std::vector<Meaning> meanings_of(const PanRequirements& required, const PanFigures& seen) {
   const auto& held = seen.azimuth_held;
-  return {{kAskedPen, fmt::format("asked for: {}°", asked.azimuth_deg)},
-          {kOneEyePen, fmt::format("far edge, one eye: {:.1f}°", seen.azimuth_far.width_deg())},
-          {kBothEyesPen, fmt::format("far edge, both eyes: {:.1f}°", seen.azimuth_far_stereo.width_deg())},
+  return {{kRequiredPen, fmt::format("required: {}°", required.azimuth_deg)},
+          {kOneEyePen, fmt::format("far edge, one camera: {:.1f}°", seen.azimuth_far.width_deg())},
+          {kBothEyesPen, fmt::format("far edge, both cameras: {:.1f}°", seen.azimuth_far_stereo.width_deg())},
           {held ? kHeldPen : Pen{kInk, 0},
-           held ? fmt::format("both eyes see all {}°: {:.2f} to {:.2f} m", asked.azimuth_deg, held->from_m, held->to_m)
-                : fmt::format("both eyes see all {}° at no distance", asked.azimuth_deg)}};
+           held ? fmt::format("both cameras see all {}°: {:.2f} to {:.2f} m", required.azimuth_deg, held->from_m,
+                              held->to_m)
+                : fmt::format("both cameras see all {}° at no distance", required.azimuth_deg)}};
 }
 
 void draw_meanings(Drawing& drawing, double top_px, const std::vector<Meaning>& meanings) {
   double y = top_px;
   for (const Meaning& meaning : meanings) {
     if (meaning.pen.width_px > 0) drawing.line({{kMargin_px, y - 5}, {kMargin_px + 28, y - 5}}, meaning.pen);
-    drawing.text({kMargin_px + 38, y}, meaning.words, {meaning.pen.colour, 14});
+    drawing.text({kMargin_px + 38, y}, meaning.text, {meaning.pen.colour, 14});
     y += 20;
   }
 }
@@ -134,16 +135,16 @@ void draw_sectors(Drawing& drawing, const Plan& plan, double radius_m, const Azi
   }
 }
 
-void draw_azimuths(Drawing& drawing, const Plan& plan, double radius_m, const PanRequirements& asked,
+void draw_azimuths(Drawing& drawing, const Plan& plan, double radius_m, const PanRequirements& required,
                    const PanFigures& seen) {
-  const AzimuthSet azimuth = asked_azimuth(asked);
-  const double half = asked.azimuth_deg / 2, gap = 26 / plan.at.px_per_m;
+  const AzimuthSet azimuth = asked_azimuth(required);
+  const double half = required.azimuth_deg / 2, gap = 26 / plan.at.px_per_m;
   for (const double end : {-half, half}) {
     if (half < 180) drawing.line({plan.polar(0, 0), plan.polar(radius_m + 3.4 * gap, end)}, {kInk, 1.2, 7});
   }
   draw_sectors(drawing, plan, radius_m + gap, seen.azimuth_far_stereo, kBothEyesPen);
   draw_sectors(drawing, plan, radius_m + 2 * gap, seen.azimuth_far, kOneEyePen);
-  draw_sectors(drawing, plan, radius_m + 3 * gap, azimuth, kAskedPen);
+  draw_sectors(drawing, plan, radius_m + 3 * gap, azimuth, kRequiredPen);
   if (!seen.azimuth_held) return;
   const DistanceSpan& held = *seen.azimuth_held;
   for (const double border_m : {held.from_m, held.to_m}) {
@@ -166,7 +167,7 @@ void name_pans(Drawing& drawing, const Plan& plan, double radius_m, const std::v
   }
 }
 
-// What there is to see from above, in metres, and how it lies in the picture.
+// Extent of the plan in metres, and its scale.
 struct PlanLayout {
   Plan plan;
   double radius_m, half_deg;

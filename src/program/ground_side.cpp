@@ -7,24 +7,25 @@
 namespace spartan::program {
 namespace {
 
-constexpr double kLabels_px = 270;  // a column for words beside the side view
+constexpr double kLabels_px = 270;  // column for labels beside the side view
 constexpr Lettering kSmall{kFaint, 13};
 
 void draw_pair_from_side(Drawing& drawing, const Scale& at, const DrawnPair& pair) {
   const double height = pair.requirements.height_m;
-  const Point eye = at(0, height), near = at(pair.figures.view_near_m, 0), far = at(pair.figures.view_far_m, 0);
-  drawing.fill({eye, near, far}, {pair.colour, 0.18});
-  drawing.line({near, eye, far}, {pair.colour, 1.5});
-  drawing.fill({eye + Point(-9, -6), eye + Point(9, -6), eye + Point(9, 6), eye + Point(-9, 6)}, {pair.colour});
-  const auto label = [&](double below_px, const std::string& words) {
-    drawing.text(eye + Point(-22, below_px), words, {pair.colour, 14, Anchor::end});
+  const Point camera = at(0, height), near = at(pair.figures.view_near_m, 0), far = at(pair.figures.view_far_m, 0);
+  drawing.fill({camera, near, far}, {pair.colour, 0.18});
+  drawing.line({near, camera, far}, {pair.colour, 1.5});
+  drawing.fill({camera + Point(-9, -6), camera + Point(9, -6), camera + Point(9, 6), camera + Point(-9, 6)},
+               {pair.colour});
+  const auto label = [&](double below_px, const std::string& text) {
+    drawing.text(camera + Point(-22, below_px), text, {pair.colour, 14, Anchor::end});
   };
   label(0, fmt::format("{} pair, {} m high", pair.name, height));
   label(17, fmt::format("{}° down, {:.1f}° high", pair.figures.tilt_deg, pair.figures.vfov_deg));
 }
 
-// What a pair sees as a bar below the ground: full colour up to where its resolution holds, a mark where that is asked
-// for.
+// The ground seen by a pair as a bar: full color up to where the required resolution holds, a mark at the required
+// range.
 void draw_bar(Drawing& drawing, const Scale& at, double y_px, const DrawnPair& pair) {
   const auto bar = [&](double from_m, double to_m, double opacity) {
     if (!(from_m < to_m)) return;
@@ -35,17 +36,17 @@ void draw_bar(Drawing& drawing, const Scale& at, double y_px, const DrawnPair& p
   const double held = std::clamp(pair.figures.range_m, near, far);
   bar(near, held, 0.9);
   bar(held, far, 0.3);
-  const double asked = at(pair.requirements.range_m, 0).x();
-  drawing.line({{asked, y_px - 3}, {asked, y_px + 15}}, {kInk, 2.5});
+  const double required = at(pair.requirements.range_m, 0).x();
+  drawing.line({{required, y_px - 3}, {required, y_px + 15}}, {kInk, 2.5});
   drawing.text({kLabels_px - 22, y_px + 11}, fmt::format("{}: {:.3f} to {:.3f} m", pair.name, near, far),
                {pair.colour, 14, Anchor::end});
 }
 
 void draw_plain_bar(Drawing& drawing, const Scale& at, double y_px, double from_m, double to_m, const Rgb8& colour,
-                    const std::string& words) {
+                    const std::string& text) {
   const double from = at(from_m, 0).x(), to = at(to_m, 0).x();
   drawing.fill({{from, y_px}, {to, y_px}, {to, y_px + 12}, {from, y_px + 12}}, {colour, 0.9});
-  drawing.text({kLabels_px - 22, y_px + 11}, words, {kInk, 14, Anchor::end});
+  drawing.text({kLabels_px - 22, y_px + 11}, text, {kInk, 14, Anchor::end});
 }
 
 void draw_bars(Drawing& drawing, const Scale& at, double y_px, const std::vector<DrawnPair>& pairs,
@@ -62,8 +63,7 @@ void draw_bars(Drawing& drawing, const Scale& at, double y_px, const std::vector
     y_px += 24;
   }
   if (near > 0) draw_plain_bar(drawing, at, y_px, 0, near, kFaint, fmt::format("blind: up to {:.3f} m", near));
-  drawing.text({at(0, 0).x(), y_px + 38}, "full colour: the asked resolution holds; black mark: asked up to here",
-               kSmall);
+  drawing.text({at(0, 0).x(), y_px + 38}, "full color: required resolution met; black mark: required range", kSmall);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ std::string base64(const std::string& bytes) {
   return text;
 }
 
-std::string picture(const Result<std::string>& png, const std::string& caption, int width_px) {
+std::string figure(const Result<std::string>& png, const std::string& caption, int width_px) {
   if (!png) return "<p>" + html_text(png.error().message()) + "</p>";
   return fmt::format(
       "<figure style=\"width:{1}px\"><img alt=\"{0}\" width=\"{1}\" "
@@ -46,7 +46,7 @@ Image<Pixel> shrink(ImageView<const Pixel> image, int width, const Sum& mean_of)
   return small;
 }
 
-// A round step that gives about five marks.
+// A round step that gives about five ticks.
 double step_for(double span) {
   const double raw = std::max(span, 1e-12) / 5, power = std::pow(10.0, std::floor(std::log10(raw)));
   for (const double factor : {1.0, 2.0, 5.0}) {
@@ -100,11 +100,11 @@ std::string html_text(const std::string& text) {
   return safe;
 }
 
-std::string html_picture(ImageView<const std::uint8_t> image, const std::string& caption, int width_px) {
-  return picture(encode_png(image), caption, width_px);
+std::string html_image(ImageView<const std::uint8_t> image, const std::string& caption, int width_px) {
+  return figure(encode_png(image), caption, width_px);
 }
-std::string html_picture(ImageView<const Rgb8> image, const std::string& caption, int width_px) {
-  return picture(encode_png(image), caption, width_px);
+std::string html_image(ImageView<const Rgb8> image, const std::string& caption, int width_px) {
+  return figure(encode_png(image), caption, width_px);
 }
 
 Image<std::uint8_t> shrunk(ImageView<const std::uint8_t> image, int width) {

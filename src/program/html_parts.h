@@ -1,4 +1,4 @@
-// Pieces of a self-contained HTML page: pictures inside the file, plots as SVG.
+// Parts of a self-contained HTML page: embedded images, SVG plots, tables.
 #pragma once
 
 #include <string>
@@ -8,14 +8,14 @@
 
 namespace spartan::program {
 
-/// Text with the characters that HTML keeps for itself replaced.
+/// Escapes the characters that are special in HTML.
 std::string html_text(const std::string& text);
 
-/// An <img> that holds its PNG, with a caption. `width_px` is how wide the page shows it.
-std::string html_picture(ImageView<const std::uint8_t> image, const std::string& caption, int width_px);
-std::string html_picture(ImageView<const Rgb8> image, const std::string& caption, int width_px);
+/// An <img> with its PNG embedded, and a caption. `width_px` is the width on the page.
+std::string html_image(ImageView<const std::uint8_t> image, const std::string& caption, int width_px);
+std::string html_image(ImageView<const Rgb8> image, const std::string& caption, int width_px);
 
-/// Mean of blocks, so that the picture is at most `width` wide.
+/// Reduces an image by block means to at most `width` columns.
 Image<std::uint8_t> shrunk(ImageView<const std::uint8_t> image, int width);
 Image<Rgb8> shrunk(ImageView<const Rgb8> image, int width);
 
@@ -28,12 +28,12 @@ struct PlotLine {
 };
 struct PlotOptions {
   std::string x_label, y_label;
-  bool equal_axes = false;  ///< a metre is as long in both directions
+  bool equal_axes = false;  ///< same scale on both axes
   int width_px = 560, height_px = 360;
 };
 std::string svg_plot(const std::vector<PlotLine>& lines, const PlotOptions& options);
 
-/// A table; the first row is its head.
+/// A table whose first row is the header.
 std::string html_table(const std::vector<std::vector<std::string>>& rows);
 
 /// The whole page.

@@ -1,4 +1,4 @@
-// What pictures said about one pair of a rig.
+// The check of one pair of a rig with images.
 #pragma once
 
 #include <cmath>
@@ -11,16 +11,16 @@
 
 namespace spartan::program {
 
-/// With the shot that is drawn.
+/// The result of the check, and the frame with the most matches, which the figure shows.
 struct InspectedPair {
   StereoPair pair;
   PairCheck check;
-  std::string shot;
+  std::string frame;
   Image<std::uint8_t> left, right;
   std::vector<PixelMatch> matches;
 
-  /// Whether there was anything to judge by: matches enough, eyes beside each other, two different pictures.
-  bool judged() const { return std::isfinite(check.correction.pitch_rad); }
+  /// Whether the images were sufficient: enough matches, cameras side by side, two different images.
+  bool checked() const { return std::isfinite(check.correction.pitch_rad); }
 };
 
 }  // namespace spartan::program

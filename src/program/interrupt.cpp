@@ -5,23 +5,23 @@
 namespace spartan::program {
 namespace {
 
-// A signal handler can reach nothing but a variable of the file.
-volatile std::sig_atomic_t asked_to_stop = 0;
+// A signal handler can only reach a variable of static storage.
+volatile std::sig_atomic_t stop_requested = 0;
 
-extern "C" void remember(int signal) {
-  asked_to_stop = 1;
+extern "C" void on_signal(int signal) {
+  stop_requested = 1;
   std::signal(signal, SIG_DFL);
 }
 
 }  // namespace
 
 void listen_for_interrupts() {
-  std::signal(SIGINT, remember);
-  std::signal(SIGTERM, remember);
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
 }
 
 bool interrupted() {
-  return asked_to_stop != 0;
+  return stop_requested != 0;
 }
 
 }  // namespace spartan::program

@@ -1,11 +1,12 @@
-// Ctrl-C: stop after the step at hand.
+// Ctrl-C stops a command after its current step.
 #pragma once
 
 namespace spartan::program {
 
-/// From now on SIGINT and SIGTERM only set a mark; a second one ends the program at once.
+/// Makes SIGINT and SIGTERM set a flag; a second signal ends the program at once.
 void listen_for_interrupts();
-/// Whether the user asked to stop. Long loops ask between steps and return an error of code `interrupted`.
+/// Whether the user interrupted the program. Long loops check it between steps and return an error of code
+/// `interrupted`.
 bool interrupted();
 
 }  // namespace spartan::program

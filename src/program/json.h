@@ -10,7 +10,7 @@ namespace spartan::program {
 /// Keys stay in the order in which they are added.
 using Json = nlohmann::ordered_json;
 
-/// JSON has no NaN: what is not finite, or not there, becomes null. Nor is there a negative zero to wonder about.
+/// JSON has no NaN: a value that is missing or not finite becomes null. Negative zero becomes zero.
 inline Json number(double value) {
   return std::isfinite(value) ? Json(value + 0.0) : Json(nullptr);
 }

@@ -1,13 +1,13 @@
-// The program `spartan`: reads the command line and hands over to a verb.
+// The program `spartan`: reads the command line and runs the command that it names.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <iostream>
 #include <thread>
 
+#include "program/commands.h"
 #include "program/context.h"
 #include "program/interrupt.h"
-#include "program/verbs.h"
 #include "spartan/core/threads.h"
 
 namespace spartan::program {
@@ -18,7 +18,7 @@ LogLevel level_of(const Context& context) {
   return context.verbose ? LogLevel::debug : LogLevel::info;
 }
 
-void add_verbs(CLI::App& app, Context& context) {
+void add_commands(CLI::App& app, Context& context) {
   add_demo(app, context);
   add_run(app, context);
   add_stereo(app, context);
@@ -31,26 +31,27 @@ void add_verbs(CLI::App& app, Context& context) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Stereo vision for rovers: where the rover is, and what the ground around it looks like.", "spartan"};
+  CLI::App app{"Stereo vision for rovers: visual odometry, dense stereo, terrain maps and localization.", "spartan"};
   app.set_version_flag("--version", SPARTAN_VERSION);
   app.require_subcommand(1);
   Context context;
   context.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  add_verbs(app, context);
+  add_commands(app, context);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    const bool asked_for_help = app.exit(e, std::cout, std::cerr) == 0;
-    return asked_for_help ? kDone : kUsage;
+    const bool help_requested = app.exit(e, std::cout, std::cerr) == 0;
+    return help_requested ? kDone : kUsage;
   }
 
   context.log = Log::to_terminal(level_of(context));
   bound_third_party_threads(context.threads);
   listen_for_interrupts();
   if (!context.chosen) {
-    context.log.error("this verb needs a further word; see --help");
+    context.log.error("this command needs a subcommand; see --help");
     return kUsage;
   }
+  for (const std::string& warning : context.warnings) context.log.warning(warning);
   const Result<ExitCode> result = context.chosen();
   if (result) return *result;
   context.log.error(result.error().message());

@@ -1,4 +1,4 @@
-// The verbs under `spartan map`.
+// The commands under `spartan map`.
 #pragma once
 
 #include <CLI/CLI.hpp>

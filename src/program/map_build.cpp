@@ -1,4 +1,4 @@
-// spartan map build: the ground in a pair of images, or around a position of a recording.
+// spartan map build: the terrain map of one pair of images, or of one stop of a recording.
 #include <fmt/format.h>
 
 #include <array>
@@ -27,8 +27,8 @@ namespace spartan::program {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kRestSeconds = 1;  // of the IMU, from a position's first shot on
-constexpr double kReach = 0.75;     // of the map's side: somewhat more than half of its diagonal
+constexpr double kRestSeconds = 1;  // of IMU samples from the first frame of the stop on
+constexpr double kReach = 0.75;     // of the side of the map: slightly more than half of its diagonal
 
 struct BuildArguments {
   std::string left, right, output, rig, recording, gravity, config;
@@ -37,13 +37,13 @@ struct BuildArguments {
   std::optional<double> extent_m, cell_m;
 };
 
-// The shots of one position and how the body stands there.
-struct Position {
+// The frames of one stop, and the attitude of the body there.
+struct Stop {
   Rig rig;
   std::string mask_folder;
   std::vector<StereoFrame> frames;
   std::optional<Eigen::Vector3d> up_in_body;
-  const char* up_source = "assumed along the body";
+  const char* up_source = "assumed: along the z axis of the body";
 };
 
 Result<std::optional<Eigen::Vector3d>> parse_gravity(const std::string& text) {
@@ -60,25 +60,25 @@ Result<std::optional<Eigen::Vector3d>> parse_gravity(const std::string& text) {
       used = 0;
     }
     if (used == 0 || used != word.size() || !std::isfinite(g[i])) {
-      return failure(ErrorCode::usage, fmt::format("'{}' is not three numbers", text), "--gravity",
-                     "where gravity points in the body frame (x forward, y left, z up), like 0,0,-1");
+      return failure(ErrorCode::usage, fmt::format("'{}' is not three numbers separated by commas", text), "--gravity",
+                     "the direction of gravity in the body frame (x forward, y left, z up), e.g. 0,0,-1");
     }
     from = to + 1;
   }
   const Eigen::Vector3d down(g[0], g[1], g[2]);
-  if (down.norm() < 1e-9) return failure(ErrorCode::usage, "has no direction", "--gravity");
+  if (down.norm() < 1e-9) return failure(ErrorCode::usage, "is zero", "--gravity");
   return Eigen::Vector3d(-down.normalized());
 }
 
-Result<Position> load_pair(const BuildArguments& a) {
+Result<Stop> load_pair(const BuildArguments& a) {
   auto left = read_image(a.left);
   if (!left) return failure(left);
   auto right = read_image(a.right);
   if (!right) return failure(right);
   auto rig = read_rig(a.rig, left->size());
   if (!rig) return failure(rig);
-  Position position;
-  position.mask_folder = std::filesystem::path(a.rig).parent_path().string();
+  Stop stop;
+  stop.mask_folder = std::filesystem::path(a.rig).parent_path().string();
   StereoFrame frame;
   const StereoPair& pair = rig->pairs.front();
   const Camera& camera = *rig->find_camera(pair.left);
@@ -90,37 +90,37 @@ Result<Position> load_pair(const BuildArguments& a) {
     frame.pan_rad = unit.rest_pan_rad;
     frame.tilt_rad = unit.rest_tilt_rad;
   }
-  position.frames.push_back(std::move(frame));
-  position.rig = std::move(*rig);
-  return position;
+  stop.frames.push_back(std::move(frame));
+  stop.rig = std::move(*rig);
+  return stop;
 }
 
-Result<Position> load_position(const BuildArguments& a) {
+Result<Stop> load_stop(const BuildArguments& a) {
   auto source = open_recording(a.recording);
   if (!source) return failure(source);
   const RecordingInfo& info = (*source)->info();
-  Position position;
-  position.rig = info.rig;
-  position.mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
-  const auto shots = (*source)->shots_at(*a.position);
-  if (shots.empty()) {
-    return failure(ErrorCode::input, fmt::format("has no shot at position {}", *a.position), a.recording,
-                   "frames.csv lists the position_id of every shot");
+  Stop stop;
+  stop.rig = info.rig;
+  stop.mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
+  const auto frames_of_stop = (*source)->shots_at(*a.position);
+  if (frames_of_stop.empty()) {
+    return failure(ErrorCode::input, fmt::format("has no frame at position {}", *a.position), a.recording,
+                   "frames.csv lists the position_id of every frame");
   }
-  for (const ShotName& shot : shots) {
-    auto frame = (*source)->frame_at(shot.pair, shot.left_stamp);
+  for (const ShotName& name : frames_of_stop) {
+    auto frame = (*source)->frame_at(name.pair, name.left_stamp);
     if (!frame) return failure(frame);
-    position.frames.push_back(std::move(*frame));
+    stop.frames.push_back(std::move(*frame));
   }
-  const auto imu = (*source)->imu_samples(shots.front().left_stamp, kRestSeconds);
+  const auto imu = (*source)->imu_samples(frames_of_stop.front().left_stamp, kRestSeconds);
   if (!imu) return failure(imu);
   LocalizationOptions planet;
   planet.gravity_m_s2 = info.gravity_m_s2.value_or(planet.gravity_m_s2);
   if (const auto rest = read_rest(*imu, planet)) {
-    position.up_in_body = rest->accel_m_s2.normalized();
-    position.up_source = "measured by the IMU";
+    stop.up_in_body = rest->accel_m_s2.normalized();
+    stop.up_source = "measured by the IMU";
   }
-  return position;
+  return stop;
 }
 
 Result<RunOptions> options_of(const BuildArguments& a) {
@@ -139,7 +139,7 @@ struct Tilt {
   double roll_rad = 0, pitch_rad = 0;
 };
 
-// Of a body whose upward direction is known: z up, then pitch (nose down positive) and roll (left side up positive).
+// From the up direction in the body frame: pitch (positive: nose down) and roll (positive: left side up).
 Tilt tilt_of(const Eigen::Vector3d& up_in_body) {
   return {std::atan2(up_in_body.y(), up_in_body.z()),
           std::atan2(-up_in_body.x(), std::hypot(up_in_body.y(), up_in_body.z()))};
@@ -153,15 +153,15 @@ int count_of(const LocalMap& map, float kind) {
   return count;
 }
 
-// Eye height and tilt of each view: as the ground says, and as the rig does.
+// Height and pitch of the left camera of each view: from the rig, and from the ground profile.
 Json views_of(const PositionMapper& mapper, const Eigen::Vector3d& up) {
   Json views = Json::array();
   for (const PositionView& view : mapper.views()) {
-    const GroundPlane believed{view.geometry.body_from_left.rotation().conjugate() * up,
-                               view.geometry.body_from_left.translation().dot(up)};
+    const GroundPlane by_rig{view.geometry.body_from_left.rotation().conjugate() * up,
+                             view.geometry.body_from_left.translation().dot(up)};
     Json json{{"pair", view.pair},
               {"stamp_ns", view.stamp.ns},
-              {"rig", {{"pitch_deg", believed.pitch_rad() / kDegree}, {"height_m", believed.height_m}}},
+              {"rig", {{"pitch_deg", by_rig.pitch_rad() / kDegree}, {"height_m", by_rig.height_m}}},
               {"ground", nullptr}};
     if (view.ground) {
       json["ground"] = {{"pitch_deg", view.ground->plane.pitch_rad() / kDegree},
@@ -172,27 +172,26 @@ Json views_of(const PositionMapper& mapper, const Eigen::Vector3d& up) {
   return views;
 }
 
-Json to_json(const PositionMapper& mapper, const LocalMap& map, const Position& position, const Eigen::Vector3d& up) {
+Json to_json(const PositionMapper& mapper, const LocalMap& map, const Stop& stop, const Eigen::Vector3d& up) {
   const Tilt tilt = tilt_of(up);
-  return {{"schema", 1},
-          {"cell_m", map.place.cell_m},
-          {"west_m", map.place.west_m},
-          {"north_m", map.place.north_m},
-          {"columns", map.size().width},
-          {"rows", map.size().height},
-          {"cells", {{"free", count_of(map, 1)}, {"obstacle", count_of(map, 2)}, {"cavity", count_of(map, 3)}}},
-          {"obstacles", map.obstacles.size()},
-          {"attitude",
-           {{"roll_deg", tilt.roll_rad / kDegree},
-            {"pitch_deg", tilt.pitch_rad / kDegree},
-            {"source", position.up_source}}},
-          {"views", views_of(mapper, up)},
-          {"time_ms",
-           {{"disparity", mapper.times().disparity},
-            {"v_disparity", mapper.times().v_disparity},
-            {"merging", mapper.times().merging},
-            {"map", mapper.times().map}}},
-          {"peak_memory_bytes", peak_memory_bytes()}};
+  return {
+      {"schema", 1},
+      {"cell_m", map.place.cell_m},
+      {"west_m", map.place.west_m},
+      {"north_m", map.place.north_m},
+      {"columns", map.size().width},
+      {"rows", map.size().height},
+      {"cells", {{"free", count_of(map, 1)}, {"obstacle", count_of(map, 2)}, {"cavity", count_of(map, 3)}}},
+      {"obstacles", map.obstacles.size()},
+      {"attitude",
+       {{"roll_deg", tilt.roll_rad / kDegree}, {"pitch_deg", tilt.pitch_rad / kDegree}, {"source", stop.up_source}}},
+      {"views", views_of(mapper, up)},
+      {"time_ms",
+       {{"disparity", mapper.times().disparity},
+        {"v_disparity", mapper.times().v_disparity},
+        {"merging", mapper.times().merging},
+        {"map", mapper.times().map}}},
+      {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 std::string to_text(const Json& json, const std::string& folder) {
@@ -201,17 +200,16 @@ std::string to_text(const Json& json, const std::string& folder) {
       fmt::format("attitude: roll {:.2f} deg, pitch {:.2f} deg ({})\n", json["attitude"]["roll_deg"].get<double>(),
                   json["attitude"]["pitch_deg"].get<double>(), json["attitude"]["source"].get<std::string>());
   for (const Json& view : json["views"]) {
-    text += fmt::format("{:<12} eye {:.3f} m high, {:.2f} deg down by the rig; ", view["pair"].get<std::string>(),
+    text += fmt::format("{:<12} camera height {:.3f} m, pitch {:.2f} deg down (rig); ", view["pair"].get<std::string>(),
                         view["rig"]["height_m"].get<double>(), view["rig"]["pitch_deg"].get<double>());
     text += view["ground"].is_null()
                 ? std::string("no ground found\n")
-                : fmt::format("{:.3f} m, {:.2f} deg by the ground\n", view["ground"]["height_m"].get<double>(),
+                : fmt::format("{:.3f} m, {:.2f} deg (ground profile)\n", view["ground"]["height_m"].get<double>(),
                               view["ground"]["pitch_deg"].get<double>());
   }
   const Json& time = json["time_ms"];
   text += fmt::format(
-      "{:.0f} ms for disparities, {:.0f} ms for v-disparity, {:.0f} ms for merging, {:.0f} ms for the map; "
-      "{:.0f} MB at most\n",
+      "disparity {:.0f} ms, v-disparity {:.0f} ms, merging {:.0f} ms, map {:.0f} ms; peak memory {:.0f} MB\n",
       time["disparity"].get<double>(), time["v_disparity"].get<double>(), time["merging"].get<double>(),
       time["map"].get<double>(), 1e-6 * json["peak_memory_bytes"].get<double>());
   text += fmt::format("{} x {} cells of {} m: {} free, {} obstacle, {} cavity; {} obstacles; results in {}\n",
@@ -224,20 +222,20 @@ std::string to_text(const Json& json, const std::string& folder) {
 Status check(const BuildArguments& a) {
   const bool pair = !a.left.empty() || !a.right.empty() || !a.rig.empty();
   if (pair == !a.recording.empty()) {
-    return failure(ErrorCode::usage, "needs two images with --rig, or --recording with --position", "map build");
+    return failure(ErrorCode::usage, "give two images with --rig, or --recording with --position", "map build");
   }
   if (pair && (a.right.empty() || a.rig.empty())) {
-    return failure(ErrorCode::usage, "two images need each other and a --rig", "map build");
+    return failure(ErrorCode::usage, "give both LEFT and RIGHT, and --rig", "map build");
   }
   if (!pair && !a.position) return failure(ErrorCode::usage, "--recording needs --position", "map build");
   return {};
 }
 
-// Where nobody knows how the camera stands, level is what the ground is.
-Eigen::Vector3d choose_up(Position& position, const PositionView& view) {
-  if (position.up_in_body) return *position.up_in_body;
-  if (position.rig.convention != PoseConvention::left_optical || !view.ground) return Eigen::Vector3d::UnitZ();
-  position.up_source = "along the ground";
+// Without an attitude measurement the ground plane is taken as level.
+Eigen::Vector3d choose_up(Stop& stop, const PositionView& view) {
+  if (stop.up_in_body) return *stop.up_in_body;
+  if (stop.rig.convention != PoseConvention::left_optical || !view.ground) return Eigen::Vector3d::UnitZ();
+  stop.up_source = "along the ground";
   return view.geometry.body_from_left.rotation() * view.ground->plane.up;
 }
 
@@ -247,30 +245,30 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   if (!gravity) return failure(gravity);
   const auto options = options_of(a);
   if (!options) return failure(options);
-  auto position = a.recording.empty() ? load_pair(a) : load_position(a);
-  if (!position) return failure(position);
+  auto stop = a.recording.empty() ? load_pair(a) : load_stop(a);
+  if (!stop) return failure(stop);
   if (*gravity) {
-    position->up_in_body = *gravity;
-    position->up_source = "given";
+    stop->up_in_body = *gravity;
+    stop->up_source = "given";
   }
   const Workers workers(context.threads);
-  auto imager = Imager::create(position->rig, options->imaging, workers, position->mask_folder);
+  auto imager = Imager::create(stop->rig, options->imaging, workers, stop->mask_folder);
   if (!imager) return failure(imager);
   PositionMapper mapper(options->reconstruction, options->mapping, workers);
   Eigen::Vector3d ahead_in_body = Eigen::Vector3d::UnitX();
-  for (const StereoFrame& frame : position->frames) {
-    const auto shot = imager->process(frame);
-    if (!shot) return failure(shot);
-    if (mapper.views().empty()) ahead_in_body = shot->body_from_left.rotation() * Eigen::Vector3d::UnitZ();
-    const Eigen::Vector3d expected = position->up_in_body.value_or(Eigen::Vector3d::UnitZ());
-    if (Status s = mapper.add(*shot, position->rig.find_pair(frame.pair)->nearest_m, expected); !s) return failure(s);
+  for (const StereoFrame& frame : stop->frames) {
+    const auto pair = imager->process(frame);
+    if (!pair) return failure(pair);
+    if (mapper.views().empty()) ahead_in_body = pair->body_from_left.rotation() * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d expected = stop->up_in_body.value_or(Eigen::Vector3d::UnitZ());
+    if (Status s = mapper.add(*pair, stop->rig.find_pair(frame.pair)->nearest_m, expected); !s) return failure(s);
   }
-  const Eigen::Vector3d up = choose_up(*position, mapper.views().front());
+  const Eigen::Vector3d up = choose_up(*stop, mapper.views().front());
   const MergedRange merged = mapper.merge();
   const LocalMap map = mapper.map(surface_points(merged), first_pose(up, ahead_in_body, 0));
   if (Status s = make_folder(a.output); !s) return failure(s);
   if (Status s = write_position(mapper.views(), merged, map, options->mapping, a.output); !s) return failure(s);
-  const Json json = to_json(mapper, map, *position, up);
+  const Json json = to_json(mapper, map, *stop, up);
   if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json, a.output)); !s) return failure(s);
   return kDone;
 }
@@ -279,24 +277,30 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
 
 void add_map_build(CLI::App& map, Context& context) {
   auto a = std::make_shared<BuildArguments>();
-  CLI::App* verb =
-      add_verb(map, context, "build", "The ground around one position of the rover as a grid",
-               "map build --recording drive --position 15 -o map", [&context, a] { return build(context, *a); });
-  verb->add_option("left", a->left, "left image");
-  verb->add_option("right", a->right, "right image");
-  verb->add_option("-o,--output", a->output, "folder for the results")->required();
-  verb->add_option("--rig", a->rig, "rig or calibration file of the two images");
-  verb->add_option("--recording", a->recording, "recording to take a position from");
-  verb->add_option("--position", a->position, "position_id: all shots that have it are merged");
-  verb->add_option("--extent-m", a->extent_m, "side of the map (default 8)")->check(CLI::Range(0.5, 1000.0));
-  verb->add_option("--cell-m", a->cell_m, "side of a cell (default 0.05)")->check(CLI::Range(0.005, 10.0));
-  verb->add_option("--gravity", a->gravity,
-                   "where gravity points in the body frame, x,y,z (default: as the IMU says, else straight down)");
-  verb->add_option("--config", a->config, "YAML file with options (see `spartan config dump`)");
-  verb->add_option("--set", a->set, "one option, like mapping.map.obstacle_m=0.03; may be given again")
+  CLI::App* command =
+      add_command(map, context, "build", "Build the terrain map of one pair of images or of one stop",
+                  "map build --recording drive --position 15 -o map", [&context, a] { return build(context, *a); });
+  command->add_option("left", a->left, "Left image.");
+  command->add_option("right", a->right, "Right image.");
+  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
+  command->add_option("--rig", a->rig, "Rig or calibration file of the two images, in any supported format.");
+  command->add_option("--recording", a->recording, "Recording to take one stop from.");
+  command->add_option("--position", a->position, "position_id of the stop; all frames with it are merged.");
+  command->add_option("--extent-m", a->extent_m, "Side length of the map in metres (default 8).")
+      ->check(CLI::Range(0.5, 1000.0));
+  command
+      ->add_option("--cell-m", a->cell_m,
+                   "Side length of a cell in metres (default 0.05). A smaller one costs time and memory.")
+      ->check(CLI::Range(0.005, 10.0));
+  command->add_option("--gravity", a->gravity,
+                      "Direction of gravity in the body frame, x,y,z (default: from the IMU, else straight down).");
+  command->add_option("--config", a->config,
+                      "YAML file with options that differ from the defaults (see `spartan config dump`).");
+  command
+      ->add_option("--set", a->set, "Set one option, e.g. mapping.map.obstacle_m=0.03. Repeatable; overrides --config.")
       ->allow_extra_args(false);
-  add_threads_option(*verb, context);
-  add_json_flag(*verb, context);
+  add_threads_option(*command, context);
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

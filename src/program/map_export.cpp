@@ -1,4 +1,4 @@
-// spartan map export: a global map for other programs.
+// spartan map export: a global map in the formats of other programs.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -24,12 +24,13 @@ Result<LatticeWindow> window_of(const ExportArguments& a, const GlobalMap& map) 
   if (a.window_m.empty()) return map.extent();
   const double west = a.window_m[0], south = a.window_m[1], east = a.window_m[2], north = a.window_m[3];
   if (!(east > west) || !(north > south)) {
-    return failure(ErrorCode::usage, "has no area", "--window", "give west,south,east,north in metres of the world");
+    return failure(ErrorCode::usage, "is empty: east must exceed west, and north south", "--window",
+                   "give west,south,east,north in metres");
   }
   return window_between(west, south, east, north, map.cell_m());
 }
 
-// The middles of the cells, in the colours of the picture.
+// The centers of the cells, in the colors of the image.
 PointCloud cloud_of(const MapView& view) {
   const Image<Rgb8> colours = draw_map(view.elevation_m, view.kind, view.cell_m, 1);
   PointCloud cloud;
@@ -46,7 +47,7 @@ PointCloud cloud_of(const MapView& view) {
 Status write(SavedMap& saved, const ExportArguments& a, const Workers& workers) {
   const std::string ending = std::filesystem::path(a.output).extension().string();
   if (ending == ".map") {
-    if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map is whole", "--window");
+    if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map file always holds the whole map", "--window");
     return MapFile::save(saved.map(), a.output);
   }
   const auto window = window_of(a, saved.map());
@@ -56,7 +57,7 @@ Status write(SavedMap& saved, const ExportArguments& a, const Workers& workers) 
   if (ending == ".tif") return write_map_geotiff(*view, saved.options().mapping.map, workers, a.output);
   if (ending == ".png") return write_png(a.output, draw_map(view->elevation_m, view->kind, view->cell_m));
   if (ending == ".ply") return write_ply(a.output, cloud_of(*view));
-  return failure(ErrorCode::usage, "has no known ending", a.output, "known are .tif, .png, .ply and .map");
+  return failure(ErrorCode::usage, "has an unknown extension", a.output, "known extensions: .tif, .png, .ply, .map");
 }
 
 Result<ExitCode> export_map(const Context& context, const ExportArguments& a) {
@@ -70,16 +71,21 @@ Result<ExitCode> export_map(const Context& context, const ExportArguments& a) {
 
 void add_map_export(CLI::App& map, Context& context) {
   auto a = std::make_shared<ExportArguments>();
-  CLI::App* verb = add_verb(map, context, "export", "A global map for other programs", "map export my_run -o site.tif",
-                            [&context, a] { return export_map(context, *a); });
-  verb->add_option("map", a->map, "a map file, or a run folder")->required();
-  verb->add_option("-o,--output", a->output,
-                   "by its ending: .tif (all layers), .png (a picture), .ply (the cells as points), .map (a map file)")
+  CLI::App* command =
+      add_command(map, context, "export", "Export a global map as GeoTIFF, image, point cloud or map file",
+                  "map export my_run -o site.tif", [&context, a] { return export_map(context, *a); });
+  command->add_option("map", a->map, "Saved map (.map) or run folder.")->required();
+  command
+      ->add_option("-o,--output", a->output,
+                   "File to write; its extension selects the format: .tif (all layers), .png (an image), .ply (cell "
+                   "centers), .map.")
       ->required();
-  verb->add_option("--window", a->window_m, "only this part: west,south,east,north in metres of the world")
+  command
+      ->add_option("--window", a->window_m,
+                   "Export only this part: west,south,east,north in metres of the world frame.")
       ->delimiter(',')
       ->expected(4);
-  add_threads_option(*verb, context);
+  add_threads_option(*command, context);
 }
 
 }  // namespace spartan::program

@@ -1,4 +1,4 @@
-// spartan map info: what is in a global map on the disk.
+// spartan map info: properties of a saved global map.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,9 +50,9 @@ std::string to_text(const Json& json) {
   const Json& cells = json["cells"];
   std::string text = fmt::format(
       "{} x {} cells of {} m in {} tiles of {} submaps; north-west corner at {:.2f}, {:.2f} m\n"
-      "{:.1f} m2 known: {} cells free, {} obstacle, {} cavity\n"
+      "{:.1f} m2 mapped: {} cells free, {} obstacle, {} cavity\n"
       "elevation {:.3f} m to {:.3f} m, standard deviation {:.1f} mm (median)\n"
-      "made at {} stops:\n",
+      "{} stops:\n",
       json["columns"].get<int>(), json["rows"].get<int>(), json["cell_m"].get<double>(),
       json["tiles"].get<std::size_t>(), json["submaps"].get<std::size_t>(), json["west_m"].get<double>(),
       json["north_m"].get<double>(), json["known_m2"].get<double>(), cells["free"].get<std::int64_t>(),
@@ -60,7 +60,7 @@ std::string to_text(const Json& json) {
       json["elevation_m"]["least"].get<double>(), json["elevation_m"]["most"].get<double>(),
       1e3 * json["sigma_m"]["median"].get<double>(), json["stops"].size());
   for (const Json& stop : json["stops"]) {
-    text += fmt::format("  {} ns at {:.3f}, {:.3f}, {:.3f} m, heading {:.1f} deg, known to {:.1f} mm\n",
+    text += fmt::format("  {} ns at {:.3f}, {:.3f}, {:.3f} m, yaw {:.1f} deg, standard deviation {:.1f} mm\n",
                         stop["stamp_ns"].get<std::int64_t>(), stop["x_m"].get<double>(), stop["y_m"].get<double>(),
                         stop["z_m"].get<double>(), stop["yaw_deg"].get<double>(), 1e3 * stop["sigma_m"].get<double>());
   }
@@ -81,10 +81,11 @@ Result<ExitCode> info(const Context& context, const std::string& path) {
 
 void add_map_info(CLI::App& map, Context& context) {
   auto path = std::make_shared<std::string>();
-  CLI::App* verb = add_verb(map, context, "info", "What a global map holds", "map info my_run",
-                            [&context, path] { return info(context, *path); });
-  verb->add_option("map", *path, "a map file, or a run folder")->required();
-  add_json_flag(*verb, context);
+  CLI::App* command =
+      add_command(map, context, "info", "Print extent, cell counts, elevations and stops of a global map",
+                  "map info my_run", [&context, path] { return info(context, *path); });
+  command->add_option("map", *path, "Saved map (.map) or run folder.")->required();
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

@@ -1,4 +1,4 @@
-// spartan map merge: two global maps of one world become one.
+// spartan map merge: merges two global maps that share a world frame.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,12 +15,13 @@
 namespace spartan::program {
 namespace {
 
-/// Apart by more than this many standard deviations in the middle: the maps do not share a world.
+/// Median difference in elevation, in standard deviations and in metres, above which two maps are unlikely to share a
+/// world frame. Empirical.
 constexpr double kSuspiciousSigmas = 3;
 constexpr double kSuspicious_m = 0.03;
 
 struct Agreement {
-  int cells = 0;  // that both know
+  int cells = 0;  // cells known in both maps
   double median_m = 0, spread_m = 0, sigma_m = 0;
 
   bool suspicious() const {
@@ -28,10 +29,10 @@ struct Agreement {
   }
 };
 
-// Elevations of b over those of a.
+// Differences of the elevations of b and a, where both are known.
 Result<Agreement> compare(GlobalMap& a, GlobalMap& b) {
   const LatticeWindow window = a.extent();
-  if (window.cells() > GlobalMap::kMostCells) return Agreement();  // not compared
+  if (window.cells() > GlobalMap::kMostCells) return Agreement();  // too large to compare
   const auto one = a.view(window), other = b.view(window);
   if (!one) return failure(one);
   if (!other) return failure(other);
@@ -65,7 +66,7 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
   if (a->map().cell_m() != b->map().cell_m()) {
     return failure(ErrorCode::configuration,
                    fmt::format("has cells of {} m, {} has {} m", b->map().cell_m(), arguments.a, a->map().cell_m()),
-                   arguments.b, "maps of one cell size can be merged");
+                   arguments.b, "only maps of equal cell size can be merged");
   }
   const auto agreement = compare(a->map(), b->map());
   if (!agreement) return failure(agreement);
@@ -75,8 +76,9 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
   }
   if (Status s = MapFile::save(both, arguments.output); !s) return failure(s);
   if (agreement->suspicious()) {
-    context.log.warning(fmt::format("{} lies {:.0f} mm over {}: do they share a world?", arguments.b,
-                                    1e3 * agreement->median_m, arguments.a));
+    context.log.warning(
+        fmt::format("the elevations of {} are {:.0f} mm above those of {}: check that both maps share a world frame",
+                    arguments.b, 1e3 * agreement->median_m, arguments.a));
   }
   const Json json{{"schema", 1},
                   {"stops", both.stops().size()},
@@ -85,8 +87,8 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
                   {"both_know_cells", agreement->cells},
                   {"apart_m", {{"median", agreement->median_m}, {"spread", agreement->spread_m}}}};
   const std::string text = fmt::format(
-      "{} stops, {} submaps, {} tiles in {}\n{} cells are known to both; there the second lies {:.1f} mm over the "
-      "first (spread {:.1f} mm)\n",
+      "{} stops, {} submaps, {} tiles in {}\n{} cells are known in both maps; the second is {:.1f} mm above the first "
+      "there (median; spread {:.1f} mm)\n",
       both.stops().size(), both.submaps().size(), both.tiles(), arguments.output, agreement->cells,
       1e3 * agreement->median_m, 1e3 * agreement->spread_m);
   if (Status s = print(context.json ? json.dump(2) + "\n" : text); !s) return failure(s);
@@ -97,13 +99,13 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
 
 void add_map_merge(CLI::App& map, Context& context) {
   auto a = std::make_shared<MergeArguments>();
-  CLI::App* verb =
-      add_verb(map, context, "merge", "Two global maps of one world as one",
-               "map merge run_monday run_tuesday -o site.map", [&context, a] { return merge(context, *a); });
-  verb->add_option("a", a->a, "a map file, or a run folder")->required();
-  verb->add_option("b", a->b, "another, in the same world")->required();
-  verb->add_option("-o,--output", a->output, "the map file to write")->required();
-  add_json_flag(*verb, context);
+  CLI::App* command =
+      add_command(map, context, "merge", "Merge two global maps that share a world frame",
+                  "map merge run_monday run_tuesday -o site.map", [&context, a] { return merge(context, *a); });
+  command->add_option("a", a->a, "Saved map (.map) or run folder.")->required();
+  command->add_option("b", a->b, "Second map, in the same world frame. Nothing is searched or moved.")->required();
+  command->add_option("-o,--output", a->output, "Map file to write.")->required();
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

@@ -8,14 +8,14 @@ namespace spartan::program {
 
 class Progress {
  public:
-  /// Says nothing at all where `quiet`.
+  /// Prints nothing if `quiet`.
   explicit Progress(bool quiet);
-  /// Ends the bar's line.
+  /// Ends the line of the bar.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `total` may be 0 where it is not known.
+  /// `total` is 0 if unknown.
   void show(int done, int total, const std::string& note);
 
  private:
@@ -24,7 +24,7 @@ class Progress {
   bool quiet_;
   bool terminal_;
   bool line_open_ = false;
-  int first_ = -1;  // `done` of the first call: a resumed run does not begin at 0
+  int first_ = -1;  // `done` of the first call; a resumed run does not begin at 0
   int last_tenth_ = -1;
   std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point last_shown_;

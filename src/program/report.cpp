@@ -29,7 +29,7 @@
 namespace spartan::program {
 namespace {
 
-constexpr int kDrivePictures = 6;
+constexpr int kDriveImages = 6;
 constexpr double kErrorScale_px = 2;
 
 std::string section(const std::string& title, const std::string& body) {
@@ -41,12 +41,12 @@ std::string percent(std::optional<double> value) {
 }
 
 // The left images along the drive.
-Result<std::string> drive_pictures(FrameSource& source, Imager& imager) {
+Result<std::string> drive_images(FrameSource& source, Imager& imager) {
   std::string html;
   for (const StereoPair& pair : source.info().rig.pairs) {
     if (!pair.for_odometry) continue;
     const std::vector<Stamp> stamps = source.announced_stamps(pair.name);
-    const int count = std::min<int>(kDrivePictures, static_cast<int>(stamps.size()));
+    const int count = std::min<int>(kDriveImages, static_cast<int>(stamps.size()));
     for (int i = 0; i < count; ++i) {
       const Stamp stamp =
           stamps[count > 1 ? static_cast<std::size_t>(i) * (stamps.size() - 1) / static_cast<std::size_t>(count - 1)
@@ -55,26 +55,26 @@ Result<std::string> drive_pictures(FrameSource& source, Imager& imager) {
       if (!frame) continue;
       const auto view = imager.process(*frame);
       if (!view) return failure(view);
-      html += html_picture(
+      html += html_image(
           shrunk(view->left, 360),
-          fmt::format("{} pair, left eye, after {:.0f} s", pair.name, seconds_between(stamps.front(), stamp)), 360);
+          fmt::format("{} pair, left camera, after {:.0f} s", pair.name, seconds_between(stamps.front(), stamp)), 360);
     }
   }
   return html;
 }
 
-Image<Rgb8> error_picture(ImageView<const float> estimate, ImageView<const float> truth) {
-  Image<Rgb8> picture(estimate.width(), estimate.height());
-  for (int y = 0; y < picture.height(); ++y) {
-    for (int x = 0; x < picture.width(); ++x) {
+Image<Rgb8> error_image(ImageView<const float> estimate, ImageView<const float> truth) {
+  Image<Rgb8> image(estimate.width(), estimate.height());
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
       const double error = estimate(x, y) - truth(x, y);
-      picture(x, y) = std::isfinite(error) ? cold_to_hot(0.5 + 0.5 * error / kErrorScale_px) : Rgb8{40, 40, 40};
+      image(x, y) = std::isfinite(error) ? cold_to_hot(0.5 + 0.5 * error / kErrorScale_px) : Rgb8{40, 40, 40};
     }
   }
-  return picture;
+  return image;
 }
 
-// The first shot of a pair with true disparities: what the matcher makes of it.
+// One frame of a pair with true disparities: disparity, error, scores.
 Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoPair& pair,
                               const ReportRequest& request) {
   const std::vector<Stamp> stamps = source.announced_stamps(pair.name);
@@ -96,24 +96,24 @@ Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoP
   const auto scores = compare_disparities(image->disparity, *truth, *mask);
   if (!scores) return failure(scores);
   std::string html =
-      html_picture(shrunk(left.view(), 360), fmt::format("{} pair, left eye, rectified", pair.name), 360);
-  html += html_picture(shrunk(colour_disparity(image->disparity).view(), 360),
-                       "Disparity as matched: near is warm, far is cold, black is unknown", 360);
+      html_image(shrunk(left.view(), 360), fmt::format("{} pair, left camera, rectified", pair.name), 360);
+  html += html_image(shrunk(colour_disparity(image->disparity).view(), 360),
+                     "Disparity: near is warm, far is cold, black is unknown", 360);
   html +=
-      html_picture(shrunk(error_picture(image->disparity, *truth).view(), 360),
-                   fmt::format("Its error: white none, blue −{0} px, red +{0} px, gray unknown", kErrorScale_px), 360);
+      html_image(shrunk(error_image(image->disparity, *truth).view(), 360),
+                 fmt::format("Disparity error: white 0, blue −{0} px, red +{0} px, gray unknown", kErrorScale_px), 360);
   std::vector<std::vector<std::string>> rows{
-      {"pixels", "matched", "wrong by over 1 px", "of the matched", "RMS inside 1 px"}};
+      {"pixels", "density", "bad-1", "bad-1 of matched", "RMS of errors below 1 px"}};
   const auto add = [&](const std::string& what, const DisparityScores& s) {
     rows.push_back({what, percent(s.density_percent), percent(s.bad_1), percent(s.matched_bad_1),
                     s.rms_in_1px ? fmt::format("{:.3f} px", *s.rms_in_1px) : "–"});
   };
-  add("all with truth", scores->all);
-  if (scores->nonocc) add("seen by both eyes", *scores->nonocc);
+  add("all with ground truth", scores->all);
+  if (scores->nonocc) add("non-occluded", *scores->nonocc);
   return html + html_table(rows);
 }
 
-// Heights in colour with shade from the north-west.
+// Elevation in color, shaded from the north-west.
 std::string elevation_of(const std::string& recording, const Trajectory& truth) {
   const auto map = read_geotiff(recording + "/truth/elevation.tif");
   if (!map || map->bands.empty()) return "";
@@ -122,7 +122,7 @@ std::string elevation_of(const std::string& recording, const Trajectory& truth) 
   for (int y = 0; y < z.height(); ++y) sorted.insert(sorted.end(), z.row(y), z.row(y) + z.width());
   std::sort(sorted.begin(), sorted.end());
   const float low = sorted[sorted.size() / 100], high = sorted[sorted.size() - 1 - sorted.size() / 100];
-  Image<Rgb8> picture(z.width(), z.height());
+  Image<Rgb8> image(z.width(), z.height());
   for (int y = 0; y < z.height(); ++y) {
     for (int x = 0; x < z.width(); ++x) {
       const float east = z(std::min(x + 1, z.width() - 1), y), south = z(x, std::min(y + 1, z.height() - 1));
@@ -131,7 +131,7 @@ std::string elevation_of(const std::string& recording, const Trajectory& truth) 
       const auto lit = [&](std::uint8_t v) {
         return static_cast<std::uint8_t>(std::clamp(0.9 * shade * v, 0.0, 255.0));
       };
-      picture(x, y) = {lit(c.r), lit(c.g), lit(c.b)};
+      image(x, y) = {lit(c.r), lit(c.g), lit(c.b)};
     }
   }
   for (const StampedPose& p : truth) {
@@ -139,19 +139,19 @@ std::string elevation_of(const std::string& recording, const Trajectory& truth) 
     const int y = static_cast<int>((map->place.north_m - p.pose.translation().y()) / map->place.cell_m);
     for (int dy = -2; dy <= 2; ++dy) {
       for (int dx = -2; dx <= 2; ++dx) {
-        if (picture.view().contains(x + dx, y + dy)) picture(x + dx, y + dy) = {20, 20, 20};
+        if (image.view().contains(x + dx, y + dy)) image(x + dx, y + dy) = {20, 20, 20};
       }
     }
   }
-  return html_picture(
-      shrunk(picture.view(), 720),
+  return html_image(
+      shrunk(image.view(), 720),
       fmt::format("True elevation, {:.2f} m (blue) to {:.2f} m (red), {:.1f} m × {:.1f} m, north up; black: the frames",
                   low, high, z.width() * map->place.cell_m, z.height() * map->place.cell_m),
       720);
 }
 
 std::string stage_table(const Json& summary) {
-  std::vector<std::vector<std::string>> rows{{"stage", "times", "median, ms", "95 %, ms", "CPU median, ms"}};
+  std::vector<std::vector<std::string>> rows{{"stage", "count", "median, ms", "95 %, ms", "CPU median, ms"}};
   for (const auto& [name, stage] : summary["stages"].items()) {
     rows.push_back({name, std::to_string(stage["count"].get<int>()),
                     fmt::format("{:.1f}", stage["wall_ms"]["median"].get<double>()),
@@ -167,21 +167,21 @@ std::string figure(const std::string& value, const std::string& what) {
 
 Result<std::string> figures_of(const Json& summary, const ReportRequest& request) {
   std::string html = "<div class=\"figures\">";
-  html += figure(fmt::format("{:.2f} m", summary["distance_m"].get<double>()), "driven");
+  html += figure(fmt::format("{:.2f} m", summary["distance_m"].get<double>()), "distance driven");
   if (!request.truth.empty()) {
     const auto compared = find_trajectories(request.run, request.truth, "");
     if (!compared) return failure(compared);
     const auto metrics = errors_of(*compared);
     if (!metrics) return failure(metrics);
     html += figure(fmt::format("{:.1f} mm", 1000 * metrics->ate_m.rmse),
-                   "position error, RMS, " + in_words(metrics->alignment));
+                   "position error, RMS, " + alignment_text(metrics->alignment));
     if (metrics->drift_percent)
-      html += figure(fmt::format("{:.2f} %", *metrics->drift_percent), "drift of the distance");
+      html += figure(fmt::format("{:.2f} %", *metrics->drift_percent), "drift, of the distance");
   }
   html += figure(
       fmt::format("{} of {}", summary["health"]["odometry"]["tracking"].get<int>(), summary["frames"].get<int>()),
       "frames tracked");
-  html += figure(fmt::format("{:.1f} s", summary["wall_seconds"].get<double>()), "for the whole run");
+  html += figure(fmt::format("{:.1f} s", summary["wall_seconds"].get<double>()), "wall time");
   return html + "</div>\n";
 }
 
@@ -194,8 +194,7 @@ Result<std::string> whole_truth(FrameSource& source, Imager& imager, const Repor
   }
   const auto truth = load_trajectory(source.info().truth_file);
   if (!truth) return failure(truth);
-  return section("What the ground looks like to it", stereo) +
-         section("The ground as it is", elevation_of(request.recording, truth->poses));
+  return section("Stereo matching", stereo) + section("True elevation", elevation_of(request.recording, truth->poses));
 }
 
 }  // namespace
@@ -222,24 +221,25 @@ Result<std::string> make_report(ReportRequest request) {
   const auto figures = figures_of(summary, request);
   if (!figures) return failure(figures);
   body += *figures;
-  const auto pictures = drive_pictures(**source, *imager);
-  if (!pictures) return failure(pictures);
-  body += section("What the rover saw", *pictures);
+  const auto images = drive_images(**source, *imager);
+  if (!images) return failure(images);
+  body += section("Images", *images);
   const auto plots = trajectory_plots(request.run, *frames, request.truth);
   if (!plots) return failure(plots);
-  body += section("Where it went", *plots);
-  body += section("What its sensors were worth", sensor_tables(summary, *frames));
-  const auto maps = map_pictures(request.run);
+  body += section("Trajectories", *plots);
+  body += section("Sensors", sensor_tables(summary, *frames));
+  const auto maps = map_images(request.run);
   if (!maps) return failure(maps);
-  if (!maps->empty()) body += section("Maps of where it stood", *maps);
+  if (!maps->empty()) body += section("Maps", *maps);
   if (request.whole_truth) {
     const auto truth = whole_truth(**source, *imager, request);
     if (!truth) return failure(truth);
     body += *truth;
   }
-  body += section("Time", stage_table(summary) + fmt::format("<p>Peak memory {:.0f} MB, {} threads.</p>\n",
-                                                             summary["peak_memory_bytes"].get<double>() / 1e6,
-                                                             summary["threads"].get<int>()));
+  body +=
+      section("Time and memory", stage_table(summary) + fmt::format("<p>Peak memory {:.0f} MB, {} threads.</p>\n",
+                                                                    summary["peak_memory_bytes"].get<double>() / 1e6,
+                                                                    summary["threads"].get<int>()));
   return html_page("Spartan: " + info.name, body);
 }
 

@@ -1,4 +1,4 @@
-// The report page of a run: what was seen, where the rover went, what it found, how right it was.
+// The report page of a run: images, trajectories, sensors, maps, and errors where the truth is known.
 #pragma once
 
 #include <string>
@@ -10,12 +10,12 @@
 namespace spartan::program {
 
 struct ReportRequest {
-  std::string run;           ///< the run's folder
-  std::string recording;     ///< that it was made from
-  OpenOptions open;          ///< how that was opened
-  RunOptions options;        ///< that the run was made with
-  std::string truth;         ///< what `find_trajectories` takes for the truth; empty: the recording's, where it has one
-  bool whole_truth = false;  ///< besides, how right the matcher is and how the ground is, as a simulation knows them
+  std::string run;           ///< run folder
+  std::string recording;     ///< the recording it was made from
+  OpenOptions open;          ///< how the recording was opened
+  RunOptions options;        ///< options of the run
+  std::string truth;         ///< truth for `find_trajectories`; empty: that of the recording, if any
+  bool whole_truth = false;  ///< also show disparity errors and the true elevation of a simulation
   int threads = 1;
 };
 

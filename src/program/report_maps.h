@@ -7,7 +7,7 @@
 
 namespace spartan::program {
 
-/// Pictures of the local maps, spread over the drive, and of the global one; empty where there are none.
-Result<std::string> map_pictures(const std::string& run);
+/// Images of the local maps, spread over the drive, and of the global map; empty if there are none.
+Result<std::string> map_images(const std::string& run);
 
 }  // namespace spartan::program

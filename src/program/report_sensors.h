@@ -1,4 +1,4 @@
-// The report's part on what each sensor of the localization was worth.
+// The report's section on the sensors of the localization.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace spartan::program {
 
-/// In how many frames each sensor was ok, suspect, excluded, missing; and when, and why, it was not ok.
+/// Number of frames in which each sensor was ok, suspect, excluded, missing; and its outages with their reasons.
 std::string sensor_tables(const Json& summary, const std::vector<FrameRecord>& frames);
 
 }  // namespace spartan::program

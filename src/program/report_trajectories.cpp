@@ -33,13 +33,13 @@ const StampedPose& nearest(const Trajectory& truth, Stamp stamp) {
   return after == truth.end() || stamp.ns - before->stamp.ns <= after->stamp.ns - stamp.ns ? *before : *after;
 }
 
-// 3σ of the position, in the direction in which it is known worst.
+// 3σ of the position along the axis of largest variance.
 double three_sigma(const Matrix6d& covariance) {
   const Eigen::Matrix3d position = covariance.topLeftCorner<3, 3>();
   return 3 * std::sqrt(std::max(0.0, position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
 }
 
-// Seen from above. KITTI's world is the first left camera's: x to the right, z ahead.
+// Projection to the ground. KITTI's world frame is that of the first left camera: x right, z forward.
 struct Ground {
   PoseConvention convention = PoseConvention::body;
   Eigen::Vector2d place(const Eigen::Vector3d& p) const {
@@ -47,8 +47,7 @@ struct Ground {
   }
 };
 
-PlotLine seen_from_above(const Trajectory& trajectory, const Ground& ground, const std::string& name,
-                         const char* colour) {
+PlotLine ground_track(const Trajectory& trajectory, const Ground& ground, const std::string& name, const char* colour) {
   PlotLine line{name, colour, {}, {}};
   for (const StampedPose& p : trajectory) {
     const Eigen::Vector2d at = ground.place(p.pose.translation());
@@ -104,8 +103,8 @@ Result<TrajectoryMetrics> errors_of(const ComparedTrajectories& compared) {
   return compare_trajectories(compared.estimate, compared.truth, options);
 }
 
-std::string in_words(Alignment alignment) {
-  return alignment == Alignment::first ? "first poses aligned" : "after the best fit";
+std::string alignment_text(Alignment alignment) {
+  return alignment == Alignment::first ? "first poses aligned" : "SE3 alignment";
 }
 
 Result<std::string> trajectory_plots(const std::string& run, const std::vector<FrameRecord>& frames,
@@ -118,23 +117,22 @@ Result<std::string> trajectory_plots(const std::string& run, const std::vector<F
   for (const Kind& kind : kKinds) {
     if (truth.empty()) {
       lines.way.push_back(
-          seen_from_above(trajectory_of(frames, kind.kind), ground, std::string(name_of(kind.kind)), kind.colour));
+          ground_track(trajectory_of(frames, kind.kind), ground, std::string(name_of(kind.kind)), kind.colour));
       continue;
     }
     const auto compared = find_trajectories(run, truth, std::string(name_of(kind.kind)));
     if (!compared) return failure(compared);
-    if (lines.way.empty()) lines.way.push_back(seen_from_above(compared->truth, ground, "truth", "#9a3b12"));
+    if (lines.way.empty()) lines.way.push_back(ground_track(compared->truth, ground, "truth", "#9a3b12"));
     if (compared->estimate.empty() || compared->truth.empty()) continue;
     const auto metrics = errors_of(*compared);
     if (!metrics) return failure(metrics);
     draw(kind, *compared, metrics->truth_from_estimate.pose, frames, ground, lines);
-    aligned = in_words(metrics->alignment);
+    aligned = alignment_text(metrics->alignment);
   }
   std::string html = svg_plot(lines.way, {"x, m", "y, m", true, 560, 420});
   if (lines.errors.empty()) return html;
-  html += svg_plot(lines.errors, {"driven, m", "position error, " + aligned + ", mm", false, 560, 420});
-  return html + "<p>Position errors, here and at the head of the page (there of the best trajectory): " + aligned +
-         ".</p>\n";
+  html += svg_plot(lines.errors, {"distance, m", "position error, " + aligned + ", mm", false, 560, 420});
+  return html + "<p>Position errors here, and of the best trajectory at the top of the page: " + aligned + ".</p>\n";
 }
 
 }  // namespace spartan::program

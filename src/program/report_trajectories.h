@@ -1,4 +1,4 @@
-// The report's part on where the rover went: every trajectory beside the truth, its error with its 3σ.
+// The report's section on trajectories: each with the truth, its error and its 3σ bound.
 #pragma once
 
 #include <string>
@@ -11,12 +11,12 @@
 
 namespace spartan::program {
 
-/// A trajectory's errors as the whole page has them: with the first poses aligned or, where the truth knows no
-/// rotation, after the best fit. Codes: compare_trajectories'.
+/// Errors of a trajectory with the first poses aligned, or, if the truth has no rotation, after an SE3 fit. Codes as
+/// compare_trajectories().
 Result<TrajectoryMetrics> errors_of(const ComparedTrajectories& compared);
-std::string in_words(Alignment alignment);
+std::string alignment_text(Alignment alignment);
 
-/// Plots of each trajectory of the run; where the truth is known (not empty) beside it, aligned as in errors_of().
+/// Plots of each trajectory of the run, with the truth if not empty, aligned as in errors_of().
 Result<std::string> trajectory_plots(const std::string& run, const std::vector<FrameRecord>& frames,
                                      const std::string& truth);
 

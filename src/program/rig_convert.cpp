@@ -30,18 +30,18 @@ bool is_there(const std::string& path) {
   return fs::exists(path, error);
 }
 
-// The rig to write, with only the pair that was asked for.
+// The rig to write, reduced to the requested pair.
 Result<Rig> chosen_rig(const ReadRig& read, const std::string& pair) {
   if (pair.empty()) return read.rig;
   if (const StereoPair* chosen = read.rig.find_pair(pair)) return rig_of_pair(read.rig, *chosen);
   std::vector<std::string> names;
   names.reserve(read.rig.pairs.size());
   for (const StereoPair& each : read.rig.pairs) names.push_back(each.name);
-  return failure(ErrorCode::usage, fmt::format("there is no pair '{}', only {}", pair, fmt::join(names, ", ")),
+  return failure(ErrorCode::usage, fmt::format("the rig has no pair '{}'; it has: {}", pair, fmt::join(names, ", ")),
                  "--pair");
 }
 
-// The folder as ".." leads out of it: without links.
+// The folder with symbolic links resolved, so that ".." is correct.
 fs::path real_folder_of(const fs::path& file) {
   std::error_code error;
   const fs::path folder = fs::absolute(file).parent_path();
@@ -49,31 +49,31 @@ fs::path real_folder_of(const fs::path& file) {
   return error ? folder.lexically_normal() : real;
 }
 
-// A size given beside files that hold another.
+// A given size must agree with the size that the files hold.
 Status check_size(const Rig& rig, ImageSize given) {
   for (const Camera& camera : rig.cameras) {
     if (given.empty() || camera.size == given) continue;
-    return failure(
-        ErrorCode::usage,
-        fmt::format("the files say that the camera {} has {} x {}", camera.name, camera.size.width, camera.size.height),
-        "--size-px", "leave it out");
+    return failure(ErrorCode::usage,
+                   fmt::format("contradicts the files: camera {} has {} x {} px", camera.name, camera.size.width,
+                               camera.size.height),
+                   "--size-px", "omit it");
   }
   return {};
 }
 
-// A name that reads as another format, or as no pair of files, would be read as such ever after.
+// The name must be recognized as this format when the file is read again.
 Status check_names(const CalibrationFiles& files, CalibrationFormat format, const std::string& to) {
   const CalibrationFile& first = files.front();
   if (const auto guess = guess_format(first.path, first.content); guess != format) {
     return failure(ErrorCode::usage,
-                   fmt::format("files of this name are read as {}, not as {}", guess ? name_of(*guess) : "nothing",
-                               name_of(format)),
-                   first.path, "choose another ending");
+                   fmt::format("a file of this name would be read as {}, not as {}",
+                               guess ? name_of(*guess) : "nothing", name_of(format)),
+                   first.path, "choose another extension");
   }
   if (!has_a_file_per_eye(format)) return {};
-  if (first.path == files.at(1).path) return failure(ErrorCode::usage, "is the name of both eyes' files", to);
+  if (first.path == files.at(1).path) return failure(ErrorCode::usage, "is the same file for both cameras", to);
   if (first.path.find(',') != std::string::npos) {
-    return failure(ErrorCode::usage, "is neither one name nor LEFT,RIGHT", to, "names of such files have no comma");
+    return failure(ErrorCode::usage, "is neither one name nor LEFT,RIGHT", to, "file names must not contain a comma");
   }
   return {};
 }
@@ -81,7 +81,7 @@ Status check_names(const CalibrationFiles& files, CalibrationFormat format, cons
 Status check_places(const CalibrationFiles& files, bool force) {
   for (const CalibrationFile& file : files) {
     if (!force && is_there(file.path)) {
-      return failure(ErrorCode::output, "is there already", file.path, "--force writes over it");
+      return failure(ErrorCode::output, "exists already", file.path, "--force overwrites it");
     }
   }
   return {};
@@ -98,31 +98,32 @@ Status write_all(const CalibrationFiles& files) {
   return write_files_atomically(contents);
 }
 
-// Names of cameras, pairs and rigs that a reader invents cannot be lost.
+// Names that a reader makes up are not counted as lost.
 bool is_a_name(const RigDifference& difference) {
   return difference.key == "name" || difference.key.ends_with(".name");
 }
 
-// What --pair left out.
+// What --pair excluded.
 std::vector<RigDifference> not_chosen(const Rig& source, const Rig& chosen) {
   std::vector<RigDifference> out;
   for (const Camera& camera : source.cameras) {
-    if (!chosen.find_camera(camera.name)) out.push_back({"cameras." + camera.name, "left out, as --pair says"});
+    if (!chosen.find_camera(camera.name)) out.push_back({"cameras." + camera.name, "excluded by --pair"});
   }
   for (const StereoPair& pair : source.pairs) {
-    if (!chosen.find_pair(pair.name)) out.push_back({"pairs." + pair.name, "left out, as --pair says"});
+    if (!chosen.find_pair(pair.name)) out.push_back({"pairs." + pair.name, "excluded by --pair"});
   }
   return out;
 }
 
-// What was not taken from the source, and what the files do not say of the rig: they are read as they will be.
+// What the reader did not use, and every difference found by reading the new files back.
 Result<std::vector<RigDifference>> losses(const ReadRig& source, const Rig& written, CalibrationFormat format,
                                           const CalibrationFiles& files) {
   const ImageSize size = written.find_camera(written.pairs.front().left)->size;
   const auto again = read_back(files, format, size);
   if (!again && again.error().code == ErrorCode::output) return failure(again);
   if (!again) {
-    return failure(ErrorCode::internal, "nothing is written, for it could not be read: " + again.error().message());
+    return failure(ErrorCode::internal,
+                   "nothing is written, because the result could not be read back: " + again.error().message());
   }
   std::vector<RigDifference> differences = describe_differences(written, again->rig);
   if (source.format != CalibrationFormat::rig_yaml) std::erase_if(differences, is_a_name);
@@ -136,8 +137,8 @@ Result<std::vector<RigDifference>> losses(const ReadRig& source, const Rig& writ
   return lost;
 }
 
-std::string in_words(const ReadRig& read, CalibrationFormat format, const CalibrationFiles& files,
-                     const std::vector<RigDifference>& lost) {
+std::string to_text(const ReadRig& read, CalibrationFormat format, const CalibrationFiles& files,
+                    const std::vector<RigDifference>& lost) {
   std::string text = fmt::format("read {}: {}\n", name_of(read.format), fmt::join(read.files, ", "));
   for (const std::string& note : read.notes) text += "  " + note + "\n";
   text += fmt::format("wrote {}:", name_of(format));
@@ -147,7 +148,7 @@ std::string in_words(const ReadRig& read, CalibrationFormat format, const Calibr
   return text;
 }
 
-std::string in_json(const ReadRig& read, CalibrationFormat format, const CalibrationFiles& files,
+std::string to_json(const ReadRig& read, CalibrationFormat format, const CalibrationFiles& files,
                     const std::vector<RigDifference>& lost) {
   Json paths = Json::array(), losses = Json::array();
   for (const CalibrationFile& file : files) paths.push_back(file.path);
@@ -177,9 +178,9 @@ Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {
   const auto lost = losses(*read, *rig, *format, *files);
   if (!lost) return failure(lost);
   if (const Status written = write_all(*files); !written) return failure(written);
-  const std::string told =
-      context.json ? in_json(*read, *format, *files, *lost) : in_words(*read, *format, *files, *lost);
-  if (Status printed = print(told); !printed) return failure(printed);
+  const std::string text =
+      context.json ? to_json(*read, *format, *files, *lost) : to_text(*read, *format, *files, *lost);
+  if (Status printed = print(text); !printed) return failure(printed);
   return kDone;
 }
 
@@ -202,7 +203,7 @@ Status calibration_is_there(const std::string& path) {
   for (const std::string& file : files) {
     if (!is_there(file)) {
       return failure(ErrorCode::input, "no such file or folder", file,
-                     "a calibration file, LEFT,RIGHT, or a folder that holds one");
+                     "give a calibration file, LEFT,RIGHT, or a folder that holds one");
     }
   }
   return {};
@@ -210,28 +211,29 @@ Status calibration_is_there(const std::string& path) {
 
 void add_rig_convert(CLI::App& rig, Context& context) {
   auto a = std::make_shared<ConvertArguments>();
-  CLI::App* verb =
-      add_verb(rig, context, "convert", "Write a calibration in another format, and say what was lost",
-               "rig convert $SPARTAN_DATA/k10_pair k10.cahvor", [&context, a] { return convert(context, *a); });
-  verb->add_option("from", a->from, "any calibration: a file, LEFT,RIGHT, or a folder that holds one")
+  CLI::App* command = add_command(
+      rig, context, "convert", "Convert a calibration to another format, and list what the format cannot hold",
+      "rig convert $SPARTAN_DATA/k10_pair k10.cahvor", [&context, a] { return convert(context, *a); });
+  command->add_option("from", a->from, "Calibration to read: a file, LEFT,RIGHT, or a folder that holds one.")
       ->required()
       ->option_text("A");
-  verb->add_option(
+  command
+      ->add_option(
           "to", a->to,
-          "the file to write; LEFT,RIGHT or one name that becomes two where a format has a file for each eye; a "
-          "folder for EuRoC. Files that are there already are kept, and that is an error")
+          "File to write; for formats with one file per camera LEFT,RIGHT or one name for both; for EuRoC a folder. "
+          "Existing files are an error without --force.")
       ->required()
       ->option_text("B");
   std::vector<std::string> names;
   for (const std::string_view name : calibration_format_names()) names.emplace_back(name);
-  verb->add_option("--to", a->format, "the format of B, where its name does not tell")->check(CLI::IsMember(names));
-  verb->add_option("--pair", a->pair, "only this pair of the rig");
-  verb->add_option("--size-px", a->size_px, "the image size, W,H, where A does not hold it")
+  command->add_option("--to", a->format, "Format of B (default: from its name).")->check(CLI::IsMember(names));
+  command->add_option("--pair", a->pair, "Convert only this pair of the rig.");
+  command->add_option("--size-px", a->size_px, "Image size W,H in pixels, for formats that do not hold it.")
       ->delimiter(',')
       ->expected(2)
       ->check(CLI::Range(1, 32767));
-  verb->add_flag("--force", a->force, "write over files that are there already");
-  add_json_flag(*verb, context);
+  command->add_flag("--force", a->force, "Overwrite existing files.");
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

@@ -1,4 +1,4 @@
-// `spartan rig convert`, and what the verbs of `rig` share.
+// `spartan rig convert`, and what the `rig` commands share.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,11 +11,11 @@ namespace spartan::program {
 
 void add_rig_convert(CLI::App& rig, Context& context);
 
-/// A self-mask's path counts from its rig file: the rig with masks that are found from another file too. Folders that
-/// are links are looked through; neither file needs to be there.
+/// Self-mask paths are relative to the rig file: returns the rig with paths relative to another file. Symbolic links
+/// are resolved; neither file has to exist.
 Rig with_masks_moved(Rig rig, const std::string& from_file, const std::string& to_file);
 
-/// Code `input` where there is no such file or folder; of "LEFT,RIGHT" both have to be there.
+/// Code `input` if the file or folder does not exist; of "LEFT,RIGHT" both must exist.
 Status calibration_is_there(const std::string& path);
 
 }  // namespace spartan::program

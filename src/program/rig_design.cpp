@@ -1,11 +1,11 @@
-// spartan rig design: which stereo pairs meet a rover's requirements.
+// spartan rig design: finds the stereo pairs that meet a rover's requirements.
 #include "program/rig_design.h"
 
 #include <limits>
 #include <memory>
 
 #include "program/design_report.h"
-#include "program/ground_picture.h"
+#include "program/ground_figure.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/rig/design/rig_designer.h"
@@ -26,14 +26,14 @@ Status write_files(const Context& context, const std::string& folder, const RigR
   if (Status s = write_file_atomically(folder + "/feasible.csv", design_csv(design)); !s) return s;
   const auto drawing = draw_ground(requirements, design);
   if (!drawing) {
-    context.log.warning("no wide pair is feasible or published: there is no ground to draw");
+    context.log.warning("no wide pair is feasible or published: no figure is written");
     return {};
   }
   if (Status s = write_file_atomically(folder + "/ground.svg", drawing->to_svg()); !s) return s;
   return write_png(folder + "/ground.png", drawing->to_image());
 }
 
-Result<ExitCode> design_verb(const Context& context, const DesignArguments& a) {
+Result<ExitCode> design_command(const Context& context, const DesignArguments& a) {
   const auto requirements = read_requirements(a.requirements);
   if (!requirements) return failure(requirements);
   const RigDesign design = design_rig(*requirements);
@@ -53,17 +53,18 @@ Result<ExitCode> design_verb(const Context& context, const DesignArguments& a) {
 
 void add_rig_design(CLI::App& rig, Context& context) {
   auto a = std::make_shared<DesignArguments>();
-  CLI::App* verb = add_verb(rig, context, "design", "Which stereo pairs meet a rover's requirements, and what they see",
-                            "rig design config/requirements/rover.yaml -o rover_design",
-                            [&context, a] { return design_verb(context, *a); });
-  verb->add_option("requirements", a->requirements, "requirements of a rig (docs/formats.md)")
+  CLI::App* command = add_command(rig, context, "design",
+                                  "Find the stereo pairs that meet a rover's requirements, and the ground they see",
+                                  "rig design config/requirements/rover.yaml -o rover_design",
+                                  [&context, a] { return design_command(context, *a); });
+  command->add_option("requirements", a->requirements, "Requirements file (docs/formats.md).")
       ->required()
       ->option_text("REQ");
-  verb->add_option("-o,--output", a->output, "a folder for ground.svg, ground.png and feasible.csv");
-  verb->add_option("--rows", a->rows, "how many feasible combinations are listed (default 10)")
+  command->add_option("-o,--output", a->output, "Folder for ground.svg, ground.png and feasible.csv.");
+  command->add_option("--rows", a->rows, "Number of feasible combinations to print (default 10).")
       ->check(CLI::Range(0, 2'000'000));
-  verb->add_flag("--all", a->all, "list the whole feasible set, with --json too");
-  add_json_flag(*verb, context);
+  command->add_flag("--all", a->all, "Print the whole feasible set, with --json, too.");
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

@@ -10,12 +10,12 @@
 #include <optional>
 
 #include "program/inspected_pair.h"
+#include "program/inspection_images.h"
 #include "program/json.h"
 #include "program/progress.h"
 #include "program/rig_convert.h"
 #include "program/rig_inspect_apply.h"
-#include "program/rig_inspect_picture.h"
-#include "program/rig_pictures.h"
+#include "program/rig_inspect_figure.h"
 #include "spartan/core/image_io.h"
 #include "spartan/odometry/view_matching.h"
 #include "spartan/rig/describe.h"
@@ -28,35 +28,35 @@ namespace {
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 struct InspectArguments {
-  std::string rig, left, right, recording, pair, apply, picture;
-  int shots = 12;
+  std::string rig, left, right, recording, pair, apply, figure;
+  int frames = 12;
 };
 
-InspectedPair inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<PicturePair> pictures, bool guessed,
+InspectedPair inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<ImagePair> images, bool guessed,
                            const Workers& workers, bool quiet) {
   std::vector<PixelMatch> all;
   InspectedPair result;
   result.pair = pair;
-  const int shots = static_cast<int>(pictures.size());
-  Progress progress(quiet || shots == 1);
-  for (int shot = 0; shot < shots; ++shot) {
-    progress.show(shot, shots, fmt::format("shots of pair {}", pair.name));
-    PicturePair& picture = pictures[static_cast<std::size_t>(shot)];
+  const int frames = static_cast<int>(images.size());
+  Progress progress(quiet || frames == 1);
+  for (int frame = 0; frame < frames; ++frame) {
+    progress.show(frame, frames, fmt::format("frames of pair {}", pair.name));
+    ImagePair& image = images[static_cast<std::size_t>(frame)];
     std::vector<PixelMatch> matches;
-    for (const ViewMatch& match : match_views(std::as_const(picture.left).view(), std::as_const(picture.right).view(),
+    for (const ViewMatch& match : match_views(std::as_const(image.left).view(), std::as_const(image.right).view(),
                                               ViewMatchingOptions(), workers)) {
       matches.push_back({match.left, match.right});
     }
     all.insert(all.end(), matches.begin(), matches.end());
-    // The shot that shows most is drawn.
-    if (result.shot.empty() || matches.size() > result.matches.size()) {
-      result.shot = picture.name;
-      result.left = std::move(picture.left);
-      result.right = std::move(picture.right);
+    // The figure shows the frame with the most matches.
+    if (result.frame.empty() || matches.size() > result.matches.size()) {
+      result.frame = image.name;
+      result.left = std::move(image.left);
+      result.right = std::move(image.right);
       result.matches = std::move(matches);
     }
   }
-  progress.show(shots, shots, fmt::format("shots of pair {} matched: judging", pair.name));
+  progress.show(frames, frames, fmt::format("frames of pair {} matched, checking the calibration", pair.name));
   result.check = guessed ? check_pictures(all, result.left.size()) : check_pair(rig, pair, all, result.left.size());
   return result;
 }
@@ -78,7 +78,7 @@ Json findings_json(const std::vector<RigFinding>& findings) {
   return list;
 }
 
-// Of a guess (no calibration) nothing is said that the pictures did not.
+// Without a calibration, figures that the images do not tell are null.
 Json to_json(const ReadRig& read, const std::vector<InspectedPair>& inspected, bool guessed) {
   const Rig& rig = read.rig;
   Json pairs = Json::object();
@@ -122,49 +122,49 @@ Json to_json(const ReadRig& read, const std::vector<InspectedPair>& inspected, b
           {"pairs", std::move(pairs)}};
 }
 
-// Rounded to what is printed, so that there is no "-0.00".
+// Rounded to the printed digits, which avoids "-0.00".
 double hundredths(double value) {
   return std::round(100 * value) / 100 + 0.0;
 }
 
-std::string turned(double radians, double sigma, const char* above, const char* below) {
+std::string rotation_text(double radians, double sigma, const char* above, const char* below) {
   return fmt::format("{:.3f}° ± {:.3f}° {}", std::abs(radians) * kDegreesPerRadian, sigma * kDegreesPerRadian,
                      radians > 0 ? above : below);
 }
 
-std::string in_words(const InspectedPair& one, bool guessed) {
+std::string to_text(const InspectedPair& one, bool guessed) {
   const PairCheck& check = one.check;
   const std::string pair = fmt::format("pair {}: ", one.pair.name);
-  std::string text = fmt::format("{}{} matches, {} of them agree\n", pair, check.matches, check.inliers);
+  std::string text = fmt::format("{}{} matches, {} inliers\n", pair, check.matches, check.inliers);
   std::vector<std::string> rows;
   const auto add_rows = [&](const char* what, const RowErrors& e) {
     if (std::isfinite(e.mean_px))
-      rows.push_back(fmt::format("{} {:.2f} px, 95 % below {:.2f} px", what, e.mean_px, e.p95_px));
+      rows.push_back(fmt::format("{} {:.2f} px (95 % below {:.2f} px)", what, e.mean_px, e.p95_px));
   };
-  add_rows("as taken by", check.as_taken);
-  if (!guessed) add_rows("rectified as given by", check.as_given);
-  add_rows("corrected by", check.as_corrected);
-  if (!rows.empty()) text += fmt::format("{}rows differ {}\n", pair, fmt::join(rows, "; "));
+  add_rows("unrectified", check.as_taken);
+  if (!guessed) add_rows("rectified with the given calibration", check.as_given);
+  add_rows("corrected", check.as_corrected);
+  if (!rows.empty()) text += fmt::format("{}mean row error {}\n", pair, fmt::join(rows, ", "));
   const PairCorrection &c = check.correction, &s = check.sigma;
   if (std::isfinite(c.pitch_rad)) {
-    text += fmt::format("{}the pictures want the right eye turned {}, {}, {}; its focal length {:+.2f} % ± {:.2f} %\n",
-                        pair, turned(c.pitch_rad, s.pitch_rad, "up", "down"),
-                        turned(c.yaw_rad, s.yaw_rad, "to the right", "to the left"),
-                        turned(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"),
-                        hundredths(100 * (c.focal_ratio - 1)), 100 * s.focal_ratio);
     text += fmt::format(
-        "{}rows cannot tell a yaw from a lens to better than that ±: it is worth ±{:.1f} px of disparity, so they say "
-        "little of far ranges\n",
+        "{}estimated correction of the right camera: rotation {}, {}, {}; focal length {:+.2f} % ± {:.2f} %\n", pair,
+        rotation_text(c.pitch_rad, s.pitch_rad, "up", "down"),
+        rotation_text(c.yaw_rad, s.yaw_rad, "to the right", "to the left"),
+        rotation_text(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"), hundredths(100 * (c.focal_ratio - 1)),
+        100 * s.focal_ratio);
+    text += fmt::format(
+        "{}row errors determine the yaw no better than that ±, because distortion has the same effect: ±{:.1f} px of "
+        "disparity, so they do not verify long ranges\n",
         pair, check.yaw_doubt_px);
   }
-  for (const RigFinding& f : check.findings) text += fmt::format("{}FOUND {}: {}\n", pair, f.id, f.text);
-  return text + fmt::format("{}verdict: {}\n", pair, name_of(check.verdict));
+  for (const RigFinding& f : check.findings) text += fmt::format("{}finding {}: {}\n", pair, f.id, f.text);
+  return text + fmt::format("{}calibration: {}\n", pair, name_of(check.verdict));
 }
 
-// The pairs that are asked for, with the recording's pictures or else those given, which are of one pair.
-Result<std::vector<InspectedPair>> inspect_pictures(const InspectArguments& a, const Rig& rig,
-                                                    std::vector<PicturePair> given, const Workers& workers,
-                                                    bool quiet) {
+// Checks the requested pairs, with images of the recording, or with the given images of one pair.
+Result<std::vector<InspectedPair>> inspect_images(const InspectArguments& a, const Rig& rig,
+                                                  std::vector<ImagePair> given, const Workers& workers, bool quiet) {
   std::vector<InspectedPair> inspected;
   const auto wanted = [&](const StereoPair& pair) { return a.pair.empty() || pair.name == a.pair; };
   if (!a.pair.empty() && !rig.find_pair(a.pair)) {
@@ -175,25 +175,25 @@ Result<std::vector<InspectedPair>> inspect_pictures(const InspectArguments& a, c
     if (!source) return failure(source);
     for (const StereoPair& pair : rig.pairs) {
       if (!wanted(pair) || !(*source)->info().rig.find_pair(pair.name)) continue;
-      auto pictures = load_shots(**source, pair.name, a.shots, workers);
-      if (!pictures) return failure(pictures);
-      inspected.push_back(inspect_pair(rig, pair, std::move(*pictures), a.rig == "-", workers, quiet));
+      auto images = load_frames(**source, pair.name, a.frames, workers);
+      if (!images) return failure(images);
+      inspected.push_back(inspect_pair(rig, pair, std::move(*images), a.rig == "-", workers, quiet));
     }
-    if (inspected.empty()) return failure(ErrorCode::input, "has none of the rig's pairs", a.recording);
+    if (inspected.empty()) return failure(ErrorCode::input, "has no pair of this rig", a.recording);
     return inspected;
   }
   const auto pair = std::find_if(rig.pairs.begin(), rig.pairs.end(), wanted);
   const Camera &left = *rig.find_camera(pair->left), &right = *rig.find_camera(pair->right);
   if (left.pixel_format != PixelFormat() || right.pixel_format != PixelFormat()) {
-    auto meant = load_pictures_of(left, right, a.left, a.right, a.shots, workers);
-    if (!meant) return failure(meant);
-    given = std::move(*meant);
+    auto decoded = load_images_of(left, right, a.left, a.right, a.frames, workers);
+    if (!decoded) return failure(decoded);
+    given = std::move(*decoded);
   }
   inspected.push_back(inspect_pair(rig, *pair, std::move(given), a.rig == "-", workers, quiet));
   return inspected;
 }
 
-// The size of the pictures is what formats that leave it out, and a guess, have to go by.
+// Formats that do not hold the image size, and a missing calibration, take it from the images.
 Result<ReadRig> read_or_guess(const std::string& rig, ImageSize size) {
   if (rig != "-") return read_calibration(rig, size);
   ReadRig guess;
@@ -204,84 +204,84 @@ Result<ReadRig> read_or_guess(const std::string& rig, ImageSize size) {
 Status check_usage(const InspectArguments& a) {
   const bool files = !a.left.empty(), recording = !a.recording.empty();
   if (files && a.right.empty())
-    return failure(ErrorCode::usage, "RIGHT is missing: pictures come in pairs", "rig inspect");
+    return failure(ErrorCode::usage, "RIGHT is missing: give a left and a right image", "rig inspect");
   if (files && recording) return failure(ErrorCode::usage, "give LEFT and RIGHT, or --recording", "rig inspect");
   if (!files && a.rig == "-") {
     return failure(ErrorCode::usage, "without a calibration (-) give LEFT and RIGHT", "rig inspect");
   }
-  if (!files && !recording && (!a.apply.empty() || !a.picture.empty())) {
-    return failure(ErrorCode::usage, "--apply and --picture need pictures", "rig inspect");
+  if (!files && !recording && (!a.apply.empty() || !a.figure.empty())) {
+    return failure(ErrorCode::usage, "--apply and --figure need images", "rig inspect");
   }
-  if (!a.picture.empty() && std::filesystem::path(a.picture).extension() != ".png") {
-    return failure(ErrorCode::usage, "the picture is a PNG: give it a name that ends in .png", "--picture");
+  if (!a.figure.empty() && std::filesystem::path(a.figure).extension() != ".png") {
+    return failure(ErrorCode::usage, "the figure is a PNG: give it a name that ends in .png", "--figure");
   }
   return {};
 }
 
-Status write_picture(const std::string& path, const Rig& rig, const InspectedPair& one, const Workers& workers) {
-  const auto picture = draw_pair_check(rig, one.pair, one.check, std::as_const(one.left).view(),
-                                       std::as_const(one.right).view(), one.matches, workers);
-  if (!picture) return failure(picture);
-  return write_png(path, std::as_const(*picture).view());
+Status write_figure(const std::string& path, const Rig& rig, const InspectedPair& one, const Workers& workers) {
+  const auto figure = draw_pair_check(rig, one.pair, one.check, std::as_const(one.left).view(),
+                                      std::as_const(one.right).view(), one.matches, workers);
+  if (!figure) return failure(figure);
+  return write_png(path, std::as_const(*figure).view());
 }
 
-std::string in_words(const InspectArguments& a, const ReadRig& read, const std::vector<InspectedPair>& inspected) {
+std::string to_text(const InspectArguments& a, const ReadRig& read, const std::vector<InspectedPair>& inspected) {
   const bool guessed = a.rig == "-";
   std::string text;
   if (guessed) {
     text = fmt::format(
-        "no calibration: two pinholes side by side are guessed, of {:.0f} px focal length; the length of the "
-        "baseline is not known\n",
+        "no calibration: two pinhole cameras side by side are assumed, with a focal length of {:.0f} px; the length "
+        "of the baseline is unknown\n",
         summarize_pair(read.rig, read.rig.pairs.front()).focal_px);
   } else {
     for (const std::string& sentence : describe_rig(read.rig)) text += sentence + "\n";
     for (const StereoPair& pair : read.rig.pairs) {
-      const bool judged = std::any_of(inspected.begin(), inspected.end(),
-                                      [&](const InspectedPair& one) { return one.pair.name == pair.name; });
-      if (judged) continue;  // the pictures say more
-      for (const std::string& doubt : describe_doubts(read.rig, pair)) text += doubt + "\n";
+      const bool checked = std::any_of(inspected.begin(), inspected.end(),
+                                       [&](const InspectedPair& one) { return one.pair.name == pair.name; });
+      if (checked) continue;  // the images tell more
+      for (const std::string& finding : describe_doubts(read.rig, pair)) text += finding + "\n";
     }
     for (const std::string& note : read.notes) text += note + "\n";
     for (const RigDifference& d : read.left_out) text += fmt::format("not used: {}: {}\n", d.key, d.text);
   }
-  for (const InspectedPair& one : inspected) text += in_words(one, guessed);
-  const bool mendable = std::any_of(inspected.begin(), inspected.end(), [&](const InspectedPair& one) {
-    return one.judged() && one.check.corrected && *one.check.corrected != read.rig;
+  for (const InspectedPair& one : inspected) text += to_text(one, guessed);
+  const bool correctable = std::any_of(inspected.begin(), inspected.end(), [&](const InspectedPair& one) {
+    return one.checked() && one.check.corrected && *one.check.corrected != read.rig;
   });
-  if (mendable && !guessed && a.apply.empty()) text += "--apply FILE writes the rig with that put right\n";
+  if (correctable && !guessed && a.apply.empty()) text += "--apply FILE writes the corrected rig\n";
   return text;
 }
 
 Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   if (Status usage = check_usage(a); !usage) return failure(usage);
   if (Status there = a.rig == "-" ? Status() : calibration_is_there(a.rig); !there) return failure(there);
-  std::vector<PicturePair> pictures;
+  std::vector<ImagePair> images;
   if (!a.left.empty()) {
-    auto loaded = load_pictures(a.left, a.right, a.shots);
+    auto loaded = load_images(a.left, a.right, a.frames);
     if (!loaded) return failure(loaded);
-    pictures = std::move(*loaded);
+    images = std::move(*loaded);
   }
-  const ImageSize size = pictures.empty() ? ImageSize() : pictures.front().left.size();
+  const ImageSize size = images.empty() ? ImageSize() : images.front().left.size();
   const auto read = read_or_guess(a.rig, size);
   if (!read) return failure(read);
   const Workers workers(context.threads);
   std::vector<InspectedPair> inspected;
   if (!a.left.empty() || !a.recording.empty()) {
-    auto result = inspect_pictures(a, read->rig, std::move(pictures), workers, context.quiet);
+    auto result = inspect_images(a, read->rig, std::move(images), workers, context.quiet);
     if (!result) return failure(result);
     inspected = std::move(*result);
   }
   const std::string text =
-      context.json ? to_json(*read, inspected, a.rig == "-").dump(2) + "\n" : in_words(a, *read, inspected);
+      context.json ? to_json(*read, inspected, a.rig == "-").dump(2) + "\n" : to_text(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
-  if (!a.picture.empty()) {
-    if (Status drawn = write_picture(a.picture, read->rig, inspected.front(), workers); !drawn) return failure(drawn);
+  if (!a.figure.empty()) {
+    if (Status drawn = write_figure(a.figure, read->rig, inspected.front(), workers); !drawn) return failure(drawn);
   }
   if (a.apply.empty()) return kDone;
   const auto sentences = write_corrected_rig(*read, inspected, a.apply);
   if (!sentences) return failure(sentences);
   if (context.json) {
-    // The findings tell the first; the rest is to be known.
+    // The findings in the JSON tell the first; the rest are warnings.
     for (std::size_t i = 1; i < sentences->size(); ++i) context.log.warning((*sentences)[i]);
     return kDone;
   }
@@ -293,25 +293,34 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
 
 void add_rig_inspect(CLI::App& rig, Context& context) {
   const auto a = std::make_shared<InspectArguments>();
-  CLI::App* verb =
-      add_verb(rig, context, "inspect", "A calibration in words, and what pictures of the pair say about it",
-               "rig inspect rig.yaml left.png right.png --picture rows.png --apply corrected.yaml",
-               [&context, a] { return inspect(context, *a); });
-  verb->add_option("rig", a->rig, "any calibration that is read (docs/formats.md), or - for none: the pictures alone")
+  CLI::App* command =
+      add_command(rig, context, "inspect", "Print a calibration, and check and correct it with images of its pairs",
+                  "rig inspect rig.yaml left.png right.png --figure rows.png --apply corrected.yaml",
+                  [&context, a] { return inspect(context, *a); });
+  command->add_option("rig", a->rig, "Calibration in any supported format (docs/formats.md), or - for none.")
       ->required()
       ->option_text("RIG");
-  verb->add_option("left", a->left, "left picture, a folder of them, or a quoted pattern (\"left*.jpg\")")
+  command->add_option("left", a->left, "Left image, a folder of images, or a quoted pattern (\"left*.jpg\").")
       ->option_text("LEFT");
-  verb->add_option("right", a->right, "the right ones")->option_text("RIGHT");
-  verb->add_option("--recording", a->recording, "take the pictures from a recording, for every pair of the rig");
-  verb->add_option("--pair", a->pair, "only this pair of the rig (with LEFT and RIGHT: the first one)");
-  verb->add_option("--shots", a->shots, "at most so many shots of a pair, spread over all of them (default 12)")
+  command
+      ->add_option("right", a->right,
+                   "Right image, folder or pattern; paired with the left ones in the order of their names.")
+      ->option_text("RIGHT");
+  command->add_option("--recording", a->recording, "Take the images from this recording, for every pair of the rig.");
+  command->add_option("--pair", a->pair,
+                      "Check only this pair of the rig (default with LEFT and RIGHT: the first one).");
+  command
+      ->add_option("--frames", a->frames,
+                   "Maximum number of frames of a pair, spread over all (default 12). More give smaller errors.")
       ->check(CLI::Range(1, 1000));
-  verb->add_option("--apply", a->apply,
-                   "write the rig with what was found put right and no more than is needed, as rig.yaml");
-  verb->add_option("--picture", a->picture, "draw the rows of the first pair, PNG");
-  add_threads_option(*verb, context);
-  add_json_flag(*verb, context);
+  command->add_option("--apply", a->apply,
+                      "Write the corrected rig as rig.yaml. Nothing is changed beyond what the findings require.");
+  command->add_option("--figure", a->figure,
+                      "Write a PNG that shows the row errors of the first pair, before and after.");
+  add_former_name(*command, context, "--shots", "--frames", a->frames);
+  add_former_name(*command, context, "--picture", "--figure", a->figure);
+  add_threads_option(*command, context);
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

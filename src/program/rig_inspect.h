@@ -1,4 +1,4 @@
-// spartan rig inspect: a calibration in words, and what pictures say about it.
+// spartan rig inspect: prints a calibration and checks it with images of its pairs.
 #pragma once
 
 #include "program/context.h"

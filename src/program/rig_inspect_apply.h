@@ -1,4 +1,4 @@
-// `rig inspect --apply`: the rig with what was found put right.
+// `rig inspect --apply`: writes the corrected rig.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace spartan::program {
 
-/// Writes it and says in words, a sentence each, what kind of rig the file now holds and what is to be known of it.
-/// Code `input` where nothing explains the pictures of a pair: then there is nothing to write.
+/// Writes the rig and returns sentences: first what the file holds (the corrected rig, or the given one), then notes.
+/// Code `input` if no hypothesis explains the images of a pair; then nothing is written.
 Result<std::vector<std::string>> write_corrected_rig(const ReadRig& read, const std::vector<InspectedPair>& inspected,
                                                      const std::string& path);
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "program/commands.h"
 #include "program/compared_trajectories.h"
 #include "program/interrupt.h"
 #include "program/json.h"
@@ -13,7 +14,6 @@
 #include "program/report.h"
 #include "program/run_arguments.h"
 #include "program/trajectory_report.h"
-#include "program/verbs.h"
 #include "spartan/core/files.h"
 #include "spartan/system/run_folder.h"
 
@@ -33,7 +33,7 @@ std::string summary_for_people(const std::string& summary_json, const std::strin
   std::string text = fmt::format("{} frames, {:.2f} m in {:.1f} s ({:.1f} s of CPU), {:.0f} MB\n",
                                  s["frames"].get<int>(), s["distance_m"].get<double>(), s["wall_seconds"].get<double>(),
                                  s["cpu_seconds"].get<double>(), s["peak_memory_bytes"].get<double>() / 1e6);
-  text += fmt::format("odometry: {} tracking, {} degraded, {} standing, {} lost\n", health["tracking"].get<int>(),
+  text += fmt::format("odometry: {} tracking, {} degraded, {} stationary, {} lost\n", health["tracking"].get<int>(),
                       health["degraded"].get<int>(), health["standing"].get<int>(), health["lost"].get<int>());
   for (const auto& [reason, count] : s["skipped"].items())
     text += fmt::format("skipped: {} {}\n", count.get<int>(), reason);
@@ -58,7 +58,7 @@ Result<std::string> score(const RunArguments& arguments, RunOutcome& outcome) {
   return table_of(*metrics, *compared);
 }
 
-// A run is done without its page: what goes wrong with it is said and no more.
+// A failure to write the report does not fail the run.
 Status write_report(const RunRequest& request, const std::string& truth) {
   ReportRequest about;
   about.run = request.output;
@@ -75,7 +75,7 @@ Status write_report(const RunRequest& request, const std::string& truth) {
   return write_file_atomically(folder.report() + "/index.html", *page);
 }
 
-Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments) {
+Result<ExitCode> run_command(const Context& context, const RunArguments& arguments) {
   RunRequest request;
   auto options = run_options(arguments.config, arguments.set);
   if (!options) return failure(options);
@@ -111,12 +111,13 @@ Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments)
     text += "\n" + *table;
   }
   if (!outcome->interrupted) {
-    if (Status s = write_report(request, arguments.truth); !s) context.log.warning("no report: " + s.error().message());
+    if (Status s = write_report(request, arguments.truth); !s)
+      context.log.warning("no report was written: " + s.error().message());
   }
   const Status printed = print(context.json ? outcome->summary_json : text);
   if (!printed) return failure(printed);
   if (outcome->interrupted) {
-    return failure(ErrorCode::interrupted, "stopped on request", arguments.output, "go on with --resume");
+    return failure(ErrorCode::interrupted, "interrupted by the user", arguments.output, "continue with --resume");
   }
   return outcome->lost ? kLost : kDone;
 }
@@ -125,20 +126,35 @@ Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments)
 
 void add_run(CLI::App& app, Context& context) {
   auto a = std::make_shared<RunArguments>();
-  CLI::App* verb = add_verb(app, context, "run", "Drive through a recording: trajectory and terrain",
-                            "run $SPARTAN_DATA/kitti_06 -o run_06", [&context, a] { return run_verb(context, *a); });
-  verb->add_option("input", a->input, "the recording's folder")->required();
-  verb->add_option("-o,--output", a->output, "the run folder to make")->required();
-  verb->add_option("--rig", a->rig, "calibration to use in place of the recording's own");
-  verb->add_option("--format", a->format, "spartan, kitti, kitti-raw or euroc; guessed without it");
-  verb->add_option("--config", a->config, "YAML file with options (see `spartan config dump`)");
-  verb->add_option("--set", a->set, "one option, as group.key=value; may be given again")->allow_extra_args(false);
-  verb->add_option("--truth", a->truth, "compare with this trajectory, or that of this recording, as `evaluate` does");
-  verb->add_flag("--resume", a->resume, "go on where an earlier run of this folder stopped");
-  verb->add_option("--max-frames", a->max_frames, "stop after so many shots")->check(CLI::NonNegativeNumber);
-  verb->add_flag("--odometry-only", a->odometry_only, "the trajectory without the terrain");
-  add_threads_option(*verb, context);
-  add_json_flag(*verb, context);
+  CLI::App* command = add_command(
+      app, context, "run", "Process a recording: trajectories, disparity images, terrain maps, and a report",
+      "run $SPARTAN_DATA/kitti_06 -o run_06", [&context, a] { return run_command(context, *a); });
+  command
+      ->add_option("input", a->input,
+                   "Folder of the recording. Its layout (Spartan, KITTI odometry, KITTI raw, EuRoC/ASL) is detected "
+                   "and printed.")
+      ->required();
+  command->add_option("-o,--output", a->output, "Run folder to create. An existing one is an error without --resume.")
+      ->required();
+  command->add_option("--rig", a->rig,
+                      "Calibration file to use instead of the recording's own, in any supported format.");
+  command->add_option("--format", a->format,
+                      "Layout of the recording: spartan, kitti, kitti-raw or euroc (default: detected).");
+  command->add_option("--config", a->config,
+                      "YAML file with options that differ from the defaults (see `spartan config dump`).");
+  command->add_option("--set", a->set, "Set one option, as group.key=value. Repeatable; overrides --config.")
+      ->allow_extra_args(false);
+  command->add_option(
+      "--truth", a->truth,
+      "Compare the result with this trajectory, or that of this recording, as `spartan evaluate` does.");
+  command->add_flag(
+      "--resume", a->resume,
+      "Continue an interrupted run in this folder. The results are the same as without the interruption.");
+  command->add_option("--max-frames", a->max_frames, "Stop after this number of stereo frames (default 0: all).")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--odometry-only", a->odometry_only, "the trajectory without the terrain");
+  add_threads_option(*command, context);
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

@@ -1,4 +1,4 @@
-// Options of a run from the command line: defaults, a file over them, single keys over that.
+// Options of a run from the command line: defaults, then a file, then single assignments.
 #pragma once
 
 #include <string>

@@ -1,17 +1,17 @@
-// spartan simulate: a scenario into a recording with truth.
+// spartan simulate: renders a scenario into a recording with ground truth.
 #include <memory>
 
+#include "program/commands.h"
 #include "program/simulation.h"
-#include "program/verbs.h"
 
 namespace spartan::program {
 namespace {
 
-Result<ExitCode> simulate_verb(const Context& context, const SimulationArguments& arguments) {
+Result<ExitCode> simulate_command(const Context& context, const SimulationArguments& arguments) {
   const auto outcome = simulate_scenario(context, arguments);
   if (!outcome) return failure(outcome);
   if (outcome->interrupted)
-    return failure(ErrorCode::interrupted, "stopped on request", arguments.output, "go on with --resume");
+    return failure(ErrorCode::interrupted, "interrupted by the user", arguments.output, "continue with --resume");
   if (Status s = print(context.json ? outcome->json : outcome->text); !s) return failure(s);
   return kDone;
 }
@@ -20,14 +20,18 @@ Result<ExitCode> simulate_verb(const Context& context, const SimulationArguments
 
 void add_simulate(CLI::App& app, Context& context) {
   auto a = std::make_shared<SimulationArguments>();
-  CLI::App* verb = add_verb(app, context, "simulate", "Simulate a drive over Mars into a recording with its truth",
-                            "simulate quick -o quick_recording", [&context, a] { return simulate_verb(context, *a); });
-  verb->add_option("scenario", a->scenario, "a shipped scenario's name, or a scenario file")->required();
-  verb->add_option("-o,--output", a->output, "the recording's folder to make")->required();
-  verb->add_option("--seed", a->seed, "in place of the scenario's")->check(CLI::NonNegativeNumber);
-  verb->add_flag("--resume", a->resume, "go on where an earlier simulation of this folder stopped");
-  add_threads_option(*verb, context);
-  add_json_flag(*verb, context);
+  CLI::App* command =
+      add_command(app, context, "simulate", "Simulate a drive over Mars: a recording with exact ground truth",
+                  "simulate quick -o quick_recording", [&context, a] { return simulate_command(context, *a); });
+  command->add_option("scenario", a->scenario, "Scenario: the name of a shipped one, or a file.")->required();
+  command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();
+  command->add_option("--seed", a->seed, "Seed of all random numbers, instead of the scenario's.")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag(
+      "--resume", a->resume,
+      "Continue an interrupted simulation in this folder. The files are the same as without the interruption.");
+  add_threads_option(*command, context);
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

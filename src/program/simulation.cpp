@@ -40,8 +40,8 @@ Result<Text> find_scenario(const std::string& wanted) {
   if (!fs::exists(wanted, error)) {
     if (const auto shipped = shipped_file("scenarios/" + wanted + ".yaml"))
       return Text{std::string(*shipped), wanted, false};
-    return failure(ErrorCode::input, "is no file and no shipped scenario", wanted,
-                   "shipped are: " + shipped_scenario_names());
+    return failure(ErrorCode::input, "is neither a file nor a shipped scenario", wanted,
+                   "shipped scenarios: " + shipped_scenario_names());
   }
   const auto content = read_file(wanted);
   if (!content) return failure(content);
@@ -56,7 +56,7 @@ Result<Rig> find_rig(const sim::Scenario& scenario, const Text& text) {
   if (const auto shipped = shipped_file("rigs/" + scenario.rig + ".yaml"))
     return parse_rig_yaml(std::string(*shipped), scenario.rig);
   return failure(ErrorCode::configuration,
-                 "the rig '" + scenario.rig + "' is no file beside the scenario and no shipped rig",
+                 "the rig '" + scenario.rig + "' is neither a file beside the scenario nor a shipped rig",
                  place_of_option(text.content, text.name, "rig"));
 }
 
@@ -89,7 +89,7 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   Progress progress(context.quiet);
   sim::SimulationHooks hooks;
   hooks.should_stop = interrupted;
-  hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.shots, "shots"); };
+  hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.shots, "frames"); };
   const auto start = std::chrono::steady_clock::now();
   const auto report =
       sim::simulate({*scenario, *rig, std::move(*drive), std::move(*views), arguments.output, arguments.resume}, hooks,
@@ -103,7 +103,7 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
       {"seconds", seconds}, {"rays_per_second_per_core", rate}};
   SimulationOutcome outcome;
   outcome.json = json.dump(2) + "\n";
-  outcome.text = fmt::format("{} shots in {:.1f} s, {:.2f} million rays a second and core\nrecording in {}\n",
+  outcome.text = fmt::format("{} frames in {:.1f} s, {:.2f} million rays per second and core\nrecording in {}\n",
                              report->frames, seconds, rate / 1e6, arguments.output);
   outcome.interrupted = report->interrupted;
   return outcome;
@@ -116,7 +116,7 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
 namespace spartan::program {
 
 Result<SimulationOutcome> simulate_scenario(const Context&, const SimulationArguments&) {
-  return failure(ErrorCode::usage, "this build of Spartan has no simulator: it was built without Embree", {},
+  return failure(ErrorCode::usage, "this build has no simulator, because Embree was not found", {},
                  "install libembree-dev and build again");
 }
 

@@ -22,7 +22,7 @@ struct SimulationOutcome {
   bool interrupted = false;
 };
 
-/// Reads the scenario (a shipped one's name, or a file), checks all of it, renders. Without Embree: code `usage`.
+/// Reads and checks the scenario (the name of a shipped one, or a file), then renders it. Without Embree: code `usage`.
 Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments);
 
 }  // namespace spartan::program

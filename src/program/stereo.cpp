@@ -1,14 +1,14 @@
-// spartan stereo: one pair of images to a disparity image.
+// spartan stereo: computes the disparity image of one pair of images.
 #include <fmt/format.h>
 
 #include <cmath>
 #include <filesystem>
 #include <memory>
 
+#include "program/commands.h"
 #include "program/disparity_scores.h"
 #include "program/json.h"
 #include "program/run_arguments.h"
-#include "program/verbs.h"
 #include "spartan/camera/interpretation.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
@@ -32,38 +32,38 @@ struct StereoArguments {
   std::vector<std::string> set;
 };
 
-// A pair with common rows, and what is known about its cameras.
-struct Shot {
+// A rectified pair and what is known about its cameras.
+struct Pair {
   Image<std::uint8_t> left, right, left_mask, right_mask;
   std::optional<RectifiedStereo> geometry;
   double nearest_m = 0;
 };
 
-Result<Shot> load_rectified(const StereoArguments& a) {
-  Shot shot;
+Result<Pair> load_rectified(const StereoArguments& a) {
+  Pair pair;
   auto left = read_gray8(a.left);
   if (!left) return failure(left);
   auto right = read_gray8(a.right);
   if (!right) return failure(right);
-  shot.left = std::move(*left);
-  shot.right = std::move(*right);
-  if (a.calib.empty()) return shot;
-  const auto rig = read_rig(a.calib, shot.left.size());
+  pair.left = std::move(*left);
+  pair.right = std::move(*right);
+  if (a.calib.empty()) return pair;
+  const auto rig = read_rig(a.calib, pair.left.size());
   if (!rig) return failure(rig);
-  const StereoPair& pair = rig->pairs.front();
-  const Camera& camera = *rig->find_camera(pair.left);
+  const StereoPair& stereo_pair = rig->pairs.front();
+  const Camera& camera = *rig->find_camera(stereo_pair.left);
   const auto* pinhole = std::get_if<PinholeModel>(&camera.model);
   if (pinhole == nullptr) {
-    return failure(ErrorCode::configuration, "is not the calibration of rectified images", a.calib,
+    return failure(ErrorCode::configuration, "is not a calibration of rectified images", a.calib,
                    "use --rig to rectify first");
   }
-  const double baseline = rig->right_from_left(pair).translation().norm();
-  shot.geometry = RectifiedStereo{camera.size, pinhole->fx, {pinhole->cx, pinhole->cy}, baseline};
-  shot.nearest_m = pair.nearest_m;
-  return shot;
+  const double baseline = rig->right_from_left(stereo_pair).translation().norm();
+  pair.geometry = RectifiedStereo{camera.size, pinhole->fx, {pinhole->cx, pinhole->cy}, baseline};
+  pair.nearest_m = stereo_pair.nearest_m;
+  return pair;
 }
 
-Result<Shot> load_and_rectify(const StereoArguments& a, const ImagingOptions& options, int threads) {
+Result<Pair> load_and_rectify(const StereoArguments& a, const ImagingOptions& options, int threads) {
   auto left = read_image(a.left);
   if (!left) return failure(left);
   auto right = read_image(a.right);
@@ -73,25 +73,25 @@ Result<Shot> load_and_rectify(const StereoArguments& a, const ImagingOptions& op
   auto imager = Imager::create(*rig, options, Workers(threads), std::filesystem::path(a.rig).parent_path().string());
   if (!imager) return failure(imager);
   StereoFrame frame;
-  const StereoPair& pair = rig->pairs.front();
-  frame.pair = pair.name;
-  frame.left = interpret(*left, rig->find_camera(pair.left)->pixel_format);
-  frame.right = interpret(*right, rig->find_camera(pair.right)->pixel_format);
+  const StereoPair& stereo_pair = rig->pairs.front();
+  frame.pair = stereo_pair.name;
+  frame.left = interpret(*left, rig->find_camera(stereo_pair.left)->pixel_format);
+  frame.right = interpret(*right, rig->find_camera(stereo_pair.right)->pixel_format);
   const auto rectified = imager->process(frame);
   if (!rectified) return failure(rectified);
-  Shot shot;
-  shot.left = Image<std::uint8_t>::copy_of(rectified->left);
-  shot.right = Image<std::uint8_t>::copy_of(rectified->right);
-  shot.left_mask = Image<std::uint8_t>::copy_of(rectified->left_mask);
-  shot.right_mask = Image<std::uint8_t>::copy_of(rectified->right_mask);
-  shot.geometry = rectified->geometry;
-  shot.nearest_m = pair.nearest_m;
-  return shot;
+  Pair pair;
+  pair.left = Image<std::uint8_t>::copy_of(rectified->left);
+  pair.right = Image<std::uint8_t>::copy_of(rectified->right);
+  pair.left_mask = Image<std::uint8_t>::copy_of(rectified->left_mask);
+  pair.right_mask = Image<std::uint8_t>::copy_of(rectified->right_mask);
+  pair.geometry = rectified->geometry;
+  pair.nearest_m = stereo_pair.nearest_m;
+  return pair;
 }
 
-DisparityRange search_range(const StereoArguments& a, const Shot& shot) {
-  const RectifiedStereo geometry = shot.geometry.value_or(RectifiedStereo{shot.left.size(), 1, {0, 0}, 1});
-  DisparityRange range = disparity_range(geometry, shot.geometry ? shot.nearest_m : 0);
+DisparityRange search_range(const StereoArguments& a, const Pair& pair) {
+  const RectifiedStereo geometry = pair.geometry.value_or(RectifiedStereo{pair.left.size(), 1, {0, 0}, 1});
+  DisparityRange range = disparity_range(geometry, pair.geometry ? pair.nearest_m : 0);
   if (a.min_disparity) range.min = *a.min_disparity;
   if (a.max_disparity) range.max = *a.max_disparity;
   return range;
@@ -108,19 +108,19 @@ Image<std::uint16_t> to_fixed_point(ImageView<const float> disparity) {
   return fixed;
 }
 
-Status write_results(const StereoArguments& a, const Shot& shot, ImageView<const float> disparity, const Log& log) {
+Status write_results(const StereoArguments& a, const Pair& pair, ImageView<const float> disparity, const Log& log) {
   if (Status s = make_folder(a.output); !s) return s;
   if (Status s = write_pfm(a.output + "/disparity.pfm", disparity); !s) return s;
   if (Status s = write_png(a.output + "/disparity.png", to_fixed_point(disparity)); !s) return s;
   if (Status s = write_png(a.output + "/disparity_colour.png", colour_disparity(disparity)); !s) return s;
   if (!a.rig.empty()) {
-    if (Status s = write_png(a.output + "/left_rectified.png", shot.left); !s) return s;
+    if (Status s = write_png(a.output + "/left_rectified.png", pair.left); !s) return s;
   }
-  if (!shot.geometry) {
-    log.info("no points.ply: without --rig or --calib the scale is not known");
+  if (!pair.geometry) {
+    log.info("points.ply is not written: the scale is unknown without --rig or --calib");
     return {};
   }
-  return write_ply(a.output + "/points.ply", to_point_cloud(disparity, shot.left, *shot.geometry, Pose(), 1, 0.5));
+  return write_ply(a.output + "/points.ply", to_point_cloud(disparity, pair.left, *pair.geometry, Pose(), 1, 0.5));
 }
 
 double known_percent(ImageView<const float> disparity) {
@@ -154,11 +154,11 @@ Result<std::optional<DisparityMetrics>> score(const StereoArguments& a, ImageVie
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   const auto options = run_options(a.config, a.set);
   if (!options) return failure(options);
-  auto shot = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
-  if (!shot) return failure(shot);
+  auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
+  if (!pair) return failure(pair);
   DisparityComputer computer(options->reconstruction, Workers(context.threads));
   const auto image =
-      computer.compute(shot->left, shot->right, search_range(a, *shot), shot->left_mask, shot->right_mask);
+      computer.compute(pair->left, pair->right, search_range(a, *pair), pair->left_mask, pair->right_mask);
   if (!image) {
     Error error = image.error();
     if (error.where.empty()) error.where = a.left + ", " + a.right;
@@ -166,7 +166,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   }
   const auto metrics = score(a, image->disparity);
   if (!metrics) return failure(metrics);
-  if (Status s = write_results(a, *shot, image->disparity, context.log); !s) return failure(s);
+  if (Status s = write_results(a, *pair, image->disparity, context.log); !s) return failure(s);
 
   Json json{{"schema", 1},
             {"width", image->disparity.width()},
@@ -177,7 +177,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (*metrics) json["scores"] = to_json(**metrics);
   std::string text = json.dump(2) + "\n";
   if (!context.json) {
-    text = fmt::format("{} x {} px, {:.1f} % known, {:.1f} ms; results in {}\n", image->disparity.width(),
+    text = fmt::format("{} x {} px, density {:.1f} %, {:.1f} ms; results in {}\n", image->disparity.width(),
                        image->disparity.height(), known_percent(image->disparity), image->times.total, a.output);
     if (*metrics) text += table_of(**metrics);
   }
@@ -189,25 +189,32 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
 
 void add_stereo(CLI::App& app, Context& context) {
   auto a = std::make_shared<StereoArguments>();
-  CLI::App* verb =
-      add_verb(app, context, "stereo", "One pair of images to a disparity image and a point cloud",
-               "stereo left.png right.png -o out --calib calib.txt", [&context, a] { return stereo(context, *a); });
-  verb->add_option("left", a->left, "left image")->required();
-  verb->add_option("right", a->right, "right image")->required();
-  verb->add_option("-o,--output", a->output, "folder for the results")->required();
-  auto* rig = verb->add_option("--rig", a->rig, "calibration of the images as taken: they are rectified first");
-  verb->add_option("--calib", a->calib, "calibration of images that are rectified already")->excludes(rig);
-  verb->add_option("--min-disparity", a->min_disparity, "smallest disparity, px (default 0)");
-  verb->add_option("--max-disparity", a->max_disparity,
-                   "largest disparity, px (default: from the rig, else a quarter of the width)");
-  verb->add_option("--truth", a->truth, "true disparities (PFM, or PNG) to score against");
-  verb->add_option("--truth-scale", a->truth_scale, "8-bit truth is divided by this");
-  verb->add_option("--mask", a->mask, "255 scored and seen by both eyes, 128 occluded, 0 no truth");
-  verb->add_option("--config", a->config, "options that differ from the defaults, as for run: imaging, reconstruction");
-  verb->add_option("--set", a->set, "one option, like imaging.view.policy=all_valid; may be given again")
+  CLI::App* command =
+      add_command(app, context, "stereo", "Compute the disparity image and the point cloud of one pair of images",
+                  "stereo left.png right.png -o out --calib calib.txt", [&context, a] { return stereo(context, *a); });
+  command->add_option("left", a->left, "Left image.")->required();
+  command->add_option("right", a->right, "Right image.")->required();
+  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
+  auto* rig = command->add_option("--rig", a->rig, "Calibration of unrectified images; they are rectified first.");
+  command->add_option("--calib", a->calib, "Calibration of images that are already rectified (for the point cloud).")
+      ->excludes(rig);
+  command->add_option("--min-disparity", a->min_disparity, "Minimum disparity in pixels (default 0).");
+  command->add_option(
+      "--max-disparity", a->max_disparity,
+      "Maximum disparity in pixels (default: from the rig, else a quarter of the width). A larger one costs time.");
+  command->add_option("--truth", a->truth, "True disparities (PFM or PNG) to compare with.");
+  command->add_option("--truth-scale", a->truth_scale, "Divisor of 8-bit true disparities (default 1).");
+  command->add_option("--mask", a->mask,
+                      "Mask of the true disparities: 255 scored and non-occluded, 128 occluded, 0 no truth.");
+  command->add_option(
+      "--config", a->config,
+      "YAML file with options as for `spartan run`; `imaging` (with --rig) and `reconstruction` apply.");
+  command
+      ->add_option("--set", a->set,
+                   "Set one option, e.g. imaging.view.policy=all_valid. Repeatable; overrides --config.")
       ->allow_extra_args(false);
-  add_threads_option(*verb, context);
-  add_json_flag(*verb, context);
+  add_threads_option(*command, context);
+  add_json_flag(*command, context);
 }
 
 }  // namespace spartan::program

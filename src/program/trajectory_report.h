@@ -1,4 +1,4 @@
-// What a comparison with the truth tells: as JSON (docs/formats.md, `evaluate`) and as a table for people.
+// A comparison with ground truth as JSON (docs/formats.md, `evaluate`) and as a table.
 #pragma once
 
 #include <string>

@@ -36,8 +36,8 @@ TEST(Demo, LeavesARecordingARunAndAPageWithoutErrors) {
   EXPECT_TRUE(fs::exists(out + "/recording/recording.yaml"));
   EXPECT_TRUE(fs::exists(out + "/run/summary.json"));
   const std::string page = content_of(out + "/report.html");
-  for (const char* part : {"What the rover saw", "Where it went", "What the ground looks like to it",
-                           "The ground as it is", "Time", "position error, RMS, first poses aligned"}) {
+  for (const char* part : {"Images", "Trajectories", "Stereo matching", "True elevation", "Time and memory",
+                           "position error, RMS, first poses aligned"}) {
     EXPECT_THAT(page, HasSubstr(part));
   }
   const std::string check = testing::source_folder() + "/scripts/check_page " + out + "/report.html";

@@ -39,11 +39,11 @@ class MapBuild : public ::testing::Test {
   const std::string drive_ = folder_.path() + "/drive";
 };
 
-// The eye stands 0.5 m over level ground and looks 25° down.
+// The camera is 0.5 m above level ground, pitched down by 25°.
 TEST_F(MapBuild, FindsHowTheEyeStandsAndMapsTheGround) {
-  const auto told = build("map", {"--extent-m", "4", "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json summary = json::parse(told.out);
+  const auto result = build("map", {"--extent-m", "4", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json summary = json::parse(result.out);
   EXPECT_EQ(summary["attitude"]["source"], "along the ground");
   EXPECT_NEAR(summary["attitude"]["pitch_deg"], 25, 0.5);
   EXPECT_NEAR(summary["views"][0]["ground"]["height_m"], 0.5, 0.02);
@@ -63,7 +63,7 @@ TEST_F(MapBuild, FindsHowTheEyeStandsAndMapsTheGround) {
     }
   }
   EXPECT_GT(known, 600);
-  EXPECT_LT(std::sqrt(squares / known), 0.05) << "half a metre below the eye";
+  EXPECT_LT(std::sqrt(squares / known), 0.05) << "half a metre below the camera";
   EXPECT_GT(free, 0.9 * known);
   for (const char* file : {"map.png", "obstacles.csv", "range.pfm", "range_sigma.pfm", "panorama.png", "coverage.png",
                            "points.ply", "stereo_0_classes.png", "stereo_0_v_disparity.png"})
@@ -71,9 +71,9 @@ TEST_F(MapBuild, FindsHowTheEyeStandsAndMapsTheGround) {
 }
 
 TEST_F(MapBuild, TakesTheGravityThatItIsTold) {
-  const auto told = build("map", {"--gravity", "0.5,0,-0.8660254", "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json summary = json::parse(told.out);
+  const auto result = build("map", {"--gravity", "0.5,0,-0.8660254", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json summary = json::parse(result.out);
   EXPECT_EQ(summary["attitude"]["source"], "given");
   EXPECT_NEAR(summary["attitude"]["pitch_deg"], 30, 1e-4) << "gravity points forward: the nose is down";
   EXPECT_NEAR(summary["attitude"]["roll_deg"], 0, 1e-4);
@@ -95,12 +95,12 @@ TEST_F(MapBuild, WhatItCannotDoIsSaid) {
   };
   EXPECT_EQ(code({}), 2);
   EXPECT_EQ(code({drive_ + "/image_0/000000.png"}), 2);
-  EXPECT_EQ(code({"--recording", drive_}), 2) << "no position";
+  EXPECT_EQ(code({"--recording", drive_}), 2) << "no stop";
   EXPECT_EQ(code({"--recording", folder_.path() + "/none", "--position", "1"}), 3);
   const auto none =
       run_program({"map", "build", "-o", folder_.path() + "/out", "--recording", drive_, "--position", "9"});
   EXPECT_EQ(none.exit_code, 3);
-  EXPECT_THAT(none.err, HasSubstr("has no shot at position 9"));
+  EXPECT_THAT(none.err, HasSubstr("has no frame at position 9"));
   const auto gravity = build("out", {"--gravity", "0,0"});
   EXPECT_EQ(gravity.exit_code, 2);
   EXPECT_THAT(gravity.err, HasSubstr("--gravity: '0,0' is not three numbers"));
@@ -125,7 +125,7 @@ LocalMap small_map(double x_m, double y_m, float elevation_m) {
   return local;
 }
 
-TEST(MapInfo, TellsOfAMapOfAnySize) {
+TEST(MapInfo, DescribesAMapOfAnySize) {
   const testing::TemporaryFolder folder;
   GlobalMap map({}, 0.05);
   for (const double x : {0.0, 500.0}) {
@@ -133,9 +133,9 @@ TEST(MapInfo, TellsOfAMapOfAnySize) {
     ASSERT_TRUE(map.add(small_map(x, x, static_cast<float>(x) / 100), {}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
   }
   ASSERT_TRUE(MapFile::save(map, folder.file("far.map")));
-  const auto told = run_program({"map", "info", folder.file("far.map"), "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json figures = json::parse(told.out);
+  const auto result = run_program({"map", "info", folder.file("far.map"), "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json figures = json::parse(result.out);
   EXPECT_GT(figures["columns"], 10000);
   EXPECT_GT(figures["rows"], 10000);
   EXPECT_EQ(figures["cells"]["free"], 800);

@@ -1,4 +1,4 @@
-// Faults planted in the calibrations of real pictures: `rig inspect` knows them by name, and what it writes is right.
+// Faults planted in calibrations of real images: `rig inspect` names them, and the rig it writes is correct.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ using ::testing::Contains;
 using testing::run_program;
 using testing::TemporaryFolder;
 
-// The first picture of a folder.
+// The first image of a folder.
 std::string first_of(const std::string& folder) {
   std::string first;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -65,17 +65,17 @@ class PlantedCalibrationFaults : public ::testing::TestWithParam<const char*> {
     return names;
   }
 
-  // The fault is named, and the rig that is written sees the pictures and the ranges that the right one sees.
+  // The fault is named, and the corrected rig gives the rows and ranges of the true one.
   void expect_named(const std::string& id, const std::function<void(Rig&)>& plant, double focal = 0.005,
                     double turn_deg = 0.2) const {
     SCOPED_TRACE(id);
     Rig planted = rig_;
     plant(planted);
-    const std::string mended = folder_.path() + "/mended.yaml";
-    const json found = inspect(planted, {"--apply", mended});
+    const std::string corrected = folder_.path() + "/corrected.yaml";
+    const json found = inspect(planted, {"--apply", corrected});
     EXPECT_THAT(ids(found), Contains(id));
     EXPECT_EQ(found["verdict"], "bad");
-    const auto rig = read_rig(mended);
+    const auto rig = read_rig(corrected);
     ASSERT_TRUE(rig) << rig.error().message();
     const json again = inspect(*rig);
     EXPECT_EQ(again["verdict"], "good") << again["findings"];
@@ -88,7 +88,7 @@ class PlantedCalibrationFaults : public ::testing::TestWithParam<const char*> {
     EXPECT_NEAR(focal_ratio(*rig->find_camera(rig->pairs[0].left)), 1, focal);
   }
 
-  // Beside the left eye's as it should be.
+  // Relative to the left camera.
   double focal_ratio(const Camera& camera) const {
     const auto focal = [](const Camera& c) {
       return project_with_jacobian(c.model, Eigen::Vector3d::UnitZ())->by_point(0, 0);
@@ -96,13 +96,13 @@ class PlantedCalibrationFaults : public ::testing::TestWithParam<const char*> {
     return focal(camera) / focal(*rig_.find_camera(rig_.pairs[0].left));
   }
 
-  Camera& eye(Rig& rig, bool right) const {
+  Camera& camera(Rig& rig, bool right) const {
     const std::string& name = right ? rig_.pairs[0].right : rig_.pairs[0].left;
     return *std::find_if(rig.cameras.begin(), rig.cameras.end(), [&](const Camera& c) { return c.name == name; });
   }
-  void move_right_eye(Rig& rig, const std::function<Pose(const Pose&)>& change) const {
+  void move_right_camera(Rig& rig, const std::function<Pose(const Pose&)>& change) const {
     const Pose left_from_right = rig.right_from_left(rig.pairs[0]).inverse();
-    eye(rig, true).mount_from_camera = eye(rig, false).mount_from_camera * change(left_from_right);
+    camera(rig, true).mount_from_camera = camera(rig, false).mount_from_camera * change(left_from_right);
   }
 
   TemporaryFolder folder_;
@@ -111,49 +111,51 @@ class PlantedCalibrationFaults : public ::testing::TestWithParam<const char*> {
 };
 
 TEST_P(PlantedCalibrationFaults, None) {
-  const std::string mended = folder_.path() + "/mended.yaml";
-  const json found = inspect(rig_, {"--apply", mended});
+  const std::string corrected = folder_.path() + "/corrected.yaml";
+  const json found = inspect(rig_, {"--apply", corrected});
   EXPECT_EQ(found["verdict"], "good") << found["findings"];
-  EXPECT_EQ(*read_rig(mended), rig_) << "nothing is changed where nothing is wrong";
+  EXPECT_EQ(*read_rig(corrected), rig_) << "nothing is changed where nothing is wrong";
 }
 
-TEST_P(PlantedCalibrationFaults, EyesAndTransforms) {
-  expect_named("inverse_transform", [&](Rig& rig) { move_right_eye(rig, [](const Pose& p) { return p.inverse(); }); });
+TEST_P(PlantedCalibrationFaults, ExchangedCamerasAndTransforms) {
+  expect_named("inverse_transform",
+               [&](Rig& rig) { move_right_camera(rig, [](const Pose& p) { return p.inverse(); }); });
   expect_named("swapped_eyes", [](Rig& rig) { std::swap(rig.pairs[0].left, rig.pairs[0].right); });
-  expect_named("swapped_eyes", [&](Rig& rig) { std::swap(eye(rig, false).model, eye(rig, true).model); });
+  expect_named("swapped_eyes", [&](Rig& rig) { std::swap(camera(rig, false).model, camera(rig, true).model); });
   expect_named("baseline_unit", [&](Rig& rig) {
-    move_right_eye(rig, [](const Pose& p) { return Pose(p.rotation(), 1000 * p.translation()); });
+    move_right_camera(rig, [](const Pose& p) { return Pose(p.rotation(), 1000 * p.translation()); });
   });
   expect_named("yaw_offset", [&](Rig& rig) {
-    move_right_eye(rig, [](const Pose& p) {
+    move_right_camera(rig, [](const Pose& p) {
       return Pose(p.rotation() * exp_so3({0, std::numbers::pi / 180, 0}), p.translation());
     });
   });
 }
 
-// A focal length common to both eyes is told by what their lenses bend only: to some percent where rows agree to a
+// A focal length common to both cameras is observable by the distortion only: to some percent where rows agree to a
 // third of a pixel.
 TEST_P(PlantedCalibrationFaults, Sizes) {
   for (const auto& change : {with_focal_times, resized}) {
     expect_named(
         "size_mismatch",
         [&](Rig& rig) {
-          for (const bool right : {false, true}) eye(rig, right).model = change(eye(rig, right).model, 2);
+          for (const bool right : {false, true}) camera(rig, right).model = change(camera(rig, right).model, 2);
         },
         0.03);
   }
-  expect_named("size_mismatch", [&](Rig& rig) { eye(rig, true).model = with_focal_times(eye(rig, true).model, 1.5); });
+  expect_named("size_mismatch",
+               [&](Rig& rig) { camera(rig, true).model = with_focal_times(camera(rig, true).model, 1.5); });
 }
 
 TEST_P(PlantedCalibrationFaults, RowsAndLenses) {
   for (const double rows_px : {2, -2, -5, 20}) {
     SCOPED_TRACE(rows_px);
     expect_named(
-        "row_offset", [&](Rig& rig) { eye(rig, true).model = with_rows_lower(eye(rig, true).model, rows_px); }, 0.005,
-        0.4);
+        "row_offset", [&](Rig& rig) { camera(rig, true).model = with_rows_lower(camera(rig, true).model, rows_px); },
+        0.005, 0.4);
   }
   const auto pinhole = [&](Rig& rig, bool right) {
-    eye(rig, right).model = std::get<RadialTangentialModel>(eye(rig, right).model).pinhole();
+    camera(rig, right).model = std::get<RadialTangentialModel>(camera(rig, right).model).pinhole();
   };
   expect_named(
       "distortion_ignored",

@@ -25,22 +25,22 @@ std::string rover() {
   return testing::source_folder() + "/config/rigs/rover.yaml";
 }
 
-std::vector<std::string> keys_of(const json& told) {
+std::vector<std::string> keys_of(const json& result) {
   std::vector<std::string> keys;
-  for (const json& each : told["lost"]) keys.push_back(each["key"]);
+  for (const json& each : result["lost"]) keys.push_back(each["key"]);
   return keys;
 }
 
 TEST(RigConvert, NothingIsLostWhereNothingIs) {
   const testing::TemporaryFolder folder;
   const std::string kitti = folder.write("calib.txt", kKitti);
-  const auto told = run_program({"rig", "convert", kitti, folder.path() + "/rig.yaml", "--size-px", "640,480"});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.out, HasSubstr("read kitti: " + kitti));
-  EXPECT_THAT(told.out, HasSubstr("body: the left camera"));
-  EXPECT_THAT(told.out, HasSubstr("wrote rig.yaml: " + folder.path() + "/rig.yaml\nnothing lost\n"));
+  const auto result = run_program({"rig", "convert", kitti, folder.path() + "/rig.yaml", "--size-px", "640,480"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("read kitti: " + kitti));
+  EXPECT_THAT(result.out, HasSubstr("body: the left camera"));
+  EXPECT_THAT(result.out, HasSubstr("wrote rig.yaml: " + folder.path() + "/rig.yaml\nnothing lost\n"));
   EXPECT_THAT(content_of(folder.path() + "/rig.yaml"), HasSubstr("size_px: [640, 480]"));
-  // On through a format with a file for each eye, and back.
+  // On through a format with one file per camera, and back.
   const auto there = run_program({"rig", "convert", folder.path() + "/rig.yaml", folder.path() + "/pair.cahvor"});
   EXPECT_EQ(there.exit_code, 0) << there.err;
   EXPECT_THAT(there.out,
@@ -56,9 +56,9 @@ TEST(RigConvert, NothingIsLostWhereNothingIs) {
 TEST(RigConvert, WhatIsLostIsSaid) {
   const testing::TemporaryFolder folder;
   const std::string to = folder.path() + "/cameras";
-  const auto told = run_program({"rig", "convert", rover(), to, "--to", "kalibr", "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json all = json::parse(told.out);
+  const auto result = run_program({"rig", "convert", rover(), to, "--to", "kalibr", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json all = json::parse(result.out);
   EXPECT_EQ(all["schema"], 1);
   EXPECT_EQ(all["format"], "kalibr");
   EXPECT_EQ(all["files"], json::array({to}));
@@ -70,7 +70,7 @@ TEST(RigConvert, WhatIsLostIsSaid) {
   EXPECT_THAT(keys, Not(::testing::Contains("body")));
   const json gone = {{"key", "pairs.narrow"}, {"text", "the pair is gone"}};
   EXPECT_THAT(all["lost"], ::testing::Contains(gone));
-  // Files of both eyes are both named.
+  // Both files are named.
   const auto two = run_program({"rig", "convert", rover(), folder.path() + "/pair.tsai", "--pair", "wide", "--json"});
   ASSERT_EQ(two.exit_code, 0) << two.err;
   EXPECT_EQ(json::parse(two.out)["files"],
@@ -82,9 +82,9 @@ TEST(RigConvert, AMaskIsFoundFromTheNewFileToo) {
   std::string text = content_of(testing::source_folder() + "/config/rigs/generic_pair.yaml");
   text.replace(text.find("    axes:"), 0, "    self_mask: masks/left.png\n");
   const std::string from = folder.write("a/rig.yaml", text), to = folder.path() + "/b/c/rig.yaml";
-  const auto told = run_program({"rig", "convert", from, to});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.out, HasSubstr("nothing lost"));
+  const auto result = run_program({"rig", "convert", from, to});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("nothing lost"));
   EXPECT_THAT(content_of(to), HasSubstr("self_mask: \"../../a/masks/left.png\""));
   // One that is named from the root stays.
   text.replace(text.find("masks/left.png"), 0, "/from/the/root/");
@@ -92,17 +92,17 @@ TEST(RigConvert, AMaskIsFoundFromTheNewFileToo) {
   EXPECT_THAT(content_of(to), HasSubstr("self_mask: \"/from/the/root/masks/left.png\""));
 }
 
-// ".." leads out of the folder that a link stands for, not out of the one that the link is in.
+// ".." is relative to the target of a symbolic link, not to the folder of the link.
 TEST(RigConvert, AMaskIsFoundThroughLinks) {
   const testing::TemporaryFolder folder;
   std::string text = content_of(testing::source_folder() + "/config/rigs/generic_pair.yaml");
   text.replace(text.find("    axes:"), 0, "    self_mask: left.png\n");
   const std::string from = folder.write("a/rig.yaml", text);
-  folder.write("a/left.png", "a picture");
+  folder.write("a/left.png", "an image");
   std::filesystem::create_directories(folder.path() + "/real/deep");
   std::filesystem::create_directory_symlink("real/deep", folder.path() + "/link");
-  const auto told = run_program({"rig", "convert", from, folder.path() + "/link/rig.yaml"});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
+  const auto result = run_program({"rig", "convert", from, folder.path() + "/link/rig.yaml"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
   const std::string there = content_of(folder.path() + "/link/rig.yaml");
   EXPECT_THAT(there, HasSubstr("self_mask: \"../../a/left.png\""));
   EXPECT_TRUE(std::filesystem::exists(folder.path() + "/link/../../a/left.png"));
@@ -120,8 +120,8 @@ TEST(RigConvert, OnePairOfMany) {
   EXPECT_FALSE(std::filesystem::exists(to));
   const auto one = run_program({"rig", "convert", rover(), to, "--pair", "narrow"});
   EXPECT_EQ(one.exit_code, 0) << one.err;
-  EXPECT_THAT(one.out, HasSubstr("pairs.wide: left out, as --pair says"));
-  EXPECT_THAT(one.out, HasSubstr("cameras.wide_left: left out, as --pair says"));
+  EXPECT_THAT(one.out, HasSubstr("pairs.wide: excluded by --pair"));
+  EXPECT_THAT(one.out, HasSubstr("cameras.wide_left: excluded by --pair"));
   EXPECT_EQ(run_program({"rig", "convert", rover(), to, "--pair", "top", "--force"}).exit_code, 2);
 }
 
@@ -130,7 +130,7 @@ TEST(RigConvert, FilesThatAreThereAreKept) {
   const std::string kitti = folder.write("calib.txt", kKitti), to = folder.write("rig.yaml", "mine");
   const auto kept = run_program({"rig", "convert", kitti, to, "--size-px", "640,480"});
   EXPECT_EQ(kept.exit_code, 5);
-  EXPECT_THAT(kept.err, HasSubstr("rig.yaml: is there already (--force writes over it)"));
+  EXPECT_THAT(kept.err, HasSubstr("rig.yaml: exists already (--force overwrites it)"));
   EXPECT_EQ(content_of(to), "mine");
   EXPECT_EQ(run_program({"rig", "convert", kitti, to, "--size-px", "640,480", "--force"}).exit_code, 0);
   EXPECT_NE(content_of(to), "mine");
@@ -155,9 +155,9 @@ TEST(RigConvert, WhatTheReaderLeavesOutIsLost) {
   const auto words = run_program({"rig", "convert", chain, folder.path() + "/a.yaml"});
   EXPECT_EQ(words.exit_code, 0) << words.err;
   EXPECT_THAT(words.out, HasSubstr("lost:\n  cam0.timeshift_cam_imu: the camera's clock is 0.0123 s off the IMU's\n"));
-  const auto told = run_program({"rig", "convert", chain, folder.path() + "/b.yaml", "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json all = json::parse(told.out);
+  const auto result = run_program({"rig", "convert", chain, folder.path() + "/b.yaml", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json all = json::parse(result.out);
   EXPECT_THAT(keys_of(all), ::testing::ElementsAre("cam0.timeshift_cam_imu"));
   EXPECT_EQ(all["body"], "the left camera, turned to x forward, y left, z up");
   EXPECT_EQ(all["notes"], json::array({"body: the left camera, turned to x forward, y left, z up"}));
@@ -174,12 +174,12 @@ TEST(RigConvert, NamesThatMeanAnotherFormatAreRefused) {
       {"x,y,z.yaml", "ros"}, {"x.cahvor,x.cahvor", "cahvor"}, {"l.cahv,r.cahv", "mrcal"}};
   for (const auto& [name, format] : names) {
     const std::string old = folder.write(name, "mine");
-    const auto told = run_program({"rig", "convert", rig, old, "--to", format, "--force"});
-    EXPECT_EQ(told.exit_code, 2) << name << ": " << told.err;
+    const auto result = run_program({"rig", "convert", rig, old, "--to", format, "--force"});
+    EXPECT_EQ(result.exit_code, 2) << name << ": " << result.err;
     EXPECT_EQ(content_of(old), "mine") << name;
   }
-  const auto told = run_program({"rig", "convert", rig, folder.path() + "/out.xml", "--to", "kalibr", "--force"});
-  EXPECT_THAT(told.err, HasSubstr("out.xml: files of this name are read as opencv, not as kalibr"));
+  const auto result = run_program({"rig", "convert", rig, folder.path() + "/out.xml", "--to", "kalibr", "--force"});
+  EXPECT_THAT(result.err, HasSubstr("out.xml: a file of this name would be read as opencv, not as kalibr"));
   for (const char* name : {"a.yaml", "b.odd", "c"}) {
     const std::string to = folder.path() + "/" + name;
     EXPECT_EQ(run_program({"rig", "convert", rig, to, "--to", "kalibr"}).exit_code, 0) << name;
@@ -190,9 +190,9 @@ TEST(RigConvert, AllFilesAreWrittenOrNone) {
   const testing::TemporaryFolder folder;
   const std::string rig = testing::source_folder() + "/config/rigs/generic_pair.yaml";
   folder.write("p_right.cahvor/inside", "x");
-  const auto told = run_program({"rig", "convert", rig, folder.path() + "/p.cahvor", "--force"});
-  EXPECT_EQ(told.exit_code, 5);
-  EXPECT_THAT(told.err, HasSubstr("p_right.cahvor"));
+  const auto result = run_program({"rig", "convert", rig, folder.path() + "/p.cahvor", "--force"});
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_THAT(result.err, HasSubstr("p_right.cahvor"));
   EXPECT_FALSE(std::filesystem::exists(folder.path() + "/p_left.cahvor"));
 }
 
@@ -203,9 +203,9 @@ TEST(RigConvert, CamerasThatLieThereAreTold) {
   ASSERT_EQ(run_program({"rig", "convert", rig, to, "--json"}).exit_code, 0);
   std::filesystem::create_directories(to + "/cam2");
   std::filesystem::copy_file(to + "/cam0/sensor.yaml", to + "/cam2/sensor.yaml");
-  const auto told = run_program({"rig", "convert", rig, to, "--json", "--force"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(keys_of(json::parse(told.out)), ::testing::Contains("cameras.cam2"));
+  const auto result = run_program({"rig", "convert", rig, to, "--json", "--force"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(keys_of(json::parse(result.out)), ::testing::Contains("cameras.cam2"));
   folder.write("mav0/cam2/sensor.yaml", "noise");
   const std::string before = content_of(to + "/cam0/sensor.yaml");
   const auto broken = run_program({"rig", "convert", rover(), to, "--pair", "narrow", "--force"});
@@ -217,9 +217,9 @@ TEST(RigConvert, CamerasThatLieThereAreTold) {
 TEST(RigConvert, ASizeThatTheFilesContradictIsRefused) {
   const testing::TemporaryFolder folder;
   const std::string rig = testing::source_folder() + "/config/rigs/generic_pair.yaml";
-  const auto told = run_program({"rig", "convert", rig, folder.path() + "/a.yml", "--size-px", "320,240"});
-  EXPECT_EQ(told.exit_code, 2);
-  EXPECT_THAT(told.err, HasSubstr("--size-px: the files say that the camera left has "));
+  const auto result = run_program({"rig", "convert", rig, folder.path() + "/a.yml", "--size-px", "320,240"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--size-px: contradicts the files: camera left has "));
 }
 
 TEST(RigConvert, ExitCodesAsDocumented) {
@@ -251,11 +251,12 @@ TEST(RigConvert, RealCalibrations) {
   const testing::TemporaryFolder folder;
   for (const char* from : {"k10_pair", "kitti_06", "kitti_0013/calib_cam_to_cam.txt", "euroc_v101"}) {
     const std::string to = folder.path() + "/" + std::filesystem::path(from).stem().string() + "_camchain.yaml";
-    const auto told = run_program({"rig", "convert", data + "/" + from, to});
-    EXPECT_EQ(told.exit_code, 0) << told.err;
+    const auto result = run_program({"rig", "convert", data + "/" + from, to});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
     // KITTI raw knows the cameras as they were before rectification, and colour cameras.
-    EXPECT_THAT(told.out, HasSubstr(std::string(from).starts_with("kitti_0013") ? "lost:\n  P_rect_02: a colour camera"
-                                                                                : "nothing lost"));
+    EXPECT_THAT(result.out,
+                HasSubstr(std::string(from).starts_with("kitti_0013") ? "lost:\n  P_rect_02: a colour camera"
+                                                                      : "nothing lost"));
   }
 }
 

@@ -38,9 +38,9 @@ std::size_t lines_of(const std::string& text) {
 
 // The keys that scripts rely on (docs/formats.md, "JSON").
 TEST(RigDesign, JsonHoldsThePublishedFigures) {
-  const auto told = run_program({"rig", "design", rover(), "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json design = json::parse(told.out);
+  const auto result = run_program({"rig", "design", rover(), "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json design = json::parse(result.out);
   EXPECT_EQ(design["schema"], 1);
   const json& wide = design["wide"];
   EXPECT_EQ(wide["combinations"], 128960);
@@ -83,7 +83,7 @@ TEST(RigDesign, JsonHoldsThePublishedFigures) {
     EXPECT_THAT(warning["pair"], ::testing::AnyOf("wide", "narrow"));
   }
   EXPECT_FALSE(wide.contains("feasible"));
-  EXPECT_EQ(run_program({"rig", "design", rover(), "--json"}).out, told.out) << "the same in every run";
+  EXPECT_EQ(run_program({"rig", "design", rover(), "--json"}).out, result.out) << "the same in every run";
 }
 
 TEST(RigDesign, ListsTheFeasibleSet) {
@@ -94,10 +94,10 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_THAT(some.out, HasSubstr("12582 more"));
   EXPECT_THAT(some.out, HasSubstr("margins of the best: range +1.521 m"));
   EXPECT_THAT(some.out, HasSubstr("\nnarrow pair: 1 of 2 combinations are feasible"));
-  EXPECT_THAT(some.out, HasSubstr("published pair (feasible, on offer): margins: range +0.002 m"));
-  EXPECT_THAT(some.out, HasSubstr("published pair (not feasible, on offer): margins: range -0.515 m"));
+  EXPECT_THAT(some.out, HasSubstr("published pair (feasible, in the lists): margins: range +0.002 m"));
+  EXPECT_THAT(some.out, HasSubstr("published pair (not feasible, in the lists): margins: range -0.515 m"));
   EXPECT_THAT(some.out, HasSubstr("ground seen by both pairs, middle column: 2.03 m\n"));
-  EXPECT_THAT(some.out, HasSubstr("at the far edge: 117.1 deg (one eye), 114.6 deg (both eyes)\n"));
+  EXPECT_THAT(some.out, HasSubstr("of the required one: 117.1 deg (one camera), 114.6 deg (both)\n"));
   EXPECT_LT(lines_of(some.out), 70u);
   EXPECT_THAT(run_program({"rig", "design", rover(), "--rows", "3"}).out, HasSubstr("...  12589 more;"));
   const auto all = run_program({"rig", "design", rover(), "--all"});
@@ -105,9 +105,9 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_GT(lines_of(all.out), 12592u);
   EXPECT_THAT(all.out, HasSubstr(" 12592.  "));
   EXPECT_THAT(all.out, Not(HasSubstr(" more;")));
-  const auto told = run_program({"rig", "design", rover(), "--all", "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json whole = json::parse(told.out);
+  const auto result = run_program({"rig", "design", rover(), "--all", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json whole = json::parse(result.out);
   ASSERT_EQ(whole["wide"]["feasible"].size(), 12592u);
   EXPECT_EQ(whole["wide"]["feasible"][0], whole["wide"]["best"]);
   const auto published =
@@ -118,8 +118,8 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   ASSERT_NE(published, whole["wide"]["feasible"].end());
   EXPECT_NEAR((*published)["focal_length_mm"], 6.6, 0.05);
   // Nothing but the sets comes with --all, and the text is laid out like that of any other JSON.
-  nlohmann::ordered_json without = nlohmann::ordered_json::parse(told.out);
-  EXPECT_TRUE(without.dump(2) + "\n" == told.out);  // too long to be shown side by side
+  nlohmann::ordered_json without = nlohmann::ordered_json::parse(result.out);
+  EXPECT_TRUE(without.dump(2) + "\n" == result.out);  // too long to be shown side by side
   for (const char* pair : {"wide", "narrow"}) without[pair].erase("feasible");
   EXPECT_EQ(without.dump(2) + "\n", run_program({"rig", "design", rover(), "--json"}).out);
 }
@@ -137,8 +137,8 @@ TEST(RigDesign, DrawsTheGround) {
   EXPECT_THAT(svg, ::testing::StartsWith("<svg"));
   EXPECT_THAT(svg, ::testing::EndsWith("</svg>\n"));
   for (const char* label :
-       {"wide: 0.488 to 4.011 m", "narrow: 0.200 to 2.516 m", "both: 2.03 m", "far edge, one eye: 117.1°",
-        "far edge, both eyes: 114.6°", "asked for: 120°", "pan -35°", "pan 0°", "pan 35°", "blind: up to 0.200 m",
+       {"wide: 0.488 to 4.011 m", "narrow: 0.200 to 2.516 m", "both: 2.03 m", "far edge, one camera: 117.1°",
+        "far edge, both cameras: 114.6°", "required: 120°", "pan -35°", "pan 0°", "pan 35°", "blind: up to 0.200 m",
         "by 25.6 % (one eye) and 21.6 % (both eyes)"}) {
     EXPECT_THAT(svg, HasSubstr(label));
   }
@@ -176,8 +176,8 @@ double x_of(const std::string& svg, const std::string& words) {
 // Left is left, lengths are to scale, and every kind of ground has its colour.
 TEST(RigDesign, TheGroundIsDrawnToScale) {
   const testing::TemporaryFolder folder;
-  const std::string asked = folder.write("asked.yaml", replaced(rover_text(), "name: ", "name: a<b "));
-  ASSERT_EQ(run_program({"rig", "design", asked, "-o", folder.path(), "-q"}).exit_code, 0);
+  const std::string required = folder.write("required.yaml", replaced(rover_text(), "name: ", "name: a<b "));
+  ASSERT_EQ(run_program({"rig", "design", required, "-o", folder.path(), "-q"}).exit_code, 0);
   const std::string svg = testing::content_of(folder.path() + "/ground.svg");
   EXPECT_THAT(svg, HasSubstr("a&lt;b"));
   EXPECT_LT(x_of(svg, "pan 35°"), x_of(svg, "pan 0°"));
@@ -193,10 +193,10 @@ TEST(RigDesign, TheGroundIsDrawnToScale) {
   double sum = 0;
   for (const auto& [x, y] : narrow[0]) sum += x - 600;
   EXPECT_NEAR(sum, 0, 0.1);
-  EXPECT_EQ(areas_of(svg, "#c8e2f3", "1").size(), 6u + 1) << "one eye, at three pans";
-  EXPECT_EQ(areas_of(svg, "#86bbde", "1").size(), 3u + 1) << "both eyes";
+  EXPECT_EQ(areas_of(svg, "#c8e2f3", "1").size(), 6u + 1) << "one camera, at three pans";
+  EXPECT_EQ(areas_of(svg, "#86bbde", "1").size(), 3u + 1) << "both cameras";
   EXPECT_EQ(areas_of(svg, "#3a86bc", "1").size(), 3u + 1) << "two pans, whichever";
-  EXPECT_EQ(areas_of(svg, "#dedede", "1").size(), 1u + 1) << "asked for, not seen";
+  EXPECT_EQ(areas_of(svg, "#dedede", "1").size(), 1u + 1) << "required, not seen";
   EXPECT_EQ(areas_of(svg, "#969696", "0.9").size(), 1u) << "blind";
 }
 
@@ -215,8 +215,8 @@ TEST(RigDesign, ThePixelsAreThoseOfTheDrawing) {
     return found;
   };
   EXPECT_GT(count({30, 30, 30}, 60), 100) << "the title";
-  EXPECT_GT(count({134, 187, 222}, pixels.height()), 10000) << "seen by both eyes of the wide pair";
-  EXPECT_GT(count({222, 222, 222}, pixels.height()), 1000) << "asked for, not seen";
+  EXPECT_GT(count({134, 187, 222}, pixels.height()), 10000) << "seen by both cameras of the wide pair";
+  EXPECT_GT(count({222, 222, 222}, pixels.height()), 1000) << "required, not seen";
 }
 
 // Pairs of other kinds are drawn too: no pans, no narrow pair, nothing published, many pans, high masts.
@@ -230,34 +230,36 @@ TEST(RigDesign, DrawsWhatIsAskedOfOthers) {
                "  pans:\n    angles_deg: [-35, 0, 35]\n    azimuth_deg: 120\n    smallest_overlap_percent: 25\n", "");
   const std::string all_round = replaced(unpublished, "[-35, 0, 35]\n    azimuth_deg: 120",
                                          "{from: -180, to: 150, step: 30}\n    azimuth_deg: 360");
-  for (const std::string& asked :
+  for (const std::string& required :
        {wide_only, unpublished, without_pans, all_round,
         replaced(replaced(unpublished, "  height_m: 1.0", "  height_m: 30"), "range_m: 4", "range_m: 3")}) {
-    const auto told = run_program({"rig", "design", folder.write("asked.yaml", asked), "-o", folder.path() + "/out"});
-    EXPECT_EQ(told.exit_code, 0) << told.err;
+    const auto result =
+        run_program({"rig", "design", folder.write("required.yaml", required), "-o", folder.path() + "/out"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_TRUE(read_image(folder.path() + "/out/ground.png"));
     EXPECT_THAT(testing::content_of(folder.path() + "/out/ground.svg"), Not(HasSubstr("nan")));
   }
   const auto off = run_program(
       {"rig", "design", folder.write("off.yaml", replaced(wide_only, "hfov_deg: 50", "hfov_deg: 50.5")), "--json"});
   EXPECT_EQ(json::parse(off.out)["wide"]["published"]["on_offer"], false) << off.out;
-  // Nothing to draw is said, and no fault.
+  // Nothing to draw is a warning, not an error.
   const auto none =
       run_program({"rig", "design", folder.write("none.yaml", replaced(unpublished, "range_m: 4.0", "range_m: 12")),
                    "-o", folder.path() + "/none"});
   EXPECT_EQ(none.exit_code, 0);
   EXPECT_THAT(none.out, HasSubstr("none of the 128960 combinations is feasible"));
-  EXPECT_THAT(none.err, HasSubstr("no ground to draw"));
+  EXPECT_THAT(none.err, HasSubstr("no figure is written"));
   EXPECT_FALSE(std::filesystem::exists(folder.path() + "/none/ground.svg"));
   EXPECT_EQ(json::parse(run_program({"rig", "design", folder.path() + "/none.yaml", "--json"}).out)["wide"]["best"],
             nullptr);
 }
 
-// The words of a picture of the ground.
-std::string drawn(const testing::TemporaryFolder& folder, const std::string& asked) {
-  const auto told = run_program({"rig", "design", folder.write("asked.yaml", asked), "-o", folder.path() + "/out"});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.out, Not(HasSubstr("nan")));
+// The text of a ground figure.
+std::string drawn(const testing::TemporaryFolder& folder, const std::string& required) {
+  const auto result =
+      run_program({"rig", "design", folder.write("required.yaml", required), "-o", folder.path() + "/out"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, Not(HasSubstr("nan")));
   std::string svg = testing::content_of(folder.path() + "/out/ground.svg");
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
@@ -266,7 +268,7 @@ std::string drawn(const testing::TemporaryFolder& folder, const std::string& ask
 
 TEST(RigDesign, DrawsWhatPansWithGapsOrToOneSideSee) {
   const testing::TemporaryFolder folder;
-  const auto asked = [](const std::string& angles, int azimuth_deg) {
+  const auto required = [](const std::string& angles, int azimuth_deg) {
     return replaced(replaced(rover_text(), "[-35, 0, 35]", angles), "azimuth_deg: 120",
                     "azimuth_deg: " + std::to_string(azimuth_deg));
   };
@@ -275,26 +277,26 @@ TEST(RigDesign, DrawsWhatPansWithGapsOrToOneSideSee) {
     int azimuth_deg;
     std::vector<std::string> words;
   } const cases[] = {
-      {"[-80, 0, 80]", 120, {"far edge, one eye: 54.1°", "all 120° at no distance", "leave a gap of 30.0°"}},
-      {"[0, 35, 70]", 120, {"far edge, both eyes: 82.3°", "all 120° at no distance", "by 25.6 % (one eye)"}},
-      {"[-60, -35, 35]", 120, {"far edge, one eye: 95.6°", "all 120°: 0.60 to 0.70 m", "leave a gap of 20.0°"}},
-      {"[-35, 0, 35]", 10, {"asked for: 10°", "far edge, one eye: 10.0°", "all 10°: 0.49 to 4.01 m"}},
-      {"[-180, -90, 0, 90, 180]", 360, {"far edge, one eye: 188.3°", "all 360° at no distance"}},
-      {"{from: -180, to: 150, step: 30}", 360, {"far edge, both eyes: 360.0°", "all 360°: 0.50 to 4.01 m"}}};
+      {"[-80, 0, 80]", 120, {"far edge, one camera: 54.1°", "all 120° at no distance", "leave a gap of 30.0°"}},
+      {"[0, 35, 70]", 120, {"far edge, both cameras: 82.3°", "all 120° at no distance", "by 25.6 % (one eye)"}},
+      {"[-60, -35, 35]", 120, {"far edge, one camera: 95.6°", "all 120°: 0.60 to 0.70 m", "leave a gap of 20.0°"}},
+      {"[-35, 0, 35]", 10, {"required: 10°", "far edge, one camera: 10.0°", "all 10°: 0.49 to 4.01 m"}},
+      {"[-180, -90, 0, 90, 180]", 360, {"far edge, one camera: 188.3°", "all 360° at no distance"}},
+      {"{from: -180, to: 150, step: 30}", 360, {"far edge, both cameras: 360.0°", "all 360°: 0.50 to 4.01 m"}}};
   for (const auto& c : cases) {
-    const std::string svg = drawn(folder, asked(c.angles, c.azimuth_deg));
+    const std::string svg = drawn(folder, required(c.angles, c.azimuth_deg));
     for (const std::string& words : c.words) EXPECT_THAT(svg, HasSubstr(words)) << c.angles;
   }
 }
 
-TEST(RigDesign, EyesThatShareNothingHaveNoNan) {
+TEST(RigDesign, CamerasWithoutCommonGroundGiveNoNan) {
   const testing::TemporaryFolder folder;
   const std::string apart = replaced(rover_text(), "    baseline_m: 0.20", "    baseline_m: 20");
   EXPECT_THAT(drawn(folder, apart), HasSubstr("both eyes share nothing"));
-  const json design = json::parse(run_program({"rig", "design", folder.path() + "/asked.yaml", "--json"}).out);
+  const json design = json::parse(run_program({"rig", "design", folder.path() + "/required.yaml", "--json"}).out);
   EXPECT_EQ(design["azimuth_far_stereo_deg"], 0);
   EXPECT_EQ(design["pan_overlap_far_stereo_percent"], nullptr);
-  EXPECT_THAT(design["reasons"]["pan_overlap_far_stereo_percent"], "both eyes share no ground");
+  EXPECT_THAT(design["reasons"]["pan_overlap_far_stereo_percent"], "the two cameras share no ground");
   EXPECT_EQ(design["reasons"].size(), 1u);
   for (const json& warning : design["warnings"]) EXPECT_TRUE(warning["value"].is_number()) << warning;
 }

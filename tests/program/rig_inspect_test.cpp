@@ -21,17 +21,17 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 using testing::run_program;
 
-TEST(RigInspect, TellsThePublishedRover) {
-  const auto told = run_program({"rig", "inspect", testing::source_folder() + "/config/rigs/rover.yaml"});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.out, HasSubstr("the right one is 200.0 mm to the right; not turned"));
-  EXPECT_THAT(told.out, HasSubstr("pan-tilt unit mast"));
+TEST(RigInspect, DescribesThePublishedRover) {
+  const auto result = run_program({"rig", "inspect", testing::source_folder() + "/config/rigs/rover.yaml"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("the right one is 200.0 mm to the right; not turned"));
+  EXPECT_THAT(result.out, HasSubstr("pan-tilt unit mast"));
 }
 
 TEST(RigInspect, JsonHoldsTheFiguresOfEveryPair) {
-  const auto told = run_program({"rig", "inspect", testing::source_folder() + "/config/rigs/rover.yaml", "--json"});
-  ASSERT_EQ(told.exit_code, 0) << told.err;
-  const json summary = json::parse(told.out);
+  const auto result = run_program({"rig", "inspect", testing::source_folder() + "/config/rigs/rover.yaml", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json summary = json::parse(result.out);
   EXPECT_EQ(summary["schema"], 1);
   ASSERT_EQ(summary["pairs"].size(), 2u);
   EXPECT_NEAR(summary["pairs"]["wide"]["baseline_m"], 0.2, 1e-9);
@@ -40,15 +40,15 @@ TEST(RigInspect, JsonHoldsTheFiguresOfEveryPair) {
   EXPECT_NEAR(summary["pairs"]["narrow"]["vfov_deg"], 49.5, 0.001);
 }
 
-// Without pictures: what was read, and doubts by the numbers alone.
-TEST(RigInspect, TellsWhatWasReadAndDoubtsIt) {
+// Without images: the calibration, and findings from its numbers.
+TEST(RigInspect, DescribesACalibrationAndItsFindings) {
   const testing::TemporaryFolder folder;
   const std::string long_one =
       folder.write("calib.txt", "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 -60000 0 500 240 0 0 0 1 0\n");
   testing::write_gray_png(folder.file("image_0/000000.png"), 640, 480);
-  const auto told = run_program({"rig", "inspect", long_one});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.out, HasSubstr("\nbody: the left camera"));
+  const auto result = run_program({"rig", "inspect", long_one});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("\nbody: the left camera"));
   const json pair = json::parse(run_program({"rig", "inspect", long_one, "--json"}).out)["pairs"].front();
   ASSERT_EQ(pair["findings"].size(), 1u);
   EXPECT_EQ(pair["findings"][0]["id"], "baseline_unit");
@@ -69,23 +69,23 @@ TEST(RigInspect, BadFilesAreNamed) {
   EXPECT_THAT(refused.err, HasSubstr("P0"));
 }
 
-// What is known of the real pairs: the models' yaw of K10 is 1° off its pictures and rows are off by a pixel; KITTI's
+// What is known of the real pairs: the models' yaw of K10 is 1° off its images and rows are off by a pixel; KITTI's
 // and EuRoC's are sound.
-TEST(RigInspect, JudgesRealPairs) {
+TEST(RigInspect, ChecksRealPairs) {
   const std::string data = testing::data_folder();
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "no real recordings; SPARTAN_DATA says where they are";
   const auto verdict = [&](std::vector<std::string> words) {
     words.insert(words.begin(), {"rig", "inspect"});
     words.emplace_back("--json");
-    const auto told = run_program(words);
-    EXPECT_EQ(told.exit_code, 0) << told.err;
-    return json::parse(told.out)["pairs"].front();
+    const auto result = run_program(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json::parse(result.out)["pairs"].front();
   };
   for (const char* name : {"kitti_06", "kitti_0013"}) {
-    const json pair = verdict({data + "/" + name, "--recording", data + "/" + name, "--shots", "4"});
+    const json pair = verdict({data + "/" + name, "--recording", data + "/" + name, "--frames", "4"});
     EXPECT_EQ(pair["verdict"], "good") << name << pair["findings"];
   }
-  EXPECT_EQ(verdict({data + "/euroc_v101", "--recording", data + "/euroc_v101", "--shots", "4"})["verdict"], "good");
+  EXPECT_EQ(verdict({data + "/euroc_v101", "--recording", data + "/euroc_v101", "--frames", "4"})["verdict"], "good");
 
   const std::string left = data + "/k10_pair/left4.png", right = data + "/k10_pair/right4.png";
   const std::string rigs = testing::source_folder() + "/config/rigs/";
@@ -103,7 +103,7 @@ TEST(RigInspect, JudgesRealPairs) {
 
   const std::string boards = data + "/opencv_chessboard/";
   EXPECT_EQ(verdict({rigs + "opencv_chessboard.yaml", boards + "left*.jpg", boards + "right*.jpg"})["verdict"], "good");
-  // Curiosity's pictures alone: not rectified, rows up to 5 px apart (pairs.md).
+  // Curiosity's images alone: not rectified, rows up to 5 px apart (pairs.md).
   const std::string mars = data + "/mars/msl_navcam_sol1431/";
   const json navcam = verdict({"-", mars + "NLB*.jpeg", mars + "NRB*.jpeg"});
   EXPECT_EQ(navcam["verdict"], "bad");
@@ -117,12 +117,12 @@ TEST(RigInspect, CorrectedK10SeesFlatGroundAndRocks) {
   const testing::TemporaryFolder folder;
   // Level is where the ground is: the rover leans forward by 6.8° to it.
   const auto build = [&](const std::string& rig) {
-    const auto told =
+    const auto result =
         run_program({"map", "build", data + "/left4.png", data + "/right4.png", "--rig",
                      testing::source_folder() + "/config/rigs/" + rig + ".yaml", "-o", folder.path() + "/" + rig,
                      "--extent-m", "9", "--gravity", "0.118,0,-0.993", "--json"});
-    EXPECT_EQ(told.exit_code, 0) << told.err;
-    return json::parse(told.out);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json::parse(result.out);
   };
   const json given = build("k10"), corrected = build("k10_corrected");
   EXPECT_LT(corrected["cells"]["obstacle"], 0.5 * given["cells"]["obstacle"].get<double>());
@@ -157,9 +157,9 @@ TEST(RigInspect, ReadsWhatOthersWrite) {
                {"kitti_06", 0.5372, 707.0912},
                {"euroc_v101/mav0/cam0/sensor.yaml", 0.1101, 458.654}};
   for (const auto& rig : known) {
-    const auto told = run_program({"rig", "inspect", data + "/" + rig.path, "--json"});
-    ASSERT_EQ(told.exit_code, 0) << told.err;
-    const json pair = json::parse(told.out)["pairs"].front();
+    const auto result = run_program({"rig", "inspect", data + "/" + rig.path, "--json"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const json pair = json::parse(result.out)["pairs"].front();
     EXPECT_NEAR(pair["baseline_m"], rig.baseline_m, 1e-4) << rig.path;
     EXPECT_NEAR(pair["focal_px"], rig.focal_px, 1e-3) << rig.path;
   }

@@ -45,8 +45,8 @@ class Run : public ::testing::Test {
 
   std::string drive() const { return folder_.path() + "/drive"; }
   std::string path(const std::string& name) const { return folder_.path() + "/" + name; }
-  std::string image(int eye, int i) const {
-    return drive() + "/image_" + std::to_string(eye) + "/" + number(i) + ".png";
+  std::string image(int side, int i) const {
+    return drive() + "/image_" + std::to_string(side) + "/" + number(i) + ".png";
   }
   ProgramResult run(const std::string& output, std::vector<std::string> more = {},
                     const ProgramLimits& limits = {}) const {
@@ -240,7 +240,7 @@ TEST_F(Run, ComparesWithTheTruth) {
   EXPECT_EQ(summary["truth"]["align"], "se3");
   EXPECT_EQ(summary["truth"]["frames"], 14);
   EXPECT_LT(summary["truth"]["ate_m"]["rmse"], 0.005);
-  // A truth that cannot be read is told before the drive begins.
+  // A truth that cannot be read is printed before the drive begins.
   const ProgramResult refused = run("other", {"--truth", path("none.txt")});
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.err, HasSubstr("none.txt"));

@@ -14,10 +14,10 @@ struct SmallDrive {
 /// Writes calib.txt, times.txt, poses.txt (truth), image_0/ and image_1/ into a new folder.
 void write_small_drive(const std::string& folder, const SmallDrive& drive = {});
 
-/// A gray picture of one level.
+/// A gray image of one level.
 void write_gray_png(const std::string& path, int width, int height);
 
-/// Turns both pictures of a rectified pair by 180° and swaps them: a good pair of another place.
+/// Rotates both images of a rectified pair by 180° and exchanges them, which gives a valid pair of another scene.
 void turn_upside_down(const std::string& left, const std::string& right);
 
 }  // namespace spartan::testing

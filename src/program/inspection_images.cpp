@@ -1,4 +1,4 @@
-#include "program/rig_pictures.h"
+#include "program/inspection_images.h"
 
 #include <fmt/format.h>
 #include <fnmatch.h>
@@ -16,14 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_picture(const fs::path& path) {
+bool is_image(const fs::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? c + 32 : c; });
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".pgm" || ending == ".ppm";
 }
 
-// The files that an argument names, in the order of their names.
+// The files that an argument names, sorted.
 Result<std::vector<std::string>> files_of(const std::string& argument) {
   std::error_code error;
   const fs::path path(argument);
@@ -33,15 +33,15 @@ Result<std::vector<std::string>> files_of(const std::string& argument) {
   const fs::path where = folder ? path : path.parent_path().empty() ? fs::path(".") : path.parent_path();
   std::vector<std::string> files;
   for (const auto& entry : fs::directory_iterator(where, error)) {
-    if (!is_picture(entry.path())) continue;
+    if (!is_image(entry.path())) continue;
     if (::fnmatch(pattern.c_str(), entry.path().filename().c_str(), 0) == 0) files.push_back(entry.path().string());
   }
-  if (files.empty()) return failure(ErrorCode::input, "no picture is named so (png, jpg, pgm, ppm)", argument);
+  if (files.empty()) return failure(ErrorCode::input, "no image file matches (png, jpg, pgm, ppm)", argument);
   std::sort(files.begin(), files.end());
   return files;
 }
 
-// `most` places of 0 … count − 1, evenly spread, the first and the last among them.
+// At most `most` indices of 0 … count − 1, evenly spread, including the first and the last.
 std::vector<std::size_t> spread(std::size_t count, int most) {
   std::vector<std::size_t> places;
   const std::size_t wanted = std::min(count, static_cast<std::size_t>(std::max(most, 1)));
@@ -50,7 +50,7 @@ std::vector<std::size_t> spread(std::size_t count, int most) {
   return places;
 }
 
-// At most `most` pairs, spread over all that the two arguments name.
+// At most `most` pairs, spread evenly over the files that the two arguments name.
 Result<std::vector<std::pair<std::string, std::string>>> pairs_of_files(const std::string& left,
                                                                         const std::string& right, int most) {
   const auto left_files = files_of(left);
@@ -59,15 +59,16 @@ Result<std::vector<std::pair<std::string, std::string>>> pairs_of_files(const st
   if (!right_files) return failure(right_files);
   if (left_files->size() != right_files->size()) {
     return failure(ErrorCode::input,
-                   fmt::format("{} left and {} right pictures", left_files->size(), right_files->size()),
-                   left + ", " + right, "every left picture needs its right one");
+                   fmt::format("{} left and {} right images", left_files->size(), right_files->size()),
+                   left + ", " + right, "every left image needs a right one");
   }
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const std::size_t i : spread(left_files->size(), most)) pairs.emplace_back((*left_files)[i], (*right_files)[i]);
   return pairs;
 }
 
-// What the pictures are judged by must not be needed to see them: sizes are those of the pictures, and the lenses any.
+// The images must not depend on the calibration under test: sizes are those of the images, the camera model is
+// arbitrary.
 Result<Imager> imager_without_geometry(const Camera& left, const Camera& right, ImageSize size,
                                        const Workers& workers) {
   const auto plain = [&](const char* name, const PixelFormat& format) {
@@ -81,41 +82,41 @@ Result<Imager> imager_without_geometry(const Camera& left, const Camera& right, 
   };
   ImagingOptions options;
   options.rectify = false;
-  return Imager::create(rig_of_one_pair("pictures", plain("left", left.pixel_format),
-                                        plain("right", right.pixel_format), Pose::from_translation({-0.1, 0, 0})),
+  return Imager::create(rig_of_one_pair("images", plain("left", left.pixel_format), plain("right", right.pixel_format),
+                                        Pose::from_translation({-0.1, 0, 0})),
                         options, workers);
 }
 
 }  // namespace
 
-Result<std::vector<PicturePair>> load_pictures(const std::string& left, const std::string& right, int most) {
+Result<std::vector<ImagePair>> load_images(const std::string& left, const std::string& right, int most) {
   const auto names = pairs_of_files(left, right, most);
   if (!names) return failure(names);
-  std::vector<PicturePair> pairs;
+  std::vector<ImagePair> pairs;
   for (const auto& [l, r] : *names) {
-    auto left_picture = read_gray8(l);
-    if (!left_picture) return failure(left_picture);
-    auto right_picture = read_gray8(r);
-    if (!right_picture) return failure(right_picture);
-    for (const auto& [path, size] : {std::pair{l, left_picture->size()}, std::pair{r, right_picture->size()}}) {
-      const ImageSize first = pairs.empty() ? left_picture->size() : pairs.front().left.size();
+    auto left_image = read_gray8(l);
+    if (!left_image) return failure(left_image);
+    auto right_image = read_gray8(r);
+    if (!right_image) return failure(right_image);
+    for (const auto& [path, size] : {std::pair{l, left_image->size()}, std::pair{r, right_image->size()}}) {
+      const ImageSize first = pairs.empty() ? left_image->size() : pairs.front().left.size();
       if (size == first) continue;
       return failure(ErrorCode::input,
                      fmt::format("is {} x {} px, {} {} x {}", size.width, size.height,
                                  pairs.empty() ? l : pairs.front().name, first.width, first.height),
                      path);
     }
-    pairs.push_back({l, std::move(*left_picture), std::move(*right_picture)});
+    pairs.push_back({l, std::move(*left_image), std::move(*right_image)});
   }
   return pairs;
 }
 
-Result<std::vector<PicturePair>> load_pictures_of(const Camera& left_camera, const Camera& right_camera,
-                                                  const std::string& left, const std::string& right, int most,
-                                                  const Workers& workers) {
+Result<std::vector<ImagePair>> load_images_of(const Camera& left_camera, const Camera& right_camera,
+                                              const std::string& left, const std::string& right, int most,
+                                              const Workers& workers) {
   const auto names = pairs_of_files(left, right, most);
   if (!names) return failure(names);
-  std::vector<PicturePair> pairs;
+  std::vector<ImagePair> pairs;
   std::optional<Imager> imager;
   for (const auto& [l, r] : *names) {
     const auto left_file = read_image(l), right_file = read_image(r);
@@ -137,15 +138,15 @@ Result<std::vector<PicturePair>> load_pictures_of(const Camera& left_camera, con
   return pairs;
 }
 
-Result<std::vector<PicturePair>> load_shots(FrameSource& source, const std::string& pair, int most,
-                                            const Workers& workers) {
+Result<std::vector<ImagePair>> load_frames(FrameSource& source, const std::string& pair, int most,
+                                           const Workers& workers) {
   ImagingOptions options;
   options.rectify = false;
   auto imager = Imager::create(source.info().rig, options, workers);
   if (!imager) return failure(imager);
   const std::vector<Stamp> stamps = source.announced_stamps(pair);
-  std::vector<PicturePair> pairs;
-  std::string reason = "it has no shot of this pair";
+  std::vector<ImagePair> pairs;
+  std::string reason = "the recording has no frame of this pair";
   for (const std::size_t i : spread(stamps.size(), most)) {
     auto frame = source.frame_at(pair, stamps[i]);
     if (!frame) {

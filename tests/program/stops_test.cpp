@@ -26,7 +26,7 @@ using testing::ProgramLimits;
 using testing::ProgramResult;
 using testing::run_program;
 
-class Positions : public ::testing::Test {
+class Stops : public ::testing::Test {
  protected:
   void SetUp() override {
     std::ofstream(path("small_rig.yaml")) << testing::kSmallRig;
@@ -57,7 +57,7 @@ class Positions : public ::testing::Test {
   testing::TemporaryFolder folder_;
 };
 
-TEST_F(Positions, BecomeMapsAndAllSensorsAreHeard) {
+TEST_F(Stops, BecomeMapsAndAllSensorsAreUsed) {
   const ProgramResult result = run("out", {"--json"});
   ASSERT_TRUE(finished(result)) << result.err;
   const auto summary = nlohmann::json::parse(result.out);
@@ -76,35 +76,35 @@ TEST_F(Positions, BecomeMapsAndAllSensorsAreHeard) {
 }
 
 // The recording ends at the second stop: its pans are not followed by a frame.
-TEST_F(Positions, EveryShotAndStopIsTimed) {
+TEST_F(Stops, EveryFrameAndStopIsTimed) {
   std::string table = testing::content_of(path("rec/frames.csv"));
   table.erase(table.rfind('\n', table.size() - 2) + 1);
   std::ofstream(path("rec/frames.csv")) << table;
-  const auto shots = std::count(table.begin(), table.end(), '\n') - 1;
+  const auto frames = std::count(table.begin(), table.end(), '\n') - 1;
   const auto times_run = [&](const std::string& output, const std::string& stage) {
     const auto summary = nlohmann::json::parse(testing::content_of(path(output + "/summary.json")));
     return summary["stages"][stage]["count"].get<int>();
   };
   ASSERT_TRUE(finished(run("out")));
-  for (const char* stage : {"camera", "imaging"}) EXPECT_EQ(times_run("out", stage), shots) << stage;
+  for (const char* stage : {"camera", "imaging"}) EXPECT_EQ(times_run("out", stage), frames) << stage;
   for (const char* stage : {"mapping", "slam", "maps"}) EXPECT_EQ(times_run("out", stage), 2) << stage << ", two stops";
   ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
   EXPECT_EQ(times_run("part", "maps"), 1) << "it goes on in the second stop";
   ASSERT_TRUE(finished(run("part", {"--resume"})));
   EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("out")));
   ASSERT_TRUE(finished(run("no_maps", {"--set", "maps=false"})));
-  EXPECT_EQ(times_run("no_maps", "camera"), shots);
+  EXPECT_EQ(times_run("no_maps", "camera"), frames);
 }
 
-TEST_F(Positions, ArePartOfTheReport) {
+TEST_F(Stops, ArePartOfTheReport) {
   ASSERT_TRUE(finished(run("out")));
   const std::string page = testing::content_of(path("out/report/index.html"));
-  for (const char* part : {"What the rover saw", "truth", "localization, 3σ", "inclinometer", "The global map",
-                           "Its coverage", "missing: has not said anything"})
+  for (const char* part : {"Images", "truth", "localization, 3σ", "inclinometer", "Global map of all stops",
+                           "Points per cell of the global map", "missing: has not said anything"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
 }
 
-TEST_F(Positions, AreReportedWithOneAlignment) {
+TEST_F(Stops, AreReportedWithOneAlignment) {
   ASSERT_TRUE(finished(run("out")));
   const auto headline = [&](const std::string& truth, const std::string& align, const std::string& words) {
     const ProgramResult score = run_program({"evaluate", path("out"), "--truth", truth, "--align", align, "--json"});
@@ -122,20 +122,20 @@ TEST_F(Positions, AreReportedWithOneAlignment) {
   places.close();
   ASSERT_TRUE(finished(run("out", {"--resume", "--truth", path("places.tum")})));
   const std::string fitted = testing::content_of(path("out/report/index.html"));
-  EXPECT_NE(fitted.find(headline(path("places.tum"), "se3", "after the best fit")), std::string::npos);
-  EXPECT_NE(fitted.find(">position error, after the best fit, mm<"), std::string::npos);
+  EXPECT_NE(fitted.find(headline(path("places.tum"), "se3", "SE3 alignment")), std::string::npos);
+  EXPECT_NE(fitted.find(">position error, SE3 alignment, mm<"), std::string::npos);
 }
 
-TEST_F(Positions, TheirMapIsToldMergedAndExported) {
+TEST_F(Stops, TheirMapIsDescribedMergedAndExported) {
   ASSERT_TRUE(finished(run("out")));
   const ProgramResult info = run_program({"map", "info", path("out"), "--json"});
   ASSERT_EQ(info.exit_code, 0) << info.err;
-  const auto told = nlohmann::json::parse(info.out);
-  EXPECT_EQ(told["stops"].size(), 2u);
-  EXPECT_GT(told["cells"]["free"], 0);
+  const auto printed = nlohmann::json::parse(info.out);
+  EXPECT_EQ(printed["stops"].size(), 2u);
+  EXPECT_GT(printed["cells"]["free"], 0);
   const auto tif = read_geotiff(path("out/maps/global.tif"));
   ASSERT_TRUE(tif) << tif.error().message();
-  EXPECT_EQ(told["columns"], tif->bands.front().width());
+  EXPECT_EQ(printed["columns"], tif->bands.front().width());
   EXPECT_EQ(tif->names.size(), 11u) << "as a local map's";
 
   const ProgramResult merged =
@@ -147,7 +147,7 @@ TEST_F(Positions, TheirMapIsToldMergedAndExported) {
   EXPECT_GT(both["both_know_cells"], 0);
   const ProgramResult again = run_program({"map", "info", path("both.map"), "--json"});
   ASSERT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(nlohmann::json::parse(again.out)["known_m2"], told["known_m2"]) << "the same ground twice";
+  EXPECT_EQ(nlohmann::json::parse(again.out)["known_m2"], printed["known_m2"]) << "the same ground twice";
 
   for (const char* file : {"x.tif", "x.png", "x.ply", "x.map"})
     EXPECT_EQ(run_program({"map", "export", path("both.map"), "-o", path(file)}).exit_code, 0) << file;
@@ -175,22 +175,22 @@ void stretch_map(const std::string& run) {
                   "(SELECT submap, ix, iy FROM map_tiles ORDER BY submap, ix, iy LIMIT 1)"));
 }
 
-TEST_F(Positions, AMapTooLargeForOnePictureLeavesNoneOfBefore) {
+TEST_F(Stops, AMapTooLargeForOneImageRemovesTheOldOne) {
   ASSERT_TRUE(finished(run("out")));
   ASSERT_TRUE(fs::exists(path("out/maps/global.tif")));
   stretch_map(path("out"));
   const ProgramResult resumed = run("out", {"--resume"});
   ASSERT_TRUE(finished(resumed)) << resumed.err;
-  EXPECT_NE(resumed.err.find("too large for one picture"), std::string::npos) << resumed.err;
-  EXPECT_EQ(resumed.err.find("no report"), std::string::npos) << resumed.err;
+  EXPECT_NE(resumed.err.find("too large for one image"), std::string::npos) << resumed.err;
+  EXPECT_EQ(resumed.err.find("no report was written"), std::string::npos) << resumed.err;
   EXPECT_FALSE(fs::exists(path("out/maps/global.tif")));
   EXPECT_FALSE(fs::exists(path("out/maps/global.png")));
   const std::string page = testing::content_of(path("out/report/index.html"));
-  EXPECT_NE(page.find("too large for one picture"), std::string::npos);
-  EXPECT_EQ(page.find("Its coverage"), std::string::npos);
+  EXPECT_NE(page.find("too large for one image"), std::string::npos);
+  EXPECT_EQ(page.find("Points per cell"), std::string::npos);
 }
 
-TEST_F(Positions, EachTrajectoryIsExported) {
+TEST_F(Stops, EachTrajectoryIsExported) {
   ASSERT_TRUE(finished(run("out")));
   for (const std::string kind : {"odometry", "slam", "localization"}) {
     ASSERT_EQ(run_program({"export", path("out"), "--format", "tum", "--trajectory", kind, "-o", path(kind)}).exit_code,
@@ -202,7 +202,7 @@ TEST_F(Positions, EachTrajectoryIsExported) {
   EXPECT_EQ(testing::content_of(path("best")), testing::content_of(path("localization")));
 }
 
-TEST_F(Positions, SensorsErrAsTheRecordingStates) {
+TEST_F(Stops, SensorNoiseIsThatOfTheRecording) {
   ASSERT_TRUE(finished(run("stated")));
   ASSERT_TRUE(finished(run("not_stated", {"--set", "noise_as_stated=false"})));
   const std::string about = testing::content_of(path("rec/recording.yaml"));
@@ -221,8 +221,8 @@ TEST_F(Positions, SensorsErrAsTheRecordingStates) {
   EXPECT_EQ(localized("silent"), localized("not_stated"));
 }
 
-// The first stop's narrow shot is the last thing that was committed.
-TEST_F(Positions, AreMappedThoughTheRunStoppedInTheMiddleOfThem) {
+// The narrow frame of the first stop is the last commit.
+TEST_F(Stops, AreMappedAfterAnInterruptionDuringTheStop) {
   ASSERT_TRUE(finished(run("whole")));
   ASSERT_TRUE(finished(run("part", {"--max-frames", "1"})));
   EXPECT_TRUE(maps_of("part").empty());
@@ -230,7 +230,7 @@ TEST_F(Positions, AreMappedThoughTheRunStoppedInTheMiddleOfThem) {
   EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("whole")));
 }
 
-TEST_F(Positions, AreMappedAfterKillsAsIfNothingHadHappened) {
+TEST_F(Stops, AreMappedTheSameAfterKills) {
   const auto start = std::chrono::steady_clock::now();
   ASSERT_TRUE(finished(run("whole")));
   const auto took = std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() - start);
@@ -245,13 +245,13 @@ TEST_F(Positions, AreMappedAfterKillsAsIfNothingHadHappened) {
   }
 }
 
-TEST_F(Positions, GiveTheSameBytesForAnyNumberOfThreads) {
+TEST_F(Stops, GiveTheSameBytesForAnyNumberOfThreads) {
   ASSERT_TRUE(finished(run("one", {"--threads", "1"})));
   ASSERT_TRUE(finished(run("two", {"--threads", "2"})));
   EXPECT_EQ(byte_stable_content(path("one")), byte_stable_content(path("two")));
 }
 
-TEST_F(Positions, MapsCanBeSwitchedOff) {
+TEST_F(Stops, MapsCanBeSwitchedOff) {
   ASSERT_TRUE(finished(run("out", {"--set", "maps=false"})));
   EXPECT_TRUE(maps_of("out").empty());
 }

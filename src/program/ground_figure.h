@@ -1,4 +1,4 @@
-// A picture of the ground that a rig's pairs see: from the side, and from above with the pans.
+// A figure of the ground that a rig's pairs see: side view, and plan with the pans.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-#include "program/ground_picture.h"
+#include "program/ground_figure.h"
 
 #include <fmt/format.h>
 
@@ -15,20 +15,20 @@ void draw_legend(Drawing& drawing, double y_px, bool pans, bool narrow) {
   struct Entry {
     Rgb8 colour;
     double opacity;
-    const char* words;
+    const char* text;
     bool shown;
   };
-  const Entry entries[] = {{kWideOneEye, 1, "wide, one eye only", true},
-                           {kWideBoth, 1, "wide, both eyes", true},
+  const Entry entries[] = {{kWideOneEye, 1, "wide, one camera only", true},
+                           {kWideBoth, 1, "wide, both cameras", true},
                            {kWideTwice, 1, "wide, from two pans", pans},
-                           {kNarrow, 0.45, "narrow, both eyes", narrow},
-                           {kUnseen, 1, "asked for, not seen", pans}};
+                           {kNarrow, 0.45, "narrow, both cameras", narrow},
+                           {kUnseen, 1, "required, not seen", pans}};
   double x = kMargin_px;
   for (const Entry& entry : entries) {
     if (!entry.shown) continue;
     drawing.fill({{x, y_px}, {x + 22, y_px}, {x + 22, y_px + 14}, {x, y_px + 14}}, {entry.colour, entry.opacity});
     drawing.line(closed({{x, y_px}, {x + 22, y_px}, {x + 22, y_px + 14}, {x, y_px + 14}}), {kFaint, 0.8});
-    drawing.text({x + 30, y_px + 12}, entry.words, {kInk, 14});
+    drawing.text({x + 30, y_px + 12}, entry.text, {kInk, 14});
     x += 230;
   }
 }
@@ -50,7 +50,7 @@ std::optional<Drawing> draw_ground(const RigRequirements& requirements, const Ri
   const PairFigures* narrow = design.narrow ? design.narrow->chosen() : nullptr;
   if (narrow) pairs.push_back({"narrow", kNarrow, *requirements.narrow, *narrow});
 
-  // Once on endless paper, to see how long it gets.
+  // Drawn once to find the height.
   const auto draw_on = [&](Drawing& drawing) {
     drawing.text({kMargin_px, 40}, "Level ground seen by " + requirements.name, kTitle);
     double y = 40;

@@ -1,4 +1,4 @@
-// The verbs of the program. A further verb is one file with one `add_…` function, declared here and called in main.
+// The commands of the program. To add one, write one file with one `add_…` function, declare it here, call it in main.
 #pragma once
 
 #include <CLI/CLI.hpp>

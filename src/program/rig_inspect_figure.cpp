@@ -1,4 +1,4 @@
-#include "program/rig_inspect_picture.h"
+#include "program/rig_inspect_figure.h"
 
 #include <fmt/format.h>
 
@@ -16,19 +16,19 @@ namespace {
 
 constexpr int kWidest_px = 640, kLines = 12, kHeading_px = 22;
 
-// One line of the picture: two views, with the places of matches in them; without views, the heading alone.
+// One strip of the figure: two images with their matches; without images, only the heading.
 struct Strip {
   std::string heading;
   Image<std::uint8_t> left, right;
   std::vector<PixelMatch> matches;
 };
 
-std::string in_words(const RowErrors& rows) {
-  if (!std::isfinite(rows.mean_px)) return "too little to tell";
-  return fmt::format("rows differ by {:.2f} px, 95 %: {:.2f} px", rows.mean_px, rows.p95_px);
+std::string to_text(const RowErrors& rows) {
+  if (!std::isfinite(rows.mean_px)) return "too few matches";
+  return fmt::format("mean row error {:.2f} px, 95 %: {:.2f} px", rows.mean_px, rows.p95_px);
 }
 
-// Green where rows agree to half a pixel, then yellow, red from 3 px on.
+// Green up to half a pixel, then yellow, red from 3 px on.
 cv::Scalar colour_of(double error_px) {
   const double t = std::clamp((std::abs(error_px) - 0.5) / 2.5, 0.0, 1.0);
   return {255 * std::min(1.0, 2 * t), 255 * std::min(1.0, 2 - 2 * t), 40};
@@ -60,7 +60,7 @@ std::optional<Strip> rectified(const Rig& rig, const StereoPair& pair, const Str
   return strip;
 }
 
-// A rig whose images hold what the strip holds: gray of 8 bits, without masks.
+// The rig with the pixel format of the strips: 8-bit gray, without masks.
 Rig plain(Rig rig) {
   for (Camera& camera : rig.cameras) {
     camera.pixel_format = {};
@@ -70,10 +70,10 @@ Rig plain(Rig rig) {
 }
 
 constexpr std::uint8_t kGround = 24;
-const cv::Scalar kWrongMatch{110, 110, 110};
+const cv::Scalar kOutlierGray{110, 110, 110};
 
-// `wrong`: matches that do not fit the corrected pair, which say nothing about its rows.
-void draw_matches(const Strip& strip, const std::vector<bool>& wrong, cv::Mat views, double scale) {
+// `outlier`: matches that do not fit the corrected pair.
+void draw_matches(const Strip& strip, const std::vector<bool>& outlier, cv::Mat views, double scale) {
   const int width = views.cols / 2;
   const auto at = [&](const Eigen::Vector2d& p, int shift) {
     return cv::Point(static_cast<int>(std::lround((p.x() + 0.5) * scale)) + shift,
@@ -85,18 +85,18 @@ void draw_matches(const Strip& strip, const std::vector<bool>& wrong, cv::Mat vi
     const double error_px = match.right.y() - match.left.y();
     const cv::Point from = at(match.left, 0), other = at(match.right, width);
     if (from.x < 0 || from.x >= width || other.x < width || other.x >= 2 * width) continue;
-    const cv::Scalar colour = wrong[i] ? kWrongMatch : colour_of(error_px);
-    if (wrong[i]) {
+    const cv::Scalar colour = outlier[i] ? kOutlierGray : colour_of(error_px);
+    if (outlier[i]) {
       cv::circle(views, from, 2, colour, 1, cv::LINE_AA);
     } else {
       const cv::Point to = from + cv::Point(0, static_cast<int>(std::lround(kArrowScale * error_px * scale)));
       cv::arrowedLine(views, from, to, colour, 1, cv::LINE_AA, 0, 0.25);
     }
-    cv::circle(views, other, 2, colour, wrong[i] ? 1 : cv::FILLED, cv::LINE_AA);
+    cv::circle(views, other, 2, colour, outlier[i] ? 1 : cv::FILLED, cv::LINE_AA);
   }
 }
 
-void draw(const Strip& strip, const std::vector<bool>& wrong, cv::Mat canvas, double scale) {
+void draw(const Strip& strip, const std::vector<bool>& outlier, cv::Mat canvas, double scale) {
   const int width = canvas.cols / 2, height = canvas.rows - kHeading_px;
   canvas.setTo(cv::Scalar::all(kGround));
   cv::putText(canvas, strip.heading, {6, 15}, cv::FONT_HERSHEY_SIMPLEX, 0.45, {235, 235, 235}, 1, cv::LINE_AA);
@@ -113,24 +113,23 @@ void draw(const Strip& strip, const std::vector<bool>& wrong, cv::Mat canvas, do
     const int y = line * height / kLines;
     cv::line(views, {0, y}, {views.cols - 1, y}, {70, 130, 220}, 1);
   }
-  draw_matches(strip, wrong, views, scale);
+  draw_matches(strip, outlier, views, scale);
 }
 
-std::vector<bool> wrong_matches(const Strip& corrected, double limit_px) {
-  std::vector<bool> wrong;
-  wrong.reserve(corrected.matches.size());
+std::vector<bool> find_outliers(const Strip& corrected, double limit_px) {
+  std::vector<bool> outlier;
+  outlier.reserve(corrected.matches.size());
   for (const PixelMatch& match : corrected.matches)
-    wrong.push_back(!(std::abs(match.left.y() - match.right.y()) <= limit_px));
-  return wrong;
+    outlier.push_back(!(std::abs(match.left.y() - match.right.y()) <= limit_px));
+  return outlier;
 }
 
-// What is drawn of the pair as given.
+// The strip of the given calibration.
 Strip as_given(const Rig& rig, const StereoPair& pair, const PairCheck& check, const Strip& taken,
                const Workers& workers) {
   auto given = check.structure_found ? std::nullopt : rectified(plain(rig), pair, taken, workers);
-  if (!given)
-    return {"as given the eyes, their sides or sizes are wrong: there is no view with common rows", {}, {}, {}};
-  given->heading = "rectified as given: " + in_words(check.as_given);
+  if (!given) return {"the given calibration cannot be rectified: cameras, sides or sizes are wrong", {}, {}, {}};
+  given->heading = "rectified with the given calibration: " + to_text(check.as_given);
   return std::move(*given);
 }
 
@@ -141,9 +140,9 @@ Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, cons
                                     const std::vector<PixelMatch>& matches, const Workers& workers) {
   const auto copy = [](ImageView<const std::uint8_t> view) { return Image<std::uint8_t>::copy_of(view); };
   std::vector<Strip> strips;
-  strips.push_back({"as taken: " + in_words(check.as_taken), copy(left), copy(right), matches});
+  strips.push_back({"unrectified: " + to_text(check.as_taken), copy(left), copy(right), matches});
   strips.push_back(as_given(rig, pair, check, strips.front(), workers));
-  std::vector<bool> wrong(matches.size(), false);
+  std::vector<bool> outlier(matches.size(), false);
   if (check.corrected) {
     const bool exchanged = check.pictures_exchanged;
     Strip taken{{}, copy(exchanged ? right : left), copy(exchanged ? left : right), matches};
@@ -152,8 +151,8 @@ Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, cons
     }
     if (auto corrected = rectified(plain(*check.corrected), *check.corrected->find_pair(pair.name), taken, workers)) {
       corrected->heading =
-          fmt::format("corrected: {} (arrows are {} times as long)", in_words(check.as_corrected), kArrowScale);
-      if (check.inlier_limit_px > 0) wrong = wrong_matches(*corrected, check.inlier_limit_px);
+          fmt::format("corrected: {} (arrows enlarged {} times)", to_text(check.as_corrected), kArrowScale);
+      if (check.inlier_limit_px > 0) outlier = find_outliers(*corrected, check.inlier_limit_px);
       strips.push_back(std::move(*corrected));
     }
   }
@@ -162,14 +161,14 @@ Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, cons
   const auto height_of = [&](const Strip& strip) { return kHeading_px + (strip.left.empty() ? 0 : height); };
   int whole = 0;
   for (const Strip& strip : strips) whole += height_of(strip);
-  Image<Rgb8> picture(2 * width, whole);
-  cv::Mat canvas = as_mat(picture);
+  Image<Rgb8> figure(2 * width, whole);
+  cv::Mat canvas = as_mat(figure);
   int top = 0;
   for (const Strip& strip : strips) {
-    draw(strip, wrong, canvas(cv::Rect(0, top, 2 * width, height_of(strip))), scale);
+    draw(strip, outlier, canvas(cv::Rect(0, top, 2 * width, height_of(strip))), scale);
     top += height_of(strip);
   }
-  return picture;
+  return figure;
 }
 
 }  // namespace spartan::program

@@ -1,4 +1,4 @@
-// What `rig inspect` draws: a pair with its rows, before and after.
+// The figure of `rig inspect`: the row errors of a pair before and after correction.
 #pragma once
 
 #include "spartan/core/image.h"
@@ -9,11 +9,10 @@
 
 namespace spartan::program {
 
-/// Both pictures of one shot side by side, three times from top to bottom: as taken, rectified with the rig as given
-/// (a heading alone where that cannot be done) and with the corrected one (left out where there is none); common rows
-/// as lines, and at each match of this shot an arrow from the left eye's row to the right eye's, drawn kArrowScale
-/// times as long as it is; gray rings at matches that are none. `matches`: of this shot, as the pictures were given.
-/// The widths of the pictures are brought to at most 640 px each.
+/// Both images of one frame side by side, in three strips from top to bottom: unrectified, rectified with the given rig
+/// (only a heading if that is impossible), rectified with the corrected rig (omitted if there is none). Lines mark
+/// common rows. An arrow at each match points from the left row to the right row, enlarged kArrowScale times; gray
+/// circles are outliers. `matches` are in pixels of the given images. Each image is reduced to at most 640 px in width.
 Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, const PairCheck& check,
                                     ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                     const std::vector<PixelMatch>& matches, const Workers& workers);

@@ -1,4 +1,5 @@
-// `spartan stereo`, `spartan map build` and `spartan rig inspect` with picture files whose meaning only the rig knows.
+// `spartan stereo`, `spartan map build` and `spartan rig inspect` with image files whose pixel format only the rig
+// states.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,29 +19,29 @@ using ::testing::HasSubstr;
 using testing::run_program;
 
 // A gray world in front of cameras of any kind: the pair of the small drive, its samples written anew.
-class PictureFiles : public ::testing::Test {
+class ImageFiles : public ::testing::Test {
  protected:
-  static Image<std::uint8_t> seen_by(int eye) {
-    return read_gray8(fmt::format("{}/image_{}/000000.png", testing::small_drive_folder(), eye)).value();
+  static Image<std::uint8_t> seen_by(int side) {
+    return read_gray8(fmt::format("{}/image_{}/000000.png", testing::small_drive_folder(), side)).value();
   }
   template <class Pixel>
-  void write_eyes(auto pixel_of) {
-    for (const int eye : {0, 1}) {
-      const auto gray = seen_by(eye);
-      Image<Pixel> picture(gray.size());
+  void write_images(auto pixel_of) {
+    for (const int side : {0, 1}) {
+      const auto gray = seen_by(side);
+      Image<Pixel> image(gray.size());
       for (int y = 0; y < gray.height(); ++y) {
         for (int x = 0; x < gray.width(); ++x) {
           if constexpr (std::is_invocable_v<decltype(pixel_of), int>) {
-            picture(x, y) = pixel_of(gray(x, y));
+            image(x, y) = pixel_of(gray(x, y));
           } else {
-            picture(x, y) = pixel_of(gray(x, y), x, y);
+            image(x, y) = pixel_of(gray(x, y), x, y);
           }
         }
       }
-      ASSERT_TRUE(write_png(eye_file(eye), picture.view()));
+      ASSERT_TRUE(write_png(file_of(side), image.view()));
     }
   }
-  std::string eye_file(int eye) const { return folder_.file(eye == 0 ? "left.png" : "right.png"); }
+  std::string file_of(int side) const { return folder_.file(side == 0 ? "left.png" : "right.png"); }
 
   std::string rig_file(const std::string& format) const {
     constexpr const char* kRig =
@@ -54,28 +55,28 @@ class PictureFiles : public ::testing::Test {
     return folder_.write("rig.yaml", fmt::format(kRig, format));
   }
   testing::ProgramResult run(std::vector<std::string> words, const std::string& format) const {
-    const std::vector<std::string> rest{eye_file(0), eye_file(1),         "--rig", rig_file(format),
-                                        "-o",        folder_.file("out"), "--json"};
+    const std::vector<std::string> rest{file_of(0), file_of(1),          "--rig", rig_file(format),
+                                        "-o",       folder_.file("out"), "--json"};
     words.insert(words.end(), rest.begin(), rest.end());
     return run_program(words);
   }
   // In percent, of `stereo`.
   double density(const std::string& format) const {
-    const auto told = run({"stereo"}, format);
-    EXPECT_EQ(told.exit_code, 0) << told.err;
-    return told.exit_code == 0 ? json::parse(told.out)["density_percent"].get<double>() : 0;
+    const auto result = run({"stereo"}, format);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.exit_code == 0 ? json::parse(result.out)["density_percent"].get<double>() : 0;
   }
   void expect_a_map(const std::string& format) const {
-    const auto told = run({"map", "build", "--gravity", "0,0,-1"}, format);
-    EXPECT_EQ(told.exit_code, 0) << told.err;
+    const auto result = run({"map", "build", "--gravity", "0,0,-1"}, format);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
   }
 
   // Of `rig inspect`, whose rig is right to the last digit.
   void expect_judged_good(const std::string& format) const {
     SCOPED_TRACE(format);
-    const auto told = run_program({"rig", "inspect", rig_file(format), eye_file(0), eye_file(1), "--json"});
-    ASSERT_EQ(told.exit_code, 0) << told.err;
-    const json pair = json::parse(told.out)["pairs"]["stereo"];
+    const auto result = run_program({"rig", "inspect", rig_file(format), file_of(0), file_of(1), "--json"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const json pair = json::parse(result.out)["pairs"]["stereo"];
     EXPECT_EQ(pair["verdict"], "good") << pair["findings"];
     EXPECT_GT(pair["inliers"], 80);
     EXPECT_LT(pair["row_error_px"]["after"]["mean"], 0.3);
@@ -84,16 +85,16 @@ class PictureFiles : public ::testing::Test {
   testing::TemporaryFolder folder_;
 };
 
-TEST_F(PictureFiles, MosaicsAndDeepSamples) {
-  write_eyes<std::uint8_t>([](int level) { return static_cast<std::uint8_t>(level); });
+TEST_F(ImageFiles, MosaicsAndDeepSamples) {
+  write_images<std::uint8_t>([](int level) { return static_cast<std::uint8_t>(level); });
   const double gray = density("");
   EXPECT_GT(gray, 70);
   EXPECT_NEAR(density(", pixel_layout: bayer_rggb"), gray, 10);
-  write_eyes<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 16); });
+  write_images<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 16); });
   EXPECT_NEAR(density(", bits: 12"), gray, 2);
   EXPECT_NEAR(density(", pixel_layout: bayer_rggb, bits: 12"), gray, 10);
   expect_a_map(", pixel_layout: bayer_rggb, bits: 12");
-  write_eyes<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 256); });
+  write_images<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 256); });
   EXPECT_NEAR(density(", bits: 12, bit_alignment: high"), gray, 2);
 }
 
@@ -103,25 +104,25 @@ int coloured(int level, int x, int y) {
   return blue ? level / 3 : red ? level : level * 4 / 5;
 }
 
-TEST_F(PictureFiles, CalibrationsAreJudgedByThem) {
-  write_eyes<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 16); });
+TEST_F(ImageFiles, CalibrationsAreCheckedWithThem) {
+  write_images<std::uint16_t>([](int level) { return static_cast<std::uint16_t>(level * 16); });
   expect_judged_good(", bits: 12");
-  write_eyes<std::uint8_t>([](int level, int x, int y) { return static_cast<std::uint8_t>(coloured(level, x, y)); });
+  write_images<std::uint8_t>([](int level, int x, int y) { return static_cast<std::uint8_t>(coloured(level, x, y)); });
   expect_judged_good(", pixel_layout: bayer_rggb");
-  write_eyes<std::uint16_t>(
+  write_images<std::uint16_t>(
       [](int level, int x, int y) { return static_cast<std::uint16_t>(16 * coloured(level, x, y)); });
   expect_judged_good(", pixel_layout: bayer_rggb, bits: 12");
-  write_eyes<Rgb8>([](int level) {
+  write_images<Rgb8>([](int level) {
     return Rgb8{static_cast<std::uint8_t>(level), static_cast<std::uint8_t>(level * 4 / 5),
                 static_cast<std::uint8_t>(level / 3)};
   });
   expect_judged_good(", pixel_layout: rgb");
 }
 
-TEST_F(PictureFiles, ColoursOfAGrayRigAreReduced) {
-  write_eyes<std::uint8_t>([](int level) { return static_cast<std::uint8_t>(level); });
+TEST_F(ImageFiles, ColoursOfAGrayRigAreReduced) {
+  write_images<std::uint8_t>([](int level) { return static_cast<std::uint8_t>(level); });
   const double gray = density("");
-  write_eyes<Rgb8>([](int level) {
+  write_images<Rgb8>([](int level) {
     const auto l = static_cast<std::uint8_t>(level);
     return Rgb8{l, l, l};
   });
