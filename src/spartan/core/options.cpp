@@ -11,7 +11,7 @@
 
 namespace spartan::options_detail {
 
-// The maps that the visitor is inside of, innermost last, with the keys that were asked for in each.
+// A YAML document and the state of its traversal: the open groups, innermost last, with the keys requested in each.
 class Tree {
  public:
   struct Level {
@@ -20,26 +20,26 @@ class Tree {
     std::set<std::string> known;
   };
   std::string name;
-  bool has_lines = true;  // false: text of a command line
+  bool has_lines = true;  // false: from a command line
   std::vector<Level> levels;
-  std::vector<YAML::Node> lists;  // open ones, innermost last
-  std::vector<std::string> faults;
+  std::vector<YAML::Node> lists;  // the open lists, innermost last
+  std::vector<std::string> errors;
   std::vector<std::string> warnings;
 
-  std::string place(const YAML::Node& node, std::string_view key) const {
+  std::string location(const YAML::Node& node, std::string_view key) const {
     const YAML::Mark mark = node.Mark();
     const std::string line = mark.is_null() || !has_lines ? "" : fmt::format(":{}", mark.line + 1);
     return fmt::format("{}{}: {}{}", name, line, levels.back().prefix, key);
   }
-  void fault(const YAML::Node& node, std::string_view key, const std::string& what) {
-    faults.push_back(fmt::format("{}: {}", place(node, key), what));
+  void add_error(const YAML::Node& node, std::string_view key, const std::string& what) {
+    errors.push_back(fmt::format("{}: {}", location(node, key), what));
   }
 
-  // The scalar or sequence under `key`, where it is given.
+  // The node of `key`, if the document has it.
   std::optional<YAML::Node> find(std::string_view key) {
     Level& level = levels.back();
     level.known.insert(std::string(key));
-    const YAML::Node map = level.map;  // const: looking must not insert
+    const YAML::Node map = level.map;  // const: operator[] of a non-const node inserts the key
     if (!map.IsMap()) return std::nullopt;
     const YAML::Node node = map[std::string(key)];
     if (!node.IsDefined()) return std::nullopt;
@@ -52,11 +52,11 @@ class Tree {
     std::set<std::string> seen;
     for (const auto& entry : level.map) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "(not a name)";
-      if (!seen.insert(key).second) fault(entry.first, key, "is given twice");
+      if (!seen.insert(key).second) add_error(entry.first, key, "is given twice");
       if (level.known.contains(key)) continue;
       std::string known;
       for (const std::string& k : level.known) known += (known.empty() ? "" : ", ") + k;
-      fault(entry.first, key, "unknown key; known here: " + known);
+      add_error(entry.first, key, "unknown key; known keys: " + known);
     }
   }
 };
@@ -103,7 +103,7 @@ void Reader::field(std::string_view key, bool& value, std::string_view) {
   if (const auto read = convert<bool>(*node)) {
     value = *read;
   } else {
-    tree_->fault(*node, key, "must be true or false");
+    tree_->add_error(*node, key, "must be true or false");
   }
 }
 
@@ -111,9 +111,9 @@ void Reader::field(std::string_view key, int& value, std::string_view, Bounds bo
   const auto node = tree_->find(key);
   if (!node) return;
   const auto read = convert<int>(*node);
-  if (!read) return tree_->fault(*node, key, "must be a whole number");
+  if (!read) return tree_->add_error(*node, key, "must be a whole number");
   if (!inside(*read, bounds))
-    return tree_->fault(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
+    return tree_->add_error(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
   value = *read;
 }
 
@@ -121,10 +121,10 @@ void Reader::field(std::string_view key, double& value, std::string_view, Bounds
   const auto node = tree_->find(key);
   if (!node) return;
   const auto read = convert<double>(*node);
-  if (!read) return tree_->fault(*node, key, "must be a number");
-  if (!std::isfinite(*read)) return tree_->fault(*node, key, "must be a finite number");
+  if (!read) return tree_->add_error(*node, key, "must be a number");
+  if (!std::isfinite(*read)) return tree_->add_error(*node, key, "must be a finite number");
   if (!inside(*read, bounds))
-    return tree_->fault(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
+    return tree_->add_error(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
   value = *read;
 }
 
@@ -133,9 +133,9 @@ void Reader::field(std::string_view key, std::string& value, std::string_view,
   const auto node = tree_->find(key);
   if (!node) return;
   const auto read = convert<std::string>(*node);
-  if (!read || node->IsNull()) return tree_->fault(*node, key, "must be text");
+  if (!read || node->IsNull()) return tree_->add_error(*node, key, "must be text");
   if (!choices.empty() && std::find(choices.begin(), choices.end(), *read) == choices.end()) {
-    return tree_->fault(*node, key, fmt::format("is '{}', must be one of: {}", *read, fmt::join(choices, ", ")));
+    return tree_->add_error(*node, key, fmt::format("is '{}', must be one of: {}", *read, fmt::join(choices, ", ")));
   }
   value = *read;
 }
@@ -144,10 +144,10 @@ void Reader::field(std::string_view key, std::vector<double>& value, std::string
   const auto node = tree_->find(key);
   if (!node) return;
   const auto read = convert<std::vector<double>>(*node);
-  if (!read) return tree_->fault(*node, key, "must be a list of numbers");
+  if (!read) return tree_->add_error(*node, key, "must be a list of numbers");
   for (const double v : *read) {
     if (!inside(v, bounds))
-      return tree_->fault(*node, key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
+      return tree_->add_error(*node, key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
   }
   value = *read;
 }
@@ -158,10 +158,10 @@ void Reader::renamed(std::string_view old_key, std::string_view key) {
   level.known.erase(std::string(old_key));
   if (!former) return;
   if (tree_->find(key)) {
-    return tree_->fault(*former, old_key, fmt::format("is the former name of {}, which is given too", key));
+    return tree_->add_error(*former, old_key, fmt::format("is the former name of {}, which is given too", key));
   }
   tree_->warnings.push_back(fmt::format("{} is now called {}; the former name is accepted for this version only",
-                                        tree_->place(*former, old_key), key));
+                                        tree_->location(*former, old_key), key));
   level.map[std::string(key)] = *former;
   level.map.remove(std::string(old_key));
 }
@@ -169,10 +169,10 @@ void Reader::renamed(std::string_view old_key, std::string_view key) {
 bool Reader::enter(std::string_view key) {
   const auto node = tree_->find(key);
   if (node && !node->IsMap() && !node->IsNull()) {
-    tree_->fault(*node, key, "must be a group of keys");
+    tree_->add_error(*node, key, "must be a group of keys");
     return false;
   }
-  // A group that is not given is entered too, so that its keys keep their values.
+  // A group without a node is entered too: its fields keep their values.
   tree_->levels.push_back({node ? *node : YAML::Node(), tree_->levels.back().prefix + std::string(key) + ".", {}});
   return true;
 }
@@ -186,7 +186,7 @@ std::optional<std::size_t> Reader::open_list(std::string_view key) {
   const auto node = tree_->find(key);
   if (!node) return std::nullopt;
   if (!node->IsSequence()) {
-    tree_->fault(*node, key, "must be a list of groups of keys");
+    tree_->add_error(*node, key, "must be a list of groups of keys");
     return std::nullopt;
   }
   tree_->lists.push_back(*node);
@@ -198,7 +198,7 @@ bool Reader::enter_item(std::string_view key, std::size_t index) {
   const YAML::Node item = list[index];
   const std::string name = fmt::format("{}[{}]", key, index);
   if (!item.IsMap()) {
-    tree_->fault(item, name, "must be a group of keys");
+    tree_->add_error(item, name, "must be a group of keys");
     return false;
   }
   tree_->levels.push_back({item, tree_->levels.back().prefix + name + ".", {}});
@@ -211,9 +211,9 @@ void Reader::close_list() {
 
 Status Reader::finish() {
   tree_->report_unknown_and_repeated();
-  if (tree_->faults.empty()) return {};
+  if (tree_->errors.empty()) return {};
   std::string text;
-  for (const std::string& fault : tree_->faults) text += (text.empty() ? "" : "\n") + fault;
+  for (const std::string& error : tree_->errors) text += (text.empty() ? "" : "\n") + error;
   return failure(ErrorCode::configuration, text, {}, "`spartan config dump` lists every option with its meaning");
 }
 
@@ -221,29 +221,29 @@ std::vector<std::string> Reader::warnings() const {
   return tree_->warnings;
 }
 
-void Validator::fault(std::string_view key, std::string_view what) {
-  faults_ += fmt::format("{}{}{} {}", faults_.empty() ? "" : "\n", prefix_, key, what);
+void Validator::add_error(std::string_view key, std::string_view what) {
+  errors_ += fmt::format("{}{}{} {}", errors_.empty() ? "" : "\n", prefix_, key, what);
 }
 void Validator::field(std::string_view key, const int& value, std::string_view, Bounds bounds) {
-  if (!inside(value, bounds)) fault(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
+  if (!inside(value, bounds)) add_error(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
 }
 void Validator::field(std::string_view key, const double& value, std::string_view, Bounds bounds) {
-  if (!std::isfinite(value)) return fault(key, "must be a finite number");
-  if (!inside(value, bounds)) fault(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
+  if (!std::isfinite(value)) return add_error(key, "must be a finite number");
+  if (!inside(value, bounds)) add_error(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
 }
 void Validator::field(std::string_view key, const std::string& value, std::string_view,
                       const std::vector<std::string>& choices) {
   if (choices.empty() || std::find(choices.begin(), choices.end(), value) != choices.end()) return;
-  fault(key, fmt::format("is '{}', must be one of: {}", value, fmt::join(choices, ", ")));
+  add_error(key, fmt::format("is '{}', must be one of: {}", value, fmt::join(choices, ", ")));
 }
 void Validator::field(std::string_view key, const std::vector<double>& value, std::string_view, Bounds bounds) {
   for (const double v : value) {
-    if (!inside(v, bounds)) return fault(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
+    if (!inside(v, bounds)) return add_error(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
   }
 }
 Status Validator::finish(std::string_view name) const {
-  if (faults_.empty()) return {};
-  return failure(ErrorCode::configuration, faults_, std::string(name),
+  if (errors_.empty()) return {};
+  return failure(ErrorCode::configuration, errors_, std::string(name),
                  "`spartan config dump` lists every option with its meaning");
 }
 
@@ -318,7 +318,7 @@ Result<std::shared_ptr<Tree>> from_assignment(const std::string& assignment) {
     }
     tree->levels.push_back({node, "", {}});
   } catch (const YAML::Exception& e) {
-    return failure(ErrorCode::usage, "not a valid value: " + e.msg, name);
+    return failure(ErrorCode::usage, "invalid value: " + e.msg, name);
   }
   return tree;
 }

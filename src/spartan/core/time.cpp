@@ -40,13 +40,13 @@ Result<Stamp> parse_decimal_seconds(std::string_view text) {
   std::string_view digits = text;
   const bool negative = !digits.empty() && digits.front() == '-';
   if (!digits.empty() && (digits.front() == '-' || digits.front() == '+')) digits.remove_prefix(1);
-  // Counted in the sign of the result, as the negative range is one larger.
+  // Accumulated with the sign of the result, because the negative range is larger by one.
   std::int64_t ns = 0;
   const auto append_digit = [&](int digit) {
     return !__builtin_mul_overflow(ns, std::int64_t{10}, &ns) &&
            !__builtin_add_overflow(ns, static_cast<std::int64_t>(negative ? -digit : digit), &ns);
   };
-  int decimals = -1;  // −1: before the point
+  int decimals = -1;  // −1: before the decimal point
   bool any = false;
   for (const char c : digits) {
     if (c == '.' && decimals < 0) {
