@@ -28,7 +28,7 @@ std::vector<std::string> words_of(const YAML::Node& node) {
   return words;
 }
 
-// A matrix, a list, a text; of other groups nothing is known.
+// A matrix, a list or a scalar; other mappings become an empty entry.
 Entry entry_of(const YAML::Node& node, int line) {
   Entry entry;
   entry.line = line;
@@ -47,17 +47,17 @@ Entry entry_of(const YAML::Node& node, int line) {
 }
 
 Result<std::map<std::string, Entry>> parse_yaml(std::string text, const std::string& name) {
-  // OpenCV's "%YAML:1.0" is no directive of YAML; as a comment it keeps its line.
+  // OpenCV's "%YAML:1.0" is not a valid YAML directive; as a comment it keeps the line numbers.
   if (text.starts_with("%YAML")) text.front() = '#';
   const auto loaded = load_yaml(text, name);
   if (!loaded) return failure(loaded);
-  if (!loaded->IsMap()) return failure(ErrorCode::configuration, "is no OpenCV file: there are no keys", name);
+  if (!loaded->IsMap()) return failure(ErrorCode::configuration, "is not an OpenCV file: it has no keys", name);
   std::map<std::string, Entry> entries;
   for (const auto& entry : *loaded) {
     if (!entry.first.IsScalar()) continue;
     const int line = entry.first.Mark().line + 1;
     if (!entries.try_emplace(entry.first.Scalar(), entry_of(entry.second, line)).second) {
-      return failure(ErrorCode::configuration, entry.first.Scalar() + ": given a second time",
+      return failure(ErrorCode::configuration, entry.first.Scalar() + ": is given twice",
                      fmt::format("{}:{}", name, line));
     }
   }
@@ -79,7 +79,7 @@ Result<OpencvStorage> OpencvStorage::read(const std::string& path) {
   return storage;
 }
 
-tl::unexpected<Error> OpencvStorage::fault(const std::string& key, const std::string& what) const {
+tl::unexpected<Error> OpencvStorage::error_at(const std::string& key, const std::string& what) const {
   const auto found = entries_.find(key);
   const std::string where = found == entries_.end() ? name_ : fmt::format("{}:{}", name_, found->second.line);
   return failure(ErrorCode::configuration, fmt::format("{}: {}", key, what), where);
@@ -87,20 +87,20 @@ tl::unexpected<Error> OpencvStorage::fault(const std::string& key, const std::st
 
 Result<std::vector<double>> OpencvStorage::matrix(const std::string& key, const std::vector<int>& counts) const {
   const auto found = entries_.find(key);
-  if (found == entries_.end()) return fault(key, "is missing");
+  if (found == entries_.end()) return error_at(key, "is missing");
   const Entry& entry = found->second;
   const auto rows = whole(entry.rows), columns = whole(entry.columns);
-  if (!rows || !columns || *rows < 1 || *columns < 1) return fault(key, "is not a matrix");
+  if (!rows || !columns || *rows < 1 || *columns < 1) return error_at(key, "is not a matrix");
   const auto total = std::ssize(entry.words);
-  if (std::int64_t{*rows} * *columns != total) return fault(key, "has other numbers than its rows and columns say");
+  if (std::int64_t{*rows} * *columns != total) return error_at(key, "does not have rows × cols numbers");
   if (std::find(counts.begin(), counts.end(), total) == counts.end()) {
-    return fault(key, fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
+    return error_at(key, fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
   }
   std::vector<double> values;
   values.reserve(entry.words.size());
   for (const std::string& word : entry.words) {
     const auto value = parse_number(word);
-    if (!value) return fault(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
+    if (!value) return error_at(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
     values.push_back(*value);
   }
   return values;

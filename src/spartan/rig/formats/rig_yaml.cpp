@@ -1,4 +1,4 @@
-// The native rig.yaml; the format is described in docs/formats.md, "rig.yaml".
+// Reader and writer of the native rig.yaml (docs/formats.md, "rig.yaml").
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -17,7 +17,7 @@ using rig_detail::YamlFaults;
 using rig_detail::YamlMap;
 
 constexpr int kSchema = 1;
-constexpr std::size_t kMostEntries = 1000;  // no rig has more cameras
+constexpr std::size_t kMaxEntries = 1000;  // cameras, pairs or pan-tilt units of a rig
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr PixelLayout kLayouts[] = {PixelLayout::gray,       PixelLayout::rgb,        PixelLayout::bayer_rggb,
                                     PixelLayout::bayer_grbg, PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr};
@@ -33,11 +33,11 @@ std::optional<Eigen::Quaterniond> read_quaternion(YamlMap& map) {
     map.fault("quaternion_xyzw", fmt::format("has length {:.6g}, must have length 1", length));
     return std::nullopt;
   }
-  // What a program wrote stays as it is, bit for bit; what a person rounded is brought to unit length.
+  // A quaternion written by a program is restored bit for bit; one rounded by hand is normalized.
   return std::abs(length - 1) < 1e-12 ? quaternion : quaternion.normalized();
 }
 
-// R = Rz(yaw) Ry(pitch) Rx(roll); with y to the left a positive pitch looks down.
+// R = Rz(yaw) Ry(pitch) Rx(roll); with y to the left, a positive pitch looks down.
 std::optional<Eigen::Quaterniond> read_roll_pitch_yaw(YamlMap& map) {
   const auto degrees = map.numbers("roll_pitch_yaw_deg", {3});
   if (!degrees) return std::nullopt;
@@ -48,16 +48,16 @@ std::optional<Eigen::Quaterniond> read_roll_pitch_yaw(YamlMap& map) {
                             turn(0, Eigen::Vector3d::UnitX()));
 }
 
-// translation_m with one of quaternion_xyzw and roll_pitch_yaw_deg, or neither for no rotation.
+// translation_m with either quaternion_xyzw or roll_pitch_yaw_deg; no rotation if both are missing.
 Pose read_pose(YamlMap& map) {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   if (map.has("quaternion_xyzw") && map.has("roll_pitch_yaw_deg")) {
-    map.fault("roll_pitch_yaw_deg", "the rotation is given twice; keep this or quaternion_xyzw");
+    map.fault("roll_pitch_yaw_deg", "the rotation is given twice; remove this or quaternion_xyzw");
   }
   if (map.has("quaternion_xyzw")) rotation = read_quaternion(map).value_or(rotation);
   if (map.has("roll_pitch_yaw_deg")) rotation = read_roll_pitch_yaw(map).value_or(rotation);
   const auto t = map.numbers("translation_m", {3});
-  (void)map.optional_node("quaternion_xyzw");  // names both for the list of known keys
+  (void)map.optional_node("quaternion_xyzw");  // adds both to the known keys
   (void)map.optional_node("roll_pitch_yaw_deg");
   return Pose::from_unit_quaternion(rotation, t ? Eigen::Vector3d((*t)[0], (*t)[1], (*t)[2]) : Eigen::Vector3d::Zero());
 }
@@ -67,7 +67,7 @@ PanTiltUnit read_pan_tilt_unit(const std::string& name, YamlMap map) {
   double scale = 1;
   std::optional<std::vector<double>> angles;
   if (map.has("rest_angles_rad") && map.has("rest_angles_deg")) {
-    map.fault("rest_angles_deg", "the angles are given twice; keep this or rest_angles_rad");
+    map.fault("rest_angles_deg", "the angles are given twice; remove this or rest_angles_rad");
   }
   if (map.has("rest_angles_rad")) angles = map.numbers("rest_angles_rad", {2});
   if (map.has("rest_angles_deg")) {
@@ -88,7 +88,7 @@ CameraModel read_model(YamlMap& map) {
   const std::vector<std::string_view> known = camera_model_names();
   const auto name = map.choice("model", {known.begin(), known.end()});
   if (!name) {
-    // Without its model nobody knows which keys belong to the camera; those of any model pass.
+    // If the model is unknown, the keys of all models are accepted to avoid follow-up errors.
     for (const std::string_view other : known) {
       for (const auto& kind : parameter_kinds(*camera_model_named(other))) (void)map.optional_node(kind.key);
     }
@@ -144,7 +144,7 @@ Camera read_camera(const std::string& name, YamlMap map) {
   if (map.has("self_mask")) camera.self_mask = map.text("self_mask").value_or("");
   if (map.has("mount")) camera.mount = map.text("mount").value_or(camera.mount);
   for (const char* key : {"vignetting", "vignetting_centre_px", "self_mask", "mount"}) (void)map.optional_node(key);
-  // Which way an unturned camera looks is said, never guessed.
+  // The orientation of a camera without rotation is explicit in the file, not a default.
   const auto axes = map.choice("axes", {"optical", "forward"});
   camera.mount_from_camera = read_pose(map);
   if (axes == "forward") camera.mount_from_camera = camera.mount_from_camera * optical_from_forward().inverse();
@@ -164,15 +164,15 @@ StereoPair read_pair(const std::string& name, YamlMap map) {
   return pair;
 }
 
-// The entries of one group, each read by `read(name, map)`.
+// Reads the entries of a group, each by `read(name, map)`.
 template <class T, class Read>
 std::vector<T> read_group(YamlMap& root, const char* key, bool required, Read read) {
   std::vector<T> items;
   const auto node = required ? root.node(key) : root.optional_node(key);
   if (!node) return items;
   YamlMap group(*node, key, root.faults());
-  if (group.entries().size() > kMostEntries) {
-    root.fault(key, fmt::format("has {} entries, more than {}", group.entries().size(), kMostEntries));
+  if (group.entries().size() > kMaxEntries) {
+    root.fault(key, fmt::format("has {} entries, more than {}", group.entries().size(), kMaxEntries));
     return items;
   }
   for (const auto& [name, entry] : group.entries()) {
@@ -199,8 +199,8 @@ Rig read_root(YamlMap root, const std::string& default_name) {
   return rig;
 }
 
-// What the numbers mean together. A fault that follows from one already told is left out.
-void add_faults_of_meaning(const Rig& rig, YamlFaults& faults) {
+// Adds the faults found by Rig::find_faults(), except those that follow from an error reported before.
+void add_rig_faults(const Rig& rig, YamlFaults& faults) {
   std::vector<RigFault> found;
   for (const RigFault& fault : rig.find_faults()) {
     const bool about_a_pair = fault.key.starts_with("pairs");
@@ -261,7 +261,7 @@ Result<Rig> parse_rig_yaml(const std::string& text, const std::string& name) {
   if (!loaded) return failure(loaded);
   YamlFaults faults(name);
   Rig rig = read_root(YamlMap(*loaded, "", faults), std::filesystem::path(name).stem().string());
-  add_faults_of_meaning(rig, faults);
+  add_rig_faults(rig, faults);
   if (const Status status = faults.status(); !status) return failure(status);
   return rig;
 }

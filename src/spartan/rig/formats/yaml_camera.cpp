@@ -39,13 +39,13 @@ CameraModel read_pinhole(YamlMap& map, const std::string& distortion, std::strin
   return RadialTangentialModel(pinhole, coefficients);
 }
 
-// omni, ds and eucm: parameters of their own, then those of a pinhole; a further distortion is not ours.
+// omni, ds and eucm: their own parameters followed by those of a pinhole; an additional distortion is not supported.
 CameraModel read_sphere(YamlMap& map, const std::string& kind, const std::string& distortion,
                         std::string_view distortion_key) {
   if (distortion != "none" && map.has(distortion_key)) {
     const auto d = map.numbers(distortion_key, {0, 4, 5, 8});
     if (d && !is_zero(*d)) {
-      map.fault(distortion_key, fmt::format("{} with a distortion besides is not supported", kind));
+      map.fault(distortion_key, fmt::format("{} with an additional distortion is not supported", kind));
     }
   }
   const auto k = map.numbers("intrinsics", {kind == "omni" ? 5 : 6});
@@ -57,7 +57,8 @@ CameraModel read_sphere(YamlMap& map, const std::string& kind, const std::string
   const double alpha = kind == "ds" ? (*k)[1] : (*k)[0];
   if (!(alpha >= 0 && alpha <= 1)) map.fault("intrinsics", fmt::format("alpha is {}, must be between 0 and 1", alpha));
   if (kind == "ds") return DoubleSphereModel{pinhole, (*k)[0], alpha};
-  if ((*k)[1] != 1) map.fault("intrinsics", fmt::format("eucm with beta = {} is not supported, only with 1", (*k)[1]));
+  if ((*k)[1] != 1)
+    map.fault("intrinsics", fmt::format("eucm with beta = {} is not supported, only beta = 1", (*k)[1]));
   return DoubleSphereModel{pinhole, 0, alpha};
 }
 
@@ -66,7 +67,7 @@ CameraModel read_sphere(YamlMap& map, const std::string& kind, const std::string
 Result<YAML::Node> load_yaml_file(const std::string& path) {
   auto text = read_calibration_text(path);
   if (!text) return failure(text);
-  // As a comment it keeps its line.
+  // As a comment it keeps the line numbers.
   if (text->starts_with("%YAML")) text->front() = '#';
   return load_yaml(*text, path);
 }
@@ -109,11 +110,11 @@ Result<std::string> kalibr_model_lines(const Camera& camera, std::string_view di
   if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
     if (std::any_of(k.begin() + 4, k.end(), [](double v) { return v != 0; })) {
-      return cannot_hold(camera, "this format has four coefficients of radial_tangential, this camera needs more");
+      return cannot_hold(camera, "this format supports four coefficients of radial_tangential, this camera has more");
     }
     return lines("pinhole", "", m->pinhole(), "radtan", {k.begin(), k.begin() + 4});
   }
-  return cannot_hold(camera, fmt::format("this format has no model like {}", name_of(camera.model)));
+  return cannot_hold(camera, fmt::format("this format does not support the model {}", name_of(camera.model)));
 }
 
 std::optional<Pose> read_rigid(YamlMap& map, std::string_view key, const std::vector<double>& rows) {
