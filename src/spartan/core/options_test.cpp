@@ -115,8 +115,8 @@ TEST(Options, AllErrorsAreReportedAtOnce) {
   EXPECT_THAT(error, HasSubstr("run.yaml:3: matcher.enabled: must be true or false"));
   EXPECT_THAT(error, HasSubstr("run.yaml:4: matcher.method: is 'magic', must be one of: sgm, block"));
   EXPECT_THAT(error, HasSubstr("run.yaml:5: matcher.lengths_m: holds -2, must be at least 0"));
-  EXPECT_THAT(error, HasSubstr("run.yaml:6: matcher.gain: must be a finite number"));
-  EXPECT_THAT(error, HasSubstr("run.yaml:7: matcher.speckle: must be a group of keys"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:6: matcher.gain: is .nan, must be a finite number"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:7: matcher.speckle: must be a group of `key: value` lines"));
   EXPECT_THAT(error, HasSubstr("run.yaml:8: matcher.extra: unknown key"));
   EXPECT_THAT(error, HasSubstr("run.yaml:9: depth: unknown key"));
 }
@@ -126,7 +126,7 @@ TEST(Options, WrongTypesAreRejected) {
   EXPECT_THAT(error_of("threads: 99999999999"), HasSubstr("whole number"));
   EXPECT_THAT(error_of("threads:"), HasSubstr("whole number"));
   EXPECT_THAT(error_of("threads: [1]"), HasSubstr("whole number"));
-  EXPECT_THAT(error_of("matcher: {gain: wide}"), HasSubstr("must be a number"));
+  EXPECT_THAT(error_of("matcher: {gain: wide}"), HasSubstr("run.yaml:1: matcher.gain: 'wide' is not a number"));
   EXPECT_THAT(error_of("matcher: {note: }"), HasSubstr("must be text"));
   EXPECT_THAT(error_of("matcher: {lengths_m: 3}"), HasSubstr("list of numbers"));
   EXPECT_THAT(error_of("matcher: {speckle: {difference_px: 1e99}}"), HasSubstr("between 0 and 10"));
@@ -137,7 +137,7 @@ TEST(Options, InvalidYamlIsRejected) {
   EXPECT_THAT(error_of("threads: 1\nmatcher: {"), HasSubstr("run.yaml:"));
   EXPECT_THAT(error_of("- 1\n- 2\n"), HasSubstr("run.yaml:1"));
   EXPECT_THAT(error_of("just text"), HasSubstr("run.yaml:1"));
-  EXPECT_THAT(error_of("threads: 1\nthreads: 2\n"), HasSubstr("given twice"));
+  EXPECT_THAT(error_of("threads: 1\nthreads: 2\n"), HasSubstr("run.yaml:1: threads: is given twice, again in line 2"));
 }
 
 TEST(Options, LoadsFiles) {
@@ -221,8 +221,8 @@ TEST(OptionLists, ErrorsNameTheItemAndItsLine) {
   const std::string message = bad.error().message();
   EXPECT_THAT(message, HasSubstr("m.yaml:2: masks[0].rows: is 12, must be between 1 and 9"));
   EXPECT_THAT(message, HasSubstr("m.yaml:3: masks[1].nam: unknown key"));
-  EXPECT_THAT(message, HasSubstr("m.yaml:4: masks[2]"));
-  EXPECT_THAT(message, HasSubstr("m.yaml:5: masks[3].rows: must be a whole number"));
+  EXPECT_THAT(message, HasSubstr("m.yaml:4: masks[2]: must be a group"));
+  EXPECT_THAT(message, HasSubstr("m.yaml:5: masks[3].rows: 'two' is not a whole number"));
   for (const char* text : {"masks: 3", "masks: {name: sky}", "masks: sky"})
     EXPECT_THAT(parse_options<MaskedOptions>(text, "m.yaml").error().message(), HasSubstr("m.yaml:1: masks: must be"));
 }
