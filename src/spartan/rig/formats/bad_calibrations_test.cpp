@@ -275,7 +275,7 @@ TEST(BadCalibrations, ManyErrorsAreSummarized) {
   const auto read = parse_rig_yaml(text, "rig.yaml");
   ASSERT_FALSE(read);
   EXPECT_LE(read.error().message().size(), 10000u);
-  EXPECT_THAT(read.error().message(), HasSubstr("faults more"));
+  EXPECT_THAT(read.error().message(), HasSubstr("more errors"));
   for (int i = 900; i < 10000; ++i) text += fmt::format("  c{}: {{}}\n", i);
   EXPECT_THAT(parse_rig_yaml(text, "rig.yaml").error().message(),
               HasSubstr("rig.yaml:2: cameras: has 10000 entries, more than 1000"));
@@ -291,7 +291,7 @@ TEST(BadCalibrations, VeryLongListsAreNotParsed) {
         "schema:\n" + repeated("- a\n", 3U << 20U)}) {
     const auto read = read_calibration(folder.write("x.yaml", text), kSize);
     ASSERT_FALSE(read);
-    EXPECT_THAT(read.error().message(), HasSubstr("x.yaml: holds more than 100000 values: no calibration"));
+    EXPECT_THAT(read.error().message(), HasSubstr("x.yaml: holds more than 100000 values"));
   }
 }
 
@@ -309,7 +309,7 @@ TEST(BadCalibrations, ImplausibleNumbersAreRejected) {
   EXPECT_THAT(message("centre_px: [320", "centre_px: [-1e9"),
               HasSubstr("cameras.left.centre_px: holds -1000000000, must be between -10000000 and 10000000"));
   EXPECT_THAT(message("translation_m: [0", "translation_m: [1e300"),
-              HasSubstr(": the place is farther than 1000000000 m from the mount"));
+              HasSubstr(" is farther than 1000000000 m from the mount"));
   EXPECT_EQ(message("focal_px: [500", "focal_px: [1e6"), "accepted");
 }
 

@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
 #include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/formats/text_matrices.h"
 #include "spartan/rig/models/model_equivalents.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan {
 namespace {
@@ -83,7 +83,7 @@ Result<Kind> read_kind(const TextMatrices& file) {
   }
   if (model.starts_with("CAHVORE") && model.size() > 7) {
     std::optional<double> linearity;
-    if (model.size() > 8 && model[8] == ',') linearity = rig_detail::parse_number(std::string_view(model).substr(9));
+    if (model.size() > 8 && model[8] == ',') linearity = parse_finite_number(std::string_view(model).substr(9));
     return linearity_of(file, model[7] - '0', linearity, "Model");
   }
   if (!model.empty() && model != "CAHV" && model != "CAHVOR" && model != "CAHVORE") {

@@ -11,8 +11,6 @@
 namespace spartan {
 namespace {
 
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
 namespace fs = std::filesystem;
 
 constexpr int kMaxCameras = 100;
@@ -25,22 +23,22 @@ fs::path sensor_file(const std::string& folder, const std::string& camera) {
 std::optional<Pose> read_body_from_sensor(YamlMap& root) {
   const auto node = root.node("T_BS");
   if (!node) return std::nullopt;
-  const auto numbers = node->IsMap() ? YamlMap(*node, root.path("T_BS"), root.faults()).numbers("data", {16})
-                                     : root.numbers("T_BS", {16});
+  const auto numbers = node->is_map() ? YamlMap(*node, root.path("T_BS"), root.errors()).numbers("data", {16})
+                                      : root.numbers("T_BS", {16});
   return numbers ? rig_detail::read_rigid(root, "T_BS", *numbers) : std::nullopt;
 }
 
 Result<Camera> read_sensor(const std::string& path, const std::string& name) {
   const auto loaded = rig_detail::load_yaml_file(path);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(path);
-  YamlMap root(*loaded, "", faults);
+  YamlErrors errors(path);
+  YamlMap root(*loaded, "", errors);
   Camera camera;
   camera.name = name;
   camera.size = rig_detail::read_resolution(root, "resolution");
   camera.model = rig_detail::read_kalibr_model(root, "distortion_coefficients");
   camera.mount_from_camera = read_body_from_sensor(root).value_or(Pose());
-  if (const Status status = faults.status(); !status) return failure(status);
+  if (const Status status = errors.status(); !status) return failure(status);
   return camera;
 }
 

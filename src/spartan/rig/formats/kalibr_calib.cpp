@@ -11,9 +11,6 @@
 namespace spartan {
 namespace {
 
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
-
 // Tolerance in m and rad between the transforms of the chain and those of the IMU, which are results of one
 // calibration.
 constexpr double kConsistency = 1e-3;
@@ -28,17 +25,17 @@ std::optional<Pose> read_transform(YamlMap& camera, std::string_view key) {
   const auto node = camera.node(key);
   if (!node) return std::nullopt;
   std::vector<double> rows;
-  if (node->IsSequence() && node->size() == 4) {
-    for (const YAML::Node& row : *node) {
-      if (!row.IsSequence() || row.size() != 4) break;
-      for (const YAML::Node& entry : row) {
-        const auto value = entry.IsScalar() ? rig_detail::parse_number(entry.Scalar()) : std::nullopt;
+  if (node->is_list() && node->items().size() == 4) {
+    for (const YamlNode& row : node->items()) {
+      if (!row.is_list() || row.items().size() != 4) break;
+      for (const YamlNode& entry : row.items()) {
+        const auto value = entry.is_scalar() ? parse_finite_number(entry.scalar()) : std::nullopt;
         if (value) rows.push_back(*value);
       }
     }
   }
   if (rows.size() == 16) return rig_detail::read_rigid(camera, key, rows);
-  camera.fault(key, "must be four rows of four finite numbers");
+  camera.add_error(key, "must be four rows of four finite numbers");
   return std::nullopt;
 }
 
@@ -67,7 +64,8 @@ std::optional<ImuOfCamera> read_imu(YamlMap& entry) {
     const auto pose = read_transform(entry, key);
     if (!pose) return std::nullopt;
     const Pose camera_from_imu = key == std::string("T_cam_imu") ? *pose : pose->inverse();
-    if (imu && !consistent(imu->camera_from_imu, camera_from_imu)) entry.fault(key, "is inconsistent with T_imu_cam");
+    if (imu && !consistent(imu->camera_from_imu, camera_from_imu))
+      entry.add_error(key, "is inconsistent with T_imu_cam");
     imu = {key, camera_from_imu};
   }
   return imu;
@@ -91,7 +89,7 @@ void read_link(YamlMap& entry, Chain& chain, Camera& camera) {
     chain.first_from_imu = first_from_imu;
     chain.imu_key = imu->key;
   } else if (!consistent(first_from_imu, *chain.first_from_imu)) {
-    entry.fault(imu->key, "is inconsistent with T_cn_cnm1");
+    entry.add_error(imu->key, "is inconsistent with T_cn_cnm1");
   }
 }
 
@@ -101,7 +99,7 @@ Chain read_chain(YamlMap& root) {
   for (std::size_t i = 0; i < kMaxCameras && (i < 2 || root.has(camera_key(i))); ++i) {
     const auto node = root.node(camera_key(i));
     if (!node) continue;
-    YamlMap entry(*node, root.path(camera_key(i)), root.faults());
+    YamlMap entry(*node, root.path(camera_key(i)), root.errors());
     Camera camera;
     camera.name = camera_key(i);
     camera.size = rig_detail::read_resolution(entry, "resolution");
@@ -133,10 +131,10 @@ std::string transform_lines(const char* key, const Pose& pose) {
 Result<ReadRig> read_kalibr_calib(const std::string& path) {
   const auto loaded = rig_detail::load_yaml_file(path);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(path);
-  YamlMap root(*loaded, "", faults);
+  YamlErrors errors(path);
+  YamlMap root(*loaded, "", errors);
   Chain chain = read_chain(root);
-  if (const Status status = faults.status(); !status) return failure(status);
+  if (const Status status = errors.status(); !status) return failure(status);
 
   const bool has_imu = chain.first_from_imu.has_value();
   const Pose body_from_first = has_imu ? chain.first_from_imu->inverse() : optical_from_forward().inverse();

@@ -8,13 +8,13 @@
 #include <cmath>
 #include <utility>
 
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
 #include "spartan/rig/formats/python_dict.h"
 #include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/models/model_equivalents.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan {
 namespace {
@@ -76,7 +76,7 @@ Result<CameraModel> read_model(const PythonDict& file) {
   }
   const Eigen::Vector3d axis = axis_from_angles(k[4], k[5]);
   if (model == "CAHVOR") return CahvorModel({pinhole, 0}, axis, {k[6], k[7], k[8]});
-  const auto linearity = rig_detail::parse_number(model.substr(kCahvore.size()));
+  const auto linearity = parse_finite_number(model.substr(kCahvore.size()));
   if (!linearity || std::abs(*linearity) > 1)
     return file.error_at(key, "the linearity must be a number between -1 and 1");
   return CahvoreModel({pinhole, 0}, axis, {k[6], k[7], k[8]}, {k[9], k[10], k[11]}, *linearity);

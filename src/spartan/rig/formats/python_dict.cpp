@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "spartan/rig/yaml_bridge.h"
+#include "spartan/core/strict_yaml.h"
 
 namespace spartan::rig_detail {
 namespace {
@@ -100,7 +100,7 @@ class Reader {
     const std::size_t end = std::min(text_.find_first_of(" \t\r\n,]})#", at_), text_.size());
     const std::string_view word = text_.substr(at_, end - at_);
     at_ = end;
-    if (const auto number = parse_number(word)) {
+    if (const auto number = parse_finite_number(word)) {
       value = *number;
       return true;
     }

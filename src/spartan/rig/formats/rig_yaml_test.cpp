@@ -141,7 +141,7 @@ TEST(RigYaml, ErrorsNameFileLineAndKey) {
   EXPECT_EQ(error_for("schema: 1", "schema: 2"), "my.yaml:1: schema: is 2; this version reads schema 1");
   EXPECT_THAT(error_for("    model: pinhole", "    model: fisheye"), HasSubstr("my.yaml:6: cameras.r.model: "));
   EXPECT_THAT(error_for("    model: pinhole", "    modell: pinhole"),
-              HasSubstr("my.yaml:6: cameras.r.modell: unknown key; known here: "));
+              HasSubstr("my.yaml:6: cameras.r.modell: unknown key; known keys: "));
   EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50]"),
               HasSubstr("my.yaml:7: cameras.r.focal_px: has 1 entries, must be a list of 2 numbers"));
   EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50, .nan]"),
@@ -160,7 +160,7 @@ TEST(RigYaml, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(error_for("right: r", "right: x"), HasSubstr("my.yaml:12: pairs.p.right: there is no camera 'x'"));
   EXPECT_THAT(error_for("pairs:\n  p: {left: l, right: r}\n", "pairs: {}\n"),
               HasSubstr("pairs: there is no stereo pair"));
-  EXPECT_THAT(error_for("  r:\n", "  l:\n"), HasSubstr("given a second time"));
+  EXPECT_THAT(error_for("  r:\n", "  l:\n"), HasSubstr("my.yaml:3: cameras.l: is given twice, again in line 4"));
   EXPECT_THAT(error_for("{left: l", "[left: l"), HasSubstr("not valid YAML"));
   EXPECT_FALSE(parse_rig_yaml("", "my.yaml"));
   EXPECT_FALSE(parse_rig_yaml("just words", "my.yaml"));

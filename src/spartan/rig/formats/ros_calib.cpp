@@ -16,9 +16,6 @@
 namespace spartan {
 namespace {
 
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
-
 // One file: the camera, its rotation into the rectified frame, its position there, and the rectified pinhole.
 struct CameraInfo {
   Camera camera;
@@ -28,7 +25,7 @@ struct CameraInfo {
 };
 
 // The key of an entry: that of a calibration file, or that of a message (upper case in ROS 1, lower case in ROS 2).
-std::string key_of(const YamlMap& root, const std::string& in_file, const std::string& in_message) {
+std::string key_of(YamlMap& root, const std::string& in_file, const std::string& in_message) {
   if (root.has(in_file)) return in_file;
   std::string small = in_message;
   std::transform(small.begin(), small.end(), small.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? c + 32 : c; });
@@ -42,7 +39,7 @@ std::string key_of(const YamlMap& root, const std::string& in_file, const std::s
 std::optional<std::vector<double>> numbers(YamlMap& root, const std::string& key, const std::vector<int>& counts) {
   const auto node = root.node(key);
   if (!node) return std::nullopt;
-  if (node->IsMap()) return YamlMap(*node, root.path(key), root.faults()).numbers("data", counts);
+  if (node->is_map()) return YamlMap(*node, root.path(key), root.errors()).numbers("data", counts);
   return root.numbers(key, counts);
 }
 
@@ -50,7 +47,7 @@ ImageSize read_size(YamlMap& root) {
   ImageSize size;
   const auto side = [&](const std::string& key) {
     const int pixels = root.integer(key).value_or(1);
-    if (pixels < 1) root.fault(key, fmt::format("is {}, must be above zero", pixels));
+    if (pixels < 1) root.add_error(key, fmt::format("is {}, must be above zero", pixels));
     return pixels;
   };
   size.width = side(key_of(root, "image_width", "width"));
@@ -66,7 +63,7 @@ CameraModel read_model(YamlMap& root) {
   }
   // In messages of cameras without distortion the name is empty.
   const auto named = root.optional_node("distortion_model");
-  const bool unnamed = named && named->IsScalar() && named->Scalar().empty();
+  const bool unnamed = named && named->is_scalar() && named->scalar().empty();
   const auto kind = unnamed ? std::optional<std::string>("none")
                             : root.choice("distortion_model", {"plumb_bob", "rational_polynomial", "equidistant",
                                                                "fisheye", "radtan", "none"});
@@ -74,7 +71,7 @@ CameraModel read_model(YamlMap& root) {
   if (*kind == "none") {
     const auto d = root.has(d_key) ? numbers(root, d_key, {0, 4, 5, 8, 12, 14}) : std::nullopt;
     if (d && std::any_of(d->begin(), d->end(), [](double v) { return v != 0; })) {
-      root.fault(d_key, "are not zero, but distortion_model has no coefficients");
+      root.add_error(d_key, "are not zero, but distortion_model has no coefficients");
     }
     return pinhole;
   }
@@ -91,17 +88,17 @@ CameraModel read_model(YamlMap& root) {
 // With a region of interest or binning, the calibration in the file does not apply to the images.
 void reject_roi_and_binning(YamlMap& root, ImageSize size) {
   for (const char* key : {"binning_x", "binning_y"}) {
-    if (root.has(key) && root.integer(key).value_or(0) > 1) root.fault(key, "binned images are not supported");
+    if (root.has(key) && root.integer(key).value_or(0) > 1) root.add_error(key, "binned images are not supported");
   }
   const auto node = root.optional_node("roi");
   if (!node) return;
-  YamlMap roi(*node, root.path("roi"), root.faults());
-  if (!node->IsMap()) return;
+  YamlMap roi(*node, root.path("roi"), root.errors());
+  if (!node->is_map()) return;
   const auto number = [&](const char* key) { return roi.has(key) ? roi.integer(key).value_or(0) : 0; };
   const int x = number("x_offset"), y = number("y_offset"), width = number("width"), height = number("height");
   // Zeros mean the whole image.
   const bool whole = x == 0 && y == 0 && (width == 0 || width == size.width) && (height == 0 || height == size.height);
-  if (!whole) root.fault("roi", "is a part of the image, which is not supported");
+  if (!whole) root.add_error("roi", "is a part of the image, which is not supported");
 }
 
 void read_rectification(YamlMap& root, CameraInfo& info) {
@@ -111,13 +108,14 @@ void read_rectification(YamlMap& root, CameraInfo& info) {
     if (is_rotation(matrix, 1e-4)) {
       info.rectified_from_camera = Eigen::Quaterniond(nearest_rotation(matrix));
     } else {
-      root.fault(r_key, "is not a rotation matrix");
+      root.add_error(r_key, "is not a rotation matrix");
     }
   }
   if (const auto p = numbers(root, p_key, {12})) {
-    if (!((*p)[0] > 0 && (*p)[5] > 0)) return root.fault(p_key, "the focal lengths must be above zero");
+    if (!((*p)[0] > 0 && (*p)[5] > 0)) return root.add_error(p_key, "the focal lengths must be above zero");
     if ((*p)[11] != 0)
-      return root.fault(p_key, "its last number must be 0: the cameras must be side by side or one above the other");
+      return root.add_error(p_key,
+                            "its last number must be 0: the cameras must be side by side or one above the other");
     info.position_m = {-(*p)[3] / (*p)[0], -(*p)[7] / (*p)[5], 0};
     info.rectified = {(*p)[0], (*p)[5], (*p)[2], (*p)[6]};
   }
@@ -126,15 +124,15 @@ void read_rectification(YamlMap& root, CameraInfo& info) {
 Result<CameraInfo> read_camera_info(const std::string& path, const std::string& name) {
   const auto loaded = rig_detail::load_yaml_file(path);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(path);
-  YamlMap root(*loaded, "", faults);
+  YamlErrors errors(path);
+  YamlMap root(*loaded, "", errors);
   CameraInfo info;
   info.camera.name = name;
   info.camera.size = read_size(root);
   info.camera.model = read_model(root);
   read_rectification(root, info);
   reject_roi_and_binning(root, info.camera.size);
-  if (const Status status = faults.status(); !status) return failure(status);
+  if (const Status status = errors.status(); !status) return failure(status);
   return info;
 }
 

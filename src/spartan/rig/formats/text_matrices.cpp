@@ -4,8 +4,8 @@
 
 #include <sstream>
 
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan::rig_detail {
 namespace {
@@ -60,7 +60,7 @@ Result<std::vector<double>> TextMatrices::numbers(const std::string& key, std::s
   std::vector<double> values;
   std::istringstream words(*content);
   for (std::string word; words >> word && !word.starts_with('#');) {
-    const auto value = parse_number(word);
+    const auto value = parse_finite_number(word);
     if (!value) return error_at(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
     values.push_back(*value);
   }

@@ -6,14 +6,14 @@
 #include <string_view>
 
 #include "spartan/core/pose.h"
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/models/camera_model.h"
 #include "spartan/rig/rig.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan::rig_detail {
 
 /// Loads a YAML file. A first line "%YAML:1.0" of OpenCV, which is not a valid YAML directive, is ignored.
-Result<YAML::Node> load_yaml_file(const std::string& path);
+Result<YamlNode> load_yaml_file(const std::string& path);
 
 /// Width and height from a list of two positive integers; empty if they are invalid, which is reported.
 ImageSize read_resolution(YamlMap& map, std::string_view key);
