@@ -1,4 +1,4 @@
-// Reading calibration files: the native rig.yaml and the formats of other projects. Writing: rig_writing.h.
+// Reading calibration files of any format. The native rig.yaml: rig_yaml.h; writing: rig_writing.h.
 #pragma once
 
 #include <string>
@@ -6,6 +6,7 @@
 
 #include "spartan/core/result.h"
 #include "spartan/rig/formats/calibration_format.h"
+#include "spartan/rig/formats/rig_yaml.h"  // IWYU pragma: export
 #include "spartan/rig/rig.h"
 #include "spartan/rig/rig_differences.h"
 
@@ -34,12 +35,6 @@ Result<ReadRig> read_calibration(const std::string& path, ImageSize size_hint = 
 Result<ReadRig> read_calibration_as(CalibrationFormat format, const std::string& path, ImageSize size_hint = {});
 /// read_calibration() without the additional information.
 Result<Rig> read_rig(const std::string& path, ImageSize size_hint = {});
-
-/// The native format (docs/formats.md, "rig.yaml"). The error lists all errors of the file, each with its line.
-Result<Rig> read_rig_yaml(const std::string& path);
-Result<Rig> parse_rig_yaml(const std::string& text, const std::string& name);
-/// The rig as rig.yaml; parse_rig_yaml() restores it bit for bit.
-std::string to_rig_yaml(const Rig& rig);
 
 /// KITTI odometry `calib.txt` (P0 and P1; baseline −P1[3]/P1[0]). The file does not contain the image size.
 Result<Rig> read_kitti_calib(const std::string& path, ImageSize size);

@@ -1,4 +1,5 @@
-// Reader and writer of the native rig.yaml (docs/formats.md, "rig.yaml").
+#include "spartan/rig/formats/rig_yaml.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,7 +9,6 @@
 
 #include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
-#include "spartan/rig/formats/rig_files.h"
 
 namespace spartan {
 namespace {

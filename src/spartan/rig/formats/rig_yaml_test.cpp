@@ -1,3 +1,5 @@
+#include "spartan/rig/formats/rig_yaml.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -5,7 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
