@@ -139,7 +139,7 @@ Result<Database> Database::open(const std::string& path, Mode mode) {
   const int code = sqlite3_open_v2(name.c_str(), &handle, flags, nullptr);
   Database db(handle, path);
   if (code != SQLITE_OK) return tl::unexpected<Error>(error_of(handle, path));
-  sqlite3_busy_timeout(handle, 5000);
+  sqlite3_busy_timeout(handle, 5000);  // ms; waits for short locks of other processes
   // NORMAL: with a write-ahead log, committed data survive when the process is killed.
   if (mode != Mode::read_only) {
     if (Status status = db.execute("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;"); !status) {

@@ -30,9 +30,10 @@ std::string to_decimal_seconds(Stamp stamp) {
 
 Result<Stamp> parse_decimal_seconds(std::string_view text) {
   if (text.find_first_of("eE") != std::string_view::npos) {
+    constexpr double kMaxSeconds = 9.2e9;  // range of int64 nanoseconds
     double seconds = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
-    if (error != std::errc{} || end != text.data() + text.size() || !(std::abs(seconds) < 9.2e9)) {
+    if (error != std::errc{} || end != text.data() + text.size() || !(std::abs(seconds) < kMaxSeconds)) {
       return not_a_time(text);
     }
     return Stamp::from_seconds(seconds);

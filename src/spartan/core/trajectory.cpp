@@ -57,7 +57,8 @@ Result<std::array<double, Count>> numbers(const Line& line, std::size_t from) {
 }
 
 Result<Pose> pose_from(const Line& line, const Eigen::Vector3d& t, const Eigen::Quaterniond& q) {
-  if (std::abs(q.norm() - 1.0) > 1e-2)
+  constexpr double kTolerance = 1e-2;  // for quaternions rounded to a few digits
+  if (std::abs(q.norm() - 1.0) > kTolerance)
     return failure(ErrorCode::input, "the quaternion does not have unit length", line.where);
   return Pose(q, t);
 }

@@ -64,6 +64,7 @@ Result<RectifiedPair> read_projections(const TextMatrices& file, const std::stri
       return error_at(key, "is not the projection of a rectified camera (fx 0 cx −fx·x; 0 fy cy 0; 0 0 1 0)");
     }
   }
+  // Tolerances for rounded files: 1e-6 of the focal length, 1e-3 px for the row, 1e-3 m for height and depth.
   const double f = (*left)(0, 0);
   const bool same_rows =
       std::abs((*right)(0, 0) - f) <= 1e-6 * f && std::abs((*right)(1, 1) - (*left)(1, 1)) <= 1e-6 * f &&

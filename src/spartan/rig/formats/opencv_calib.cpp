@@ -113,7 +113,8 @@ Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::strin
     return *rotation;
   }
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
-  if (!is_rotation(rotation, 1e-4)) return files.error_at({name}, "is not a rotation matrix");
+  constexpr double kTolerance = 1e-4;  // for matrices rounded to a few digits
+  if (!is_rotation(rotation, kTolerance)) return files.error_at({name}, "is not a rotation matrix");
   return Eigen::Quaterniond(nearest_rotation(rotation));
 }
 

@@ -18,7 +18,8 @@ using rig_detail::CameraOfFile;
 using rig_detail::TextMatrices;
 
 Result<Eigen::Matrix3d> rotation_or_error(const TextMatrices& file, const char* key, const Eigen::Matrix3d& matrix) {
-  if (!is_rotation(matrix, 1e-4)) return file.error_at(key, "is not a rotation matrix");
+  constexpr double kTolerance = 1e-4;  // for matrices rounded to a few digits
+  if (!is_rotation(matrix, kTolerance)) return file.error_at(key, "is not a rotation matrix");
   return nearest_rotation(matrix);
 }
 

@@ -120,7 +120,8 @@ Result<std::string> kalibr_model_lines(const Camera& camera, std::string_view di
 
 std::optional<Pose> read_rigid(YamlMap& map, std::string_view key, const std::vector<double>& rows) {
   const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
-  if (!is_rotation(matrix.topLeftCorner<3, 3>(), 1e-4) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  constexpr double kTolerance = 1e-4;  // for matrices rounded to a few digits
+  if (!is_rotation(matrix.topLeftCorner<3, 3>(), kTolerance) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
     map.add_error(key, "is not a rigid transform");
     return std::nullopt;
   }

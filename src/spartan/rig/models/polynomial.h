@@ -30,12 +30,12 @@ template <class Function>
 std::optional<double> solve_increasing(const Function& f, double target, double low, double high, double start) {
   if (!(f(low).value <= target)) return std::nullopt;
   if (std::isinf(high)) {
-    constexpr double kFarthest = 1e12;
+    constexpr double kFarthest = 1e12;  // end of the doubling
     for (high = std::fmax(start, low + 1); high < kFarthest && f(high).value < target;) high *= 2;
   }
   if (!(f(high).value >= target)) return std::nullopt;
   double x = start > low && start < high ? start : 0.5 * (low + high);
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 200; ++i) {  // bisection alone needs about 100 steps
     const ValueWithDerivative at = f(x);
     (at.value < target ? low : high) = x;
     const double newton = x + (target - at.value) / at.derivative;
