@@ -1,5 +1,5 @@
-// A folder with calibrations: which files of it are one, which two belong together, and what is in them.
-// The input is the files, each behind a line "=== NAME".
+// Folders with calibrations: detection of calibration files, of pairs of files, and reading.
+// The input contains the files, each after a line "=== NAME".
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -12,33 +12,33 @@ namespace {
 using spartan::testing::check_survives_writing;
 
 constexpr spartan::ImageSize kSize{640, 480};
-constexpr std::size_t kMostFiles = 6;
+constexpr std::size_t kMaxFiles = 6;
 
-// Names that stay in the folder: no step upwards, at most two folders.
-bool is_harmless(std::string_view name) {
-  const auto plain = [](char c) {
+// Relative names without "..", with at most two folders.
+bool is_safe(std::string_view name) {
+  const auto allowed = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
            c == '.' || c == ',' || c == '/';
   };
   if (name.empty() || name.size() > 60 || name.find("..") != std::string_view::npos) return false;
   if (name.front() == '/' || name.back() == '/' || name.find("//") != std::string_view::npos) return false;
-  return std::all_of(name.begin(), name.end(), plain) && std::count(name.begin(), name.end(), '/') <= 2 &&
+  return std::all_of(name.begin(), name.end(), allowed) && std::count(name.begin(), name.end(), '/') <= 2 &&
          name.find("./") == std::string_view::npos && name != ".";
 }
 
-// Writes the files; their paths.
+// Writes the files and returns their paths.
 std::vector<std::string> unpack(const spartan::testing::TemporaryFolder& folder, std::string_view text) {
   constexpr std::string_view kHead = "=== ";
   std::vector<std::string> paths;
-  while (text.starts_with(kHead) && paths.size() < kMostFiles) {
+  while (text.starts_with(kHead) && paths.size() < kMaxFiles) {
     const std::size_t line = text.find('\n');
     if (line == std::string_view::npos) break;
     const std::string name(text.substr(kHead.size(), line - kHead.size()));
     text.remove_prefix(line + 1);
     const std::size_t next = text.find("\n=== ");
-    // A name that is a folder already stays one.
+    // A name of an existing folder is skipped.
     std::error_code error;
-    if (!is_harmless(name) || std::filesystem::exists(folder.path() + "/" + name, error)) break;
+    if (!is_safe(name) || std::filesystem::exists(folder.path() + "/" + name, error)) break;
     std::filesystem::create_directories(std::filesystem::path(folder.path() + "/" + name).parent_path(), error);
     if (error) break;
     paths.push_back(folder.write(name, text.substr(0, next)));

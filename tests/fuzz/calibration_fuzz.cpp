@@ -1,5 +1,5 @@
-// Calibrations of other projects in one file: KITTI, KITTI raw, EuRoC, Kalibr, OpenCV; and which one a file is.
-// What is accepted is sound, and can be written and read again.
+// Calibration formats with one file (KITTI, KITTI raw, EuRoC, Kalibr, OpenCV) and format detection.
+// Accepted calibrations must be valid and round-trip.
 #include <cstdint>
 #include <string>
 
@@ -26,11 +26,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   (void)spartan::guess_format("x.txt", text);
   if (text.find("T_BS") == std::string::npos) return 0;
-  // Two eyes at one place are refused: the right one is moved.
+  // Two cameras at the same position are rejected, so the right one is moved.
   static const spartan::testing::TemporaryFolder folder;
   std::string right = text;
-  const std::size_t place = right.find("0.055");
-  if (place != std::string::npos) right.replace(place, 5, "-0.05");
+  const std::size_t at = right.find("0.055");
+  if (at != std::string::npos) right.replace(at, 5, "-0.05");
   folder.write("cam0/sensor.yaml", text);
   folder.write("cam1/sensor.yaml", right);
   check(spartan::read_euroc_calib(folder.path()), Format::euroc);

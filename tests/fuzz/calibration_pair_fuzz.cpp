@@ -1,5 +1,6 @@
-// Calibrations with a file for each eye: ROS, mrcal, Ames, JPL. The input is both, with a line "=====" between them.
-// What is accepted is sound, and can be written and read again.
+// Calibration formats with one file per camera: ROS, mrcal, Ames, JPL. The input contains both files, separated by a
+// line
+// "=====". Accepted calibrations must be valid and round-trip.
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -22,10 +23,10 @@ InputFile file_of(std::string_view text) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  const std::string_view between = "\n=====\n";
-  const std::size_t at = text.find(between);
+  const std::string_view separator = "\n=====\n";
+  const std::size_t at = text.find(separator);
   const InputFile left = file_of(text.substr(0, at));
-  const InputFile right = file_of(at == std::string_view::npos ? text : text.substr(at + between.size()));
+  const InputFile right = file_of(at == std::string_view::npos ? text : text.substr(at + separator.size()));
   const std::string l = left.path(), r = right.path();
   check_survives_writing(spartan::read_ros_calib(l, r));
   check_survives_writing(spartan::read_mrcal_calib(l, r));

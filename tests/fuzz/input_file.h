@@ -1,4 +1,4 @@
-// A file in memory with the fuzzer's input, for parsers that open a path.
+// The fuzzer's input as a memory file, for parsers that open a path.
 #pragma once
 
 #include <sys/mman.h>

@@ -12,8 +12,8 @@ struct Group {
   std::vector<double> lengths_m{1, 2};
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("count", count, "how many", spartan::between(0, 100));
-    v.field("lengths_m", lengths_m, "how long", spartan::at_least(0));
+    v.field("count", count, "Number of items.", spartan::between(0, 100));
+    v.field("lengths_m", lengths_m, "Lengths in m.", spartan::at_least(0));
   }
 };
 
@@ -25,10 +25,10 @@ struct Options {
   Group group;
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("on", on, "whether");
-    v.field("gain", gain, "how strong");
-    v.field("method", method, "how", {"fast", "exact"});
-    v.field("note", note, "why");
+    v.field("on", on, "Whether it is on.");
+    v.field("gain", gain, "Gain.");
+    v.field("method", method, "Method.", {"fast", "exact"});
+    v.field("note", note, "Free text.");
     v.group("group", group);
   }
 };
@@ -38,7 +38,7 @@ struct Options {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   const auto options = spartan::parse_options<Options>(text, "input");
-  // What is accepted can be written and read again.
+  // Accepted options must round-trip.
   if (options && !spartan::parse_options<Options>(spartan::dump_options(*options), "dump")) __builtin_trap();
   (void)spartan::set_option(Options{}, text);
   return 0;

@@ -1,4 +1,4 @@
-// PFM files.
+// PFM image files.
 #include <cstdint>
 #include <string>
 

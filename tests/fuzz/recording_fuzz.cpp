@@ -1,4 +1,4 @@
-// What announces a recording's shots: frames.csv and recording.yaml, KITTI's times.txt, EuRoC's data.csv.
+// The index files of recordings: frames.csv and recording.yaml, KITTI's times.txt, EuRoC's data.csv.
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -17,15 +17,15 @@ constexpr const char* kFrames =
     "frame_id,position_id,pair,left_stamp_ns,right_stamp_ns,left,right,pan_deg,tilt_deg,exposure_us,gain,bits\n"
     "0,0,stereo,1,1,image_0/000000.png,image_1/000000.png,0,0,0,0,8\n";
 
-// One folder that is every layout at once, with one good picture for each eye.
+// A folder with the files of every layout and one valid image for each camera.
 struct Recording {
   Recording() {
     folder.write("calib.txt", kCalib);
     folder.write("rig.yaml",
                  spartan::to_rig_yaml(spartan::read_kitti_calib(folder.path() + "/calib.txt", {32, 16}).value()));
-    const spartan::Image<std::uint8_t> picture(32, 16);
+    const spartan::Image<std::uint8_t> image(32, 16);
     for (const char* name : {"image_0/000000.png", "image_1/000000.png", "cam0/data/1.png", "cam1/data/1.png"}) {
-      if (!spartan::write_png(folder.file(name), picture.view())) __builtin_trap();
+      if (!spartan::write_png(folder.file(name), image.view())) __builtin_trap();
     }
   }
   void open(spartan::RecordingFormat format) const {

@@ -7,7 +7,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto rig = spartan::parse_rig_yaml(std::string(reinterpret_cast<const char*>(data), size), "rig.yaml");
   if (!rig) return 0;
-  // What is accepted is sound, and can be written and read again.
+  // An accepted rig must be valid and round-trip.
   if (!rig->find_faults().empty()) __builtin_trap();
   const auto again = spartan::parse_rig_yaml(spartan::to_rig_yaml(*rig), "rig.yaml");
   if (!again || !(*again == *rig)) __builtin_trap();

@@ -1,4 +1,4 @@
-// Scenarios of simulated drives.
+// Scenarios of the simulator.
 #include <cstdint>
 #include <string>
 
@@ -8,7 +8,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   const auto scenario = spartan::sim::parse_scenario(text, "scenario.yaml");
   if (!scenario) return 0;
-  // What is accepted can be written and read again, and planned or refused.
+  // An accepted scenario must round-trip; planning it may fail but not crash.
   const std::string dump = spartan::dump_options(*scenario);
   const auto again = spartan::sim::parse_scenario(dump, "dump");
   if (!again || spartan::dump_options(*again) != dump) __builtin_trap();

@@ -1,4 +1,4 @@
-// Tables of IMU, wheels, compass and inclinometer.
+// CSV tables of IMU, wheel odometry, compass and inclinometer.
 #include <cstdint>
 #include <variant>
 
@@ -7,7 +7,7 @@
 
 namespace {
 
-void play(const spartan::OpenStream& open) {
+void read_all(const spartan::OpenStream& open) {
   const auto stream = open();
   if (!stream) return;
   for (;;) {
@@ -24,10 +24,10 @@ void play(const spartan::OpenStream& open) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const spartan::testing::InputFile input(data, size);
   const spartan::TableFormat format{.separator = ',', .header = {}, .ends_with_newline = true};
-  play(spartan::stream_of_table(input.path(), format, 7, spartan::read_imu_row(Eigen::Quaterniond::Identity())));
-  play(spartan::stream_of_table(input.path(), format, 3, spartan::read_wheel_row));
-  play(spartan::stream_of_table(input.path(), format, 3, spartan::read_compass_row));
-  play(spartan::stream_of_table(input.path(), {.separator = ' ', .header = {}, .ends_with_newline = false}, 4,
-                                spartan::read_inclinometer_row));
+  read_all(spartan::stream_of_table(input.path(), format, 7, spartan::read_imu_row(Eigen::Quaterniond::Identity())));
+  read_all(spartan::stream_of_table(input.path(), format, 3, spartan::read_wheel_row));
+  read_all(spartan::stream_of_table(input.path(), format, 3, spartan::read_compass_row));
+  read_all(spartan::stream_of_table(input.path(), {.separator = ' ', .header = {}, .ends_with_newline = false}, 4,
+                                    spartan::read_inclinometer_row));
   return 0;
 }

@@ -1,4 +1,4 @@
-// What a reader of calibrations accepted is sound, and survives being written and read again.
+// Checks that an accepted calibration is valid and round-trips through writing and reading.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 
 namespace spartan::testing {
 
-// Numbers like a camera's. Those near the ends of what a double holds lose digits on the way, or grow too large.
-inline bool is_of_sane_size(const Rig& rig) {
+// Whether all numbers have the magnitude of a real camera. Extreme numbers lose digits or overflow in a conversion.
+inline bool is_plausible(const Rig& rig) {
   constexpr double kLeastFocal_px = 100, kMost = 1e4, kFarthest_m = 100, kLeastBaseline_m = 1e-3;
   for (const Camera& camera : rig.cameras) {
     const ModelParameters lists = parameters(camera.model);
@@ -56,28 +56,28 @@ inline const char* file_name(CalibrationFormat format) {
   return "";
 }
 
-inline void stop(const Rig& rig, CalibrationFormat format, const std::string& what) {
+inline void abort_with(const Rig& rig, CalibrationFormat format, const std::string& what) {
   std::fprintf(stderr, "%s: %s\n%s\n", std::string(name_of(format)).c_str(), what.c_str(), to_rig_yaml(rig).c_str());
   __builtin_trap();
 }
 
 inline void check_survives_writing(const Rig& rig, CalibrationFormat format) {
-  if (!rig.find_faults().empty()) stop(rig, format, "unsound");
+  if (!rig.find_faults().empty()) abort_with(rig, format, "invalid");
   const TemporaryFolder folder;
   const auto files = to_calibration_files(rig, format, folder.path() + "/" + file_name(format));
-  const bool sane = is_of_sane_size(rig);
+  const bool plausible = is_plausible(rig);
   if (!files) {
-    if (sane) stop(rig, format, "cannot be written: " + files.error().message());
+    if (plausible) abort_with(rig, format, "cannot be written: " + files.error().message());
     return;
   }
   for (const CalibrationFile& file : *files) folder.write(file.path.substr(folder.path().size() + 1), file.content);
   const std::string& first = files->front().path;
   const auto again =
       read_calibration(has_a_file_per_eye(format) ? first + "," + files->at(1).path : first, rig.cameras[0].size);
-  if (!sane) return;
-  if (!again) return stop(rig, format, "cannot be read again: " + again.error().message());
+  if (!plausible) return;
+  if (!again) return abort_with(rig, format, "cannot be read again: " + again.error().message());
   for (const RigDifference& each : describe_differences(rig, again->rig)) {
-    if (!each.key.ends_with("name")) stop(rig, format, each.key + ": " + each.text);
+    if (!each.key.ends_with("name")) abort_with(rig, format, each.key + ": " + each.text);
   }
 }
 

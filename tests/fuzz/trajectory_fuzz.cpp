@@ -6,7 +6,7 @@
 
 namespace {
 
-// What is accepted is a trajectory: finite poses, stamps that grow.
+// An accepted trajectory must have finite poses and increasing stamps.
 void check(const spartan::Result<spartan::Trajectory>& trajectory) {
   if (!trajectory) return;
   for (std::size_t i = 0; i < trajectory->size(); ++i) {

@@ -31,8 +31,8 @@ void ArchiveReader::raw(void* data, std::size_t size) {
     return;
   }
   if (size == 0) return;
-  std::memcpy(data, bytes_.data() + at_, size);
-  at_ += size;
+  std::memcpy(data, bytes_.data() + offset_, size);
+  offset_ += size;
 }
 
 std::string ArchiveReader::get_string() {
@@ -61,8 +61,9 @@ Matrix6d ArchiveReader::get_matrix6() {
 }
 
 Status ArchiveReader::finish(const std::string& what) const {
-  if (!ok_) return failure(ErrorCode::input, "the saved state ends early", what);
-  if (at_ != bytes_.size()) return failure(ErrorCode::input, "the saved state has bytes left over", what);
+  if (!ok_) return failure(ErrorCode::input, "the saved state is truncated", what);
+  if (offset_ != bytes_.size())
+    return failure(ErrorCode::input, "the saved state has unexpected bytes at its end", what);
   return {};
 }
 

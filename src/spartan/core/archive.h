@@ -1,4 +1,5 @@
-// Binary values for stage memory: little-endian, versioned, checked on the way back.
+// Binary serialization of stage states for checkpoints: little-endian, checked when read. Each stage writes a version
+// number of its own first.
 #pragma once
 
 #include <bit>
@@ -15,7 +16,7 @@ namespace spartan {
 
 using Bytes = std::vector<std::uint8_t>;
 
-static_assert(std::endian::native == std::endian::little, "archives are written as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "archives hold the memory layout of a little-endian machine");
 
 /// Appends values to a byte string.
 class ArchiveWriter {
@@ -30,7 +31,7 @@ class ArchiveWriter {
   void put(const Eigen::Vector3d& v);
   void put(const Pose& pose);
   void put(const Matrix6d& m);
-  /// A count, then the elements as they lie in memory.
+  /// The number of elements (uint64), then the elements in their memory layout.
   template <class T>
     requires std::is_trivially_copyable_v<T>
   void put_array(const T* data, std::size_t count) {
@@ -44,11 +45,11 @@ class ArchiveWriter {
   Bytes bytes_;
 };
 
-/// Reads what ArchiveWriter wrote, in the same order. After the first value that is not there every further
-/// one is zero; ask `finish()` at the end.
+/// Reads what ArchiveWriter wrote, in the same order. After the first value beyond the end of the bytes, that value and
+/// all following ones are zero; call finish() at the end to check for errors.
 class ArchiveReader {
  public:
-  /// Borrows the bytes.
+  /// Keeps a reference to the bytes, which must outlive the reader.
   explicit ArchiveReader(const Bytes& bytes) : bytes_(bytes) {}
   explicit ArchiveReader(Bytes&&) = delete;
 
@@ -56,7 +57,7 @@ class ArchiveReader {
     requires std::is_arithmetic_v<T> || std::is_enum_v<T>
   T get() {
     if constexpr (std::is_same_v<T, bool>) {
-      return get<std::uint8_t>() != 0;  // any other byte would not be a valid bool
+      return get<std::uint8_t>() != 0;  // a bool with a byte value other than 0 and 1 is undefined behaviour
     } else {
       T value{};
       raw(&value, sizeof value);
@@ -81,14 +82,14 @@ class ArchiveReader {
     return values;
   }
 
-  /// All was there and nothing is left over; else an error that names `what`.
+  /// Checks that every value was present and no byte is left over; otherwise an error of code `input` at `what`.
   Status finish(const std::string& what) const;
 
  private:
-  std::size_t remaining() const { return ok_ ? bytes_.size() - at_ : 0; }
+  std::size_t remaining() const { return ok_ ? bytes_.size() - offset_ : 0; }
   void raw(void* data, std::size_t size);
   const Bytes& bytes_;
-  std::size_t at_ = 0;
+  std::size_t offset_ = 0;
   bool ok_ = true;
 };
 

@@ -35,7 +35,7 @@ void read_example(ArchiveReader& reader) {
   reader.get_array<float>();
 }
 
-TEST(Archive, GivesBackEveryKindOfValue) {
+TEST(Archive, RoundTripsEveryTypeOfValue) {
   const Bytes bytes = example();
   ArchiveReader reader(bytes);
   EXPECT_EQ(reader.get<std::uint32_t>(), 7U);
@@ -54,7 +54,7 @@ TEST(Archive, GivesBackEveryKindOfValue) {
   EXPECT_TRUE(reader.finish("example"));
 }
 
-TEST(Archive, NoticesEveryTruncation) {
+TEST(Archive, DetectsEveryTruncation) {
   const Bytes whole = example();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
@@ -67,7 +67,7 @@ TEST(Archive, NoticesEveryTruncation) {
   }
 }
 
-TEST(Archive, NoticesBytesLeftOver) {
+TEST(Archive, DetectsExtraBytes) {
   Bytes bytes = example();
   bytes.push_back(0);
   ArchiveReader reader(bytes);
@@ -75,13 +75,13 @@ TEST(Archive, NoticesBytesLeftOver) {
   EXPECT_FALSE(reader.finish("example"));
 }
 
-TEST(Archive, DoesNotBelieveAnAbsurdCount) {
+TEST(Archive, RejectsAnArrayLongerThanItsBytes) {
   ArchiveWriter writer;
   writer.put(~std::uint64_t{0});
   const Bytes bytes = writer.take();
   ArchiveReader reader(bytes);
   EXPECT_TRUE(reader.get_array<double>().empty());
-  EXPECT_EQ(reader.get<int>(), 0) << "values behind a fault are zero";
+  EXPECT_EQ(reader.get<int>(), 0) << "values after an error are zero";
   EXPECT_FALSE(reader.finish("example"));
 }
 
@@ -99,7 +99,7 @@ RC_GTEST_PROP(Archive, RoundTripsArraysAndText,
   RC_ASSERT(reader.finish("property").has_value());
 }
 
-// Whatever the bytes, reading ends with a verdict and touches nothing outside (the sanitizers look on).
+// Any bytes are read without access out of bounds (checked by the sanitizers) and end with a status.
 RC_GTEST_PROP(Archive, SurvivesAnyBytes, (const Bytes& bytes)) {
   ArchiveReader reader(bytes);
   read_example(reader);

@@ -15,14 +15,14 @@ Error error_of(sqlite3* db, const std::string& path) {
     case SQLITE_FULL:
     case SQLITE_IOERR:
       return {ErrorCode::output, "cannot be written: " + what, path,
-              "free space on the disk or raise the file size limit, then go on with --resume"};
+              "free disk space or raise the file size limit, then continue with --resume"};
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
     case SQLITE_PERM:
-      return {ErrorCode::output, "cannot be written: " + what, path, "choose a folder you may write to with -o"};
+      return {ErrorCode::output, "cannot be written: " + what, path, "choose a writable folder with -o"};
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      return {ErrorCode::output, "is in use by another process", path, "wait until the other run has ended"};
+      return {ErrorCode::output, "is in use by another process", path, "wait until the other process has finished"};
     case SQLITE_NOTADB:
     case SQLITE_CORRUPT:
       return {ErrorCode::input, "is damaged or not a database: " + what, path, "run again into a new folder"};
@@ -31,8 +31,8 @@ Error error_of(sqlite3* db, const std::string& path) {
   }
 }
 
-// What has a meaning in a URI stands as %XX.
-std::string escaped(const std::string& path) {
+// Percent-encodes the characters that have a meaning in a URI.
+std::string percent_encoded(const std::string& path) {
   std::string text;
   for (const char c : path) text += c == '%' ? "%25" : c == '?' ? "%3f" : c == '#' ? "%23" : std::string(1, c);
   return text;
@@ -128,19 +128,19 @@ Result<Database> Database::open(const std::string& path, Mode mode) {
   std::string name = path;
   if (mode == Mode::read_only) {
     flags = SQLITE_OPEN_READONLY;
-    // Without a write-ahead log nobody is writing. Said so, SQLite makes no files of its own beside it, and needs no
-    // permission to.
+    // Without a write-ahead log no process is writing. With `immutable` SQLite creates no -wal and -shm files beside
+    // the database and so needs no write permission for the folder.
     if (!std::filesystem::exists(path + "-wal")) {
       flags |= SQLITE_OPEN_URI;
-      name = "file:" + escaped(path) + "?immutable=1";
+      name = "file:" + percent_encoded(path) + "?immutable=1";
     }
   }
   sqlite3* handle = nullptr;
   const int code = sqlite3_open_v2(name.c_str(), &handle, flags, nullptr);
   Database db(handle, path);
   if (code != SQLITE_OK) return tl::unexpected<Error>(error_of(handle, path));
-  sqlite3_busy_timeout(handle, 5000);
-  // NORMAL: with a write-ahead log a killed process loses nothing that was committed.
+  sqlite3_busy_timeout(handle, 5000);  // ms; waits for short locks of other processes
+  // NORMAL: with a write-ahead log, committed data survive when the process is killed.
   if (mode != Mode::read_only) {
     if (Status status = db.execute("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;"); !status) {
       return failure(status);

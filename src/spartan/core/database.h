@@ -1,4 +1,4 @@
-// A thin, owning layer over SQLite: errors as Result, statements that clean up after themselves.
+// RAII wrapper of SQLite with errors as Result.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,8 @@ struct sqlite3_stmt;
 
 namespace spartan {
 
-/// One prepared statement. Bind with `bind(1, …)`, step, read columns; `reset()` to use it again.
+/// A prepared statement. Bind parameters with `bind(1, …)` (the first index is 1), call step(), read columns (the first
+/// index is 0); reset() before it is used again.
 class SqlStatement {
  public:
   SqlStatement(sqlite3* db, sqlite3_stmt* statement, std::string path);
@@ -26,11 +27,11 @@ class SqlStatement {
   SqlStatement& bind(int index, double value);
   SqlStatement& bind(int index, const std::string& text);
   SqlStatement& bind(int index, const Bytes& blob);
-  SqlStatement& bind(int index, const std::optional<double>& value);  ///< NULL where there is none
+  SqlStatement& bind(int index, const std::optional<double>& value);  ///< NULL for nullopt
 
-  /// True while there is a row; code `output` where the disk is full or the file cannot be written.
+  /// Advances to the next row: true if there is one. Code `output` if the disk is full or the file cannot be written.
   Result<bool> step();
-  /// Steps to the end and resets.
+  /// Runs the statement to its end and resets it.
   Status run();
   void reset();
 
@@ -46,10 +47,12 @@ class SqlStatement {
   std::string path_;
 };
 
+/// A connection to an SQLite database file.
 class Database {
  public:
   enum class Mode { create, open, read_only };
-  /// Opens with a write-ahead log. Codes: `output` (cannot be made or written), `input` (missing or not a database).
+  /// Opens the database, with a write-ahead log unless it is read-only. Codes: `output` (cannot be created or written),
+  /// `input` (missing or not a database).
   static Result<Database> open(const std::string& path, Mode mode);
   Database(Database&&) noexcept;
   Database& operator=(Database&&) noexcept;

@@ -1,4 +1,4 @@
-// Files written whole or not at all.
+// Reading files, and writing them atomically.
 #pragma once
 
 #include <string>
@@ -9,25 +9,26 @@
 
 namespace spartan {
 
-/// The whole of a file; code `input` where it cannot be read.
+/// The content of a file; code `input` if it cannot be read.
 Result<std::string> read_file(const std::string& path);
 
-/// Writes under a temporary name in the same folder, flushes to the disk and renames: a reader sees the old
-/// content or the new one, never a part. Code `output` (permission, disk full, size limit) with the path.
+/// Writes to a temporary file in the same folder, flushes it to the disk (fsync) and renames it: a reader sees either
+/// the old content or the complete new one. Code `output` (permission, disk full, size limit) with the path.
 Status write_file_atomically(const std::string& path, std::string_view content);
 
+/// A file to write.
 struct NewFile {
   std::string path;
   std::string_view content;
 };
-/// The same for files that belong together: all are on the disk before the first is renamed, so that what is there
-/// already stays where one of them cannot be written.
+/// The same for files that belong together: all of them are on the disk before the first is renamed, so if one cannot
+/// be written, the existing files remain unchanged.
 Status write_files_atomically(const std::vector<NewFile>& files);
 
-/// The error of code `output` for a failed write: `error_number` is what errno said.
+/// The error of code `output` for a failed write, with a hint that depends on `error_number`, a value of errno.
 tl::unexpected<Error> write_failure(const std::string& path, int error_number);
 
-/// Makes the folder and its parents; code `output`.
+/// Creates the folder and its parents; code `output` if that fails.
 Status make_folder(const std::string& path);
 
 }  // namespace spartan

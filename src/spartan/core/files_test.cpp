@@ -19,23 +19,23 @@ std::size_t entries(const std::string& folder) {
   return static_cast<std::size_t>(std::distance(begin, {}));
 }
 
-TEST(Files, WriteReplacesTheWholeContent) {
+TEST(Files, WritingReplacesTheContent) {
   const TemporaryFolder folder;
   const std::string path = folder.write("a.txt", "a long old content");
   const std::string content("new\0bytes", 9);
   ASSERT_TRUE(write_file_atomically(path, content));
   EXPECT_EQ(content_of(path), content);
   EXPECT_EQ(read_file(path).value(), content);
-  EXPECT_EQ(entries(folder.path()), 1U) << "no temporary file stays behind";
+  EXPECT_EQ(entries(folder.path()), 1U) << "no temporary file remains";
 }
 
-TEST(Files, EmptyFilesAreFiles) {
+TEST(Files, EmptyFilesRoundTrip) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_file_atomically(folder.file("empty"), ""));
   EXPECT_EQ(read_file(folder.file("empty")).value(), "");
 }
 
-TEST(Files, SeveralAreWrittenAllOrNone) {
+TEST(Files, AllOfSeveralFilesAreWrittenOrNone) {
   const TemporaryFolder folder;
   const std::string first = folder.write("first", "old"), second = folder.file("second");
   std::filesystem::create_directory(second);
@@ -52,16 +52,16 @@ TEST(Files, SeveralAreWrittenAllOrNone) {
   EXPECT_EQ(content_of(first) + content_of(second), "newnewer");
 }
 
-TEST(Files, ReadSaysWhichFileAndWhy) {
+TEST(Files, ReadErrorsNameTheFile) {
   const TemporaryFolder folder;
   const auto missing = read_file(folder.path() + "/none");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::input);
   EXPECT_EQ(missing.error().where, folder.path() + "/none");
-  EXPECT_FALSE(read_file(folder.path())) << "a folder is no file";
+  EXPECT_FALSE(read_file(folder.path())) << "a folder is not a file";
 }
 
-TEST(Files, WriteIntoAFolderThatIsNotThere) {
+TEST(Files, WritingIntoAMissingFolderFails) {
   const TemporaryFolder folder;
   const Status status = write_file_atomically(folder.path() + "/none/a.txt", "text");
   ASSERT_FALSE(status);
@@ -70,14 +70,14 @@ TEST(Files, WriteIntoAFolderThatIsNotThere) {
   EXPECT_FALSE(status.error().hint.empty());
 }
 
-TEST(Files, WriteWithoutPermission) {
-  // /proc refuses new files even to root.
+TEST(Files, WritingWithoutPermissionFails) {
+  // /proc rejects new files, even from root.
   const Status status = write_file_atomically("/proc/spartan_test", "text");
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::output);
 }
 
-TEST(Files, AFullDiskLeavesTheOldContent) {
+TEST(Files, AFailedWriteKeepsTheOldContent) {
   const TemporaryFolder folder;
   const std::string path = folder.write("a.txt", "old");
   rlimit before{};
@@ -96,11 +96,11 @@ TEST(Files, AFullDiskLeavesTheOldContent) {
   EXPECT_EQ(entries(folder.path()), 1U);
 }
 
-TEST(Files, MakeFolderWithParents) {
+TEST(Files, CreatesFoldersWithParents) {
   const TemporaryFolder folder;
   ASSERT_TRUE(make_folder(folder.path() + "/a/b/c"));
   EXPECT_TRUE(std::filesystem::is_directory(folder.path() + "/a/b/c"));
-  EXPECT_TRUE(make_folder(folder.path() + "/a/b/c")) << "already there";
+  EXPECT_TRUE(make_folder(folder.path() + "/a/b/c")) << "exists already";
   const std::string file = folder.write("file", "x");
   for (const std::string& path : {file, file + "/below"}) {
     const Status status = make_folder(path);

@@ -10,14 +10,14 @@
 
 namespace spartan {
 
-/// One image as a camera delivers it. Copies are cheap and share the pixels, which nobody changes.
-/// Either keeps its pixels alive, or borrows memory that the caller keeps alive.
+/// One image as a camera delivers it. Copies are cheap: they share the pixels, which are immutable.
+/// It either shares ownership of its pixels or borrows memory that the caller keeps alive.
 class FrameImage {
  public:
   FrameImage() = default;
 
-  /// Borrows; the caller keeps the memory alive and unchanged while any copy is in use. Throws where the
-  /// sample type does not fit the format.
+  /// Borrows the pixels; the caller keeps the memory alive and unchanged while any copy is in use. Throws
+  /// std::invalid_argument if the pixel type does not match the format.
   template <class Pixel>
   static FrameImage borrow(ImageView<const Pixel> view, PixelFormat format) {
     check<Pixel>(format);
@@ -28,7 +28,7 @@ class FrameImage {
     image.stride_bytes_ = view.stride() * static_cast<std::ptrdiff_t>(sizeof(Pixel));
     return image;
   }
-  /// Takes the pixels over.
+  /// Takes ownership of the pixels; throws as borrow().
   template <class Pixel>
   static FrameImage own(Image<Pixel> pixels, PixelFormat format) {
     auto owner = std::make_shared<const Image<Pixel>>(std::move(pixels));
@@ -37,11 +37,12 @@ class FrameImage {
     return image;
   }
 
-  /// The same pixels with another meaning (a Bayer phase, fewer bits); throws where the samples are of another kind.
+  /// The same pixels with another format (Bayer phase, number of bits); throws std::invalid_argument if the number of
+  /// channels or bytes per sample differs.
   FrameImage with_format(PixelFormat format) const {
     if ((format.layout == PixelLayout::rgb) != (format_.layout == PixelLayout::rgb) ||
         format.bytes_per_sample() != format_.bytes_per_sample()) {
-      throw std::invalid_argument("FrameImage::with_format: the samples are of another kind");
+      throw std::invalid_argument("FrameImage::with_format: the pixel types differ");
     }
     FrameImage image = *this;
     image.format_ = format;
@@ -54,7 +55,7 @@ class FrameImage {
   int height() const { return size_.height; }
   bool empty() const { return size_.empty(); }
 
-  /// The pixels as uint8_t, uint16_t, Rgb8 or Rgb16; throws where that is not what they are.
+  /// The pixels as uint8_t, uint16_t, Rgb8 or Rgb16; throws std::invalid_argument if they have another type.
   template <class Pixel>
   ImageView<const Pixel> as() const {
     check<Pixel>(format_);
@@ -68,7 +69,7 @@ class FrameImage {
     constexpr bool colour = std::is_same_v<Pixel, Rgb8> || std::is_same_v<Pixel, Rgb16>;
     constexpr int bytes = colour ? sizeof(Pixel) / 3 : sizeof(Pixel);
     if (colour != (format.layout == PixelLayout::rgb) || bytes != format.bytes_per_sample()) {
-      throw std::invalid_argument("FrameImage: the sample type does not fit the pixel format");
+      throw std::invalid_argument("FrameImage: the pixel type does not match the pixel format");
     }
   }
 

@@ -5,7 +5,7 @@
 namespace spartan {
 namespace {
 
-TEST(FrameImage, OwnsPixelsThatOutliveTheMaker) {
+TEST(FrameImage, SharesOwnershipOfItsPixels) {
   FrameImage copy;
   {
     Image<std::uint16_t> pixels(7, 3);
@@ -27,14 +27,14 @@ TEST(FrameImage, BorrowsWithoutCopying) {
   EXPECT_EQ(frame.as<std::uint8_t>().row(1), pixels.row(2) + 2);
 }
 
-TEST(FrameImage, RowsOfThreeBytePixelsStayInStep) {
+TEST(FrameImage, HandlesTheRowStrideOfThreeBytePixels) {
   Image<Rgb8> pixels(5, 3);
   pixels(4, 2) = {1, 2, 3};
   const FrameImage frame = FrameImage::own(std::move(pixels), {PixelLayout::rgb, 8});
   EXPECT_EQ(frame.as<Rgb8>()(4, 2), (Rgb8{1, 2, 3}));
 }
 
-TEST(FrameImage, RefusesTheWrongSampleType) {
+TEST(FrameImage, RejectsTheWrongPixelType) {
   EXPECT_THROW(FrameImage::own(Image<std::uint8_t>(2, 2), {PixelLayout::gray, 12}), std::invalid_argument);
   EXPECT_THROW(FrameImage::own(Image<std::uint8_t>(2, 2), {PixelLayout::rgb, 8}), std::invalid_argument);
   EXPECT_THROW(FrameImage::own(Image<Rgb8>(2, 2), {PixelLayout::gray, 8}), std::invalid_argument);
@@ -44,7 +44,7 @@ TEST(FrameImage, RefusesTheWrongSampleType) {
   EXPECT_THROW(frame.as<std::uint16_t>(), std::invalid_argument);
 }
 
-TEST(PixelFormat, FullScaleFollowsBitsAndAlignment) {
+TEST(PixelFormat, FullScaleDependsOnBitsAndAlignment) {
   EXPECT_EQ((PixelFormat{PixelLayout::gray, 8, BitAlignment::high}.full_scale()), 255);
   EXPECT_EQ((PixelFormat{PixelLayout::gray, 12, BitAlignment::low}.full_scale()), 4095);
   EXPECT_EQ((PixelFormat{PixelLayout::gray, 12, BitAlignment::high}.full_scale()), 65520);

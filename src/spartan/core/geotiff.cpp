@@ -30,7 +30,7 @@ Status write_bands(GDALDataset& dataset, const std::string& path, const std::vec
     const ImageView<const float>& values = bands[i].values;
     band->SetDescription(bands[i].name.c_str());
     band->SetNoDataValue(std::numeric_limits<double>::quiet_NaN());
-    // GDAL takes what it writes as void*, but leaves it alone.
+    // RasterIO takes a void* in both directions; with GF_Write it does not change the data.
     const CPLErr error =
         band->RasterIO(GF_Write, 0, 0, values.width(), values.height(), const_cast<float*>(values.data()),
                        values.width(), values.height(), GDT_Float32, 0,
@@ -47,7 +47,7 @@ Status write_geotiff(const std::string& path, const MapPlace& place, const std::
   const ImageSize size = bands.empty() ? ImageSize{} : bands.front().values.size();
   for (const MapBand& band : bands) {
     if (band.values.size() != size || size.empty())
-      throw std::invalid_argument("write_geotiff: bands of different or no size");
+      throw std::invalid_argument("write_geotiff: empty bands, or bands of different sizes");
   }
   GDALRegister_GTiff();
   CPLPushErrorHandler(CPLQuietErrorHandler);
@@ -64,7 +64,7 @@ Status write_geotiff(const std::string& path, const MapPlace& place, const std::
     dataset->SetGeoTransform(transform.data());
     if (Status s = write_bands(*dataset, path, bands); !s) return s;
     CPLErrorReset();
-    dataset.reset();  // what was compressed last is written here, and a full disk shows here
+    dataset.reset();  // writes the last blocks: a full disk is reported here
     if (CPLGetLastErrorType() >= CE_Failure)
       return failure(ErrorCode::output, std::string("cannot be written: ") + CPLGetLastErrorMsg(), path);
     return std::rename(temporary.c_str(), path.c_str()) == 0 ? Status{} : Status(write_failure(path, errno));
@@ -83,7 +83,7 @@ Result<LoadedMap> read_geotiff(const std::string& path) {
         GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers.data()));
     std::array<double, 6> transform{};
     if (!dataset || dataset->GetGeoTransform(transform.data()) != CE_None)
-      return failure(ErrorCode::input, std::string("is no GeoTIFF: ") + CPLGetLastErrorMsg(), path);
+      return failure(ErrorCode::input, std::string("is not a GeoTIFF: ") + CPLGetLastErrorMsg(), path);
     LoadedMap map;
     map.place = {transform[0], transform[3], transform[1]};
     for (int i = 1; i <= dataset->GetRasterCount(); ++i) {
@@ -106,12 +106,12 @@ Result<LoadedMap> read_geotiff(const std::string& path) {
 #else
 
 Status write_geotiff(const std::string& path, const MapPlace&, const std::vector<MapBand>&) {
-  return failure(ErrorCode::usage, "this build of Spartan has no GDAL, so it cannot write GeoTIFF", path,
-                 "install libgdal-dev and build again");
+  return failure(ErrorCode::usage, "cannot write GeoTIFF: Spartan was built without GDAL", path,
+                 "install libgdal-dev and rebuild");
 }
 Result<LoadedMap> read_geotiff(const std::string& path) {
-  return failure(ErrorCode::usage, "this build of Spartan has no GDAL, so it cannot read GeoTIFF", path,
-                 "install libgdal-dev and build again");
+  return failure(ErrorCode::usage, "cannot read GeoTIFF: Spartan was built without GDAL", path,
+                 "install libgdal-dev and rebuild");
 }
 
 #endif

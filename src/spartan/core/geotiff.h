@@ -1,4 +1,4 @@
-// Maps for geographic programs: GeoTIFF.
+// Reading and writing of raster maps as GeoTIFF, through GDAL.
 #pragma once
 
 #include <string>
@@ -9,27 +9,29 @@
 
 namespace spartan {
 
-/// One band of a map. Row 0 lies in the north (largest y); NaN is "no data".
+/// One band of a raster map. Row 0 is the northernmost (largest y); NaN means "no data".
 struct MapBand {
   std::string name;
   ImageView<const float> values;
 };
 
-/// Where a map lies in the world plane, metres: its north-west corner and the side of a cell.
+/// Georeference of a north-up raster in the world plane, metres: x and y of its north-west corner and the side of a
+/// cell (GDAL's geotransform without rotation).
 struct MapPlace {
   double west_m = 0, north_m = 0, cell_m = 1;
 };
 
-/// Writes float32 bands of one size, compressed, without a map projection; the file appears whole or not at all.
-/// Code `output` where it cannot be written, `usage` where Spartan was built without GDAL.
+/// Writes float32 bands of equal size, compressed, without a map projection. The file is written atomically.
+/// Code `output` if it cannot be written, `usage` if Spartan was built without GDAL.
 Status write_geotiff(const std::string& path, const MapPlace& place, const std::vector<MapBand>& bands);
 
-/// What a GeoTIFF of one such map holds; bands as float32. Code `input` where it cannot be read.
+/// The content of such a GeoTIFF; bands as float32.
 struct LoadedMap {
   MapPlace place;
   std::vector<std::string> names;
   std::vector<Image<float>> bands;
 };
+/// Code `input` if the file cannot be read, `usage` if Spartan was built without GDAL.
 Result<LoadedMap> read_geotiff(const std::string& path);
 
 }  // namespace spartan

@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-TEST(GeoTiff, ReadsBackWhatWasWritten) {
+TEST(GeoTiff, RoundTrips) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/map.tif";
   Image<float> a(37, 21), b(37, 21);

@@ -1,4 +1,4 @@
-// Images that own their pixels, and views that borrow them.
+// Images that own their pixels, and non-owning views.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace spartan {
 
-/// Three interleaved channels, in the order in which they lie in memory.
+/// Three interleaved channels, in memory order.
 template <class T>
 struct Rgb {
   T r{}, g{}, b{};
@@ -30,15 +30,15 @@ struct ImageSize {
   friend bool operator==(const ImageSize&, const ImageSize&) = default;
 };
 
-/// A borrowed rectangle of pixels. Integer coordinates are pixel centres (docs/conventions.md).
-/// `stride` counts pixels of type T from one row to the next.
+/// A non-owning view of a rectangle of pixels. Integer coordinates are pixel centres (docs/conventions.md).
+/// `stride` is the distance between rows in pixels of type T.
 template <class T>
 class ImageView {
  public:
   ImageView() = default;
   ImageView(T* data, int width, int height, std::ptrdiff_t stride)
       : data_(data), width_(width), height_(height), stride_(stride) {}
-  /// A view of pixels is also a view of constant pixels.
+  /// Conversion to a view of constant pixels.
   template <class Other>
     requires(std::is_const_v<T> && std::is_same_v<Other, std::remove_const_t<T>>)
   ImageView(const ImageView<Other>& other)
@@ -55,10 +55,10 @@ class ImageView {
   T& operator()(int x, int y) const { return row(y)[x]; }
   bool contains(int x, int y) const { return x >= 0 && y >= 0 && x < width_ && y < height_; }
 
-  /// The part that starts at (x, y); throws where it does not lie inside.
+  /// The sub-image with its top-left pixel at (x, y); throws std::out_of_range if it is not inside the view.
   ImageView crop(int x, int y, int width, int height) const {
     if (x < 0 || y < 0 || width < 0 || height < 0 || width > width_ - x || height > height_ - y) {
-      throw std::out_of_range("ImageView::crop: the part leaves the image");
+      throw std::out_of_range("ImageView::crop: the rectangle is not inside the image");
     }
     return {row(y) + x, width, height, stride_};
   }
@@ -70,8 +70,8 @@ class ImageView {
   std::ptrdiff_t stride_ = 0;
 };
 
-/// An image that owns its pixels: rows begin on 64-byte borders and are padded to whole 64-byte blocks.
-/// Moves; copies only by `clone()`.
+/// An image that owns its pixels: rows are 64-byte aligned and padded to whole 64-byte blocks.
+/// Movable; copied only by clone().
 template <class T>
 class Image {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -80,14 +80,14 @@ class Image {
   static constexpr std::size_t kAlignment = 64;
 
   Image() = default;
-  /// Pixels are value-initialised (zero).
+  /// Pixels are value-initialized (zero). Throws std::invalid_argument on a negative size.
   Image(int width, int height) : Image(width, height, T{}) {}
   explicit Image(ImageSize size) : Image(size.width, size.height) {}
   Image(int width, int height, T value) : width_(width), height_(height) {
     if (width < 0 || height < 0) throw std::invalid_argument("Image: negative size");
     const std::size_t row_bytes =
         (static_cast<std::size_t>(width) * sizeof(T) + kAlignment - 1) / kAlignment * kAlignment;
-    // A pixel of three bytes does not divide 64: such rows are padded to a multiple of both.
+    // sizeof(T) may not divide 64 (RGB: 3 bytes): rows are padded to a common multiple of both.
     std::size_t padded = row_bytes;
     while (padded % sizeof(T) != 0) padded += kAlignment;
     stride_ = static_cast<std::ptrdiff_t>(padded / sizeof(T));

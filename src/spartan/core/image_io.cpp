@@ -42,7 +42,7 @@ Result<std::string> png_of(const cv::Mat& mat) {
   try {
     cv::imencode(".png", mat, png);
   } catch (const cv::Exception& e) {
-    return failure(ErrorCode::internal, "a picture cannot be encoded: " + e.msg);
+    return failure(ErrorCode::internal, "cannot encode the image as PNG: " + e.msg);
   }
   return std::string(png.begin(), png.end());
 }
@@ -58,7 +58,7 @@ Status write_encoded(const std::string& path, const Result<std::string>& png) {
   return write_file_atomically(path, *png);
 }
 
-// "Pf\n<width> <height>\n<scale>\n": the next word of the header, its separator taken too.
+// The next word of the PFM header "Pf\n<width> <height>\n<scale>\n"; removes it and its separator from `rest`.
 std::string_view next_word(std::string_view& rest) {
   const std::size_t begin = rest.find_first_not_of(" \t\r\n");
   if (begin == std::string_view::npos) return rest = {};
@@ -79,15 +79,15 @@ bool parse(std::string_view word, T& value) {
 
 Result<FrameImage> decode_image(const std::string& content, const std::string& name) {
   const char* const hint = "replace the file, or remove it to skip the frame";
-  if (const std::string fault = picture_file_fault(content); !fault.empty())
-    return failure(ErrorCode::input, fault, name, hint);
+  if (const std::string error = picture_file_fault(content); !error.empty())
+    return failure(ErrorCode::input, error, name, hint);
   if (is_jpeg(content)) {
     auto image = decode_jpeg(content, JpegColour::as_stored);
     if (!image) return failure(image.error().code, image.error().what, name, hint);
     return image;
   }
   cv::Mat mat = decode(content, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
-  if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", name, hint);
+  if (mat.empty()) return failure(ErrorCode::input, "is damaged or cannot be decoded", name, hint);
   if (mat.channels() == 3) cv::cvtColor(mat, mat, cv::COLOR_BGR2RGB);
   switch (mat.type()) {
     case CV_8UC1:
@@ -99,7 +99,7 @@ Result<FrameImage> decode_image(const std::string& content, const std::string& n
     case CV_16UC3:
       return own<Rgb16>(mat, PixelLayout::rgb);
     default:
-      return failure(ErrorCode::input, "has neither 8 nor 16 bits a sample", name);
+      return failure(ErrorCode::input, "has neither 8 nor 16 bits per sample", name);
   }
 }
 
@@ -112,15 +112,15 @@ Result<FrameImage> read_image(const std::string& path) {
 Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
   const auto content = read_file(path);
   if (!content) return failure(content);
-  if (const std::string fault = picture_file_fault(*content); !fault.empty())
-    return failure(ErrorCode::input, fault, path);
+  if (const std::string error = picture_file_fault(*content); !error.empty())
+    return failure(ErrorCode::input, error, path);
   if (is_jpeg(*content)) {
     const auto image = decode_jpeg(*content, JpegColour::gray);
     if (!image) return failure(image.error().code, image.error().what, path);
     return Image<std::uint8_t>::copy_of(image->as<std::uint8_t>());
   }
   const cv::Mat mat = decode(*content, cv::IMREAD_GRAYSCALE);
-  if (mat.empty()) return failure(ErrorCode::input, "is damaged, or not a picture that can be read", path);
+  if (mat.empty()) return failure(ErrorCode::input, "is damaged or cannot be decoded", path);
   return Image<std::uint8_t>::copy_of(as_view<std::uint8_t>(mat));
 }
 
@@ -168,7 +168,7 @@ Result<Image<float>> parse_pfm(const std::string& content, const std::string& na
       !std::isfinite(scale)) {
     return failure(ErrorCode::input, "is not a single-channel PFM file", name);
   }
-  if (rest.size() < width * height * sizeof(float)) return failure(ErrorCode::input, "PFM file ends early", name);
+  if (rest.size() < width * height * sizeof(float)) return failure(ErrorCode::input, "PFM file is truncated", name);
   Image<float> image(static_cast<int>(width), static_cast<int>(height));
   for (int y = image.height() - 1; y >= 0; --y) {
     for (int x = 0; x < image.width(); ++x, rest.remove_prefix(sizeof(float))) {

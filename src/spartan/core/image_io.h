@@ -1,4 +1,4 @@
-// Image files: PNG, JPEG, PGM/PPM in; PNG, PFM out.
+// Image files: reads PNG, JPEG, PGM/PPM and PFM; writes PNG and PFM.
 #pragma once
 
 #include <string>
@@ -8,16 +8,16 @@
 
 namespace spartan {
 
-/// Decodes a picture file into gray or RGB of 8 or 16 bits (`format.bits` is 8 or 16; a recording that knows
-/// better says so by `with_format`). A file that is missing, empty, truncated (PNG without its end chunk,
-/// JPEG without its end marker, or with damage that its decoder notices) or no picture of these kinds gives an error
-/// with code `input` that names the path and what is wrong.
+/// Decodes an image file into gray or RGB with 8 or 16 bits (`format.bits` is 8 or 16; FrameImage::with_format() sets
+/// a smaller number of significant bits or a Bayer phase). Code `input`, with the path and the reason, if the file is
+/// missing, empty, truncated (PNG without its end chunk, JPEG without its end marker), damaged as far as the decoder
+/// detects it, or of another format.
 Result<FrameImage> read_image(const std::string& path);
 
-/// The same from memory; `name` stands in errors.
+/// The same from memory; `name` is used in error messages.
 Result<FrameImage> decode_image(const std::string& content, const std::string& name);
 
-/// Gray, whatever the file holds (colour by Rec. 601 luma), reduced to 8 bits.
+/// Decodes an image file into 8-bit gray: colour is converted to luma (Rec. 601), 16 bits are reduced to 8.
 Result<Image<std::uint8_t>> read_gray8(const std::string& path);
 
 /// 8- or 16-bit gray or RGB PNG, written atomically; code `output`.
@@ -26,13 +26,14 @@ Status write_png(const std::string& path, ImageView<const std::uint16_t> image);
 Status write_png(const std::string& path, ImageView<const Rgb8> image);
 Status write_png(const std::string& path, ImageView<const Rgb16> image);
 
-/// A PNG file's content.
+/// Encodes an image as PNG in memory.
 Result<std::string> encode_png(ImageView<const std::uint8_t> image);
 Result<std::string> encode_png(ImageView<const Rgb8> image);
 
-/// Single-channel PFM ("Pf"), little endian, bottom row first; NaN is written as +inf (unknown).
+/// Writes a single-channel PFM ("Pf"), little-endian, bottom row first; NaN (unknown) is written as +inf. Code
+/// `output`.
 Status write_pfm(const std::string& path, ImageView<const float> image);
-/// Reads "Pf" of either byte order; +inf becomes NaN.
+/// Reads a single-channel PFM of either byte order; values that are not finite become NaN. Code `input`.
 Result<Image<float>> read_pfm(const std::string& path);
 Result<Image<float>> parse_pfm(const std::string& content, const std::string& name);
 

@@ -22,8 +22,8 @@ using testing::content_of;
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
-// Smooth with some noise, so that JPEG has something to encode in every scan.
-Image<std::uint8_t> picture(int width, int height) {
+// A gradient with noise, so that every JPEG scan contains data.
+Image<std::uint8_t> test_image(int width, int height) {
   Random random(static_cast<std::uint64_t>(width));
   Image<std::uint8_t> image(width, height);
   for (int y = 0; y < height; ++y) {
@@ -50,7 +50,7 @@ void expect_same(ImageView<const Pixel> a, ImageView<const Pixel> b) {
 TEST(ImageIo, PngRoundTrips) {
   const TemporaryFolder folder;
   for (const int width : {1, 5, 64, 65}) {
-    const Image<std::uint8_t> gray = picture(width, 7);
+    const Image<std::uint8_t> gray = test_image(width, 7);
     Image<std::uint16_t> deep(width, 7);
     Image<Rgb8> colour(width, 7);
     for (int y = 0; y < 7; ++y) {
@@ -87,14 +87,14 @@ TEST(ImageIo, ColourBecomesGrayByLuma) {
   EXPECT_NEAR((*gray)(1, 1), 0.299 * 200 + 0.587 * 100 + 0.114 * 50, 1.0);
 }
 
-TEST(ImageIo, WritingAnswersWithAnError) {
+TEST(ImageIo, FailedWritesReturnAnError) {
   const Status status = write_png("/proc/none/a.png", Image<std::uint8_t>(2, 2));
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::output);
   EXPECT_FALSE(write_pfm("/proc/none/a.pfm", Image<float>(2, 2)));
 }
 
-TEST(ImageIo, PfmRoundTripsWithHoles) {
+TEST(ImageIo, PfmRoundTripsWithUnknownValues) {
   const TemporaryFolder folder;
   Image<float> image(7, 3);
   for (int y = 0; y < 3; ++y) {
@@ -120,14 +120,14 @@ TEST(ImageIo, PfmRoundTripsWithHoles) {
   }
 }
 
-TEST(ImageIo, PfmOfTheOtherByteOrder) {
+TEST(ImageIo, ReadsBigEndianPfm) {
   const auto image = parse_pfm(std::string("Pf\n1 2\n1.0\n\x3F\x80\x00\x00\x7F\x80\x00\x00", 19), "a.pfm");
   ASSERT_TRUE(image) << image.error().message();
   EXPECT_EQ((*image)(0, 1), 1.0F);
-  EXPECT_TRUE(std::isnan((*image)(0, 0))) << "inf is unknown";
+  EXPECT_TRUE(std::isnan((*image)(0, 0))) << "inf means unknown";
 }
 
-TEST(ImageIo, PfmThatIsNotWhole) {
+TEST(ImageIo, RejectsTruncatedAndInvalidPfm) {
   const std::string whole = "Pf\n2 2\n-1.0\n" + std::string(16, '\0');
   ASSERT_TRUE(parse_pfm(whole, "a"));
   for (std::size_t size = 0; size < whole.size(); ++size) EXPECT_FALSE(parse_pfm(whole.substr(0, size), "a")) << size;
@@ -139,7 +139,7 @@ TEST(ImageIo, PfmThatIsNotWhole) {
   }
 }
 
-// Every file of these kinds must be refused at any cut, and taken with bytes behind its end.
+// Files of every kind: each must be rejected if truncated anywhere, and accepted with trailing bytes.
 struct Sample {
   const char* name;
   std::string bytes;
@@ -149,7 +149,7 @@ void PrintTo(const Sample& sample, std::ostream* out) {
 }
 
 std::vector<Sample> samples() {
-  const Image<std::uint8_t> gray = picture(61, 43);
+  const Image<std::uint8_t> gray = test_image(61, 43);
   Image<Rgb8> colour(61, 43);
   for (int y = 0; y < 43; ++y) {
     for (int x = 0; x < 61; ++x) colour(x, y) = {gray(x, y), static_cast<std::uint8_t>(4 * x), 90};
@@ -166,17 +166,17 @@ std::vector<Sample> samples() {
           {"ppm", encode(".ppm", c)}};
 }
 
-class PictureFile : public ::testing::TestWithParam<Sample> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, PictureFile, ::testing::ValuesIn(samples()),
+class ImageFile : public ::testing::TestWithParam<Sample> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, ImageFile, ::testing::ValuesIn(samples()),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST_P(PictureFile, IsReadWhole) {
+TEST_P(ImageFile, IsDecoded) {
   const auto image = decode_image(GetParam().bytes, "a");
   ASSERT_TRUE(image) << image.error().message();
   EXPECT_EQ(image->size(), (ImageSize{61, 43}));
 }
 
-TEST_P(PictureFile, IsRefusedAtEveryCut) {
+TEST_P(ImageFile, IsRejectedIfTruncatedAnywhere) {
   const std::string& whole = GetParam().bytes;
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const auto image = decode_image(whole.substr(0, size), "cut");
@@ -186,16 +186,16 @@ TEST_P(PictureFile, IsRefusedAtEveryCut) {
   }
 }
 
-TEST_P(PictureFile, MayHaveBytesBehindItsEnd) {
+TEST_P(ImageFile, MayHaveTrailingBytes) {
   for (const std::string& tail : {std::string(1, '\0'), std::string(3, '\xFF'), std::string("\xFF\xD8 thumbnail")}) {
     const auto image = decode_image(GetParam().bytes + tail, "a");
     ASSERT_TRUE(image) << image.error().message();
   }
 }
 
-// The sample marker of a thumbnail sits inside a table of its own, where the walk must not look for the end.
-TEST(PictureFileJpeg, ThumbnailInsideATableDoesNotEndThePicture) {
-  const Image<std::uint8_t> gray = picture(61, 43);
+// An EXIF thumbnail is itself a JPEG inside a segment: its end marker does not end the image.
+TEST(JpegFile, ThumbnailInASegmentDoesNotEndTheImage) {
+  const Image<std::uint8_t> gray = test_image(61, 43);
   const std::string thumbnail = encode(".jpg", as_mat(gray));
   const std::string whole = encode(".jpg", as_mat(gray));
   const std::size_t length = thumbnail.size() + 2;
@@ -205,8 +205,8 @@ TEST(PictureFileJpeg, ThumbnailInsideATableDoesNotEndThePicture) {
   EXPECT_FALSE(decode_image(with.substr(0, with.size() - 300), "a"));
 }
 
-// OpenCV's decoder, which is the same library, as an oracle for the pixels.
-TEST(PictureFileJpeg, DecodesAsOpenCvDoes) {
+// Reference for the pixels: OpenCV's decoder, which is based on the same library.
+TEST(JpegFile, DecodesAsOpenCv) {
   cv::Mat colour(33, 47, CV_8UC3), gray;
   cv::randu(colour, 0, 256);
   cv::GaussianBlur(colour, colour, {5, 5}, 2);
@@ -223,8 +223,8 @@ TEST(PictureFileJpeg, DecodesAsOpenCvDoes) {
   EXPECT_EQ(cv::norm(as_mat(ours_gray.as<std::uint8_t>()), decoded(gray_file, cv::IMREAD_GRAYSCALE), cv::NORM_INF), 0);
 }
 
-TEST(PictureFileJpeg, PaddingBeforeTheEndIsAllowed) {
-  const std::string whole = encode(".jpg", as_mat(picture(64, 48)));
+TEST(JpegFile, PaddingBeforeTheEndMarkerIsAllowed) {
+  const std::string whole = encode(".jpg", as_mat(test_image(64, 48)));
   std::string padded = whole;
   padded.insert(whole.size() - 2, "\x20\x20\x20", 3);
   const auto image = decode_image(padded, "b.jpg");
@@ -233,9 +233,9 @@ TEST(PictureFileJpeg, PaddingBeforeTheEndIsAllowed) {
   EXPECT_EQ(cv::norm(as_mat(image->as<std::uint8_t>()), as_mat(plain.as<std::uint8_t>()), cv::NORM_INF), 0);
 }
 
-// The markers are all in place, the pixels between them are not.
-TEST(PictureFileJpeg, DamageBetweenTheMarkersIsNoticed) {
-  const std::string whole = encode(".jpg", as_mat(picture(64, 48)));
+// All markers are present, but part of the data between them is missing.
+TEST(JpegFile, DamagedScanDataAreDetected) {
+  const std::string whole = encode(".jpg", as_mat(test_image(64, 48)));
   const std::size_t scan = whole.find("\xFF\xDA");
   ASSERT_NE(scan, std::string::npos);
   std::string cut = whole;
@@ -246,24 +246,24 @@ TEST(PictureFileJpeg, DamageBetweenTheMarkersIsNoticed) {
   EXPECT_THAT(refused.error().message(), HasSubstr("b.jpg: JPEG file is damaged: "));
 }
 
-TEST(PictureFileJpeg, FillBytesBeforeAMarkerAreAllowed) {
-  std::string bytes = encode(".jpg", as_mat(picture(16, 16)));
+TEST(JpegFile, FillBytesBeforeAMarkerAreAllowed) {
+  std::string bytes = encode(".jpg", as_mat(test_image(16, 16)));
   bytes.insert(bytes.size() - 2, "\xFF\xFF");
   bytes.insert(2, "\xFF");
   EXPECT_TRUE(decode_image(bytes, "a"));
 }
 
-TEST(ImageIo, WhatIsNoPicture) {
+TEST(ImageIo, RejectsFilesThatAreNotImages) {
   const TemporaryFolder folder;
-  const auto fault_of = [](const auto& result) {
+  const auto error_of = [](const auto& result) {
     EXPECT_FALSE(result);
     return result ? std::string() : result.error().message();
   };
-  EXPECT_THAT(fault_of(read_image(folder.write("empty.png", ""))), HasSubstr("empty.png: file is empty"));
-  EXPECT_THAT(fault_of(read_gray8(folder.write("empty.png", ""))), HasSubstr("empty.png: file is empty"));
-  EXPECT_THAT(fault_of(read_image(folder.path() + "/none.png")), HasSubstr("none.png"));
-  EXPECT_THAT(fault_of(read_image(folder.path())), HasSubstr("folder"));
-  EXPECT_THAT(fault_of(read_image(folder.write("a.png", "some text"))), HasSubstr("not a PNG"));
+  EXPECT_THAT(error_of(read_image(folder.write("empty.png", ""))), HasSubstr("empty.png: file is empty"));
+  EXPECT_THAT(error_of(read_gray8(folder.write("empty.png", ""))), HasSubstr("empty.png: file is empty"));
+  EXPECT_THAT(error_of(read_image(folder.path() + "/none.png")), HasSubstr("none.png"));
+  EXPECT_THAT(error_of(read_image(folder.path())), HasSubstr("folder"));
+  EXPECT_THAT(error_of(read_image(folder.write("a.png", "some text"))), HasSubstr("not a PNG"));
   EXPECT_FALSE(decode_image("P5\n0 0\n255\n", "a"));
   EXPECT_FALSE(decode_image("P5\n30000 30000\n255\n", "a"));
   EXPECT_FALSE(decode_image("\xFF\xD8\xFF\xD9", "a"));
@@ -277,8 +277,8 @@ TEST(ImageIo, WhatIsNoPicture) {
   }
 }
 
-TEST(ImageIo, DamageInsideAPngIsNoticed) {
-  const std::string whole = encode(".png", as_mat(picture(61, 43)));
+TEST(ImageIo, DamageInsideAPngIsDetected) {
+  const std::string whole = encode(".png", as_mat(test_image(61, 43)));
   for (std::size_t at = 60; at + 20 < whole.size(); at += 97) {  // inside the pixel data
     std::string damaged = whole;
     damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
@@ -286,19 +286,19 @@ TEST(ImageIo, DamageInsideAPngIsNoticed) {
   }
 }
 
-TEST(ImageIo, SizesThatNobodyHasAreTakenForNoise) {
-  std::string png = encode(".png", as_mat(picture(8, 8)));
+TEST(ImageIo, ImplausibleSizesAreRejected) {
+  std::string png = encode(".png", as_mat(test_image(8, 8)));
   png[16] = '\x7F';  // first byte of the width
-  EXPECT_THAT(decode_image(png, "a").error().what, HasSubstr("senseless size"));
-  std::string jpeg = encode(".jpg", as_mat(picture(8, 8)));
+  EXPECT_THAT(decode_image(png, "a").error().what, HasSubstr("implausible image size"));
+  std::string jpeg = encode(".jpg", as_mat(test_image(8, 8)));
   const std::size_t frame = jpeg.find("\xFF\xC0");
   ASSERT_NE(frame, std::string::npos);
   jpeg[frame + 5] = jpeg[frame + 7] = '\x7F';
-  EXPECT_THAT(decode_image(jpeg, "a").error().what, HasSubstr("senseless size"));
+  EXPECT_THAT(decode_image(jpeg, "a").error().what, HasSubstr("implausible image size"));
 }
 
-// Pictures of many makers: cameras of rovers and cars, NASA's archive, OpenCV's examples.
-TEST(PictureFileReal, WholeFilesAreTaken) {
+// Images from many sources: cameras of rovers and cars, NASA's archive, OpenCV's examples.
+TEST(ImageFileReal, IntactFilesAreAccepted) {
   const char* const set = std::getenv("SPARTAN_DATA");
   const char* const source = std::getenv("SPARTAN_SOURCE_DIR");
   const std::string data = set ? set : source ? std::string(source) + "/../shared/data" : "";

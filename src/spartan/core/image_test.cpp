@@ -14,7 +14,7 @@ class ImageOf : public ::testing::Test {};
 using PixelTypes = ::testing::Types<std::uint8_t, std::uint16_t, float, double, Rgb8, Rgb16>;
 TYPED_TEST_SUITE(ImageOf, PixelTypes);
 
-TYPED_TEST(ImageOf, RowsBeginOnBlockBorders) {
+TYPED_TEST(ImageOf, RowsAreAligned) {
   for (const int width : {1, 7, 21, 22, 63, 64, 65, 1226}) {
     const Image<TypeParam> image(width, 3);
     EXPECT_GE(image.stride(), width);
@@ -24,7 +24,7 @@ TYPED_TEST(ImageOf, RowsBeginOnBlockBorders) {
   }
 }
 
-TYPED_TEST(ImageOf, StartsAsZeroAndKeepsWhatIsWritten) {
+TYPED_TEST(ImageOf, IsZeroInitializedAndStoresValues) {
   Image<TypeParam> image(5, 4);
   for (int y = 0; y < 4; ++y) {
     for (int x = 0; x < 5; ++x) EXPECT_EQ(image(x, y), TypeParam{});
@@ -50,7 +50,7 @@ Image<int> numbered(int width, int height) {
   return image;
 }
 
-TEST(Image, SizesWithoutPixels) {
+TEST(Image, EmptyAndInvalidSizes) {
   EXPECT_TRUE(Image<int>().empty());
   EXPECT_TRUE(Image<int>(0, 5).empty());
   EXPECT_TRUE(Image<int>(5, 0).empty());
@@ -58,7 +58,7 @@ TEST(Image, SizesWithoutPixels) {
   EXPECT_THROW(Image<int>(-1, 5), std::invalid_argument);
 }
 
-TEST(Image, MovesAndLeavesNothingBehind) {
+TEST(Image, AMovedFromImageIsEmpty) {
   static_assert(!std::is_copy_constructible_v<Image<int>>);
   static_assert(std::is_nothrow_move_constructible_v<Image<int>>);
   Image<int> from = numbered(4, 3);
@@ -71,7 +71,7 @@ TEST(Image, MovesAndLeavesNothingBehind) {
   EXPECT_EQ(from.data(), nullptr);
 }
 
-TEST(Image, ClonesArePixelsOfTheirOwn) {
+TEST(Image, ClonesAreIndependent) {
   Image<int> original = numbered(4, 3);
   const Image<int> copy = original.clone();
   original(1, 1) = -1;
@@ -92,7 +92,7 @@ TEST(ImageView, CropsShareThePixels) {
   EXPECT_EQ(Image<int>::copy_of(part)(2, 3), 404);
 }
 
-TEST(ImageView, CropsMustLieInside) {
+TEST(ImageView, RejectsCropsOutsideTheImage) {
   const Image<int> image(6, 5);
   EXPECT_NO_THROW(image.view().crop(0, 0, 6, 5));
   EXPECT_THROW(image.view().crop(-1, 0, 1, 1), std::out_of_range);
@@ -103,7 +103,7 @@ TEST(ImageView, CropsMustLieInside) {
   EXPECT_THROW(image.view().crop(1, 1, std::numeric_limits<int>::max(), 1), std::out_of_range);
 }
 
-TEST(ImageView, KnowsItsPixels) {
+TEST(ImageView, ContainsItsPixels) {
   const Image<int> image(6, 5);
   EXPECT_TRUE(image.contains(5, 4));
   EXPECT_FALSE(image.contains(6, 4));

@@ -16,12 +16,12 @@ struct Destroy {
 };
 using Decoder = std::unique_ptr<void, Destroy>;
 
-// Some cameras pad the picture's data; that nothing but the end follows (0xd9) means that all of it was read. The
-// decoder keeps the first of its warnings.
+// Some cameras pad the image data. If only the end marker (0xd9) follows the padding, all data were read. The decoder
+// reports only its first warning.
 bool is_harmless(const Decoder& decoder) {
-  const std::string_view said = tjGetErrorStr2(decoder.get());
+  const std::string_view warning = tjGetErrorStr2(decoder.get());
   return tjGetErrorCode(decoder.get()) == TJERR_WARNING &&
-         said.find("extraneous bytes before marker 0xd9") != std::string_view::npos;
+         warning.find("extraneous bytes before marker 0xd9") != std::string_view::npos;
 }
 
 template <class Pixel>
@@ -30,9 +30,9 @@ Result<FrameImage> decode_as(const Decoder& decoder, std::string_view content, I
   Image<Pixel> pixels(size);
   const int bytes_per_row = static_cast<int>(pixels.stride() * static_cast<std::ptrdiff_t>(sizeof(Pixel)));
   const auto* jpeg = reinterpret_cast<const unsigned char*>(content.data());
-  const int fault = tjDecompress2(decoder.get(), jpeg, content.size(), reinterpret_cast<unsigned char*>(pixels.data()),
+  const int error = tjDecompress2(decoder.get(), jpeg, content.size(), reinterpret_cast<unsigned char*>(pixels.data()),
                                   size.width, bytes_per_row, size.height, kFormat, 0);
-  if (fault != 0 && !is_harmless(decoder)) {
+  if (error != 0 && !is_harmless(decoder)) {
     return failure(ErrorCode::input, std::string("JPEG file is damaged: ") + tjGetErrorStr2(decoder.get()));
   }
   return FrameImage::own(std::move(pixels), {layout, 8, BitAlignment::low});
@@ -42,7 +42,7 @@ Result<FrameImage> decode_as(const Decoder& decoder, std::string_view content, I
 
 Result<FrameImage> decode_jpeg(std::string_view content, JpegColour colour) {
   const Decoder decoder(tjInitDecompress());
-  if (!decoder) return failure(ErrorCode::internal, "the JPEG decoder cannot be started");
+  if (!decoder) return failure(ErrorCode::internal, "cannot create the JPEG decoder");
   ImageSize size;
   int subsampling = 0, stored = 0;
   const auto* jpeg = reinterpret_cast<const unsigned char*>(content.data());
@@ -51,7 +51,7 @@ Result<FrameImage> decode_jpeg(std::string_view content, JpegColour colour) {
   }
   if (size.empty() || size.width > static_cast<int>(kLargestImageSide) ||
       size.height > static_cast<int>(kLargestImageSide)) {
-    return failure(ErrorCode::input, "JPEG header with a senseless size");
+    return failure(ErrorCode::input, "JPEG header with an implausible image size");
   }
   if (colour == JpegColour::gray || stored == TJCS_GRAY) {
     return decode_as<std::uint8_t>(decoder, content, size, PixelLayout::gray);

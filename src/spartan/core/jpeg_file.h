@@ -1,4 +1,4 @@
-// JPEG pictures, decoded so that damage is noticed.
+// Strict JPEG decoding: warnings of the decoder are errors.
 #pragma once
 
 #include <string_view>
@@ -10,10 +10,10 @@ namespace spartan {
 
 enum class JpegColour { as_stored, gray };
 
-/// Gray stays gray, all else becomes RGB of 8 bits (or gray, from its luma, where that is asked for). Any complaint of
-/// the decoder is an error of code `input`, but for padding before the end marker, which some cameras write: it would
-/// fill what it cannot read with gray and go on. A picture is never turned, whatever its EXIF part says: calibrations
-/// hold for the sensor's own rows and columns.
+/// Decodes to 8-bit gray if the file is gray or `colour` is `gray` (its luma), otherwise to 8-bit RGB. Every warning of
+/// the decoder is an error of code `input`, because the decoder fills the data it cannot read with gray; the exception
+/// is padding before the end marker, which some cameras write. The EXIF orientation is ignored: a calibration refers to
+/// the rows and columns of the sensor.
 Result<FrameImage> decode_jpeg(std::string_view content, JpegColour colour);
 
 }  // namespace spartan

@@ -38,7 +38,7 @@ struct Log::Sink {
   explicit Sink(std::vector<spdlog::sink_ptr> sinks) : logger("spartan", sinks.begin(), sinks.end()) {
     logger.set_level(spdlog::level::debug);
     logger.flush_on(spdlog::level::info);
-    logger.set_error_handler([](const std::string&) {});  // a full disk must not print once a message
+    logger.set_error_handler([](const std::string&) {});  // a full disk must not print an error for each message
   }
   spdlog::logger logger;
 };
@@ -58,7 +58,7 @@ Log Log::with_file(const std::string& path) const {
     file->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l: %v");
     sinks.push_back(std::move(file));
   } catch (const spdlog::spdlog_ex&) {
-    // Documented: without the file the other sinks have to do.
+    // As documented, the other sinks are kept.
   }
   Log log;
   log.sink_ = std::make_shared<Sink>(std::move(sinks));

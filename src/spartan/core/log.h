@@ -1,4 +1,4 @@
-// One sink for what the library has to say to people.
+// Logging to standard error and to a file.
 #pragma once
 
 #include <memory>
@@ -9,14 +9,14 @@ namespace spartan {
 
 enum class LogLevel { debug, info, warning, error, off };
 
-/// Where messages go: standard error, optionally a file too. A value that is handed on; copies share the sink.
-/// A default-made Log says nothing.
+/// A logger that is passed by value; copies share their sinks. A default-constructed Log discards all messages.
 class Log {
  public:
   Log() = default;
   /// Messages of at least `level` to standard error.
   static Log to_terminal(LogLevel level);
-  /// This log, and everything from `info` up to the file too (appended). Where the file cannot be opened, this log.
+  /// This log with an additional file sink (appended, level `info` and above). If the file cannot be opened, the result
+  /// equals this log.
   Log with_file(const std::string& path) const;
 
   void debug(std::string_view text) const { write(LogLevel::debug, text); }

@@ -11,14 +11,14 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Log, WithoutASinkSaysNothing) {
+TEST(Log, WithoutASinkDiscardsMessages) {
   ::testing::internal::CaptureStderr();
   const Log log;
-  log.error("nobody hears this");
+  log.error("discarded");
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
-TEST(Log, TheFileGetsEverythingFromInfoUp) {
+TEST(Log, TheFileReceivesLevelInfoAndAbove) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.write("log.txt", "earlier\n");
   ::testing::internal::CaptureStderr();
@@ -28,23 +28,23 @@ TEST(Log, TheFileGetsEverythingFromInfoUp) {
     log.debug("a detail");
     copy.info("a {brace} is no format");
     log.warning("a warning");
-    log.error("a fault");
+    log.error("an error");
   }
   const std::string terminal = ::testing::internal::GetCapturedStderr();
   const std::string file = testing::content_of(path);
   EXPECT_THAT(file, HasSubstr("earlier\n"));
   EXPECT_THAT(file, HasSubstr("info: a {brace} is no format\n"));
   EXPECT_THAT(file, HasSubstr("warning: a warning\n"));
-  EXPECT_THAT(file, HasSubstr("error: a fault\n"));
+  EXPECT_THAT(file, HasSubstr("error: an error\n"));
   EXPECT_THAT(file, Not(HasSubstr("a detail")));
-  EXPECT_THAT(terminal, HasSubstr("a fault"));
+  EXPECT_THAT(terminal, HasSubstr("an error"));
   EXPECT_THAT(terminal, Not(HasSubstr("a warning")));
 }
 
-TEST(Log, AFileThatCannotBeOpenedIsNoFault) {
+TEST(Log, AFileThatCannotBeOpenedIsIgnored) {
   ::testing::internal::CaptureStderr();
-  Log::to_terminal(LogLevel::info).with_file("/proc/none/log.txt").info("still heard");
-  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("still heard"));
+  Log::to_terminal(LogLevel::info).with_file("/proc/none/log.txt").info("still printed");
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("still printed"));
 }
 
 }  // namespace

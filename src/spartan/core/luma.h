@@ -1,4 +1,4 @@
-// Gray of colour.
+// Conversion of colour to gray.
 #pragma once
 
 #include "spartan/core/image.h"

@@ -1,4 +1,4 @@
-// The middle one of some values.
+// The median of a list of values.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace spartan {
 
-/// The upper one of the two in the middle where their number is even; 0 without any.
+/// The median; for an even number of values the larger of the two middle ones; T{} for an empty list.
 template <class T>
 T median(std::vector<T> values) {
   if (values.empty()) return T{};

@@ -1,4 +1,4 @@
-// The only public header that knows cv::Mat. Views share memory with the matrix; nothing is copied.
+// Conversion between cv::Mat and image views without copying. The only public header that includes OpenCV.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -36,7 +36,8 @@ struct MatType<Rgb16> {
 };
 }  // namespace opencv_detail
 
-/// A matrix over the view's memory. Channel order stays as it lies (Rgb8: R, G, B).
+/// A cv::Mat header that refers to the view's memory. The channel order is unchanged (Rgb8: R, G, B; OpenCV's own
+/// functions expect B, G, R). Constness of the pixels is lost.
 template <class T>
 cv::Mat as_mat(ImageView<T> view) {
   using Pixel = std::remove_const_t<T>;
@@ -52,15 +53,15 @@ cv::Mat as_mat(const Image<T>& image) {
   return as_mat(image.view());
 }
 
-/// A view over the matrix's memory; throws where the element type is another.
+/// A view of the matrix's memory; throws std::invalid_argument if the element type differs.
 template <class T>
 ImageView<T> as_view(cv::Mat& mat) {
-  if (mat.type() != opencv_detail::MatType<T>::value) throw std::invalid_argument("as_view: other element type");
+  if (mat.type() != opencv_detail::MatType<T>::value) throw std::invalid_argument("as_view: the element type differs");
   return {mat.ptr<T>(), mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step / sizeof(T))};
 }
 template <class T>
 ImageView<const T> as_view(const cv::Mat& mat) {
-  if (mat.type() != opencv_detail::MatType<T>::value) throw std::invalid_argument("as_view: other element type");
+  if (mat.type() != opencv_detail::MatType<T>::value) throw std::invalid_argument("as_view: the element type differs");
   return {mat.ptr<T>(), mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step / sizeof(T))};
 }
 

@@ -1,76 +1,35 @@
 #include "spartan/core/options.h"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <set>
 #include <sstream>
 
 #include "spartan/core/files.h"
+#include "spartan/core/strict_yaml.h"
 
 namespace spartan::options_detail {
 
-// The maps that the visitor is inside of, innermost last, with the keys that were asked for in each.
+// A YAML document and the state of its traversal: the open groups and lists, innermost last.
 class Tree {
  public:
-  struct Level {
-    YAML::Node map;
-    std::string prefix;
-    std::set<std::string> known;
-  };
-  std::string name;
-  bool has_lines = true;  // false: text of a command line
-  std::vector<Level> levels;
-  std::vector<YAML::Node> lists;  // open ones, innermost last
-  std::vector<std::string> faults;
+  Tree(std::string name, const YamlNode& root, bool has_lines) : errors(std::move(name), has_lines) { enter(root, ""); }
+  Tree(const Tree&) = delete;
+  Tree& operator=(const Tree&) = delete;
+
+  // A group without content has no keys.
+  void enter(const YamlNode& node, const std::string& path) {
+    levels.emplace_back(node.is_null() ? YamlNode::map_of({}) : node, path, errors);
+  }
+
+  YamlErrors errors;
+  std::vector<YamlMap> levels;
+  std::vector<YamlNode> lists;
   std::vector<std::string> warnings;
-
-  std::string place(const YAML::Node& node, std::string_view key) const {
-    const YAML::Mark mark = node.Mark();
-    const std::string line = mark.is_null() || !has_lines ? "" : fmt::format(":{}", mark.line + 1);
-    return fmt::format("{}{}: {}{}", name, line, levels.back().prefix, key);
-  }
-  void fault(const YAML::Node& node, std::string_view key, const std::string& what) {
-    faults.push_back(fmt::format("{}: {}", place(node, key), what));
-  }
-
-  // The scalar or sequence under `key`, where it is given.
-  std::optional<YAML::Node> find(std::string_view key) {
-    Level& level = levels.back();
-    level.known.insert(std::string(key));
-    const YAML::Node map = level.map;  // const: looking must not insert
-    if (!map.IsMap()) return std::nullopt;
-    const YAML::Node node = map[std::string(key)];
-    if (!node.IsDefined()) return std::nullopt;
-    return node;
-  }
-
-  void report_unknown_and_repeated() {
-    const Level& level = levels.back();
-    if (!level.map.IsMap()) return;
-    std::set<std::string> seen;
-    for (const auto& entry : level.map) {
-      const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "(not a name)";
-      if (!seen.insert(key).second) fault(entry.first, key, "is given twice");
-      if (level.known.contains(key)) continue;
-      std::string known;
-      for (const std::string& k : level.known) known += (known.empty() ? "" : ", ") + k;
-      fault(entry.first, key, "unknown key; known here: " + known);
-    }
-  }
 };
 
 namespace {
-
-template <class T>
-std::optional<T> convert(const YAML::Node& node) {
-  try {
-    return node.as<T>();
-  } catch (const YAML::Exception&) {
-    return std::nullopt;
-  }
-}
 
 std::string number(double value) {
   return fmt::format("{}", value);
@@ -98,110 +57,80 @@ bool inside(double value, Bounds bounds) {
 }  // namespace
 
 void Reader::field(std::string_view key, bool& value, std::string_view) {
-  const auto node = tree_->find(key);
-  if (!node) return;
-  if (const auto read = convert<bool>(*node)) {
-    value = *read;
-  } else {
-    tree_->fault(*node, key, "must be true or false");
-  }
+  YamlMap& map = tree_->levels.back();
+  if (map.has(key)) value = map.boolean(key).value_or(value);
 }
 
 void Reader::field(std::string_view key, int& value, std::string_view, Bounds bounds) {
-  const auto node = tree_->find(key);
-  if (!node) return;
-  const auto read = convert<int>(*node);
-  if (!read) return tree_->fault(*node, key, "must be a whole number");
-  if (!inside(*read, bounds))
-    return tree_->fault(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
+  YamlMap& map = tree_->levels.back();
+  const auto read = map.has(key) ? map.integer(key) : std::nullopt;
+  if (!read) return;
+  if (!inside(*read, bounds)) return map.add_error(key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
   value = *read;
 }
 
 void Reader::field(std::string_view key, double& value, std::string_view, Bounds bounds) {
-  const auto node = tree_->find(key);
-  if (!node) return;
-  const auto read = convert<double>(*node);
-  if (!read) return tree_->fault(*node, key, "must be a number");
-  if (!std::isfinite(*read)) return tree_->fault(*node, key, "must be a finite number");
-  if (!inside(*read, bounds))
-    return tree_->fault(*node, key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
+  YamlMap& map = tree_->levels.back();
+  const auto read = map.has(key) ? map.number(key) : std::nullopt;
+  if (!read) return;
+  if (!inside(*read, bounds)) return map.add_error(key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
   value = *read;
 }
 
 void Reader::field(std::string_view key, std::string& value, std::string_view,
                    const std::vector<std::string>& choices) {
-  const auto node = tree_->find(key);
-  if (!node) return;
-  const auto read = convert<std::string>(*node);
-  if (!read || node->IsNull()) return tree_->fault(*node, key, "must be text");
-  if (!choices.empty() && std::find(choices.begin(), choices.end(), *read) == choices.end()) {
-    return tree_->fault(*node, key, fmt::format("is '{}', must be one of: {}", *read, fmt::join(choices, ", ")));
-  }
-  value = *read;
+  YamlMap& map = tree_->levels.back();
+  if (!map.has(key)) return;
+  value = (choices.empty() ? map.text(key) : map.choice(key, choices)).value_or(value);
 }
 
 void Reader::field(std::string_view key, std::vector<double>& value, std::string_view, Bounds bounds) {
-  const auto node = tree_->find(key);
-  if (!node) return;
-  const auto read = convert<std::vector<double>>(*node);
-  if (!read) return tree_->fault(*node, key, "must be a list of numbers");
+  YamlMap& map = tree_->levels.back();
+  const auto read = map.has(key) ? map.numbers(key) : std::nullopt;
+  if (!read) return;
   for (const double v : *read) {
-    if (!inside(v, bounds))
-      return tree_->fault(*node, key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
+    if (!inside(v, bounds)) return map.add_error(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
   }
   value = *read;
 }
 
 void Reader::renamed(std::string_view old_key, std::string_view key) {
-  const auto former = tree_->find(old_key);
-  Tree::Level& level = tree_->levels.back();
-  level.known.erase(std::string(old_key));
-  if (!former) return;
-  if (tree_->find(key)) {
-    return tree_->fault(*former, old_key, fmt::format("is the former name of {}, which is given too", key));
-  }
-  tree_->warnings.push_back(fmt::format("{} is now called {}; the former name is accepted for this version only",
-                                        tree_->place(*former, old_key), key));
-  level.map[std::string(key)] = *former;
-  level.map.remove(std::string(old_key));
+  YamlMap& map = tree_->levels.back();
+  const std::string where = tree_->errors.location(map.path(old_key));
+  if (!map.rename(old_key, key)) return;
+  tree_->warnings.push_back(
+      fmt::format("{} is now called {}; the former name is accepted for this version only", where, key));
 }
 
 bool Reader::enter(std::string_view key) {
-  const auto node = tree_->find(key);
-  if (node && !node->IsMap() && !node->IsNull()) {
-    tree_->fault(*node, key, "must be a group of keys");
-    return false;
-  }
-  // A group that is not given is entered too, so that its keys keep their values.
-  tree_->levels.push_back({node ? *node : YAML::Node(), tree_->levels.back().prefix + std::string(key) + ".", {}});
+  // A group that the document does not have is entered too: its fields keep their values.
+  YamlMap& map = tree_->levels.back();
+  tree_->enter(map.optional_node(key).value_or(YamlNode()), map.path(key));
   return true;
 }
 
 void Reader::leave() {
-  tree_->report_unknown_and_repeated();
+  tree_->levels.back().reject_unknown_keys();
   tree_->levels.pop_back();
 }
 
 std::optional<std::size_t> Reader::open_list(std::string_view key) {
-  const auto node = tree_->find(key);
+  YamlMap& map = tree_->levels.back();
+  const auto node = map.optional_node(key);
   if (!node) return std::nullopt;
-  if (!node->IsSequence()) {
-    tree_->fault(*node, key, "must be a list of groups of keys");
+  if (!node->is_list()) {
+    map.add_error(key, "must be a list of groups of `key: value` lines");
     return std::nullopt;
   }
   tree_->lists.push_back(*node);
-  return node->size();
+  return node->items().size();
 }
 
 bool Reader::enter_item(std::string_view key, std::size_t index) {
-  const YAML::Node list = tree_->lists.back();
-  const YAML::Node item = list[index];
-  const std::string name = fmt::format("{}[{}]", key, index);
-  if (!item.IsMap()) {
-    tree_->fault(item, name, "must be a group of keys");
-    return false;
-  }
-  tree_->levels.push_back({item, tree_->levels.back().prefix + name + ".", {}});
+  const YamlNode item = tree_->lists.back().items()[index];
+  const std::string path = tree_->levels.back().path(fmt::format("{}[{}]", key, index));
+  tree_->errors.set_line(path, item.line());
+  tree_->levels.emplace_back(item, path, tree_->errors);
   return true;
 }
 
@@ -210,40 +139,37 @@ void Reader::close_list() {
 }
 
 Status Reader::finish() {
-  tree_->report_unknown_and_repeated();
-  if (tree_->faults.empty()) return {};
-  std::string text;
-  for (const std::string& fault : tree_->faults) text += (text.empty() ? "" : "\n") + fault;
-  return failure(ErrorCode::configuration, text, {}, "`spartan config dump` lists every option with its meaning");
+  tree_->levels.back().reject_unknown_keys();
+  return tree_->errors.status("`spartan config dump` lists every option with its meaning");
 }
 
 std::vector<std::string> Reader::warnings() const {
   return tree_->warnings;
 }
 
-void Validator::fault(std::string_view key, std::string_view what) {
-  faults_ += fmt::format("{}{}{} {}", faults_.empty() ? "" : "\n", prefix_, key, what);
+void Validator::add_error(std::string_view key, std::string_view what) {
+  errors_ += fmt::format("{}{}{} {}", errors_.empty() ? "" : "\n", prefix_, key, what);
 }
 void Validator::field(std::string_view key, const int& value, std::string_view, Bounds bounds) {
-  if (!inside(value, bounds)) fault(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
+  if (!inside(value, bounds)) add_error(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
 }
 void Validator::field(std::string_view key, const double& value, std::string_view, Bounds bounds) {
-  if (!std::isfinite(value)) return fault(key, "must be a finite number");
-  if (!inside(value, bounds)) fault(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
+  if (!std::isfinite(value)) return add_error(key, "must be a finite number");
+  if (!inside(value, bounds)) add_error(key, fmt::format("is {}, must be {}", value, bounds_text(bounds)));
 }
 void Validator::field(std::string_view key, const std::string& value, std::string_view,
                       const std::vector<std::string>& choices) {
   if (choices.empty() || std::find(choices.begin(), choices.end(), value) != choices.end()) return;
-  fault(key, fmt::format("is '{}', must be one of: {}", value, fmt::join(choices, ", ")));
+  add_error(key, fmt::format("is '{}', must be one of: {}", value, fmt::join(choices, ", ")));
 }
 void Validator::field(std::string_view key, const std::vector<double>& value, std::string_view, Bounds bounds) {
   for (const double v : value) {
-    if (!inside(v, bounds)) return fault(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
+    if (!inside(v, bounds)) return add_error(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
   }
 }
 Status Validator::finish(std::string_view name) const {
-  if (faults_.empty()) return {};
-  return failure(ErrorCode::configuration, faults_, std::string(name),
+  if (errors_.empty()) return {};
+  return failure(ErrorCode::configuration, errors_, std::string(name),
                  "`spartan config dump` lists every option with its meaning");
 }
 
@@ -260,9 +186,7 @@ void Lister::field(std::string_view key, const std::string& value, std::string_v
                    const std::vector<std::string>& choices) {
   std::string text(meaning);
   if (!choices.empty()) text += fmt::format(" ({})", fmt::join(choices, " | "));
-  YAML::Emitter quoted;
-  quoted << YAML::DoubleQuoted << value;
-  lines.push_back({prefix_ + std::string(key), quoted.c_str(), text});
+  lines.push_back({prefix_ + std::string(key), yaml_quoted(value), text});
 }
 void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds) {
   lines.push_back({prefix_ + std::string(key), fmt::format("[{}]", fmt::join(value, ", ")), std::string(meaning)});
@@ -275,20 +199,9 @@ std::string Lister::in_flow_style(const std::vector<OptionLine>& lines) {
 }
 
 Result<std::shared_ptr<Tree>> parse(const std::string& text, const std::string& name) {
-  auto tree = std::make_shared<Tree>();
-  tree->name = name;
-  try {
-    const YAML::Node root = YAML::Load(text);
-    if (!root.IsNull() && !root.IsMap()) {
-      return failure(ErrorCode::configuration, "must be a list of `key: value` lines", name + ":1");
-    }
-    tree->levels.push_back({root, "", {}});
-  } catch (const YAML::ParserException& e) {
-    return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, fmt::format("{}:{}", name, e.mark.line + 1));
-  } catch (const YAML::Exception& e) {
-    return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, name);
-  }
-  return tree;
+  const auto root = parse_yaml(text, name);
+  if (!root) return failure(root);
+  return std::make_shared<Tree>(name, *root, true);
 }
 
 Result<std::shared_ptr<Tree>> load(const std::string& path) {
@@ -303,24 +216,14 @@ Result<std::shared_ptr<Tree>> from_assignment(const std::string& assignment) {
   if (equals == std::string::npos || equals == 0) {
     return failure(ErrorCode::usage, "'" + assignment + "' is not of the form key=value", "--set");
   }
-  auto tree = std::make_shared<Tree>();
-  tree->name = name;
-  tree->has_lines = false;
-  try {
-    // a.b.c=v → {a: {b: {c: v}}}
-    YAML::Node node = YAML::Load(assignment.substr(equals + 1));
-    std::vector<std::string> keys = split_key(assignment.substr(0, equals));
-    std::reverse(keys.begin(), keys.end());
-    for (const std::string& key : keys) {
-      YAML::Node map(YAML::NodeType::Map);
-      map[key] = node;
-      node = map;
-    }
-    tree->levels.push_back({node, "", {}});
-  } catch (const YAML::Exception& e) {
-    return failure(ErrorCode::usage, "not a valid value: " + e.msg, name);
-  }
-  return tree;
+  const auto value = parse_yaml(assignment.substr(equals + 1), name);
+  if (!value) return failure(ErrorCode::usage, value.error().what, name);
+  // a.b.c=v → {a: {b: {c: v}}}
+  std::vector<std::string> keys = split_key(assignment.substr(0, equals));
+  std::reverse(keys.begin(), keys.end());
+  YamlNode node = *value;
+  for (const std::string& key : keys) node = YamlNode::map_of({{YamlNode::text(key), node}});
+  return std::make_shared<Tree>(name, node, false);
 }
 
 std::string to_yaml(const std::vector<OptionLine>& lines) {
@@ -344,25 +247,21 @@ std::string to_yaml(const std::vector<OptionLine>& lines) {
 namespace spartan {
 
 std::string place_of_option(const std::string& text, const std::string& name, const std::string& key) {
-  std::string nowhere = fmt::format("{}: {}", name, key);
-  try {
-    YAML::Node node = YAML::Load(text);
-    int line = 0;
-    for (const std::string& part : options_detail::split_key(key)) {
-      if (!node.IsMap()) return nowhere;
-      YAML::Node inner(YAML::NodeType::Undefined);
-      for (const auto& entry : node) {
-        if (!entry.first.IsScalar() || entry.first.Scalar() != part) continue;
-        line = entry.first.Mark().line + 1;
-        inner.reset(entry.second);
-      }
-      if (!inner.IsDefined()) return nowhere;
-      node.reset(inner);
-    }
-    return fmt::format("{}:{}: {}", name, line, key);
-  } catch (const YAML::Exception&) {
-    return nowhere;
+  const std::string without_line = fmt::format("{}: {}", name, key);
+  const auto root = parse_yaml(text, name);
+  if (!root) return without_line;
+  YamlNode node = *root;
+  int line = 0;
+  for (const std::string& part : options_detail::split_key(key)) {
+    const std::vector<YamlEntry>& entries = node.entries();
+    const auto found = std::find_if(entries.begin(), entries.end(), [&](const YamlEntry& entry) {
+      return entry.key.is_scalar() && entry.key.scalar() == part;
+    });
+    if (found == entries.end()) return without_line;
+    line = found->key.line();
+    node = YamlNode(found->value);
   }
+  return fmt::format("{}:{}: {}", name, line, key);
 }
 
 }  // namespace spartan

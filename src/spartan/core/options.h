@@ -1,17 +1,18 @@
 // Option structs and their YAML files.
 //
-// A struct lists its fields once; reading, dumping and checking follow from that:
+// A struct describes its fields once; reading, dumping and validation are derived from the description:
 //
 //   struct SpeckleOptions {
 //     int size_px = 100;
 //     template <class Visitor> void describe(Visitor& v) {
-//       v.field("size_px", size_px, "patches smaller than this are dropped", at_least(0));
+//       v.field("size_px", size_px, "Speckles of fewer pixels are removed; raising it removes larger ones.",
+//       at_least(0));
 //     }
 //   };
 //
-// Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. An enum is a field
-// where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field or a
-// group accepts the key's former name, with a warning. A key carries its unit (docs/conventions.md).
+// Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. An enum is a
+// field where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field
+// or a group accepts the key's former name, with a warning. A key carries its unit (docs/conventions.md).
 #pragma once
 
 #include <array>
@@ -28,7 +29,7 @@
 
 namespace spartan {
 
-/// Bounds of a numeric option, both ends included. Values that are not finite are always refused.
+/// Bounds of a numeric option, both inclusive. Values that are not finite are always rejected.
 struct Bounds {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -40,7 +41,8 @@ inline Bounds between(double low, double high) {
   return {low, high};
 }
 
-/// The name of an enum's value in files. A function beside the enum lists them, found by the enum's namespace:
+/// The name of an enum value in files. A function in the namespace of the enum lists them (found by argument-dependent
+/// lookup):
 ///
 ///   enum class Order { rows, columns };
 ///   constexpr auto enum_names(Order) {
@@ -52,7 +54,7 @@ struct EnumName {
   const char* name;
 };
 
-/// The name of a value that `enum_names` lists.
+/// The name of an enum value; empty if enum_names() does not list it.
 template <class Enum>
   requires std::is_enum_v<Enum>
 constexpr std::string_view name_of(Enum value) {
@@ -62,7 +64,7 @@ constexpr std::string_view name_of(Enum value) {
   return {};
 }
 
-/// The value with that name, if there is one.
+/// The enum value with that name, if there is one.
 template <class Enum>
   requires std::is_enum_v<Enum>
 constexpr std::optional<Enum> value_named(std::string_view name) {
@@ -72,7 +74,7 @@ constexpr std::optional<Enum> value_named(std::string_view name) {
   return std::nullopt;
 }
 
-/// One line of an option listing: "reconstruction.sgm.p1", its value as YAML text, what it means.
+/// One line of an option listing: the full key ("reconstruction.sgm.p1"), the value as YAML text, and the meaning.
 struct OptionLine {
   std::string key;
   std::string value;
@@ -81,7 +83,7 @@ struct OptionLine {
 
 namespace options_detail {
 
-// A parsed YAML tree; hides the parser from this header.
+// A parsed YAML document; hides the YAML library from this header.
 class Tree;
 
 template <class Enum>
@@ -91,6 +93,7 @@ std::vector<std::string> choices_of() {
   return names;
 }
 
+// Visitor that assigns the values of a YAML document to the described fields.
 class Reader {
  public:
   explicit Reader(std::shared_ptr<Tree> tree) : tree_(std::move(tree)) {}
@@ -116,7 +119,7 @@ class Reader {
       leave();
     }
   }
-  /// Items that are given replace the whole list.
+  /// A list in the document replaces the whole list.
   template <class Group>
   void list(std::string_view key, std::vector<Group>& values, std::string_view) {
     const std::optional<std::size_t> count = open_list(key);
@@ -130,9 +133,9 @@ class Reader {
     }
     close_list();
   }
-  /// All faults in one error.
+  /// All errors of the document in one Error.
   Status finish();
-  /// Warnings of former names that were used.
+  /// A warning for each former name in the document.
   std::vector<std::string> warnings() const;
 
  private:
@@ -144,6 +147,7 @@ class Reader {
   std::shared_ptr<Tree> tree_;
 };
 
+// Visitor that lists keys, values and meanings.
 class Lister {
  public:
   void field(std::string_view key, const bool& value, std::string_view meaning);
@@ -165,7 +169,7 @@ class Lister {
     value.describe(*this);
     prefix_.resize(length);
   }
-  /// One line: the items as YAML in flow style.
+  /// One line: the items in YAML flow style.
   template <class Group>
   void list(std::string_view key, std::vector<Group>& values, std::string_view meaning) {
     std::string items;
@@ -183,6 +187,7 @@ class Lister {
   std::string prefix_;
 };
 
+// Visitor that checks values against their bounds and choices.
 class Validator {
  public:
   void field(std::string_view, const bool&, std::string_view) {}
@@ -194,7 +199,7 @@ class Validator {
   template <class Enum>
     requires std::is_enum_v<Enum>
   void field(std::string_view key, const Enum& value, std::string_view) {
-    if (name_of(value).empty()) fault(key, "is not one of the values of its enum");
+    if (name_of(value).empty()) add_error(key, "is not one of the values of its enum");
   }
   void renamed(std::string_view, std::string_view) {}
   template <class Group>
@@ -208,13 +213,13 @@ class Validator {
   void list(std::string_view key, std::vector<Group>& values, std::string_view) {
     for (std::size_t i = 0; i < values.size(); ++i) group(std::string(key) + "[" + std::to_string(i) + "]", values[i]);
   }
-  /// All faults in one error.
+  /// All errors in one Error.
   Status finish(std::string_view name) const;
 
  private:
-  void fault(std::string_view key, std::string_view what);
+  void add_error(std::string_view key, std::string_view what);
   std::string prefix_;
-  std::string faults_;
+  std::string errors_;
 };
 
 Result<std::shared_ptr<Tree>> parse(const std::string& text, const std::string& name);
@@ -224,12 +229,13 @@ std::string to_yaml(const std::vector<OptionLine>& lines);
 
 }  // namespace options_detail
 
-/// "name:line: group.key" for a key of a YAML text, for complaints that concern several keys; "name: group.key" where
-/// the text does not have the key.
+/// The location "name:line: group.key" of a key in a YAML text, for errors that concern several keys; "name: group.key"
+/// if the text does not have the key.
 std::string place_of_option(const std::string& text, const std::string& name, const std::string& key);
 
-/// Reads YAML text over the given values: what the text does not name keeps its value. Unknown keys, wrong
-/// types and values out of bounds are refused, all of them in one error with "name:line: key".
+/// Reads options from YAML text. Fields that the text does not contain keep their values in `defaults`. Unknown and
+/// repeated keys, wrong types and values out of bounds are errors (code `configuration`), all reported in one Error,
+/// each on a line "name:line: key: reason".
 template <class Options>
 Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {}) {
   auto tree = options_detail::parse(text, name);
@@ -240,7 +246,7 @@ Result<Options> parse_options(const std::string& text, const std::string& name, 
   return defaults;
 }
 
-/// The same from a file.
+/// The same from a file; code `configuration` also if the file cannot be read.
 template <class Options>
 Result<Options> load_options(const std::string& path, Options defaults = {}) {
   auto tree = options_detail::load(path);
@@ -251,7 +257,7 @@ Result<Options> load_options(const std::string& path, Options defaults = {}) {
   return defaults;
 }
 
-/// Applies one "group.key=value", as given on a command line. Errors have code `usage`.
+/// Applies one assignment "group.key=value" of a command line. Errors have code `usage`.
 template <class Options>
 Result<Options> set_option(Options options, const std::string& assignment) {
   auto tree = options_detail::from_assignment(assignment);
@@ -265,8 +271,9 @@ Result<Options> set_option(Options options, const std::string& assignment) {
   return options;
 }
 
-/// Checks values that were set in code against the bounds and choices of their description. `name` is what the options
-/// are of ("odometry options"); the error (code `configuration`) names every field that is wrong, its value and bound.
+/// Checks values that were set in code against the bounds and choices of their description. `name` names the options in
+/// the error ("odometry options"). The error (code `configuration`) lists every invalid field with its value and
+/// bounds.
 template <class Options>
 Status validate(Options options, std::string_view name) {
   options_detail::Validator validator;
@@ -274,8 +281,8 @@ Status validate(Options options, std::string_view name) {
   return validator.finish(name);
 }
 
-/// "name:line: group.old is now called new" for each former name of an option that the text uses; parse_options() accepts
-/// them for one version. Empty where the text cannot be parsed.
+/// A warning "name:line: group.old is now called new" for each former name of an option in the text; parse_options()
+/// accepts former names for one version. Empty if the text cannot be parsed.
 template <class Options>
 std::vector<std::string> renamed_options(const std::string& text, const std::string& name, Options options = {}) {
   auto tree = options_detail::parse(text, name);
@@ -285,7 +292,7 @@ std::vector<std::string> renamed_options(const std::string& text, const std::str
   return reader.warnings();
 }
 
-/// The same for one "group.key=value".
+/// The same for one assignment "group.key=value".
 template <class Options>
 std::vector<std::string> renamed_options(const std::string& assignment, Options options = {}) {
   auto tree = options_detail::from_assignment(assignment);
@@ -295,7 +302,7 @@ std::vector<std::string> renamed_options(const std::string& assignment, Options 
   return reader.warnings();
 }
 
-/// Every option with its value and meaning, in the order of description.
+/// Every option with its value and meaning, in the order of the description.
 template <class Options>
 std::vector<OptionLine> list_options(Options options) {
   options_detail::Lister lister;
@@ -303,7 +310,7 @@ std::vector<OptionLine> list_options(Options options) {
   return lister.lines;
 }
 
-/// YAML with the meanings as comments; parse_options() of it gives the same values, bit for bit.
+/// The options as YAML with their meanings as comments; parse_options() restores the same values bit for bit.
 template <class Options>
 std::string dump_options(const Options& options) {
   return options_detail::to_yaml(list_options(options));

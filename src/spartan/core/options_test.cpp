@@ -20,8 +20,8 @@ struct SpeckleOptions {
   double difference_px = 1.5;
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("size_px", size_px, "patches smaller than this are dropped", at_least(0));
-    v.field("difference_px", difference_px, "largest step inside a patch", between(0, 10));
+    v.field("size_px", size_px, "Speckles of fewer pixels are removed.", at_least(0));
+    v.field("difference_px", difference_px, "Largest difference of neighbours in a speckle, in px.", between(0, 10));
   }
 };
 
@@ -34,11 +34,11 @@ struct MatcherOptions {
   SpeckleOptions speckle;
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("enabled", enabled, "whether to match at all");
-    v.field("method", method, "how to match", {"sgm", "block"});
-    v.field("note", note, "free text");
-    v.field("lengths_m", lengths_m, "lengths", at_least(0));
-    v.field("gain", gain, "any finite number");
+    v.field("enabled", enabled, "Whether to match.");
+    v.field("method", method, "Matching method.", {"sgm", "block"});
+    v.field("note", note, "Free text.");
+    v.field("lengths_m", lengths_m, "Lengths in m.", at_least(0));
+    v.field("gain", gain, "Any finite number.");
     v.group("speckle", speckle);
   }
 };
@@ -48,8 +48,8 @@ struct MaskOptions {
   int rows = 1;
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("name", name, "of the mask");
-    v.field("rows", rows, "masked", between(1, 9));
+    v.field("name", name, "Name of the mask.");
+    v.field("rows", rows, "Number of masked rows.", between(1, 9));
   }
 };
 
@@ -59,14 +59,14 @@ struct RunOptions {
   template <class Visitor>
   void describe(Visitor& v) {
     v.group("matcher", matcher);
-    v.field("threads", threads, "how many", between(1, 64));
+    v.field("threads", threads, "Number of threads.", between(1, 64));
   }
 };
 
 Result<RunOptions> parse(const std::string& text) {
   return parse_options<RunOptions>(text, "run.yaml");
 }
-std::string fault_of(const std::string& text) {
+std::string error_of(const std::string& text) {
   const auto result = parse(text);
   EXPECT_FALSE(result) << text;
   if (result) return {};
@@ -74,7 +74,7 @@ std::string fault_of(const std::string& text) {
   return result.error().message();
 }
 
-TEST(Options, WhatIsNotNamedKeepsItsValue) {
+TEST(Options, MissingKeysKeepTheirDefaults) {
   const auto options = parse("matcher:\n  speckle:\n    size_px: 7\n");
   ASSERT_TRUE(options);
   EXPECT_EQ(options->matcher.speckle.size_px, 7);
@@ -94,14 +94,14 @@ TEST(Options, GroupsNest) {
   EXPECT_EQ(options->matcher.speckle.difference_px, 2);
 }
 
-TEST(Options, UnknownKeysAreNamedWithTheirLine) {
-  const std::string fault = fault_of("threads: 2\nmatcher:\n  speckle:\n    size_pixels: 3\n");
-  EXPECT_THAT(fault, HasSubstr("run.yaml:4: matcher.speckle.size_pixels: unknown key"));
-  EXPECT_THAT(fault, HasSubstr("size_px")) << "says which keys there are";
+TEST(Options, UnknownKeysAreReportedWithTheirLine) {
+  const std::string error = error_of("threads: 2\nmatcher:\n  speckle:\n    size_pixels: 3\n");
+  EXPECT_THAT(error, HasSubstr("run.yaml:4: matcher.speckle.size_pixels: unknown key"));
+  EXPECT_THAT(error, HasSubstr("size_px")) << "lists the known keys";
 }
 
-TEST(Options, EveryFaultIsReportedAtOnce) {
-  const std::string fault = fault_of(
+TEST(Options, AllErrorsAreReportedAtOnce) {
+  const std::string error = error_of(
       "threads: 99\n"
       "matcher:\n"
       "  enabled: perhaps\n"
@@ -111,36 +111,36 @@ TEST(Options, EveryFaultIsReportedAtOnce) {
       "  speckle: 5\n"
       "  extra: 1\n"
       "depth: 3\n");
-  EXPECT_THAT(fault, HasSubstr("run.yaml:1: threads: is 99, must be between 1 and 64"));
-  EXPECT_THAT(fault, HasSubstr("run.yaml:3: matcher.enabled: must be true or false"));
-  EXPECT_THAT(fault, HasSubstr("run.yaml:4: matcher.method: is 'magic', must be one of: sgm, block"));
-  EXPECT_THAT(fault, HasSubstr("run.yaml:5: matcher.lengths_m: holds -2, must be at least 0"));
-  EXPECT_THAT(fault, HasSubstr("run.yaml:6: matcher.gain: must be a finite number"));
-  EXPECT_THAT(fault, HasSubstr("run.yaml:7: matcher.speckle: must be a group of keys"));
-  EXPECT_THAT(fault, HasSubstr("run.yaml:8: matcher.extra: unknown key"));
-  EXPECT_THAT(fault, HasSubstr("run.yaml:9: depth: unknown key"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:1: threads: is 99, must be between 1 and 64"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:3: matcher.enabled: must be true or false"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:4: matcher.method: is 'magic', must be one of: sgm, block"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:5: matcher.lengths_m: holds -2, must be at least 0"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:6: matcher.gain: is .nan, must be a finite number"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:7: matcher.speckle: must be a group of `key: value` lines"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:8: matcher.extra: unknown key"));
+  EXPECT_THAT(error, HasSubstr("run.yaml:9: depth: unknown key"));
 }
 
-TEST(Options, WrongTypesAreRefused) {
-  EXPECT_THAT(fault_of("threads: 1.5"), HasSubstr("whole number"));
-  EXPECT_THAT(fault_of("threads: 99999999999"), HasSubstr("whole number"));
-  EXPECT_THAT(fault_of("threads:"), HasSubstr("whole number"));
-  EXPECT_THAT(fault_of("threads: [1]"), HasSubstr("whole number"));
-  EXPECT_THAT(fault_of("matcher: {gain: wide}"), HasSubstr("must be a number"));
-  EXPECT_THAT(fault_of("matcher: {note: }"), HasSubstr("must be text"));
-  EXPECT_THAT(fault_of("matcher: {lengths_m: 3}"), HasSubstr("list of numbers"));
-  EXPECT_THAT(fault_of("matcher: {speckle: {difference_px: 1e99}}"), HasSubstr("between 0 and 10"));
-  EXPECT_THAT(fault_of("matcher: {gain: 1e999}"), HasSubstr("number"));
+TEST(Options, WrongTypesAreRejected) {
+  EXPECT_THAT(error_of("threads: 1.5"), HasSubstr("whole number"));
+  EXPECT_THAT(error_of("threads: 99999999999"), HasSubstr("whole number"));
+  EXPECT_THAT(error_of("threads:"), HasSubstr("whole number"));
+  EXPECT_THAT(error_of("threads: [1]"), HasSubstr("whole number"));
+  EXPECT_THAT(error_of("matcher: {gain: wide}"), HasSubstr("run.yaml:1: matcher.gain: 'wide' is not a number"));
+  EXPECT_THAT(error_of("matcher: {note: }"), HasSubstr("must be text"));
+  EXPECT_THAT(error_of("matcher: {lengths_m: 3}"), HasSubstr("list of numbers"));
+  EXPECT_THAT(error_of("matcher: {speckle: {difference_px: 1e99}}"), HasSubstr("between 0 and 10"));
+  EXPECT_THAT(error_of("matcher: {gain: 1e999}"), HasSubstr("number"));
 }
 
-TEST(Options, TextThatIsNoYaml) {
-  EXPECT_THAT(fault_of("threads: 1\nmatcher: {"), HasSubstr("run.yaml:"));
-  EXPECT_THAT(fault_of("- 1\n- 2\n"), HasSubstr("run.yaml:1"));
-  EXPECT_THAT(fault_of("just text"), HasSubstr("run.yaml:1"));
-  EXPECT_THAT(fault_of("threads: 1\nthreads: 2\n"), HasSubstr("given twice"));
+TEST(Options, InvalidYamlIsRejected) {
+  EXPECT_THAT(error_of("threads: 1\nmatcher: {"), HasSubstr("run.yaml:"));
+  EXPECT_THAT(error_of("- 1\n- 2\n"), HasSubstr("run.yaml:1"));
+  EXPECT_THAT(error_of("just text"), HasSubstr("run.yaml:1"));
+  EXPECT_THAT(error_of("threads: 1\nthreads: 2\n"), HasSubstr("run.yaml:1: threads: is given twice, again in line 2"));
 }
 
-TEST(Options, FilesAreReadToo) {
+TEST(Options, LoadsFiles) {
   const testing::TemporaryFolder folder;
   EXPECT_EQ(load_options<RunOptions>(folder.write("a.yaml", "threads: 4"))->threads, 4);
   EXPECT_TRUE(load_options<RunOptions>(folder.write("empty.yaml", "")));
@@ -150,7 +150,7 @@ TEST(Options, FilesAreReadToo) {
   EXPECT_EQ(missing.error().where, folder.path() + "/none.yaml");
 }
 
-TEST(Options, OneCanBeSetOnACommandLine) {
+TEST(Options, AppliesAssignments) {
   auto options = set_option(RunOptions{}, "matcher.speckle.size_px=12");
   ASSERT_TRUE(options) << options.error().message();
   options = set_option(*options, "matcher.lengths_m=[5, 10]");
@@ -163,7 +163,7 @@ TEST(Options, OneCanBeSetOnACommandLine) {
   EXPECT_EQ(options->threads, 1);
 }
 
-TEST(Options, WhatCannotBeSetIsAFaultOfUsage) {
+TEST(Options, InvalidAssignmentsAreUsageErrors) {
   for (const char* assignment : {"threads", "=3", "threads=", "threads=0", "thread=2", "matcher=3", "threads.x=1",
                                  "matcher.note=[", "matcher.gain=1}, threads: {2", "..=1"}) {
     const auto options = set_option(RunOptions{}, assignment);
@@ -178,7 +178,7 @@ TEST(Options, ListsEveryOptionInOrder) {
   const auto lines = list_options(RunOptions{});
   ASSERT_EQ(lines.size(), 8U);
   EXPECT_EQ(lines[0].key, "matcher.enabled");
-  EXPECT_EQ(lines[1].meaning, "how to match (sgm | block)");
+  EXPECT_EQ(lines[1].meaning, "Matching method. (sgm | block)");
   EXPECT_EQ(lines[5].key, "matcher.speckle.size_px");
   EXPECT_EQ(lines[5].value, "100");
   EXPECT_EQ(lines[7].key, "threads");
@@ -190,13 +190,13 @@ struct MaskedOptions {
   int after = 0;
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("before", before, "a key before");
-    v.list("masks", masks, "what is not looked at");
-    v.field("after", after, "a key after");
+    v.field("before", before, "A key before the list.");
+    v.list("masks", masks, "Masked regions.");
+    v.field("after", after, "A key after the list.");
   }
 };
 
-TEST(OptionLists, ItemsThatAreGivenReplaceTheWholeList) {
+TEST(OptionLists, AGivenListReplacesTheWholeList) {
   const auto kept = parse_options<MaskedOptions>("before: 1\n", "m.yaml");
   ASSERT_TRUE(kept);
   ASSERT_EQ(kept->masks.size(), 1U);
@@ -214,20 +214,20 @@ TEST(OptionLists, ItemsThatAreGivenReplaceTheWholeList) {
   EXPECT_TRUE(none->masks.empty());
 }
 
-TEST(OptionLists, FaultsNameTheItemAndItsLine) {
+TEST(OptionLists, ErrorsNameTheItemAndItsLine) {
   const auto bad = parse_options<MaskedOptions>(
       "masks:\n  - {name: sky, rows: 12}\n  - {nam: wheel}\n  - 3\n  - {rows: two}\n", "m.yaml");
   ASSERT_FALSE(bad);
-  const std::string said = bad.error().message();
-  EXPECT_THAT(said, HasSubstr("m.yaml:2: masks[0].rows: is 12, must be between 1 and 9"));
-  EXPECT_THAT(said, HasSubstr("m.yaml:3: masks[1].nam: unknown key"));
-  EXPECT_THAT(said, HasSubstr("m.yaml:4: masks[2]"));
-  EXPECT_THAT(said, HasSubstr("m.yaml:5: masks[3].rows: must be a whole number"));
+  const std::string message = bad.error().message();
+  EXPECT_THAT(message, HasSubstr("m.yaml:2: masks[0].rows: is 12, must be between 1 and 9"));
+  EXPECT_THAT(message, HasSubstr("m.yaml:3: masks[1].nam: unknown key"));
+  EXPECT_THAT(message, HasSubstr("m.yaml:4: masks[2]: must be a group"));
+  EXPECT_THAT(message, HasSubstr("m.yaml:5: masks[3].rows: 'two' is not a whole number"));
   for (const char* text : {"masks: 3", "masks: {name: sky}", "masks: sky"})
     EXPECT_THAT(parse_options<MaskedOptions>(text, "m.yaml").error().message(), HasSubstr("m.yaml:1: masks: must be"));
 }
 
-TEST(OptionLists, AreListedAsOneLineThatReadsBack) {
+TEST(OptionLists, AreDumpedOnOneLine) {
   MaskedOptions options;
   options.masks = {{"a, b: {c}", 2}, {"", 9}, {"[#\"'", 1}};
   const auto lines = list_options(options);
@@ -242,7 +242,7 @@ TEST(OptionLists, AreListedAsOneLineThatReadsBack) {
   }
 }
 
-TEST(OptionLists, PlaceOfAnOptionIsItsLine) {
+TEST(OptionLists, LocationOfAnOptionIsItsLine) {
   const std::string text = "before: 1\nmasks:\n  - {name: sky}\nmatcher:\n  speckle:\n    size_px: 3\n";
   EXPECT_EQ(place_of_option(text, "m.yaml", "masks"), "m.yaml:2: masks");
   EXPECT_EQ(place_of_option(text, "m.yaml", "matcher.speckle.size_px"), "m.yaml:6: matcher.speckle.size_px");

@@ -24,25 +24,25 @@ std::uint32_t big_endian(std::string_view bytes) {
   return value;
 }
 
-bool is_sensible(std::size_t width, std::size_t height) {
+bool is_plausible(std::size_t width, std::size_t height) {
   return width > 0 && height > 0 && width <= kLargestImageSide && height <= kLargestImageSide &&
          width * height <= kMostImagePixels;
 }
 
-std::string png_fault(std::string_view png) {
+std::string png_error(std::string_view png) {
   std::size_t at = kPngMagic.size();
   while (at + 12 <= png.size()) {  // length, type, data, checksum
     const std::size_t length = big_endian(png.substr(at, 4));
     const std::string_view type = png.substr(at + 4, 4);
-    if (length > png.size() - at - 12) return "PNG file ends early";
+    if (length > png.size() - at - 12) return "PNG file is truncated";
     if (type == "IHDR"sv && length >= 8 &&
-        !is_sensible(big_endian(png.substr(at + 8, 4)), big_endian(png.substr(at + 12, 4)))) {
-      return "PNG header with a senseless size";
+        !is_plausible(big_endian(png.substr(at + 8, 4)), big_endian(png.substr(at + 12, 4)))) {
+      return "PNG header with an implausible image size";
     }
     if (type == "IEND"sv) return {};
     at += 12 + length;
   }
-  return "PNG file ends early";
+  return "PNG file is truncated";
 }
 
 // Markers of a JPEG file (T.81 table B.1).
@@ -55,7 +55,7 @@ bool is_frame_header(std::uint8_t marker) {  // SOF0 … SOF15 without DHT, JPG,
   return marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
 }
 
-// Where the entropy-coded data that begins at `at` ends: at the first marker that is not a restart. In the data a
+// The end of the entropy-coded data that begins at `at`: the first marker that is not a restart. Inside the data a
 // byte 0xFF is always followed by a stuffed 0.
 std::size_t end_of_scan(std::string_view jpeg, std::size_t at) {
   for (; at + 1 < jpeg.size(); ++at) {
@@ -66,9 +66,9 @@ std::size_t end_of_scan(std::string_view jpeg, std::size_t at) {
   return jpeg.size();
 }
 
-// A progressive picture has many scans, with tables between them; the end marker comes once, behind the last.
-std::string jpeg_fault(std::string_view jpeg) {
-  constexpr const char *early = "JPEG file ends early", *damaged = "JPEG file is damaged";
+// A progressive JPEG has several scans with tables between them, and one end marker after the last scan.
+std::string jpeg_error(std::string_view jpeg) {
+  constexpr const char *truncated = "JPEG file is truncated", *damaged = "JPEG file is damaged";
   std::size_t at = kJpegMagic.size();
   bool any_scan = false;
   while (at + 2 <= jpeg.size()) {
@@ -78,19 +78,19 @@ std::string jpeg_fault(std::string_view jpeg) {
       ++at;
       continue;
     }
-    if (marker == kEnd) return any_scan ? std::string{} : "JPEG file without a picture in it";
+    if (marker == kEnd) return any_scan ? std::string{} : "JPEG file without image data";
     if (marker == kTemporary || is_restart(marker)) {
       at += 2;
       continue;
     }
-    if (at + 4 > jpeg.size()) return early;
+    if (at + 4 > jpeg.size()) return truncated;
     const std::size_t length = big_endian(jpeg.substr(at + 2, 2));
     if (length < 2) return damaged;
-    if (length > jpeg.size() - at - 2) return early;
+    if (length > jpeg.size() - at - 2) return truncated;
     if (is_frame_header(marker)) {
       if (length < 8) return damaged;
-      if (!is_sensible(big_endian(jpeg.substr(at + 7, 2)), big_endian(jpeg.substr(at + 5, 2)))) {
-        return "JPEG header with a senseless size";
+      if (!is_plausible(big_endian(jpeg.substr(at + 7, 2)), big_endian(jpeg.substr(at + 5, 2)))) {
+        return "JPEG header with an implausible image size";
       }
     }
     at += 2 + length;
@@ -98,10 +98,10 @@ std::string jpeg_fault(std::string_view jpeg) {
     any_scan = true;
     at = end_of_scan(jpeg, at);
   }
-  return early;
+  return truncated;
 }
 
-// The next number of a PNM header, with the white space and comments before it and the one separator behind it.
+// The next number of a PNM header; skips white space and comments before it and one separator after it.
 std::size_t next_number(std::string_view& rest) {
   for (;;) {
     while (!rest.empty() && std::isspace(static_cast<unsigned char>(rest.front()))) rest.remove_prefix(1);
@@ -116,15 +116,15 @@ std::size_t next_number(std::string_view& rest) {
   return value;
 }
 
-std::string pnm_fault(std::string_view pnm) {
+std::string pnm_error(std::string_view pnm) {
   const bool binary = pnm[1] == '5' || pnm[1] == '6', colour = pnm[1] == '3' || pnm[1] == '6';
   std::string_view rest = pnm.substr(2);
   const std::size_t width = next_number(rest), height = next_number(rest), largest = next_number(rest);
-  if (!is_sensible(width, height) || largest == 0 || largest > 65535) return "PGM/PPM header is not valid";
-  // A text sample takes two characters at least, but for the last one.
+  if (!is_plausible(width, height) || largest == 0 || largest > 65535) return "PGM/PPM header is invalid";
+  // In the text formats every sample but the last takes at least two characters.
   const std::size_t samples = width * height * (colour ? 3 : 1);
   const std::size_t least = binary ? samples * (largest > 255 ? 2 : 1) : 2 * samples - 1;
-  return rest.size() < least ? "PGM/PPM file ends early" : "";
+  return rest.size() < least ? "PGM/PPM file is truncated" : "";
 }
 
 bool is_pnm(std::string_view content) {
@@ -137,10 +137,10 @@ bool is_pnm(std::string_view content) {
 std::string picture_file_fault(std::string_view content) {
   if (content.empty()) return "file is empty";
   if (content.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) return "file is too large";
-  if (content.starts_with(kPngMagic)) return png_fault(content);
-  if (content.starts_with(kJpegMagic)) return jpeg_fault(content);
-  if (is_pnm(content)) return pnm_fault(content);
-  return "is not a PNG, JPEG, PGM or PPM picture";
+  if (content.starts_with(kPngMagic)) return png_error(content);
+  if (content.starts_with(kJpegMagic)) return jpeg_error(content);
+  if (is_pnm(content)) return pnm_error(content);
+  return "is not a PNG, JPEG, PGM or PPM image";
 }
 
 }  // namespace spartan

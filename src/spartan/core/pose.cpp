@@ -6,13 +6,13 @@
 namespace spartan {
 namespace {
 
-// Q(ρ, φ), the lower-left … upper-right coupling block of the left Jacobian of SE(3)
+// Q(ρ, φ), the upper-right block of the left Jacobian of SE(3), which couples translation and rotation
 // (Barfoot & Furgale 2014, eq. 102; Solà eq. 180).
 Eigen::Matrix3d coupling(const Eigen::Vector3d& rho, const Eigen::Vector3d& phi) {
   const double squared = phi.squaredNorm();
   const double angle = std::sqrt(squared);
   double a, b, c;
-  if (angle < 1e-2) {  // closed forms cancel; the series is exact to 1e-13 here
+  if (angle < 1e-2) {  // the closed forms lose digits by cancellation; here the series is exact to 1e-13
     a = 1.0 / 6.0 - squared / 120.0 + squared * squared / 5040.0;
     b = 1.0 / 24.0 - squared / 720.0 + squared * squared / 40320.0;
     c = 1.0 / 120.0 - squared / 2520.0 + squared * squared / 120960.0;

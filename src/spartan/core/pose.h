@@ -1,7 +1,7 @@
 // Rigid transforms SE(3) and their uncertainty.
 //
-// A transform is named `a_from_b`: p_a = a_from_b * p_b. A tangent vector is ξ = (translation ρ, rotation φ),
-// and perturbations stand on the right: T ⊕ ξ = T · Exp(ξ) with the full SE(3) exponential.
+// A transform is named `a_from_b`: p_a = a_from_b * p_b. A tangent vector is ξ = (translation ρ, rotation φ), in m and
+// rad; perturbations are applied on the right: T ⊕ ξ = T · Exp(ξ) with the full SE(3) exponential.
 // Sources: Solà et al. 2018, appendix D; Barfoot & Furgale, "Associating uncertainty with three-dimensional
 // poses for use in estimation problems", T-RO 2014.
 #pragma once
@@ -16,27 +16,28 @@ namespace spartan {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// A rigid transform (metres). The quaternion is kept at unit length.
+/// A rigid transform with a unit quaternion and a translation in metres.
 class Pose {
  public:
   Pose() = default;  ///< identity
   Pose(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation)
       : rotation_(rotation.normalized()), translation_(translation) {}
-  /// `rotation` must be a rotation matrix; see is_rotation() and nearest_rotation() for outside data.
+  /// `rotation` must be a rotation matrix; see is_rotation() and nearest_rotation() for data from files.
   Pose(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
       : Pose(Eigen::Quaterniond(rotation), translation) {}
   static Pose from_rotation(const Eigen::Quaterniond& rotation) { return {rotation, Eigen::Vector3d::Zero()}; }
   static Pose from_translation(const Eigen::Vector3d& translation) {
     return {Eigen::Quaterniond::Identity(), translation};
   }
-  /// Takes the quaternion as it is, bit for bit (for values that were stored); it must have unit length.
+  /// Uses the quaternion without normalization, so that stored values are restored bit for bit; it must have unit
+  /// length.
   static Pose from_unit_quaternion(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
     Pose pose;
     pose.rotation_ = rotation;
     pose.translation_ = translation;
     return pose;
   }
-  /// The upper 3×4 part counts.
+  /// From the upper 3×4 part of a homogeneous matrix.
   static Pose from_matrix(const Eigen::Matrix4d& matrix);
 
   const Eigen::Quaterniond& rotation() const { return rotation_; }
@@ -68,18 +69,18 @@ Matrix6d right_jacobian_inverse_se3(const Vector6d& tangent);
 /// The rotation angle of a pose, in [0, π] rad.
 double rotation_angle(const Pose& pose);
 
-/// Between two poses: translation by straight line, rotation by slerp; fraction 0 → a, 1 → b.
+/// Interpolates the translation linearly and the rotation by slerp; fraction 0 gives a, 1 gives b.
 Pose interpolate(const Pose& a, const Pose& b, double fraction);
 
-/// A transform with the covariance of its right perturbation, order (translation, rotation), m² and rad².
+/// A transform with the 6×6 covariance of its right perturbation, order (translation, rotation), in m² and rad².
 struct UncertainPose {
   Pose pose;
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-/// a_from_b ∘ b_from_c for independent errors, to first order: Σ = Ad(c_from_b) Σ_ab Adᵀ + Σ_bc.
+/// Composition a_from_b · b_from_c for independent errors, to first order: Σ = Ad(c_from_b) Σ_ab Adᵀ + Σ_bc.
 UncertainPose compose(const UncertainPose& a_from_b, const UncertainPose& b_from_c);
-/// b_from_a; Σ' = Ad(a_from_b) Σ Adᵀ.
+/// The inverse b_from_a; Σ' = Ad(a_from_b) Σ Adᵀ.
 UncertainPose invert(const UncertainPose& a_from_b);
 
 }  // namespace spartan

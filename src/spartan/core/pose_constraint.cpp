@@ -14,14 +14,14 @@ PoseConstraint carried(const PoseConstraint& constraint, const UncertainPose& mo
           forth * constraint.map_covariance * forth.transpose()};
 }
 
-// (Λ⁻¹ + C)⁻¹ for a Λ of any rank.
+// (Λ⁻¹ + C)⁻¹ = (I + Λ C)⁻¹ Λ, which exists for a Λ of any rank.
 Matrix6d blurred(const Matrix6d& information, const Matrix6d& covariance) {
   const Matrix6d m = (Matrix6d::Identity() + information * covariance).partialPivLu().solve(information);
   return 0.5 * (m + m.transpose());
 }
 
 Matrix6d common_share(const Matrix6d& pose, const Matrix6d& map) {
-  constexpr double kLeastVariance = 1e-14;  // a pose may be exact
+  constexpr double kLeastVariance = 1e-14;  // m² or rad²; keeps the covariance of an exact pose invertible
   const Matrix6d root = Eigen::LLT<Matrix6d>(pose + kLeastVariance * Matrix6d::Identity()).matrixL();
   const auto lower = root.triangularView<Eigen::Lower>();
   const Matrix6d half = lower.solve(map), whitened = lower.solve(half.transpose());

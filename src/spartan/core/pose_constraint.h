@@ -1,4 +1,4 @@
-// What map merging tells the localization: where the rover was, as far as the map could decide.
+// The absolute pose measurement that map merging gives to the localization.
 #pragma once
 
 #include "spartan/core/pose.h"
@@ -6,27 +6,30 @@
 
 namespace spartan {
 
-/// world_from_body at a stamp, as the map has it. Perturbations stand on the right, order (translation, rotation).
+/// A measurement of world_from_body at a stamp, from a match with the map. Matrices refer to right perturbations, order
+/// (translation, rotation), in m and rad.
 struct PoseConstraint {
   Stamp stamp;
   Pose world_from_body;
-  /// Inverse covariance of the match with the map, m⁻² and rad⁻². Directions that nothing is known about have no
-  /// information: the matrix is positive semidefinite and may be of any rank.
+  /// Information (inverse covariance) of the match with the map, m⁻² and rad⁻²: positive semidefinite, of any rank.
+  /// Unobservable directions have zero information.
   Matrix6d information = Matrix6d::Zero();
-  /// Of the map under the rover, as rigidly fixed to it: errors of the poses that it was made from.
+  /// Covariance of the map around the rover as a rigid body, from the errors of the poses it was built with, m² and
+  /// rad².
   Matrix6d map_covariance = Matrix6d::Zero();
 };
 
-/// The same of the pose that a motion led to: `constraint.world_from_body` · `motion`, at `stamp`.
+/// Transports a constraint along a motion: the constraint of `constraint.world_from_body` · `motion` at `stamp`.
 PoseConstraint carried(const PoseConstraint& constraint, const UncertainPose& motion, Stamp stamp);
 
-/// Information of a measurement whose error gets one more, independent part.
+/// Inflates information Λ by the covariance C of a further, independent error: (Λ⁻¹ + C)⁻¹, also for a singular Λ.
 Matrix6d blurred(const Matrix6d& information, const Matrix6d& covariance);
 
-/// What the errors of a pose and of a map made from earlier poses of the same drive have in common, as the share S of
-/// the pose's covariance P: their cross-covariance is P S. Where the pose has become less certain since, it has all of
-/// the map's error; where it has become more certain, the map has all of the pose's: along common axes of both the
-/// smaller variance. Covariances of the same right perturbation.
+/// The fraction S of the covariance P of a pose that it shares with a map built from earlier poses of the same drive:
+/// the cross-covariance of both errors is P S. Along the common principal axes of both covariances (generalized
+/// eigenvectors) the shared variance is the smaller one: where the pose has become less certain since, its error
+/// contains the whole error of the map; where it has become more certain, the map's error contains that of the pose.
+/// Both are covariances of the same right perturbation.
 Matrix6d common_share(const Matrix6d& pose, const Matrix6d& map);
 
 }  // namespace spartan

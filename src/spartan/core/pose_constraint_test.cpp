@@ -23,16 +23,16 @@ Matrix6d common_covariance(const Matrix6d& pose, const Matrix6d& map) {
   return pose * common_share(pose, map);
 }
 
-TEST(CommonShare, IsTheMapsWhereThePoseHasDriftedSince) {
+TEST(SharedFraction, IsTheMapCovarianceIfThePoseHasDriftedSince) {
   Random random(3);
   for (int i = 0; i < 20; ++i) {
     const Matrix6d map = random_covariance(random), pose = map + random_covariance(random);
     EXPECT_LE((common_covariance(pose, map) - map).norm(), 1e-9 * map.norm());
-    EXPECT_LE((common_covariance(map, pose) - map).norm(), 1e-9 * map.norm()) << "whichever came first";
+    EXPECT_LE((common_covariance(map, pose) - map).norm(), 1e-9 * map.norm()) << "symmetric in both";
   }
 }
 
-TEST(CommonShare, IsNeverMoreThanEither) {
+TEST(SharedFraction, IsBoundedByBothCovariances) {
   Random random(4);
   for (int i = 0; i < 20; ++i) {
     const Matrix6d map = random_covariance(random), pose = random_covariance(random),
@@ -43,15 +43,15 @@ TEST(CommonShare, IsNeverMoreThanEither) {
   }
 }
 
-TEST(CommonShare, AnExactPoseOrMapHasNoError) {
+TEST(SharedFraction, IsZeroForAnExactPoseOrMap) {
   Random random(5);
   const Matrix6d some = random_covariance(random);
   EXPECT_LE(common_covariance(Matrix6d::Zero(), some).norm(), 1e-12);
   EXPECT_LE(common_covariance(some, Matrix6d::Zero()).norm(), 1e-12);
 }
 
-TEST(PoseConstraint, IsCarriedAlongAMotion) {
-  // Against a linear map of errors: T Exp(ξ) M Exp(n) = T M Exp(Ad(M⁻¹) ξ + n) to first order.
+TEST(PoseConstraint, IsTransportedAlongAMotion) {
+  // Compared with the numerical Jacobian of the errors: T Exp(ξ) M Exp(n) = T M Exp(Ad(M⁻¹) ξ + n) to first order.
   Random random(8);
   const auto small = [&](double size) {
     Vector6d v;
@@ -74,7 +74,7 @@ TEST(PoseConstraint, IsCarriedAlongAMotion) {
   EXPECT_LE((on.information.inverse() - expected).norm(), 1e-5 * expected.norm());
   const Matrix6d map = by_error * c.map_covariance * by_error.transpose();
   EXPECT_LE((on.map_covariance - map).norm(), 1e-5 * map.norm());
-  // What is not known stays unknown.
+  // Zero information remains zero.
   c.information.setZero();
   EXPECT_EQ(carried(c, motion, {9}).information.norm(), 0);
 }

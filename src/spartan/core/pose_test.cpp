@@ -35,7 +35,7 @@ TEST(Pose, ObeysGroupLaws) {
   testing::expect_group_laws<Pose, 6>(group, tricky_tangents(), 2e-8);
 }
 
-TEST(Pose, AdjointMovesAPerturbationToTheOtherSide) {
+TEST(Pose, AdjointTransportsAPerturbation) {
   Random random(3);
   for (const Vector6d& tangent : tricky_tangents()) {
     const Pose pose = exp_se3(tangent);
@@ -46,9 +46,9 @@ TEST(Pose, AdjointMovesAPerturbationToTheOtherSide) {
   }
 }
 
-TEST(Pose, JacobiansMatchDifferences) {
+TEST(Pose, JacobiansMatchNumericalDerivatives) {
   for (const Vector6d& tangent : tricky_tangents()) {
-    if (tangent.tail<3>().norm() > 3.0) continue;  // differences across π compare two branches of the logarithm
+    if (tangent.tail<3>().norm() > 3.0) continue;  // numerical derivatives across π mix two branches of the logarithm
     const Pose inverse = exp_se3(tangent).inverse();
     const auto difference = testing::numeric_jacobian<6, 6>(
         [&](const Vector6d& delta) -> Vector6d { return log_se3(inverse * exp_se3(tangent + delta)); },
@@ -58,8 +58,8 @@ TEST(Pose, JacobiansMatchDifferences) {
   }
 }
 
-// Sampling is the oracle: transported covariances must be those of transported samples.
-TEST(Pose, CovarianceTransportAgreesWithSampling) {
+// Monte Carlo reference: a propagated covariance equals the covariance of propagated samples.
+TEST(Pose, CovariancePropagationAgreesWithSampling) {
   Random random(11);
   Vector6d a_tangent, b_tangent, sigma_a, sigma_b;
   a_tangent << 1, 2, -0.5, 0.3, -0.4, 0.8;
@@ -86,7 +86,7 @@ TEST(Pose, CovarianceTransportAgreesWithSampling) {
   EXPECT_LE((sampled_inverse - inverse.covariance).norm(), 0.03 * inverse.covariance.norm());
 }
 
-TEST(Pose, NearestRotationMendsAMatrix) {
+TEST(Pose, NearestRotationProjectsOntoSO3) {
   const Eigen::Matrix3d exact = exp_so3({0.2, -0.7, 1.1}).toRotationMatrix();
   Eigen::Matrix3d rough = 1.02 * exact;
   rough(0, 1) += 0.01;

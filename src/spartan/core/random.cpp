@@ -15,13 +15,14 @@ std::uint32_t Random::next() {
   const std::uint64_t old = state_;
   state_ = old * 6364136223846793005ULL + increment_;
   const auto shifted = static_cast<std::uint32_t>(((old >> 18U) ^ old) >> 27U);
-  const auto turn = static_cast<std::uint32_t>(old >> 59U);
-  return (shifted >> turn) | (shifted << ((32U - turn) & 31U));
+  const auto rotation = static_cast<std::uint32_t>(old >> 59U);
+  return (shifted >> rotation) | (shifted << ((32U - rotation) & 31U));
 }
 
 std::uint32_t Random::below(std::uint32_t bound) {
   if (bound == 0) throw std::invalid_argument("Random::below: bound is 0");
-  const std::uint32_t threshold = (0U - bound) % bound;  // 2³² mod bound: smaller draws would favour low values
+  const std::uint32_t threshold =
+      (0U - bound) % bound;  // 2³² mod bound; draws below it are rejected, they would bias the result
   for (;;) {
     const std::uint32_t draw = next();
     if (draw >= threshold) return draw % bound;
@@ -34,7 +35,7 @@ double Random::uniform() {
 }
 
 double Random::normal() {
-  // The second number of each pair is dropped: the generator then has no hidden state beside the counter.
+  // The second number of each pair is discarded, so that the generator needs no further state.
   for (;;) {
     const double u = uniform(-1, 1), v = uniform(-1, 1);
     const double s = u * u + v * v;

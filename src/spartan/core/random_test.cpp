@@ -9,8 +9,8 @@
 namespace spartan {
 namespace {
 
-// The first round of the demo program published with PCG32 (pcg-random.org): seed 42, stream 54.
-TEST(Random, GivesThePublishedSequence) {
+// The first numbers of the demo program published with PCG32 (pcg-random.org): seed 42, stream 54.
+TEST(Random, ReproducesThePublishedSequence) {
   Random random(42, 54);
   for (const std::uint32_t expected : {0xa15c02b7U, 0x7b47f409U, 0xba1d3330U, 0x83d2f293U, 0xbfa4784bU, 0xcbed606eU}) {
     EXPECT_EQ(random.next(), expected);
@@ -24,8 +24,8 @@ TEST(Random, SeedsAndStreamsDiffer) {
   EXPECT_NE(first, c.next());
 }
 
-// Bounds of the tests below are five standard errors of the sampled moment.
-TEST(Random, UniformHasItsMoments) {
+// The tolerances below are five standard errors of the sampled moment.
+TEST(Random, UniformHasTheExpectedMoments) {
   Random random(5);
   const int count = 200000;
   double sum = 0, squares = 0;
@@ -40,7 +40,7 @@ TEST(Random, UniformHasItsMoments) {
   EXPECT_NEAR(squares / count, 1.0 / 3.0, 5 * std::sqrt(4.0 / 45.0 / count));
 }
 
-TEST(Random, NormalHasItsMoments) {
+TEST(Random, NormalHasTheExpectedMoments) {
   Random random(6);
   const int count = 200000;
   std::array<double, 5> moments{};
@@ -57,7 +57,7 @@ TEST(Random, NormalHasItsMoments) {
   EXPECT_NEAR(static_cast<double>(beyond_two_sigma) / count, 0.0455003, 5 * std::sqrt(0.0455 * 0.9545 / count));
 }
 
-TEST(Random, BelowIsEvenOverItsRange) {
+TEST(Random, BelowIsUniform) {
   Random random(8);
   std::array<int, 6> hits{};
   const int count = 120000;
@@ -69,7 +69,7 @@ TEST(Random, BelowIsEvenOverItsRange) {
   EXPECT_THROW(random.below(0), std::invalid_argument);
 }
 
-// A bound above 2³¹ shows a bias that a plain remainder has: its lower half would come twice as often.
+// A bound above 2³¹ exposes the bias of a plain remainder: it would draw low values twice as often.
 TEST(Random, BelowHasNoBiasForLargeBounds) {
   Random random(9);
   const std::uint32_t bound = 0xC0000000U;

@@ -36,7 +36,7 @@ Eigen::Quaterniond exp_so3(const Eigen::Vector3d& rotation_vector) {
 }
 
 Eigen::Vector3d log_so3(const Eigen::Quaterniond& rotation) {
-  // 2·atan2(|v|, w) keeps its precision near π, where acos(w) would lose half the digits.
+  // 2·atan2(|v|, w) is accurate at all angles; acos(w) loses half of the digits near 0.
   const double sign = rotation.w() < 0 ? -1.0 : 1.0;
   const Eigen::Vector3d v = sign * rotation.vec();
   const double w = sign * rotation.w();

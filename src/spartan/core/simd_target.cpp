@@ -8,7 +8,7 @@
 namespace spartan {
 namespace {
 
-// Lower bits stand for better targets; a mask keeps a target and everything below it.
+// In Highway a lower bit is a better target: this mask keeps a target and all that are worse.
 std::int64_t at_most(std::int64_t best) {
   return ~(best - 1);
 }

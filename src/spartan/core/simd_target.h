@@ -1,4 +1,4 @@
-// Choosing the instruction set of a kernel by name, without any global state.
+// Selection of the SIMD instruction set of a kernel by name, without global state.
 #pragma once
 
 #include <cstddef>
@@ -7,11 +7,11 @@
 
 namespace spartan {
 
-/// Position of the chosen target in a Highway dispatch table. "auto" takes the best that this processor has; a name
-/// that it does not have takes the best one below it.
+/// Index of a target in a Highway dispatch table. `name` is "sse4", "avx2" or "avx3"; "auto" selects the best target of
+/// this processor. A target that the processor does not support falls back to the best supported one below it.
 std::size_t simd_target_index(const std::string& name);
 
-/// Names that can be told apart on this processor, best last: "sse4", "avx2", "avx3".
+/// The targets that this processor supports, best last: "sse4", "avx2", "avx3".
 std::vector<std::string> available_simd_targets();
 
 }  // namespace spartan

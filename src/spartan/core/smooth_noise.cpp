@@ -25,7 +25,7 @@ const std::array<Direction, kNoiseDirections>& directions() {
   return table;
 }
 
-// std::floor is a call into the library on the oldest x86-64.
+// std::floor is a library call on baseline x86-64 (no SSE4.1).
 inline std::int32_t floor_of(double x) {
   const auto truncated = static_cast<std::int32_t>(x);
   return truncated - (x < truncated ? 1 : 0);
@@ -38,7 +38,7 @@ inline double fade_slope(double t) {
   return 30 * t * t * (t * (t - 2) + 1);
 }
 
-/// The four corners around a point: gradients and their products with the way to the point.
+/// The four lattice points around a point: gradients and their dot products with the offset to the point.
 struct Corners {
   Direction g00, g10, g01, g11;
   double n00, n10, n01, n11;

@@ -1,4 +1,4 @@
-// Smooth random functions of the plane, with their derivatives.
+// Gradient (Perlin) noise in the plane, with its derivatives, and sums of octaves.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace spartan {
 
-/// A well-mixed number from three.
+/// Hash of integer coordinates and a seed.
 inline std::uint32_t mix(std::int32_t x, std::int32_t y, std::uint32_t seed) {
   std::uint32_t h =
       (static_cast<std::uint32_t>(x) * 0x8da6b343U) ^ (static_cast<std::uint32_t>(y) * 0xd8163841U) ^ seed;
@@ -24,25 +24,25 @@ struct NoiseSample {
 };
 
 /// Gradient noise on the integer lattice (Perlin, "Improving Noise", SIGGRAPH 2002: unit gradients, quintic fade):
-/// twice continuously differentiable, mean 0, standard deviation kNoiseSigma,
-/// magnitude below kNoiseHighest, slope below kNoiseSteepest, second
-/// derivatives below kNoiseMostCurved.
+/// twice continuously differentiable, mean 0, standard deviation kNoiseSigma, magnitude below kNoiseHighest, slope
+/// below kNoiseSteepest, second derivatives below kNoiseMostCurved.
 NoiseSample gradient_noise(double x, double y, std::uint32_t seed);
-/// The directions that the corners' gradients take: kNoiseDirections pairs (x, y).
+/// Number of gradient directions at the lattice points, and their kNoiseDirections unit vectors (x, y).
 inline constexpr std::uint32_t kNoiseDirections = 64;
 const double* noise_directions();
-/// The value alone, the same bits.
+/// The value of gradient_noise() alone, with the same bits.
 double gradient_noise_value(double x, double y, std::uint32_t seed);
 inline constexpr double kNoiseSigma = 0.216;
 inline constexpr double kNoiseHighest = 0.7072;
 inline constexpr double kNoiseSteepest = 2.1;
 inline constexpr double kNoiseMostCurved = 12;
 
-/// One octave of a sum of noise: lattice spacing `size`, turned and shifted so that lattices do not line up.
+/// One octave of a sum of gradient noise with lattice spacing `size`, rotated and shifted so that the lattices of
+/// different octaves are not aligned.
 struct Octave {
   double size = 1;
   double frequency = 1;  ///< 1 / size
-  double amplitude = 1;  ///< the noise is multiplied by it
+  double amplitude = 1;  ///< factor of the noise
   double cosine = 1, sine = 0, shift_x = 0, shift_y = 0;
   std::uint32_t seed = 0;
 
@@ -50,8 +50,8 @@ struct Octave {
   double value(double x, double y) const;
 };
 
-/// `count` octaves of sizes `largest`, `largest`/2 …; amplitudes fall by `gain` from each to the next, and the
-/// standard deviation of the sum is `sigma`.
+/// Makes `count` octaves of sizes `largest`, `largest`/2 …. Each amplitude is `gain` times the one before; the standard
+/// deviation of the sum is `sigma`.
 std::vector<Octave> make_octaves(std::uint64_t seed, int count, double largest, double gain, double sigma);
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// How long each stage took: for reports only; no result depends on it.
+// Timing of pipeline stages, for reports only; no result depends on it.
 #pragma once
 
 #include <ctime>
@@ -8,24 +8,25 @@
 
 namespace spartan {
 
+/// Wall-clock and CPU time of one stage.
 struct StageTime {
   std::string stage;
   double wall_ms = 0;
   double cpu_ms = 0;  ///< of all threads of the process
 };
 
-/// Measures stages one after the other.
+/// Measures the times of consecutive stages.
 class StageClock {
  public:
-  /// Runs `work` and notes its time under `stage`; gives back what it returns.
+  /// Runs `work`, records its time under the name `stage`, and returns its result.
   template <class Work>
   auto measure(const char* stage, Work&& work) {
     const Lap lap(*this, stage);
     return std::forward<Work>(work)();
   }
-  /// Times that another clock took.
+  /// Appends times measured elsewhere.
   void add(const std::vector<StageTime>& times) { times_.insert(times_.end(), times.begin(), times.end()); }
-  /// What was measured since the last call, in order.
+  /// Returns the times recorded since the last call, in order, and clears them.
   std::vector<StageTime> take() { return std::exchange(times_, {}); }
 
  private:

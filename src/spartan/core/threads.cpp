@@ -22,21 +22,22 @@ namespace spartan {
 
 #ifdef SPARTAN_THREAD_SANITIZER
 
-// TBB is not built for the thread sanitizer, which so would take its tasks for races. Plain threads do the same work.
+// The installed TBB is not instrumented for the thread sanitizer, which would report its tasks as data races.
+// Plain threads replace it.
 struct Workers::Arena {
   explicit Arena(int threads) : threads_(threads) {}
 
   void run(int parts, const std::function<void(int)>& part) const {
     std::atomic<int> next{0};
-    std::exception_ptr fault;
-    std::mutex fault_lock;
+    std::exception_ptr error;
+    std::mutex error_mutex;
     const auto work = [&] {
       for (int i = next++; i < parts; i = next++) {
         try {
           part(i);
         } catch (...) {
-          const std::lock_guard lock(fault_lock);
-          fault = std::current_exception();
+          const std::lock_guard lock(error_mutex);
+          error = std::current_exception();
         }
       }
     };
@@ -45,7 +46,7 @@ struct Workers::Arena {
     for (int i = 1; i < threads_; ++i) others.emplace_back(work);
     work();
     for (std::thread& other : others) other.join();
-    if (fault) std::rethrow_exception(fault);
+    if (error) std::rethrow_exception(error);
   }
 
  private:
@@ -68,7 +69,7 @@ struct Workers::Arena {
 #endif
 
 Workers::Workers(int threads) : threads_(threads) {
-  if (threads < 1) throw std::invalid_argument("Workers: at least one thread is needed");
+  if (threads < 1) throw std::invalid_argument("Workers: the number of threads must be at least 1");
   if (threads > 1) arena_ = std::make_shared<Arena>(threads);
 }
 

@@ -1,4 +1,4 @@
-// How many threads the library may use: a value that is handed to the stages.
+// A thread pool with a bounded number of threads, passed to the stages by value.
 #pragma once
 
 #include <functional>
@@ -6,18 +6,18 @@
 
 namespace spartan {
 
-/// A bounded set of workers. Copies share them. Made once by whoever builds the pipeline.
+/// A bounded set of worker threads (a TBB task arena). Copies share the threads.
 class Workers {
  public:
-  /// `threads` ≥ 1; the calling thread counts as one of them.
+  /// `threads` ≥ 1 includes the calling thread; throws std::invalid_argument otherwise.
   explicit Workers(int threads = 1);
 
   int threads() const { return threads_; }
-  /// Runs body(begin, end) over disjoint parts of [begin, end), each `grain` long (the last may be shorter).
-  /// The parts depend on `grain` alone, never on the number of threads, so results can be made the same
-  /// for any number. Returns when all are done; an exception of a part is thrown again here.
+  /// Runs body(begin, end) in parallel over disjoint parts of [begin, end), each of length `grain` (the last may be
+  /// shorter). The parts depend only on `grain`, not on the number of threads, so that results can be independent of
+  /// it. Returns when all parts are done; rethrows an exception of a part. Throws std::invalid_argument if grain < 1.
   void for_each_part(int begin, int end, int grain, const std::function<void(int, int)>& body) const;
-  /// Runs the two at once where there are threads, else one after the other.
+  /// Runs both functions, in parallel if there is more than one thread.
   void run_both(const std::function<void()>& first, const std::function<void()>& second) const;
 
  private:
@@ -26,7 +26,7 @@ class Workers {
   std::shared_ptr<Arena> arena_;
 };
 
-/// Bounds the threads of third-party libraries (OpenCV) for the whole process; called once by the program.
+/// Limits the threads of third-party libraries (OpenCV) in the whole process; called once by the program.
 void bound_third_party_threads(int threads);
 
 }  // namespace spartan

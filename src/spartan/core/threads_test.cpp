@@ -38,7 +38,7 @@ RC_GTEST_PROP(Workers, PartsCoverTheRangeOnceForAnyNumberOfThreads, ()) {
   RC_ASSERT(at == begin + length);
 }
 
-TEST(Workers, PassExceptionsOn) {
+TEST(Workers, RethrowExceptions) {
   for (const int threads : {1, 2}) {
     const Workers workers(threads);
     EXPECT_THROW(workers.for_each_part(0, 10, 1,
@@ -50,7 +50,7 @@ TEST(Workers, PassExceptionsOn) {
   }
 }
 
-TEST(Workers, RunBoth) {
+TEST(Workers, RunBothFunctions) {
   for (const int threads : {1, 2}) {
     std::atomic<int> sum = 0;
     Workers(threads).run_both([&] { sum += 1; }, [&] { sum += 10; });
@@ -58,14 +58,14 @@ TEST(Workers, RunBoth) {
   }
 }
 
-TEST(Workers, NestWithoutStandingStill) {
+TEST(Workers, NestWithoutDeadlock) {
   const Workers workers(2);
   std::atomic<int> count = 0;
   workers.for_each_part(0, 8, 1, [&](int, int) { workers.for_each_part(0, 8, 1, [&](int, int) { ++count; }); });
   EXPECT_EQ(count, 64);
 }
 
-TEST(Workers, RefuseSenselessArguments) {
+TEST(Workers, RejectInvalidArguments) {
   EXPECT_THROW(Workers(0), std::invalid_argument);
   EXPECT_THROW(Workers(1).for_each_part(0, 1, 0, [](int, int) {}), std::invalid_argument);
 }

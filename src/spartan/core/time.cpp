@@ -30,9 +30,10 @@ std::string to_decimal_seconds(Stamp stamp) {
 
 Result<Stamp> parse_decimal_seconds(std::string_view text) {
   if (text.find_first_of("eE") != std::string_view::npos) {
+    constexpr double kMaxSeconds = 9.2e9;  // range of int64 nanoseconds
     double seconds = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
-    if (error != std::errc{} || end != text.data() + text.size() || !(std::abs(seconds) < 9.2e9)) {
+    if (error != std::errc{} || end != text.data() + text.size() || !(std::abs(seconds) < kMaxSeconds)) {
       return not_a_time(text);
     }
     return Stamp::from_seconds(seconds);
@@ -40,13 +41,13 @@ Result<Stamp> parse_decimal_seconds(std::string_view text) {
   std::string_view digits = text;
   const bool negative = !digits.empty() && digits.front() == '-';
   if (!digits.empty() && (digits.front() == '-' || digits.front() == '+')) digits.remove_prefix(1);
-  // Counted in the sign of the result, as the negative range is one larger.
+  // Accumulated with the sign of the result, because the negative range is larger by one.
   std::int64_t ns = 0;
   const auto append_digit = [&](int digit) {
     return !__builtin_mul_overflow(ns, std::int64_t{10}, &ns) &&
            !__builtin_add_overflow(ns, static_cast<std::int64_t>(negative ? -digit : digit), &ns);
   };
-  int decimals = -1;  // −1: before the point
+  int decimals = -1;  // −1: before the decimal point
   bool any = false;
   for (const char c : digits) {
     if (c == '.' && decimals < 0) {

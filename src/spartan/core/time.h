@@ -1,4 +1,4 @@
-// Time stamps. Time comes in with the data; nothing in the library reads a clock for its results.
+// Time stamps. Time comes with the data; no result of the library depends on a clock.
 #pragma once
 
 #include <compare>
@@ -10,7 +10,7 @@
 
 namespace spartan {
 
-/// A moment in nanoseconds since the recording's own epoch (mid-exposure for images).
+/// A time in nanoseconds since the epoch of the recording (mid-exposure for images).
 struct Stamp {
   std::int64_t ns = 0;
 
@@ -24,10 +24,11 @@ inline double seconds_between(Stamp from, Stamp to) {
   return static_cast<double>(to.ns - from.ns) * 1e-9;
 }
 
-/// "12.000000345": seconds with nine decimals, without rounding.
+/// Seconds with nine decimals ("12.000000345"), exact.
 std::string to_decimal_seconds(Stamp stamp);
 
-/// Reads decimal seconds ("1.5", "-0.25", "1403715273.262142976", "1.2e3") without losing nanoseconds.
+/// Parses decimal seconds ("1.5", "-0.25", "1403715273.262142976", "1.2e3"). Without an exponent the result is exact;
+/// digits below a nanosecond are cut off. Code `input`.
 Result<Stamp> parse_decimal_seconds(std::string_view text);
 
 }  // namespace spartan

@@ -14,12 +14,12 @@ namespace spartan {
 namespace {
 
 struct Line {
-  std::string place;  // "file:line"
+  std::string where;  // "file:line"
   std::vector<std::string_view> words;
   bool has_commas = false;
 };
 
-// Lines that are neither empty nor comments, split at blanks and commas.
+// The lines that are neither empty nor comments, split at white space and commas.
 std::vector<Line> split(std::string_view text, const std::string& name) {
   std::vector<Line> lines;
   int number = 0;
@@ -50,28 +50,30 @@ Result<std::array<double, Count>> numbers(const Line& line, std::size_t from) {
     if (!word.empty() && word.front() == '+') word.remove_prefix(1);
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), values[i]);
     if (error != std::errc{} || end != word.data() + word.size() || !std::isfinite(values[i])) {
-      return failure(ErrorCode::input, fmt::format("'{}' is not a finite number", word), line.place);
+      return failure(ErrorCode::input, fmt::format("'{}' is not a finite number", word), line.where);
     }
   }
   return values;
 }
 
 Result<Pose> pose_from(const Line& line, const Eigen::Vector3d& t, const Eigen::Quaterniond& q) {
-  if (std::abs(q.norm() - 1.0) > 1e-2) return failure(ErrorCode::input, "the quaternion has not length 1", line.place);
+  constexpr double kTolerance = 1e-2;  // for quaternions rounded to a few digits
+  if (std::abs(q.norm() - 1.0) > kTolerance)
+    return failure(ErrorCode::input, "the quaternion does not have unit length", line.where);
   return Pose(q, t);
 }
 
 Status check_order(const Trajectory& trajectory, const Line& line) {
   const std::size_t n = trajectory.size();
   if (n >= 2 && trajectory[n - 1].stamp <= trajectory[n - 2].stamp) {
-    return failure(ErrorCode::input, "the time stamp is not later than the one before", line.place,
+    return failure(ErrorCode::input, "the time stamp is not later than the previous one", line.where,
                    "sort the file by time");
   }
   return {};
 }
 
 Status not_empty(const Trajectory& trajectory, const std::string& name) {
-  if (trajectory.empty()) return failure(ErrorCode::input, "holds no poses", name);
+  if (trajectory.empty()) return failure(ErrorCode::input, "contains no poses", name);
   return {};
 }
 
@@ -81,7 +83,7 @@ Result<std::vector<Stamp>> read_times(const std::string& path) {
   std::vector<Stamp> stamps;
   for (const Line& line : split(*text, path)) {
     const auto stamp = parse_decimal_seconds(line.words.front());
-    if (!stamp) return failure(ErrorCode::input, stamp.error().what, line.place);
+    if (!stamp) return failure(ErrorCode::input, stamp.error().what, line.where);
     stamps.push_back(*stamp);
   }
   return stamps;
@@ -126,10 +128,11 @@ Result<Trajectory> parse_tum(const std::string& text, const std::string& name) {
   for (const Line& line : split(text, name)) {
     if (line.words.size() != 8) {
       return failure(ErrorCode::input,
-                     fmt::format("{} values, a TUM line has 8: t tx ty tz qx qy qz qw", line.words.size()), line.place);
+                     fmt::format("{} values, a TUM line must have 8: t tx ty tz qx qy qz qw", line.words.size()),
+                     line.where);
     }
     const auto stamp = parse_decimal_seconds(line.words[0]);
-    if (!stamp) return failure(ErrorCode::input, stamp.error().what, line.place);
+    if (!stamp) return failure(ErrorCode::input, stamp.error().what, line.where);
     const auto v = numbers<7>(line, 1);
     if (!v) return failure(v);
     const auto& a = *v;
@@ -151,7 +154,8 @@ Result<Trajectory> parse_kitti(const std::string& text, const std::string& name,
   }
   for (const Line& line : lines) {
     if (line.words.size() != 12) {
-      return failure(ErrorCode::input, fmt::format("{} values, a KITTI line has 12", line.words.size()), line.place);
+      return failure(ErrorCode::input, fmt::format("{} values, a KITTI line must have 12", line.words.size()),
+                     line.where);
     }
     const auto v = numbers<12>(line, 0);
     if (!v) return failure(v);
@@ -165,7 +169,7 @@ Result<Trajectory> parse_kitti(const std::string& text, const std::string& name,
       }
     }
     if (!is_rotation(rotation, 1e-3))
-      return failure(ErrorCode::input, "the left 3×3 part is not a rotation", line.place);
+      return failure(ErrorCode::input, "the left 3×3 part is not a rotation matrix", line.where);
     const std::size_t index = trajectory.size();
     const Stamp stamp = stamps.empty() ? Stamp{static_cast<std::int64_t>(index) * 1'000'000'000} : stamps[index];
     trajectory.push_back({stamp, Pose(nearest_rotation(rotation), translation)});
@@ -180,13 +184,14 @@ Result<Trajectory> parse_euroc(const std::string& text, const std::string& name)
   for (const Line& line : split(text, name)) {
     if (line.words.size() < 8) {
       return failure(ErrorCode::input,
-                     fmt::format("{} values, an EuRoC line has at least 8: ns,p,q", line.words.size()), line.place);
+                     fmt::format("{} values, an EuRoC line must have at least 8: ns,p,q", line.words.size()),
+                     line.where);
     }
     std::int64_t ns = 0;
     const std::string_view word = line.words[0];
     if (const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), ns);
         error != std::errc{} || end != word.data() + word.size()) {
-      return failure(ErrorCode::input, fmt::format("'{}' is not a time in nanoseconds", word), line.place);
+      return failure(ErrorCode::input, fmt::format("'{}' is not a time in nanoseconds", word), line.where);
     }
     const auto v = numbers<7>(line, 1);
     if (!v) return failure(v);
@@ -204,7 +209,7 @@ Result<LoadedTrajectory> load_trajectory(const std::string& path) {
   const auto text = read_file(path);
   if (!text) return failure(text);
   const std::vector<Line> lines = split(*text, path);
-  if (lines.empty()) return failure(ErrorCode::input, "holds no poses", path);
+  if (lines.empty()) return failure(ErrorCode::input, "contains no poses", path);
 
   LoadedTrajectory loaded;
   Result<Trajectory> poses;

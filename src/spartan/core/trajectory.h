@@ -1,4 +1,4 @@
-// A trajectory: poses over time.
+// Trajectories and their file formats: TUM, KITTI, EuRoC.
 #pragma once
 
 #include <optional>
@@ -16,37 +16,39 @@ struct StampedPose {
   Pose pose;  ///< world_from_body
 };
 
-/// In order of time.
+/// Poses with strictly increasing stamps.
 using Trajectory = std::vector<StampedPose>;
 
 enum class TrajectoryFormat { tum, kitti, euroc };
 
-/// One line a pose: "seconds tx ty tz qx qy qz qw", seconds with nanosecond digits.
+/// One line per pose: "seconds tx ty tz qx qy qz qw", seconds with nine decimals.
 std::string to_tum(const Trajectory& trajectory);
-/// One line a pose: the 12 numbers of the upper 3×4 matrix, row by row.
+/// One line per pose: the upper 3×4 part of the matrix in row-major order.
 std::string to_kitti(const Trajectory& trajectory);
-/// "timestamp [ns],px,py,pz,qw,qx,qy,qz".
+/// A header, then one line per pose: "timestamp [ns],px,py,pz,qw,qx,qy,qz".
 std::string to_euroc(const Trajectory& trajectory);
 
-/// Readers give code `input` with "file:line" for what they cannot understand: wrong count of numbers, NaN,
-/// quaternions without length, matrices that are no rotations, stamps that do not increase.
+/// The parsers return code `input` with "name:line" for a wrong number of values, values that are not finite numbers,
+/// quaternions that do not have unit length (within 0.01), matrices that are not rotations (within 0.001 per element),
+/// and stamps that do not increase.
 Result<Trajectory> parse_tum(const std::string& text, const std::string& name);
-/// `stamps` as many as there are lines, or empty: then 0, 1, 2 … s.
+/// `stamps`: one for each line, or empty for 0, 1, 2 … s.
 Result<Trajectory> parse_kitti(const std::string& text, const std::string& name, const std::vector<Stamp>& stamps);
 Result<Trajectory> parse_euroc(const std::string& text, const std::string& name);
 
+/// A trajectory read from a file.
 struct LoadedTrajectory {
   Trajectory poses;
   TrajectoryFormat format = TrajectoryFormat::tum;
-  bool has_stamps = true;    ///< false: a KITTI file without `times.txt` beside it; stamps are line numbers
-  bool has_rotation = true;  ///< false: all rotations are the identity, so the file knows positions only
+  bool has_stamps = true;    ///< false: a KITTI file without `times.txt` beside it; the stamps are 0, 1, 2 … s
+  bool has_rotation = true;  ///< false: all rotations are the identity, so the file holds positions only
 };
 
-/// Guesses the format from the content (12 numbers a line: KITTI, with stamps from `times.txt` beside it;
-/// commas: EuRoC; 8 numbers: TUM).
+/// Reads a trajectory and detects its format from the content: 12 numbers per line are KITTI (stamps from `times.txt`
+/// beside it), commas are EuRoC, otherwise TUM. Code `input`.
 Result<LoadedTrajectory> load_trajectory(const std::string& path);
 
-/// Length of the polyline through the positions, in metres.
+/// Length of the polyline through the positions, m.
 double path_length(const Trajectory& trajectory);
 
 }  // namespace spartan

@@ -43,7 +43,7 @@ TEST(Trajectory, EveryFormatRoundTrips) {
   }
 }
 
-TEST(Trajectory, LinesLookAsDocumented) {
+TEST(Trajectory, LinesHaveTheDocumentedFormat) {
   const Trajectory one{{Stamp{1'500'000'000}, Pose(exp_so3({0, 0, 0}), {1, 2, 3})}};
   EXPECT_EQ(to_tum(one),
             "1.500000000 1.000000000 2.000000000 3.000000000 0.000000000000 0.000000000000 0.000000000000 "
@@ -52,37 +52,37 @@ TEST(Trajectory, LinesLookAsDocumented) {
   EXPECT_THAT(to_kitti(one), HasSubstr("1.000000000000e+00 0.000000000000e+00 0.000000000000e+00 1.000000000000e+00 "));
 }
 
-TEST(Trajectory, CommentsBlankLinesAndLineEndsOfWindows) {
+TEST(Trajectory, IgnoresCommentsBlankLinesAndCarriageReturns) {
   const auto trajectory = parse_tum("# a, comment\r\n\r\n1 0 0 0 0 0 0 1\r\n \t\n2 1 0 0 0 0 0 1", "a.tum");
   ASSERT_TRUE(trajectory) << trajectory.error().message();
   EXPECT_EQ(trajectory->size(), 2U);
 }
 
-std::string fault_of(const Result<Trajectory>& result) {
+std::string error_of(const Result<Trajectory>& result) {
   EXPECT_FALSE(result);
   if (result) return {};
   EXPECT_EQ(result.error().code, ErrorCode::input);
   return result.error().message();
 }
 
-TEST(Trajectory, FaultsNameFileAndLine) {
+TEST(Trajectory, ErrorsNameFileAndLine) {
   const std::string good = "1 0 0 0 0 0 0 1\n";
-  EXPECT_THAT(fault_of(parse_tum(good + "2 0 0 0 0 0 0\n", "a.tum")), HasSubstr("a.tum:2: 7 values"));
-  EXPECT_THAT(fault_of(parse_tum(good + "2 0 0 0 0 0 0 1 9\n", "a.tum")), HasSubstr("a.tum:2: 9 values"));
-  EXPECT_THAT(fault_of(parse_tum("#\n" + good + "2 0 nan 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:3: 'nan'"));
-  EXPECT_THAT(fault_of(parse_tum(good + "2 0 1x 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:2: '1x'"));
-  EXPECT_THAT(fault_of(parse_tum(good + "2 0 0 0 0 0 0 0\n", "a.tum")), HasSubstr("a.tum:2: the quaternion"));
-  EXPECT_THAT(fault_of(parse_tum(good + "1 0 0 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:2: the time stamp"));
-  EXPECT_THAT(fault_of(parse_tum("x 0 0 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:1: 'x' is not a time"));
-  EXPECT_THAT(fault_of(parse_tum("# nothing\n", "a.tum")), HasSubstr("a.tum: holds no poses"));
-  EXPECT_THAT(fault_of(parse_euroc("1.5,0,0,0,1,0,0,0\n", "a.csv")), HasSubstr("a.csv:1: '1.5'"));
-  EXPECT_THAT(fault_of(parse_euroc("1,0,0,0,1,0,0\n", "a.csv")), HasSubstr("a.csv:1: 7 values"));
-  EXPECT_THAT(fault_of(parse_kitti("1 0 0 0 0 1 0 0 0 0 2 0\n", "a.txt", {})), HasSubstr("a.txt:1: the left 3×3"));
-  EXPECT_THAT(fault_of(parse_kitti("1 0 0 0 0 1 0 0 0 0 -1 0\n", "a.txt", {})), HasSubstr("a.txt:1: the left 3×3"));
-  EXPECT_THAT(fault_of(parse_kitti("1 0 0\n", "a.txt", {})), HasSubstr("a.txt:1: 3 values"));
+  EXPECT_THAT(error_of(parse_tum(good + "2 0 0 0 0 0 0\n", "a.tum")), HasSubstr("a.tum:2: 7 values"));
+  EXPECT_THAT(error_of(parse_tum(good + "2 0 0 0 0 0 0 1 9\n", "a.tum")), HasSubstr("a.tum:2: 9 values"));
+  EXPECT_THAT(error_of(parse_tum("#\n" + good + "2 0 nan 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:3: 'nan'"));
+  EXPECT_THAT(error_of(parse_tum(good + "2 0 1x 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:2: '1x'"));
+  EXPECT_THAT(error_of(parse_tum(good + "2 0 0 0 0 0 0 0\n", "a.tum")), HasSubstr("a.tum:2: the quaternion"));
+  EXPECT_THAT(error_of(parse_tum(good + "1 0 0 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:2: the time stamp"));
+  EXPECT_THAT(error_of(parse_tum("x 0 0 0 0 0 0 1\n", "a.tum")), HasSubstr("a.tum:1: 'x' is not a time"));
+  EXPECT_THAT(error_of(parse_tum("# nothing\n", "a.tum")), HasSubstr("a.tum: contains no poses"));
+  EXPECT_THAT(error_of(parse_euroc("1.5,0,0,0,1,0,0,0\n", "a.csv")), HasSubstr("a.csv:1: '1.5'"));
+  EXPECT_THAT(error_of(parse_euroc("1,0,0,0,1,0,0\n", "a.csv")), HasSubstr("a.csv:1: 7 values"));
+  EXPECT_THAT(error_of(parse_kitti("1 0 0 0 0 1 0 0 0 0 2 0\n", "a.txt", {})), HasSubstr("a.txt:1: the left 3×3"));
+  EXPECT_THAT(error_of(parse_kitti("1 0 0 0 0 1 0 0 0 0 -1 0\n", "a.txt", {})), HasSubstr("a.txt:1: the left 3×3"));
+  EXPECT_THAT(error_of(parse_kitti("1 0 0\n", "a.txt", {})), HasSubstr("a.txt:1: 3 values"));
 }
 
-TEST(Trajectory, KittiTakesItsStampsFromTheFileBeside) {
+TEST(Trajectory, KittiStampsComeFromTimesTxt) {
   const testing::TemporaryFolder folder;
   const std::string line = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   const std::string path = folder.write("poses.txt", line + line);
@@ -106,7 +106,7 @@ TEST(Trajectory, KittiTakesItsStampsFromTheFileBeside) {
   EXPECT_THAT(load_trajectory(path).error().where, HasSubstr("times.txt:2"));
 }
 
-TEST(Trajectory, FormatsAreGuessedFromTheContent) {
+TEST(Trajectory, FormatsAreDetectedFromTheContent) {
   const testing::TemporaryFolder folder;
   const Trajectory trajectory = random_trajectory(3, 4);
   const auto format_of = [&](const std::string& text) { return load_trajectory(folder.write("a", text))->format; };
@@ -126,8 +126,8 @@ TEST(Trajectory, PathLengthIsThatOfThePolyline) {
   EXPECT_DOUBLE_EQ(path_length({at(0, 0), at(3, 4), at(3, 4), at(0, 4)}), 8.0);
 }
 
-// No text makes the readers do anything but give poses or say what is wrong.
-RC_GTEST_PROP(Trajectory, ReadersSurviveAnyText, (const std::string& noise)) {
+// Any text gives poses or an error of code `input`.
+RC_GTEST_PROP(Trajectory, ParsersSurviveAnyText, (const std::string& noise)) {
   for (const auto& result : {parse_tum(noise, "n"), parse_kitti(noise, "n", {}), parse_euroc(noise, "n")}) {
     if (!result) RC_ASSERT(result.error().code == ErrorCode::input);
   }

@@ -8,14 +8,11 @@
 #include <numbers>
 
 #include "spartan/core/files.h"
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/design/stereo_relations.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan {
 namespace {
-
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
 
 constexpr int kSchema = 1;
 constexpr std::size_t kLongestList = 1000;
@@ -35,7 +32,7 @@ bool within(double value, const Limits& limits) {
 std::optional<double> bounded(YamlMap& map, const char* key, const Limits& limits) {
   const auto value = map.number(key);
   if (!value || within(*value, limits)) return value;
-  map.fault(key, fmt::format("is {}, must be between {} and {}", *value, limits.low, limits.high));
+  map.add_error(key, fmt::format("is {}, must be between {} and {}", *value, limits.low, limits.high));
   return std::nullopt;
 }
 
@@ -46,27 +43,27 @@ std::optional<double> optional_bounded(YamlMap& map, const char* key, const Limi
 std::optional<int> whole(YamlMap& map, const char* key, const Limits& limits) {
   const auto value = map.integer(key);
   if (!value || within(*value, limits)) return value;
-  map.fault(key, fmt::format("is {}, must be between {} and {}", *value, limits.low, limits.high));
+  map.add_error(key, fmt::format("is {}, must be between {} and {}", *value, limits.low, limits.high));
   return std::nullopt;
 }
 
 // {from, to, step}. Every value is the nearest double of its decimal: 0.05 + 10 · 0.01 is 0.15, not a bit more.
-std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, const YAML::Node& node) {
-  YamlMap steps(node, map.path(key), map.faults());
+std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, const YamlNode& node) {
+  YamlMap steps(node, map.path(key), map.errors());
   const auto from = steps.number("from"), to = steps.number("to"), step = steps.number("step");
-  steps.refuse_unknown_keys();
+  steps.reject_unknown_keys();
   if (!from || !to || !step) return std::nullopt;
   if (!(*step > 0) || *to < *from) {
-    steps.fault(*step > 0 ? "to" : "step", *step > 0 ? "is below from" : "must be positive");
+    steps.add_error(*step > 0 ? "to" : "step", *step > 0 ? "is below from" : "must be positive");
     return std::nullopt;
   }
   const double count = (*to - *from) / *step;
   if (!(count < static_cast<double>(kLongestList))) {
-    steps.fault("step", fmt::format("gives more than {} values", kLongestList));
+    steps.add_error("step", fmt::format("gives more than {} values", kLongestList));
     return std::nullopt;
   }
   if (std::abs(count - std::round(count)) > 1e-6) {
-    steps.fault("step", fmt::format("does not lead from {} to {}", *from, *to));
+    steps.add_error("step", fmt::format("does not lead from {} to {}", *from, *to));
     return std::nullopt;
   }
   std::vector<double> values;
@@ -76,16 +73,16 @@ std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, con
   return values;
 }
 
-std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, const YAML::Node& node) {
-  if (node.size() == 0 || node.size() > kLongestList) {
-    map.fault(key, fmt::format("has {} entries, must have 1 to {}", node.size(), kLongestList));
+std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, const YamlNode& node) {
+  if (node.items().size() == 0 || node.items().size() > kLongestList) {
+    map.add_error(key, fmt::format("has {} entries, must have 1 to {}", node.items().size(), kLongestList));
     return std::nullopt;
   }
   std::vector<double> values;
-  for (const YAML::Node& entry : node) {
-    const auto value = entry.IsScalar() ? rig_detail::parse_number(entry.Scalar()) : std::nullopt;
+  for (const YamlNode& entry : node.items()) {
+    const auto value = entry.is_scalar() ? parse_finite_number(entry.scalar()) : std::nullopt;
     if (!value) {
-      map.fault(key, "must hold finite numbers only");
+      map.add_error(key, "must hold finite numbers only");
       return std::nullopt;
     }
     values.push_back(*value);
@@ -97,21 +94,21 @@ std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, co
 std::vector<double> read_values(YamlMap& map, const char* key, const Limits& limits) {
   const auto node = map.node(key);
   if (!node) return {};
-  if (!node->IsSequence() && !node->IsMap()) {
-    map.fault(key, "must be a list of numbers, or {from, to, step}");
+  if (!node->is_list() && !node->is_map()) {
+    map.add_error(key, "must be a list of numbers, or {from, to, step}");
     return {};
   }
-  const auto values = node->IsMap() ? read_steps(map, key, *node) : read_listed(map, key, *node);
+  const auto values = node->is_map() ? read_steps(map, key, *node) : read_listed(map, key, *node);
   if (!values) return {};
   for (const double value : *values) {
     if (within(value, limits)) continue;
-    map.fault(key, fmt::format("holds {}, must be between {} and {}", value, limits.low, limits.high));
+    map.add_error(key, fmt::format("holds {}, must be between {} and {}", value, limits.low, limits.high));
     return {};
   }
   std::vector<double> sorted = *values;
   std::sort(sorted.begin(), sorted.end());
   if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end()) {
-    map.fault(key, fmt::format("holds {} twice", *twice));
+    map.add_error(key, fmt::format("holds {} twice", *twice));
     return {};
   }
   return *values;
@@ -124,10 +121,10 @@ ShapeLists read_lists(YamlMap map) {
   lists.hfov_deg = read_values(map, "hfov_deg", kView_deg);
   lists.pixel_sizes_um = read_values(map, "pixel_sizes_um", kPixel_um);
   for (const double width : read_values(map, "widths_px", kSide_px)) {
-    if (width != std::floor(width)) map.fault("widths_px", fmt::format("holds {}, must be whole numbers", width));
+    if (width != std::floor(width)) map.add_error("widths_px", fmt::format("holds {}, must be whole numbers", width));
     lists.widths_px.push_back(static_cast<int>(width));
   }
-  map.refuse_unknown_keys();
+  map.reject_unknown_keys();
   return lists;
 }
 
@@ -137,7 +134,7 @@ PanRequirements read_pans(YamlMap map) {
   std::sort(pans.angles_deg.begin(), pans.angles_deg.end());
   pans.azimuth_deg = bounded(map, "azimuth_deg", {1e-6, 360}).value_or(0);
   pans.smallest_overlap_percent = bounded(map, "smallest_overlap_percent", {0, 100}).value_or(0);
-  map.refuse_unknown_keys();
+  map.reject_unknown_keys();
   return pans;
 }
 
@@ -152,7 +149,7 @@ PublishedPair read_published(YamlMap map) {
   published.vfov_deg = optional_bounded(map, "vfov_deg", kView_deg);
   published.focal_length_mm = optional_bounded(map, "focal_length_mm", {1e-3, 1e5});
   published.tilt_deg = optional_bounded(map, "tilt_deg", kTilt_deg);
-  map.refuse_unknown_keys();
+  map.reject_unknown_keys();
   return published;
 }
 
@@ -166,19 +163,19 @@ std::vector<DesignCriterion> read_order(YamlMap& map) {
   std::vector<DesignCriterion> order;
   const auto node = map.node("order");
   if (!node) return order;
-  if (!node->IsSequence() || node->size() == 0) {
-    map.fault("order", "must be a list of: range_margin, pan_overlap, shorter_baseline");
+  if (!node->is_list() || node->items().size() == 0) {
+    map.add_error("order", "must be a list of: range_margin, pan_overlap, shorter_baseline");
     return order;
   }
-  for (const YAML::Node& entry : *node) {
+  for (const YamlNode& entry : node->items()) {
     const auto* known = std::find_if(std::begin(kKnown), std::end(kKnown),
-                                     [&](const auto& k) { return entry.IsScalar() && entry.Scalar() == k.name; });
+                                     [&](const auto& k) { return entry.is_scalar() && entry.scalar() == k.name; });
     if (known == std::end(kKnown)) {
-      map.fault("order", "must hold range_margin, pan_overlap, shorter_baseline only");
+      map.add_error("order", "must hold range_margin, pan_overlap, shorter_baseline only");
       break;
     }
     if (std::find(order.begin(), order.end(), known->criterion) != order.end()) {
-      map.fault("order", fmt::format("holds {} twice", known->name));
+      map.add_error("order", fmt::format("holds {} twice", known->name));
       break;
     }
     order.push_back(known->criterion);
@@ -202,14 +199,15 @@ void read_limits(YamlMap& map, PairRequirements& pair) {
 
 // What the numbers mean together; told of numbers that are sound by themselves.
 void add_faults_of_meaning(YamlMap& map, const PairRequirements& pair) {
-  const auto sound = [&](const char* key) { return !map.faults().touches(map.path(key)); };
+  const auto sound = [&](const char* key) { return !map.errors().touches(map.path(key)); };
   if (sound("height_m") && sound("smallest_height_m") && pair.height_m < pair.smallest_height_m) {
-    map.fault("height_m", fmt::format("is {}, below smallest_height_m, {}", pair.height_m, pair.smallest_height_m));
+    map.add_error("height_m", fmt::format("is {}, below smallest_height_m, {}", pair.height_m, pair.smallest_height_m));
   }
   const double below_horizon_deg = std::atan(pair.height_m / pair.range_m) / kRadiansPerDegree;
   if (sound("height_m") && sound("range_m") && sound("tilt_step_deg") && pair.tilt_step_deg >= below_horizon_deg) {
-    map.fault("tilt_step_deg", fmt::format("is {}; the ground at range_m lies only {:.3f} degrees below the horizon",
-                                           pair.tilt_step_deg, below_horizon_deg));
+    map.add_error("tilt_step_deg",
+                  fmt::format("is {}; the ground at range_m lies only {:.3f} degrees below the horizon",
+                              pair.tilt_step_deg, below_horizon_deg));
   }
   if (!pair.published || !sound("published") || !sound("rows_per_column")) return;
   const PublishedPair& published = *pair.published;
@@ -217,8 +215,8 @@ void add_faults_of_meaning(YamlMap& map, const PairRequirements& pair) {
       vertical_view_rad(published.shape.hfov_deg * kRadiansPerDegree, pair.published_rows_per_column()) /
       kRadiansPerDegree);
   if (published.tilt_deg && *published.tilt_deg <= vfov_deg / 2) {
-    map.fault("published.tilt_deg", fmt::format("is {}, the top row, {:.2f} degrees higher, would look at the sky",
-                                                *published.tilt_deg, vfov_deg / 2));
+    map.add_error("published.tilt_deg", fmt::format("is {}, the top row, {:.2f} degrees higher, would look at the sky",
+                                                    *published.tilt_deg, vfov_deg / 2));
   }
 }
 
@@ -226,18 +224,18 @@ PairRequirements read_pair(YamlMap map) {
   PairRequirements pair;
   read_limits(map, pair);
   if (const auto lists = map.node("candidates")) {
-    pair.lists = read_lists(YamlMap(*lists, map.path("candidates"), map.faults()));
+    pair.lists = read_lists(YamlMap(*lists, map.path("candidates"), map.errors()));
     if (const std::size_t count = pair.lists.combinations(); count > kMostCombinations) {
-      map.fault("candidates", fmt::format("are {} combinations, at most {} are tried", count, kMostCombinations));
+      map.add_error("candidates", fmt::format("are {} combinations, at most {} are tried", count, kMostCombinations));
     }
   }
   pair.order = read_order(map);
   if (const auto pans = map.optional_node("pans"))
-    pair.pans = read_pans(YamlMap(*pans, map.path("pans"), map.faults()));
+    pair.pans = read_pans(YamlMap(*pans, map.path("pans"), map.errors()));
   if (const auto published = map.optional_node("published")) {
-    pair.published = read_published(YamlMap(*published, map.path("published"), map.faults()));
+    pair.published = read_published(YamlMap(*published, map.path("published"), map.errors()));
   }
-  map.refuse_unknown_keys();
+  map.reject_unknown_keys();
   add_faults_of_meaning(map, pair);
   return pair;
 }
@@ -245,14 +243,14 @@ PairRequirements read_pair(YamlMap map) {
 RigRequirements read_root(YamlMap root, const std::string& default_name) {
   RigRequirements requirements;
   if (const auto schema = root.integer("schema"); schema && *schema != kSchema) {
-    root.fault("schema", fmt::format("is {}; this version reads schema {}", *schema, kSchema));
+    root.add_error("schema", fmt::format("is {}; this version reads schema {}", *schema, kSchema));
   }
   requirements.name = root.optional_node("name") ? root.text("name").value_or(default_name) : default_name;
-  if (const auto wide = root.node("wide")) requirements.wide = read_pair(YamlMap(*wide, "wide", root.faults()));
+  if (const auto wide = root.node("wide")) requirements.wide = read_pair(YamlMap(*wide, "wide", root.errors()));
   if (const auto narrow = root.optional_node("narrow")) {
-    requirements.narrow = read_pair(YamlMap(*narrow, "narrow", root.faults()));
+    requirements.narrow = read_pair(YamlMap(*narrow, "narrow", root.errors()));
   }
-  root.refuse_unknown_keys();
+  root.reject_unknown_keys();
   return requirements;
 }
 
@@ -277,11 +275,11 @@ double PairRequirements::published_rows_per_column() const {
 }
 
 Result<RigRequirements> parse_requirements(const std::string& text, const std::string& name) {
-  const auto loaded = rig_detail::load_yaml(text, name);
+  const auto loaded = parse_yaml(text, name);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(name);
-  RigRequirements requirements = read_root(YamlMap(*loaded, "", faults), std::filesystem::path(name).stem().string());
-  if (const Status status = faults.status(); !status) return failure(status);
+  YamlErrors errors(name);
+  RigRequirements requirements = read_root(YamlMap(*loaded, "", errors), std::filesystem::path(name).stem().string());
+  if (const Status status = errors.status(); !status) return failure(status);
   return requirements;
 }
 

@@ -1,4 +1,4 @@
-// Files that are cut off, damaged, full of noise, or say what cannot be: refused, with file and line or key.
+// Truncated, damaged, random and inconsistent files: rejected, with file and line or key.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using Format = CalibrationFormat;
 
 constexpr ImageSize kSize{640, 480};
 
-// A format with a lens whose numbers all stand in its files.
+// A format with a camera model that it represents completely.
 struct Case {
   Format format;
   const char* path;
@@ -47,7 +47,7 @@ std::vector<Case> cases() {
           {Format::cahvor, "pair.cahvore", fisheye}};
 }
 
-// The files of a sound rig in a folder of their own; one of them can be replaced by another text.
+// The files of a valid rig in a temporary folder; the text of one of them can be replaced.
 class Files {
  public:
   explicit Files(const Case& of) : of_(of) {
@@ -70,14 +70,14 @@ class Files {
   void put(const CalibrationFile& file, const std::string& text) const {
     folder_.write(file.path.substr(folder_.path().size() + 1), text);
   }
-  void put_back() const {
+  void restore() const {
     for (const CalibrationFile& file : files_) put(file, file.content);
   }
   Result<ReadRig> read() const {
     const bool two = has_a_file_per_eye(of_.format);
     return read_calibration(two ? files_[0].path + "," + files_[1].path : files_[0].path, kSize);
   }
-  // A sound rig, or an error that names the folder; what it says.
+  // Reads the files: "accepted" for a valid rig, otherwise the message of an error that must name the folder.
   std::string outcome() const {
     const auto read = this->read();
     if (read) {
@@ -85,7 +85,7 @@ class Files {
       return "accepted";
     }
     EXPECT_EQ(read.error().code, ErrorCode::configuration) << read.error().message();
-    EXPECT_THAT(read.error().message(), HasSubstr(folder_.path())) << "no file is named";
+    EXPECT_THAT(read.error().message(), HasSubstr(folder_.path())) << "the message names no file";
     return read.error().message();
   }
 
@@ -95,11 +95,11 @@ class Files {
   CalibrationFiles files_;
 };
 
-TEST(BadCalibrations, TheFilesAreSoundToBeginWith) {
+TEST(BadCalibrations, UnchangedFilesAreAccepted) {
   for (const Case& each : cases()) EXPECT_EQ(Files(each).outcome(), "accepted") << each.path;
 }
 
-TEST(BadCalibrations, CutOffAnywhere) {
+TEST(BadCalibrations, TruncatedAnywhere) {
   Random random(1);
   for (const Case& each : cases()) {
     SCOPED_TRACE(each.path);
@@ -120,14 +120,14 @@ TEST(BadCalibrations, CutOffAnywhere) {
       EXPECT_NE(files.outcome(), "accepted") << file.path;
       if (std::string(each.path).ends_with(".xml")) {
         files.put(file, file.content.substr(0, file.content.rfind('<')));
-        EXPECT_THAT(files.outcome(), HasSubstr("ends before </opencv_storage>"));
+        EXPECT_THAT(files.outcome(), HasSubstr("is truncated: </opencv_storage> is missing"));
       }
-      files.put_back();
+      files.restore();
     }
   }
 }
 
-// The places of the text where a number stands behind its key.
+// Positions and lengths of the numbers that follow a key.
 std::vector<std::pair<std::size_t, std::size_t>> numbers_in(const std::string& text) {
   std::vector<std::pair<std::size_t, std::size_t>> places;
   const std::string in_number = "0123456789.e-+";
@@ -146,7 +146,8 @@ std::vector<std::pair<std::size_t, std::size_t>> numbers_in(const std::string& t
   return places;
 }
 
-// The key that a place of the text belongs to: the nearest one before it, of "key:", "key =", "'key':" or "<key>".
+// The key that a position of the text belongs to: the last one before it of the form "key:", "key =", "'key':" or
+// "<key>".
 std::string key_before(const std::string& text, std::size_t at) {
   const std::string in_key = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789";
   for (std::size_t end = at;;) {
@@ -161,7 +162,8 @@ std::string key_before(const std::string& text, std::size_t at) {
   }
 }
 
-// What a file says for other programs or twice, and the image size where it was given by the one who asked.
+// Numbers that the readers ignore because other programs need them, because they are redundant, or because the caller
+// provides the image size.
 const std::map<Format, std::set<std::string>> kUnread{
     {Format::kitti_raw, {"S_00", "K_00", "D_00", "R_00", "T_00", "S_01", "K_01", "D_01", "R_01", "T_01", "R_rect_01"}},
     {Format::euroc, {"rows", "cols"}},
@@ -170,8 +172,8 @@ const std::map<Format, std::set<std::string>> kUnread{
     {Format::cahvor, {"T", "P"}},
 };
 
-// Every number in turn: none of those that are read may be taken for another.
-TEST(BadCalibrations, NumbersThatAreNone) {
+// Every number in turn: an invalid value must not be accepted for any number that is read.
+TEST(BadCalibrations, InvalidNumbers) {
   for (const Case& each : cases()) {
     SCOPED_TRACE(each.path);
     const Files files(each);
@@ -183,12 +185,12 @@ TEST(BadCalibrations, NumbersThatAreNone) {
         for (const char* odd : {"nan", "-.inf", "1e999", "twelve", "-1e308"}) {
           std::string text = file.content;
           files.put(file, text.replace(at, length, odd));
-          const std::string said = files.outcome();
+          const std::string message = files.outcome();
           if (std::string(odd) == "-1e308" || unread.contains(key)) continue;
-          EXPECT_NE(said, "accepted") << file.path << ": " << key << " as " << odd;
+          EXPECT_NE(message, "accepted") << file.path << ": " << key << " as " << odd;
         }
       }
-      files.put_back();
+      files.restore();
     }
   }
 }
@@ -213,8 +215,8 @@ std::string repeated(const std::string& text, std::size_t bytes) {
   return all;
 }
 
-// Ten megabytes of anything are refused for their size; three of them are read and refused for what they say.
-TEST(BadCalibrations, TenMegabytesOfNoise) {
+// Ten megabytes are rejected because of their size; three megabytes are read and rejected because of their content.
+TEST(BadCalibrations, LargeRandomFiles) {
   constexpr std::size_t kTen = 10U << 20U, kThree = 3U << 20U;
   Random random(7);
   std::string bytes(kTen, ' '), letters(kTen, ' ');
@@ -226,23 +228,23 @@ TEST(BadCalibrations, TenMegabytesOfNoise) {
       SCOPED_TRACE(file.path);
       for (const std::string* noise : {&bytes, &letters}) {
         files.put(file, *noise);
-        const std::string said = files.outcome();
-        EXPECT_NE(said, "accepted");
+        const std::string message = files.outcome();
+        EXPECT_NE(message, "accepted");
         if (each.format != Format::mrcal && (&file == &files.all().front())) {
-          EXPECT_THAT(said, HasSubstr("is larger than 4 MB: no calibration"));
+          EXPECT_THAT(message, HasSubstr("is larger than 4 MB, so it is not a calibration file"));
         }
         files.put(file, noise->substr(0, kThree));
         EXPECT_NE(files.outcome(), "accepted");
         files.put(file, file.content.substr(0, file.content.size() / 2) + noise->substr(0, kThree));
         (void)files.outcome();
       }
-      files.put_back();
+      files.restore();
     }
   }
 }
 
-// What a parser would go down with.
-TEST(BadCalibrations, DeepNests) {
+// Input that exhausts the stack of a recursive parser.
+TEST(BadCalibrations, DeepNesting) {
   constexpr std::size_t kBytes = 1U << 16U;
   std::string stairs;
   for (std::size_t depth = 0; stairs.size() < kBytes; ++depth) stairs += std::string(depth, ' ') + "a:\n";
@@ -262,25 +264,25 @@ TEST(BadCalibrations, DeepNests) {
         EXPECT_NE(files.outcome(), "accepted");
       }
     }
-    files.put_back();
+    files.restore();
   }
 }
 
-// Many keys, many faults: no message as long as the file.
-TEST(BadCalibrations, ManyFaultsAreToldInShort) {
+// Many errors: the message must be much shorter than the file.
+TEST(BadCalibrations, ManyErrorsAreSummarized) {
   std::string text = "schema: 1\ncameras:\n";
   for (int i = 0; i < 900; ++i) text += fmt::format("  c{}: {{}}\n", i);
   const auto read = parse_rig_yaml(text, "rig.yaml");
   ASSERT_FALSE(read);
   EXPECT_LE(read.error().message().size(), 10000u);
-  EXPECT_THAT(read.error().message(), HasSubstr("faults more"));
+  EXPECT_THAT(read.error().message(), HasSubstr("more errors"));
   for (int i = 900; i < 10000; ++i) text += fmt::format("  c{}: {{}}\n", i);
   EXPECT_THAT(parse_rig_yaml(text, "rig.yaml").error().message(),
               HasSubstr("rig.yaml:2: cameras: has 10000 entries, more than 1000"));
 }
 
-// A value of YAML takes hundreds of times its place in the file.
-TEST(BadCalibrations, ListsWithoutAnEndAreNotParsed) {
+// A parsed YAML value takes hundreds of times its size in the file.
+TEST(BadCalibrations, VeryLongListsAreNotParsed) {
   const std::string list = repeated("a,", 3U << 20U);
   const TemporaryFolder folder;
   for (const std::string& text :
@@ -289,36 +291,36 @@ TEST(BadCalibrations, ListsWithoutAnEndAreNotParsed) {
         "schema:\n" + repeated("- a\n", 3U << 20U)}) {
     const auto read = read_calibration(folder.write("x.yaml", text), kSize);
     ASSERT_FALSE(read);
-    EXPECT_THAT(read.error().message(), HasSubstr("x.yaml: holds more than 100000 values: no calibration"));
+    EXPECT_THAT(read.error().message(), HasSubstr("x.yaml: holds more than 100000 values"));
   }
 }
 
-// What no lens has, and what no printed number is for.
-TEST(BadCalibrations, NumbersBeyondAllCamerasAreRefused) {
+// Values that no camera has.
+TEST(BadCalibrations, ImplausibleNumbersAreRejected) {
   const Files files(cases()[0]);
   const CalibrationFile& file = files.all()[0];
-  const auto said = [&](const std::string& what, const std::string& with) {
+  const auto message = [&](const std::string& what, const std::string& with) {
     std::string text = file.content;
     files.put(file, text.replace(text.find(what), what.size(), with));
     return files.outcome();
   };
-  EXPECT_THAT(said("focal_px: [500", "focal_px: [1e308"),
+  EXPECT_THAT(message("focal_px: [500", "focal_px: [1e308"),
               HasSubstr("cameras.left.focal_px: holds 1e+308, must be above zero and at most 10000000"));
-  EXPECT_THAT(said("centre_px: [320", "centre_px: [-1e9"),
+  EXPECT_THAT(message("centre_px: [320", "centre_px: [-1e9"),
               HasSubstr("cameras.left.centre_px: holds -1000000000, must be between -10000000 and 10000000"));
-  EXPECT_THAT(said("translation_m: [0", "translation_m: [1e300"),
-              HasSubstr(": the place is farther than 1000000000 m from the mount"));
-  EXPECT_EQ(said("focal_px: [500", "focal_px: [1e6"), "accepted");
+  EXPECT_THAT(message("translation_m: [0", "translation_m: [1e300"),
+              HasSubstr(" is farther than 1000000000 m from the mount"));
+  EXPECT_EQ(message("focal_px: [500", "focal_px: [1e6"), "accepted");
 }
 
-// --- what is said of certain faults ---
+// --- messages of particular errors ---
 
-struct Fault {
+struct Mistake {
   Format format;
   std::size_t file;
-  const char *what, *with, *said;
+  const char *what, *with, *message;
 };
-const Fault kFaults[] = {
+const Mistake kMistakes[] = {
     {Format::rig_yaml, 0, "focal_px: [500", "focal_px: [0",
      "rig.yaml:8: cameras.left.focal_px: holds 0, must be above zero"},
     {Format::rig_yaml, 0, "size_px: [640", "size_px: [-640", "rig.yaml:6: cameras.left.size_px: is -640 × 480"},
@@ -352,7 +354,7 @@ const Fault kFaults[] = {
     {Format::mrcal, 1, "'imagersize': [640", "'imagersize': [6.4",
      "pair_right.cameramodel:10: imagersize: must be two whole"},
     {Format::mrcal, 1, "'extrinsics': [", "'extrinsics': [1e9, ", "extrinsics: has 7 numbers, must have 6"},
-    {Format::mrcal, 0, "'lensmodel':", "'lensmodel'", "pair_left.cameramodel:2: misses a colon behind 'lensmodel'"},
+    {Format::mrcal, 0, "'lensmodel':", "'lensmodel'", "pair_left.cameramodel:2: a colon is missing after 'lensmodel'"},
     {Format::tsai, 1, "fv = 501", "fv = 0", "pair_right.tsai:4: fv: the focal length must be above zero"},
     {Format::tsai, 0, "pitch = 1", "pitch = 0", "pair_left.tsai:12: pitch: is 0, must be above zero"},
     {Format::tsai, 0, "R = 1", "R = 2", "pair_left.tsai:11: R: is not a rotation matrix"},
@@ -363,17 +365,17 @@ const Fault kFaults[] = {
     {Format::cahvor, 1, "Dimensions = 640", "Dimensions = -640", "pair_right.cahvore:2: Dimensions: must be two whole"},
 };
 
-TEST(BadCalibrations, FaultsAreNamedWithFileAndLineOrKey) {
-  for (const Fault& fault : kFaults) {
+TEST(BadCalibrations, ErrorsNameFileAndLineOrKey) {
+  for (const Mistake& mistake : kMistakes) {
     for (const Case& each : cases()) {
-      if (each.format != fault.format || std::string(each.path).ends_with(".xml")) continue;
+      if (each.format != mistake.format || std::string(each.path).ends_with(".xml")) continue;
       const Files files(each);
-      const CalibrationFile& file = files.all()[fault.file];
+      const CalibrationFile& file = files.all()[mistake.file];
       std::string text = file.content;
-      const std::size_t at = text.find(fault.what);
-      ASSERT_NE(at, std::string::npos) << fault.what << " in\n" << text;
-      files.put(file, text.replace(at, std::string(fault.what).size(), fault.with));
-      EXPECT_THAT(files.outcome(), HasSubstr(fault.said));
+      const std::size_t at = text.find(mistake.what);
+      ASSERT_NE(at, std::string::npos) << mistake.what << " in\n" << text;
+      files.put(file, text.replace(at, std::string(mistake.what).size(), mistake.with));
+      EXPECT_THAT(files.outcome(), HasSubstr(mistake.message));
     }
   }
 }

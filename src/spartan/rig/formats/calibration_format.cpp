@@ -12,7 +12,7 @@ namespace {
 struct Kind {
   CalibrationFormat format;
   std::string_view name;
-  bool file_per_eye, image_size;
+  bool file_per_camera, image_size;
 };
 constexpr std::array<Kind, 10> kKinds{{
     {CalibrationFormat::rig_yaml, "rig.yaml", false, true},
@@ -36,12 +36,12 @@ bool has_line(const std::string& text, const std::string& start) {
   return text.starts_with(start) || text.find("\n" + start) != std::string::npos;
 }
 
-// Endings that one format only uses.
-std::optional<CalibrationFormat> format_of_ending(const std::string& ending) {
-  if (ending == ".tsai") return CalibrationFormat::tsai;
-  if (ending == ".cahv" || ending == ".cahvor" || ending == ".cahvore") return CalibrationFormat::cahvor;
-  if (ending == ".cameramodel") return CalibrationFormat::mrcal;
-  if (ending == ".xml") return CalibrationFormat::opencv;
+// File extensions that only one format uses.
+std::optional<CalibrationFormat> format_of_extension(const std::string& extension) {
+  if (extension == ".tsai") return CalibrationFormat::tsai;
+  if (extension == ".cahv" || extension == ".cahvor" || extension == ".cahvore") return CalibrationFormat::cahvor;
+  if (extension == ".cameramodel") return CalibrationFormat::mrcal;
+  if (extension == ".xml") return CalibrationFormat::opencv;
   return std::nullopt;
 }
 
@@ -66,7 +66,7 @@ std::vector<std::string_view> calibration_format_names() {
 }
 
 bool has_a_file_per_eye(CalibrationFormat format) {
-  return kind_of(format).file_per_eye;
+  return kind_of(format).file_per_camera;
 }
 
 bool holds_image_size(CalibrationFormat format) {
@@ -74,8 +74,8 @@ bool holds_image_size(CalibrationFormat format) {
 }
 
 std::optional<CalibrationFormat> guess_format(const std::string& path, const std::string& text) {
-  const std::string ending = std::filesystem::path(path).extension().string();
-  if (const auto format = format_of_ending(ending)) return format;
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (const auto format = format_of_extension(extension)) return format;
   if (has_line(text, "P_rect_00:")) return CalibrationFormat::kitti_raw;
   if (has_line(text, "P0:")) return CalibrationFormat::kitti;
   if (has_line(text, "T_BS:")) return CalibrationFormat::euroc;
@@ -87,26 +87,26 @@ std::optional<CalibrationFormat> guess_format(const std::string& path, const std
   if (text.find("LENSMODEL_") != std::string::npos && has_line(text, "{")) return CalibrationFormat::mrcal;
   if (has_line(text, "u_direction")) return CalibrationFormat::tsai;
   if (has_line(text, "Dimensions")) return CalibrationFormat::cahvor;
-  if (ending == ".yaml" || ending == ".yml") return CalibrationFormat::rig_yaml;
+  if (extension == ".yaml" || extension == ".yml") return CalibrationFormat::rig_yaml;
   return std::nullopt;
 }
 
 Result<CalibrationFormat> format_for_name(const std::string& path) {
   const std::filesystem::path file(path);
-  const std::string name = file.filename().string(), ending = file.extension().string();
+  const std::string name = file.filename().string(), extension = file.extension().string();
   std::error_code error;
-  if (const auto format = format_of_ending(ending)) return *format;
+  if (const auto format = format_of_extension(extension)) return *format;
   if (name == "calib_cam_to_cam.txt") return CalibrationFormat::kitti_raw;
   if (name == "calib.txt") return CalibrationFormat::kitti;
   if (name.find("camchain") != std::string::npos) return CalibrationFormat::kalibr;
   if (name.find("camera_info") != std::string::npos || path.find(',') != std::string::npos) {
     return CalibrationFormat::ros;
   }
-  if (ending == ".yml") return CalibrationFormat::opencv;
-  if (ending == ".yaml") return CalibrationFormat::rig_yaml;
-  if (ending.empty() || std::filesystem::is_directory(file, error)) return CalibrationFormat::euroc;
-  return failure(ErrorCode::usage, "this name tells no format", path,
-                 fmt::format("say --to {}", fmt::join(calibration_format_names(), "|")));
+  if (extension == ".yml") return CalibrationFormat::opencv;
+  if (extension == ".yaml") return CalibrationFormat::rig_yaml;
+  if (extension.empty() || std::filesystem::is_directory(file, error)) return CalibrationFormat::euroc;
+  return failure(ErrorCode::usage, "the file name does not determine the format", path,
+                 fmt::format("add --to {}", fmt::join(calibration_format_names(), "|")));
 }
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// The formats of calibration files, and which of them a name means.
+// The supported formats of calibration files, and their detection from names and content.
 #pragma once
 
 #include <optional>
@@ -12,20 +12,23 @@ namespace spartan {
 
 enum class CalibrationFormat { rig_yaml, kitti, kitti_raw, euroc, kalibr, opencv, ros, mrcal, tsai, cahvor };
 
-/// "rig.yaml", "kitti", "kitti-raw", "euroc", "kalibr", "opencv", "ros", "mrcal", "tsai", "cahvor".
+/// The name of a format: "rig.yaml", "kitti", "kitti-raw", "euroc", "kalibr", "opencv", "ros", "mrcal", "tsai",
+/// "cahvor".
 std::string_view name_of(CalibrationFormat format);
+/// The format with that name, if there is one.
 std::optional<CalibrationFormat> calibration_format_named(std::string_view name);
+/// The names of all formats.
 std::vector<std::string_view> calibration_format_names();
 
-/// Two files make a pair, one for each eye.
+/// Whether the format stores each camera of a pair in a file of its own.
 bool has_a_file_per_eye(CalibrationFormat format);
-/// Whether the files say how large the pictures are.
+/// Whether the files contain the image size.
 bool holds_image_size(CalibrationFormat format);
 
-/// The format that a name stands for by its ending, or that its text begins like; none where nothing is known by it.
+/// Detects the format of an existing file from its extension and its text; nullopt if it is unknown.
 std::optional<CalibrationFormat> guess_format(const std::string& path, const std::string& text);
-/// The format to write under a name; code `usage` where the name does not tell. A name without an ending is EuRoC's
-/// folder.
+/// The format to write to a path, from its file name; code `usage` if the name does not determine it. A name without
+/// extension is a folder of EuRoC's layout.
 Result<CalibrationFormat> format_for_name(const std::string& path);
 
 }  // namespace spartan

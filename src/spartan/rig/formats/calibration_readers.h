@@ -1,18 +1,18 @@
-// Readers that tell what they left out, behind those of rig_files.h that give the rig alone. Internal to rig.
+// Readers that also report ignored information; those in rig_files.h return the rig alone. Internal to rig.
 #pragma once
 
 #include "spartan/rig/formats/rig_files.h"
 
 namespace spartan::rig_detail {
 
-/// What a body is that is nothing else; `ReadRig::body`.
+/// `ReadRig::body` of a rig whose files define no body frame.
 constexpr const char* kBodyIsLeftCamera = "the left camera, turned to x forward, y left, z up";
 
 Result<ReadRig> read_kitti(const std::string& path, ImageSize size);
 Result<ReadRig> read_kitti_raw(const std::string& path);
 Result<ReadRig> read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path, ImageSize size);
 
-/// The rig alone.
+/// Returns the rig of a ReadRig.
 Result<Rig> rig_of(Result<ReadRig> read);
 
 }  // namespace spartan::rig_detail

@@ -1,4 +1,4 @@
-// Readers of what other projects use: KITTI, KITTI raw, EuRoC, OpenCV.
+// Readers of KITTI, KITTI raw, EuRoC and OpenCV calibrations.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -38,26 +38,26 @@ TEST(KittiCalib, BaselineIsInTheLastColumn) {
   EXPECT_LE((right_in_left(*rig) - Eigen::Vector3d(0.54, 0, 0)).norm(), 1e-12);
 }
 
-TEST(KittiCalib, FaultsAreNamed) {
+TEST(KittiCalib, ErrorsAreSpecific) {
   const TemporaryFolder folder;
-  const auto said = [&](const std::string& what, const std::string& with, ImageSize size = {1240, 376}) {
+  const auto message_for = [&](const std::string& what, const std::string& with, ImageSize size = {1240, 376}) {
     return complaint(read_kitti_calib(folder.write("calib.txt", replaced(kKitti, what, with)), size));
   };
-  EXPECT_THAT(said("P1:", "Q1:"), HasSubstr("P1"));
-  EXPECT_THAT(said("P0: 700", "P0: nan"), HasSubstr("calib.txt:1"));
-  EXPECT_THAT(said("P0: 700", "P0: inf"), HasSubstr("calib.txt:1"));
-  EXPECT_THAT(said("P0: 700", "P0:"), HasSubstr("calib.txt:1"));
-  EXPECT_THAT(said("P0: 700", "P0: 0"), HasSubstr("above zero"));
-  EXPECT_THAT(said("P0: 700", "P0: seven"), HasSubstr("calib.txt:1"));
-  EXPECT_THAT(said("-378", "378"), HasSubstr("baseline of -0.54"));
-  EXPECT_THAT(said("-378 0 700 180", "-378 0 700 190"), HasSubstr("does not see the rows of P0"));
-  EXPECT_THAT(said("P0", "P0", ImageSize{}), HasSubstr("image size is not known"));
+  EXPECT_THAT(message_for("P1:", "Q1:"), HasSubstr("P1"));
+  EXPECT_THAT(message_for("P0: 700", "P0: nan"), HasSubstr("calib.txt:1"));
+  EXPECT_THAT(message_for("P0: 700", "P0: inf"), HasSubstr("calib.txt:1"));
+  EXPECT_THAT(message_for("P0: 700", "P0:"), HasSubstr("calib.txt:1"));
+  EXPECT_THAT(message_for("P0: 700", "P0: 0"), HasSubstr("above zero"));
+  EXPECT_THAT(message_for("P0: 700", "P0: seven"), HasSubstr("calib.txt:1"));
+  EXPECT_THAT(message_for("-378", "378"), HasSubstr("baseline of -0.54"));
+  EXPECT_THAT(message_for("-378 0 700 180", "-378 0 700 190"), HasSubstr("does not have the rows of P0"));
+  EXPECT_THAT(message_for("P0", "P0", ImageSize{}), HasSubstr("image size is not known"));
   EXPECT_THAT(complaint(read_kitti_calib(folder.path() + "/none.txt", {1240, 376})), HasSubstr("none.txt"));
   EXPECT_THAT(complaint(read_kitti_calib(folder.write("empty.txt", ""), {1240, 376})), HasSubstr("empty.txt"));
 }
 
-// A NaN anywhere is a file that is not to be trusted; what else is there is left out, and said.
-TEST(KittiCalib, OtherCamerasAreLeftOutButSound) {
+// A NaN anywhere makes the file invalid; other cameras are ignored, which is reported.
+TEST(KittiCalib, OtherCamerasAreIgnoredButChecked) {
   const TemporaryFolder folder;
   const auto read = [&](const std::string& what, const std::string& with) {
     return read_calibration(folder.write("calib.txt", replaced(kKitti, what, with) + "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n"),
@@ -66,15 +66,15 @@ TEST(KittiCalib, OtherCamerasAreLeftOutButSound) {
   EXPECT_THAT(complaint(read("P2: 700", "P2: nan")), HasSubstr("calib.txt:3: P2: 'nan' is not a finite number"));
   EXPECT_THAT(complaint(read("P2: 700", "Tr: nan")), HasSubstr("calib.txt:3: Tr"));
   EXPECT_THAT(complaint(read("P2: 700", "P3: 1 700")), HasSubstr("calib.txt:3: P3: has 13 numbers, must have 12"));
-  const auto told = [](const Result<ReadRig>& of) {
+  const auto ignored_of = [](const Result<ReadRig>& of) {
     std::string all;
     for (const RigDifference& each : of.value().left_out) all += each.key + ": " + each.text + "\n";
     return all;
   };
-  EXPECT_EQ(told(read("P0", "P0")),
+  EXPECT_EQ(ignored_of(read("P0", "P0")),
             "P2: a colour camera, which is not read\nTr: the place of the laser scanner, which is not read\n");
-  EXPECT_THAT(told(read("-378 0 700 180 0 0 0 1 0", "-378 0 700 180 0.5 0 0 1 0.0009")),
-              HasSubstr("P1: the last numbers of its rows 2 and 3, 0.5 and 0.0009, are taken as 0"));
+  EXPECT_THAT(ignored_of(read("-378 0 700 180 0 0 0 1 0", "-378 0 700 180 0.5 0 0 1 0.0009")),
+              HasSubstr("P1: the last numbers of its rows 2 and 3, 0.5 and 0.0009, are set to 0"));
 }
 
 // --- KITTI raw ---
@@ -87,7 +87,7 @@ const std::string kRaw =
 const std::string kImuToVelo = "R: 1 0 0 0 1 0 0 0 1\nT: -0.8 0.3 -0.8\n";
 const std::string kVeloToCam = "R: 0 -1 0 0 0 -1 1 0 0\nT: 0 -0.07 -0.27\n";
 
-TEST(KittiRawCalib, WithoutTheImuTheLeftCameraIsTheBody) {
+TEST(KittiRawCalib, WithoutImuTheBodyIsTheLeftCamera) {
   const TemporaryFolder folder;
   const auto rig = read_kitti_raw_calib(folder.write("calib_cam_to_cam.txt", kRaw));
   ASSERT_TRUE(rig) << rig.error().message();
@@ -96,7 +96,7 @@ TEST(KittiRawCalib, WithoutTheImuTheLeftCameraIsTheBody) {
   EXPECT_NEAR(right_in_left(*rig).x(), 387.377 / 721, 1e-12);
 }
 
-TEST(KittiRawCalib, TheImuIsTheBodyWhereItIsKnown) {
+TEST(KittiRawCalib, WithImuTheBodyIsTheImu) {
   const TemporaryFolder folder;
   folder.write("calib_imu_to_velo.txt", kImuToVelo);
   folder.write("calib_velo_to_cam.txt", kVeloToCam);
@@ -110,7 +110,7 @@ TEST(KittiRawCalib, TheImuIsTheBodyWhereItIsKnown) {
   EXPECT_NEAR(right_in_left(*rig).x(), 387.377 / 721, 1e-12);
 }
 
-TEST(KittiRawCalib, TheCamerasBeforeRectificationAreLeftOut) {
+TEST(KittiRawCalib, UnrectifiedCamerasAreIgnored) {
   const TemporaryFolder folder;
   const auto keys = [&](const std::string& more) {
     std::string all;
@@ -119,20 +119,21 @@ TEST(KittiRawCalib, TheCamerasBeforeRectificationAreLeftOut) {
     return all;
   };
   EXPECT_EQ(keys(""), "");
-  EXPECT_EQ(keys("K_00: 721 0 609 0 721 172 0 0 1\nD_00: 0 0 0 0 0\n"), "") << "it is the rectified one";
+  EXPECT_EQ(keys("K_00: 721 0 609 0 721 172 0 0 1\nD_00: 0 0 0 0 0\n"), "") << "it equals the rectified camera";
   EXPECT_EQ(keys("K_00: 721 0 609 0 721 172 0 0 1\nD_00: 0.1 0 0 0 0\n"), "K_00;");
   EXPECT_EQ(keys("K_01: 720 0 609 0 721 172 0 0 1\nD_01: 0 0 0 0 0\nP_rect_02: 1 0 0 0 0 1 0 0 0 0 1 0\n"),
             "P_rect_02;K_01;");
 }
 
-TEST(KittiRawCalib, FaultsAreNamed) {
+TEST(KittiRawCalib, ErrorsAreSpecific) {
   const TemporaryFolder folder;
-  const auto said = [&](const std::string& what, const std::string& with) {
+  const auto message_for = [&](const std::string& what, const std::string& with) {
     return complaint(read_kitti_raw_calib(folder.write("calib_cam_to_cam.txt", replaced(kRaw, what, with))));
   };
-  EXPECT_THAT(said("S_rect_00: 1242 375", "S_rect_00: 1242"), HasSubstr("calib_cam_to_cam.txt:3"));
-  EXPECT_THAT(said("S_rect_00: 1242 375", "S_rect_00: 1242.5 375"), HasSubstr("S_rect_00: must be two whole numbers"));
-  EXPECT_THAT(said("S_rect_00: 1242 375", "S_rect_00: 1242 -375"), HasSubstr("S_rect_00"));
+  EXPECT_THAT(message_for("S_rect_00: 1242 375", "S_rect_00: 1242"), HasSubstr("calib_cam_to_cam.txt:3"));
+  EXPECT_THAT(message_for("S_rect_00: 1242 375", "S_rect_00: 1242.5 375"),
+              HasSubstr("S_rect_00: must be two whole numbers"));
+  EXPECT_THAT(message_for("S_rect_00: 1242 375", "S_rect_00: 1242 -375"), HasSubstr("S_rect_00"));
   folder.write("calib_velo_to_cam.txt", kVeloToCam);
   folder.write("calib_imu_to_velo.txt", replaced(kImuToVelo, "R: 1", "R: 2"));
   EXPECT_THAT(complaint(read_kitti_raw_calib(folder.write("calib_cam_to_cam.txt", kRaw))),
@@ -170,28 +171,28 @@ class EurocCalib : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(EurocCalib, BodyIsThatOfTheFiles) {
+TEST_F(EurocCalib, BodyIsTheOneOfTheFiles) {
   const auto rig = read(kEuroc, right_);
   ASSERT_TRUE(rig) << rig.error().message();
   EXPECT_EQ(rig->convention, PoseConvention::body);
   EXPECT_LE((right_in_left(*rig) - Eigen::Vector3d(0.11, 0, 0)).norm(), 1e-12);
   EXPECT_EQ(parameters(rig->cameras[0].model)[2], (std::vector<double>{-0.28, 0.07, 0.0001, 0.00002}));
   EXPECT_EQ(rig->cameras[1].size, (ImageSize{752, 480}));
-  EXPECT_TRUE(read("%YAML:1.0\n" + kEuroc, right_)) << "OpenCV's first line";
+  EXPECT_TRUE(read("%YAML:1.0\n" + kEuroc, right_)) << "first line of OpenCV";
 }
 
-TEST_F(EurocCalib, FaultsAreNamed) {
-  const auto said = [&](const std::string& what, const std::string& with) {
+TEST_F(EurocCalib, ErrorsAreSpecific) {
+  const auto message_for = [&](const std::string& what, const std::string& with) {
     return complaint(read(replaced(kEuroc, what, with), right_));
   };
-  EXPECT_THAT(said("intrinsics: [458, ", "intrinsics: [.nan, "), HasSubstr("cam0/sensor.yaml:14: intrinsics"));
-  EXPECT_THAT(said("intrinsics: [458, ", "intrinsics: ["), HasSubstr("must be a list of 4 numbers"));
-  EXPECT_THAT(said("intrinsics: [458, ", "intrinsics: [0, "), HasSubstr("above zero"));
-  EXPECT_THAT(said("camera_model: pinhole", "camera_model: fov"), HasSubstr("sensor.yaml:13: camera_model"));
-  EXPECT_THAT(said("radial-tangential", "fov"), HasSubstr("sensor.yaml:15: distortion_model"));
-  EXPECT_THAT(said("data: [0, 0, 1, 0.1", "data: [0, 0, 2, 0.1"), HasSubstr("T_BS: is not a rigid transform"));
-  EXPECT_THAT(said("resolution: [752, 480]", "resolution: [752, 0]"), HasSubstr("sensor.yaml:12: resolution"));
-  EXPECT_THAT(said("T_BS:", "T_SB:"), HasSubstr("T_BS"));
+  EXPECT_THAT(message_for("intrinsics: [458, ", "intrinsics: [.nan, "), HasSubstr("cam0/sensor.yaml:14: intrinsics"));
+  EXPECT_THAT(message_for("intrinsics: [458, ", "intrinsics: ["), HasSubstr("must be a list of 4 numbers"));
+  EXPECT_THAT(message_for("intrinsics: [458, ", "intrinsics: [0, "), HasSubstr("above zero"));
+  EXPECT_THAT(message_for("camera_model: pinhole", "camera_model: fov"), HasSubstr("sensor.yaml:13: camera_model"));
+  EXPECT_THAT(message_for("radial-tangential", "fov"), HasSubstr("sensor.yaml:15: distortion_model"));
+  EXPECT_THAT(message_for("data: [0, 0, 1, 0.1", "data: [0, 0, 2, 0.1"), HasSubstr("T_BS: is not a rigid transform"));
+  EXPECT_THAT(message_for("resolution: [752, 480]", "resolution: [752, 0]"), HasSubstr("sensor.yaml:12: resolution"));
+  EXPECT_THAT(message_for("T_BS:", "T_SB:"), HasSubstr("T_BS"));
   EXPECT_THAT(complaint(read(kEuroc, kEuroc)), HasSubstr("baseline is zero"));
   const std::string both = complaint(read(replaced(kEuroc, "752", "x"), replaced(right_, "752", "y")));
   EXPECT_THAT(both, HasSubstr("cam0"));
@@ -202,7 +203,7 @@ TEST_F(EurocCalib, FaultsAreNamed) {
 
 // --- OpenCV ---
 
-// As the calibration samples write it.
+// A file as written by the calibration samples of OpenCV.
 std::string opencv_yml(double tx, const cv::Mat& distortion = (cv::Mat_<double>(1, 5) << -0.2, 0.1, 0.001, 0, 0.02),
                        const char* name = "memory.yml") {
   cv::FileStorage file(name, cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
@@ -212,7 +213,7 @@ std::string opencv_yml(double tx, const cv::Mat& distortion = (cv::Mat_<double>(
   return file.releaseAndGetString();
 }
 
-TEST(OpencvCalib, TIsWhereTheLeftEyeIsSeenFromTheRight) {
+TEST(OpencvCalib, TIsTheTranslationOfRightFromLeft) {
   const TemporaryFolder folder;
   const auto rig = read_opencv_calib(folder.write("stereo.yml", opencv_yml(-0.12)), "", {640, 480});
   ASSERT_TRUE(rig) << rig.error().message();
@@ -222,7 +223,7 @@ TEST(OpencvCalib, TIsWhereTheLeftEyeIsSeenFromTheRight) {
   EXPECT_EQ(parameters(rig->cameras[0].model)[2], (std::vector<double>{-0.2, 0.1, 0.001, 0, 0.02}));
 }
 
-TEST(OpencvCalib, XmlIsReadToo) {
+TEST(OpencvCalib, ReadsXml) {
   const TemporaryFolder folder;
   const cv::Mat distortion = (cv::Mat_<double>(1, 4) << -0.2, 0.1, 0, 0);
   const auto rig = read_rig(folder.write("stereo.xml", opencv_yml(-0.12, distortion, "memory.xml")), {640, 480});
@@ -230,14 +231,14 @@ TEST(OpencvCalib, XmlIsReadToo) {
   EXPECT_EQ(parameters(rig->cameras[1].model)[2], (std::vector<double>{-0.2, 0.1, 0, 0}));
 }
 
-TEST(OpencvCalib, AMatrixThatClaimsToBeHugeIsRefused) {
+TEST(OpencvCalib, AMatrixWithTooManyRowsIsRejected) {
   const TemporaryFolder folder;
   const std::string text = replaced(opencv_yml(-0.12), "rows: 3", "rows: 200000000");
   EXPECT_THAT(complaint(read_opencv_calib(folder.write("stereo.yml", text), "", {640, 480})),
-              HasSubstr("M1: has other numbers than its rows and columns say"));
+              HasSubstr("M1: does not have rows × cols numbers"));
 }
 
-TEST(OpencvCalib, SizeIsTakenFromTheFileWhereItHasOne) {
+TEST(OpencvCalib, TheSizeInTheFileHasPrecedence) {
   const TemporaryFolder folder;
   const std::string with_size = opencv_yml(-0.12) + "image_width: 800\nimage_height: 600\n";
   const auto rig = read_opencv_calib(folder.write("stereo.yml", with_size), "", {640, 480});
@@ -245,25 +246,25 @@ TEST(OpencvCalib, SizeIsTakenFromTheFileWhereItHasOne) {
   EXPECT_EQ(rig->cameras[0].size, (ImageSize{800, 600}));
 }
 
-TEST(OpencvCalib, FaultsAreNamed) {
+TEST(OpencvCalib, ErrorsAreSpecific) {
   const TemporaryFolder folder;
-  const auto said = [&](const std::string& text, ImageSize size = {640, 480}) {
+  const auto message_for = [&](const std::string& text, ImageSize size = {640, 480}) {
     return complaint(read_opencv_calib(folder.write("stereo.yml", text), "", size));
   };
-  EXPECT_THAT(said(replaced(opencv_yml(-0.12), "M2", "N2")), HasSubstr("M2"));
-  EXPECT_THAT(said(replaced(opencv_yml(-0.12), "530.", ".Nan")),
+  EXPECT_THAT(message_for(replaced(opencv_yml(-0.12), "M2", "N2")), HasSubstr("M2"));
+  EXPECT_THAT(message_for(replaced(opencv_yml(-0.12), "530.", ".Nan")),
               HasSubstr("stereo.yml:3: M1: '.Nan' is not a finite number"));
-  EXPECT_THAT(said(opencv_yml(0)), HasSubstr("stereo.yml"));
-  EXPECT_THAT(said(opencv_yml(-0.12, cv::Mat_<double>::zeros(1, 3))),
+  EXPECT_THAT(message_for(opencv_yml(0)), HasSubstr("stereo.yml"));
+  EXPECT_THAT(message_for(opencv_yml(-0.12, cv::Mat_<double>::zeros(1, 3))),
               HasSubstr("D1: has 3 numbers, must have 4 or 5 or 8"));
-  EXPECT_THAT(said(opencv_yml(-0.12), {}), HasSubstr("image size is not known"));
-  EXPECT_THAT(said(opencv_yml(-0.12).substr(0, 300)), HasSubstr("stereo.yml"));
-  EXPECT_THAT(said("no yaml at all: ["), HasSubstr("stereo.yml"));
+  EXPECT_THAT(message_for(opencv_yml(-0.12), {}), HasSubstr("image size is not known"));
+  EXPECT_THAT(message_for(opencv_yml(-0.12).substr(0, 300)), HasSubstr("stereo.yml"));
+  EXPECT_THAT(message_for("no yaml at all: ["), HasSubstr("stereo.yml"));
 }
 
-// --- which reader ---
+// --- detection of the format ---
 
-TEST(ReadRig, KnowsTheFormatByItsContent) {
+TEST(ReadRig, DetectsTheFormatFromTheContent) {
   const TemporaryFolder folder;
   EXPECT_EQ(read_rig(folder.write("a/x.txt", kKitti), {1240, 376}).value().name, "kitti");
   EXPECT_EQ(read_rig(folder.write("b/x.txt", kRaw)).value().name, "kitti_raw");
@@ -273,12 +274,12 @@ TEST(ReadRig, KnowsTheFormatByItsContent) {
   EXPECT_EQ(read_rig(folder.path()).value().name, "euroc");
   EXPECT_EQ(read_rig(testing::source_folder() + "/config/rigs/rover.yaml").value().name, "rover");
   EXPECT_THAT(complaint(read_rig(folder.write("poem.txt", "roses are red"))), HasSubstr("poem.txt"));
-  EXPECT_THAT(complaint(read_rig(folder.path() + "/a")), HasSubstr("no calibration here"));
+  EXPECT_THAT(complaint(read_rig(folder.path() + "/a")), HasSubstr("contains no calibration"));
   EXPECT_THAT(complaint(read_rig(folder.path() + "/none")), HasSubstr("/none"));
 }
 
-// Whatever the file is called.
-TEST(CalibrationFormats, AreKnownByTheirText) {
+// Independent of the file name.
+TEST(CalibrationFormats, AreDetectedFromTheText) {
   using Format = CalibrationFormat;
   EXPECT_EQ(guess_format("x.txt", "{\n  'lensmodel': 'LENSMODEL_PINHOLE',\n}\n"), Format::mrcal);
   EXPECT_EQ(guess_format("x.txt", "VERSION_4\nPINHOLE\nfu = 1\nu_direction = 1 0 0\n"), Format::tsai);
@@ -286,7 +287,7 @@ TEST(CalibrationFormats, AreKnownByTheirText) {
   EXPECT_EQ(guess_format("x.txt", "roses are red\n"), std::nullopt);
 }
 
-TEST(CalibrationFormats, AreWrittenByTheirNames) {
+TEST(CalibrationFormats, AreSelectedByFileNamesForWriting) {
   using Format = CalibrationFormat;
   const std::pair<const char*, Format> known[] = {{"a.cahv", Format::cahvor},
                                                   {"a.cahvore", Format::cahvor},
@@ -306,23 +307,23 @@ TEST(CalibrationFormats, AreWrittenByTheirNames) {
   EXPECT_EQ(format_for_name("a.odd").error().code, ErrorCode::usage);
 }
 
-TEST(ReadRig, AMarkOfUtf8IsNoText) {
+TEST(ReadRig, IgnoresAByteOrderMark) {
   const TemporaryFolder folder;
   EXPECT_EQ(complaint(read_calibration(folder.write("calib.txt", "\xEF\xBB\xBF" + kKitti), {1240, 376})), "nothing");
   EXPECT_EQ(complaint(read_calibration(folder.write("s.yml", "\xEF\xBB\xBF" + opencv_yml(-0.1)), {640, 480})),
             "nothing");
 }
 
-// A calibration is read more than once; a pipe gives its text once only, or never.
-TEST(ReadRig, OnlyFilesAreRead) {
+// A calibration is read more than once, which a pipe does not allow.
+TEST(ReadRig, RejectsPipes) {
   const TemporaryFolder folder;
   const std::string pipe = folder.path() + "/pipe.yaml";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_THAT(complaint(read_calibration(pipe)), HasSubstr("pipe.yaml: is no file"));
-  EXPECT_THAT(complaint(read_rig_yaml(pipe)), HasSubstr("pipe.yaml: is no file"));
+  EXPECT_THAT(complaint(read_calibration(pipe)), HasSubstr("pipe.yaml: is not a regular file"));
+  EXPECT_THAT(complaint(read_rig_yaml(pipe)), HasSubstr("pipe.yaml: is not a regular file"));
 }
 
-TEST(ReadRig, AFolderStandsForTheOneCalibrationInIt) {
+TEST(ReadRig, AFolderIsReadIfItContainsOneCalibration) {
   const TemporaryFolder folder;
   const auto name = [&](const std::string& path) {
     return read_rig(folder.path() + "/" + path, {640, 480}).value().name;
@@ -335,7 +336,7 @@ TEST(ReadRig, AFolderStandsForTheOneCalibrationInIt) {
   EXPECT_EQ(name("xml"), "opencv");
   folder.write("two/a.yml", opencv_yml(-0.1));
   folder.write("two/b.yml", opencv_yml(-0.2));
-  EXPECT_THAT(complaint(read_rig(folder.path() + "/two")), HasSubstr("holds more than one calibration"));
+  EXPECT_THAT(complaint(read_rig(folder.path() + "/two")), HasSubstr("contains more than one calibration"));
 }
 
 TEST(ReadRig, RealCalibrations) {

@@ -1,4 +1,4 @@
-// Random rigs through every format that can hold them, and through two in a row: nothing is lost.
+// Random rigs through every format that supports them, and through chains of two formats: nothing is lost.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -17,14 +17,14 @@ namespace {
 using testing::TemporaryFolder;
 using Format = CalibrationFormat;
 
-struct Holder {
+struct FormatCase {
   Format format;
   const char* path;
-  std::vector<const char*> models;  // kinds below
-  bool body, left_camera;           // which frames it can say: a body of its own, the left camera's
-  bool sizes;                       // an image size for each eye
+  std::vector<const char*> models;  // names of any_model()
+  bool body, left_camera;           // which body frames it supports: any, the left camera
+  bool sizes;                       // an image size for each camera
 };
-const std::vector<Holder> kHolders{
+const std::vector<FormatCase> kFormatCases{
     {Format::rig_yaml,
      "rig.yaml",
      {"pinhole", "radtan4", "radtan5", "radtan8", "equidistant", "two_terms", "double_sphere", "cahv", "cahvor",
@@ -83,7 +83,7 @@ Eigen::Vector3d any_vector(double most) {
   return {between(-most, most), between(-most, most), between(-most, most)};
 }
 
-// A skew for models that may have one is given by the kind "cahv" only: mrcal's files have none.
+// Only "cahv" has a skew, because mrcal's files do not support it.
 CameraModel any_model(const std::string& kind) {
   const PinholeModel pinhole{between(300, 1500), between(300, 1500), between(0, 1300), between(0, 1000)};
   const auto k = [] { return between(-0.1, 0.1); };
@@ -121,12 +121,12 @@ ImageSize any_size() {
   return {*rc::gen::inRange(2, 5000), *rc::gen::inRange(2, 5000)};
 }
 
-// What only rig.yaml has a place for: the keys of what is not as in a camera of which nothing is said.
-std::set<std::string> keys_of_pictures(const Rig& rig) {
+// The keys that only rig.yaml supports and whose values differ from their defaults.
+std::set<std::string> native_only_keys(const Rig& rig) {
   std::set<std::string> keys;
   for (const Camera& camera : rig.cameras) {
-    const auto add = [&](bool told, const char* key) {
-      if (told) keys.insert("cameras." + camera.name + "." + key);
+    const auto add = [&](bool differs, const char* key) {
+      if (differs) keys.insert("cameras." + camera.name + "." + key);
     };
     add(camera.pixel_format.layout != PixelLayout::gray, "pixel_layout");
     add(camera.pixel_format.bits != 8, "bits");
@@ -138,7 +138,7 @@ std::set<std::string> keys_of_pictures(const Rig& rig) {
   return keys;
 }
 
-// One pair; rectified where asked for. The body sees the left camera look forward within what REP-103 frames allow.
+// A rig of one pair, optionally rectified. With `body`, the left camera looks roughly forward in a REP-103 body frame.
 Rig any_rig(const std::string& kind, bool body, bool rectified, bool sizes) {
   const ImageSize size = any_size();
   Camera left = any_camera("left", kind, size), right = any_camera("right", kind, sizes ? any_size() : size);
@@ -160,35 +160,35 @@ Rig any_rig(const std::string& kind, bool body, bool rectified, bool sizes) {
   return rig;
 }
 
-Result<ReadRig> there_and_back(const Rig& rig, const Holder& holder, const TemporaryFolder& folder) {
-  const auto files = to_calibration_files(rig, holder.format, folder.path() + "/" + holder.path);
+Result<ReadRig> round_trip(const Rig& rig, const FormatCase& format_case, const TemporaryFolder& folder) {
+  const auto files = to_calibration_files(rig, format_case.format, folder.path() + "/" + format_case.path);
   if (!files) return failure(files);
   for (const CalibrationFile& file : *files) folder.write(file.path.substr(folder.path().size() + 1), file.content);
-  const bool two = has_a_file_per_eye(holder.format);
+  const bool two = has_a_file_per_eye(format_case.format);
   const std::string path = two ? (*files)[0].path + "," + (*files)[1].path : (*files)[0].path;
   return read_calibration(path, rig.cameras[0].size);
 }
 
-// What is told as lost though it should not be, or lost and not told.
-std::string told(const Rig& wanted, const Rig& got, Format format) {
+// Differences that are reported but not expected, and expected ones that are not reported.
+std::string unexpected_differences(const Rig& wanted, const Rig& got, Format format) {
   std::string text;
-  std::set<std::string> of_pictures = format == Format::rig_yaml ? std::set<std::string>() : keys_of_pictures(wanted);
+  std::set<std::string> expected = format == Format::rig_yaml ? std::set<std::string>() : native_only_keys(wanted);
   for (const RigDifference& each : describe_differences(wanted, got)) {
-    if (each.key.ends_with("name") || of_pictures.erase(each.key) > 0) continue;
+    if (each.key.ends_with("name") || expected.erase(each.key) > 0) continue;
     text += each.key + ": " + each.text + "\n";
   }
-  for (const std::string& key : of_pictures) text += key + ": lost, and nobody told\n";
+  for (const std::string& key : expected) text += key + ": lost without a report\n";
   return text;
 }
 
-// Apart from describe_differences(): the pair's geometry, and the numbers of the models.
+// Compares the extrinsics of the pair and the parameters of the models, independent of describe_differences().
 void expect_same(const Rig& wanted, const Rig& got) {
   const Pose was = wanted.right_from_left(wanted.pairs[0]), is = got.right_from_left(got.pairs[0]);
   RC_ASSERT((was.translation() - is.translation()).norm() <= 1e-12);
   RC_ASSERT(rotation_angle(was.inverse() * is) <= 1e-12);
-  const std::vector<std::pair<std::string, std::string>> eyes{{wanted.pairs[0].left, got.pairs[0].left},
-                                                              {wanted.pairs[0].right, got.pairs[0].right}};
-  for (const auto& [a, b] : eyes) {
+  const std::vector<std::pair<std::string, std::string>> names{{wanted.pairs[0].left, got.pairs[0].left},
+                                                               {wanted.pairs[0].right, got.pairs[0].right}};
+  for (const auto& [a, b] : names) {
     const ModelParameters numbers = parameters(plainest(wanted.find_camera(a)->model));
     const ModelParameters others = parameters(plainest(got.find_camera(b)->model));
     RC_ASSERT(numbers.size() == others.size());
@@ -196,7 +196,7 @@ void expect_same(const Rig& wanted, const Rig& got) {
       for (std::size_t i = 0; i < std::max(numbers[list].size(), others[list].size()); ++i) {
         const double x = i < numbers[list].size() ? numbers[list][i] : 0;
         const double y = i < others[list].size() ? others[list][i] : 0;
-        // H and V hold centre, focal length and skew together: pixels round as the longest of them.
+        // H and V combine principal point, focal length and skew: rounding is relative to their norm.
         const double scale = list < 3 && numbers[0][0] > 100 ? 2000 : 1;
         RC_ASSERT(std::abs(x - y) <= 1e-12 * scale);
       }
@@ -204,42 +204,43 @@ void expect_same(const Rig& wanted, const Rig& got) {
   }
 }
 
-RC_GTEST_PROP(CalibrationRoundTrip, EveryFormatHoldsWhatItSaysItHolds, ()) {
-  const Holder holder = *rc::gen::elementOf(kHolders);
-  const std::string kind = *rc::gen::elementOf(holder.models);
-  const bool body = holder.body && (!holder.left_camera || *rc::gen::arbitrary<bool>());
-  const bool rectified = holder.format == Format::kitti || holder.format == Format::kitti_raw;
-  const Rig rig = any_rig(kind, body, rectified, holder.sizes);
+RC_GTEST_PROP(CalibrationRoundTrip, EveryFormatPreservesWhatItSupports, ()) {
+  const FormatCase format_case = *rc::gen::elementOf(kFormatCases);
+  const std::string kind = *rc::gen::elementOf(format_case.models);
+  const bool body = format_case.body && (!format_case.left_camera || *rc::gen::arbitrary<bool>());
+  const bool rectified = format_case.format == Format::kitti || format_case.format == Format::kitti_raw;
+  const Rig rig = any_rig(kind, body, rectified, format_case.sizes);
   RC_PRE(rig.find_faults().empty());
-  RC_CLASSIFY(true, std::string(holder.path) + " " + kind);
+  RC_CLASSIFY(true, std::string(format_case.path) + " " + kind);
   const TemporaryFolder folder;
-  const auto read = there_and_back(rig, holder, folder);
-  if (!read) RC_FAIL(std::string(holder.path) + ", " + kind + ": " + read.error().message());
-  RC_ASSERT(read->format == holder.format);
-  const std::string lost = told(rig, read->rig, holder.format);
-  if (!lost.empty()) RC_FAIL(std::string(holder.path) + ", " + kind + ": " + lost);
+  const auto read = round_trip(rig, format_case, folder);
+  if (!read) RC_FAIL(std::string(format_case.path) + ", " + kind + ": " + read.error().message());
+  RC_ASSERT(read->format == format_case.format);
+  const std::string lost = unexpected_differences(rig, read->rig, format_case.format);
+  if (!lost.empty()) RC_FAIL(std::string(format_case.path) + ", " + kind + ": " + lost);
   expect_same(rig, read->rig);
 }
 
-// A → B → A, where both hold the model and the frame.
+// A → B → A, if both support the model and the body frame.
 RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
-  const Holder a = *rc::gen::elementOf(kHolders), b = *rc::gen::elementOf(kHolders);
+  const FormatCase a = *rc::gen::elementOf(kFormatCases), b = *rc::gen::elementOf(kFormatCases);
   const std::string kind = *rc::gen::elementOf(a.models);
   const bool held = std::any_of(b.models.begin(), b.models.end(), [&](const char* m) { return kind == m; });
   const bool by_body = a.body && b.body, by_left = a.left_camera && b.left_camera;
   RC_PRE(held && (by_body || by_left));
-  const auto is_kitti = [](const Holder& h) { return h.format == Format::kitti || h.format == Format::kitti_raw; };
+  const auto is_kitti = [](const FormatCase& h) { return h.format == Format::kitti || h.format == Format::kitti_raw; };
   const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()), is_kitti(a) || is_kitti(b),
                           a.sizes && b.sizes);
   RC_PRE(rig.find_faults().empty());
   const TemporaryFolder first, second, third;
-  const auto of_a = there_and_back(rig, a, first);
+  const auto of_a = round_trip(rig, a, first);
   if (!of_a) RC_FAIL(of_a.error().message());
-  const auto of_b = there_and_back(of_a->rig, b, second);
+  const auto of_b = round_trip(of_a->rig, b, second);
   if (!of_b) RC_FAIL(of_b.error().message());
-  const auto again = there_and_back(of_b->rig, a, third);
+  const auto again = round_trip(of_b->rig, a, third);
   if (!again) RC_FAIL(again.error().message());
-  const std::string lost = told(of_a->rig, again->rig, b.format == Format::rig_yaml ? a.format : b.format);
+  const std::string lost =
+      unexpected_differences(of_a->rig, again->rig, b.format == Format::rig_yaml ? a.format : b.format);
   if (!lost.empty()) RC_FAIL(std::string(a.path) + " → " + b.path + ", " + kind + ": " + lost);
   expect_same(of_a->rig, again->rig);
 }
@@ -253,7 +254,7 @@ PixelFormat any_pixel_format() {
   return format;
 }
 
-// The pair stands on a mast, its pixels are anything, and it need not be for odometry.
+// Mounts the pair on a mast, with random pixel formats and flags.
 void put_on_mast(Rig& rig) {
   PanTiltUnit mast;
   mast.body_from_base = Pose(exp_so3(any_vector(0.1)), any_vector(1));
@@ -269,12 +270,12 @@ void put_on_mast(Rig& rig) {
   rig.pairs[0].for_odometry = *rc::gen::arbitrary<bool>();
 }
 
-// All that a rig can be, bit for bit.
-RC_GTEST_PROP(CalibrationRoundTrip, RigYamlHoldsEverything, ()) {
-  Rig rig = any_rig(*rc::gen::elementOf(kHolders[0].models), true, false, true);
+// Every property of a rig, bit for bit.
+RC_GTEST_PROP(CalibrationRoundTrip, RigYamlPreservesEverything, ()) {
+  Rig rig = any_rig(*rc::gen::elementOf(kFormatCases[0].models), true, false, true);
   put_on_mast(rig);
   for (const char* name : {"below_left", "below_right"}) {
-    Camera camera = any_camera(name, *rc::gen::elementOf(kHolders[0].models), any_size());
+    Camera camera = any_camera(name, *rc::gen::elementOf(kFormatCases[0].models), any_size());
     camera.mount_from_camera = Pose(exp_so3(any_vector(2)), any_vector(3));
     camera.pixel_format = any_pixel_format();
     camera.vignetting.coefficients = {between(-0.3, 0), between(-0.1, 0.1)};
@@ -287,54 +288,55 @@ RC_GTEST_PROP(CalibrationRoundTrip, RigYamlHoldsEverything, ()) {
   rig.pairs.push_back({"below", "below_left", "below_right", between(0, 1), *rc::gen::arbitrary<bool>()});
   RC_PRE(rig.find_faults().empty());
   const TemporaryFolder folder;
-  const auto read = there_and_back(rig, kHolders[0], folder);
+  const auto read = round_trip(rig, kFormatCases[0], folder);
   if (!read) RC_FAIL(read.error().message());
   RC_ASSERT(read->rig == rig);
 }
 
-// A mast, pixels and distances have no place in other formats: they are dropped, which is told; the cameras stand as
-// at rest.
-RC_GTEST_PROP(CalibrationRoundTrip, WhatIsDroppedIsToldAndNothingElseChanges, ()) {
-  const Holder holder = kHolders[*rc::gen::inRange<std::size_t>(1, kHolders.size())];
-  const std::string kind = *rc::gen::elementOf(holder.models);
-  const bool rectified = holder.format == Format::kitti || holder.format == Format::kitti_raw;
-  const Rig plain = any_rig(kind, true, rectified, holder.sizes);
+// Other formats do not support pan-tilt units, pixel formats and minimum distances: they are dropped and reported.
+// Camera poses are those at the rest angles.
+RC_GTEST_PROP(CalibrationRoundTrip, DroppedPropertiesAreReported, ()) {
+  const FormatCase format_case = kFormatCases[*rc::gen::inRange<std::size_t>(1, kFormatCases.size())];
+  const std::string kind = *rc::gen::elementOf(format_case.models);
+  const bool rectified = format_case.format == Format::kitti || format_case.format == Format::kitti_raw;
+  const Rig plain = any_rig(kind, true, rectified, format_case.sizes);
   Rig rig = plain;
   put_on_mast(rig);
   RC_PRE(rig.find_faults().empty());
   const TemporaryFolder folder;
-  const auto read = there_and_back(rig, holder, folder);
-  if (!read) RC_FAIL(std::string(holder.path) + ", " + kind + ": " + read.error().message());
+  const auto read = round_trip(rig, format_case, folder);
+  if (!read) RC_FAIL(std::string(format_case.path) + ", " + kind + ": " + read.error().message());
   std::set<std::string> lost;
   for (const RigDifference& each : describe_differences(rig, read->rig)) lost.insert(each.key);
-  std::set<std::string> wanted = keys_of_pictures(rig);
+  std::set<std::string> wanted = native_only_keys(rig);
   wanted.insert("pan_tilt_units.mast");
   const std::string pair = "pairs." + rig.pairs[0].name + ".";
   if (rig.pairs[0].nearest_m != 0) wanted.insert(pair + "nearest_m");
   if (!rig.pairs[0].for_odometry) wanted.insert(pair + "for_odometry");
-  if (!holder.body) wanted.insert({"body", "pose_convention"});
+  if (!format_case.body) wanted.insert({"body", "pose_convention"});
   std::erase_if(lost, [](const std::string& key) { return key.ends_with("name"); });
   RC_ASSERT(lost == wanted);
   expect_same(rig, read->rig);
 }
 
-// Formats without an end of cameras keep all of them.
-RC_GTEST_PROP(CalibrationRoundTrip, FurtherCamerasAreKept, ()) {
-  const Holder holder = *rc::gen::elementOf(std::vector<Holder>{kHolders[0], kHolders[3], kHolders[4]});
+// Formats for any number of cameras keep all of them.
+RC_GTEST_PROP(CalibrationRoundTrip, AdditionalCamerasAreKept, ()) {
+  const FormatCase format_case =
+      *rc::gen::elementOf(std::vector<FormatCase>{kFormatCases[0], kFormatCases[3], kFormatCases[4]});
   Rig rig = any_rig("radtan4", true, false, true);
   const int more = *rc::gen::inRange(1, 4);
   for (int i = 0; i < more; ++i) {
     Camera camera = any_camera(("more" + std::to_string(i)).c_str(), "equidistant", {640, 480});
     camera.mount_from_camera = Pose(exp_so3(any_vector(2)), any_vector(3));
-    rig.cameras.insert(rig.cameras.begin(), camera);  // in front of the pair
+    rig.cameras.insert(rig.cameras.begin(), camera);  // before those of the pair
   }
   RC_PRE(rig.find_faults().empty());
   const TemporaryFolder folder;
-  const auto read = there_and_back(rig, holder, folder);
+  const auto read = round_trip(rig, format_case, folder);
   if (!read) RC_FAIL(read.error().message());
   RC_ASSERT(read->rig.cameras.size() == rig.cameras.size());
-  // Their order is that of the files: the pair first.
-  for (std::size_t i = 0; i < rig.cameras.size() && holder.format != Format::rig_yaml; ++i) {
+  // The order is that of the files: first the pair.
+  for (std::size_t i = 0; i < rig.cameras.size() && format_case.format != Format::rig_yaml; ++i) {
     const std::size_t at = (i + static_cast<std::size_t>(more)) % rig.cameras.size();
     const Camera& camera = rig.cameras[at];
     const Camera& kept = read->rig.cameras[i < 2 ? i : 2 + (at + 0)];

@@ -1,4 +1,4 @@
-// Reading and writing the text of calibration files. Internal to rig.
+// Helpers for reading and writing the text of calibration files. Internal to rig.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,33 +13,34 @@
 
 namespace spartan::rig_detail {
 
-/// What is larger is no calibration; nothing above is read into memory.
+/// Maximum size of a calibration file; larger files are rejected before they are read.
 constexpr std::size_t kLargestCalibration_bytes = std::size_t{4} << 20U;
-/// mrcal's files carry the whole optimisation that they come from.
+/// Maximum size of mrcal's files, which may contain all inputs of the optimization.
 constexpr std::size_t kLargestModelFile_bytes = std::size_t{64} << 20U;
 
-/// The whole of a file; code `configuration` where it cannot be read or is too large.
+/// The content of a file without a byte order mark; code `configuration` if it cannot be read or is too large.
 Result<std::string> read_calibration_text(const std::string& path, std::size_t largest = kLargestCalibration_bytes);
 
-/// A rig that is sound, or its faults.
+/// The rig if Rig::validate() accepts it, otherwise its error.
 Result<Rig> validated(Rig rig, const std::string& where);
 
-/// The error of a file that does not hold the image size where nothing else tells it.
+/// The error for a file without image size if the size is not known otherwise.
 tl::unexpected<Error> unknown_size(const std::string& where);
 
-/// Width and height where they are whole numbers above zero, and no more than a picture can have.
+/// Width and height if they are positive integers of at most 10⁶; nullopt otherwise.
 std::optional<ImageSize> whole_size(double width, double height);
-/// The pinhole of a camera matrix in nine numbers, row by row; none where it has another form than fx 0 cx; 0 fy cy;
-/// 0 0 1. Focal lengths are not looked at.
+/// The pinhole of a row-major 3×3 camera matrix; nullopt if it is not of the form fx 0 cx; 0 fy cy; 0 0 1. Focal
+/// lengths are not checked.
 std::optional<PinholeModel> pinhole_of_rows(const std::vector<double>& rows);
-/// The rotation of a rotation vector, rad; none where it goes round so often that its digits are lost.
-std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& turn);
+/// The rotation of a rotation vector in rad; nullopt if its angle exceeds 1000 rad, where its precision is lost.
+std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& rotation_vector);
 
-/// Numbers with all their digits, separated; of a matrix row by row.
+/// Numbers in full precision (they parse to the same bits), separated; a matrix in row-major order.
 std::string list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers, const char* separator = " ");
 std::string rows_of(const Eigen::Matrix3d& matrix, const char* separator = " ");
 
-/// The size that all pictures in a folder have; empty where there is none or sizes differ. Looks at the first few.
-ImageSize size_of_pictures_in(const std::string& folder);
+/// The common size of the first 8 images of a folder in alphabetical order; empty if there are none or their sizes
+/// differ.
+ImageSize size_of_images_in(const std::string& folder);
 
 }  // namespace spartan::rig_detail

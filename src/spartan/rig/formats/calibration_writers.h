@@ -1,4 +1,4 @@
-// One writer a format; rig_writing.h chooses. Internal to rig.
+// The writers of each format; to_calibration_files() in rig_writing.h selects one. Internal to rig.
 #pragma once
 
 #include "spartan/rig/formats/rig_writing.h"
@@ -15,18 +15,18 @@ Result<CalibrationFiles> write_mrcal_calib(const Rig& rig, const std::string& pa
 Result<CalibrationFiles> write_tsai_calib(const Rig& rig, const std::string& path);
 Result<CalibrationFiles> write_cahvor_calib(const Rig& rig, const std::string& path);
 
-/// The eyes of a rig that is one pair and nothing else.
-struct Eyes {
+/// The cameras of a rig that consists of one stereo pair.
+struct PairCameras {
   const Camera *left, *right;
   const StereoPair* pair;
 };
-/// Code `configuration` where the rig has further cameras or pairs; `format` is named in it.
-Result<Eyes> only_pair(const Rig& rig, CalibrationFormat format);
+/// Code `configuration`, naming `format`, if the rig has further cameras or pairs.
+Result<PairCameras> single_pair(const Rig& rig, CalibrationFormat format);
 
-/// The cameras with those of the first pair in front.
-std::vector<const Camera*> pair_first(const Rig& rig);
+/// All cameras, beginning with those of the first pair.
+std::vector<const Camera*> cameras_pair_first(const Rig& rig);
 
-/// "cameras.left: KITTI holds rectified pinholes only, this camera is equidistant".
+/// An error of code `configuration` for a camera that a format cannot represent: "cameras.NAME: why".
 tl::unexpected<Error> cannot_hold(const Camera& camera, const std::string& why);
 
 }  // namespace spartan::rig_detail

@@ -1,4 +1,4 @@
-// EuRoC/ASL calibration (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016).
+// Reader and writer of EuRoC/ASL calibrations (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016).
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -11,36 +11,34 @@
 namespace spartan {
 namespace {
 
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
 namespace fs = std::filesystem;
 
-constexpr int kMostCameras = 100;
+constexpr int kMaxCameras = 100;
 
 fs::path sensor_file(const std::string& folder, const std::string& camera) {
   return fs::path(folder) / camera / "sensor.yaml";
 }
 
-// T_BS: body from sensor, 4×4 row by row; both forms are in use: {rows, cols, data: […]} and the plain list.
+// T_BS: body from sensor, 4×4 in row-major order. Two notations are in use: {rows, cols, data: […]} and a plain list.
 std::optional<Pose> read_body_from_sensor(YamlMap& root) {
   const auto node = root.node("T_BS");
   if (!node) return std::nullopt;
-  const auto numbers = node->IsMap() ? YamlMap(*node, root.path("T_BS"), root.faults()).numbers("data", {16})
-                                     : root.numbers("T_BS", {16});
+  const auto numbers = node->is_map() ? YamlMap(*node, root.path("T_BS"), root.errors()).numbers("data", {16})
+                                      : root.numbers("T_BS", {16});
   return numbers ? rig_detail::read_rigid(root, "T_BS", *numbers) : std::nullopt;
 }
 
 Result<Camera> read_sensor(const std::string& path, const std::string& name) {
   const auto loaded = rig_detail::load_yaml_file(path);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(path);
-  YamlMap root(*loaded, "", faults);
+  YamlErrors errors(path);
+  YamlMap root(*loaded, "", errors);
   Camera camera;
   camera.name = name;
   camera.size = rig_detail::read_resolution(root, "resolution");
   camera.model = rig_detail::read_kalibr_model(root, "distortion_coefficients");
   camera.mount_from_camera = read_body_from_sensor(root).value_or(Pose());
-  if (const Status status = faults.status(); !status) return failure(status);
+  if (const Status status = errors.status(); !status) return failure(status);
   return camera;
 }
 
@@ -50,9 +48,9 @@ Result<Rig> read_euroc_calib(const std::string& mav0_folder) {
   Rig rig;
   rig.name = "euroc";
   rig.pairs = {{"stereo", "cam0", "cam1"}};
-  Error all{ErrorCode::configuration, "", "", ""};
+  Error errors{ErrorCode::configuration, "", "", ""};
   std::error_code error;
-  for (int i = 0; i < kMostCameras; ++i) {
+  for (int i = 0; i < kMaxCameras; ++i) {
     const std::string name = fmt::format("cam{}", i);
     const fs::path file = sensor_file(mav0_folder, name);
     if (i > 1 && !fs::exists(file, error)) break;
@@ -60,16 +58,16 @@ Result<Rig> read_euroc_calib(const std::string& mav0_folder) {
     if (camera) {
       rig.cameras.push_back(std::move(*camera));
     } else {
-      all.what += (all.what.empty() ? "" : "\n") + camera.error().message();
+      errors.what += (errors.what.empty() ? "" : "\n") + camera.error().message();
     }
   }
-  if (!all.what.empty()) return tl::unexpected<Error>(all);
+  if (!errors.what.empty()) return tl::unexpected<Error>(errors);
   return rig_detail::validated(std::move(rig), mav0_folder);
 }
 
 Result<CalibrationFiles> rig_detail::write_euroc_calib(const Rig& rig, const std::string& folder) {
   CalibrationFiles files;
-  for (const Camera* camera : pair_first(rig)) {
+  for (const Camera* camera : cameras_pair_first(rig)) {
     const auto model = kalibr_model_lines(*camera, "distortion_coefficients", "");
     if (!model) return failure(model);
     const Pose body_from_sensor = rig.body_from_camera(camera->name);

@@ -12,41 +12,42 @@
 namespace spartan::rig_detail {
 namespace {
 
-// A rover is not larger; cameras that stand farther off are in a frame of the world, often with the Earth's centre.
+// Maximum distance of a camera from the body origin; farther cameras are in a world frame, often Earth-centred.
 constexpr double kLargestRover_m = 100;
-// Closer to straight up or down than this (a degree) a camera does not tell where forward is.
-constexpr double kLeastLevel = 0.0175;
+// sin of 1°: a camera that looks within one degree of vertical does not determine the forward direction.
+constexpr double kMinSine = 0.0175;
 
-// How a camera stands in a frame whose x is forward: which end of z is up, and whether it looks ahead.
-struct Stance {
-  bool z_up, ahead;
+// The orientation of a camera in a frame whose x is forward: whether z is up, and whether the camera looks forward.
+struct ForwardFrame {
+  bool z_up, looks_forward;
 };
 
-// Right is sideways for a camera that looks along x, ahead or back, however it is tilted; and down is below the level
-// then. An upside-down camera cannot be told from one in a frame that is.
-std::optional<Stance> stance_in_rover(const Pose& file_from_camera) {
+// For a camera that looks forward or backward along x with any tilt, its right axis is along ±y and its down axis has a
+// vertical component. An upside-down camera cannot be distinguished from an upside-down frame.
+std::optional<ForwardFrame> forward_frame_of(const Pose& file_from_camera) {
   if (!(file_from_camera.translation().norm() <= kLargestRover_m)) return std::nullopt;
   const Eigen::Matrix3d axes = file_from_camera.rotation_matrix();
   const Eigen::Vector3d right = axes.col(0), down = axes.col(1);
   Eigen::Index largest = 0;
   right.cwiseAbs().maxCoeff(&largest);
-  if (largest != 1 || std::abs(down.z()) < kLeastLevel) return std::nullopt;
+  if (largest != 1 || std::abs(down.z()) < kMinSine) return std::nullopt;
   const bool z_up = down.z() < 0;
-  return Stance{z_up, z_up == (right.y() < 0)};
+  return ForwardFrame{z_up, z_up == (right.y() < 0)};
 }
 
-// The body is the left camera; where that stands in its files is lost, unless they are in its own frame.
+// The body is the left camera. Its pose in the frame of the files is lost, unless it is the identity.
 ReadRig rig_in_frame_of_camera(CalibrationFormat format, Camera left, Camera right) {
   ReadRig read;
-  read.body = std::string(kBodyIsLeftCamera) + " (in the files' frame it does not stand as on a rover)";
-  const Pose place = left.mount_from_camera;
-  if (place.translation().norm() > 1e-12 || rotation_angle(place) > 1e-12) {
-    read.left_out = {{"body", fmt::format("the files' frame is not kept; the left camera stands there at ({:.10g}, "
-                                          "{:.10g}, {:.10g}), turned by {:.6g} degrees",
-                                          place.translation().x(), place.translation().y(), place.translation().z(),
-                                          rotation_angle(place) * 180 / std::numbers::pi)}};
+  read.body = std::string(kBodyIsLeftCamera) + " (the frame of the files is not plausible as a body frame)";
+  const Pose file_from_left = left.mount_from_camera;
+  if (file_from_left.translation().norm() > 1e-12 || rotation_angle(file_from_left) > 1e-12) {
+    read.left_out = {{"body", fmt::format("the frame of the files is not kept; in it, the left camera is at ({:.10g}, "
+                                          "{:.10g}, {:.10g}), rotated by {:.6g} degrees",
+                                          file_from_left.translation().x(), file_from_left.translation().y(),
+                                          file_from_left.translation().z(),
+                                          rotation_angle(file_from_left) * 180 / std::numbers::pi)}};
   }
-  const Pose right_from_left = right.mount_from_camera.inverse() * place;
+  const Pose right_from_left = right.mount_from_camera.inverse() * file_from_left;
   read.rig = rig_of_one_pair(std::string(name_of(format)), std::move(left), std::move(right), right_from_left);
   return read;
 }
@@ -54,17 +55,17 @@ ReadRig rig_in_frame_of_camera(CalibrationFormat format, Camera left, Camera rig
 }  // namespace
 
 ReadRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera right) {
-  const auto stance = stance_in_rover(left.mount_from_camera);
+  const auto frame = forward_frame_of(left.mount_from_camera);
   ReadRig read;
-  if (stance && right.mount_from_camera.translation().norm() <= kLargestRover_m) {
-    if (!stance->z_up) {
+  if (frame && right.mount_from_camera.translation().norm() <= kLargestRover_m) {
+    if (!frame->z_up) {
       const Pose body_from_file = Pose::from_unit_quaternion({0, 1, 0, 0}, Eigen::Vector3d::Zero());
       left.mount_from_camera = body_from_file * left.mount_from_camera;
       right.mount_from_camera = body_from_file * right.mount_from_camera;
     }
-    read.body = stance->z_up ? "the files' frame"
-                             : "the files' frame, which is forward-right-down, turned to x forward, y left, z up";
-    read.body += stance->ahead ? "; the left camera looks forward along it" : "; the left camera looks back along it";
+    read.body = frame->z_up ? "the frame of the files"
+                            : "the frame of the files, which is forward-right-down, turned to x forward, y left, z up";
+    read.body += frame->looks_forward ? "; the left camera looks forward" : "; the left camera looks backward";
     read.rig.name = name_of(format);
     read.rig.pairs = {{"stereo", left.name, right.name}};
     read.rig.cameras = {std::move(left), std::move(right)};
@@ -76,28 +77,28 @@ ReadRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera righ
 }
 
 Result<ReadRig> read_two_files(CalibrationFormat format, const std::string& left_path, const std::string& right_path,
-                               const EyeReader& read_eye) {
-  auto left = read_eye(left_path, "left");
+                               const CameraReader& read_camera) {
+  auto left = read_camera(left_path, "left");
   if (!left) return failure(std::move(left));
-  auto right = read_eye(right_path, "right");
+  auto right = read_camera(right_path, "right");
   if (!right) return failure(std::move(right));
   ReadRig read = rig_in_frame_of_files(format, std::move(left->camera), std::move(right->camera));
-  for (const auto* eye : {&*left, &*right}) {
-    read.left_out.insert(read.left_out.end(), eye->left_out.begin(), eye->left_out.end());
+  for (const auto* camera : {&*left, &*right}) {
+    read.left_out.insert(read.left_out.end(), camera->left_out.begin(), camera->left_out.end());
   }
   read.files = {left_path, right_path};
-  if (const Status sound = read.rig.validate(left_path + " and " + right_path); !sound) return failure(sound);
+  if (const Status valid = read.rig.validate(left_path + " and " + right_path); !valid) return failure(valid);
   return read;
 }
 
 Result<CalibrationFiles> write_two_files(const Rig& rig, CalibrationFormat format, const std::string& path,
-                                         const EyeWriter& text_of) {
-  const auto eyes = only_pair(rig, format);
-  if (!eyes) return failure(eyes);
-  const Pose file_from_body = body_is_left_camera(rig, *eyes->pair) ? optical_from_forward() : Pose();
-  const auto left = text_of(*eyes->left, file_from_body * rig.body_from_camera(eyes->left->name));
+                                         const CameraWriter& text_of) {
+  const auto cameras = single_pair(rig, format);
+  if (!cameras) return failure(cameras);
+  const Pose file_from_body = body_is_left_camera(rig, *cameras->pair) ? optical_from_forward() : Pose();
+  const auto left = text_of(*cameras->left, file_from_body * rig.body_from_camera(cameras->left->name));
   if (!left) return failure(left);
-  const auto right = text_of(*eyes->right, file_from_body * rig.body_from_camera(eyes->right->name));
+  const auto right = text_of(*cameras->right, file_from_body * rig.body_from_camera(cameras->right->name));
   if (!right) return failure(right);
   const PairOfFiles names = names_of_pair(path);
   return CalibrationFiles{{names.left, *left}, {names.right, *right}};

@@ -1,4 +1,4 @@
-// Rigs from formats that place each camera in a frame which they do not explain. Internal to rig.
+// Rigs from formats that give camera poses in an undocumented frame. Internal to rig.
 #pragma once
 
 #include <functional>
@@ -9,35 +9,35 @@
 
 namespace spartan::rig_detail {
 
-/// A rig of two cameras whose `mount_from_camera` is the pose in the frame of their files. The body is
-///  - that frame, where the left camera stands in it as on a rover with x forward, y left, z up (REP-103): its right
+/// A rig of two cameras whose `mount_from_camera` is the pose in the frame of their files. The body frame is
+///  - the frame of the files, if it is plausible as a body frame with x forward, y left, z up (REP-103): the image x
 ///  axis
-///    mostly along −y (it looks ahead) or +y (it looks back), its down axis with −z, both eyes within 100 m;
-///  - that frame turned by 180° about x, where it is forward-right-down: the same with down along +z;
-///  - the left camera turned to x forward, y left, z up (rig_of_one_pair) in any other frame, with `left_out` saying
-///  so.
-/// "Mostly" is the axis with the largest part: any tilt but within a degree of straight up or down will do. `body` says
-/// which. The pair is named `stereo`.
+///    of the left camera mainly along −y (it looks forward) or +y (it looks backward), the image y axis downwards (−z),
+///    both cameras within 100 m of the origin;
+///  - the frame of the files rotated by 180° about x, if it is forward-right-down: as above with downwards along +z;
+///  - otherwise the left camera, turned to x forward, y left, z up (rig_of_one_pair); `left_out` reports the lost pose.
+/// "Mainly" refers to the largest component, so any tilt works except within one degree of vertical. `body` describes
+/// the chosen frame. The pair is named `stereo`.
 ReadRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera right);
 
-/// A camera whose `mount_from_camera` is its pose in the file's frame, and what the file holds besides.
-struct EyeOfFile {
+/// A camera whose `mount_from_camera` is its pose in the frame of the file, and the ignored content of the file.
+struct CameraOfFile {
   Camera camera;
   std::vector<RigDifference> left_out = {};
 };
-using EyeReader = std::function<Result<EyeOfFile>(const std::string& path, const std::string& name)>;
-/// The cameras `left` and `right` of two such files, validated.
+using CameraReader = std::function<Result<CameraOfFile>(const std::string& path, const std::string& name)>;
+/// Reads the cameras `left` and `right` from two such files into a validated rig.
 Result<ReadRig> read_two_files(CalibrationFormat format, const std::string& left_path, const std::string& right_path,
-                               const EyeReader& read_eye);
+                               const CameraReader& read_camera);
 
-/// The text of a camera's file.
-using EyeWriter = std::function<Result<std::string>(const Camera& camera, const Pose& file_from_camera)>;
-/// The two files of a rig that is one pair; `path` as in names_of_pair(). Their frame is the body, or the left camera
-/// where the body is nothing else: so that reading them finds the same rig.
+/// Formats the file of one camera.
+using CameraWriter = std::function<Result<std::string>(const Camera& camera, const Pose& file_from_camera)>;
+/// The two files of a rig that is one pair; `path` as in names_of_pair(). Poses are given in the body frame, or in the
+/// left optical frame if the body is that camera, so that reading the files gives the same rig.
 Result<CalibrationFiles> write_two_files(const Rig& rig, CalibrationFormat format, const std::string& path,
-                                         const EyeWriter& text_of);
+                                         const CameraWriter& text_of);
 
-/// Whether the body is the camera turned to x forward, y left, z up, and the poses are those of the camera.
+/// Whether the body frame is the left camera turned to x forward, y left, z up, and poses follow `left_optical`.
 bool body_is_left_camera(const Rig& rig, const StereoPair& pair);
 
 }  // namespace spartan::rig_detail

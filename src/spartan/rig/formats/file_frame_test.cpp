@@ -1,4 +1,4 @@
-// Which frame of two cameras' files is the body.
+// The choice of the body frame for formats with one file per camera.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,11 +17,11 @@ using testing::TemporaryFolder;
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
-// Two pinholes in a frame with x forward, y left, z up, turned by yaw and looking down by pitch.
-Rig pair_in_body(double yaw_deg, double pitch_deg, const Eigen::Vector3d& place) {
+// Two pinhole cameras in a frame with x forward, y left, z up, rotated by yaw and then by pitch (positive looks down).
+Rig pair_in_body(double yaw_deg, double pitch_deg, const Eigen::Vector3d& position) {
   const Pose looks(Eigen::Quaterniond(Eigen::AngleAxisd(yaw_deg * kRadiansPerDegree, Eigen::Vector3d::UnitZ()) *
                                       Eigen::AngleAxisd(pitch_deg * kRadiansPerDegree, Eigen::Vector3d::UnitY())),
-                   place);
+                   position);
   Rig rig;
   rig.name = "r";
   rig.pairs = {{"stereo", "left", "right"}};
@@ -42,7 +42,7 @@ Rig seen_from(const Pose& frame_from_body, Rig rig) {
   return rig;
 }
 
-// What is read where the files' frame is the body of `rig`.
+// Writes and reads `rig` with its body as the frame of the files.
 ReadRig through_files(const Rig& rig, const char* name = "pair.cahvor") {
   const TemporaryFolder folder;
   const auto files = to_calibration_files(rig, format_for_name(name).value(), folder.path() + "/" + name).value();
@@ -55,10 +55,10 @@ double apart(const Rig& a, const Rig& b) {
   return off.translation().norm() + rotation_angle(off);
 }
 
-// x forward, y left, z up turned to x forward, y right, z down.
+// Transform from x forward, y left, z up to x forward, y right, z down.
 const Pose kDown = Pose::from_unit_quaternion({0, 1, 0, 0}, Eigen::Vector3d::Zero());
 
-TEST(FileFrame, CamerasMayLookDownAndUpSteeply) {
+TEST(FileFrame, SupportsSteepTilts) {
   for (const char* name : {"pair.cahvor", "pair.tsai", "pair.cameramodel"}) {
     for (const double pitch : {-85, -50, -20, 0, 20, 44, 50, 70, 85}) {
       const Rig rig = pair_in_body(10, pitch, {1, 0.06, 1});
@@ -73,22 +73,22 @@ TEST(FileFrame, CamerasMayLookDownAndUpSteeply) {
   }
 }
 
-// Both pairs of one rover have one body.
-TEST(FileFrame, PairsThatLookBackKeepTheRoversFrame) {
+// A backward-looking pair of a rover has the same body frame as a forward-looking one.
+TEST(FileFrame, BackwardLookingPairsKeepTheFrame) {
   for (const double yaw : {180, 165, -170}) {
     for (const double pitch : {-30, 0, 37, 60}) {
       const Rig rig = pair_in_body(yaw, pitch, {-0.7, 0.08, 0.5});
       const ReadRig up = through_files(rig), down = through_files(seen_from(kDown, rig));
       EXPECT_LE(apart(rig, up.rig), 1e-9) << yaw << ", " << pitch;
       EXPECT_LE(apart(rig, down.rig), 1e-9) << yaw << ", " << pitch;
-      EXPECT_THAT(up.body, HasSubstr("looks back"));
-      EXPECT_THAT(down.body, HasSubstr("looks back"));
+      EXPECT_THAT(up.body, HasSubstr("looks backward"));
+      EXPECT_THAT(down.body, HasSubstr("looks backward"));
     }
   }
 }
 
-TEST(FileFrame, AFrameThatIsNoRoversIsSaidToBeLost) {
-  // The centre of the Earth; a camera's own frame that is not the left one's; straight down; to the side.
+TEST(FileFrame, OtherFramesAreReportedAsLost) {
+  // An Earth-centred frame; the optical frame of another camera; a vertical camera; a camera that looks sideways.
   const Rig on_earth = pair_in_body(0, 30, {-2665990.6, -3838640.2, 4312790.1});
   const Rig of_camera = seen_from(optical_from_forward(), pair_in_body(0, 0, {0, 0.5, 0}));
   for (const Rig& rig : {on_earth, of_camera, pair_in_body(0, 90, {1, 0, 1}), pair_in_body(90, 10, {1, 0, 1})}) {
@@ -97,9 +97,9 @@ TEST(FileFrame, AFrameThatIsNoRoversIsSaidToBeLost) {
     EXPECT_LE((optical_from_forward() * read.rig.body_from_camera("left")).translation().norm(), 1e-12);
     ASSERT_EQ(read.left_out.size(), 1u);
     EXPECT_EQ(read.left_out[0].key, "body");
-    EXPECT_THAT(read.left_out[0].text, HasSubstr("the files' frame is not kept; the left camera stands there at ("));
+    EXPECT_THAT(read.left_out[0].text, HasSubstr("the frame of the files is not kept; in it, the left camera is at ("));
   }
-  // The left camera's own frame says no more than the body that is the left camera.
+  // The optical frame of the left camera contains no further information.
   const Rig own =
       seen_from(optical_from_forward() * Pose::from_translation({0, -0.06, 0}), pair_in_body(0, 0, {0, 0, 0}));
   EXPECT_TRUE(through_files(own).left_out.empty());

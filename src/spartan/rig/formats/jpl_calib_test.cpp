@@ -1,4 +1,4 @@
-// mrcal and JPL: files that mrcal 2.2 wrote, and where it says that the point (3, 0.4, 0.2) is seen.
+// mrcal and JPL files written by mrcal 2.2, with its projections of the point (3, 0.4, 0.2).
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,17 +22,17 @@ using testing::replaced;
 using testing::right_in_left;
 using testing::TemporaryFolder;
 
-// Where the body's point is seen, brought to 1 m from the camera: mrcal does so before it looks, and only CAHVORE,
-// which is not central, sees a difference.
-Eigen::Vector2d seen(const Rig& rig, const char* camera, const Eigen::Vector3d& point) {
+// The projection of a point in the body frame, normalized to 1 m from the camera as in mrcal, which matters only for
+// the non-central CAHVORE.
+Eigen::Vector2d projected(const Rig& rig, const char* camera, const Eigen::Vector3d& point) {
   return project(rig.find_camera(camera)->model, (rig.body_from_camera(camera).inverse() * point).normalized()).value();
 }
 
-struct OfMrcal {
+struct MrcalCase {
   const char *name, *numbers, *cahvor_model, *cahvor_lines;
   Eigen::Vector2d left, right;
 };
-const OfMrcal kOfMrcal[] = {
+const MrcalCase kMrcalCases[] = {
     {"PINHOLE", "", "CAHV = perspective, linear", "", {565.30695802, 282.08847828}, {525.33661675, 272.78024447}},
     {"OPENCV4",
      " -0.1, 0.02, 0.0004, -0.0007,",
@@ -62,7 +62,7 @@ const OfMrcal kOfMrcal[] = {
      {527.07792514, 273.83272829}},
 };
 
-std::string cameramodel(const OfMrcal& of, bool left) {
+std::string cameramodel(const MrcalCase& of, bool left) {
   const char* place = left ? "1.450793522, -1.465374484, 1.00454599, 0.07658262933, 0.8785734014, 0.214111838"
                            : "1.472013065, -1.472013065, 1.028903554, -0.06777136222, 0.8771103171, 0.2229002783";
   return fmt::format(
@@ -76,7 +76,7 @@ std::string cameramodel(const OfMrcal& of, bool left) {
       of.name, of.numbers, place);
 }
 
-std::string cahvor(const OfMrcal& of, bool left) {
+std::string cahvor(const MrcalCase& of, bool left) {
   const std::string o =
       left ? "0.9459821133   -0.0009361639   -0.3242174655" : "0.9425976388   -0.0192241307   -0.3333768501";
   std::string lines = of.cahvor_lines;
@@ -95,52 +95,53 @@ std::string cahvor(const OfMrcal& of, bool left) {
       lines);
 }
 
-TEST(MrcalCalib, SeesWhatMrcalSees) {
-  for (const OfMrcal& of : kOfMrcal) {
+TEST(MrcalCalib, ProjectsAsMrcal) {
+  for (const MrcalCase& of : kMrcalCases) {
     SCOPED_TRACE(of.name);
     const TemporaryFolder folder;
     folder.write("right.cameramodel", cameramodel(of, false));
     const auto read = read_calibration(folder.write("left.cameramodel", cameramodel(of, true)));
     ASSERT_TRUE(read) << read.error().message();
     EXPECT_EQ(read->rig.convention, PoseConvention::body);
-    // The files hold ten digits.
-    EXPECT_LE((seen(read->rig, "left", {3, 0.4, 0.2}) - of.left).norm(), 1e-5);
-    EXPECT_LE((seen(read->rig, "right", {3, 0.4, 0.2}) - of.right).norm(), 1e-5);
+    // The files have ten digits.
+    EXPECT_LE((projected(read->rig, "left", {3, 0.4, 0.2}) - of.left).norm(), 1e-5);
+    EXPECT_LE((projected(read->rig, "right", {3, 0.4, 0.2}) - of.right).norm(), 1e-5);
     EXPECT_EQ(read->rig.cameras[0].size, (ImageSize{1280, 720}));
   }
 }
 
-TEST(CahvorCalib, SeesWhatMrcalSees) {
-  for (const OfMrcal& of : kOfMrcal) {
+TEST(CahvorCalib, ProjectsAsMrcal) {
+  for (const MrcalCase& of : kMrcalCases) {
     SCOPED_TRACE(of.name);
     const TemporaryFolder folder;
     folder.write("right.cahvor", cahvor(of, false));
     const auto read = read_calibration(folder.write("left.cahvor", cahvor(of, true)));
     ASSERT_TRUE(read) << read.error().message();
-    EXPECT_LE((seen(read->rig, "left", {3, 0.4, 0.2}) - of.left).norm(), 1e-5);
-    EXPECT_LE((seen(read->rig, "right", {3, 0.4, 0.2}) - of.right).norm(), 1e-5);
+    EXPECT_LE((projected(read->rig, "left", {3, 0.4, 0.2}) - of.left).norm(), 1e-5);
+    EXPECT_LE((projected(read->rig, "right", {3, 0.4, 0.2}) - of.right).norm(), 1e-5);
   }
 }
 
-TEST(MrcalCalib, OtherModelsAreRefusedByName) {
+TEST(MrcalCalib, UnsupportedModelsAreNamed) {
   const TemporaryFolder folder;
-  folder.write("right.cameramodel", cameramodel(kOfMrcal[0], false));
-  const auto said = [&](const std::string& what, const std::string& with) {
+  folder.write("right.cameramodel", cameramodel(kMrcalCases[0], false));
+  const auto message_for = [&](const std::string& what, const std::string& with) {
     return complaint(
-        read_calibration(folder.write("left.cameramodel", replaced(cameramodel(kOfMrcal[0], true), what, with))));
+        read_calibration(folder.write("left.cameramodel", replaced(cameramodel(kMrcalCases[0], true), what, with))));
   };
-  EXPECT_THAT(said("LENSMODEL_PINHOLE", "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3"),
+  EXPECT_THAT(message_for("LENSMODEL_PINHOLE", "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3"),
               HasSubstr("left.cameramodel:3: lensmodel: LENSMODEL_SPLINED_STEREOGRAPHIC_order=3 is not supported"));
-  EXPECT_THAT(said("LENSMODEL_PINHOLE", "LENSMODEL_LATLON"), HasSubstr("LATLON is not supported"));
-  EXPECT_THAT(said("LENSMODEL_PINHOLE", "DISTORTION_PINHOLE"), HasSubstr("nothing"));
-  EXPECT_THAT(said("360.5,", "360.5, 1,"), HasSubstr("left.cameramodel:6: intrinsics: has 5 numbers, must have 4"));
+  EXPECT_THAT(message_for("LENSMODEL_PINHOLE", "LENSMODEL_LATLON"), HasSubstr("LATLON is not supported"));
+  EXPECT_THAT(message_for("LENSMODEL_PINHOLE", "DISTORTION_PINHOLE"), HasSubstr("nothing"));
+  EXPECT_THAT(message_for("360.5,", "360.5, 1,"),
+              HasSubstr("left.cameramodel:6: intrinsics: has 5 numbers, must have 4"));
 }
 
-// What JPL's and Ames' own programs write beside that.
-TEST(CahvorCalib, EveryWayToSayALinearityIsKnown) {
+// Notations of the programs of JPL and Ames.
+TEST(CahvorCalib, ReadsEveryNotationOfTheLinearity) {
   const auto linearity = [](const std::string& model, const std::string& further) {
     const TemporaryFolder folder;
-    OfMrcal of = kOfMrcal[4];
+    MrcalCase of = kMrcalCases[4];
     of.cahvor_model = model.c_str();
     const auto text = [&](bool left) { return cahvor(of, left) + further; };
     folder.write("r.cahvore", text(false));
@@ -157,13 +158,13 @@ TEST(CahvorCalib, EveryWayToSayALinearityIsKnown) {
   EXPECT_THAT(linearity("CAHVORE3 = general", ""), HasSubstr("l.cahvore:2: Model: must be CAHVORE of type"));
   EXPECT_THAT(linearity("CAHVORE3,2 = general", ""), HasSubstr("Model"));
   EXPECT_THAT(linearity("CAHVORE4 = odd", ""), HasSubstr("Model"));
-  EXPECT_THAT(linearity("CAHVORE", ""), HasSubstr("E: a CAHVORE must say its type"));
+  EXPECT_THAT(linearity("CAHVORE", ""), HasSubstr("E: a CAHVORE file must state its type"));
   EXPECT_THAT(linearity("RPC = odd", ""), HasSubstr("Model: RPC is not supported"));
 }
 
-// mrcal knows a CAHVORE by "CAHVORE3,<linearity> = general" alone.
-TEST(CahvorCalib, MrcalKnowsEveryLinearityThatIsWritten) {
-  const std::regex of_mrcal("Model = CAHVORE3,([0-9.e-]+)\\s*=\\s*general");
+// mrcal reads only the notation "CAHVORE3,<linearity> = general".
+TEST(CahvorCalib, WritesTheNotationOfMrcal) {
+  const std::regex mrcal_pattern("Model = CAHVORE3,([0-9.e-]+)\\s*=\\s*general");
   for (const double linearity : {1.0, 0.0, 0.37, -0.4, 1e-5}) {
     Camera left, right;
     left.name = "left";
@@ -174,14 +175,14 @@ TEST(CahvorCalib, MrcalKnowsEveryLinearityThatIsWritten) {
     const Rig rig = rig_of_one_pair("r", left, right, Pose::from_translation({-0.12, 0, 0}));
     const auto files = to_calibration_files(rig, CalibrationFormat::cahvor, "p.cahvore").value();
     std::smatch found;
-    ASSERT_TRUE(std::regex_search(files[0].content, found, of_mrcal)) << files[0].content;
+    ASSERT_TRUE(std::regex_search(files[0].content, found, mrcal_pattern)) << files[0].content;
     EXPECT_EQ(std::stod(found[1]), linearity);
     EXPECT_THAT(files[0].content, HasSubstr(fmt::format("\nT = 3\nP = {}\n", linearity)));
   }
 }
 
-// Six decimals leave a skew of some 1e-4 px. It must not keep a rig from formats that have none.
-TEST(CahvorCalib, TheRoundingOfShortFilesIsNoSkew) {
+// Vectors with six decimals give a skew of about 1e-4 px, which formats without skew must accept.
+TEST(CahvorCalib, SkewFromRoundingIsAcceptedByOtherFormats) {
   const TemporaryFolder folder;
   const auto text = [](double y, double skew) {
     return fmt::format(
@@ -216,25 +217,26 @@ TEST(CahvorCalib, TheRoundingOfShortFilesIsNoSkew) {
     EXPECT_THAT(texts, HasSubstr("[0.0003"));
     const std::string refused = to_calibration_files(rig(0.5), format, name).error().message();
     EXPECT_THAT(refused, HasSubstr("cameras.left: "));
-    EXPECT_THAT(refused, HasSubstr("has no skew, this camera's is 0.5 px: 0.427 px across the picture"));
+    EXPECT_THAT(refused, HasSubstr("does not support skew, this camera has 0.5 px: 0.427 px across the image"));
   }
   EXPECT_TRUE(to_calibration_files(rig(0.5), CalibrationFormat::cahvor, "p.cahv"));
 }
 
-TEST(CahvorCalib, CommentsMayStandBehindNumbers) {
+TEST(CahvorCalib, CommentsMayFollowNumbers) {
   const TemporaryFolder folder;
-  const std::string right = cahvor(kOfMrcal[0], false);
+  const std::string right = cahvor(kMrcalCases[0], false);
   folder.write("right.cahvor", right);
-  const std::string text = replaced(cahvor(kOfMrcal[0], true), "Dimensions = 1280 720", "Dimensions = 1280 720 # px");
+  const std::string text =
+      replaced(cahvor(kMrcalCases[0], true), "Dimensions = 1280 720", "Dimensions = 1280 720 # px");
   EXPECT_EQ(complaint(read_calibration(folder.write("left.cahvor", text))), "nothing");
   EXPECT_THAT(complaint(read_calibration(folder.write("left.cahvor", replaced(text, "720 # px", "# 720")))),
               HasSubstr("left.cahvor:1: Dimensions: has 1 numbers, must have 2"));
 }
 
-TEST(MrcalCalib, WhatElseMrcalKeepsIsLeftOut) {
+TEST(MrcalCalib, OtherContentOfMrcalFilesIsIgnored) {
   const TemporaryFolder folder;
-  folder.write("right.cameramodel", cameramodel(kOfMrcal[0], false));
-  const auto read = read_calibration(folder.write("left.cameramodel", cameramodel(kOfMrcal[0], true))).value();
+  folder.write("right.cameramodel", cameramodel(kMrcalCases[0], false));
+  const auto read = read_calibration(folder.write("left.cameramodel", cameramodel(kMrcalCases[0], true))).value();
   std::string keys;
   for (const RigDifference& each : read.left_out) keys += each.key + ";";
   EXPECT_EQ(keys,
@@ -242,18 +244,18 @@ TEST(MrcalCalib, WhatElseMrcalKeepsIsLeftOut) {
             "right.optimization_inputs;");
 }
 
-// With the optimisation in it a file is large, whatever its name.
+// With the inputs of the optimization a file is large; the name does not matter.
 TEST(MrcalCalib, LargeFilesAreReadUnderAnyName) {
   const TemporaryFolder folder;
-  std::string left = cameramodel(kOfMrcal[0], true);
+  std::string left = cameramodel(kMrcalCases[0], true);
   left.insert(left.find("b'P)h") + 2, std::string(5U << 20U, 'x'));
-  folder.write("right.txt", cameramodel(kOfMrcal[0], false));
+  folder.write("right.txt", cameramodel(kMrcalCases[0], false));
   const auto read = read_calibration(folder.write("left.txt", left));
   ASSERT_TRUE(read) << read.error().message();
   EXPECT_EQ(read->format, CalibrationFormat::mrcal);
 }
 
-TEST(CahvorCalib, ASkewIsKept) {
+TEST(CahvorCalib, TheSkewIsKept) {
   const TemporaryFolder folder;
   // A = z, H = (fx, 0, cx), V = (skew, fy, cy).
   const auto text = [](double x) {
@@ -266,7 +268,7 @@ TEST(CahvorCalib, ASkewIsKept) {
   const auto read = read_calibration(folder.write("left.cahv", text(0)));
   ASSERT_TRUE(read) << read.error().message();
   EXPECT_EQ(read->rig.cameras[0].model, CameraModel(CahvModel{{500, 501, 320, 240}, 0.25}));
-  EXPECT_EQ(read->rig.convention, PoseConvention::left_optical) << "no frame that REP-103 knows";
+  EXPECT_EQ(read->rig.convention, PoseConvention::left_optical) << "not a REP-103 frame";
   EXPECT_LE((right_in_left(read->rig) - Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-15);
 }
 

@@ -1,4 +1,4 @@
-// Kalibr's camchain.yaml and camchain-imucam.yaml (Furgale et al.; the project's wiki, "Yaml formats").
+// Reader and writer of Kalibr's camchain.yaml and camchain-imucam.yaml (Furgale et al.; Kalibr wiki, "Yaml formats").
 #include <fmt/format.h>
 
 #include "spartan/rig/formats/calibration_readers.h"
@@ -11,50 +11,48 @@
 namespace spartan {
 namespace {
 
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
-
-// The chain and the IMU's transforms are results of one calibration: more than this apart they are not.
-constexpr double kSame = 1e-3;
-constexpr std::size_t kMostCameras = 100;
+// Tolerance in m and rad between the transforms of the chain and those of the IMU, which are results of one
+// calibration.
+constexpr double kConsistency = 1e-3;
+constexpr std::size_t kMaxCameras = 100;
 
 std::string camera_key(std::size_t i) {
   return fmt::format("cam{}", i);
 }
 
-// A list of four lists of four.
+// A 4×4 matrix as a list of four rows.
 std::optional<Pose> read_transform(YamlMap& camera, std::string_view key) {
   const auto node = camera.node(key);
   if (!node) return std::nullopt;
   std::vector<double> rows;
-  if (node->IsSequence() && node->size() == 4) {
-    for (const YAML::Node& row : *node) {
-      if (!row.IsSequence() || row.size() != 4) break;
-      for (const YAML::Node& entry : row) {
-        const auto value = entry.IsScalar() ? rig_detail::parse_number(entry.Scalar()) : std::nullopt;
+  if (node->is_list() && node->items().size() == 4) {
+    for (const YamlNode& row : node->items()) {
+      if (!row.is_list() || row.items().size() != 4) break;
+      for (const YamlNode& entry : row.items()) {
+        const auto value = entry.is_scalar() ? parse_finite_number(entry.scalar()) : std::nullopt;
         if (value) rows.push_back(*value);
       }
     }
   }
   if (rows.size() == 16) return rig_detail::read_rigid(camera, key, rows);
-  camera.fault(key, "must be four rows of four finite numbers");
+  camera.add_error(key, "must be four rows of four finite numbers");
   return std::nullopt;
 }
 
-// The cameras of a chain: `mount_from_camera` is the pose in the frame of cam0 until all are read.
+// The cameras of a chain. While reading, `mount_from_camera` is the pose in the frame of cam0.
 struct Chain {
   std::vector<Camera> cameras;
   std::optional<Pose> first_from_imu;
-  std::string imu_key;  // where it stands
+  std::string imu_key;  // the key that gives it
   std::vector<RigDifference> left_out;
 };
 
-bool same(const Pose& a, const Pose& b) {
+bool consistent(const Pose& a, const Pose& b) {
   const Pose apart = a.inverse() * b;
-  return apart.translation().norm() <= kSame && rotation_angle(apart) <= kSame;
+  return apart.translation().norm() <= kConsistency && rotation_angle(apart) <= kConsistency;
 }
 
-// Kalibr writes T_cam_imu; OpenVINS' files have the inverse.
+// Kalibr writes T_cam_imu; the files of OpenVINS have its inverse, T_imu_cam.
 struct ImuOfCamera {
   std::string key;
   Pose camera_from_imu;
@@ -66,13 +64,14 @@ std::optional<ImuOfCamera> read_imu(YamlMap& entry) {
     const auto pose = read_transform(entry, key);
     if (!pose) return std::nullopt;
     const Pose camera_from_imu = key == std::string("T_cam_imu") ? *pose : pose->inverse();
-    if (imu && !same(imu->camera_from_imu, camera_from_imu)) entry.fault(key, "contradicts T_imu_cam");
+    if (imu && !consistent(imu->camera_from_imu, camera_from_imu))
+      entry.add_error(key, "is inconsistent with T_imu_cam");
     imu = {key, camera_from_imu};
   }
   return imu;
 }
 
-// The first camera that knows the IMU tells all of them; what the others say must be the same.
+// The first camera with a transform to the IMU defines the body; the transforms of the others must be consistent.
 void read_link(YamlMap& entry, Chain& chain, Camera& camera) {
   const auto imu = read_imu(entry);
   if (!chain.cameras.empty()) {
@@ -89,18 +88,18 @@ void read_link(YamlMap& entry, Chain& chain, Camera& camera) {
   if (!chain.first_from_imu) {
     chain.first_from_imu = first_from_imu;
     chain.imu_key = imu->key;
-  } else if (!same(first_from_imu, *chain.first_from_imu)) {
-    entry.fault(imu->key, "contradicts T_cn_cnm1");
+  } else if (!consistent(first_from_imu, *chain.first_from_imu)) {
+    entry.add_error(imu->key, "is inconsistent with T_cn_cnm1");
   }
 }
 
 Chain read_chain(YamlMap& root) {
   Chain chain;
-  // A missing cam1 is a fault; a pair needs two.
-  for (std::size_t i = 0; i < kMostCameras && (i < 2 || root.has(camera_key(i))); ++i) {
+  // A missing cam1 is an error: a pair needs two cameras.
+  for (std::size_t i = 0; i < kMaxCameras && (i < 2 || root.has(camera_key(i))); ++i) {
     const auto node = root.node(camera_key(i));
     if (!node) continue;
-    YamlMap entry(*node, root.path(camera_key(i)), root.faults());
+    YamlMap entry(*node, root.path(camera_key(i)), root.errors());
     Camera camera;
     camera.name = camera_key(i);
     camera.size = rig_detail::read_resolution(entry, "resolution");
@@ -132,10 +131,10 @@ std::string transform_lines(const char* key, const Pose& pose) {
 Result<ReadRig> read_kalibr_calib(const std::string& path) {
   const auto loaded = rig_detail::load_yaml_file(path);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(path);
-  YamlMap root(*loaded, "", faults);
+  YamlErrors errors(path);
+  YamlMap root(*loaded, "", errors);
   Chain chain = read_chain(root);
-  if (const Status status = faults.status(); !status) return failure(status);
+  if (const Status status = errors.status(); !status) return failure(status);
 
   const bool has_imu = chain.first_from_imu.has_value();
   const Pose body_from_first = has_imu ? chain.first_from_imu->inverse() : optical_from_forward().inverse();
@@ -145,9 +144,9 @@ Result<ReadRig> read_kalibr_calib(const std::string& path) {
   rig.convention = has_imu ? PoseConvention::body : PoseConvention::left_optical;
   rig.cameras = std::move(chain.cameras);
   rig.pairs = {{"stereo", camera_key(0), camera_key(1)}};
-  auto sound = rig_detail::validated(std::move(rig), path);
-  if (!sound) return failure(std::move(sound));
-  return ReadRig{std::move(*sound),
+  auto valid = rig_detail::validated(std::move(rig), path);
+  if (!valid) return failure(std::move(valid));
+  return ReadRig{std::move(*valid),
                  CalibrationFormat::kalibr,
                  {path},
                  {},
@@ -159,7 +158,7 @@ Result<CalibrationFiles> rig_detail::write_kalibr_calib(const Rig& rig, const st
   const bool with_body = !body_is_left_camera(rig, rig.pairs.front());
   std::string text;
   Pose body_from_previous;
-  const auto cameras = pair_first(rig);
+  const auto cameras = cameras_pair_first(rig);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const auto model = kalibr_model_lines(*cameras[i], "distortion_coeffs", "  ");
     if (!model) return failure(model);

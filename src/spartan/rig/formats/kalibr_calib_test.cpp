@@ -1,4 +1,4 @@
-// Kalibr: its documented examples, and values by hand.
+// Kalibr: its documented examples and manually computed values.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ cam2:
   resolution: [1440, 1080]
 )";
 
-TEST(KalibrCalib, TheChainLeadsFromCameraToCamera) {
+TEST(KalibrCalib, ChainsTransforms) {
   const TemporaryFolder folder;
   const auto read = read_calibration(folder.write("camchain.yaml", kCamchain));
   ASSERT_TRUE(read) << read.error().message();
@@ -60,7 +60,8 @@ TEST(KalibrCalib, TheChainLeadsFromCameraToCamera) {
   ASSERT_EQ(rig.pairs.size(), 1u);
   EXPECT_EQ(rig.pairs[0].right, "cam1");
   EXPECT_LE((right_in_left(rig) - Eigen::Vector3d(0.11, -0.002, -0.001)).norm(), 1e-15);
-  // Camera 2 looks along x of camera 1, whose p = (x, y, z) is (0.5 − z, y, x) for it: its place is (0, 0, 0.5) there.
+  // Camera 2 looks along x of camera 1: p2 = (0.5 − z, y, x) for p1 = (x, y, z), so its position in camera 1 is (0, 0,
+  // 0.5).
   const Pose cam1_from_cam2 = rig.body_from_camera("cam1").inverse() * rig.body_from_camera("cam2");
   EXPECT_LE((cam1_from_cam2.translation() - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-15);
   EXPECT_LE((cam1_from_cam2.rotation() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-15);
@@ -72,7 +73,7 @@ TEST(KalibrCalib, TheChainLeadsFromCameraToCamera) {
   EXPECT_EQ(rig.cameras[2].size, (ImageSize{1440, 1080}));
 }
 
-TEST(KalibrCalib, TheImuIsTheBodyWhereItIsKnown) {
+TEST(KalibrCalib, WithImuTheBodyIsTheImu) {
   const TemporaryFolder folder;
   // The camera looks along the IMU's x: p_cam = (−y, −z, x) + t.
   const std::string imu =
@@ -93,11 +94,12 @@ TEST(KalibrCalib, TheImuIsTheBodyWhereItIsKnown) {
   const std::string other = replaced(imu, "0.07", "0.09");
   const std::string both = replaced(replaced(kCamchain, "  rostopic: /cam0/image_raw\n", imu),
                                     "  resolution: [640, 400]\n", other + "  resolution: [640, 400]\n");
-  EXPECT_THAT(complaint(read_calibration(folder.write("camchain.yaml", both))), HasSubstr("contradicts T_cn_cnm1"));
+  EXPECT_THAT(complaint(read_calibration(folder.write("camchain.yaml", both))),
+              HasSubstr("is inconsistent with T_cn_cnm1"));
 }
 
-// The IMU's place may be said of any camera, and either way round (OpenVINS: T_imu_cam).
-TEST(KalibrCalib, AnyCameraMayKnowTheImu) {
+// The transform to the IMU may be given for any camera and in either direction (OpenVINS: T_imu_cam).
+TEST(KalibrCalib, AnyCameraMayGiveTheImu) {
   const TemporaryFolder folder;
   const std::string cam_imu =
       "  T_cam_imu:\n  - [0, -1, 0, 0.07]\n  - [0, 0, -1, -0.01]\n  - [1, 0, 0, 0.004]\n  - [0, 0, 0, 1]\n";
@@ -107,13 +109,13 @@ TEST(KalibrCalib, AnyCameraMayKnowTheImu) {
     const std::string at = fmt::format("cam{}:\n", camera);
     return read_calibration(folder.write("camchain.yaml", replaced(kCamchain, at, at + text)));
   };
-  const Eigen::Vector3d place(-0.004, 0.07, -0.01);
+  const Eigen::Vector3d position(-0.004, 0.07, -0.01);
   for (const std::string& text : {cam_imu, imu_cam, cam_imu + imu_cam}) {
     for (const int camera : {0, 1, 2}) {
       const auto read = with(camera, text);
       ASSERT_TRUE(read) << read.error().message();
       const std::string name = fmt::format("cam{}", camera);
-      EXPECT_LE((read->rig.body_from_camera(name).translation() - place).norm(), 1e-14) << name;
+      EXPECT_LE((read->rig.body_from_camera(name).translation() - position).norm(), 1e-14) << name;
       EXPECT_LE(
           (read->rig.body_from_camera(name).rotation() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(),
           1e-14)
@@ -124,11 +126,11 @@ TEST(KalibrCalib, AnyCameraMayKnowTheImu) {
     }
   }
   EXPECT_THAT(complaint(with(1, cam_imu + replaced(imu_cam, "0.07", "0.09"))),
-              HasSubstr("cam1.T_cam_imu: contradicts T_imu_cam"));
+              HasSubstr("cam1.T_cam_imu: is inconsistent with T_imu_cam"));
 }
 
-// Both cameras by the IMU alone, without a chain between them.
-TEST(KalibrCalib, TheImuIsAChainToo) {
+// Both cameras relative to the IMU, without T_cn_cnm1.
+TEST(KalibrCalib, ExtrinsicsMayComeFromTheImu) {
   const TemporaryFolder folder;
   std::string text = kCamchain.substr(0, kCamchain.find("cam2:"));
   const std::string link =
@@ -144,17 +146,20 @@ TEST(KalibrCalib, TheImuIsAChainToo) {
   EXPECT_LE((right_in_left(read->rig) - Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-15);
 }
 
-TEST(KalibrCalib, WhatIsNotOursIsRefusedByName) {
+TEST(KalibrCalib, UnsupportedContentIsNamed) {
   const TemporaryFolder folder;
-  const auto said = [&](const std::string& what, const std::string& with) {
+  const auto message_for = [&](const std::string& what, const std::string& with) {
     return complaint(read_calibration(folder.write("camchain.yaml", replaced(kCamchain, what, with))));
   };
-  EXPECT_THAT(said("distortion_coeffs: [0, 0", "distortion_coeffs: [0.1, 0"),
-              HasSubstr("camchain.yaml:12: cam1.distortion_coeffs: omni with a distortion besides is not supported"));
-  EXPECT_THAT(said("model: radtan", "model: fov"), HasSubstr("camchain.yaml:4: cam0.distortion_model: is 'fov'"));
-  EXPECT_THAT(said("camera_model: ds", "camera_model: eucm"), HasSubstr("cam2.intrinsics: eucm with beta = 0.59"));
-  EXPECT_THAT(said("ds\n  intrinsics: [-0.2, 0.59", "eucm\n  intrinsics: [0.6, 1"), HasSubstr("nothing"));
-  EXPECT_THAT(said("-0.2, 0.59", "-0.2, 1.59"), HasSubstr("alpha is 1.59"));
+  EXPECT_THAT(
+      message_for("distortion_coeffs: [0, 0", "distortion_coeffs: [0.1, 0"),
+      HasSubstr("camchain.yaml:12: cam1.distortion_coeffs: omni with an additional distortion is not supported"));
+  EXPECT_THAT(message_for("model: radtan", "model: fov"),
+              HasSubstr("camchain.yaml:4: cam0.distortion_model: is 'fov'"));
+  EXPECT_THAT(message_for("camera_model: ds", "camera_model: eucm"),
+              HasSubstr("cam2.intrinsics: eucm with beta = 0.59"));
+  EXPECT_THAT(message_for("ds\n  intrinsics: [-0.2, 0.59", "eucm\n  intrinsics: [0.6, 1"), HasSubstr("nothing"));
+  EXPECT_THAT(message_for("-0.2, 0.59", "-0.2, 1.59"), HasSubstr("alpha is 1.59"));
 }
 
 }  // namespace

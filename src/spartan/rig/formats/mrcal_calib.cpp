@@ -1,4 +1,5 @@
-// mrcal's .cameramodel (mrcal's documentation, "The camera-model data structure" and "lens models").
+// Reader and writer of mrcal's .cameramodel (mrcal's documentation, "The camera-model data structure" and "lens
+// models").
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,28 +8,28 @@
 #include <cmath>
 #include <utility>
 
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
 #include "spartan/rig/formats/python_dict.h"
 #include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/models/model_equivalents.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan {
 namespace {
 
-using rig_detail::EyeOfFile;
+using rig_detail::CameraOfFile;
 using rig_detail::PythonDict;
 
-// What else mrcal keeps in its files.
-constexpr std::array<std::pair<const char*, const char*>, 2> kPassedOver{
-    {{"valid_intrinsics_region", "where the lens is known well is not kept"},
-     {"optimization_inputs", "the optimisation that the camera comes from is not kept"}}};
+// Content of the files that a Rig cannot represent.
+constexpr std::array<std::pair<const char*, const char*>, 2> kIgnored{
+    {{"valid_intrinsics_region", "the region of valid intrinsics is not kept"},
+     {"optimization_inputs", "the inputs of the optimization are not kept"}}};
 
 constexpr std::string_view kCahvore = "CAHVORE_linearity=";
 
-// How many numbers follow fx, fy, cx, cy; none where the model is not one of ours.
+// How many numbers follow fx, fy, cx, cy; nullopt for an unsupported model.
 std::optional<std::size_t> further_numbers(std::string_view model) {
   if (model == "PINHOLE") return 0;
   if (model == "OPENCV4") return 4;
@@ -40,7 +41,7 @@ std::optional<std::size_t> further_numbers(std::string_view model) {
   return std::nullopt;
 }
 
-// O from its two angles: about y, then up out of the plane of x and z.
+// The optical axis O from its azimuth alpha about y and its elevation beta out of the xz plane.
 Eigen::Vector3d axis_from_angles(double alpha, double beta) {
   return {std::sin(alpha) * std::cos(beta), std::sin(beta), std::cos(alpha) * std::cos(beta)};
 }
@@ -53,14 +54,14 @@ Result<CameraModel> read_model(const PythonDict& file) {
   const bool prefixed = name->starts_with("LENSMODEL_") || name->starts_with("DISTORTION_");
   const auto further = prefixed ? further_numbers(model) : std::nullopt;
   if (!further) {
-    return file.fault(
-        key, fmt::format("{} is not supported, only PINHOLE, OPENCV4, 5, 8, CAHVOR, CAHVORE", name->substr(0, 60)));
+    return file.error_at(key, fmt::format("{} is not supported; supported: PINHOLE, OPENCV4, 5, 8, CAHVOR, CAHVORE",
+                                          name->substr(0, 60)));
   }
-  const auto held = file.numbers("intrinsics", 4 + *further);
-  if (!held) return failure(held);
-  const std::vector<double>& k = *held;
+  const auto values = file.numbers("intrinsics", 4 + *further);
+  if (!values) return failure(values);
+  const std::vector<double>& k = *values;
   const PinholeModel pinhole{k[0], k[1], k[2], k[3]};
-  if (!(k[0] > 0 && k[1] > 0)) return file.fault("intrinsics", "the focal lengths must be above zero");
+  if (!(k[0] > 0 && k[1] > 0)) return file.error_at("intrinsics", "the focal lengths must be above zero");
   if (model == "PINHOLE") return pinhole;
   if (model.starts_with("OPENCV")) {
     RadialTangentialModel::Coefficients coefficients{};
@@ -68,19 +69,20 @@ Result<CameraModel> read_model(const PythonDict& file) {
       if (i < 12) {
         coefficients[i - 4] = k[i];
       } else if (k[i] != 0) {
-        return file.fault("intrinsics", "thin-prism coefficients are not supported");
+        return file.error_at("intrinsics", "thin-prism coefficients are not supported");
       }
     }
     return RadialTangentialModel(pinhole, coefficients);
   }
   const Eigen::Vector3d axis = axis_from_angles(k[4], k[5]);
   if (model == "CAHVOR") return CahvorModel({pinhole, 0}, axis, {k[6], k[7], k[8]});
-  const auto linearity = rig_detail::parse_number(model.substr(kCahvore.size()));
-  if (!linearity || std::abs(*linearity) > 1) return file.fault(key, "the linearity must be a number within -1 and 1");
+  const auto linearity = parse_finite_number(model.substr(kCahvore.size()));
+  if (!linearity || std::abs(*linearity) > 1)
+    return file.error_at(key, "the linearity must be a number between -1 and 1");
   return CahvoreModel({pinhole, 0}, axis, {k[6], k[7], k[8]}, {k[9], k[10], k[11]}, *linearity);
 }
 
-Result<EyeOfFile> read_eye(const std::string& path, const std::string& name) {
+Result<CameraOfFile> read_camera(const std::string& path, const std::string& name) {
   const auto text = rig_detail::read_calibration_text(path, rig_detail::kLargestModelFile_bytes);
   if (!text) return failure(text);
   const auto file = PythonDict::parse(*text, path);
@@ -93,18 +95,18 @@ Result<EyeOfFile> read_eye(const std::string& path, const std::string& name) {
   const auto size = file->numbers("imagersize", 2);
   if (!size) return failure(size);
   const auto known = rig_detail::whole_size((*size)[0], (*size)[1]);
-  if (!known) return file->fault("imagersize", "must be two whole numbers above zero");
+  if (!known) return file->error_at("imagersize", "must be two whole numbers above zero");
   camera.size = *known;
   const auto e = file->numbers("extrinsics", 6);
   if (!e) return failure(e);
-  const auto turn = rig_detail::rotation_of_vector({(*e)[0], (*e)[1], (*e)[2]});
-  if (!turn) return file->fault("extrinsics", "its first three numbers are not a rotation");
-  camera.mount_from_camera = Pose(*turn, {(*e)[3], (*e)[4], (*e)[5]}).inverse();
-  EyeOfFile eye{std::move(camera)};
-  for (const auto& [key, what] : kPassedOver) {
-    if (file->has(key)) eye.left_out.push_back({fmt::format("{}.{}", name, key), what});
+  const auto rotation = rig_detail::rotation_of_vector({(*e)[0], (*e)[1], (*e)[2]});
+  if (!rotation) return file->error_at("extrinsics", "its first three numbers are not a rotation");
+  camera.mount_from_camera = Pose(*rotation, {(*e)[3], (*e)[4], (*e)[5]}).inverse();
+  CameraOfFile result{std::move(camera)};
+  for (const auto& [key, what] : kIgnored) {
+    if (file->has(key)) result.left_out.push_back({fmt::format("{}.{}", name, key), what});
   }
-  return eye;
+  return result;
 }
 
 struct Lens {
@@ -143,7 +145,7 @@ Result<Lens> lens_of(const Camera& camera) {
     }
     return lens;
   }
-  return rig_detail::cannot_hold(camera, fmt::format("mrcal's files have no model like {}", name_of(camera.model)));
+  return rig_detail::cannot_hold(camera, fmt::format("mrcal files do not support the model {}", name_of(camera.model)));
 }
 
 Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
@@ -161,7 +163,7 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
 }  // namespace
 
 Result<ReadRig> read_mrcal_calib(const std::string& left_path, const std::string& right_path) {
-  return rig_detail::read_two_files(CalibrationFormat::mrcal, left_path, right_path, read_eye);
+  return rig_detail::read_two_files(CalibrationFormat::mrcal, left_path, right_path, read_camera);
 }
 
 Result<CalibrationFiles> rig_detail::write_mrcal_calib(const Rig& rig, const std::string& path) {

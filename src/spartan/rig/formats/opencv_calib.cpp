@@ -1,4 +1,4 @@
-// Reader of OpenCV's stereo calibration files.
+// Reader of OpenCV's stereo calibration files (FileStorage, YAML or XML).
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -15,7 +15,7 @@ namespace {
 using rig_detail::OpencvStorage;
 using Names = std::vector<std::string>;
 
-// One or two files, asked in turn for a key under any of its usual names.
+// One or two files, searched in order for a key under any of its common names.
 class Storages {
  public:
   Status open(const std::string& path) {
@@ -26,7 +26,7 @@ class Storages {
     return {};
   }
 
-  /// The matrix as doubles, row by row, with `counts` elements.
+  /// The matrix in row-major order; its number of elements must be one of `counts`.
   Result<std::vector<double>> matrix(const Names& names, const std::vector<int>& counts) const {
     for (const OpencvStorage& storage : storages_) {
       for (const std::string& name : names) {
@@ -44,10 +44,10 @@ class Storages {
   std::optional<ImageSize> size(const std::string& name) const {
     return has(name) ? holder(name)->size(name) : std::nullopt;
   }
-  /// "key: what" at the line of the first of the names that is there.
-  tl::unexpected<Error> fault(const Names& names, const std::string& what) const {
+  /// An error "key: what" at the line of the first of the names that exists.
+  tl::unexpected<Error> error_at(const Names& names, const std::string& what) const {
     for (const std::string& name : names) {
-      if (has(name)) return holder(name)->fault(name, what);
+      if (has(name)) return holder(name)->error_at(name, what);
     }
     return failure(ErrorCode::configuration, what, paths_);
   }
@@ -64,19 +64,19 @@ class Storages {
   std::string paths_;
 };
 
-// Four coefficients may be those of either model: a file of cv::fisheye has to say it.
+// Four coefficients are ambiguous: a file of cv::fisheye must be marked as such.
 bool is_fisheye(const Storages& files) {
-  const std::string said = files.text("camera_model") + files.text("distortion_model");
-  return files.integer("fisheye_model").value_or(0) != 0 || said.find("fisheye") != std::string::npos ||
-         said.find("equidistant") != std::string::npos;
+  const std::string model_name = files.text("camera_model") + files.text("distortion_model");
+  return files.integer("fisheye_model").value_or(0) != 0 || model_name.find("fisheye") != std::string::npos ||
+         model_name.find("equidistant") != std::string::npos;
 }
 
 Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& names) {
-  const auto held = files.matrix(names, {9});
-  if (!held) return failure(held);
-  const auto pinhole = rig_detail::pinhole_of_rows(*held);
+  const auto values = files.matrix(names, {9});
+  if (!values) return failure(values);
+  const auto pinhole = rig_detail::pinhole_of_rows(*values);
   if (!pinhole || !(pinhole->fx > 0 && pinhole->fy > 0)) {
-    return files.fault(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
+    return files.error_at(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
   }
   return *pinhole;
 }
@@ -98,7 +98,7 @@ Result<CameraModel> read_model(const Storages& files, const std::string& number)
     if (i < coefficients.size()) {
       coefficients[i] = (*d)[i];
     } else if ((*d)[i] != 0) {
-      return files.fault(names, "thin-prism and tilt coefficients (the 9th and on) are not supported");
+      return files.error_at(names, "thin-prism and tilt coefficients (the 9th and on) are not supported");
     }
   }
   return RadialTangentialModel(*pinhole, coefficients);
@@ -108,41 +108,42 @@ Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::strin
   const auto r = files.matrix({name}, {3, 9});
   if (!r) return failure(r);
   if (r->size() == 3) {
-    const auto turn = rig_detail::rotation_of_vector({(*r)[0], (*r)[1], (*r)[2]});
-    if (!turn) return files.fault({name}, "is not a rotation");
-    return *turn;
+    const auto rotation = rig_detail::rotation_of_vector({(*r)[0], (*r)[1], (*r)[2]});
+    if (!rotation) return files.error_at({name}, "is not a rotation");
+    return *rotation;
   }
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
-  if (!is_rotation(rotation, 1e-4)) return files.fault({name}, "is not a rotation matrix");
+  constexpr double kTolerance = 1e-4;  // for matrices rounded to a few digits
+  if (!is_rotation(rotation, kTolerance)) return files.error_at({name}, "is not a rotation matrix");
   return Eigen::Quaterniond(nearest_rotation(rotation));
 }
 
-// A rectified eye: its pinhole, and where it stands in the rectified frame.
-struct RectifiedEye {
+// A rectified camera: its pinhole and its position in the rectified frame.
+struct RectifiedCamera {
   PinholeModel pinhole;
-  Eigen::Vector3d place_m;
+  Eigen::Vector3d position_m;
 };
-Result<RectifiedEye> read_projection(const Storages& files, const std::string& name) {
-  const auto held = files.matrix({name}, {12});
-  if (!held) return failure(held);
-  const auto& p = *held;
+Result<RectifiedCamera> read_projection(const Storages& files, const std::string& name) {
+  const auto values = files.matrix({name}, {12});
+  if (!values) return failure(values);
+  const auto& p = *values;
   const bool rectified =
       p[0] > 0 && p[5] > 0 && p[1] == 0 && p[4] == 0 && p[8] == 0 && p[9] == 0 && p[10] == 1 && p[11] == 0;
   if (!rectified) {
-    return files.fault({name}, "is not the projection of a rectified camera (fx 0 cx tx; 0 fy cy ty; 0 0 1 0)");
+    return files.error_at({name}, "is not the projection of a rectified camera (fx 0 cx tx; 0 fy cy ty; 0 0 1 0)");
   }
-  return RectifiedEye{{p[0], p[5], p[2], p[6]}, {-p[3] / p[0], -p[7] / p[5], 0}};
+  return RectifiedCamera{{p[0], p[5], p[2], p[6]}, {-p[3] / p[0], -p[7] / p[5], 0}};
 }
 
-// How the right eye stands in the rectified frame, seen from the left one.
+// The position of the right camera relative to the left one in the rectified frame.
 Result<Eigen::Vector3d> read_rectified_baseline(const Storages& files) {
   const auto left = read_projection(files, "P1"), right = read_projection(files, "P2");
   if (!left) return failure(left);
   if (!right) return failure(right);
-  return Eigen::Vector3d(right->place_m - left->place_m);
+  return Eigen::Vector3d(right->position_m - left->position_m);
 }
 
-// X_right = R X_left + T; or by the rectification, R2 X_right = R1 X_left − baseline.
+// X_right = R X_left + T; or from the rectification, R2 X_right = R1 X_left − baseline.
 Result<Pose> read_right_from_left(const Storages& files) {
   if (files.has("R") || files.has("T") || !files.has("P2")) {
     const auto rotation = read_rotation(files, "R");
@@ -178,32 +179,32 @@ Result<Rig> read_unrectified(const Storages& files, ImageSize size) {
                          camera_of("right", size, std::move(*right)), *right_from_left);
 }
 
-// A file that holds P1 and P2 but no camera matrices describes the rectified pictures.
+// A file with P1 and P2 but without camera matrices describes rectified images.
 Result<Rig> read_rectified(const Storages& files, ImageSize size) {
   const auto left = read_projection(files, "P1"), right = read_projection(files, "P2");
   if (!left) return failure(left);
   if (!right) return failure(right);
   return rig_of_one_pair("opencv", camera_of("left", size, left->pinhole), camera_of("right", size, right->pinhole),
-                         Pose::from_translation(left->place_m - right->place_m));
+                         Pose::from_translation(left->position_m - right->position_m));
 }
 
 Result<int> read_side(const Storages& files, const char* key, const char* other) {
   const auto pixels = files.integer(key);
-  if (!pixels || *pixels < 1) return files.fault({key}, "must be a whole number above zero");
-  if (!files.has(other)) return files.fault({key}, fmt::format("without {}", other));
+  if (!pixels || *pixels < 1) return files.error_at({key}, "must be a whole number above zero");
+  if (!files.has(other)) return files.error_at({key}, fmt::format("is given without {}", other));
   return *pixels;
 }
 
-// What the file says, which must be sound; `otherwise` where it says nothing.
-Result<ImageSize> size_in(const Storages& files, ImageSize otherwise) {
+// The image size in the files, which must be valid; `fallback` if they do not contain it.
+Result<ImageSize> size_in(const Storages& files, ImageSize fallback) {
   for (const char* key : {"image_size", "imageSize"}) {
     if (!files.has(key)) continue;
     const auto size = files.size(key);
-    if (!size || size->empty()) return files.fault({key}, "must be two whole numbers above zero");
+    if (!size || size->empty()) return files.error_at({key}, "must be two whole numbers above zero");
     return *size;
   }
   const char *width_key = "image_width", *height_key = "image_height";
-  if (!files.has(width_key) && !files.has(height_key)) return otherwise;
+  if (!files.has(width_key) && !files.has(height_key)) return fallback;
   const auto width = read_side(files, files.has(width_key) ? width_key : height_key, height_key);
   const auto height = read_side(files, files.has(height_key) ? height_key : width_key, width_key);
   if (!width) return failure(width);
@@ -211,11 +212,12 @@ Result<ImageSize> size_in(const Storages& files, ImageSize otherwise) {
   return ImageSize{*width, *height};
 }
 
-// The rectified view that the file chose: a rig has no place for it. Of rectified pictures P1 and P2 are the cameras.
+// The rectification of the file, which a Rig does not represent. For rectified images P1 and P2 are the cameras
+// themselves.
 std::vector<RigDifference> rectification_in(const Storages& files, bool raw) {
   std::vector<RigDifference> left_out;
   for (const char* key : raw ? std::vector{"R1", "R2", "P1", "P2", "Q"} : std::vector{"R1", "R2"}) {
-    if (files.has(key)) left_out.push_back({key, "the rectified view of the file is not kept"});
+    if (files.has(key)) left_out.push_back({key, "the rectification of the file is not kept"});
   }
   return left_out;
 }
@@ -233,17 +235,17 @@ Result<ReadRig> rig_detail::read_opencv(const std::string& intrinsics_path, cons
     if (path.empty()) continue;
     if (const Status status = files.open(path); !status) return failure(status);
   }
-  const auto known = size_in(files, size);
-  if (!known) return failure(known);
-  if (known->empty()) return unknown_size(files.paths());
+  const auto image_size = size_in(files, size);
+  if (!image_size) return failure(image_size);
+  if (image_size->empty()) return unknown_size(files.paths());
   const bool raw = files.has("M1") || files.has("K1") || files.has("cameraMatrix1") || files.has("camera_matrix_1");
-  auto rig = raw || !files.has("P1") ? read_unrectified(files, *known) : read_rectified(files, *known);
+  auto rig = raw || !files.has("P1") ? read_unrectified(files, *image_size) : read_rectified(files, *image_size);
   if (!rig) return failure(std::move(rig));
-  auto sound = validated(std::move(*rig), files.paths());
-  if (!sound) return failure(std::move(sound));
+  auto valid = validated(std::move(*rig), files.paths());
+  if (!valid) return failure(std::move(valid));
   std::vector<std::string> paths{intrinsics_path};
   if (!extrinsics_path.empty()) paths.push_back(extrinsics_path);
-  return ReadRig{std::move(*sound), CalibrationFormat::opencv,   std::move(paths), {},
+  return ReadRig{std::move(*valid), CalibrationFormat::opencv,   std::move(paths), {},
                  kBodyIsLeftCamera, rectification_in(files, raw)};
 }
 

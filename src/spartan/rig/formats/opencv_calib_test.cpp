@@ -1,4 +1,4 @@
-// OpenCV: files that its own FileStorage wrote.
+// OpenCV files written by cv::FileStorage.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,14 +30,14 @@ std::string opencv_file(const std::function<void(cv::FileStorage&)>& fill) {
   return file.releaseAndGetString();
 }
 
-TEST(OpencvFiles, AFisheyeHasToSaySo) {
+TEST(OpencvFiles, FisheyeFilesMustBeMarked) {
   const TemporaryFolder folder;
-  const auto text = [&](const std::function<void(cv::FileStorage&)>& say) {
+  const auto text = [&](const std::function<void(cv::FileStorage&)>& mark) {
     return opencv_file([&](cv::FileStorage& file) {
-      say(file);
-      for (const char* eye : {"1", "2"}) {
-        file << std::string("K") + eye << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
-        file << std::string("D") + eye << row({0.1, 0.02, 0.003, 0.0004}, 4);
+      mark(file);
+      for (const char* number : {"1", "2"}) {
+        file << std::string("K") + number << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
+        file << std::string("D") + number << row({0.1, 0.02, 0.003, 0.0004}, 4);
       }
       file << "R" << row({1, 0, 0, 0, 1, 0, 0, 0, 1}, 3) << "T" << row({-0.1, 0, 0}, 3);
     });
@@ -60,14 +60,14 @@ TEST(OpencvFiles, AFisheyeHasToSaySo) {
             "equidistant");
 }
 
-TEST(OpencvFiles, TheRectificationTellsThePairToo) {
+TEST(OpencvFiles, ExtrinsicsMayComeFromTheRectification) {
   const TemporaryFolder folder;
   const double c = std::cos(0.1), s = std::sin(0.1);
-  const auto fill = [&](cv::FileStorage& file, bool with_eyes) {
-    for (const char* eye : {"1", "2"}) {
-      if (!with_eyes) continue;
-      file << std::string("M") + eye << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
-      file << std::string("D") + eye << row({0, 0, 0, 0, 0});
+  const auto fill = [&](cv::FileStorage& file, bool with_cameras) {
+    for (const char* number : {"1", "2"}) {
+      if (!with_cameras) continue;
+      file << std::string("M") + number << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
+      file << std::string("D") + number << row({0, 0, 0, 0, 0});
     }
     file << "R1" << row({c, 0, s, 0, 1, 0, -s, 0, c}, 3) << "R2" << row({1, 0, 0, 0, 1, 0, 0, 0, 1}, 3);
     file << "P1" << row({290, 0, 310, 0, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
@@ -86,32 +86,33 @@ TEST(OpencvFiles, TheRectificationTellsThePairToo) {
   EXPECT_LE(rotation_angle(rectified->right_from_left(rectified->pairs[0])), 1e-15);
 }
 
-// A size that cannot be read is not one that is absent.
-TEST(OpencvFiles, ABadSizeIsNamed) {
+// An invalid size is an error, not a missing size.
+TEST(OpencvFiles, AnInvalidSizeIsReported) {
   const TemporaryFolder folder;
   const std::string text = opencv_file([&](cv::FileStorage& file) {
-    for (const char* eye : {"1", "2"}) {
-      file << std::string("M") + eye << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
-      file << std::string("D") + eye << row({0.1, 0, 0, 0, 0});
+    for (const char* number : {"1", "2"}) {
+      file << std::string("M") + number << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
+      file << std::string("D") + number << row({0.1, 0, 0, 0, 0});
     }
     file << "R" << row({1, 0, 0, 0, 1, 0, 0, 0, 1}, 3) << "T" << row({-0.1, 0, 0}, 3);
   });
-  const auto said = [&](const std::string& what, const std::string& with) {
+  const auto message_for = [&](const std::string& what, const std::string& with) {
     return complaint(read_calibration(folder.write("s.yml", replaced(text, what, with)), {111, 222}));
   };
   for (const char* bad : {"abc", "1e300", "0", "-640", "640.5", "[640, 480]"}) {
-    EXPECT_THAT(said("image_width: 640", std::string("image_width: ") + bad),
+    EXPECT_THAT(message_for("image_width: 640", std::string("image_width: ") + bad),
                 HasSubstr("s.yml:3: image_width: must be a whole number above zero"))
         << bad;
   }
-  EXPECT_THAT(said("image_height: 480\n", ""), HasSubstr("s.yml:3: image_width: without image_height"));
+  EXPECT_THAT(message_for("image_height: 480\n", ""), HasSubstr("s.yml:3: image_width: is given without image_height"));
   const std::string both = "image_width: 640\nimage_height: 480\n";
-  EXPECT_THAT(said(both, "image_size: [640, x]\n"), HasSubstr("s.yml:3: image_size: must be two whole numbers above"));
-  EXPECT_EQ(said(both, "image_size: [640, 480]\n"), "nothing");
-  EXPECT_EQ(said(both, ""), "nothing") << "then the size that is given counts";
+  EXPECT_THAT(message_for(both, "image_size: [640, x]\n"),
+              HasSubstr("s.yml:3: image_size: must be two whole numbers above"));
+  EXPECT_EQ(message_for(both, "image_size: [640, 480]\n"), "nothing");
+  EXPECT_EQ(message_for(both, ""), "nothing") << "the given size is used";
 }
 
-TEST(OpencvFiles, RowsAndColumnsAreCounts) {
+TEST(OpencvFiles, RowsAndColumnsMustBePositive) {
   const TemporaryFolder folder;
   const std::string text = opencv_file([&](cv::FileStorage& file) {
     file << "P1" << row({290, 0, 310, 0, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
@@ -122,18 +123,18 @@ TEST(OpencvFiles, RowsAndColumnsAreCounts) {
   EXPECT_EQ(complaint(read_calibration(folder.write("s.yml", text))), "nothing");
 }
 
-TEST(OpencvFiles, TheRectifiedViewIsLeftOut) {
+TEST(OpencvFiles, TheRectificationIsIgnored) {
   const TemporaryFolder folder;
-  const auto left_out = [&](bool with_eyes) {
+  const auto left_out = [&](bool with_cameras) {
     const std::string text = opencv_file([&](cv::FileStorage& file) {
       const cv::Mat p = row({290, 0, 310, 0, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
       cv::Mat right = p.clone();
       right.at<double>(0, 3) = -29;
       file << "R1" << row({0, 0, 0}) << "R2" << row({0, 0, 0}) << "P1" << p << "P2" << right;
-      if (!with_eyes) return;
-      for (const char* eye : {"1", "2"}) {
-        file << std::string("M") + eye << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
-        file << std::string("D") + eye << row({0.1, 0, 0, 0, 0});
+      if (!with_cameras) return;
+      for (const char* number : {"1", "2"}) {
+        file << std::string("M") + number << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
+        file << std::string("D") + number << row({0.1, 0, 0, 0, 0});
       }
     });
     std::string keys;
@@ -150,9 +151,9 @@ TEST(OpencvFiles, ThinPrismsMustBeZero) {
   const auto read = [&](double prism) {
     return read_calibration(
         folder.write("s.yml", opencv_file([&](cv::FileStorage& file) {
-                       for (const char* eye : {"1", "2"}) {
-                         file << std::string("M") + eye << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
-                         file << std::string("D") + eye << row({0.1, 0, 0, 0, 0, 0.2, 0, 0, prism, 0, 0, 0});
+                       for (const char* number : {"1", "2"}) {
+                         file << std::string("M") + number << row({300, 0, 320, 0, 301, 240, 0, 0, 1}, 3);
+                         file << std::string("D") + number << row({0.1, 0, 0, 0, 0, 0.2, 0, 0, prism, 0, 0, 0});
                        }
                        file << "R" << row({0, 0.1, 0}, 3) << "T" << row({-0.1, 0, 0}, 3);
                      })));

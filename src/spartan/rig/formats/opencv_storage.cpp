@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan::rig_detail {
 namespace {
@@ -14,51 +14,48 @@ namespace {
 using Entry = OpencvStorage::Entry;
 
 std::optional<int> whole(const std::string& word) {
-  const auto value = parse_number(word);
+  const auto value = parse_finite_number(word);
   if (!value || *value != static_cast<double>(static_cast<long>(std::clamp(*value, -1e9, 1e9)))) return std::nullopt;
   return static_cast<int>(*value);
 }
 
-std::vector<std::string> words_of(const YAML::Node& node) {
+std::vector<std::string> words_of(const YamlNode& node) {
   std::vector<std::string> words;
-  if (node.IsScalar()) words.push_back(node.Scalar());
-  if (!node.IsSequence()) return words;
-  words.reserve(node.size());
-  for (const YAML::Node& entry : node) words.push_back(entry.IsScalar() ? entry.Scalar() : "[");
+  if (node.is_scalar()) words.push_back(node.scalar());
+  if (!node.is_list()) return words;
+  words.reserve(node.items().size());
+  for (const YamlNode& entry : node.items()) words.push_back(entry.is_scalar() ? entry.scalar() : "[");
   return words;
 }
 
-// A matrix, a list, a text; of other groups nothing is known.
-Entry entry_of(const YAML::Node& node, int line) {
+// A matrix, a list or a scalar; other mappings become an empty entry.
+Entry entry_of(const YamlNode& node, int line) {
   Entry entry;
   entry.line = line;
-  if (!node.IsMap()) {
+  if (!node.is_map()) {
     entry.words = words_of(node);
     return entry;
   }
-  for (const auto& part : node) {
-    if (!part.first.IsScalar()) continue;
-    const std::string& key = part.first.Scalar();
-    if (key == "rows" && part.second.IsScalar()) entry.rows = part.second.Scalar();
-    if (key == "cols" && part.second.IsScalar()) entry.columns = part.second.Scalar();
-    if (key == "data") entry.words = words_of(part.second);
+  for (const auto& [key, value] : node.entries()) {
+    if (key.scalar() == "rows") entry.rows = value.scalar();
+    if (key.scalar() == "cols") entry.columns = value.scalar();
+    if (key.scalar() == "data") entry.words = words_of(value);
   }
   return entry;
 }
 
-Result<std::map<std::string, Entry>> parse_yaml(std::string text, const std::string& name) {
-  // OpenCV's "%YAML:1.0" is no directive of YAML; as a comment it keeps its line.
+Result<std::map<std::string, Entry>> parse_opencv_yaml(std::string text, const std::string& name) {
+  // OpenCV's "%YAML:1.0" is not a valid YAML directive; as a comment it keeps the line numbers.
   if (text.starts_with("%YAML")) text.front() = '#';
-  const auto loaded = load_yaml(text, name);
+  const auto loaded = parse_yaml(text, name);
   if (!loaded) return failure(loaded);
-  if (!loaded->IsMap()) return failure(ErrorCode::configuration, "is no OpenCV file: there are no keys", name);
+  if (!loaded->is_map()) return failure(ErrorCode::configuration, "is not an OpenCV file: it has no keys", name);
   std::map<std::string, Entry> entries;
-  for (const auto& entry : *loaded) {
-    if (!entry.first.IsScalar()) continue;
-    const int line = entry.first.Mark().line + 1;
-    if (!entries.try_emplace(entry.first.Scalar(), entry_of(entry.second, line)).second) {
-      return failure(ErrorCode::configuration, entry.first.Scalar() + ": given a second time",
-                     fmt::format("{}:{}", name, line));
+  for (const auto& [key, value] : loaded->entries()) {
+    if (!key.is_scalar()) continue;
+    if (!entries.try_emplace(key.scalar(), entry_of(value, key.line())).second) {
+      return failure(ErrorCode::configuration, key.scalar() + ": is given twice",
+                     fmt::format("{}:{}", name, key.line()));
     }
   }
   return entries;
@@ -71,7 +68,7 @@ Result<OpencvStorage> OpencvStorage::read(const std::string& path) {
   if (!text) return failure(text);
   const std::size_t first = text->find_first_not_of(" \t\r\n");
   const bool xml = first != std::string::npos && (*text)[first] == '<';
-  auto entries = xml ? parse_opencv_xml(*text, path) : parse_yaml(*text, path);
+  auto entries = xml ? parse_opencv_xml(*text, path) : parse_opencv_yaml(*text, path);
   if (!entries) return failure(std::move(entries));
   OpencvStorage storage;
   storage.name_ = path;
@@ -79,7 +76,7 @@ Result<OpencvStorage> OpencvStorage::read(const std::string& path) {
   return storage;
 }
 
-tl::unexpected<Error> OpencvStorage::fault(const std::string& key, const std::string& what) const {
+tl::unexpected<Error> OpencvStorage::error_at(const std::string& key, const std::string& what) const {
   const auto found = entries_.find(key);
   const std::string where = found == entries_.end() ? name_ : fmt::format("{}:{}", name_, found->second.line);
   return failure(ErrorCode::configuration, fmt::format("{}: {}", key, what), where);
@@ -87,20 +84,20 @@ tl::unexpected<Error> OpencvStorage::fault(const std::string& key, const std::st
 
 Result<std::vector<double>> OpencvStorage::matrix(const std::string& key, const std::vector<int>& counts) const {
   const auto found = entries_.find(key);
-  if (found == entries_.end()) return fault(key, "is missing");
+  if (found == entries_.end()) return error_at(key, "is missing");
   const Entry& entry = found->second;
   const auto rows = whole(entry.rows), columns = whole(entry.columns);
-  if (!rows || !columns || *rows < 1 || *columns < 1) return fault(key, "is not a matrix");
+  if (!rows || !columns || *rows < 1 || *columns < 1) return error_at(key, "is not a matrix");
   const auto total = std::ssize(entry.words);
-  if (std::int64_t{*rows} * *columns != total) return fault(key, "has other numbers than its rows and columns say");
+  if (std::int64_t{*rows} * *columns != total) return error_at(key, "does not have rows × cols numbers");
   if (std::find(counts.begin(), counts.end(), total) == counts.end()) {
-    return fault(key, fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
+    return error_at(key, fmt::format("has {} numbers, must have {}", total, fmt::join(counts, " or ")));
   }
   std::vector<double> values;
   values.reserve(entry.words.size());
   for (const std::string& word : entry.words) {
-    const auto value = parse_number(word);
-    if (!value) return fault(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
+    const auto value = parse_finite_number(word);
+    if (!value) return error_at(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
     values.push_back(*value);
   }
   return values;

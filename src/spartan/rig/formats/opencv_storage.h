@@ -1,4 +1,4 @@
-// The matrices and values at the top of an OpenCV file storage, YAML or XML. Internal to rig.
+// The matrices and values at the top level of an OpenCV FileStorage file, YAML or XML. Internal to rig.
 #pragma once
 
 #include <map>
@@ -11,28 +11,29 @@
 
 namespace spartan::rig_detail {
 
-/// Not cv::FileStorage: its parser reads behind the end of XML that was cut off, recurses as deep as a file likes, and
-/// does not tell lines.
+/// Replaces cv::FileStorage, whose parser reads out of bounds in truncated XML, has no limit of recursion, and does not
+/// report line numbers.
 class OpencvStorage {
  public:
-  /// Code `configuration` where the file cannot be read or is neither YAML nor XML.
+  /// Code `configuration` if the file cannot be read or is neither YAML nor XML.
   static Result<OpencvStorage> read(const std::string& path);
 
   bool has(const std::string& key) const { return entries_.contains(key); }
-  /// The matrix as doubles, row by row, with one of `counts` of elements.
+  /// The matrix in row-major order; its number of elements must be one of `counts`.
   Result<std::vector<double>> matrix(const std::string& key, const std::vector<int>& counts) const;
+  /// nullopt if the key is missing or not an integer.
   std::optional<int> integer(const std::string& key) const;
-  /// Two whole numbers in a list.
+  /// A list of two integers.
   std::optional<ImageSize> size(const std::string& key) const;
-  /// Empty where the key is missing or no text.
+  /// The first word of the value; empty if the key is missing.
   std::string text(const std::string& key) const;
   /// "key: what" at the key's line, code `configuration`.
-  tl::unexpected<Error> fault(const std::string& key, const std::string& what) const;
+  tl::unexpected<Error> error_at(const std::string& key, const std::string& what) const;
 
-  /// A value: its words, of a matrix those of its data.
+  /// A value: its words; for a matrix the words of its data.
   struct Entry {
     int line = 0;
-    std::string rows, columns;  ///< of a matrix
+    std::string rows, columns;  ///< of a matrix, as text
     std::vector<std::string> words;
   };
 
@@ -41,7 +42,7 @@ class OpencvStorage {
   std::map<std::string, Entry> entries_;
 };
 
-/// The entries of a file in XML; code `configuration` with "name:line".
+/// The entries of an XML file; code `configuration` with "name:line".
 Result<std::map<std::string, OpencvStorage::Entry>> parse_opencv_xml(const std::string& text, const std::string& name);
 
 }  // namespace spartan::rig_detail

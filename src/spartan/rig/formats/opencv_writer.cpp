@@ -23,11 +23,14 @@ Result<Lens> lens_of(const Camera& camera, bool fisheye) {
     const auto& k = m->coefficients();
     return Lens{m->pinhole(), {k.begin(), k.begin() + (is_rational(*m) ? 8 : 5)}};
   }
-  if (fisheye) return cannot_hold(camera, fmt::format("one eye is a fisheye, this one is {}", name_of(camera.model)));
-  return cannot_hold(camera, fmt::format("OpenCV has no model like {}", name_of(camera.model)));
+  if (fisheye)
+    return cannot_hold(
+        camera, fmt::format("the other camera is a fisheye, this one is {}; OpenCV files have one model for both",
+                            name_of(camera.model)));
+  return cannot_hold(camera, fmt::format("OpenCV files do not support the model {}", name_of(camera.model)));
 }
 
-// Read back with all digits: OpenCV writes 17 of them.
+// OpenCV writes 17 digits, so values round-trip exactly.
 cv::Mat matrix(const std::vector<double>& numbers, int rows) {
   return cv::Mat(numbers, true).reshape(1, rows);
 }
@@ -35,23 +38,24 @@ cv::Mat matrix(const std::vector<double>& numbers, int rows) {
 }  // namespace
 
 Result<CalibrationFiles> write_opencv_calib(const Rig& rig, const std::string& path) {
-  const auto eyes = only_pair(rig, CalibrationFormat::opencv);
-  if (!eyes) return failure(eyes);
-  if (!(eyes->left->size == eyes->right->size)) {
-    return cannot_hold(*eyes->right, "OpenCV's file has one image size for both eyes, the left one has another");
+  const auto cameras = single_pair(rig, CalibrationFormat::opencv);
+  if (!cameras) return failure(cameras);
+  if (!(cameras->left->size == cameras->right->size)) {
+    return cannot_hold(*cameras->right,
+                       "OpenCV files have one image size for both cameras, this one differs from the left one");
   }
-  const bool fisheye = expressed_as<EquidistantModel>(eyes->left->model).has_value() ||
-                       expressed_as<EquidistantModel>(eyes->right->model).has_value();
-  const auto left = lens_of(*eyes->left, fisheye), right = lens_of(*eyes->right, fisheye);
+  const bool fisheye = expressed_as<EquidistantModel>(cameras->left->model).has_value() ||
+                       expressed_as<EquidistantModel>(cameras->right->model).has_value();
+  const auto left = lens_of(*cameras->left, fisheye), right = lens_of(*cameras->right, fisheye);
   if (!left) return failure(left);
   if (!right) return failure(right);
-  const Pose right_from_left = rig.right_from_left(*eyes->pair);
+  const Pose right_from_left = rig.right_from_left(*cameras->pair);
   const Eigen::Matrix3d rows = right_from_left.rotation_matrix().transpose();
   const Eigen::Vector3d& t = right_from_left.translation();
   try {
     cv::FileStorage file(path.ends_with(".xml") ? "memory.xml" : "memory.yml",
                          cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
-    file << "image_width" << eyes->left->size.width << "image_height" << eyes->left->size.height;
+    file << "image_width" << cameras->left->size.width << "image_height" << cameras->left->size.height;
     if (fisheye) file << "fisheye_model" << 1;
     for (const auto& [number, lens] : {std::pair{"1", &*left}, std::pair{"2", &*right}}) {
       const PinholeModel& p = lens->pinhole;

@@ -1,4 +1,4 @@
-// OpenCV's XML: <opencv_storage> <KEY> text </KEY> … , a matrix with <rows>, <cols> and <data> inside.
+// Parser of OpenCV's XML: <opencv_storage> <KEY> text </KEY> … , a matrix with <rows>, <cols> and <data> inside.
 #include <fmt/format.h>
 
 #include <sstream>
@@ -10,18 +10,18 @@ namespace {
 
 using Entries = std::map<std::string, OpencvStorage::Entry>;
 
-// Goes over the tags once, with the names of those that are open on a stack of its own.
+// Reads the tags in one pass, with an explicit stack of open tags.
 class XmlReader {
  public:
   explicit XmlReader(const std::string& text) : text_(text) {}
 
-  /// Empty where all went well.
+  /// An error message; empty on success.
   std::string run() {
     while (true) {
       const std::size_t tag = text_.find('<', at_);
       take_text(tag);
-      if (tag == std::string::npos) return open_.empty() && closed_ ? "" : "ends before </opencv_storage>";
-      if (std::string fault = take_tag(tag); !fault.empty()) return fault;
+      if (tag == std::string::npos) return open_.empty() && closed_ ? "" : "is truncated: </opencv_storage> is missing";
+      if (std::string error = take_tag(tag); !error.empty()) return error;
     }
   }
   int line() const { return line_; }
@@ -33,7 +33,7 @@ class XmlReader {
     for (; at_ < std::min(place, text_.size()); ++at_) line_ += text_[at_] == '\n' ? 1 : 0;
   }
 
-  // Words inside of a key, or of a part of a matrix.
+  // Words inside a key or inside a part of a matrix.
   void take_text(std::size_t end) {
     const std::string words = text_.substr(at_, end == std::string::npos ? end : end - at_);
     move_to(end);
@@ -52,32 +52,32 @@ class XmlReader {
     const bool comment = text_.compare(tag, 4, "<!--") == 0;
     const std::string closing = comment ? "-->" : ">";
     const std::size_t end = text_.find(closing, tag);
-    if (end == std::string::npos) return "a tag is not closed";
+    if (end == std::string::npos) return "unterminated tag";
     const std::string inside = text_.substr(tag + 1, end - tag - 1);
     const std::string name = inside.substr(0, inside.find_first_of(" \t\r\n/", inside.starts_with('/') ? 1 : 0));
-    std::string fault;
+    std::string error;
     if (inside.starts_with('/')) {
-      fault = close(name.substr(1));
+      error = close(name.substr(1));
     } else if (!comment && !inside.starts_with('?') && !inside.starts_with('!')) {
-      fault = open(name);
-      if (fault.empty() && inside.ends_with('/')) fault = close(name);
+      error = open(name);
+      if (error.empty() && inside.ends_with('/')) error = close(name);
     }
-    if (fault.empty()) move_to(end + closing.size());
-    return fault;
+    if (error.empty()) move_to(end + closing.size());
+    return error;
   }
 
   std::string open(const std::string& name) {
-    if (closed_) return "goes on behind </opencv_storage>";
+    if (closed_) return "has content after </opencv_storage>";
     if (open_.empty() && name != "opencv_storage") return "must begin with <opencv_storage>";
     if (open_.size() == 1 && !entries.try_emplace(name, OpencvStorage::Entry{line_, "", "", {}}).second) {
-      return name.substr(0, 40) + ": given a second time";
+      return name.substr(0, 40) + ": is given twice";
     }
     open_.push_back(name);
     return "";
   }
 
   std::string close(const std::string& name) {
-    if (open_.empty() || open_.back() != name) return fmt::format("</{}> closes nothing", name.substr(0, 40));
+    if (open_.empty() || open_.back() != name) return fmt::format("</{}> has no opening tag", name.substr(0, 40));
     open_.pop_back();
     closed_ = open_.empty();
     return "";
@@ -94,8 +94,8 @@ class XmlReader {
 
 Result<Entries> parse_opencv_xml(const std::string& text, const std::string& name) {
   XmlReader reader(text);
-  const std::string fault = reader.run();
-  if (!fault.empty()) return failure(ErrorCode::configuration, fault, fmt::format("{}:{}", name, reader.line()));
+  const std::string error = reader.run();
+  if (!error.empty()) return failure(ErrorCode::configuration, error, fmt::format("{}:{}", name, reader.line()));
   return std::move(reader.entries);
 }
 

@@ -1,4 +1,4 @@
-// A dictionary as Python writes it: {'key': value, …}. mrcal's files are one. Internal to rig.
+// Parser of Python dict literals {'key': value, …}, the format of mrcal's files. Internal to rig.
 #pragma once
 
 #include <map>
@@ -11,20 +11,20 @@
 
 namespace spartan::rig_detail {
 
-/// The values are texts, numbers and flat lists of numbers; what else stands in the file is passed over, but must be
-/// well formed: nested lists, bytes, None. Comments (#) are allowed.
+/// Values are strings, numbers and flat lists of numbers. Nested lists, bytes, None, True and False are skipped but
+/// must be well formed. Comments (#) are allowed.
 class PythonDict {
  public:
-  /// Code `configuration` with "name:line" where the text is no such dictionary.
+  /// Code `configuration` with "name:line" if the text is not such a dict.
   static Result<PythonDict> parse(std::string_view text, const std::string& name);
 
   bool has(const std::string& key) const { return entries_.contains(key); }
   Result<std::string> text(const std::string& key) const;
-  /// All numbers of a list; they are finite.
+  /// A list of finite numbers; with `count`, exactly that many.
   Result<std::vector<double>> numbers(const std::string& key) const;
   Result<std::vector<double>> numbers(const std::string& key, std::size_t count) const;
   /// "key: what" at the key's line, code `configuration`.
-  tl::unexpected<Error> fault(const std::string& key, const std::string& what) const;
+  tl::unexpected<Error> error_at(const std::string& key, const std::string& what) const;
 
   struct Other {};
   struct Entry {

@@ -1,4 +1,4 @@
-// What files will say once they are written. Nothing is written where they shall be.
+// Reading calibration files as they will be after writing, without writing them to their destination.
 #pragma once
 
 #include "spartan/rig/formats/rig_files.h"
@@ -6,9 +6,10 @@
 
 namespace spartan {
 
-/// Reads the files of to_calibration_files() as that format, in a temporary folder, together with what lies at their
-/// place already and would be read with them: further cameras of EuRoC, the IMU of KITTI raw, OpenCV's other file.
-/// Errors name the files by their own places; code `output` where there is no temporary folder.
+/// Writes the files of to_calibration_files() to a temporary folder and reads them in that format, together with
+/// existing files at their destination that would be read with them: further cameras of EuRoC, the IMU of KITTI raw,
+/// OpenCV's other file. Errors name the files by their destination; code `output` if no temporary folder can be
+/// created.
 Result<ReadRig> read_back(const CalibrationFiles& files, CalibrationFormat format, ImageSize size);
 
 }  // namespace spartan

@@ -17,7 +17,7 @@ tl::unexpected<Error> cannot_hold(const Camera& camera, const std::string& why) 
   return failure(ErrorCode::configuration, why, "cameras." + camera.name);
 }
 
-Result<Eyes> only_pair(const Rig& rig, CalibrationFormat format) {
+Result<PairCameras> single_pair(const Rig& rig, CalibrationFormat format) {
   if (rig.pairs.size() != 1) {
     return failure(ErrorCode::configuration,
                    fmt::format("{} holds one pair, this rig has {}", name_of(format), rig.pairs.size()), "pairs",
@@ -28,12 +28,12 @@ Result<Eyes> only_pair(const Rig& rig, CalibrationFormat format) {
     if (camera.name == pair.left || camera.name == pair.right) continue;
     return failure(ErrorCode::configuration,
                    fmt::format("{} holds two cameras, this rig has {}", name_of(format), rig.cameras.size()),
-                   "cameras." + camera.name, "leave it out with --pair " + pair.name);
+                   "cameras." + camera.name, "select the pair with --pair " + pair.name);
   }
-  return Eyes{rig.find_camera(pair.left), rig.find_camera(pair.right), &pair};
+  return PairCameras{rig.find_camera(pair.left), rig.find_camera(pair.right), &pair};
 }
 
-std::vector<const Camera*> pair_first(const Rig& rig) {
+std::vector<const Camera*> cameras_pair_first(const Rig& rig) {
   const StereoPair& pair = rig.pairs.front();
   std::vector<const Camera*> cameras{rig.find_camera(pair.left), rig.find_camera(pair.right)};
   for (const Camera& camera : rig.cameras) {
@@ -44,21 +44,23 @@ std::vector<const Camera*> pair_first(const Rig& rig) {
 
 namespace {
 
-// Vectors of six decimals leave a skew that moves no pixel of the picture by this much. Most formats have none.
+// Maximum displacement of a pixel by a skew that is treated as a rounding error (JPL vectors with six decimals) and
+// dropped in formats without skew, px.
 constexpr double kRoundingSkew_px = 0.01;
 
-// By how much the skew moves rows from one side of the picture to the other.
+// The displacement of rows by the skew from one side of the image to the other, px.
 double skew_across_px(const Camera& camera) {
   return std::abs(skew_px(camera.model)) * camera.size.width / parameters(camera.model).front().front();
 }
 
-// The rig as a format says it that has no skew.
+// The rig without skew, for formats that do not support it.
 Result<Rig> without_skews(Rig rig, CalibrationFormat format) {
   for (Camera& camera : rig.cameras) {
     const double across = skew_across_px(camera);
     if (across > kRoundingSkew_px) {
-      return cannot_hold(camera, fmt::format("{} has no skew, this camera's is {:.6g} px: {:.3g} px across the picture",
-                                             name_of(format), skew_px(camera.model), across));
+      return cannot_hold(camera,
+                         fmt::format("{} does not support skew, this camera has {:.6g} px: {:.3g} px across the image",
+                                     name_of(format), skew_px(camera.model), across));
     }
     camera.model = without_skew(camera.model);
   }
@@ -88,7 +90,7 @@ Result<CalibrationFiles> write_as(const Rig& rig, CalibrationFormat format, cons
     case CalibrationFormat::cahvor:
       return write_cahvor_calib(rig, path);
   }
-  return failure(ErrorCode::internal, "an unknown format");
+  return failure(ErrorCode::internal, "unknown calibration format");
 }
 
 }  // namespace
@@ -107,13 +109,13 @@ Rig rig_of_pair(const Rig& rig, const StereoPair& pair) {
 }
 
 Result<CalibrationFiles> to_calibration_files(const Rig& rig, CalibrationFormat format, const std::string& path) {
-  if (Status sound = rig.validate("the rig"); !sound) return failure(std::move(sound));
+  if (Status valid = rig.validate("the rig"); !valid) return failure(std::move(valid));
   if (format == CalibrationFormat::rig_yaml || format == CalibrationFormat::cahvor) {
     return rig_detail::write_as(rig, format, path);
   }
-  const auto straight = rig_detail::without_skews(rig, format);
-  if (!straight) return failure(straight);
-  return rig_detail::write_as(*straight, format, path);
+  const auto unskewed = rig_detail::without_skews(rig, format);
+  if (!unskewed) return failure(unskewed);
+  return rig_detail::write_as(*unskewed, format, path);
 }
 
 }  // namespace spartan

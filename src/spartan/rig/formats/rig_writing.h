@@ -1,4 +1,4 @@
-// Writing calibrations: the texts of files, and what they lost.
+// Writing calibrations in any supported format.
 #pragma once
 
 #include <string>
@@ -10,18 +10,19 @@
 
 namespace spartan {
 
+/// The path and content of a file.
 struct CalibrationFile {
   std::string path, content;
 };
 using CalibrationFiles = std::vector<CalibrationFile>;
 
-/// The files that hold the rig in a format; nothing is written. `path` is the file, of EuRoC the folder, of formats
-/// with a file for each eye "LEFT,RIGHT" or one name that becomes two. Code `configuration`, naming camera and
-/// reason, where the format cannot say how the cameras see or has no place for all of them. Lesser things (names, pixel
-/// formats, masks, a mast that turns, a skew below 0.01 px across the picture) are dropped: rig_differences.h tells.
+/// The files that represent the rig in a format; nothing is written to disk. `path` is the file, for EuRoC the folder,
+/// for formats with one file per camera "LEFT,RIGHT" or one path from which two are derived. Code `configuration`,
+/// naming camera and reason, if the format cannot represent a camera model or all cameras. Other information (names,
+/// pixel formats, masks, pan-tilt units, a skew below 0.01 px across the image) is dropped; see rig_differences.h.
 Result<CalibrationFiles> to_calibration_files(const Rig& rig, CalibrationFormat format, const std::string& path);
 
-/// The rig with nothing but this pair.
+/// The rig reduced to one pair, its cameras and their mounts.
 Rig rig_of_pair(const Rig& rig, const StereoPair& pair);
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// What formats cannot hold is refused by name.
+// Rigs that a format does not support are rejected with the name of the camera.
 #include "spartan/rig/formats/rig_writing.h"
 
 #include <gmock/gmock.h>
@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(CalibrationWriting, WhatAFormatCannotHoldIsRefusedByCamera) {
+TEST(CalibrationWriting, UnsupportedCamerasAreNamed) {
   Camera left, right;
   left.name = "left";
   right.name = "right";
@@ -27,26 +27,31 @@ TEST(CalibrationWriting, WhatAFormatCannotHoldIsRefusedByCamera) {
   const RadialTangentialModel rational(pinhole, {0.1, 0, 0, 0, 0, 0.1, 0, 0});
   const CahvModel skewed{pinhole, 0.5};
   EXPECT_THAT(refusal(fisheye, CalibrationFormat::kitti, "calib.txt"),
-              HasSubstr("cameras.left: kitti holds rectified"));
+              HasSubstr("cameras.left: kitti supports rectified"));
   EXPECT_THAT(refusal(fisheye, CalibrationFormat::tsai, "a.tsai"),
-              HasSubstr("cameras.left: .tsai has no model like equi"));
+              HasSubstr("cameras.left: .tsai files do not support the model equi"));
   EXPECT_THAT(refusal(fisheye, CalibrationFormat::mrcal, "a.cameramodel"),
-              HasSubstr("cameras.left: mrcal's files have no"));
-  EXPECT_THAT(refusal(fisheye, CalibrationFormat::cahvor, "a.cahvor"), HasSubstr("cameras.left: .cahvor has no model"));
-  EXPECT_THAT(refusal(rational, CalibrationFormat::kalibr, "a.yaml"), HasSubstr("cameras.left: this format has four"));
-  EXPECT_THAT(refusal(rational, CalibrationFormat::tsai, "a.tsai"), HasSubstr("no coefficients k4, k5, k6"));
+              HasSubstr("cameras.left: mrcal files do not support"));
+  EXPECT_THAT(refusal(fisheye, CalibrationFormat::cahvor, "a.cahvor"),
+              HasSubstr("cameras.left: .cahvor files do not support the model"));
+  EXPECT_THAT(refusal(rational, CalibrationFormat::kalibr, "a.yaml"),
+              HasSubstr("cameras.left: this format supports four"));
+  EXPECT_THAT(refusal(rational, CalibrationFormat::tsai, "a.tsai"),
+              HasSubstr("do not support the coefficients k4, k5, k6"));
   EXPECT_THAT(refusal(skewed, CalibrationFormat::mrcal, "a.cameramodel"),
-              HasSubstr("cameras.left: mrcal has no skew, this camera's is 0.5 px: 0.64 px"));
-  EXPECT_THAT(refusal(skewed, CalibrationFormat::ros, "a.yaml"), HasSubstr("cameras.left: ros has no skew"));
-  EXPECT_THAT(refusal(skewed, CalibrationFormat::opencv, "a.yml"), HasSubstr("cameras.left: opencv has no skew"));
-  EXPECT_THAT(refusal(skewed, CalibrationFormat::euroc, "a"), HasSubstr("cameras.left: euroc has no skew"));
+              HasSubstr("cameras.left: mrcal does not support skew, this camera has 0.5 px: 0.64 px"));
+  EXPECT_THAT(refusal(skewed, CalibrationFormat::ros, "a.yaml"), HasSubstr("cameras.left: ros does not support skew"));
+  EXPECT_THAT(refusal(skewed, CalibrationFormat::opencv, "a.yml"),
+              HasSubstr("cameras.left: opencv does not support skew"));
+  EXPECT_THAT(refusal(skewed, CalibrationFormat::euroc, "a"), HasSubstr("cameras.left: euroc does not support skew"));
   EXPECT_EQ(refusal(skewed, CalibrationFormat::cahvor, "a.cahvor"), "nothing");
 
   left.model = right.model = pinhole;
-  const Rig turned = rig_of_one_pair("r", left, right, Pose(exp_so3({0, 0.01, 0}), {-0.1, 0, 0}));
-  EXPECT_THAT(to_calibration_files(turned, CalibrationFormat::kitti, "calib.txt").error().message(),
-              HasSubstr("cameras.right: kitti holds rectified pairs only; this camera is turned by 0.01 rad"));
-  Rig three = turned;
+  const Rig rotated = rig_of_one_pair("r", left, right, Pose(exp_so3({0, 0.01, 0}), {-0.1, 0, 0}));
+  EXPECT_THAT(to_calibration_files(rotated, CalibrationFormat::kitti, "calib.txt").error().message(),
+              HasSubstr("cameras.right: kitti supports rectified pairs only; relative to the left camera, this one is "
+                        "rotated by 0.01 rad"));
+  Rig three = rotated;
   three.cameras.push_back(left);
   three.cameras.back().name = "third";
   for (const auto format : {CalibrationFormat::ros, CalibrationFormat::opencv, CalibrationFormat::tsai}) {

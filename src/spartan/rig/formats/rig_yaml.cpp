@@ -1,4 +1,5 @@
-// The native rig.yaml; the format is described in docs/formats.md, "rig.yaml".
+#include "spartan/rig/formats/rig_yaml.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -6,18 +7,14 @@
 #include <filesystem>
 #include <numbers>
 
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan {
 namespace {
 
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
-
 constexpr int kSchema = 1;
-constexpr std::size_t kMostEntries = 1000;  // no rig has more cameras
+constexpr std::size_t kMaxEntries = 1000;  // cameras, pairs or pan-tilt units of a rig
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr PixelLayout kLayouts[] = {PixelLayout::gray,       PixelLayout::rgb,        PixelLayout::bayer_rggb,
                                     PixelLayout::bayer_grbg, PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr};
@@ -30,14 +27,14 @@ std::optional<Eigen::Quaterniond> read_quaternion(YamlMap& map) {
   const Eigen::Quaterniond quaternion((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
   const double length = quaternion.norm();
   if (!(std::abs(length - 1) <= 1e-3)) {
-    map.fault("quaternion_xyzw", fmt::format("has length {:.6g}, must have length 1", length));
+    map.add_error("quaternion_xyzw", fmt::format("has length {:.6g}, must have length 1", length));
     return std::nullopt;
   }
-  // What a program wrote stays as it is, bit for bit; what a person rounded is brought to unit length.
+  // A quaternion written by a program is restored bit for bit; one rounded by hand is normalized.
   return std::abs(length - 1) < 1e-12 ? quaternion : quaternion.normalized();
 }
 
-// R = Rz(yaw) Ry(pitch) Rx(roll); with y to the left a positive pitch looks down.
+// R = Rz(yaw) Ry(pitch) Rx(roll); with y to the left, a positive pitch looks down.
 std::optional<Eigen::Quaterniond> read_roll_pitch_yaw(YamlMap& map) {
   const auto degrees = map.numbers("roll_pitch_yaw_deg", {3});
   if (!degrees) return std::nullopt;
@@ -48,17 +45,16 @@ std::optional<Eigen::Quaterniond> read_roll_pitch_yaw(YamlMap& map) {
                             turn(0, Eigen::Vector3d::UnitX()));
 }
 
-// translation_m with one of quaternion_xyzw and roll_pitch_yaw_deg, or neither for no rotation.
+// translation_m with either quaternion_xyzw or roll_pitch_yaw_deg; no rotation if both are missing.
 Pose read_pose(YamlMap& map) {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  if (map.has("quaternion_xyzw") && map.has("roll_pitch_yaw_deg")) {
-    map.fault("roll_pitch_yaw_deg", "the rotation is given twice; keep this or quaternion_xyzw");
+  const bool has_quaternion = map.has("quaternion_xyzw"), has_angles = map.has("roll_pitch_yaw_deg");
+  if (has_quaternion && has_angles) {
+    map.add_error("roll_pitch_yaw_deg", "the rotation is given twice; remove this or quaternion_xyzw");
   }
-  if (map.has("quaternion_xyzw")) rotation = read_quaternion(map).value_or(rotation);
-  if (map.has("roll_pitch_yaw_deg")) rotation = read_roll_pitch_yaw(map).value_or(rotation);
+  if (has_quaternion) rotation = read_quaternion(map).value_or(rotation);
+  if (has_angles) rotation = read_roll_pitch_yaw(map).value_or(rotation);
   const auto t = map.numbers("translation_m", {3});
-  (void)map.optional_node("quaternion_xyzw");  // names both for the list of known keys
-  (void)map.optional_node("roll_pitch_yaw_deg");
   return Pose::from_unit_quaternion(rotation, t ? Eigen::Vector3d((*t)[0], (*t)[1], (*t)[2]) : Eigen::Vector3d::Zero());
 }
 
@@ -66,11 +62,12 @@ PanTiltUnit read_pan_tilt_unit(const std::string& name, YamlMap map) {
   PanTiltUnit unit{name, read_pose(map)};
   double scale = 1;
   std::optional<std::vector<double>> angles;
-  if (map.has("rest_angles_rad") && map.has("rest_angles_deg")) {
-    map.fault("rest_angles_deg", "the angles are given twice; keep this or rest_angles_rad");
+  const bool in_radians = map.has("rest_angles_rad"), in_degrees = map.has("rest_angles_deg");
+  if (in_radians && in_degrees) {
+    map.add_error("rest_angles_deg", "the angles are given twice; remove this or rest_angles_rad");
   }
-  if (map.has("rest_angles_rad")) angles = map.numbers("rest_angles_rad", {2});
-  if (map.has("rest_angles_deg")) {
+  if (in_radians) angles = map.numbers("rest_angles_rad", {2});
+  if (in_degrees) {
     angles = map.numbers("rest_angles_deg", {2});
     scale = kRadiansPerDegree;
   }
@@ -78,9 +75,7 @@ PanTiltUnit read_pan_tilt_unit(const std::string& name, YamlMap map) {
     unit.rest_pan_rad = (*angles)[0] * scale;
     unit.rest_tilt_rad = (*angles)[1] * scale;
   }
-  (void)map.optional_node("rest_angles_rad");
-  (void)map.optional_node("rest_angles_deg");
-  map.refuse_unknown_keys();
+  map.reject_unknown_keys();
   return unit;
 }
 
@@ -88,9 +83,9 @@ CameraModel read_model(YamlMap& map) {
   const std::vector<std::string_view> known = camera_model_names();
   const auto name = map.choice("model", {known.begin(), known.end()});
   if (!name) {
-    // Without its model nobody knows which keys belong to the camera; those of any model pass.
+    // If the model is unknown, the keys of all models are accepted to avoid follow-up errors.
     for (const std::string_view other : known) {
-      for (const auto& kind : parameter_kinds(*camera_model_named(other))) (void)map.optional_node(kind.key);
+      for (const auto& kind : parameter_kinds(*camera_model_named(other))) (void)map.has(kind.key);
     }
     return {};
   }
@@ -117,7 +112,6 @@ PixelFormat read_pixel_format(YamlMap& map) {
   if (map.has("bit_alignment") && map.choice("bit_alignment", {"low", "high"}) == "high") {
     format.alignment = BitAlignment::high;
   }
-  for (const char* key : {"pixel_layout", "bits", "bit_alignment"}) (void)map.optional_node(key);
   return format;
 }
 
@@ -127,7 +121,7 @@ Camera read_camera(const std::string& name, YamlMap map) {
   if (const auto size = map.numbers("size_px", {2})) {
     if (std::abs((*size)[0]) > 1e6 || std::abs((*size)[1]) > 1e6 || std::floor((*size)[0]) != (*size)[0] ||
         std::floor((*size)[1]) != (*size)[1]) {
-      map.fault("size_px", "must be two whole numbers, width and height");
+      map.add_error("size_px", "must be two whole numbers, width and height");
     } else {
       camera.size = {static_cast<int>((*size)[0]), static_cast<int>((*size)[1])};
     }
@@ -143,12 +137,11 @@ Camera read_camera(const std::string& name, YamlMap map) {
   }
   if (map.has("self_mask")) camera.self_mask = map.text("self_mask").value_or("");
   if (map.has("mount")) camera.mount = map.text("mount").value_or(camera.mount);
-  for (const char* key : {"vignetting", "vignetting_centre_px", "self_mask", "mount"}) (void)map.optional_node(key);
-  // Which way an unturned camera looks is said, never guessed.
+  // The orientation of a camera without rotation is explicit in the file, not a default.
   const auto axes = map.choice("axes", {"optical", "forward"});
   camera.mount_from_camera = read_pose(map);
   if (axes == "forward") camera.mount_from_camera = camera.mount_from_camera * optical_from_forward().inverse();
-  map.refuse_unknown_keys();
+  map.reject_unknown_keys();
   return camera;
 }
 
@@ -159,24 +152,23 @@ StereoPair read_pair(const std::string& name, YamlMap map) {
   pair.right = map.text("right").value_or("");
   if (map.has("nearest_m")) pair.nearest_m = map.number("nearest_m").value_or(0);
   if (map.has("for_odometry")) pair.for_odometry = map.boolean("for_odometry").value_or(true);
-  for (const char* key : {"nearest_m", "for_odometry"}) (void)map.optional_node(key);
-  map.refuse_unknown_keys();
+  map.reject_unknown_keys();
   return pair;
 }
 
-// The entries of one group, each read by `read(name, map)`.
+// Reads the entries of a group, each by `read(name, map)`.
 template <class T, class Read>
 std::vector<T> read_group(YamlMap& root, const char* key, bool required, Read read) {
   std::vector<T> items;
   const auto node = required ? root.node(key) : root.optional_node(key);
   if (!node) return items;
-  YamlMap group(*node, key, root.faults());
-  if (group.entries().size() > kMostEntries) {
-    root.fault(key, fmt::format("has {} entries, more than {}", group.entries().size(), kMostEntries));
+  YamlMap group(*node, key, root.errors());
+  if (group.entries().size() > kMaxEntries) {
+    root.add_error(key, fmt::format("has {} entries, more than {}", group.entries().size(), kMaxEntries));
     return items;
   }
   for (const auto& [name, entry] : group.entries()) {
-    items.push_back(read(name, YamlMap(entry, group.path(name), root.faults())));
+    items.push_back(read(name, YamlMap(entry, group.path(name), root.errors())));
   }
   return items;
 }
@@ -185,29 +177,28 @@ Rig read_root(YamlMap root, const std::string& default_name) {
   Rig rig;
   rig.name = default_name;
   if (const auto schema = root.integer("schema"); schema && *schema != kSchema) {
-    root.fault("schema", fmt::format("is {}; this version reads schema {}", *schema, kSchema));
+    root.add_error("schema", fmt::format("is {}; this version reads schema {}", *schema, kSchema));
   }
   if (root.has("name")) rig.name = root.text("name").value_or(default_name);
   if (root.has("pose_convention") && root.choice("pose_convention", {"body", "left_optical"}) == "left_optical") {
     rig.convention = PoseConvention::left_optical;
   }
-  for (const char* key : {"name", "pose_convention"}) (void)root.optional_node(key);
   rig.pan_tilt_units = read_group<PanTiltUnit>(root, "pan_tilt_units", false, read_pan_tilt_unit);
   rig.cameras = read_group<Camera>(root, "cameras", true, read_camera);
   rig.pairs = read_group<StereoPair>(root, "pairs", true, read_pair);
-  root.refuse_unknown_keys();
+  root.reject_unknown_keys();
   return rig;
 }
 
-// What the numbers mean together. A fault that follows from one already told is left out.
-void add_faults_of_meaning(const Rig& rig, YamlFaults& faults) {
+// Adds the faults found by Rig::find_faults(), except those that follow from an error reported before.
+void add_rig_faults(const Rig& rig, YamlErrors& errors) {
   std::vector<RigFault> found;
   for (const RigFault& fault : rig.find_faults()) {
     const bool about_a_pair = fault.key.starts_with("pairs");
-    if (faults.touches(fault.key) || (about_a_pair && faults.touches("cameras"))) continue;
+    if (errors.touches(fault.key) || (about_a_pair && errors.touches("cameras"))) continue;
     found.push_back(fault);
   }
-  for (const RigFault& fault : found) faults.add(fault.key, fault.what);
+  for (const RigFault& fault : found) errors.add(fault.key, fault.what);
 }
 
 // --- writing ---
@@ -216,19 +207,13 @@ std::string list(const Eigen::Ref<const Eigen::VectorXd>& numbers) {
   return fmt::format("[{}]", fmt::join(numbers.data(), numbers.data() + numbers.size(), ", "));
 }
 
-std::string quoted(const std::string& text) {
-  YAML::Emitter emitter;
-  emitter << YAML::DoubleQuoted << text;
-  return emitter.c_str();
-}
-
 std::string pose_lines(const Pose& pose) {
   return fmt::format("    translation_m: {}\n    quaternion_xyzw: {}\n", list(pose.translation()),
                      list(pose.rotation().coeffs()));
 }
 
 std::string camera_lines(const Camera& camera) {
-  std::string text = fmt::format("  {}:\n    size_px: [{}, {}]\n    model: {}\n", quoted(camera.name),
+  std::string text = fmt::format("  {}:\n    size_px: [{}, {}]\n    model: {}\n", yaml_quoted(camera.name),
                                  camera.size.width, camera.size.height, name_of(camera.model));
   const auto kinds = parameter_kinds(camera.model);
   const ModelParameters numbers = parameters(camera.model);
@@ -244,25 +229,26 @@ std::string camera_lines(const Camera& camera) {
   if (camera.vignetting.centre_px) {
     text += fmt::format("    vignetting_centre_px: {}\n", list(*camera.vignetting.centre_px));
   }
-  if (!camera.self_mask.empty()) text += fmt::format("    self_mask: {}\n", quoted(camera.self_mask));
-  return text + fmt::format("    mount: {}\n    axes: optical\n{}", quoted(camera.mount),
+  if (!camera.self_mask.empty()) text += fmt::format("    self_mask: {}\n", yaml_quoted(camera.self_mask));
+  return text + fmt::format("    mount: {}\n    axes: optical\n{}", yaml_quoted(camera.mount),
                             pose_lines(camera.mount_from_camera));
 }
 
 std::string pair_lines(const StereoPair& pair) {
-  return fmt::format("  {}:\n    left: {}\n    right: {}\n    nearest_m: {}\n    for_odometry: {}\n", quoted(pair.name),
-                     quoted(pair.left), quoted(pair.right), pair.nearest_m, pair.for_odometry);
+  return fmt::format("  {}:\n    left: {}\n    right: {}\n    nearest_m: {}\n    for_odometry: {}\n",
+                     yaml_quoted(pair.name), yaml_quoted(pair.left), yaml_quoted(pair.right), pair.nearest_m,
+                     pair.for_odometry);
 }
 
 }  // namespace
 
 Result<Rig> parse_rig_yaml(const std::string& text, const std::string& name) {
-  const auto loaded = rig_detail::load_yaml(text, name);
+  const auto loaded = parse_yaml(text, name);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(name);
-  Rig rig = read_root(YamlMap(*loaded, "", faults), std::filesystem::path(name).stem().string());
-  add_faults_of_meaning(rig, faults);
-  if (const Status status = faults.status(); !status) return failure(status);
+  YamlErrors errors(name);
+  Rig rig = read_root(YamlMap(*loaded, "", errors), std::filesystem::path(name).stem().string());
+  add_rig_faults(rig, errors);
+  if (const Status status = errors.status(); !status) return failure(status);
   return rig;
 }
 
@@ -273,12 +259,12 @@ Result<Rig> read_rig_yaml(const std::string& path) {
 }
 
 std::string to_rig_yaml(const Rig& rig) {
-  std::string text = fmt::format("schema: {}\nname: {}\npose_convention: {}\n", kSchema, quoted(rig.name),
+  std::string text = fmt::format("schema: {}\nname: {}\npose_convention: {}\n", kSchema, yaml_quoted(rig.name),
                                  rig.convention == PoseConvention::left_optical ? "left_optical" : "body");
   if (!rig.pan_tilt_units.empty()) text += "pan_tilt_units:\n";
   for (const PanTiltUnit& unit : rig.pan_tilt_units) {
-    text += fmt::format("  {}:\n{}    rest_angles_rad: [{}, {}]\n", quoted(unit.name), pose_lines(unit.body_from_base),
-                        unit.rest_pan_rad, unit.rest_tilt_rad);
+    text += fmt::format("  {}:\n{}    rest_angles_rad: [{}, {}]\n", yaml_quoted(unit.name),
+                        pose_lines(unit.body_from_base), unit.rest_pan_rad, unit.rest_tilt_rad);
   }
   text += "cameras:\n";
   for (const Camera& camera : rig.cameras) text += camera_lines(camera);

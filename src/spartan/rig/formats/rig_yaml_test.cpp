@@ -1,3 +1,5 @@
+#include "spartan/rig/formats/rig_yaml.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -5,7 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
@@ -32,8 +33,8 @@ pairs:
   p: {left: l, right: r}
 )";
 
-// What is said about the good file after a change.
-std::string complaint(const std::string& what, const std::string& with) {
+// The error message for the valid file after a replacement.
+std::string error_for(const std::string& what, const std::string& with) {
   return testing::complaint(parse_rig_yaml(replaced(kGood, what, with), "my.yaml"));
 }
 
@@ -44,11 +45,11 @@ TEST(RigYaml, ReadsVignetting) {
   ASSERT_TRUE(rig) << rig.error().message();
   EXPECT_EQ(rig->cameras[0].vignetting, (Vignetting{{-0.3, 0.05}, Eigen::Vector2d(30, 20.5)}));
   EXPECT_EQ(rig->cameras[1].vignetting, Vignetting());
-  EXPECT_THAT(complaint("axes: optical, ", "vignetting: [], axes: optical, "), HasSubstr("cameras.l.vignetting"));
-  EXPECT_THAT(complaint("axes: optical, ", "vignetting: [.nan], axes: optical, "), HasSubstr("cameras.l.vignetting"));
+  EXPECT_THAT(error_for("axes: optical, ", "vignetting: [], axes: optical, "), HasSubstr("cameras.l.vignetting"));
+  EXPECT_THAT(error_for("axes: optical, ", "vignetting: [.nan], axes: optical, "), HasSubstr("cameras.l.vignetting"));
 }
 
-TEST(RigYaml, ReadsTheShortestFile) {
+TEST(RigYaml, ReadsAMinimalFile) {
   const auto rig = parse_rig_yaml(kGood, "some/my.yaml");
   ASSERT_TRUE(rig) << rig.error().message();
   EXPECT_EQ(rig->name, "my");
@@ -62,7 +63,7 @@ TEST(RigYaml, ReadsTheShortestFile) {
   EXPECT_EQ(rig->pairs[0].nearest_m, 0);
 }
 
-TEST(RigYaml, ReadsTheExampleOfTheDocument) {
+TEST(RigYaml, ReadsTheExampleInTheDocumentation) {
   const std::string text = testing::doc_example("rig.yaml");
   ASSERT_FALSE(text.empty());
   const auto rig = parse_rig_yaml(text, "docs/formats.md");
@@ -81,15 +82,15 @@ TEST(RigYaml, ReadsTheExampleOfTheDocument) {
   EXPECT_EQ(rig->pairs[1].nearest_m, 0.3);
 }
 
-// Every key that the reader knows is explained, and the other way round.
-TEST(RigYaml, TheDocumentNamesEveryKey) {
+// Every key of the reader is documented, and every documented key is read.
+TEST(RigYaml, TheDocumentationNamesEveryKey) {
   std::ifstream file(testing::source_folder() + "/docs/formats.md");
   const std::string page((std::istreambuf_iterator<char>(file)), {});
   const std::string section = page.substr(std::min(page.size(), page.find("| `schema` | 1 |")));
-  const std::string complaint_text =
-      complaint("pairs:", "nonsense: 1\npairs:") + complaint("    model", "    nonsense: 1\n    model") +
-      complaint("{left", "{nonsense: 1, left") +
-      complaint("cameras:", "pan_tilt_units: {m: {translation_m: [0, 0, 0], nonsense: 1}}\ncameras:");
+  const std::string messages =
+      error_for("pairs:", "nonsense: 1\npairs:") + error_for("    model", "    nonsense: 1\n    model") +
+      error_for("{left", "{nonsense: 1, left") +
+      error_for("cameras:", "pan_tilt_units: {m: {translation_m: [0, 0, 0], nonsense: 1}}\ncameras:");
   for (const char* key : {"schema",
                           "name",
                           "pose_convention",
@@ -117,54 +118,56 @@ TEST(RigYaml, TheDocumentNamesEveryKey) {
                           "right",
                           "nearest_m",
                           "for_odometry"}) {
-    EXPECT_THAT(complaint_text, HasSubstr(key));
+    EXPECT_THAT(messages, HasSubstr(key));
     EXPECT_NE(section.find(key), std::string::npos) << key;
   }
 }
 
-TEST(RigYaml, RotationsAsPeopleGiveThem) {
-  const auto looks = [](const std::string& angles) {
+TEST(RigYaml, ReadsRollPitchYaw) {
+  const auto viewing_direction = [](const std::string& angles) {
     const auto rig = parse_rig_yaml(replaced(replaced(kGood, "axes: optical\n", "axes: forward\n"), "[0.1, 0, 0]\n",
                                              "[0.1, 0, 0]\n    roll_pitch_yaw_deg: " + angles + "\n"),
                                     "my.yaml");
     return Eigen::Vector3d(rig.value().cameras[1].mount_from_camera.rotation() * Eigen::Vector3d::UnitZ());
   };
-  EXPECT_LE((looks("[0, 0, 0]") - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
-  EXPECT_LE((looks("[0, 90, 0]") - Eigen::Vector3d(0, 0, -1)).norm(), 1e-12) << "a positive pitch looks down";
-  EXPECT_LE((looks("[0, 0, 90]") - Eigen::Vector3d(0, 1, 0)).norm(), 1e-12) << "a positive yaw looks to the left";
-  EXPECT_LE((looks("[77, 0, 0]") - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LE((viewing_direction("[0, 0, 0]") - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LE((viewing_direction("[0, 90, 0]") - Eigen::Vector3d(0, 0, -1)).norm(), 1e-12)
+      << "a positive pitch viewing_direction down";
+  EXPECT_LE((viewing_direction("[0, 0, 90]") - Eigen::Vector3d(0, 1, 0)).norm(), 1e-12)
+      << "a positive yaw viewing_direction to the left";
+  EXPECT_LE((viewing_direction("[77, 0, 0]") - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
 }
 
-TEST(RigYaml, FaultsNameFileLineAndKey) {
-  EXPECT_EQ(complaint("schema: 1", "schema: 2"), "my.yaml:1: schema: is 2; this version reads schema 1");
-  EXPECT_THAT(complaint("    model: pinhole", "    model: fisheye"), HasSubstr("my.yaml:6: cameras.r.model: "));
-  EXPECT_THAT(complaint("    model: pinhole", "    modell: pinhole"),
-              HasSubstr("my.yaml:6: cameras.r.modell: unknown key; known here: "));
-  EXPECT_THAT(complaint("    focal_px: [50, 50]", "    focal_px: [50]"),
+TEST(RigYaml, ErrorsNameFileLineAndKey) {
+  EXPECT_EQ(error_for("schema: 1", "schema: 2"), "my.yaml:1: schema: is 2; this version reads schema 1");
+  EXPECT_THAT(error_for("    model: pinhole", "    model: fisheye"), HasSubstr("my.yaml:6: cameras.r.model: "));
+  EXPECT_THAT(error_for("    model: pinhole", "    modell: pinhole"),
+              HasSubstr("my.yaml:6: cameras.r.modell: unknown key; known keys: "));
+  EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50]"),
               HasSubstr("my.yaml:7: cameras.r.focal_px: has 1 entries, must be a list of 2 numbers"));
-  EXPECT_THAT(complaint("    focal_px: [50, 50]", "    focal_px: [50, .nan]"),
+  EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50, .nan]"),
               HasSubstr("my.yaml:7: cameras.r.focal_px: is .nan, must be a finite number"));
-  EXPECT_THAT(complaint("    focal_px: [50, 50]", "    focal_px: [50, inf]"), HasSubstr("must be a finite number"));
-  EXPECT_THAT(complaint("    focal_px: [50, 50]", "    focal_px: [50, 0x]"), HasSubstr("'0x' is not a number"));
-  EXPECT_THAT(complaint("    focal_px: [50, 50]", "    focal_px: [50, -3]"), HasSubstr("must be above zero"));
-  EXPECT_THAT(complaint("    size_px: [64, 48]", "    size_px: [64, 48.5]"),
+  EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50, inf]"), HasSubstr("must be a finite number"));
+  EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50, 0x]"), HasSubstr("'0x' is not a number"));
+  EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50, -3]"), HasSubstr("must be above zero"));
+  EXPECT_THAT(error_for("    size_px: [64, 48]", "    size_px: [64, 48.5]"),
               HasSubstr("my.yaml:5: cameras.r.size_px: "));
-  EXPECT_THAT(complaint("    axes: optical\n", ""), HasSubstr("cameras.r.axes"));
-  EXPECT_THAT(complaint("[0.1, 0, 0]\n", "[0.1, 0, 0]\n    quaternion_xyzw: [1, 1, 0, 0]\n"),
+  EXPECT_THAT(error_for("    axes: optical\n", ""), HasSubstr("cameras.r.axes"));
+  EXPECT_THAT(error_for("[0.1, 0, 0]\n", "[0.1, 0, 0]\n    quaternion_xyzw: [1, 1, 0, 0]\n"),
               HasSubstr("has length 1.41421"));
   EXPECT_THAT(
-      complaint("[0.1, 0, 0]\n", "[0.1, 0, 0]\n    quaternion_xyzw: [0, 0, 0, 1]\n    roll_pitch_yaw_deg: [0, 0, 0]\n"),
+      error_for("[0.1, 0, 0]\n", "[0.1, 0, 0]\n    quaternion_xyzw: [0, 0, 0, 1]\n    roll_pitch_yaw_deg: [0, 0, 0]\n"),
       HasSubstr("the rotation is given twice"));
-  EXPECT_THAT(complaint("right: r", "right: x"), HasSubstr("my.yaml:12: pairs.p.right: there is no camera 'x'"));
-  EXPECT_THAT(complaint("pairs:\n  p: {left: l, right: r}\n", "pairs: {}\n"),
+  EXPECT_THAT(error_for("right: r", "right: x"), HasSubstr("my.yaml:12: pairs.p.right: there is no camera 'x'"));
+  EXPECT_THAT(error_for("pairs:\n  p: {left: l, right: r}\n", "pairs: {}\n"),
               HasSubstr("pairs: there is no stereo pair"));
-  EXPECT_THAT(complaint("  r:\n", "  l:\n"), HasSubstr("given a second time"));
-  EXPECT_THAT(complaint("{left: l", "[left: l"), HasSubstr("not valid YAML"));
+  EXPECT_THAT(error_for("  r:\n", "  l:\n"), HasSubstr("my.yaml:3: cameras.l: is given twice, again in line 4"));
+  EXPECT_THAT(error_for("{left: l", "[left: l"), HasSubstr("not valid YAML"));
   EXPECT_FALSE(parse_rig_yaml("", "my.yaml"));
   EXPECT_FALSE(parse_rig_yaml("just words", "my.yaml"));
 }
 
-TEST(RigYaml, AllFaultsOfAFileAtOnce) {
+TEST(RigYaml, AllErrorsAreReportedAtOnce) {
   std::string text = replaced(kGood, "    focal_px: [50, 50]", "    focal_px: [50]");
   text = replaced(text, "right: r}", "right: r, colour: red}");
   text = replaced(text, "schema: 1", "schema: one");
@@ -175,7 +178,7 @@ TEST(RigYaml, AllFaultsOfAFileAtOnce) {
   }
 }
 
-TEST(RigYaml, TextIsUtf8) {
+TEST(RigYaml, TextMustBeUtf8) {
   const auto with_name = [](const std::string& name) {
     return parse_rig_yaml(kGood + "name: " + name + "\n", "my.yaml");
   };
@@ -188,14 +191,14 @@ TEST(RigYaml, TextIsUtf8) {
   }
 }
 
-TEST(RigYaml, AMissingFileIsNamed) {
+TEST(RigYaml, AMissingFileIsReported) {
   const auto rig = read_rig_yaml("/nonexistent/rig.yaml");
   ASSERT_FALSE(rig);
   EXPECT_EQ(rig.error().code, ErrorCode::configuration);
   EXPECT_THAT(rig.error().message(), HasSubstr("/nonexistent/rig.yaml"));
 }
 
-// --- any rig there and back ---
+// --- round trips of random rigs ---
 
 double any_number() {
   return *rc::gen::map(rc::gen::inRange(-2000000000, 2000000000), [](int v) { return v / 3.7e7; });
@@ -248,7 +251,7 @@ Rig any_rig() {
   return rig;
 }
 
-RC_GTEST_PROP(RigYaml, WritingAndReadingLosesNothing, ()) {
+RC_GTEST_PROP(RigYaml, RoundTrips, ()) {
   const Rig rig = any_rig();
   RC_PRE(rig.find_faults().empty());
   const auto read = parse_rig_yaml(to_rig_yaml(rig), "rig.yaml");
@@ -256,8 +259,8 @@ RC_GTEST_PROP(RigYaml, WritingAndReadingLosesNothing, ()) {
   RC_ASSERT(*read == rig);
 }
 
-// A file that broke off, or in which a byte turned over, is read or refused, and nothing else.
-RC_GTEST_PROP(RigYaml, DamagedFilesAreNoDanger, ()) {
+// A truncated file, or one with a changed byte, is either read or rejected.
+RC_GTEST_PROP(RigYaml, SurvivesDamagedFiles, ()) {
   std::string text = testing::doc_example("rig.yaml");
   if (*rc::gen::arbitrary<bool>()) {
     text.resize(*rc::gen::inRange<std::size_t>(0, text.size()));

@@ -1,5 +1,5 @@
-// camera_info of ROS: as camera_calibration_parsers writes it, or a message as `rostopic echo` prints it
-// (sensor_msgs/CameraInfo; REP 104). Both eyes are rectified by R; in P of the right one Tx = −fx' b.
+// Reader and writer of ROS camera_info files: as written by camera_calibration_parsers, or messages as printed by
+// `rostopic echo` (sensor_msgs/CameraInfo; REP 104). R rectifies each camera; in P of the right one Tx = −fx' b.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -16,19 +16,16 @@
 namespace spartan {
 namespace {
 
-using rig_detail::YamlFaults;
-using rig_detail::YamlMap;
-
-// One file: the camera, its turn into the rectified frame, its place there, and what the rectified picture is.
-struct Eye {
+// One file: the camera, its rotation into the rectified frame, its position there, and the rectified pinhole.
+struct CameraInfo {
   Camera camera;
   Eigen::Quaterniond rectified_from_camera = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   PinholeModel rectified;
 };
 
-// The key under which this file has a thing: that of a calibration file, or of a message (of ROS 1, of ROS 2).
-std::string key_of(const YamlMap& root, const std::string& in_file, const std::string& in_message) {
+// The key of an entry: that of a calibration file, or that of a message (upper case in ROS 1, lower case in ROS 2).
+std::string key_of(YamlMap& root, const std::string& in_file, const std::string& in_message) {
   if (root.has(in_file)) return in_file;
   std::string small = in_message;
   std::transform(small.begin(), small.end(), small.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? c + 32 : c; });
@@ -38,11 +35,11 @@ std::string key_of(const YamlMap& root, const std::string& in_file, const std::s
   return in_file;
 }
 
-// {rows, cols, data: […]} or the plain list.
+// {rows, cols, data: […]} or a plain list.
 std::optional<std::vector<double>> numbers(YamlMap& root, const std::string& key, const std::vector<int>& counts) {
   const auto node = root.node(key);
   if (!node) return std::nullopt;
-  if (node->IsMap()) return YamlMap(*node, root.path(key), root.faults()).numbers("data", counts);
+  if (node->is_map()) return YamlMap(*node, root.path(key), root.errors()).numbers("data", counts);
   return root.numbers(key, counts);
 }
 
@@ -50,7 +47,7 @@ ImageSize read_size(YamlMap& root) {
   ImageSize size;
   const auto side = [&](const std::string& key) {
     const int pixels = root.integer(key).value_or(1);
-    if (pixels < 1) root.fault(key, fmt::format("is {}, must be above zero", pixels));
+    if (pixels < 1) root.add_error(key, fmt::format("is {}, must be above zero", pixels));
     return pixels;
   };
   size.width = side(key_of(root, "image_width", "width"));
@@ -64,9 +61,9 @@ CameraModel read_model(YamlMap& root) {
   if (const auto k = numbers(root, k_key, {9})) {
     pinhole = rig_detail::read_camera_matrix(root, k_key, *k).value_or(PinholeModel{});
   }
-  // Messages of cameras without a distortion leave its name empty.
+  // In messages of cameras without distortion the name is empty.
   const auto named = root.optional_node("distortion_model");
-  const bool unnamed = named && named->IsScalar() && named->Scalar().empty();
+  const bool unnamed = named && named->is_scalar() && named->scalar().empty();
   const auto kind = unnamed ? std::optional<std::string>("none")
                             : root.choice("distortion_model", {"plumb_bob", "rational_polynomial", "equidistant",
                                                                "fisheye", "radtan", "none"});
@@ -74,7 +71,7 @@ CameraModel read_model(YamlMap& root) {
   if (*kind == "none") {
     const auto d = root.has(d_key) ? numbers(root, d_key, {0, 4, 5, 8, 12, 14}) : std::nullopt;
     if (d && std::any_of(d->begin(), d->end(), [](double v) { return v != 0; })) {
-      root.fault(d_key, "are not zero, but distortion_model knows none");
+      root.add_error(d_key, "are not zero, but distortion_model has no coefficients");
     }
     return pinhole;
   }
@@ -88,69 +85,71 @@ CameraModel read_model(YamlMap& root) {
   return RadialTangentialModel(pinhole, coefficients);
 }
 
-// A part of the sensor, or pixels taken together, have other numbers than those that the file states.
-void refuse_parts(YamlMap& root, ImageSize size) {
+// With a region of interest or binning, the calibration in the file does not apply to the images.
+void reject_roi_and_binning(YamlMap& root, ImageSize size) {
   for (const char* key : {"binning_x", "binning_y"}) {
-    if (root.has(key) && root.integer(key).value_or(0) > 1) root.fault(key, "binned pictures are not supported");
+    if (root.has(key) && root.integer(key).value_or(0) > 1) root.add_error(key, "binned images are not supported");
   }
   const auto node = root.optional_node("roi");
   if (!node) return;
-  YamlMap roi(*node, root.path("roi"), root.faults());
-  if (!node->IsMap()) return;
+  YamlMap roi(*node, root.path("roi"), root.errors());
+  if (!node->is_map()) return;
   const auto number = [&](const char* key) { return roi.has(key) ? roi.integer(key).value_or(0) : 0; };
   const int x = number("x_offset"), y = number("y_offset"), width = number("width"), height = number("height");
-  // Zeros stand for the whole picture.
+  // Zeros mean the whole image.
   const bool whole = x == 0 && y == 0 && (width == 0 || width == size.width) && (height == 0 || height == size.height);
-  if (!whole) root.fault("roi", "is a part of the picture, which is not supported");
+  if (!whole) root.add_error("roi", "is a part of the image, which is not supported");
 }
 
-void read_rectification(YamlMap& root, Eye& eye) {
+void read_rectification(YamlMap& root, CameraInfo& info) {
   const std::string r_key = key_of(root, "rectification_matrix", "R"), p_key = key_of(root, "projection_matrix", "P");
   if (const auto r = numbers(root, r_key, {9})) {
     const Eigen::Matrix3d matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
     if (is_rotation(matrix, 1e-4)) {
-      eye.rectified_from_camera = Eigen::Quaterniond(nearest_rotation(matrix));
+      info.rectified_from_camera = Eigen::Quaterniond(nearest_rotation(matrix));
     } else {
-      root.fault(r_key, "is not a rotation matrix");
+      root.add_error(r_key, "is not a rotation matrix");
     }
   }
   if (const auto p = numbers(root, p_key, {12})) {
-    if (!((*p)[0] > 0 && (*p)[5] > 0)) return root.fault(p_key, "the focal lengths must be above zero");
-    if ((*p)[11] != 0) return root.fault(p_key, "its last number must be 0: eyes side by side, or one above the other");
-    eye.place_m = {-(*p)[3] / (*p)[0], -(*p)[7] / (*p)[5], 0};
-    eye.rectified = {(*p)[0], (*p)[5], (*p)[2], (*p)[6]};
+    if (!((*p)[0] > 0 && (*p)[5] > 0)) return root.add_error(p_key, "the focal lengths must be above zero");
+    if ((*p)[11] != 0)
+      return root.add_error(p_key,
+                            "its last number must be 0: the cameras must be side by side or one above the other");
+    info.position_m = {-(*p)[3] / (*p)[0], -(*p)[7] / (*p)[5], 0};
+    info.rectified = {(*p)[0], (*p)[5], (*p)[2], (*p)[6]};
   }
 }
 
-Result<Eye> read_eye(const std::string& path, const std::string& name) {
+Result<CameraInfo> read_camera_info(const std::string& path, const std::string& name) {
   const auto loaded = rig_detail::load_yaml_file(path);
   if (!loaded) return failure(loaded);
-  YamlFaults faults(path);
-  YamlMap root(*loaded, "", faults);
-  Eye eye;
-  eye.camera.name = name;
-  eye.camera.size = read_size(root);
-  eye.camera.model = read_model(root);
-  read_rectification(root, eye);
-  refuse_parts(root, eye.camera.size);
-  if (const Status status = faults.status(); !status) return failure(status);
-  return eye;
+  YamlErrors errors(path);
+  YamlMap root(*loaded, "", errors);
+  CameraInfo info;
+  info.camera.name = name;
+  info.camera.size = read_size(root);
+  info.camera.model = read_model(root);
+  read_rectification(root, info);
+  reject_roi_and_binning(root, info.camera.size);
+  if (const Status status = errors.status(); !status) return failure(status);
+  return info;
 }
 
-// The rectified view that goes with a pair, where Spartan chooses it. Rows lie along the baseline, the line of sight
-// between those of the eyes; the pictures look like the mean of both.
+// The rectification that Spartan writes for a pair: rows parallel to the baseline, the optical axis between those of
+// the cameras, and the mean of both intrinsics.
 struct RectifiedView {
   PinholeModel pinhole;
   Eigen::Matrix3d from_left, from_right;
-  double baseline_m = 0;  // below zero where the right eye stands to the left
+  double baseline_m = 0;  // negative if the right camera is to the left of the left one
 };
 
 RectifiedView rectified_view(const PinholeModel& left, const PinholeModel& right, const Pose& left_from_right) {
   const Eigen::Vector3d& t = left_from_right.translation();
   const double sign = t.x() < 0 ? -1 : 1;
   const Eigen::Vector3d x = sign * t.normalized();
-  const Eigen::Vector3d ahead = Eigen::Vector3d::UnitZ() + left_from_right.rotation() * Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d y = ahead.cross(x);
+  const Eigen::Vector3d forward = Eigen::Vector3d::UnitZ() + left_from_right.rotation() * Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d y = forward.cross(x);
   if (y.norm() < 1e-3) y = x.unitOrthogonal();
   y.normalize();
   RectifiedView view;
@@ -167,20 +166,21 @@ PinholeModel pinhole_of(const CameraModel& model) {
   return PinholeModel::from_parameters(numbers);
 }
 
-// A rig has no place for a rectified view. It is lost, unless it is the one that would be written again.
-std::vector<RigDifference> lost_view(const Eye& left, const Eye& right, const Pose& left_from_right) {
-  constexpr double kSame = 1e-9;
+// A Rig does not represent a rectification. It is lost unless it equals the one that rectified_view() computes.
+std::vector<RigDifference> lost_view(const CameraInfo& left, const CameraInfo& right, const Pose& left_from_right) {
+  constexpr double kTolerance = 1e-9;
   const RectifiedView own =
       rectified_view(pinhole_of(left.camera.model), pinhole_of(right.camera.model), left_from_right);
-  const auto same = [&](const Eye& eye, const Eigen::Matrix3d& turn) {
-    const PinholeModel &a = eye.rectified, &b = own.pinhole;
-    const Eigen::Vector4d apart(a.fx - b.fx, a.fy - b.fy, a.cx - b.cx, a.cy - b.cy);
-    return apart.norm() <= kSame * b.fx && (eye.rectified_from_camera.toRotationMatrix() - turn).norm() <= kSame;
+  const auto same = [&](const CameraInfo& info, const Eigen::Matrix3d& rectification) {
+    const PinholeModel &a = info.rectified, &b = own.pinhole;
+    const Eigen::Vector4d difference(a.fx - b.fx, a.fy - b.fy, a.cx - b.cx, a.cy - b.cy);
+    return difference.norm() <= kTolerance * b.fx &&
+           (info.rectified_from_camera.toRotationMatrix() - rectification).norm() <= kTolerance;
   };
-  if (same(left, own.from_left) && same(right, own.from_right) && left.place_m.norm() <= kSame) return {};
+  if (same(left, own.from_left) && same(right, own.from_right) && left.position_m.norm() <= kTolerance) return {};
   return {{"projection_matrix",
-           fmt::format("the rectified view of the files, R and P (fx {:.6g}, cx {:.6g}; right {:.6g}, {:.6g}), is not "
-                       "kept, only how the eyes stand",
+           fmt::format("the rectification of the files, R and P (fx {:.6g}, cx {:.6g}; right {:.6g}, {:.6g}), is not "
+                       "kept, only the extrinsics",
                        left.rectified.fx, left.rectified.cx, right.rectified.fx, right.rectified.cx)}};
 }
 
@@ -205,25 +205,25 @@ Result<Lens> lens_of(const Camera& camera) {
   if (const auto m = expressed_as<EquidistantModel>(camera.model)) {
     return Lens{m->pinhole(), "equidistant", {m->coefficients().begin(), m->coefficients().end()}};
   }
-  return rig_detail::cannot_hold(camera, fmt::format("ROS has no model like {}", name_of(camera.model)));
+  return rig_detail::cannot_hold(camera,
+                                 fmt::format("camera_info does not support the model {}", name_of(camera.model)));
 }
 
 }  // namespace
 
 Result<ReadRig> read_ros_calib(const std::string& left_path, const std::string& right_path) {
-  auto left = read_eye(left_path, "left");
+  auto left = read_camera_info(left_path, "left");
   if (!left) return failure(std::move(left));
-  auto right = read_eye(right_path, "right");
+  auto right = read_camera_info(right_path, "right");
   if (!right) return failure(std::move(right));
-  // p_rectified = R p_camera − place, the same for both eyes' points.
-  const Eigen::Vector3d apart = right->place_m - left->place_m;
-  if (apart.norm() < 1e-9) {
-    return failure(ErrorCode::configuration, "projection_matrix: Tx is that of the left file: the baseline is zero",
-                   right_path,
-                   "calibrate both eyes together; a calibration of each alone does not know how they stand");
+  // p_rectified = R p_camera − position, for the points of either camera.
+  const Eigen::Vector3d difference = right->position_m - left->position_m;
+  if (difference.norm() < 1e-9) {
+    return failure(ErrorCode::configuration, "projection_matrix: Tx equals that of the left file: the baseline is zero",
+                   right_path, "calibrate both cameras together; separate calibrations do not contain the extrinsics");
   }
   const Eigen::Quaterniond right_from_rectified = right->rectified_from_camera.conjugate();
-  const Pose right_from_left(right_from_rectified * left->rectified_from_camera, right_from_rectified * -apart);
+  const Pose right_from_left(right_from_rectified * left->rectified_from_camera, right_from_rectified * -difference);
   auto rig = rig_detail::validated(rig_of_one_pair("ros", left->camera, right->camera, right_from_left), right_path);
   if (!rig) return failure(std::move(rig));
   return ReadRig{std::move(*rig),
@@ -235,12 +235,12 @@ Result<ReadRig> read_ros_calib(const std::string& left_path, const std::string& 
 }
 
 Result<CalibrationFiles> rig_detail::write_ros_calib(const Rig& rig, const std::string& path) {
-  const auto eyes = only_pair(rig, CalibrationFormat::ros);
-  if (!eyes) return failure(eyes);
-  const auto left = lens_of(*eyes->left), right = lens_of(*eyes->right);
+  const auto cameras = single_pair(rig, CalibrationFormat::ros);
+  if (!cameras) return failure(cameras);
+  const auto left = lens_of(*cameras->left), right = lens_of(*cameras->right);
   if (!left) return failure(left);
   if (!right) return failure(right);
-  const Pose left_from_right = rig.right_from_left(*eyes->pair).inverse();
+  const Pose left_from_right = rig.right_from_left(*cameras->pair).inverse();
   const RectifiedView view = rectified_view(left->pinhole, right->pinhole, left_from_right);
   const PinholeModel& p = view.pinhole;
   const auto text = [&](const Camera& camera, const Lens& lens, const Eigen::Matrix3d& r, double x_m) {
@@ -256,8 +256,8 @@ Result<CalibrationFiles> rig_detail::write_ros_calib(const Rig& rig, const std::
                         fmt::format("{}, 0, {}, {}, 0, {}, {}, 0, 0, 0, 1, 0", p.fx, p.cx, 0 - p.fx * x_m, p.fy, p.cy));
   };
   const PairOfFiles names = names_of_pair(path);
-  return CalibrationFiles{{names.left, text(*eyes->left, *left, view.from_left, 0)},
-                          {names.right, text(*eyes->right, *right, view.from_right, view.baseline_m)}};
+  return CalibrationFiles{{names.left, text(*cameras->left, *left, view.from_left, 0)},
+                          {names.right, text(*cameras->right, *right, view.from_right, view.baseline_m)}};
 }
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// camera_info of ROS: its documented examples, and values by hand.
+// ROS camera_info: its documented examples and manually computed values.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using testing::replaced;
 using testing::right_in_left;
 using testing::TemporaryFolder;
 
-// The structure of camera_calibration_parsers; R turns each eye by the same 0.1 rad about y, P has fx' = 400.
+// A file as written by camera_calibration_parsers; R rotates both cameras by 0.1 rad about y, P has fx' = 400.
 std::string camera_info(const char* name, double tx, const char* model = "plumb_bob",
                         const char* d = "-0.2, 0.1, 0.001, -0.002, 0.02") {
   const double c = std::cos(0.1), s = std::sin(0.1);
@@ -30,7 +30,7 @@ std::string camera_info(const char* name, double tx, const char* model = "plumb_
       name, model, d, c, s, -s, c, tx);
 }
 
-TEST(RosCalib, TheBaselineIsInTheRightProjection) {
+TEST(RosCalib, TheBaselineComesFromTheRightProjection) {
   const TemporaryFolder folder;
   folder.write("right.yaml", camera_info("right", -48));
   const auto read = read_calibration(folder.write("left.yaml", camera_info("left", 0)));
@@ -45,7 +45,7 @@ TEST(RosCalib, TheBaselineIsInTheRightProjection) {
   EXPECT_EQ(read->rig.cameras[1].size, (ImageSize{640, 480}));
 }
 
-TEST(RosCalib, MessagesAreReadToo) {
+TEST(RosCalib, ReadsMessages) {
   const TemporaryFolder folder;
   const auto message = [](bool ros2, double tx) {
     const char* names = ros2 ? "dkrp" : "DKRP";
@@ -67,40 +67,44 @@ TEST(RosCalib, MessagesAreReadToo) {
   EXPECT_THAT(complaint(read_calibration(folder.write("l.yaml", binned))), HasSubstr("l.yaml:10: binning_x"));
 }
 
-// A part of the sensor has another centre and size than the calibration says.
-TEST(RosCalib, APartOfTheSensorIsRefused) {
+// A region of interest changes the principal point and the image size.
+TEST(RosCalib, RejectsARegionOfInterest) {
   const TemporaryFolder folder;
   folder.write("right.yaml", camera_info("right", -48));
-  const auto said = [&](const std::string& roi) {
+  const auto message_for = [&](const std::string& roi) {
     return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0) + roi)));
   };
-  EXPECT_THAT(said("roi: {x_offset: 100, y_offset: 50, width: 300, height: 200}\n"),
-              HasSubstr("left.yaml:21: roi: is a part of the picture"));
-  EXPECT_THAT(said("roi: {x_offset: 0, y_offset: 50, width: 0, height: 0}\n"), HasSubstr("left.yaml:21: roi"));
-  EXPECT_THAT(said("roi: {x_offset: 0, y_offset: 0, width: 640, height: 200}\n"), HasSubstr("left.yaml:21: roi"));
-  EXPECT_THAT(said("roi: {x_offset: nan, y_offset: 0, width: 0, height: 0}\n"), HasSubstr("roi.x_offset: is nan"));
-  EXPECT_THAT(said("roi: none\n"), HasSubstr("roi: must be a group"));
-  EXPECT_EQ(said("roi:\n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: false\n"), "nothing");
-  EXPECT_EQ(said("roi: {x_offset: 0, y_offset: 0, width: 640, height: 480}\n"), "nothing");
+  EXPECT_THAT(message_for("roi: {x_offset: 100, y_offset: 50, width: 300, height: 200}\n"),
+              HasSubstr("left.yaml:21: roi: is a part of the image"));
+  EXPECT_THAT(message_for("roi: {x_offset: 0, y_offset: 50, width: 0, height: 0}\n"), HasSubstr("left.yaml:21: roi"));
+  EXPECT_THAT(message_for("roi: {x_offset: 0, y_offset: 0, width: 640, height: 200}\n"),
+              HasSubstr("left.yaml:21: roi"));
+  EXPECT_THAT(message_for("roi: {x_offset: nan, y_offset: 0, width: 0, height: 0}\n"),
+              HasSubstr("roi.x_offset: is nan"));
+  EXPECT_THAT(message_for("roi: none\n"), HasSubstr("roi: must be a group"));
+  EXPECT_EQ(message_for("roi:\n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: false\n"),
+            "nothing");
+  EXPECT_EQ(message_for("roi: {x_offset: 0, y_offset: 0, width: 640, height: 480}\n"), "nothing");
 }
 
 TEST(RosCalib, NoDistortionHasNoCoefficients) {
   const TemporaryFolder folder;
   folder.write("right.yaml", camera_info("right", -48));
-  const auto said = [&](const char* model, const char* d) {
+  const auto message_for = [&](const char* model, const char* d) {
     return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0, model, d))));
   };
   for (const char* model : {"none", "''"}) {
-    EXPECT_EQ(said(model, "0, 0, 0, 0, 0"), "nothing");
-    EXPECT_EQ(said(model, ""), "nothing");
-    EXPECT_THAT(said(model, "-0.2, 0, 0, 0, 0"),
-                HasSubstr("left.yaml:9: distortion_coefficients: are not zero, but distortion_model knows none"));
+    EXPECT_EQ(message_for(model, "0, 0, 0, 0, 0"), "nothing");
+    EXPECT_EQ(message_for(model, ""), "nothing");
+    EXPECT_THAT(
+        message_for(model, "-0.2, 0, 0, 0, 0"),
+        HasSubstr("left.yaml:9: distortion_coefficients: are not zero, but distortion_model has no coefficients"));
   }
-  EXPECT_THAT(said("fov", "0, 0, 0, 0, 0"), ::testing::EndsWith("equidistant, fisheye, radtan, none"));
+  EXPECT_THAT(message_for("fov", "0, 0, 0, 0, 0"), ::testing::EndsWith("equidistant, fisheye, radtan, none"));
 }
 
-// R and P choose a rectified view; a rig has no place for it.
-TEST(RosCalib, AnotherRectifiedViewIsLeftOut) {
+// R and P define a rectification, which a Rig does not represent.
+TEST(RosCalib, AnotherRectificationIsIgnored) {
   const TemporaryFolder folder;
   const auto left_out = [&](const std::string& left, const std::string& right) {
     folder.write("right.yaml", right);
@@ -111,21 +115,24 @@ TEST(RosCalib, AnotherRectifiedViewIsLeftOut) {
   EXPECT_EQ(read.left_out[0].key, "projection_matrix");
   EXPECT_THAT(read.left_out[0].text, HasSubstr("(fx 400, cx 310; right 400, 310)"));
   const auto own = to_calibration_files(read.rig, CalibrationFormat::ros, "left.yaml,right.yaml").value();
-  EXPECT_TRUE(left_out(own[0].content, own[1].content).left_out.empty()) << "it would be written again";
+  EXPECT_TRUE(left_out(own[0].content, own[1].content).left_out.empty()) << "the same rectification would be written";
 }
 
-TEST(RosCalib, KindsAndFaultsAreNamed) {
+TEST(RosCalib, ReadsModelsAndReportsErrors) {
   const TemporaryFolder folder;
   folder.write("right.yaml", camera_info("right", -48, "equidistant", "0.1, 0.02, 0.003, 0.004"));
-  const auto said = [&](const std::string& text) {
+  const auto message_for = [&](const std::string& text) {
     return complaint(read_calibration(folder.write("left.yaml", text)));
   };
-  EXPECT_EQ(said(camera_info("left", 0, "equidistant", "0.1, 0.02, 0.003, 0.004")), "nothing");
+  EXPECT_EQ(message_for(camera_info("left", 0, "equidistant", "0.1, 0.02, 0.003, 0.004")), "nothing");
   EXPECT_EQ(read_rig(folder.path() + "/left.yaml")->cameras[0].model,
             CameraModel(EquidistantModel({430, 431, 320.5, 240.5}, {0.1, 0.02, 0.003, 0.004})));
-  EXPECT_THAT(said(camera_info("left", 0, "thin_prism")), HasSubstr("left.yaml:8: distortion_model: is 'thin_prism'"));
-  EXPECT_THAT(said(camera_info("left", -48)), HasSubstr("right.yaml: projection_matrix: Tx is that of the left file"));
-  EXPECT_THAT(said(replaced(camera_info("left", 0), "data: [430, 0,", "data: [430, 3,")), HasSubstr("camera_matrix"));
+  EXPECT_THAT(message_for(camera_info("left", 0, "thin_prism")),
+              HasSubstr("left.yaml:8: distortion_model: is 'thin_prism'"));
+  EXPECT_THAT(message_for(camera_info("left", -48)),
+              HasSubstr("right.yaml: projection_matrix: Tx equals that of the left file"));
+  EXPECT_THAT(message_for(replaced(camera_info("left", 0), "data: [430, 0,", "data: [430, 3,")),
+              HasSubstr("camera_matrix"));
 }
 
 }  // namespace

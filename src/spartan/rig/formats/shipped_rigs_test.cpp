@@ -1,4 +1,4 @@
-// The rigs in config/rigs are what they say they are (docs/architecture.md; the published rover's figures).
+// The rigs in config/rigs have the documented properties (docs/architecture.md; published values of the rover).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,8 @@ Rig shipped(const std::string& name) {
   return read_rig_yaml(testing::source_folder() + "/config/rigs/" + name + ".yaml").value();
 }
 
-// How far ahead of the camera's foot the ground is that a place of the middle column sees; the body stands on it.
+// Distance from below the camera to the ground point on the ray of a pixel in the middle column; the ground is z = 0 of
+// the body frame.
 double ground_ahead_m(const Rig& rig, const std::string& camera, double row) {
   const Camera& c = *rig.find_camera(camera);
   const Pose body_from_camera = rig.body_from_camera(camera);
@@ -42,7 +43,7 @@ void expect_pair(const Rig& rig, const std::string& name, double baseline_m, dou
   EXPECT_LE((right_in_left - Eigen::Vector3d(baseline_m, 0, 0)).norm(), 1e-12) << name;
 }
 
-TEST(ShippedRigs, RoverIsThePublishedOne) {
+TEST(ShippedRigs, RoverHasThePublishedValues) {
   for (const char* name : {"rover", "rover_narrow1024"}) {
     SCOPED_TRACE(name);
     const Rig rig = shipped(name);
@@ -59,7 +60,7 @@ TEST(ShippedRigs, RoverIsThePublishedOne) {
   EXPECT_EQ(shipped("rover_narrow1024").find_camera("narrow_left")->size, (ImageSize{1024, 768}));
 }
 
-TEST(ShippedRigs, TheMastTurnsTheWidePair) {
+TEST(ShippedRigs, TheMastRotatesTheWidePair) {
   const Rig rig = shipped("rover");
   const double pan = 35 * std::numbers::pi / 180, tilt = 39 * std::numbers::pi / 180;
   const Eigen::Vector3d look = rig.body_from_camera("wide_left", pan, tilt).rotation() * Eigen::Vector3d::UnitZ();
@@ -69,7 +70,7 @@ TEST(ShippedRigs, TheMastTurnsTheWidePair) {
             rig.body_from_camera("narrow_left").translation());
 }
 
-TEST(ShippedRigs, RealRigsAreThoseOfTheirFiles) {
+TEST(ShippedRigs, RealRigsEqualTheirOriginalFiles) {
   const std::string data = testing::data_folder();
   if (!std::filesystem::exists(data + "/k10_pair"))
     GTEST_SKIP() << "no real recordings; SPARTAN_DATA says where they are";
@@ -82,7 +83,7 @@ TEST(ShippedRigs, RealRigsAreThoseOfTheirFiles) {
   }
 }
 
-TEST(ShippedRigs, EveryShippedRigIsRead) {
+TEST(ShippedRigs, EveryShippedRigIsValid) {
   int read = 0;
   for (const auto& entry : std::filesystem::directory_iterator(testing::source_folder() + "/config/rigs")) {
     const auto rig = read_rig(entry.path().string());

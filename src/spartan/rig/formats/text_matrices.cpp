@@ -4,8 +4,8 @@
 
 #include <sstream>
 
+#include "spartan/core/strict_yaml.h"
 #include "spartan/rig/formats/calibration_text.h"
-#include "spartan/rig/yaml_bridge.h"
 
 namespace spartan::rig_detail {
 namespace {
@@ -39,8 +39,8 @@ TextMatrices TextMatrices::parse(const std::string& text, const std::string& nam
       if (!key.empty()) result.words_.push_back({number, key});
       continue;
     }
-    const auto [place, fresh] = result.lines_.try_emplace(key, Line{number, line.substr(at + 1)});
-    if (!fresh) place->second.twice = true;
+    const auto [entry, inserted] = result.lines_.try_emplace(key, Line{number, line.substr(at + 1)});
+    if (!inserted) entry->second.twice = true;
   }
   return result;
 }
@@ -50,21 +50,21 @@ Result<std::string> TextMatrices::text(const std::string& key) const {
   if (found == lines_.end()) {
     return failure(ErrorCode::configuration, fmt::format("the line '{}{}' is missing", key, separator_), name_);
   }
-  if (found->second.twice) return fault(key, "given more than once");
+  if (found->second.twice) return error_at(key, "is given more than once");
   return trimmed(found->second.text);
 }
 
 Result<std::vector<double>> TextMatrices::numbers(const std::string& key, std::size_t count) const {
-  const auto held = text(key);
-  if (!held) return failure(held);
+  const auto content = text(key);
+  if (!content) return failure(content);
   std::vector<double> values;
-  std::istringstream words(*held);
+  std::istringstream words(*content);
   for (std::string word; words >> word && !word.starts_with('#');) {
-    const auto value = parse_number(word);
-    if (!value) return fault(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
+    const auto value = parse_finite_number(word);
+    if (!value) return error_at(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
     values.push_back(*value);
   }
-  if (values.size() != count) return fault(key, fmt::format("has {} numbers, must have {}", values.size(), count));
+  if (values.size() != count) return error_at(key, fmt::format("has {} numbers, must have {}", values.size(), count));
   return values;
 }
 
@@ -79,7 +79,7 @@ std::string TextMatrices::where(const std::string& key) const {
   return found == lines_.end() ? name_ : fmt::format("{}:{}", name_, found->second.number);
 }
 
-tl::unexpected<Error> TextMatrices::fault(const std::string& key, const std::string& what) const {
+tl::unexpected<Error> TextMatrices::error_at(const std::string& key, const std::string& what) const {
   return failure(ErrorCode::configuration, fmt::format("{}: {}", key, what), where(key));
 }
 

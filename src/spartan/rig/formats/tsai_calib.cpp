@@ -1,4 +1,4 @@
-// Pinhole cameras of the Ames Stereo Pipeline, .tsai (its documentation, "Pinhole models").
+// Reader and writer of pinhole cameras of the Ames Stereo Pipeline, .tsai (its documentation, "Pinhole models").
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,20 +14,22 @@
 namespace spartan {
 namespace {
 
-using rig_detail::EyeOfFile;
+using rig_detail::CameraOfFile;
 using rig_detail::TextMatrices;
 
-Result<Eigen::Matrix3d> rotation_or_fault(const TextMatrices& file, const char* key, const Eigen::Matrix3d& matrix) {
-  if (!is_rotation(matrix, 1e-4)) return file.fault(key, "is not a rotation matrix");
+Result<Eigen::Matrix3d> rotation_or_error(const TextMatrices& file, const char* key, const Eigen::Matrix3d& matrix) {
+  constexpr double kTolerance = 1e-4;  // for matrices rounded to a few digits
+  if (!is_rotation(matrix, kTolerance)) return file.error_at(key, "is not a rotation matrix");
   return nearest_rotation(matrix);
 }
 
-// R turns from the camera into the world of the file. u, v, w are the axes of the picture in the camera, usually 1.
+// R rotates from the camera into the world frame of the file. u, v, w are the image axes in the camera frame, usually
+// the identity.
 Result<Pose> read_pose(const TextMatrices& file) {
   const auto r = file.numbers("R", 9);
   if (!r) return failure(r);
   const auto world_from_camera =
-      rotation_or_fault(file, "R", Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data()));
+      rotation_or_error(file, "R", Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data()));
   if (!world_from_camera) return failure(world_from_camera);
   const auto centre = file.vector("C");
   if (!centre) return failure(centre);
@@ -37,14 +39,14 @@ Result<Pose> read_pose(const TextMatrices& file) {
     if (!axis) return failure(axis);
     rows.row(row) = axis->transpose();
   }
-  const auto picture_from_camera = rotation_or_fault(file, "u_direction", rows);
-  if (!picture_from_camera) {
-    return file.fault("u_direction", "with v_direction and w_direction is not a rotation matrix");
+  const auto image_from_camera = rotation_or_error(file, "u_direction", rows);
+  if (!image_from_camera) {
+    return file.error_at("u_direction", "with v_direction and w_direction is not a rotation matrix");
   }
-  return Pose(*world_from_camera * picture_from_camera->transpose(), *centre);
+  return Pose(*world_from_camera * image_from_camera->transpose(), *centre);
 }
 
-// The line that names the distortion; old files have none and mean TSAI.
+// The line with the name of the distortion; in old files it is missing and means TSAI.
 Result<std::string> distortion_name(const TextMatrices& file) {
   std::string name;
   for (const TextMatrices::Word& word : file.words()) {
@@ -52,9 +54,10 @@ Result<std::string> distortion_name(const TextMatrices& file) {
     std::string lower = word.text;
     std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? c + 32 : c; });
     if (lower != "tsai" && lower != "null") {
-      return failure(ErrorCode::configuration,
-                     fmt::format("'{}' is not supported, only PINHOLE with TSAI or NULL", word.text.substr(0, 40)),
-                     fmt::format("{}:{}", file.name(), word.line));
+      return failure(
+          ErrorCode::configuration,
+          fmt::format("'{}' is not supported; supported: PINHOLE with TSAI or NULL", word.text.substr(0, 40)),
+          fmt::format("{}:{}", file.name(), word.line));
     }
     name = lower;
   }
@@ -64,18 +67,18 @@ Result<std::string> distortion_name(const TextMatrices& file) {
 Result<CameraModel> read_model(const TextMatrices& file) {
   double pitch = 1;
   if (file.has("pitch")) {
-    const auto held = file.numbers("pitch", 1);
-    if (!held) return failure(held);
-    pitch = held->front();
-    if (!(pitch > 0)) return file.fault("pitch", fmt::format("is {}, must be above zero", pitch));
+    const auto values = file.numbers("pitch", 1);
+    if (!values) return failure(values);
+    pitch = values->front();
+    if (!(pitch > 0)) return file.error_at("pitch", fmt::format("is {}, must be above zero", pitch));
   }
   std::array<double, 4> core{};
   const std::array<const char*, 4> keys{"fu", "fv", "cu", "cv"};
   for (std::size_t i = 0; i < core.size(); ++i) {
-    const auto held = file.numbers(keys[i], 1);
-    if (!held) return failure(held);
-    if (i < 2 && !(held->front() > 0)) return file.fault(keys[i], "the focal length must be above zero");
-    core[i] = held->front() / pitch;
+    const auto values = file.numbers(keys[i], 1);
+    if (!values) return failure(values);
+    if (i < 2 && !(values->front() > 0)) return file.error_at(keys[i], "the focal length must be above zero");
+    core[i] = values->front() / pitch;
   }
   const PinholeModel pinhole{core[0], core[1], core[2], core[3]};
   const auto name = distortion_name(file);
@@ -85,14 +88,14 @@ Result<CameraModel> read_model(const TextMatrices& file) {
   const std::array<const char*, 5> names{"k1", "k2", "p1", "p2", "k3"};
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (i == 4 && !file.has(names[i])) break;
-    const auto held = file.numbers(names[i], 1);
-    if (!held) return failure(held);
-    k[i] = held->front();
+    const auto values = file.numbers(names[i], 1);
+    if (!values) return failure(values);
+    k[i] = values->front();
   }
   return RadialTangentialModel(pinhole, k);
 }
 
-Result<EyeOfFile> read_eye(const std::string& path, const std::string& name, ImageSize size) {
+Result<CameraOfFile> read_camera(const std::string& path, const std::string& name, ImageSize size) {
   const auto file = TextMatrices::read(path, '=');
   if (!file) return failure(file);
   auto model = read_model(*file);
@@ -105,17 +108,18 @@ Result<EyeOfFile> read_eye(const std::string& path, const std::string& name, Ima
   camera.size = size;
   camera.model = std::move(*model);
   camera.mount_from_camera = *pose;
-  return EyeOfFile{std::move(camera)};
+  return CameraOfFile{std::move(camera)};
 }
 
 Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
   const auto model = expressed_as<RadialTangentialModel>(camera.model);
   if (!model) {
-    return rig_detail::cannot_hold(camera, fmt::format(".tsai has no model like {}", name_of(camera.model)));
+    return rig_detail::cannot_hold(camera,
+                                   fmt::format(".tsai files do not support the model {}", name_of(camera.model)));
   }
   const auto& k = model->coefficients();
   if (is_rational(*model)) {
-    return rig_detail::cannot_hold(camera, ".tsai has no coefficients k4, k5, k6");
+    return rig_detail::cannot_hold(camera, ".tsai files do not support the coefficients k4, k5, k6");
   }
   const PinholeModel& p = model->pinhole();
   std::string text = fmt::format(
@@ -133,7 +137,7 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
 Result<ReadRig> read_tsai_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
   return rig_detail::read_two_files(
       CalibrationFormat::tsai, left_path, right_path,
-      [&](const std::string& path, const std::string& eye) { return read_eye(path, eye, size); });
+      [&](const std::string& path, const std::string& name) { return read_camera(path, name, size); });
 }
 
 Result<CalibrationFiles> rig_detail::write_tsai_calib(const Rig& rig, const std::string& path) {

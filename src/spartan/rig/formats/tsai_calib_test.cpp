@@ -1,4 +1,4 @@
-// The Ames Stereo Pipeline: a file that it ships, and values by hand.
+// Ames Stereo Pipeline: a file from its distribution and manually computed values.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 using testing::replaced;
 using testing::TemporaryFolder;
 
-// The left camera of the K10 rover as the Ames Stereo Pipeline ships it (Apache-2.0), and one 10 cm to its right.
+// The left camera of the K10 rover from the distribution of the Ames Stereo Pipeline (Apache-2.0).
 const std::string kTsai =
     "fu = 620.857971191406\nfv = 622.298034667969\ncu = 526.128784179688\ncv = 374.273742675781\n"
     "u_direction = 1 0 0\nv_direction = 0 1 0\nw_direction = 0 0 1\nC = 0.0751 -0.065 -0.902\n"
@@ -26,13 +26,14 @@ const std::string kTsai =
 class TsaiCalib : public ::testing::Test {
  protected:
   Result<ReadRig> read(const std::string& left, ImageSize size = {1024, 768}) {
+    // The right camera is 10 cm to the right of the left one.
     folder_.write("k_right.tsai", replaced(kTsai, "-0.065", "0.035"));
     return read_calibration(folder_.write("k_left.tsai", left), size);
   }
   TemporaryFolder folder_;
 };
 
-TEST_F(TsaiCalib, AForwardRightDownFrameIsTurned) {
+TEST_F(TsaiCalib, AForwardRightDownFrameIsConverted) {
   const auto k10 = read(kTsai);
   ASSERT_TRUE(k10) << k10.error().message();
   EXPECT_EQ(k10->rig.convention, PoseConvention::body);
@@ -46,7 +47,7 @@ TEST_F(TsaiCalib, AForwardRightDownFrameIsTurned) {
   EXPECT_THAT(k10->notes.at(0), HasSubstr("forward-right-down"));
 }
 
-TEST_F(TsaiCalib, DistortionAndPitchAreAsTheProjectHasThem) {
+TEST_F(TsaiCalib, DistortionAndPitchAreThoseOfTheStereoPipeline) {
   const auto model = [&](const std::string& text) { return read(text).value().rig.cameras[0].model; };
   const CameraModel plain = model(kTsai);
   EXPECT_EQ(plain, CameraModel(RadialTangentialModel(
@@ -60,7 +61,7 @@ TEST_F(TsaiCalib, DistortionAndPitchAreAsTheProjectHasThem) {
   EXPECT_EQ(parameters(model(version4))[2][4], 0.5);
   EXPECT_EQ(name_of(model("VERSION_4\nPINHOLE\n" + kTsai.substr(0, kTsai.find("k1")) + "pitch = 1\nNULL\n")),
             "pinhole");
-  // Picture axes that are not those of the camera: u to the camera's y, v to its −x.
+  // Image axes that differ from the camera axes: u along the camera's y, v along its −x.
   const std::string turned = replaced(replaced(kTsai, "u_direction = 1 0 0", "u_direction = 0 1 0"),
                                       "v_direction = 0 1 0", "v_direction = -1 0 0");
   const auto right_from_left = [&](const std::string& text) {
@@ -72,13 +73,13 @@ TEST_F(TsaiCalib, DistortionAndPitchAreAsTheProjectHasThem) {
   EXPECT_LE((lying * Eigen::Vector3d(0, 1, 2) - straight * Eigen::Vector3d(-1, 0, 2)).norm(), 1e-9);
 }
 
-TEST_F(TsaiCalib, CommentsMayStandBehindNumbers) {
+TEST_F(TsaiCalib, CommentsMayFollowNumbers) {
   EXPECT_EQ(complaint(read(replaced(kTsai, "C = 0.0751 -0.065 -0.902", "C = 0.0751 -0.065 -0.902 # centre"))),
             "nothing");
 }
 
-TEST_F(TsaiCalib, FaultsAreNamed) {
-  const auto said = [&](const std::string& what, const std::string& with) {
+TEST_F(TsaiCalib, ErrorsAreSpecific) {
+  const auto message_for = [&](const std::string& what, const std::string& with) {
     return complaint(read(replaced(kTsai, what, with)));
   };
   for (const char* kind : {"AdjustableTSAI", "BrownConrady", "Photometrix", "RPC"}) {
@@ -86,10 +87,12 @@ TEST_F(TsaiCalib, FaultsAreNamed) {
         complaint(read("VERSION_4\nPINHOLE\n" + replaced(kTsai, "k1 =", std::string("pitch = 1\n") + kind + "\nk1 ="))),
         HasSubstr(fmt::format("k_left.tsai:13: '{}' is not supported", kind)));
   }
-  EXPECT_THAT(said("R = 0.0007", "R = 0.7"), HasSubstr("k_left.tsai:9: R: is not a rotation matrix"));
-  EXPECT_THAT(said("u_direction = 1", "u_direction = 2"), HasSubstr("k_left.tsai:5: u_direction: with v_direction"));
-  EXPECT_THAT(said("k2 = 0.1", "k9 = 0.1"), HasSubstr("k_left.tsai: the line 'k2=' is missing"));
-  EXPECT_THAT(said("fu = 620", "fu = -620"), HasSubstr("k_left.tsai:1: fu: the focal length must be above zero"));
+  EXPECT_THAT(message_for("R = 0.0007", "R = 0.7"), HasSubstr("k_left.tsai:9: R: is not a rotation matrix"));
+  EXPECT_THAT(message_for("u_direction = 1", "u_direction = 2"),
+              HasSubstr("k_left.tsai:5: u_direction: with v_direction"));
+  EXPECT_THAT(message_for("k2 = 0.1", "k9 = 0.1"), HasSubstr("k_left.tsai: the line 'k2=' is missing"));
+  EXPECT_THAT(message_for("fu = 620", "fu = -620"),
+              HasSubstr("k_left.tsai:1: fu: the focal length must be above zero"));
   EXPECT_THAT(complaint(read(kTsai, {})), HasSubstr("image size is not known"));
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 bool positive_focal_lengths(YamlMap& map, std::string_view key, double fx, double fy) {
   if (fx > 0 && fy > 0) return true;
-  map.fault(key, "the focal lengths must be above zero");
+  map.add_error(key, "the focal lengths must be above zero");
   return false;
 }
 
@@ -39,13 +39,13 @@ CameraModel read_pinhole(YamlMap& map, const std::string& distortion, std::strin
   return RadialTangentialModel(pinhole, coefficients);
 }
 
-// omni, ds and eucm: parameters of their own, then those of a pinhole; a further distortion is not ours.
+// omni, ds and eucm: their own parameters followed by those of a pinhole; an additional distortion is not supported.
 CameraModel read_sphere(YamlMap& map, const std::string& kind, const std::string& distortion,
                         std::string_view distortion_key) {
   if (distortion != "none" && map.has(distortion_key)) {
     const auto d = map.numbers(distortion_key, {0, 4, 5, 8});
     if (d && !is_zero(*d)) {
-      map.fault(distortion_key, fmt::format("{} with a distortion besides is not supported", kind));
+      map.add_error(distortion_key, fmt::format("{} with an additional distortion is not supported", kind));
     }
   }
   const auto k = map.numbers("intrinsics", {kind == "omni" ? 5 : 6});
@@ -55,27 +55,29 @@ CameraModel read_sphere(YamlMap& map, const std::string& kind, const std::string
   if (!positive_focal_lengths(map, "intrinsics", pinhole.fx, pinhole.fy)) return DoubleSphereModel{};
   if (kind == "omni") return DoubleSphereModel{pinhole, (*k)[0], 0};
   const double alpha = kind == "ds" ? (*k)[1] : (*k)[0];
-  if (!(alpha >= 0 && alpha <= 1)) map.fault("intrinsics", fmt::format("alpha is {}, must be between 0 and 1", alpha));
+  if (!(alpha >= 0 && alpha <= 1))
+    map.add_error("intrinsics", fmt::format("alpha is {}, must be between 0 and 1", alpha));
   if (kind == "ds") return DoubleSphereModel{pinhole, (*k)[0], alpha};
-  if ((*k)[1] != 1) map.fault("intrinsics", fmt::format("eucm with beta = {} is not supported, only with 1", (*k)[1]));
+  if ((*k)[1] != 1)
+    map.add_error("intrinsics", fmt::format("eucm with beta = {} is not supported, only beta = 1", (*k)[1]));
   return DoubleSphereModel{pinhole, 0, alpha};
 }
 
 }  // namespace
 
-Result<YAML::Node> load_yaml_file(const std::string& path) {
+Result<YamlNode> load_yaml_file(const std::string& path) {
   auto text = read_calibration_text(path);
   if (!text) return failure(text);
-  // As a comment it keeps its line.
+  // As a comment it keeps the line numbers.
   if (text->starts_with("%YAML")) text->front() = '#';
-  return load_yaml(*text, path);
+  return parse_yaml(*text, path);
 }
 
 ImageSize read_resolution(YamlMap& map, std::string_view key) {
   const auto size = map.numbers(key, {2});
   if (!size) return {};
   const auto known = whole_size((*size)[0], (*size)[1]);
-  if (!known) map.fault(key, "must be two whole numbers above zero");
+  if (!known) map.add_error(key, "must be two whole numbers above zero");
   return known.value_or(ImageSize{});
 }
 
@@ -109,17 +111,18 @@ Result<std::string> kalibr_model_lines(const Camera& camera, std::string_view di
   if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
     if (std::any_of(k.begin() + 4, k.end(), [](double v) { return v != 0; })) {
-      return cannot_hold(camera, "this format has four coefficients of radial_tangential, this camera needs more");
+      return cannot_hold(camera, "this format supports four coefficients of radial_tangential, this camera has more");
     }
     return lines("pinhole", "", m->pinhole(), "radtan", {k.begin(), k.begin() + 4});
   }
-  return cannot_hold(camera, fmt::format("this format has no model like {}", name_of(camera.model)));
+  return cannot_hold(camera, fmt::format("this format does not support the model {}", name_of(camera.model)));
 }
 
 std::optional<Pose> read_rigid(YamlMap& map, std::string_view key, const std::vector<double>& rows) {
   const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
-  if (!is_rotation(matrix.topLeftCorner<3, 3>(), 1e-4) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
-    map.fault(key, "is not a rigid transform");
+  constexpr double kTolerance = 1e-4;  // for matrices rounded to a few digits
+  if (!is_rotation(matrix.topLeftCorner<3, 3>(), kTolerance) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+    map.add_error(key, "is not a rigid transform");
     return std::nullopt;
   }
   return Pose(nearest_rotation(matrix.topLeftCorner<3, 3>()), matrix.topRightCorner<3, 1>());
@@ -128,7 +131,7 @@ std::optional<Pose> read_rigid(YamlMap& map, std::string_view key, const std::ve
 std::optional<PinholeModel> read_camera_matrix(YamlMap& map, std::string_view key, const std::vector<double>& rows) {
   const auto pinhole = pinhole_of_rows(rows);
   if (!pinhole) {
-    map.fault(key, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
+    map.add_error(key, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
     return std::nullopt;
   }
   if (!positive_focal_lengths(map, key, pinhole->fx, pinhole->fy)) return std::nullopt;

@@ -1,4 +1,4 @@
-// The linear photogrammetric camera of JPL.
+// CAHV: the linear photogrammetric camera model of JPL.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,17 +9,17 @@
 
 namespace spartan {
 
-/// With the vectors C (place), A (axis), H, V:
+/// With the vectors C (projection centre), A (unit image-plane normal), H (horizontal) and V (vertical):
 ///   u = (P − C)·H / (P − C)·A,  v = (P − C)·V / (P − C)·A
 /// Source: Yakimovsky and Cunningham, "A system for extracting three-dimensional measurements from a stereo pair of TV
-/// cameras", CGIP 1978. The camera frame here has its origin in C, z along A, x along the part of H across A, y = z ×
-/// x:
+/// cameras", CGIP 1978. The camera frame here has its origin in C, z along A, x along the component of H perpendicular
+/// to A, and y = z × x:
 ///   A = (0, 0, 1),  H = (fx, 0, cx),  V = (skew, fy, cy)
-/// which is the pinhole of the core with a skew (rows and columns of a real sensor are at right angles; fitted vectors
-/// may not be). Domain: z > 0.
+/// which is the pinhole `core` with a skew (rows and columns of a real sensor are perpendicular; fitted vectors need
+/// not be). Domain: z > 0.
 struct CahvModel {
   PinholeModel core;
-  double skew_px = 0;  ///< the part of V along x
+  double skew_px = 0;  ///< the x component of V
 
   static constexpr std::string_view kName = "cahv";
   static std::vector<ModelParameterKind> parameter_kinds();

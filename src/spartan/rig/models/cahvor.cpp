@@ -10,16 +10,16 @@
 namespace spartan {
 namespace {
 
-// μ with dμ/dτ.
-rig_detail::Slope mu_of(const CahvorModel::Radial& r, double tau) {
+// μ(τ) with dμ/dτ.
+rig_detail::ValueWithDerivative mu_of(const CahvorModel::Radial& r, double tau) {
   return {r[0] + tau * (r[1] + tau * r[2]), r[1] + 2 * tau * r[2]};
 }
 
 }  // namespace
 
-double rig_detail::cahvor_growth_end(const CahvorModel::Radial& r) {
+double rig_detail::cahvor_monotonic_limit(const CahvorModel::Radial& r) {
   if (!std::all_of(r.begin(), r.end(), [](double v) { return std::isfinite(v); }) || !(1 + r[0] > 0)) return 0;
-  // A radius of 10⁶ is a line of sight 0.2″ from the image plane: nothing beyond can be seen.
+  // At a radius of 10⁶ a ray is 0.2″ from the image plane: nothing beyond is visible.
   constexpr double kLargestSquare = 1e12;
   const auto ends = sign_changes({1 + r[0], 3 * r[1], 5 * r[2]}, 0, kLargestSquare);
   return ends.empty() ? std::numeric_limits<double>::infinity() : std::sqrt(ends.front());
@@ -30,7 +30,7 @@ CahvorModel::CahvorModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, Ra
       given_axis_(optical_axis),
       axis_(optical_axis.normalized()),
       radial_(radial),
-      largest_radius_(rig_detail::cahvor_growth_end(radial)) {}
+      largest_radius_(rig_detail::cahvor_monotonic_limit(radial)) {}
 
 std::vector<ModelParameterKind> CahvorModel::parameter_kinds() {
   std::vector<ModelParameterKind> kinds = CahvModel::parameter_kinds();
@@ -66,11 +66,12 @@ std::optional<ProjectionWithJacobian> CahvorModel::project_with_jacobian(const E
   const double omega = point.dot(axis_);
   const Eigen::Vector3d lambda = point - omega * axis_;
   const double tau = lambda.squaredNorm() / (omega * omega);
-  const rig_detail::Slope mu = mu_of(radial_, tau);
+  const rig_detail::ValueWithDerivative mu = mu_of(radial_, tau);
   // ∂λ = I − O Oᵀ, ∂τ = 2 (λ − τ ω O)/ω², ∂P' = I + μ ∂λ + λ μ' ∂τ.
-  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis_ * axis_.transpose();
+  const Eigen::Matrix3d perpendicular = Eigen::Matrix3d::Identity() - axis_ * axis_.transpose();
   const Eigen::RowVector3d by_tau = 2 / (omega * omega) * (lambda - tau * omega * axis_).transpose();
-  const Eigen::Matrix3d by_point = Eigen::Matrix3d::Identity() + mu.value * across + mu.slope * lambda * by_tau;
+  const Eigen::Matrix3d by_point =
+      Eigen::Matrix3d::Identity() + mu.value * perpendicular + mu.derivative * lambda * by_tau;
   auto result = cahv_.project_with_jacobian(point + mu.value * lambda);
   if (result) result->by_point = (result->by_point * by_point).eval();
   if (result && !result->by_point.allFinite()) return std::nullopt;
@@ -80,15 +81,15 @@ std::optional<ProjectionWithJacobian> CahvorModel::project_with_jacobian(const E
 std::optional<Ray> CahvorModel::unproject(const Eigen::Vector2d& pixel) const {
   const auto linear = cahv_.unproject(pixel);
   if (!linear) return std::nullopt;
-  // λ' = (1 + μ) λ stays across O: the direction about the axis is known, its angle has one unknown, x = √τ.
+  // λ' = (1 + μ) λ is perpendicular to O: the azimuth about O is known, x = √τ is the only unknown.
   const double omega = linear->direction.dot(axis_);
   if (!(omega > 0)) return std::nullopt;
   const Eigen::Vector3d side = (linear->direction - omega * axis_) / omega;
   const double radius = side.norm();
   if (radius == 0) return Ray{Eigen::Vector3d::Zero(), axis_};
   const auto radial = [&](double x) {
-    const rig_detail::Slope mu = mu_of(radial_, x * x);
-    return rig_detail::Slope{x * (1 + mu.value), 1 + mu.value + 2 * x * x * mu.slope};
+    const rig_detail::ValueWithDerivative mu = mu_of(radial_, x * x);
+    return rig_detail::ValueWithDerivative{x * (1 + mu.value), 1 + mu.value + 2 * x * x * mu.derivative};
   };
   const auto x = rig_detail::solve_increasing(radial, radius, 0, largest_radius_, radius);
   if (!x || !(*x < largest_radius_)) return std::nullopt;

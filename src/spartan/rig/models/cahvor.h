@@ -1,4 +1,4 @@
-// CAHV with radial distortion about an optical axis of its own: the camera model of the Mars rovers.
+// CAHVOR: CAHV with radial distortion about a separate optical axis, the camera model of the Mars rovers.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,17 +10,17 @@
 
 namespace spartan {
 
-/// With P seen from C, ω = P·O, λ = P − ω O, τ = λ·λ/ω²:
+/// With P relative to C, ω = P·O, λ = P − ω O, τ = λ·λ/ω²:
 ///   μ = r0 + r1 τ + r2 τ²,  P' = P + μ λ,  (u, v) = CAHV of P'
 /// Source: Gennery, "Least-squares camera calibration including lens distortion and automatic editing of calibration
 /// points", in Calibration and Orientation of Cameras in Computer Vision, 2001; frame as in cahv.h.
-/// Domain: ω > 0, √τ below the radius where √τ (1 + μ) stops growing, P' before the camera (z > 0).
+/// Domain: ω > 0, √τ below the radius where √τ (1 + μ) stops increasing, P' in front of the camera (z > 0).
 class CahvorModel {
  public:
   using Radial = std::array<double, 3>;
 
   CahvorModel() : CahvorModel({}, Eigen::Vector3d::UnitZ(), {}) {}
-  /// `optical_axis`: O in the camera frame, of unit length.
+  /// `optical_axis`: the unit vector O in the camera frame. `radial`: r0, r1, r2.
   CahvorModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, Radial radial);
 
   static constexpr std::string_view kName = "cahvor";
@@ -29,9 +29,9 @@ class CahvorModel {
   static CahvorModel from_parameters(const ModelParameters& parameters);
 
   const CahvModel& cahv() const { return cahv_; }
-  const Eigen::Vector3d& optical_axis() const { return given_axis_; }  ///< as given
+  const Eigen::Vector3d& optical_axis() const { return given_axis_; }  ///< as passed to the constructor
   const Radial& radial() const { return radial_; }
-  /// Largest valid √τ; infinity where the map grows everywhere.
+  /// Upper bound of √τ; infinity if the radial map increases everywhere.
   double largest_radius() const { return largest_radius_; }
 
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;
@@ -43,16 +43,16 @@ class CahvorModel {
 
  private:
   CahvModel cahv_;
-  Eigen::Vector3d given_axis_, axis_;  ///< O as given, and of length 1 to the last digit
+  Eigen::Vector3d given_axis_, axis_;  ///< O as passed to the constructor, and normalized
   Radial radial_{};
   double largest_radius_ = 0;
 };
 
 namespace rig_detail {
 
-/// The first root of d(x (1 + r0 + r1 x² + r2 x⁴))/dx above zero: where the radial map of CAHVOR and CAHVORE stops
-/// growing. Infinity where it does not, 0 where it never grows or a coefficient is not finite.
-double cahvor_growth_end(const CahvorModel::Radial& radial);
+/// The smallest positive root of d(x (1 + r0 + r1 x² + r2 x⁴))/dx, where the radial map of CAHVOR and CAHVORE stops
+/// increasing. Infinity if there is none; 0 if the map decreases at 0 or a coefficient is not finite.
+double cahvor_monotonic_limit(const CahvorModel::Radial& radial);
 
 }  // namespace rig_detail
 

@@ -10,33 +10,33 @@
 namespace spartan {
 namespace {
 
-using rig_detail::Slope;
+using rig_detail::ValueWithDerivative;
 
-// χ(θ).
-Slope chi_of(double linearity, double angle) {
-  const double turned = linearity * angle;
-  if (linearity > 0) return {std::tan(turned) / linearity, 1 / (std::cos(turned) * std::cos(turned))};
-  if (linearity < 0) return {std::sin(turned) / linearity, std::cos(turned)};
+// χ(θ) with dχ/dθ.
+ValueWithDerivative chi_of(double linearity, double angle) {
+  const double scaled = linearity * angle;
+  if (linearity > 0) return {std::tan(scaled) / linearity, 1 / (std::cos(scaled) * std::cos(scaled))};
+  if (linearity < 0) return {std::sin(scaled) / linearity, std::cos(scaled)};
   return {angle, 1};
 }
 
-// χ (1 + μ(χ)) by θ: the tangent of the angle that the light has behind the lens.
-Slope bent_of(const CahvoreModel::Radial& r, double linearity, double angle) {
-  const Slope chi = chi_of(linearity, angle);
+// b(θ) = χ (1 + μ(χ)) with db/dθ: the tangent of the off-axis angle after distortion.
+ValueWithDerivative distorted_radius(const CahvoreModel::Radial& r, double linearity, double angle) {
+  const ValueWithDerivative chi = chi_of(linearity, angle);
   const double s = chi.value * chi.value;
-  return {chi.value * (1 + r[0] + s * (r[1] + s * r[2])), (1 + r[0] + s * (3 * r[1] + s * 5 * r[2])) * chi.slope};
+  return {chi.value * (1 + r[0] + s * (r[1] + s * r[2])), (1 + r[0] + s * (3 * r[1] + s * 5 * r[2])) * chi.derivative};
 }
 
 // An angle with its sine and cosine.
-struct Turn {
-  explicit Turn(double a) : angle(a), sine(std::sin(a)), cosine(std::cos(a)) {}
+struct Angle {
+  explicit Angle(double a) : angle(a), sine(std::sin(a)), cosine(std::cos(a)) {}
   double angle, sine, cosine;
 };
 
-// s(θ) sin θ = (θ − sin θ) E(θ): the way of the entrance pupil, times sin θ, with its derivative.
-Slope pupil_of(const CahvoreModel::Entrance& e, const Turn& t) {
+// s(θ) sin θ = (θ − sin θ) E(θ): the offset of the entrance pupil times sin θ, with its derivative by θ.
+ValueWithDerivative pupil_of(const CahvoreModel::Entrance& e, const Angle& t) {
   const double s = t.angle * t.angle;
-  // θ − sin θ and 1 − cos θ lose their digits near zero.
+  // θ − sin θ and 1 − cos θ lose digits by cancellation near zero: below 0.1 rad their Taylor series are used.
   const bool small = t.angle < 0.1;
   const double gap =
       small ? t.angle * s * (1 / 6.0 - s * (1 / 120.0 - s * (1 / 5040.0 - s / 362880.0))) : t.angle - t.sine;
@@ -45,55 +45,57 @@ Slope pupil_of(const CahvoreModel::Entrance& e, const Turn& t) {
   return {gap * polynomial, gap_slope * polynomial + gap * slope};
 }
 
-// The smallest angle at which χ (1 + μ) no longer grows, or χ has its own end.
-double angle_where_growth_ends(const CahvoreModel::Radial& r, double linearity) {
+// The smallest angle at which χ (1 + μ) stops increasing, or where χ is no longer defined.
+double monotonic_limit(const CahvoreModel::Radial& r, double linearity) {
   double end = std::numbers::pi;
   if (linearity != 0) end = std::min(end, 0.5 * std::numbers::pi / std::abs(linearity));
-  const double chi = rig_detail::cahvor_growth_end(r);
+  const double chi = rig_detail::cahvor_monotonic_limit(r);
   if (linearity > 0) return std::min(end, std::atan(chi * linearity) / linearity);
   if (linearity < 0) return chi * -linearity < 1 ? std::asin(chi * -linearity) / -linearity : end;
   return std::min(end, chi);
 }
 
-// f = (ω − s) sin θ − |λ| cos θ: by how much the line of sight at the angle misses a point, with ∂f/∂θ.
-Slope miss_of(const CahvoreModel::Entrance& e, double omega, double lambda, double angle) {
-  const Turn t(angle);
-  const Slope pupil = pupil_of(e, t);
-  return {omega * t.sine - lambda * t.cosine - pupil.value, omega * t.cosine + lambda * t.sine - pupil.slope};
+// f(θ) = (ω − s) sin θ − |λ| cos θ with ∂f/∂θ: the signed distance of a point from the ray of angle θ.
+ValueWithDerivative ray_distance(const CahvoreModel::Entrance& e, double omega, double lambda, double angle) {
+  const Angle t(angle);
+  const ValueWithDerivative pupil = pupil_of(e, t);
+  return {omega * t.sine - lambda * t.cosine - pupil.value, omega * t.cosine + lambda * t.sine - pupil.derivative};
 }
 
-// How far from C neighbouring lines of sight cross, or begin before they cross; zero where they part from each other.
-// `pupil_m` is how far the pupil itself is.
-struct Crossing {
+// The intersection of neighbouring rays at an angle: the distance of the pupil from C, and the largest distance from C
+// of the ray segment between pupil and intersection; `reach_m` is 0 if neighbouring rays diverge.
+struct RayIntersection {
   double pupil_m, reach_m;
 };
-Crossing crossing_of(const CahvoreModel::Entrance& e, double angle) {
-  const Turn t(angle);
-  const Slope pupil = pupil_of(e, t);
-  const double way = pupil.value / t.sine, depth = pupil.slope - way * t.cosine;  // s, s' sin θ
-  const double begins = std::abs(way);
-  if (!(depth > 0)) return {begins, 0};
-  return {begins, std::max(begins, std::hypot(way + depth * t.cosine, depth * t.sine))};
+RayIntersection ray_intersection(const CahvoreModel::Entrance& e, double angle) {
+  const Angle t(angle);
+  const ValueWithDerivative pupil = pupil_of(e, t);
+  const double offset = pupil.value / t.sine, depth = pupil.derivative - offset * t.cosine;  // s, s' sin θ
+  const double pupil_distance = std::abs(offset);
+  if (!(depth > 0)) return {pupil_distance, 0};
+  return {pupil_distance, std::max(pupil_distance, std::hypot(offset + depth * t.cosine, depth * t.sine))};
 }
 
-// The angle at which the pupil or the crossings go far out, and how far off lines of sight cross up to there.
-struct Crossings {
+// The angle at which the pupil or the ray intersections diverge, and the largest distance of an intersection from C
+// below that angle.
+struct IntersectionLimits {
   double end, farthest_m;
 };
-Crossings crossings_of(const CahvoreModel::Entrance& e, double end) {
+IntersectionLimits intersection_limits(const CahvoreModel::Entrance& e, double end) {
   if (e == CahvoreModel::Entrance{}) return {end, 0};
-  // θ/sin θ goes to infinity at 180°. No lens looks there; the lines of sight there must not spoil the others.
-  constexpr double kMuch = 5;
-  // The walk finds the farthest crossing to much less than the margin: nothing here turns within a step.
+  // θ/sin θ diverges at 180°, where no lens images anything. The domain ends where a distance exceeds this multiple of
+  // the largest one within 90° (empirical), so that such rays do not exclude near points for all other rays.
+  constexpr double kDivergence = 5;
+  // All functions vary slowly over one step, so sampling finds the farthest intersection to much less than the margin.
   constexpr int kSteps = 256;
-  constexpr double kMargin = 1.01;
-  double beside = 0, farthest = 0;
+  constexpr double kMargin = 1.01;  // on the largest distance
+  double within_90_deg = 0, farthest = 0;
   for (int i = 1; i <= kSteps; ++i) {
     const double angle = end * i / kSteps;
-    const Crossing crossing = crossing_of(e, angle);
+    const RayIntersection crossing = ray_intersection(e, angle);
     if (angle <= 0.5 * std::numbers::pi) {
-      beside = std::max({beside, crossing.pupil_m, crossing.reach_m});
-    } else if (std::max(crossing.pupil_m, crossing.reach_m) > kMuch * beside) {
+      within_90_deg = std::max({within_90_deg, crossing.pupil_m, crossing.reach_m});
+    } else if (std::max(crossing.pupil_m, crossing.reach_m) > kDivergence * within_90_deg) {
       end = end * (i - 1) / kSteps;
       break;
     }
@@ -104,8 +106,8 @@ Crossings crossings_of(const CahvoreModel::Entrance& e, double end) {
 
 }  // namespace
 
-struct CahvoreModel::Sight {
-  Eigen::Vector3d side;  // the direction of λ; anything across the axis where λ is zero
+struct CahvoreModel::AxialPoint {
+  Eigen::Vector3d side;  // the direction of λ; any direction perpendicular to the axis if λ is zero
   double omega, lambda;
   double angle;
 };
@@ -118,10 +120,10 @@ CahvoreModel::CahvoreModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, 
       radial_(radial),
       entrance_(entrance_m),
       linearity_(linearity) {
-  const Crossings crossings = crossings_of(entrance_m, angle_where_growth_ends(radial, linearity));
-  // The last digits before the end are left to rounding.
-  largest_angle_ = crossings.end * (1 - 1e-12);
-  nearest_ = crossings.farthest_m;
+  const IntersectionLimits limits = intersection_limits(entrance_m, monotonic_limit(radial, linearity));
+  // A margin for rounding at the end of the domain.
+  largest_angle_ = limits.end * (1 - 1e-12);
+  nearest_ = limits.farthest_m;
 }
 
 std::vector<ModelParameterKind> CahvoreModel::parameter_kinds() {
@@ -144,48 +146,49 @@ CahvoreModel CahvoreModel::from_parameters(const ModelParameters& parameters) {
   return {plain.cahv(), plain.optical_axis(), plain.radial(), {e.at(0), e.at(1), e.at(2)}, parameters.at(6).at(0)};
 }
 
-std::optional<CahvoreModel::Sight> CahvoreModel::sight_of(const Eigen::Vector3d& point) const {
+std::optional<CahvoreModel::AxialPoint> CahvoreModel::axial_point_of(const Eigen::Vector3d& point) const {
   if (!point.allFinite() || !(point.squaredNorm() > nearest_ * nearest_)) return std::nullopt;
-  Sight sight{};
-  sight.omega = point.dot(axis_);
-  const Eigen::Vector3d lambda = point - sight.omega * axis_;
-  sight.lambda = lambda.norm();
-  if (sight.lambda == 0) {
-    sight.side = axis_.unitOrthogonal();
-    return sight.omega > 0 ? std::optional(sight) : std::nullopt;  // straight behind, or the camera's own place
+  AxialPoint axial{};
+  axial.omega = point.dot(axis_);
+  const Eigen::Vector3d lambda = point - axial.omega * axis_;
+  axial.lambda = lambda.norm();
+  if (axial.lambda == 0) {
+    axial.side = axis_.unitOrthogonal();
+    return axial.omega > 0 ? std::optional(axial) : std::nullopt;  // on the axis behind the camera, or at C
   }
-  sight.side = lambda / sight.lambda;
-  // Outside of `nearest_` f crosses zero once at most, upwards. The pupil moves by millimetres: the angle seen from C
-  // is close.
+  axial.side = lambda / axial.lambda;
+  // Beyond `nearest_` f has at most one zero and increases there. The pupil moves by millimetres, so the angle at C is
+  // a good initial value.
   const auto angle =
-      rig_detail::solve_increasing([&](double a) { return miss_of(entrance_, sight.omega, sight.lambda, a); }, 0, 0,
-                                   largest_angle_, std::atan2(sight.lambda, sight.omega));
+      rig_detail::solve_increasing([&](double a) { return ray_distance(entrance_, axial.omega, axial.lambda, a); }, 0,
+                                   0, largest_angle_, std::atan2(axial.lambda, axial.omega));
   if (!angle) return std::nullopt;
-  sight.angle = *angle;
-  return sight;
+  axial.angle = *angle;
+  return axial;
 }
 
-// P' is taken per χ/|λ|: O + (bent/|λ|) λ, which exists on the axis too.
+// P' is scaled by χ/|λ|: O + b λ/|λ|, which is defined on the axis too.
 std::optional<Eigen::Vector2d> CahvoreModel::project(const Eigen::Vector3d& point) const {
-  const auto sight = sight_of(point);
-  if (!sight) return std::nullopt;
-  return cahv_.project(axis_ + bent_of(radial_, linearity_, sight->angle).value * sight->side);
+  const auto axial = axial_point_of(point);
+  if (!axial) return std::nullopt;
+  return cahv_.project(axis_ + distorted_radius(radial_, linearity_, axial->angle).value * axial->side);
 }
 
 std::optional<ProjectionWithJacobian> CahvoreModel::project_with_jacobian(const Eigen::Vector3d& point) const {
-  const auto sight = sight_of(point);
-  if (!sight) return std::nullopt;
-  const Slope bent = bent_of(radial_, linearity_, sight->angle);
-  auto result = cahv_.project_with_jacobian(axis_ + bent.value * sight->side);
+  const auto axial = axial_point_of(point);
+  if (!axial) return std::nullopt;
+  const ValueWithDerivative distorted = distorted_radius(radial_, linearity_, axial->angle);
+  auto result = cahv_.project_with_jacobian(axis_ + distorted.value * axial->side);
   if (!result) return std::nullopt;
-  // P'' = O + b(θ) n with n = λ/|λ|: ∂n = (I − O Oᵀ − n nᵀ)/|λ|, and by the implicit equation of θ
+  // P'' = O + b(θ) n with n = λ/|λ|: ∂n = (I − O Oᵀ − n nᵀ)/|λ|, and by the implicit function theorem with g = ∂f/∂θ
   // ∂θ/∂ω = −sin θ/g, ∂θ/∂|λ| = cos θ/g. On the axis b/|λ| → b'/g.
-  const Eigen::Vector3d& n = sight->side;
-  const double grows = miss_of(entrance_, sight->omega, sight->lambda, sight->angle).slope;
+  const Eigen::Vector3d& n = axial->side;
+  const double df_dangle = ray_distance(entrance_, axial->omega, axial->lambda, axial->angle).derivative;
   const Eigen::Matrix3d around = Eigen::Matrix3d::Identity() - axis_ * axis_.transpose() - n * n.transpose();
-  const double across = sight->lambda > 0 ? bent.value / sight->lambda : bent.slope / grows;
-  const Eigen::RowVector3d by_angle = (std::cos(sight->angle) * n - std::sin(sight->angle) * axis_).transpose() / grows;
-  result->by_point = (result->by_point * (across * around + bent.slope * n * by_angle)).eval();
+  const double across = axial->lambda > 0 ? distorted.value / axial->lambda : distorted.derivative / df_dangle;
+  const Eigen::RowVector3d by_angle =
+      (std::cos(axial->angle) * n - std::sin(axial->angle) * axis_).transpose() / df_dangle;
+  result->by_point = (result->by_point * (across * around + distorted.derivative * n * by_angle)).eval();
   if (!result->by_point.allFinite()) return std::nullopt;
   return result;
 }
@@ -198,12 +201,12 @@ std::optional<Ray> CahvoreModel::unproject(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector3d lambda = (linear->direction - omega * axis_) / omega;
   const double radius = lambda.norm();
   if (radius == 0) return Ray{Eigen::Vector3d::Zero(), axis_};
-  const auto angle = rig_detail::solve_increasing([&](double a) { return bent_of(radial_, linearity_, a); }, radius, 0,
-                                                  largest_angle_, std::atan(radius));
+  const auto angle = rig_detail::solve_increasing([&](double a) { return distorted_radius(radial_, linearity_, a); },
+                                                  radius, 0, largest_angle_, std::atan(radius));
   if (!angle) return std::nullopt;
-  const Turn t(*angle);
-  const double way = t.sine > 0 ? pupil_of(entrance_, t).value / t.sine : 0;
-  return Ray{way * axis_, (t.cosine * axis_ + t.sine / radius * lambda).normalized()};
+  const Angle t(*angle);
+  const double offset = t.sine > 0 ? pupil_of(entrance_, t).value / t.sine : 0;
+  return Ray{offset * axis_, (t.cosine * axis_ + t.sine / radius * lambda).normalized()};
 }
 
 }  // namespace spartan

@@ -17,7 +17,7 @@ namespace {
 constexpr ImageSize kSize{752, 480};
 const PinholeModel kPinhole{458.654, 457.296, 367.215, 248.375};
 
-// Nearly none, EuRoC's, strong barrel, pincushion, k3, and the rational form.
+// Almost none, EuRoC's, strong barrel, pincushion, with k3, and the rational form.
 const std::vector<RadialTangentialModel::Coefficients> kLenses{
     {1e-9, 0, 0, 0},
     {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05},
@@ -31,13 +31,13 @@ CameraModel lens(std::size_t i) {
   return RadialTangentialModel(kPinhole, kLenses[i]);
 }
 
-TEST(Pinhole, ObeysTheLaws) {
+TEST(Pinhole, SatisfiesTheModelLaws) {
   testing::expect_round_trips(kPinhole, kSize);
   testing::expect_true_jacobians(kPinhole, kSize);
   testing::expect_honest_limits(kPinhole);
 }
 
-TEST(RadialTangential, ObeysTheLaws) {
+TEST(RadialTangential, SatisfiesTheModelLaws) {
   for (std::size_t i = 0; i < kLenses.size(); ++i) {
     SCOPED_TRACE(i);
     testing::expect_round_trips(lens(i), kSize);
@@ -61,8 +61,8 @@ TEST(RadialTangential, ProjectsAsOpenCv) {
   }
 }
 
-// Beyond the radius where the map stops growing a pixel would have two lines of sight: there is no answer.
-TEST(RadialTangential, AnswersOnlyWhereTheMapGrows) {
+// Beyond the radius where the map stops increasing a pixel would have two rays: the domain ends there.
+TEST(RadialTangential, DomainEndsWhereTheMapStopsIncreasing) {
   const RadialTangentialModel barrel(kPinhole, {-0.3, 0, 0, 0});
   // d(r − 0.3 r³)/dr = 0 at r = 1/√0.9
   EXPECT_NEAR(barrel.largest_radius(), 1 / std::sqrt(0.9), 1e-9);
@@ -73,8 +73,8 @@ TEST(RadialTangential, AnswersOnlyWhereTheMapGrows) {
   EXPECT_FALSE(barrel.unproject({kPinhole.cx + 1.001 * farthest * kPinhole.fx, kPinhole.cy}));
 }
 
-// A narrow lens, a fisheye beyond the half space, and one whose map folds back inside the picture.
-TEST(Equidistant, ObeysTheLaws) {
+// A narrow lens, a fisheye with more than 180°, and one whose map folds back inside the image.
+TEST(Equidistant, SatisfiesTheModelLaws) {
   const std::vector<std::pair<EquidistantModel::Coefficients, double>> lenses{
       {{0, 0, 0, 0}, 0.33}, {{-0.013, 0.032, -0.024, 0.006}, 1}, {{0.05, 0.01, 0.002, 1e-4}, 1}};
   for (const auto& [k, share] : lenses) {
@@ -86,7 +86,7 @@ TEST(Equidistant, ObeysTheLaws) {
   }
 }
 
-TEST(Equidistant, AnswersOnlyWhereTheMapGrows) {
+TEST(Equidistant, DomainEndsWhereTheMapStopsIncreasing) {
   const PinholeModel pinhole{200, 200, 376, 240};
   // d(θ − 0.2 θ³)/dθ = 0 at θ = 1/√0.6
   const EquidistantModel folds(pinhole, {-0.2, 0, 0, 0});
@@ -97,36 +97,36 @@ TEST(Equidistant, AnswersOnlyWhereTheMapGrows) {
   const double farthest = 200 / std::sqrt(0.6) * (1 - 0.2 / 0.6);
   EXPECT_TRUE(folds.unproject({376 + 0.999 * farthest, 240}));
   EXPECT_FALSE(folds.unproject({376 + 1.001 * farthest, 240}));
-  // Without coefficients all is seen but the one direction behind.
+  // Without coefficients every direction but the one straight behind projects.
   const EquidistantModel whole(pinhole, {});
   EXPECT_NEAR(whole.project(at(3.0))->x(), 376 + 200 * 3.0, 1e-9);
   EXPECT_FALSE(whole.unproject({376 + 200 * 3.15, 240}));
   EXPECT_FALSE(whole.project({0, 0, -1}));
 }
 
-// The published examples of wide lenses (ξ, α), those without either sphere, and one of |ξ| > 1.
+// Published parameters (ξ, α) of wide-angle lenses, the special cases ξ = 0 and α = 0, and one with |ξ| > 1.
 const std::vector<DoubleSphereModel> kSpheres{
     {{313.0, 313.5, 367.2, 248.4}, -0.18, 0.59}, {{190.0, 190.5, 367.2, 248.4}, -0.27, 0.55},
     {{400.0, 401.0, 367.2, 248.4}, 0, 0},        {{300.0, 301.0, 367.2, 248.4}, 0.6, 0.3},
     {{600.0, 601.0, 367.2, 248.4}, 1.4, 0.2},    {{300.0, 301.0, 367.2, 248.4}, 0.1, 1},
 };
 
-TEST(DoubleSphere, ObeysTheLaws) {
+TEST(DoubleSphere, SatisfiesTheModelLaws) {
   const std::vector<double> shares{0.5, 0.33, 1, 1, 0.29, 0.08};
   ASSERT_EQ(shares.size(), kSpheres.size());
   for (std::size_t i = 0; i < kSpheres.size(); ++i) {
     const DoubleSphereModel& model = kSpheres[i];
     SCOPED_TRACE(model.xi);
     EXPECT_GE(testing::expect_consistent_answers(model, kSize), shares[i]);
-    if (model.alpha == 1) continue;  // the picture's corners are beyond its fold
+    if (model.alpha == 1) continue;  // the image corners are outside of the domain
     testing::expect_round_trips(model, kSize);
     testing::expect_true_jacobians(model, kSize);
     testing::expect_honest_limits(model, model.alpha > 0 || model.xi > 0);
   }
 }
 
-// Both spheres away: the pinhole. The first away: the unified model x/(α d + (1 − α) z) in closed form.
-TEST(DoubleSphere, HoldsTheSimplerModels) {
+// ξ = α = 0: the pinhole. ξ = 0: the unified camera model x/(α d + (1 − α) z) in closed form.
+TEST(DoubleSphere, ContainsTheSimplerModels) {
   for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 8)) {
     const Eigen::Vector3d p = 2 * kPinhole.unproject(pixel)->direction;
     EXPECT_LE((*DoubleSphereModel{kPinhole, 0, 0}.project(p) - pixel).norm(), 1e-10);
@@ -137,8 +137,8 @@ TEST(DoubleSphere, HoldsTheSimplerModels) {
   }
 }
 
-// The image radius must grow with the angle all over the domain, and no further: found by walking outwards.
-TEST(DoubleSphere, AnswersExactlyWhereTheMapGrows) {
+// The end of the domain equals the angle at which the image radius stops increasing, found by stepping outwards.
+TEST(DoubleSphere, DomainEndsWhereTheMapStopsIncreasing) {
   for (const DoubleSphereModel& model : kSpheres) {
     const auto radius = [&](double angle) {
       const double d2 = std::sqrt(1 + 2 * model.xi * std::cos(angle) + model.xi * model.xi);
@@ -153,19 +153,19 @@ TEST(DoubleSphere, AnswersExactlyWhereTheMapGrows) {
   }
 }
 
-TEST(Cahv, ObeysTheLaws) {
+TEST(Cahv, SatisfiesTheModelLaws) {
   const CahvModel model{kPinhole, 0.37};
   testing::expect_round_trips(model, kSize);
   testing::expect_true_jacobians(model, kSize);
   testing::expect_honest_limits(model);
-  // u = P·H/P·A, v = P·V/P·A with the vectors themselves.
+  // u = P·H/P·A, v = P·V/P·A, computed with the vectors.
   const Eigen::Vector3d p(0.3, -0.2, 1.7);
   EXPECT_LE((*model.project(p) - Eigen::Vector2d(p.dot(model.h()), p.dot(model.v())) / p.z()).norm(), 1e-12);
 }
 
 const Eigen::Vector3d kOpticalAxis = Eigen::Vector3d(0.013, -0.021, 1).normalized();
 
-TEST(Cahvor, ObeysTheLaws) {
+TEST(Cahvor, SatisfiesTheModelLaws) {
   for (const CahvorModel::Radial& radial :
        {CahvorModel::Radial{0, 0, 0}, {1e-3, -0.12, 0.04}, {-4e-4, 0.2, 0.05}, {0, -0.3, 0.11}}) {
     const CahvorModel model({kPinhole, -0.2}, kOpticalAxis, radial);
@@ -174,11 +174,11 @@ TEST(Cahvor, ObeysTheLaws) {
     testing::expect_honest_limits(model);
     EXPECT_EQ(testing::expect_consistent_answers(model, kSize), 1);
   }
-  // √τ (1 − 0.3 τ) grows to √τ = 1/√0.9.
+  // √τ (1 − 0.3 τ) increases up to √τ = 1/√0.9.
   EXPECT_NEAR(CahvorModel({kPinhole, 0}, kOpticalAxis, {0, -0.3, 0}).largest_radius(), 1 / std::sqrt(0.9), 1e-9);
 }
 
-TEST(Cahvore, ObeysTheLaws) {
+TEST(Cahvore, SatisfiesTheModelLaws) {
   const CahvModel wide{{230.5, 231.0, 367.2, 248.4}, 0.1};
   const std::vector<std::pair<double, double>> linearities{{1.0, 1}, {0.8, 1}, {0.37, 1}, {0.0, 0.6}, {-0.3, 0.39}};
   for (const auto& [linearity, share] : linearities) {
@@ -189,7 +189,7 @@ TEST(Cahvore, ObeysTheLaws) {
     testing::expect_true_jacobians(model, kSize);
     testing::expect_honest_limits(model, linearity < 1);
   }
-  // The axis itself, and beside it by next to nothing.
+  // On the axis and very close to it.
   const CahvoreModel model(wide, kOpticalAxis, {5e-4, -0.03, 0.006}, {0.004, 0.002, -3e-4}, 0.2);
   for (const double off : {0.0, 1e-12, 1e-8, 1e-5}) {
     const Eigen::Vector3d point = 1.5 * kOpticalAxis + off * kOpticalAxis.unitOrthogonal();
@@ -201,7 +201,7 @@ TEST(Cahvore, ObeysTheLaws) {
   }
 }
 
-// The pupil moves: lines of sight do not meet in one point. Near things show it, far ones do not.
+// The entrance pupil moves: rays do not intersect in one point. Only near points reveal it.
 TEST(Cahvore, IsNotCentral) {
   const CahvoreModel model({{230.5, 231.0, 367.2, 248.4}, 0}, Eigen::Vector3d::UnitZ(), {0, 0, 0}, {0.01, 0, 0}, 0);
   const auto ray = model.unproject({367.2 + 230.5 * 1.2, 248.4});
@@ -210,13 +210,13 @@ TEST(Cahvore, IsNotCentral) {
   EXPECT_NEAR(std::atan2(ray->direction.x(), ray->direction.z()), 1.2, 1e-12);
 }
 
-// Near the pupil several lines of sight lead through one point: no pixel of them is the right one.
-TEST(Cahvore, SeesNothingWhereLinesOfSightCross) {
+// Near the pupil several rays pass through one point, so its pixel is ambiguous.
+TEST(Cahvore, ProjectsNothingWhereRaysIntersect) {
   const CahvModel wide{{230.5, 231.0, 367.2, 248.4}, 0.1};
   const CahvoreModel model(wide, kOpticalAxis, {5e-4, -0.03, 0.006}, {0.004, 0.002, -3e-4}, 0);
   EXPECT_GT(model.nearest_m(), 0.005);
   EXPECT_LT(model.nearest_m(), 0.02);
-  // Every line of sight of a fine grid at every depth: none or its own pixel.
+  // Every ray of a fine grid at every depth projects to its own pixel or not at all.
   int none = 0, own = 0;
   for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 40)) {
     const auto ray = model.unproject(pixel);
@@ -230,17 +230,17 @@ TEST(Cahvore, SeesNothingWhereLinesOfSightCross) {
     }
   }
   EXPECT_GT(own, none / 10);
-  // θ/sin θ has no end: the lines of sight far behind the camera must not take the near points from all others.
+  // θ/sin θ diverges: rays far behind the camera must not exclude near points for all other rays.
   const CahvoreModel plain(wide, kOpticalAxis, {0, 0, 0}, {0.004, 0, 0}, 0);
   EXPECT_LT(plain.nearest_m(), 0.03);
   EXPECT_GT(plain.largest_angle(), 2.5);
   EXPECT_TRUE(plain.project(0.03 * kOpticalAxis));
-  // A pupil that moves backwards parts the lines of sight.
+  // If the pupil moves backwards, neighbouring rays diverge.
   EXPECT_EQ(CahvoreModel(wide, kOpticalAxis, {0, 0, 0}, {-0.004, 0, 0}, 1).nearest_m(), 0);
 }
 
-// L = 1 without a moving pupil is CAHVOR; L = 0 without one and without μ is equidistant.
-TEST(Cahvore, HoldsTheSimplerModels) {
+// L = 1 with a fixed pupil is CAHVOR; L = 0 with a fixed pupil and μ = 0 is equidistant.
+TEST(Cahvore, ContainsTheSimplerModels) {
   const CahvorModel::Radial radial{1e-3, -0.12, 0.04};
   const CahvoreModel perspective({kPinhole, 0}, kOpticalAxis, radial, {0, 0, 0}, 1);
   const CahvorModel cahvor({kPinhole, 0}, kOpticalAxis, radial);
@@ -256,19 +256,19 @@ TEST(Cahvore, HoldsTheSimplerModels) {
   }
 }
 
-TEST(CameraModel, IsKnownByItsName) {
+TEST(CameraModel, IsFoundByItsName) {
   EXPECT_EQ(camera_model_names(), (std::vector<std::string_view>{"pinhole", "radial_tangential", "equidistant",
                                                                  "double_sphere", "cahv", "cahvor", "cahvore"}));
   EXPECT_FALSE(camera_model_named("fisheye"));
   for (const std::string_view name : camera_model_names()) EXPECT_EQ(name_of(*camera_model_named(name)), name);
 }
 
-TEST(CameraModel, NumbersGoThereAndBack) {
+TEST(CameraModel, ParametersRoundTrip) {
   for (std::size_t i = 0; i < kLenses.size(); ++i) {
     EXPECT_EQ(with_parameters(*camera_model_named("radial_tangential"), parameters(lens(i))), lens(i)) << i;
   }
   EXPECT_EQ(with_parameters(PinholeModel{}, parameters(CameraModel(kPinhole))), CameraModel(kPinhole));
-  // As short as it can be told without loss.
+  // Trailing zeros are omitted.
   EXPECT_EQ(parameters(lens(1))[2].size(), 4u);
   EXPECT_EQ(parameters(lens(2))[2].size(), 5u);
   EXPECT_EQ(parameters(lens(5))[2].size(), 8u);

@@ -1,4 +1,4 @@
-// The camera models against those who have them too: OpenCV (fisheye, omnidir) and mrcal (CAHVOR, CAHVORE).
+// Comparison of the camera models with OpenCV (fisheye, omnidir) and mrcal (CAHVOR, CAHVORE).
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -46,8 +46,8 @@ TEST(Equidistant, ProjectsAsOpenCv) {
   }
 }
 
-// α = 0 is Mei's unified model, which OpenCV has as omnidir.
-TEST(DoubleSphere, IsTheUnifiedModelOfOpenCvWithoutTheSecondSphere) {
+// α = 0 is Mei's unified model, OpenCV's omnidir.
+TEST(DoubleSphere, WithoutAlphaProjectsAsOmnidirOfOpenCv) {
   for (const double xi : {0.0, 0.4, 0.9}) {
     const DoubleSphereModel model{kCore, xi, 0};
     for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 24)) {
@@ -88,7 +88,7 @@ TEST(Cahvore, ProjectsAsMrcal) {
     for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, 24)) {
       const auto ray = model.unproject(pixel);
       ASSERT_TRUE(ray) << pixel.transpose() << " linearity " << linearity;
-      // mrcal brings every point to the distance 1 from C before it looks, so only such points can be compared.
+      // mrcal normalizes every point to the distance 1 from C before it projects, so only such points can be compared.
       const double along = ray->origin.dot(ray->direction);
       const double range = std::sqrt(along * along - ray->origin.squaredNorm() + 1) - along;
       EXPECT_LE((oracle.project(ray->origin + range * ray->direction) - pixel).norm(), 1e-9)

@@ -6,7 +6,7 @@
 namespace spartan {
 namespace {
 
-// The names of the formula in the header, for one point.
+// The quantities of the formula in the header for one point.
 struct Spheres {
   double d1, h, d2, denominator;
 };

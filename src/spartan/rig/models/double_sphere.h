@@ -1,4 +1,4 @@
-// The double-sphere camera, for wide and fisheye lenses.
+// The double-sphere camera model for wide-angle and fisheye lenses.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,11 +11,11 @@ namespace spartan {
 
 /// With d1 = |p|, h = ξ d1 + Z, d2 = √(X² + Y² + h²):
 ///   u = fx X/(α d2 + (1 − α) h) + cx, v = fy Y/(α d2 + (1 − α) h) + cy
-/// Source: Usenko, Demmel, Cremers, "The double sphere camera model", 3DV 2018, eq. 40–52. ξ = 0 is the unified model
-/// with α, α = 0 that of Mei with ξ, both 0 the pinhole.
-/// Domain: h > −w d2 with w = α/(1 − α) for α ≤ ½ and (1 − α)/α above, and d1 + ξ Z > 0 (only for |ξ| > 1 a limit).
-/// That is where the image radius grows with the angle off the axis (docs/math/camera_models.md); the bound on Z in
-/// eq. 43–45 of the paper is the same for ξ = 0 and for α = ½, and narrower otherwise.
+/// Source: Usenko, Demmel, Cremers, "The double sphere camera model", 3DV 2018, eq. 40–52. ξ = 0 gives the
+/// unified camera model with α, α = 0 that of Mei with ξ, and ξ = α = 0 the pinhole.
+/// Domain: h > −w d2 with w = α/(1 − α) for α ≤ ½ and (1 − α)/α above, and d1 + ξ Z > 0 (restrictive only for |ξ| > 1).
+/// There the image radius increases with the off-axis angle (docs/math/camera_models.md). The bound on Z in eq. 43–45
+/// of the paper is equal for ξ = 0 and for α = ½, and more restrictive otherwise.
 struct DoubleSphereModel {
   PinholeModel pinhole;
   double xi = 0;

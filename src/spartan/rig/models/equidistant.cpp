@@ -12,23 +12,23 @@ namespace {
 using Coefficients = EquidistantModel::Coefficients;
 
 // ρ(θ) with dρ/dθ.
-rig_detail::Slope image_radius(const Coefficients& k, double angle) {
+rig_detail::ValueWithDerivative image_radius(const Coefficients& k, double angle) {
   const double s = angle * angle;
   return {angle * (1 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))),
           1 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3])))};
 }
 
-double angle_where_growth_ends(const Coefficients& k) {
+double monotonic_limit(const Coefficients& k) {
   if (!std::all_of(k.begin(), k.end(), [](double v) { return std::isfinite(v); })) return 0;
-  const rig_detail::Polynomial growth{1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]};  // dρ/dθ in θ²
-  const auto ends = rig_detail::sign_changes(growth, 0, std::numbers::pi * std::numbers::pi);
+  const rig_detail::Polynomial derivative{1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]};  // dρ/dθ as a polynomial in θ²
+  const auto ends = rig_detail::sign_changes(derivative, 0, std::numbers::pi * std::numbers::pi);
   return ends.empty() ? std::numbers::pi : std::sqrt(ends.front());
 }
 
 }  // namespace
 
 EquidistantModel::EquidistantModel(PinholeModel pinhole, Coefficients coefficients)
-    : pinhole_(pinhole), coefficients_(coefficients), largest_angle_(angle_where_growth_ends(coefficients)) {}
+    : pinhole_(pinhole), coefficients_(coefficients), largest_angle_(monotonic_limit(coefficients)) {}
 
 std::vector<ModelParameterKind> EquidistantModel::parameter_kinds() {
   std::vector<ModelParameterKind> kinds = PinholeModel::parameter_kinds();
@@ -52,8 +52,8 @@ std::optional<Eigen::Vector2d> EquidistantModel::project(const Eigen::Vector3d& 
   const double side = point.head<2>().norm();
   const double angle = std::atan2(side, point.z());
   if (!point.allFinite() || !(angle < largest_angle_)) return std::nullopt;
-  if (side == 0 && point.z() <= 0) return std::nullopt;  // the camera's own place
-  // ρ/side → 1/z on the axis.
+  if (side == 0 && point.z() <= 0) return std::nullopt;  // the projection centre
+  // ρ/side → 1/z as the point approaches the axis.
   const double scale = side > 0 ? image_radius(coefficients_, angle).value / side : 1 / point.z();
   const Eigen::Vector2d pixel(pinhole_.fx * (scale * point.x()) + pinhole_.cx,
                               pinhole_.fy * (scale * point.y()) + pinhole_.cy);
@@ -69,11 +69,11 @@ std::optional<ProjectionWithJacobian> EquidistantModel::project_with_jacobian(co
   Eigen::Matrix<double, 2, 3> by_point;
   if (side > 0) {
     // m = ρ(θ) (x, y)/side with ∂θ/∂side = z/|p|², ∂θ/∂z = −side/|p|².
-    const rig_detail::Slope rho = image_radius(coefficients_, std::atan2(side, z));
-    const double cosine = x / side, sine = y / side, across = rho.value / side, along = rho.slope * z / square;
+    const rig_detail::ValueWithDerivative rho = image_radius(coefficients_, std::atan2(side, z));
+    const double cosine = x / side, sine = y / side, across = rho.value / side, along = rho.derivative * z / square;
     by_point << across * sine * sine + along * cosine * cosine, (along - across) * sine * cosine,
-        -rho.slope * side / square * cosine, (along - across) * sine * cosine,
-        across * cosine * cosine + along * sine * sine, -rho.slope * side / square * sine;
+        -rho.derivative * side / square * cosine, (along - across) * sine * cosine,
+        across * cosine * cosine + along * sine * sine, -rho.derivative * side / square * sine;
   } else {
     by_point << 1 / z, 0, 0, 0, 1 / z, 0;
   }

@@ -1,4 +1,4 @@
-// The equidistant fisheye camera (Kannala–Brandt with four coefficients; "fisheye" of OpenCV, "equidistant" of Kalibr).
+// The equidistant fisheye camera model (Kannala–Brandt with four coefficients; OpenCV "fisheye", Kalibr "equidistant").
 #pragma once
 
 #include <Eigen/Core>
@@ -10,13 +10,12 @@
 
 namespace spartan {
 
-/// With θ the angle between the point and the optical axis and φ its direction around it:
+/// With θ the angle between the point and the optical axis and φ the azimuth about it:
 ///   θ = atan2(√(X² + Y²), Z),  ρ = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)
 ///   u = fx ρ cos φ + cx, v = fy ρ sin φ + cy
 /// Source: Kannala and Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
 /// fish-eye lenses", PAMI 2006, eq. 6 with the coefficients divided by the first; OpenCV documentation, "Fisheye camera
-/// model". Domain: θ below π and below the angle where ρ stops growing (dρ/dθ = 0); points beside and behind the camera
-/// are seen.
+/// model". Domain: θ below π and below the angle where ρ stops increasing (dρ/dθ = 0); points with z ≤ 0 project too.
 class EquidistantModel {
  public:
   using Coefficients = std::array<double, 4>;
@@ -31,7 +30,7 @@ class EquidistantModel {
 
   const PinholeModel& pinhole() const { return pinhole_; }
   const Coefficients& coefficients() const { return coefficients_; }
-  /// Largest valid θ, rad.
+  /// Upper bound of θ, rad.
   double largest_angle() const { return largest_angle_; }
 
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;

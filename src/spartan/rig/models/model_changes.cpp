@@ -9,7 +9,7 @@
 namespace spartan {
 namespace {
 
-// The numbers of a model with those of the named keys changed.
+// Applies `change` to the values of the named parameters.
 CameraModel with_changed(const CameraModel& model, std::initializer_list<std::string_view> keys,
                          const std::function<double(double)>& change) {
   const auto kinds = parameter_kinds(model);
@@ -57,18 +57,20 @@ CameraModel with_radial(const CameraModel& model, double k, ImageSize size) {
   const PinholeModel pinhole = plain ? *plain : radial->pinhole();
   const double across = std::max(pinhole.cx, size.width - 1 - pinhole.cx) / pinhole.fx,
                down = std::max(pinhole.cy, size.height - 1 - pinhole.cy) / pinhole.fy;
-  // Far out a negative k would turn the rays round: there is nothing to fit there.
-  constexpr int kRadii = 100;
-  constexpr double kLeastShrink = 0.3;
-  const auto straight = [&](double distorted) { return distorted / (1 + k * distorted * distorted); };
+  // For a negative k the undistorted radius diverges at 1 + k r_d² = 0: the fit ends where that factor is 0.3
+  // (empirical).
+  constexpr int kRadii = 100;  // samples of the fit
+  constexpr double kSmallestFactor = 0.3;
+  const auto undistorted = [&](double distorted) { return distorted / (1 + k * distorted * distorted); };
   const double corner = std::hypot(across, down);
-  const double last = k < 0 ? std::min(corner, std::sqrt((1 - kLeastShrink) / -k)) : corner;
-  const double reach = straight(last) * straight(last);
-  // g = r_d/r_u ≈ (1 + k1 s + k2 s²)/(1 + k4 s + k5 s²), s = r_u², times the denominator: linear in what is sought.
+  const double last = k < 0 ? std::min(corner, std::sqrt((1 - kSmallestFactor) / -k)) : corner;
+  const double reach = undistorted(last) * undistorted(last);
+  // g = r_d/r_u ≈ (1 + k1 s + k2 s²)/(1 + k4 s + k5 s²) with s = r_u²; multiplied by the denominator it is linear in
+  // k1, k2, k4, k5.
   Eigen::Matrix<double, kRadii, 4> by_coefficient;
   Eigen::Matrix<double, kRadii, 1> wanted;
   for (int i = 0; i < kRadii; ++i) {
-    const double distorted = last * (i + 1) / kRadii, r = straight(distorted), g = distorted / r, s = r * r / reach;
+    const double distorted = last * (i + 1) / kRadii, r = undistorted(distorted), g = distorted / r, s = r * r / reach;
     by_coefficient.row(i) = r * Eigen::RowVector4d(s, s * s, -g * s, -g * s * s);
     wanted[i] = r * (g - 1);
   }

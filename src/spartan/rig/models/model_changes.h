@@ -1,4 +1,4 @@
-// Camera models with some of their numbers changed, whatever the model.
+// Camera models with modified parameters, for every type of model.
 #pragma once
 
 #include "spartan/core/image.h"
@@ -6,20 +6,21 @@
 
 namespace spartan {
 
-/// Focal lengths (and what is measured by them) times `factor`; the centre stays.
+/// Multiplies focal lengths and skew by `factor`; the principal point is unchanged.
 CameraModel with_focal_times(const CameraModel& model, double factor);
 
-/// The model for pictures that are `factor` times as large; their corner stays.
+/// The model for images resampled to `factor` times the size; the outer corner of the top-left pixel is fixed.
 CameraModel resized(const CameraModel& model, double factor);
 
-/// The model for pictures that show everything `rows_px` lower.
+/// Shifts the principal point by `rows_px` rows downwards.
 CameraModel with_rows_lower(const CameraModel& model, double rows_px);
 
-/// fx and fy both what the one of them is.
+/// Sets both focal lengths to fx (`by_x`) or to fy.
 CameraModel with_square_pixels(const CameraModel& model, bool by_x);
 
-/// A pinhole with the distortion that it lacks: r_u = r_d/(1 + k r_d²) as far as pictures of that size reach, as k1,
-/// k2, k4 and k5 of the rational model (least squares; off by less than 0.01 px). Other models stay as they are.
+/// Replaces the distortion of a pinhole or radial_tangential model by the one-parameter division model (Fitzgibbon
+/// 2001) r_u = r_d/(1 + k r_d²), as k1, k2, k4 and k5 of the rational model: a least-squares fit over an image of that
+/// size, with an error below 0.01 px. Other models are returned unchanged.
 CameraModel with_radial(const CameraModel& model, double k, ImageSize size);
 
 }  // namespace spartan

@@ -8,8 +8,8 @@ namespace {
 constexpr PinholeModel kPinhole{500, 510, 320, 240};
 const Eigen::Vector3d kPoint(0.3, -0.2, 0.9);
 
-// The corner of the picture, half a pixel beside the first one's middle, stays where it is.
-TEST(ModelChanges, LargerPicturesSeeTheSame) {
+// The corner of the image, half a pixel from the centre of the first pixel, is fixed.
+TEST(ModelChanges, ResizingScalesPixelCoordinates) {
   for (const CameraModel& model : {CameraModel(kPinhole), CameraModel(CahvModel{kPinhole, 3}),
                                    CameraModel(RadialTangentialModel(kPinhole, {-0.2, 0.05, 1e-3, 2e-3}))}) {
     for (const double factor : {0.5, 2.0}) {
@@ -21,7 +21,7 @@ TEST(ModelChanges, LargerPicturesSeeTheSame) {
   }
 }
 
-TEST(ModelChanges, LowerRowsSeeTheSameFurtherDown) {
+TEST(ModelChanges, RowOffsetsShiftTheImage) {
   for (const CameraModel& model : {CameraModel(kPinhole), CameraModel(CahvModel{kPinhole, 3}),
                                    CameraModel(RadialTangentialModel(kPinhole, {-0.2, 0.05, 1e-3, 2e-3}))}) {
     const Eigen::Vector2d before = *project(model, kPoint), after = *project(with_rows_lower(model, 7), kPoint);
@@ -29,8 +29,8 @@ TEST(ModelChanges, LowerRowsSeeTheSameFurtherDown) {
   }
 }
 
-// r_u = r_d/(1 + k r_d²), from the middle to the corner.
-TEST(ModelChanges, APinholeIsBent) {
+// r_u = r_d/(1 + k r_d²), from the centre to the corner of the image.
+TEST(ModelChanges, DivisionModelIsApproximated) {
   constexpr ImageSize kSize{640, 480};
   for (const double k : {-0.6, -0.3, -0.1, 0.1, 0.4}) {
     const CameraModel bent = with_radial(kPinhole, k, kSize);

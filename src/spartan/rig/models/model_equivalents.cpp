@@ -38,7 +38,8 @@ CameraModel plainest(const CahvModel& m) {
   return m;
 }
 
-// Whether the light is bent about z, and not scaled there: what models without an axis of their own can say.
+// Whether the distortion is centred on z with r0 = 0 and there is no skew: the case that models without a separate
+// optical axis can represent.
 bool is_about_z(const CahvModel& cahv, const Eigen::Vector3d& axis, const Radial& radial) {
   return cahv.skew_px == 0 && axis == Eigen::Vector3d::UnitZ() && radial[0] == 0;
 }

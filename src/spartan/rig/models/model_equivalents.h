@@ -1,4 +1,4 @@
-// One camera under several names: which models say the same thing.
+// Exact conversion between camera models.
 #pragma once
 
 #include <optional>
@@ -7,21 +7,21 @@
 
 namespace spartan {
 
-/// The plainest model with the same projection; its numbers are those of the given one:
+/// The simplest model with exactly the same projection; parameter values are copied unchanged:
 ///   radial_tangential without coefficients, double_sphere with ξ = α = 0, cahv without skew      → pinhole
 ///   cahvor with r = 0 → cahv;  cahvor about z with r0 = 0, without skew                          → radial_tangential
 ///   cahvore with L = 1, e = 0 → cahvor;  with L = 0, e = 0 about z with r0 = 0, without skew     → equidistant
 CameraModel plainest(const CameraModel& model);
 
-/// Whether k4, k5 or k6 counts: what many formats have no place for.
+/// Whether k4, k5 or k6 is not zero: the rational model, which many formats do not support.
 bool is_rational(const RadialTangentialModel& model);
 
-/// The skew of cahv, cahvor and cahvore, in pixels; 0 of models that have none.
+/// The skew of cahv, cahvor and cahvore, px; 0 for models without skew.
 double skew_px(const CameraModel& model);
-/// The same model with rows and columns at right angles.
+/// The same model with zero skew.
 CameraModel without_skew(const CameraModel& model);
 
-/// The same camera as a model of the wanted kind; none where that kind cannot say it.
+/// Converts to another type of model with exactly the same projection; nullopt if that type cannot represent it.
 template <class Model>
 std::optional<Model> expressed_as(const CameraModel& model);
 

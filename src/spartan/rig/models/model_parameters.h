@@ -1,4 +1,4 @@
-// How a camera model lists its numbers, so that files and checks need no knowledge of any single model.
+// Description of the parameters of a camera model, so that file formats and validation work for every model.
 #pragma once
 
 #include <limits>
@@ -7,16 +7,17 @@
 
 namespace spartan {
 
-/// One key of a model in rig.yaml, holding a list of numbers.
+/// One parameter of a model: a key in rig.yaml that holds a list of numbers.
 struct ModelParameterKind {
-  std::string_view key;     ///< with its unit, as "focal_px"
-  std::vector<int> counts;  ///< how many numbers there may be
-  bool positive = false;    ///< each number must be above zero; all must be finite in any case
+  std::string_view key;     ///< with its unit: "focal_px"
+  std::vector<int> counts;  ///< the allowed numbers of values
+  bool positive = false;    ///< each value must be positive; all must be finite in any case
+  /// Bounds of each value, inclusive.
   double least = -std::numeric_limits<double>::infinity(), most = std::numeric_limits<double>::infinity();
-  bool unit_length = false;  ///< the numbers are a direction of length 1 (within 0.001)
+  bool unit_length = false;  ///< the values are a unit vector (within 0.001)
 };
 
-/// The numbers of a model, one list for each of its kinds, in their order.
+/// The values of a model: one list for each ModelParameterKind, in the same order.
 using ModelParameters = std::vector<std::vector<double>>;
 
 }  // namespace spartan

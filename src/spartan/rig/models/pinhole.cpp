@@ -3,7 +3,7 @@
 namespace spartan {
 
 std::vector<ModelParameterKind> PinholeModel::parameter_kinds() {
-  // No lens has more; numbers beyond say that a file is damaged.
+  // No real lens reaches this value; larger ones indicate a damaged file.
   constexpr double kMost_px = 1e7;
   return {{.key = "focal_px", .counts = {2}, .positive = true, .most = kMost_px},
           {.key = "centre_px", .counts = {2}, .least = -kMost_px, .most = kMost_px}};

@@ -1,4 +1,4 @@
-// The pinhole camera.
+// The pinhole camera model.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace spartan {
 
-/// u = fx x/z + cx, v = fy y/z + cy. Valid for z > 0. Pixel centres are integers.
+/// u = fx x/z + cx, v = fy y/z + cy. Domain: z > 0. Integer coordinates are pixel centres.
 struct PinholeModel {
   double fx = 1, fy = 1;  ///< px
   double cx = 0, cy = 0;  ///< px

@@ -25,7 +25,7 @@ Polynomial product(const Polynomial& a, const Polynomial& b) {
   return result;
 }
 
-// Between two neighbouring sign changes of p' the polynomial is monotone, so that bisection finds every one.
+// Between neighbouring sign changes of p' the polynomial is monotonic, so bisection finds every sign change of p.
 std::vector<double> sign_changes(Polynomial p, double low, double high) {
   while (!p.empty() && p.back() == 0) p.pop_back();
   if (p.size() < 2) return {};

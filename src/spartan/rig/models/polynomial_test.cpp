@@ -8,8 +8,8 @@
 namespace spartan::rig_detail {
 namespace {
 
-TEST(Polynomial, FindsEverySignChangeAndOnlyThose) {
-  // (s − 1)(s − 2)(s − 4)², the double root touches zero without a change.
+TEST(Polynomial, FindsExactlyTheSignChanges) {
+  // (s − 1)(s − 2)(s − 4)², with a double root that does not change the sign.
   const Polynomial p = product(product({-1, 1}, {-2, 1}), product({-4, 1}, {-4, 1}));
   const auto roots = sign_changes(p, 0, 10);
   ASSERT_EQ(roots.size(), 2u);
@@ -19,8 +19,8 @@ TEST(Polynomial, FindsEverySignChangeAndOnlyThose) {
   EXPECT_TRUE(sign_changes({1, 0, 0}, 0, 10).empty());
 }
 
-TEST(SolveIncreasing, InvertsWhereItCanAndSaysWhereNot) {
-  const auto cube = [](double x) { return Slope{x * x * x, 3 * x * x}; };
+TEST(SolveIncreasing, InvertsInsideTheRangeOnly) {
+  const auto cube = [](double x) { return ValueWithDerivative{x * x * x, 3 * x * x}; };
   for (const double target : {0.0, 1e-9, 0.5, 8.0, 26.9}) {
     const auto x = solve_increasing(cube, target, 0, 3, 2);
     ASSERT_TRUE(x) << target;
@@ -32,9 +32,9 @@ TEST(SolveIncreasing, InvertsWhereItCanAndSaysWhereNot) {
   EXPECT_NEAR(*solve_increasing(cube, 1e9, 0, std::numeric_limits<double>::infinity(), 2), 1000, 1e-9);
 }
 
-// A wall on which Newton's method alone would run away.
-TEST(SolveIncreasing, HoldsAgainstFlatParts) {
-  const auto step = [](double x) { return Slope{std::atan(50 * x), 50 / (1 + 2500 * x * x)}; };
+// A step function for which plain Newton iterations diverge.
+TEST(SolveIncreasing, ConvergesOnFlatParts) {
+  const auto step = [](double x) { return ValueWithDerivative{std::atan(50 * x), 50 / (1 + 2500 * x * x)}; };
   EXPECT_NEAR(*solve_increasing(step, std::atan(0.5), -10, 10, 9.0), 0.01, 1e-12);
 }
 

@@ -18,27 +18,27 @@ using rig_detail::value;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// With s = r² and c = N/D: d(r c)/dr = c + 2 s dc/ds = (N D + 2 s (N' D − N D')) / D². The map grows from the centre
-// to the first zero of that numerator or of D.
-double radius_where_growth_ends(const RadialTangentialModel::Coefficients& k) {
+// With s = r² and c = N/D: d(r c)/dr = c + 2 s dc/ds = (N D + 2 s (N' D − N D')) / D². The map increases from the
+// centre to the first zero of that numerator or of D.
+double monotonic_limit(const RadialTangentialModel::Coefficients& k) {
   if (!std::all_of(k.begin(), k.end(), [](double v) { return std::isfinite(v); })) return 0;
   const Polynomial n{1, k[0], k[1], k[4]}, d{1, k[5], k[6], k[7]};
   const Polynomial slope_n = product(derivative(n), d), slope_d = product(n, derivative(d));
-  Polynomial growth = product(n, d);
-  for (std::size_t i = 0; i < slope_n.size(); ++i) growth[i + 1] += 2 * (slope_n[i] - slope_d[i]);
-  // A radius of 10⁶ is a line of sight 0.2″ from the image plane: nothing beyond can be seen.
+  Polynomial derivative_numerator = product(n, d);
+  for (std::size_t i = 0; i < slope_n.size(); ++i) derivative_numerator[i + 1] += 2 * (slope_n[i] - slope_d[i]);
+  // At a radius of 10⁶ a ray is 0.2″ from the image plane: nothing beyond is visible.
   constexpr double kLargestSquare = 1e12;
   double first = kInfinity;
-  for (const Polynomial* p : {static_cast<const Polynomial*>(&growth), &d}) {
+  for (const Polynomial* p : {static_cast<const Polynomial*>(&derivative_numerator), &d}) {
     for (const double root : sign_changes(*p, 0, kLargestSquare)) first = std::min(first, root);
   }
   return std::sqrt(first);
 }
 
-// (x', y') of a point of the normalised image plane, with ∂(x', y')/∂(x, y).
+// (x', y') of a point of the normalized image plane, with ∂(x', y')/∂(x, y).
 struct Distorted {
-  Eigen::Vector2d at;
-  Eigen::Matrix2d slope;
+  Eigen::Vector2d point;
+  Eigen::Matrix2d jacobian;
 };
 
 Distorted distort(const RadialTangentialModel::Coefficients& k, const Eigen::Vector2d& p) {
@@ -48,18 +48,18 @@ Distorted distort(const RadialTangentialModel::Coefficients& k, const Eigen::Vec
   const double c = n / d, dc = (dn - c * dd) / d;
   const double p1 = k[2], p2 = k[3];
   Distorted result;
-  result.at << x * c + 2 * p1 * x * y + p2 * (s + 2 * x * x), y * c + p1 * (s + 2 * y * y) + 2 * p2 * x * y;
+  result.point << x * c + 2 * p1 * x * y + p2 * (s + 2 * x * x), y * c + p1 * (s + 2 * y * y) + 2 * p2 * x * y;
   const double mixed = 2 * x * y * dc + 2 * p1 * x + 2 * p2 * y;
-  result.slope << c + 2 * x * x * dc + 2 * p1 * y + 6 * p2 * x, mixed, mixed,
+  result.jacobian << c + 2 * x * x * dc + 2 * p1 * y + 6 * p2 * x, mixed, mixed,
       c + 2 * y * y * dc + 6 * p1 * y + 2 * p2 * x;
   return result;
 }
 
 bool inside(const Distorted& distorted) {
-  return distorted.at.allFinite() && distorted.slope.determinant() > 0;
+  return distorted.point.allFinite() && distorted.jacobian.determinant() > 0;
 }
 
-// The radius that the radial map r → r c alone sends to `target`; the edge where it reaches no further.
+// Inverse of the radial map r → r c without tangential terms; near the edge of the domain if `target` is out of range.
 double undistorted_radius(const RadialTangentialModel& model, double target) {
   const RadialTangentialModel::Coefficients& k = model.coefficients();
   const auto radial = [&](double r) {
@@ -67,9 +67,9 @@ double undistorted_radius(const RadialTangentialModel& model, double target) {
     const double n = 1 + s * (k[0] + s * (k[1] + s * k[4])), d = 1 + s * (k[5] + s * (k[6] + s * k[7]));
     const double dn = k[0] + s * (2 * k[1] + s * 3 * k[4]), dd = k[5] + s * (2 * k[6] + s * 3 * k[7]);
     const double c = n / d;
-    return rig_detail::Slope{r * c, c + 2 * s * (dn - c * dd) / d};
+    return rig_detail::ValueWithDerivative{r * c, c + 2 * s * (dn - c * dd) / d};
   };
-  // Tangential terms may reach a little beyond what the radial map does.
+  // Tangential terms can map slightly beyond the range of the radial map.
   return rig_detail::solve_increasing(radial, target, 0, model.largest_radius(), target)
       .value_or(0.999 * model.largest_radius());
 }
@@ -77,7 +77,7 @@ double undistorted_radius(const RadialTangentialModel& model, double target) {
 }  // namespace
 
 RadialTangentialModel::RadialTangentialModel(PinholeModel pinhole, Coefficients coefficients)
-    : pinhole_(pinhole), coefficients_(coefficients), largest_radius_(radius_where_growth_ends(coefficients)) {}
+    : pinhole_(pinhole), coefficients_(coefficients), largest_radius_(monotonic_limit(coefficients)) {}
 
 std::vector<ModelParameterKind> RadialTangentialModel::parameter_kinds() {
   std::vector<ModelParameterKind> kinds = PinholeModel::parameter_kinds();
@@ -108,7 +108,8 @@ std::optional<Eigen::Vector2d> RadialTangentialModel::project(const Eigen::Vecto
   if (!(p.norm() < largest_radius_)) return std::nullopt;
   const Distorted distorted = distort(coefficients_, p);
   if (!inside(distorted)) return std::nullopt;
-  return Eigen::Vector2d(pinhole_.fx * distorted.at.x() + pinhole_.cx, pinhole_.fy * distorted.at.y() + pinhole_.cy);
+  return Eigen::Vector2d(pinhole_.fx * distorted.point.x() + pinhole_.cx,
+                         pinhole_.fy * distorted.point.y() + pinhole_.cy);
 }
 
 std::optional<ProjectionWithJacobian> RadialTangentialModel::project_with_jacobian(const Eigen::Vector3d& point) const {
@@ -118,7 +119,7 @@ std::optional<ProjectionWithJacobian> RadialTangentialModel::project_with_jacobi
   // ∂(u, v)/∂(x', y') · ∂(x', y')/∂(x, y) · ∂(x, y)/∂(X, Y, Z) with x = X/Z, y = Y/Z.
   Eigen::Matrix<double, 2, 3> by_point;
   by_point << 1, 0, -p.x(), 0, 1, -p.y();
-  by_point = Eigen::Vector2d(pinhole_.fx, pinhole_.fy).asDiagonal() * distort(coefficients_, p).slope * by_point;
+  by_point = Eigen::Vector2d(pinhole_.fx, pinhole_.fy).asDiagonal() * distort(coefficients_, p).jacobian * by_point;
   return ProjectionWithJacobian{*pixel, by_point / point.z()};
 }
 
@@ -129,23 +130,23 @@ std::optional<Ray> RadialTangentialModel::unproject(const Eigen::Vector2d& pixel
   const double length = target.norm();
   Eigen::Vector2d p = length > 0 ? Eigen::Vector2d(target * (undistorted_radius(*this, length) / length)) : target;
   Distorted distorted = distort(coefficients_, p);
-  double error = (distorted.at - target).norm();
-  const double settled = 1e-15 * (1 + length);  // what rounding leaves
-  for (int i = 0; i < 50 && error > settled; ++i) {
-    // A step that leads away (next to the edge, where the slope vanishes) is halved until it leads nearer.
-    Eigen::Vector2d step = distorted.slope.inverse() * (target - distorted.at);
-    bool nearer = false;
-    for (int half = 0; half < 30 && !nearer; ++half, step *= 0.5) {
+  double error = (distorted.point - target).norm();
+  const double rounding = 1e-15 * (1 + length);  // rounding level
+  for (int i = 0; i < 50 && error > rounding; ++i) {
+    // Step halving: near the edge, where the Jacobian becomes singular, a full step may increase the error.
+    Eigen::Vector2d step = distorted.jacobian.inverse() * (target - distorted.point);
+    bool improved = false;
+    for (int half = 0; half < 30 && !improved; ++half, step *= 0.5) {
       const Distorted next = distort(coefficients_, p + step);
-      const double next_error = (next.at - target).norm();
+      const double next_error = (next.point - target).norm();
       if (!((p + step).norm() < largest_radius_) || !inside(next) || !(next_error < error)) continue;
       p += step;
       distorted = next;
       error = next_error;
-      nearer = true;
+      improved = true;
       break;
     }
-    if (!nearer) break;
+    if (!improved) break;
   }
   if (!(error <= tolerance) || !(p.norm() < largest_radius_) || !inside(distorted)) return std::nullopt;
   return Ray{Eigen::Vector3d::Zero(), Eigen::Vector3d(p.x(), p.y(), 1).normalized()};
