@@ -209,7 +209,7 @@ std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
   const auto drawn = [](const sim::SensorFaults& faults, double outliers) -> Spoil {
     return [=](const TrueDrive& d, std::uint64_t seed, const Subset& subset) {
       sim::CompassOptions compass = d.scenario.compass;
-      if (outliers > 0) compass.outlier_share = outliers;
+      if (outliers > 0) compass.outlier_fraction = outliers;
       return arrivals(draw(d, faults, compass, seed), subset);
     };
   };
@@ -220,8 +220,10 @@ std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
       {"compass outliers 30 %", compass, 0, drive.motion->seconds(), drawn({}, 0.3)},
       {"wheel slip 80 % for 40 s", wheels, from, from + 40,
        [=](const TrueDrive& d, std::uint64_t s, const Subset& w) { return slipping(d, s, w, from, from + 40); }},
-      {"IMU gap 10 s", imu, from, from + 10, drawn({{"imu", "drop", from, from + 10}}, 0)},
-      {"IMU frozen 10 s", imu, from, from + 10, drawn({{"imu", "freeze", from, from + 10}}, 0)},
+      {"IMU gap 10 s", imu, from, from + 10,
+       drawn({{sim::MotionSensor::imu, sim::SensorFaultKind::drop, from, from + 10}}, 0)},
+      {"IMU frozen 10 s", imu, from, from + 10,
+       drawn({{sim::MotionSensor::imu, sim::SensorFaultKind::freeze, from, from + 10}}, 0)},
       {"NaN in 5 % of all samples", imu, 0, drive.motion->seconds(), with_nans},
       {"stamps reversed for 40 s", imu, from, from + 40,
        [=](const TrueDrive& d, std::uint64_t s, const Subset& w) {

@@ -20,7 +20,7 @@
 #include "spartan/rig/formats/rig_files.h"
 #include "spartan/sim/motion_sensors.h"
 #include "spartan/sim/scenario.h"
-#include "spartan/sim/simulator.h"
+#include "spartan/sim/world.h"
 
 namespace spartan {
 
@@ -63,7 +63,7 @@ inline std::optional<TrueDrive> open_true_drive(const std::string& folder, const
   drive.world = std::make_unique<sim::World>(sim::make_world(*scenario, *plan));
   drive.motion = std::make_unique<sim::BodyMotion>(*plan, sim::WheelGround{drive.world->shape, drive.world->wheel_lift},
                                                    scenario->chassis, Workers(2));
-  for (const sim::Shot& shot : plan->shots()) {
+  for (const sim::PlannedFrame& shot : plan->frames()) {
     const auto pair =
         std::find_if(rig->pairs.begin(), rig->pairs.end(), [&](const auto& p) { return p.name == shot.pair; });
     if (pair == rig->pairs.end() || !pair->for_odometry) continue;
@@ -131,8 +131,8 @@ inline DrawnDrive draw(const TrueDrive& drive, const sim::SensorFaults& faults, 
   DrawnDrive d;
   d.imu = sim::measure_imu(*drive.motion, s.imu, s.gravity_m_s2, faults, seed);
   d.wheels = sim::measure_wheels(*drive.motion, s.chassis, s.wheels, faults, seed);
-  d.compass = sim::measure_heading(*drive.motion, compass, faults, seed);
-  d.inclinometer = sim::measure_tilt(*drive.motion, s.inclinometer, faults, seed);
+  d.compass = sim::measure_compass(*drive.motion, compass, faults, seed);
+  d.inclinometer = sim::measure_inclinometer(*drive.motion, s.inclinometer, faults, seed);
   d.motions = MeasuredOdometryError().draw(drive, seed);
   return d;
 }
@@ -176,7 +176,7 @@ inline LocalizationOptions options_for(const TrueDrive& drive) {
   // Known, as recordings state it.
   options.gravity_m_s2 = drive.scenario.gravity_m_s2;
   const sim::Scenario& s = drive.scenario;
-  return with_stated(options, sim::stated_noise(s.imu, s.compass, s.inclinometer));
+  return with_stated(options, sim::specified_noise(s.imu, s.compass, s.inclinometer));
 }
 
 inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {

@@ -31,7 +31,7 @@ struct Stage {
     world_from_camera = {Eigen::Quaterniond(tilt.toRotationMatrix() * forward),
                          Eigen::Vector3d(0, 0, shape.height(0, 0) + 1)};
   }
-  Surroundings around() const { return {scene, sky, sun, soil, LightOptions{}.sky_lux}; }
+  LitScene around() const { return {scene, sky, sun, soil, LightOptions{}.sky_lux}; }
 };
 
 const Stage& stage() {
@@ -80,7 +80,7 @@ void EmbreeShadow(benchmark::State& state) {
       const Eigen::Vector3f from(rays.origin_x[k], rays.origin_y[k], rays.origin_z[k]),
           along(rays.direction_x[k], rays.direction_y[k], rays.direction_z[k]);
       const bool met = hits.distance[k] < 200;
-      rays.set(k, met ? Eigen::Vector3f(from + (hits.distance[k] - 1e-4F) * along) : from, stage().sun.towards(0),
+      rays.set(k, met ? Eigen::Vector3f(from + (hits.distance[k] - 1e-4F) * along) : from, stage().sun.direction(0),
                met ? 200.0F : -1.0F);
     }
   }

@@ -24,7 +24,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/rig/formats/rig_files.h"
-#include "spartan/sim/simulator.h"
+#include "spartan/sim/frame_preview.h"
 #include "spectrum_plot.h"
 
 namespace spartan {
@@ -219,9 +219,9 @@ std::optional<sim::SimulationRequest> load(const fs::path& file) {
 void measure(const fs::path& file, const std::string& pictures, std::vector<cv::Mat>& sheet, SpectrumPlot& plot) {
   const auto request = load(file);
   if (!request) return;
-  const auto& shots = request->drive.shots();
+  const auto& shots = request->drive.frames();
   for (const std::string pair : {"narrow", "wide"}) {
-    const auto shot = std::find_if(shots.begin(), shots.end(), [&](const sim::Shot& s) {
+    const auto shot = std::find_if(shots.begin(), shots.end(), [&](const sim::PlannedFrame& s) {
       return s.pair == pair && (pair == "narrow" || s.pan_rad == 0);
     });
     if (shot == shots.end()) continue;
