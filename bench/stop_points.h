@@ -130,10 +130,10 @@ inline std::vector<StopPoints> points_of_stops(const std::string& recording, con
   PositionMapper mapper(disparity, mapping, Workers(2));
   if (folder) std::filesystem::create_directories(*folder);
   std::size_t number = 0;
-  for (const auto& [position, shots] : drive->stops) {
+  for (const auto& [position, frames] : drive->stops) {
     if (number++ < stops.size()) continue;
-    const Stamp stamp = shots.front().left_stamp;
-    look(*drive, *imager, mapper, shots);
+    const Stamp stamp = frames.front().left_stamp;
+    add_views(*drive, *imager, mapper, frames);
     stops.push_back({stamp, true_pose(*drive, stamp), surface_points(mapper.merge())});
     if (!folder) continue;
     const Bytes bytes = to_bytes(stops.back());
