@@ -20,6 +20,7 @@ struct PlannedFrame {
   double pan_rad = 0, tilt_rad = 0;
 };
 
+/// Planar motion over time and the frames to take. A rover that follows it exactly is simulated by BodyMotion.
 class Drive {
  public:
   /// The rover is stationary for this time before it moves, so that gravity can be measured.

@@ -34,6 +34,7 @@ struct RayPacket {
   }
 };
 
+/// The hits of a RayPacket.
 struct HitPacket {
   alignas(32) float distance[kPacket];                                        ///< m; infinity without a hit
   alignas(32) float normal_x[kPacket], normal_y[kPacket], normal_z[kPacket];  ///< of the triangle, unit length

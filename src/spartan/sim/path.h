@@ -9,6 +9,7 @@
 
 namespace spartan::sim {
 
+/// Position and heading in the world plane; the heading is counter-clockwise from x.
 struct PlanarPose {
   double x = 0, y = 0, heading = 0;  ///< m, m, rad
 };

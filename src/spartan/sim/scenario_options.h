@@ -342,6 +342,7 @@ struct CaptureOptions {
   }
 };
 
+/// Geometry of the four-wheeled rover.
 struct ChassisOptions {
   double wheelbase_m = 0.7;     ///< m; front to rear axle
   double track_m = 0.6;         ///< m; left to right wheel
@@ -448,6 +449,7 @@ struct CompassOptions {
   }
 };
 
+/// An inclinometer for roll and pitch.
 struct InclinometerOptions {
   bool enabled = true;
   double rate_hz = 5;      ///< Hz
@@ -496,6 +498,7 @@ using SensorFaults = std::vector<SensorFault>;
 
 // --- Ground truth ---
 
+/// What ground truth is written.
 struct TruthOptions {
   bool disparity = true;
   double cell_m = 0.02;     ///< m

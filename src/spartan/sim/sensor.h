@@ -34,6 +34,7 @@ struct ImageFault {
   std::uint64_t dust_seed = 0;
 };
 
+/// The image sensor behind one camera's lens.
 class Sensor {
  public:
   Sensor(const SensorOptions& options, const Camera& camera);

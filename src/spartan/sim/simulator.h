@@ -15,6 +15,7 @@
 
 namespace spartan::sim {
 
+/// What to simulate, and where to write it.
 struct SimulationRequest {
   Scenario scenario;
   Rig rig;      ///< the true rig

@@ -9,6 +9,7 @@
 
 namespace spartan::sim {
 
+/// Albedo and scattering of soil and rocks; see SoilOptions for the model.
 class Soil {
  public:
   Soil(const SoilOptions& options, std::uint64_t seed);

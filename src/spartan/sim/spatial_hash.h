@@ -11,6 +11,7 @@
 
 namespace spartan::sim {
 
+/// Items in square cells of kCell_m.
 template <class Item>
 class SpatialHash {
  public:

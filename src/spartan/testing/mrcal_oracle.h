@@ -13,6 +13,7 @@ extern "C" {
 
 namespace spartan::testing {
 
+/// A camera model of mrcal.
 class MrcalModel {
  public:
   /// Name ("LENSMODEL_CAHVOR") and parameters in the order of mrcal. Throws std::invalid_argument where they do not

@@ -24,6 +24,7 @@ struct SyntheticWorldOptions {
   double noise_levels = 1.0;      ///< standard deviation of the image noise, gray levels
 };
 
+/// Height, albedo and ray intersections of the ground.
 class SyntheticTerrain {
  public:
   explicit SyntheticTerrain(const SyntheticWorldOptions& options);

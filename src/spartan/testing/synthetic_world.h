@@ -17,6 +17,7 @@ struct SyntheticShot {
   Image<std::uint8_t> mask;  ///< 255 visible in both cameras, 128 in the left one only, 0 no truth
 };
 
+/// Renders the ground of SyntheticTerrain with sunlight, sky light and image noise.
 class SyntheticWorld {
  public:
   explicit SyntheticWorld(const SyntheticWorldOptions& options);
