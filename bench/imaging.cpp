@@ -200,8 +200,7 @@ void compare_debayering(const std::vector<Pair>& pairs, int threads) {
     table.note(pair.name, "full colour", score(pair, full, {}, threads));
     const RawPair mosaics{mosaic_of(left), mosaic_of(right), {}};
     for (const char* method : {"bilinear", "edge_aware"}) {
-      ImagingOptions options;
-      options.debayer = method;
+      const auto options = must(set_option(ImagingOptions(), fmt::format("debayer={}", method)));
       table.note(pair.name, method, score(pair, mosaics, options, threads));
     }
   }
