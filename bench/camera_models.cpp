@@ -1,5 +1,5 @@
-// Every camera model beside its oracle: the largest difference on a grid over the whole picture, the round trip pixel →
-// ray → pixel, the Jacobians beside central differences, and the time of a projection beside OpenCV's or mrcal's.
+// Compares every camera model with a reference implementation (OpenCV or mrcal): largest difference on a grid over the
+// image, round trip pixel → ray → pixel, Jacobians against central differences, and time of a projection.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -32,9 +32,9 @@ using Pixels = std::vector<cv::Point2d>;
 
 struct Oracle {
   std::string name;
-  std::function<Pixels(const Points&)> project;  // empty: none
-  double unit_distance = 0;                      // > 0: compares at this distance from the camera's origin only
-  double least_z = 0;                            // of a direction
+  std::function<Pixels(const Points&)> project;  // empty: no reference
+  double unit_distance = 0;                      // > 0: compare at this distance from the camera's origin only
+  double min_z = 0;                              // of the compared directions
 };
 
 struct Case {
@@ -49,28 +49,28 @@ cv::Matx33d matrix() {
 
 Oracle opencv(const std::vector<double>& distortion) {
   return {"OpenCV projectPoints", [distortion](const Points& points) {
-            Pixels seen;
-            cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), matrix(), distortion, seen);
-            return seen;
+            Pixels projected;
+            cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), matrix(), distortion, projected);
+            return projected;
           }};
 }
 
 Oracle opencv_fisheye(const EquidistantModel::Coefficients& k) {
   return {"OpenCV fisheye",
           [k](const Points& points) {
-            Pixels seen;
-            cv::fisheye::projectPoints(points, seen, cv::Vec3d(), cv::Vec3d(), matrix(),
+            Pixels projected;
+            cv::fisheye::projectPoints(points, projected, cv::Vec3d(), cv::Vec3d(), matrix(),
                                        cv::Vec4d(k[0], k[1], k[2], k[3]));
-            return seen;
+            return projected;
           },
           0, 0.01};
 }
 
 Oracle opencv_omnidir(double xi) {
   return {"OpenCV omnidir", [xi](const Points& points) {
-            Pixels seen;
-            cv::omnidir::projectPoints(points, seen, cv::Vec3d(), cv::Vec3d(), matrix(), xi, cv::Vec4d());
-            return seen;
+            Pixels projected;
+            cv::omnidir::projectPoints(points, projected, cv::Vec3d(), cv::Vec3d(), matrix(), xi, cv::Vec4d());
+            return projected;
           }};
 }
 
@@ -79,13 +79,13 @@ Oracle mrcal(const std::string& name, std::vector<double> intrinsics, double uni
   const testing::MrcalModel model(name, std::move(intrinsics));
   return {"mrcal",
           [model](const Points& points) {
-            Pixels seen;
-            seen.reserve(points.size());
+            Pixels projected;
+            projected.reserve(points.size());
             for (const cv::Point3d& p : points) {
               const Eigen::Vector2d q = model.project({p.x, p.y, p.z});
-              seen.emplace_back(q.x(), q.y());
+              projected.emplace_back(q.x(), q.y());
             }
-            return seen;
+            return projected;
           },
           unit_distance};
 }
@@ -124,22 +124,22 @@ std::vector<Case> cases() {
 // The point on the ray at that distance from the camera's origin.
 Eigen::Vector3d at_distance(const Ray& ray, double distance) {
   const double along = ray.origin.dot(ray.direction);
-  const double way = std::sqrt(along * along - ray.origin.squaredNorm() + distance * distance) - along;
-  return ray.origin + way * ray.direction;
+  const double t = std::sqrt(along * along - ray.origin.squaredNorm() + distance * distance) - along;
+  return ray.origin + t * ray.direction;
 }
 
 struct Accuracy {
-  int seen = 0, asked = 0, compared = 0;
-  double oracle_px = 0, round_trip_px = 0, jacobian = 0;  // largest; the last relative
+  int with_ray = 0, tested = 0, compared = 0;
+  double oracle_px = 0, round_trip_px = 0, jacobian = 0;  // largest errors; that of the Jacobian is relative
 };
 
-Accuracy judge(const Case& c) {
+Accuracy measure_accuracy(const Case& c) {
   Accuracy a;
   for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, kGrid)) {
-    ++a.asked;
+    ++a.tested;
     const auto ray = unproject(c.model, pixel);
     if (!ray) continue;
-    ++a.seen;
+    ++a.with_ray;
     const Eigen::Vector3d point = at_distance(*ray, c.oracle.unit_distance > 0 ? c.oracle.unit_distance : 3);
     const auto ours = project_with_jacobian(c.model, point);
     if (!ours) continue;
@@ -147,7 +147,7 @@ Accuracy judge(const Case& c) {
     const auto numeric = testing::numeric_jacobian<2, 3>(
         [&](const Eigen::Vector3d& p) { return project(c.model, p).value_or(Eigen::Vector2d(NAN, NAN)); }, point, 3e-4);
     if (numeric.allFinite()) a.jacobian = std::max(a.jacobian, (ours->by_point - numeric).norm() / numeric.norm());
-    if (!c.oracle.project || ray->direction.z() < c.oracle.least_z) continue;
+    if (!c.oracle.project || ray->direction.z() < c.oracle.min_z) continue;
     const cv::Point2d other = c.oracle.project({{point.x(), point.y(), point.z()}}).front();
     a.oracle_px = std::max(a.oracle_px, std::hypot(other.x - ours->pixel.x(), other.y - ours->pixel.y()));
     ++a.compared;
@@ -156,7 +156,7 @@ Accuracy judge(const Case& c) {
 }
 
 void report(const Case& c) {
-  const Accuracy a = judge(c);
+  const Accuracy a = measure_accuracy(c);
   std::vector<Eigen::Vector2d> pixels;
   std::vector<Eigen::Vector3d> points;
   Points same;
@@ -183,9 +183,9 @@ void report(const Case& c) {
       c.oracle.project ? median_milliseconds(kRuns, [&] { sum += c.oracle.project(same).front().x; }) : NAN;
   constexpr double kPerMillion = 1e6 / kPoints;
   fmt::print("| {} | {} | {:.0f} % | {} | {:.1e} | {:.1e} | {:.0f} | {:.0f} | {:.0f} | {} |\n", c.name, c.oracle.name,
-             100.0 * a.seen / a.asked, c.oracle.project ? fmt::format("{:.1e}", a.oracle_px) : "-", a.round_trip_px,
-             a.jacobian, project_ms * kPerMillion, jacobian_ms * kPerMillion, unproject_ms * kPerMillion,
-             c.oracle.project ? fmt::format("{:.0f}", oracle_ms * kPerMillion) : "-");
+             100.0 * a.with_ray / a.tested, c.oracle.project ? fmt::format("{:.1e}", a.oracle_px) : "-",
+             a.round_trip_px, a.jacobian, project_ms * kPerMillion, jacobian_ms * kPerMillion,
+             unproject_ms * kPerMillion, c.oracle.project ? fmt::format("{:.0f}", oracle_ms * kPerMillion) : "-");
   if (!std::isfinite(sum)) fmt::print("not finite\n");
 }
 
@@ -195,10 +195,12 @@ void report(const Case& c) {
 int main() try {
   cv::setNumThreads(1);
   fmt::print(
-      "Grid of {0} x {0} places over {1} x {2} px; ms per million, medians of {3} runs on one thread.\n"
-      "| model | oracle | seen | oracle, px | round trip, px | Jacobian, relative | project | with Jacobian | "
+      "Grid of {0} x {0} points over {1} x {2} px; times in ms per million calls, medians of {3} runs on one thread.\n"
+      "| model | reference | grid with a ray | largest difference, px | round trip, px | Jacobian, relative | project "
+      "| with "
+      "Jacobian | "
       "unproject | "
-      "oracle's project |\n|---|---|---|---|---|---|---|---|---|---|\n",
+      "reference: project |\n|---|---|---|---|---|---|---|---|---|---|\n",
       spartan::kGrid + 1, spartan::kSize.width, spartan::kSize.height, spartan::kRuns);
   for (const spartan::Case& c : spartan::cases()) spartan::report(c);
 } catch (const std::exception& e) {

@@ -1,5 +1,5 @@
-// Debayering beside OpenCV's on mosaics made of real colour images: PSNR against the full-colour image and time, one
-// thread. `make bench-debayer`.
+// Compares debayering with OpenCV on mosaics sampled from real colour images: PSNR against the full-colour image, and
+// time on one thread. `make bench-debayer`.
 //
 //   debayer [--repeat N]
 #include "spartan/imaging/debayer.h"
@@ -35,7 +35,7 @@ using spartan::PixelLayout;
 using spartan::Rgb8;
 namespace fs = std::filesystem;
 
-constexpr int kBorder = 8;  // left out on every side, for all methods
+constexpr int kBorder = 8;  // pixels ignored at every side, for all methods
 
 using spartan::median;
 using spartan::milliseconds;
@@ -51,12 +51,12 @@ const Pattern kPatterns[] = {
     {PixelLayout::bayer_gbrg, "gbrg", cv::COLOR_BayerGR2RGB, cv::COLOR_BayerGR2RGB_VNG, cv::COLOR_BayerGR2RGB_EA},
     {PixelLayout::bayer_bggr, "bggr", cv::COLOR_BayerRG2RGB, cv::COLOR_BayerRG2RGB_VNG, cv::COLOR_BayerRG2RGB_EA}};
 
-// Of three 8-bit channels together.
-double psnr(const cv::Mat& truth, const cv::Mat& found, int rows_down = 0) {
+// Over all three 8-bit channels.
+double psnr(const cv::Mat& truth, const cv::Mat& result, int row_offset = 0) {
   double squares = 0, count = 0;
   for (int y = kBorder; y < truth.rows - kBorder; ++y) {
     const std::uint8_t* const t = truth.ptr(y);
-    const std::uint8_t* const f = found.ptr(y + rows_down);
+    const std::uint8_t* const f = result.ptr(y + row_offset);
     for (int i = 3 * kBorder; i < 3 * (truth.cols - kBorder); ++i) {
       squares += (t[i] - f[i]) * (t[i] - f[i]);
       ++count;
@@ -79,10 +79,10 @@ cv::Mat mosaic_of(const cv::Mat& colours, const Pattern& pattern) {
 struct Method {
   std::string name;
   std::function<void(const cv::Mat& mosaic, const Pattern&, cv::Mat& result)> run;
-  int rows_down = 0;  // where it puts row 0 of the picture
+  int row_offset = 0;  // row of the result that belongs to row 0 of the image
 };
 
-Method ours(const std::string& name, DebayerMethod method, const std::string& simd = "auto") {
+Method spartan_method(const std::string& name, DebayerMethod method, const std::string& simd = "auto") {
   auto debayerer = std::make_shared<Debayerer>(method, simd);
   return {name, [debayerer](const cv::Mat& mosaic, const Pattern& pattern, cv::Mat& result) {
             result.create(mosaic.size(), CV_8UC3);
@@ -91,23 +91,23 @@ Method ours(const std::string& name, DebayerMethod method, const std::string& si
           }};
 }
 
-Method theirs(const std::string& name, int Pattern::*code, int rows_down = 0) {
+Method opencv(const std::string& name, int Pattern::*code, int row_offset = 0) {
   return {name,
           [code](const cv::Mat& mosaic, const Pattern& pattern, cv::Mat& result) {
             cv::cvtColor(mosaic, result, pattern.*code);
           },
-          rows_down};
+          row_offset};
 }
 
 std::vector<Method> methods() {
-  return {
-      ours("ours bilinear", DebayerMethod::bilinear), ours("ours edge-aware", DebayerMethod::edge_aware),
-      theirs("OpenCV bilinear", &Pattern::bilinear), theirs("OpenCV VNG", &Pattern::vng),
-      // OpenCV 4.6 writes what belongs to row y + 2 into row y; set right here, so that the method itself is judged.
-      theirs("VNG set right", &Pattern::vng, -2), theirs("OpenCV EA", &Pattern::edge_aware)};
+  return {spartan_method("Spartan bilinear", DebayerMethod::bilinear),
+          spartan_method("Spartan edge-aware", DebayerMethod::edge_aware),
+          opencv("OpenCV bilinear", &Pattern::bilinear), opencv("OpenCV VNG", &Pattern::vng),
+          // OpenCV 4.6 writes row y + 2 of the result into row y; compensated here, to measure the method itself.
+          opencv("VNG shifted", &Pattern::vng, -2), opencv("OpenCV EA", &Pattern::edge_aware)};
 }
 
-std::vector<fs::path> pictures(const fs::path& data) {
+std::vector<fs::path> find_images(const fs::path& data) {
   std::vector<fs::path> found;
   for (const auto& entry : fs::directory_iterator(data / "middlebury")) {
     for (const char* view : {"view1.png", "view5.png"}) {
@@ -123,13 +123,13 @@ void compare(const std::vector<fs::path>& files, int repeat) {
   std::vector<double> mean(all.size());
   std::vector<std::map<std::string, double>> by_pattern(all.size());
   std::vector<std::vector<double>> times(all.size());
-  fmt::print("PSNR, dB; means of the four patterns\n{:<22}", "picture");
+  fmt::print("PSNR, dB; means of the four Bayer patterns\n{:<22}", "image");
   for (const Method& m : all) fmt::print(" {:>15}", m.name);
   fmt::print("\n");
   for (const fs::path& file : files) {
     cv::Mat colours;
     cv::cvtColor(cv::imread(file.string()), colours, cv::COLOR_BGR2RGB);
-    std::vector<double> of_picture(all.size());
+    std::vector<double> of_image(all.size());
     for (const Pattern& pattern : kPatterns) {
       const cv::Mat mosaic = mosaic_of(colours, pattern);
       for (std::size_t i = 0; i < all.size(); ++i) {
@@ -138,14 +138,14 @@ void compare(const std::vector<fs::path>& files, int repeat) {
         runs.reserve(static_cast<std::size_t>(repeat));
         for (int r = 0; r < repeat; ++r) runs.push_back(milliseconds([&] { all[i].run(mosaic, pattern, result); }));
         times[i].push_back(median(runs));
-        const double value = psnr(colours, result, all[i].rows_down);
-        of_picture[i] += value / std::size(kPatterns);
+        const double value = psnr(colours, result, all[i].row_offset);
+        of_image[i] += value / std::size(kPatterns);
         by_pattern[i][pattern.block] += value / static_cast<double>(files.size());
         mean[i] += value / static_cast<double>(files.size() * std::size(kPatterns));
       }
     }
     fmt::print("{:<22}", file.parent_path().filename().string() + "/" + file.stem().string());
-    for (const double value : of_picture) fmt::print(" {:15.2f}", value);
+    for (const double value : of_image) fmt::print(" {:15.2f}", value);
     fmt::print("\n");
   }
   for (const Pattern& pattern : kPatterns) {
@@ -160,7 +160,7 @@ void compare(const std::vector<fs::path>& files, int repeat) {
   fmt::print("\n");
 }
 
-// One large mosaic on every instruction set, colour and luma of 8 and 16 bits.
+// One large mosaic on every instruction set: RGB and luma output, 8 and 16 bits.
 void time_targets(int repeat) {
   constexpr int kSide = 1120;
   Image<std::uint8_t> mosaic8(kSide, kSide);
@@ -220,9 +220,9 @@ int main(int argc, char** argv) try {
   const char* const data = std::getenv("SPARTAN_DATA");
   const fs::path folder = data != nullptr ? data : "../shared/data";
   if (fs::exists(folder / "middlebury")) {
-    compare(pictures(folder), repeat);
+    compare(find_images(folder), repeat);
   } else {
-    fmt::print("no colour pictures: SPARTAN_DATA does not name the data folder\n");
+    fmt::print("no colour images: set SPARTAN_DATA to the data folder\n");
   }
   time_targets(repeat);
   return 0;

@@ -1,4 +1,5 @@
-// What the imaging options do to stereo on the real pairs with truth, and what they cost. `make bench-imaging`.
+// Effect of the imaging options on stereo matching of real pairs with ground truth, and their cost. `make
+// bench-imaging`.
 //
 //   imaging [--threads N]
 #include <fmt/format.h>
@@ -51,10 +52,10 @@ const std::vector<Variant> kGrayVariants = {
     {"stretch, balance", with(true, true)},     {"stretch, local 2", with(false, true, 2)},
     {"stretch, local 4", with(false, true, 4)}, {"all three, local 2", with(true, true, 2)}};
 
-/// Two images as they come from the cameras.
-struct Shot {
+/// Two images as recorded.
+struct RawPair {
   FrameImage left, right;
-  std::vector<double> vignetting;  ///< that the rig states of both eyes
+  std::vector<double> vignetting;  ///< coefficients in the rig file, both cameras
 };
 
 struct Scores {
@@ -67,21 +68,21 @@ struct Scores {
   }
 };
 
-Scores score(const Pair& pair, const Shot& shot, const ImagingOptions& options, int threads) {
-  Camera eye;
-  eye.name = "left";
-  eye.size = shot.left.size();
-  eye.pixel_format = shot.left.format();
-  eye.model = PinholeModel{1000, 1000, (eye.size.width - 1) / 2.0, (eye.size.height - 1) / 2.0};
-  eye.vignetting.coefficients = shot.vignetting;
-  Camera right = eye;
+Scores score(const Pair& pair, const RawPair& raw, const ImagingOptions& options, int threads) {
+  Camera left;
+  left.name = "left";
+  left.size = raw.left.size();
+  left.pixel_format = raw.left.format();
+  left.model = PinholeModel{1000, 1000, (left.size.width - 1) / 2.0, (left.size.height - 1) / 2.0};
+  left.vignetting.coefficients = raw.vignetting;
+  Camera right = left;
   right.name = "right";
-  const Rig rig = rig_of_one_pair(pair.name, eye, right, Pose(Eigen::Quaterniond::Identity(), {-0.1, 0, 0}));
+  const Rig rig = rig_of_one_pair(pair.name, left, right, Pose(Eigen::Quaterniond::Identity(), {-0.1, 0, 0}));
   auto imager = must(Imager::create(rig, options, Workers(threads)));
   StereoFrame frame;
   frame.pair = rig.pairs.front().name;
-  frame.left = shot.left;
-  frame.right = shot.right;
+  frame.left = raw.left;
+  frame.right = raw.right;
   std::vector<double> times;
   RectifiedPair rectified;
   for (int i = 0; i < 5; ++i) {
@@ -97,20 +98,20 @@ Scores score(const Pair& pair, const Shot& shot, const ImagingOptions& options, 
           *std::min_element(times.begin(), times.end())};
 }
 
-/// The picture as another eye might have taken it: levels times `gain` and the light at each pixel, 12 bits.
-FrameImage taken_with(ImageView<const std::uint8_t> image, double gain, const std::vector<double>& vignetting) {
+/// The image as recorded by a camera with another gain and vignetting, 12 bits.
+FrameImage simulate_lens(ImageView<const std::uint8_t> image, double gain, const std::vector<double>& vignetting) {
   const PixelFormat format{PixelLayout::gray, 12};
   const Vignetting lens{vignetting, {}};
-  Image<std::uint16_t> taken(image.size());
+  Image<std::uint16_t> recorded(image.size());
   const double cx = (image.width() - 1) / 2.0, cy = (image.height() - 1) / 2.0;
   const double diagonal_squared = image.width() * image.width() + image.height() * image.height();
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
       const double rho2 = 4 * ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / diagonal_squared;
-      taken(x, y) = static_cast<std::uint16_t>(std::min(4095.0, image(x, y) * 16 * gain * lens.light_at(rho2)));
+      recorded(x, y) = static_cast<std::uint16_t>(std::min(4095.0, image(x, y) * 16 * gain * lens.light_at(rho2)));
     }
   }
-  return FrameImage::own(std::move(taken), format);
+  return FrameImage::own(std::move(recorded), format);
 }
 
 Image<Rgb8> read_colours(const std::filesystem::path& path) {
@@ -163,50 +164,49 @@ class Table {
 };
 
 void compare_contrast(const std::vector<Pair>& pairs, int threads) {
-  Table table("Gray pairs as they are");
+  Table table("Gray pairs, unchanged");
   for (const Pair& pair : pairs) {
-    const Shot shot{FrameImage::borrow(pair.left.view(), {}), FrameImage::borrow(pair.right.view(), {}), {}};
-    for (const Variant& v : kGrayVariants) table.note(pair.name, v.name, score(pair, shot, v.options, threads));
+    const RawPair raw{FrameImage::borrow(pair.left.view(), {}), FrameImage::borrow(pair.right.view(), {}), {}};
+    for (const Variant& v : kGrayVariants) table.note(pair.name, v.name, score(pair, raw, v.options, threads));
   }
 }
 
 void compare_lenses(const std::vector<Pair>& pairs, int threads) {
-  Table table("12 bits; the right eye at 0.6 of the light, then both eyes with 0.4 of the light in the corners");
+  Table table("12 bits; right camera at 0.6 of the light, then both cameras with vignetting to 0.4 in the corners");
   for (const Pair& pair : pairs) {
-    const Shot dark{taken_with(pair.left, 1, {}), taken_with(pair.right, 0.6, {}), {}};
+    const RawPair dark{simulate_lens(pair.left, 1, {}), simulate_lens(pair.right, 0.6, {}), {}};
     for (const bool balance : {false, true}) {
       ImagingOptions options;
       options.balance = balance;
       table.note(pair.name, balance ? "dark right, balance" : "dark right", score(pair, dark, options, threads));
     }
     const std::vector<double> lens{-0.6};
-    const Shot shaded{taken_with(pair.left, 1, lens), taken_with(pair.right, 1, lens), lens};
+    const RawPair shaded{simulate_lens(pair.left, 1, lens), simulate_lens(pair.right, 1, lens), lens};
     for (const bool undo : {false, true}) {
       ImagingOptions options;
       options.vignetting = undo;
-      table.note(pair.name, undo ? "shaded, undone" : "shaded", score(pair, shaded, options, threads));
+      table.note(pair.name, undo ? "vignetting, corrected" : "vignetting", score(pair, shaded, options, threads));
     }
   }
 }
 
 void compare_debayering(const std::vector<Pair>& pairs, int threads) {
-  Table table("Colour pairs as mosaics");
+  Table table("Colour pairs as Bayer mosaics");
   for (const Pair& pair : pairs) {
     if (!std::filesystem::exists(pair.folder / "view5.png")) continue;
     const auto left = read_colours(pair.folder / "view1.png"), right = read_colours(pair.folder / "view5.png");
     const PixelFormat rgb{PixelLayout::rgb, 8};
-    const Shot full{FrameImage::borrow(left.view(), rgb), FrameImage::borrow(right.view(), rgb), {}};
+    const RawPair full{FrameImage::borrow(left.view(), rgb), FrameImage::borrow(right.view(), rgb), {}};
     table.note(pair.name, "full colour", score(pair, full, {}, threads));
-    const Shot mosaics{mosaic_of(left), mosaic_of(right), {}};
+    const RawPair mosaics{mosaic_of(left), mosaic_of(right), {}};
     for (const char* method : {"bilinear", "edge_aware"}) {
-      ImagingOptions options;
-      options.debayer = method;
+      const auto options = must(set_option(ImagingOptions(), fmt::format("debayer={}", method)));
       table.note(pair.name, method, score(pair, mosaics, options, threads));
     }
   }
 }
 
-/// The median of left level / right level over pixels that stereo matches.
+/// The median ratio of left to right gray level over pixels matched by stereo.
 double matched_ratio(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, int threads) {
   DisparityComputer computer(DisparityOptions{}, Workers(threads));
   const auto image = must(computer.compute(left, right, {0, 127}));
@@ -215,16 +215,17 @@ double matched_ratio(ImageView<const std::uint8_t> left, ImageView<const std::ui
   for (int y = 0; y < left.height(); ++y) {
     for (int x = 0; x < left.width(); ++x) {
       const float d = image.disparity(x, y);
-      const int there = std::isnan(d) ? -1 : x - static_cast<int>(std::lround(d));
-      if (there < 0 || left(x, y) < 8 || right(there, y) < 8 || left(x, y) > 254 || right(there, y) > 254) continue;
-      // Levels are whole: spread evenly, so that the median of their ratios lies between them.
-      ratios.push_back((left(x, y) + random.uniform(-0.5, 0.5)) / right(there, y));
+      const int right_x = std::isnan(d) ? -1 : x - static_cast<int>(std::lround(d));
+      if (right_x < 0 || left(x, y) < 8 || right(right_x, y) < 8 || left(x, y) > 254 || right(right_x, y) > 254)
+        continue;
+      // Dither: gray levels are integers, and the median of their ratios would be quantized.
+      ratios.push_back((left(x, y) + random.uniform(-0.5, 0.5)) / right(right_x, y));
     }
   }
   return median(std::move(ratios));
 }
 
-/// What the histograms say about the brightness of the eyes, frame by frame, against the pixels that stereo matches.
+/// Brightness ratio of the cameras by histograms, frame by frame, against the ratio over pixels matched by stereo.
 void compare_gains(const std::filesystem::path& folder, int threads) {
   fmt::print("\n{:<14} {:>6} {:>11} {:>9} {:>13} {:>11}\n", "recording", "frames", "RMS error", "largest",
              "largest step", "of the gain");
@@ -262,7 +263,7 @@ void run(int threads) {
   const char* const data = std::getenv("SPARTAN_DATA");
   const std::filesystem::path folder = data != nullptr ? data : "../shared/data";
   if (!std::filesystem::exists(folder / "middlebury")) {
-    fmt::print("no stereo pairs: SPARTAN_DATA does not name the data folder\n");
+    fmt::print("no stereo pairs: set SPARTAN_DATA to the data folder\n");
     return;
   }
   const std::vector<Pair> pairs = load_stereo_pairs(folder);

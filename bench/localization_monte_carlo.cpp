@@ -1,11 +1,11 @@
-// Localization over drawn drives: `make bench-localization_monte_carlo`.
+// Monte Carlo test of the localization: `make bench-localization_monte_carlo`.
 //
 //   localization_monte_carlo [--seeds N] [--first SEED] [--threads N] [--tables subsets|faults] [--config FOLDER]
 //   [SCENARIO...]
 //
-// The rover's true motion is the simulator's; its sensors are drawn anew for each seed, and so is the odometry, from
-// the error that was measured on rendered drives (MeasuredOdometryError). Nothing is rendered. Trials are paired: all
-// subsets of sensors see the same drive, the same readings and the same odometry. Default: rocky_20pct, crater_rim,
+// The true motion comes from the simulator; for each seed the sensor errors are drawn anew, and the odometry errors
+// from the model measured on rendered drives (MeasuredOdometryError). Nothing is rendered. Trials are paired: all
+// subsets of sensors use the same drive, the same samples and the same odometry. Default: rocky_20pct, crater_rim,
 // loop.
 #include <fmt/format.h>
 
@@ -23,7 +23,8 @@ struct Mean {
   double mean = 0, half_width = 0;  // of the 95 % confidence interval
 };
 
-// Student's t for n − 1 degrees of freedom, within 1 % from n = 8 on: 1.96 + 2.4 / (n − 1).
+// 97.5 % quantile of Student's t with n − 1 degrees of freedom, approximated within 1 % for n ≥ 8 by
+// 1.96 + 2.4 / (n − 1).
 Mean mean_of(const std::vector<double>& values) {
   const auto n = static_cast<double>(values.size());
   const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
@@ -32,7 +33,8 @@ Mean mean_of(const std::vector<double>& values) {
   return {mean, n > 1 ? (1.96 + 2.4 / (n - 1)) * std::sqrt(squares / (n - 1) / n) : 0};
 }
 
-// Quantile of chi-square over its degrees of freedom times `dof`, by Wilson and Hilferty (within 0.1 % from 90 up).
+// Quantile of the mean of `trials` chi-square variables with `dof` degrees of freedom, by the Wilson-Hilferty
+// approximation (within 0.1 % for dof · trials ≥ 90).
 double chi_square_mean(double normal_quantile, int dof, int trials) {
   const double k = dof * trials, c = 2.0 / (9.0 * k);
   return dof * std::pow(1 - c + normal_quantile * std::sqrt(c), 3);
@@ -40,7 +42,7 @@ double chi_square_mean(double normal_quantile, int dof, int trials) {
 
 struct Band {
   double low, high;
-  bool holds(double x) const { return x >= low && x <= high; }
+  bool contains(double x) const { return x >= low && x <= high; }
 };
 Band band(int dof, int trials) {
   return {chi_square_mean(-1.959964, dof, trials), chi_square_mean(1.959964, dof, trials)};
@@ -54,14 +56,14 @@ std::vector<double> each(const std::vector<TrialResult>& trials, const Value& va
   return values;
 }
 
-using Spoil = std::function<std::vector<Arrival>(const TrueDrive&, std::uint64_t seed, const Subset&)>;
+using MeasurementSource = std::function<std::vector<Arrival>(const TrueDrive&, std::uint64_t seed, const Subset&)>;
 
 struct Seeds {
   int first = 1, count = 30;
 };
 
 std::vector<TrialResult> run_trials(const TrueDrive& drive, const Subset& subset, const Seeds& seeds,
-                                    const Spoil& arrivals_of, const Workers& workers) {
+                                    const MeasurementSource& arrivals_of, const Workers& workers) {
   std::vector<TrialResult> results(static_cast<std::size_t>(seeds.count));
   workers.for_each_part(0, seeds.count, 1, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
@@ -76,28 +78,29 @@ std::vector<Arrival> nominal(const TrueDrive& drive, std::uint64_t seed, const S
   return arrivals(draw(drive, {}, drive.scenario.compass, seed), subset);
 }
 
-// Mean NEES over trials at every `every`th shot: the share of shots where it lies in the band.
-double share_in_band(const std::vector<TrialResult>& trials, const Band& b, double ShotError::*nees) {
+// Percentage of every fifth frame at which the mean NEES over the trials is inside the band.
+double percent_in_band(const std::vector<TrialResult>& trials, const Band& b, double FrameError::*nees) {
   int inside = 0, count = 0;
-  for (std::size_t i = 0; i < trials[0].shots.size(); i += 5) {
+  for (std::size_t i = 0; i < trials[0].frames.size(); i += 5) {
     double sum = 0;
-    for (const TrialResult& t : trials) sum += t.shots[i].*nees;
-    inside += b.holds(sum / static_cast<double>(trials.size())) ? 1 : 0;
+    for (const TrialResult& t : trials) sum += t.frames[i].*nees;
+    inside += b.contains(sum / static_cast<double>(trials.size())) ? 1 : 0;
     ++count;
   }
   return 100.0 * inside / count;
 }
 
-void table_of_subsets(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
+void print_subsets(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
   const Band three = band(3, seeds.count), six = band(6, seeds.count);
-  fmt::print("\n## {}: {:.0f} m, {} shots, {} seeds\n\n", drive.scenario.name, drive.length_m, drive.poses.size(),
+  fmt::print("\n## {}: {:.0f} m, {} frames, {} seeds\n\n", drive.scenario.name, drive.length_m, drive.poses.size(),
              seeds.count);
   fmt::print(
-      "NEES bands (95 %): position, attitude {:.2f} to {:.2f}; pose {:.2f} to {:.2f}. In brackets: share of shots "
-      "inside.\n\n",
+      "NEES bands (95 %): position, attitude {:.2f} to {:.2f}; pose {:.2f} to {:.2f}. In brackets: frames inside the "
+      "band.\n\n",
       three.low, three.high, six.low, six.high);
   fmt::print(
-      "| sensors | end, % | less vision alone | ATE, mm | less vision alone | NEES position | attitude | pose |\n");
+      "| sensors | final error, % | minus vision alone | ATE, mm | minus vision alone | NEES position | attitude | "
+      "pose |\n");
   fmt::print("|---|---|---|---|---|---|---|---|\n");
   std::vector<TrialResult> alone;
   int worse = 0, outside = 0;
@@ -111,21 +114,21 @@ void table_of_subsets(const TrueDrive& drive, const Seeds& seeds, const Workers&
       by_ate.push_back(1e3 * (trials[i].ate_m - alone[i].ate_m));
     }
     const Mean end = mean_of(by_end), ate = mean_of(by_ate);
-    const auto nees = [&](double ShotError::*which) {
-      return mean_of(each(trials, [&](const TrialResult& t) { return t.shots.back().*which; })).mean;
+    const auto nees = [&](double FrameError::*which) {
+      return mean_of(each(trials, [&](const TrialResult& t) { return t.frames.back().*which; })).mean;
     };
-    const double position = nees(&ShotError::nees_position), attitude = nees(&ShotError::nees_attitude),
-                 pose = nees(&ShotError::nees_pose);
+    const double position = nees(&FrameError::nees_position), attitude = nees(&FrameError::nees_attitude),
+                 pose = nees(&FrameError::nees_pose);
     worse += end.mean - end.half_width > 0 || ate.mean - ate.half_width > 0 ? 1 : 0;
-    outside += three.holds(position) && three.holds(attitude) && six.holds(pose) ? 0 : 1;
+    outside += three.contains(position) && three.contains(attitude) && six.contains(pose) ? 0 : 1;
     fmt::print(
         "| {} | {:.4f} | {:+.4f} ± {:.4f} | {:.2f} | {:+.2f} ± {:.2f} | {:.2f} ({:.0f} %) | {:.2f} ({:.0f} %) | "
         "{:.2f} ({:.0f} %) |\n",
         subset.name(), mean_of(each(trials, [](const auto& t) { return t.final_percent; })).mean, end.mean,
         end.half_width, 1e3 * mean_of(each(trials, [](const auto& t) { return t.ate_m; })).mean, ate.mean,
-        ate.half_width, position, share_in_band(trials, three, &ShotError::nees_position), attitude,
-        share_in_band(trials, three, &ShotError::nees_attitude), pose,
-        share_in_band(trials, six, &ShotError::nees_pose));
+        ate.half_width, position, percent_in_band(trials, three, &FrameError::nees_position), attitude,
+        percent_in_band(trials, three, &FrameError::nees_attitude), pose,
+        percent_in_band(trials, six, &FrameError::nees_pose));
     std::fflush(stdout);
   }
   fmt::print("\nworse than vision alone (95 %): {} of 15; NEES at the end outside a band: {} of 16\n", worse, outside);
@@ -135,7 +138,7 @@ struct FaultCase {
   std::string name;
   LocalizationSensor sensor;
   double from_s, to_s;
-  Spoil spoil;
+  MeasurementSource measurements;
 };
 
 std::vector<Arrival> without_vision(const TrueDrive& drive, std::uint64_t seed, const Subset& subset, double from_s,
@@ -148,7 +151,7 @@ std::vector<Arrival> without_vision(const TrueDrive& drive, std::uint64_t seed, 
   return arrivals(d, subset);
 }
 
-// Wheels that turn five times as far as the rover goes.
+// Wheels that roll five times the distance travelled.
 std::vector<Arrival> slipping(const TrueDrive& drive, std::uint64_t seed, const Subset& subset, double from_s,
                               double to_s) {
   DrawnDrive d = draw(drive, {}, drive.scenario.compass, seed);
@@ -156,9 +159,9 @@ std::vector<Arrival> slipping(const TrueDrive& drive, std::uint64_t seed, const 
   WheelSample last = d.wheels.front();
   for (WheelSample& w : d.wheels) {
     const WheelSample now = w;
-    const double turns = w.stamp >= sim::stamp_at(from_s) && w.stamp < sim::stamp_at(to_s) ? 5 : 1;
-    left += turns * (now.left_m - last.left_m);
-    right += turns * (now.right_m - last.right_m);
+    const double factor = w.stamp >= sim::stamp_at(from_s) && w.stamp < sim::stamp_at(to_s) ? 5 : 1;
+    left += factor * (now.left_m - last.left_m);
+    right += factor * (now.right_m - last.right_m);
     w.left_m = left;
     w.right_m = right;
     last = now;
@@ -172,30 +175,31 @@ std::vector<Arrival> with_nans(const TrueDrive& drive, std::uint64_t seed, const
   for (Arrival& a : all) {
     if (random.uniform() >= 0.05) continue;
     const double nan = std::nan("");
-    if (auto* imu = std::get_if<ImuSample>(&a.what)) imu->accel_m_s2.y() = nan;
-    if (auto* wheels = std::get_if<WheelSample>(&a.what)) wheels->left_m = nan;
-    if (auto* compass = std::get_if<CompassSample>(&a.what)) compass->heading_rad = nan;
-    if (auto* tilt = std::get_if<InclinometerSample>(&a.what)) tilt->pitch_rad = nan;
-    if (auto* motion = std::get_if<RelativeMotion>(&a.what)) motion->covariance(2, 2) = nan;
+    if (auto* imu = std::get_if<ImuSample>(&a.measurement)) imu->accel_m_s2.y() = nan;
+    if (auto* wheels = std::get_if<WheelSample>(&a.measurement)) wheels->left_m = nan;
+    if (auto* compass = std::get_if<CompassSample>(&a.measurement)) compass->heading_rad = nan;
+    if (auto* tilt = std::get_if<InclinometerSample>(&a.measurement)) tilt->pitch_rad = nan;
+    if (auto* motion = std::get_if<RelativeMotion>(&a.measurement)) motion->covariance(2, 2) = nan;
   }
   return all;
 }
 
-// For a while every other sample comes 0.3 s late, behind younger ones, and one in fifty carries a stamp 20 s too old.
-std::vector<Arrival> with_stamps_reversed(const TrueDrive& drive, std::uint64_t seed, const Subset& subset,
-                                          double from_s, double to_s) {
+// During the interval every other sample arrives 0.3 s late, after newer ones, and one in fifty has a time stamp 20 s
+// too old.
+std::vector<Arrival> with_reordered_stamps(const TrueDrive& drive, std::uint64_t seed, const Subset& subset,
+                                           double from_s, double to_s) {
   auto all = nominal(drive, seed, subset);
   Random random(seed, 402);
   for (std::size_t i = 0; i < all.size(); ++i) {
     Arrival& a = all[i];
     if (a.at_ns < sim::stamp_at(from_s).ns || a.at_ns >= sim::stamp_at(to_s).ns) continue;
-    if (std::holds_alternative<RelativeMotion>(a.what)) continue;
+    if (std::holds_alternative<RelativeMotion>(a.measurement)) continue;
     if (random.uniform() < 0.02) {
       std::visit(
           [](auto& m) {
             if constexpr (requires { m.stamp; }) m.stamp.ns -= 20'000'000'000;
           },
-          a.what);
+          a.measurement);
     } else if (i % 2 == 0) {
       a.at_ns += 300'000'000;
     }
@@ -206,10 +210,10 @@ std::vector<Arrival> with_stamps_reversed(const TrueDrive& drive, std::uint64_t 
 
 std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
   const double from = 0.4 * drive.motion->seconds();
-  const auto drawn = [](const sim::SensorFaults& faults, double outliers) -> Spoil {
+  const auto drawn = [](const sim::SensorFaults& faults, double outliers) -> MeasurementSource {
     return [=](const TrueDrive& d, std::uint64_t seed, const Subset& subset) {
       sim::CompassOptions compass = d.scenario.compass;
-      if (outliers > 0) compass.outlier_share = outliers;
+      if (outliers > 0) compass.outlier_fraction = outliers;
       return arrivals(draw(d, faults, compass, seed), subset);
     };
   };
@@ -220,53 +224,56 @@ std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
       {"compass outliers 30 %", compass, 0, drive.motion->seconds(), drawn({}, 0.3)},
       {"wheel slip 80 % for 40 s", wheels, from, from + 40,
        [=](const TrueDrive& d, std::uint64_t s, const Subset& w) { return slipping(d, s, w, from, from + 40); }},
-      {"IMU gap 10 s", imu, from, from + 10, drawn({{"imu", "drop", from, from + 10}}, 0)},
-      {"IMU frozen 10 s", imu, from, from + 10, drawn({{"imu", "freeze", from, from + 10}}, 0)},
+      {"IMU gap 10 s", imu, from, from + 10,
+       drawn({{sim::MotionSensor::imu, sim::SensorFaultKind::drop, from, from + 10}}, 0)},
+      {"IMU frozen 10 s", imu, from, from + 10,
+       drawn({{sim::MotionSensor::imu, sim::SensorFaultKind::freeze, from, from + 10}}, 0)},
       {"NaN in 5 % of all samples", imu, 0, drive.motion->seconds(), with_nans},
-      {"stamps reversed for 40 s", imu, from, from + 40,
+      {"stamps out of order for 40 s", imu, from, from + 40,
        [=](const TrueDrive& d, std::uint64_t s, const Subset& w) {
-         return with_stamps_reversed(d, s, w, from, from + 40);
+         return with_reordered_stamps(d, s, w, from, from + 40);
        }},
   };
 }
 
-// Beyond 3 σ as often as a normal error in three dimensions is by chance in 0.27 %.
+// 99.73 % quantile of chi-square with three degrees of freedom, the probability of 3 σ in one dimension.
 constexpr double kThreeSigma = 14.156;
 
-void table_of_faults(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
-  fmt::print("\n## {}: faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds.count);
+void print_faults(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
+  fmt::print("\n## {}: sensor faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds.count);
   fmt::print(
-      "\"Inside 3 σ\": trials whose position error lies inside the 99.7 % region of its covariance, 5 shots after the "
+      "\"Inside 3 σ\": trials whose position error is inside the 99.7 % region of its covariance, 5 frames after the "
       "fault and at the end.\n\n");
   fmt::print(
-      "| fault | end, % | vision alone, same fault | largest error, mm | inside 3 σ after the fault | at the end | "
+      "| fault | final error, % | vision alone, same fault | largest error, mm | inside 3 σ after the fault | at the "
+      "end | "
       "NEES pose "
-      "at the end | excluded / missing, shots of a trial | state at the end "
+      "at the end | excluded / missing, frames per trial | state at the end "
       "|\n|---|---|---|---|---|---|---|---|---|\n");
   for (const FaultCase& fault : fault_cases(drive)) {
-    const auto trials = run_trials(drive, Subset::of(15), seeds, fault.spoil, workers);
-    const auto alone = run_trials(drive, Subset::of(0), seeds, fault.spoil, workers);
-    int inside_after = 0, inside_end = 0, well = 0;
+    const auto trials = run_trials(drive, Subset::of(15), seeds, fault.measurements, workers);
+    const auto alone = run_trials(drive, Subset::of(0), seeds, fault.measurements, workers);
+    int inside_after = 0, inside_end = 0, ok = 0;
     double largest = 0, excluded = 0, missing = 0;
     for (const TrialResult& t : trials) {
       std::size_t after = 0;
-      while (after + 1 < t.shots.size() && t.shots[after].time_s < fault.to_s) ++after;
-      after = std::min(after + 5, t.shots.size() - 1);
-      inside_after += t.shots[after].nees_position < kThreeSigma ? 1 : 0;
-      inside_end += t.shots.back().nees_position < kThreeSigma ? 1 : 0;
-      for (const ShotError& s : t.shots) largest = std::max(largest, s.distance_m);
+      while (after + 1 < t.frames.size() && t.frames[after].time_s < fault.to_s) ++after;
+      after = std::min(after + 5, t.frames.size() - 1);
+      inside_after += t.frames[after].nees_position < kThreeSigma ? 1 : 0;
+      inside_end += t.frames.back().nees_position < kThreeSigma ? 1 : 0;
+      for (const FrameError& s : t.frames) largest = std::max(largest, s.distance_m);
       const auto sensor = static_cast<std::size_t>(fault.sensor);
       excluded += t.states_s[sensor][static_cast<std::size_t>(SensorState::excluded)];
       missing += t.states_s[sensor][static_cast<std::size_t>(SensorState::missing)];
-      well += t.last.health[sensor].state == SensorState::ok ? 1 : 0;
+      ok += t.last.health[sensor].state == SensorState::ok ? 1 : 0;
     }
     const auto end = [](const TrialResult& t) { return t.final_percent; };
     const double n = static_cast<double>(trials.size());
     fmt::print("| {} | {:.4f} | {:.4f} | {:.0f} | {} of {} | {} of {} | {:.2f} | {:.1f} / {:.1f} | {} of {} ok |\n",
                fault.name, mean_of(each(trials, end)).mean, mean_of(each(alone, end)).mean, 1e3 * largest, inside_after,
                seeds.count, inside_end, seeds.count,
-               mean_of(each(trials, [](const TrialResult& t) { return t.shots.back().nees_pose; })).mean, excluded / n,
-               missing / n, well, seeds.count);
+               mean_of(each(trials, [](const TrialResult& t) { return t.frames.back().nees_pose; })).mean, excluded / n,
+               missing / n, ok, seeds.count);
     std::fflush(stdout);
   }
 }
@@ -278,17 +285,17 @@ void run(const std::vector<std::string>& words) {
   const Workers workers(arguments.number("--threads"));
   const Seeds seeds{arguments.number("--first"), arguments.number("--seeds")};
   fmt::print(
-      "# Localization, Monte Carlo\n\nOdometry drawn from its measured error. End: distance of the last position from "
-      "the truth, over the way; ATE: RMS over the shots; both seen from the first pose. ±: 95 % confidence of the "
-      "paired "
-      "difference.\n");
+      "# Localization, Monte Carlo\n\nOdometry errors drawn from their measured model. Final error: of the last "
+      "position, "
+      "over the distance travelled; ATE: RMS position error over the frames; both relative to the first pose. ±: 95 % "
+      "confidence interval of the paired difference.\n");
   for (const std::string& name : arguments.scenarios) {
     const auto drive = open_true_drive(arguments.options.at("--config"), name);
     if (!drive)
       throw std::runtime_error(fmt::format("{}: no such scenario in {}", name, arguments.options.at("--config")));
     const std::string& tables = arguments.options.at("--tables");
-    if (tables != "faults") table_of_subsets(*drive, seeds, workers);
-    if (tables != "subsets") table_of_faults(*drive, seeds, workers);
+    if (tables != "faults") print_subsets(*drive, seeds, workers);
+    if (tables != "subsets") print_faults(*drive, seeds, workers);
   }
 }
 

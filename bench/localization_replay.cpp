@@ -1,9 +1,9 @@
-// Localization of rendered recordings whose odometry has been run: `make bench-localization_replay ARGS="..."`.
+// Replays the localization of rendered recordings with stored odometry: `make bench-localization_replay ARGS="..."`.
 //
 //   localization_replay [--from FOLDER] [--runs FOLDER] SCENARIO...
 //
-// FOLDER/SCENARIO of --from is a recording with sensors and truth; of --runs, what `spartan run --odometry-only` made
-// of it. Every subset of sensors over the same real odometry.
+// FOLDER/SCENARIO of --from is a recording with sensors and ground truth; of --runs, the output of `spartan run
+// --odometry-only` for it. Localizes with every subset of sensors over the same odometry.
 #include <fmt/format.h>
 
 #include <stdexcept>
@@ -17,7 +17,7 @@
 namespace spartan {
 namespace {
 
-// The recorded drive in the form of a drawn one.
+// A recorded drive in the form of a simulated one.
 struct RecordedDrive {
   TrueDrive truth;
   DrawnDrive drawn;
@@ -51,7 +51,7 @@ std::optional<RecordedDrive> open_recorded(const std::string& recording, const s
     const auto truth = std::min_element(poses->poses.begin(), poses->poses.end(), [&](const auto& a, const auto& b) {
       return std::abs(a.stamp.ns - frame.stamp.ns) < std::abs(b.stamp.ns - frame.stamp.ns);
     });
-    drive.truth.shots_s.push_back(seconds_between(sim::stamp_at(0), frame.stamp));
+    drive.truth.frames_s.push_back(seconds_between(sim::stamp_at(0), frame.stamp));
     drive.truth.poses.push_back(truth->pose);
     if (frame.motion.first) continue;
     const Matrix6d ad = adjoint(body_from_left);
@@ -64,24 +64,24 @@ std::optional<RecordedDrive> open_recorded(const std::string& recording, const s
   return drive;
 }
 
-double mean_nees(const TrialResult& r, double ShotError::*which) {
+double mean_nees(const TrialResult& r, double FrameError::*which) {
   double sum = 0;
-  for (const ShotError& s : r.shots) sum += s.*which;
-  return sum / static_cast<double>(r.shots.size());
+  for (const FrameError& s : r.frames) sum += s.*which;
+  return sum / static_cast<double>(r.frames.size());
 }
 
 void run(const std::vector<std::string>& words) {
   const RecordingArguments arguments = read_arguments(words, {{"--runs", "runs"}});
-  fmt::print("| recording | sensors | end, % | ATE, mm | NEES over all shots: position | attitude | pose |\n");
+  fmt::print("| recording | sensors | final error, % | ATE, mm | NEES over all frames: position | attitude | pose |\n");
   fmt::print("|---|---|---|---|---|---|---|\n");
   for (const std::string& name : arguments.scenarios) {
     const auto drive = open_recorded(arguments.folder + "/" + name, arguments.options.at("--runs") + "/" + name);
-    if (!drive) throw std::runtime_error(name + ": no recording with truth, or no run of it");
+    if (!drive) throw std::runtime_error(name + ": there is no recording with ground truth, or no run of it");
     for (int mask = 0; mask < 16; ++mask) {
       const TrialResult r = run_trial(drive->truth, arrivals(drive->drawn, Subset::of(mask)));
       fmt::print("| {} | {} | {:.4f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, Subset::of(mask).name(),
-                 r.final_percent, 1e3 * r.ate_m, mean_nees(r, &ShotError::nees_position),
-                 mean_nees(r, &ShotError::nees_attitude), mean_nees(r, &ShotError::nees_pose));
+                 r.final_percent, 1e3 * r.ate_m, mean_nees(r, &FrameError::nees_position),
+                 mean_nees(r, &FrameError::nees_attitude), mean_nees(r, &FrameError::nees_pose));
     }
   }
 }

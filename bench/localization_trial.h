@@ -1,4 +1,4 @@
-// One simulated drive with drawn sensors and drawn odometry, and a localization that takes it.
+// One simulated drive with random sensor errors and random odometry errors, and a localization that processes it.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -20,11 +20,11 @@
 #include "spartan/rig/formats/rig_files.h"
 #include "spartan/sim/motion_sensors.h"
 #include "spartan/sim/scenario.h"
-#include "spartan/sim/simulator.h"
+#include "spartan/sim/world.h"
 
 namespace spartan {
 
-/// Which sensors stand beside vision.
+/// Sensors used in addition to vision.
 struct Subset {
   bool imu = false, wheels = false, compass = false, inclinometer = false;
   static Subset of(int mask) { return {(mask & 1) != 0, (mask & 2) != 0, (mask & 4) != 0, (mask & 8) != 0}; }
@@ -38,14 +38,14 @@ struct Subset {
   }
 };
 
-/// The true motion of a scenario and when its odometry pair takes pictures.
+/// The true motion of a scenario and the times of its odometry frames.
 struct TrueDrive {
   sim::Scenario scenario;
-  std::unique_ptr<sim::World> world;  // the motion borrows it while it is made
+  std::unique_ptr<sim::World> world;  // borrowed during construction of the motion
   std::unique_ptr<sim::BodyMotion> motion;
-  std::vector<double> shots_s;
-  std::vector<Pose> poses;  ///< at the shots
-  double length_m = 0;      ///< of the polyline through them
+  std::vector<double> frames_s;
+  std::vector<Pose> poses;  ///< at the frames
+  double length_m = 0;      ///< of the polyline through the poses
 };
 
 inline std::optional<TrueDrive> open_true_drive(const std::string& folder, const std::string& name) {
@@ -63,19 +63,19 @@ inline std::optional<TrueDrive> open_true_drive(const std::string& folder, const
   drive.world = std::make_unique<sim::World>(sim::make_world(*scenario, *plan));
   drive.motion = std::make_unique<sim::BodyMotion>(*plan, sim::WheelGround{drive.world->shape, drive.world->wheel_lift},
                                                    scenario->chassis, Workers(2));
-  for (const sim::Shot& shot : plan->shots()) {
+  for (const sim::PlannedFrame& frame : plan->frames()) {
     const auto pair =
-        std::find_if(rig->pairs.begin(), rig->pairs.end(), [&](const auto& p) { return p.name == shot.pair; });
+        std::find_if(rig->pairs.begin(), rig->pairs.end(), [&](const auto& p) { return p.name == frame.pair; });
     if (pair == rig->pairs.end() || !pair->for_odometry) continue;
-    drive.shots_s.push_back(shot.time_s);
-    drive.poses.push_back(drive.motion->world_from_body(shot.time_s));
+    drive.frames_s.push_back(frame.time_s);
+    drive.poses.push_back(drive.motion->world_from_body(frame.time_s));
   }
   for (std::size_t i = 1; i < drive.poses.size(); ++i)
     drive.length_m += (drive.poses[i].translation() - drive.poses[i - 1].translation()).norm();
   return drive;
 }
 
-/// What a rover's sensors and its odometry say on a drive, in the order of arrival.
+/// Simulated measurements of the sensors and the odometry on one drive, in order of time.
 struct DrawnDrive {
   std::vector<ImuSample> imu;
   std::vector<WheelSample> wheels;
@@ -84,16 +84,16 @@ struct DrawnDrive {
   std::vector<RelativeMotion> motions;
 };
 
-/// The error of a visual motion as it was measured on nine rendered drives (docs/math/localization.md, "Vision"): the
-/// stated covariance (mean of rocky_20pct, body frame), white noise of 1.10 times it, and a lasting part in units of
-/// the stated standard deviations: a Gauss-Markov process that falls to 1/e in 57 shots, and a constant of the drive
-/// of 1.53 times its variance.
+/// Error model of visual odometry, measured on nine rendered drives (docs/math/localization.md, "Vision"): white noise
+/// of 1.10 times the reported covariance (mean of rocky_20pct, body frame), and a correlated part in units of the
+/// reported standard deviations: a Gauss-Markov process with a correlation length of 57 frames, and a constant of the
+/// drive of 1.53 times its variance.
 struct MeasuredOdometryError {
   Vector6d sigma = (Vector6d() << 27.0e-6, 16.7e-6, 23.1e-6, 34.5e-6, 22.5e-6, 20.9e-6).finished();
-  Vector6d lasting_variance = (Vector6d() << 0.718, 0.372, 0.104, 0.316, 0.209, 0.116).finished();
+  Vector6d correlated_variance = (Vector6d() << 0.718, 0.372, 0.104, 0.316, 0.209, 0.116).finished();
   double white = 1.10, constant = 1.53, steps = 57;
 
-  Matrix6d stated() const {
+  Matrix6d reported_covariance() const {
     Matrix6d c = Matrix6d::Identity();
     const auto set = [&](int i, int j, double value) { c(i, j) = c(j, i) = value; };
     set(0, 1, -0.162), set(0, 2, -0.629), set(0, 3, -0.024), set(0, 4, -0.417), set(0, 5, 0.077);
@@ -109,16 +109,16 @@ struct MeasuredOdometryError {
       for (int i = 0; i < 6; ++i) v[i] = random.normal();
       return v;
     };
-    const Matrix6d covariance = stated(), root = covariance.llt().matrixL();
-    const Vector6d lasting_sigma = lasting_variance.cwiseSqrt();
-    const Vector6d stays = std::sqrt(constant) * lasting_sigma.cwiseProduct(normal6());
-    Vector6d wanders = lasting_sigma.cwiseProduct(normal6());
+    const Matrix6d covariance = reported_covariance(), root = covariance.llt().matrixL();
+    const Vector6d correlated_sigma = correlated_variance.cwiseSqrt();
+    const Vector6d constant_part = std::sqrt(constant) * correlated_sigma.cwiseProduct(normal6());
+    Vector6d markov_part = correlated_sigma.cwiseProduct(normal6());
     const double keep = std::exp(-1 / steps);
     std::vector<RelativeMotion> motions;
     for (std::size_t i = 1; i < drive.poses.size(); ++i) {
-      wanders = keep * wanders + std::sqrt(1 - keep * keep) * lasting_sigma.cwiseProduct(normal6());
-      const Vector6d error = std::sqrt(white) * (root * normal6()) + sigma.cwiseProduct(stays + wanders);
-      motions.push_back({sim::stamp_at(drive.shots_s[i - 1]), sim::stamp_at(drive.shots_s[i]),
+      markov_part = keep * markov_part + std::sqrt(1 - keep * keep) * correlated_sigma.cwiseProduct(normal6());
+      const Vector6d error = std::sqrt(white) * (root * normal6()) + sigma.cwiseProduct(constant_part + markov_part);
+      motions.push_back({sim::stamp_at(drive.frames_s[i - 1]), sim::stamp_at(drive.frames_s[i]),
                          drive.poses[i - 1].inverse() * drive.poses[i] * exp_se3(-error), covariance, true});
     }
     return motions;
@@ -131,16 +131,16 @@ inline DrawnDrive draw(const TrueDrive& drive, const sim::SensorFaults& faults, 
   DrawnDrive d;
   d.imu = sim::measure_imu(*drive.motion, s.imu, s.gravity_m_s2, faults, seed);
   d.wheels = sim::measure_wheels(*drive.motion, s.chassis, s.wheels, faults, seed);
-  d.compass = sim::measure_heading(*drive.motion, compass, faults, seed);
-  d.inclinometer = sim::measure_tilt(*drive.motion, s.inclinometer, faults, seed);
+  d.compass = sim::measure_compass(*drive.motion, compass, faults, seed);
+  d.inclinometer = sim::measure_inclinometer(*drive.motion, s.inclinometer, faults, seed);
   d.motions = MeasuredOdometryError().draw(drive, seed);
   return d;
 }
 
-/// One arrival: what, and when it comes (which need not be the order of its stamps).
+/// One measurement with its time of arrival, which may differ from its time stamp.
 struct Arrival {
   std::int64_t at_ns = 0;
-  Measurement what;
+  Measurement measurement;
 };
 
 inline std::vector<Arrival> arrivals(const DrawnDrive& d, const Subset& subset) {
@@ -154,56 +154,56 @@ inline std::vector<Arrival> arrivals(const DrawnDrive& d, const Subset& subset) 
   if (subset.inclinometer) add(d.inclinometer);
   add(d.motions);
   std::stable_sort(all.begin(), all.end(), [](const Arrival& a, const Arrival& b) {
-    return a.at_ns != b.at_ns ? a.at_ns < b.at_ns : a.what.index() < b.what.index();
+    return a.at_ns != b.at_ns ? a.at_ns < b.at_ns : a.measurement.index() < b.measurement.index();
   });
   return all;
 }
 
-/// How far the localization was from the truth at each shot, both seen from the first pose.
-struct ShotError {
-  double time_s = 0, distance_m = 0;  ///< distance: of the position
+/// Error of the localization at a frame, relative to the first pose.
+struct FrameError {
+  double time_s = 0, distance_m = 0;  ///< distance_m: position error
   double nees_position = 0, nees_attitude = 0, nees_pose = 0;
 };
 struct TrialResult {
-  std::vector<ShotError> shots;
+  std::vector<FrameError> frames;
   double ate_m = 0, final_percent = 0;
   LocalizationEstimate last;
-  std::array<std::array<double, 4>, kLocalizationSensors> states_s{};  ///< shots in each state, by sensor
+  std::array<std::array<double, 4>, kLocalizationSensors> states_s{};  ///< frames in each state, by sensor
 };
 
 inline LocalizationOptions options_for(const TrueDrive& drive) {
   LocalizationOptions options;
-  // Known, as recordings state it.
+  // A recording specifies it.
   options.gravity_m_s2 = drive.scenario.gravity_m_s2;
   const sim::Scenario& s = drive.scenario;
-  return with_stated(options, sim::stated_noise(s.imu, s.compass, s.inclinometer));
+  return with_stated(options, sim::specified_noise(s.imu, s.compass, s.inclinometer));
 }
 
 inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {
   Localizer localizer(options_for(drive));
   TrialResult result;
-  Pose first;  // the localization's, which defines its world
-  const std::int64_t start_ns = sim::stamp_at(drive.shots_s.front()).ns;
-  std::size_t shot = 0;
+  Pose first;  // of the localization, relative to which errors are measured
+  const std::int64_t start_ns = sim::stamp_at(drive.frames_s.front()).ns;
+  std::size_t frame = 0;
   double squares = 0;
   for (const Arrival& arrival : all) {
     if (!localizer.started() && arrival.at_ns > start_ns) {
       localizer.start({start_ns}, Eigen::Vector3d::UnitX());
       first = localizer.estimate().world_from_body.pose;
     }
-    localizer.add(arrival.what);
-    const auto* motion = std::get_if<RelativeMotion>(&arrival.what);
-    if (motion == nullptr || ++shot >= drive.poses.size()) continue;
+    localizer.add(arrival.measurement);
+    const auto* motion = std::get_if<RelativeMotion>(&arrival.measurement);
+    if (motion == nullptr || ++frame >= drive.poses.size()) continue;
     result.last = localizer.estimate();
     const LocalizationEstimate& e = result.last;
     for (std::size_t i = 0; i < result.states_s.size(); ++i)
       result.states_s[i][static_cast<std::size_t>(e.health[i].state)] += 1;
     const Pose estimate = first.inverse() * e.world_from_body.pose,
-               truth = drive.poses[0].inverse() * drive.poses[shot];
+               truth = drive.poses[0].inverse() * drive.poses[frame];
     const Vector6d error = log_se3(estimate.inverse() * truth);
     const Matrix6d& p = e.world_from_body.covariance;
-    ShotError s;
-    s.time_s = drive.shots_s[shot];
+    FrameError s;
+    s.time_s = drive.frames_s[frame];
     s.distance_m = (estimate.translation() - truth.translation()).norm();
     const Eigen::Matrix3d position = p.topLeftCorner<3, 3>(), attitude = p.bottomRightCorner<3, 3>();
     const Eigen::Vector3d rho = error.head<3>(), phi = error.tail<3>();
@@ -211,10 +211,10 @@ inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>&
     s.nees_attitude = phi.dot(attitude.ldlt().solve(phi));
     s.nees_pose = error.dot(p.ldlt().solve(error));
     squares += s.distance_m * s.distance_m;
-    result.shots.push_back(s);
+    result.frames.push_back(s);
   }
-  result.ate_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, result.shots.size())));
-  result.final_percent = 100 * result.shots.back().distance_m / drive.length_m;
+  result.ate_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, result.frames.size())));
+  result.final_percent = 100 * result.frames.back().distance_m / drive.length_m;
   return result;
 }
 

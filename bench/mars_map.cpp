@@ -1,10 +1,10 @@
-// Maps of simulated stops beside the truth. `make bench-mars_map`.
+// Maps of simulated stops against ground truth. `make bench-mars_map`.
 //
-//   mars_map [--from FOLDER] [--stops N] [--list 1] SCENARIO...      recordings as scripts/recordings makes them; with
-//                                                                    --list the obstacles that were missed
+//   mars_map [--from FOLDER] [--stops N] [--list 1] SCENARIO...
 //
-// Default: 10 stops each of rocky_20pct, crater_rim, flat_featureless, diffuse_200lux. Poses are the true ones: only
-// the map is judged.
+// Uses recordings from scripts/recordings; --list prints the obstacles and cavities that were missed. Default: 10 stops
+// each of rocky_20pct, crater_rim, flat_featureless, diffuse_200lux. Poses are the true ones, so that only the maps are
+// evaluated.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,22 +28,22 @@
 namespace spartan {
 namespace {
 
-// What the eyes could see of the cells of a map.
-struct Seen {
-  explicit Seen(ImageSize size)
+// What the cameras can see of the cells of a map.
+struct Visibility {
+  explicit Visibility(ImageSize size)
       : pixels(size), lowest_m(size.width, size.height, std::numeric_limits<float>::quiet_NaN()) {}
-  Image<std::uint16_t> pixels;  // that both eyes of one pair see, the most of any pair
-  Image<float> lowest_m;        // of the true surface
+  Image<std::uint16_t> pixels;  // visible in both cameras of a pair, maximum over the pairs
+  Image<float> lowest_m;        // of the visible true surface
 };
 
-// Adds one shot.
-void look_truly(const Drive& drive, const std::string& pair, Stamp stamp, const ViewGeometry& view,
-                const Pose& world_from_body, const MapPlace& place, Seen& seen) {
+// Adds the true disparities of one frame.
+void add_true_view(const Drive& drive, const std::string& pair, Stamp stamp, const ViewGeometry& view,
+                   const Pose& world_from_body, const MapPlace& place, Visibility& visibility) {
   const std::string name = fmt::format("/{}/{}.png", pair, stamp.ns);
   const auto disparity = read_disparity(drive.folder + "/truth/disparity" + name);
   const auto mask = read_truth_mask(drive.folder + "/truth/mask" + name);
   if (!disparity || !mask) return;
-  Image<std::uint16_t> counts(seen.pixels.size());
+  Image<std::uint16_t> counts(visibility.pixels.size());
   for (int y = 0; y < disparity->height(); ++y) {
     for (int x = 0; x < disparity->width(); ++x) {
       if ((*mask)(x, y) != 255) continue;
@@ -52,12 +52,12 @@ void look_truly(const Drive& drive, const std::string& pair, Stamp stamp, const 
       const GridCell cell = cell_at(place, p.x(), p.y());
       if (!counts.contains(cell.column, cell.row)) continue;
       if (counts(cell.column, cell.row) != 0xFFFF) ++counts(cell.column, cell.row);
-      float& lowest = seen.lowest_m(cell.column, cell.row);
+      float& lowest = visibility.lowest_m(cell.column, cell.row);
       lowest = std::fmin(lowest, static_cast<float>(p.z()));
     }
   }
   for (int y = 0; y < counts.height(); ++y) {
-    for (int x = 0; x < counts.width(); ++x) seen.pixels(x, y) = std::max(seen.pixels(x, y), counts(x, y));
+    for (int x = 0; x < counts.width(); ++x) visibility.pixels(x, y) = std::max(visibility.pixels(x, y), counts(x, y));
   }
 }
 
@@ -84,7 +84,7 @@ struct Sums {
   }
 };
 
-// Obstacles by their height, and what became of the cells that are seen, over all scenarios.
+// Detected obstacles by height, and the confusion matrix of visible cells, over all scenarios.
 struct Totals {
   static constexpr std::array<double, 5> kHeights_m{0.1, 0.15, 0.2, 0.3, 9};
   std::array<int, 4> things{}, found{};
@@ -103,7 +103,7 @@ struct Totals {
     }
   }
   void print() const {
-    fmt::print("\nobstacles found by height:");
+    fmt::print("\nobstacles detected by height:");
     for (std::size_t i = 0; i < things.size(); ++i) {
       const std::string heights = i + 1 < things.size()
                                       ? fmt::format("{:.2f}-{:.2f} m", kHeights_m[i], kHeights_m[i + 1])
@@ -111,7 +111,7 @@ struct Totals {
       fmt::print("  {} {}/{}", heights, found[i], things[i]);
     }
     constexpr std::array<const char*, 4> kNames{"unknown", "free", "obstacle", "cavity"};
-    fmt::print("\n{:<22}", "cells: true, seen as");
+    fmt::print("\n{:<22}", "cells: true, mapped as");
     for (const char* name : kNames) fmt::print("{:>10}", name);
     for (std::size_t i = 1; i < 4; ++i) {
       fmt::print("\n{:<22}", kNames[i]);
@@ -133,10 +133,10 @@ void list_missed(std::int64_t position, const char* what, const std::vector<Judg
   }
 }
 
-void judge(const std::string& folder, const std::string& scenario, int wanted, bool list, Totals& totals) {
+void evaluate(const std::string& folder, const std::string& scenario, int wanted, bool list, Totals& totals) {
   auto drive = open_drive(folder + "/" + scenario);
   if (!drive) {
-    fmt::print("{:<18} left out: {} (scripts/recordings makes it)\n", scenario, drive.error().message());
+    fmt::print("{:<18} skipped: {} (create it with scripts/recordings)\n", scenario, drive.error().message());
     return;
   }
   auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));
@@ -146,28 +146,28 @@ void judge(const std::string& folder, const std::string& scenario, int wanted, b
   int stops = 0;
   Image<float> level(drive->elevation.bands[0].size());
   for (int y = 0; y < level.height(); ++y) {
-    // height_m of obstacles.tif is the surface over the level.
+    // height_m of obstacles.tif is the surface above the level.
     for (int x = 0; x < level.width(); ++x)
       level(x, y) = drive->elevation.bands[0](x, y) - drive->obstacles.bands[1](x, y);
   }
   const TrueGround truth{drive->elevation.place, drive->elevation.bands[0], drive->elevation.bands[1], level};
-  for (const auto& [position, shots] : drive->stops) {
+  for (const auto& [position, frames] : drive->stops) {
     if (stops == wanted) break;
     ++stops;
-    look(*drive, *imager, mapper, shots);
+    add_views(*drive, *imager, mapper, frames);
     const MergedRange merged = mapper.merge();
-    const Pose pose = true_pose(*drive, shots.front().left_stamp);
+    const Pose pose = true_pose(*drive, frames.front().left_stamp);
     const LocalMap map = mapper.map(surface_points(merged), pose);
-    Seen seen(map.size());
+    Visibility visibility(map.size());
     for (const PositionView& view : mapper.views())
-      look_truly(*drive, view.pair, view.stamp, view.geometry, pose, map.place, seen);
+      add_true_view(*drive, view.pair, view.stamp, view.geometry, pose, map.place, visibility);
     for (std::size_t bin = 0; bin < sums.size(); ++bin) {
       MapScoring scoring;
       scoring.eye_m = pose.translation().head<2>();
       scoring.nearest_m = bin < 3 ? kBorders_m[bin] : 0;
       scoring.farthest_m = kBorders_m[bin + 1];
       const MapMetrics metrics =
-          judge_map({map.place, map.elevation_m, map.kind, seen.pixels, seen.lowest_m}, truth, scoring);
+          judge_map({map.place, map.elevation_m, map.kind, visibility.pixels, visibility.lowest_m}, truth, scoring);
       sums[bin].add(metrics);
       if (bin == 3) totals.add(metrics);
       if (list && bin == 3) {
@@ -198,7 +198,7 @@ void run(const std::vector<std::string>& words) {
              "covered %", "obstacles", "false %", "cavities");
   Totals totals;
   for (const std::string& scenario : scenarios) {
-    judge(arguments.folder, scenario, arguments.number("--stops"), arguments.number("--list") != 0, totals);
+    evaluate(arguments.folder, scenario, arguments.number("--stops"), arguments.number("--list") != 0, totals);
   }
   totals.print();
   fmt::print("peak memory {:.0f} MB\n", 1e-6 * static_cast<double>(peak_memory_bytes()));

@@ -1,8 +1,9 @@
-// Disparities on simulated pairs beside OpenCV's, with the truth, by range. `make bench-mars_stereo`.
+// Stereo matching of simulated pairs by Spartan and OpenCV against ground truth, by range. `make bench-mars_stereo`.
 //
-//   mars_stereo [--from FOLDER] [--pairs N] [--pair NAME] SCENARIO...      recordings as scripts/recordings makes them
+//   mars_stereo [--from FOLDER] [--pairs N] [--pair NAME] SCENARIO...
 //
-// Default: 10 wide pairs (other stops and pans each) of rocky_20pct, diffuse_200lux, night_edge, flat_featureless.
+// Uses recordings from scripts/recordings. Default: 10 frames of the wide pair (different stops and pans) of
+// rocky_20pct, diffuse_200lux, night_edge, flat_featureless.
 #include <fmt/format.h>
 
 #include <array>
@@ -33,7 +34,7 @@ struct RangeBin {
 constexpr std::array<RangeBin, 5> kBins{RangeBin{0, 100}, RangeBin{0, 1.5}, RangeBin{1.5, 2.5}, RangeBin{2.5, 4},
                                         RangeBin{4, 100}};
 
-// Sums over pixels that both eyes see, of one matcher and one range.
+// Sums over pixels visible in both cameras, for one matcher and one range.
 struct Score {
   double truth = 0, matched = 0, beyond_1_px = 0, beyond_2_cm = 0, inside = 0, sum = 0, squares = 0;
   void add(double disparity, double true_disparity, double focal_times_baseline) {
@@ -127,7 +128,7 @@ void compare(const std::string& folder, const std::string& scenario, const std::
   const std::string recording = folder + "/" + scenario;
   const auto source = open_recording(recording);
   if (!source) {
-    fmt::print("{:<18} left out: {} (scripts/recordings makes it)\n", scenario, source.error().message());
+    fmt::print("{:<18} skipped: {} (create it with scripts/recordings)\n", scenario, source.error().message());
     return;
   }
   auto imager = Imager::create((*source)->info().rig, ImagingOptions(), Workers(2));
@@ -136,7 +137,7 @@ void compare(const std::string& folder, const std::string& scenario, const std::
   for (const StereoPair& pair : (*source)->info().rig.pairs) {
     if (pair.name != pair_name) continue;
     const std::vector<Stamp> stamps = (*source)->announced_stamps(pair.name);
-    // Spread over the stops; the step is odd, so that the pans take turns.
+    // Spread over the recording, so that stops and pans vary.
     const std::size_t count = std::min<std::size_t>(static_cast<std::size_t>(wanted), stamps.size());
     for (std::size_t i = 0; i < count; ++i)
       compare_pair(**source, *imager, pair, stamps[i * stamps.size() / count], recording, scores);

@@ -1,4 +1,4 @@
-// Recorded stops of simulated drives with their truth.
+// Stops of simulated recordings with their ground truth.
 #pragma once
 
 #include <algorithm>
@@ -19,14 +19,14 @@
 
 namespace spartan {
 
-// A recording with its truth.
+// A recording with its ground truth.
 struct Drive {
   std::string folder;
   std::unique_ptr<FrameSource> source;
   Rig rig;
   Trajectory poses;
   LoadedMap elevation, obstacles;
-  std::map<std::int64_t, std::vector<ShotName>> stops;  // where more than one pair looked
+  std::map<std::int64_t, std::vector<ShotName>> stops;  // with frames of more than one pair
 };
 
 inline Result<Drive> open_drive(const std::string& folder) {
@@ -47,11 +47,11 @@ inline Result<Drive> open_drive(const std::string& folder) {
   drive.poses = std::move(*trajectory);
   drive.elevation = std::move(*elevation);
   drive.obstacles = std::move(*obstacles);
-  // Shots are numbered by position without gaps, and every position has one of the odometry's pair.
+  // Position ids have no gaps, and every position has a frame of the odometry pair.
   for (std::int64_t position = 0;; ++position) {
-    std::vector<ShotName> shots = drive.source->shots_at(position);
-    if (shots.empty()) break;
-    if (shots.size() > 1) drive.stops[position] = std::move(shots);
+    std::vector<ShotName> frames = drive.source->shots_at(position);
+    if (frames.empty()) break;
+    if (frames.size() > 1) drive.stops[position] = std::move(frames);
   }
   return drive;
 }
@@ -64,14 +64,14 @@ inline Pose true_pose(const Drive& drive, Stamp stamp) {
       ->pose;
 }
 
-// The views of one stop, taken by the mapper.
-inline void look(Drive& drive, Imager& imager, PositionMapper& mapper, const std::vector<ShotName>& shots) {
+// Adds all views of one stop to the mapper.
+inline void add_views(Drive& drive, Imager& imager, PositionMapper& mapper, const std::vector<ShotName>& frames) {
   mapper.leave();
-  for (const auto& [pair, stamp] : shots) {
+  for (const auto& [pair, stamp] : frames) {
     const auto frame = drive.source->frame_at(pair, stamp);
     if (!frame) continue;
-    const auto shot = imager.process(*frame);
-    if (shot) (void)mapper.add(*shot, drive.rig.find_pair(pair)->nearest_m);
+    const auto rectified = imager.process(*frame);
+    if (rectified) (void)mapper.add(*rectified, drive.rig.find_pair(pair)->nearest_m);
   }
 }
 

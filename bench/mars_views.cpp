@@ -1,9 +1,9 @@
-// What the views of simulated stops say for themselves and together. `make bench-mars_views`.
+// Ground detection and merging of the views of simulated stops. `make bench-mars_views`.
 //
 //   mars_views [--from FOLDER] [--stops N] SCENARIO...
 //
-// The eye's height and pitch over the ground as v-disparity finds them, beside the plane through the true points that
-// the pair sees; how much the merged view covers beside the best single pair; the steps where views join.
+// Measures the error of the camera's height and pitch above the ground by v-disparity, against the plane through the
+// true points in view; the coverage of the merged view against the best single view; and the height steps at seams.
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
@@ -26,9 +26,9 @@ namespace spartan {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kFarthest_m = 4;  // of what counts as the ground before a pair
+constexpr double kFarthest_m = 4;  // range of the points of the true ground plane
 
-// The plane through the true points, by least squares.
+// Least-squares plane through the true points.
 std::optional<GroundPlane> true_plane(const Drive& drive, const PositionView& view) {
   const auto disparity =
       read_disparity(fmt::format("{}/truth/disparity/{}/{}.png", drive.folder, view.pair, view.stamp.ns));
@@ -54,7 +54,7 @@ std::optional<GroundPlane> true_plane(const Drive& drive, const PositionView& vi
   return GroundPlane{up, -up.dot(mean)};
 }
 
-struct Stand {
+struct GroundErrors {
   std::vector<double> height_m, pitch_deg;
 };
 
@@ -66,15 +66,15 @@ int known_cells(const LocalMap& map) {
   return count;
 }
 
-// The map of a single view of the stop.
-int cells_of_one(const PositionView& view, PositionMapper& mapper, const Pose& pose) {
+// Number of known cells in the map of a single view of the stop.
+int known_cells_of(const PositionView& view, PositionMapper& mapper, const Pose& pose) {
   const std::vector<ViewGeometry> geometry{view.geometry};
   const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), geometry, 0.3, Workers(2));
   const std::vector<MergedView> views{{view.geometry, view.disparity, view.left, {}}};
   return known_cells(mapper.map(surface_points(merger.merge(views)), pose));
 }
 
-// Error of the height of a pixel of the merged view.
+// Height error of a pixel of the merged view.
 std::optional<double> height_error(const MergedRange& merged, const Drive& drive, const Pose& pose, int x, int y) {
   const double range = merged.range_m(x, y);
   if (!std::isfinite(range)) return std::nullopt;
@@ -85,8 +85,8 @@ std::optional<double> height_error(const MergedRange& merged, const Drive& drive
   return p.z() - surface(cell.column, cell.row);
 }
 
-// Across each border between two sets of views: the median step of the height's error. On ground, where a pixel beside
-// the true surface's cell does not matter.
+// Median step of the height error across each seam between two sets of views. Uses pixels with errors below 5 cm, that
+// is ground, where an offset of one cell does not matter.
 std::vector<double> seams(const MergedRange& merged, const Drive& drive, const Pose& pose) {
   std::map<std::pair<int, int>, std::vector<double>> steps;
   for (int y = 0; y < merged.range_m.height(); ++y) {
@@ -104,45 +104,45 @@ std::vector<double> seams(const MergedRange& merged, const Drive& drive, const P
   return medians;
 }
 
-void judge(const std::string& folder, const std::string& scenario, int wanted) {
+void evaluate(const std::string& folder, const std::string& scenario, int wanted) {
   auto drive = open_drive(folder + "/" + scenario);
   if (!drive) {
-    fmt::print("{:<18} left out: {} (scripts/recordings makes it)\n", scenario, drive.error().message());
+    fmt::print("{:<18} skipped: {} (create it with scripts/recordings)\n", scenario, drive.error().message());
     return;
   }
   auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));
   if (!imager) return;
   PositionMapper mapper({}, {}, Workers(2));
-  std::map<std::string, Stand> stands;
+  std::map<std::string, GroundErrors> ground_errors;
   std::vector<double> gains, steps;
   int stops = 0;
-  for (const auto& [position, shots] : drive->stops) {
+  for (const auto& [position, frames] : drive->stops) {
     if (stops++ == wanted) break;
-    look(*drive, *imager, mapper, shots);
-    const Pose pose = true_pose(*drive, shots.front().left_stamp);
+    add_views(*drive, *imager, mapper, frames);
+    const Pose pose = true_pose(*drive, frames.front().left_stamp);
     int best = 0;
     for (const PositionView& view : mapper.views()) {
-      best = std::max(best, cells_of_one(view, mapper, pose));
+      best = std::max(best, known_cells_of(view, mapper, pose));
       const auto plane = true_plane(*drive, view);
       if (!plane || !view.ground) continue;
-      Stand& stand = stands[view.pair];
-      stand.height_m.push_back(std::abs(view.ground->plane.height_m - plane->height_m));
-      stand.pitch_deg.push_back(std::abs(view.ground->plane.pitch_rad() - plane->pitch_rad()) / kDegree);
+      GroundErrors& errors = ground_errors[view.pair];
+      errors.height_m.push_back(std::abs(view.ground->plane.height_m - plane->height_m));
+      errors.pitch_deg.push_back(std::abs(view.ground->plane.pitch_rad() - plane->pitch_rad()) / kDegree);
     }
     const MergedRange merged = mapper.merge();
     gains.push_back(static_cast<double>(known_cells(mapper.map(surface_points(merged), pose))) / best);
     for (const double step : seams(merged, *drive, pose)) steps.push_back(step);
   }
-  for (const auto& [pair, stand] : stands) {
+  for (const auto& [pair, errors] : ground_errors) {
     fmt::print(
-        "{:<18} {:<7} eye over the ground, median and largest error: {:.1f} and {:.1f} mm, {:.2f} and {:.2f} deg\n",
-        scenario, pair, 1e3 * median(stand.height_m),
-        1e3 * *std::max_element(stand.height_m.begin(), stand.height_m.end()), median(stand.pitch_deg),
-        *std::max_element(stand.pitch_deg.begin(), stand.pitch_deg.end()));
+        "{:<18} {:<7} camera above the ground, median and largest error: {:.1f} and {:.1f} mm, {:.2f} and {:.2f} deg\n",
+        scenario, pair, 1e3 * median(errors.height_m),
+        1e3 * *std::max_element(errors.height_m.begin(), errors.height_m.end()), median(errors.pitch_deg),
+        *std::max_element(errors.pitch_deg.begin(), errors.pitch_deg.end()));
   }
-  fmt::print("{:<18} cells of the merged view over those of the best pair: {:.2f} at least, {:.2f} in the middle\n",
-             scenario, *std::min_element(gains.begin(), gains.end()), median(gains));
-  fmt::print("{:<18} steps at {} borders between views: median {:.1f} mm, largest {:.1f} mm\n", scenario, steps.size(),
+  fmt::print("{:<18} cells of the merged view over those of the best view: minimum {:.2f}, median {:.2f}\n", scenario,
+             *std::min_element(gains.begin(), gains.end()), median(gains));
+  fmt::print("{:<18} height steps at {} seams: median {:.1f} mm, largest {:.1f} mm\n", scenario, steps.size(),
              1e3 * median(steps), 1e3 * *std::max_element(steps.begin(), steps.end()));
   std::fflush(stdout);
 }
@@ -152,7 +152,7 @@ void run(const std::vector<std::string>& words) {
   if (arguments.scenarios.empty())
     arguments.scenarios = {"rocky_20pct", "crater_rim", "flat_featureless", "diffuse_200lux"};
   for (const std::string& scenario : arguments.scenarios)
-    judge(arguments.folder, scenario, arguments.number("--stops"));
+    evaluate(arguments.folder, scenario, arguments.number("--stops"));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Rectification beside cv::remap (bilinear, CV_16SC2 maps), one thread, in the same run: time and accuracy against
-// bilinear interpolation in double precision at the exact places. `make bench-rectification`.
+// Compares rectification with cv::remap (bilinear, CV_16SC2 maps) on one thread in the same run: time, and accuracy
+// against bilinear interpolation in double precision at the exact coordinates. `make bench-rectification`.
 //
 //   rectification [--repeat N]
 #include <fmt/format.h>
@@ -32,9 +32,9 @@ using spartan::ImageSize;
 using spartan::median;
 using spartan::milliseconds;
 
-// A picture with detail down to a pixel, smooth enough that interpolation means something.
+// An image with detail down to a pixel, smooth enough for interpolation.
 template <class Pixel, int kChannels>
-Image<Pixel> picture(ImageSize size, double full_scale) {
+Image<Pixel> make_image(ImageSize size, double full_scale) {
   spartan::Random random(7);
   using Sample = std::conditional_t<sizeof(Pixel) / kChannels == 1, std::uint8_t, std::uint16_t>;
   Image<Pixel> result(size);
@@ -52,10 +52,10 @@ struct Scene {
   ImageSize size;
   spartan::CameraModel camera;
   spartan::RectifiedStereo view;
-  Eigen::Matrix3d turn;
+  Eigen::Matrix3d rotation;
 };
 
-// A lens with barrel distortion as of a wide-angle rover camera, turned by two degrees about each axis.
+// A lens with the barrel distortion of a wide-angle rover camera, rotated by two degrees about each axis.
 Scene scene_of(int width, int height) {
   const double focal = 0.8 * width, cx = (width - 1) / 2.0, cy = (height - 1) / 2.0;
   return {{width, height},
@@ -65,8 +65,8 @@ Scene scene_of(int width, int height) {
 }
 
 struct Maps {
-  cv::Mat exact_x, exact_y;  // CV_64F; NaN where the camera does not see
-  cv::Mat fixed, parts;      // OpenCV's
+  cv::Mat exact_x, exact_y;  // CV_64F; (-9, -9) without a projection
+  cv::Mat fixed, parts;      // in OpenCV's fixed-point format
 };
 
 Maps maps_of(const Scene& scene) {
@@ -77,10 +77,10 @@ Maps maps_of(const Scene& scene) {
     for (int x = 0; x < scene.view.size.width; ++x) {
       const Eigen::Vector3d direction((x - scene.view.centre_px.x()) / scene.view.focal_px,
                                       (y - scene.view.centre_px.y()) / scene.view.focal_px, 1);
-      const Eigen::Vector2d place =
-          spartan::project(scene.camera, scene.turn * direction).value_or(Eigen::Vector2d(-9, -9));
-      maps.exact_x.at<double>(y, x) = place.x();
-      maps.exact_y.at<double>(y, x) = place.y();
+      const Eigen::Vector2d pixel =
+          spartan::project(scene.camera, scene.rotation * direction).value_or(Eigen::Vector2d(-9, -9));
+      maps.exact_x.at<double>(y, x) = pixel.x();
+      maps.exact_y.at<double>(y, x) = pixel.y();
     }
   }
   cv::Mat x, y;
@@ -95,7 +95,7 @@ struct Accuracy {
   double rms() const { return std::sqrt(squares / count); }
 };
 
-// Over the pixels that the table sees, in units of the samples.
+// Over the pixels inside the mask of the table, in gray levels.
 template <class Sample>
 Accuracy accuracy(const Scene& scene, const Maps& maps, const spartan::RemapTable& table, const cv::Mat& source,
                   const cv::Mat& result) {
@@ -128,32 +128,31 @@ void compare(const Scene& scene, const char* kind, const std::string& simd, int 
   using Sample = std::conditional_t<sizeof(Pixel) / kChannels == 1, std::uint8_t, std::uint16_t>;
   const spartan::Workers one(1);
   const Maps maps = maps_of(scene);
-  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.turn, {}, one, 1, simd);
-  auto source = picture<Pixel, kChannels>(scene.size, sizeof(Sample) == 1 ? 255 : 65535);
-  Image<Pixel> ours(scene.view.size), theirs(scene.view.size);
+  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, one, 1, simd);
+  auto source = make_image<Pixel, kChannels>(scene.size, sizeof(Sample) == 1 ? 255 : 65535);
+  Image<Pixel> spartan_result(scene.view.size), opencv_result(scene.view.size);
   const cv::Mat from = spartan::as_mat(source);
-  cv::Mat into = spartan::as_mat(theirs);
+  cv::Mat into = spartan::as_mat(opencv_result);
 
-  std::vector<double> our_times, their_times, ratios;
+  std::vector<double> spartan_times, opencv_times, ratios;
   for (int i = 0; i < repeat; ++i) {
-    our_times.push_back(milliseconds([&] { table.apply(source.view(), ours.view(), one); }));
-    their_times.push_back(
+    spartan_times.push_back(milliseconds([&] { table.apply(source.view(), spartan_result.view(), one); }));
+    opencv_times.push_back(
         milliseconds([&] { cv::remap(from, into, maps.fixed, maps.parts, cv::INTER_LINEAR, cv::BORDER_CONSTANT); }));
-    ratios.push_back(their_times.back() / our_times.back());
+    ratios.push_back(opencv_times.back() / spartan_times.back());
   }
-  const Accuracy a = accuracy<Sample>(scene, maps, table, from, spartan::as_mat(ours));
+  const Accuracy a = accuracy<Sample>(scene, maps, table, from, spartan::as_mat(spartan_result));
   const Accuracy b = accuracy<Sample>(scene, maps, table, from, into);
   const double pixels = static_cast<double>(scene.size.width) * scene.size.height;
   fmt::print("{:>4} x {:<4} {:<8} {:<5} {:8.3f} {:10.3f} {:7.1f} {:8.2f} {:7.2f} {:9.3f} {:9.3f} {:9.3f} {:9.3f}\n",
-             scene.size.width, scene.size.height, kind, simd, median(our_times), median(their_times), median(ratios),
-             median(our_times) * 1e6 / pixels, static_cast<double>(table.bytes()) / pixels, a.rms(), b.rms(), a.largest,
-             b.largest);
+             scene.size.width, scene.size.height, kind, simd, median(spartan_times), median(opencv_times),
+             median(ratios), median(spartan_times) * 1e6 / pixels, static_cast<double>(table.bytes()) / pixels, a.rms(),
+             b.rms(), a.largest, b.largest);
 }
 
-// What the memory alone allows: as many bytes as the rectification moves (table, source, result), read and written by
-// memcpy halves.
-void print_limit(const Scene& scene, const char* kind, std::size_t pixel_bytes, int repeat) {
-  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.turn, {}, spartan::Workers(1));
+// Memory bandwidth limit: memcpy of as many bytes as the rectification reads and writes (table, source, result).
+void print_memory_limit(const Scene& scene, const char* kind, std::size_t pixel_bytes, int repeat) {
+  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, spartan::Workers(1));
   const auto pixels = static_cast<std::size_t>(scene.size.width) * static_cast<std::size_t>(scene.size.height);
   const std::size_t bytes = table.bytes() + 2 * pixel_bytes * pixels;
   std::vector<std::uint8_t> from(bytes / 2, 1), to(bytes / 2);
@@ -163,8 +162,9 @@ void print_limit(const Scene& scene, const char* kind, std::size_t pixel_bytes, 
     times.push_back(milliseconds([&] { std::memcpy(to.data(), from.data(), to.size()); }));
     from[static_cast<std::size_t>(i) % from.size()] = to[to.size() / 2];
   }
-  fmt::print("{:>4} x {:<4} {:<8} {:.2f} bytes moved a pixel; memcpy moves as many in {:.3f} ms\n", scene.size.width,
-             scene.size.height, kind, static_cast<double>(bytes) / static_cast<double>(pixels), median(times));
+  fmt::print("{:>4} x {:<4} {:<8} {:.2f} bytes moved per pixel; memcpy of the same amount takes {:.3f} ms\n",
+             scene.size.width, scene.size.height, kind, static_cast<double>(bytes) / static_cast<double>(pixels),
+             median(times));
 }
 
 }  // namespace
@@ -176,7 +176,7 @@ int main(int argc, char** argv) try {
   }
   cv::setNumThreads(1);
   fmt::print("{:<11} {:<8} {:<5} {:>8} {:>10} {:>7} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9}\n", "size", "pixels", "simd",
-             "ours ms", "OpenCV ms", "ratio", "ns/px", "B/px", "rms", "cv rms", "largest", "cv larg.");
+             "Spartan", "OpenCV ms", "ratio", "ns/px", "B/px", "rms", "cv rms", "largest", "cv larg.");
   const Scene small = scene_of(640, 480), large = scene_of(1120, 1120);
   for (const Scene& scene : {small, large}) {
     for (const std::string& simd : spartan::available_simd_targets()) {
@@ -185,10 +185,10 @@ int main(int argc, char** argv) try {
       compare<spartan::Rgb8, 3>(scene, "RGB 8", simd, repeat);
       compare<spartan::Rgb16, 3>(scene, "RGB 16", simd, repeat);
     }
-    print_limit(scene, "gray 8", sizeof(std::uint8_t), repeat);
-    print_limit(scene, "gray 16", sizeof(std::uint16_t), repeat);
-    print_limit(scene, "RGB 8", sizeof(spartan::Rgb8), repeat);
-    print_limit(scene, "RGB 16", sizeof(spartan::Rgb16), repeat);
+    print_memory_limit(scene, "gray 8", sizeof(std::uint8_t), repeat);
+    print_memory_limit(scene, "gray 16", sizeof(std::uint16_t), repeat);
+    print_memory_limit(scene, "RGB 8", sizeof(spartan::Rgb8), repeat);
+    print_memory_limit(scene, "RGB 16", sizeof(spartan::Rgb16), repeat);
   }
   return 0;
 } catch (const std::exception& e) {

@@ -1,9 +1,9 @@
-// The texture of simulated soil beside that of real ground: local contrast and power spectrum. `make bench-soil`.
+// Compares the texture of simulated soil with real ground: local contrast and power spectrum. `make bench-soil`.
 //
-//   soil [--pictures DIR] [--sheet FILE] [--plot FILE.svg] [SCENARIO.yaml...]   without scenarios: all of
-//   config/scenarios
+//   soil [--images DIR] [--sheet FILE] [--plot FILE.svg] [SCENARIO.yaml...]
 //
-// --sheet: a contact sheet of all scenarios beside Curiosity's pair. --plot: the spectra.
+// Without scenarios: all of config/scenarios. --images: writes the rendered images. --sheet: writes a contact sheet of
+// all scenarios beside the pair of Curiosity. --plot: writes the spectra.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/rig/formats/rig_files.h"
-#include "spartan/sim/simulator.h"
+#include "spartan/sim/frame_preview.h"
 #include "spectrum_plot.h"
 
 namespace spartan {
@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 
 constexpr int kWindow = 9;
 
-// Median over 9×9 windows that lie wholly in the mask of standard deviation over mean.
+// Median of standard deviation over mean in the 9 × 9 windows that lie wholly in the mask.
 double local_contrast(ImageView<const float> image, ImageView<const std::uint8_t> mask) {
   std::vector<double> contrasts;
   for (int y0 = 0; y0 + kWindow <= image.height(); y0 += kWindow) {
@@ -59,7 +59,7 @@ double local_contrast(ImageView<const float> image, ImageView<const std::uint8_t
   return *middle;
 }
 
-// Mean power in rings of width 0.03 around each frequency, over that of the first; Hann window, mean and slope removed.
+// Mean power in rings of width 0.03 around each frequency, normalized by the first; Hann window, plane fit removed.
 Spectrum spectrum(ImageView<const float> patch) {
   const int n = std::min(patch.width(), patch.height());
   cv::Mat m(n, n, CV_64F), design(n * n, 3, CV_64F), values(n * n, 1, CV_64F), plane;
@@ -118,12 +118,12 @@ void print(const Spectrum& power) {
   fmt::print("\n");
 }
 
-struct Place {
+struct Square {
   int x = 0, y = 0, side = 0;
 };
 
-// The largest square of soil alone (64 pixels or more), the lowest in the picture; none: side 0.
-Place find_soil(ImageView<const std::uint8_t> soil) {
+// The largest square of soil alone (64 pixels or more), the lowest in the image; side 0 if there is none.
+Square find_soil(ImageView<const std::uint8_t> soil) {
   for (const int side : {128, 112, 96, 80, 64}) {
     for (int y = soil.height() - side - 8; y >= 0; y -= 8) {
       for (int x = 8; x + side < soil.width() - 8; x += 8) {
@@ -155,7 +155,7 @@ void measure_real(const std::string& data, SpectrumPlot& plot) {
   for (const Patch& patch : kReal) {
     const auto image = read_gray8(data + "/" + patch.file);
     if (!image) {
-      fmt::print("{:28} not there\n", patch.name);
+      fmt::print("{:28} not found\n", patch.name);
       continue;
     }
     const auto whole = to_float(FrameImage::borrow(image->view(), {}));
@@ -169,7 +169,7 @@ void measure_real(const std::string& data, SpectrumPlot& plot) {
 
 constexpr int kTileWidth = 400, kTileHeight = 300, kColumns = 4;
 
-// A picture of one size with its name below, stretched to the range that it uses.
+// An image tile of fixed size with its name below, contrast stretched to its 0.5 and 99.5 % quantiles.
 cv::Mat tile(ImageView<const std::uint8_t> image, const std::string& name) {
   const cv::Mat whole(image.height(), image.width(), CV_8U, const_cast<std::uint8_t*>(image.data()),
                       static_cast<std::size_t>(image.stride()));
@@ -216,16 +216,16 @@ std::optional<sim::SimulationRequest> load(const fs::path& file) {
   return sim::SimulationRequest{*scenario, *rig, std::move(*drive), {}, "", false};
 }
 
-void measure(const fs::path& file, const std::string& pictures, std::vector<cv::Mat>& sheet, SpectrumPlot& plot) {
+void measure(const fs::path& file, const std::string& images, std::vector<cv::Mat>& sheet, SpectrumPlot& plot) {
   const auto request = load(file);
   if (!request) return;
-  const auto& shots = request->drive.shots();
+  const auto& frames = request->drive.frames();
   for (const std::string pair : {"narrow", "wide"}) {
-    const auto shot = std::find_if(shots.begin(), shots.end(), [&](const sim::Shot& s) {
+    const auto frame = std::find_if(frames.begin(), frames.end(), [&](const sim::PlannedFrame& s) {
       return s.pair == pair && (pair == "narrow" || s.pan_rad == 0);
     });
-    if (shot == shots.end()) continue;
-    const auto preview = sim::preview_left(*request, static_cast<std::size_t>(shot - shots.begin()), Workers(2));
+    if (frame == frames.end()) continue;
+    const auto preview = sim::preview_left(*request, static_cast<std::size_t>(frame - frames.begin()), Workers(2));
     const Image<float> noisy = to_float(preview.recorded);
     const double black = request->scenario.sensor.black_level * ((1 << preview.recorded.format().bits) - 1);
     Image<float> over_black(noisy.width(), noisy.height());
@@ -235,33 +235,34 @@ void measure(const fs::path& file, const std::string& pictures, std::vector<cv::
     fmt::print("{:28} {:8.3f} {:8.3f}  ", fmt::format("{}, {}", file.stem().string(), pair),
                local_contrast(preview.noise_free.view(), preview.soil.view()),
                local_contrast(over_black.view(), preview.soil.view()));
-    const Place place = find_soil(preview.soil.view());
-    if (place.side > 0) {
-      const Spectrum power = spectrum(noisy.view().crop(place.x, place.y, place.side, place.side));
+    const Square square = find_soil(preview.soil.view());
+    if (square.side > 0) {
+      const Spectrum power = spectrum(noisy.view().crop(square.x, square.y, square.side, square.side));
       print(power);
       plot.add_simulated(fmt::format("{}, {}", file.stem().string(), pair), power);
     } else {
-      fmt::print(" no square of soil alone\n");
+      fmt::print(" no square without rocks\n");
     }
-    fmt::print("{:28} {}x{} at ({}, {}); exposure {:.2f} ms, gain {:.2f}, {:.2f} million rays a second on two cores\n",
-               "", place.side, place.side, place.x, place.y, 1e3 * preview.exposure.seconds, preview.exposure.gain,
-               static_cast<double>(preview.rays) / preview.seconds / 1e6);
+    fmt::print(
+        "{:28} {}x{} at ({}, {}); exposure {:.2f} ms, gain {:.2f}, {:.2f} million rays per second on two cores\n", "",
+        square.side, square.side, square.x, square.y, 1e3 * preview.exposure.seconds, preview.exposure.gain,
+        static_cast<double>(preview.rays) / preview.seconds / 1e6);
     if (preview.recorded.format().bits == 8)
       sheet.push_back(tile(preview.recorded.as<std::uint8_t>(), fmt::format("{}, {}", file.stem().string(), pair)));
-    if (!pictures.empty()) {
-      const std::string name = fmt::format("{}/{}_{}.png", pictures, file.stem().string(), pair);
+    if (!images.empty()) {
+      const std::string name = fmt::format("{}/{}_{}.png", images, file.stem().string(), pair);
       if (preview.recorded.format().bits == 8) (void)write_png(name, preview.recorded.as<std::uint8_t>());
     }
   }
 }
 
 void compare(const std::vector<std::string>& words) {
-  std::string pictures, sheet, plot_file;
+  std::string images, sheet, plot_file;
   std::vector<fs::path> files;
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
-    if (word == "--pictures" && i + 1 < words.size()) {
-      pictures = words[++i];
+    if (word == "--images" && i + 1 < words.size()) {
+      images = words[++i];
     } else if (word == "--sheet" && i + 1 < words.size()) {
       sheet = words[++i];
     } else if (word == "--plot" && i + 1 < words.size()) {
@@ -274,24 +275,24 @@ void compare(const std::vector<std::string>& words) {
     for (const auto& entry : fs::directory_iterator("config/scenarios")) files.push_back(entry.path());
     std::sort(files.begin(), files.end());
   }
-  if (!pictures.empty()) fs::create_directories(pictures);
+  if (!images.empty()) fs::create_directories(images);
   const char* const data = std::getenv("SPARTAN_DATA");
   fmt::print("{:28} {:>8} {:>8}   power at", "", "clean", "noisy");
   for (const double f : kFrequencies) fmt::print(" {:7.2f}", f);
-  fmt::print(" cycles a pixel\n");
+  fmt::print(" cycles per pixel\n");
   const std::string real = data != nullptr ? data : "../shared/data";
   SpectrumPlot plot;
   measure_real(real, plot);
   std::vector<cv::Mat> tiles;
-  for (const std::string eye : {"NL", "NR"}) {
+  for (const std::string camera : {"NL", "NR"}) {
     const auto image =
-        read_gray8(fmt::format("{}/mars/msl_navcam_sol1431/{}B_524534514EDR_F0562034NCAM00280M_.jpeg", real, eye));
+        read_gray8(fmt::format("{}/mars/msl_navcam_sol1431/{}B_524534514EDR_F0562034NCAM00280M_.jpeg", real, camera));
     if (image) {
       tiles.push_back(
-          tile(image->view().crop(0, 424, 1024, 600), "Curiosity, " + eye + "B sol 1431 (NASA/JPL-Caltech)"));
+          tile(image->view().crop(0, 424, 1024, 600), "Curiosity, " + camera + "B sol 1431 (NASA/JPL-Caltech)"));
     }
   }
-  for (const fs::path& file : files) measure(file, pictures, tiles, plot);
+  for (const fs::path& file : files) measure(file, images, tiles, plot);
   if (!sheet.empty()) write_sheet(sheet, tiles);
   if (!plot_file.empty()) (void)write_file_atomically(plot_file, plot.svg());
 }

@@ -1,4 +1,4 @@
-// Power spectra of soil as an SVG picture: simulated ones as lines over the band that real patches allow.
+// Plots power spectra of soil as SVG: simulated ones as lines over the band around those of real patches.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,8 +11,8 @@
 
 namespace spartan {
 
-inline constexpr std::array<double, 6> kFrequencies{0.05, 0.1, 0.15, 0.2, 0.3, 0.4};  // cycles a pixel
-using Spectrum = std::array<double, kFrequencies.size()>;                             // power over that of the first
+inline constexpr std::array<double, 6> kFrequencies{0.05, 0.1, 0.15, 0.2, 0.3, 0.4};  // cycles per pixel
+using Spectrum = std::array<double, kFrequencies.size()>;                             // power normalized by the first
 
 class SpectrumPlot {
  public:
@@ -65,12 +65,12 @@ class SpectrumPlot {
           kLeft, y_of(p), kRight, kLeft - 6, y_of(p) + 4, p);
     }
     return out + fmt::format(
-                     "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">cycles a pixel</text>"
-                     "<text x=\"{}\" y=\"{}\">power over that at 0.05</text>\n",
+                     "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">cycles per pixel</text>"
+                     "<text x=\"{}\" y=\"{}\">power relative to 0.05</text>\n",
                      (kLeft + kRight) / 2, kBottom + 36, kLeft, kTop - 10);
   }
 
-  // From half the lowest to twice the highest of the real ones.
+  // From half the minimum to twice the maximum of the real spectra.
   std::string band() const {
     if (real_.empty()) return {};
     std::string up, back;

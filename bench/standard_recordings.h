@@ -1,4 +1,4 @@
-// What benchmarks on the standard recordings are told: where these lie, how much of each to take, which ones.
+// Command-line arguments of the benchmarks on the standard recordings.
 #pragma once
 
 #include <cstdio>
@@ -18,7 +18,7 @@ struct RecordingArguments {
   int number(const std::string& option) const { return std::stoi(options.at(option)); }
 };
 
-/// `defaults`: every option with its value; each takes one word. "--from" is one always.
+/// `defaults`: every option with its default; each option takes one value. "--from" is always an option.
 inline RecordingArguments read_arguments(const std::vector<std::string>& words,
                                          const std::map<std::string, std::string>& defaults) {
   const char* const home = std::getenv("HOME");
@@ -36,7 +36,7 @@ inline RecordingArguments read_arguments(const std::vector<std::string>& words,
   return arguments;
 }
 
-/// What main() returns: 1 where the benchmark throws, and says why.
+/// Runs a benchmark and returns the exit code of main(); prints exceptions and returns 1.
 inline int run_benchmark(int argc, char** argv, void (*run)(const std::vector<std::string>& words)) {
   try {
     run({argv + 1, argv + argc});

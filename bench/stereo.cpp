@@ -1,6 +1,6 @@
-// Disparities beside OpenCV's on the real pairs with truth: accuracy, density, time. `make bench-stereo`.
+// Compares stereo matching with OpenCV on real pairs with ground truth: accuracy, density, time. `make bench-stereo`.
 //
-//   stereo [--repeat N] [--set key=value]... [--pictures DIR]
+//   stereo [--repeat N] [--set key=value]... [--images DIR]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 using spartan::must;
 using spartan::Pair;
 
-// OpenCV leaves the columns out whose search range leaves the picture, so it gets a border on the left.
+// OpenCV does not match columns whose search range leaves the image, so the images get a border on the left.
 Image<float> opencv_disparity(const Pair& pair, int mode) {
   const int n = pair.disparities;
   cv::Mat left, right, fixed;
@@ -88,17 +88,17 @@ void print_line(const std::string& pair, const std::string& method, const Scores
              s.bad_05, s.bad_1, s.bad_2, s.matched_bad_1, s.matched_bad_2, s.density, s.nonocc_bad_1, s.rms, s.ms);
 }
 
-// Green good, orange over 1 px, red over 2 px, blue a hole, black no truth.
-cv::Vec3b verdict_on(float found, float truth) {
+// Green: below 1 px, orange: over 1 px, red: over 2 px, blue: no match, black: no ground truth.
+cv::Vec3b error_colour(float disparity, float truth) {
   if (!std::isfinite(truth)) return {0, 0, 0};
-  if (!std::isfinite(found)) return {120, 60, 0};
-  const float error = std::abs(found - truth);
+  if (!std::isfinite(disparity)) return {120, 60, 0};
+  const float error = std::abs(disparity - truth);
   if (error > 2) return {0, 0, 255};
   return error > 1 ? cv::Vec3b(0, 160, 255) : cv::Vec3b(60, 120, 60);
 }
 
-void write_pictures(const std::string& folder, const Pair& pair, ImageView<const float> disparity) {
-  cv::Mat picture(pair.left.height() * 2, pair.left.width() * 2, CV_8UC3, cv::Scalar(0, 0, 0));
+void write_images(const std::string& folder, const Pair& pair, ImageView<const float> disparity) {
+  cv::Mat image(pair.left.height() * 2, pair.left.width() * 2, CV_8UC3, cv::Scalar(0, 0, 0));
   for (int y = 0; y < disparity.height(); ++y) {
     for (int x = 0; x < disparity.width(); ++x) {
       const auto level = [&](float d) {
@@ -106,21 +106,21 @@ void write_pictures(const std::string& folder, const Pair& pair, ImageView<const
                                 : std::uint8_t{0};
       };
       const float d = disparity(x, y), t = pair.truth(x, y);
-      const std::uint8_t gray = pair.left(x, y), found = level(d), true_level = level(t);
-      picture.at<cv::Vec3b>(y, x) = {gray, gray, gray};
-      picture.at<cv::Vec3b>(y, x + disparity.width()) = {true_level, true_level, true_level};
-      picture.at<cv::Vec3b>(y + disparity.height(), x) = {found, found, found};
-      const cv::Vec3b verdict = verdict_on(d, t);
-      picture.at<cv::Vec3b>(y + disparity.height(), x + disparity.width()) = verdict;
+      const std::uint8_t gray = pair.left(x, y), estimated = level(d), true_level = level(t);
+      image.at<cv::Vec3b>(y, x) = {gray, gray, gray};
+      image.at<cv::Vec3b>(y, x + disparity.width()) = {true_level, true_level, true_level};
+      image.at<cv::Vec3b>(y + disparity.height(), x) = {estimated, estimated, estimated};
+      const cv::Vec3b colour = error_colour(d, t);
+      image.at<cv::Vec3b>(y + disparity.height(), x + disparity.width()) = colour;
     }
   }
-  cv::imwrite(folder + "/" + pair.name + ".png", picture);
+  cv::imwrite(folder + "/" + pair.name + ".png", image);
 }
 
 struct Arguments {
   int repeat = 3;
   bool rivals = true;
-  std::string pictures;
+  std::string images;
   spartan::DisparityOptions options;
 };
 
@@ -131,7 +131,7 @@ Arguments parse(int argc, char** argv) {
     if (word == "--no-rivals") arguments.rivals = false;
     if (i + 1 >= argc) continue;
     if (word == "--repeat") arguments.repeat = std::max(1, std::atoi(argv[++i]));
-    if (word == "--pictures") arguments.pictures = argv[++i];
+    if (word == "--images") arguments.images = argv[++i];
     if (word == "--set") arguments.options = must(spartan::set_option(arguments.options, argv[++i]));
   }
   return arguments;
@@ -168,14 +168,14 @@ class Means {
   std::map<std::string, Scores> sums_;
 };
 
-Scores run_ours(const Pair& pair, const spartan::DisparityOptions& options, int threads, int repeat,
-                const std::string& pictures) {
+Scores run_spartan(const Pair& pair, const spartan::DisparityOptions& options, int threads, int repeat,
+                   const std::string& images) {
   spartan::DisparityComputer computer(options, spartan::Workers(threads));
   spartan::DisparityImage image;
   const double ms = time_of(repeat + 1, [&] {
     image = must(computer.compute(pair.left, pair.right, {0, pair.disparities - 1}));
   });
-  if (!pictures.empty()) write_pictures(pictures, pair, image.disparity);
+  if (!images.empty()) write_images(images, pair, image.disparity);
   return score(pair, image.disparity, ms);
 }
 
@@ -188,8 +188,8 @@ void compare_all(const std::vector<Pair>& pairs, const Arguments& arguments) {
       print_line(pair.name, method, s);
       means.add(method, s);
     };
-    note("ours 1 thread", run_ours(pair, arguments.options, 1, arguments.repeat, arguments.pictures));
-    note("ours 2 threads", run_ours(pair, arguments.options, 2, arguments.repeat, ""));
+    note("Spartan 1 thr.", run_spartan(pair, arguments.options, 1, arguments.repeat, arguments.images));
+    note("Spartan 2 thr.", run_spartan(pair, arguments.options, 2, arguments.repeat, ""));
     if (!arguments.rivals) continue;
     for (const auto& [name, mode] :
          {std::pair{"SGBM", cv::StereoSGBM::MODE_SGBM}, std::pair{"SGBM HH", cv::StereoSGBM::MODE_HH}}) {
@@ -203,7 +203,7 @@ void compare_all(const std::vector<Pair>& pairs, const Arguments& arguments) {
   means.print(static_cast<double>(pairs.size()));
 }
 
-// The same work on every instruction set, on the largest pair.
+// Times on every instruction set, on the largest pair.
 void time_targets(const std::vector<Pair>& pairs, const Arguments& arguments) {
   const auto largest = std::max_element(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
     return a.left.width() * a.left.height() * a.disparities < b.left.width() * b.left.height() * b.disparities;
@@ -236,7 +236,7 @@ int main(int argc, char** argv) {
   const char* const data = std::getenv("SPARTAN_DATA");
   const fs::path folder = data != nullptr ? data : "../shared/data";
   if (!fs::exists(folder / "middlebury")) {
-    fmt::print("no stereo pairs: SPARTAN_DATA does not name the data folder\n");
+    fmt::print("no stereo pairs: set SPARTAN_DATA to the data folder\n");
     return 0;
   }
   const std::vector<Pair> pairs = spartan::load_stereo_pairs(folder);

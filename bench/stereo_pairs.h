@@ -1,4 +1,4 @@
-// The real stereo pairs with truth that benchmarks look at.
+// Real stereo pairs with ground truth for benchmarks.
 #pragma once
 
 #include <fmt/format.h>
@@ -19,14 +19,14 @@
 
 namespace spartan {
 
-/// A rectified pair with its truth.
+/// A rectified pair with its ground truth.
 struct Pair {
   std::string name;
   std::filesystem::path folder;
   Image<std::uint8_t> left, right;
   Image<float> truth;
   Image<std::uint8_t> mask;
-  int disparities = 0;  // the search range: largest truth + 8, rounded up to a multiple of 16
+  int disparities = 0;  // search range: largest true disparity + 8, rounded up to a multiple of 16
 };
 
 template <class T>
@@ -59,8 +59,8 @@ inline Pair load_middlebury(const std::filesystem::path& folder) {
     for (int x = 0; x < pair.truth.width(); ++x) {
       const float d = pair.truth(x, y);
       if (!std::isfinite(d)) continue;
-      const int seen = x - static_cast<int>(std::lround(d));
-      const bool both = seen >= 0 && std::abs(other(seen, y) - d) <= 1.0F;
+      const int right_x = x - static_cast<int>(std::lround(d));
+      const bool both = right_x >= 0 && std::abs(other(right_x, y) - d) <= 1.0F;
       pair.mask(x, y) = both ? kMaskSeenByBoth : kMaskOccluded;
     }
   }
@@ -80,7 +80,7 @@ inline Pair load_eth3d(const std::filesystem::path& folder) {
   return pair;
 }
 
-/// Middlebury, then ETH3D, each by name.
+/// Middlebury pairs, then ETH3D pairs, each sorted by name.
 inline std::vector<Pair> load_stereo_pairs(const std::filesystem::path& data) {
   std::vector<std::filesystem::path> folders;
   for (const char* set : {"middlebury", "eth3d"}) {

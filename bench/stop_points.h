@@ -1,18 +1,23 @@
-// Points on the ground of every stop of a recording, kept on the disk: matching is tried often, stereo is slow.
+// Points on the ground of every stop of a recording, cached on disk: matching is benchmarked often, and stereo is slow.
 #pragma once
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "mars_stops.h"
 #include "spartan/core/archive.h"
 #include "spartan/reconstruction/map_generator.h"
+#include "spartan/testing/real_data.h"
 
 namespace spartan {
 
@@ -56,31 +61,88 @@ inline std::optional<StopPoints> read_points(const std::string& path) {
   return stop;
 }
 
-// In the order of the drive; made where they are not in `cache` yet. Empty where there is no such recording.
+/// FNV-1a, 64 bits, continued from `hash`.
+inline std::uint64_t hash_of(std::string_view bytes, std::uint64_t hash = 0xcbf29ce484222325U) {
+  for (const char c : bytes) hash = (hash ^ static_cast<std::uint8_t>(c)) * 0x100000001b3U;
+  return hash;
+}
+
+/// Hash of all sources that the points depend on (tests excluded); none where the source folder is not found. The
+/// program must be up to date with them, as `make bench-…` ensures.
+inline std::optional<std::uint64_t> hash_of_sources() {
+  namespace fs = std::filesystem;
+  const fs::path root = testing::source_folder();
+  std::vector<fs::path> files{root / "bench/mars_stops.h", root / "bench/stop_points.h"};
+  for (const char* module : {"core", "rig", "camera", "imaging", "reconstruction"}) {
+    std::error_code error;
+    const auto before = files.size();
+    for (const auto& entry : fs::recursive_directory_iterator(root / "src/spartan" / module, error)) {
+      const std::string name = entry.path().filename().string();
+      const bool source = name.ends_with(".h") || name.ends_with(".cpp");
+      if (source && name.find("_test.") == std::string::npos) files.push_back(entry.path());
+    }
+    if (error || files.size() == before) return std::nullopt;
+  }
+  std::sort(files.begin(), files.end());
+  std::uint64_t hash = hash_of("");
+  for (const fs::path& file : files) {
+    const auto content = read_file(file.string());
+    if (!content) return std::nullopt;
+    hash = hash_of(*content, hash_of(file.lexically_relative(root).string(), hash));
+  }
+  return hash;
+}
+
+/// The cache folder of a recording's points: its name is a hash of the recording, the options and the sources. None
+/// where one of them cannot be read.
+inline std::optional<std::string> cache_folder(const std::string& recording, const std::string& cache,
+                                               const std::string& options) {
+  std::optional<std::uint64_t> hash = hash_of_sources();
+  if (!hash) return std::nullopt;
+  // The images themselves are too large; the scenario has the seeds that they depend on.
+  for (const char* file : {"recording.yaml", "rig.yaml", "frames.csv", "truth/poses.tum", "truth/scenario.yaml"}) {
+    const auto content = read_file(recording + "/" + file);
+    if (!content) return std::nullopt;
+    hash = hash_of(*content, *hash);
+  }
+  return fmt::format("{}/{:016x}", cache, hash_of(options, *hash));
+}
+
+/// In the order of the drive. Computes the points that are not in `cache` yet. Empty where there is no such recording.
 inline std::vector<StopPoints> points_of_stops(const std::string& recording, const std::string& cache) {
+  const ImagingOptions imaging;
+  const DisparityOptions disparity;
+  const MappingOptions mapping;
+  const auto folder =
+      cache_folder(recording, cache, dump_options(imaging) + dump_options(disparity) + dump_options(mapping));
   std::vector<StopPoints> stops;
-  std::optional<StopPoints> kept;
-  while ((kept = read_points(fmt::format("{}/{}.points", cache, stops.size())))) stops.push_back(std::move(*kept));
-  if (!stops.empty() && std::filesystem::exists(cache + "/complete")) return stops;
+  if (folder) {
+    std::optional<StopPoints> cached;
+    while ((cached = read_points(fmt::format("{}/{}.points", *folder, stops.size())))) {
+      stops.push_back(std::move(*cached));
+    }
+    if (!stops.empty() && std::filesystem::exists(*folder + "/complete")) return stops;
+  }
   auto drive = open_drive(recording);
   if (!drive) return {};
-  auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));
+  auto imager = Imager::create(drive->rig, imaging, Workers(2));
   if (!imager) return {};
-  PositionMapper mapper({}, {}, Workers(2));
-  std::filesystem::create_directories(cache);
+  PositionMapper mapper(disparity, mapping, Workers(2));
+  if (folder) std::filesystem::create_directories(*folder);
   std::size_t number = 0;
-  for (const auto& [position, shots] : drive->stops) {
+  for (const auto& [position, frames] : drive->stops) {
     if (number++ < stops.size()) continue;
-    const Stamp stamp = shots.front().left_stamp;
-    look(*drive, *imager, mapper, shots);
+    const Stamp stamp = frames.front().left_stamp;
+    add_views(*drive, *imager, mapper, frames);
     stops.push_back({stamp, true_pose(*drive, stamp), surface_points(mapper.merge())});
+    if (!folder) continue;
     const Bytes bytes = to_bytes(stops.back());
-    const std::string path = fmt::format("{}/{}.points", cache, number - 1);
+    const std::string path = fmt::format("{}/{}.points", *folder, number - 1);
     std::ofstream(path + ".part", std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     std::filesystem::rename(path + ".part", path);
   }
-  std::ofstream(cache + "/complete") << stops.size();
+  if (folder) std::ofstream(*folder + "/complete") << stops.size();
   return stops;
 }
 

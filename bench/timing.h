@@ -1,4 +1,4 @@
-// Wall-clock times for the benchmarks that have a main of their own.
+// Wall-clock timing for benchmarks with their own main.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@ inline double milliseconds(const std::function<void()>& work) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The median of several runs.
+/// Median time of several runs.
 inline double median_milliseconds(int runs, const std::function<void()>& work) {
   std::vector<double> times;
   times.reserve(static_cast<std::size_t>(runs));

@@ -8,16 +8,16 @@
 namespace spartan::sim {
 namespace {
 
-// Places of a disc of radius 1 whose mean stands for it.
-constexpr std::size_t kSpots = 9;
-constexpr std::array<double, kSpots> kSpotX{0, 0.7, -0.7, 0, 0, 0.5, -0.5, 0.5, -0.5};
-constexpr std::array<double, kSpots> kSpotY{0, 0, 0, 0.7, -0.7, 0.5, 0.5, -0.5, -0.5};
+// Points in a disc of radius 1 whose mean approximates the mean over the disc.
+constexpr std::size_t kDiscPoints = 9;
+constexpr std::array<double, kDiscPoints> kDiscX{0, 0.7, -0.7, 0, 0, 0.5, -0.5, 0.5, -0.5};
+constexpr std::array<double, kDiscPoints> kDiscY{0, 0, 0, 0.7, -0.7, 0.5, 0.5, -0.5, -0.5};
 
 }  // namespace
 
-Vector6d stand_on(const WheelGround& ground, const ChassisOptions& chassis, const PlanarPose& at) {
+Vector6d fit_to_ground(const WheelGround& ground, const ChassisOptions& chassis, const PlanarPose& at) {
   const double c = std::cos(at.heading), s = std::sin(at.heading);
-  std::array<double, 4 * kSpots> x{}, y{}, z{};
+  std::array<double, 4 * kDiscPoints> x{}, y{}, z{};
   std::array<double, 4> height{};
   std::size_t n = 0;
   for (int wheel = 0; wheel < 4; ++wheel) {
@@ -25,15 +25,15 @@ Vector6d stand_on(const WheelGround& ground, const ChassisOptions& chassis, cons
                  aside = (wheel % 2 == 0 ? 0.5 : -0.5) * chassis.track_m;
     height[static_cast<std::size_t>(wheel)] =
         ground.rocks.at(at.x + c * along - s * aside, at.y + s * along + c * aside, at.heading);
-    for (std::size_t k = 0; k < kSpots; ++k, ++n) {
-      const double a = along + chassis.wheel_radius_m * kSpotX[k], b = aside + chassis.wheel_radius_m * kSpotY[k];
+    for (std::size_t k = 0; k < kDiscPoints; ++k, ++n) {
+      const double a = along + chassis.wheel_radius_m * kDiscX[k], b = aside + chassis.wheel_radius_m * kDiscY[k];
       x[n] = at.x + c * a - s * b;
       y[n] = at.y + s * a + c * b;
     }
   }
   ground.shape.heights(x, y, z);
-  for (std::size_t i = 0; i < z.size(); ++i) height[i / kSpots] += z[i] / kSpots;
-  // Least squares over a rectangle: each slope is the difference of the sides' means.
+  for (std::size_t i = 0; i < z.size(); ++i) height[i / kDiscPoints] += z[i] / kDiscPoints;
+  // Least-squares plane over a rectangle: each slope is the difference of the means of two sides.
   const double rise_along = ((height[0] + height[1]) - (height[2] + height[3])) / (2 * chassis.wheelbase_m);
   const double rise_aside = ((height[0] + height[2]) - (height[1] + height[3])) / (2 * chassis.track_m);
   const double pitch = -std::atan(rise_along);
@@ -48,15 +48,15 @@ BodyMotion::BodyMotion(const Drive& drive, const WheelGround& ground, const Chas
     : knots_(static_cast<std::size_t>(std::ceil(drive.seconds() / kKnot_s)) + 1) {
   workers.for_each_part(0, static_cast<int>(knots_.size()), 256, [&](int from, int to) {
     for (int i = from; i < to; ++i)
-      knots_[static_cast<std::size_t>(i)] = stand_on(ground, chassis, drive.at(i * kKnot_s));
+      knots_[static_cast<std::size_t>(i)] = fit_to_ground(ground, chassis, drive.at(i * kKnot_s));
   });
 }
 
-// Uniform cubic B-spline over the four knots around the time, or a derivative of it.
-Vector6d BodyMotion::blend(double time_s, int derivative) const {
-  const double place = std::clamp(time_s / kKnot_s, 0.0, static_cast<double>(knots_.size() - 1) - 1e-9);
-  const auto i = static_cast<std::ptrdiff_t>(place);
-  const double t = place - static_cast<double>(i), u = 1 - t;
+// Uniform cubic B-spline of the four knots around the time, or its derivative.
+Vector6d BodyMotion::evaluate_spline(double time_s, int derivative) const {
+  const double knot = std::clamp(time_s / kKnot_s, 0.0, static_cast<double>(knots_.size() - 1) - 1e-9);
+  const auto i = static_cast<std::ptrdiff_t>(knot);
+  const double t = knot - static_cast<double>(i), u = 1 - t;
   std::array<double, 4> w{};
   if (derivative == 0) {
     w = {u * u * u / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * u * u * u - 6 * u * u + 4) / 6, t * t * t / 6};
@@ -74,26 +74,26 @@ Vector6d BodyMotion::blend(double time_s, int derivative) const {
 }
 
 Pose BodyMotion::world_from_body(double time_s) const {
-  const Vector6d p = blend(time_s, 0);
-  const Eigen::Quaterniond turn = Eigen::AngleAxisd(p[5], Eigen::Vector3d::UnitZ()) *
-                                  Eigen::AngleAxisd(p[4], Eigen::Vector3d::UnitY()) *
-                                  Eigen::AngleAxisd(p[3], Eigen::Vector3d::UnitX());
-  return {turn, p.head<3>()};
+  const Vector6d p = evaluate_spline(time_s, 0);
+  const Eigen::Quaterniond rotation = Eigen::AngleAxisd(p[5], Eigen::Vector3d::UnitZ()) *
+                                      Eigen::AngleAxisd(p[4], Eigen::Vector3d::UnitY()) *
+                                      Eigen::AngleAxisd(p[3], Eigen::Vector3d::UnitX());
+  return {rotation, p.head<3>()};
 }
 
 Eigen::Vector3d BodyMotion::velocity(double time_s) const {
-  return blend(time_s, 1).head<3>();
+  return evaluate_spline(time_s, 1).head<3>();
 }
 Eigen::Vector3d BodyMotion::acceleration(double time_s) const {
-  return blend(time_s, 2).head<3>();
+  return evaluate_spline(time_s, 2).head<3>();
 }
 Eigen::Vector3d BodyMotion::roll_pitch_yaw(double time_s) const {
-  return blend(time_s, 0).tail<3>();
+  return evaluate_spline(time_s, 0).tail<3>();
 }
 
-// Body rates of the angles z-y-x: ω = (ṙ − ẏ sin p, ṗ cos r + ẏ sin r cos p, ẏ cos r cos p − ṗ sin r).
+// Body rates from the rates of z-y-x Euler angles: ω = (ṙ − ẏ sin p, ṗ cos r + ẏ sin r cos p, ẏ cos r cos p − ṗ sin r).
 Eigen::Vector3d BodyMotion::angular_velocity(double time_s) const {
-  const Vector6d at = blend(time_s, 0), rate = blend(time_s, 1);
+  const Vector6d at = evaluate_spline(time_s, 0), rate = evaluate_spline(time_s, 1);
   const double r = at[3], p = at[4];
   return {rate[3] - rate[5] * std::sin(p), rate[4] * std::cos(r) + rate[5] * std::sin(r) * std::cos(p),
           rate[5] * std::cos(r) * std::cos(p) - rate[4] * std::sin(r)};

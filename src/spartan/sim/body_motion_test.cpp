@@ -12,21 +12,21 @@
 namespace spartan::sim {
 namespace {
 
-struct Ride {
+struct SimulatedDrive {
   Drive drive;
   TerrainShape shape;
   BodyMotion motion;
 };
 
-Ride ride(const PathOptions& path, const TerrainShapeOptions& terrain = {}) {
+SimulatedDrive simulate_drive(const PathOptions& path, const TerrainShapeOptions& terrain = {}) {
   auto drive = Drive::plan(path, {}, Rig());
   TerrainShape shape(terrain, 4);
   BodyMotion motion(*drive, {shape, WheelLift()}, {}, Workers(1));
   return {std::move(*drive), shape, motion};
 }
 
-TEST(BodyMotion, DerivativesAreThoseOfThePose) {
-  const Ride r = ride({.kind = "winding", .length_m = 3, .wavelength_m = 3});
+TEST(BodyMotion, DerivativesMatchFiniteDifferencesOfThePose) {
+  const SimulatedDrive r = simulate_drive({.kind = PathKind::winding, .length_m = 3, .wavelength_m = 3});
   constexpr double kStep = 1e-3;
   for (double t = 3; t < r.motion.seconds() - 2; t += 3.37) {
     const Pose before = r.motion.world_from_body(t - kStep), here = r.motion.world_from_body(t),
@@ -41,7 +41,7 @@ TEST(BodyMotion, DerivativesAreThoseOfThePose) {
   }
 }
 
-TEST(BodyMotion, StandsOnAPlaneAsItLies) {
+TEST(BodyMotion, OnAPlaneTheBodyHasItsNormalAndHeight) {
   TerrainShapeOptions plane;
   plane.relief_m = plane.ripple_height_m = plane.dune_height_m = 0;
   plane.slope_deg = 10;
@@ -49,22 +49,23 @@ TEST(BodyMotion, StandsOnAPlaneAsItLies) {
   const TerrainShape shape(plane, 1);
   for (const double heading_deg : {0.0, 30.0, 120.0, -60.0}) {
     const double heading = heading_deg * std::numbers::pi / 180;
-    const Vector6d at = stand_on({shape, WheelLift()}, {}, {0.5, -0.2, heading});
-    const Eigen::Quaterniond turn = Eigen::AngleAxisd(at[5], Eigen::Vector3d::UnitZ()) *
-                                    Eigen::AngleAxisd(at[4], Eigen::Vector3d::UnitY()) *
-                                    Eigen::AngleAxisd(at[3], Eigen::Vector3d::UnitX());
+    const Vector6d at = fit_to_ground({shape, WheelLift()}, {}, {0.5, -0.2, heading});
+    const Eigen::Quaterniond attitude = Eigen::AngleAxisd(at[5], Eigen::Vector3d::UnitZ()) *
+                                        Eigen::AngleAxisd(at[4], Eigen::Vector3d::UnitY()) *
+                                        Eigen::AngleAxisd(at[3], Eigen::Vector3d::UnitX());
     const double rise = std::tan(10 * std::numbers::pi / 180);
     const Eigen::Vector3d normal =
         Eigen::Vector3d(-rise * std::cos(std::numbers::pi / 6), -rise * std::sin(std::numbers::pi / 6), 1).normalized();
-    EXPECT_LT((turn * Eigen::Vector3d::UnitZ() - normal).norm(), 1e-9) << heading_deg;
+    EXPECT_LT((attitude * Eigen::Vector3d::UnitZ() - normal).norm(), 1e-9) << heading_deg;
     EXPECT_NEAR(at[2], shape.height(0.5, -0.2), 1e-9);
   }
 }
 
-// Strapdown integration of the readings without errors, by the midpoint of neighbouring readings.
-TEST(Imu, ReadingsWithoutErrorsIntegrateToTheTruePath) {
+// Strapdown integration of error-free samples by the midpoint rule.
+TEST(Imu, SamplesWithoutErrorsIntegrateToTheTruePath) {
   constexpr double kGravity = 3.71;
-  const Ride r = ride({.kind = "winding", .length_m = 2, .swing_deg = 30, .wavelength_m = 2});
+  const SimulatedDrive r =
+      simulate_drive({.kind = PathKind::winding, .length_m = 2, .swing_deg = 30, .wavelength_m = 2});
   ImuOptions perfect;
   perfect.rate_hz = 200;
   perfect.gyro_noise_rad_s_sqrt_hz = perfect.gyro_bias_rad_s = perfect.gyro_walk_rad_s2_sqrt_hz = 0;
@@ -85,16 +86,17 @@ TEST(Imu, ReadingsWithoutErrorsIntegrateToTheTruePath) {
   }
   const double end = seconds_between(samples.front().stamp, samples.back().stamp);
   const Pose truth = r.motion.world_from_body(end);
-  fmt::print("IMU without errors: {:.2f} mm off after {:.0f} s\n", 1000 * (position - truth.translation()).norm(), end);
+  fmt::print("IMU without errors: position error {:.2f} mm after {:.0f} s\n",
+             1000 * (position - truth.translation()).norm(), end);
   EXPECT_LT((position - truth.translation()).norm(), 0.01) << "over " << end << " s";
   EXPECT_LT(rotation_angle(Pose(attitude, position).inverse() * Pose(truth.rotation(), position)), 1e-5);
 }
 
-TEST(Imu, FaultsSilenceOrFreezeItAndTouchNothingElse) {
-  const Ride r = ride({.kind = "straight", .length_m = 0.5});
+TEST(Imu, FaultsDropOrFreezeSamplesAndLeaveOthersUnchanged) {
+  const SimulatedDrive r = simulate_drive({.kind = PathKind::straight, .length_m = 0.5});
   const auto whole = measure_imu(r.motion, {}, 3.71, {}, 7);
-  const auto dropped = measure_imu(r.motion, {}, 3.71, {{"imu", "drop", 1, 2}}, 7);
-  const auto frozen = measure_imu(r.motion, {}, 3.71, {{"imu", "freeze", 1, 2}}, 7);
+  const auto dropped = measure_imu(r.motion, {}, 3.71, {{MotionSensor::imu, SensorFaultKind::drop, 1, 2}}, 7);
+  const auto frozen = measure_imu(r.motion, {}, 3.71, {{MotionSensor::imu, SensorFaultKind::freeze, 1, 2}}, 7);
   EXPECT_EQ(dropped.size(), whole.size() - 100);
   ASSERT_EQ(frozen.size(), whole.size());
   EXPECT_EQ(frozen[150].gyro_rad_s, whole[99].gyro_rad_s);
@@ -103,9 +105,9 @@ TEST(Imu, FaultsSilenceOrFreezeItAndTouchNothingElse) {
   EXPECT_TRUE(measure_imu(r.motion, {.enabled = false}, 3.71, {}, 7).empty());
 }
 
-// The overlapping Allan deviation of a standing gyro: white noise N/√τ at one second.
-TEST(Imu, AllanDeviationIsThatOfItsDensity) {
-  const Ride r = ride({.kind = "standing", .standing_s = 400});
+// The overlapping Allan deviation of a stationary gyroscope: white noise N/√τ at one second.
+TEST(Imu, AllanDeviationMatchesTheNoiseDensity) {
+  const SimulatedDrive r = simulate_drive({.kind = PathKind::stationary, .stationary_s = 400});
   ImuOptions noisy;
   noisy.gyro_bias_rad_s = 0.01;
   noisy.gyro_walk_rad_s2_sqrt_hz = 0;
@@ -121,11 +123,11 @@ TEST(Imu, AllanDeviationIsThatOfItsDensity) {
   EXPECT_NEAR(allan, noisy.gyro_noise_rad_s_sqrt_hz, 0.1 * noisy.gyro_noise_rad_s_sqrt_hz);
 }
 
-TEST(Wheels, RollFartherUphillThanTheyCarry) {
+TEST(Wheels, RolledDistanceFollowsTheSlipModel) {
   TerrainShapeOptions slope;
   slope.relief_m = slope.ripple_height_m = slope.dune_height_m = 0;
   slope.slope_deg = 12;
-  const Ride up = ride({.kind = "straight", .length_m = 3}, slope);
+  const SimulatedDrive up = simulate_drive({.kind = PathKind::straight, .length_m = 3}, slope);
   WheelOptions wheels;
   wheels.slip_sand = wheels.radius_error = wheels.resolution_m = 0;
   wheels.slip_level = 0.05;
@@ -135,21 +137,21 @@ TEST(Wheels, RollFartherUphillThanTheyCarry) {
                slip = 0.05 + 1.5 * std::tan(12 * std::numbers::pi / 180);
   EXPECT_NEAR(samples.back().left_m, travelled / (1 - slip), 0.01);
   EXPECT_NEAR(samples.back().right_m, samples.back().left_m, 1e-6);
-  const Ride turn = ride({.kind = "turn_in_place", .turn_deg = 90});
+  const SimulatedDrive turn = simulate_drive({.kind = PathKind::turn_in_place, .turn_deg = 90});
   const auto turned = measure_wheels(
       turn.motion, {}, {.slip_level = 0, .slip_by_slope = 0, .slip_sand = 0, .radius_error = 0, .resolution_m = 0}, {},
       1);
   EXPECT_NEAR(turned.back().right_m - turned.back().left_m, 0.6 * std::numbers::pi / 2, 0.01);
 }
 
-TEST(Heading, IsTheBodysWithItsErrors) {
-  const Ride r = ride({.kind = "turn_in_place", .turn_deg = 90, .turn_rate_deg_s = 1});
-  const auto exact = measure_heading(r.motion, {.sigma_deg = 0, .bias_deg = 0, .outlier_share = 0}, {}, 1);
+TEST(Compass, MeasuresTheHeadingWithItsErrors) {
+  const SimulatedDrive r = simulate_drive({.kind = PathKind::turn_in_place, .turn_deg = 90, .turn_rate_deg_s = 1});
+  const auto exact = measure_compass(r.motion, {.sigma_deg = 0, .bias_deg = 0, .outlier_fraction = 0}, {}, 1);
   EXPECT_NEAR(exact.front().heading_rad, 0, 1e-6);
   EXPECT_NEAR(exact.back().heading_rad, std::numbers::pi / 2, 1e-3);
-  const auto tilt = measure_tilt(r.motion, {.sigma_deg = 0, .bias_deg = 0}, {}, 1);
+  const auto tilt = measure_inclinometer(r.motion, {.sigma_deg = 0, .bias_deg = 0}, {}, 1);
   EXPECT_NEAR(tilt.back().roll_rad, r.motion.roll_pitch_yaw(r.motion.seconds()).x(), 1e-3);
-  const auto wild = measure_heading(r.motion, {.sigma_deg = 0, .bias_deg = 0, .outlier_share = 0.5}, {}, 1);
+  const auto wild = measure_compass(r.motion, {.sigma_deg = 0, .bias_deg = 0, .outlier_fraction = 0.5}, {}, 1);
   int outliers = 0;
   for (std::size_t i = 0; i < wild.size(); ++i)
     outliers += std::abs(wild[i].heading_rad - exact[i].heading_rad) > 0.05 ? 1 : 0;

@@ -10,15 +10,15 @@ namespace spartan::sim {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-constexpr double kSettle_s = 0.5;  // at rest before a picture
-constexpr double kSame_m = 0.005;  // distances that count as one
+constexpr double kSettle_s = 0.5;  // stationary before and after the frames of a stop; empirical
+constexpr double kSame_m = 0.005;  // tolerance between distances: half of Motion::kStep_m
 
 }  // namespace
 
-// Lays motion after motion and notes the shots.
+// Appends motion after motion and plans the frames.
 class Drive::Planner {
  public:
-  Planner(const PathOptions& path, const ShotOptions& options, const Rig& rig)
+  Planner(const PathOptions& path, const CaptureOptions& options, const Rig& rig)
       : path_(path), options_(options), rig_(rig) {}
 
   Result<Drive> plan() {
@@ -27,18 +27,18 @@ class Drive::Planner {
     double length = 0;
     for (const PathLeg& leg : *legs) length += curve_length(leg.curve);
     if (Status s = find_stops(length); !s) return failure(s);
-    add(Motion::stand(here_, kRest_s));
-    arrive();
+    add(Motion::stationary(here_, kInitialStop_s));
+    capture_at_halt();
     for (const PathLeg& leg : *legs) {
       if (!leg.curve.empty()) {
         drive_along(leg.curve);
       } else if (leg.turn_rad != 0) {
-        turn(leg.turn_rad);
+        turn_in_place(leg.turn_rad);
       } else {
-        rest(leg.rest_s);
+        pause(leg.rest_s);
       }
     }
-    add(Motion::stand(here_, kSettle_s));
+    add(Motion::stationary(here_, kSettle_s));
     return std::move(drive_);
   }
 
@@ -47,7 +47,8 @@ class Drive::Planner {
     for (const double at : options_.stops_m) {
       if (at > length + kSame_m) {
         return failure(ErrorCode::configuration,
-                       fmt::format("a stop at {} m lies beyond the path's {:.2f} m", at, length), "shots.stops_m");
+                       fmt::format("the stop at {} m is beyond the end of the path at {:.2f} m", at, length),
+                       "capture.stops_m");
       }
       stops_.push_back(at);
     }
@@ -63,32 +64,33 @@ class Drive::Planner {
   }
 
   void add(const Motion& motion) {
-    drive_.parts_.push_back({drive_.seconds_, motion});
+    drive_.segments_.push_back({drive_.seconds_, motion});
     drive_.seconds_ += motion.seconds();
     here_ = motion.at(motion.seconds());
   }
 
-  // A picture of every pair for odometry, at one position.
-  void look(double time_s) {
+  // A frame of every odometry pair.
+  void add_odometry_frames(double time_s) {
     for (const StereoPair& pair : rig_.pairs) {
-      if (pair.for_odometry) drive_.shots_.push_back({time_s, pair.name, position_, 0, 0});
+      if (pair.for_odometry) drive_.frames_.push_back({time_s, pair.name, position_id_, 0, 0});
     }
   }
 
-  // At rest: a picture, and at a stop the pans of the other pairs.
-  void arrive() {
-    ++position_;
-    add(Motion::stand(here_, kSettle_s));
-    look(drive_.seconds_);
+  // Stationary: a frame of the odometry pairs, and at a stop the pans of the other pairs.
+  void capture_at_halt() {
+    ++position_id_;
+    add(Motion::stationary(here_, kSettle_s));
+    add_odometry_frames(drive_.seconds_);
     if (!is_stop(driven_)) return;
     for (const double pan_deg : options_.pans_deg) {
-      add(Motion::stand(here_, options_.seconds_a_pan));
+      add(Motion::stationary(here_, options_.pan_period_s));
       for (const StereoPair& pair : rig_.pairs) {
         if (!pair.for_odometry)
-          drive_.shots_.push_back({drive_.seconds_, pair.name, position_, pan_deg * kRadiansPerDegree, tilt_of(pair)});
+          drive_.frames_.push_back(
+              {drive_.seconds_, pair.name, position_id_, pan_deg * kRadiansPerDegree, tilt_of(pair)});
       }
     }
-    add(Motion::stand(here_, kSettle_s));
+    add(Motion::stationary(here_, kSettle_s));
   }
 
   double tilt_of(const StereoPair& pair) const {
@@ -101,71 +103,72 @@ class Drive::Planner {
 
   void drive_along(std::vector<PlanarPose> curve) {
     while (curve.size() > 1) {
-      const double left = curve_length(curve);
+      const double remaining = curve_length(curve);
       const auto next = std::find_if(stops_.begin(), stops_.end(), [&](double s) { return s > driven_ + kSame_m; });
-      std::vector<PlanarPose> part = curve, rest;
-      if (next != stops_.end() && *next < driven_ + left - kSame_m) std::tie(part, rest) = cut(curve, *next - driven_);
+      std::vector<PlanarPose> part = curve, later;
+      if (next != stops_.end() && *next < driven_ + remaining - kSame_m)
+        std::tie(part, later) = cut(curve, *next - driven_);
       const Motion motion = Motion::drive(part, path_.speed_m_s, path_.ramp_s);
       const double from = driven_, from_s = drive_.seconds_;
       add(motion);
       driven_ += motion.amount();
       for (; next_frame_m_ < driven_ - kSame_m; next_frame_m_ += options_.frame_step_m) {
-        ++position_;
-        look(from_s + motion.time_of(next_frame_m_ - from));
+        ++position_id_;
+        add_odometry_frames(from_s + motion.time_of(next_frame_m_ - from));
       }
-      arrive();
+      capture_at_halt();
       if (next_frame_m_ < driven_ + kSame_m) next_frame_m_ += options_.frame_step_m;
-      curve = std::move(rest);
+      curve = std::move(later);
     }
   }
 
-  void turn(double angle) {
+  void turn_in_place(double angle) {
     const Motion motion = Motion::turn(here_, angle, path_.turn_rate_deg_s * kRadiansPerDegree, path_.ramp_s);
     const double from_s = drive_.seconds_, step = options_.frame_turn_deg * kRadiansPerDegree;
     add(motion);
     for (double due = step; due < std::abs(angle) - 1e-6; due += step) {
-      ++position_;
-      look(from_s + motion.time_of(due));
+      ++position_id_;
+      add_odometry_frames(from_s + motion.time_of(due));
     }
-    arrive();
+    capture_at_halt();
   }
 
-  void rest(double seconds) {
+  void pause(double seconds) {
     const double from_s = drive_.seconds_;
-    add(Motion::stand(here_, seconds));
+    add(Motion::stationary(here_, seconds));
     for (double t = options_.frame_period_s; t <= seconds + 1e-9; t += options_.frame_period_s) {
-      ++position_;
-      look(from_s + t);
+      ++position_id_;
+      add_odometry_frames(from_s + t);
     }
   }
 
   const PathOptions& path_;
-  const ShotOptions& options_;
+  const CaptureOptions& options_;
   const Rig& rig_;
   Drive drive_;
   PlanarPose here_;
   std::vector<double> stops_;
   double driven_ = 0, next_frame_m_ = options_.frame_step_m;
-  std::int64_t position_ = -1;
+  std::int64_t position_id_ = -1;
 };
 
-Result<Drive> Drive::plan(const PathOptions& path, const ShotOptions& shots, const Rig& rig) {
-  return Planner(path, shots, rig).plan();
+Result<Drive> Drive::plan(const PathOptions& path, const CaptureOptions& capture, const Rig& rig) {
+  return Planner(path, capture, rig).plan();
 }
 
 PlanarPose Drive::at(double time_s) const {
-  const auto after = std::upper_bound(parts_.begin(), parts_.end(), time_s,
-                                      [](double t, const Part& part) { return t < part.from_s; });
-  const Part& part = after == parts_.begin() ? parts_.front() : *(after - 1);
-  return part.motion.at(std::clamp(time_s - part.from_s, 0.0, part.motion.seconds()));
+  const auto after = std::upper_bound(segments_.begin(), segments_.end(), time_s,
+                                      [](double t, const Segment& segment) { return t < segment.from_s; });
+  const Segment& segment = after == segments_.begin() ? segments_.front() : *(after - 1);
+  return segment.motion.at(std::clamp(time_s - segment.from_s, 0.0, segment.motion.seconds()));
 }
 
 std::vector<PlanarPose> Drive::track() const {
   std::vector<PlanarPose> places;
-  for (const Part& part : parts_) {
-    const double amount = part.motion.drives() ? part.motion.amount() : 0;
+  for (const Segment& segment : segments_) {
+    const double amount = segment.motion.drives() ? segment.motion.amount() : 0;
     const int steps = static_cast<int>(amount / (2 * Motion::kStep_m)) + 1;
-    for (int i = 0; i <= steps; ++i) places.push_back(part.motion.at(part.motion.time_of(amount * i / steps)));
+    for (int i = 0; i <= steps; ++i) places.push_back(segment.motion.at(segment.motion.time_of(amount * i / steps)));
   }
   return places;
 }

@@ -5,32 +5,46 @@
 namespace spartan::sim {
 namespace {
 
-constexpr double kDarkness = 0.002;  // light that a covered eye still gets
+constexpr double kDarkness = 0.002;  // fraction of the light that reaches a covered camera
 
-void apply(const CameraFault& fault, Random& random, std::uint64_t seed, ShotFault& shot) {
-  if (fault.kind == "dropped") shot.dropped = true;
-  if (fault.kind == "left_dark") shot.left.light *= kDarkness;
-  if (fault.kind == "right_dark") shot.right.light *= kDarkness;
-  if (fault.kind == "left_dust") shot.left.dust = true;
-  if (fault.kind == "right_dust") shot.right.dust = true;
-  if (fault.kind == "overexposed" || fault.kind == "brightness_step") {
-    shot.left.light *= fault.amount;
-    shot.right.light *= fault.amount;
+void apply(const CameraFault& fault, Random& random, std::uint64_t seed, FrameFaultState& state) {
+  using enum CameraFaultKind;
+  switch (fault.kind) {
+    case dropped:
+      state.dropped = true;
+      break;
+    case left_dark:
+      state.left.light_factor *= kDarkness;
+      break;
+    case right_dark:
+      state.right.light_factor *= kDarkness;
+      break;
+    case left_dust:
+      state.left.dust = true;
+      break;
+    case right_dust:
+      state.right.dust = true;
+      break;
+    case overexposed:
+    case brightness_step:
+      state.left.light_factor *= fault.amount;
+      state.right.light_factor *= fault.amount;
+      break;
+    case stamp_jitter:
+      state.left_jitter_s = random.normal(0, fault.amount);
+      state.right_jitter_s = random.normal(0, fault.amount);
+      break;
   }
-  if (fault.kind == "stamp_jitter") {
-    shot.left_jitter_s = random.normal(0, fault.amount);
-    shot.right_jitter_s = random.normal(0, fault.amount);
-  }
-  shot.left.dust_seed = seed + 1;
-  shot.right.dust_seed = seed + 2;
+  state.left.dust_seed = seed + 1;
+  state.right.dust_seed = seed + 2;
 }
 
 }  // namespace
 
-ShotFault fault_of(const CameraFaults& faults, const std::string& pair, double time_s, std::uint64_t shot,
-                   std::uint64_t seed) {
-  ShotFault result;
-  Random random(seed + shot, 301);
+FrameFaultState fault_state(const CameraFaults& faults, const std::string& pair, double time_s,
+                            std::uint64_t frame_index, std::uint64_t seed) {
+  FrameFaultState result;
+  Random random(seed + frame_index, 301);
   for (const CameraFault& fault : faults) {
     if ((fault.pair.empty() || fault.pair == pair) && time_s >= fault.from_s && time_s < fault.to_s)
       apply(fault, random, seed, result);

@@ -19,17 +19,17 @@ namespace spartan::sim {
 namespace {
 
 constexpr int kAllRays[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
-constexpr double kOverlap_m = 0.5;  // the coarse ground reaches so far under the fine one …
-constexpr double kRockEdge_m = 0.007;
-constexpr double kFarRockEdge = 0.13;  // outside the region, over the diameter
-constexpr double kSunk_m = 0.02;       // … and this much below it
+constexpr double kOverlap_m = 0.5;     // overlap of the coarse ground with the fine one, so that no gaps open …
+constexpr double kSunk_m = 0.02;       // … and its depth below it there, so that it stays hidden; empirical
+constexpr double kRockEdge_m = 0.007;  // edge length of rocks in the region, about kGrid_m
+constexpr double kFarRockEdge = 0.13;  // edge length over diameter, outside the region
 
 struct Release {
   void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
   void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
 };
 
-// A rectangle of ground as one Embree grid.
+// A rectangle of ground, one Embree grid geometry.
 struct GridPlan {
   Region region;
   double step_m;
@@ -40,18 +40,19 @@ int steps_of(double length_m, double step_m) {
   return std::max(1, static_cast<int>(std::lround(length_m / step_m)));
 }
 
-// The region with its borders on multiples of the step.
-Region widened(const Region& r, double step_m) {
+// The region grown until its borders are multiples of the step.
+Region snapped_to_lattice(const Region& r, double step_m) {
   return {std::floor(r.x0 / step_m) * step_m, std::floor(r.y0 / step_m) * step_m, std::ceil(r.x1 / step_m) * step_m,
           std::ceil(r.y1 / step_m) * step_m};
 }
 
-// All rocks of the region; around it those that are large for their distance.
+// All rocks in the region; around it those that cover more than a few pixels from there: over 5 cm up to 6 m away,
+// over 25 cm up to 25 m (empirical).
 std::vector<Rock> visible_rocks(const RockField& rocks, const Region& region) {
   constexpr double kNear_m = 6, kFar_m = 25;
-  std::vector<Rock> chosen = rocks.rocks_between(region);
+  std::vector<Rock> chosen = rocks.rocks_in(region);
   for (const auto& [reach_m, smallest_m] : {std::pair{kNear_m, 0.05}, std::pair{kFar_m, 0.25}}) {
-    for (const Rock& rock : rocks.rocks_between(region.grown(reach_m), smallest_m)) {
+    for (const Rock& rock : rocks.rocks_in(region.grown(reach_m), smallest_m)) {
       const bool farther = reach_m == kNear_m || !region.grown(kNear_m).contains(rock.x, rock.y);
       if (farther && rock.diameter_m > smallest_m && !region.contains(rock.x, rock.y)) chosen.push_back(rock);
     }
@@ -69,7 +70,7 @@ struct GroundScene::State {
   std::size_t triangles = 0;
   unsigned rocks_id = RTC_INVALID_GEOMETRY_ID;
 
-  State(const TerrainShape& shape, const Region& wanted, const Workers& workers);
+  State(const TerrainShape& shape, const Region& requested, const Workers& workers);
   unsigned attach(RTCGeometry geometry) {
     rtcCommitGeometry(geometry);
     const unsigned id = rtcAttachGeometry(scene.get(), geometry);
@@ -81,7 +82,7 @@ struct GroundScene::State {
 };
 
 void GroundScene::State::add_ground(const TerrainShape& shape, const GridPlan& plan, const Workers& workers) {
-  const Region r = widened(plan.region, plan.step_m);
+  const Region r = snapped_to_lattice(plan.region, plan.step_m);
   if (!(r.x1 > r.x0) || !(r.y1 > r.y0)) return;
   const int nx = steps_of(r.x1 - r.x0, plan.step_m) + 1, ny = steps_of(r.y1 - r.y0, plan.step_m) + 1;
   RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_GRID);
@@ -145,13 +146,14 @@ void GroundScene::State::add_rocks(const TerrainShape& shape, const std::vector<
   rocks_id = attach(geometry);
 }
 
-GroundScene::State::State(const TerrainShape& shape, const Region& wanted, const Workers& workers)
-    : region(widened(wanted, kGrid_m)) {
-  const double cx = 0.5 * (wanted.x0 + wanted.x1), cy = 0.5 * (wanted.y0 + wanted.y1);
+GroundScene::State::State(const TerrainShape& shape, const Region& requested, const Workers& workers)
+    : region(snapped_to_lattice(requested, kGrid_m)) {
+  const double cx = 0.5 * (requested.x0 + requested.x1), cy = 0.5 * (requested.y0 + requested.y1);
   origin = {cx, cy, shape.height(cx, cy)};
-  // One instruction set: the same hits on every machine. The threads only build the hierarchy.
+  // A fixed instruction set gives the same hits on every machine. The threads build the BVH only.
   device.reset(rtcNewDevice(fmt::format("threads={},isa=avx2", workers.threads()).c_str()));
-  if (!device) throw std::runtime_error("GroundScene: Embree does not start; it needs a processor with AVX2");
+  if (!device)
+    throw std::runtime_error("GroundScene: cannot create an Embree device; a processor with AVX2 is required");
   scene.reset(rtcNewScene(device.get()));
   rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
 }
@@ -182,7 +184,7 @@ GroundScene::GroundScene(const TerrainShape& shape, const RockField& rocks, cons
 GroundScene GroundScene::rocks_only(const TerrainShape& shape, const RockField& rocks, const Region& region,
                                     const Workers& workers) {
   auto state = std::make_unique<State>(shape, region.grown(2), workers);
-  state->add_rocks(shape, rocks.rocks_between(region.grown(2), RockField::kLargestPebble_m), workers);
+  state->add_rocks(shape, rocks.rocks_in(region.grown(2), RockField::kLargestPebble_m), workers);
   rtcCommitScene(state->scene.get());
   return GroundScene(std::move(state));
 }
@@ -212,7 +214,7 @@ RTCRay8 embree_rays(const RayPacket& rays) {
     r.dir_x[i] = rays.direction_x[i];
     r.dir_y[i] = rays.direction_y[i];
     r.dir_z[i] = rays.direction_z[i];
-    r.tfar[i] = rays.farthest[i];
+    r.tfar[i] = rays.max_distance[i];
     r.mask[i] = ~0U;
   }
   return r;
@@ -239,7 +241,7 @@ HitPacket GroundScene::intersect(const RayPacket& rays) const {
     }
     Eigen::Vector3f n(query.hit.Ng_x[i], query.hit.Ng_y[i], query.hit.Ng_z[i]);
     n.normalize();
-    // Towards the ray, whichever way the triangle winds.
+    // Make the normal face the ray, whatever the winding order of the triangle.
     if (n.dot(Eigen::Vector3f(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i])) > 0) n = -n;
     hits.distance[i] = query.ray.tfar[i];
     hits.normal_x[i] = n.x();
@@ -258,7 +260,7 @@ std::uint32_t GroundScene::occluded(const RayPacket& rays) const {
   rtcOccluded8(kAllRays, state_->scene.get(), &context, &query);
   std::uint32_t blocked = 0;
   for (int i = 0; i < kPacket; ++i) {
-    if (rays.farthest[i] >= 0 && query.tfar[i] < 0) blocked |= 1U << i;
+    if (rays.max_distance[i] >= 0 && query.tfar[i] < 0) blocked |= 1U << i;
   }
   return blocked;
 }

@@ -21,7 +21,7 @@ Sun::Sun(const LightOptions& options) : lux_(options.sun_lux) {
   const Eigen::Vector3d middle(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                                std::sin(elevation));
   const Eigen::Vector3d aside(-std::sin(azimuth), std::cos(azimuth), 0), over = middle.cross(aside);
-  // The four points of a square that has the disc's second moments.
+  // The corners of the square with the second moments of the disc.
   const double off = 0.5 * std::tan(0.5 * options.sun_diameter_deg * kRadiansPerDegree);
   for (int i = 0; i < kPoints; ++i) {
     const double u = i % 2 == 0 ? -off : off, v = i / 2 == 0 ? -off : off;
@@ -29,7 +29,7 @@ Sun::Sun(const LightOptions& options) : lux_(options.sun_lux) {
   }
 }
 
-double Sun::level_lux(double sky_lux) const {
+double Sun::horizontal_lux(double sky_lux) const {
   double up = 0;
   for (const Eigen::Vector3f& point : points_) up += static_cast<double>(point.z()) / kPoints;
   return sky_lux + lux_ * std::max(up, 0.0);

@@ -12,29 +12,29 @@ namespace spartan::sim {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-constexpr std::int64_t kEpoch_ns = 1'000'000'000'000;
+constexpr std::int64_t kEpoch_ns = 1'000'000'000'000;  // stamp of the start of every drive: 1000 s
 
 Eigen::Vector3d normal_vector(Random& random, double sigma) {
   return {random.normal(0, sigma), random.normal(0, sigma), random.normal(0, sigma)};
 }
 
-// Readings at the sensor's rate: `read(t, step)` is asked for each, in order; faults leave some out or repeat them.
+// Samples at the sensor's rate: calls `read(t)` for each in order; faults then drop samples or repeat the last one.
 template <class Sample, class Read>
-std::vector<Sample> readings(const BodyMotion& motion, double rate_hz, const std::string& sensor,
-                             const SensorFaults& faults, const Read& read) {
+std::vector<Sample> sample_sensor(const BodyMotion& motion, double rate_hz, MotionSensor sensor,
+                                  const SensorFaults& faults, const Read& read) {
   std::vector<Sample> samples;
   std::optional<Sample> last;
   const auto count = static_cast<std::int64_t>(std::floor(motion.seconds() * rate_hz));
   for (std::int64_t i = 0; i <= count; ++i) {
     const double t = static_cast<double>(i) / rate_hz;
-    Sample sample = read(t);  // asked in any case: a fault changes no other reading
+    Sample sample = read(t);  // always called, so that a fault does not shift the random numbers of other samples
     sample.stamp = stamp_at(t);
     const auto fault = std::find_if(faults.begin(), faults.end(), [&](const SensorFault& f) {
       return f.sensor == sensor && t >= f.from_s && t < f.to_s;
     });
     if (fault == faults.end()) {
       last = sample;
-    } else if (fault->kind == "drop" || !last) {
+    } else if (fault->kind == SensorFaultKind::drop || !last) {
       continue;
     } else {
       sample = *last;
@@ -60,18 +60,19 @@ ImuSample true_imu(const BodyMotion& motion, double time_s, double gravity_m_s2)
   return sample;
 }
 
-SensorNoise stated_noise(const ImuOptions& imu, const CompassOptions& compass,
-                         const InclinometerOptions& inclinometer) {
-  // Biases of a drive that do not walk: zero would say that nothing is stated.
+SensorNoise specified_noise(const ImuOptions& imu, const CompassOptions& compass,
+                            const InclinometerOptions& inclinometer) {
+  // The biases are constant over a drive. Zero would mean that no value is specified, so this is a negligible random
+  // walk.
   constexpr double kNoWalk_rad_sqrt_hz = 1e-7;
-  SensorNoise stated;
+  SensorNoise noise;
   if (imu.enabled) {
-    stated.imu = {imu.gyro_noise_rad_s_sqrt_hz, imu.gyro_bias_rad_s, imu.gyro_walk_rad_s2_sqrt_hz,
-                  imu.accel_noise_m_s2_sqrt_hz, imu.accel_bias_m_s2, imu.accel_walk_m_s3_sqrt_hz};
+    noise.imu = {imu.gyro_noise_rad_s_sqrt_hz, imu.gyro_bias_rad_s, imu.gyro_walk_rad_s2_sqrt_hz,
+                 imu.accel_noise_m_s2_sqrt_hz, imu.accel_bias_m_s2, imu.accel_walk_m_s3_sqrt_hz};
   }
-  if (compass.enabled) stated.compass = {kNoWalk_rad_sqrt_hz};
-  if (inclinometer.enabled) stated.inclinometer = {inclinometer.bias_deg * kRadiansPerDegree, kNoWalk_rad_sqrt_hz};
-  return stated;
+  if (compass.enabled) noise.compass = {kNoWalk_rad_sqrt_hz};
+  if (inclinometer.enabled) noise.inclinometer = {inclinometer.bias_deg * kRadiansPerDegree, kNoWalk_rad_sqrt_hz};
+  return noise;
 }
 
 std::vector<ImuSample> measure_imu(const BodyMotion& motion, const ImuOptions& o, double gravity_m_s2,
@@ -81,7 +82,7 @@ std::vector<ImuSample> measure_imu(const BodyMotion& motion, const ImuOptions& o
   Eigen::Vector3d gyro_bias = normal_vector(random, o.gyro_bias_rad_s);
   Eigen::Vector3d accel_bias = normal_vector(random, o.accel_bias_m_s2);
   const double root_rate = std::sqrt(o.rate_hz);
-  return readings<ImuSample>(motion, o.rate_hz, "imu", faults, [&](double t) {
+  return sample_sensor<ImuSample>(motion, o.rate_hz, MotionSensor::imu, faults, [&](double t) {
     ImuSample sample = true_imu(motion, t, gravity_m_s2);
     sample.gyro_rad_s += gyro_bias + normal_vector(random, o.gyro_noise_rad_s_sqrt_hz * root_rate);
     sample.accel_m_s2 += accel_bias + normal_vector(random, o.accel_noise_m_s2_sqrt_hz * root_rate);
@@ -101,8 +102,8 @@ std::vector<WheelSample> measure_wheels(const BodyMotion& motion, const ChassisO
   const auto counted = [&](double rolled) {
     return o.resolution_m > 0 ? std::floor(rolled / o.resolution_m) * o.resolution_m : rolled;
   };
-  return readings<WheelSample>(motion, o.rate_hz, "wheels", faults, [&](double t) {
-    // From reading to reading at the speed of its middle.
+  return sample_sensor<WheelSample>(motion, o.rate_hz, MotionSensor::wheels, faults, [&](double t) {
+    // Midpoint rule between samples.
     const double middle = 0.5 * (before + t), step = t - before;
     const Pose pose = motion.world_from_body(middle);
     const Eigen::Vector3d ahead = pose.rotation() * Eigen::Vector3d::UnitX();
@@ -119,27 +120,27 @@ std::vector<WheelSample> measure_wheels(const BodyMotion& motion, const ChassisO
   });
 }
 
-std::vector<CompassSample> measure_heading(const BodyMotion& motion, const CompassOptions& o,
+std::vector<CompassSample> measure_compass(const BodyMotion& motion, const CompassOptions& o,
                                            const SensorFaults& faults, std::uint64_t seed) {
   if (!o.enabled) return {};
   Random random(seed, 203);
   const double bias = random.normal(0, o.bias_deg * kRadiansPerDegree), sigma = o.sigma_deg * kRadiansPerDegree;
-  return readings<CompassSample>(motion, o.rate_hz, "compass", faults, [&](double t) {
-    const bool outlier = random.uniform() < o.outlier_share;
+  return sample_sensor<CompassSample>(motion, o.rate_hz, MotionSensor::compass, faults, [&](double t) {
+    const bool outlier = random.uniform() < o.outlier_fraction;
     const double error = bias + random.normal(0, sigma), anywhere = random.uniform(-std::numbers::pi, std::numbers::pi);
     const double heading = outlier ? anywhere : motion.roll_pitch_yaw(t).z() + error;
     return CompassSample{{}, std::remainder(heading, 2 * std::numbers::pi), sigma};
   });
 }
 
-std::vector<InclinometerSample> measure_tilt(const BodyMotion& motion, const InclinometerOptions& o,
-                                             const SensorFaults& faults, std::uint64_t seed) {
+std::vector<InclinometerSample> measure_inclinometer(const BodyMotion& motion, const InclinometerOptions& o,
+                                                     const SensorFaults& faults, std::uint64_t seed) {
   if (!o.enabled) return {};
   Random random(seed, 204);
   const double sigma = o.sigma_deg * kRadiansPerDegree;
   const double roll_bias = random.normal(0, o.bias_deg * kRadiansPerDegree);
   const double pitch_bias = random.normal(0, o.bias_deg * kRadiansPerDegree);
-  return readings<InclinometerSample>(motion, o.rate_hz, "inclinometer", faults, [&](double t) {
+  return sample_sensor<InclinometerSample>(motion, o.rate_hz, MotionSensor::inclinometer, faults, [&](double t) {
     const Eigen::Vector3d angles = motion.roll_pitch_yaw(t);
     const double roll = angles.x() + roll_bias + random.normal(0, sigma);
     return InclinometerSample{{}, roll, angles.y() + pitch_bias + random.normal(0, sigma), sigma};

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-// Compiled once per instruction set: Highway includes this file again for each.
+// Compiled once per instruction set: Highway includes this file again for each of them.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "spartan/sim/noise_sum.cpp"
 #include <hwy/foreach_target.h>
@@ -14,7 +14,7 @@
 #define SPARTAN_SIM_NOISE_SUM_POINTS
 namespace spartan::sim {
 
-// Places in struct-of-arrays form; `footprint` may be null.
+// Points in struct-of-arrays form; `footprint` may be null.
 struct NoisePoints {
   const double* x;
   const double* y;
@@ -30,13 +30,14 @@ HWY_BEFORE_NAMESPACE();
 namespace spartan::sim::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+// Perlin's quintic fade 6t⁵ − 15t⁴ + 10t³.
 template <class D, class V>
 HWY_INLINE V fade(D d, V t) {
   const V inner = hn::Add(hn::Mul(t, hn::Sub(hn::Mul(t, hn::Set(d, 6.0)), hn::Set(d, 15.0))), hn::Set(d, 10.0));
   return hn::Mul(hn::Mul(hn::Mul(t, t), t), inner);
 }
 
-// mix() of core: a well-mixed number of two lattice coordinates, times their primes, and the seed.
+// mix() of core: hash of two lattice coordinates, multiplied by their primes, and the seed.
 template <class DU, class VU>
 HWY_INLINE VU mixed(DU du, VU x, VU y, VU seed) {
   VU h = hn::Xor(hn::Xor(x, y), seed);
@@ -47,6 +48,7 @@ HWY_INLINE VU mixed(DU du, VU x, VU y, VU seed) {
   return hn::Xor(h, hn::ShiftRight<16>(h));
 }
 
+// Contribution of one lattice corner: its gradient times the offset from it.
 template <class D, class DU, class VU, class V>
 HWY_INLINE V corner(D d, DU du, VU hash, V tx, V ty) {
   const hn::Rebind<std::int64_t, D> di64;
@@ -92,7 +94,7 @@ HWY_INLINE void add_block(D d, std::span<const Octave> octaves, const NoisePoint
     for (const Octave& o : octaves) {
       const auto ratio = hn::Sub(hn::Div(hn::Set(d, o.size), footprint), hn::Set(d, 1.0));
       const auto weight = hn::Min(hn::Max(ratio, hn::Zero(d)), hn::Set(d, 1.0));
-      if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) break;  // octaves come largest first
+      if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) break;  // octaves are in order of decreasing size
       sum = hn::Add(sum, hn::Mul(weight, octave_value(d, o, x, y)));
     }
   }

@@ -1,4 +1,4 @@
-// Sums of smooth noise at many places at once.
+// Sums of octaves of gradient noise, vectorized over many points.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,16 @@
 
 namespace spartan::sim {
 
-/// Octaves of core's smooth noise, evaluated lane by lane: the same bits as the scalar functions on every instruction
+/// Octaves of core's gradient noise, evaluated with SIMD: the same bits as the scalar functions on every instruction
 /// set.
 class NoiseSum {
  public:
   NoiseSum() = default;
   explicit NoiseSum(std::vector<Octave> octaves);
 
-  /// Adds to sums[k] the octaves' values at (x[k], y[k]); all four of one length. An octave fades out as its lattice
-  /// comes down to two footprints, where its mean over one is nothing: weight clamp(size / footprint_m[k] − 1, 0, 1).
-  /// No footprints: all of every octave.
+  /// Adds to sums[k] the value of all octaves at (x[k], y[k]); all four spans have the same length. An octave fades out
+  /// as its lattice spacing comes down to the footprint, where its mean over the footprint vanishes: weight
+  /// clamp(size / footprint_m[k] − 1, 0, 1). Without footprints every octave counts fully.
   void add_to(std::span<double> sums, std::span<const double> x, std::span<const double> y,
               std::span<const double> footprint_m = {}) const;
   double value(double x, double y) const;

@@ -12,16 +12,17 @@ namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
-// The integral of the speed, over its plateau, while it rises over t in 0 … 1: of t³(6t² − 15t + 10).
-double risen_integral(double t) {
+// Distance covered during the acceleration phase, as a fraction of (full speed × ramp time): the integral of the
+// smooth step t³(6t² − 15t + 10) from 0 to t in 0 … 1.
+double ramp_integral(double t) {
   return t * t * t * t * (t * (t - 3) + 2.5);
 }
 
-PlanarPose between(const PlanarPose& a, const PlanarPose& b, double part) {
+PlanarPose interpolate(const PlanarPose& a, const PlanarPose& b, double part) {
   return {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y), a.heading + part * (b.heading - a.heading)};
 }
 
-// The curve whose heading is given along its length, by the midpoint rule over a thousandth of a step.
+// Integrates a curve from its heading as a function of its length, by the midpoint rule with kParts sub-steps per step.
 std::vector<PlanarPose> curve_of(double length_m, const std::function<double(double)>& heading) {
   constexpr int kParts = 20;
   std::vector<PlanarPose> curve{{0, 0, heading(0)}};
@@ -40,7 +41,7 @@ std::vector<PlanarPose> curve_of(double length_m, const std::function<double(dou
   return curve;
 }
 
-// Carries a curve that starts at the origin to a start.
+// Moves a curve that starts at the origin to a start pose.
 std::vector<PlanarPose> from_start(std::vector<PlanarPose> curve, const PlanarPose& start) {
   const double c = std::cos(start.heading), s = std::sin(start.heading);
   for (PlanarPose& p : curve) {
@@ -49,7 +50,7 @@ std::vector<PlanarPose> from_start(std::vector<PlanarPose> curve, const PlanarPo
   return curve;
 }
 
-// A natural cubic spline through points over the chords' lengths: second derivatives at the knots.
+// Natural cubic spline through points, parameterized by chord length; `bend` holds the second derivatives at the knots.
 struct Spline {
   std::vector<double> t;
   Eigen::MatrixX2d points, bend;
@@ -82,7 +83,7 @@ struct Spline {
   }
 };
 
-// Points of the spline at equal distances, with the headings of the chords around them.
+// Resamples the spline at equal distances, with headings from the chords around each point.
 std::vector<PlanarPose> smooth_curve(const std::vector<Eigen::Vector2d>& through) {
   const Spline spline(through);
   constexpr int kFine = 4000;
@@ -114,13 +115,14 @@ std::vector<PlanarPose> smooth_curve(const std::vector<Eigen::Vector2d>& through
 
 Result<std::vector<PathLeg>> lay_waypoints(const PathOptions& o) {
   if (o.waypoints_m.empty() || o.waypoints_m.size() % 2 != 0) {
-    return failure(ErrorCode::configuration, "waypoints_m must hold x, y, x, y …", "waypoints_m");
+    return failure(ErrorCode::configuration, "must list the coordinates x, y, x, y … of at least one waypoint",
+                   "waypoints_m");
   }
   std::vector<Eigen::Vector2d> through{{0, 0}};
   for (std::size_t i = 0; i < o.waypoints_m.size(); i += 2) {
     through.emplace_back(o.waypoints_m[i], o.waypoints_m[i + 1]);
     if ((through.back() - through[through.size() - 2]).norm() < 0.05)
-      return failure(ErrorCode::configuration, "two waypoints lie within 5 cm", "waypoints_m");
+      return failure(ErrorCode::configuration, "two successive waypoints are less than 5 cm apart", "waypoints_m");
   }
   const std::vector<PlanarPose> curve = smooth_curve(through);
   std::vector<PathLeg> legs;
@@ -144,7 +146,7 @@ std::vector<PathLeg> lay_square_spiral(const PathOptions& o) {
 
 }  // namespace
 
-Motion Motion::stand(const PlanarPose& at, double seconds) {
+Motion Motion::stationary(const PlanarPose& at, double seconds) {
   Motion m;
   m.start_ = at;
   m.seconds_ = seconds;
@@ -153,7 +155,7 @@ Motion Motion::stand(const PlanarPose& at, double seconds) {
 
 namespace {
 
-// Plateau, ramp and duration of a motion over an amount; short ones do not reach the full rate.
+// Speed profile of a motion over an amount: smooth ramps around a plateau. Short motions do not reach the full rate.
 struct Profile {
   double rate, ramp_s, seconds;
 };
@@ -191,26 +193,26 @@ Motion Motion::drive(std::vector<PlanarPose> curve, double speed_m_s, double ram
 double Motion::progress(double t) const {
   if (rate_ <= 0 || t <= 0) return 0;
   if (t >= seconds_) return amount_;
-  if (t > seconds_ - ramp_s_) return amount_ - rate_ * ramp_s_ * risen_integral((seconds_ - t) / ramp_s_);
+  if (t > seconds_ - ramp_s_) return amount_ - rate_ * ramp_s_ * ramp_integral((seconds_ - t) / ramp_s_);
   if (t >= ramp_s_) return rate_ * (0.5 * ramp_s_ + (t - ramp_s_));
-  return rate_ * ramp_s_ * risen_integral(t / ramp_s_);
+  return rate_ * ramp_s_ * ramp_integral(t / ramp_s_);
 }
 
 PlanarPose Motion::at(double t) const {
   const double done = progress(t);
   if (curve_.empty()) return {start_.x, start_.y, start_.heading + turn_sign_ * done};
-  const double place = std::clamp(done / kStep_m, 0.0, static_cast<double>(curve_.size() - 1));
-  const auto i = std::min(static_cast<std::size_t>(place), curve_.size() - 2);
+  const double index = std::clamp(done / kStep_m, 0.0, static_cast<double>(curve_.size() - 1));
+  const auto i = std::min(static_cast<std::size_t>(index), curve_.size() - 2);
   // The last step may be shorter than the others.
-  const double rest = i + 2 == curve_.size() ? std::max(amount_ / kStep_m - static_cast<double>(i), 1e-9) : 1.0;
-  return between(curve_[i], curve_[i + 1], std::clamp((place - static_cast<double>(i)) / rest, 0.0, 1.0));
+  const double last_step = i + 2 == curve_.size() ? std::max(amount_ / kStep_m - static_cast<double>(i), 1e-9) : 1.0;
+  return interpolate(curve_[i], curve_[i + 1], std::clamp((index - static_cast<double>(i)) / last_step, 0.0, 1.0));
 }
 
-double Motion::time_of(double progress_wanted) const {
+double Motion::time_of(double target_progress) const {
   double low = 0, high = seconds_;
   while (high - low > 1e-6) {
     const double middle = 0.5 * (low + high);
-    (progress(middle) < progress_wanted ? low : high) = middle;
+    (progress(middle) < target_progress ? low : high) = middle;
   }
   return high;
 }
@@ -230,14 +232,14 @@ std::pair<std::vector<PlanarPose>, std::vector<PlanarPose>> cut(const std::vecto
 
 Result<std::vector<PathLeg>> lay_path(const PathOptions& o) {
   const double turn = o.turn_deg * kRadiansPerDegree, swing = o.swing_deg * kRadiansPerDegree;
-  if (o.kind == "waypoints") return lay_waypoints(o);
-  if (o.kind == "square_spiral") return lay_square_spiral(o);
-  if (o.kind == "turn_in_place") return std::vector<PathLeg>{{{}, turn, 0}};
-  if (o.kind == "standing") return std::vector<PathLeg>{{{}, 0, o.standing_s}};
+  if (o.kind == PathKind::waypoints) return lay_waypoints(o);
+  if (o.kind == PathKind::square_spiral) return lay_square_spiral(o);
+  if (o.kind == PathKind::turn_in_place) return std::vector<PathLeg>{{{}, turn, 0}};
+  if (o.kind == PathKind::stationary) return std::vector<PathLeg>{{{}, 0, o.stationary_s}};
   const auto heading = [&](double s) {
-    if (o.kind == "arc") return turn * s / o.length_m;
-    if (o.kind == "loop") return 2 * std::numbers::pi * s / o.length_m;
-    if (o.kind == "winding") return swing * std::sin(2 * std::numbers::pi * s / o.wavelength_m);
+    if (o.kind == PathKind::arc) return turn * s / o.length_m;
+    if (o.kind == PathKind::loop) return 2 * std::numbers::pi * s / o.length_m;
+    if (o.kind == PathKind::winding) return swing * std::sin(2 * std::numbers::pi * s / o.wavelength_m);
     return 0.0;
   };
   return std::vector<PathLeg>{{curve_of(o.length_m, heading), 0, 0}};

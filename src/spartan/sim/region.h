@@ -1,9 +1,9 @@
-// A rectangle of the world plane.
+// A rectangle in the world plane.
 #pragma once
 
 namespace spartan::sim {
 
-/// Metres.
+/// Bounds in metres.
 struct Region {
   double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   bool contains(double x, double y) const { return x >= x0 && x <= x1 && y >= y0 && y <= y1; }

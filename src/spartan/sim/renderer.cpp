@@ -9,13 +9,14 @@
 namespace spartan::sim {
 namespace {
 
-constexpr float kFarthest_m = 400;
-constexpr float kLift_m = 2e-4F;  // shadow rays begin above the surface
-constexpr int kMostAlbedos = 4;   // places that stand for a stretched footprint
-constexpr int kReach_px = 2;      // the point spread ends here, at four standard deviations
+constexpr float kFarthest_m = 400;        // beyond the corner of the horizon square
+constexpr float kShadowOffset_m = 2e-4F;  // shadow rays start above the surface, against self-intersection
+constexpr int kMaxAlbedoSamples = 4;      // along an elongated footprint
+constexpr int kReach_px = 2;              // support of the point spread function: four standard deviations
 
-// Which of the four sun points and times ray (column, row) takes: every pixel and every block of four pixels has all.
-int turn_of(int column, int row) {
+// Which of the four points of the sun and poses ray (column, row) uses: every pixel and every block of four pixels
+// uses all of them.
+int sample_index(int column, int row) {
   const int in_pixel = 2 * (row & 1) + (column & 1), of_pixel = 2 * (row >> 1 & 1) + (column >> 1 & 1);
   return in_pixel ^ of_pixel;
 }
@@ -24,8 +25,8 @@ std::vector<float> point_spread(int side) {
   std::vector<double> spread;
   double sum = 0;
   for (int k = -kReach_px * side; k < (kReach_px + 1) * side; ++k) {
-    const double away = (k + 0.5) / side - 0.5;
-    spread.push_back(std::exp(-0.5 * away * away / (Renderer::kPointSpread_px * Renderer::kPointSpread_px)));
+    const double offset = (k + 0.5) / side - 0.5;
+    spread.push_back(std::exp(-0.5 * offset * offset / (Renderer::kPointSpread_px * Renderer::kPointSpread_px)));
     sum += spread.back();
   }
   std::vector<float> weights;
@@ -39,19 +40,19 @@ Eigen::Vector3f direction_at(const Camera& camera, double u, double v) {
   return ray ? Eigen::Vector3f(ray->direction.cast<float>()) : Eigen::Vector3f(0, 0, 0);
 }
 
-// A packet's samples between the tracer and the shader.
+// Intersections of a packet, for shading.
 struct Hits {
   HitPacket at;
   std::array<Eigen::Vector3f, kPacket> look;
-  std::array<bool, kPacket> met;
+  std::array<bool, kPacket> hit;
   std::uint32_t lit = 0;
   std::array<float, kPacket> albedo{};
 };
 
-// Albedos of a packet. A footprint is stretched by 1/cos along the view: up to kMostAlbedos places along it, each
-// averaged over its part, stand for it.
-void find_albedos(const Surroundings& s, const Eigen::Vector3d& eye, double radians_per_ray, Hits& h) {
-  constexpr std::size_t kMost = static_cast<std::size_t>(kPacket) * kMostAlbedos;
+// Albedos of a packet. A footprint is elongated by 1/cos of the emission angle: it is averaged over up to
+// kMaxAlbedoSamples points along it, each filtered to its part.
+void find_albedos(const LitScene& s, const Eigen::Vector3d& camera_centre, double radians_per_ray, Hits& h) {
+  constexpr std::size_t kMost = static_cast<std::size_t>(kPacket) * kMaxAlbedoSamples;
   struct List {
     std::array<double, kMost> x{}, y{}, footprint{}, albedo{};
     std::array<int, kMost> ray{};
@@ -62,14 +63,14 @@ void find_albedos(const Surroundings& s, const Eigen::Vector3d& eye, double radi
   std::array<int, kPacket> parts{};
   for (int k = 0; k < kPacket; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    if (!h.met[i]) continue;
+    if (!h.hit[i]) continue;
     const Eigen::Vector3f n(h.at.normal_x[k], h.at.normal_y[k], h.at.normal_z[k]);
     const Eigen::Vector3f& look = h.look[i];
     const double distance = h.at.distance[k], across = distance * radians_per_ray;
     const double along = across / std::max(0.05, static_cast<double>(-n.dot(look)));
-    const int count = std::clamp(static_cast<int>(std::lround(along / across)), 1, kMostAlbedos);
+    const int count = std::clamp(static_cast<int>(std::lround(along / across)), 1, kMaxAlbedoSamples);
     parts[i] = count;
-    const Eigen::Vector3d place = eye + distance * look.cast<double>();
+    const Eigen::Vector3d place = camera_centre + distance * look.cast<double>();
     const Eigen::Vector3d stretch = along * (look - look.dot(n) * n).normalized().cast<double>();
     const bool rock = h.at.rock[k];
     List& list = lists[rock ? 1 : 0];
@@ -106,11 +107,11 @@ Sampling Sampling::of(int per_pixel) {
     case 16:
       return {4, false};
     default:
-      throw std::invalid_argument("Sampling: 1, 2, 4, 9 or 16 rays a pixel");
+      throw std::invalid_argument("Sampling: rays per pixel must be 1, 2, 4, 9 or 16");
   }
 }
 
-// One row of the finer picture, all materials.
+// One row of the supersampled image, all materials.
 struct Renderer::Row {
   std::array<float*, kMaterials> values{};
   bool split = false;
@@ -144,38 +145,38 @@ std::int64_t Renderer::rays() const {
   return static_cast<std::int64_t>(width_) * height_ / (sampling_.every_other ? 2 : 1);
 }
 
-void Renderer::shade_row(const Surroundings& s, std::span<const Pose> poses, int row, Row& out) const {
-  std::array<Eigen::Matrix3f, kTimes> turns;
-  std::array<Eigen::Vector3f, kTimes> eyes;
+void Renderer::shade_row(const LitScene& s, std::span<const Pose> poses, int row, Row& out) const {
+  std::array<Eigen::Matrix3f, kTimes> rotations;
+  std::array<Eigen::Vector3f, kTimes> centres;
   for (std::size_t t = 0; t < kTimes; ++t) {
-    turns[t] = poses[t].rotation().toRotationMatrix().cast<float>();
-    eyes[t] = (poses[t].translation() - s.scene.origin()).cast<float>();
+    rotations[t] = poses[t].rotation().toRotationMatrix().cast<float>();
+    centres[t] = (poses[t].translation() - s.scene.origin()).cast<float>();
   }
   const Eigen::Vector3d middle = poses[kTimes / 2].translation();
   const Eigen::Vector3f* const directions =
       directions_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
   const int step = sampling_.every_other ? 2 : 1;
-  const double bounce_lux = s.soil.mean_albedo() * s.sun.level_lux(s.sky_lux);
+  const double bounce_lux = s.soil.mean_albedo() * s.sun.horizontal_lux(s.sky_lux);
   for (int first = sampling_.every_other ? row & 1 : 0; first < width_; first += kPacket * step) {
     RayPacket rays, shadows;
     Hits h;
     for (int k = 0; k < kPacket; ++k) {
       const int column = first + k * step;
-      const auto t = static_cast<std::size_t>(turn_of(column, row));
+      const auto t = static_cast<std::size_t>(sample_index(column, row));
       const Eigen::Vector3f& direction = directions[column];
-      h.look[static_cast<std::size_t>(k)] = turns[t] * direction;
-      rays.set(k, eyes[t], h.look[static_cast<std::size_t>(k)], direction.z() != 0 ? kFarthest_m : -1.0F);
+      h.look[static_cast<std::size_t>(k)] = rotations[t] * direction;
+      rays.set(k, centres[t], h.look[static_cast<std::size_t>(k)], direction.z() != 0 ? kFarthest_m : -1.0F);
     }
     h.at = s.scene.intersect(rays);
     for (int k = 0; k < kPacket; ++k) {
       const auto i = static_cast<std::size_t>(k);
       const Eigen::Vector3f n(h.at.normal_x[k], h.at.normal_y[k], h.at.normal_z[k]);
-      const Eigen::Vector3f& towards_sun = s.sun.towards(turn_of(first + k * step, row));
-      h.met[i] = std::isfinite(h.at.distance[k]);
-      const bool faces_sun = h.met[i] && s.sun.lux() > 0 && n.dot(towards_sun) > 0;
+      const Eigen::Vector3f& towards_sun = s.sun.direction(sample_index(first + k * step, row));
+      h.hit[i] = std::isfinite(h.at.distance[k]);
+      const bool faces_sun = h.hit[i] && s.sun.lux() > 0 && n.dot(towards_sun) > 0;
       const Eigen::Vector3f origin(rays.origin_x[k], rays.origin_y[k], rays.origin_z[k]);
       const Eigen::Vector3f place =
-          h.met[i] ? Eigen::Vector3f(origin + h.at.distance[k] * h.look[i] + kLift_m * n) : origin;
+          h.hit[i] ? Eigen::Vector3f(origin + h.at.distance[k] * h.look[i] + kShadowOffset_m * n) : origin;
       shadows.set(k, place, towards_sun, faces_sun ? kFarthest_m : -1.0F);
       h.lit |= faces_sun ? 1U << k : 0U;
     }
@@ -184,25 +185,25 @@ void Renderer::shade_row(const Surroundings& s, std::span<const Pose> poses, int
     for (int k = 0; k < kPacket; ++k) {
       const auto i = static_cast<std::size_t>(k);
       const int column = first + k * step;
-      if (!h.met[i]) {
+      if (!h.hit[i]) {
         out.put(column, Material::sky, s.sky_lux / std::numbers::pi);
         continue;
       }
       const Eigen::Vector3f n(h.at.normal_x[k], h.at.normal_y[k], h.at.normal_z[k]);
       const Eigen::Vector3d place = middle + static_cast<double>(h.at.distance[k]) * h.look[i].cast<double>();
       const bool rock = h.at.rock[k];
-      const double open = s.sky.share(place, n.z());
+      const double view_factor = s.sky.view_factor(place, n.z());
       const double emission = -n.dot(h.look[i]);
-      const double cos_sun = n.dot(s.sun.towards(turn_of(column, row)));
-      const double sun = (h.lit >> k & 1U) != 0 ? s.sun.lux() * s.soil.scattered(cos_sun, emission) : 0.0;
-      // What hides the sky is ground: it shines as level ground in the open.
-      const double around = s.sky_lux * open + bounce_lux * (1 - open);
+      const double cos_sun = n.dot(s.sun.direction(sample_index(column, row)));
+      const double sun = (h.lit >> k & 1U) != 0 ? s.sun.lux() * s.soil.reflectance(cos_sun, emission) : 0.0;
+      // One bounce: what occludes the sky is ground with the radiance of open level ground.
+      const double around = s.sky_lux * view_factor + bounce_lux * (1 - view_factor);
       out.put(column, rock ? Material::rock : Material::soil, h.albedo[i] * (sun + around) / std::numbers::pi);
     }
   }
 }
 
-// Rays that were left out take the mean of their neighbours to the left, right, above and below.
+// Fills rays that were skipped with the mean of their four neighbours.
 void fill_every_other(Image<float>& fine) {
   for (int y = 0; y < fine.height(); ++y) {
     for (int x = 1 - (y & 1); x < fine.width(); x += 2) {
@@ -237,8 +238,8 @@ Image<float> Renderer::filtered(const Image<float>& fine, const Workers& workers
   return result;
 }
 
-Radiance Renderer::render(const Surroundings& surroundings, const Poses& world_from_camera, bool split_materials,
-                          const Workers& workers) const {
+LuminanceImage Renderer::render(const LitScene& scene, const Poses& world_from_camera, bool split_materials,
+                                const Workers& workers) const {
   const std::size_t planes = split_materials ? kMaterials : 1;
   std::array<Image<float>, kMaterials> fine;
   for (std::size_t m = 0; m < planes; ++m) fine[m] = Image<float>(width_, height_);
@@ -247,19 +248,19 @@ Radiance Renderer::render(const Surroundings& surroundings, const Poses& world_f
       Row out;
       out.split = split_materials;
       for (std::size_t m = 0; m < planes; ++m) out.values[m] = fine[m].row(row);
-      shade_row(surroundings, world_from_camera, row, out);
+      shade_row(scene, world_from_camera, row, out);
     }
   });
-  Radiance radiance;
-  radiance.split = split_materials;
+  LuminanceImage luminance;
+  luminance.split = split_materials;
   for (std::size_t m = 0; m < planes; ++m) {
     if (sampling_.every_other) fill_every_other(fine[m]);
-    radiance.by_material[m] = filtered(fine[m], workers);
+    luminance.by_material[m] = filtered(fine[m], workers);
   }
-  return radiance;
+  return luminance;
 }
 
-double Renderer::metered(const Surroundings& surroundings, const Pose& world_from_camera, int step) const {
+double Renderer::mean_luminance(const LitScene& scene, const Pose& world_from_camera, int step) const {
   const Poses poses{world_from_camera, world_from_camera, world_from_camera, world_from_camera};
   std::vector<float> values(static_cast<std::size_t>(width_));
   Row row;
@@ -267,7 +268,7 @@ double Renderer::metered(const Surroundings& surroundings, const Pose& world_fro
   double sum = 0;
   std::int64_t count = 0;
   for (int j = border_; j < height_ - border_; j += step * sampling_.side) {
-    shade_row(surroundings, poses, j, row);
+    shade_row(scene, poses, j, row);
     const int every = sampling_.every_other ? 2 : 1;
     for (int i = sampling_.every_other ? j & 1 : 0; i < width_; i += every) {
       sum += values[static_cast<std::size_t>(i)];
@@ -280,9 +281,9 @@ double Renderer::metered(const Surroundings& surroundings, const Pose& world_fro
 Image<float> render_depth(const Camera& camera, const GroundScene& scene, const Pose& world_from_camera,
                           const Workers& workers) {
   const auto [w, h] = camera.size;
-  const Eigen::Matrix3f turn = world_from_camera.rotation().toRotationMatrix().cast<float>();
+  const Eigen::Matrix3f rotation = world_from_camera.rotation().toRotationMatrix().cast<float>();
   const Eigen::Vector3d from_origin = world_from_camera.translation() - scene.origin();
-  const Eigen::Vector3f eye = from_origin.cast<float>();
+  const Eigen::Vector3f centre = from_origin.cast<float>();
   Image<float> result(w, h, std::numeric_limits<float>::quiet_NaN());
   workers.for_each_part(0, h, 8, [&](int from, int to) {
     for (int y = from; y < to; ++y) {
@@ -293,7 +294,7 @@ Image<float> render_depth(const Camera& camera, const GroundScene& scene, const 
           const Eigen::Vector3f direction =
               first + k < w ? direction_at(camera, first + k, y) : Eigen::Vector3f(0, 0, 0);
           along[static_cast<std::size_t>(k)] = direction.z();
-          rays.set(k, eye, turn * direction, direction.z() != 0 ? kFarthest_m : -1.0F);
+          rays.set(k, centre, rotation * direction, direction.z() != 0 ? kFarthest_m : -1.0F);
         }
         const HitPacket hits = scene.intersect(rays);
         for (int k = 0; k < kPacket && first + k < w; ++k) {

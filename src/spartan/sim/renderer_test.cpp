@@ -19,7 +19,7 @@
 namespace spartan::sim {
 namespace {
 
-// A camera over (0, 0), looking along x and down.
+// A camera above (0, 0), looking along x and down.
 Pose looking_down(double height_m, double down_deg, double roll_deg = 0) {
   const double degree = std::numbers::pi / 180;
   const Eigen::Quaterniond tilt(Eigen::AngleAxisd(down_deg * degree, Eigen::Vector3d::UnitY()));
@@ -29,7 +29,7 @@ Pose looking_down(double height_m, double down_deg, double roll_deg = 0) {
 
 Camera pinhole(int width, int height, double focal_px) {
   Camera camera;
-  camera.name = "eye";
+  camera.name = "camera";
   camera.size = {width, height};
   camera.model = PinholeModel{focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
   return camera;
@@ -41,11 +41,11 @@ TerrainShapeOptions flat() {
   return options;
 }
 
-// Points on the ground that a pixel's ray meets go through OpenCV's camera back to that pixel.
-TEST(Renderer, PointsOfTheWorldLieWhereOpenCvProjectsThem) {
+// OpenCV projects the point where a pixel's ray hits the ground back to that pixel.
+TEST(Renderer, HitPointsProjectToTheirPixelsWithOpenCv) {
   const Workers workers(2);
   const TerrainShape shape({}, 3);
-  const RockField rocks({.share = 0.1}, 3);
+  const RockField rocks({.coverage = 0.1}, 3);
   const GroundScene scene(shape, rocks, {-1, -2, 4, 2}, workers);
   Camera camera = pinhole(320, 240, 240);
   const PinholeModel plain{240, 243, 161.3, 118.2};
@@ -53,8 +53,8 @@ TEST(Renderer, PointsOfTheWorldLieWhereOpenCvProjectsThem) {
   const Pose world_from_camera = looking_down(0.8, 35, 4);
   const Image<float> depth = render_depth(camera, scene, world_from_camera, workers);
   const Pose camera_from_world = world_from_camera.inverse();
-  const Eigen::AngleAxisd turn(camera_from_world.rotation());
-  const Eigen::Vector3d rvec = turn.angle() * turn.axis();
+  const Eigen::AngleAxisd rotation(camera_from_world.rotation());
+  const Eigen::Vector3d rvec = rotation.angle() * rotation.axis();
   const cv::Mat k = (cv::Mat_<double>(3, 3) << 240, 0, 161.3, 0, 243, 118.2, 0, 0, 1);
   const std::vector<double> distortion{-0.12, 0.03, 0.001, -0.0005};
   double worst = 0;
@@ -66,7 +66,7 @@ TEST(Renderer, PointsOfTheWorldLieWhereOpenCvProjectsThem) {
       ASSERT_TRUE(ray);
       const Eigen::Vector3d world =
           world_from_camera * Eigen::Vector3d(depth(x, y) / ray->direction.z() * ray->direction);
-      // It lies on the ground, or on a rock above it.
+      // The point is on the ground, or on a rock above it.
       if (scene.region().contains(world.x(), world.y())) {
         EXPECT_GT(world.z(), shape.height(world.x(), world.y()) - 1.5e-3);
       }
@@ -81,12 +81,12 @@ TEST(Renderer, PointsOfTheWorldLieWhereOpenCvProjectsThem) {
     }
   }
   EXPECT_GT(count, 800);
-  fmt::print("projections: largest distance from OpenCV's {:.5f} px over {} points\n", worst, count);
+  fmt::print("projections: largest difference from OpenCV {:.5f} px over {} points\n", worst, count);
   EXPECT_LT(worst, 0.01);
 }
 
-// The horizon seen by a rolled camera is an edge; its profile is the integral of the point spread, and it lies where
-// the camera model says.
+// The horizon in the image of a rolled camera is a slanted edge: its profile is the integral of the point spread
+// function, at the position that the camera model predicts.
 struct Edge {
   double sigma_px = 0, shift_px = 0;
 };
@@ -94,28 +94,28 @@ struct Edge {
 Edge edge_of_horizon(double roll_deg) {
   const Workers workers(2);
   const TerrainShape shape(flat(), 1);
-  const RockField none({.share = 0, .pebbles_per_m2 = 0}, 1);
+  const RockField none({.coverage = 0, .pebbles_per_m2 = 0}, 1);
   const GroundScene scene(shape, none, {-1, -1, 1, 1}, workers);
   const SkyLight sky(scene, shape, workers);
   const Sun sun({.sun_lux = 0});
   const Soil soil({.albedo = 0.02, .contrast = 0}, 1);
-  const Surroundings around{scene, sky, sun, soil, 5000};
+  const LitScene lit{scene, sky, sun, soil, 5000};
   const Camera camera = pinhole(200, 200, 300);
   const Renderer renderer(camera, Sampling::of(4));
   const Pose pose = looking_down(1, 0, roll_deg);
-  const Radiance picture = renderer.render(around, {pose, pose, pose, pose}, false, workers);
-  // Distance of a pixel from the horizon, which is the image of directions with z = 0 … less the ground's end at 120 m.
+  const LuminanceImage image = renderer.render(lit, {pose, pose, pose, pose}, false, workers);
+  // Distance of a pixel from the horizon: directions below z = 0 by the dip of the edge of the ground at 120 m.
   const double dip = std::atan2(1.0, GroundScene::kHorizon_m + 1);
   std::vector<std::pair<double, double>> profile;
   for (int y = 60; y < 140; ++y) {
     for (int x = 60; x < 140; ++x) {
       const Eigen::Vector3d d = pose.rotation() * Eigen::Vector3d((x - 99.5) / 300, (y - 99.5) / 300, 1);
       const double off = 300 * (std::atan2(d.z(), std::hypot(d.x(), d.y())) + dip);
-      if (std::abs(off) < 4) profile.emplace_back(off, picture.total(x, y));
+      if (std::abs(off) < 4) profile.emplace_back(off, image.total(x, y));
     }
   }
-  // Least squares for edge, width and both levels by search over the width.
-  const auto misfit = [&](double sigma, double shift) {
+  // Least squares for position, width and both levels: grid search over position and width.
+  const auto cost = [&](double sigma, double shift) {
     double s1 = 0, sp = 0, spp = 0, sv = 0, svp = 0, svv = 0;
     for (const auto& [off, value] : profile) {
       const double p = 0.5 * (1 + std::erf((off - shift) / (sigma * std::numbers::sqrt2)));
@@ -133,7 +133,7 @@ Edge edge_of_horizon(double roll_deg) {
   Edge edge;
   for (double sigma = 0.3; sigma < 0.8; sigma += 0.005) {
     for (double shift = -0.5; shift < 0.5; shift += 0.02) {
-      if (const double m = misfit(sigma, shift); m < best) {
+      if (const double m = cost(sigma, shift); m < best) {
         best = m;
         edge = {sigma, shift};
       }
@@ -142,10 +142,10 @@ Edge edge_of_horizon(double roll_deg) {
   return edge;
 }
 
-TEST(Renderer, SlantedEdgeShowsThePointSpreadWhereItBelongs) {
+TEST(Renderer, SlantedEdgeHasThePointSpreadAndPosition) {
   for (const double roll_deg : {5.0, 85.0, -175.0, -95.0}) {
     const Edge edge = edge_of_horizon(roll_deg);
-    fmt::print("point spread on an edge at {} degrees: {:.3f} px, {:+.2f} px off\n", roll_deg, edge.sigma_px,
+    fmt::print("point spread on an edge at {} degrees: {:.3f} px, position error {:+.2f} px\n", roll_deg, edge.sigma_px,
                edge.shift_px);
     EXPECT_NEAR(edge.sigma_px, Renderer::kPointSpread_px, 0.05 * Renderer::kPointSpread_px);
     EXPECT_NEAR(edge.shift_px, 0, 0.05);
@@ -178,27 +178,27 @@ double sampled(const FrameImage& image, double x, int y) {
   return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)));
 }
 
-// The right image, moved by the true disparity, is the left one but for the noise of both.
+// The right image warped by the true disparity equals the left one, except for the noise of both.
 TEST(TrueDisparity, WarpsRightOntoLeft) {
   const Workers workers(2);
   const TerrainShape shape({}, 3);
-  const RockField rocks({.share = 0.1}, 3);
+  const RockField rocks({.coverage = 0.1}, 3);
   const GroundScene scene(shape, rocks, {-0.5, -1.5, 3, 1.5}, workers);
   const SkyLight sky(scene, shape, workers);
   const LightOptions light;
   const Sun sun(light);
   const Soil soil({}, 3);
-  const Surroundings around{scene, sky, sun, soil, light.sky_lux};
+  const LitScene lit{scene, sky, sun, soil, light.sky_lux};
   const Stereo s = parallel_pair(320, 240, 300, 0.1);
   const Pose left_pose = s.rig.cameras[0].mount_from_camera, right_pose = s.rig.cameras[1].mount_from_camera;
   const SensorOptions sensor{.vignetting = 0};
   const Renderer left(s.rig.cameras[0], Sampling::of(4)), right(s.rig.cameras[1], Sampling::of(4));
-  const Exposure exposure = choose_exposure(sensor, left.metered(around, left_pose, 8));
-  const auto shoot = [&](const Renderer& renderer, const Pose& pose, std::uint64_t seed) {
+  const Exposure exposure = choose_exposure(sensor, left.mean_luminance(lit, left_pose, 8));
+  const auto expose = [&](const Renderer& renderer, const Pose& pose, std::uint64_t seed) {
     return Sensor(sensor, renderer.camera())
-        .expose(renderer.render(around, {pose, pose, pose, pose}, false, workers), exposure, {}, seed, workers);
+        .expose(renderer.render(lit, {pose, pose, pose, pose}, false, workers), exposure, {}, seed, workers);
   };
-  const FrameImage left_image = shoot(left, left_pose, 1), right_image = shoot(right, right_pose, 2);
+  const FrameImage left_image = expose(left, left_pose, 1), right_image = expose(right, right_pose, 2);
   const TrueDisparity truth = DisparityTruth(s.rig, s.rig, s.rig.pairs[0], s.view).of(scene, left_pose, workers);
   std::vector<double> differences;
   int both = 0, left_only = 0;
@@ -216,15 +216,16 @@ TEST(TrueDisparity, WarpsRightOntoLeft) {
   std::nth_element(differences.begin(), differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2),
                    differences.end());
   const double median = differences[differences.size() / 2];
-  // Noise of one eye at the mean level: shot, read, rounding. The median of |difference| of two is 0.6745 √2 of it.
+  // Noise of one image at the mean level: shot noise, read noise, quantization. The median of the absolute difference
+  // of two images is 0.6745 √2 times it.
   const double electrons = 0.45 * 15000, levels = 255 * (1 - 1.0 / 64) / 15000;
-  const double floor = 0.6745 * std::sqrt(2 * (levels * levels * (electrons + 225) + 1.0 / 12));
-  fmt::print("right warped onto left: median difference {:.3f} gray levels, noise floor {:.3f}\n", median, floor);
-  EXPECT_LT(median, 1.35 * floor);
-  EXPECT_GT(median, 0.5 * floor);
+  const double noise_floor = 0.6745 * std::sqrt(2 * (levels * levels * (electrons + 225) + 1.0 / 12));
+  fmt::print("right warped onto left: median difference {:.3f} gray levels, noise floor {:.3f}\n", median, noise_floor);
+  EXPECT_LT(median, 1.35 * noise_floor);
+  EXPECT_GT(median, 0.5 * noise_floor);
 }
 
-// A second renderer without acceleration: every triangle, double precision, many rays.
+// A reference renderer without acceleration structure: every triangle, double precision.
 class BruteForce {
  public:
   BruteForce(const TerrainShape& shape, const std::vector<Rock>& rocks, const Region& region) {
@@ -235,7 +236,7 @@ class BruteForce {
       const double x = region.x0 + i * kStep, y = region.y0 + j * kStep;
       return Eigen::Vector3d(x, y, shape.height(x, y));
     };
-    // Embree cuts a cell of a grid from the corner (1, 0) to (0, 1).
+    // Embree splits a cell of a grid along the diagonal from corner (1, 0) to (0, 1).
     for (int j = 0; j < ny; ++j) {
       for (int i = 0; i < nx; ++i) {
         triangles_.push_back({corner(i, j), corner(i + 1, j), corner(i, j + 1), false});
@@ -257,7 +258,7 @@ class BruteForce {
     Eigen::Vector3d normal;
     bool rock = false;
   };
-  // Möller and Trumbore, 1997.
+  // Möller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997.
   Hit first(const Eigen::Vector3d& from, const Eigen::Vector3d& d, double nearest) const {
     Hit hit;
     for (const Triangle& t : triangles_) {
@@ -284,11 +285,11 @@ class BruteForce {
   std::vector<Triangle> triangles_;
 };
 
-TEST(Renderer, AgreesWithOneThatTriesEveryTriangle) {
+TEST(Renderer, AgreesWithABruteForceReference) {
   const Workers workers(2);
   const TerrainShape shape({}, 8);
   RockFieldOptions pebbly;
-  pebbly.share = 0.2;
+  pebbly.coverage = 0.2;
   pebbly.largest_m = 0.08;
   pebbly.pebbles_per_m2 = 0;
   const RockField rocks(pebbly, 8);
@@ -298,14 +299,14 @@ TEST(Renderer, AgreesWithOneThatTriesEveryTriangle) {
   const LightOptions light{.sun_elevation_deg = 35, .sky_lux = 0};
   const Sun sun(light);
   const Soil soil({.lunar_weight = 0.5}, 8);
-  const Surroundings around{scene, sky, sun, soil, 0};
+  const LitScene lit{scene, sky, sun, soil, 0};
   const Camera camera = pinhole(36, 28, 120);
   const Pose pose(Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX())),
                   Eigen::Vector3d(0, 0, shape.height(0, 0) + 0.6));
-  const Radiance fast = Renderer(camera, Sampling::of(16)).render(around, {pose, pose, pose, pose}, false, workers);
+  const LuminanceImage fast = Renderer(camera, Sampling::of(16)).render(lit, {pose, pose, pose, pose}, false, workers);
 
-  const BruteForce brute(shape, rocks.rocks_between(region.grown(0.1)), scene.region());
-  const double bounce = soil.mean_albedo() * sun.level_lux(0);
+  const BruteForce brute(shape, rocks.rocks_in(region.grown(0.1)), scene.region());
+  const double bounce = soil.mean_albedo() * sun.horizontal_lux(0);
   constexpr int kFine = 3, kReach = 2 * kFine;
   const int w = 36 * kFine + 2 * kReach, h = 28 * kFine + 2 * kReach;
   Image<float> fine(w, h);
@@ -322,15 +323,16 @@ TEST(Renderer, AgreesWithOneThatTriesEveryTriangle) {
       double albedo = 0;
       const Soil::Places there{{&px, 1}, {&py, 1}, {&footprint, 1}};
       hit.rock ? soil.rock_albedo(there, {&albedo, 1}) : soil.ground_albedo(there, {&albedo, 1});
-      double lit = 0;
+      double sunlight = 0;
       for (int k = 0; k < Sun::kPoints; ++k) {
-        const Eigen::Vector3d towards = sun.towards(k).cast<double>();
+        const Eigen::Vector3d towards = sun.direction(k).cast<double>();
         if (hit.normal.dot(towards) <= 0 || brute.first(place + 2e-4 * hit.normal, towards, 0).distance < 1e8) continue;
         const double i0 = hit.normal.dot(towards), e = -hit.normal.dot(look);
-        lit += light.sun_lux * (0.5 * 2 * i0 / (i0 + e) + 0.5 * i0) / Sun::kPoints;
+        sunlight += light.sun_lux * (0.5 * 2 * i0 / (i0 + e) + 0.5 * i0) / Sun::kPoints;
       }
-      const double open = sky.share(place, static_cast<float>(hit.normal.z()));  // the sky has a test of its own
-      fine(i, j) = static_cast<float>(albedo * (lit + bounce * (1 - open)) / std::numbers::pi);
+      const double view_factor =
+          sky.view_factor(place, static_cast<float>(hit.normal.z()));  // tested in sky_light_test.cpp
+      fine(i, j) = static_cast<float>(albedo * (sunlight + bounce * (1 - view_factor)) / std::numbers::pi);
     }
   }
   double squares = 0, sum = 0, total = 0;
@@ -353,17 +355,17 @@ TEST(Renderer, AgreesWithOneThatTriesEveryTriangle) {
   }
   const double n = 28 * 36, mean = total / n;
   EXPECT_GT(mean, 100);
-  fmt::print("every triangle: mean {:+.4f} %, RMS {:.3f} %\n", 100 * sum / n / mean,
+  fmt::print("brute force: mean difference {:+.4f} %, RMS {:.3f} %\n", 100 * sum / n / mean,
              100 * std::sqrt(squares / n) / mean);
   EXPECT_LT(std::abs(sum / n), 0.003 * mean);
   EXPECT_LT(std::sqrt(squares / n), 0.02 * mean);
 }
 
-TEST(Renderer, GivesTheSameBitsForAnyNumberOfThreads) {
+TEST(Renderer, IsBitIdenticalForAnyNumberOfThreads) {
   const TerrainShape shape({}, 3);
-  const RockField rocks({.share = 0.1}, 3);
+  const RockField rocks({.coverage = 0.1}, 3);
   const Camera camera = pinhole(160, 120, 120);
-  std::vector<Image<float>> pictures;
+  std::vector<Image<float>> images;
   for (const int threads : {1, 2}) {
     const Workers workers(threads);
     const GroundScene scene(shape, rocks, {-0.5, -1, 2, 1}, workers);
@@ -371,20 +373,19 @@ TEST(Renderer, GivesTheSameBitsForAnyNumberOfThreads) {
     const Sun sun({});
     const Soil soil({}, 3);
     const Pose pose = looking_down(0.5, 40);
-    pictures.push_back(std::move(Renderer(camera, Sampling::of(2))
-                                     .render({scene, sky, sun, soil, 5000}, {pose, pose, pose, pose}, false, workers)
-                                     .by_material[0]));
+    images.push_back(std::move(Renderer(camera, Sampling::of(2))
+                                   .render({scene, sky, sun, soil, 5000}, {pose, pose, pose, pose}, false, workers)
+                                   .by_material[0]));
   }
   for (int y = 0; y < 120; ++y) {
-    for (int x = 0; x < 160; ++x) ASSERT_EQ(pictures[0](x, y), pictures[1](x, y)) << x << ", " << y;
+    for (int x = 0; x < 160; ++x) ASSERT_EQ(images[0](x, y), images[1](x, y)) << x << ", " << y;
   }
 }
 
-// Where two scenes overlap, the ground is the same.
-TEST(GroundScene, IsTheSameGroundWhereverItIsMade) {
+TEST(GroundScene, OverlappingScenesAgree) {
   const Workers workers(2);
   const TerrainShape shape({}, 3);
-  const RockField rocks({.share = 0.1}, 3);
+  const RockField rocks({.coverage = 0.1}, 3);
   const GroundScene a(shape, rocks, {-1, -1, 2, 1}, workers), b(shape, rocks, {0.333, -1.2, 3.1, 1.5}, workers);
   Random random(1);
   for (int i = 0; i < 500; ++i) {

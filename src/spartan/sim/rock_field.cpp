@@ -13,21 +13,21 @@
 namespace spartan::sim {
 namespace {
 
-constexpr int kSteps = 400;
-constexpr double kCell_m = 2;
-constexpr std::array<double, 2> kBorders_m{0.04, 0.15};  // between the strata
+constexpr int kSteps = 400;                              // of numerical integration over diameters
+constexpr double kCell_m = 2;                            // rocks are drawn per square cell of this side
+constexpr std::array<double, 2> kBorders_m{0.04, 0.15};  // diameters that separate the strata
 constexpr double kSmallestPebble_m = 0.004;
-constexpr double kSlenderest = 1.6;  // length over width
+constexpr double kMaxElongation = 1.6;  // length over width
 
-double density(double share, double q, double diameter) {
-  return share * q * std::exp(-q * diameter) * 4 / (std::numbers::pi * diameter * diameter);
+double density(double coverage, double q, double diameter) {
+  return coverage * q * std::exp(-q * diameter) * 4 / (std::numbers::pi * diameter * diameter);
 }
 
 double diameter_of_step(double from_m, double to_m, double step) {
   return from_m * std::pow(to_m / from_m, step / kSteps);
 }
 
-// Knuth's for small means, the normal approximation beyond.
+// Knuth's algorithm for small means, the normal approximation for large ones.
 int poisson(double mean, Random& random) {
   if (mean > 60) return std::max(0, static_cast<int>(std::lround(random.normal(mean, std::sqrt(mean)))));
   const double limit = std::exp(-mean);
@@ -38,28 +38,28 @@ int poisson(double mean, Random& random) {
 
 }  // namespace
 
-double golombek_q(double share) {
-  return 1.79 + 0.152 / share;
+double golombek_q(double coverage) {
+  return 1.79 + 0.152 / coverage;
 }
 
-double golombek_cover(double share, double diameter_m) {
-  return share <= 0 ? 0 : share * std::exp(-golombek_q(share) * diameter_m);
+double golombek_cover(double coverage, double diameter_m) {
+  return coverage <= 0 ? 0 : coverage * std::exp(-golombek_q(coverage) * diameter_m);
 }
 
-double golombek_count_per_m2(double share, double from_m, double to_m) {
-  if (share <= 0 || !(to_m > from_m)) return 0;
+double golombek_count_per_m2(double coverage, double from_m, double to_m) {
+  if (coverage <= 0 || !(to_m > from_m)) return 0;
   // Simpson's rule over ln D, where the integrand is smooth.
-  const double q = golombek_q(share), step = std::log(to_m / from_m) / kSteps;
+  const double q = golombek_q(coverage), step = std::log(to_m / from_m) / kSteps;
   double sum = 0;
   for (int i = 0; i <= kSteps; ++i) {
     const double d = from_m * std::exp(i * step);
-    sum += (i == 0 || i == kSteps ? 1 : i % 2 == 1 ? 4 : 2) * density(share, q, d) * d;
+    sum += (i == 0 || i == kSteps ? 1 : i % 2 == 1 ? 4 : 2) * density(coverage, q, d) * d;
   }
   return sum * step / 3;
 }
 
 RockField::RockField(const RockFieldOptions& options, std::uint64_t seed) : options_(options), seed_(seed) {
-  if (options.share > 0) {
+  if (options.coverage > 0) {
     double from = options.smallest_m;
     std::uint64_t stream = 77;
     for (const double border : kBorders_m) {
@@ -69,7 +69,7 @@ RockField::RockField(const RockFieldOptions& options, std::uint64_t seed) : opti
     add_stratum(from, options.largest_m, stream);
   }
   if (options.pebbles_per_m2 > 0) {
-    // Numbers that fall with the square of the diameter, as of rocks broken again and again.
+    // Cumulative numbers fall with the square of the diameter, a power law of fragmentation.
     Stratum pebbles{kSmallestPebble_m, kLargestPebble_m, options.pebbles_per_m2, {0.0}, 90};
     const auto below = [](double d) { return 1 - kSmallestPebble_m * kSmallestPebble_m / (d * d); };
     for (int i = 1; i <= kSteps; ++i) {
@@ -85,19 +85,19 @@ void RockField::add_stratum(double from_m, double to_m, std::uint64_t stream) {
   Stratum stratum{from_m, to_m, 0, {0.0}, stream};
   for (int i = 0; i < kSteps; ++i) {
     const double a = diameter_of_step(from_m, to_m, i), b = diameter_of_step(from_m, to_m, i + 1);
-    stratum.cumulative.push_back(stratum.cumulative.back() + golombek_count_per_m2(options_.share, a, b));
+    stratum.cumulative.push_back(stratum.cumulative.back() + golombek_count_per_m2(options_.coverage, a, b));
   }
   stratum.count_per_m2 = stratum.cumulative.back();
   strata_.push_back(std::move(stratum));
 }
 
-void RockField::keep_off(ClearWay way, double clearance_m) {
-  way_ = std::move(way);
+void RockField::clear_corridor(DriveCorridor corridor, double clearance_m) {
+  corridor_ = std::move(corridor);
   clearance_m_ = clearance_m;
 }
 
-double RockField::Stratum::diameter_at(double share_of_count) const {
-  const double wanted = share_of_count * count_per_m2;
+double RockField::Stratum::diameter_at(double count_fraction) const {
+  const double wanted = count_fraction * count_per_m2;
   const auto above = std::upper_bound(cumulative.begin(), cumulative.end(), wanted);
   const auto i = std::clamp<std::ptrdiff_t>(above - cumulative.begin(), 1, kSteps) - 1;
   const auto at = static_cast<std::size_t>(i);
@@ -105,9 +105,9 @@ double RockField::Stratum::diameter_at(double share_of_count) const {
   return diameter_of_step(from_m, to_m, static_cast<double>(i) + std::clamp(part, 0.0, 1.0));
 }
 
-bool RockField::is_in_the_way(const Rock& rock) const {
+bool RockField::blocks_corridor(const Rock& rock) const {
   return rock.height_m > clearance_m_ &&
-         way_.blocked_by(rock.x, rock.y, 0.5 * rock.diameter_m * std::sqrt(kSlenderest) * 1.1);
+         corridor_.intersects_disc(rock.x, rock.y, 0.5 * rock.diameter_m * std::sqrt(kMaxElongation) * 1.1);
 }
 
 void RockField::append_cell(const Stratum& stratum, std::int32_t i, std::int32_t j, std::vector<Rock>& rocks) const {
@@ -120,13 +120,13 @@ void RockField::append_cell(const Stratum& stratum, std::int32_t i, std::int32_t
     rock.diameter_m = stratum.diameter_at(random.uniform());
     rock.height_m = rock.diameter_m * options_.height_ratio * random.uniform(0.6, 1.4);
     rock.turn_rad = random.uniform(0, 2 * std::numbers::pi);
-    rock.elongation = random.uniform(1, kSlenderest);
+    rock.elongation = random.uniform(1, kMaxElongation);
     rock.shape = random.next();
     rocks.push_back(rock);
   }
 }
 
-std::vector<Rock> RockField::rocks_between(const Region& region, double smallest_m) const {
+std::vector<Rock> RockField::rocks_in(const Region& region, double smallest_m) const {
   const auto cell = [](double v) { return static_cast<std::int32_t>(std::floor(v / kCell_m)); };
   std::vector<Rock> found, here;
   for (const Stratum& stratum : strata_) {
@@ -137,7 +137,7 @@ std::vector<Rock> RockField::rocks_between(const Region& region, double smallest
         append_cell(stratum, i, j, here);
         std::copy_if(here.begin(), here.end(), std::back_inserter(found), [&](const Rock& rock) {
           return rock.x >= region.x0 && rock.x < region.x1 && rock.y >= region.y0 && rock.y < region.y1 &&
-                 !is_in_the_way(rock);
+                 !blocks_corridor(rock);
         });
       }
     }

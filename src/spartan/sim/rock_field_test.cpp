@@ -9,7 +9,7 @@
 namespace spartan::sim {
 namespace {
 
-TEST(Golombek, CoverIsTheModels) {
+TEST(Golombek, CoverMatchesTheModel) {
   // Golombek & Rapp 1997: k = 0.1 gives q = 3.31.
   EXPECT_NEAR(golombek_q(0.1), 3.31, 1e-12);
   EXPECT_NEAR(golombek_cover(0.1, 0), 0.1, 1e-12);
@@ -28,12 +28,12 @@ TEST(Golombek, CountsAddUpToTheCover) {
   }
 }
 
-// The share of the ground that rocks of a diameter and more cover, measured over a hectare.
+// The fraction of the ground covered by rocks of a diameter and more, measured over a hectare.
 TEST(RockField, CumulativeAreaFollowsTheModel) {
   constexpr double kSide = 100;
   for (const double k : {0.05, 0.1, 0.2}) {
-    const RockField field({.share = k, .smallest_m = 0.03, .largest_m = 3, .height_ratio = 0.5}, 5);
-    const auto rocks = field.rocks_between({0, 0, kSide, kSide});
+    const RockField field({.coverage = k, .smallest_m = 0.03, .largest_m = 3, .height_ratio = 0.5}, 5);
+    const auto rocks = field.rocks_in({0, 0, kSide, kSide});
     for (const double diameter : {0.05, 0.1, 0.2, 0.3, 0.5}) {
       double area = 0;
       for (const Rock& rock : rocks) {
@@ -46,17 +46,17 @@ TEST(RockField, CumulativeAreaFollowsTheModel) {
   }
 }
 
-TEST(RockField, TheSamePlaceHoldsTheSameRocks) {
+TEST(RockField, QueriesOfTheSamePlaceReturnTheSameRocks) {
   const RockField field({}, 9);
-  const auto whole = field.rocks_between({-4, -4, 4, 4}), again = field.rocks_between({-4, -4, 4, 4});
+  const auto whole = field.rocks_in({-4, -4, 4, 4}), again = field.rocks_in({-4, -4, 4, 4});
   ASSERT_EQ(whole.size(), again.size());
   std::size_t parts = 0;
   for (const double x : {-4.0, 0.0}) {
-    for (const double y : {-4.0, 0.0}) parts += field.rocks_between({x, y, x + 4, y + 4}).size();
+    for (const double y : {-4.0, 0.0}) parts += field.rocks_in({x, y, x + 4, y + 4}).size();
   }
   EXPECT_EQ(parts, whole.size());
-  EXPECT_NE(RockField({}, 10).rocks_between({-4, -4, 4, 4}).size(), whole.size());
-  EXPECT_TRUE(RockField({.share = 0, .pebbles_per_m2 = 0}, 9).rocks_between({-50, -50, 50, 50}).empty());
+  EXPECT_NE(RockField({}, 10).rocks_in({-4, -4, 4, 4}).size(), whole.size());
+  EXPECT_TRUE(RockField({.coverage = 0, .pebbles_per_m2 = 0}, 9).rocks_in({-50, -50, 50, 50}).empty());
 }
 
 }  // namespace

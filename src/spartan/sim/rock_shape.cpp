@@ -12,8 +12,8 @@
 namespace spartan::sim {
 namespace {
 
-constexpr double kBuried = 0.08;  // the middle lies this share of the visible height over the ground
-constexpr int kPlanes = 14;
+constexpr double kCentreHeight = 0.08;  // of the centre above the ground, over the height of the rock
+constexpr int kPlanes = 14;             // random cutting planes
 
 TriangleMesh icosahedron() {
   const float g = 1.6180340F;
@@ -56,15 +56,15 @@ const TriangleMesh& sphere(int subdivisions) {
   return spheres[static_cast<std::size_t>(subdivisions)];
 }
 
-// An icosahedron's edge is 0.53 of its diameter; each subdivision halves it.
+// The edge of an icosahedron is 0.53 times its diameter; each subdivision halves it.
 int subdivisions_for(double diameter_m, double edge_m) {
   return std::clamp(static_cast<int>(std::lround(std::log2(0.53 * diameter_m / edge_m))), 1, kFinest);
 }
 
-// The body's radius in a direction: cut by planes, then rough.
-class Body {
+// Radius of the rock in each direction: a sphere cut by planes, then roughened.
+class RockSurface {
  public:
-  explicit Body(std::uint32_t shape) {
+  explicit RockSurface(std::uint32_t shape) {
     Random random(shape, 3);
     for (auto& [normal, distance] : planes_) {
       normal = Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
@@ -73,7 +73,8 @@ class Body {
     for (NoiseSum& rough : rough_) rough = NoiseSum(make_octaves(random.next(), kRoughOctaves, 0.8, 0.6, 0.04));
   }
 
-  /// Roughness is three planes' noise, each weighted by how much the direction looks along its normal.
+  /// Roughness is triplanar: noise on three planes, weighted by the squared component of the direction along each
+  /// normal.
   std::vector<double> radii(const std::vector<Eigen::Vector3f>& directions) const {
     std::vector<double> radii(directions.size());
     for (std::size_t i = 0; i < radii.size(); ++i) radii[i] = cut(directions[i].cast<double>());
@@ -113,12 +114,12 @@ class Body {
 
 TriangleMesh make_rock(const Rock& rock, double edge_m) {
   TriangleMesh mesh = sphere(subdivisions_for(rock.diameter_m, edge_m));
-  const std::vector<double> radii = Body(rock.shape).radii(mesh.vertices);
+  const std::vector<double> radii = RockSurface(rock.shape).radii(mesh.vertices);
   for (std::size_t i = 0; i < radii.size(); ++i) mesh.vertices[i] *= static_cast<float>(radii[i]);
-  // Scaled so that top and foot have the sizes asked for.
+  // Scale to the requested height and diameter at the ground.
   float top = 0, foot = 0;
   for (const Eigen::Vector3f& v : mesh.vertices) top = std::max(top, v.z());
-  const float ground = -top * static_cast<float>(kBuried / (1 - kBuried));
+  const float ground = -top * static_cast<float>(kCentreHeight / (1 - kCentreHeight));
   int counted = 0;
   for (const Eigen::Vector3f& v : mesh.vertices) {
     if (std::abs(v.z() - ground) > 0.25F) continue;
@@ -127,11 +128,11 @@ TriangleMesh make_rock(const Rock& rock, double edge_m) {
   }
   const double wide = 0.5 * rock.diameter_m / (foot / static_cast<float>(counted));
   const double along = wide * std::sqrt(rock.elongation), across = wide / std::sqrt(rock.elongation);
-  const double up = rock.height_m * (1 - kBuried) / top;
+  const double up = rock.height_m * (1 - kCentreHeight) / top;
   const double c = std::cos(rock.turn_rad), s = std::sin(rock.turn_rad);
   for (Eigen::Vector3f& v : mesh.vertices) {
     const double x = along * v.x(), y = across * v.y();
-    v = Eigen::Vector3d(c * x - s * y, s * x + c * y, up * v.z() + kBuried * rock.height_m).cast<float>();
+    v = Eigen::Vector3d(c * x - s * y, s * x + c * y, up * v.z() + kCentreHeight * rock.height_m).cast<float>();
   }
   return mesh;
 }

@@ -1,4 +1,4 @@
-// The shapes of rocks: angular bodies with a rough skin.
+// Meshes of rocks: angular bodies with a rough surface.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,9 +15,9 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// A sphere of 20 · 4^n triangles, cut by planes and roughened. Edges are about `edge_m` long where the rock is large
-/// enough for that. World coordinates relative to the rock's foot: z = 0 is the ground under its middle, its top is at
-/// rock.height_m, its mean diameter at the ground is rock.diameter_m. Part of it lies in the ground.
+/// A sphere of 20 · 4^n triangles, cut by random planes and roughened by noise. Edges are about `edge_m` long where the
+/// rock is large enough. World axes, relative to the rock's foot: z = 0 is the ground under its centre, its top is at
+/// rock.height_m, its mean diameter at the ground is rock.diameter_m. It extends below the ground.
 TriangleMesh make_rock(const Rock& rock, double edge_m);
 
 }  // namespace spartan::sim

@@ -14,15 +14,15 @@ constexpr double kPlanckTimesLight_Jm = 6.62607015e-34 * 299792458.0;
 constexpr double kWavelength_m = 555e-9;
 constexpr double kLumensPerWatt = 683.0;  // at 555 nm
 
-// Colours of soil, rock and sky behind the filters of a colour sensor, relative to luminance: dust is butterscotch,
-// basalt nearly gray, the dusty sky between.
+// Responses of the red, green and blue filters to soil, rock and sky, relative to luminance: dust is butterscotch,
+// basalt nearly gray, the dusty sky between them. Empirical.
 struct Tint {
   std::array<float, 3> rgb;
 };
 constexpr std::array<Tint, kMaterials> kTints{
     {{{1.45F, 0.93F, 0.60F}}, {{1.18F, 0.98F, 0.83F}}, {{1.20F, 0.97F, 0.80F}}}};
 
-// Index into rgb of a pixel of a Bayer layout.
+// Index into rgb of a pixel in a Bayer mosaic.
 int channel_of(PixelLayout layout, int x, int y) {
   const int at = 2 * (y & 1) + (x & 1);
   constexpr std::array<std::array<int, 4>, 4> kChannels{{{0, 1, 1, 2}, {1, 0, 2, 1}, {1, 2, 0, 1}, {2, 1, 1, 0}}};
@@ -38,7 +38,7 @@ int channel_of(PixelLayout layout, int x, int y) {
   }
 }
 
-// Specks on the front lens, far out of focus: soft dark discs.
+// Specks of dust on the front lens, far out of focus: soft dark discs.
 class Dust {
  public:
   Dust(std::uint64_t seed, ImageSize size) {
@@ -85,11 +85,11 @@ Exposure choose_exposure(const SensorOptions& s, double mean_luminance) {
 }
 
 Sensor::Sensor(const SensorOptions& options, const Camera& camera)
-    : options_(options), camera_(camera), falloff_(camera.size.width, camera.size.height, 1.0F) {
+    : options_(options), camera_(camera), vignetting_(camera.size.width, camera.size.height, 1.0F) {
   for (int y = 0; y < camera.size.height; ++y) {
     for (int x = 0; x < camera.size.width; ++x) {
       const auto ray = unproject(camera.model, Eigen::Vector2d(x, y));
-      falloff_(x, y) =
+      vignetting_(x, y) =
           ray ? static_cast<float>(std::pow(std::max(0.0, ray->direction.z()), 4 * options.vignetting)) : 0.0F;
     }
   }
@@ -100,29 +100,29 @@ double Sensor::levels_per_electron(const Exposure& exposure) const {
   return exposure.gain * full * (1 - options_.black_level) / options_.full_well_e;
 }
 
-Image<float> Sensor::electrons(const Radiance& radiance, const Exposure& exposure, const EyeFault& fault) const {
-  const auto per_luminance = static_cast<float>(electrons_per_second(options_) * exposure.seconds * fault.light);
-  const bool colour = camera_.pixel_format.is_bayer() && radiance.split;
+Image<float> Sensor::electrons(const LuminanceImage& image, const Exposure& exposure, const ImageFault& fault) const {
+  const auto per_luminance = static_cast<float>(electrons_per_second(options_) * exposure.seconds * fault.light_factor);
+  const bool colour = camera_.pixel_format.is_bayer() && image.split;
   const Dust dust(fault.dust_seed, camera_.size);
   Image<float> result(camera_.size.width, camera_.size.height);
   for (int y = 0; y < result.height(); ++y) {
     for (int x = 0; x < result.width(); ++x) {
-      float luminance = radiance.total(x, y);
+      float luminance = image.total(x, y);
       if (colour) {
         const auto c = static_cast<std::size_t>(channel_of(camera_.pixel_format.layout, x, y));
         luminance = 0;
-        for (std::size_t m = 0; m < kMaterials; ++m) luminance += radiance.by_material[m](x, y) * kTints[m].rgb[c];
+        for (std::size_t m = 0; m < kMaterials; ++m) luminance += image.by_material[m](x, y) * kTints[m].rgb[c];
       }
-      result(x, y) = luminance * per_luminance * falloff_(x, y);
+      result(x, y) = luminance * per_luminance * vignetting_(x, y);
       if (fault.dust) result(x, y) *= dust.transmission(x, y);
     }
   }
   return result;
 }
 
-FrameImage Sensor::expose(const Radiance& radiance, const Exposure& exposure, const EyeFault& fault, std::uint64_t seed,
-                          const Workers& workers) const {
-  const Image<float> signal = electrons(radiance, exposure, fault);
+FrameImage Sensor::expose(const LuminanceImage& luminance, const Exposure& exposure, const ImageFault& fault,
+                          std::uint64_t seed, const Workers& workers) const {
+  const Image<float> signal = electrons(luminance, exposure, fault);
   const PixelFormat& format = camera_.pixel_format;
   const double full = (1 << format.bits) - 1, black = options_.black_level * full;
   const int shift = format.bits > 8 && format.alignment == BitAlignment::high ? 16 - format.bits : 0;
@@ -132,7 +132,8 @@ FrameImage Sensor::expose(const Radiance& radiance, const Exposure& exposure, co
       for (int y = from; y < to; ++y) {
         Random random(seed, static_cast<std::uint64_t>(y));
         for (int x = 0; x < image.width(); ++x) {
-          // Shot noise is Poisson's, read noise Gaussian; their sum is Gaussian where it can be seen.
+          // Shot noise is Poisson-distributed, read noise Gaussian; their sum is Gaussian at the levels where noise
+          // shows.
           const double mean = signal(x, y);
           const double e = std::min(mean + std::sqrt(mean + read_variance) * random.normal(), options_.full_well_e);
           const auto level = static_cast<int>(std::clamp(std::round(black + levels * e), 0.0, full));
@@ -146,8 +147,8 @@ FrameImage Sensor::expose(const Radiance& radiance, const Exposure& exposure, co
   return format.bits > 8 ? develop(Image<std::uint16_t>(w, h)) : develop(Image<std::uint8_t>(w, h));
 }
 
-Image<float> Sensor::noise_free(const Radiance& radiance, const Exposure& exposure) const {
-  Image<float> image = electrons(radiance, exposure, {});
+Image<float> Sensor::noise_free(const LuminanceImage& luminance, const Exposure& exposure) const {
+  Image<float> image = electrons(luminance, exposure, {});
   const auto levels = static_cast<float>(levels_per_electron(exposure));
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) image(x, y) *= levels;

@@ -9,24 +9,25 @@
 namespace spartan::sim {
 namespace {
 
-constexpr double kMargin_m = 1;      // rocks so far outside still hide the sky
-constexpr double kFarStep_m = 0.25;  // of the ground around
-constexpr double kFar_m = 20;
-constexpr int kSide = 2;  // heights a cell are kSide² of the scene's
-constexpr double kAbove_m = 20;
-constexpr float kUnderneath = 0.4F;      // of what is seen over an overhang, underneath it
-constexpr float kSameHeight_m = 0.005F;  // points of the grid that differ more from a place count less for it
+// Empirical constants; sky_light_test.cpp compares the result with ray casting.
+constexpr double kMargin_m = 1;          // rocks within this distance outside the region occlude the sky, too
+constexpr double kFarStep_m = 0.25;      // grid spacing of the surrounding ground
+constexpr double kFar_m = 20;            // extent of the surrounding ground
+constexpr int kSide = 2;                 // each cell samples kSide² heights of the scene
+constexpr double kAbove_m = 20;          // height above the origin from which vertical rays start
+constexpr float kUnderneath = 0.4F;      // view factor below an overhang over that on top of it
+constexpr float kSameHeight_m = 0.005F;  // grid points whose height differs by more from a point get less weight
 
-// Heights on a grid; point (i, j) stands at (x0 + i step, y0 + j step).
-// A cell's highest place hides the sky from others.
+// Mean heights on a grid, relative to the scene's origin; cell (i, j) is centred at (x0 + i step, y0 + j step).
+// `tops` are the highest samples of each cell, which occlude the sky for other cells.
 struct HeightGrid {
   double x0, y0, step;
   Image<float> heights;
   Image<float> tops = {};
 };
 
-// The scene seen from above, the mean of kSide² places a cell.
-HeightGrid look_down(const GroundScene& scene, const Region& region, double step, const Workers& workers) {
+// The scene from above by vertical rays, the mean of kSide² samples per cell.
+HeightGrid rasterize_heights(const GroundScene& scene, const Region& region, double step, const Workers& workers) {
   HeightGrid grid{region.x0, region.y0, step,
                   Image<float>(static_cast<int>((region.x1 - region.x0) / step) + 2,
                                static_cast<int>((region.y1 - region.y0) / step) + 2)};
@@ -62,8 +63,8 @@ HeightGrid look_down(const GroundScene& scene, const Region& region, double step
   return grid;
 }
 
-HeightGrid ground_around(const TerrainShape& shape, const GroundScene& scene, const Region& region,
-                         const Workers& workers) {
+HeightGrid rasterize_terrain(const TerrainShape& shape, const GroundScene& scene, const Region& region,
+                             const Workers& workers) {
   HeightGrid grid{region.x0, region.y0, kFarStep_m,
                   Image<float>(static_cast<int>((region.x1 - region.x0) / kFarStep_m) + 2,
                                static_cast<int>((region.y1 - region.y0) / kFarStep_m) + 2)};
@@ -79,8 +80,8 @@ HeightGrid ground_around(const TerrainShape& shape, const GroundScene& scene, co
   return grid;
 }
 
-// The slope of the horizon at every point of a grid, looking along (cos, sin) of an azimuth. Lines of the grid are
-// walked from their far end; the points ahead that can still be seen form an upper hull.
+// Slope (tangent of the elevation) of the horizon at every point of a grid, in the direction (cos, sin) of an azimuth.
+// Sweeps each line of the grid from its far end and keeps the visible points ahead as an upper convex hull on a stack.
 class HorizonSweep {
  public:
   HorizonSweep(const HeightGrid& grid, double azimuth)
@@ -88,7 +89,7 @@ class HorizonSweep {
     const double c = std::cos(azimuth), s = std::sin(azimuth);
     forwards_ = (along_x_ ? c : s) > 0;
     drift_ = along_x_ ? s / c : c / s;
-    pace_ = grid.step * std::sqrt(1 + drift_ * drift_);
+    step_length_ = grid.step * std::sqrt(1 + drift_ * drift_);
     major_ = along_x_ ? grid.heights.width() : grid.heights.height();
     minor_ = along_x_ ? grid.heights.height() : grid.heights.width();
   }
@@ -100,7 +101,7 @@ class HorizonSweep {
     const int last = minor_ + static_cast<int>(std::ceil(std::max(0.0, -total))) + 1;
     workers.for_each_part(first, last, 64, [&](int from, int to) {
       std::vector<Point> hull;
-      for (int line = from; line < to; ++line) walk(line, hull, result);
+      for (int line = from; line < to; ++line) sweep_line(line, hull, result);
     });
     return result;
   }
@@ -118,14 +119,14 @@ class HorizonSweep {
     return at(low) + part * (at(high) - at(low));
   }
 
-  void walk(int line, std::vector<Point>& hull, Image<float>& result) const {
+  void sweep_line(int line, std::vector<Point>& hull, Image<float>& result) const {
     hull.clear();
     for (int step = 0; step < major_; ++step) {
       const int along = forwards_ ? major_ - 1 - step : step;
       const double across = line + drift_ * along;
       const int cell = static_cast<int>(std::floor(across + 0.5));
       if (cell < 0 || cell >= minor_) continue;
-      const Point here{-pace_ * step, height_at(grid_.heights, along, across)};
+      const Point here{-step_length_ * step, height_at(grid_.heights, along, across)};
       const auto slope = [&](const Point& p) { return (p.height - here.height) / (p.at - here.at); };
       while (hull.size() >= 2 && slope(hull[hull.size() - 2]) >= slope(hull.back())) hull.pop_back();
       const auto horizon = static_cast<float>(hull.empty() ? 0.0 : std::max(slope(hull.back()), 0.0));
@@ -136,7 +137,7 @@ class HorizonSweep {
 
   const HeightGrid& grid_;
   bool along_x_, forwards_ = true;
-  double drift_ = 0, pace_ = 0;
+  double drift_ = 0, step_length_ = 0;
   int major_ = 0, minor_ = 0;
 };
 
@@ -148,8 +149,8 @@ float interpolated(const Image<float>& image, double u, double v) {
          b * ((1 - a) * image(i, j + 1) + a * image(i + 1, j + 1));
 }
 
-// The gentler of the slopes to both neighbours: ground beside a rock stays ground.
-double gentle_slope(double before, double here, double after, double step) {
+// The smaller of the one-sided slopes: a rock does not tilt the ground beside it.
+double min_slope(double before, double here, double after, double step) {
   const double down = (here - before) / step, up = (after - here) / step;
   return std::abs(down) < std::abs(up) ? down : up;
 }
@@ -158,16 +159,16 @@ Eigen::Vector3d normal_at(const HeightGrid& grid, int i, int j) {
   const Image<float>& z = grid.heights;
   const int i0 = std::max(i - 1, 0), i1 = std::min(i + 1, z.width() - 1), j0 = std::max(j - 1, 0),
             j1 = std::min(j + 1, z.height() - 1);
-  return Eigen::Vector3d(-gentle_slope(z(i0, j), z(i, j), z(i1, j), grid.step),
-                         -gentle_slope(z(i, j0), z(i, j), z(i, j1), grid.step), 1)
+  return Eigen::Vector3d(-min_slope(z(i0, j), z(i, j), z(i1, j), grid.step),
+                         -min_slope(z(i, j0), z(i, j), z(i, j1), grid.step), 1)
       .normalized();
 }
 
-// The sky's light from one direction, of horizon's slope, on a plane; all directions together give π for open level
-// ground.
-double light_from(double azimuth_cos, double azimuth_sin, double slope, const Eigen::Vector3d& n) {
+// Irradiance by the sky in one azimuth above a horizon of the given slope, on a plane of normal n (class comment); the
+// integral over all azimuths is π for open level ground.
+double sky_irradiance(double azimuth_cos, double azimuth_sin, double slope, const Eigen::Vector3d& n) {
   const double towards = n.x() * azimuth_cos + n.y() * azimuth_sin;
-  const double own = -towards / std::max(n.z(), 1e-3);  // slope of the plane itself
+  const double own = -towards / std::max(n.z(), 1e-3);  // horizon by the plane itself
   const double t = std::max({slope, own, 0.0}), h = std::atan(t), cos2 = 1 / (1 + t * t);
   return 0.5 * (n.z() * cos2 + towards * (std::numbers::pi / 2 - h - t * cos2));
 }
@@ -176,10 +177,10 @@ double light_from(double azimuth_cos, double azimuth_sin, double slope, const Ei
 
 SkyLight::SkyLight(const GroundScene& scene, const TerrainShape& shape, const Workers& workers)
     : region_(scene.region().grown(kMargin_m)) {
-  HeightGrid near = look_down(scene, region_, kStep_m, workers);
-  const HeightGrid far = ground_around(shape, scene, scene.region().grown(kFar_m), workers);
+  HeightGrid near = rasterize_heights(scene, region_, kStep_m, workers);
+  const HeightGrid far = rasterize_terrain(shape, scene, scene.region().grown(kFar_m), workers);
   const auto [nx, ny] = near.heights.size();
-  open_ = Image<float>(nx, ny, 0.0F);
+  relative_view_factor_ = Image<float>(nx, ny, 0.0F);
   for (int k = 0; k < kAzimuths; ++k) {
     const double azimuth = 2 * std::numbers::pi * (k + 0.5) / kAzimuths, c = std::cos(azimuth), s = std::sin(azimuth);
     const Image<float> near_slopes = HorizonSweep(near, azimuth).slopes(workers);
@@ -190,34 +191,37 @@ SkyLight::SkyLight(const GroundScene& scene, const TerrainShape& shape, const Wo
         for (int i = 0; i < nx; ++i) {
           const double u = (near.x0 + i * kStep_m - far.x0) / kFarStep_m;
           const float slope = std::max(near_slopes(i, j), interpolated(far_slopes, u, v));
-          open_(i, j) += static_cast<float>(light_from(c, s, slope, normal_at(near, i, j)) * 2 / kAzimuths);
+          relative_view_factor_(i, j) +=
+              static_cast<float>(sky_irradiance(c, s, slope, normal_at(near, i, j)) * 2 / kAzimuths);
         }
       }
     });
   }
   workers.for_each_part(0, ny, 16, [&](int from, int to) {
     for (int j = from; j < to; ++j) {
-      for (int i = 0; i < nx; ++i) open_(i, j) /= static_cast<float>(0.5 * (1 + normal_at(near, i, j).z()));
+      for (int i = 0; i < nx; ++i)
+        relative_view_factor_(i, j) /= static_cast<float>(0.5 * (1 + normal_at(near, i, j).z()));
     }
   });
   heights_ = std::move(near.heights);
   base_m_ = scene.origin().z();
 }
 
-float SkyLight::share(const Eigen::Vector3d& place, float normal_z) const {
+float SkyLight::view_factor(const Eigen::Vector3d& point, float normal_z) const {
   const float tilted = 0.5F * (1 + normal_z);
-  const double u = (place.x() - region_.x0) / kStep_m, v = (place.y() - region_.y0) / kStep_m;
-  if (!(u >= 0) || !(v >= 0) || u >= open_.width() - 1 || v >= open_.height() - 1) return tilted;
+  const double u = (point.x() - region_.x0) / kStep_m, v = (point.y() - region_.y0) / kStep_m;
+  if (!(u >= 0) || !(v >= 0) || u >= relative_view_factor_.width() - 1 || v >= relative_view_factor_.height() - 1)
+    return tilted;
   const int i = static_cast<int>(u), j = static_cast<int>(v);
   const auto a = static_cast<float>(u - i), b = static_cast<float>(v - j);
-  const auto height = static_cast<float>(place.z() - base_m_);
+  const auto height = static_cast<float>(point.z() - base_m_);
   float sum = 0, weights = 0, lowest = 1e9F;
   for (int k = 0; k < 4; ++k) {
     const int x = i + (k & 1), y = j + (k >> 1);
     const float off = (heights_(x, y) - height) / kSameHeight_m;
     lowest = std::min(lowest, off);
     const float weight = ((k & 1) != 0 ? a : 1 - a) * ((k >> 1) != 0 ? b : 1 - b) / (1 + off * off) + 1e-6F;
-    sum += weight * open_(x, y);
+    sum += weight * relative_view_factor_(x, y);
     weights += weight;
   }
   const float under = lowest > 2 ? kUnderneath : 1.0F;

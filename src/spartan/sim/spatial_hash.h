@@ -1,21 +1,24 @@
-// Things on the plane, found by where they are.
+// A hash grid of items on the plane.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "spartan/sim/region.h"
 
 namespace spartan::sim {
 
+/// Items in square cells of kCell_m.
 template <class Item>
 class SpatialHash {
  public:
   void add(double x, double y, Item item) { cells_[key_of(cell_of(x), cell_of(y))].push_back(std::move(item)); }
 
-  /// Calls `visit(item)` for those in the region and for some around it, until it says true; whether it did.
+  /// Calls `visit(item)` for all items in the region, and for some around it, until it returns true. Returns whether it
+  /// did.
   template <class Visit>
   bool any_near(const Region& region, Visit&& visit) const {
     for (std::int32_t j = cell_of(region.y0); j <= cell_of(region.y1); ++j) {

@@ -12,9 +12,9 @@ namespace spartan::sim {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-constexpr double kFinestRelief_m = 0.02;
-constexpr std::size_t kBlock = 256;  // places evaluated together
-constexpr double kWallShare = 0.35;  // of a pit's radius
+constexpr double kFinestRelief_m = 0.02;  // shortest wavelength of the relief
+constexpr std::size_t kBlock = 256;       // points evaluated together
+constexpr double kWallFraction = 0.35;    // width of a cavity's wall over its radius; empirical
 
 int octaves_down_to(double largest, double finest) {
   return std::max(1, static_cast<int>(std::ceil(std::log2(largest / finest))) + 1);
@@ -25,7 +25,7 @@ double smooth_step(double t) {
   return t * t * (3 - 2 * t);
 }
 
-// A wave train of unit height: crests sharper than troughs, as wind leaves them.
+// A wave of unit height with crests sharper than troughs, as in aeolian ripples.
 double crest(double phase) {
   const double s = 0.5 + 0.5 * std::sin(phase);
   return s * std::sqrt(s) - 0.5;
@@ -75,32 +75,31 @@ void TerrainShape::add_ripples(std::span<const double> x, std::span<const double
   }
 }
 
-// The crest is rounded over a tenth of the radius, so that the slope does not break there.
+// Smooth minimum of bowl and apron: the rim is rounded over a tenth of the radius, so that the slope is continuous.
 double TerrainShape::crater(double x, double y) const {
   const double radius = options_.crater_radius_m;
   if (radius <= 0) return 0;
   const double r = std::hypot(x - options_.crater_x_m, y - options_.crater_y_m) / radius;
   const double bowl = -options_.crater_depth_m + (options_.crater_rim_m + options_.crater_depth_m) * r * r;
   const double apron = options_.crater_rim_m / std::max(r * r * r, 1e-3);
-  // A smooth minimum of both.
   const double softness = 0.05 * (options_.crater_rim_m + options_.crater_depth_m), gap = bowl - apron;
   return 0.5 * (bowl + apron - std::sqrt(gap * gap + softness * softness));
 }
 
-// Pits stand one in a cell of a lattice, off its middle by chance; cells without one are left out by chance.
+// Each cell of a lattice holds one cavity at a random offset, or none, at random.
 double TerrainShape::cavity_depth(double x, double y) const {
   if (options_.cavities_per_100m2 <= 0) return 0;
   const double cell = std::max(std::sqrt(50.0 / options_.cavities_per_100m2), 2.2 * options_.cavity_diameter_m);
-  const double share = options_.cavities_per_100m2 / 100 * cell * cell;
+  const double probability = options_.cavities_per_100m2 / 100 * cell * cell;
   const auto ix = static_cast<std::int32_t>(std::floor(x / cell)), iy = static_cast<std::int32_t>(std::floor(y / cell));
-  if (unit_of(mix(ix, iy, seed_)) >= share) return 0;
+  if (unit_of(mix(ix, iy, seed_)) >= probability) return 0;
   const double size = 0.5 + 0.5 * unit_of(mix(ix, iy, seed_ + 1));
   const double radius = 0.5 * size * options_.cavity_diameter_m;
-  const double room = 0.5 * cell - 1.05 * radius;
-  const double cx = (ix + 0.5) * cell + room * (2 * unit_of(mix(ix, iy, seed_ + 2)) - 1);
-  const double cy = (iy + 0.5) * cell + room * (2 * unit_of(mix(ix, iy, seed_ + 3)) - 1);
-  const double away = std::hypot(x - cx, y - cy) / radius;
-  return away >= 1 ? 0 : size * options_.cavity_depth_m * smooth_step((1 - away) / kWallShare);
+  const double max_offset = 0.5 * cell - 1.05 * radius;
+  const double cx = (ix + 0.5) * cell + max_offset * (2 * unit_of(mix(ix, iy, seed_ + 2)) - 1);
+  const double cy = (iy + 0.5) * cell + max_offset * (2 * unit_of(mix(ix, iy, seed_ + 3)) - 1);
+  const double distance = std::hypot(x - cx, y - cy) / radius;
+  return distance >= 1 ? 0 : size * options_.cavity_depth_m * smooth_step((1 - distance) / kWallFraction);
 }
 
 void TerrainShape::heights(std::span<const double> x, std::span<const double> y, std::span<double> heights) const {

@@ -10,12 +10,12 @@
 namespace spartan::sim {
 namespace {
 
-constexpr float kFarthest_m = 400;
-constexpr float kShort_m = 1e-3F;  // rays between an eye and the ground stop so far from the ground
+constexpr float kFarthest_m = 400;        // beyond the corner of the horizon square
+constexpr float kGroundOffset_m = 1e-3F;  // visibility rays end this far before the ground, against self-intersection
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kTile_m = 8;
+constexpr double kTile_m = 8;  // side of the tiles in which maps are rasterized
 
-bool lies_in(const Eigen::Vector2d& pixel, ImageSize size) {
+bool is_inside(const Eigen::Vector2d& pixel, ImageSize size) {
   return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < size.width - 0.5 && pixel.y() < size.height - 0.5;
 }
 
@@ -25,18 +25,18 @@ DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& believed_rig, con
                                const RectifiedView& view)
     : view_(view),
       true_right_(*true_rig.find_camera(pair.right)),
-      believed_right_(*believed_rig.find_camera(pair.right)),
+      nominal_right_(*believed_rig.find_camera(pair.right)),
       right_from_left_(true_rig.right_from_left(pair)) {
   const Camera& true_left = *true_rig.find_camera(pair.left);
-  const Camera& believed_left = *believed_rig.find_camera(pair.left);
+  const Camera& nominal_left = *believed_rig.find_camera(pair.left);
   const auto [w, h] = view.geometry.size;
   directions_.assign(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), Eigen::Vector3f(0, 0, 0));
   for (int v = 0; v < h; ++v) {
     for (int u = 0; u < w; ++u) {
       const Eigen::Vector3d rectified((u - view.geometry.centre_px.x()) / view.geometry.focal_px,
                                       (v - view.geometry.centre_px.y()) / view.geometry.focal_px, 1);
-      const auto recorded = project(believed_left.model, view.left_from_rectified * rectified);
-      if (!recorded || !lies_in(*recorded, true_left.size)) continue;
+      const auto recorded = project(nominal_left.model, view.left_from_rectified * rectified);
+      if (!recorded || !is_inside(*recorded, true_left.size)) continue;
       const auto ray = unproject(true_left.model, *recorded);
       if (ray) {
         directions_[static_cast<std::size_t>(v) * static_cast<std::size_t>(w) + static_cast<std::size_t>(u)] =
@@ -50,9 +50,9 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
                               TrueDisparity& truth) const {
   const int w = view_.geometry.size.width;
   const Pose world_from_right = world_from_left * right_from_left_.inverse();
-  const Eigen::Matrix3f turn = world_from_left.rotation_matrix().cast<float>();
-  const Eigen::Vector3f eye = (world_from_left.translation() - scene.origin()).cast<float>();
-  const Eigen::Vector3f right_eye = (world_from_right.translation() - scene.origin()).cast<float>();
+  const Eigen::Matrix3f rotation = world_from_left.rotation_matrix().cast<float>();
+  const Eigen::Vector3f left_centre = (world_from_left.translation() - scene.origin()).cast<float>();
+  const Eigen::Vector3f right_centre = (world_from_right.translation() - scene.origin()).cast<float>();
   for (int first = 0; first < w; first += kPacket) {
     RayPacket rays, back;
     std::array<Eigen::Vector3f, kPacket> directions;
@@ -60,35 +60,35 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
       const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(w) +
                              static_cast<std::size_t>(std::min(first + k, w - 1));
       directions[static_cast<std::size_t>(k)] = directions_[at];
-      const bool there = first + k < w && directions_[at].z() != 0;
-      rays.set(k, eye, turn * directions_[at], there ? kFarthest_m : -1.0F);
+      const bool valid = first + k < w && directions_[at].z() != 0;
+      rays.set(k, left_centre, rotation * directions_[at], valid ? kFarthest_m : -1.0F);
     }
     const HitPacket hits = scene.intersect(rays);
     std::array<float, kPacket> disparity{};
     for (int k = 0; k < kPacket; ++k) {
       const auto i = static_cast<std::size_t>(k);
       disparity[i] = kNaN;
-      back.set(k, eye, Eigen::Vector3f::UnitZ(), -1.0F);
-      if (rays.farthest[k] < 0 || !std::isfinite(hits.distance[k])) continue;
+      back.set(k, left_centre, Eigen::Vector3f::UnitZ(), -1.0F);
+      if (rays.max_distance[k] < 0 || !std::isfinite(hits.distance[k])) continue;
       const Eigen::Vector3d in_left = static_cast<double>(hits.distance[k]) * directions[i].cast<double>();
       const auto recorded = project(true_right_.model, right_from_left_ * in_left);
       if (!recorded) continue;
-      const auto believed = unproject(believed_right_.model, *recorded);
-      if (!believed) continue;
-      const Eigen::Vector3d rectified = view_.right_from_rectified.transpose() * believed->direction;
+      const auto nominal = unproject(nominal_right_.model, *recorded);
+      if (!nominal) continue;
+      const Eigen::Vector3d rectified = view_.right_from_rectified.transpose() * nominal->direction;
       const double u = view_.geometry.focal_px * rectified.x() / rectified.z() + view_.geometry.centre_px.x();
       disparity[i] = static_cast<float>(first + k - u);
-      if (!lies_in(*recorded, true_right_.size)) continue;
-      const Eigen::Vector3f place = eye + hits.distance[k] * Eigen::Vector3f(turn * directions[i]);
-      const Eigen::Vector3f way = place - right_eye;
-      const float distance = way.norm();
-      back.set(k, right_eye, way / distance, distance - kShort_m);
+      if (!is_inside(*recorded, true_right_.size)) continue;
+      const Eigen::Vector3f place = left_centre + hits.distance[k] * Eigen::Vector3f(rotation * directions[i]);
+      const Eigen::Vector3f to_point = place - right_centre;
+      const float distance = to_point.norm();
+      back.set(k, right_centre, to_point / distance, distance - kGroundOffset_m);
     }
     const std::uint32_t hidden = scene.occluded(back);
     for (int k = 0; k < kPacket && first + k < w; ++k) {
       const float d = disparity[static_cast<std::size_t>(k)];
       const bool known = std::isfinite(d) && d > 0;
-      const bool both = known && back.farthest[k] > 0 && (hidden >> k & 1U) == 0;
+      const bool both = known && back.max_distance[k] > 0 && (hidden >> k & 1U) == 0;
       truth.disparity(first + k, row) = known ? d : kNaN;
       truth.mask(first + k, row) = both ? 255 : known ? 128 : 0;
     }
@@ -106,7 +106,7 @@ TrueDisparity DisparityTruth::of(const GroundScene& scene, const Pose& world_fro
 
 namespace {
 
-// The part of the map inside one scene's region; rays straight down.
+// Fills the part of the map inside one scene's region by vertical rays.
 void fill_tile(const TerrainShape& shape, const GroundScene& scene, GroundMap& map, int i0, int j0, int i1, int j1) {
   const double top_m = 50;
   for (int j = j0; j < j1; ++j) {
@@ -125,7 +125,8 @@ void fill_tile(const TerrainShape& shape, const GroundScene& scene, GroundMap& m
         map.ground(first + k, j) = static_cast<float>(ground);
         map.level(first + k, j) = static_cast<float>(ground + shape.cavity_depth(x, y));
         const double rock = hits.rock[k] ? scene.origin().z() + top_m - static_cast<double>(hits.distance[k]) : ground;
-        map.surface(first + k, j) = static_cast<float>(std::max(ground, rock));  // a rock may lie below a slope
+        map.surface(first + k, j) =
+            static_cast<float>(std::max(ground, rock));  // the lower side of a rock on a slope may be below the ground
       }
     }
   }
@@ -136,7 +137,7 @@ void fill_tile(const TerrainShape& shape, const GroundScene& scene, GroundMap& m
 GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Region& region, double cell_m,
                      const Workers& workers) {
   GroundMap map;
-  constexpr double kRounding = 1e-6;  // of a cell: a region that ends on the lattice gets no cell more
+  constexpr double kRounding = 1e-6;  // in cells: a region that ends on the lattice gets no extra cell
   map.cell_m = cell_m;
   map.west_m = std::floor(region.x0 / cell_m + kRounding) * cell_m;
   map.north_m = std::ceil(region.y1 / cell_m - kRounding) * cell_m;

@@ -1,4 +1,4 @@
-// What is really there: disparities of a shot, and the ground seen from above.
+// Ground truth: disparities of a frame and elevation maps.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,27 +8,20 @@
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/threads.h"
-#include "spartan/rig/rectified_stereo.h"
 #include "spartan/rig/rig.h"
 #include "spartan/sim/ground_scene.h"
+#include "spartan/sim/rectified_view.h"
 
 namespace spartan::sim {
 
-/// How a pair's images are turned into rows that match, as whoever reads the recording will do it.
-struct RectifiedView {
-  RectifiedStereo geometry;
-  Eigen::Matrix3d left_from_rectified = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d right_from_rectified = Eigen::Matrix3d::Identity();
-};
-
 struct TrueDisparity {
-  Image<float> disparity;    ///< rectified left image; NaN where there is no truth
-  Image<std::uint8_t> mask;  ///< 255 seen by both eyes, 128 by the left one only, 0 no truth
+  Image<float> disparity;    ///< px of the rectified left image; NaN where there is no truth
+  Image<std::uint8_t> mask;  ///< 255 visible in both cameras, 128 in the left one only, 0 no truth
 };
 
-/// Disparities of one pair. A pixel of the rectified left view is followed back into the image as recorded by the
-/// believed camera, out into the world by the true one, to the ground, into the true right camera, and forward again:
-/// the column where a perfect matcher finds it.
+/// True disparities of one pair. A pixel of the rectified left view is mapped to the recorded image by the nominal
+/// camera, to a ray by the true camera, to the ground, into the true right camera, and to the rectified right view by
+/// the nominal camera: the column where a perfect matcher finds it.
 class DisparityTruth {
  public:
   DisparityTruth(const Rig& true_rig, const Rig& believed_rig, const StereoPair& pair, const RectifiedView& view);
@@ -39,23 +32,23 @@ class DisparityTruth {
   void fill_row(const GroundScene& scene, const Pose& world_from_left, int row, TrueDisparity& truth) const;
 
   RectifiedView view_;
-  Camera true_right_, believed_right_;
+  Camera true_right_, nominal_right_;
   Pose right_from_left_;
-  std::vector<Eigen::Vector3f> directions_;  // in the true left camera; zero where the image as recorded ends
+  std::vector<Eigen::Vector3f> directions_;  // in the true left camera; zero outside the recorded image
 };
 
-/// The ground from above, row 0 in the north (largest y); values at the cells' middles.
+/// Elevation maps, row 0 in the north (largest y); values at cell centres.
 struct GroundMap {
   double west_m = 0, north_m = 0, cell_m = 0;
-  Image<float> surface;  ///< with rocks, m
-  Image<float> ground;   ///< without rocks, cavities included
-  Image<float> level;    ///< without rocks and cavities
+  Image<float> surface;  ///< m; with rocks
+  Image<float> ground;   ///< m; without rocks, with cavities
+  Image<float> level;    ///< m; without rocks and cavities
 };
 
 GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Region& region, double cell_m,
                      const Workers& workers);
 
-/// 1 ground, 2 obstacle (its surface is more than `obstacle_m` over the ground), 3 cavity (its surface is more than
+/// 1 ground, 2 obstacle (the surface is more than `obstacle_m` above the ground), 3 cavity (the surface is more than
 /// `cavity_m` below the ground without cavities).
 Image<float> classify_ground(const GroundMap& map, double obstacle_m, double cavity_m);
 

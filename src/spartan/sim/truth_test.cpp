@@ -16,7 +16,7 @@ TerrainShapeOptions level_ground() {
 }
 
 RockFieldOptions no_rocks() {
-  return {.share = 0, .pebbles_per_m2 = 0};
+  return {.coverage = 0, .pebbles_per_m2 = 0};
 }
 
 TEST(GroundMap, RowsRunSouthwardsAndColumnsEastwards) {
@@ -35,15 +35,15 @@ TEST(GroundMap, RowsRunSouthwardsAndColumnsEastwards) {
     EXPECT_EQ(map.surface(column, row), map.ground(column, row));
     EXPECT_EQ(map.level(column, row), map.ground(column, row));
   }
-  EXPECT_GT(map.ground(39, 0), map.ground(0, 19)) << "up to the north-east";
+  EXPECT_GT(map.ground(39, 0), map.ground(0, 19)) << "the terrain rises to the north-east";
 }
 
-TEST(GroundMap, RocksStandAsHighAsTheyAreListedAndNowhereElse) {
+TEST(GroundMap, RocksHaveTheirListedHeightAndTheRestIsGround) {
   const TerrainShape shape(level_ground(), 1);
-  const RockField field({.share = 0.2, .pebbles_per_m2 = 0}, 5);
+  const RockField field({.coverage = 0.2, .pebbles_per_m2 = 0}, 5);
   const Region region{-3, -3, 3, 3};
   const GroundMap map = map_ground(shape, field, region, 0.01, Workers(2));
-  const std::vector<Rock> rocks = field.rocks_between(region.grown(3));
+  const std::vector<Rock> rocks = field.rocks_in(region.grown(3));
   int large = 0, bare = 0;
   for (const Rock& rock : rocks) {
     if (rock.diameter_m < 0.2 || !region.grown(-0.8).contains(rock.x, rock.y)) continue;
@@ -75,7 +75,7 @@ TEST(GroundMap, RocksStandAsHighAsTheyAreListedAndNowhereElse) {
   EXPECT_GT(bare, 100);
 }
 
-TEST(GroundMap, CavitiesLieBelowTheLevel) {
+TEST(GroundMap, CavitiesAreBelowTheLevel) {
   TerrainShapeOptions pitted = level_ground();
   pitted.cavities_per_100m2 = 20;
   const TerrainShape shape(pitted, 2);
@@ -97,8 +97,8 @@ TEST(GroundMap, CavitiesLieBelowTheLevel) {
   EXPECT_EQ(classed, deep);
 }
 
-// Cells of plain ground, a low and a high rock, a shallow and a deep cavity, a high and a low rock in a cavity.
-TEST(GroundMap, ClassesAreByHeightOverTheGroundAndDepthBelowTheLevel) {
+// Cells of bare ground, a low and a high rock, a shallow and a deep cavity, a high and a low rock in a cavity.
+TEST(GroundMap, ClassesFollowHeightAboveGroundAndDepthBelowLevel) {
   GroundMap map;
   for (Image<float>* image : {&map.surface, &map.ground, &map.level}) *image = Image<float>(7, 1);
   const auto cell = [&](int i, float surface, float ground, float level) {

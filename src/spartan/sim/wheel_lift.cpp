@@ -6,17 +6,17 @@
 namespace spartan::sim {
 namespace {
 
-constexpr int kAlong = 8, kAcross = 1;  // samples to either side of the wheel's middle
+constexpr int kAlong = 8, kAcross = 1;  // samples to either side of the wheel's centre
 
-double longer_half(const Rock& rock) {
+double semi_major_axis(const Rock& rock) {
   return 0.5 * rock.diameter_m * std::sqrt(rock.elongation);
 }
 
 double height_over(const Rock& rock, double x, double y) {
   const double dx = x - rock.x, dy = y - rock.y;
   const double c = std::cos(rock.turn_rad), s = std::sin(rock.turn_rad);
-  const double along = (c * dx + s * dy) / longer_half(rock),
-               across = (c * dy - s * dx) / (longer_half(rock) / rock.elongation);
+  const double along = (c * dx + s * dy) / semi_major_axis(rock),
+               across = (c * dy - s * dx) / (semi_major_axis(rock) / rock.elongation);
   const double inside = 1 - along * along - across * across;
   return inside > 0 ? rock.height_m * std::sqrt(inside) : 0;
 }
@@ -28,7 +28,7 @@ WheelLift::WheelLift(const std::vector<Rock>& rocks, double wheel_radius_m, doub
   for (const Rock& rock : rocks) {
     if (rock.height_m < kPressedIn_m) continue;
     rocks_.add(rock.x, rock.y, rock);
-    largest_reach_m_ = std::max(largest_reach_m_, longer_half(rock));
+    largest_reach_m_ = std::max(largest_reach_m_, semi_major_axis(rock));
   }
 }
 

@@ -1,4 +1,4 @@
-// Wheels climb the rocks that they roll over.
+// How far wheels are lifted by the rocks that they roll over.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,8 @@
 
 namespace spartan::sim {
 
-/// A rigid wheel over rocks taken for half ellipsoids of their size. Rocks lower than kPressedIn_m give way.
+/// A rigid wheel over rocks approximated by half ellipsoids of their size. Rocks lower than kPressedIn_m are pressed
+/// into the soil.
 class WheelLift {
  public:
   static constexpr double kPressedIn_m = 0.01;
@@ -16,8 +17,8 @@ class WheelLift {
   WheelLift() = default;
   WheelLift(const std::vector<Rock>& rocks, double wheel_radius_m, double wheel_width_m);
 
-  /// How far a wheel on level ground is lifted, m: the largest, over its footprint, of the rocks' height less that of
-  /// the wheel's rim over the ground, R − √(R² − s²) at the distance s before or behind its middle.
+  /// Lift of a wheel on level ground in metres: the maximum, over its footprint, of the height of the rocks less that
+  /// of the wheel's rim above the ground, R − √(R² − s²) at the distance s before or behind its centre.
   double at(double x, double y, double heading) const;
 
  private:

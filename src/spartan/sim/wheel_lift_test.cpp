@@ -18,8 +18,8 @@ Rock dome(double x, double y, double radius_m) {
   return rock;
 }
 
-// Two circles that touch: the wheel's middle is R + a from the dome's, so it stands √((R + a)² − d²) high.
-TEST(WheelLift, IsThatOfACircleOnACircle) {
+// Two touching circles: the wheel's centre is at a distance R + a from that of the dome, at height √((R + a)² − d²).
+TEST(WheelLift, MatchesACircleOnACircle) {
   constexpr double kWheel_m = 0.1, kDome_m = 0.04;
   const WheelLift lift({dome(1, 2, kDome_m)}, kWheel_m, 0.01);
   const double heading = 0.7, reach = std::sqrt(std::pow(kWheel_m + kDome_m, 2) - kWheel_m * kWheel_m);
@@ -29,7 +29,7 @@ TEST(WheelLift, IsThatOfACircleOnACircle) {
   }
 }
 
-TEST(WheelLift, PebblesArePressedInAndRocksBesideTheRimDoNothing) {
+TEST(WheelLift, IgnoresPebblesAndRocksBesideTheWheel) {
   const WheelLift lift({dome(0, 0, 0.009), dome(0, 1, 0.04)}, 0.1, 0.08);
   EXPECT_EQ(lift.at(0, 0, 0), 0);
   EXPECT_EQ(lift.at(0, 1 - 0.085, 0), 0);
@@ -37,7 +37,7 @@ TEST(WheelLift, PebblesArePressedInAndRocksBesideTheRimDoNothing) {
   EXPECT_GT(lift.at(0, 1 - 0.085, 1.5), 0);
 }
 
-TEST(WheelLift, ALongRockLiftsAlongItsLength) {
+TEST(WheelLift, AnElongatedRockLiftsAlongItsLength) {
   Rock rock = dome(0, 0, 0.04);
   rock.elongation = 1.6;
   rock.turn_rad = 1.5707963;
@@ -47,7 +47,7 @@ TEST(WheelLift, ALongRockLiftsAlongItsLength) {
   EXPECT_EQ(lift.at(0.04, 0, 1.5707963), 0);
 }
 
-// A rock under the left front wheel: up a quarter, nose up, left side up.
+// A rock under the left front wheel: the body rises by a quarter of its height and tilts away from it.
 TEST(WheelLift, TheBodyTiltsAwayFromTheRock) {
   TerrainShapeOptions level;
   level.relief_m = level.ripple_height_m = level.dune_height_m = 0;
@@ -58,7 +58,8 @@ TEST(WheelLift, TheBodyTiltsAwayFromTheRock) {
                aside = 0.5 * chassis.track_m;
   const WheelLift lift({dome(at.x + c * along - s * aside, at.y + s * along + c * aside, 0.04)}, chassis.wheel_radius_m,
                        0.01);
-  const Vector6d flat = stand_on({shape, WheelLift()}, chassis, at), tilted = stand_on({shape, lift}, chassis, at);
+  const Vector6d flat = fit_to_ground({shape, WheelLift()}, chassis, at),
+                 tilted = fit_to_ground({shape, lift}, chassis, at);
   EXPECT_NEAR(tilted[2] - flat[2], 0.01, 1e-9);
   EXPECT_NEAR(tilted[4] - flat[4], -std::atan(0.02 / chassis.wheelbase_m), 1e-4);
   EXPECT_NEAR(tilted[3] - flat[3], std::atan(0.02 / chassis.track_m), 1e-4);

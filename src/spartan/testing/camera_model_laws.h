@@ -1,4 +1,4 @@
-// Laws that every camera model must obey, as reusable checks. A further model runs them in its own test.
+// Properties that every camera model must have, as reusable checks. A new model runs them in its own test.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 
 namespace spartan::testing {
 
-/// Places over the whole picture, its borders and corners included.
+/// A grid of pixel coordinates over the whole image, including its borders and corners.
 inline std::vector<Eigen::Vector2d> picture_grid(ImageSize size, int steps = 16) {
   std::vector<Eigen::Vector2d> grid;
   for (int j = 0; j <= steps; ++j) {
@@ -23,8 +23,8 @@ inline std::vector<Eigen::Vector2d> picture_grid(ImageSize size, int steps = 16)
   return grid;
 }
 
-/// pixel → ray → pixel at several depths, to `tolerance_px`; the model must see every place of the picture. Nearer than
-/// `sees_from_m` it need not answer; another pixel it must not give anywhere.
+/// Round trip pixel → ray → pixel at several depths, to `tolerance_px`; the model must have a ray for every pixel of
+/// the image. Points nearer than `sees_from_m` may have no projection, but never a different one.
 inline void expect_round_trips(const CameraModel& model, ImageSize size, double tolerance_px = 1e-9,
                                double sees_from_m = 0) {
   for (const Eigen::Vector2d& pixel : picture_grid(size)) {
@@ -40,26 +40,27 @@ inline void expect_round_trips(const CameraModel& model, ImageSize size, double 
   }
 }
 
-/// Wherever the model has a line of sight, over the picture and far around it, pixel and line belong to each other.
-/// Returns the share of the grid that has one: the picture alone is a ninth.
+/// Wherever the model has a ray, in the image and far around it, the ray projects to its pixel.
+/// Returns the fraction of the grid that has a ray; the image alone is a ninth of it.
 [[nodiscard]] inline double expect_consistent_answers(const CameraModel& model, ImageSize size,
                                                       double tolerance_px = 1e-9) {
-  int answers = 0, asked = 0;
+  int with_ray = 0, tested = 0;
   for (const Eigen::Vector2d& pixel : picture_grid({3 * size.width, 3 * size.height}, 48)) {
-    ++asked;
-    const Eigen::Vector2d place = pixel - Eigen::Vector2d(size.width, size.height);
-    const auto ray = unproject(model, place);
+    ++tested;
+    const Eigen::Vector2d shifted = pixel - Eigen::Vector2d(size.width, size.height);
+    const auto ray = unproject(model, shifted);
     if (!ray) continue;
-    ++answers;
+    ++with_ray;
     const auto back = project(model, ray->origin + 2 * ray->direction);
-    EXPECT_TRUE(back) << place.transpose();
+    EXPECT_TRUE(back) << shifted.transpose();
     if (!back) continue;
-    EXPECT_LE((*back - place).norm(), tolerance_px * std::max(1.0, place.norm() / size.width)) << place.transpose();
+    EXPECT_LE((*back - shifted).norm(), tolerance_px * std::max(1.0, shifted.norm() / size.width))
+        << shifted.transpose();
   }
-  return static_cast<double>(answers) / asked;
+  return static_cast<double>(with_ray) / tested;
 }
 
-/// ∂pixel/∂point against central differences, relative to its size.
+/// ∂pixel/∂point against central differences; the tolerance is relative to its norm.
 inline void expect_true_jacobians(const CameraModel& model, ImageSize size, double tolerance = 1e-6) {
   for (const Eigen::Vector2d& pixel : picture_grid(size, 6)) {
     const auto ray = unproject(model, pixel);
@@ -76,7 +77,8 @@ inline void expect_true_jacobians(const CameraModel& model, ImageSize size, doub
   }
 }
 
-/// The points behind a camera that sees forward only, and numbers that are none, get no answer; no answer holds a NaN.
+/// Points behind a camera with less than 180° field of view, and coordinates that are not finite, have no projection;
+/// no projection and no ray contains NaN.
 inline void expect_honest_limits(const CameraModel& model, bool sees_beside = false) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(project(model, {0, 0, 0}));

@@ -1,4 +1,4 @@
-// Examples in the documents, for tests that read them as a user would.
+// Examples in the documentation, for tests that read them as a user would.
 #pragma once
 
 #include <fstream>
@@ -9,7 +9,7 @@
 
 namespace spartan::testing {
 
-/// The text of the fenced block behind `<!-- example: NAME -->` in docs/formats.md; empty where there is none.
+/// The text of the fenced code block after `<!-- example: NAME -->` in docs/formats.md; empty if there is none.
 inline std::string doc_example(const std::string& name) {
   std::ifstream file(source_folder() + "/docs/formats.md");
   std::stringstream text;

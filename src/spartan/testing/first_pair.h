@@ -1,11 +1,11 @@
-// Where the eyes of a rig's first pair stand.
+// Geometry of a rig's first pair.
 #pragma once
 
 #include "spartan/rig/rig.h"
 
 namespace spartan::testing {
 
-/// The right eye in the left one's frame, metres.
+/// Position of the right camera in the frame of the left one, in metres.
 inline Eigen::Vector3d right_in_left(const Rig& rig) {
   return rig.right_from_left(rig.pairs[0]).inverse().translation();
 }

@@ -1,4 +1,4 @@
-// Laws that groups must obey, as reusable checks.
+// Group axioms as reusable checks.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 namespace spartan::testing {
 
-/// A Lie group seen from outside: elements as vectors of their tangent, operations as functions.
+/// Interface of a Lie group: maps between elements and tangent vectors, and the group operations.
 template <class Element, int Dim>
 struct GroupUnderTest {
   using Tangent = Eigen::Matrix<double, Dim, 1>;
@@ -17,10 +17,10 @@ struct GroupUnderTest {
   std::function<Tangent(const Element&)> log;
   std::function<Element(const Element&, const Element&)> compose;
   std::function<Element(const Element&)> inverse;
-  std::function<double(const Element&, const Element&)> distance;  ///< 0 where the two are the same
+  std::function<double(const Element&, const Element&)> distance;  ///< 0 for equal elements
 };
 
-/// Round trip, inverse, identity and associativity over all samples (tangents); angles must be below π.
+/// Checks round trip, inverse, identity and associativity for all samples (tangent vectors); angles must be below π.
 template <class Element, int Dim>
 void expect_group_laws(const GroupUnderTest<Element, Dim>& group,
                        const std::vector<Eigen::Matrix<double, Dim, 1>>& samples, double tolerance) {
@@ -43,7 +43,7 @@ void expect_group_laws(const GroupUnderTest<Element, Dim>& group,
   }
 }
 
-/// Rotation vectors where implementations break: zero, tiny, ordinary, next to π, along and across the axes.
+/// Rotation vectors where implementations tend to fail: zero, tiny, ordinary and near π, along the axes and oblique.
 inline std::vector<Eigen::Vector3d> tricky_rotation_vectors() {
   std::vector<Eigen::Vector3d> samples{Eigen::Vector3d::Zero()};
   const std::vector<Eigen::Vector3d> axes{Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ(),

@@ -1,4 +1,4 @@
-// The camera models of mrcal, to hold ours against.
+// The camera models of mrcal, as reference for ours.
 #pragma once
 
 extern "C" {
@@ -13,11 +13,13 @@ extern "C" {
 
 namespace spartan::testing {
 
+/// A camera model of mrcal.
 class MrcalModel {
  public:
-  /// A name and parameters as mrcal gives them, "LENSMODEL_CAHVOR".
+  /// Name ("LENSMODEL_CAHVOR") and parameters in the order of mrcal. Throws std::invalid_argument where they do not
+  /// fit.
   MrcalModel(const std::string& name, std::vector<double> intrinsics) : intrinsics_(std::move(intrinsics)) {
-    if (!mrcal_lensmodel_from_name(&model_, name.c_str())) throw std::invalid_argument("mrcal has no " + name);
+    if (!mrcal_lensmodel_from_name(&model_, name.c_str())) throw std::invalid_argument("mrcal has no model " + name);
     if (mrcal_lensmodel_num_params(&model_) != static_cast<int>(intrinsics_.size())) {
       throw std::invalid_argument(name + ": wrong number of parameters");
     }
@@ -27,7 +29,7 @@ class MrcalModel {
     p.x = point.x(), p.y = point.y(), p.z = point.z();
     mrcal_point2_t q;
     if (!mrcal_project(&q, nullptr, nullptr, &p, 1, &model_, intrinsics_.data())) {
-      throw std::runtime_error("mrcal does not project");
+      throw std::runtime_error("mrcal_project failed");
     }
     return {q.x, q.y};
   }

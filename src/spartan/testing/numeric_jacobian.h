@@ -1,4 +1,4 @@
-// Derivatives by central differences, to hold analytic ones against.
+// Derivatives by central differences, as reference for analytic ones.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Where the files are that some tests need: real recordings, and what ships with the project.
+// Folders of the files that some tests need: real recordings, and files of the project.
 #pragma once
 
 #include <cstdlib>
@@ -6,13 +6,13 @@
 
 namespace spartan::testing {
 
-/// The project's source folder, for tests that read files which ship with it.
+/// The project's source folder: $SPARTAN_SOURCE_DIR, or the working directory.
 inline std::string source_folder() {
   const char* source = std::getenv("SPARTAN_SOURCE_DIR");
   return source ? source : ".";
 }
 
-/// $SPARTAN_DATA, or ../shared/data beside the source folder.
+/// The folder of recordings and images: $SPARTAN_DATA, or ../shared/data beside the source folder.
 inline std::string data_folder() {
   if (const char* given = std::getenv("SPARTAN_DATA")) return given;
   return source_folder() + "/../shared/data";

@@ -1,4 +1,4 @@
-// A pair of eyes whose calibration is known, what it sees, and how a judgement of it is judged.
+// A stereo pair of known calibration, synthetic matches of it, and checks of its inspection.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ inline Camera camera(const std::string& name, const CameraModel& model) {
   return made;
 }
 
-// Two lenses that bend, a baseline of 11 cm, eyes a little turned to each other.
+// Two lenses with distortion, a baseline of 11 cm, and a small rotation between the cameras.
 inline Rig true_rig() {
   const Pose left_from_right(exp_so3({0.004, -0.006, 0.003}), {0.11, 0.001, -0.0005});
   return rig_of_one_pair(
@@ -34,15 +34,14 @@ inline Rig true_rig() {
       left_from_right.inverse());
 }
 
-// The same without distortion.
+// The same rig without distortion.
 inline Rig straight_rig() {
   Rig rig = true_rig();
   for (Camera& c : rig.cameras) c.model = std::get<RadialTangentialModel>(c.model).pinhole();
   return rig;
 }
 
-// What the rig's eyes see of points on the ground, on walls and far away, found to 0.15 px; one in twelve matches is
-// wrong.
+// Matches of points on the ground, on walls and far away, with noise of 0.15 px; one in twelve is an outlier.
 inline std::vector<PixelMatch> look(const Rig& rig, int count = 700, std::uint64_t seed = 1) {
   Random random(seed);
   const StereoPair& pair = rig.pairs.front();
@@ -53,20 +52,21 @@ inline std::vector<PixelMatch> look(const Rig& rig, int count = 700, std::uint64
     const Eigen::Vector2d pixel(random.uniform(0, kSize.width - 1), random.uniform(0, kSize.height - 1));
     const auto ray = unproject(left.model, pixel);
     if (!ray) continue;
-    // Below the horizon the ground 1 m below the eyes, above it walls from 3 m away to the far hills.
+    // Below the horizon the ground 1 m below the cameras, above it walls and hills from 3 m away.
     const double depth = ray->direction.y() > 0.08 ? 1 / ray->direction.y() : std::exp(random.uniform(1, 6));
-    const auto seen = project(right.model, right_from_left * (depth * ray->direction));
-    if (!seen || seen->x() < 0 || seen->x() > kSize.width - 1 || seen->y() < 0 || seen->y() > kSize.height - 1)
+    const auto projected = project(right.model, right_from_left * (depth * ray->direction));
+    if (!projected || projected->x() < 0 || projected->x() > kSize.width - 1 || projected->y() < 0 ||
+        projected->y() > kSize.height - 1)
       continue;
-    Eigen::Vector2d found = *seen + 0.15 * Eigen::Vector2d(random.normal(), random.normal());
+    Eigen::Vector2d found = *projected + 0.15 * Eigen::Vector2d(random.normal(), random.normal());
     if (random.uniform(0, 12) < 1) found = {random.uniform(0, kSize.width - 1), random.uniform(0, kSize.height - 1)};
     matches.push_back({pixel, found});
   }
   return matches;
 }
 
-inline PairCheck check(const Rig& believed, const std::vector<PixelMatch>& matches) {
-  return check_pair(believed, believed.pairs.front(), matches, kSize);
+inline PairCheck check(const Rig& nominal, const std::vector<PixelMatch>& matches) {
+  return check_pair(nominal, nominal.pairs.front(), matches, kSize);
 }
 
 inline std::vector<std::string> ids(const PairCheck& result) {
@@ -76,7 +76,7 @@ inline std::vector<std::string> ids(const PairCheck& result) {
   return names;
 }
 
-// The rig with left_from_right changed.
+// The rig with left_from_right replaced.
 inline Rig with_pose(Rig rig, const Pose& left_from_right) {
   rig.cameras[1].mount_from_camera = rig.cameras[0].mount_from_camera * left_from_right;
   return rig;
@@ -85,13 +85,13 @@ inline Pose left_from_right(const Rig& rig) {
   return rig.right_from_left(rig.pairs.front()).inverse();
 }
 
-// What --apply writes must be good, and see the world as the true rig does.
+// The corrected rig must pass the check, and agree with the true rig up to `angle_deg` of rotation.
 inline void expect_mended(const Rig& truth, const PairCheck& result, double angle_deg = 0.15) {
   const auto again = check(*result.corrected, look(truth, 700, 2));
   EXPECT_THAT(ids(again), ::testing::IsEmpty());
   EXPECT_EQ(again.verdict, PairVerdict::good);
-  const Pose apart = left_from_right(truth).inverse() * left_from_right(*result.corrected);
-  EXPECT_LE(rotation_angle(apart) / kDegree, angle_deg);
+  const Pose difference = left_from_right(truth).inverse() * left_from_right(*result.corrected);
+  EXPECT_LE(rotation_angle(difference) / kDegree, angle_deg);
 }
 
 }  // namespace spartan::testing

@@ -9,9 +9,10 @@ namespace {
 
 constexpr int kReliefOctaves = 3, kTextureOctaves = 7;
 constexpr double kReliefGain = 0.3;
-constexpr double kWavelengthPerLattice = 1.5;  // gradient noise has most of its power there
+constexpr double kWavelengthPerLattice = 1.5;  // wavelength of most power of gradient noise, in lattice steps
 constexpr double kStoneHeightPerRadius = 0.55;
-constexpr double kStoneSlope = 2.43 * kStoneHeightPerRadius / 0.7;  // of (1 − q⁴)², over the shorter half axis
+constexpr double kStoneSlope =
+    2.43 * kStoneHeightPerRadius / 0.7;  // largest slope of (1 − q⁴)², for the shortest half axis
 constexpr double kStoneProbability = 0.7;
 
 double fraction(std::uint32_t bits) {
@@ -26,7 +27,7 @@ void add(NoiseSample& sum, const NoiseSample& part) {
 
 }  // namespace
 
-/// One stone: an ellipse on the ground, (1 − q⁴)² high, where q is 1 on its rim.
+/// One stone: height ∝ (1 − q⁴)² over an ellipse, where q is 1 on its rim.
 struct SyntheticTerrain::Stone {
   double x, y, half_long, half_short, cosine, sine, height, tone;
 
@@ -58,7 +59,7 @@ SyntheticTerrain::SyntheticTerrain(const SyntheticWorldOptions& options) : optio
     slope_squares += std::pow(octave.amplitude / octave.size * kNoiseSteepest, 2);
     curvature_squares += std::pow(octave.amplitude / (octave.size * octave.size) * kNoiseMostCurved, 2);
   }
-  // The octaves are not all at their extreme over a whole step: the root of the squares is enough.
+  // The octaves do not have their extremes at the same points: the root of the sum of squares is a sufficient bound.
   steepest_ = std::sqrt(slope_squares);
   most_curved_ = std::sqrt(curvature_squares);
   if (options.stones_per_m2 > 0) {
@@ -67,7 +68,7 @@ SyntheticTerrain::SyntheticTerrain(const SyntheticWorldOptions& options) : optio
   }
 }
 
-// A stone lies wholly inside its cell, so that one cell is looked at.
+// A stone lies wholly inside its cell, so that only one cell has to be searched.
 std::optional<SyntheticTerrain::Stone> SyntheticTerrain::stone_of_cell(double cell_x, double cell_y) const {
   const auto seed = static_cast<std::uint32_t>(options_.seed * 3);
   const std::uint32_t first = mix(static_cast<std::int32_t>(cell_x), static_cast<std::int32_t>(cell_y), seed);
@@ -76,12 +77,12 @@ std::optional<SyntheticTerrain::Stone> SyntheticTerrain::stone_of_cell(double ce
   const std::uint32_t third = mix(static_cast<std::int32_t>(first), 2, seed);
   const double small = fraction(first >> 16U);
   Stone stone{};
-  stone.half_long = options_.stone_size_m / 2 * (0.3 + 0.7 * small * small);  // small ones are the most
+  stone.half_long = options_.stone_size_m / 2 * (0.3 + 0.7 * small * small);  // mostly small
   stone.half_short = stone.half_long * (0.7 + 0.3 * fraction(second >> 16U));
   stone.height = kStoneHeightPerRadius * stone.half_long * (0.6 + 0.4 * fraction(third));
-  const double room = stone_cell_m_ - 2 * stone.half_long;
-  stone.x = cell_x * stone_cell_m_ + stone.half_long + room * fraction(third >> 16U);
-  stone.y = cell_y * stone_cell_m_ + stone.half_long + room * fraction(second >> 8U);
+  const double free_width = stone_cell_m_ - 2 * stone.half_long;
+  stone.x = cell_x * stone_cell_m_ + stone.half_long + free_width * fraction(third >> 16U);
+  stone.y = cell_y * stone_cell_m_ + stone.half_long + free_width * fraction(second >> 8U);
   const double half_tangent = 2 * fraction(second) - 1;  // of the angle of the long axis
   stone.cosine = (1 - half_tangent * half_tangent) / (1 + half_tangent * half_tangent);
   stone.sine = 2 * half_tangent / (1 + half_tangent * half_tangent);
@@ -95,9 +96,9 @@ std::optional<SyntheticTerrain::Stone> SyntheticTerrain::stone_at(double x, doub
   return stone && stone->around(x, y) ? stone : std::nullopt;
 }
 
-// How far a ray may go before it stands above another stone: to the rim of this cell's or to the cell's border.
+// Distance along a ray to the next place that may have a stone: the rim of this cell's stone or the border of the cell.
 double SyntheticTerrain::free_of_stones(double x, double y, double dx, double dy) const {
-  constexpr double kInside = 1e-6;  // past a border, so that the next question is about the next cell
+  constexpr double kInside = 1e-6;  // past the border, so that the next query is in the next cell
   const double cell_x = std::floor(x / stone_cell_m_), cell_y = std::floor(y / stone_cell_m_);
   const auto to_border = [&](double position, double cell, double speed) {
     if (speed == 0) return std::numeric_limits<double>::infinity();
@@ -129,7 +130,7 @@ NoiseSample SyntheticTerrain::ground(double x, double y) const {
 double SyntheticTerrain::albedo(double x, double y, double footprint_m) const {
   double logarithm = 0;
   for (const Octave& octave : texture_) {
-    // Fades from one pixel a lattice step (wavelength 1.5 px: could not be sampled) to two.
+    // An octave fades in from one footprint per lattice step (wavelength 1.5 px, above the Nyquist limit) to two.
     const double weight = std::clamp(octave.size / footprint_m - 1, 0.0, 1.0);
     if (weight > 0) logarithm += weight * octave.value(x, y);
   }
@@ -141,7 +142,7 @@ double SyntheticTerrain::albedo(double x, double y, double footprint_m) const {
   return tone * std::exp(logarithm);
 }
 
-// Sphere tracing of a cone: at the distance t its rays are t · spread apart from its axis.
+// Sphere tracing of a cone: at distance t its rays are up to t · spread from its axis.
 double SyntheticTerrain::clear_distance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                         double spread) const {
   constexpr double kFarEnough_m = 50, kSmallStep = 0.02;
@@ -157,10 +158,11 @@ double SyntheticTerrain::clear_distance(const Eigen::Vector3d& origin, const Eig
   return kFarEnough_m;
 }
 
-// Steps that cannot pass through the ground. With the gap g, its rate −g' along the ray, and bounds L of the slope
-// and K of the curvature of the hills, g stays positive for g / L (Hart, "Sphere tracing", 1996) and up to the root
-// of g + g' t − K t²/2; over a stone the first bound holds with the stone's slope, and elsewhere a step ends where
-// the next stone may begin. Newton's method makes the end exact, from either side.
+// Ray marching with steps that cannot pass through the ground. With the gap g to the ground, its derivative g' along
+// the ray, and bounds L of the slope and K of the curvature of the hills, g stays positive for g / L (Hart, "Sphere
+// tracing", 1996) and up to the root of g + g' t − K t²/2. Over a stone the first bound holds with the slope of the
+// stone; elsewhere a step ends where the next stone may begin. Newton's method refines the intersection, from either
+// side.
 std::optional<double> SyntheticTerrain::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                                   double farthest, double nearest) const {
   constexpr double kExact = 1e-9, kNewton_m = 2e-3;
@@ -189,7 +191,7 @@ std::optional<double> SyntheticTerrain::intersect(const Eigen::Vector3d& origin,
       t += gap / -rate;
       continue;
     }
-    if (gap < 0) return t;  // the ray begins inside the ground
+    if (gap < 0) return t;  // the ray starts inside the ground
     if (stone) {
       t += gap / (fastest + across * kStoneSlope);
       continue;

@@ -1,4 +1,4 @@
-// Ground with known height and colour everywhere: hills, stones and a texture that stays with the world.
+// Procedural ground with known height and albedo: hills, stones and a texture fixed to the world.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,36 +10,37 @@
 
 namespace spartan::testing {
 
-/// A height field z(x, y) over the world plane with a texture fixed to it; both are sums of smooth noise, so that
-/// exact intersections and sub-pixel truth exist.
+/// A height field z(x, y) over the world plane with a texture fixed to it; both are sums of gradient noise, so that
+/// exact intersections and sub-pixel ground truth exist.
 struct SyntheticWorldOptions {
   std::uint64_t seed = 1;
   double relief_m = 0.05;         ///< standard deviation of the height
   double relief_size_m = 1.0;     ///< wavelength of the largest hills
-  double texture_size_m = 0.004;  ///< finest grain of the texture
+  double texture_size_m = 0.004;  ///< shortest wavelength of the texture
   double contrast = 0.25;         ///< standard deviation of the albedo over its mean
   double stones_per_m2 = 0;       ///< 0: none
   double stone_size_m = 0.15;     ///< diameter of the largest stones
-  double brightness = 105;        ///< gray level of level ground of mean albedo
+  double brightness = 105;        ///< gray level of horizontal ground of mean albedo
   double noise_levels = 1.0;      ///< standard deviation of the image noise, gray levels
 };
 
+/// Height, albedo and ray intersections of the ground.
 class SyntheticTerrain {
  public:
   explicit SyntheticTerrain(const SyntheticWorldOptions& options);
 
-  /// Height of the hills without stones, and with its slope.
+  /// Height of the hills without stones, metres.
   double relief(double x, double y) const;
-  /// Height of the ground with stones and its slope, metres.
+  /// Height of the ground with stones in metres, and its gradient.
   NoiseSample ground(double x, double y) const;
-  /// Reflectance around 1. Grain below `footprint_m`, the size of a pixel on the ground, is left out.
+  /// Relative albedo with mean about 1. Detail below `footprint_m`, the size of a pixel on the ground, is filtered out.
   double albedo(double x, double y, double footprint_m) const;
 
-  /// Distance along the ray (unit direction) to the first point on the ground, to 1e-9 m; none within `farthest`.
-  /// Nothing is looked for nearer than `nearest`.
+  /// Distance along the ray (unit direction) to the first intersection with the ground between `nearest` and
+  /// `farthest`, to 1e-9 m.
   std::optional<double> intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double farthest,
                                   double nearest = 0) const;
-  /// A distance up to which no ray meets the ground whose unit direction differs from `direction` by at most `spread`.
+  /// A distance up to which no ray whose unit direction differs from `direction` by at most `spread` hits the ground.
   double clear_distance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double spread) const;
 
  private:
@@ -51,7 +52,7 @@ class SyntheticTerrain {
   SyntheticWorldOptions options_;
   std::vector<Octave> relief_, texture_;
   double stone_cell_m_ = 0;
-  double relief_top_ = 0, stone_top_ = 0;  ///< nothing is higher
+  double relief_top_ = 0, stone_top_ = 0;  ///< upper bounds of the heights
   double steepest_ = 0, most_curved_ = 0;  ///< bounds of the hills' slope and curvature (1/m)
 };
 

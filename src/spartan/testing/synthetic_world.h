@@ -1,4 +1,4 @@
-// A small stereo world with known answers: textured ground, looked at by a rectified pair.
+// Renders stereo images of textured ground with ground truth for a rectified pair.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,19 @@
 
 namespace spartan::testing {
 
-/// Two images and what is true about them.
+/// A stereo frame with its ground truth.
 struct SyntheticShot {
   Image<std::uint8_t> left, right;
-  Image<float> disparity;    ///< of the left image; NaN where the ray meets nothing
-  Image<std::uint8_t> mask;  ///< 255 seen by both eyes, 128 by the left one only, 0 nothing there
+  Image<float> disparity;    ///< px of the left image; NaN where the ray hits nothing
+  Image<std::uint8_t> mask;  ///< 255 visible in both cameras, 128 in the left one only, 0 no truth
 };
 
+/// Renders the ground of SyntheticTerrain with sunlight, sky light and image noise.
 class SyntheticWorld {
  public:
   explicit SyntheticWorld(const SyntheticWorldOptions& options);
 
-  /// Height of the ground with its stones, and of the hills alone (where a rover would drive), metres.
+  /// Height of the ground with stones, and of the hills alone, in metres.
   double height(double x, double y) const;
   double relief(double x, double y) const;
   /// `world_from_left`: left optical frame (x right, y down, z forward) in the world (z up). `noise_seed` changes the
@@ -29,13 +30,13 @@ class SyntheticWorld {
   SyntheticShot render(const RectifiedStereo& stereo, const Pose& world_from_left, std::uint64_t noise_seed) const;
 
  private:
-  struct Eye;
+  struct View;
   struct Surface;
-  Image<double> measure_depth(const Eye& eye) const;
-  bool right_eye_sees(const Eye& right, ImageView<const double> right_depth, double u, int v, double depth) const;
-  Image<std::uint8_t> photograph(const Eye& eye, ImageView<const double> depth, std::uint64_t noise_seed) const;
-  double gray_level(const Eye& eye, int u, int v, double depth, bool at_edge) const;
-  double reflected(const Eye& eye, const Surface& surface, double depth) const;
+  Image<double> measure_depth(const View& view) const;
+  bool visible_in_right(const View& right, ImageView<const double> right_depth, double u, int v, double depth) const;
+  Image<std::uint8_t> render_image(const View& view, ImageView<const double> depth, std::uint64_t noise_seed) const;
+  double gray_level(const View& view, int u, int v, double depth, bool at_edge) const;
+  double shade(const View& view, const Surface& surface, double depth) const;
 
   SyntheticWorldOptions options_;
   SyntheticTerrain terrain_;

@@ -32,14 +32,14 @@ double sample(const Image<std::uint8_t>& image, double x, int y) {
 }
 
 // Median |left − right warped onto it| with the truth shifted by `error_px`.
-double warp_difference(const SyntheticShot& shot, double error_px) {
+double warp_difference(const SyntheticShot& frame, double error_px) {
   std::vector<double> differences;
-  for (int v = 0; v < shot.left.height(); ++v) {
-    for (int u = 0; u < shot.left.width(); ++u) {
-      if (shot.mask(u, v) != 255) continue;
-      const double u_right = u - static_cast<double>(shot.disparity(u, v)) - error_px;
-      if (u_right < 0 || u_right > shot.right.width() - 1) continue;
-      differences.push_back(std::abs(shot.left(u, v) - sample(shot.right, u_right, v)));
+  for (int v = 0; v < frame.left.height(); ++v) {
+    for (int u = 0; u < frame.left.width(); ++u) {
+      if (frame.mask(u, v) != 255) continue;
+      const double u_right = u - static_cast<double>(frame.disparity(u, v)) - error_px;
+      if (u_right < 0 || u_right > frame.right.width() - 1) continue;
+      differences.push_back(std::abs(frame.left(u, v) - sample(frame.right, u_right, v)));
     }
   }
   return median(std::move(differences));
@@ -51,7 +51,7 @@ SyntheticWorldOptions stony() {
   return options;
 }
 
-TEST(SmoothNoise, HasTheStatedSpreadSlopeAndDerivatives) {
+TEST(SmoothNoise, HasItsDocumentedDeviationBoundsAndDerivatives) {
   Random random(1);
   double square = 0, steepest = 0, most_curved = 0;
   constexpr int kCount = 200000;
@@ -99,7 +99,7 @@ TEST(SyntheticTerrain, RaysEndAtTheFirstPointOnTheGround) {
   EXPECT_GT(hits, 200);
 }
 
-TEST(SyntheticTerrain, NoRayOfAClearConeMeetsTheGround) {
+TEST(SyntheticTerrain, NoRayOfAClearConeHitsTheGround) {
   const SyntheticTerrain terrain(stony());
   Random random(4);
   double clear_sum = 0;
@@ -125,12 +125,12 @@ TEST(SyntheticTerrain, NoRayOfAClearConeMeetsTheGround) {
 TEST(SyntheticWorld, TruthDisparityWarpsRightOntoLeft) {
   for (const auto& options : {SyntheticWorldOptions{}, stony()}) {
     const SyntheticWorld world(options);
-    const SyntheticShot shot = world.render(narrow_pair(), looking_down(0.3, 0.55), 7);
-    const double exact = warp_difference(shot, 0);
+    const SyntheticShot frame = world.render(narrow_pair(), looking_down(0.3, 0.55), 7);
+    const double exact = warp_difference(frame, 0);
     // Noise of 1 level in both images: the median |difference| is about 0.67 · √(1 + 2/3) = 0.87.
     EXPECT_LT(exact, 1.4);
-    EXPECT_GT(warp_difference(shot, 0.5), 2 * exact);
-    EXPECT_GT(warp_difference(shot, -0.5), 2 * exact);
+    EXPECT_GT(warp_difference(frame, 0.5), 2 * exact);
+    EXPECT_GT(warp_difference(frame, -0.5), 2 * exact);
   }
 }
 
@@ -140,7 +140,7 @@ TEST(SyntheticWorld, KnownPointsProjectWhereTheyShould) {
   const SyntheticWorld world(options);
   const RectifiedStereo stereo = narrow_pair();
   const Pose world_from_left = looking_down(world.relief(1.0, -2.0) + 0.6, 0.55, 1.0, -2.0);
-  const SyntheticShot shot = world.render(stereo, world_from_left, 1);
+  const SyntheticShot frame = world.render(stereo, world_from_left, 1);
   Random random(3);
   int seen = 0, off = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -150,57 +150,57 @@ TEST(SyntheticWorld, KnownPointsProjectWhereTheyShould) {
     const int u = static_cast<int>(std::floor(uvd.x())), v = static_cast<int>(std::floor(uvd.y()));
     if (u < 0 || v < 0 || u + 1 >= stereo.size.width || v + 1 >= stereo.size.height) continue;
     const double fu = uvd.x() - u, fv = uvd.y() - v;
-    const auto d = [&](int a, int b) { return static_cast<double>(shot.disparity(a, b)); };
+    const auto d = [&](int a, int b) { return static_cast<double>(frame.disparity(a, b)); };
     const double there =
         (1 - fv) * ((1 - fu) * d(u, v) + fu * d(u + 1, v)) + fv * ((1 - fu) * d(u, v + 1) + fu * d(u + 1, v + 1));
-    if (there > uvd.z() + 0.5) continue;  // behind a hill
+    if (there > uvd.z() + 0.5) continue;  // occluded by a hill
     off += std::abs(there - uvd.z()) > 0.2 ? 1 : 0;
     ++seen;
   }
   EXPECT_GT(seen, 500);
-  EXPECT_LE(off, seen / 20) << "more than what interpolation over the crests of hills explains";
+  EXPECT_LE(off, seen / 20) << "more than interpolation across the crests of hills explains";
 }
 
-TEST(SyntheticWorld, EveryPixelsTruthLiesOnTheGround) {
+TEST(SyntheticWorld, TrueDisparitiesTriangulateToTheGround) {
   const SyntheticWorld world(stony());
   const Pose world_from_left = looking_down(0.4, 0.55);
-  const SyntheticShot shot = world.render(narrow_pair(), world_from_left, 1);
+  const SyntheticShot frame = world.render(narrow_pair(), world_from_left, 1);
   for (int v = 60; v < 240; v += 7) {
     for (int u = 0; u < 320; u += 7) {
       const Eigen::Vector3d p =
-          world_from_left * narrow_pair().triangulate(u, v, static_cast<double>(shot.disparity(u, v)));
+          world_from_left * narrow_pair().triangulate(u, v, static_cast<double>(frame.disparity(u, v)));
       EXPECT_NEAR(p.z(), world.height(p.x(), p.y()), 2e-5);
     }
   }
 }
 
-TEST(SyntheticWorld, MaskTellsWhatTheRightEyeDoesNotSee) {
+TEST(SyntheticWorld, MaskMarksOcclusionsInTheRightImage) {
   const SyntheticWorld world(stony());
   const RectifiedStereo stereo = narrow_pair();
   const Pose world_from_left = looking_down(0.3, 0.4);
-  const SyntheticShot shot = world.render(stereo, world_from_left, 1);
-  const Eigen::Vector3d right_eye = world_from_left * Eigen::Vector3d(stereo.baseline_m, 0, 0);
+  const SyntheticShot frame = world.render(stereo, world_from_left, 1);
+  const Eigen::Vector3d right_centre = world_from_left * Eigen::Vector3d(stereo.baseline_m, 0, 0);
   int inside = 0, disagreements = 0, hidden = 0;
   for (int v = 0; v < stereo.size.height; v += 3) {
     for (int u = 0; u < stereo.size.width; u += 3) {
-      if (std::isnan(shot.disparity(u, v))) {
-        EXPECT_EQ(shot.mask(u, v), 0);
+      if (std::isnan(frame.disparity(u, v))) {
+        EXPECT_EQ(frame.mask(u, v), 0);
         continue;
       }
-      const double d = static_cast<double>(shot.disparity(u, v));
+      const double d = static_cast<double>(frame.disparity(u, v));
       if (u - d < 0) {
-        EXPECT_EQ(shot.mask(u, v), 128);
+        EXPECT_EQ(frame.mask(u, v), 128);
         continue;
       }
       const Eigen::Vector3d point = world_from_left * stereo.triangulate(u, v, d);
       bool free = true;
       for (double part = 0.2; part < 0.995; part += 0.002) {
-        const Eigen::Vector3d p = right_eye + part * (point - right_eye);
+        const Eigen::Vector3d p = right_centre + part * (point - right_centre);
         free = free && p.z() > world.height(p.x(), p.y());
       }
       ++inside;
       hidden += free ? 0 : 1;
-      disagreements += free != (shot.mask(u, v) == 255) ? 1 : 0;
+      disagreements += free != (frame.mask(u, v) == 255) ? 1 : 0;
     }
   }
   EXPECT_GT(hidden, 10);
@@ -223,12 +223,12 @@ TEST(SyntheticWorld, NoiseSeedChangesTheNoiseOnly) {
   EXPECT_NEAR(std::sqrt(square / (320 * 240)), std::sqrt(2 * (1 + 1 / 12.0)), 0.1);
 }
 
-TEST(SyntheticWorld, TheHorizonHasNoTruth) {
+TEST(SyntheticWorld, TheSkyHasNoTruth) {
   const SyntheticWorld world({});
-  const auto shot = world.render(narrow_pair(), looking_down(0.3, 0.0), 1);
-  EXPECT_TRUE(std::isnan(shot.disparity(160, 10)));
-  EXPECT_EQ(shot.mask(160, 10), 0);
-  EXPECT_EQ(shot.mask(300, 230), 255);
+  const auto frame = world.render(narrow_pair(), looking_down(0.3, 0.0), 1);
+  EXPECT_TRUE(std::isnan(frame.disparity(160, 10)));
+  EXPECT_EQ(frame.mask(160, 10), 0);
+  EXPECT_EQ(frame.mask(300, 230), 255);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A folder that lives as long as the test that needs it.
+// A temporary folder for a test, removed by the destructor.
 #pragma once
 
 #include <stdlib.h>
@@ -16,7 +16,7 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "spartan_test_XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make " + name);
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot create the folder " + name);
     path_ = name;
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
@@ -27,13 +27,13 @@ class TemporaryFolder {
   }
 
   const std::string& path() const { return path_; }
-  /// The path of a file in it; folders on the way are made.
+  /// The path of a file in the folder; creates its parent folders.
   std::string file(const std::string& name) const {
     const std::filesystem::path path = std::filesystem::path(path_) / name;
     std::filesystem::create_directories(path.parent_path());
     return path.string();
   }
-  /// Writes a file and gives its path.
+  /// Writes a file and returns its path.
   std::string write(const std::string& name, std::string_view content) const {
     std::string path = file(name);
     std::ofstream(path, std::ios::binary) << content;

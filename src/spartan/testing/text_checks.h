@@ -1,4 +1,4 @@
-// What tests of file readers ask again and again: a good text made bad, and what is said about it.
+// Helpers for tests of file readers: corrupt a valid text, and get the error message.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -9,14 +9,14 @@
 
 namespace spartan::testing {
 
-/// The text with the first `what` replaced; the test fails where there is none.
+/// The text with the first occurrence of `what` replaced; fails the test where there is none.
 inline std::string replaced(std::string text, const std::string& what, const std::string& with) {
   const std::size_t at = text.find(what);
   EXPECT_NE(at, std::string::npos) << what;
   return at == std::string::npos ? text : text.replace(at, what.size(), with);
 }
 
-/// The message of an error, whose code must be `configuration`; "nothing" where there is none.
+/// The message of an error, whose code must be `configuration`; "nothing" if the result has a value.
 template <class T>
 std::string complaint(const Result<T>& read) {
   if (read) return "nothing";

@@ -1,4 +1,4 @@
-// Recordings of a few tiny pictures in every layout, written file by file so that tests can spoil them.
+// Tiny recordings in every layout, written file by file so that tests can corrupt them.
 #pragma once
 
 #include <cstdint>
@@ -13,38 +13,38 @@ namespace spartan::testing {
 
 inline constexpr ImageSize kTinySize{24, 16};
 
-/// Noise that differs from seed to seed.
+/// An image of uniform noise.
 Image<std::uint8_t> tiny_image(std::uint64_t seed, ImageSize size = kTinySize);
-/// The same as a file; folders on the way are made.
+/// The same image as a file; creates its parent folders.
 void write_tiny_png(const std::string& path, std::uint64_t seed, ImageSize size = kTinySize);
 
-/// "left" and "right" of kTinySize side by side, pair "stereo".
+/// A rig of two parallel cameras "left" and "right" of kTinySize, pair "stereo".
 Rig tiny_rig();
 
-/// KITTI odometry: calib.txt, times.txt, image_0, image_1. The pictures have the seeds 2 i and 2 i + 1.
+/// KITTI odometry: calib.txt, times.txt, image_0, image_1. Frame i has images of the seeds 2 i and 2 i + 1.
 void write_tiny_kitti(const TemporaryFolder& folder, int frames, double period_s = 0.1);
 /// KITTI raw: calib_cam_to_cam.txt, image_00, image_01; without IMU.
 void write_tiny_kitti_raw(const TemporaryFolder& folder, int frames);
-/// EuRoC below mav0: cam0 and cam1 with the pictures of these stamps; without IMU.
+/// EuRoC below mav0: cam0 and cam1 with images at these time stamps; without IMU.
 void write_tiny_euroc(const TemporaryFolder& folder, const std::vector<std::int64_t>& left_ns,
                       const std::vector<std::int64_t>& right_ns);
 /// Spartan: recording.yaml, rig.yaml, frames.csv, images/stereo.
 void write_tiny_spartan(const TemporaryFolder& folder, int frames, double period_s = 0.1);
 
-/// Everything a source hands out, sorted by kind, and all in the order of coming.
+/// All samples of a source, by kind and in the order of arrival.
 struct Played {
   std::vector<Sample> all;
   std::vector<StereoFrame> frames;
   std::vector<MissingFrame> missing;
-  std::string error;  ///< that ended the reading; empty: it went to the end
+  std::string error;  ///< that ended the reading; empty at the end of the source
 };
 Played play(FrameSource& source);
 
-/// Frame ids of what came as a frame, or as missing.
+/// Frame ids of the frames, or of the missing frames.
 std::vector<std::int64_t> ids_of(const std::vector<StereoFrame>& frames);
 std::vector<std::int64_t> ids_of(const std::vector<MissingFrame>& missing);
 
-/// Same format and pixels.
+/// Whether format and pixels are equal.
 bool same_image(const FrameImage& a, const FrameImage& b);
 
 }  // namespace spartan::testing

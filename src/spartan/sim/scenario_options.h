@@ -1,0 +1,519 @@
+// The option structs of a scenario (scenario.yaml), one per group of keys.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "spartan/core/options.h"
+
+namespace spartan::sim {
+
+// --- World ---
+
+/// Shape of the ground without rocks. Relief is fractal: octaves of gradient noise from `relief_size_m` down to 2 cm,
+/// whose amplitudes fall by the factor `relief_gain` from each octave to the next one of half the wavelength (0.5:
+/// self-similar, Hurst exponent 1). Ripples and dunes are wave trains with meandering crests. Cavities are round pits
+/// with walls of fixed steepness. A crater is a paraboloid inside its rim and an ejecta apron outside, which falls
+/// with the cube of the distance.
+struct TerrainShapeOptions {
+  double relief_m = 0.06;          ///< m; standard deviation of the height
+  double relief_size_m = 8;        ///< m; longest wavelength
+  double relief_gain = 0.42;       ///< amplitude ratio of successive octaves
+  double slope_deg = 0;            ///< deg; overall inclination
+  double slope_heading_deg = 0;    ///< deg; uphill direction, counter-clockwise from x
+  double ripple_height_m = 0.008;  ///< m; crest to trough
+  double ripple_length_m = 0.14;   ///< m; crest to crest
+  double dune_height_m = 0.1;      ///< m; crest to trough
+  double dune_length_m = 7;        ///< m; crest to crest
+  double cavities_per_100m2 = 0;   ///< 1/(100 m²)
+  double cavity_diameter_m = 0.6;  ///< m; largest cavity
+  double cavity_depth_m = 0.25;    ///< m; largest cavity
+  double crater_radius_m = 0;      ///< m; centre to rim crest; 0: no crater
+  double crater_rim_m = 1;         ///< m; rim crest above the plain
+  double crater_depth_m = 2;       ///< m; floor below the plain
+  double crater_x_m = 0;           ///< m; centre, world x
+  double crater_y_m = 0;           ///< m; centre, world y
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("relief_m", relief_m,
+            "Standard deviation of the fractal relief in metres; raising it makes the ground rougher at every scale.",
+            between(0, 5));
+    v.field("relief_size_m", relief_size_m,
+            "Longest wavelength of the fractal relief in metres; raising it gives broader hills.", between(0.1, 200));
+    v.field("relief_gain", relief_gain,
+            "Amplitude of an octave of the relief over that of the next longer one; raising it gives more fine detail "
+            "(0.5 is self-similar).",
+            between(0.2, 0.9));
+    v.field("slope_deg", slope_deg, "Inclination of the whole terrain in degrees.", between(0, 30));
+    v.field("slope_heading_deg", slope_heading_deg,
+            "Uphill direction of the whole terrain in degrees, counter-clockwise from the world's x axis.");
+    v.field("ripple_height_m", ripple_height_m, "Crest-to-trough height of the wind ripples in metres; 0 for none.",
+            between(0, 0.1));
+    v.field("ripple_length_m", ripple_length_m, "Crest-to-crest length of the wind ripples in metres.",
+            between(0.05, 2));
+    v.field("dune_height_m", dune_height_m, "Crest-to-trough height of the dunes in metres; 0 for none.",
+            between(0, 5));
+    v.field("dune_length_m", dune_length_m, "Crest-to-crest length of the dunes in metres.", between(1, 100));
+    v.field("cavities_per_100m2", cavities_per_100m2,
+            "Mean number of cavities (negative obstacles) on 100 square metres; 0 for none.", between(0, 200));
+    v.field("cavity_diameter_m", cavity_diameter_m,
+            "Diameter of the largest cavities in metres; the smallest have half of it.", between(0.1, 5));
+    v.field("cavity_depth_m", cavity_depth_m, "Depth of the largest cavities in metres; the smallest have half of it.",
+            between(0, 3));
+    v.field("crater_radius_m", crater_radius_m,
+            "Radius of a single large crater in metres, from its centre to the rim crest; 0 for none.",
+            between(0, 200));
+    v.field("crater_rim_m", crater_rim_m, "Height of the crater's rim crest above the plain in metres.",
+            between(0, 50));
+    v.field("crater_depth_m", crater_depth_m, "Depth of the crater's floor below the plain in metres.",
+            between(0, 100));
+    v.field("crater_x_m", crater_x_m, "World x coordinate of the crater's centre in metres.");
+    v.field("crater_y_m", crater_y_m, "World y coordinate of the crater's centre in metres.");
+  }
+};
+
+/// Sizes follow Golombek & Rapp, "Size-frequency distributions of rocks on Mars" (JGR 1997): rocks of diameter D and
+/// more cover the fraction F(D) = k exp(−q D) of the ground, q = 1.79 + 0.152/k, D in metres.
+struct RockFieldOptions {
+  double coverage = 0.07;       ///< k of the model, fraction of the area
+  double smallest_m = 0.01;     ///< m; smallest diameter
+  double largest_m = 2.5;       ///< m; largest diameter
+  double height_ratio = 0.5;    ///< mean height over diameter
+  double pebbles_per_m2 = 300;  ///< 1/m²; pebbles of 4 to 10 mm besides the model
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.renamed("share", "coverage");
+    v.field("coverage", coverage,
+            "Fraction of the ground that rocks of all sizes cover (k of Golombek and Rapp, 1997); raising it gives "
+            "more and larger rocks.",
+            between(0, 0.3));
+    v.field("smallest_m", smallest_m, "Diameter of the smallest rocks of the model in metres.", between(0.003, 1));
+    v.field("largest_m", largest_m, "Diameter of the largest rocks in metres.", between(0.01, 5));
+    v.field("pebbles_per_m2", pebbles_per_m2,
+            "Number of pebbles of 4 to 10 mm diameter on a square metre, in addition to the rocks of the model.",
+            between(0, 5000));
+    v.field("height_ratio", height_ratio, "Mean height of a rock above the ground over its diameter.", between(0.1, 1));
+  }
+};
+
+/// Albedo is fixed to the world. Its variation is a sum of gradient noise from 2.4 m down to 0.3 mm; detail finer than
+/// the footprint of a pixel is filtered out.
+/// Scattering: Lunar–Lambert (McEwen, Icarus 1991), a mean of the Lommel–Seeliger and Lambert laws with weight L:
+///   r = albedo (2 L μ₀ / (μ₀ + μ) + (1 − L) μ₀), μ₀ and μ the cosines of incidence and emission.
+struct SoilOptions {
+  double albedo = 0.2;             ///< mean albedo of the soil
+  double contrast = 0.14;          ///< standard deviation of the albedo over its mean
+  double octave_gain = 1.15;       ///< amplitude ratio of successive octaves of the albedo
+  double rock_albedo_ratio = 0.8;  ///< mean albedo of rocks over that of the soil
+  double lunar_weight = 0.5;       ///< L of the Lunar–Lambert law
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("albedo", albedo, "Mean albedo of the soil.", between(0.02, 0.9));
+    v.field("contrast", contrast,
+            "Standard deviation of the albedo over its mean, all scales together; raising it gives more texture.",
+            between(0, 0.6));
+    v.renamed("grain", "octave_gain");
+    v.field("octave_gain", octave_gain,
+            "Amplitude of an octave of the albedo over that of the next longer one; raising it moves contrast to "
+            "finer scales.",
+            between(0.5, 1.5));
+    v.field("rock_albedo_ratio", rock_albedo_ratio, "Mean albedo of the rocks over that of the soil.", between(0.1, 3));
+    v.field("lunar_weight", lunar_weight,
+            "Weight L of the Lunar-Lambert scattering law: 0 is Lambert, 1 is Lommel-Seeliger.", between(0, 1));
+  }
+};
+
+/// Illuminances in lux.
+struct LightOptions {
+  double sun_lux = 20000;          ///< lx; direct sun, on a plane normal to it
+  double sun_elevation_deg = 45;   ///< deg; above the horizon
+  double sun_azimuth_deg = 70;     ///< deg; counter-clockwise from x
+  double sun_diameter_deg = 0.35;  ///< deg; angular diameter
+  double sky_lux = 6000;           ///< lx; whole sky, on a horizontal plane
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("sun_lux", sun_lux, "Illuminance by the direct sun in lux, on a plane normal to it; 0 is overcast.",
+            between(0, 200000));
+    v.field("sun_elevation_deg", sun_elevation_deg,
+            "Elevation of the sun above the horizon in degrees; lowering it gives longer shadows.", between(1, 90));
+    v.field("sun_azimuth_deg", sun_azimuth_deg,
+            "Azimuth of the sun in degrees, counter-clockwise from the world's x axis.");
+    v.field("sun_diameter_deg", sun_diameter_deg,
+            "Angular diameter of the sun in degrees; raising it gives softer shadows.", between(0, 5));
+    v.field("sky_lux", sky_lux, "Illuminance by the whole sky in lux, on a horizontal plane.", between(0, 100000));
+  }
+};
+
+// --- Cameras ---
+
+/// Image sensor, lens and exposure rule, the same for all cameras of the rig.
+struct SensorOptions {
+  double pixel_um = 5.5;            ///< µm; pixel pitch
+  double f_number = 2.0;            ///< focal length over aperture
+  double transmission = 0.9;        ///< of the lens
+  double vignetting = 0.7;          ///< exponent applied to cos⁴ of the field angle
+  double quantum_efficiency = 0.5;  ///< electrons per photon
+  double full_well_e = 15000;       ///< e⁻
+  double read_noise_e = 15;         ///< e⁻; standard deviation
+  double black_level = 1.0 / 64;    ///< fraction of full scale
+  double target_level = 0.45;       ///< fraction of the full well
+  double longest_exposure_ms = 20;  ///< ms
+  double largest_gain = 16;         ///< 1: the full well is full scale
+  int noise_seed = 0;               ///< seed of the image noise alone
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("pixel_um", pixel_um, "Pixel pitch of the image sensor in micrometres; larger pixels collect more light.",
+            between(0.5, 50));
+    v.field("f_number", f_number, "F-number of the lens; raising it makes images darker.", between(0.7, 32));
+    v.field("transmission", transmission, "Fraction of the light that the lens transmits.", between(0.05, 1));
+    v.field("vignetting", vignetting,
+            "Exponent of the vignetting, applied to cos^4 of the field angle: 0 is none, 1 is natural vignetting.",
+            between(0, 3));
+    v.field("quantum_efficiency", quantum_efficiency, "Electrons per photon.", between(0.01, 1));
+    v.field("full_well_e", full_well_e, "Full-well capacity of a pixel in electrons.", between(500, 200000));
+    v.field("read_noise_e", read_noise_e, "Standard deviation of the read noise in electrons.", between(0, 500));
+    v.field("black_level", black_level, "Gray level without light, as a fraction of full scale.", between(0, 0.25));
+    v.field("target_level", target_level,
+            "Mean signal that auto exposure aims at, as a fraction of the full well; raising it gives brighter images.",
+            between(0.01, 0.9));
+    v.field("longest_exposure_ms", longest_exposure_ms,
+            "Longest exposure time in milliseconds; auto exposure raises the gain beyond it. Raising it reduces noise "
+            "and adds motion blur.",
+            between(0.01, 10000));
+    v.field("largest_gain", largest_gain,
+            "Largest gain of auto exposure; with a gain of 1 the full well is full scale.", between(1, 1000));
+    v.field("noise_seed", noise_seed,
+            "Seed of the image noise alone; another one gives the same world and drive with other noise.", at_least(0));
+  }
+};
+
+/// Difference between the nominal rig, which the recording states, and the true one. Errors are those of the right
+/// camera relative to the left one, except for the focal length, which is wrong in both.
+struct NominalRigOptions {
+  double yaw_deg = 0;        ///< deg; right camera about its y axis
+  double row_offset_px = 0;  ///< px; principal point of the right camera
+  double focal_percent = 0;  ///< %; both cameras
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("yaw_deg", yaw_deg,
+            "Rotation error of the right camera about its y axis in the nominal calibration, in degrees.",
+            between(-5, 5));
+    v.renamed("rows_px", "row_offset_px");
+    v.field("row_offset_px", row_offset_px,
+            "Error of the right camera's principal point in rows in the nominal calibration, in pixels.",
+            between(-50, 50));
+    v.field("focal_percent", focal_percent, "Error of both focal lengths in the nominal calibration, in percent.",
+            between(-20, 20));
+  }
+};
+
+enum class CameraFaultKind {
+  dropped,
+  left_dark,
+  right_dark,
+  overexposed,
+  left_dust,
+  right_dust,
+  brightness_step,
+  stamp_jitter
+};
+constexpr auto enum_names(CameraFaultKind) {
+  using enum CameraFaultKind;
+  return std::array{EnumName{dropped, "dropped"},
+                    EnumName{left_dark, "left_dark"},
+                    EnumName{right_dark, "right_dark"},
+                    EnumName{overexposed, "overexposed"},
+                    EnumName{left_dust, "left_dust"},
+                    EnumName{right_dust, "right_dust"},
+                    EnumName{brightness_step, "brightness_step"},
+                    EnumName{stamp_jitter, "stamp_jitter"}};
+}
+
+/// A fault of a pair's cameras during an interval.
+struct CameraFault {
+  CameraFaultKind kind = CameraFaultKind::dropped;
+  std::string pair;             ///< empty: all pairs
+  double from_s = 0, to_s = 0;  ///< s since the start of the recording
+  double amount = 0;            ///< by kind: factor on the light, or standard deviation in s
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("kind", kind,
+            "Kind of fault: frames dropped, left or right camera dark, both overexposed, dust on the left or right "
+            "lens, a step of brightness, or jitter of the time stamps.");
+    v.field("pair", pair, "Name of the pair that fails; empty for all pairs.");
+    v.field("from_s", from_s, "Start of the fault in seconds since the start of the recording.", at_least(0));
+    v.field("to_s", to_s, "End of the fault in seconds since the start of the recording.", at_least(0));
+    v.field("amount", amount,
+            "Size of the fault: for overexposed and brightness_step the factor on the light that auto exposure does "
+            "not see; for stamp_jitter the standard deviation of the time stamps in seconds.",
+            at_least(0));
+  }
+};
+using CameraFaults = std::vector<CameraFault>;
+
+// --- Drive ---
+
+enum class PathKind { straight, arc, winding, waypoints, loop, square_spiral, turn_in_place, stationary };
+constexpr auto enum_names(PathKind) {
+  using enum PathKind;
+  return std::array{EnumName{straight, "straight"},
+                    EnumName{arc, "arc"},
+                    EnumName{winding, "winding"},
+                    EnumName{waypoints, "waypoints"},
+                    EnumName{loop, "loop"},
+                    EnumName{square_spiral, "square_spiral"},
+                    EnumName{turn_in_place, "turn_in_place"},
+                    EnumName{stationary, "standing"}};
+}
+
+/// Path of the body in the world plane. Paths begin at the world's origin, heading along x.
+struct PathOptions {
+  PathKind kind = PathKind::straight;
+  double length_m = 15;                  ///< m; straight, arc, winding, loop
+  double turn_deg = 90;                  ///< deg; arc, turn_in_place; positive to the left
+  double swing_deg = 20;                 ///< deg; winding: amplitude of the heading
+  double wavelength_m = 8;               ///< m; winding
+  std::vector<double> waypoints_m = {};  ///< m; waypoints: x, y, x, y …
+  double leg_m = 1;                      ///< m; square_spiral: first leg
+  double growth_m = 0.5;                 ///< m; square_spiral: added per leg
+  int legs = 8;                          ///< square_spiral
+  double stationary_s = 30;              ///< s; standing
+  double speed_m_s = 0.06;               ///< m/s
+  double turn_rate_deg_s = 5;            ///< deg/s; turns in place
+  double ramp_s = 2;                     ///< s; acceleration and deceleration
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("kind", kind, "Shape of the path; the keys below say for which shapes they are used.");
+    v.field("length_m", length_m, "Length of a straight, arc, winding or loop path in metres.", between(0.1, 20000));
+    v.field("turn_deg", turn_deg, "Change of heading over an arc or a turn_in_place in degrees, positive to the left.",
+            between(-3600, 3600));
+    v.field("swing_deg", swing_deg, "Amplitude of the heading of a winding path in degrees.", between(0, 80));
+    v.field("wavelength_m", wavelength_m, "Wavelength of a winding path in metres.", between(0.5, 1000));
+    v.field("waypoints_m", waypoints_m,
+            "World coordinates x, y, x, y ... in metres of the waypoints after the start, joined by a cubic spline.");
+    v.field("leg_m", leg_m, "Length of the first leg of a square_spiral in metres.", between(0.1, 1000));
+    v.field("growth_m", growth_m, "Length in metres that each leg of a square_spiral is longer than the one before.",
+            between(0, 1000));
+    v.field("legs", legs, "Number of legs of a square_spiral.", between(1, 1000));
+    v.renamed("standing_s", "stationary_s");
+    v.field("stationary_s", stationary_s, "Duration of a drive of kind standing in seconds.", between(0.1, 100000));
+    v.field("speed_m_s", speed_m_s, "Driving speed in metres per second; raising it adds motion blur.",
+            between(0.001, 5));
+    v.field("turn_rate_deg_s", turn_rate_deg_s, "Rate of turns in place in degrees per second.", between(0.1, 180));
+    v.field("ramp_s", ramp_s, "Time in seconds to accelerate to full speed, and to stop from it.", between(0.1, 60));
+  }
+};
+
+/// When odometry pairs take frames, and where the rover stops for panoramas.
+struct CaptureOptions {
+  double frame_step_m = 0.1;                    ///< m; between odometry frames
+  double frame_turn_deg = 4;                    ///< deg; between odometry frames, turning in place
+  double frame_period_s = 1;                    ///< s; between odometry frames, stationary
+  double stop_every_m = 0;                      ///< m; 0: no regular stops
+  std::vector<double> stops_m = {};             ///< m; further stops
+  std::vector<double> pans_deg = {-35, 0, 35};  ///< deg; positive to the left
+  double pan_period_s = 2;                      ///< s; from pan to pan
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("frame_step_m", frame_step_m, "Distance in metres between frames of the odometry pairs.",
+            between(0.005, 100));
+    v.field("frame_turn_deg", frame_turn_deg,
+            "Angle in degrees between frames of the odometry pairs while the rover turns in place.", between(0.1, 90));
+    v.field("frame_period_s", frame_period_s,
+            "Time in seconds between frames of the odometry pairs where the path is stationary.", between(0.01, 1000));
+    v.field("stop_every_m", stop_every_m,
+            "Distance in metres between stops with panoramas, the first at the start; 0 for no regular stops.",
+            between(0, 10000));
+    v.field("stops_m", stops_m, "Distances in metres along the path of further stops with panoramas.", at_least(0));
+    v.field("pans_deg", pans_deg, "Pan angles of a panorama in degrees, positive to the left.", between(-180, 180));
+    v.renamed("seconds_a_pan", "pan_period_s");
+    v.field("pan_period_s", pan_period_s, "Time in seconds from one pan of a panorama to the next.",
+            between(0.1, 1000));
+  }
+};
+
+/// Geometry of the four-wheeled rover.
+struct ChassisOptions {
+  double wheelbase_m = 0.7;     ///< m; front to rear axle
+  double track_m = 0.6;         ///< m; left to right wheel
+  double wheel_radius_m = 0.1;  ///< m
+  double wheel_width_m = 0.08;  ///< m
+  double clearance_m = 0.05;    ///< m; height of rocks that wheels can climb
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("wheelbase_m", wheelbase_m, "Distance from the front to the rear axle in metres.", between(0.05, 10));
+    v.field("track_m", track_m, "Distance from the left to the right wheels in metres.", between(0.05, 10));
+    v.field("wheel_radius_m", wheel_radius_m,
+            "Wheel radius in metres; a wheel rests on the mean height of the ground over a disc of this radius.",
+            between(0.01, 2));
+    v.field("wheel_width_m", wheel_width_m, "Width of a wheel in metres; wider wheels climb more rocks.",
+            between(0.005, 2));
+    v.field("clearance_m", clearance_m,
+            "Height of rocks in metres above which they are removed from the rover's path; wheels climb lower ones.",
+            between(0, 5));
+  }
+};
+
+// --- Motion sensors ---
+
+/// Errors as from an Allan deviation: white noise by its density, the bias as a constant of the drive plus a random
+/// walk.
+struct ImuOptions {
+  bool enabled = true;
+  double rate_hz = 100;                    ///< Hz
+  double gyro_noise_rad_s_sqrt_hz = 1e-4;  ///< rad/s/√Hz
+  double gyro_bias_rad_s = 5e-5;           ///< rad/s; standard deviation at the start
+  double gyro_walk_rad_s2_sqrt_hz = 2e-6;  ///< rad/s²/√Hz
+  double accel_noise_m_s2_sqrt_hz = 1e-3;  ///< m/s²/√Hz
+  double accel_bias_m_s2 = 5e-3;           ///< m/s²; standard deviation at the start
+  double accel_walk_m_s3_sqrt_hz = 5e-5;   ///< m/s³/√Hz
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has an IMU.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(1, 2000));
+    v.field("gyro_noise_rad_s_sqrt_hz", gyro_noise_rad_s_sqrt_hz,
+            "Density of the gyroscopes' white noise in rad/s/sqrt(Hz).", at_least(0));
+    v.field("gyro_bias_rad_s", gyro_bias_rad_s, "Standard deviation of the gyroscopes' bias at the start in rad/s.",
+            at_least(0));
+    v.field("gyro_walk_rad_s2_sqrt_hz", gyro_walk_rad_s2_sqrt_hz,
+            "Density of the random walk of the gyroscopes' bias in rad/s^2/sqrt(Hz).", at_least(0));
+    v.field("accel_noise_m_s2_sqrt_hz", accel_noise_m_s2_sqrt_hz,
+            "Density of the accelerometers' white noise in m/s^2/sqrt(Hz).", at_least(0));
+    v.field("accel_bias_m_s2", accel_bias_m_s2, "Standard deviation of the accelerometers' bias at the start in m/s^2.",
+            at_least(0));
+    v.field("accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz,
+            "Density of the random walk of the accelerometers' bias in m/s^3/sqrt(Hz).", at_least(0));
+  }
+};
+
+/// Wheel odometry with slip, the fraction of the rolled distance that does not move the rover:
+///   slip = level + by_slope · tan(climb) + sand · noise(x, y),  rolled = travelled / (1 − slip).
+struct WheelOptions {
+  bool enabled = true;
+  double rate_hz = 20;           ///< Hz
+  double slip_level = 0.02;      ///< slip on level ground
+  double slip_by_slope = 1;      ///< slip per tan(climb)
+  double slip_sand = 0.03;       ///< standard deviation of the slip between patches of sand
+  double sand_size_m = 2;        ///< m; size of the patches
+  double radius_error = 0.005;   ///< standard deviation of each side's scale
+  double resolution_m = 0.0005;  ///< m; encoder step
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has wheel encoders.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(0.1, 1000));
+    v.field("slip_level", slip_level, "Slip on level ground, as a fraction of the rolled distance.",
+            between(-0.5, 0.9));
+    v.field("slip_by_slope", slip_by_slope, "Additional slip on a climb of 45 degrees; it grows with tan(climb).",
+            between(0, 5));
+    v.field("slip_sand", slip_sand, "Standard deviation of the slip between patches of sand.", between(0, 0.5));
+    v.field("sand_size_m", sand_size_m, "Size of the patches of sand in metres.", between(0.1, 100));
+    v.field("radius_error", radius_error,
+            "Standard deviation of the scale error of each side, as a fraction of the distance.", between(0, 0.2));
+    v.field("resolution_m", resolution_m, "Resolution of the encoders in metres of rolled distance; 0 is exact.",
+            between(0, 0.1));
+  }
+};
+
+/// A compass or sun sensor.
+struct CompassOptions {
+  bool enabled = true;
+  double rate_hz = 1;              ///< Hz
+  double sigma_deg = 1;            ///< deg; standard deviation of the noise
+  double bias_deg = 1;             ///< deg; standard deviation of the bias
+  double outlier_fraction = 0.02;  ///< fraction of samples with a random heading
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has a compass.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(0.01, 100));
+    v.field("sigma_deg", sigma_deg, "Standard deviation of the noise of a sample in degrees, as recorded with it.",
+            between(0, 90));
+    v.field("bias_deg", bias_deg, "Standard deviation in degrees of the bias, which is constant over the drive.",
+            between(0, 90));
+    v.renamed("outlier_share", "outlier_fraction");
+    v.field("outlier_fraction", outlier_fraction, "Fraction of samples whose heading is uniformly random.",
+            between(0, 1));
+  }
+};
+
+/// An inclinometer for roll and pitch.
+struct InclinometerOptions {
+  bool enabled = true;
+  double rate_hz = 5;      ///< Hz
+  double sigma_deg = 0.2;  ///< deg; standard deviation of the noise
+  double bias_deg = 0.1;   ///< deg; standard deviation of the bias
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has an inclinometer.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(0.01, 1000));
+    v.field("sigma_deg", sigma_deg, "Standard deviation of the noise of a sample in degrees, as recorded with it.",
+            between(0, 45));
+    v.field("bias_deg", bias_deg,
+            "Standard deviation in degrees of the biases of roll and pitch, which are constant over the drive.",
+            between(0, 45));
+  }
+};
+
+enum class MotionSensor { imu, wheels, compass, inclinometer };
+constexpr auto enum_names(MotionSensor) {
+  using enum MotionSensor;
+  return std::array{EnumName{imu, "imu"}, EnumName{wheels, "wheels"}, EnumName{compass, "compass"},
+                    EnumName{inclinometer, "inclinometer"}};
+}
+
+enum class SensorFaultKind { drop, freeze };
+constexpr auto enum_names(SensorFaultKind) {
+  return std::array{EnumName{SensorFaultKind::drop, "drop"}, EnumName{SensorFaultKind::freeze, "freeze"}};
+}
+
+/// An interval in which a sensor sends nothing, or repeats its last sample.
+struct SensorFault {
+  MotionSensor sensor = MotionSensor::imu;
+  SensorFaultKind kind = SensorFaultKind::drop;
+  double from_s = 0, to_s = 0;  ///< s since the start of the recording
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("sensor", sensor, "Sensor that fails.");
+    v.field("kind", kind, "Kind of fault: drop sends no samples, freeze repeats the last one.");
+    v.field("from_s", from_s, "Start of the fault in seconds since the start of the recording.", at_least(0));
+    v.field("to_s", to_s, "End of the fault in seconds since the start of the recording.", at_least(0));
+  }
+};
+using SensorFaults = std::vector<SensorFault>;
+
+// --- Ground truth ---
+
+/// What ground truth is written.
+struct TruthOptions {
+  bool disparity = true;
+  double cell_m = 0.02;     ///< m
+  double obstacle_m = 0.1;  ///< m; above the ground without rocks
+  double cavity_m = 0.1;    ///< m; below the ground without cavities
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("disparity", disparity, "Whether to write the true disparity image and its mask of every frame.");
+    v.field("cell_m", cell_m, "Cell size of elevation.tif and obstacles.tif in metres.", between(0.005, 1));
+    v.field("obstacle_m", obstacle_m,
+            "Height in metres above the ground without rocks from which on a cell is an obstacle.", between(0.01, 5));
+    v.field("cavity_m", cavity_m, "Depth in metres below the ground without cavities from which on a cell is a cavity.",
+            between(0.01, 5));
+  }
+};
+
+}  // namespace spartan::sim
