@@ -1,4 +1,4 @@
-// EuRoC/ASL: cam0/data.csv, cam0/data/<file>, cam1/…, imu0/data.csv, sensor.yaml in each.
+// EuRoC/ASL layout: cam0/data.csv, cam0/data/<file>, cam1/…, imu0/data.csv, each with a sensor.yaml.
 // Source: Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016.
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// With whole paths in place of the names.
+// The images of one camera folder, file names expanded to paths.
 Result<EurocImages> read_images(const fs::path& camera) {
   auto table = TableReader::open((camera / "data.csv").string(), {});
   if (!table) return failure(table);
@@ -33,33 +33,36 @@ struct EurocImu {
   ImuNoise noise;
 };
 
-// The rotation of T_BS; the identity where there is none.
+// The rotation part of T_BS (body from sensor); identity where the key is missing.
 Result<Eigen::Quaterniond> rotation_of(const YAML::Node& transform, const std::string& path) {
   if (!transform) return Eigen::Quaterniond::Identity();
-  // Both forms are in use: {rows, cols, data: […]} and the plain list.
+  // Two forms are in use: {rows, cols, data: […]} and a plain list of 16 numbers.
   const auto data = (transform.IsMap() ? transform["data"] : transform).as<std::vector<double>>();
-  if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS has not 16 numbers", path);
+  if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS does not have 16 numbers", path);
   Eigen::Matrix3d rotation;
   rotation << data[0], data[1], data[2], data[4], data[5], data[6], data[8], data[9], data[10];
-  if (!is_rotation(rotation, 1e-3)) return failure(ErrorCode::configuration, "T_BS holds no rotation", path);
+  if (!is_rotation(rotation, 1e-3))
+    return failure(ErrorCode::configuration, "the rotation part of T_BS is not a rotation matrix", path);
   return Eigen::Quaterniond(nearest_rotation(rotation));
 }
 
-// A noise density; 0, not stated, where it is missing.
+// A noise density; 0 (unknown) where the key is missing.
 Result<double> density(const YAML::Node& file, const char* key, const std::string& path) {
   const double value = file[key] ? file[key].as<double>() : 0;
-  if (!(value >= 0 && value < 10)) return failure(ErrorCode::configuration, fmt::format("{} is {}", key, value), path);
+  if (!(value >= 0 && value < 10))
+    return failure(ErrorCode::configuration, fmt::format("{} is {}, expected a number in [0, 10)", key, value), path);
   return value;
 }
 
-// imu0/sensor.yaml; nothing known where there is none.
+// Reads imu0/sensor.yaml; defaults where the file is missing.
 Result<EurocImu> read_imu(const std::string& path) {
   EurocImu imu;
   std::error_code error;
   if (!fs::exists(path, error)) return imu;
   auto text = read_file(path);
   if (!text) return failure(text);
-  if (text->starts_with("%YAML:")) text->erase(0, text->find('\n'));  // OpenCV's header is no valid YAML
+  if (text->starts_with("%YAML:"))
+    text->erase(0, text->find('\n'));  // the %YAML:1.0 header of OpenCV is not valid YAML
   try {
     const YAML::Node file = YAML::Load(*text);
     const auto rotation = rotation_of(file["T_BS"], path);
@@ -69,9 +72,9 @@ Result<EurocImu> read_imu(const std::string& path) {
                                      {"gyroscope_random_walk", &imu.noise.gyro_walk_rad_s2_sqrt_hz},
                                      {"accelerometer_noise_density", &imu.noise.accel_noise_m_s2_sqrt_hz},
                                      {"accelerometer_random_walk", &imu.noise.accel_walk_m_s3_sqrt_hz}}) {
-      const auto stated = density(file, key, path);
-      if (!stated) return failure(stated);
-      *noise = *stated;
+      const auto specified = density(file, key, path);
+      if (!specified) return failure(specified);
+      *noise = *specified;
     }
   } catch (const YAML::Exception& e) {
     return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, path);
@@ -79,23 +82,23 @@ Result<EurocImu> read_imu(const std::string& path) {
   return imu;
 }
 
-Shot make_shot(const StampMatch& match, const EurocImages& left, const EurocImages& right) {
-  Shot shot;
+FrameEntry make_entry(const StampMatch& match, const EurocImages& left, const EurocImages& right) {
+  FrameEntry entry;
   const Stamp any = match.left ? left.stamps[*match.left] : right.stamps[*match.right];
-  shot.left_stamp = shot.right_stamp = any;
-  shot.only_right = !match.left;
-  if (match.left) shot.left_file = left.files[*match.left];
+  entry.left_stamp = entry.right_stamp = any;
+  entry.right_only = !match.left;
+  if (match.left) entry.left_file = left.files[*match.left];
   if (match.right) {
-    shot.right_file = right.files[*match.right];
-    shot.right_stamp = right.stamps[*match.right];
+    entry.right_file = right.files[*match.right];
+    entry.right_stamp = right.stamps[*match.right];
   }
   if (!match.left || !match.right) {
     const bool no_left = !match.left;
-    shot.fault = no_left ? FrameFault::left_missing : FrameFault::right_missing;
-    shot.message = fmt::format("{}: no image of the {} eye near {} ns", no_left ? shot.right_file : shot.left_file,
-                               no_left ? "left" : "right", any.ns);
+    entry.fault = no_left ? FrameFault::left_missing : FrameFault::right_missing;
+    entry.message = fmt::format("{}: has no {} image within the pairing tolerance at {} ns",
+                                no_left ? entry.right_file : entry.left_file, no_left ? "left" : "right", any.ns);
   }
-  return shot;
+  return entry;
 }
 
 }  // namespace
@@ -112,12 +115,12 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
   if (!rig) return failure(rig);
   index.info.rig = std::move(rig->rig);
   index.info.rig_source = rig->source;
-  const std::string pair = only_pair(index.info.rig);
+  const std::string pair = default_pair(index.info.rig);
   for (const StampMatch& match : match_stamps(left->stamps, right->stamps, options.pair_tolerance_s)) {
-    Shot shot = make_shot(match, *left, *right);
-    shot.frame_id = static_cast<std::int64_t>(index.shots.size());
-    shot.pair = pair;
-    index.shots.push_back(std::move(shot));
+    FrameEntry entry = make_entry(match, *left, *right);
+    entry.frame_id = static_cast<std::int64_t>(index.frames.size());
+    entry.pair = pair;
+    index.frames.push_back(std::move(entry));
   }
   std::error_code error;
   if (const fs::path truth = folder / "state_groundtruth_estimate0" / "data.csv"; fs::exists(truth, error)) {

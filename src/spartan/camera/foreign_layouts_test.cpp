@@ -1,4 +1,4 @@
-// Recordings as others lay them out: KITTI odometry, KITTI raw, EuRoC; and which of them a folder is.
+// Recordings in the layouts of public data sets: KITTI odometry, KITTI raw, EuRoC; and detection of the layout.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,11 +26,11 @@ const std::string kKittiCalib = "P0: 30 0 16 0 0 30 8 0 0 0 1 0\nP1: 30 0 16 -3 
 class ForeignLayouts : public ::testing::Test {
  protected:
   void image(const std::string& name, int width = 32, int height = 16) {
-    Image<std::uint8_t> picture(width, height);
+    Image<std::uint8_t> pixels(width, height);
     for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) picture(x, y) = static_cast<std::uint8_t>((7 * x + 31 * y) % 256);
+      for (int x = 0; x < width; ++x) pixels(x, y) = static_cast<std::uint8_t>((7 * x + 31 * y) % 256);
     }
-    ASSERT_TRUE(write_png(folder_.file(name), picture.view()));
+    ASSERT_TRUE(write_png(folder_.file(name), pixels.view()));
   }
   std::string text_of(const std::string& name) { return read_file(folder_.path() + "/" + name).value(); }
   void remove(const std::string& name) { ASSERT_TRUE(std::filesystem::remove_all(folder_.path() + "/" + name) > 0); }
@@ -40,13 +40,13 @@ class ForeignLayouts : public ::testing::Test {
     EXPECT_TRUE(source) << source.error().message();
     return source ? std::move(*source) : nullptr;
   }
-  std::string refusal(const OpenOptions& options = {}) {
+  std::string rejection(const OpenOptions& options = {}) {
     const auto source = open_recording(folder_.path(), options);
     if (source) return "opened";
     EXPECT_EQ(source.error().code, ErrorCode::input);
     return source.error().message();
   }
-  // "f0 f1 right_missing …": frames by number, what is missing by reason, i: IMU.
+  // "f0 f1 right_missing …": frames by id, missing frames by fault, IMU samples as i.
   std::vector<std::string> play(FrameSource& source) {
     std::vector<std::string> seen;
     while (true) {
@@ -69,12 +69,12 @@ class KittiLayout : public ForeignLayouts {
     folder_.write("calib.txt", kKittiCalib);
     folder_.write("times.txt", "0.0\n1.036e-01\n2.07e-01\n0.31\n");
     for (int i = 0; i < 4; ++i) {
-      for (const char* eye : {"image_0", "image_1"}) image(fmt::format("{}/{:06}.png", eye, i));
+      for (const char* side : {"image_0", "image_1"}) image(fmt::format("{}/{:06}.png", side, i));
     }
   }
 };
 
-TEST_F(KittiLayout, IsRead) {
+TEST_F(KittiLayout, ReadsFramesAndTruth) {
   auto source = open();
   EXPECT_EQ(source->info().format, RecordingFormat::kitti);
   EXPECT_THAT(source->info().layout_reason, HasSubstr("calib.txt and image_0 found"));
@@ -88,7 +88,7 @@ TEST_F(KittiLayout, IsRead) {
   EXPECT_EQ(open()->info().truth_file, folder_.path() + "/poses.txt");
 }
 
-TEST_F(KittiLayout, GoesOnWhereAnEyeIsMissing) {
+TEST_F(KittiLayout, SkipsFramesWithAMissingImage) {
   remove("image_1/000001.png");
   remove("image_0/000002.png");
   auto source = open();
@@ -96,39 +96,39 @@ TEST_F(KittiLayout, GoesOnWhereAnEyeIsMissing) {
   EXPECT_EQ(source->info().sequence.orphans_left, 1);
   EXPECT_EQ(source->info().sequence.orphans_right, 1);
   remove("image_1");
-  EXPECT_THAT(refusal(), HasSubstr("none of the 4 announced stereo shots is usable"));
+  EXPECT_THAT(rejection(), HasSubstr("none of the 4 listed stereo frames is usable"));
 }
 
-TEST_F(KittiLayout, WithoutTimesTenShotsASecond) {
+TEST_F(KittiLayout, AssumesTenHertzWithoutTimes) {
   remove("times.txt");
   auto source = open();
-  EXPECT_THAT(source->info().layout_reason, HasSubstr("no times.txt: images are taken to be 0.1 s apart"));
+  EXPECT_THAT(source->info().layout_reason, HasSubstr("no times.txt: frames are assumed to be 0.1 s apart"));
   EXPECT_THAT(source->announced_stamps("stereo"),
               ElementsAre(Stamp{0}, Stamp{100'000'000}, Stamp{200'000'000}, Stamp{300'000'000}));
 }
 
-TEST_F(KittiLayout, TimesThatMakeNoSense) {
+TEST_F(KittiLayout, RejectsInvalidTimes) {
   folder_.write("times.txt", "0\n0.1\nnan\n0.3\n");
-  EXPECT_THAT(refusal(), HasSubstr("times.txt:3"));
+  EXPECT_THAT(rejection(), HasSubstr("times.txt:3"));
   folder_.write("times.txt", "");
-  EXPECT_THAT(refusal(), HasSubstr("it holds no time"));
+  EXPECT_THAT(rejection(), HasSubstr("the file holds no times"));
   folder_.write("times.txt", "0\n0.1\n0.05\n0.3\n");
   auto source = open();
   EXPECT_THAT(play(*source), ElementsAre("f0", "f1", "stamp_reversed", "f3"));
   EXPECT_EQ(source->info().sequence.reversals, 1);
   folder_.write("times.txt", "0\n0.1\n");
   EXPECT_THAT(play(*open()), ElementsAre("f0", "f1"));
-  EXPECT_THAT(open()->info().sequence.remarks, ::testing::Not(IsEmpty())) << "two images stand without a time";
+  EXPECT_THAT(open()->info().sequence.remarks, ::testing::Not(IsEmpty())) << "two images have no time";
 }
 
-TEST_F(KittiLayout, GapsAreCounted) {
+TEST_F(KittiLayout, CountsGaps) {
   folder_.write("times.txt", "0\n0.1\n0.2\n1.3\n");
   const auto source = open();
   EXPECT_EQ(source->info().sequence.gaps, 1);
   EXPECT_NEAR(source->info().sequence.longest_gap_s, 1.1, 1e-9);
 }
 
-TEST_F(KittiLayout, DamagedImagesAreSkipped) {
+TEST_F(KittiLayout, SkipsDamagedImages) {
   const std::string whole = text_of("image_0/000001.png");
   folder_.write("image_0/000001.png", whole.substr(0, whole.size() - 20));
   folder_.write("image_1/000002.png", "");
@@ -136,13 +136,13 @@ TEST_F(KittiLayout, DamagedImagesAreSkipped) {
   EXPECT_THAT(play(*open()), ElementsAre("f0", "unreadable", "unreadable", "wrong_size"));
 }
 
-TEST_F(KittiLayout, JpegsThatEndEarlyAreSkipped) {
-  cv::Mat picture(16, 32, CV_8U);
-  cv::randu(picture, 0, 256);
+TEST_F(KittiLayout, SkipsTruncatedJpegs) {
+  cv::Mat pixels(16, 32, CV_8U);
+  cv::randu(pixels, 0, 256);
   for (int i = 0; i < 4; ++i) {
-    for (const char* eye : {"image_0", "image_1"}) {
-      remove(fmt::format("{}/{:06}.png", eye, i));
-      cv::imwrite(folder_.file(fmt::format("{}/{:06}.jpg", eye, i)), picture);
+    for (const char* side : {"image_0", "image_1"}) {
+      remove(fmt::format("{}/{:06}.png", side, i));
+      cv::imwrite(folder_.file(fmt::format("{}/{:06}.jpg", side, i)), pixels);
     }
   }
   EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "f2", "f3"));
@@ -154,12 +154,12 @@ TEST_F(KittiLayout, JpegsThatEndEarlyAreSkipped) {
   }
 }
 
-TEST_F(KittiLayout, CalibrationFaultsAreOfTheirOwnKind) {
+TEST_F(KittiLayout, CalibrationFaultsHaveCodeConfiguration) {
   folder_.write("calib.txt", "P0: nan 0 16 0 0 30 8 0 0 0 1 0\nP1: 30 0 16 -3 0 30 8 0 0 0 1 0\n");
-  const auto refused = open_recording(folder_.path());
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
-  // Another calibration takes its place.
+  const auto rejected = open_recording(folder_.path());
+  ASSERT_FALSE(rejected);
+  EXPECT_EQ(rejected.error().code, ErrorCode::configuration);
+  // A calibration given by the caller replaces it.
   OpenOptions options;
   options.rig_file = folder_.write("other.txt", kKittiCalib);
   EXPECT_EQ(open(options)->info().rig_source, options.rig_file);
@@ -176,7 +176,7 @@ class KittiRawLayout : public ForeignLayouts {
     std::string times;
     for (int i = 0; i < 3; ++i) {
       times += fmt::format("2011-09-26 13:02:25.{}64389445\n", i);
-      for (const char* eye : {"image_00", "image_01"}) image(fmt::format("{}/data/{:010}.png", eye, i));
+      for (const char* side : {"image_00", "image_01"}) image(fmt::format("{}/data/{:010}.png", side, i));
       std::string oxts;
       for (int k = 0; k < 30; ++k) oxts += fmt::format("{} ", 100 * i + k);
       folder_.write(fmt::format("oxts/data/{:010}.txt", i), oxts + "\n");
@@ -186,7 +186,7 @@ class KittiRawLayout : public ForeignLayouts {
   }
 };
 
-TEST_F(KittiRawLayout, IsReadWithItsInertialUnit) {
+TEST_F(KittiRawLayout, ReadsFramesAndImu) {
   folder_.write("calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n");
   folder_.write("calib_velo_to_cam.txt", "R: 0 -1 0 0 0 -1 1 0 0\nT: 0 0 0\n");
   auto source = open();
@@ -201,11 +201,11 @@ TEST_F(KittiRawLayout, IsReadWithItsInertialUnit) {
   EXPECT_EQ(imu[1].gyro_rad_s, Eigen::Vector3d(117, 118, 119));
 }
 
-TEST_F(KittiRawLayout, DatesThatMakeNoSense) {
+TEST_F(KittiRawLayout, RejectsInvalidDates) {
   for (const char* bad :
        {"2011-13-26 13:02:25.0", "2011-09-26 13:02", "2011-09-26", "yesterday noon", "2011-09-26 25:02:25.0"}) {
     folder_.write("image_00/timestamps.txt", std::string(bad) + "\n");
-    EXPECT_THAT(refusal(), HasSubstr("image_00/timestamps.txt:1")) << bad;
+    EXPECT_THAT(rejection(), HasSubstr("image_00/timestamps.txt:1")) << bad;
   }
 }
 
@@ -234,7 +234,7 @@ class EurocLayout : public ForeignLayouts {
   }
 };
 
-TEST_F(EurocLayout, IsReadFromWhereverItIsPointedAt) {
+TEST_F(EurocLayout, OpensAboveAndInsideMav0) {
   EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "f2", "f3"));
   EXPECT_EQ(open()->info().format, RecordingFormat::euroc);
   auto source = open_recording(folder_.path() + "/mav0");
@@ -242,7 +242,7 @@ TEST_F(EurocLayout, IsReadFromWhereverItIsPointedAt) {
   EXPECT_THAT(play(**source), ElementsAre("f0", "f1", "f2", "f3"));
 }
 
-TEST_F(EurocLayout, PairsAreMatchedByTheirStamps) {
+TEST_F(EurocLayout, PairsImagesByStamp) {
   list(1, {1002, 2998, 4001, 70000});
   auto source = open();
   EXPECT_THAT(play(*source), ElementsAre("f0", "right_missing", "f2", "f3", "left_missing"));
@@ -253,7 +253,7 @@ TEST_F(EurocLayout, PairsAreMatchedByTheirStamps) {
   EXPECT_EQ(frame->right_stamp, Stamp{2'998'000});
 }
 
-TEST_F(EurocLayout, TheUnitsAxesAreTurnedIntoTheBody) {
+TEST_F(EurocLayout, RotatesImuSamplesIntoTheBodyFrame) {
   folder_.write("mav0/imu0/sensor.yaml", "T_BS: {rows: 4, cols: 4, data: [0,-1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]}\n");
   folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n1500000,0,0,0,0,0,0\n");
   auto source = open();
@@ -263,9 +263,9 @@ TEST_F(EurocLayout, TheUnitsAxesAreTurnedIntoTheBody) {
   EXPECT_LE((imu[0].accel_m_s2 - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
 }
 
-TEST_F(EurocLayout, TheUnitsNoiseIsWhatItsFileStates) {
+TEST_F(EurocLayout, ReadsTheNoiseOfTheImu) {
   folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n");
-  EXPECT_EQ(open()->info().noise.imu.gyro_noise_rad_s_sqrt_hz, 0) << "no sensor.yaml: not stated";
+  EXPECT_EQ(open()->info().noise.imu.gyro_noise_rad_s_sqrt_hz, 0) << "no sensor.yaml: unknown";
   const std::string densities =
       "%YAML:1.0\ngyroscope_noise_density: 1.7e-4\ngyroscope_random_walk: 1.9e-5\n"
       "accelerometer_noise_density: 2.0e-3\n";
@@ -274,51 +274,51 @@ TEST_F(EurocLayout, TheUnitsNoiseIsWhatItsFileStates) {
   EXPECT_EQ(noise.gyro_noise_rad_s_sqrt_hz, 1.7e-4);
   EXPECT_EQ(noise.gyro_walk_rad_s2_sqrt_hz, 1.9e-5);
   EXPECT_EQ(noise.accel_noise_m_s2_sqrt_hz, 2e-3);
-  EXPECT_EQ(noise.accel_walk_m_s3_sqrt_hz, 0) << "not stated";
-  const auto complaint = [&](const std::string& text) {
+  EXPECT_EQ(noise.accel_walk_m_s3_sqrt_hz, 0) << "key missing: unknown";
+  const auto error_message = [&](const std::string& text) {
     folder_.write("mav0/imu0/sensor.yaml", text);
-    const auto refused = open_recording(folder_.path());
-    EXPECT_EQ(refused.error().code, ErrorCode::configuration);
-    return refused.error().message();
+    const auto rejected = open_recording(folder_.path());
+    EXPECT_EQ(rejected.error().code, ErrorCode::configuration);
+    return rejected.error().message();
   };
-  EXPECT_THAT(complaint(densities + "accelerometer_random_walk: -1\n"),
-              HasSubstr("imu0/sensor.yaml: accelerometer_random_walk is -1"));
-  EXPECT_THAT(complaint("gyroscope_noise_density: small\n"), HasSubstr("imu0/sensor.yaml: not valid YAML"));
+  EXPECT_THAT(error_message(densities + "accelerometer_random_walk: -1\n"),
+              HasSubstr("imu0/sensor.yaml: accelerometer_random_walk is -1, expected a number in [0, 10)"));
+  EXPECT_THAT(error_message("gyroscope_noise_density: small\n"), HasSubstr("imu0/sensor.yaml: not valid YAML"));
 }
 
-TEST_F(EurocLayout, FaultsNameFileAndLine) {
+TEST_F(EurocLayout, ErrorsNameFileAndLine) {
   folder_.write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1000000,1000000.png\nsoon,2000000.png\n");
-  EXPECT_THAT(refusal(), HasSubstr("cam1/data.csv:3: the first column is not a time in nanoseconds"));
+  EXPECT_THAT(rejection(), HasSubstr("cam1/data.csv:3: the first column is not a time in nanoseconds"));
   folder_.write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1000000\n");
-  EXPECT_THAT(refusal(), HasSubstr("cam1/data.csv:2: 1 values where 2 are expected"));
+  EXPECT_THAT(rejection(), HasSubstr("cam1/data.csv:2: 1 values, expected 2"));
   remove("mav0/cam1/data.csv");
-  EXPECT_THAT(refusal(), HasSubstr("cam1/data.csv"));
+  EXPECT_THAT(rejection(), HasSubstr("cam1/data.csv"));
 }
 
 // --- which layout ---
 
-TEST_F(ForeignLayouts, WhatIsNoRecordingIsToldWhatWasLookedFor) {
-  EXPECT_THAT(refusal(), HasSubstr("the folder is empty"));
+TEST_F(ForeignLayouts, RejectsOtherFoldersAndListsTheKnownLayouts) {
+  EXPECT_THAT(rejection(), HasSubstr("the folder is empty"));
   folder_.write("holiday.txt", "x");
-  EXPECT_THAT(refusal(), HasSubstr("no layout of a recording that is known"));
-  EXPECT_THAT(refusal(), HasSubstr("looked for calib.txt with image_0"));
+  EXPECT_THAT(rejection(), HasSubstr("is not a recording of a known layout"));
+  EXPECT_THAT(rejection(), HasSubstr("looked for calib.txt with image_0"));
   EXPECT_THAT(open_recording(folder_.path() + "/none").error().message(), HasSubstr("no such folder"));
   EXPECT_THAT(open_recording(folder_.path() + "/holiday.txt").error().message(), HasSubstr("is a file"));
 }
 
-TEST_F(EurocLayout, KittiWinsWhereBothAreThere) {
+TEST_F(EurocLayout, KittiHasPrecedence) {
   folder_.write("calib.txt", kKittiCalib);
-  for (const char* eye : {"image_0", "image_1"}) image(std::string(eye) + "/000000.png");
+  for (const char* side : {"image_0", "image_1"}) image(std::string(side) + "/000000.png");
   EXPECT_EQ(open()->info().format, RecordingFormat::kitti);
   OpenOptions options;
   options.format = RecordingFormat::euroc;
   EXPECT_EQ(open(options)->info().format, RecordingFormat::euroc);
-  EXPECT_THAT(open(options)->info().layout_reason, HasSubstr("euroc asked for"));
+  EXPECT_THAT(open(options)->info().layout_reason, HasSubstr("euroc requested"));
   options.format = RecordingFormat::spartan;
-  EXPECT_THAT(refusal(options), HasSubstr("recording.yaml"));
+  EXPECT_THAT(rejection(options), HasSubstr("recording.yaml"));
 }
 
-TEST(RecordingFormats, HaveTheNamesOfTheCommandLine) {
+TEST(RecordingFormats, NamesRoundTrip) {
   for (const char* name : {"spartan", "kitti", "kitti-raw", "euroc"})
     EXPECT_EQ(name_of(parse_recording_format(name).value()), name);
   const auto unknown = parse_recording_format("tum");

@@ -16,18 +16,18 @@ struct FormatEntry {
   RecordingFormat format;
   std::string_view name;
   Result<RecordingIndex> (*index)(const LayoutChoice&, const OpenOptions&);
-  // Where the layout lies in a folder and how it is recognised; nothing where it does not.
+  // Detects the layout in a folder; nothing where it is absent.
   std::optional<LayoutChoice> (*recognise)(const fs::path&, const OpenOptions&);
 };
 
-bool is_there(const fs::path& path) {
+bool path_exists(const fs::path& path) {
   std::error_code error;
   return fs::exists(path, error);
 }
 
 std::optional<LayoutChoice> recognise_kitti(const fs::path& folder, const OpenOptions& options) {
-  if (!is_there(folder / "image_0")) return std::nullopt;
-  if (is_there(folder / "calib.txt")) {
+  if (!path_exists(folder / "image_0")) return std::nullopt;
+  if (path_exists(folder / "calib.txt")) {
     return LayoutChoice{RecordingFormat::kitti, folder.string(), "calib.txt and image_0 found"};
   }
   if (options.rig_file.empty()) return std::nullopt;
@@ -36,20 +36,20 @@ std::optional<LayoutChoice> recognise_kitti(const fs::path& folder, const OpenOp
 
 std::optional<LayoutChoice> recognise_spartan(const fs::path& folder, const OpenOptions&) {
   for (const char* file : {"recording.yaml", "frames.csv"}) {
-    if (is_there(folder / file))
+    if (path_exists(folder / file))
       return LayoutChoice{RecordingFormat::spartan, folder.string(), fmt::format("{} found", file)};
   }
   return std::nullopt;
 }
 
 std::optional<LayoutChoice> recognise_kitti_raw(const fs::path& folder, const OpenOptions&) {
-  if (!is_there(folder / "image_00")) return std::nullopt;
+  if (!path_exists(folder / "image_00")) return std::nullopt;
   return LayoutChoice{RecordingFormat::kitti_raw, folder.string(), "image_00 found"};
 }
 
 std::optional<LayoutChoice> recognise_euroc(const fs::path& folder, const OpenOptions&) {
   for (const fs::path& mav : {folder / "mav0", folder}) {
-    if (is_there(mav / "cam0" / "data.csv")) {
+    if (path_exists(mav / "cam0" / "data.csv")) {
       const std::string name = (mav == folder ? "" : "mav0/") + std::string("cam0/data.csv found");
       return LayoutChoice{RecordingFormat::euroc, mav.string(), name};
     }
@@ -57,7 +57,7 @@ std::optional<LayoutChoice> recognise_euroc(const fs::path& folder, const OpenOp
   return std::nullopt;
 }
 
-// In the order in which layouts are tried: a folder with calib.txt and image_0 is KITTI's, whatever lies beside.
+// In order of detection: a folder with calib.txt and image_0 is KITTI odometry, whatever else it contains.
 constexpr std::array<FormatEntry, 4> kFormats{{
     {RecordingFormat::kitti, "kitti", index_kitti, recognise_kitti},
     {RecordingFormat::spartan, "spartan", index_spartan, recognise_spartan},
@@ -79,24 +79,25 @@ const FormatEntry& entry_of(RecordingFormat format) {
 Result<LayoutChoice> choose_layout(const std::string& path, const OpenOptions& options) {
   std::error_code error;
   if (!fs::exists(path, error)) return failure(ErrorCode::input, "no such folder", path, kLookedFor);
-  if (!fs::is_directory(path, error)) return failure(ErrorCode::input, "is a file, not a recording's folder", path);
+  if (!fs::is_directory(path, error))
+    return failure(ErrorCode::input, "is a file, not the folder of a recording", path);
   if (fs::directory_iterator(path, error) == fs::directory_iterator()) {
     return failure(ErrorCode::input, error ? "the folder cannot be read" : "the folder is empty", path, kLookedFor);
   }
   if (options.format) {
     auto layout = entry_of(*options.format).recognise(path, options);
     if (!layout) layout = LayoutChoice{*options.format, path, ""};
-    layout->reason = fmt::format("{} asked for", name_of(*options.format));
+    layout->reason = fmt::format("{} requested", name_of(*options.format));
     return *layout;
   }
   std::optional<LayoutChoice> chosen;
   for (const FormatEntry& entry : kFormats) {
     const auto layout = entry.recognise(path, options);
     if (layout && chosen)
-      chosen->reason += fmt::format("; --format {} is possible too: {}", entry.name, layout->reason);
+      chosen->reason += fmt::format("; --format {} is also possible: {}", entry.name, layout->reason);
     if (layout && !chosen) chosen = layout;
   }
-  if (!chosen) return failure(ErrorCode::input, "no layout of a recording that is known", path, kLookedFor);
+  if (!chosen) return failure(ErrorCode::input, "is not a recording of a known layout", path, kLookedFor);
   return *chosen;
 }
 
@@ -112,7 +113,7 @@ Result<RecordingFormat> parse_recording_format(std::string_view name) {
     if (entry.name == name) return entry.format;
     known += (known.empty() ? "" : ", ") + std::string(entry.name);
   }
-  return failure(ErrorCode::usage, fmt::format("'{}' is no format of a recording", name), {}, "known are " + known);
+  return failure(ErrorCode::usage, fmt::format("unknown recording format '{}'", name), {}, "choose one of " + known);
 }
 
 Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, const OpenOptions& options) {
@@ -126,7 +127,7 @@ Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, con
   info.layout_reason = layout->reason + (info.layout_reason.empty() ? "" : "; " + info.layout_reason);
   info.has_imu = static_cast<bool>(index->imu);
   if (info.name.empty()) info.name = fs::weakly_canonical(path).filename().string();
-  if (Status status = arrange(*index, options.pair_tolerance_s); !status) return failure(status);
+  if (Status status = validate_and_sort(*index, options.pair_tolerance_s); !status) return failure(status);
   return make_indexed_source(std::move(*index));
 }
 

@@ -1,4 +1,4 @@
-// Which layout a folder is taken for, and what is said where it is none.
+// Detection of the folder layout, and its errors.
 #include "spartan/camera/frame_source.h"
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
-std::string fault_of(const std::string& path, const OpenOptions& options = {}, ErrorCode code = ErrorCode::input) {
+std::string error_of(const std::string& path, const OpenOptions& options = {}, ErrorCode code = ErrorCode::input) {
   const auto source = open_recording(path, options);
   if (source) return "no fault";
   EXPECT_EQ(source.error().code, code) << source.error().message();
@@ -33,7 +33,7 @@ class Layouts : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(Layouts, KittiIsRecognised) {
+TEST_F(Layouts, RecognisesKitti) {
   testing::write_tiny_kitti(folder_, 2);
   const RecordingInfo info = info_of(folder_.path());
   EXPECT_EQ(info.format, RecordingFormat::kitti);
@@ -43,20 +43,20 @@ TEST_F(Layouts, KittiIsRecognised) {
   EXPECT_EQ(info.path, folder_.path());
 }
 
-TEST_F(Layouts, KittiRawIsRecognised) {
+TEST_F(Layouts, RecognisesKittiRaw) {
   testing::write_tiny_kitti_raw(folder_, 2);
   EXPECT_EQ(info_of(folder_.path()).format, RecordingFormat::kitti_raw);
   EXPECT_THAT(info_of(folder_.path()).layout_reason, HasSubstr("image_00 found"));
 }
 
-TEST_F(Layouts, EurocIsRecognisedAboveAndInsideMav0) {
+TEST_F(Layouts, RecognisesEurocAboveAndInsideMav0) {
   testing::write_tiny_euroc(folder_, {0, 50'000'000}, {0, 50'000'000});
   EXPECT_EQ(info_of(folder_.path()).format, RecordingFormat::euroc);
   EXPECT_EQ(info_of(folder_.path()).layout_reason, "mav0/cam0/data.csv found");
   EXPECT_EQ(info_of(folder_.path() + "/mav0").layout_reason, "cam0/data.csv found");
 }
 
-TEST_F(Layouts, SpartanIsRecognised) {
+TEST_F(Layouts, RecognisesSpartan) {
   testing::write_tiny_spartan(folder_, 2);
   const RecordingInfo info = info_of(folder_.path());
   EXPECT_EQ(info.format, RecordingFormat::spartan);
@@ -64,49 +64,49 @@ TEST_F(Layouts, SpartanIsRecognised) {
   EXPECT_EQ(info.name, "tiny");
 }
 
-TEST_F(Layouts, KittiComesFirstAndTheOthersAreNamed) {
+TEST_F(Layouts, KittiHasPrecedenceAndTheOthersAreReported) {
   testing::write_tiny_kitti(folder_, 2);
   testing::write_tiny_euroc(folder_, {0, 50'000'000}, {0, 50'000'000});
   testing::write_tiny_kitti_raw(folder_, 2);
   const RecordingInfo info = info_of(folder_.path());
   EXPECT_EQ(info.format, RecordingFormat::kitti);
-  EXPECT_THAT(info.layout_reason, HasSubstr("--format kitti-raw is possible too: image_00 found"));
-  EXPECT_THAT(info.layout_reason, HasSubstr("--format euroc is possible too: mav0/cam0/data.csv found"));
+  EXPECT_THAT(info.layout_reason, HasSubstr("--format kitti-raw is also possible: image_00 found"));
+  EXPECT_THAT(info.layout_reason, HasSubstr("--format euroc is also possible: mav0/cam0/data.csv found"));
 }
 
-TEST_F(Layouts, TheFormatAskedForIsTaken) {
+TEST_F(Layouts, UsesTheRequestedFormat) {
   testing::write_tiny_kitti(folder_, 2);
   testing::write_tiny_euroc(folder_, {0, 50'000'000}, {0, 50'000'000});
   const RecordingInfo info = info_of(folder_.path(), {.format = RecordingFormat::euroc, .rig_file = {}});
   EXPECT_EQ(info.format, RecordingFormat::euroc);
-  EXPECT_EQ(info.layout_reason, "euroc asked for");
+  EXPECT_EQ(info.layout_reason, "euroc requested");
   fs::remove_all(folder_.path() + "/mav0");
-  EXPECT_THAT(fault_of(folder_.path(), {.format = RecordingFormat::euroc, .rig_file = {}}),
+  EXPECT_THAT(error_of(folder_.path(), {.format = RecordingFormat::euroc, .rig_file = {}}),
               HasSubstr("cam0/data.csv: is missing"));
-  EXPECT_THAT(fault_of(folder_.path(), {.format = RecordingFormat::kitti_raw, .rig_file = {}}),
+  EXPECT_THAT(error_of(folder_.path(), {.format = RecordingFormat::kitti_raw, .rig_file = {}}),
               HasSubstr("image_00/timestamps.txt: is missing"));
-  EXPECT_THAT(fault_of(folder_.path(), {.format = RecordingFormat::spartan, .rig_file = {}}),
+  EXPECT_THAT(error_of(folder_.path(), {.format = RecordingFormat::spartan, .rig_file = {}}),
               HasSubstr("has no recording.yaml"));
 }
 
-TEST_F(Layouts, WhatIsNoRecordingIsToldWhatWasLookedFor) {
-  EXPECT_THAT(fault_of(folder_.path()), HasSubstr("the folder is empty"));
-  EXPECT_THAT(fault_of(folder_.path() + "/none"), HasSubstr("no such folder"));
+TEST_F(Layouts, RejectsOtherFoldersAndListsTheKnownLayouts) {
+  EXPECT_THAT(error_of(folder_.path()), HasSubstr("the folder is empty"));
+  EXPECT_THAT(error_of(folder_.path() + "/none"), HasSubstr("no such folder"));
   folder_.write("some/photo.png", "");
-  for (const std::string& fault : {fault_of(folder_.path()), fault_of(folder_.path() + "/none")}) {
+  for (const std::string& fault : {error_of(folder_.path()), error_of(folder_.path() + "/none")}) {
     for (const char* name :
          {"calib.txt", "image_0 ", "image_00", "timestamps.txt", "mav0/cam0/data.csv", "recording.yaml"}) {
       EXPECT_THAT(fault, HasSubstr(name));
     }
   }
-  EXPECT_THAT(fault_of(folder_.path() + "/some/photo.png"), HasSubstr("is a file"));
+  EXPECT_THAT(error_of(folder_.path() + "/some/photo.png"), HasSubstr("is a file"));
 }
 
-TEST_F(Layouts, AnotherCalibrationCanBeNamed) {
+TEST_F(Layouts, UsesTheGivenCalibration) {
   testing::write_tiny_kitti(folder_, 2);
   fs::rename(folder_.path() + "/calib.txt", folder_.path() + "/mine.txt");
-  EXPECT_THAT(fault_of(folder_.path()), HasSubstr("no layout"));
-  EXPECT_THAT(fault_of(folder_.path(), {.format = RecordingFormat::kitti, .rig_file = {}}),
+  EXPECT_THAT(error_of(folder_.path()), HasSubstr("not a recording of a known layout"));
+  EXPECT_THAT(error_of(folder_.path(), {.format = RecordingFormat::kitti, .rig_file = {}}),
               HasSubstr("calib.txt: is missing: the recording has no calibration"));
   const TemporaryFolder other;
   testing::write_tiny_spartan(other, 1);
@@ -117,7 +117,7 @@ TEST_F(Layouts, AnotherCalibrationCanBeNamed) {
   EXPECT_THAT(info.layout_reason, HasSubstr("a rig given"));
 }
 
-TEST(FormatNames, GoBothWays) {
+TEST(FormatNames, RoundTrip) {
   for (const RecordingFormat format :
        {RecordingFormat::spartan, RecordingFormat::kitti, RecordingFormat::kitti_raw, RecordingFormat::euroc}) {
     EXPECT_EQ(parse_recording_format(name_of(format)), format);
@@ -125,7 +125,7 @@ TEST(FormatNames, GoBothWays) {
   const auto wrong = parse_recording_format("rosbag");
   ASSERT_FALSE(wrong);
   EXPECT_EQ(wrong.error().code, ErrorCode::usage);
-  EXPECT_THAT(wrong.error().message(), HasSubstr("known are kitti, spartan, kitti-raw, euroc"));
+  EXPECT_THAT(wrong.error().message(), HasSubstr("choose one of kitti, spartan, kitti-raw, euroc"));
 }
 
 TEST(FaultNames, AreTheKeysOfTheSummary) {

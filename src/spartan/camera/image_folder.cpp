@@ -16,10 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Larger file numbers (such as time stamps) are not frame numbers; empirical.
 constexpr std::int64_t kLargestNumber = 100'000'000;
-constexpr std::size_t kSizeProbes = 16;
+constexpr std::size_t kSizeProbes = 16;  // image headers read to find the common size
 
-// Stem → path. Of several files with one stem the first extension of the list counts.
+// Stem → path. Of several files with the same stem, the first extension in the order of list_images() is used.
 using Stems = std::map<std::string, std::string>;
 
 Stems list_images(const std::string& folder) {
@@ -36,7 +37,8 @@ Stems list_images(const std::string& folder) {
   return stems;
 }
 
-// Number of each stem. Nothing where the names do not count shots: a letter in them, or far fewer files than numbers.
+// The number of each stem; nothing where names are not frame numbers: they hold a letter, or the numbers span far more
+// than the number of files.
 std::optional<std::map<std::string, std::int64_t>> numbers_of(const Stems& left, const Stems& right,
                                                               std::size_t announced) {
   std::map<std::string, std::int64_t> numbers;
@@ -50,11 +52,13 @@ std::optional<std::map<std::string, std::int64_t>> numbers_of(const Stems& left,
       high = std::max(high, *number);
     }
   }
+  // Missing files are allowed: numbers may span ten times the count of frames or files, plus 100; empirical.
   const auto most = static_cast<std::int64_t>(10 * std::max(announced, left.size() + right.size()) + 100);
   if (!numbers.empty() && high - low > most) return std::nullopt;
   return numbers;
 }
 
+// The rank of each stem among the sorted stems of both folders.
 std::map<std::string, std::int64_t> ranks_of(const Stems& left, const Stems& right) {
   std::map<std::string, std::int64_t> ranks;
   for (const Stems* stems : {&left, &right}) {
@@ -73,7 +77,7 @@ NumberedImages number_images(const std::string& left_folder, const std::string& 
   const Stems left = list_images(left_folder), right = list_images(right_folder);
   auto numbers = numbers_of(left, right, announced.value_or(0));
   if (!numbers) {
-    images.remarks.push_back("the images' names are no numbers that count shots; they are taken in the order of names");
+    images.remarks.push_back("the image names are not frame numbers; images are used in the order of their names");
     numbers = ranks_of(left, right);
   }
   std::int64_t low = std::numeric_limits<std::int64_t>::max(), high = -1;
@@ -85,16 +89,16 @@ NumberedImages number_images(const std::string& left_folder, const std::string& 
   const auto count = announced ? static_cast<std::int64_t>(*announced) : span;
   if (high >= 0 && (!announced || low >= count)) images.first_number = low;
   if (images.first_number > 0) {
-    images.remarks.push_back(fmt::format("the images' numbers begin at {}, which is taken for the first shot", low));
+    images.remarks.push_back(fmt::format("the image numbers start at {}, which is taken as the first frame", low));
   }
 
-  images.shots.resize(static_cast<std::size_t>(count));
+  images.frames.resize(static_cast<std::size_t>(count));
   int beyond = 0;
-  const auto place = [&](const Stems& stems, std::string ImageFiles::*eye) {
+  const auto place = [&](const Stems& stems, std::string ImageFiles::*side) {
     for (const auto& [stem, path] : stems) {
       const std::int64_t at = numbers->at(stem) - images.first_number;
       if (at >= 0 && at < count) {
-        images.shots[static_cast<std::size_t>(at)].*eye = path;
+        images.frames[static_cast<std::size_t>(at)].*side = path;
       } else {
         ++beyond;
       }
@@ -104,15 +108,15 @@ NumberedImages number_images(const std::string& left_folder, const std::string& 
   place(right, &ImageFiles::right);
   if (beyond > 0) {
     images.remarks.push_back(
-        fmt::format("{} images lie beyond the {} announced shots and are not read", beyond, count));
+        fmt::format("{} images have no entry among the {} listed frames and are not read", beyond, count));
   }
   return images;
 }
 
-std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& shots) {
+std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& frames) {
   std::vector<const std::string*> files;
-  for (const ImageFiles& shot : shots) {
-    if (!shot.left.empty()) files.push_back(&shot.left);
+  for (const ImageFiles& entry : frames) {
+    if (!entry.left.empty()) files.push_back(&entry.left);
   }
   const std::size_t probes = std::min(files.size(), kSizeProbes);
   std::map<std::pair<int, int>, int> votes;

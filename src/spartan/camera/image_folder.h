@@ -1,4 +1,4 @@
-// The images of the two eyes of a KITTI recording: files whose numbers say to which shot they belong.
+// Image folders of the left and right camera of a KITTI recording, whose file numbers are frame numbers.
 #pragma once
 
 #include <cstdint>
@@ -10,24 +10,24 @@
 
 namespace spartan {
 
-/// Image files of one shot; empty where an eye has none.
+/// Image files of one frame; an empty path where the image is missing.
 struct ImageFiles {
   std::string left, right;
 };
 
 struct NumberedImages {
-  std::vector<ImageFiles> shots;     ///< one for each announced shot
-  std::int64_t first_number = 0;     ///< file number of shots[0]
-  std::vector<std::string> remarks;  ///< images that no shot claims; numbers that do not begin at 0
+  std::vector<ImageFiles> frames;    ///< one entry for each listed frame
+  std::int64_t first_number = 0;     ///< file number of frames[0]
+  std::vector<std::string> remarks;  ///< images that belong to no frame; numbers that do not start at 0
 };
 
-/// Puts the files of two folders (png, jpg, jpeg, pgm) to the shots. File numbers count from 0; where none of them lies
-/// in [0, announced) from the lowest one; where names are no such numbers, the sorted names count.
-/// `announced` none: as many shots as the numbers span, from the lowest one on.
+/// Assigns the files of two folders (png, jpg, jpeg, pgm) to frames. The file number is the frame index; where no
+/// number lies in [0, announced), indices are relative to the lowest number. Where names are not such numbers, the rank
+/// among the sorted names is the index. Without `announced` there are as many frames as the range of the numbers holds.
 NumberedImages number_images(const std::string& left_folder, const std::string& right_folder,
                              std::optional<std::size_t> announced);
 
-/// The size that most of the left images have, from the headers of some files spread over the recording.
-std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& shots);
+/// The most frequent size of the left images, from the headers of up to 16 files spread over the recording.
+std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& frames);
 
 }  // namespace spartan

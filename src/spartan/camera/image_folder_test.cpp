@@ -14,7 +14,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Names of the files of both eyes, "-" where an eye has none.
+// Names of the left and right file of each frame, "-" where one is missing.
 class ImageFolder : public ::testing::Test {
  protected:
   ImageFolder() {
@@ -31,15 +31,15 @@ class ImageFolder : public ::testing::Test {
       return path.empty() ? std::string("-") : std::filesystem::path(path).filename().string();
     };
     std::vector<std::string> names;
-    names.reserve(images_.shots.size());
-    for (const ImageFiles& shot : images_.shots) names.push_back(name(shot.left) + " " + name(shot.right));
+    names.reserve(images_.frames.size());
+    for (const ImageFiles& files : images_.frames) names.push_back(name(files.left) + " " + name(files.right));
     return names;
   }
   testing::TemporaryFolder folder_;
   NumberedImages images_;
 };
 
-TEST_F(ImageFolder, NumbersSayTheShot) {
+TEST_F(ImageFolder, FileNumbersAreFrameNumbers) {
   put("000000.png", "000000.png");
   put("000002.png", "000001.png");
   EXPECT_THAT(number(4), ElementsAre("000000.png 000000.png", "- 000001.png", "000002.png -", "- -"));
@@ -47,31 +47,31 @@ TEST_F(ImageFolder, NumbersSayTheShot) {
   EXPECT_THAT(number(std::nullopt), ElementsAre("000000.png 000000.png", "- 000001.png", "000002.png -"));
 }
 
-TEST_F(ImageFolder, ImagesBeyondTheAnnouncedOnesAreSaid) {
+TEST_F(ImageFolder, ReportsImagesBeyondTheListedFrames) {
   put("0.png", "0.png");
   put("5.png", "5.png");
   EXPECT_THAT(number(2), ElementsAre("0.png 0.png", "- -"));
   ASSERT_EQ(images_.remarks.size(), 1U);
-  EXPECT_THAT(images_.remarks[0], HasSubstr("2 images lie beyond the 2 announced shots"));
+  EXPECT_THAT(images_.remarks[0], HasSubstr("2 images have no entry among the 2 listed frames"));
 }
 
-TEST_F(ImageFolder, APieceOfARecordingCountsFromItsFirstImage) {
+TEST_F(ImageFolder, AnExcerptStartsAtItsLowestNumber) {
   put("000150.png", "000150.png");
   put("000151.png", "000151.png");
   EXPECT_THAT(number(2), ElementsAre("000150.png 000150.png", "000151.png 000151.png"));
   EXPECT_EQ(images_.first_number, 150);
-  EXPECT_THAT(images_.remarks, ElementsAre(HasSubstr("begin at 150")));
+  EXPECT_THAT(images_.remarks, ElementsAre(HasSubstr("start at 150")));
 }
 
-TEST_F(ImageFolder, NamesThatAreNoNumbersCountInTheirOrder) {
+TEST_F(ImageFolder, OtherNamesAreUsedInSortedOrder) {
   put("b.png", "b.png");
   put("a.png", "");
   EXPECT_THAT(number(std::nullopt), ElementsAre("a.png -", "b.png b.png"));
-  EXPECT_THAT(images_.remarks, ElementsAre(HasSubstr("no numbers that count shots")));
+  EXPECT_THAT(images_.remarks, ElementsAre(HasSubstr("not frame numbers")));
 }
 
-// Stamps as names must not be taken for a billion missing shots.
-TEST_F(ImageFolder, StampsAsNamesAreNoNumbers) {
+// Time stamps as names must not become a billion missing frames.
+TEST_F(ImageFolder, StampsAsNamesAreNotFrameNumbers) {
   put("1403715273262142976.png", "1403715273262142976.png");
   put("1403715273312143104.png", "1403715273312143104.png");
   EXPECT_EQ(number(std::nullopt).size(), 2U);
@@ -79,26 +79,26 @@ TEST_F(ImageFolder, StampsAsNamesAreNoNumbers) {
   EXPECT_EQ(number(std::nullopt).size(), 4U);
 }
 
-TEST_F(ImageFolder, OtherFilesDoNotCountAndPngComesFirst) {
+TEST_F(ImageFolder, IgnoresOtherFilesAndPrefersPng) {
   put("0.jpg", "0.JPG");
   put("0.png", "");
   put("readme.txt", ".DS_Store");
   EXPECT_THAT(number(std::nullopt), ElementsAre("0.png 0.JPG"));
 }
 
-TEST_F(ImageFolder, EmptyAndMissingFoldersHoldNoImage) {
+TEST_F(ImageFolder, EmptyAndMissingFoldersHoldNoImages) {
   EXPECT_THAT(number(std::nullopt), IsEmpty());
-  EXPECT_EQ(number_images(folder_.path() + "/none", folder_.path() + "/none", 3).shots.size(), 3U);
+  EXPECT_EQ(number_images(folder_.path() + "/none", folder_.path() + "/none", 3).frames.size(), 3U);
 }
 
-TEST_F(ImageFolder, TheSizeOfMostImagesCounts) {
+TEST_F(ImageFolder, FindsTheMostFrequentImageSize) {
   for (int i = 0; i < 5; ++i) {
     testing::write_tiny_png(folder_.file("l/" + std::to_string(i) + ".png"), 1,
                             i == 0 ? ImageSize{9, 9} : ImageSize{12, 8});
   }
   folder_.write("l/5.png", "nonsense");
   number(std::nullopt);
-  EXPECT_EQ(common_image_size(images_.shots), (ImageSize{12, 8}));
+  EXPECT_EQ(common_image_size(images_.frames), (ImageSize{12, 8}));
   EXPECT_FALSE(common_image_size({}));
   EXPECT_FALSE(common_image_size({{"none.png", "none.png"}}));
 }

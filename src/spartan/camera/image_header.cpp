@@ -10,21 +10,23 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-constexpr std::size_t kHeaderBytes = 1 << 18;  // JPEG may hold some 64-KiB blocks of remarks before the size
-constexpr int kLargestSide = 32768;
+constexpr std::size_t kHeaderBytes = 1 << 18;  // a JPEG may hold several 64-KiB metadata segments before the size
+constexpr int kLargestSide = 32768;            // px; larger sizes are taken as damaged headers
 
+// Unsigned big-endian number; 0 where it is larger than kLargestSide.
 int big_endian(std::string_view bytes) {
   std::uint32_t value = 0;
   for (const char c : bytes) value = (value << 8U) | static_cast<std::uint8_t>(c);
   return value > static_cast<std::uint32_t>(kLargestSide) ? 0 : static_cast<int>(value);
 }
 
+// The IHDR chunk is the first one: width and height at bytes 16 and 20.
 ImageSize png_size(std::string_view head) {
   if (head.size() < 24) return {};
   return {big_endian(head.substr(16, 4)), big_endian(head.substr(20, 4))};
 }
 
-// Walks the segments to the start of frame (C0 to CF without the tables C4, C8, CC), which holds height and width.
+// Skips segments up to the start-of-frame marker (C0 to CF except C4, C8 and CC), which holds height and width.
 ImageSize jpeg_size(std::string_view head) {
   std::size_t at = 2;
   while (at + 9 <= head.size() && head[at] == '\xFF') {
@@ -42,7 +44,7 @@ ImageSize jpeg_size(std::string_view head) {
   return {};
 }
 
-// "P5 # remark\n<width> <height> …"
+// "P5 # comment\n<width> <height> …"
 ImageSize pnm_size(std::string_view head) {
   std::string words;
   for (std::size_t i = 2; i < head.size(); ++i) {

@@ -1,4 +1,4 @@
-// The size of a picture file without decoding it.
+// Image size from the header of an image file, without decoding it.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@
 
 namespace spartan {
 
-/// From the header of a PNG, JPEG or PGM/PPM file; nothing where there is no such header.
+/// Size from the header of a PNG, JPEG or PGM/PPM file; nothing where the header is of none of these.
 std::optional<ImageSize> read_image_size(const std::string& path);
 /// The same from the first bytes of a file.
 std::optional<ImageSize> parse_image_size(std::string_view head);

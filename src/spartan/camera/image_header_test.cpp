@@ -17,7 +17,7 @@ std::string encoded(const std::string& extension, int width, int height, const s
   return {bytes.begin(), bytes.end()};
 }
 
-TEST(ImageHeader, FindsTheSizeWithoutThePixels) {
+TEST(ImageHeader, FindsTheSizeWithoutDecoding) {
   for (const char* extension : {".png", ".jpg", ".pgm"}) {
     const std::string file = encoded(extension, 61, 43);
     EXPECT_EQ(parse_image_size(file), (ImageSize{61, 43})) << extension;
@@ -27,15 +27,15 @@ TEST(ImageHeader, FindsTheSizeWithoutThePixels) {
   EXPECT_EQ(parse_image_size("P5 # a remark 99 99\n# more\n 7\n3 255\n"), (ImageSize{7, 3}));
 }
 
-TEST(ImageHeader, ThumbnailsAreNotThePicture) {
-  const std::string thumbnail = encoded(".jpg", 16, 8), picture = encoded(".jpg", 61, 43);
+TEST(ImageHeader, IgnoresEmbeddedThumbnails) {
+  const std::string thumbnail = encoded(".jpg", 16, 8), pixels = encoded(".jpg", 61, 43);
   const std::size_t length = thumbnail.size() + 2;
   const std::string block =
       std::string("\xFF\xE1") + static_cast<char>(length / 256) + static_cast<char>(length % 256) + thumbnail;
-  EXPECT_EQ(parse_image_size(picture.substr(0, 2) + block + picture.substr(2)), (ImageSize{61, 43}));
+  EXPECT_EQ(parse_image_size(pixels.substr(0, 2) + block + pixels.substr(2)), (ImageSize{61, 43}));
 }
 
-TEST(ImageHeader, NothingWhereThereIsNoHeader) {
+TEST(ImageHeader, ReturnsNothingWithoutAValidHeader) {
   EXPECT_FALSE(parse_image_size(""));
   EXPECT_FALSE(parse_image_size("some text"));
   EXPECT_FALSE(parse_image_size("P5\n-3 5\n255\n"));
@@ -55,7 +55,7 @@ TEST(ImageHeader, NothingWhereThereIsNoHeader) {
   }
 }
 
-TEST(ImageHeader, IsReadFromAFile) {
+TEST(ImageHeader, ReadsAFile) {
   const testing::TemporaryFolder folder;
   EXPECT_EQ(read_image_size(folder.write("a.png", encoded(".png", 61, 43))), (ImageSize{61, 43}));
   EXPECT_FALSE(read_image_size(folder.path() + "/none.png"));

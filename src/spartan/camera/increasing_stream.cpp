@@ -18,12 +18,12 @@ void IncreasingStream::look_ahead() {
     } else if (!last_ || stamp_of(**row) > *last_) {
       ahead_.push_back(std::move(**row));
     } else {
-      ++left_out_;
+      ++discarded_;
     }
   }
 }
 
-bool IncreasingStream::front_stands_against_the_rest() const {
+bool IncreasingStream::front_is_outlier() const {
   const Stamp front = stamp_of(ahead_.front());
   const auto falls = [&](const Sample& row) { return stamp_of(row) <= front; };
   if (std::none_of(ahead_.begin() + 1, ahead_.end(), falls)) return false;
@@ -35,15 +35,15 @@ bool IncreasingStream::front_stands_against_the_rest() const {
 
 Result<std::optional<Sample>> IncreasingStream::next() {
   for (look_ahead(); !ahead_.empty(); look_ahead()) {
-    const bool leave_out = front_stands_against_the_rest();
+    const bool discard = front_is_outlier();
     Sample front = std::move(ahead_.front());
     ahead_.pop_front();
-    if (leave_out) {
-      ++left_out_;
+    if (discard) {
+      ++discarded_;
       continue;
     }
     last_ = stamp_of(front);
-    left_out_ +=
+    discarded_ +=
         static_cast<std::int64_t>(std::erase_if(ahead_, [&](const Sample& row) { return stamp_of(row) <= *last_; }));
     return std::optional(std::move(front));
   }

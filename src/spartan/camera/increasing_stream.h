@@ -1,4 +1,4 @@
-// The rows of a sensor table whose stamps increase.
+// Sensor stream filter that discards samples whose stamps do not increase.
 #pragma once
 
 #include <cstdint>
@@ -10,30 +10,32 @@
 
 namespace spartan {
 
-/// Leaves out the rows that stand against most of those around them: one stamp far ahead costs itself and not all that
-/// follow it, one that runs back costs itself too. It looks `kLookAhead` rows ahead, so a jump must be over before half
-/// of that.
+/// Discards as few samples as possible within a sliding window so that stamps strictly increase (longest increasing
+/// subsequence, see find_reversals()). An isolated stamp far in the future or in the past is discarded alone; it does
+/// not invalidate the samples after it. The window holds `kLookAhead` samples, so an outlier burst must be shorter than
+/// half of it.
 class IncreasingStream : public SampleStream {
  public:
   explicit IncreasingStream(std::unique_ptr<SampleStream> rows) : rows_(std::move(rows)) {}
 
-  /// A fault comes behind the last row before it.
+  /// An error of the input is returned after all valid samples before it.
   Result<std::optional<Sample>> next() override;
 
-  std::int64_t left_out() const { return left_out_; }
+  /// Number of samples discarded so far.
+  std::int64_t discarded() const { return discarded_; }
 
-  static constexpr std::size_t kLookAhead = 64;
+  static constexpr std::size_t kLookAhead = 64;  ///< samples; empirical
 
  private:
   void look_ahead();
-  bool front_stands_against_the_rest() const;
+  bool front_is_outlier() const;
 
   std::unique_ptr<SampleStream> rows_;
   std::deque<Sample> ahead_;
   std::optional<Stamp> last_;
   std::optional<Error> fault_;
   bool ended_ = false;
-  std::int64_t left_out_ = 0;
+  std::int64_t discarded_ = 0;
 };
 
 }  // namespace spartan

@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-// One sensor with the sample that it would hand out next.
+// A sensor stream with its next sample.
 class SensorHead {
  public:
   explicit SensorHead(OpenStream open) : open_(std::move(open)) {}
@@ -29,7 +29,7 @@ class SensorHead {
     return {};
   }
   const std::optional<Sample>& head() const { return head_; }
-  std::int64_t left_out() const { return stream_ ? stream_->left_out() : 0; }
+  std::int64_t discarded() const { return stream_ ? stream_->discarded() : 0; }
 
  private:
   OpenStream open_;
@@ -37,8 +37,8 @@ class SensorHead {
   std::optional<Sample> head_;
 };
 
-MissingFrame missing(const Shot& shot, FrameFault fault, std::string message) {
-  return {shot.frame_id, shot.pair, shot.left_stamp, fault, std::move(message)};
+MissingFrame missing(const FrameEntry& entry, FrameFault fault, std::string message) {
+  return {entry.frame_id, entry.pair, entry.left_stamp, fault, std::move(message)};
 }
 
 class IndexedSource : public FrameSource {
@@ -54,8 +54,8 @@ class IndexedSource : public FrameSource {
     auto taken = take();
     if (!taken) return failure(taken);
     if (taken->sensor) return std::move(taken->sensor);
-    if (!taken->shot) return std::nullopt;
-    return load(*taken->shot);
+    if (!taken->entry) return std::nullopt;
+    return load(*taken->entry);
   }
 
   Status seek(std::int64_t samples_taken) override {
@@ -63,37 +63,39 @@ class IndexedSource : public FrameSource {
     for (std::int64_t i = 0; i < samples_taken; ++i) {
       const auto taken = take();
       if (!taken) return failure(taken);
-      if (!taken->sensor && !taken->shot) {
-        return failure(ErrorCode::input, fmt::format("holds {} samples, not {}", i, samples_taken), index_.info.path);
+      if (!taken->sensor && !taken->entry) {
+        return failure(ErrorCode::input,
+                       fmt::format("the recording holds only {} samples, cannot seek to sample {}", i, samples_taken),
+                       index_.info.path);
       }
     }
     return {};
   }
 
   Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) override {
-    for (const Shot& shot : index_.shots) {
-      if (shot.pair != pair || shot.left_stamp != left_stamp || shot.fault == FrameFault::stamp_reversed) continue;
-      Sample sample = load(shot);
+    for (const FrameEntry& entry : index_.frames) {
+      if (entry.pair != pair || entry.left_stamp != left_stamp || entry.fault == FrameFault::stamp_reversed) continue;
+      Sample sample = load(entry);
       if (auto* frame = std::get_if<StereoFrame>(&sample)) return std::move(*frame);
       return failure(ErrorCode::input, std::get<MissingFrame>(sample).message);
     }
     return failure(ErrorCode::input,
-                   fmt::format("has no shot of pair '{}' at {} s", pair, to_decimal_seconds(left_stamp)),
+                   fmt::format("has no frame of pair '{}' at {} s", pair, to_decimal_seconds(left_stamp)),
                    index_.info.path);
   }
 
   std::vector<Stamp> announced_stamps(const std::string& pair) const override {
     std::vector<Stamp> stamps;
-    for (const Shot& shot : index_.shots) {
-      if (shot.pair == pair) stamps.push_back(shot.left_stamp);
+    for (const FrameEntry& entry : index_.frames) {
+      if (entry.pair == pair) stamps.push_back(entry.left_stamp);
     }
     return stamps;
   }
 
   std::vector<ShotName> shots_at(std::int64_t position_id) const override {
     std::vector<ShotName> names;
-    for (const Shot& shot : index_.shots) {
-      if (shot.position_id == position_id && !shot.fault) names.push_back({shot.pair, shot.left_stamp});
+    for (const FrameEntry& entry : index_.frames) {
+      if (entry.position_id == position_id && !entry.fault) names.push_back({entry.pair, entry.left_stamp});
     }
     return names;
   }
@@ -116,21 +118,21 @@ class IndexedSource : public FrameSource {
 
   std::int64_t sensor_samples_left_out() const override {
     std::int64_t sum = 0;
-    for (const SensorHead& sensor : sensors_) sum += sensor.left_out();
+    for (const SensorHead& sensor : sensors_) sum += sensor.discarded();
     return sum;
   }
 
  private:
-  // Neither: the end.
+  // The next item: a sensor sample or a listed frame; neither at the end.
   struct Taken {
     std::optional<Sample> sensor;
-    const Shot* shot = nullptr;
+    const FrameEntry* entry = nullptr;
   };
 
-  // Takes what comes next and decodes nothing.
+  // Advances to the next item without decoding an image.
   Result<Taken> take() {
     if (!started_) {
-      next_shot_ = 0;
+      next_frame_ = 0;
       for (SensorHead& sensor : sensors_) {
         if (Status status = sensor.rewind(); !status) return failure(status);
       }
@@ -140,49 +142,50 @@ class IndexedSource : public FrameSource {
     for (SensorHead& sensor : sensors_) {
       if (sensor.head() && (!first || stamp_of(*sensor.head()) < stamp_of(*first->head()))) first = &sensor;
     }
-    const Shot* shot = next_shot_ < index_.shots.size() ? &index_.shots[next_shot_] : nullptr;
-    if (first && (!shot || stamp_of(*first->head()) <= shot->played_at)) {
+    const FrameEntry* entry = next_frame_ < index_.frames.size() ? &index_.frames[next_frame_] : nullptr;
+    if (first && (!entry || stamp_of(*first->head()) <= entry->playback_stamp)) {
       Taken taken{*first->head(), nullptr};
       if (Status status = first->advance(); !status) return failure(status);
       return taken;
     }
-    if (shot) ++next_shot_;
-    return Taken{std::nullopt, shot};
+    if (entry) ++next_frame_;
+    return Taken{std::nullopt, entry};
   }
 
-  Sample load(const Shot& shot) const {
-    if (shot.fault) return missing(shot, *shot.fault, shot.message);
-    const StereoPair* pair = index_.info.rig.find_pair(shot.pair);
+  Sample load(const FrameEntry& entry) const {
+    if (entry.fault) return missing(entry, *entry.fault, entry.message);
+    const StereoPair* pair = index_.info.rig.find_pair(entry.pair);
     const Camera* left_camera = index_.info.rig.find_camera(pair->left);
     const Camera* right_camera = index_.info.rig.find_camera(pair->right);
-    auto left = load_eye(shot, shot.left_file, *left_camera, FrameFault::left_missing);
+    auto left = load_image(entry, entry.left_file, *left_camera, FrameFault::left_missing);
     if (!left) return left.error();
-    auto right = load_eye(shot, shot.right_file, *right_camera, FrameFault::right_missing);
+    auto right = load_image(entry, entry.right_file, *right_camera, FrameFault::right_missing);
     if (!right) return right.error();
-    return StereoFrame{shot.frame_id,    shot.position_id, shot.pair,         shot.left_stamp,
-                       shot.right_stamp, std::move(*left), std::move(*right), shot.pan_rad,
-                       shot.tilt_rad,    shot.exposure_us, shot.gain};
+    return StereoFrame{entry.frame_id,    entry.position_id, entry.pair,        entry.left_stamp,
+                       entry.right_stamp, std::move(*left),  std::move(*right), entry.pan_rad,
+                       entry.tilt_rad,    entry.exposure_us, entry.gain};
   }
 
-  static tl::expected<FrameImage, MissingFrame> load_eye(const Shot& shot, const std::string& file,
-                                                         const Camera& camera, FrameFault when_missing) {
+  static tl::expected<FrameImage, MissingFrame> load_image(const FrameEntry& entry, const std::string& file,
+                                                           const Camera& camera, FrameFault when_missing) {
     auto image = read_image(file);
     if (!image) {
       std::error_code error;
       const bool there = std::filesystem::exists(file, error);
-      return tl::unexpected(missing(shot, there ? FrameFault::unreadable : when_missing, image.error().message()));
+      return tl::unexpected(missing(entry, there ? FrameFault::unreadable : when_missing, image.error().message()));
     }
     if (image->size() != camera.size) {
-      return tl::unexpected(missing(shot, FrameFault::wrong_size,
-                                    fmt::format("{}: is {}x{}, camera '{}' takes {}x{}", file, image->width(),
-                                                image->height(), camera.name, camera.size.width, camera.size.height)));
+      return tl::unexpected(
+          missing(entry, FrameFault::wrong_size,
+                  fmt::format("{}: the image is {}x{}, but camera '{}' in the rig is {}x{}", file, image->width(),
+                              image->height(), camera.name, camera.size.width, camera.size.height)));
     }
-    return interpret(*image, camera.pixel_format, shot.bits);
+    return interpret(*image, camera.pixel_format, entry.bits);
   }
 
   RecordingIndex index_;
   std::vector<SensorHead> sensors_;
-  std::size_t next_shot_ = 0;
+  std::size_t next_frame_ = 0;
   bool started_ = false;
 };
 

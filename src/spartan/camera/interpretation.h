@@ -1,15 +1,16 @@
-// What the samples of a picture file stand for.
+// Pixel format of a decoded image file, from the calibration.
 #pragma once
 
 #include "spartan/core/frame_image.h"
 
 namespace spartan {
 
-/// A picture as read_image() gives it, as an image of the camera that took it. A file says how many bits a sample takes
-/// up; how many of them carry signal, and which colours they stand for, is known to the rig (`camera`) and to a
-/// recording's list of shots (`bits`; 0: as the camera). Gray samples become the camera's mosaic, deep ones get its
-/// bits and alignment. No sample is changed, and what does not fit is left as it is: imaging reduces colours to gray
-/// where the camera is gray, and refuses the rest with both formats.
+/// Relabels an image of read_image() with the pixel format of the camera that took it. An image file states only the
+/// bits of storage of a sample. The number of significant bits and the Bayer pattern come from the rig (`camera`) and
+/// from the frame list of a recording (`bits`; 0: as the camera). Gray samples get the camera's Bayer layout; samples
+/// of 16 bits get its significant bits and alignment. Samples are not changed. A format that contradicts the camera is
+/// kept: the Imager converts RGB to gray for a gray camera and rejects other mismatches with both formats in the
+/// message.
 FrameImage interpret(const FrameImage& image, const PixelFormat& camera, int bits = 0);
 
 }  // namespace spartan

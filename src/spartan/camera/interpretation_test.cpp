@@ -15,28 +15,28 @@ FrameImage gray16() {
   return FrameImage::own(Image<std::uint16_t>(4, 3, 700), PixelFormat{PixelLayout::gray, 16});
 }
 
-TEST(Interpretation, GraySamplesAreTheCamerasMosaic) {
+TEST(Interpretation, GraySamplesGetTheBayerLayoutOfTheCamera) {
   EXPECT_EQ(interpret(gray8(), kBayer8).format(), kBayer8);
   EXPECT_EQ(interpret(gray16(), kBayer12).format(), kBayer12);
   EXPECT_EQ(interpret(gray16(), kBayer12).as<std::uint16_t>()(2, 1), 700);
 }
 
-TEST(Interpretation, TheShotKnowsItsBitsBetterThanTheCamera) {
+TEST(Interpretation, BitsOfTheFrameOverrideThoseOfTheCamera) {
   EXPECT_EQ(interpret(gray16(), kGray10).format(), kGray10);
   EXPECT_EQ(interpret(gray16(), kGray10, 14).format().bits, 14);
   EXPECT_EQ(interpret(gray8(), kGray8, 12).format(), kGray8) << "a byte holds no more than 8";
 }
 
-TEST(Interpretation, ColoursStayColours) {
+TEST(Interpretation, RgbStaysRgb) {
   EXPECT_EQ(interpret(FrameImage::own(Image<Rgb8>(4, 3), kRgb8), kGray8).format(), kRgb8);
   EXPECT_EQ(interpret(FrameImage::own(Image<Rgb16>(4, 3), kRgb16), kGray10).format(),
             (PixelFormat{PixelLayout::rgb, 10}));
 }
 
-TEST(Interpretation, WhatDoesNotFitStaysAsItIs) {
+TEST(Interpretation, KeepsAFormatThatContradictsTheCamera) {
   EXPECT_EQ(interpret(gray8(), kRgb8).format(), kGray8);
   const auto colour = FrameImage::own(Image<Rgb8>(4, 3), kRgb8);
-  EXPECT_EQ(interpret(colour, kBayer8).format(), kRgb8) << "colours cannot become a mosaic again";
+  EXPECT_EQ(interpret(colour, kBayer8).format(), kRgb8) << "RGB cannot become a mosaic again";
   EXPECT_EQ(interpret(gray8(), kGray10).format(), kGray8);
 }
 

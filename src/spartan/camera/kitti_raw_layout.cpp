@@ -1,6 +1,6 @@
-// KITTI raw (synchronised and rectified): image_00/data, image_01/data with timestamps.txt, oxts/, calibration in the
-// drive's folder or in the day's folder above it. Source: Geiger et al., "Vision meets robotics: the KITTI dataset",
-// IJRR 2013; the development kit's readme.
+// KITTI raw layout (synchronised and rectified): image_00/data and image_01/data with timestamps.txt, oxts/,
+// calibration in the folder of the drive or in the folder of the day above it. Source: Geiger et al., "Vision meets
+// robotics: the KITTI dataset", IJRR 2013; the development kit's readme.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -21,8 +21,8 @@ Result<std::vector<Stamp>> read_stamps(const std::string& path) {
   return read_kitti_raw_times(std::move(*table));
 }
 
-// One file a sample: 30 numbers, of which 11 … 13 are the acceleration and 17 … 19 the turn rate along x, y, z of the
-// unit.
+// OXTS files hold one sample each: 30 numbers, of which (counted from 0) 11 … 13 are the acceleration and 17 … 19 the
+// angular rate along x, y, z of the unit.
 class OxtsStream : public SampleStream {
  public:
   OxtsStream(fs::path folder, std::vector<Stamp> stamps) : folder_(std::move(folder)), stamps_(std::move(stamps)) {}
@@ -32,16 +32,16 @@ class OxtsStream : public SampleStream {
       const std::size_t i = next_++;
       const fs::path file = folder_ / fmt::format("{:010}.txt", i);
       std::error_code error;
-      if (!fs::exists(file, error)) continue;  // a drive may lack some
+      if (!fs::exists(file, error)) continue;  // some drives lack single files
       auto table = TableReader::open(file.string(), kitti_raw_times_format());
       if (!table) return failure(table);
       const auto row = table->next(20);
       if (!row) return failure(row);
-      if (!*row) return table->fault("is empty");
+      if (!*row) return table->error_in_row("the file holds no sample");
       std::array<double, 6> v{};
       for (std::size_t k = 0; k < 6; ++k) {
         const auto value = parse_number<double>((**row)[k < 3 ? 11 + k : 14 + k]);
-        if (!value) return table->fault("holds something that is not a finite number");
+        if (!value) return table->error_in_row("holds a value that is not a finite number");
         v[k] = *value;
       }
       return Sample(ImuSample{stamps_[i], {v[3], v[4], v[5]}, {v[0], v[1], v[2]}});
@@ -75,9 +75,8 @@ Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOpt
   NumberedImages images =
       number_images((folder / "image_00" / "data").string(), (folder / "image_01" / "data").string(), left->size());
   index.info.sequence.remarks = std::move(images.remarks);
-  const auto size = common_image_size(images.shots);
-  if (!size)
-    return failure(ErrorCode::input, "holds no image that can be read", (folder / "image_00" / "data").string());
+  const auto size = common_image_size(images.frames);
+  if (!size) return failure(ErrorCode::input, "holds no readable image", (folder / "image_00" / "data").string());
   const std::string calib = find_calibration(folder);
   auto rig = choose_rig(options, calib, *size, [&] { return read_kitti_raw_calib(calib); });
   if (!rig) return failure(rig);
@@ -85,21 +84,21 @@ Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOpt
   index.info.rig_source = rig->source;
 
   for (std::size_t i = 0; i < left->size(); ++i) {
-    Shot shot;
-    shot.frame_id = static_cast<std::int64_t>(i);
-    shot.pair = only_pair(index.info.rig);
-    shot.left_stamp = (*left)[i];
-    shot.right_stamp = i < right->size() ? (*right)[i] : shot.left_stamp;
-    shot.left_file = images.shots[i].left;
-    shot.right_file = images.shots[i].right;
-    if (shot.left_file.empty() || shot.right_file.empty()) {
-      shot.fault = shot.left_file.empty() ? FrameFault::left_missing : FrameFault::right_missing;
-      shot.message = fmt::format("{}: has no image number {}", folder.string(), i);
+    FrameEntry entry;
+    entry.frame_id = static_cast<std::int64_t>(i);
+    entry.pair = default_pair(index.info.rig);
+    entry.left_stamp = (*left)[i];
+    entry.right_stamp = i < right->size() ? (*right)[i] : entry.left_stamp;
+    entry.left_file = images.frames[i].left;
+    entry.right_file = images.frames[i].right;
+    if (entry.left_file.empty() || entry.right_file.empty()) {
+      entry.fault = entry.left_file.empty() ? FrameFault::left_missing : FrameFault::right_missing;
+      entry.message = fmt::format("{}: has no image number {}", folder.string(), i);
     }
-    index.shots.push_back(std::move(shot));
+    index.frames.push_back(std::move(entry));
   }
   std::error_code error;
-  // Without the way from the IMU to the cameras the body is the left camera, and the IMU's axes are not known.
+  // Without the IMU-to-camera calibration the body frame is the left camera and the orientation of the IMU is unknown.
   const bool body_is_imu = index.info.rig.convention == PoseConvention::body;
   if (const fs::path oxts = folder / "oxts"; body_is_imu && fs::exists(oxts / "timestamps.txt", error)) {
     index.imu = [oxts]() -> Result<std::unique_ptr<SampleStream>> {

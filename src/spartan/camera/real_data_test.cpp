@@ -1,4 +1,4 @@
-// The real recordings of $SPARTAN_DATA, as far as they are there.
+// Real recordings below $SPARTAN_DATA, where available.
 #include "spartan/testing/real_data.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ struct Expected {
 
 class RealData : public ::testing::TestWithParam<Expected> {};
 
-TEST_P(RealData, HoldsWhatItsReadmeSays) {
+TEST_P(RealData, MatchesItsReadme) {
   const Expected& expected = GetParam();
   const std::string path = testing::data_folder() + "/" + expected.folder;
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << expected.folder << " in $SPARTAN_DATA";

@@ -15,10 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void set_fault(Shot& shot, FrameFault fault, std::string message) {
-  if (shot.fault) return;
-  shot.fault = fault;
-  shot.message = std::move(message);
+void set_fault(FrameEntry& entry, FrameFault fault, std::string message) {
+  if (entry.fault) return;
+  entry.fault = fault;
+  entry.message = std::move(message);
 }
 
 bool has_file(const std::string& path) {
@@ -26,52 +26,53 @@ bool has_file(const std::string& path) {
   return !path.empty() && fs::is_regular_file(path, error);
 }
 
-void find_missing_files(Shot& shot) {
-  if (shot.fault) return;
-  const bool left = has_file(shot.left_file), right = has_file(shot.right_file);
+void check_image_files(FrameEntry& entry) {
+  if (entry.fault) return;
+  const bool left = has_file(entry.left_file), right = has_file(entry.right_file);
   if (left && right) return;
-  const std::string& missing = left ? shot.right_file : shot.left_file;
+  const std::string& missing = left ? entry.right_file : entry.left_file;
   const std::string what = missing.empty()
-                               ? fmt::format("frame {} names no {} image", shot.frame_id, left ? "right" : "left")
+                               ? fmt::format("frame {} lists no {} image", entry.frame_id, left ? "right" : "left")
                                : fmt::format("{}: is missing", missing);
-  set_fault(shot, left ? FrameFault::right_missing : FrameFault::left_missing,
+  set_fault(entry, left ? FrameFault::right_missing : FrameFault::left_missing,
             what + (left || right ? "" : ", and so is the right image"));
 }
 
-// Marks what runs backwards among the shots of one pair and says when each is played: at its own stamp, or at that of
-// the shot it is listed after where it runs backwards.
-void order_pair(std::vector<Shot>& shots, const std::vector<std::size_t>& members, SequenceReport& report) {
+// Marks the frames of one pair with reversed stamps and sets when each is played: at its own stamp, or, where that is
+// reversed, at the stamp of the last frame before it in the list that is not.
+void order_pair(std::vector<FrameEntry>& frames, const std::vector<std::size_t>& members, SequenceReport& report) {
   std::vector<std::size_t> listed;
   std::vector<Stamp> stamps;
   for (const std::size_t i : members) {
-    shots[i].played_at = shots[i].left_stamp;
-    if (shots[i].only_right) continue;
+    frames[i].playback_stamp = frames[i].left_stamp;
+    if (frames[i].right_only) continue;
     listed.push_back(i);
-    stamps.push_back(shots[i].left_stamp);
+    stamps.push_back(frames[i].left_stamp);
   }
   const std::vector<bool> reversed = find_reversals(stamps);
   const auto first = std::find(reversed.begin(), reversed.end(), false);
   if (first == reversed.end()) return;
   Stamp last = stamps[static_cast<std::size_t>(first - reversed.begin())];
   for (std::size_t k = 0; k < listed.size(); ++k) {
-    Shot& shot = shots[listed[k]];
+    FrameEntry& entry = frames[listed[k]];
     if (!reversed[k]) {
       last = stamps[k];
       continue;
     }
     ++report.reversals;
-    shot.played_at = last;
-    shot.fault = FrameFault::stamp_reversed;
-    shot.message = fmt::format("{}: the stamp {} s does not fit between its neighbours ({} s is the last good one)",
-                               shot.left_file.empty() ? fmt::format("shot {}", shot.frame_id) : shot.left_file,
-                               to_decimal_seconds(stamps[k]), to_decimal_seconds(last));
+    entry.playback_stamp = last;
+    entry.fault = FrameFault::stamp_reversed;
+    entry.message = fmt::format("{}: the stamp {} s is out of order; the last stamp in order is {} s",
+                                entry.left_file.empty() ? fmt::format("frame {}", entry.frame_id) : entry.left_file,
+                                to_decimal_seconds(stamps[k]), to_decimal_seconds(last));
   }
 }
 
-void report_pair(const std::vector<Shot>& shots, const std::vector<std::size_t>& members, SequenceReport& report) {
+void report_pair(const std::vector<FrameEntry>& frames, const std::vector<std::size_t>& members,
+                 SequenceReport& report) {
   std::vector<Stamp> complete;
   for (const std::size_t i : members) {
-    if (!shots[i].fault) complete.push_back(shots[i].left_stamp);
+    if (!frames[i].fault) complete.push_back(frames[i].left_stamp);
   }
   std::sort(complete.begin(), complete.end());
   const StepReport steps = report_steps(complete);
@@ -80,46 +81,48 @@ void report_pair(const std::vector<Shot>& shots, const std::vector<std::size_t>&
   report.longest_gap_s = std::max(report.longest_gap_s, steps.longest_gap_s);
 }
 
-Status require_usable_shot(const RecordingIndex& index) {
-  if (std::any_of(index.shots.begin(), index.shots.end(), [](const Shot& s) { return !s.fault; })) return {};
-  if (index.shots.empty()) return failure(ErrorCode::input, "announces no stereo shot", index.info.path);
+Status require_usable_frame(const RecordingIndex& index) {
+  if (std::any_of(index.frames.begin(), index.frames.end(), [](const FrameEntry& s) { return !s.fault; })) return {};
+  if (index.frames.empty()) return failure(ErrorCode::input, "lists no stereo frame", index.info.path);
   return failure(ErrorCode::input,
-                 fmt::format("none of the {} announced stereo shots is usable; the first one: {}", index.shots.size(),
-                             index.shots.front().message),
-                 index.info.path, "both images of a shot must be there, with stamps that increase");
+                 fmt::format("none of the {} listed stereo frames is usable; the first one: {}", index.frames.size(),
+                             index.frames.front().message),
+                 index.info.path, "each frame needs both images and an increasing stamp");
 }
 
 }  // namespace
 
-Status arrange(RecordingIndex& index, double pair_tolerance_s) {
-  std::vector<Shot>& shots = index.shots;
+Status validate_and_sort(RecordingIndex& index, double pair_tolerance_s) {
+  std::vector<FrameEntry>& frames = index.frames;
   SequenceReport& report = index.info.sequence;
-  report.announced = static_cast<int>(shots.size());
+  report.announced = static_cast<int>(frames.size());
   std::map<std::string, std::vector<std::size_t>> pairs;
-  for (std::size_t i = 0; i < shots.size(); ++i) pairs[shots[i].pair].push_back(i);
+  for (std::size_t i = 0; i < frames.size(); ++i) pairs[frames[i].pair].push_back(i);
 
-  for (Shot& shot : shots) find_missing_files(shot);
-  for (const auto& [name, members] : pairs) order_pair(shots, members, report);
-  for (Shot& shot : shots) {
-    report.orphans_left += shot.fault == FrameFault::right_missing;
-    report.orphans_right += shot.fault == FrameFault::left_missing && has_file(shot.right_file);
-    const double apart = std::abs(seconds_between(shot.left_stamp, shot.right_stamp));
+  for (FrameEntry& entry : frames) check_image_files(entry);
+  for (const auto& [name, members] : pairs) order_pair(frames, members, report);
+  for (FrameEntry& entry : frames) {
+    report.orphans_left += entry.fault == FrameFault::right_missing;
+    report.orphans_right += entry.fault == FrameFault::left_missing && has_file(entry.right_file);
+    const double apart = std::abs(seconds_between(entry.left_stamp, entry.right_stamp));
     if (apart > pair_tolerance_s) {
-      set_fault(shot, FrameFault::stamps_apart,
-                fmt::format("{}: its right image was taken {:.6f} s apart, more than the {} s allowed", shot.left_file,
-                            apart, pair_tolerance_s));
+      set_fault(
+          entry, FrameFault::stamps_apart,
+          fmt::format("{}: the stamps of the left and right image differ by {:.6f} s, more than the tolerance of {} s",
+                      entry.left_file, apart, pair_tolerance_s));
     }
   }
   for (const auto& [name, members] : pairs) {
     const StereoPair* pair = index.info.rig.find_pair(name);
-    if (pair && (pair->for_odometry || pairs.size() == 1)) report_pair(shots, members, report);
+    if (pair && (pair->for_odometry || pairs.size() == 1)) report_pair(frames, members, report);
   }
 
-  std::stable_sort(shots.begin(), shots.end(), [](const Shot& a, const Shot& b) { return a.played_at < b.played_at; });
-  return require_usable_shot(index);
+  std::stable_sort(frames.begin(), frames.end(),
+                   [](const FrameEntry& a, const FrameEntry& b) { return a.playback_stamp < b.playback_stamp; });
+  return require_usable_frame(index);
 }
 
-std::string only_pair(const Rig& rig) {
+std::string default_pair(const Rig& rig) {
   for (const StereoPair& pair : rig.pairs) {
     if (pair.for_odometry) return pair.name;
   }
@@ -132,7 +135,7 @@ Result<RigChoice> choose_rig(const OpenOptions& options, const std::string& own_
   std::error_code error;
   if (own && !fs::exists(own_file, error)) {
     return failure(ErrorCode::input, "is missing: the recording has no calibration", own_file,
-                   "add the file, or name a calibration with --rig");
+                   "add the file, or give a calibration with --rig");
   }
   auto rig = own ? read_own() : read_rig(options.rig_file, size_hint);
   if (!rig) return failure(rig);

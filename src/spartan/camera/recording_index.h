@@ -1,4 +1,4 @@
-// What a recording holds, before any image is decoded. Every layout is read into this; one source plays it.
+// Index of a recording before any image is decoded. Each folder layout is read into an index, which one source plays.
 #pragma once
 
 #include <functional>
@@ -11,67 +11,69 @@
 
 namespace spartan {
 
-/// One shot as the recording announces it.
-struct Shot {
+/// One stereo frame as listed by the recording.
+struct FrameEntry {
   std::int64_t frame_id = 0;
   std::int64_t position_id = -1;
   std::string pair;
-  Stamp left_stamp, right_stamp;      ///< where one eye is missing both are the stamp of the other
-  std::string left_file, right_file;  ///< paths; empty: the recording has no such file
+  Stamp left_stamp, right_stamp;      ///< both the same where one image is missing
+  std::string left_file, right_file;  ///< paths; empty: the recording lists no such file
   double pan_rad = 0, tilt_rad = 0;
   double exposure_us = 0, gain = 0;
-  int bits = 0;                     ///< 0: as the rig says
-  bool only_right = false;          ///< a right image without partner: stands outside the order of the left list
-  Stamp played_at;                  ///< by which it is merged with other samples; set by arrange()
-  std::optional<FrameFault> fault;  ///< known without decoding
-  std::string message;              ///< about the fault
+  int bits = 0;                     ///< significant bits of a sample; 0: as in the rig
+  bool right_only = false;          ///< right image without a left one; ignored in the order of left stamps
+  Stamp playback_stamp;             ///< merges the frame with other samples; set by validate_and_sort()
+  std::optional<FrameFault> fault;  ///< a fault known before decoding
+  std::string message;              ///< describes the fault
 };
 
-/// Samples of one sensor, one after the other; nothing at the end.
+/// Samples of one sensor in file order; nothing at the end.
 class SampleStream {
  public:
   virtual ~SampleStream() = default;
   virtual Result<std::optional<Sample>> next() = 0;
 };
-/// Starts a stream from its beginning.
+/// Opens a stream at its first sample.
 using OpenStream = std::function<Result<std::unique_ptr<SampleStream>>()>;
 
+/// Frames and sensor streams of a recording.
 struct RecordingIndex {
   RecordingInfo info;
-  std::vector<Shot> shots;                ///< each pair in the order in which the recording lists it
+  std::vector<FrameEntry> frames;         ///< in file order until validate_and_sort()
   OpenStream imu;                         ///< empty: no IMU
   std::vector<OpenStream> other_sensors;  ///< wheels, compass, inclinometer
 };
 
-/// Where a layout was found, and why it is taken for that.
+/// A detected folder layout and the reason for it.
 struct LayoutChoice {
   RecordingFormat format = RecordingFormat::kitti;
   std::string folder;
   std::string reason;
 };
 
-/// One function a layout. Codes: `input`, `configuration`.
+/// Reads the index of one layout. Codes: `input`, `configuration`.
 Result<RecordingIndex> index_kitti(const LayoutChoice& layout, const OpenOptions& options);
 Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOptions& options);
 Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions& options);
 Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptions& options);
 
-/// Finds missing files, stamps that run backwards or lie apart, gaps; brings the shots of all pairs into the order in
-/// which they are played; fills `info.sequence`. Code `input` where no shot is usable as far as can be told without
-/// decoding.
-Status arrange(RecordingIndex& index, double pair_tolerance_s);
+/// Marks frames with missing files, reversed stamps, or left and right stamps more than `pair_tolerance_s` apart; sorts
+/// the frames of all pairs into playback order; fills `info.sequence`. Code `input` where no frame is usable as far as
+/// known without decoding.
+Status validate_and_sort(RecordingIndex& index, double pair_tolerance_s);
 
-/// Plays an arranged index.
+/// Plays an index that validate_and_sort() has sorted.
 std::unique_ptr<FrameSource> make_indexed_source(RecordingIndex index);
 
-/// The name of the pair that a recording of one unnamed pair takes from a rig: the first for odometry, else the first.
-std::string only_pair(const Rig& rig);
+/// The pair that frames of a layout without pair names belong to: the first odometry pair of the rig, else the first.
+std::string default_pair(const Rig& rig);
 
-/// The rig of `options.rig_file`, or what `read_own` finds in `own_file`.
+/// A rig and the file that it was read from.
 struct RigChoice {
   Rig rig;
   std::string source;
 };
+/// The rig of `options.rig_file` if given, else the result of `read_own` for the recording's `own_file`.
 Result<RigChoice> choose_rig(const OpenOptions& options, const std::string& own_file, ImageSize size_hint,
                              const std::function<Result<Rig>()>& read_own);
 

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A text table that grows row by row.
+// A text file that is appended row by row.
 class TableFile {
  public:
   static Result<TableFile> create(const std::string& path, const std::string& header) {
@@ -62,31 +62,31 @@ Status write_image(const std::string& path, const FrameImage& image) {
   return format.bits > 8 ? write_png(path, image.as<std::uint16_t>()) : write_png(path, image.as<std::uint8_t>());
 }
 
-// Why the image of one eye would not be read back as it is; empty where it would.
-std::string misfit(const FrameImage& image, const Camera& camera) {
+// Why the image of one camera cannot be stored without loss; empty where it can.
+std::string format_mismatch(const FrameImage& image, const Camera& camera) {
   if (image.size() != camera.size) {
-    return fmt::format("is {}x{}, camera '{}' takes {}x{}", image.width(), image.height(), camera.name,
+    return fmt::format("is {}x{}, but camera '{}' in the rig is {}x{}", image.width(), image.height(), camera.name,
                        camera.size.width, camera.size.height);
   }
   const PixelFormat& format = image.format();
   if (format.layout == PixelLayout::rgb) {
-    return format.bits == 8 ? "" : "has colour of more than 8 bits, which cannot be recorded; record the Bayer image";
+    return format.bits == 8 ? "" : "is RGB of more than 8 bits, which cannot be recorded; record the Bayer image";
   }
   const PixelLayout expected =
       camera.pixel_format.layout == PixelLayout::rgb ? PixelLayout::gray : camera.pixel_format.layout;
   if (format.layout != expected) {
-    return fmt::format("is {}, the rig says that camera '{}' gives {}", name_of(format.layout), camera.name,
+    return fmt::format("is {}, but the layout of camera '{}' in the rig is {}", name_of(format.layout), camera.name,
                        name_of(expected));
   }
   if (format.bits > 8 && format.alignment != camera.pixel_format.alignment) {
-    return fmt::format("has its bits at the other end than the rig says of camera '{}'", camera.name);
+    return fmt::format("has another bit alignment than camera '{}' in the rig", camera.name);
   }
   return {};
 }
 
-constexpr const char* kRowsBefore = "/frames.csv.before";
+constexpr const char* kPreviousRowsFile = "/frames.csv.before";
 
-// The whole rows of a frames.csv that may break off in its last one.
+// The complete rows of a frames.csv (its last row may be truncated), by left image.
 std::map<std::string, std::string> rows_by_left_image(const std::string& table) {
   std::map<std::string, std::string> rows;
   constexpr std::size_t kColumns = 12, kLeft = 5;
@@ -120,44 +120,44 @@ struct RecordingWriter::State {
   RecordingOptions options;
   Rig rig;
   std::optional<TableFile> frames;
-  std::map<std::string, std::string> rows_before;  // of a resumed recording: left image → row
+  std::map<std::string, std::string> previous_rows;  // rows of the interrupted run: left image → row
   std::map<std::string, TableFile> sensors;
-  std::map<std::string, Stamp> last;  // of each pair and each sensor
+  std::map<std::string, Stamp> last;  // last stamp of each pair and each sensor
 
-  tl::unexpected<Error> refuse(const std::string& who, Stamp stamp, const std::string& why) const {
+  tl::unexpected<Error> reject(const std::string& who, Stamp stamp, const std::string& why) const {
     return failure(ErrorCode::input, fmt::format("{} at {} s {}", who, to_decimal_seconds(stamp), why), folder);
   }
 
-  // The stamp may be the next one of `who`.
+  // Checks that the stamp comes after the last one of `who` (a pair or a sensor file).
   Status check_stamp(const std::string& who, Stamp stamp) const {
-    if (!is_sane(stamp)) return refuse(who, stamp, "is out of the range of time");
+    if (!is_in_range(stamp)) return reject(who, stamp, "is out of range");
     const auto found = last.find(who);
     if (found == last.end() || stamp > found->second) return {};
-    return refuse(who, stamp,
-                  fmt::format("does not come after the one before it, at {} s", to_decimal_seconds(found->second)));
+    return reject(who, stamp,
+                  fmt::format("does not come after the previous stamp, {} s", to_decimal_seconds(found->second)));
   }
 
   Status check(const StereoFrame& frame) const {
     const StereoPair* pair = rig.find_pair(frame.pair);
     if (!pair) return failure(ErrorCode::input, "the rig has no pair '" + frame.pair + "'", folder);
     if (Status s = check_stamp(frame.pair, frame.left_stamp); !s) return s;
-    if (!is_sane(frame.right_stamp)) return refuse(frame.pair, frame.right_stamp, "is out of the range of time");
+    if (!is_in_range(frame.right_stamp)) return reject(frame.pair, frame.right_stamp, "is out of range");
     if (!all_finite({frame.pan_rad, frame.tilt_rad, frame.exposure_us, frame.gain}))
-      return refuse(frame.pair, frame.left_stamp, "has an angle, exposure or gain that is not finite");
+      return reject(frame.pair, frame.left_stamp, "has an angle, exposure or gain that is not finite");
     for (const auto& [image, camera] : {std::pair{&frame.left, &pair->left}, std::pair{&frame.right, &pair->right}}) {
-      const std::string why = misfit(*image, *rig.find_camera(*camera));
-      if (!why.empty()) return refuse("image of '" + *camera + "'", frame.left_stamp, why);
+      const std::string why = format_mismatch(*image, *rig.find_camera(*camera));
+      if (!why.empty()) return reject("image of '" + *camera + "'", frame.left_stamp, why);
     }
     if (frame.left.format().bits != frame.right.format().bits)
-      return refuse(frame.pair, frame.left_stamp, "has eyes of different bits");
+      return reject(frame.pair, frame.left_stamp, "has left and right images of different bit depth");
     return {};
   }
 
-  // A row of `stamp` and the numbers.
+  // Appends a row of `stamp` and the numbers; creates the table at its first row.
   Status append_sensor(const std::string& name, const char* header, Stamp stamp,
                        std::initializer_list<double> numbers) {
     if (Status s = check_stamp(name, stamp); !s) return s;
-    if (!all_finite(numbers)) return refuse(name, stamp, "has a number that is not finite");
+    if (!all_finite(numbers)) return reject(name, stamp, "has a number that is not finite");
     auto found = sensors.find(name);
     if (found == sensors.end()) {
       if (Status s = make_folder(folder + "/sensors"); !s) return s;
@@ -177,66 +177,68 @@ RecordingWriter::RecordingWriter(RecordingWriter&&) noexcept = default;
 RecordingWriter& RecordingWriter::operator=(RecordingWriter&&) noexcept = default;
 RecordingWriter::~RecordingWriter() = default;
 
-Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const Rig& believed_rig,
+Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const Rig& nominal_rig,
                                                 const RecordingOptions& options) {
   std::error_code error;
   if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
-    return failure(ErrorCode::output, "exists already and is left as it is", folder, "give another folder");
+    return failure(ErrorCode::output, "already exists and is not overwritten", folder, "choose another folder");
   }
-  return open(folder, believed_rig, options, {});
+  return open(folder, nominal_rig, options, {});
 }
 
-Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const Rig& believed_rig,
+Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const Rig& nominal_rig,
                                                 const RecordingOptions& options) {
   std::error_code error;
   std::map<std::string, std::string> rows;
   if (const auto table = read_file(folder + "/frames.csv")) {
     if (fs::exists(folder + "/recording.yaml", error)) {
-      return failure(ErrorCode::output, "is a whole recording and is left as it is", folder, "give another folder");
+      return failure(ErrorCode::output, "is a finished recording and is not overwritten", folder,
+                     "choose another folder");
     }
-    // A resumed recording may be cut off too: the rows it has not come to yet are kept beside.
+    // A resumed run may be interrupted as well: rows that it has not reached yet are kept in a file of their own.
     rows = rows_by_left_image(*table);
-    if (const auto kept = read_file(folder + kRowsBefore)) rows.merge(rows_by_left_image(*kept));
+    if (const auto kept = read_file(folder + kPreviousRowsFile)) rows.merge(rows_by_left_image(*kept));
     std::string text = std::string(kFramesHeader) + "\n";
     for (const auto& [image, row] : rows) text += row + "\n";
-    if (Status s = write_file_atomically(folder + kRowsBefore, text); !s) return failure(s);
+    if (Status s = write_file_atomically(folder + kPreviousRowsFile, text); !s) return failure(s);
   } else if (fs::exists(folder, error) && !fs::is_empty(folder, error)) {
-    return failure(ErrorCode::output, "is no recording that was begun, and is left as it is", folder,
-                   "give another folder");
+    return failure(ErrorCode::output, "is not an unfinished recording and is not overwritten", folder,
+                   "choose another folder");
   }
-  return open(folder, believed_rig, options, std::move(rows));
+  return open(folder, nominal_rig, options, std::move(rows));
 }
 
-Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const Rig& believed_rig,
+Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const Rig& nominal_rig,
                                               const RecordingOptions& options,
-                                              std::map<std::string, std::string> rows_before) {
-  if (Status s = believed_rig.validate("rig of the recording"); !s) return failure(s);
-  for (const StereoPair& pair : believed_rig.pairs) {
+                                              std::map<std::string, std::string> previous_rows) {
+  if (Status s = nominal_rig.validate("rig of the recording"); !s) return failure(s);
+  for (const StereoPair& pair : nominal_rig.pairs) {
     if (is_folder_name(pair.name)) continue;
-    return failure(ErrorCode::configuration, "the name of pair '" + pair.name + "' cannot be that of a folder", folder);
+    return failure(ErrorCode::configuration, "the name of pair '" + pair.name + "' is not usable as a folder name",
+                   folder);
   }
   if (Status s = make_folder(folder); !s) return failure(s);
-  // First of all files: by it resume() knows a recording that was begun, however early it was cut off.
+  // The first file to be created: resume() recognises an unfinished recording by it, however early it was interrupted.
   auto frames = TableFile::create(folder + "/frames.csv", kFramesHeader);
   if (!frames) return failure(frames);
-  for (const StereoPair& pair : believed_rig.pairs) {
+  for (const StereoPair& pair : nominal_rig.pairs) {
     if (Status s = make_folder(folder + "/images/" + pair.name); !s) return failure(s);
   }
-  if (Status s = write_file_atomically(folder + "/rig.yaml", to_rig_yaml(believed_rig)); !s) return failure(s);
+  if (Status s = write_file_atomically(folder + "/rig.yaml", to_rig_yaml(nominal_rig)); !s) return failure(s);
   auto state = std::make_unique<State>();
   state->folder = folder;
   state->options = options;
-  state->rig = believed_rig;
+  state->rig = nominal_rig;
   state->frames.emplace(std::move(*frames));
-  state->rows_before = std::move(rows_before);
+  state->previous_rows = std::move(previous_rows);
   return RecordingWriter(std::move(state));
 }
 
 Result<bool> RecordingWriter::take_over(const std::string& pair, Stamp left_stamp) {
   const std::string stem = fmt::format("images/{}/{}", pair, left_stamp.ns);
-  const auto row = state_->rows_before.find(stem + "_left.png");
+  const auto row = state_->previous_rows.find(stem + "_left.png");
   std::error_code error;
-  if (row == state_->rows_before.end() || !fs::exists(state_->folder + "/" + stem + "_left.png", error) ||
+  if (row == state_->previous_rows.end() || !fs::exists(state_->folder + "/" + stem + "_left.png", error) ||
       !fs::exists(state_->folder + "/" + stem + "_right.png", error)) {
     return false;
   }
@@ -307,7 +309,7 @@ Status RecordingWriter::finish() {
     if (Status s = table.flush(); !s) return s;
   }
   std::error_code ignored;
-  fs::remove(state_->folder + kRowsBefore, ignored);
+  fs::remove(state_->folder + kPreviousRowsFile, ignored);
   const RecordingFile file{.schema = 1, .about = state_->options};
   return write_file_atomically(state_->folder + "/recording.yaml", dump_options(file));
 }

@@ -13,54 +13,57 @@
 
 namespace spartan {
 
+/// Contents of recording.yaml.
 struct RecordingOptions {
   std::string name;
   std::string description;
   double gravity_m_s2 = 9.81;
-  SensorNoise noise = {};  ///< as it is believed
+  SensorNoise noise = {};  ///< specified (nominal) sensor noise
 };
 
-/// Makes the folder, then takes samples in any order of kinds, each kind (and the shots of each pair) with stamps that
-/// increase. What is written reads back bit for bit; what would not is refused with code `input`: stamps that do not
-/// increase, numbers that are not finite, images that do not fit the rig's cameras. Nothing of it is recorded then.
-/// A shot is in the files when `add` returns, everything else after `finish()`; a recording that was not finished has
-/// no recording.yaml.
+/// Creates the folder and appends samples. Kinds of samples may be interleaved in any order; within a kind (and within
+/// the frames of a pair) stamps must strictly increase. Everything written reads back bit for bit. `add` rejects a
+/// sample with code `input`, and writes nothing of it, where its stamp does not increase, a number is not finite or an
+/// image does not match the camera in the rig. A frame is on disk when `add` returns, everything else after `finish()`.
+/// A recording without recording.yaml is unfinished.
 class RecordingWriter {
  public:
-  /// Code `output` where the folder exists and is not empty, or cannot be made; `configuration` for a rig that is not
-  /// valid, or has a pair whose name cannot be a folder's.
-  static Result<RecordingWriter> create(const std::string& folder, const Rig& believed_rig,
+  /// Starts a recording. `nominal_rig` is written to rig.yaml. Code `output` where the folder exists and is not empty,
+  /// or cannot be created; `configuration` where the rig is invalid or a pair name is not usable as a folder name.
+  static Result<RecordingWriter> create(const std::string& folder, const Rig& nominal_rig,
                                         const RecordingOptions& options);
-  /// Goes on with a recording that `create` made for the same rig and that was not finished: shots whose row and
-  /// images are there can be taken over; everything else is written again. Makes the recording where there is none.
-  static Result<RecordingWriter> resume(const std::string& folder, const Rig& believed_rig,
+  /// Resumes an unfinished recording that `create` started for the same rig. Frames with a complete row and both images
+  /// can be reused with take_over(); all other data is written again. Starts a recording where there is none.
+  static Result<RecordingWriter> resume(const std::string& folder, const Rig& nominal_rig,
                                         const RecordingOptions& options);
   RecordingWriter(RecordingWriter&&) noexcept;
   RecordingWriter& operator=(RecordingWriter&&) noexcept;
   ~RecordingWriter();
 
   Status add(const StereoFrame& frame);
-  /// Takes over a shot that the resumed recording holds whole; false where it does not.
+  /// Reuses a complete frame of the resumed recording instead of writing it; false where it is absent or incomplete.
   Result<bool> take_over(const std::string& pair, Stamp left_stamp);
   Status add(const ImuSample& sample);
   Status add(const WheelSample& sample);
   Status add(const CompassSample& sample);
   Status add(const InclinometerSample& sample);
 
-  /// Writes truth/rig.yaml and truth/poses.tum.
+  /// Writes the ground truth: truth/rig.yaml and truth/poses.tum (world_from_body).
   Status write_truth(const Rig& true_rig, const Trajectory& poses);
-  /// Writes truth/disparity/<pair>/<stamp>.png and truth/mask/<pair>/<stamp>.png (255 both eyes, 128 left only, 0
-  /// none).
+  /// Writes truth/disparity/<pair>/<stamp>.png (16 bits, disparity × 256 in px, 0 unknown) and
+  /// truth/mask/<pair>/<stamp>.png (255 seen by both cameras, 128 by the left one only, 0 by none).
   Status write_truth_disparity(const std::string& pair, Stamp left_stamp, ImageView<const float> disparity,
                                ImageView<const std::uint8_t> mask);
 
+  /// Flushes all tables and writes recording.yaml.
   Status finish();
 
  private:
   struct State;
   explicit RecordingWriter(std::unique_ptr<State> state);
-  static Result<RecordingWriter> open(const std::string& folder, const Rig& believed_rig,
-                                      const RecordingOptions& options, std::map<std::string, std::string> rows_before);
+  static Result<RecordingWriter> open(const std::string& folder, const Rig& nominal_rig,
+                                      const RecordingOptions& options,
+                                      std::map<std::string, std::string> previous_rows);
   std::unique_ptr<State> state_;
 };
 

@@ -35,7 +35,7 @@ Pose random_pose(Random& random) {
   return Pose(exp_so3(turn), three());
 }
 
-// One or two pairs on the body or on a mast, cameras of any size, colour and depth.
+// One or two pairs on the body or on a mast; cameras of any size, pixel layout and bit depth.
 Rig random_rig(Random& random) {
   Rig rig;
   rig.name = "random";
@@ -49,8 +49,8 @@ Rig random_rig(Random& random) {
     if (camera.pixel_format.bits > 8 && random.below(2)) camera.pixel_format.alignment = BitAlignment::high;
     camera.mount = random.below(2) ? "mast" : "body";
     const std::string name = "pair" + std::to_string(p);
-    for (const char* eye : {"_left", "_right"}) {
-      camera.name = name + eye;
+    for (const char* side : {"_left", "_right"}) {
+      camera.name = name + side;
       camera.mount_from_camera = random_pose(random);
       rig.cameras.push_back(camera);
     }
@@ -83,7 +83,7 @@ FrameImage random_image(Random& random, ImageSize size, PixelFormat format) {
 StereoFrame random_frame(Random& random, const Rig& rig, const StereoPair& pair, Stamp stamp) {
   const Camera& camera = *rig.find_camera(pair.left);
   PixelFormat format = camera.pixel_format;
-  format.bits = 8 + static_cast<int>(random.below(9));  // the exposure bracket of a camera may use fewer bits
+  format.bits = 8 + static_cast<int>(random.below(9));  // a frame may use fewer bits than its camera
   if (format.bits == 8) format.alignment = BitAlignment::low;
   if (format.layout == PixelLayout::gray && random.below(4) == 0) format = {PixelLayout::rgb, 8, BitAlignment::low};
   StereoFrame frame;
@@ -150,7 +150,7 @@ Status add(RecordingWriter& writer, const Sample& sample) {
       sample);
 }
 
-RC_GTEST_PROP(RecordingWriter, WhatIsWrittenReadsBackBitForBit, ()) {
+RC_GTEST_PROP(RecordingWriter, ReadsBackBitForBit, ()) {
   Random random(*rc::gen::arbitrary<std::uint32_t>());
   const Rig rig = random_rig(random);
   const TemporaryFolder folder;
@@ -163,7 +163,7 @@ RC_GTEST_PROP(RecordingWriter, WhatIsWrittenReadsBackBitForBit, ()) {
   const int count = *rc::gen::inRange(1, 25);
   for (int i = 0; i < count; ++i) {
     stamp.ns += 1 + static_cast<std::int64_t>(random.below(3'000'000'000));
-    // A recording without a shot is none.
+    // A recording needs at least one frame.
     Sample sample = i == 0 ? Sample(random_frame(random, rig, rig.pairs[0], stamp)) : random_sample(random, rig, stamp);
     if (auto* frame = std::get_if<StereoFrame>(&sample)) frame->frame_id = i;
     const Status status = add(*writer, sample);
@@ -189,7 +189,7 @@ RC_GTEST_PROP(RecordingWriter, WhatIsWrittenReadsBackBitForBit, ()) {
 
 // --- truth ---
 
-TEST(RecordingWriter, WritesTheTruth) {
+TEST(RecordingWriter, WritesTheGroundTruth) {
   const TemporaryFolder folder;
   testing::write_tiny_spartan(folder, 1);
   fs::remove_all(folder.path() + "/images");
@@ -214,13 +214,13 @@ TEST(RecordingWriter, WritesTheTruth) {
   ASSERT_TRUE(fixed);
   EXPECT_EQ(fixed->as<std::uint16_t>()(0, 0), 384);
   EXPECT_EQ(fixed->as<std::uint16_t>()(1, 0), 0) << "unknown";
-  EXPECT_EQ(fixed->as<std::uint16_t>()(2, 0), 65535) << "the largest there is";
+  EXPECT_EQ(fixed->as<std::uint16_t>()(2, 0), 65535) << "the largest value of the format";
   const auto seen = read_image(other.path() + "/truth/mask/stereo/5.png");
   ASSERT_TRUE(seen);
   EXPECT_EQ(seen->as<std::uint8_t>()(1, 0), 128);
 }
 
-TEST(RecordingWriter, TheTruthIsFoundByTheReader) {
+TEST(RecordingWriter, GroundTruthIsFoundByTheReader) {
   const TemporaryFolder folder;
   testing::write_tiny_spartan(folder, 2);
   folder.write("truth/poses.tum", "0 0 0 0 0 0 0 1\n");
@@ -229,9 +229,9 @@ TEST(RecordingWriter, TheTruthIsFoundByTheReader) {
 
 // --- faults ---
 
-class Refusals : public ::testing::Test {
+class Rejections : public ::testing::Test {
  protected:
-  Refusals() : writer_(RecordingWriter::create(folder_.path(), tiny_rig(), {}).value()) {}
+  Rejections() : writer_(RecordingWriter::create(folder_.path(), tiny_rig(), {}).value()) {}
   static StereoFrame frame(std::int64_t ns) {
     StereoFrame frame;
     frame.pair = "stereo";
@@ -241,7 +241,7 @@ class Refusals : public ::testing::Test {
     return frame;
   }
   template <class T>
-  std::string fault(const T& sample) {
+  std::string rejection(const T& sample) {
     const Status status = writer_.add(sample);
     if (status) return "no fault";
     EXPECT_EQ(status.error().code, ErrorCode::input);
@@ -251,58 +251,60 @@ class Refusals : public ::testing::Test {
   RecordingWriter writer_;
 };
 
-TEST_F(Refusals, StampsMustIncreaseWithinAKind) {
+TEST_F(Rejections, StampsMustIncreaseWithinAKind) {
   ASSERT_TRUE(writer_.add(frame(1'000'000'000)));
-  EXPECT_THAT(fault(frame(1'000'000'000)), HasSubstr("stereo at 1.000000000 s does not come after the one before it"));
-  EXPECT_THAT(fault(frame(999)), HasSubstr("does not come after"));
-  ASSERT_TRUE(writer_.add(ImuSample{Stamp{5}, {}, {}})) << "another kind has an order of its own";
-  EXPECT_THAT(fault(ImuSample{Stamp{5}, {0, 0, 0}, {0, 0, 0}}), HasSubstr("imu.csv at 0.000000005 s"));
-  EXPECT_THAT(fault(ImuSample{Stamp{std::numeric_limits<std::int64_t>::max()}, {0, 0, 0}, {0, 0, 0}}),
-              HasSubstr("out of the range"));
+  EXPECT_THAT(rejection(frame(1'000'000'000)),
+              HasSubstr("stereo at 1.000000000 s does not come after the previous stamp"));
+  EXPECT_THAT(rejection(frame(999)), HasSubstr("does not come after"));
+  ASSERT_TRUE(writer_.add(ImuSample{Stamp{5}, {}, {}})) << "each kind has its own order";
+  EXPECT_THAT(rejection(ImuSample{Stamp{5}, {0, 0, 0}, {0, 0, 0}}), HasSubstr("imu.csv at 0.000000005 s"));
+  EXPECT_THAT(rejection(ImuSample{Stamp{std::numeric_limits<std::int64_t>::max()}, {0, 0, 0}, {0, 0, 0}}),
+              HasSubstr("out of range"));
   ASSERT_TRUE(writer_.add(frame(2'000'000'000)));
   ASSERT_TRUE(writer_.finish());
   const Played played = play(**open_recording(folder_.path()));
-  EXPECT_EQ(played.frames.size(), 2U) << "what was refused is not recorded";
+  EXPECT_EQ(played.frames.size(), 2U) << "a rejected sample is not recorded";
   EXPECT_TRUE(testing::same_image(played.frames[0].left, frame(0).left));
 }
 
-TEST_F(Refusals, NumbersMustBeFinite) {
+TEST_F(Rejections, NumbersMustBeFinite) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-  EXPECT_THAT(fault(ImuSample{Stamp{5}, {0, nan, 0}, {0, 0, 0}}), HasSubstr("not finite"));
-  EXPECT_THAT(fault(WheelSample{Stamp{5}, inf, 0}), HasSubstr("not finite"));
-  EXPECT_THAT(fault(CompassSample{Stamp{5}, 0, nan}), HasSubstr("not finite"));
-  EXPECT_THAT(fault(InclinometerSample{Stamp{5}, 0, -inf, 0}), HasSubstr("not finite"));
+  EXPECT_THAT(rejection(ImuSample{Stamp{5}, {0, nan, 0}, {0, 0, 0}}), HasSubstr("not finite"));
+  EXPECT_THAT(rejection(WheelSample{Stamp{5}, inf, 0}), HasSubstr("not finite"));
+  EXPECT_THAT(rejection(CompassSample{Stamp{5}, 0, nan}), HasSubstr("not finite"));
+  EXPECT_THAT(rejection(InclinometerSample{Stamp{5}, 0, -inf, 0}), HasSubstr("not finite"));
   for (double StereoFrame::*number :
        {&StereoFrame::pan_rad, &StereoFrame::tilt_rad, &StereoFrame::exposure_us, &StereoFrame::gain}) {
     StereoFrame bad = frame(5);
     bad.*number = nan;
-    EXPECT_THAT(fault(bad), HasSubstr("not finite"));
+    EXPECT_THAT(rejection(bad), HasSubstr("not finite"));
   }
-  EXPECT_FALSE(fs::exists(folder_.path() + "/sensors")) << "nothing good came";
+  EXPECT_FALSE(fs::exists(folder_.path() + "/sensors")) << "no valid sample was added";
 }
 
-TEST_F(Refusals, ImagesMustFitTheRig) {
+TEST_F(Rejections, ImagesMustFitTheRig) {
   StereoFrame bad = frame(5);
   bad.pair = "wide";
-  EXPECT_THAT(fault(bad), HasSubstr("no pair 'wide'"));
+  EXPECT_THAT(rejection(bad), HasSubstr("no pair 'wide'"));
   bad = frame(5);
   bad.right = FrameImage::own(tiny_image(1, {3, 4}), {});
-  EXPECT_THAT(fault(bad), HasSubstr("image of 'right' at 0.000000005 s is 3x4, camera 'right' takes 24x16"));
+  EXPECT_THAT(rejection(bad),
+              HasSubstr("image of 'right' at 0.000000005 s is 3x4, but camera 'right' in the rig is 24x16"));
   bad = frame(5);
   bad.left = bad.left.with_format({PixelLayout::bayer_rggb, 8, BitAlignment::low});
-  EXPECT_THAT(fault(bad), HasSubstr("the rig says that camera 'left' gives gray"));
+  EXPECT_THAT(rejection(bad), HasSubstr("but the layout of camera 'left' in the rig is gray"));
   bad = frame(5);
   bad.left = FrameImage::own(Image<std::uint16_t>(testing::kTinySize), {PixelLayout::gray, 12, BitAlignment::low});
-  EXPECT_THAT(fault(bad), HasSubstr("eyes of different bits"));
+  EXPECT_THAT(rejection(bad), HasSubstr("left and right images of different bit depth"));
   bad.left = bad.right =
       FrameImage::own(Image<std::uint16_t>(testing::kTinySize), {PixelLayout::gray, 12, BitAlignment::high});
-  EXPECT_THAT(fault(bad), HasSubstr("bits at the other end"));
+  EXPECT_THAT(rejection(bad), HasSubstr("another bit alignment"));
   bad.left = bad.right = FrameImage::own(Image<Rgb16>(testing::kTinySize), {PixelLayout::rgb, 16, BitAlignment::low});
-  EXPECT_THAT(fault(bad), HasSubstr("more than 8 bits"));
+  EXPECT_THAT(rejection(bad), HasSubstr("more than 8 bits"));
   EXPECT_TRUE(fs::is_empty(folder_.path() + "/images/stereo"));
 }
 
-TEST_F(Refusals, AnUnfinishedRecordingIsNone) {
+TEST_F(Rejections, AnUnfinishedRecordingDoesNotOpen) {
   ASSERT_TRUE(writer_.add(frame(5)));
   const auto source = open_recording(folder_.path());
   ASSERT_FALSE(source);
@@ -310,20 +312,20 @@ TEST_F(Refusals, AnUnfinishedRecordingIsNone) {
   EXPECT_THAT(source.error().message(), HasSubstr("was not finished"));
 }
 
-TEST(RecordingWriterFolder, AnExistingOneIsLeftAsItIs) {
+TEST(RecordingWriterFolder, IsNotOverwritten) {
   const TemporaryFolder folder;
   folder.write("recording/mine.txt", "mine");
   for (const char* name : {"/recording", "/recording/mine.txt"}) {
     const auto writer = RecordingWriter::create(folder.path() + name, tiny_rig(), {});
     ASSERT_FALSE(writer) << name;
     EXPECT_EQ(writer.error().code, ErrorCode::output);
-    EXPECT_THAT(writer.error().message(), HasSubstr("exists already"));
+    EXPECT_THAT(writer.error().message(), HasSubstr("already exists"));
   }
   EXPECT_EQ(testing::content_of(folder.path() + "/recording/mine.txt"), "mine");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path() + "/recording"), {}), 1);
 }
 
-TEST(RecordingWriterFolder, OneThatCannotBeMadeIsSaid) {
+TEST(RecordingWriterFolder, ReportsWhereItCannotBeCreated) {
   const TemporaryFolder folder;
   folder.write("file", "");
   for (const std::string& path : {folder.path() + "/file/recording", std::string("/proc/none/recording")}) {
@@ -334,7 +336,7 @@ TEST(RecordingWriterFolder, OneThatCannotBeMadeIsSaid) {
   }
 }
 
-TEST(RecordingWriterFolder, NothingIsMadeForARigThatIsNotValid) {
+TEST(RecordingWriterFolder, IsNotCreatedForAnInvalidRig) {
   const TemporaryFolder folder;
   const std::string path = folder.path() + "/recording";
   Rig rig = tiny_rig();
@@ -348,14 +350,14 @@ TEST(RecordingWriterFolder, NothingIsMadeForARigThatIsNotValid) {
   EXPECT_FALSE(fs::exists(path));
 }
 
-TEST(RecordingWriterFolder, AFullDiskIsSaid) {
+TEST(RecordingWriterFolder, ReportsAFullDisk) {
   const TemporaryFolder folder;
   auto writer = RecordingWriter::create(folder.path() + "/r", tiny_rig(), {});
   ASSERT_TRUE(writer);
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   fs::create_directory(folder.path() + "/r/sensors");
   fs::create_symlink("/dev/full", folder.path() + "/r/sensors/imu.csv");
-  ASSERT_TRUE(writer->add(ImuSample{Stamp{1}, {0, 0, 0}, {0, 0, 0}})) << "still in memory";
+  ASSERT_TRUE(writer->add(ImuSample{Stamp{1}, {0, 0, 0}, {0, 0, 0}})) << "still buffered";
   const Status finished = writer->finish();
   ASSERT_FALSE(finished);
   EXPECT_EQ(finished.error().code, ErrorCode::output);

@@ -1,4 +1,4 @@
-// What the sensors of a rover deliver: plain values with a time stamp.
+// Stereo frames and sensor samples with their time stamps.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,58 +11,60 @@
 
 namespace spartan {
 
-/// One shot of one stereo pair. The images may borrow memory that the caller keeps (see FrameImage).
+/// One synchronous capture of a stereo pair. The images may borrow memory that the caller keeps (see FrameImage).
 struct StereoFrame {
   std::int64_t frame_id = 0;
-  std::int64_t position_id = -1;  ///< shots of one stop share it; −1: not stated
-  std::string pair;               ///< name in the rig
+  std::int64_t position_id = -1;  ///< id of the stop, shared by its frames; −1: unknown
+  std::string pair;               ///< name of the stereo pair in the rig
   Stamp left_stamp, right_stamp;  ///< mid-exposure
   FrameImage left, right;
-  double pan_rad = 0, tilt_rad = 0;
-  double exposure_us = 0, gain = 0;  ///< 0: not stated
+  double pan_rad = 0, tilt_rad = 0;  ///< of the mast
+  double exposure_us = 0, gain = 0;  ///< 0: unknown
 };
 
+/// Angular rate and specific force in the body frame.
 struct ImuSample {
   Stamp stamp;
   Eigen::Vector3d gyro_rad_s = Eigen::Vector3d::Zero();  ///< body frame
-  Eigen::Vector3d accel_m_s2 = Eigen::Vector3d::Zero();  ///< specific force, body frame: at rest it points up
+  Eigen::Vector3d accel_m_s2 = Eigen::Vector3d::Zero();  ///< specific force, body frame; points up at rest
 };
 
-/// Rolled distance of the wheels of each side since the start.
+/// Odometer: accumulated rolled distance of the left and right wheels since the start.
 struct WheelSample {
   Stamp stamp;
   double left_m = 0, right_m = 0;
 };
 
-/// Heading of body x, counter-clockwise from east.
+/// Heading of the body x axis, counter-clockwise from east, with its standard deviation.
 struct CompassSample {
   Stamp stamp;
   double heading_rad = 0, sigma_rad = 0;
 };
 
+/// Roll and pitch of the body, with their standard deviation.
 struct InclinometerSample {
   Stamp stamp;
   double roll_rad = 0, pitch_rad = 0, sigma_rad = 0;
 };
 
-/// Why a shot that the recording announces is not there.
+/// Why a listed frame cannot be delivered.
 enum class FrameFault { left_missing, right_missing, unreadable, wrong_size, stamp_reversed, stamps_apart };
 
-/// "left_missing" …: the keys under `skipped` in summary.json.
+/// The key under `skipped` in summary.json, e.g. "left_missing".
 std::string_view name_of(FrameFault fault);
 
-/// Stands in the stream where a shot should be: said, counted, skipped.
+/// Placeholder in the stream for a listed frame that cannot be delivered.
 struct MissingFrame {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
   FrameFault fault = FrameFault::unreadable;
-  std::string message;  ///< names the file and what is wrong with it
+  std::string message;  ///< file and cause
 };
 
 using Sample = std::variant<StereoFrame, ImuSample, WheelSample, CompassSample, InclinometerSample, MissingFrame>;
 
-/// The stamp that orders samples (a stereo frame's left one).
+/// The stamp by which samples are ordered; for a stereo frame the left one.
 Stamp stamp_of(const Sample& sample);
 
 }  // namespace spartan

@@ -17,7 +17,7 @@ class TableStream : public SampleStream {
     if (!row) return failure(row);
     if (!*row) return std::nullopt;
     auto sample = read_row_(**row);
-    if (!sample) return table_.fault(sample.error().what);
+    if (!sample) return table_.error_in_row(sample.error().what);
     return std::move(*sample);
   }
 
@@ -33,7 +33,7 @@ Result<Stamp> stamp_field(std::string_view text) {
   return *stamp;
 }
 
-// Fields 1 … Count as numbers.
+// Parses fields 1 … Count as numbers.
 template <std::size_t Count>
 Result<std::array<double, Count>> numbers(const std::vector<std::string_view>& row) {
   std::array<double, Count> values{};
@@ -45,7 +45,7 @@ Result<std::array<double, Count>> numbers(const std::vector<std::string_view>& r
   return values;
 }
 
-// The stamp and `Count` numbers of a row, handed to `make`.
+// Parses the stamp and `Count` numbers of a row; `make` builds the sample.
 template <std::size_t Count, class Make>
 Result<Sample> read_row(const std::vector<std::string_view>& row, Make make) {
   const auto stamp = stamp_field(row[0]);

@@ -1,4 +1,4 @@
-// Sensor samples from tables in text files, a row at a time.
+// Sensor samples from CSV files, read row by row.
 #pragma once
 
 #include <functional>
@@ -9,21 +9,21 @@
 
 namespace spartan {
 
-/// Makes a sample of a row's fields; an error names what is wrong with them, without the place.
+/// Parses the fields of a row into a sample. An error describes the field; the caller adds file and line.
 using RowReader = std::function<Result<Sample>(const std::vector<std::string_view>&)>;
 
-/// A stream over a table whose rows have at least `fields` fields. Errors of a row name file and line.
+/// Opens a stream over a table whose rows have at least `fields` fields. Errors (code `input`) name file and line.
 OpenStream stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
                            const RowReader& read_row);
 
-/// Row readers of stamp_ns and numbers: gyro x y z (rad/s), specific force x y z (m/s²), both turned by
-/// `body_from_imu`.
+/// IMU rows: stamp_ns, angular rate x y z (rad/s), specific force x y z (m/s²). `body_from_imu` rotates both into the
+/// body frame.
 RowReader read_imu_row(const Eigen::Quaterniond& body_from_imu);
-/// stamp_ns, left_m, right_m.
+/// Wheel rows: stamp_ns, left_m, right_m.
 Result<Sample> read_wheel_row(const std::vector<std::string_view>& row);
-/// stamp_ns, heading_rad, sigma_rad.
+/// Compass rows: stamp_ns, heading_rad, sigma_rad.
 Result<Sample> read_compass_row(const std::vector<std::string_view>& row);
-/// stamp_ns, roll_rad, pitch_rad, sigma_rad.
+/// Inclinometer rows: stamp_ns, roll_rad, pitch_rad, sigma_rad.
 Result<Sample> read_inclinometer_row(const std::vector<std::string_view>& row);
 
 }  // namespace spartan

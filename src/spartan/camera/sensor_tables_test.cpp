@@ -32,7 +32,7 @@ class SensorTables : public ::testing::Test {
                                   const Eigen::Quaterniond& body_from_imu = Eigen::Quaterniond::Identity()) {
     return read_all(stream_of_table(folder_.write("imu.csv", text), {}, 7, read_imu_row(body_from_imu)));
   }
-  std::string imu_fault(const std::string& text) {
+  std::string imu_error(const std::string& text) {
     const auto samples = imu(text);
     if (samples) return "no fault";
     EXPECT_EQ(samples.error().code, ErrorCode::input);
@@ -41,7 +41,7 @@ class SensorTables : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(SensorTables, ReadsTheImuAndTurnsItIntoTheBody) {
+TEST_F(SensorTables, RotatesImuSamplesIntoTheBodyFrame) {
   const Eigen::Quaterniond quarter(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()));
   const auto samples = imu("#t,wx,wy,wz,ax,ay,az\r\n1000, 1,2,3, 4,5,6\r\n2000,0,0,0,0,0,9.81,extra\r\n", quarter);
   ASSERT_TRUE(samples) << samples.error().message();
@@ -52,15 +52,15 @@ TEST_F(SensorTables, ReadsTheImuAndTurnsItIntoTheBody) {
   EXPECT_TRUE(first.accel_m_s2.isApprox(Eigen::Vector3d(-5, 4, 6)));
 }
 
-TEST_F(SensorTables, FaultsNameFileAndLine) {
-  EXPECT_THAT(imu_fault("1,0,0,0,0,0,1\n2,0,0,nan,0,0,1\n"), HasSubstr("imu.csv:2: 'nan' is not a finite number"));
-  EXPECT_THAT(imu_fault("1,0,0,0,0,0,1e999\n"), HasSubstr("imu.csv:1: '1e999' is not a finite number"));
-  EXPECT_THAT(imu_fault("1,0,0,0,0,0,\n"), HasSubstr("imu.csv:1: '' is not a finite number"));
-  EXPECT_THAT(imu_fault("1.5,0,0,0,0,0,1\n"), HasSubstr("imu.csv:1: '1.5' is not a time in nanoseconds"));
-  EXPECT_THAT(imu_fault("\n1,0,0,0,0,0\n"), HasSubstr("imu.csv:2: 6 values where 7 are expected"));
+TEST_F(SensorTables, ErrorsNameFileAndLine) {
+  EXPECT_THAT(imu_error("1,0,0,0,0,0,1\n2,0,0,nan,0,0,1\n"), HasSubstr("imu.csv:2: 'nan' is not a finite number"));
+  EXPECT_THAT(imu_error("1,0,0,0,0,0,1e999\n"), HasSubstr("imu.csv:1: '1e999' is not a finite number"));
+  EXPECT_THAT(imu_error("1,0,0,0,0,0,\n"), HasSubstr("imu.csv:1: '' is not a finite number"));
+  EXPECT_THAT(imu_error("1.5,0,0,0,0,0,1\n"), HasSubstr("imu.csv:1: '1.5' is not a time in nanoseconds"));
+  EXPECT_THAT(imu_error("\n1,0,0,0,0,0\n"), HasSubstr("imu.csv:2: 6 values, expected 7"));
 }
 
-TEST_F(SensorTables, AMissingFileIsSaidWhenTheStreamIsOpened) {
+TEST_F(SensorTables, OpeningReportsAMissingFile) {
   const auto samples = read_all(stream_of_table(folder_.path() + "/none.csv", {}, 3, read_wheel_row));
   ASSERT_FALSE(samples);
   EXPECT_THAT(samples.error().message(), HasSubstr("none.csv: is missing"));

@@ -1,4 +1,4 @@
-// The tables by which recordings announce their shots. Errors have code `input` and name file and line.
+// Tables in which recordings list their frames. Errors have code `input` and name file and line.
 #pragma once
 
 #include <string>
@@ -9,27 +9,28 @@
 
 namespace spartan {
 
-/// KITTI odometry, times.txt: a time in seconds in each row.
+/// KITTI odometry, times.txt: one time in seconds per row.
 Result<std::vector<Stamp>> read_kitti_times(TableReader table);
 
-/// KITTI raw, timestamps.txt: "2011-09-26 13:02:25.964389445" in each row, taken as nanoseconds since 1970.
+/// KITTI raw, timestamps.txt: one UTC date and time per row, e.g. "2011-09-26 13:02:25.964389445". Stamps count from
+/// 1970.
 Result<std::vector<Stamp>> read_kitti_raw_times(TableReader table);
-/// The format of that table.
+/// Table format of timestamps.txt.
 inline TableFormat kitti_raw_times_format() {
   return {.separator = ' ', .header = {}, .ends_with_newline = false};
 }
 
-/// The images of one eye.
+/// Images of one camera.
 struct EurocImages {
   std::vector<Stamp> stamps;
-  std::vector<std::string> files;  ///< as the table names them
+  std::vector<std::string> files;  ///< names as in the table
 };
-/// EuRoC, data.csv: a time in nanoseconds and a file name in each row.
+/// EuRoC, data.csv: a time in nanoseconds and a file name per row.
 Result<EurocImages> read_euroc_images(TableReader table);
 
-/// Spartan, frames.csv (docs/formats.md). Paths are below `folder`; an empty field stays empty.
-Result<std::vector<Shot>> read_spartan_shots(TableReader table, const std::string& folder, const Rig& rig);
-/// The format of that table.
-TableFormat spartan_shots_format();
+/// Spartan, frames.csv (docs/formats.md). `folder` is prepended to the image paths; an empty field stays empty.
+Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std::string& folder, const Rig& rig);
+/// Table format of frames.csv.
+TableFormat spartan_frames_format();
 
 }  // namespace spartan

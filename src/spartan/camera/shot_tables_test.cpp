@@ -16,7 +16,7 @@ TableReader table(const std::string& text, TableFormat format = {}) {
   return TableReader::over(text, "t", std::move(format)).value();
 }
 template <class T>
-std::string fault_of(const Result<T>& result) {
+std::string error_of(const Result<T>& result) {
   if (result) return "no fault";
   EXPECT_EQ(result.error().code, ErrorCode::input);
   return result.error().message();
@@ -28,10 +28,10 @@ TEST(KittiTimes, AreReadToTheNanosecond) {
   EXPECT_THAT(*read_kitti_times(table("")), ElementsAre());
 }
 
-TEST(KittiTimes, FaultsNameTheLine) {
-  EXPECT_THAT(fault_of(read_kitti_times(table("0\n1.0x\n"))), HasSubstr("t:2: '1.0x' is not a time"));
-  EXPECT_THAT(fault_of(read_kitti_times(table("0\nnan\n"))), HasSubstr("t:2"));
-  EXPECT_THAT(fault_of(read_kitti_times(table("9.1e9\n"))), HasSubstr("t:1: the time is out of range"));
+TEST(KittiTimes, ErrorsNameTheLine) {
+  EXPECT_THAT(error_of(read_kitti_times(table("0\n1.0x\n"))), HasSubstr("t:2: '1.0x' is not a time"));
+  EXPECT_THAT(error_of(read_kitti_times(table("0\nnan\n"))), HasSubstr("t:2"));
+  EXPECT_THAT(error_of(read_kitti_times(table("9.1e9\n"))), HasSubstr("t:1: the time is out of range"));
 }
 
 TEST(KittiRawTimes, AreDates) {
@@ -42,7 +42,7 @@ TEST(KittiRawTimes, AreDates) {
        {"2011-09-26\n", "2011-13-26 13:02:25\n", "2011-02-30 13:02:25\n", "2011-09-26 24:02:25\n",
         "2011-09-26 13:60:25\n", "2011-09-26 13:02:99\n", "2011/09/26 13:02:25\n", "-001-09-26 13:02:25\n",
         "9999-09-26 13:02:25\n", "2011-09-26 13:02:9000000000\n", "2011-09-26 13:02:2x\n", "2011-09-26 1:02:25\n"}) {
-    EXPECT_THAT(fault_of(read(text)), HasSubstr("t:1: ")) << text;
+    EXPECT_THAT(error_of(read(text)), HasSubstr("t:1: ")) << text;
   }
 }
 
@@ -51,45 +51,45 @@ TEST(EurocImages, AreListedWithTheirStamps) {
   ASSERT_TRUE(images);
   EXPECT_THAT(images->stamps, ElementsAre(Stamp{20}, Stamp{10}));
   EXPECT_THAT(images->files, ElementsAre("a.png", "b.png"));
-  EXPECT_THAT(fault_of(read_euroc_images(table("10,a.png\n20\n"))), HasSubstr("t:2: 1 values where 2 are expected"));
-  EXPECT_THAT(fault_of(read_euroc_images(table("a.png,10\n"))), HasSubstr("t:1: the first column"));
-  EXPECT_THAT(fault_of(read_euroc_images(table("10,\n"))), HasSubstr("t:1: names no file"));
+  EXPECT_THAT(error_of(read_euroc_images(table("10,a.png\n20\n"))), HasSubstr("t:2: 1 values, expected 2"));
+  EXPECT_THAT(error_of(read_euroc_images(table("a.png,10\n"))), HasSubstr("t:1: the first column"));
+  EXPECT_THAT(error_of(read_euroc_images(table("10,\n"))), HasSubstr("t:1: the file name is empty"));
 }
 
-class SpartanShots : public ::testing::Test {
+class SpartanFrames : public ::testing::Test {
  protected:
-  Result<std::vector<Shot>> read(const std::string& rows) const {
-    return read_spartan_shots(table(std::string(kFramesHeader) + "\n" + rows, spartan_shots_format()), "/rec",
-                              testing::tiny_rig());
+  Result<std::vector<FrameEntry>> read(const std::string& rows) const {
+    return read_spartan_frames(table(std::string(kFramesHeader) + "\n" + rows, spartan_frames_format()), "/rec",
+                               testing::tiny_rig());
   }
 };
 
-TEST_F(SpartanShots, HoldTheirColumns) {
-  const auto shots = read("7,3,stereo,1000,1001,images/a.png,images/b.png,-35,39,2500,1.5,12\n");
-  ASSERT_TRUE(shots) << shots.error().message();
-  ASSERT_EQ(shots->size(), 1U);
-  const Shot& shot = shots->front();
-  EXPECT_EQ(shot.frame_id, 7);
-  EXPECT_EQ(shot.position_id, 3);
-  EXPECT_EQ(shot.pair, "stereo");
-  EXPECT_EQ(shot.left_stamp, Stamp{1000});
-  EXPECT_EQ(shot.right_stamp, Stamp{1001});
-  EXPECT_EQ(shot.left_file, "/rec/images/a.png");
-  EXPECT_EQ(shot.right_file, "/rec/images/b.png");
-  EXPECT_DOUBLE_EQ(shot.pan_rad, -35 * M_PI / 180);
-  EXPECT_DOUBLE_EQ(shot.tilt_rad, 39 * M_PI / 180);
-  EXPECT_EQ(shot.exposure_us, 2500);
-  EXPECT_EQ(shot.gain, 1.5);
-  EXPECT_EQ(shot.bits, 12);
+TEST_F(SpartanFrames, HoldTheirColumns) {
+  const auto frames = read("7,3,stereo,1000,1001,images/a.png,images/b.png,-35,39,2500,1.5,12\n");
+  ASSERT_TRUE(frames) << frames.error().message();
+  ASSERT_EQ(frames->size(), 1U);
+  const FrameEntry& entry = frames->front();
+  EXPECT_EQ(entry.frame_id, 7);
+  EXPECT_EQ(entry.position_id, 3);
+  EXPECT_EQ(entry.pair, "stereo");
+  EXPECT_EQ(entry.left_stamp, Stamp{1000});
+  EXPECT_EQ(entry.right_stamp, Stamp{1001});
+  EXPECT_EQ(entry.left_file, "/rec/images/a.png");
+  EXPECT_EQ(entry.right_file, "/rec/images/b.png");
+  EXPECT_DOUBLE_EQ(entry.pan_rad, -35 * M_PI / 180);
+  EXPECT_DOUBLE_EQ(entry.tilt_rad, 39 * M_PI / 180);
+  EXPECT_EQ(entry.exposure_us, 2500);
+  EXPECT_EQ(entry.gain, 1.5);
+  EXPECT_EQ(entry.bits, 12);
 }
 
-TEST_F(SpartanShots, EmptyImageFieldsStayEmpty) {
-  const auto shots = read("0,0,stereo,1,1,,b.png,0,0,0,0,8\n");
-  ASSERT_TRUE(shots);
-  EXPECT_EQ(shots->front().left_file, "");
+TEST_F(SpartanFrames, EmptyImageFieldsStayEmpty) {
+  const auto frames = read("0,0,stereo,1,1,,b.png,0,0,0,0,8\n");
+  ASSERT_TRUE(frames);
+  EXPECT_EQ(frames->front().left_file, "");
 }
 
-TEST_F(SpartanShots, FaultsNameLineAndColumn) {
+TEST_F(SpartanFrames, ErrorsNameLineAndColumn) {
   const std::vector<std::string> good{"0", "0", "stereo", "1", "1", "a", "b", "0", "0", "0", "0", "8"};
   const std::vector<std::pair<std::size_t, std::string>> columns{
       {0, "frame_id"}, {1, "position_id"}, {2, "pair"},        {3, "left_stamp_ns"}, {4, "right_stamp_ns"},
@@ -98,13 +98,13 @@ TEST_F(SpartanShots, FaultsNameLineAndColumn) {
     for (const std::string value : {"", "x", "nan"}) {
       std::string row;
       for (std::size_t i = 0; i < good.size(); ++i) row += (i ? "," : "") + (i == column ? value : good[i]);
-      EXPECT_THAT(fault_of(read("# remark\n" + row + "\n")), HasSubstr("t:3: " + name)) << row;
+      EXPECT_THAT(error_of(read("# remark\n" + row + "\n")), HasSubstr("t:3: " + name)) << row;
     }
   }
-  EXPECT_THAT(fault_of(read("0,0,stereo,1,1,a,b,0,0,0,0,7\n")), HasSubstr("t:2: bits is '7'"));
-  EXPECT_THAT(fault_of(read("0,0,stereo,1,1,a,b,0,0,0,0,17\n")), HasSubstr("t:2: bits is '17'"));
-  EXPECT_THAT(fault_of(read("0,0,stereo,1,1,a,b,0,0,0,0\n")), HasSubstr("t:2: 11 values where 12"));
-  EXPECT_THAT(fault_of(read("0,0,stereo,1,1,a,b,0,0,0,0,8")), HasSubstr("t:2: the file breaks off"));
+  EXPECT_THAT(error_of(read("0,0,stereo,1,1,a,b,0,0,0,0,7\n")), HasSubstr("t:2: bits is '7'"));
+  EXPECT_THAT(error_of(read("0,0,stereo,1,1,a,b,0,0,0,0,17\n")), HasSubstr("t:2: bits is '17'"));
+  EXPECT_THAT(error_of(read("0,0,stereo,1,1,a,b,0,0,0,0\n")), HasSubstr("t:2: 11 values, expected 12"));
+  EXPECT_THAT(error_of(read("0,0,stereo,1,1,a,b,0,0,0,0,8")), HasSubstr("t:2: the file is truncated"));
 }
 
 }  // namespace

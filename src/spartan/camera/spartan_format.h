@@ -1,4 +1,4 @@
-// What writer and reader of Spartan recordings agree on (docs/formats.md, "Recording").
+// File headers and recording.yaml of Spartan recordings, shared by writer and reader (docs/formats.md, "Recording").
 #pragma once
 
 #include <string>
@@ -16,17 +16,18 @@ inline constexpr const char* kWheelsHeader = "stamp_ns,left_m,right_m";
 inline constexpr const char* kCompassHeader = "stamp_ns,heading_rad,sigma_rad";
 inline constexpr const char* kInclinometerHeader = "stamp_ns,roll_rad,pitch_rad,sigma_rad";
 
-/// recording.yaml.
+/// The contents of recording.yaml.
 struct RecordingFile {
-  int schema = 1;
+  int schema = 1;  ///< version of the format
   RecordingOptions about;
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("schema", schema, "version of this format", between(1, 1));
-    v.field("name", about.name, "a name for people");
-    v.field("description", about.description, "where it comes from");
-    v.field("gravity_m_s2", about.gravity_m_s2, "where it was recorded", between(0.1, 30));
+    v.field("schema", schema, "Version of this file format.", between(1, 1));
+    v.field("name", about.name, "Name of the recording, shown in reports.");
+    v.field("description", about.description, "Description of the recording, e.g. where and how it was made.");
+    v.field("gravity_m_s2", about.gravity_m_s2,
+            "Gravitational acceleration at the recording site in m/s²: 9.81 on Earth, 3.71 on Mars.", between(0.1, 30));
     v.group("imu_noise", about.noise.imu);
     v.group("compass_noise", about.noise.compass);
     v.group("inclinometer_noise", about.noise.inclinometer);

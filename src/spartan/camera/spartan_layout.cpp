@@ -1,4 +1,4 @@
-// Spartan recordings: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/formats.md, "Recording").
+// Spartan layout: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/formats.md, "Recording").
 #include <filesystem>
 
 #include "spartan/camera/recording_index.h"
@@ -12,10 +12,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<std::vector<Shot>> read_shots(const fs::path& folder, const Rig& rig) {
-  auto table = TableReader::open((folder / "frames.csv").string(), spartan_shots_format());
+Result<std::vector<FrameEntry>> read_frames(const fs::path& folder, const Rig& rig) {
+  auto table = TableReader::open((folder / "frames.csv").string(), spartan_frames_format());
   if (!table) return failure(table);
-  return read_spartan_shots(std::move(*table), folder.string(), rig);
+  return read_spartan_frames(std::move(*table), folder.string(), rig);
 }
 
 }  // namespace
@@ -24,8 +24,8 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   const fs::path folder = layout.folder;
   std::error_code error;
   if (!fs::exists(folder / "recording.yaml", error)) {
-    return failure(ErrorCode::input, "has no recording.yaml: its writing was not finished", folder.string(),
-                   "record it again");
+    return failure(ErrorCode::input, "has no recording.yaml: the recording was not finished", folder.string(),
+                   "resume or repeat the recording");
   }
   auto file = load_options<RecordingFile>((folder / "recording.yaml").string());
   if (!file) return failure(file);
@@ -39,9 +39,9 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   if (!rig) return failure(rig);
   index.info.rig = std::move(rig->rig);
   index.info.rig_source = rig->source;
-  auto shots = read_shots(folder, index.info.rig);
-  if (!shots) return failure(shots);
-  index.shots = std::move(*shots);
+  auto frames = read_frames(folder, index.info.rig);
+  if (!frames) return failure(frames);
+  index.frames = std::move(*frames);
   if (const fs::path truth = folder / "truth" / "poses.tum"; fs::exists(truth, error))
     index.info.truth_file = truth.string();
 

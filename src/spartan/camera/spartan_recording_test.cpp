@@ -1,4 +1,4 @@
-// Spartan recordings: what RecordingWriter writes, the source reads.
+// Spartan recordings: FrameSource reads what RecordingWriter writes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -29,14 +29,14 @@ Rig rover(PixelFormat format = {}) {
   rig.name = "rover";
   rig.pan_tilt_units = {{"mast", Pose::from_translation({0, 0, 1})}};
   for (const char* pair : {"front", "mast"}) {
-    for (const char* eye : {"left", "right"}) {
+    for (const char* side : {"left", "right"}) {
       Camera camera;
-      camera.name = std::string(pair) + "_" + eye;
+      camera.name = std::string(pair) + "_" + side;
       camera.size = kSize;
       camera.model = PinholeModel{20, 20, 11.5, 7.5};
       camera.pixel_format = format;
       if (pair == std::string("mast")) camera.mount = "mast";
-      const double y = eye == std::string("left") ? 0.05 : -0.05;
+      const double y = side == std::string("left") ? 0.05 : -0.05;
       camera.mount_from_camera = Pose::from_translation({0, y, 0}) * optical_from_forward().inverse();
       rig.cameras.push_back(camera);
     }
@@ -69,7 +69,7 @@ bool same_pixels(const FrameImage& a, const FrameImage& b) {
   return true;
 }
 
-StereoFrame shot(std::int64_t id, const std::string& pair, std::int64_t stamp_ns, PixelFormat format = {}) {
+StereoFrame make_frame(std::int64_t id, const std::string& pair, std::int64_t stamp_ns, PixelFormat format = {}) {
   StereoFrame frame;
   frame.frame_id = id;
   frame.pair = pair;
@@ -94,7 +94,7 @@ double any_number() {
                        [](std::int64_t v) { return static_cast<double>(v) / 3.7e10; });
 }
 
-RC_GTEST_PROP(SpartanRecording, GivesBackWhatWasWritten, ()) {
+RC_GTEST_PROP(SpartanRecording, ReadsBackWhatWasWritten, ()) {
   const TemporaryFolder folder;
   PixelFormat format;
   format.layout = *rc::gen::element(PixelLayout::gray, PixelLayout::bayer_grbg);
@@ -109,7 +109,7 @@ RC_GTEST_PROP(SpartanRecording, GivesBackWhatWasWritten, ()) {
   const int count = *rc::gen::inRange(1, 5);
   for (int i = 0; i < count; ++i) {
     stamp += *rc::gen::inRange<std::int64_t>(1, 3000000000);
-    StereoFrame frame = shot(i, *rc::gen::element<std::string>("front", "mast"), stamp, format);
+    StereoFrame frame = make_frame(i, *rc::gen::element<std::string>("front", "mast"), stamp, format);
     frame.right_stamp.ns += *rc::gen::inRange(-4000000, 4000000);
     frame.position_id = *rc::gen::inRange(-1, 5);
     frame.pan_rad = any_number() / 10;
@@ -165,12 +165,12 @@ RC_GTEST_PROP(SpartanRecording, GivesBackWhatWasWritten, ()) {
   RC_ASSERT(sensors == 4u);
 }
 
-// A small sound recording, written anew for each test and then spoiled.
+// A small valid recording, written for each test and then damaged.
 class SpartanRecordingFaults : public ::testing::Test {
  protected:
   SpartanRecordingFaults() {
     auto writer = RecordingWriter::create(path_, rover(), {"r", "", 9.81}).value();
-    for (int i = 0; i < 5; ++i) EXPECT_TRUE(writer.add(shot(i, "front", 2'000'000'000LL * i)));
+    for (int i = 0; i < 5; ++i) EXPECT_TRUE(writer.add(make_frame(i, "front", 2'000'000'000LL * i)));
     for (int i = 0; i < 5; ++i) EXPECT_TRUE(writer.add(ImuSample{{1'500'000'000LL * i}, {0, 0, 0}, {0, 0, 9.81}}));
     EXPECT_TRUE(writer.finish());
   }
@@ -180,7 +180,7 @@ class SpartanRecordingFaults : public ::testing::Test {
     ASSERT_NE(at, std::string::npos) << file << " has no " << what;
     folder_.write("rec/" + file, text.replace(at, what.size(), with));
   }
-  std::string complaint() {
+  std::string error_message() {
     auto source = open_recording(path_);
     while (source) {
       const auto sample = (*source)->next();
@@ -200,52 +200,52 @@ class SpartanRecordingFaults : public ::testing::Test {
   const std::string path_ = folder_.path() + "/rec";
 };
 
-TEST_F(SpartanRecordingFaults, NoneInASoundOneAtHalfAFrameASecond) {
-  EXPECT_EQ(complaint(), "nothing");
+TEST_F(SpartanRecordingFaults, NoneInAValidRecordingAtHalfAHertz) {
+  EXPECT_EQ(error_message(), "nothing");
   auto source = open_recording(path_).value();
   EXPECT_EQ(source->info().sequence.announced, 5);
   EXPECT_EQ(source->info().sequence.gaps, 0);
   EXPECT_EQ(source->info().sequence.median_step_s, 2);
-  // By time; where the stamps are the same the sensor comes first.
+  // Ordered by stamp; at equal stamps the sensor comes first.
   std::string order;
   for (const Sample& sample : all_samples(*source)) order += std::holds_alternative<ImuSample>(sample) ? 'i' : 'f';
   EXPECT_EQ(order, "ifififiiff");
 }
 
-TEST_F(SpartanRecordingFaults, OfTheTablesNameFileLineAndColumn) {
+TEST_F(SpartanRecordingFaults, ErrorsInTablesNameFileLineAndColumn) {
   change("frames.csv", "2,-1,front,4000000000", "2,-1,front,4e9");
-  EXPECT_THAT(complaint(), HasSubstr("frames.csv:4: left_stamp_ns is '4e9'"));
+  EXPECT_THAT(error_message(), HasSubstr("frames.csv:4: left_stamp_ns is '4e9'"));
   change("frames.csv", "4e9", "4000000000");
   change("frames.csv", "1,-1,front", "1,-1,rear");
-  EXPECT_THAT(complaint(), HasSubstr("frames.csv:3: pair (which the rig does not have) is 'rear'"));
+  EXPECT_THAT(error_message(), HasSubstr("frames.csv:3: pair (not in the rig) is 'rear'"));
   change("frames.csv", "rear", "front");
   change("frames.csv", "frame_id", "id");
-  EXPECT_THAT(complaint(), HasSubstr("frames.csv:1: the columns are"));
+  EXPECT_THAT(error_message(), HasSubstr("frames.csv:1: the columns are"));
   change("frames.csv", "id", "frame_id");
   change("sensors/imu.csv", "9.81", "nan");
-  EXPECT_THAT(complaint(), HasSubstr("imu.csv:2"));
+  EXPECT_THAT(error_message(), HasSubstr("imu.csv:2"));
 }
 
-TEST_F(SpartanRecordingFaults, OfTheYamlFiles) {
+TEST_F(SpartanRecordingFaults, ErrorsInYamlFilesNameTheFile) {
   change("recording.yaml", "name:", "nam:");
-  EXPECT_THAT(complaint(), HasSubstr("recording.yaml"));
+  EXPECT_THAT(error_message(), HasSubstr("recording.yaml"));
   change("recording.yaml", "nam:", "name:");
   change("rig.yaml", "bits: 8", "bits: 99");
-  EXPECT_THAT(complaint(), HasSubstr("rig.yaml"));
+  EXPECT_THAT(error_message(), HasSubstr("rig.yaml"));
   std::filesystem::remove(path_ + "/recording.yaml");
-  EXPECT_THAT(complaint(), HasSubstr("its writing was not finished"));
+  EXPECT_THAT(error_message(), HasSubstr("the recording was not finished"));
 }
 
-TEST_F(SpartanRecordingFaults, ATableThatBreaksOffEndsTheReadingThere) {
+TEST_F(SpartanRecordingFaults, ATruncatedTableEndsTheStream) {
   std::string text = read_file(path_ + "/sensors/imu.csv").value();
   text.resize(text.size() - 2);
   folder_.write("rec/sensors/imu.csv", text);
-  EXPECT_THAT(complaint(), HasSubstr("imu.csv:6: the file breaks off"));
+  EXPECT_THAT(error_message(), HasSubstr("imu.csv:6: the file is truncated"));
 }
 
-TEST_F(SpartanRecordingFaults, MissingAndDamagedImagesAreSkipped) {
+TEST_F(SpartanRecordingFaults, SkipsMissingAndDamagedImages) {
   std::filesystem::remove(path_ + "/images/front/2000000000_right.png");
-  folder_.write("rec/images/front/4000000000_left.png", "no picture");
+  folder_.write("rec/images/front/4000000000_left.png", "no image");
   const std::string whole = read_file(path_ + "/images/front/6000000000_left.png").value();
   folder_.write("rec/images/front/6000000000_left.png", whole.substr(0, whole.size() / 2));
   ASSERT_TRUE(write_png(path_ + "/images/front/8000000000_right.png", Image<std::uint8_t>(25, 16).view()));
@@ -253,14 +253,14 @@ TEST_F(SpartanRecordingFaults, MissingAndDamagedImagesAreSkipped) {
                                                FrameFault::unreadable, FrameFault::wrong_size}));
 }
 
-TEST_F(SpartanRecordingFaults, StampsThatRunBackwardsOrApart) {
+TEST_F(SpartanRecordingFaults, DetectsReversedAndUnsynchronizedStamps) {
   change("frames.csv", "2,-1,front,4000000000,4000000000", "2,-1,front,1000000000,1000000000");
   change("frames.csv", "3,-1,front,6000000000,6000000000", "3,-1,front,6000000000,6100000000");
   EXPECT_EQ(faults(), (std::vector<FrameFault>{FrameFault::stamp_reversed, FrameFault::stamps_apart}));
   EXPECT_EQ(open_recording(path_).value()->info().sequence.reversals, 1);
 }
 
-TEST_F(SpartanRecordingFaults, SeekLeadsToTheSamePlace) {
+TEST_F(SpartanRecordingFaults, SeekContinuesLikeAnUninterruptedReader) {
   std::filesystem::remove(path_ + "/images/front/4000000000_left.png");
   const auto all = all_samples(*open_recording(path_).value());
   for (std::size_t taken = 0; taken <= all.size(); ++taken) {
@@ -276,15 +276,15 @@ TEST_F(SpartanRecordingFaults, SeekLeadsToTheSamePlace) {
   EXPECT_FALSE(open_recording(path_).value()->seek(static_cast<std::int64_t>(all.size()) + 1));
 }
 
-TEST_F(SpartanRecordingFaults, ShotsOnRequestByStamp) {
+TEST_F(SpartanRecordingFaults, FramesOnRequestByStamp) {
   auto source = open_recording(path_).value();
   EXPECT_EQ(source->announced_stamps("front").size(), 5u);
   const auto frame = source->frame_at("front", {6'000'000'000LL});
   ASSERT_TRUE(frame) << frame.error().message();
   EXPECT_EQ(frame->frame_id, 3);
-  EXPECT_TRUE(same_pixels(frame->left, shot(3, "front", 0).left));
+  EXPECT_TRUE(same_pixels(frame->left, make_frame(3, "front", 0).left));
   EXPECT_THAT(source->frame_at("front", {7}).error().message(),
-              HasSubstr("has no shot of pair 'front' at 0.000000007 s"));
+              HasSubstr("has no frame of pair 'front' at 0.000000007 s"));
   EXPECT_FALSE(source->frame_at("mast", {6'000'000'000LL}));
   const auto imu = source->imu_samples({}, 3);
   ASSERT_TRUE(imu);
@@ -296,46 +296,46 @@ TEST_F(SpartanRecordingFaults, ShotsOnRequestByStamp) {
   EXPECT_EQ(later->front().stamp, second);
 }
 
-TEST_F(SpartanRecordingFaults, ShotsOfAPosition) {
+TEST_F(SpartanRecordingFaults, FramesOfAStop) {
   change("frames.csv", "2,-1,front", "2,7,front");
   change("frames.csv", "3,-1,front", "3,7,front");
   std::filesystem::remove(path_ + "/images/front/4000000000_left.png");
   const auto source = open_recording(path_).value();
-  const auto shots = source->shots_at(7);
-  ASSERT_EQ(shots.size(), 1u) << "the other one has no left image";
-  EXPECT_EQ(shots[0].pair, "front");
-  EXPECT_EQ(shots[0].left_stamp.ns, 6000000000);
+  const auto keys = source->shots_at(7);
+  ASSERT_EQ(keys.size(), 1u) << "the other frame has no left image";
+  EXPECT_EQ(keys[0].pair, "front");
+  EXPECT_EQ(keys[0].left_stamp.ns, 6000000000);
   EXPECT_TRUE(source->shots_at(8).empty());
 }
 
-TEST(RecordingWriter, LeavesWhatIsThereAlone) {
+TEST(RecordingWriter, DoesNotOverwriteAFolder) {
   const TemporaryFolder folder;
   folder.write("mine.txt", "keep");
-  const auto refused = RecordingWriter::create(folder.path(), rover(), {});
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::output);
-  EXPECT_THAT(refused.error().message(), HasSubstr("exists already"));
+  const auto rejected = RecordingWriter::create(folder.path(), rover(), {});
+  ASSERT_FALSE(rejected);
+  EXPECT_EQ(rejected.error().code, ErrorCode::output);
+  EXPECT_THAT(rejected.error().message(), HasSubstr("already exists"));
   Rig faulty = rover();
   faulty.pairs.clear();
   EXPECT_EQ(RecordingWriter::create(folder.path() + "/new", faulty, {}).error().code, ErrorCode::configuration);
   EXPECT_EQ(RecordingWriter::create("/proc/no/where", rover(), {}).error().code, ErrorCode::output);
 }
 
-TEST(RecordingWriter, WhatDoesNotFitIsRefused) {
+TEST(RecordingWriter, RejectsFramesOfAnUnknownPair) {
   const TemporaryFolder folder;
   auto writer = RecordingWriter::create(folder.path() + "/rec", rover(), {}).value();
-  EXPECT_FALSE(writer.add(shot(0, "rear", 1)));
-  EXPECT_TRUE(writer.add(shot(0, "front", 1)));
+  EXPECT_FALSE(writer.add(make_frame(0, "rear", 1)));
+  EXPECT_TRUE(writer.add(make_frame(0, "front", 1)));
   EXPECT_THAT(open_recording(folder.path() + "/rec").error().message(), HasSubstr("was not finished"));
 }
 
-TEST(RecordingWriter, TruthIsInTheDocumentsFormat) {
+TEST(RecordingWriter, WritesGroundTruthInTheDocumentedFormat) {
   const TemporaryFolder folder;
   auto writer = RecordingWriter::create(folder.path() + "/rec", rover(), {}).value();
-  ASSERT_TRUE(writer.add(shot(0, "front", 1)));
+  ASSERT_TRUE(writer.add(make_frame(0, "front", 1)));
   Image<float> disparity(3, 1, std::numeric_limits<float>::quiet_NaN());
   disparity(0, 0) = 2.5f;
-  disparity(1, 0) = 300.0f;  // more than the format holds
+  disparity(1, 0) = 300.0f;  // above the largest value of the format
   Image<std::uint8_t> mask(3, 1, std::uint8_t{128});
   ASSERT_TRUE(writer.write_truth_disparity("front", {1}, disparity, mask));
   ASSERT_TRUE(writer.write_truth(rover(), {{Stamp{1}, Pose::from_translation({1, 2, 3})}}));
@@ -350,8 +350,8 @@ TEST(RecordingWriter, TruthIsInTheDocumentsFormat) {
   EXPECT_EQ(open_recording(folder.path() + "/rec").value()->info().truth_file, truth + "/poses.tum");
 }
 
-// The tables of docs/formats.md, put into a folder as they stand there.
-TEST(SpartanRecording, TheDocumentsExamplesAreRead) {
+// The example tables of docs/formats.md, written to a folder unchanged.
+TEST(SpartanRecording, ReadsTheExamplesOfTheDocumentation) {
   const TemporaryFolder folder;
   for (const char* name : {"recording.yaml", "frames.csv"})
     folder.write(std::string("rec/") + name, testing::doc_example(name));
@@ -361,8 +361,8 @@ TEST(SpartanRecording, TheDocumentsExamplesAreRead) {
   }
   folder.write("rec/rig.yaml", to_rig_yaml(rover()));
   for (const char* name : {"front/1000000000", "mast/1000000000", "front/2500000000"}) {
-    for (const char* eye : {"_left.png", "_right.png"}) {
-      const std::string path = folder.file(std::string("rec/images/") + name + eye);
+    for (const char* side : {"_left.png", "_right.png"}) {
+      const std::string path = folder.file(std::string("rec/images/") + name + side);
       ASSERT_TRUE(write_png(path, Image<std::uint8_t>(kSize.width, kSize.height).view()));
     }
   }

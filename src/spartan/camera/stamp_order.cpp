@@ -7,7 +7,7 @@
 namespace spartan {
 namespace {
 
-constexpr double kGapFactor = 3;
+constexpr double kGapFactor = 3;  // a gap is longer than this multiple of the median interval
 
 std::vector<std::size_t> sorted_order(const std::vector<Stamp>& stamps) {
   std::vector<std::size_t> order(stamps.size());
@@ -23,8 +23,9 @@ double distance_s(Stamp a, Stamp b) {
 }  // namespace
 
 std::vector<bool> find_reversals(const std::vector<Stamp>& stamps) {
-  // run[i]: length of the longest increasing subsequence that begins with i, by patience sorting from the back.
-  // heads[k]: the largest stamp with which a subsequence of k + 1 stamps can begin; decreasing in k.
+  // Longest increasing subsequence by patience sorting, from the back.
+  // run[i]: length of the longest increasing subsequence that starts at i.
+  // heads[k]: the largest stamp that can start a subsequence of k + 1 stamps; decreasing in k.
   std::vector<std::size_t> run(stamps.size());
   std::vector<Stamp> heads;
   for (std::size_t i = stamps.size(); i-- > 0;) {
@@ -36,7 +37,7 @@ std::vector<bool> find_reversals(const std::vector<Stamp>& stamps) {
       *place = std::max(*place, stamps[i]);
     }
   }
-  // Taking the first stamp that still allows the full length, again and again, keeps the earliest ones.
+  // Of all longest subsequences keep the earliest stamps: greedily take the first stamp that allows the full length.
   std::vector<bool> reversed(stamps.size(), true);
   std::size_t wanted = heads.size();
   std::optional<Stamp> last;

@@ -11,6 +11,7 @@
 namespace spartan {
 namespace {
 
+// Half of the range: the difference of two stamps fits 64 bits.
 constexpr std::int64_t kLargestStamp = std::numeric_limits<std::int64_t>::max() / 2;
 constexpr std::string_view kBlanks = " \t\r";
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
@@ -32,7 +33,7 @@ std::vector<std::string_view> split(std::string_view line, char separator) {
   }
 }
 
-// Held as text, a quotation of foreign bytes must stay short and printable.
+// Quotes file content in an error message: at most 80 characters, non-printable ones replaced.
 std::string quote(std::string_view text) {
   std::string quoted;
   for (const char c : text.substr(0, 80)) quoted += c >= ' ' && c <= '~' ? c : '?';
@@ -43,7 +44,8 @@ std::string quote(std::string_view text) {
 
 Result<TableReader> TableReader::open(const std::string& path, TableFormat format) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return failure(ErrorCode::input, "is missing, or no file", path);
+  if (!std::filesystem::is_regular_file(path, error))
+    return failure(ErrorCode::input, "is missing or not a file", path);
   auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
   if (!*file) return failure(ErrorCode::input, "cannot be read", path);
   return begin(path, std::move(format), std::move(file));
@@ -60,9 +62,9 @@ Result<TableReader> TableReader::begin(std::string path, TableFormat format, std
   const auto first = table.next();
   if (!first) return failure(first);
   if (!*first)
-    return failure(ErrorCode::input, fmt::format("is empty, expected are the columns '{}'", header), table.path_);
+    return failure(ErrorCode::input, fmt::format("the file is empty, expected the columns '{}'", header), table.path_);
   if (**first != split(header, table.format_.separator)) {
-    return table.fault(fmt::format("the columns are {}, expected are '{}'", quote(trim(table.line_)), header));
+    return table.error_in_row(fmt::format("the columns are {}, expected '{}'", quote(trim(table.line_)), header));
   }
   return table;
 }
@@ -73,32 +75,32 @@ Result<std::optional<std::vector<std::string_view>>> TableReader::next() {
     const bool broken_off = stream_->eof();
     const std::string_view line = trim(line_);
     if (line.empty() || line.front() == '#') continue;
-    if (broken_off && format_.ends_with_newline) return fault("the file breaks off in this line");
+    if (broken_off && format_.ends_with_newline) return error_in_row("the file is truncated in this line");
     return split(line, format_.separator);
   }
-  if (stream_->bad()) return failure(ErrorCode::input, "cannot be read to its end", path_);
+  if (stream_->bad()) return failure(ErrorCode::input, "cannot be read to the end of the file", path_);
   return std::nullopt;
 }
 
 Result<std::optional<std::vector<std::string_view>>> TableReader::next(std::size_t fields) {
   auto row = next();
   if (row && *row && (*row)->size() < fields) {
-    return fault(fmt::format("{} values where {} are expected: {}", (*row)->size(), fields, quote(trim(line_))));
+    return error_in_row(fmt::format("{} values, expected {}: {}", (*row)->size(), fields, quote(trim(line_))));
   }
   return row;
 }
 
-bool is_sane(Stamp stamp) {
+bool is_in_range(Stamp stamp) {
   return stamp.ns <= kLargestStamp && stamp.ns >= -kLargestStamp;
 }
 
 std::optional<Stamp> parse_stamp_ns(std::string_view text) {
   const auto ns = parse_number<std::int64_t>(text);
-  if (!ns || !is_sane(Stamp{*ns})) return std::nullopt;
+  if (!ns || !is_in_range(Stamp{*ns})) return std::nullopt;
   return Stamp{*ns};
 }
 
-// A double of degrees cannot name every double of radians; a few digits more can.
+// Not every double of radians has a double of degrees that converts back to it; long double has enough digits.
 std::optional<double> parse_degrees(std::string_view text) {
   const auto degrees = parse_number<long double>(text);
   if (!degrees) return std::nullopt;
@@ -108,7 +110,7 @@ std::optional<double> parse_degrees(std::string_view text) {
 std::string to_degrees(double radians) {
   const long double degrees = static_cast<long double>(radians) * (180 / std::numbers::pi_v<long double>);
   std::string text;
-  // From three digits on: fewer would write 90 as 9e+01.
+  // At least three digits: with fewer, 90 would be written as 9e+01.
   for (int digits = 3; digits <= 21; ++digits) {
     text = fmt::format("{:.{}g}", degrees, digits);
     if (parse_degrees(text) == radians) break;

@@ -1,4 +1,4 @@
-// Tables in text files, read a line at a time.
+// Tables in text files (CSV or blank-separated), read line by line.
 #pragma once
 
 #include <charconv>
@@ -17,32 +17,34 @@
 
 namespace spartan {
 
-/// How a table is written.
+/// Syntax of a table.
 struct TableFormat {
   char separator = ',';            ///< ' ': any run of blanks
-  std::string header;              ///< names of the columns, must be the first row; empty: there is none
-  bool ends_with_newline = false;  ///< true: a last line without one was broken off
+  std::string header;              ///< expected column names in the first row; empty: no header
+  bool ends_with_newline = false;  ///< true: a last line without a newline is an error (truncated file)
 };
 
-/// Reads rows in constant memory. Empty lines and lines that begin with '#' do not count; blanks around fields,
-/// carriage returns and a byte-order mark are taken off.
+/// Reads rows in constant memory. Skips empty lines and lines that start with '#'; strips blanks around fields,
+/// carriage returns and a byte-order mark.
 class TableReader {
  public:
-  /// Code `input` where the file cannot be read or has another header.
+  /// Opens a file. Code `input` where it cannot be read or its header differs.
   static Result<TableReader> open(const std::string& path, TableFormat format);
-  /// The same over text in memory; `name` stands in errors.
+  /// Reads text in memory; errors call it `name`.
   static Result<TableReader> over(std::string text, const std::string& name, TableFormat format);
 
   /// The fields of the next row, valid until the next call; nothing at the end.
   Result<std::optional<std::vector<std::string_view>>> next();
-  /// The same, for a table whose rows have at least `fields` fields: fewer are an error of code `input`.
+  /// The same; a row with fewer than `fields` fields is an error of code `input`.
   Result<std::optional<std::vector<std::string_view>>> next(std::size_t fields);
 
   const std::string& path() const { return path_; }
-  /// "file:line" of the row that next() gave last.
-  std::string place() const { return path_ + ":" + std::to_string(line_number_); }
-  /// An error of code `input` at the row that next() gave last.
-  tl::unexpected<Error> fault(std::string what) const { return failure(ErrorCode::input, std::move(what), place()); }
+  /// "file:line" of the row that next() returned last.
+  std::string location() const { return path_ + ":" + std::to_string(line_number_); }
+  /// An error of code `input` at the row that next() returned last.
+  tl::unexpected<Error> error_in_row(std::string what) const {
+    return failure(ErrorCode::input, std::move(what), location());
+  }
 
  private:
   static Result<TableReader> begin(std::string path, TableFormat format, std::unique_ptr<std::istream> stream);
@@ -55,7 +57,7 @@ class TableReader {
   int line_number_ = 0;
 };
 
-/// The whole of `text` as a number; nothing where it is none, or not finite.
+/// Parses all of `text` as a number; nothing where it is not a number or not finite.
 template <class Number>
 std::optional<Number> parse_number(std::string_view text) {
   Number value{};
@@ -67,14 +69,14 @@ std::optional<Number> parse_number(std::string_view text) {
   return value;
 }
 
-/// Within ±146 years of the epoch, so that differences of stamps do not overflow.
-bool is_sane(Stamp stamp);
-/// A stamp in nanoseconds; nothing where it is none or not sane.
+/// Whether the stamp is within ±146 years of the epoch, so that differences of stamps do not overflow.
+bool is_in_range(Stamp stamp);
+/// Parses a stamp in nanoseconds; nothing where it is not an integer or out of range.
 std::optional<Stamp> parse_stamp_ns(std::string_view text);
 
-/// Radians in decimal degrees with the fewest digits from which parse_degrees() gives the same double.
+/// Formats radians as decimal degrees with the fewest digits from which parse_degrees() recovers the same double.
 std::string to_degrees(double radians);
-/// Decimal degrees to radians, computed with 64 bits of mantissa or more and rounded once.
+/// Converts decimal degrees to radians in long double (64-bit mantissa or more), rounded once.
 std::optional<double> parse_degrees(std::string_view text);
 
 }  // namespace spartan

@@ -1,5 +1,5 @@
-// Every pair of camera models from one end of imaging to the other: a wall drawn into both eyes by their models comes
-// out of the rectified view where two pinholes would see it.
+// End-to-end test of imaging for every pair of camera models: a wall rendered with both models appears in the rectified
+// views as two pinhole cameras would see it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,8 +23,8 @@ struct NamedModel {
   CameraModel model;
 };
 
-// A hundred pixels lie between the middle and a corner: the three fisheyes see more than 90° to the side there. The
-// pupil of the last one moves by up to 6 cm.
+// The corners are 100 px from the centre, where the three fisheye models see beyond 90° from the axis. The entrance
+// pupil of the last model moves by up to 6 cm.
 const std::vector<NamedModel> kModels{
     {"pinhole", PinholeModel{125, 124, 81, 58}},
     {"radial_tangential", RadialTangentialModel({125, 126, 82, 57}, {-0.25, 0.06, 2e-4, 3e-5})},
@@ -44,8 +44,8 @@ Camera camera_with(const std::string& name, const CameraModel& model) {
   return camera;
 }
 
-// A wall across the left rectified view's axis, painted by the direction to its points, so that its far parts are as
-// smooth as its middle.
+// A wall perpendicular to the optical axis of the left rectified view. Its texture is a function of direction, so that
+// distant parts are as smooth as the centre.
 struct Wall {
   Pose rectified_from_body;
   double depth_m;
@@ -55,7 +55,7 @@ struct Wall {
     return 128 + 60 * std::sin(6 * n.x() + 1) + 50 * std::cos(5 * n.y());
   }
 
-  /// What a pixel sees; mid gray where it does not see the wall.
+  /// The gray level at a pixel; mid gray where it does not see the wall.
   double level_at(const Camera& camera, const Pose& body_from_camera, const Vector2d& pixel) const {
     const auto ray = unproject(camera.model, pixel);
     if (!ray) return 128;
@@ -66,7 +66,7 @@ struct Wall {
     return level_towards(origin + (depth_m - origin.z()) / direction.z() * direction);
   }
 
-  FrameImage picture(const Camera& camera, const Pose& body_from_camera) const {
+  FrameImage render(const Camera& camera, const Pose& body_from_camera) const {
     Image<std::uint16_t> image(camera.size);
     for (int y = 0; y < image.height(); ++y) {
       for (int x = 0; x < image.width(); ++x) {
@@ -83,7 +83,7 @@ struct Outcome {
 };
 
 Outcome compare(ImageView<const std::uint8_t> seen, ImageView<const std::uint8_t> mask, const RectifiedStereo& view,
-                double eye_x_m, double depth_m) {
+                double camera_x_m, double depth_m) {
   Outcome outcome;
   for (int y = 0; y < seen.height(); ++y) {
     for (int x = 0; x < seen.width(); ++x) {
@@ -92,7 +92,7 @@ Outcome compare(ImageView<const std::uint8_t> seen, ImageView<const std::uint8_t
         continue;
       }
       const Vector3d direction((x - view.centre_px.x()) / view.focal_px, (y - view.centre_px.y()) / view.focal_px, 1);
-      const double expected = Wall::level_towards(Vector3d(eye_x_m, 0, 0) + depth_m * direction);
+      const double expected = Wall::level_towards(Vector3d(camera_x_m, 0, 0) + depth_m * direction);
       outcome.largest_error = std::max(outcome.largest_error, std::abs(seen(x, y) - expected * 200 / 257));
       ++outcome.compared;
     }
@@ -100,31 +100,31 @@ Outcome compare(ImageView<const std::uint8_t> seen, ImageView<const std::uint8_t
   return outcome;
 }
 
-/// Both eyes' pictures of a wall through the imager; nothing where there is no such view.
+/// Errors of both rectified images of a wall; nothing where the view is impossible.
 std::optional<std::pair<Outcome, Outcome>> outcomes_of(const NamedModel& left, const NamedModel& right,
                                                        const ImagingOptions& options, double wall_depth_m) {
-  Camera eyes[] = {camera_with("left", left.model), camera_with("right", right.model)};
-  for (Camera& eye : eyes) eye.pixel_format = {PixelLayout::gray, 16};
-  const Rig rig =
-      rig_of_one_pair("test", eyes[0], eyes[1], Pose(exp_so3({0.02, -0.03, 0.04}), {kBaseline_m, 0, 0}).inverse());
+  Camera cameras[] = {camera_with("left", left.model), camera_with("right", right.model)};
+  for (Camera& camera : cameras) camera.pixel_format = {PixelLayout::gray, 16};
+  const Rig rig = rig_of_one_pair("test", cameras[0], cameras[1],
+                                  Pose(exp_so3({0.02, -0.03, 0.04}), {kBaseline_m, 0, 0}).inverse());
   auto imager = Imager::create(rig, options, Workers(2));
   if (!imager) return std::nullopt;
   StereoFrame frame;
   frame.pair = rig.pairs[0].name;
-  const auto blank = FrameImage::own(Image<std::uint16_t>(kSize), eyes[0].pixel_format);
+  const auto blank = FrameImage::own(Image<std::uint16_t>(kSize), cameras[0].pixel_format);
   frame.left = frame.right = blank;
   const Wall wall{imager->process(frame)->body_from_left.inverse(), wall_depth_m};
-  frame.left = wall.picture(eyes[0], rig.body_from_camera("left"));
-  frame.right = wall.picture(eyes[1], rig.body_from_camera("right"));
+  frame.left = wall.render(cameras[0], rig.body_from_camera("left"));
+  frame.right = wall.render(cameras[1], rig.body_from_camera("right"));
   const auto pair = imager->process(frame);
   EXPECT_TRUE(pair) << pair.error().message();
   return std::pair{compare(pair->left, pair->left_mask, pair->geometry, 0, wall_depth_m),
                    compare(pair->right, pair->right_mask, pair->geometry, kBaseline_m, wall_depth_m)};
 }
 
-ImagingOptions plain_options(const std::string& policy) {
+ImagingOptions plain_options(ViewPolicy policy) {
   ImagingOptions options;
-  options.contrast = options.balance = false;
+  options.contrast = options.gain_compensation = false;
   options.view.policy = policy;
   options.view.depth_m = kDepth_m;
   return options;
@@ -134,7 +134,7 @@ bool is_fisheye(const NamedModel& named) {
   return project(named.model, Vector3d(1, 0, -0.02)).has_value();
 }
 
-// Off by the rounding of 16 to 8 bits, of the places and of the interpolation between pixels.
+// Gray levels: rounding from 16 to 8 bits, of the table positions and of the interpolation.
 constexpr double kTolerance = 1.2;
 
 class AnyModel : public ::testing::TestWithParam<std::tuple<int, int>> {
@@ -143,17 +143,17 @@ class AnyModel : public ::testing::TestWithParam<std::tuple<int, int>> {
   const NamedModel& right() const { return kModels[std::size_t(std::get<1>(GetParam()))]; }
 };
 
-TEST_P(AnyModel, IsSeenAsByAPinhole) {
-  for (const std::string policy : {"keep_resolution", "all_valid", "whole_view"}) {
-    SCOPED_TRACE(policy);
+TEST_P(AnyModel, IsRectifiedToAPinhole) {
+  for (const ViewPolicy policy : {ViewPolicy::keep_resolution, ViewPolicy::all_valid, ViewPolicy::whole_view}) {
+    SCOPED_TRACE(name_of(policy));
     const auto outcomes = outcomes_of(left(), right(), plain_options(policy), kDepth_m);
-    const bool no_plane_shows_it = policy == "whole_view" && (is_fisheye(left()) || is_fisheye(right()));
+    const bool no_plane_shows_it = policy == ViewPolicy::whole_view && (is_fisheye(left()) || is_fisheye(right()));
     ASSERT_EQ(outcomes.has_value(), !no_plane_shows_it);
     if (!outcomes) continue;
-    for (const Outcome& eye : {outcomes->first, outcomes->second}) {
-      EXPECT_LT(eye.largest_error, kTolerance);
-      EXPECT_GT(eye.compared, 0.45 * kSize.width * kSize.height);
-      EXPECT_TRUE(eye.masked == 0 || policy != "all_valid");
+    for (const Outcome& camera : {outcomes->first, outcomes->second}) {
+      EXPECT_LT(camera.largest_error, kTolerance);
+      EXPECT_GT(camera.compared, 0.45 * kSize.width * kSize.height);
+      EXPECT_TRUE(camera.masked == 0 || policy != ViewPolicy::all_valid);
     }
   }
 }
@@ -166,10 +166,10 @@ std::string pair_name(const ::testing::TestParamInfo<std::tuple<int, int>>& test
 const auto kEveryModel = ::testing::Range(0, int(kModels.size()));
 INSTANTIATE_TEST_SUITE_P(Pairs, AnyModel, ::testing::Combine(kEveryModel, kEveryModel), pair_name);
 
-// Where the rays of a camera do not meet in one point, a view is right for one depth.
-TEST(MovingPupil, TheViewIsRightForTheDepthItIsMadeFor) {
+// The view of a non-central camera is exact at one depth only.
+TEST(NonCentralCamera, ViewIsExactAtTheGivenDepth) {
   const NamedModel& cahvore = kModels.back();
-  ImagingOptions options = plain_options("keep_resolution");
+  ImagingOptions options = plain_options(ViewPolicy::keep_resolution);
   const auto error = [&](double wall_depth_m) {
     const auto outcomes = outcomes_of(cahvore, cahvore, options, wall_depth_m);
     EXPECT_TRUE(outcomes);
@@ -182,13 +182,13 @@ TEST(MovingPupil, TheViewIsRightForTheDepthItIsMadeFor) {
   EXPECT_GT(error(kDepth_m / 4), 2 * kTolerance);
 }
 
-// Where a side of the picture looks beyond all planes and the other one nearly, the view stays between the two.
-TEST(Fisheye, TheViewStaysInTheMiddleOfThePicture) {
+// Where one edge of the image is beyond 90° and the other one near it, the view stays centred.
+TEST(Fisheye, ViewIsCentredOnTheImage) {
   for (const Vector2d& centre : {Vector2d(79.5, 59.5), Vector2d(74, 63), Vector2d(88, 54)}) {
     const Camera left = camera_with("left", EquidistantModel({58, 58, centre.x(), centre.y()}, {}));
     const Camera right = camera_with("right", left.model);
     const Rig rig = rig_of_one_pair("test", left, right, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse());
-    const auto imager = Imager::create(rig, plain_options("keep_resolution"), Workers(1));
+    const auto imager = Imager::create(rig, plain_options(ViewPolicy::keep_resolution), Workers(1));
     ASSERT_TRUE(imager);
     const RectifiedStereo view = imager->geometry(rig.pairs[0].name);
     EXPECT_LT((view.centre_px - Vector2d(79.5, 59.5)).norm(), 1.5 * (centre - Vector2d(79.5, 59.5)).norm() + 1e-6)

@@ -1,4 +1,4 @@
-// Where the colours stand in a Bayer mosaic.
+// Position of the colours in a Bayer mosaic.
 #pragma once
 
 #include <stdexcept>
@@ -7,16 +7,16 @@
 
 namespace spartan {
 
-/// Where red stands in the top-left 2×2 block. Blue stands diagonally to it, green on the other two.
-struct RedPlace {
+/// Column and row of red in the top-left 2×2 block. Blue is diagonal to it, green at the other two.
+struct BayerPhase {
   int x, y;
 
   bool is_green(int column, int row) const { return ((column + x + row + y) & 1) != 0; }
   bool is_red_row(int row) const { return ((row + y) & 1) == 0; }
 };
 
-/// Throws where `layout` is no Bayer pattern.
-inline RedPlace red_place(PixelLayout layout) {
+/// Throws where `layout` is not a Bayer pattern.
+inline BayerPhase bayer_phase(PixelLayout layout) {
   switch (layout) {
     case PixelLayout::bayer_rggb:
       return {0, 0};
@@ -30,7 +30,7 @@ inline RedPlace red_place(PixelLayout layout) {
     case PixelLayout::rgb:
       break;
   }
-  throw std::invalid_argument("debayer: the layout is no Bayer pattern");
+  throw std::invalid_argument("debayer: the layout is not a Bayer pattern");
 }
 
 }  // namespace spartan

@@ -7,10 +7,10 @@
 namespace spartan {
 namespace {
 
-constexpr int kRowsPerPart = 64;
+constexpr int kRowsPerPart = 64;  // rows per task; does not affect results
 
 int levels_of(PixelFormat format) {
-  if (format.bits < 8 || format.bits > 16) throw std::invalid_argument("contrast: 8 to 16 bits a sample");
+  if (format.bits < 8 || format.bits > 16) throw std::invalid_argument("contrast: samples must have 8 to 16 bits");
   return 1 << format.bits;
 }
 
@@ -22,7 +22,7 @@ template <class T>
 void map_rows(ImageView<const T> image, ImageView<std::uint8_t> result, const Workers& workers,
               const std::vector<std::uint8_t>& table, int shift) {
   if (image.size() != result.size()) throw std::invalid_argument("contrast: the sizes differ");
-  // Stray bits above those that carry signal must not lead out of the table.
+  // Stray bits above the significant ones must not index beyond the table.
   const unsigned last = static_cast<unsigned>(table.size()) - 1;
   workers.for_each_part(0, image.height(), kRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
@@ -33,7 +33,7 @@ void map_rows(ImageView<const T> image, ImageView<std::uint8_t> result, const Wo
   });
 }
 
-/// How many samples were counted.
+/// Adds the samples inside the mask to `counts`; returns their number.
 template <class T>
 std::uint64_t count_rows(ImageView<const T> image, ImageView<const std::uint8_t> mask,
                          std::vector<std::uint64_t>& counts, int shift) {
@@ -42,9 +42,9 @@ std::uint64_t count_rows(ImageView<const T> image, ImageView<const std::uint8_t>
   std::uint64_t count = 0;
   for (int y = 0; y < image.height(); ++y) {
     const T* const in = image.row(y);
-    const std::uint8_t* const wanted = mask.empty() ? nullptr : mask.row(y);
+    const std::uint8_t* const included = mask.empty() ? nullptr : mask.row(y);
     for (int x = 0; x < image.width(); ++x) {
-      if (wanted != nullptr && wanted[x] == 0) continue;
+      if (included != nullptr && included[x] == 0) continue;
       ++counts[std::min<unsigned>(in[x] >> shift, last)];
       ++count;
     }
@@ -92,7 +92,7 @@ double GrayHistogram::quantile(double percent) const {
 }
 
 double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right) {
-  // Below this the level of black, which nobody states, would decide.
+  // Below 1/32 of full scale the unknown black level dominates the ratio; the highest level is saturated.
   const double least = left.levels() / 32.0, most = left.levels() - 1.5;
   std::vector<double> ratios;
   ratios.reserve(17);
@@ -107,11 +107,12 @@ double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right) {
 }
 
 double gain_between(const GrayHistogram& left, const GrayHistogram& right) {
-  constexpr double kDoubt = 0.05;  // as much may come from what only one eye sees
+  // The ratio error caused by strips that only one camera sees; measured up to 6 % (docs/math/imaging.md).
+  constexpr double kDeadband = 0.05;
   const double ratio = brightness_ratio(left, right);
   const double difference = std::max(ratio, 1 / ratio) - 1;
-  if (difference <= kDoubt) return 1;
-  const double gain = std::min(1 + difference - kDoubt * kDoubt / difference, 2.0);
+  if (difference <= kDeadband) return 1;
+  const double gain = std::min(1 + difference - kDeadband * kDeadband / difference, 2.0);
   return ratio > 1 ? gain : 1 / gain;
 }
 
@@ -140,7 +141,7 @@ void ContrastMapping::stretch(const GrayHistogram& histogram, double low_percent
   if (histogram.empty()) return set_range(0, last);
   int low = histogram.percentile(low_percent);
   int high = std::max(histogram.percentile(high_percent), low);
-  const int least = std::max(16, histogram.levels() / 16);
+  const int least = std::max(16, histogram.levels() / 16);  // smallest range, so that noise is not amplified
   if (high - low < least) {
     low = std::clamp((low + high - least) / 2, 0, last - least);
     high = low + least;
@@ -148,13 +149,13 @@ void ContrastMapping::stretch(const GrayHistogram& histogram, double low_percent
   set_range(low, high);
 }
 
-void ContrastMapping::follow(const ContrastMapping& other, double gain) {
+void ContrastMapping::copy_with_gain(const ContrastMapping& other, double gain) {
   if (other.table_.size() != table_.size()) throw std::invalid_argument("contrast: the mapping has another depth");
   set_range(other.low_, other.high_, gain);
 }
 
 void ContrastMapping::set_range(int low, int high, double gain) {
-  // In 1/256 of a level, so that a gain does not round twice.
+  // Computed in 1/256 level, so that rounding by the gain is negligible before the final rounding.
   constexpr int kUnit = 256;
   low_ = low;
   high_ = high;

@@ -32,7 +32,7 @@ ContrastMapping stretched(PixelFormat format, ImageView<const T> left, ImageView
   return mapping;
 }
 
-TEST(Contrast, PercentilesCountSamples) {
+TEST(Contrast, ComputesPercentiles) {
   GrayHistogram histogram({});
   histogram.add(ramp<std::uint8_t>(10, 109).view());
   EXPECT_EQ(histogram.percentile(0), 10);
@@ -41,7 +41,7 @@ TEST(Contrast, PercentilesCountSamples) {
   EXPECT_EQ(histogram.percentile(100), 109);
 }
 
-TEST(Contrast, OnlyWhatTheMaskShowsIsCounted) {
+TEST(Contrast, CountsSamplesInsideTheMaskOnly) {
   const auto image = ramp<std::uint8_t>(10, 109);
   Image<std::uint8_t> mask(image.size());
   for (int x = 50; x < 100; ++x) mask(x, 2) = 1;
@@ -54,13 +54,13 @@ TEST(Contrast, OnlyWhatTheMaskShowsIsCounted) {
   EXPECT_THROW(histogram.add(image, mask.view().crop(0, 0, 5, 4)), std::invalid_argument);
 }
 
-TEST(Contrast, AFullRangeStaysAsItIs) {
+TEST(Contrast, AFullRangeIsNotChanged) {
   const auto image = ramp<std::uint8_t>(0, 255);
   const ContrastMapping mapping = stretched<std::uint8_t>({}, image, image);
   for (int level = 0; level < 256; ++level) EXPECT_EQ(mapping(level), level);
 }
 
-TEST(Contrast, BothEyesGetOneMapping) {
+TEST(Contrast, BothImagesGetOneMapping) {
   const auto dark = ramp<std::uint8_t>(40, 99);
   const auto bright = ramp<std::uint8_t>(80, 139);
   const ContrastMapping mapping = stretched<std::uint8_t>({}, dark, bright, 0, 100);
@@ -71,7 +71,7 @@ TEST(Contrast, BothEyesGetOneMapping) {
   EXPECT_NEAR(mapping(90), 255.0 * 50 / 99, 0.5);
 }
 
-TEST(Contrast, LowAndHighAlignmentOfTwelveBitsGiveTheSame) {
+TEST(Contrast, LowAndHighAlignmentGiveTheSame) {
   const PixelFormat low{PixelLayout::gray, 12, BitAlignment::low}, high{PixelLayout::gray, 12, BitAlignment::high};
   const auto stored_low = ramp<std::uint16_t>(500, 1500), stored_high = ramp<std::uint16_t>(500, 1500, 4);
   const auto mapping_low = stretched<std::uint16_t>(low, stored_low, stored_low);
@@ -91,8 +91,8 @@ TEST(Contrast, SixteenBitsWithoutStretchAreScaled) {
   EXPECT_EQ(mapping(65535), 255);
 }
 
-// One grain of noise more or less must not change the whole picture.
-TEST(Contrast, AConstantPictureIsMappedLikeANearlyConstantOne) {
+// A few noisy pixels more or less must not change the whole image.
+TEST(Contrast, AConstantImageIsMappedLikeANearlyConstantOne) {
   for (const int level : {0, 3, 77, 250, 254}) {
     SCOPED_TRACE(level);
     Image<std::uint8_t> image(40, 50, static_cast<std::uint8_t>(level));
@@ -105,8 +105,8 @@ TEST(Contrast, AConstantPictureIsMappedLikeANearlyConstantOne) {
   EXPECT_EQ(stretched<std::uint8_t>({}, white, white)(255), 255);
 }
 
-TEST(Contrast, NoiseIsNotBlownUp) {
-  // The same flat picture at any depth: ± 0.3 % of the scale.
+TEST(Contrast, NoiseIsNotAmplified) {
+  // The same nearly constant image at any bit depth: ± 0.3 % of full scale.
   for (const int bits : {8, 10, 12, 14, 16}) {
     SCOPED_TRACE(bits);
     const PixelFormat format{PixelLayout::gray, bits};
@@ -122,7 +122,7 @@ TEST(Contrast, NoiseIsNotBlownUp) {
   }
 }
 
-TEST(Contrast, QuantilesLieBetweenLevels) {
+TEST(Contrast, QuantilesAreInterpolatedBetweenLevels) {
   GrayHistogram histogram({});
   histogram.add(ramp<std::uint8_t>(10, 109).view());
   EXPECT_NEAR(histogram.quantile(50), 59.5, 1e-9);
@@ -130,7 +130,7 @@ TEST(Contrast, QuantilesLieBetweenLevels) {
   EXPECT_NEAR(histogram.quantile(100), 109.5, 1e-9);
 }
 
-TEST(Contrast, TheGainBetweenTheEyesIsFound) {
+TEST(Contrast, FindsTheGainBetweenTheImages) {
   const PixelFormat format{PixelLayout::gray, 12};
   const auto histogram_of = [&](double factor) {
     Image<std::uint16_t> image(100, 40);
@@ -144,9 +144,9 @@ TEST(Contrast, TheGainBetweenTheEyesIsFound) {
   EXPECT_NEAR(gain_between(histogram_of(1), histogram_of(0.7)), 1 / 0.7, 0.01);
   EXPECT_NEAR(gain_between(histogram_of(0.7), histogram_of(1)), 0.7, 0.005);
   EXPECT_EQ(gain_between(histogram_of(1), histogram_of(1)), 1);
-  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.97)), 1) << "too little to mean anything";
-  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.4)), 2) << "no more than twice";
-  EXPECT_EQ(gain_between(histogram_of(0.05), histogram_of(0.1)), 1) << "too dark to tell";
+  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.97)), 1) << "below the threshold";
+  EXPECT_EQ(gain_between(histogram_of(1), histogram_of(0.4)), 2) << "limited to 2";
+  EXPECT_EQ(gain_between(histogram_of(0.05), histogram_of(0.1)), 1) << "too dark to estimate";
 }
 
 GrayHistogram noisy_ramp(double factor, std::uint64_t seed) {
@@ -162,15 +162,15 @@ GrayHistogram noisy_ramp(double factor, std::uint64_t seed) {
   return histogram;
 }
 
-// Frames of a still scene must not flicker, wherever the true ratio lies.
-TEST(Contrast, TheGainFollowsTheRatioWithoutJumps) {
+// Frames of a static scene must not flicker, whatever the true ratio.
+TEST(Contrast, TheGainIsAContinuousFunctionOfTheRatio) {
   for (const double ratio : {0.93, 0.95, 1.0, 1.04, 1.05, 1.06, 1.1}) {
     double low = 2, high = 0, low_ratio = 2, high_ratio = 0;
     for (std::uint64_t frame = 0; frame < 8; ++frame) {
       const auto left = noisy_ramp(ratio, 2 * frame), right = noisy_ramp(1, 2 * frame + 1);
       const double gain = gain_between(left, right), estimate = brightness_ratio(left, right);
       EXPECT_NEAR(estimate, ratio, 0.006);
-      EXPECT_NEAR(gain * gain_between(right, left), 1, 1e-12) << "neither eye is preferred";
+      EXPECT_NEAR(gain * gain_between(right, left), 1, 1e-12) << "symmetric in left and right";
       EXPECT_LE(std::abs(gain - 1), std::abs(estimate - 1));
       low = std::min(low, gain);
       high = std::max(high, gain);
@@ -181,20 +181,20 @@ TEST(Contrast, TheGainFollowsTheRatioWithoutJumps) {
   }
 }
 
-TEST(Contrast, AFollowingMappingDoesTheSameToScaledSamples) {
+TEST(Contrast, ACopyWithGainMapsScaledSamplesAlike) {
   const PixelFormat format{PixelLayout::gray, 12};
   const auto left = ramp<std::uint16_t>(800, 2400);
-  ContrastMapping mapping = stretched<std::uint16_t>(format, left, left), follower(format);
-  follower.follow(mapping, 1.25);
+  ContrastMapping mapping = stretched<std::uint16_t>(format, left, left), copy(format);
+  copy.copy_with_gain(mapping, 1.25);
   for (int level = 0; level < 4096; ++level) {
     if (level * 1.25 > 4095) break;
-    ASSERT_NEAR(follower(level), mapping(static_cast<int>(std::lround(level * 1.25))), 1) << level;
+    ASSERT_NEAR(copy(level), mapping(static_cast<int>(std::lround(level * 1.25))), 1) << level;
   }
-  follower.follow(mapping, 1);
-  for (int level = 0; level < 4096; ++level) ASSERT_EQ(follower(level), mapping(level));
+  copy.copy_with_gain(mapping, 1);
+  for (int level = 0; level < 4096; ++level) ASSERT_EQ(copy(level), mapping(level));
 }
 
-TEST(Contrast, StrayBitsDoNotLeaveTheTable) {
+TEST(Contrast, StrayBitsStayInsideTheTable) {
   const PixelFormat format{PixelLayout::gray, 10, BitAlignment::low};
   const Image<std::uint16_t> image(4, 4, 0xffff);
   Image<std::uint8_t> result(4, 4);

@@ -10,33 +10,33 @@
 namespace spartan {
 namespace {
 
-constexpr int kRowsPerPart = 32;
-constexpr int kRowsPerBand = 64;  // a band computes up to seven rows beyond its own
+constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
+constexpr int kRowsPerBand = 64;  // a band also processes up to seven rows above and below it
 
-/// Memory of bands that nobody works in at present: as many as there are threads, made once.
-class MemoryPool {
+/// Idle band buffers for reuse: at most one per thread is ever allocated.
+class BufferPool {
  public:
-  std::unique_ptr<bayer::BandMemory> take(int width) {
+  std::unique_ptr<bayer::BandBuffers> take(int width) {
     const std::lock_guard lock(mutex_);
-    while (!free_.empty()) {
-      auto memory = std::move(free_.back());
-      free_.pop_back();
-      if (memory->width() == width) return memory;
+    while (!idle_.empty()) {
+      auto buffers = std::move(idle_.back());
+      idle_.pop_back();
+      if (buffers->width() == width) return buffers;
     }
-    return std::make_unique<bayer::BandMemory>(width);
+    return std::make_unique<bayer::BandBuffers>(width);
   }
-  void give_back(std::unique_ptr<bayer::BandMemory> memory) {
+  void give_back(std::unique_ptr<bayer::BandBuffers> buffers) {
     const std::lock_guard lock(mutex_);
-    free_.push_back(std::move(memory));
+    idle_.push_back(std::move(buffers));
   }
 
  private:
   std::mutex mutex_;
-  std::vector<std::unique_ptr<bayer::BandMemory>> free_;
+  std::vector<std::unique_ptr<bayer::BandBuffers>> idle_;
 };
 
 template <class T>
-void run_bilinear(ImageView<const T> mosaic, RedPlace red, const bayer::Kernels<T>& kernels, auto result,
+void run_bilinear(ImageView<const T> mosaic, BayerPhase phase, const bayer::Kernels<T>& kernels, auto result,
                   const Workers& workers) {
   const int height = mosaic.height();
   workers.for_each_part(0, height, kRowsPerPart, [&](int begin, int end) {
@@ -45,8 +45,8 @@ void run_bilinear(ImageView<const T> mosaic, RedPlace red, const bayer::Kernels<
                                       mosaic.row(y),
                                       mosaic.row(y + 1 < height ? y + 1 : y - 1),
                                       mosaic.width(),
-                                      red.is_red_row(y),
-                                      red.is_green(0, y)};
+                                      phase.is_red_row(y),
+                                      phase.is_green(0, y)};
       if constexpr (std::is_same_v<decltype(result), ImageView<T>>) {
         kernels.bilinear_luma(row, result.row(y));
       } else {
@@ -57,18 +57,18 @@ void run_bilinear(ImageView<const T> mosaic, RedPlace red, const bayer::Kernels<
 }
 
 template <class T, class Pixel>
-void run_edge_aware(ImageView<const T> mosaic, RedPlace red, const PixelFormat& format,
-                    const bayer::Kernels<T>& kernels, ImageView<Pixel> result, MemoryPool& pool,
+void run_edge_aware(ImageView<const T> mosaic, BayerPhase phase, const PixelFormat& format,
+                    const bayer::Kernels<T>& kernels, ImageView<Pixel> result, BufferPool& pool,
                     const Workers& workers) {
   workers.for_each_part(0, mosaic.height(), kRowsPerBand, [&](int begin, int end) {
-    auto memory = pool.take(mosaic.width());
-    const bayer::Band<T, Pixel> band{mosaic, red, format.full_scale(), result, begin, end};
+    auto buffers = pool.take(mosaic.width());
+    const bayer::Band<T, Pixel> band{mosaic, phase, format.full_scale(), result, begin, end};
     if constexpr (std::is_same_v<Pixel, T>) {
-      kernels.edge_aware_luma(band, *memory);
+      kernels.edge_aware_luma(band, *buffers);
     } else {
-      kernels.edge_aware_colour(band, *memory);
+      kernels.edge_aware_colour(band, *buffers);
     }
-    pool.give_back(std::move(memory));
+    pool.give_back(std::move(buffers));
   });
 }
 
@@ -78,15 +78,16 @@ struct Debayerer::State {
   DebayerMethod method;
   bayer::Kernels<std::uint8_t> kernels8;
   bayer::Kernels<std::uint16_t> kernels16;
-  MemoryPool pool;
+  BufferPool pool;
 
   template <class T, class Pixel>
   void run(ImageView<const T> mosaic, const PixelFormat& format, ImageView<Pixel> result, const Workers& workers) {
-    const RedPlace red = red_place(format.layout);
-    if (format.bytes_per_sample() != sizeof(T)) throw std::invalid_argument("debayer: the samples are of another kind");
+    const BayerPhase phase = bayer_phase(format.layout);
+    if (format.bytes_per_sample() != sizeof(T))
+      throw std::invalid_argument("debayer: the samples have another type than the format");
     if (mosaic.size() != result.size()) throw std::invalid_argument("debayer: the sizes differ");
     if (mosaic.width() < 2 || mosaic.height() < 2) {
-      throw std::invalid_argument("debayer: a mosaic has at least 2 × 2 samples");
+      throw std::invalid_argument("debayer: the mosaic must have at least 2 × 2 samples");
     }
     const auto& kernels = [this]() -> const bayer::Kernels<T>& {
       if constexpr (sizeof(T) == 1) {
@@ -95,8 +96,8 @@ struct Debayerer::State {
         return kernels16;
       }
     }();
-    if (method == DebayerMethod::bilinear) return run_bilinear(mosaic, red, kernels, result, workers);
-    run_edge_aware(mosaic, red, format, kernels, result, pool, workers);
+    if (method == DebayerMethod::bilinear) return run_bilinear(mosaic, phase, kernels, result, workers);
+    run_edge_aware(mosaic, phase, format, kernels, result, pool, workers);
   }
 };
 

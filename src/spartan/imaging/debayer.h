@@ -1,4 +1,4 @@
-// Colour out of Bayer mosaics: the published sub-module "debayering".
+// Debayering (demosaicing): colour or luma from Bayer mosaics. The paper's sub-module "debayering".
 #pragma once
 
 #include <cstdint>
@@ -8,25 +8,18 @@
 #include "spartan/core/image.h"
 #include "spartan/core/pixel_format.h"
 #include "spartan/core/threads.h"
+#include "spartan/imaging/imaging_options.h"
 
 namespace spartan {
 
-enum class DebayerMethod : std::uint8_t {
-  /// A missing colour is the rounded mean of its two or four nearest samples.
-  bilinear,
-  /// Green minus red or blue is interpolated along rows and along columns and mixed by how little it changes to either
-  /// side (docs/math/imaging.md); red and blue follow from green along the straighter of two directions.
-  edge_aware,
-};
-
-/// Makes colours, or the luma of the same colours, of mosaics of 8 to 16 bits. Keeps the memory that it works in; one
-/// object may serve several threads at once. At the borders the mosaic is mirrored about its outermost samples, which
-/// keeps its phase. `result` has the size of `mosaic` (at least 2 × 2) and the same scale. A mosaic of any depth and
-/// alignment gives the same picture, but for rounding. Throws where sizes differ, `format` is no Bayer pattern or has
-/// samples of another kind.
+/// Interpolates RGB, or the luma of the same RGB, from mosaics of 8 to 16 bits. Reuses its buffers; one object may be
+/// used by several threads at once. Beyond the borders the mosaic is mirrored about its outermost samples, which keeps
+/// the Bayer phase. `result` has the size of `mosaic` (at least 2 × 2 px) and the same scale. Up to rounding, the
+/// result does not depend on bit depth and alignment. Throws where the sizes differ, `format` is not a Bayer pattern or
+/// its samples have another type.
 class Debayerer {
  public:
-  /// `simd`: see simd_target_index(); the result is the same, bit for bit.
+  /// `simd`: instruction set, see simd_target_index(); all give the same bits.
   explicit Debayerer(DebayerMethod method = DebayerMethod::bilinear, const std::string& simd = "auto");
   Debayerer(Debayerer&&) noexcept;
   Debayerer& operator=(Debayerer&&) noexcept;

@@ -17,7 +17,7 @@ namespace {
 
 struct Pattern {
   PixelLayout layout;
-  int opencv_code;  // OpenCV names a pattern by the second row's second and third sample
+  int opencv_code;  // OpenCV names a pattern by the second and third sample of the second row
 };
 const Pattern kPatterns[] = {{PixelLayout::bayer_rggb, cv::COLOR_BayerBG2RGB},
                              {PixelLayout::bayer_grbg, cv::COLOR_BayerGB2RGB},
@@ -36,7 +36,7 @@ Image<T> random_mosaic(int width, int height, int largest) {
   return mosaic;
 }
 
-// Of samples that fill their container.
+// The format whose samples use all bits of T.
 template <class T>
 PixelFormat format_of(PixelLayout layout) {
   return {layout, 8 * static_cast<int>(sizeof(T))};
@@ -124,7 +124,7 @@ void expect_uniform_colours_back(Rgb<T> colour) {
   }
 }
 
-TEST(Debayer, GivesAUniformColourBackUpToTheBorders) {
+TEST(Debayer, KeepsAUniformColourUpToTheBorders) {
   expect_uniform_colours_back(Rgb8{255, 3, 128});
   expect_uniform_colours_back(Rgb16{4000, 2500, 700});
   expect_uniform_colours_back(Rgb16{65535, 0, 65535});
@@ -149,8 +149,8 @@ TEST(Debayer, AGrayRampStaysGray) {
   }
 }
 
-// One scene through sensors of all phases: a mosaic without its first column or row is one of another phase.
-TEST(Debayer, AllPhasesGiveTheSamePicture) {
+// One scene with all Bayer phases: a mosaic without its first column or row has another phase.
+TEST(Debayer, AllPhasesGiveTheSameImage) {
   const auto mosaic = random_mosaic<std::uint8_t>(50, 90, 255);
   const PixelLayout shifted[2][2] = {{PixelLayout::bayer_rggb, PixelLayout::bayer_grbg},
                                      {PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr}};
@@ -194,12 +194,12 @@ TEST(Debayer, ThreadsAndTargetsGiveTheSameBytes) {
   expect_same_bytes_everywhere<std::uint16_t>(4095);
 }
 
-// The edge-aware method once more, pixel by pixel and in double precision (docs/math/imaging.md). Its results are
-// levels of 8 bits; `unit` is one of these.
+// Reference implementation of the edge-aware method, pixel by pixel in double precision (docs/math/imaging.md). Results
+// are in 8-bit levels; `unit` is the size of one of them.
 template <class T>
-class PlainEdgeAware {
+class ReferenceEdgeAware {
  public:
-  PlainEdgeAware(ImageView<const T> mosaic, const PixelFormat& format, double unit)
+  ReferenceEdgeAware(ImageView<const T> mosaic, const PixelFormat& format, double unit)
       : mosaic_(mosaic), layout_(format.layout), unit_(unit), largest_(format.full_scale() / unit) {}
 
   double red(int x, int y) const { return other(x, y, 'r'); }
@@ -242,16 +242,16 @@ class PlainEdgeAware {
     }
     return sum / total;
   }
-  double bend(int x, int y, int dx, int dy) const {
+  double edge_strength(int x, int y, int dx, int dy) const {
     const double before = green(x - dx, y - dy), behind = green(x + dx, y + dy);
     return std::abs(before - behind) + std::abs(2 * green(x, y) - before - behind);
   }
-  // Green minus the colour, along two axes.
+  // Green minus the colour, blended from two axes.
   double between(int x, int y, char colour, int ax, int ay, int bx, int by) const {
     const double a0 = minus(x - ax, y - ay, colour), a1 = minus(x + ax, y + ay, colour);
     const double b0 = minus(x - bx, y - by, colour), b1 = minus(x + bx, y + by, colour);
-    const double a = 1 / (1 + bend(x, y, ax, ay) + std::abs(a0 - a1));
-    const double b = 1 / (1 + bend(x, y, bx, by) + std::abs(b0 - b1));
+    const double a = 1 / (1 + edge_strength(x, y, ax, ay) + std::abs(a0 - a1));
+    const double b = 1 / (1 + edge_strength(x, y, bx, by) + std::abs(b0 - b1));
     return (a * (a0 + a1) + b * (b0 + b1)) / (2 * (a + b));
   }
   double minus(int x, int y, char colour) const {
@@ -275,19 +275,19 @@ void expect_as_the_formula(const PixelFormat& format, double unit) {
   }
   Image<Rgb<T>> result(mosaic.size());
   Debayerer(DebayerMethod::edge_aware).apply(mosaic, format, result, Workers(1));
-  const PlainEdgeAware<T> plain(mosaic, format, unit);
-  // Half a level of rounding and the rounded differences; single precision.
+  const ReferenceEdgeAware<T> reference(mosaic, format, unit);
+  // Rounding of the result (½ level) and of the differences; single precision.
   const double tolerance = 0.65 / unit + 1e-3;
   for (int y = 0; y < mosaic.height(); ++y) {
     for (int x = 0; x < mosaic.width(); ++x) {
-      ASSERT_NEAR(result(x, y).r / unit, plain.red(x, y), tolerance) << x << ", " << y;
-      ASSERT_NEAR(result(x, y).g / unit, plain.green(x, y), tolerance) << x << ", " << y;
-      ASSERT_NEAR(result(x, y).b / unit, plain.blue(x, y), tolerance) << x << ", " << y;
+      ASSERT_NEAR(result(x, y).r / unit, reference.red(x, y), tolerance) << x << ", " << y;
+      ASSERT_NEAR(result(x, y).g / unit, reference.green(x, y), tolerance) << x << ", " << y;
+      ASSERT_NEAR(result(x, y).b / unit, reference.blue(x, y), tolerance) << x << ", " << y;
     }
   }
 }
 
-// Whatever the depth and the alignment, steps count in 1/256 of the scale.
+// At any bit depth and alignment, gradients are in 1/256 of full scale.
 TEST(Debayer, EdgeAwareFollowsItsFormula) {
   for (const Pattern& pattern : kPatterns) {
     expect_as_the_formula<std::uint8_t>({pattern.layout, 8}, 1);
@@ -304,7 +304,7 @@ TEST(Debayer, LumaHasTheFullRange) {
   EXPECT_EQ(luma(Rgb8{255, 0, 0}), 76);
 }
 
-TEST(Debayer, RefusesWhatIsNoMosaic) {
+TEST(Debayer, RejectsImagesThatAreNotMosaics) {
   Image<std::uint8_t> image(4, 4), other(5, 4);
   const auto refuses = [&](PixelFormat format, const Image<std::uint8_t>& mosaic) {
     EXPECT_THROW(Debayerer().apply(mosaic, format, image, Workers(1)), std::invalid_argument);

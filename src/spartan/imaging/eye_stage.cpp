@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-constexpr int kRowsPerPart = 64;
+constexpr int kRowsPerPart = 64;  // rows per task; does not affect results
 
 std::string describe(ImageSize size, const PixelFormat& format) {
   std::string text = fmt::format("{} × {} {} of {} bits", size.width, size.height, name_of(format.layout), format.bits);
@@ -30,12 +30,14 @@ void reduce_to_luma(ImageView<const Rgb<T>> colour, ImageView<T> gray, const Wor
   });
 }
 
+// Sets pixels outside of the mask to 0.
 void keep_where(ImageView<std::uint8_t> pixels, ImageView<const std::uint8_t> mask) {
   for (int y = 0; y < pixels.height(); ++y) {
     for (int x = 0; x < pixels.width(); ++x) pixels(x, y) &= mask(x, y);
   }
 }
 
+// Reads the self-mask as 0 or 255; empty where the camera has none.
 Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::string& folder) {
   if (camera.self_mask.empty()) return Image<std::uint8_t>();
   const std::string path = (std::filesystem::path(folder) / camera.self_mask).string();
@@ -46,7 +48,7 @@ Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::stri
   }
   if (mask->size() != camera.size) {
     return failure(ErrorCode::configuration,
-                   fmt::format("the self-mask is {} × {}, the camera '{}' has {} × {}", mask->width(), mask->height(),
+                   fmt::format("the self-mask is {} × {}, but camera '{}' is {} × {}", mask->width(), mask->height(),
                                camera.name, camera.size.width, camera.size.height),
                    path);
   }
@@ -58,45 +60,44 @@ Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::stri
 
 }  // namespace
 
-EyeStage::EyeStage(const Camera& camera, const ImagingOptions& options)
-    : camera_(camera),
-      debayerer_(options.debayer == "bilinear" ? DebayerMethod::bilinear : DebayerMethod::edge_aware),
-      mapped_(camera.size) {
+CameraStage::CameraStage(const Camera& camera, const ImagingOptions& options)
+    : camera_(camera), debayerer_(options.debayer), mapped_(camera.size) {
   if (options.local_contrast.enabled) {
-    local_.emplace(options.local_contrast.tiles, options.local_contrast.clip);
+    local_.emplace(options.local_contrast.tiles, options.local_contrast.clip_limit);
     equalised_ = Image<std::uint8_t>(camera.size);
   }
 }
 
-Result<EyeStage> EyeStage::create(const Camera& camera, const Rectification& plan,
-                                  const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
-                                  const std::string& mask_folder, const Workers& workers, const std::string& where) {
+Result<CameraStage> CameraStage::create(const Camera& camera, const Rectification& plan,
+                                        const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
+                                        const std::string& mask_folder, const Workers& workers,
+                                        const std::string& where) {
   auto mask = load_self_mask(camera, mask_folder);
   if (!mask) return failure(mask);
-  EyeStage eye(camera, options);
+  CameraStage stage(camera, options);
   if (options.vignetting && !camera.vignetting.coefficients.empty()) {
-    auto light = LightCorrection::create(camera, workers);
+    auto light = VignettingCorrection::create(camera, workers);
     if (!light) return failure(light);
-    eye.light_ = std::move(*light);
+    stage.vignetting_ = std::move(*light);
   }
-  // A gray image as it came is not copied.
-  if (camera.pixel_format.layout != PixelLayout::gray || eye.light_) eye.make_gray_buffer();
-  eye.self_mask_ = std::move(*mask);
-  if (plan.passes_through) {
-    if (Status status = eye.check_mask(where); !status) return failure(status);
-    return eye;
+  // A raw gray image is used in place, without a copy.
+  if (camera.pixel_format.layout != PixelLayout::gray || stage.vignetting_) stage.make_gray_buffer();
+  stage.self_mask_ = std::move(*mask);
+  if (plan.is_identity) {
+    if (Status status = stage.check_mask(where); !status) return failure(status);
+    return stage;
   }
-  eye.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, eye.self_mask_, workers,
-                     plan.depth_m);
-  if (Status status = eye.check_mask(where); !status) return failure(status);
-  eye.result_ = Image<std::uint8_t>(plan.geometry.size);
-  eye.counted_ = view_footprint(camera, plan.geometry, camera_from_rectified, plan.depth_m);
-  if (!eye.self_mask_.empty()) keep_where(eye.counted_, eye.self_mask_);
-  return eye;
+  stage.table_.emplace(camera.model, camera.size, plan.geometry, camera_from_rectified, stage.self_mask_, workers,
+                       plan.depth_m);
+  if (Status status = stage.check_mask(where); !status) return failure(status);
+  stage.result_ = Image<std::uint8_t>(plan.geometry.size);
+  stage.histogram_mask_ = view_footprint(camera, plan.geometry, camera_from_rectified, plan.depth_m);
+  if (!stage.self_mask_.empty()) keep_where(stage.histogram_mask_, stage.self_mask_);
+  return stage;
 }
 
-Status EyeStage::check_mask(const std::string& where) const {
-  constexpr double kLeastPercent = 1;
+Status CameraStage::check_mask(const std::string& where) const {
+  constexpr double kLeastPercent = 1;  // of the pixels of the view must be valid; empirical
   const auto seen = mask();
   if (seen.empty()) return {};
   std::int64_t count = 0;
@@ -110,25 +111,25 @@ Status EyeStage::check_mask(const std::string& where) const {
                  "check the transforms of the two cameras and the self-masks, or choose another view (imaging.view)");
 }
 
-void EyeStage::make_gray_buffer() {
+void CameraStage::make_gray_buffer() {
   if (is_deep() && gray16_.empty()) gray16_ = Image<std::uint16_t>(camera_.size);
   if (!is_deep() && gray8_.empty()) gray8_ = Image<std::uint8_t>(camera_.size);
 }
 
-Status EyeStage::check(const FrameImage& image, const std::string& where) const {
-  PixelFormat taken = image.format();
-  // Of many calibration files nobody can say that the pictures have colours.
-  const bool reduced = taken.layout == PixelLayout::rgb && camera_.pixel_format.layout == PixelLayout::gray;
-  if (reduced) taken.layout = PixelLayout::gray;
-  if (image.size() == camera_.size && taken == camera_.pixel_format) return {};
+Status CameraStage::check(const FrameImage& image, const std::string& where) const {
+  PixelFormat format = image.format();
+  // Many calibration formats cannot state that a camera delivers colour.
+  const bool reduced = format.layout == PixelLayout::rgb && camera_.pixel_format.layout == PixelLayout::gray;
+  if (reduced) format.layout = PixelLayout::gray;
+  if (image.size() == camera_.size && format == camera_.pixel_format) return {};
   return failure(ErrorCode::input,
-                 fmt::format("the image of camera '{}' is {}, the rig says {}", camera_.name,
+                 fmt::format("the image of camera '{}' is {}, but the rig specifies {}", camera_.name,
                              describe(image.size(), image.format()), describe(camera_.size, camera_.pixel_format)),
-                 where, "correct size_px and the pixel format in the rig, or take images that fit");
+                 where, "correct size_px and the pixel format in the rig, or use images of this camera");
 }
 
 template <class T>
-ImageView<const T> EyeStage::to_gray(const FrameImage& image, Image<T>& buffer, const Workers& workers) const {
+ImageView<const T> CameraStage::to_gray(const FrameImage& image, Image<T>& buffer, const Workers& workers) const {
   const PixelLayout layout = image.format().layout;
   if (layout == PixelLayout::gray) return image.as<T>();
   if (layout == PixelLayout::rgb) {
@@ -139,7 +140,7 @@ ImageView<const T> EyeStage::to_gray(const FrameImage& image, Image<T>& buffer, 
   return buffer;
 }
 
-void EyeStage::make_gray(const FrameImage& image, const Workers& workers) {
+void CameraStage::make_gray(const FrameImage& image, const Workers& workers) {
   if (image.format().layout != PixelLayout::gray) make_gray_buffer();
   if (is_deep()) {
     gray16_view_ = to_gray<std::uint16_t>(image, gray16_, workers);
@@ -148,33 +149,33 @@ void EyeStage::make_gray(const FrameImage& image, const Workers& workers) {
   }
 }
 
-void EyeStage::correct_light(const Workers& workers) {
-  if (!light_) return;
+void CameraStage::correct_vignetting(const Workers& workers) {
+  if (!vignetting_) return;
   if (is_deep()) {
-    light_->apply(gray16_view_, gray16_, workers);
+    vignetting_->apply(gray16_view_, gray16_, workers);
     gray16_view_ = gray16_;
   } else {
-    light_->apply(gray8_view_, gray8_, workers);
+    vignetting_->apply(gray8_view_, gray8_, workers);
     gray8_view_ = gray8_;
   }
 }
 
-void EyeStage::count(GrayHistogram& histogram) const {
-  const auto where = counted_.empty() ? self_mask_.view() : counted_.view();
+void CameraStage::add_to_histogram(GrayHistogram& histogram) const {
+  const auto where = histogram_mask_.empty() ? self_mask_.view() : histogram_mask_.view();
   if (is_deep()) return histogram.add(gray16_view_, where);
   histogram.add(gray8_view_, where);
 }
 
-void EyeStage::map(const ContrastMapping& mapping, const Workers& workers) {
+void CameraStage::apply_contrast(const ContrastMapping& mapping, const Workers& workers) {
   if (is_deep()) return mapping.apply(gray16_view_, mapped_, workers);
   mapping.apply(gray8_view_, mapped_, workers);
 }
 
-void EyeStage::equalise(const Workers& workers) {
+void CameraStage::equalise_locally(const Workers& workers) {
   if (local_) local_->apply(mapped_, equalised_, workers);
 }
 
-void EyeStage::rectify(const Workers& workers) {
+void CameraStage::rectify(const Workers& workers) {
   if (table_) table_->apply(working(), result_, workers);
 }
 

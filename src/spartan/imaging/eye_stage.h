@@ -1,4 +1,4 @@
-// One eye on its way from the sensor to the rectified view.
+// Imaging stage of one camera: from the raw image to the rectified image.
 #pragma once
 
 #include <cstdint>
@@ -20,39 +20,39 @@
 
 namespace spartan {
 
-/// Buffers and tables of one eye. Its steps are called in the order in which they stand here; the views that they
-/// leave are valid until the next image.
-class EyeStage {
+/// Buffers and lookup tables of one camera. The steps must be called in the order of their declaration; the views of
+/// the result are valid until the next image.
+class CameraStage {
  public:
-  /// Code `configuration` where the self-mask cannot be read, the vignetting leaves no light or the eye sees less than
-  /// 1 % of the view. `where` names the pair in the last of these.
-  static Result<EyeStage> create(const Camera& camera, const Rectification& plan,
-                                 const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
-                                 const std::string& mask_folder, const Workers& workers, const std::string& where);
+  /// Code `configuration` where the self-mask cannot be read, the vignetting correction is out of range or the camera
+  /// sees less than 1 % of the view. `where` names the pair in the last of these errors.
+  static Result<CameraStage> create(const Camera& camera, const Rectification& plan,
+                                    const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
+                                    const std::string& mask_folder, const Workers& workers, const std::string& where);
 
-  /// Code `input` where the image has another size or format than the camera. A gray camera's image may be RGB.
+  /// Code `input` where the size or pixel format differs from the camera's. The image of a gray camera may be RGB.
   Status check(const FrameImage& image, const std::string& where) const;
 
-  bool has_vignetting() const { return light_.has_value(); }
+  bool has_vignetting() const { return vignetting_.has_value(); }
   bool has_local_contrast() const { return local_.has_value(); }
   bool is_resampled() const { return table_.has_value(); }
 
-  /// Sensor → gray of the same depth.
+  /// Raw image → gray image of the same depth.
   void make_gray(const FrameImage& image, const Workers& workers);
-  void correct_light(const Workers& workers);
-  /// The gray levels of what the view shows and is not the rover itself: neither its body nor the black around a
-  /// fisheye's picture says how bright the ground is.
-  void count(GrayHistogram& histogram) const;
-  /// Gray → 8-bit working image.
-  void map(const ContrastMapping& mapping, const Workers& workers);
-  void equalise(const Workers& workers);
+  void correct_vignetting(const Workers& workers);
+  /// Adds the gray levels inside the rectified view and outside the self-mask to the histogram: neither the rover's own
+  /// body nor the black border of a fisheye image represents the brightness of the ground.
+  void add_to_histogram(GrayHistogram& histogram) const;
+  /// Gray image → 8-bit working image.
+  void apply_contrast(const ContrastMapping& mapping, const Workers& workers);
+  void equalise_locally(const Workers& workers);
   void rectify(const Workers& workers);
 
   ImageView<const std::uint8_t> result() const { return table_ ? result_.view() : working(); }
   ImageView<const std::uint8_t> mask() const { return table_ ? table_->mask() : self_mask_.view(); }
 
  private:
-  EyeStage(const Camera& camera, const ImagingOptions& options);
+  CameraStage(const Camera& camera, const ImagingOptions& options);
   Status check_mask(const std::string& where) const;
   void make_gray_buffer();
   bool is_deep() const { return camera_.pixel_format.bits > 8; }
@@ -62,11 +62,11 @@ class EyeStage {
 
   Camera camera_;
   Debayerer debayerer_;
-  std::optional<LightCorrection> light_;
+  std::optional<VignettingCorrection> vignetting_;
   std::optional<LocalContrast> local_;
   std::optional<RemapTable> table_;
   Image<std::uint8_t> gray8_, mapped_, equalised_, result_;
-  Image<std::uint8_t> self_mask_, counted_;  ///< of the sensor, 0 where not; empty: everything
+  Image<std::uint8_t> self_mask_, histogram_mask_;  ///< size of the sensor, 0: excluded; empty: nothing excluded
   Image<std::uint16_t> gray16_;
   ImageView<const std::uint8_t> gray8_view_;
   ImageView<const std::uint16_t> gray16_view_;

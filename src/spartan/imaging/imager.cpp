@@ -12,19 +12,18 @@
 namespace spartan {
 namespace {
 
-/// Everything that belongs to one stereo pair.
+/// Stages, histograms and mappings of one stereo pair.
 struct PairStage {
   StereoPair pair;
   Rectification plan;
-  EyeStage left, right;
+  CameraStage left, right;
   GrayHistogram left_histogram, right_histogram;
   ContrastMapping left_mapping, right_mapping;
 };
 
 VirtualView virtual_view(const ViewOptions& options, const Camera& left) {
   VirtualView view;
-  if (options.policy == "all_valid") view.policy = ViewPolicy::all_valid;
-  if (options.policy == "whole_view") view.policy = ViewPolicy::whole_view;
+  view.policy = options.policy;
   if (options.width_px > 0 || options.height_px > 0) {
     view.size = {options.width_px > 0 ? options.width_px : left.size.width,
                  options.height_px > 0 ? options.height_px : left.size.height};
@@ -34,16 +33,16 @@ VirtualView virtual_view(const ViewOptions& options, const Camera& left) {
   return view;
 }
 
-/// One mapping for both eyes, behind the factor that makes the right one as bright as the left one.
-void choose_mappings(PairStage& stage, const ImagingOptions& options) {
+/// One contrast mapping for both images, after the gain that matches the right image to the left one.
+void update_mappings(PairStage& stage, const ImagingOptions& options) {
   stage.left_histogram.clear();
   stage.right_histogram.clear();
-  stage.left.count(stage.left_histogram);
-  stage.right.count(stage.right_histogram);
-  const double gain = options.balance ? gain_between(stage.left_histogram, stage.right_histogram) : 1;
+  stage.left.add_to_histogram(stage.left_histogram);
+  stage.right.add_to_histogram(stage.right_histogram);
+  const double gain = options.gain_compensation ? gain_between(stage.left_histogram, stage.right_histogram) : 1;
   stage.left_histogram.add(stage.right_histogram, gain);
   stage.left_mapping.stretch(stage.left_histogram, options.contrast_low_percent, options.contrast_high_percent);
-  stage.right_mapping.follow(stage.left_mapping, gain);
+  stage.right_mapping.copy_with_gain(stage.left_mapping, gain);
 }
 
 }  // namespace
@@ -62,29 +61,31 @@ struct Imager::State {
     const Pose right_from_left = rig.right_from_left(pair);
     if (left.pixel_format.bits != right.pixel_format.bits ||
         left.pixel_format.alignment != right.pixel_format.alignment) {
-      return failure(ErrorCode::configuration, "the two eyes have pixels of different depth", where);
+      return failure(ErrorCode::configuration, "the two cameras have different bit depth or bit alignment", where);
     }
     Result<Rectification> plan =
         options.rectify ? plan_rectification(left, right, right_from_left, where, virtual_view(options.view, left))
                         : assume_rectified(left, right_from_left);
     if (!plan) return failure(plan);
-    if (plan->passes_through && left.size != right.size) {
-      return failure(ErrorCode::configuration, "images of different size cannot be rectified already", where);
+    if (plan->is_identity && left.size != right.size) {
+      return failure(ErrorCode::configuration,
+                     "the cameras have different image sizes, so their images cannot be already rectified", where);
     }
-    auto left_eye = EyeStage::create(left, *plan, plan->left_from_rectified, options, mask_folder, workers, where);
-    if (!left_eye) return failure(left_eye);
-    auto right_eye = EyeStage::create(right, *plan, plan->right_from_rectified, options, mask_folder, workers, where);
-    if (!right_eye) return failure(right_eye);
+    auto left_stage = CameraStage::create(left, *plan, plan->left_from_rectified, options, mask_folder, workers, where);
+    if (!left_stage) return failure(left_stage);
+    auto right_stage =
+        CameraStage::create(right, *plan, plan->right_from_rectified, options, mask_folder, workers, where);
+    if (!right_stage) return failure(right_stage);
     const GrayHistogram histogram(left.pixel_format);
     const ContrastMapping mapping(left.pixel_format);
-    pairs.emplace(pair.name, PairStage{pair, *plan, std::move(*left_eye), std::move(*right_eye), histogram, histogram,
-                                       mapping, mapping});
+    pairs.emplace(pair.name, PairStage{pair, *plan, std::move(*left_stage), std::move(*right_stage), histogram,
+                                       histogram, mapping, mapping});
     return {};
   }
 
-  /// The images of both eyes, step by step.
+  /// Runs all steps on both images and measures their durations.
   void process(PairStage& stage, const StereoFrame& frame) {
-    EyeStage &left = stage.left, &right = stage.right;
+    CameraStage &left = stage.left, &right = stage.right;
     const auto step = [&](const char* name, bool wanted, auto work) {
       if (wanted) clock.measure(name, work);
     };
@@ -92,23 +93,23 @@ struct Imager::State {
       left.make_gray(frame.left, workers);
       right.make_gray(frame.right, workers);
     };
-    // A gray image only has to be pointed at.
-    const bool has_colours =
+    // A raw gray image needs no conversion, so its time is not reported.
+    const bool has_colour =
         frame.left.format().layout != PixelLayout::gray || frame.right.format().layout != PixelLayout::gray;
-    step("imaging.debayer", has_colours, make_gray);
-    if (!has_colours) make_gray();
+    step("imaging.debayer", has_colour, make_gray);
+    if (!has_colour) make_gray();
     step("imaging.vignetting", left.has_vignetting() || right.has_vignetting(), [&] {
-      left.correct_light(workers);
-      right.correct_light(workers);
+      left.correct_vignetting(workers);
+      right.correct_vignetting(workers);
     });
     step("imaging.contrast", true, [&] {
-      if (options.contrast) choose_mappings(stage, options);
-      left.map(stage.left_mapping, workers);
-      right.map(stage.right_mapping, workers);
+      if (options.contrast) update_mappings(stage, options);
+      left.apply_contrast(stage.left_mapping, workers);
+      right.apply_contrast(stage.right_mapping, workers);
     });
     step("imaging.local_contrast", left.has_local_contrast(), [&] {
-      left.equalise(workers);
-      right.equalise(workers);
+      left.equalise_locally(workers);
+      right.equalise_locally(workers);
     });
     step("imaging.rectify", left.is_resampled(), [&] {
       left.rectify(workers);

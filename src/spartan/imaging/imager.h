@@ -1,4 +1,4 @@
-// The imaging stage: debayering → vignetting → contrast → rectification.
+// Imager: from raw stereo frames to rectified pairs (debayering → vignetting → contrast → rectification).
 #pragma once
 
 #include <memory>
@@ -13,24 +13,25 @@
 
 namespace spartan {
 
-/// Turns shots into rectified pairs. Holds one lookup table per eye and its image buffers; has no memory from
-/// frame to frame.
+/// Converts stereo frames to rectified pairs. Holds one rectification table and image buffers per camera; its results
+/// do not depend on earlier frames.
 class Imager {
  public:
-  /// Code `configuration` where a pair cannot be rectified (eyes that look apart, no view as asked for, an eye that
-  /// sees less than 1 % of it), a self-mask cannot be read or a vignetting leaves no light. `mask_folder`: the rig
-  /// file's folder, which the names of self-masks are relative to.
+  /// Code `configuration` where a pair cannot be rectified (diverging optical axes, an impossible view, a camera that
+  /// sees less than 1 % of the view), a self-mask cannot be read or a vignetting correction is out of range.
+  /// `mask_folder` is the folder of the rig file, to which the names of self-masks are relative.
   static Result<Imager> create(const Rig& rig, const ImagingOptions& options, Workers workers,
                                const std::string& mask_folder = {});
   Imager(Imager&&) noexcept;
   Imager& operator=(Imager&&) noexcept;
   ~Imager();
 
-  /// The views in the result are valid until the next call for the same pair. Code `input` where the frame's pair
-  /// is unknown or its images have another size or format than the rig says. RGB images of a gray camera become gray.
+  /// The image views of the result are valid until the next call for the same pair. Code `input` where the pair of the
+  /// frame is unknown or an image has another size or pixel format than its camera in the rig. RGB images of a gray
+  /// camera are converted to gray.
   Result<RectifiedPair> process(const StereoFrame& frame);
 
-  /// Geometry of a pair's rectified view. Throws on an unknown name.
+  /// Geometry of the rectified images of a pair. Throws where there is no such pair.
   RectifiedStereo geometry(const std::string& pair) const;
 
  private:

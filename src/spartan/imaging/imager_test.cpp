@@ -25,9 +25,9 @@ Camera camera(const std::string& name, PixelFormat format, const CameraModel& mo
   return result;
 }
 
-Rig rig_with(const PixelFormat& format, const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
+Rig rig_with(const PixelFormat& format, const Eigen::Vector3d& rotation = Eigen::Vector3d::Zero()) {
   return rig_of_one_pair("test", camera("left", format), camera("right", format),
-                         Pose(exp_so3(turn), {0.1, 0, 0}).inverse());
+                         Pose(exp_so3(rotation), {0.1, 0, 0}).inverse());
 }
 
 template <class T>
@@ -49,7 +49,7 @@ StereoFrame frame_of(const FrameImage& left, const FrameImage& right) {
   return frame;
 }
 
-TEST(Imager, ARectifiedPairPassesUnchanged) {
+TEST(Imager, ARectifiedPairIsNotChanged) {
   ImagingOptions options;
   options.contrast = false;
   const Rig rig = rig_with({});
@@ -103,28 +103,28 @@ TEST(Imager, EveryDepthAndLayoutGivesTheSameWorkingImage) {
   }
 }
 
-TEST(Imager, RefusesFramesThatDoNotFitTheRig) {
+TEST(Imager, RejectsFramesThatContradictTheRig) {
   auto imager = Imager::create(rig_with({}), {}, Workers(1));
   ASSERT_TRUE(imager);
   const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
-  const auto refusal = [&](const StereoFrame& frame) {
+  const auto rejection = [&](const StereoFrame& frame) {
     const auto pair = imager->process(frame);
     EXPECT_FALSE(pair);
     EXPECT_EQ(pair.error().code, ErrorCode::input);
     return pair.error().message();
   };
   const auto small = FrameImage::own(Image<std::uint8_t>(32, 48), {});
-  EXPECT_THAT(refusal(frame_of(good, small)), HasSubstr("camera 'right' is 32 × 48"));
-  EXPECT_THAT(refusal(frame_of(good, small)), HasSubstr("the rig says 64 × 48 gray of 8 bits"));
+  EXPECT_THAT(rejection(frame_of(good, small)), HasSubstr("camera 'right' is 32 × 48"));
+  EXPECT_THAT(rejection(frame_of(good, small)), HasSubstr("the rig specifies 64 × 48 gray of 8 bits"));
   const PixelFormat deep{PixelLayout::gray, 12};
-  EXPECT_THAT(refusal(frame_of(FrameImage::own(ramp<std::uint16_t>(1), deep), good)),
+  EXPECT_THAT(rejection(frame_of(FrameImage::own(ramp<std::uint16_t>(1), deep), good)),
               HasSubstr("gray of 12 bits, low alignment"));
   StereoFrame unknown = frame_of(good, good);
   unknown.pair = "mast";
-  EXPECT_THAT(refusal(unknown), HasSubstr("no stereo pair 'mast'"));
+  EXPECT_THAT(rejection(unknown), HasSubstr("no stereo pair 'mast'"));
 }
 
-TEST(Imager, ColoursOfAGrayCameraAreReduced) {
+TEST(Imager, RgbImagesOfAGrayCameraBecomeGray) {
   auto imager = Imager::create(rig_with({}), {}, Workers(1));
   ASSERT_TRUE(imager);
   const auto gray = ramp<std::uint8_t>(2);
@@ -152,8 +152,8 @@ TEST(Imager, LoadsSelfMasks) {
   for (int x = 0; x < kSize.width; ++x) mask(x, 47) = 0;
   ASSERT_TRUE(write_png(folder.file("masks/left.png"), mask.view()));
   const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
-  for (const bool turned : {false, true}) {
-    Rig rig = rig_with({}, {0, turned ? 0.02 : 0, 0});
+  for (const bool rotated : {false, true}) {
+    Rig rig = rig_with({}, {0, rotated ? 0.02 : 0, 0});
     rig.cameras[0].self_mask = "masks/left.png";
     auto imager = Imager::create(rig, {}, Workers(1), folder.path());
     ASSERT_TRUE(imager) << imager.error().message();
@@ -162,31 +162,31 @@ TEST(Imager, LoadsSelfMasks) {
     ASSERT_FALSE(pair->left_mask.empty());
     EXPECT_EQ(pair->left_mask(30, 47), 0);
     EXPECT_EQ(pair->left_mask(30, 20), 255);
-    EXPECT_EQ(pair->right_mask.empty(), !turned);
+    EXPECT_EQ(pair->right_mask.empty(), !rotated);
     rig.cameras[0].self_mask = "masks/missing.png";
-    const auto refused = Imager::create(rig, {}, Workers(1), folder.path());
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().code, ErrorCode::configuration);
-    EXPECT_THAT(refused.error().message(), HasSubstr("missing.png"));
+    const auto rejected = Imager::create(rig, {}, Workers(1), folder.path());
+    ASSERT_FALSE(rejected);
+    EXPECT_EQ(rejected.error().code, ErrorCode::configuration);
+    EXPECT_THAT(rejected.error().message(), HasSubstr("missing.png"));
   }
 }
 
-// Both eyes see the same, but for the rover's body at the lower border of the right one.
-TEST(Imager, TheRoverItselfDoesNotChangeTheBalance) {
+// Both cameras see the same, except for the rover's body at the lower border of the right image.
+TEST(Imager, TheSelfMaskIsExcludedFromGainCompensation) {
   const testing::TemporaryFolder folder;
   Image<std::uint8_t> scene(kSize), with_body(kSize), mask(kSize.width, kSize.height, 255);
-  for (const double share : {0.1, 0.2, 0.3}) {
+  for (const double fraction : {0.1, 0.2, 0.3}) {
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {
-        const bool body = y >= (1 - share) * kSize.height;
+        const bool body = y >= (1 - fraction) * kSize.height;
         scene(x, y) = static_cast<std::uint8_t>(90 + (x * 37 + y * 11) % 101);
         with_body(x, y) = body ? 25 : scene(x, y);
         mask(x, y) = body ? 0 : 255;
       }
     }
     ASSERT_TRUE(write_png(folder.file("body.png"), mask.view()));
-    for (const double turn : {0.0, 0.002}) {
-      Rig rig = rig_with({}, {0, turn, 0});
+    for (const double rotation : {0.0, 0.002}) {
+      Rig rig = rig_with({}, {0, rotation, 0});
       rig.cameras[1].self_mask = "body.png";
       auto imager = Imager::create(rig, {}, Workers(1), folder.path());
       ASSERT_TRUE(imager) << imager.error().message();
@@ -197,25 +197,25 @@ TEST(Imager, TheRoverItselfDoesNotChangeTheBalance) {
       for (int y = 2; y < 30; ++y) {
         for (int x = 2; x < 60; ++x) sum += pair->right(x, y) - pair->left(x, y);
       }
-      EXPECT_NEAR(sum / (28 * 58), 0, 1) << share << " of the eye, turned by " << turn;
+      EXPECT_NEAR(sum / (28 * 58), 0, 1) << fraction << " of the image, rotated by " << rotation;
     }
   }
 }
 
-TEST(Imager, WhatTheViewDoesNotShowDoesNotChangeItsLevels) {
+TEST(Imager, PixelsOutsideOfTheViewDoNotAffectTheContrast) {
   const CameraModel fisheye = EquidistantModel({20, 20, 31.5, 23.5}, {});  // 88° at 31 px
   const Rig rig = rig_of_one_pair("test", camera("left", {}, fisheye), camera("right", {}, fisheye),
                                   Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse());
   auto imager = Imager::create(rig, {}, Workers(1));
   ASSERT_TRUE(imager) << imager.error().message();
   const auto seen_with = [&](int surround) {
-    auto picture = ramp<std::uint8_t>(1);
+    auto pixels = ramp<std::uint8_t>(1);
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {
-        if (std::hypot(x - 31.5, y - 23.5) > 33) picture(x, y) = static_cast<std::uint8_t>(surround);
+        if (std::hypot(x - 31.5, y - 23.5) > 33) pixels(x, y) = static_cast<std::uint8_t>(surround);
       }
     }
-    const auto image = FrameImage::own(std::move(picture), {});
+    const auto image = FrameImage::own(std::move(pixels), {});
     return Image<std::uint8_t>::copy_of(imager->process(frame_of(image, image))->left);
   };
   const auto black = seen_with(0), white = seen_with(255);
@@ -224,11 +224,11 @@ TEST(Imager, WhatTheViewDoesNotShowDoesNotChangeItsLevels) {
   }
 }
 
-TEST(Imager, ChoosesTheViewThatIsAskedFor) {
+TEST(Imager, UsesTheRequestedView) {
   const Rig rig = rig_with({}, {0, 0.02, 0});
   const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
   ImagingOptions options;
-  options.view.policy = "all_valid";
+  options.view.policy = ViewPolicy::all_valid;
   options.view.width_px = 100;
   options.view.height_px = 50;
   auto imager = Imager::create(rig, options, Workers(1));
@@ -239,13 +239,13 @@ TEST(Imager, ChoosesTheViewThatIsAskedFor) {
   EXPECT_TRUE(pair->left_mask.empty());
   EXPECT_TRUE(pair->right_mask.empty());
   options.view.focal_px = 10;
-  const auto refused = Imager::create(rig, options, Workers(1));
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+  const auto rejected = Imager::create(rig, options, Workers(1));
+  ASSERT_FALSE(rejected);
+  EXPECT_EQ(rejected.error().code, ErrorCode::configuration);
 }
 
-TEST(Imager, RefusesAViewThatAnEyeSeesNothingOf) {
-  const auto refusal = [](const Rig& rig, const ImagingOptions& options, const std::string& mask_folder = {}) {
+TEST(Imager, RejectsAViewThatACameraDoesNotSee) {
+  const auto rejection = [](const Rig& rig, const ImagingOptions& options, const std::string& mask_folder = {}) {
     const auto imager = Imager::create(rig, options, Workers(1), mask_folder);
     EXPECT_FALSE(imager);
     if (imager) return std::string();
@@ -254,35 +254,35 @@ TEST(Imager, RefusesAViewThatAnEyeSeesNothingOf) {
   };
   ImagingOptions options;
   options.view.focal_px = 1e-9;
-  EXPECT_THAT(refusal(rig_with({}, {0, 0.02, 0}), options), HasSubstr("camera 'left' sees 0.0 % of the view"));
-  const PinholeModel narrow{360, 360, 31.5, 23.5};  // toed in by more than they see
-  EXPECT_THAT(refusal(rig_of_one_pair("test", camera("left", {}, narrow), camera("right", {}, narrow),
-                                      Pose(exp_so3({0, -0.4, 0}), {0.1, 0, 0}).inverse()),
-                      {}),
+  EXPECT_THAT(rejection(rig_with({}, {0, 0.02, 0}), options), HasSubstr("camera 'left' sees 0.0 % of the view"));
+  const PinholeModel narrow{360, 360, 31.5, 23.5};  // converge by more than their field of view
+  EXPECT_THAT(rejection(rig_of_one_pair("test", camera("left", {}, narrow), camera("right", {}, narrow),
+                                        Pose(exp_so3({0, -0.4, 0}), {0.1, 0, 0}).inverse()),
+                        {}),
               HasSubstr("camera 'left' sees 0.0 % of the view"));
   const testing::TemporaryFolder folder;
   ASSERT_TRUE(write_png(folder.file("all.png"), Image<std::uint8_t>(kSize).view()));
-  for (const double turn : {0.0, 0.02}) {
-    Rig rig = rig_with({}, {0, turn, 0});
+  for (const double rotation : {0.0, 0.02}) {
+    Rig rig = rig_with({}, {0, rotation, 0});
     rig.cameras[1].self_mask = "all.png";
-    EXPECT_THAT(refusal(rig, {}, folder.path()), HasSubstr("camera 'right' sees 0.0 % of the view"));
+    EXPECT_THAT(rejection(rig, {}, folder.path()), HasSubstr("camera 'right' sees 0.0 % of the view"));
   }
-  // A wide view around a narrow eye is allowed.
+  // A view wider than the field of view is allowed.
   options.view.focal_px = 15;
   EXPECT_TRUE(Imager::create(rig_with({}, {0, 0.02, 0}), options, Workers(1)));
 }
 
-TEST(Imager, UndoesTheVignettingOfTheRig) {
+TEST(Imager, CorrectsTheVignetting) {
   Rig rig = rig_with({});
   ImagingOptions options;
-  options.contrast = options.balance = false;
+  options.contrast = options.gain_compensation = false;
   const auto flat = FrameImage::own(Image<std::uint8_t>(kSize.width, kSize.height, 100), {});
   const auto corner = [&](bool undo) -> int {
     options.vignetting = undo;
     auto imager = Imager::create(rig, options, Workers(2));
     EXPECT_TRUE(imager);
     const auto pair = imager->process(frame_of(flat, flat));
-    EXPECT_EQ(pair->right(0, 0), 100) << "the right eye has none";
+    EXPECT_EQ(pair->right(0, 0), 100) << "the right camera has none";
     EXPECT_EQ(pair->left(32, 24), 100);
     return pair->left(0, 0);
   };
@@ -293,22 +293,22 @@ TEST(Imager, UndoesTheVignettingOfTheRig) {
   EXPECT_FALSE(Imager::create(rig, options, Workers(1)));
 }
 
-TEST(Imager, BalancesTheEyes) {
+TEST(Imager, CompensatesTheGainBetweenTheCameras) {
   const PixelFormat format{PixelLayout::gray, 12};
   ImagingOptions options;
-  for (const bool balance : {false, true}) {
-    options.balance = balance;
+  for (const bool gain_compensation : {false, true}) {
+    options.gain_compensation = gain_compensation;
     auto imager = Imager::create(rig_with(format), options, Workers(2));
     ASSERT_TRUE(imager);
     const auto pair = imager->process(
         frame_of(FrameImage::own(ramp<std::uint16_t>(30), format), FrameImage::own(ramp<std::uint16_t>(20), format)));
     ASSERT_TRUE(pair);
     const int difference = std::abs(pair->left(50, 30) - pair->right(50, 30));
-    EXPECT_TRUE(balance ? difference <= 1 : difference > 30) << difference;
+    EXPECT_TRUE(gain_compensation ? difference <= 1 : difference > 30) << difference;
   }
 }
 
-TEST(Imager, EqualisesLocallyAfterTheStretch) {
+TEST(Imager, AppliesClaheAfterTheStretch) {
   ImagingOptions options;
   const auto image = FrameImage::own(ramp<std::uint8_t>(1), {});
   const auto result = [&](bool local, double clip) {
@@ -321,7 +321,7 @@ TEST(Imager, EqualisesLocallyAfterTheStretch) {
   EXPECT_GT(equalised(8, 11) - equalised(4, 4), plain(8, 11) - plain(4, 4));
 }
 
-TEST(Imager, TimesWhatItDid) {
+TEST(Imager, ReportsTheDurationsOfItsSteps) {
   const PixelFormat bayer{PixelLayout::bayer_grbg, 8};
   const auto stages = [](const Rig& rig, const FrameImage& image, const ImagingOptions& options) {
     auto imager = Imager::create(rig, options, Workers(1));
@@ -345,13 +345,13 @@ TEST(Imager, TimesWhatItDid) {
                    "imaging.rectify"}));
 }
 
-// A pair whose eyes are turned against each other photographs the synthetic world through distorting lenses; the
-// imager must give back what ideal eyes see.
-TEST(Imager, UndoesLensesAndTurnsOfASyntheticPair) {
+// Two distorting cameras that are rotated to each other view the synthetic world; the imager must reproduce what ideal
+// cameras see.
+TEST(Imager, RectifiesASyntheticDistortedPair) {
   const ImageSize size{320, 240};
   testing::SyntheticWorldOptions world_options;
   world_options.noise_levels = 0;
-  world_options.texture_size_m = 0.015;  // coarse, as the picture is interpolated twice
+  world_options.texture_size_m = 0.015;  // coarse, as the image is interpolated twice
   const testing::SyntheticWorld world(world_options);
   Eigen::Matrix3d looking_down;
   looking_down << 0, -0.8, 0.6, -1, 0, 0, 0, -0.6, -0.8;
@@ -368,7 +368,7 @@ TEST(Imager, UndoesLensesAndTurnsOfASyntheticPair) {
   ASSERT_TRUE(imager) << imager.error().message();
   const RectifiedStereo view = imager->geometry("stereo");
 
-  // The ideal view, wide enough for the lenses; the cameras' images are taken out of it.
+  // The ideal view covers the field of view of the lenses; the distorted images are sampled from it.
   const Pose left_from_rectified =
       optical_from_forward() * imager
                                    ->process(frame_of(FrameImage::own(Image<std::uint8_t>(size), {}),
@@ -377,22 +377,22 @@ TEST(Imager, UndoesLensesAndTurnsOfASyntheticPair) {
   const RectifiedStereo wide{{640, 480}, view.focal_px * 1.3, {319.5, 239.5}, view.baseline_m};
   const auto truth = world.render(wide, world_from_left * left_from_rectified, 1);
   const Pose right_from_rectified = rig.right_from_left(rig.pairs[0]) * left_from_rectified;
-  const auto through_lens = [&](const Camera& eye, const Eigen::Matrix3d& from_rectified,
+  const auto through_lens = [&](const Camera& lens_camera, const Eigen::Matrix3d& from_rectified,
                                 const Image<std::uint8_t>& ideal) {
-    Image<std::uint8_t> picture(size);
+    Image<std::uint8_t> pixels(size);
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {
-        const auto ray = unproject(eye.model, {x, y});
+        const auto ray = unproject(lens_camera.model, {x, y});
         const Eigen::Vector3d p = wide.project(from_rectified.transpose() * ray->direction);
         const int px = static_cast<int>(p.x()), py = static_cast<int>(p.y());
         if (!(p.x() >= 0 && p.y() >= 0) || px + 1 >= 640 || py + 1 >= 480) continue;
         const double fx = p.x() - px, fy = p.y() - py;
-        picture(x, y) =
+        pixels(x, y) =
             static_cast<std::uint8_t>(std::lround((1 - fy) * ((1 - fx) * ideal(px, py) + fx * ideal(px + 1, py)) +
                                                   fy * ((1 - fx) * ideal(px, py + 1) + fx * ideal(px + 1, py + 1))));
       }
     }
-    return picture;
+    return pixels;
   };
   const auto seen_left = through_lens(left, left_from_rectified.rotation_matrix(), truth.left);
   const auto seen_right = through_lens(right, right_from_rectified.rotation_matrix(), truth.right);

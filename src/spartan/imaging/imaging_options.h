@@ -1,71 +1,131 @@
-// Options of the imaging stage, one struct a sub-step.
+// Options of the imaging stage: debayering, vignetting, contrast, rectification.
 #pragma once
 
-#include <string>
+#include <array>
+#include <cstdint>
 
 #include "spartan/core/options.h"
 
 namespace spartan {
 
+/// How missing colours of a Bayer mosaic are interpolated (demosaicing).
+enum class DebayerMethod : std::uint8_t {
+  /// The rounded mean of the two or four nearest samples of the colour.
+  bilinear,
+  /// Green minus red (or blue) is interpolated along rows and along columns. The two are averaged with weights that
+  /// fall
+  /// with the local gradient of the difference (docs/math/imaging.md). Red and blue follow from green, interpolated
+  /// mostly along the direction with the weaker edges.
+  edge_aware,
+};
+constexpr auto enum_names(DebayerMethod) {
+  return std::array{EnumName{DebayerMethod::bilinear, "bilinear"}, EnumName{DebayerMethod::edge_aware, "edge_aware"}};
+}
+
+/// Which part of the two fields of view the rectified images cover.
+enum class ViewPolicy : std::uint8_t {
+  keep_resolution,  ///< the cameras' resolution on their optical axes; pixels outside of a sensor are masked
+  all_valid,        ///< the widest view in which both cameras see every pixel; nothing is masked
+  whole_view,       ///< everything that either camera sees, at lower resolution and with masked pixels
+};
+constexpr auto enum_names(ViewPolicy) {
+  return std::array{EnumName{ViewPolicy::keep_resolution, "keep_resolution"},
+                    EnumName{ViewPolicy::all_valid, "all_valid"}, EnumName{ViewPolicy::whole_view, "whole_view"}};
+}
+
 struct LocalContrastOptions {
-  bool enabled = false;
-  int tiles = 8;
-  double clip = 2;
+  bool enabled = false;   ///< whether to apply CLAHE
+  int tiles = 8;          ///< tiles along each side of the image
+  double clip_limit = 2;  ///< largest count of a gray level in a tile, as a multiple of the mean count
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("enabled", enabled,
-            "equalise the gray levels tile by tile (CLAHE), each eye for itself: the same surface may get different "
-            "levels in the two eyes");
-    v.field("tiles", tiles, "across and down the image", between(1, 64));
-    v.field("clip", clip, "no level may occur more often in a tile than so many times the mean", between(1, 256));
+    v.field(
+        "enabled", enabled,
+        "Applies contrast-limited adaptive histogram equalisation (CLAHE) to each image on its own; false is better "
+        "for stereo matching, since the same surface may get different gray levels in the left and right image.");
+    v.field("tiles", tiles,
+            "Number of CLAHE tiles along each side of the image; raising it adapts the contrast to smaller regions and "
+            "amplifies noise there.",
+            between(1, 64));
+    v.renamed("clip", "clip_limit");
+    v.field("clip_limit", clip_limit,
+            "Largest count of a gray level in a CLAHE tile as a multiple of the mean count; raising it allows stronger "
+            "contrast and more noise.",
+            between(1, 256));
   }
 };
 
 struct ViewOptions {
-  std::string policy = "keep_resolution";
-  int width_px = 0, height_px = 0;
-  double focal_px = 0;
-  double depth_m = 0;
+  ViewPolicy policy = ViewPolicy::keep_resolution;  ///< which part of the fields of view is shown
+  int width_px = 0, height_px = 0;                  ///< size of the rectified images, px; 0: as the left camera
+  double focal_px = 0;                              ///< focal length of the rectified images, px; 0: by the policy
+  double depth_m = 0;  ///< depth for which non-central cameras are rectified, m; 0: infinity
 
   template <class Visitor>
   void describe(Visitor& v) {
     v.field(
         "policy", policy,
-        "keep_resolution: the cameras' own, what looks past a sensor is masked; all_valid: as wide as both eyes see "
-        "every pixel; whole_view: everything that either eye sees",
-        {"keep_resolution", "all_valid", "whole_view"});
-    v.field("width_px", width_px, "of the rectified images; 0: as the left camera's", between(0, 32767));
-    v.field("height_px", height_px, "of the rectified images; 0: as the left camera's", between(0, 32767));
-    v.field("focal_px", focal_px, "of the rectified images; 0: as the policy has it", between(0, 1e6));
+        "Part of the fields of view that the rectified images cover: keep_resolution keeps the resolution of the "
+        "cameras and masks pixels outside of a sensor, all_valid is the widest view in which both cameras see every "
+        "pixel, whole_view covers all that either camera sees at lower resolution.");
+    v.field("width_px", width_px,
+            "Width of the rectified images in px; 0 takes the width of the left camera, raising it covers more (or "
+            "finer) ground and costs time.",
+            between(0, 32767));
+    v.field("height_px", height_px,
+            "Height of the rectified images in px; 0 takes the height of the left camera, raising it covers more (or "
+            "finer) ground and costs time.",
+            between(0, 32767));
+    v.field("focal_px", focal_px,
+            "Focal length of the rectified images in px; 0 lets the policy choose it, raising it narrows the view and "
+            "increases the resolution.",
+            between(0, 1e6));
     v.field("depth_m", depth_m,
-            "of the surface for which the view is right where a camera's rays do not meet in one point; 0: far away",
+            "Depth in m at which rectification is exact for non-central cameras (CAHVORE), whose rays do not meet in "
+            "one point; 0 means infinity, central cameras ignore it.",
             between(0, 1e6));
   }
 };
 
 struct ImagingOptions {
-  std::string debayer = "edge_aware";
-  bool vignetting = true;
-  bool contrast = true;
-  bool balance = true;
-  double contrast_low_percent = 0.1;
-  double contrast_high_percent = 99.9;
+  DebayerMethod debayer = DebayerMethod::edge_aware;  ///< interpolation of Bayer mosaics
+  bool vignetting = true;                             ///< whether to correct the vignetting given in the rig
+  bool contrast = true;                               ///< whether to stretch the gray levels
+  bool gain_compensation = true;                      ///< whether to match the brightness of right and left image
+  double contrast_low_percent = 0.1;                  ///< percentile of the gray levels that becomes black, %
+  double contrast_high_percent = 99.9;                ///< percentile of the gray levels that becomes white, %
   LocalContrastOptions local_contrast;
-  bool rectify = true;
+  bool rectify = true;  ///< whether to undistort and rectify
   ViewOptions view;
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("debayer", debayer, "how colours are made of Bayer mosaics", {"bilinear", "edge_aware"});
-    v.field("vignetting", vignetting, "undo the fall-off of light that the rig states");
-    v.field("contrast", contrast, "stretch the gray levels, the same way for both eyes; false: no balance either");
-    v.field("balance", balance,
-            "before that, scale the right eye's levels to the left one's where the histograms differ by more than 5 %");
-    v.field("contrast_low_percent", contrast_low_percent, "share of pixels that may become black", between(0, 50));
-    v.field("contrast_high_percent", contrast_high_percent, "share of pixels below white", between(50, 100));
+    v.field("debayer", debayer,
+            "Interpolation of Bayer mosaics: bilinear is faster, edge_aware keeps edges sharper and free of false "
+            "colours.");
+    v.field(
+        "vignetting", vignetting,
+        "Corrects the vignetting that the rig gives for a camera; false leaves the image darker towards its edges.");
+    v.field("contrast", contrast,
+            "Stretches the gray levels linearly between two percentiles, with the same mapping for both images; false "
+            "scales the full range of the sensor to 8 bits and also disables gain_compensation.");
+    v.renamed("balance", "gain_compensation");
+    v.field("gain_compensation", gain_compensation,
+            "Multiplies the gray levels of the right image by a gain that matches the left image before the stretch, "
+            "where their histograms differ by more than 5 %; false keeps the brightness difference of the cameras.");
+    v.field("contrast_low_percent", contrast_low_percent,
+            "Percentile of the gray levels in % that is mapped to black; raising it darkens more pixels to black and "
+            "raises the contrast of the rest.",
+            between(0, 50));
+    v.field(
+        "contrast_high_percent", contrast_high_percent,
+        "Percentile of the gray levels in % that is mapped to white; lowering it saturates more pixels to white and "
+        "raises the contrast of the rest.",
+        between(50, 100));
     v.group("local_contrast", local_contrast);
-    v.field("rectify", rectify, "false: the images are rectified already, whatever the rig says");
+    v.field("rectify", rectify,
+            "Undistorts and rectifies the images; false treats the input as already rectified, whatever the rig says.");
     v.group("view", view);
   }
 };

@@ -9,11 +9,11 @@
 namespace spartan {
 namespace {
 
-constexpr int kRowsPerPart = 32;
+constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
 
 }  // namespace
 
-Result<LightCorrection> LightCorrection::create(const Camera& camera, const Workers& workers) {
+Result<VignettingCorrection> VignettingCorrection::create(const Camera& camera, const Workers& workers) {
   const Eigen::Vector2d middle((camera.size.width - 1) / 2.0, (camera.size.height - 1) / 2.0);
   const Eigen::Vector2d centre =
       camera.vignetting.centre_px.value_or(project(camera.model, Eigen::Vector3d::UnitZ()).value_or(middle));
@@ -26,7 +26,7 @@ Result<LightCorrection> LightCorrection::create(const Camera& camera, const Work
     for (int y = begin; y < end; ++y) {
       for (int x = 0; x < camera.size.width; ++x) {
         const double factor = (1 << kFractionBits) / light(x, y);
-        // 0 stands for too little light.
+        // 0 marks a relative illumination out of range.
         const bool fits = light(x, y) > Vignetting::kLeast && factor >= 1;
         factors(x, y) = fits ? static_cast<std::uint16_t>(std::lround(factor)) : std::uint16_t{0};
       }
@@ -35,18 +35,19 @@ Result<LightCorrection> LightCorrection::create(const Camera& camera, const Work
   for (int y = 0; y < camera.size.height; ++y) {
     for (int x = 0; x < camera.size.width; ++x) {
       if (factors(x, y) != 0) continue;
-      return failure(ErrorCode::configuration,
-                     fmt::format("the vignetting of camera '{}' leaves {:.3g} of the light at pixel {}, {}; it must be "
-                                 "between {} and {}",
-                                 camera.name, light(x, y), x, y, Vignetting::kLeast, 1 << kFractionBits),
-                     "cameras." + camera.name + ".vignetting");
+      return failure(
+          ErrorCode::configuration,
+          fmt::format("the vignetting of camera '{}' gives a relative illumination of {:.3g} at pixel {}, {}; it "
+                      "must be between {} and {}",
+                      camera.name, light(x, y), x, y, Vignetting::kLeast, 1 << kFractionBits),
+          "cameras." + camera.name + ".vignetting");
     }
   }
-  return LightCorrection(std::move(factors), camera.pixel_format.full_scale());
+  return VignettingCorrection(std::move(factors), camera.pixel_format.full_scale());
 }
 
 template <class T>
-void LightCorrection::apply_any(ImageView<const T> image, ImageView<T> result, const Workers& workers) const {
+void VignettingCorrection::apply_any(ImageView<const T> image, ImageView<T> result, const Workers& workers) const {
   if (image.size() != factors_.size() || result.size() != factors_.size()) {
     throw std::invalid_argument("LightCorrection: the images have another size than the camera");
   }
@@ -65,12 +66,12 @@ void LightCorrection::apply_any(ImageView<const T> image, ImageView<T> result, c
   });
 }
 
-void LightCorrection::apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result,
-                            const Workers& workers) const {
+void VignettingCorrection::apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result,
+                                 const Workers& workers) const {
   apply_any(image, result, workers);
 }
-void LightCorrection::apply(ImageView<const std::uint16_t> image, ImageView<std::uint16_t> result,
-                            const Workers& workers) const {
+void VignettingCorrection::apply(ImageView<const std::uint16_t> image, ImageView<std::uint16_t> result,
+                                 const Workers& workers) const {
   apply_any(image, result, workers);
 }
 

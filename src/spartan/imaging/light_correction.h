@@ -1,4 +1,4 @@
-// Undoes the fall-off of light towards the edge of the image.
+// Vignetting correction.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +10,22 @@
 
 namespace spartan {
 
-/// One factor a pixel, 1 / Vignetting::light_at, in fixed point with 13 bits behind the point. Black is taken to be 0.
-class LightCorrection {
+/// Multiplies each pixel by 1 / Vignetting::light_at, in fixed point with 13 fraction bits. The black level is taken to
+/// be 0.
+class VignettingCorrection {
  public:
-  /// Code `configuration` where some pixel gets less than Vignetting::kLeast of the light.
-  static Result<LightCorrection> create(const Camera& camera, const Workers& workers);
+  /// Code `configuration` where the relative illumination of a pixel is not between Vignetting::kLeast and 2¹³.
+  static Result<VignettingCorrection> create(const Camera& camera, const Workers& workers);
 
-  /// Rounded; what leaves the scale of the camera's pixel format becomes its largest value. `result` may be `image`.
-  /// Throws where sizes differ from the camera's.
+  /// Results are rounded and saturate at the full scale of the camera's pixel format. `result` may be `image`. Throws
+  /// where the sizes differ from the camera's.
   void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
   void apply(ImageView<const std::uint16_t> image, ImageView<std::uint16_t> result, const Workers& workers) const;
 
   static constexpr int kFractionBits = 13;
 
  private:
-  LightCorrection(Image<std::uint16_t> factors, int full_scale)
+  VignettingCorrection(Image<std::uint16_t> factors, int full_scale)
       : factors_(std::move(factors)), full_scale_(full_scale) {}
   template <class T>
   void apply_any(ImageView<const T> image, ImageView<T> result, const Workers& workers) const;

@@ -20,7 +20,7 @@ Camera camera_with(std::vector<double> coefficients, PixelFormat format = {}) {
   return camera;
 }
 
-// What the formula of rig/vignetting.h says, written out.
+// The formula of rig/vignetting.h.
 double light(const Camera& camera, double cx, double cy, int x, int y) {
   const double rho2 = ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (0.25 * (64 * 64 + 48 * 48));
   const auto& a = camera.vignetting.coefficients;
@@ -31,7 +31,7 @@ double light(const Camera& camera, double cx, double cy, int x, int y) {
 
 template <class T>
 void expect_a_flat_field_flat(const Camera& camera, double cx, double cy, int level) {
-  const auto correction = LightCorrection::create(camera, Workers(2));
+  const auto correction = VignettingCorrection::create(camera, Workers(2));
   ASSERT_TRUE(correction) << correction.error().message();
   Image<T> image(camera.size);
   for (int y = 0; y < 48; ++y) {
@@ -46,7 +46,7 @@ void expect_a_flat_field_flat(const Camera& camera, double cx, double cy, int le
   }
 }
 
-TEST(LightCorrection, MakesAFlatFieldFlat) {
+TEST(VignettingCorrection, FlattensAFlatField) {
   expect_a_flat_field_flat<std::uint8_t>(camera_with({-0.3}), 30, 25, 200);
   expect_a_flat_field_flat<std::uint16_t>(camera_with({-0.5, 0.2, -0.1}, {PixelLayout::gray, 12}), 30, 25, 3000);
   Camera shifted = camera_with({-0.4, 0.1});
@@ -54,10 +54,10 @@ TEST(LightCorrection, MakesAFlatFieldFlat) {
   expect_a_flat_field_flat<std::uint8_t>(shifted, 20, 40, 150);
 }
 
-TEST(LightCorrection, NothingLeavesTheScale) {
+TEST(VignettingCorrection, SaturatesAtFullScale) {
   const PixelFormat high{PixelLayout::gray, 12, BitAlignment::high};
   const Camera camera = camera_with({-0.6}, high);
-  const auto correction = LightCorrection::create(camera, Workers(1));
+  const auto correction = VignettingCorrection::create(camera, Workers(1));
   ASSERT_TRUE(correction);
   Image<std::uint16_t> image(64, 48, 0xFFF0);
   correction->apply(image, image, Workers(1));
@@ -66,8 +66,8 @@ TEST(LightCorrection, NothingLeavesTheScale) {
   }
 }
 
-TEST(LightCorrection, NoFallOffChangesNothing) {
-  const auto correction = LightCorrection::create(camera_with({0}), Workers(1));
+TEST(VignettingCorrection, ZeroCoefficientsChangeNothing) {
+  const auto correction = VignettingCorrection::create(camera_with({0}), Workers(1));
   Image<std::uint8_t> image(64, 48);
   for (int y = 0; y < 48; ++y) {
     for (int x = 0; x < 64; ++x) image(x, y) = static_cast<std::uint8_t>(x * y);
@@ -79,11 +79,11 @@ TEST(LightCorrection, NoFallOffChangesNothing) {
   }
 }
 
-TEST(LightCorrection, RefusesALensThatLeavesNoLight) {
-  const auto refused = LightCorrection::create(camera_with({-1.2}), Workers(1));
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
-  EXPECT_THAT(refused.error().message(), HasSubstr("cameras.left.vignetting"));
+TEST(VignettingCorrection, RejectsIlluminationOutOfRange) {
+  const auto rejected = VignettingCorrection::create(camera_with({-1.2}), Workers(1));
+  ASSERT_FALSE(rejected);
+  EXPECT_EQ(rejected.error().code, ErrorCode::configuration);
+  EXPECT_THAT(rejected.error().message(), HasSubstr("cameras.left.vignetting"));
 }
 
 }  // namespace

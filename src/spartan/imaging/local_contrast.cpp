@@ -9,24 +9,25 @@
 namespace spartan {
 namespace {
 
-constexpr int kRowsPerPart = 32;
-constexpr int kWeightBits = 11;
+constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
+constexpr int kWeightBits = 11;   // fraction bits of the bilinear weights
 
 }  // namespace
 
-LocalContrast::Between LocalContrast::tiles_around(int at, int tile) const {
-  // In halves of a tile's size, from the middle of the first tile.
+LocalContrast::TilePair LocalContrast::tiles_around(int at, int tile) const {
+  // In half pixels, relative to the centre of the first tile.
   const int from_middle = 2 * at - tile, step = 2 * tile;
   const int before = from_middle < 0 ? -1 : from_middle / step;
   const int rest = from_middle - before * step;
   return {std::max(before, 0), std::min(before + 1, tiles_ - 1), ((rest << kWeightBits) + tile) / step};
 }
 
-LocalContrast::LocalContrast(int tiles, double clip)
+LocalContrast::LocalContrast(int tiles, double clip_limit)
     : tiles_(tiles),
-      clip_(clip),
+      clip_limit_(clip_limit),
       mappings_(static_cast<std::size_t>(std::max(tiles, 0)) * static_cast<std::size_t>(std::max(tiles, 0)) * 256) {
-  if (tiles < 1 || !(clip >= 1)) throw std::invalid_argument("LocalContrast: at least one tile and a clip of 1");
+  if (tiles < 1 || !(clip_limit >= 1))
+    throw std::invalid_argument("LocalContrast: needs at least one tile and a clip limit of at least 1");
 }
 
 void LocalContrast::make_mapping(ImageView<const std::uint8_t> image, ImageSize tile, int tile_x, int tile_y) {
@@ -38,13 +39,13 @@ void LocalContrast::make_mapping(ImageView<const std::uint8_t> image, ImageSize 
     for (int x = std::max(left, inside); x < right; ++x) ++counts[row[mirrored(x, image.width())]];
   }
   const int area = tile.width * tile.height;
-  const int most = std::max(1, static_cast<int>(clip_ * area / 256));
+  const int limit = std::max(1, static_cast<int>(clip_limit_ * area / 256));
   int excess = 0;
   for (int& count : counts) {
-    excess += std::max(0, count - most);
-    count = std::min(count, most);
+    excess += std::max(0, count - limit);
+    count = std::min(count, limit);
   }
-  // What does not divide by 256 goes to levels at equal distances.
+  // The remainder of the division by 256 goes to levels at equal distances.
   const int rest = excess % 256;
   for (int& count : counts) count += excess / 256;
   for (int i = 0; i < rest; ++i) ++counts[static_cast<std::size_t>(i * std::max(256 / rest, 1))];
@@ -52,7 +53,7 @@ void LocalContrast::make_mapping(ImageView<const std::uint8_t> image, ImageSize 
   std::int64_t below = 0;
   for (std::size_t level = 0; level < 256; ++level) {
     below += counts[level];
-    // Ties go to the even level, as OpenCV rounds.
+    // Round half to even, as OpenCV does.
     const std::int64_t whole = 255 * below / area, twice_rest = 2 * (255 * below % area);
     const bool up = twice_rest > area || (twice_rest == area && whole % 2 == 1);
     out[level] = static_cast<std::uint8_t>(whole + (up ? 1 : 0));
@@ -73,19 +74,19 @@ void LocalContrast::apply(ImageView<const std::uint8_t> image, ImageView<std::ui
   workers.for_each_part(0, image.height(), kRowsPerPart, [&](int begin, int end) {
     constexpr int kOne = 1 << kWeightBits, kHalf = 1 << (2 * kWeightBits - 1);
     for (int y = begin; y < end; ++y) {
-      const Between rows = tiles_around(y, tile.height);
+      const TilePair rows = tiles_around(y, tile.height);
       const std::uint8_t* const in = image.row(y);
       std::uint8_t* const out = result.row(y);
       const std::uint8_t* const mappings[2] = {mapping(0, rows.first), mapping(0, rows.second)};
-      const Between* const around = columns_.data();
+      const TilePair* const around = columns_.data();
       for (int x = 0, width = image.width(); x < width; ++x) {
-        const Between columns = around[x];
-        const int above = (kOne - columns.share) * mappings[0][256 * columns.first + in[x]] +
-                          columns.share * mappings[0][256 * columns.second + in[x]];
-        const int below = (kOne - columns.share) * mappings[1][256 * columns.first + in[x]] +
-                          columns.share * mappings[1][256 * columns.second + in[x]];
-        out[x] =
-            static_cast<std::uint8_t>(((kOne - rows.share) * above + rows.share * below + kHalf) >> (2 * kWeightBits));
+        const TilePair columns = around[x];
+        const int above = (kOne - columns.weight) * mappings[0][256 * columns.first + in[x]] +
+                          columns.weight * mappings[0][256 * columns.second + in[x]];
+        const int below = (kOne - columns.weight) * mappings[1][256 * columns.first + in[x]] +
+                          columns.weight * mappings[1][256 * columns.second + in[x]];
+        out[x] = static_cast<std::uint8_t>(((kOne - rows.weight) * above + rows.weight * below + kHalf) >>
+                                           (2 * kWeightBits));
       }
     }
   });

@@ -1,4 +1,4 @@
-// Contrast that follows the light of each part of the picture: the local mode of the sub-module "contrast".
+// Local contrast (CLAHE): the local mode of the paper's sub-module "contrast".
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,17 @@
 
 namespace spartan {
 
-/// Contrast-limited adaptive histogram equalisation (Zuiderveld, "Contrast Limited Adaptive Histogram Equalization",
-/// Graphics Gems IV, 1994). The image is cut into tiles × tiles rectangles (mirrored beyond its right and lower border
-/// up to whole ones); the mapping of each makes its levels equally frequent, after counts over `clip` times the mean
-/// are cut off and spread over all levels; a pixel is mapped by the four tiles around it, bilinearly.
+/// Contrast-limited adaptive histogram equalisation (CLAHE; Zuiderveld, "Contrast Limited Adaptive Histogram
+/// Equalization", Graphics Gems IV, 1994), as cv::createCLAHE. The image is divided into tiles × tiles rectangles
+/// (mirrored beyond its right and lower border up to whole tiles). Each tile has a mapping by histogram equalisation,
+/// in which counts above `clip_limit` times the mean count are clipped and spread over all levels. A pixel is mapped by
+/// bilinear interpolation between the mappings of the four nearest tiles.
 class LocalContrast {
  public:
-  /// Throws where `tiles` < 1 or `clip` < 1.
-  LocalContrast(int tiles, double clip);
+  /// Throws where `tiles` < 1 or `clip_limit` < 1.
+  LocalContrast(int tiles, double clip_limit);
 
-  /// Images of one size. Integers throughout: the same bytes for any number of threads.
+  /// Both images have the same size. Integer arithmetic: the same bytes for any number of threads.
   void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers);
 
  private:
@@ -27,15 +28,15 @@ class LocalContrast {
   }
   void make_mapping(ImageView<const std::uint8_t> image, ImageSize tile, int tile_x, int tile_y);
 
-  /// The two tiles around a place on one axis, and the share of the second one in 1/2048.
-  struct Between {
-    int first, second, share;
+  /// The two nearest tiles along one axis and the weight of the second one in 1/2048.
+  struct TilePair {
+    int first, second, weight;
   };
-  Between tiles_around(int at, int tile) const;
+  TilePair tiles_around(int at, int tile) const;
 
   int tiles_;
-  double clip_;
-  std::vector<Between> columns_;
+  double clip_limit_;
+  std::vector<TilePair> columns_;
   std::vector<std::uint8_t> mappings_;
 };
 

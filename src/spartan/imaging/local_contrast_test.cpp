@@ -13,7 +13,7 @@
 namespace spartan {
 namespace {
 
-Image<std::uint8_t> picture(ImageSize size) {
+Image<std::uint8_t> test_image(ImageSize size) {
   Random random(3);
   Image<std::uint8_t> image(size);
   for (int y = 0; y < size.height; ++y) {
@@ -28,9 +28,9 @@ Image<std::uint8_t> picture(ImageSize size) {
 TEST(LocalContrast, AgreesWithOpenCv) {
   for (const ImageSize size : {ImageSize{320, 240}, ImageSize{301, 203}, ImageSize{37, 90}}) {
     for (const auto& [tiles, clip] : {std::pair{8, 2.0}, {8, 40.0}, {3, 4.5}, {1, 3.0}}) {
-      // Where only one side divides, OpenCV lengthens the other one by a whole pixel a tile.
+      // Where only one side is divisible, OpenCV extends the other one by a full pixel per tile.
       if ((size.width % tiles == 0) != (size.height % tiles == 0)) continue;
-      const auto image = picture(size);
+      const auto image = test_image(size);
       Image<std::uint8_t> ours(size);
       LocalContrast(tiles, clip).apply(image, ours, Workers(1));
       cv::Mat theirs;
@@ -45,7 +45,7 @@ TEST(LocalContrast, AgreesWithOpenCv) {
   }
 }
 
-TEST(LocalContrast, AConstantPictureStaysConstant) {
+TEST(LocalContrast, AConstantImageStaysConstant) {
   const Image<std::uint8_t> image(65, 43, 90);
   Image<std::uint8_t> result(image.size());
   LocalContrast(8, 2).apply(image, result, Workers(1));
@@ -64,10 +64,10 @@ TEST(LocalContrast, RaisesTheContrastOfADarkCorner) {
   EXPECT_GT(result(7, 8) - result(8, 8), 2 * (image(7, 8) - image(8, 8)));
 }
 
-TEST(LocalContrast, ThreadsGiveTheSameBytesAndSizesMayChange) {
+TEST(LocalContrast, AnyNumberOfThreadsGivesTheSameBytesAndSizesMayChange) {
   LocalContrast one(8, 2), two(8, 2);
   for (const ImageSize size : {ImageSize{301, 203}, ImageSize{64, 480}, ImageSize{1, 1}}) {
-    const auto image = picture(size);
+    const auto image = test_image(size);
     Image<std::uint8_t> a(size), b(size);
     one.apply(image, a, Workers(1));
     two.apply(image, b, Workers(2));
@@ -77,7 +77,7 @@ TEST(LocalContrast, ThreadsGiveTheSameBytesAndSizesMayChange) {
   }
 }
 
-TEST(LocalContrast, RefusesSenselessParameters) {
+TEST(LocalContrast, RejectsInvalidParameters) {
   EXPECT_THROW(LocalContrast(0, 2), std::invalid_argument);
   EXPECT_THROW(LocalContrast(8, 0.5), std::invalid_argument);
   Image<std::uint8_t> image(4, 4), other(5, 4);

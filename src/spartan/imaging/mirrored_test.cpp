@@ -5,7 +5,7 @@
 namespace spartan {
 namespace {
 
-TEST(Mirrored, WalksToAndFro) {
+TEST(Mirrored, ReflectsAtBothEnds) {
   for (const int size : {1, 2, 3, 7}) {
     int at = 0, way = -1;
     for (int i = 0; i < 50; ++i) {

@@ -1,4 +1,4 @@
-// Our rectification beside OpenCV's, on real cameras.
+// Comparison of the rectification with OpenCV on real cameras.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ struct OpenCvMaps {
   cv::Mat x, y;
 };
 
-// What OpenCV makes of the same camera, rotation and new camera matrix.
+// The maps of cv::initUndistortRectifyMap for the same camera, rotation and new camera matrix.
 OpenCvMaps opencv_maps(const Camera& camera, const RectifiedStereo& view, const Eigen::Matrix3d& from_rectified) {
   const auto& model = std::get<RadialTangentialModel>(camera.model);
   const PinholeModel& p = model.pinhole();
@@ -55,7 +55,7 @@ OpenCvMaps opencv_maps(const Camera& camera, const RectifiedStereo& view, const 
   return maps;
 }
 
-// Largest distance between our table and OpenCV's maps, over all pixels that ours has a place for.
+// Largest distance between RemapTable and the maps of OpenCV, over all valid pixels of the table.
 double largest_map_difference(const Camera& camera, const RectifiedStereo& view,
                               const Eigen::Matrix3d& from_rectified) {
   const RemapTable table(camera.model, camera.size, view, from_rectified, {}, Workers(2));
@@ -111,14 +111,14 @@ TEST(AgreementWithOpenCv, EurocImages) {
   const Camera& camera = *rig->find_camera(pair.left);
   const auto plan = plan_rectification(camera, *rig->find_camera(pair.right), rig->right_from_left(pair), "euroc");
   ASSERT_TRUE(plan);
-  const auto picture = read_gray8(std::filesystem::directory_iterator(folder + "/cam0/data")->path().string());
-  ASSERT_TRUE(picture);
+  const auto image = read_gray8(std::filesystem::directory_iterator(folder + "/cam0/data")->path().string());
+  ASSERT_TRUE(image);
   const RemapTable table(camera.model, camera.size, plan->geometry, plan->left_from_rectified, {}, Workers(1));
   Image<std::uint8_t> ours(plan->geometry.size);
-  table.apply(*picture, ours, Workers(1));
+  table.apply(*image, ours, Workers(1));
   const OpenCvMaps maps = opencv_maps(camera, plan->geometry, plan->left_from_rectified);
   cv::Mat theirs;
-  cv::remap(as_mat(*picture), theirs, maps.x, maps.y, cv::INTER_LINEAR);
+  cv::remap(as_mat(*image), theirs, maps.x, maps.y, cv::INTER_LINEAR);
   double sum = 0;
   int count = 0;
   for (int y = 0; y < ours.height(); ++y) {
@@ -129,20 +129,19 @@ TEST(AgreementWithOpenCv, EurocImages) {
     }
   }
   fmt::print("euroc_v101: mean difference from cv::remap {:.3f} gray levels\n", sum / count);
-  EXPECT_LT(sum / count, 0.5);  // cv::remap knows 1/32 px only
+  EXPECT_LT(sum / count, 0.5);  // cv::remap has a resolution of 1/32 px
 }
 
 using Corners = std::vector<cv::Point2f>;
 const cv::Size kBoard(9, 6);
 constexpr double kSquare_m = 0.025;
 
-std::optional<Corners> find_corners(const cv::Mat& picture) {
+std::optional<Corners> find_corners(const cv::Mat& image) {
   Corners corners;
-  if (!cv::findChessboardCorners(picture, kBoard, corners,
-                                 cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE)) {
+  if (!cv::findChessboardCorners(image, kBoard, corners, cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return std::nullopt;
   }
-  cv::cornerSubPix(picture, corners, {5, 5}, {-1, -1}, {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-3});
+  cv::cornerSubPix(image, corners, {5, 5}, {-1, -1}, {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-3});
   return corners;
 }
 

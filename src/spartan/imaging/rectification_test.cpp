@@ -25,11 +25,11 @@ Camera distorted(double focal_px = 500) {
   return camera_with(RadialTangentialModel({focal_px, focal_px + 2, 325, 236}, {-0.28, 0.07, 2e-4, 3e-5}));
 }
 
-Pose right_eye_at(const Eigen::Vector3d& place, const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
-  return Pose(exp_so3(turn), place).inverse();
+Pose right_camera_at(const Eigen::Vector3d& position, const Eigen::Vector3d& rotation = Eigen::Vector3d::Zero()) {
+  return Pose(exp_so3(rotation), position).inverse();
 }
 
-// Where the rectified views see a point of the left camera's frame.
+// Pixels of a point of the left camera frame in both rectified views.
 struct Views {
   Eigen::Vector2d left, right;
 };
@@ -39,17 +39,17 @@ Views view(const Rectification& plan, const Pose& right_from_left, const Eigen::
           seen(plan.right_from_rectified.transpose() * (right_from_left * point))};
 }
 
-RC_GTEST_PROP(Rectification, PutsEveryPointOnOneRowWithTheDisparityOfItsDepth, (std::uint64_t seed)) {
+RC_GTEST_PROP(Rectification, PointsHaveEqualRowsAndTheDisparityOfTheirDepth, (std::uint64_t seed)) {
   Random random(seed);
-  const auto shake = [&](double size) {
+  const auto perturbation = [&](double size) {
     return Eigen::Vector3d(random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size));
   };
-  // The baseline stays more along x than along y or z: anything else is refused, rightly.
-  const Eigen::Vector3d place = Eigen::Vector3d(random.uniform(0.05, 0.6), 0, 0) + shake(0.02);
-  const Pose right_from_left = right_eye_at(place, shake(0.15));
+  // The baseline stays mainly along x; others are rejected.
+  const Eigen::Vector3d position = Eigen::Vector3d(random.uniform(0.05, 0.6), 0, 0) + perturbation(0.02);
+  const Pose right_from_left = right_camera_at(position, perturbation(0.15));
   const auto plan = plan_rectification(distorted(500), distorted(510), right_from_left, "pair");
   if (!plan) RC_FAIL(plan.error().message());
-  RC_ASSERT(!plan->passes_through);
+  RC_ASSERT(!plan->is_identity);
   RC_ASSERT(is_rotation(plan->left_from_rectified, 1e-9));
   RC_ASSERT(is_rotation(plan->right_from_rectified, 1e-9));
   for (int i = 0; i < 20; ++i) {
@@ -57,13 +57,13 @@ RC_GTEST_PROP(Rectification, PutsEveryPointOnOneRowWithTheDisparityOfItsDepth, (
     const Views views = view(*plan, right_from_left, point);
     const double depth = (plan->left_from_rectified.transpose() * point).z();
     RC_ASSERT(std::abs(views.left.y() - views.right.y()) < 1e-8);
-    const double disparity = plan->geometry.focal_px * place.norm() / depth;
+    const double disparity = plan->geometry.focal_px * position.norm() / depth;
     RC_ASSERT(std::abs(views.left.x() - views.right.x() - disparity) < 1e-8);
   }
 }
 
-TEST(Rectification, TurnsBothEyesEquallyAndKeepsResolutionAndCentre) {
-  const auto plan = plan_rectification(distorted(), distorted(), right_eye_at({0.1, 0, 0}, {0.06, 0, 0}), "pair");
+TEST(Rectification, RotatesBothCamerasEquallyAndKeepsResolutionAndCentre) {
+  const auto plan = plan_rectification(distorted(), distorted(), right_camera_at({0.1, 0, 0}, {0.06, 0, 0}), "pair");
   ASSERT_TRUE(plan);
   const auto angle = [](const Eigen::Matrix3d& r) { return log_so3(Eigen::Quaterniond(r)).norm(); };
   EXPECT_NEAR(angle(plan->left_from_rectified), 0.03, 1e-6);
@@ -73,42 +73,42 @@ TEST(Rectification, TurnsBothEyesEquallyAndKeepsResolutionAndCentre) {
   EXPECT_EQ(plan->geometry.size, (ImageSize{640, 480}));
 }
 
-TEST(Rectification, PairsThatAreRectifiedPassThrough) {
+TEST(Rectification, RectifiedPairsGiveTheIdentity) {
   const Camera pinhole = camera_with(PinholeModel{500, 500, 310, 245});
-  const auto plan = plan_rectification(pinhole, pinhole, right_eye_at({0.1, 0, 0}), "pair");
+  const auto plan = plan_rectification(pinhole, pinhole, right_camera_at({0.1, 0, 0}), "pair");
   ASSERT_TRUE(plan);
-  EXPECT_TRUE(plan->passes_through);
+  EXPECT_TRUE(plan->is_identity);
   EXPECT_EQ(plan->geometry, (RectifiedStereo{{640, 480}, 500, {310, 245}, 0.1}));
-  // Distortion coefficients that are all zero make a pinhole too.
+  // Zero distortion coefficients also make a pinhole.
   const Camera undistorted = camera_with(RadialTangentialModel({500, 500, 310, 245}, {}));
-  EXPECT_TRUE(plan_rectification(undistorted, pinhole, right_eye_at({0.1, 0, 0}), "pair")->passes_through);
+  EXPECT_TRUE(plan_rectification(undistorted, pinhole, right_camera_at({0.1, 0, 0}), "pair")->is_identity);
 
   const auto needs_work = [&](const Camera& left, const Camera& right, const Pose& pose) {
     const auto made = plan_rectification(left, right, pose, "pair");
-    return made && !made->passes_through;
+    return made && !made->is_identity;
   };
-  const Pose straight = right_eye_at({0.1, 0, 0});
+  const Pose straight = right_camera_at({0.1, 0, 0});
   EXPECT_TRUE(needs_work(pinhole, camera_with(PinholeModel{501, 501, 310, 245}), straight));
   EXPECT_TRUE(needs_work(pinhole, camera_with(PinholeModel{500, 500, 310, 245.1}), straight));
   EXPECT_TRUE(needs_work(camera_with(PinholeModel{500, 502, 310, 245}), camera_with(PinholeModel{500, 502, 310, 245}),
                          straight));
-  EXPECT_TRUE(needs_work(pinhole, pinhole, right_eye_at({0.1, 0, 0}, {0, 1e-3, 0})));
-  EXPECT_TRUE(needs_work(pinhole, pinhole, right_eye_at({0.1, 1e-3, 0})));
+  EXPECT_TRUE(needs_work(pinhole, pinhole, right_camera_at({0.1, 0, 0}, {0, 1e-3, 0})));
+  EXPECT_TRUE(needs_work(pinhole, pinhole, right_camera_at({0.1, 1e-3, 0})));
 }
 
-TEST(Rectification, RefusesWhatIsNoPairOfEyesSideBySide) {
-  const auto refusal = [](const Pose& pose) {
+TEST(Rectification, RejectsPairsThatAreNotSideBySide) {
+  const auto rejection = [](const Pose& pose) {
     const auto plan = plan_rectification(distorted(), distorted(), pose, "rig.yaml: pairs.front");
     EXPECT_FALSE(plan);
     if (plan) return std::string();
     EXPECT_EQ(plan.error().code, ErrorCode::configuration);
     return plan.error().message();
   };
-  EXPECT_THAT(refusal(right_eye_at({0.02, 0.1, 0})), HasSubstr("more vertical than horizontal"));
-  EXPECT_THAT(refusal(right_eye_at({-0.1, 0, 0})), HasSubstr("swapped"));
-  EXPECT_THAT(refusal(right_eye_at({0.02, 0, 0.1})), HasSubstr("behind each other"));
-  EXPECT_THAT(refusal(right_eye_at({0.1, 0, 0}, {0, 1.3, 0})), HasSubstr("look apart"));
-  EXPECT_THAT(refusal(right_eye_at({-0.1, 0, 0})), HasSubstr("pairs.front"));
+  EXPECT_THAT(rejection(right_camera_at({0.02, 0.1, 0})), HasSubstr("more vertical than horizontal"));
+  EXPECT_THAT(rejection(right_camera_at({-0.1, 0, 0})), HasSubstr("swapped"));
+  EXPECT_THAT(rejection(right_camera_at({0.02, 0, 0.1})), HasSubstr("behind each other"));
+  EXPECT_THAT(rejection(right_camera_at({0.1, 0, 0}, {0, 1.3, 0})), HasSubstr("optical axes differ"));
+  EXPECT_THAT(rejection(right_camera_at({-0.1, 0, 0})), HasSubstr("pairs.front"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What imaging hands to reconstruction and odometry.
+// A rectified stereo pair: output of imaging, input of reconstruction and odometry.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +13,17 @@
 
 namespace spartan {
 
-/// Two images with common rows, 8-bit gray after the contrast stage. The views borrow the buffers of whoever made
-/// the pair (an `Imager` keeps them until its next frame).
+/// Two rectified images with common rows, 8-bit gray after the contrast step. The views borrow the buffers of their
+/// producer (an `Imager` keeps them until its next frame of the pair).
 struct RectifiedPair {
   std::string pair;
   Stamp stamp;  ///< of the left image
   RectifiedStereo geometry;
   ImageView<const std::uint8_t> left, right;
-  /// 255 where a camera has really looked and does not see the rover itself; empty: everywhere.
+  /// 255 where the pixel is inside the sensor and outside the self-mask, else 0; empty: valid everywhere.
   ImageView<const std::uint8_t> left_mask, right_mask;
-  std::vector<StageTime> times;  ///< "imaging.debayer" …, of what was done; for reports only
-  Pose body_from_left;           ///< rectified left optical frame at this shot's pan and tilt
+  std::vector<StageTime> times;  ///< durations of the steps ("imaging.debayer" …), for reports only
+  Pose body_from_left;           ///< pose of the rectified left optical frame at the pan and tilt of this frame
 };
 
 }  // namespace spartan

@@ -16,10 +16,10 @@ using remap::Cell;
 using remap::kBlock;
 using remap::kCell;
 using remap::kOne;
-using remap::Place;
+using remap::SourcePixel;
 
-constexpr int kRowsPerPart = 16;
-constexpr int kRowsAhead = 4;  // the memory has their time to bring the source
+constexpr int kRowsPerPart = 16;  // rows per task; does not affect results
+constexpr int kPrefetchRows = 4;  // rows between prefetch and use of the source pixels; empirical
 
 template <class Pixel>
 auto kernel_of(const remap::Kernels& kernels) {
@@ -46,15 +46,16 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
   if (!self_mask.empty() && self_mask.size() != source_size) {
     throw std::invalid_argument("RemapTable: the self-mask has another size than the source");
   }
-  // A place beside the border by no more than places are rounded lies on it: else rounding errors would mask borders.
+  // Positions outside the sensor by no more than the rounding error are moved to its border; otherwise rounding errors
+  // would mask border rows and columns.
   const Eigen::Vector2d last(source_size.width - 1, source_size.height - 1);
-  const auto on_sensor = [&](const Eigen::Vector2d& place) -> std::optional<Eigen::Vector2d> {
-    constexpr double kBeside = 0.5 / kOne;
-    const Eigen::Vector2d nearest = place.cwiseMax(0).cwiseMin(last);
-    if (!((place - nearest).array().abs() <= kBeside).all()) return std::nullopt;
+  const auto on_sensor = [&](const Eigen::Vector2d& pixel) -> std::optional<Eigen::Vector2d> {
+    constexpr double kRounding = 0.5 / kOne;
+    const Eigen::Vector2d nearest = pixel.cwiseMax(0).cwiseMin(last);
+    if (!((pixel - nearest).array().abs() <= kRounding).all()) return std::nullopt;
     return nearest;
   };
-  const auto masked = [&](Place p) {
+  const auto masked = [&](SourcePixel p) {
     const int below = std::min(p.y + 1, source_size.height - 1);
     return !self_mask.empty() && (self_mask(p.x, p.y) == 0 || self_mask(p.x + 1, p.y) == 0 ||
                                   self_mask(p.x, below) == 0 || self_mask(p.x + 1, below) == 0);
@@ -67,13 +68,13 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
         for (int i = 0, x = left; i < kCell && x < view.size.width; ++i, ++x) {
           const Eigen::Vector3d direction((x - view.centre_px.x()) / view.focal_px,
                                           (y - view.centre_px.y()) / view.focal_px, 1);
-          const auto place = project(camera, camera_from_rectified * (depth_m * direction));
+          const auto pixel = project(camera, camera_from_rectified * (depth_m * direction));
           Entry& entry = entries[static_cast<std::size_t>(i)];
-          const auto seen = place ? on_sensor(*place) : std::nullopt;
-          if (seen) entry = entry_of(*seen);
-          entry.seen = entry.seen && !masked(entry.place);
-          mask_(x, y) = entry.seen ? 255 : 0;
-          if (!entry.seen) all_valid = false;
+          const auto inside = pixel ? on_sensor(*pixel) : std::nullopt;
+          if (inside) entry = to_entry(*inside);
+          entry.valid = entry.valid && !masked(entry.pixel);
+          mask_(x, y) = entry.valid ? 255 : 0;
+          if (!entry.valid) all_valid = false;
         }
         for (int i = 0; i < kCell; i += kBlock) {
           store_block(left + i, y, std::span(entries).subspan(static_cast<std::size_t>(i), kBlock));
@@ -84,10 +85,10 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
   all_valid_ = all_valid;
 }
 
-RemapTable::Entry RemapTable::entry_of(const Eigen::Vector2d& place) const {
-  const int fixed_x = static_cast<int>(std::lround(place.x() * kOne));
-  const int fixed_y = static_cast<int>(std::lround(place.y() * kOne));
-  // The last column is the whole way from the one before: the neighbour then always exists.
+RemapTable::Entry RemapTable::to_entry(const Eigen::Vector2d& pixel) const {
+  const int fixed_x = static_cast<int>(std::lround(pixel.x() * kOne));
+  const int fixed_y = static_cast<int>(std::lround(pixel.y() * kOne));
+  // The last column is expressed as the one before it with fraction 1, so that the right neighbour always exists.
   const int x = std::min(fixed_x / kOne, source_size_.width - 2), y = fixed_y / kOne;
   return {{static_cast<std::int16_t>(x), static_cast<std::int16_t>(y)},
           static_cast<std::uint8_t>(fixed_x - x * kOne),
@@ -98,46 +99,47 @@ RemapTable::Entry RemapTable::entry_of(const Eigen::Vector2d& place) const {
 void RemapTable::store_block(int x, int y, std::span<const Entry> entries) {
   int left = source_size_.width, right = -1, first = source_size_.height, last = -1;
   for (const Entry& e : entries) {
-    if (!e.seen) continue;
-    left = std::min<int>(left, e.place.x);
-    right = std::max<int>(right, e.place.x);
-    first = std::min<int>(first, e.place.y);
-    last = std::max<int>(last, e.place.y);
+    if (!e.valid) continue;
+    left = std::min<int>(left, e.pixel.x);
+    right = std::max<int>(right, e.pixel.x);
+    first = std::min<int>(first, e.pixel.y);
+    last = std::max<int>(last, e.pixel.y);
   }
   const bool any = right >= 0;
-  // Every load stays inside its row.
+  // Loads of 16 bytes must stay inside the row.
   const int corner_x = any ? std::clamp(left, 0, std::max(0, source_size_.width - remap::kLoad)) : 0;
   const int corner_y = any ? first : 0;
-  const bool scattered =
-      source_size_.width < remap::kLoad || right - corner_x > remap::kLoad - 2 || last - corner_y > remap::kLargestStep;
+  const bool scattered = source_size_.width < remap::kLoad || right - corner_x > remap::kLoad - 2 ||
+                         last - corner_y > remap::kMaxRowOffset;
   Cell& cell = cells_(x / kCell, y);
   const int block = x % kCell / kBlock;
   cell.corners[block] = {static_cast<std::int16_t>(corner_x), static_cast<std::int16_t>(corner_y)};
   cell.kinds[block] = scattered ? remap::kScattered : static_cast<std::uint8_t>(std::max(0, last - corner_y - 1));
-  Scattered far{x, {}};
+  Scattered block_entry{x, {}};
   for (int i = 0; i < kBlock; ++i) {
     const Entry& e = entries[static_cast<std::size_t>(i)];
     const int at = x % kCell + i;
-    const int code = scattered ? 0 : 16 * (e.place.y - corner_y) + e.place.x - corner_x;
-    cell.codes[at] = e.seen ? static_cast<std::uint8_t>(code) : remap::kUnseen;
-    cell.part_x[at] = e.part_x;
-    cell.part_y[at] = e.part_y;
-    far.places[static_cast<std::size_t>(i)] = e.place;
+    const int code = scattered ? 0 : 16 * (e.pixel.y - corner_y) + e.pixel.x - corner_x;
+    cell.codes[at] = e.valid ? static_cast<std::uint8_t>(code) : remap::kInvalid;
+    cell.fraction_x[at] = e.fraction_x;
+    cell.fraction_y[at] = e.fraction_y;
+    block_entry.pixels[static_cast<std::size_t>(i)] = e.pixel;
   }
-  if (scattered) scattered_[static_cast<std::size_t>(y)].push_back(far);
+  if (scattered) scattered_[static_cast<std::size_t>(y)].push_back(block_entry);
 }
 
 Eigen::Vector2d RemapTable::source_of(int x, int y) const {
   const Cell& cell = cells_(x / kCell, y);
   const int at = x % kCell, block = at / kBlock;
-  Place place = remap::place_of(cell, at);
+  SourcePixel pixel = remap::source_pixel(cell, at);
   if (cell.kinds[block] == remap::kScattered) {
-    const auto& far = scattered_[static_cast<std::size_t>(y)];
-    place = std::find_if(far.begin(), far.end(), [&](const Scattered& s) {
+    const auto& row_entries = scattered_[static_cast<std::size_t>(y)];
+    pixel = std::find_if(row_entries.begin(), row_entries.end(), [&](const Scattered& s) {
               return s.x == x / kBlock * kBlock;
-            })->places[static_cast<std::size_t>(x % kBlock)];
+            })->pixels[static_cast<std::size_t>(x % kBlock)];
   }
-  return {place.x + cell.part_x[at] / static_cast<double>(kOne), place.y + cell.part_y[at] / static_cast<double>(kOne)};
+  return {pixel.x + cell.fraction_x[at] / static_cast<double>(kOne),
+          pixel.y + cell.fraction_y[at] / static_cast<double>(kOne)};
 }
 
 std::size_t RemapTable::bytes() const {
@@ -155,15 +157,15 @@ void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> resul
     const remap::Source<Pixel> from{source.data(), source.stride(), source.width(), source.height()};
     for (int y = begin; y < end; ++y) {
       Pixel* const out = result.row(y);
-      const Cell* const ahead = cells_.row(std::min(y + kRowsAhead, result.height() - 1));
-      kernel_of<Pixel>(kernels_)(cells_.row(y), ahead, size().width, from, out);
-      for (const Scattered& far : scattered_[static_cast<std::size_t>(y)]) {
-        for (int i = 0; i < kBlock && far.x + i < size().width; ++i) {
-          const Cell& cell = cells_(far.x / kCell, y);
-          const int at = far.x % kCell + i;
-          if (cell.codes[at] == remap::kUnseen) continue;
-          out[far.x + i] =
-              remap::sample(from, far.places[static_cast<std::size_t>(i)], cell.part_x[at], cell.part_y[at]);
+      const Cell* const prefetched = cells_.row(std::min(y + kPrefetchRows, result.height() - 1));
+      kernel_of<Pixel>(kernels_)(cells_.row(y), prefetched, size().width, from, out);
+      for (const Scattered& block_entry : scattered_[static_cast<std::size_t>(y)]) {
+        for (int i = 0; i < kBlock && block_entry.x + i < size().width; ++i) {
+          const Cell& cell = cells_(block_entry.x / kCell, y);
+          const int at = block_entry.x % kCell + i;
+          if (cell.codes[at] == remap::kInvalid) continue;
+          out[block_entry.x + i] = remap::sample(from, block_entry.pixels[static_cast<std::size_t>(i)],
+                                                 cell.fraction_x[at], cell.fraction_y[at]);
         }
       }
     }

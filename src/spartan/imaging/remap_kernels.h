@@ -1,8 +1,8 @@
-// The inner loop of the rectification, one version per instruction set.
+// The inner loop of the rectification, compiled once per instruction set.
 //
-// Neighbours in the rectified view look at neighbours in the source. So eight pixels of a row share a block: they are
-// fetched by one 16-byte load a source row and a byte shuffle, where a gather would take sixteen loads. That is for
-// gray of 8 bits; of the other kinds of pixels a load brings two neighbours with all their channels.
+// Neighbouring pixels of the rectified view have neighbouring source positions. Eight pixels of a row form a block: one
+// 16-byte load per source row and a byte shuffle fetch their samples, where a gather would take sixteen loads. This
+// applies to 8-bit gray. For the other pixel types one load fetches two neighbouring pixels with all their channels.
 #pragma once
 
 #include <cstddef>
@@ -15,26 +15,26 @@ namespace spartan::remap {
 inline constexpr int kFractionBits = 7;
 inline constexpr int kOne = 1 << kFractionBits;
 inline constexpr int kBlock = 8;                 ///< pixels
-inline constexpr int kLoad = 16;                 ///< bytes of a source row that a block may look at
-inline constexpr int kBlocks = 4;                ///< of a cell
+inline constexpr int kLoad = 16;                 ///< bytes of a source row that a block may read
+inline constexpr int kBlocks = 4;                ///< in a cell
 inline constexpr int kCell = kBlocks * kBlock;   ///< pixels
-inline constexpr int kLargestStep = 7;           ///< rows between the first and the last that a block's pixels start on
-inline constexpr std::uint8_t kUnseen = 0x80;    ///< code of a pixel without a place
-inline constexpr std::uint8_t kScattered = 255;  ///< kind of a block whose pixels look further apart
+inline constexpr int kMaxRowOffset = 7;          ///< largest difference of the top source rows of the pixels of a block
+inline constexpr std::uint8_t kInvalid = 0x80;   ///< code of an invalid pixel
+inline constexpr std::uint8_t kScattered = 255;  ///< kind of a block whose source pixels are further apart
 
-/// A place in the source, px.
-struct Place {
+/// Integer coordinates in the source image, px.
+struct SourcePixel {
   std::int16_t x, y;
 };
 
-/// 32 pixels of a row of the table: 128 bytes, two cache lines. A pixel looks at (x, y), (x + 1, y), (x, y + 1) and (x
-/// + 1, y + 1), where the last source row also stands for the one below it.
+/// 32 pixels of a table row: 128 bytes, two cache lines. A pixel is interpolated between the source pixels (x, y),
+/// (x + 1, y), (x, y + 1) and (x + 1, y + 1); below the last source row that row is repeated.
 struct Cell {
-  std::uint8_t codes[kCell];   ///< kUnseen, or 16 · (y − corner.y) + (x − corner.x); 0 in scattered blocks
-  std::uint8_t part_x[kCell];  ///< how far beyond x, in 1/128 px (128 at the last column)
-  std::uint8_t part_y[kCell];  ///< how far beyond y, below 128
-  Place corners[kBlocks];
-  std::uint8_t kinds[kBlocks];  ///< source rows beyond three that the block needs, or kScattered
+  std::uint8_t codes[kCell];       ///< kInvalid, or 16 · (y − corner.y) + (x − corner.x); 0 in scattered blocks
+  std::uint8_t fraction_x[kCell];  ///< fraction of the column in 1/128 px (128 at the last column)
+  std::uint8_t fraction_y[kCell];  ///< fraction of the row in 1/128 px, < 128
+  SourcePixel corners[kBlocks];
+  std::uint8_t kinds[kBlocks];  ///< source rows that the block needs minus 3, or kScattered
   std::uint8_t unused[12];
 };
 
@@ -45,50 +45,53 @@ struct Source {
   int width, height;
 };
 
-/// From four samples:
-///   top = 128 s00 + part_x (s10 − s00), bottom likewise, level = top + round(part_y (bottom − top) / 128),
-/// and that by 128, rounded: at most 0.504 from the exact value between the samples.
-inline std::int32_t interpolate(std::int32_t s00, std::int32_t s10, std::int32_t s01, std::int32_t s11, int part_x,
-                                int part_y) {
+/// Bilinear interpolation between four samples:
+///   top = 128 s00 + fraction_x (s10 − s00), bottom likewise, level = top + round(fraction_y (bottom − top) / 128),
+/// divided by 128 and rounded: at most 0.504 from the exact bilinear value.
+inline std::int32_t interpolate(std::int32_t s00, std::int32_t s10, std::int32_t s01, std::int32_t s11, int fraction_x,
+                                int fraction_y) {
   constexpr int kHalf = kOne / 2;
-  const std::int32_t top = kOne * s00 + part_x * (s10 - s00), bottom = kOne * s01 + part_x * (s11 - s01);
-  return (top + ((part_y * (bottom - top) + kHalf) >> kFractionBits) + kHalf) >> kFractionBits;
+  const std::int32_t top = kOne * s00 + fraction_x * (s10 - s00), bottom = kOne * s01 + fraction_x * (s11 - s01);
+  return (top + ((fraction_y * (bottom - top) + kHalf) >> kFractionBits) + kHalf) >> kFractionBits;
 }
 
 template <class T>
-T between(const T& s00, const T& s10, const T& s01, const T& s11, int part_x, int part_y) {
-  return static_cast<T>(interpolate(s00, s10, s01, s11, part_x, part_y));
+T between(const T& s00, const T& s10, const T& s01, const T& s11, int fraction_x, int fraction_y) {
+  return static_cast<T>(interpolate(s00, s10, s01, s11, fraction_x, fraction_y));
 }
 template <class T>
-Rgb<T> between(const Rgb<T>& s00, const Rgb<T>& s10, const Rgb<T>& s01, const Rgb<T>& s11, int part_x, int part_y) {
-  return {between(s00.r, s10.r, s01.r, s11.r, part_x, part_y), between(s00.g, s10.g, s01.g, s11.g, part_x, part_y),
-          between(s00.b, s10.b, s01.b, s11.b, part_x, part_y)};
+Rgb<T> between(const Rgb<T>& s00, const Rgb<T>& s10, const Rgb<T>& s01, const Rgb<T>& s11, int fraction_x,
+               int fraction_y) {
+  return {between(s00.r, s10.r, s01.r, s11.r, fraction_x, fraction_y),
+          between(s00.g, s10.g, s01.g, s11.g, fraction_x, fraction_y),
+          between(s00.b, s10.b, s01.b, s11.b, fraction_x, fraction_y)};
 }
 
-/// The plain way: between the four samples at a place.
+/// Scalar reference: interpolates at a source pixel.
 template <class Pixel>
-Pixel sample(const Source<Pixel>& source, Place place, int part_x, int part_y) {
-  const Pixel* const p = source.data + place.y * source.stride + place.x;
-  const Pixel* const q = place.y + 1 < source.height ? p + source.stride : p;
-  return between(p[0], p[1], q[0], q[1], part_x, part_y);
+Pixel sample(const Source<Pixel>& source, SourcePixel at, int fraction_x, int fraction_y) {
+  const Pixel* const p = source.data + at.y * source.stride + at.x;
+  const Pixel* const q = at.y + 1 < source.height ? p + source.stride : p;
+  return between(p[0], p[1], q[0], q[1], fraction_x, fraction_y);
 }
 
-/// Of a pixel that is seen and not in a scattered block.
-inline Place place_of(const Cell& cell, int at) {
-  const Place corner = cell.corners[at / kBlock];
+/// Top-left source pixel of a valid pixel in a block that is not scattered.
+inline SourcePixel source_pixel(const Cell& cell, int at) {
+  const SourcePixel corner = cell.corners[at / kBlock];
   return {static_cast<std::int16_t>(corner.x + (cell.codes[at] & 15)),
           static_cast<std::int16_t>(corner.y + (cell.codes[at] >> 4))};
 }
 
-/// Fill `width` pixels of a row of the result from the cells of the table's row; those of scattered blocks become 0.
-/// `ahead`: the cells of a row that comes soon, whose source is asked of the memory meanwhile. A view that is turned
-/// goes from source row to source row, which the processor does not foresee.
+/// Compute `width` pixels of a result row from the cells of the table row; pixels of scattered blocks become 0.
+/// `prefetched`: cells of a later row, whose source pixels are prefetched. A rotated view crosses source rows, which
+/// the hardware prefetcher does not predict.
 struct Kernels {
-  void (*gray8)(const Cell* cells, const Cell* ahead, int width, const Source<std::uint8_t>& source, std::uint8_t* out);
-  void (*gray16)(const Cell* cells, const Cell* ahead, int width, const Source<std::uint16_t>& source,
+  void (*gray8)(const Cell* cells, const Cell* prefetched, int width, const Source<std::uint8_t>& source,
+                std::uint8_t* out);
+  void (*gray16)(const Cell* cells, const Cell* prefetched, int width, const Source<std::uint16_t>& source,
                  std::uint16_t* out);
-  void (*colour8)(const Cell* cells, const Cell* ahead, int width, const Source<Rgb8>& source, Rgb8* out);
-  void (*colour16)(const Cell* cells, const Cell* ahead, int width, const Source<Rgb16>& source, Rgb16* out);
+  void (*colour8)(const Cell* cells, const Cell* prefetched, int width, const Source<Rgb8>& source, Rgb8* out);
+  void (*colour16)(const Cell* cells, const Cell* prefetched, int width, const Source<Rgb16>& source, Rgb16* out);
 };
 
 /// The kernels of one instruction set; see simd_target_index().

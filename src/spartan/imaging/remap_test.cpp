@@ -25,34 +25,35 @@ RectifiedStereo odd_view() {
 }
 
 template <class Pixel = std::uint8_t>
-Image<Pixel> noise_picture(ImageSize size) {
+Image<Pixel> noise_image(ImageSize size) {
   Random random(1);
-  Image<Pixel> picture(size);
+  Image<Pixel> image(size);
   for (int y = 0; y < size.height; ++y) {
-    auto* const bytes = reinterpret_cast<std::uint8_t*>(picture.row(y));
+    auto* const bytes = reinterpret_cast<std::uint8_t*>(image.row(y));
     for (std::size_t i = 0; i < static_cast<std::size_t>(size.width) * sizeof(Pixel); ++i) {
       bytes[i] = static_cast<std::uint8_t>(random.below(256));
     }
   }
-  return picture;
+  return image;
 }
 
-// The plain reference: where a pixel of the view looks in the camera.
-std::optional<Eigen::Vector2d> place(const RectifiedStereo& view, const Eigen::Matrix3d& turn, int x, int y) {
+// Reference: the exact position of a view pixel in the camera image.
+std::optional<Eigen::Vector2d> exact_position(const RectifiedStereo& view, const Eigen::Matrix3d& rotation, int x,
+                                              int y) {
   const Eigen::Vector3d direction((x - view.centre_px.x()) / view.focal_px, (y - view.centre_px.y()) / view.focal_px,
                                   1);
-  return project(camera(), turn * direction);
+  return project(camera(), rotation * direction);
 }
 
-TEST(RemapTable, HoldsEveryPlaceToAHundredthOfAPixel) {
-  const Eigen::Matrix3d turn = exp_so3({0.02, -0.15, 0.03}).toRotationMatrix();
+TEST(RemapTable, PositionsAreExactToAHundredthOfAPixel) {
+  const Eigen::Matrix3d rotation = exp_so3({0.02, -0.15, 0.03}).toRotationMatrix();
   const RectifiedStereo view = odd_view();
-  const RemapTable table(camera(), kSource, view, turn, {}, Workers(2));
+  const RemapTable table(camera(), kSource, view, rotation, {}, Workers(2));
   ASSERT_FALSE(table.mask().empty());
   int valid = 0;
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {
-      const auto exact = place(view, turn, x, y);
+      const auto exact = exact_position(view, rotation, x, y);
       const bool inside = exact && exact->x() >= 0 && exact->y() >= 0 && exact->x() <= kSource.width - 1 &&
                           exact->y() <= kSource.height - 1;
       ASSERT_EQ(table.mask()(x, y), inside ? 255 : 0) << x << ", " << y;
@@ -64,10 +65,10 @@ TEST(RemapTable, HoldsEveryPlaceToAHundredthOfAPixel) {
   EXPECT_GT(valid, view.size.width * view.size.height / 2);
 }
 
-TEST(RemapTable, InterpolatesAsAPlainReferenceDoes) {
+TEST(RemapTable, InterpolatesBilinearly) {
   const RectifiedStereo view = odd_view();
   const RemapTable table(camera(), kSource, view, Eigen::Matrix3d::Identity(), {}, Workers(1));
-  const auto source = noise_picture(kSource);
+  const auto source = noise_image(kSource);
   Image<std::uint8_t> result(view.size), threaded(view.size);
   table.apply(source, result, Workers(1));
   table.apply(source, threaded, Workers(2));
@@ -91,7 +92,7 @@ TEST(RemapTable, InterpolatesAsAPlainReferenceDoes) {
 
 template <class Pixel>
 void expect_back(const RemapTable& identity) {
-  const auto source = noise_picture<Pixel>(kSource);
+  const auto source = noise_image<Pixel>(kSource);
   Image<Pixel> result(kSource);
   identity.apply(source, result, Workers(1));
   for (int y = 0; y < kSource.height; ++y) {
@@ -99,7 +100,7 @@ void expect_back(const RemapTable& identity) {
   }
 }
 
-TEST(RemapTable, TheIdentityGivesTheImageBackToItsLastPixel) {
+TEST(RemapTable, TheIdentityKeepsAllPixels) {
   const RectifiedStereo view{kSource, 100, {80, 60}, 0.1};
   const RemapTable table(PinholeModel{100, 100, 80, 60}, kSource, view, Eigen::Matrix3d::Identity(), {}, Workers(1));
   EXPECT_TRUE(table.mask().empty());
@@ -109,9 +110,9 @@ TEST(RemapTable, TheIdentityGivesTheImageBackToItsLastPixel) {
   expect_back<Rgb16>(table);
 }
 
-// Focal lengths and centres without an end in binary: places on the border come out a rounding error beside it.
-TEST(RemapTable, RoundingMasksNoBorder) {
-  const auto picture = noise_picture(kSource);
+// Focal lengths and centres without an exact binary form: border positions have rounding errors.
+TEST(RemapTable, RoundingErrorsDoNotMaskTheBorder) {
+  const auto image = noise_image(kSource);
   struct View {
     double focal_px, x, y;
   };
@@ -122,30 +123,30 @@ TEST(RemapTable, RoundingMasksNoBorder) {
                              Workers(1));
       ASSERT_TRUE(table.mask().empty()) << f << ", off by " << off;
       Image<std::uint8_t> result(kSource);
-      table.apply(picture, result, Workers(1));
+      table.apply(image, result, Workers(1));
       for (int j = 0; j < kSource.height; ++j) {
-        for (int i = 0; i < kSource.width; ++i) ASSERT_EQ(result(i, j), picture(i, j)) << i << ", " << j;
+        for (int i = 0; i < kSource.width; ++i) ASSERT_EQ(result(i, j), image(i, j)) << i << ", " << j;
       }
     }
     const RemapTable beside(PinholeModel{f, f, x + 0.005, y}, kSource, view, Eigen::Matrix3d::Identity(), {},
                             Workers(1));
-    EXPECT_EQ(beside.mask()(kSource.width - 1, 7), 0) << "further than a place is rounded";
+    EXPECT_EQ(beside.mask()(kSource.width - 1, 7), 0) << "outside by more than the rounding error";
     EXPECT_EQ(beside.mask()(0, 7), 255);
   }
 }
 
-TEST(RemapTable, WarpsTheSelfMaskAlong) {
+TEST(RemapTable, AppliesTheSelfMask) {
   const RectifiedStereo view{kSource, 100, {80, 60}, 0.1};
   Image<std::uint8_t> self_mask(kSource.width, kSource.height, 255);
   self_mask(50, 40) = 0;
-  // The view stands a quarter of a pixel beside the camera: two of its pixels touch the masked one.
+  // The view is shifted by a quarter of a pixel: two of its pixels touch the masked one.
   const RemapTable table(PinholeModel{100, 100, 80.25, 60}, kSource, view, Eigen::Matrix3d::Identity(), self_mask,
                          Workers(1));
   EXPECT_EQ(table.mask()(49, 40), 0);
   EXPECT_EQ(table.mask()(50, 40), 0);
   EXPECT_EQ(table.mask()(48, 40), 255);
   EXPECT_EQ(table.mask()(51, 40), 255);
-  EXPECT_EQ(table.mask()(159, 40), 0) << "looks past the sensor";
+  EXPECT_EQ(table.mask()(159, 40), 0) << "outside of the sensor";
 }
 
 template <class T>
@@ -157,22 +158,23 @@ std::array<T, 3> channels(const Rgb<T>& colour) {
   return {colour.r, colour.g, colour.b};
 }
 
-// The formula of remap::interpolate once more, straight from the places and with divisions that round down.
+// The formula of remap::interpolate, computed from the positions with divisions that round down.
 template <class Pixel>
-auto plain_sample(ImageView<const Pixel> source, const Eigen::Vector2d& place) {
-  const int x = static_cast<int>(place.x()), y = static_cast<int>(place.y());
-  const auto part_x = static_cast<std::int64_t>((place.x() - x) * 128);
-  const auto part_y = static_cast<std::int64_t>((place.y() - y) * 128);
+auto reference_sample(ImageView<const Pixel> source, const Eigen::Vector2d& position) {
+  const int x = static_cast<int>(position.x()), y = static_cast<int>(position.y());
+  const auto fraction_x = static_cast<std::int64_t>((position.x() - x) * 128);
+  const auto fraction_y = static_cast<std::int64_t>((position.y() - y) * 128);
   auto result = channels(Pixel{});
   for (std::size_t c = 0; c < result.size(); ++c) {
     const auto at = [&](int dx, int dy) {
       const Pixel& pixel = source(std::min(x + dx, source.width() - 1), std::min(y + dy, source.height() - 1));
       return static_cast<std::int64_t>(channels(pixel)[c]);
     };
-    const std::int64_t top = 128 * at(0, 0) + part_x * (at(1, 0) - at(0, 0));
-    const std::int64_t bottom = 128 * at(0, 1) + part_x * (at(1, 1) - at(0, 1));
-    const auto share = static_cast<std::int64_t>(std::floor(static_cast<double>(part_y * (bottom - top) + 64) / 128));
-    result[c] = static_cast<typename decltype(result)::value_type>((top + share + 64) / 128);
+    const std::int64_t top = 128 * at(0, 0) + fraction_x * (at(1, 0) - at(0, 0));
+    const std::int64_t bottom = 128 * at(0, 1) + fraction_x * (at(1, 1) - at(0, 1));
+    const auto weighted =
+        static_cast<std::int64_t>(std::floor(static_cast<double>(fraction_y * (bottom - top) + 64) / 128));
+    result[c] = static_cast<typename decltype(result)::value_type>((top + weighted + 64) / 128);
   }
   return result;
 }
@@ -181,11 +183,11 @@ struct Case {
   const char* what;
   ImageSize source, view;
   double focal_px;
-  Eigen::Vector3d turn;
+  Eigen::Vector3d rotation;
 };
 
-// Smooth ones, steep ones (rows that climb by more than two in a block), ones whose blocks are wider than a load, and
-// sources that are as wide as one or narrower.
+// Smooth views, steep views (more than two source rows in a block), views with blocks wider than a load, and sources as
+// wide as a load or narrower.
 const Case kCases[] = {{"smooth", {160, 120}, {149, 113}, 128, {0.01, -0.02, 0.01}},
                        {"magnified", {160, 120}, {165, 37}, 400, {0, 0, -0.05}},
                        {"steep", {160, 120}, {131, 120}, 130, {0.02, 0.03, 0.6}},
@@ -205,15 +207,15 @@ CameraModel lens_for(const Case& c) {
 
 RemapTable table_for(const Case& c, const std::string& simd, ImageView<const std::uint8_t> self_mask = {}) {
   const RectifiedStereo view{c.view, c.focal_px, {(c.view.width - 1) / 2.0, (c.view.height - 1) / 2.0}, 0.1};
-  return {lens_for(c), c.source, view, exp_so3(c.turn).toRotationMatrix(), self_mask, Workers(2), 1, simd};
+  return {lens_for(c), c.source, view, exp_so3(c.rotation).toRotationMatrix(), self_mask, Workers(2), 1, simd};
 }
 
-// The source has no byte to spare behind its last row, which a sanitizer watches; beside the result lie pixels that are
-// not its own.
+// The source ends with its last row, so that a sanitizer detects reads beyond it; the result is part of a larger image
+// whose other pixels must not change.
 template <class Pixel>
-void expect_plain_formula(const RemapTable& table) {
+void expect_reference_formula(const RemapTable& table) {
   const auto [width, height] = table.source_size();
-  const auto noise = noise_picture<Pixel>({width + 3, height});
+  const auto noise = noise_image<Pixel>({width + 3, height});
   std::vector<Pixel> pixels;
   pixels.reserve(static_cast<std::size_t>((width + 3) * height - 3));
   for (int y = 0; y < height; ++y) {
@@ -232,7 +234,7 @@ void expect_plain_formula(const RemapTable& table) {
         ASSERT_EQ(canvas(x, y), untouched) << x << ", " << y;
       } else if (table.mask().empty() || table.mask()(x, y) == 255) {
         ++seen;
-        ASSERT_EQ(channels(result(x, y)), plain_sample(source, table.source_of(x, y))) << x << ", " << y;
+        ASSERT_EQ(channels(result(x, y)), reference_sample(source, table.source_of(x, y))) << x << ", " << y;
       } else {
         ASSERT_EQ(result(x, y), Pixel{}) << x << ", " << y;
       }
@@ -242,7 +244,7 @@ void expect_plain_formula(const RemapTable& table) {
 }
 
 template <class Pixel>
-void expect_plain_formula_everywhere() {
+void expect_reference_formula_on_every_target() {
   for (const Case& c : kCases) {
     Random random(5);
     Image<std::uint8_t> holes(c.source);
@@ -251,29 +253,29 @@ void expect_plain_formula_everywhere() {
     }
     for (const std::string& simd : available_simd_targets()) {
       SCOPED_TRACE(std::string(c.what) + ", " + simd);
-      expect_plain_formula<Pixel>(table_for(c, simd));
-      expect_plain_formula<Pixel>(table_for(c, simd, holes));
+      expect_reference_formula<Pixel>(table_for(c, simd));
+      expect_reference_formula<Pixel>(table_for(c, simd, holes));
     }
   }
 }
 
-TEST(RemapTable, EveryTargetGivesTheBytesOfThePlainFormula) {
-  expect_plain_formula_everywhere<std::uint8_t>();
+TEST(RemapTable, EveryTargetMatchesTheReference8Bit) {
+  expect_reference_formula_on_every_target<std::uint8_t>();
 }
 
-TEST(RemapTable, EveryTargetGivesTheBytesOfThePlainFormulaOf16Bits) {
-  expect_plain_formula_everywhere<std::uint16_t>();
+TEST(RemapTable, EveryTargetMatchesTheReference16Bit) {
+  expect_reference_formula_on_every_target<std::uint16_t>();
 }
 
-TEST(RemapTable, EveryTargetGivesTheBytesOfThePlainFormulaOfColours) {
-  expect_plain_formula_everywhere<Rgb8>();
+TEST(RemapTable, EveryTargetMatchesTheReferenceRgb8) {
+  expect_reference_formula_on_every_target<Rgb8>();
 }
 
-TEST(RemapTable, EveryTargetGivesTheBytesOfThePlainFormulaOfColoursOf16Bits) {
-  expect_plain_formula_everywhere<Rgb16>();
+TEST(RemapTable, EveryTargetMatchesTheReferenceRgb16) {
+  expect_reference_formula_on_every_target<Rgb16>();
 }
 
-TEST(RemapTable, AConstantPictureStaysConstant) {
+TEST(RemapTable, AConstantImageStaysConstant) {
   for (const Case& c : kCases) {
     const RemapTable table = table_for(c, "auto");
     const Image<Rgb16> source(c.source.width, c.source.height, Rgb16{65535, 1, 40000});
@@ -288,7 +290,7 @@ TEST(RemapTable, AConstantPictureStaysConstant) {
   }
 }
 
-TEST(RemapTable, RefusesOtherSizes) {
+TEST(RemapTable, RejectsOtherSizes) {
   const RemapTable table(camera(), kSource, odd_view(), Eigen::Matrix3d::Identity(), {}, Workers(1));
   Image<std::uint8_t> small(100, 100), result(odd_view().size);
   EXPECT_THROW(table.apply(small, result, Workers(1)), std::invalid_argument);

@@ -1,4 +1,4 @@
-// Which part of a camera's image a rectified view shows.
+// Footprint of the rectified view in the camera image.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +10,8 @@
 
 namespace spartan {
 
-/// 255 where the view shows a pixel of the camera, 0 elsewhere, told for blocks of 8 × 8 pixels by their middle.
-/// `depth_m`: as for a RemapTable.
+/// Mask in camera pixels: 255 where the pixel is inside the rectified view, else 0. Evaluated at the centres of blocks
+/// of 8 × 8 pixels. `depth_m`: as for a RemapTable.
 Image<std::uint8_t> view_footprint(const Camera& camera, const RectifiedStereo& view,
                                    const Eigen::Matrix3d& camera_from_rectified, double depth_m);
 

@@ -14,20 +14,20 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// A power of two: central cameras give the same bits as at depth 1.
+// Depth used for infinity, m. A power of two, so that central cameras give the same bits as at depth 1.
 constexpr double kFar_m = 1 << 20;
-// cos 85°: beyond, a plane would have to be eleven times as wide as far.
-constexpr double kLeastCosine = 0.0871557, kLargestTangent = 11.430052;
-// tan 70°: beyond, a plane stretches what is seen to more than eight times its size.
-constexpr double kFarthestTangent = 2.747477;
+// cos 85° and tan 85°: a plane that shows more has to be wider than 11 times its distance to either side.
+constexpr double kMinCosine = 0.0871557, kMaxTangent = 11.430052;
+// tan 70°: further out a plane magnifies radially by more than a factor of 8 (1 / cos² 70°).
+constexpr double kOutlineTangent = 2.747477;
 
-constexpr const char* kNoCommonView = "the two eyes have no common view";
+constexpr const char* kNoCommonView = "the two cameras have no common view";
 
-/// Points of the view's plane at depth 1 ↔ pixels of one eye.
-class EyeOnPlane {
+/// Maps between points of the view plane at depth 1 and pixels of one camera.
+class PlaneProjection {
  public:
-  EyeOnPlane(const TurnedEye& eye, double depth_m)
-      : camera_(eye.camera), camera_from_rectified_(eye.camera_from_rectified), depth_(depth_m) {}
+  PlaneProjection(const RotatedCamera& camera, double depth_m)
+      : camera_(camera.camera), camera_from_rectified_(camera.camera_from_rectified), depth_(depth_m) {}
 
   bool sees(const Vector2d& point) const {
     const auto pixel = project(camera_.model, camera_from_rectified_ * (depth_ * point.homogeneous()));
@@ -35,9 +35,10 @@ class EyeOnPlane {
            pixel->y() <= camera_.size.height - 1;
   }
 
-  /// Along the edge of the sensor, or of what the model has an answer for inside it. Directions, z not always positive.
+  /// Directions, in the rectified frame, along the edge of the sensor or of the model's domain inside it. z may be
+  /// negative.
   std::vector<Vector3d> outline() const {
-    constexpr int kPerSide = 32;
+    constexpr int kPerSide = 32;  // points per side of the sensor
     const double right = camera_.size.width - 1, bottom = camera_.size.height - 1;
     std::vector<Vector3d> points;
     points.reserve(4 * (kPerSide + 1));
@@ -61,7 +62,8 @@ class EyeOnPlane {
     return (origin + (depth_ - origin.z()) / direction.z() * direction).normalized();
   }
 
-  // The edge of the model's domain on the way from the image's middle to a pixel of its border.
+  // The direction of a border pixel or, by bisection, of the edge of the model's domain on the line from the image
+  // centre.
   std::optional<Vector3d> outermost(const Vector2d& pixel) const {
     if (auto whole = direction_of(pixel)) return whole;
     const Vector2d middle((camera_.size.width - 1) / 2.0, (camera_.size.height - 1) / 2.0);
@@ -81,8 +83,8 @@ class EyeOnPlane {
   double depth_;
 };
 
-struct Eyes {
-  EyeOnPlane left, right;
+struct Cameras {
+  PlaneProjection left, right;
   bool both_see(const Vector2d& point) const { return left.sees(point) && right.sees(point); }
 };
 
@@ -90,19 +92,19 @@ Vector2d middle_of(ImageSize size) {
   return {(size.width - 1) / 2.0, (size.height - 1) / 2.0};
 }
 
-/// Where a direction meets the plane at depth 1; at most 70° from the plane's axis.
+/// The intersection of a direction with the plane at depth 1; clamped to 70° from the optical axis of the view.
 Vector2d on_plane(const Vector3d& direction) {
   const double length = direction.head<2>().norm();
-  if (length < kFarthestTangent * direction.z()) return direction.hnormalized();
-  return direction.head<2>() * (kFarthestTangent / length);
+  if (length < kOutlineTangent * direction.z()) return direction.hnormalized();
+  return direction.head<2>() * (kOutlineTangent / length);
 }
 
-/// The mean of an eye's outline on the plane at depth 1. What lies far from the axis has no more say than what lies at
-/// 70°: a fisheye's picture ends at 84° on one side and 86° on the other, and they are as far apart as 0° and 67°.
-std::optional<Vector2d> mean_outline(const EyeOnPlane& eye) {
+/// The mean of a camera's outline on the plane at depth 1. Directions beyond 70° are clamped; otherwise they dominate
+/// the mean: on the plane the midpoint of 84° on one side and 86° on the other is at 67°.
+std::optional<Vector2d> mean_outline(const PlaneProjection& camera) {
   Vector2d sum = Vector2d::Zero();
   int count = 0;
-  for (const Vector3d& direction : eye.outline()) {
+  for (const Vector3d& direction : camera.outline()) {
     sum += on_plane(direction);
     ++count;
   }
@@ -112,10 +114,10 @@ std::optional<Vector2d> mean_outline(const EyeOnPlane& eye) {
 
 // --- all_valid ---
 
-/// Whether both eyes see every border pixel of a view around `centre` (at depth 1) with this focal length.
-bool border_is_seen(const Eyes& eyes, const Vector2d& centre, double focal_px, ImageSize size, int step) {
+/// Whether both cameras see every `step`-th border pixel of a view around `centre` (at depth 1) with this focal length.
+bool border_is_seen(const Cameras& cameras, const Vector2d& centre, double focal_px, ImageSize size, int step) {
   const Vector2d half = middle_of(size);
-  const auto seen = [&](double x, double y) { return eyes.both_see(centre + (Vector2d(x, y) - half) / focal_px); };
+  const auto seen = [&](double x, double y) { return cameras.both_see(centre + (Vector2d(x, y) - half) / focal_px); };
   const double right = size.width - 1, bottom = size.height - 1;
   for (int x = 0; x < size.width + step; x += step) {
     const double at = std::min<double>(x, right);
@@ -128,73 +130,75 @@ bool border_is_seen(const Eyes& eyes, const Vector2d& centre, double focal_px, I
   return true;
 }
 
-/// The widest view around a centre, as 1 / focal length; 0 where not even the centre is seen.
-double widest_around(const Eyes& eyes, const Vector2d& centre, ImageSize size, double most) {
+/// The widest view around a centre by bisection, as 1 / focal length; 0 where not even the centre is seen.
+double widest_view_around(const Cameras& cameras, const Vector2d& centre, ImageSize size, double max_width) {
   const int step = std::max(1, std::min(size.width, size.height) / 16);
-  if (!eyes.both_see(centre)) return 0;
-  double fits = 0, too_wide = most;
+  if (!cameras.both_see(centre)) return 0;
+  double fits = 0, too_wide = max_width;
+  // 24 bisections: to 2⁻²⁴ of the widest view.
   for (int i = 0; i < 24; ++i) {
     const double width = (fits + too_wide) / 2;
-    (border_is_seen(eyes, centre, 1 / width, size, step) ? fits : too_wide) = width;
+    (border_is_seen(cameras, centre, 1 / width, size, step) ? fits : too_wide) = width;
   }
   return fits;
 }
 
-struct Fit {
+struct CentredView {
   Vector2d centre;
   double width;  ///< 1 / focal length
 };
 
-/// Climbs from `start` to the centre of the largest view by steps along the axes and diagonals that are halved.
-Fit largest_view(const Eyes& eyes, const Vector2d& start, ImageSize size) {
-  const double most = 2 * kLargestTangent / std::max(size.width, size.height);
-  Fit best{start, widest_around(eyes, start, size, most)};
+/// Hill climbing from `start` to the centre of the widest view, by steps along axes and diagonals that are halved.
+CentredView largest_view(const Cameras& cameras, const Vector2d& start, ImageSize size) {
+  const double max_width = 2 * kMaxTangent / std::max(size.width, size.height);
+  CentredView best{start, widest_view_around(cameras, start, size, max_width)};
+  // Steps on the plane at depth 1, from a third of its depth to well below a pixel; at most 20 of each size. Empirical.
   for (double step = 0.3; step > 1e-5; step /= 2) {
-    bool climbs = true;
-    for (int i = 0; climbs && i < 20; ++i) {
-      climbs = false;
-      for (const Vector2d& way : {Vector2d(1, 0), Vector2d(-1, 0), Vector2d(0, 1), Vector2d(0, -1), Vector2d(1, 1),
-                                  Vector2d(1, -1), Vector2d(-1, 1), Vector2d(-1, -1)}) {
-        const Vector2d centre = best.centre + step * way;
-        const double width = widest_around(eyes, centre, size, most);
+    bool improved = true;
+    for (int i = 0; improved && i < 20; ++i) {
+      improved = false;
+      for (const Vector2d& direction : {Vector2d(1, 0), Vector2d(-1, 0), Vector2d(0, 1), Vector2d(0, -1),
+                                        Vector2d(1, 1), Vector2d(1, -1), Vector2d(-1, 1), Vector2d(-1, -1)}) {
+        const Vector2d centre = best.centre + step * direction;
+        const double width = widest_view_around(cameras, centre, size, max_width);
         if (width <= best.width * (1 + 1e-9)) continue;
         best = {centre, width};
-        climbs = true;
+        improved = true;
       }
     }
   }
   return best;
 }
 
-Result<RectifiedStereo> show_what_both_see(const Eyes& eyes, const Vector2d& start, ImageSize size, double focal_px,
-                                           const std::string& where) {
-  const Fit fit = largest_view(eyes, start, size);
-  if (!(fit.width > 0)) return failure(ErrorCode::configuration, kNoCommonView, where);
-  double least = 1 / fit.width;
-  // The search looked at some pixels of the border; all of them decide.
-  while (!border_is_seen(eyes, fit.centre, least, size, 1)) least *= 1.0002;
-  if (focal_px > 0 && focal_px < least) {
+Result<RectifiedStereo> make_all_valid_view(const Cameras& cameras, const Vector2d& start, ImageSize size,
+                                            double focal_px, const std::string& where) {
+  const CentredView best_view = largest_view(cameras, start, size);
+  if (!(best_view.width > 0)) return failure(ErrorCode::configuration, kNoCommonView, where);
+  double min_focal = 1 / best_view.width;
+  // The search sampled the border; now all of its pixels must be seen.
+  while (!border_is_seen(cameras, best_view.centre, min_focal, size, 1)) min_focal *= 1.0002;
+  if (focal_px > 0 && focal_px < min_focal) {
     return failure(ErrorCode::configuration,
-                   fmt::format("a view of {} × {} px with a focal length of {:.6g} px has pixels that an eye does not "
-                               "see; the least focal length is {:.6g} px",
-                               size.width, size.height, focal_px, least),
-                   where, "take a longer focal length, a smaller size, or another policy");
+                   fmt::format("a view of {} × {} px with a focal length of {:.6g} px has pixels that a camera does "
+                               "not see; the shortest focal length is {:.6g} px",
+                               size.width, size.height, focal_px, min_focal),
+                   where, "choose a longer focal length, a smaller size or another policy (imaging.view)");
   }
-  const double focal = focal_px > 0 ? focal_px : least;
-  return RectifiedStereo{size, focal, middle_of(size) - focal * fit.centre, 0};
+  const double focal = focal_px > 0 ? focal_px : min_focal;
+  return RectifiedStereo{size, focal, middle_of(size) - focal * best_view.centre, 0};
 }
 
 // --- whole_view ---
 
-Result<RectifiedStereo> show_what_either_sees(const Eyes& eyes, ImageSize size, double focal_px,
-                                              const std::string& where) {
+Result<RectifiedStereo> make_whole_view(const Cameras& cameras, ImageSize size, double focal_px,
+                                        const std::string& where) {
   Vector2d low(1e9, 1e9), high(-1e9, -1e9);
-  for (const EyeOnPlane* eye : {&eyes.left, &eyes.right}) {
-    for (const Vector3d& direction : eye->outline()) {
-      if (direction.z() < kLeastCosine) {
+  for (const PlaneProjection* camera : {&cameras.left, &cameras.right}) {
+    for (const Vector3d& direction : camera->outline()) {
+      if (direction.z() < kMinCosine) {
         return failure(ErrorCode::configuration,
-                       "an eye sees more than 85° from the view's axis: no plane shows all of it", where,
-                       "take another policy, such as keep_resolution with a shorter focal length");
+                       "a camera sees more than 85° from the optical axis of the view: no plane shows all of it", where,
+                       "choose another policy, such as keep_resolution with a shorter focal length");
       }
       low = low.cwiseMin(direction.hnormalized());
       high = high.cwiseMax(direction.hnormalized());
@@ -202,39 +206,46 @@ Result<RectifiedStereo> show_what_either_sees(const Eyes& eyes, ImageSize size, 
   }
   const Vector2d extent = high - low;
   if (!(extent.minCoeff() > 0)) return failure(ErrorCode::configuration, kNoCommonView, where);
-  const double longest = std::min((size.width - 1) / extent.x(), (size.height - 1) / extent.y());
-  if (focal_px > longest) {
-    return failure(ErrorCode::configuration,
-                   fmt::format("with a focal length of {:.6g} px not all that the eyes see fits into {} × {} px; the "
-                               "longest is {:.6g} px",
-                               focal_px, size.width, size.height, longest),
-                   where, "take a shorter focal length, a larger size, or another policy");
+  const double max_focal = std::min((size.width - 1) / extent.x(), (size.height - 1) / extent.y());
+  if (focal_px > max_focal) {
+    return failure(
+        ErrorCode::configuration,
+        fmt::format("with a focal length of {:.6g} px not all that the cameras see fits into {} × {} px; the "
+                    "longest focal length is {:.6g} px",
+                    focal_px, size.width, size.height, max_focal),
+        where, "choose a shorter focal length, a larger size or another policy (imaging.view)");
   }
-  const double focal = focal_px > 0 ? focal_px : longest;
+  const double focal = focal_px > 0 ? focal_px : max_focal;
   return RectifiedStereo{size, focal, middle_of(size) - focal * (low + high) / 2, 0};
 }
 
-/// What no policy can make a view of. Tables and images of a pair take 12 bytes a pixel of the view.
+/// Rejects sizes and numbers that are invalid for every policy. Tables and images of a pair take 12 bytes per pixel of
+/// the view, 805 MB for the largest.
 Status check_numbers(ImageSize size, const VirtualView& view, const std::string& where) {
   constexpr std::int64_t kLargestArea = 1 << 26;
   if (size.width < 2 || size.height < 2 || std::int64_t{size.width} * size.height > kLargestArea) {
-    return failure(ErrorCode::configuration,
-                   fmt::format("a view of {} × {} px cannot be made: at least 2 × 2 px, at most {} in all", size.width,
-                               size.height, kLargestArea),
-                   where, "choose another size (imaging.view.width_px, height_px)");
+    return failure(
+        ErrorCode::configuration,
+        fmt::format("a view of {} × {} px is impossible: it needs at least 2 × 2 px and at most {} px in total",
+                    size.width, size.height, kLargestArea),
+        where, "choose another size (imaging.view.width_px, height_px)");
   }
   if (!(view.focal_px >= 0) || !std::isfinite(view.focal_px)) {
-    return failure(ErrorCode::configuration, fmt::format("a view has no focal length of {} px", view.focal_px), where);
+    return failure(ErrorCode::configuration,
+                   fmt::format("the focal length {} px of the view is negative or not finite", view.focal_px), where,
+                   "correct imaging.view.focal_px");
   }
   if (!(view.depth_m >= 0) || !std::isfinite(view.depth_m)) {
-    return failure(ErrorCode::configuration, fmt::format("a view has no depth of {} m", view.depth_m), where);
+    return failure(ErrorCode::configuration,
+                   fmt::format("the depth {} m of the view is negative or not finite", view.depth_m), where,
+                   "correct imaging.view.depth_m");
   }
   return {};
 }
 
 }  // namespace
 
-double depth_of(const VirtualView& view) {
+double effective_depth(const VirtualView& view) {
   return view.depth_m > 0 ? view.depth_m : kFar_m;
 }
 
@@ -244,22 +255,22 @@ std::optional<double> resolution_on_axis(const Camera& camera, double depth_m) {
   return depth_m * std::sqrt(std::abs(projection->by_point.leftCols<2>().determinant()));
 }
 
-Result<RectifiedStereo> choose_view(const TurnedEye& left, const TurnedEye& right, const VirtualView& view,
+Result<RectifiedStereo> choose_view(const RotatedCamera& left, const RotatedCamera& right, const VirtualView& view,
                                     const std::string& where) {
-  const double depth = depth_of(view);
-  const Eyes eyes{{left, depth}, {right, depth}};
+  const double depth = effective_depth(view);
+  const Cameras cameras{{left, depth}, {right, depth}};
   const ImageSize size = view.size.empty() ? left.camera.size : view.size;
   if (Status status = check_numbers(size, view, where); !status) return failure(status);
-  if (view.policy == ViewPolicy::whole_view) return show_what_either_sees(eyes, size, view.focal_px, where);
+  if (view.policy == ViewPolicy::whole_view) return make_whole_view(cameras, size, view.focal_px, where);
 
   const auto left_resolution = resolution_on_axis(left.camera, depth);
   const auto right_resolution = resolution_on_axis(right.camera, depth);
   if (!left_resolution || !right_resolution) return failure(ErrorCode::configuration, kNoCommonView, where);
   const double natural_focal = (*left_resolution + *right_resolution) / 2;
-  const auto left_outline = mean_outline(eyes.left), right_outline = mean_outline(eyes.right);
+  const auto left_outline = mean_outline(cameras.left), right_outline = mean_outline(cameras.right);
   if (!left_outline || !right_outline) return failure(ErrorCode::configuration, kNoCommonView, where);
   const Vector2d centre = (*left_outline + *right_outline) / 2;
-  if (view.policy == ViewPolicy::all_valid) return show_what_both_see(eyes, centre, size, view.focal_px, where);
+  if (view.policy == ViewPolicy::all_valid) return make_all_valid_view(cameras, centre, size, view.focal_px, where);
   const double focal = view.focal_px > 0 ? view.focal_px : natural_focal;
   return RectifiedStereo{size, focal, middle_of(size) - focal * centre, 0};
 }

@@ -24,7 +24,7 @@ Camera camera_with(const CameraModel& model) {
   return camera;
 }
 
-// Barrel distortion and an own centre for each eye, one of them turned.
+// Barrel distortion and different principal points; the right camera is rotated.
 const Camera kLeft = camera_with(RadialTangentialModel({125, 126, 82, 57}, {-0.25, 0.06, 2e-4, 3e-5}));
 const Camera kRight = camera_with(RadialTangentialModel({127, 126, 76, 63}, {-0.22, 0.04, -3e-4, 1e-4}));
 const Pose kRightFromLeft = Pose(exp_so3({0.03, -0.04, 0.05}), {0.1, 0.003, -0.002}).inverse();
@@ -33,11 +33,11 @@ Result<Rectification> planned(const VirtualView& view, const Camera& left = kLef
   return plan_rectification(left, right, kRightFromLeft, "pair", view);
 }
 
-RemapTable table_of(const Camera& camera, const Rectification& plan, const Eigen::Matrix3d& turn) {
-  return {camera.model, camera.size, plan.geometry, turn, {}, Workers(2), plan.depth_m};
+RemapTable table_of(const Camera& camera, const Rectification& plan, const Eigen::Matrix3d& rotation) {
+  return {camera.model, camera.size, plan.geometry, rotation, {}, Workers(2), plan.depth_m};
 }
 
-double seen_share(const RemapTable& table) {
+double seen_fraction(const RemapTable& table) {
   const auto mask = table.mask();
   if (mask.empty()) return 1;
   int seen = 0;
@@ -52,7 +52,7 @@ bool all_seen(const Rectification& plan) {
          table_of(kRight, plan, plan.right_from_rectified).mask().empty();
 }
 
-TEST(VirtualView, AllValidHasNoMaskedPixelAndIsTheWidestSuchView) {
+TEST(VirtualView, AllValidIsTheWidestViewWithoutMaskedPixels) {
   for (const ImageSize size : {ImageSize{}, ImageSize{320, 100}, ImageSize{60, 90}}) {
     const auto plan = planned({ViewPolicy::all_valid, size});
     ASSERT_TRUE(plan) << plan.error().message();
@@ -69,7 +69,7 @@ TEST(VirtualView, AllValidHasNoMaskedPixelAndIsTheWidestSuchView) {
   }
 }
 
-TEST(VirtualView, AllValidTakesALongerFocalLengthAndRefusesAShorterOne) {
+TEST(VirtualView, AllValidAcceptsALongerFocalLengthAndRejectsAShorterOne) {
   const double least = planned({ViewPolicy::all_valid})->geometry.focal_px;
   const auto longer = planned({ViewPolicy::all_valid, {}, least * 1.5});
   ASSERT_TRUE(longer);
@@ -78,19 +78,20 @@ TEST(VirtualView, AllValidTakesALongerFocalLengthAndRefusesAShorterOne) {
   const auto shorter = planned({ViewPolicy::all_valid, {}, least * 0.9});
   ASSERT_FALSE(shorter);
   EXPECT_EQ(shorter.error().code, ErrorCode::configuration);
-  EXPECT_THAT(shorter.error().message(), HasSubstr("an eye does not see"));
+  EXPECT_THAT(shorter.error().message(), HasSubstr("a camera does not see"));
 }
 
-TEST(VirtualView, WholeViewHoldsEveryBorderPixelOfBothSensors) {
+TEST(VirtualView, WholeViewContainsEveryBorderPixelOfBothSensors) {
   for (const ImageSize size : {ImageSize{}, ImageSize{400, 240}}) {
     const auto plan = planned({ViewPolicy::whole_view, size});
     ASSERT_TRUE(plan) << plan.error().message();
     const RectifiedStereo& g = plan->geometry;
     double nearest_to_border = 1e9;
-    const auto look = [&](const Camera& camera, const Eigen::Matrix3d& turn, double x, double y) {
-      const Eigen::Vector3d direction = turn.transpose() * unproject(camera.model, {x, y})->direction;
-      const Eigen::Vector3d place = g.project(direction);
-      for (const double inside : {place.x(), place.y(), g.size.width - 1 - place.x(), g.size.height - 1 - place.y()}) {
+    const auto look = [&](const Camera& camera, const Eigen::Matrix3d& rotation, double x, double y) {
+      const Eigen::Vector3d direction = rotation.transpose() * unproject(camera.model, {x, y})->direction;
+      const Eigen::Vector3d position = g.project(direction);
+      for (const double inside :
+           {position.x(), position.y(), g.size.width - 1 - position.x(), g.size.height - 1 - position.y()}) {
         EXPECT_GT(inside, -0.1) << x << ", " << y;
         nearest_to_border = std::min(nearest_to_border, inside);
       }
@@ -107,26 +108,26 @@ TEST(VirtualView, WholeViewHoldsEveryBorderPixelOfBothSensors) {
         look(kRight, plan->right_from_rectified, x, y);
       }
     }
-    EXPECT_LT(nearest_to_border, 0.1) << "no larger than needed";
+    EXPECT_LT(nearest_to_border, 0.1) << "not larger than needed";
   }
 }
 
-TEST(VirtualView, WholeViewOfEqualEyesMasksNothing) {
+TEST(VirtualView, WholeViewOfEqualCamerasMasksNothing) {
   for (const auto& [f, x, y] : {std::array{125.0, 79.5, 59.5}, {125.325, 77.675, 61.275}, {114.6635, 91.80375, 62.1}}) {
-    const Camera eye = camera_with(PinholeModel{f, f, x, y});
-    const auto plan = plan_rectification(eye, eye, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse(), "pair",
-                                         {ViewPolicy::whole_view, kSize});
-    ASSERT_TRUE(plan && !plan->passes_through);
-    EXPECT_TRUE(table_of(eye, *plan, plan->left_from_rectified).mask().empty()) << f;
-    EXPECT_TRUE(table_of(eye, *plan, plan->right_from_rectified).mask().empty()) << f;
+    const Camera camera = camera_with(PinholeModel{f, f, x, y});
+    const auto plan = plan_rectification(camera, camera, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse(),
+                                         "pair", {ViewPolicy::whole_view, kSize});
+    ASSERT_TRUE(plan && !plan->is_identity);
+    EXPECT_TRUE(table_of(camera, *plan, plan->left_from_rectified).mask().empty()) << f;
+    EXPECT_TRUE(table_of(camera, *plan, plan->right_from_rectified).mask().empty()) << f;
   }
 }
 
-TEST(VirtualView, WholeViewRefusesWhatNoPlaneShows) {
+TEST(VirtualView, WholeViewRejectsFieldsOfViewBeyondAPlane) {
   const auto too_long = planned({ViewPolicy::whole_view, {}, 500});
   ASSERT_FALSE(too_long);
   EXPECT_EQ(too_long.error().code, ErrorCode::configuration);
-  EXPECT_THAT(too_long.error().message(), HasSubstr("not all that the eyes see fits"));
+  EXPECT_THAT(too_long.error().message(), HasSubstr("not all that the cameras see fits"));
   const Camera wide = camera_with(PinholeModel{4, 4, 80, 60});  // 87° to the side
   const auto too_wide = planned({ViewPolicy::whole_view}, wide, wide);
   ASSERT_FALSE(too_wide);
@@ -135,8 +136,8 @@ TEST(VirtualView, WholeViewRefusesWhatNoPlaneShows) {
   EXPECT_TRUE(planned({ViewPolicy::keep_resolution}, wide, wide));
 }
 
-TEST(VirtualView, SizesAndNumbersThatMakeNoViewAreRefused) {
-  const auto refusal = [](const VirtualView& view) {
+TEST(VirtualView, RejectsInvalidSizesAndNumbers) {
+  const auto rejection = [](const VirtualView& view) {
     const auto plan = planned(view);
     EXPECT_FALSE(plan) << plan->geometry.focal_px;
     if (plan) return std::string();
@@ -144,19 +145,19 @@ TEST(VirtualView, SizesAndNumbersThatMakeNoViewAreRefused) {
     return plan.error().message();
   };
   for (const ViewPolicy policy : {ViewPolicy::keep_resolution, ViewPolicy::all_valid, ViewPolicy::whole_view}) {
-    EXPECT_THAT(refusal({policy, {1, 100}}), HasSubstr("1 × 100"));
-    EXPECT_THAT(refusal({policy, {100, 1}}), HasSubstr("at least 2 × 2"));
-    EXPECT_THAT(refusal({policy, {32767, 32767}}), HasSubstr("at most 67108864 in all"));
-    EXPECT_THAT(refusal({policy, {}, std::nan("")}), HasSubstr("focal length"));
-    EXPECT_THAT(refusal({policy, {}, -100}), HasSubstr("focal length"));
-    EXPECT_THAT(refusal({policy, {}, 0, std::nan("")}), HasSubstr("depth"));
+    EXPECT_THAT(rejection({policy, {1, 100}}), HasSubstr("1 × 100"));
+    EXPECT_THAT(rejection({policy, {100, 1}}), HasSubstr("at least 2 × 2"));
+    EXPECT_THAT(rejection({policy, {32767, 32767}}), HasSubstr("at most 67108864 px in total"));
+    EXPECT_THAT(rejection({policy, {}, std::nan("")}), HasSubstr("focal length"));
+    EXPECT_THAT(rejection({policy, {}, -100}), HasSubstr("focal length"));
+    EXPECT_THAT(rejection({policy, {}, 0, std::nan("")}), HasSubstr("depth"));
   }
   const Camera pinhole = camera_with(PinholeModel{130, 130, 80, 60});
   const Pose straight = Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse();
   EXPECT_FALSE(plan_rectification(pinhole, pinhole, straight, "pair", {ViewPolicy::all_valid, {}, std::nan("")}));
 }
 
-TEST(VirtualView, AllValidRefusesEyesThatSeeNothingInCommon) {
+TEST(VirtualView, AllValidRejectsCamerasWithoutACommonView) {
   const Camera narrow = camera_with(PinholeModel{5000, 5000, 80, 60});
   const auto plan = plan_rectification(narrow, narrow, Pose(exp_so3({0.2, 0, 0}), {0.1, 0, 0}).inverse(), "pair",
                                        {ViewPolicy::all_valid});
@@ -165,7 +166,7 @@ TEST(VirtualView, AllValidRefusesEyesThatSeeNothingInCommon) {
   EXPECT_THAT(plan.error().message(), HasSubstr("no common view"));
 }
 
-TEST(VirtualView, KeepResolutionTakesSizeAndFocalLengthAsTheyAre) {
+TEST(VirtualView, KeepResolutionUsesTheGivenSizeAndFocalLength) {
   const auto natural = planned({});
   const auto larger = planned({ViewPolicy::keep_resolution, {300, 200}});
   ASSERT_TRUE(natural && larger);
@@ -175,37 +176,37 @@ TEST(VirtualView, KeepResolutionTakesSizeAndFocalLengthAsTheyAre) {
   EXPECT_EQ(planned({ViewPolicy::keep_resolution, {}, 99})->geometry.focal_px, 99);
 }
 
-// An eye that stands before the other one turns the common axes away from where both look.
-TEST(VirtualView, EyesThatLeanTheSameWayKeepTheirView) {
-  struct Leaning {
+// A camera in front of the other one rotates the common axes away from both optical axes.
+TEST(VirtualView, CamerasWithLongitudinalOffsetKeepTheirView) {
+  struct Offset {
     double focal_px, ahead_m;
   };
-  for (const auto& [focal_px, ahead_m] : {Leaning{300, 0.05}, {300, 0.08}, {450, 0.08}, {900, 0.014}, {900, 0.03}}) {
+  for (const auto& [focal_px, ahead_m] : {Offset{300, 0.05}, {300, 0.08}, {450, 0.08}, {900, 0.014}, {900, 0.03}}) {
     SCOPED_TRACE(::testing::Message() << "f " << focal_px << " px, " << ahead_m << " m ahead");
-    const Camera eye = camera_with(PinholeModel{focal_px, focal_px, 79.5, 59.5});
-    const auto plan =
-        plan_rectification(eye, eye, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, ahead_m}).inverse(), "pair", {});
+    const Camera camera = camera_with(PinholeModel{focal_px, focal_px, 79.5, 59.5});
+    const auto plan = plan_rectification(camera, camera,
+                                         Pose(Eigen::Quaterniond::Identity(), {0.1, 0, ahead_m}).inverse(), "pair", {});
     ASSERT_TRUE(plan) << plan.error().message();
-    for (const auto& turn : {plan->left_from_rectified, plan->right_from_rectified}) {
-      EXPECT_GT(seen_share(table_of(eye, *plan, turn)), 0.99);
+    for (const auto& rotation : {plan->left_from_rectified, plan->right_from_rectified}) {
+      EXPECT_GT(seen_fraction(table_of(camera, *plan, rotation)), 0.99);
     }
   }
 }
 
-// A sensor beside its lens' axis, as of a shifted lens or a cut-out picture.
-TEST(VirtualView, APictureBesideItsLensAxisIsShown) {
-  const Camera eye = camera_with(PinholeModel{300, 300, 500, 60});
+// A principal point outside of the image, as of a shifted lens or a cropped image.
+TEST(VirtualView, APrincipalPointOutsideTheImageIsSupported) {
+  const Camera camera = camera_with(PinholeModel{300, 300, 500, 60});
   const auto plan =
-      plan_rectification(eye, eye, Pose(exp_so3({0, 0.01, 0}), {0.1, 0, 0}).inverse(), "pair", VirtualView{});
+      plan_rectification(camera, camera, Pose(exp_so3({0, 0.01, 0}), {0.1, 0, 0}).inverse(), "pair", VirtualView{});
   ASSERT_TRUE(plan) << plan.error().message();
-  EXPECT_GT(seen_share(table_of(eye, *plan, plan->left_from_rectified)), 0.9);
+  EXPECT_GT(seen_fraction(table_of(camera, *plan, plan->left_from_rectified)), 0.9);
 }
 
-TEST(VirtualView, RectifiedImagesPassUnlessAViewIsChosen) {
+TEST(VirtualView, RectifiedImagesPassUnlessSizeOrFocalLengthIsGiven) {
   const Camera pinhole = camera_with(PinholeModel{130, 130, 80, 60});
   const Pose straight = Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse();
   const auto passes = [&](const VirtualView& view) {
-    return plan_rectification(pinhole, pinhole, straight, "pair", view)->passes_through;
+    return plan_rectification(pinhole, pinhole, straight, "pair", view)->is_identity;
   };
   EXPECT_TRUE(passes({ViewPolicy::all_valid}));
   EXPECT_TRUE(passes({ViewPolicy::whole_view}));
