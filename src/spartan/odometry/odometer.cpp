@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
-#include <chrono>
 #include <cmath>
 
+#include "spartan/core/stage_clock.h"
 #include "spartan/odometry/landmark_detector.h"
 #include "spartan/odometry/landmark_matching.h"
 #include "spartan/odometry/landmark_reconstruction.h"
@@ -24,20 +24,6 @@ constexpr double kLostTranslation_m = 1.0, kLostRotation_rad = 0.5;
 constexpr int kMinCoarseInliers = 10;
 /// With fewer inliers inside of the gates, the descriptors are matched over the whole image as well; empirical.
 constexpr int kSufficientCoarseInliers = 30;
-
-class Stopwatch {
- public:
-  /// Milliseconds since the last lap.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-    return ms;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 /// Mean image flow in pixels that a motion causes at the inlier landmarks.
 double mean_flow(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit) {
