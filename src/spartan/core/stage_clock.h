@@ -1,6 +1,7 @@
 // Timing of pipeline stages, for reports only; no result depends on it.
 #pragma once
 
+#include <chrono>
 #include <ctime>
 #include <string>
 #include <utility>
@@ -13,6 +14,21 @@ struct StageTime {
   std::string stage;
   double wall_ms = 0;
   double cpu_ms = 0;  ///< of all threads of the process
+};
+
+/// Wall-clock time between laps.
+class Stopwatch {
+ public:
+  /// Milliseconds since the previous lap, or since construction.
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return ms;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
 /// Measures the times of consecutive stages.

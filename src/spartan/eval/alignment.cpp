@@ -1,7 +1,6 @@
 #include "spartan/eval/alignment.h"
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <stdexcept>
@@ -24,7 +23,7 @@ Eigen::Vector3d mean(const std::vector<Eigen::Vector3d>& points) {
 
 void check_counts(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target) {
   if (source.empty() || source.size() != target.size()) {
-    throw std::invalid_argument("alignment: as many source points as target points are needed, at least one");
+    throw std::invalid_argument("alignment: source and target must have the same number of points, at least one");
   }
 }
 
@@ -45,8 +44,8 @@ std::string_view name_of(Alignment alignment) {
 }
 
 std::optional<Alignment> alignment_named(std::string_view name) {
-  for (const auto& [value, known] : kNames) {
-    if (known == name) return value;
+  for (const auto& [value, known_name] : kNames) {
+    if (known_name == name) return value;
   }
   return std::nullopt;
 }
@@ -54,34 +53,21 @@ std::optional<Alignment> alignment_named(std::string_view name) {
 Similarity fit_similarity(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target,
                           bool with_scale) {
   check_counts(source, target);
-  const Eigen::Vector3d source_mean = mean(source), target_mean = mean(target);  // eq. 34, 35
-  const double share = 1.0 / static_cast<double>(source.size());
-  double source_variance = 0;                            // eq. 36
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // eq. 38
-  for (std::size_t i = 0; i < source.size(); ++i) {
-    source_variance += share * (source[i] - source_mean).squaredNorm();
-    covariance += share * (target[i] - target_mean) * (source[i] - source_mean).transpose();
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs = Eigen::Vector3d::Ones();  // the diagonal of S, eq. 39 and 43
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs.z() = -1;
-  const Eigen::Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();  // eq. 40
-  const bool scale_is_known = with_scale && source_variance > 0;
-  const double scale = scale_is_known ? svd.singularValues().dot(signs) / source_variance : 1.0;  // eq. 42
-  return {scale, Pose(rotation, target_mean - scale * rotation * source_mean)};                   // eq. 41
+  return fit_umeyama(target, source, with_scale ? FitScale::estimated : FitScale::fixed)->target_from_source;
 }
 
 Similarity fit_yaw(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target) {
   check_counts(source, target);
-  // Σ targetᵀ Rz(θ) source = C cos θ + S sin θ + const. is largest at θ = atan2(S, C); points about their means.
+  // For points relative to their means, Σ targetᵀ Rz(θ) source = C cos θ + S sin θ + const., with maximum at
+  // θ = atan2(S, C).
   const Eigen::Vector3d source_mean = mean(source), target_mean = mean(target);
-  double along = 0, across = 0;
+  double cosine_sum = 0, sine_sum = 0;
   for (std::size_t i = 0; i < source.size(); ++i) {
     const Eigen::Vector3d s = source[i] - source_mean, t = target[i] - target_mean;
-    along += s.x() * t.x() + s.y() * t.y();
-    across += s.x() * t.y() - s.y() * t.x();
+    cosine_sum += s.x() * t.x() + s.y() * t.y();
+    sine_sum += s.x() * t.y() - s.y() * t.x();
   }
-  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(std::atan2(sine_sum, cosine_sum), Eigen::Vector3d::UnitZ()));
   return {1.0, Pose(rotation, target_mean - rotation * source_mean)};
 }
 

@@ -1,4 +1,4 @@
-// Laying one trajectory over another.
+// Alignment of an estimated trajectory with the true one.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,13 +8,14 @@
 
 #include "spartan/core/pose.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/core/umeyama.h"
 
 namespace spartan {
 
-/// What may be fitted before two trajectories are compared.
+/// What is fitted before two trajectories are compared.
 enum class Alignment {
   none,   ///< nothing
-  first,  ///< the first pose of the estimate is put onto the first of the truth
+  first,  ///< the first pose of the estimate is moved onto the first pose of the truth
   yaw,    ///< translation and rotation about z (4 degrees of freedom, least squares)
   se3,    ///< translation and rotation (6, least squares)
   sim3,   ///< translation, rotation and scale (7, least squares)
@@ -22,25 +23,13 @@ enum class Alignment {
 std::string_view name_of(Alignment alignment);
 std::optional<Alignment> alignment_named(std::string_view name);
 
-/// x ↦ s R x + t. On a pose the scale acts on the position alone.
-struct Similarity {
-  double scale = 1;
-  Pose pose;  ///< R, t (metres)
-
-  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
-    return scale * (pose.rotation() * point) + pose.translation();
-  }
-  Pose operator*(const Pose& other) const { return {pose.rotation() * other.rotation(), *this * other.translation()}; }
-};
-
-/// The similarity that minimises Σ |target_i − (s R source_i + t)|²; s = 1 unless `with_scale`.
-/// Source: Umeyama, "Least-squares estimation of transformation parameters between two point patterns", PAMI 1991.
-/// Points on one line (or at one place) leave the rotation about it open: then one of the best is given.
-/// Throws where the counts differ or are 0.
+/// The similarity that minimizes Σ |target_i − (s R source_i + t)|² (Umeyama 1991, core/umeyama.h); s = 1 unless
+/// `with_scale`. Where all points lie on a line or at one place, one of several optimal rotations is returned.
+/// Throws std::invalid_argument where the counts differ or are 0.
 Similarity fit_similarity(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target,
                           bool with_scale);
 
-/// The rotation about z and the translation that minimise the same sum, in closed form.
+/// The rotation about z and the translation that minimize the same sum, in closed form.
 /// Source: Zhang & Scaramuzza, "A tutorial on quantitative trajectory evaluation for visual(-inertial) odometry",
 /// IROS 2018, section III-B.
 Similarity fit_yaw(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target);

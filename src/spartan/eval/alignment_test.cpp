@@ -39,7 +39,7 @@ void expect_same(const Similarity& a, const Similarity& b, double tolerance) {
   EXPECT_LE((a.pose.matrix() - b.pose.matrix()).cwiseAbs().maxCoeff(), tolerance);
 }
 
-TEST(Alignment, FindsWhatWasApplied) {
+TEST(Alignment, RecoversTheAppliedTransform) {
   Random random(1);
   for (int n = 0; n < 50; ++n) {
     const Points source = random_points(random, 3 + n);
@@ -52,8 +52,8 @@ TEST(Alignment, FindsWhatWasApplied) {
   }
 }
 
-// The sum may not fall in any direction of the parameters that are fitted.
-TEST(Alignment, IsTheLeastSumOfSquares) {
+// The sum of squares must rise in every direction of the fitted parameters.
+TEST(Alignment, MinimizesTheSumOfSquares) {
   Random random(2);
   for (int n = 0; n < 20; ++n) {
     const Points source = random_points(random, 12);
@@ -78,7 +78,7 @@ TEST(Alignment, IsTheLeastSumOfSquares) {
   }
 }
 
-TEST(Alignment, NeverMirrors) {
+TEST(Alignment, NeverReflects) {
   Random random(3);
   const Points source = random_points(random, 30);
   Points mirrored = source;
@@ -88,30 +88,30 @@ TEST(Alignment, NeverMirrors) {
   EXPECT_GT(fitted.scale, 0);
 }
 
-TEST(Alignment, LinesAndSinglePlacesStillFit) {
+TEST(Alignment, FitsCollinearAndCoincidentPoints) {
   Random random(4);
   const Similarity applied{1, Pose(exp_so3({0.3, -0.8, 0.5}), {1, 2, 3})};
   Points line;
   for (int i = 0; i < 10; ++i) line.emplace_back(i, 2.0 * i, -0.5 * i);
   const Points target = moved(applied, line, random, 0);
   EXPECT_LE(sum_of_squares(fit_similarity(line, target, false), line, target), 1e-18);
-  const Points standing(5, Eigen::Vector3d(1, 1, 1)), elsewhere(5, Eigen::Vector3d(4, 5, 6));
+  const Points coincident(5, Eigen::Vector3d(1, 1, 1)), elsewhere(5, Eigen::Vector3d(4, 5, 6));
   for (const bool with_scale : {false, true}) {
-    const Similarity fitted = fit_similarity(standing, elsewhere, with_scale);
+    const Similarity fitted = fit_similarity(coincident, elsewhere, with_scale);
     EXPECT_EQ(fitted.scale, 1.0);
-    EXPECT_LE(sum_of_squares(fitted, standing, elsewhere), 1e-18);
+    EXPECT_LE(sum_of_squares(fitted, coincident, elsewhere), 1e-18);
   }
-  EXPECT_LE(sum_of_squares(fit_yaw(standing, elsewhere), standing, elsewhere), 1e-18);
+  EXPECT_LE(sum_of_squares(fit_yaw(coincident, elsewhere), coincident, elsewhere), 1e-18);
 }
 
-TEST(Alignment, FirstPoseGoesOntoFirstPose) {
+TEST(Alignment, AlignsTheFirstPoses) {
   const Trajectory estimate{{{}, Pose(exp_so3({0.1, 0.2, 0.3}), {1, 2, 3})}, {{1}, Pose()}};
   const Trajectory truth{{{}, Pose(exp_so3({-0.4, 0, 1}), {7, 8, 9})}, {{1}, Pose()}};
   const Similarity fitted = align(estimate, truth, Alignment::first);
   EXPECT_LE(((fitted * estimate[0].pose).matrix() - truth[0].pose.matrix()).norm(), 1e-12);
 }
 
-TEST(Alignment, KnowsItsNames) {
+TEST(Alignment, NamesAreUniqueAndCountsAreChecked) {
   for (const Alignment a : {Alignment::none, Alignment::first, Alignment::yaw, Alignment::se3, Alignment::sim3}) {
     EXPECT_EQ(alignment_named(name_of(a)), a);
   }

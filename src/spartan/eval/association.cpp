@@ -11,8 +11,8 @@ double distance_s(const StampedPose& a, const StampedPose& b) {
   return std::abs(seconds_between(a.stamp, b.stamp));
 }
 
-std::string span(const Trajectory& trajectory) {
-  if (trajectory.empty()) return "nothing";
+std::string time_range(const Trajectory& trajectory) {
+  if (trajectory.empty()) return "no poses";
   return to_decimal_seconds(trajectory.front().stamp) + " … " + to_decimal_seconds(trajectory.back().stamp) + " s";
 }
 
@@ -20,26 +20,26 @@ std::string span(const Trajectory& trajectory) {
 
 Result<AssociatedTrajectories> associate(const Trajectory& estimate, const Trajectory& truth, double max_dt_s) {
   AssociatedTrajectories pairs;
-  std::size_t nearest = 0, taken = truth.size();
+  std::size_t nearest = 0, last_used = truth.size();
   for (const StampedPose& entry : estimate) {
     while (nearest + 1 < truth.size() && distance_s(entry, truth[nearest + 1]) < distance_s(entry, truth[nearest])) {
       ++nearest;
     }
     if (truth.empty() || distance_s(entry, truth[nearest]) > max_dt_s) continue;
-    if (taken == nearest) {  // the truth pose has a partner already, from before
+    if (last_used == nearest) {  // the truth pose is already paired with the previous estimate
       if (distance_s(pairs.estimate.back(), truth[nearest]) > distance_s(entry, truth[nearest])) {
         pairs.estimate.back() = entry;
       }
       continue;
     }
-    taken = nearest;
+    last_used = nearest;
     pairs.estimate.push_back(entry);
     pairs.truth.push_back(truth[nearest]);
   }
   if (pairs.estimate.empty()) {
     return failure(ErrorCode::input,
-                   fmt::format("no pose of the estimate lies within {} s of one of the truth", max_dt_s), {},
-                   fmt::format("estimate: {}; truth: {}", span(estimate), span(truth)));
+                   fmt::format("no pose of the estimate is within {} s of a pose of the truth", max_dt_s), {},
+                   fmt::format("estimate: {}; truth: {}", time_range(estimate), time_range(truth)));
   }
   return pairs;
 }

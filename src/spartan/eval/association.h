@@ -1,4 +1,4 @@
-// Which pose of one trajectory belongs to which of another.
+// Association of the poses of two trajectories by time.
 #pragma once
 
 #include "spartan/core/result.h"
@@ -11,8 +11,9 @@ struct AssociatedTrajectories {
   Trajectory estimate, truth;
 };
 
-/// Pairs every pose of the estimate with the truth pose nearest in time, at most `max_dt_s` (seconds) away; where
-/// several ask for the same truth pose, the nearest gets it. Code `input` where no pair is found.
+/// Pairs every pose of the estimate with the truth pose nearest in time, at most `max_dt_s` (seconds) away. Where
+/// several poses share the nearest truth pose, the one nearest to it is kept. Fails with code `input` where no pair is
+/// found.
 Result<AssociatedTrajectories> associate(const Trajectory& estimate, const Trajectory& truth, double max_dt_s);
 
 }  // namespace spartan

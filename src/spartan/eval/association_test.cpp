@@ -17,21 +17,21 @@ Trajectory at_seconds(const std::vector<double>& seconds) {
 TEST(Association, TakesTheNearestInTime) {
   const auto pairs = associate(at_seconds({0.0, 0.1, 0.205, 0.5}), at_seconds({0.01, 0.09, 0.11, 0.2, 0.3}), 0.02);
   ASSERT_TRUE(pairs);
-  ASSERT_EQ(pairs->truth.size(), 3U) << "0.5 has no partner";
+  ASSERT_EQ(pairs->truth.size(), 3U) << "0.5 s has no truth pose within the limit";
   EXPECT_EQ(pairs->truth[0].stamp, Stamp::from_seconds(0.01));
   EXPECT_EQ(pairs->truth[1].stamp, Stamp::from_seconds(0.09)) << "the earlier one of two equally near";
   EXPECT_EQ(pairs->truth[2].stamp, Stamp::from_seconds(0.2));
   EXPECT_EQ(pairs->estimate[2].stamp, Stamp::from_seconds(0.205));
 }
 
-TEST(Association, ATruthPoseHasOnePartner) {
+TEST(Association, ATruthPoseIsUsedOnce) {
   const auto pairs = associate(at_seconds({0.0, 0.01, 0.02, 0.03}), at_seconds({0.012, 0.5}), 0.02);
   ASSERT_TRUE(pairs);
   ASSERT_EQ(pairs->estimate.size(), 1U);
   EXPECT_EQ(pairs->estimate[0].stamp, Stamp::from_seconds(0.01));
 }
 
-TEST(Association, NothingNearIsAnError) {
+TEST(Association, FailsWithoutAnyPair) {
   for (const auto& pairs : {associate(at_seconds({0, 1}), at_seconds({5, 6}), 0.02), associate({}, at_seconds({1}), 1),
                             associate(at_seconds({1}), {}, 1)}) {
     ASSERT_FALSE(pairs);
@@ -39,8 +39,8 @@ TEST(Association, NothingNearIsAnError) {
   }
 }
 
-// Against a search over all pairs.
-RC_GTEST_PROP(Association, AgreesWithAPlainSearch, ()) {
+// Against a brute-force search over all pairs.
+RC_GTEST_PROP(Association, AgreesWithBruteForce, ()) {
   const auto stamps = [] {
     const auto drawn = *rc::gen::container<std::set<int>>(rc::gen::inRange(0, 300));
     Trajectory trajectory;

@@ -8,16 +8,16 @@
 namespace spartan {
 namespace {
 
-// Counts and sums over the pixels of one kind; the scores are their ratios.
-class Tally {
+// Counts and sums over the pixels of one kind, from which the scores are computed.
+class ErrorCounts {
  public:
   void add(float estimate, float truth) {
     ++truth_;
     if (!std::isfinite(estimate)) return;
     ++matched_;
     const double error = std::abs(static_cast<double>(estimate) - static_cast<double>(truth));
-    sum_ += error;
-    for (std::size_t i = 0; i < kThresholds.size(); ++i) beyond_[i] += error > kThresholds[i];
+    absolute_sum_ += error;
+    for (std::size_t i = 0; i < kThresholds.size(); ++i) above_[i] += error > kThresholds[i];
     if (error <= 1.0) {
       ++within_1px_;
       squares_within_1px_ += error * error;
@@ -25,7 +25,7 @@ class Tally {
   }
 
   DisparityScores scores() const {
-    const auto bad = [&](std::size_t i) { return percent(truth_ - matched_ + beyond_[i], truth_); };
+    const auto bad = [&](std::size_t i) { return percent(truth_ - matched_ + above_[i], truth_); };
     DisparityScores s;
     s.truth_pixels = truth_;
     s.matched_pixels = matched_;
@@ -33,11 +33,11 @@ class Tally {
     s.bad_1 = bad(1);
     s.bad_2 = bad(2);
     s.bad_3 = bad(3);
-    s.matched_bad_1 = percent(beyond_[1], matched_);
-    s.matched_bad_2 = percent(beyond_[2], matched_);
+    s.matched_bad_1 = percent(above_[1], matched_);
+    s.matched_bad_2 = percent(above_[2], matched_);
     s.density_percent = percent(matched_, truth_);
     if (within_1px_ > 0) s.rms_in_1px = std::sqrt(squares_within_1px_ / static_cast<double>(within_1px_));
-    if (matched_ > 0) s.mean_abs_px = sum_ / static_cast<double>(matched_);
+    if (matched_ > 0) s.mean_abs_px = absolute_sum_ / static_cast<double>(matched_);
     return s;
   }
 
@@ -50,8 +50,8 @@ class Tally {
   }
 
   std::int64_t truth_ = 0, matched_ = 0, within_1px_ = 0;
-  std::array<std::int64_t, kThresholds.size()> beyond_{};
-  double sum_ = 0, squares_within_1px_ = 0;
+  std::array<std::int64_t, kThresholds.size()> above_{};
+  double absolute_sum_ = 0, squares_within_1px_ = 0;
 };
 
 Status check_size(const char* name, ImageSize size, ImageSize expected) {
@@ -68,7 +68,7 @@ Result<DisparityMetrics> compare_disparities(ImageView<const float> estimate, Im
   if (!mask.empty()) {
     if (const Status same = check_size("mask", mask.size(), estimate.size()); !same) return failure(same);
   }
-  Tally all, nonocc;
+  ErrorCounts all, nonocc;
   for (int y = 0; y < truth.height(); ++y) {
     for (int x = 0; x < truth.width(); ++x) {
       const std::uint8_t kind = mask.empty() ? kMaskSeenByBoth : mask(x, y);

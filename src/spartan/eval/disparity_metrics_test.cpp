@@ -23,7 +23,7 @@ Image<float> row_of(const std::vector<float>& values) {
   return image;
 }
 
-TEST(DisparityMetrics, CountedByHand) {
+TEST(DisparityMetrics, AgreesWithCountsByHand) {
   //                        errors:      0     0.5   0.75   1.0   1.5   2.5    4   hole  no truth
   const Image<float> truth = row_of({10.F, 10.F, 10.F, 10.F, 10.F, 10.F, 10.F, 10.F, kHole, 10.F});
   const Image<float> found = row_of({10.F, 9.5F, 10.75F, 11.F, 8.5F, 12.5F, 14.F, kHole, 3.F, 10.F});
@@ -50,7 +50,7 @@ TEST(DisparityMetrics, CountedByHand) {
   EXPECT_DOUBLE_EQ(*metrics->nonocc->mean_abs_px, (0.75 + 1 + 1.5 + 2.5) / 5);
 }
 
-TEST(DisparityMetrics, WithoutAMaskThereIsNoNonocc) {
+TEST(DisparityMetrics, NonoccNeedsAMask) {
   const auto metrics = compare_disparities(row_of({1, 2, kHole}), row_of({1, kHole, 3}));
   ASSERT_TRUE(metrics);
   EXPECT_EQ(metrics->all.truth_pixels, 2);
@@ -58,7 +58,7 @@ TEST(DisparityMetrics, WithoutAMaskThereIsNoNonocc) {
   EXPECT_FALSE(metrics->nonocc);
 }
 
-TEST(DisparityMetrics, NothingToScoreGivesNoFigures) {
+TEST(DisparityMetrics, ScoresOverNoPixelsAreMissing) {
   const auto empty = compare_disparities(row_of({1, 2}), row_of({kHole, kHole}));
   ASSERT_TRUE(empty);
   EXPECT_FALSE(empty->all.bad_1);
@@ -72,7 +72,7 @@ TEST(DisparityMetrics, NothingToScoreGivesNoFigures) {
   EXPECT_FALSE(holes->all.mean_abs_px);
 }
 
-TEST(DisparityMetrics, SizesMustAgree) {
+TEST(DisparityMetrics, FailsOnDifferentSizes) {
   const auto other_truth = compare_disparities(Image<float>(3, 2), Image<float>(2, 3));
   ASSERT_FALSE(other_truth);
   EXPECT_EQ(other_truth.error().code, ErrorCode::input);
@@ -81,7 +81,7 @@ TEST(DisparityMetrics, SizesMustAgree) {
   EXPECT_FALSE(compare_disparities(Image<float>(3, 2), Image<float>(3, 2), mask.view()));
 }
 
-TEST(DisparityTruth, ReadsEveryKind) {
+TEST(DisparityTruth, ReadsEveryFormat) {
   const testing::TemporaryFolder folder;
   Image<std::uint8_t> eight(2, 1);
   eight(1, 0) = 90;
@@ -107,7 +107,7 @@ TEST(DisparityTruth, ReadsEveryKind) {
   expect("a.pfm", 3, 12.25F);
 }
 
-TEST(DisparityTruth, RefusesWhatIsNone) {
+TEST(DisparityTruth, RejectsOtherImages) {
   const testing::TemporaryFolder folder;
   ASSERT_TRUE(write_png(folder.file("colour.png"), Image<Rgb8>(2, 2, Rgb8{1, 2, 3})));
   EXPECT_EQ(read_disparity(folder.file("colour.png")).error().code, ErrorCode::input);
@@ -116,7 +116,7 @@ TEST(DisparityTruth, RefusesWhatIsNone) {
   EXPECT_EQ(read_disparity(folder.file("colour.png"), 0).error().code, ErrorCode::usage);
 }
 
-TEST(DisparityTruth, MasksHoldThreeValues) {
+TEST(DisparityTruth, MasksHaveThreeValues) {
   const testing::TemporaryFolder folder;
   Image<std::uint8_t> mask(3, 1);
   mask(1, 0) = 128;

@@ -24,14 +24,15 @@ Image<float> divided(ImageView<const Sample> image, double divisor) {
   return disparity;
 }
 
-// A gray picture that was stored as RGB.
-Result<Image<std::uint8_t>> one_channel(ImageView<const Rgb8> image, const std::string& path) {
+// A gray image that is stored as RGB.
+Result<Image<std::uint8_t>> gray_from_rgb(ImageView<const Rgb8> image, const std::string& path) {
   Image<std::uint8_t> gray(image.size());
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
       const Rgb8 pixel = image(x, y);
       if (pixel.r != pixel.g || pixel.g != pixel.b) {
-        return failure(ErrorCode::input, "is a colour picture, not a disparity image", path);
+        return failure(ErrorCode::input, "is a color image; a disparity image is gray, or RGB with equal channels",
+                       path);
       }
       gray(x, y) = pixel.r;
     }
@@ -43,7 +44,7 @@ Result<Image<std::uint8_t>> one_channel(ImageView<const Rgb8> image, const std::
 
 Result<Image<float>> read_disparity(const std::string& path, double scale_of_8_bit) {
   if (!(scale_of_8_bit > 0) || !std::isfinite(scale_of_8_bit)) {
-    return failure(ErrorCode::usage, fmt::format("the truth scale is {}, must be positive", scale_of_8_bit));
+    return failure(ErrorCode::usage, fmt::format("the truth scale is {}, but must be positive", scale_of_8_bit));
   }
   const auto content = read_file(path);
   if (!content) return failure(content);
@@ -54,11 +55,12 @@ Result<Image<float>> read_disparity(const std::string& path, double scale_of_8_b
   if (image->format().bits == 16 && !rgb) return divided(image->as<std::uint16_t>(), 256.0);
   if (image->format().bits == 8 && !rgb) return divided(image->as<std::uint8_t>(), scale_of_8_bit);
   if (image->format().bits == 8) {
-    const auto gray = one_channel(image->as<Rgb8>(), path);
+    const auto gray = gray_from_rgb(image->as<Rgb8>(), path);
     if (!gray) return failure(gray);
     return divided(gray->view(), scale_of_8_bit);
   }
-  return failure(ErrorCode::input, "is a 16-bit colour picture, not a disparity image", path);
+  return failure(ErrorCode::input, "is a 16-bit color image; a disparity image is PFM, 16-bit gray PNG or 8-bit PNG",
+                 path);
 }
 
 Result<Image<std::uint8_t>> read_truth_mask(const std::string& path) {
@@ -68,8 +70,8 @@ Result<Image<std::uint8_t>> read_truth_mask(const std::string& path) {
     for (int x = 0; x < mask->width(); ++x) {
       const std::uint8_t value = (*mask)(x, y);
       if (value != kMaskSeenByBoth && value != kMaskOccluded && value != kMaskNoTruth) {
-        return failure(ErrorCode::input, fmt::format("holds {} at ({}, {}), a mask holds 255, 128 and 0", value, x, y),
-                       path);
+        return failure(ErrorCode::input,
+                       fmt::format("holds {} at ({}, {}); a truth mask holds only 255, 128 and 0", value, x, y), path);
       }
     }
   }

@@ -1,4 +1,4 @@
-// True disparities and masks from files.
+// Ground-truth disparities and masks from files.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,15 @@
 
 namespace spartan {
 
-/// Disparities in px, NaN where unknown. What the file is shows in its content:
-/// - PFM: as they are; inf is unknown.
+/// Reads disparities in px, NaN where unknown. The format is recognized by the content of the file:
+/// - PFM: values as they are; inf is unknown.
 /// - 16-bit PNG: value / 256; 0 is unknown (KITTI).
 /// - 8-bit PNG (gray, or RGB with equal channels): value / `scale_of_8_bit`; 0 is unknown (Middlebury).
-/// Code `input` for anything else, `usage` for a scale that is not positive.
+/// Fails with code `input` for anything else, `usage` where the scale is not positive.
 Result<Image<float>> read_disparity(const std::string& path, double scale_of_8_bit = 1);
 
-/// 255 scored and seen by both eyes, 128 occluded, 0 no truth; other values are refused with code `input`.
+/// Reads a mask: 255 seen by both cameras, 128 occluded in the right image, 0 without truth. Fails with code `input` on
+/// other values.
 Result<Image<std::uint8_t>> read_truth_mask(const std::string& path);
 
 }  // namespace spartan

@@ -6,30 +6,32 @@
 #include <numbers>
 #include <optional>
 
+#include "spartan/core/connected_components.h"
+
 namespace spartan {
 namespace {
 
-// What is truly in one cell of the map.
+// Ground truth within one cell of the map.
 struct TrueCell {
   double mean_m = 0, lowest_m = 0, highest_m = 0;
-  double over_m = 0, under_m = 0;  // the most over the local ground, and below the level
+  double over_m = 0, under_m = 0;  // maximum height above the local ground, maximum depth below the level
   double level_m = 0;              // mean
 };
 
-struct Span {
+struct IndexRange {
   int from, to;
 };
 
-// Finer cells whose middles lie in [low, low + side).
-Span finer(double low, double side, double cell) {
+// Indices of the cells of width `cell` whose centers lie in [low, low + side).
+IndexRange cells_within(double low, double side, double cell) {
   return {static_cast<int>(std::ceil(low / cell - 0.5 - 1e-9)),
           static_cast<int>(std::ceil((low + side) / cell - 0.5 - 1e-9))};
 }
 
 std::optional<TrueCell> true_cell(const JudgedMap& map, const TrueGround& truth, int column, int row) {
   const double side = map.place.cell_m, fine = truth.place.cell_m;
-  const Span x = finer(map.place.west_m + column * side - truth.place.west_m, side, fine);
-  const Span y = finer(truth.place.north_m - (map.place.north_m - row * side), side, fine);
+  const IndexRange x = cells_within(map.place.west_m + column * side - truth.place.west_m, side, fine);
+  const IndexRange y = cells_within(truth.place.north_m - (map.place.north_m - row * side), side, fine);
   if (x.from < 0 || y.from < 0 || x.to > truth.surface_m.width() || y.to > truth.surface_m.height() || x.to <= x.from ||
       y.to <= y.from)
     return std::nullopt;
@@ -54,57 +56,44 @@ std::optional<TrueCell> true_cell(const JudgedMap& map, const TrueGround& truth,
   return cell;
 }
 
-// Cells of the map with what is truly there: 0 outside the truth, else as JudgedMap::kind.
+// Ground truth by cell of the map; kind 0 outside of the ground truth, else as JudgedMap::kind.
 struct Labels {
   Image<std::uint8_t> kind;
   Image<float> size;  // height or depth
   Image<float> level;
 };
 
-// Cells of one kind that touch become things; `visit` says which cells count.
+// The connected regions of one kind that have a visible cell.
 template <class Visible, class Marked>
-std::vector<JudgedThing> things(const Labels& labels, std::uint8_t kind, const MapPlace& place, double found_share,
-                                ImageView<const float> lowest_seen, const Visible& visible, const Marked& marked) {
+std::vector<JudgedThing> regions_of(const Labels& labels, std::uint8_t kind, const MapPlace& place,
+                                    double min_marked_fraction, ImageView<const float> lowest_seen,
+                                    const Visible& visible, const Marked& marked) {
   const auto [w, h] = labels.kind.size();
-  Image<std::uint8_t> done(w, h);
-  std::vector<JudgedThing> found;
-  std::vector<std::pair<int, int>> open;
-  for (int y0 = 0; y0 < h; ++y0) {
-    for (int x0 = 0; x0 < w; ++x0) {
-      if (labels.kind(x0, y0) != kind || done(x0, y0) != 0) continue;
-      JudgedThing thing;
-      int cells = 0;
-      open.assign(1, {x0, y0});
-      done(x0, y0) = 1;
-      while (!open.empty()) {
-        const auto [x, y] = open.back();
-        open.pop_back();
-        ++cells;
-        thing.middle_m +=
-            Eigen::Vector2d(place.west_m + (x + 0.5) * place.cell_m, place.north_m - (y + 0.5) * place.cell_m);
-        thing.height_m = std::max(thing.height_m, static_cast<double>(labels.size(x, y)));
-        if (visible(x, y)) {
-          ++thing.visible_cells;
-          thing.marked_cells += marked(x, y) ? 1 : 0;
-          const double depth = labels.level(x, y) - lowest_seen(x, y);
-          if (depth > thing.seen_depth_m) thing.seen_depth_m = depth;
-        }
-        for (int j = std::max(y - 1, 0); j <= std::min(y + 1, h - 1); ++j) {
-          for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
-            if (labels.kind(i, j) != kind || done(i, j) != 0) continue;
-            done(i, j) = 1;
-            open.emplace_back(i, j);
-          }
-        }
-      }
-      if (thing.visible_cells == 0) continue;
-      thing.middle_m /= cells;
-      thing.diameter_m = std::sqrt(4 / std::numbers::pi * cells) * place.cell_m;
-      thing.found = thing.marked_cells >= found_share * thing.visible_cells;
-      found.push_back(thing);
-    }
+  Image<std::uint8_t> mask(w, h);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) mask(x, y) = labels.kind(x, y) == kind ? 1 : 0;
   }
-  return found;
+  std::vector<JudgedThing> regions;
+  for (const std::vector<PixelIndex>& cells : connected_components(mask)) {
+    JudgedThing region;
+    for (const auto [x, y] : cells) {
+      region.middle_m +=
+          Eigen::Vector2d(place.west_m + (x + 0.5) * place.cell_m, place.north_m - (y + 0.5) * place.cell_m);
+      region.height_m = std::max(region.height_m, static_cast<double>(labels.size(x, y)));
+      if (!visible(x, y)) continue;
+      ++region.visible_cells;
+      region.marked_cells += marked(x, y) ? 1 : 0;
+      const double depth = labels.level(x, y) - lowest_seen(x, y);
+      if (depth > region.seen_depth_m) region.seen_depth_m = depth;
+    }
+    if (region.visible_cells == 0) continue;
+    const auto count = static_cast<int>(cells.size());
+    region.middle_m /= count;
+    region.diameter_m = std::sqrt(4 / std::numbers::pi * count) * place.cell_m;
+    region.found = region.marked_cells >= min_marked_fraction * region.visible_cells;
+    regions.push_back(region);
+  }
+  return regions;
 }
 
 bool near_obstacle(const Labels& labels, int x, int y) {
@@ -128,7 +117,7 @@ MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapSco
                                     map.place.north_m - (y + 0.5) * map.place.cell_m - s.eye_m.y());
     return range >= s.nearest_m && range < s.farthest_m;
   };
-  const auto is_visible = [&](int x, int y) { return in_range(x, y) && map.visible(x, y) >= s.fewest_pixels; };
+  const auto is_visible = [&](int x, int y) { return in_range(x, y) && map.visible(x, y) >= s.min_visible_pixels; };
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       const auto cell = true_cell(map, truth, x, y);
@@ -141,7 +130,7 @@ MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapSco
         ++m.visible_cells;
         m.covered_cells += known ? 1 : 0;
       }
-      if (!known || !in_range(x, y) || cell->highest_m - cell->lowest_m >= s.flat_m) continue;
+      if (!known || !in_range(x, y) || cell->highest_m - cell->lowest_m >= s.max_relief_m) continue;
       const double error = map.elevation_m(x, y) - cell->mean_m;
       sum += error;
       squares += error * error;
@@ -162,11 +151,11 @@ MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapSco
     m.bias_m = sum / m.judged_cells;
     m.rms_m = std::sqrt(squares / m.judged_cells);
   }
-  m.obstacles = things(labels, 2, map.place, s.found_share, map.lowest_seen_m, is_visible,
-                       [&](int x, int y) { return map.kind(x, y) == 2; });
-  m.cavities = things(labels, 3, map.place, s.found_share, map.lowest_seen_m, is_visible,
-                      [&](int x, int y) { return map.kind(x, y) == 3; });
-  std::erase_if(m.cavities, [&](const JudgedThing& thing) { return thing.seen_depth_m < s.cavity_m; });
+  m.obstacles = regions_of(labels, 2, map.place, s.min_marked_fraction, map.lowest_seen_m, is_visible,
+                           [&](int x, int y) { return map.kind(x, y) == 2; });
+  m.cavities = regions_of(labels, 3, map.place, s.min_marked_fraction, map.lowest_seen_m, is_visible,
+                          [&](int x, int y) { return map.kind(x, y) == 3; });
+  std::erase_if(m.cavities, [&](const JudgedThing& cavity) { return cavity.seen_depth_m < s.cavity_m; });
   return m;
 }
 

@@ -23,11 +23,11 @@ Status check(const TrajectoryMetricsOptions& options, bool truth_has_rotation) {
     return failure(ErrorCode::usage, "segment lengths must be positive");
   }
   if (options.segment_step < 1 || options.rpe_delta_frames < 1 || !(options.max_dt_s >= 0)) {
-    return failure(ErrorCode::usage, "steps in frames must be at least 1, and the time difference at least 0");
+    return failure(ErrorCode::usage, "steps in frames must be at least 1, and the maximum time difference at least 0");
   }
   if (options.alignment == Alignment::first && !truth_has_rotation) {
-    return failure(ErrorCode::usage, "the truth has no rotation, so its first pose cannot be aligned to", {},
-                   "take yaw, se3 or sim3");
+    return failure(ErrorCode::usage, "the truth has no rotation, so the alignment `first` is not possible", {},
+                   "use yaw, se3 or sim3");
   }
   return {};
 }
@@ -51,23 +51,24 @@ ErrorStatistics absolute_errors(const Trajectory& estimate, const Trajectory& tr
   return statistics_of(std::move(errors));
 }
 
-// For every frame the way along the true path so far, metres.
-std::vector<double> distances(const Trajectory& truth) {
-  std::vector<double> way{0.0};
+// Path length up to every frame, metres.
+std::vector<double> path_lengths(const Trajectory& truth) {
+  std::vector<double> lengths{0.0};
   for (std::size_t i = 1; i < truth.size(); ++i) {
-    way.push_back(way.back() + (truth[i].pose.translation() - truth[i - 1].pose.translation()).norm());
+    lengths.push_back(lengths.back() + (truth[i].pose.translation() - truth[i - 1].pose.translation()).norm());
   }
-  return way;
+  return lengths;
 }
 
-SegmentErrors segment_errors(const Trajectory& estimate, const Trajectory& truth, const std::vector<double>& way,
+SegmentErrors segment_errors(const Trajectory& estimate, const Trajectory& truth, const std::vector<double>& path_m,
                              double length_m, std::size_t step) {
   SegmentErrors errors{length_m, 0, std::nullopt, std::nullopt};
   double translation = 0, rotation = 0;
   for (std::size_t i = 0; i < truth.size(); i += step) {
-    const auto end = std::lower_bound(way.begin() + static_cast<std::ptrdiff_t>(i), way.end(), way[i] + length_m);
-    if (end == way.end()) break;
-    const Pose error = relative_error(estimate, truth, i, static_cast<std::size_t>(end - way.begin()));
+    const auto end =
+        std::lower_bound(path_m.begin() + static_cast<std::ptrdiff_t>(i), path_m.end(), path_m[i] + length_m);
+    if (end == path_m.end()) break;
+    const Pose error = relative_error(estimate, truth, i, static_cast<std::size_t>(end - path_m.begin()));
     translation += error.translation().norm() / length_m;
     rotation += rotation_angle(error) / length_m;
     ++errors.count;
@@ -148,8 +149,8 @@ Result<TrajectoryMetrics> compare_trajectories(const Trajectory& estimate, const
   metrics.rpe_delta_frames = options.rpe_delta_frames;
   metrics.truth_from_estimate = align(pairs->estimate, pairs->truth, options.alignment);
   metrics.frames = pairs->truth.size();
-  const std::vector<double> way = distances(pairs->truth);
-  metrics.path_length_m = way.back();
+  const std::vector<double> path_m = path_lengths(pairs->truth);
+  metrics.path_length_m = path_m.back();
 
   const Trajectory aligned = transformed(metrics.truth_from_estimate, pairs->estimate);
   metrics.ate_m = absolute_errors(aligned, pairs->truth);
@@ -158,7 +159,7 @@ Result<TrajectoryMetrics> compare_trajectories(const Trajectory& estimate, const
     const auto step = static_cast<std::size_t>(options.segment_step);
     metrics.segments.emplace();
     for (const double length : options.segment_lengths_m) {
-      metrics.segments->push_back(segment_errors(aligned, pairs->truth, way, length, step));
+      metrics.segments->push_back(segment_errors(aligned, pairs->truth, path_m, length, step));
     }
     if (metrics.path_length_m > 0) {
       const Pose error = relative_error(pairs->estimate, pairs->truth, 0, metrics.frames - 1);

@@ -24,7 +24,7 @@ Stamp frame_time(int i) {
   return Stamp{i * 100'000'000LL};
 }
 
-// A winding drive of uneven steps, and the same with noise that grows.
+// A winding drive with steps of different length, and an estimate of it with accumulating noise.
 struct Drive {
   Trajectory truth, estimate;
 };
@@ -52,7 +52,7 @@ TrajectoryMetrics compare(const Drive& drive, const TrajectoryMetricsOptions& op
   return metrics.value_or(TrajectoryMetrics{});
 }
 
-TEST(ErrorStatistics, OfFewNumbers) {
+TEST(ErrorStatistics, OfShortLists) {
   const ErrorStatistics odd = statistics_of({5, 1, 3});
   EXPECT_DOUBLE_EQ(odd.mean, 3);
   EXPECT_DOUBLE_EQ(odd.median, 3);
@@ -62,7 +62,7 @@ TEST(ErrorStatistics, OfFewNumbers) {
   EXPECT_THROW(statistics_of({}), std::invalid_argument);
 }
 
-// Straight on for 20 m in steps of 1 m; the estimate goes 2 % too far and turns 0.1° about z with every metre.
+// Straight for 20 m in steps of 1 m; the estimate is 2 % too long and turns 0.1° about z per meter.
 Drive straight_drive() {
   Drive drive;
   const double turn = 0.1 * std::numbers::pi / 180;
@@ -74,7 +74,7 @@ Drive straight_drive() {
   return drive;
 }
 
-TEST(TrajectoryMetrics, ClosedFormOnAStraightDrive) {
+TEST(TrajectoryMetrics, AgreesWithTheClosedFormOnAStraightDrive) {
   TrajectoryMetricsOptions options;
   options.alignment = Alignment::first;
   options.segment_lengths_m = {5, 20, 21};
@@ -90,23 +90,23 @@ TEST(TrajectoryMetrics, ClosedFormOnAStraightDrive) {
   ASSERT_EQ(m.segments->size(), 3U);
   EXPECT_EQ(m.segments->at(0).count, 16);
   EXPECT_NEAR(*m.segments->at(0).rotation_deg_per_m, 0.1, 1e-9);
-  EXPECT_EQ(m.segments->at(1).count, 1) << "a segment may end at the last frame exactly";
+  EXPECT_EQ(m.segments->at(1).count, 1) << "a segment may end exactly at the last frame";
   EXPECT_NEAR(*m.segments->at(1).translation_percent, 2.0, 1e-10);
   EXPECT_EQ(m.segments->at(2).count, 0);
   EXPECT_EQ(m.segments->at(2).translation_percent, std::nullopt);
   EXPECT_TRUE(m.missing.empty());
 }
 
-TEST(TrajectoryMetrics, Sim3TakesTheScaleAway) {
+TEST(TrajectoryMetrics, Sim3RemovesTheScale) {
   TrajectoryMetricsOptions options;
   options.alignment = Alignment::sim3;
   const TrajectoryMetrics m = compare(straight_drive(), options);
   EXPECT_NEAR(m.truth_from_estimate.scale, 1 / 1.02, 1e-12);
   EXPECT_NEAR(m.ate_m.max, 0, 1e-12);
-  EXPECT_NEAR(*m.drift_percent, 2.0, 1e-10) << "drift is that of the estimate as it came";
+  EXPECT_NEAR(*m.drift_percent, 2.0, 1e-10) << "drift is that of the estimate before alignment";
 }
 
-TEST(TrajectoryMetrics, ASecondWorldChangesNothingAfterAlignment) {
+TEST(TrajectoryMetrics, AlignmentRemovesTheWorldFrame) {
   const Drive drive = noisy_drive(5, 120);
   Drive moved = drive;
   const Pose other(exp_so3({0.3, 0.5, -2}), {100, 20, -7});
@@ -122,20 +122,20 @@ TEST(TrajectoryMetrics, ASecondWorldChangesNothingAfterAlignment) {
   }
 }
 
-// The devkit's way, written down plainly: walk on from the first frame until the length is reached, take E = D⁻¹ D'.
-SegmentErrors plain_segments(const Drive& drive, double length, int step) {
+// The method of the KITTI development kit, as a plain loop: from the first frame to the one at the length, E = D⁻¹ D'.
+SegmentErrors brute_force_segments(const Drive& drive, double length, int step) {
   SegmentErrors result{length, 0, 0.0, 0.0};
   const auto n = static_cast<int>(drive.truth.size());
   for (int first = 0; first < n; first += step) {
-    double way = 0;
+    double path_m = 0;
     int last = first;
-    while (way < length && last + 1 < n) {
+    while (path_m < length && last + 1 < n) {
       const Eigen::Matrix4d a = drive.truth[static_cast<std::size_t>(last)].pose.matrix();
       const Eigen::Matrix4d b = drive.truth[static_cast<std::size_t>(last) + 1].pose.matrix();
-      way += (b.col(3) - a.col(3)).norm();
+      path_m += (b.col(3) - a.col(3)).norm();
       ++last;
     }
-    if (way < length) continue;
+    if (path_m < length) continue;
     const auto matrix = [](const Trajectory& t, int i) { return t[static_cast<std::size_t>(i)].pose.matrix(); };
     const Eigen::Matrix4d true_motion = matrix(drive.truth, first).inverse() * matrix(drive.truth, last);
     const Eigen::Matrix4d motion = matrix(drive.estimate, first).inverse() * matrix(drive.estimate, last);
@@ -150,7 +150,7 @@ SegmentErrors plain_segments(const Drive& drive, double length, int step) {
   return result;
 }
 
-TEST(TrajectoryMetrics, SegmentsAgreeWithAPlainSearch) {
+TEST(TrajectoryMetrics, SegmentsAgreeWithBruteForce) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Drive drive = noisy_drive(seed, 1600);
     TrajectoryMetricsOptions every, kitti;
@@ -160,7 +160,7 @@ TEST(TrajectoryMetrics, SegmentsAgreeWithAPlainSearch) {
       const TrajectoryMetrics m = compare(drive, options);
       ASSERT_EQ(m.segments->size(), options.segment_lengths_m.size());
       for (const SegmentErrors& segment : *m.segments) {
-        const SegmentErrors expected = plain_segments(drive, segment.length_m, options.segment_step);
+        const SegmentErrors expected = brute_force_segments(drive, segment.length_m, options.segment_step);
         ASSERT_GT(expected.count, 0);
         EXPECT_EQ(segment.count, expected.count) << segment.length_m;
         EXPECT_NEAR(*segment.translation_percent, *expected.translation_percent, 1e-9);
@@ -170,7 +170,7 @@ TEST(TrajectoryMetrics, SegmentsAgreeWithAPlainSearch) {
   }
 }
 
-TEST(TrajectoryMetrics, WithoutTrueRotationSomeAreMissingWithTheReason) {
+TEST(TrajectoryMetrics, MetricsThatNeedTrueRotationsAreMissing) {
   Drive drive = noisy_drive(4, 60);
   for (auto& entry : drive.truth) entry.pose = Pose::from_translation(entry.pose.translation());
   TrajectoryMetricsOptions options;
@@ -179,7 +179,7 @@ TEST(TrajectoryMetrics, WithoutTrueRotationSomeAreMissingWithTheReason) {
   EXPECT_FALSE(m.segments);
   EXPECT_FALSE(m.rpe_rotation_deg);
   ASSERT_TRUE(m.rpe_translation_m);
-  EXPECT_LT(m.rpe_translation_m->max, 0.2) << "displacements of 0.7 m, compared as vectors of the true world";
+  EXPECT_LT(m.rpe_translation_m->max, 0.2) << "displacements of 0.7 m, compared as vectors of the true world frame";
   std::map<std::string, std::string> reasons;
   for (const MissingMetric& missing : m.missing) reasons[missing.name] = missing.reason;
   EXPECT_EQ(reasons.size(), 3U);
@@ -192,13 +192,13 @@ TEST(TrajectoryMetrics, WithoutTrueRotationSomeAreMissingWithTheReason) {
   EXPECT_EQ(refused.error().code, ErrorCode::usage);
 }
 
-TEST(TrajectoryMetrics, StandingStillAndSingleFrames) {
+TEST(TrajectoryMetrics, AcceptsStationaryTruthAndSingleFrames) {
   Drive drive = noisy_drive(6, 5, 0.0);
   for (auto& entry : drive.truth) entry.pose = drive.truth.front().pose;
-  const TrajectoryMetrics standing = compare(drive, {});
-  EXPECT_EQ(standing.path_length_m, 0);
-  EXPECT_FALSE(standing.drift_percent);
-  EXPECT_EQ(standing.segments->front().count, 0);
+  const TrajectoryMetrics stationary = compare(drive, {});
+  EXPECT_EQ(stationary.path_length_m, 0);
+  EXPECT_FALSE(stationary.drift_percent);
+  EXPECT_EQ(stationary.segments->front().count, 0);
   drive.truth.resize(1);
   drive.estimate.resize(1);
   const TrajectoryMetrics one = compare(drive, {});
@@ -208,7 +208,7 @@ TEST(TrajectoryMetrics, StandingStillAndSingleFrames) {
   EXPECT_EQ(one.missing.size(), 3U);
 }
 
-TEST(TrajectoryMetrics, RefusesSenselessOptions) {
+TEST(TrajectoryMetrics, RejectsInvalidOptions) {
   const Drive drive = noisy_drive(7, 10);
   TrajectoryMetricsOptions length, step, delta;
   length.segment_lengths_m = {5, 0};
@@ -221,7 +221,7 @@ TEST(TrajectoryMetrics, RefusesSenselessOptions) {
   }
 }
 
-// A python that knows evo: SPARTAN_EVO_PYTHON, the project's own environment, or the system's.
+// A Python with evo: SPARTAN_EVO_PYTHON, the project's own environment, or the system's.
 std::string python_with_evo(const std::string& source_folder) {
   std::vector<std::string> candidates;
   if (const char* set = std::getenv("SPARTAN_EVO_PYTHON")) candidates.emplace_back(set);
@@ -252,7 +252,8 @@ TEST(TrajectoryMetrics, AgreesWithEvo) {
   const char* const source = std::getenv("SPARTAN_SOURCE_DIR");
   if (source == nullptr) GTEST_SKIP() << "SPARTAN_SOURCE_DIR is not set";
   const std::string python = python_with_evo(source);
-  if (python.empty()) GTEST_SKIP() << "evo is not there (pip install evo; SPARTAN_EVO_PYTHON names its python)";
+  if (python.empty())
+    GTEST_SKIP() << "evo is not installed (pip install evo; SPARTAN_EVO_PYTHON names the Python that has it)";
   const testing::TemporaryFolder folder;
   Drive drive = noisy_drive(11, 150);
   drive.estimate.erase(drive.estimate.begin() + 40, drive.estimate.begin() + 45);  // frames without a pose

@@ -3,6 +3,12 @@
 #include <Eigen/Dense>
 
 namespace spartan {
+namespace {
+
+/// Smallest depth relative to the depth in the anchor at which a point counts as in front of the camera; empirical.
+constexpr double kMinRelativeDepth = 0.01;
+
+}  // namespace
 
 std::optional<AnchoredProjection> project_anchored(const RectifiedStereo& stereo, const AnchoredPoint& point,
                                                    const Pose& current_from_anchor) {
@@ -13,7 +19,7 @@ std::optional<AnchoredProjection> project_anchored(const RectifiedStereo& stereo
                             1);
   const double w = point.disparity * inverse_fb;
   const Eigen::Vector3d q = rotation * ray + w * t;
-  if (!(q.z() > 0.01)) return std::nullopt;
+  if (!(q.z() > kMinRelativeDepth)) return std::nullopt;
 
   const double g = 1 / q.z();
   AnchoredProjection p;

@@ -1,4 +1,6 @@
-// Projection of a point that is given by pixel and disparity in another shot.
+// Projection of a point that is given by pixel and disparity in another frame (anchored inverse-depth
+// parameterization). Source: Civera, Davison, Montiel, "Inverse depth parametrization for monocular SLAM", T-RO 24
+// (2008); derivation in docs/math/odometry.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,29 +11,30 @@
 
 namespace spartan {
 
-/// Pixel and disparity of a point in a shot's left image.
+/// Pixel and disparity of a point in the left image of its anchor frame.
 struct AnchoredPoint {
   Eigen::Vector2d pixel;
   double disparity = 0;
 };
 
 struct AnchoredProjection {
-  Eigen::Vector3d measured;                     ///< (u, v, d) in the other shot
-  Eigen::Matrix<double, 3, 6> by_motion;        ///< by ξ of previous_from_current · Exp(ξ)
-  Eigen::Vector3d by_disparity;                 ///< by the disparity in the anchor
-  Eigen::Matrix<double, 3, 2> by_anchor_pixel;  ///< by the pixel in the anchor
+  Eigen::Vector3d measured;                     ///< predicted (u, v, d) in the other frame, pixels
+  Eigen::Matrix<double, 3, 6> by_motion;        ///< Jacobian by ξ of previous_from_current · Exp(ξ)
+  Eigen::Vector3d by_disparity;                 ///< Jacobian by the disparity in the anchor
+  Eigen::Matrix<double, 3, 2> by_anchor_pixel;  ///< Jacobian by the pixel in the anchor
 };
 
-/// With x̄ the ray (x/z, y/z, 1) of the pixel and w = d/(f b) the inverse depth, the point seen from the other shot is
-///   q = R x̄ + w t   (times the depth),   u = f q_x/q_z + c_x,  v = f q_y/q_z + c_y,  d' = d/q_z.
-/// Linear in the disparity and regular for points at infinity, so noise of far points neither biases nor explodes.
-/// A right perturbation ξ = (ρ, φ) of previous_from_current gives δq = −w ρ + q × φ.
-/// Nothing where the point is not in front of the camera.
+/// With x̄ = (x/z, y/z, 1) the ray of the pixel and w = d/(f b) the inverse depth, the point divided by its depth in the
+/// anchor is, in the other frame,
+///   q = R x̄ + w t,   u = f q_x/q_z + c_x,  v = f q_y/q_z + c_y,  d' = d/q_z.
+/// This is linear in the disparity and regular at infinity, so the noise of distant points neither biases the estimate
+/// nor diverges. A right perturbation ξ = (ρ, φ) of previous_from_current gives δq = −w ρ + q × φ.
+/// std::nullopt where the point is not in front of the camera.
 std::optional<AnchoredProjection> project_anchored(const RectifiedStereo& stereo, const AnchoredPoint& point,
                                                    const Pose& current_from_anchor);
 
-/// How the surroundings of the point look in the other shot: ∂(u, v)/∂(x, y) for a surface whose disparity changes by
-/// `slant` per pixel, and the slant there.
+/// Affine warp of the image around a point from the anchor to the other frame: ∂(u, v)/∂(x, y) for a surface whose
+/// disparity gradient in the anchor is `slant` (pixels per pixel), and the disparity gradient in the other frame.
 struct AnchoredWarp {
   Eigen::Matrix2d pixels;
   Eigen::Vector2d slant;

@@ -24,8 +24,8 @@ bool Occupancy::is_free(double x, double y) const {
   const int column = cell_of(x), row = cell_of(y);
   for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r) {
     for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) {
-      for (const Place& place : cells_[static_cast<std::size_t>(r * columns_ + c)]) {
-        if (std::hypot(place.x - x, place.y - y) < spacing_px_) return false;
+      for (const Point& point : cells_[static_cast<std::size_t>(r * columns_ + c)]) {
+        if (std::hypot(point.x - x, point.y - y) < spacing_px_) return false;
       }
     }
   }
@@ -45,7 +45,7 @@ std::vector<Feature> spread_features(std::vector<Feature> features, ImageSize si
   Occupancy occupancy(size, spacing_px);
   std::vector<int> filled(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0);
   struct Ranked {
-    int rank;  // how many stronger ones its cell has
+    int rank;  // number of stronger features in its cell
     std::size_t index;
   };
   std::vector<Ranked> ranked;

@@ -1,4 +1,4 @@
-// Choosing features so that they cover the image.
+// Selection of features that cover the image evenly.
 #pragma once
 
 #include <vector>
@@ -7,26 +7,27 @@
 
 namespace spartan {
 
-/// Keeps at most `count` of the features: the image is cut into about count/4 square cells, each cell gives its
-/// strongest in turn (first all cells' strongest, then all second ones …) until enough are there; none stands nearer
-/// than `spacing_px` to one already kept. Result strongest first; ties are broken by y, then x.
+/// Selects at most `count` features. The image is divided into about count/4 square cells; the strongest feature of
+/// every cell is taken first, then the second strongest of every cell, and so on. No two selected features are nearer
+/// than `spacing_px`. Result in order of decreasing strength; ties are broken by y, then x.
 std::vector<Feature> spread_features(std::vector<Feature> features, ImageSize size, int count, double spacing_px);
 
-/// Marks places of an image as taken, to keep a distance between landmarks.
+/// Keeps a minimum distance between points of an image.
 class Occupancy {
  public:
   Occupancy(ImageSize size, double spacing_px);
+  /// True where no point that was taken is nearer than the spacing.
   bool is_free(double x, double y) const;
   void take(double x, double y);
 
  private:
-  struct Place {
+  struct Point {
     float x, y;
   };
   int cell_of(double v) const { return static_cast<int>(v / cell_px_) + 1; }
   double spacing_px_, cell_px_;
   int columns_, rows_;
-  std::vector<std::vector<Place>> cells_;
+  std::vector<std::vector<Point>> cells_;
 };
 
 }  // namespace spartan

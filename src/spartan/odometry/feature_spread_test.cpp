@@ -9,8 +9,8 @@
 namespace spartan {
 namespace {
 
-// Strong features crowd in one corner, weak ones lie everywhere.
-std::vector<Feature> crowd() {
+// Strong features are clustered in one corner, weak ones lie everywhere.
+std::vector<Feature> clustered_features() {
   std::vector<Feature> features;
   Random random(3);
   for (int i = 0; i < 4000; ++i) {
@@ -24,8 +24,8 @@ std::vector<Feature> crowd() {
   return features;
 }
 
-TEST(FeatureSpread, CoversTheImageAndKeepsTheDistance) {
-  const std::vector<Feature> kept = spread_features(crowd(), {640, 480}, 300, 5);
+TEST(FeatureSpread, CoversTheImageAndKeepsTheSpacing) {
+  const std::vector<Feature> kept = spread_features(clustered_features(), {640, 480}, 300, 5);
   ASSERT_EQ(kept.size(), 300u);
   int quarter[4] = {};
   for (const Feature& f : kept) ++quarter[(f.x > 320 ? 1 : 0) + (f.y > 240 ? 2 : 0)];
@@ -34,8 +34,8 @@ TEST(FeatureSpread, CoversTheImageAndKeepsTheDistance) {
     for (std::size_t j = 0; j < i; ++j) EXPECT_GE(std::hypot(kept[i].x - kept[j].x, kept[i].y - kept[j].y), 5);
 }
 
-TEST(FeatureSpread, DoesNotDependOnTheOrderOfItsInput) {
-  std::vector<Feature> features = crowd();
+TEST(FeatureSpread, IsIndependentOfTheInputOrder) {
+  std::vector<Feature> features = clustered_features();
   const std::vector<Feature> a = spread_features(features, {640, 480}, 300, 5);
   std::reverse(features.begin(), features.end());
   const std::vector<Feature> b = spread_features(features, {640, 480}, 300, 5);
@@ -43,7 +43,7 @@ TEST(FeatureSpread, DoesNotDependOnTheOrderOfItsInput) {
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].x, b[i].x);
 }
 
-TEST(FeatureSpread, TakesAllWhereThereAreFew) {
+TEST(FeatureSpread, KeepsAllWhereThereAreFew) {
   std::vector<Feature> features(3);
   features[1].x = 50;
   features[2].y = 50;

@@ -1,4 +1,4 @@
-// Sums over upright rectangles in constant time.
+// Sums over upright rectangles in constant time (Viola & Jones, CVPR 2001).
 #pragma once
 
 #include <cstdint>
@@ -7,18 +7,18 @@
 
 namespace spartan {
 
-/// I(x, y) = Σ of the pixels left of x and above y; one column and one row more than the image. Sums wrap at 2³²,
-/// and differences of them are right as long as the true sum fits (8-bit images up to 16 megapixels always).
+/// I(x, y) = Σ of the pixels left of x and above y; one column and one row more than the image. Sums wrap modulo 2³²;
+/// their differences are exact as long as the true sum fits (always for 8-bit images of up to 16 megapixels).
 class IntegralImage {
  public:
   void compute(ImageView<const std::uint8_t> image);
 
-  /// Of the image that was summed.
+  /// Size of the summed image.
   int width() const { return sums_.width() - 1; }
   int height() const { return sums_.height() - 1; }
   const std::uint32_t* row(int y) const { return sums_.row(y); }
 
-  /// Sum over x0 ≤ x < x1, y0 ≤ y < y1; the rectangle must lie inside.
+  /// Sum over x0 ≤ x < x1, y0 ≤ y < y1; the rectangle must lie inside the image.
   std::uint32_t box(int x0, int y0, int x1, int y1) const {
     const std::uint32_t *top = row(y0), *bottom = row(y1);
     return bottom[x1] - bottom[x0] - top[x1] + top[x0];

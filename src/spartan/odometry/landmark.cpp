@@ -6,7 +6,7 @@
 namespace spartan {
 
 const Anchor& LandmarkMemory::anchor(std::uint32_t id) const {
-  // Anchors are made with growing ids and never reordered.
+  // Anchors get increasing ids and are never reordered.
   const auto found = std::lower_bound(anchors.begin(), anchors.end(), id,
                                       [](const Anchor& a, std::uint32_t wanted) { return a.id < wanted; });
   if (found == anchors.end() || found->id != id) throw std::logic_error("LandmarkMemory: no such anchor");

@@ -1,4 +1,4 @@
-// What the odometry remembers of a place in the world.
+// Landmarks that the odometry tracks, and the frames in which they are anchored.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,28 +11,28 @@
 
 namespace spartan {
 
-/// A past shot in which landmarks were first seen.
+/// A past stereo frame in which landmarks were first observed.
 struct Anchor {
   std::uint32_t id = 0;
-  Pose latest_from_anchor;  ///< of the left optical frames; "latest" is the last shot that was taken in
+  Pose latest_from_anchor;  ///< between left optical frames; "latest" is the last stereo frame that was processed
 };
 
-/// A point of the world, given by a whole pixel of its anchor's left image and its disparity there. The pixel is the
-/// point's definition and thus exact; all uncertainty of place lies in the disparity.
+/// A 3D point, parameterized by a whole pixel of its anchor's left image and its disparity there. The pixel defines the
+/// point and is therefore exact; all uncertainty of its position lies in the disparity.
 struct Landmark {
   std::uint32_t anchor_id = 0;
   Eigen::Vector2d anchor_pixel = Eigen::Vector2d::Zero();
   double disparity = 0;                             ///< in the anchor, pixels
   double variance = 0;                              ///< of the disparity, pixels²
-  Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< ∂disparity/∂(x, y) of the surface around it
-  ImagePatch patch{};                               ///< how it looked in the anchor's left image
+  Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< disparity gradient ∂d/∂(x, y) of the surface around it
+  ImagePatch patch{};                               ///< its surroundings in the anchor's left image
 
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< in the latest shot
-  float scale = 0;                                  ///< of the feature when it was last described
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< position in the latest left image
+  float scale = 0;                                  ///< of the feature from which the descriptor was taken last
   float angle = 0;
   std::int8_t sign = 0;
   Descriptor descriptor{};
-  std::int32_t missed = 0;  ///< shots in a row in which it was not found where it should be
+  std::int32_t missed_frames = 0;  ///< consecutive frames without an inlier measurement
 };
 
 /// The landmarks of t−1: the published "1/z" block of the odometry.
@@ -41,9 +41,9 @@ struct LandmarkMemory {
   std::vector<Anchor> anchors;
   std::vector<Landmark> landmarks;
 
-  /// The anchor must be there.
+  /// Throws std::logic_error where there is no such anchor.
   const Anchor& anchor(std::uint32_t id) const;
-  /// Drops the anchors that no landmark refers to.
+  /// Removes the anchors that no landmark refers to.
   void drop_unused_anchors();
 };
 

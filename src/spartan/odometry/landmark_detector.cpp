@@ -16,8 +16,11 @@ double squared_distance(const Descriptor& a, const Descriptor& b) {
 }
 
 std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions& options, Workers workers) {
-  if (options.detector == "surf") return std::make_unique<SurfDetector>(options, std::move(workers));
-  throw std::invalid_argument("unknown landmark detector: " + options.detector);
+  switch (options.detector) {
+    case DetectorType::surf:
+      return std::make_unique<SurfDetector>(options, std::move(workers));
+  }
+  throw std::invalid_argument("make_landmark_detector: unknown detector");
 }
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// Landmark matching: the published sub-module. Finds the landmarks of t−1 again in the current shot.
+// Landmark matching, a sub-module of the published odometry: associates the landmarks of t−1 with the current frame.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 
 namespace spartan {
 
-/// A feature of the current shot together with its disparity, where that was found. Features stand on whole pixels.
+/// A feature of the current frame and its disparity at the nearest whole pixel, where one was found.
 struct ReconstructedFeature {
   Feature feature;
   std::optional<RowAlignment> stereo;
@@ -24,19 +24,20 @@ class LandmarkMatching {
                    Workers workers)
       : options_(options), reconstruction_(reconstruction), workers_(std::move(workers)) {}
 
-  /// For each landmark the index of the feature that is like it, or −1: within the gate around the place that
-  /// `current_from_previous` predicts (without it: anywhere), near in descriptor, clearly nearer than the second one,
-  /// and each feature for one landmark only.
+  /// For each landmark the index of the feature that matches it, or −1. Features are candidates within the gate around
+  /// the position that `current_from_previous` predicts (without it: in the whole image); the best one must pass the
+  /// maximum descriptor distance and the ratio test (Lowe, IJCV 60, 2004, §7.1). Each feature matches at most one
+  /// landmark.
   std::vector<int> by_descriptor(const LandmarkMemory& memory, const std::vector<ReconstructedFeature>& features,
                                  const RectifiedStereo& stereo, const std::optional<Pose>& current_from_previous) const;
 
-  /// Pairs of landmark and feature, as coarse matches for a first motion.
+  /// Pairs of landmark and feature as measurements for the coarse motion.
   std::vector<LandmarkMatch> coarse_matches(const LandmarkMemory& memory,
                                             const std::vector<ReconstructedFeature>& features,
                                             const std::vector<int>& feature_of) const;
 
-  /// Re-establishes each landmark by correlating its patch, warped by the predicted geometry, and measures its
-  /// disparity by a narrow search. `current_from_previous` is good to a few pixels.
+  /// Measures each landmark: its patch, warped by the predicted geometry, is aligned with the left image, and its
+  /// disparity is searched near the predicted one. `current_from_previous` must be accurate to a few pixels.
   std::vector<LandmarkMatch> by_correlation(const LandmarkMemory& memory, const StereoImages& images,
                                             const Pose& current_from_previous) const;
 
@@ -48,8 +49,9 @@ class LandmarkMatching {
   Workers workers_;
 };
 
-/// Drops matches whose distances to most of their partners have changed beyond what the noise explains: a rigid world
-/// keeps all distances between its points. Each match is compared with `partners` others, spread over the list.
+/// Rigidity check: discards matches whose 3D distances to most of their partners have changed by more than the noise
+/// explains, since a rigid scene preserves all distances between its points. Each match is compared with about
+/// `partners` others, spread over the list. Fewer than eight matches are returned unchanged.
 std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector<LandmarkMatch> matches,
                                       int partners = 24);
 

@@ -47,18 +47,18 @@ LandmarkMemory memory_of(std::vector<Landmark> landmarks) {
   return memory;
 }
 
-TEST(LandmarkMatching, ComparesWithinTheGateAroundThePrediction) {
+TEST(LandmarkMatching, GatesFeaturesAroundThePrediction) {
   const LandmarkMemory memory = memory_of({landmark_at(100, 100, 1), landmark_at(300, 200, 2)});
   const std::vector<ReconstructedFeature> features{feature_at(310, 205, 2), feature_at(220, 100, 1)};
   const std::vector<int> gated = matching().by_descriptor(memory, features, kStereo, Pose());
   EXPECT_EQ(gated, (std::vector<int>{-1, 0}));
   EXPECT_EQ(matching().by_descriptor(memory, features, kStereo, std::nullopt), (std::vector<int>{1, 0}));
-  // 12 px/m at 6 m: a step of 1.44 m to the left moves the image by 120 px to the right.
+  // Disparity 10 px is a depth of 6 m: a motion of 1.44 m to the left moves the image by 120 px to the right.
   const Pose step = Pose::from_translation({1.44, 0, 0});
   EXPECT_EQ(matching().by_descriptor(memory, features, kStereo, step), (std::vector<int>{1, -1}));
 }
 
-TEST(LandmarkMatching, RefusesOtherSignsScalesAndTwins) {
+TEST(LandmarkMatching, RejectsOtherSignsOtherScalesAndAmbiguousFeatures) {
   const LandmarkMemory memory = memory_of({landmark_at(100, 100, 1)});
   ReconstructedFeature other = feature_at(100, 100, 1);
   other.feature.sign = -1;
@@ -66,17 +66,17 @@ TEST(LandmarkMatching, RefusesOtherSignsScalesAndTwins) {
   other = feature_at(100, 100, 1);
   other.feature.scale = 5;
   EXPECT_EQ(matching().by_descriptor(memory, {other}, kStereo, Pose())[0], -1);
-  const std::vector<ReconstructedFeature> twins{feature_at(100, 100, 1), feature_at(110, 100, 1)};
-  EXPECT_EQ(matching().by_descriptor(memory, twins, kStereo, Pose())[0], -1);
+  const std::vector<ReconstructedFeature> duplicates{feature_at(100, 100, 1), feature_at(110, 100, 1)};
+  EXPECT_EQ(matching().by_descriptor(memory, duplicates, kStereo, Pose())[0], -1);
 }
 
-TEST(LandmarkMatching, GivesAFeatureToOneLandmarkOnly) {
+TEST(LandmarkMatching, AFeatureMatchesOneLandmarkOnly) {
   const LandmarkMemory memory = memory_of({landmark_at(100, 100, 1), landmark_at(105, 100, 1)});
   const std::vector<int> found = matching().by_descriptor(memory, {feature_at(102, 100, 1)}, kStereo, Pose());
   EXPECT_EQ((found[0] >= 0) + (found[1] >= 0), 1);
 }
 
-TEST(LandmarkMatching, DropsWhatMovesAgainstTheRest) {
+TEST(LandmarkMatching, RigidityCheckRejectsPointsThatMoveAgainstTheOthers) {
   Random random(1);
   const Pose motion = exp_se3((Vector6d() << 0.1, 0, 0.2, 0, 0.05, 0.01).finished());
   std::vector<LandmarkMatch> matches;

@@ -8,16 +8,23 @@
 namespace spartan {
 namespace {
 
-/// Standard deviation given to a disparity that was taken from a dense image.
+/// Standard deviation of a disparity from the dense image; empirical.
 constexpr double kDenseSigma_px = 0.25;
-/// The sub-pixel alignment may move this far from the best whole disparity.
-constexpr double kAlignmentReach_px = 1.5;
+/// Largest disparity gradient (px/px) of a dense disparity image on a surface; more is a depth edge.
+constexpr double kDepthEdge = 1;
+/// The sub-pixel alignment may move this far from the maximum of the row correlation.
+constexpr double kAlignmentRadius_px = 1.5;
+/// The row correlation may be lower than `min_correlation` by this, since its windows are not slanted; the alignment
+/// then has to reach `min_correlation`. Empirical.
+constexpr double kUnslantedLoss = 0.2;
+/// Largest difference between the pixel and the result of the search back from right to left.
+constexpr int kLeftRightTolerance_px = 1;
 
 std::size_t index_of_best(const std::vector<float>& scores) {
   return static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin());
 }
 
-/// Best score outside the peak at `best`: the slopes of the peak do not count.
+/// Best score outside the peak at `best`, which extends down its slopes to the next minimum on either side.
 float second_best(const std::vector<float>& scores, std::size_t best) {
   std::size_t left = best, right = best;
   while (left > 0 && scores[left - 1] < scores[left]) --left;
@@ -32,37 +39,39 @@ float second_best(const std::vector<float>& scores, std::size_t best) {
 }  // namespace
 
 std::optional<RowAlignment> LandmarkReconstruction::reconstruct(const StereoImages& images, int x, int y) const {
-  if (options_.source == "dense" && !images.disparity.empty()) return from_dense(images, x, y);
-  const int least = static_cast<int>(std::floor(options_.min_disparity_px));
-  const int most = static_cast<int>(std::lround(options_.max_disparity_share * images.left.width()));
-  const std::optional<double> whole = search(images, x, y, least, most);
-  if (!whole) return std::nullopt;
+  if (options_.source == DisparitySource::dense && !images.disparity.empty()) return from_dense(images, x, y);
+  const int min_disparity = static_cast<int>(std::floor(options_.min_disparity_px));
+  const int max_disparity = static_cast<int>(std::lround(options_.max_disparity_fraction * images.left.width()));
+  const std::optional<double> disparity = search(images, x, y, min_disparity, max_disparity);
+  if (!disparity) return std::nullopt;
   RowAlignment start;
-  start.disparity = *whole;
-  return align(images, {x, y}, start, kAlignmentReach_px);
+  start.disparity = *disparity;
+  return align(images, {x, y}, start, kAlignmentRadius_px);
 }
 
-std::optional<double> LandmarkReconstruction::search(const StereoImages& images, int x, int y, int least,
-                                                     int most) const {
+std::optional<double> LandmarkReconstruction::search(const StereoImages& images, int x, int y, int min_disparity,
+                                                     int max_disparity) const {
   constexpr int rx = kCorrelationRadiusX, ry = kCorrelationRadiusY;
   const int width = images.left.width(), height = images.left.height();
   if (x < rx || x + rx >= width || y < ry || y + ry >= height) return std::nullopt;
-  const int from = std::max(x - most, rx), to = std::min(x - least, width - 1 - rx);
+  const int from = std::max(x - max_disparity, rx), to = std::min(x - min_disparity, width - 1 - rx);
   if (to - from < 2) return std::nullopt;
 
   const std::vector<float> scores = correlate_row(images.left, x, y, images.right, from, to);
   const std::size_t best = index_of_best(scores);
-  if (scores[best] < options_.min_correlation - 0.2) return std::nullopt;
+  if (scores[best] < options_.min_correlation - kUnslantedLoss) return std::nullopt;
   if (second_best(scores, best) + options_.uniqueness > scores[best]) return std::nullopt;
   const int matched = from + static_cast<int>(best);
   if (!images.right_mask.empty() && images.right_mask(matched, y) == 0) return std::nullopt;
 
   if (options_.left_right_check) {
-    const int back_from = std::max(matched + least, rx), back_to = std::min(matched + most, width - 1 - rx);
+    const int back_from = std::max(matched + min_disparity, rx),
+              back_to = std::min(matched + max_disparity, width - 1 - rx);
     const std::vector<float> back = correlate_row(images.right, matched, y, images.left, back_from, back_to);
-    if (std::abs(back_from + static_cast<int>(index_of_best(back)) - x) > 1) return std::nullopt;
+    if (std::abs(back_from + static_cast<int>(index_of_best(back)) - x) > kLeftRightTolerance_px) return std::nullopt;
   }
 
+  // Parabola through the maximum and its neighbors.
   double peak = static_cast<double>(best);
   if (best > 0 && best + 1 < scores.size()) {
     const double curvature = scores[best - 1] + scores[best + 1] - 2.0 * scores[best];
@@ -72,25 +81,25 @@ std::optional<double> LandmarkReconstruction::search(const StereoImages& images,
 }
 
 std::optional<RowAlignment> LandmarkReconstruction::align(const StereoImages& images, const Eigen::Vector2d& pixel,
-                                                          const RowAlignment& start, double reach_px) const {
-  const std::optional<AlignmentTemplate> wanted = AlignmentTemplate::around(images.left_smooth, pixel);
-  if (!wanted) return std::nullopt;
+                                                          const RowAlignment& start, double radius_px) const {
+  const std::optional<AlignmentTemplate> reference = AlignmentTemplate::around(images.left_smooth, pixel);
+  if (!reference) return std::nullopt;
   std::optional<RowAlignment> found =
-      align_along_row(*wanted, images.right_smooth, pixel, start, options_.slant, reach_px);
+      align_along_row(*reference, images.right_smooth, pixel, start, options_.slant, radius_px);
   if (!found || found->correlation < options_.min_correlation) return std::nullopt;
   if (found->disparity < options_.min_disparity_px) return std::nullopt;
   return found;
 }
 
 std::optional<RowAlignment> LandmarkReconstruction::refine(const StereoImages& images, const Eigen::Vector2d& pixel,
-                                                           const RowAlignment& predicted, double reach_px) const {
-  if (options_.source == "dense" && !images.disparity.empty()) {
+                                                           const RowAlignment& predicted, double radius_px) const {
+  if (options_.source == DisparitySource::dense && !images.disparity.empty()) {
     std::optional<RowAlignment> found =
         from_dense(images, static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
-    if (found && std::abs(found->disparity - predicted.disparity) > reach_px) return std::nullopt;
+    if (found && std::abs(found->disparity - predicted.disparity) > radius_px) return std::nullopt;
     return found;
   }
-  return align(images, pixel, predicted, reach_px);
+  return align(images, pixel, predicted, radius_px);
 }
 
 std::optional<RowAlignment> LandmarkReconstruction::from_dense(const StereoImages& images, int x, int y) const {
@@ -105,7 +114,7 @@ std::optional<RowAlignment> LandmarkReconstruction::from_dense(const StereoImage
   found.slant = {0.5 * (dense(x + 1, y) - dense(x - 1, y)), 0.5 * (dense(x, y + 1) - dense(x, y - 1))};
   found.sigma_px = kDenseSigma_px;
   found.correlation = 1;
-  if (found.slant.cwiseAbs().maxCoeff() > 1) return std::nullopt;  // a depth edge
+  if (found.slant.cwiseAbs().maxCoeff() > kDepthEdge) return std::nullopt;
   return found;
 }
 

@@ -8,32 +8,33 @@
 namespace spartan {
 namespace {
 
-/// A landmark is given up after so many shots in which it should have been seen.
-constexpr int kMostMissed = 2;
-/// Shared errors of view and calibration do not average out: a disparity is never known better than this.
-constexpr double kLeastDisparitySigma_px = 0.03;
-/// A feature this near to a landmark stands on it.
-constexpr double kSamePlace_px = 2.0;
+/// A landmark is removed after so many consecutive frames without an inlier measurement; empirical.
+constexpr int kMaxMissedFrames = 2;
+/// Lower bound of a disparity's standard deviation: errors of viewpoint and calibration that all measurements share do
+/// not average out. Empirical.
+constexpr double kMinDisparitySigma_px = 0.03;
+/// A feature within this distance of a landmark shows the same point; empirical.
+constexpr double kSamePoint_px = 2.0;
 
-/// Gives a landmark a new patch, cut around the whole pixel next to where it is, in the current shot. False where the
-/// patch leaves the image.
-bool anchor_here(Landmark& landmark, std::uint32_t anchor_id, const StereoImages& images, const RowAlignment& seen) {
-  const Eigen::Vector2d whole(std::round(landmark.pixel.x()), std::round(landmark.pixel.y()));
-  const auto patch = cut_patch(images.left_smooth, static_cast<int>(whole.x()), static_cast<int>(whole.y()));
+/// Re-anchors a landmark in the current frame with the patch around the nearest whole pixel. False where the patch
+/// leaves the image.
+bool anchor_here(Landmark& landmark, std::uint32_t anchor_id, const StereoImages& images, const RowAlignment& stereo) {
+  const Eigen::Vector2d pixel(std::round(landmark.pixel.x()), std::round(landmark.pixel.y()));
+  const auto patch = cut_patch(images.left_smooth, static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
   if (!patch) return false;
   landmark.anchor_id = anchor_id;
-  landmark.anchor_pixel = whole;
-  landmark.disparity = seen.disparity + seen.slant.dot(whole - landmark.pixel);
-  landmark.variance = seen.sigma_px * seen.sigma_px;
-  landmark.slant = seen.slant;
+  landmark.anchor_pixel = pixel;
+  landmark.disparity = stereo.disparity + stereo.slant.dot(pixel - landmark.pixel);
+  landmark.variance = stereo.sigma_px * stereo.sigma_px;
+  landmark.slant = stereo.slant;
   landmark.patch = *patch;
-  landmark.pixel = whole;
+  landmark.pixel = pixel;
   return true;
 }
 
-/// The look of a landmark changes as the rover nears it.
-void describe_anew(Landmark& landmark, const Feature& feature) {
-  if (std::hypot(feature.x - landmark.pixel.x(), feature.y - landmark.pixel.y()) > kSamePlace_px) return;
+/// The appearance of a landmark changes as the rover approaches it, so the descriptor follows.
+void refresh_descriptor(Landmark& landmark, const Feature& feature) {
+  if (std::hypot(feature.x - landmark.pixel.x(), feature.y - landmark.pixel.y()) > kSamePoint_px) return;
   landmark.scale = feature.scale;
   landmark.angle = feature.angle;
   landmark.descriptor = feature.descriptor;
@@ -50,9 +51,9 @@ void LandmarkUpkeep::update(LandmarkMemory& memory, const StereoImages& images,
                             const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
                             const std::vector<ReconstructedFeature>& features,
                             const std::vector<int>& feature_of) const {
-  const double noise = fit.noise_scale * fit.noise_scale, most_grown = options_.matching.max_scale_change;
+  const double noise = fit.noise_scale * fit.noise_scale, max_scale = options_.matching.max_scale_change;
   const Eigen::Vector3d offset(0, 0, fit.offset.value);
-  for (Landmark& landmark : memory.landmarks) ++landmark.missed;
+  for (Landmark& landmark : memory.landmarks) ++landmark.missed_frames;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (!fit.inlier[i]) continue;
     const LandmarkMatch& match = matches[i];
@@ -60,24 +61,25 @@ void LandmarkUpkeep::update(LandmarkMemory& memory, const StereoImages& images,
     const AnchoredPoint point{match.point.pixel, match.point.disparity + fit.offset.value};
     const auto p = project_anchored(images.geometry, point, memory.anchor(landmark.anchor_id).latest_from_anchor);
     if (!p) continue;
+    // Scalar Kalman update in information form: H = ∂h/∂d, R = noise · covariance.
     const Eigen::Vector3d weighted = (noise * match.covariance).ldlt().solve(p->by_disparity);
     const double variance = 1 / (1 / landmark.variance + weighted.dot(p->by_disparity));
     landmark.disparity += variance * weighted.dot(match.measured + offset - p->measured);
-    landmark.variance = std::max(variance, kLeastDisparitySigma_px * kLeastDisparitySigma_px);
+    landmark.variance = std::max(variance, kMinDisparitySigma_px * kMinDisparitySigma_px);
     landmark.pixel = match.measured.head<2>();
-    landmark.missed = 0;
+    landmark.missed_frames = 0;
     const int feature = feature_of.empty() ? -1 : feature_of[match.landmark];
-    if (feature >= 0) describe_anew(landmark, features[static_cast<std::size_t>(feature)].feature);
+    if (feature >= 0) refresh_descriptor(landmark, features[static_cast<std::size_t>(feature)].feature);
 
     const AnchoredWarp warp = warp_of(*p, landmark.slant);
-    const double grown = std::sqrt(std::abs(warp.pixels.determinant()));
-    if (grown < most_grown && grown * most_grown > 1) continue;
+    const double scale = std::sqrt(std::abs(warp.pixels.determinant()));
+    if (scale < max_scale && scale * max_scale > 1) continue;
     const double sigma = std::sqrt(landmark.variance) * std::abs(p->by_disparity.z());
-    const RowAlignment seen{p->measured.z() - fit.offset.value, warp.slant, std::max(sigma, kLeastDisparitySigma_px),
-                            1};
-    if (!anchor_here(landmark, memory.next_anchor_id, images, seen)) landmark.missed = kMostMissed;
+    const RowAlignment stereo{p->measured.z() - fit.offset.value, warp.slant, std::max(sigma, kMinDisparitySigma_px),
+                              1};
+    if (!anchor_here(landmark, memory.next_anchor_id, images, stereo)) landmark.missed_frames = kMaxMissedFrames;
   }
-  std::erase_if(memory.landmarks, [](const Landmark& l) { return l.missed >= kMostMissed; });
+  std::erase_if(memory.landmarks, [](const Landmark& l) { return l.missed_frames >= kMaxMissedFrames; });
 }
 
 void LandmarkUpkeep::add(LandmarkMemory& memory, const StereoImages& images,
@@ -91,9 +93,9 @@ void LandmarkUpkeep::add(LandmarkMemory& memory, const StereoImages& images,
     Landmark landmark;
     // The disparity was measured at the whole pixel.
     landmark.pixel = {std::round(f.feature.x), std::round(f.feature.y)};
-    RowAlignment seen = *f.stereo;
-    seen.sigma_px = std::hypot(seen.sigma_px, options_.motion.disparity_sigma_px);
-    if (!anchor_here(landmark, memory.next_anchor_id, images, seen)) continue;
+    RowAlignment stereo = *f.stereo;
+    stereo.sigma_px = std::hypot(stereo.sigma_px, options_.motion.disparity_sigma_px);
+    if (!anchor_here(landmark, memory.next_anchor_id, images, stereo)) continue;
     landmark.scale = f.feature.scale;
     landmark.angle = f.feature.angle;
     landmark.sign = f.feature.sign;

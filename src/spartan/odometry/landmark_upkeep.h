@@ -1,4 +1,5 @@
-// Keeping the landmarks of t−1: what was measured goes in, what is gone goes out, new ones come.
+// Landmark management: updates the landmarks of t−1 with their measurements, re-anchors and removes them, adds new
+// ones.
 #pragma once
 
 #include <vector>
@@ -11,23 +12,23 @@
 
 namespace spartan {
 
-/// The latest shot is now the current one.
+/// Makes the current frame the latest one: latest_from_anchor ← previous_from_current⁻¹ · latest_from_anchor.
 void move_anchors(LandmarkMemory& memory, const Pose& previous_from_current);
 
 class LandmarkUpkeep {
  public:
   explicit LandmarkUpkeep(const OdometryOptions& options) : options_(options) {}
 
-  /// Takes the inliers' measurements into their landmarks (a Kalman update of the anchor's disparity), gives those that
-  /// have grown or shrunk too much a new patch, drops those that were missed too often. One that a feature stands on
-  /// (`feature_of`, −1: none; may be empty) takes over its descriptor, as its look has changed. The anchors have been
-  /// moved.
+  /// Applies the inliers' measurements to their landmarks (scalar Kalman update of the anchor's disparity), re-anchors
+  /// landmarks whose apparent size has changed too much, and removes those without an inlier measurement in several
+  /// consecutive frames. A landmark on which a feature lies (`feature_of`, −1: none; may be empty) takes over its
+  /// descriptor. Call move_anchors() first.
   void update(LandmarkMemory& memory, const StereoImages& images, const std::vector<LandmarkMatch>& matches,
               const MotionFit& fit, const std::vector<ReconstructedFeature>& features,
               const std::vector<int>& feature_of) const;
 
-  /// Features that stand apart from all landmarks become landmarks, up to the number asked for; the current shot
-  /// becomes their anchor.
+  /// Adds features that are far enough from all landmarks and have a disparity as new landmarks, up to the maximum
+  /// number of landmarks, anchored in the current frame.
   void add(LandmarkMemory& memory, const StereoImages& images, const std::vector<ReconstructedFeature>& features) const;
 
  private:

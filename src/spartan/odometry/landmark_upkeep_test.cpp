@@ -30,8 +30,8 @@ class LandmarkUpkeepTest : public ::testing::Test {
 
   StereoImages images() const { return {kStereo, image_, image_, smooth_.view(), smooth_.view(), {}, {}, {}}; }
 
-  // The rover has moved; the landmark of true disparity `truth` in the anchor is seen without noise.
-  void see(const Pose& previous_from_current, double truth, bool inlier = true, double offset = 0) {
+  // The rover moves and measures the landmark, whose true disparity in the anchor is `truth`, without noise.
+  void measure(const Pose& previous_from_current, double truth, bool inlier = true, double offset = 0) {
     LandmarkMatch match;
     match.point = {memory_.landmarks[0].anchor_pixel, memory_.landmarks[0].disparity};
     match.disparity_variance = memory_.landmarks[0].variance;
@@ -45,7 +45,7 @@ class LandmarkUpkeepTest : public ::testing::Test {
     fit.inlier = {inlier};
     fit.offset.value = offset;
     move_anchors(memory_, previous_from_current);
-    upkeep_.update(memory_, images(), {match}, fit, {}, {});
+    manager_.update(memory_, images(), {match}, fit, {}, {});
   }
 
   ReconstructedFeature feature_at(float x, float y) const {
@@ -59,60 +59,60 @@ class LandmarkUpkeepTest : public ::testing::Test {
   Image<std::uint8_t> image_;
   SmoothedImage smooth_;
   LandmarkMemory memory_;
-  LandmarkUpkeep upkeep_{OdometryOptions{}};
+  LandmarkUpkeep manager_{OdometryOptions{}};
 };
 
-TEST_F(LandmarkUpkeepTest, WeighsAMeasuredDisparityWithTheKnownOne) {
-  see(Pose(), 10.5);  // standing: only the disparity tells, σ² 0.01 against 0.04
+TEST_F(LandmarkUpkeepTest, FusesTheMeasuredDisparityByVariance) {
+  measure(Pose(), 10.5);  // stationary: only the disparity is informative, σ² 0.01 against 0.04
   EXPECT_NEAR(memory_.landmarks[0].disparity, 10 + 0.5 * 0.04 / 0.05, 1e-9);
   EXPECT_NEAR(memory_.landmarks[0].variance, 0.04 * 0.01 / 0.05, 1e-9);
 }
 
-TEST_F(LandmarkUpkeepTest, LearnsFromParallaxToo) {
-  see(Pose::from_translation({0.5, 0, 0}), 10.5);  // five baselines to the side
+TEST_F(LandmarkUpkeepTest, FusesMotionParallax) {
+  measure(Pose::from_translation({0.5, 0, 0}), 10.5);  // five baselines to the side
   EXPECT_NEAR(memory_.landmarks[0].disparity, 10.5, 0.01);
   EXPECT_LE(memory_.landmarks[0].variance, 0.0011);
 }
 
-TEST_F(LandmarkUpkeepTest, KeepsTheOffsetOutOfTheDisparity) {
-  see(Pose(), 10.2, true, 0.2);  // as large as was measured when the offset was not known
+TEST_F(LandmarkUpkeepTest, TheDisparityOffsetDoesNotEnterTheDisparity) {
+  measure(Pose(), 10.2, true, 0.2);  // the error of a disparity that was measured before the offset was known
   EXPECT_NEAR(memory_.landmarks[0].disparity, 10, 1e-9);
 }
 
-TEST_F(LandmarkUpkeepTest, ALandmarkThatHasGrownGetsANewPatch) {
+TEST_F(LandmarkUpkeepTest, ReanchorsALandmarkWhoseScaleHasChanged) {
   const Pose ahead = Pose::from_translation({0, 0, 0.5});  // from 1.5 m to 1 m
-  see(ahead, 10);
+  measure(ahead, 10);
   const Landmark& l = memory_.landmarks[0];
   EXPECT_EQ(l.anchor_id, 1u);
-  const Eigen::Vector3d seen = project_anchored(kStereo, {{120, 80}, 10}, ahead.inverse())->measured;
-  EXPECT_EQ(l.anchor_pixel.x(), std::round(seen.x()));
-  EXPECT_EQ(l.anchor_pixel.y(), std::round(seen.y()));
-  EXPECT_NEAR(l.disparity, seen.z(), 1e-6);
+  const Eigen::Vector3d expected = project_anchored(kStereo, {{120, 80}, 10}, ahead.inverse())->measured;
+  EXPECT_EQ(l.anchor_pixel.x(), std::round(expected.x()));
+  EXPECT_EQ(l.anchor_pixel.y(), std::round(expected.y()));
+  EXPECT_NEAR(l.disparity, expected.z(), 1e-6);
   EXPECT_EQ(l.patch,
             *cut_patch(smooth_.view(), static_cast<int>(l.anchor_pixel.x()), static_cast<int>(l.anchor_pixel.y())));
 }
 
-TEST_F(LandmarkUpkeepTest, DropsWhatIsMissedTwice) {
-  see(Pose(), 10, false);
+TEST_F(LandmarkUpkeepTest, RemovesLandmarksThatAreMissedTwice) {
+  measure(Pose(), 10, false);
   ASSERT_EQ(memory_.landmarks.size(), 1u);
-  see(Pose(), 10, true);
-  EXPECT_EQ(memory_.landmarks[0].missed, 0);
-  see(Pose(), 10, false);
-  see(Pose(), 10, false);
+  measure(Pose(), 10, true);
+  EXPECT_EQ(memory_.landmarks[0].missed_frames, 0);
+  measure(Pose(), 10, false);
+  measure(Pose(), 10, false);
   EXPECT_TRUE(memory_.landmarks.empty());
 }
 
-TEST_F(LandmarkUpkeepTest, AddsFeaturesThatStandApartAndHaveADisparity) {
+TEST_F(LandmarkUpkeepTest, AddsFeaturesThatAreFarFromLandmarksAndHaveADisparity) {
   std::vector<ReconstructedFeature> features{feature_at(40.4f, 30.6f), feature_at(122, 81), feature_at(42, 31),
                                              feature_at(60, 60), feature_at(3, 3)};
   features[3].stereo.reset();
-  upkeep_.add(memory_, images(), features);
+  manager_.add(memory_, images(), features);
   ASSERT_EQ(memory_.landmarks.size(), 2u);
   EXPECT_EQ(memory_.landmarks[1].anchor_pixel, Eigen::Vector2d(40, 31));
   EXPECT_EQ(memory_.landmarks[1].disparity, 12);
   EXPECT_EQ(memory_.anchors.size(), 2u);
-  upkeep_.add(memory_, images(), {});
-  EXPECT_EQ(memory_.anchors.size(), 2u);  // an anchor without landmarks goes
+  manager_.add(memory_, images(), {});
+  EXPECT_EQ(memory_.anchors.size(), 2u);  // an anchor without landmarks is removed
 }
 
 }  // namespace

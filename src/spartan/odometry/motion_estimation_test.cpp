@@ -16,10 +16,10 @@ struct World {
   int landmarks = 120;
   double pixel_sigma = 0, disparity_sigma = 0, anchor_sigma = 0;
   int outliers = 0;
-  double offset = 0;  // all disparities are measured too small by it
+  double offset = 0;  // missing from all measured disparities
 };
 
-// Landmarks of one anchor, the previous shot, 1 … 20 m away.
+// Landmarks anchored in the previous frame, 1 … 20 m away.
 std::vector<LandmarkMatch> make_matches(const World& world, const Pose& previous_from_current, Random& random) {
   std::vector<LandmarkMatch> matches;
   while (static_cast<int>(matches.size()) < world.landmarks) {
@@ -51,7 +51,7 @@ Pose some_motion(Random& random) {
   return exp_se3(t);
 }
 
-TEST(MotionEstimation, FindsAnExactMotionFromNothing) {
+TEST(MotionEstimation, RecoversAnExactMotionWithoutAStartValue) {
   Random random(1);
   const MotionEstimation estimation{MotionEstimationOptions{}};
   for (int trial = 0; trial < 10; ++trial) {
@@ -66,7 +66,7 @@ TEST(MotionEstimation, FindsAnExactMotionFromNothing) {
   }
 }
 
-TEST(MotionEstimation, SurvivesHalfTheMatchesBeingWrong) {
+TEST(MotionEstimation, IsRobustAgainstFiftyPercentOutliers) {
   Random random(2);
   const MotionEstimation estimation{MotionEstimationOptions{}};
   for (int trial = 0; trial < 10; ++trial) {
@@ -82,7 +82,7 @@ TEST(MotionEstimation, SurvivesHalfTheMatchesBeingWrong) {
   }
 }
 
-// Mean of eᵀ Σ⁻¹ e over trials; 6 for a covariance that tells the truth.
+// Mean NEES eᵀ Σ⁻¹ e over trials; 6 for a consistent covariance.
 double mean_nees(const World& world, const MotionEstimationOptions& options, DisparityOffset offset) {
   Random random(3);
   const MotionEstimation estimation{options};
@@ -100,17 +100,17 @@ double mean_nees(const World& world, const MotionEstimationOptions& options, Dis
   return sum / trials;
 }
 
-TEST(MotionEstimation, CovarianceTellsTheTruth) {
-  // 300 trials with 6 degrees of freedom: the mean of an honest estimator has a standard deviation of 0.2.
+TEST(MotionEstimation, CovarianceIsConsistent) {
+  // 300 trials with 6 degrees of freedom: the mean of a consistent estimator has a standard deviation of 0.2.
   const World noisy{.pixel_sigma = 0.2, .disparity_sigma = 0.3, .anchor_sigma = 0.25};
   MotionEstimationOptions plain;
   plain.robust = false;
   EXPECT_NEAR(mean_nees(noisy, plain, {}), 6, 0.9);
-  EXPECT_NEAR(mean_nees(noisy, {}, {}), 6, 1.2);  // robust weights see tails where there are none
+  EXPECT_NEAR(mean_nees(noisy, {}, {}), 6, 1.2);  // the Cauchy loss assumes tails that this noise has not
   EXPECT_NEAR(mean_nees(noisy, plain, {0, 0.01}), 6, 0.9);
 }
 
-TEST(MotionEstimation, CovarianceGrowsWithNoiseThatNobodyAnnounced) {
+TEST(MotionEstimation, NoiseScaleFollowsUnspecifiedNoise) {
   Random random(4);
   World world{.pixel_sigma = 0.5, .disparity_sigma = 0.5};
   auto matches = make_matches(world, Pose(), random);
@@ -133,10 +133,11 @@ TEST(MotionEstimation, EstimatesTheDisparityOffsetFromForwardMotion) {
   EXPECT_LT(with->offset.variance, 0.03 * 0.03);
   EXPECT_NEAR(without->offset.value, 0, 1e-6);
   EXPECT_LT(std::abs(with->previous_from_current.translation().z() - 0.5), 0.003);
-  EXPECT_GT(without->previous_from_current.translation().z() - 0.5, 0.004);  // all is nearer than it seems
+  EXPECT_GT(without->previous_from_current.translation().z() - 0.5,
+            0.004);  // all points are nearer than their disparities say
 }
 
-TEST(MotionEstimation, RefusesTooFewMatches) {
+TEST(MotionEstimation, RejectsTooFewMatches) {
   Random random(6);
   const MotionEstimation estimation{MotionEstimationOptions{}};
   EXPECT_FALSE(estimation.coarse(kStereo, {}).has_value());

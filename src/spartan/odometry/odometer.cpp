@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
-#include <chrono>
 #include <cmath>
 
+#include "spartan/core/stage_clock.h"
 #include "spartan/odometry/landmark_detector.h"
 #include "spartan/odometry/landmark_matching.h"
 #include "spartan/odometry/landmark_reconstruction.h"
@@ -18,39 +18,25 @@
 namespace spartan {
 namespace {
 
-/// Standard deviations of a motion that was not measured.
+/// Standard deviations of a motion that was not measured; larger than any motion between two frames of a rover.
 constexpr double kLostTranslation_m = 1.0, kLostRotation_rad = 0.5;
-/// A coarse motion that fewer landmarks than this agree on is not trusted.
-constexpr int kLeastCoarseInliers = 10;
-/// With as many, landmarks far from where they were predicted need not be looked for.
-constexpr int kSureCoarseInliers = 30;
+/// With fewer inliers the coarse motion is replaced by the prediction; empirical.
+constexpr int kMinCoarseInliers = 10;
+/// With fewer inliers inside of the gates, the descriptors are matched over the whole image as well; empirical.
+constexpr int kSufficientCoarseInliers = 30;
 
-class Stopwatch {
- public:
-  /// Milliseconds since the last lap.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-    return ms;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
-/// Mean shift in the image that a motion means for the landmarks, pixels.
+/// Mean image flow in pixels that a motion causes at the inlier landmarks.
 double mean_flow(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit) {
   const Pose current_from_previous = fit.previous_from_current.inverse();
   double sum = 0;
   int count = 0;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (!fit.inlier[i]) continue;
-    const auto before = project_anchored(stereo, matches[i].point, matches[i].previous_from_anchor);
-    const auto now =
+    const auto previous = project_anchored(stereo, matches[i].point, matches[i].previous_from_anchor);
+    const auto current =
         project_anchored(stereo, matches[i].point, current_from_previous * matches[i].previous_from_anchor);
-    if (!before || !now) continue;
-    sum += (now->measured - before->measured).head<2>().norm();
+    if (!previous || !current) continue;
+    sum += (current->measured - previous->measured).head<2>().norm();
     ++count;
   }
   return count > 0 ? sum / count : 0;
@@ -80,7 +66,7 @@ struct Odometer::State {
         reconstruction(options.reconstruction),
         matching(options.matching, reconstruction, workers),
         estimation(options.motion),
-        upkeep(options) {}
+        manager(options) {}
 
   OdometryOptions options;
   Workers workers;
@@ -88,45 +74,45 @@ struct Odometer::State {
   LandmarkReconstruction reconstruction;
   LandmarkMatching matching;
   MotionEstimation estimation;
-  LandmarkUpkeep upkeep;
+  LandmarkUpkeep manager;
   SmoothedImage left_smooth, right_smooth;
   std::vector<ReconstructedFeature> features;
   OdometerMemory memory;
 
-  std::optional<std::string> refusal(const RectifiedPair& pair) const;
+  std::optional<std::string> defect_of(const RectifiedPair& pair) const;
   Pose predict(Stamp now) const;
-  DisparityOffset offset_now() const;
+  DisparityOffset predicted_offset() const;
   void detect(const RectifiedPair& pair);
   void reconstruct(const StereoImages& images);
   void measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate, Stopwatch& watch);
   struct CoarseMotion {
     Pose previous_from_current;
     std::vector<LandmarkMatch> matches;
-    std::vector<int> feature_of;  ///< of each landmark; −1: none
+    std::vector<int> feature_of;  ///< index of the feature of each landmark; −1: none
   };
   CoarseMotion coarse_motion(const RectifiedStereo& stereo, const Pose& predicted);
-  void set_noise_floor(std::vector<LandmarkMatch>& matches) const;
+  void add_noise_floor(std::vector<LandmarkMatch>& matches) const;
   void decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
                      MotionEstimate& estimate) const;
 };
 
-/// Why a pair cannot be used, if so.
-std::optional<std::string> Odometer::State::refusal(const RectifiedPair& pair) const {
+/// Why a pair cannot be used; std::nullopt where it can.
+std::optional<std::string> Odometer::State::defect_of(const RectifiedPair& pair) const {
   if (pair.left.empty() || pair.right.empty()) return "an image is empty";
   if (pair.left.size() != pair.right.size()) return "left and right image differ in size";
   if (!(pair.geometry.focal_px > 0) || !(pair.geometry.baseline_m > 0)) return "the pair has no geometry";
   return std::nullopt;
 }
 
-/// Constant velocity.
+/// Constant-velocity model: the latest measured motion, scaled to the time since then.
 Pose Odometer::State::predict(Stamp now) const {
-  const double span = seconds_between(memory.stamp, now);
-  if (!(memory.velocity_span_s > 0) || !(span > 0)) return {};
-  return exp_se3(memory.last_motion * (span / memory.velocity_span_s));
+  const double elapsed_s = seconds_between(memory.stamp, now);
+  if (!(memory.velocity_span_s > 0) || !(elapsed_s > 0)) return {};
+  return exp_se3(memory.last_motion * (elapsed_s / memory.velocity_span_s));
 }
 
-/// What is known of the disparity offset before a shot is looked at.
-DisparityOffset Odometer::State::offset_now() const {
+/// Prior of the disparity offset for the current frame: a random walk, bounded by the prior of the calibration.
+DisparityOffset Odometer::State::predicted_offset() const {
   const double sigma = options.motion.offset_sigma_px, drift = options.motion.offset_drift_px;
   if (!(sigma > 0)) return {};
   if (!(memory.offset.variance > 0)) return {0, sigma * sigma};
@@ -135,10 +121,8 @@ DisparityOffset Odometer::State::offset_now() const {
 
 void Odometer::State::detect(const RectifiedPair& pair) {
   features.clear();
-  for (const Feature& found : detector->detect(pair.left, pair.left_mask)) {
-    ReconstructedFeature f{found, std::nullopt};
-    features.push_back(f);
-  }
+  for (const Feature& feature : detector->detect(pair.left, pair.left_mask))
+    features.push_back({feature, std::nullopt});
 }
 
 void Odometer::State::reconstruct(const StereoImages& images) {
@@ -151,7 +135,7 @@ void Odometer::State::reconstruct(const StereoImages& images) {
   });
 }
 
-/// A first motion from descriptors, and the matches it rests on; the prediction alone where they do not tell.
+/// Coarse motion from descriptor matches; the prediction where too few of them agree.
 Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedStereo& stereo, const Pose& predicted) {
   if (!options.matching.descriptors) return {predicted, {}, {}};
   struct Attempt {
@@ -161,23 +145,23 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedSter
     int inliers() const { return fit ? fit->inliers : 0; }
   };
   const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
-    Attempt made;
-    made.feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
-    made.matches = matching.coarse_matches(memory.map, features, made.feature_of);
-    made.fit = estimation.coarse(stereo, made.matches);
-    return made;
+    Attempt result;
+    result.feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
+    result.matches = matching.coarse_matches(memory.map, features, result.feature_of);
+    result.fit = estimation.coarse(stereo, result.matches);
+    return result;
   };
   Attempt best = attempt(predicted.inverse());
-  if (best.inliers() < kSureCoarseInliers) {
-    Attempt anywhere = attempt(std::nullopt);
-    if (anywhere.inliers() > best.inliers()) best = std::move(anywhere);
+  if (best.inliers() < kSufficientCoarseInliers) {
+    Attempt ungated = attempt(std::nullopt);
+    if (ungated.inliers() > best.inliers()) best = std::move(ungated);
   }
-  const Pose motion = best.inliers() >= kLeastCoarseInliers ? best.fit->previous_from_current : predicted;
+  const Pose motion = best.inliers() >= kMinCoarseInliers ? best.fit->previous_from_current : predicted;
   return {motion, std::move(best.matches), std::move(best.feature_of)};
 }
 
-/// What every measurement is uncertain by beyond its own residual.
-void Odometer::State::set_noise_floor(std::vector<LandmarkMatch>& matches) const {
+/// Adds the specified noise, which the residual of a single patch alignment does not show.
+void Odometer::State::add_noise_floor(std::vector<LandmarkMatch>& matches) const {
   const double pixel = options.motion.pixel_sigma_px, disparity = options.motion.disparity_sigma_px;
   for (LandmarkMatch& match : matches) {
     match.covariance.diagonal() += Eigen::Vector3d(pixel * pixel, pixel * pixel, disparity * disparity);
@@ -188,7 +172,7 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
                                     const MotionFit& fit, MotionEstimate& estimate) const {
   estimate.previous_from_current = fit.previous_from_current;
   estimate.covariance = fit.covariance;
-  if (fit.inliers < options.motion.few_inliers) {
+  if (fit.inliers < options.motion.min_tracking_inliers) {
     estimate.status = TrackingStatus::degraded;
     estimate.reason = fmt::format("only {} landmarks agree on the motion", fit.inliers);
     return;
@@ -199,10 +183,10 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
     return;
   }
   estimate.status = TrackingStatus::tracking;
-  if (!options.standing.detect) return;
+  if (!options.stationary.detect) return;
   const double flow = mean_flow(stereo, matches, fit);
-  if (flow > options.standing.max_flow_px) return;
-  // The landmarks keep their place while the rover stands, so a slow creep adds up until it is seen.
+  if (flow > options.stationary.max_flow_px) return;
+  // The anchors are not moved while the rover is stationary, so a slow creep accumulates until it exceeds the limit.
   estimate.status = TrackingStatus::standing;
   estimate.reason = fmt::format("the image has shifted by {:.2f} px", flow);
   estimate.previous_from_current = Pose();
@@ -214,11 +198,11 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   std::vector<LandmarkMatch> matches =
       options.matching.correlation ? matching.by_correlation(memory.map, images, start.inverse()) : coarse_matches;
   if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
-  set_noise_floor(matches);
+  add_noise_floor(matches);
   estimate.matches = static_cast<int>(matches.size());
   estimate.times.match = watch.lap();
 
-  const std::optional<MotionFit> fit = estimation.fine(images.geometry, matches, start, offset_now());
+  const std::optional<MotionFit> fit = estimation.fine(images.geometry, matches, start, predicted_offset());
   if (!fit || fit->inliers < options.motion.min_inliers) {
     estimate.status = TrackingStatus::lost;
     estimate.reason = fmt::format("{} landmarks, {} matches, {} agree on a motion", memory.map.landmarks.size(),
@@ -231,7 +215,7 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   decide_status(images.geometry, matches, *fit, estimate);
   memory.offset = fit->offset;
   move_anchors(memory.map, estimate.previous_from_current);
-  upkeep.update(memory.map, images, matches, *fit, features, feature_of);
+  manager.update(memory.map, images, matches, *fit, features, feature_of);
   estimate.times.estimate = watch.lap();
 }
 
@@ -251,10 +235,10 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
   estimate.from = s.memory.started ? s.memory.stamp : pair.stamp;
   const Pose prediction = predicted ? *predicted : s.predict(pair.stamp);
 
-  const std::optional<std::string> refusal = s.refusal(pair);
-  if (refusal) {
+  const std::optional<std::string> defect = s.defect_of(pair);
+  if (defect) {
     estimate.status = TrackingStatus::lost;
-    estimate.reason = *refusal;
+    estimate.reason = *defect;
   } else {
     StereoImages images{pair.geometry, pair.left, pair.right, {}, {}, pair.left_mask, pair.right_mask, disparity};
     s.left_smooth.compute(pair.left, s.workers);
@@ -274,7 +258,7 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
       }
     }
     if (estimate.status == TrackingStatus::lost) s.memory.map = {};
-    s.upkeep.add(s.memory.map, images, s.features);
+    s.manager.add(s.memory.map, images, s.features);
     s.memory.geometry = pair.geometry;
   }
 

@@ -1,4 +1,4 @@
-// Visual odometry: the motion of the rover from one stereo shot to the next.
+// Visual odometry: the motion of the rover from one stereo frame to the next.
 #pragma once
 
 #include <memory>
@@ -16,35 +16,36 @@
 namespace spartan {
 
 enum class TrackingStatus : std::uint8_t {
-  tracking,  ///< the motion is measured well
-  degraded,  ///< measured from little; its covariance says so
-  lost,      ///< not measured: the pose given is the prediction
-  standing,  ///< the rover has not moved
+  tracking,  ///< the motion is measured
+  degraded,  ///< measured from few inliers or against many outliers; its covariance says how well
+  lost,      ///< not measured: the motion returned is the prediction
+  standing,  ///< the rover is stationary: the motion returned is the identity
 };
 std::string_view name_of(TrackingStatus status);
 
-/// Milliseconds of each sub-step of one call (wall clock; for reports only, nothing depends on it).
+/// Wall-clock milliseconds of each sub-module in one call; for reports only, no result depends on it.
 struct OdometryTimes {
   double detect = 0, reconstruct = 0, match = 0, estimate = 0, total = 0;
 };
 
-/// The motion between two shots, in rectified left optical frames.
+/// The motion between two stereo frames, in rectified left optical frames.
 struct MotionEstimate {
   Stamp from, to;
-  bool first = false;  ///< there was no shot before: the motion is the identity
+  bool first = false;  ///< there was no previous frame: the motion is the identity
   Pose previous_from_current;
   Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²
   TrackingStatus status = TrackingStatus::tracking;
-  std::string reason;  ///< why it is not `tracking`; empty otherwise
+  std::string reason;  ///< why the status is not `tracking`; empty otherwise
   int landmarks = 0, matches = 0, inliers = 0;
-  double rms_px = 0;  ///< of the inliers' reprojection residuals
+  double rms_px = 0;  ///< root mean square of the inliers' reprojection residuals per coordinate, pixels
   OdometryTimes times;
 };
 
 struct OdometryOptions;  // odometry_options.h
 
-/// Landmark detection → landmark 3D reconstruction → landmark matching → motion estimation, holding the landmarks of
-/// t−1 (the published "1/z" block).
+/// Stereo visual odometry of the SPARTAN paper (Kostavelis et al., ICCV Workshops 2011): landmark detection → landmark
+/// 3D reconstruction → landmark matching → motion estimation. It keeps the landmarks of t−1 (the published "1/z"
+/// block). Derivation: docs/math/odometry.md.
 class Odometer {
  public:
   Odometer(const OdometryOptions& options, Workers workers);
@@ -52,12 +53,15 @@ class Odometer {
   Odometer& operator=(Odometer&&) noexcept;
   ~Odometer();
 
-  /// Takes the next shot. `predicted` (previous_from_current) comes from outside where something better than constant
-  /// velocity is known. `disparity` of the left image is used where the options ask for it and it is not empty.
+  /// Processes the next stereo frame. `predicted` (previous_from_current, left optical frames) replaces the
+  /// constant-velocity prediction. `disparity` is the dense disparity of the left image (pixels, NaN unknown), used
+  /// where the option reconstruction.source is `dense` and it is not empty. Never fails: a pair that cannot be used
+  /// gives the status `lost` with a reason.
   MotionEstimate add(const RectifiedPair& pair, const std::optional<Pose>& predicted = {},
                      ImageView<const float> disparity = {});
 
-  /// The memory of the stage as a versioned value; restore() of it makes the following estimates the same, bit for bit.
+  /// The state as a versioned value; after restore() the following estimates are the same, bit for bit. restore() fails
+  /// with code `input` where the bytes are damaged or of another version, and then changes nothing.
   Bytes save() const;
   Status restore(const Bytes& state);
 

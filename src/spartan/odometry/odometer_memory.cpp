@@ -35,7 +35,7 @@ void put(ArchiveWriter& out, const Landmark& landmark) {
   out.put(landmark.angle);
   out.put(landmark.sign);
   out.put_array(landmark.descriptor.data(), landmark.descriptor.size());
-  out.put(landmark.missed);
+  out.put(landmark.missed_frames);
 }
 
 template <class T, std::size_t N>
@@ -52,18 +52,18 @@ bool get(ArchiveReader& in, Landmark& landmark) {
   landmark.disparity = in.get<double>();
   landmark.variance = in.get<double>();
   landmark.slant = in.get_vector2();
-  bool whole = fill(landmark.patch, in.get_array<std::uint16_t>());
+  bool complete = fill(landmark.patch, in.get_array<std::uint16_t>());
   landmark.pixel = in.get_vector2();
   landmark.scale = in.get<float>();
   landmark.angle = in.get<float>();
   landmark.sign = in.get<std::int8_t>();
-  whole = fill(landmark.descriptor, in.get_array<std::int8_t>()) && whole;
-  landmark.missed = in.get<std::int32_t>();
-  return whole;
+  complete = fill(landmark.descriptor, in.get_array<std::int8_t>()) && complete;
+  landmark.missed_frames = in.get<std::int32_t>();
+  return complete;
 }
 
 tl::unexpected<Error> damaged(const std::string& what) {
-  return failure(ErrorCode::input, what, "odometry memory", "start the run anew");
+  return failure(ErrorCode::input, what, "odometry state", "start a new run instead of resuming this one");
 }
 
 }  // namespace
@@ -92,21 +92,21 @@ Bytes OdometerMemory::save() const {
 Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
   if (const auto version = in.get<std::uint32_t>(); version != kVersion) {
-    return damaged("version " + std::to_string(version) + " instead of " + std::to_string(kVersion));
+    return damaged("has version " + std::to_string(version) + ", version " + std::to_string(kVersion) + " is required");
   }
   OdometerMemory memory;
   memory.started = in.get<bool>();
   memory.stamp.ns = in.get<std::int64_t>();
   memory.geometry = get_stereo(in);
   const std::vector<double> motion = in.get_array<double>();
-  if (motion.size() != 6) return damaged("damaged");
+  if (motion.size() != 6) return damaged("is damaged: the latest motion has not 6 entries");
   std::copy(motion.begin(), motion.end(), memory.last_motion.data());
   memory.velocity_span_s = in.get<double>();
   memory.offset.value = in.get<double>();
   memory.offset.variance = in.get<double>();
   memory.map.next_anchor_id = in.get<std::uint32_t>();
   const auto anchors = in.get<std::uint32_t>();
-  if (anchors > bytes.size()) return damaged("damaged");
+  if (anchors > bytes.size()) return damaged("is damaged: more anchors than bytes");
   for (std::uint32_t i = 0; i < anchors; ++i) {
     Anchor anchor;
     anchor.id = in.get<std::uint32_t>();
@@ -116,10 +116,10 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   const auto landmarks = in.get<std::uint32_t>();
   for (std::uint32_t i = 0; i < landmarks; ++i) {
     Landmark landmark;
-    if (!get(in, landmark)) return damaged("damaged");
+    if (!get(in, landmark)) return damaged("is damaged: a patch or descriptor has the wrong length");
     memory.map.landmarks.push_back(landmark);
   }
-  if (Status status = in.finish("odometry memory"); !status) return failure(status);
+  if (Status status = in.finish("odometry state"); !status) return failure(status);
   return memory;
 }
 

@@ -1,4 +1,4 @@
-// All that the odometry carries from one shot to the next, and its form as bytes.
+// The state that the odometry keeps from one frame to the next, and its serialization.
 #pragma once
 
 #include "spartan/core/archive.h"
@@ -13,15 +13,15 @@ namespace spartan {
 
 struct OdometerMemory {
   bool started = false;
-  Stamp stamp;  ///< of the latest shot
+  Stamp stamp;  ///< of the latest frame
   RectifiedStereo geometry;
-  Vector6d last_motion = Vector6d::Zero();  ///< Log of the latest measured previous_from_current
-  double velocity_span_s = 0;               ///< time that motion took; 0: none yet
-  DisparityOffset offset;                   ///< variance 0 before the first motion
+  Vector6d last_motion = Vector6d::Zero();  ///< Log of the latest measured previous_from_current, (m, rad)
+  double velocity_span_s = 0;               ///< duration of that motion; 0: none measured yet
+  DisparityOffset offset;                   ///< variance 0 before the first measured motion
   LandmarkMemory map;
 
   Bytes save() const;
-  /// Code `input` where the bytes are of another version or damaged.
+  /// Fails with code `input` where the bytes are of another version or damaged.
   static Result<OdometerMemory> restore(const Bytes& bytes);
 };
 

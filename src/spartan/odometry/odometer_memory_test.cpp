@@ -25,25 +25,25 @@ OdometerMemory some_memory() {
     l.patch.fill(static_cast<std::uint16_t>(1000 + i));
     l.pixel = {11.5, 21.25};
     l.descriptor[5] = static_cast<std::int8_t>(-i);
-    l.missed = i;
+    l.missed_frames = i;
     memory.map.landmarks.push_back(l);
   }
   return memory;
 }
 
-TEST(OdometerMemory, ComesBackAsItWas) {
+TEST(OdometerMemory, RestoresWhatWasSaved) {
   const Bytes bytes = some_memory().save();
-  const Result<OdometerMemory> back = OdometerMemory::restore(bytes);
-  ASSERT_TRUE(back.has_value()) << back.error().message();
-  EXPECT_EQ(back->save(), bytes);
-  EXPECT_EQ(back->map.landmarks[2].patch[0], 1002);
-  EXPECT_EQ(back->map.landmarks[2].disparity, 6.25);
-  EXPECT_EQ(back->offset.value, 0.07);
-  EXPECT_EQ(back->map.anchor(3).latest_from_anchor.translation(),
+  const Result<OdometerMemory> restored = OdometerMemory::restore(bytes);
+  ASSERT_TRUE(restored.has_value()) << restored.error().message();
+  EXPECT_EQ(restored->save(), bytes);
+  EXPECT_EQ(restored->map.landmarks[2].patch[0], 1002);
+  EXPECT_EQ(restored->map.landmarks[2].disparity, 6.25);
+  EXPECT_EQ(restored->offset.value, 0.07);
+  EXPECT_EQ(restored->map.anchor(3).latest_from_anchor.translation(),
             some_memory().map.anchors[0].latest_from_anchor.translation());
 }
 
-TEST(OdometerMemory, RefusesOtherVersionsAndDamage) {
+TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
   const Bytes whole = some_memory().save();
   Bytes other = whole;
   other[0] = 99;
@@ -59,7 +59,7 @@ TEST(OdometerMemory, RefusesOtherVersionsAndDamage) {
   EXPECT_FALSE(OdometerMemory::restore(longer).has_value());
 }
 
-TEST(LandmarkMemory, DropsAnchorsThatNoLandmarkNeeds) {
+TEST(LandmarkMemory, DropsUnusedAnchors) {
   LandmarkMemory memory = some_memory().map;
   std::erase_if(memory.landmarks, [](const Landmark& l) { return l.anchor_id == 3; });
   memory.drop_unused_anchors();

@@ -20,7 +20,7 @@ using testing::SyntheticWorld;
 
 const RectifiedStereo kStereo{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
 
-// Half a metre above level ground, looking 32° down, `heading_rad` to the left of world x.
+// A camera half a meter above level ground, tilted 32° down, heading `heading_rad` to the left of world x.
 Pose camera_at(double x, double y, double heading_rad) {
   const double s = std::sin(0.55), c = std::cos(0.55);
   Eigen::Matrix3d body_from_optical;
@@ -28,35 +28,35 @@ Pose camera_at(double x, double y, double heading_rad) {
   return Pose(exp_so3({0, 0, heading_rad}), {x, y, 0.5}) * Pose(body_from_optical, {0, 0, 0});
 }
 
-// A curved drive: 4 cm and 0.8° a shot.
-Pose on_the_way(int shot) {
-  const double turned = 0.014 * shot, radius = 0.04 / 0.014;
-  return camera_at(radius * std::sin(turned), radius * (1 - std::cos(turned)), turned);
+// A curved drive: 4 cm and 0.8° per frame.
+Pose true_pose(int frame) {
+  const double heading = 0.014 * frame, radius = 0.04 / 0.014;
+  return camera_at(radius * std::sin(heading), radius * (1 - std::cos(heading)), heading);
 }
 
-// Shots are rendered once for all tests.
-const SyntheticShot& shot_of(int index) {
-  static const std::vector<SyntheticShot> shots = [] {
+// Frames are rendered once for all tests.
+const SyntheticShot& frame_of(int index) {
+  static const std::vector<SyntheticShot> frames = [] {
     const SyntheticWorld world(testing::SyntheticWorldOptions{});
-    std::vector<SyntheticShot> made;
-    made.reserve(10);
-    for (int i = 0; i < 10; ++i) made.push_back(world.render(kStereo, on_the_way(i), static_cast<std::uint64_t>(i)));
-    return made;
+    std::vector<SyntheticShot> rendered;
+    rendered.reserve(10);
+    for (int i = 0; i < 10; ++i) rendered.push_back(world.render(kStereo, true_pose(i), static_cast<std::uint64_t>(i)));
+    return rendered;
   }();
-  return shots[static_cast<std::size_t>(index)];
+  return frames[static_cast<std::size_t>(index)];
 }
 
-RectifiedPair pair_of(const SyntheticShot& shot, int time) {
+RectifiedPair pair_of(const SyntheticShot& frame, int time) {
   RectifiedPair pair;
   pair.stamp.ns = time * 1'000'000'000LL;
   pair.geometry = kStereo;
-  pair.left = shot.left;
-  pair.right = shot.right;
+  pair.left = frame.left;
+  pair.right = frame.right;
   return pair;
 }
 
 RectifiedPair pair_of(int index) {
-  return pair_of(shot_of(index), index);
+  return pair_of(frame_of(index), index);
 }
 
 RectifiedPair blank_pair(const Image<std::uint8_t>& blank, int time) {
@@ -78,7 +78,7 @@ Image<std::uint8_t> noisy(const Image<std::uint8_t>& image, Random& random) {
 }
 
 Pose true_motion(int from, int to) {
-  return on_the_way(from).inverse() * on_the_way(to);
+  return true_pose(from).inverse() * true_pose(to);
 }
 
 double translation_error(const MotionEstimate& estimate, int from, int to) {
@@ -93,7 +93,7 @@ std::vector<MotionEstimate> drive(const OdometryOptions& options, int threads = 
   Odometer odometer(options, Workers(threads));
   std::vector<MotionEstimate> estimates;
   estimates.reserve(10);
-  for (int i = 0; i < 10; ++i) estimates.push_back(odometer.add(pair_of(i), {}, shot_of(i).disparity));
+  for (int i = 0; i < 10; ++i) estimates.push_back(odometer.add(pair_of(i), {}, frame_of(i).disparity));
   return estimates;
 }
 
@@ -119,17 +119,17 @@ TEST(Odometer, FollowsASyntheticDrive) {
     const Vector6d error = log_se3(true_motion(i - 1, i).inverse() * e.previous_from_current);
     nees += error.dot(e.covariance.ldlt().solve(error)) / 9;
   }
-  // 36 cm driven: a third of a percent.
+  // A third of a percent of 36 cm.
   EXPECT_LT((true_motion(0, 9).inverse() * travelled).translation().norm(), 0.0012);
   EXPECT_GT(nees, 1);
-  EXPECT_LT(nees, 15);  // 6 in the mean; nine samples that hang together
+  EXPECT_LT(nees, 15);  // expected value 6; nine correlated samples
 }
 
-TEST(Odometer, EverySubStepCanBeSwitchedOff) {
+TEST(Odometer, EverySubModuleCanBeSwitchedOff) {
   for (const char* switched :
        {"detection.surf.upright=false", "reconstruction.source=dense", "reconstruction.left_right_check=false",
         "reconstruction.slant=false", "matching.descriptors=false", "matching.correlation=false",
-        "matching.rigidity=false", "motion.robust=false", "motion.offset_sigma_px=0", "standing.detect=false"}) {
+        "matching.rigidity=false", "motion.robust=false", "motion.offset_sigma_px=0", "stationary.detect=false"}) {
     const Result<OdometryOptions> options = set_option(OdometryOptions{}, switched);
     ASSERT_TRUE(options.has_value()) << options.error().message();
     Pose travelled;
@@ -142,12 +142,12 @@ TEST(Odometer, EverySubStepCanBeSwitchedOff) {
   }
 }
 
-TEST(Odometer, GivesTheSameBitsForAnyNumberOfThreads) {
+TEST(Odometer, IsBitIdenticalForAnyNumberOfThreads) {
   const std::vector<MotionEstimate> one = drive({}, 1), two = drive({}, 2);
   for (std::size_t i = 0; i < one.size(); ++i) EXPECT_TRUE(same_bits(one[i], two[i])) << i;
 }
 
-TEST(Odometer, GoesOnFromItsSavedStateBitForBit) {
+TEST(Odometer, ResumesFromItsSavedStateBitForBit) {
   Odometer whole({}, Workers(1));
   for (int i = 0; i < 5; ++i) whole.add(pair_of(i));
   Odometer resumed({}, Workers(1));
@@ -161,16 +161,16 @@ TEST(Odometer, GoesOnFromItsSavedStateBitForBit) {
   EXPECT_EQ(resumed.save(), before);
 }
 
-TEST(Odometer, StandsStillOnImagesThatDifferInNoiseAlone) {
+TEST(Odometer, IsStationaryOnImagesThatDifferInNoiseOnly) {
   for (const bool detect : {true, false}) {
     Random random(1);
     OdometryOptions options;
-    options.standing.detect = detect;
+    options.stationary.detect = detect;
     Odometer odometer(options, Workers(1));
     Pose travelled;
     for (int i = 0; i < 8; ++i) {
-      const Image<std::uint8_t> left = noisy(shot_of(0).left, random), right = noisy(shot_of(0).right, random);
-      RectifiedPair pair = pair_of(shot_of(0), i);
+      const Image<std::uint8_t> left = noisy(frame_of(0).left, random), right = noisy(frame_of(0).right, random);
+      RectifiedPair pair = pair_of(frame_of(0), i);
       pair.left = left;
       pair.right = right;
       const MotionEstimate e = odometer.add(pair);
@@ -180,60 +180,61 @@ TEST(Odometer, StandsStillOnImagesThatDifferInNoiseAlone) {
       }
     }
     EXPECT_LT(travelled.translation().norm(), detect ? 1e-12 : 0.0005);
-    // The next shot moves: nothing of the way is lost.
-    const MotionEstimate moved = odometer.add(pair_of(shot_of(1), 8));
+    // The next frame has moved: the whole motion is measured.
+    const MotionEstimate moved = odometer.add(pair_of(frame_of(1), 8));
     EXPECT_EQ(moved.status, TrackingStatus::tracking);
     EXPECT_LT(translation_error(moved, 0, 1), 0.001);
   }
 }
 
-TEST(Odometer, CreepingIsNotTakenForStanding) {
-  // 0.3 mm a shot is 0.05 px: seen as standing at first, but it adds up until a quarter of a pixel (1.6 mm) is passed.
+TEST(Odometer, SlowMotionIsNotTakenForStationary) {
+  // 0.3 mm per frame is 0.05 px: stationary at first, but it accumulates until it exceeds a quarter of a pixel (1.6
+  // mm).
   const SyntheticWorld world(testing::SyntheticWorldOptions{});
   Odometer odometer({}, Workers(1));
   Pose travelled;
-  int standing = 0;
+  int stationary = 0;
   for (int i = 0; i < 9; ++i) {
-    const SyntheticShot shot = world.render(kStereo, camera_at(0.0003 * i, 0, 0), static_cast<std::uint64_t>(200 + i));
-    const MotionEstimate e = odometer.add(pair_of(shot, i));
-    standing += e.status == TrackingStatus::standing;
+    const SyntheticShot frame = world.render(kStereo, camera_at(0.0003 * i, 0, 0), static_cast<std::uint64_t>(200 + i));
+    const MotionEstimate e = odometer.add(pair_of(frame, i));
+    stationary += e.status == TrackingStatus::standing;
     travelled = travelled * e.previous_from_current;
   }
-  EXPECT_GE(standing, 3);
+  EXPECT_GE(stationary, 3);
   EXPECT_GT(travelled.translation().norm(), 0.0014);
   EXPECT_LT(travelled.translation().norm(), 0.0026);
 }
 
-TEST(Odometer, IsLostWithAReasonAndResumesAtTheNextShotButOne) {
+TEST(Odometer, IsLostWithAReasonAndRecoversTwoFramesLater) {
   Odometer odometer({}, Workers(1));
   for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
   const Image<std::uint8_t> blank(320, 240, 90);
   const MotionEstimate lost = odometer.add(blank_pair(blank, 4));
   EXPECT_EQ(lost.status, TrackingStatus::lost);
   EXPECT_FALSE(lost.reason.empty());
-  // Constant velocity; the uncertainty is that of a guess.
+  // The constant-velocity prediction with a large covariance.
   EXPECT_LT(translation_error(lost, 3, 4), 0.002);
   EXPECT_GT(lost.covariance(0, 0), 0.1);
-  EXPECT_EQ(odometer.add(pair_of(5)).status, TrackingStatus::lost);  // nothing to compare with yet
+  EXPECT_EQ(odometer.add(pair_of(5)).status, TrackingStatus::lost);  // no landmarks yet
   const MotionEstimate back = odometer.add(pair_of(6));
   EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
   EXPECT_LT(translation_error(back, 5, 6), 0.001);
 }
 
-TEST(Odometer, UsesAPredictionWhenThereIsOne) {
-  // Half the way at once, without descriptors: only the prediction leads there.
+TEST(Odometer, UsesAGivenPrediction) {
+  // A motion of five frames at once, without descriptors: found only with the prediction.
   OdometryOptions options;
   options.matching.descriptors = false;
-  Odometer led(options, Workers(1)), alone(options, Workers(1));
-  led.add(pair_of(0));
-  alone.add(pair_of(0));
-  const MotionEstimate found = led.add(pair_of(5), true_motion(0, 5));
+  Odometer predicted(options, Workers(1)), unpredicted(options, Workers(1));
+  predicted.add(pair_of(0));
+  unpredicted.add(pair_of(0));
+  const MotionEstimate found = predicted.add(pair_of(5), true_motion(0, 5));
   EXPECT_EQ(found.status, TrackingStatus::tracking) << found.reason;
   EXPECT_LT(translation_error(found, 0, 5), 0.004);
-  EXPECT_NE(alone.add(pair_of(5)).status, TrackingStatus::tracking);
+  EXPECT_NE(unpredicted.add(pair_of(5)).status, TrackingStatus::tracking);
 }
 
-TEST(Odometer, FindsALargeUnannouncedMotion) {
+TEST(Odometer, FindsALargeUnpredictedMotion) {
   Odometer odometer({}, Workers(1));
   odometer.add(pair_of(0));
   const MotionEstimate found = odometer.add(pair_of(6));
@@ -241,7 +242,7 @@ TEST(Odometer, FindsALargeUnannouncedMotion) {
   EXPECT_LT(translation_error(found, 0, 6), 0.004);
 }
 
-TEST(Odometer, RefusesPairsThatAreNoneWithoutCrashing) {
+TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 200}, {12, 12}, {30, 20}, {64, 48}}) {
     Odometer odometer({}, Workers(2));
     const Image<std::uint8_t> tiny(width, height, 60);
@@ -262,7 +263,7 @@ TEST(Odometer, RefusesPairsThatAreNoneWithoutCrashing) {
   EXPECT_EQ(odometer.add(other).status, TrackingStatus::lost);
 }
 
-TEST(Odometer, DrivesTheFirstMetresOfKitti) {
+TEST(Odometer, MeasuresTheFirstMetersOfKitti) {
   const std::string folder = testing::data_folder() + "/kitti_06";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "set SPARTAN_DATA to the folder with kitti_06";
   Odometer odometer({}, Workers(2));

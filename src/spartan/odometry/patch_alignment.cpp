@@ -9,18 +9,34 @@ namespace spartan {
 namespace {
 
 constexpr int kMaxIterations = 15;
-constexpr double kSettled_px = 0.005;
-/// Smoothing correlates the noise of neighbouring pixels: the variance of a sum over many of them is the variance of
-/// one pixel over Σ kernel² = (70/256)².
+/// The iteration has converged where a step is smaller than this.
+constexpr double kConverged_px = 0.005;
+/// Smoothing correlates the noise of neighboring pixels: the variance of a sum over many of them is the variance of
+/// one pixel divided by Σ kernel² = (70/256)² of the binomial filter [1 4 6 4 1]/16 in two dimensions.
 constexpr double kNoiseCorrelation = 1.0 / ((70.0 / 256.0) * (70.0 / 256.0));
-/// Least standard deviation of a window that carries any information, gray levels.
-constexpr float kLeastDeviation = 0.5f;
+/// Effective number of pixels under the Gaussian window: about half of its area.
+constexpr double kEffectivePixels = 0.5 * kWindowArea;
+/// Minimum standard deviation of a window with usable texture, gray levels.
+constexpr float kMinDeviation = 0.5f;
+/// Minimum information (mean squared gradient, gray levels² per pixel²) in one direction, and its determinant in two;
+/// empirical.
+constexpr double kMinInformation = 1e-2, kMinDeterminant = 1e-4;
+/// Minimum determinant of a warp: patches that are compressed more are not aligned; empirical.
+constexpr double kMinWarpDeterminant = 0.05;
 /// Prior on the slant: σ = 0.4 px/px against a noise of about 4 gray levels (before smoothing).
 constexpr double kSlantPrior = 16.0 / (0.4 * 0.4);
+/// Information that fixes the slant where it is not estimated.
+constexpr double kFixedSlant = 1e12;
+/// Largest slant along and across the row (px/px); a larger one is a wrong match; empirical.
+constexpr double kMaxSlantX = 0.8, kMaxSlantY = 1.5;
+/// Standard deviation of the Gaussian window, pixels.
+constexpr float kWindowSigma_px = 4.0f;
+/// Weight of a step of the slant against one of the position in the convergence test: about the extent of the window.
+constexpr double kSlantLever_px = 3;
 
 using Window = std::array<float, kWindowArea>;
 
-/// Gaussian weights over the window, sum 1: what lies near the centre counts more.
+/// Gaussian weights over the window with sum 1.
 const Window& window_weights() {
   static const Window weights = [] {
     Window w{};
@@ -28,7 +44,8 @@ const Window& window_weights() {
     for (int y = 0, i = 0; y < kWindowSide; ++y) {
       for (int x = 0; x < kWindowSide; ++x, ++i) {
         const int dx = x - kWindowRadius, dy = y - kWindowRadius;
-        w[static_cast<std::size_t>(i)] = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2 * 4.0f * 4.0f));
+        w[static_cast<std::size_t>(i)] =
+            std::exp(-static_cast<float>(dx * dx + dy * dy) / (2 * kWindowSigma_px * kWindowSigma_px));
         sum += w[static_cast<std::size_t>(i)];
       }
     }
@@ -38,8 +55,8 @@ const Window& window_weights() {
   return weights;
 }
 
-/// Takes the weighted mean off and returns the weighted standard deviation.
-float normalise(Window& window) {
+/// Subtracts the weighted mean and returns the weighted standard deviation.
+float subtract_mean(Window& window) {
   const Window& w = window_weights();
   float mean = 0;
   for (std::size_t i = 0; i < kWindowArea; ++i) mean += w[i] * window[i];
@@ -58,13 +75,13 @@ float weighted_dot(const Window& a, const Window& b) {
   return sum;
 }
 
-/// Samples the image over the warped window, mean taken off; nothing where a corner leaves it.
+/// Samples the image over the warped window; std::nullopt where a corner leaves the image.
 std::optional<Window> warped_window(ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
                                     const Eigen::Vector2d& centre) {
-  const double reach_x = kWindowRadius * (std::abs(warp(0, 0)) + std::abs(warp(0, 1)));
-  const double reach_y = kWindowRadius * (std::abs(warp(1, 0)) + std::abs(warp(1, 1)));
-  if (!(centre.x() - reach_x >= 0 && centre.x() + reach_x < image.width() - 1.01 && centre.y() - reach_y >= 0 &&
-        centre.y() + reach_y < image.height() - 1.01)) {
+  const double radius_x = kWindowRadius * (std::abs(warp(0, 0)) + std::abs(warp(0, 1)));
+  const double radius_y = kWindowRadius * (std::abs(warp(1, 0)) + std::abs(warp(1, 1)));
+  if (!(centre.x() - radius_x >= 0 && centre.x() + radius_x < image.width() - 1.01 && centre.y() - radius_y >= 0 &&
+        centre.y() + radius_y < image.height() - 1.01)) {
     return std::nullopt;
   }
   Window window;
@@ -81,31 +98,32 @@ std::optional<Window> warped_window(ImageView<const std::uint16_t> image, const 
   return window;
 }
 
-/// How an image differs from a template, its contrast brought to the template's.
+/// Difference of an image window to a template, after matching mean and contrast.
 struct WindowDifference {
-  Window seen, residual;
+  Window observed, residual;
   float deviation;
-  double correlation(const AlignmentTemplate& wanted) const {
-    return weighted_dot(seen, wanted.value) / (deviation * wanted.deviation);
+  double correlation(const AlignmentTemplate& reference) const {
+    return weighted_dot(observed, reference.value) / (deviation * reference.deviation);
   }
   double variance() const { return weighted_dot(residual, residual); }
 };
 
-/// Nothing where the window leaves the image or sees nothing.
-std::optional<WindowDifference> difference_from(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> image,
-                                                const Eigen::Matrix2d& warp, const Eigen::Vector2d& centre) {
-  const std::optional<Window> seen = warped_window(image, warp, centre);
-  if (!seen) return std::nullopt;
-  WindowDifference difference{*seen, {}, 0};
-  difference.deviation = normalise(difference.seen);
-  if (difference.deviation < kLeastDeviation) return std::nullopt;
-  const float contrast = wanted.deviation / difference.deviation;
+/// std::nullopt where the window leaves the image or has no texture.
+std::optional<WindowDifference> difference_from(const AlignmentTemplate& reference,
+                                                ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
+                                                const Eigen::Vector2d& centre) {
+  const std::optional<Window> observed = warped_window(image, warp, centre);
+  if (!observed) return std::nullopt;
+  WindowDifference difference{*observed, {}, 0};
+  difference.deviation = subtract_mean(difference.observed);
+  if (difference.deviation < kMinDeviation) return std::nullopt;
+  const float contrast = reference.deviation / difference.deviation;
   for (std::size_t i = 0; i < kWindowArea; ++i)
-    difference.residual[i] = contrast * difference.seen[i] - wanted.value[i];
+    difference.residual[i] = contrast * difference.observed[i] - reference.value[i];
   return difference;
 }
 
-/// J Jᵀ, a weighted mean over the window.
+/// Weighted mean of JᵀJ over the window, J given by its columns.
 template <std::size_t Unknowns>
 Eigen::Matrix<double, Unknowns, Unknowns> information_of(const std::array<Window, Unknowns>& j) {
   Eigen::Matrix<double, Unknowns, Unknowns> information;
@@ -118,7 +136,7 @@ Eigen::Matrix<double, Unknowns, Unknowns> information_of(const std::array<Window
   return information;
 }
 
-/// J r.
+/// Weighted mean of Jᵀr over the window.
 template <std::size_t Unknowns>
 Eigen::Matrix<double, Unknowns, 1> gradient_of(const std::array<Window, Unknowns>& j, const Window& residual) {
   Eigen::Matrix<double, Unknowns, 1> gradient;
@@ -148,7 +166,7 @@ AlignmentTemplate::AlignmentTemplate(const std::array<float, kPatchSide * kPatch
       gradient_y[i] = 0.5f * (p[kPatchSide] - p[-kPatchSide]);
     }
   }
-  deviation = normalise(value);
+  deviation = subtract_mean(value);
 }
 
 AlignmentTemplate::AlignmentTemplate(const ImagePatch& patch)
@@ -175,61 +193,62 @@ std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::
   return AlignmentTemplate(pixels);
 }
 
-std::optional<Alignment> align_translation(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> image,
-                                           const Eigen::Matrix2d& warp, const Eigen::Vector2d& start, double reach_px) {
-  if (wanted.deviation < kLeastDeviation || !(std::abs(warp.determinant()) > 0.05)) return std::nullopt;
-  // ∇image = warp⁻ᵀ ∇template where the two are aligned.
+std::optional<PatchAlignment> align_translation(const AlignmentTemplate& reference,
+                                                ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
+                                                const Eigen::Vector2d& start, double radius_px) {
+  if (reference.deviation < kMinDeviation || !(std::abs(warp.determinant()) > kMinWarpDeterminant)) return std::nullopt;
+  // At the solution ∇image = warp⁻ᵀ ∇template, so the Jacobian is computed once, from the template.
   const Eigen::Matrix2f to_image = warp.inverse().transpose().cast<float>();
   std::array<Window, 2> j;
   for (std::size_t i = 0; i < kWindowArea; ++i) {
-    j[0][i] = to_image(0, 0) * wanted.gradient_x[i] + to_image(0, 1) * wanted.gradient_y[i];
-    j[1][i] = to_image(1, 0) * wanted.gradient_x[i] + to_image(1, 1) * wanted.gradient_y[i];
+    j[0][i] = to_image(0, 0) * reference.gradient_x[i] + to_image(0, 1) * reference.gradient_y[i];
+    j[1][i] = to_image(1, 0) * reference.gradient_x[i] + to_image(1, 1) * reference.gradient_y[i];
   }
-  for (Window& window : j) normalise(window);  // the unknown brightness takes the mean away
+  for (Window& window : j) subtract_mean(window);  // projects out the unknown brightness
   const Eigen::Matrix2d information = information_of(j);
-  if (!(information.determinant() > 1e-4)) return std::nullopt;
+  if (!(information.determinant() > kMinDeterminant)) return std::nullopt;
   const Eigen::Matrix2d inverse = information.inverse();
 
   Eigen::Vector2d position = start;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    const auto difference = difference_from(wanted, image, warp, position);
+    const auto difference = difference_from(reference, image, warp, position);
     if (!difference) return std::nullopt;
     const Eigen::Vector2d step = -(inverse * gradient_of(j, difference->residual));
     position += step;
-    if (!((position - start).norm() <= reach_px)) return std::nullopt;
-    if (step.norm() > kSettled_px) continue;
+    if (!((position - start).norm() <= radius_px)) return std::nullopt;
+    if (step.norm() > kConverged_px) continue;
     const double variance = difference->variance();
-    Alignment found;
+    PatchAlignment found;
     found.position = position;
-    found.correlation = difference->correlation(wanted);
-    // `information` is a weighted mean over the window, so the sum over independent pixels is larger by their number.
-    found.covariance = inverse * (variance * kNoiseCorrelation / (0.5 * kWindowArea));
+    found.correlation = difference->correlation(reference);
+    // `information` is a mean over the window; the sum over independent pixels is larger by their number.
+    found.covariance = inverse * (variance * kNoiseCorrelation / kEffectivePixels);
     return found;
   }
   return std::nullopt;
 }
 
-std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> right,
+std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,
                                             const Eigen::Vector2d& centre, const RowAlignment& start,
-                                            bool estimate_slant, double reach_px) {
-  if (wanted.deviation < kLeastDeviation) return std::nullopt;
-  // right(x − d − s·offset) ≈ template: derivative by d is −∇x, by the slant −offset ∇x.
+                                            bool estimate_slant, double radius_px) {
+  if (reference.deviation < kMinDeviation) return std::nullopt;
+  // right(x − d − s·offset) ≈ template(x): the derivative by d is −∂x, by the slant −offset ∂x.
   std::array<Window, 3> j;
   for (std::size_t i = 0; i < kWindowArea; ++i) {
     const int column = static_cast<int>(i) % kWindowSide, row = static_cast<int>(i) / kWindowSide;
-    j[0][i] = -wanted.gradient_x[i];
+    j[0][i] = -reference.gradient_x[i];
     j[1][i] = j[0][i] * static_cast<float>(column - kWindowRadius);
     j[2][i] = j[0][i] * static_cast<float>(row - kWindowRadius);
   }
-  for (Window& window : j) normalise(window);
+  for (Window& window : j) subtract_mean(window);
   Eigen::Matrix3d information = information_of(j);
-  if (!(information(0, 0) > 1e-2)) return std::nullopt;
-  const double prior = kSlantPrior * kNoiseCorrelation / (0.5 * kWindowArea);
+  if (!(information(0, 0) > kMinInformation)) return std::nullopt;
+  const double prior = kSlantPrior * kNoiseCorrelation / kEffectivePixels;
   information(1, 1) += prior;
   information(2, 2) += prior;
   if (!estimate_slant) {
     const double alone = information(0, 0);
-    information = Eigen::Vector3d(alone, 1e12, 1e12).asDiagonal();
+    information = Eigen::Vector3d(alone, kFixedSlant, kFixedSlant).asDiagonal();
   }
   const Eigen::Matrix3d inverse = information.inverse();
 
@@ -237,44 +256,46 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, Ima
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     Eigen::Matrix2d warp;
     warp << 1 - x[1], -x[2], 0, 1;
-    const auto difference = difference_from(wanted, right, warp, centre - Eigen::Vector2d(x[0], 0));
+    const auto difference = difference_from(reference, right, warp, centre - Eigen::Vector2d(x[0], 0));
     if (!difference) return std::nullopt;
     Eigen::Vector3d gradient = gradient_of(j, difference->residual);
     gradient[1] += prior * (x[1] - start.slant.x());
     gradient[2] += prior * (x[2] - start.slant.y());
     const Eigen::Vector3d step = -(inverse * gradient);
     x += step;
-    if (!(std::abs(x[0] - start.disparity) <= reach_px) || !(std::abs(x[1]) < 0.8) || !(std::abs(x[2]) < 1.5)) {
+    if (!(std::abs(x[0] - start.disparity) <= radius_px) || !(std::abs(x[1]) < kMaxSlantX) ||
+        !(std::abs(x[2]) < kMaxSlantY)) {
       return std::nullopt;
     }
-    if (std::abs(step[0]) + 3 * std::abs(step[1]) + 3 * std::abs(step[2]) > 2 * kSettled_px) continue;
+    if (std::abs(step[0]) + kSlantLever_px * std::abs(step[1]) + kSlantLever_px * std::abs(step[2]) > 2 * kConverged_px)
+      continue;
     RowAlignment found;
     found.disparity = x[0];
     found.slant = {x[1], x[2]};
-    found.correlation = difference->correlation(wanted);
+    found.correlation = difference->correlation(reference);
     const double variance = difference->variance();
-    found.sigma_px = std::sqrt(inverse(0, 0) * variance * kNoiseCorrelation / (0.5 * kWindowArea));
+    found.sigma_px = std::sqrt(inverse(0, 0) * variance * kNoiseCorrelation / kEffectivePixels);
     return found;
   }
   return std::nullopt;
 }
 
-std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> right,
-                                              const Eigen::Vector2d& start, double reach_px) {
-  if (wanted.deviation < kLeastDeviation) return std::nullopt;
-  // right(c + (ox − s·o, oy)) ≈ template: derivatives by c are ∇, by the slant −offset ∇x.
+std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,
+                                              const Eigen::Vector2d& start, double radius_px) {
+  if (reference.deviation < kMinDeviation) return std::nullopt;
+  // right(c + (ox − s·o, oy)) ≈ template: the derivative by c is the gradient, by the slant −offset ∂x.
   std::array<Window, 4> j;
   for (std::size_t i = 0; i < kWindowArea; ++i) {
     const int column = static_cast<int>(i) % kWindowSide, row = static_cast<int>(i) / kWindowSide;
-    j[0][i] = wanted.gradient_x[i];
-    j[1][i] = wanted.gradient_y[i];
-    j[2][i] = -wanted.gradient_x[i] * static_cast<float>(column - kWindowRadius);
-    j[3][i] = -wanted.gradient_x[i] * static_cast<float>(row - kWindowRadius);
+    j[0][i] = reference.gradient_x[i];
+    j[1][i] = reference.gradient_y[i];
+    j[2][i] = -reference.gradient_x[i] * static_cast<float>(column - kWindowRadius);
+    j[3][i] = -reference.gradient_x[i] * static_cast<float>(row - kWindowRadius);
   }
-  for (Window& window : j) normalise(window);
+  for (Window& window : j) subtract_mean(window);
   Eigen::Matrix4d information = information_of(j);
-  if (!(information.topLeftCorner<2, 2>().determinant() > 1e-4)) return std::nullopt;
-  const double prior = kSlantPrior * kNoiseCorrelation / (0.5 * kWindowArea);
+  if (!(information.topLeftCorner<2, 2>().determinant() > kMinDeterminant)) return std::nullopt;
+  const double prior = kSlantPrior * kNoiseCorrelation / kEffectivePixels;
   information(2, 2) += prior;
   information(3, 3) += prior;
   const Eigen::Matrix4d inverse = information.inverse();
@@ -283,21 +304,22 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, I
   for (int iteration = 0; iteration < 2 * kMaxIterations; ++iteration) {
     Eigen::Matrix2d warp;
     warp << 1 - x[2], -x[3], 0, 1;
-    const auto difference = difference_from(wanted, right, warp, x.head<2>());
+    const auto difference = difference_from(reference, right, warp, x.head<2>());
     if (!difference) return std::nullopt;
     Eigen::Vector4d gradient = gradient_of(j, difference->residual);
     gradient.tail<2>() += prior * x.tail<2>();
     const Eigen::Vector4d step = -(inverse * gradient);
     x += step;
-    if (!((x.head<2>() - start).norm() <= reach_px) || !(std::abs(x[2]) < 0.8) || !(std::abs(x[3]) < 1.5)) {
+    if (!((x.head<2>() - start).norm() <= radius_px) || !(std::abs(x[2]) < kMaxSlantX) ||
+        !(std::abs(x[3]) < kMaxSlantY)) {
       return std::nullopt;
     }
-    if (step.head<2>().norm() + 3 * step.tail<2>().norm() > 2 * kSettled_px) continue;
+    if (step.head<2>().norm() + kSlantLever_px * step.tail<2>().norm() > 2 * kConverged_px) continue;
     const double variance = difference->variance();
     SlantedAlignment found;
-    found.place.position = x.head<2>();
-    found.place.correlation = difference->correlation(wanted);
-    found.place.covariance = inverse.topLeftCorner<2, 2>() * (variance * kNoiseCorrelation / (0.5 * kWindowArea));
+    found.match.position = x.head<2>();
+    found.match.correlation = difference->correlation(reference);
+    found.match.covariance = inverse.topLeftCorner<2, 2>() * (variance * kNoiseCorrelation / kEffectivePixels);
     found.slant = x.tail<2>();
     return found;
   }

@@ -17,20 +17,20 @@ inline constexpr int kWindowSide = 2 * kWindowRadius + 1;
 inline constexpr int kWindowArea = kWindowSide * kWindowSide;
 inline constexpr int kPatchSide = kWindowSide + 2;
 
-/// The surroundings of a pixel in a smoothed image, gray levels times 256, row by row.
+/// Pixels around a pixel of a smoothed image, gray levels times 256, row by row.
 using ImagePatch = std::array<std::uint16_t, kPatchSide * kPatchSide>;
 
-/// Around a whole pixel; nothing where the patch leaves the image.
+/// The patch around a whole pixel; std::nullopt where it leaves the image.
 std::optional<ImagePatch> cut_patch(ImageView<const std::uint16_t> image, int x, int y);
 
-/// A window of gray levels with its gradients, ready to be found again. Offsets run over the window row by row.
+/// A window of gray levels and its gradients, the template of an alignment. Offsets run over the window row by row.
 class AlignmentTemplate {
  public:
   explicit AlignmentTemplate(const ImagePatch& patch);
-  /// Around a sub-pixel place of a smoothed image; nothing where it leaves the image.
+  /// Around a sub-pixel position of a smoothed image; std::nullopt where the window leaves the image.
   static std::optional<AlignmentTemplate> around(ImageView<const std::uint16_t> image, const Eigen::Vector2d& centre);
 
-  /// Weighted mean taken off; `deviation` is the weighted standard deviation, gray levels.
+  /// Gray levels without their weighted mean; `deviation` is the weighted standard deviation.
   std::array<float, kWindowArea> value, gradient_x, gradient_y;
   float deviation = 0;
 
@@ -38,43 +38,45 @@ class AlignmentTemplate {
   explicit AlignmentTemplate(const std::array<float, kPatchSide * kPatchSide>& pixels);
 };
 
-/// Where a template was found.
-struct Alignment {
+/// Result of an alignment.
+struct PatchAlignment {
   Eigen::Vector2d position;    ///< of the template's centre, pixels
-  Eigen::Matrix2d covariance;  ///< from the residual and the texture, pixels²
-  double correlation = 0;      ///< normalised, at the end
+  Eigen::Matrix2d covariance;  ///< from the residual and the gradients, pixels²
+  double correlation = 0;      ///< normalized cross-correlation at the result
 };
 
-/// Moves the centre so that image(centre + warp · offset) is like template(offset) up to brightness and contrast
-/// (translation only; inverse-compositional normal equations). Nothing where it leaves the image, does not settle or
-/// goes further than `reach_px` from the start.
-std::optional<Alignment> align_translation(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> image,
-                                           const Eigen::Matrix2d& warp, const Eigen::Vector2d& start, double reach_px);
+/// Estimates the center so that image(center + warp · offset) ≈ template(offset) up to brightness and contrast
+/// (translation only; inverse-compositional Gauss-Newton, Baker & Matthews §3.2). std::nullopt where the window leaves
+/// the image, the iteration does not converge or moves farther than `radius_px` from the start.
+std::optional<PatchAlignment> align_translation(const AlignmentTemplate& reference,
+                                                ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
+                                                const Eigen::Vector2d& start, double radius_px);
 
+/// Disparity of a patch from an alignment along the image row.
 struct RowAlignment {
-  double disparity = 0;
-  Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< ∂disparity/∂(x, y) in the left image
-  double sigma_px = 0;                              ///< of the disparity, from the residual and the texture
-  double correlation = 0;
+  double disparity = 0;                             ///< pixels
+  Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< disparity gradient ∂d/∂(x, y) in the left image
+  double sigma_px = 0;                              ///< of the disparity, from the residual and the gradients
+  double correlation = 0;                           ///< normalized cross-correlation at the result
 };
 
-/// Finds disparity and slant so that right(centre + offset − (disparity + slant · offset, 0)) is like the template,
-/// which was taken around `centre` of the left image. A slant is held near its start by a weak prior; with
-/// `estimate_slant` false it stays.
-std::optional<RowAlignment> align_along_row(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> right,
-                                            const Eigen::Vector2d& centre, const RowAlignment& start,
-                                            bool estimate_slant, double reach_px);
+/// Estimates disparity and slant so that right(center + offset − (disparity + slant · offset, 0)) ≈ template(offset),
+/// for a template around `center` of the left image. A weak Gaussian prior keeps the slant near its start; with
+/// `estimate_slant` false the slant is fixed. std::nullopt as for align_translation().
+std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,
+                                            const Eigen::Vector2d& center, const RowAlignment& start,
+                                            bool estimate_slant, double radius_px);
 
-/// Where a template of the left eye was found in the right one when neither row nor slant are known.
+/// Alignment of a left template in the right image where neither row nor slant is known.
 struct SlantedAlignment {
-  Alignment place;
-  Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< ∂disparity/∂(x, y) in the left image
+  PatchAlignment match;
+  Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< disparity gradient ∂d/∂(x, y) in the left image
 };
 
-/// As align_translation with the surface's slant estimated along: right(centre + offset − (slant · offset, 0)) is like
-/// the template. Without it, slanted edges of slanted ground draw a match up or down. A weak prior holds the slant near
-/// 0.
-std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& wanted, ImageView<const std::uint16_t> right,
-                                              const Eigen::Vector2d& start, double reach_px);
+/// align_translation() that estimates the slant of the surface as well: right(center + offset − (slant · offset, 0)) ≈
+/// template(offset). Without the slant, oblique edges on slanted ground bias the row of the match. A weak Gaussian
+/// prior keeps the slant near 0.
+std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,
+                                              const Eigen::Vector2d& start, double radius_px);
 
 }  // namespace spartan

@@ -14,18 +14,18 @@ namespace {
 
 constexpr int kSide = 64;
 
-// texture(A⁻¹ (x − centre − shift)) with noise, smoothed.
-class Picture {
+// texture(A⁻¹ (x − center − shift)) with noise, smoothed.
+class WarpedTexture {
  public:
-  Picture(const Eigen::Matrix2d& warp, const Eigen::Vector2d& shift, double gain = 1, double noise = 0,
-          std::uint64_t seed = 1) {
+  WarpedTexture(const Eigen::Matrix2d& warp, const Eigen::Vector2d& shift, double gain = 1, double noise = 0,
+                std::uint64_t seed = 1) {
     const auto octaves = make_octaves(11, 2, 9, 0.7, 35);
     Image<std::uint8_t> image(kSide, kSide);
     Random random(seed);
-    const Eigen::Matrix2d back = warp.inverse();
+    const Eigen::Matrix2d inverse_warp = warp.inverse();
     for (int y = 0; y < kSide; ++y) {
       for (int x = 0; x < kSide; ++x) {
-        const Eigen::Vector2d p = back * (Eigen::Vector2d(x - 32, y - 32) - shift);
+        const Eigen::Vector2d p = inverse_warp * (Eigen::Vector2d(x - 32, y - 32) - shift);
         double value = 120;
         for (const auto& octave : octaves) value += octave.value(p.x(), p.y());
         value = 100 + gain * (value - 120) + noise * random.normal();
@@ -41,10 +41,11 @@ class Picture {
 };
 
 AlignmentTemplate reference(double noise = 0, std::uint64_t seed = 1) {
-  return AlignmentTemplate(*cut_patch(Picture(Eigen::Matrix2d::Identity(), {0, 0}, 1, noise, seed).view(), 32, 32));
+  return AlignmentTemplate(
+      *cut_patch(WarpedTexture(Eigen::Matrix2d::Identity(), {0, 0}, 1, noise, seed).view(), 32, 32));
 }
 
-TEST(SmoothedImage, IsTheBinomialFilterWithRepeatedBorders) {
+TEST(SmoothedImage, IsTheBinomialFilterWithReplicatedBorders) {
   Image<std::uint8_t> image(9, 7);
   Random random(5);
   for (int y = 0; y < 7; ++y)
@@ -66,37 +67,37 @@ TEST(SmoothedImage, IsTheBinomialFilterWithRepeatedBorders) {
   EXPECT_EQ(smooth.view()(0, 0), 9 * 256);
 }
 
-TEST(PatchAlignment, FindsSubPixelShiftsWithoutAPullToWholePixels) {
-  const AlignmentTemplate wanted = reference();
+TEST(PatchAlignment, FindsSubPixelShiftsWithoutPixelLocking) {
+  const AlignmentTemplate base = reference();
   for (const double x : {-1.3, -0.75, -0.5, -0.25, 0.0, 0.1, 0.33, 0.5, 0.8, 1.4}) {
     const Eigen::Vector2d shift(x, 0.6 * x + 0.2);
-    const Picture moved(Eigen::Matrix2d::Identity(), shift);
-    const auto found = align_translation(wanted, moved.view(), Eigen::Matrix2d::Identity(), {32, 32}, 4);
+    const WarpedTexture moved(Eigen::Matrix2d::Identity(), shift);
+    const auto found = align_translation(base, moved.view(), Eigen::Matrix2d::Identity(), {32, 32}, 4);
     ASSERT_TRUE(found.has_value()) << x;
     EXPECT_LT((found->position - Eigen::Vector2d(32, 32) - shift).norm(), 0.02) << x;
     EXPECT_GT(found->correlation, 0.99);
   }
 }
 
-TEST(PatchAlignment, ForgivesContrastAndAKnownWarp) {
+TEST(PatchAlignment, IsInvariantToContrastAndAKnownWarp) {
   Eigen::Matrix2d warp;
   warp << 1.2, 0.05, -0.1, 1.3;
   const Eigen::Vector2d shift(0.7, -0.4);
-  const Picture moved(warp, shift, 0.5);
+  const WarpedTexture moved(warp, shift, 0.5);
   const auto found = align_translation(reference(), moved.view(), warp, {32, 32}, 4);
   ASSERT_TRUE(found.has_value());
   EXPECT_LT((found->position - Eigen::Vector2d(32, 32) - shift).norm(), 0.05);
 }
 
-TEST(PatchAlignment, CovarianceCoversTheScatter) {
-  // Over many noises the error's length in units of the stated covariance has mean 2. The smoothing makes the stated
-  // one careful: 0.3 … 1.2 times.
+TEST(PatchAlignment, CovarianceCoversTheErrors) {
+  // The squared Mahalanobis distance of the error has mean 2 over many noise realizations. The correction for smoothing
+  // makes the covariance conservative: 0.3 … 1.2 times that.
   double sum = 0;
   const int trials = 200;
   for (int i = 0; i < trials; ++i) {
     const auto seed = static_cast<std::uint64_t>(i);
     const Eigen::Vector2d shift(0.01 * i - 1, 0.3);
-    const Picture moved(Eigen::Matrix2d::Identity(), shift, 1, 4, 2 * seed + 1);
+    const WarpedTexture moved(Eigen::Matrix2d::Identity(), shift, 1, 4, 2 * seed + 1);
     const auto found =
         align_translation(reference(4, 2 * seed), moved.view(), Eigen::Matrix2d::Identity(), {32, 32}, 4);
     ASSERT_TRUE(found.has_value());
@@ -113,54 +114,54 @@ TEST(PatchAlignment, FindsDisparityAndSlant) {
   Eigen::Matrix2d warp;
   warp << 1 - slant.x(), -slant.y(), 0, 1;
   for (const double d : {-0.8, -0.3, 0.0, 0.45, 1.0}) {
-    const Picture right(warp, {-d, 0});
+    const WarpedTexture right(warp, {-d, 0});
     RowAlignment start;
     const auto found = align_along_row(reference(), right.view(), {32, 32}, start, true, 2);
     ASSERT_TRUE(found.has_value()) << d;
     EXPECT_NEAR(found->disparity, d, 0.04) << d;
     EXPECT_NEAR(found->slant.x(), slant.x(), 0.03);
     EXPECT_NEAR(found->slant.y(), slant.y(), 0.03);
-    const auto stiff = align_along_row(reference(), right.view(), {32, 32}, start, false, 2);
-    if (stiff) {
-      EXPECT_LT(stiff->correlation, found->correlation);
+    const auto fronto_parallel = align_along_row(reference(), right.view(), {32, 32}, start, false, 2);
+    if (fronto_parallel) {
+      EXPECT_LT(fronto_parallel->correlation, found->correlation);
     }
   }
 }
 
-// As along the row, with a row that is not known either.
-TEST(PatchAlignment, FindsPlaceAndSlant) {
+// As along the row, with the row unknown as well.
+TEST(PatchAlignment, FindsPositionAndSlant) {
   const Eigen::Vector2d slant(0.05, 0.3);
   Eigen::Matrix2d warp;
   warp << 1 - slant.x(), -slant.y(), 0, 1;
   for (const double d : {-0.8, -0.3, 0.0, 0.45, 1.0}) {
     const Eigen::Vector2d shift(-d, 0.4 * d + 0.3);
-    const Picture right(warp, shift);
+    const WarpedTexture right(warp, shift);
     const auto found = align_slanted(reference(), right.view(), {32, 32}, 3);
     ASSERT_TRUE(found.has_value()) << d;
-    EXPECT_LT((found->place.position - Eigen::Vector2d(32, 32) - shift).norm(), 0.05) << d;
+    EXPECT_LT((found->match.position - Eigen::Vector2d(32, 32) - shift).norm(), 0.05) << d;
     EXPECT_NEAR(found->slant.x(), slant.x(), 0.03);
     EXPECT_NEAR(found->slant.y(), slant.y(), 0.03);
-    const auto stiff = align_translation(reference(), right.view(), Eigen::Matrix2d::Identity(), {32, 32}, 3);
-    if (stiff) {
-      EXPECT_LT(stiff->correlation, found->place.correlation);
+    const auto fronto_parallel = align_translation(reference(), right.view(), Eigen::Matrix2d::Identity(), {32, 32}, 3);
+    if (fronto_parallel) {
+      EXPECT_LT(fronto_parallel->correlation, found->match.correlation);
     }
   }
-  EXPECT_FALSE(align_slanted(reference(), Picture(Eigen::Matrix2d::Identity(), {3, 3}).view(), {32, 32}, 1));
+  EXPECT_FALSE(align_slanted(reference(), WarpedTexture(Eigen::Matrix2d::Identity(), {3, 3}).view(), {32, 32}, 1));
 }
 
-TEST(PatchAlignment, RefusesBordersFlatPatchesAndFarWays) {
-  const Picture picture(Eigen::Matrix2d::Identity(), {0, 0});
-  EXPECT_FALSE(cut_patch(picture.view(), 6, 32).has_value());
-  EXPECT_TRUE(cut_patch(picture.view(), 7, 56).has_value());
-  EXPECT_FALSE(cut_patch(picture.view(), 32, 57).has_value());
+TEST(PatchAlignment, RejectsBordersFlatPatchesAndLargeSteps) {
+  const WarpedTexture texture(Eigen::Matrix2d::Identity(), {0, 0});
+  EXPECT_FALSE(cut_patch(texture.view(), 6, 32).has_value());
+  EXPECT_TRUE(cut_patch(texture.view(), 7, 56).has_value());
+  EXPECT_FALSE(cut_patch(texture.view(), 32, 57).has_value());
   const Eigen::Matrix2d same = Eigen::Matrix2d::Identity();
-  EXPECT_FALSE(align_translation(reference(), picture.view(), same, {3, 32}, 4).has_value());
-  EXPECT_FALSE(align_translation(reference(), picture.view(), same, {1e9, 32}, 4).has_value());
-  EXPECT_FALSE(align_translation(reference(), picture.view(), same, {std::nan(""), 32}, 4).has_value());
+  EXPECT_FALSE(align_translation(reference(), texture.view(), same, {3, 32}, 4).has_value());
+  EXPECT_FALSE(align_translation(reference(), texture.view(), same, {1e9, 32}, 4).has_value());
+  EXPECT_FALSE(align_translation(reference(), texture.view(), same, {std::nan(""), 32}, 4).has_value());
   ImagePatch flat;
   flat.fill(100 * 256);
-  EXPECT_FALSE(align_translation(AlignmentTemplate(flat), picture.view(), same, {32, 32}, 4).has_value());
-  const Picture moved(same, {1.5, 0});
+  EXPECT_FALSE(align_translation(AlignmentTemplate(flat), texture.view(), same, {32, 32}, 4).has_value());
+  const WarpedTexture moved(same, {1.5, 0});
   EXPECT_FALSE(align_translation(reference(), moved.view(), same, {32, 32}, 0.5).has_value());
 }
 

@@ -17,7 +17,7 @@ Image<std::uint8_t> random_image(std::uint64_t seed) {
   return image;
 }
 
-double plain_correlation(const Image<std::uint8_t>& a, int ax, const Image<std::uint8_t>& b, int bx, int y) {
+double brute_force_correlation(const Image<std::uint8_t>& a, int ax, const Image<std::uint8_t>& b, int bx, int y) {
   double sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
   int n = 0;
   for (int j = -kCorrelationRadiusY; j <= kCorrelationRadiusY; ++j) {
@@ -33,18 +33,18 @@ double plain_correlation(const Image<std::uint8_t>& a, int ax, const Image<std::
   return (ab - sum_a * sum_b / n) / std::sqrt((aa - sum_a * sum_a / n) * (bb - sum_b * sum_b / n));
 }
 
-TEST(RowCorrelation, IsPearsonsCoefficientAtEveryPlace) {
+TEST(RowCorrelation, IsPearsonsCoefficientAtEveryPosition) {
   const Image<std::uint8_t> a = random_image(1), b = random_image(2);
   for (const auto& [from, to] : {std::pair(7, 89), {20, 20}, {30, 51}}) {
     const std::vector<float> scores = correlate_row(a, 40, 12, b, from, to);
     ASSERT_EQ(scores.size(), static_cast<std::size_t>(to - from + 1));
     for (int x = from; x <= to; ++x) {
-      EXPECT_NEAR(scores[static_cast<std::size_t>(x - from)], plain_correlation(a, 40, b, x, 12), 1e-5);
+      EXPECT_NEAR(scores[static_cast<std::size_t>(x - from)], brute_force_correlation(a, 40, b, x, 12), 1e-5);
     }
   }
 }
 
-TEST(RowCorrelation, IsOneForTheSameUpToContrastAndMinusOneWithoutTexture) {
+TEST(RowCorrelation, IsInvariantToContrastAndMinusOneWithoutTexture) {
   const Image<std::uint8_t> a = random_image(1);
   Image<std::uint8_t> b(97, 31);
   for (int y = 0; y < 31; ++y)

@@ -1,4 +1,4 @@
-// Lightly smoothed images in fixed point, on which patches are aligned to sub-pixel accuracy.
+// Lightly smoothed images in fixed point, for the sub-pixel alignment of patches.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 namespace spartan {
 
 /// Gray levels times 256 after the binomial filter [1 4 6 4 1]/16 in both directions (σ = 1 px; the weights sum to
-/// 256, so nothing is rounded). Smoothing makes bilinear interpolation nearly exact, which keeps the alignment free
-/// of a pull towards whole pixels. Border pixels are repeated outwards.
+/// 256, so nothing is rounded). Smoothing makes bilinear interpolation nearly exact, which keeps the alignment free of
+/// a bias towards whole pixels (pixel locking). Border pixels are replicated.
 class SmoothedImage {
  public:
   void compute(ImageView<const std::uint8_t> image, const Workers& workers);
@@ -21,7 +21,7 @@ class SmoothedImage {
   Image<std::uint16_t> pixels_;
 };
 
-/// Bilinear interpolation; (x, y) must lie in [0, width − 1) × [0, height − 1). Gray levels (not times 256).
+/// Bilinear interpolation, in gray levels (not times 256); (x, y) must lie in [0, width − 1) × [0, height − 1).
 inline float sample(ImageView<const std::uint16_t> image, float x, float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
   const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);

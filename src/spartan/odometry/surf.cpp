@@ -17,13 +17,13 @@ int filter_size(int octave, int layer) {
   return 3 * ((2 << octave) * (layer + 1) + 1);
 }
 
-/// Blob scale of a filter: the 9-px filter stands for Gaussian derivatives of σ = 1.2.
+/// Blob scale of a filter: the 9-px filter approximates Gaussian derivatives of σ = 1.2 px (§3.2).
 float scale_of_filter(float filter_px) {
   return 1.2f * filter_px / 9.0f;
 }
 
-/// One row of determinants at x = x0, x0 + Step, …. The integral's rows are fetched once, so that the loop is a
-/// plain run over memory.
+/// One row of determinants at x = x0, x0 + Step, … The row pointers of the integral image are computed once, so that
+/// the loop runs over contiguous memory and can be vectorized.
 template <int Step>
 void hessian_row(const IntegralImage& integral, int y, int x0, int count, int filter_px, float* out) {
   const int lobe = filter_px / 3, half = filter_px / 2;
@@ -72,7 +72,7 @@ void hessian_row(const IntegralImage& integral, int y, int x0, int count, int fi
 struct Cube {
   float v[3][3][3];
 
-  /// Larger than all 26 neighbours.
+  /// True where the center is larger than all 26 neighbors (non-maximum suppression).
   bool is_maximum() const {
     const float centre = v[1][1][1];
     for (int s = 0; s < 3; ++s) {
@@ -84,8 +84,8 @@ struct Cube {
     return true;
   }
 
-  /// Place of the maximum of the quadratic through the cube, (x, y, scale) in grid units from the centre
-  /// (Brown & Lowe 2002).
+  /// Maximum of the quadratic through the cube, (x, y, scale) in grid units from the center (Brown & Lowe, "Invariant
+  /// features from interest point groups", BMVC 2002).
   Eigen::Vector3f peak() const {
     const auto& c = v[1];
     const Eigen::Vector3f gradient(0.5f * (c[1][2] - c[1][0]), 0.5f * (c[2][1] - c[0][1]),
@@ -102,7 +102,7 @@ struct Cube {
   }
 };
 
-/// Haar responses (dx, dy) of side 2·half at a pixel corner.
+/// Haar wavelet responses (dx, dy) of side 2·half at a pixel corner.
 Eigen::Vector2f haar(const IntegralImage& integral, int x, int y, int half) {
   const auto sum = [&](int x0, int y0, int x1, int y1) {
     return static_cast<float>(static_cast<std::int32_t>(integral.clipped_box(x0, y0, x1, y1)));
@@ -171,11 +171,11 @@ Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature
       const float weight = std::exp(-(a * a + b * b) / (2 * 3.3f * 3.3f));
       const Eigen::Vector2f d = weight * haar(integral, x, y, half);
       const float dx = co * d.x() + si * d.y(), dy = co * d.y() - si * d.x();
-      float* square = &v[static_cast<std::size_t>(4 * ((j / 5) * 4 + i / 5))];
-      square[0] += dx;
-      square[1] += std::abs(dx);
-      square[2] += dy;
-      square[3] += std::abs(dy);
+      float* subregion = &v[static_cast<std::size_t>(4 * ((j / 5) * 4 + i / 5))];
+      subregion[0] += dx;
+      subregion[1] += std::abs(dx);
+      subregion[2] += dy;
+      subregion[3] += std::abs(dy);
     }
   }
   float squared = 0;
@@ -221,14 +221,15 @@ std::vector<Feature> SurfDetector::find_maxima(ImageSize size) const {
     for (int middle = 1; middle + 1 < kLayersPerOctave; ++middle) {
       const Layer* layer = &layers_[static_cast<std::size_t>(octave * kLayersPerOctave + middle)];
       const int step = layer->step_px, filter_step = layer[1].filter_px - layer[0].filter_px;
-      const int first = (layer[1].filter_px / 2 + 1 + step - 1) / step + 1;  // the largest filter fits, and a neighbour
+      const int first =
+          (layer[1].filter_px / 2 + 1 + step - 1) / step + 1;  // room for the largest filter and a neighbor
       const int last_x = (size.width - 1 - layer[1].filter_px / 2 - 1) / step - 1;
       const int last_y = (size.height - 1 - layer[1].filter_px / 2 - 1) / step - 1;
       for (int y = first; y <= last_y; ++y) {
         const float *row = layer->response.row(y), *up = layer->response.row(y - 1), *down = layer->response.row(y + 1);
         for (int x = first; x <= last_x; ++x) {
           const float centre = row[x];
-          // Cheap tests first: most pixels end here.
+          // Cheap tests first; most pixels fail one of them.
           if (!(centre > threshold && centre > row[x - 1] && centre > row[x + 1] && centre > up[x] && centre > down[x]))
             continue;
           Cube cube;

@@ -10,7 +10,7 @@
 namespace spartan {
 namespace {
 
-Image<std::uint8_t> painted(int width, int height, const std::function<double(double, double)>& gray) {
+Image<std::uint8_t> rendered(int width, int height, const std::function<double(double, double)>& gray) {
   Image<std::uint8_t> image(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x)
@@ -20,16 +20,16 @@ Image<std::uint8_t> painted(int width, int height, const std::function<double(do
 }
 
 Image<std::uint8_t> blob(double x0, double y0, double sigma, double height) {
-  return painted(121, 101, [=](double x, double y) {
+  return rendered(121, 101, [=](double x, double y) {
     return 120 + height * std::exp(-((x - x0) * (x - x0) + (y - y0) * (y - y0)) / (2 * sigma * sigma));
   });
 }
 
-// A texture under a similarity: image(x) = texture(R(−angle) (x − centre) / zoom).
+// A texture under a similarity: image(x) = texture(R(−angle) (x − center) / zoom).
 Image<std::uint8_t> texture(double angle, double zoom) {
   const auto octaves = make_octaves(3, 3, 24, 0.7, 45);
   const double c = std::cos(angle), s = std::sin(angle);
-  return painted(320, 320, [=](double x, double y) {
+  return rendered(320, 320, [=](double x, double y) {
     const double dx = (x - 159.5) / zoom, dy = (y - 159.5) / zoom;
     double value = 128;
     for (const auto& octave : octaves) value += octave.value(c * dx + s * dy, c * dy - s * dx);
@@ -59,7 +59,7 @@ DetectionOptions few() {
   return options;
 }
 
-TEST(Surf, FindsABlobAtItsPlaceAndScaleAndSign) {
+TEST(Surf, FindsPositionScaleAndSignOfABlob) {
   for (const double sigma : {3.0, 3.5, 4.5, 6.0, 8.0}) {
     for (const double height : {90.0, -90.0}) {
       SurfDetector detector(few(), Workers(1));
@@ -76,23 +76,24 @@ TEST(Surf, FindsABlobAtItsPlaceAndScaleAndSign) {
 
 TEST(Surf, BoxHessianHasTheSignsOfTheSecondDerivatives) {
   IntegralImage integral;
-  integral.compute(
-      painted(61, 61, [](double x, double y) { return 60 + 0.05 * (x - 30) * (x - 30) + 0.02 * (y - 30) * (y - 30); }));
+  integral.compute(rendered(
+      61, 61, [](double x, double y) { return 60 + 0.05 * (x - 30) * (x - 30) + 0.02 * (y - 30) * (y - 30); }));
   const BoxHessian bowl = box_hessian(integral, 30, 30, 15);
   EXPECT_GT(bowl.xx, 0);
   EXPECT_NEAR(bowl.xx / bowl.yy, 2.5, 0.2);
   EXPECT_NEAR(bowl.xy, 0, 0.05 * bowl.xx);
-  integral.compute(painted(61, 61, [](double x, double y) { return 120 + 0.1 * (x - 30) * (y - 30); }));
+  integral.compute(rendered(61, 61, [](double x, double y) { return 120 + 0.1 * (x - 30) * (y - 30); }));
   const BoxHessian saddle = box_hessian(integral, 30, 30, 15);
   EXPECT_GT(std::abs(saddle.xy), 20 * std::abs(saddle.xx));
   EXPECT_LT(saddle.determinant(), 0);
 }
 
-// Share of the features of `a` that `b` has where the similarity says, and with the nearest descriptor.
-struct Repeated {
+// Fraction of the features of `a` that `b` has at the transformed position (repeatability), and for which that feature
+// has the nearest descriptor.
+struct Repeatability {
   double found = 0, matched = 0;
 };
-Repeated repeat(bool upright, double angle, double zoom) {
+Repeatability repeatability_of(bool upright, double angle, double zoom) {
   DetectionOptions options = few();
   options.surf.upright = upright;
   SurfDetector detector(options, Workers(1));
@@ -117,23 +118,23 @@ Repeated repeat(bool upright, double angle, double zoom) {
   return {static_cast<double>(found) / inside, static_cast<double>(matched) / inside};
 }
 
-TEST(Surf, RepeatsItselfUnderASmallZoomAndTurn) {
-  const Repeated repeated = repeat(true, 0.1, 1.1);
+TEST(Surf, IsRepeatableUnderSmallZoomAndRotation) {
+  const Repeatability repeated = repeatability_of(true, 0.1, 1.1);
   EXPECT_GT(repeated.found, 0.6);
   EXPECT_GT(repeated.matched, 0.5);
 }
 
-TEST(Surf, RepeatsItselfUnderAnyTurnWhenOrientationIsAssigned) {
-  const Repeated turned = repeat(false, 1.2, 1.0), upright = repeat(true, 1.2, 1.0);
-  EXPECT_GT(turned.found, 0.6);
-  EXPECT_GT(turned.matched, 0.5);
-  EXPECT_LT(upright.matched, 0.2);  // what the orientation is for
+TEST(Surf, IsRepeatableUnderLargeRotationWithOrientation) {
+  const Repeatability oriented = repeatability_of(false, 1.2, 1.0), upright = repeatability_of(true, 1.2, 1.0);
+  EXPECT_GT(oriented.found, 0.6);
+  EXPECT_GT(oriented.matched, 0.5);
+  EXPECT_LT(upright.matched, 0.2);  // without orientation
 }
 
-TEST(Surf, DescriptorDoesNotChangeWithBrightnessAndContrast) {
+TEST(Surf, DescriptorIsInvariantToBrightnessAndContrast) {
   const Image<std::uint8_t> plain = texture(0, 1);
-  const Image<std::uint8_t> dull =
-      painted(320, 320, [&](double x, double y) { return 90 + 0.5 * plain(static_cast<int>(x), static_cast<int>(y)); });
+  const Image<std::uint8_t> dull = rendered(
+      320, 320, [&](double x, double y) { return 90 + 0.5 * plain(static_cast<int>(x), static_cast<int>(y)); });
   IntegralImage a, b;
   a.compute(plain);
   b.compute(dull);
@@ -144,7 +145,7 @@ TEST(Surf, DescriptorDoesNotChangeWithBrightnessAndContrast) {
   EXPECT_LT(std::sqrt(squared_distance(surf_descriptor(a, f), surf_descriptor(b, f))), 0.05);
 }
 
-TEST(Surf, IsTheSameForAnyNumberOfThreads) {
+TEST(Surf, IsIdenticalForAnyNumberOfThreads) {
   const Image<std::uint8_t> image = texture(0.3, 1);
   SurfDetector one(few(), Workers(1)), two(few(), Workers(2));
   const std::vector<Feature>& a = one.detect(image, {});
@@ -157,7 +158,7 @@ TEST(Surf, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Surf, KeepsToTheMaskTheCountAndTheOrder) {
+TEST(Surf, RespectsMaskCountAndOrder) {
   const Image<std::uint8_t> image = texture(0, 1);
   Image<std::uint8_t> mask(320, 320);
   for (int y = 0; y < 320; ++y)

@@ -13,7 +13,7 @@
 namespace spartan {
 namespace {
 
-// The nearest of `others` for each feature, and how clearly.
+// Nearest of `others` by descriptor distance, with the distance of the second nearest.
 struct Nearest {
   int index = -1;
   double distance = std::numeric_limits<double>::infinity();
@@ -45,19 +45,19 @@ std::vector<Nearest> nearest_of(const std::vector<Feature>& features, const std:
 
 std::optional<ViewMatch> align(const Feature& left, const Feature& right, ImageView<const std::uint16_t> left_smooth,
                                ImageView<const std::uint16_t> right_smooth, const ViewMatchingOptions& options) {
-  // The left place is moved on to a whole pixel, the right one along with it.
-  const Eigen::Vector2d exact(left.x, left.y);
-  const Eigen::Vector2d place = exact.array().round();
-  const auto patch = cut_patch(left_smooth, static_cast<int>(place.x()), static_cast<int>(place.y()));
+  // The left point is moved to the nearest whole pixel, the start in the right image by the same amount.
+  const Eigen::Vector2d detected(left.x, left.y);
+  const Eigen::Vector2d pixel = detected.array().round();
+  const auto patch = cut_patch(left_smooth, static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
   if (!patch) return std::nullopt;
-  const Eigen::Vector2d start = Eigen::Vector2d(right.x, right.y) + (place - exact);
-  const AlignmentTemplate wanted(*patch);
+  const Eigen::Vector2d start = Eigen::Vector2d(right.x, right.y) + (pixel - detected);
+  const AlignmentTemplate reference(*patch);
   const auto coarse =
-      align_translation(wanted, right_smooth, Eigen::Matrix2d::Identity(), start, options.correlation_reach_px);
+      align_translation(reference, right_smooth, Eigen::Matrix2d::Identity(), start, options.correlation_radius_px);
   if (!coarse) return std::nullopt;
-  const auto found = align_slanted(wanted, right_smooth, coarse->position, options.correlation_reach_px);
-  if (!found || found->place.correlation < options.min_correlation) return std::nullopt;
-  return ViewMatch{place, found->place.position, std::sqrt(found->place.covariance(1, 1)), found->place.correlation};
+  const auto found = align_slanted(reference, right_smooth, coarse->position, options.correlation_radius_px);
+  if (!found || found->match.correlation < options.min_correlation) return std::nullopt;
+  return ViewMatch{pixel, found->match.position, std::sqrt(found->match.covariance(1, 1)), found->match.correlation};
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Matching two pictures of which nothing is known: for the check of a calibration.
+// Matching two images of unknown relative geometry, for the check of a calibration.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,23 +10,23 @@
 
 namespace spartan {
 
-/// The same place in two pictures, pixels.
+/// Corresponding points of two images, pixels.
 struct ViewMatch {
   Eigen::Vector2d left, right;
-  double sigma_px = 0;     ///< of `right`, from the residual and the texture
-  double correlation = 0;  ///< normalised, of the two surroundings
+  double sigma_px = 0;     ///< standard deviation of `right` along y, from the residual and the gradients
+  double correlation = 0;  ///< normalized cross-correlation of the two patches
 };
 
 struct ViewMatchingOptions {
-  int features = 2000;            ///< at most so many a picture, spread over it
-  double descriptor_ratio = 0.8;  ///< nearest over second nearest descriptor
-  double min_correlation = 0.8;
-  double correlation_reach_px = 3;
+  int features = 2000;               ///< maximum number of features of an image, spread over it
+  double descriptor_ratio = 0.8;     ///< maximum ratio of the nearest to the second nearest descriptor distance
+  double min_correlation = 0.8;      ///< minimum normalized cross-correlation of the aligned patches
+  double correlation_radius_px = 3;  ///< maximum distance of the alignment from the detected feature, pixels
 };
 
-/// SURF features of both pictures; those whose descriptors are each other's nearest, and clearly nearer than the second
-/// one, are aligned to sub-pixel by correlation. Neither rows nor a range of disparities are presumed: a few of the
-/// matches may be wrong, and callers must bear that. Ordered by the strength of the left features; the same for any
+/// Matches SURF features of both images: mutual nearest neighbors that pass the ratio test (Lowe, IJCV 60, 2004) are
+/// aligned to sub-pixel accuracy. Neither rows nor a range of disparities are assumed, so a few of the matches are
+/// wrong and callers must be robust against them. In order of the strength of the left features; identical for any
 /// number of threads.
 std::vector<ViewMatch> match_views(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                    const ViewMatchingOptions& options, const Workers& workers);

@@ -15,15 +15,15 @@ namespace {
 
 const RectifiedStereo kStereo{{320, 240}, 260.0, {159.5, 119.5}, 0.12};
 
-testing::SyntheticShot shot() {
+testing::SyntheticShot synthetic_frame() {
   const testing::SyntheticWorld world{testing::SyntheticWorldOptions()};
   const Pose tilted = Pose(exp_so3({0, 0.4, 0}), {0, 0, 0.5});
   return world.render(kStereo, tilted * optical_from_forward().inverse(), 1);
 }
 
-// On a rectified pair of a world without noise rows are known, though nothing presumes them.
-TEST(ViewMatching, FindsTheSameRowsToATenthOfAPixel) {
-  const auto pair = shot();
+// Corresponding points of a rectified pair lie in the same row, which the matching does not assume.
+TEST(ViewMatching, FindsTheRowsOfARectifiedPairToATenthOfAPixel) {
+  const auto pair = synthetic_frame();
   const auto matches = match_views(pair.left.view(), pair.right.view(), {}, Workers(1));
   ASSERT_GT(matches.size(), 80u);
   std::vector<double> rows, disparities;
@@ -36,8 +36,8 @@ TEST(ViewMatching, FindsTheSameRowsToATenthOfAPixel) {
   EXPECT_GT(median(disparities), 5);
 }
 
-TEST(ViewMatching, IsTheSameForAnyNumberOfThreads) {
-  const auto pair = shot();
+TEST(ViewMatching, IsIdenticalForAnyNumberOfThreads) {
+  const auto pair = synthetic_frame();
   const auto one = match_views(pair.left.view(), pair.right.view(), {}, Workers(1));
   const auto two = match_views(pair.left.view(), pair.right.view(), {}, Workers(2));
   ASSERT_EQ(one.size(), two.size());
@@ -47,7 +47,7 @@ TEST(ViewMatching, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(ViewMatching, FindsNothingInAnEmptyPicture) {
+TEST(ViewMatching, FindsNothingInAnEmptyImage) {
   const Image<std::uint8_t> empty(320, 240);
   EXPECT_TRUE(match_views(empty.view(), empty.view(), {}, Workers(1)).empty());
 }

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "spartan/core/connected_components.h"
+
 namespace spartan {
 namespace {
 
@@ -86,40 +88,28 @@ void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
   }
 }
 
-// Cells of obstacles that touch, also by a corner.
+// The 8-connected regions of obstacle cells.
 void list_obstacles(LocalMap& map) {
   const auto [w, h] = map.size();
-  Image<std::uint8_t> done(w, h);
-  std::vector<GridCell> open;
-  for (int y0 = 0; y0 < h; ++y0) {
-    for (int x0 = 0; x0 < w; ++x0) {
-      if (map.kind(x0, y0) != 2 || done(x0, y0) != 0) continue;
-      Eigen::Vector2d low = middle_of(map.place, x0, y0), high = low;
-      Obstacle obstacle;
-      open.assign(1, {x0, y0});
-      done(x0, y0) = 1;
-      while (!open.empty()) {
-        const auto [x, y] = open.back();
-        open.pop_back();
-        const Eigen::Vector2d at = middle_of(map.place, x, y);
-        low = low.cwiseMin(at);
-        high = high.cwiseMax(at);
-        ++obstacle.cells;
-        obstacle.height_m =
-            std::max(obstacle.height_m, static_cast<double>(map.elevation_max_m(x, y) - map.ground_m(x, y)));
-        for (int j = std::max(y - 1, 0); j <= std::min(y + 1, h - 1); ++j) {
-          for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
-            if (map.kind(i, j) != 2 || done(i, j) != 0) continue;
-            done(i, j) = 1;
-            open.push_back({i, j});
-          }
-        }
-      }
-      obstacle.middle_m = 0.5 * (low + high);
-      obstacle.width_m = high.x() - low.x() + map.place.cell_m;
-      obstacle.length_m = high.y() - low.y() + map.place.cell_m;
-      map.obstacles.push_back(obstacle);
+  Image<std::uint8_t> mask(w, h);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) mask(x, y) = map.kind(x, y) == 2 ? 1 : 0;
+  }
+  for (const std::vector<PixelIndex>& cells : connected_components(mask)) {
+    Eigen::Vector2d low = middle_of(map.place, cells.front().x, cells.front().y), high = low;
+    Obstacle obstacle;
+    obstacle.cells = static_cast<int>(cells.size());
+    for (const auto [x, y] : cells) {
+      const Eigen::Vector2d at = middle_of(map.place, x, y);
+      low = low.cwiseMin(at);
+      high = high.cwiseMax(at);
+      obstacle.height_m =
+          std::max(obstacle.height_m, static_cast<double>(map.elevation_max_m(x, y) - map.ground_m(x, y)));
     }
+    obstacle.middle_m = 0.5 * (low + high);
+    obstacle.width_m = high.x() - low.x() + map.place.cell_m;
+    obstacle.length_m = high.y() - low.y() + map.place.cell_m;
+    map.obstacles.push_back(obstacle);
   }
 }
 

@@ -1,28 +1,15 @@
 #include "spartan/reconstruction/position_mapper.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
+
+#include "spartan/core/stage_clock.h"
 
 namespace spartan {
 namespace {
 
 constexpr double kUnknownHeight_m = 1;      // scale of the search where the eye's height is not known
 constexpr double kNearestPanorama_m = 0.3;  // nothing of interest is nearer to the virtual camera
-
-// Adds the time since it was made or last asked.
-class Lap {
- public:
-  double milliseconds() {
-    const auto now = std::chrono::steady_clock::now();
-    const double passed = std::chrono::duration<double, std::milli>(now - since_).count();
-    since_ = now;
-    return passed;
-  }
-
- private:
-  std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
-};
 
 // Between the eyes.
 Eigen::Vector3d middle_of(const ViewGeometry& view) {
@@ -48,16 +35,16 @@ PositionMapper::PositionMapper(const DisparityOptions& disparity, const MappingO
     : options_(options), workers_(workers), computer_(disparity, workers), generator_(options.map, workers) {}
 
 Status PositionMapper::add(const RectifiedPair& shot, double nearest_m, const Eigen::Vector3d& up_in_body) {
-  Lap lap;
+  Stopwatch watch;
   const auto image = computer_.compute(shot.left, shot.right, disparity_range(shot.geometry, nearest_m), shot.left_mask,
                                        shot.right_mask);
   if (!image) return failure(image);
-  times_.disparity += lap.milliseconds();
+  times_.disparity += watch.lap();
   const double height = shot.body_from_left.translation().dot(up_in_body);
   const GroundPlane expected{shot.body_from_left.rotation().conjugate() * up_in_body,
                              height > 0.05 ? height : kUnknownHeight_m};
   auto ground = compute_v_disparity(image->disparity, shot.geometry, expected, options_.v_disparity, workers_);
-  times_.v_disparity += lap.milliseconds();
+  times_.v_disparity += watch.lap();
   views_.push_back({shot.pair,
                     shot.stamp,
                     {shot.geometry, shot.body_from_left},
@@ -68,7 +55,7 @@ Status PositionMapper::add(const RectifiedPair& shot, double nearest_m, const Ei
 }
 
 MergedRange PositionMapper::merge() {
-  Lap lap;
+  Stopwatch watch;
   std::vector<ViewGeometry> geometries;
   std::vector<MergedView> merged_views;
   for (const PositionView& view : views_) {
@@ -78,14 +65,14 @@ MergedRange PositionMapper::merge() {
   }
   const DisparityMerger merger(options_.merging, centre_of(views_), geometries, kNearestPanorama_m, workers_);
   MergedRange merged = merger.merge(merged_views);
-  times_.merging += lap.milliseconds();
+  times_.merging += watch.lap();
   return merged;
 }
 
 LocalMap PositionMapper::map(std::span<const SurfacePoint> points, const Pose& map_from_body) {
-  Lap lap;
+  Stopwatch watch;
   LocalMap map = generator_.generate(points, map_from_body);
-  times_.map += lap.milliseconds();
+  times_.map += watch.lap();
   return map;
 }
 

@@ -1,12 +1,12 @@
 #include "spartan/reconstruction/semi_global_matcher.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "spartan/core/simd_target.h"
+#include "spartan/core/stage_clock.h"
 #include "spartan/reconstruction/subpixel.h"
 
 namespace spartan {
@@ -18,20 +18,6 @@ constexpr int kVector = 64;                         // bytes; room behind rows f
 int round_up(int value, int multiple) {
   return (value + multiple - 1) / multiple * multiple;
 }
-
-class Stopwatch {
- public:
-  // Milliseconds since the last lap.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-    return ms;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "spartan/core/levenberg_marquardt.h"
 #include "spartan/core/median.h"
 #include "spartan/rig/rectifying_axes.h"
 
@@ -293,27 +294,22 @@ class Fitter {
     return weights;
   }
 
-  // Levenberg-Marquardt.
   void minimise(double scale_px, int steps) {
-    double damping = 1e-4;
-    for (int step = 0; step < steps; ++step) {
+    using FreeNormal = NormalEquations<Eigen::MatrixXd, Eigen::VectorXd>;
+    const auto linearize = [&](const Parameters& p) -> FreeNormal {
+      at_ = p;
+      lenses_.keep_aimed(std::exp(at_[3]));
       const Normal normal = normal_equations(robust_weights(scale_px));
-      const double before = robust_cost(at_, scale_px);
-      bool better = false;
-      for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-        Eigen::MatrixXd damped = normal.matrix.topLeftCorner(free_, free_);
-        damped.diagonal() *= 1 + damping;
-        Parameters moved = at_;
-        moved.head(free_) += damped.ldlt().solve(normal.right_side.head(free_));
-        const double after = robust_cost(moved, scale_px);
-        better = after < before;
-        damping = better ? 0.1 * damping : 10 * damping;
-        if (better) at_ = moved;
-        if (better) lenses_.keep_aimed(std::exp(at_[3]));
-        if (better && before - after < 1e-7 * before) return;
-      }
-      if (!better) return;
-    }
+      return {robust_cost(at_, scale_px), normal.matrix.topLeftCorner(free_, free_), normal.right_side.head(free_)};
+    };
+    const auto cost = [&](const Parameters& p) { return robust_cost(p, scale_px); };
+    const auto moved = [&](Parameters p, const Eigen::VectorXd& step) {
+      p.head(free_) += step;
+      return p;
+    };
+    const LevenbergMarquardtOptions options{.max_steps = steps, .max_rejections = 8, .relative_decrease = 1e-7};
+    at_ = minimize_levenberg_marquardt(at_, options, linearize, cost, moved);
+    lenses_.keep_aimed(std::exp(at_[3]));
   }
 
   PairOfLenses lenses_;
