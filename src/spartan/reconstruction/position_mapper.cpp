@@ -7,10 +7,10 @@
 namespace spartan {
 namespace {
 
-constexpr double kUnknownHeight_m = 1;      // scale of the search where the eye's height is not known
-constexpr double kNearestPanorama_m = 0.3;  // nothing of interest is nearer to the virtual camera
+constexpr double kUnknownHeight_m = 1;      // scale of the ground search where the camera's height is unknown
+constexpr double kNearestPanorama_m = 0.3;  // nearest depth that the virtual camera covers
 
-// Adds the time since it was made or last asked.
+// Stopwatch: milliseconds since construction or since the last call.
 class Lap {
  public:
   double milliseconds() {
@@ -24,7 +24,7 @@ class Lap {
   std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
 };
 
-// Between the eyes.
+// Midpoint between the left and the right camera.
 Eigen::Vector3d middle_of(const ViewGeometry& view) {
   return view.body_from_left * Eigen::Vector3d(0.5 * view.stereo.baseline_m, 0, 0);
 }
