@@ -37,6 +37,7 @@ class Stopwatch {
 
 SemiGlobalMatcher::SemiGlobalMatcher(const DisparityOptions& options, Workers workers)
     : options_(options), workers_(std::move(workers)), kernels_(sgm::kernels_for(simd_target_index(options.simd))) {
+  // P2 for every gray-level change along a path; see DisparityOptions.
   for (std::size_t step = 0; step < p2_by_step_.size(); ++step) {
     const double p2 = options.p2_flat / (1.0 + static_cast<double>(step) / options.p2_falloff_levels);
     p2_by_step_[step] = static_cast<std::uint8_t>(std::max(options.p2_edge, static_cast<int>(std::lround(p2))));
@@ -93,6 +94,7 @@ const RawDisparity& SemiGlobalMatcher::match(ImageView<const std::uint8_t> left,
   times_.cost = watch.lap();
   for (Pass& pass : passes_) pass.cost_ms = pass.aggregate_ms = pass.select_ms = 0;
 
+  // Both passes sweep their first halves, then, after a barrier, complete the sums in the half of the other pass.
   const int h = size_.height, upper = h / 2, lower = h - upper;
   workers_.run_both([&] { sweep(passes_[0], 0, upper, false); }, [&] { sweep(passes_[1], 0, lower, false); });
   workers_.run_both([&] { sweep(passes_[0], upper, h, true); }, [&] { sweep(passes_[1], lower, h, true); });
@@ -194,6 +196,7 @@ void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete)
     for (int r = 0; r < sgm::kPaths; ++r) {
       const auto i = static_cast<std::size_t>(r);
       paths.to[r] = slot(pass, r, indices[i]);
+      // At the start of a path L' = 0, so that L = C.
       paths.from[r] = begins[i] ? zero : paths.to[r];
       paths.from_min[r] = begins[i] ? std::uint8_t{0} : pass.minima[static_cast<std::size_t>(r * w + indices[i])];
       paths.p2[r] = p2_by_step_[static_cast<std::size_t>(std::abs(gray[column] - previous[i]))];

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kMinCells = 5;  // known cells of the neighbourhood that a plane is fitted to
 
-// Normal equations of the plane z = p0 x + p1 y + p2 neighbourhood a cell, and the elevation range of the 3×3 cells.
+// Normal equations of the plane z = p0 x + p1 y + p2 around a cell, and the elevation range of the 3×3 cells.
 struct Neighbourhood {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
