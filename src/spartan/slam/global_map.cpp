@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "spartan/slam/map_refinement.h"
+#include "spartan/slam/surface_grid.h"
 
 namespace spartan {
 namespace {

@@ -14,10 +14,11 @@
 #include "spartan/reconstruction/terrain_shape.h"
 #include "spartan/slam/lattice.h"
 #include "spartan/slam/slam_options.h"
-#include "spartan/slam/surface_grid.h"
 #include "spartan/slam/tile_store.h"
 
 namespace spartan {
+
+struct SurfaceGrid;
 
 /// A rectangular part of the global map in the world frame. Unobserved cells are NaN (count, class, log-odds: 0).
 struct MapView {
