@@ -7,6 +7,7 @@
 #include "spartan/core/geotiff.h"
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"
+#include "spartan/reconstruction/ground_class.h"
 
 namespace spartan {
 
@@ -25,6 +26,12 @@ struct Obstacle {
   int cells = 0;
 };
 
+/// The bands of a map file in their order. They borrow from the map and from this struct.
+struct MapBands {
+  Image<float> classes;  ///< The classes as numbers.
+  std::vector<MapBand> list;
+};
+
 /// Elevation, classes and traversability in a gravity-aligned map frame (z up). Unobserved cells are NaN unless stated
 /// otherwise.
 struct LocalMap {
@@ -35,14 +42,14 @@ struct LocalMap {
   Image<float> count;        ///< Number of points; 0 where unobserved.
   Image<float> ground_m;     ///< Elevation of the ground surface beneath obstacles and above cavities.
   Image<float> slope_rad, roughness_m, step_m;
-  Image<float> kind;               ///< 0 unknown, 1 free, 2 obstacle, 3 cavity
+  Image<GroundClass> kind;         ///< Unobserved cells are unknown, free cells are ground.
   Image<float> occupancy_logodds;  ///< Log-odds of an obstacle or a cavity; 0 where unobserved.
   Image<float> cost;               ///< Traversal cost, 0 (easy) … 1 (not traversable).
   std::vector<Obstacle> obstacles;
 
   ImageSize size() const { return elevation_m.size(); }
   /// The bands of a map file, with the names of docs/formats.md, "Maps".
-  std::vector<MapBand> bands() const;
+  MapBands bands() const;
 };
 
 }  // namespace spartan

@@ -73,11 +73,11 @@ void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
                    under = map.ground_m(x, y) - map.elevation_min_m(x, y);
       const double sigma = std::sqrt(static_cast<double>(map.variance_m2(x, y))) + kLeastSigma_m;
       const double obstacle_m = options.obstacle_m * (grid.at(x, y).cut ? options.cut_share : 1);
-      map.kind(x, y) = 1;
+      map.kind(x, y) = GroundClass::ground;
       if (over > obstacle_m) {
-        map.kind(x, y) = 2;
+        map.kind(x, y) = GroundClass::obstacle;
       } else if (under > options.cavity_m) {
-        map.kind(x, y) = 3;
+        map.kind(x, y) = GroundClass::cavity;
       }
       // Log-odds of p = Φ((height − threshold) / σ), where Φ(x) ≈ 1 / (1 + exp(−1.702 x)) within 0.01.
       const double past = std::max(over - obstacle_m, under - options.cavity_m) / sigma;
@@ -93,7 +93,7 @@ void list_obstacles(LocalMap& map) {
   std::vector<GridCell> open;
   for (int y0 = 0; y0 < h; ++y0) {
     for (int x0 = 0; x0 < w; ++x0) {
-      if (map.kind(x0, y0) != 2 || done(x0, y0) != 0) continue;
+      if (map.kind(x0, y0) != GroundClass::obstacle || done(x0, y0) != 0) continue;
       Eigen::Vector2d low = middle_of(map.place, x0, y0), high = low;
       Obstacle obstacle;
       open.assign(1, {x0, y0});
@@ -109,7 +109,7 @@ void list_obstacles(LocalMap& map) {
             std::max(obstacle.height_m, static_cast<double>(map.elevation_max_m(x, y) - map.ground_m(x, y)));
         for (int j = std::max(y - 1, 0); j <= std::min(y + 1, h - 1); ++j) {
           for (int i = std::max(x - 1, 0); i <= std::min(x + 1, w - 1); ++i) {
-            if (map.kind(i, j) != 2 || done(i, j) != 0) continue;
+            if (map.kind(i, j) != GroundClass::obstacle || done(i, j) != 0) continue;
             done(i, j) = 1;
             open.push_back({i, j});
           }
@@ -155,7 +155,8 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
   for (Image<float>* layer :
        {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2, &map.ground_m})
     *layer = Image<float>(w, h, kNaN);
-  for (Image<float>* layer : {&map.count, &map.kind, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
+  for (Image<float>* layer : {&map.count, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
+  map.kind = Image<GroundClass>(w, h);
   Image<std::uint8_t> starts(w, h);
   bool any_ground = false;
   for (int y = 0; y < h; ++y) {

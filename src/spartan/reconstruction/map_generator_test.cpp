@@ -31,7 +31,8 @@ std::vector<SurfacePoint> points_on(const Height& height, double noise_m = 0.002
   return points;
 }
 
-float at(const LocalMap& map, const Image<float>& layer, double x, double y) {
+template <class T>
+T at(const LocalMap& map, const Image<T>& layer, double x, double y) {
   const GridCell cell = cell_at(map.place, x, y);
   return layer(cell.column, cell.row);
 }
@@ -48,10 +49,20 @@ TEST(LocalMap, CellsAndTheirCentresAgree) {
   EXPECT_EQ(cell_at(place, -1.4, 1.9).row, 0) << "row 0 lies in the north";
 }
 
+TEST(GroundClass, BandHasTheDocumentedValues) {
+  Image<GroundClass> classes(4, 1);
+  classes(1, 0) = GroundClass::ground;
+  classes(2, 0) = GroundClass::obstacle;
+  classes(3, 0) = GroundClass::cavity;
+  const Image<float> band = class_band(classes);
+  for (int x = 0; x < 4; ++x) EXPECT_EQ(band(x, 0), static_cast<float>(x));
+}
+
 TEST(LocalMap, BandsHaveTheDocumentedNames) {
   const LocalMap map = MapGenerator({}, Workers(1)).generate({}, Pose());
   std::string names;
-  for (const MapBand& band : map.bands()) {
+  const MapBands bands = map.bands();
+  for (const MapBand& band : bands.list) {
     names += (names.empty() ? "" : " ") + band.name;
     EXPECT_EQ(band.values.size(), map.size()) << band.name;
   }
@@ -67,7 +78,7 @@ TEST(MapGenerator, PlaneGroundIsFreeWithLowCost) {
   for (int row = 0; row < map.size().height; ++row) {
     for (int column = 0; column < map.size().width; ++column) {
       if (!(map.count(column, row) > 0)) {
-        EXPECT_EQ(map.kind(column, row), 0) << "an unobserved cell is never free";
+        EXPECT_EQ(map.kind(column, row), GroundClass::unknown) << "an unobserved cell is never free";
         EXPECT_TRUE(std::isnan(map.elevation_m(column, row)));
         EXPECT_EQ(map.occupancy_logodds(column, row), 0);
         continue;
@@ -77,7 +88,7 @@ TEST(MapGenerator, PlaneGroundIsFreeWithLowCost) {
       // At the border of the points, those of a cell are not distributed around its centre.
       if (middle.x() < 0.6 || middle.x() > 3.4 || std::abs(middle.y()) > 1.4) continue;
       EXPECT_NEAR(map.elevation_m(column, row), slope(middle.x(), middle.y()), 0.003);
-      EXPECT_EQ(map.kind(column, row), 1);
+      EXPECT_EQ(map.kind(column, row), GroundClass::ground);
       EXPECT_LT(map.occupancy_logodds(column, row), -3);
       EXPECT_NEAR(map.slope_rad(column, row), std::atan(std::hypot(0.08, 0.05)), 0.01);
       EXPECT_LT(map.roughness_m(column, row), 0.003);
@@ -100,10 +111,10 @@ TEST(MapGenerator, ClassifiesRocksPitsAndOccludedGround) {
     return p.in_body.x() > 2.2F && p.in_body.x() < 2.5F && std::abs(p.in_body.y() - 0.5F) < 0.15F;
   });
   const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
-  EXPECT_EQ(at(map, map.kind, 2, 0.5), 2);
-  EXPECT_EQ(at(map, map.kind, 1.5, -0.7), 3);
-  EXPECT_EQ(at(map, map.kind, 2.35, 0.5), 0);
-  EXPECT_EQ(at(map, map.kind, 1.0, 0.5), 1);
+  EXPECT_EQ(at(map, map.kind, 2, 0.5), GroundClass::obstacle);
+  EXPECT_EQ(at(map, map.kind, 1.5, -0.7), GroundClass::cavity);
+  EXPECT_EQ(at(map, map.kind, 2.35, 0.5), GroundClass::unknown);
+  EXPECT_EQ(at(map, map.kind, 1.0, 0.5), GroundClass::ground);
   EXPECT_GT(at(map, map.occupancy_logodds, 2, 0.5), 3);
   EXPECT_EQ(at(map, map.cost, 2, 0.5), 1);
   EXPECT_EQ(at(map, map.cost, 1.5, -0.7), 1);
@@ -122,12 +133,13 @@ TEST(MapGenerator, ATruncatedObjectNeedsLessHeightToBeAnObstacle) {
   };
   std::vector<SurfacePoint> points = points_on(surface);
   const LocalMap whole = MapGenerator({}, Workers(1)).generate(points, Pose());
-  EXPECT_EQ(at(whole, whole.kind, 3.47, 0), 1);
+  EXPECT_EQ(at(whole, whole.kind, 3.47, 0), GroundClass::ground);
   for (SurfacePoint& p : points) p.cut = p.in_body.x() > 3.4F;
   const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
-  EXPECT_EQ(at(map, map.kind, 3.47, 0), 2);
-  EXPECT_EQ(at(map, map.kind, 3.2, 0), 1);
-  EXPECT_EQ(at(map, map.kind, 3.42, 0), 1) << "ground at the upper edge of the view is not an obstacle";
+  EXPECT_EQ(at(map, map.kind, 3.47, 0), GroundClass::obstacle);
+  EXPECT_EQ(at(map, map.kind, 3.2, 0), GroundClass::ground);
+  EXPECT_EQ(at(map, map.kind, 3.42, 0), GroundClass::ground)
+      << "ground at the upper edge of the view is not an obstacle";
 }
 
 // A panorama whose columns start lower from left to right, with a hole.

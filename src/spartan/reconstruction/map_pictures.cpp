@@ -62,7 +62,7 @@ void draw_curve(cv::Mat& image, const std::vector<cv::Point>& curve, Rgb8 colour
 
 }  // namespace
 
-Image<Rgb8> draw_map(ImageView<const float> elevation_m, ImageView<const float> kind, double cell_m, int scale) {
+Image<Rgb8> draw_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m, int scale) {
   Image<Rgb8> image(elevation_m.width() * scale, elevation_m.height() * scale);
   for (int y = 0; y < elevation_m.height(); ++y) {
     for (int x = 0; x < elevation_m.width(); ++x) {
@@ -70,8 +70,8 @@ Image<Rgb8> draw_map(ImageView<const float> elevation_m, ImageView<const float> 
       if (std::isfinite(elevation_m(x, y))) {
         const std::uint8_t light = shade(elevation_m, x, y, cell_m);
         colour = {light, light, light};
-        if (kind(x, y) == 2) colour = mixed(colour, kObstacle, 0.6);
-        if (kind(x, y) == 3) colour = mixed(colour, kCavity, 0.6);
+        if (kind(x, y) == GroundClass::obstacle) colour = mixed(colour, kObstacle, 0.6);
+        if (kind(x, y) == GroundClass::cavity) colour = mixed(colour, kCavity, 0.6);
       }
       for (int j = 0; j < scale; ++j) std::fill_n(image.row(y * scale + j) + x * scale, scale, colour);
     }

@@ -16,13 +16,14 @@ bool same(Rgb8 a, Rgb8 b) {
 }
 
 TEST(MapPictures, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreDark) {
-  Image<float> elevation(9, 3), kind(9, 3, 1.0F);
+  Image<float> elevation(9, 3);
+  Image<GroundClass> kind(9, 3, GroundClass::ground);
   for (int y = 0; y < 3; ++y) {
     for (int x = 0; x < 9; ++x) elevation(x, y) = 0.02F * static_cast<float>(std::min(x, 8 - x));
   }
   elevation(8, 0) = std::numeric_limits<float>::quiet_NaN();
-  kind(4, 1) = 2;
-  kind(2, 1) = 3;
+  kind(4, 1) = GroundClass::obstacle;
+  kind(2, 1) = GroundClass::cavity;
   const Image<Rgb8> image = draw_map(elevation, kind, 0.05, 2);
   EXPECT_EQ(image.width(), 18);
   const auto at = [&](int x, int y) { return image(2 * x + 1, 2 * y + 1); };

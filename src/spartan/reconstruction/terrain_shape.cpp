@@ -64,10 +64,10 @@ TerrainShape measure_shape(const TerrainSurface& s, const RoverLimits& rover, co
         shape.slope_rad(x, y) = static_cast<float>(std::atan(std::hypot(plane.x(), plane.y())));
         shape.roughness_m(x, y) = static_cast<float>(std::sqrt(
             std::max(0.0, neighbourhood.squares - neighbourhood.right.dot(plane)) / neighbourhood.normal(2, 2)));
-        const double worst =
-            std::max({shape.slope_rad(x, y) / steepest, shape.step_m(x, y) / rover.max_step_m,
-                      shape.roughness_m(x, y) / (0.5 * rover.wheel_radius_m),
-                      (s.elevation_max_m(x, y) - s.ground_m(x, y)) / rover.clearance_m, s.kind(x, y) == 3 ? 1.0 : 0.0});
+        const double worst = std::max({shape.slope_rad(x, y) / steepest, shape.step_m(x, y) / rover.max_step_m,
+                                       shape.roughness_m(x, y) / (0.5 * rover.wheel_radius_m),
+                                       (s.elevation_max_m(x, y) - s.ground_m(x, y)) / rover.clearance_m,
+                                       s.kind(x, y) == GroundClass::cavity ? 1.0 : 0.0});
         shape.cost(x, y) = static_cast<float>(std::clamp(worst, 0.0, 1.0));
       }
     }

@@ -4,6 +4,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/options.h"
 #include "spartan/core/threads.h"
+#include "spartan/reconstruction/ground_class.h"
 
 namespace spartan {
 
@@ -46,7 +47,8 @@ struct RoverLimits {
 
 /// Input layers of one size, as LocalMap's of the same names.
 struct TerrainSurface {
-  ImageView<const float> elevation_m, elevation_max_m, ground_m, kind;
+  ImageView<const float> elevation_m, elevation_max_m, ground_m;
+  ImageView<const GroundClass> kind;
   double cell_m = 0.05;
 };
 

@@ -7,12 +7,10 @@
 #include "spartan/core/image.h"
 #include "spartan/core/options.h"
 #include "spartan/core/threads.h"
+#include "spartan/reconstruction/ground_class.h"
 #include "spartan/reconstruction/ground_plane.h"
 
 namespace spartan {
-
-/// Class of a pixel or a map cell relative to the ground surface. A cavity is a negative obstacle.
-enum class GroundClass : std::uint8_t { unknown, ground, obstacle, cavity };
 
 struct VDisparityOptions {
   int strips = 5;               ///< Number of vertical image strips, each with its own ground profile.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "spartan/slam/map_refinement.h"
 #include "spartan/slam/surface_grid.h"
@@ -22,8 +23,8 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
   s.highest_m = local.elevation_max_m(column, row);
   s.count = local.count(column, row);
   s.occupancy_logodds = local.occupancy_logodds(column, row);
-  const int kind = static_cast<int>(local.kind(column, row));
-  s.shape = static_cast<std::int16_t>(kind == 2 ? 1 : kind == 3 ? -1 : 0);
+  const GroundClass kind = local.kind(column, row);
+  s.shape = static_cast<std::int16_t>(kind == GroundClass::obstacle ? 1 : kind == GroundClass::cavity ? -1 : 0);
   s.votes = 1;
   Eigen::Vector2f slope = grid.slope(column, row);
   if (!slope.allFinite()) slope.setZero();
@@ -36,24 +37,26 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
 
 }  // namespace
 
-std::vector<MapBand> MapView::bands(const TerrainShape& shape) const {
-  return {{"elevation_m", elevation_m.view()},
-          {"elevation_min_m", elevation_min_m.view()},
-          {"elevation_max_m", elevation_max_m.view()},
-          {"variance_m2", variance_m2.view()},
-          {"count", count.view()},
-          {"slope_rad", shape.slope_rad.view()},
-          {"roughness_m", shape.roughness_m.view()},
-          {"step_m", shape.step_m.view()},
-          {"class", kind.view()},
-          {"occupancy_logodds", occupancy_logodds.view()},
-          {"cost", shape.cost.view()}};
+MapBands MapView::bands(const TerrainShape& shape) const {
+  MapBands bands{class_band(kind), {}};
+  bands.list = {{"elevation_m", elevation_m.view()},
+                {"elevation_min_m", elevation_min_m.view()},
+                {"elevation_max_m", elevation_max_m.view()},
+                {"variance_m2", variance_m2.view()},
+                {"count", count.view()},
+                {"slope_rad", shape.slope_rad.view()},
+                {"roughness_m", shape.roughness_m.view()},
+                {"step_m", shape.step_m.view()},
+                {"class", std::as_const(bands.classes).view()},
+                {"occupancy_logodds", occupancy_logodds.view()},
+                {"cost", shape.cost.view()}};
+  return bands;
 }
 
 TerrainShape MapView::shape(const MapOptions& options, const Workers& workers) const {
   Image<std::uint8_t> free(window.width, window.height);
   for (int r = 0; r < window.height; ++r) {
-    for (int c = 0; c < window.width; ++c) free(c, r) = kind(c, r) == 1 ? 1 : 0;
+    for (int c = 0; c < window.width; ++c) free(c, r) = kind(c, r) == GroundClass::ground ? 1 : 0;
   }
   const Image<float> ground_m = fit_ground(elevation_m, free, cell_m, options.ground, workers);
   return measure_shape({elevation_m, elevation_max_m, ground_m, kind, cell_m}, options.rover, workers);

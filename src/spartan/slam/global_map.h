@@ -20,16 +20,17 @@ namespace spartan {
 
 struct SurfaceGrid;
 
-/// A rectangular part of the global map in the world frame. Unobserved cells are NaN (count, class, log-odds: 0).
+/// A rectangular part of the global map in the world frame. Unobserved cells are NaN (count and log-odds: 0).
 struct MapView {
   LatticeWindow window;
   double cell_m = 0.05;
-  Image<float> elevation_m, elevation_min_m, elevation_max_m, variance_m2, count, kind, occupancy_logodds;
+  Image<float> elevation_m, elevation_min_m, elevation_max_m, variance_m2, count, occupancy_logodds;
+  Image<GroundClass> kind;
   Image<std::int32_t> stop;  ///< The first stop that observed the cell; −1: none.
 
   MapPlace place() const { return window.place(cell_m); }
   /// The bands of a map file, with the names of docs/formats.md, "Maps". `shape`: of this view.
-  std::vector<MapBand> bands(const TerrainShape& shape) const;
+  MapBands bands(const TerrainShape& shape) const;
   /// Slope, roughness, steps and costs. The ground surface is first fitted to the free cells.
   TerrainShape shape(const MapOptions& options, const Workers& workers) const;
   SurfaceGrid grid() const;
@@ -38,7 +39,7 @@ struct MapView {
 /// The map at one position.
 struct MapSample {
   double elevation_m = 0, variance_m2 = 0, occupancy_logodds = 0;
-  int kind = 0;
+  GroundClass kind = GroundClass::unknown;
 };
 
 class GlobalMap {

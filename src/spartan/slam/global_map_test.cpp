@@ -34,7 +34,8 @@ void add(GlobalMap& map, const Ground& ground, const Pose& pose, std::uint64_t s
 // Serializes a view.
 Bytes bytes_of(const MapView& view) {
   ArchiveWriter out;
-  for (const MapBand& band : view.bands({})) {
+  const MapBands bands = view.bands({});
+  for (const MapBand& band : bands.list) {
     for (int y = 0; y < band.values.height(); ++y)
       out.put_array(band.values.row(y), static_cast<std::size_t>(band.values.width()));
   }
@@ -73,7 +74,7 @@ TEST(GlobalMap, AViewOfOneStopEqualsItsLocalMap) {
   }
   EXPECT_GT(known, 3000);
   EXPECT_EQ(map.stops().at(0).stamp.ns, 5);
-  EXPECT_EQ(view.bands({}).size(), local.bands().size());
+  EXPECT_EQ(view.bands({}).list.size(), local.bands().list.size());
 }
 
 TEST(GlobalMap, TraversabilityEqualsThatOfTheLocalMap) {
@@ -137,7 +138,7 @@ TEST(GlobalMap, ElevationBetweenCellsIsBilinear) {
   const auto sample = map.at(5.013, 4.111);
   ASSERT_TRUE(sample && *sample);
   EXPECT_NEAR((*sample)->elevation_m, 0.1 * 5.013 - 0.2 * 4.111, 0.003);
-  EXPECT_EQ((*sample)->kind, 1);
+  EXPECT_EQ((*sample)->kind, GroundClass::ground);
   EXPECT_FALSE(map.at(1, 4)->has_value()) << "nothing is observed behind the rover";
 }
 
@@ -311,22 +312,23 @@ RC_GTEST_PROP(GlobalMap, ObservationsNeverRaiseAVarianceAndUnobservedCellsAreNev
     LocalMap local;
     local.place = {0, 0.4, 0.05};
     for (Image<float>* layer : {&local.elevation_m, &local.elevation_min_m, &local.elevation_max_m, &local.variance_m2,
-                                &local.count, &local.kind, &local.occupancy_logodds})
+                                &local.count, &local.occupancy_logodds})
       *layer = Image<float>(8, 8, 0.0F);
+    local.kind = Image<GroundClass>(8, 8);
     for (int k = 0; k < 8; ++k) {
       const int x = *rc::gen::inRange(0, 8), y = *rc::gen::inRange(0, 8);
       local.elevation_m(x, y) = local.elevation_min_m(x, y) = local.elevation_max_m(x, y) =
           0.01F * static_cast<float>(*rc::gen::inRange(-9, 9));
       local.variance_m2(x, y) = 1e-5F * static_cast<float>(*rc::gen::inRange(1, 99));
       local.count(x, y) = 2;
-      local.kind(x, y) = 1;
+      local.kind(x, y) = GroundClass::ground;
       local.occupancy_logodds(x, y) = -1;
     }
     RC_ASSERT(map.add(local, {}, {}, covariance_of(0.01, 0.01)).has_value());
     const MapView view = *map.view({0, 8, 8, 8});
     for (int y = 0; y < 8; ++y) {
       for (int x = 0; x < 8; ++x) {
-        RC_ASSERT((view.count(x, y) > 0) == (view.kind(x, y) != 0));
+        RC_ASSERT((view.count(x, y) > 0) == (view.kind(x, y) != GroundClass::unknown));
         RC_ASSERT(view.count(x, y) > 0 || before(x, y) == INFINITY);
         if (!(view.count(x, y) > 0)) continue;
         RC_ASSERT(view.variance_m2(x, y) <= before(x, y));

@@ -113,8 +113,9 @@ Result<MapView> GlobalMap::view(const LatticeWindow& window) {
   }
   for (Image<float>* layer : {&view.elevation_m, &view.elevation_min_m, &view.elevation_max_m, &view.variance_m2})
     *layer = Image<float>(window.width, window.height, kNaN);
-  for (Image<float>* layer : {&view.count, &view.kind, &view.occupancy_logodds})
+  for (Image<float>* layer : {&view.count, &view.occupancy_logodds})
     *layer = Image<float>(window.width, window.height, 0.0F);
+  view.kind = Image<GroundClass>(window.width, window.height);
   view.stop = Image<std::int32_t>(window.width, window.height, -1);
   std::size_t i = 0;
   for (int row = 0; row < window.height; ++row) {
@@ -126,7 +127,7 @@ Result<MapView> GlobalMap::view(const LatticeWindow& window) {
       view.elevation_max_m(column, row) = s.highest_m;
       view.variance_m2(column, row) = s.variance_m2;
       view.count(column, row) = s.count;
-      view.kind(column, row) = static_cast<float>(cells[i].kind());
+      view.kind(column, row) = cells[i].kind();
       view.occupancy_logodds(column, row) = s.occupancy_logodds;
       view.stop(column, row) = s.stop;
     }
@@ -195,7 +196,7 @@ Result<std::optional<MapSample>> GlobalMap::at(double x_m, double y_m) {
     sample.variance_m2 += weight * around->variance_m2(c, r);
     sample.occupancy_logodds += weight * around->occupancy_logodds(c, r);
   }
-  sample.kind = static_cast<int>(around->kind(a < 0.5 ? 0 : 1, b < 0.5 ? 1 : 0));
+  sample.kind = around->kind(a < 0.5 ? 0 : 1, b < 0.5 ? 1 : 0);
   return sample;
 }
 

@@ -40,10 +40,10 @@ CellSurface with_one_vote_less(CellSurface alternative) {
 
 }  // namespace
 
-int MapCell::kind() const {
-  if (!surface.observed()) return 0;
-  if (surface.occupancy_logodds <= 0) return 1;
-  return surface.shape >= 0 ? 2 : 3;
+GroundClass MapCell::kind() const {
+  if (!surface.observed()) return GroundClass::unknown;
+  if (surface.occupancy_logodds <= 0) return GroundClass::ground;
+  return surface.shape >= 0 ? GroundClass::obstacle : GroundClass::cavity;
 }
 
 MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion) {

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "spartan/reconstruction/ground_class.h"
+
 namespace spartan {
 
 /// A surface in a cell, fused from the observations of one or more stops. Elevations are relative to the submap's
@@ -30,8 +32,8 @@ struct MapCell {
   CellSurface surface;
   CellSurface alternative;  ///< Fused from observations that contradict the surface.
 
-  /// 0 unknown (not observed), 1 free, 2 obstacle, 3 cavity.
-  int kind() const;
+  /// Unobserved cells are unknown, free cells are ground.
+  GroundClass kind() const;
   friend bool operator==(const MapCell&, const MapCell&) = default;
 };
 

@@ -71,14 +71,14 @@ TEST(MapCell, ReliefWidensTheGate) {
 }
 
 TEST(MapCell, KindFollowsTheLogOdds) {
-  EXPECT_EQ(MapCell{}.kind(), 0);
+  EXPECT_EQ(MapCell{}.kind(), GroundClass::unknown);
   CellSurface s = seen(0, 1e-4F);
-  EXPECT_EQ((MapCell{s, {}}.kind()), 1);
+  EXPECT_EQ((MapCell{s, {}}.kind()), GroundClass::ground);
   s.occupancy_logodds = 2;
   s.shape = 1;
-  EXPECT_EQ((MapCell{s, {}}.kind()), 2);
+  EXPECT_EQ((MapCell{s, {}}.kind()), GroundClass::obstacle);
   s.shape = -1;
-  EXPECT_EQ((MapCell{s, {}}.kind()), 3);
+  EXPECT_EQ((MapCell{s, {}}.kind()), GroundClass::cavity);
 }
 
 // Any sequence of observations, empty ones included.
@@ -100,7 +100,7 @@ RC_GTEST_PROP(MapCell, ObservationsNeverRaiseTheVariance, ()) {
     any = any || observation.observed();
     cell = next;
     RC_ASSERT(cell.surface.observed() == any);
-    RC_ASSERT(any || cell.kind() == 0);
+    RC_ASSERT(any || cell.kind() == GroundClass::unknown);
     if (any) RC_ASSERT(cell.surface.variance_m2 >= 4e-6F * 0.999F);
   }
 }

@@ -10,7 +10,7 @@ namespace spartan {
 
 /// Statistics of the observed cells; all 0 where there are none.
 struct MapFigures {
-  std::array<std::int64_t, 4> cells{};  ///< Number of cells by class (docs/formats.md, "Maps").
+  std::array<std::int64_t, 4> cells{};  ///< Number of cells by GroundClass.
   std::int64_t known = 0;               ///< Number of observed cells.
   float least_m = 0, most_m = 0;        ///< Lowest and highest elevation.
   float median_variance_m2 = 0;         ///< Of the elevations; the upper of the two middle values of an even number.

@@ -21,7 +21,7 @@ LatticeWindow add_stop(GlobalMap& map, double x, double y, double yaw) {
   LocalMap local = MapGenerator({}, Workers(1)).generate(points_at(ground, pose, 1), pose);
   for (int r = 0; r < local.size().height; ++r) {
     for (int c = 0; c < local.size().width; c += 10) {
-      local.kind(c, r) = 2;
+      local.kind(c, r) = GroundClass::obstacle;
       local.occupancy_logodds(c, r) = 3;
     }
   }
