@@ -167,7 +167,7 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
       scoring.nearest_m = bin < 3 ? kBorders_m[bin] : 0;
       scoring.farthest_m = kBorders_m[bin + 1];
       const MapMetrics metrics =
-          judge_map({map.place, map.elevation_m, map.kind, visibility.pixels, visibility.lowest_m}, truth, scoring);
+          judge_map({map.place, map.elevation_m, class_band(map.kind), visibility.pixels, visibility.lowest_m}, truth, scoring);
       sums[bin].add(metrics);
       if (bin == 3) totals.add(metrics);
       if (list && bin == 3) {

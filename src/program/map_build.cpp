@@ -145,7 +145,7 @@ Tilt tilt_of(const Eigen::Vector3d& up_in_body) {
           std::atan2(-up_in_body.x(), std::hypot(up_in_body.y(), up_in_body.z()))};
 }
 
-int count_of(const LocalMap& map, float kind) {
+int count_of(const LocalMap& map, GroundClass kind) {
   int count = 0;
   for (int y = 0; y < map.size().height; ++y) {
     for (int x = 0; x < map.size().width; ++x) count += map.kind(x, y) == kind ? 1 : 0;
@@ -174,24 +174,28 @@ Json views_of(const PositionMapper& mapper, const Eigen::Vector3d& up) {
 
 Json to_json(const PositionMapper& mapper, const LocalMap& map, const Stop& stop, const Eigen::Vector3d& up) {
   const Tilt tilt = tilt_of(up);
-  return {
-      {"schema", 1},
-      {"cell_m", map.place.cell_m},
-      {"west_m", map.place.west_m},
-      {"north_m", map.place.north_m},
-      {"columns", map.size().width},
-      {"rows", map.size().height},
-      {"cells", {{"free", count_of(map, 1)}, {"obstacle", count_of(map, 2)}, {"cavity", count_of(map, 3)}}},
-      {"obstacles", map.obstacles.size()},
-      {"attitude",
-       {{"roll_deg", tilt.roll_rad / kDegree}, {"pitch_deg", tilt.pitch_rad / kDegree}, {"source", stop.up_source}}},
-      {"views", views_of(mapper, up)},
-      {"time_ms",
-       {{"disparity", mapper.times().disparity},
-        {"v_disparity", mapper.times().v_disparity},
-        {"merging", mapper.times().merging},
-        {"map", mapper.times().map}}},
-      {"peak_memory_bytes", peak_memory_bytes()}};
+  return {{"schema", 1},
+          {"cell_m", map.place.cell_m},
+          {"west_m", map.place.west_m},
+          {"north_m", map.place.north_m},
+          {"columns", map.size().width},
+          {"rows", map.size().height},
+          {"cells",
+           {{"free", count_of(map, GroundClass::ground)},
+            {"obstacle", count_of(map, GroundClass::obstacle)},
+            {"cavity", count_of(map, GroundClass::cavity)}}},
+          {"obstacles", map.obstacles.size()},
+          {"attitude",
+           {{"roll_deg", tilt.roll_rad / kDegree},
+            {"pitch_deg", tilt.pitch_rad / kDegree},
+            {"source", stop.up_source}}},
+          {"views", views_of(mapper, up)},
+          {"time_ms",
+           {{"disparity", mapper.times().disparity},
+            {"v_disparity", mapper.times().v_disparity},
+            {"merging", mapper.times().merging},
+            {"map", mapper.times().map}}},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 std::string to_text(const Json& json, const std::string& folder) {

@@ -120,7 +120,7 @@ LocalMap small_map(double x_m, double y_m, float elevation_m) {
     *layer = Image<float>(kSide, kSide, elevation_m);
   local.variance_m2 = Image<float>(kSide, kSide, 1e-4F);
   local.count = Image<float>(kSide, kSide, 5);
-  local.kind = Image<float>(kSide, kSide, 1);
+  local.kind = Image<GroundClass>(kSide, kSide, GroundClass::ground);
   local.occupancy_logodds = Image<float>(kSide, kSide, -1);
   return local;
 }

@@ -16,10 +16,10 @@ Image<Rgb8> colour_disparity(ImageView<const float> disparity) {
       if (!std::isnan(disparity(x, y))) known.push_back(disparity(x, y));
     }
   }
-  Image<Rgb8> picture(disparity.size());
-  if (known.empty()) return picture;
-  const auto percentile = [&](double share) {
-    const auto at = known.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(known.size() - 1));
+  Image<Rgb8> image(disparity.size());
+  if (known.empty()) return image;
+  const auto percentile = [&](double fraction) {
+    const auto at = known.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(known.size() - 1));
     std::nth_element(known.begin(), at, known.end());
     return *at;
   };
@@ -34,10 +34,10 @@ Image<Rgb8> colour_disparity(ImageView<const float> disparity) {
       if (std::isnan(d)) continue;
       const int level = static_cast<int>(std::clamp((d - low) / (high - low), 0.0F, 1.0F) * 255.0F);
       const auto bgr = colours.at<cv::Vec3b>(level);
-      picture(x, y) = {bgr[2], bgr[1], bgr[0]};
+      image(x, y) = {bgr[2], bgr[1], bgr[0]};
     }
   }
-  return picture;
+  return image;
 }
 
 }  // namespace spartan

@@ -1,11 +1,12 @@
-// Disparities as a picture for people.
+// Disparity images rendered in colour.
 #pragma once
 
 #include "spartan/core/image.h"
 
 namespace spartan {
 
-/// Near is warm, far is cold (Google's "turbo" map), unknown is black; the colours span the 1st to the 99th percentile.
+/// Renders disparities with Google's "turbo" colour map: large disparities (near) are red, small ones (far) blue,
+/// unknown pixels (NaN) black. The colour range spans the 1st to the 99th percentile of the known disparities.
 Image<Rgb8> colour_disparity(ImageView<const float> disparity);
 
 }  // namespace spartan

@@ -16,16 +16,16 @@
 namespace spartan {
 namespace {
 
-// A pair of the synthetic ground, 0.5 m above it, looking 30° down.
+// A stereo pair of the synthetic ground, seen from 0.5 m above it, pitched down by 30°.
 const testing::SyntheticShot& ground() {
-  static const testing::SyntheticShot shot = [] {
+  static const testing::SyntheticShot frame = [] {
     testing::SyntheticWorldOptions options;
     options.stones_per_m2 = 3;
     const Pose tilt = Pose(exp_so3({0, 30 * M_PI / 180, 0}), {0, 0, 0.5});
     return testing::SyntheticWorld(options).render({{320, 240}, 260.0, {159.5, 119.5}, 0.12},
                                                    tilt * optical_from_forward().inverse(), 1);
   }();
-  return shot;
+  return frame;
 }
 
 std::vector<float> values(ImageView<const float> image) {
@@ -45,7 +45,7 @@ bool same_bytes(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
-TEST(DisparityComputer, FindsTheTruthOfASyntheticPair) {
+TEST(DisparityComputer, MatchesTheTrueDisparitiesOfASyntheticPair) {
   const std::vector<float> found = disparity_of_ground({}, 1), truth = values(ground().disparity);
   int visible = 0, known = 0, wrong = 0;
   double squares = 0;
@@ -66,8 +66,8 @@ TEST(DisparityComputer, FindsTheTruthOfASyntheticPair) {
   EXPECT_LT(std::sqrt(squares / known), 0.2) << "px";
 }
 
-TEST(DisparityComputer, GivesTheSameBytesOnEveryInstructionSetAndAnyNumberOfThreads) {
-  for (const int count : {96, 80, 48}) {  // filled up to 96, 96 and 64 bytes: vectors of 32 and of 64
+TEST(DisparityComputer, IsDeterministicOnEveryInstructionSetAndNumberOfThreads) {
+  for (const int count : {96, 80, 48}) {  // padded to 96, 96 and 64 bytes: vectors of 32 and of 64 bytes
     DisparityOptions options;
     const std::vector<float> expected = disparity_of_ground(options, 1, count);
     EXPECT_TRUE(same_bytes(disparity_of_ground(options, 2, count), expected)) << "two threads";
@@ -79,7 +79,7 @@ TEST(DisparityComputer, GivesTheSameBytesOnEveryInstructionSetAndAnyNumberOfThre
   }
 }
 
-TEST(DisparityComputer, UsesItsBuffersAgainWithoutATrace) {
+TEST(DisparityComputer, DoesNotDependOnThePreviousCall) {
   DisparityComputer computer(DisparityOptions{}, Workers(1));
   const auto first = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
   ASSERT_TRUE(computer.compute(ground().right, ground().left, {-40, 10}));
@@ -87,7 +87,7 @@ TEST(DisparityComputer, UsesItsBuffersAgainWithoutATrace) {
   EXPECT_TRUE(same_bytes(first, again));
 }
 
-// The right eye of a turned pair is the left one: disparities change their sign and nothing else.
+// With left and right camera swapped, disparities change their sign and nothing else.
 TEST(DisparityComputer, FindsNegativeDisparities) {
   Random random(4);
   Image<std::uint8_t> left(120, 60), right(120, 60);
@@ -105,7 +105,7 @@ TEST(DisparityComputer, FindsNegativeDisparities) {
   }
 }
 
-TEST(DisparityComputer, LeavesOutWhatTheMasksHide) {
+TEST(DisparityComputer, DiscardsMaskedPixels) {
   Image<std::uint8_t> mask(320, 240, 255);
   for (int y = 0; y < 240; ++y) std::fill(mask.row(y) + 100, mask.row(y) + 140, std::uint8_t{0});
   DisparityComputer computer(DisparityOptions{}, Workers(1));
@@ -116,7 +116,7 @@ TEST(DisparityComputer, LeavesOutWhatTheMasksHide) {
   }
 }
 
-TEST(DisparityComputer, RefusesWhatDoesNotFit) {
+TEST(DisparityComputer, RejectsInvalidSizesAndRanges) {
   DisparityComputer computer(DisparityOptions{}, Workers(1));
   const Image<std::uint8_t> small(40, 30), other(41, 30);
   EXPECT_EQ(computer.compute(small, other, {0, 15}).error().code, ErrorCode::input);
@@ -126,7 +126,7 @@ TEST(DisparityComputer, RefusesWhatDoesNotFit) {
   EXPECT_EQ(computer.compute(small, small, {0, 15}, other, {}).error().code, ErrorCode::input) << "mask";
 }
 
-TEST(DisparityComputer, SurvivesTinyImages) {
+TEST(DisparityComputer, AcceptsTinyImages) {
   DisparityComputer computer(DisparityOptions{}, Workers(2));
   for (const int width : {1, 2, 5, 17, 33}) {
     for (const int height : {1, 2, 3, 9}) {
@@ -138,7 +138,7 @@ TEST(DisparityComputer, SurvivesTinyImages) {
   }
 }
 
-TEST(DisparityRange, ComesFromTheNearestPointOrTheWidth) {
+TEST(DisparityRange, FollowsFromTheNearestDepthOrTheWidth) {
   const RectifiedStereo stereo{{640, 480}, 492.7, {319.5, 239.5}, 0.12};
   EXPECT_EQ(disparity_range(stereo, 0).count(), 176) << "a quarter of 640, rounded up";
   EXPECT_EQ(disparity_range(stereo, 0.5).count(), 128) << "118.2 px";

@@ -9,7 +9,7 @@ namespace spartan {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-constexpr int kRowsAtOnce = 32;
+constexpr int kRowsAtOnce = 32;  // rows of one work item of a thread
 
 }  // namespace
 
@@ -22,8 +22,8 @@ void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const Worke
         float d = raw.left(x, y);
         if (raw.unique(x, y) == 0) d = kUnknown;
         if (tolerance_px >= 0 && !std::isnan(d)) {
-          const int seen = std::clamp(x - static_cast<int>(std::lround(d)), 0, w - 1);
-          const std::int16_t other = raw.right(seen, y);
+          const int matched = std::clamp(x - static_cast<int>(std::lround(d)), 0, w - 1);
+          const std::int16_t other = raw.right(matched, y);
           if (other == RawDisparity::kNoMatch || std::abs(static_cast<double>(d) - other) > tolerance_px + 0.5)
             d = kUnknown;
         }
@@ -42,16 +42,16 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
       if (std::isnan(d)) continue;
       if (!left_mask.empty() && left_mask(x, y) == 0) d = kUnknown;
       if (right_mask.empty() || std::isnan(d)) continue;
-      const int seen = std::clamp(x - static_cast<int>(std::lround(d)), 0, disparity.width() - 1);
-      if (right_mask(seen, y) == 0) d = kUnknown;
+      const int matched = std::clamp(x - static_cast<int>(std::lround(d)), 0, disparity.width() - 1);
+      if (right_mask(matched, y) == 0) d = kUnknown;
     }
   }
 }
 
 namespace {
 
-// Median of what is known of the 3×3 pixels around (x, y); the lower one of an even count: a value that was measured,
-// not a mean across an edge.
+// Median of the known values of the 3×3 pixels around (x, y). For an even count it is the lower of the two middle
+// values: a measured disparity, not a mean across a depth edge.
 float median_of_known(ImageView<const float> in, int x, int y) {
   std::array<float, 9> values{};
   std::size_t known = 0;
@@ -65,21 +65,21 @@ float median_of_known(ImageView<const float> in, int x, int y) {
   return *middle;
 }
 
-float middle_of(float a, float b, float c) {
+float median_of(float a, float b, float c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
 
-// Three values above each other, sorted; all NaN where one of them is.
+// The three values of a window column, sorted; all NaN where one of them is NaN.
 struct Column {
   float low = kUnknown, middle = kUnknown, high = kUnknown;
 };
 Column column_of(float a, float b, float c) {
   if (std::isnan(a + b + c)) return {};
-  return {std::min({a, b, c}), middle_of(a, b, c), std::max({a, b, c})};
+  return {std::min({a, b, c}), median_of(a, b, c), std::max({a, b, c})};
 }
 
-// Of nine values in three sorted columns the median is that of the largest low, the middle middle and the smallest high
-// one: each column is sorted once for three pixels.
+// Of nine values in three sorted columns the median is the median of the largest minimum, the median of the medians and
+// the smallest maximum. Each column is sorted once and used for three pixels.
 void median_row(ImageView<const float> in, int y, ImageView<float> out) {
   const int w = in.width();
   const bool inside = y > 0 && y + 1 < in.height();
@@ -95,7 +95,7 @@ void median_row(ImageView<const float> in, int y, ImageView<float> out) {
       out(x, y) = median_of_known(in, x, y);
     } else {
       out(x, y) =
-          middle_of(std::max({left.low, centre.low, right.low}), middle_of(left.middle, centre.middle, right.middle),
+          median_of(std::max({left.low, centre.low, right.low}), median_of(left.middle, centre.middle, right.middle),
                     std::min({left.high, centre.high, right.high}));
     }
     left = centre;

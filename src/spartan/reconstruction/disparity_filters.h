@@ -1,4 +1,4 @@
-// Checks that take away what should not be trusted. Unknown is NaN throughout.
+// Checks and filters that discard unreliable disparities. Unknown is NaN throughout.
 #pragma once
 
 #include <cstdint>
@@ -10,37 +10,38 @@
 
 namespace spartan {
 
-/// Drops disparities that the right eye sees elsewhere: |d − d_right(x − d)| > tolerance_px, and those that are not
-/// unique.
+/// Left-right consistency check. Discards a disparity d where the right image's own match differs,
+/// |d − d_right(x − d)| > tolerance_px + 0.5 (the right disparities are whole pixels), where the right pixel has no
+/// match, and where the match is not unique. A negative tolerance disables the left-right part.
 void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const Workers& workers,
                        ImageView<float> disparity);
 
-/// Drops what lies outside the masks (255 valid); an empty mask lets all pass.
+/// Discards disparities of excluded pixels of either image (mask 0; valid is 255). An empty mask excludes nothing.
 void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::uint8_t> right_mask,
                  ImageView<float> disparity);
 
 /// Median of the known values in the 3×3 neighbourhood of each known pixel; unknown pixels stay unknown.
 void median_3x3(ImageView<const float> in, const Workers& workers, ImageView<float> out);
 
-/// Drops 4-connected patches of fewer than `size_px` pixels; neighbours belong together where they differ by at most
-/// `step_px`. Runs of connected pixels along the rows are joined by union and find. Keeps its buffers from call to
-/// call.
+/// Discards 4-connected components of fewer than `size_px` pixels. Neighbours are connected where their disparities
+/// differ by at most `step_px`. Method: connected-component labelling by runs along the rows and union-find. Buffers
+/// are kept from call to call.
 class SpeckleFilter {
  public:
   void apply(int size_px, double step_px, ImageView<float> disparity);
 
  private:
   struct Run {
-    int y, from, to;  ///< pixels from … to − 1 of row y
-    int parent;       ///< index of another run of the patch; itself at the root
-    int pixels;       ///< of the whole patch, at its root
+    int y, from, to;  ///< Pixels from … to − 1 of row y.
+    int parent;       ///< Index of another run of the component; its own index at the root.
+    int pixels;       ///< Pixels of the whole component, valid at its root.
   };
   int root_of(int run);
   void join(int one, int other);
   void find_runs(float step, ImageView<const float> disparity);
 
   std::vector<Run> runs_;
-  std::vector<int> above_, here_;  ///< run of each pixel in the row above and in this one, −1: unknown
+  std::vector<int> above_, here_;  ///< Run of each pixel in the row above and in this row; −1: unknown.
 };
 
 }  // namespace spartan

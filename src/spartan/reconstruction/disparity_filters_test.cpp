@@ -14,8 +14,8 @@ namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
-// Blobs of a few levels with holes: patches of all sizes.
-Image<float> patchy(int width, int height, double holes, std::uint64_t seed) {
+// Regions of a few disparity levels with holes: components of all sizes.
+Image<float> blobs(int width, int height, double holes, std::uint64_t seed) {
   Random random(seed);
   Image<float> image(width, height);
   for (int y = 0; y < height; ++y) {
@@ -42,7 +42,7 @@ void expect_same(ImageView<const float> found, ImageView<const float> wanted) {
   }
 }
 
-// The definition, by sorting.
+// Reference implementation by sorting.
 Image<float> median_by_sorting(ImageView<const float> in) {
   Image<float> out(in.width(), in.height(), kUnknown);
   for (int y = 0; y < in.height(); ++y) {
@@ -62,35 +62,35 @@ Image<float> median_by_sorting(ImageView<const float> in) {
   return out;
 }
 
-// The definition, by flooding.
+// Reference implementation by flood fill.
 Image<float> despeckled_by_flooding(ImageView<const float> in, int size_px, double step_px) {
   Image<float> out(in.width(), in.height(), kUnknown);
   Image<std::uint8_t> seen(in.width(), in.height(), 0);
   for (int y0 = 0; y0 < in.height(); ++y0) {
     for (int x0 = 0; x0 < in.width(); ++x0) {
       if (std::isnan(in(x0, y0)) || seen(x0, y0) != 0) continue;
-      std::vector<std::pair<int, int>> patch{{x0, y0}};
+      std::vector<std::pair<int, int>> component{{x0, y0}};
       seen(x0, y0) = 1;
-      for (std::size_t next = 0; next < patch.size(); ++next) {
-        const auto [x, y] = patch[next];
+      for (std::size_t next = 0; next < component.size(); ++next) {
+        const auto [x, y] = component[next];
         for (const auto& [u, v] : {std::pair(x - 1, y), {x + 1, y}, {x, y - 1}, {x, y + 1}}) {
           if (u < 0 || v < 0 || u >= in.width() || v >= in.height() || seen(u, v) != 0) continue;
           if (!(std::abs(in(u, v) - in(x, y)) <= static_cast<float>(step_px))) continue;
           seen(u, v) = 1;
-          patch.emplace_back(u, v);
+          component.emplace_back(u, v);
         }
       }
-      if (static_cast<int>(patch.size()) < size_px) continue;
-      for (const auto& [x, y] : patch) out(x, y) = in(x, y);
+      if (static_cast<int>(component.size()) < size_px) continue;
+      for (const auto& [x, y] : component) out(x, y) = in(x, y);
     }
   }
   return out;
 }
 
-TEST(Median, IsTheMiddleOfWhatIsKnown) {
+TEST(Median, EqualsTheReference) {
   for (const double holes : {0.0, 0.1, 0.6}) {
     for (const ImageSize size : {ImageSize{57, 70}, {1, 1}, {1, 9}, {9, 1}, {2, 2}}) {
-      const Image<float> in = patchy(size.width, size.height, holes, 4);
+      const Image<float> in = blobs(size.width, size.height, holes, 4);
       Image<float> out(size);
       median_3x3(in, Workers(2), out);
       expect_same(out, median_by_sorting(in));
@@ -98,11 +98,11 @@ TEST(Median, IsTheMiddleOfWhatIsKnown) {
   }
 }
 
-TEST(Speckles, GoWhereTheyAreSmallerThanAskedFor) {
+TEST(SpeckleFilter, EqualsTheReference) {
   SpeckleFilter filter;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     for (const double holes : {0.05, 0.3}) {
-      Image<float> image = patchy(83, 61, holes, seed);
+      Image<float> image = blobs(83, 61, holes, seed);
       const Image<float> wanted = despeckled_by_flooding(image, 12, 1);
       filter.apply(12, 1, image);
       expect_same(image, wanted);
@@ -110,7 +110,7 @@ TEST(Speckles, GoWhereTheyAreSmallerThanAskedFor) {
   }
 }
 
-TEST(Speckles, AStepOfTheLimitConnects) {
+TEST(SpeckleFilter, ADifferenceEqualToTheLimitConnects) {
   for (const ImageSize size : {ImageSize{4, 1}, {1, 4}}) {
     Image<float> image(size);
     for (int i = 0; i < 4; ++i)
@@ -123,19 +123,19 @@ TEST(Speckles, AStepOfTheLimitConnects) {
   }
 }
 
-TEST(Speckles, NoneGoWithoutASize) {
+TEST(SpeckleFilter, KeepsAllPixelsWhenDisabled) {
   Image<float> image(1, 1, 5.0f);
   SpeckleFilter().apply(0, 1, image);
   EXPECT_EQ(image(0, 0), 5.0f);
 }
 
-TEST(LeftRightCheck, AsksTheRightEye) {
+TEST(LeftRightCheck, ComparesWithTheRightDisparities) {
   RawDisparity raw;
   raw.left = Image<float>(8, 1, 2.0f);
   raw.right = Image<std::int16_t>(8, 1, std::int16_t{2});
   raw.unique = Image<std::uint8_t>(8, 1, std::uint8_t{1});
-  raw.right(3, 0) = 4;                       // asked by x = 5
-  raw.right(4, 0) = RawDisparity::kNoMatch;  // asked by x = 6
+  raw.right(3, 0) = 4;                       // matched by x = 5
+  raw.right(4, 0) = RawDisparity::kNoMatch;  // matched by x = 6
   raw.unique(7, 0) = 0;
   Image<float> out(8, 1);
   drop_inconsistent(raw, 1, Workers(1), out);
@@ -144,11 +144,11 @@ TEST(LeftRightCheck, AsksTheRightEye) {
   for (int x = 0; x < 8; ++x) EXPECT_EQ(std::isnan(out(x, 0)), x == 7) << x;
 }
 
-TEST(Masks, DropWhatEitherEyeMustNotUse) {
+TEST(Masks, DiscardExcludedPixelsOfEitherImage) {
   Image<float> disparity(6, 1, 2.0f);
   Image<std::uint8_t> left(6, 1, std::uint8_t{255}), right(6, 1, std::uint8_t{255});
   left(5, 0) = 0;
-  right(1, 0) = 0;  // where x = 3 looks
+  right(1, 0) = 0;  // the match of x = 3
   apply_masks(left, right, disparity);
   for (int x = 0; x < 6; ++x) EXPECT_EQ(std::isnan(disparity(x, 0)), x == 3 || x == 5) << x;
 }

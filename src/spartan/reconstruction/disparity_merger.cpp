@@ -15,15 +15,15 @@ constexpr std::size_t kMostViews = 8;
 constexpr int kClasses = 4;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-// (u, v, d, 1) → homogeneous point in the centre's axes.
+// Reprojection matrix: (u, v, d, 1) → homogeneous point in the axes of the virtual camera.
 Eigen::Matrix4d reprojection(const RectifiedStereo& g, const Pose& centre_from_left) {
   Eigen::Matrix4d q;
   q << 1, 0, 0, -g.centre_px.x(), 0, 1, 0, -g.centre_px.y(), 0, 0, 0, g.focal_px, 0, 0, 1 / g.baseline_m, 0;
   return centre_from_left.matrix() * q;
 }
 
-// Standard deviation of the range from that of the disparity, σ_z = z² σ_d / (f b), along a ray that is `stretch` times
-// as long as its depth.
+// Standard deviation of the range from that of the disparity: σ_z = z² σ_d / (f b), times `stretch`, the ratio of range
+// and depth.
 double range_sigma(const RectifiedStereo& g, double disparity, double stretch, double sigma_px) {
   const double fb = g.focal_px * g.baseline_m, depth = fb / disparity;
   return depth * depth * sigma_px / fb * stretch;
@@ -31,15 +31,16 @@ double range_sigma(const RectifiedStereo& g, double disparity, double stretch, d
 
 }  // namespace
 
-// What one view has in each cell: the nearest surface.
+// The nearest surface that one view sees in each cell.
 struct DisparityMerger::Layer {
   explicit Layer(ImageSize size) : sum_range(size), sum_variance(size), sum_gray(size), count(size), votes(size) {}
   Image<float> sum_range, sum_variance, sum_gray;
   Image<std::uint16_t> count;
-  Image<std::uint32_t> votes;  // a byte a class, saturated
+  Image<std::uint32_t> votes;  // pixels of each class, one saturating byte per class
 
   float range(int x, int y) const { return sum_range(x, y) / static_cast<float>(count(x, y)); }
-  // Neighbouring disparities err together: averaging a cell's pixels is not trusted to make it better.
+  // The mean of the pixels' variances, not the variance of their mean: errors of neighbouring disparities are
+  // correlated.
   float variance(int x, int y) const { return sum_variance(x, y) / static_cast<float>(count(x, y)); }
 
   void add(int x, int y, float r, float variance_m2, std::uint8_t level, std::uint8_t kind, float gate) {
@@ -65,10 +66,8 @@ DisparityMerger::DisparityMerger(const MergingOptions& options, const Pose& body
                                  std::span<const ViewGeometry> views, double nearest_m, Workers workers)
     : options_(options), body_from_centre_(body_from_centre), workers_(std::move(workers)) {
   if (views.size() > kMostViews) throw std::invalid_argument("DisparityMerger: more than 8 views");
-  const auto projection =
-      options.projection == "sphere" ? PanoramicCamera::Projection::sphere : PanoramicCamera::Projection::cylinder;
-  camera_ = plan_panorama(projection, options.pixels_per_degree * 180 / std::numbers::pi, body_from_centre, views,
-                          nearest_m, options.farthest_m);
+  camera_ = plan_panorama(options.projection, options.pixels_per_degree * 180 / std::numbers::pi, body_from_centre,
+                          views, nearest_m, options.farthest_m);
 }
 
 void DisparityMerger::throw_into(const MergedView& view, Layer& layer) const {
@@ -99,7 +98,7 @@ void DisparityMerger::throw_into(const MergedView& view, Layer& layer) const {
 
 namespace {
 
-// A view's answer for one cell.
+// The surface that one view sees in a cell.
 struct Candidate {
   std::size_t view = 0;
   float range = 0, variance = 0, gray = 0;
@@ -107,7 +106,7 @@ struct Candidate {
   int count = 0;
 };
 
-// Whether a view looks through a point: it sees something clearly farther where the point would be.
+// Whether a view sees free space at a point: its disparity at the point's pixel is smaller by more than the gate.
 bool looks_through(const MergedView& view, const Eigen::Vector3d& point_in_body, double gate, double sigma_px) {
   const RectifiedStereo& g = view.geometry.stereo;
   const Eigen::Vector3d in_left = view.geometry.body_from_left.inverse() * point_in_body;
@@ -150,7 +149,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
     for (std::size_t i = 1; i < count; ++i) {
       for (std::size_t j = i; j > 0 && found[j].range < found[j - 1].range; --j) std::swap(found[j], found[j - 1]);
     }
-    // From the nearest on: a surface stands unless more views look through it than see it.
+    // From the nearest surface on: it is retained unless more views see free space through it than see it.
     std::size_t first = 0, last = 0;
     while (true) {
       last = first + 1;
@@ -190,8 +189,8 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
 
 namespace {
 
-// Cells between two known ones of one surface, at most kGap away: where the virtual camera's cells are finer than a
-// view's pixels.
+// Maximum distance in cells of the known cells from which a gap is interpolated. Gaps occur where the cells of the
+// virtual camera are smaller than the pixels of a view.
 constexpr int kGap = 2;
 
 void fill_gaps(MergedRange& merged, float gate, const Workers& workers) {

@@ -1,6 +1,7 @@
-// Disparity merging: the published sub-module that joins the views of one rover position.
+// Disparity merging: fuses the views of one stop into one panoramic range image.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -14,53 +15,70 @@
 namespace spartan {
 
 struct MergingOptions {
-  std::string projection = "cylinder";
-  double pixels_per_degree = 12;
-  double farthest_m = 6;
-  double disparity_sigma_px = 0.3;
-  double gate_sigmas = 3;
+  PanoramicCamera::Projection projection = PanoramicCamera::Projection::cylinder;  ///< Of the virtual camera.
+  double pixels_per_degree = 12;    ///< Resolution of the virtual camera, pixels per degree of azimuth.
+  double farthest_m = 6;            ///< Maximum range of a point from the virtual camera, m.
+  double disparity_sigma_px = 0.3;  ///< Standard deviation of a disparity, pixels.
+  double gate_sigmas = 3;           ///< Gate on range differences, standard deviations.
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("projection", projection, "of the virtual camera", {"cylinder", "sphere"});
-    v.field("pixels_per_degree", pixels_per_degree, "of the virtual camera", between(0.5, 60));
-    v.field("farthest_m", farthest_m, "points farther away are left out", between(0.5, 10000));
-    v.field("disparity_sigma_px", disparity_sigma_px, "standard deviation of a disparity", between(0.01, 5));
-    v.field("gate_sigmas", gate_sigmas, "ranges that differ by more belong to different surfaces", between(1, 10));
+    v.field("projection", projection,
+            "Projection of the virtual panoramic camera: rows of a cylinder are equal steps of slope, rows of a sphere "
+            "equal steps of elevation angle; choose sphere for cameras that look steeply down.");
+    v.field("pixels_per_degree", pixels_per_degree,
+            "Resolution of the virtual panoramic camera in pixels per degree of azimuth; raising it keeps finer detail "
+            "and costs memory and time.",
+            between(0.5, 60));
+    v.renamed("farthest_m", "max_range_m");
+    v.field("max_range_m", farthest_m,
+            "Maximum range of a point from the virtual camera in metres; farther points are discarded.",
+            between(0.5, 10000));
+    v.field(
+        "disparity_sigma_px", disparity_sigma_px,
+        "Standard deviation of a disparity in pixels, from which the variance of a range follows; raising it merges "
+        "surfaces that are farther apart.",
+        between(0.01, 5));
+    v.field("gate_sigmas", gate_sigmas,
+            "Gate on the difference of two ranges in standard deviations; ranges that differ by more belong to "
+            "different surfaces, and raising it averages more of them.",
+            between(1, 10));
   }
 };
 
-/// One view that is merged. Everything is borrowed.
+/// One view to be merged. All images are borrowed and of one size.
 struct MergedView {
   ViewGeometry geometry;
-  ImageView<const float> disparity;       ///< px, NaN unknown
-  ImageView<const std::uint8_t> left;     ///< gray levels of the rectified left image
-  ImageView<const std::uint8_t> classes;  ///< per pixel, handed through by majority; may be empty (all 0)
+  ImageView<const float> disparity;       ///< Pixels; NaN where unknown.
+  ImageView<const std::uint8_t> left;     ///< Gray levels of the rectified left image.
+  ImageView<const std::uint8_t> classes;  ///< GroundClass of each pixel; may be empty (all 0).
 };
 
-/// The ground as seen from one point by all views together.
+/// The range image of the virtual panoramic camera, fused from all views.
 struct MergedRange {
   PanoramicCamera camera;
   Pose body_from_centre;
-  Image<float> range_m;         ///< along the ray; NaN unknown
-  Image<float> sigma_m;         ///< standard deviation of the range
-  Image<std::uint8_t> views;    ///< bit i: view i is in it
-  Image<std::uint8_t> gray;     ///< mean gray level
-  Image<std::uint8_t> classes;  ///< of the view with the most pixels there
+  Image<float> range_m;         ///< Along the ray; NaN where unknown.
+  Image<float> sigma_m;         ///< Standard deviation of the range.
+  Image<std::uint8_t> views;    ///< Bit i: view i contributed.
+  Image<std::uint8_t> gray;     ///< Mean gray level, weighted by the ranges' inverse variances.
+  Image<std::uint8_t> classes;  ///< Majority GroundClass of the view with the most pixels in the cell.
 };
 
-/// Every pixel of every view is thrown into the virtual camera by one matrix a view, made from the fixed geometry: with
-/// disparity d, (X, Y, Z, W)ᵀ = M (u, v, d, 1)ᵀ. Pixels of one view that share a cell and a surface are averaged; of
-/// two surfaces the nearer stays. Views agree where their ranges differ by less than the gate: then they are weighted
-/// by their variances. Where they do not, the nearer surface stands unless more views look right through it than see
-/// it: in doubt there is an obstacle. Cells that no pixel met between two of one surface are filled.
+/// Fuses the views of one stop. Every pixel of every view is rasterized into the virtual camera by one 4×4 matrix per
+/// view, which the fixed geometry gives: with disparity d, (X, Y, Z, W)ᵀ = M (u, v, d, 1)ᵀ. Pixels of one view that
+/// fall into one cell and belong to one surface are averaged; of two surfaces the nearer one is retained. Views agree
+/// where their ranges differ by less than the gate; their ranges are then averaged with inverse-variance weights. Where
+/// views disagree, the nearer surface is retained unless more views see free space through it than see it, so that a
+/// doubtful cell counts as an obstacle. Empty cells between two cells of one surface are interpolated. Derivation:
+/// docs/math/stereo.md.
 class DisparityMerger {
  public:
   /// At most 8 views.
   DisparityMerger(const MergingOptions& options, const Pose& body_from_centre, std::span<const ViewGeometry> views,
                   double nearest_m, Workers workers);
 
-  /// Views in the order and with the geometry of the constructor; one without disparities (empty) is left out.
+  /// Views in the order and with the geometry of the constructor; a view with an empty disparity image is skipped.
   MergedRange merge(std::span<const MergedView> views) const;
 
   const PanoramicCamera& camera() const { return camera_; }

@@ -16,7 +16,7 @@ namespace {
 
 using Height = std::function<double(double, double)>;
 
-// A third of the published wide pair's resolution, three pans.
+// A third of the resolution of the paper's wide pair, at three pan angles.
 const RectifiedStereo kWide{{373, 373}, 400, {186, 186}, 0.2};
 
 struct Stop {
@@ -47,7 +47,7 @@ Stop three_pans(const Height& height) {
   return stop;
 }
 
-// Cells larger than the views' pixels: no gaps to fill.
+// Cells larger than the views' pixels: there are no gaps to interpolate.
 MergingOptions coarse() {
   MergingOptions options;
   options.pixels_per_degree = 2;
@@ -62,7 +62,7 @@ int known(const Image<float>& image) {
   return count;
 }
 
-TEST(DisparityMerger, RangesAreThoseOfTheGroundAndCoverMoreThanAnyView) {
+TEST(DisparityMerger, RangesMatchTheGroundAndCoverMoreThanAnyView) {
   const Stop stop = three_pans([](double x, double y) { return 0.05 * std::sin(2 * x) * std::cos(1.5 * y); });
   const MergedRange merged = stop.merge();
   double worst = 0;
@@ -74,7 +74,7 @@ TEST(DisparityMerger, RangesAreThoseOfTheGroundAndCoverMoreThanAnyView) {
       worst = std::max(worst, std::abs(p.z() - 0.05 * std::sin(2 * p.x()) * std::cos(1.5 * p.y())));
     }
   }
-  EXPECT_LT(worst, 0.012) << "half a pixel of the virtual camera on rolling ground";
+  EXPECT_LT(worst, 0.012) << "half a pixel of the virtual camera, on undulating ground";
   std::vector<int> alone;
   for (std::size_t i = 0; i < 3; ++i) {
     int count = 0;
@@ -86,16 +86,16 @@ TEST(DisparityMerger, RangesAreThoseOfTheGroundAndCoverMoreThanAnyView) {
   for (const int count : alone) EXPECT_GT(known(merged.range_m), 2 * count);
 }
 
-// Where two views agree, the variance is half of that of one.
-TEST(DisparityMerger, ViewsThatAgreeMakeItSurer) {
+// Where two views agree, the variance is half of that of one view.
+TEST(DisparityMerger, ViewsThatAgreeReduceTheVariance) {
   const Stop stop = three_pans([](double, double) { return 0; });
   const MergedRange merged = stop.merge(coarse());
   int both = 0;
-  for (int y = 0; y < merged.views.height() / 2; ++y) {  // farther down there are gaps
+  for (int y = 0; y < merged.views.height() / 2; ++y) {  // the lower half has gaps
     for (int x = 1; x < merged.views.width(); ++x) {
       if (merged.views(x, y) != 3 || merged.views(x - 1, y) != 1) continue;
       EXPECT_NEAR(merged.sigma_m(x, y) / merged.sigma_m(x - 1, y), std::sqrt(0.5), 0.08);
-      EXPECT_NEAR(merged.gray(x, y), 75, 3) << "of two views with 50 and 100";
+      EXPECT_NEAR(merged.gray(x, y), 75, 3) << "mean of two views with 50 and 100";
       ++both;
     }
   }
@@ -108,8 +108,8 @@ TEST(DisparityMerger, ViewsThatAgreeMakeItSurer) {
       << "z² σ / (f b)";
 }
 
-// Something in the air that only the middle view sees: two others look through it, or one.
-TEST(DisparityMerger, AGhostThatMoreViewsLookThroughIsDropped) {
+// A false surface that only the middle view sees: two other views, or one, see free space through it.
+TEST(DisparityMerger, DiscardsASurfaceThatMoreViewsSeeThrough) {
   Stop stop;
   for (const double pan : {0.3, 0.0, -0.3})
     stop.add(kWide, testing::looking(1, pan, 0.68, optical_from_forward()), [](double, double) { return 0; });
@@ -131,11 +131,11 @@ TEST(DisparityMerger, AGhostThatMoreViewsLookThroughIsDropped) {
     }
   }
   EXPECT_GT(dropped, 100);
-  EXPECT_LT(wrong, dropped / 20) << "at the edges of views";
-  EXPECT_GT(kept, 50) << "in doubt there is an obstacle";
+  EXPECT_LT(wrong, dropped / 20) << "only at the borders of views";
+  EXPECT_GT(kept, 50) << "a tie keeps the nearer surface";
 }
 
-TEST(DisparityMerger, TheNearerSurfaceStandsWhereNobodyLooksThroughIt) {
+TEST(DisparityMerger, KeepsTheNearerSurfaceWhereNoViewSeesThroughIt) {
   const Height rock = [](double x, double y) { return std::hypot(x - 1.6, y) < 0.25 ? 0.3 : 0.0; };
   const Stop stop = three_pans(rock);
   const MergedRange merged = stop.merge();
@@ -144,7 +144,7 @@ TEST(DisparityMerger, TheNearerSurfaceStandsWhereNobodyLooksThroughIt) {
   const Eigen::Vector3d p =
       Eigen::Vector3d(0, 0, 1) + static_cast<double>(range) * merged.camera.direction(pixel->x(), pixel->y());
   EXPECT_NEAR(std::hypot(p.x() - 1.6, p.y()), 0.25, 0.03);
-  // Cells at the rock's edge hold the rock or the ground behind it, never something between.
+  // Cells at the rock's edge have the range of the rock or of the ground behind it, never one in between.
   const MergedRange large_cells = stop.merge(coarse());
   for (int y = 0; y < large_cells.range_m.height(); ++y) {
     for (int x = 0; x < large_cells.range_m.width(); ++x) {
@@ -156,7 +156,7 @@ TEST(DisparityMerger, TheNearerSurfaceStandsWhereNobodyLooksThroughIt) {
   }
 }
 
-TEST(DisparityMerger, ClassesComeFromTheViewThatSeesMost) {
+TEST(DisparityMerger, ClassesComeFromTheViewWithTheMostPixels) {
   Stop stop = three_pans([](double, double) { return 0; });
   std::vector<MergedView> views = stop.views();
   Image<std::uint8_t> all_ground(373, 373, 1), all_rock(373, 373, 2);
@@ -178,7 +178,7 @@ TEST(DisparityMerger, ClassesComeFromTheViewThatSeesMost) {
   }
 }
 
-TEST(DisparityMerger, GivesTheSameBytesForAnyNumberOfThreadsAndTakesMissingViews) {
+TEST(DisparityMerger, IsDeterministicForAnyNumberOfThreadsAndSkipsEmptyViews) {
   Stop stop = three_pans([](double x, double y) { return 0.1 * std::sin(3 * x + y); });
   const MergedRange one = stop.merge({}, 1), two = stop.merge({}, 2);
   for (int y = 0; y < one.range_m.height(); ++y) {

@@ -9,15 +9,18 @@
 namespace spartan {
 namespace {
 
-// A patch of the disparity image: its best plane d = at + gradient · (place − middle).
-struct Patch {
-  Eigen::Vector2d middle;  // relative to the centre of the image
+constexpr std::size_t kMinBlocks = 8;  // least number of blocks that a plane is fitted to; empirical
+
+// A block of the disparity image with its fitted plane d = disparity + gradient · (pixel − centre).
+struct Block {
+  Eigen::Vector2d centre;  // relative to the principal point, pixels
   Eigen::Vector2d gradient;
-  double at = 0;
+  double disparity = 0;
 };
 
-// Least squares over the patch's known pixels; none where it has holes or is not flat.
-std::optional<Patch> fit_patch(ImageView<const float> disparity, int x0, int y0, int side, double sigma_px) {
+// Least squares over the known pixels of a block. None where more than a quarter of them is unknown, or where the
+// residuals' RMS is larger than three standard deviations (not planar).
+std::optional<Block> fit_block(ImageView<const float> disparity, int x0, int y0, int side, double sigma_px) {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double squares = 0;
@@ -38,32 +41,33 @@ std::optional<Patch> fit_patch(ImageView<const float> disparity, int x0, int y0,
   const Eigen::Vector3d plane = a.ldlt().solve(b);
   const double rms = std::sqrt(std::max(0.0, squares - b.dot(plane)) / count);
   if (rms > 3 * sigma_px) return std::nullopt;
-  return Patch{{x0 + half, y0 + half}, plane.head<2>(), plane.z()};
+  return Block{{x0 + half, y0 + half}, plane.head<2>(), plane.z()};
 }
 
-std::vector<Patch> fit_patches(ImageView<const float> disparity, const RectifiedStereo& g,
-                               const GroundPlaneOptions& options) {
-  std::vector<Patch> patches;
+std::vector<Block> fit_blocks(ImageView<const float> disparity, const RectifiedStereo& g,
+                              const GroundPlaneOptions& options) {
+  std::vector<Block> blocks;
   const int side = options.block_px;
   for (int y = 0; y + side <= disparity.height(); y += side) {
     for (int x = 0; x + side <= disparity.width(); x += side) {
-      auto patch = fit_patch(disparity, x, y, side, options.disparity_sigma_px);
-      if (!patch) continue;
-      patch->middle -= g.centre_px;
-      patches.push_back(*patch);
+      auto block = fit_block(disparity, x, y, side, options.disparity_sigma_px);
+      if (!block) continue;
+      block->centre -= g.centre_px;
+      blocks.push_back(*block);
     }
   }
-  return patches;
+  return blocks;
 }
 
-// The normal of a patch, away from the ground: up ∝ −(f g_x, f g_y, d_c) with d_c its plane's disparity at the centre.
+// The plane in space of a block, normal away from the ground: up ∝ −(f g_x, f g_y, d_c), d_c the disparity of the
+// block's plane at the principal point.
 GroundPlane plane_of(const RectifiedStereo& g, const Eigen::Vector2d& gradient, double at_centre) {
   const Eigen::Vector3d n(-gradient.x() * g.focal_px, -gradient.y() * g.focal_px, -at_centre);
   return {n.normalized(), g.focal_px * g.baseline_m / n.norm()};
 }
 
-// The value where most of the sorted values lie within `width` of each other: the middle of those.
-double densest(std::vector<double> values, double width) {
+// Mode of the values: the middle of the interval of length `width` that contains most of them.
+double mode_of(std::vector<double> values, double width) {
   std::sort(values.begin(), values.end());
   std::size_t best_from = 0, best_count = 0, to = 0;
   for (std::size_t from = 0; from < values.size(); ++from) {
@@ -88,43 +92,45 @@ double GroundPlane::roll_rad() const {
 
 std::optional<GroundPlane> find_ground_plane(ImageView<const float> disparity, const RectifiedStereo& geometry,
                                              const GroundPlane& expected, const GroundPlaneOptions& options) {
-  const std::vector<Patch> all = fit_patches(disparity, geometry, options);
-  const double turn = std::cos(options.steepest_deg * std::numbers::pi / 180);
-  std::vector<Patch> patches;
+  const std::vector<Block> all = fit_blocks(disparity, geometry, options);
+  const double min_cosine = std::cos(options.max_tilt_deg * std::numbers::pi / 180);
+  std::vector<Block> blocks;
   std::vector<double> inverse_heights;
-  for (const Patch& patch : all) {
-    const GroundPlane plane = plane_of(geometry, patch.gradient, patch.at - patch.gradient.dot(patch.middle));
-    if (plane.up.dot(expected.up) < turn) continue;
-    patches.push_back(patch);
+  for (const Block& block : all) {
+    const GroundPlane plane = plane_of(geometry, block.gradient, block.disparity - block.gradient.dot(block.centre));
+    if (plane.up.dot(expected.up) < min_cosine) continue;
+    blocks.push_back(block);
     inverse_heights.push_back(1 / plane.height_m);
   }
-  if (patches.size() < 8 || patches.size() * 20 < all.size()) return std::nullopt;
-  // Where most agree, first in the plane's distance, then by least squares over those that lie near it.
-  const double inverse = densest(inverse_heights, 0.2 / expected.height_m);
-  std::vector<char> agrees(patches.size());
-  for (std::size_t i = 0; i < patches.size(); ++i) agrees[i] = std::abs(inverse_heights[i] - inverse) < 0.15 * inverse;
+  if (blocks.size() < kMinBlocks || blocks.size() * 20 < all.size()) return std::nullopt;
+  // Consensus: first the mode of the inverse heights (interval of a fifth of the expected one, inliers within 15 %,
+  // empirical), then least squares over the inliers, repeated.
+  const double inverse = mode_of(inverse_heights, 0.2 / expected.height_m);
+  std::vector<char> inlier(blocks.size());
+  for (std::size_t i = 0; i < blocks.size(); ++i) inlier[i] = std::abs(inverse_heights[i] - inverse) < 0.15 * inverse;
   GroundPlane plane;
   for (int round = 0; round < 6; ++round) {
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     int count = 0;
-    for (std::size_t i = 0; i < patches.size(); ++i) {
-      if (agrees[i] == 0) continue;
-      const Eigen::Vector3d row(patches[i].middle.x(), patches[i].middle.y(), 1);
-      // By relative error: far patches count like near ones.
-      const double weight = 1 / (patches[i].at * patches[i].at);
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (inlier[i] == 0) continue;
+      const Eigen::Vector3d row(blocks[i].centre.x(), blocks[i].centre.y(), 1);
+      // Relative errors are minimized, so that far blocks have as much weight as near ones.
+      const double weight = 1 / (blocks[i].disparity * blocks[i].disparity);
       a += weight * row * row.transpose();
-      b += weight * patches[i].at * row;
+      b += weight * blocks[i].disparity * row;
       ++count;
     }
-    if (count < 8) return std::nullopt;
+    if (count < static_cast<int>(kMinBlocks)) return std::nullopt;
     const Eigen::Vector3d fit = a.ldlt().solve(b);
     plane = plane_of(geometry, fit.head<2>(), fit.z());
-    // Near: within a tenth of the height over the plane, later a twentieth.
+    // Inliers lie within a tenth of the camera's height from the plane, in the last rounds within a twentieth;
+    // empirical.
     const double gate = round < 3 ? 0.1 : 0.05;
-    for (std::size_t i = 0; i < patches.size(); ++i) {
-      const double d = fit.x() * patches[i].middle.x() + fit.y() * patches[i].middle.y() + fit.z();
-      agrees[i] = d > 0 && std::abs(1 - d / patches[i].at) < gate;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const double d = fit.x() * blocks[i].centre.x() + fit.y() * blocks[i].centre.y() + fit.z();
+      inlier[i] = d > 0 && std::abs(1 - d / blocks[i].disparity) < gate;
     }
   }
   return plane;

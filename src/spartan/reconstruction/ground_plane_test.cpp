@@ -16,10 +16,10 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 const RectifiedStereo kView{{400, 400}, 430, {199.5, 199.5}, 0.2};
 
-// A plane seen by an eye that looks `pitch` down and is rolled.
+// A plane seen by a camera that is pitched down and rolled.
 GroundPlane plane_seen(double height_m, double pitch_deg, double roll_deg) {
   const double p = pitch_deg * kDegree, r = roll_deg * kDegree;
-  // Up in the optical frame of an unrolled eye: (0, −cos p, −sin p).
+  // Up in the optical frame of a camera without roll: (0, −cos p, −sin p).
   return {{std::cos(p) * std::sin(r), -std::cos(p) * std::cos(r), -std::sin(p)}, height_m};
 }
 
@@ -37,7 +37,7 @@ Image<float> disparity_of(const GroundPlane& plane, const Noise& noise, std::uin
         image(x, y) = static_cast<float>(d + random.normal(0, noise.sigma_px));
     }
   }
-  // Rocks: upright discs that stand on the ground, of the disparity of their foot.
+  // Rocks: upright discs with the disparity of the ground at their lower end.
   const int count = static_cast<int>(noise.rocks * 400 * 400 / 2500);
   for (int i = 0; i < count; ++i) {
     const int cx = static_cast<int>(random.below(400)), cy = static_cast<int>(random.below(400));
@@ -52,8 +52,8 @@ Image<float> disparity_of(const GroundPlane& plane, const Noise& noise, std::uin
   return image;
 }
 
-// d is linear in the image, as the header says: f b / z of the point where the ray meets the plane.
-TEST(GroundPlane, DisparityIsThatOfThePointOnIt) {
+// d is linear in the image: f b / z of the point where the ray intersects the plane.
+TEST(GroundPlane, DisparityTriangulatesToAPointOnThePlane) {
   const GroundPlane plane = plane_seen(1.1, 35, 7);
   for (const double u : {0.0, 150.0, 399.0}) {
     for (const double v : {120.0, 250.0, 399.0}) {
@@ -65,7 +65,7 @@ TEST(GroundPlane, DisparityIsThatOfThePointOnIt) {
   EXPECT_NEAR(plane.roll_rad(), 7 * kDegree, 1e-9);
 }
 
-TEST(GroundPlane, AnglesAreThoseOfAnEyeOnTheBody) {
+TEST(GroundPlane, PitchAndRollAreThoseOfTheMountedCamera) {
   const Pose body_from_left =
       Pose::from_rotation(Eigen::Quaterniond(Eigen::AngleAxisd(39 * kDegree, Eigen::Vector3d::UnitY()))) *
       optical_from_forward().inverse();
@@ -74,7 +74,7 @@ TEST(GroundPlane, AnglesAreThoseOfAnEyeOnTheBody) {
   EXPECT_NEAR(plane.roll_rad(), 0, 1e-9);
 }
 
-RC_GTEST_PROP(GroundPlane, IsFoundUnderNoiseHolesAndRocks, ()) {
+RC_GTEST_PROP(GroundPlane, IsEstimatedWithNoiseHolesAndRocks, ()) {
   const double height = 0.01 * *rc::gen::inRange(30, 200), pitch = *rc::gen::inRange(15, 50),
                roll = *rc::gen::inRange(-20, 20);
   const GroundPlane truth = plane_seen(height, pitch, roll);
@@ -85,7 +85,7 @@ RC_GTEST_PROP(GroundPlane, IsFoundUnderNoiseHolesAndRocks, ()) {
   RC_ASSERT(std::acos(std::min(1.0, found->up.dot(truth.up))) < 0.3 * kDegree);
 }
 
-TEST(GroundPlane, WithoutRocksItIsExact) {
+TEST(GroundPlane, IsExactWithoutNoise) {
   const GroundPlane truth = plane_seen(1, 39, 3);
   const auto found = find_ground_plane(disparity_of(truth, {0, 0, 0}, 1), kView, plane_seen(0.8, 35, 0), {});
   ASSERT_TRUE(found);
@@ -93,17 +93,17 @@ TEST(GroundPlane, WithoutRocksItIsExact) {
   EXPECT_LT((found->up - truth.up).norm(), 1e-4);
 }
 
-TEST(GroundPlane, IsNotFoundWhereThereIsNone) {
+TEST(GroundPlane, IsNotFoundWhereThereIsNoGround) {
   const GroundPlane expected = plane_seen(1, 39, 0);
   const Image<float> nothing(400, 400, std::numeric_limits<float>::quiet_NaN()), wall(400, 400, 60.0F);
   EXPECT_FALSE(find_ground_plane(nothing, kView, expected, {}));
   EXPECT_FALSE(find_ground_plane(wall, kView, expected, {}));
   Random random(2, 1);
-  Image<float> chaos(400, 400);
+  Image<float> noise_only(400, 400);
   for (int y = 0; y < 400; ++y) {
-    for (int x = 0; x < 400; ++x) chaos(x, y) = static_cast<float>(random.uniform(5, 200));
+    for (int x = 0; x < 400; ++x) noise_only(x, y) = static_cast<float>(random.uniform(5, 200));
   }
-  EXPECT_FALSE(find_ground_plane(chaos, kView, expected, {}));
+  EXPECT_FALSE(find_ground_plane(noise_only, kView, expected, {}));
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr int kRounds = 6;
+constexpr int kRounds = 6;  // of least squares; the first has no robust weights
 
 class GroundFit {
  public:
@@ -20,25 +20,25 @@ class GroundFit {
       : elevation_(elevation),
         ground_(ground),
         options_(options),
-        reach_(std::max(2, static_cast<int>(std::lround(0.5 * options.window_m / cell_m)))) {}
+        radius_(std::max(2, static_cast<int>(std::lround(0.5 * options.window_m / cell_m)))) {}
 
-  // Height of the ground at a cell.
+  // Elevation of the ground surface at a cell: z = s₀ + s₁u + s₂v + s₃u² + s₄uv + s₅v² with u = v = 0 there.
   float at(int x, int y) const {
     Vector6 surface = Vector6::Zero();
-    double scale = options_.coarse_m;
-    const double step = std::pow(options_.fine_m / options_.coarse_m, 1.0 / (kRounds - 2));
+    double scale = options_.initial_scale_m;
+    const double step = std::pow(options_.final_scale_m / options_.initial_scale_m, 1.0 / (kRounds - 2));
     for (int round = 0; round < kRounds; ++round) {
       Matrix6 a = Matrix6::Identity() * 1e-6;
       Vector6 b = Vector6::Zero();
       int count = 0;
-      for (int j = std::max(y - reach_, 0); j <= std::min(y + reach_, elevation_.height() - 1); ++j) {
-        for (int i = std::max(x - reach_, 0); i <= std::min(x + reach_, elevation_.width() - 1); ++i) {
+      for (int j = std::max(y - radius_, 0); j <= std::min(y + radius_, elevation_.height() - 1); ++j) {
+        for (int i = std::max(x - radius_, 0); i <= std::min(x + radius_, elevation_.width() - 1); ++i) {
           const double z = elevation_(i, j);
           if (!std::isfinite(z)) continue;
-          const double u = static_cast<double>(i - x) / reach_, v = static_cast<double>(j - y) / reach_;
+          const double u = static_cast<double>(i - x) / radius_, v = static_cast<double>(j - y) / radius_;
           if (u * u + v * v > 1) continue;
           const Vector6 row{1, u, v, u * u, u * v, v * v};
-          double weight = (1 - u * u - v * v) * (ground_(i, j) != 0 ? 1.0 : options_.doubtful_weight);
+          double weight = (1 - u * u - v * v) * (ground_(i, j) != 0 ? 1.0 : options_.non_ground_weight);
           if (round > 0) {
             const double r = (z - row.dot(surface)) / scale, t = 1 + r * r;
             weight /= t * t;
@@ -50,7 +50,7 @@ class GroundFit {
       }
       if (count < 6) return std::numeric_limits<float>::quiet_NaN();
       surface = a.ldlt().solve(b);
-      if (round > 0) scale = std::max(scale * step, options_.fine_m);
+      if (round > 0) scale = std::max(scale * step, options_.final_scale_m);
     }
     return static_cast<float>(surface[0]);
   }
@@ -59,17 +59,17 @@ class GroundFit {
   ImageView<const float> elevation_;
   ImageView<const std::uint8_t> ground_;
   const GroundSurfaceOptions& options_;
-  int reach_;
+  int radius_;
 };
 
-// Between the lattice's places; those that are unknown do not count.
-float interpolated(const Image<float>& lattice, double u, double v) {
-  const int i = std::clamp(static_cast<int>(u), 0, lattice.width() - 2),
-            j = std::clamp(static_cast<int>(v), 0, lattice.height() - 2);
+// Bilinear interpolation between the nodes; unknown nodes have no weight.
+float interpolated(const Image<float>& nodes, double u, double v) {
+  const int i = std::clamp(static_cast<int>(u), 0, nodes.width() - 2),
+            j = std::clamp(static_cast<int>(v), 0, nodes.height() - 2);
   const double a = u - i, b = v - j;
   double sum = 0, weights = 0;
   for (int k = 0; k < 4; ++k) {
-    const float z = lattice(i + (k & 1), j + (k >> 1));
+    const float z = nodes(i + (k & 1), j + (k >> 1));
     if (!std::isfinite(z)) continue;
     const double weight = ((k & 1) != 0 ? a : 1 - a) * ((k >> 1) != 0 ? b : 1 - b) + 1e-9;
     sum += weight * z;
@@ -83,18 +83,18 @@ float interpolated(const Image<float>& lattice, double u, double v) {
 Image<float> fit_ground(ImageView<const float> elevation_m, ImageView<const std::uint8_t> ground, double cell_m,
                         const GroundSurfaceOptions& options, const Workers& workers) {
   const auto [w, h] = elevation_m.size();
-  const int step = std::max(1, static_cast<int>(std::lround(options.lattice_m / cell_m)));
+  const int step = std::max(1, static_cast<int>(std::lround(options.node_spacing_m / cell_m)));
   const GroundFit fit(elevation_m, ground, cell_m, options);
-  Image<float> lattice(std::max(2, (w - 1) / step + 2), std::max(2, (h - 1) / step + 2));
-  workers.for_each_part(0, lattice.height(), 1, [&](int from, int to) {
+  Image<float> nodes(std::max(2, (w - 1) / step + 2), std::max(2, (h - 1) / step + 2));
+  workers.for_each_part(0, nodes.height(), 1, [&](int from, int to) {
     for (int j = from; j < to; ++j) {
-      for (int i = 0; i < lattice.width(); ++i) lattice(i, j) = fit.at(i * step, j * step);
+      for (int i = 0; i < nodes.width(); ++i) nodes(i, j) = fit.at(i * step, j * step);
     }
   });
   Image<float> result(w, h);
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x)
-      result(x, y) = interpolated(lattice, static_cast<double>(x) / step, static_cast<double>(y) / step);
+      result(x, y) = interpolated(nodes, static_cast<double>(x) / step, static_cast<double>(y) / step);
   }
   return result;
 }

@@ -1,4 +1,4 @@
-// The ground under what stands on it.
+// The ground surface beneath rocks and above pits, fitted robustly to an elevation grid.
 #pragma once
 
 #include <cstdint>
@@ -10,26 +10,46 @@
 namespace spartan {
 
 struct GroundSurfaceOptions {
-  double window_m = 1.8;
-  double lattice_m = 0.2;
-  double coarse_m = 0.12;
-  double fine_m = 0.03;
-  double doubtful_weight = 0.2;
+  double window_m = 1.8;           ///< Diameter of the neighbourhood of one fit, m.
+  double node_spacing_m = 0.2;     ///< Distance between the nodes at which the surface is fitted, m.
+  double initial_scale_m = 0.12;   ///< Scale of the robust weights in the first weighted round, m.
+  double final_scale_m = 0.03;     ///< Scale of the robust weights in the last round, m.
+  double non_ground_weight = 0.2;  ///< Weight of cells that are not marked as ground; 1: the same as ground.
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("window_m", window_m, "the ground is smooth over this", between(0.1, 100));
-    v.field("lattice_m", lattice_m, "from place to place where it is fitted", between(0.01, 10));
-    v.field("coarse_m", coarse_m, "cells so far off count half at first", between(0.001, 10));
-    v.field("fine_m", fine_m, "and in the end", between(0.001, 10));
-    v.field("doubtful_weight", doubtful_weight, "of cells that v-disparity does not call ground", between(0, 1));
+    v.field("window_m", window_m,
+            "Diameter of the neighbourhood to which the ground surface is fitted, in metres; raising it bridges larger "
+            "rocks and follows the terrain less closely. It should be more than twice the size of the largest rock.",
+            between(0.1, 100));
+    v.renamed("lattice_m", "node_spacing_m");
+    v.field("node_spacing_m", node_spacing_m,
+            "Distance in metres between the nodes at which the ground surface is fitted; it is interpolated between "
+            "them, and raising it is faster and coarser.",
+            between(0.01, 10));
+    v.renamed("coarse_m", "initial_scale_m");
+    v.field(
+        "initial_scale_m", initial_scale_m,
+        "Scale of the Geman-McClure weights in the first weighted round, in metres: a cell with that residual has a "
+        "quarter of the full weight; raising it helps on uneven ground.",
+        between(0.001, 10));
+    v.renamed("fine_m", "final_scale_m");
+    v.field("final_scale_m", final_scale_m,
+            "Scale of the Geman-McClure weights in the last round, in metres; raising it lets low rocks and shallow "
+            "pits pull the surface.",
+            between(0.001, 10));
+    v.renamed("doubtful_weight", "non_ground_weight");
+    v.field("non_ground_weight", non_ground_weight,
+            "Weight of cells that v-disparity does not classify as ground, relative to ground cells; 0 excludes them.",
+            between(0, 1));
   }
 };
 
-/// At every place of a lattice a surface of second order is fitted to the cells around by least squares that are
-/// weighted anew (Geman-McClure: w = 1/(1 + (r/s)²)², s falling from coarse to fine), so that rocks and pits, less than
-/// half of the window, do not count; between the places it is interpolated. `elevation_m`: NaN unknown. `ground`: not 0
-/// where a cell is taken for ground beforehand. NaN where fewer than six cells are near.
+/// Fits a second-order surface to the cells around every node of a regular lattice by iteratively reweighted least
+/// squares with Geman-McClure weights, w = 1/(1 + (r/s)²)², whose scale s falls from the initial to the final one
+/// (graduated non-convexity), so that rocks and pits smaller than half of the window are outliers. Between the nodes
+/// the surface is interpolated bilinearly. `elevation_m`: NaN where unknown. `ground`: not 0 where a cell is known to
+/// be ground beforehand. The result has the size of `elevation_m`, in metres; NaN where fewer than six cells are near.
 Image<float> fit_ground(ImageView<const float> elevation_m, ImageView<const std::uint8_t> ground, double cell_m,
                         const GroundSurfaceOptions& options, const Workers& workers);
 

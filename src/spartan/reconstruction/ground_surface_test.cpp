@@ -37,12 +37,12 @@ double worst_of(const Image<float>& fitted, const Height& truth) {
 
 const Height kSlope = [](double x, double y) { return 0.3 * x - 0.1 * y; };
 
-TEST(GroundSurface, SlopesAreTheirOwnGround) {
+TEST(GroundSurface, ReproducesASlope) {
   EXPECT_LT(worst_of(fit_ground(grid_of(kSlope), everywhere(1), kCell_m, {}, Workers(1)), kSlope), 1e-4);
 }
 
-// Two rocks and a pit, told by nobody.
-TEST(GroundSurface, GoesOnUnderRocksAndOverPits) {
+// Two rocks and a pit that are not marked.
+TEST(GroundSurface, ContinuesBeneathRocksAndAbovePits) {
   const Height cluttered = [](double x, double y) {
     double z = kSlope(x, y);
     if (std::hypot(x - 1.5, y - 1.5) < 0.35) z += 0.25;
@@ -56,26 +56,26 @@ TEST(GroundSurface, GoesOnUnderRocksAndOverPits) {
 // A ridge whose sides fall by 20 degrees within half a metre.
 TEST(GroundSurface, FollowsARidge) {
   const Height ridge = [](double x, double) {
-    const double away = std::abs(x - 2);
-    return away < 0.5 ? -0.364 * away * away : -0.364 * (away - 0.25);
+    const double distance = std::abs(x - 2);
+    return distance < 0.5 ? -0.364 * distance * distance : -0.364 * (distance - 0.25);
   };
   EXPECT_LT(worst_of(fit_ground(grid_of(ridge), everywhere(1), kCell_m, {}, Workers(1)), ridge), 0.05);
 }
 
-TEST(GroundSurface, HolesAreBridgedAndNothingIsMadeOfNothing) {
-  Image<float> patchy = grid_of(kSlope);
+TEST(GroundSurface, BridgesHolesAndIsUnknownWithoutData) {
+  Image<float> with_holes = grid_of(kSlope);
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
-      if (std::hypot(x - 40, y - 40) < 6 || y < 3) patchy(x, y) = nan;
+      if (std::hypot(x - 40, y - 40) < 6 || y < 3) with_holes(x, y) = nan;
     }
   }
-  EXPECT_LT(worst_of(fit_ground(patchy, everywhere(1), kCell_m, {}, Workers(1)), kSlope), 1e-3);
+  EXPECT_LT(worst_of(fit_ground(with_holes, everywhere(1), kCell_m, {}, Workers(1)), kSlope), 1e-3);
   const Image<float> nothing(kSide, kSide, nan);
   EXPECT_TRUE(std::isnan(fit_ground(nothing, everywhere(1), kCell_m, {}, Workers(1))(40, 40)));
 }
 
-TEST(GroundSurface, GivesTheSameBytesForAnyNumberOfThreads) {
+TEST(GroundSurface, IsDeterministicForAnyNumberOfThreads) {
   const Image<float> grid = grid_of([](double x, double y) { return 0.1 * std::sin(5 * x) * std::cos(3 * y); });
   const Image<float> one = fit_ground(grid, everywhere(1), kCell_m, {}, Workers(1)),
                      two = fit_ground(grid, everywhere(1), kCell_m, {}, Workers(2));

@@ -1,6 +1,7 @@
 #include "spartan/reconstruction/local_map.h"
 
 #include <cmath>
+#include <utility>
 
 namespace spartan {
 
@@ -13,18 +14,20 @@ Eigen::Vector2d middle_of(const MapPlace& place, int column, int row) {
   return {place.west_m + (column + 0.5) * place.cell_m, place.north_m - (row + 0.5) * place.cell_m};
 }
 
-std::vector<MapBand> LocalMap::bands() const {
-  return {{"elevation_m", elevation_m.view()},
-          {"elevation_min_m", elevation_min_m.view()},
-          {"elevation_max_m", elevation_max_m.view()},
-          {"variance_m2", variance_m2.view()},
-          {"count", count.view()},
-          {"slope_rad", slope_rad.view()},
-          {"roughness_m", roughness_m.view()},
-          {"step_m", step_m.view()},
-          {"class", kind.view()},
-          {"occupancy_logodds", occupancy_logodds.view()},
-          {"cost", cost.view()}};
+MapBands LocalMap::bands() const {
+  MapBands bands{class_band(kind), {}};
+  bands.list = {{"elevation_m", elevation_m.view()},
+                {"elevation_min_m", elevation_min_m.view()},
+                {"elevation_max_m", elevation_max_m.view()},
+                {"variance_m2", variance_m2.view()},
+                {"count", count.view()},
+                {"slope_rad", slope_rad.view()},
+                {"roughness_m", roughness_m.view()},
+                {"step_m", step_m.view()},
+                {"class", std::as_const(bands.classes).view()},
+                {"occupancy_logodds", occupancy_logodds.view()},
+                {"cost", cost.view()}};
+  return bands;
 }
 
 }  // namespace spartan

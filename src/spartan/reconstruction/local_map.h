@@ -1,4 +1,4 @@
-// The ground around one position of the rover as a grid.
+// The local map: a 2.5D grid of the terrain around one stop.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,41 +7,49 @@
 #include "spartan/core/geotiff.h"
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"
+#include "spartan/reconstruction/ground_class.h"
 
 namespace spartan {
 
-/// Cells of a map: row 0 in the north (largest y), column 0 in the west (smallest x).
+/// A cell of a map: row 0 lies in the north (largest y), column 0 in the west (smallest x).
 struct GridCell {
   int column = 0, row = 0;
 };
 GridCell cell_at(const MapPlace& place, double x_m, double y_m);
 Eigen::Vector2d middle_of(const MapPlace& place, int column, int row);
 
-/// Something that stands up from the ground: cells that touch.
+/// An 8-connected component of obstacle cells.
 struct Obstacle {
-  Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();  ///< map frame
-  double width_m = 0, length_m = 0;                    ///< along x and y
-  double height_m = 0;                                 ///< over the ground
+  Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();  ///< Centre of the bounding box, map frame.
+  double width_m = 0, length_m = 0;                    ///< Extent of the bounding box along x and y.
+  double height_m = 0;                                 ///< Highest point above the ground surface.
   int cells = 0;
 };
 
-/// Gravity-aligned (z up), with the heading of the attitude that it was made with. NaN where nothing was seen.
+/// The bands of a map file in their order. They borrow from the map and from this struct.
+struct MapBands {
+  Image<float> classes;  ///< The classes as numbers.
+  std::vector<MapBand> list;
+};
+
+/// Elevation, classes and traversability in a gravity-aligned map frame (z up). Unobserved cells are NaN unless stated
+/// otherwise.
 struct LocalMap {
   Pose map_from_body;
   MapPlace place;
   Image<float> elevation_m, elevation_min_m, elevation_max_m;
-  Image<float> variance_m2;  ///< of elevation_m
-  Image<float> count;        ///< points; 0 where nothing was seen
-  Image<float> ground_m;     ///< the ground without what stands on it
+  Image<float> variance_m2;  ///< Variance of elevation_m.
+  Image<float> count;        ///< Number of points; 0 where unobserved.
+  Image<float> ground_m;     ///< Elevation of the ground surface beneath obstacles and above cavities.
   Image<float> slope_rad, roughness_m, step_m;
-  Image<float> kind;               ///< 0 unknown, 1 free, 2 obstacle, 3 cavity
-  Image<float> occupancy_logodds;  ///< of an obstacle or a cavity; 0 where nothing was seen
-  Image<float> cost;               ///< 0 easy … 1 not to be driven on
+  Image<GroundClass> kind;         ///< Unobserved cells are unknown, free cells are ground.
+  Image<float> occupancy_logodds;  ///< Log-odds of an obstacle or a cavity; 0 where unobserved.
+  Image<float> cost;               ///< Traversal cost, 0 (easy) … 1 (not traversable).
   std::vector<Obstacle> obstacles;
 
   ImageSize size() const { return elevation_m.size(); }
-  /// As files name them (docs/formats.md, "Maps").
-  std::vector<MapBand> bands() const;
+  /// The bands of a map file, with the names of docs/formats.md, "Maps".
+  MapBands bands() const;
 };
 
 }  // namespace spartan

@@ -12,11 +12,11 @@ namespace spartan {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kLeastSigma_m = 0.001;
-constexpr float kMostLogodds = 5;
-constexpr double kCut_rad = 0.5 * std::numbers::pi / 180;  // so far below the edge of the view a point is cut
+constexpr double kLeastSigma_m = 0.001;  // lower bound of a point's vertical standard deviation; empirical
+constexpr float kMostLogodds = 5;        // saturation of a cell's log-odds: a probability of 0.993
+constexpr double kCut_rad = 0.5 * std::numbers::pi / 180;  // height of the margin at the upper edge of the view
 
-// What the points of a cell add up to.
+// Sums over the points of a cell.
 struct Cell {
   double weights = 0, sum = 0;
   float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
@@ -46,14 +46,14 @@ Grid make_grid(const MapOptions& options, const Eigen::Vector3d& middle) {
 }
 
 void throw_points(std::span<const SurfacePoint> points, const Pose& map_from_body, Grid& grid) {
-  const Eigen::Matrix3f turn = map_from_body.rotation_matrix().cast<float>();
-  const Eigen::Vector3f shift = map_from_body.translation().cast<float>();
+  const Eigen::Matrix3f rotation = map_from_body.rotation_matrix().cast<float>();
+  const Eigen::Vector3f translation = map_from_body.translation().cast<float>();
   for (const SurfacePoint& point : points) {
-    const Eigen::Vector3f p = turn * point.in_body + shift;
+    const Eigen::Vector3f p = rotation * point.in_body + translation;
     const GridCell at = cell_at(grid.place, p.x(), p.y());
     if (at.column < 0 || at.row < 0 || at.column >= grid.width || at.row >= grid.height) continue;
     const double sigma =
-        std::max(std::abs(static_cast<double>(turn.row(2).dot(point.along)) * point.sigma_m), kLeastSigma_m);
+        std::max(std::abs(static_cast<double>(rotation.row(2).dot(point.along)) * point.sigma_m), kLeastSigma_m);
     Cell& cell = grid.at(at.column, at.row);
     const double weight = 1 / (sigma * sigma);
     cell.weights += weight;
@@ -75,25 +75,25 @@ void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
                    under = map.ground_m(x, y) - map.elevation_min_m(x, y);
       const double sigma = std::sqrt(static_cast<double>(map.variance_m2(x, y))) + kLeastSigma_m;
       const double obstacle_m = options.obstacle_m * (grid.at(x, y).cut ? options.cut_share : 1);
-      map.kind(x, y) = 1;
+      map.kind(x, y) = GroundClass::ground;
       if (over > obstacle_m) {
-        map.kind(x, y) = 2;
+        map.kind(x, y) = GroundClass::obstacle;
       } else if (under > options.cavity_m) {
-        map.kind(x, y) = 3;
+        map.kind(x, y) = GroundClass::cavity;
       }
-      // ln(p / (1 − p)) of Φ((over − threshold) / σ), by the logistic curve of the same slope.
+      // Log-odds of p = Φ((height − threshold) / σ), where Φ(x) ≈ 1 / (1 + exp(−1.702 x)) within 0.01.
       const double past = std::max(over - obstacle_m, under - options.cavity_m) / sigma;
       map.occupancy_logodds(x, y) = std::clamp(static_cast<float>(1.702 * past), -kMostLogodds, kMostLogodds);
     }
   }
 }
 
-// The 8-connected regions of obstacle cells.
+// Obstacles are the 8-connected components of obstacle cells.
 void list_obstacles(LocalMap& map) {
   const auto [w, h] = map.size();
   Image<std::uint8_t> mask(w, h);
   for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x) mask(x, y) = map.kind(x, y) == 2 ? 1 : 0;
+    for (int x = 0; x < w; ++x) mask(x, y) = map.kind(x, y) == GroundClass::obstacle ? 1 : 0;
   }
   for (const std::vector<PixelIndex>& cells : connected_components(mask)) {
     Eigen::Vector2d low = middle_of(map.place, cells.front().x, cells.front().y), high = low;
@@ -117,7 +117,7 @@ void list_obstacles(LocalMap& map) {
 
 std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
   std::vector<SurfacePoint> points;
-  const Eigen::Matrix3d turn = merged.body_from_centre.rotation_matrix();
+  const Eigen::Matrix3d rotation = merged.body_from_centre.rotation_matrix();
   const int edge = std::max(1, static_cast<int>(std::lround(kCut_rad * merged.camera.per_radian())));
   std::vector<int> tops(static_cast<std::size_t>(merged.range_m.width()), merged.range_m.height());
   for (int y = 0; y < merged.range_m.height(); ++y) {
@@ -126,7 +126,7 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
       if (!std::isfinite(range)) continue;
       int& top = tops[static_cast<std::size_t>(x)];
       top = std::min(top, y);
-      const Eigen::Vector3d along = turn * merged.camera.direction(x, y);
+      const Eigen::Vector3d along = rotation * merged.camera.direction(x, y);
       const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * along;
       points.push_back({place.cast<float>(), merged.sigma_m(x, y), along.cast<float>(),
                         static_cast<GroundClass>(merged.classes(x, y)), y < top + edge});
@@ -145,7 +145,8 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
   for (Image<float>* layer :
        {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2, &map.ground_m})
     *layer = Image<float>(w, h, kNaN);
-  for (Image<float>* layer : {&map.count, &map.kind, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
+  for (Image<float>* layer : {&map.count, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
+  map.kind = Image<GroundClass>(w, h);
   Image<std::uint8_t> starts(w, h);
   bool any_ground = false;
   for (int y = 0; y < h; ++y) {
@@ -156,7 +157,8 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
       map.elevation_min_m(x, y) = cell.lowest;
       map.elevation_max_m(x, y) = cell.highest;
       map.count(x, y) = static_cast<float>(cell.count);
-      // A cell's points err together (disparities are smooth): their mean is as uncertain as one of them.
+      // Errors of a cell's points are correlated (disparities are smooth), so the variance of their mean is that of
+      // one.
       map.variance_m2(x, y) = static_cast<float>(cell.count / cell.weights);
       starts(x, y) = 2 * cell.ground > cell.count ? 1 : 0;
       any_ground = any_ground || starts(x, y) != 0;

@@ -1,4 +1,4 @@
-// Map generation: points on the ground become a map with obstacles, cavities and costs.
+// Map generation: a point cloud becomes a local map with obstacles, cavities and traversal costs.
 #pragma once
 
 #include <cstdint>
@@ -16,46 +16,66 @@
 namespace spartan {
 
 struct MapOptions {
-  double extent_m = 8;
-  double cell_m = 0.05;
-  double obstacle_m = 0.1;
-  double cavity_m = 0.1;
-  double cut_share = 0.3;
-  int fewest_points = 1;
+  double extent_m = 8;      ///< Side of the square map, m.
+  double cell_m = 0.05;     ///< Side of a cell, m.
+  double obstacle_m = 0.1;  ///< Minimum height of an obstacle above the ground surface, m.
+  double cavity_m = 0.1;    ///< Minimum depth of a cavity (negative obstacle) below the ground surface, m.
+  double cut_share = 0.3;   ///< Factor on obstacle_m where the upper edge of the view truncates an object.
+  int fewest_points = 1;    ///< Minimum number of points of an observed cell.
   GroundSurfaceOptions ground;
   RoverLimits rover;
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("extent_m", extent_m, "side of the map", between(0.5, 1000));
-    v.field("cell_m", cell_m, "side of a cell", between(0.005, 10));
-    v.field("obstacle_m", obstacle_m, "what stands so much over the ground is an obstacle", between(0.005, 5));
-    v.field("cavity_m", cavity_m, "what lies so much below the ground is a cavity", between(0.005, 5));
-    v.field("cut_share", cut_share,
-            "what the upper edge of the view cuts off may be higher: an obstacle from this share of obstacle_m on",
-            between(0.05, 1));
-    v.field("fewest_points", fewest_points, "a cell with fewer stays unknown", between(1, 1000));
+    v.field("extent_m", extent_m,
+            "Side of the square local map in metres; raising it covers terrain farther from the rover and costs memory "
+            "and time.",
+            between(0.5, 1000));
+    v.field("cell_m", cell_m,
+            "Side of a map cell in metres; raising it averages more points per cell and loses small obstacles.",
+            between(0.005, 10));
+    v.field("obstacle_m", obstacle_m,
+            "Minimum height of an obstacle above the ground surface in metres; raising it reports fewer, higher "
+            "obstacles.",
+            between(0.005, 5));
+    v.field("cavity_m", cavity_m,
+            "Minimum depth of a cavity (negative obstacle) below the ground surface in metres; raising it reports "
+            "fewer, deeper cavities.",
+            between(0.005, 5));
+    v.renamed("cut_share", "truncated_obstacle_factor");
+    v.field(
+        "truncated_obstacle_factor", cut_share,
+        "Factor on obstacle_m for points at the upper edge of the view, where an object may continue above what was "
+        "seen; raising it misses more truncated rocks and reports fewer false ones.",
+        between(0.05, 1));
+    v.renamed("fewest_points", "min_points");
+    v.field("min_points", fewest_points,
+            "Minimum number of points of an observed cell; raising it leaves sparsely covered cells unknown.",
+            between(1, 1000));
     v.group("ground", ground);
     v.group("rover", rover);
   }
 };
 
-/// A point seen.
+/// A point of the observed surface.
 struct SurfacePoint {
-  Eigen::Vector3f in_body;
-  float sigma_m = 0;      ///< along the ray
-  Eigen::Vector3f along;  ///< the ray's direction, unit length, body frame
+  Eigen::Vector3f in_body;  ///< m, body frame.
+  float sigma_m = 0;        ///< Standard deviation along the ray.
+  Eigen::Vector3f along;    ///< Direction of the ray, unit length, body frame.
   GroundClass kind = GroundClass::unknown;
-  bool cut = false;  ///< nothing was seen above it
+  bool cut = false;  ///< At the upper edge of the view: the object may continue above.
 };
 
+/// The points of all known pixels of a merged range image, in the body frame.
 std::vector<SurfacePoint> surface_points(const MergedRange& merged);
 
 class MapGenerator {
  public:
   MapGenerator(const MapOptions& options, Workers workers) : options_(options), workers_(std::move(workers)) {}
 
-  /// `map_from_body`: gravity-aligned; the map's middle is at its origin. Cells are at whole multiples of their side.
+  /// `map_from_body`: gravity-aligned; the map is centred on its origin. Cell corners are at integer multiples of the
+  /// cell size. A cell's elevation is the inverse-variance weighted mean of its points; its class follows from the
+  /// heights of its points above and below the fitted ground surface. Derivation: docs/math/stereo.md.
   LocalMap generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const;
 
  private:

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// Points of a surface z(x, y) ahead of the rover, 1 cm apart, seen from 1 m over its origin.
+// Points of a surface z(x, y) ahead of the rover, 1 cm apart, seen from 1 m above its origin.
 template <class Height>
 std::vector<SurfacePoint> points_on(const Height& height, double noise_m = 0.002) {
   std::vector<SurfacePoint> points;
@@ -31,12 +31,13 @@ std::vector<SurfacePoint> points_on(const Height& height, double noise_m = 0.002
   return points;
 }
 
-float at(const LocalMap& map, const Image<float>& layer, double x, double y) {
+template <class T>
+T at(const LocalMap& map, const Image<T>& layer, double x, double y) {
   const GridCell cell = cell_at(map.place, x, y);
   return layer(cell.column, cell.row);
 }
 
-TEST(LocalMap, CellsAndTheirMiddlesAgree) {
+TEST(LocalMap, CellsAndTheirCentresAgree) {
   const MapPlace place{-1.5, 2.0, 0.25};
   for (int row = 0; row < 9; ++row) {
     for (int column = 0; column < 9; ++column) {
@@ -48,10 +49,20 @@ TEST(LocalMap, CellsAndTheirMiddlesAgree) {
   EXPECT_EQ(cell_at(place, -1.4, 1.9).row, 0) << "row 0 lies in the north";
 }
 
-TEST(LocalMap, BandsAreNamedAsTheFormatsSay) {
+TEST(GroundClass, BandHasTheDocumentedValues) {
+  Image<GroundClass> classes(4, 1);
+  classes(1, 0) = GroundClass::ground;
+  classes(2, 0) = GroundClass::obstacle;
+  classes(3, 0) = GroundClass::cavity;
+  const Image<float> band = class_band(classes);
+  for (int x = 0; x < 4; ++x) EXPECT_EQ(band(x, 0), static_cast<float>(x));
+}
+
+TEST(LocalMap, BandsHaveTheDocumentedNames) {
   const LocalMap map = MapGenerator({}, Workers(1)).generate({}, Pose());
   std::string names;
-  for (const MapBand& band : map.bands()) {
+  const MapBands bands = map.bands();
+  for (const MapBand& band : bands.list) {
     names += (names.empty() ? "" : " ") + band.name;
     EXPECT_EQ(band.values.size(), map.size()) << band.name;
   }
@@ -60,24 +71,24 @@ TEST(LocalMap, BandsAreNamedAsTheFormatsSay) {
             "occupancy_logodds cost");
 }
 
-TEST(MapGenerator, PlainGroundIsFreeAndCheap) {
+TEST(MapGenerator, PlaneGroundIsFreeWithLowCost) {
   const auto slope = [](double x, double y) { return 0.08 * x - 0.05 * y; };
   const LocalMap map = MapGenerator({}, Workers(1)).generate(points_on(slope), Pose());
   int known = 0;
   for (int row = 0; row < map.size().height; ++row) {
     for (int column = 0; column < map.size().width; ++column) {
       if (!(map.count(column, row) > 0)) {
-        EXPECT_EQ(map.kind(column, row), 0) << "a cell never seen is never free";
+        EXPECT_EQ(map.kind(column, row), GroundClass::unknown) << "an unobserved cell is never free";
         EXPECT_TRUE(std::isnan(map.elevation_m(column, row)));
         EXPECT_EQ(map.occupancy_logodds(column, row), 0);
         continue;
       }
       ++known;
       const Eigen::Vector2d middle = middle_of(map.place, column, row);
-      // At the edge the points of a cell do not lie around its middle.
+      // At the border of the points, those of a cell are not distributed around its centre.
       if (middle.x() < 0.6 || middle.x() > 3.4 || std::abs(middle.y()) > 1.4) continue;
       EXPECT_NEAR(map.elevation_m(column, row), slope(middle.x(), middle.y()), 0.003);
-      EXPECT_EQ(map.kind(column, row), 1);
+      EXPECT_EQ(map.kind(column, row), GroundClass::ground);
       EXPECT_LT(map.occupancy_logodds(column, row), -3);
       EXPECT_NEAR(map.slope_rad(column, row), std::atan(std::hypot(0.08, 0.05)), 0.01);
       EXPECT_LT(map.roughness_m(column, row), 0.003);
@@ -89,25 +100,25 @@ TEST(MapGenerator, PlainGroundIsFreeAndCheap) {
   EXPECT_TRUE(map.obstacles.empty());
 }
 
-TEST(MapGenerator, RocksPitsAndWhatLiesBehindThem) {
+TEST(MapGenerator, ClassifiesRocksPitsAndOccludedGround) {
   const auto surface = [](double x, double y) {
     if (std::hypot(x - 2, y - 0.5) < 0.2) return 0.22 + 0.05 * x;
     if (std::hypot(x - 1.5, y + 0.7) < 0.25) return -0.2 + 0.05 * x;
     return 0.05 * x;
   };
   std::vector<SurfacePoint> points = points_on(surface);
-  std::erase_if(points, [](const SurfacePoint& p) {  // hidden behind the rock
+  std::erase_if(points, [](const SurfacePoint& p) {  // occluded by the rock
     return p.in_body.x() > 2.2F && p.in_body.x() < 2.5F && std::abs(p.in_body.y() - 0.5F) < 0.15F;
   });
   const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
-  EXPECT_EQ(at(map, map.kind, 2, 0.5), 2);
-  EXPECT_EQ(at(map, map.kind, 1.5, -0.7), 3);
-  EXPECT_EQ(at(map, map.kind, 2.35, 0.5), 0);
-  EXPECT_EQ(at(map, map.kind, 1.0, 0.5), 1);
+  EXPECT_EQ(at(map, map.kind, 2, 0.5), GroundClass::obstacle);
+  EXPECT_EQ(at(map, map.kind, 1.5, -0.7), GroundClass::cavity);
+  EXPECT_EQ(at(map, map.kind, 2.35, 0.5), GroundClass::unknown);
+  EXPECT_EQ(at(map, map.kind, 1.0, 0.5), GroundClass::ground);
   EXPECT_GT(at(map, map.occupancy_logodds, 2, 0.5), 3);
   EXPECT_EQ(at(map, map.cost, 2, 0.5), 1);
   EXPECT_EQ(at(map, map.cost, 1.5, -0.7), 1);
-  EXPECT_NEAR(at(map, map.ground_m, 2, 0.5), 0.1, 0.02) << "the ground goes on under the rock";
+  EXPECT_NEAR(at(map, map.ground_m, 2, 0.5), 0.1, 0.02) << "the ground surface continues beneath the rock";
   EXPECT_NEAR(at(map, map.elevation_m, 2, 0.5), 0.32, 0.01);
   ASSERT_EQ(map.obstacles.size(), 1U);
   EXPECT_LT((map.obstacles[0].middle_m - Eigen::Vector2d(2, 0.5)).norm(), 0.05);
@@ -115,23 +126,24 @@ TEST(MapGenerator, RocksPitsAndWhatLiesBehindThem) {
   EXPECT_NEAR(map.obstacles[0].height_m, 0.22, 0.03);
 }
 
-// Of a rock whose front is all that the view still holds.
-TEST(MapGenerator, WhatTheViewCutsOffCountsAsAnObstacleEarlier) {
+// A rock of which the view contains the front only.
+TEST(MapGenerator, ATruncatedObjectNeedsLessHeightToBeAnObstacle) {
   const auto surface = [](double x, double y) {
     return x > 3.4 && std::abs(y) < 0.2 ? std::min(0.5 * (x - 3.4), 0.05) : 0.0;
   };
   std::vector<SurfacePoint> points = points_on(surface);
   const LocalMap whole = MapGenerator({}, Workers(1)).generate(points, Pose());
-  EXPECT_EQ(at(whole, whole.kind, 3.47, 0), 1);
+  EXPECT_EQ(at(whole, whole.kind, 3.47, 0), GroundClass::ground);
   for (SurfacePoint& p : points) p.cut = p.in_body.x() > 3.4F;
   const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
-  EXPECT_EQ(at(map, map.kind, 3.47, 0), 2);
-  EXPECT_EQ(at(map, map.kind, 3.2, 0), 1);
-  EXPECT_EQ(at(map, map.kind, 3.42, 0), 1) << "the ground at the edge is ground";
+  EXPECT_EQ(at(map, map.kind, 3.47, 0), GroundClass::obstacle);
+  EXPECT_EQ(at(map, map.kind, 3.2, 0), GroundClass::ground);
+  EXPECT_EQ(at(map, map.kind, 3.42, 0), GroundClass::ground)
+      << "ground at the upper edge of the view is not an obstacle";
 }
 
-// A panorama whose columns begin lower from left to right, with a hole.
-TEST(SurfacePoints, TheTopsOfColumnsAreCut) {
+// A panorama whose columns start lower from left to right, with a hole.
+TEST(SurfacePoints, TheUpperEndsOfColumnsAreTruncated) {
   MergedRange merged;
   merged.camera = PanoramicCamera(PanoramicCamera::Projection::cylinder, {8, 40}, 8 * 180 / std::numbers::pi, 0, -0.2);
   merged.range_m = Image<float>(8, 40, 3.0F);
@@ -143,26 +155,26 @@ TEST(SurfacePoints, TheTopsOfColumnsAreCut) {
   merged.range_m(0, 20) = std::numeric_limits<float>::quiet_NaN();
   int cut = 0;
   for (const SurfacePoint& p : surface_points(merged)) cut += p.cut ? 1 : 0;
-  EXPECT_EQ(cut, 8 * 4) << "half a degree is four rows; holes are no edges";
+  EXPECT_EQ(cut, 8 * 4) << "half a degree is four rows; holes are not edges";
 }
 
-// Turning the points and the attitude that says how they are turned leaves the map as it was.
-TEST(MapGenerator, TurningRigAndWorldTogetherChangesNothing) {
+// Rotating the points and correcting the attitude accordingly does not change the map.
+TEST(MapGenerator, IsInvariantToTheBodyFrame) {
   const auto surface = [](double x, double y) {
     return 0.05 * std::sin(3 * x) + (std::hypot(x - 2, y) < 0.2 ? 0.2 : 0.0);
   };
   const std::vector<SurfacePoint> points = points_on(surface);
-  const Pose turn(Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.3, -0.9, 0.1).normalized())),
-                  {0.1, 0.2, 0.3});
-  std::vector<SurfacePoint> turned = points;
-  for (SurfacePoint& p : turned) {
-    p.in_body = (turn * p.in_body.cast<double>()).cast<float>();
-    p.along = (turn.rotation() * p.along.cast<double>()).cast<float>();
+  const Pose rotation(Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.3, -0.9, 0.1).normalized())),
+                      {0.1, 0.2, 0.3});
+  std::vector<SurfacePoint> rotated = points;
+  for (SurfacePoint& p : rotated) {
+    p.in_body = (rotation * p.in_body.cast<double>()).cast<float>();
+    p.along = (rotation.rotation() * p.along.cast<double>()).cast<float>();
   }
   const Pose map_from_body = Pose::from_translation({0.5, 0, 0});
   const LocalMap a = MapGenerator({}, Workers(1)).generate(points, map_from_body);
-  // The same map frame: its middle follows the body's origin, so the place may differ, not the cells.
-  const LocalMap b = MapGenerator({}, Workers(1)).generate(turned, map_from_body * turn.inverse());
+  // The map frame is the same. The map is centred on the body's origin, so its window may differ, but not its cells.
+  const LocalMap b = MapGenerator({}, Workers(1)).generate(rotated, map_from_body * rotation.inverse());
   int same = 0, different = 0;
   for (double x = 1.2; x < 3.8; x += 0.05) {
     for (double y = -1.3; y < 1.3; y += 0.05) {
@@ -178,7 +190,7 @@ TEST(MapGenerator, TurningRigAndWorldTogetherChangesNothing) {
   EXPECT_LT(different, same / 100);
 }
 
-TEST(MapGenerator, MorePointsNeverMakeACellLessSure) {
+TEST(MapGenerator, MorePointsNeverRaiseTheVariance) {
   const auto flat = [](double, double) { return 0.0; };
   std::vector<SurfacePoint> points = points_on(flat);
   const LocalMap some = MapGenerator({}, Workers(1)).generate(points, Pose());
@@ -193,12 +205,12 @@ TEST(MapGenerator, MorePointsNeverMakeACellLessSure) {
   }
 }
 
-TEST(MapGenerator, SteepGroundCostsAsMuchAsItsSlope) {
+TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
   const double rise = std::tan(10 * kDegree);
   const LocalMap map =
       MapGenerator({}, Workers(1)).generate(points_on([&](double x, double) { return rise * x; }), Pose());
   EXPECT_NEAR(at(map, map.slope_rad, 2, 0), 10 * kDegree, 0.2 * kDegree);
-  EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of 20 degrees";
+  EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of at most 20 degrees";
 }
 
 }  // namespace

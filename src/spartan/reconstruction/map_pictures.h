@@ -1,4 +1,4 @@
-// Maps and what leads to them as pictures for people.
+// Maps, pixel classes and v-disparity images rendered in colour.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,20 @@
 
 namespace spartan {
 
-/// The relief lit from the north-west, obstacles tinted red and cavities blue; unknown cells are dark. `kind` as
+/// Shaded relief lit from the north-west, obstacles tinted red and cavities blue; unknown cells are dark. `kind` as
 /// LocalMap::kind. Each cell becomes `scale` x `scale` pixels.
-Image<Rgb8> draw_map(ImageView<const float> elevation_m, ImageView<const float> kind, double cell_m, int scale = 4);
+Image<Rgb8> draw_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m,
+                     int scale = 4);
 
-/// The left image with the ground tinted green, obstacles red, cavities blue; unknown pixels stay gray.
+/// The left image with the ground tinted green, obstacles red and cavities blue; unknown pixels stay gray.
 Image<Rgb8> draw_classes(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> classes);
 
-/// The v-disparity image (brighter: more pixels) with the profile of each strip as it would lie straight ahead, yellow,
-/// and of the middle one what is counted as an obstacle (from the red line up) and as a cavity (from the blue one
-/// down).
-Image<Rgb8> draw_v_disparity(const VDisparity& seen, const RectifiedStereo& geometry, const VDisparityOptions& options);
+/// The v-disparity image (brighter: more pixels) with the ground profile of each strip, as it would appear straight
+/// ahead, in yellow. For the middle strip the thresholds of an obstacle (red) and of a cavity (blue) are drawn as well.
+Image<Rgb8> draw_v_disparity(const VDisparity& v_disparity, const RectifiedStereo& geometry,
+                             const VDisparityOptions& options);
 
-/// Which views took part: a colour for each set of them. `views` as MergedRange::views.
+/// The views that contributed to each cell, a colour for each set of them. `views` as MergedRange::views.
 Image<Rgb8> draw_coverage(ImageView<const std::uint8_t> views);
 
 }  // namespace spartan

@@ -6,9 +6,10 @@
 namespace spartan {
 namespace {
 
-constexpr double kSteepest = 3;  // slope below which a cylinder ends: a third of the eye's height from its foot
+constexpr double kSteepest =
+    3;  // largest slope of a cylinder: the ground at a third of the camera's height ahead of it
 
-double upness(PanoramicCamera::Projection projection, const Eigen::Vector3d& d) {
+double elevation_of(PanoramicCamera::Projection projection, const Eigen::Vector3d& d) {
   const double level = std::hypot(d.x(), d.y());
   return projection == PanoramicCamera::Projection::cylinder ? d.z() / level : std::atan2(d.z(), level);
 }
@@ -21,7 +22,8 @@ PanoramicCamera::PanoramicCamera(Projection projection, ImageSize size, double p
 std::optional<Eigen::Vector2d> PanoramicCamera::project(const Eigen::Vector3d& direction) const {
   if (std::hypot(direction.x(), direction.y()) <= 1e-9 * std::abs(direction.z())) return std::nullopt;
   const double azimuth = std::atan2(direction.y(), direction.x());
-  return Eigen::Vector2d(per_radian_ * (left_rad_ - azimuth), per_radian_ * (top_ - upness(projection_, direction)));
+  return Eigen::Vector2d(per_radian_ * (left_rad_ - azimuth),
+                         per_radian_ * (top_ - elevation_of(projection_, direction)));
 }
 
 Eigen::Vector3d PanoramicCamera::direction(double u, double v) const {
@@ -45,7 +47,7 @@ PanoramicCamera plan_panorama(PanoramicCamera::Projection projection, double per
           const double d = view.stereo.focal_px * view.stereo.baseline_m / depth;
           const Eigen::Vector3d p =
               centre_from_left * view.stereo.triangulate(i * (w - 1.0) / kSteps, j * (h - 1.0) / kSteps, d);
-          const double azimuth = std::atan2(p.y(), p.x()), up = upness(projection, p);
+          const double azimuth = std::atan2(p.y(), p.x()), up = elevation_of(projection, p);
           left = std::max(left, azimuth);
           right = std::min(right, azimuth);
           top = std::max(top, up);

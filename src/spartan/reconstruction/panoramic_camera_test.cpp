@@ -14,7 +14,7 @@ namespace {
 
 using Projection = PanoramicCamera::Projection;
 
-RC_GTEST_PROP(PanoramicCamera, DirectionsOfPixelsProjectBack, (bool cylinder)) {
+RC_GTEST_PROP(PanoramicCamera, ProjectionInvertsDirection, (bool cylinder)) {
   const auto some = [](int low, int high) { return 0.1 * *rc::gen::inRange(10 * low, 10 * high); };
   const PanoramicCamera camera(cylinder ? Projection::cylinder : Projection::sphere, {900, 400}, 300, 1.4, 0.3);
   const double u = some(0, 900), v = some(0, 400);
@@ -25,7 +25,7 @@ RC_GTEST_PROP(PanoramicCamera, DirectionsOfPixelsProjectBack, (bool cylinder)) {
   RC_ASSERT((*pixel - Eigen::Vector2d(u, v)).norm() < 1e-9);
 }
 
-TEST(PanoramicCamera, ColumnsRunToTheRightAndRowsDown) {
+TEST(PanoramicCamera, ColumnsIncreaseToTheRightAndRowsDownwards) {
   const PanoramicCamera camera(Projection::cylinder, {900, 400}, 300, 1.0, 0.5);
   const Eigen::Vector2d ahead = *camera.project({1, 0, 0}), left = *camera.project({1, 0.5, 0}),
                         below = *camera.project({1, 0, -0.5});
@@ -36,7 +36,7 @@ TEST(PanoramicCamera, ColumnsRunToTheRightAndRowsDown) {
   EXPECT_FALSE(camera.project({0, 0, -1}));
 }
 
-TEST(PanoramicCamera, HoldsAllThatTheViewsSee) {
+TEST(PanoramicCamera, ContainsTheFieldsOfViewTightly) {
   const RectifiedStereo g{{320, 320}, 343, {159.5, 159.5}, 0.2};
   std::vector<ViewGeometry> views;
   for (const double pan : {-0.6, 0.0, 0.6})
@@ -62,7 +62,7 @@ TEST(PanoramicCamera, HoldsAllThatTheViewsSee) {
         }
       }
     }
-    EXPECT_LT(lowest.maxCoeff(), 2) << "and not much more";
+    EXPECT_LT(lowest.maxCoeff(), 2) << "the image is not much larger than necessary";
     EXPECT_GT(highest.x(), camera.size().width - 3);
     EXPECT_GT(highest.y(), camera.size().height - 3);
   }

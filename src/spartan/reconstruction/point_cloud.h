@@ -1,4 +1,4 @@
-// Coloured points from a disparity image, and their PLY files.
+// Coloured point clouds from disparity images, and their PLY files.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,15 +19,15 @@ struct ColouredPoint {
 };
 using PointCloud = std::vector<ColouredPoint>;
 
-/// Every `step_px`-th known pixel of every `step_px`-th row whose disparity is at least `smallest_disparity_px`, moved
-/// by `target_from_left`. Gray levels of the left image become the colour.
+/// Triangulates every `step_px`-th pixel of every `step_px`-th row with a known disparity of at least
+/// `smallest_disparity_px` and transforms it by `target_from_left`. The colour is the gray level of the left image.
 PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const std::uint8_t> left,
                           const RectifiedStereo& geometry, const Pose& target_from_left, int step_px,
                           double smallest_disparity_px);
 
-/// Binary little-endian PLY with float x, y, z and uchar red, green, blue. Code `output`.
+/// Writes a binary little-endian PLY file with float x, y, z and uchar red, green, blue. Code `output`.
 Status write_ply(const std::string& path, const PointCloud& cloud);
-/// Reads what write_ply() wrote; nothing else. Code `input`.
+/// Reads files of write_ply() only. Code `input`.
 Result<PointCloud> read_ply(const std::string& path);
 
 }  // namespace spartan

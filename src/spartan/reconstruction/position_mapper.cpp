@@ -8,10 +8,10 @@
 namespace spartan {
 namespace {
 
-constexpr double kUnknownHeight_m = 1;      // scale of the search where the eye's height is not known
-constexpr double kNearestPanorama_m = 0.3;  // nothing of interest is nearer to the virtual camera
+constexpr double kUnknownHeight_m = 1;      // scale of the ground search where the camera's height is unknown
+constexpr double kNearestPanorama_m = 0.3;  // nearest depth that the virtual camera covers
 
-// Between the eyes.
+// Midpoint between the left and the right camera.
 Eigen::Vector3d middle_of(const ViewGeometry& view) {
   return view.body_from_left * Eigen::Vector3d(0.5 * view.stereo.baseline_m, 0, 0);
 }

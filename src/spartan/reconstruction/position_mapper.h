@@ -1,4 +1,4 @@
-// 3D reconstruction of one rover position: all its views become one merged view, and that a map.
+// 3D reconstruction of one stop: all its views are fused into one range image, and that becomes a local map.
 #pragma once
 
 #include <optional>
@@ -18,7 +18,7 @@
 
 namespace spartan {
 
-/// How the disparities of a position become a map.
+/// Options of the steps from the disparity images of a stop to its local map.
 struct MappingOptions {
   VDisparityOptions v_disparity;
   MergingOptions merging;
@@ -32,40 +32,41 @@ struct MappingOptions {
   }
 };
 
-/// One shot of a position with what was found in it.
+/// One view of a stop: a stereo frame with its disparities and its ground profile.
 struct PositionView {
   std::string pair;
   Stamp stamp;
   ViewGeometry geometry;
-  Image<float> disparity;  ///< px, NaN unknown
+  Image<float> disparity;  ///< Pixels; NaN where unknown.
   Image<std::uint8_t> left;
-  std::optional<VDisparity> ground;  ///< none where no ground was found: its pixels count as unknown
+  std::optional<VDisparity> ground;  ///< Empty where no ground was found; the classes of its pixels are then unknown.
 };
 
-/// Wall-clock milliseconds since the mapper was made, for reports only.
+/// Wall-clock milliseconds since construction; for reports only.
 struct MappingTimes {
   double disparity = 0, v_disparity = 0, merging = 0, map = 0;
 };
 
-/// Disparity computation → v-disparity for each view as it comes, disparity merging when the position is complete.
-/// Maps are generated from the merged view at whatever pose the caller believes in (MapGenerator is cheap).
+/// Computes disparities and v-disparity of each view as it is added, and merges the views when the stop is complete.
+/// Local maps are generated from the merged range image at the pose that the caller gives (MapGenerator is cheap).
 class PositionMapper {
  public:
   PositionMapper(const DisparityOptions& disparity, const MappingOptions& options, Workers workers);
 
-  /// A view of the current position. `nearest_m` as StereoPair says. `up_in_body`: where the ground is looked for.
-  /// Code `input` as DisparityComputer.
+  /// Adds a view of the current stop. `nearest_m`: nearest depth of the search range, as StereoPair says. `up_in_body`:
+  /// direction away from the expected ground plane, body frame. Code `input` as DisparityComputer.
   Status add(const RectifiedPair& shot, double nearest_m, const Eigen::Vector3d& up_in_body = Eigen::Vector3d::UnitZ());
 
   std::span<const PositionView> views() const { return views_; }
 
-  /// The views in one: a panoramic camera at the mean middle of the pair with the longest baseline, its axis of turn
-  /// upright in the body. At least one view must be there.
+  /// Merges the views into a panoramic camera. Its centre is the mean of the midpoints between the left and the right
+  /// camera over all views of the pair with the longest baseline; its axis is the body's z axis. At least one view is
+  /// required.
   MergedRange merge();
 
   LocalMap map(std::span<const SurfacePoint> points, const Pose& map_from_body);
 
-  /// Forgets the views: the rover goes on.
+  /// Discards the views, for the next stop.
   void leave() { views_.clear(); }
 
   const MappingTimes& times() const { return times_; }

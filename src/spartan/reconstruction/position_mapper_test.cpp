@@ -23,7 +23,7 @@ testing::SyntheticWorldOptions gentle_ground() {
   return options;
 }
 
-// A position on the synthetic world: a pan to each side and a narrow view ahead.
+// A stop in the synthetic world: the wide pair panned to each side, and a view of the narrow pair straight ahead.
 struct Views {
   Views() {
     add("narrow", kNarrow, testing::looking(0.4, 0, 0.55, optical_from_forward()));
@@ -31,7 +31,7 @@ struct Views {
     add("wide", kWide, testing::looking(1, -0.35, 0.68, optical_from_forward()));
   }
   void add(const std::string& name, const RectifiedStereo& stereo, const Pose& body_from_left) {
-    shots.push_back(world.render(stereo, body_from_left, shots.size()));
+    frames.push_back(world.render(stereo, body_from_left, frames.size()));
     RectifiedPair pair;
     pair.pair = name;
     pair.stamp.ns = static_cast<std::int64_t>(pairs.size());
@@ -41,12 +41,12 @@ struct Views {
   }
   RectifiedPair pair(std::size_t i) const {
     RectifiedPair pair = pairs[i];
-    pair.left = shots[i].left;
-    pair.right = shots[i].right;
+    pair.left = frames[i].left;
+    pair.right = frames[i].right;
     return pair;
   }
   testing::SyntheticWorld world{gentle_ground()};
-  std::vector<testing::SyntheticShot> shots;
+  std::vector<testing::SyntheticShot> frames;
   std::vector<RectifiedPair> pairs;
 };
 
@@ -63,7 +63,7 @@ int known_cells(const LocalMap& map) {
   return count;
 }
 
-TEST(PositionMapper, MapsTheGroundAroundAPosition) {
+TEST(PositionMapper, MapsTheGroundAroundAStop) {
   PositionMapper mapper({}, {}, Workers(2));
   std::vector<int> cells;
   for (std::size_t i = 0; i < views().pairs.size(); ++i) {
@@ -71,7 +71,7 @@ TEST(PositionMapper, MapsTheGroundAroundAPosition) {
     EXPECT_TRUE(mapper.views().back().ground.has_value());
   }
   const MergedRange merged = mapper.merge();
-  // Between the eyes of the wide pair, which do not turn about their middle: 1 m high, near the mast's axis.
+  // Midpoint of the wide pair, which does not rotate about its midpoint: 1 m high, near the mast's axis.
   EXPECT_NEAR(merged.body_from_centre.translation().z(), 1, 1e-9);
   EXPECT_LT(merged.body_from_centre.translation().head<2>().norm(), 0.11);
   const LocalMap map = mapper.map(surface_points(merged), Pose());
@@ -96,16 +96,16 @@ TEST(PositionMapper, MapsTheGroundAroundAPosition) {
   }
 }
 
-TEST(PositionMapper, ForgetsThePositionThatItLeft) {
+TEST(PositionMapper, DiscardsTheViewsOfThePreviousStop) {
   PositionMapper mapper({}, {}, Workers(1));
   ASSERT_TRUE(mapper.add(views().pair(1), kNearest_m));
   mapper.leave();
   EXPECT_TRUE(mapper.views().empty());
   ASSERT_TRUE(mapper.add(views().pair(0), kNearest_m));
-  EXPECT_NEAR(mapper.merge().body_from_centre.translation().z(), 0.4, 1e-9) << "the narrow pair is all there is";
+  EXPECT_NEAR(mapper.merge().body_from_centre.translation().z(), 0.4, 1e-9) << "only the narrow pair is left";
 }
 
-TEST(PositionMapper, RefusesImagesThatDoNotFit) {
+TEST(PositionMapper, RejectsImagesOfDifferentSizes) {
   PositionMapper mapper({}, {}, Workers(1));
   RectifiedPair pair = views().pair(0);
   pair.right = views().pair(1).right;

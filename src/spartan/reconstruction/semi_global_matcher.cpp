@@ -12,8 +12,8 @@
 namespace spartan {
 namespace {
 
-constexpr int kWindowColumns = 4, kWindowRows = 3;  // the census window reaches so far
-constexpr int kVector = 64;                         // bytes; room behind rows for whole vectors
+constexpr int kWindowColumns = 4, kWindowRows = 3;  // half sizes of the 9×7 census window
+constexpr int kVector = 64;                         // bytes of the widest vector: padding behind each row
 
 int round_up(int value, int multiple) {
   return (value + multiple - 1) / multiple * multiple;
@@ -23,6 +23,7 @@ int round_up(int value, int multiple) {
 
 SemiGlobalMatcher::SemiGlobalMatcher(const DisparityOptions& options, Workers workers)
     : options_(options), workers_(std::move(workers)), kernels_(sgm::kernels_for(simd_target_index(options.simd))) {
+  // P2 for every gray-level change along a path; see DisparityOptions.
   for (std::size_t step = 0; step < p2_by_step_.size(); ++step) {
     const double p2 = options.p2_flat / (1.0 + static_cast<double>(step) / options.p2_falloff_levels);
     p2_by_step_[step] = static_cast<std::uint8_t>(std::max(options.p2_edge, static_cast<int>(std::lround(p2))));
@@ -47,7 +48,7 @@ void SemiGlobalMatcher::resize(ImageSize size, DisparityRange range) {
     pass.minima.assign(static_cast<std::size_t>(slot_count), 0);
     pass.cost_row = Image<std::uint8_t>(w * padded_, 1);
     pass.sum_row = Image<std::uint16_t>(w * padded_, 1);
-    pass.claim_cost.assign(static_cast<std::size_t>(w), 0);
+    pass.right_costs.assign(static_cast<std::size_t>(w), 0);
   }
   zero_slot_ = Image<std::uint8_t>(slot_size, 1);
   raw_.left = Image<float>(w, h);
@@ -63,7 +64,7 @@ std::size_t SemiGlobalMatcher::buffer_bytes() const {
       bytes(framed_, 1) + bytes(left_planes_, 1) + bytes(right_planes_, 1) + bytes(sums_, 2) + bytes(zero_slot_, 1);
   for (const Pass& pass : passes_) {
     total += bytes(pass.slots, 1) + pass.minima.size() + bytes(pass.cost_row, 1) + bytes(pass.sum_row, 2) +
-             2 * pass.claim_cost.size();
+             2 * pass.right_costs.size();
   }
   return total + bytes(raw_.left, 4) + bytes(raw_.unique, 1) + bytes(raw_.right, 2);
 }
@@ -79,15 +80,16 @@ const RawDisparity& SemiGlobalMatcher::match(ImageView<const std::uint8_t> left,
   times_.cost = watch.lap();
   for (Pass& pass : passes_) pass.cost_ms = pass.aggregate_ms = pass.select_ms = 0;
 
+  // Both passes sweep their first halves, then, after a barrier, complete the sums in the half of the other pass.
   const int h = size_.height, upper = h / 2, lower = h - upper;
   workers_.run_both([&] { sweep(passes_[0], 0, upper, false); }, [&] { sweep(passes_[1], 0, lower, false); });
   workers_.run_both([&] { sweep(passes_[0], upper, h, true); }, [&] { sweep(passes_[1], lower, h, true); });
 
-  const double share = workers_.threads() > 1 ? 0.5 : 1.0;
+  const double per_pass = workers_.threads() > 1 ? 0.5 : 1.0;
   for (const Pass& pass : passes_) {
-    times_.cost += share * pass.cost_ms;
-    times_.aggregate += share * pass.aggregate_ms;
-    times_.select += share * pass.select_ms;
+    times_.cost += per_pass * pass.cost_ms;
+    times_.aggregate += per_pass * pass.aggregate_ms;
+    times_.select += per_pass * pass.select_ms;
   }
   return raw_;
 }
@@ -146,7 +148,7 @@ void SemiGlobalMatcher::compute_costs(Pass& pass, int y) {
   kernels_.cost_row(row);
   for (int x = 0; x < w; ++x) {
     std::uint8_t* const cost = row.cost + static_cast<std::ptrdiff_t>(x) * padded_;
-    // Index k looks at the right column x − min − k: outside the picture for k > x − min and for k < x − min − w + 1.
+    // Index k is matched to the right column x − min − k: outside of the image for k > x − min and k < x − min − w + 1.
     const int last = std::clamp(x - range_.min + 1, 0, count), first = std::clamp(x - range_.min - w + 1, 0, count);
     std::memset(cost, options_.out_of_view_cost, static_cast<std::size_t>(first));
     std::memset(cost + last, options_.out_of_view_cost, static_cast<std::size_t>(count - last));
@@ -158,8 +160,8 @@ std::uint8_t* SemiGlobalMatcher::slot(Pass& pass, int direction, int index) cons
   return pass.slots.row(direction * size_.width + index) + sgm::kGuard;
 }
 
-// `row` counts along the sweep; column x of the sweep is column w − 1 − x of the picture in the upward pass.
-// A path that comes down a diagonal keeps its slot: (x − row) and (x + row) are constant along it.
+// `row` counts along the sweep; column x of the sweep is column w − 1 − x of the image in the upward pass. A diagonal
+// path keeps its slot from row to row, because (x − row) or (x + row) is constant along it.
 void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete) {
   const int w = size_.width;
   const int flip = pass.upwards ? -1 : 1, first = pass.upwards ? w - 1 : 0;
@@ -180,6 +182,7 @@ void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete)
     for (int r = 0; r < sgm::kPaths; ++r) {
       const auto i = static_cast<std::size_t>(r);
       paths.to[r] = slot(pass, r, indices[i]);
+      // At the start of a path L' = 0, so that L = C.
       paths.from[r] = begins[i] ? zero : paths.to[r];
       paths.from_min[r] = begins[i] ? std::uint8_t{0} : pass.minima[static_cast<std::size_t>(r * w + indices[i])];
       paths.p2[r] = p2_by_step_[static_cast<std::size_t>(std::abs(gray[column] - previous[i]))];
@@ -201,23 +204,24 @@ void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete)
 
 void SemiGlobalMatcher::select_row(Pass& pass, int y) {
   const int w = size_.width, count = range_.count();
-  std::fill(pass.claim_cost.begin(), pass.claim_cost.end(), std::numeric_limits<std::uint16_t>::max());
+  std::fill(pass.right_costs.begin(), pass.right_costs.end(), std::numeric_limits<std::uint16_t>::max());
   std::int16_t* const right = raw_.right.row(y);
   std::fill(right, right + w, RawDisparity::kNoMatch);
-  const double margin = 1.0 + options_.uniqueness_percent / 100.0;
+  const double uniqueness_ratio = 1.0 + options_.uniqueness_percent / 100.0;
   float* const disparity = raw_.left.row(y);
   std::uint8_t* const unique = raw_.unique.row(y);
   for (int x = 0; x < w; ++x) {
     std::uint16_t* const sums = pass.sum_row.data() + static_cast<std::ptrdiff_t>(x) * padded_;
     const sgm::Winner winner = kernels_.find_winner(sums, count, padded_);
-    const int d = range_.min + winner.index, seen = x - d;
-    disparity[x] = seen < 0 || seen >= w ? std::numeric_limits<float>::quiet_NaN()
-                                         : static_cast<float>(d) + subpixel_offset(sums, winner.index, count);
-    if (seen >= 0 && seen < w && winner.best < pass.claim_cost[static_cast<std::size_t>(seen)]) {
-      pass.claim_cost[static_cast<std::size_t>(seen)] = winner.best;
-      right[seen] = static_cast<std::int16_t>(d);
+    const int d = range_.min + winner.index, matched = x - d;
+    disparity[x] = matched < 0 || matched >= w ? std::numeric_limits<float>::quiet_NaN()
+                                               : static_cast<float>(d) + subpixel_offset(sums, winner.index, count);
+    // The right disparities come from the same sums: of all left pixels matched to a right pixel, the cheapest wins.
+    if (matched >= 0 && matched < w && winner.best < pass.right_costs[static_cast<std::size_t>(matched)]) {
+      pass.right_costs[static_cast<std::size_t>(matched)] = winner.best;
+      right[matched] = static_cast<std::int16_t>(d);
     }
-    unique[x] = options_.uniqueness_percent <= 0 || winner.runner_up >= margin * winner.best;
+    unique[x] = options_.uniqueness_percent <= 0 || winner.runner_up >= uniqueness_ratio * winner.best;
   }
 }
 

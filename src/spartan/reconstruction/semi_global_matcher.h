@@ -1,11 +1,11 @@
-// Census + semi-global matching over eight paths: the matching core of the disparity computation.
+// Census transform and semi-global matching over eight paths (Hirschmüller, PAMI 2008): the core of the dense stereo.
 //
 // Two passes sweep the image, one downwards with the paths from the left, upper left, above and upper right, one
-// upwards with the opposite four (the same code on the picture turned by 180°). Both start at once, at the top and at
-// the bottom. In the first half of its sweep a pass stores the sum of its four paths; in the second half it finds the
-// other's sums there, adds its own, and has the sums over all eight paths, row by row, while they are still in the
-// cache. So there is one volume of sums and none of costs, and two threads have equal work whose result cannot depend
-// on who is faster.
+// upwards with the opposite four (the same code on the image rotated by 180°). Both start at the same time, at the top
+// and at the bottom. In the first half of its sweep a pass stores the sums of its four paths. In the second half it
+// reads the sums that the other pass stored there, adds its own, and so completes the sums over all eight paths row by
+// row, while they are still in the cache. Only one volume of sums is needed and no volume of costs. Two threads have
+// equal work, and the result does not depend on their timing.
 #pragma once
 
 #include <array>
@@ -20,11 +20,11 @@
 
 namespace spartan {
 
-/// Raw matches, before any check but the one against the picture's border.
+/// Raw matches before any check except the one against the image border.
 struct RawDisparity {
-  Image<float> left;           ///< px, with sub-pixel part; NaN where the match leaves the right image
-  Image<std::uint8_t> unique;  ///< 1 where no runner-up comes near
-  Image<std::int16_t> right;   ///< px, whole: of the cheapest left pixel that claims it; kNoMatch: none does
+  Image<float> left;           ///< Pixels, with sub-pixel part; NaN where x − d lies outside of the right image.
+  Image<std::uint8_t> unique;  ///< 1 where the match passes the uniqueness check.
+  Image<std::int16_t> right;   ///< Whole pixels: disparity of the cheapest left pixel matched to it, or kNoMatch.
   static constexpr std::int16_t kNoMatch = INT16_MIN;
 };
 
@@ -32,23 +32,25 @@ class SemiGlobalMatcher {
  public:
   SemiGlobalMatcher(const DisparityOptions& options, Workers workers);
 
-  /// Both images of one size; the range is not empty. The result stays valid until the next call.
+  /// Both images must have one size, and the range must not be empty. The result is valid until the next call.
   const RawDisparity& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                             DisparityRange range);
 
-  /// Of the last call, in milliseconds; steps that run on two threads count their mean.
+  /// Times of the last call in milliseconds; for steps that run on two threads, the mean of both.
   const DisparityTimes& times() const { return times_; }
   std::size_t buffer_bytes() const;
 
  private:
-  // What one sweep carries along.
+  // State of one sweep.
   struct Pass {
     bool upwards = false;
-    Image<std::uint8_t> slots;  // path costs, a slot a row: one a pixel for each of three directions, one for the row
-    std::vector<std::uint8_t> minima;       // of each slot
-    Image<std::uint8_t> cost_row;           // padded · width
-    Image<std::uint16_t> sum_row;           // of four or eight paths
-    std::vector<std::uint16_t> claim_cost;  // of the cheapest left pixel that claims each right pixel of the row
+    // Path costs L(p, ·), one slot a row of the image: a slot per column for each of the three directions that come
+    // from the row before, and one slot for the direction along the row.
+    Image<std::uint8_t> slots;
+    std::vector<std::uint8_t> minima;        // min L of each slot
+    Image<std::uint8_t> cost_row;            // matching costs of one row, width · padded
+    Image<std::uint16_t> sum_row;            // sums over four or eight paths of one row
+    std::vector<std::uint16_t> right_costs;  // aggregated cost of the cheapest left pixel matched to each right pixel
     double cost_ms = 0, aggregate_ms = 0, select_ms = 0;
   };
 
@@ -68,12 +70,12 @@ class SemiGlobalMatcher {
 
   ImageSize size_;
   DisparityRange range_;
-  int padded_ = 0;      // disparities, filled up to whole vectors
+  int padded_ = 0;      // number of disparities, rounded up to whole vectors
   int mirror_pad_ = 0;  // columns before the mirrored right planes
   ImageView<const std::uint8_t> gray_;
-  Image<std::uint8_t> framed_;                      // gray image with its border repeated
-  Image<std::uint8_t> left_planes_, right_planes_;  // 8 rows a row
-  Image<std::uint16_t> sums_;                       // volume: row y holds width · padded sums
+  Image<std::uint8_t> framed_;                      // gray image with replicated border
+  Image<std::uint8_t> left_planes_, right_planes_;  // 8 byte planes per image row, as consecutive rows
+  Image<std::uint16_t> sums_;                       // volume of aggregated costs: row y holds width · padded sums
   std::array<Pass, 2> passes_;
   Image<std::uint8_t> zero_slot_;
   RawDisparity raw_;

@@ -17,7 +17,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
 
-using namespace reference;  // NOLINT(google-build-using-namespace): one lane is no vector
+using namespace reference;  // NOLINT(google-build-using-namespace): no vectors on this target
 
 #else
 
@@ -40,7 +40,7 @@ void census_row(const CensusRow& r) {
   const int lanes = static_cast<int>(hn::Lanes(d));
   int x = 0;
   for (; x + lanes <= r.width; x += lanes) census_block(d, r, x);
-  // The last, overlapping block; narrow images go pixel by pixel.
+  // The last block overlaps the one before; images narrower than a vector are processed pixel by pixel.
   if (x < r.width && r.width >= lanes) return census_block(d, r, r.width - lanes);
   const hn::CappedTag<std::uint8_t, 1> one;
   for (; x < r.width; ++x) census_block(one, r, x);
@@ -64,7 +64,7 @@ void cost_row_with(D d, const CostRow& r) {
 
 template <class D>
 HWY_INLINE std::uint8_t smallest(D, hn::Vec<D> v) {
-  // Bytes in pairs: the smaller of each pair, then the smallest of the 16-bit lanes.
+  // Horizontal minimum of bytes: the smaller of each pair, then the minimum of the 16-bit lanes.
   const hn::Repartition<std::uint16_t, D> d16;
   const auto pairs = hn::BitCast(d16, v);
   const auto low = hn::And(pairs, hn::Set(d16, 0xFF));
@@ -83,7 +83,7 @@ PathMinima pixel_paths_with(D d, const PixelPaths& p) {
   const auto jump0 = hn::Set(d, p.p2[0]), jump1 = hn::Set(d, p.p2[1]);
   const auto jump2 = hn::Set(d, p.p2[2]), jump3 = hn::Set(d, p.p2[3]);
   auto min0 = hn::Set(d, kNever), min1 = min0, min2 = min0, min3 = min0;
-  // What lies one below the block is loaded before the block before it is stored: slots are updated in place.
+  // Slots are updated in place: L'(d − 1) of a block is loaded before the preceding block is overwritten.
   auto below0 = hn::LoadU(d, p.from[0] - 1), below1 = hn::LoadU(d, p.from[1] - 1);
   auto below2 = hn::LoadU(d, p.from[2] - 1), below3 = hn::LoadU(d, p.from[3] - 1);
 
@@ -149,7 +149,7 @@ Winner find_winner_with(D d, std::uint16_t* sums, int count, int padded) {
   return {index, best, runner_up};
 }
 
-// `padded` is a multiple of 32: the widest vectors that divide it.
+// `padded` is a multiple of 32: uses the widest vectors that divide it.
 template <class Function>
 HWY_INLINE auto with_widest_bytes(int padded, Function function) {
   const hn::ScalableTag<std::uint8_t> full;

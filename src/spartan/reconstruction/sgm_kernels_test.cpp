@@ -18,13 +18,13 @@ std::vector<std::uint8_t> random_bytes(std::uint64_t seed, std::size_t count, st
   return bytes;
 }
 
-// Every instruction set against the plain version, over odd widths and both vector widths of the disparities.
+// Every instruction set against the scalar reference, for odd widths and both vector widths of the disparities.
 class KernelsOnEveryTarget : public ::testing::TestWithParam<std::string> {
  protected:
   Kernels kernels() const { return kernels_for(simd_target_index(GetParam())); }
 };
 
-TEST_P(KernelsOnEveryTarget, CensusIsThePlainOne) {
+TEST_P(KernelsOnEveryTarget, CensusEqualsTheReference) {
   for (const int width : {1, 7, 15, 16, 17, 63, 64, 65, 200}) {
     const auto stride = static_cast<std::size_t>(width + 80);
     const std::vector<std::uint8_t> image = random_bytes(static_cast<std::uint64_t>(width), 7 * stride, 9);
@@ -46,7 +46,7 @@ TEST_P(KernelsOnEveryTarget, CensusIsThePlainOne) {
   }
 }
 
-TEST_P(KernelsOnEveryTarget, CostsAreThePlainOnes) {
+TEST_P(KernelsOnEveryTarget, CostsEqualTheReference) {
   for (const int padded : {32, 64, 96, 128}) {
     const int width = 37;
     const auto right_width = static_cast<std::size_t>(width + padded + 64);
@@ -68,7 +68,7 @@ TEST_P(KernelsOnEveryTarget, CostsAreThePlainOnes) {
   }
 }
 
-TEST_P(KernelsOnEveryTarget, PathsAreThePlainOnes) {
+TEST_P(KernelsOnEveryTarget, PathsEqualTheReference) {
   for (const int padded : {32, 64, 96, 128}) {
     for (const bool adds : {false, true}) {
       const int stride = padded + 2 * kGuard;
@@ -107,7 +107,7 @@ TEST_P(KernelsOnEveryTarget, PathsAreThePlainOnes) {
   }
 }
 
-TEST_P(KernelsOnEveryTarget, WinnersAreThePlainOnes) {
+TEST_P(KernelsOnEveryTarget, WinnersEqualTheReference) {
   Random random(9);
   for (int trial = 0; trial < 300; ++trial) {
     const int padded = 32 * (1 + static_cast<int>(random.below(4))),
@@ -116,7 +116,7 @@ TEST_P(KernelsOnEveryTarget, WinnersAreThePlainOnes) {
     for (int k = 0; k < count; ++k) sums[static_cast<std::size_t>(k)] = static_cast<std::uint16_t>(random.below(40));
     auto copy = sums;
     const Winner a = kernels().find_winner(sums.data(), count, padded);
-    EXPECT_EQ(sums, copy) << "the sums are given back as they were";
+    EXPECT_EQ(sums, copy) << "the sums are restored";
     const Winner b = reference::find_winner(copy.data(), count, padded);
     ASSERT_EQ(a.index, b.index);
     ASSERT_EQ(a.best, b.best);

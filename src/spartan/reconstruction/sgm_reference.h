@@ -1,5 +1,5 @@
-// The kernels of sgm_kernels.h in plain C++: what the vector versions are compared with, and what a processor without
-// vectors runs.
+// The kernels of sgm_kernels.h in scalar C++: the reference of the tests, and the implementation on targets without
+// SIMD.
 #pragma once
 
 #include "spartan/reconstruction/sgm_kernels.h"

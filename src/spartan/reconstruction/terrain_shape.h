@@ -1,41 +1,62 @@
-// How hard the ground is to drive over.
+// Traversability: slope, roughness, step height and traversal cost of every cell.
 #pragma once
 
 #include "spartan/core/image.h"
 #include "spartan/core/options.h"
 #include "spartan/core/threads.h"
+#include "spartan/reconstruction/ground_class.h"
 
 namespace spartan {
 
-/// The rover that a map's costs are meant for.
+/// Limits of the rover for which traversal costs are computed.
 struct RoverLimits {
-  double wheel_radius_m = 0.1;
-  double clearance_m = 0.1;
-  double track_m = 0.6;
-  double steepest_deg = 20;
-  double highest_step_m = 0.08;
+  double wheel_radius_m = 0.1;  ///< m
+  double clearance_m = 0.1;     ///< Ground clearance, m.
+  double track_m = 0.6;         ///< Distance between the left and the right wheels, m.
+  double max_slope_deg = 20;    ///< degrees
+  double max_step_m = 0.08;     ///< m
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("wheel_radius_m", wheel_radius_m, "roughness of half of it cannot be driven on", between(0.01, 5));
-    v.field("clearance_m", clearance_m, "obstacles as high as this cannot be driven over", between(0.01, 5));
-    v.field("track_m", track_m, "left to right wheel: slopes are taken over half of it", between(0.05, 10));
-    v.field("steepest_deg", steepest_deg, "slopes as steep as this cannot be driven on", between(1, 80));
-    v.field("highest_step_m", highest_step_m, "steps as high as this cannot be climbed", between(0.005, 5));
+    v.field("wheel_radius_m", wheel_radius_m,
+            "Wheel radius of the rover in metres; a roughness of half of it has cost 1, and raising it lowers the cost "
+            "of rough ground.",
+            between(0.01, 5));
+    v.field(
+        "clearance_m", clearance_m,
+        "Ground clearance of the rover in metres; an object that high has cost 1, and raising it lowers the cost of "
+        "rocks.",
+        between(0.01, 5));
+    v.field("track_m", track_m,
+            "Distance between the left and the right wheels in metres; slope and roughness are fitted over a square of "
+            "half of it, so raising it smooths them.",
+            between(0.05, 10));
+    v.renamed("steepest_deg", "max_slope_deg");
+    v.field("max_slope_deg", max_slope_deg,
+            "Steepest traversable slope in degrees; a slope that steep has cost 1, and raising it lowers the cost of "
+            "slopes.",
+            between(1, 80));
+    v.renamed("highest_step_m", "max_step_m");
+    v.field(
+        "max_step_m", max_step_m,
+        "Highest traversable step between neighbouring cells in metres; a step that high has cost 1, and raising it "
+        "lowers the cost of steps.",
+        between(0.005, 5));
   }
 };
 
-/// Layers of one size, as LocalMap's of the same names.
+/// Input layers of one size, as LocalMap's of the same names.
 struct TerrainSurface {
-  ImageView<const float> elevation_m, elevation_max_m, ground_m, kind;
+  ImageView<const float> elevation_m, elevation_max_m, ground_m;
+  ImageView<const GroundClass> kind;
   double cell_m = 0.05;
 };
 
-/// NaN where nothing was seen, and beside the step also where too little was seen around.
+/// NaN in unobserved cells; all but the step are also NaN where too few neighbours are observed.
 struct TerrainShape {
-  Image<float> slope_rad, roughness_m;  ///< of the plane through a wheel's surroundings
-  Image<float> step_m;                  ///< among the cell and its neighbours
-  Image<float> cost;                    ///< 0 easy … 1 not to be driven on: the worst of its reasons
+  Image<float> slope_rad, roughness_m;  ///< Slope and residual RMS of the plane fitted to the neighbourhood.
+  Image<float> step_m;                  ///< Elevation range of the cell and its eight neighbours.
+  Image<float> cost;                    ///< 0 (easy) … 1 (not traversable): the largest of its terms.
 };
 TerrainShape measure_shape(const TerrainSurface& surface, const RoverLimits& rover, const Workers& workers);
 

@@ -16,25 +16,25 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 const RectifiedStereo kView{{373, 373}, 400, {186, 186}, 0.2};
 
-struct Seen {
+struct Scene {
   Image<float> disparity;
-  Image<std::uint8_t> truth;  // classes by the true height over the ground
+  Image<std::uint8_t> truth;  // classes by the true height above the ground
   GroundPlane expected;
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();  // truly, in the optical frame
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();  // true direction, in the optical frame
 };
 
 using Height = std::function<double(double, double)>;
 
-// A rover that may be rolled; `ground` without and `surface` with what stands on it or is dug into it.
-Seen look_at(const Height& ground, const Height& surface, double roll_deg = 0, double noise_px = 0.15) {
+// The view of a rover that may be rolled; `surface` is `ground` with rocks and pits.
+Scene look_at(const Height& ground, const Height& surface, double roll_deg = 0, double noise_px = 0.15) {
   const Pose world_from_body =
       Pose::from_rotation(Eigen::Quaterniond(Eigen::AngleAxisd(roll_deg * kDegree, Eigen::Vector3d::UnitX())));
   const Pose world_from_left = world_from_body * testing::looking(1, 0, 39 * kDegree, optical_from_forward());
-  Seen seen{testing::disparity_of(surface, kView, world_from_left),
-            Image<std::uint8_t>(373, 373),
-            {},
-            world_from_left.rotation().conjugate() * Eigen::Vector3d::UnitZ()};
-  // What the rig says, without the roll.
+  Scene seen{testing::disparity_of(surface, kView, world_from_left),
+             Image<std::uint8_t>(373, 373),
+             {},
+             world_from_left.rotation().conjugate() * Eigen::Vector3d::UnitZ()};
+  // The prediction of the rig, without the roll.
   seen.expected = {
       testing::looking(1, 0, 39 * kDegree, optical_from_forward()).rotation().conjugate() * Eigen::Vector3d::UnitZ(),
       1};
@@ -45,40 +45,40 @@ Seen look_at(const Height& ground, const Height& surface, double roll_deg = 0, d
       if (!(d > 0)) continue;
       const Eigen::Vector3d p = world_from_left * kView.triangulate(x, y, d);
       const double over = p.z() - ground(p.x(), p.y());
-      seen.truth(x, y) = over > 0.12 ? 2 : over < -0.12 ? 3 : std::abs(over) < 0.04 ? 1 : 0;  // 0: may be either
+      seen.truth(x, y) = over > 0.12 ? 2 : over < -0.12 ? 3 : std::abs(over) < 0.04 ? 1 : 0;  // 0: not scored
       seen.disparity(x, y) = static_cast<float>(d + random.normal(0, noise_px));
     }
   }
   return seen;
 }
 
-struct Share {
-  int right = 0, all = 0;
-  double of() const { return static_cast<double>(right) / std::max(all, 1); }
+struct Recall {
+  int correct = 0, all = 0;
+  double of() const { return static_cast<double>(correct) / std::max(all, 1); }
 };
 
-// How many of the pixels of a class are called so.
-Share recognized(const Seen& seen, const VDisparity& found, std::uint8_t kind) {
-  Share share;
+// Recall: the fraction of the pixels of a class that are classified correctly.
+Recall recall(const Scene& seen, const VDisparity& found, std::uint8_t kind) {
+  Recall recall;
   for (int y = 0; y < 373; ++y) {
     for (int x = 0; x < 373; ++x) {
       if (seen.truth(x, y) != kind) continue;
-      ++share.all;
-      share.right += found.classes(x, y) == kind ? 1 : 0;
+      ++recall.all;
+      recall.correct += found.classes(x, y) == kind ? 1 : 0;
     }
   }
-  return share;
+  return recall;
 }
 
 const Height kFlat = [](double, double) { return 0.0; };
 
-TEST(VDisparity, LevelGroundGivesTheCamerasHeightAndPitch) {
-  const Seen seen = look_at(kFlat, kFlat);
+TEST(VDisparity, LevelGroundGivesCameraHeightAndPitch) {
+  const Scene seen = look_at(kFlat, kFlat);
   const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, Workers(2));
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->plane.height_m, 1, 0.005);
   EXPECT_NEAR(found->plane.pitch_rad(), 39 * kDegree, 0.2 * kDegree);
-  EXPECT_GT(recognized(seen, *found, 1).of(), 0.999);
+  EXPECT_GT(recall(seen, *found, 1).of(), 0.999);
 }
 
 TEST(VDisparity, RocksAreObstaclesAndPitsAreCavities) {
@@ -88,48 +88,48 @@ TEST(VDisparity, RocksAreObstaclesAndPitsAreCavities) {
     return 0.0;
   };
   for (const double roll_deg : {0.0, 12.0, -12.0}) {
-    const Seen seen = look_at(kFlat, surface, roll_deg);
+    const Scene seen = look_at(kFlat, surface, roll_deg);
     const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, Workers(2));
     ASSERT_TRUE(found) << roll_deg;
-    ASSERT_GT(recognized(seen, *found, 2).all, 500);
-    ASSERT_GT(recognized(seen, *found, 3).all, 300);
-    EXPECT_GT(recognized(seen, *found, 1).of(), 0.995) << roll_deg;
-    EXPECT_GT(recognized(seen, *found, 2).of(), 0.97) << roll_deg;
-    EXPECT_GT(recognized(seen, *found, 3).of(), 0.9) << roll_deg;
+    ASSERT_GT(recall(seen, *found, 2).all, 500);
+    ASSERT_GT(recall(seen, *found, 3).all, 300);
+    EXPECT_GT(recall(seen, *found, 1).of(), 0.995) << roll_deg;
+    EXPECT_GT(recall(seen, *found, 2).of(), 0.97) << roll_deg;
+    EXPECT_GT(recall(seen, *found, 3).of(), 0.9) << roll_deg;
     EXPECT_LT(std::acos(std::min(1.0, found->plane.up.dot(seen.up))), 0.3 * kDegree);
   }
 }
 
-// A dip, then a rise of 15 degrees: ground all the same, and a rock on it is still a rock.
-TEST(VDisparity, TheProfileFollowsGroundThatIsNotFlat) {
+// A dip, then a rise of 15 degrees: both are ground, and a rock on them is an obstacle.
+TEST(VDisparity, TheProfileFollowsUnevenGround) {
   const Height hills = [](double x, double) { return 0.08 * std::sin(2.2 * x) + 0.27 * std::max(0.0, x - 2.2); };
   const Height with_rock = [&](double x, double y) {
     return hills(x, y) + (std::hypot(x - 2.6, y) < 0.15 ? 0.25 : 0.0);
   };
-  const Seen seen = look_at(hills, with_rock);
+  const Scene seen = look_at(hills, with_rock);
   const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, Workers(2));
   ASSERT_TRUE(found);
-  EXPECT_GT(recognized(seen, *found, 1).of(), 0.98);
-  EXPECT_GT(recognized(seen, *found, 2).of(), 0.9);
+  EXPECT_GT(recall(seen, *found, 1).of(), 0.98);
+  EXPECT_GT(recall(seen, *found, 2).of(), 0.9);
 }
 
-// Ground that falls to the left: one profile cannot follow it, strips can.
+// Ground that is higher on the left: several strips follow it, one profile does not.
 TEST(VDisparity, StripsFollowGroundThatIsHigherOnOneSide) {
   const Height bank = [](double x, double y) {
     return y > 0.2 ? 0.25 * std::min(1.0, (y - 0.2) * 1.2) * std::min(1.0, x) : 0.0;
   };
-  const Seen seen = look_at(bank, bank);
+  const Scene seen = look_at(bank, bank);
   VDisparityOptions one, many;
   one.strips = 1;
   many.strips = 9;
   const auto narrow = compute_v_disparity(seen.disparity, kView, seen.expected, many, Workers(2));
   const auto wide = compute_v_disparity(seen.disparity, kView, seen.expected, one, Workers(2));
   ASSERT_TRUE(narrow && wide);
-  EXPECT_LT(1 - recognized(seen, *narrow, 1).of(), 0.2 * (1 - recognized(seen, *wide, 1).of()));
+  EXPECT_LT(1 - recall(seen, *narrow, 1).of(), 0.2 * (1 - recall(seen, *wide, 1).of()));
 }
 
-TEST(VDisparity, TheHistogramHoldsEveryKnownPixelOnce) {
-  const Seen seen = look_at(kFlat, kFlat, 8);
+TEST(VDisparity, TheHistogramContainsEveryKnownPixelOnce) {
+  const Scene seen = look_at(kFlat, kFlat, 8);
   const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, Workers(1));
   ASSERT_TRUE(found);
   int in_histogram = 0, known = 0, widest = 0;
@@ -148,11 +148,11 @@ TEST(VDisparity, TheHistogramHoldsEveryKnownPixelOnce) {
     for (int x = 0; x < 373; ++x) known += seen.disparity(x, y) > 0 ? 1 : 0;
   }
   EXPECT_EQ(in_histogram, known);
-  EXPECT_LT(widest, 4) << "derotated, the ground is a thin line";
+  EXPECT_LT(widest, 4) << "after derotation the ground is a thin line";
 }
 
-TEST(VDisparity, GivesTheSameForAnyNumberOfThreads) {
-  const Seen seen = look_at(kFlat, [](double x, double y) { return std::hypot(x - 1.4, y) < 0.2 ? 0.2 : 0.0; });
+TEST(VDisparity, IsDeterministicForAnyNumberOfThreads) {
+  const Scene seen = look_at(kFlat, [](double x, double y) { return std::hypot(x - 1.4, y) < 0.2 ? 0.2 : 0.0; });
   const auto a = compute_v_disparity(seen.disparity, kView, seen.expected, {}, Workers(1)),
              b = compute_v_disparity(seen.disparity, kView, seen.expected, {}, Workers(2));
   ASSERT_TRUE(a && b);

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "spartan/slam/map_refinement.h"
+#include "spartan/slam/surface_grid.h"
 
 namespace spartan {
 namespace {
@@ -21,8 +23,8 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
   s.highest_m = local.elevation_max_m(column, row);
   s.count = local.count(column, row);
   s.occupancy_logodds = local.occupancy_logodds(column, row);
-  const int kind = static_cast<int>(local.kind(column, row));
-  s.shape = static_cast<std::int16_t>(kind == 2 ? 1 : kind == 3 ? -1 : 0);
+  const GroundClass kind = local.kind(column, row);
+  s.shape = static_cast<std::int16_t>(kind == GroundClass::obstacle ? 1 : kind == GroundClass::cavity ? -1 : 0);
   s.votes = 1;
   Eigen::Vector2f slope = grid.slope(column, row);
   if (!slope.allFinite()) slope.setZero();
@@ -35,24 +37,26 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
 
 }  // namespace
 
-std::vector<MapBand> MapView::bands(const TerrainShape& shape) const {
-  return {{"elevation_m", elevation_m.view()},
-          {"elevation_min_m", elevation_min_m.view()},
-          {"elevation_max_m", elevation_max_m.view()},
-          {"variance_m2", variance_m2.view()},
-          {"count", count.view()},
-          {"slope_rad", shape.slope_rad.view()},
-          {"roughness_m", shape.roughness_m.view()},
-          {"step_m", shape.step_m.view()},
-          {"class", kind.view()},
-          {"occupancy_logodds", occupancy_logodds.view()},
-          {"cost", shape.cost.view()}};
+MapBands MapView::bands(const TerrainShape& shape) const {
+  MapBands bands{class_band(kind), {}};
+  bands.list = {{"elevation_m", elevation_m.view()},
+                {"elevation_min_m", elevation_min_m.view()},
+                {"elevation_max_m", elevation_max_m.view()},
+                {"variance_m2", variance_m2.view()},
+                {"count", count.view()},
+                {"slope_rad", shape.slope_rad.view()},
+                {"roughness_m", shape.roughness_m.view()},
+                {"step_m", shape.step_m.view()},
+                {"class", std::as_const(bands.classes).view()},
+                {"occupancy_logodds", occupancy_logodds.view()},
+                {"cost", shape.cost.view()}};
+  return bands;
 }
 
 TerrainShape MapView::shape(const MapOptions& options, const Workers& workers) const {
   Image<std::uint8_t> free(window.width, window.height);
   for (int r = 0; r < window.height; ++r) {
-    for (int c = 0; c < window.width; ++c) free(c, r) = kind(c, r) == 1 ? 1 : 0;
+    for (int c = 0; c < window.width; ++c) free(c, r) = kind(c, r) == GroundClass::ground ? 1 : 0;
   }
   const Image<float> ground_m = fit_ground(elevation_m, free, cell_m, options.ground, workers);
   return measure_shape({elevation_m, elevation_max_m, ground_m, kind, cell_m}, options.rover, workers);
@@ -65,11 +69,11 @@ SurfaceGrid MapView::grid() const {
   grid.elevation_m = elevation_m.clone();
   grid.variance_m2 = variance_m2.clone();
   grid.relief_m = elevation_max_m.clone();
-  grid.evidence = Image<float>(window.width, window.height, 0.0F);
+  grid.occupancy = Image<float>(window.width, window.height, 0.0F);
   for (int r = 0; r < window.height; ++r) {
     for (int c = 0; c < window.width; ++c) {
       grid.relief_m(c, r) -= elevation_min_m(c, r);
-      if (count(c, r) > 0) grid.evidence(c, r) = std::tanh(0.5F * occupancy_logodds(c, r));
+      if (count(c, r) > 0) grid.occupancy(c, r) = std::tanh(0.5F * occupancy_logodds(c, r));
     }
   }
   return grid;
@@ -83,8 +87,9 @@ Result<GlobalMap> GlobalMap::from_store(const GlobalMapOptions& options, double 
   const auto cell = store.property("cell_m");
   if (!cell) return failure(cell);
   if (*cell && **cell != cell_m) {
-    return failure(ErrorCode::configuration, fmt::format("the map has cells of {} m, not {} m", **cell, cell_m), "",
-                   "set the map's cell_m");
+    return failure(ErrorCode::configuration,
+                   fmt::format("the map has cells of {} m, the options say {} m", **cell, cell_m), "",
+                   "set mapping.map.cell_m to the cell size of the map");
   }
   auto submaps = store.submaps();
   if (!submaps) return failure(submaps);
@@ -101,7 +106,7 @@ Result<GlobalMap> GlobalMap::from_store(const GlobalMapOptions& options, double 
 }
 
 CellFusion GlobalMap::fusion() const {
-  return {options_.gate_sigmas, options_.relief_sigma, options_.least_sigma_m * options_.least_sigma_m};
+  return {options_.gate_sigmas, options_.relief_sigma_ratio, options_.min_sigma_m * options_.min_sigma_m};
 }
 
 std::size_t GlobalMap::tiles_in_memory() const {
@@ -115,7 +120,7 @@ Result<Tile*> GlobalMap::load(const TileKey& key) {
   Slot& slot = found->second;
   slot.used = ++clock_;
   if (!slot.tile) {
-    if (store_ == nullptr) throw std::logic_error("GlobalMap: a tile is in the store, but there is none");
+    if (store_ == nullptr) throw std::logic_error("GlobalMap: a tile is in the store, but no store is open");
     auto tile = store_->read({key, slot.revision});
     if (!tile) return failure(tile);
     slot.tile = std::make_unique<Tile>(*tile);
@@ -131,21 +136,21 @@ Result<Tile*> GlobalMap::load_or_make(const TileKey& key) {
   return tile;
 }
 
-void GlobalMap::drop_surplus() {
-  const std::size_t most =
+void GlobalMap::evict_tiles() {
+  const std::size_t max_tiles =
       std::max<std::size_t>(1, static_cast<std::size_t>(options_.memory_mb) * 1000000 / sizeof(Tile));
   std::vector<Slot*> clean;
-  std::size_t there = 0;
+  std::size_t in_memory = 0;
   for (auto& [key, slot] : tiles_) {
     if (!slot.tile) continue;
-    ++there;
+    ++in_memory;
     if (!slot.changed && slot.revision > 0) clean.push_back(&slot);
   }
   std::sort(clean.begin(), clean.end(), [](const Slot* a, const Slot* b) { return a->used < b->used; });
   for (Slot* slot : clean) {
-    if (there <= most) return;
+    if (in_memory <= max_tiles) return;
     slot->tile.reset();
-    --there;
+    --in_memory;
   }
 }
 
@@ -167,38 +172,39 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
   const std::int32_t stop = stops_.empty() ? 0 : stops_.back().id + 1;
   stops_.push_back({stop, stamp, world_from_body});
   const Submap submap = submap_for(body);
-  const auto step = submap.step(cell_m_);
-  if (!step) throw std::logic_error("GlobalMap::add: the newest submap was moved off the lattice");
-  const auto down = static_cast<float>(-submap.world_from_submap.translation().z());
-  // Right perturbation → the world's axes, about the body.
-  const Matrix6d turn = [&] {
+  const auto offset = submap.lattice_offset(cell_m_);
+  if (!offset) throw std::logic_error("GlobalMap::add: the newest submap was moved off the lattice");
+  const auto minus_anchor_height = static_cast<float>(-submap.world_from_submap.translation().z());
+  // Covariance of the right perturbation, transformed to world axes about the body.
+  const Matrix6d rotation = [&] {
     Matrix6d m = Matrix6d::Zero();
     m.topLeftCorner<3, 3>() = m.bottomRightCorner<3, 3>() = world_from_body.pose.rotation_matrix();
     return m;
   }();
-  const Matrix6d world_covariance = turn * relative * turn.transpose();
+  const Matrix6d world_covariance = rotation * relative * rotation.transpose();
   const SurfaceGrid grid = grid_of(local);
   const LatticeWindow& window = grid.window;
-  const CellFusion how = fusion();
-  for (int ty = Tile::of(window.north - window.height - step->y); ty <= Tile::of(window.north - 1 - step->y); ++ty) {
-    for (int tx = Tile::of(window.west - step->x); tx <= Tile::of(window.west + window.width - 1 - step->x); ++tx) {
+  const CellFusion fusion_parameters = fusion();
+  for (int ty = Tile::of(window.north - window.height - offset->y); ty <= Tile::of(window.north - 1 - offset->y);
+       ++ty) {
+    for (int tx = Tile::of(window.west - offset->x); tx <= Tile::of(window.west + window.width - 1 - offset->x); ++tx) {
       Tile* tile = nullptr;
       for (int y = 0; y < kSide; ++y) {
-        const int row = window.north - 1 - (ty * kSide + y + step->y);
+        const int row = window.north - 1 - (ty * kSide + y + offset->y);
         if (row < 0 || row >= window.height) continue;
         for (int x = 0; x < kSide; ++x) {
-          const int column = tx * kSide + x + step->x - window.west;
+          const int column = tx * kSide + x + offset->x - window.west;
           if (column < 0 || column >= window.width || !(local.count(column, row) > 0)) continue;
           if (tile == nullptr) {
             auto loaded = load_or_make({submap.id, tx, ty});
             if (!loaded) return failure(loaded);
             tile = *loaded;
           }
-          CellSurface seen = surface_of(local, column, row, world_covariance, grid, body);
-          seen.raise(down);
-          seen.stop = stop;
+          CellSurface observation = surface_of(local, column, row, world_covariance, grid, body);
+          observation.shift_elevation(minus_anchor_height);
+          observation.stop = stop;
           MapCell& cell = tile->at(x, y);
-          cell = observed(cell, seen, how);
+          cell = fuse_observation(cell, observation, fusion_parameters);
         }
       }
     }
@@ -209,7 +215,7 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
 Status GlobalMap::merge(GlobalMap& other) {
   const std::int32_t first_submap = submaps_.empty() ? 0 : submaps_.back().id + 1,
                      first_stop = stops_.empty() ? 0 : stops_.back().id + 1;
-  if (other.cell_m_ != cell_m_) return failure(ErrorCode::usage, "the maps have cells of different sizes");
+  if (other.cell_m_ != cell_m_) return failure(ErrorCode::usage, "maps of different cell sizes cannot be merged");
   for (Submap submap : other.submaps_) {
     submap.id += first_submap;
     submaps_.push_back(submap);
@@ -219,14 +225,14 @@ Status GlobalMap::merge(GlobalMap& other) {
     stops_.push_back(stop);
   }
   for (auto& [key, slot] : other.tiles_) {
-    const auto theirs = other.load(key);
-    if (!theirs) return failure(theirs);
-    auto ours = load_or_make({key.submap + first_submap, key.x, key.y});
-    if (!ours) return failure(ours);
-    **ours = **theirs;
-    for (MapCell& cell : (*ours)->cells) {
-      if (cell.surface.seen()) cell.surface.stop += first_stop;
-      if (cell.rival.seen()) cell.rival.stop += first_stop;
+    const auto source = other.load(key);
+    if (!source) return failure(source);
+    auto target = load_or_make({key.submap + first_submap, key.x, key.y});
+    if (!target) return failure(target);
+    **target = **source;
+    for (MapCell& cell : (*target)->cells) {
+      if (cell.surface.observed()) cell.surface.stop += first_stop;
+      if (cell.alternative.observed()) cell.alternative.stop += first_stop;
     }
   }
   return {};
@@ -249,7 +255,7 @@ Status GlobalMap::flush() {
     ++slot.revision;
     slot.changed = false;
   }
-  drop_surplus();
+  evict_tiles();
   return {};
 }
 
@@ -265,7 +271,7 @@ Status GlobalMap::copy_to(TileStore& store) {
     const auto tile = load(key);
     if (!tile) return failure(tile);
     if (Status s = store.write({key, 1}, **tile); !s) return s;
-    drop_surplus();
+    evict_tiles();
   }
   return {};
 }

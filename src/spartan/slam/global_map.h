@@ -1,4 +1,4 @@
-// The global map: submaps of tiled cells, of which only some are in memory.
+// The global map: submaps of tiled cells, with a limited number of tiles in memory.
 #pragma once
 
 #include <cstddef>
@@ -14,64 +14,67 @@
 #include "spartan/reconstruction/terrain_shape.h"
 #include "spartan/slam/lattice.h"
 #include "spartan/slam/slam_options.h"
-#include "spartan/slam/surface_grid.h"
 #include "spartan/slam/tile_store.h"
 
 namespace spartan {
 
-/// A rectangle of the global map; elevations are the world's. NaN (count, class, log-odds: 0) where nothing was seen.
+struct SurfaceGrid;
+
+/// A rectangular part of the global map in the world frame. Unobserved cells are NaN (count and log-odds: 0).
 struct MapView {
   LatticeWindow window;
   double cell_m = 0.05;
-  Image<float> elevation_m, elevation_min_m, elevation_max_m, variance_m2, count, kind, occupancy_logodds;
-  Image<std::int32_t> stop;  ///< the first that saw it; −1 nowhere
+  Image<float> elevation_m, elevation_min_m, elevation_max_m, variance_m2, count, occupancy_logodds;
+  Image<GroundClass> kind;
+  Image<std::int32_t> stop;  ///< The first stop that observed the cell; −1: none.
 
   MapPlace place() const { return window.place(cell_m); }
-  /// As files name them (docs/formats.md, "Maps"), with the shape that goes with them.
-  std::vector<MapBand> bands(const TerrainShape& shape) const;
-  /// The ground is fitted to the free cells first: costs are of what stands over it.
+  /// The bands of a map file, with the names of docs/formats.md, "Maps". `shape`: of this view.
+  MapBands bands(const TerrainShape& shape) const;
+  /// Slope, roughness, steps and costs. The ground surface is first fitted to the free cells.
   TerrainShape shape(const MapOptions& options, const Workers& workers) const;
   SurfaceGrid grid() const;
 };
 
-/// The map at one place.
+/// The map at one position.
 struct MapSample {
   double elevation_m = 0, variance_m2 = 0, occupancy_logodds = 0;
-  int kind = 0;
+  GroundClass kind = GroundClass::unknown;
 };
 
 class GlobalMap {
  public:
   GlobalMap(const GlobalMapOptions& options, double cell_m);
 
-  /// From now on tiles may live in the store alone. Borrowed; must hold this map or be empty.
+  /// From now on tiles may be paged out to the store. Borrowed; it must contain this map or be empty.
   void page_to(TileStore* store) { store_ = store; }
-  /// A map as the store holds it. Codes as the store's; `configuration` where its cells have another size.
+  /// Opens the map of a store. Codes: the store's; `configuration` where its cell size differs.
   static Result<GlobalMap> from_store(const GlobalMapOptions& options, double cell_m, TileStore& store);
 
-  /// Fuses a local map, made at `stop`'s pose, cell on cell. `relative`: how well the map's place among what is there
-  /// already is known (covariance of the pose's right perturbation); it makes the observations less certain where
-  /// heights change with the pose. The stop gets the next number.
+  /// Fuses a local map that was generated at `world_from_body`, cell by cell, and appends a stop with the next number.
+  /// `relative`: covariance of the pose relative to this map (right perturbation). It inflates the variances of the
+  /// observations by J relative Jᵀ, J the Jacobian of the elevation with respect to the pose.
   Status add(const LocalMap& local, const Stamp& stamp, const UncertainPose& world_from_body, const Matrix6d& relative);
-  /// Appends another map's submaps and stops. Where they overlap, views fuse them.
+  /// Appends another map's submaps and stops. Overlapping submaps are fused in views.
   Status merge(GlobalMap& other);
 
-  /// Codes: the store's; `usage` for more cells than kMostCells, which would take a gigabyte and more.
+  /// Renders a window. Codes: the store's; `usage` for more than kMostCells cells, which would need more than a
+  /// gigabyte.
   Result<MapView> view(const LatticeWindow& window);
   static constexpr std::int64_t kMostCells = 8'000'000;
-  /// Everything that was seen; empty where nothing was.
+  /// Bounding window of all tiles; empty for an empty map.
   LatticeWindow extent() const;
-  /// The parts of it where there are tiles, in windows of at most `side` by `side` cells that do not overlap.
+  /// Disjoint windows of at most `side` by `side` cells that cover all tiles.
   std::vector<LatticeWindow> pieces(int side) const;
-  /// Bilinear between the middles of the cells around; none where one of those is unknown.
+  /// Bilinear interpolation between cell centres; none where one of the four cells is unknown.
   Result<std::optional<MapSample>> at(double x_m, double y_m);
 
-  /// Writes what has changed to the store, inside the transaction it is in; then tiles beyond the memory may go.
+  /// Writes all changes to the store, inside its current transaction, and then evicts tiles beyond the memory limit.
   Status flush();
-  /// All of it into an empty store.
+  /// Writes the whole map into an empty store.
   Status copy_to(TileStore& store);
 
-  /// A submap's anchor moves, with all that hangs on it.
+  /// Moves the anchor of a submap, and thereby all its cells.
   void move_submap(std::int32_t id, const Pose& world_from_submap);
 
   double cell_m() const { return cell_m_; }
@@ -83,19 +86,19 @@ class GlobalMap {
 
  private:
   struct Slot {
-    std::int64_t revision = 0;   // 0: not in the store yet
-    std::unique_ptr<Tile> tile;  // on its own: what is dropped is freed
+    std::int64_t revision = 0;   // 0: not yet in the store
+    std::unique_ptr<Tile> tile;  // null: evicted
     bool changed = false;
     std::uint64_t used = 0;
   };
-  static_assert(sizeof(Slot) < sizeof(Tile) / 100, "a tile that is not in memory costs next to nothing");
+  static_assert(sizeof(Slot) < sizeof(Tile) / 100, "an evicted tile must need little memory");
   Result<Tile*> load(const TileKey& key);
   Result<Tile*> load_or_make(const TileKey& key);
-  void drop_surplus();
+  void evict_tiles();
   const Submap& submap_for(const Eigen::Vector3d& place);
   LatticeWindow window_of_tile(const TileKey& key) const;
-  Status draw_in_step(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
-  Status draw_moved(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
+  Status render_aligned(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
+  Status render_resampled(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
   CellFusion fusion() const;
 
   GlobalMapOptions options_;

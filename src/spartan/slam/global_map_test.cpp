@@ -17,8 +17,8 @@ using testing::covariance_of;
 using testing::Ground;
 using testing::points_at;
 using testing::pose_at;
+using testing::pose_on_ground;
 using testing::rocky_ground;
-using testing::standing;
 using testing::TemporaryFolder;
 
 LocalMap map_of(const Ground& ground, const Pose& pose, std::uint64_t seed) {
@@ -31,10 +31,11 @@ void add(GlobalMap& map, const Ground& ground, const Pose& pose, std::uint64_t s
       map.add(map_of(ground, pose, seed), {static_cast<std::int64_t>(seed)}, {pose, Matrix6d::Zero()}, relative));
 }
 
-// All of a view as bytes.
+// Serializes a view.
 Bytes bytes_of(const MapView& view) {
   ArchiveWriter out;
-  for (const MapBand& band : view.bands({})) {
+  const MapBands bands = view.bands({});
+  for (const MapBand& band : bands.list) {
     for (int y = 0; y < band.values.height(); ++y)
       out.put_array(band.values.row(y), static_cast<std::size_t>(band.values.width()));
   }
@@ -47,9 +48,9 @@ Bytes all_of(GlobalMap& map) {
   return bytes_of(*map.view(map.extent()));
 }
 
-TEST(GlobalMap, OneStopIsShownAsItsLocalMapCellByCell) {
+TEST(GlobalMap, AViewOfOneStopEqualsItsLocalMap) {
   const Ground ground = rocky_ground();
-  const Pose pose = standing(ground, -17.3, 9.1, 2.2);
+  const Pose pose = pose_on_ground(ground, -17.3, 9.1, 2.2);
   const LocalMap local = map_of(ground, pose, 1);
   GlobalMap map({}, 0.05);
   ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
@@ -73,12 +74,12 @@ TEST(GlobalMap, OneStopIsShownAsItsLocalMapCellByCell) {
   }
   EXPECT_GT(known, 3000);
   EXPECT_EQ(map.stops().at(0).stamp.ns, 5);
-  EXPECT_EQ(view.bands({}).size(), local.bands().size());
+  EXPECT_EQ(view.bands({}).list.size(), local.bands().list.size());
 }
 
-TEST(GlobalMap, IsAsHardToDriveOverAsTheLocalMapSays) {
+TEST(GlobalMap, TraversabilityEqualsThatOfTheLocalMap) {
   const Ground ground = rocky_ground();
-  const Pose pose = standing(ground, -17.3, 9.1, 2.2);
+  const Pose pose = pose_on_ground(ground, -17.3, 9.1, 2.2);
   const LocalMap local = map_of(ground, pose, 1);
   GlobalMap map({}, 0.05);
   ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
@@ -97,29 +98,29 @@ TEST(GlobalMap, IsAsHardToDriveOverAsTheLocalMapSays) {
     }
   }
   EXPECT_GT(known, 3000);
-  EXPECT_GT(close, 0.95 * known) << "the ground under the stones is fitted anew";
+  EXPECT_GT(close, 0.95 * known) << "the ground surface beneath the stones is fitted again";
 }
 
-TEST(GlobalMap, MoreThanCanBeShownIsRefused) {
+TEST(GlobalMap, RejectsViewsOfTooManyCells) {
   GlobalMap map({}, 0.05);
   EXPECT_EQ(map.view({0, 0, 2000, 4001}).error().code, ErrorCode::usage);
   EXPECT_TRUE(map.view({0, 0, 2000, 1}));
 }
 
-TEST(GlobalMap, PiecesHoldEveryTileOnceAndNothingInBetween) {
+TEST(GlobalMap, PiecesAreDisjointAndCoverTheTilesOnly) {
   const Ground ground = rocky_ground();
   GlobalMap map({}, 0.05);
   EXPECT_TRUE(map.pieces(64).empty());
-  add(map, ground, standing(ground, 0, 0, 0), 1);
-  add(map, ground, standing(ground, 400, -300, 1), 2);
+  add(map, ground, pose_on_ground(ground, 0, 0, 0), 1);
+  add(map, ground, pose_on_ground(ground, 400, -300, 1), 2);
   const LatticeWindow all = map.extent();
   std::int64_t cells = 0;
   for (const int side : {64, 1000}) {
     const std::vector<LatticeWindow> pieces = map.pieces(side);
-    EXPECT_LE(pieces.size(), 2 * map.tiles()) << "not all of the extent";
+    EXPECT_LE(pieces.size(), 2 * map.tiles()) << "the gap between the stops is not covered";
     for (const LatticeWindow& p : pieces) {
       EXPECT_TRUE(p.width <= side && p.height <= side);
-      EXPECT_EQ(window_around(all, p), all) << "inside";
+      EXPECT_EQ(window_around(all, p), all) << "inside of the extent";
       EXPECT_EQ((p.west - all.west) % side, 0);
       EXPECT_EQ((all.north - p.north) % side, 0);
       cells += p.cells();
@@ -131,58 +132,58 @@ TEST(GlobalMap, PiecesHoldEveryTileOnceAndNothingInBetween) {
 TEST(GlobalMap, ElevationBetweenCellsIsBilinear) {
   const Ground plane = [](double x, double y) { return 0.1 * x - 0.2 * y; };
   GlobalMap map({}, 0.05);
-  const Pose pose = standing(plane, 3, 4, 0);
+  const Pose pose = pose_on_ground(plane, 3, 4, 0);
   ASSERT_TRUE(map.add(MapGenerator({}, Workers(1)).generate(points_at(plane, pose, 1, 0), pose), {}, {pose, {}},
                       Matrix6d::Zero()));
   const auto sample = map.at(5.013, 4.111);
   ASSERT_TRUE(sample && *sample);
   EXPECT_NEAR((*sample)->elevation_m, 0.1 * 5.013 - 0.2 * 4.111, 0.003);
-  EXPECT_EQ((*sample)->kind, 1);
-  EXPECT_FALSE(map.at(1, 4)->has_value()) << "behind the rover nothing was seen";
+  EXPECT_EQ((*sample)->kind, GroundClass::ground);
+  EXPECT_FALSE(map.at(1, 4)->has_value()) << "nothing is observed behind the rover";
 }
 
-TEST(GlobalMap, AnUncertainPoseMakesSlopesUncertain) {
+TEST(GlobalMap, ThePoseCovarianceInflatesTheVarianceOfSlopes) {
   const Ground plane = [](double x, double) { return 0.5 * x; };
   const Pose pose = pose_at(0, 0, 0, 0.8);
   Matrix6d relative = Matrix6d::Zero();
   relative.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 0.01;
-  GlobalMap sure({}, 0.05), unsure({}, 0.05);
+  GlobalMap certain({}, 0.05), uncertain({}, 0.05);
   const LocalMap local = MapGenerator({}, Workers(1)).generate(points_at(plane, pose, 1, 0), pose);
-  ASSERT_TRUE(sure.add(local, {}, {pose, relative}, Matrix6d::Zero()));
-  ASSERT_TRUE(unsure.add(local, {}, {pose, relative}, relative));
-  const double more = (*unsure.at(1.5, 1.5))->variance_m2 - (*sure.at(1.5, 1.5))->variance_m2;
+  ASSERT_TRUE(certain.add(local, {}, {pose, relative}, Matrix6d::Zero()));
+  ASSERT_TRUE(uncertain.add(local, {}, {pose, relative}, relative));
+  const double more = (*uncertain.at(1.5, 1.5))->variance_m2 - (*certain.at(1.5, 1.5))->variance_m2;
   EXPECT_NEAR(more, 0.01 * (0.25 + 1), 0.001);
 }
 
-TEST(GlobalMap, SubmapsFollowTheDriveAndMeetCellOnCell) {
+TEST(GlobalMap, SubmapsFollowTheDriveAndShareTheLattice) {
   const Ground ground = rocky_ground();
   GlobalMapOptions options;
   options.submap_m = 2;
   GlobalMap small(options, 0.05), one({}, 0.05);
   for (int i = 0; i < 4; ++i) {
-    const Pose pose = standing(ground, 1.5 * i, 0.3 * i, 0.1 * i);
+    const Pose pose = pose_on_ground(ground, 1.5 * i, 0.3 * i, 0.1 * i);
     add(small, ground, pose, static_cast<std::uint64_t>(i + 1));
     add(one, ground, pose, static_cast<std::uint64_t>(i + 1));
   }
   EXPECT_EQ(one.submaps().size(), 1U);
   EXPECT_EQ(small.submaps().size(), 2U);
   const MapView a = *one.view(one.extent()), b = *small.view(one.extent());
-  int known = 0, apart = 0;
+  int known = 0, different = 0;
   for (int r = 0; r < a.window.height; ++r) {
     for (int c = 0; c < a.window.width; ++c) {
       ASSERT_EQ(a.count(c, r) > 0, b.count(c, r) > 0);
       if (!(a.count(c, r) > 0)) continue;
       ++known;
-      // Cells that changed their mind on the way may do so at another time.
-      apart += std::abs(a.elevation_m(c, r) - b.elevation_m(c, r)) > 1e-5 ? 1 : 0;
+      // Cells whose surface was replaced by its alternative may differ, because the order of fusion differs.
+      different += std::abs(a.elevation_m(c, r) - b.elevation_m(c, r)) > 1e-5 ? 1 : 0;
     }
   }
-  EXPECT_LT(apart, known / 50);
+  EXPECT_LT(different, known / 50);
 }
 
-TEST(GlobalMap, AMovedAnchorMovesItsCells) {
+TEST(GlobalMap, MovingAnAnchorMovesItsCells) {
   const Ground ground = rocky_ground();
-  const Pose pose = standing(ground, 0, 0, 0);
+  const Pose pose = pose_on_ground(ground, 0, 0, 0);
   GlobalMap map({}, 0.05);
   add(map, ground, pose, 1);
   const LatticeWindow window = map.extent();
@@ -196,21 +197,21 @@ TEST(GlobalMap, AMovedAnchorMovesItsCells) {
       ASSERT_NEAR(after.elevation_m(c, r), before.elevation_m(c, r) + 0.5, 1e-5);
     }
   }
-  // Turned and off the lattice: interpolated.
+  // Rotated and off the lattice: interpolated.
   const Ground plane = [](double x, double y) { return 0.1 * x + 0.05 * y; };
   GlobalMap level({}, 0.05);
   ASSERT_TRUE(level.add(MapGenerator({}, Workers(1)).generate(points_at(plane, Pose(), 1, 0), Pose()), {}, {},
                         Matrix6d::Zero()));
-  const Pose turn = Pose(exp_so3({0.02, 0.03, 0.4}), {0.013, 0.02, 0.1});
-  level.move_submap(0, turn * level.submaps()[0].world_from_submap);
-  const Eigen::Vector3d from(2, 0.4, plane(2, 0.4)), to = turn * from;
+  const Pose motion = Pose(exp_so3({0.02, 0.03, 0.4}), {0.013, 0.02, 0.1});
+  level.move_submap(0, motion * level.submaps()[0].world_from_submap);
+  const Eigen::Vector3d from(2, 0.4, plane(2, 0.4)), to = motion * from;
   EXPECT_NEAR((*level.at(to.x(), to.y()))->elevation_m, to.z(), 0.003);
 }
 
-TEST(GlobalMap, MergedMapsShowBoth) {
+TEST(GlobalMap, MergedMapsContainBoth) {
   const Ground ground = rocky_ground();
-  const Pose a = standing(ground, 0, 0, 0), b = standing(ground, 2, 0.5, 0.2);
-  GlobalMap first({}, 0.05), second({}, 0.05), apart({}, 0.05);
+  const Pose a = pose_on_ground(ground, 0, 0, 0), b = pose_on_ground(ground, 2, 0.5, 0.2);
+  GlobalMap first({}, 0.05), second({}, 0.05), different({}, 0.05);
   add(first, ground, a, 1);
   add(second, ground, b, 2);
   GlobalMapOptions two;
@@ -226,10 +227,10 @@ TEST(GlobalMap, MergedMapsShowBoth) {
   EXPECT_FALSE(first.merge(coarse));
 }
 
-TEST(GlobalMap, ResultsDoNotDependOnTheMemory) {
+TEST(GlobalMap, ResultsDoNotDependOnTheMemoryLimit) {
   const Ground ground = rocky_ground();
   const TemporaryFolder folder;
-  Bytes seen[2], stored[2];
+  Bytes views[2], stored[2];
   std::size_t most_in_memory[2]{};
   for (const int tiny : {0, 1}) {
     GlobalMapOptions options;
@@ -241,13 +242,13 @@ TEST(GlobalMap, ResultsDoNotDependOnTheMemory) {
     GlobalMap map(options, 0.05);
     map.page_to(&store);
     for (int i = 0; i < 6; ++i) {
-      add(map, ground, standing(ground, 1.5 * i, 0, 0.2 * i), static_cast<std::uint64_t>(i + 1));
+      add(map, ground, pose_on_ground(ground, 1.5 * i, 0, 0.2 * i), static_cast<std::uint64_t>(i + 1));
       ASSERT_TRUE(db.execute("BEGIN IMMEDIATE"));
       ASSERT_TRUE(map.flush());
       ASSERT_TRUE(db.execute("COMMIT"));
       most_in_memory[tiny] = std::max(most_in_memory[tiny], map.tiles_in_memory());
     }
-    seen[tiny] = all_of(map);
+    views[tiny] = all_of(map);
     ArchiveWriter out;
     const auto index = store.index();
     for (const TileStore::Entry& entry : *index) {
@@ -259,19 +260,19 @@ TEST(GlobalMap, ResultsDoNotDependOnTheMemory) {
   }
   EXPECT_LE(most_in_memory[1], 15U);
   EXPECT_GT(most_in_memory[0], 30U);
-  EXPECT_EQ(seen[0], seen[1]);
+  EXPECT_EQ(views[0], views[1]);
   EXPECT_EQ(stored[0], stored[1]);
 }
 
-TEST(GlobalMap, SavedLoadedAndContinuedIsTheSame) {
+TEST(GlobalMap, SavingAndLoadingDoesNotChangeTheResult) {
   const Ground ground = rocky_ground();
   const TemporaryFolder folder;
   const std::string path = folder.file("map.sqlite");
-  const Pose a = standing(ground, 0, 0, 0), b = standing(ground, 1.5, 0, 0.1);
-  GlobalMap straight({}, 0.05);
-  add(straight, ground, a, 1);
-  ASSERT_TRUE(MapFile::save(straight, path));
-  add(straight, ground, b, 2);
+  const Pose a = pose_on_ground(ground, 0, 0, 0), b = pose_on_ground(ground, 1.5, 0, 0.1);
+  GlobalMap uninterrupted({}, 0.05);
+  add(uninterrupted, ground, a, 1);
+  ASSERT_TRUE(MapFile::save(uninterrupted, path));
+  add(uninterrupted, ground, b, 2);
   {
     auto file = MapFile::open(path, {}, Database::Mode::open);
     ASSERT_TRUE(file) << file.error().message();
@@ -281,7 +282,7 @@ TEST(GlobalMap, SavedLoadedAndContinuedIsTheSame) {
   auto again = MapFile::open(path, {}, Database::Mode::read_only);
   ASSERT_TRUE(again) << again.error().message();
   EXPECT_EQ(again->map().stops().size(), 2U);
-  EXPECT_EQ(all_of(again->map()), all_of(straight));
+  EXPECT_EQ(all_of(again->map()), all_of(uninterrupted));
 
   EXPECT_EQ(MapFile::open(folder.file("none"), {}, Database::Mode::open).error().code, ErrorCode::input);
   EXPECT_EQ(MapFile::open(folder.write("text", "no map"), {}, Database::Mode::open).error().code, ErrorCode::input);
@@ -290,7 +291,7 @@ TEST(GlobalMap, SavedLoadedAndContinuedIsTheSame) {
   EXPECT_EQ(MapFile::open(path, {}, Database::Mode::open).error().code, ErrorCode::configuration);
 }
 
-TEST(GlobalMap, CellsOfAnotherSizeAreRefused) {
+TEST(GlobalMap, RejectsAStoreOfAnotherCellSize) {
   const TemporaryFolder folder;
   Database db = *Database::open(folder.file("map.sqlite"), Database::Mode::create);
   TileStore store = *TileStore::open(db);
@@ -301,8 +302,8 @@ TEST(GlobalMap, CellsOfAnotherSizeAreRefused) {
   EXPECT_EQ(GlobalMap::from_store({}, 0.1, store).error().code, ErrorCode::configuration);
 }
 
-// Maps of single cells: any stops, at any heights.
-RC_GTEST_PROP(GlobalMap, ObservationsNeverRaiseAVarianceAndTheUnseenIsNeverFree, ()) {
+// Maps of single cells with random elevations.
+RC_GTEST_PROP(GlobalMap, ObservationsNeverRaiseAVarianceAndUnobservedCellsAreNeverFree, ()) {
   GlobalMapOptions options;
   options.submap_m = 1e4;
   GlobalMap map(options, 0.05);
@@ -311,22 +312,23 @@ RC_GTEST_PROP(GlobalMap, ObservationsNeverRaiseAVarianceAndTheUnseenIsNeverFree,
     LocalMap local;
     local.place = {0, 0.4, 0.05};
     for (Image<float>* layer : {&local.elevation_m, &local.elevation_min_m, &local.elevation_max_m, &local.variance_m2,
-                                &local.count, &local.kind, &local.occupancy_logodds})
+                                &local.count, &local.occupancy_logodds})
       *layer = Image<float>(8, 8, 0.0F);
+    local.kind = Image<GroundClass>(8, 8);
     for (int k = 0; k < 8; ++k) {
       const int x = *rc::gen::inRange(0, 8), y = *rc::gen::inRange(0, 8);
       local.elevation_m(x, y) = local.elevation_min_m(x, y) = local.elevation_max_m(x, y) =
           0.01F * static_cast<float>(*rc::gen::inRange(-9, 9));
       local.variance_m2(x, y) = 1e-5F * static_cast<float>(*rc::gen::inRange(1, 99));
       local.count(x, y) = 2;
-      local.kind(x, y) = 1;
+      local.kind(x, y) = GroundClass::ground;
       local.occupancy_logodds(x, y) = -1;
     }
     RC_ASSERT(map.add(local, {}, {}, covariance_of(0.01, 0.01)).has_value());
     const MapView view = *map.view({0, 8, 8, 8});
     for (int y = 0; y < 8; ++y) {
       for (int x = 0; x < 8; ++x) {
-        RC_ASSERT((view.count(x, y) > 0) == (view.kind(x, y) != 0));
+        RC_ASSERT((view.count(x, y) > 0) == (view.kind(x, y) != GroundClass::unknown));
         RC_ASSERT(view.count(x, y) > 0 || before(x, y) == INFINITY);
         if (!(view.count(x, y) > 0)) continue;
         RC_ASSERT(view.variance_m2(x, y) <= before(x, y));

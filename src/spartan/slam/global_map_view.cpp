@@ -1,4 +1,4 @@
-// What the global map shows: windows drawn from its submaps, its extent, samples.
+// Views of the global map: windows rendered from its submaps, its extent, samples.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,28 +17,28 @@ constexpr int kSide = Tile::kSide;
 
 }  // namespace
 
-Status GlobalMap::draw_in_step(const Submap& submap, MapView& view, std::vector<MapCell>& cells) {
-  const LatticeStep step = *submap.step(cell_m_);
+Status GlobalMap::render_aligned(const Submap& submap, MapView& view, std::vector<MapCell>& cells) {
+  const LatticeOffset offset = *submap.lattice_offset(cell_m_);
   const LatticeWindow& w = view.window;
-  const auto up = static_cast<float>(submap.world_from_submap.translation().z());
-  const CellFusion how = fusion();
-  for (int ty = Tile::of(w.north - w.height - step.y); ty <= Tile::of(w.north - 1 - step.y); ++ty) {
-    for (int tx = Tile::of(w.west - step.x); tx <= Tile::of(w.west + w.width - 1 - step.x); ++tx) {
+  const auto anchor_height = static_cast<float>(submap.world_from_submap.translation().z());
+  const CellFusion fusion_parameters = fusion();
+  for (int ty = Tile::of(w.north - w.height - offset.y); ty <= Tile::of(w.north - 1 - offset.y); ++ty) {
+    for (int tx = Tile::of(w.west - offset.x); tx <= Tile::of(w.west + w.width - 1 - offset.x); ++tx) {
       const auto tile = load({submap.id, tx, ty});
       if (!tile) return failure(tile);
       if (*tile == nullptr) continue;
       for (int y = 0; y < kSide; ++y) {
-        const int row = w.north - 1 - (ty * kSide + y + step.y);
+        const int row = w.north - 1 - (ty * kSide + y + offset.y);
         if (row < 0 || row >= w.height) continue;
         for (int x = 0; x < kSide; ++x) {
-          const int column = tx * kSide + x + step.x - w.west;
+          const int column = tx * kSide + x + offset.x - w.west;
           if (column < 0 || column >= w.width) continue;
           CellSurface surface = (*tile)->at(x, y).surface;
-          if (!surface.seen()) continue;
-          surface.raise(up);
+          if (!surface.observed()) continue;
+          surface.shift_elevation(anchor_height);
           MapCell& cell = cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(w.width) +
                                 static_cast<std::size_t>(column)];
-          cell = observed(cell, surface, how);
+          cell = fuse_observation(cell, surface, fusion_parameters);
         }
       }
     }
@@ -46,50 +46,50 @@ Status GlobalMap::draw_in_step(const Submap& submap, MapView& view, std::vector<
   return {};
 }
 
-Status GlobalMap::draw_moved(const Submap& submap, MapView& view, std::vector<MapCell>& cells) {
+Status GlobalMap::render_resampled(const Submap& submap, MapView& view, std::vector<MapCell>& cells) {
   const LatticeWindow& w = view.window;
   const MapPlace place = view.place();
   const Pose submap_from_world = submap.world_from_submap.inverse();
-  const CellFusion how = fusion();
+  const CellFusion fusion_parameters = fusion();
   for (int row = 0; row < w.height; ++row) {
     for (int column = 0; column < w.width; ++column) {
       const Eigen::Vector2d at = middle_of(place, column, row);
-      // Where the vertical through the cell's middle meets the submap: its height is not known beforehand.
+      // Intersection of the vertical through the cell's centre with the submap's surface, by fixed-point iteration.
       double z = submap.world_from_submap.translation().z();
-      CellSurface found;
-      bool whole = false;
+      CellSurface interpolated;
+      bool complete = false;
       for (int round = 0; round < 3; ++round) {
         const Eigen::Vector3d p = submap_from_world * Eigen::Vector3d(at.x(), at.y(), z);
         const double u = p.x() / cell_m_ - 0.5, v = p.y() / cell_m_ - 0.5;
         const int x0 = static_cast<int>(std::floor(u)), y0 = static_cast<int>(std::floor(v));
         const double a = u - x0, b = v - y0;
         double elevation = 0, variance = 0, logodds = 0;
-        whole = true;
-        for (int k = 0; k < 4 && whole; ++k) {
+        complete = true;
+        for (int k = 0; k < 4 && complete; ++k) {
           const int x = x0 + k % 2, y = y0 + k / 2;
           const auto tile = load({submap.id, Tile::of(x), Tile::of(y)});
           if (!tile) return failure(tile);
           const CellSurface* s =
               *tile == nullptr ? nullptr : &(*tile)->at(x - kSide * Tile::of(x), y - kSide * Tile::of(y)).surface;
-          whole = s != nullptr && s->seen();
-          if (!whole) break;
-          const double share = (k % 2 == 1 ? a : 1 - a) * (k / 2 == 1 ? b : 1 - b);
-          if (k == 0 || share >= 0.25) found = *s;
-          elevation += share * s->elevation_m;
-          variance += share * s->variance_m2;
-          logodds += share * s->occupancy_logodds;
+          complete = s != nullptr && s->observed();
+          if (!complete) break;
+          const double weight = (k % 2 == 1 ? a : 1 - a) * (k / 2 == 1 ? b : 1 - b);
+          if (k == 0 || weight >= 0.25) interpolated = *s;
+          elevation += weight * s->elevation_m;
+          variance += weight * s->variance_m2;
+          logodds += weight * s->occupancy_logodds;
         }
-        if (!whole) break;
-        const Eigen::Vector3d met = submap.world_from_submap * Eigen::Vector3d(p.x(), p.y(), elevation);
-        z = met.z();
-        found.raise(static_cast<float>(z) - found.elevation_m);
-        found.variance_m2 = static_cast<float>(variance);
-        found.occupancy_logodds = static_cast<float>(logodds);
+        if (!complete) break;
+        const Eigen::Vector3d point = submap.world_from_submap * Eigen::Vector3d(p.x(), p.y(), elevation);
+        z = point.z();
+        interpolated.shift_elevation(static_cast<float>(z) - interpolated.elevation_m);
+        interpolated.variance_m2 = static_cast<float>(variance);
+        interpolated.occupancy_logodds = static_cast<float>(logodds);
       }
-      if (!whole) continue;
+      if (!complete) continue;
       MapCell& cell =
           cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(w.width) + static_cast<std::size_t>(column)];
-      cell = observed(cell, found, how);
+      cell = fuse_observation(cell, interpolated, fusion_parameters);
     }
   }
   return {};
@@ -97,39 +97,42 @@ Status GlobalMap::draw_moved(const Submap& submap, MapView& view, std::vector<Ma
 
 Result<MapView> GlobalMap::view(const LatticeWindow& window) {
   if (window.cells() > kMostCells) {
-    return failure(ErrorCode::usage,
-                   fmt::format("the map is {} x {} cells, more than can be shown at once", window.width, window.height),
-                   "", "`spartan map export --window` takes a part of it");
+    return failure(
+        ErrorCode::usage,
+        fmt::format("the window has {} x {} cells, more than the limit of a view", window.width, window.height), "",
+        "`spartan map export --window` exports a part of the map");
   }
   MapView view;
   view.window = window;
   view.cell_m = cell_m_;
   std::vector<MapCell> cells(static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height));
   for (const Submap& submap : submaps_) {
-    const bool in_step = submap.step(cell_m_).has_value();
-    if (Status s = in_step ? draw_in_step(submap, view, cells) : draw_moved(submap, view, cells); !s) return failure(s);
+    const bool aligned = submap.lattice_offset(cell_m_).has_value();
+    if (Status s = aligned ? render_aligned(submap, view, cells) : render_resampled(submap, view, cells); !s)
+      return failure(s);
   }
   for (Image<float>* layer : {&view.elevation_m, &view.elevation_min_m, &view.elevation_max_m, &view.variance_m2})
     *layer = Image<float>(window.width, window.height, kNaN);
-  for (Image<float>* layer : {&view.count, &view.kind, &view.occupancy_logodds})
+  for (Image<float>* layer : {&view.count, &view.occupancy_logodds})
     *layer = Image<float>(window.width, window.height, 0.0F);
+  view.kind = Image<GroundClass>(window.width, window.height);
   view.stop = Image<std::int32_t>(window.width, window.height, -1);
   std::size_t i = 0;
   for (int row = 0; row < window.height; ++row) {
     for (int column = 0; column < window.width; ++column, ++i) {
       const CellSurface& s = cells[i].surface;
-      if (!s.seen()) continue;
+      if (!s.observed()) continue;
       view.elevation_m(column, row) = s.elevation_m;
       view.elevation_min_m(column, row) = s.lowest_m;
       view.elevation_max_m(column, row) = s.highest_m;
       view.variance_m2(column, row) = s.variance_m2;
       view.count(column, row) = s.count;
-      view.kind(column, row) = static_cast<float>(cells[i].kind());
+      view.kind(column, row) = cells[i].kind();
       view.occupancy_logodds(column, row) = s.occupancy_logodds;
       view.stop(column, row) = s.stop;
     }
   }
-  drop_surplus();
+  evict_tiles();
   return view;
 }
 
@@ -144,7 +147,7 @@ LatticeWindow GlobalMap::window_of_tile(const TileKey& key) const {
     south = std::min(south, p.y());
     north = std::max(north, p.y());
   }
-  // A corner on the lattice stays there in spite of rounding.
+  // The tolerance keeps corners on the lattice in spite of rounding.
   const auto low = [&](double v) { return static_cast<int>(std::floor(v / cell_m_ + 1e-6)); };
   const auto high = [&](double v) { return static_cast<int>(std::ceil(v / cell_m_ - 1e-6)); };
   return {low(west), high(north), high(east) - low(west), high(north) - low(south)};
@@ -161,7 +164,7 @@ LatticeWindow GlobalMap::extent() const {
 
 std::vector<LatticeWindow> GlobalMap::pieces(int side) const {
   const LatticeWindow all = extent();
-  std::set<std::pair<int, int>> touched;  // row and column of pieces, from the extent's corner
+  std::set<std::pair<int, int>> touched;  // row and column of windows, from the corner of the extent
   for (const auto& [key, slot] : tiles_) {
     const LatticeWindow tile = window_of_tile(key);
     const int row = all.north - tile.north, column = tile.west - all.west;
@@ -188,12 +191,12 @@ Result<std::optional<MapSample>> GlobalMap::at(double x_m, double y_m) {
   for (int k = 0; k < 4; ++k) {
     const int c = k % 2, r = 1 - k / 2;
     if (!(around->count(c, r) > 0)) return std::nullopt;
-    const double share = (c == 1 ? a : 1 - a) * (r == 0 ? b : 1 - b);
-    sample.elevation_m += share * around->elevation_m(c, r);
-    sample.variance_m2 += share * around->variance_m2(c, r);
-    sample.occupancy_logodds += share * around->occupancy_logodds(c, r);
+    const double weight = (c == 1 ? a : 1 - a) * (r == 0 ? b : 1 - b);
+    sample.elevation_m += weight * around->elevation_m(c, r);
+    sample.variance_m2 += weight * around->variance_m2(c, r);
+    sample.occupancy_logodds += weight * around->occupancy_logodds(c, r);
   }
-  sample.kind = static_cast<int>(around->kind(a < 0.5 ? 0 : 1, b < 0.5 ? 1 : 0));
+  sample.kind = around->kind(a < 0.5 ? 0 : 1, b < 0.5 ? 1 : 0);
   return sample;
 }
 

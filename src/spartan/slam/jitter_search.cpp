@@ -8,12 +8,12 @@
 namespace spartan {
 namespace {
 
-constexpr double kNone = 2;  // cost of a place where too little overlaps
-constexpr int kFewestCells = 40;
+constexpr double kNone = 2;       // cost of a pose with too little overlap; costs are at most 1
+constexpr int kFewestCells = 40;  // minimum overlap of a pose, cells of twice the map's cell size; empirical
 
-// A cell of the local map, from the centre.
+// A cell of the local map, relative to the centre of rotation.
 struct LocalCell {
-  float x, y, z, variance, evidence;
+  float x, y, z, variance, occupancy;
 };
 
 std::vector<LocalCell> cells_of(const SurfaceGrid& grid, const Eigen::Vector3d& centre) {
@@ -25,19 +25,19 @@ std::vector<LocalCell> cells_of(const SurfaceGrid& grid, const Eigen::Vector3d& 
       const Eigen::Vector2d at = middle_of(place, c, r) - centre.head<2>();
       cells.push_back({static_cast<float>(at.x()), static_cast<float>(at.y()),
                        static_cast<float>(grid.elevation_m(c, r) - centre.z()), grid.variance_m2(c, r),
-                       grid.evidence(c, r)});
+                       grid.occupancy(c, r)});
     }
   }
   return cells;
 }
 
-// Where a local and a global cell lie on each other; elevations differ by d.
+// A local cell with the global elevation at its position: d is the elevation difference.
 struct Pair {
   float x, y, d, variance, disagreement;
 };
 
-// The global map laid out for many look-ups: elevations from the centre, and around each cell's middle the variance and
-// the evidence of the nearest cell.
+// Look-up of the global map: elevations are interpolated bilinearly, relative to the centre of rotation; variance and
+// occupancy are those of the nearest cell.
 class Ground {
  public:
   Ground(const SurfaceGrid& grid, const Eigen::Vector3d& centre)
@@ -47,7 +47,7 @@ class Ground {
         z0_(static_cast<float>(centre.z())),
         per_m_(1 / grid.cell_m) {}
 
-  /// Adds the pair of a cell that lies at (x, y) from the centre; nothing where the ground is not known.
+  // Adds the pair of a local cell at (x, y) relative to the centre; nothing where the global elevation is unknown.
   void meet(const LocalCell& cell, double x, double y, std::vector<Pair>& pairs) const {
     const double u = u0_ + x * per_m_, v = v0_ - y * per_m_;
     if (!(u >= 0 && v >= 0 && u < grid_.window.width - 1 && v < grid_.window.height - 1)) return;
@@ -59,7 +59,7 @@ class Ground {
     const int nearest_c = c + (a > 0.5F ? 1 : 0), nearest_r = r + (b > 0.5F ? 1 : 0);
     pairs.push_back({static_cast<float>(x), static_cast<float>(y), cell.z - (z - z0_),
                      cell.variance + grid_.variance_m2(nearest_c, nearest_r),
-                     0.5F * (1 - cell.evidence * grid_.evidence(nearest_c, nearest_r))});
+                     0.5F * (1 - cell.occupancy * grid_.occupancy(nearest_c, nearest_r))});
   }
 
  private:
@@ -69,7 +69,7 @@ class Ground {
   double per_m_;
 };
 
-// d ≈ p₀ + p₁ x + p₂ y with weights of Geman-McClure around the plane before.
+// Fits d ≈ p₀ + p₁ x + p₂ y with the Geman-McClure weights of the residuals from the previous plane.
 Eigen::Vector3d fit_plane(const std::vector<Pair>& pairs, const Eigen::Vector3d& before, double scale_m) {
   Eigen::Matrix3d m = Eigen::Matrix3d::Identity() * 1e-9;
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
@@ -85,9 +85,9 @@ Eigen::Vector3d fit_plane(const std::vector<Pair>& pairs, const Eigen::Vector3d&
 
 double cost_of(const std::vector<Pair>& pairs, const Eigen::Vector3d& plane, const MatchOptions& options) {
   double sum = 0;
-  const double blur2 = options.blur_m * options.blur_m;
+  const double scale2 = options.elevation_scale_m * options.elevation_scale_m;
   for (const Pair& pair : pairs) {
-    const double r = pair.d - plane[0] - plane[1] * pair.x - plane[2] * pair.y, u2 = r * r / (blur2 + pair.variance);
+    const double r = pair.d - plane[0] - plane[1] * pair.x - plane[2] * pair.y, u2 = r * r / (scale2 + pair.variance);
     sum += u2 / (1 + u2) + options.class_weight * pair.disagreement;
   }
   return sum / (static_cast<double>(pairs.size()) * (1 + options.class_weight));
@@ -102,7 +102,7 @@ int steps(double half, double step) {
   return std::max(1, static_cast<int>(std::ceil(half / step - 1e-9)));
 }
 
-// x → turn about the centre by yaw, then the shift, then height and tilt so that the plane vanishes.
+// Rotation about the centre by yaw, then translation, then height and tilt that bring the fitted plane to zero.
 Pose correction_of(const Eigen::Vector3d& centre, double dx, double dy, double yaw, const Eigen::Vector3d& plane) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
   // (θ × q)_z = θ_x q_y − θ_y q_x must be −(p₁ q_x + p₂ q_y).
@@ -121,8 +121,9 @@ SearchWindow search_window(const UncertainPose& world_from_body, const MatchOpti
   const auto half = [&](double variance, double step, double widest) {
     return std::clamp(options.window_sigmas * std::sqrt(std::max(variance, 0.0)), std::min(step, widest), widest);
   };
-  return {half(place(0, 0), options.step_m, options.widest_m), half(place(1, 1), options.step_m, options.widest_m),
-          half(attitude(2, 2), options.step_deg * degree, options.widest_deg * degree)};
+  return {half(place(0, 0), options.step_m, options.max_search_m),
+          half(place(1, 1), options.step_m, options.max_search_m),
+          half(attitude(2, 2), options.step_deg * degree, options.max_search_deg * degree)};
 }
 
 std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGrid& global,
@@ -135,7 +136,7 @@ std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGri
             na = steps(window.yaw_rad, yaw_step);
   const int wide = 2 * nx + 1, high = 2 * ny + 1, turns = 2 * na + 1;
 
-  // Height and tilt roughly, so that the robust fits begin inside their reach.
+  // Approximate height and tilt, so that the robust fits start within their basin of convergence.
   std::vector<Pair> pairs;
   for (const LocalCell& cell : cells) ground.meet(cell, cell.x, cell.y, pairs);
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
@@ -157,8 +158,8 @@ std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGri
             ground.meet(cell, cosine * cell.x - sine * cell.y + dx, sine * cell.x + cosine * cell.y + dy, met);
           if (met.size() < kFewestCells) continue;
           Trial& trial = at(a, j, i);
-          trial.plane = fit_plane(met, start, 4 * options.blur_m);
-          trial.plane = fit_plane(met, trial.plane, options.blur_m);
+          trial.plane = fit_plane(met, start, 4 * options.elevation_scale_m);
+          trial.plane = fit_plane(met, trial.plane, options.elevation_scale_m);
           trial.cost = cost_of(met, trial.plane, options);
         }
       }

@@ -1,4 +1,4 @@
-// The jittering search: a map is shifted and turned over another until they fit best.
+// Correlative scan matching of two elevation maps: exhaustive search over x, y and yaw (the paper's "jittering").
 #pragma once
 
 #include <Eigen/Core>
@@ -11,24 +11,26 @@
 
 namespace spartan {
 
-/// What is searched, to each side of the given pose.
+/// Half sizes of the search window around the prior pose.
 struct SearchWindow {
   double x_m = 0, y_m = 0, yaw_rad = 0;
 };
-/// From the covariance of a body's pose: so many sigmas, not more than the options' widest, at least a step.
+/// The window that follows from the covariance of the prior pose: window_sigmas standard deviations, at most
+/// max_search, at least one step.
 SearchWindow search_window(const UncertainPose& world_from_body, const MatchOptions& options);
 
-/// A place where the maps fit better than around it.
+/// A local minimum of the matching cost.
 struct JitterPeak {
-  Pose correction;       ///< world_from_world: apply it to the local map
-  double cost = 1;       ///< 0 all cells agree … 1 none does
-  bool at_edge = false;  ///< of the window
+  Pose correction;       ///< world_from_world, to be applied to the local map.
+  double cost = 1;       ///< 0 (all cells agree) … 1 (none agrees).
+  bool at_edge = false;  ///< On the border of the search window.
 };
 
-/// All peaks, best first. `centre`: of the turns, near the middle of the local map. For every shift and turn, height
-/// and tilt are those of the plane through the elevations' differences d, found by least squares weighted anew, so that
-/// they need no search. Cost of a cell: u² / (1 + u²) (Geman-McClure), u² = d² / (blur² + variances), plus the class
-/// weight times (1 − e₁ e₂)/2 of the evidences; their mean over the cells that both maps know.
+/// All local minima, lowest cost first. `centre`: centre of rotation, near the middle of the local map. For every
+/// translation and yaw, height, roll and pitch follow from the plane fitted to the elevation differences d by
+/// iteratively reweighted least squares, so that they are not searched. The cost is the mean over all cells that both
+/// maps have observed of u² / (1 + u²) (Geman-McClure), u² = d² / (elevation_scale² + variances), plus the class weight
+/// times (1 − o₁ o₂)/2 of the signed occupancies o (see SurfaceGrid), divided by 1 + the class weight.
 std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGrid& global,
                                       const Eigen::Vector3d& centre, const SearchWindow& window,
                                       const MatchOptions& options, const Workers& workers);

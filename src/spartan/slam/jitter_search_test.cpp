@@ -11,54 +11,54 @@ using testing::covariance_of;
 using testing::Ground;
 using testing::points_at;
 using testing::pose_at;
+using testing::pose_on_ground;
 using testing::rocky_ground;
-using testing::standing;
 
 SurfaceGrid map_at(const std::vector<SurfacePoint>& points, const Pose& pose) {
   return coarser(grid_of(MapGenerator({}, Workers(1)).generate(points, pose)));
 }
 
-TEST(JitterSearch, WindowFollowsTheCovarianceInTheWorldsAxes) {
+TEST(ScanMatching, WindowFollowsTheCovarianceInWorldAxes) {
   MatchOptions options;
   Matrix6d covariance = Matrix6d::Zero();
   covariance.diagonal() << 0.01, 0.0001, 1, 1, 1, 0.0004;
-  // Turned by 90 degrees: the body's x is the world's y.
+  // Yaw of 90 degrees: the body's x axis is the world's y axis.
   const SearchWindow window = search_window({pose_at(0, 0, 0, M_PI / 2), covariance}, options);
   EXPECT_NEAR(window.y_m, 0.3, 1e-9);
   EXPECT_NEAR(window.x_m, options.step_m, 1e-9) << "at least a step";
   EXPECT_NEAR(window.yaw_rad, 0.06, 1e-9);
-  EXPECT_NEAR(search_window({Pose(), covariance_of(9, 9)}, options).x_m, options.widest_m, 1e-9);
+  EXPECT_NEAR(search_window({Pose(), covariance_of(9, 9)}, options).x_m, options.max_search_m, 1e-9);
 }
 
-TEST(JitterSearch, FindsTheOffsetToAboutAStep) {
+TEST(ScanMatching, FindsTheOffsetWithinAStep) {
   const Ground ground = rocky_ground();
-  const Pose before = standing(ground, 0, 0, 0), now = standing(ground, 1, 0.2, 0.1);
+  const Pose before = pose_on_ground(ground, 0, 0, 0), now = pose_on_ground(ground, 1, 0.2, 0.1);
   const Pose offset = pose_at(0.2, -0.15, 0.1, 0.05) * Pose::from_rotation(exp_so3({0.03, -0.02, 0}));
-  const Pose given =
+  const Pose prior =
       Pose::from_translation(now.translation()) * offset * Pose::from_translation(-now.translation()) * now;
   const std::vector<JitterPeak> peaks =
-      jitter_search(map_at(points_at(ground, now, 2), given), map_at(points_at(ground, before, 1), before),
-                    given.translation(), {0.3, 0.3, 0.07}, {}, Workers(2));
+      jitter_search(map_at(points_at(ground, now, 2), prior), map_at(points_at(ground, before, 1), before),
+                    prior.translation(), {0.3, 0.3, 0.07}, {}, Workers(2));
   ASSERT_FALSE(peaks.empty());
-  const Pose wrong = now.inverse() * peaks.front().correction * given;
+  const Pose wrong = now.inverse() * peaks.front().correction * prior;
   EXPECT_LT(wrong.translation().norm(), 0.06);
   EXPECT_LT(rotation_angle(wrong), 0.02);
   EXPECT_FALSE(peaks.front().at_edge);
   for (std::size_t i = 1; i < peaks.size(); ++i) EXPECT_LE(peaks[i - 1].cost, peaks[i].cost);
 }
 
-TEST(JitterSearch, ClassesSpeakWhereElevationsAreTheSame) {
-  // A plain with three places that are known to be obstacles, all as high as the rest.
+TEST(ScanMatching, OccupancyDecidesWhereElevationsAreEqual) {
+  // A plane with three obstacle cells whose elevation is that of their surroundings.
   const auto plain = [](double east) {
-    SurfaceGrid grid = throw_on_grid(points_at([](double, double) { return 0.0; }, Pose(), 1, 0), Pose(),
-                                     window_around(2, 0, 3, 0.1), 0.1, 1);
+    SurfaceGrid grid = rasterize(points_at([](double, double) { return 0.0; }, Pose(), 1, 0), Pose(),
+                                 window_around(2, 0, 3, 0.1), 0.1, 1);
     for (const Eigen::Vector2d& at : {Eigen::Vector2d(1.55, 0.35), {2.55, -0.75}, {2.95, 0.85}}) {
       const GridCell cell = cell_at(grid.window.place(0.1), at.x() + east, at.y());
-      for (int k = 0; k < 9; ++k) grid.evidence(cell.column + k % 3, cell.row + k / 3) = 1;
+      for (int k = 0; k < 9; ++k) grid.occupancy(cell.column + k % 3, cell.row + k / 3) = 1;
     }
     for (int r = 0; r < grid.window.height; ++r) {
       for (int c = 0; c < grid.window.width; ++c)
-        if (grid.evidence(c, r) != 1) grid.evidence(c, r) = -1;
+        if (grid.occupancy(c, r) != 1) grid.occupancy(c, r) = -1;
     }
     return grid;
   };

@@ -1,4 +1,5 @@
-// The world's lattice of cells: corners at whole multiples of the cells' side, so that maps meet cell on cell.
+// The world lattice of map cells: corners at integer multiples of the cell size, so that the cells of all maps
+// coincide.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 namespace spartan {
 
 /// A rectangle of cells. Column c holds x in [(west + c) s, (west + c + 1) s), row r holds y in
-/// [(north − r − 1) s, (north − r) s), s the cells' side: as in files, row 0 lies in the north.
+/// [(north − r − 1) s, (north − r) s), s the cell size: row 0 lies in the north, as in map files.
 struct LatticeWindow {
   int west = 0, north = 0;
   int width = 0, height = 0;
@@ -22,7 +23,7 @@ struct LatticeWindow {
   friend bool operator==(const LatticeWindow&, const LatticeWindow&) = default;
 };
 
-/// All cells that a rectangle of the world touches.
+/// All cells that intersect a rectangle of the world.
 inline LatticeWindow window_between(double west_m, double south_m, double east_m, double north_m, double cell_m) {
   const int west = static_cast<int>(std::floor(west_m / cell_m)), east = static_cast<int>(std::ceil(east_m / cell_m)),
             south = static_cast<int>(std::floor(south_m / cell_m)),
@@ -30,12 +31,12 @@ inline LatticeWindow window_between(double west_m, double south_m, double east_m
   return {west, north, east - west, north - south};
 }
 
-/// All cells within `reach_m` of a place, measured along x and y.
+/// All cells within `reach_m` of a point, measured along x and y.
 inline LatticeWindow window_around(double x_m, double y_m, double reach_m, double cell_m) {
   return window_between(x_m - reach_m, y_m - reach_m, x_m + reach_m, y_m + reach_m, cell_m);
 }
 
-/// The smallest window that holds both.
+/// The smallest window that contains both.
 inline LatticeWindow window_around(const LatticeWindow& a, const LatticeWindow& b) {
   const int west = std::min(a.west, b.west), north = std::max(a.north, b.north),
             east = std::max(a.west + a.width, b.west + b.width),
@@ -43,7 +44,7 @@ inline LatticeWindow window_around(const LatticeWindow& a, const LatticeWindow& 
   return {west, north, east - west, north - south};
 }
 
-/// The cells of a map that lies on the lattice.
+/// The window of a map whose cells lie on the lattice.
 inline LatticeWindow window_of(const MapPlace& place, ImageSize size) {
   return {static_cast<int>(std::lround(place.west_m / place.cell_m)),
           static_cast<int>(std::lround(place.north_m / place.cell_m)), size.width, size.height};

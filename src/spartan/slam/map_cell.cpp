@@ -6,12 +6,12 @@
 namespace spartan {
 namespace {
 
-constexpr float kMostLogodds = 10;
+constexpr float kMaxLogodds = 10;  // saturation, so that a cell can still change after many observations
 
 bool agree(const CellSurface& a, const CellSurface& b, const CellFusion& fusion) {
   const double d = static_cast<double>(a.elevation_m) - b.elevation_m;
-  const double relief_a = fusion.relief_sigma * (a.highest_m - a.lowest_m),
-               relief_b = fusion.relief_sigma * (b.highest_m - b.lowest_m);
+  const double relief_a = fusion.relief_sigma_ratio * (a.highest_m - a.lowest_m),
+               relief_b = fusion.relief_sigma_ratio * (b.highest_m - b.lowest_m);
   const double variance =
       static_cast<double>(a.variance_m2) + b.variance_m2 + relief_a * relief_a + relief_b * relief_b;
   return d * d <= fusion.gate_sigmas * fusion.gate_sigmas * variance;
@@ -25,44 +25,44 @@ CellSurface fused(const CellSurface& a, const CellSurface& b, double least_varia
   f.lowest_m = std::min(a.lowest_m, b.lowest_m);
   f.highest_m = std::max(a.highest_m, b.highest_m);
   f.count = a.count + b.count;
-  f.occupancy_logodds = std::clamp(a.occupancy_logodds + b.occupancy_logodds, -kMostLogodds, kMostLogodds);
+  f.occupancy_logodds = std::clamp(a.occupancy_logodds + b.occupancy_logodds, -kMaxLogodds, kMaxLogodds);
   f.shape = static_cast<std::int16_t>(std::clamp(a.shape + b.shape, -30000, 30000));
   f.votes = static_cast<std::uint16_t>(std::min(a.votes + b.votes, 60000));
   return f;
 }
 
-// One vote less; nothing is left of the last.
-CellSurface doubted(CellSurface rival) {
-  if (rival.votes <= 1) return {};
-  --rival.votes;
-  return rival;
+// Removes one vote; the last one removes the surface.
+CellSurface with_one_vote_less(CellSurface alternative) {
+  if (alternative.votes <= 1) return {};
+  --alternative.votes;
+  return alternative;
 }
 
 }  // namespace
 
-int MapCell::kind() const {
-  if (!surface.seen()) return 0;
-  if (surface.occupancy_logodds <= 0) return 1;
-  return surface.shape >= 0 ? 2 : 3;
+GroundClass MapCell::kind() const {
+  if (!surface.observed()) return GroundClass::unknown;
+  if (surface.occupancy_logodds <= 0) return GroundClass::ground;
+  return surface.shape >= 0 ? GroundClass::obstacle : GroundClass::cavity;
 }
 
-MapCell observed(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion) {
-  if (!observation.seen()) return cell;
+MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion) {
+  if (!observation.observed()) return cell;
   CellSurface seen = observation;
   seen.variance_m2 = std::max(seen.variance_m2, static_cast<float>(fusion.least_variance_m2));
   MapCell next = cell;
-  if (!cell.surface.seen()) {
+  if (!cell.surface.observed()) {
     next.surface = seen;
   } else if (agree(cell.surface, seen, fusion)) {
     next.surface = fused(cell.surface, seen, fusion.least_variance_m2);
-    next.rival = doubted(cell.rival);
-  } else if (!cell.rival.seen()) {
-    next.rival = seen;
-  } else if (agree(cell.rival, seen, fusion)) {
-    next.rival = fused(cell.rival, seen, fusion.least_variance_m2);
-    if (next.rival.variance_m2 <= next.surface.variance_m2) std::swap(next.surface, next.rival);
+    next.alternative = with_one_vote_less(cell.alternative);
+  } else if (!cell.alternative.observed()) {
+    next.alternative = seen;
+  } else if (agree(cell.alternative, seen, fusion)) {
+    next.alternative = fused(cell.alternative, seen, fusion.least_variance_m2);
+    if (next.alternative.variance_m2 <= next.surface.variance_m2) std::swap(next.surface, next.alternative);
   } else {
-    next.rival = doubted(cell.rival);
+    next.alternative = with_one_vote_less(cell.alternative);
   }
   return next;
 }

@@ -1,23 +1,26 @@
-// The 2.5D cell of the global map: what is believed of a piece of ground, and what speaks against it.
+// The 2.5D cell of the global map: its current surface, and an alternative surface of contradicting observations.
 #pragma once
 
 #include <cstdint>
 
+#include "spartan/reconstruction/ground_class.h"
+
 namespace spartan {
 
-/// A surface in a cell, as one or more stops saw it. Elevations are over the submap's anchor.
+/// A surface in a cell, fused from the observations of one or more stops. Elevations are relative to the submap's
+/// anchor.
 struct CellSurface {
   float elevation_m = 0;
-  float variance_m2 = 0;  ///< of elevation_m
+  float variance_m2 = 0;  ///< Variance of elevation_m.
   float lowest_m = 0, highest_m = 0;
-  float count = 0;              ///< points; 0: nothing was seen
-  float occupancy_logodds = 0;  ///< of an obstacle or a cavity
-  std::int32_t stop = -1;       ///< the first that saw it
-  std::int16_t shape = 0;       ///< obstacles seen less cavities seen
-  std::uint16_t votes = 0;      ///< observations
+  float count = 0;              ///< Number of points; 0: not observed.
+  float occupancy_logodds = 0;  ///< Log-odds of an obstacle or a cavity.
+  std::int32_t stop = -1;       ///< The first stop that observed it.
+  std::int16_t shape = 0;       ///< Observations as an obstacle minus observations as a cavity.
+  std::uint16_t votes = 0;      ///< Number of observations.
 
-  bool seen() const { return count > 0; }
-  void raise(float by_m) {
+  bool observed() const { return count > 0; }
+  void shift_elevation(float by_m) {
     elevation_m += by_m;
     lowest_m += by_m;
     highest_m += by_m;
@@ -27,24 +30,25 @@ struct CellSurface {
 
 struct MapCell {
   CellSurface surface;
-  CellSurface rival;  ///< of observations that contradict it
+  CellSurface alternative;  ///< Fused from observations that contradict the surface.
 
-  /// 0 unknown, 1 free, 2 obstacle, 3 cavity. What was never seen is unknown.
-  int kind() const;
+  /// Unobserved cells are unknown, free cells are ground.
+  GroundClass kind() const;
   friend bool operator==(const MapCell&, const MapCell&) = default;
 };
 
-/// When two elevations belong to one surface, and how well one can be known.
+/// Parameters of the fusion of elevations; see GlobalMapOptions.
 struct CellFusion {
   double gate_sigmas = 3;
-  double relief_sigma = 0.15;  ///< what a cell's own relief adds to a difference, over that relief
+  double relief_sigma_ratio = 0.15;  ///< Standard deviation of a cell's elevation over its relief.
   double least_variance_m2 = 4e-6;
 };
 
-/// The cell with one more observation. Within the gate the two fuse by their variances (never to less than the least).
-/// Beyond it the surface stays as it is: the rival takes the observation where the two agree, else loses a vote and is
-/// forgotten with its last one; it takes the surface's place as soon as it is known at least as well. What confirms the
-/// surface costs the rival a vote too. So a variance never rises, and a repeated contradiction wins.
-MapCell observed(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion);
+/// Fuses one observation into a cell. If it passes the gate of the surface, both are fused with inverse-variance
+/// weights (the variance has a lower bound), and the alternative loses a vote. Otherwise the surface does not change:
+/// if the observation passes the gate of the alternative, it is fused into that; if not, the alternative loses a vote.
+/// An alternative without votes is discarded. When its variance is at most that of the surface, the two are swapped. So
+/// a variance never rises, and repeated contradiction replaces the surface.
+MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion);
 
 }  // namespace spartan

@@ -21,66 +21,67 @@ CellSurface seen(float elevation, float variance, std::int32_t stop = 0) {
 }
 
 TEST(MapCell, FusesByVariance) {
-  MapCell cell = observed({}, seen(0.10F, 4e-4F), {});
-  cell = observed(cell, seen(0.12F, 1e-4F, 1), {});
+  MapCell cell = fuse_observation({}, seen(0.10F, 4e-4F), {});
+  cell = fuse_observation(cell, seen(0.12F, 1e-4F, 1), {});
   EXPECT_NEAR(cell.surface.elevation_m, (0.10 * 1 + 0.12 * 4) / 5, 1e-6);
   EXPECT_NEAR(cell.surface.variance_m2, 0.8e-4, 1e-9);
   EXPECT_EQ(cell.surface.count, 10);
-  EXPECT_EQ(cell.surface.stop, 0) << "the first that saw it";
+  EXPECT_EQ(cell.surface.stop, 0) << "the first stop that observed it";
   EXPECT_EQ(cell.surface.votes, 2);
   EXPECT_FLOAT_EQ(cell.surface.lowest_m, 0.10F);
   EXPECT_FLOAT_EQ(cell.surface.highest_m, 0.12F);
   EXPECT_FLOAT_EQ(cell.surface.occupancy_logodds, -2);
-  EXPECT_FALSE(cell.rival.seen());
+  EXPECT_FALSE(cell.alternative.observed());
 }
 
-TEST(MapCell, AnOutlierDoesNotBlurIt) {
-  const MapCell before = observed({}, seen(0.1F, 1e-4F), {});
-  const MapCell after = observed(before, seen(0.4F, 1e-4F), {});
+TEST(MapCell, AnOutlierDoesNotChangeTheSurface) {
+  const MapCell before = fuse_observation({}, seen(0.1F, 1e-4F), {});
+  const MapCell after = fuse_observation(before, seen(0.4F, 1e-4F), {});
   EXPECT_EQ(after.surface, before.surface);
-  EXPECT_FLOAT_EQ(after.rival.elevation_m, 0.4F);
+  EXPECT_FLOAT_EQ(after.alternative.elevation_m, 0.4F);
 }
 
-TEST(MapCell, ConfirmationForgetsTheRival) {
-  MapCell cell = observed({}, seen(0.1F, 1e-4F), {});
-  cell = observed(cell, seen(0.4F, 1e-4F), {});
-  cell = observed(cell, seen(0.1F, 1e-4F), {});
-  EXPECT_FALSE(cell.rival.seen());
+TEST(MapCell, ConfirmationDiscardsTheAlternative) {
+  MapCell cell = fuse_observation({}, seen(0.1F, 1e-4F), {});
+  cell = fuse_observation(cell, seen(0.4F, 1e-4F), {});
+  cell = fuse_observation(cell, seen(0.1F, 1e-4F), {});
+  EXPECT_FALSE(cell.alternative.observed());
 }
 
-TEST(MapCell, ChangesItsMindAfterRepeatedContradiction) {
+TEST(MapCell, RepeatedContradictionReplacesTheSurface) {
   MapCell cell;
-  for (int i = 0; i < 3; ++i) cell = observed(cell, seen(0.1F, 1e-4F), {});
+  for (int i = 0; i < 3; ++i) cell = fuse_observation(cell, seen(0.1F, 1e-4F), {});
   int needed = 0;
   while (cell.surface.elevation_m < 0.3F && needed < 20) {
-    cell = observed(cell, seen(0.4F, 1e-4F, 7), {});
+    cell = fuse_observation(cell, seen(0.4F, 1e-4F, 7), {});
     ++needed;
   }
-  EXPECT_EQ(needed, 3) << "as often as it was confirmed";
+  EXPECT_EQ(needed, 3) << "as many contradictions as there were confirmations";
   EXPECT_EQ(cell.surface.stop, 7);
-  EXPECT_FLOAT_EQ(cell.rival.elevation_m, 0.1F);
+  EXPECT_FLOAT_EQ(cell.alternative.elevation_m, 0.1F);
 }
 
-TEST(MapCell, ItsOwnReliefWidensTheGate) {
+TEST(MapCell, ReliefWidensTheGate) {
   CellSurface rough = seen(0.1F, 1e-4F);
   rough.highest_m = 0.5F;  // 0.15 of 0.4 m is 6 cm
-  const MapCell cell = observed(observed({}, rough, {}), seen(0.25F, 1e-4F), {});
-  EXPECT_FALSE(cell.rival.seen());
-  EXPECT_TRUE(observed(observed({}, seen(0.1F, 1e-4F), {}), seen(0.25F, 1e-4F), {}).rival.seen());
+  const MapCell cell = fuse_observation(fuse_observation({}, rough, {}), seen(0.25F, 1e-4F), {});
+  EXPECT_FALSE(cell.alternative.observed());
+  EXPECT_TRUE(
+      fuse_observation(fuse_observation({}, seen(0.1F, 1e-4F), {}), seen(0.25F, 1e-4F), {}).alternative.observed());
 }
 
-TEST(MapCell, KindFollowsTheEvidence) {
-  EXPECT_EQ(MapCell{}.kind(), 0);
+TEST(MapCell, KindFollowsTheLogOdds) {
+  EXPECT_EQ(MapCell{}.kind(), GroundClass::unknown);
   CellSurface s = seen(0, 1e-4F);
-  EXPECT_EQ((MapCell{s, {}}.kind()), 1);
+  EXPECT_EQ((MapCell{s, {}}.kind()), GroundClass::ground);
   s.occupancy_logodds = 2;
   s.shape = 1;
-  EXPECT_EQ((MapCell{s, {}}.kind()), 2);
+  EXPECT_EQ((MapCell{s, {}}.kind()), GroundClass::obstacle);
   s.shape = -1;
-  EXPECT_EQ((MapCell{s, {}}.kind()), 3);
+  EXPECT_EQ((MapCell{s, {}}.kind()), GroundClass::cavity);
 }
 
-// Any sequence of observations, also of cells that nothing was seen in.
+// Any sequence of observations, empty ones included.
 CellSurface any_observation() {
   CellSurface s = seen(static_cast<float>(*rc::gen::inRange(-30, 30)) * 0.01F,
                        static_cast<float>(*rc::gen::inRange(1, 400)) * 1e-6F);
@@ -94,12 +95,12 @@ RC_GTEST_PROP(MapCell, ObservationsNeverRaiseTheVariance, ()) {
   bool any = false;
   for (int i = *rc::gen::inRange(1, 30); i > 0; --i) {
     const CellSurface observation = any_observation();
-    const MapCell next = observed(cell, observation, {});
-    if (cell.surface.seen()) RC_ASSERT(next.surface.variance_m2 <= cell.surface.variance_m2);
-    any = any || observation.seen();
+    const MapCell next = fuse_observation(cell, observation, {});
+    if (cell.surface.observed()) RC_ASSERT(next.surface.variance_m2 <= cell.surface.variance_m2);
+    any = any || observation.observed();
     cell = next;
-    RC_ASSERT(cell.surface.seen() == any);
-    RC_ASSERT(any || cell.kind() == 0);
+    RC_ASSERT(cell.surface.observed() == any);
+    RC_ASSERT(any || cell.kind() == GroundClass::unknown);
     if (any) RC_ASSERT(cell.surface.variance_m2 >= 4e-6F * 0.999F);
   }
 }

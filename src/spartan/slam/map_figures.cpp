@@ -9,18 +9,18 @@ namespace {
 
 constexpr std::size_t kBins = 1U << 16U;
 
-// The bits of floats that are not negative, as numbers, are in the order of the floats.
+// The bits of non-negative floats, read as integers, have the same order as the floats.
 std::uint32_t bits_of(float value) {
   return std::bit_cast<std::uint32_t>(value);
 }
 
-struct PlaceInBin {
+struct BinIndex {
   std::uint32_t bin = 0;
   std::int64_t index = 0;  // in the bin
 };
 
-// Where the value with this index would lie if all were sorted; there are more of them.
-PlaceInBin find_index(const std::vector<std::int64_t>& counts, std::int64_t index) {
+// The bin that contains the value with this index in sorted order; `counts` sum up to more than the index.
+BinIndex find_index(const std::vector<std::int64_t>& counts, std::int64_t index) {
   std::uint32_t bin = 0;
   for (; index >= counts[bin]; ++bin) index -= counts[bin];
   return {bin, index};
@@ -55,8 +55,9 @@ Result<MapFigures> figures_of(GlobalMap& map, int side) {
   });
   if (!counted) return failure(counted);
   if (figures.known == 0) return figures;
-  // The variances may be too many to keep them: the middle one's upper bits first, then those below.
-  const PlaceInBin middle = find_index(upper, figures.known / 2);
+  // The variances may be too many to store: exact median by two histograms, first of the upper bits, then of the lower
+  // bits of those values that share the median's upper bits.
+  const BinIndex middle = find_index(upper, figures.known / 2);
   const Status found = each_known_cell(map, side, [&](const MapView& view, int c, int r) {
     const std::uint32_t bits = bits_of(view.variance_m2(c, r));
     if (bits / kBins == middle.bin) ++lower[bits % kBins];

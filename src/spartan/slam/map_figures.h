@@ -1,4 +1,4 @@
-// What a global map of any size amounts to.
+// Statistics of a global map of any size.
 #pragma once
 
 #include <array>
@@ -8,15 +8,15 @@
 
 namespace spartan {
 
-/// Of the cells that were seen; all 0 where none was.
+/// Statistics of the observed cells; all 0 where there are none.
 struct MapFigures {
-  std::array<std::int64_t, 4> cells{};  ///< by class (docs/formats.md, "Maps")
-  std::int64_t known = 0;
-  float least_m = 0, most_m = 0;  ///< elevation
-  float median_variance_m2 = 0;   ///< of the elevation; the upper one of an even number
+  std::array<std::int64_t, 4> cells{};  ///< Number of cells by GroundClass.
+  std::int64_t known = 0;               ///< Number of observed cells.
+  float least_m = 0, most_m = 0;        ///< Lowest and highest elevation.
+  float median_variance_m2 = 0;         ///< Of the elevations; the upper of the two middle values of an even number.
 };
 
-/// Looks at pieces of `side` by `side` cells one after the other, each of them twice. Codes: GlobalMap::view's.
+/// Processes windows of at most `side` by `side` cells one after the other, in two passes. Codes: GlobalMap::view's.
 Result<MapFigures> figures_of(GlobalMap& map, int side = 512);
 
 }  // namespace spartan

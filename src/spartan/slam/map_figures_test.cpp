@@ -11,17 +11,17 @@ namespace spartan {
 namespace {
 
 using testing::points_at;
+using testing::pose_on_ground;
 using testing::rocky_ground;
-using testing::standing;
 
-// A stop on rocky ground, every tenth column said to be an obstacle; gives the part of the map that it may have seen.
+// Adds a stop on rocky ground with every tenth column marked as an obstacle; returns the window of its local map.
 LatticeWindow add_stop(GlobalMap& map, double x, double y, double yaw) {
   const auto ground = rocky_ground();
-  const Pose pose = standing(ground, x, y, yaw);
+  const Pose pose = pose_on_ground(ground, x, y, yaw);
   LocalMap local = MapGenerator({}, Workers(1)).generate(points_at(ground, pose, 1), pose);
   for (int r = 0; r < local.size().height; ++r) {
     for (int c = 0; c < local.size().width; c += 10) {
-      local.kind(c, r) = 2;
+      local.kind(c, r) = GroundClass::obstacle;
       local.occupancy_logodds(c, r) = 3;
     }
   }
@@ -29,7 +29,7 @@ LatticeWindow add_stop(GlobalMap& map, double x, double y, double yaw) {
   return window_of(local.place, local.size());
 }
 
-// The same from whole views that do not overlap.
+// The same statistics from views that do not overlap.
 MapFigures expected_figures(GlobalMap& map, const std::vector<LatticeWindow>& windows) {
   MapFigures figures;
   std::vector<float> variances, elevations;
@@ -60,7 +60,7 @@ void expect_same(const MapFigures& a, const MapFigures& b) {
   EXPECT_EQ(a.median_variance_m2, b.median_variance_m2);
 }
 
-TEST(MapFigures, AreThoseOfTheWholeViewForPiecesOfAnySize) {
+TEST(MapStatistics, DoNotDependOnTheSizeOfTheWindows) {
   GlobalMapOptions options;
   options.submap_m = 2;
   GlobalMap map(options, 0.05);
@@ -77,7 +77,7 @@ TEST(MapFigures, AreThoseOfTheWholeViewForPiecesOfAnySize) {
   }
 }
 
-TEST(MapFigures, OfAMapThatIsTooLargeToBeSeenAtOnce) {
+TEST(MapStatistics, OfAMapThatIsTooLargeForOneView) {
   GlobalMap map({}, 0.05);
   const LatticeWindow one = add_stop(map, -3, 2, 0.3), other = add_stop(map, 300, 200, 2);
   ASSERT_GT(map.extent().cells(), GlobalMap::kMostCells);
@@ -87,7 +87,7 @@ TEST(MapFigures, OfAMapThatIsTooLargeToBeSeenAtOnce) {
   expect_same(*figures, expected_figures(map, {one, other}));
 }
 
-TEST(MapFigures, OfAnEmptyMapAreZero) {
+TEST(MapStatistics, OfAnEmptyMapAreZero) {
   GlobalMap map({}, 0.05);
   const auto figures = figures_of(map);
   ASSERT_TRUE(figures);

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 
 constexpr int kApplicationId = 0x53504D50;  // "SPMP"
 
-// Version 1 is what TileStore makes; each later one adds its step here.
+// Version 1 is the schema of TileStore; each later version adds its migration here.
 const std::vector<MapMigration>& steps() {
   static const std::vector<MapMigration> list{{1, "SELECT 1"}};
   return list;
@@ -33,7 +33,7 @@ Status write(GlobalMap& map, const std::string& path) {
   auto store = TileStore::open(*db);
   if (!store) return failure(store);
   if (Status s = map.copy_to(*store); !s) return s;
-  // One file without a log beside it, so that it can be renamed and copied.
+  // The rollback journal leaves a single file without a write-ahead log, so that it can be renamed and copied.
   return db->execute(fmt::format("PRAGMA user_version = {}; COMMIT; PRAGMA journal_mode = DELETE;", steps().back().to));
 }
 
@@ -58,11 +58,12 @@ Result<MapFile> MapFile::open(const std::string& path, const GlobalMapOptions& o
   auto db = std::make_unique<Database>(std::move(*opened));
   const auto id = pragma(*db, "application_id");
   if (!id) return failure(id);
-  if (*id != kApplicationId) return failure(ErrorCode::input, "is not a map", path);
+  if (*id != kApplicationId) return failure(ErrorCode::input, "is not a map file of this program", path);
   const auto version = pragma(*db, "user_version");
   if (!version) return failure(version);
   if (mode == Database::Mode::read_only && *version < steps().back().to)
-    return failure(ErrorCode::configuration, fmt::format("has version {}", *version), path, "open it for writing once");
+    return failure(ErrorCode::configuration, fmt::format("has version {}", *version), path,
+                   "open it once for writing to migrate it");
   if (Status s = migrate(*db, steps()); !s) return failure(s);
   auto store = TileStore::open_existing(*db);
   if (!store) return failure(store);

@@ -1,4 +1,4 @@
-// A global map in a file of its own: SQLite with the tile tables of the run's store.
+// A global map in a file of its own: an SQLite database with the tile tables of a run's store.
 #pragma once
 
 #include <memory>
@@ -10,17 +10,17 @@
 
 namespace spartan {
 
-/// An open map file, and the map in it, paged from it.
+/// An open map file and its map, whose tiles are read from it on demand.
 class MapFile {
  public:
   /// Writes the whole map under a temporary name and renames it; an existing file is replaced. Code `output`.
   static Status save(GlobalMap& map, const std::string& path);
-  /// Codes: `input` (missing, damaged, not a map), `configuration` (newer than this program). Files of older versions
-  /// are brought up to date first, unless they are opened to be read only: then those are refused.
+  /// Codes: `input` (missing, damaged, not a map), `configuration` (of a newer version of the program). Files of older
+  /// versions are migrated first; opened read-only, they are rejected with code `configuration`.
   static Result<MapFile> open(const std::string& path, const GlobalMapOptions& options, Database::Mode mode);
 
   GlobalMap& map() { return *map_; }
-  /// One transaction with everything that has changed.
+  /// Writes all changes in one transaction.
   Status commit();
 
  private:

@@ -1,4 +1,4 @@
-// Where a local map lies in the global one: search, refinement, decision.
+// Registration of a local map to the global map: search, refinement, acceptance tests.
 #pragma once
 
 #include <span>
@@ -13,34 +13,36 @@
 
 namespace spartan {
 
-/// Why a place is believed or not.
+/// Whether a match is accepted, or the reason why not.
 enum class MatchVerdict {
-  decided,
-  no_overlap,  ///< too little ground that both maps know
-  flat,        ///< the ground does not determine all six directions
-  ambiguous,   ///< another place fits nearly as well
-  misfit,      ///< the residuals are larger than the maps' variances allow
-  at_edge,     ///< the best place lies at the edge of what was searched
+  decided,        ///< Accepted: all six degrees of freedom are determined.
+  no_overlap,     ///< The maps overlap too little.
+  flat,           ///< The terrain does not determine all six degrees of freedom.
+  ambiguous,      ///< Another pose fits nearly as well.
+  high_residual,  ///< The residuals are larger than the maps' variances allow ("misfit" in files).
+  at_edge,        ///< The best pose lies outside of the search window.
 };
 std::string_view name_of(MatchVerdict verdict);
 
 struct MapMatch {
   MatchVerdict verdict = MatchVerdict::no_overlap;
-  Pose world_from_body;  ///< the best place found; the given one where there is none
-  /// Of its right perturbation, against the global map as it stands: zero where not decided, but for `flat`, where the
-  /// determined directions have theirs.
+  Pose world_from_body;  ///< The best pose found; the prior pose where there is none.
+  /// Inverse covariance of its right perturbation relative to the global map. Zero where the match is not accepted; for
+  /// `flat` it has the rank of the determined directions.
   Matrix6d information = Matrix6d::Zero();
-  double overlap = 0;  ///< share of the local map's cells that the global map knows
-  int cells = 0, blocks = 0, determined = 0;
-  double misfit = 0;                  ///< of the residuals over what the variances say
-  double sigma_m = 0, sigma_rad = 0;  ///< largest standard deviations of place and attitude
-  double lead = 0;                    ///< sigmas by which the next best place fits worse; infinite where there is none
-  int candidates = 0;
+  double overlap = 0;         ///< Fraction of the local map's cells that the global map has observed.
+  int cells = 0, blocks = 0;  ///< Overlapping cells, and blocks of them.
+  int determined = 0;         ///< Number of determined directions, 0 … 6.
+  double misfit = 0;          ///< Normalized residual: median |r| / (0.6745 σ), 1 where the variances are right.
+  double sigma_m = 0, sigma_rad = 0;  ///< Largest standard deviations of translation and rotation.
+  double lead = 0;     ///< Margin: standard errors by which the next candidate fits worse; infinite without one.
+  int candidates = 0;  ///< Number of refined candidates.
 
   bool decided() const { return verdict == MatchVerdict::decided; }
 };
 
-/// Method: docs/math/map_merging.md. `local` is the map of the points at the given pose.
+/// Matches the points of a stop to the global map. `local` is the local map of the points at the prior pose
+/// `world_from_body`; a cell needs `fewest_points` points. Method: docs/math/map_merging.md.
 MapMatch match_map(std::span<const SurfacePoint> points, const LocalMap& local, const MapView& global,
                    const UncertainPose& world_from_body, int fewest_points, const MatchOptions& options,
                    const Workers& workers);

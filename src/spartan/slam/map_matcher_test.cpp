@@ -15,8 +15,8 @@ using testing::covariance_of;
 using testing::Ground;
 using testing::points_at;
 using testing::pose_at;
+using testing::pose_on_ground;
 using testing::rocky_ground;
-using testing::standing;
 
 struct Scene {
   Pose now;
@@ -34,7 +34,7 @@ Scene scene(const Ground& mapped, const Ground& seen, const Pose& before, const 
 }
 
 Scene scene(const Ground& ground) {
-  return scene(ground, ground, standing(ground, 0, 0, 0), standing(ground, 1, 0.2, 0.1));
+  return scene(ground, ground, pose_on_ground(ground, 0, 0, 0), pose_on_ground(ground, 1, 0.2, 0.1));
 }
 
 Vector6d offset(double dx, double dy, double dz, double roll, double pitch, double yaw) {
@@ -45,15 +45,15 @@ Vector6d offset(double dx, double dy, double dz, double roll, double pitch, doub
 
 MapMatch match(const Scene& s, const Vector6d& off, int threads = 2) {
   const Workers workers(threads);
-  const UncertainPose given{moved(s.now, s.now.translation(), off), covariance_of(0.08, 0.02)};
-  return match_map(s.points, MapGenerator({}, workers).generate(s.points, given.pose), s.global, given, 2, {}, workers);
+  const UncertainPose prior{moved(s.now, s.now.translation(), off), covariance_of(0.08, 0.02)};
+  return match_map(s.points, MapGenerator({}, workers).generate(s.points, prior.pose), s.global, prior, 2, {}, workers);
 }
 
 double distance(const Pose& a, const Pose& b) {
   return (a.inverse() * b).translation().norm();
 }
 
-TEST(MapMatcher, DecidesOnRockyGround) {
+TEST(MapMatcher, AcceptsAMatchOnRockyGround) {
   const Scene s = scene(rocky_ground());
   const MapMatch m = match(s, offset(0.15, -0.1, 0.05, 0.02, -0.01, 0.04));
   EXPECT_EQ(name_of(m.verdict), "decided");
@@ -66,15 +66,15 @@ TEST(MapMatcher, DecidesOnRockyGround) {
   EXPECT_LT(error.dot(m.information * error), 22.5) << "within its own uncertainty";
 }
 
-TEST(MapMatcher, TheSameGroundOverlapsWhollyAndNoMore) {
+TEST(MapMatcher, OverlapOfTheSameGroundIsAboutOne) {
   const Ground ground = rocky_ground();
-  const Pose pose = standing(ground, 0, 0, 0);
+  const Pose pose = pose_on_ground(ground, 0, 0, 0);
   const MapMatch m = match(scene(ground, ground, pose, pose), offset(0.05, 0, 0, 0, 0, 0));
   EXPECT_GT(m.overlap, 0.9);
   EXPECT_LE(m.overlap, 1);
 }
 
-TEST(MapMatcher, IsTheSameForAnyNumberOfThreads) {
+TEST(MapMatcher, IsDeterministicForAnyNumberOfThreads) {
   const Scene s = scene(rocky_ground());
   const Vector6d off = offset(0.1, 0.1, 0, 0, 0, 0.03);
   const MapMatch one = match(s, off, 1), two = match(s, off, 2);
@@ -83,60 +83,60 @@ TEST(MapMatcher, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.lead, two.lead);
 }
 
-TEST(MapMatcher, CannotDecideOnAPlain) {
-  const Ground plain = [](double x, double y) { return 0.05 * x + 0.02 * y; };
+TEST(MapMatcher, RejectsAMatchOnAPlane) {
+  const Ground plane = [](double x, double y) { return 0.05 * x + 0.02 * y; };
   for (const double dx : {0.0, 0.15}) {
-    const MapMatch m = match(scene(plain), offset(dx, 0.1, 0.05, 0.01, 0.01, 0.03));
+    const MapMatch m = match(scene(plane), offset(dx, 0.1, 0.05, 0.01, 0.01, 0.03));
     EXPECT_FALSE(m.decided());
-    // Height and tilt it may know; where on the plain it stands it does not.
+    // Height and tilt may be determined, the position on the plane is not.
     const Matrix6d r = m.information;
     EXPECT_LT(r(0, 0) + r(1, 1), 1e-2 * std::max(r(2, 2), 1.0) + 3e4);
   }
 }
 
-TEST(MapMatcher, AlongDunesOneDirectionStaysOpen) {
+TEST(MapMatcher, OneDirectionIsUndeterminedOnDunes) {
   const Ground dunes = [](double x, double) { return 0.06 * std::sin(2.1 * x) + 0.03 * std::sin(5.3 * x + 1); };
   const MapMatch m = match(scene(dunes), offset(0.1, 0.1, 0.02, 0, 0, 0.02));
   EXPECT_EQ(name_of(m.verdict), "flat");
   EXPECT_EQ(m.determined, 5);
   const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(m.information);
   EXPECT_LT(axes.eigenvalues()[0], 1e-6 * axes.eigenvalues()[5]);
-  // The open direction is along the crests, the world's y.
-  const Eigen::Vector3d open = m.world_from_body.rotation() * axes.eigenvectors().col(0).head<3>();
-  EXPECT_GT(std::abs(open.y()), 0.9);
+  // The undetermined direction is along the crests, the world's y axis.
+  const Eigen::Vector3d undetermined = m.world_from_body.rotation() * axes.eigenvectors().col(0).head<3>();
+  EXPECT_GT(std::abs(undetermined.y()), 0.9);
 }
 
-TEST(MapMatcher, EggBoxIsAmbiguous) {
-  const Ground box = [](double x, double y) { return 0.02 * std::sin(21 * x) * std::sin(21 * y); };
-  const MapMatch m = match(scene(box), offset(0.1, -0.05, 0.02, 0, 0, 0.01));
+TEST(MapMatcher, PeriodicGroundIsAmbiguous) {
+  const Ground egg_box = [](double x, double y) { return 0.02 * std::sin(21 * x) * std::sin(21 * y); };
+  const MapMatch m = match(scene(egg_box), offset(0.1, -0.05, 0.02, 0, 0, 0.01));
   EXPECT_EQ(name_of(m.verdict), "ambiguous");
   EXPECT_TRUE(m.information.isZero());
 }
 
-TEST(MapMatcher, OtherGroundIsNotBelieved) {
+TEST(MapMatcher, RejectsDifferentGround) {
   for (const std::uint64_t seed : {11U, 12U}) {
     const Ground here = rocky_ground(3), there = rocky_ground(seed);
-    const MapMatch m =
-        match(scene(there, here, standing(there, 0, 0, 0), standing(here, 1, 0.2, 0.1)), offset(0.1, 0, 0, 0, 0, 0.02));
+    const MapMatch m = match(scene(there, here, pose_on_ground(there, 0, 0, 0), pose_on_ground(here, 1, 0.2, 0.1)),
+                             offset(0.1, 0, 0, 0, 0, 0.02));
     EXPECT_FALSE(m.decided()) << seed;
   }
 }
 
-TEST(MapMatcher, TooLittleOverlapIsSaid) {
+TEST(MapMatcher, ReportsTooLittleOverlap) {
   const Ground ground = rocky_ground();
-  const MapMatch m =
-      match(scene(ground, ground, standing(ground, 0, 0, 0), standing(ground, 4.2, 0, 0)), offset(0, 0, 0, 0, 0, 0));
+  const MapMatch m = match(scene(ground, ground, pose_on_ground(ground, 0, 0, 0), pose_on_ground(ground, 4.2, 0, 0)),
+                           offset(0, 0, 0, 0, 0, 0));
   EXPECT_EQ(name_of(m.verdict), "no_overlap");
   EXPECT_TRUE(m.information.isZero());
 }
 
-TEST(MapMatcher, AnOffsetBeyondTheWindowIsNotBelieved) {
+TEST(MapMatcher, RejectsAnOffsetOutsideOfTheSearchWindow) {
   const Scene s = scene(rocky_ground());
   EXPECT_FALSE(match(s, offset(0.45, 0, 0, 0, 0, 0)).decided());  // the window ends at 3 · 8 cm
 }
 
-// The whole world, with map and rover, shifted and turned: the answer goes along.
-TEST(MapMatcher, GoesAlongWithTheWorld) {
+// A rigid motion of the whole world, map and rover, moves the result alike.
+TEST(MapMatcher, IsEquivariantToMotionsOfTheWorld) {
   const Ground ground = rocky_ground();
   const Scene here = scene(ground);
   const Vector6d off = offset(0.1, -0.08, 0.03, 0.01, 0, 0.02);
@@ -149,7 +149,7 @@ TEST(MapMatcher, GoesAlongWithTheWorld) {
       const Eigen::Vector3d p = world.inverse() * Eigen::Vector3d(u, v, 0);
       return ground(p.x(), p.y()) + 0.3;
     };
-    const Scene there = scene(elsewhere, elsewhere, world * standing(ground, 0, 0, 0), world * here.now);
+    const Scene there = scene(elsewhere, elsewhere, world * pose_on_ground(ground, 0, 0, 0), world * here.now);
     const MapMatch b = match(there, off);
     ASSERT_TRUE(b.decided());
     const Pose apart = (world * a.world_from_body).inverse() * b.world_from_body;

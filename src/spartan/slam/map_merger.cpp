@@ -17,31 +17,34 @@ Matrix6d symmetric(const Matrix6d& m) {
 
 struct Correction {
   UncertainPose corrected;
-  Matrix6d relative;  // covariance of the corrected pose against the map
+  Matrix6d relative;  // covariance of the corrected pose relative to the map
 };
 
-// The given pose P moved towards the match: best where the errors of pose and map (covariance M) have the part C in
-// common. Their difference has Q = P + M − 2 C, and the gain is K = (P − C)(Q + I⁻¹)⁻¹ for a match of information I.
-Correction moved_towards(const UncertainPose& given, const Pose& match, const Matrix6d& match_information,
-                         const Matrix6d& map_covariance) {
-  const Vector6d offset = log_se3(given.pose.inverse() * match);
-  const Matrix6d from_match = right_jacobian_se3(offset);
-  // Perturbations of the match as perturbations of the given pose: log(P⁻¹ M Exp δ) = offset + J_r⁻¹ δ.
-  const Matrix6d information = from_match.transpose() * match_information * from_match;
-  const Matrix6d own =
-      symmetric(given.covariance * (Matrix6d::Identity() - common_share(given.covariance, map_covariance)));
-  const Matrix6d apart = own + map_covariance - (given.covariance - own);
-  const Matrix6d gain = own * blurred(information, apart);
+// Updates the prior pose (covariance P) by a match of information I with a map of covariance M whose errors are
+// correlated with those of the pose: cross-covariance C. The difference of both has the covariance Q = P + M − 2 C, and
+// the optimal gain is K = (P − C)(Q + I⁻¹)⁻¹.
+Correction updated_by_match(const UncertainPose& prior, const Pose& match, const Matrix6d& match_information,
+                            const Matrix6d& map_covariance) {
+  const Vector6d offset = log_se3(prior.pose.inverse() * match);
+  const Matrix6d jacobian = right_jacobian_se3(offset);
+  // Perturbations of the match as perturbations of the prior pose: log(prior⁻¹ match Exp δ) = offset + J_r⁻¹ δ.
+  const Matrix6d information = jacobian.transpose() * match_information * jacobian;
+  const Matrix6d independent =
+      symmetric(prior.covariance * (Matrix6d::Identity() - common_share(prior.covariance, map_covariance)));
+  const Matrix6d difference = independent + map_covariance - (prior.covariance - independent);
+  const Matrix6d gain = independent * blurred(information, difference);
   const Vector6d step = gain * offset;
-  const Matrix6d turn = right_jacobian_se3(step);
-  const Matrix6d learnt = gain * own.transpose(), unlearnt = gain * apart;
-  return {{given.pose * exp_se3(step), symmetric(turn * (given.covariance - learnt) * turn.transpose())},
-          symmetric(apart - unlearnt - unlearnt.transpose() + learnt)};
+  const Matrix6d jacobian_of_step = right_jacobian_se3(step);
+  const Matrix6d reduction = gain * independent.transpose(), cross = gain * difference;
+  return {{prior.pose * exp_se3(step),
+           symmetric(jacobian_of_step * (prior.covariance - reduction) * jacobian_of_step.transpose())},
+          symmetric(difference - cross - cross.transpose() + reduction)};
 }
 
+// Half side of the part of the global map that a local map can overlap anywhere in the search window.
 double view_reach(const MapOptions& map, const MatchOptions& match) {
   const double half = 0.5 * map.extent_m;
-  return half + match.widest_m + 1.5 * half * std::sin(match.widest_deg * std::numbers::pi / 180);
+  return half + match.max_search_m + 1.5 * half * std::sin(match.max_search_deg * std::numbers::pi / 180);
 }
 
 }  // namespace
@@ -53,14 +56,15 @@ MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, 
       generator_(map_options, workers),
       map_(options.map, map_options.cell_m) {}
 
-// Mean covariance of the stops that mapped the ground under the local map, each carried over to this body rigidly.
+// Covariance of the map under the local map: the mean of the covariances of the stops that observed it, weighted by
+// cells, each transported rigidly to this body frame.
 Matrix6d MapMerger::map_covariance(const MapView& view, const LocalMap& local, const Pose& world_from_body) const {
   std::map<std::int32_t, int> cells;
-  const LatticeWindow ours = window_of(local.place, local.size());
+  const LatticeWindow local_window = window_of(local.place, local.size());
   int all = 0;
-  for (int r = 0; r < ours.height; ++r) {
-    for (int c = 0; c < ours.width; ++c) {
-      const int column = c + ours.west - view.window.west, row = r + view.window.north - ours.north;
+  for (int r = 0; r < local_window.height; ++r) {
+    for (int c = 0; c < local_window.width; ++c) {
+      const int column = c + local_window.west - view.window.west, row = r + view.window.north - local_window.north;
       if (!(local.count(c, r) > 0) || !view.stop.contains(column, row) || view.stop(column, row) < 0) continue;
       ++cells[view.stop(column, row)];
       ++all;
@@ -71,8 +75,8 @@ Matrix6d MapMerger::map_covariance(const MapView& view, const LocalMap& local, c
     const auto stop =
         std::find_if(map_.stops().begin(), map_.stops().end(), [&](const MapStop& s) { return s.id == id; });
     if (stop == map_.stops().end()) continue;
-    const Matrix6d carry = adjoint(world_from_body.inverse() * stop->world_from_body.pose);
-    mean += (static_cast<double>(count) / all) * carry * stop->world_from_body.covariance * carry.transpose();
+    const Matrix6d transport = adjoint(world_from_body.inverse() * stop->world_from_body.pose);
+    mean += (static_cast<double>(count) / all) * transport * stop->world_from_body.covariance * transport.transpose();
   }
   return symmetric(mean);
 }
@@ -93,11 +97,11 @@ Result<MapMergeResult> MapMerger::add(std::span<const SurfacePoint> points, cons
         match_map(points, result.local, *view, world_from_body, map_options_.fewest_points, options_.match, workers_);
     const MapMatch& match = result.match;
     const Matrix6d of_map = map_covariance(*view, result.local, match.world_from_body);
-    Correction moved = moved_towards(world_from_body, match.world_from_body, match.information, of_map);
-    relative = moved.relative;
+    const Correction update = updated_by_match(world_from_body, match.world_from_body, match.information, of_map);
+    relative = update.relative;
     if (!match.information.isZero()) {
       result.constraint = PoseConstraint{stamp, match.world_from_body, match.information, of_map};
-      result.corrected = moved.corrected;
+      result.corrected = update.corrected;
       result.local = generator_.generate(points, result.corrected.pose);
     }
   }
@@ -117,15 +121,17 @@ Bytes MapMerger::save() const {
 Status MapMerger::restore(const Bytes& bytes, TileStore& store) {
   ArchiveReader in(bytes);
   if (const auto version = in.get<std::uint32_t>(); version != kVersion) {
-    return failure(ErrorCode::input, "version " + std::to_string(version) + " instead of " + std::to_string(kVersion),
-                   "map memory", "start the run anew");
+    return failure(ErrorCode::input,
+                   "has version " + std::to_string(version) + ", expected " + std::to_string(kVersion), "map memory",
+                   "restart the run from its beginning");
   }
   const auto submaps = in.get<std::uint64_t>(), stops = in.get<std::uint64_t>(), tiles = in.get<std::uint64_t>();
   if (Status s = in.finish("map memory"); !s) return s;
   auto map = GlobalMap::from_store(options_.map, map_options_.cell_m, store);
   if (!map) return failure(map);
   if (map->submaps().size() != submaps || map->stops().size() != stops || map->tiles() != tiles)
-    return failure(ErrorCode::input, "does not fit the map's tables", "map memory", "start the run anew");
+    return failure(ErrorCode::input, "does not fit the map tables of the store", "map memory",
+                   "restart the run from its beginning");
   map_ = std::move(*map);
   return {};
 }

@@ -1,4 +1,4 @@
-// Map merging: the published sub-module that turns local maps into one global map and corrects the odometry by it.
+// Map merging: fuses local maps into one global map and corrects the pose of the odometry by map matching.
 #pragma once
 
 #include <optional>
@@ -17,37 +17,38 @@
 namespace spartan {
 
 struct MapMergeResult {
-  MapMatch match;           ///< against the global map of the stop before; `no_overlap` where there was none
-  UncertainPose corrected;  ///< world_from_body: the given pose, moved as far as the match says
-  /// What the map alone says: none where it could not decide at all, of less than full rank where only some directions
+  MapMatch match;           ///< Relative to the global map of the previous stops; `no_overlap` where there was none.
+  UncertainPose corrected;  ///< world_from_body: the prior pose updated by the match.
+  /// The constraint of the match alone: none where it was rejected, of less than full rank where only some directions
   /// are determined.
   std::optional<PoseConstraint> constraint;
-  LocalMap local;  ///< at the corrected pose
+  LocalMap local;  ///< At the corrected pose.
 
   bool decided() const { return match.decided(); }
 };
 
-/// The memory is the global map of t−1. Where the match cannot decide, the local map is fused at the given pose, its
-/// cells less certain by that pose's covariance. The first stop stands where it is given and is the map's measure.
+/// Its state is the global map of the stops up to t−1. Where the match is rejected, the local map is fused at the prior
+/// pose, and the variances of its cells are inflated by that pose's covariance. The first stop keeps its prior pose and
+/// defines the map frame. Derivation: docs/math/map_merging.md.
 class MapMerger {
  public:
   MapMerger(const SlamOptions& options, const MapOptions& map_options, const Workers& workers);
 
-  /// The points of one stop, in its body frame. `world_from_body`: where the odometry or the localization believes it
-  /// is. Errors are those of the store that tiles are read from.
+  /// Adds the points of one stop, in its body frame. `world_from_body`: prior pose of the odometry or the localization.
+  /// Errors are those of the store that tiles are read from.
   Result<MapMergeResult> add(std::span<const SurfacePoint> points, const Stamp& stamp,
                              const UncertainPose& world_from_body);
 
   GlobalMap& map() { return map_; }
 
-  /// From now on the map's tiles may live in the store, which must hold this map or be empty. Borrowed.
+  /// From now on tiles of the map may be paged out to the store, which must contain this map or be empty. Borrowed.
   void page_to(TileStore* store) { map_.page_to(store); }
-  /// Writes what has changed into the store, inside the transaction that it is in.
+  /// Writes all changes to the store, inside its current transaction.
   Status flush() { return map_.flush(); }
-  /// What belongs to the flushed tables, versioned.
+  /// The state that belongs to the flushed tables, versioned.
   Bytes save() const;
-  /// The state of `save()` with the tables as they were then. Code `input` where the bytes are damaged, of another
-  /// version, or do not fit the tables.
+  /// Restores the state of `save()` with the tables of that moment. Code `input` where the bytes are damaged, of
+  /// another version, or do not fit the tables.
   Status restore(const Bytes& bytes, TileStore& store);
 
  private:

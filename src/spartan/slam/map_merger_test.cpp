@@ -16,8 +16,8 @@ using testing::covariance_of;
 using testing::Ground;
 using ::testing::HasSubstr;
 using testing::points_at;
+using testing::pose_on_ground;
 using testing::rocky_ground;
-using testing::standing;
 using testing::TemporaryFolder;
 
 Pose off_by(const Pose& pose, double x, double y, double yaw) {
@@ -26,38 +26,38 @@ Pose off_by(const Pose& pose, double x, double y, double yaw) {
   return moved(pose, pose.translation(), eta);
 }
 
-MapMerger merger() {
+MapMerger make_merger() {
   return {SlamOptions(), MapOptions(), Workers(2)};
 }
 
 Pose stop(const Ground& ground, int i) {
-  return standing(ground, 1.0 * i, 0.2 * i, 0.1 * i);
+  return pose_on_ground(ground, 1.0 * i, 0.2 * i, 0.1 * i);
 }
 
-// The i-th stop of a drive, given 10 cm and more than a degree wrong.
+// The i-th stop of a drive, with a prior that is wrong by 10 cm and more than a degree.
 Result<MapMergeResult> visit(MapMerger& to, const Ground& ground, int i) {
   const Pose at = stop(ground, i);
-  const UncertainPose given = i == 0 ? UncertainPose{at, Matrix6d::Zero()}
+  const UncertainPose prior = i == 0 ? UncertainPose{at, Matrix6d::Zero()}
                                      : UncertainPose{off_by(at, 0.08, -0.06, 0.02), covariance_of(0.08, 0.02)};
-  return to.add(points_at(ground, at, static_cast<std::uint64_t>(i) + 1), {100 + i}, given);
+  return to.add(points_at(ground, at, static_cast<std::uint64_t>(i) + 1), {100 + i}, prior);
 }
 
-TEST(MapMerger, TheFirstStopStandsWhereItIsGiven) {
+TEST(MapMerger, TheFirstStopKeepsItsPriorPose) {
   const Ground ground = rocky_ground();
-  MapMerger merging = merger();
-  const auto first = visit(merging, ground, 0);
+  MapMerger merger = make_merger();
+  const auto first = visit(merger, ground, 0);
   ASSERT_TRUE(first);
   EXPECT_FALSE(first->decided());
   EXPECT_FALSE(first->constraint);
   EXPECT_EQ(first->corrected.pose.matrix(), stop(ground, 0).matrix());
-  EXPECT_EQ(merging.map().stops().size(), 1U);
+  EXPECT_EQ(merger.map().stops().size(), 1U);
 }
 
-TEST(MapMerger, TheSecondIsCorrectedAndHandsOnAConstraint) {
+TEST(MapMerger, TheSecondStopIsCorrectedAndGivesAConstraint) {
   const Ground ground = rocky_ground();
-  MapMerger merging = merger();
-  ASSERT_TRUE(visit(merging, ground, 0));
-  const auto second = visit(merging, ground, 1);
+  MapMerger merger = make_merger();
+  ASSERT_TRUE(visit(merger, ground, 0));
+  const auto second = visit(merger, ground, 1);
   ASSERT_TRUE(second);
   EXPECT_TRUE(second->decided());
   const Pose wrong = stop(ground, 1).inverse() * second->corrected.pose;
@@ -66,48 +66,49 @@ TEST(MapMerger, TheSecondIsCorrectedAndHandsOnAConstraint) {
   ASSERT_TRUE(second->constraint);
   EXPECT_EQ(second->constraint->stamp.ns, 101);
   EXPECT_EQ(second->constraint->information, second->constraint->information.transpose());
-  EXPECT_TRUE(second->constraint->map_covariance.isZero()) << "the first stop was certain";
-  EXPECT_EQ(merging.map().stops()[1].world_from_body.pose.matrix(), second->corrected.pose.matrix());
+  EXPECT_TRUE(second->constraint->map_covariance.isZero()) << "the first stop has no covariance";
+  EXPECT_EQ(merger.map().stops()[1].world_from_body.pose.matrix(), second->corrected.pose.matrix());
 }
 
-TEST(MapMerger, TheMapsOwnErrorIsNotLearntAway) {
+TEST(MapMerger, TheCovarianceOfTheMapIsNotReduced) {
   const Ground ground = rocky_ground();
-  MapMerger merging = merger();
+  MapMerger merger = make_merger();
   Matrix6d covariance = covariance_of(0.05, 0.01);
   covariance(0, 5) = covariance(5, 0) = 2e-4;
   const Pose a = stop(ground, 0), b = stop(ground, 1);
-  ASSERT_TRUE(merging.add(points_at(ground, a, 1), {}, {a, covariance}));
-  const Matrix6d carry = adjoint(b.inverse() * a), of_map = carry * covariance * carry.transpose();
+  ASSERT_TRUE(merger.add(points_at(ground, a, 1), {}, {a, covariance}));
+  const Matrix6d transport = adjoint(b.inverse() * a), of_map = transport * covariance * transport.transpose();
   const Matrix6d driven = covariance_of(0.08, 0.02);
-  const auto second = merging.add(points_at(ground, b, 2), {}, {b, of_map + driven});
+  const auto second = merger.add(points_at(ground, b, 2), {}, {b, of_map + driven});
   ASSERT_TRUE(second && second->constraint);
-  EXPECT_LT((second->constraint->map_covariance - of_map).norm(), 0.01 * of_map.norm()) << "rigidly fixed to its stop";
-  // Odometry and match are two measurements of one motion since the first stop.
+  EXPECT_LT((second->constraint->map_covariance - of_map).norm(), 0.01 * of_map.norm())
+      << "transported rigidly from its stop";
+  // Odometry and match are two independent measurements of the motion since the first stop.
   const Matrix6d since = (driven.inverse() + second->match.information).inverse();
   EXPECT_LT((second->corrected.covariance - of_map - since).norm(), 0.02 * of_map.norm());
   EXPECT_LT((second->corrected.covariance - of_map - since).diagonal().norm(), 0.5 * since.norm());
 }
 
-TEST(MapMerger, WithoutADecisionTheGivenPoseStands) {
+TEST(MapMerger, KeepsThePriorPoseWhereTheMatchIsRejected) {
   const Ground ground = rocky_ground(), other = rocky_ground(17);
-  MapMerger merging = merger();
-  ASSERT_TRUE(visit(merging, ground, 0));
-  const Pose at = standing(other, 1, 0.2, 0.1);
-  const auto second = merging.add(points_at(other, at, 2), {}, {at, covariance_of(0.08, 0.02)});
+  MapMerger merger = make_merger();
+  ASSERT_TRUE(visit(merger, ground, 0));
+  const Pose at = pose_on_ground(other, 1, 0.2, 0.1);
+  const auto second = merger.add(points_at(other, at, 2), {}, {at, covariance_of(0.08, 0.02)});
   ASSERT_TRUE(second);
   EXPECT_FALSE(second->decided());
-  EXPECT_EQ(merging.map().stops().size(), 2U) << "it is fused all the same";
-  const bool stands = second->corrected.pose.matrix() == at.matrix();
-  EXPECT_TRUE(second->constraint || stands);
+  EXPECT_EQ(merger.map().stops().size(), 2U) << "the map is fused nevertheless";
+  const bool unchanged = second->corrected.pose.matrix() == at.matrix();
+  EXPECT_TRUE(second->constraint || unchanged);
 }
 
-TEST(MapMerger, UndeterminedDirectionsKeepWhatWasGiven) {
+TEST(MapMerger, UndeterminedDirectionsKeepThePrior) {
   const Ground dunes = [](double x, double) { return 0.06 * std::sin(2.1 * x) + 0.03 * std::sin(5.3 * x + 1); };
-  MapMerger merging = merger();
-  const Pose a = standing(dunes, 0, 0, 0), b = standing(dunes, 1, 0, 0);
-  ASSERT_TRUE(merging.add(points_at(dunes, a, 1), {}, {a, Matrix6d::Zero()}));
-  const UncertainPose given{Pose::from_translation({0.1, 0.07, 0.02}) * b, covariance_of(0.08, 0.01)};
-  const auto second = merging.add(points_at(dunes, b, 2), {}, given);
+  MapMerger merger = make_merger();
+  const Pose a = pose_on_ground(dunes, 0, 0, 0), b = pose_on_ground(dunes, 1, 0, 0);
+  ASSERT_TRUE(merger.add(points_at(dunes, a, 1), {}, {a, Matrix6d::Zero()}));
+  const UncertainPose prior{Pose::from_translation({0.1, 0.07, 0.02}) * b, covariance_of(0.08, 0.01)};
+  const auto second = merger.add(points_at(dunes, b, 2), {}, prior);
   ASSERT_TRUE(second);
   EXPECT_EQ(name_of(second->match.verdict), "flat");
   const Eigen::Vector3d wrong = second->corrected.pose.translation() - b.translation();
@@ -138,40 +139,41 @@ Bytes bytes_of(TileStore& store) {
   return out.take();
 }
 
-TEST(MapMerger, GoesOnAfterSavingAsIfNothingHadHappened) {
+TEST(MapMerger, ResumesAfterSavingWithTheSameResult) {
   const Ground ground = rocky_ground();
   const TemporaryFolder folder;
-  Database straight_db = *Database::open(folder.file("straight"), Database::Mode::create),
+  Database straight_db = *Database::open(folder.file("uninterrupted"), Database::Mode::create),
            db = *Database::open(folder.file("resumed"), Database::Mode::create);
   TileStore straight_store = *TileStore::open(straight_db), store = *TileStore::open(db);
-  MapMerger straight = merger();
-  straight.page_to(&straight_store);
+  MapMerger uninterrupted = make_merger();
+  uninterrupted.page_to(&straight_store);
   for (int i = 0; i < 3; ++i) {
-    ASSERT_TRUE(visit(straight, ground, i));
-    ASSERT_TRUE(straight.flush());
+    ASSERT_TRUE(visit(uninterrupted, ground, i));
+    ASSERT_TRUE(uninterrupted.flush());
   }
   Bytes memory;
   {
-    MapMerger before = merger();
+    MapMerger before = make_merger();
     before.page_to(&store);
     for (int i = 0; i < 2; ++i) {
       ASSERT_TRUE(visit(before, ground, i));
       ASSERT_TRUE(before.flush());
     }
     memory = before.save();
-    ASSERT_TRUE(visit(before, ground, 2)) << "never flushed: lost";
+    ASSERT_TRUE(visit(before, ground, 2)) << "never flushed, so it is lost";
   }
-  MapMerger resumed = merger();
+  MapMerger resumed = make_merger();
   ASSERT_TRUE(resumed.restore(memory, store));
   ASSERT_TRUE(visit(resumed, ground, 2));
   ASSERT_TRUE(resumed.flush());
   EXPECT_EQ(bytes_of(store), bytes_of(straight_store));
-  EXPECT_EQ(resumed.save(), straight.save());
+  EXPECT_EQ(resumed.save(), uninterrupted.save());
 
-  EXPECT_THAT(merger().restore(memory, store).error().message(), HasSubstr("does not fit")) << "the tables went on";
+  EXPECT_THAT(make_merger().restore(memory, store).error().message(), HasSubstr("does not fit"))
+      << "the tables have changed since";
   memory[0] = 7;
-  EXPECT_THAT(merger().restore(memory, store).error().message(), HasSubstr("version 7"));
-  EXPECT_FALSE(merger().restore({}, store));
+  EXPECT_THAT(make_merger().restore(memory, store).error().message(), HasSubstr("version 7"));
+  EXPECT_FALSE(make_merger().restore({}, store));
 }
 
 }  // namespace

@@ -9,11 +9,12 @@
 namespace spartan {
 namespace {
 
-constexpr int kMostSteps = 20;
-constexpr double kStill_m = 5e-4, kStill_rad = 3e-4;
-constexpr double kLeastDrop_m = 0.05;  // of a ray from the eye to a cell
-constexpr double kLeastBlur_m = 0.002, kLeastScale = 0.1;
-constexpr double kDamping = 1e-6;  // of the mean diagonal: keeps directions without slope where they are
+// All empirical.
+constexpr int kMaxIterations = 20;
+constexpr double kConverged_m = 5e-4, kConverged_rad = 3e-4;  // step sizes at convergence
+constexpr double kMinDrop_m = 0.05;                           // vertical distance from the camera to a cell
+constexpr double kMinInflation_m = 0.002, kMinScale = 0.1;  // inflation below which it becomes 0; least residual scale
+constexpr double kDamping = 1e-6;  // relative damping of the diagonal: directions without slope do not move
 
 int known_cells(const Image<float>& elevation_m) {
   int known = 0;
@@ -41,41 +42,42 @@ std::vector<MatchedCell> matched_cells(const SurfaceGrid& local, const SurfaceGr
                                        const ResidualScale& scale, const MatchOptions& options) {
   std::vector<MatchedCell> cells;
   const MapPlace place = global.window.place(global.cell_m);
-  const double k2 = options.robust_sigmas * options.robust_sigmas, rough2 = options.relief_sigma * options.relief_sigma;
+  const double k2 = options.robust_sigmas * options.robust_sigmas,
+               rough2 = options.relief_sigma_ratio * options.relief_sigma_ratio;
   for (int r = 0; r < global.window.height; ++r) {
     for (int c = 0; c < global.window.width; ++c) {
       const float zl = local.elevation_m(c, r), zg = global.elevation_m(c, r);
       if (!std::isfinite(zl) || !std::isfinite(zg)) continue;
-      const Eigen::Vector2f by_local = local.slope(c, r), by_global = global.slope(c, r);
-      if (!by_local.allFinite() || !by_global.allFinite()) continue;
+      const Eigen::Vector2f jacobian_by_local = local.slope(c, r), jacobian_by_global = global.slope(c, r);
+      if (!jacobian_by_local.allFinite() || !jacobian_by_global.allFinite()) continue;
       MatchedCell cell{c, r, static_cast<double>(zl) - zg};
       const double relief2 = static_cast<double>(local.relief_m(c, r)) * local.relief_m(c, r) +
                              static_cast<double>(global.relief_m(c, r)) * global.relief_m(c, r);
       const double variance =
           static_cast<double>(local.variance_m2(c, r)) + global.variance_m2(c, r) + rough2 * relief2;
       cell.sigma_m = std::sqrt(variance);
-      const double s2 = scale.scale * scale.scale * variance + scale.blur_m * scale.blur_m,
+      const double s2 = scale.scale * scale.scale * variance + scale.inflation_m * scale.inflation_m,
                    u2 = cell.residual_m * cell.residual_m / (k2 * s2), robust = 1 / (1 + u2);
       cell.weight = robust * robust / s2;
       cell.curvature = cell.weight * (1 - 3 * u2) * robust;
       const Eigen::Vector2d at = middle_of(place, c, r);
       const Eigen::Vector3d place_m(at.x(), at.y(), 0.5 * (zl + zg));
-      cell.by_local = elevation_jacobian(by_local.cast<double>(), place_m - from.body);
-      cell.by_global = elevation_jacobian(by_global.cast<double>(), place_m - from.body);
-      // A surface moved along the ray by σ / |a_z|, seen at a fixed place.
-      const Eigen::Vector3d ray = place_m - from.eye;
+      cell.jacobian_by_local = elevation_jacobian(jacobian_by_local.cast<double>(), place_m - from.body);
+      cell.jacobian_by_global = elevation_jacobian(jacobian_by_global.cast<double>(), place_m - from.body);
+      // Change of the elevation at a fixed position when the surface moves along the ray by σ / |a_z|.
+      const Eigen::Vector3d ray = place_m - from.camera;
       const double noise = std::sqrt(static_cast<double>(local.variance_m2(c, r)) + global.variance_m2(c, r));
-      const double range_noise = noise / std::max(std::abs(ray.z()), kLeastDrop_m);
+      const double range_noise = noise / std::max(std::abs(ray.z()), kMinDrop_m);
       const Vector6d j = cell.jacobian();
-      cell.common_m = range_noise * j.head<3>().dot(ray);
-      cell.relief_common_m = range_noise * j.head<2>().dot(ray.head<2>());
+      cell.common_error_m = range_noise * j.head<3>().dot(ray);
+      cell.relief_error_m = range_noise * j.head<2>().dot(ray.head<2>());
       cells.push_back(cell);
     }
   }
   return cells;
 }
 
-Eigen::Vector3d eye_of(std::span<const SurfacePoint> points) {
+Eigen::Vector3d ray_origin_of(std::span<const SurfacePoint> points) {
   Eigen::Matrix3d m = Eigen::Matrix3d::Identity() * 1e-9;
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < points.size(); i += std::max<std::size_t>(1, points.size() / 1000)) {
@@ -87,7 +89,7 @@ Eigen::Vector3d eye_of(std::span<const SurfacePoint> points) {
   return m.ldlt().solve(v);
 }
 
-double misfit_of(std::span<const MatchedCell> cells) {
+double median_normalized_residual(std::span<const MatchedCell> cells) {
   std::vector<double> ratios;
   ratios.reserve(cells.size());
   for (const MatchedCell& cell : cells) ratios.push_back(std::abs(cell.residual_m) / cell.sigma_m);
@@ -97,7 +99,7 @@ double misfit_of(std::span<const MatchedCell> cells) {
   return *middle / 0.6745;
 }
 
-std::vector<SurfacePoint> thinned(std::span<const SurfacePoint> points, double side_m) {
+std::vector<SurfacePoint> downsampled(std::span<const SurfacePoint> points, double side_m) {
   struct Sum {
     Eigen::Vector3d place = Eigen::Vector3d::Zero(), along = Eigen::Vector3d::Zero();
     double variance = 0;
@@ -138,16 +140,16 @@ std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, c
                                          const Pose& world_from_body, int fewest_points, const MatchOptions& options) {
   RefinedMatch match;
   match.world_from_body = world_from_body;
-  const Eigen::Vector3d eye = eye_of(points);
-  ResidualScale scale{options.blur_m, 1};
-  for (; match.iterations < kMostSteps; ++match.iterations) {
-    const SurfaceGrid local = throw_on_grid(points, match.world_from_body, global.window, global.cell_m, fewest_points);
-    const Viewpoint from{match.world_from_body.translation(), match.world_from_body * eye};
+  const Eigen::Vector3d camera = ray_origin_of(points);
+  ResidualScale scale{options.elevation_scale_m, 1};
+  for (; match.iterations < kMaxIterations; ++match.iterations) {
+    const SurfaceGrid local = rasterize(points, match.world_from_body, global.window, global.cell_m, fewest_points);
+    const Viewpoint from{match.world_from_body.translation(), match.world_from_body * camera};
     match.cells = matched_cells(local, global, from, scale, options);
-    if (static_cast<int>(match.cells.size()) < options.fewest_cells) return std::nullopt;
-    match.misfit = misfit_of(match.cells);
-    if (match.converged || match.iterations + 1 == kMostSteps) match.known_cells = known_cells(local.elevation_m);
-    if (match.converged) break;  // the cells are those of the pose
+    if (static_cast<int>(match.cells.size()) < options.min_cells) return std::nullopt;
+    match.misfit = median_normalized_residual(match.cells);
+    if (match.converged || match.iterations + 1 == kMaxIterations) match.known_cells = known_cells(local.elevation_m);
+    if (match.converged) break;  // after the cells have been computed at the final pose
     Matrix6d normal = Matrix6d::Zero();
     Vector6d gradient = Vector6d::Zero();
     for (const MatchedCell& cell : match.cells) {
@@ -159,10 +161,11 @@ std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, c
     const Vector6d step = -normal.ldlt().solve(gradient);
     if (!step.allFinite()) return std::nullopt;
     match.world_from_body = moved(match.world_from_body, from.body, step);
-    match.converged = scale.blur_m == 0 && step.head<3>().norm() < kStill_m && step.tail<3>().norm() < kStill_rad;
+    match.converged =
+        scale.inflation_m == 0 && step.head<3>().norm() < kConverged_m && step.tail<3>().norm() < kConverged_rad;
     if (!match.converged) {
-      if (scale.blur_m == 0) scale.scale = std::clamp(match.misfit, kLeastScale, 1.0);
-      scale.blur_m = scale.blur_m > kLeastBlur_m ? 0.5 * scale.blur_m : 0;
+      if (scale.inflation_m == 0) scale.scale = std::clamp(match.misfit, kMinScale, 1.0);
+      scale.inflation_m = scale.inflation_m > kMinInflation_m ? 0.5 * scale.inflation_m : 0;
     }
   }
   return match;

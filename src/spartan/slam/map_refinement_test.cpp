@@ -11,14 +11,14 @@ namespace {
 using testing::Ground;
 using testing::numeric_jacobian;
 using testing::points_at;
+using testing::pose_on_ground;
 using testing::rocky_ground;
-using testing::standing;
 
 double hills(double x, double y) {
   return 0.1 * std::sin(1.3 * x + 0.4) * std::cos(0.9 * y) + 0.05 * x;
 }
 
-// Height over a place of the hills moved by η about c: the point of the hills that comes to lie there, by iteration.
+// Elevation at a fixed position of the hills moved by η about c, by fixed-point iteration.
 double moved_height(const Eigen::Vector3d& c, const Vector6d& eta, double x, double y) {
   Eigen::Vector2d from(x, y);
   double z = 0;
@@ -31,7 +31,7 @@ double moved_height(const Eigen::Vector3d& c, const Vector6d& eta, double x, dou
   return z;
 }
 
-TEST(MapRefinement, JacobianIsThatOfAMovedSurface) {
+TEST(MapRefinement, JacobianEqualsTheNumericOneOfAMovedSurface) {
   const Eigen::Vector3d c(0.4, -0.3, 0.2);
   for (const Eigen::Vector2d& at : {Eigen::Vector2d(1, 2), {-1.5, 0.3}, {0.4, -2.2}}) {
     const auto numeric = numeric_jacobian<1, 6>(
@@ -45,13 +45,13 @@ TEST(MapRefinement, JacobianIsThatOfAMovedSurface) {
   }
 }
 
-TEST(MapRefinement, EyeIsWhereTheRaysMeet) {
+TEST(MapRefinement, RayOriginIsTheCameraCentre) {
   const Ground ground = rocky_ground();
-  const Eigen::Vector3d eye = eye_of(points_at(ground, standing(ground, 1, 2, 0.3), 1));
-  EXPECT_LT((eye - Eigen::Vector3d(0, 0, 1)).norm(), 1e-4);
+  const Eigen::Vector3d camera = ray_origin_of(points_at(ground, pose_on_ground(ground, 1, 2, 0.3), 1));
+  EXPECT_LT((camera - Eigen::Vector3d(0, 0, 1)).norm(), 1e-4);
 }
 
-TEST(MapRefinement, ThinnedPointsAreMeansOfTheirSquares) {
+TEST(MapRefinement, DownsampledPointsAreTheMeansOfTheirSquares) {
   std::vector<SurfacePoint> points;
   points.reserve(5);
   for (int i = 0; i < 4; ++i) {
@@ -59,14 +59,14 @@ TEST(MapRefinement, ThinnedPointsAreMeansOfTheirSquares) {
         {{0.001F * static_cast<float>(i), 0, 0.1F * static_cast<float>(i)}, 0.01F, {0, 0, -1}, GroundClass::ground});
   }
   points.push_back({{1, 1, 1}, 0.02F, {0, 0, -1}, GroundClass::ground});
-  const auto means = thinned(points, 0.0125);
+  const auto means = downsampled(points, 0.0125);
   ASSERT_EQ(means.size(), 2U);
   EXPECT_NEAR(means[0].in_body.z(), 0.15, 1e-6);
   EXPECT_NEAR(means[0].sigma_m, 0.01, 1e-7);
-  EXPECT_TRUE(thinned({}, 0.01).empty());
+  EXPECT_TRUE(downsampled({}, 0.01).empty());
 }
 
-TEST(MapRefinement, WeightsAreTheDerivativesOfTheRobustCost) {
+TEST(MapRefinement, WeightsAreDerivativesOfTheRobustCost) {
   const LatticeWindow window = window_around(0, 0, 1, 0.05);
   const auto grid = [&](double height) {
     SurfaceGrid g;
@@ -86,15 +86,15 @@ TEST(MapRefinement, WeightsAreTheDerivativesOfTheRobustCost) {
     EXPECT_NEAR(cells[0].weight * rf, (cost(rf + h) - cost(rf - h)) / (2 * h),
                 1e-3 * std::abs(cells[0].weight * rf) + 1e-6);
     EXPECT_NEAR(cells[0].curvature, (cost(rf + h) - 2 * cost(rf) + cost(rf - h)) / (h * h), 1e-3 * cells[0].weight);
-    // The eye is 1 m up: a shift of the range by σ / |a_z| lifts level ground by σ, everywhere.
-    EXPECT_NEAR(std::abs(cells[0].common_m), std::sqrt(2e-4), 2e-3);
-    EXPECT_NEAR(cells[0].relief_common_m, 0, 1e-9) << "level ground has no relief";
+    // The camera is 1 m high: a range error of σ / |a_z| raises level ground by σ everywhere.
+    EXPECT_NEAR(std::abs(cells[0].common_error_m), std::sqrt(2e-4), 2e-3);
+    EXPECT_NEAR(cells[0].relief_error_m, 0, 1e-9) << "level ground has no relief";
   }
 }
 
-TEST(MapRefinement, ComesBackFromAnOffset) {
+TEST(MapRefinement, ConvergesFromAnOffset) {
   const Ground ground = rocky_ground();
-  const Pose before = standing(ground, 0, 0, 0), now = standing(ground, 1, 0.2, 0.1);
+  const Pose before = pose_on_ground(ground, 0, 0, 0), now = pose_on_ground(ground, 1, 0.2, 0.1);
   const SurfaceGrid global = grid_of(MapGenerator({}, Workers(1)).generate(points_at(ground, before, 1), before));
   Vector6d eta;
   eta << 0.03, -0.02, 0.02, 0.01, -0.01, 0.015;
@@ -106,9 +106,9 @@ TEST(MapRefinement, ComesBackFromAnOffset) {
   EXPECT_LT(rotation_angle(wrong), 0.001);
 }
 
-TEST(MapRefinement, NothingToGoByIsNoAnswer) {
+TEST(MapRefinement, GivesNothingWithoutOverlap) {
   const Ground ground = rocky_ground();
-  const Pose before = standing(ground, 0, 0, 0), far = standing(ground, 30, 0, 0);
+  const Pose before = pose_on_ground(ground, 0, 0, 0), far = pose_on_ground(ground, 30, 0, 0);
   const SurfaceGrid global = grid_of(MapGenerator({}, Workers(1)).generate(points_at(ground, before, 1), before));
   EXPECT_FALSE(refine_match(points_at(ground, far, 2), global, far, 2, {}));
 }

@@ -1,4 +1,4 @@
-// What speaks for a match: how certain it is, direction by direction, and how far ahead of another one.
+// Covariance of a map match, and its cost for the comparison with other candidates.
 #pragma once
 
 #include <span>
@@ -7,19 +7,23 @@
 
 namespace spartan {
 
-/// Of a refined match, from blocks of cells that err on their own (docs/math/map_merging.md, "Information").
-struct MatchEvidence {
+/// Covariance of a refined match from blocks of cells with independent errors (docs/math/map_merging.md,
+/// "Information").
+struct MatchCovariance {
   int cells = 0, blocks = 0;
-  double misfit = 0;  ///< median |residual| / (0.6745 σ): 1 where the variances say the truth
-  /// Inverse covariance of η = (t, θ) about the centre that the cells were made with, by the block jackknife; zero in
+  double misfit = 0;  ///< Normalized residual: median |residual| / (0.6745 σ), 1 where the variances are right.
+  /// Inverse covariance of η = (t, θ) about the centre of the cells' Jacobians, by the block jackknife; zero in
   /// directions that are not determined.
   Matrix6d information = Matrix6d::Zero();
-  int determined = 0;                 ///< directions with information
-  double sigma_m = 0, sigma_rad = 0;  ///< largest standard deviations of place and attitude, believed or not
+  int determined = 0;                 ///< Number of directions with information.
+  double sigma_m = 0, sigma_rad = 0;  ///< Largest standard deviations of translation and rotation; infinite where a
+                                      ///< direction has no significant curvature.
 };
-MatchEvidence weigh(std::span<const MatchedCell> cells, double cell_m, const MatchOptions& options);
+MatchCovariance estimate_match_covariance(std::span<const MatchedCell> cells, double cell_m,
+                                          const MatchOptions& options);
 
-/// Mean robust cost u²/(1 + u²) of the cells, u = residual / (k scale σ), and its variance by blocks.
+/// Mean robust cost u²/(1 + u²) of the cells, u = residual / (k scale σ), k = robust_sigmas, and its variance from
+/// blocks.
 struct MatchCost {
   double mean = 1, variance = 0;
 };

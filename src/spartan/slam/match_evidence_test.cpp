@@ -35,8 +35,8 @@ Drawn draw(Random& random, double slope, double slope_noise, double across = 1) 
       cell.sigma_m = kNoise_m;
       cell.weight = cell.curvature = 1 / (kNoise_m * kNoise_m);
       cell.residual_m = kNoise_m * random.normal();
-      cell.by_local = elevation_jacobian(seen(), at);
-      cell.by_global = elevation_jacobian(seen(), at);
+      cell.jacobian_by_local = elevation_jacobian(observed(), at);
+      cell.jacobian_by_global = elevation_jacobian(observed(), at);
       const Vector6d j = cell.jacobian();
       normal += j * j.transpose();
       right += cell.residual_m * j;
@@ -48,85 +48,86 @@ Drawn draw(Random& random, double slope, double slope_noise, double across = 1) 
   return drawn;
 }
 
-TEST(MatchEvidence, CovarianceIsThatOfTheErrors) {
+TEST(MatchCovariance, IsConsistentWithTheErrors) {
   MatchOptions options;
-  options.common_share = 0;
+  options.common_error_ratio = 0;
   Random random(5);
   double nees = 0;
   constexpr int kDraws = 40;
   for (int i = 0; i < kDraws; ++i) {
     const Drawn drawn = draw(random, 0.1, 0);
-    const MatchEvidence evidence = weigh(drawn.cells, 0.05, options);
-    ASSERT_EQ(evidence.determined, 6);
-    EXPECT_NEAR(evidence.misfit, 1, 0.05);
-    nees += drawn.error.dot(evidence.information * drawn.error) / kDraws;
+    const MatchCovariance covariance = estimate_match_covariance(drawn.cells, 0.05, options);
+    ASSERT_EQ(covariance.determined, 6);
+    EXPECT_NEAR(covariance.misfit, 1, 0.05);
+    nees += drawn.error.dot(covariance.information * drawn.error) / kDraws;
   }
-  // Mean of χ² with 6 degrees of freedom over 40 draws: 6 ± 0.55; blocks of 64 make it some percent wider.
+  // Mean of χ² with 6 degrees of freedom over 40 draws: 6 ± 0.55; with 64 blocks it is a few percent wider.
   EXPECT_GT(nees, 4.3);
   EXPECT_LT(nees, 7.9);
 }
 
-TEST(MatchEvidence, NoiseOfTheSlopesIsNotRelief) {
+TEST(MatchCovariance, NoiseOfTheSlopesIsNotRelief) {
   Random random(6);
   const MatchOptions options;
-  // With noise alone the curvature along x and y may come out either way, but the directions stay undetermined.
+  // With noise alone the curvature along x and y may have either sign, but the directions are undetermined.
   for (int i = 0; i < 5; ++i) {
-    const MatchEvidence evidence = weigh(draw(random, 0, 0.05).cells, 0.05, options);
-    EXPECT_LE(evidence.determined, 4) << "height, roll and pitch, and at most one by chance";
-    // The horizontal is not among what is known.
-    EXPECT_LT(evidence.information(0, 0), 1e-2 * evidence.information(2, 2));
+    const MatchCovariance covariance = estimate_match_covariance(draw(random, 0, 0.05).cells, 0.05, options);
+    EXPECT_LE(covariance.determined, 4) << "height, roll and pitch, and at most one by chance";
+    // The horizontal directions are not determined.
+    EXPECT_LT(covariance.information(0, 0), 1e-2 * covariance.information(2, 2));
   }
 }
 
-TEST(MatchEvidence, AlongARidgeNothingIsKnown) {
+TEST(MatchCovariance, HasNoInformationAlongARidge) {
   Random random(7);
-  const MatchEvidence evidence = weigh(draw(random, 0.1, 0, 0).cells, 0.05, {});
-  EXPECT_EQ(evidence.determined, 5);
+  const MatchCovariance covariance = estimate_match_covariance(draw(random, 0.1, 0, 0).cells, 0.05, {});
+  EXPECT_EQ(covariance.determined, 5);
   Vector6d along = Vector6d::Zero();
   along[1] = 1;
-  EXPECT_LT(along.dot(evidence.information * along), 1e-3 * evidence.information(0, 0));
+  EXPECT_LT(along.dot(covariance.information * along), 1e-3 * covariance.information(0, 0));
 }
 
-TEST(MatchEvidence, OneStoneIsNotEnough) {
+TEST(MatchCovariance, OneStoneDoesNotDetermineAllDirections) {
   Random random(8);
   Drawn drawn = draw(random, 0, 0);
   for (MatchedCell& cell : drawn.cells) {
     if (cell.row < 20 || cell.row >= 26 || cell.column < 20 || cell.column >= 26) continue;
     const Eigen::Vector2d slope(random.normal(), random.normal());
-    cell.by_local = cell.by_global = elevation_jacobian(slope, {0, 0, 0});
+    cell.jacobian_by_local = cell.jacobian_by_global = elevation_jacobian(slope, {0, 0, 0});
   }
-  EXPECT_LT(weigh(drawn.cells, 0.05, {}).determined, 6);
+  EXPECT_LT(estimate_match_covariance(drawn.cells, 0.05, {}).determined, 6);
 }
 
-TEST(MatchEvidence, CommonErrorsWidenIt) {
+TEST(MatchCovariance, CommonErrorsInflateIt) {
   Random random(9);
   Drawn drawn = draw(random, 0.1, 0);
-  for (MatchedCell& cell : drawn.cells) cell.common_m = 0.02;
+  for (MatchedCell& cell : drawn.cells) cell.common_error_m = 0.02;
   MatchOptions alone;
-  alone.common_share = 0;
-  const MatchEvidence without = weigh(drawn.cells, 0.05, alone), with = weigh(drawn.cells, 0.05, {});
-  // Level areas of 1.5 m that rise together by 22 mm, nine of them: the height alone is wrong by 22 / 3 mm.
+  alone.common_error_ratio = 0;
+  const MatchCovariance without = estimate_match_covariance(drawn.cells, 0.05, alone),
+                        with = estimate_match_covariance(drawn.cells, 0.05, {});
+  // Nine level areas of 1.5 m, each with a common error of 22 mm: the standard deviation of the height is 22 / 3 mm.
   EXPECT_LT(without.information.inverse()(2, 2), 1e-6);
   EXPECT_NEAR(std::sqrt(with.information.inverse()(2, 2)), 0.022 / 3, 0.004);
 }
 
-TEST(MatchEvidence, ReliefThatStandsOffIsUncertainAsAWhole) {
+TEST(MatchCovariance, FrontoParallelBiasInflatesItWithoutChangingTheRank) {
   Random random(10);
   Drawn drawn = draw(random, 0.1, 0);
-  // All relief 1 cm farther ahead: what the residuals of a shift along x by 1 cm are.
-  for (MatchedCell& cell : drawn.cells) cell.relief_common_m = 0.01 * cell.jacobian()[0];
+  // All relief is biased by 1 cm along x: the residuals are those of a translation by 1 cm.
+  for (MatchedCell& cell : drawn.cells) cell.relief_error_m = 0.01 * cell.jacobian()[0];
   MatchOptions options;
-  options.relief_share = 0;
-  const MatchEvidence without = weigh(drawn.cells, 0.05, options);
-  options.relief_share = 1;
-  const MatchEvidence with = weigh(drawn.cells, 0.05, options);
-  EXPECT_EQ(with.determined, without.determined) << "it decides nothing";
+  options.relief_error_ratio = 0;
+  const MatchCovariance without = estimate_match_covariance(drawn.cells, 0.05, options);
+  options.relief_error_ratio = 1;
+  const MatchCovariance with = estimate_match_covariance(drawn.cells, 0.05, options);
+  EXPECT_EQ(with.determined, without.determined) << "the bias does not change which directions are determined";
   const Matrix6d more = with.information.inverse() - without.information.inverse();
   EXPECT_NEAR(std::sqrt(more(0, 0)), 0.01, 0.001);
   EXPECT_LT(std::sqrt(more(1, 1)), 0.001);
 }
 
-TEST(MatchEvidence, AFewUnequalStonesOnLevelGroundAreEnough) {
+TEST(MatchCovariance, AFewDifferentStonesDetermineAllDirections) {
   Random random(11);
   Drawn drawn = draw(random, 0, 0.01);
   for (MatchedCell& cell : drawn.cells) {
@@ -134,9 +135,10 @@ TEST(MatchEvidence, AFewUnequalStonesOnLevelGroundAreEnough) {
     if (!steep && !low) continue;
     const double slope = steep ? 1 : 0.5;
     const Eigen::Vector3d at((cell.column - 40) * 0.05 + 1, (40 - cell.row) * 0.05, 0);
-    cell.by_local = cell.by_global = elevation_jacobian({slope * random.normal(), slope * random.normal()}, at);
+    cell.jacobian_by_local = cell.jacobian_by_global =
+        elevation_jacobian({slope * random.normal(), slope * random.normal()}, at);
   }
-  EXPECT_EQ(weigh(drawn.cells, 0.05, {}).determined, 6);
+  EXPECT_EQ(estimate_match_covariance(drawn.cells, 0.05, {}).determined, 6);
 }
 
 TEST(MatchCost, IsTheMeanOfTheCells) {
@@ -150,7 +152,7 @@ TEST(MatchCost, IsTheMeanOfTheCells) {
   options.block_m = 0.5;
   const MatchCost cost = cost_of(cells, 0.05, 1, options);  // k σ = 3 cm: a cost of a half for every second cell
   EXPECT_NEAR(cost.mean, 0.25, 1e-12);
-  // 40 blocks of 10 cells, each 0.25 off the mean.
+  // 40 blocks of 10 cells, each with a mean that deviates by 0.25.
   EXPECT_NEAR(cost.variance, 0.0625 / 39, 1e-9);
 }
 

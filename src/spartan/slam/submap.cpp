@@ -27,27 +27,27 @@ CellSurface get_surface(ArchiveReader& in) {
 
 }  // namespace
 
-std::optional<LatticeStep> Submap::step(double cell_m) const {
+std::optional<LatticeOffset> Submap::lattice_offset(double cell_m) const {
   const Eigen::Vector3d& t = world_from_submap.translation();
   if (world_from_submap.rotation().vec().cwiseAbs().maxCoeff() > 1e-12) return std::nullopt;
   const double x = std::round(t.x() / cell_m), y = std::round(t.y() / cell_m);
   if (std::abs(x * cell_m - t.x()) > 1e-6 || std::abs(y * cell_m - t.y()) > 1e-6) return std::nullopt;
-  return LatticeStep{static_cast<int>(x), static_cast<int>(y)};
+  return LatticeOffset{static_cast<int>(x), static_cast<int>(y)};
 }
 
 Bytes to_bytes(const Tile& tile) {
   ArchiveWriter out;
   out.put(kVersion);
   std::uint32_t seen = 0;
-  for (const MapCell& cell : tile.cells) seen += cell.surface.seen() ? 1 : 0;
+  for (const MapCell& cell : tile.cells) seen += cell.surface.observed() ? 1 : 0;
   out.put(seen);
   for (std::size_t i = 0; i < tile.cells.size(); ++i) {
     const MapCell& cell = tile.cells[i];
-    if (!cell.surface.seen()) continue;
+    if (!cell.surface.observed()) continue;
     out.put(static_cast<std::uint16_t>(i));
-    out.put(cell.rival.seen());
+    out.put(cell.alternative.observed());
     put(out, cell.surface);
-    if (cell.rival.seen()) put(out, cell.rival);
+    if (cell.alternative.observed()) put(out, cell.alternative);
   }
   return out.take();
 }
@@ -56,18 +56,19 @@ Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
   ArchiveReader in(bytes);
   const auto version = in.get<std::uint32_t>();
   if (version != kVersion) {
-    return failure(ErrorCode::input, "version " + std::to_string(version) + " instead of " + std::to_string(kVersion),
-                   what, "make the map anew");
+    return failure(ErrorCode::input,
+                   "has version " + std::to_string(version) + ", expected " + std::to_string(kVersion), what,
+                   "rebuild the map");
   }
   Tile tile;
   const auto seen = in.get<std::uint32_t>();
-  if (seen > tile.cells.size()) return failure(ErrorCode::input, "damaged", what, "make the map anew");
+  if (seen > tile.cells.size()) return failure(ErrorCode::input, "is damaged", what, "rebuild the map");
   for (std::uint32_t i = 0; i < seen; ++i) {
     const auto index = in.get<std::uint16_t>();
-    if (index >= tile.cells.size()) return failure(ErrorCode::input, "damaged", what, "make the map anew");
+    if (index >= tile.cells.size()) return failure(ErrorCode::input, "is damaged", what, "rebuild the map");
     const bool has_rival = in.get<bool>();
     tile.cells[index].surface = get_surface(in);
-    if (has_rival) tile.cells[index].rival = get_surface(in);
+    if (has_rival) tile.cells[index].alternative = get_surface(in);
   }
   if (Status status = in.finish(what); !status) return failure(status);
   return tile;

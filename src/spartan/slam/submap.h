@@ -1,4 +1,4 @@
-// Submaps: pieces of the global map that hang on a pose, made of tiles of cells.
+// Submaps: parts of the global map with an anchor pose each, stored as tiles of cells.
 #pragma once
 
 #include <array>
@@ -14,21 +14,23 @@
 
 namespace spartan {
 
-/// Gravity-aligned. Its cells hold x in [c s, (c + 1) s) and y in [r s, (r + 1) s) of the submap's own frame, s their
-/// side; a newly made anchor is not turned and stands on the world's lattice, so that world and submap have the same
-/// cells. Moving the anchor moves all of them and rewrites none.
-struct LatticeStep {
+/// Translation in whole cells.
+struct LatticeOffset {
   int x = 0, y = 0;
 };
+
+/// A gravity-aligned submap. Its cells cover x in [c s, (c + 1) s) and y in [r s, (r + 1) s) of the submap frame, s the
+/// cell size. A new anchor has no rotation and lies on the world lattice, so that the cells of world and submap
+/// coincide. Moving the anchor moves all cells without rewriting them.
 struct Submap {
   std::int32_t id = 0;
   Pose world_from_submap;
 
-  /// Cells of the lattice from the world's to the submap's origin; none where the anchor is turned or off the lattice.
-  std::optional<LatticeStep> step(double cell_m) const;
+  /// Offset in cells of the submap's origin from the world's; none where the anchor is rotated or off the lattice.
+  std::optional<LatticeOffset> lattice_offset(double cell_m) const;
 };
 
-/// A stop that the map was made from: where it was put, and how well that is known (right perturbation).
+/// A stop that was fused into the map, with its corrected pose (covariance of the right perturbation).
 struct MapStop {
   std::int32_t id = 0;
   Stamp stamp;
@@ -40,10 +42,10 @@ struct TileKey {
   friend auto operator<=>(const TileKey&, const TileKey&) = default;
 };
 
-/// A square of cells: those with x in [kSide · key.x, kSide · (key.x + 1)) of the submap's, and y alike.
+/// A square of cells: columns [kSide · key.x, kSide · (key.x + 1)) of the submap, and rows alike.
 struct Tile {
   static constexpr int kSide = 32;
-  /// The tile that a cell of the submap lies in.
+  /// Index of the tile that contains a cell of the submap.
   static constexpr int of(int cell) { return cell >= 0 ? cell / kSide : -((kSide - 1 - cell) / kSide); }
   std::array<MapCell, kSide * kSide> cells;
 
@@ -52,9 +54,9 @@ struct Tile {
   friend bool operator==(const Tile&, const Tile&) = default;
 };
 
-/// Only the cells that were seen. Versioned.
+/// Serializes the observed cells only. Versioned.
 Bytes to_bytes(const Tile& tile);
-/// Code `input` where the bytes are of another version or damaged; `what` names them.
+/// Code `input` where the bytes are of another version or damaged; `what` names them in the error.
 Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what);
 
 }  // namespace spartan

@@ -9,7 +9,7 @@ namespace spartan {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kLeastSigma_m = 0.001;
+constexpr double kMinSigma_m = 0.001;  // as the map generator's
 
 SurfaceGrid empty_grid(const LatticeWindow& window, double cell_m) {
   SurfaceGrid grid;
@@ -17,11 +17,11 @@ SurfaceGrid empty_grid(const LatticeWindow& window, double cell_m) {
   grid.cell_m = cell_m;
   for (Image<float>* layer : {&grid.elevation_m, &grid.variance_m2, &grid.relief_m})
     *layer = Image<float>(window.width, window.height, kNaN);
-  grid.evidence = Image<float>(window.width, window.height, 0.0F);
+  grid.occupancy = Image<float>(window.width, window.height, 0.0F);
   return grid;
 }
 
-// Difference over the step between two neighbours of a cell, of which one may be missing.
+// Finite difference between two neighbours of a cell, of which one may be unknown.
 float difference(float before, float here, float after, float step) {
   const bool has_before = std::isfinite(before), has_after = std::isfinite(after);
   if (has_before && has_after) return (after - before) / (2 * step);
@@ -49,25 +49,25 @@ float SurfaceGrid::elevation_at(double x_m, double y_m) const {
   return (1 - b) * ((1 - a) * above[0] + a * above[1]) + b * ((1 - a) * below[0] + a * below[1]);
 }
 
-SurfaceGrid throw_on_grid(std::span<const SurfacePoint> points, const Pose& world_from_body,
-                          const LatticeWindow& window, double cell_m, int fewest_points) {
+SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_from_body, const LatticeWindow& window,
+                      double cell_m, int fewest_points) {
   struct Cell {
     double weights = 0, sum = 0;
     float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
     int count = 0;
   };
-  // Counted from the window's corner: floats are fine enough there.
+  // Coordinates are relative to the window's corner, where single precision is sufficient.
   const Eigen::Vector3d corner(window.west * cell_m, window.north * cell_m, 0);
-  const Eigen::Matrix3f turn = world_from_body.rotation_matrix().cast<float>();
-  const Eigen::Vector3f shift = (world_from_body.translation() - corner).cast<float>();
+  const Eigen::Matrix3f rotation = world_from_body.rotation_matrix().cast<float>();
+  const Eigen::Vector3f translation = (world_from_body.translation() - corner).cast<float>();
   const float per_m = static_cast<float>(1 / cell_m);
   std::vector<Cell> cells(static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height));
   for (const SurfacePoint& point : points) {
-    const Eigen::Vector3f p = turn * point.in_body + shift;
+    const Eigen::Vector3f p = rotation * point.in_body + translation;
     const int column = static_cast<int>(std::floor(p.x() * per_m)), row = static_cast<int>(std::floor(-p.y() * per_m));
     if (column < 0 || row < 0 || column >= window.width || row >= window.height) continue;
     const double sigma =
-        std::max(static_cast<double>(std::abs(turn.row(2).dot(point.along)) * point.sigma_m), kLeastSigma_m);
+        std::max(static_cast<double>(std::abs(rotation.row(2).dot(point.along)) * point.sigma_m), kMinSigma_m);
     Cell& cell = cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(window.width) +
                        static_cast<std::size_t>(column)];
     const double weight = 1 / (sigma * sigma);
@@ -99,14 +99,14 @@ SurfaceGrid grid_of(const LocalMap& map) {
       grid.elevation_m(c, r) = map.elevation_m(c, r);
       grid.variance_m2(c, r) = map.variance_m2(c, r);
       grid.relief_m(c, r) = map.elevation_max_m(c, r) - map.elevation_min_m(c, r);
-      grid.evidence(c, r) = std::tanh(0.5F * map.occupancy_logodds(c, r));
+      grid.occupancy(c, r) = std::tanh(0.5F * map.occupancy_logodds(c, r));
     }
   }
   return grid;
 }
 
 SurfaceGrid coarser(const SurfaceGrid& grid) {
-  // Corners of the coarse lattice are every second of the fine one.
+  // Corners of the coarse lattice are every second corner of the fine one.
   const auto half_down = [](int i) { return i >= 0 ? i / 2 : -((1 - i) / 2); };
   const LatticeWindow& fine = grid.window;
   LatticeWindow window;
@@ -119,7 +119,7 @@ SurfaceGrid coarser(const SurfaceGrid& grid) {
     for (int c = 0; c < window.width; ++c) {
       const int c0 = 2 * (window.west + c) - fine.west, r0 = fine.north - 2 * (window.north - r);
       double weights = 0, sum = 0;
-      float lowest = std::numeric_limits<float>::infinity(), highest = -lowest, relief = 0, evidence = 0;
+      float lowest = std::numeric_limits<float>::infinity(), highest = -lowest, relief = 0, occupancy = 0;
       int known = 0;
       for (int j = r0; j < r0 + 2; ++j) {
         for (int i = c0; i < c0 + 2; ++i) {
@@ -131,7 +131,7 @@ SurfaceGrid coarser(const SurfaceGrid& grid) {
           lowest = std::min(lowest, z);
           highest = std::max(highest, z);
           relief = std::max(relief, grid.relief_m(i, j));
-          evidence += grid.evidence(i, j);
+          occupancy += grid.occupancy(i, j);
           ++known;
         }
       }
@@ -139,7 +139,7 @@ SurfaceGrid coarser(const SurfaceGrid& grid) {
       coarse.elevation_m(c, r) = static_cast<float>(sum / weights);
       coarse.variance_m2(c, r) = static_cast<float>(known / weights);
       coarse.relief_m(c, r) = std::max(relief, highest - lowest);
-      coarse.evidence(c, r) = evidence / static_cast<float>(known);
+      coarse.occupancy(c, r) = occupancy / static_cast<float>(known);
     }
   }
   return coarse;

@@ -1,4 +1,4 @@
-// Elevations on the lattice, as the matching of maps needs them.
+// Elevation grids on the world lattice, the input of map matching.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,31 +11,30 @@
 
 namespace spartan {
 
-/// NaN where nothing is known. All images have the window's size.
+/// All images have the size of the window. Unknown cells are NaN.
 struct SurfaceGrid {
   LatticeWindow window;
   double cell_m = 0.05;
   Image<float> elevation_m;
-  Image<float> variance_m2;  ///< of the elevation
-  Image<float> relief_m;     ///< highest less lowest point in the cell
-  Image<float> evidence;     ///< that something stands or gapes here: tanh(log-odds / 2), −1 … 1; 0 unknown
+  Image<float> variance_m2;  ///< Variance of the elevation.
+  Image<float> relief_m;     ///< Highest minus lowest point in the cell.
+  Image<float> occupancy;    ///< Signed occupancy 2p − 1 = tanh(log-odds / 2) of an obstacle or a cavity; 0: unknown.
 
-  /// East and north slope by the difference of the neighbours (central, or one-sided at an edge); NaN where it has
-  /// none.
+  /// East and north slope by finite differences of the neighbours (central, or one-sided at a border); NaN without any.
   Eigen::Vector2f slope(int column, int row) const;
-  /// Bilinear between the cells' middles; NaN where one of the four is not known.
+  /// Bilinear interpolation between cell centres; NaN where one of the four cells is unknown.
   float elevation_at(double x_m, double y_m) const;
 };
 
-/// Throws points into cells: means weighted by variance, as the map generator makes them. A cell with fewer than
-/// `fewest_points` stays unknown. No evidence.
-SurfaceGrid throw_on_grid(std::span<const SurfacePoint> points, const Pose& world_from_body,
-                          const LatticeWindow& window, double cell_m, int fewest_points);
+/// Rasterizes points into cells: inverse-variance weighted means, as the map generator computes them. A cell with fewer
+/// than `fewest_points` points is unknown. The occupancy is 0.
+SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_from_body, const LatticeWindow& window,
+                      double cell_m, int fewest_points);
 
-/// As it stands in a local map.
+/// The grid of a local map.
 SurfaceGrid grid_of(const LocalMap& map);
 
-/// Cells of twice the side: means weighted by variance.
+/// Halves the resolution: inverse-variance weighted means of 2×2 cells, of which at least two must be known.
 SurfaceGrid coarser(const SurfaceGrid& grid);
 
 }  // namespace spartan

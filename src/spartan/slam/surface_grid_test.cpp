@@ -11,15 +11,15 @@ namespace {
 
 using testing::Ground;
 using testing::points_at;
+using testing::pose_on_ground;
 using testing::rocky_ground;
-using testing::standing;
 
 Ground plane(double a, double b) {
   return [=](double x, double y) { return 0.1 + a * x + b * y; };
 }
 
-// Points on every 1 cm of a square around the origin.
-std::vector<SurfacePoint> carpet(const Ground& ground, double half) {
+// Points at 1 cm spacing in a square around the origin.
+std::vector<SurfacePoint> dense_points(const Ground& ground, double half) {
   std::vector<SurfacePoint> points;
   for (double x = -half + 0.005; x < half; x += 0.01) {
     for (double y = -half + 0.005; y < half; y += 0.01)
@@ -28,22 +28,22 @@ std::vector<SurfacePoint> carpet(const Ground& ground, double half) {
   return points;
 }
 
-TEST(SurfaceGrid, CellsAreThoseOfTheMapGenerator) {
+TEST(SurfaceGrid, RasterizesAsTheMapGenerator) {
   const Ground ground = rocky_ground();
-  const Pose pose = standing(ground, 3.21, -1.37, 0.4);
+  const Pose pose = pose_on_ground(ground, 3.21, -1.37, 0.4);
   const std::vector<SurfacePoint> points = points_at(ground, pose, 1);
   const LocalMap map = MapGenerator({}, Workers(1)).generate(points, pose);
   const SurfaceGrid from_map = grid_of(map);
-  const SurfaceGrid thrown = throw_on_grid(points, pose, from_map.window, 0.05, MapOptions().fewest_points);
+  const SurfaceGrid rasterized = rasterize(points, pose, from_map.window, 0.05, MapOptions().fewest_points);
   int known = 0, other = 0;
   for (int r = 0; r < from_map.window.height; ++r) {
     for (int c = 0; c < from_map.window.width; ++c) {
-      const bool a = std::isfinite(from_map.elevation_m(c, r)), b = std::isfinite(thrown.elevation_m(c, r));
+      const bool a = std::isfinite(from_map.elevation_m(c, r)), b = std::isfinite(rasterized.elevation_m(c, r));
       known += a ? 1 : 0;
-      // A point on a border may fall to either side by rounding.
-      const bool same = a == b && (!a || (std::abs(from_map.elevation_m(c, r) - thrown.elevation_m(c, r)) < 1e-5 &&
-                                          std::abs(from_map.relief_m(c, r) - thrown.relief_m(c, r)) < 1e-5 &&
-                                          std::abs(from_map.variance_m2(c, r) - thrown.variance_m2(c, r)) < 1e-8));
+      // A point on a cell border may fall to either side because of rounding.
+      const bool same = a == b && (!a || (std::abs(from_map.elevation_m(c, r) - rasterized.elevation_m(c, r)) < 1e-5 &&
+                                          std::abs(from_map.relief_m(c, r) - rasterized.relief_m(c, r)) < 1e-5 &&
+                                          std::abs(from_map.variance_m2(c, r) - rasterized.variance_m2(c, r)) < 1e-8));
       other += same ? 0 : 1;
     }
   }
@@ -53,7 +53,7 @@ TEST(SurfaceGrid, CellsAreThoseOfTheMapGenerator) {
 
 TEST(SurfaceGrid, SlopeAndElevationOfAPlaneAreExact) {
   const LatticeWindow window = window_around(0, 0, 0.5, 0.05);
-  const SurfaceGrid grid = throw_on_grid(carpet(plane(0.2, -0.3), 0.5), Pose(), window, 0.05, 2);
+  const SurfaceGrid grid = rasterize(dense_points(plane(0.2, -0.3), 0.5), Pose(), window, 0.05, 2);
   for (const GridCell cell : {GridCell{5, 7}, GridCell{0, 0}, GridCell{19, 19}}) {
     EXPECT_NEAR(grid.slope(cell.column, cell.row).x(), 0.2, 1e-4);
     EXPECT_NEAR(grid.slope(cell.column, cell.row).y(), -0.3, 1e-4);
@@ -62,10 +62,10 @@ TEST(SurfaceGrid, SlopeAndElevationOfAPlaneAreExact) {
   EXPECT_TRUE(std::isnan(grid.elevation_at(0.6, 0)));
 }
 
-TEST(SurfaceGrid, CoarserCellsLieOnTheCoarserLattice) {
-  // Odd borders, below and above zero.
+TEST(SurfaceGrid, CoarseCellsLieOnTheCoarseLattice) {
+  // Odd borders on both sides of zero.
   const LatticeWindow window{-7, 9, 17, 15};
-  const SurfaceGrid fine = throw_on_grid(carpet(plane(0.2, -0.3), 0.6), Pose(), window, 0.05, 2);
+  const SurfaceGrid fine = rasterize(dense_points(plane(0.2, -0.3), 0.6), Pose(), window, 0.05, 2);
   const SurfaceGrid coarse = coarser(fine);
   EXPECT_EQ(coarse.cell_m, 0.1);
   int known = 0;

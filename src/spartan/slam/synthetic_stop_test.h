@@ -1,4 +1,4 @@
-// What a rover would see of known ground: points with noise, for the tests of this module.
+// Simulated observations of known ground: points with noise, for the tests of this module.
 #pragma once
 
 #include <cmath>
@@ -25,21 +25,21 @@ inline Ground rocky_ground(std::uint64_t seed = 3) {
   return [terrain = SyntheticTerrain(options)](double x, double y) { return terrain.ground(x, y).value; };
 }
 
-/// A fan of 120 degrees from 0.6 to 4 m before the body, its origin on the ground, the eye 1 m above. Nothing hides
-/// anything. The noise along a ray is that of a disparity, independent from point to point.
+/// Points in a sector of 120 degrees from 0.6 to 4 m ahead of the body, whose origin is on the ground, with the camera
+/// 1 m above. There are no occlusions. The noise along a ray is that of a disparity, independent from point to point.
 inline std::vector<SurfacePoint> points_at(const Ground& ground, const Pose& world_from_body, std::uint64_t seed,
                                            double noise = 1) {
   std::vector<SurfacePoint> points;
   const Pose body_from_world = world_from_body.inverse();
-  const Eigen::Vector3d eye = world_from_body * Eigen::Vector3d(0, 0, 1);
+  const Eigen::Vector3d camera = world_from_body * Eigen::Vector3d(0, 0, 1);
   const Eigen::Vector3d ahead = world_from_body.rotation() * Eigen::Vector3d::UnitX();
   const double heading = std::atan2(ahead.y(), ahead.x());
   Random random(seed);
   constexpr double kStep = 0.018;
   for (double range = 0.6; range < 4; range += kStep) {
     for (double turn = -1.05; turn < 1.05; turn += kStep / range) {
-      const double x = eye.x() + range * std::cos(heading + turn), y = eye.y() + range * std::sin(heading + turn);
-      const Eigen::Vector3d place(x, y, ground(x, y)), along = (place - eye).normalized();
+      const double x = camera.x() + range * std::cos(heading + turn), y = camera.y() + range * std::sin(heading + turn);
+      const Eigen::Vector3d place(x, y, ground(x, y)), along = (place - camera).normalized();
       const double sigma = 0.001 + 0.0012 * range * range;
       const Eigen::Vector3d seen = place + noise * sigma * 0.3 * random.normal() * along;
       points.push_back({(body_from_world * seen).cast<float>(), static_cast<float>(sigma),
@@ -53,8 +53,8 @@ inline Pose pose_at(double x, double y, double z, double yaw) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(x, y, z)};
 }
 
-/// On the ground at a place.
-inline Pose standing(const Ground& ground, double x, double y, double yaw) {
+/// A pose on the ground.
+inline Pose pose_on_ground(const Ground& ground, double x, double y, double yaw) {
   return pose_at(x, y, ground(x, y), yaw);
 }
 

@@ -25,7 +25,7 @@ Bytes bytes_of(const Matrix6d& matrix) {
   return out.take();
 }
 
-// FNV-1a (Fowler, Noll, Vo) over the key and the bytes: a tile in the wrong place is damage too.
+// FNV-1a hash (Fowler, Noll, Vo) of key and bytes, so that a tile under a wrong key is detected as well.
 std::int64_t checksum_of(const TileStore::Entry& entry, const Bytes& bytes) {
   std::uint64_t hash = 0xcbf29ce484222325U;
   const auto add = [&](const void* data, std::size_t size) {
@@ -202,7 +202,7 @@ Status migrate(Database& db, const std::vector<MapMigration>& steps) {
   }
   for (const MapMigration& step : steps) {
     if (step.to <= version) continue;
-    // One text: a failure inside leaves the transaction open, so that it is taken back.
+    // Executed as one text: a failure leaves the transaction open, and it is rolled back.
     Status status =
         db.execute(fmt::format("BEGIN IMMEDIATE; {}; PRAGMA user_version = {}; COMMIT;", step.sql, step.to));
     if (!status) {

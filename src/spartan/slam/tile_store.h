@@ -1,4 +1,4 @@
-// The global map on the disk: tables of tiles, submaps and stops, in a run's store or in a file of their own.
+// Persistent storage of the global map: tables of tiles, submaps and stops, in a run's store or in a map file.
 #pragma once
 
 #include <cstdint>
@@ -12,24 +12,24 @@
 
 namespace spartan {
 
-/// Writes happen in whatever transaction the database is in; whoever owns it commits. Tables (all `map_…`):
+/// Writes take part in the current transaction of the database; its owner commits. Tables (all `map_…`):
 /// map_tiles (submap, ix, iy, revision → checksum, cells), map_submaps (id → anchor), map_stops (id → stamp, pose,
 /// covariance), map_properties (key → value). Only the newest revision of a tile is kept.
 class TileStore {
  public:
-  /// The tables, made where they are missing. Borrows the database.
+  /// Opens the tables and creates missing ones. Borrows the database.
   static Result<TileStore> open(Database& db);
-  /// Tables that are there already, of a database that may be read only.
+  /// Opens existing tables of a database that may be read-only.
   static Result<TileStore> open_existing(Database& db);
 
   struct Entry {
     TileKey key;
     std::int64_t revision = 0;
   };
-  /// All tiles, in order.
+  /// All tiles in the order of their keys, with their newest revisions.
   Result<std::vector<Entry>> index();
   Status write(const Entry& entry, const Tile& tile);
-  /// Code `input`, naming file and tile, where it is missing or its checksum does not fit.
+  /// Code `input`, naming file and tile, where the tile is missing or its checksum is wrong.
   Result<Tile> read(const Entry& entry);
 
   Status write(const Submap& submap);
@@ -46,13 +46,13 @@ class TileStore {
   std::optional<SqlStatement> insert_tile_, delete_older_, select_tile_;
 };
 
-/// One step of a saved map's history: what brings a file of version `to` − 1 to version `to`.
+/// One step of the schema migration: from version `to` − 1 to version `to`.
 struct MapMigration {
   int to = 0;
   std::string sql;
 };
-/// Runs the steps that are missing, each in a transaction of its own with the new `user_version`. Code `configuration`
-/// where the file is newer than the last step.
+/// Runs the missing steps, each in a transaction of its own that also sets `user_version`. Code `configuration` where
+/// the file is newer than the last step.
 Status migrate(Database& db, const std::vector<MapMigration>& steps);
 
 }  // namespace spartan

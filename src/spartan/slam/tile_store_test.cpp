@@ -24,7 +24,7 @@ Tile some_tile(float elevation) {
     s.count = 3;
     s.stop = i;
   }
-  tile.at(5, 0).rival = tile.at(0, 0).surface;
+  tile.at(5, 0).alternative = tile.at(0, 0).surface;
   return tile;
 }
 
@@ -32,16 +32,16 @@ Database make(const std::string& path) {
   return *Database::open(path, Database::Mode::create);
 }
 
-RC_GTEST_PROP(Tile, SurvivesBytes, ()) {
+RC_GTEST_PROP(Tile, SerializationIsLossless, ()) {
   Tile tile;
   for (int i = *rc::gen::inRange(0, 200); i > 0; --i) {
     MapCell& cell = tile.at(*rc::gen::inRange(0, Tile::kSide), *rc::gen::inRange(0, Tile::kSide));
-    for (CellSurface* s : {&cell.surface, &cell.rival}) {
+    for (CellSurface* s : {&cell.surface, &cell.alternative}) {
       s->elevation_m = static_cast<float>(*rc::gen::arbitrary<std::int16_t>());
       s->variance_m2 = 0.25F;
       s->count = static_cast<float>(s == &cell.surface ? 1 : *rc::gen::inRange(0, 2));
-      if (!s->seen()) *s = {};
-      s->shape = s->seen() ? *rc::gen::arbitrary<std::int16_t>() : std::int16_t{0};
+      if (!s->observed()) *s = {};
+      s->shape = s->observed() ? *rc::gen::arbitrary<std::int16_t>() : std::int16_t{0};
     }
   }
   const auto again = tile_from_bytes(to_bytes(tile), "tile");
@@ -49,7 +49,7 @@ RC_GTEST_PROP(Tile, SurvivesBytes, ()) {
   RC_ASSERT(*again == tile);
 }
 
-TEST(Tile, RefusesCutBytesAndOtherVersions) {
+TEST(Tile, RejectsTruncatedBytesAndOtherVersions) {
   Bytes bytes = to_bytes(some_tile(1));
   Bytes cut(bytes.begin(), bytes.end() - 1);
   EXPECT_THAT(tile_from_bytes(cut, "tile 7").error().message(), HasSubstr("tile 7"));
@@ -57,7 +57,7 @@ TEST(Tile, RefusesCutBytesAndOtherVersions) {
   EXPECT_THAT(tile_from_bytes(bytes, "tile 7").error().message(), HasSubstr("version 9"));
 }
 
-TEST(TileStore, GivesBackWhatWasWritten) {
+TEST(TileStore, ReadsWhatWasWritten) {
   const TemporaryFolder folder;
   Database db = make(folder.file("map.sqlite"));
   auto store = TileStore::open(db);
@@ -90,7 +90,7 @@ TEST(TileStore, GivesBackWhatWasWritten) {
   EXPECT_FALSE(store->property("none")->has_value());
 }
 
-TEST(TileStore, DamageIsToldWithFileAndTile) {
+TEST(TileStore, ReportsDamageWithFileAndTile) {
   const TemporaryFolder folder;
   const std::string path = folder.file("map.sqlite");
   Database db = make(path);
@@ -102,13 +102,13 @@ TEST(TileStore, DamageIsToldWithFileAndTile) {
   EXPECT_EQ(tile.error().code, ErrorCode::input);
   EXPECT_THAT(tile.error().message(), HasSubstr(path));
   EXPECT_THAT(tile.error().message(), HasSubstr("tile 2, 3 of submap 0, revision 1 is damaged"));
-  // The right bytes in the wrong place are damage too.
+  // The right bytes under a wrong key are damage as well.
   ASSERT_TRUE(store->write({{0, 2, 3}, 2}, some_tile(1)));
   ASSERT_TRUE(db.execute("UPDATE map_tiles SET ix = 7"));
   EXPECT_THAT(store->read({{0, 7, 3}, 2}).error().message(), HasSubstr("checksum"));
 }
 
-TEST(TileStore, AKillBeforeTheCommitLeavesWhatWasCommitted) {
+TEST(TileStore, AKilledWriterLeavesTheLastCommittedState) {
   const TemporaryFolder folder;
   const std::string path = folder.file("map.sqlite");
   const pid_t child = ::fork();
@@ -139,7 +139,7 @@ int version_of(Database& db) {
   return static_cast<int>(statement->integer(0));
 }
 
-TEST(Migration, RunsTheMissingStepsInOrder) {
+TEST(Migration, RunsMissingStepsInOrder) {
   const TemporaryFolder folder;
   Database db = make(folder.file("map.sqlite"));
   const std::vector<MapMigration> steps{
@@ -147,7 +147,7 @@ TEST(Migration, RunsTheMissingStepsInOrder) {
   ASSERT_TRUE(migrate(db, {steps[0]}));
   EXPECT_EQ(version_of(db), 1);
   ASSERT_TRUE(migrate(db, steps));
-  ASSERT_TRUE(migrate(db, steps)) << "nothing is done twice";
+  ASSERT_TRUE(migrate(db, steps)) << "no step is run twice";
   EXPECT_EQ(version_of(db), 3);
   auto select = db.prepare("SELECT x FROM a");
   ASSERT_TRUE(*select->step());
@@ -160,7 +160,7 @@ TEST(Migration, AFailingStepChangesNothing) {
   Database db = make(folder.file("map.sqlite"));
   EXPECT_FALSE(migrate(db, {{1, "CREATE TABLE a (x INTEGER); INSERT INTO nothing VALUES (1)"}}));
   EXPECT_EQ(version_of(db), 0);
-  EXPECT_TRUE(db.execute("CREATE TABLE a (x INTEGER)")) << "the table of the failed step is gone";
+  EXPECT_TRUE(db.execute("CREATE TABLE a (x INTEGER)")) << "the table of the failed step was rolled back";
 }
 
 }  // namespace

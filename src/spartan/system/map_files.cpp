@@ -49,14 +49,14 @@ Status write_view(const PositionView& view, const VDisparityOptions& options, co
 }  // namespace
 
 Status write_local_map(const LocalMap& map, const std::string& path) {
-  if (Status s = write_geotiff(path + ".tif", map.place, map.bands()); !s) return s;
+  if (Status s = write_geotiff(path + ".tif", map.place, map.bands().list); !s) return s;
   return write_png(path + ".png", draw_map(map.elevation_m, map.kind, map.place.cell_m));
 }
 
 Status write_map_geotiff(const MapView& view, const MapOptions& options, const Workers& workers,
                          const std::string& path) {
   const TerrainShape shape = view.shape(options, workers);
-  return write_geotiff(path, view.place(), view.bands(shape));
+  return write_geotiff(path, view.place(), view.bands(shape).list);
 }
 
 Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers& workers, const std::string& path) {
