@@ -190,6 +190,39 @@ TEST_F(Positions, AMapTooLargeForOnePictureLeavesNoneOfBefore) {
   EXPECT_EQ(page.find("Its coverage"), std::string::npos);
 }
 
+// A tile that fails its checksum ends the run where it is read; nothing of that is committed.
+TEST_F(Positions, ADamagedTileEndsTheRun) {
+  ASSERT_TRUE(finished(run("whole")));
+  ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
+  const auto shift_checksums = [&](const std::string& by) {
+    auto db = Database::open(path("part/run.sqlite"), Database::Mode::open);
+    ASSERT_TRUE(db) << db.error().message();
+    ASSERT_TRUE(db->execute("UPDATE map_tiles SET checksum = checksum " + by));
+  };
+  shift_checksums("+ 1");
+  for (int i = 0; i < 2; ++i) {
+    const ProgramResult damaged = run("part", {"--resume"});
+    EXPECT_EQ(damaged.exit_code, 3) << damaged.err;
+    EXPECT_NE(damaged.err.find("is damaged: its checksum does not fit"), std::string::npos) << damaged.err;
+    EXPECT_NE(damaged.err.find("run.sqlite"), std::string::npos) << damaged.err;
+    EXPECT_EQ(damaged.err.find("skipped"), std::string::npos) << damaged.err;
+  }
+  shift_checksums("- 1");
+  ASSERT_TRUE(finished(run("part", {"--resume"})));
+  EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("whole"))) << "no frame was lost";
+}
+
+TEST_F(Positions, ADamagedStoreEndsTheRun) {
+  ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
+  std::fstream file(path("part/run.sqlite"), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(0);
+  file << std::string(4096, 'x');
+  file.close();
+  const ProgramResult damaged = run("part", {"--resume"});
+  EXPECT_EQ(damaged.exit_code, 3) << damaged.err;
+  EXPECT_NE(damaged.err.find("is damaged or not a database"), std::string::npos) << damaged.err;
+}
+
 TEST_F(Positions, EachTrajectoryIsExported) {
   ASSERT_TRUE(finished(run("out")));
   for (const std::string kind : {"odometry", "slam", "localization"}) {

@@ -61,8 +61,8 @@ Matrix6d ArchiveReader::get_matrix6() {
 }
 
 Status ArchiveReader::finish(const std::string& what) const {
-  if (!ok_) return failure(ErrorCode::input, "the saved state ends early", what);
-  if (at_ != bytes_.size()) return failure(ErrorCode::input, "the saved state has bytes left over", what);
+  if (!ok_) return failure(ErrorCode::store_damaged, "the saved state ends early", what);
+  if (at_ != bytes_.size()) return failure(ErrorCode::store_damaged, "the saved state has bytes left over", what);
   return {};
 }
 

@@ -81,7 +81,7 @@ class ArchiveReader {
     return values;
   }
 
-  /// All was there and nothing is left over; else an error that names `what`.
+  /// All was there and nothing is left over; else an error that names `what`, code `store_damaged`.
   Status finish(const std::string& what) const;
 
  private:

@@ -28,7 +28,7 @@ class SqlStatement {
   SqlStatement& bind(int index, const Bytes& blob);
   SqlStatement& bind(int index, const std::optional<double>& value);  ///< NULL where there is none
 
-  /// True while there is a row; code `output` where the disk is full or the file cannot be written.
+  /// True while there is a row. Codes: `output` where the disk is full or the file cannot be written, `store_damaged`.
   Result<bool> step();
   /// Steps to the end and resets.
   Status run();
@@ -49,7 +49,8 @@ class SqlStatement {
 class Database {
  public:
   enum class Mode { create, open, read_only };
-  /// Opens with a write-ahead log. Codes: `output` (cannot be made or written), `input` (missing or not a database).
+  /// Opens with a write-ahead log. Codes: `output` (cannot be made or written), `store_damaged` (damaged or not a
+  /// database).
   static Result<Database> open(const std::string& path, Mode mode);
   Database(Database&&) noexcept;
   Database& operator=(Database&&) noexcept;

@@ -121,7 +121,7 @@ Status EyeStage::check(const FrameImage& image, const std::string& where) const 
   const bool reduced = taken.layout == PixelLayout::rgb && camera_.pixel_format.layout == PixelLayout::gray;
   if (reduced) taken.layout = PixelLayout::gray;
   if (image.size() == camera_.size && taken == camera_.pixel_format) return {};
-  return failure(ErrorCode::input,
+  return failure(ErrorCode::frame_rejected,
                  fmt::format("the image of camera '{}' is {}, the rig says {}", camera_.name,
                              describe(image.size(), image.format()), describe(camera_.size, camera_.pixel_format)),
                  where, "correct size_px and the pixel format in the rig, or take images that fit");

@@ -26,8 +26,9 @@ class Imager {
   Imager& operator=(Imager&&) noexcept;
   ~Imager();
 
-  /// The views in the result are valid until the next call for the same pair. Code `input` where the frame's pair
-  /// is unknown or its images have another size or format than the rig says. RGB images of a gray camera become gray.
+  /// The views in the result are valid until the next call for the same pair. Code `frame_rejected` where the
+  /// frame's pair is unknown or its images have another size or format than the rig says. RGB images of a gray camera
+  /// become gray.
   Result<RectifiedPair> process(const StereoFrame& frame);
 
   /// Geometry of a pair's rectified view. Throws on an unknown name.

@@ -63,7 +63,7 @@ bool get(ArchiveReader& in, Landmark& landmark) {
 }
 
 tl::unexpected<Error> damaged(const std::string& what) {
-  return failure(ErrorCode::input, what, "odometry memory", "start the run anew");
+  return failure(ErrorCode::store_damaged, what, "odometry memory", "start the run anew");
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ struct OdometerMemory {
   LandmarkMemory map;
 
   Bytes save() const;
-  /// Code `input` where the bytes are of another version or damaged.
+  /// Code `store_damaged` where the bytes are of another version or damaged.
   static Result<OdometerMemory> restore(const Bytes& bytes);
 };
 

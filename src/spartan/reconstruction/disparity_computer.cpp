@@ -33,17 +33,18 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
                                                   ImageView<const std::uint8_t> left_mask,
                                                   ImageView<const std::uint8_t> right_mask) {
   if (left.empty() || left.size() != right.size()) {
-    return failure(ErrorCode::input,
+    return failure(ErrorCode::frame_rejected,
                    fmt::format("the left image has {}x{} pixels, the right one {}x{}", left.width(), left.height(),
                                right.width(), right.height()),
                    {}, "both images of a pair must have the same size");
   }
   const auto fits = [&](ImageView<const std::uint8_t> mask) { return mask.empty() || mask.size() == left.size(); };
   if (!fits(left_mask) || !fits(right_mask))
-    return failure(ErrorCode::input, "a mask has another size than the images");
+    return failure(ErrorCode::frame_rejected, "a mask has another size than the images");
   if (range.count() < 1 || range.max >= left.width() || range.min <= -left.width()) {
-    return failure(ErrorCode::input, fmt::format("the search range {} … {} px is empty or wider than the image ({} px)",
-                                                 range.min, range.max, left.width()));
+    return failure(ErrorCode::frame_rejected,
+                   fmt::format("the search range {} … {} px is empty or wider than the image ({} px)", range.min,
+                               range.max, left.width()));
   }
   using Clock = std::chrono::steady_clock;
   const auto since = [](Clock::time_point start) {

@@ -125,7 +125,7 @@ Status MapMerger::restore(const Bytes& bytes, TileStore& store) {
   auto map = GlobalMap::from_store(options_.map, map_options_.cell_m, store);
   if (!map) return failure(map);
   if (map->submaps().size() != submaps || map->stops().size() != stops || map->tiles() != tiles)
-    return failure(ErrorCode::input, "does not fit the map's tables", "map memory", "start the run anew");
+    return failure(ErrorCode::store_damaged, "does not fit the map's tables", "map memory", "start the run anew");
   map_ = std::move(*map);
   return {};
 }

@@ -46,8 +46,8 @@ class MapMerger {
   Status flush() { return map_.flush(); }
   /// What belongs to the flushed tables, versioned.
   Bytes save() const;
-  /// The state of `save()` with the tables as they were then. Code `input` where the bytes are damaged, of another
-  /// version, or do not fit the tables.
+  /// The state of `save()` with the tables as they were then. Codes: `store_damaged` where the bytes are damaged or
+  /// do not fit the tables, `input` where they are of another version.
   Status restore(const Bytes& bytes, TileStore& store);
 
  private:

@@ -29,7 +29,7 @@ class TileStore {
   /// All tiles, in order.
   Result<std::vector<Entry>> index();
   Status write(const Entry& entry, const Tile& tile);
-  /// Code `input`, naming file and tile, where it is missing or its checksum does not fit.
+  /// Code `store_damaged`, naming file and tile, where it is missing or its checksum does not fit.
   Result<Tile> read(const Entry& entry);
 
   Status write(const Submap& submap);

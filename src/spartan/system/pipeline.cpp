@@ -212,7 +212,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
       if (Status status = s.look(frame); !status) return failure(status);
       return std::nullopt;
     }
-    return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair),
+    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair),
                    fmt::format("frame {}", frame.frame_id), "frames carry the name of their pair in the rig");
   }
   const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
@@ -292,7 +292,7 @@ Status Pipeline::recall(const StereoFrame& frame) {
   State& s = *state_;
   const StereoPair* const pair = s.rig.find_pair(frame.pair);
   if (pair == nullptr)
-    return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair), "recall");
+    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair), "recall");
   const auto shot = s.imager.process(frame);
   if (!shot) return failure(shot);
   if (pair->name != s.pair.name) return s.position.look(frame.position_id, pair->name, *shot, pair->nearest_m);

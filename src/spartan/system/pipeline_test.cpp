@@ -200,14 +200,14 @@ TEST(Pipeline, LeavesOutFramesThatDoNotFitAndGoesOn) {
   stranger.pair = "rear";
   const auto unknown = pipeline.add(stranger);
   ASSERT_FALSE(unknown);
-  EXPECT_EQ(unknown.error().code, ErrorCode::input);
+  EXPECT_EQ(unknown.error().code, ErrorCode::frame_rejected);
   EXPECT_NE(unknown.error().message().find("rear"), std::string::npos);
   StereoFrame small = frame_of(1);
   const Image<std::uint8_t> cut(100, 100);
   small.right = FrameImage::borrow(cut.view(), {});
   const auto unfit = pipeline.add(small);
   ASSERT_FALSE(unfit);
-  EXPECT_EQ(unfit.error().code, ErrorCode::input);
+  EXPECT_EQ(unfit.error().code, ErrorCode::frame_rejected);
   EXPECT_NEAR(push(pipeline, 1).world_from_body.pose.translation().x(), kStep_m, 0.002);
 }
 

@@ -216,8 +216,8 @@ Status Drive::take(const Sample& sample) {
 Status Drive::take_frame(const StereoFrame& frame) {
   auto result = pipeline_.add(frame);
   if (!result) {
-    // The shot does not fit the rig: it is said, counted and left out.
-    if (result.error().code != ErrorCode::input) return failure(result);
+    // The frame does not fit the rig: it is said, counted and left out. Whatever else fails ends the run.
+    if (result.error().code != ErrorCode::frame_rejected) return failure(result);
     return take_missing(
         {frame.frame_id, frame.pair, frame.left_stamp, FrameFault::wrong_size, result.error().message()});
   }

@@ -177,7 +177,7 @@ TEST(RunStore, RefusesWhatIsNoStore) {
   std::fclose(file);
   const auto opened = RunStore::open_read_only(path);
   ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::input);
+  EXPECT_EQ(opened.error().code, ErrorCode::store_damaged);
 }
 
 // A process that is killed between two statements of a transaction leaves the frames before it, and nothing else.
