@@ -44,7 +44,7 @@ struct MergedRange {
   Pose body_from_centre;
   Image<float> range_m;         ///< along the ray; NaN unknown
   Image<float> sigma_m;         ///< standard deviation of the range
-  Image<std::uint8_t> views;    ///< bit i: view i is in it
+  Image<std::uint8_t> views;    ///< bit i: view i, i + 8, i + 16 … is in it
   Image<std::uint8_t> gray;     ///< mean gray level
   Image<std::uint8_t> classes;  ///< of the view with the most pixels there
 };
@@ -56,7 +56,7 @@ struct MergedRange {
 /// it: in doubt there is an obstacle. Cells that no pixel met between two of one surface are filled.
 class DisparityMerger {
  public:
-  /// At most 8 views.
+  /// Any number of views; merge() holds one layer of the panorama's size for each.
   DisparityMerger(const MergingOptions& options, const Pose& body_from_centre, std::span<const ViewGeometry> views,
                   double nearest_m, Workers workers);
 

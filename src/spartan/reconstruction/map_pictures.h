@@ -20,7 +20,7 @@ Image<Rgb8> draw_classes(ImageView<const std::uint8_t> left, ImageView<const std
 /// down).
 Image<Rgb8> draw_v_disparity(const VDisparity& seen, const RectifiedStereo& geometry, const VDisparityOptions& options);
 
-/// Which views took part: a colour for each set of them. `views` as MergedRange::views.
+/// Which views took part: a colour for each set of them, the same for every eighth view. `views` as MergedRange::views.
 Image<Rgb8> draw_coverage(ImageView<const std::uint8_t> views);
 
 }  // namespace spartan

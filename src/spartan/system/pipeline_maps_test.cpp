@@ -216,6 +216,48 @@ TEST(PipelineMaps, AStopGoesOnFromRestoredMemory) {
   }
 }
 
+void expect_same_map(const LocalMap& a, const LocalMap& b) {
+  ASSERT_EQ(a.size(), b.size());
+  int known = 0;
+  for (int y = 0; y < a.size().height; ++y) {
+    for (int x = 0; x < a.size().width; ++x) {
+      ASSERT_EQ(a.count(x, y), b.count(x, y));
+      if (!(a.count(x, y) > 0)) continue;
+      ASSERT_EQ(a.elevation_m(x, y), b.elevation_m(x, y));
+      ASSERT_EQ(a.variance_m2(x, y), b.variance_m2(x, y));
+      ++known;
+    }
+  }
+  EXPECT_GT(known, 100);
+}
+
+// More views than a mask of eight bits can tell apart, saved and restored between the ninth and the tenth.
+TEST(PipelineMaps, AStopMayHaveAnyNumberOfViews) {
+  Pipeline straight = Pipeline::create(rover(), {}, Workers(1)).value(),
+           later = Pipeline::create(rover(), {}, Workers(2)).value();
+  drive_to(straight, 0);
+  for (int i = 1; i <= 8; ++i) look_around(straight, 0, 0.1 * i);
+  ASSERT_TRUE(straight.add(frame_of(images_of("narrow", 0), "narrow", 0, 1)).value().has_value());
+  const testing::TemporaryFolder folder;
+  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
+  TileStore tiles = TileStore::open(db).value();
+  ASSERT_TRUE(later.restore(straight.save(), tiles));
+  const auto wanted = later.wanted_shots();
+  ASSERT_EQ(wanted.size(), 9U);
+  for (const ShotName& shot : wanted)
+    ASSERT_TRUE(later.recall(frame_of(images_of(shot.pair, 0), shot.pair, 0, shot.left_stamp.seconds())));
+  for (int i = 1; i <= 4; ++i) {
+    look_around(straight, 0, 1 + 0.1 * i);
+    look_around(later, 0, 1 + 0.1 * i);
+  }
+  const FrameResult one = drive_to(straight, 1), other = drive_to(later, 1);
+  ASSERT_TRUE(one.position && other.position);
+  EXPECT_EQ(one.position->views, 13);
+  EXPECT_EQ(other.position->views, 13);
+  expect_same_map(one.position->merged.local, other.position->merged.local);
+  EXPECT_EQ(straight.save(), later.save());
+}
+
 TEST(PipelineMaps, ViewsDoNotPileUpWhereTheOdometryIsDark) {
   Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value(),
            other = Pipeline::create(rover(), {}, Workers(2)).value();
