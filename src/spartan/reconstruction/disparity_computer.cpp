@@ -28,10 +28,9 @@ DisparityComputer::DisparityComputer(DisparityComputer&&) noexcept = default;
 DisparityComputer& DisparityComputer::operator=(DisparityComputer&&) noexcept = default;
 DisparityComputer::~DisparityComputer() = default;
 
-Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> left,
-                                                  ImageView<const std::uint8_t> right, DisparityRange range,
-                                                  ImageView<const std::uint8_t> left_mask,
-                                                  ImageView<const std::uint8_t> right_mask) {
+Status DisparityComputer::check(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                DisparityRange range, ImageView<const std::uint8_t> left_mask,
+                                ImageView<const std::uint8_t> right_mask) {
   if (left.empty() || left.size() != right.size()) {
     return failure(ErrorCode::frame_rejected,
                    fmt::format("the left image has {}x{} pixels, the right one {}x{}", left.width(), left.height(),
@@ -46,6 +45,14 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
                    fmt::format("the search range {} … {} px is empty or wider than the image ({} px)", range.min,
                                range.max, left.width()));
   }
+  return {};
+}
+
+Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> left,
+                                                  ImageView<const std::uint8_t> right, DisparityRange range,
+                                                  ImageView<const std::uint8_t> left_mask,
+                                                  ImageView<const std::uint8_t> right_mask) {
+  if (Status fits = check(left, right, range, left_mask, right_mask); !fits) return failure(fits);
   using Clock = std::chrono::steady_clock;
   const auto since = [](Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();

@@ -119,6 +119,7 @@ TEST(DisparityComputer, LeavesOutWhatTheMasksHide) {
 TEST(DisparityComputer, RefusesWhatDoesNotFit) {
   DisparityComputer computer(DisparityOptions{}, Workers(1));
   const Image<std::uint8_t> small(40, 30), other(41, 30);
+  EXPECT_TRUE(DisparityComputer::check(small, small, {0, 15}));
   EXPECT_EQ(computer.compute(small, other, {0, 15}).error().code, ErrorCode::frame_rejected);
   EXPECT_EQ(computer.compute(small, small, {0, 40}).error().code, ErrorCode::frame_rejected) << "wider than the image";
   EXPECT_EQ(computer.compute(small, small, {5, 4}).error().code, ErrorCode::frame_rejected) << "empty";

@@ -164,9 +164,7 @@ const Submap& GlobalMap::submap_for(const Eigen::Vector3d& place) {
 Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const UncertainPose& world_from_body,
                       const Matrix6d& relative) {
   const Eigen::Vector3d body = world_from_body.pose.translation();
-  const std::int32_t stop = stops_.empty() ? 0 : stops_.back().id + 1;
-  stops_.push_back({stop, stamp, world_from_body});
-  const Submap submap = submap_for(body);
+  const Submap submap = submap_for(body);  // a new one has no tiles that could fail to load
   const auto step = submap.step(cell_m_);
   if (!step) throw std::logic_error("GlobalMap::add: the newest submap was moved off the lattice");
   const auto down = static_cast<float>(-submap.world_from_submap.translation().z());
@@ -180,8 +178,19 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
   const SurfaceGrid grid = grid_of(local);
   const LatticeWindow& window = grid.window;
   const CellFusion how = fusion();
-  for (int ty = Tile::of(window.north - window.height - step->y); ty <= Tile::of(window.north - 1 - step->y); ++ty) {
-    for (int tx = Tile::of(window.west - step->x); tx <= Tile::of(window.west + window.width - 1 - step->x); ++tx) {
+  const int south_tile = Tile::of(window.north - window.height - step->y),
+            north_tile = Tile::of(window.north - 1 - step->y), west_tile = Tile::of(window.west - step->x),
+            east_tile = Tile::of(window.west + window.width - 1 - step->x);
+  // What can fail comes first: nothing is fused unless all of it can be.
+  for (int ty = south_tile; ty <= north_tile; ++ty) {
+    for (int tx = west_tile; tx <= east_tile; ++tx) {
+      if (const auto loaded = load({submap.id, tx, ty}); !loaded) return failure(loaded);
+    }
+  }
+  const std::int32_t stop = stops_.empty() ? 0 : stops_.back().id + 1;
+  stops_.push_back({stop, stamp, world_from_body});
+  for (int ty = south_tile; ty <= north_tile; ++ty) {
+    for (int tx = west_tile; tx <= east_tile; ++tx) {
       Tile* tile = nullptr;
       for (int y = 0; y < kSide; ++y) {
         const int row = window.north - 1 - (ty * kSide + y + step->y);

@@ -51,7 +51,7 @@ class GlobalMap {
 
   /// Fuses a local map, made at `stop`'s pose, cell on cell. `relative`: how well the map's place among what is there
   /// already is known (covariance of the pose's right perturbation); it makes the observations less certain where
-  /// heights change with the pose. The stop gets the next number.
+  /// heights change with the pose. The stop gets the next number. After an error of the store nothing has changed.
   Status add(const LocalMap& local, const Stamp& stamp, const UncertainPose& world_from_body, const Matrix6d& relative);
   /// Appends another map's submaps and stops. Where they overlap, views fuse them.
   Status merge(GlobalMap& other);

@@ -34,7 +34,7 @@ class MapMerger {
   MapMerger(const SlamOptions& options, const MapOptions& map_options, const Workers& workers);
 
   /// The points of one stop, in its body frame. `world_from_body`: where the odometry or the localization believes it
-  /// is. Errors are those of the store that tiles are read from.
+  /// is. Errors are those of the store that tiles are read from; after one nothing has changed.
   Result<MapMergeResult> add(std::span<const SurfacePoint> points, const Stamp& stamp,
                              const UncertainPose& world_from_body);
 

@@ -80,6 +80,7 @@ struct Pipeline::State {
   Status look(const StereoFrame& frame);
   Result<std::optional<MappedPosition>> leave_position();
   bool terrain_is_due() const;
+  Status check_disparities(const RectifiedPair& shot) const;
   Result<TerrainView> reconstruct(const RectifiedPair& shot);
 };
 
@@ -142,9 +143,10 @@ Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
     position.leave();
     return std::nullopt;
   }
-  const auto survey = clock.measure("mapping", [&] { return position.leave(); });
+  const auto survey = clock.measure("mapping", [&] { return position.survey(); });
   auto merged = clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->standing); });
-  if (!merged) return failure(merged);
+  if (!merged) return failure(merged);  // the position stays at hand
+  position.leave();
   if (merged->constraint) hear_map(*survey, *merged->constraint);
   return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(*merged)};
 }
@@ -159,6 +161,12 @@ void Pipeline::State::hear_map(const PositionSurvey& survey, const PoseConstrain
 bool Pipeline::State::terrain_is_due() const {
   if (!options.terrain.enabled) return false;
   return distance_of_last_terrain_m < 0 || distance_m - distance_of_last_terrain_m >= options.terrain.every_m;
+}
+
+// Whether the terrain and the map of a position can be made of a shot, wherever they are due.
+Status Pipeline::State::check_disparities(const RectifiedPair& shot) const {
+  if (!maps_positions && !options.terrain.enabled) return {};
+  return PositionMapper::check(shot, pair.nearest_m);
 }
 
 Result<TerrainView> Pipeline::State::reconstruct(const RectifiedPair& shot) {
@@ -219,6 +227,8 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (!shot) return failure(shot);
   s.clock.add(shot->times);
 
+  // What can fail comes first, here and in leave_position(); behind it every stage moves on, and none of them fails.
+  if (Status fits = s.check_disparities(*shot); !fits) return failure(fits);
   FrameResult result;
   // Before the stages move on: the map belongs to where the rover still stands.
   if (s.maps_positions && frame.position_id != s.position.position_id()) {

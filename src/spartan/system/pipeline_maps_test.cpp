@@ -258,6 +258,111 @@ TEST(PipelineMaps, AStopMayHaveAnyNumberOfViews) {
   EXPECT_EQ(straight.save(), later.save());
 }
 
+// A pipeline over a store of its own.
+struct StoredRover {
+  testing::TemporaryFolder folder;
+  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
+  TileStore tiles = TileStore::open(db).value();
+  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+
+  // One mapped stop behind, another one at hand; then from restored memory, so that the map's tiles are in the store
+  // alone.
+  void drive_to_the_second_stop() {
+    pipeline.page_maps_to(tiles);
+    drive_to(pipeline, 0);
+    look_around(pipeline, 0);
+    for (int i = 1; i < kShots; ++i) drive_to(pipeline, i);
+    look_around(pipeline, kShots - 1);
+    ASSERT_TRUE(db.execute("BEGIN IMMEDIATE") && pipeline.flush_maps() && db.execute("COMMIT"));
+    const Bytes memory = pipeline.save();
+    pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+    pipeline.page_maps_to(tiles);
+    ASSERT_TRUE(pipeline.restore(memory, tiles));
+    for (const ShotName& shot : pipeline.wanted_shots()) {
+      const auto& images = images_of(shot.pair, kShots - 1);
+      ASSERT_TRUE(pipeline.recall(frame_of(images, shot.pair, kShots - 1, shot.left_stamp.seconds())));
+    }
+  }
+  Result<std::optional<FrameResult>> leave(double after_s) {
+    const auto& images = images_of("narrow", kShots - 1);
+    return pipeline.add(frame_of(images, "narrow", kShots, 3.0 * (kShots - 1) + after_s));
+  }
+};
+
+void expect_same(const FrameResult& a, const FrameResult& b) {
+  EXPECT_EQ(a.world_from_body.pose.matrix(), b.world_from_body.pose.matrix());
+  EXPECT_EQ(a.world_from_body.covariance, b.world_from_body.covariance);
+  EXPECT_EQ(a.motion.from, b.motion.from);
+  EXPECT_EQ(a.terrain.has_value(), b.terrain.has_value());
+  ASSERT_EQ(a.position.has_value(), b.position.has_value());
+  if (!a.position) return;
+  EXPECT_EQ(a.position->position_id, b.position->position_id);
+  EXPECT_EQ(a.position->views, b.position->views);
+  EXPECT_EQ(a.position->merged.match.verdict, b.position->merged.match.verdict);
+  EXPECT_EQ(a.position->merged.corrected.pose.matrix(), b.position->merged.corrected.pose.matrix());
+  expect_same_map(a.position->merged.local, b.position->merged.local);
+}
+
+TEST(PipelineMaps, ADamagedTileAdvancesNothing) {
+  StoredRover damaged, sound;
+  damaged.drive_to_the_second_stop();
+  sound.drive_to_the_second_stop();
+  ASSERT_EQ(damaged.pipeline.save(), sound.pipeline.save());
+  // Every tile in turn: the view that is matched, and the cells that are fused, may meet it first.
+  const auto count = [&] {
+    auto select = damaged.db.prepare("SELECT count(*) FROM map_tiles");
+    EXPECT_TRUE(select->step().value());
+    return select->integer(0);
+  }();
+  int met = 0;
+  for (std::int64_t i = 0; i < count && met < 3; ++i) {
+    const std::string tile =
+        "WHERE (submap, ix, iy) = (SELECT submap, ix, iy FROM map_tiles ORDER BY submap, ix, iy "
+        "LIMIT 1 OFFSET " +
+        std::to_string(i) + ")";
+    ASSERT_TRUE(damaged.db.execute("UPDATE map_tiles SET checksum = checksum + 1 " + tile));
+    const auto failed = damaged.leave(1);
+    ASSERT_TRUE(damaged.db.execute("UPDATE map_tiles SET checksum = checksum - 1 " + tile));
+    if (failed) break;  // beyond what is loaded
+    ++met;
+    EXPECT_EQ(failed.error().code, ErrorCode::store_damaged);
+    EXPECT_NE(failed.error().message().find("is damaged"), std::string::npos);
+    ASSERT_EQ(damaged.pipeline.save(), sound.pipeline.save()) << "tile " << i;
+  }
+  ASSERT_GT(met, 0);
+  const auto one = damaged.leave(2), other = sound.leave(2);
+  ASSERT_TRUE(one && *one && other && *other);
+  ASSERT_TRUE((*one)->position) << "the stop is not lost";
+  expect_same(**one, **other);
+  EXPECT_EQ(damaged.pipeline.save(), sound.pipeline.save());
+}
+
+TEST(PipelineMaps, FramesOfTheWrongSizeAtAStopAdvanceNothing) {
+  Pipeline seeing = Pipeline::create(rover(), {}, Workers(2)).value(),
+           sparing = Pipeline::create(rover(), {}, Workers(2)).value();
+  const Image<std::uint8_t> cut(100, 100);
+  const auto refused = [&](const char* pair, int position, double seconds) {
+    StereoFrame frame = frame_of(images_of(pair, 0), pair, position, seconds);
+    frame.right = FrameImage::borrow(cut.view(), {});
+    const Bytes before = seeing.save();
+    const auto result = seeing.add(frame);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::frame_rejected);
+    EXPECT_EQ(seeing.save(), before);
+  };
+  refused("wide", 0, -1);  // before the odometry's frame there
+  refused("narrow", 0, -0.5);
+  drive_to(seeing, 0);
+  drive_to(sparing, 0);
+  refused("wide", 0, 0.5);  // would have been the first view
+  look_around(seeing, 0);
+  look_around(sparing, 0);
+  refused("wide", 0, 1.5);
+  refused("narrow", 1, 2);  // of the next position
+  expect_same(drive_to(seeing, 1), drive_to(sparing, 1));
+  EXPECT_EQ(seeing.save(), sparing.save());
+}
+
 TEST(PipelineMaps, ViewsDoNotPileUpWhereTheOdometryIsDark) {
   Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value(),
            other = Pipeline::create(rover(), {}, Workers(2)).value();
