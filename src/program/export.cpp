@@ -16,10 +16,7 @@ Result<ExitCode> export_verb(const Context& context, const ExportArguments& argu
   if (!format) return failure(format);
   const auto kind = parse_trajectory_kind(arguments.trajectory);
   const Workers workers(context.threads);
-  if (Status s =
-          export_run(arguments.run, *format, kind.value_or(kTrajectoriesBestFirst[0]), workers, arguments.output);
-      !s)
-    return failure(s);
+  if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);
   return kDone;
 }
 
@@ -35,7 +32,9 @@ void add_export(CLI::App& app, Context& context) {
                    "tum, kitti, euroc, csv (trajectories), geotiff (the global map) or ply (terrain)")
       ->required();
   verb->add_option("-o,--output", a->output, "the file to write")->required();
-  verb->add_option("--trajectory", a->trajectory, "which one: odometry, slam or localization (default)")
+  verb->add_option(
+          "--trajectory", a->trajectory,
+          "which one: odometry, slam or localization (default: the best that the run has, which is the last of them)")
       ->check(CLI::IsMember({"odometry", "slam", "localization"}));
   add_threads_option(*verb, context);
 }

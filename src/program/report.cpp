@@ -228,7 +228,8 @@ Result<std::string> make_report(ReportRequest request) {
   const auto plots = trajectory_plots(request.run, *frames, request.truth);
   if (!plots) return failure(plots);
   body += section("Where it went", *plots);
-  body += section("What its sensors were worth", sensor_tables(summary, *frames));
+  if (!summary["health"]["localization"].empty())
+    body += section("What its sensors were worth", sensor_tables(summary, *frames));
   const auto maps = map_pictures(request.run);
   if (!maps) return failure(maps);
   if (!maps->empty()) body += section("Maps of where it stood", *maps);

@@ -35,6 +35,9 @@ std::string summary_for_people(const std::string& summary_json, const std::strin
                                  s["cpu_seconds"].get<double>(), s["peak_memory_bytes"].get<double>() / 1e6);
   text += fmt::format("odometry: {} tracking, {} degraded, {} standing, {} lost\n", health["tracking"].get<int>(),
                       health["degraded"].get<int>(), health["standing"].get<int>(), health["lost"].get<int>());
+  std::string absent;
+  for (const auto& part : s["absent"]) absent += (absent.empty() ? "" : ", ") + part.get<std::string>();
+  if (!absent.empty()) text += "not part of this run: " + absent + "\n";
   for (const auto& [reason, count] : s["skipped"].items())
     text += fmt::format("skipped: {} {}\n", count.get<int>(), reason);
   for (const auto& span : s["lost_spans"]) {
@@ -80,7 +83,7 @@ Result<ExitCode> run_verb(const Context& context, const RunArguments& arguments)
   auto options = run_options(arguments.config, arguments.set);
   if (!options) return failure(options);
   request.options = std::move(*options);
-  if (arguments.odometry_only) request.options.terrain.enabled = false;
+  if (arguments.odometry_only) request.options.odometry_only = true;
   if (!arguments.format.empty()) {
     const auto format = parse_recording_format(arguments.format);
     if (!format) return failure(format);
@@ -136,7 +139,8 @@ void add_run(CLI::App& app, Context& context) {
   verb->add_option("--truth", a->truth, "compare with this trajectory, or that of this recording, as `evaluate` does");
   verb->add_flag("--resume", a->resume, "go on where an earlier run of this folder stopped");
   verb->add_option("--max-frames", a->max_frames, "stop after so many shots")->check(CLI::NonNegativeNumber);
-  verb->add_flag("--odometry-only", a->odometry_only, "the trajectory without the terrain");
+  verb->add_flag("--odometry-only", a->odometry_only,
+                 "run the visual odometry alone: no localization, no maps, no SLAM and no terrain");
   add_threads_option(*verb, context);
   add_json_flag(*verb, context);
 }

@@ -39,17 +39,18 @@ struct MappedPosition {
   MapMergeResult merged;   ///< where it lies there, and the local map at that place
 };
 
-/// What one stereo shot told.
+/// What one stereo shot told. `slam`, `localization`, terrain and position are absent in a run by odometry alone
+/// (RunOptions::odometry_only).
 struct FrameResult {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
   UncertainPose world_from_body;  ///< by odometry alone; the covariance tells of its lasting errors too
   MotionEstimate motion;
-  UncertainPose slam;                      ///< world_from_body: odometry, corrected by the map
-  LocalizationEstimate localization;       ///< by all sensors
-  std::optional<TerrainView> terrain;      ///< where one was due
-  std::optional<MappedPosition> position;  ///< the one that was left for this shot
+  std::optional<UncertainPose> slam;                 ///< world_from_body: odometry, corrected by the map
+  std::optional<LocalizationEstimate> localization;  ///< by all sensors
+  std::optional<TerrainView> terrain;                ///< where one was due
+  std::optional<MappedPosition> position;            ///< the one that was left for this shot
   std::vector<StageTime> times;
 };
 

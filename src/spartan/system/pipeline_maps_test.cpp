@@ -113,18 +113,18 @@ TEST(PipelineMaps, TheMapIsHeardByTheLocalization) {
   FrameResult result = drive_to(pipeline, 0);
   look_around(pipeline, 0);
   for (int i = 1; i < kShots; ++i) result = drive_to(pipeline, i);
-  EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).state, SensorState::missing);
+  EXPECT_EQ(result.localization->health_of(LocalizationSensor::map).state, SensorState::missing);
   look_around(pipeline, kShots - 1);
   // The next position: what the last one said comes with it.
   StereoFrame next = frame_of(images_of("narrow", kShots - 1), "narrow", kShots, 3.0 * kShots);
   result = pipeline.add(next).value().value();
   ASSERT_TRUE(result.position);
-  EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).state, SensorState::ok);
-  EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).used, 1);
+  EXPECT_EQ(result.localization->health_of(LocalizationSensor::map).state, SensorState::ok);
+  EXPECT_EQ(result.localization->health_of(LocalizationSensor::map).used, 1);
   // The correction shows in the slam pose too, which else is the odometry's.
   const Eigen::Vector3d corrected = result.position->merged.corrected.pose.translation();
   EXPECT_GT((corrected - result.world_from_body.pose.translation()).norm(), 1e-6);
-  EXPECT_LT((result.slam.pose.translation() - corrected).norm(), 1e-8) << "it has stood since";
+  EXPECT_LT((result.slam->pose.translation() - corrected).norm(), 1e-8) << "it has stood since";
 }
 
 // As recordings with a fast narrow pair have it: at 4 Hz through the whole stop, the pans in between, minutes long. And
@@ -151,13 +151,14 @@ TEST(PipelineMaps, AStopMayBeLongAndTheOdometrysPairMayLookOn) {
     ASSERT_TRUE(result.position);
     EXPECT_EQ(result.position->views, 2) << "the narrow pair's first look and the wide pair's";
     EXPECT_EQ(result.position->stamp, Stamp::from_seconds(arrived));
-    EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).used, 1);
-    EXPECT_EQ(result.localization.health_of(LocalizationSensor::map).refused.too_late, 0);
+    EXPECT_EQ(result.localization->health_of(LocalizationSensor::map).used, 1);
+    EXPECT_EQ(result.localization->health_of(LocalizationSensor::map).refused.too_late, 0);
     const Eigen::Vector3d truth = world_from_body(kShots).translation();
-    EXPECT_LT((result.localization.world_from_body.pose.translation() - truth).norm(), 0.015);
-    EXPECT_LT((result.slam.pose.translation() - truth).norm(), 0.015);
+    EXPECT_LT((result.localization->world_from_body.pose.translation() - truth).norm(), 0.015);
+    EXPECT_LT((result.slam->pose.translation() - truth).norm(), 0.015);
     const auto since = [](const UncertainPose& a, const UncertainPose& b) { return a.pose.inverse() * b.pose; };
-    const Pose slam = since(before.slam, result.slam), odometry = since(before.world_from_body, result.world_from_body);
+    const Pose slam = since(*before.slam, *result.slam),
+               odometry = since(before.world_from_body, result.world_from_body);
     EXPECT_GT(log_se3(odometry.inverse() * slam).norm(), 1e-7) << "the map was heard";
   }
 }
