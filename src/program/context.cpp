@@ -13,6 +13,8 @@ ExitCode exit_code(ErrorCode code) {
     case ErrorCode::usage:
       return kUsage;
     case ErrorCode::input:
+    case ErrorCode::frame_rejected:
+    case ErrorCode::store_damaged:
       return kInput;
     case ErrorCode::configuration:
       return kConfiguration;

@@ -227,7 +227,8 @@ Result<std::string> make_report(ReportRequest request) {
   const auto plots = trajectory_plots(request.run, *frames, request.truth);
   if (!plots) return failure(plots);
   body += section("Trajectories", *plots);
-  body += section("Sensors", sensor_tables(summary, *frames));
+  if (!summary["health"]["localization"].empty())
+    body += section("Sensors", sensor_tables(summary, *frames));
   const auto maps = map_images(request.run);
   if (!maps) return failure(maps);
   if (!maps->empty()) body += section("Maps", *maps);

@@ -115,6 +115,7 @@ Result<std::string> trajectory_plots(const std::string& run, const std::vector<F
   Lines lines;
   std::string aligned;
   for (const Kind& kind : kKinds) {
+    if (!has_trajectory(frames, kind.kind)) continue;
     if (truth.empty()) {
       lines.way.push_back(
           ground_track(trajectory_of(frames, kind.kind), ground, std::string(name_of(kind.kind)), kind.colour));

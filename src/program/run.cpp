@@ -35,6 +35,9 @@ std::string summary_for_people(const std::string& summary_json, const std::strin
                                  s["cpu_seconds"].get<double>(), s["peak_memory_bytes"].get<double>() / 1e6);
   text += fmt::format("odometry: {} tracking, {} degraded, {} stationary, {} lost\n", health["tracking"].get<int>(),
                       health["degraded"].get<int>(), health["standing"].get<int>(), health["lost"].get<int>());
+  std::string absent;
+  for (const auto& part : s["absent"]) absent += (absent.empty() ? "" : ", ") + part.get<std::string>();
+  if (!absent.empty()) text += "not part of this run: " + absent + "\n";
   for (const auto& [reason, count] : s["skipped"].items())
     text += fmt::format("skipped: {} {}\n", count.get<int>(), reason);
   for (const auto& span : s["lost_spans"]) {
@@ -80,7 +83,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   auto options = run_options(arguments.config, arguments.set);
   if (!options) return failure(options);
   request.options = std::move(*options);
-  if (arguments.odometry_only) request.options.terrain.enabled = false;
+  if (arguments.odometry_only) request.options.odometry_only = true;
   if (!arguments.format.empty()) {
     const auto format = parse_recording_format(arguments.format);
     if (!format) return failure(format);
@@ -152,7 +155,7 @@ void add_run(CLI::App& app, Context& context) {
       "Continue an interrupted run in this folder. The results are the same as without the interruption.");
   command->add_option("--max-frames", a->max_frames, "Stop after this number of stereo frames (default 0: all).")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--odometry-only", a->odometry_only, "the trajectory without the terrain");
+  command->add_flag("--odometry-only", a->odometry_only, "Run the visual odometry alone: no localization, maps, SLAM or terrain.");
   add_threads_option(*command, context);
   add_json_flag(*command, context);
 }

@@ -190,6 +190,80 @@ TEST_F(Stops, AMapTooLargeForOneImageRemovesTheOldOne) {
   EXPECT_EQ(page.find("Points per cell"), std::string::npos);
 }
 
+// A tile that fails its checksum ends the run where it is read; nothing of that is committed.
+TEST_F(Stops, ADamagedTileEndsTheRun) {
+  ASSERT_TRUE(finished(run("whole")));
+  ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
+  const auto shift_checksums = [&](const std::string& by) {
+    auto db = Database::open(path("part/run.sqlite"), Database::Mode::open);
+    ASSERT_TRUE(db) << db.error().message();
+    ASSERT_TRUE(db->execute("UPDATE map_tiles SET checksum = checksum " + by));
+  };
+  shift_checksums("+ 1");
+  for (int i = 0; i < 2; ++i) {
+    const ProgramResult damaged = run("part", {"--resume"});
+    EXPECT_EQ(damaged.exit_code, 3) << damaged.err;
+    EXPECT_NE(damaged.err.find("is damaged: its checksum does not fit"), std::string::npos) << damaged.err;
+    EXPECT_NE(damaged.err.find("run.sqlite"), std::string::npos) << damaged.err;
+    EXPECT_EQ(damaged.err.find("skipped"), std::string::npos) << damaged.err;
+  }
+  shift_checksums("- 1");
+  ASSERT_TRUE(finished(run("part", {"--resume"})));
+  EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("whole"))) << "no frame was lost";
+}
+
+TEST_F(Stops, ADamagedStoreEndsTheRun) {
+  ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
+  std::fstream file(path("part/run.sqlite"), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(0);
+  file << std::string(4096, 'x');
+  file.close();
+  const ProgramResult damaged = run("part", {"--resume"});
+  EXPECT_EQ(damaged.exit_code, 3) << damaged.err;
+  EXPECT_NE(damaged.err.find("is damaged or not a database"), std::string::npos) << damaged.err;
+}
+
+TEST_F(Stops, OdometryAloneGivesTheSameOdometry) {
+  ASSERT_TRUE(finished(run("whole")));
+  const ProgramResult alone = run("alone", {"--odometry-only", "--json"});
+  ASSERT_TRUE(finished(alone)) << alone.err;
+  EXPECT_EQ(testing::content_of(path("alone/trajectory_odometry.tum")),
+            testing::content_of(path("whole/trajectory_odometry.tum")));
+  const auto summary = nlohmann::json::parse(alone.out);
+  EXPECT_EQ(summary["world"]["gravity"], "measured") << "the start attitude is";
+  EXPECT_EQ(summary["world"]["heading"], "east");
+  for (const char* stage : {"localization", "mapping", "slam", "maps", "reconstruction", "terrain"})
+    EXPECT_FALSE(summary["stages"].contains(stage)) << stage;
+  EXPECT_EQ(summary["stages"]["imaging"]["count"], summary["frames"]) << "images of the wide pair are not touched";
+  EXPECT_EQ(summary["absent"], nlohmann::json::parse(R"(["localization", "slam", "maps", "terrain"])"));
+  EXPECT_TRUE(summary["health"]["localization"].empty());
+  EXPECT_TRUE(maps_of("alone").empty());
+  for (const char* file : {"trajectory_slam.tum", "trajectory_localization.tum", "maps/global.tif"})
+    EXPECT_FALSE(fs::exists(path("alone/") + file)) << file;
+  EXPECT_TRUE(fs::exists(path("alone/report/index.html"))) << alone.err;
+
+  ASSERT_TRUE(finished(run("part", {"--odometry-only", "--max-frames", "3"})));
+  EXPECT_EQ(run("part", {"--resume"}).exit_code, 4) << "another run";
+  ASSERT_TRUE(finished(run("part", {"--odometry-only", "--resume"})));
+  EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("alone")));
+  EXPECT_EQ(run("whole", {"--odometry-only", "--resume"}).exit_code, 4);
+
+  const auto exported = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"export", path("alone"), "--format", "tum", "-o", path("x.tum")};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_program(words);
+  };
+  const ProgramResult refused = exported({"--trajectory", "localization"});
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.err.find("holds no localization trajectory"), std::string::npos) << refused.err;
+  EXPECT_EQ(exported({"--trajectory", "slam"}).exit_code, 3);
+  ASSERT_EQ(exported({}).exit_code, 0) << "the best there is";
+  EXPECT_EQ(testing::content_of(path("x.tum")), testing::content_of(path("alone/trajectory_odometry.tum")));
+  const ProgramResult score = run_program({"evaluate", path("alone"), "--truth", path("rec"), "--json"});
+  ASSERT_EQ(score.exit_code, 0) << score.err;
+  EXPECT_EQ(nlohmann::json::parse(score.out)["trajectory"], "odometry");
+}
+
 TEST_F(Stops, EachTrajectoryIsExported) {
   ASSERT_TRUE(finished(run("out")));
   for (const std::string kind : {"odometry", "slam", "localization"}) {

@@ -61,9 +61,9 @@ Matrix6d ArchiveReader::get_matrix6() {
 }
 
 Status ArchiveReader::finish(const std::string& what) const {
-  if (!ok_) return failure(ErrorCode::input, "the saved state is truncated", what);
+  if (!ok_) return failure(ErrorCode::store_damaged, "the saved state is truncated", what);
   if (offset_ != bytes_.size())
-    return failure(ErrorCode::input, "the saved state has unexpected bytes at its end", what);
+    return failure(ErrorCode::store_damaged, "the saved state has unexpected bytes at its end", what);
   return {};
 }
 

@@ -62,7 +62,7 @@ TEST(Archive, DetectsEveryTruncation) {
     read_example(reader);
     const Status status = reader.finish("odometry state");
     ASSERT_FALSE(status) << size;
-    EXPECT_EQ(status.error().code, ErrorCode::input);
+    EXPECT_EQ(status.error().code, ErrorCode::store_damaged);
     EXPECT_EQ(status.error().where, "odometry state");
   }
 }

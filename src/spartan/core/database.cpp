@@ -25,7 +25,7 @@ Error error_of(sqlite3* db, const std::string& path) {
       return {ErrorCode::output, "is in use by another process", path, "wait until the other process has finished"};
     case SQLITE_NOTADB:
     case SQLITE_CORRUPT:
-      return {ErrorCode::input, "is damaged or not a database: " + what, path, "run again into a new folder"};
+      return {ErrorCode::store_damaged, "is damaged or not a database: " + what, path, "run again into a new folder"};
     default:
       return {ErrorCode::internal, what, path, ""};
   }

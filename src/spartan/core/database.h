@@ -29,7 +29,8 @@ class SqlStatement {
   SqlStatement& bind(int index, const Bytes& blob);
   SqlStatement& bind(int index, const std::optional<double>& value);  ///< NULL for nullopt
 
-  /// Advances to the next row: true if there is one. Code `output` if the disk is full or the file cannot be written.
+  /// Advances to the next row: true if there is one. Codes: `output` if the disk is full or the file cannot be
+  /// written, `store_damaged`.
   Result<bool> step();
   /// Runs the statement to its end and resets it.
   Status run();
@@ -52,7 +53,7 @@ class Database {
  public:
   enum class Mode { create, open, read_only };
   /// Opens the database, with a write-ahead log unless it is read-only. Codes: `output` (cannot be created or written),
-  /// `input` (missing or not a database).
+  /// `store_damaged` (missing, damaged or not a database).
   static Result<Database> open(const std::string& path, Mode mode);
   Database(Database&&) noexcept;
   Database& operator=(Database&&) noexcept;

@@ -7,14 +7,17 @@
 
 namespace spartan {
 
-/// What kind of thing went wrong. The program's exit codes follow from it (docs/formats.md, "Exit codes").
+/// What kind of thing went wrong: what a caller can act on. The program's exit codes follow from it (docs/formats.md,
+/// "Exit codes").
 enum class ErrorCode {
-  internal,       ///< a fault of the program itself
-  usage,          ///< the caller asked for something that does not exist
-  input,          ///< images or recordings missing, empty, unreadable or of the wrong shape
-  configuration,  ///< a calibration, rig, option file or scenario is invalid
-  output,         ///< something cannot be written
-  interrupted,    ///< the user asked to stop
+  internal,        ///< a fault of the program itself
+  usage,           ///< the caller asked for something that does not exist
+  input,           ///< images or recordings missing, empty, unreadable or of the wrong shape
+  frame_rejected,  ///< one stereo frame does not fit the rig; the frames after it may
+  store_damaged,   ///< a database, map tile or saved state is damaged; nothing that rests on it can go on
+  configuration,   ///< a calibration, rig, option file or scenario is invalid
+  output,          ///< something cannot be written
+  interrupted,     ///< the user asked to stop
 };
 
 /// An error for people: what happened, where (file, line, key), what to do about it.

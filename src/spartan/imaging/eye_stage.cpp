@@ -122,7 +122,7 @@ Status CameraStage::check(const FrameImage& image, const std::string& where) con
   const bool reduced = format.layout == PixelLayout::rgb && camera_.pixel_format.layout == PixelLayout::gray;
   if (reduced) format.layout = PixelLayout::gray;
   if (image.size() == camera_.size && format == camera_.pixel_format) return {};
-  return failure(ErrorCode::input,
+  return failure(ErrorCode::frame_rejected,
                  fmt::format("the image of camera '{}' is {}, but the rig specifies {}", camera_.name,
                              describe(image.size(), image.format()), describe(camera_.size, camera_.pixel_format)),
                  where, "correct size_px and the pixel format in the rig, or use images of this camera");

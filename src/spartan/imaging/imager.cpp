@@ -137,7 +137,7 @@ Result<RectifiedPair> Imager::process(const StereoFrame& frame) {
   const std::string where = fmt::format("frame {}", frame.frame_id);
   const auto found = state_->pairs.find(frame.pair);
   if (found == state_->pairs.end()) {
-    return failure(ErrorCode::input, fmt::format("the rig has no stereo pair '{}'", frame.pair), where);
+    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no stereo pair '{}'", frame.pair), where);
   }
   PairStage& stage = found->second;
   if (Status status = stage.left.check(frame.left, where); !status) return failure(status);

@@ -26,7 +26,7 @@ class Imager {
   Imager& operator=(Imager&&) noexcept;
   ~Imager();
 
-  /// The image views of the result are valid until the next call for the same pair. Code `input` where the pair of the
+  /// The image views of the result are valid until the next call for the same pair. Code `frame_rejected` where the pair of the
   /// frame is unknown or an image has another size or pixel format than its camera in the rig. RGB images of a gray
   /// camera are converted to gray.
   Result<RectifiedPair> process(const StereoFrame& frame);

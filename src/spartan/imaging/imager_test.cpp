@@ -110,7 +110,7 @@ TEST(Imager, RejectsFramesThatContradictTheRig) {
   const auto rejection = [&](const StereoFrame& frame) {
     const auto pair = imager->process(frame);
     EXPECT_FALSE(pair);
-    EXPECT_EQ(pair.error().code, ErrorCode::input);
+    EXPECT_EQ(pair.error().code, ErrorCode::frame_rejected);
     return pair.error().message();
   };
   const auto small = FrameImage::own(Image<std::uint8_t>(32, 48), {});

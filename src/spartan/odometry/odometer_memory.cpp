@@ -63,7 +63,7 @@ bool get(ArchiveReader& in, Landmark& landmark) {
 }
 
 tl::unexpected<Error> damaged(const std::string& what) {
-  return failure(ErrorCode::input, what, "odometry state", "start a new run instead of resuming this one");
+  return failure(ErrorCode::store_damaged, what, "odometry state", "start a new run instead of resuming this one");
 }
 
 }  // namespace

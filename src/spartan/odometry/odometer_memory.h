@@ -21,7 +21,7 @@ struct OdometerMemory {
   LandmarkMemory map;
 
   Bytes save() const;
-  /// Fails with code `input` where the bytes are of another version or damaged.
+  /// Fails with code `store_damaged` where the bytes are of another version or damaged.
   static Result<OdometerMemory> restore(const Bytes& bytes);
 };
 

@@ -52,7 +52,7 @@ TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
     const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length));
     const auto result = OdometerMemory::restore(cut);
     ASSERT_FALSE(result.has_value()) << length;
-    EXPECT_EQ(result.error().code, ErrorCode::input);
+    EXPECT_EQ(result.error().code, ErrorCode::store_damaged);
   }
   Bytes longer = whole;
   longer.push_back(0);

@@ -28,24 +28,31 @@ DisparityComputer::DisparityComputer(DisparityComputer&&) noexcept = default;
 DisparityComputer& DisparityComputer::operator=(DisparityComputer&&) noexcept = default;
 DisparityComputer::~DisparityComputer() = default;
 
-Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> left,
-                                                  ImageView<const std::uint8_t> right, DisparityRange range,
-                                                  ImageView<const std::uint8_t> left_mask,
-                                                  ImageView<const std::uint8_t> right_mask) {
+Status DisparityComputer::check(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                DisparityRange range, ImageView<const std::uint8_t> left_mask,
+                                ImageView<const std::uint8_t> right_mask) {
   if (left.empty() || left.size() != right.size()) {
-    return failure(ErrorCode::input,
+    return failure(ErrorCode::frame_rejected,
                    fmt::format("the left image has {}x{} pixels, the right one {}x{}", left.width(), left.height(),
                                right.width(), right.height()),
                    {}, "rectify both images of a pair to the same size");
   }
   const auto fits = [&](ImageView<const std::uint8_t> mask) { return mask.empty() || mask.size() == left.size(); };
   if (!fits(left_mask) || !fits(right_mask))
-    return failure(ErrorCode::input, "the size of a mask differs from the size of the images");
+    return failure(ErrorCode::frame_rejected, "the size of a mask differs from the size of the images");
   if (range.count() < 1 || range.max >= left.width() || range.min <= -left.width()) {
-    return failure(ErrorCode::input,
+    return failure(ErrorCode::frame_rejected,
                    fmt::format("the disparity search range {} … {} px is empty or wider than the image ({} px)",
                                range.min, range.max, left.width()));
   }
+  return {};
+}
+
+Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> left,
+                                                  ImageView<const std::uint8_t> right, DisparityRange range,
+                                                  ImageView<const std::uint8_t> left_mask,
+                                                  ImageView<const std::uint8_t> right_mask) {
+  if (Status fits = check(left, right, range, left_mask, right_mask); !fits) return failure(fits);
   using Clock = std::chrono::steady_clock;
   const auto since = [](Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();

@@ -44,11 +44,15 @@ class DisparityComputer {
   DisparityComputer& operator=(DisparityComputer&&) noexcept;
   ~DisparityComputer();
 
-  /// Both images must be rectified and of one size. Masks (255: valid, 0: excluded) may be empty. Code `input` where
-  /// sizes differ, or where the search range is empty or wider than the image.
+  /// Both images must be rectified and of one size. Masks (255: valid, 0: excluded) may be empty. Codes as check().
   Result<DisparityImage> compute(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                  DisparityRange range, ImageView<const std::uint8_t> left_mask = {},
                                  ImageView<const std::uint8_t> right_mask = {});
+
+  /// What compute() needs of its input, without computing: where this is well, compute() does not fail. Code
+  /// `frame_rejected` where sizes differ or the range is empty or wider than the image.
+  static Status check(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range,
+                      ImageView<const std::uint8_t> left_mask = {}, ImageView<const std::uint8_t> right_mask = {});
 
  private:
   struct State;

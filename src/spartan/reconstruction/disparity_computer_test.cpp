@@ -119,11 +119,12 @@ TEST(DisparityComputer, DiscardsMaskedPixels) {
 TEST(DisparityComputer, RejectsInvalidSizesAndRanges) {
   DisparityComputer computer(DisparityOptions{}, Workers(1));
   const Image<std::uint8_t> small(40, 30), other(41, 30);
-  EXPECT_EQ(computer.compute(small, other, {0, 15}).error().code, ErrorCode::input);
-  EXPECT_EQ(computer.compute(small, small, {0, 40}).error().code, ErrorCode::input) << "wider than the image";
-  EXPECT_EQ(computer.compute(small, small, {5, 4}).error().code, ErrorCode::input) << "empty";
-  EXPECT_EQ(computer.compute({}, {}, {0, 3}).error().code, ErrorCode::input);
-  EXPECT_EQ(computer.compute(small, small, {0, 15}, other, {}).error().code, ErrorCode::input) << "mask";
+  EXPECT_TRUE(DisparityComputer::check(small, small, {0, 15}));
+  EXPECT_EQ(computer.compute(small, other, {0, 15}).error().code, ErrorCode::frame_rejected);
+  EXPECT_EQ(computer.compute(small, small, {0, 40}).error().code, ErrorCode::frame_rejected) << "wider than the image";
+  EXPECT_EQ(computer.compute(small, small, {5, 4}).error().code, ErrorCode::frame_rejected) << "empty";
+  EXPECT_EQ(computer.compute({}, {}, {0, 3}).error().code, ErrorCode::frame_rejected);
+  EXPECT_EQ(computer.compute(small, small, {0, 15}, other, {}).error().code, ErrorCode::frame_rejected) << "mask";
 }
 
 TEST(DisparityComputer, AcceptsTinyImages) {

@@ -1,17 +1,15 @@
 #include "spartan/reconstruction/disparity_merger.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
 #include <utility>
 
 namespace spartan {
 namespace {
 
-constexpr std::size_t kMostViews = 8;
+constexpr std::size_t kViewBits = 8;  // of MergedRange::views
 constexpr int kClasses = 4;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
@@ -65,7 +63,6 @@ struct DisparityMerger::Layer {
 DisparityMerger::DisparityMerger(const MergingOptions& options, const Pose& body_from_centre,
                                  std::span<const ViewGeometry> views, double nearest_m, Workers workers)
     : options_(options), body_from_centre_(body_from_centre), workers_(std::move(workers)) {
-  if (views.size() > kMostViews) throw std::invalid_argument("DisparityMerger: more than 8 views");
   camera_ = plan_panorama(options.projection, options.pixels_per_degree * 180 / std::numbers::pi, body_from_centre,
                           views, nearest_m, options.farthest_m);
 }
@@ -131,7 +128,7 @@ std::uint8_t most_votes(std::uint32_t votes) {
 void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row,
                                MergedRange& merged) const {
   const auto gate = static_cast<float>(options_.gate_sigmas);
-  std::array<Candidate, kMostViews> found;
+  std::vector<Candidate> found(views.size());
   for (int x = 0; x < camera_.size().width; ++x) {
     std::size_t count = 0;
     for (std::size_t k = 0; k < views.size(); ++k) {
@@ -146,9 +143,10 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
                         n};
     }
     if (count == 0) continue;
-    for (std::size_t i = 1; i < count; ++i) {
-      for (std::size_t j = i; j > 0 && found[j].range < found[j - 1].range; --j) std::swap(found[j], found[j - 1]);
-    }
+    std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count),
+              [](const Candidate& a, const Candidate& b) {
+                return a.range != b.range ? a.range < b.range : a.view < b.view;
+              });
     // From the nearest surface on: it is retained unless more views see free space through it than see it.
     std::size_t first = 0, last = 0;
     while (true) {
@@ -176,7 +174,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
       weights += 1 / c.variance;
       sum += c.range / c.variance;
       gray += c.gray / c.variance;
-      seen_by = static_cast<std::uint8_t>(seen_by | 1U << c.view);
+      seen_by = static_cast<std::uint8_t>(seen_by | 1U << c.view % kViewBits);
       if (c.count > best->count) best = &c;
     }
     merged.range_m(x, row) = sum / weights;

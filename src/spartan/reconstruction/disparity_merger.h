@@ -60,7 +60,7 @@ struct MergedRange {
   Pose body_from_centre;
   Image<float> range_m;         ///< Along the ray; NaN where unknown.
   Image<float> sigma_m;         ///< Standard deviation of the range.
-  Image<std::uint8_t> views;    ///< Bit i: view i contributed.
+  Image<std::uint8_t> views;    ///< Bit i: view i, i + 8, i + 16 … contributed.
   Image<std::uint8_t> gray;     ///< Mean gray level, weighted by the ranges' inverse variances.
   Image<std::uint8_t> classes;  ///< Majority GroundClass of the view with the most pixels in the cell.
 };
@@ -74,7 +74,7 @@ struct MergedRange {
 /// docs/math/stereo.md.
 class DisparityMerger {
  public:
-  /// At most 8 views.
+  /// Any number of views; merge() holds one layer of the panorama's size for each.
   DisparityMerger(const MergingOptions& options, const Pose& body_from_centre, std::span<const ViewGeometry> views,
                   double nearest_m, Workers workers);
 

@@ -108,6 +108,54 @@ TEST(DisparityMerger, ViewsThatAgreeReduceTheVariance) {
       << "z² σ / (f b)";
 }
 
+// Each of three views four times: the same surfaces with a quarter of the variance.
+TEST(DisparityMerger, MergesAnyNumberOfViews) {
+  Stop twelve;
+  for (int i = 0; i < 4; ++i) {
+    const Stop three = three_pans([](double, double) { return 0; });
+    for (std::size_t k = 0; k < 3; ++k) {
+      twelve.geometries.push_back(three.geometries[k]);
+      twelve.disparities.push_back(three.disparities[k].clone());
+      twelve.grays.push_back(three.grays[k].clone());
+    }
+  }
+  const MergedRange few = three_pans([](double, double) { return 0; }).merge(coarse()), many = twelve.merge(coarse());
+  ASSERT_EQ(few.range_m.size(), many.range_m.size());
+  EXPECT_EQ(known(few.range_m), known(many.range_m));
+  for (int y = 0; y < few.range_m.height(); ++y) {
+    for (int x = 0; x < few.range_m.width(); ++x) {
+      if (!std::isfinite(few.range_m(x, y))) continue;
+      ASSERT_NEAR(many.range_m(x, y), few.range_m(x, y), 1e-5F * few.range_m(x, y));
+      ASSERT_NEAR(many.sigma_m(x, y), few.sigma_m(x, y) / 2, 1e-4F * few.sigma_m(x, y));
+      ASSERT_NEAR(many.gray(x, y), few.gray(x, y), 1);
+      ASSERT_NE(many.views(x, y), 0);
+    }
+  }
+}
+
+TEST(DisparityMerger, ViewsBeyondTheEighthShareTheBitsOfTheFirst) {
+  const Stop pans = three_pans([](double, double) { return 0; });
+  Stop ten;
+  for (int i = 0; i < 10; ++i) {
+    const std::size_t k = i < 8 ? 0 : 2;
+    ten.geometries.push_back(pans.geometries[k]);
+    ten.disparities.push_back(pans.disparities[k].clone());
+    ten.grays.push_back(pans.grays[k].clone());
+  }
+  const MergedRange merged = ten.merge(coarse());
+  int left = 0, right = 0, both = 0;
+  for (int y = 0; y < merged.views.height(); ++y) {
+    for (int x = 0; x < merged.views.width(); ++x) {
+      left += merged.views(x, y) == 0xFF && x < merged.views.width() / 3 ? 1 : 0;
+      right += merged.views(x, y) == 3 ? 1 : 0;
+      both += merged.views(x, y) != 0 && merged.views(x, y) != 0xFF && merged.views(x, y) != 3 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(left, 100) << "views 0 to 7";
+  EXPECT_GT(right, 100) << "views 8 and 9 have the bits 0 and 1";
+  EXPECT_EQ(both, 0);
+}
+
 // A false surface that only the middle view sees: two other views, or one, see free space through it.
 TEST(DisparityMerger, DiscardsASurfaceThatMoreViewsSeeThrough) {
   Stop stop;

@@ -21,7 +21,7 @@ Image<Rgb8> draw_classes(ImageView<const std::uint8_t> left, ImageView<const std
 Image<Rgb8> draw_v_disparity(const VDisparity& v_disparity, const RectifiedStereo& geometry,
                              const VDisparityOptions& options);
 
-/// The views that contributed to each cell, a colour for each set of them. `views` as MergedRange::views.
+/// The views that contributed to each cell, a color for each set of them, the same for every eighth view. `views` as MergedRange::views.
 Image<Rgb8> draw_coverage(ImageView<const std::uint8_t> views);
 
 }  // namespace spartan

@@ -34,6 +34,11 @@ Pose centre_of(std::span<const PositionView> views) {
 PositionMapper::PositionMapper(const DisparityOptions& disparity, const MappingOptions& options, Workers workers)
     : options_(options), workers_(workers), computer_(disparity, workers), generator_(options.map, workers) {}
 
+Status PositionMapper::check(const RectifiedPair& shot, double nearest_m) {
+  return DisparityComputer::check(shot.left, shot.right, disparity_range(shot.geometry, nearest_m), shot.left_mask,
+                                  shot.right_mask);
+}
+
 Status PositionMapper::add(const RectifiedPair& shot, double nearest_m, const Eigen::Vector3d& up_in_body) {
   Stopwatch watch;
   const auto image = computer_.compute(shot.left, shot.right, disparity_range(shot.geometry, nearest_m), shot.left_mask,

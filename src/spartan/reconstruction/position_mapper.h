@@ -53,8 +53,11 @@ class PositionMapper {
  public:
   PositionMapper(const DisparityOptions& disparity, const MappingOptions& options, Workers workers);
 
+  /// Whether add() of that view would succeed, without computing. Codes as DisparityComputer::check().
+  static Status check(const RectifiedPair& shot, double nearest_m);
+
   /// Adds a view of the current stop. `nearest_m`: nearest depth of the search range, as StereoPair says. `up_in_body`:
-  /// direction away from the expected ground plane, body frame. Code `input` as DisparityComputer.
+  /// direction away from the expected ground plane, body frame. Codes as check().
   Status add(const RectifiedPair& shot, double nearest_m, const Eigen::Vector3d& up_in_body = Eigen::Vector3d::UnitZ());
 
   std::span<const PositionView> views() const { return views_; }

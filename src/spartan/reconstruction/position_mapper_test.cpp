@@ -111,7 +111,7 @@ TEST(PositionMapper, RejectsImagesOfDifferentSizes) {
   pair.right = views().pair(1).right;
   const Status refused = mapper.add(pair, kNearest_m);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::input);
+  EXPECT_EQ(refused.error().code, ErrorCode::frame_rejected);
   EXPECT_TRUE(mapper.views().empty());
 }
 

@@ -169,9 +169,7 @@ const Submap& GlobalMap::submap_for(const Eigen::Vector3d& place) {
 Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const UncertainPose& world_from_body,
                       const Matrix6d& relative) {
   const Eigen::Vector3d body = world_from_body.pose.translation();
-  const std::int32_t stop = stops_.empty() ? 0 : stops_.back().id + 1;
-  stops_.push_back({stop, stamp, world_from_body});
-  const Submap submap = submap_for(body);
+  const Submap submap = submap_for(body);  // a new one has no tiles that could fail to load
   const auto offset = submap.lattice_offset(cell_m_);
   if (!offset) throw std::logic_error("GlobalMap::add: the newest submap was moved off the lattice");
   const auto minus_anchor_height = static_cast<float>(-submap.world_from_submap.translation().z());
@@ -185,9 +183,19 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
   const SurfaceGrid grid = grid_of(local);
   const LatticeWindow& window = grid.window;
   const CellFusion fusion_parameters = fusion();
-  for (int ty = Tile::of(window.north - window.height - offset->y); ty <= Tile::of(window.north - 1 - offset->y);
-       ++ty) {
-    for (int tx = Tile::of(window.west - offset->x); tx <= Tile::of(window.west + window.width - 1 - offset->x); ++tx) {
+  const int south_tile = Tile::of(window.north - window.height - offset->y),
+            north_tile = Tile::of(window.north - 1 - offset->y), west_tile = Tile::of(window.west - offset->x),
+            east_tile = Tile::of(window.west + window.width - 1 - offset->x);
+  // Everything that can fail comes first, so that an error leaves the map unchanged.
+  for (int ty = south_tile; ty <= north_tile; ++ty) {
+    for (int tx = west_tile; tx <= east_tile; ++tx) {
+      if (const auto loaded = load({submap.id, tx, ty}); !loaded) return failure(loaded);
+    }
+  }
+  const std::int32_t stop = stops_.empty() ? 0 : stops_.back().id + 1;
+  stops_.push_back({stop, stamp, world_from_body});
+  for (int ty = south_tile; ty <= north_tile; ++ty) {
+    for (int tx = west_tile; tx <= east_tile; ++tx) {
       Tile* tile = nullptr;
       for (int y = 0; y < kSide; ++y) {
         const int row = window.north - 1 - (ty * kSide + y + offset->y);

@@ -54,6 +54,7 @@ class GlobalMap {
   /// Fuses a local map that was generated at `world_from_body`, cell by cell, and appends a stop with the next number.
   /// `relative`: covariance of the pose relative to this map (right perturbation). It inflates the variances of the
   /// observations by J relative Jᵀ, J the Jacobian of the elevation with respect to the pose.
+  /// After an error of the store nothing has changed.
   Status add(const LocalMap& local, const Stamp& stamp, const UncertainPose& world_from_body, const Matrix6d& relative);
   /// Appends another map's submaps and stops. Overlapping submaps are fused in views.
   Status merge(GlobalMap& other);

@@ -285,7 +285,8 @@ TEST(GlobalMap, SavingAndLoadingDoesNotChangeTheResult) {
   EXPECT_EQ(all_of(again->map()), all_of(uninterrupted));
 
   EXPECT_EQ(MapFile::open(folder.file("none"), {}, Database::Mode::open).error().code, ErrorCode::input);
-  EXPECT_EQ(MapFile::open(folder.write("text", "no map"), {}, Database::Mode::open).error().code, ErrorCode::input);
+  EXPECT_EQ(MapFile::open(folder.write("text", "no map"), {}, Database::Mode::open).error().code,
+            ErrorCode::store_damaged);
   Database db = *Database::open(path, Database::Mode::open);
   ASSERT_TRUE(db.execute("PRAGMA user_version = 99"));
   EXPECT_EQ(MapFile::open(path, {}, Database::Mode::open).error().code, ErrorCode::configuration);

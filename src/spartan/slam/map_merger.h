@@ -35,7 +35,7 @@ class MapMerger {
   MapMerger(const SlamOptions& options, const MapOptions& map_options, const Workers& workers);
 
   /// Adds the points of one stop, in its body frame. `world_from_body`: prior pose of the odometry or the localization.
-  /// Errors are those of the store that tiles are read from.
+  /// Errors are those of the store that tiles are read from; after one nothing has changed.
   Result<MapMergeResult> add(std::span<const SurfacePoint> points, const Stamp& stamp,
                              const UncertainPose& world_from_body);
 
@@ -47,8 +47,8 @@ class MapMerger {
   Status flush() { return map_.flush(); }
   /// The state that belongs to the flushed tables, versioned.
   Bytes save() const;
-  /// Restores the state of `save()` with the tables of that moment. Code `input` where the bytes are damaged, of
-  /// another version, or do not fit the tables.
+  /// Restores the state of `save()` with the tables of that moment. Codes: `store_damaged` where the bytes
+  /// are damaged or do not fit the tables, `input` where they are of another version.
   Status restore(const Bytes& bytes, TileStore& store);
 
  private:

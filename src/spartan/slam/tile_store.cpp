@@ -119,13 +119,13 @@ Result<Tile> TileStore::read(const Entry& e) {
   if (!row || !*row) {
     select.reset();
     if (!row) return failure(row);
-    return failure(ErrorCode::input, name_of(e) + " is missing", db_->path(), "make the map anew");
+    return failure(ErrorCode::store_damaged, name_of(e) + " is missing", db_->path(), "make the map anew");
   }
   const std::int64_t checksum = select.integer(0);
   const Bytes bytes = select.blob(1);
   select.reset();
   if (checksum != checksum_of(e, bytes)) {
-    return failure(ErrorCode::input, name_of(e) + " is damaged: its checksum does not fit", db_->path(),
+    return failure(ErrorCode::store_damaged, name_of(e) + " is damaged: its checksum does not fit", db_->path(),
                    "make the map anew");
   }
   return tile_from_bytes(bytes, db_->path() + ": " + name_of(e));

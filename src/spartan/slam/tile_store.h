@@ -29,7 +29,7 @@ class TileStore {
   /// All tiles in the order of their keys, with their newest revisions.
   Result<std::vector<Entry>> index();
   Status write(const Entry& entry, const Tile& tile);
-  /// Code `input`, naming file and tile, where the tile is missing or its checksum is wrong.
+  /// Code `store_damaged`, naming file and tile, where the tile is missing or its checksum is wrong.
   Result<Tile> read(const Entry& entry);
 
   Status write(const Submap& submap);

@@ -99,7 +99,7 @@ TEST(TileStore, ReportsDamageWithFileAndTile) {
   ASSERT_TRUE(db.execute("UPDATE map_tiles SET cells = zeroblob(length(cells))"));
   const auto tile = store->read({{0, 2, 3}, 1});
   ASSERT_FALSE(tile);
-  EXPECT_EQ(tile.error().code, ErrorCode::input);
+  EXPECT_EQ(tile.error().code, ErrorCode::store_damaged);
   EXPECT_THAT(tile.error().message(), HasSubstr(path));
   EXPECT_THAT(tile.error().message(), HasSubstr("tile 2, 3 of submap 0, revision 1 is damaged"));
   // The right bytes under a wrong key are damage as well.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -74,6 +75,11 @@ Result<std::string> trajectory_text(const RunFolder& folder, ExportFormat format
   return failure(ErrorCode::internal, "is not a format for trajectories", folder.path);
 }
 
+TrajectoryKind best_of(const std::vector<FrameRecord>& frames) {
+  return *std::find_if(kTrajectoriesBestFirst.begin(), kTrajectoriesBestFirst.end(),
+                       [&](TrajectoryKind kind) { return has_trajectory(frames, kind); });
+}
+
 Status export_map(const std::string& run_folder, const Workers& workers, const std::string& path) {
   auto saved = SavedMap::open(run_folder);
   if (!saved) return failure(saved);
@@ -93,8 +99,8 @@ Result<ExportFormat> parse_export_format(std::string_view name) {
   return failure(ErrorCode::usage, fmt::format("'{}' is not a format; known: {}", name, known), "--format");
 }
 
-Status export_run(const std::string& run_folder, ExportFormat format, TrajectoryKind kind, const Workers& workers,
-                  const std::string& path) {
+Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
+                  const Workers& workers, const std::string& path) {
   if (format == ExportFormat::geotiff) return export_map(run_folder, workers, path);
   const RunFolder folder{run_folder};
   auto store = RunStore::open_read_only(folder.store());
@@ -107,7 +113,12 @@ Status export_run(const std::string& run_folder, ExportFormat format, Trajectory
   const auto frames = store->frames();
   if (!frames) return failure(frames);
   if (frames->empty()) return failure(ErrorCode::input, "holds no frames", folder.store());
-  const auto text = trajectory_text(folder, format, kind, *frames);
+  if (kind && !has_trajectory(*frames, *kind)) {
+    return failure(ErrorCode::input, fmt::format("holds no {} trajectory", name_of(*kind)), folder.path,
+                   "run without --odometry-only");
+  }
+  const TrajectoryKind chosen = kind.value_or(best_of(*frames));
+  const auto text = trajectory_text(folder, format, chosen, *frames);
   if (!text) return failure(text);
   return write_file_atomically(path, *text);
 }

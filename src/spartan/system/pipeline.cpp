@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "spartan/localization/dead_reckoning.h"
 #include "spartan/localization/start_frame.h"
 #include "spartan/localization/vision_track.h"
 #include "spartan/reconstruction/disparity_computer.h"
@@ -42,9 +43,11 @@ struct Pipeline::State {
         localizer(with_gravity(options_in)),
         odometry_track(with_gravity(options_in)),
         slam_track(with_gravity(options_in)),
+        dead_reckoning(options_in.localization.vision),
         position(options_in.reconstruction, options_in.mapping, workers),
         merger(options_in.slam, options_in.mapping.map, workers) {
-    maps_positions = options.maps && rig.pairs.size() > 1;
+    maps_positions = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
+    makes_terrain = options.terrain.enabled && !options.odometry_only;
   }
 
   Rig rig;
@@ -55,9 +58,10 @@ struct Pipeline::State {
   DisparityComputer disparity_computer;
   Localizer localizer;
   VisionTrack odometry_track, slam_track;  // the odometry's poses, without and with the map's corrections
+  DeadReckoning dead_reckoning;            // in the place of all three where the odometry runs alone
   PositionStage position;
   MapMerger merger;
-  bool maps_positions = false;
+  bool maps_positions = false, makes_terrain = false;
   StageClock clock;
 
   std::optional<Eigen::Vector3d> up_in_body;  // at the start, as level() was told
@@ -74,20 +78,24 @@ struct Pipeline::State {
   void start(const RectifiedPair& shot);
   void advance(const MotionEstimate& motion);
   RelativeMotion body_motion(const RectifiedPair& shot, const MotionEstimate& motion) const;
+  void take(const Measurement& sample);
   void localize(const RelativeMotion& moved);
   Status pass(const StereoFrame& frame, const RectifiedPair& shot, const RelativeMotion& moved);
   void hear_map(const PositionSurvey& survey, const PoseConstraint& constraint);
   Status look(const StereoFrame& frame);
   Result<std::optional<MappedPosition>> leave_position();
   bool terrain_is_due() const;
+  Status check_disparities(const RectifiedPair& shot) const;
   Result<TerrainView> reconstruct(const RectifiedPair& shot);
 };
 
 void Pipeline::State::start(const RectifiedPair& shot) {
   localizer.start(shot.stamp, shot.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body);
   const Pose first = localizer.estimate().world_from_body.pose;
-  odometry_track.start(shot.stamp, first);
-  slam_track.start(shot.stamp, first);
+  if (!options.odometry_only) {
+    odometry_track.start(shot.stamp, first);
+    slam_track.start(shot.stamp, first);
+  }
   world_from_left = first * shot.body_from_left;
   started = true;
 }
@@ -112,6 +120,11 @@ RelativeMotion Pipeline::State::body_motion(const RectifiedPair& shot, const Mot
     moved.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
   moved.covariance = turn * motion.covariance * turn.transpose();
   return moved;
+}
+
+// The odometry alone needs to know only how the world lies at the start.
+void Pipeline::State::take(const Measurement& sample) {
+  if (!options.odometry_only || !started) localizer.add(sample);
 }
 
 void Pipeline::State::localize(const RelativeMotion& moved) {
@@ -142,9 +155,10 @@ Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
     position.leave();
     return std::nullopt;
   }
-  const auto survey = clock.measure("mapping", [&] { return position.leave(); });
+  const auto survey = clock.measure("mapping", [&] { return position.survey(); });
   auto merged = clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->standing); });
-  if (!merged) return failure(merged);
+  if (!merged) return failure(merged);  // the position stays at hand
+  position.leave();
   if (merged->constraint) hear_map(*survey, *merged->constraint);
   return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(*merged)};
 }
@@ -157,8 +171,14 @@ void Pipeline::State::hear_map(const PositionSurvey& survey, const PoseConstrain
 }
 
 bool Pipeline::State::terrain_is_due() const {
-  if (!options.terrain.enabled) return false;
+  if (!makes_terrain) return false;
   return distance_of_last_terrain_m < 0 || distance_m - distance_of_last_terrain_m >= options.terrain.every_m;
+}
+
+// Whether the terrain and the map of a position can be made of a shot, wherever they are due.
+Status Pipeline::State::check_disparities(const RectifiedPair& shot) const {
+  if (!maps_positions && !makes_terrain) return {};
+  return PositionMapper::check(shot, pair.nearest_m);
 }
 
 Result<TerrainView> Pipeline::State::reconstruct(const RectifiedPair& shot) {
@@ -193,16 +213,16 @@ void Pipeline::level(std::span<const ImuSample> at_rest) {
     state_->up_in_body = rest->accel_m_s2.normalized();
 }
 void Pipeline::add(const ImuSample& sample) {
-  state_->localizer.add(sample);
+  state_->take(sample);
 }
 void Pipeline::add(const WheelSample& sample) {
-  state_->localizer.add(sample);
+  state_->take(sample);
 }
 void Pipeline::add(const CompassSample& sample) {
-  state_->localizer.add(sample);
+  state_->take(sample);
 }
 void Pipeline::add(const InclinometerSample& sample) {
-  state_->localizer.add(sample);
+  state_->take(sample);
 }
 
 Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
@@ -212,13 +232,15 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
       if (Status status = s.look(frame); !status) return failure(status);
       return std::nullopt;
     }
-    return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair),
+    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair),
                    fmt::format("frame {}", frame.frame_id), "frames carry the name of their pair in the rig");
   }
   const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
   if (!shot) return failure(shot);
   s.clock.add(shot->times);
 
+  // What can fail comes first, here and in leave_position(); behind it every stage moves on, and none of them fails.
+  if (Status fits = s.check_disparities(*shot); !fits) return failure(fits);
   FrameResult result;
   // Before the stages move on: the map belongs to where the rover still stands.
   if (s.maps_positions && frame.position_id != s.position.position_id()) {
@@ -231,19 +253,27 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
 
   result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot); });
   const RelativeMotion moved = s.body_motion(*shot, result.motion);
-  s.clock.measure("localization", [&] {
-    if (!result.motion.first) {
-      s.advance(result.motion);
-      s.localize(moved);
-    }
-  });
+  if (!result.motion.first) {
+    s.advance(result.motion);
+    if (s.options.odometry_only) s.dead_reckoning.add(moved);
+  }
+  if (!s.options.odometry_only) {
+    s.clock.measure("localization", [&] {
+      if (!result.motion.first) s.localize(moved);
+    });
+  }
   s.last_stamp = shot->stamp;
   result.frame_id = frame.frame_id;
   result.pair = frame.pair;
   result.stamp = shot->stamp;
-  result.world_from_body = {s.world_from_left * s.left_from_body, s.odometry_track.world_from_body().covariance};
-  result.localization = s.localizer.estimate();
-  result.slam = s.slam_track.world_from_body();
+  result.world_from_body.pose = s.world_from_left * s.left_from_body;
+  if (s.options.odometry_only) {
+    result.world_from_body.covariance = s.dead_reckoning.covariance();
+  } else {
+    result.world_from_body.covariance = s.odometry_track.world_from_body().covariance;
+    result.localization = s.localizer.estimate();
+    result.slam = s.slam_track.world_from_body();
+  }
   if (Status status = s.pass(frame, *shot, moved); !status) return failure(status);
 
   if (s.terrain_is_due()) {
@@ -292,7 +322,7 @@ Status Pipeline::recall(const StereoFrame& frame) {
   State& s = *state_;
   const StereoPair* const pair = s.rig.find_pair(frame.pair);
   if (pair == nullptr)
-    return failure(ErrorCode::input, fmt::format("the rig has no pair named '{}'", frame.pair), "recall");
+    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair), "recall");
   const auto shot = s.imager.process(frame);
   if (!shot) return failure(shot);
   if (pair->name != s.pair.name) return s.position.look(frame.position_id, pair->name, *shot, pair->nearest_m);
@@ -324,8 +354,10 @@ Bytes Pipeline::save() const {
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
   s.position.save(out);
+  const bool alone = s.options.odometry_only;
   for (const Bytes& stage :
-       {s.odometer.save(), s.localizer.save(), s.odometry_track.save(), s.slam_track.save(), s.merger.save()})
+       {s.odometer.save(), s.localizer.save(), alone ? s.dead_reckoning.save() : s.odometry_track.save(),
+        alone ? Bytes() : s.slam_track.save(), s.merger.save()})
     out.put_array(stage.data(), stage.size());
   return out.take();
 }
@@ -354,8 +386,12 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   if (Status status = in.finish("run.sqlite: memory of the pipeline"); !status) return status;
   if (Status status = s.odometer.restore(stages[0]); !status) return status;
   if (Status status = s.localizer.restore(stages[1]); !status) return status;
-  if (Status status = s.odometry_track.restore(stages[2]); !status) return status;
-  if (Status status = s.slam_track.restore(stages[3]); !status) return status;
+  if (s.options.odometry_only) {
+    if (Status status = s.dead_reckoning.restore(stages[2]); !status) return status;
+  } else {
+    if (Status status = s.odometry_track.restore(stages[2]); !status) return status;
+    if (Status status = s.slam_track.restore(stages[3]); !status) return status;
+  }
   return s.merger.restore(stages[4], maps);
 }
 

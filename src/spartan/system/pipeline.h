@@ -39,17 +39,18 @@ struct MappedPosition {
   MapMergeResult merged;   ///< where it lies there, and the local map at that place
 };
 
-/// What one stereo shot told.
+/// What one stereo shot told. `slam`, `localization`, terrain and position are absent in a run by odometry alone
+/// (RunOptions::odometry_only).
 struct FrameResult {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
   UncertainPose world_from_body;  ///< by odometry alone; the covariance tells of its lasting errors too
   MotionEstimate motion;
-  UncertainPose slam;                      ///< world_from_body: odometry, corrected by the map
-  LocalizationEstimate localization;       ///< by all sensors
-  std::optional<TerrainView> terrain;      ///< where one was due
-  std::optional<MappedPosition> position;  ///< the one that was left for this shot
+  std::optional<UncertainPose> slam;                 ///< world_from_body: odometry, corrected by the map
+  std::optional<LocalizationEstimate> localization;  ///< by all sensors
+  std::optional<TerrainView> terrain;                ///< where one was due
+  std::optional<MappedPosition> position;            ///< the one that was left for this shot
   std::vector<StageTime> times;
 };
 
@@ -76,9 +77,10 @@ class Pipeline {
   void add(const InclinometerSample& sample);
 
   /// One shot. Those of pairs that do not drive the odometry give nothing by themselves: they are views of the position
-  /// whose id they carry, which becomes a map when the odometry's pair reports another position. Code `input` where the
-  /// images do not fit the rig, or it has no such pair: the frame is then left out and the pipeline goes on with the
-  /// next.
+  /// whose id they carry, which becomes a map when the odometry's pair reports another position. After an error nothing
+  /// has advanced, as if the shot had never been: the pipeline may go on with the next one, or get this one again.
+  /// Codes: `frame_rejected` where the images do not fit the rig, or it has no such pair; those of the store that tiles
+  /// of the map are read from (`store_damaged`).
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
 
   /// The global map's tiles may live in the store from now on; what has changed is written by flush_maps(), inside the
@@ -87,7 +89,7 @@ class Pipeline {
   Status flush_maps();
   GlobalMap& global_map();
 
-  /// The position at hand, where it is a map already: at the end of a drive.
+  /// The position at hand, where it is a map already: at the end of a drive. After an error it stays at hand.
   Result<std::optional<MappedPosition>> leave_position();
 
   /// What took its time since the last result: views of a position, leaving it.

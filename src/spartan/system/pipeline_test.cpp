@@ -183,6 +183,41 @@ TEST(Pipeline, IsLevelledByTheFirstSecondWhereNothingCameBefore) {
   EXPECT_NEAR((first.world_from_body.pose.rotation() * Eigen::Vector3d::UnitX()).z(), std::sin(tilt), 1e-9);
 }
 
+TEST(Pipeline, OdometryAloneGivesTheSamePoses) {
+  RunOptions options;
+  options.odometry_only = true;
+  Pipeline whole = pipeline_of(), alone = pipeline_of(options), later = pipeline_of(options, 2);
+  for (Pipeline* pipeline : {&whole, &alone}) {
+    for (int i = 0; i < 50; ++i) {
+      pipeline->add(ImuSample{{i * 10'000'000LL - 500'000'000LL}, {0, 0, 0}, 9.81 * Eigen::Vector3d(0.1, 0, 0.99)});
+      pipeline->add(CompassSample{{i * 10'000'000LL - 500'000'000LL}, 0.5, 0.01});
+    }
+  }
+  EmptyMaps maps;
+  for (int i = 0; i < 5; ++i) {
+    if (i == 3) {
+      ASSERT_TRUE(later.restore(alone.save(), maps.tiles));
+    }
+    const FrameResult all = push(whole, i), one = push(alone, i);
+    EXPECT_EQ(one.world_from_body.pose.matrix(), all.world_from_body.pose.matrix());
+    for (int k = 0; k < 6 && i > 0; ++k) {
+      const double wanted = all.world_from_body.covariance(k, k);
+      EXPECT_NEAR(one.world_from_body.covariance(k, k), wanted, 0.05 * wanted + 1e-11) << i << ", " << k;
+    }
+    EXPECT_FALSE(one.slam || one.localization || one.terrain || one.position);
+    EXPECT_TRUE(all.slam && all.localization);
+    for (const StageTime& time : one.times)
+      EXPECT_TRUE(time.stage.starts_with("imaging") || time.stage == "odometry") << time.stage;
+    if (i < 3) continue;
+    const FrameResult again = push(later, i);
+    EXPECT_EQ(again.world_from_body.pose.matrix(), one.world_from_body.pose.matrix());
+    EXPECT_EQ(again.world_from_body.covariance, one.world_from_body.covariance);
+  }
+  EXPECT_EQ(alone.save(), later.save());
+  EXPECT_TRUE(alone.gravity_measured());
+  EXPECT_TRUE(alone.heading_east());
+}
+
 TEST(Pipeline, OtherPairsOfTheRigGiveNothingByThemselves) {
   Pipeline pipeline = pipeline_of();
   EXPECT_EQ(pipeline.odometry_pair(), "narrow");
@@ -200,14 +235,14 @@ TEST(Pipeline, LeavesOutFramesThatDoNotFitAndGoesOn) {
   stranger.pair = "rear";
   const auto unknown = pipeline.add(stranger);
   ASSERT_FALSE(unknown);
-  EXPECT_EQ(unknown.error().code, ErrorCode::input);
+  EXPECT_EQ(unknown.error().code, ErrorCode::frame_rejected);
   EXPECT_NE(unknown.error().message().find("rear"), std::string::npos);
   StereoFrame small = frame_of(1);
   const Image<std::uint8_t> cut(100, 100);
   small.right = FrameImage::borrow(cut.view(), {});
   const auto unfit = pipeline.add(small);
   ASSERT_FALSE(unfit);
-  EXPECT_EQ(unfit.error().code, ErrorCode::input);
+  EXPECT_EQ(unfit.error().code, ErrorCode::frame_rejected);
   EXPECT_NEAR(push(pipeline, 1).world_from_body.pose.translation().x(), kStep_m, 0.002);
 }
 

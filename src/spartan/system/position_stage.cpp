@@ -22,9 +22,13 @@ RectifiedPair PositionStage::KeptShot::view() const {
 
 Status PositionStage::pass(std::int64_t position_id, const RectifiedPair& shot, double nearest_m,
                            const UncertainPose& standing, const UncertainPose& moved) {
+  const bool arrives = position_id >= 0 && position_id != position_id_;
+  if (arrives) {
+    if (Status fits = PositionMapper::check(shot, nearest_m); !fits) return fits;
+  }
   std::erase_if(early_, [&](const EarlyLook& look) { return look.position_id != position_id; });
   if (position_id < 0) return {};
-  if (position_id != position_id_) return arrive(position_id, shot, nearest_m, standing);
+  if (arrives) return arrive(position_id, shot, nearest_m, standing);
   last_stamp_ = shot.stamp;
   since_arrival_ = compose(since_arrival_, moved);
   return {};
@@ -61,6 +65,7 @@ Status PositionStage::add(const RectifiedPair& shot, double nearest_m) {
 Status PositionStage::look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot,
                            double nearest_m) {
   if (position_id < 0) return {};
+  if (Status fits = PositionMapper::check(shot, nearest_m); !fits) return fits;
   std::erase_if(wanted_, [&](const ShotName& w) { return w.pair == pair && w.left_stamp == shot.stamp; });
   if (position_id != position_id_) {
     // Of one position, so that they do not pile up where the odometry's pair has gone dark.
@@ -80,25 +85,26 @@ std::optional<Stamp> PositionStage::wanted_arrival() const {
   return position_id_ < 0 || kept_ ? std::nullopt : std::optional(stamp_);
 }
 
-std::optional<PositionSurvey> PositionStage::leave() {
-  std::optional<PositionSurvey> survey;
-  if (!mapper_.views().empty()) {
-    survey.emplace();
-    survey->position_id = position_id_;
-    survey->stamp = stamp_;
-    survey->last_stamp = last_stamp_;
-    survey->since_arrival = since_arrival_;
-    survey->standing = standing_;
-    survey->views = static_cast<int>(mapper_.views().size());
-    survey->merged = mapper_.merge();
-    survey->points = surface_points(survey->merged);
-  }
+std::optional<PositionSurvey> PositionStage::survey() {
+  if (mapper_.views().empty()) return std::nullopt;
+  PositionSurvey survey;
+  survey.position_id = position_id_;
+  survey.stamp = stamp_;
+  survey.last_stamp = last_stamp_;
+  survey.since_arrival = since_arrival_;
+  survey.standing = standing_;
+  survey.views = static_cast<int>(mapper_.views().size());
+  survey.merged = mapper_.merge();
+  survey.points = surface_points(survey.merged);
+  return survey;
+}
+
+void PositionStage::leave() {
   mapper_.leave();
   kept_.reset();
   looks_.clear();
   wanted_.clear();
   position_id_ = -1;
-  return survey;
 }
 
 void PositionStage::save(ArchiveWriter& out) const {

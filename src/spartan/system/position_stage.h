@@ -30,18 +30,19 @@ struct PositionSurvey {
 
 /// Shots of one position share a position_id. The pair that drives the odometry sees every position; a position is
 /// mapped where other pairs look too, be it before the odometry's first shot there. The stage's memory are the names of
-/// its views and the pose there: the views are looked at again after a resume.
+/// its views and the pose there: the views are looked at again after a resume. A view is checked when it comes, so that
+/// what is kept of it can be matched whenever that is due.
 class PositionStage {
  public:
   PositionStage(const DisparityOptions& disparity, const MappingOptions& options, Workers workers)
       : mapper_(disparity, options, std::move(workers)) {}
 
   /// A shot of the odometry's pair, wherever it is: the first one at a position is a view of it. `standing`: the body
-  /// at the shot; `moved`: previous_from_current of the body since the shot before. Code `input` as look().
+  /// at the shot; `moved`: previous_from_current of the body since the shot before. Codes as look().
   Status pass(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing,
               const UncertainPose& moved);
-  /// A view by the pair of that name. One of a position that the odometry passes by is left out. Code `input` as
-  /// DisparityComputer.
+  /// A view by the pair of that name. One of a position that the odometry passes by is left out. Code `frame_rejected`
+  /// where the view cannot be matched (PositionMapper::check): nothing has changed then.
   Status look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot, double nearest_m);
 
   std::int64_t position_id() const { return position_id_; }
@@ -51,8 +52,10 @@ class PositionStage {
   const std::vector<ShotName>& wanted_looks() const { return wanted_; }
   void recall_arrival(const RectifiedPair& shot, double nearest_m);
 
-  /// The position as it was seen, where other pairs looked; nothing is kept of it.
-  std::optional<PositionSurvey> leave();
+  /// The position as it was seen, where other pairs looked. It stays the position at hand until leave().
+  std::optional<PositionSurvey> survey();
+  /// Nothing is kept of the position.
+  void leave();
 
   PositionMapper& mapper() { return mapper_; }
 

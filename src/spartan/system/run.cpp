@@ -5,6 +5,7 @@
 #include <chrono>
 #include <filesystem>
 #include <utility>
+#include <vector>
 
 #include "spartan/core/files.h"
 #include "spartan/core/process.h"
@@ -216,8 +217,8 @@ Status Drive::take(const Sample& sample) {
 Status Drive::take_frame(const StereoFrame& frame) {
   auto result = pipeline_.add(frame);
   if (!result) {
-    // The shot does not fit the rig: it is said, counted and left out.
-    if (result.error().code != ErrorCode::input) return failure(result);
+    // The frame does not fit the rig: it is said, counted and left out. Whatever else fails ends the run.
+    if (result.error().code != ErrorCode::frame_rejected) return failure(result);
     return take_missing(
         {frame.frame_id, frame.pair, frame.left_stamp, FrameFault::wrong_size, result.error().message()});
   }
@@ -238,7 +239,7 @@ Status Drive::take_frame(const StereoFrame& frame) {
   record.world_from_body = shot.world_from_body;
   record.motion = shot.motion;
   record.slam = shot.slam;
-  record.localization = record_of(shot.localization);
+  if (shot.localization) record.localization = record_of(*shot.localization);
   if (shot.motion.status == TrackingStatus::lost) {
     hooks_.log.warning(fmt::format("frame {}: lost: {}", shot.frame_id, shot.motion.reason));
   }
@@ -307,12 +308,22 @@ Status write_map(GlobalMap& map, const RunRequest& request, const RunFolder& fol
   return write_global_map(map, request.options.mapping.map, Workers(request.threads), folder.global_map());
 }
 
+// What the options leave out of a run.
+std::vector<std::string> absent_parts(const RunOptions& options) {
+  std::vector<std::string> absent;
+  if (options.odometry_only) absent = {"localization", "slam"};
+  if (options.odometry_only || !options.maps) absent.emplace_back("maps");
+  if (options.odometry_only || !options.terrain.enabled) absent.emplace_back("terrain");
+  return absent;
+}
+
 // Text files are made from the store alone, so a resumed run writes the same bytes.
 Result<RunOutcome> write_results(Drive& drive, const RunRequest& request, const RunFolder& folder, RunFacts facts,
                                  const Log& log) {
   const auto frames = drive.store().frames();
   if (!frames) return failure(frames);
   for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
+    if (request.options.odometry_only && kind != TrajectoryKind::odometry) continue;
     if (Status s = write_file_atomically(folder.trajectory(kind), to_tum(trajectory_of(*frames, kind))); !s)
       return failure(s);
   }
@@ -349,6 +360,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   RunHooks hooks = given_hooks;
   hooks.log = given_hooks.log.with_file(folder.log());
   report_sequence(info, hooks.log);
+  if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
   const RunIdentity identity{fingerprint(**source), dump_options(options), to_rig_yaml(info.rig)};
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
@@ -374,6 +386,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   facts.gravity_measured = drive.gravity_measured();
   facts.heading_east = drive.heading_east();
   facts.threads = request.threads;
+  facts.absent = absent_parts(options);
   facts.resumed_from_frame = drive.resumed_from_frame();
   facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   facts.cpu_seconds = cpu_seconds();

@@ -43,8 +43,9 @@ struct RunOutcome {
   bool interrupted = false;  ///< stopped on request; `--resume` goes on
 };
 
-/// Codes: `input` (no recording, no usable frame), `configuration` (rig, options, or a resume of another run), `output`
-/// (the folder exists already, cannot be written, disk full). What was committed before an error stays.
+/// Codes: `input` (no recording, no usable frame), `store_damaged` (the run that is resumed), `configuration` (rig,
+/// options, or a resume of another run), `output` (the folder exists already, cannot be written, disk full). What was
+/// committed before an error stays.
 Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks);
 
 }  // namespace spartan

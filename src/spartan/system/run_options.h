@@ -34,6 +34,7 @@ struct RunOptions {
   double gravity_m_s2 = 0;
   bool noise_as_stated = true;
   std::string odometry_pair;
+  bool odometry_only = false;
   ImagingOptions imaging;
   OdometryOptions odometry;
   DisparityOptions reconstruction;
@@ -52,6 +53,9 @@ struct RunOptions {
         "noise_as_stated", noise_as_stated,
         "what the recording states of its sensors' noise and biases stands in the place of localization's defaults");
     v.field("odometry_pair", odometry_pair, "which pair drives the odometry; empty: the rig's first one made for it");
+    v.field("odometry_only", odometry_only,
+            "true runs the visual odometry alone: no localization, no maps, no SLAM and no terrain; the start attitude "
+            "is still measured");
     v.group("imaging", imaging);
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);

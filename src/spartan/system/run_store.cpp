@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <utility>
 
 #include "spartan/core/database.h"
 
@@ -268,32 +269,81 @@ Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& 
 
 namespace {
 
-Result<std::optional<LocalizationRecord>> read_localization(SqlStatement& select, SqlStatement& health,
-                                                            std::int64_t seq) {
-  select.bind(1, seq);
-  const auto row = select.step();
-  if (!row) return failure(row);
-  if (!*row) {
-    select.reset();
-    return std::nullopt;
+// One query over a table whose first column is a frame's `seq`, read along with the frames: its rows stand in the order
+// of the frames, so each is read once, whatever the number of frames.
+class RowsOfFrames {
+ public:
+  static Result<RowsOfFrames> open(Database& db, const char* sql) {
+    auto select = db.prepare(sql);
+    if (!select) return failure(select);
+    RowsOfFrames rows(std::move(*select), db.path());
+    if (Status s = rows.next(); !s) return failure(s);
+    return rows;
   }
+
+  /// Calls `read(row)` for each row of this frame. Frames are asked for in their order.
+  template <class Read>
+  Status of(std::int64_t seq, const Read& read) {
+    while (more_ && seq_ <= seq) {
+      if (seq_ == seq) read(std::as_const(select_));
+      if (Status s = next(); !s) return s;
+    }
+    return {};
+  }
+
+ private:
+  RowsOfFrames(SqlStatement select, std::string path) : select_(std::move(select)), path_(std::move(path)) {}
+
+  Status next() {
+    const auto row = select_.step();
+    if (!row) return failure(row);
+    more_ = *row;
+    if (!more_) return {};
+    const std::int64_t before = std::exchange(seq_, select_.integer(0));
+    if (seq_ >= before) return {};
+    return failure(ErrorCode::store_damaged, "is damaged: rows are not in the order of the frames", path_,
+                   "run again into a new folder");
+  }
+
+  SqlStatement select_;
+  std::string path_;
+  std::int64_t seq_ = 0;
+  bool more_ = false;
+};
+
+LocalizationRecord localization_of(const SqlStatement& row) {
   LocalizationRecord l;
-  const Bytes pose = select.blob(1), covariance = select.blob(2), odom = select.blob(3),
-              odom_covariance = select.blob(4);
+  const Bytes pose = row.blob(1), covariance = row.blob(2), odom = row.blob(3), odom_covariance = row.blob(4);
   l.world_from_body = {ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()};
   l.odom_from_body = {ArchiveReader(odom).get_pose(), ArchiveReader(odom_covariance).get_matrix6()};
-  if (!select.is_null(5)) l.slip = select.real(5);
-  if (!select.is_null(6)) l.slip_sigma = select.real(6);
-  select.reset();
-  health.bind(1, seq);
-  for (;;) {
-    const auto more = health.step();
-    if (!more) return failure(more);
-    if (!*more) break;
-    l.sensors.push_back({health.text(0), health.text(1), health.text(2)});
-  }
-  health.reset();
+  if (!row.is_null(5)) l.slip = row.real(5);
+  if (!row.is_null(6)) l.slip_sigma = row.real(6);
   return l;
+}
+
+FrameRecord frame_of(const SqlStatement& row) {
+  FrameRecord r;
+  r.frame_id = row.integer(1);
+  r.pair = row.text(2);
+  r.stamp.ns = row.integer(3);
+  r.status = row.text(4);
+  r.fault = row.text(5);
+  r.message = row.text(6);
+  r.has_pose = row.integer(7) != 0;
+  const Eigen::Quaterniond q(row.real(14), row.real(11), row.real(12), row.real(13));
+  r.world_from_body.pose = Pose::from_unit_quaternion(q, {row.real(8), row.real(9), row.real(10)});
+  const Bytes covariance = row.blob(15), motion = row.blob(18), motion_covariance = row.blob(19);
+  r.world_from_body.covariance = ArchiveReader(covariance).get_matrix6();
+  r.motion.from.ns = row.integer(16);
+  r.motion.to = r.stamp;
+  r.motion.first = row.integer(17) != 0;
+  r.motion.previous_from_current = ArchiveReader(motion).get_pose();
+  r.motion.covariance = ArchiveReader(motion_covariance).get_matrix6();
+  r.motion.landmarks = static_cast<int>(row.integer(20));
+  r.motion.matches = static_cast<int>(row.integer(21));
+  r.motion.inliers = static_cast<int>(row.integer(22));
+  r.motion.rms_px = row.real(23);
+  return r;
 }
 
 }  // namespace
@@ -302,63 +352,41 @@ TileStore& RunStore::tiles() {
   return *state_->tiles;
 }
 
+// Tables of several rows a frame are written in its transaction, so their rows stand in the order of the frames.
 Result<std::vector<FrameRecord>> RunStore::frames() {
-  auto select = state_->db.prepare("SELECT * FROM frames ORDER BY seq");
+  Database& db = state_->db;
+  auto select = db.prepare("SELECT * FROM frames ORDER BY seq");
   if (!select) return failure(select);
-  auto times = state_->db.prepare("SELECT stage, wall_ms, cpu_ms FROM stage_times WHERE seq = ? ORDER BY rowid");
+  auto times = RowsOfFrames::open(db, "SELECT seq, stage, wall_ms, cpu_ms FROM stage_times ORDER BY rowid");
   if (!times) return failure(times);
-  auto localization = state_->db.prepare("SELECT * FROM localization WHERE seq = ?");
+  auto localization = RowsOfFrames::open(db, "SELECT * FROM localization ORDER BY seq");
   if (!localization) return failure(localization);
-  auto slam = state_->db.prepare("SELECT * FROM slam WHERE seq = ?");
+  auto slam = RowsOfFrames::open(db, "SELECT * FROM slam ORDER BY seq");
   if (!slam) return failure(slam);
-  auto health = state_->db.prepare("SELECT sensor, state, reason FROM health WHERE seq = ? ORDER BY rowid");
+  auto health = RowsOfFrames::open(db, "SELECT seq, sensor, state, reason FROM health ORDER BY rowid");
   if (!health) return failure(health);
   std::vector<FrameRecord> records;
   for (;;) {
     const auto row = select->step();
     if (!row) return failure(row);
     if (!*row) return records;
-    FrameRecord r;
-    r.frame_id = select->integer(1);
-    r.pair = select->text(2);
-    r.stamp.ns = select->integer(3);
-    r.status = select->text(4);
-    r.fault = select->text(5);
-    r.message = select->text(6);
-    r.has_pose = select->integer(7) != 0;
-    const Eigen::Quaterniond q(select->real(14), select->real(11), select->real(12), select->real(13));
-    r.world_from_body.pose = Pose::from_unit_quaternion(q, {select->real(8), select->real(9), select->real(10)});
-    const Bytes covariance = select->blob(15), motion = select->blob(18), motion_covariance = select->blob(19);
-    r.world_from_body.covariance = ArchiveReader(covariance).get_matrix6();
-    r.motion.from.ns = select->integer(16);
-    r.motion.to = r.stamp;
-    r.motion.first = select->integer(17) != 0;
-    r.motion.previous_from_current = ArchiveReader(motion).get_pose();
-    r.motion.covariance = ArchiveReader(motion_covariance).get_matrix6();
-    r.motion.landmarks = static_cast<int>(select->integer(20));
-    r.motion.matches = static_cast<int>(select->integer(21));
-    r.motion.inliers = static_cast<int>(select->integer(22));
-    r.motion.rms_px = select->real(23);
-    times->bind(1, select->integer(0));
-    for (;;) {
-      const auto time = times->step();
-      if (!time) return failure(time);
-      if (!*time) break;
-      r.times.push_back({times->text(0), times->real(1), times->real(2)});
-    }
-    times->reset();
-    slam->bind(1, select->integer(0));
-    const auto corrected = slam->step();
-    if (!corrected) return failure(corrected);
-    if (*corrected) {
-      const Bytes pose = slam->blob(1), slam_covariance = slam->blob(2);
-      r.slam = UncertainPose{ArchiveReader(pose).get_pose(), ArchiveReader(slam_covariance).get_matrix6()};
-    }
-    slam->reset();
-    auto localized = read_localization(*localization, *health, select->integer(0));
-    if (!localized) return failure(localized);
-    r.localization = std::move(*localized);
-    records.push_back(std::move(r));
+    const std::int64_t seq = select->integer(0);
+    FrameRecord& r = records.emplace_back(frame_of(*select));
+    Status read = times->of(seq, [&](const SqlStatement& time) {
+      r.times.push_back({time.text(1), time.real(2), time.real(3)});
+    });
+    if (read)
+      read = slam->of(seq, [&](const SqlStatement& corrected) {
+        const Bytes pose = corrected.blob(1), covariance = corrected.blob(2);
+        r.slam = UncertainPose{ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()};
+      });
+    if (read)
+      read = localization->of(seq, [&](const SqlStatement& localized) { r.localization = localization_of(localized); });
+    if (read)
+      read = health->of(seq, [&](const SqlStatement& sensor) {
+        if (r.localization) r.localization->sensors.push_back({sensor.text(1), sensor.text(2), sensor.text(3)});
+      });
+    if (!read) return failure(read);
   }
 }
 

@@ -1,12 +1,14 @@
 #include "spartan/system/run_store.h"
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <filesystem>
 
+#include "spartan/core/database.h"
 #include "spartan/core/random.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -142,6 +144,82 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
   EXPECT_EQ(terrain->front().points, 1234);
 }
 
+// Steps of SQLite's virtual machine, over all databases that are opened while it lives. Statements that take more than
+// `most` are interrupted.
+class StepCounter {
+ public:
+  explicit StepCounter(std::int64_t most) {
+    steps_ = 0;
+    most_ = most;
+    sqlite3_auto_extension(reinterpret_cast<void (*)()>(&watch));
+  }
+  StepCounter(const StepCounter&) = delete;
+  StepCounter& operator=(const StepCounter&) = delete;
+  ~StepCounter() { sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(&watch)); }
+  std::int64_t steps() const { return steps_; }
+
+ private:
+  static constexpr int kGranularity = 10;
+  static int watch(sqlite3* db, const char**, const void*) {
+    sqlite3_progress_handler(
+        db, kGranularity, [](void*) { return (steps_ += kGranularity) > most_ ? 1 : 0; }, nullptr);
+    return SQLITE_OK;
+  }
+  static inline std::int64_t steps_ = 0, most_ = 0;
+};
+
+// Five frames, doubled as often as asked.
+void fill(const std::string& path, int doublings) {
+  {
+    auto store = RunStore::create(path, kIdentity);
+    ASSERT_TRUE(store) << store.error().message();
+    for (int i = 0; i < 5; ++i)
+      ASSERT_TRUE(store->commit(
+          {some_frame(i), {}, {}, {}}, [] { return Bytes{1}; }, i));
+  }
+  auto db = Database::open(path, Database::Mode::open);
+  ASSERT_TRUE(db);
+  ASSERT_TRUE(db->execute("BEGIN"));
+  for (int i = 0; i < doublings; ++i) {
+    for (const std::string table : {"frames", "stage_times", "localization", "slam", "health"}) {
+      const Status doubled = db->execute(
+          "CREATE TEMP TABLE more AS SELECT * FROM " + table + " ORDER BY rowid; UPDATE more SET seq = seq + " +
+          std::to_string(5 << i) + "; INSERT INTO " + table + " SELECT * FROM more ORDER BY rowid; DROP TABLE more");
+      ASSERT_TRUE(doubled) << doubled.error().message();
+    }
+  }
+  ASSERT_TRUE(db->execute("COMMIT"));
+}
+
+TEST(RunStore, IsReadInStepsLinearInItsFrames) {
+  const testing::TemporaryFolder folder;
+  const auto steps_of = [&](int doublings) -> std::int64_t {
+    const std::string path = folder.path() + "/" + std::to_string(doublings) + ".sqlite";
+    fill(path, doublings);
+    const std::size_t count = std::size_t{5} << doublings;
+    const StepCounter counter(static_cast<std::int64_t>(500 * count));
+    auto store = RunStore::open_read_only(path);
+    EXPECT_TRUE(store);
+    const auto frames = store->frames();
+    EXPECT_TRUE(frames) << count << " frames: " << frames.error().message() << " after " << counter.steps() << " steps";
+    if (!frames) return -1;
+    EXPECT_EQ(frames->size(), count);
+    for (std::size_t i = 0; i < count; i += 1003) {
+      const FrameRecord expected = some_frame(static_cast<int>(i % 5)), &read = (*frames)[i];
+      EXPECT_EQ(read.frame_id, expected.frame_id);
+      EXPECT_EQ(read.times.size(), 2U);
+      EXPECT_EQ(read.slam.has_value(), expected.slam.has_value());
+      EXPECT_EQ(read.localization.has_value(), expected.localization.has_value());
+      EXPECT_EQ(read.localization ? read.localization->sensors.size() : 2U, 2U);
+    }
+    return counter.steps();
+  };
+  const std::int64_t few = steps_of(9), many = steps_of(12);  // 2560 and 20480 frames
+  ASSERT_GT(few, 0);
+  ASSERT_GT(many, 0);
+  EXPECT_LT(static_cast<double>(many), 8.5 * static_cast<double>(few));
+}
+
 TEST(RunStore, RefusesAnotherRun) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
@@ -177,7 +255,7 @@ TEST(RunStore, RefusesWhatIsNoStore) {
   std::fclose(file);
   const auto opened = RunStore::open_read_only(path);
   ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::input);
+  EXPECT_EQ(opened.error().code, ErrorCode::store_damaged);
 }
 
 // A process that is killed between two statements of a transaction leaves the frames before it, and nothing else.

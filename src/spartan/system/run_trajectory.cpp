@@ -1,5 +1,7 @@
 #include "spartan/system/run_trajectory.h"
 
+#include <algorithm>
+
 namespace spartan {
 
 std::string_view name_of(TrajectoryKind kind) {
@@ -27,6 +29,13 @@ std::optional<UncertainPose> pose_of(const FrameRecord& frame, TrajectoryKind ki
   }
   if (!frame.has_pose) return std::nullopt;
   return kind == TrajectoryKind::slam ? frame.slam : std::optional(frame.world_from_body);
+}
+
+bool has_trajectory(const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
+  if (kind == TrajectoryKind::odometry) return true;
+  return std::any_of(frames.begin(), frames.end(), [kind](const FrameRecord& frame) {
+    return kind == TrajectoryKind::slam ? frame.slam.has_value() : frame.localization.has_value();
+  });
 }
 
 Trajectory trajectory_of(const std::vector<FrameRecord>& frames, TrajectoryKind kind) {

@@ -23,6 +23,9 @@ std::optional<TrajectoryKind> parse_trajectory_kind(std::string_view name);
 /// world_from_body where it was measured; the localization goes on where vision is lost.
 std::optional<UncertainPose> pose_of(const FrameRecord& frame, TrajectoryKind kind);
 
+/// Whether a run has that trajectory: one by odometry alone has no other.
+bool has_trajectory(const std::vector<FrameRecord>& frames, TrajectoryKind kind);
+
 /// All of them, in the order of time.
 Trajectory trajectory_of(const std::vector<FrameRecord>& frames, TrajectoryKind kind);
 

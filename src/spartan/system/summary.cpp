@@ -115,6 +115,7 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"cpu_seconds", facts.cpu_seconds},
       {"peak_memory_bytes", facts.peak_memory_bytes},
       {"threads", facts.threads},
+      {"absent", facts.absent},
       {"stages", stages(frames)},
       {"health", {{"odometry", health}, {"localization", sensors}}},
       {"lost_spans", spans},

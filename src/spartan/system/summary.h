@@ -19,6 +19,7 @@ struct RunFacts {
   bool gravity_measured = false;
   bool heading_east = false;
   int threads = 1;
+  std::vector<std::string> absent;           ///< what the options leave out of the run
   double wall_seconds = 0, cpu_seconds = 0;  ///< of this call of the program
   std::int64_t peak_memory_bytes = 0;
   std::optional<std::int64_t> resumed_from_frame;  ///< frame_id of the first frame that was processed after --resume

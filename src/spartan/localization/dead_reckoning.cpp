@@ -1,0 +1,79 @@
+#include "spartan/localization/dead_reckoning.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace spartan {
+namespace {
+
+constexpr std::uint32_t kVersion = 1;
+constexpr int kDrift = 6, kConstant = 12;  // where z₁ and z₂ begin
+/// As the filter has it: what stays for a drive falls to 1/e after so many frames.
+constexpr double kConstantSteps = 5000;
+
+Vector6d six_of(const std::vector<double>& values) {
+  Vector6d six = Vector6d::Zero();
+  std::copy_n(values.begin(), std::min<std::size_t>(6, values.size()), six.data());
+  return six;
+}
+
+}  // namespace
+
+DeadReckoning::DeadReckoning(const VisionOptions& options)
+    : white_factor_(options.white_factor),
+      drift_steps_(options.drift_steps),
+      drift_sigmas_(six_of(options.drift_sigmas)),
+      constant_sigmas_(six_of(options.constant_sigmas)) {
+  covariance_.diagonal().segment<6>(kDrift) = drift_sigmas_.cwiseAbs2();
+  covariance_.diagonal().segment<6>(kConstant) = constant_sigmas_.cwiseAbs2();
+}
+
+void DeadReckoning::age(int index, const Vector6d& sigmas, double steps) {
+  const double stays = std::exp(-1 / steps);
+  covariance_.middleRows<6>(index) *= stays;
+  covariance_.middleCols<6>(index) *= stays;
+  covariance_.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
+}
+
+void DeadReckoning::add(const RelativeMotion& motion) {
+  const Pose& moved = motion.previous_from_current;
+  // The exact identity says that the rover is stationary: lasting errors have no part in it.
+  const bool stationary = moved.translation().isZero(1e-12) && moved.rotation().vec().isZero(1e-12);
+  const bool drifts = motion.measured && !stationary;
+  if (drifts) {
+    age(kDrift, drift_sigmas_, drift_steps_);
+    age(kConstant, constant_sigmas_, kConstantSteps);
+  }
+  Covariance by = Covariance::Identity();
+  by.topLeftCorner<6, 6>() = adjoint(moved.inverse());
+  if (drifts) {
+    const Matrix6d deviations = motion.covariance.diagonal().cwiseSqrt().asDiagonal();
+    by.block<6, 6>(0, kDrift) = deviations;
+    by.block<6, 6>(0, kConstant) = deviations;
+  }
+  const Covariance propagated = by * covariance_ * by.transpose();
+  covariance_ = 0.5 * (propagated + propagated.transpose());
+  covariance_.topLeftCorner<6, 6>() +=
+      0.5 * (motion.measured ? white_factor_ : 1.0) * (motion.covariance + motion.covariance.transpose());
+}
+
+Bytes DeadReckoning::save() const {
+  ArchiveWriter out;
+  out.put(kVersion);
+  out.put_array(covariance_.data(), static_cast<std::size_t>(covariance_.size()));
+  return out.take();
+}
+
+Status DeadReckoning::restore(const Bytes& bytes) {
+  ArchiveReader in(bytes);
+  const auto version = in.get<std::uint32_t>();
+  const auto values = in.get_array<double>();
+  const std::string what = "memory of the dead reckoning";
+  if (Status s = in.finish(what); !s) return s;
+  if (version != kVersion || values.size() != static_cast<std::size_t>(covariance_.size()))
+    return failure(ErrorCode::store_damaged, "is of another version or damaged", what, "run again from the start");
+  covariance_ = Eigen::Map<const Covariance>(values.data());
+  return {};
+}
+
+}  // namespace spartan

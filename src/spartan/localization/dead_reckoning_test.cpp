@@ -1,0 +1,81 @@
+#include "spartan/localization/dead_reckoning.h"
+
+#include <gtest/gtest.h>
+
+#include "spartan/localization/drive_test.h"
+#include "spartan/localization/vision_track.h"
+
+namespace spartan {
+namespace {
+
+// The filter of the same model, with nothing to correct it, is the oracle.
+TEST(DeadReckoning, IsTheCovarianceOfTheFilterThatHearsVisionAlone) {
+  const TestDrive drive;
+  const LocalizationOptions options;  // with errors that last
+  VisionTrack track(options);
+  track.start(test_stamp(2.5), Pose());
+  DeadReckoning reckoned(options.vision);
+  int compared = 0;
+  for (const Measurement& m : test_motions(drive, 122.5, 1, 5)) {
+    const auto& motion = std::get<RelativeMotion>(m);
+    ASSERT_TRUE(track.add(motion));
+    reckoned.add(motion);
+    const Matrix6d wanted = track.world_from_body().covariance, found = reckoned.covariance();
+    for (int i = 0; i < 6; ++i) EXPECT_NEAR(found(i, i), wanted(i, i), 0.03 * wanted(i, i) + 1e-11) << i;
+    ++compared;
+  }
+  EXPECT_EQ(compared, 80);
+}
+
+TEST(DeadReckoning, ComposesIndependentErrors) {
+  const TestDrive drive;
+  VisionOptions white;
+  white.white_factor = 1;
+  white.drift_sigmas = white.constant_sigmas = {0, 0, 0, 0, 0, 0};
+  DeadReckoning reckoned(white);
+  UncertainPose composed;
+  for (const Measurement& m : test_motions(drive, 62.5, 1, 6)) {
+    const auto& motion = std::get<RelativeMotion>(m);
+    reckoned.add(motion);
+    composed = compose(composed, {motion.previous_from_current, motion.covariance});
+  }
+  EXPECT_TRUE(reckoned.covariance().isApprox(composed.covariance, 1e-9));
+}
+
+TEST(DeadReckoning, LastingErrorsHaveNoPartWhereTheRoverIsStationaryOrVisionIsLost) {
+  VisionOptions vision;
+  vision.white_factor = 1;
+  for (const bool measured : {true, false}) {
+    RelativeMotion motion;
+    motion.covariance = test_motion_covariance();
+    motion.measured = measured;
+    if (!measured) motion.previous_from_current = Pose::from_translation({0.1, 0, 0});
+    DeadReckoning reckoned(vision);
+    reckoned.add(motion);
+    EXPECT_TRUE(reckoned.covariance().isApprox(motion.covariance, 1e-12)) << measured;
+  }
+}
+
+TEST(DeadReckoning, GoesOnFromRestoredMemory) {
+  const TestDrive drive;
+  const VisionOptions options;
+  DeadReckoning straight(options), later(options);
+  const auto motions = test_motions(drive, 32.5, 1, 7);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    if (i == motions.size() / 2) {
+      ASSERT_TRUE(later.restore(straight.save()));
+    }
+    straight.add(std::get<RelativeMotion>(motions[i]));
+    if (i >= motions.size() / 2) later.add(std::get<RelativeMotion>(motions[i]));
+  }
+  EXPECT_EQ(straight.save(), later.save());
+  Bytes cut = straight.save();
+  cut.pop_back();
+  const Status refused = later.restore(cut);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::store_damaged);
+  EXPECT_EQ(straight.save(), later.save()) << "a refused memory changes nothing";
+}
+
+}  // namespace
+}  // namespace spartan
