@@ -25,6 +25,7 @@ class Tree {
   std::vector<YAML::Node> lists;  // open ones, innermost last
   std::vector<std::string> faults;
   std::vector<std::string> warnings;
+  std::vector<std::string> given;  // fields
 
   std::string place(const YAML::Node& node, std::string_view key) const {
     const YAML::Mark mark = node.Mark();
@@ -43,6 +44,13 @@ class Tree {
     if (!map.IsMap()) return std::nullopt;
     const YAML::Node node = map[std::string(key)];
     if (!node.IsDefined()) return std::nullopt;
+    return node;
+  }
+
+  // The same of a field, which counts as given.
+  std::optional<YAML::Node> find_field(std::string_view key) {
+    auto node = find(key);
+    if (node) given.push_back(levels.back().prefix + std::string(key));
     return node;
   }
 
@@ -91,6 +99,14 @@ std::vector<std::string> split_key(const std::string& key) {
   return parts;
 }
 
+bool fits(const std::vector<double>& values, Length length) {
+  return length.exactly == 0 || values.size() == static_cast<std::size_t>(length.exactly);
+}
+
+std::string length_fault(const std::vector<double>& values, Length length) {
+  return fmt::format("has {} numbers, must have {}", values.size(), length.exactly);
+}
+
 bool inside(double value, Bounds bounds) {
   return std::isfinite(value) && value >= bounds.low && value <= bounds.high;
 }
@@ -98,7 +114,7 @@ bool inside(double value, Bounds bounds) {
 }  // namespace
 
 void Reader::field(std::string_view key, bool& value, std::string_view) {
-  const auto node = tree_->find(key);
+  const auto node = tree_->find_field(key);
   if (!node) return;
   if (const auto read = convert<bool>(*node)) {
     value = *read;
@@ -108,7 +124,7 @@ void Reader::field(std::string_view key, bool& value, std::string_view) {
 }
 
 void Reader::field(std::string_view key, int& value, std::string_view, Bounds bounds) {
-  const auto node = tree_->find(key);
+  const auto node = tree_->find_field(key);
   if (!node) return;
   const auto read = convert<int>(*node);
   if (!read) return tree_->fault(*node, key, "must be a whole number");
@@ -118,7 +134,7 @@ void Reader::field(std::string_view key, int& value, std::string_view, Bounds bo
 }
 
 void Reader::field(std::string_view key, double& value, std::string_view, Bounds bounds) {
-  const auto node = tree_->find(key);
+  const auto node = tree_->find_field(key);
   if (!node) return;
   const auto read = convert<double>(*node);
   if (!read) return tree_->fault(*node, key, "must be a number");
@@ -130,7 +146,7 @@ void Reader::field(std::string_view key, double& value, std::string_view, Bounds
 
 void Reader::field(std::string_view key, std::string& value, std::string_view,
                    const std::vector<std::string>& choices) {
-  const auto node = tree_->find(key);
+  const auto node = tree_->find_field(key);
   if (!node) return;
   const auto read = convert<std::string>(*node);
   if (!read || node->IsNull()) return tree_->fault(*node, key, "must be text");
@@ -140,11 +156,12 @@ void Reader::field(std::string_view key, std::string& value, std::string_view,
   value = *read;
 }
 
-void Reader::field(std::string_view key, std::vector<double>& value, std::string_view, Bounds bounds) {
-  const auto node = tree_->find(key);
+void Reader::field(std::string_view key, std::vector<double>& value, std::string_view, Bounds bounds, Length length) {
+  const auto node = tree_->find_field(key);
   if (!node) return;
   const auto read = convert<std::vector<double>>(*node);
   if (!read) return tree_->fault(*node, key, "must be a list of numbers");
+  if (!fits(*read, length)) return tree_->fault(*node, key, length_fault(*read, length));
   for (const double v : *read) {
     if (!inside(v, bounds))
       return tree_->fault(*node, key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
@@ -164,6 +181,11 @@ void Reader::renamed(std::string_view old_key, std::string_view key) {
                                         tree_->place(*former, old_key), key));
   level.map[std::string(key)] = *former;
   level.map.remove(std::string(old_key));
+}
+
+void Reader::check(std::string_view key, bool good, std::string_view fault) {
+  if (good || !tree_->has_lines) return;
+  tree_->fault(tree_->find(key).value_or(tree_->levels.back().map), key, std::string(fault));
 }
 
 bool Reader::enter(std::string_view key) {
@@ -221,6 +243,11 @@ std::vector<std::string> Reader::warnings() const {
   return tree_->warnings;
 }
 
+void Reader::add_given(GivenKeys* given) const {
+  if (given == nullptr) return;
+  for (const std::string& key : tree_->given) given->add(key);
+}
+
 void Validator::fault(std::string_view key, std::string_view what) {
   faults_ += fmt::format("{}{}{} {}", faults_.empty() ? "" : "\n", prefix_, key, what);
 }
@@ -236,7 +263,9 @@ void Validator::field(std::string_view key, const std::string& value, std::strin
   if (choices.empty() || std::find(choices.begin(), choices.end(), value) != choices.end()) return;
   fault(key, fmt::format("is '{}', must be one of: {}", value, fmt::join(choices, ", ")));
 }
-void Validator::field(std::string_view key, const std::vector<double>& value, std::string_view, Bounds bounds) {
+void Validator::field(std::string_view key, const std::vector<double>& value, std::string_view, Bounds bounds,
+                      Length length) {
+  if (!fits(value, length)) return fault(key, length_fault(value, length));
   for (const double v : value) {
     if (!inside(v, bounds)) return fault(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
   }
@@ -264,7 +293,7 @@ void Lister::field(std::string_view key, const std::string& value, std::string_v
   quoted << YAML::DoubleQuoted << value;
   lines.push_back({prefix_ + std::string(key), quoted.c_str(), text});
 }
-void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds) {
+void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds, Length) {
   lines.push_back({prefix_ + std::string(key), fmt::format("[{}]", fmt::join(value, ", ")), std::string(meaning)});
 }
 
@@ -342,6 +371,15 @@ std::string to_yaml(const std::vector<OptionLine>& lines) {
 }  // namespace spartan::options_detail
 
 namespace spartan {
+
+GivenKeys GivenKeys::in_group(std::string_view group) const {
+  const std::string prefix = std::string(group) + ".";
+  GivenKeys inside;
+  for (const std::string& key : keys_) {
+    if (key.starts_with(prefix)) inside.add(key.substr(prefix.size()));
+  }
+  return inside;
+}
 
 std::string place_of_option(const std::string& text, const std::string& name, const std::string& key) {
   std::string nowhere = fmt::format("{}: {}", name, key);

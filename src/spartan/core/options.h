@@ -9,9 +9,10 @@
 //     }
 //   };
 //
-// Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. An enum is a field
-// where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field or a
-// group accepts the key's former name, with a warning. A key carries its unit (docs/conventions.md).
+// Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. An enum is a
+// field where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field
+// or a group accepts the key's former name, with a warning. `v.check("key", good, "is …")` after the fields refuses
+// values that do not fit each other. A key carries its unit (docs/conventions.md).
 #pragma once
 
 #include <array>
@@ -19,6 +20,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -39,6 +41,11 @@ inline Bounds at_least(double low) {
 inline Bounds between(double low, double high) {
   return {low, high};
 }
+
+/// How many numbers a list option holds; 0: any count.
+struct Length {
+  int exactly = 0;
+};
 
 /// The name of an enum's value in files. A function beside the enum lists them, found by the enum's namespace:
 ///
@@ -72,6 +79,18 @@ constexpr std::optional<Enum> value_named(std::string_view name) {
   return std::nullopt;
 }
 
+/// Keys of options that were given, in a file or on a command line: "localization.imu.gyro_bias_rad_s".
+class GivenKeys {
+ public:
+  void add(std::string key) { keys_.insert(std::move(key)); }
+  bool contains(const std::string& key) const { return keys_.contains(key); }
+  /// Those inside of a group, without its name.
+  GivenKeys in_group(std::string_view group) const;
+
+ private:
+  std::set<std::string> keys_;
+};
+
 /// One line of an option listing: "reconstruction.sgm.p1", its value as YAML text, what it means.
 struct OptionLine {
   std::string key;
@@ -100,7 +119,8 @@ class Reader {
   void field(std::string_view key, double& value, std::string_view meaning, Bounds bounds = {});
   void field(std::string_view key, std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
-  void field(std::string_view key, std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, std::vector<double>& value, std::string_view meaning, Bounds bounds = {},
+             Length length = {});
   template <class Enum>
     requires std::is_enum_v<Enum>
   void field(std::string_view key, Enum& value, std::string_view meaning) {
@@ -109,6 +129,8 @@ class Reader {
     value = value_named<Enum>(name).value_or(value);
   }
   void renamed(std::string_view old_key, std::string_view key);
+  /// Not for single options of a command line: the next one may make the values fit.
+  void check(std::string_view key, bool good, std::string_view fault);
   template <class Group>
   void group(std::string_view key, Group& value) {
     if (enter(key)) {
@@ -134,6 +156,8 @@ class Reader {
   Status finish();
   /// Warnings of former names that were used.
   std::vector<std::string> warnings() const;
+  /// Adds the keys of the fields that were read.
+  void add_given(GivenKeys* given) const;
 
  private:
   bool enter(std::string_view key);
@@ -151,13 +175,15 @@ class Lister {
   void field(std::string_view key, const double& value, std::string_view meaning, Bounds bounds = {});
   void field(std::string_view key, const std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
-  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {},
+             Length length = {});
   template <class Enum>
     requires std::is_enum_v<Enum>
   void field(std::string_view key, const Enum& value, std::string_view meaning) {
     field(key, std::string(name_of(value)), meaning, choices_of<Enum>());
   }
   void renamed(std::string_view, std::string_view) {}
+  void check(std::string_view, bool, std::string_view) {}
   template <class Group>
   void group(std::string_view key, Group& value) {
     const std::size_t length = prefix_.size();
@@ -190,13 +216,17 @@ class Validator {
   void field(std::string_view key, const double& value, std::string_view meaning, Bounds bounds = {});
   void field(std::string_view key, const std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
-  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {},
+             Length length = {});
   template <class Enum>
     requires std::is_enum_v<Enum>
   void field(std::string_view key, const Enum& value, std::string_view) {
     if (name_of(value).empty()) fault(key, "is not one of the values of its enum");
   }
   void renamed(std::string_view, std::string_view) {}
+  void check(std::string_view key, bool good, std::string_view what) {
+    if (!good) fault(key, what);
+  }
   template <class Group>
   void group(std::string_view key, Group& value) {
     const std::size_t length = prefix_.size();
@@ -229,31 +259,35 @@ std::string to_yaml(const std::vector<OptionLine>& lines);
 std::string place_of_option(const std::string& text, const std::string& name, const std::string& key);
 
 /// Reads YAML text over the given values: what the text does not name keeps its value. Unknown keys, wrong
-/// types and values out of bounds are refused, all of them in one error with "name:line: key".
+/// types and values out of bounds are refused, all of them in one error with "name:line: key". The keys that the text
+/// names are added to `given`.
 template <class Options>
-Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {}) {
+Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {},
+                              GivenKeys* given = nullptr) {
   auto tree = options_detail::parse(text, name);
   if (!tree) return failure(tree);
   options_detail::Reader reader(*tree);
   defaults.describe(reader);
   if (Status status = reader.finish(); !status) return failure(status);
+  reader.add_given(given);
   return defaults;
 }
 
 /// The same from a file.
 template <class Options>
-Result<Options> load_options(const std::string& path, Options defaults = {}) {
+Result<Options> load_options(const std::string& path, Options defaults = {}, GivenKeys* given = nullptr) {
   auto tree = options_detail::load(path);
   if (!tree) return failure(tree);
   options_detail::Reader reader(*tree);
   defaults.describe(reader);
   if (Status status = reader.finish(); !status) return failure(status);
+  reader.add_given(given);
   return defaults;
 }
 
-/// Applies one "group.key=value", as given on a command line. Errors have code `usage`.
+/// Applies one "group.key=value", as given on a command line; its keys are added to `given`. Errors have code `usage`.
 template <class Options>
-Result<Options> set_option(Options options, const std::string& assignment) {
+Result<Options> set_option(Options options, const std::string& assignment, GivenKeys* given = nullptr) {
   auto tree = options_detail::from_assignment(assignment);
   if (!tree) return failure(tree);
   options_detail::Reader reader(*tree);
@@ -262,6 +296,7 @@ Result<Options> set_option(Options options, const std::string& assignment) {
     status.error().code = ErrorCode::usage;
     return failure(status);
   }
+  reader.add_given(given);
   return options;
 }
 
@@ -274,8 +309,8 @@ Status validate(Options options, std::string_view name) {
   return validator.finish(name);
 }
 
-/// "name:line: group.old is now called new" for each former name of an option that the text uses; parse_options() accepts
-/// them for one version. Empty where the text cannot be parsed.
+/// "name:line: group.old is now called new" for each former name of an option that the text uses; parse_options()
+/// accepts them for one version. Empty where the text cannot be parsed.
 template <class Options>
 std::vector<std::string> renamed_options(const std::string& text, const std::string& name, Options options = {}) {
   auto tree = options_detail::parse(text, name);
