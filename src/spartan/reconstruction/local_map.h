@@ -32,10 +32,10 @@ struct LocalMap {
   Image<float> elevation_m, elevation_min_m, elevation_max_m;
   Image<float> variance_m2;  ///< of elevation_m
   Image<float> count;        ///< points; 0 where nothing was seen
-  Image<float> ground_m;     ///< the ground without what stands on it
+  Image<float> ground_m;     ///< the ground without what stands on it; NaN where too few cells lie around
   Image<float> slope_rad, roughness_m, step_m;
-  Image<float> kind;               ///< 0 unknown, 1 free, 2 obstacle, 3 cavity
-  Image<float> occupancy_logodds;  ///< of an obstacle or a cavity; 0 where nothing was seen
+  Image<float> kind;               ///< 0 unknown (also where ground_m is NaN), 1 free, 2 obstacle, 3 cavity
+  Image<float> occupancy_logodds;  ///< of an obstacle or a cavity; 0 where the class is unknown
   Image<float> cost;               ///< 0 easy … 1 not to be driven on
   std::vector<Obstacle> obstacles;
 

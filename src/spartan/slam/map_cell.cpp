@@ -41,7 +41,7 @@ CellSurface doubted(CellSurface rival) {
 }  // namespace
 
 int MapCell::kind() const {
-  if (!surface.seen()) return 0;
+  if (!surface.seen() || surface.votes == 0) return 0;
   if (surface.occupancy_logodds <= 0) return 1;
   return surface.shape >= 0 ? 2 : 3;
 }

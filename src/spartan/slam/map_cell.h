@@ -14,7 +14,7 @@ struct CellSurface {
   float occupancy_logodds = 0;  ///< of an obstacle or a cavity
   std::int32_t stop = -1;       ///< the first that saw it
   std::int16_t shape = 0;       ///< obstacles seen less cavities seen
-  std::uint16_t votes = 0;      ///< observations
+  std::uint16_t votes = 0;      ///< observations of its class; 0: the class is unknown
 
   bool seen() const { return count > 0; }
   void raise(float by_m) {
@@ -29,7 +29,7 @@ struct MapCell {
   CellSurface surface;
   CellSurface rival;  ///< of observations that contradict it
 
-  /// 0 unknown, 1 free, 2 obstacle, 3 cavity. What was never seen is unknown.
+  /// 0 unknown, 1 free, 2 obstacle, 3 cavity. Unknown: never observed, or only without a class.
   int kind() const;
   friend bool operator==(const MapCell&, const MapCell&) = default;
 };
