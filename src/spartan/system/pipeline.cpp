@@ -80,7 +80,8 @@ struct Pipeline::State {
   Status look(const StereoFrame& frame);
   Result<std::optional<MappedPosition>> leave_position();
   bool terrain_is_due() const;
-  Result<TerrainView> reconstruct(const RectifiedPair& shot);
+  Result<ImageView<const float>> dense_disparity(const RectifiedPair& shot);
+  Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& shot);
 };
 
 void Pipeline::State::start(const RectifiedPair& shot) {
@@ -161,12 +162,20 @@ bool Pipeline::State::terrain_is_due() const {
   return distance_of_last_terrain_m < 0 || distance_m - distance_of_last_terrain_m >= options.terrain.every_m;
 }
 
-Result<TerrainView> Pipeline::State::reconstruct(const RectifiedPair& shot) {
-  const DisparityRange range = disparity_range(shot.geometry, pair.nearest_m);
-  auto image = disparity_computer.compute(shot.left, shot.right, range, shot.left_mask, shot.right_mask);
-  if (!image) return failure(image);
-  distance_of_last_terrain_m = distance_m;
-  return TerrainView{shot, image->disparity, world_from_left};
+// The view lasts until the next call.
+Result<ImageView<const float>> Pipeline::State::dense_disparity(const RectifiedPair& shot) {
+  return clock.measure("reconstruction", [&]() -> Result<ImageView<const float>> {
+    const DisparityRange range = disparity_range(shot.geometry, pair.nearest_m);
+    auto image = disparity_computer.compute(shot.left, shot.right, range, shot.left_mask, shot.right_mask);
+    if (!image) return failure(image);
+    return image->disparity;
+  });
+}
+
+// Empty where the odometry searches its disparities itself.
+Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const RectifiedPair& shot) {
+  if (options.odometry.reconstruction.source != "dense") return ImageView<const float>();
+  return dense_disparity(shot);
 }
 
 Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Workers workers,
@@ -218,6 +227,8 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
   if (!shot) return failure(shot);
   s.clock.add(shot->times);
+  auto disparity = s.disparity_for_odometry(*shot);
+  if (!disparity) return failure(disparity);
 
   FrameResult result;
   // Before the stages move on: the map belongs to where the rover still stands.
@@ -229,7 +240,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (!s.started) s.start(*shot);
   s.left_from_body = shot->body_from_left.inverse();
 
-  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot); });
+  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot, {}, *disparity); });
   const RelativeMotion moved = s.body_motion(*shot, result.motion);
   s.clock.measure("localization", [&] {
     if (!result.motion.first) {
@@ -247,9 +258,10 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (Status status = s.pass(frame, *shot, moved); !status) return failure(status);
 
   if (s.terrain_is_due()) {
-    auto terrain = s.clock.measure("reconstruction", [&] { return s.reconstruct(*shot); });
-    if (!terrain) return failure(terrain);
-    result.terrain = std::move(*terrain);
+    if (disparity->empty()) disparity = s.dense_disparity(*shot);
+    if (!disparity) return failure(disparity);
+    s.distance_of_last_terrain_m = s.distance_m;
+    result.terrain = TerrainView{*shot, *disparity, s.world_from_left};
   }
   result.times = s.clock.take();
   return result;
