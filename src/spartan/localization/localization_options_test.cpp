@@ -23,7 +23,19 @@ TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
   EXPECT_EQ(one.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
   LocalizationOptions set;
   set.inclinometer.bias_rad = 0.2;
-  EXPECT_EQ(with_stated(set, {{}, {}, {8, 9}}).inclinometer.bias_rad, 0.2) << "somebody wanted it";
+  EXPECT_EQ(with_stated(set, {{}, {}, {8, 9}}).inclinometer.bias_rad, 0.2) << "set in code";
+}
+
+TEST(LocalizationOptions, ADefaultThatIsGivenIsNotReplaced) {
+  GivenKeys given;
+  given.add("imu.gyro_bias_rad_s");
+  given.add("inclinometer.bias_rad");
+  const LocalizationOptions defaults;
+  const LocalizationOptions used = with_stated(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}}, given);
+  EXPECT_EQ(used.imu.gyro_bias_rad_s, defaults.imu.gyro_bias_rad_s);
+  EXPECT_EQ(used.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
+  EXPECT_EQ(used.imu.gyro_noise_rad_s_sqrt_hz, 1);
+  EXPECT_EQ(used.inclinometer.bias_walk_rad_sqrt_hz, 9);
 }
 
 }  // namespace
