@@ -55,10 +55,10 @@ struct VisionOptions {
             between(0.01, 1e4));
     v.field("drift_sigmas", drift_sigmas,
             "standard deviation of the errors that last for a while, over the stated ones: x, y, z, about x, y, z",
-            between(0, 1e3));
+            between(0, 1e3), Length{6});
     v.field("drift_steps", drift_steps, "after so many shots such an error has fallen to 1/e", between(1, 1e6));
-    v.field("constant_sigmas", constant_sigmas, "the same of the errors that stay for the whole drive",
-            between(0, 1e3));
+    v.field("constant_sigmas", constant_sigmas, "the same of the errors that stay for the whole drive", between(0, 1e3),
+            Length{6});
     v.field("gate_probability", gate_probability, "share of good motions that the test lets pass",
             between(0.5, 1 - 1e-12));
   }
