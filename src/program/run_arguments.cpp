@@ -14,6 +14,7 @@ Result<RunOptions> run_options(const std::string& file, const std::vector<std::s
     if (!changed) return failure(changed);
     options = std::move(*changed);
   }
+  if (Status status = validate(options, file.empty() ? "--set" : file); !status) return failure(status);
   return options;
 }
 

@@ -1,6 +1,8 @@
 // Options of map merging and of the global map.
 #pragma once
 
+#include <cmath>
+
 #include "spartan/core/options.h"
 
 namespace spartan {
@@ -29,6 +31,14 @@ struct MatchOptions {
   double lead_certainty = 2.33;
   double largest_misfit = 3;
 
+  /// The search holds 32 bytes for each trial: 160 MB.
+  static constexpr double kMostTrials = 5e6;
+  /// Of the largest search: shifts along x and y times rotations.
+  double trials() const {
+    const auto count = [](double widest, double step) { return 2 * std::ceil(widest / step) + 1; };
+    return count(widest_m, step_m) * count(widest_m, step_m) * count(widest_deg, step_deg);
+  }
+
   template <class Visitor>
   void describe(Visitor& v) {
     v.field("window_sigmas", window_sigmas, "of the given pose that are searched to each side", between(1, 10));
@@ -56,6 +66,10 @@ struct MatchOptions {
             between(0, 20));
     v.field("lead_certainty", lead_certainty, "sigmas that the best place fits better than the next", between(1, 20));
     v.field("largest_misfit", largest_misfit, "of the residuals over what the variances say", between(1, 100));
+    v.check(
+        "step_m", trials() <= kMostTrials,
+        "is too small for widest_m: (2 widest_m / step_m + 1)^2 shifts times (2 widest_deg / step_deg + 1) rotations "
+        "exceed 5 million trials");
   }
 };
 
