@@ -17,9 +17,9 @@ namespace spartan {
 /// frame to frame.
 class Imager {
  public:
-  /// Code `configuration` where a pair cannot be rectified (eyes that look apart, no view as asked for, an eye that
-  /// sees less than 1 % of it), a self-mask cannot be read or a vignetting leaves no light. `mask_folder`: the rig
-  /// file's folder, which the names of self-masks are relative to.
+  /// Code `configuration` where options are out of their bounds, a pair cannot be rectified (eyes that look apart, no
+  /// view as asked for, an eye that sees less than 1 % of it), a self-mask cannot be read or a vignetting leaves no
+  /// light. `mask_folder`: the rig file's folder, which the names of self-masks are relative to.
   static Result<Imager> create(const Rig& rig, const ImagingOptions& options, Workers workers,
                                const std::string& mask_folder = {});
   Imager(Imager&&) noexcept;

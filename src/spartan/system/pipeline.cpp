@@ -180,6 +180,7 @@ Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const Rec
 
 Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Workers workers,
                                   const std::string& mask_folder) {
+  if (Status status = validate(options, "options"); !status) return failure(status);
   const StereoPair* const pair = pair_for_odometry(rig, options.odometry_pair);
   if (pair == nullptr) {
     return options.odometry_pair.empty()

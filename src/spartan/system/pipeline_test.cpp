@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "spartan/core/database.h"
@@ -249,6 +250,23 @@ TEST(Pipeline, NeedsAPairForTheOdometry) {
   Rig only_wide = rover();
   only_wide.pairs.pop_back();
   EXPECT_FALSE(Pipeline::create(only_wide, {}, Workers(1)));
+}
+
+TEST(Pipeline, RefusesOptionsOutOfBoundsThatWereSetInCode) {
+  RunOptions options;
+  options.reconstruction.p2_flat = 300;
+  options.mapping.v_disparity.strips = 0;
+  options.mapping.map.cell_m = 0;
+  options.terrain.every_m = std::numeric_limits<double>::quiet_NaN();
+  options.imaging.contrast_high_percent = 101;
+  options.localization.vision.drift_sigmas = {1, 2, 3};
+  const auto refused = Pipeline::create(rover(), options, Workers(1));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+  for (const char* field : {"reconstruction.p2_flat is 300", "strips is 0", "mapping.map.cell_m is 0",
+                            "terrain.every_m must be a finite number", "imaging.contrast_high_percent is 101",
+                            "localization.vision.drift_sigmas has 3 numbers, must have 6"})
+    EXPECT_NE(refused.error().message().find(field), std::string::npos) << field;
 }
 
 }  // namespace
