@@ -80,7 +80,7 @@ Status write_report(const RunRequest& request, const std::string& truth) {
 
 Result<ExitCode> run_command(const Context& context, const RunArguments& arguments) {
   RunRequest request;
-  auto options = run_options(arguments.config, arguments.set);
+  auto options = run_options(arguments.config, arguments.set, &request.given);
   if (!options) return failure(options);
   request.options = std::move(*options);
   if (arguments.odometry_only) request.options.odometry_only = true;

@@ -9,7 +9,9 @@
 
 namespace spartan::program {
 
-/// `file` may be empty. Codes: `configuration` (the file), `usage` (an assignment).
-Result<RunOptions> run_options(const std::string& file, const std::vector<std::string>& assignments);
+/// `file` may be empty. The keys that file and assignments name are added to `given`. Codes: `configuration` (the file,
+/// or options that do not fit each other), `usage` (an assignment).
+Result<RunOptions> run_options(const std::string& file, const std::vector<std::string>& assignments,
+                               GivenKeys* given = nullptr);
 
 }  // namespace spartan::program

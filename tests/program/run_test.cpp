@@ -83,6 +83,19 @@ TEST_F(Run, LeavesTrajectoryTerrainAndSummary) {
   EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.01);
 }
 
+TEST_F(Run, TakesTheOdometrysDisparitiesFromTheDenseImageWhereTheOptionAsksForIt) {
+  ASSERT_EQ(run("row").exit_code, 0);
+  const ProgramResult dense = run("dense", {"--set", "odometry.reconstruction.source=dense", "--json"});
+  ASSERT_EQ(dense.exit_code, 0) << dense.err;
+  EXPECT_NE(testing::content_of(path("dense/trajectory_odometry.tum")),
+            testing::content_of(path("row/trajectory_odometry.tum")));
+  EXPECT_EQ(nlohmann::json::parse(dense.out)["stages"]["reconstruction"]["count"], 14) << "once a frame";
+  const ProgramResult score =
+      run_program({"evaluate", path("dense"), "--truth", drive(), "--align", "first", "--json"});
+  ASSERT_EQ(score.exit_code, 0) << score.err;
+  EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.02);
+}
+
 TEST_F(Run, GivesTheSameBytesForAnyNumberOfThreads) {
   ASSERT_EQ(run("one", {"--threads", "1"}).exit_code, 0);
   ASSERT_EQ(run("two", {"--threads", "2"}).exit_code, 0);

@@ -295,6 +295,21 @@ TEST_F(Stops, SensorNoiseIsThatOfTheRecording) {
   EXPECT_EQ(localized("silent"), localized("not_stated"));
 }
 
+TEST_F(Stops, ADefaultThatIsGivenIsNotOverruledByTheRecording) {
+  ASSERT_TRUE(finished(run("specified")));
+  ASSERT_TRUE(finished(run("set", {"--set", "localization.inclinometer.bias_rad=0.0025"})));
+  std::ofstream(path("options.yaml")) << "localization: {compass: {offset_walk_rad_sqrt_hz: 0.00015}}\n";
+  ASSERT_TRUE(finished(run("file", {"--config", path("options.yaml")})));
+  const auto has = [&](const std::string& output, const char* line) {
+    return testing::content_of(path(output + "/config.yaml")).find(line) != std::string::npos;
+  };
+  EXPECT_TRUE(has("specified", " bias_rad: 0.00174532") && has("specified", "offset_walk_rad_sqrt_hz: 1e-07"));
+  EXPECT_TRUE(has("set", " bias_rad: 0.0025 ")) << "given with --set";
+  EXPECT_TRUE(has("set", "offset_walk_rad_sqrt_hz: 1e-07")) << "not given: as the recording specifies";
+  EXPECT_TRUE(has("file", "offset_walk_rad_sqrt_hz: 0.00015 ")) << "given in the file";
+  EXPECT_TRUE(has("file", " bias_rad: 0.00174532"));
+}
+
 // The narrow frame of the first stop is the last commit.
 TEST_F(Stops, AreMappedAfterAnInterruptionDuringTheStop) {
   ASSERT_TRUE(finished(run("whole")));

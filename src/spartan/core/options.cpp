@@ -27,6 +27,14 @@ class Tree {
   std::vector<YamlMap> levels;
   std::vector<YamlNode> lists;
   std::vector<std::string> warnings;
+  std::vector<std::string> given;  // keys of the fields that the document has
+
+  // Whether the document has the field.
+  bool find_field(std::string_view key) {
+    if (!levels.back().has(key)) return false;
+    given.push_back(levels.back().path(key));
+    return true;
+  }
 };
 
 namespace {
@@ -50,6 +58,14 @@ std::vector<std::string> split_key(const std::string& key) {
   return parts;
 }
 
+bool fits(const std::vector<double>& values, Length length) {
+  return length.exactly == 0 || values.size() == static_cast<std::size_t>(length.exactly);
+}
+
+std::string length_fault(const std::vector<double>& values, Length length) {
+  return fmt::format("has {} numbers, must have {}", values.size(), length.exactly);
+}
+
 bool inside(double value, Bounds bounds) {
   return std::isfinite(value) && value >= bounds.low && value <= bounds.high;
 }
@@ -57,13 +73,12 @@ bool inside(double value, Bounds bounds) {
 }  // namespace
 
 void Reader::field(std::string_view key, bool& value, std::string_view) {
-  YamlMap& map = tree_->levels.back();
-  if (map.has(key)) value = map.boolean(key).value_or(value);
+  if (tree_->find_field(key)) value = tree_->levels.back().boolean(key).value_or(value);
 }
 
 void Reader::field(std::string_view key, int& value, std::string_view, Bounds bounds) {
   YamlMap& map = tree_->levels.back();
-  const auto read = map.has(key) ? map.integer(key) : std::nullopt;
+  const auto read = tree_->find_field(key) ? map.integer(key) : std::nullopt;
   if (!read) return;
   if (!inside(*read, bounds)) return map.add_error(key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
   value = *read;
@@ -71,7 +86,7 @@ void Reader::field(std::string_view key, int& value, std::string_view, Bounds bo
 
 void Reader::field(std::string_view key, double& value, std::string_view, Bounds bounds) {
   YamlMap& map = tree_->levels.back();
-  const auto read = map.has(key) ? map.number(key) : std::nullopt;
+  const auto read = tree_->find_field(key) ? map.number(key) : std::nullopt;
   if (!read) return;
   if (!inside(*read, bounds)) return map.add_error(key, fmt::format("is {}, must be {}", *read, bounds_text(bounds)));
   value = *read;
@@ -80,14 +95,15 @@ void Reader::field(std::string_view key, double& value, std::string_view, Bounds
 void Reader::field(std::string_view key, std::string& value, std::string_view,
                    const std::vector<std::string>& choices) {
   YamlMap& map = tree_->levels.back();
-  if (!map.has(key)) return;
+  if (!tree_->find_field(key)) return;
   value = (choices.empty() ? map.text(key) : map.choice(key, choices)).value_or(value);
 }
 
-void Reader::field(std::string_view key, std::vector<double>& value, std::string_view, Bounds bounds) {
+void Reader::field(std::string_view key, std::vector<double>& value, std::string_view, Bounds bounds, Length length) {
   YamlMap& map = tree_->levels.back();
-  const auto read = map.has(key) ? map.numbers(key) : std::nullopt;
+  const auto read = tree_->find_field(key) ? map.numbers(key) : std::nullopt;
   if (!read) return;
+  if (!fits(*read, length)) return map.add_error(key, length_fault(*read, length));
   for (const double v : *read) {
     if (!inside(v, bounds)) return map.add_error(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
   }
@@ -100,6 +116,11 @@ void Reader::renamed(std::string_view old_key, std::string_view key) {
   if (!map.rename(old_key, key)) return;
   tree_->warnings.push_back(
       fmt::format("{} is now called {}; the former name is accepted for this version only", where, key));
+}
+
+void Reader::check(std::string_view key, bool good, std::string_view fault) {
+  // A command line sets one option at a time, so combinations are checked by validate() in the end.
+  if (!good && tree_->errors.has_lines()) tree_->levels.back().add_error(key, std::string(fault));
 }
 
 bool Reader::enter(std::string_view key) {
@@ -147,6 +168,11 @@ std::vector<std::string> Reader::warnings() const {
   return tree_->warnings;
 }
 
+void Reader::add_given(GivenKeys* given) const {
+  if (given == nullptr) return;
+  for (const std::string& key : tree_->given) given->add(key);
+}
+
 void Validator::add_error(std::string_view key, std::string_view what) {
   errors_ += fmt::format("{}{}{} {}", errors_.empty() ? "" : "\n", prefix_, key, what);
 }
@@ -162,7 +188,9 @@ void Validator::field(std::string_view key, const std::string& value, std::strin
   if (choices.empty() || std::find(choices.begin(), choices.end(), value) != choices.end()) return;
   add_error(key, fmt::format("is '{}', must be one of: {}", value, fmt::join(choices, ", ")));
 }
-void Validator::field(std::string_view key, const std::vector<double>& value, std::string_view, Bounds bounds) {
+void Validator::field(std::string_view key, const std::vector<double>& value, std::string_view, Bounds bounds,
+                      Length length) {
+  if (!fits(value, length)) return add_error(key, length_fault(value, length));
   for (const double v : value) {
     if (!inside(v, bounds)) return add_error(key, fmt::format("holds {}, must be {}", v, bounds_text(bounds)));
   }
@@ -188,7 +216,7 @@ void Lister::field(std::string_view key, const std::string& value, std::string_v
   if (!choices.empty()) text += fmt::format(" ({})", fmt::join(choices, " | "));
   lines.push_back({prefix_ + std::string(key), yaml_quoted(value), text});
 }
-void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds) {
+void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds, Length) {
   lines.push_back({prefix_ + std::string(key), fmt::format("[{}]", fmt::join(value, ", ")), std::string(meaning)});
 }
 
@@ -245,6 +273,15 @@ std::string to_yaml(const std::vector<OptionLine>& lines) {
 }  // namespace spartan::options_detail
 
 namespace spartan {
+
+GivenKeys GivenKeys::in_group(std::string_view group) const {
+  const std::string prefix = std::string(group) + ".";
+  GivenKeys inside;
+  for (const std::string& key : keys_) {
+    if (key.starts_with(prefix)) inside.add(key.substr(prefix.size()));
+  }
+  return inside;
+}
 
 std::string place_of_option(const std::string& text, const std::string& name, const std::string& key) {
   const std::string without_line = fmt::format("{}: {}", name, key);

@@ -12,7 +12,8 @@
 //
 // Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. An enum is a
 // field where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field
-// or a group accepts the key's former name, with a warning. A key carries its unit (docs/conventions.md).
+// or a group accepts the key's former name, with a warning. `v.check("key", good, "is …")` after the fields rejects
+// combinations of values. A key carries its unit (docs/conventions.md).
 #pragma once
 
 #include <array>
@@ -20,6 +21,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -40,6 +42,11 @@ inline Bounds at_least(double low) {
 inline Bounds between(double low, double high) {
   return {low, high};
 }
+
+/// Number of values in a list option; 0: any number.
+struct Length {
+  int exactly = 0;
+};
 
 /// The name of an enum value in files. A function in the namespace of the enum lists them (found by argument-dependent
 /// lookup):
@@ -74,6 +81,18 @@ constexpr std::optional<Enum> value_named(std::string_view name) {
   return std::nullopt;
 }
 
+/// Keys of options that were given in a file or on a command line, e.g. "localization.imu.gyro_bias_rad_s".
+class GivenKeys {
+ public:
+  void add(std::string key) { keys_.insert(std::move(key)); }
+  bool contains(const std::string& key) const { return keys_.contains(key); }
+  /// The keys inside a group, without its name.
+  GivenKeys in_group(std::string_view group) const;
+
+ private:
+  std::set<std::string> keys_;
+};
+
 /// One line of an option listing: the full key ("reconstruction.sgm.p1"), the value as YAML text, and the meaning.
 struct OptionLine {
   std::string key;
@@ -103,7 +122,8 @@ class Reader {
   void field(std::string_view key, double& value, std::string_view meaning, Bounds bounds = {});
   void field(std::string_view key, std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
-  void field(std::string_view key, std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, std::vector<double>& value, std::string_view meaning, Bounds bounds = {},
+             Length length = {});
   template <class Enum>
     requires std::is_enum_v<Enum>
   void field(std::string_view key, Enum& value, std::string_view meaning) {
@@ -112,6 +132,8 @@ class Reader {
     value = value_named<Enum>(name).value_or(value);
   }
   void renamed(std::string_view old_key, std::string_view key);
+  /// Not for single options of a command line: the next one may make the values fit.
+  void check(std::string_view key, bool good, std::string_view fault);
   template <class Group>
   void group(std::string_view key, Group& value) {
     if (enter(key)) {
@@ -137,6 +159,8 @@ class Reader {
   Status finish();
   /// A warning for each former name in the document.
   std::vector<std::string> warnings() const;
+  /// Adds the keys of the fields that were read.
+  void add_given(GivenKeys* given) const;
 
  private:
   bool enter(std::string_view key);
@@ -155,13 +179,15 @@ class Lister {
   void field(std::string_view key, const double& value, std::string_view meaning, Bounds bounds = {});
   void field(std::string_view key, const std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
-  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {},
+             Length length = {});
   template <class Enum>
     requires std::is_enum_v<Enum>
   void field(std::string_view key, const Enum& value, std::string_view meaning) {
     field(key, std::string(name_of(value)), meaning, choices_of<Enum>());
   }
   void renamed(std::string_view, std::string_view) {}
+  void check(std::string_view, bool, std::string_view) {}
   template <class Group>
   void group(std::string_view key, Group& value) {
     const std::size_t length = prefix_.size();
@@ -195,13 +221,17 @@ class Validator {
   void field(std::string_view key, const double& value, std::string_view meaning, Bounds bounds = {});
   void field(std::string_view key, const std::string& value, std::string_view meaning,
              const std::vector<std::string>& choices = {});
-  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {});
+  void field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds = {},
+             Length length = {});
   template <class Enum>
     requires std::is_enum_v<Enum>
   void field(std::string_view key, const Enum& value, std::string_view) {
     if (name_of(value).empty()) add_error(key, "is not one of the values of its enum");
   }
   void renamed(std::string_view, std::string_view) {}
+  void check(std::string_view key, bool good, std::string_view what) {
+    if (!good) add_error(key, what);
+  }
   template <class Group>
   void group(std::string_view key, Group& value) {
     const std::size_t length = prefix_.size();
@@ -235,31 +265,34 @@ std::string place_of_option(const std::string& text, const std::string& name, co
 
 /// Reads options from YAML text. Fields that the text does not contain keep their values in `defaults`. Unknown and
 /// repeated keys, wrong types and values out of bounds are errors (code `configuration`), all reported in one Error,
-/// each on a line "name:line: key: reason".
+/// each on a line "name:line: key: reason". The keys that the text contains are added to `given`.
 template <class Options>
-Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {}) {
+Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {},
+                              GivenKeys* given = nullptr) {
   auto tree = options_detail::parse(text, name);
   if (!tree) return failure(tree);
   options_detail::Reader reader(*tree);
   defaults.describe(reader);
   if (Status status = reader.finish(); !status) return failure(status);
+  reader.add_given(given);
   return defaults;
 }
 
 /// The same from a file; code `configuration` also if the file cannot be read.
 template <class Options>
-Result<Options> load_options(const std::string& path, Options defaults = {}) {
+Result<Options> load_options(const std::string& path, Options defaults = {}, GivenKeys* given = nullptr) {
   auto tree = options_detail::load(path);
   if (!tree) return failure(tree);
   options_detail::Reader reader(*tree);
   defaults.describe(reader);
   if (Status status = reader.finish(); !status) return failure(status);
+  reader.add_given(given);
   return defaults;
 }
 
-/// Applies one assignment "group.key=value" of a command line. Errors have code `usage`.
+/// Applies one assignment "group.key=value" of a command line; its key is added to `given`. Errors have code `usage`.
 template <class Options>
-Result<Options> set_option(Options options, const std::string& assignment) {
+Result<Options> set_option(Options options, const std::string& assignment, GivenKeys* given = nullptr) {
   auto tree = options_detail::from_assignment(assignment);
   if (!tree) return failure(tree);
   options_detail::Reader reader(*tree);
@@ -268,6 +301,7 @@ Result<Options> set_option(Options options, const std::string& assignment) {
     status.error().code = ErrorCode::usage;
     return failure(status);
   }
+  reader.add_given(given);
   return options;
 }
 

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "spartan/testing/temporary_folder.h"
 
@@ -264,6 +266,206 @@ RC_GTEST_PROP(Options, DumpsParseToTheSameBits, (double gain, bool enabled, int 
   RC_ASSERT(back->matcher.speckle.size_px == options.matcher.speckle.size_px);
   RC_ASSERT(back->matcher.note == options.matcher.note);
   RC_ASSERT(back->matcher.lengths_m == options.matcher.lengths_m);
+}
+
+enum class Filter { none, median, bilateral };
+constexpr auto enum_names(Filter) {
+  return std::array{EnumName{Filter::none, "none"}, EnumName{Filter::median, "median"},
+                    EnumName{Filter::bilateral, "bilateral"}};
+}
+
+struct FilterOptions {
+  Filter filter = Filter::median;
+  int radius_px = 1;
+  std::vector<double> weights{1, 2, 1};
+  SpeckleOptions speckle;
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.renamed("smoothing", "filter");
+    v.field("filter", filter, "how disparities are filtered");
+    v.renamed("radius", "radius_px");
+    v.field("radius_px", radius_px, "half the window", between(1, 9));
+    v.field("weights", weights, "of three neighbors", between(0, 10));
+    v.renamed("islands", "speckle");
+    v.group("speckle", speckle);
+  }
+};
+
+Result<FilterOptions> parse_filter(const std::string& text) {
+  return parse_options<FilterOptions>(text, "f.yaml");
+}
+std::string filter_fault_of(const std::string& text) {
+  const auto result = parse_filter(text);
+  EXPECT_FALSE(result) << text;
+  return result ? std::string() : result.error().message();
+}
+
+TEST(EnumOptions, AreReadAndListedByName) {
+  EXPECT_EQ(name_of(Filter::bilateral), "bilateral");
+  EXPECT_EQ(value_named<Filter>("none"), Filter::none);
+  EXPECT_EQ(value_named<Filter>("gaussian"), std::nullopt);
+  EXPECT_EQ(parse_filter("filter: bilateral")->filter, Filter::bilateral);
+  EXPECT_EQ(parse_filter("radius_px: 2")->filter, Filter::median) << "not named: the default stays";
+  EXPECT_EQ(set_option(FilterOptions{}, "filter=none")->filter, Filter::none);
+  const auto lines = list_options(FilterOptions{Filter::bilateral});
+  EXPECT_EQ(lines[0].value, "\"bilateral\"");
+  EXPECT_EQ(lines[0].meaning, "how disparities are filtered (none | median | bilateral)");
+  for (const Filter filter : {Filter::none, Filter::median, Filter::bilateral})
+    EXPECT_EQ(parse_filter(dump_options(FilterOptions{filter}))->filter, filter);
+}
+
+TEST(EnumOptions, OtherNamesAreRefused) {
+  for (const char* text : {"filter: gaussian", "filter: Median", "filter: 1"})
+    EXPECT_THAT(filter_fault_of(text), HasSubstr("f.yaml:1: filter: is '")) << text;
+  EXPECT_THAT(filter_fault_of("filter: gaussian"), HasSubstr("must be one of: none, median, bilateral"));
+  EXPECT_THAT(filter_fault_of("filter: [none]"), HasSubstr("f.yaml:1: filter: must be text"));
+}
+
+TEST(RenamedOptions, FormerNamesAreAcceptedWithAWarning) {
+  const std::string text = "smoothing: none\nradius: 3\nislands:\n  size_px: 7\n";
+  const auto options = parse_filter(text);
+  ASSERT_TRUE(options) << options.error().message();
+  EXPECT_EQ(options->filter, Filter::none);
+  EXPECT_EQ(options->radius_px, 3);
+  EXPECT_EQ(options->speckle.size_px, 7);
+  const auto warnings = renamed_options<FilterOptions>(text, "f.yaml");
+  ASSERT_EQ(warnings.size(), 3U);
+  EXPECT_THAT(warnings[0], HasSubstr("f.yaml:1: smoothing is now called filter"));
+  EXPECT_THAT(warnings[1], HasSubstr("f.yaml:2: radius is now called radius_px"));
+  EXPECT_THAT(warnings[2], HasSubstr("islands is now called speckle"));
+  EXPECT_EQ(renamed_options<FilterOptions>("filter: none\nradius_px: 3\n", "f.yaml").size(), 0U);
+  EXPECT_EQ(renamed_options<FilterOptions>("filter: [", "f.yaml").size(), 0U);
+}
+
+TEST(RenamedOptions, TheCommandLineKnowsThemToo) {
+  EXPECT_EQ(set_option(FilterOptions{}, "radius=4")->radius_px, 4);
+  EXPECT_EQ(set_option(FilterOptions{}, "islands.size_px=4")->speckle.size_px, 4);
+  const auto warnings = renamed_options<FilterOptions>("islands.size_px=4");
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_THAT(warnings[0], HasSubstr("islands is now called speckle"));
+}
+
+TEST(RenamedOptions, AreCheckedAsTheirSuccessors) {
+  EXPECT_THAT(filter_fault_of("radius: 12"), HasSubstr("radius_px: is 12, must be between 1 and 9"));
+  EXPECT_THAT(filter_fault_of("radius: 2\nradius_px: 2\n"),
+              HasSubstr("f.yaml:1: radius: is the former name of radius_px, which is given too"));
+  EXPECT_THAT(filter_fault_of("islands: {size: 2}"), HasSubstr("speckle.size: unknown key"));
+  const std::string fault = filter_fault_of("window: 3");
+  EXPECT_THAT(fault, HasSubstr("window: unknown key"));
+  EXPECT_THAT(fault, Not(HasSubstr("smoothing"))) << "former names are not among the known ones";
+}
+
+TEST(ValidateOptions, DefaultsAreGood) {
+  EXPECT_TRUE(validate(RunOptions{}, "run options"));
+  EXPECT_TRUE(validate(FilterOptions{}, "filter options"));
+  EXPECT_TRUE(validate(MaskedOptions{}, "masks"));
+}
+
+TEST(ValidateOptions, EveryFieldThatIsWrongIsNamed) {
+  RunOptions options;
+  options.threads = 99;
+  options.matcher.method = "magic";
+  options.matcher.gain = std::numeric_limits<double>::infinity();
+  options.matcher.lengths_m = {1, -2};
+  options.matcher.speckle.size_px = -1;
+  options.matcher.speckle.difference_px = std::numeric_limits<double>::quiet_NaN();
+  const Status checked = validate(options, "run options");
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().code, ErrorCode::configuration);
+  EXPECT_EQ(checked.error().where, "run options");
+  EXPECT_EQ(checked.error().what,
+            "matcher.method is 'magic', must be one of: sgm, block\n"
+            "matcher.lengths_m holds -2, must be at least 0\n"
+            "matcher.gain must be a finite number\n"
+            "matcher.speckle.size_px is -1, must be at least 0\n"
+            "matcher.speckle.difference_px must be a finite number\n"
+            "threads is 99, must be between 1 and 64");
+}
+
+TEST(ValidateOptions, BoundsThemselvesAreInside) {
+  for (const int threads : {1, 64}) {
+    RunOptions options;
+    options.threads = threads;
+    EXPECT_TRUE(validate(options, "run options")) << threads;
+  }
+  for (const int threads : {0, 65}) {
+    RunOptions options;
+    options.threads = threads;
+    EXPECT_FALSE(validate(options, "run options")) << threads;
+  }
+}
+
+TEST(ValidateOptions, NotANumberInAListIsRefused) {
+  FilterOptions options;
+  options.weights = {1, std::numeric_limits<double>::quiet_NaN(), 1};
+  EXPECT_THAT(validate(options, "filter options").error().message(), HasSubstr("weights holds nan"));
+}
+
+TEST(ValidateOptions, AnEnumHoldsOneOfItsValues) {
+  FilterOptions options;
+  options.filter = static_cast<Filter>(17);
+  EXPECT_EQ(name_of(options.filter), "");
+  EXPECT_THAT(validate(options, "filter options").error().message(),
+              HasSubstr("filter is not one of the values of its enum"));
+}
+
+TEST(ValidateOptions, ItemsOfListsAreNamed) {
+  MaskedOptions options;
+  options.masks = {{"sky", 2}, {"wheel", 12}};
+  EXPECT_THAT(validate(options, "masks").error().message(), HasSubstr("masks[1].rows is 12, must be between 1 and 9"));
+}
+
+struct WindowOptions {
+  std::vector<double> sigmas{1, 1, 1};
+  double widest_m = 1, step_m = 0.1;
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("sigmas", sigmas, "along x, y, z", between(0, 10), Length{3});
+    v.field("widest_m", widest_m, "half the window", between(0, 10));
+    v.field("step_m", step_m, "between trials", between(0, 10));
+    v.check("step_m", widest_m <= 100 * step_m, "is less than a hundredth of widest_m");
+  }
+};
+
+TEST(OptionLengths, ListsOfOtherLengthAreRefused) {
+  EXPECT_TRUE(parse_options<WindowOptions>("sigmas: [1, 2, 3]", "w.yaml"));
+  for (const char* list : {"[]", "[1, 2]", "[1, 2, 3, 4]"}) {
+    const auto options = parse_options<WindowOptions>(std::string("sigmas: ") + list, "w.yaml");
+    ASSERT_FALSE(options) << list;
+    EXPECT_THAT(options.error().message(), HasSubstr("w.yaml:1: sigmas: has "));
+    EXPECT_THAT(options.error().message(), HasSubstr("numbers, must have 3"));
+  }
+  EXPECT_FALSE(set_option(WindowOptions{}, "sigmas=[1, 2]"));
+  WindowOptions in_code;
+  in_code.sigmas = {1};
+  EXPECT_THAT(validate(in_code, "window").error().message(), HasSubstr("sigmas has 1 numbers, must have 3"));
+}
+
+TEST(OptionChecks, ValuesThatDoNotFitEachOtherAreRefused) {
+  const auto in_file = parse_options<WindowOptions>("widest_m: 5\nstep_m: 0.01\n", "w.yaml");
+  ASSERT_FALSE(in_file);
+  EXPECT_THAT(in_file.error().message(), HasSubstr("w.yaml:2: step_m: is less than a hundredth of widest_m"));
+  EXPECT_FALSE(parse_options<WindowOptions>("{}", "w.yaml", WindowOptions{{1, 1, 1}, 5, 0.01})) << "neither is given";
+  const auto first = set_option(WindowOptions{}, "step_m=0.001");
+  ASSERT_TRUE(first) << "the next option on the command line may make them fit";
+  EXPECT_TRUE(validate(*set_option(*first, "widest_m=0.05"), "window"));
+  EXPECT_THAT(validate(*first, "window").error().message(), HasSubstr("step_m is less than a hundredth of widest_m"));
+}
+
+TEST(OptionKeys, ThatWereGivenAreKnown) {
+  GivenKeys given;
+  ASSERT_TRUE(parse_options<RunOptions>("matcher:\n  gain: 0.1\n  speckle: {}\n", "run.yaml", {}, &given));
+  ASSERT_TRUE(set_option(RunOptions{}, "matcher.speckle.size_px=100", &given));
+  EXPECT_TRUE(given.contains("matcher.gain")) << "given, though it is the default";
+  EXPECT_TRUE(given.contains("matcher.speckle.size_px"));
+  EXPECT_FALSE(given.contains("matcher.speckle.difference_px"));
+  EXPECT_FALSE(given.contains("threads"));
+  EXPECT_TRUE(given.in_group("matcher").contains("gain"));
+  EXPECT_TRUE(given.in_group("matcher.speckle").contains("size_px"));
+  EXPECT_FALSE(given.in_group("match").contains("gain"));
+  GivenKeys renamed;
+  ASSERT_TRUE(parse_options<FilterOptions>("radius: 3", "f.yaml", {}, &renamed));
+  EXPECT_TRUE(renamed.contains("radius_px")) << "by its present name";
 }
 
 }  // namespace

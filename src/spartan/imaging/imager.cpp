@@ -120,6 +120,7 @@ struct Imager::State {
 
 Result<Imager> Imager::create(const Rig& rig, const ImagingOptions& options, Workers workers,
                               const std::string& mask_folder) {
+  if (Status status = validate(options, "imaging options"); !status) return failure(status);
   if (Status status = rig.validate(rig.name); !status) return failure(status);
   auto state = std::make_unique<State>(State{rig, options, std::move(workers), {}, {}});
   for (const StereoPair& pair : state->rig.pairs) {

@@ -17,7 +17,7 @@ namespace spartan {
 /// do not depend on earlier frames.
 class Imager {
  public:
-  /// Code `configuration` where a pair cannot be rectified (diverging optical axes, an impossible view, a camera that
+  /// Code `configuration` where options are out of bounds, a pair cannot be rectified (diverging optical axes, an impossible view, a camera that
   /// sees less than 1 % of the view), a self-mask cannot be read or a vignetting correction is out of range.
   /// `mask_folder` is the folder of the rig file, to which the names of self-masks are relative.
   static Result<Imager> create(const Rig& rig, const ImagingOptions& options, Workers workers,

@@ -415,5 +415,16 @@ TEST(Imager, RectifiesASyntheticDistortedPair) {
   EXPECT_GT(shifted_sum, 2 * right_sum);
 }
 
+TEST(Imager, RefusesOptionsOutOfBoundsThatWereSetInCode) {
+  ImagingOptions options;
+  options.contrast_low_percent = -1;
+  options.local_contrast.tiles = 0;
+  const auto refused = Imager::create(rig_with({}), options, Workers(1));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+  EXPECT_THAT(refused.error().message(), HasSubstr("contrast_low_percent is -1"));
+  EXPECT_THAT(refused.error().message(), HasSubstr("local_contrast.tiles is 0"));
+}
+
 }  // namespace
 }  // namespace spartan

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "spartan/localization/chi_square.h"
 #include "spartan/localization/kalman_update.h"
@@ -25,9 +26,8 @@ void set_variance(ErrorCovariance& p, int at, int size, double sigma) {
 }
 
 Vector6d six_of(const std::vector<double>& values) {
-  Vector6d six = Vector6d::Zero();
-  std::copy_n(values.begin(), std::min<std::size_t>(6, values.size()), six.data());
-  return six;
+  if (values.size() != 6) throw std::invalid_argument("ErrorStateFilter: a list of drift sigmas must have 6 numbers");
+  return Eigen::Map<const Vector6d>(values.data());
 }
 
 template <class T>

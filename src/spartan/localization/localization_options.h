@@ -55,10 +55,10 @@ struct VisionOptions {
             between(0.01, 1e4));
     v.field("drift_sigmas", drift_sigmas,
             "standard deviation of the errors that last for a while, over the stated ones: x, y, z, about x, y, z",
-            between(0, 1e3));
+            between(0, 1e3), Length{6});
     v.field("drift_steps", drift_steps, "after so many shots such an error has fallen to 1/e", between(1, 1e6));
-    v.field("constant_sigmas", constant_sigmas, "the same of the errors that stay for the whole drive",
-            between(0, 1e3));
+    v.field("constant_sigmas", constant_sigmas, "the same of the errors that stay for the whole drive", between(0, 1e3),
+            Length{6});
     v.field("gate_probability", gate_probability, "share of good motions that the test lets pass",
             between(0.5, 1 - 1e-12));
   }
@@ -208,26 +208,34 @@ struct LocalizationOptions {
   }
 };
 
-/// With what is stated of the sensors at hand in the place of the defaults; what somebody set stays.
-inline LocalizationOptions with_stated(LocalizationOptions options, const SensorNoise& stated) {
+/// Replaces defaults by the noise that a recording specifies for its sensors. Kept are values whose keys were given (in
+/// a config file or with --set; `given` holds keys of LocalizationOptions), even where they are the default, and values
+/// that differ from the default (set in code).
+inline LocalizationOptions with_stated(LocalizationOptions options, const SensorNoise& stated,
+                                       const GivenKeys& given = {}) {
   const LocalizationOptions defaults;
-  const auto take = [](double& value, double by_default, double by_recording) {
-    if (value == by_default && by_recording > 0) value = by_recording;
+  const auto take = [&](const char* key, double& value, double by_default, double by_recording) {
+    if (!given.contains(key) && value == by_default && by_recording > 0) value = by_recording;
   };
-  const auto take_imu = [&](double InertialOptions::*ours, double ImuNoise::*theirs) {
-    take(options.imu.*ours, defaults.imu.*ours, stated.imu.*theirs);
+  const auto take_imu = [&](const char* key, double InertialOptions::*ours, double ImuNoise::*theirs) {
+    take(key, options.imu.*ours, defaults.imu.*ours, stated.imu.*theirs);
   };
-  take_imu(&InertialOptions::gyro_noise_rad_s_sqrt_hz, &ImuNoise::gyro_noise_rad_s_sqrt_hz);
-  take_imu(&InertialOptions::gyro_bias_rad_s, &ImuNoise::gyro_bias_rad_s);
-  take_imu(&InertialOptions::gyro_walk_rad_s2_sqrt_hz, &ImuNoise::gyro_walk_rad_s2_sqrt_hz);
-  take_imu(&InertialOptions::accel_noise_m_s2_sqrt_hz, &ImuNoise::accel_noise_m_s2_sqrt_hz);
-  take_imu(&InertialOptions::accel_bias_m_s2, &ImuNoise::accel_bias_m_s2);
-  take_imu(&InertialOptions::accel_walk_m_s3_sqrt_hz, &ImuNoise::accel_walk_m_s3_sqrt_hz);
-  take(options.compass.offset_walk_rad_sqrt_hz, defaults.compass.offset_walk_rad_sqrt_hz,
-       stated.compass.offset_walk_rad_sqrt_hz);
-  take(options.inclinometer.bias_rad, defaults.inclinometer.bias_rad, stated.inclinometer.bias_rad);
-  take(options.inclinometer.bias_walk_rad_sqrt_hz, defaults.inclinometer.bias_walk_rad_sqrt_hz,
-       stated.inclinometer.bias_walk_rad_sqrt_hz);
+  take_imu("imu.gyro_noise_rad_s_sqrt_hz", &InertialOptions::gyro_noise_rad_s_sqrt_hz,
+           &ImuNoise::gyro_noise_rad_s_sqrt_hz);
+  take_imu("imu.gyro_bias_rad_s", &InertialOptions::gyro_bias_rad_s, &ImuNoise::gyro_bias_rad_s);
+  take_imu("imu.gyro_walk_rad_s2_sqrt_hz", &InertialOptions::gyro_walk_rad_s2_sqrt_hz,
+           &ImuNoise::gyro_walk_rad_s2_sqrt_hz);
+  take_imu("imu.accel_noise_m_s2_sqrt_hz", &InertialOptions::accel_noise_m_s2_sqrt_hz,
+           &ImuNoise::accel_noise_m_s2_sqrt_hz);
+  take_imu("imu.accel_bias_m_s2", &InertialOptions::accel_bias_m_s2, &ImuNoise::accel_bias_m_s2);
+  take_imu("imu.accel_walk_m_s3_sqrt_hz", &InertialOptions::accel_walk_m_s3_sqrt_hz,
+           &ImuNoise::accel_walk_m_s3_sqrt_hz);
+  take("compass.offset_walk_rad_sqrt_hz", options.compass.offset_walk_rad_sqrt_hz,
+       defaults.compass.offset_walk_rad_sqrt_hz, stated.compass.offset_walk_rad_sqrt_hz);
+  take("inclinometer.bias_rad", options.inclinometer.bias_rad, defaults.inclinometer.bias_rad,
+       stated.inclinometer.bias_rad);
+  take("inclinometer.bias_walk_rad_sqrt_hz", options.inclinometer.bias_walk_rad_sqrt_hz,
+       defaults.inclinometer.bias_walk_rad_sqrt_hz, stated.inclinometer.bias_walk_rad_sqrt_hz);
   return options;
 }
 

@@ -1,9 +1,14 @@
 #include "spartan/localization/localization_options.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <string>
 
 namespace spartan {
 namespace {
+
+using ::testing::HasSubstr;
 
 TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
   const LocalizationOptions defaults;
@@ -23,7 +28,37 @@ TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
   EXPECT_EQ(one.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
   LocalizationOptions set;
   set.inclinometer.bias_rad = 0.2;
-  EXPECT_EQ(with_stated(set, {{}, {}, {8, 9}}).inclinometer.bias_rad, 0.2) << "somebody wanted it";
+  EXPECT_EQ(with_stated(set, {{}, {}, {8, 9}}).inclinometer.bias_rad, 0.2) << "set in code";
+}
+
+TEST(LocalizationOptions, ADefaultThatIsGivenIsNotReplaced) {
+  GivenKeys given;
+  given.add("imu.gyro_bias_rad_s");
+  given.add("inclinometer.bias_rad");
+  const LocalizationOptions defaults;
+  const LocalizationOptions used = with_stated(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}}, given);
+  EXPECT_EQ(used.imu.gyro_bias_rad_s, defaults.imu.gyro_bias_rad_s);
+  EXPECT_EQ(used.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
+  EXPECT_EQ(used.imu.gyro_noise_rad_s_sqrt_hz, 1);
+  EXPECT_EQ(used.inclinometer.bias_walk_rad_sqrt_hz, 9);
+}
+
+TEST(LocalizationOptions, DriftOfVisionNeedsSixSigmas) {
+  for (const char* key : {"drift_sigmas", "constant_sigmas"}) {
+    for (const char* list : {"[1, 2, 3]", "[]", "[1, 2, 3, 4, 5, 6, 7]"}) {
+      const auto options =
+          parse_options<LocalizationOptions>(std::string("vision: {") + key + ": " + list + "}\n", "run.yaml");
+      ASSERT_FALSE(options) << key << ": " << list;
+      EXPECT_EQ(options.error().code, ErrorCode::configuration);
+      EXPECT_THAT(options.error().message(), HasSubstr(std::string("run.yaml:1: vision.") + key));
+      EXPECT_THAT(options.error().message(), HasSubstr("must have 6"));
+    }
+  }
+  LocalizationOptions in_code;
+  in_code.vision.drift_sigmas = {1, 2, 3};
+  const Status checked = validate(in_code, "localization options");
+  ASSERT_FALSE(checked);
+  EXPECT_THAT(checked.error().message(), HasSubstr("vision.drift_sigmas has 3 numbers, must have 6"));
 }
 
 }  // namespace

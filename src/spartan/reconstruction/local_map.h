@@ -40,10 +40,10 @@ struct LocalMap {
   Image<float> elevation_m, elevation_min_m, elevation_max_m;
   Image<float> variance_m2;  ///< Variance of elevation_m.
   Image<float> count;        ///< Number of points; 0 where unobserved.
-  Image<float> ground_m;     ///< Elevation of the ground surface beneath obstacles and above cavities.
+  Image<float> ground_m;     ///< Elevation of the ground surface beneath obstacles and above cavities; NaN where too few cells are around.
   Image<float> slope_rad, roughness_m, step_m;
-  Image<GroundClass> kind;         ///< Unobserved cells are unknown, free cells are ground.
-  Image<float> occupancy_logodds;  ///< Log-odds of an obstacle or a cavity; 0 where unobserved.
+  Image<GroundClass> kind;         ///< Unobserved cells and cells without ground_m are unknown, free cells are ground.
+  Image<float> occupancy_logodds;  ///< Log-odds of an obstacle or a cavity; 0 where the class is unknown.
   Image<float> cost;               ///< Traversal cost, 0 (easy) … 1 (not traversable).
   std::vector<Obstacle> obstacles;
 

@@ -70,7 +70,8 @@ void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
   const auto [w, h] = map.size();
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
-      if (!(map.count(x, y) > 0)) continue;
+      // Without a ground surface nothing is over or under it: the cell stays unknown, its log-odds 0.
+      if (!(map.count(x, y) > 0) || !std::isfinite(map.ground_m(x, y))) continue;
       const double over = map.elevation_max_m(x, y) - map.ground_m(x, y),
                    under = map.ground_m(x, y) - map.elevation_min_m(x, y);
       const double sigma = std::sqrt(static_cast<double>(map.variance_m2(x, y))) + kLeastSigma_m;

@@ -213,5 +213,16 @@ TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
   EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of at most 20 degrees";
 }
 
+// Three points far from all others: too few cells for the surface of the ground.
+TEST(MapGenerator, AnIslandWithoutGroundIsUnknown) {
+  const Eigen::Vector3f along = Eigen::Vector3f(3.4F, 3.4F, -1).normalized();
+  std::vector<SurfacePoint> points(3, {{3.41F, 3.41F, 0}, 0.005F, along, GroundClass::ground});
+  const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
+  EXPECT_EQ(at(map, map.count, 3.41, 3.41), 3);
+  EXPECT_NEAR(at(map, map.elevation_m, 3.41, 3.41), 0, 1e-6) << "its elevation is measured all the same";
+  EXPECT_EQ(at(map, map.kind, 3.41, 3.41), 0);
+  EXPECT_EQ(at(map, map.occupancy_logodds, 3.41, 3.41), 0);
+}
+
 }  // namespace
 }  // namespace spartan

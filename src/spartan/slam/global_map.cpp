@@ -22,10 +22,14 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
   s.lowest_m = local.elevation_min_m(column, row);
   s.highest_m = local.elevation_max_m(column, row);
   s.count = local.count(column, row);
-  s.occupancy_logodds = local.occupancy_logodds(column, row);
+  // Without a class only the elevation is fused.
   const GroundClass kind = local.kind(column, row);
-  s.shape = static_cast<std::int16_t>(kind == GroundClass::obstacle ? 1 : kind == GroundClass::cavity ? -1 : 0);
-  s.votes = 1;
+  const float logodds = local.occupancy_logodds(column, row);
+  if (kind != GroundClass::unknown && std::isfinite(logodds)) {
+    s.occupancy_logodds = logodds;
+    s.shape = static_cast<std::int16_t>(kind == GroundClass::obstacle ? 1 : kind == GroundClass::cavity ? -1 : 0);
+    s.votes = 1;
+  }
   Eigen::Vector2f slope = grid.slope(column, row);
   if (!slope.allFinite()) slope.setZero();
   const Eigen::Vector2d at = middle_of(local.place, column, row);
@@ -33,6 +37,11 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
       elevation_jacobian(slope.cast<double>(), {at.x() - body.x(), at.y() - body.y(), s.elevation_m - body.z()});
   s.variance_m2 = static_cast<float>(local.variance_m2(column, row) + j.dot(world_covariance * j));
   return s;
+}
+
+bool is_finite(const CellSurface& s) {
+  return std::isfinite(s.elevation_m) && std::isfinite(s.variance_m2) && std::isfinite(s.lowest_m) &&
+         std::isfinite(s.highest_m);
 }
 
 }  // namespace
@@ -203,12 +212,13 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
         for (int x = 0; x < kSide; ++x) {
           const int column = tx * kSide + x + offset->x - window.west;
           if (column < 0 || column >= window.width || !(local.count(column, row) > 0)) continue;
+          CellSurface observation = surface_of(local, column, row, world_covariance, grid, body);
+          if (!is_finite(observation)) continue;
           if (tile == nullptr) {
             auto loaded = load_or_make({submap.id, tx, ty});
             if (!loaded) return failure(loaded);
             tile = *loaded;
           }
-          CellSurface observation = surface_of(local, column, row, world_covariance, grid, body);
           observation.shift_elevation(minus_anchor_height);
           observation.stop = stop;
           MapCell& cell = tile->at(x, y);

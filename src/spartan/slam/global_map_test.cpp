@@ -5,6 +5,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "spartan/slam/map_file.h"
 #include "spartan/slam/synthetic_stop_test.h"
@@ -337,6 +338,24 @@ RC_GTEST_PROP(GlobalMap, ObservationsNeverRaiseAVarianceAndUnobservedCellsAreNev
       }
     }
   }
+}
+
+TEST(GlobalMap, ACellThatIsNotFiniteDoesNotEnterIt) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const Ground ground = rocky_ground();
+  const Pose pose = standing(ground, 0, 0, 0);
+  LocalMap local = map_of(ground, pose, 1);
+  const GridCell no_class = cell_at(local.place, 2.02, 0.02), no_variance = cell_at(local.place, 2.02, 0.52);
+  ASSERT_GT(local.count(no_class.column, no_class.row), 0);
+  ASSERT_GT(local.count(no_variance.column, no_variance.row), 0);
+  local.occupancy_logodds(no_class.column, no_class.row) = nan;
+  local.variance_m2(no_variance.column, no_variance.row) = nan;
+  GlobalMap map({}, 0.05);
+  ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
+  const MapView view = *map.view(window_of(local.place, local.size()));
+  EXPECT_EQ(view.occupancy_logodds(no_class.column, no_class.row), 0);
+  EXPECT_EQ(view.kind(no_class.column, no_class.row), 0);
+  EXPECT_EQ(view.count(no_variance.column, no_variance.row), 0);
 }
 
 }  // namespace

@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <stdexcept>
 
 namespace spartan {
 namespace {
@@ -135,6 +137,9 @@ std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGri
   const int nx = steps(window.x_m, options.step_m), ny = steps(window.y_m, options.step_m),
             na = steps(window.yaw_rad, yaw_step);
   const int wide = 2 * nx + 1, high = 2 * ny + 1, turns = 2 * na + 1;
+  const std::int64_t count = std::int64_t{wide} * high * turns;
+  if (static_cast<double>(count) > MatchOptions::kMostTrials)
+    throw std::invalid_argument("jitter_search: the window exceeds MatchOptions::kMostTrials");
 
   // Approximate height and tilt, so that the robust fits start within their basin of convergence.
   std::vector<Pair> pairs;
@@ -142,7 +147,7 @@ std::vector<JitterPeak> jitter_search(const SurfaceGrid& local, const SurfaceGri
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
   for (const double scale : {10.0, 0.3, 0.1, 0.1}) start = fit_plane(pairs, start, scale);
 
-  std::vector<Trial> trials(static_cast<std::size_t>(wide * high * turns));
+  std::vector<Trial> trials(static_cast<std::size_t>(count));
   const auto at = [&](int a, int j, int i) -> Trial& {
     return trials[static_cast<std::size_t>((a * high + j) * wide + i)];
   };

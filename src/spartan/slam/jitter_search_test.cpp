@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+
 #include "spartan/slam/synthetic_stop_test.h"
 
 namespace spartan {
@@ -65,6 +67,24 @@ TEST(ScanMatching, OccupancyDecidesWhereElevationsAreEqual) {
   const auto peaks = jitter_search(plain(0.2), plain(0), {2, 0, 0}, {0.4, 0.4, 0.02}, {}, Workers(1));
   ASSERT_FALSE(peaks.empty());
   EXPECT_NEAR((peaks.front().correction * Eigen::Vector3d(2, 0, 0)).x(), 1.8, 0.051);
+}
+
+TEST(JitterSearch, ASearchThatIsTooLargeIsRefused) {
+  MatchOptions options;
+  EXPECT_TRUE(validate(options, "match"));
+  options.widest_m = 10;
+  EXPECT_TRUE(validate(options, "match")) << "401 x 401 shifts, 17 rotations";
+  options.step_m = 0.005;
+  options.step_deg = 0.05;
+  options.widest_deg = 60;  // 4001 x 4001 shifts, 2401 rotations: more trials than an int counts
+  const Status refused = validate(options, "match");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+  EXPECT_NE(refused.error().message().find("step_m"), std::string::npos) << refused.error().message();
+  EXPECT_FALSE(parse_options<MatchOptions>("{widest_m: 10, step_m: 0.005, step_deg: 0.05}", "match.yaml"));
+  SurfaceGrid none;
+  none.cell_m = 0.1;
+  EXPECT_THROW(jitter_search(none, none, {0, 0, 0}, {10, 10, 1.05}, options, Workers(1)), std::invalid_argument);
 }
 
 }  // namespace

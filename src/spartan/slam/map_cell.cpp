@@ -41,7 +41,7 @@ CellSurface with_one_vote_less(CellSurface alternative) {
 }  // namespace
 
 GroundClass MapCell::kind() const {
-  if (!surface.observed()) return GroundClass::unknown;
+  if (!surface.observed() || surface.votes == 0) return GroundClass::unknown;
   if (surface.occupancy_logodds <= 0) return GroundClass::ground;
   return surface.shape >= 0 ? GroundClass::obstacle : GroundClass::cavity;
 }

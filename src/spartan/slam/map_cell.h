@@ -17,7 +17,7 @@ struct CellSurface {
   float occupancy_logodds = 0;  ///< Log-odds of an obstacle or a cavity.
   std::int32_t stop = -1;       ///< The first stop that observed it.
   std::int16_t shape = 0;       ///< Observations as an obstacle minus observations as a cavity.
-  std::uint16_t votes = 0;      ///< Number of observations.
+  std::uint16_t votes = 0;      ///< Number of observations of the class; 0: the class is unknown.
 
   bool observed() const { return count > 0; }
   void shift_elevation(float by_m) {
@@ -32,7 +32,7 @@ struct MapCell {
   CellSurface surface;
   CellSurface alternative;  ///< Fused from observations that contradict the surface.
 
-  /// Unobserved cells are unknown, free cells are ground.
+  /// Cells that were never observed, or only without a class, are unknown; free cells are ground.
   GroundClass kind() const;
   friend bool operator==(const MapCell&, const MapCell&) = default;
 };

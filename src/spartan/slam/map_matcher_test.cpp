@@ -158,5 +158,33 @@ TEST(MapMatcher, IsEquivariantToMotionsOfTheWorld) {
   }
 }
 
+// And a stone that is too far from all ground for the surface of the ground to be fitted there.
+std::vector<SurfacePoint> with_island(std::vector<SurfacePoint> points, const Pose& body_from_world) {
+  for (double x = -2.49; x < -2; x += 0.02) {
+    for (double y = -2.49; y < -2; y += 0.02) {
+      const Eigen::Vector3d p = body_from_world * Eigen::Vector3d(x, y, 0.1), along = p - Eigen::Vector3d(0, 0, 1);
+      points.push_back({p.cast<float>(), 0.005F, along.normalized().cast<float>(), GroundClass::unknown});
+    }
+  }
+  return points;
+}
+
+TEST(MapMatcher, AnIslandWithoutGroundDoesNotSpoilTheMatch) {
+  const Ground ground = rocky_ground();
+  const Workers workers(2);
+  const Pose before = standing(ground, 0, 0, 0), now = standing(ground, 1, 0.2, 0.1);
+  GlobalMap map({}, 0.05);
+  const LocalMap mapped =
+      MapGenerator({}, workers).generate(with_island(points_at(ground, before, 1), before.inverse()), before);
+  ASSERT_TRUE(map.add(mapped, {}, {before, {}}, Matrix6d::Zero()));
+  const MapView view = *map.view(window_around(now.translation().x(), now.translation().y(), 5, 0.05));
+  const GridCell cell = cell_at(view.place(), -2.23, -2.23);
+  EXPECT_GT(view.count(cell.column, cell.row), 0);
+  EXPECT_EQ(view.occupancy_logodds(cell.column, cell.row), 0);
+  EXPECT_EQ(view.kind(cell.column, cell.row), 0) << "no class was observed";
+  const Scene s{now, with_island(points_at(ground, now, 2), now.inverse()), *map.view(view.window)};
+  EXPECT_EQ(name_of(match(s, offset(0.15, -0.1, 0.05, 0.02, -0.01, 0.04)).verdict), "decided");
+}
+
 }  // namespace
 }  // namespace spartan

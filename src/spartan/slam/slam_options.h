@@ -1,6 +1,8 @@
 // Options of map merging and of the global map.
 #pragma once
 
+#include <cmath>
+
 #include "spartan/core/options.h"
 
 namespace spartan {
@@ -29,6 +31,14 @@ struct MatchOptions {
   double min_relief_sigmas = 1.65;     ///< Required significance of the curvature along a direction.
   double min_margin_sigmas = 2.33;     ///< Required margin over the second-best candidate, standard errors.
   double max_normalized_residual = 3;  ///< Largest accepted median of the normalized residuals.
+
+  /// Limit of the search: 32 bytes for each trial, 160 MB.
+  static constexpr double kMostTrials = 5e6;
+  /// Number of trials of the largest search: shifts along x and y times rotations.
+  double trials() const {
+    const auto count = [](double widest, double step) { return 2 * std::ceil(widest / step) + 1; };
+    return count(max_search_m, step_m) * count(max_search_m, step_m) * count(max_search_deg, step_deg);
+  }
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -104,11 +114,11 @@ struct MatchOptions {
     v.renamed("fewest_cells", "min_cells");
     v.field(
         "min_cells", min_cells,
-        "Minimum number of cells that both maps have fuse_observation; raising it rejects matches of small overlap.",
+        "Minimum number of cells that both maps have observed; raising it rejects matches of small overlap.",
         between(20, 1e6));
     v.renamed("fewest_blocks", "min_blocks");
     v.field("min_blocks", min_blocks,
-            "Minimum number of blocks (see block_m) that both maps have fuse_observation; raising it rejects matches "
+            "Minimum number of blocks (see block_m) that both maps have observed; raising it rejects matches "
             "of small "
             "overlap.",
             between(8, 1e4));
@@ -138,6 +148,11 @@ struct MatchOptions {
             "Largest accepted median of the absolute residuals over their standard deviations, scaled to 1 for normal "
             "residuals; raising it accepts matches that fit worse.",
             between(1, 100));
+    v.check(
+        "step_m", trials() <= kMostTrials,
+        "is too small for max_search_m: (2 max_search_m / step_m + 1)^2 shifts times (2 max_search_deg / step_deg + 1) "
+        "rotations "
+        "exceed 5 million trials");
   }
 };
 
@@ -159,7 +174,7 @@ struct GlobalMapOptions {
             "only, so raising it saves reads.",
             between(1, 1e6));
     v.field("gate_sigmas", gate_sigmas,
-            "Gate on the difference between an fuse_observation elevation and that of its cell, in standard "
+            "Gate on the difference between an observed elevation and that of its cell, in standard "
             "deviations; raising "
             "it fuses observations that contradict more.",
             between(1, 20));

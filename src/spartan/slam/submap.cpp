@@ -22,6 +22,12 @@ CellSurface get_surface(ArchiveReader& in) {
   s.stop = in.get<std::int32_t>();
   s.shape = in.get<std::int16_t>();
   s.votes = in.get<std::uint16_t>();
+  // Version 0.1.0 stored NaN for cells without a ground surface: their class is unknown.
+  if (std::isnan(s.occupancy_logodds)) {
+    s.occupancy_logodds = 0;
+    s.shape = 0;
+    s.votes = 0;
+  }
   return s;
 }
 

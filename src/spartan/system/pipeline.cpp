@@ -86,7 +86,8 @@ struct Pipeline::State {
   Result<std::optional<MappedPosition>> leave_position();
   bool terrain_is_due() const;
   Status check_disparities(const RectifiedPair& shot) const;
-  Result<TerrainView> reconstruct(const RectifiedPair& shot);
+  Result<ImageView<const float>> dense_disparity(const RectifiedPair& shot);
+  Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& shot);
 };
 
 void Pipeline::State::start(const RectifiedPair& shot) {
@@ -175,22 +176,31 @@ bool Pipeline::State::terrain_is_due() const {
   return distance_of_last_terrain_m < 0 || distance_m - distance_of_last_terrain_m >= options.terrain.every_m;
 }
 
-// Whether the terrain and the map of a position can be made of a shot, wherever they are due.
+// Whether the terrain and the map of a stop can be computed from this pair, if they become due.
 Status Pipeline::State::check_disparities(const RectifiedPair& shot) const {
   if (!maps_positions && !makes_terrain) return {};
   return PositionMapper::check(shot, pair.nearest_m);
 }
 
-Result<TerrainView> Pipeline::State::reconstruct(const RectifiedPair& shot) {
-  const DisparityRange range = disparity_range(shot.geometry, pair.nearest_m);
-  auto image = disparity_computer.compute(shot.left, shot.right, range, shot.left_mask, shot.right_mask);
-  if (!image) return failure(image);
-  distance_of_last_terrain_m = distance_m;
-  return TerrainView{shot, image->disparity, world_from_left};
+// The view is valid until the next call.
+Result<ImageView<const float>> Pipeline::State::dense_disparity(const RectifiedPair& shot) {
+  return clock.measure("reconstruction", [&]() -> Result<ImageView<const float>> {
+    const DisparityRange range = disparity_range(shot.geometry, pair.nearest_m);
+    auto image = disparity_computer.compute(shot.left, shot.right, range, shot.left_mask, shot.right_mask);
+    if (!image) return failure(image);
+    return image->disparity;
+  });
+}
+
+// Empty if the odometry computes the disparities of its landmarks itself.
+Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const RectifiedPair& shot) {
+  if (options.odometry.reconstruction.source != "dense") return ImageView<const float>();
+  return dense_disparity(shot);
 }
 
 Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Workers workers,
                                   const std::string& mask_folder) {
+  if (Status status = validate(options, "options"); !status) return failure(status);
   const StereoPair* const pair = pair_for_odometry(rig, options.odometry_pair);
   if (pair == nullptr) {
     return options.odometry_pair.empty()
@@ -238,6 +248,8 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
   if (!shot) return failure(shot);
   s.clock.add(shot->times);
+  auto disparity = s.disparity_for_odometry(*shot);
+  if (!disparity) return failure(disparity);
 
   // What can fail comes first, here and in leave_position(); behind it every stage moves on, and none of them fails.
   if (Status fits = s.check_disparities(*shot); !fits) return failure(fits);
@@ -251,7 +263,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (!s.started) s.start(*shot);
   s.left_from_body = shot->body_from_left.inverse();
 
-  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot); });
+  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot, {}, *disparity); });
   const RelativeMotion moved = s.body_motion(*shot, result.motion);
   if (!result.motion.first) {
     s.advance(result.motion);
@@ -277,9 +289,10 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (Status status = s.pass(frame, *shot, moved); !status) return failure(status);
 
   if (s.terrain_is_due()) {
-    auto terrain = s.clock.measure("reconstruction", [&] { return s.reconstruct(*shot); });
-    if (!terrain) return failure(terrain);
-    result.terrain = std::move(*terrain);
+    if (disparity->empty()) disparity = s.dense_disparity(*shot);
+    if (!disparity) return failure(disparity);
+    s.distance_of_last_terrain_m = s.distance_m;
+    result.terrain = TerrainView{*shot, *disparity, s.world_from_left};
   }
   result.times = s.clock.take();
   return result;

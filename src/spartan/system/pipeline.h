@@ -58,7 +58,7 @@ struct FrameResult {
 /// the same way, over memory it owns. Not thread-safe; one pipeline per rover.
 class Pipeline {
  public:
-  /// Codes: `configuration` (rig or options that do not fit).
+  /// Codes: `configuration` (rig or options that do not fit; names every option that is out of its bounds).
   /// Self-masks are looked up in `mask_folder` (where the rig file lies).
   static Result<Pipeline> create(const Rig& rig, const RunOptions& options, Workers workers,
                                  const std::string& mask_folder = {});

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "spartan/core/database.h"
@@ -118,6 +120,34 @@ TEST(Pipeline, TheFirstFrameShowsTheGround) {
   const Eigen::Vector3d point = first.terrain->world_from_left * in_left;
   EXPECT_NEAR(point.z(), 0, 0.2);
   EXPECT_FALSE(push(pipeline, 1).terrain) << "the next one is due five metres on";
+}
+
+TEST(Pipeline, DenseDisparitiesReachTheOdometryAndAreComputedOncePerFrame) {
+  RunOptions options;
+  options.terrain.every_m = 0;  // with every frame
+  Pipeline row = pipeline_of(options);
+  const auto set = set_option(options, "odometry.reconstruction.source=dense");
+  ASSERT_TRUE(set) << set.error().message();
+  Pipeline dense = pipeline_of(*set);
+  for (int i = 0; i < 3; ++i) {
+    const FrameResult by_row = push(row, i), by_dense = push(dense, i);
+    ASSERT_TRUE(by_row.terrain && by_dense.terrain);
+    EXPECT_EQ(std::count_if(by_dense.times.begin(), by_dense.times.end(),
+                            [](const StageTime& time) { return time.stage == "reconstruction"; }),
+              1)
+        << "one dense disparity image serves odometry and terrain";
+    if (i > 0) {
+      EXPECT_NE(by_row.motion.previous_from_current.translation(), by_dense.motion.previous_from_current.translation());
+      EXPECT_EQ(by_dense.motion.status, TrackingStatus::tracking);
+      EXPECT_NEAR(by_dense.world_from_body.pose.translation().x(), i * kStep_m, 0.005);
+    }
+    for (int y = 0; y < 240; ++y) {
+      for (int x = 0; x < 320; ++x) {
+        const float a = by_row.terrain->disparity(x, y), b = by_dense.terrain->disparity(x, y);
+        ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << x << " " << y;
+      }
+    }
+  }
 }
 
 TEST(Pipeline, RestoredMemoryGoesOnInTheSameWay) {
@@ -255,6 +285,23 @@ TEST(Pipeline, NeedsAPairForTheOdometry) {
   Rig only_wide = rover();
   only_wide.pairs.pop_back();
   EXPECT_FALSE(Pipeline::create(only_wide, {}, Workers(1)));
+}
+
+TEST(Pipeline, RefusesOptionsOutOfBoundsThatWereSetInCode) {
+  RunOptions options;
+  options.reconstruction.p2_flat = 300;
+  options.mapping.v_disparity.strips = 0;
+  options.mapping.map.cell_m = 0;
+  options.terrain.every_m = std::numeric_limits<double>::quiet_NaN();
+  options.imaging.contrast_high_percent = 101;
+  options.localization.vision.drift_sigmas = {1, 2, 3};
+  const auto refused = Pipeline::create(rover(), options, Workers(1));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::configuration);
+  for (const char* field : {"reconstruction.p2_flat is 300", "strips is 0", "mapping.map.cell_m is 0",
+                            "terrain.every_m must be a finite number", "imaging.contrast_high_percent is 101",
+                            "localization.vision.drift_sigmas has 3 numbers, must have 6"})
+    EXPECT_NE(refused.error().message().find(field), std::string::npos) << field;
 }
 
 }  // namespace

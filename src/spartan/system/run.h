@@ -18,6 +18,7 @@ struct RunRequest {
   std::string rig_file;                   ///< empty: the recording's own calibration
   std::optional<RecordingFormat> format;  ///< none: guess
   RunOptions options;
+  GivenKeys given;  ///< keys of `options` that the user gave: the recording's noise does not replace them
   bool resume = false;
   int threads = 1;
   int max_frames = 0;  ///< stereo shots taken from the recording; 0: all
