@@ -194,7 +194,7 @@ Result<ImageView<const float>> Pipeline::State::dense_disparity(const RectifiedP
 
 // Empty if the odometry computes the disparities of its landmarks itself.
 Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const RectifiedPair& shot) {
-  if (options.odometry.reconstruction.source != "dense") return ImageView<const float>();
+  if (options.odometry.reconstruction.source != DisparitySource::dense) return ImageView<const float>();
   return dense_disparity(shot);
 }
 
