@@ -11,23 +11,22 @@
 namespace spartan::rig_detail {
 namespace {
 
-// A value takes hundreds of times its place in the file: of more, none is looked at.
-constexpr std::ptrdiff_t kMostValues = 100000;
+// A parsed value needs hundreds of times its size in the file; larger files are rejected before parsing.
+constexpr std::ptrdiff_t kMaxValues = 100000;
 
-// What begins values, no fewer than there are.
-std::ptrdiff_t values_at_most(const std::string& text) {
+// Upper bound of the number of values: counts the characters that start one.
+std::ptrdiff_t max_value_count(const std::string& text) {
   return std::count_if(text.begin(), text.end(), [](char c) { return c == ',' || c == '\n' || c == '[' || c == '{'; });
 }
 
-// A file with more faults than this is read no further by anybody.
-constexpr std::size_t kMostTold = 50;
+constexpr std::size_t kMaxReported = 50;  // errors of one file
 
 bool starts_with_key(const std::string& key, const std::string& group) {
   return group.empty() || key == group ||
          (key.size() > group.size() && key.starts_with(group) && key[group.size()] == '.');
 }
 
-bool is_number_without_end(std::string_view text) {
+bool is_not_finite(std::string_view text) {
   if (!text.empty() && (text.front() == '+' || text.front() == '-')) text.remove_prefix(1);
   if (!text.empty() && text.front() == '.') text.remove_prefix(1);
   std::string lower(text);
@@ -36,11 +35,11 @@ bool is_number_without_end(std::string_view text) {
 }
 
 std::string number_fault(std::string_view text) {
-  if (is_number_without_end(text)) return fmt::format("is {}, must be a finite number", text);
+  if (is_not_finite(text)) return fmt::format("is {}, must be a finite number", text);
   return fmt::format("'{}' is not a number", text.substr(0, 40));
 }
 
-// Bytes of the character that begins at `at`; 0 where no character of UTF-8 does (RFC 3629).
+// Length in bytes of the UTF-8 character at `at`; 0 where there is no valid one (RFC 3629).
 std::size_t character_length(std::string_view text, std::size_t at) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(text[i])); };
   const std::uint32_t lead = byte(at);
@@ -52,13 +51,13 @@ std::size_t character_length(std::string_view text, std::size_t at) {
     if ((byte(at + k) & 0xC0) != 0x80) return 0;
     code = code << 6 | (byte(at + k) & 0x3F);
   }
-  constexpr std::uint32_t kLeast[] = {0x80, 0x800, 0x10000};
+  constexpr std::uint32_t kMinCode[] = {0x80, 0x800, 0x10000};
   const bool surrogate = code >= 0xD800 && code < 0xE000;
-  return code < kLeast[length - 2] || code > 0x10FFFF || surrogate ? 0 : length;
+  return code < kMinCode[length - 2] || code > 0x10FFFF || surrogate ? 0 : length;
 }
 
-// Where text stops being UTF-8; its size where it never does.
-std::size_t first_broken_character(std::string_view text) {
+// Offset of the first byte that is not UTF-8; the size of the text if there is none.
+std::size_t first_invalid_utf8(std::string_view text) {
   std::size_t at = 0;
   while (at < text.size()) {
     const std::size_t length = character_length(text, at);
@@ -101,20 +100,20 @@ Status YamlFaults::status() const {
   std::vector<Line> sorted = faults_;
   std::stable_sort(sorted.begin(), sorted.end(), [](const Line& a, const Line& b) { return a.number < b.number; });
   std::string text;
-  const std::size_t told = std::min(sorted.size(), kMostTold);
-  for (std::size_t i = 0; i < told; ++i) text += (text.empty() ? "" : "\n") + sorted[i].text;
-  if (told < sorted.size()) text += fmt::format("\n{}: and {} faults more", name_, sorted.size() - told);
+  const std::size_t reported = std::min(sorted.size(), kMaxReported);
+  for (std::size_t i = 0; i < reported; ++i) text += (text.empty() ? "" : "\n") + sorted[i].text;
+  if (reported < sorted.size()) text += fmt::format("\n{}: and {} more errors", name_, sorted.size() - reported);
   return failure(ErrorCode::configuration, text);
 }
 
 Result<YAML::Node> load_yaml(const std::string& text, const std::string& name) {
-  if (const std::size_t at = first_broken_character(text); at < text.size()) {
+  if (const std::size_t at = first_invalid_utf8(text); at < text.size()) {
     const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
     return failure(ErrorCode::configuration, "not valid UTF-8", fmt::format("{}:{}", name, line));
   }
-  if (values_at_most(text) > kMostValues) {
-    return failure(ErrorCode::configuration, fmt::format("holds more than {} values: no calibration", kMostValues),
-                   name);
+  if (max_value_count(text) > kMaxValues) {
+    return failure(ErrorCode::configuration,
+                   fmt::format("holds more than {} values, too many for a calibration", kMaxValues), name);
   }
   try {
     return YAML::Load(text);
@@ -141,7 +140,7 @@ YamlMap::YamlMap(const YAML::Node& node, std::string key, YamlFaults& faults) : 
   for (const auto& entry : node) {
     faults_.saw(entry.first.IsScalar() ? path(entry.first.Scalar()) : key_, entry.first);
     if (!entry.first.IsScalar()) {
-      faults_.add(key_, "a key must be a word; quote it if it reads as something else");
+      faults_.add(key_, "a key must be a scalar");
     } else if (!seen.insert(entry.first.Scalar()).second) {
       faults_.add(path(entry.first.Scalar()),
                   fmt::format("given a second time in line {}", entry.first.Mark().line + 1));

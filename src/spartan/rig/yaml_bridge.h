@@ -1,4 +1,4 @@
-// Reading a YAML map key by key, with every fault of the file collected. Internal to rig: the parser's types show.
+// Reads a YAML map key by key and collects all errors of the file. Internal: it exposes types of yaml-cpp.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -15,17 +15,18 @@
 
 namespace spartan::rig_detail {
 
-/// The faults of one file, and the lines where its keys stand.
+/// The errors of one file, and the line of each of its keys.
 class YamlFaults {
  public:
   explicit YamlFaults(std::string name) : name_(std::move(name)) {}
 
-  /// Remembers where a key stands. Keys are whole paths, "cameras.left.focal_px".
+  /// Records the line of a key. Keys are full paths, "cameras.left.focal_px".
   void saw(const std::string& key, const YAML::Node& node);
-  /// "name:line: key: what", the line being that of the key or of the nearest group around it.
+  /// Adds "name:line: key: what", with the line of the key or of the innermost group that contains it.
   void add(const std::string& key, const std::string& what);
-  /// Whether the key, a key inside of it or a group around it has a fault.
+  /// Whether the key, a key inside it or a group around it has an error.
   bool touches(const std::string& key) const;
+  /// All errors in one, code `configuration`, ordered by line.
   Status status() const;
   const std::string& name() const { return name_; }
 
@@ -42,31 +43,32 @@ class YamlFaults {
   std::vector<Line> faults_;
 };
 
-/// Loads the text; code `configuration` with the line where it is not YAML.
+/// Parses the text. Code `configuration`, with the line, where it is not UTF-8 or not YAML.
 Result<YAML::Node> load_yaml(const std::string& text, const std::string& name);
 
-/// A finite number in full; "nan" and "inf" are none.
+/// The number, if the whole text is one and it is finite.
 std::optional<double> parse_number(std::string_view text);
 
-/// One map of the file. Every getter reports what is wrong and remembers the key; a value that cannot be had is none.
+/// One map of the file. Each getter records its key as known, reports errors, and returns none where there is no valid
+/// value.
 class YamlMap {
  public:
-  /// `key` is the path of the map, empty for the root. Reports a node that is no map, and keys given twice.
+  /// `key` is the path of the map, empty for the root. Reports a node that is not a map, and duplicate keys.
   YamlMap(const YAML::Node& node, std::string key, YamlFaults& faults);
 
   bool has(std::string_view key) const;
   std::optional<YAML::Node> optional_node(std::string_view key);
-  std::optional<YAML::Node> node(std::string_view key);  ///< a missing key is a fault
+  std::optional<YAML::Node> node(std::string_view key);  ///< a missing key is an error
   std::optional<std::string> text(std::string_view key);
   std::optional<std::string> choice(std::string_view key, const std::vector<std::string>& choices);
   std::optional<bool> boolean(std::string_view key);
   std::optional<double> number(std::string_view key);
   std::optional<int> integer(std::string_view key);
   std::optional<std::vector<double>> numbers(std::string_view key, const std::vector<int>& counts);
-  /// The entries in the order of the file: (name, node).
+  /// (name, node) in the order of the file.
   std::vector<std::pair<std::string, YAML::Node>> entries() const { return entries_; }
 
-  /// Reports every key that none of the getters asked for.
+  /// Reports every key that no getter has requested.
   void refuse_unknown_keys();
 
   std::string path(std::string_view key) const;
