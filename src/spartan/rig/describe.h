@@ -1,4 +1,4 @@
-// A rig in words, for people who wonder whether their calibration says what they think.
+// A rig as text, to check that a calibration file means what its author intended.
 #pragma once
 
 #include <string>
@@ -12,24 +12,25 @@ namespace spartan {
 /// "120.0 mm", "1.200 m".
 std::string describe_length(double metres);
 
-/// "120.0 mm to the right, 0.3 mm up, 0.1 mm back; turned 0.020° to the left, …" for a camera's pose seen from
-/// another optical frame.
+/// "120.0 mm to the right, 0.3 mm up, 0.1 mm back; rotated 0.020° to the left, …": pose of the second optical frame in
+/// the first one (x right, y down, z forward).
 std::string describe_relative_pose(const Pose& first_from_second);
 
-/// Figures of one pair as `rig inspect --json` prints them.
+/// Geometry of one pair as `rig inspect --json` prints it; focal length and fields of view are those of the left
+/// camera.
 struct PairSummary {
   std::string name;
   double baseline_m = 0;
-  double focal_px = 0;
-  double hfov_deg = 0, vfov_deg = 0;
+  double focal_px = 0;                ///< pixels per radian on the optical axis
+  double hfov_deg = 0, vfov_deg = 0;  ///< through the image centre, from border to border; NaN where undefined
 };
 PairSummary summarize_pair(const Rig& rig, const StereoPair& pair);
 
-/// Sentences about every camera and pair: model, size, fields of view, where it sits, how the right eye stands
-/// to the left one, the range resolution at 0.5 … 20 m for a disparity step of 0.3 px (Δz = z² c / (f b)).
+/// Lines about every camera and pair: model, image size, fields of view, pose in the body frame, pose of the right
+/// camera relative to the left one, and range resolution at 0.5 … 20 m for 0.3 px of disparity (Δz = z² c / (f b)).
 std::vector<std::string> describe_rig(const Rig& rig);
 
-/// What looks wrong with a pair by its numbers alone (find_doubts), a sentence each.
+/// One line per finding of find_doubts(), what is implausible about a pair by its numbers alone.
 std::vector<std::string> describe_doubts(const Rig& rig, const StereoPair& pair);
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// Poses as the recording's own truth gives them.
+// Conversion of trajectories to the pose convention of a recording's ground truth.
 #pragma once
 
 #include "spartan/core/pose.h"
@@ -7,12 +7,12 @@
 
 namespace spartan {
 
-/// A trajectory of world_from_body in the recording's convention (Rig::convention): for `body` itself; for
-/// `left_optical` first_left_from_left, the left camera of the first pair seen from where it stood at the first entry,
-/// (T₀ B)⁻¹ Tᵢ B with B = body_from_left, whichever way the world's axes lie.
+/// Converts world_from_body to the recording's convention (Rig::convention). `body`: unchanged. `left_optical`:
+/// first_left_from_left, the left camera of the first pair relative to its pose at the first entry,
+/// (T₀ B)⁻¹ Tᵢ B with B = body_from_left; independent of the world frame.
 Trajectory in_recording_convention(const Rig& rig, Trajectory world_from_body);
 
-/// first_left_from_left of the named pair, as KITTI's pose files have it.
+/// Converts world_from_body to first_left_from_left of a pair, the convention of KITTI's pose files.
 Trajectory in_left_optical_convention(const Rig& rig, const StereoPair& pair, Trajectory world_from_body);
 
 }  // namespace spartan

@@ -14,9 +14,9 @@ Rig one_pair() {
   return rig_of_one_pair("rig", left, right, Pose::from_translation({-0.1, 0, 0}));
 }
 
-// A metre ahead and to the left, turned to the left: in KITTI's optical frame z is ahead, −x left, and turning to the
-// left is about −y. Where the world lies does not matter: KITTI counts from the first left camera.
-TEST(PoseConvention, LeftOpticalIsKittis) {
+// A motion ahead and to the left with a left turn: in KITTI's optical frame z is forward, −x left, and a left turn is
+// about −y. The world frame has no effect: KITTI's poses are relative to the first left camera.
+TEST(PoseConvention, LeftOpticalIsThatOfKitti) {
   const Pose moved(exp_so3({0, 0, 0.3}), {1, 0.5, 0.2});
   for (const Pose& start : {Pose(), Pose(exp_so3({0.2, -0.1, 0.4}), {5, 6, 7})}) {
     const Trajectory kitti = in_recording_convention(one_pair(), {{Stamp{0}, start}, {Stamp{1}, start * moved}});
@@ -29,7 +29,7 @@ TEST(PoseConvention, LeftOpticalIsKittis) {
   EXPECT_TRUE(in_recording_convention(one_pair(), {}).empty());
 }
 
-TEST(PoseConvention, BodyStaysAsItIs) {
+TEST(PoseConvention, BodyIsUnchanged) {
   Rig rig = one_pair();
   rig.convention = PoseConvention::body;
   const Trajectory trajectory{{Stamp{5}, Pose(exp_so3({0.1, 0.2, 0.3}), {1, 2, 3})}};

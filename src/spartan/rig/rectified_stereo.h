@@ -1,4 +1,4 @@
-// The geometry of a rectified stereo pair: two equal pinholes, side by side.
+// Geometry of a rectified stereo pair.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,8 +7,8 @@
 
 namespace spartan {
 
-/// Both images have the same focal length and centre and the same rows; the right camera stands `baseline_m`
-/// along +x of the left one. A point (x, y, z) of the left optical frame is seen at
+/// Two equal pinholes with common rows, the right one `baseline_m` along +x of the left one. A point (x, y, z) of the
+/// left optical frame projects to
 ///   u = f x/z + cx, v = f y/z + cy, d = u_left − u_right = f b / z.
 struct RectifiedStereo {
   ImageSize size;
@@ -16,12 +16,12 @@ struct RectifiedStereo {
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
   double baseline_m = 0;
 
-  /// (u, v, d) with d > 0 → point in the left optical frame, metres.
+  /// Point in the left optical frame, metres, of (u, v, d) in pixels with d > 0.
   Eigen::Vector3d triangulate(double u, double v, double d) const {
     const double z = focal_px * baseline_m / d;
     return {(u - centre_px.x()) * z / focal_px, (v - centre_px.y()) * z / focal_px, z};
   }
-  /// Point with z > 0 → (u, v, d).
+  /// (u, v, d) in pixels of a point with z > 0.
   Eigen::Vector3d project(const Eigen::Vector3d& p) const {
     const double scale = focal_px / p.z();
     return {scale * p.x() + centre_px.x(), scale * p.y() + centre_px.y(), scale * baseline_m};

@@ -1,4 +1,4 @@
-// The common axes of two eyes, in which their rows are the same.
+// The common axes of a stereo pair in which the rows of both cameras agree.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,16 +7,15 @@
 
 namespace spartan {
 
-/// A direction of the rectified view is `left_from_rectified` times it in the axes of the left camera; the same for the
-/// right one.
+/// Rotations from the rectified frame into the optical frames of the left and the right camera.
 struct RectifyingAxes {
   Eigen::Matrix3d left_from_rectified = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d right_from_rectified = Eigen::Matrix3d::Identity();
 };
 
-/// x along the baseline; z the mean of the two optical axes made orthogonal to it; y = z × x (after Fusiello, Trucco,
-/// Verri, "A compact algorithm for rectification of stereo pairs", 2000, with the mean axis in the place of the old
-/// left one, so that both eyes turn equally). The baseline must neither vanish nor lie along the mean axis.
+/// x along the baseline; z the mean of the two optical axes, orthogonalized to x; y = z × x. After Fusiello, Trucco,
+/// Verri, "A compact algorithm for rectification of stereo pairs", 2000, with the mean optical axis instead of the left
+/// one, so that both cameras are rotated equally. The baseline must not be zero or parallel to the mean axis.
 inline RectifyingAxes rectifying_axes(const Pose& right_from_left) {
   const Pose left_from_right = right_from_left.inverse();
   const Eigen::Vector3d x = left_from_right.translation().normalized();

@@ -21,10 +21,10 @@ const T* find_named(const std::vector<T>& all, const std::string& name) {
   return found == all.end() ? nullptr : &*found;
 }
 
-// Between two pixels one can interpolate; larger pictures cannot be addressed by the 16-bit tables of rectification.
+// Interpolation needs two pixels; the 16-bit tables of the rectification address at most 32767.
 constexpr int kSmallestSide = 2, kLargestSide = 32767;
-// Frames of the Earth's centre are nearer; numbers beyond say that a file is damaged.
-constexpr double kFarthest_m = 1e9;
+// Larger than any distance to the Earth's centre: a file with such a position is damaged.
+constexpr double kMaxDistance_m = 1e9;
 
 class FaultFinder {
  public:
@@ -44,7 +44,7 @@ class FaultFinder {
  private:
   void add(const std::string& key, const std::string& what) { faults_.push_back({key, what}); }
 
-  // Names become folders of a recording and frames of transforms.
+  // Names are used as folders of a recording and as names of coordinate frames.
   template <class T>
   void check_names(const std::string& key, const std::vector<T>& items) {
     std::set<std::string> seen;
@@ -55,18 +55,18 @@ class FaultFinder {
       if (item.name.empty() || !plain) {
         add(fmt::format("{}.{}", key, item.name), "a name must consist of letters, digits, _ and -");
       } else if (!seen.insert(item.name).second) {
-        add(fmt::format("{}.{}", key, item.name), "this name was given before");
+        add(fmt::format("{}.{}", key, item.name), "this name is used twice");
       }
     }
   }
 
   void check_pose(const std::string& key, const Pose& pose) {
     if (!pose.all_finite()) {
-      add(key, "the place holds numbers that are not finite");
-    } else if (!(pose.translation().norm() <= kFarthest_m)) {
-      add(key, fmt::format("the place is farther than {} m from the mount", kFarthest_m));
+      add(key, "the pose has values that are not finite");
+    } else if (!(pose.translation().norm() <= kMaxDistance_m)) {
+      add(key, fmt::format("the position is farther than {} m from the mount", kMaxDistance_m));
     } else if (std::abs(pose.rotation().norm() - 1) > 1e-6) {
-      add(key, "the quaternion has no unit length");
+      add(key, "the quaternion does not have unit length");
     }
   }
 
@@ -87,7 +87,7 @@ class FaultFinder {
       check_numbers(fmt::format("{}.{}", key, kinds[i].key), kinds[i], numbers[i]);
     }
     if (faults_.size() == before && !project(model, Eigen::Vector3d::UnitZ())) {
-      add(key, "with these numbers the camera sees nothing straight ahead");
+      add(key, "with these parameters the camera model cannot project its optical axis");
     }
   }
 
@@ -131,7 +131,7 @@ class FaultFinder {
     check_pose(key, camera.mount_from_camera);
   }
 
-  const Camera* check_eye(const std::string& key, const std::string& name) {
+  const Camera* find_pair_camera(const std::string& key, const std::string& name) {
     const Camera* camera = rig_.find_camera(name);
     if (!camera) add(key, fmt::format("there is no camera '{}'", name));
     return camera;
@@ -142,15 +142,15 @@ class FaultFinder {
     if (!std::isfinite(pair.nearest_m) || pair.nearest_m < 0) {
       add(key + ".nearest_m", fmt::format("is {}, must be a finite distance, or 0 for none", pair.nearest_m));
     }
-    const Camera* left = check_eye(key + ".left", pair.left);
-    const Camera* right = check_eye(key + ".right", pair.right);
+    const Camera* left = find_pair_camera(key + ".left", pair.left);
+    const Camera* right = find_pair_camera(key + ".right", pair.right);
     if (!left || !right) return;
-    if (left == right) return add(key + ".right", "both eyes are the same camera");
+    if (left == right) return add(key + ".right", "left and right are the same camera");
     if (left->mount != right->mount) {
-      return add(key, fmt::format("the eyes sit on different mounts, '{}' and '{}'", left->mount, right->mount));
+      return add(key, fmt::format("the two cameras are on different mounts, '{}' and '{}'", left->mount, right->mount));
     }
     const double baseline = (left->mount_from_camera.translation() - right->mount_from_camera.translation()).norm();
-    if (baseline < 1e-9) add(key, "both eyes are at one place: the baseline is zero");
+    if (baseline < 1e-9) add(key, "both cameras are at the same position: the baseline is zero");
   }
 
   const Rig& rig_;

@@ -1,4 +1,4 @@
-// The rig: cameras, where they sit, which of them form stereo pairs.
+// The rig: cameras, their poses on the rover, and the stereo pairs they form.
 #pragma once
 
 #include <optional>
@@ -19,45 +19,48 @@ namespace spartan {
 struct PanTiltUnit {
   std::string name = "mast";
   Pose body_from_base;
-  double rest_pan_rad = 0, rest_tilt_rad = 0;  ///< the angles where nothing else is said
+  double rest_pan_rad = 0, rest_tilt_rad = 0;  ///< default angles
 
   /// body_from_head at the given angles (rad): body_from_base · Rz(pan) · Ry(tilt).
   Pose body_from_head(double pan_rad, double tilt_rad) const;
   friend bool operator==(const PanTiltUnit&, const PanTiltUnit&);  ///< bit for bit, as for all of a rig
 };
 
+/// One camera: image size, camera model, photometric properties and pose on its mount.
 struct Camera {
   std::string name;
   ImageSize size;
   CameraModel model;
-  PixelFormat pixel_format;    ///< what its images hold; `gray` of 8 bits unless the rig says otherwise
-  Vignetting vignetting;       ///< undone by imaging
-  std::string self_mask;       ///< picture file, 0 where the rover sees itself; empty: none. Relative to the rig file
+  PixelFormat pixel_format;    ///< default: `gray`, 8 bits
+  Vignetting vignetting;       ///< corrected by the imaging module
+  std::string self_mask;       ///< image file, 0 where the rover is visible; empty: none. Relative to the rig file
   std::string mount = "body";  ///< "body" or the name of a pan-tilt unit
   Pose mount_from_camera;      ///< camera: optical frame (x right, y down, z forward)
   friend bool operator==(const Camera&, const Camera&);
 };
 
+/// Two cameras on the same mount that take synchronous images.
 struct StereoPair {
   std::string name;
   std::string left, right;   ///< camera names
-  double nearest_m = 0;      ///< depth z before the eyes; nothing nearer has to be matched; 0: not stated
-  bool for_odometry = true;  ///< false: only looked at where the rover stops (a panned pair)
+  double nearest_m = 0;      ///< smallest depth z to match, bounds the disparity; 0: not given
+  bool for_odometry = true;  ///< false: used only at stops (a panned pair)
   friend bool operator==(const StereoPair&, const StereoPair&) = default;
 };
 
-/// In which frame the recording itself gives poses; exports and comparisons with outside truth use it.
+/// The frames of a recording's own poses; exports and comparisons with ground truth use it.
 enum class PoseConvention {
   body,          ///< world_from_body, world z up
   left_optical,  ///< first left optical frame from left optical frame (KITTI)
 };
 
-/// One thing wrong with a rig.
+/// One error of a rig, as found by Rig::find_faults().
 struct RigFault {
   std::string key;  ///< as in rig.yaml, "cameras.left.focal_px"
   std::string what;
 };
 
+/// All cameras of a rover and their geometry. The body frame is x forward, y left, z up.
 struct Rig {
   std::string name;
   PoseConvention convention = PoseConvention::body;
@@ -67,26 +70,27 @@ struct Rig {
 
   const Camera* find_camera(const std::string& camera) const;
   const StereoPair* find_pair(const std::string& pair) const;
-  /// body_from_camera; the angles count for cameras on a pan-tilt unit only. Throws on an unknown name.
+  /// body_from_camera; the angles apply to cameras on a pan-tilt unit only. Throws std::invalid_argument for unknown
+  /// names.
   Pose body_from_camera(const std::string& camera, double pan_rad, double tilt_rad) const;
-  /// The same with the unit's angles of rest.
+  /// The same at the rest angles of the pan-tilt unit.
   Pose body_from_camera(const std::string& camera) const;
-  /// right_from_left of a pair. Throws on an unknown name.
+  /// right_from_left of a pair. Throws std::invalid_argument for unknown names.
   Pose right_from_left(const StereoPair& pair) const;
 
-  /// Every fault of the rig: unknown or doubled names, sizes and focal lengths that are not positive, values that
-  /// are not finite, two eyes at one place or on different mounts, no pair.
+  /// All errors: unknown or duplicate names, sizes and focal lengths that are not positive, values that are not finite,
+  /// two cameras of a pair at one position or on different mounts, no pair.
   std::vector<RigFault> find_faults() const;
   /// All of find_faults() in one error (code `configuration`), one line each: "where: key: what".
   Status validate(const std::string& where) const;
   friend bool operator==(const Rig&, const Rig&) = default;
 };
 
-/// Turns x forward, y left, z up into x right, y down, z forward: optical_from_body axes.
+/// The rotation from body axes (x forward, y left, z up) to optical axes (x right, y down, z forward).
 Pose optical_from_forward();
 
-/// A rig of one pair whose body is the left camera turned to x forward, y left, z up (docs/conventions.md:
-/// recordings without a body frame). Poses follow the `left_optical` convention.
+/// A rig of one pair without a body frame of its own: the body is the left camera, rotated to x forward, y left, z up
+/// (docs/conventions.md: recordings without a body frame). Poses follow the `left_optical` convention.
 Rig rig_of_one_pair(const std::string& name, Camera left, Camera right, const Pose& right_from_left);
 
 }  // namespace spartan

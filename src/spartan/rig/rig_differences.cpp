@@ -23,16 +23,17 @@ bool same(const Pose& a, const Pose& b) {
 
 class Comparison {
  public:
-  Comparison(const Rig& wanted, const Rig& got) : wanted_(wanted), got_(got) { match_cameras(); }
+  Comparison(const Rig& wanted, const Rig& result) : wanted_(wanted), result_(result) { match_cameras(); }
 
   std::vector<RigDifference> run() && {
-    compare("name", "the name", wanted_.name, got_.name);
-    compare("pose_convention", "the poses of the recording", text_of(wanted_.convention), text_of(got_.convention));
+    compare("name", "the name", wanted_.name, result_.name);
+    compare("pose_convention", "the pose convention of the recording", text_of(wanted_.convention),
+            text_of(result_.convention));
     compare_units();
     compare_body();
     for (const Camera& camera : wanted_.cameras) compare_camera(camera);
     for (std::size_t i = 0; i < wanted_.pairs.size(); ++i) compare_pair(i);
-    find_surplus();
+    find_additions();
     return std::move(differences_);
   }
 
@@ -40,111 +41,111 @@ class Comparison {
   void add(const std::string& key, const std::string& text) { differences_.push_back({key, text}); }
 
   static std::string text_of(PoseConvention convention) {
-    return convention == PoseConvention::body ? "those of the body" : "those of the left camera";
+    return convention == PoseConvention::body ? "body" : "left camera";
   }
 
   template <class T>
-  void compare(const std::string& key, const std::string& subject, const T& wanted, const T& got) {
-    if (wanted != got) add(key, fmt::format("{}: {}, now {}", subject, quoted(wanted), quoted(got)));
+  void compare(const std::string& key, const std::string& subject, const T& wanted, const T& result) {
+    if (wanted != result) add(key, fmt::format("{}: {}, now {}", subject, quoted(wanted), quoted(result)));
   }
   static std::string quoted(const std::string& text) { return text.empty() ? "none" : text; }
   static std::string quoted(double value) { return fmt::format("{}", value); }
   static std::string quoted(int value) { return fmt::format("{}", value); }
   static std::string quoted(bool value) { return value ? "yes" : "no"; }
 
-  // Each camera of the wanted rig finds at most one of the other.
+  // Assigns to each camera of the wanted rig at most one of the resulting rig.
   void match_cameras() {
-    const auto give = [&](const std::string& wanted, const std::string& got) {
+    const auto assign = [&](const std::string& wanted, const std::string& result) {
       const bool taken =
-          std::any_of(partner_.begin(), partner_.end(), [&](const auto& entry) { return entry.second == got; });
-      if (!taken && got_.find_camera(got)) partner_.try_emplace(wanted, got);
+          std::any_of(partner_.begin(), partner_.end(), [&](const auto& entry) { return entry.second == result; });
+      if (!taken && result_.find_camera(result)) partner_.try_emplace(wanted, result);
     };
-    for (std::size_t i = 0; i < std::min(wanted_.pairs.size(), got_.pairs.size()); ++i) {
-      give(wanted_.pairs[i].left, got_.pairs[i].left);
-      give(wanted_.pairs[i].right, got_.pairs[i].right);
+    for (std::size_t i = 0; i < std::min(wanted_.pairs.size(), result_.pairs.size()); ++i) {
+      assign(wanted_.pairs[i].left, result_.pairs[i].left);
+      assign(wanted_.pairs[i].right, result_.pairs[i].right);
     }
-    for (const Camera& camera : wanted_.cameras) give(camera.name, camera.name);
+    for (const Camera& camera : wanted_.cameras) assign(camera.name, camera.name);
     for (const Camera& camera : wanted_.cameras) {
-      for (const Camera& other : got_.cameras) give(camera.name, other.name);
+      for (const Camera& other : result_.cameras) assign(camera.name, other.name);
     }
   }
 
   const Camera* partner_of(const std::string& camera) const {
     const auto found = partner_.find(camera);
-    return found == partner_.end() ? nullptr : got_.find_camera(found->second);
+    return found == partner_.end() ? nullptr : result_.find_camera(found->second);
   }
 
   void compare_units() {
     for (const PanTiltUnit& unit : wanted_.pan_tilt_units) {
-      const auto kept = std::find(got_.pan_tilt_units.begin(), got_.pan_tilt_units.end(), unit);
-      if (kept != got_.pan_tilt_units.end()) continue;
-      const bool there = std::any_of(got_.pan_tilt_units.begin(), got_.pan_tilt_units.end(),
-                                     [&](const PanTiltUnit& other) { return other.name == unit.name; });
+      const auto equal = std::find(result_.pan_tilt_units.begin(), result_.pan_tilt_units.end(), unit);
+      if (equal != result_.pan_tilt_units.end()) continue;
+      const bool exists = std::any_of(result_.pan_tilt_units.begin(), result_.pan_tilt_units.end(),
+                                      [&](const PanTiltUnit& other) { return other.name == unit.name; });
       add("pan_tilt_units." + unit.name,
-          there ? "the pan-tilt unit stands elsewhere"
-                : "the pan-tilt unit is gone: its cameras stand still, at its angles of rest");
+          exists ? "the pan-tilt unit has another pose or other rest angles"
+                 : "the pan-tilt unit is missing: its cameras are fixed at its rest angles");
     }
   }
 
-  // The frame that all cameras are in; how they stand to each other is compared apart from it.
+  // The pose of the first camera in the body frame; the relative poses of the cameras are compared separately.
   void compare_body() {
     const Camera& first = wanted_.cameras.front();
     const Camera* other = partner_of(first.name);
     if (!other) return;
-    const Pose was = wanted_.body_from_camera(first.name), is = got_.body_from_camera(other->name);
+    const Pose was = wanted_.body_from_camera(first.name), is = result_.body_from_camera(other->name);
     if (same(was, is)) return;
     const Pose moved = optical_from_forward() * is * was.inverse() * optical_from_forward().inverse();
-    add("body", fmt::format("the body's frame is another one; seen from the new one, the old one is {}",
+    add("body", fmt::format("the body frame differs: relative to the new one, the old one is {}",
                             describe_relative_pose(moved)));
   }
 
   void compare_camera(const Camera& camera) {
     const std::string key = "cameras." + camera.name;
     const Camera* other = partner_of(camera.name);
-    if (!other) return add(key, "the camera is gone");
+    if (!other) return add(key, "the camera is missing");
     const auto field = [&](const char* name) { return fmt::format("{}.{}", key, name); };
     compare(field("name"), "the camera's name", camera.name, other->name);
     const auto size = [](const Camera& c) { return fmt::format("{} x {}", c.size.width, c.size.height); };
     compare(field("size_px"), "the image size", size(camera), size(*other));
     compare_model(key, camera.model, other->model);
-    compare(field("pixel_layout"), "the pixels", std::string(name_of(camera.pixel_format.layout)),
+    compare(field("pixel_layout"), "the pixel layout", std::string(name_of(camera.pixel_format.layout)),
             std::string(name_of(other->pixel_format.layout)));
-    compare(field("bits"), "bits that carry signal", camera.pixel_format.bits, other->pixel_format.bits);
+    compare(field("bits"), "the significant bits", camera.pixel_format.bits, other->pixel_format.bits);
     const auto alignment = [](const Camera& c) {
       return std::string(c.pixel_format.alignment == BitAlignment::high ? "high" : "low");
     };
-    compare(field("bit_alignment"), "their end of the sample", alignment(camera), alignment(*other));
+    compare(field("bit_alignment"), "the bit alignment", alignment(camera), alignment(*other));
     compare_vignetting(key, camera.vignetting, other->vignetting);
     compare(field("self_mask"), "the self-mask", camera.self_mask, other->self_mask);
-    compare_place(key, camera, *other);
+    compare_pose(key, camera, *other);
   }
 
-  void compare_vignetting(const std::string& key, const Vignetting& wanted, const Vignetting& got) {
+  void compare_vignetting(const std::string& key, const Vignetting& wanted, const Vignetting& result) {
     const auto list = [](const std::vector<double>& numbers) {
       return numbers.empty() ? std::string() : fmt::format("[{}]", fmt::join(numbers, ", "));
     };
     const auto centre = [&](const Vignetting& v) {
       return v.centre_px ? list({v.centre_px->x(), v.centre_px->y()}) : std::string();
     };
-    compare(key + ".vignetting", "the fall-off of light", list(wanted.coefficients), list(got.coefficients));
-    compare(key + ".vignetting_centre_px", "its centre", centre(wanted), centre(got));
+    compare(key + ".vignetting", "the vignetting", list(wanted.coefficients), list(result.coefficients));
+    compare(key + ".vignetting_centre_px", "the vignetting centre", centre(wanted), centre(result));
   }
 
-  void compare_place(const std::string& key, const Camera& camera, const Camera& other) {
+  void compare_pose(const std::string& key, const Camera& camera, const Camera& other) {
     const std::string& first = wanted_.cameras.front().name;
     const Camera* other_first = partner_of(first);
     if (camera.name == first || !other_first) return;
     const Pose was = wanted_.body_from_camera(first).inverse() * wanted_.body_from_camera(camera.name);
-    const Pose is = got_.body_from_camera(other_first->name).inverse() * got_.body_from_camera(other.name);
+    const Pose is = result_.body_from_camera(other_first->name).inverse() * result_.body_from_camera(other.name);
     if (same(was, is)) return;
     add(key + ".place",
-        fmt::format("seen from {}: {}, now {}", first, describe_relative_pose(was), describe_relative_pose(is)));
+        fmt::format("relative to {}: {}, now {}", first, describe_relative_pose(was), describe_relative_pose(is)));
   }
 
-  void compare_model(const std::string& key, const CameraModel& wanted, const CameraModel& got) {
+  void compare_model(const std::string& key, const CameraModel& wanted, const CameraModel& result) {
     CameraModel was = plainest(wanted);
-    const CameraModel is = plainest(got);
-    // A skew that is gone is no other kind of camera.
+    const CameraModel is = plainest(result);
+    // A lost skew is reported as such, not as another camera model.
     if (skew_px(was) != 0 && skew_px(is) == 0) {
       add(key + ".skew_px", fmt::format("[{}], now none", skew_px(was)));
       was = plainest(without_skew(was));
@@ -161,7 +162,7 @@ class Comparison {
     }
   }
 
-  // Lists end with zeros that need not be there. Pixels round with the focal length, whatever they count.
+  // Trailing zeros of a list may be omitted. Values in pixels are rounded in proportion to the focal length.
   static bool agree(const ModelParameterKind& kind, std::vector<double> a, std::vector<double> b,
                     const std::vector<double>& focal_px) {
     a.resize(std::max(a.size(), b.size()));
@@ -181,43 +182,43 @@ class Comparison {
   void compare_pair(std::size_t i) {
     const StereoPair& pair = wanted_.pairs[i];
     const std::string key = "pairs." + pair.name;
-    if (i >= got_.pairs.size()) return add(key, "the pair is gone");
-    const StereoPair& other = got_.pairs[i];
+    if (i >= result_.pairs.size()) return add(key, "the pair is missing");
+    const StereoPair& other = result_.pairs[i];
     compare(key + ".name", "the pair's name", pair.name, other.name);
     const Camera *left = partner_of(pair.left), *right = partner_of(pair.right);
-    if (left && left->name != other.left) add(key + ".left", "another camera is the left eye");
-    if (right && right->name != other.right) add(key + ".right", "another camera is the right eye");
+    if (left && left->name != other.left) add(key + ".left", "the left camera is another one");
+    if (right && right->name != other.right) add(key + ".right", "the right camera is another one");
     compare(key + ".nearest_m", "the nearest depth", pair.nearest_m, other.nearest_m);
     compare(key + ".for_odometry", "for odometry", pair.for_odometry, other.for_odometry);
   }
 
-  // What nobody wanted: files that lay there already.
-  void find_surplus() {
-    for (const PanTiltUnit& unit : got_.pan_tilt_units) {
+  // What only the result has, for example from files that already existed.
+  void find_additions() {
+    for (const PanTiltUnit& unit : result_.pan_tilt_units) {
       const bool wanted = std::any_of(wanted_.pan_tilt_units.begin(), wanted_.pan_tilt_units.end(),
                                       [&](const PanTiltUnit& other) { return other.name == unit.name; });
-      if (!wanted) add("pan_tilt_units." + unit.name, "a pan-tilt unit that was not there before");
+      if (!wanted) add("pan_tilt_units." + unit.name, "an additional pan-tilt unit");
     }
-    for (const Camera& camera : got_.cameras) {
+    for (const Camera& camera : result_.cameras) {
       const bool wanted =
           std::any_of(partner_.begin(), partner_.end(), [&](const auto& entry) { return entry.second == camera.name; });
-      if (!wanted) add("cameras." + camera.name, "a camera that was not there before");
+      if (!wanted) add("cameras." + camera.name, "an additional camera");
     }
-    for (std::size_t i = wanted_.pairs.size(); i < got_.pairs.size(); ++i) {
-      add("pairs." + got_.pairs[i].name, "a pair that was not there before");
+    for (std::size_t i = wanted_.pairs.size(); i < result_.pairs.size(); ++i) {
+      add("pairs." + result_.pairs[i].name, "an additional pair");
     }
   }
 
   const Rig& wanted_;
-  const Rig& got_;
+  const Rig& result_;
   std::map<std::string, std::string> partner_;
   std::vector<RigDifference> differences_;
 };
 
 }  // namespace
 
-std::vector<RigDifference> describe_differences(const Rig& wanted, const Rig& got) {
-  return Comparison(wanted, got).run();
+std::vector<RigDifference> describe_differences(const Rig& wanted, const Rig& result) {
+  return Comparison(wanted, result).run();
 }
 
 }  // namespace spartan

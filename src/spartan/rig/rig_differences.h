@@ -1,4 +1,4 @@
-// What became of a rig.
+// Comparison of two rigs, for reports of what a conversion loses.
 #pragma once
 
 #include <string>
@@ -9,14 +9,14 @@
 namespace spartan {
 
 struct RigDifference {
-  std::string key;   ///< as in rig.yaml: "cameras.left.distortion"; "body" for the body's frame
-  std::string text;  ///< a sentence
+  std::string key;   ///< as in rig.yaml: "cameras.left.distortion"; "body" for the body frame
+  std::string text;  ///< what was, and what it is now
 };
 
-/// What of the wanted rig is another way in the one that was got, in the order of rig.yaml, then what is in that one
-/// only. Cameras belong together by
-/// their places in the pairs, then by name. Models that see the same are the same (model_equivalents.h); numbers are
-/// when they agree to 12 digits, poses to 1e-11 m and rad: what rotations in other forms round.
-std::vector<RigDifference> describe_differences(const Rig& wanted, const Rig& got);
+/// Where the resulting rig differs from the wanted one, in the order of rig.yaml, then what only the resulting one has.
+/// Cameras are matched by their role in the pairs, then by name. Camera models are equal if they project equally
+/// (model_equivalents.h), numbers if they agree to 12 digits, poses if they agree to 1e-11 m and rad, which is the
+/// rounding of a conversion between representations of a rotation.
+std::vector<RigDifference> describe_differences(const Rig& wanted, const Rig& result);
 
 }  // namespace spartan

@@ -34,14 +34,14 @@ Rig rover() {
 
 template <class Change>
 std::string differences(Change change) {
-  Rig got = rover();
-  change(got);
+  Rig result = rover();
+  change(result);
   std::string keys;
-  for (const RigDifference& each : describe_differences(rover(), got)) keys += each.key + ";";
+  for (const RigDifference& each : describe_differences(rover(), result)) keys += each.key + ";";
   return keys;
 }
 
-TEST(RigDifferences, EveryFieldIsLookedAt) {
+TEST(RigDifferences, EveryFieldIsCompared) {
   EXPECT_EQ(differences([](Rig&) {}), "");
   EXPECT_EQ(differences([](Rig& r) { r.name = "x"; }), "name;");
   EXPECT_EQ(differences([](Rig& r) { r.convention = PoseConvention::left_optical; }), "pose_convention;");
@@ -82,21 +82,21 @@ TEST(RigDifferences, EveryFieldIsLookedAt) {
   EXPECT_EQ(differences([](Rig& r) { r.pairs.clear(); }), "pairs.front;");
 }
 
-TEST(RigDifferences, AnEyeMayBeAnotherCamera) {
+TEST(RigDifferences, PairsOfOtherCameras) {
   Rig wanted = rover();
   wanted.pairs.push_back({"side", "left", "third", 0.3, true});
-  Rig got = wanted;
-  got.pairs[1].left = "right";
-  auto found = describe_differences(wanted, got);
+  Rig result = wanted;
+  result.pairs[1].left = "right";
+  auto found = describe_differences(wanted, result);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].key, "pairs.side.left");
-  got.pairs[1] = {"side", "left", "right", 0.3, true};
-  found = describe_differences(wanted, got);
+  result.pairs[1] = {"side", "left", "right", 0.3, true};
+  found = describe_differences(wanted, result);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].key, "pairs.side.right");
 }
 
-TEST(RigDifferences, WhatNobodyWantedIsTold) {
+TEST(RigDifferences, AdditionsAreReported) {
   EXPECT_EQ(differences([](Rig& r) {
               r.cameras.push_back(r.cameras[2]);
               r.cameras[3].name = "fourth";
@@ -106,7 +106,7 @@ TEST(RigDifferences, WhatNobodyWantedIsTold) {
             "pan_tilt_units.arm;cameras.fourth;pairs.back;");
 }
 
-TEST(RigDifferences, RoundingIsNone) {
+TEST(RigDifferences, RoundingIsIgnored) {
   EXPECT_EQ(differences([](Rig& r) { std::get<PinholeModel>(r.cameras[0].model).cx += 1e-13; }), "");
   EXPECT_EQ(differences([](Rig& r) { r.cameras[0].model = RadialTangentialModel(kPinhole, {}); }), "");
   EXPECT_EQ(differences([](Rig& r) {
@@ -115,23 +115,24 @@ TEST(RigDifferences, RoundingIsNone) {
             "");
 }
 
-TEST(RigDifferences, SayWhatWasAndWhatIs) {
-  Rig got = rover();
-  got.cameras[0].size = {1, 2};
-  got.cameras[2].mount_from_camera = Pose::from_translation({0, 0.5, 0}) * got.cameras[2].mount_from_camera;
-  const auto found = describe_differences(rover(), got);
+TEST(RigDifferences, TextsNameBothValues) {
+  Rig result = rover();
+  result.cameras[0].size = {1, 2};
+  result.cameras[2].mount_from_camera = Pose::from_translation({0, 0.5, 0}) * result.cameras[2].mount_from_camera;
+  const auto found = describe_differences(rover(), result);
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].text, "the image size: 640 x 480, now 1 x 2");
-  EXPECT_THAT(found[1].text, HasSubstr("seen from left: 200.0 mm to the left; not turned, now 700.0 mm to the left"));
+  EXPECT_THAT(found[1].text,
+              HasSubstr("relative to left: 200.0 mm to the left; not rotated, now 700.0 mm to the left"));
   const auto text = [](const auto& change) {
     Rig changed = rover();
     change(changed);
     return describe_differences(rover(), changed).at(0).text;
   };
   EXPECT_EQ(text([](Rig& r) { std::get<PinholeModel>(r.cameras[0].model).cx = 321; }), "[320, 240], now [321, 240]");
-  EXPECT_THAT(text([](Rig& r) { r.pan_tilt_units[0].rest_pan_rad = 0; }), HasSubstr("stands elsewhere"));
-  EXPECT_THAT(text([](Rig& r) { r.pan_tilt_units.clear(); }), HasSubstr("is gone"));
-  // The cameras stand 1 m further ahead in the new body's frame, and so does the old body.
+  EXPECT_THAT(text([](Rig& r) { r.pan_tilt_units[0].rest_pan_rad = 0; }), HasSubstr("another pose"));
+  EXPECT_THAT(text([](Rig& r) { r.pan_tilt_units.clear(); }), HasSubstr("is missing"));
+  // In the new body frame the cameras are 1 m further ahead, and so is the old body frame.
   EXPECT_THAT(text([](Rig& r) {
                 for (Camera& c : r.cameras)
                   c.mount_from_camera = Pose::from_translation({1, 0, 0}) * c.mount_from_camera;
@@ -141,7 +142,7 @@ TEST(RigDifferences, SayWhatWasAndWhatIs) {
 
 // --- model_equivalents.h ---
 
-TEST(ModelEquivalents, ThePlainestSeesTheSame) {
+TEST(ModelEquivalents, PlainestModelProjectsEqually) {
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ(), tilted = Eigen::Vector3d(0.1, 0, 1).normalized();
   const CahvModel cahv{kPinhole, 0}, skewed{kPinhole, 0.5};
   const struct {
@@ -188,7 +189,7 @@ void expect_expressed(const CameraModel& model) {
   EXPECT_EQ(plainest(CameraModel(*other)), plainest(model));
 }
 
-TEST(ModelEquivalents, OneCameraUnderSeveralNames) {
+TEST(ModelEquivalents, EquivalentModels) {
   expect_expressed<RadialTangentialModel>(kPinhole);
   expect_expressed<DoubleSphereModel>(kPinhole);
   expect_expressed<CahvModel>(kPinhole);
@@ -208,7 +209,7 @@ TEST(ModelEquivalents, OneCameraUnderSeveralNames) {
 
 // --- pair_of_files.h ---
 
-TEST(PairOfFiles, ThePartnerLiesBeside) {
+TEST(PairOfFiles, FindsTheOtherFile) {
   const testing::TemporaryFolder folder;
   const auto partner = [&](const std::string& given, const std::string& other) {
     folder.write(given, "x");
@@ -228,25 +229,25 @@ TEST(PairOfFiles, ThePartnerLiesBeside) {
   EXPECT_EQ(partner("l_r.x", "r_r.x"), both("l_r.x", "r_r.x"));
 }
 
-TEST(PairOfFiles, DoubtIsAnErrorThatSaysWhatToType) {
+TEST(PairOfFiles, AmbiguousNamesAreAnError) {
   const testing::TemporaryFolder folder;
   for (const char* name : {"left_left.x", "right_left.x", "left_right.x", "alone.x", "odd,name.x"})
     folder.write(name, "x");
-  const auto said = [&](const std::string& name) {
+  const auto message_of = [&](const std::string& name) {
     const auto pair = rig_detail::find_pair_of_files(folder.path() + "/" + name);
     EXPECT_FALSE(pair);
     EXPECT_EQ(pair.error().code, ErrorCode::configuration);
     return pair.error().message();
   };
-  EXPECT_THAT(said("left_left.x"), HasSubstr("could be of the other eye (name both: LEFT,RIGHT)"));
-  EXPECT_THAT(said("alone.x"), HasSubstr("the file of the other eye is not known (name both: LEFT,RIGHT)"));
-  EXPECT_THAT(said("odd,name.x"), HasSubstr("the file of the other eye is not known"));
+  EXPECT_THAT(message_of("left_left.x"), HasSubstr("could be of the other eye (name both: LEFT,RIGHT)"));
+  EXPECT_THAT(message_of("alone.x"), HasSubstr("the file of the other eye is not known (name both: LEFT,RIGHT)"));
+  EXPECT_THAT(message_of("odd,name.x"), HasSubstr("the file of the other eye is not known"));
   const auto named = rig_detail::find_pair_of_files("a.x,b.x");
   EXPECT_EQ(named->left, "a.x");
   EXPECT_EQ(named->right, "b.x");
 }
 
-TEST(PairOfFiles, NamesToWrite) {
+TEST(PairOfFiles, NamesOfWrittenFiles) {
   EXPECT_EQ(rig_detail::names_of_pair("a/b.tsai").left, "a/b_left.tsai");
   EXPECT_EQ(rig_detail::names_of_pair("a/b.tsai").right, "a/b_right.tsai");
   EXPECT_EQ(rig_detail::names_of_pair("x.y,z.y").right, "z.y");

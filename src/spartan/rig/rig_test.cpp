@@ -33,7 +33,7 @@ Rig rig_on_mast() {
   return rig;
 }
 
-// The keys of what is wrong after a change.
+// The keys of all errors after a change.
 template <class Change>
 std::vector<std::string> faults_after(Change change) {
   Rig rig = rig_on_mast();
@@ -44,7 +44,7 @@ std::vector<std::string> faults_after(Change change) {
 }
 using Keys = std::vector<std::string>;
 
-TEST(Rig, ASoundOneHasNoFaults) {
+TEST(Rig, ValidRigHasNoFaults) {
   EXPECT_EQ(faults_after([](Rig&) {}), Keys{});
   EXPECT_TRUE(rig_on_mast().validate("rig.yaml"));
 }
@@ -86,12 +86,12 @@ TEST(Rig, EveryKindOfFaultIsFound) {
   EXPECT_EQ(faults_after([](Rig& r) { r.pan_tilt_units[0].name = "arm"; }),
             (Keys{"cameras.left.mount", "cameras.right.mount"}));
   EXPECT_EQ(faults_after([](Rig& r) { r.cameras.push_back(r.cameras[0]); }), Keys{"cameras.left"});
-  // Names become folders.
+  // Names are used as folders.
   EXPECT_EQ(faults_after([](Rig& r) { r.pairs[0].name = "../up"; }), Keys{"pairs.../up"});
   EXPECT_EQ(faults_after([](Rig& r) { r.pairs[0].name = ""; }), Keys{"pairs."});
 }
 
-TEST(Rig, AllFaultsAreToldAtOnce) {
+TEST(Rig, AllFaultsAreReportedAtOnce) {
   Rig rig = rig_on_mast();
   rig.cameras[0].size = {-1, 480};
   rig.pairs[0].right = "nobody";
@@ -102,8 +102,8 @@ TEST(Rig, AllFaultsAreToldAtOnce) {
   EXPECT_THAT(status.error().message(), HasSubstr("my.yaml: pairs.wide.right: there is no camera 'nobody'"));
 }
 
-// Pan to the left, then tilt down: worked out by hand for a quarter turn.
-TEST(Rig, PanAndTiltTurnWhatSitsOnTheMast) {
+// Pan to the left, then tilt down: calculated by hand for 90°.
+TEST(Rig, PanAndTiltRotateCamerasOnTheMast) {
   const Rig rig = rig_on_mast();
   const double quarter = std::numbers::pi / 2;
   const Pose panned = rig.body_from_camera("left", quarter, 0);
@@ -112,11 +112,11 @@ TEST(Rig, PanAndTiltTurnWhatSitsOnTheMast) {
   const Pose tilted = rig.body_from_camera("left", 0, quarter);
   EXPECT_LE((tilted.translation() - Eigen::Vector3d(0.05, 0.1, 0.9)).norm(), 1e-12);
   EXPECT_LE((tilted.rotation() * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
-  // At rest where nothing is said.
+  // Rest angles by default.
   EXPECT_EQ(rig.body_from_camera("right").matrix(), rig.body_from_camera("right", 0.1, 0.6).matrix());
 }
 
-TEST(Rig, TheMastDoesNotMoveOneEyeAgainstTheOther) {
+TEST(Rig, PanAndTiltKeepTheRelativePose) {
   const Rig rig = rig_on_mast();
   const Pose right_from_left = rig.right_from_left(rig.pairs[0]);
   for (const double pan : {-0.6, 0.0, 0.4}) {
@@ -126,7 +126,7 @@ TEST(Rig, TheMastDoesNotMoveOneEyeAgainstTheOther) {
   EXPECT_LE((right_from_left.translation() - Eigen::Vector3d(-0.2, 0, 0)).norm(), 1e-12);
 }
 
-TEST(Rig, OneThatHasNoBodyGetsTheLeftCameraAsOne) {
+TEST(Rig, WithoutABodyFrameTheLeftCameraDefinesIt) {
   const Rig rig = rig_of_one_pair("front", camera("l", 5), camera("r", 6), Pose::from_translation({-0.3, 0.01, 0}));
   EXPECT_TRUE(rig.validate("rig"));
   EXPECT_EQ(rig.convention, PoseConvention::left_optical);

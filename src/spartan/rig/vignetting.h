@@ -1,4 +1,4 @@
-// How a lens loses light towards the edge of the image.
+// Vignetting: the loss of light towards the image border.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,14 +10,17 @@
 
 namespace spartan {
 
-/// Light at a pixel over light at the centre: 1 + a1 ρ² + a2 ρ⁴ + a3 ρ⁶, where ρ is the distance from the centre over
-/// half the image's diagonal. No coefficients: no fall-off.
+/// Relative illumination, light at a pixel over light at the centre: 1 + a1 ρ² + a2 ρ⁴ + a3 ρ⁶, where ρ is the distance
+/// from the centre over half the image diagonal. No coefficients: no vignetting.
 struct Vignetting {
   std::vector<double> coefficients;          ///< a1, a2, a3; missing ones are 0
-  std::optional<Eigen::Vector2d> centre_px;  ///< none: where the camera sees its optical axis
+  std::optional<Eigen::Vector2d> centre_px;  ///< none: the principal point
 
-  static constexpr double kLeast = 0.125;  ///< a pixel that gets less light holds no picture worth amplifying
+  /// Smallest relative illumination that is corrected; amplifying darker pixels (more than 8 times) yields mostly
+  /// noise.
+  static constexpr double kLeast = 0.125;
 
+  /// Relative illumination at ρ².
   double light_at(double rho_squared) const {
     double sum = 0;
     for (std::size_t i = coefficients.size(); i-- > 0;) sum = (sum + coefficients[i]) * rho_squared;

@@ -6,37 +6,37 @@
 namespace spartan {
 namespace {
 
-constexpr double kNothing_deg = 1e-9;
+constexpr double kTolerance_deg = 1e-9;
 
-// The same directions within −180 … 180: a sector over the back becomes two.
-std::vector<AzimuthSector> cut_behind(const std::vector<AzimuthSector>& sectors) {
-  std::vector<AzimuthSector> cut;
-  cut.reserve(2 * sectors.size());
+// The same azimuths within −180 … 180: a sector across ±180 becomes two.
+std::vector<AzimuthSector> split_at_180(const std::vector<AzimuthSector>& sectors) {
+  std::vector<AzimuthSector> split;
+  split.reserve(2 * sectors.size());
   for (const AzimuthSector& sector : sectors) {
     if (!(sector.width_deg() > 0)) continue;
     if (sector.width_deg() >= 360) return {{-180, 180}};
-    const double turns = 360 * std::floor((sector.from_deg + 180) / 360);
-    const double from = sector.from_deg - turns, to = sector.to_deg - turns;
-    cut.push_back({from, std::min(to, 180.0)});
-    if (to > 180) cut.push_back({-180, to - 360});
+    const double offset = 360 * std::floor((sector.from_deg + 180) / 360);
+    const double from = sector.from_deg - offset, to = sector.to_deg - offset;
+    split.push_back({from, std::min(to, 180.0)});
+    if (to > 180) split.push_back({-180, to - 360});
   }
-  return cut;
+  return split;
 }
 
 }  // namespace
 
 AzimuthSet::AzimuthSet(const std::vector<AzimuthSector>& sectors) {
-  std::vector<AzimuthSector> cut = cut_behind(sectors);
-  std::sort(cut.begin(), cut.end(),
+  std::vector<AzimuthSector> split = split_at_180(sectors);
+  std::sort(split.begin(), split.end(),
             [](const AzimuthSector& a, const AzimuthSector& b) { return a.from_deg < b.from_deg; });
-  for (const AzimuthSector& next : cut) {
-    if (!sectors_.empty() && next.from_deg <= sectors_.back().to_deg + kNothing_deg) {
+  for (const AzimuthSector& next : split) {
+    if (!sectors_.empty() && next.from_deg <= sectors_.back().to_deg + kTolerance_deg) {
       sectors_.back().to_deg = std::max(sectors_.back().to_deg, next.to_deg);
     } else {
       sectors_.push_back(next);
     }
   }
-  std::erase_if(sectors_, [](const AzimuthSector& sector) { return sector.width_deg() < kNothing_deg; });
+  std::erase_if(sectors_, [](const AzimuthSector& sector) { return sector.width_deg() < kTolerance_deg; });
 }
 
 AzimuthSet AzimuthSet::all() {
@@ -61,19 +61,19 @@ bool AzimuthSet::contains(double azimuth_deg) const {
 }
 
 bool AzimuthSet::covers(const AzimuthSet& other) const {
-  return within(other).width_deg() >= other.width_deg() - kNothing_deg;
+  return intersected_with(other).width_deg() >= other.width_deg() - kTolerance_deg;
 }
 
-AzimuthSet AzimuthSet::turned_by(const std::vector<double>& angles_deg) const {
-  std::vector<AzimuthSector> turned;
-  turned.reserve(sectors_.size() * angles_deg.size());
+AzimuthSet AzimuthSet::rotated_by(const std::vector<double>& angles_deg) const {
+  std::vector<AzimuthSector> rotated;
+  rotated.reserve(sectors_.size() * angles_deg.size());
   for (const double angle : angles_deg) {
-    for (const AzimuthSector& sector : sectors_) turned.push_back({sector.from_deg + angle, sector.to_deg + angle});
+    for (const AzimuthSector& sector : sectors_) rotated.push_back({sector.from_deg + angle, sector.to_deg + angle});
   }
-  return AzimuthSet(turned);
+  return AzimuthSet(rotated);
 }
 
-AzimuthSet AzimuthSet::within(const AzimuthSet& other) const {
+AzimuthSet AzimuthSet::intersected_with(const AzimuthSet& other) const {
   std::vector<AzimuthSector> shared;
   shared.reserve(sectors_.size() + other.sectors_.size());
   for (auto a = sectors_.begin(), b = other.sectors_.begin(); a != sectors_.end() && b != other.sectors_.end();) {

@@ -1,4 +1,4 @@
-// Where requirements and what meets them do not fit together.
+// Warnings about inconsistencies between requirements, published pair and search result.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace spartan {
 struct RigDesign;
 struct RigRequirements;
 
-/// One thing a person should know. `value` is the figure that `text` is about, in the unit that the text gives it.
+/// One warning. `value` is the quantity that `text` reports, in the unit of the text.
 struct DesignWarning {
   std::string id;  ///< docs/math/rig_design.md, "Warnings"
   std::string pair;
@@ -17,7 +17,7 @@ struct DesignWarning {
   double value = 0;
 };
 
-/// Everything there is to say of a design; its own warnings do not count.
+/// All warnings about a design; ignores the field `warnings` of `design`.
 std::vector<DesignWarning> find_design_warnings(const RigRequirements& requirements, const RigDesign& design);
 
 }  // namespace spartan

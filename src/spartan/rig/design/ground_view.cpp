@@ -13,19 +13,19 @@ namespace {
 
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
-// Twice the area of the triangle o, a, b; positive where it turns to the left.
-double turn(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+// Twice the signed area of the triangle o, a, b; positive if counter-clockwise.
+double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector2d u = a - o, v = b - o;
   return u.x() * v.y() - u.y() * v.x();
 }
 
-// What lies to the left of the line from a to b (Sutherland and Hodgman, CACM 17, 1974).
+// The part of a polygon to the left of the line from a to b (Sutherland and Hodgman, CACM 17, 1974).
 GroundPolygon left_of(const GroundPolygon& polygon, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   GroundPolygon kept;
   kept.reserve(polygon.size() + 1);
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector2d &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
-    const double side_p = turn(a, b, p), side_q = turn(a, b, q);
+    const double side_p = cross(a, b, p), side_q = cross(a, b, q);
     if (side_p >= 0) kept.push_back(p);
     if ((side_p > 0 && side_q < 0) || (side_p < 0 && side_q > 0))
       kept.push_back(p + (q - p) * side_p / (side_p - side_q));
@@ -35,7 +35,7 @@ GroundPolygon left_of(const GroundPolygon& polygon, const Eigen::Vector2d& a, co
 
 }  // namespace
 
-bool sees_ground_only(const GroundView& view) {
+bool is_below_horizon(const GroundView& view) {
   return view.tilt_rad > view.vfov_rad / 2;
 }
 
@@ -47,14 +47,14 @@ double far_edge_m(const GroundView& view) {
   return ground_ahead_m(view.height_m, view.tilt_rad - view.vfov_rad / 2);
 }
 
-GroundPolygon footprint(const GroundView& view, double eye_left_m, double pan_rad) {
-  if (!sees_ground_only(view)) throw std::invalid_argument("footprint: the view has a horizon");
+GroundPolygon footprint(const GroundView& view, double camera_left_m, double pan_rad) {
+  if (!is_below_horizon(view)) throw std::invalid_argument("footprint: the view reaches above the horizon");
   const double side = std::tan(view.hfov_rad / 2), rise = std::tan(view.vfov_rad / 2);
   const double c = std::cos(view.tilt_rad), s = std::sin(view.tilt_rad);
-  // The ray (1 ahead, `left`, `up`) of the camera, tilted down, until it has come down by the height.
+  // Intersects the camera ray (1 ahead, `left`, `up`), tilted down, with the ground.
   const auto on_ground = [&](double left, double up) {
     const double ahead = c + up * s, down = s - up * c;
-    const Eigen::Vector2d point(view.height_m * ahead / down, view.height_m * left / down + eye_left_m);
+    const Eigen::Vector2d point(view.height_m * ahead / down, view.height_m * left / down + camera_left_m);
     return Eigen::Vector2d(Eigen::Rotation2Dd(pan_rad) * point);
   };
   return {on_ground(-side, -rise), on_ground(-side, rise), on_ground(side, rise), on_ground(side, -rise)};
@@ -72,11 +72,11 @@ GroundPolygon intersection(const GroundPolygon& a, const GroundPolygon& b) {
 
 double area_m2(const GroundPolygon& polygon) {
   double twice = 0;
-  for (std::size_t i = 1; i + 1 < polygon.size(); ++i) twice += turn(polygon[0], polygon[i], polygon[i + 1]);
+  for (std::size_t i = 1; i + 1 < polygon.size(); ++i) twice += cross(polygon[0], polygon[i], polygon[i + 1]);
   return twice / 2;
 }
 
-std::optional<double> far_half_azimuth_rad(const GroundPolygon& polygon) {
+std::optional<double> far_edge_half_azimuth_rad(const GroundPolygon& polygon) {
   if (polygon.empty()) return std::nullopt;
   double far = polygon.front().x(), half = 0;
   for (const Eigen::Vector2d& corner : polygon) far = std::max(far, corner.x());
@@ -94,14 +94,14 @@ AzimuthSet azimuths_at(const GroundPolygon& polygon, double distance_m) {
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
     const Eigen::Vector2d along = b - a;
-    if (along.norm() <= 1e-12 * size) continue;  // a corner that stands there twice has no side
-    // Inside of this side is what lies at least so far towards its inner normal.
+    if (along.norm() <= 1e-12 * size) continue;  // skip duplicate corners
+    // Points inside this side have at least this coordinate along its inner normal.
     const Eigen::Vector2d inward = Eigen::Vector2d(-along.y(), along.x()).normalized();
     const double least_m = inward.dot(a);
     if (least_m <= -distance_m) continue;
     if (least_m >= distance_m) return {};
-    seen = seen.within(AzimuthSet::around(std::atan2(inward.y(), inward.x()) * kDegreesPerRadian,
-                                          std::acos(least_m / distance_m) * kDegreesPerRadian));
+    seen = seen.intersected_with(AzimuthSet::around(std::atan2(inward.y(), inward.x()) * kDegreesPerRadian,
+                                                    std::acos(least_m / distance_m) * kDegreesPerRadian));
   }
   return seen;
 }

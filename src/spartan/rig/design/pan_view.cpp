@@ -10,11 +10,12 @@ namespace spartan {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-// Between distances at which the shape of a footprint's azimuths changes, it is looked at in so many places.
-constexpr int kLooks = 64;
+// Samples between two critical distances: the resolution with which full coverage is searched (empirical).
+constexpr int kSamplesPerInterval = 64;
 
-// Where an arc around the origin meets a corner of the polygon or first touches a side, rising, from 0 to beyond it.
-std::vector<double> turning_points_m(const GroundPolygon& polygon) {
+// Radii at which a circle around the origin passes a corner of the polygon or touches a side, ascending, from 0 to
+// beyond the polygon. Between them the covered azimuths change continuously.
+std::vector<double> critical_distances_m(const GroundPolygon& polygon) {
   std::vector<double> distances{0};
   distances.reserve(2 * polygon.size() + 2);
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -29,41 +30,44 @@ std::vector<double> turning_points_m(const GroundPolygon& polygon) {
   return distances;
 }
 
-std::vector<double> places_to_look_m(const GroundPolygon& polygon) {
-  const std::vector<double> turning = turning_points_m(polygon);
-  std::vector<double> places{0};
-  places.reserve(kLooks * turning.size());
-  for (std::size_t i = 1; i < turning.size(); ++i) {
-    const double step = (turning[i] - turning[i - 1]) / kLooks;
-    for (int k = 0; k < kLooks && step > 0; ++k) places.push_back(turning[i - 1] + (k + 0.5) * step);
+std::vector<double> sample_distances_m(const GroundPolygon& polygon) {
+  const std::vector<double> critical = critical_distances_m(polygon);
+  std::vector<double> samples{0};
+  samples.reserve(kSamplesPerInterval * critical.size());
+  for (std::size_t i = 1; i < critical.size(); ++i) {
+    const double step = (critical[i] - critical[i - 1]) / kSamplesPerInterval;
+    for (int k = 0; k < kSamplesPerInterval && step > 0; ++k) samples.push_back(critical[i - 1] + (k + 0.5) * step);
   }
-  return places;
+  return samples;
 }
 
-// Where all of the asked azimuth is seen. A ring is found that is wider than the looks are apart; its borders are
-// exact.
-std::optional<DistanceSpan> longest_held(const GroundPolygon& polygon, const PanRequirements& pans) {
-  const AzimuthSet asked = asked_azimuth(pans);
-  const auto sees_all = [&](double distance_m) { return seen_azimuth(polygon, pans, distance_m).covers(asked); };
-  const auto border_m = [&](double unseen_m, double seen_m) {
+// The longest range of distances with full coverage of the required azimuth. Ranges shorter than the sampling may be
+// missed; the limits of a range are found by bisection.
+std::optional<DistanceSpan> longest_full_coverage(const GroundPolygon& polygon, const PanRequirements& pans) {
+  const AzimuthSet required = asked_azimuth(pans);
+  const auto covers_all = [&](double distance_m) {
+    return covered_azimuth(polygon, pans, distance_m).covers(required);
+  };
+  // 60 halvings reach the resolution of a double.
+  const auto limit_m = [&](double outside_m, double inside_m) {
     for (int halvings = 0; halvings < 60; ++halvings) {
-      const double middle = (unseen_m + seen_m) / 2;
-      (sees_all(middle) ? seen_m : unseen_m) = middle;
+      const double middle = (outside_m + inside_m) / 2;
+      (covers_all(middle) ? inside_m : outside_m) = middle;
     }
-    return seen_m;
+    return inside_m;
   };
   std::optional<DistanceSpan> longest;
-  const std::vector<double> places = places_to_look_m(polygon);
+  const std::vector<double> samples = sample_distances_m(polygon);
   DistanceSpan span;
   bool inside = false;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const bool seen = sees_all(places[i]);
-    if (seen && !inside) span.from_m = i == 0 ? 0 : border_m(places[i - 1], places[i]);
-    if (!seen && inside) {
-      span.to_m = border_m(places[i], places[i - 1]);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const bool covered = covers_all(samples[i]);
+    if (covered && !inside) span.from_m = i == 0 ? 0 : limit_m(samples[i - 1], samples[i]);
+    if (!covered && inside) {
+      span.to_m = limit_m(samples[i], samples[i - 1]);
       if (!longest || span.to_m - span.from_m > longest->to_m - longest->from_m) longest = span;
     }
-    inside = seen;
+    inside = covered;
   }
   return longest;
 }
@@ -82,13 +86,14 @@ AzimuthSet asked_azimuth(const PanRequirements& pans) {
   return AzimuthSet::around(0, pans.azimuth_deg / 2);
 }
 
-AzimuthSet seen_azimuth(const GroundPolygon& at_pan_0, const PanRequirements& pans, double distance_m) {
-  return azimuths_at(at_pan_0, distance_m).turned_by(pans.angles_deg).within(asked_azimuth(pans));
+AzimuthSet covered_azimuth(const GroundPolygon& at_pan_0, const PanRequirements& pans, double distance_m) {
+  return azimuths_at(at_pan_0, distance_m).rotated_by(pans.angles_deg).intersected_with(asked_azimuth(pans));
 }
 
-PanFigures pan_figures(const GroundView& view, const PanRequirements& pans) {
+PanFigures pan_coverage(const GroundView& view, const PanRequirements& pans) {
   const GroundPolygon common = common_footprint(view, 0);
-  const auto one_eye = far_half_azimuth_rad(footprint(view, 0, 0)), both_eyes = far_half_azimuth_rad(common);
+  const auto one_camera = far_edge_half_azimuth_rad(footprint(view, 0, 0)),
+             both_cameras = far_edge_half_azimuth_rad(common);
   const double step_rad = pans.widest_step_deg() * kRadiansPerDegree;
   const auto overlap = [&](double view_rad) -> std::optional<PanOverlap> {
     if (pans.angles_deg.size() < 2) return std::nullopt;
@@ -96,16 +101,16 @@ PanFigures pan_figures(const GroundView& view, const PanRequirements& pans) {
   };
   const auto far_azimuth = [&](std::optional<double> half_rad) {
     const AzimuthSet of_a_pan = AzimuthSet::around(0, half_rad.value_or(0) / kRadiansPerDegree);
-    return of_a_pan.turned_by(pans.angles_deg).within(asked_azimuth(pans));
+    return of_a_pan.rotated_by(pans.angles_deg).intersected_with(asked_azimuth(pans));
   };
 
   PanFigures figures;
   figures.overlap = overlap(view.hfov_rad);
-  if (one_eye) figures.far_overlap = overlap(2 * *one_eye);
-  if (both_eyes) figures.far_overlap_stereo = overlap(2 * *both_eyes);
-  figures.azimuth_far = far_azimuth(one_eye);
-  figures.azimuth_far_stereo = far_azimuth(both_eyes);
-  figures.azimuth_held = longest_held(common, pans);
+  if (one_camera) figures.far_overlap = overlap(2 * *one_camera);
+  if (both_cameras) figures.far_overlap_stereo = overlap(2 * *both_cameras);
+  figures.azimuth_far = far_azimuth(one_camera);
+  figures.azimuth_far_stereo = far_azimuth(both_cameras);
+  figures.azimuth_held = longest_full_coverage(common, pans);
   return figures;
 }
 

@@ -1,4 +1,4 @@
-// What a pair sees of the ground around the rover from the pans of one stop (docs/math/rig_design.md, "Ground").
+// Ground coverage of a panned pair at one stop (docs/math/rig_design.md, "Ground").
 #pragma once
 
 #include <optional>
@@ -9,35 +9,35 @@
 
 namespace spartan {
 
-/// What neighbouring pans share that are a step apart, each spanning the view.
+/// Overlap of two neighbouring views that are one pan step apart.
 struct PanOverlap {
   double view_rad = 0, step_rad = 0;
-  double percent() const;  ///< of the view; negative: a gap
-  double gap_deg() const;  ///< between them; negative: an overlap
+  double percent() const;  ///< share of the field of view; negative: a gap
+  double gap_deg() const;  ///< between the views; negative: an overlap
 };
 
-/// On the ground, from the axis of pan.
+/// A range of distances on the ground from the pan axis.
 struct DistanceSpan {
   double from_m = 0, to_m = 0;
 };
 
-/// What the pans see together. Azimuths are of the azimuth that is asked for, straight ahead in its middle.
+/// Coverage of all pans together. Azimuths are clipped to the required azimuth, which is centred straight ahead.
 struct PanFigures {
-  std::optional<PanOverlap> overlap;             ///< nominal: of the view's angle; none for a single pan
-  std::optional<PanOverlap> far_overlap;         ///< at the top row, one eye; none for a single pan
-  std::optional<PanOverlap> far_overlap_stereo;  ///< what both eyes see; none too where they share nothing
-  AzimuthSet azimuth_far;                        ///< in which directions the top row's ground is seen, one eye
-  AzimuthSet azimuth_far_stereo;                 ///< and by both
-  /// Where both eyes see all of the asked azimuth; the longest such span, none where there is no such distance.
+  std::optional<PanOverlap> overlap;             ///< nominal, from the field of view; none for a single pan
+  std::optional<PanOverlap> far_overlap;         ///< at the top row, one camera; none for a single pan
+  std::optional<PanOverlap> far_overlap_stereo;  ///< the same for both cameras; also none without common ground
+  AzimuthSet azimuth_far;                        ///< azimuths at which the far edge (top row) is seen, one camera
+  AzimuthSet azimuth_far_stereo;                 ///< the same for both cameras
+  /// Distances at which both cameras cover the whole required azimuth: the longest such range; none if there is none.
   std::optional<DistanceSpan> azimuth_held;
 };
 
-PanFigures pan_figures(const GroundView& view, const PanRequirements& pans);
+PanFigures pan_coverage(const GroundView& view, const PanRequirements& pans);
 
-/// The azimuth that is asked for.
+/// The azimuth that the requirements demand.
 AzimuthSet asked_azimuth(const PanRequirements& pans);
-/// In which directions of it ground is seen at a distance from the axis of pan. `at_pan_0` is a footprint, of one eye
-/// or of both.
-AzimuthSet seen_azimuth(const GroundPolygon& at_pan_0, const PanRequirements& pans, double distance_m);
+/// The part of the required azimuth that the pans cover at a distance from the pan axis. `at_pan_0` is a footprint at
+/// pan 0, of one camera or of both.
+AzimuthSet covered_azimuth(const GroundPolygon& at_pan_0, const PanRequirements& pans, double distance_m);
 
 }  // namespace spartan

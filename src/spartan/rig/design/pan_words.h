@@ -1,4 +1,4 @@
-// What pans see, in words for warnings, reports and pictures. `degrees` is the sign after an angle.
+// Text about pan coverage for warnings, reports and figures. `degrees` is the unit after an angle.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace spartan {
 
-/// "-58.5 to 58.5 deg", each sector of it, or "nowhere".
-std::string in_words(const AzimuthSet& set, const std::string& degrees = " deg");
+/// "-58.5 to 58.5 deg", a list of the sectors, or "nowhere".
+std::string to_text(const AzimuthSet& set, const std::string& degrees = " deg");
 /// "overlap by 30.0 %", or "leave a gap of 30.0 deg".
-std::string in_words(const PanOverlap& overlap, const std::string& degrees = " deg");
-/// One sentence on neighbouring pans; there must be more than one.
+std::string to_text(const PanOverlap& overlap, const std::string& degrees = " deg");
+/// One sentence about the overlap of neighbouring pans, of which there must be at least two.
 std::string overlaps_in_words(const PanFigures& pans, const std::string& degrees = " deg");
 
 }  // namespace spartan

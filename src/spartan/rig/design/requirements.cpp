@@ -15,10 +15,10 @@ namespace spartan {
 namespace {
 
 constexpr int kSchema = 1;
-constexpr std::size_t kLongestList = 1000;
+constexpr std::size_t kMaxListLength = 1000;
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
-// What a number may be; both ends are included.
+// Bounds of a value, both included.
 struct Limits {
   double low, high;
 };
@@ -47,7 +47,8 @@ std::optional<int> whole(YamlMap& map, const char* key, const Limits& limits) {
   return std::nullopt;
 }
 
-// {from, to, step}. Every value is the nearest double of its decimal: 0.05 + 10 · 0.01 is 0.15, not a bit more.
+// {from, to, step}. Rounded to 9 decimals, so that each value is the double nearest to its decimal: 0.05 + 10 · 0.01 is
+// exactly 0.15.
 std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, const YamlNode& node) {
   YamlMap steps(node, map.path(key), map.errors());
   const auto from = steps.number("from"), to = steps.number("to"), step = steps.number("step");
@@ -58,12 +59,12 @@ std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, con
     return std::nullopt;
   }
   const double count = (*to - *from) / *step;
-  if (!(count < static_cast<double>(kLongestList))) {
-    steps.add_error("step", fmt::format("gives more than {} values", kLongestList));
+  if (!(count < static_cast<double>(kMaxListLength))) {
+    steps.add_error("step", fmt::format("gives more than {} values", kMaxListLength));
     return std::nullopt;
   }
   if (std::abs(count - std::round(count)) > 1e-6) {
-    steps.add_error("step", fmt::format("does not lead from {} to {}", *from, *to));
+    steps.add_error("step", fmt::format("does not divide the range from {} to {} evenly", *from, *to));
     return std::nullopt;
   }
   std::vector<double> values;
@@ -74,8 +75,8 @@ std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, con
 }
 
 std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, const YamlNode& node) {
-  if (node.items().size() == 0 || node.items().size() > kLongestList) {
-    map.add_error(key, fmt::format("has {} entries, must have 1 to {}", node.items().size(), kLongestList));
+  if (node.items().size() == 0 || node.items().size() > kMaxListLength) {
+    map.add_error(key, fmt::format("has {} entries, must have 1 to {}", node.items().size(), kMaxListLength));
     return std::nullopt;
   }
   std::vector<double> values;
@@ -90,7 +91,7 @@ std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, co
   return values;
 }
 
-// A list [a, b, …] or {from, to, step}; every value within limits, none twice.
+// A list [a, b, …] or {from, to, step}; every value within limits, without duplicates.
 std::vector<double> read_values(YamlMap& map, const char* key, const Limits& limits) {
   const auto node = map.node(key);
   if (!node) return {};
@@ -107,15 +108,15 @@ std::vector<double> read_values(YamlMap& map, const char* key, const Limits& lim
   }
   std::vector<double> sorted = *values;
   std::sort(sorted.begin(), sorted.end());
-  if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end()) {
-    map.add_error(key, fmt::format("holds {} twice", *twice));
+  if (const auto duplicate = std::adjacent_find(sorted.begin(), sorted.end()); duplicate != sorted.end()) {
+    map.add_error(key, fmt::format("holds {} twice", *duplicate));
     return {};
   }
   return *values;
 }
 
-ShapeLists read_lists(YamlMap map) {
-  ShapeLists lists;
+CandidateLists read_lists(YamlMap map) {
+  CandidateLists lists;
   lists.baselines_m = read_values(map, "baselines_m", kLength_m);
   lists.nearest_m = read_values(map, "nearest_m", kLength_m);
   lists.hfov_deg = read_values(map, "hfov_deg", kView_deg);
@@ -197,26 +198,26 @@ void read_limits(YamlMap& map, PairRequirements& pair) {
   pair.rows_per_column = optional_bounded(map, "rows_per_column", {0.01, 100}).value_or(1);
 }
 
-// What the numbers mean together; told of numbers that are sound by themselves.
-void add_faults_of_meaning(YamlMap& map, const PairRequirements& pair) {
-  const auto sound = [&](const char* key) { return !map.errors().touches(map.path(key)); };
-  if (sound("height_m") && sound("smallest_height_m") && pair.height_m < pair.smallest_height_m) {
+// Consistency of several values; checked only where each value is valid by itself.
+void check_consistency(YamlMap& map, const PairRequirements& pair) {
+  const auto valid = [&](const char* key) { return !map.errors().touches(map.path(key)); };
+  if (valid("height_m") && valid("smallest_height_m") && pair.height_m < pair.smallest_height_m) {
     map.add_error("height_m", fmt::format("is {}, below smallest_height_m, {}", pair.height_m, pair.smallest_height_m));
   }
   const double below_horizon_deg = std::atan(pair.height_m / pair.range_m) / kRadiansPerDegree;
-  if (sound("height_m") && sound("range_m") && sound("tilt_step_deg") && pair.tilt_step_deg >= below_horizon_deg) {
-    map.add_error("tilt_step_deg",
-                  fmt::format("is {}; the ground at range_m lies only {:.3f} degrees below the horizon",
-                              pair.tilt_step_deg, below_horizon_deg));
+  if (valid("height_m") && valid("range_m") && valid("tilt_step_deg") && pair.tilt_step_deg >= below_horizon_deg) {
+    map.add_error("tilt_step_deg", fmt::format("is {}; the ground at range_m is only {:.3f} degrees below the horizon",
+                                               pair.tilt_step_deg, below_horizon_deg));
   }
-  if (!pair.published || !sound("published") || !sound("rows_per_column")) return;
+  if (!pair.published || !valid("published") || !valid("rows_per_column")) return;
   const PublishedPair& published = *pair.published;
   const double vfov_deg = published.vfov_deg.value_or(
       vertical_view_rad(published.shape.hfov_deg * kRadiansPerDegree, pair.published_rows_per_column()) /
       kRadiansPerDegree);
   if (published.tilt_deg && *published.tilt_deg <= vfov_deg / 2) {
-    map.add_error("published.tilt_deg", fmt::format("is {}, the top row, {:.2f} degrees higher, would look at the sky",
-                                                    *published.tilt_deg, vfov_deg / 2));
+    map.add_error("published.tilt_deg",
+                  fmt::format("is {}, so the top row, {:.2f} degrees higher, would be above the horizon",
+                              *published.tilt_deg, vfov_deg / 2));
   }
 }
 
@@ -226,7 +227,7 @@ PairRequirements read_pair(YamlMap map) {
   if (const auto lists = map.node("candidates")) {
     pair.lists = read_lists(YamlMap(*lists, map.path("candidates"), map.errors()));
     if (const std::size_t count = pair.lists.combinations(); count > kMostCombinations) {
-      map.add_error("candidates", fmt::format("are {} combinations, at most {} are tried", count, kMostCombinations));
+      map.add_error("candidates", fmt::format("has {} combinations, at most {} are allowed", count, kMostCombinations));
     }
   }
   pair.order = read_order(map);
@@ -236,7 +237,7 @@ PairRequirements read_pair(YamlMap map) {
     pair.published = read_published(YamlMap(*published, map.path("published"), map.errors()));
   }
   map.reject_unknown_keys();
-  add_faults_of_meaning(map, pair);
+  check_consistency(map, pair);
   return pair;
 }
 
@@ -256,7 +257,7 @@ RigRequirements read_root(YamlMap root, const std::string& default_name) {
 
 }  // namespace
 
-std::size_t ShapeLists::combinations() const {
+std::size_t CandidateLists::combinations() const {
   return baselines_m.size() * nearest_m.size() * hfov_deg.size() * pixel_sizes_um.size() * widths_px.size();
 }
 

@@ -1,4 +1,4 @@
-// What a rover asks of its stereo pairs, and what there is to build them from (docs/formats.md, "Requirements of a
+// Requirements of a rover on its stereo pairs, and the candidates to choose from (docs/formats.md, "Requirements of a
 // rig").
 #pragma once
 
@@ -10,72 +10,75 @@
 
 namespace spartan {
 
-/// One way to build a pair, in the units of the file: so a list's 0.15 stays 0.15.
+/// The design parameters of a pair, in the units of the file so that a listed 0.15 stays exactly 0.15.
 struct PairShape {
   double baseline_m = 0;
-  double nearest_m = 0;  ///< d_min: nothing nearer has to be matched
+  double nearest_m = 0;  ///< d_min, the smallest depth to match
   double hfov_deg = 0;
   double pixel_size_um = 0;
   int width_px = 0;
   friend bool operator==(const PairShape&, const PairShape&) = default;
 };
 
-/// What is on offer; every combination is tried.
-struct ShapeLists {
+/// The candidate values; every combination is evaluated.
+struct CandidateLists {
   std::vector<double> baselines_m, nearest_m, hfov_deg, pixel_sizes_um;
   std::vector<int> widths_px;
   std::size_t combinations() const;
 };
-constexpr std::size_t kMostCombinations = 2'000'000;
+constexpr std::size_t kMostCombinations = 2'000'000;  // bounds time and memory of the search
 
-/// What makes one feasible shape better than another; the next one counts where two are equal to 10⁻⁹.
+/// Criteria of the lexicographic order of feasible pairs; values within 10⁻⁹ are equal, and the next criterion decides.
 enum class DesignCriterion { range_margin, pan_overlap, shorter_baseline };
 
-/// A pair on a pan unit that looks around at stops.
+/// A pair on a pan unit that takes several views at a stop.
 struct PanRequirements {
-  std::vector<double> angles_deg;  ///< rising
-  double azimuth_deg = 0;          ///< asked for, over all pans; straight ahead is its middle
+  std::vector<double> angles_deg;  ///< ascending
+  double azimuth_deg = 0;          ///< required over all pans, centred straight ahead
   double smallest_overlap_percent = 0;
-  /// Between neighbours; 0 for a single pan. Where all around is asked for, the last and the first are neighbours too.
+  /// Largest step between neighbouring pans; 0 for a single pan. Where 360° are required, the last and the first pan
+  /// are neighbours too.
   double widest_step_deg() const;
 };
 
-/// A pair that was chosen by others, as they describe it.
+/// A published pair, as its source describes it, to be checked against the requirements.
 struct PublishedPair {
   PairShape shape;
-  std::optional<int> height_px;  ///< without it the rows of the requirements
+  std::optional<int> height_px;  ///< default: by PairRequirements::rows_per_column
   std::optional<double> vfov_deg, focal_length_mm, tilt_deg;
 };
 
+/// Requirements on one stereo pair.
 struct PairRequirements {
-  double range_m = 0;             ///< up to here …
-  double range_resolution_m = 0;  ///< … a step of disparity may not be worth more than this
-  double disparity_accuracy_px = 0;
-  double largest_stereo_angle_deg = 0;
-  std::optional<double> contradicting_stereo_angle_deg;  ///< another limit that the same source states
-  double largest_search_percent = 0;
+  double range_m = 0;                   ///< range up to which range_resolution_m is required
+  double range_resolution_m = 0;        ///< largest depth change of a disparity step of disparity_accuracy_px
+  double disparity_accuracy_px = 0;     ///< c, accuracy of the stereo matching
+  double largest_stereo_angle_deg = 0;  ///< largest convergence angle at the nearest depth
+  std::optional<double> contradicting_stereo_angle_deg;  ///< a second limit that the same source gives
+  double largest_search_percent = 0;                     ///< largest disparity search range, of the image width
   double smallest_baseline_m = 0, smallest_height_m = 0;
-  double height_m = 0;         ///< of the eyes over the ground
-  double tilt_step_deg = 0;    ///< tilts are multiples of it
-  double rows_per_column = 1;  ///< of the sensors on offer
-  ShapeLists lists;
+  double height_m = 0;         ///< of the cameras above the ground
+  double tilt_step_deg = 0;    ///< the tilt is a multiple of it
+  double rows_per_column = 1;  ///< of the candidate sensors
+  CandidateLists lists;
   std::vector<DesignCriterion> order;
-  std::optional<PanRequirements> pans;  ///< none: it looks ahead only
+  std::optional<PanRequirements> pans;  ///< none: the pair is fixed, looking ahead
   std::optional<PublishedPair> published;
 
   /// Rows over columns of the published sensor.
   double published_rows_per_column() const;
 };
 
+/// Requirements on the pairs of a rover.
 struct RigRequirements {
   std::string name;
   PairRequirements wide;                   ///< on the mast, for maps
-  std::optional<PairRequirements> narrow;  ///< at its foot, for odometry
+  std::optional<PairRequirements> narrow;  ///< at the foot of the mast, for odometry
 };
 
-/// All faults of a file at once, each with its line; code `configuration`.
+/// Parses requirements. All errors of the text are reported at once, each with its line; code `configuration`.
 Result<RigRequirements> parse_requirements(const std::string& text, const std::string& name);
-/// The same; code `input` where the file cannot be read.
+/// The same from a file; code `input` where it cannot be read.
 Result<RigRequirements> read_requirements(const std::string& path);
 
 }  // namespace spartan

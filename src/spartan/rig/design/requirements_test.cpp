@@ -41,7 +41,7 @@ std::string complaint(const std::string& what, const std::string& with) {
   return testing::complaint(parse_requirements(replaced(kGood, what, with), "my.yaml"));
 }
 
-TEST(Requirements, ReadsTheShortestFile) {
+TEST(Requirements, ReadsAMinimalFile) {
   const auto read = parse_requirements(kGood, "some/my.yaml");
   ASSERT_TRUE(read) << read.error().message();
   EXPECT_EQ(read->name, "my");
@@ -53,17 +53,17 @@ TEST(Requirements, ReadsTheShortestFile) {
   EXPECT_EQ(read->wide.lists.combinations(), 2u * 1 * 26 * 10 * 1);
 }
 
-// As if each had been typed: not a bit more, whatever the sum of the steps.
-TEST(Requirements, StepsAreTheDecimalsThemselves) {
+// Equal to the decimals as typed, whatever the rounding of the steps.
+TEST(Requirements, StepsAreExactDecimals) {
   const auto read = parse_requirements(kGood, "my.yaml");
   ASSERT_TRUE(read);
-  const ShapeLists& lists = read->wide.lists;
+  const CandidateLists& lists = read->wide.lists;
   ASSERT_EQ(lists.baselines_m.size(), 26u);
   for (int i = 0; i < 26; ++i) EXPECT_EQ(lists.baselines_m[static_cast<std::size_t>(i)], (5 + i) / 100.0);
   EXPECT_THAT(lists.nearest_m, ElementsAre(0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5));
 }
 
-TEST(Requirements, PansMayStandInAnyOrder) {
+TEST(Requirements, PansMayBeInAnyOrder) {
   const auto read = parse_requirements(
       kGood + "  pans: {angles_deg: [10, -50, 0], azimuth_deg: 90, smallest_overlap_percent: 5}\n", "my.yaml");
   ASSERT_TRUE(read) << read.error().message();
@@ -82,7 +82,7 @@ TEST(Requirements, RowsOfThePublishedPair) {
   EXPECT_EQ(rows(kGood + replaced(published, "width_px: 1000", "width_px: 1000, height_px: 800")), 0.8);
 }
 
-TEST(Requirements, ShippedOnesAreThePublishedLists) {
+TEST(Requirements, ShippedFilesHoldThePublishedLists) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(testing::source_folder() + "/config/requirements")) {
     const auto read = read_requirements(entry.path().string());
@@ -106,7 +106,7 @@ TEST(Requirements, ShippedOnesAreThePublishedLists) {
   EXPECT_EQ(rover.wide.pans->widest_step_deg(), 35);
 }
 
-TEST(Requirements, EachFaultIsNamedWithItsLine) {
+TEST(Requirements, EachErrorIsReportedWithItsLine) {
   EXPECT_THAT(complaint("range_m: 4", "range_m: nan"), HasSubstr("my.yaml:3: wide.range_m: is nan"));
   EXPECT_THAT(complaint("range_m: 4", "range_m: -4"), HasSubstr("my.yaml:3: wide.range_m: is -4"));
   EXPECT_THAT(complaint("  range_m: 4\n", ""), HasSubstr("wide.range_m: is missing"));
@@ -118,7 +118,7 @@ TEST(Requirements, EachFaultIsNamedWithItsLine) {
   EXPECT_THAT(complaint("[780, 1120]", "7"), HasSubstr("{from, to, step}"));
   EXPECT_THAT(complaint("[5.5]", "[wide]"), HasSubstr("numbers only"));
   EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.305, step: 0.01"),
-              HasSubstr("does not lead from 0.05 to 0.305"));
+              HasSubstr("does not divide the range from 0.05 to 0.305 evenly"));
   EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.30, step: 0"), HasSubstr("must be positive"));
   EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.01, step: 0.01"), HasSubstr("below from"));
   EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.30, step: 1e-9"), HasSubstr("more than 1000 values"));
@@ -135,12 +135,12 @@ TEST(Requirements, EachFaultIsNamedWithItsLine) {
       complaint("  order",
                 "  published: {baseline_m: 0.2, nearest_m: 1, hfov_deg: 50, pixel_size_um: 5.5, width_px: 1120, "
                 "tilt_deg: 20}\n  order"),
-      HasSubstr("wide.published.tilt_deg: is 20, the top row, 25.00 degrees higher, would look at the sky"));
+      HasSubstr("wide.published.tilt_deg: is 20, so the top row, 25.00 degrees higher, would be above the horizon"));
   EXPECT_THAT(complaint("  order", "  nonsense: 1\n  order"), HasSubstr("wide.nonsense: unknown key"));
   EXPECT_THAT(complaint("wide:", "wide: 3\nmore:"), HasSubstr("wide: must be a group"));
 }
 
-TEST(Requirements, AllFaultsAreToldAtOnce) {
+TEST(Requirements, AllErrorsAreReportedAtOnce) {
   const auto read = parse_requirements(
       replaced(replaced(replaced(kGood, "range_m: 4", "range_m: 0"), "[780, 1120]", "[0]"), "[5.5]", "[5.5, .inf]"),
       "my.yaml");
@@ -150,23 +150,23 @@ TEST(Requirements, AllFaultsAreToldAtOnce) {
   EXPECT_THAT(read.error().message(), HasSubstr("my.yaml:12: "));
 }
 
-TEST(Requirements, TooManyCombinationsAreRefused) {
+TEST(Requirements, TooManyCombinationsAreRejected) {
   std::string text = replaced(kGood, "[50]", "{from: 40, to: 70, step: 0.1}");
   text = replaced(text, "step: 0.01", "step: 0.001");
   text = replaced(text, "step: 0.1}\n    hfov", "step: 0.01}\n    hfov");
   const auto read = parse_requirements(text, "my.yaml");
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message(), HasSubstr("my.yaml:10: wide.candidates: are 13750282 combinations"));
+  EXPECT_THAT(read.error().message(), HasSubstr("my.yaml:10: wide.candidates: has 13750282 combinations"));
 }
 
-TEST(Requirements, AFileThatIsNotThereIsMissingInput) {
+TEST(Requirements, MissingFileIsAnInputError) {
   const testing::TemporaryFolder folder;
   EXPECT_EQ(read_requirements(folder.path() + "/none.yaml").error().code, ErrorCode::input);
   EXPECT_EQ(read_requirements(folder.path()).error().code, ErrorCode::input);
 }
 
-// The example of the document holds every key that the reader knows, and the table below it explains each.
-TEST(Requirements, TheDocumentNamesEveryKey) {
+// The example in the documentation has every key that the reader knows, and the table below it explains each.
+TEST(Requirements, DocumentationNamesEveryKey) {
   const std::string text = testing::doc_example("requirements.yaml");
   ASSERT_FALSE(text.empty());
   const auto read = parse_requirements(text, "docs/formats.md");
@@ -214,8 +214,8 @@ TEST(Requirements, TheDocumentNamesEveryKey) {
   }
 }
 
-// A file that broke off, or in which a byte turned over, is read or refused, and nothing else.
-RC_GTEST_PROP(Requirements, DamagedFilesAreNoDanger, ()) {
+// A truncated file, or one with a changed byte, is read or rejected without a crash.
+RC_GTEST_PROP(Requirements, DamagedFilesDoNotCrash, ()) {
   std::string text = kGood;
   if (*rc::gen::arbitrary<bool>()) {
     text.resize(*rc::gen::inRange<std::size_t>(0, text.size()));

@@ -15,12 +15,12 @@ namespace spartan {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-// A value on its limit passes, and values this near to each other are equal: more than rounding, less than any meaning.
-constexpr double kSame = 1e-9;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+// Tolerance of limits and of equality: more than rounding errors, less than any relevant difference.
+constexpr double kTolerance = 1e-9;
 
 bool holds(double margin) {
-  return margin >= -kSame;
+  return margin >= -kTolerance;
 }
 
 DepthAccuracy accuracy_of(const PairRequirements& requirements) {
@@ -30,31 +30,32 @@ DepthAccuracy accuracy_of(const PairRequirements& requirements) {
 double tilt_for_range_deg(double vfov_deg, const PairRequirements& requirements) {
   const double reaching_deg =
       tilt_to_reach_rad(requirements.height_m, requirements.range_m, vfov_deg * kRadiansPerDegree) / kRadiansPerDegree;
-  const double steps = std::floor(reaching_deg / requirements.tilt_step_deg + kSame);
+  const double steps = std::floor(reaching_deg / requirements.tilt_step_deg + kTolerance);
   return std::min(90.0, std::round(steps * requirements.tilt_step_deg * 1e9) / 1e9);
 }
 
-// Everything but the figures of the view.
+// Everything except field of view and tilt.
 PairFigures stereo_figures(const PairShape& shape, const PairRequirements& requirements) {
   const double hfov_rad = shape.hfov_deg * kRadiansPerDegree;
   const double angle_rad = stereo_angle_rad(shape.baseline_m, shape.nearest_m);
   PairFigures pair;
   pair.shape = shape;
-  pair.range_m = reach_m({shape.baseline_m, static_cast<double>(shape.width_px), hfov_rad}, accuracy_of(requirements));
+  pair.range_m =
+      max_range_m({shape.baseline_m, static_cast<double>(shape.width_px), hfov_rad}, accuracy_of(requirements));
   pair.focal_length_mm = focal_length_mm(shape.pixel_size_um, shape.width_px, hfov_rad);
   pair.stereo_angle_deg = angle_rad / kRadiansPerDegree;
   pair.search_percent = search_percent(angle_rad, hfov_rad);
-  const bool turns = requirements.pans && requirements.pans->angles_deg.size() > 1;
+  const bool pans = requirements.pans && requirements.pans->angles_deg.size() > 1;
   pair.pan_overlap_percent =
-      turns ? overlap_percent(hfov_rad, requirements.pans->widest_step_deg() * kRadiansPerDegree) : kNone;
+      pans ? overlap_percent(hfov_rad, requirements.pans->widest_step_deg() * kRadiansPerDegree) : kNan;
   pair.margins = {pair.range_m - requirements.range_m, requirements.largest_stereo_angle_deg - pair.stereo_angle_deg,
                   requirements.largest_search_percent - pair.search_percent,
                   shape.baseline_m - requirements.smallest_baseline_m,
-                  turns ? pair.pan_overlap_percent - requirements.pans->smallest_overlap_percent : kNone};
+                  pans ? pair.pan_overlap_percent - requirements.pans->smallest_overlap_percent : kNan};
   const PairMargins& margins = pair.margins;
   pair.feasible = holds(margins.range_m) && holds(margins.stereo_angle_deg) && holds(margins.search_percent) &&
                   holds(margins.baseline_m);
-  pair.with_pan_overlap = pair.feasible && turns && holds(margins.pan_overlap_percent);
+  pair.with_pan_overlap = pair.feasible && pans && holds(margins.pan_overlap_percent);
   return pair;
 }
 
@@ -70,9 +71,9 @@ double square_pixel_view_deg(double hfov_deg, double rows_per_column) {
   return vertical_view_rad(hfov_deg * kRadiansPerDegree, rows_per_column) / kRadiansPerDegree;
 }
 
-// visit(shape) of every combination, in the order of the lists.
+// Calls visit(shape) for every combination, in the order of the lists.
 template <class Visit>
-void for_every_shape(const ShapeLists& lists, const Visit& visit) {
+void for_every_shape(const CandidateLists& lists, const Visit& visit) {
   for (const double baseline_m : lists.baselines_m) {
     for (const double nearest_m : lists.nearest_m) {
       for (const double hfov_deg : lists.hfov_deg) {
@@ -86,7 +87,7 @@ void for_every_shape(const ShapeLists& lists, const Visit& visit) {
   }
 }
 
-// How near the closest of the computed figures is to its limit, as a part of that limit. A baseline is not computed.
+// Smallest distance of a computed value from its limit, relative to that limit. The baseline is given, not computed.
 double distance_to_limits(const PairFigures& pair, const PairRequirements& requirements) {
   const PairMargins& margins = pair.margins;
   double nearest = std::min({std::abs(margins.range_m) / requirements.range_m,
@@ -101,7 +102,7 @@ void search(const PairRequirements& requirements, PairDesign& design) {
   for_every_shape(requirements.lists, [&](const PairShape& shape) {
     const PairFigures pair = stereo_figures(shape, requirements);
     design.nearest_to_a_limit = std::min(design.nearest_to_a_limit, distance_to_limits(pair, requirements));
-    if (pair.feasible) design.feasible.push_back(figures_of(shape, requirements));
+    if (pair.feasible) design.feasible.push_back(metrics_of(shape, requirements));
   });
 }
 
@@ -117,45 +118,45 @@ double value_of(const PairFigures& pair, DesignCriterion criterion) {
   return 0;
 }
 
-// The place of each pair by one criterion, the best has 0. Values that are the same as their neighbour in size share a
-// place, so two that are the same always do.
-std::vector<std::uint32_t> places_by(DesignCriterion criterion, const std::vector<PairFigures>& pairs) {
-  std::vector<std::pair<double, std::uint32_t>> falling;
-  falling.reserve(pairs.size());
+// The rank of each pair by one criterion, 0 for the best. Values within the tolerance of their neighbour in sorted
+// order share a rank.
+std::vector<std::uint32_t> ranks_by(DesignCriterion criterion, const std::vector<PairFigures>& pairs) {
+  std::vector<std::pair<double, std::uint32_t>> descending;
+  descending.reserve(pairs.size());
   for (const PairFigures& pair : pairs) {
-    falling.emplace_back(value_of(pair, criterion), static_cast<std::uint32_t>(falling.size()));
+    descending.emplace_back(value_of(pair, criterion), static_cast<std::uint32_t>(descending.size()));
   }
-  std::sort(falling.begin(), falling.end(), std::greater<>());
-  std::vector<std::uint32_t> places(pairs.size());
-  std::uint32_t place = 0;
-  for (std::size_t i = 0; i < falling.size(); ++i) {
-    if (i > 0 && falling[i - 1].first - falling[i].first >= kSame) ++place;
-    places[falling[i].second] = place;
+  std::sort(descending.begin(), descending.end(), std::greater<>());
+  std::vector<std::uint32_t> ranks(pairs.size());
+  std::uint32_t rank = 0;
+  for (std::size_t i = 0; i < descending.size(); ++i) {
+    if (i > 0 && descending[i - 1].first - descending[i].first >= kTolerance) ++rank;
+    ranks[descending[i].second] = rank;
   }
-  return places;
+  return ranks;
 }
 
-// Puts at each place the pair that `from` names for it, in the memory that is there.
+// Moves to each position i the pair at from[i], in place.
 void permute(std::vector<PairFigures>& pairs, std::vector<std::uint32_t> from) {
   for (std::uint32_t start = 0; start < from.size(); ++start) {
     const PairFigures first = pairs[start];
-    std::uint32_t place = start;
-    while (from[place] != start) {
-      pairs[place] = pairs[from[place]];
-      place = std::exchange(from[place], place);
+    std::uint32_t position = start;
+    while (from[position] != start) {
+      pairs[position] = pairs[from[position]];
+      position = std::exchange(from[position], position);
     }
-    pairs[place] = first;
-    from[place] = place;
+    pairs[position] = first;
+    from[position] = position;
   }
 }
 
-// The best first; what is equally good stays in the order of the lists.
-void put_in_order(PairDesign& design, const std::vector<DesignCriterion>& order) {
-  std::vector<std::vector<std::uint32_t>> places;
-  places.reserve(order.size());
-  for (const DesignCriterion criterion : order) places.push_back(places_by(criterion, design.feasible));
+// Best first; equal pairs stay in the order of the lists.
+void sort_by_criteria(PairDesign& design, const std::vector<DesignCriterion>& order) {
+  std::vector<std::vector<std::uint32_t>> ranks;
+  ranks.reserve(order.size());
+  for (const DesignCriterion criterion : order) ranks.push_back(ranks_by(criterion, design.feasible));
   const auto better = [&](std::uint32_t a, std::uint32_t b) {
-    for (const auto& by_criterion : places) {
+    for (const auto& by_criterion : ranks) {
       if (by_criterion[a] != by_criterion[b]) return by_criterion[a] < by_criterion[b];
     }
     return false;
@@ -170,10 +171,10 @@ void put_in_order(PairDesign& design, const std::vector<DesignCriterion>& order)
 
 template <class Value>
 bool holds_value(const std::vector<Value>& list, Value value) {
-  return std::any_of(list.begin(), list.end(), [&](Value listed) { return std::abs(listed - value) < kSame; });
+  return std::any_of(list.begin(), list.end(), [&](Value listed) { return std::abs(listed - value) < kTolerance; });
 }
 
-bool on_offer(const PairShape& shape, const ShapeLists& lists) {
+bool is_candidate(const PairShape& shape, const CandidateLists& lists) {
   return holds_value(lists.baselines_m, shape.baseline_m) && holds_value(lists.nearest_m, shape.nearest_m) &&
          holds_value(lists.hfov_deg, shape.hfov_deg) && holds_value(lists.pixel_sizes_um, shape.pixel_size_um) &&
          holds_value(lists.widths_px, shape.width_px);
@@ -183,7 +184,7 @@ PairDesign design_pair(const PairRequirements& requirements) {
   PairDesign design;
   design.combinations = requirements.lists.combinations();
   search(requirements, design);
-  put_in_order(design, requirements.order);
+  sort_by_criteria(design, requirements.order);
   if (requirements.pans && requirements.pans->angles_deg.size() > 1) {
     const auto overlaps = [](const PairFigures& pair) { return pair.with_pan_overlap; };
     design.with_pan_overlap_count = std::count_if(design.feasible.begin(), design.feasible.end(), overlaps);
@@ -191,13 +192,13 @@ PairDesign design_pair(const PairRequirements& requirements) {
     if (best != design.feasible.end()) design.best_with_pan_overlap = *best;
   }
   if (requirements.published) {
-    design.published = published_figures(requirements);
-    design.published_on_offer = on_offer(requirements.published->shape, requirements.lists);
+    design.published = published_metrics(requirements);
+    design.published_on_offer = is_candidate(requirements.published->shape, requirements.lists);
   }
   return design;
 }
 
-// Whether there is ground that both of its eyes see.
+// Whether both cameras of the pair see common ground.
 bool shares_ground(const PairFigures& pair, const PairRequirements& requirements) {
   return !common_footprint(ground_view(pair, requirements), 0).empty();
 }
@@ -209,14 +210,14 @@ const PairFigures* PairDesign::chosen() const {
   return best_with_pan_overlap ? &*best_with_pan_overlap : best();
 }
 
-PairFigures figures_of(const PairShape& shape, const PairRequirements& requirements) {
+PairFigures metrics_of(const PairShape& shape, const PairRequirements& requirements) {
   PairFigures pair = stereo_figures(shape, requirements);
   const double vfov_deg = square_pixel_view_deg(shape.hfov_deg, requirements.rows_per_column);
   add_view(pair, vfov_deg, tilt_for_range_deg(vfov_deg, requirements), requirements);
   return pair;
 }
 
-PairFigures published_figures(const PairRequirements& requirements) {
+PairFigures published_metrics(const PairRequirements& requirements) {
   const PublishedPair& published = requirements.published.value();
   PairFigures pair = stereo_figures(published.shape, requirements);
   const double vfov_deg = published.vfov_deg.value_or(
@@ -244,7 +245,7 @@ RigDesign design_rig(const RigRequirements& requirements) {
   const PairFigures* wide = design.wide.chosen();
   const PairFigures* narrow = design.narrow ? design.narrow->chosen() : nullptr;
   if (wide && requirements.wide.pans) {
-    design.pans = pan_figures(ground_view(*wide, requirements.wide), *requirements.wide.pans);
+    design.pans = pan_coverage(ground_view(*wide, requirements.wide), *requirements.wide.pans);
   }
   if (wide && narrow) {
     const bool both_see = shares_ground(*wide, requirements.wide) && shares_ground(*narrow, *requirements.narrow);

@@ -52,7 +52,7 @@ Whole whole(const PairShape& s) {
           rounded(100 * s.pixel_size_um)};
 }
 
-// The same limits in other words, with whole numbers of centimetres and in long double: no root, no arc tangent.
+// The same limits in another form, with integers in centimetres and in long double, without roots and arc tangents.
 // Resolution: r b w ≥ 2 c L² tan(F/2). Stereo angle: b/2 ≤ d tan(7.5°). Search range φ ≤ F/4: b/2 ≤ d tan(F/8).
 std::set<Whole> feasible_by_tangents() {
   const long double degree = std::numbers::pi_v<long double> / 180;
@@ -84,7 +84,7 @@ TEST(RigDesigner, FindsTheFeasibleSetOfThePublishedLists) {
   for (const PairFigures& pair : wide.feasible) found.insert(whole(pair.shape));
   EXPECT_EQ(found, feasible_by_tangents());
   EXPECT_TRUE(found.contains({20, 10, 50, 1120, 550})) << "the published pair";
-  EXPECT_GT(wide.nearest_to_a_limit, 1e-6) << "no figure lies so near to its limit that rounding could decide";
+  EXPECT_GT(wide.nearest_to_a_limit, 1e-6) << "no value is so close to its limit that rounding matters";
 }
 
 TEST(RigDesigner, ReproducesThePublishedWidePair) {
@@ -101,25 +101,25 @@ TEST(RigDesigner, ReproducesThePublishedWidePair) {
   EXPECT_NEAR(pair.pan_overlap_percent, 30, 1e-9);
   EXPECT_NEAR(pair.margins.range_m, pair.range_m - 4, 1e-12);
   EXPECT_NEAR(pair.margins.baseline_m, 0.1, 1e-12);
-  // The rule for tilts finds the published one.
-  EXPECT_EQ(figures_of(pair.shape, rover().wide).tilt_deg, 39);
+  // The tilt rule yields the published tilt.
+  EXPECT_EQ(metrics_of(pair.shape, rover().wide).tilt_deg, 39);
 }
 
 TEST(RigDesigner, ReproducesThePublishedNarrowPair) {
   ASSERT_TRUE(rover_design().narrow && rover_design().narrow->published);
   const PairFigures& pair = *rover_design().narrow->published;
-  EXPECT_FALSE(pair.feasible) << "2 cm hold to 1.99 m only";
+  EXPECT_FALSE(pair.feasible) << "a resolution of 2 cm only up to 1.99 m";
   EXPECT_NEAR(pair.range_m, 1.99, 0.005);
   EXPECT_NEAR(pair.view_near_m, 0.200, 0.0005);
   EXPECT_NEAR(pair.view_far_m, 2.516, 0.0005);
   EXPECT_NEAR(rover_design().view_overlap_m.value(), 2.03, 0.005);
   EXPECT_EQ(rover_design().narrow->with_pan_overlap_count, std::nullopt);
-  RigRequirements unsaid = rover();
-  unsaid.narrow->published->tilt_deg.reset();
-  EXPECT_EQ(published_figures(*unsaid.narrow).tilt_deg, 31.55) << "the rule for tilts finds the published one";
+  RigRequirements without_tilt = rover();
+  without_tilt.narrow->published->tilt_deg.reset();
+  EXPECT_EQ(published_metrics(*without_tilt.narrow).tilt_deg, 31.55) << "the tilt rule yields the published tilt";
 }
 
-TEST(RigDesigner, PutsTheBestFirst) {
+TEST(RigDesigner, SortsTheBestFirst) {
   const PairDesign& wide = rover_design().wide;
   for (std::size_t i = 1; i < wide.feasible.size(); ++i) {
     const PairFigures &better = wide.feasible[i - 1], &worse = wide.feasible[i];
@@ -129,7 +129,7 @@ TEST(RigDesigner, PutsTheBestFirst) {
     ASSERT_GE(better.pan_overlap_percent, worse.pan_overlap_percent - 1e-8);
     ASSERT_LE(better.shape.baseline_m, worse.shape.baseline_m);
   }
-  // The largest b w / tan(F/2) of all that are feasible, by another loop.
+  // The largest b w / tan(F/2) of the feasible set, by an independent loop.
   double largest = 0;
   for (const auto& [b, d, f, w, s] : feasible_by_tangents()) {
     largest = std::max(largest, b * w / std::tan(f * std::numbers::pi / 360));
@@ -146,8 +146,8 @@ TEST(RigDesigner, PutsTheBestFirst) {
   }
 }
 
-// 0.15 m · 1040 px and 0.20 m · 780 px reach equally far; then the shorter baseline counts, whatever was listed first.
-TEST(RigDesigner, WhatIsEqualIsDecidedByWhatComesNext) {
+// 0.15 m · 1040 px and 0.20 m · 780 px have the same range; then the shorter baseline decides, not the list order.
+TEST(RigDesigner, EqualValuesAreDecidedByTheNextCriterion) {
   const auto lists = [](RigRequirements& r) {
     r.wide.lists = {{0.20, 0.15}, {1.5}, {45, 50}, {5.5}, {780, 1040}};
     r.wide.range_m = 3;
@@ -156,8 +156,10 @@ TEST(RigDesigner, WhatIsEqualIsDecidedByWhatComesNext) {
   std::vector<Whole> order;
   order.reserve(design.wide.feasible.size());
   for (const PairFigures& pair : design.wide.feasible) order.push_back(whole(pair.shape));
-  const auto place = [&](const Whole& shape) { return std::find(order.begin(), order.end(), shape) - order.begin(); };
-  EXPECT_EQ(place({15, 15, 45, 1040, 550}) + 1, place({20, 15, 45, 780, 550}));
+  const auto position = [&](const Whole& shape) {
+    return std::find(order.begin(), order.end(), shape) - order.begin();
+  };
+  EXPECT_EQ(position({15, 15, 45, 1040, 550}) + 1, position({20, 15, 45, 780, 550}));
   const RigDesign by_overlap = design_after([&](RigRequirements& r) {
     lists(r);
     r.wide.order = {DesignCriterion::pan_overlap, DesignCriterion::shorter_baseline, DesignCriterion::range_margin};
@@ -165,7 +167,7 @@ TEST(RigDesigner, WhatIsEqualIsDecidedByWhatComesNext) {
   EXPECT_EQ(whole(by_overlap.wide.best()->shape), (Whole{15, 15, 50, 1040, 550}));
 }
 
-// Two values next to a multiple of 1e-9, one to either side, are the same; so are the ends of a chain of them.
+// Values to either side of a multiple of 1e-9 are equal; so are the ends of a chain of such values.
 TEST(RigDesigner, ValuesThatDifferByLessThanOneInABillionAreEqual) {
   const RigDesign design = design_after([](RigRequirements& r) {
     r.wide.lists = {{0.2, 0.2000000005 - 1e-13, 0.2000000005 + 1e-13, 0.2000000011, 0.21}, {1.5}, {45}, {5.5}, {1120}};
@@ -178,7 +180,7 @@ TEST(RigDesigner, ValuesThatDifferByLessThanOneInABillionAreEqual) {
   EXPECT_EQ(design.wide.feasible.back().shape.baseline_m, 0.21);
 }
 
-TEST(RigDesigner, WhatLiesOnALimitPassesAndIsSaid) {
+TEST(RigDesigner, ValuesOnALimitPassWithAWarning) {
   const RigDesign design = design_after([](RigRequirements& r) {
     r.wide.lists = {{0.2}, {1}, {60}, {5.5}, {1120}};
     r.wide.range_m = r.wide.height_m = 1;
@@ -191,7 +193,7 @@ TEST(RigDesigner, WhatLiesOnALimitPassesAndIsSaid) {
   EXPECT_EQ(find_warning(rover_design(), "on_a_limit"), nullptr);
 }
 
-TEST(RigDesigner, WarnsOfEveryTensionOfThePublishedNumbers) {
+TEST(RigDesigner, WarnsOfAllInconsistenciesOfThePublishedRig) {
   const RigDesign& design = rover_design();
   expect_warning(design, "not_unique", 12591, 0);
   EXPECT_NE(find_warning(design, "not_unique")->text.find("8875 of them with enough overlap"), std::string::npos);
@@ -210,14 +212,14 @@ TEST(RigDesigner, WarnsOfEveryTensionOfThePublishedNumbers) {
   expect_warning(design, "largest_disparity", 185, 0.5);
   expect_warning(design, "focal_length_misfit", 3.65, 0.005);
   expect_warning(design, "vertical_view_misfit", 51.9, 0.05);
-  EXPECT_EQ(design.warnings.size(), 16u) << "and of nothing else";
+  EXPECT_EQ(design.warnings.size(), 16u) << "and no others";
   EXPECT_EQ(find_warning(design, "azimuth_far")->pair, "wide");
   EXPECT_EQ(find_warning(design, "range_short")->pair, "narrow");
 }
 
-// What is mended is no longer told.
+// Corrected requirements no longer cause warnings.
 TEST(RigDesigner, WarningsFollowTheRequirements) {
-  const RigDesign mended = design_after([](RigRequirements& r) {
+  const RigDesign consistent = design_after([](RigRequirements& r) {
     r.wide.contradicting_stereo_angle_deg.reset();
     r.wide.pans->azimuth_deg = 110;
     r.narrow->disparity_accuracy_px = 0.18;
@@ -229,7 +231,7 @@ TEST(RigDesigner, WarningsFollowTheRequirements) {
   for (const char* id :
        {"stereo_angle_limits_disagree", "azimuth_far", "azimuth_far_stereo", "azimuth_held_to", "range_short",
         "accuracy_needed", "width_needed", "nearest_row", "focal_length_misfit", "vertical_view_misfit"}) {
-    EXPECT_EQ(find_warning(mended, id), nullptr) << id;
+    EXPECT_EQ(find_warning(consistent, id), nullptr) << id;
   }
   const RigDesign stereo_only = design_after([](RigRequirements& r) { r.wide.pans->azimuth_deg = 115; });
   EXPECT_EQ(find_warning(stereo_only, "azimuth_far"), nullptr);
@@ -237,19 +239,19 @@ TEST(RigDesigner, WarningsFollowTheRequirements) {
   const RigDesign binding = design_after([](RigRequirements& r) { r.wide.smallest_baseline_m = 0.2; });
   EXPECT_EQ(find_warning(binding, "baseline_limit_never_binds"), nullptr);
   EXPECT_LT(binding.wide.feasible.size(), 12592u);
-  const RigDesign broken = design_after([](RigRequirements& r) {
+  const RigDesign infeasible = design_after([](RigRequirements& r) {
     r.wide.published->shape = {0.35, 0.6, 45, 5.5, 1120};
     r.wide.pans->angles_deg = {-50, 0, 50};
     r.wide.smallest_baseline_m = 0.4;
   });
   for (const char* id : {"nothing_feasible", "stereo_angle_large", "search_large", "baseline_short", "pan_overlap"}) {
-    EXPECT_NE(find_warning(broken, id), nullptr) << id;
+    EXPECT_NE(find_warning(infeasible, id), nullptr) << id;
   }
-  EXPECT_FALSE(broken.wide.published_on_offer);
-  EXPECT_EQ(broken.wide.best(), nullptr);
+  EXPECT_FALSE(infeasible.wide.published_on_offer);
+  EXPECT_EQ(infeasible.wide.best(), nullptr);
 }
 
-TEST(RigDesigner, OnOfferIsWhatEveryListHolds) {
+TEST(RigDesigner, CandidatesAreInEveryList) {
   const PairShape published = rover().wide.published->shape;
   PairShape others[] = {published, published, published, published, published};
   others[0].baseline_m = 0.205;
@@ -266,21 +268,21 @@ TEST(RigDesigner, OnOfferIsWhatEveryListHolds) {
   }
 }
 
-// The published tilt is taken, not that of the rule; straight down is the lowest that a row can look.
-TEST(RigDesigner, ThePublishedTiltIsLookedAlong) {
+// The published tilt is used, not that of the rule; the nearest ground is straight down.
+TEST(RigDesigner, PublishedTiltIsUsed) {
   const RigDesign steep = design_after([](RigRequirements& r) { r.narrow->published->tilt_deg = 70; });
   const PairFigures& narrow = *steep.narrow->published;
   EXPECT_EQ(narrow.tilt_deg, 70);
   EXPECT_NEAR(narrow.view_far_m, 0.3 / std::tan((70 - 49.5 / 2) * std::numbers::pi / 180), 1e-9);
-  EXPECT_LT(narrow.view_near_m, 0) << "behind the eyes";
+  EXPECT_LT(narrow.view_near_m, 0) << "behind the cameras";
   expect_warning(steep, "nearest_row", 0.3, 1e-12);
-  // It no longer reaches the ground of the wide pair.
+  // Its view no longer overlaps that of the wide pair.
   EXPECT_EQ(steep.view_overlap_m, 0.0);
   EXPECT_NE(find_warning(steep, "views_apart"), nullptr);
   EXPECT_EQ(find_warning(rover_design(), "views_apart"), nullptr);
 }
 
-TEST(RigDesigner, PansAllRoundAndTooFew) {
+TEST(RigDesigner, PansOfAFullCircleAndTooFew) {
   const RigDesign round = design_after([](RigRequirements& r) {
     r.wide.pans->angles_deg = {-180, -150, -120, -90, -60, -30, 0, 30, 60, 90, 120, 150};
     r.wide.pans->azimuth_deg = 360;
@@ -290,11 +292,11 @@ TEST(RigDesigner, PansAllRoundAndTooFew) {
   const RigDesign few = design_after([](RigRequirements& r) { r.wide.pans->azimuth_deg = 200; });
   EXPECT_FALSE(few.pans->azimuth_held);
   const RigDesign uneven = design_after([](RigRequirements& r) { r.wide.pans->angles_deg = {-35, 0, 20}; });
-  EXPECT_NEAR(uneven.pans->overlap->percent(), 30, 1e-9) << "by the widest step";
+  EXPECT_NEAR(uneven.pans->overlap->percent(), 30, 1e-9) << "of the widest step";
 }
 
-// Parts of the limits: overlap of 30 % in place of 25 % is nearest, by 5 of 100.
-TEST(RigDesigner, TheNearestLimitIsThatOfTheOverlap) {
+// Relative to the limits the overlap is nearest: 30 % instead of 25 %, by 5 of 100.
+TEST(RigDesigner, NearestLimitIsTheOverlap) {
   const RigDesign design = design_after([](RigRequirements& r) {
     r.wide.lists = {{0.2}, {1}, {50}, {5.5}, {1120}};
     r.wide.range_m = 3;
@@ -302,7 +304,7 @@ TEST(RigDesigner, TheNearestLimitIsThatOfTheOverlap) {
   EXPECT_NEAR(design.wide.nearest_to_a_limit, 0.05, 1e-9);
 }
 
-TEST(RigDesigner, WithoutAPublishedPairTheBestIsLookedAt) {
+TEST(RigDesigner, WithoutAPublishedPairTheBestIsSelected) {
   const RigDesign design = design_after([](RigRequirements& r) {
     r.wide.published.reset();
     r.narrow.reset();
@@ -319,20 +321,20 @@ TEST(RigDesigner, WithoutAPublishedPairTheBestIsLookedAt) {
   EXPECT_NEAR(one_pan.pans->azimuth_far.width_deg(), 2 * 23.54, 0.01);
 }
 
-// Eyes 20 m apart: every figure is one, every text is words.
-TEST(RigDesigner, EyesThatShareNothingAreSaidInWords) {
+// A baseline of 20 m: all values stay finite.
+TEST(RigDesigner, PairsWithoutCommonGround) {
   const RigDesign design = design_after([](RigRequirements& r) { r.wide.published->shape.baseline_m = 20; });
   EXPECT_TRUE(design.pans->azimuth_far_stereo.empty());
   EXPECT_FALSE(design.pans->azimuth_held);
   EXPECT_FALSE(design.pans->far_overlap_stereo);
-  EXPECT_EQ(design.view_overlap_m, 0) << "nothing that the wide pair sees";
+  EXPECT_EQ(design.view_overlap_m, 0) << "the wide pair sees no common ground";
   expect_warning(design, "azimuth_far_stereo", 0, 0);
   expect_warning(design, "azimuth_held_to", 0, 0);
   EXPECT_EQ(find_warning(design, "pan_overlap_far_stereo"), nullptr);
   EXPECT_NE(find_warning(design, "views_apart"), nullptr);
 }
 
-RC_GTEST_PROP(RigDesigner, NoWarningIsWithoutAFigure, ()) {
+RC_GTEST_PROP(RigDesigner, WarningsHaveFiniteValues, ()) {
   const auto one_of = [](std::initializer_list<double> values) { return *rc::gen::elementOf(std::vector(values)); };
   RigRequirements r = rover();
   r.wide.lists = r.narrow->lists = {{0.1, 0.2}, {1}, {50}, {5.5}, {1120}};
@@ -350,7 +352,7 @@ RC_GTEST_PROP(RigDesigner, NoWarningIsWithoutAFigure, ()) {
   }
 }
 
-// Every candidate's tilt lets the top row reach the range, and one step more would not.
+// At the tilt of each candidate the top row reaches the range; one step more, and it would not.
 TEST(RigDesigner, TiltsReachTheRange) {
   for (const PairFigures& pair : rover_design().wide.feasible) {
     ASSERT_GE(pair.view_far_m, 4);

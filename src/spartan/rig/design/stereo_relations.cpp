@@ -17,22 +17,22 @@ double vertical_view_rad(double hfov_rad, double rows_per_column) {
   return 2 * std::atan(rows_per_column * std::tan(hfov_rad / 2));
 }
 
-double range_resolution_m(const StereoShape& shape, double disparity_px, double depth_m) {
-  return depth_m * depth_m * disparity_px / (focal_length_px(shape.width_px, shape.hfov_rad) * shape.baseline_m);
+double range_resolution_m(const StereoGeometry& pair, double disparity_px, double depth_m) {
+  return depth_m * depth_m * disparity_px / (focal_length_px(pair.width_px, pair.hfov_rad) * pair.baseline_m);
 }
 
-double reach_m(const StereoShape& shape, const DepthAccuracy& accuracy) {
-  return std::sqrt(0.5 * accuracy.resolution_m * (shape.baseline_m * shape.width_px) /
-                   (accuracy.disparity_px * std::tan(shape.hfov_rad / 2)));
+double max_range_m(const StereoGeometry& pair, const DepthAccuracy& accuracy) {
+  return std::sqrt(0.5 * accuracy.resolution_m * (pair.baseline_m * pair.width_px) /
+                   (accuracy.disparity_px * std::tan(pair.hfov_rad / 2)));
 }
 
-double accuracy_for_reach_px(const StereoShape& shape, double resolution_m, double range_m) {
-  return resolution_m * focal_length_px(shape.width_px, shape.hfov_rad) * shape.baseline_m / (range_m * range_m);
+double accuracy_for_range_px(const StereoGeometry& pair, double resolution_m, double range_m) {
+  return resolution_m * focal_length_px(pair.width_px, pair.hfov_rad) * pair.baseline_m / (range_m * range_m);
 }
 
-double width_for_reach_px(const StereoShape& shape, const DepthAccuracy& accuracy, double range_m) {
-  return 2 * accuracy.disparity_px * range_m * range_m * std::tan(shape.hfov_rad / 2) /
-         (accuracy.resolution_m * shape.baseline_m);
+double width_for_range_px(const StereoGeometry& pair, const DepthAccuracy& accuracy, double range_m) {
+  return 2 * accuracy.disparity_px * range_m * range_m * std::tan(pair.hfov_rad / 2) /
+         (accuracy.resolution_m * pair.baseline_m);
 }
 
 double stereo_angle_rad(double baseline_m, double nearest_m) {
@@ -43,8 +43,8 @@ double search_percent(double stereo_angle_rad, double hfov_rad) {
   return 100 * stereo_angle_rad / hfov_rad;
 }
 
-double disparity_px(const StereoShape& shape, double depth_m) {
-  return focal_length_px(shape.width_px, shape.hfov_rad) * shape.baseline_m / depth_m;
+double disparity_px(const StereoGeometry& pair, double depth_m) {
+  return focal_length_px(pair.width_px, pair.hfov_rad) * pair.baseline_m / depth_m;
 }
 
 double ground_ahead_m(double height_m, double depression_rad) {

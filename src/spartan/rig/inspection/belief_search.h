@@ -1,4 +1,4 @@
-// Which meaning of a calibration its pictures agree with.
+// Search for the calibration hypothesis that explains the matches of an image pair.
 #pragma once
 
 #include <vector>
@@ -8,37 +8,36 @@
 
 namespace spartan {
 
-/// A belief fitted to the pictures.
-struct BelievedPair {
-  PairBelief belief;
-  std::vector<PixelMatch> matches;  ///< exchanged where the pictures are
-  PairFit fit;                      ///< of everything that the belief leaves open
-  bool good_rows = false;           ///< without the corrections of the fit
-  bool as_it_is = false;            ///< the rows agree as well without the corrections of the fit
-  double cost = 0;                  ///< of the rows as they are, or corrected and then so much a match
-  int lost = 0;                     ///< matches that cost as much as one can
-  double wrong_side = 0;            ///< share of the inliers whose disparity is negative with at most a small yaw
-  bool agrees = false;              ///< most rows do, on the right side
-  /// They agree, and nothing about it is far-fetched. Where not, no mistake that is known here explains the
-  /// pictures.
-  bool explains = false;
-  bool eyes_told = true;  ///< false: two equal eyes; an inverted transform and exchanged eyes are the same thing
-  bool size_told = true;  ///< false: the other eye's size, the other way round, makes the rows agree as well
-  /// Mean row difference of the inliers, px: with the calibration as given (the right eye on the right; NaN where it
-  /// has no lines of sight), and with the belief, corrected where it is not `as_it_is`.
-  double rows_given_px = 0, rows_px = 0;
+/// A hypothesis with its small correction estimated from the matches.
+struct FittedHypothesis {
+  PairHypothesis hypothesis;
+  std::vector<PixelMatch> matches;  ///< left and right as the hypothesis assigns the images
+  PairFit fit;                      ///< of the parameters that the hypothesis leaves free
+  bool rows_good = false;           ///< the rows are good without the correction of the fit
+  bool uncorrected = false;         ///< the rows agree as well without the correction of the fit
+  double cost = 0;                  ///< of the uncorrected rows, or of the corrected rows with a penalty per match
+  int saturated = 0;                ///< matches of maximum row cost: outliers under this hypothesis
+  double negative_share = 0;        ///< share of the inliers with negative disparity, at most a small yaw applied
+  bool consistent = false;          ///< most rows agree, with positive disparities
+  /// Consistent, and the correction is within the limits of the prior. Where not, no known error explains the images.
+  bool accepted = false;
+  bool sides_unambiguous = true;  ///< false: equal cameras; an inverse transform and swapped cameras are equivalent
+  bool size_unambiguous = true;   ///< false: the inverse size factor on the other camera fits as well
+  /// Mean absolute row error of the inliers, px: with the calibration as given (the right camera on the right; NaN
+  /// where its models cannot unproject the matches), and with the hypothesis, corrected unless `uncorrected`.
+  double nominal_rows_px = 0, rows_px = 0;
 };
 
-/// Tries the calibration as given (with sizes brought to those of the pictures where these are known); where rows or
-/// signs disagree, the transform inverted, eyes, lenses or pictures exchanged, focal lengths of another picture size
-/// for one eye or both, pinholes that bend, and rows moved where no ordinary correction does. All are fitted to the
-/// same matches; the cheapest counts where it costs clearly less than a simpler one. A belief with which the rows agree
-/// as they are is simpler than one that needs corrections: those cost kCorrected a match. Disparities are positive: a
-/// belief that makes most of them negative is out.
-/// `calibrated`: false where the lenses are a guess, of which no size can be wrong.
-BelievedPair believe_pair(const Camera& left, const Camera& right, const Pose& left_from_right,
-                          const std::vector<PixelMatch>& matches, ImageSize picture, bool calibrated = true);
+/// Greedy hypothesis search. Starts with the calibration as given (scaled to the image size where that is known). While
+/// rows or signs of disparities disagree, it tries one further error at a time: inverse transform, swapped cameras,
+/// camera models or images, focal lengths of another image size for one or both cameras, missing radial distortion, and
+/// a vertical shift where no typical correction suffices. All hypotheses are fitted to the same matches. The cheapest
+/// one replaces a simpler one where its cost is clearly lower; a correction costs a fixed penalty per match, so that a
+/// hypothesis whose rows agree uncorrected counts as simpler. A hypothesis under which most disparities are negative is
+/// rejected. `calibrated`: false where the camera models are guessed; then sizes are not tested.
+FittedHypothesis find_hypothesis(const Camera& left, const Camera& right, const Pose& left_from_right,
+                                 const std::vector<PixelMatch>& matches, ImageSize image_size, bool calibrated = true);
 
-PairFitOptions fit_options(const PairBelief& belief);
+PairFitOptions fit_options(const PairHypothesis& hypothesis);
 
 }  // namespace spartan

@@ -10,102 +10,107 @@
 namespace spartan {
 namespace {
 
-void bring_to_size(Camera& camera, ImageSize picture) {
-  if (picture.empty() || camera.size == picture) return;
-  if (const auto factor = size_factor(camera.size, picture)) camera.model = resized(camera.model, *factor);
-  camera.size = picture;
+void scale_to_size(Camera& camera, ImageSize image_size) {
+  if (image_size.empty() || camera.size == image_size) return;
+  if (const auto factor = size_factor(camera.size, image_size)) camera.model = resized(camera.model, *factor);
+  camera.size = image_size;
 }
 
 }  // namespace
 
-PairBelief belief_as_given(const Camera& left, const Camera& right, const Pose& left_from_right, ImageSize picture) {
-  PairBelief belief;
-  belief.left = left;
-  belief.right = right;
-  belief.left_from_right = left_from_right;
-  bring_to_size(belief.left, picture);
-  bring_to_size(belief.right, picture);
-  return belief;
+PairHypothesis nominal_hypothesis(const Camera& left, const Camera& right, const Pose& left_from_right,
+                                  ImageSize image_size) {
+  PairHypothesis hypothesis;
+  hypothesis.left = left;
+  hypothesis.right = right;
+  hypothesis.left_from_right = left_from_right;
+  scale_to_size(hypothesis.left, image_size);
+  scale_to_size(hypothesis.right, image_size);
+  return hypothesis;
 }
 
-PairBelief with_eyes_in_place(PairBelief belief) {
-  belief.inverted = belief.left_from_right.translation().x() < 0;
-  if (belief.inverted) belief.left_from_right = belief.left_from_right.inverse();
-  return belief;
+PairHypothesis with_right_camera_on_right(PairHypothesis hypothesis) {
+  hypothesis.inverted = hypothesis.left_from_right.translation().x() < 0;
+  if (hypothesis.inverted) hypothesis.left_from_right = hypothesis.left_from_right.inverse();
+  return hypothesis;
 }
 
-PairBelief with_other_eyes(PairBelief belief) {
-  if (belief.inverted || belief.eyes_exchanged) {
-    std::swap(belief.left, belief.right);
-    std::swap(belief.inverted, belief.eyes_exchanged);
+PairHypothesis with_cameras_swapped(PairHypothesis hypothesis) {
+  if (hypothesis.inverted || hypothesis.cameras_swapped) {
+    std::swap(hypothesis.left, hypothesis.right);
+    std::swap(hypothesis.inverted, hypothesis.cameras_swapped);
   } else {
-    std::swap(belief.left.model, belief.right.model);
-    std::swap(belief.left.size, belief.right.size);
-    belief.lenses_exchanged = !belief.lenses_exchanged;
+    std::swap(hypothesis.left.model, hypothesis.right.model);
+    std::swap(hypothesis.left.size, hypothesis.right.size);
+    hypothesis.lenses_swapped = !hypothesis.lenses_swapped;
   }
-  std::swap(belief.size.left, belief.size.right);
-  std::swap(belief.left_bends, belief.right_bends);
-  return belief;
+  std::swap(hypothesis.size.left, hypothesis.size.right);
+  std::swap(hypothesis.fit_left_radial, hypothesis.fit_right_radial);
+  return hypothesis;
 }
 
-PairBelief with_other_pictures(PairBelief belief) {
-  belief.pictures_exchanged = !belief.pictures_exchanged;
-  return belief;
+PairHypothesis with_images_swapped(PairHypothesis hypothesis) {
+  hypothesis.images_swapped = !hypothesis.images_swapped;
+  return hypothesis;
 }
 
-std::vector<PixelMatch> as_believed(const PairBelief& belief, const std::vector<PixelMatch>& matches) {
-  std::vector<PixelMatch> seen = matches;
-  if (belief.pictures_exchanged) {
-    for (PixelMatch& match : seen) std::swap(match.left, match.right);
+std::vector<PixelMatch> matches_under_hypothesis(const PairHypothesis& hypothesis,
+                                                 const std::vector<PixelMatch>& matches) {
+  std::vector<PixelMatch> oriented = matches;
+  if (hypothesis.images_swapped) {
+    for (PixelMatch& match : oriented) std::swap(match.left, match.right);
   }
-  return seen;
+  return oriented;
 }
 
-PairBelief with_rows_as_given(PairBelief belief) {
-  if (belief.rows_lower_px != 0) belief.right.model = with_rows_lower(belief.right.model, -belief.rows_lower_px);
-  belief.rows_lower_px = 0;
-  return belief;
+PairHypothesis without_row_shift(PairHypothesis hypothesis) {
+  if (hypothesis.row_shift_px != 0)
+    hypothesis.right.model = with_rows_lower(hypothesis.right.model, -hypothesis.row_shift_px);
+  hypothesis.row_shift_px = 0;
+  return hypothesis;
 }
 
-PairBelief with_rows_moved(PairBelief belief, const std::vector<PixelMatch>& matches) {
-  constexpr int kRounds = 4;  // rows of the rectified view are nearly those of the picture
-  const std::vector<PixelMatch> seen = as_believed(belief, matches);
-  belief = with_rows_as_given(std::move(belief));
-  double lower_px = 0;
-  PairBelief moved = belief;
+PairHypothesis with_row_shift(PairHypothesis hypothesis, const std::vector<PixelMatch>& matches) {
+  // Fixed-point iteration: a row of the rectified view is nearly a row of the image, so a few rounds suffice.
+  constexpr int kRounds = 4;
+  const std::vector<PixelMatch> oriented = matches_under_hypothesis(hypothesis, matches);
+  hypothesis = without_row_shift(std::move(hypothesis));
+  double shift_px = 0;
+  PairHypothesis shifted = hypothesis;
   for (int round = 0; round < kRounds; ++round) {
-    const RectifiedMatches rows = rectify_matches(moved.left.model, moved.right.model, moved.left_from_right, seen);
-    const double higher_px = row_errors(rows.row_error_px).median_px;
-    if (!std::isfinite(higher_px)) return belief;
-    lower_px -= higher_px;
-    moved.right.model = with_rows_lower(belief.right.model, lower_px);
+    const RectifiedMatches rows =
+        rectify_matches(shifted.left.model, shifted.right.model, shifted.left_from_right, oriented);
+    const double median_px = row_errors(rows.row_error_px).median_px;
+    if (!std::isfinite(median_px)) return hypothesis;
+    shift_px -= median_px;
+    shifted.right.model = with_rows_lower(hypothesis.right.model, shift_px);
   }
-  moved.rows_lower_px = lower_px;
-  return moved;
+  shifted.row_shift_px = shift_px;
+  return shifted;
 }
 
-PairBelief with_size(PairBelief belief, const SizeChange& size, const std::vector<PixelMatch>& matches) {
-  const bool moved = belief.rows_lower_px != 0;
-  belief = with_rows_as_given(std::move(belief));
-  belief.size = size;
-  const auto change = size.centre_too ? resized : with_focal_times;
-  if (size.left) belief.left.model = change(belief.left.model, size.factor);
-  if (size.right) belief.right.model = change(belief.right.model, size.factor);
-  return moved ? with_rows_moved(std::move(belief), matches) : belief;
+PairHypothesis with_size(PairHypothesis hypothesis, const SizeChange& size, const std::vector<PixelMatch>& matches) {
+  const bool shifted = hypothesis.row_shift_px != 0;
+  hypothesis = without_row_shift(std::move(hypothesis));
+  hypothesis.size = size;
+  const auto change = size.scale_centre ? resized : with_focal_times;
+  if (size.left) hypothesis.left.model = change(hypothesis.left.model, size.factor);
+  if (size.right) hypothesis.right.model = change(hypothesis.right.model, size.factor);
+  return shifted ? with_row_shift(std::move(hypothesis), matches) : hypothesis;
 }
 
-std::vector<PairBelief> with_square_eyes(const PairBelief& belief, AspectDoubt least) {
-  std::vector<PairBelief> beliefs;
+std::vector<PairHypothesis> square_pixel_hypotheses(const PairHypothesis& hypothesis, AspectDeviation least) {
+  std::vector<PairHypothesis> hypotheses;
   for (const bool by_x : {true, false}) {
-    PairBelief square = belief;
+    PairHypothesis square = hypothesis;
     for (Camera* camera : {&square.left, &square.right}) {
-      if (doubt_of_aspect(*camera) < least) continue;
+      if (aspect_deviation(*camera) < least) continue;
       camera->model = with_square_pixels(camera->model, by_x);
-      square.stated_size = true;
+      square.size_from_plausibility = true;
     }
-    if (square.stated_size && !belief.stated_size) beliefs.push_back(std::move(square));
+    if (square.size_from_plausibility && !hypothesis.size_from_plausibility) hypotheses.push_back(std::move(square));
   }
-  return beliefs;
+  return hypotheses;
 }
 
 }  // namespace spartan

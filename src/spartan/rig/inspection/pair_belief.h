@@ -1,4 +1,4 @@
-// What a calibration that does not fit its pictures may really mean, one mistake at a time.
+// Hypotheses about a stereo calibration that does not fit its images, one calibration error at a time.
 #pragma once
 
 #include <vector>
@@ -9,55 +9,60 @@
 
 namespace spartan {
 
-/// A calibration of pictures of another size: focal lengths, and the centre too or not, times a factor.
+/// Corrects a calibration made for another image size: scales the focal lengths, and with `scale_centre` the principal
+/// point too.
 struct SizeChange {
-  bool left = false, right = false;  ///< the eyes it is of
-  bool centre_too = false;
+  bool left = false, right = false;  ///< cameras to which it applies
+  bool scale_centre = false;
   double factor = 1;
   bool any() const { return left || right; }
 };
 
-/// A pair as it may really be: the calibration with its mistakes taken out.
-struct PairBelief {
+/// A stereo calibration with assumed errors removed.
+struct PairHypothesis {
   Camera left, right;
   Pose left_from_right;
-  bool inverted = false;            ///< the transform is the inverse of what it should be
-  bool eyes_exchanged = false;      ///< what the rig calls left stands on the right
-  bool lenses_exchanged = false;    ///< the eyes have each other's lenses
-  bool pictures_exchanged = false;  ///< the picture given as the left one was taken by the right eye
-  bool stated_size = false;         ///< put right where the calibration's own numbers look wrong (find_doubts)
-  SizeChange size;                  ///< found by the pictures
-  double rows_lower_px = 0;         ///< the right picture shows everything so much lower than the calibration says
-  bool left_bends = false, right_bends = false;  ///< a pinhole that is none: its distortion is fitted too
+  bool inverted = false;                ///< the given transform is the inverse of the correct one
+  bool cameras_swapped = false;         ///< the camera that the rig calls left is the right one
+  bool lenses_swapped = false;          ///< each camera has the camera model of the other one
+  bool images_swapped = false;          ///< the first image was taken by the right camera
+  bool size_from_plausibility = false;  ///< corrected because the calibration's own numbers are implausible
+  SizeChange size;                      ///< estimated from the images
+  double row_shift_px = 0;  ///< the right image shows everything this much lower than the given calibration says
+  bool fit_left_radial = false, fit_right_radial = false;  ///< the pinhole lacks radial distortion: estimate it
 };
 
-/// The calibration as given, each eye's brought to this size of the pictures where it is of another one of the same
-/// shape. An empty size is not known.
-PairBelief belief_as_given(const Camera& left, const Camera& right, const Pose& left_from_right, ImageSize picture);
+/// The calibration as given. A camera whose calibration is of another image size of the same aspect ratio is scaled to
+/// `image_size`. An empty size is unknown.
+PairHypothesis nominal_hypothesis(const Camera& left, const Camera& right, const Pose& left_from_right,
+                                  ImageSize image_size);
 
-/// With the right eye on the right: the inverse of the transform as given where it is not.
-PairBelief with_eyes_in_place(PairBelief belief);
+/// Inverts the transform where it places the right camera on the left.
+PairHypothesis with_right_camera_on_right(PairHypothesis hypothesis);
 
-/// The eyes have each other's places. Where the transform has the right one on the left, that is another way to read
-/// it; where it does not, only the lenses can be exchanged.
-PairBelief with_other_eyes(PairBelief belief);
+/// Swaps the cameras. Where the given transform places the right camera on the left, swapped camera names are the
+/// alternative to an inverse transform; where it does not, only the camera models can be swapped.
+PairHypothesis with_cameras_swapped(PairHypothesis hypothesis);
 
-PairBelief with_other_pictures(PairBelief belief);
+PairHypothesis with_images_swapped(PairHypothesis hypothesis);
 
-/// The matches as the belief has their pictures.
-std::vector<PixelMatch> as_believed(const PairBelief& belief, const std::vector<PixelMatch>& matches);
+/// The matches with left and right as the hypothesis assigns the images.
+std::vector<PixelMatch> matches_under_hypothesis(const PairHypothesis& hypothesis,
+                                                 const std::vector<PixelMatch>& matches);
 
-/// A crop that nobody told the calibration of: the right eye's centre moved until the median row agrees, over what was
-/// moved before. A lens that bends does so about its centre, which no pitch can imitate. `matches` as given.
-PairBelief with_rows_moved(PairBelief belief, const std::vector<PixelMatch>& matches);
+/// Assumes a crop that the calibration does not include: shifts the principal point of the right camera vertically
+/// until the median row error is zero, replacing an earlier shift. A pitch cannot imitate it where the lens has
+/// distortion, because distortion is centred on the principal point. `matches` as given, not swapped.
+PairHypothesis with_row_shift(PairHypothesis hypothesis, const std::vector<PixelMatch>& matches);
 
-/// The same with the rows where the calibration has them.
-PairBelief with_rows_as_given(PairBelief belief);
+/// Without the row shift.
+PairHypothesis without_row_shift(PairHypothesis hypothesis);
 
-/// With another size; rows that were moved are moved anew. `matches` as given.
-PairBelief with_size(PairBelief belief, const SizeChange& size, const std::vector<PixelMatch>& matches);
+/// With another size; a row shift is estimated anew. `matches` as given, not swapped.
+PairHypothesis with_size(PairHypothesis hypothesis, const SizeChange& size, const std::vector<PixelMatch>& matches);
 
-/// With square pixels where fx and fy are apart: by fx, and by fy.
-std::vector<PairBelief> with_square_eyes(const PairBelief& belief, AspectDoubt least);
+/// Hypotheses with square pixels for the cameras whose fx and fy differ at least by `least`: both set to fx, both set
+/// to fy.
+std::vector<PairHypothesis> square_pixel_hypotheses(const PairHypothesis& hypothesis, AspectDeviation least);
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// Judging the calibration of a stereo pair by pictures that it took.
+// Checks the calibration of a stereo pair by matches between its images.
 #pragma once
 
 #include <optional>
@@ -13,54 +13,58 @@
 namespace spartan {
 
 enum class PairVerdict {
-  good,    ///< rows agree to 0.5 px in the mean and 1.5 px for 95 %, and nothing is found
-  usable,  ///< to 1 px and 3 px: stereo works and loses some; or nothing worse is found than a doubt
-  bad,     ///< what is found spoils the ranges or the rows; or the pictures show too little to judge
+  good,    ///< row errors have a mean of at most 0.5 px and a 95th percentile of at most 1.5 px; no findings
+  usable,  ///< at most 1 px and 3 px: stereo works with fewer matches; or only findings that leave the ranges correct
+  bad,     ///< a finding makes ranges or rows wrong, or the images do not suffice for a check
 };
 std::string_view name_of(PairVerdict verdict);
 
+/// The result of a check. Row errors are signed left − right, in pixels.
 struct PairCheck {
-  int matches = 0, inliers = 0;  ///< inliers fit the corrected pair
-  /// Of the inliers: rows in the pictures as taken; in the rectified view of the pair as given (but for eyes, transform
-  /// and picture size that were found wrong: with those no row means anything); of the rig `corrected`. NaN where there
-  /// is too little to tell.
+  int matches = 0, inliers = 0;  ///< inliers agree with the corrected pair
+  /// Row errors of the inliers: in the unrectified images; rectified with the calibration as given (swapped cameras,
+  /// inverse transform and image size corrected, for without that no row is meaningful); rectified with the rig
+  /// `corrected`. NaN where the matches do not suffice.
   RowErrors as_taken, as_given, as_corrected;
-  std::vector<RowErrorCell> map;     ///< 8 x 6 cells over the left picture, those with at least 3 matches
-  PairCorrection correction, sigma;  ///< sigma of yaw: with what a lens can do that looks like it (0.3°); NaN as above
-  double yaw_doubt_px = 0;  ///< what the sigma of the yaw is worth in disparity: rows leave range that uncertain
+  std::vector<RowErrorCell> map;     ///< 8 x 6 cells over the left image, those with at least 3 matches
+  PairCorrection correction, sigma;  ///< sigma of yaw includes a lens decentering that imitates it (0.3°); NaN as above
+  double yaw_doubt_px = 0;  ///< sigma of yaw as a disparity error, px: the uncertainty that rows leave in range
   std::vector<RigFinding> findings;
   PairVerdict verdict = PairVerdict::bad;
-  std::vector<PixelMatch> matched;   ///< the inliers, for pictures
-  std::vector<double> row_error_px;  ///< of them, as given
-  double inlier_limit_px = 0;        ///< row error of the corrected pair up to which a match is one
-  bool pictures_exchanged = false;   ///< the first picture is the right eye's: `matched` and `corrected` have it so
-  bool structure_found = false;      ///< eyes, transform or size are wrong: the rig as given cannot be drawn
-  /// The rig with what was found taken in: eyes, transform, unit, sizes, distortion; turns, and yaw, focal ratio and
-  /// the baseline's direction where the pictures need them. Nothing found: the rig as given. Nothing explains the
-  /// pictures: none.
+  std::vector<PixelMatch> matched;   ///< the inliers, unrectified
+  std::vector<double> row_error_px;  ///< of each inlier, rectified with the calibration as given
+  double inlier_limit_px = 0;        ///< largest corrected row error of an inlier
+  bool pictures_exchanged =
+      false;                     ///< the first image is of the right camera; `matched` and `corrected` account for it
+  bool structure_found = false;  ///< cameras, transform or image size are wrong: the rig as given cannot be rectified
+  /// The rig with the findings corrected: swapped cameras, transform, unit, image sizes, distortion; pitch and roll;
+  /// and yaw, focal ratio and baseline direction where the images require it. Without findings the rig as given; none
+  /// where no hypothesis explains the images.
   std::optional<Rig> corrected;
 };
 
-/// `matches`: of one or more shots; a share of them may be wrong. `picture_size`: of the pictures they come from.
-/// Beside the findings of find_doubts() as far as the pictures leave them:
-/// - `inverse_transform`, `swapped_eyes`, `size_mismatch`, `distortion_ignored`: what believe_pair() finds;
-/// - `row_offset`: median row difference above 0.5 px; `roll_offset`: rows turned by more than 0.5 px over half the
-///   picture's width; `rows_apart`: rows differ by more than a good pair's and nothing else was found;
-/// - `yaw_offset`: beyond 2.6 standard deviations, or negative disparities that it explains. The rows tell a yaw by the
-///   pattern x y only, which the lens can imitate;
-/// - `focal_ratio`: above 0.3 %;
-/// - `not_enough_texture`: fewer than 40 matches agree, or in fewer than a quarter of the picture's parts;
-/// - `same_picture`: both pictures are one; `not_explained`: no mistake that is known here makes the rows agree: other
-///   moments, other places, another rig.
+/// Checks a pair by matches of one or more stereo frames, a share of which may be wrong. `image_size`: size of the
+/// images they come from. Method: docs/math/pair_check.md. Findings, beside those of find_doubts() that the images do
+/// not refute:
+/// - `inverse_transform`, `swapped_eyes`, `size_mismatch`, `distortion_ignored`: gross errors (hypothesis search);
+/// - `row_offset`: median row error above 0.5 px;
+/// - `roll_offset`: roll of more than 0.5 px over half the image width;
+/// - `rows_apart`: rows worse than those of a good pair, without another finding;
+/// - `yaw_offset`: yaw beyond 2.6 standard deviations, or one that explains negative disparities. Rows observe yaw only
+///   by the pattern x y, which lens decentering imitates;
+/// - `focal_ratio`: focal lengths inconsistent by more than 0.3 %;
+/// - `not_enough_texture`: fewer than 40 inliers, or inliers in fewer than a quarter of the image cells;
+/// - `same_picture`: both images are the same;
+/// - `not_explained`: no hypothesis makes the rows agree: images of different times, places or rigs.
 PairCheck check_pair(const Rig& rig, const StereoPair& pair, const std::vector<PixelMatch>& matches,
-                     ImageSize picture_size);
+                     ImageSize image_size);
 
-/// The same for pictures without a calibration, with guessed_rig(). Yaw, focal ratio and distortion are those of a
-/// guess: they are taken in, but not findings.
-PairCheck check_pictures(const std::vector<PixelMatch>& matches, ImageSize picture_size);
+/// The same for images without a calibration, with guessed_rig(). Yaw, focal ratio and distortion are corrected but not
+/// reported as findings, for they refer to the guess.
+PairCheck check_pictures(const std::vector<PixelMatch>& matches, ImageSize image_size);
 
-/// For pictures without a calibration: two equal pinholes side by side, 1 m apart, of 1.2 times the larger side as
-/// focal length. What it says about rows, pitch and roll holds for any focal length near that.
-Rig guessed_rig(ImageSize picture_size);
+/// A rig for images without a calibration: two equal pinholes with a focal length of 1.2 times the larger image side,
+/// parallel, 1 m apart. Results for rows, pitch and roll hold for any focal length close to it.
+Rig guessed_rig(ImageSize image_size);
 
 }  // namespace spartan

@@ -21,22 +21,22 @@ using testing::straight_rig;
 using testing::true_rig;
 using testing::with_pose;
 
-TEST(PairCheck, SoundRigsAreGood) {
+TEST(PairCheck, CorrectRigsAreGood) {
   for (const Rig& rig : {true_rig(), straight_rig()}) {
     const PairCheck result = check(rig, look(rig));
     EXPECT_THAT(ids(result), IsEmpty());
     EXPECT_EQ(result.verdict, PairVerdict::good);
     EXPECT_NEAR(result.as_given.mean_px, 0.12, 0.03);  // 0.15 √(2/π)
     EXPECT_NEAR(result.as_given.p95_px, 0.30, 0.1);
-    EXPECT_NEAR(result.as_taken.median_px, 248.4 - 255.2, 4) << "the right principal point lies lower";
+    EXPECT_NEAR(result.as_taken.median_px, 248.4 - 255.2, 4) << "the right principal point is lower";
     EXPECT_GE(result.inliers, 600);
     EXPECT_LE(result.inliers, 660);
     expect_mended(rig, result);
   }
 }
 
-// The errors are found to what is said about them.
-TEST(PairCheck, CorrectionsAreThoseOfTheWorld) {
+// Errors of the estimates agree with their standard deviations (normalized estimation error squared).
+TEST(PairCheck, CorrectionsAreConsistentWithTheirSigma) {
   const Rig truth = true_rig();
   Eigen::Vector4d square = Eigen::Vector4d::Zero();
   constexpr int kTrials = 40;
@@ -47,11 +47,11 @@ TEST(PairCheck, CorrectionsAreThoseOfTheWorld) {
     wanted.roll_rad = 0.01 * random.normal();
     wanted.yaw_rad = 0.005 * random.normal();
     wanted.focal_ratio = 1 + 0.01 * random.normal();
-    // The believed rig is the true one before the correction.
-    Pose believed = left_from_right(truth);
-    const Eigen::Quaterniond turn = corrected_left_from_right(Pose(), wanted).rotation();
-    believed = Pose(believed.rotation() * turn.conjugate(), believed.translation());
-    Rig rig = with_pose(truth, believed);
+    // The nominal rig needs this correction to become the true one.
+    Pose nominal = left_from_right(truth);
+    const Eigen::Quaterniond rotation = corrected_left_from_right(Pose(), wanted).rotation();
+    nominal = Pose(nominal.rotation() * rotation.conjugate(), nominal.translation());
+    Rig rig = with_pose(truth, nominal);
     auto numbers = parameters(rig.cameras[1].model);
     for (double& f : numbers[0]) f /= wanted.focal_ratio;
     rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
@@ -63,12 +63,12 @@ TEST(PairCheck, CorrectionsAreThoseOfTheWorld) {
                                 (fit.correction.focal_ratio - wanted.focal_ratio) / fit.sigma.focal_ratio);
     square += error.cwiseAbs2();
   }
-  // Mean normalized squares of 40 trials: 1 ± 0.22.
+  // Mean normalized squares of 40 trials: expected 1 ± 0.22.
   for (int k = 0; k < 4; ++k) EXPECT_NEAR(square[k] / kTrials, 1, 0.7) << k;
 }
 
 // x right, y down, z ahead.
-TEST(PairCheck, TurnsAndSwingsAreThoseSaid) {
+TEST(PairCheck, SignsOfCorrections) {
   const auto corrected = [](const PairCorrection& c) {
     return corrected_left_from_right(Pose::from_translation({1, 0, 0}), c);
   };
@@ -81,22 +81,23 @@ TEST(PairCheck, TurnsAndSwingsAreThoseSaid) {
   EXPECT_NEAR(swung.norm(), 1, 1e-12);
 }
 
-TEST(PairCheck, SaysWhenThereIsTooLittleToSee) {
+TEST(PairCheck, ReportsTooFewMatches) {
   const Rig truth = true_rig();
   const PairCheck few = check(truth, look(truth, 30));
   EXPECT_THAT(ids(few), ElementsAre("not_enough_texture"));
   EXPECT_EQ(few.verdict, PairVerdict::bad);
-  EXPECT_TRUE(std::isnan(few.correction.yaw_rad) && std::isnan(few.as_given.mean_px)) << "no figure is made up";
+  EXPECT_TRUE(std::isnan(few.correction.yaw_rad) && std::isnan(few.as_given.mean_px)) << "unknown values are NaN";
   EXPECT_EQ(*few.corrected, truth);
   EXPECT_THAT(ids(check(truth, {})), ElementsAre("not_enough_texture"));
-  // Many, but in one corner.
+  // Many matches, all in one corner.
   std::vector<PixelMatch> corner = look(truth, 4000);
   std::erase_if(corner, [](const PixelMatch& m) { return m.left.x() > 180 || m.left.y() > 160; });
   EXPECT_THAT(ids(check(truth, corner)), ElementsAre("not_enough_texture"));
 }
 
-// Hills from 60 m on: a yaw within its error puts most of them beyond infinity, and says nothing about the eyes.
-TEST(PairCheck, FarViewsDoNotTellTheEyes) {
+// Distant points only (60 m and more): a yaw within its uncertainty makes most disparities negative, which must not be
+// taken for swapped cameras.
+TEST(PairCheck, DistantScenesDoNotRevealSwappedCameras) {
   const Rig truth = true_rig();
   Random random(1);
   std::vector<PixelMatch> far;
@@ -116,8 +117,8 @@ TEST(PairCheck, FarViewsDoNotTellTheEyes) {
   }
 }
 
-// On either side of each limit of check_pair(). Rows are off besides, so that there is something to put right.
-TEST(PairCheck, FindingsBeginAtTheirLimits) {
+// To either side of each limit of check_pair(). Row errors are added where a finding appears only with bad rows.
+TEST(PairCheck, FindingsAppearAtTheirLimits) {
   const Rig truth = true_rig();
   const auto with = [&](const PairCorrection& off, double rows_px) {
     Rig rig = with_pose(truth, corrected_left_from_right(left_from_right(truth), off));
@@ -126,17 +127,17 @@ TEST(PairCheck, FindingsBeginAtTheirLimits) {
   };
   constexpr double kDegree = testing::kDegree;
   EXPECT_THAT(with({}, 0.4), IsEmpty());
-  EXPECT_THAT(with({}, 0.5), ElementsAre("row_offset")) << "0.57 px where the lens is straightened";
+  EXPECT_THAT(with({}, 0.5), ElementsAre("row_offset")) << "0.57 px after undistortion";
   EXPECT_THAT(with({.roll_rad = 0.05 * kDegree}, 0.8), ElementsAre("row_offset")) << "0.33 px at the sides";
   EXPECT_THAT(with({.roll_rad = 0.10 * kDegree}, 0.8), ElementsAre("row_offset", "roll_offset")) << "0.66 px";
   EXPECT_THAT(with({.focal_ratio = 1.0022}, 0), IsEmpty());
   EXPECT_THAT(with({.focal_ratio = 1.0040}, 0), ElementsAre("focal_ratio"));
-  EXPECT_THAT(with({.yaw_rad = -0.75 * kDegree}, 0), ElementsAre("rows_apart")) << "the lens may be it";
+  EXPECT_THAT(with({.yaw_rad = -0.75 * kDegree}, 0), ElementsAre("rows_apart")) << "may be lens decentering";
   EXPECT_THAT(with({.yaw_rad = -0.95 * kDegree}, 0), ElementsAre("yaw_offset"));
 }
 
-// So little distortion is no pinhole's mistake.
-TEST(PairCheck, DistortionIsNamedWhereItShows) {
+// Small distortion is not reported for a pinhole.
+TEST(PairCheck, DistortionIsReportedWhereSignificant) {
   for (const double k1 : {-0.015, -0.04}) {
     Rig truth = straight_rig();
     truth.cameras[1].model = RadialTangentialModel({457.6, 456.1, 379.9, 255.2}, {k1, 0});
@@ -145,7 +146,7 @@ TEST(PairCheck, DistortionIsNamedWhereItShows) {
   }
 }
 
-TEST(PairCheck, WithoutACalibrationThePicturesSpeak) {
+TEST(PairCheck, WorksWithoutACalibration) {
   const PairCheck result = check_pictures(look(straight_rig()), kSize);
   EXPECT_THAT(ids(result), ::testing::Not(Contains("inverse_transform")));
   EXPECT_NEAR(result.correction.roll_rad, 0.003, 0.001);

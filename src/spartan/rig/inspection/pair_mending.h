@@ -1,4 +1,4 @@
-// Putting a rig right by what its pictures said.
+// Correction of a rig by the errors found in its images.
 #pragma once
 
 #include "spartan/rig/inspection/belief_search.h"
@@ -6,19 +6,20 @@
 
 namespace spartan {
 
-/// What was found wrong beside eyes and sizes.
-struct FoundWrong {
+/// Errors that were found beside swapped cameras and sizes.
+struct FoundErrors {
   bool yaw = false, focal_ratio = false, distortion = false;
 };
 
-/// The belief's correction by no more than is needed: pitch and roll, what was found, and what the rows cannot do
-/// without. Rows tell a yaw, a focal ratio and the baseline's direction with little force, and a wrong one costs range.
-PairCorrection needed_correction(const BelievedPair& believed, const FoundWrong& found);
+/// The smallest correction that makes the rows agree: pitch and roll, the errors that were found, and the baseline
+/// direction only where the rows need it. Rows observe yaw, focal ratio and baseline direction weakly, while errors in
+/// these cost range accuracy.
+PairCorrection minimal_correction(const FittedHypothesis& fitted, const FoundErrors& found);
 
-/// The rig with the pair as it is believed and corrected. `wrong_unit`: the baseline is brought to metres from its
-/// likelier_unit(), where there is one. The vignetting's centre goes with the size and the principal point; a self-mask
-/// stays the file that it was.
-Rig mended_rig(Rig rig, const StereoPair& pair, const PairBelief& belief, const PairCorrection& correction,
-               bool wrong_unit);
+/// The rig with the hypothesis and the correction applied to the pair. `wrong_unit`: converts the baseline from its
+/// likely_unit() to metres, where there is one. The vignetting centre is scaled with the image size and moves with the
+/// principal point; the self-mask file is not changed.
+Rig corrected_rig(Rig rig, const StereoPair& pair, const PairHypothesis& hypothesis, const PairCorrection& correction,
+                  bool wrong_unit);
 
 }  // namespace spartan

@@ -5,7 +5,7 @@
 namespace spartan {
 namespace {
 
-// A pair of 640 x 480 px whose left eye has a vignetting with a centre of its own.
+// A pair of 640 x 480 px whose left camera has a vignetting with its own centre.
 Rig rig_with_vignetting() {
   const auto camera = [](const char* name) {
     Camera made;
@@ -21,43 +21,44 @@ Rig rig_with_vignetting() {
   return rig;
 }
 
-// The rig with its pair's left eye as the change makes it.
-Camera mended_left(const Rig& rig, ImageSize size, const SizeChange& change = {}) {
-  PairBelief belief;
-  belief.left = *rig.find_camera("left");
-  belief.right = *rig.find_camera("right");
-  belief.left_from_right = rig.right_from_left(rig.pairs[0]).inverse();
-  belief.left.size = belief.right.size = size;
-  belief.size = change;
-  return *mended_rig(rig, rig.pairs[0], belief, {}, false).find_camera("left");
+// The left camera after a size change.
+Camera corrected_left(const Rig& rig, ImageSize size, const SizeChange& change = {}) {
+  PairHypothesis hypothesis;
+  hypothesis.left = *rig.find_camera("left");
+  hypothesis.right = *rig.find_camera("right");
+  hypothesis.left_from_right = rig.right_from_left(rig.pairs[0]).inverse();
+  hypothesis.left.size = hypothesis.right.size = size;
+  hypothesis.size = change;
+  return *corrected_rig(rig, rig.pairs[0], hypothesis, {}, false).find_camera("left");
 }
 
-// It is counted in the calibration's pixels: (300.5 + 0.5) / 2 − 0.5 in pictures half as large.
-TEST(PairMending, VignettingGoesWithTheSize) {
+// The centre is in pixels of the calibration: (300.5 + 0.5) / 2 − 0.5 in images half as large.
+TEST(PairCorrection, VignettingCentreScalesWithTheImage) {
   const Rig rig = rig_with_vignetting();
-  EXPECT_EQ(mended_left(rig, {640, 480}), rig.cameras[0]) << "nothing changed";
-  const Camera half = mended_left(rig, {320, 240});
+  EXPECT_EQ(corrected_left(rig, {640, 480}), rig.cameras[0]) << "unchanged";
+  const Camera half = corrected_left(rig, {320, 240});
   EXPECT_EQ(half.size, (ImageSize{320, 240}));
   EXPECT_EQ(half.vignetting.centre_px, Eigen::Vector2d(150, 129.5));
-  EXPECT_EQ(half.vignetting.coefficients, rig.cameras[0].vignetting.coefficients) << "they are relative to the size";
-  EXPECT_EQ(mended_left(rig, {640, 400}).vignetting, rig.cameras[0].vignetting) << "a part of the pictures: not known";
-  EXPECT_EQ(mended_left(rig, {640, 480}, {true, true, true, 2}).vignetting.centre_px, Eigen::Vector2d(601.5, 519.5));
-  EXPECT_EQ(mended_left(rig, {640, 480}, {true, true, false, 2}).vignetting, rig.cameras[0].vignetting);
-  EXPECT_EQ(mended_left(rig, {640, 480}, {false, true, true, 2}).vignetting, rig.cameras[0].vignetting);
+  EXPECT_EQ(half.vignetting.coefficients, rig.cameras[0].vignetting.coefficients) << "they do not depend on the size";
+  EXPECT_EQ(corrected_left(rig, {640, 400}).vignetting, rig.cameras[0].vignetting)
+      << "another aspect ratio: unknown crop";
+  EXPECT_EQ(corrected_left(rig, {640, 480}, {true, true, true, 2}).vignetting.centre_px, Eigen::Vector2d(601.5, 519.5));
+  EXPECT_EQ(corrected_left(rig, {640, 480}, {true, true, false, 2}).vignetting, rig.cameras[0].vignetting);
+  EXPECT_EQ(corrected_left(rig, {640, 480}, {false, true, true, 2}).vignetting, rig.cameras[0].vignetting);
 }
 
-// The right picture was cut: everything in it lies higher.
-TEST(PairMending, VignettingGoesWithMovedRows) {
+// The right image was cropped: everything in it is higher.
+TEST(PairCorrection, VignettingCentreMovesWithTheRowShift) {
   Rig rig = rig_with_vignetting();
   rig.cameras[1].vignetting = rig.cameras[0].vignetting;
-  PairBelief belief;
-  belief.left = rig.cameras[0];
-  belief.right = rig.cameras[1];
-  belief.left_from_right = rig.right_from_left(rig.pairs[0]).inverse();
-  belief.rows_lower_px = -7;
-  const Rig mended = mended_rig(rig, rig.pairs[0], belief, {}, false);
-  EXPECT_EQ(mended.cameras[0].vignetting, rig.cameras[0].vignetting);
-  EXPECT_EQ(mended.cameras[1].vignetting.centre_px, Eigen::Vector2d(300.5, 252.5));
+  PairHypothesis hypothesis;
+  hypothesis.left = rig.cameras[0];
+  hypothesis.right = rig.cameras[1];
+  hypothesis.left_from_right = rig.right_from_left(rig.pairs[0]).inverse();
+  hypothesis.row_shift_px = -7;
+  const Rig corrected = corrected_rig(rig, rig.pairs[0], hypothesis, {}, false);
+  EXPECT_EQ(corrected.cameras[0].vignetting, rig.cameras[0].vignetting);
+  EXPECT_EQ(corrected.cameras[1].vignetting.centre_px, Eigen::Vector2d(300.5, 252.5));
 }
 
 }  // namespace

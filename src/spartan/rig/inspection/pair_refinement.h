@@ -1,4 +1,4 @@
-// How the calibration of a stereo pair must be changed so that it fits the pictures: a fit to matched places.
+// Refinement of a stereo calibration: the small correction that makes the rows of matched points agree.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,52 +9,53 @@
 
 namespace spartan {
 
-/// The same place in both pictures as taken, pixels.
+/// The same point in both images, unrectified, pixels.
 struct PixelMatch {
   Eigen::Vector2d left, right;
 };
 
-/// What is to be changed. Turns are those of the right eye about its own axes as `describe_relative_pose` names them,
-/// left_from_right' = left_from_right · Ry(yaw) Rx(pitch) Rz(roll): to the right, up, clockwise. The baseline's
-/// direction turns by `baseline_down_rad` and `baseline_ahead_rad`. All of them small.
+/// A small correction of a stereo calibration. The rotation is that of the right camera about its own axes,
+/// left_from_right' = left_from_right · Ry(yaw) Rx(pitch) Rz(roll), positive to the right, up and clockwise as in
+/// `describe_relative_pose`. `baseline_down_rad` and `baseline_ahead_rad` rotate the direction of the baseline.
 struct PairCorrection {
   double pitch_rad = 0, yaw_rad = 0, roll_rad = 0;
   double baseline_down_rad = 0, baseline_ahead_rad = 0;
-  double focal_ratio = 1;  ///< factor of the right eye's focal length
-  /// Of a pinhole that should have been bent: r → r/(1 + k r²) straightens its rays; k is about Brown's k1. 0 where not
-  /// asked for.
+  double focal_ratio = 1;  ///< factor on the focal length of the right camera
+  /// Radial distortion that a pinhole model lacks, k of r → r/(1 + k r²), which undistorts its rays; k is close to
+  /// Brown's k1. 0 where it is not estimated.
   double left_radial = 0, right_radial = 0;
 };
 
-/// left_from_right with the correction taken in.
+/// left_from_right with the rotation and the baseline direction of the correction applied.
 Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection& correction);
 
-/// Where matches lie in the rectified view of a pair, at the scale of `focal_px`. NaN where a model has no line of
-/// sight.
+/// Matches in the rectified view of a pair, scaled to `focal_px`. NaN where a camera model cannot unproject a pixel.
 struct RectifiedMatches {
-  double focal_px = 0;                             ///< pixels per radian of that view, the mean of both eyes
+  double focal_px = 0;                             ///< pixels per radian of that view, the mean of both cameras
   std::vector<double> row_error_px, disparity_px;  ///< of each match: left − right
 };
-/// To compare beliefs about the same matches: Σ min(r²/σ², 9), σ = 0.3 px; a row that is no number counts 9.
-inline constexpr double kRowUnit_px = 0.3, kMostOfARow = 9;
-double cost_of_rows(const std::vector<double>& row_error_px);
-/// Nothing is beyond infinity; but what is far away lies on both sides of it where a yaw is off by little.
-inline constexpr double kBeyondInfinity_px = -1.5;
+/// Cost that compares hypotheses over the same matches: Σ min(r²/σ², 9) with σ = 0.3 px (truncated least squares);
+/// a row error that is not finite costs 9.
+inline constexpr double kRowSigma_px = 0.3, kMaxRowCost = 9;
+double truncated_row_cost(const std::vector<double>& row_error_px);
+/// Disparities below this count as negative. A true disparity is never negative, but those of distant points scatter
+/// around zero where the yaw is slightly wrong.
+inline constexpr double kNegativeDisparity_px = -1.5;
 RectifiedMatches rectify_matches(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
                                  const std::vector<PixelMatch>& matches);
 
 struct PairFit {
-  PairCorrection correction, sigma;  ///< the estimate and its standard deviations (of the ratio: of its logarithm)
-  RectifiedMatches given, rows;      ///< as given, and as corrected
-  double inlier_limit_px = 0;        ///< four times the spread of the rows, at most kLargestInlier_px
-  std::vector<bool> inlier;          ///< fits the corrected pair
+  PairCorrection correction, sigma;  ///< estimate and its standard deviations (of focal_ratio: of its logarithm)
+  RectifiedMatches given, rows;      ///< with the calibration as given, and with the correction
+  double inlier_limit_px = 0;        ///< four times the spread of the row errors, at most kMaxInlierError_px
+  std::vector<bool> inlier;          ///< of each match: its corrected row error is within the limit
   int inliers = 0;
-  double rms_px = 0;  ///< of the inliers' row errors as corrected
-  double cost = 0;    ///< cost_of_rows() plus the priors
+  double rms_px = 0;  ///< of the inliers' corrected row errors
+  double cost = 0;    ///< truncated_row_cost() plus the priors
 };
-inline constexpr double kLargestInlier_px = 3;
+inline constexpr double kMaxInlierError_px = 3;
 
-/// What belongs to the inliers, of what there is of every match.
+/// The values that belong to inliers, of one value per match.
 template <class T>
 std::vector<T> inliers_of(const std::vector<T>& values, const std::vector<bool>& inlier) {
   std::vector<T> result;
@@ -65,20 +66,20 @@ std::vector<T> inliers_of(const std::vector<T>& values, const std::vector<bool>&
 }
 
 struct PairFitOptions {
-  /// What is estimated beside pitch and roll; the rest is as given.
+  /// Parameters to estimate beside pitch and roll; the others keep their given value.
   bool yaw = true, focal = true, baseline = true;
   bool left_radial = false, right_radial = false;
-  /// What is thought of the errors of a calibration beforehand (standard deviations). They hold what the pictures do
-  /// not tell: the yaw of a narrow view, the baseline's direction where all is far away.
+  /// Standard deviations of the priors: how wrong a calibration usually is. The priors bound what the images cannot
+  /// observe: the yaw of a narrow field of view, the baseline direction where everything is distant.
   double turn_sigma_rad = 0.05, baseline_sigma_rad = 0.02, focal_sigma = 0.03, radial_sigma = 0.3;
-  double match_sigma_px = 0.15;  ///< least standard deviation of a row difference
+  double match_sigma_px = 0.15;  ///< lower bound of the standard deviation of a row error
 };
 
-/// Robust least squares over the row differences in the rectified view, Σ ρ(r²) plus the priors, by Levenberg-Marquardt
-/// with Cauchy weights whose scale shrinks from 20 px, so that a share of wrong matches does no harm (graduated
-/// non-convexity after Blake & Zisserman 1987). What each parameter does to a row (x, y of the rectified view at focal
-/// length 1, d the disparity): pitch 1 + y², roll x, yaw x y, baseline down d, baseline ahead y d, focal ratio y,
-/// k y (x² + y²) of each eye (docs/math/pair_check.md).
+/// Robust least squares over the row errors of the rectified view, Σ ρ(r²) plus the priors: Levenberg-Marquardt with
+/// Cauchy weights whose scale shrinks from 20 px (graduated non-convexity, Blake & Zisserman 1987), which tolerates a
+/// share of wrong matches. Effect of each parameter on a row (x, y in the rectified view at focal length 1, d the
+/// disparity): pitch 1 + y², roll x, yaw x y, baseline down d, baseline ahead y d, focal ratio y, radial
+/// k y (x² + y²) of each camera (docs/math/pair_check.md).
 PairFit fit_pair(const CameraModel& left, const CameraModel& right, const Pose& left_from_right,
                  const std::vector<PixelMatch>& matches, const PairFitOptions& options = {});
 

@@ -1,4 +1,4 @@
-// One rig of what was put right in each of its pairs.
+// Merging the corrections of several stereo pairs into one rig.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace spartan {
 
-/// The rig as one pair's pictures want it (PairCheck::corrected).
+/// The rig as corrected for one pair (PairCheck::corrected).
 struct CorrectedPair {
   std::string pair;
   Rig rig;
@@ -16,13 +16,14 @@ struct CorrectedPair {
 
 struct RigOfPairs {
   Rig rig;
-  std::vector<std::string> left_out;  ///< pairs whose correction does not go with those before them
+  std::vector<std::string> left_out;  ///< pairs whose correction contradicts that of an earlier pair
 };
 
-/// The rig with every pair's correction taken in, in that order. A camera of two pairs stays as the first of them has
-/// it, and the other eye of the second one moves in its place: what a pair's pictures tell is how its eyes stand to
-/// each other. Where that cannot be done (both eyes are of pairs before, or the camera's own numbers are to change
-/// again) the pair is left out. All rigs have the cameras and pairs of `given`.
+/// Applies the correction of every pair to the rig, in the given order. The images of a pair determine the pose of its
+/// cameras relative to each other only. A camera shared by two pairs therefore keeps the pose that the first pair gave
+/// it, and the other camera of the second pair moves instead. A correction is discarded where that is impossible: both
+/// cameras belong to earlier pairs, or the shared camera's intrinsics would change again. All rigs have the cameras and
+/// pairs of `given`.
 RigOfPairs take_together(const Rig& given, const std::vector<CorrectedPair>& pairs);
 
 }  // namespace spartan

@@ -28,61 +28,61 @@ Pose left_from_right(const Rig& rig, const std::string& pair) {
   return rig.right_from_left(*rig.find_pair(pair)).inverse();
 }
 
-// The right eye of a pair turned, as a correction does.
-CorrectedPair turned(Rig rig, const std::string& pair, const Eigen::Vector3d& turn) {
+// The right camera of a pair rotated, as a correction does.
+CorrectedPair rotated(Rig rig, const std::string& pair, const Eigen::Vector3d& rotation) {
   for (Camera& camera : rig.cameras) {
     if (camera.name != rig.find_pair(pair)->right) continue;
-    camera.mount_from_camera = camera.mount_from_camera * Pose(exp_so3(turn), Eigen::Vector3d::Zero());
+    camera.mount_from_camera = camera.mount_from_camera * Pose(exp_so3(rotation), Eigen::Vector3d::Zero());
   }
   return {pair, std::move(rig)};
 }
 
-void expect_stands_as_in(const CorrectedPair& wanted, const Rig& rig) {
+void expect_relative_pose_of(const CorrectedPair& wanted, const Rig& rig) {
   const Pose between = left_from_right(wanted.rig, wanted.pair).inverse() * left_from_right(rig, wanted.pair);
   EXPECT_LT(between.translation().norm(), 1e-12) << wanted.pair;
   EXPECT_LT(rotation_angle(between), 1e-12) << wanted.pair;
 }
 
-TEST(PairsTogether, NothingCorrectedChangesNothing) {
+TEST(MergeCorrections, WithoutCorrectionsTheRigIsUnchanged) {
   const Rig rig = row_of_cameras();
-  const RigOfPairs together = take_together(rig, {{"narrow", rig}, {"wide", rig}, {"all", rig}});
-  EXPECT_EQ(together.rig, rig);
-  EXPECT_THAT(together.left_out, IsEmpty());
+  const RigOfPairs merged = take_together(rig, {{"narrow", rig}, {"wide", rig}, {"all", rig}});
+  EXPECT_EQ(merged.rig, rig);
+  EXPECT_THAT(merged.left_out, IsEmpty());
 }
 
-// The middle camera is the right eye of one pair and the left eye of the other.
-TEST(PairsTogether, ACameraOfTwoPairsKeepsBothCorrections) {
+// The middle camera is the right camera of one pair and the left camera of the other.
+TEST(MergeCorrections, SharedCameraKeepsBothCorrections) {
   const Rig rig = row_of_cameras();
-  const CorrectedPair narrow = turned(rig, "narrow", {0.01, 0.002, -0.003}),
-                      wide = turned(rig, "wide", {-0.004, 0.001, 0.02}), sound{"wide", rig};
-  for (const auto& pairs : {std::vector{narrow, wide}, {wide, narrow}, {narrow, sound}, {sound, narrow}}) {
-    const RigOfPairs together = take_together(rig, pairs);
-    EXPECT_THAT(together.left_out, IsEmpty());
-    for (const CorrectedPair& pair : pairs) expect_stands_as_in(pair, together.rig);
+  const CorrectedPair narrow = rotated(rig, "narrow", {0.01, 0.002, -0.003}),
+                      wide = rotated(rig, "wide", {-0.004, 0.001, 0.02}), unchanged{"wide", rig};
+  for (const auto& pairs : {std::vector{narrow, wide}, {wide, narrow}, {narrow, unchanged}, {unchanged, narrow}}) {
+    const RigOfPairs merged = take_together(rig, pairs);
+    EXPECT_THAT(merged.left_out, IsEmpty());
+    for (const CorrectedPair& pair : pairs) expect_relative_pose_of(pair, merged.rig);
   }
 }
 
-TEST(PairsTogether, WhatContradictsPairsBeforeIsLeftOut) {
+TEST(MergeCorrections, ContradictingCorrectionsAreDiscarded) {
   const Rig rig = row_of_cameras();
-  const CorrectedPair narrow = turned(rig, "narrow", {0.01, 0, 0}), wide = turned(rig, "wide", {0, 0, 0.02});
-  const RigOfPairs together = take_together(rig, {narrow, wide, {"all", rig}});
-  EXPECT_THAT(together.left_out, ElementsAre("all"));
-  expect_stands_as_in(narrow, together.rig);
-  expect_stands_as_in(wide, together.rig);
-  // Another focal length of a camera by which a pair before was judged.
+  const CorrectedPair narrow = rotated(rig, "narrow", {0.01, 0, 0}), wide = rotated(rig, "wide", {0, 0, 0.02});
+  const RigOfPairs merged = take_together(rig, {narrow, wide, {"all", rig}});
+  EXPECT_THAT(merged.left_out, ElementsAre("all"));
+  expect_relative_pose_of(narrow, merged.rig);
+  expect_relative_pose_of(wide, merged.rig);
+  // A correction with another focal length for a camera of an earlier pair.
   CorrectedPair longer = narrow;
   longer.rig.cameras[1].model = PinholeModel{510, 510, 319.5, 239.5};
   EXPECT_THAT(take_together(rig, {longer, {"wide", rig}}).left_out, ElementsAre("wide"));
-  EXPECT_EQ(take_together(rig, {longer, {"wide", rig}}).rig, longer.rig) << "the first one has its way";
+  EXPECT_EQ(take_together(rig, {longer, {"wide", rig}}).rig, longer.rig) << "the first correction is kept";
 }
 
-TEST(PairsTogether, ExchangedEyesAreTakenIn) {
+TEST(MergeCorrections, SwappedCamerasAreApplied) {
   const Rig rig = row_of_cameras();
   CorrectedPair wide{"wide", rig};
   std::swap(wide.rig.pairs[1].left, wide.rig.pairs[1].right);
-  const RigOfPairs together = take_together(rig, {turned(rig, "narrow", {0.01, 0, 0}), wide});
-  EXPECT_EQ(together.rig.pairs[1].left, "right");
-  expect_stands_as_in(wide, together.rig);
+  const RigOfPairs merged = take_together(rig, {rotated(rig, "narrow", {0.01, 0, 0}), wide});
+  EXPECT_EQ(merged.rig.pairs[1].left, "right");
+  expect_relative_pose_of(wide, merged.rig);
 }
 
 }  // namespace

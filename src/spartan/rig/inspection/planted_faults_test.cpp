@@ -1,4 +1,4 @@
-// Faults that people plant in calibrations, each known by its name and put right.
+// Fault injection: common calibration errors must be found under their id and corrected.
 #include "spartan/rig/inspection/pair_check.h"
 #include "spartan/rig/models/model_changes.h"
 #include "spartan/testing/seen_pair.h"
@@ -23,7 +23,7 @@ using testing::straight_rig;
 using testing::true_rig;
 using testing::with_pose;
 
-double resolution(const Rig& rig) {
+double focal_px(const Rig& rig) {
   return project_with_jacobian(rig.cameras[0].model, Eigen::Vector3d::UnitZ())->by_point(0, 0);
 }
 
@@ -35,7 +35,7 @@ TEST(PlantedFault, InverseTransform) {
   expect_mended(truth, result);
 }
 
-TEST(PlantedFault, SwappedPictures) {
+TEST(PlantedFault, SwappedImages) {
   const Rig truth = true_rig();
   std::vector<PixelMatch> matches = look(truth);
   for (PixelMatch& match : matches) std::swap(match.left, match.right);
@@ -45,7 +45,7 @@ TEST(PlantedFault, SwappedPictures) {
   expect_mended(truth, result);
 }
 
-TEST(PlantedFault, SwappedEyesOfTheRig) {
+TEST(PlantedFault, SwappedCamerasAndImages) {
   const Rig truth = true_rig();
   Rig rig = truth;
   std::swap(rig.pairs[0].left, rig.pairs[0].right);
@@ -57,7 +57,7 @@ TEST(PlantedFault, SwappedEyesOfTheRig) {
   expect_mended(truth, result);
 }
 
-// In millimetres, in centimetres, in metres that were taken for millimetres.
+// In millimetres, in centimetres, and in metres taken for millimetres.
 TEST(PlantedFault, BaselineInOtherUnits) {
   const Rig truth = true_rig();
   const Pose pose = left_from_right(truth);
@@ -70,34 +70,34 @@ TEST(PlantedFault, BaselineInOtherUnits) {
   }
 }
 
-TEST(PlantedFault, EyesApart) {
+TEST(PlantedFault, CamerasRotatedApart) {
   const Rig truth = true_rig();
   const PairCheck result = check(with_pose(truth, Pose(exp_so3({0, 20 * kDegree, 0}), {0.11, 0, 0})), {});
   EXPECT_THAT(ids(result), ElementsAre("eyes_apart", "not_enough_texture"));
   EXPECT_EQ(result.verdict, PairVerdict::bad);
 }
 
-// The calibration of pictures twice as large: centre and focal length, or the focal length alone.
+// The calibration of images twice as large: principal point and focal length, or the focal length alone.
 TEST(PlantedFault, FocalLengthOfAnotherSize) {
   const Rig truth = true_rig();
-  for (const bool centre_too : {true, false}) {
+  for (const bool scale_centre : {true, false}) {
     Rig rig = truth;
     for (Camera& c : rig.cameras) {
       auto numbers = parameters(c.model);
       for (double& f : numbers[0]) f *= 2;
-      if (centre_too) {
+      if (scale_centre) {
         for (double& v : numbers[1]) v = (v + 0.5) * 2 - 0.5;
       }
       c.model = with_parameters(c.model, numbers);
     }
     const PairCheck result = check(rig, look(truth));
-    EXPECT_THAT(ids(result), Contains("size_mismatch")) << centre_too;
+    EXPECT_THAT(ids(result), Contains("size_mismatch")) << scale_centre;
     EXPECT_EQ(result.verdict, PairVerdict::bad);
     expect_mended(truth, result, 0.3);
   }
 }
 
-TEST(PlantedFault, PicturesOfAnotherSize) {
+TEST(PlantedFault, ImagesOfAnotherSize) {
   const Rig truth = true_rig();
   const auto halved = [](std::vector<PixelMatch> matches) {
     for (PixelMatch& m : matches) {
@@ -114,7 +114,7 @@ TEST(PlantedFault, PicturesOfAnotherSize) {
   EXPECT_EQ(again.verdict, PairVerdict::good);
 }
 
-// Of the right eye only: the left one's numbers are sound.
+// Of the right camera only: the intrinsics of the left one are right.
 TEST(PlantedFault, OneCalibrationOfAnotherSize) {
   const Rig truth = true_rig();
   Rig rig = truth;
@@ -126,8 +126,8 @@ TEST(PlantedFault, OneCalibrationOfAnotherSize) {
   expect_mended(truth, result);
 }
 
-// A focal length that is none (millimetres), or one of its two numbers: the view in degrees and fx/fy are no factors.
-TEST(PlantedFault, FocalLengthsThatCannotBe) {
+// A focal length in millimetres, or a wrong fy: the finding's value is then an angle or fx/fy, not a size factor.
+TEST(PlantedFault, ImplausibleFocalLengths) {
   const Rig truth = straight_rig();
   for (const PinholeModel& odd : {PinholeModel{3, 3, 367.2, 248.4}, PinholeModel{458, 229, 367.2, 248.4}}) {
     Rig rig = truth;
@@ -135,32 +135,32 @@ TEST(PlantedFault, FocalLengthsThatCannotBe) {
     const PairCheck result = check(rig, look(truth));
     EXPECT_THAT(ids(result), Contains("size_mismatch"));
     EXPECT_EQ(result.verdict, PairVerdict::bad);
-    const auto seen_ahead = [](const Rig& r) { return *project(r.cameras[0].model, Eigen::Vector3d::UnitZ()); };
-    EXPECT_EQ(seen_ahead(*result.corrected), seen_ahead(rig)) << "the picture is no larger";
+    const auto principal_point = [](const Rig& r) { return *project(r.cameras[0].model, Eigen::Vector3d::UnitZ()); };
+    EXPECT_EQ(principal_point(*result.corrected), principal_point(rig)) << "the image size is unchanged";
   }
 }
 
-// By a crop that the calibration does not know of: down and up, by little and by much. The rest of the calibration is
-// right.
-TEST(PlantedFault, RowsOff) {
+// A crop of the right image that is not in the calibration, upwards and downwards, small and large. The rest of the
+// calibration is right.
+TEST(PlantedFault, RowShift) {
   const Rig truth = true_rig();
   for (const double rows_px : {2.0, -2.0, -5.0, 20.0, -20.0}) {
     Rig rig = truth;
     rig.cameras[1].model = with_rows_lower(rig.cameras[1].model, rows_px);
     const PairCheck result = check(rig, look(truth));
     EXPECT_THAT(ids(result), ElementsAre("row_offset")) << rows_px;
-    EXPECT_NEAR(result.as_given.median_px / rows_px, 1, 0.25) << "a little more where the lens is straightened";
+    EXPECT_NEAR(result.as_given.median_px / rows_px, 1, 0.25) << "slightly more after undistortion";
     EXPECT_NEAR(result.findings.at(0).value, result.as_given.median_px, 1e-9);
     EXPECT_THAT(result.findings.at(0).text,
-                HasSubstr(rows_px > 0 ? "px below those of the right one" : "px above those of the right one"));
+                HasSubstr(rows_px > 0 ? "px below those of the right image" : "px above those of the right image"));
     EXPECT_EQ(result.verdict, PairVerdict::bad);
-    EXPECT_NEAR(resolution(*result.corrected), resolution(truth), 1e-9);
-    // As long as the rows agree it may as well be a pitch: two rows are 0.25°.
-    expect_mended(truth, result, std::max(0.4, std::abs(rows_px) / resolution(truth) / kDegree + 0.15));
+    EXPECT_NEAR(focal_px(*result.corrected), focal_px(truth), 1e-9);
+    // A pitch explains small shifts equally well: two rows are 0.25°.
+    expect_mended(truth, result, std::max(0.4, std::abs(rows_px) / focal_px(truth) / kDegree + 0.15));
   }
 }
 
-TEST(PlantedFault, RowsOffAndTheInverseTransform) {
+TEST(PlantedFault, RowShiftAndInverseTransform) {
   const Rig truth = true_rig();
   Rig rig = with_pose(truth, left_from_right(truth).inverse());
   rig.cameras[1].model = with_rows_lower(rig.cameras[1].model, -8);
@@ -170,8 +170,8 @@ TEST(PlantedFault, RowsOffAndTheInverseTransform) {
   expect_mended(truth, result, 0.4);
 }
 
-// Rows alone make a pair usable or bad.
-TEST(PlantedFault, RowsDecideTheVerdict) {
+// Row errors alone make a pair usable or bad.
+TEST(PlantedFault, RowErrorsDetermineTheGrade) {
   const Rig truth = true_rig();
   const auto off_by = [&](double rows_px) {
     Rig rig = truth;
@@ -182,10 +182,10 @@ TEST(PlantedFault, RowsDecideTheVerdict) {
   EXPECT_EQ(off_by(0.7).verdict, PairVerdict::usable);
   const PairCheck bad = off_by(1.4);
   EXPECT_EQ(bad.verdict, PairVerdict::bad);
-  EXPECT_LT(bad.as_given.p95_px, 3) << "by the mean";
+  EXPECT_LT(bad.as_given.p95_px, 3) << "bad because of the mean";
 }
 
-TEST(PlantedFault, YawOfADegree) {
+TEST(PlantedFault, YawOfOneDegree) {
   for (const Rig& truth : {true_rig(), straight_rig()}) {
     for (const double yaw_deg : {1.0, -1.0}) {
       PairCorrection off;
@@ -202,24 +202,24 @@ TEST(PlantedFault, YawOfADegree) {
   }
 }
 
-// Half a degree may be the lens's, and stays; but not where the far hills would be beyond infinity.
+// Half a degree may be lens decentering and is not corrected, except where distant points have negative disparities.
 TEST(PlantedFault, YawOfHalfADegree) {
   const Rig truth = true_rig();
-  const auto planted = [&](double yaw_deg) {
+  const auto injected = [&](double yaw_deg) {
     PairCorrection off;
     off.yaw_rad = yaw_deg * kDegree;
     return check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), look(truth));
   };
-  const PairCheck stays = planted(-0.5);
-  EXPECT_THAT(ids(stays), ElementsAre("rows_apart"));
-  EXPECT_THAT(stays.findings.at(0).text, HasSubstr("rows do not tell which"));
-  EXPECT_EQ(stays.verdict, PairVerdict::usable);
-  const Pose apart = left_from_right(truth).inverse() * left_from_right(*stays.corrected);
+  const PairCheck ambiguous = injected(-0.5);
+  EXPECT_THAT(ids(ambiguous), ElementsAre("rows_apart"));
+  EXPECT_THAT(ambiguous.findings.at(0).text, HasSubstr("rows do not distinguish the two"));
+  EXPECT_EQ(ambiguous.verdict, PairVerdict::usable);
+  const Pose apart = left_from_right(truth).inverse() * left_from_right(*ambiguous.corrected);
   EXPECT_NEAR(rotation_angle(apart) / kDegree, 0.5, 0.1);
-  const PairCheck told = planted(0.5);
-  EXPECT_THAT(ids(told), ElementsAre("yaw_offset"));
-  EXPECT_THAT(told.findings.at(0).text, HasSubstr("beyond infinity"));
-  expect_mended(truth, told);
+  const PairCheck observable = injected(0.5);
+  EXPECT_THAT(ids(observable), ElementsAre("yaw_offset"));
+  EXPECT_THAT(observable.findings.at(0).text, HasSubstr("have negative disparity"));
+  expect_mended(truth, observable);
 }
 
 TEST(PlantedFault, DistortionIgnored) {
@@ -244,8 +244,8 @@ TEST(PlantedFault, FocalRatio) {
   expect_mended(truth, result);
 }
 
-// What is wrong in one eye only, and what looks like something else at first sight.
-TEST(PlantedFault, FocalLengthOfAnotherSizeInOneEye) {
+// An error of one camera that resembles other errors.
+TEST(PlantedFault, FocalLengthOfAnotherSizeInOneCamera) {
   const Rig truth = true_rig();
   for (const double factor : {0.5, 1.5}) {
     Rig rig = truth;
@@ -254,16 +254,16 @@ TEST(PlantedFault, FocalLengthOfAnotherSizeInOneEye) {
     EXPECT_THAT(ids(result), Contains("size_mismatch")) << factor;
     EXPECT_THAT(ids(result), Not(Contains("swapped_eyes"))) << factor;
     EXPECT_NEAR(result.correction.focal_ratio, 1 / factor, 0.005 / factor);
-    EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the right eye")) << factor;
-    EXPECT_THAT(result.findings.at(0).text, Not(HasSubstr("do not tell"))) << factor;
+    EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the right camera")) << factor;
+    EXPECT_THAT(result.findings.at(0).text, Not(HasSubstr("do not distinguish"))) << factor;
     EXPECT_TRUE(result.structure_found);
     EXPECT_EQ(result.corrected->cameras[0].model, truth.cameras[0].model);
     expect_mended(truth, result);
   }
 }
 
-// By less than sizes usually differ, which looks like an error of the lens at first.
-TEST(PlantedFault, FocalLengthOfALittleOtherSizeInOneEye) {
+// A factor closer to one than usual, which resembles an error of the lens.
+TEST(PlantedFault, FocalLengthOfASimilarSizeInOneCamera) {
   const Rig truth = true_rig();
   Rig rig = truth;
   rig.cameras[1].model = with_focal_times(rig.cameras[1].model, 1.25);
@@ -273,17 +273,17 @@ TEST(PlantedFault, FocalLengthOfALittleOtherSizeInOneEye) {
   expect_mended(truth, result);
 }
 
-// Rows of pinholes do not tell a size that both have; a centre that is none does.
+// A size error common to two pinholes does not change their rows; an implausible principal point reveals it.
 TEST(PlantedFault, SizeOfTwoPinholes) {
   const Rig truth = straight_rig();
   Rig rig = truth;
   for (Camera& c : rig.cameras) c.model = resized(c.model, 2);
   const PairCheck result = check(rig, look(truth));
   EXPECT_THAT(ids(result), Each(std::string("size_mismatch")));
-  EXPECT_NEAR(resolution(*result.corrected), resolution(truth), 1);
+  EXPECT_NEAR(focal_px(*result.corrected), focal_px(truth), 1);
 }
 
-// Of two equal pinholes it may as well be the other one's.
+// With two equal pinholes the inverse factor on the other camera explains it equally well.
 TEST(PlantedFault, FocalLengthOfAnotherSizeInOneOfTwoPinholes) {
   Rig truth = straight_rig();
   truth.cameras[1].model = truth.cameras[0].model;
@@ -292,13 +292,13 @@ TEST(PlantedFault, FocalLengthOfAnotherSizeInOneOfTwoPinholes) {
   rig.cameras[1].model = with_focal_times(rig.cameras[1].model, 2);
   const PairCheck result = check(rig, look(truth));
   EXPECT_THAT(ids(result), Contains("size_mismatch"));
-  EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the left eye 2 times as large"));
-  EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the right eye 0.5 times as large"));
-  EXPECT_THAT(result.findings.at(0).text, HasSubstr("rows do not tell which"));
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the left camera 2 times as large"));
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("of the right camera 0.5 times as large"));
+  EXPECT_THAT(result.findings.at(0).text, HasSubstr("rows do not distinguish the two"));
 }
 
-// Pictures exchanged and a yaw: no size is told that is none.
-TEST(PlantedFault, SwappedPicturesAndAYaw) {
+// Swapped images and a yaw: no size error must be reported.
+TEST(PlantedFault, SwappedImagesAndYaw) {
   const Rig truth = straight_rig();
   std::vector<PixelMatch> matches = look(truth);
   for (PixelMatch& match : matches) std::swap(match.left, match.right);
@@ -319,12 +319,12 @@ TEST(PlantedFault, FxAlone) {
   }
   const PairCheck result = check(rig, look(truth));
   EXPECT_THAT(ids(result), Each(std::string("size_mismatch")));
-  EXPECT_NEAR(resolution(*result.corrected), resolution(truth), 2);
+  EXPECT_NEAR(focal_px(*result.corrected), focal_px(truth), 2);
   expect_mended(truth, result);
 }
 
-// Pictures right, the names of the eyes exchanged: not the inverse transform, which has other lenses.
-TEST(PlantedFault, SwappedNamesOfTheEyes) {
+// The images are right, the camera names swapped. An inverse transform would not explain the different camera models.
+TEST(PlantedFault, SwappedCameraNames) {
   const Rig truth = true_rig();
   Rig rig = truth;
   std::swap(rig.pairs[0].left, rig.pairs[0].right);
@@ -334,7 +334,7 @@ TEST(PlantedFault, SwappedNamesOfTheEyes) {
   expect_mended(truth, result);
 }
 
-TEST(PlantedFault, SwappedLenses) {
+TEST(PlantedFault, SwappedIntrinsics) {
   const Rig truth = true_rig();
   Rig rig = truth;
   std::swap(rig.cameras[0].model, rig.cameras[1].model);
@@ -344,8 +344,8 @@ TEST(PlantedFault, SwappedLenses) {
   expect_mended(truth, result);
 }
 
-// Two eyes that are the same: pictures do not tell an inverse transform from exchanged names, and it is said.
-TEST(PlantedFault, EqualEyesOnTheWrongSide) {
+// With two equal cameras an inverse transform and swapped names are equivalent; both are reported.
+TEST(PlantedFault, EqualCamerasOnTheWrongSide) {
   Rig truth = straight_rig();
   truth.cameras[1].model = truth.cameras[0].model;
   truth = with_pose(truth, Pose::from_translation({0.11, 0, 0}));
@@ -354,7 +354,7 @@ TEST(PlantedFault, EqualEyesOnTheWrongSide) {
   expect_mended(truth, result);
 }
 
-TEST(PlantedFault, DistortionIgnoredInOneEye) {
+TEST(PlantedFault, DistortionIgnoredInOneCamera) {
   const Rig truth = true_rig();
   Rig rig = truth;
   rig.cameras[1].model = std::get<RadialTangentialModel>(truth.cameras[1].model).pinhole();
@@ -365,7 +365,7 @@ TEST(PlantedFault, DistortionIgnoredInOneEye) {
   EXPECT_LT(check(*result.corrected, look(truth, 700, 2)).as_given.mean_px, 0.3);
 }
 
-TEST(PlantedFault, RollOfADegree) {
+TEST(PlantedFault, RollOfOneDegree) {
   const Rig truth = true_rig();
   PairCorrection off;
   off.roll_rad = kDegree;
@@ -376,7 +376,7 @@ TEST(PlantedFault, RollOfADegree) {
   expect_mended(truth, result);
 }
 
-TEST(PlantedFault, BaselineInAnotherDirection) {
+TEST(PlantedFault, BaselineDirection) {
   const Rig truth = true_rig();
   Pose pose = left_from_right(truth);
   pose = Pose(pose.rotation(), pose.translation() + Eigen::Vector3d(0, 0.01, 0.01));
@@ -385,8 +385,8 @@ TEST(PlantedFault, BaselineInAnotherDirection) {
   expect_mended(truth, result);
 }
 
-// What would have to be turned by half a circle is no calibration with an error.
-TEST(PlantedFault, AnEyeUpsideDown) {
+// A rotation of 180° is not a calibration error: no correction is made.
+TEST(PlantedFault, CameraUpsideDown) {
   const Rig truth = true_rig();
   PairCorrection off;
   off.roll_rad = 180 * kDegree;
@@ -396,21 +396,21 @@ TEST(PlantedFault, AnEyeUpsideDown) {
   EXPECT_TRUE(!result.corrected || *result.corrected == rig);
 }
 
-// Millimetres in the place of pixels: whatever is said, no lens without a view comes of it.
+// Focal lengths in millimetres instead of pixels: a corrected rig must have a plausible focal length.
 TEST(PlantedFault, FocalLengthsInMillimetres) {
   const Rig truth = true_rig();
   Rig rig = truth;
-  for (Camera& c : rig.cameras) c.model = with_focal_times(c.model, 3 / resolution(truth));
+  for (Camera& c : rig.cameras) c.model = with_focal_times(c.model, 3 / focal_px(truth));
   const PairCheck result = check(rig, look(truth));
   EXPECT_EQ(result.verdict, PairVerdict::bad);
   EXPECT_THAT(ids(result), Contains("size_mismatch"));
   if (result.corrected) {
-    EXPECT_GE(resolution(*result.corrected), 3);
+    EXPECT_GE(focal_px(*result.corrected), 3);
   }
 }
 
-// Other moments, other rigs: nothing is named that is not there, and no rig is made of it.
-TEST(PlantedFault, PicturesThatDoNotBelongTogether) {
+// Images of different times or rigs: no specific error is reported and no corrected rig is made.
+TEST(PlantedFault, UnrelatedImages) {
   std::vector<PixelMatch> matches = look(true_rig());
   Random random(5);
   for (PixelMatch& match : matches) match.right.y() += random.uniform(-60, 60);
@@ -420,14 +420,14 @@ TEST(PlantedFault, PicturesThatDoNotBelongTogether) {
   EXPECT_TRUE(std::isnan(result.correction.yaw_rad) && std::isnan(result.as_corrected.mean_px));
 }
 
-TEST(PlantedFault, OnePictureTwice) {
+TEST(PlantedFault, SameImageTwice) {
   std::vector<PixelMatch> matches = look(straight_rig());
   for (PixelMatch& match : matches) match.right = match.left;
   EXPECT_THAT(ids(check(straight_rig(), matches)), ElementsAre("same_picture"));
 }
 
-// A sound rig comes back as it was: corrections within their errors would cost range.
-TEST(PlantedFault, NoneIsMended) {
+// A correct rig is returned unchanged: corrections within their uncertainty would degrade range.
+TEST(PlantedFault, CorrectRigIsUnchanged) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Rig truth = true_rig();
     EXPECT_EQ(*check(truth, look(truth, 300, seed)).corrected, truth) << seed;

@@ -11,7 +11,7 @@ namespace spartan {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr int kColumns = 8, kRows = 6, kLeastInCell = 3;
+constexpr int kColumns = 8, kRows = 6, kMinMatchesPerCell = 3;
 static_assert(kColumns * kRows == kRowErrorCells);
 
 }  // namespace
@@ -31,23 +31,23 @@ RowErrors row_errors(std::vector<double> signed_px) {
 }
 
 std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches, const std::vector<double>& signed_px,
-                                         ImageSize picture) {
-  if (picture.empty()) return {};
+                                         ImageSize image_size) {
+  if (image_size.empty()) return {};
   std::vector<std::vector<double>> cells(kRowErrorCells);
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (!std::isfinite(signed_px[i])) continue;
     const Eigen::Vector2d& p = matches[i].left;
-    const int column = std::clamp(static_cast<int>(p.x() * kColumns / picture.width), 0, kColumns - 1);
-    const int row = std::clamp(static_cast<int>(p.y() * kRows / picture.height), 0, kRows - 1);
+    const int column = std::clamp(static_cast<int>(p.x() * kColumns / image_size.width), 0, kColumns - 1);
+    const int row = std::clamp(static_cast<int>(p.y() * kRows / image_size.height), 0, kRows - 1);
     cells[static_cast<std::size_t>(row * kColumns + column)].push_back(signed_px[i]);
   }
   std::vector<RowErrorCell> map;
   for (int k = 0; k < kRowErrorCells; ++k) {
     std::vector<double>& errors = cells[static_cast<std::size_t>(k)];
     const int count = static_cast<int>(errors.size());
-    if (count < kLeastInCell) continue;
+    if (count < kMinMatchesPerCell) continue;
     const int column = k % kColumns, row = k / kColumns;
-    map.push_back({{(column + 0.5) * picture.width / kColumns, (row + 0.5) * picture.height / kRows},
+    map.push_back({{(column + 0.5) * image_size.width / kColumns, (row + 0.5) * image_size.height / kRows},
                    count,
                    median(std::move(errors))});
   }

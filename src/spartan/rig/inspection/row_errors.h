@@ -1,4 +1,4 @@
-// How far the rows of two eyes are apart.
+// Statistics of the row errors (vertical disparities) of a stereo pair.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,31 +9,32 @@
 
 namespace spartan {
 
-/// Row differences (left − right) of matches, pixels.
+/// Row errors (left − right) of matches, pixels.
 struct RowErrors {
-  double mean_px = 0, p95_px = 0;  ///< of their absolute values
+  double mean_px = 0, p95_px = 0;  ///< of the absolute values
   double median_px = 0;            ///< signed
 };
 
-/// What stereo needs: 0.5 px in the mean, 1.5 px for 95 %.
+/// What stereo matching needs: a mean of at most 0.5 px, and 95 % of the matches within 1.5 px.
 inline constexpr double kGoodRowsMean_px = 0.5, kGoodRowsP95_px = 1.5;
 inline bool are_good(const RowErrors& rows) {
   return rows.mean_px <= kGoodRowsMean_px && rows.p95_px <= kGoodRowsP95_px;
 }
 
-/// A part of the left picture.
+/// A cell of the left image.
 struct RowErrorCell {
   Eigen::Vector2d centre_px;
   int matches = 0;
-  double median_px = 0;  ///< signed row difference of the pair as given, in the rectified view
+  double median_px = 0;  ///< signed row error in the rectified view of the pair as given
 };
 
-/// What is no number (no line of sight) does not count; NaN without any that is.
+/// Statistics of the finite values (others are matches that cannot be unprojected); NaN where there is none.
 RowErrors row_errors(std::vector<double> signed_px);
 
-/// The picture in 8 × 6 parts; those with at least 3 matches, row by row. Empty where the size is not known.
+/// Row errors in a grid of 8 × 6 cells over the left image: the cells with at least 3 matches, row by row. Empty where
+/// the image size is not known. `signed_px`: one value per match.
 std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches, const std::vector<double>& signed_px,
-                                         ImageSize picture);
+                                         ImageSize image_size);
 inline constexpr int kRowErrorCells = 8 * 6;
 
 }  // namespace spartan
