@@ -135,7 +135,7 @@ struct Accuracy {
 
 Accuracy measure_accuracy(const Case& c) {
   Accuracy a;
-  for (const Eigen::Vector2d& pixel : testing::picture_grid(kSize, kGrid)) {
+  for (const Eigen::Vector2d& pixel : testing::image_grid(kSize, kGrid)) {
     ++a.tested;
     const auto ray = unproject(c.model, pixel);
     if (!ray) continue;
@@ -160,7 +160,7 @@ void report(const Case& c) {
   std::vector<Eigen::Vector2d> pixels;
   std::vector<Eigen::Vector3d> points;
   Points same;
-  const auto grid = testing::picture_grid(kSize, 96);
+  const auto grid = testing::image_grid(kSize, 96);
   for (int i = 0; std::ssize(points) < kPoints; ++i) {
     const Eigen::Vector2d& pixel = grid[static_cast<std::size_t>(i) % grid.size()];
     const auto ray = unproject(c.model, pixel);

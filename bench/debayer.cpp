@@ -87,7 +87,7 @@ Method spartan_method(const std::string& name, DebayerMethod method, const std::
   return {name, [debayerer](const cv::Mat& mosaic, const Pattern& pattern, cv::Mat& result) {
             result.create(mosaic.size(), CV_8UC3);
             debayerer->apply(spartan::as_view<std::uint8_t>(mosaic), {pattern.layout, 8},
-                             spartan::as_view<Rgb8>(result), spartan::Workers(1));
+                             spartan::as_view<Rgb8>(result), spartan::ThreadPool(1));
           }};
 }
 
@@ -176,7 +176,7 @@ void time_targets(int repeat) {
   Image<spartan::Rgb16> rgb16(kSide, kSide);
   Image<std::uint16_t> luma16(kSide, kSide);
   fmt::print("\n{} x {}, ms: {:>12} {:>8} {:>8} {:>8}\n", kSide, kSide, "RGB 8", "luma 8", "RGB 16", "luma 16");
-  const spartan::Workers one(1);
+  const spartan::ThreadPool one(1);
   const auto time = [&](const Debayerer& d, const auto& mosaic, auto& result) {
     const int bits = 8 * static_cast<int>(sizeof(mosaic(0, 0)));
     std::vector<double> runs;

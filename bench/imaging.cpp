@@ -39,9 +39,9 @@ struct Variant {
   ImagingOptions options;
 };
 
-ImagingOptions with(bool balance, bool contrast, double local_clip = 0) {
+ImagingOptions with(bool gain_compensation, bool contrast, double local_clip = 0) {
   ImagingOptions options;
-  options.balance = balance;
+  options.gain_compensation = gain_compensation;
   options.contrast = contrast;
   if (local_clip > 0) options.local_contrast = {true, 8, local_clip};
   return options;
@@ -78,7 +78,7 @@ Scores score(const Pair& pair, const RawPair& raw, const ImagingOptions& options
   Camera right = left;
   right.name = "right";
   const Rig rig = rig_of_one_pair(pair.name, left, right, Pose(Eigen::Quaterniond::Identity(), {-0.1, 0, 0}));
-  auto imager = must(Imager::create(rig, options, Workers(threads)));
+  auto imager = must(Imager::create(rig, options, ThreadPool(threads)));
   StereoFrame frame;
   frame.pair = rig.pairs.front().name;
   frame.left = raw.left;
@@ -91,7 +91,7 @@ Scores score(const Pair& pair, const RawPair& raw, const ImagingOptions& options
     for (const StageTime& t : rectified.times) sum += t.wall_ms;
     times.push_back(sum);
   }
-  DisparityComputer computer(DisparityOptions{}, Workers(threads));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(threads));
   const auto image = must(computer.compute(rectified.left, rectified.right, {0, pair.disparities - 1}));
   const auto all = must(compare_disparities(image.disparity, pair.truth, pair.mask)).all;
   return {all.bad_2.value_or(0), all.matched_bad_2.value_or(0), all.density_percent.value_or(0),
@@ -108,7 +108,8 @@ FrameImage simulate_lens(ImageView<const std::uint8_t> image, double gain, const
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
       const double rho2 = 4 * ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / diagonal_squared;
-      recorded(x, y) = static_cast<std::uint16_t>(std::min(4095.0, image(x, y) * 16 * gain * lens.light_at(rho2)));
+      recorded(x, y) =
+          static_cast<std::uint16_t>(std::min(4095.0, image(x, y) * 16 * gain * lens.relative_illumination(rho2)));
     }
   }
   return FrameImage::own(std::move(recorded), format);
@@ -175,10 +176,11 @@ void compare_lenses(const std::vector<Pair>& pairs, int threads) {
   Table table("12 bits; right camera at 0.6 of the light, then both cameras with vignetting to 0.4 in the corners");
   for (const Pair& pair : pairs) {
     const RawPair dark{simulate_lens(pair.left, 1, {}), simulate_lens(pair.right, 0.6, {}), {}};
-    for (const bool balance : {false, true}) {
+    for (const bool gain_compensation : {false, true}) {
       ImagingOptions options;
-      options.balance = balance;
-      table.note(pair.name, balance ? "dark right, balance" : "dark right", score(pair, dark, options, threads));
+      options.gain_compensation = gain_compensation;
+      table.note(pair.name, gain_compensation ? "dark right, balance" : "dark right",
+                 score(pair, dark, options, threads));
     }
     const std::vector<double> lens{-0.6};
     const RawPair shaded{simulate_lens(pair.left, 1, lens), simulate_lens(pair.right, 1, lens), lens};
@@ -208,7 +210,7 @@ void compare_debayering(const std::vector<Pair>& pairs, int threads) {
 
 /// The median ratio of left to right gray level over pixels matched by stereo.
 double matched_ratio(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, int threads) {
-  DisparityComputer computer(DisparityOptions{}, Workers(threads));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(threads));
   const auto image = must(computer.compute(left, right, {0, 127}));
   Random random(1);
   std::vector<double> ratios;

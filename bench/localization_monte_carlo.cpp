@@ -63,9 +63,9 @@ struct Seeds {
 };
 
 std::vector<TrialResult> run_trials(const TrueDrive& drive, const Subset& subset, const Seeds& seeds,
-                                    const MeasurementSource& arrivals_of, const Workers& workers) {
+                                    const MeasurementSource& arrivals_of, const ThreadPool& workers) {
   std::vector<TrialResult> results(static_cast<std::size_t>(seeds.count));
-  workers.for_each_part(0, seeds.count, 1, [&](int from, int to) {
+  workers.parallel_for(0, seeds.count, 1, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       const auto seed = static_cast<std::uint64_t>(seeds.first + i);
       results[static_cast<std::size_t>(i)] = run_trial(drive, arrivals_of(drive, seed, subset));
@@ -90,7 +90,7 @@ double percent_in_band(const std::vector<TrialResult>& trials, const Band& b, do
   return 100.0 * inside / count;
 }
 
-void print_subsets(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
+void print_subsets(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& workers) {
   const Band three = band(3, seeds.count), six = band(6, seeds.count);
   fmt::print("\n## {}: {:.0f} m, {} frames, {} seeds\n\n", drive.scenario.name, drive.length_m, drive.poses.size(),
              seeds.count);
@@ -239,7 +239,7 @@ std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
 // 99.73 % quantile of chi-square with three degrees of freedom, the probability of 3 σ in one dimension.
 constexpr double kThreeSigma = 14.156;
 
-void print_faults(const TrueDrive& drive, const Seeds& seeds, const Workers& workers) {
+void print_faults(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& workers) {
   fmt::print("\n## {}: sensor faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds.count);
   fmt::print(
       "\"Inside 3 σ\": trials whose position error is inside the 99.7 % region of its covariance, 5 frames after the "
@@ -282,7 +282,7 @@ void run(const std::vector<std::string>& words) {
   RecordingArguments arguments = read_arguments(
       words, {{"--seeds", "30"}, {"--first", "1"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "both"}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct", "crater_rim", "loop"};
-  const Workers workers(arguments.number("--threads"));
+  const ThreadPool workers(arguments.number("--threads"));
   const Seeds seeds{arguments.number("--first"), arguments.number("--seeds")};
   fmt::print(
       "# Localization, Monte Carlo\n\nOdometry errors drawn from their measured model. Final error: of the last "

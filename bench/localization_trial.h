@@ -17,7 +17,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/localization/measurement.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/sim/motion_sensors.h"
 #include "spartan/sim/scenario.h"
 #include "spartan/sim/world.h"
@@ -62,7 +62,7 @@ inline std::optional<TrueDrive> open_true_drive(const std::string& folder, const
   drive.scenario = *scenario;
   drive.world = std::make_unique<sim::World>(sim::make_world(*scenario, *plan));
   drive.motion = std::make_unique<sim::BodyMotion>(*plan, sim::WheelGround{drive.world->shape, drive.world->wheel_lift},
-                                                   scenario->chassis, Workers(2));
+                                                   scenario->chassis, ThreadPool(2));
   for (const sim::PlannedFrame& frame : plan->frames()) {
     const auto pair =
         std::find_if(rig->pairs.begin(), rig->pairs.end(), [&](const auto& p) { return p.name == frame.pair; });
@@ -176,7 +176,7 @@ inline LocalizationOptions options_for(const TrueDrive& drive) {
   // A recording specifies it.
   options.gravity_m_s2 = drive.scenario.gravity_m_s2;
   const sim::Scenario& s = drive.scenario;
-  return with_stated(options, sim::specified_noise(s.imu, s.compass, s.inclinometer));
+  return with_specified_noise(options, sim::specified_noise(s.imu, s.compass, s.inclinometer));
 }
 
 inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {

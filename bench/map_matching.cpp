@@ -39,7 +39,7 @@ void accumulate_time(Clock::time_point& start, double& sum) {
 }
 
 constexpr double kDegree = std::numbers::pi / 180;
-const Workers kWorkers(2);
+const ThreadPool kWorkers(2);
 MatchOptions g_options;
 
 struct StopWithMap {
@@ -143,9 +143,9 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
         "{:<16} {:>2} overlap {:.2f} {:<10} error {:6.1f} mm {:5.2f} deg sigma {:5.1f} mm {:5.2f} deg nees {:6.1f} det "
         "{} "
         "cells {} blocks {} misfit {:.2f} lead {:.1f} cand {} {:.2f} s\n",
-        setting.scenario, setting.incoming, setting.overlap, name_of(o.match.verdict), 1000 * o.error_m, o.error_deg,
+        setting.scenario, setting.incoming, setting.overlap, name_of(o.match.status), 1000 * o.error_m, o.error_deg,
         1000 * o.match.sigma_m, o.match.sigma_rad / kDegree, o.nees, o.match.determined, o.match.cells, o.match.blocks,
-        o.match.misfit, o.match.lead, o.match.candidates, o.seconds);
+        o.match.normalized_residual, o.match.margin, o.match.candidates, o.seconds);
   }
   return o;
 }
@@ -187,7 +187,7 @@ struct Tally {
     const bool accurate = o.error_m <= 0.02 && o.error_deg <= 0.5;
     recovered += o.match.decided() && accurate ? 1 : 0;
     false_success += o.match.decided() && o.error_m > 0.1 ? 1 : 0;
-    ++verdicts[std::string(name_of(o.match.verdict))];
+    ++verdicts[std::string(name_of(o.match.status))];
     seconds.push_back(o.seconds);
     if (!o.match.decided()) return;
     errors_m.push_back(o.error_m);
@@ -362,7 +362,7 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
         const Vector6d xi = log_se3(off);
         fmt::print(
             "  {:>2} {:<10} error before {:6.1f} mm, corrected {:6.1f} mm {:5.2f} deg, sigma {:.1f} mm, nees {:.1f}\n",
-            i, name_of(result->match.verdict),
+            i, name_of(result->match.status),
             1000 * (at.pose.translation() - stops[i].points.world_from_body.translation()).norm(),
             1000 * off.translation().norm(), rotation_angle(off) / kDegree,
             1000 * std::sqrt(result->corrected.covariance.diagonal().head<3>().maxCoeff()),

@@ -22,7 +22,7 @@
 #include "spartan/core/process.h"
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/eval/map_metrics.h"
-#include "spartan/reconstruction/position_mapper.h"
+#include "spartan/reconstruction/stop_mapper.h"
 #include "standard_recordings.h"
 
 namespace spartan {
@@ -38,7 +38,7 @@ struct Visibility {
 
 // Adds the true disparities of one frame.
 void add_true_view(const Drive& drive, const std::string& pair, Stamp stamp, const ViewGeometry& view,
-                   const Pose& world_from_body, const MapPlace& place, Visibility& visibility) {
+                   const Pose& world_from_body, const GeoTransform& place, Visibility& visibility) {
   const std::string name = fmt::format("/{}/{}.png", pair, stamp.ns);
   const auto disparity = read_disparity(drive.folder + "/truth/disparity" + name);
   const auto mask = read_truth_mask(drive.folder + "/truth/mask" + name);
@@ -65,19 +65,19 @@ struct Sums {
   double cells = 0, error = 0, squares = 0, visible = 0, covered = 0, free = 0, false_marks = 0;
   int obstacles = 0, found = 0, cavities = 0, cavities_found = 0;
   void add(const MapMetrics& m) {
-    cells += m.judged_cells;
-    error += m.judged_cells * m.bias_m;
-    squares += m.judged_cells * m.rms_m * m.rms_m;
+    cells += m.elevation_cells;
+    error += m.elevation_cells * m.bias_m;
+    squares += m.elevation_cells * m.rms_m * m.rms_m;
     visible += m.visible_cells;
     covered += m.covered_cells;
     free += m.free_cells;
     false_marks += m.false_cells;
-    for (const JudgedThing& thing : m.obstacles) {
+    for (const HazardScore& thing : m.obstacles) {
       if (thing.height_m < 0.15) continue;
       ++obstacles;
       found += thing.found ? 1 : 0;
     }
-    for (const JudgedThing& thing : m.cavities) {
+    for (const HazardScore& thing : m.cavities) {
       ++cavities;
       cavities_found += thing.found ? 1 : 0;
     }
@@ -91,7 +91,7 @@ struct Totals {
   std::array<std::array<std::int64_t, 4>, 4> confusion{};
 
   void add(const MapMetrics& m) {
-    for (const JudgedThing& thing : m.obstacles) {
+    for (const HazardScore& thing : m.obstacles) {
       for (std::size_t i = 0; i < things.size(); ++i) {
         if (thing.height_m < kHeights_m[i] || thing.height_m >= kHeights_m[i + 1]) continue;
         ++things[i];
@@ -123,8 +123,8 @@ struct Totals {
 
 constexpr std::array<double, 5> kBorders_m{0, 1.5, 2.5, 4, 4};
 
-void list_missed(std::int64_t position, const char* what, const std::vector<JudgedThing>& things) {
-  for (const JudgedThing& thing : things) {
+void list_missed(std::int64_t position, const char* what, const std::vector<HazardScore>& things) {
+  for (const HazardScore& thing : things) {
     if (thing.found || thing.height_m < 0.15) continue;
     fmt::print(
         "  {} missed at position {}: ({:.2f}, {:.2f}), {:.2f} m, diameter {:.2f} m, {} of {} visible cells marked\n",
@@ -139,9 +139,9 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
     fmt::print("{:<18} skipped: {} (create it with scripts/recordings)\n", scenario, drive.error().message());
     return;
   }
-  auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));
+  auto imager = Imager::create(drive->rig, ImagingOptions(), ThreadPool(2));
   if (!imager) return;
-  PositionMapper mapper({}, {}, Workers(2));
+  StopMapper mapper({}, {}, ThreadPool(2));
   std::array<Sums, 4> sums;  // three bins of range, all
   int stops = 0;
   Image<float> level(drive->elevation.bands[0].size());
@@ -150,7 +150,7 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
     for (int x = 0; x < level.width(); ++x)
       level(x, y) = drive->elevation.bands[0](x, y) - drive->obstacles.bands[1](x, y);
   }
-  const TrueGround truth{drive->elevation.place, drive->elevation.bands[0], drive->elevation.bands[1], level};
+  const TerrainTruth truth{drive->elevation.place, drive->elevation.bands[0], drive->elevation.bands[1], level};
   for (const auto& [position, frames] : drive->stops) {
     if (stops == wanted) break;
     ++stops;
@@ -159,15 +159,15 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
     const Pose pose = true_pose(*drive, frames.front().left_stamp);
     const LocalMap map = mapper.map(surface_points(merged), pose);
     Visibility visibility(map.size());
-    for (const PositionView& view : mapper.views())
+    for (const StopView& view : mapper.views())
       add_true_view(*drive, view.pair, view.stamp, view.geometry, pose, map.place, visibility);
     for (std::size_t bin = 0; bin < sums.size(); ++bin) {
-      MapScoring scoring;
-      scoring.eye_m = pose.translation().head<2>();
+      MapMetricsOptions scoring;
+      scoring.viewpoint_m = pose.translation().head<2>();
       scoring.nearest_m = bin < 3 ? kBorders_m[bin] : 0;
       scoring.farthest_m = kBorders_m[bin + 1];
-      const MapMetrics metrics =
-          judge_map({map.place, map.elevation_m, class_band(map.kind), visibility.pixels, visibility.lowest_m}, truth, scoring);
+      const MapMetrics metrics = evaluate_map(
+          {map.place, map.elevation_m, class_band(map.kind), visibility.pixels, visibility.lowest_m}, truth, scoring);
       sums[bin].add(metrics);
       if (bin == 3) totals.add(metrics);
       if (list && bin == 3) {
@@ -183,7 +183,7 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
                1000 * s.error / s.cells, 1000 * std::sqrt(s.squares / s.cells), 100 * s.covered / s.visible, s.found,
                s.obstacles, 100 * s.false_marks / s.free, s.cavities_found, s.cavities);
   }
-  const MappingTimes& times = mapper.times();
+  const StopMapperTimes& times = mapper.times();
   fmt::print("{:<18} seconds a stop on two threads: disparity {:.2f}, v-disparity {:.2f}, merging {:.2f}, map {:.2f}\n",
              "", 1e-3 * times.disparity / stops, 1e-3 * times.v_disparity / stops, 1e-3 * times.merging / stops,
              1e-3 * times.map / stops);

@@ -101,7 +101,7 @@ void compare_pair(FrameSource& source, Imager& imager, const StereoPair& pair, S
   if (!view) return;
   const DisparityRange range = disparity_range(view->geometry, pair.nearest_m);
   const int disparities = (range.max + 15) / 16 * 16;
-  DisparityComputer computer(DisparityOptions{}, Workers(2));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(2));
   if (const auto ours = computer.compute(view->left, view->right, range, view->left_mask, view->right_mask))
     add_scores(ours->disparity, *truth, *mask, view->geometry, scores["Spartan"]);
   add_scores(opencv_disparity(view->left, view->right, disparities, cv::StereoSGBM::MODE_SGBM), *truth, *mask,
@@ -131,12 +131,12 @@ void compare(const std::string& folder, const std::string& scenario, const std::
     fmt::print("{:<18} skipped: {} (create it with scripts/recordings)\n", scenario, source.error().message());
     return;
   }
-  auto imager = Imager::create((*source)->info().rig, ImagingOptions(), Workers(2));
+  auto imager = Imager::create((*source)->info().rig, ImagingOptions(), ThreadPool(2));
   if (!imager) return;
   Scores scores;
   for (const StereoPair& pair : (*source)->info().rig.pairs) {
     if (pair.name != pair_name) continue;
-    const std::vector<Stamp> stamps = (*source)->announced_stamps(pair.name);
+    const std::vector<Stamp> stamps = (*source)->listed_stamps(pair.name);
     // Spread over the recording, so that stops and pans vary.
     const std::size_t count = std::min<std::size_t>(static_cast<std::size_t>(wanted), stamps.size());
     for (std::size_t i = 0; i < count; ++i)

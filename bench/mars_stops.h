@@ -15,7 +15,7 @@
 #include "spartan/core/geotiff.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/imaging/imager.h"
-#include "spartan/reconstruction/position_mapper.h"
+#include "spartan/reconstruction/stop_mapper.h"
 
 namespace spartan {
 
@@ -26,7 +26,7 @@ struct Drive {
   Rig rig;
   Trajectory poses;
   LoadedMap elevation, obstacles;
-  std::map<std::int64_t, std::vector<ShotName>> stops;  // with frames of more than one pair
+  std::map<std::int64_t, std::vector<FrameKey>> stops;  // with frames of more than one pair
 };
 
 inline Result<Drive> open_drive(const std::string& folder) {
@@ -49,7 +49,7 @@ inline Result<Drive> open_drive(const std::string& folder) {
   drive.obstacles = std::move(*obstacles);
   // Position ids have no gaps, and every position has a frame of the odometry pair.
   for (std::int64_t position = 0;; ++position) {
-    std::vector<ShotName> frames = drive.source->shots_at(position);
+    std::vector<FrameKey> frames = drive.source->frames_at(position);
     if (frames.empty()) break;
     if (frames.size() > 1) drive.stops[position] = std::move(frames);
   }
@@ -65,7 +65,7 @@ inline Pose true_pose(const Drive& drive, Stamp stamp) {
 }
 
 // Adds all views of one stop to the mapper.
-inline void add_views(Drive& drive, Imager& imager, PositionMapper& mapper, const std::vector<ShotName>& frames) {
+inline void add_views(Drive& drive, Imager& imager, StopMapper& mapper, const std::vector<FrameKey>& frames) {
   mapper.leave();
   for (const auto& [pair, stamp] : frames) {
     const auto frame = drive.source->frame_at(pair, stamp);

@@ -29,7 +29,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFarthest_m = 4;  // range of the points of the true ground plane
 
 // Least-squares plane through the true points.
-std::optional<GroundPlane> true_plane(const Drive& drive, const PositionView& view) {
+std::optional<GroundPlane> true_plane(const Drive& drive, const StopView& view) {
   const auto disparity =
       read_disparity(fmt::format("{}/truth/disparity/{}/{}.png", drive.folder, view.pair, view.stamp.ns));
   if (!disparity) return std::nullopt;
@@ -67,9 +67,9 @@ int known_cells(const LocalMap& map) {
 }
 
 // Number of known cells in the map of a single view of the stop.
-int known_cells_of(const PositionView& view, PositionMapper& mapper, const Pose& pose) {
+int known_cells_of(const StopView& view, StopMapper& mapper, const Pose& pose) {
   const std::vector<ViewGeometry> geometry{view.geometry};
-  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), geometry, 0.3, Workers(2));
+  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), geometry, 0.3, ThreadPool(2));
   const std::vector<MergedView> views{{view.geometry, view.disparity, view.left, {}}};
   return known_cells(mapper.map(surface_points(merger.merge(views)), pose));
 }
@@ -110,9 +110,9 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
     fmt::print("{:<18} skipped: {} (create it with scripts/recordings)\n", scenario, drive.error().message());
     return;
   }
-  auto imager = Imager::create(drive->rig, ImagingOptions(), Workers(2));
+  auto imager = Imager::create(drive->rig, ImagingOptions(), ThreadPool(2));
   if (!imager) return;
-  PositionMapper mapper({}, {}, Workers(2));
+  StopMapper mapper({}, {}, ThreadPool(2));
   std::map<std::string, GroundErrors> ground_errors;
   std::vector<double> gains, steps;
   int stops = 0;
@@ -121,7 +121,7 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
     add_views(*drive, *imager, mapper, frames);
     const Pose pose = true_pose(*drive, frames.front().left_stamp);
     int best = 0;
-    for (const PositionView& view : mapper.views()) {
+    for (const StopView& view : mapper.views()) {
       best = std::max(best, known_cells_of(view, mapper, pose));
       const auto plane = true_plane(*drive, view);
       if (!plane || !view.ground) continue;

@@ -17,8 +17,8 @@ struct TestScene {
   RockField rocks{RockFieldOptions{}, 21};
   Soil soil{SoilOptions{}, 21};
   Sun sun{LightOptions{}};
-  GroundScene scene{shape, rocks, {-0.5, -2.5, 6, 2.5}, Workers(2)};
-  SkyLight sky{scene, shape, Workers(2)};
+  GroundScene scene{shape, rocks, {-0.5, -2.5, 6, 2.5}, ThreadPool(2)};
+  SkyLight sky{scene, shape, ThreadPool(2)};
   Camera camera;
   Pose world_from_camera;
 
@@ -96,7 +96,7 @@ void WholeImage(benchmark::State& state) {
   const Renderer renderer(test_scene().camera, Sampling::of(4));
   Renderer::Poses poses;
   poses.fill(test_scene().world_from_camera);
-  for (auto _ : state) benchmark::DoNotOptimize(renderer.render(test_scene().lit(), poses, false, Workers(1)));
+  for (auto _ : state) benchmark::DoNotOptimize(renderer.render(test_scene().lit(), poses, false, ThreadPool(1)));
   count(state, static_cast<std::size_t>(renderer.rays()));
 }
 BENCHMARK(WholeImage)->Unit(benchmark::kMillisecond);

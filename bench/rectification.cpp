@@ -126,7 +126,7 @@ Accuracy accuracy(const Scene& scene, const Maps& maps, const spartan::RemapTabl
 template <class Pixel, int kChannels>
 void compare(const Scene& scene, const char* kind, const std::string& simd, int repeat) {
   using Sample = std::conditional_t<sizeof(Pixel) / kChannels == 1, std::uint8_t, std::uint16_t>;
-  const spartan::Workers one(1);
+  const spartan::ThreadPool one(1);
   const Maps maps = maps_of(scene);
   const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, one, 1, simd);
   auto source = make_image<Pixel, kChannels>(scene.size, sizeof(Sample) == 1 ? 255 : 65535);
@@ -152,7 +152,7 @@ void compare(const Scene& scene, const char* kind, const std::string& simd, int 
 
 // Memory bandwidth limit: memcpy of as many bytes as the rectification reads and writes (table, source, result).
 void print_memory_limit(const Scene& scene, const char* kind, std::size_t pixel_bytes, int repeat) {
-  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, spartan::Workers(1));
+  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, spartan::ThreadPool(1));
   const auto pixels = static_cast<std::size_t>(scene.size.width) * static_cast<std::size_t>(scene.size.height);
   const std::size_t bytes = table.bytes() + 2 * pixel_bytes * pixels;
   std::vector<std::uint8_t> from(bytes / 2, 1), to(bytes / 2);

@@ -170,7 +170,7 @@ class Means {
 
 Scores run_spartan(const Pair& pair, const spartan::DisparityOptions& options, int threads, int repeat,
                    const std::string& images) {
-  spartan::DisparityComputer computer(options, spartan::Workers(threads));
+  spartan::DisparityComputer computer(options, spartan::ThreadPool(threads));
   spartan::DisparityImage image;
   const double ms = time_of(repeat + 1, [&] {
     image = must(computer.compute(pair.left, pair.right, {0, pair.disparities - 1}));
@@ -214,7 +214,7 @@ void time_targets(const std::vector<Pair>& pairs, const Arguments& arguments) {
     for (const int threads : {1, 2}) {
       spartan::DisparityOptions options = arguments.options;
       options.simd = simd;
-      spartan::DisparityComputer computer(options, spartan::Workers(threads));
+      spartan::DisparityComputer computer(options, spartan::ThreadPool(threads));
       spartan::DisparityImage image;
       const double ms = time_of(arguments.repeat + 2, [&] {
         image = must(computer.compute(largest->left, largest->right, {0, largest->disparities - 1}));

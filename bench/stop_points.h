@@ -31,8 +31,8 @@ inline Bytes to_bytes(const StopPoints& stop) {
   std::vector<float> values;
   values.reserve(9 * stop.points.size());
   for (const SurfacePoint& p : stop.points) {
-    values.insert(values.end(), {p.in_body.x(), p.in_body.y(), p.in_body.z(), p.sigma_m, p.along.x(), p.along.y(),
-                                 p.along.z(), static_cast<float>(p.kind), p.cut ? 1.0F : 0.0F});
+    values.insert(values.end(), {p.in_body.x(), p.in_body.y(), p.in_body.z(), p.sigma_m, p.ray.x(), p.ray.y(),
+                                 p.ray.z(), static_cast<float>(p.kind), p.truncated ? 1.0F : 0.0F});
   }
   ArchiveWriter out;
   out.put(stop.stamp.ns);
@@ -125,9 +125,9 @@ inline std::vector<StopPoints> points_of_stops(const std::string& recording, con
   }
   auto drive = open_drive(recording);
   if (!drive) return {};
-  auto imager = Imager::create(drive->rig, imaging, Workers(2));
+  auto imager = Imager::create(drive->rig, imaging, ThreadPool(2));
   if (!imager) return {};
-  PositionMapper mapper(disparity, mapping, Workers(2));
+  StopMapper mapper(disparity, mapping, ThreadPool(2));
   if (folder) std::filesystem::create_directories(*folder);
   std::size_t number = 0;
   for (const auto& [position, frames] : drive->stops) {

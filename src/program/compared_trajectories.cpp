@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/pose_convention.h"
 #include "spartan/system/run_folder.h"
 

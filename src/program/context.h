@@ -11,7 +11,7 @@
 
 namespace spartan::program {
 
-/// docs/formats.md, "Exit codes".
+/// docs/reference/command_line.md.
 enum ExitCode : int {
   kDone = 0,
   kInternalFault = 1,

@@ -5,13 +5,13 @@
 namespace spartan::program {
 namespace {
 
-Json figures_json(const PairFigures& pair) {
+Json figures_json(const PairMetrics& pair) {
   const PairMargins& margins = pair.margins;
-  return {{"baseline_m", number(pair.shape.baseline_m)},
-          {"nearest_m", number(pair.shape.nearest_m)},
-          {"hfov_deg", number(pair.shape.hfov_deg)},
-          {"width_px", pair.shape.width_px},
-          {"pixel_size_um", number(pair.shape.pixel_size_um)},
+  return {{"baseline_m", number(pair.parameters.baseline_m)},
+          {"nearest_m", number(pair.parameters.nearest_m)},
+          {"hfov_deg", number(pair.parameters.hfov_deg)},
+          {"width_px", pair.parameters.width_px},
+          {"pixel_size_um", number(pair.parameters.pixel_size_um)},
           {"range_m", number(pair.range_m)},
           {"focal_length_mm", number(pair.focal_length_mm)},
           {"stereo_angle_deg", number(pair.stereo_angle_deg)},
@@ -31,21 +31,21 @@ Json figures_json(const PairFigures& pair) {
 
 Json published_json(const PairDesign& design) {
   if (!design.published) return nullptr;
-  Json json = {{"feasible", design.published->feasible}, {"on_offer", design.published_on_offer}};
+  Json json = {{"feasible", design.published->feasible}, {"on_offer", design.published_is_candidate}};
   json.update(figures_json(*design.published));
   return json;
 }
 
 // Without the feasible set.
 Json pair_json(const PairDesign& design) {
-  const auto or_null = [](const PairFigures* pair) { return pair ? figures_json(*pair) : Json(nullptr); };
+  const auto or_null = [](const PairMetrics* pair) { return pair ? figures_json(*pair) : Json(nullptr); };
   Json json = {{"combinations", design.combinations}, {"feasible_count", design.feasible.size()}};
   json["with_pan_overlap_count"] = design.with_pan_overlap_count ? Json(*design.with_pan_overlap_count) : Json(nullptr);
   json["best"] = or_null(design.best());
   json["equally_good"] = design.equally_good;
   json["best_with_pan_overlap"] = or_null(design.best_with_pan_overlap ? &*design.best_with_pan_overlap : nullptr);
   json["published"] = published_json(design);
-  json["nearest_to_a_limit"] = number(design.nearest_to_a_limit);
+  json["nearest_to_a_limit"] = number(design.smallest_limit_distance);
   return json;
 }
 
@@ -59,7 +59,7 @@ Json sectors_json(const AzimuthSet& set) {
 class GroundJson {
  public:
   explicit GroundJson(const RigDesign& design) {
-    const char* no_pair = design.wide.chosen() ? nullptr : "no wide pair is feasible or published";
+    const char* no_pair = design.wide.selected() ? nullptr : "no wide pair is feasible or published";
     const char* no_narrow = design.narrow ? "no narrow pair is feasible or published" : "there is no narrow pair";
     add("view_overlap_m", number(design.view_overlap_m), no_pair ? no_pair : no_narrow);
     if (design.pans) {
@@ -76,12 +76,12 @@ class GroundJson {
   const Json& reasons() const { return reasons_; }
 
  private:
-  void add_pans(const PanFigures& pans) {
+  void add_pans(const PanCoverage& pans) {
     const auto percent = [](const std::optional<PanOverlap>& overlap) {
       return overlap ? number(overlap->percent()) : Json(nullptr);
     };
     const char* single = "there is a single pan";
-    const DistanceSpan held = pans.azimuth_held.value_or(DistanceSpan{});
+    const DistanceSpan held = pans.full_coverage.value_or(DistanceSpan{});
     add("pan_overlap_percent", percent(pans.overlap), single);
     add("pan_overlap_far_percent", percent(pans.far_overlap), single);
     add("pan_overlap_far_stereo_percent", percent(pans.far_overlap_stereo),
@@ -158,7 +158,7 @@ void add_pair(Pieces& pieces, const PairDesign& design, bool whole_set) {
   text.resize(text.rfind('\n'));  // the object goes on
   pieces.add(text + ",\n    \"feasible\": [");
   const char* separator = "\n      ";
-  for (const PairFigures& pair : design.feasible) {
+  for (const PairMetrics& pair : design.feasible) {
     if (pieces.failed()) return;
     pieces.add(separator + dump_inside(figures_json(pair), 3));
     separator = ",\n      ";

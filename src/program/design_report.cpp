@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "spartan/rig/design/pan_words.h"
+#include "spartan/rig/design/pan_text.h"
 
 namespace spartan::program {
 namespace {
@@ -18,16 +18,16 @@ std::string percent_or_dash(double value) {
   return std::isnan(value) ? "-" : fmt::format("{:.1f}", value);
 }
 
-std::string row(const std::string& name, const PairFigures& pair) {
+std::string row(const std::string& name, const PairMetrics& pair) {
   return fmt::format(
       "{:>14}  {:>5}  {:>9}  {:>8}  {:>6}  {:>6}  {:6.2f}  {:9.3f}  {:12.2f}  {:10.2f}  {:>8}  {:>10}  {:.3f} - "
       "{:.3f}\n",
-      name, pair.shape.baseline_m, pair.shape.nearest_m, pair.shape.hfov_deg, pair.shape.width_px,
-      pair.shape.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg, pair.search_percent,
+      name, pair.parameters.baseline_m, pair.parameters.nearest_m, pair.parameters.hfov_deg, pair.parameters.width_px,
+      pair.parameters.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg, pair.search_percent,
       percent_or_dash(pair.pan_overlap_percent), pair.tilt_deg, pair.view_near_m, pair.view_far_m);
 }
 
-std::string margins_of(const PairFigures& pair) {
+std::string margins_of(const PairMetrics& pair) {
   const PairMargins& margins = pair.margins;
   std::string text =
       fmt::format("range {:+.3f} m, stereo angle {:+.2f} deg, search range {:+.2f} %, baseline {:+.2f} m",
@@ -73,17 +73,17 @@ std::string pair_text(const std::string& name, const PairRequirements& required,
   if (listed < design.feasible.size()) {
     text += fmt::format("{:>14}  {} more; --all lists them, -o writes them\n", "...", design.feasible.size() - listed);
   }
-  if (const PairFigures* best = design.best()) text += row("best", *best);
+  if (const PairMetrics* best = design.best()) text += row("best", *best);
   if (design.best_with_pan_overlap) text += row("best + overlap", *design.best_with_pan_overlap);
   if (design.published) text += row("published", *design.published);
-  if (const PairFigures* best = design.best()) text += "margins of the best: " + margins_of(*best) + "\n";
+  if (const PairMetrics* best = design.best()) text += "margins of the best: " + margins_of(*best) + "\n";
   if (design.best_with_pan_overlap) {
     text += "margins of the best with enough overlap: " + margins_of(*design.best_with_pan_overlap) + "\n";
   }
   if (design.published) {
     text +=
         fmt::format("published pair ({}, {}): margins: {}\n", design.published->feasible ? "feasible" : "not feasible",
-                    design.published_on_offer ? "in the lists" : "not in the lists", margins_of(*design.published));
+                    design.published_is_candidate ? "in the lists" : "not in the lists", margins_of(*design.published));
   }
   return text + "\n";
 }
@@ -93,14 +93,14 @@ std::string ground_text(const RigDesign& design) {
   if (design.view_overlap_m)
     text += fmt::format("ground seen by both pairs, middle column: {:.2f} m\n", *design.view_overlap_m);
   if (!design.pans) return text;
-  const PanFigures& pans = *design.pans;
-  if (pans.overlap) text += overlaps_in_words(pans) + "\n";
+  const PanCoverage& pans = *design.pans;
+  if (pans.overlap) text += describe_overlaps(pans) + "\n";
   text += fmt::format(
       "azimuth seen by the pans at the far edge, of the required one: {:.1f} deg (one camera), {:.1f} deg (both)\n",
       pans.azimuth_far.width_deg(), pans.azimuth_far_stereo.width_deg());
-  if (!pans.azimuth_held) return text + "both cameras see all of it at no distance\n";
-  return text + fmt::format("both cameras see all of it from {:.2f} m to {:.2f} m\n", pans.azimuth_held->from_m,
-                            pans.azimuth_held->to_m);
+  if (!pans.full_coverage) return text + "both cameras see all of it at no distance\n";
+  return text + fmt::format("both cameras see all of it from {:.2f} m to {:.2f} m\n", pans.full_coverage->from_m,
+                            pans.full_coverage->to_m);
 }
 
 }  // namespace
@@ -121,11 +121,11 @@ std::string design_csv(const RigDesign& design) {
       "pan_overlap_percent,enough_pan_overlap,tilt_deg,view_near_m,view_far_m\n";
   const auto add = [&](const char* name, const PairDesign& pairs) {
     std::size_t rank = 0;
-    for (const PairFigures& pair : pairs.feasible) {
+    for (const PairMetrics& pair : pairs.feasible) {
       text += fmt::format("{},{},{},{},{},{},{},{:.4f},{:.6f},{:.5f},{:.5f},{},{},{},{:.5f},{:.5f}\n", name, ++rank,
-                          pair.shape.baseline_m, pair.shape.nearest_m, pair.shape.hfov_deg, pair.shape.width_px,
-                          pair.shape.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg,
-                          pair.search_percent,
+                          pair.parameters.baseline_m, pair.parameters.nearest_m, pair.parameters.hfov_deg,
+                          pair.parameters.width_px, pair.parameters.pixel_size_um, pair.focal_length_mm, pair.range_m,
+                          pair.stereo_angle_deg, pair.search_percent,
                           std::isnan(pair.pan_overlap_percent) ? "" : fmt::format("{:.5f}", pair.pan_overlap_percent),
                           pair.with_pan_overlap ? 1 : 0, pair.tilt_deg, pair.view_near_m, pair.view_far_m);
     }

@@ -15,7 +15,7 @@ Result<ExitCode> export_command(const Context& context, const ExportArguments& a
   const auto format = parse_export_format(arguments.format);
   if (!format) return failure(format);
   const auto kind = parse_trajectory_kind(arguments.trajectory);
-  const Workers workers(context.threads);
+  const ThreadPool workers(context.threads);
   if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);
   return kDone;
 }
@@ -33,7 +33,9 @@ void add_export(CLI::App& app, Context& context) {
                    "Format: tum, kitti, euroc or csv (trajectory), geotiff (global map), ply (terrain point cloud).")
       ->required();
   command->add_option("-o,--output", a->output, "File to write.")->required();
-  command->add_option("--trajectory", a->trajectory, "Trajectory: odometry, slam or localization (default: the last of these that exists).")
+  command
+      ->add_option("--trajectory", a->trajectory,
+                   "Trajectory: odometry, slam or localization (default: the last of these that exists).")
       ->check(CLI::IsMember({"odometry", "slam", "localization"}));
   add_threads_option(*command, context);
 }

@@ -6,7 +6,7 @@
 
 #include "program/ground_plan.h"
 #include "program/ground_side.h"
-#include "spartan/rig/design/pan_words.h"
+#include "spartan/rig/design/pan_text.h"
 
 namespace spartan::program {
 namespace {
@@ -34,20 +34,21 @@ void draw_legend(Drawing& drawing, double y_px, bool pans, bool narrow) {
 }
 
 std::string caption(const DrawnPair& pair) {
-  const PairShape& shape = pair.figures.shape;
+  const PairParameters& parameters = pair.figures.parameters;
   return fmt::format("{}: baseline {} m, {} px of {} um, {}° wide, {:.2f} mm; {} m resolution holds to {:.2f} m",
-                     pair.name, shape.baseline_m, shape.width_px, shape.pixel_size_um, shape.hfov_deg,
-                     pair.figures.focal_length_mm, pair.requirements.range_resolution_m, pair.figures.range_m);
+                     pair.name, parameters.baseline_m, parameters.width_px, parameters.pixel_size_um,
+                     parameters.hfov_deg, pair.figures.focal_length_mm, pair.requirements.range_resolution_m,
+                     pair.figures.range_m);
 }
 
 }  // namespace
 
 std::optional<Drawing> draw_ground(const RigRequirements& requirements, const RigDesign& design) {
-  const PairFigures* wide = design.wide.chosen();
+  const PairMetrics* wide = design.wide.selected();
   if (!wide) return std::nullopt;
   constexpr Lettering kTitle{kInk, 22};
   std::vector<DrawnPair> pairs{{"wide", kWide, requirements.wide, *wide}};
-  const PairFigures* narrow = design.narrow ? design.narrow->chosen() : nullptr;
+  const PairMetrics* narrow = design.narrow ? design.narrow->selected() : nullptr;
   if (narrow) pairs.push_back({"narrow", kNarrow, *requirements.narrow, *narrow});
 
   // Drawn once to find the height.
@@ -58,7 +59,7 @@ std::optional<Drawing> draw_ground(const RigRequirements& requirements, const Ri
     y = draw_side(drawing, y + 10, pairs, design.view_overlap_m);
     y = draw_plan(drawing, y, pairs, design.pans);
     if (design.pans && design.pans->overlap) {
-      drawing.text({kMargin_px, y += 16}, overlaps_in_words(*design.pans, "°"), {kInk, 14});
+      drawing.text({kMargin_px, y += 16}, describe_overlaps(*design.pans, "°"), {kInk, 14});
     }
     draw_legend(drawing, y += 18, design.pans.has_value(), narrow != nullptr);
     return static_cast<int>(std::ceil(y)) + 34;

@@ -8,7 +8,7 @@
 
 namespace spartan::program {
 
-/// Of the chosen pairs (PairDesign::chosen); none where there is no wide pair to draw.
+/// Of the selected pairs (PairDesign::selected); none where there is no wide pair to draw.
 std::optional<Drawing> draw_ground(const RigRequirements& requirements, const RigDesign& design);
 
 }  // namespace spartan::program

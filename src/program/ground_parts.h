@@ -26,7 +26,7 @@ struct DrawnPair {
   std::string name;
   Rgb8 colour;
   const PairRequirements& requirements;
-  const PairFigures& figures;
+  const PairMetrics& figures;
   GroundView view() const { return ground_view(figures, requirements); }
 };
 

@@ -103,8 +103,8 @@ constexpr Pen kRequiredPen{kInk, 1.8}, kOneEyePen{kWide, 1.8, 5}, kBothEyesPen{k
 constexpr double kArcs_px = 92;  // distance of the azimuth arcs from the ground
 constexpr double kMeanings_px = 44;
 
-std::vector<Meaning> meanings_of(const PanRequirements& required, const PanFigures& seen) {
-  const auto& held = seen.azimuth_held;
+std::vector<Meaning> meanings_of(const PanRequirements& required, const PanCoverage& seen) {
+  const auto& held = seen.full_coverage;
   return {{kRequiredPen, fmt::format("required: {}°", required.azimuth_deg)},
           {kOneEyePen, fmt::format("far edge, one camera: {:.1f}°", seen.azimuth_far.width_deg())},
           {kBothEyesPen, fmt::format("far edge, both cameras: {:.1f}°", seen.azimuth_far_stereo.width_deg())},
@@ -136,8 +136,8 @@ void draw_sectors(Drawing& drawing, const Plan& plan, double radius_m, const Azi
 }
 
 void draw_azimuths(Drawing& drawing, const Plan& plan, double radius_m, const PanRequirements& required,
-                   const PanFigures& seen) {
-  const AzimuthSet azimuth = asked_azimuth(required);
+                   const PanCoverage& seen) {
+  const AzimuthSet azimuth = required_azimuth(required);
   const double half = required.azimuth_deg / 2, gap = 26 / plan.at.px_per_m;
   for (const double end : {-half, half}) {
     if (half < 180) drawing.line({plan.polar(0, 0), plan.polar(radius_m + 3.4 * gap, end)}, {kInk, 1.2, 7});
@@ -145,8 +145,8 @@ void draw_azimuths(Drawing& drawing, const Plan& plan, double radius_m, const Pa
   draw_sectors(drawing, plan, radius_m + gap, seen.azimuth_far_stereo, kBothEyesPen);
   draw_sectors(drawing, plan, radius_m + 2 * gap, seen.azimuth_far, kOneEyePen);
   draw_sectors(drawing, plan, radius_m + 3 * gap, azimuth, kRequiredPen);
-  if (!seen.azimuth_held) return;
-  const DistanceSpan& held = *seen.azimuth_held;
+  if (!seen.full_coverage) return;
+  const DistanceSpan& held = *seen.full_coverage;
   for (const double border_m : {held.from_m, held.to_m}) {
     if (border_m > 0) drawing.line(plan.arc(border_m, -half, half), kHeldPen);
   }
@@ -178,7 +178,7 @@ PlanLayout lay_out_plan(double top_px, const DrawnPair& wide, const Views& views
   constexpr double kTallest_px = 700;
   const bool pans = wide.requirements.pans.has_value();
   const double radius = std::max(farthest_corner_m(views.both_eyes), wide.requirements.range_m);
-  const double half_deg = (pans ? wide.requirements.pans->azimuth_deg : wide.figures.shape.hfov_deg) / 2;
+  const double half_deg = (pans ? wide.requirements.pans->azimuth_deg : wide.figures.parameters.hfov_deg) / 2;
   const double outside_px = pans ? kArcs_px : 0;
 
   Extent extent;
@@ -200,7 +200,7 @@ PlanLayout lay_out_plan(double top_px, const DrawnPair& wide, const Views& views
 }  // namespace
 
 double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs,
-                 const std::optional<PanFigures>& pans) {
+                 const std::optional<PanCoverage>& pans) {
   const DrawnPair& wide = pairs.front();
   const Views views = views_of(wide);
   const PlanLayout layout = lay_out_plan(top_px, wide, views);

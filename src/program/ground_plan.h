@@ -10,6 +10,6 @@ namespace spartan::program {
 
 /// The first pair is the wide one, `pans` its figures. Gives the row, px, below which nothing is drawn.
 double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs,
-                 const std::optional<PanFigures>& pans);
+                 const std::optional<PanCoverage>& pans);
 
 }  // namespace spartan::program

@@ -70,7 +70,7 @@ Result<std::vector<std::pair<std::string, std::string>>> pairs_of_files(const st
 // The images must not depend on the calibration under test: sizes are those of the images, the camera model is
 // arbitrary.
 Result<Imager> imager_without_geometry(const Camera& left, const Camera& right, ImageSize size,
-                                       const Workers& workers) {
+                                       const ThreadPool& workers) {
   const auto plain = [&](const char* name, const PixelFormat& format) {
     Camera camera;
     camera.name = name;
@@ -113,7 +113,7 @@ Result<std::vector<ImagePair>> load_images(const std::string& left, const std::s
 
 Result<std::vector<ImagePair>> load_images_of(const Camera& left_camera, const Camera& right_camera,
                                               const std::string& left, const std::string& right, int most,
-                                              const Workers& workers) {
+                                              const ThreadPool& workers) {
   const auto names = pairs_of_files(left, right, most);
   if (!names) return failure(names);
   std::vector<ImagePair> pairs;
@@ -139,12 +139,12 @@ Result<std::vector<ImagePair>> load_images_of(const Camera& left_camera, const C
 }
 
 Result<std::vector<ImagePair>> load_frames(FrameSource& source, const std::string& pair, int most,
-                                           const Workers& workers) {
+                                           const ThreadPool& workers) {
   ImagingOptions options;
   options.rectify = false;
   auto imager = Imager::create(source.info().rig, options, workers);
   if (!imager) return failure(imager);
-  const std::vector<Stamp> stamps = source.announced_stamps(pair);
+  const std::vector<Stamp> stamps = source.listed_stamps(pair);
   std::vector<ImagePair> pairs;
   std::string reason = "the recording has no frame of this pair";
   for (const std::size_t i : spread(stamps.size(), most)) {

@@ -26,10 +26,10 @@ Result<std::vector<ImagePair>> load_images(const std::string& left, const std::s
 /// rectification, as those of a recording do.
 Result<std::vector<ImagePair>> load_images_of(const Camera& left_camera, const Camera& right_camera,
                                               const std::string& left, const std::string& right, int most,
-                                              const Workers& workers);
+                                              const ThreadPool& workers);
 
 /// Frames of one pair of a recording, spread evenly; unreadable ones are skipped. Code `input` if none can be read.
 Result<std::vector<ImagePair>> load_frames(FrameSource& source, const std::string& pair, int most,
-                                           const Workers& workers);
+                                           const ThreadPool& workers);
 
 }  // namespace spartan::program

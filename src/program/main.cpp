@@ -45,7 +45,7 @@ int run(int argc, char** argv) {
   }
 
   context.log = Log::to_terminal(level_of(context));
-  bound_third_party_threads(context.threads);
+  limit_third_party_threads(context.threads);
   listen_for_interrupts();
   if (!context.chosen) {
     context.log.error("this command needs a subcommand; see --help");

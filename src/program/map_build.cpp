@@ -19,8 +19,8 @@
 #include "spartan/core/process.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/localization/start_frame.h"
-#include "spartan/reconstruction/position_mapper.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/reconstruction/stop_mapper.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/system/map_files.h"
 
 namespace spartan::program {
@@ -102,12 +102,12 @@ Result<Stop> load_stop(const BuildArguments& a) {
   Stop stop;
   stop.rig = info.rig;
   stop.mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
-  const auto frames_of_stop = (*source)->shots_at(*a.position);
+  const auto frames_of_stop = (*source)->frames_at(*a.position);
   if (frames_of_stop.empty()) {
     return failure(ErrorCode::input, fmt::format("has no frame at position {}", *a.position), a.recording,
                    "frames.csv lists the position_id of every frame");
   }
-  for (const ShotName& name : frames_of_stop) {
+  for (const FrameKey& name : frames_of_stop) {
     auto frame = (*source)->frame_at(name.pair, name.left_stamp);
     if (!frame) return failure(frame);
     stop.frames.push_back(std::move(*frame));
@@ -116,7 +116,7 @@ Result<Stop> load_stop(const BuildArguments& a) {
   if (!imu) return failure(imu);
   LocalizationOptions planet;
   planet.gravity_m_s2 = info.gravity_m_s2.value_or(planet.gravity_m_s2);
-  if (const auto rest = read_rest(*imu, planet)) {
+  if (const auto rest = static_reading(*imu, planet)) {
     stop.up_in_body = rest->accel_m_s2.normalized();
     stop.up_source = "measured by the IMU";
   }
@@ -129,7 +129,7 @@ Result<RunOptions> options_of(const BuildArguments& a) {
   MappingOptions& mapping = options->mapping;
   if (a.extent_m) {
     mapping.map.extent_m = *a.extent_m;
-    mapping.merging.farthest_m = kReach * *a.extent_m;
+    mapping.merging.max_range_m = kReach * *a.extent_m;
   }
   if (a.cell_m) mapping.map.cell_m = *a.cell_m;
   return options;
@@ -154,9 +154,9 @@ int count_of(const LocalMap& map, GroundClass kind) {
 }
 
 // Height and pitch of the left camera of each view: from the rig, and from the ground profile.
-Json views_of(const PositionMapper& mapper, const Eigen::Vector3d& up) {
+Json views_of(const StopMapper& mapper, const Eigen::Vector3d& up) {
   Json views = Json::array();
-  for (const PositionView& view : mapper.views()) {
+  for (const StopView& view : mapper.views()) {
     const GroundPlane by_rig{view.geometry.body_from_left.rotation().conjugate() * up,
                              view.geometry.body_from_left.translation().dot(up)};
     Json json{{"pair", view.pair},
@@ -172,30 +172,29 @@ Json views_of(const PositionMapper& mapper, const Eigen::Vector3d& up) {
   return views;
 }
 
-Json to_json(const PositionMapper& mapper, const LocalMap& map, const Stop& stop, const Eigen::Vector3d& up) {
+Json to_json(const StopMapper& mapper, const LocalMap& map, const Stop& stop, const Eigen::Vector3d& up) {
   const Tilt tilt = tilt_of(up);
-  return {{"schema", 1},
-          {"cell_m", map.place.cell_m},
-          {"west_m", map.place.west_m},
-          {"north_m", map.place.north_m},
-          {"columns", map.size().width},
-          {"rows", map.size().height},
-          {"cells",
-           {{"free", count_of(map, GroundClass::ground)},
-            {"obstacle", count_of(map, GroundClass::obstacle)},
-            {"cavity", count_of(map, GroundClass::cavity)}}},
-          {"obstacles", map.obstacles.size()},
-          {"attitude",
-           {{"roll_deg", tilt.roll_rad / kDegree},
-            {"pitch_deg", tilt.pitch_rad / kDegree},
-            {"source", stop.up_source}}},
-          {"views", views_of(mapper, up)},
-          {"time_ms",
-           {{"disparity", mapper.times().disparity},
-            {"v_disparity", mapper.times().v_disparity},
-            {"merging", mapper.times().merging},
-            {"map", mapper.times().map}}},
-          {"peak_memory_bytes", peak_memory_bytes()}};
+  return {
+      {"schema", 1},
+      {"cell_m", map.place.cell_m},
+      {"west_m", map.place.west_m},
+      {"north_m", map.place.north_m},
+      {"columns", map.size().width},
+      {"rows", map.size().height},
+      {"cells",
+       {{"free", count_of(map, GroundClass::ground)},
+        {"obstacle", count_of(map, GroundClass::obstacle)},
+        {"cavity", count_of(map, GroundClass::cavity)}}},
+      {"obstacles", map.obstacles.size()},
+      {"attitude",
+       {{"roll_deg", tilt.roll_rad / kDegree}, {"pitch_deg", tilt.pitch_rad / kDegree}, {"source", stop.up_source}}},
+      {"views", views_of(mapper, up)},
+      {"time_ms",
+       {{"disparity", mapper.times().disparity},
+        {"v_disparity", mapper.times().v_disparity},
+        {"merging", mapper.times().merging},
+        {"map", mapper.times().map}}},
+      {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 std::string to_text(const Json& json, const std::string& folder) {
@@ -236,7 +235,7 @@ Status check(const BuildArguments& a) {
 }
 
 // Without an attitude measurement the ground plane is taken as level.
-Eigen::Vector3d choose_up(Stop& stop, const PositionView& view) {
+Eigen::Vector3d choose_up(Stop& stop, const StopView& view) {
   if (stop.up_in_body) return *stop.up_in_body;
   if (stop.rig.convention != PoseConvention::left_optical || !view.ground) return Eigen::Vector3d::UnitZ();
   stop.up_source = "along the ground";
@@ -255,10 +254,10 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
     stop->up_in_body = *gravity;
     stop->up_source = "given";
   }
-  const Workers workers(context.threads);
+  const ThreadPool workers(context.threads);
   auto imager = Imager::create(stop->rig, options->imaging, workers, stop->mask_folder);
   if (!imager) return failure(imager);
-  PositionMapper mapper(options->reconstruction, options->mapping, workers);
+  StopMapper mapper(options->reconstruction, options->mapping, workers);
   Eigen::Vector3d ahead_in_body = Eigen::Vector3d::UnitX();
   for (const StereoFrame& frame : stop->frames) {
     const auto pair = imager->process(frame);

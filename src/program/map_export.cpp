@@ -7,7 +7,7 @@
 
 #include "program/map.h"
 #include "spartan/core/image_io.h"
-#include "spartan/reconstruction/map_pictures.h"
+#include "spartan/reconstruction/map_rendering.h"
 #include "spartan/reconstruction/point_cloud.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/saved_map.h"
@@ -32,19 +32,19 @@ Result<LatticeWindow> window_of(const ExportArguments& a, const GlobalMap& map) 
 
 // The centers of the cells, in the colors of the image.
 PointCloud cloud_of(const MapView& view) {
-  const Image<Rgb8> colours = draw_map(view.elevation_m, view.kind, view.cell_m, 1);
+  const Image<Rgb8> colours = render_map(view.elevation_m, view.kind, view.cell_m, 1);
   PointCloud cloud;
   for (int r = 0; r < view.window.height; ++r) {
     for (int c = 0; c < view.window.width; ++c) {
       if (!(view.count(c, r) > 0)) continue;
-      const Eigen::Vector2f at = middle_of(view.place(), c, r).cast<float>();
+      const Eigen::Vector2f at = cell_centre(view.place(), c, r).cast<float>();
       cloud.push_back({{at.x(), at.y(), view.elevation_m(c, r)}, colours(c, r)});
     }
   }
   return cloud;
 }
 
-Status write(SavedMap& saved, const ExportArguments& a, const Workers& workers) {
+Status write(SavedMap& saved, const ExportArguments& a, const ThreadPool& workers) {
   const std::string ending = std::filesystem::path(a.output).extension().string();
   if (ending == ".map") {
     if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map file always holds the whole map", "--window");
@@ -55,7 +55,7 @@ Status write(SavedMap& saved, const ExportArguments& a, const Workers& workers) 
   const auto view = saved.map().view(*window);
   if (!view) return failure(view);
   if (ending == ".tif") return write_map_geotiff(*view, saved.options().mapping.map, workers, a.output);
-  if (ending == ".png") return write_png(a.output, draw_map(view->elevation_m, view->kind, view->cell_m));
+  if (ending == ".png") return write_png(a.output, render_map(view->elevation_m, view->kind, view->cell_m));
   if (ending == ".ply") return write_ply(a.output, cloud_of(*view));
   return failure(ErrorCode::usage, "has an unknown extension", a.output, "known extensions: .tif, .png, .ply, .map");
 }
@@ -63,7 +63,7 @@ Status write(SavedMap& saved, const ExportArguments& a, const Workers& workers) 
 Result<ExitCode> export_map(const Context& context, const ExportArguments& a) {
   auto saved = SavedMap::open(a.map);
   if (!saved) return failure(saved);
-  if (Status s = write(*saved, a, Workers(context.threads)); !s) return failure(s);
+  if (Status s = write(*saved, a, ThreadPool(context.threads)); !s) return failure(s);
   return kDone;
 }
 

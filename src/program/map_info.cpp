@@ -8,7 +8,7 @@
 
 #include "program/json.h"
 #include "program/map.h"
-#include "spartan/slam/map_figures.h"
+#include "spartan/slam/map_statistics.h"
 #include "spartan/system/saved_map.h"
 
 namespace spartan::program {
@@ -26,24 +26,25 @@ Json stop_json(const MapStop& stop) {
           {"sigma_m", std::sqrt(std::max(0.0, variance))}};
 }
 
-Json to_json(const GlobalMap& map, const MapFigures& figures) {
+Json to_json(const GlobalMap& map, const MapStatistics& statistics) {
   Json stops = Json::array();
   for (const MapStop& stop : map.stops()) stops.push_back(stop_json(stop));
   const LatticeWindow extent = map.extent();
-  const MapPlace place = extent.place(map.cell_m());
-  return {{"schema", 1},
-          {"cell_m", map.cell_m()},
-          {"west_m", place.west_m},
-          {"north_m", place.north_m},
-          {"columns", extent.width},
-          {"rows", extent.height},
-          {"submaps", map.submaps().size()},
-          {"tiles", map.tiles()},
-          {"cells", {{"free", figures.cells[1]}, {"obstacle", figures.cells[2]}, {"cavity", figures.cells[3]}}},
-          {"known_m2", static_cast<double>(figures.known) * map.cell_m() * map.cell_m()},
-          {"elevation_m", {{"least", figures.least_m}, {"most", figures.most_m}}},
-          {"sigma_m", {{"median", std::sqrt(static_cast<double>(figures.median_variance_m2))}}},
-          {"stops", std::move(stops)}};
+  const GeoTransform place = extent.place(map.cell_m());
+  return {
+      {"schema", 1},
+      {"cell_m", map.cell_m()},
+      {"west_m", place.west_m},
+      {"north_m", place.north_m},
+      {"columns", extent.width},
+      {"rows", extent.height},
+      {"submaps", map.submaps().size()},
+      {"tiles", map.tiles()},
+      {"cells", {{"free", statistics.cells[1]}, {"obstacle", statistics.cells[2]}, {"cavity", statistics.cells[3]}}},
+      {"known_m2", static_cast<double>(statistics.known) * map.cell_m() * map.cell_m()},
+      {"elevation_m", {{"least", statistics.min_elevation_m}, {"most", statistics.max_elevation_m}}},
+      {"sigma_m", {{"median", std::sqrt(static_cast<double>(statistics.median_variance_m2))}}},
+      {"stops", std::move(stops)}};
 }
 
 std::string to_text(const Json& json) {
@@ -70,9 +71,9 @@ std::string to_text(const Json& json) {
 Result<ExitCode> info(const Context& context, const std::string& path) {
   auto saved = SavedMap::open(path);
   if (!saved) return failure(saved);
-  const auto figures = figures_of(saved->map());
-  if (!figures) return failure(figures);
-  const Json json = to_json(saved->map(), *figures);
+  const auto statistics = map_statistics(saved->map());
+  if (!statistics) return failure(statistics);
+  const Json json = to_json(saved->map(), *statistics);
   if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json)); !s) return failure(s);
   return kDone;
 }

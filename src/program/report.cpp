@@ -21,8 +21,8 @@
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/eval/trajectory_metrics.h"
 #include "spartan/imaging/imager.h"
-#include "spartan/reconstruction/disparity_colour.h"
 #include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/reconstruction/disparity_rendering.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
 
@@ -45,7 +45,7 @@ Result<std::string> drive_images(FrameSource& source, Imager& imager) {
   std::string html;
   for (const StereoPair& pair : source.info().rig.pairs) {
     if (!pair.for_odometry) continue;
-    const std::vector<Stamp> stamps = source.announced_stamps(pair.name);
+    const std::vector<Stamp> stamps = source.listed_stamps(pair.name);
     const int count = std::min<int>(kDriveImages, static_cast<int>(stamps.size()));
     for (int i = 0; i < count; ++i) {
       const Stamp stamp =
@@ -77,7 +77,7 @@ Image<Rgb8> error_image(ImageView<const float> estimate, ImageView<const float> 
 // One frame of a pair with true disparities: disparity, error, scores.
 Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoPair& pair,
                               const ReportRequest& request) {
-  const std::vector<Stamp> stamps = source.announced_stamps(pair.name);
+  const std::vector<Stamp> stamps = source.listed_stamps(pair.name);
   if (stamps.empty()) return std::string();
   const Stamp stamp = stamps[stamps.size() / 2];
   const auto frame = source.frame_at(pair.name, stamp);
@@ -89,7 +89,7 @@ Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoP
   const auto view = imager.process(*frame);
   if (!view) return failure(view);
   const Image<std::uint8_t> left = Image<std::uint8_t>::copy_of(view->left);
-  DisparityComputer computer(request.options.reconstruction, Workers(request.threads));
+  DisparityComputer computer(request.options.reconstruction, ThreadPool(request.threads));
   const auto image = computer.compute(view->left, view->right, disparity_range(view->geometry, pair.nearest_m),
                                       view->left_mask, view->right_mask);
   if (!image) return failure(image);
@@ -213,7 +213,7 @@ Result<std::string> make_report(ReportRequest request) {
   const RecordingInfo& info = (*source)->info();
   if (request.truth.empty()) request.truth = info.truth_file;
   const std::string masks = std::filesystem::path(info.rig_source).parent_path().string();
-  auto imager = Imager::create(info.rig, request.options.imaging, Workers(request.threads), masks);
+  auto imager = Imager::create(info.rig, request.options.imaging, ThreadPool(request.threads), masks);
   if (!imager) return failure(imager);
 
   std::string body =
@@ -227,8 +227,7 @@ Result<std::string> make_report(ReportRequest request) {
   const auto plots = trajectory_plots(request.run, *frames, request.truth);
   if (!plots) return failure(plots);
   body += section("Trajectories", *plots);
-  if (!summary["health"]["localization"].empty())
-    body += section("Sensors", sensor_tables(summary, *frames));
+  if (!summary["health"]["localization"].empty()) body += section("Sensors", sensor_tables(summary, *frames));
   const auto maps = map_images(request.run);
   if (!maps) return failure(maps);
   if (!maps->empty()) body += section("Maps", *maps);

@@ -18,7 +18,7 @@ namespace {
 constexpr int kMostMaps = 6, kGlobalWidth_px = 1100;
 constexpr double kMostDecades = 4;  // of points in a cell
 
-// The names of MatchVerdict with spaces.
+// The names of MatchStatus with spaces.
 std::string status_text(std::string status) {
   std::replace(status.begin(), status.end(), '_', ' ');
   return status;

@@ -9,9 +9,9 @@
 
 #include "program/json.h"
 #include "spartan/core/files.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
 #include "spartan/rig/formats/read_back.h"
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
 #include "spartan/rig/rig_differences.h"
 
 namespace spartan::program {
@@ -31,7 +31,7 @@ bool is_there(const std::string& path) {
 }
 
 // The rig to write, reduced to the requested pair.
-Result<Rig> chosen_rig(const ReadRig& read, const std::string& pair) {
+Result<Rig> chosen_rig(const LoadedRig& read, const std::string& pair) {
   if (pair.empty()) return read.rig;
   if (const StereoPair* chosen = read.rig.find_pair(pair)) return rig_of_pair(read.rig, *chosen);
   std::vector<std::string> names;
@@ -64,13 +64,13 @@ Status check_size(const Rig& rig, ImageSize given) {
 // The name must be recognized as this format when the file is read again.
 Status check_names(const CalibrationFiles& files, CalibrationFormat format, const std::string& to) {
   const CalibrationFile& first = files.front();
-  if (const auto guess = guess_format(first.path, first.content); guess != format) {
+  if (const auto guess = detect_calibration_format(first.path, first.content); guess != format) {
     return failure(ErrorCode::usage,
                    fmt::format("a file of this name would be read as {}, not as {}",
                                guess ? name_of(*guess) : "nothing", name_of(format)),
                    first.path, "choose another extension");
   }
-  if (!has_a_file_per_eye(format)) return {};
+  if (!has_file_per_camera(format)) return {};
   if (first.path == files.at(1).path) return failure(ErrorCode::usage, "is the same file for both cameras", to);
   if (first.path.find(',') != std::string::npos) {
     return failure(ErrorCode::usage, "is neither one name nor LEFT,RIGHT", to, "file names must not contain a comma");
@@ -116,7 +116,7 @@ std::vector<RigDifference> not_chosen(const Rig& source, const Rig& chosen) {
 }
 
 // What the reader did not use, and every difference found by reading the new files back.
-Result<std::vector<RigDifference>> losses(const ReadRig& source, const Rig& written, CalibrationFormat format,
+Result<std::vector<RigDifference>> losses(const LoadedRig& source, const Rig& written, CalibrationFormat format,
                                           const CalibrationFiles& files) {
   const ImageSize size = written.find_camera(written.pairs.front().left)->size;
   const auto again = read_back(files, format, size);
@@ -127,17 +127,17 @@ Result<std::vector<RigDifference>> losses(const ReadRig& source, const Rig& writ
   }
   std::vector<RigDifference> differences = describe_differences(written, again->rig);
   if (source.format != CalibrationFormat::rig_yaml) std::erase_if(differences, is_a_name);
-  std::vector<RigDifference> lost = source.left_out;
+  std::vector<RigDifference> lost = source.ignored;
   for (RigDifference& each : not_chosen(source.rig, written)) lost.push_back(std::move(each));
   for (RigDifference& each : differences) lost.push_back(std::move(each));
-  if (!holds_image_size(format)) {
+  if (!contains_image_size(format)) {
     lost.push_back(
         {"size_px", fmt::format("these files do not hold the image size, {} x {}", size.width, size.height)});
   }
   return lost;
 }
 
-std::string to_text(const ReadRig& read, CalibrationFormat format, const CalibrationFiles& files,
+std::string to_text(const LoadedRig& read, CalibrationFormat format, const CalibrationFiles& files,
                     const std::vector<RigDifference>& lost) {
   std::string text = fmt::format("read {}: {}\n", name_of(read.format), fmt::join(read.files, ", "));
   for (const std::string& note : read.notes) text += "  " + note + "\n";
@@ -148,7 +148,7 @@ std::string to_text(const ReadRig& read, CalibrationFormat format, const Calibra
   return text;
 }
 
-std::string to_json(const ReadRig& read, CalibrationFormat format, const CalibrationFiles& files,
+std::string to_json(const LoadedRig& read, CalibrationFormat format, const CalibrationFiles& files,
                     const std::vector<RigDifference>& lost) {
   Json paths = Json::array(), losses = Json::array();
   for (const CalibrationFile& file : files) paths.push_back(file.path);
@@ -162,7 +162,7 @@ std::string to_json(const ReadRig& read, CalibrationFormat format, const Calibra
 Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {
   if (const Status there = calibration_is_there(a.from); !there) return failure(there);
   const auto named = calibration_format_named(a.format);
-  const auto format = named ? Result<CalibrationFormat>(*named) : format_for_name(a.to);
+  const auto format = named ? Result<CalibrationFormat>(*named) : calibration_format_for_path(a.to);
   if (!format) return failure(format);
   const ImageSize size = a.size_px.empty() ? ImageSize{} : ImageSize{a.size_px[0], a.size_px[1]};
   const auto read = read_calibration(a.from, size);

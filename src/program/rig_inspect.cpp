@@ -19,7 +19,7 @@
 #include "spartan/core/image_io.h"
 #include "spartan/odometry/view_matching.h"
 #include "spartan/rig/describe.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/inspection/pair_check.h"
 
 namespace spartan::program {
@@ -33,7 +33,7 @@ struct InspectArguments {
 };
 
 InspectedPair inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<ImagePair> images, bool guessed,
-                           const Workers& workers, bool quiet) {
+                           const ThreadPool& workers, bool quiet) {
   std::vector<PixelMatch> all;
   InspectedPair result;
   result.pair = pair;
@@ -57,7 +57,7 @@ InspectedPair inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<I
     }
   }
   progress.show(frames, frames, fmt::format("frames of pair {} matched, checking the calibration", pair.name));
-  result.check = guessed ? check_pictures(all, result.left.size()) : check_pair(rig, pair, all, result.left.size());
+  result.check = guessed ? check_images(all, result.left.size()) : check_pair(rig, pair, all, result.left.size());
   return result;
 }
 
@@ -79,7 +79,7 @@ Json findings_json(const std::vector<RigFinding>& findings) {
 }
 
 // Without a calibration, figures that the images do not tell are null.
-Json to_json(const ReadRig& read, const std::vector<InspectedPair>& inspected, bool guessed) {
+Json to_json(const LoadedRig& read, const std::vector<InspectedPair>& inspected, bool guessed) {
   const Rig& rig = read.rig;
   Json pairs = Json::object();
   for (const StereoPair& pair : rig.pairs) {
@@ -89,21 +89,21 @@ Json to_json(const ReadRig& read, const std::vector<InspectedPair>& inspected, b
                         {"focal_px", known(summary.focal_px)},
                         {"hfov_deg", known(summary.hfov_deg)},
                         {"vfov_deg", known(summary.vfov_deg)},
-                        {"findings", findings_json(find_doubts(rig, pair))}};
+                        {"findings", findings_json(plausibility_findings(rig, pair))}};
   }
   for (const InspectedPair& one : inspected) {
     const PairCheck& check = one.check;
     Json& pair = pairs[one.pair.name];
     pair["findings"] = findings_json(check.findings);
-    pair["verdict"] = name_of(check.verdict);
+    pair["verdict"] = name_of(check.grade);
     pair["matches"] = check.matches;
     pair["inliers"] = check.inliers;
-    pair["row_error_px"] = {{"before", rows_json(check.as_taken)},
-                            {"after", rows_json(check.as_given)},
-                            {"corrected", rows_json(check.as_corrected)}};
+    pair["row_error_px"] = {{"before", rows_json(check.unrectified_rows)},
+                            {"after", rows_json(check.nominal_rows)},
+                            {"corrected", rows_json(check.corrected_rows)}};
     pair["corrections"] = corrections_json(check.correction, check.correction.focal_ratio);
     pair["corrections"]["sigma"] = corrections_json(check.sigma, check.sigma.focal_ratio);
-    pair["yaw_doubt_px"] = number(check.yaw_doubt_px);
+    pair["yaw_doubt_px"] = number(check.yaw_sigma_px);
     Json map = Json::array();
     for (const RowErrorCell& cell : check.map) {
       map.push_back({{"x_px", number(cell.centre_px.x())},
@@ -113,12 +113,12 @@ Json to_json(const ReadRig& read, const std::vector<InspectedPair>& inspected, b
     }
     pair["row_error_map"] = std::move(map);
   }
-  Json left_out = Json::array();
-  for (const RigDifference& d : read.left_out) left_out.push_back({{"key", d.key}, {"text", d.text}});
+  Json ignored = Json::array();
+  for (const RigDifference& d : read.ignored) ignored.push_back({{"key", d.key}, {"text", d.text}});
   return {{"schema", 1},
           {"body", read.body.empty() ? Json(nullptr) : Json(read.body)},
           {"notes", read.notes},
-          {"left_out", std::move(left_out)},
+          {"left_out", std::move(ignored)},
           {"pairs", std::move(pairs)}};
 }
 
@@ -141,9 +141,9 @@ std::string to_text(const InspectedPair& one, bool guessed) {
     if (std::isfinite(e.mean_px))
       rows.push_back(fmt::format("{} {:.2f} px (95 % below {:.2f} px)", what, e.mean_px, e.p95_px));
   };
-  add_rows("unrectified", check.as_taken);
-  if (!guessed) add_rows("rectified with the given calibration", check.as_given);
-  add_rows("corrected", check.as_corrected);
+  add_rows("unrectified", check.unrectified_rows);
+  if (!guessed) add_rows("rectified with the given calibration", check.nominal_rows);
+  add_rows("corrected", check.corrected_rows);
   if (!rows.empty()) text += fmt::format("{}mean row error {}\n", pair, fmt::join(rows, ", "));
   const PairCorrection &c = check.correction, &s = check.sigma;
   if (std::isfinite(c.pitch_rad)) {
@@ -156,15 +156,15 @@ std::string to_text(const InspectedPair& one, bool guessed) {
     text += fmt::format(
         "{}row errors determine the yaw no better than that ±, because distortion has the same effect: ±{:.1f} px of "
         "disparity, so they do not verify long ranges\n",
-        pair, check.yaw_doubt_px);
+        pair, check.yaw_sigma_px);
   }
   for (const RigFinding& f : check.findings) text += fmt::format("{}finding {}: {}\n", pair, f.id, f.text);
-  return text + fmt::format("{}calibration: {}\n", pair, name_of(check.verdict));
+  return text + fmt::format("{}calibration: {}\n", pair, name_of(check.grade));
 }
 
 // Checks the requested pairs, with images of the recording, or with the given images of one pair.
 Result<std::vector<InspectedPair>> inspect_images(const InspectArguments& a, const Rig& rig,
-                                                  std::vector<ImagePair> given, const Workers& workers, bool quiet) {
+                                                  std::vector<ImagePair> given, const ThreadPool& workers, bool quiet) {
   std::vector<InspectedPair> inspected;
   const auto wanted = [&](const StereoPair& pair) { return a.pair.empty() || pair.name == a.pair; };
   if (!a.pair.empty() && !rig.find_pair(a.pair)) {
@@ -194,9 +194,9 @@ Result<std::vector<InspectedPair>> inspect_images(const InspectArguments& a, con
 }
 
 // Formats that do not hold the image size, and a missing calibration, take it from the images.
-Result<ReadRig> read_or_guess(const std::string& rig, ImageSize size) {
+Result<LoadedRig> read_or_guess(const std::string& rig, ImageSize size) {
   if (rig != "-") return read_calibration(rig, size);
-  ReadRig guess;
+  LoadedRig guess;
   guess.rig = guessed_rig(size);
   return guess;
 }
@@ -218,14 +218,14 @@ Status check_usage(const InspectArguments& a) {
   return {};
 }
 
-Status write_figure(const std::string& path, const Rig& rig, const InspectedPair& one, const Workers& workers) {
+Status write_figure(const std::string& path, const Rig& rig, const InspectedPair& one, const ThreadPool& workers) {
   const auto figure = draw_pair_check(rig, one.pair, one.check, std::as_const(one.left).view(),
                                       std::as_const(one.right).view(), one.matches, workers);
   if (!figure) return failure(figure);
   return write_png(path, std::as_const(*figure).view());
 }
 
-std::string to_text(const InspectArguments& a, const ReadRig& read, const std::vector<InspectedPair>& inspected) {
+std::string to_text(const InspectArguments& a, const LoadedRig& read, const std::vector<InspectedPair>& inspected) {
   const bool guessed = a.rig == "-";
   std::string text;
   if (guessed) {
@@ -239,10 +239,10 @@ std::string to_text(const InspectArguments& a, const ReadRig& read, const std::v
       const bool checked = std::any_of(inspected.begin(), inspected.end(),
                                        [&](const InspectedPair& one) { return one.pair.name == pair.name; });
       if (checked) continue;  // the images tell more
-      for (const std::string& finding : describe_doubts(read.rig, pair)) text += finding + "\n";
+      for (const std::string& finding : describe_plausibility(read.rig, pair)) text += finding + "\n";
     }
     for (const std::string& note : read.notes) text += note + "\n";
-    for (const RigDifference& d : read.left_out) text += fmt::format("not used: {}: {}\n", d.key, d.text);
+    for (const RigDifference& d : read.ignored) text += fmt::format("not used: {}: {}\n", d.key, d.text);
   }
   for (const InspectedPair& one : inspected) text += to_text(one, guessed);
   const bool correctable = std::any_of(inspected.begin(), inspected.end(), [&](const InspectedPair& one) {
@@ -264,7 +264,7 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   const ImageSize size = images.empty() ? ImageSize() : images.front().left.size();
   const auto read = read_or_guess(a.rig, size);
   if (!read) return failure(read);
-  const Workers workers(context.threads);
+  const ThreadPool workers(context.threads);
   std::vector<InspectedPair> inspected;
   if (!a.left.empty() || !a.recording.empty()) {
     auto result = inspect_images(a, read->rig, std::move(images), workers, context.quiet);

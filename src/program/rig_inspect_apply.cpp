@@ -8,17 +8,17 @@
 #include "program/rig_convert.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/rig/inspection/pairs_together.h"
+#include "spartan/rig/inspection/merge_corrections.h"
 
 namespace spartan::program {
 namespace {
 
 // Without a calibration file the rig is an assumption.
-bool is_assumed(const ReadRig& read) {
+bool is_assumed(const LoadedRig& read) {
   return read.files.empty();
 }
 
-Status write_rig(const Rig& rig, const ReadRig& read, const std::string& path) {
+Status write_rig(const Rig& rig, const LoadedRig& read, const std::string& path) {
   const std::string remark =
       is_assumed(read)
           ? "# Made from images alone: the focal length is an assumption, and the baseline of 1 m arbitrary.\n"
@@ -27,7 +27,7 @@ Status write_rig(const Rig& rig, const ReadRig& read, const std::string& path) {
 }
 
 // What the written file holds.
-std::string to_text(const Rig& rig, const ReadRig& read, const std::vector<InspectedPair>& inspected,
+std::string to_text(const Rig& rig, const LoadedRig& read, const std::vector<InspectedPair>& inspected,
                     const std::string& path) {
   const char* as_before = is_assumed(read) ? "the assumed rig" : "the given rig";
   const auto any = [&](const auto& what) { return std::any_of(inspected.begin(), inspected.end(), what); };
@@ -53,7 +53,7 @@ void add_mask_notes(const Rig& rig, const Rig& given, const std::string& folder,
 
 }  // namespace
 
-Result<std::vector<std::string>> write_corrected_rig(const ReadRig& read, const std::vector<InspectedPair>& inspected,
+Result<std::vector<std::string>> write_corrected_rig(const LoadedRig& read, const std::vector<InspectedPair>& inspected,
                                                      const std::string& path) {
   std::vector<CorrectedPair> corrected;
   for (const InspectedPair& one : inspected) {
@@ -67,7 +67,7 @@ Result<std::vector<std::string>> write_corrected_rig(const ReadRig& read, const 
     // A pair that could not be checked does not constrain the others.
     if (one.checked()) corrected.push_back({one.pair.name, *one.check.corrected});
   }
-  const RigOfPairs together = take_together(read.rig, corrected);
+  const MergedRig together = merge_corrections(read.rig, corrected);
   const Rig moved = is_assumed(read) ? together.rig : with_masks_moved(together.rig, read.files.front(), path);
   if (Status written = write_rig(moved, read, path); !written) return failure(written);
 
@@ -76,7 +76,7 @@ Result<std::vector<std::string>> write_corrected_rig(const ReadRig& read, const 
     if (!one.checked() && !corrected.empty())
       sentences.push_back(fmt::format("pair {}: could not be checked and is not corrected", one.pair.name));
   }
-  for (const std::string& pair : together.left_out) {
+  for (const std::string& pair : together.discarded) {
     sentences.push_back(
         fmt::format("pair {}: its correction is not applied, because it contradicts that of another pair with the same "
                     "cameras. Inspect {} again",

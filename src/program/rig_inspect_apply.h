@@ -6,13 +6,13 @@
 
 #include "program/inspected_pair.h"
 #include "spartan/core/result.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 namespace spartan::program {
 
 /// Writes the rig and returns sentences: first what the file holds (the corrected rig, or the given one), then notes.
 /// Code `input` if no hypothesis explains the images of a pair; then nothing is written.
-Result<std::vector<std::string>> write_corrected_rig(const ReadRig& read, const std::vector<InspectedPair>& inspected,
+Result<std::vector<std::string>> write_corrected_rig(const LoadedRig& read, const std::vector<InspectedPair>& inspected,
                                                      const std::string& path);
 
 }  // namespace spartan::program

@@ -34,7 +34,7 @@ cv::Scalar colour_of(double error_px) {
   return {255 * std::min(1.0, 2 * t), 255 * std::min(1.0, 2 - 2 * t), 40};
 }
 
-std::optional<Strip> rectified(const Rig& rig, const StereoPair& pair, const Strip& taken, const Workers& workers) {
+std::optional<Strip> rectified(const Rig& rig, const StereoPair& pair, const Strip& taken, const ThreadPool& workers) {
   const Camera *left = rig.find_camera(pair.left), *right = rig.find_camera(pair.right);
   const auto plan = plan_rectification(*left, *right, rig.right_from_left(pair), pair.name);
   auto imager = Imager::create(rig, {}, workers);
@@ -125,11 +125,11 @@ std::vector<bool> find_outliers(const Strip& corrected, double limit_px) {
 }
 
 // The strip of the given calibration.
-Strip as_given(const Rig& rig, const StereoPair& pair, const PairCheck& check, const Strip& taken,
-               const Workers& workers) {
-  auto given = check.structure_found ? std::nullopt : rectified(plain(rig), pair, taken, workers);
+Strip nominal_rows(const Rig& rig, const StereoPair& pair, const PairCheck& check, const Strip& taken,
+                   const ThreadPool& workers) {
+  auto given = check.has_gross_error ? std::nullopt : rectified(plain(rig), pair, taken, workers);
   if (!given) return {"the given calibration cannot be rectified: cameras, sides or sizes are wrong", {}, {}, {}};
-  given->heading = "rectified with the given calibration: " + to_text(check.as_given);
+  given->heading = "rectified with the given calibration: " + to_text(check.nominal_rows);
   return std::move(*given);
 }
 
@@ -137,21 +137,21 @@ Strip as_given(const Rig& rig, const StereoPair& pair, const PairCheck& check, c
 
 Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, const PairCheck& check,
                                     ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                    const std::vector<PixelMatch>& matches, const Workers& workers) {
+                                    const std::vector<PixelMatch>& matches, const ThreadPool& workers) {
   const auto copy = [](ImageView<const std::uint8_t> view) { return Image<std::uint8_t>::copy_of(view); };
   std::vector<Strip> strips;
-  strips.push_back({"unrectified: " + to_text(check.as_taken), copy(left), copy(right), matches});
-  strips.push_back(as_given(rig, pair, check, strips.front(), workers));
+  strips.push_back({"unrectified: " + to_text(check.unrectified_rows), copy(left), copy(right), matches});
+  strips.push_back(nominal_rows(rig, pair, check, strips.front(), workers));
   std::vector<bool> outlier(matches.size(), false);
   if (check.corrected) {
-    const bool exchanged = check.pictures_exchanged;
+    const bool exchanged = check.images_swapped;
     Strip taken{{}, copy(exchanged ? right : left), copy(exchanged ? left : right), matches};
     for (PixelMatch& match : taken.matches) {
       if (exchanged) std::swap(match.left, match.right);
     }
     if (auto corrected = rectified(plain(*check.corrected), *check.corrected->find_pair(pair.name), taken, workers)) {
       corrected->heading =
-          fmt::format("corrected: {} (arrows enlarged {} times)", to_text(check.as_corrected), kArrowScale);
+          fmt::format("corrected: {} (arrows enlarged {} times)", to_text(check.corrected_rows), kArrowScale);
       if (check.inlier_limit_px > 0) outlier = find_outliers(*corrected, check.inlier_limit_px);
       strips.push_back(std::move(*corrected));
     }

@@ -15,7 +15,7 @@ namespace spartan::program {
 /// circles are outliers. `matches` are in pixels of the given images. Each image is reduced to at most 640 px in width.
 Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, const PairCheck& check,
                                     ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                    const std::vector<PixelMatch>& matches, const Workers& workers);
+                                    const std::vector<PixelMatch>& matches, const ThreadPool& workers);
 
 inline constexpr int kArrowScale = 10;
 

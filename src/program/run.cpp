@@ -155,7 +155,8 @@ void add_run(CLI::App& app, Context& context) {
       "Continue an interrupted run in this folder. The results are the same as without the interruption.");
   command->add_option("--max-frames", a->max_frames, "Stop after this number of stereo frames (default 0: all).")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--odometry-only", a->odometry_only, "Run the visual odometry alone: no localization, maps, SLAM or terrain.");
+  command->add_flag("--odometry-only", a->odometry_only,
+                    "Run the visual odometry alone: no localization, maps, SLAM or terrain.");
   add_threads_option(*command, context);
   add_json_flag(*command, context);
 }

@@ -14,7 +14,7 @@
 #include "program/shipped_files.h"
 #include "spartan/core/files.h"
 #include "spartan/imaging/rectification.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/sim/simulator.h"
 
 namespace spartan::program {
@@ -57,7 +57,7 @@ Result<Rig> find_rig(const sim::Scenario& scenario, const Text& text) {
     return parse_rig_yaml(std::string(*shipped), scenario.rig);
   return failure(ErrorCode::configuration,
                  "the rig '" + scenario.rig + "' is neither a file beside the scenario nor a shipped rig",
-                 place_of_option(text.content, text.name, "rig"));
+                 option_location(text.content, text.name, "rig"));
 }
 
 Result<std::map<std::string, sim::RectifiedView>> rectified_views(const Rig& rig) {
@@ -83,17 +83,17 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   if (!rig) return failure(rig);
   auto drive = sim::plan_drive(*scenario, *rig, text->content, text->name);
   if (!drive) return failure(drive);
-  auto views = rectified_views(sim::believed_rig(*rig, scenario->believed));
+  auto views = rectified_views(sim::nominal_rig(*rig, scenario->nominal_rig));
   if (!views) return failure(views);
 
   Progress progress(context.quiet);
   sim::SimulationHooks hooks;
   hooks.should_stop = interrupted;
-  hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.shots, "frames"); };
+  hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.frames, "frames"); };
   const auto start = std::chrono::steady_clock::now();
   const auto report =
       sim::simulate({*scenario, *rig, std::move(*drive), std::move(*views), arguments.output, arguments.resume}, hooks,
-                    Workers(context.threads));
+                    ThreadPool(context.threads));
   if (!report) return failure(report);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const double rate =

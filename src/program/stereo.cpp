@@ -15,11 +15,11 @@
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/eval/disparity_truth.h"
 #include "spartan/imaging/imager.h"
-#include "spartan/reconstruction/disparity_colour.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_options.h"
+#include "spartan/reconstruction/disparity_rendering.h"
 #include "spartan/reconstruction/point_cloud.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 namespace spartan::program {
 namespace {
@@ -70,7 +70,7 @@ Result<Pair> load_and_rectify(const StereoArguments& a, const ImagingOptions& op
   if (!right) return failure(right);
   const auto rig = read_rig(a.rig, left->size());
   if (!rig) return failure(rig);
-  auto imager = Imager::create(*rig, options, Workers(threads), std::filesystem::path(a.rig).parent_path().string());
+  auto imager = Imager::create(*rig, options, ThreadPool(threads), std::filesystem::path(a.rig).parent_path().string());
   if (!imager) return failure(imager);
   StereoFrame frame;
   const StereoPair& stereo_pair = rig->pairs.front();
@@ -156,7 +156,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (!options) return failure(options);
   auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!pair) return failure(pair);
-  DisparityComputer computer(options->reconstruction, Workers(context.threads));
+  DisparityComputer computer(options->reconstruction, ThreadPool(context.threads));
   const auto image =
       computer.compute(pair->left, pair->right, search_range(a, *pair), pair->left_mask, pair->right_mask);
   if (!image) {

@@ -62,7 +62,7 @@ spartan::Camera camera(const char* name) {
 int main() {
   const spartan::Rig rig = spartan::rig_of_one_pair("front", camera("left"), camera("right"),
                                                     spartan::Pose::from_translation({-kBaseline_m, 0, 0}));
-  auto pipeline = spartan::Pipeline::create(rig, spartan::RunOptions{}, spartan::Workers(2));
+  auto pipeline = spartan::Pipeline::create(rig, spartan::RunOptions{}, spartan::ThreadPool(2));
   if (!pipeline) {
     std::fprintf(stderr, "%s\n", pipeline.error().message().c_str());
     return 1;

@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   spartan::testing::check_survives_writing(spartan::read_kalibr_calib(input.path()));
 
   const std::string text(reinterpret_cast<const char*>(data), size);
-  (void)spartan::guess_format("x.txt", text);
+  (void)spartan::detect_calibration_format("x.txt", text);
   if (text.find("T_BS") == std::string::npos) return 0;
   // Two cameras at the same position are rejected, so the right one is moved.
   static const spartan::testing::TemporaryFolder folder;

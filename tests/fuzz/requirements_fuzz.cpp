@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (requirements->narrow && requirements->narrow->lists.combinations() > kMaxCombinations) return 0;
   const spartan::RigDesign design = spartan::design_rig(*requirements);
   if (design.wide.feasible.size() > design.wide.combinations) __builtin_trap();
-  for (const spartan::PairFigures& pair : design.wide.feasible) {
+  for (const spartan::PairMetrics& pair : design.wide.feasible) {
     if (!std::isfinite(pair.range_m) || !std::isfinite(pair.view_near_m) || !std::isfinite(pair.view_far_m))
       __builtin_trap();
   }

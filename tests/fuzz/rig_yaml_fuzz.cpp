@@ -2,13 +2,13 @@
 #include <cstdint>
 #include <string>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto rig = spartan::parse_rig_yaml(std::string(reinterpret_cast<const char*>(data), size), "rig.yaml");
   if (!rig) return 0;
   // An accepted rig must be valid and round-trip.
-  if (!rig->find_faults().empty()) __builtin_trap();
+  if (!rig->validation_errors().empty()) __builtin_trap();
   const auto again = spartan::parse_rig_yaml(spartan::to_rig_yaml(*rig), "rig.yaml");
   if (!again || !(*again == *rig)) __builtin_trap();
   return 0;

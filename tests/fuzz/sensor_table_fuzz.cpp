@@ -7,7 +7,7 @@
 
 namespace {
 
-void read_all(const spartan::OpenStream& open) {
+void read_all(const spartan::SampleStreamFactory& open) {
   const auto stream = open();
   if (!stream) return;
   for (;;) {

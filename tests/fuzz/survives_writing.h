@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <string>
 
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
 #include "spartan/rig/rig_differences.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -62,7 +62,7 @@ inline void abort_with(const Rig& rig, CalibrationFormat format, const std::stri
 }
 
 inline void check_survives_writing(const Rig& rig, CalibrationFormat format) {
-  if (!rig.find_faults().empty()) abort_with(rig, format, "invalid");
+  if (!rig.validation_errors().empty()) abort_with(rig, format, "invalid");
   const TemporaryFolder folder;
   const auto files = to_calibration_files(rig, format, folder.path() + "/" + file_name(format));
   const bool plausible = is_plausible(rig);
@@ -73,7 +73,7 @@ inline void check_survives_writing(const Rig& rig, CalibrationFormat format) {
   for (const CalibrationFile& file : *files) folder.write(file.path.substr(folder.path().size() + 1), file.content);
   const std::string& first = files->front().path;
   const auto again =
-      read_calibration(has_a_file_per_eye(format) ? first + "," + files->at(1).path : first, rig.cameras[0].size);
+      read_calibration(has_file_per_camera(format) ? first + "," + files->at(1).path : first, rig.cameras[0].size);
   if (!plausible) return;
   if (!again) return abort_with(rig, format, "cannot be read again: " + again.error().message());
   for (const RigDifference& each : describe_differences(rig, again->rig)) {
@@ -81,7 +81,7 @@ inline void check_survives_writing(const Rig& rig, CalibrationFormat format) {
   }
 }
 
-inline void check_survives_writing(const Result<ReadRig>& read) {
+inline void check_survives_writing(const Result<LoadedRig>& read) {
   if (read) check_survives_writing(read->rig, read->format);
 }
 

@@ -130,7 +130,7 @@ TEST_F(ImageFiles, ColoursOfAGrayRigAreReduced) {
   expect_a_map("");
   const auto refused = run({"stereo"}, ", pixel_layout: bayer_rggb");
   EXPECT_EQ(refused.exit_code, 3);
-  EXPECT_THAT(refused.err, HasSubstr("rgb of 8 bits, the rig says 320 × 240 bayer_rggb of 8 bits"));
+  EXPECT_THAT(refused.err, HasSubstr("rgb of 8 bits, but the rig specifies 320 × 240 bayer_rggb of 8 bits"));
 }
 
 }  // namespace

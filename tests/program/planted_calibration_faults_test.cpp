@@ -11,8 +11,8 @@
 
 #include "program.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/models/model_changes.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/models/model_modification.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -135,7 +135,7 @@ TEST_P(PlantedCalibrationFaults, ExchangedCamerasAndTransforms) {
 // A focal length common to both cameras is observable by the distortion only: to some percent where rows agree to a
 // third of a pixel.
 TEST_P(PlantedCalibrationFaults, Sizes) {
-  for (const auto& change : {with_focal_times, resized}) {
+  for (const auto& change : {with_scaled_focal_length, resized}) {
     expect_named(
         "size_mismatch",
         [&](Rig& rig) {
@@ -144,14 +144,14 @@ TEST_P(PlantedCalibrationFaults, Sizes) {
         0.03);
   }
   expect_named("size_mismatch",
-               [&](Rig& rig) { camera(rig, true).model = with_focal_times(camera(rig, true).model, 1.5); });
+               [&](Rig& rig) { camera(rig, true).model = with_scaled_focal_length(camera(rig, true).model, 1.5); });
 }
 
 TEST_P(PlantedCalibrationFaults, RowsAndLenses) {
   for (const double rows_px : {2, -2, -5, 20}) {
     SCOPED_TRACE(rows_px);
     expect_named(
-        "row_offset", [&](Rig& rig) { camera(rig, true).model = with_rows_lower(camera(rig, true).model, rows_px); },
+        "row_offset", [&](Rig& rig) { camera(rig, true).model = with_row_offset(camera(rig, true).model, rows_px); },
         0.005, 0.4);
   }
   const auto pinhole = [&](Rig& rig, bool right) {

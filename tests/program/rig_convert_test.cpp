@@ -68,7 +68,7 @@ TEST(RigConvert, WhatIsLostIsSaid) {
   EXPECT_THAT(keys, ::testing::Contains("cameras.wide_left.name"));
   EXPECT_THAT(keys, Not(::testing::Contains("cameras.wide_right.place"))) << "at the angles of rest";
   EXPECT_THAT(keys, Not(::testing::Contains("body")));
-  const json gone = {{"key", "pairs.narrow"}, {"text", "the pair is gone"}};
+  const json gone = {{"key", "pairs.narrow"}, {"text", "the pair is missing"}};
   EXPECT_THAT(all["lost"], ::testing::Contains(gone));
   // Both files are named.
   const auto two = run_program({"rig", "convert", rover(), folder.path() + "/pair.tsai", "--pair", "wide", "--json"});

@@ -36,7 +36,7 @@ std::size_t lines_of(const std::string& text) {
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
-// The keys that scripts rely on (docs/formats.md, "JSON").
+// The keys that scripts rely on (docs/reference/json.md).
 TEST(RigDesign, JsonHoldsThePublishedFigures) {
   const auto result = run_program({"rig", "design", rover(), "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -139,7 +139,7 @@ TEST(RigDesign, DrawsTheGround) {
   for (const char* label :
        {"wide: 0.488 to 4.011 m", "narrow: 0.200 to 2.516 m", "both: 2.03 m", "far edge, one camera: 117.1°",
         "far edge, both cameras: 114.6°", "required: 120°", "pan -35°", "pan 0°", "pan 35°", "blind: up to 0.200 m",
-        "by 25.6 % (one eye) and 21.6 % (both eyes)"}) {
+        "by 25.6 % (one camera) and 21.6 % (both cameras)"}) {
     EXPECT_THAT(svg, HasSubstr(label));
   }
   const auto png = read_image(out + "/ground.png");
@@ -278,7 +278,7 @@ TEST(RigDesign, DrawsWhatPansWithGapsOrToOneSideSee) {
     std::vector<std::string> words;
   } const cases[] = {
       {"[-80, 0, 80]", 120, {"far edge, one camera: 54.1°", "all 120° at no distance", "leave a gap of 30.0°"}},
-      {"[0, 35, 70]", 120, {"far edge, both cameras: 82.3°", "all 120° at no distance", "by 25.6 % (one eye)"}},
+      {"[0, 35, 70]", 120, {"far edge, both cameras: 82.3°", "all 120° at no distance", "by 25.6 % (one camera)"}},
       {"[-60, -35, 35]", 120, {"far edge, one camera: 95.6°", "all 120°: 0.60 to 0.70 m", "leave a gap of 20.0°"}},
       {"[-35, 0, 35]", 10, {"required: 10°", "far edge, one camera: 10.0°", "all 10°: 0.49 to 4.01 m"}},
       {"[-180, -90, 0, 90, 180]", 360, {"far edge, one camera: 188.3°", "all 360° at no distance"}},
@@ -292,7 +292,7 @@ TEST(RigDesign, DrawsWhatPansWithGapsOrToOneSideSee) {
 TEST(RigDesign, CamerasWithoutCommonGroundGiveNoNan) {
   const testing::TemporaryFolder folder;
   const std::string apart = replaced(rover_text(), "    baseline_m: 0.20", "    baseline_m: 20");
-  EXPECT_THAT(drawn(folder, apart), HasSubstr("both eyes share nothing"));
+  EXPECT_THAT(drawn(folder, apart), HasSubstr("both cameras share no ground"));
   const json design = json::parse(run_program({"rig", "design", folder.path() + "/required.yaml", "--json"}).out);
   EXPECT_EQ(design["azimuth_far_stereo_deg"], 0);
   EXPECT_EQ(design["pan_overlap_far_stereo_percent"], nullptr);

@@ -24,7 +24,7 @@ using testing::run_program;
 TEST(RigInspect, DescribesThePublishedRover) {
   const auto result = run_program({"rig", "inspect", testing::source_folder() + "/config/rigs/rover.yaml"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("the right one is 200.0 mm to the right; not turned"));
+  EXPECT_THAT(result.out, HasSubstr("the right one is 200.0 mm to the right; not rotated"));
   EXPECT_THAT(result.out, HasSubstr("pan-tilt unit mast"));
 }
 

@@ -1,4 +1,4 @@
-// What of a run folder must be the same, whatever happened on the way (docs/formats.md, "Byte-stable").
+// What of a run folder must be the same, whatever happened on the way (docs/reference/files.md).
 #pragma once
 
 #include <map>

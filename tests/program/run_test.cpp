@@ -219,7 +219,7 @@ TEST_F(Run, StereoShowsTheViewThatIsAskedFor) {
   const ProgramResult impossible =
       stereo({"--set", "imaging.view.focal_px=90000", "--set", "imaging.view.policy=whole_view"});
   EXPECT_EQ(impossible.exit_code, 4) << impossible.err;
-  EXPECT_THAT(impossible.err, HasSubstr("not all that the eyes see fits"));
+  EXPECT_THAT(impossible.err, HasSubstr("not all that the cameras see fits"));
   EXPECT_EQ(stereo({"--set", "imaging.view.policy=any"}).exit_code, 2);
   EXPECT_EQ(stereo({"--set", "imaging.view.width_px=1", "--set", "imaging.view.policy=whole_view"}).exit_code, 4);
   const std::string all = "32767";

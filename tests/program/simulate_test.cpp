@@ -210,7 +210,7 @@ TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
   write("small.yaml", "schema: 1\nrig: small_rig.yaml\nshots:\n  stops_m: [99]\n");
   result = simulate("bad");
   EXPECT_EQ(result.exit_code, 4);
-  EXPECT_THAT(result.err, HasSubstr("small.yaml:4: shots.stops_m"));
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:4: capture.stops_m"));
   write("small.yaml", "schema: 1\nrig: none.yaml\n");
   result = simulate("bad");
   EXPECT_EQ(result.exit_code, 4);

@@ -51,7 +51,7 @@ void write_small_drive(const std::string& folder, const SmallDrive& drive) {
   const Pose start = world_from_left(drive, 0);
   for (int i = 0; i < drive.frames; ++i) {
     const Pose pose = world_from_left(drive, i);
-    const SyntheticShot shot = world.render(camera, pose, static_cast<std::uint64_t>(i));
+    const SyntheticFrame shot = world.render(camera, pose, static_cast<std::uint64_t>(i));
     must(write_png(fmt::format("{}/image_0/{:06}.png", folder, i), shot.left));
     must(write_png(fmt::format("{}/image_1/{:06}.png", folder, i), shot.right));
     times += fmt::format("{:.9f}\n", drive.period_s * i);

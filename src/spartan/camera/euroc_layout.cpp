@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <utility>
 
+#include "spartan/camera/frame_tables.h"
 #include "spartan/camera/recording_index.h"
 #include "spartan/camera/sensor_tables.h"
-#include "spartan/camera/shot_tables.h"
 #include "spartan/camera/stamp_order.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 namespace spartan {
 namespace {

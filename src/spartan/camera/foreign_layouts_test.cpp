@@ -9,7 +9,7 @@
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -47,7 +47,7 @@ class ForeignLayouts : public ::testing::Test {
     return source.error().message();
   }
   // "f0 f1 right_missing …": frames by id, missing frames by fault, IMU samples as i.
-  std::vector<std::string> play(FrameSource& source) {
+  std::vector<std::string> collect_samples(FrameSource& source) {
     std::vector<std::string> seen;
     while (true) {
       const auto sample = source.next();
@@ -80,8 +80,8 @@ TEST_F(KittiLayout, ReadsFramesAndTruth) {
   EXPECT_THAT(source->info().layout_reason, HasSubstr("calib.txt and image_0 found"));
   EXPECT_EQ(source->info().truth_file, "");
   EXPECT_FALSE(source->info().has_imu);
-  EXPECT_THAT(play(*source), ElementsAre("f0", "f1", "f2", "f3"));
-  EXPECT_THAT(source->announced_stamps("stereo"),
+  EXPECT_THAT(collect_samples(*source), ElementsAre("f0", "f1", "f2", "f3"));
+  EXPECT_THAT(source->listed_stamps("stereo"),
               ElementsAre(Stamp{0}, Stamp{103'600'000}, Stamp{207'000'000}, Stamp{310'000'000}));
   EXPECT_EQ(source->frame_at("stereo", {207'000'000}).value().frame_id, 2);
   folder_.write("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
@@ -92,7 +92,7 @@ TEST_F(KittiLayout, SkipsFramesWithAMissingImage) {
   remove("image_1/000001.png");
   remove("image_0/000002.png");
   auto source = open();
-  EXPECT_THAT(play(*source), ElementsAre("f0", "right_missing", "left_missing", "f3"));
+  EXPECT_THAT(collect_samples(*source), ElementsAre("f0", "right_missing", "left_missing", "f3"));
   EXPECT_EQ(source->info().sequence.orphans_left, 1);
   EXPECT_EQ(source->info().sequence.orphans_right, 1);
   remove("image_1");
@@ -103,7 +103,7 @@ TEST_F(KittiLayout, AssumesTenHertzWithoutTimes) {
   remove("times.txt");
   auto source = open();
   EXPECT_THAT(source->info().layout_reason, HasSubstr("no times.txt: frames are assumed to be 0.1 s apart"));
-  EXPECT_THAT(source->announced_stamps("stereo"),
+  EXPECT_THAT(source->listed_stamps("stereo"),
               ElementsAre(Stamp{0}, Stamp{100'000'000}, Stamp{200'000'000}, Stamp{300'000'000}));
 }
 
@@ -114,10 +114,10 @@ TEST_F(KittiLayout, RejectsInvalidTimes) {
   EXPECT_THAT(rejection(), HasSubstr("the file holds no times"));
   folder_.write("times.txt", "0\n0.1\n0.05\n0.3\n");
   auto source = open();
-  EXPECT_THAT(play(*source), ElementsAre("f0", "f1", "stamp_reversed", "f3"));
+  EXPECT_THAT(collect_samples(*source), ElementsAre("f0", "f1", "stamp_reversed", "f3"));
   EXPECT_EQ(source->info().sequence.reversals, 1);
   folder_.write("times.txt", "0\n0.1\n");
-  EXPECT_THAT(play(*open()), ElementsAre("f0", "f1"));
+  EXPECT_THAT(collect_samples(*open()), ElementsAre("f0", "f1"));
   EXPECT_THAT(open()->info().sequence.remarks, ::testing::Not(IsEmpty())) << "two images have no time";
 }
 
@@ -133,7 +133,7 @@ TEST_F(KittiLayout, SkipsDamagedImages) {
   folder_.write("image_0/000001.png", whole.substr(0, whole.size() - 20));
   folder_.write("image_1/000002.png", "");
   image("image_1/000003.png", 31, 16);
-  EXPECT_THAT(play(*open()), ElementsAre("f0", "unreadable", "unreadable", "wrong_size"));
+  EXPECT_THAT(collect_samples(*open()), ElementsAre("f0", "unreadable", "unreadable", "wrong_size"));
 }
 
 TEST_F(KittiLayout, SkipsTruncatedJpegs) {
@@ -145,11 +145,11 @@ TEST_F(KittiLayout, SkipsTruncatedJpegs) {
       cv::imwrite(folder_.file(fmt::format("{}/{:06}.jpg", side, i)), pixels);
     }
   }
-  EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "f2", "f3"));
+  EXPECT_THAT(collect_samples(*open()), ElementsAre("f0", "f1", "f2", "f3"));
   const std::string whole = text_of("image_0/000002.jpg");
   for (const std::size_t kept : {whole.size() - 2, whole.size() - 40, whole.size() / 2, std::size_t{3}}) {
     folder_.write("image_0/000002.jpg", whole.substr(0, kept));
-    EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "unreadable", "f3"))
+    EXPECT_THAT(collect_samples(*open()), ElementsAre("f0", "f1", "unreadable", "f3"))
         << kept << " of " << whole.size() << " bytes";
   }
 }
@@ -192,9 +192,9 @@ TEST_F(KittiRawLayout, ReadsFramesAndImu) {
   auto source = open();
   EXPECT_EQ(source->info().format, RecordingFormat::kitti_raw);
   EXPECT_TRUE(source->info().has_imu);
-  EXPECT_THAT(play(*source), ElementsAre("i", "f0", "i", "f1", "i", "f2"));
+  EXPECT_THAT(collect_samples(*source), ElementsAre("i", "f0", "i", "f1", "i", "f2"));
   // 2011-09-26 13:02:25 UTC
-  EXPECT_EQ(source->announced_stamps("stereo")[0], Stamp{1317042145'064389445LL});
+  EXPECT_EQ(source->listed_stamps("stereo")[0], Stamp{1317042145'064389445LL});
   const auto imu = source->imu_samples({}, 10).value();
   ASSERT_EQ(imu.size(), 3u);
   EXPECT_EQ(imu[1].accel_m_s2, Eigen::Vector3d(111, 112, 113));
@@ -235,17 +235,17 @@ class EurocLayout : public ForeignLayouts {
 };
 
 TEST_F(EurocLayout, OpensAboveAndInsideMav0) {
-  EXPECT_THAT(play(*open()), ElementsAre("f0", "f1", "f2", "f3"));
+  EXPECT_THAT(collect_samples(*open()), ElementsAre("f0", "f1", "f2", "f3"));
   EXPECT_EQ(open()->info().format, RecordingFormat::euroc);
   auto source = open_recording(folder_.path() + "/mav0");
   ASSERT_TRUE(source);
-  EXPECT_THAT(play(**source), ElementsAre("f0", "f1", "f2", "f3"));
+  EXPECT_THAT(collect_samples(**source), ElementsAre("f0", "f1", "f2", "f3"));
 }
 
 TEST_F(EurocLayout, PairsImagesByStamp) {
   list(1, {1002, 2998, 4001, 70000});
   auto source = open();
-  EXPECT_THAT(play(*source), ElementsAre("f0", "right_missing", "f2", "f3", "left_missing"));
+  EXPECT_THAT(collect_samples(*source), ElementsAre("f0", "right_missing", "f2", "f3", "left_missing"));
   EXPECT_EQ(source->info().sequence.orphans_left, 1);
   EXPECT_EQ(source->info().sequence.orphans_right, 1);
   const auto frame = source->frame_at("stereo", {3'000'000});
@@ -257,7 +257,7 @@ TEST_F(EurocLayout, RotatesImuSamplesIntoTheBodyFrame) {
   folder_.write("mav0/imu0/sensor.yaml", "T_BS: {rows: 4, cols: 4, data: [0,-1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]}\n");
   folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n1500000,0,0,0,0,0,0\n");
   auto source = open();
-  EXPECT_THAT(play(*source), ElementsAre("i", "f0", "i", "f1", "f2", "f3"));
+  EXPECT_THAT(collect_samples(*source), ElementsAre("i", "f0", "i", "f1", "f2", "f3"));
   const auto imu = source->imu_samples({}, 1).value();
   EXPECT_LE((imu[0].gyro_rad_s - Eigen::Vector3d(-2, 1, 3)).norm(), 1e-12);
   EXPECT_LE((imu[0].accel_m_s2 - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);

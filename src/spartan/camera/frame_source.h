@@ -51,7 +51,7 @@ struct RecordingInfo {
 };
 
 /// Identifies one stereo frame of a recording, see FrameSource::frame_at().
-struct ShotName {
+struct FrameKey {
   std::string pair;
   Stamp left_stamp;
 };
@@ -78,17 +78,17 @@ class FrameSource {
   virtual Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) = 0;
 
   /// Left stamps of all listed frames of a pair, in playback order.
-  virtual std::vector<Stamp> announced_stamps(const std::string& pair) const = 0;
+  virtual std::vector<Stamp> listed_stamps(const std::string& pair) const = 0;
 
   /// Frames of one stop that are complete as far as known without decoding, in playback order.
-  virtual std::vector<ShotName> shots_at(std::int64_t position_id) const = 0;
+  virtual std::vector<FrameKey> frames_at(std::int64_t position_id) const = 0;
 
   /// IMU samples of an interval of `seconds` that starts at `from` (none: at the first sample). Does not move the read
   /// position.
   virtual Result<std::vector<ImuSample>> imu_samples(std::optional<Stamp> from, double seconds) = 0;
 
   /// Number of sensor samples discarded so far because their stamps did not increase.
-  virtual std::int64_t sensor_samples_left_out() const = 0;
+  virtual std::int64_t sensor_samples_discarded() const = 0;
 };
 
 /// How to open a recording.

@@ -14,7 +14,7 @@ namespace {
 // A sensor stream with its next sample.
 class SensorHead {
  public:
-  explicit SensorHead(OpenStream open) : open_(std::move(open)) {}
+  explicit SensorHead(SampleStreamFactory open) : open_(std::move(open)) {}
 
   Status rewind() {
     auto stream = open_();
@@ -32,7 +32,7 @@ class SensorHead {
   std::int64_t discarded() const { return stream_ ? stream_->discarded() : 0; }
 
  private:
-  OpenStream open_;
+  SampleStreamFactory open_;
   std::optional<IncreasingStream> stream_;
   std::optional<Sample> head_;
 };
@@ -45,7 +45,7 @@ class IndexedSource : public FrameSource {
  public:
   explicit IndexedSource(RecordingIndex index) : index_(std::move(index)) {
     if (index_.imu) sensors_.emplace_back(index_.imu);
-    for (const OpenStream& open : index_.other_sensors) sensors_.emplace_back(open);
+    for (const SampleStreamFactory& open : index_.other_sensors) sensors_.emplace_back(open);
   }
 
   const RecordingInfo& info() const override { return index_.info; }
@@ -84,7 +84,7 @@ class IndexedSource : public FrameSource {
                    index_.info.path);
   }
 
-  std::vector<Stamp> announced_stamps(const std::string& pair) const override {
+  std::vector<Stamp> listed_stamps(const std::string& pair) const override {
     std::vector<Stamp> stamps;
     for (const FrameEntry& entry : index_.frames) {
       if (entry.pair == pair) stamps.push_back(entry.left_stamp);
@@ -92,8 +92,8 @@ class IndexedSource : public FrameSource {
     return stamps;
   }
 
-  std::vector<ShotName> shots_at(std::int64_t position_id) const override {
-    std::vector<ShotName> names;
+  std::vector<FrameKey> frames_at(std::int64_t position_id) const override {
+    std::vector<FrameKey> names;
     for (const FrameEntry& entry : index_.frames) {
       if (entry.position_id == position_id && !entry.fault) names.push_back({entry.pair, entry.left_stamp});
     }
@@ -116,7 +116,7 @@ class IndexedSource : public FrameSource {
     return samples;
   }
 
-  std::int64_t sensor_samples_left_out() const override {
+  std::int64_t sensor_samples_discarded() const override {
     std::int64_t sum = 0;
     for (const SensorHead& sensor : sensors_) sum += sensor.discarded();
     return sum;

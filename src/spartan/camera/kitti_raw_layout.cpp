@@ -5,10 +5,10 @@
 
 #include <filesystem>
 
+#include "spartan/camera/frame_tables.h"
 #include "spartan/camera/image_folder.h"
 #include "spartan/camera/recording_index.h"
-#include "spartan/camera/shot_tables.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 namespace spartan {
 namespace {

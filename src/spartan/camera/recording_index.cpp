@@ -8,7 +8,7 @@
 #include <map>
 
 #include "spartan/camera/stamp_order.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 namespace spartan {
 namespace {

@@ -34,14 +34,14 @@ class SampleStream {
   virtual Result<std::optional<Sample>> next() = 0;
 };
 /// Opens a stream at its first sample.
-using OpenStream = std::function<Result<std::unique_ptr<SampleStream>>()>;
+using SampleStreamFactory = std::function<Result<std::unique_ptr<SampleStream>>()>;
 
 /// Frames and sensor streams of a recording.
 struct RecordingIndex {
   RecordingInfo info;
-  std::vector<FrameEntry> frames;         ///< in file order until validate_and_sort()
-  OpenStream imu;                         ///< empty: no IMU
-  std::vector<OpenStream> other_sensors;  ///< wheels, compass, inclinometer
+  std::vector<FrameEntry> frames;                  ///< in file order until validate_and_sort()
+  SampleStreamFactory imu;                         ///< empty: no IMU
+  std::vector<SampleStreamFactory> other_sensors;  ///< wheels, compass, inclinometer
 };
 
 /// A detected folder layout and the reason for it.

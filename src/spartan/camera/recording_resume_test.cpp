@@ -36,7 +36,7 @@ StereoFrame make_frame(int i) {
 int write_frames(RecordingWriter& writer, int from, int to) {
   int taken = 0;
   for (int i = from; i < to; ++i) {
-    const auto there = writer.take_over("stereo", stamp_of_frame(i));
+    const auto there = writer.reuse_frame("stereo", stamp_of_frame(i));
     EXPECT_TRUE(there) << there.error().message();
     if (*there) {
       ++taken;
@@ -160,8 +160,8 @@ TEST_F(ResumedRecording, AnotherFolderIsNotOverwritten) {
 TEST_F(ResumedRecording, FramesMustStillBeInOrder) {
   begin(3);
   RecordingWriter writer = resumed(path_);
-  ASSERT_TRUE(*writer.take_over("stereo", stamp_of_frame(1)));
-  const auto back = writer.take_over("stereo", stamp_of_frame(0));
+  ASSERT_TRUE(*writer.reuse_frame("stereo", stamp_of_frame(1)));
+  const auto back = writer.reuse_frame("stereo", stamp_of_frame(0));
   ASSERT_FALSE(back);
   EXPECT_THAT(back.error().message(), HasSubstr("does not come after"));
 }

@@ -18,7 +18,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/options.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 namespace spartan {
 namespace {
@@ -234,7 +234,7 @@ Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const R
   return RecordingWriter(std::move(state));
 }
 
-Result<bool> RecordingWriter::take_over(const std::string& pair, Stamp left_stamp) {
+Result<bool> RecordingWriter::reuse_frame(const std::string& pair, Stamp left_stamp) {
   const std::string stem = fmt::format("images/{}/{}", pair, left_stamp.ns);
   const auto row = state_->previous_rows.find(stem + "_left.png");
   std::error_code error;

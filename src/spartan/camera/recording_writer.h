@@ -1,4 +1,4 @@
-// Writes Spartan recordings (docs/formats.md, "Recording").
+// Writes Spartan recordings (docs/reference/recording.md).
 #pragma once
 
 #include <map>
@@ -33,7 +33,7 @@ class RecordingWriter {
   static Result<RecordingWriter> create(const std::string& folder, const Rig& nominal_rig,
                                         const RecordingOptions& options);
   /// Resumes an unfinished recording that `create` started for the same rig. Frames with a complete row and both images
-  /// can be reused with take_over(); all other data is written again. Starts a recording where there is none.
+  /// can be reused with reuse_frame(); all other data is written again. Starts a recording where there is none.
   static Result<RecordingWriter> resume(const std::string& folder, const Rig& nominal_rig,
                                         const RecordingOptions& options);
   RecordingWriter(RecordingWriter&&) noexcept;
@@ -42,7 +42,7 @@ class RecordingWriter {
 
   Status add(const StereoFrame& frame);
   /// Reuses a complete frame of the resumed recording instead of writing it; false where it is absent or incomplete.
-  Result<bool> take_over(const std::string& pair, Stamp left_stamp);
+  Result<bool> reuse_frame(const std::string& pair, Stamp left_stamp);
   Status add(const ImuSample& sample);
   Status add(const WheelSample& sample);
   Status add(const CompassSample& sample);

@@ -17,9 +17,9 @@ namespace spartan {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::collect_samples;
+using testing::CollectedSamples;
 using ::testing::HasSubstr;
-using testing::play;
-using testing::Played;
 using testing::TemporaryFolder;
 using testing::tiny_image;
 using testing::tiny_rig;
@@ -181,7 +181,7 @@ RC_GTEST_PROP(RecordingWriter, ReadsBackBitForBit, ()) {
   RC_ASSERT((*source)->info().noise.imu.accel_walk_m_s3_sqrt_hz == 5e-5);
   RC_ASSERT((*source)->info().noise.compass.offset_walk_rad_sqrt_hz == 1e-6);
   RC_ASSERT((*source)->info().noise.inclinometer.bias_rad == 2e-3);
-  const Played played = play(**source);
+  const CollectedSamples played = collect_samples(**source);
   RC_ASSERT(played.error == "");
   RC_ASSERT(played.all.size() == written.size());
   for (std::size_t i = 0; i < written.size(); ++i) RC_ASSERT(same(played.all[i], written[i]));
@@ -262,7 +262,7 @@ TEST_F(Rejections, StampsMustIncreaseWithinAKind) {
               HasSubstr("out of range"));
   ASSERT_TRUE(writer_.add(frame(2'000'000'000)));
   ASSERT_TRUE(writer_.finish());
-  const Played played = play(**open_recording(folder_.path()));
+  const CollectedSamples played = collect_samples(**open_recording(folder_.path()));
   EXPECT_EQ(played.frames.size(), 2U) << "a rejected sample is not recorded";
   EXPECT_TRUE(testing::same_image(played.frames[0].left, frame(0).left));
 }

@@ -57,8 +57,8 @@ Result<Sample> read_row(const std::vector<std::string_view>& row, Make make) {
 
 }  // namespace
 
-OpenStream stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
-                           const RowReader& read_row) {
+SampleStreamFactory stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
+                                    const RowReader& read_row) {
   return [=]() -> Result<std::unique_ptr<SampleStream>> {
     auto table = TableReader::open(path, format);
     if (!table) return failure(table);

@@ -13,8 +13,8 @@ namespace spartan {
 using RowReader = std::function<Result<Sample>(const std::vector<std::string_view>&)>;
 
 /// Opens a stream over a table whose rows have at least `fields` fields. Errors (code `input`) name file and line.
-OpenStream stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
-                           const RowReader& read_row);
+SampleStreamFactory stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
+                                    const RowReader& read_row);
 
 /// IMU rows: stamp_ns, angular rate x y z (rad/s), specific force x y z (m/s²). `body_from_imu` rotates both into the
 /// body frame.

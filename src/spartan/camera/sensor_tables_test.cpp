@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
 // All samples of a table, or the error that ends it.
-Result<std::vector<Sample>> read_all(const OpenStream& open) {
+Result<std::vector<Sample>> read_all(const SampleStreamFactory& open) {
   auto stream = open();
   if (!stream) return failure(stream);
   std::vector<Sample> samples;

@@ -1,4 +1,4 @@
-// File headers and recording.yaml of Spartan recordings, shared by writer and reader (docs/formats.md, "Recording").
+// File headers and recording.yaml of Spartan recordings, shared by writer and reader (docs/reference/recording.md).
 #pragma once
 
 #include <string>

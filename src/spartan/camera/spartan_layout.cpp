@@ -1,11 +1,11 @@
-// Spartan layout: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/formats.md, "Recording").
+// Spartan layout: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/reference/recording.md).
 #include <filesystem>
 
+#include "spartan/camera/frame_tables.h"
 #include "spartan/camera/recording_index.h"
 #include "spartan/camera/sensor_tables.h"
-#include "spartan/camera/shot_tables.h"
 #include "spartan/camera/spartan_format.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 
 namespace spartan {
 namespace {
@@ -47,15 +47,15 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
 
   const fs::path sensors = folder / "sensors";
   const auto stream = [&](const char* name, const char* header, std::size_t fields,
-                          const RowReader& reader) -> OpenStream {
+                          const RowReader& reader) -> SampleStreamFactory {
     if (!fs::exists(sensors / name, error)) return {};
     return stream_of_table((sensors / name).string(), {.separator = ',', .header = header, .ends_with_newline = true},
                            fields, reader);
   };
   index.imu = stream("imu.csv", kImuHeader, 7, read_imu_row(Eigen::Quaterniond::Identity()));
-  for (OpenStream other : {stream("wheels.csv", kWheelsHeader, 3, read_wheel_row),
-                           stream("compass.csv", kCompassHeader, 3, read_compass_row),
-                           stream("inclinometer.csv", kInclinometerHeader, 4, read_inclinometer_row)}) {
+  for (SampleStreamFactory other : {stream("wheels.csv", kWheelsHeader, 3, read_wheel_row),
+                                    stream("compass.csv", kCompassHeader, 3, read_compass_row),
+                                    stream("inclinometer.csv", kInclinometerHeader, 4, read_inclinometer_row)}) {
     if (other) index.other_sensors.push_back(std::move(other));
   }
   return index;

@@ -12,7 +12,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/random.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -278,7 +278,7 @@ TEST_F(SpartanRecordingFaults, SeekContinuesLikeAnUninterruptedReader) {
 
 TEST_F(SpartanRecordingFaults, FramesOnRequestByStamp) {
   auto source = open_recording(path_).value();
-  EXPECT_EQ(source->announced_stamps("front").size(), 5u);
+  EXPECT_EQ(source->listed_stamps("front").size(), 5u);
   const auto frame = source->frame_at("front", {6'000'000'000LL});
   ASSERT_TRUE(frame) << frame.error().message();
   EXPECT_EQ(frame->frame_id, 3);
@@ -301,11 +301,11 @@ TEST_F(SpartanRecordingFaults, FramesOfAStop) {
   change("frames.csv", "3,-1,front", "3,7,front");
   std::filesystem::remove(path_ + "/images/front/4000000000_left.png");
   const auto source = open_recording(path_).value();
-  const auto keys = source->shots_at(7);
+  const auto keys = source->frames_at(7);
   ASSERT_EQ(keys.size(), 1u) << "the other frame has no left image";
   EXPECT_EQ(keys[0].pair, "front");
   EXPECT_EQ(keys[0].left_stamp.ns, 6000000000);
-  EXPECT_TRUE(source->shots_at(8).empty());
+  EXPECT_TRUE(source->frames_at(8).empty());
 }
 
 TEST(RecordingWriter, DoesNotOverwriteAFolder) {

@@ -82,7 +82,8 @@ class ArchiveReader {
     return values;
   }
 
-  /// Checks that every value was present and no byte is left over; otherwise an error of code `store_damaged` at `what`.
+  /// Checks that every value was present and no byte is left over; otherwise an error of code `store_damaged` at
+  /// `what`.
   Status finish(const std::string& what) const;
 
  private:

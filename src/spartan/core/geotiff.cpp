@@ -43,7 +43,7 @@ Status write_bands(GDALDataset& dataset, const std::string& path, const std::vec
 
 }  // namespace
 
-Status write_geotiff(const std::string& path, const MapPlace& place, const std::vector<MapBand>& bands) {
+Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands) {
   const ImageSize size = bands.empty() ? ImageSize{} : bands.front().values.size();
   for (const MapBand& band : bands) {
     if (band.values.size() != size || size.empty())
@@ -105,7 +105,7 @@ Result<LoadedMap> read_geotiff(const std::string& path) {
 
 #else
 
-Status write_geotiff(const std::string& path, const MapPlace&, const std::vector<MapBand>&) {
+Status write_geotiff(const std::string& path, const GeoTransform&, const std::vector<MapBand>&) {
   return failure(ErrorCode::usage, "cannot write GeoTIFF: Spartan was built without GDAL", path,
                  "install libgdal-dev and rebuild");
 }

@@ -17,17 +17,17 @@ struct MapBand {
 
 /// Georeference of a north-up raster in the world plane, metres: x and y of its north-west corner and the side of a
 /// cell (GDAL's geotransform without rotation).
-struct MapPlace {
+struct GeoTransform {
   double west_m = 0, north_m = 0, cell_m = 1;
 };
 
 /// Writes float32 bands of equal size, compressed, without a map projection. The file is written atomically.
 /// Code `output` if it cannot be written, `usage` if Spartan was built without GDAL.
-Status write_geotiff(const std::string& path, const MapPlace& place, const std::vector<MapBand>& bands);
+Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands);
 
 /// The content of such a GeoTIFF; bands as float32.
 struct LoadedMap {
-  MapPlace place;
+  GeoTransform place;
   std::vector<std::string> names;
   std::vector<Image<float>> bands;
 };

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "spartan/core/files.h"
+#include "spartan/core/image_file_check.h"
 #include "spartan/core/jpeg_file.h"
 #include "spartan/core/opencv_bridge.h"
-#include "spartan/core/picture_file.h"
 
 namespace spartan {
 namespace {
@@ -79,7 +79,7 @@ bool parse(std::string_view word, T& value) {
 
 Result<FrameImage> decode_image(const std::string& content, const std::string& name) {
   const char* const hint = "replace the file, or remove it to skip the frame";
-  if (const std::string error = picture_file_fault(content); !error.empty())
+  if (const std::string error = image_file_error(content); !error.empty())
     return failure(ErrorCode::input, error, name, hint);
   if (is_jpeg(content)) {
     auto image = decode_jpeg(content, JpegColour::as_stored);
@@ -112,7 +112,7 @@ Result<FrameImage> read_image(const std::string& path) {
 Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
   const auto content = read_file(path);
   if (!content) return failure(content);
-  if (const std::string error = picture_file_fault(*content); !error.empty())
+  if (const std::string error = image_file_error(*content); !error.empty())
     return failure(ErrorCode::input, error, path);
   if (is_jpeg(*content)) {
     const auto image = decode_jpeg(*content, JpegColour::gray);
@@ -164,7 +164,7 @@ Result<Image<float>> parse_pfm(const std::string& content, const std::string& na
   std::size_t width = 0, height = 0;
   double scale = 0;
   if (magic != "Pf" || !parse(width_text, width) || !parse(height_text, height) || !parse(scale_text, scale) ||
-      width == 0 || height == 0 || width > kLargestImageSide || height > kLargestImageSide || scale == 0 ||
+      width == 0 || height == 0 || width > kMaxImageSide || height > kMaxImageSide || scale == 0 ||
       !std::isfinite(scale)) {
     return failure(ErrorCode::input, "is not a single-channel PFM file", name);
   }

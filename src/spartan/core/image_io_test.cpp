@@ -10,8 +10,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "spartan/core/image_file_check.h"
 #include "spartan/core/opencv_bridge.h"
-#include "spartan/core/picture_file.h"
 #include "spartan/core/random.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -307,7 +307,7 @@ TEST(ImageFileReal, IntactFilesAreAccepted) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(data)) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") continue;
-    EXPECT_EQ(picture_file_fault(content_of(entry.path().string())), "") << entry.path();
+    EXPECT_EQ(image_file_error(content_of(entry.path().string())), "") << entry.path();
     ++count;
   }
   EXPECT_GT(count, 0);

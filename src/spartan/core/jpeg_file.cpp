@@ -6,7 +6,7 @@
 #include <string>
 #include <type_traits>
 
-#include "spartan/core/picture_file.h"
+#include "spartan/core/image_file_check.h"
 
 namespace spartan {
 namespace {
@@ -49,8 +49,7 @@ Result<FrameImage> decode_jpeg(std::string_view content, JpegColour colour) {
   if (tjDecompressHeader3(decoder.get(), jpeg, content.size(), &size.width, &size.height, &subsampling, &stored) != 0) {
     return failure(ErrorCode::input, std::string("JPEG file is damaged: ") + tjGetErrorStr2(decoder.get()));
   }
-  if (size.empty() || size.width > static_cast<int>(kLargestImageSide) ||
-      size.height > static_cast<int>(kLargestImageSide)) {
+  if (size.empty() || size.width > static_cast<int>(kMaxImageSide) || size.height > static_cast<int>(kMaxImageSide)) {
     return failure(ErrorCode::input, "JPEG header with an implausible image size");
   }
   if (colour == JpegColour::gray || stored == TJCS_GRAY) {

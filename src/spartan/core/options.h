@@ -261,7 +261,7 @@ std::string to_yaml(const std::vector<OptionLine>& lines);
 
 /// The location "name:line: group.key" of a key in a YAML text, for errors that concern several keys; "name: group.key"
 /// if the text does not have the key.
-std::string place_of_option(const std::string& text, const std::string& name, const std::string& key);
+std::string option_location(const std::string& text, const std::string& name, const std::string& key);
 
 /// Reads options from YAML text. Fields that the text does not contain keep their values in `defaults`. Unknown and
 /// repeated keys, wrong types and values out of bounds are errors (code `configuration`), all reported in one Error,

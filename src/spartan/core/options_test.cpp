@@ -246,9 +246,9 @@ TEST(OptionLists, AreDumpedOnOneLine) {
 
 TEST(OptionLists, LocationOfAnOptionIsItsLine) {
   const std::string text = "before: 1\nmasks:\n  - {name: sky}\nmatcher:\n  speckle:\n    size_px: 3\n";
-  EXPECT_EQ(place_of_option(text, "m.yaml", "masks"), "m.yaml:2: masks");
-  EXPECT_EQ(place_of_option(text, "m.yaml", "matcher.speckle.size_px"), "m.yaml:6: matcher.speckle.size_px");
-  EXPECT_EQ(place_of_option(text, "m.yaml", "after"), "m.yaml: after");
+  EXPECT_EQ(option_location(text, "m.yaml", "masks"), "m.yaml:2: masks");
+  EXPECT_EQ(option_location(text, "m.yaml", "matcher.speckle.size_px"), "m.yaml:6: matcher.speckle.size_px");
+  EXPECT_EQ(option_location(text, "m.yaml", "after"), "m.yaml: after");
 }
 
 RC_GTEST_PROP(Options, DumpsParseToTheSameBits, (double gain, bool enabled, int size)) {

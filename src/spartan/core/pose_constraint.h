@@ -20,16 +20,16 @@ struct PoseConstraint {
 };
 
 /// Transports a constraint along a motion: the constraint of `constraint.world_from_body` · `motion` at `stamp`.
-PoseConstraint carried(const PoseConstraint& constraint, const UncertainPose& motion, Stamp stamp);
+PoseConstraint transported(const PoseConstraint& constraint, const UncertainPose& motion, Stamp stamp);
 
 /// Inflates information Λ by the covariance C of a further, independent error: (Λ⁻¹ + C)⁻¹, also for a singular Λ.
-Matrix6d blurred(const Matrix6d& information, const Matrix6d& covariance);
+Matrix6d inflated(const Matrix6d& information, const Matrix6d& covariance);
 
 /// The fraction S of the covariance P of a pose that it shares with a map built from earlier poses of the same drive:
 /// the cross-covariance of both errors is P S. Along the common principal axes of both covariances (generalized
 /// eigenvectors) the shared variance is the smaller one: where the pose has become less certain since, its error
 /// contains the whole error of the map; where it has become more certain, the map's error contains that of the pose.
 /// Both are covariances of the same right perturbation.
-Matrix6d common_share(const Matrix6d& pose, const Matrix6d& map);
+Matrix6d shared_fraction(const Matrix6d& pose, const Matrix6d& map);
 
 }  // namespace spartan

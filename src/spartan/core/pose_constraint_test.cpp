@@ -20,7 +20,7 @@ double least_eigenvalue(const Matrix6d& m) {
 }
 
 Matrix6d common_covariance(const Matrix6d& pose, const Matrix6d& map) {
-  return pose * common_share(pose, map);
+  return pose * shared_fraction(pose, map);
 }
 
 TEST(SharedFraction, IsTheMapCovarianceIfThePoseHasDriftedSince) {
@@ -62,7 +62,7 @@ TEST(PoseConstraint, IsTransportedAlongAMotion) {
   const Matrix6d covariance = random_covariance(random);
   c.information = covariance.inverse();
   const UncertainPose motion{exp_se3(small(1)), random_covariance(random)};
-  const PoseConstraint on = carried(c, motion, {9});
+  const PoseConstraint on = transported(c, motion, {9});
   EXPECT_EQ(on.stamp, Stamp{9});
   EXPECT_LE(log_se3(on.world_from_body.inverse() * c.world_from_body * motion.pose).norm(), 1e-12);
   Matrix6d by_error;
@@ -76,7 +76,7 @@ TEST(PoseConstraint, IsTransportedAlongAMotion) {
   EXPECT_LE((on.map_covariance - map).norm(), 1e-5 * map.norm());
   // Zero information remains zero.
   c.information.setZero();
-  EXPECT_EQ(carried(c, motion, {9}).information.norm(), 0);
+  EXPECT_EQ(transported(c, motion, {9}).information.norm(), 0);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ namespace spartan {
 
 // The installed TBB is not instrumented for the thread sanitizer, which would report its tasks as data races.
 // Plain threads replace it.
-struct Workers::Arena {
+struct ThreadPool::Arena {
   explicit Arena(int threads) : threads_(threads) {}
 
   void run(int parts, const std::function<void(int)>& part) const {
@@ -55,7 +55,7 @@ struct Workers::Arena {
 
 #else
 
-struct Workers::Arena {
+struct ThreadPool::Arena {
   explicit Arena(int threads) : tasks_(threads) {}
 
   void run(int parts, const std::function<void(int)>& part) {
@@ -68,12 +68,12 @@ struct Workers::Arena {
 
 #endif
 
-Workers::Workers(int threads) : threads_(threads) {
+ThreadPool::ThreadPool(int threads) : threads_(threads) {
   if (threads < 1) throw std::invalid_argument("Workers: the number of threads must be at least 1");
   if (threads > 1) arena_ = std::make_shared<Arena>(threads);
 }
 
-void Workers::for_each_part(int begin, int end, int grain, const std::function<void(int, int)>& body) const {
+void ThreadPool::parallel_for(int begin, int end, int grain, const std::function<void(int, int)>& body) const {
   if (grain < 1) throw std::invalid_argument("Workers: the grain must be at least 1");
   if (end <= begin) return;
   const int parts = (end - begin + grain - 1) / grain;
@@ -88,7 +88,7 @@ void Workers::for_each_part(int begin, int end, int grain, const std::function<v
   arena_->run(parts, run_part);
 }
 
-void Workers::run_both(const std::function<void()>& first, const std::function<void()>& second) const {
+void ThreadPool::parallel_invoke(const std::function<void()>& first, const std::function<void()>& second) const {
   if (!arena_) {
     first();
     second();
@@ -97,7 +97,7 @@ void Workers::run_both(const std::function<void()>& first, const std::function<v
   arena_->run(2, [&](int part) { part == 0 ? first() : second(); });
 }
 
-void bound_third_party_threads(int threads) {
+void limit_third_party_threads(int threads) {
   cv::setNumThreads(threads);
 }
 

@@ -7,18 +7,18 @@
 namespace spartan {
 
 /// A bounded set of worker threads (a TBB task arena). Copies share the threads.
-class Workers {
+class ThreadPool {
  public:
   /// `threads` ≥ 1 includes the calling thread; throws std::invalid_argument otherwise.
-  explicit Workers(int threads = 1);
+  explicit ThreadPool(int threads = 1);
 
   int threads() const { return threads_; }
   /// Runs body(begin, end) in parallel over disjoint parts of [begin, end), each of length `grain` (the last may be
   /// shorter). The parts depend only on `grain`, not on the number of threads, so that results can be independent of
   /// it. Returns when all parts are done; rethrows an exception of a part. Throws std::invalid_argument if grain < 1.
-  void for_each_part(int begin, int end, int grain, const std::function<void(int, int)>& body) const;
+  void parallel_for(int begin, int end, int grain, const std::function<void(int, int)>& body) const;
   /// Runs both functions, in parallel if there is more than one thread.
-  void run_both(const std::function<void()>& first, const std::function<void()>& second) const;
+  void parallel_invoke(const std::function<void()>& first, const std::function<void()>& second) const;
 
  private:
   struct Arena;
@@ -27,6 +27,6 @@ class Workers {
 };
 
 /// Limits the threads of third-party libraries (OpenCV) in the whole process; called once by the program.
-void bound_third_party_threads(int threads);
+void limit_third_party_threads(int threads);
 
 }  // namespace spartan

@@ -13,10 +13,10 @@
 namespace spartan {
 namespace {
 
-std::set<std::pair<int, int>> parts_of(const Workers& workers, int begin, int end, int grain) {
+std::set<std::pair<int, int>> parts_of(const ThreadPool& workers, int begin, int end, int grain) {
   std::mutex mutex;
   std::multiset<std::pair<int, int>> parts;
-  workers.for_each_part(begin, end, grain, [&](int from, int to) {
+  workers.parallel_for(begin, end, grain, [&](int from, int to) {
     const std::lock_guard lock(mutex);
     parts.insert({from, to});
   });
@@ -25,10 +25,10 @@ std::set<std::pair<int, int>> parts_of(const Workers& workers, int begin, int en
   return once;
 }
 
-RC_GTEST_PROP(Workers, PartsCoverTheRangeOnceForAnyNumberOfThreads, ()) {
+RC_GTEST_PROP(ThreadPool, PartsCoverTheRangeOnceForAnyNumberOfThreads, ()) {
   const int begin = *rc::gen::inRange(-50, 50), length = *rc::gen::inRange(0, 200), grain = *rc::gen::inRange(1, 40);
-  const auto alone = parts_of(Workers(1), begin, begin + length, grain);
-  RC_ASSERT(parts_of(Workers(2), begin, begin + length, grain) == alone);
+  const auto alone = parts_of(ThreadPool(1), begin, begin + length, grain);
+  RC_ASSERT(parts_of(ThreadPool(2), begin, begin + length, grain) == alone);
   int at = begin;
   for (const auto& [from, to] : alone) {
     RC_ASSERT(from == at);
@@ -38,36 +38,36 @@ RC_GTEST_PROP(Workers, PartsCoverTheRangeOnceForAnyNumberOfThreads, ()) {
   RC_ASSERT(at == begin + length);
 }
 
-TEST(Workers, RethrowExceptions) {
+TEST(ThreadPool, RethrowExceptions) {
   for (const int threads : {1, 2}) {
-    const Workers workers(threads);
-    EXPECT_THROW(workers.for_each_part(0, 10, 1,
-                                       [](int from, int) {
-                                         if (from == 7) throw std::runtime_error("seven");
-                                       }),
+    const ThreadPool workers(threads);
+    EXPECT_THROW(workers.parallel_for(0, 10, 1,
+                                      [](int from, int) {
+                                        if (from == 7) throw std::runtime_error("seven");
+                                      }),
                  std::runtime_error);
-    EXPECT_THROW(workers.run_both([] {}, [] { throw std::runtime_error("second"); }), std::runtime_error);
+    EXPECT_THROW(workers.parallel_invoke([] {}, [] { throw std::runtime_error("second"); }), std::runtime_error);
   }
 }
 
-TEST(Workers, RunBothFunctions) {
+TEST(ThreadPool, RunBothFunctions) {
   for (const int threads : {1, 2}) {
     std::atomic<int> sum = 0;
-    Workers(threads).run_both([&] { sum += 1; }, [&] { sum += 10; });
+    ThreadPool(threads).parallel_invoke([&] { sum += 1; }, [&] { sum += 10; });
     EXPECT_EQ(sum, 11);
   }
 }
 
-TEST(Workers, NestWithoutDeadlock) {
-  const Workers workers(2);
+TEST(ThreadPool, NestWithoutDeadlock) {
+  const ThreadPool workers(2);
   std::atomic<int> count = 0;
-  workers.for_each_part(0, 8, 1, [&](int, int) { workers.for_each_part(0, 8, 1, [&](int, int) { ++count; }); });
+  workers.parallel_for(0, 8, 1, [&](int, int) { workers.parallel_for(0, 8, 1, [&](int, int) { ++count; }); });
   EXPECT_EQ(count, 64);
 }
 
-TEST(Workers, RejectInvalidArguments) {
-  EXPECT_THROW(Workers(0), std::invalid_argument);
-  EXPECT_THROW(Workers(1).for_each_part(0, 1, 0, [](int, int) {}), std::invalid_argument);
+TEST(ThreadPool, RejectInvalidArguments) {
+  EXPECT_THROW(ThreadPool(0), std::invalid_argument);
+  EXPECT_THROW(ThreadPool(1).parallel_for(0, 1, 0, [](int, int) {}), std::invalid_argument);
 }
 
 }  // namespace

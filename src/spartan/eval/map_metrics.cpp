@@ -28,7 +28,7 @@ IndexRange cells_within(double low, double side, double cell) {
           static_cast<int>(std::ceil((low + side) / cell - 0.5 - 1e-9))};
 }
 
-std::optional<TrueCell> true_cell(const JudgedMap& map, const TrueGround& truth, int column, int row) {
+std::optional<TrueCell> true_cell(const EvaluatedMap& map, const TerrainTruth& truth, int column, int row) {
   const double side = map.place.cell_m, fine = truth.place.cell_m;
   const IndexRange x = cells_within(map.place.west_m + column * side - truth.place.west_m, side, fine);
   const IndexRange y = cells_within(truth.place.north_m - (map.place.north_m - row * side), side, fine);
@@ -56,7 +56,7 @@ std::optional<TrueCell> true_cell(const JudgedMap& map, const TrueGround& truth,
   return cell;
 }
 
-// Ground truth by cell of the map; kind 0 outside of the ground truth, else as JudgedMap::kind.
+// Ground truth by cell of the map; kind 0 outside of the ground truth, else as EvaluatedMap::kind.
 struct Labels {
   Image<std::uint8_t> kind;
   Image<float> size;  // height or depth
@@ -65,7 +65,7 @@ struct Labels {
 
 // The connected regions of one kind that have a visible cell.
 template <class Visible, class Marked>
-std::vector<JudgedThing> regions_of(const Labels& labels, std::uint8_t kind, const MapPlace& place,
+std::vector<HazardScore> regions_of(const Labels& labels, std::uint8_t kind, const GeoTransform& place,
                                     double min_marked_fraction, ImageView<const float> lowest_seen,
                                     const Visible& visible, const Marked& marked) {
   const auto [w, h] = labels.kind.size();
@@ -73,9 +73,9 @@ std::vector<JudgedThing> regions_of(const Labels& labels, std::uint8_t kind, con
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) mask(x, y) = labels.kind(x, y) == kind ? 1 : 0;
   }
-  std::vector<JudgedThing> regions;
+  std::vector<HazardScore> regions;
   for (const std::vector<PixelIndex>& cells : connected_components(mask)) {
-    JudgedThing region;
+    HazardScore region;
     for (const auto [x, y] : cells) {
       region.middle_m +=
           Eigen::Vector2d(place.west_m + (x + 0.5) * place.cell_m, place.north_m - (y + 0.5) * place.cell_m);
@@ -107,14 +107,14 @@ bool near_obstacle(const Labels& labels, int x, int y) {
 
 }  // namespace
 
-MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapScoring& s) {
+MapMetrics evaluate_map(const EvaluatedMap& map, const TerrainTruth& truth, const MapMetricsOptions& s) {
   const auto [w, h] = map.elevation_m.size();
   Labels labels{Image<std::uint8_t>(w, h), Image<float>(w, h), Image<float>(w, h)};
   MapMetrics m;
   double sum = 0, squares = 0;
   const auto in_range = [&](int x, int y) {
-    const double range = std::hypot(map.place.west_m + (x + 0.5) * map.place.cell_m - s.eye_m.x(),
-                                    map.place.north_m - (y + 0.5) * map.place.cell_m - s.eye_m.y());
+    const double range = std::hypot(map.place.west_m + (x + 0.5) * map.place.cell_m - s.viewpoint_m.x(),
+                                    map.place.north_m - (y + 0.5) * map.place.cell_m - s.viewpoint_m.y());
     return range >= s.nearest_m && range < s.farthest_m;
   };
   const auto is_visible = [&](int x, int y) { return in_range(x, y) && map.visible(x, y) >= s.min_visible_pixels; };
@@ -134,7 +134,7 @@ MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapSco
       const double error = map.elevation_m(x, y) - cell->mean_m;
       sum += error;
       squares += error * error;
-      ++m.judged_cells;
+      ++m.elevation_cells;
     }
   }
   for (int y = 0; y < h; ++y) {
@@ -147,15 +147,15 @@ MapMetrics judge_map(const JudgedMap& map, const TrueGround& truth, const MapSco
       m.false_cells += kind == 2 && !near_obstacle(labels, x, y) ? 1 : 0;
     }
   }
-  if (m.judged_cells > 0) {
-    m.bias_m = sum / m.judged_cells;
-    m.rms_m = std::sqrt(squares / m.judged_cells);
+  if (m.elevation_cells > 0) {
+    m.bias_m = sum / m.elevation_cells;
+    m.rms_m = std::sqrt(squares / m.elevation_cells);
   }
   m.obstacles = regions_of(labels, 2, map.place, s.min_marked_fraction, map.lowest_seen_m, is_visible,
                            [&](int x, int y) { return map.kind(x, y) == 2; });
   m.cavities = regions_of(labels, 3, map.place, s.min_marked_fraction, map.lowest_seen_m, is_visible,
                           [&](int x, int y) { return map.kind(x, y) == 3; });
-  std::erase_if(m.cavities, [&](const JudgedThing& cavity) { return cavity.seen_depth_m < s.cavity_m; });
+  std::erase_if(m.cavities, [&](const HazardScore& cavity) { return cavity.seen_depth_m < s.cavity_m; });
   return m;
 }
 

@@ -15,7 +15,7 @@ struct Case {
   Image<float> elevation{40, 40, 1.0F}, kind{40, 40, 1.0F};
   Image<std::uint16_t> visible{40, 40, 10};
   Image<float> lowest_seen{40, 40, 1.0F};
-  MapPlace place{-2, 2, 0.1};
+  GeoTransform place{-2, 2, 0.1};
 
   Case() {
     box(surface, 200, 0.02, 0.8, 1.2, 0.8, 1.2, 1.2F);
@@ -35,8 +35,9 @@ struct Case {
       }
     }
   }
-  MapMetrics evaluate(const MapScoring& scoring = {}) const {
-    return judge_map({place, elevation, kind, visible, lowest_seen}, {{-2, 2, 0.02}, surface, ground, level}, scoring);
+  MapMetrics evaluate(const MapMetricsOptions& scoring = {}) const {
+    return evaluate_map({place, elevation, kind, visible, lowest_seen}, {{-2, 2, 0.02}, surface, ground, level},
+                        scoring);
   }
   static int column(double x) { return static_cast<int>((x + 2) / 0.1); }
   static int row(double y) { return static_cast<int>((2 - y) / 0.1); }
@@ -44,7 +45,7 @@ struct Case {
 
 TEST(MapMetrics, ACorrectMapHasNoErrors) {
   const MapMetrics m = Case().evaluate();
-  EXPECT_EQ(m.judged_cells, 1600);
+  EXPECT_EQ(m.elevation_cells, 1600);
   EXPECT_NEAR(m.rms_m, 0, 1e-6);
   EXPECT_EQ(m.coverage(), 1);
   EXPECT_EQ(m.false_cells, 0);
@@ -68,7 +69,7 @@ TEST(MapMetrics, ElevationErrorsCountOnFlatCells) {
   c.surface(Case::column(0) * 5 + 2, Case::row(0.05) * 5 + 2) = 1.06F;  // a stone: relief over 5 cm
   c.elevation(Case::column(0.05), Case::row(0.05)) = 5;
   const MapMetrics m = c.evaluate();
-  EXPECT_EQ(m.judged_cells, 1599);
+  EXPECT_EQ(m.elevation_cells, 1599);
   EXPECT_NEAR(m.bias_m, 40 * 0.02 / 1599, 1e-6);
   EXPECT_NEAR(m.rms_m, std::sqrt(40 * 0.02 * 0.02 / 1599), 1e-6);
 }
@@ -127,7 +128,7 @@ TEST(MapMetrics, FalsePositivesAreTwoCellsFromAnyObstacle) {
 }
 
 TEST(MapMetrics, RangesPartitionTheCells) {
-  MapScoring near, far;
+  MapMetricsOptions near, far;
   near.farthest_m = far.nearest_m = 1.0;
   const Case c;
   const MapMetrics a = c.evaluate(near), b = c.evaluate(far), all = c.evaluate();

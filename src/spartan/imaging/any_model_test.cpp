@@ -107,7 +107,7 @@ std::optional<std::pair<Outcome, Outcome>> outcomes_of(const NamedModel& left, c
   for (Camera& camera : cameras) camera.pixel_format = {PixelLayout::gray, 16};
   const Rig rig = rig_of_one_pair("test", cameras[0], cameras[1],
                                   Pose(exp_so3({0.02, -0.03, 0.04}), {kBaseline_m, 0, 0}).inverse());
-  auto imager = Imager::create(rig, options, Workers(2));
+  auto imager = Imager::create(rig, options, ThreadPool(2));
   if (!imager) return std::nullopt;
   StereoFrame frame;
   frame.pair = rig.pairs[0].name;
@@ -188,7 +188,7 @@ TEST(Fisheye, ViewIsCentredOnTheImage) {
     const Camera left = camera_with("left", EquidistantModel({58, 58, centre.x(), centre.y()}, {}));
     const Camera right = camera_with("right", left.model);
     const Rig rig = rig_of_one_pair("test", left, right, Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse());
-    const auto imager = Imager::create(rig, plain_options(ViewPolicy::keep_resolution), Workers(1));
+    const auto imager = Imager::create(rig, plain_options(ViewPolicy::keep_resolution), ThreadPool(1));
     ASSERT_TRUE(imager);
     const RectifiedStereo view = imager->geometry(rig.pairs[0].name);
     EXPECT_LT((view.centre_px - Vector2d(79.5, 59.5)).norm(), 1.5 * (centre - Vector2d(79.5, 59.5)).norm() + 1e-6)

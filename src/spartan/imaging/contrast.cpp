@@ -19,12 +19,12 @@ int shift_of(PixelFormat format) {
 }
 
 template <class T>
-void map_rows(ImageView<const T> image, ImageView<std::uint8_t> result, const Workers& workers,
+void map_rows(ImageView<const T> image, ImageView<std::uint8_t> result, const ThreadPool& workers,
               const std::vector<std::uint8_t>& table, int shift) {
   if (image.size() != result.size()) throw std::invalid_argument("contrast: the sizes differ");
   // Stray bits above the significant ones must not index beyond the table.
   const unsigned last = static_cast<unsigned>(table.size()) - 1;
-  workers.for_each_part(0, image.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, image.height(), kRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       const T* in = image.row(y);
       std::uint8_t* out = result.row(y);
@@ -169,12 +169,12 @@ void ContrastMapping::set_range(int low, int high, double gain) {
 }
 
 void ContrastMapping::apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result,
-                            const Workers& workers) const {
+                            const ThreadPool& workers) const {
   map_rows(image, result, workers, table_, shift_);
 }
 
 void ContrastMapping::apply(ImageView<const std::uint16_t> image, ImageView<std::uint8_t> result,
-                            const Workers& workers) const {
+                            const ThreadPool& workers) const {
   map_rows(image, result, workers, table_, shift_);
 }
 

@@ -67,8 +67,8 @@ class ContrastMapping {
 
   std::uint8_t operator()(int stored) const { return table_[static_cast<std::size_t>(stored >> shift_)]; }
   /// Maps an image; `result` has its size. Rows are distributed over the workers.
-  void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
-  void apply(ImageView<const std::uint16_t> image, ImageView<std::uint8_t> result, const Workers& workers) const;
+  void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const ThreadPool& workers) const;
+  void apply(ImageView<const std::uint16_t> image, ImageView<std::uint8_t> result, const ThreadPool& workers) const;
 
  private:
   void set_range(int low, int high, double gain = 1);

@@ -77,8 +77,8 @@ TEST(Contrast, LowAndHighAlignmentGiveTheSame) {
   const auto mapping_low = stretched<std::uint16_t>(low, stored_low, stored_low);
   const auto mapping_high = stretched<std::uint16_t>(high, stored_high, stored_high);
   Image<std::uint8_t> from_low(stored_low.size()), from_high(stored_high.size());
-  mapping_low.apply(stored_low, from_low, Workers(1));
-  mapping_high.apply(stored_high, from_high, Workers(2));
+  mapping_low.apply(stored_low, from_low, ThreadPool(1));
+  mapping_high.apply(stored_high, from_high, ThreadPool(2));
   for (int x = 0; x < from_low.width(); ++x) EXPECT_EQ(from_low(x, 3), from_high(x, 3));
   EXPECT_EQ(from_low(0, 0), 0);
   EXPECT_EQ(from_low(from_low.width() - 1, 0), 255);
@@ -199,7 +199,7 @@ TEST(Contrast, StrayBitsStayInsideTheTable) {
   const Image<std::uint16_t> image(4, 4, 0xffff);
   Image<std::uint8_t> result(4, 4);
   const ContrastMapping mapping = stretched<std::uint16_t>(format, image, image);
-  mapping.apply(image, result, Workers(1));
+  mapping.apply(image, result, ThreadPool(1));
   EXPECT_EQ(result(0, 0), 255);
 }
 

@@ -37,9 +37,9 @@ class BufferPool {
 
 template <class T>
 void run_bilinear(ImageView<const T> mosaic, BayerPhase phase, const bayer::Kernels<T>& kernels, auto result,
-                  const Workers& workers) {
+                  const ThreadPool& workers) {
   const int height = mosaic.height();
-  workers.for_each_part(0, height, kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, height, kRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       const bayer::BilinearRow<T> row{mosaic.row(y > 0 ? y - 1 : 1),
                                       mosaic.row(y),
@@ -59,8 +59,8 @@ void run_bilinear(ImageView<const T> mosaic, BayerPhase phase, const bayer::Kern
 template <class T, class Pixel>
 void run_edge_aware(ImageView<const T> mosaic, BayerPhase phase, const PixelFormat& format,
                     const bayer::Kernels<T>& kernels, ImageView<Pixel> result, BufferPool& pool,
-                    const Workers& workers) {
-  workers.for_each_part(0, mosaic.height(), kRowsPerBand, [&](int begin, int end) {
+                    const ThreadPool& workers) {
+  workers.parallel_for(0, mosaic.height(), kRowsPerBand, [&](int begin, int end) {
     auto buffers = pool.take(mosaic.width());
     const bayer::Band<T, Pixel> band{mosaic, phase, format.full_scale(), result, begin, end};
     if constexpr (std::is_same_v<Pixel, T>) {
@@ -81,7 +81,7 @@ struct Debayerer::State {
   BufferPool pool;
 
   template <class T, class Pixel>
-  void run(ImageView<const T> mosaic, const PixelFormat& format, ImageView<Pixel> result, const Workers& workers) {
+  void run(ImageView<const T> mosaic, const PixelFormat& format, ImageView<Pixel> result, const ThreadPool& workers) {
     const BayerPhase phase = bayer_phase(format.layout);
     if (format.bytes_per_sample() != sizeof(T))
       throw std::invalid_argument("debayer: the samples have another type than the format");
@@ -113,19 +113,19 @@ Debayerer& Debayerer::operator=(Debayerer&&) noexcept = default;
 Debayerer::~Debayerer() = default;
 
 void Debayerer::apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<Rgb8> result,
-                      const Workers& workers) const {
+                      const ThreadPool& workers) const {
   state_->run(mosaic, format, result, workers);
 }
 void Debayerer::apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<Rgb16> result,
-                      const Workers& workers) const {
+                      const ThreadPool& workers) const {
   state_->run(mosaic, format, result, workers);
 }
 void Debayerer::apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<std::uint8_t> result,
-                      const Workers& workers) const {
+                      const ThreadPool& workers) const {
   state_->run(mosaic, format, result, workers);
 }
 void Debayerer::apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<std::uint16_t> result,
-                      const Workers& workers) const {
+                      const ThreadPool& workers) const {
   state_->run(mosaic, format, result, workers);
 }
 

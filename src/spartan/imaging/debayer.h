@@ -26,13 +26,13 @@ class Debayerer {
   ~Debayerer();
 
   void apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<Rgb8> result,
-             const Workers& workers) const;
+             const ThreadPool& workers) const;
   void apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<Rgb16> result,
-             const Workers& workers) const;
+             const ThreadPool& workers) const;
   void apply(ImageView<const std::uint8_t> mosaic, const PixelFormat& format, ImageView<std::uint8_t> result,
-             const Workers& workers) const;
+             const ThreadPool& workers) const;
   void apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& format, ImageView<std::uint16_t> result,
-             const Workers& workers) const;
+             const ThreadPool& workers) const;
 
  private:
   struct State;

@@ -49,7 +49,7 @@ void expect_as_opencv(int largest) {
     for (const Pattern& pattern : kPatterns) {
       SCOPED_TRACE(name_of(pattern.layout));
       Image<Rgb<T>> ours(size);
-      Debayerer().apply(mosaic, format_of<T>(pattern.layout), ours, Workers(2));
+      Debayerer().apply(mosaic, format_of<T>(pattern.layout), ours, ThreadPool(2));
       cv::Mat theirs;
       cv::cvtColor(as_mat(mosaic), theirs, pattern.opencv_code);
       const auto reference = as_view<Rgb<T>>(theirs);
@@ -95,7 +95,7 @@ template <class T>
 Image<Rgb<T>> debayered(DebayerMethod method, ImageView<const T> mosaic, PixelLayout layout, int threads = 1,
                         const std::string& simd = "auto") {
   Image<Rgb<T>> result(mosaic.size());
-  Debayerer(method, simd).apply(mosaic, format_of<T>(layout), result, Workers(threads));
+  Debayerer(method, simd).apply(mosaic, format_of<T>(layout), result, ThreadPool(threads));
   return result;
 }
 
@@ -117,7 +117,7 @@ void expect_uniform_colours_back(Rgb<T> colour) {
         const auto mosaic = mosaic_of<T>(uniform, pattern.layout);
         expect_same<Rgb<T>>(debayered<T>(method, mosaic, pattern.layout), uniform);
         Image<T> gray(size);
-        Debayerer(method).apply(mosaic, format_of<T>(pattern.layout), gray, Workers(1));
+        Debayerer(method).apply(mosaic, format_of<T>(pattern.layout), gray, ThreadPool(1));
         expect_same<T>(gray, Image<T>(size.width, size.height, luma(colour)));
       }
     }
@@ -181,7 +181,7 @@ void expect_same_bytes_everywhere(int largest) {
       for (const std::string& simd : available_simd_targets()) {
         SCOPED_TRACE(simd);
         expect_same<Rgb<T>>(debayered<T>(method, mosaic, PixelLayout::bayer_gbrg, 2, simd), expected);
-        Debayerer(method, simd).apply(mosaic, format_of<T>(PixelLayout::bayer_gbrg), gray, Workers(2));
+        Debayerer(method, simd).apply(mosaic, format_of<T>(PixelLayout::bayer_gbrg), gray, ThreadPool(2));
         expect_same<T>(gray, expected_gray);
       }
     }
@@ -274,7 +274,7 @@ void expect_as_the_formula(const PixelFormat& format, double unit) {
     for (int x = 0; x < mosaic.width(); ++x) mosaic(x, y) = static_cast<T>(mosaic(x, y) << shift);
   }
   Image<Rgb<T>> result(mosaic.size());
-  Debayerer(DebayerMethod::edge_aware).apply(mosaic, format, result, Workers(1));
+  Debayerer(DebayerMethod::edge_aware).apply(mosaic, format, result, ThreadPool(1));
   const ReferenceEdgeAware<T> reference(mosaic, format, unit);
   // Rounding of the result (½ level) and of the differences; single precision.
   const double tolerance = 0.65 / unit + 1e-3;
@@ -307,7 +307,7 @@ TEST(Debayer, LumaHasTheFullRange) {
 TEST(Debayer, RejectsImagesThatAreNotMosaics) {
   Image<std::uint8_t> image(4, 4), other(5, 4);
   const auto refuses = [&](PixelFormat format, const Image<std::uint8_t>& mosaic) {
-    EXPECT_THROW(Debayerer().apply(mosaic, format, image, Workers(1)), std::invalid_argument);
+    EXPECT_THROW(Debayerer().apply(mosaic, format, image, ThreadPool(1)), std::invalid_argument);
   };
   refuses({PixelLayout::gray, 8}, image);
   refuses({PixelLayout::bayer_rggb, 8}, other);

@@ -5,8 +5,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "spartan/imaging/camera_stage.h"
 #include "spartan/imaging/contrast.h"
-#include "spartan/imaging/eye_stage.h"
 #include "spartan/imaging/rectification.h"
 
 namespace spartan {
@@ -50,7 +50,7 @@ void update_mappings(PairStage& stage, const ImagingOptions& options) {
 struct Imager::State {
   Rig rig;
   ImagingOptions options;
-  Workers workers;
+  ThreadPool workers;
   std::map<std::string, PairStage> pairs;
   StageClock clock;
 
@@ -118,7 +118,7 @@ struct Imager::State {
   }
 };
 
-Result<Imager> Imager::create(const Rig& rig, const ImagingOptions& options, Workers workers,
+Result<Imager> Imager::create(const Rig& rig, const ImagingOptions& options, ThreadPool workers,
                               const std::string& mask_folder) {
   if (Status status = validate(options, "imaging options"); !status) return failure(status);
   if (Status status = rig.validate(rig.name); !status) return failure(status);

@@ -17,18 +17,19 @@ namespace spartan {
 /// do not depend on earlier frames.
 class Imager {
  public:
-  /// Code `configuration` where options are out of bounds, a pair cannot be rectified (diverging optical axes, an impossible view, a camera that
-  /// sees less than 1 % of the view), a self-mask cannot be read or a vignetting correction is out of range.
-  /// `mask_folder` is the folder of the rig file, to which the names of self-masks are relative.
-  static Result<Imager> create(const Rig& rig, const ImagingOptions& options, Workers workers,
+  /// Code `configuration` where options are out of bounds, a pair cannot be rectified (diverging optical axes, an
+  /// impossible view, a camera that sees less than 1 % of the view), a self-mask cannot be read or a vignetting
+  /// correction is out of range. `mask_folder` is the folder of the rig file, to which the names of self-masks are
+  /// relative.
+  static Result<Imager> create(const Rig& rig, const ImagingOptions& options, ThreadPool workers,
                                const std::string& mask_folder = {});
   Imager(Imager&&) noexcept;
   Imager& operator=(Imager&&) noexcept;
   ~Imager();
 
-  /// The image views of the result are valid until the next call for the same pair. Code `frame_rejected` where the pair of the
-  /// frame is unknown or an image has another size or pixel format than its camera in the rig. RGB images of a gray
-  /// camera are converted to gray.
+  /// The image views of the result are valid until the next call for the same pair. Code `frame_rejected` where the
+  /// pair of the frame is unknown or an image has another size or pixel format than its camera in the rig. RGB images
+  /// of a gray camera are converted to gray.
   Result<RectifiedPair> process(const StereoFrame& frame);
 
   /// Geometry of the rectified images of a pair. Throws where there is no such pair.

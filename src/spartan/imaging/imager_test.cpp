@@ -53,7 +53,7 @@ TEST(Imager, ARectifiedPairIsNotChanged) {
   ImagingOptions options;
   options.contrast = false;
   const Rig rig = rig_with({});
-  auto imager = Imager::create(rig, options, Workers(1));
+  auto imager = Imager::create(rig, options, ThreadPool(1));
   ASSERT_TRUE(imager) << imager.error().message();
   const auto left = ramp<std::uint8_t>(1), right = ramp<std::uint8_t>(2);
   const auto pair =
@@ -75,7 +75,7 @@ TEST(Imager, ARectifiedPairIsNotChanged) {
 TEST(Imager, EveryDepthAndLayoutGivesTheSameWorkingImage) {
   // A gray world: all layouts must agree but for the interpolation at the borders of a mosaic.
   const auto working_image = [](const PixelFormat& format, const FrameImage& image) {
-    auto imager = Imager::create(rig_with(format), {}, Workers(2));
+    auto imager = Imager::create(rig_with(format), {}, ThreadPool(2));
     EXPECT_TRUE(imager);
     const auto pair = imager->process(frame_of(image, image));
     EXPECT_TRUE(pair) << pair.error().message();
@@ -104,7 +104,7 @@ TEST(Imager, EveryDepthAndLayoutGivesTheSameWorkingImage) {
 }
 
 TEST(Imager, RejectsFramesThatContradictTheRig) {
-  auto imager = Imager::create(rig_with({}), {}, Workers(1));
+  auto imager = Imager::create(rig_with({}), {}, ThreadPool(1));
   ASSERT_TRUE(imager);
   const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
   const auto rejection = [&](const StereoFrame& frame) {
@@ -125,7 +125,7 @@ TEST(Imager, RejectsFramesThatContradictTheRig) {
 }
 
 TEST(Imager, RgbImagesOfAGrayCameraBecomeGray) {
-  auto imager = Imager::create(rig_with({}), {}, Workers(1));
+  auto imager = Imager::create(rig_with({}), {}, ThreadPool(1));
   ASSERT_TRUE(imager);
   const auto gray = ramp<std::uint8_t>(2);
   Image<Rgb8> colour(kSize);
@@ -142,7 +142,7 @@ TEST(Imager, RgbImagesOfAGrayCameraBecomeGray) {
   for (int y = 0; y < kSize.height; ++y) {
     for (int x = 0; x < kSize.width; ++x) ASSERT_EQ(from_colour->right(x, y), expected(x, y));
   }
-  EXPECT_FALSE(Imager::create(rig_with(rgb), {}, Workers(1))
+  EXPECT_FALSE(Imager::create(rig_with(rgb), {}, ThreadPool(1))
                    ->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::borrow(gray.view(), {}))));
 }
 
@@ -155,7 +155,7 @@ TEST(Imager, LoadsSelfMasks) {
   for (const bool rotated : {false, true}) {
     Rig rig = rig_with({}, {0, rotated ? 0.02 : 0, 0});
     rig.cameras[0].self_mask = "masks/left.png";
-    auto imager = Imager::create(rig, {}, Workers(1), folder.path());
+    auto imager = Imager::create(rig, {}, ThreadPool(1), folder.path());
     ASSERT_TRUE(imager) << imager.error().message();
     const auto pair = imager->process(frame_of(good, good));
     ASSERT_TRUE(pair);
@@ -164,7 +164,7 @@ TEST(Imager, LoadsSelfMasks) {
     EXPECT_EQ(pair->left_mask(30, 20), 255);
     EXPECT_EQ(pair->right_mask.empty(), !rotated);
     rig.cameras[0].self_mask = "masks/missing.png";
-    const auto rejected = Imager::create(rig, {}, Workers(1), folder.path());
+    const auto rejected = Imager::create(rig, {}, ThreadPool(1), folder.path());
     ASSERT_FALSE(rejected);
     EXPECT_EQ(rejected.error().code, ErrorCode::configuration);
     EXPECT_THAT(rejected.error().message(), HasSubstr("missing.png"));
@@ -188,7 +188,7 @@ TEST(Imager, TheSelfMaskIsExcludedFromGainCompensation) {
     for (const double rotation : {0.0, 0.002}) {
       Rig rig = rig_with({}, {0, rotation, 0});
       rig.cameras[1].self_mask = "body.png";
-      auto imager = Imager::create(rig, {}, Workers(1), folder.path());
+      auto imager = Imager::create(rig, {}, ThreadPool(1), folder.path());
       ASSERT_TRUE(imager) << imager.error().message();
       const auto pair =
           imager->process(frame_of(FrameImage::own(scene.clone(), {}), FrameImage::own(with_body.clone(), {})));
@@ -206,7 +206,7 @@ TEST(Imager, PixelsOutsideOfTheViewDoNotAffectTheContrast) {
   const CameraModel fisheye = EquidistantModel({20, 20, 31.5, 23.5}, {});  // 88° at 31 px
   const Rig rig = rig_of_one_pair("test", camera("left", {}, fisheye), camera("right", {}, fisheye),
                                   Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}).inverse());
-  auto imager = Imager::create(rig, {}, Workers(1));
+  auto imager = Imager::create(rig, {}, ThreadPool(1));
   ASSERT_TRUE(imager) << imager.error().message();
   const auto seen_with = [&](int surround) {
     auto pixels = ramp<std::uint8_t>(1);
@@ -231,7 +231,7 @@ TEST(Imager, UsesTheRequestedView) {
   options.view.policy = ViewPolicy::all_valid;
   options.view.width_px = 100;
   options.view.height_px = 50;
-  auto imager = Imager::create(rig, options, Workers(1));
+  auto imager = Imager::create(rig, options, ThreadPool(1));
   ASSERT_TRUE(imager) << imager.error().message();
   const auto pair = imager->process(frame_of(good, good));
   ASSERT_TRUE(pair);
@@ -239,14 +239,14 @@ TEST(Imager, UsesTheRequestedView) {
   EXPECT_TRUE(pair->left_mask.empty());
   EXPECT_TRUE(pair->right_mask.empty());
   options.view.focal_px = 10;
-  const auto rejected = Imager::create(rig, options, Workers(1));
+  const auto rejected = Imager::create(rig, options, ThreadPool(1));
   ASSERT_FALSE(rejected);
   EXPECT_EQ(rejected.error().code, ErrorCode::configuration);
 }
 
 TEST(Imager, RejectsAViewThatACameraDoesNotSee) {
   const auto rejection = [](const Rig& rig, const ImagingOptions& options, const std::string& mask_folder = {}) {
-    const auto imager = Imager::create(rig, options, Workers(1), mask_folder);
+    const auto imager = Imager::create(rig, options, ThreadPool(1), mask_folder);
     EXPECT_FALSE(imager);
     if (imager) return std::string();
     EXPECT_EQ(imager.error().code, ErrorCode::configuration);
@@ -269,7 +269,7 @@ TEST(Imager, RejectsAViewThatACameraDoesNotSee) {
   }
   // A view wider than the field of view is allowed.
   options.view.focal_px = 15;
-  EXPECT_TRUE(Imager::create(rig_with({}, {0, 0.02, 0}), options, Workers(1)));
+  EXPECT_TRUE(Imager::create(rig_with({}, {0, 0.02, 0}), options, ThreadPool(1)));
 }
 
 TEST(Imager, CorrectsTheVignetting) {
@@ -279,7 +279,7 @@ TEST(Imager, CorrectsTheVignetting) {
   const auto flat = FrameImage::own(Image<std::uint8_t>(kSize.width, kSize.height, 100), {});
   const auto corner = [&](bool undo) -> int {
     options.vignetting = undo;
-    auto imager = Imager::create(rig, options, Workers(2));
+    auto imager = Imager::create(rig, options, ThreadPool(2));
     EXPECT_TRUE(imager);
     const auto pair = imager->process(frame_of(flat, flat));
     EXPECT_EQ(pair->right(0, 0), 100) << "the right camera has none";
@@ -290,7 +290,7 @@ TEST(Imager, CorrectsTheVignetting) {
   EXPECT_EQ(corner(false), 100);
   EXPECT_NEAR(corner(true), 200, 2);
   rig.cameras[0].vignetting.coefficients = {-2};
-  EXPECT_FALSE(Imager::create(rig, options, Workers(1)));
+  EXPECT_FALSE(Imager::create(rig, options, ThreadPool(1)));
 }
 
 TEST(Imager, CompensatesTheGainBetweenTheCameras) {
@@ -298,7 +298,7 @@ TEST(Imager, CompensatesTheGainBetweenTheCameras) {
   ImagingOptions options;
   for (const bool gain_compensation : {false, true}) {
     options.gain_compensation = gain_compensation;
-    auto imager = Imager::create(rig_with(format), options, Workers(2));
+    auto imager = Imager::create(rig_with(format), options, ThreadPool(2));
     ASSERT_TRUE(imager);
     const auto pair = imager->process(
         frame_of(FrameImage::own(ramp<std::uint16_t>(30), format), FrameImage::own(ramp<std::uint16_t>(20), format)));
@@ -313,7 +313,7 @@ TEST(Imager, AppliesClaheAfterTheStretch) {
   const auto image = FrameImage::own(ramp<std::uint8_t>(1), {});
   const auto result = [&](bool local, double clip) {
     options.local_contrast = {local, 4, clip};
-    auto imager = Imager::create(rig_with({}), options, Workers(2));
+    auto imager = Imager::create(rig_with({}), options, ThreadPool(2));
     EXPECT_TRUE(imager);
     return Image<std::uint8_t>::copy_of(imager->process(frame_of(image, image))->left);
   };
@@ -324,7 +324,7 @@ TEST(Imager, AppliesClaheAfterTheStretch) {
 TEST(Imager, ReportsTheDurationsOfItsSteps) {
   const PixelFormat bayer{PixelLayout::bayer_grbg, 8};
   const auto stages = [](const Rig& rig, const FrameImage& image, const ImagingOptions& options) {
-    auto imager = Imager::create(rig, options, Workers(1));
+    auto imager = Imager::create(rig, options, ThreadPool(1));
     EXPECT_TRUE(imager);
     std::vector<std::string> names;
     for (int i = 0; i < 2; ++i) {
@@ -364,7 +364,7 @@ TEST(Imager, RectifiesASyntheticDistortedPair) {
   const Rig rig = rig_of_one_pair("test", left, right, Pose(exp_so3({0.02, 0.03, -0.02}), {0.1, 0.002, 0}).inverse());
   ImagingOptions options;
   options.contrast = false;
-  auto imager = Imager::create(rig, options, Workers(2));
+  auto imager = Imager::create(rig, options, ThreadPool(2));
   ASSERT_TRUE(imager) << imager.error().message();
   const RectifiedStereo view = imager->geometry("stereo");
 
@@ -419,7 +419,7 @@ TEST(Imager, RefusesOptionsOutOfBoundsThatWereSetInCode) {
   ImagingOptions options;
   options.contrast_low_percent = -1;
   options.local_contrast.tiles = 0;
-  const auto refused = Imager::create(rig_with({}), options, Workers(1));
+  const auto refused = Imager::create(rig_with({}), options, ThreadPool(1));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
   EXPECT_THAT(refused.error().message(), HasSubstr("contrast_low_percent is -1"));

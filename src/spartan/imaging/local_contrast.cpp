@@ -60,18 +60,19 @@ void LocalContrast::make_mapping(ImageView<const std::uint8_t> image, ImageSize 
   }
 }
 
-void LocalContrast::apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers) {
+void LocalContrast::apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result,
+                          const ThreadPool& workers) {
   if (image.size() != result.size()) throw std::invalid_argument("LocalContrast: the sizes differ");
   if (image.empty()) return;
   const ImageSize tile{(image.width() + tiles_ - 1) / tiles_, (image.height() + tiles_ - 1) / tiles_};
   columns_.resize(static_cast<std::size_t>(image.width()));
   for (int x = 0; x < image.width(); ++x) columns_[static_cast<std::size_t>(x)] = tiles_around(x, tile.width);
-  workers.for_each_part(0, tiles_, 1, [&](int begin, int end) {
+  workers.parallel_for(0, tiles_, 1, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       for (int x = 0; x < tiles_; ++x) make_mapping(image, tile, x, y);
     }
   });
-  workers.for_each_part(0, image.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, image.height(), kRowsPerPart, [&](int begin, int end) {
     constexpr int kOne = 1 << kWeightBits, kHalf = 1 << (2 * kWeightBits - 1);
     for (int y = begin; y < end; ++y) {
       const TilePair rows = tiles_around(y, tile.height);

@@ -20,7 +20,7 @@ class LocalContrast {
   LocalContrast(int tiles, double clip_limit);
 
   /// Both images have the same size. Integer arithmetic: the same bytes for any number of threads.
-  void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const Workers& workers);
+  void apply(ImageView<const std::uint8_t> image, ImageView<std::uint8_t> result, const ThreadPool& workers);
 
  private:
   std::uint8_t* mapping(int tile_x, int tile_y) {

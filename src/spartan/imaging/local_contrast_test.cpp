@@ -32,7 +32,7 @@ TEST(LocalContrast, AgreesWithOpenCv) {
       if ((size.width % tiles == 0) != (size.height % tiles == 0)) continue;
       const auto image = test_image(size);
       Image<std::uint8_t> ours(size);
-      LocalContrast(tiles, clip).apply(image, ours, Workers(1));
+      LocalContrast(tiles, clip).apply(image, ours, ThreadPool(1));
       cv::Mat theirs;
       cv::createCLAHE(clip, {tiles, tiles})->apply(as_mat(image), theirs);
       for (int y = 0; y < size.height; ++y) {
@@ -48,7 +48,7 @@ TEST(LocalContrast, AgreesWithOpenCv) {
 TEST(LocalContrast, AConstantImageStaysConstant) {
   const Image<std::uint8_t> image(65, 43, 90);
   Image<std::uint8_t> result(image.size());
-  LocalContrast(8, 2).apply(image, result, Workers(1));
+  LocalContrast(8, 2).apply(image, result, ThreadPool(1));
   for (int y = 0; y < 43; ++y) {
     for (int x = 0; x < 65; ++x) ASSERT_EQ(result(x, y), result(0, 0));
   }
@@ -60,7 +60,7 @@ TEST(LocalContrast, RaisesTheContrastOfADarkCorner) {
     for (int x = 0; x < 40; ++x) image(x, y) = static_cast<std::uint8_t>(20 + (x + y) % 8);
   }
   Image<std::uint8_t> result(image.size());
-  LocalContrast(8, 8).apply(image, result, Workers(1));
+  LocalContrast(8, 8).apply(image, result, ThreadPool(1));
   EXPECT_GT(result(7, 8) - result(8, 8), 2 * (image(7, 8) - image(8, 8)));
 }
 
@@ -69,8 +69,8 @@ TEST(LocalContrast, AnyNumberOfThreadsGivesTheSameBytesAndSizesMayChange) {
   for (const ImageSize size : {ImageSize{301, 203}, ImageSize{64, 480}, ImageSize{1, 1}}) {
     const auto image = test_image(size);
     Image<std::uint8_t> a(size), b(size);
-    one.apply(image, a, Workers(1));
-    two.apply(image, b, Workers(2));
+    one.apply(image, a, ThreadPool(1));
+    two.apply(image, b, ThreadPool(2));
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) ASSERT_EQ(a(x, y), b(x, y));
     }
@@ -81,7 +81,7 @@ TEST(LocalContrast, RejectsInvalidParameters) {
   EXPECT_THROW(LocalContrast(0, 2), std::invalid_argument);
   EXPECT_THROW(LocalContrast(8, 0.5), std::invalid_argument);
   Image<std::uint8_t> image(4, 4), other(5, 4);
-  EXPECT_THROW(LocalContrast(8, 2).apply(image, other, Workers(1)), std::invalid_argument);
+  EXPECT_THROW(LocalContrast(8, 2).apply(image, other, ThreadPool(1)), std::invalid_argument);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/imaging/rectification.h"
 #include "spartan/imaging/remap.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {
@@ -58,7 +58,7 @@ OpenCvMaps opencv_maps(const Camera& camera, const RectifiedStereo& view, const 
 // Largest distance between RemapTable and the maps of OpenCV, over all valid pixels of the table.
 double largest_map_difference(const Camera& camera, const RectifiedStereo& view,
                               const Eigen::Matrix3d& from_rectified) {
-  const RemapTable table(camera.model, camera.size, view, from_rectified, {}, Workers(2));
+  const RemapTable table(camera.model, camera.size, view, from_rectified, {}, ThreadPool(2));
   const OpenCvMaps maps = opencv_maps(camera, view, from_rectified);
   double largest = 0;
   int valid = 0;
@@ -113,9 +113,9 @@ TEST(AgreementWithOpenCv, EurocImages) {
   ASSERT_TRUE(plan);
   const auto image = read_gray8(std::filesystem::directory_iterator(folder + "/cam0/data")->path().string());
   ASSERT_TRUE(image);
-  const RemapTable table(camera.model, camera.size, plan->geometry, plan->left_from_rectified, {}, Workers(1));
+  const RemapTable table(camera.model, camera.size, plan->geometry, plan->left_from_rectified, {}, ThreadPool(1));
   Image<std::uint8_t> ours(plan->geometry.size);
-  table.apply(*image, ours, Workers(1));
+  table.apply(*image, ours, ThreadPool(1));
   const OpenCvMaps maps = opencv_maps(camera, plan->geometry, plan->left_from_rectified);
   cv::Mat theirs;
   cv::remap(as_mat(*image), theirs, maps.x, maps.y, cv::INTER_LINEAR);
@@ -227,7 +227,7 @@ TEST_F(Chessboard, CornersLieOnCommonRows) {
   ASSERT_TRUE(plan);
   ImagingOptions options;
   options.contrast = false;
-  auto imager = Imager::create(rig_, options, Workers(2));
+  auto imager = Imager::create(rig_, options, ThreadPool(2));
   ASSERT_TRUE(imager) << imager.error().message();
 
   RowErrors mapped, detected;

@@ -33,7 +33,7 @@ auto kernel_of(const remap::Kernels& kernels) {
 
 RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
                        const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
-                       const Workers& workers, double depth_m, const std::string& simd)
+                       const ThreadPool& workers, double depth_m, const std::string& simd)
     : source_size_(source_size),
       kernels_(remap::kernels_for(simd_target_index(simd))),
       cells_((view.size.width + kCell - 1) / kCell, view.size.height),
@@ -61,7 +61,7 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
                                   self_mask(p.x, below) == 0 || self_mask(p.x + 1, below) == 0);
   };
   std::atomic<bool> all_valid = true;
-  workers.for_each_part(0, view.size.height, kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, view.size.height, kRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       for (int left = 0; left < view.size.width; left += kCell) {
         CellEntries entries{};
@@ -149,11 +149,11 @@ std::size_t RemapTable::bytes() const {
 }
 
 template <class Pixel>
-void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> result, const Workers& workers) const {
+void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> result, const ThreadPool& workers) const {
   if (source.size() != source_size_ || result.size() != size()) {
     throw std::invalid_argument("RemapTable: the images have other sizes than the table");
   }
-  workers.for_each_part(0, result.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, result.height(), kRowsPerPart, [&](int begin, int end) {
     const remap::Source<Pixel> from{source.data(), source.stride(), source.width(), source.height()};
     for (int y = begin; y < end; ++y) {
       Pixel* const out = result.row(y);
@@ -173,17 +173,17 @@ void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> resul
 }
 
 void RemapTable::apply(ImageView<const std::uint8_t> source, ImageView<std::uint8_t> result,
-                       const Workers& workers) const {
+                       const ThreadPool& workers) const {
   apply_any(source, result, workers);
 }
 void RemapTable::apply(ImageView<const std::uint16_t> source, ImageView<std::uint16_t> result,
-                       const Workers& workers) const {
+                       const ThreadPool& workers) const {
   apply_any(source, result, workers);
 }
-void RemapTable::apply(ImageView<const Rgb8> source, ImageView<Rgb8> result, const Workers& workers) const {
+void RemapTable::apply(ImageView<const Rgb8> source, ImageView<Rgb8> result, const ThreadPool& workers) const {
   apply_any(source, result, workers);
 }
-void RemapTable::apply(ImageView<const Rgb16> source, ImageView<Rgb16> result, const Workers& workers) const {
+void RemapTable::apply(ImageView<const Rgb16> source, ImageView<Rgb16> result, const ThreadPool& workers) const {
   apply_any(source, result, workers);
 }
 

@@ -27,7 +27,7 @@ class RemapTable {
   /// bits.
   RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
              const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
-             const Workers& workers, double depth_m = 1, const std::string& simd = "auto");
+             const ThreadPool& workers, double depth_m = 1, const std::string& simd = "auto");
 
   ImageSize size() const { return mask_.size(); }
   ImageSize source_size() const { return source_size_; }
@@ -40,10 +40,10 @@ class RemapTable {
 
   /// Bilinear interpolation in integers (remap::interpolate), each channel separately; invalid pixels become 0. Throws
   /// where the sizes differ from those of the table.
-  void apply(ImageView<const std::uint8_t> source, ImageView<std::uint8_t> result, const Workers& workers) const;
-  void apply(ImageView<const std::uint16_t> source, ImageView<std::uint16_t> result, const Workers& workers) const;
-  void apply(ImageView<const Rgb8> source, ImageView<Rgb8> result, const Workers& workers) const;
-  void apply(ImageView<const Rgb16> source, ImageView<Rgb16> result, const Workers& workers) const;
+  void apply(ImageView<const std::uint8_t> source, ImageView<std::uint8_t> result, const ThreadPool& workers) const;
+  void apply(ImageView<const std::uint16_t> source, ImageView<std::uint16_t> result, const ThreadPool& workers) const;
+  void apply(ImageView<const Rgb8> source, ImageView<Rgb8> result, const ThreadPool& workers) const;
+  void apply(ImageView<const Rgb16> source, ImageView<Rgb16> result, const ThreadPool& workers) const;
 
   static constexpr int kFractionBits = remap::kFractionBits;
 
@@ -63,7 +63,7 @@ class RemapTable {
   Entry to_entry(const Eigen::Vector2d& pixel) const;
   void store_block(int x, int y, std::span<const Entry> entries);
   template <class Pixel>
-  void apply_any(ImageView<const Pixel> source, ImageView<Pixel> result, const Workers& workers) const;
+  void apply_any(ImageView<const Pixel> source, ImageView<Pixel> result, const ThreadPool& workers) const;
 
   ImageSize source_size_;
   remap::Kernels kernels_;

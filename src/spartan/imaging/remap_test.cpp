@@ -48,7 +48,7 @@ std::optional<Eigen::Vector2d> exact_position(const RectifiedStereo& view, const
 TEST(RemapTable, PositionsAreExactToAHundredthOfAPixel) {
   const Eigen::Matrix3d rotation = exp_so3({0.02, -0.15, 0.03}).toRotationMatrix();
   const RectifiedStereo view = odd_view();
-  const RemapTable table(camera(), kSource, view, rotation, {}, Workers(2));
+  const RemapTable table(camera(), kSource, view, rotation, {}, ThreadPool(2));
   ASSERT_FALSE(table.mask().empty());
   int valid = 0;
   for (int y = 0; y < view.size.height; ++y) {
@@ -67,11 +67,11 @@ TEST(RemapTable, PositionsAreExactToAHundredthOfAPixel) {
 
 TEST(RemapTable, InterpolatesBilinearly) {
   const RectifiedStereo view = odd_view();
-  const RemapTable table(camera(), kSource, view, Eigen::Matrix3d::Identity(), {}, Workers(1));
+  const RemapTable table(camera(), kSource, view, Eigen::Matrix3d::Identity(), {}, ThreadPool(1));
   const auto source = noise_image(kSource);
   Image<std::uint8_t> result(view.size), threaded(view.size);
-  table.apply(source, result, Workers(1));
-  table.apply(source, threaded, Workers(2));
+  table.apply(source, result, ThreadPool(1));
+  table.apply(source, threaded, ThreadPool(2));
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {
       ASSERT_EQ(result(x, y), threaded(x, y));
@@ -94,7 +94,7 @@ template <class Pixel>
 void expect_back(const RemapTable& identity) {
   const auto source = noise_image<Pixel>(kSource);
   Image<Pixel> result(kSource);
-  identity.apply(source, result, Workers(1));
+  identity.apply(source, result, ThreadPool(1));
   for (int y = 0; y < kSource.height; ++y) {
     for (int x = 0; x < kSource.width; ++x) ASSERT_EQ(result(x, y), source(x, y)) << x << ", " << y;
   }
@@ -102,7 +102,7 @@ void expect_back(const RemapTable& identity) {
 
 TEST(RemapTable, TheIdentityKeepsAllPixels) {
   const RectifiedStereo view{kSource, 100, {80, 60}, 0.1};
-  const RemapTable table(PinholeModel{100, 100, 80, 60}, kSource, view, Eigen::Matrix3d::Identity(), {}, Workers(1));
+  const RemapTable table(PinholeModel{100, 100, 80, 60}, kSource, view, Eigen::Matrix3d::Identity(), {}, ThreadPool(1));
   EXPECT_TRUE(table.mask().empty());
   expect_back<std::uint8_t>(table);
   expect_back<std::uint16_t>(table);
@@ -120,16 +120,16 @@ TEST(RemapTable, RoundingErrorsDoNotMaskTheBorder) {
     const RectifiedStereo view{kSource, f, {x, y}, 0.1};
     for (const double off : {0.0, 0.003, -0.003}) {
       const RemapTable table(PinholeModel{f, f, x + off, y - off}, kSource, view, Eigen::Matrix3d::Identity(), {},
-                             Workers(1));
+                             ThreadPool(1));
       ASSERT_TRUE(table.mask().empty()) << f << ", off by " << off;
       Image<std::uint8_t> result(kSource);
-      table.apply(image, result, Workers(1));
+      table.apply(image, result, ThreadPool(1));
       for (int j = 0; j < kSource.height; ++j) {
         for (int i = 0; i < kSource.width; ++i) ASSERT_EQ(result(i, j), image(i, j)) << i << ", " << j;
       }
     }
     const RemapTable beside(PinholeModel{f, f, x + 0.005, y}, kSource, view, Eigen::Matrix3d::Identity(), {},
-                            Workers(1));
+                            ThreadPool(1));
     EXPECT_EQ(beside.mask()(kSource.width - 1, 7), 0) << "outside by more than the rounding error";
     EXPECT_EQ(beside.mask()(0, 7), 255);
   }
@@ -141,7 +141,7 @@ TEST(RemapTable, AppliesTheSelfMask) {
   self_mask(50, 40) = 0;
   // The view is shifted by a quarter of a pixel: two of its pixels touch the masked one.
   const RemapTable table(PinholeModel{100, 100, 80.25, 60}, kSource, view, Eigen::Matrix3d::Identity(), self_mask,
-                         Workers(1));
+                         ThreadPool(1));
   EXPECT_EQ(table.mask()(49, 40), 0);
   EXPECT_EQ(table.mask()(50, 40), 0);
   EXPECT_EQ(table.mask()(48, 40), 255);
@@ -207,7 +207,7 @@ CameraModel lens_for(const Case& c) {
 
 RemapTable table_for(const Case& c, const std::string& simd, ImageView<const std::uint8_t> self_mask = {}) {
   const RectifiedStereo view{c.view, c.focal_px, {(c.view.width - 1) / 2.0, (c.view.height - 1) / 2.0}, 0.1};
-  return {lens_for(c), c.source, view, exp_so3(c.rotation).toRotationMatrix(), self_mask, Workers(2), 1, simd};
+  return {lens_for(c), c.source, view, exp_so3(c.rotation).toRotationMatrix(), self_mask, ThreadPool(2), 1, simd};
 }
 
 // The source ends with its last row, so that a sanitizer detects reads beyond it; the result is part of a larger image
@@ -226,7 +226,7 @@ void expect_reference_formula(const RemapTable& table) {
   const Pixel untouched = source(0, 0);
   Image<Pixel> canvas(table.size().width + 5, table.size().height, untouched);
   const auto result = canvas.view().crop(0, 0, table.size().width, table.size().height);
-  table.apply(source, result, Workers(2));
+  table.apply(source, result, ThreadPool(2));
   int seen = 0;
   for (int y = 0; y < canvas.height(); ++y) {
     for (int x = 0; x < canvas.width(); ++x) {
@@ -280,7 +280,7 @@ TEST(RemapTable, AConstantImageStaysConstant) {
     const RemapTable table = table_for(c, "auto");
     const Image<Rgb16> source(c.source.width, c.source.height, Rgb16{65535, 1, 40000});
     Image<Rgb16> result(c.view);
-    table.apply(source, result, Workers(1));
+    table.apply(source, result, ThreadPool(1));
     for (int y = 0; y < c.view.height; ++y) {
       for (int x = 0; x < c.view.width; ++x) {
         const bool valid = table.mask().empty() || table.mask()(x, y) == 255;
@@ -291,9 +291,9 @@ TEST(RemapTable, AConstantImageStaysConstant) {
 }
 
 TEST(RemapTable, RejectsOtherSizes) {
-  const RemapTable table(camera(), kSource, odd_view(), Eigen::Matrix3d::Identity(), {}, Workers(1));
+  const RemapTable table(camera(), kSource, odd_view(), Eigen::Matrix3d::Identity(), {}, ThreadPool(1));
   Image<std::uint8_t> small(100, 100), result(odd_view().size);
-  EXPECT_THROW(table.apply(small, result, Workers(1)), std::invalid_argument);
+  EXPECT_THROW(table.apply(small, result, ThreadPool(1)), std::invalid_argument);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ TEST(ViewFootprint, CoversThePositionsOfTheTable) {
   const RectifiedStereo view{{149, 113}, 200, {75.3, 55.1}, 0.1};
   const Eigen::Matrix3d rotation = exp_so3({0.02, -0.15, 0.03}).toRotationMatrix();
   const auto footprint = view_footprint(camera, view, rotation, 1 << 20);
-  const RemapTable table(camera.model, camera.size, view, rotation, {}, Workers(1), 1 << 20);
+  const RemapTable table(camera.model, camera.size, view, rotation, {}, ThreadPool(1), 1 << 20);
   Image<std::uint8_t> looked_at(camera.size);
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {

@@ -34,7 +34,7 @@ Result<Rectification> planned(const VirtualView& view, const Camera& left = kLef
 }
 
 RemapTable table_of(const Camera& camera, const Rectification& plan, const Eigen::Matrix3d& rotation) {
-  return {camera.model, camera.size, plan.geometry, rotation, {}, Workers(2), plan.depth_m};
+  return {camera.model, camera.size, plan.geometry, rotation, {}, ThreadPool(2), plan.depth_m};
 }
 
 double seen_fraction(const RemapTable& table) {

@@ -15,8 +15,8 @@ namespace spartan {
 ///     ξ' = Ad(M⁻¹) ξ + D (z₁ + z₂) + n
 ///
 /// (docs/math/localization.md, "Vision"). Nothing is estimated: a fixed amount of arithmetic for each motion. Equals
-/// the covariance of VisionTrack without constraints to first order; where vision is lost, the motion's own covariance
-/// counts.
+/// the covariance of VisionOnlyFilter without constraints to first order; where vision is lost, the motion's own
+/// covariance counts.
 class DeadReckoning {
  public:
   explicit DeadReckoning(const VisionOptions& options);

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "spartan/localization/drive_test.h"
-#include "spartan/localization/vision_track.h"
+#include "spartan/localization/vision_only_filter.h"
 
 namespace spartan {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 TEST(DeadReckoning, IsTheCovarianceOfTheFilterThatHearsVisionAlone) {
   const TestDrive drive;
   const LocalizationOptions options;  // with errors that last
-  VisionTrack track(options);
+  VisionOnlyFilter track(options);
   track.start(test_stamp(2.5), Pose());
   DeadReckoning reckoned(options.vision);
   int compared = 0;

@@ -59,7 +59,7 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
                              const std::optional<Eigen::Vector3d>& up_in_body) {
   const auto imu = only<ImuSample>(before);
   const auto wheels = only<WheelSample>(before);
-  const auto rest = read_rest(imu, options_);
+  const auto rest = static_reading(imu, options_);
   const auto tilt = median_tilt(only<InclinometerSample>(before), options_.inclinometer.least_sigma_rad);
   const auto heading = agreed_heading(only<CompassSample>(before), options_.compass.least_sigma_rad);
   const Eigen::Vector3d up = rest   ? rest->accel_m_s2.normalized()

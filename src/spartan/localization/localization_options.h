@@ -211,8 +211,8 @@ struct LocalizationOptions {
 /// Replaces defaults by the noise that a recording specifies for its sensors. Kept are values whose keys were given (in
 /// a config file or with --set; `given` holds keys of LocalizationOptions), even where they are the default, and values
 /// that differ from the default (set in code).
-inline LocalizationOptions with_stated(LocalizationOptions options, const SensorNoise& stated,
-                                       const GivenKeys& given = {}) {
+inline LocalizationOptions with_specified_noise(LocalizationOptions options, const SensorNoise& stated,
+                                                const GivenKeys& given = {}) {
   const LocalizationOptions defaults;
   const auto take = [&](const char* key, double& value, double by_default, double by_recording) {
     if (!given.contains(key) && value == by_default && by_recording > 0) value = by_recording;

@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
   const LocalizationOptions defaults;
-  const LocalizationOptions all = with_stated(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}});
+  const LocalizationOptions all = with_specified_noise(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}});
   EXPECT_EQ(all.imu.gyro_noise_rad_s_sqrt_hz, 1);
   EXPECT_EQ(all.imu.gyro_bias_rad_s, 2);
   EXPECT_EQ(all.imu.gyro_walk_rad_s2_sqrt_hz, 3);
@@ -22,13 +22,13 @@ TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
   EXPECT_EQ(all.compass.offset_walk_rad_sqrt_hz, 7);
   EXPECT_EQ(all.inclinometer.bias_rad, 8);
   EXPECT_EQ(all.inclinometer.bias_walk_rad_sqrt_hz, 9);
-  const LocalizationOptions one = with_stated(defaults, {{}, {7}, {}});
+  const LocalizationOptions one = with_specified_noise(defaults, {{}, {7}, {}});
   EXPECT_EQ(one.compass.offset_walk_rad_sqrt_hz, 7);
   EXPECT_EQ(one.imu.gyro_bias_rad_s, defaults.imu.gyro_bias_rad_s);
   EXPECT_EQ(one.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
   LocalizationOptions set;
   set.inclinometer.bias_rad = 0.2;
-  EXPECT_EQ(with_stated(set, {{}, {}, {8, 9}}).inclinometer.bias_rad, 0.2) << "set in code";
+  EXPECT_EQ(with_specified_noise(set, {{}, {}, {8, 9}}).inclinometer.bias_rad, 0.2) << "set in code";
 }
 
 TEST(LocalizationOptions, ADefaultThatIsGivenIsNotReplaced) {
@@ -36,7 +36,7 @@ TEST(LocalizationOptions, ADefaultThatIsGivenIsNotReplaced) {
   given.add("imu.gyro_bias_rad_s");
   given.add("inclinometer.bias_rad");
   const LocalizationOptions defaults;
-  const LocalizationOptions used = with_stated(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}}, given);
+  const LocalizationOptions used = with_specified_noise(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}}, given);
   EXPECT_EQ(used.imu.gyro_bias_rad_s, defaults.imu.gyro_bias_rad_s);
   EXPECT_EQ(used.inclinometer.bias_rad, defaults.inclinometer.bias_rad);
   EXPECT_EQ(used.imu.gyro_noise_rad_s_sqrt_hz, 1);

@@ -180,7 +180,7 @@ Innovation map_innovation(const Belief& belief, int pose, const PoseConstraint& 
   i.noise += directions * map * directions.transpose();
   const Matrix6d believed = belief.covariance.block<6, 6>(pose, pose);
   // The residual is truth less belief, plus the map's error: where both err alike it is none, hence the sign.
-  i.shared = -belief.covariance.middleCols<6>(pose) * common_share(believed, map) * directions.transpose();
+  i.shared = -belief.covariance.middleCols<6>(pose) * shared_fraction(believed, map) * directions.transpose();
   return i;
 }
 

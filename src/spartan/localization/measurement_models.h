@@ -56,7 +56,7 @@ Innovation rest_innovation(const NavigationState& state, const Eigen::Vector3d& 
 
 /// A pose by a map, of the one that stands at `pose` among the errors (kPose or kVisionClone): the directions that
 /// carry information, each independent but for the map's error. What that has in common with the error of the belief
-/// (common_share) reaches the parts of the state through the pose. No rows where there is no information.
+/// (shared_fraction) reaches the parts of the state through the pose. No rows where there is no information.
 Innovation map_innovation(const Belief& belief, int pose, const PoseConstraint& constraint, double covariance_factor);
 
 }  // namespace spartan

@@ -18,7 +18,7 @@ double wrapped(double angle) {
 
 }  // namespace
 
-std::optional<RestReading> read_rest(std::span<const ImuSample> samples, const LocalizationOptions& o) {
+std::optional<RestReading> static_reading(std::span<const ImuSample> samples, const LocalizationOptions& o) {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = gyro, gyro_squares = gyro, accel_squares = gyro;
   double count = 0;
   for (const ImuSample& s : samples) {

@@ -21,7 +21,7 @@ struct RestReading {
 /// From samples in order of time. Nothing where there are fewer than 10 finite ones, where their mean differs from
 /// gravity by more than 5 % or scatters by more than 10 % of it: the rover was not at rest, or the sensor is in other
 /// units.
-std::optional<RestReading> read_rest(std::span<const ImuSample> samples, const LocalizationOptions& options);
+std::optional<RestReading> static_reading(std::span<const ImuSample> samples, const LocalizationOptions& options);
 
 struct Heading {
   double radians = 0;

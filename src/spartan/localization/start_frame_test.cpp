@@ -22,7 +22,7 @@ std::vector<ImuSample> resting(const Eigen::Vector3d& force, double scatter, int
 
 TEST(StartFrame, ReadsRest) {
   const Eigen::Vector3d force(0.1, -0.2, 3.7);
-  const auto rest = read_rest(resting(force, 0.01, 400), test_options());
+  const auto rest = static_reading(resting(force, 0.01, 400), test_options());
   ASSERT_TRUE(rest.has_value());
   EXPECT_TRUE(rest->still);
   EXPECT_LE((rest->accel_m_s2 - force).norm(), 5 * 0.01 / 20);
@@ -30,16 +30,16 @@ TEST(StartFrame, ReadsRest) {
 }
 
 TEST(StartFrame, ReadsNoRestFromOtherUnitsMotionOrTooLittle) {
-  EXPECT_FALSE(read_rest(resting({0, 0, 1}, 0.01, 400), test_options()));
-  EXPECT_FALSE(read_rest(resting({0, 0, 3.71}, 0.5, 400), test_options()));
-  EXPECT_FALSE(read_rest(resting({0, 0, 3.71}, 0.01, 9), test_options()));
-  const auto shaken = read_rest(resting({0, 0, 3.71}, 0.1, 400), test_options());
+  EXPECT_FALSE(static_reading(resting({0, 0, 1}, 0.01, 400), test_options()));
+  EXPECT_FALSE(static_reading(resting({0, 0, 3.71}, 0.5, 400), test_options()));
+  EXPECT_FALSE(static_reading(resting({0, 0, 3.71}, 0.01, 9), test_options()));
+  const auto shaken = static_reading(resting({0, 0, 3.71}, 0.1, 400), test_options());
   ASSERT_TRUE(shaken.has_value());
   EXPECT_FALSE(shaken->still);
   EXPECT_GT(shaken->accel_sigma_m_s2, 0.05);
   auto broken = resting({0, 0, 3.71}, 0.01, 400);
   broken[7].accel_m_s2.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(read_rest(broken, test_options())->accel_m_s2.allFinite());
+  EXPECT_TRUE(static_reading(broken, test_options())->accel_m_s2.allFinite());
 }
 
 TEST(StartFrame, HeadingIsTheOneMostAgreeOn) {

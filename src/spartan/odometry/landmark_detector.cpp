@@ -15,7 +15,7 @@ double squared_distance(const Descriptor& a, const Descriptor& b) {
   return sum / (254.0 * 254.0);
 }
 
-std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions& options, Workers workers) {
+std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions& options, ThreadPool workers) {
   switch (options.detector) {
     case DetectorType::surf:
       return std::make_unique<SurfDetector>(options, std::move(workers));

@@ -41,6 +41,6 @@ class LandmarkDetector {
 };
 
 /// Makes the detector that the options select. Throws std::invalid_argument where the value is none of DetectorType.
-std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions& options, Workers workers);
+std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions& options, ThreadPool workers);
 
 }  // namespace spartan

@@ -7,10 +7,10 @@
 
 #include "spartan/core/stage_clock.h"
 #include "spartan/odometry/landmark_detector.h"
-#include "spartan/odometry/landmark_matching.h"
-#include "spartan/odometry/landmark_reconstruction.h"
-#include "spartan/odometry/landmark_upkeep.h"
-#include "spartan/odometry/motion_estimation.h"
+#include "spartan/odometry/landmark_manager.h"
+#include "spartan/odometry/landmark_matcher.h"
+#include "spartan/odometry/landmark_reconstructor.h"
+#include "spartan/odometry/motion_estimator.h"
 #include "spartan/odometry/odometer_memory.h"
 #include "spartan/odometry/odometry_options.h"
 #include "spartan/odometry/smoothed_image.h"
@@ -52,14 +52,14 @@ std::string_view name_of(TrackingStatus status) {
       return "degraded";
     case TrackingStatus::lost:
       return "lost";
-    case TrackingStatus::standing:
+    case TrackingStatus::stationary:
       return "standing";
   }
   return "unknown";
 }
 
 struct Odometer::State {
-  State(const OdometryOptions& o, Workers w)
+  State(const OdometryOptions& o, ThreadPool w)
       : options(o),
         workers(std::move(w)),
         detector(make_landmark_detector(options.detection, workers)),
@@ -69,12 +69,12 @@ struct Odometer::State {
         manager(options) {}
 
   OdometryOptions options;
-  Workers workers;
+  ThreadPool workers;
   std::unique_ptr<LandmarkDetector> detector;
-  LandmarkReconstruction reconstruction;
-  LandmarkMatching matching;
-  MotionEstimation estimation;
-  LandmarkUpkeep manager;
+  LandmarkReconstructor reconstruction;
+  LandmarkMatcher matching;
+  MotionEstimator estimation;
+  LandmarkManager manager;
   SmoothedImage left_smooth, right_smooth;
   std::vector<ReconstructedFeature> features;
   OdometerMemory memory;
@@ -126,7 +126,7 @@ void Odometer::State::detect(const RectifiedPair& pair) {
 }
 
 void Odometer::State::reconstruct(const StereoImages& images) {
-  workers.for_each_part(0, static_cast<int>(features.size()), 16, [&](int begin, int end) {
+  workers.parallel_for(0, static_cast<int>(features.size()), 16, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       ReconstructedFeature& f = features[static_cast<std::size_t>(i)];
       f.stereo = reconstruction.reconstruct(images, static_cast<int>(std::lround(f.feature.x)),
@@ -187,7 +187,7 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
   const double flow = mean_flow(stereo, matches, fit);
   if (flow > options.stationary.max_flow_px) return;
   // The anchors are not moved while the rover is stationary, so a slow creep accumulates until it exceeds the limit.
-  estimate.status = TrackingStatus::standing;
+  estimate.status = TrackingStatus::stationary;
   estimate.reason = fmt::format("the image has shifted by {:.2f} px", flow);
   estimate.previous_from_current = Pose();
 }
@@ -219,7 +219,7 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   estimate.times.estimate = watch.lap();
 }
 
-Odometer::Odometer(const OdometryOptions& options, Workers workers)
+Odometer::Odometer(const OdometryOptions& options, ThreadPool workers)
     : state_(std::make_unique<State>(options, std::move(workers))) {}
 Odometer::Odometer(Odometer&&) noexcept = default;
 Odometer& Odometer::operator=(Odometer&&) noexcept = default;

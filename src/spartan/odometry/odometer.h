@@ -16,10 +16,10 @@
 namespace spartan {
 
 enum class TrackingStatus : std::uint8_t {
-  tracking,  ///< the motion is measured
-  degraded,  ///< measured from few inliers or against many outliers; its covariance says how well
-  lost,      ///< not measured: the motion returned is the prediction
-  standing,  ///< the rover is stationary: the motion returned is the identity
+  tracking,    ///< the motion is measured
+  degraded,    ///< measured from few inliers or against many outliers; its covariance says how well
+  lost,        ///< not measured: the motion returned is the prediction
+  stationary,  ///< the rover is stationary: the motion returned is the identity
 };
 std::string_view name_of(TrackingStatus status);
 
@@ -48,7 +48,7 @@ struct OdometryOptions;  // odometry_options.h
 /// block). Derivation: docs/math/odometry.md.
 class Odometer {
  public:
-  Odometer(const OdometryOptions& options, Workers workers);
+  Odometer(const OdometryOptions& options, ThreadPool workers);
   Odometer(Odometer&&) noexcept;
   Odometer& operator=(Odometer&&) noexcept;
   ~Odometer();

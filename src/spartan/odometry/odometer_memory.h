@@ -6,7 +6,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
 #include "spartan/odometry/landmark.h"
-#include "spartan/odometry/motion_estimation.h"
+#include "spartan/odometry/motion_estimator.h"
 #include "spartan/rig/rectified_stereo.h"
 
 namespace spartan {

@@ -15,7 +15,7 @@
 namespace spartan {
 namespace {
 
-using testing::SyntheticShot;
+using testing::SyntheticFrame;
 using testing::SyntheticWorld;
 
 const RectifiedStereo kStereo{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
@@ -35,10 +35,10 @@ Pose true_pose(int frame) {
 }
 
 // Frames are rendered once for all tests.
-const SyntheticShot& frame_of(int index) {
-  static const std::vector<SyntheticShot> frames = [] {
+const SyntheticFrame& frame_of(int index) {
+  static const std::vector<SyntheticFrame> frames = [] {
     const SyntheticWorld world(testing::SyntheticWorldOptions{});
-    std::vector<SyntheticShot> rendered;
+    std::vector<SyntheticFrame> rendered;
     rendered.reserve(10);
     for (int i = 0; i < 10; ++i) rendered.push_back(world.render(kStereo, true_pose(i), static_cast<std::uint64_t>(i)));
     return rendered;
@@ -46,7 +46,7 @@ const SyntheticShot& frame_of(int index) {
   return frames[static_cast<std::size_t>(index)];
 }
 
-RectifiedPair pair_of(const SyntheticShot& frame, int time) {
+RectifiedPair pair_of(const SyntheticFrame& frame, int time) {
   RectifiedPair pair;
   pair.stamp.ns = time * 1'000'000'000LL;
   pair.geometry = kStereo;
@@ -90,7 +90,7 @@ double rotation_error(const MotionEstimate& estimate, int from, int to) {
 }
 
 std::vector<MotionEstimate> drive(const OdometryOptions& options, int threads = 1) {
-  Odometer odometer(options, Workers(threads));
+  Odometer odometer(options, ThreadPool(threads));
   std::vector<MotionEstimate> estimates;
   estimates.reserve(10);
   for (int i = 0; i < 10; ++i) estimates.push_back(odometer.add(pair_of(i), {}, frame_of(i).disparity));
@@ -148,9 +148,9 @@ TEST(Odometer, IsBitIdenticalForAnyNumberOfThreads) {
 }
 
 TEST(Odometer, ResumesFromItsSavedStateBitForBit) {
-  Odometer whole({}, Workers(1));
+  Odometer whole({}, ThreadPool(1));
   for (int i = 0; i < 5; ++i) whole.add(pair_of(i));
-  Odometer resumed({}, Workers(1));
+  Odometer resumed({}, ThreadPool(1));
   ASSERT_TRUE(resumed.restore(whole.save()).has_value());
   for (int i = 5; i < 10; ++i) {
     EXPECT_TRUE(same_bits(whole.add(pair_of(i)), resumed.add(pair_of(i)))) << i;
@@ -166,7 +166,7 @@ TEST(Odometer, IsStationaryOnImagesThatDifferInNoiseOnly) {
     Random random(1);
     OdometryOptions options;
     options.stationary.detect = detect;
-    Odometer odometer(options, Workers(1));
+    Odometer odometer(options, ThreadPool(1));
     Pose travelled;
     for (int i = 0; i < 8; ++i) {
       const Image<std::uint8_t> left = noisy(frame_of(0).left, random), right = noisy(frame_of(0).right, random);
@@ -176,7 +176,7 @@ TEST(Odometer, IsStationaryOnImagesThatDifferInNoiseOnly) {
       const MotionEstimate e = odometer.add(pair);
       travelled = travelled * e.previous_from_current;
       if (i > 0) {
-        EXPECT_EQ(e.status, detect ? TrackingStatus::standing : TrackingStatus::tracking);
+        EXPECT_EQ(e.status, detect ? TrackingStatus::stationary : TrackingStatus::tracking);
       }
     }
     EXPECT_LT(travelled.translation().norm(), detect ? 1e-12 : 0.0005);
@@ -191,13 +191,14 @@ TEST(Odometer, SlowMotionIsNotTakenForStationary) {
   // 0.3 mm per frame is 0.05 px: stationary at first, but it accumulates until it exceeds a quarter of a pixel (1.6
   // mm).
   const SyntheticWorld world(testing::SyntheticWorldOptions{});
-  Odometer odometer({}, Workers(1));
+  Odometer odometer({}, ThreadPool(1));
   Pose travelled;
   int stationary = 0;
   for (int i = 0; i < 9; ++i) {
-    const SyntheticShot frame = world.render(kStereo, camera_at(0.0003 * i, 0, 0), static_cast<std::uint64_t>(200 + i));
+    const SyntheticFrame frame =
+        world.render(kStereo, camera_at(0.0003 * i, 0, 0), static_cast<std::uint64_t>(200 + i));
     const MotionEstimate e = odometer.add(pair_of(frame, i));
-    stationary += e.status == TrackingStatus::standing;
+    stationary += e.status == TrackingStatus::stationary;
     travelled = travelled * e.previous_from_current;
   }
   EXPECT_GE(stationary, 3);
@@ -206,7 +207,7 @@ TEST(Odometer, SlowMotionIsNotTakenForStationary) {
 }
 
 TEST(Odometer, IsLostWithAReasonAndRecoversTwoFramesLater) {
-  Odometer odometer({}, Workers(1));
+  Odometer odometer({}, ThreadPool(1));
   for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
   const Image<std::uint8_t> blank(320, 240, 90);
   const MotionEstimate lost = odometer.add(blank_pair(blank, 4));
@@ -225,7 +226,7 @@ TEST(Odometer, UsesAGivenPrediction) {
   // A motion of five frames at once, without descriptors: found only with the prediction.
   OdometryOptions options;
   options.matching.descriptors = false;
-  Odometer predicted(options, Workers(1)), unpredicted(options, Workers(1));
+  Odometer predicted(options, ThreadPool(1)), unpredicted(options, ThreadPool(1));
   predicted.add(pair_of(0));
   unpredicted.add(pair_of(0));
   const MotionEstimate found = predicted.add(pair_of(5), true_motion(0, 5));
@@ -235,7 +236,7 @@ TEST(Odometer, UsesAGivenPrediction) {
 }
 
 TEST(Odometer, FindsALargeUnpredictedMotion) {
-  Odometer odometer({}, Workers(1));
+  Odometer odometer({}, ThreadPool(1));
   odometer.add(pair_of(0));
   const MotionEstimate found = odometer.add(pair_of(6));
   EXPECT_EQ(found.status, TrackingStatus::tracking) << found.reason;
@@ -244,7 +245,7 @@ TEST(Odometer, FindsALargeUnpredictedMotion) {
 
 TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 200}, {12, 12}, {30, 20}, {64, 48}}) {
-    Odometer odometer({}, Workers(2));
+    Odometer odometer({}, ThreadPool(2));
     const Image<std::uint8_t> tiny(width, height, 60);
     RectifiedPair pair = blank_pair(tiny, 0);
     pair.geometry.size = tiny.size();
@@ -252,7 +253,7 @@ TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
     pair.stamp.ns = 1;
     EXPECT_EQ(odometer.add(pair).status, TrackingStatus::lost);
   }
-  Odometer odometer({}, Workers(1));
+  Odometer odometer({}, ThreadPool(1));
   EXPECT_EQ(odometer.add(RectifiedPair{}).status, TrackingStatus::lost);
   odometer.add(pair_of(0));
   RectifiedPair uneven = pair_of(1);
@@ -266,7 +267,7 @@ TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
 TEST(Odometer, MeasuresTheFirstMetersOfKitti) {
   const std::string folder = testing::data_folder() + "/kitti_06";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "set SPARTAN_DATA to the folder with kitti_06";
-  Odometer odometer({}, Workers(2));
+  Odometer odometer({}, ThreadPool(2));
   Pose travelled;
   for (int i = 0; i < 6; ++i) {
     const auto left = read_gray8(folder + "/image_0/00000" + std::to_string(i) + ".png"),

@@ -228,7 +228,7 @@ struct MotionEstimationOptions {
   }
 };
 
-struct StandingOptions {
+struct StationaryOptions {
   bool detect = true;         ///< detect that the rover is stationary and hold its pose
   double max_flow_px = 0.25;  ///< largest mean image flow of a stationary rover, pixels
 
@@ -248,7 +248,7 @@ struct OdometryOptions {
   LandmarkReconstructionOptions reconstruction;
   LandmarkMatchingOptions matching;
   MotionEstimationOptions motion;
-  StandingOptions stationary;
+  StationaryOptions stationary;
 
   template <class Visitor>
   void describe(Visitor& v) {

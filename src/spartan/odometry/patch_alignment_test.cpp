@@ -5,8 +5,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "spartan/core/gradient_noise.h"
 #include "spartan/core/random.h"
-#include "spartan/core/smooth_noise.h"
 #include "spartan/odometry/smoothed_image.h"
 
 namespace spartan {
@@ -32,7 +32,7 @@ class WarpedTexture {
         image(x, y) = static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
       }
     }
-    smooth_.compute(image, Workers(1));
+    smooth_.compute(image, ThreadPool(1));
   }
   ImageView<const std::uint16_t> view() const { return smooth_.view(); }
 
@@ -51,7 +51,7 @@ TEST(SmoothedImage, IsTheBinomialFilterWithReplicatedBorders) {
   for (int y = 0; y < 7; ++y)
     for (int x = 0; x < 9; ++x) image(x, y) = static_cast<std::uint8_t>(random.below(256));
   SmoothedImage smooth;
-  smooth.compute(image, Workers(2));
+  smooth.compute(image, ThreadPool(2));
   const int kernel[5] = {1, 4, 6, 4, 1};
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 9; ++x) {
@@ -63,7 +63,7 @@ TEST(SmoothedImage, IsTheBinomialFilterWithReplicatedBorders) {
       EXPECT_EQ(smooth.view()(x, y), sum);
     }
   }
-  smooth.compute(Image<std::uint8_t>(1, 1, 9), Workers(1));
+  smooth.compute(Image<std::uint8_t>(1, 1, 9), ThreadPool(1));
   EXPECT_EQ(smooth.view()(0, 0), 9 * 256);
 }
 

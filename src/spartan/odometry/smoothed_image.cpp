@@ -14,13 +14,13 @@ int binomial(In a, In b, In c, In d, In e) {
 
 }  // namespace
 
-void SmoothedImage::compute(ImageView<const std::uint8_t> image, const Workers& workers) {
+void SmoothedImage::compute(ImageView<const std::uint8_t> image, const ThreadPool& workers) {
   const int width = image.width(), height = image.height();
   if (pixels_.size() != image.size()) {
     pixels_ = Image<std::uint16_t>(image.size());
     rows_ = Image<std::uint16_t>(image.size());
   }
-  workers.for_each_part(0, height, kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, height, kRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       const auto source = [&](int dy) { return image.row(std::clamp(y + dy, 0, height - 1)); };
       const std::uint8_t *a = source(-2), *b = source(-1), *c = source(0), *d = source(1), *e = source(2);

@@ -13,7 +13,7 @@ namespace spartan {
 /// a bias towards whole pixels (pixel locking). Border pixels are replicated.
 class SmoothedImage {
  public:
-  void compute(ImageView<const std::uint8_t> image, const Workers& workers);
+  void compute(ImageView<const std::uint8_t> image, const ThreadPool& workers);
   ImageView<const std::uint16_t> view() const { return pixels_; }
 
  private:

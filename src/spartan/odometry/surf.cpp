@@ -188,7 +188,7 @@ Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature
   return descriptor;
 }
 
-SurfDetector::SurfDetector(const DetectionOptions& options, Workers workers)
+SurfDetector::SurfDetector(const DetectionOptions& options, ThreadPool workers)
     : options_(options), workers_(std::move(workers)) {
   for (int octave = 0; octave < options_.surf.octaves; ++octave) {
     for (int layer = 0; layer < kLayersPerOctave; ++layer) {
@@ -206,7 +206,7 @@ void SurfDetector::compute_layers(ImageSize size) {
     const int columns = (size.width - 1 - margin) / step - first + 1;
     const int rows = (size.height - 1 - margin) / step - first + 1;
     if (columns <= 0 || rows <= 0) continue;
-    workers_.for_each_part(first, first + rows, kRowsPerPart, [&](int begin, int end) {
+    workers_.parallel_for(first, first + rows, kRowsPerPart, [&](int begin, int end) {
       for (int r = begin; r < end; ++r) {
         hessian_row(integral_, r * step, first * step, columns, layer.filter_px, step, layer.response.row(r) + first);
       }
@@ -265,7 +265,7 @@ const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> i
     });
   }
   features_ = spread_features(std::move(found), image.size(), options_.landmarks, options_.spacing_px);
-  workers_.for_each_part(0, static_cast<int>(features_.size()), 64, [&](int begin, int end) {
+  workers_.parallel_for(0, static_cast<int>(features_.size()), 64, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       Feature& f = features_[static_cast<std::size_t>(i)];
       if (!options_.surf.upright) f.angle = surf_orientation(integral_, f);

@@ -13,7 +13,7 @@ namespace spartan {
 /// filters on the integral image (§3), and describes them by sums of Haar wavelet responses (§4).
 class SurfDetector final : public LandmarkDetector {
  public:
-  SurfDetector(const DetectionOptions& options, Workers workers);
+  SurfDetector(const DetectionOptions& options, ThreadPool workers);
   const std::vector<Feature>& detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask) override;
 
  private:
@@ -27,7 +27,7 @@ class SurfDetector final : public LandmarkDetector {
   std::vector<Feature> find_maxima(ImageSize size) const;
 
   DetectionOptions options_;
-  Workers workers_;
+  ThreadPool workers_;
   IntegralImage integral_;
   std::vector<Layer> layers_;  ///< four per octave, in order of filter size
   std::vector<Feature> features_;

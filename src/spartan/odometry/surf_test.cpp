@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "spartan/core/smooth_noise.h"
+#include "spartan/core/gradient_noise.h"
 
 namespace spartan {
 namespace {
@@ -62,7 +62,7 @@ DetectionOptions few() {
 TEST(Surf, FindsPositionScaleAndSignOfABlob) {
   for (const double sigma : {3.0, 3.5, 4.5, 6.0, 8.0}) {
     for (const double height : {90.0, -90.0}) {
-      SurfDetector detector(few(), Workers(1));
+      SurfDetector detector(few(), ThreadPool(1));
       const std::vector<Feature>& found = detector.detect(blob(60.3, 49.6, sigma, height), {});
       ASSERT_FALSE(found.empty()) << sigma;
       const Feature& f = found.front();
@@ -96,7 +96,7 @@ struct Repeatability {
 Repeatability repeatability_of(bool upright, double angle, double zoom) {
   DetectionOptions options = few();
   options.surf.upright = upright;
-  SurfDetector detector(options, Workers(1));
+  SurfDetector detector(options, ThreadPool(1));
   const std::vector<Feature> a = detector.detect(texture(0, 1), {});
   const std::vector<Feature> b = detector.detect(texture(angle, zoom), {});
   int inside = 0, found = 0, matched = 0;
@@ -147,7 +147,7 @@ TEST(Surf, DescriptorIsInvariantToBrightnessAndContrast) {
 
 TEST(Surf, IsIdenticalForAnyNumberOfThreads) {
   const Image<std::uint8_t> image = texture(0.3, 1);
-  SurfDetector one(few(), Workers(1)), two(few(), Workers(2));
+  SurfDetector one(few(), ThreadPool(1)), two(few(), ThreadPool(2));
   const std::vector<Feature>& a = one.detect(image, {});
   const std::vector<Feature>& b = two.detect(image, {});
   ASSERT_EQ(a.size(), b.size());
@@ -165,7 +165,7 @@ TEST(Surf, RespectsMaskCountAndOrder) {
     for (int x = 160; x < 320; ++x) mask(x, y) = 255;
   DetectionOptions options = few();
   options.landmarks = 50;
-  SurfDetector detector(options, Workers(1));
+  SurfDetector detector(options, ThreadPool(1));
   const std::vector<Feature>& found = detector.detect(image, mask);
   ASSERT_EQ(found.size(), 50u);
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -177,7 +177,7 @@ TEST(Surf, RespectsMaskCountAndOrder) {
 }
 
 TEST(Surf, FindsNothingInTinyOrFlatImages) {
-  SurfDetector detector(few(), Workers(1));
+  SurfDetector detector(few(), ThreadPool(1));
   for (const auto& [width, height] : {std::pair(1, 1), {5, 40}, {10, 10}, {24, 24}, {200, 100}}) {
     EXPECT_TRUE(detector.detect(Image<std::uint8_t>(width, height, 77), {}).empty());
   }

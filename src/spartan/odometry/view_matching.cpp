@@ -21,9 +21,9 @@ struct Nearest {
 };
 
 std::vector<Nearest> nearest_of(const std::vector<Feature>& features, const std::vector<Feature>& others,
-                                const Workers& workers) {
+                                const ThreadPool& workers) {
   std::vector<Nearest> result(features.size());
-  workers.for_each_part(0, static_cast<int>(features.size()), 64, [&](int begin, int end) {
+  workers.parallel_for(0, static_cast<int>(features.size()), 64, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       const Feature& feature = features[static_cast<std::size_t>(i)];
       Nearest& best = result[static_cast<std::size_t>(i)];
@@ -63,7 +63,7 @@ std::optional<ViewMatch> align(const Feature& left, const Feature& right, ImageV
 }  // namespace
 
 std::vector<ViewMatch> match_views(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                   const ViewMatchingOptions& options, const Workers& workers) {
+                                   const ViewMatchingOptions& options, const ThreadPool& workers) {
   DetectionOptions detection;
   detection.landmarks = options.features;
   const auto detector = make_landmark_detector(detection, workers);

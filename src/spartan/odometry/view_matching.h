@@ -29,6 +29,6 @@ struct ViewMatchingOptions {
 /// wrong and callers must be robust against them. In order of the strength of the left features; identical for any
 /// number of threads.
 std::vector<ViewMatch> match_views(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                   const ViewMatchingOptions& options, const Workers& workers);
+                                   const ViewMatchingOptions& options, const ThreadPool& workers);
 
 }  // namespace spartan

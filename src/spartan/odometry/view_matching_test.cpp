@@ -15,7 +15,7 @@ namespace {
 
 const RectifiedStereo kStereo{{320, 240}, 260.0, {159.5, 119.5}, 0.12};
 
-testing::SyntheticShot synthetic_frame() {
+testing::SyntheticFrame synthetic_frame() {
   const testing::SyntheticWorld world{testing::SyntheticWorldOptions()};
   const Pose tilted = Pose(exp_so3({0, 0.4, 0}), {0, 0, 0.5});
   return world.render(kStereo, tilted * optical_from_forward().inverse(), 1);
@@ -24,7 +24,7 @@ testing::SyntheticShot synthetic_frame() {
 // Corresponding points of a rectified pair lie in the same row, which the matching does not assume.
 TEST(ViewMatching, FindsTheRowsOfARectifiedPairToATenthOfAPixel) {
   const auto pair = synthetic_frame();
-  const auto matches = match_views(pair.left.view(), pair.right.view(), {}, Workers(1));
+  const auto matches = match_views(pair.left.view(), pair.right.view(), {}, ThreadPool(1));
   ASSERT_GT(matches.size(), 80u);
   std::vector<double> rows, disparities;
   for (const ViewMatch& match : matches) {
@@ -38,8 +38,8 @@ TEST(ViewMatching, FindsTheRowsOfARectifiedPairToATenthOfAPixel) {
 
 TEST(ViewMatching, IsIdenticalForAnyNumberOfThreads) {
   const auto pair = synthetic_frame();
-  const auto one = match_views(pair.left.view(), pair.right.view(), {}, Workers(1));
-  const auto two = match_views(pair.left.view(), pair.right.view(), {}, Workers(2));
+  const auto one = match_views(pair.left.view(), pair.right.view(), {}, ThreadPool(1));
+  const auto two = match_views(pair.left.view(), pair.right.view(), {}, ThreadPool(2));
   ASSERT_EQ(one.size(), two.size());
   for (std::size_t i = 0; i < one.size(); ++i) {
     EXPECT_EQ(one[i].left, two[i].left);
@@ -49,7 +49,7 @@ TEST(ViewMatching, IsIdenticalForAnyNumberOfThreads) {
 
 TEST(ViewMatching, FindsNothingInAnEmptyImage) {
   const Image<std::uint8_t> empty(320, 240);
-  EXPECT_TRUE(match_views(empty.view(), empty.view(), {}, Workers(1)).empty());
+  EXPECT_TRUE(match_views(empty.view(), empty.view(), {}, ThreadPool(1)).empty());
 }
 
 }  // namespace

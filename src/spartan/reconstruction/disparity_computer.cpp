@@ -13,16 +13,16 @@
 namespace spartan {
 
 struct DisparityComputer::State {
-  State(const DisparityOptions& options_in, const Workers& workers_in)
+  State(const DisparityOptions& options_in, const ThreadPool& workers_in)
       : options(options_in), workers(workers_in), matcher(options_in, workers_in) {}
   DisparityOptions options;
-  Workers workers;
+  ThreadPool workers;
   SemiGlobalMatcher matcher;
   SpeckleFilter speckles;
   Image<float> checked, smoothed;
 };
 
-DisparityComputer::DisparityComputer(const DisparityOptions& options, Workers workers)
+DisparityComputer::DisparityComputer(const DisparityOptions& options, ThreadPool workers)
     : state_(std::make_unique<State>(options, workers)) {}
 DisparityComputer::DisparityComputer(DisparityComputer&&) noexcept = default;
 DisparityComputer& DisparityComputer::operator=(DisparityComputer&&) noexcept = default;

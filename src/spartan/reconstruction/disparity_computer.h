@@ -39,7 +39,7 @@ struct DisparityOptions;  // disparity_options.h
 /// result is the same, bit for bit, for any number of threads and on every SIMD instruction set.
 class DisparityComputer {
  public:
-  DisparityComputer(const DisparityOptions& options, Workers workers);
+  DisparityComputer(const DisparityOptions& options, ThreadPool workers);
   DisparityComputer(DisparityComputer&&) noexcept;
   DisparityComputer& operator=(DisparityComputer&&) noexcept;
   ~DisparityComputer();

@@ -17,8 +17,8 @@ namespace spartan {
 namespace {
 
 // A stereo pair of the synthetic ground, seen from 0.5 m above it, pitched down by 30°.
-const testing::SyntheticShot& ground() {
-  static const testing::SyntheticShot frame = [] {
+const testing::SyntheticFrame& ground() {
+  static const testing::SyntheticFrame frame = [] {
     testing::SyntheticWorldOptions options;
     options.stones_per_m2 = 3;
     const Pose tilt = Pose(exp_so3({0, 30 * M_PI / 180, 0}), {0, 0, 0.5});
@@ -35,7 +35,7 @@ std::vector<float> values(ImageView<const float> image) {
 }
 
 std::vector<float> disparity_of_ground(const DisparityOptions& options, int threads, int count = 96) {
-  DisparityComputer computer(options, Workers(threads));
+  DisparityComputer computer(options, ThreadPool(threads));
   const auto image = computer.compute(ground().left, ground().right, {0, count - 1});
   EXPECT_TRUE(image) << image.error().message();
   return image ? values(image->disparity) : std::vector<float>{};
@@ -80,7 +80,7 @@ TEST(DisparityComputer, IsDeterministicOnEveryInstructionSetAndNumberOfThreads) 
 }
 
 TEST(DisparityComputer, DoesNotDependOnThePreviousCall) {
-  DisparityComputer computer(DisparityOptions{}, Workers(1));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
   const auto first = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
   ASSERT_TRUE(computer.compute(ground().right, ground().left, {-40, 10}));
   const auto again = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
@@ -97,7 +97,7 @@ TEST(DisparityComputer, FindsNegativeDisparities) {
   for (int y = 0; y < 60; ++y) {
     for (int x = 0; x < 120; ++x) right(x, y) = left(std::max(0, x - 7), y);  // x_left − x_right = −7
   }
-  DisparityComputer computer(DisparityOptions{}, Workers(1));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
   const auto image = computer.compute(left, right, {-16, 15});
   ASSERT_TRUE(image);
   for (int y = 5; y < 55; ++y) {
@@ -108,7 +108,7 @@ TEST(DisparityComputer, FindsNegativeDisparities) {
 TEST(DisparityComputer, DiscardsMaskedPixels) {
   Image<std::uint8_t> mask(320, 240, 255);
   for (int y = 0; y < 240; ++y) std::fill(mask.row(y) + 100, mask.row(y) + 140, std::uint8_t{0});
-  DisparityComputer computer(DisparityOptions{}, Workers(1));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
   const auto image = computer.compute(ground().left, ground().right, {0, 95}, mask, {});
   ASSERT_TRUE(image);
   for (int y = 0; y < 240; ++y) {
@@ -117,7 +117,7 @@ TEST(DisparityComputer, DiscardsMaskedPixels) {
 }
 
 TEST(DisparityComputer, RejectsInvalidSizesAndRanges) {
-  DisparityComputer computer(DisparityOptions{}, Workers(1));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
   const Image<std::uint8_t> small(40, 30), other(41, 30);
   EXPECT_TRUE(DisparityComputer::check(small, small, {0, 15}));
   EXPECT_EQ(computer.compute(small, other, {0, 15}).error().code, ErrorCode::frame_rejected);
@@ -128,7 +128,7 @@ TEST(DisparityComputer, RejectsInvalidSizesAndRanges) {
 }
 
 TEST(DisparityComputer, AcceptsTinyImages) {
-  DisparityComputer computer(DisparityOptions{}, Workers(2));
+  DisparityComputer computer(DisparityOptions{}, ThreadPool(2));
   for (const int width : {1, 2, 5, 17, 33}) {
     for (const int height : {1, 2, 3, 9}) {
       const Image<std::uint8_t> image(width, height, 100);

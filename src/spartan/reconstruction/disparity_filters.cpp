@@ -13,10 +13,10 @@ constexpr int kRowsAtOnce = 32;  // rows of one work item of a thread
 
 }  // namespace
 
-void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const Workers& workers,
+void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const ThreadPool& workers,
                        ImageView<float> disparity) {
   const int w = disparity.width();
-  workers.for_each_part(0, disparity.height(), kRowsAtOnce, [&](int from, int to) {
+  workers.parallel_for(0, disparity.height(), kRowsAtOnce, [&](int from, int to) {
     for (int y = from; y < to; ++y) {
       for (int x = 0; x < w; ++x) {
         float d = raw.left(x, y);
@@ -105,8 +105,8 @@ void median_row(ImageView<const float> in, int y, ImageView<float> out) {
 
 }  // namespace
 
-void median_3x3(ImageView<const float> in, const Workers& workers, ImageView<float> out) {
-  workers.for_each_part(0, in.height(), kRowsAtOnce, [&](int from, int to) {
+void median_3x3(ImageView<const float> in, const ThreadPool& workers, ImageView<float> out) {
+  workers.parallel_for(0, in.height(), kRowsAtOnce, [&](int from, int to) {
     for (int y = from; y < to; ++y) median_row(in, y, out);
   });
 }

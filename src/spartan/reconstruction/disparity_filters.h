@@ -13,7 +13,7 @@ namespace spartan {
 /// Left-right consistency check. Discards a disparity d where the right image's own match differs,
 /// |d − d_right(x − d)| > tolerance_px + 0.5 (the right disparities are whole pixels), where the right pixel has no
 /// match, and where the match is not unique. A negative tolerance disables the left-right part.
-void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const Workers& workers,
+void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const ThreadPool& workers,
                        ImageView<float> disparity);
 
 /// Discards disparities of excluded pixels of either image (mask 0; valid is 255). An empty mask excludes nothing.
@@ -21,7 +21,7 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
                  ImageView<float> disparity);
 
 /// Median of the known values in the 3×3 neighbourhood of each known pixel; unknown pixels stay unknown.
-void median_3x3(ImageView<const float> in, const Workers& workers, ImageView<float> out);
+void median_3x3(ImageView<const float> in, const ThreadPool& workers, ImageView<float> out);
 
 /// Discards 4-connected components of fewer than `size_px` pixels. Neighbours are connected where their disparities
 /// differ by at most `step_px`. Method: connected-component labelling by runs along the rows and union-find. Buffers

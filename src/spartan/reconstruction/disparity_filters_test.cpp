@@ -92,7 +92,7 @@ TEST(Median, EqualsTheReference) {
     for (const ImageSize size : {ImageSize{57, 70}, {1, 1}, {1, 9}, {9, 1}, {2, 2}}) {
       const Image<float> in = blobs(size.width, size.height, holes, 4);
       Image<float> out(size);
-      median_3x3(in, Workers(2), out);
+      median_3x3(in, ThreadPool(2), out);
       expect_same(out, median_by_sorting(in));
     }
   }
@@ -138,9 +138,9 @@ TEST(LeftRightCheck, ComparesWithTheRightDisparities) {
   raw.right(4, 0) = RawDisparity::kNoMatch;  // matched by x = 6
   raw.unique(7, 0) = 0;
   Image<float> out(8, 1);
-  drop_inconsistent(raw, 1, Workers(1), out);
+  drop_inconsistent(raw, 1, ThreadPool(1), out);
   for (int x = 0; x < 8; ++x) EXPECT_EQ(std::isnan(out(x, 0)), x >= 5) << x;
-  drop_inconsistent(raw, -1, Workers(1), out);
+  drop_inconsistent(raw, -1, ThreadPool(1), out);
   for (int x = 0; x < 8; ++x) EXPECT_EQ(std::isnan(out(x, 0)), x == 7) << x;
 }
 

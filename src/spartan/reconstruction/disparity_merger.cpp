@@ -61,13 +61,13 @@ struct DisparityMerger::Layer {
 };
 
 DisparityMerger::DisparityMerger(const MergingOptions& options, const Pose& body_from_centre,
-                                 std::span<const ViewGeometry> views, double nearest_m, Workers workers)
+                                 std::span<const ViewGeometry> views, double nearest_m, ThreadPool workers)
     : options_(options), body_from_centre_(body_from_centre), workers_(std::move(workers)) {
   camera_ = plan_panorama(options.projection, options.pixels_per_degree * 180 / std::numbers::pi, body_from_centre,
-                          views, nearest_m, options.farthest_m);
+                          views, nearest_m, options.max_range_m);
 }
 
-void DisparityMerger::throw_into(const MergedView& view, Layer& layer) const {
+void DisparityMerger::rasterize_view(const MergedView& view, Layer& layer) const {
   const RectifiedStereo& g = view.geometry.stereo;
   const Eigen::Matrix4d m = reprojection(g, body_from_centre_.inverse() * view.geometry.body_from_left);
   const auto gate = static_cast<float>(options_.gate_sigmas);
@@ -80,7 +80,7 @@ void DisparityMerger::throw_into(const MergedView& view, Layer& layer) const {
       const Eigen::Vector4d h = m * Eigen::Vector4d(u, v, d, 1);
       const Eigen::Vector3d p = h.head<3>() / h.w();
       const double range = p.norm();
-      if (range > options_.farthest_m) continue;
+      if (range > options_.max_range_m) continue;
       const auto pixel = camera_.project(p);
       if (!pixel) continue;
       const int column = static_cast<int>(std::lround(pixel->x())), row = static_cast<int>(std::lround(pixel->y()));
@@ -104,7 +104,7 @@ struct Candidate {
 };
 
 // Whether a view sees free space at a point: its disparity at the point's pixel is smaller by more than the gate.
-bool looks_through(const MergedView& view, const Eigen::Vector3d& point_in_body, double gate, double sigma_px) {
+bool sees_free_space(const MergedView& view, const Eigen::Vector3d& point_in_body, double gate, double sigma_px) {
   const RectifiedStereo& g = view.geometry.stereo;
   const Eigen::Vector3d in_left = view.geometry.body_from_left.inverse() * point_in_body;
   if (in_left.z() <= 0) return false;
@@ -128,22 +128,22 @@ std::uint8_t most_votes(std::uint32_t votes) {
 void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row,
                                MergedRange& merged) const {
   const auto gate = static_cast<float>(options_.gate_sigmas);
-  std::vector<Candidate> found(views.size());
+  std::vector<Candidate> candidates(views.size());
   for (int x = 0; x < camera_.size().width; ++x) {
     std::size_t count = 0;
     for (std::size_t k = 0; k < views.size(); ++k) {
       const Layer& layer = layers[k];
       const int n = layer.count(x, row);
       if (n == 0) continue;
-      found[count++] = {k,
-                        layer.range(x, row),
-                        layer.variance(x, row),
-                        layer.sum_gray(x, row) / static_cast<float>(n),
-                        layer.votes(x, row),
-                        n};
+      candidates[count++] = {k,
+                             layer.range(x, row),
+                             layer.variance(x, row),
+                             layer.sum_gray(x, row) / static_cast<float>(n),
+                             layer.votes(x, row),
+                             n};
     }
     if (count == 0) continue;
-    std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count),
+    std::sort(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count),
               [](const Candidate& a, const Candidate& b) {
                 return a.range != b.range ? a.range < b.range : a.view < b.view;
               });
@@ -151,26 +151,27 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
     std::size_t first = 0, last = 0;
     while (true) {
       last = first + 1;
-      while (last < count &&
-             found[last].range - found[first].range < gate * std::sqrt(found[last].variance + found[first].variance)) {
+      while (last < count && candidates[last].range - candidates[first].range <
+                                 gate * std::sqrt(candidates[last].variance + candidates[first].variance)) {
         ++last;
       }
       if (last == count) break;
-      const Eigen::Vector3d place =
-          body_from_centre_ * Eigen::Vector3d(static_cast<double>(found[first].range) * camera_.direction(x, row));
-      std::size_t against = 0;
+      const Eigen::Vector3d point =
+          body_from_centre_ * Eigen::Vector3d(static_cast<double>(candidates[first].range) * camera_.direction(x, row));
+      std::size_t free_space_votes = 0;
       for (std::size_t i = last; i < count; ++i) {
-        against +=
-            looks_through(views[found[i].view], place, options_.gate_sigmas, options_.disparity_sigma_px) ? 1 : 0;
+        free_space_votes +=
+            sees_free_space(views[candidates[i].view], point, options_.gate_sigmas, options_.disparity_sigma_px) ? 1
+                                                                                                                 : 0;
       }
-      if (against <= last - first) break;
+      if (free_space_votes <= last - first) break;
       first = last;
     }
     float weights = 0, sum = 0, gray = 0;
     std::uint8_t seen_by = 0;
-    const Candidate* best = &found[first];
+    const Candidate* best = &candidates[first];
     for (std::size_t i = first; i < last; ++i) {
-      const Candidate& c = found[i];
+      const Candidate& c = candidates[i];
       weights += 1 / c.variance;
       sum += c.range / c.variance;
       gray += c.gray / c.variance;
@@ -191,7 +192,7 @@ namespace {
 // virtual camera are smaller than the pixels of a view.
 constexpr int kGap = 2;
 
-void fill_gaps(MergedRange& merged, float gate, const Workers& workers) {
+void fill_gaps(MergedRange& merged, float gate, const ThreadPool& workers) {
   const Image<float> range = merged.range_m.clone(), sigma = merged.sigma_m.clone();
   const Image<std::uint8_t> views = merged.views.clone(), gray = merged.gray.clone(), classes = merged.classes.clone();
   const auto known = [&](int x, int y) { return range.contains(x, y) && std::isfinite(range(x, y)); };
@@ -213,7 +214,7 @@ void fill_gaps(MergedRange& merged, float gate, const Workers& workers) {
       }
     }
   };
-  workers.for_each_part(0, range.height(), 16, [&](int from, int to) {
+  workers.parallel_for(0, range.height(), 16, [&](int from, int to) {
     for (int y = from; y < to; ++y) {
       for (int x = 0; x < range.width(); ++x) {
         if (!std::isfinite(range(x, y))) fill(x, y);
@@ -229,10 +230,10 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
   std::vector<Layer> layers;
   layers.reserve(views.size());
   for (std::size_t k = 0; k < views.size(); ++k) layers.emplace_back(size);
-  workers_.for_each_part(0, static_cast<int>(views.size()), 1, [&](int from, int to) {
+  workers_.parallel_for(0, static_cast<int>(views.size()), 1, [&](int from, int to) {
     for (int k = from; k < to; ++k) {
       const MergedView& view = views[static_cast<std::size_t>(k)];
-      if (!view.disparity.empty()) throw_into(view, layers[static_cast<std::size_t>(k)]);
+      if (!view.disparity.empty()) rasterize_view(view, layers[static_cast<std::size_t>(k)]);
     }
   });
   MergedRange merged{camera_,
@@ -242,7 +243,7 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
                      Image<std::uint8_t>(size),
                      Image<std::uint8_t>(size),
                      Image<std::uint8_t>(size)};
-  workers_.for_each_part(0, size.height, 16, [&](int from, int to) {
+  workers_.parallel_for(0, size.height, 16, [&](int from, int to) {
     for (int row = from; row < to; ++row) fuse_row(views, layers, row, merged);
   });
   fill_gaps(merged, static_cast<float>(options_.gate_sigmas), workers_);

@@ -17,7 +17,7 @@ namespace spartan {
 struct MergingOptions {
   PanoramicCamera::Projection projection = PanoramicCamera::Projection::cylinder;  ///< Of the virtual camera.
   double pixels_per_degree = 12;    ///< Resolution of the virtual camera, pixels per degree of azimuth.
-  double farthest_m = 6;            ///< Maximum range of a point from the virtual camera, m.
+  double max_range_m = 6;           ///< Maximum range of a point from the virtual camera, m.
   double disparity_sigma_px = 0.3;  ///< Standard deviation of a disparity, pixels.
   double gate_sigmas = 3;           ///< Gate on range differences, standard deviations.
 
@@ -31,7 +31,7 @@ struct MergingOptions {
             "and costs memory and time.",
             between(0.5, 60));
     v.renamed("farthest_m", "max_range_m");
-    v.field("max_range_m", farthest_m,
+    v.field("max_range_m", max_range_m,
             "Maximum range of a point from the virtual camera in metres; farther points are discarded.",
             between(0.5, 10000));
     v.field(
@@ -76,7 +76,7 @@ class DisparityMerger {
  public:
   /// Any number of views; merge() holds one layer of the panorama's size for each.
   DisparityMerger(const MergingOptions& options, const Pose& body_from_centre, std::span<const ViewGeometry> views,
-                  double nearest_m, Workers workers);
+                  double nearest_m, ThreadPool workers);
 
   /// Views in the order and with the geometry of the constructor; a view with an empty disparity image is skipped.
   MergedRange merge(std::span<const MergedView> views) const;
@@ -85,13 +85,13 @@ class DisparityMerger {
 
  private:
   struct Layer;
-  void throw_into(const MergedView& view, Layer& layer) const;
+  void rasterize_view(const MergedView& view, Layer& layer) const;
   void fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row, MergedRange& merged) const;
 
   MergingOptions options_;
   Pose body_from_centre_;
   PanoramicCamera camera_;
-  Workers workers_;
+  ThreadPool workers_;
 };
 
 }  // namespace spartan

@@ -35,7 +35,7 @@ struct Stop {
     return views;
   }
   MergedRange merge(const MergingOptions& options = {}, int threads = 2) const {
-    const DisparityMerger merger(options, Pose::from_translation({0, 0, 1}), geometries, 0.8, Workers(threads));
+    const DisparityMerger merger(options, Pose::from_translation({0, 0, 1}), geometries, 0.8, ThreadPool(threads));
     return merger.merge(views());
   }
 };
@@ -43,7 +43,7 @@ struct Stop {
 Stop three_pans(const Height& height) {
   Stop stop;
   for (const double pan : {0.6, 0.0, -0.6})
-    stop.add(kWide, testing::looking(1, pan, 0.68, optical_from_forward()), height);
+    stop.add(kWide, testing::camera_pose_at(1, pan, 0.68, optical_from_forward()), height);
   return stop;
 }
 
@@ -160,7 +160,7 @@ TEST(DisparityMerger, ViewsBeyondTheEighthShareTheBitsOfTheFirst) {
 TEST(DisparityMerger, DiscardsASurfaceThatMoreViewsSeeThrough) {
   Stop stop;
   for (const double pan : {0.3, 0.0, -0.3})
-    stop.add(kWide, testing::looking(1, pan, 0.68, optical_from_forward()), [](double, double) { return 0; });
+    stop.add(kWide, testing::camera_pose_at(1, pan, 0.68, optical_from_forward()), [](double, double) { return 0; });
   const MergedRange clean = stop.merge(coarse());
   for (int y = 180; y < 200; ++y) {
     for (int x = 0; x < 373; ++x) stop.disparities[1](x, y) *= 1.25F;
@@ -211,7 +211,7 @@ TEST(DisparityMerger, ClassesComeFromTheViewWithTheMostPixels) {
   views[0].classes = all_ground;
   views[1].classes = all_rock;
   views[2].classes = all_ground;
-  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, Workers(1));
+  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, ThreadPool(1));
   const MergedRange merged = merger.merge(views);
   for (int y = 0; y < merged.views.height(); ++y) {
     for (int x = 0; x < merged.views.width(); ++x) {
@@ -236,7 +236,7 @@ TEST(DisparityMerger, IsDeterministicForAnyNumberOfThreadsAndSkipsEmptyViews) {
   }
   std::vector<MergedView> views = stop.views();
   views[1].disparity = {};
-  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, Workers(1));
+  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, ThreadPool(1));
   const MergedRange without = merger.merge(views);
   EXPECT_LT(known(without.range_m), known(one.range_m));
   for (int y = 0; y < without.views.height(); ++y) {

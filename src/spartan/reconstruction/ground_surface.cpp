@@ -81,12 +81,12 @@ float interpolated(const Image<float>& nodes, double u, double v) {
 }  // namespace
 
 Image<float> fit_ground(ImageView<const float> elevation_m, ImageView<const std::uint8_t> ground, double cell_m,
-                        const GroundSurfaceOptions& options, const Workers& workers) {
+                        const GroundSurfaceOptions& options, const ThreadPool& workers) {
   const auto [w, h] = elevation_m.size();
   const int step = std::max(1, static_cast<int>(std::lround(options.node_spacing_m / cell_m)));
   const GroundFit fit(elevation_m, ground, cell_m, options);
   Image<float> nodes(std::max(2, (w - 1) / step + 2), std::max(2, (h - 1) / step + 2));
-  workers.for_each_part(0, nodes.height(), 1, [&](int from, int to) {
+  workers.parallel_for(0, nodes.height(), 1, [&](int from, int to) {
     for (int j = from; j < to; ++j) {
       for (int i = 0; i < nodes.width(); ++i) nodes(i, j) = fit.at(i * step, j * step);
     }

@@ -51,6 +51,6 @@ struct GroundSurfaceOptions {
 /// the surface is interpolated bilinearly. `elevation_m`: NaN where unknown. `ground`: not 0 where a cell is known to
 /// be ground beforehand. The result has the size of `elevation_m`, in metres; NaN where fewer than six cells are near.
 Image<float> fit_ground(ImageView<const float> elevation_m, ImageView<const std::uint8_t> ground, double cell_m,
-                        const GroundSurfaceOptions& options, const Workers& workers);
+                        const GroundSurfaceOptions& options, const ThreadPool& workers);
 
 }  // namespace spartan

@@ -38,7 +38,7 @@ double worst_of(const Image<float>& fitted, const Height& truth) {
 const Height kSlope = [](double x, double y) { return 0.3 * x - 0.1 * y; };
 
 TEST(GroundSurface, ReproducesASlope) {
-  EXPECT_LT(worst_of(fit_ground(grid_of(kSlope), everywhere(1), kCell_m, {}, Workers(1)), kSlope), 1e-4);
+  EXPECT_LT(worst_of(fit_ground(grid_of(kSlope), everywhere(1), kCell_m, {}, ThreadPool(1)), kSlope), 1e-4);
 }
 
 // Two rocks and a pit that are not marked.
@@ -50,7 +50,7 @@ TEST(GroundSurface, ContinuesBeneathRocksAndAbovePits) {
     if (std::hypot(x - 1.2, y - 3.0) < 0.3) z -= 0.3;
     return z;
   };
-  EXPECT_LT(worst_of(fit_ground(grid_of(cluttered), everywhere(1), kCell_m, {}, Workers(2)), kSlope), 0.01);
+  EXPECT_LT(worst_of(fit_ground(grid_of(cluttered), everywhere(1), kCell_m, {}, ThreadPool(2)), kSlope), 0.01);
 }
 
 // A ridge whose sides fall by 20 degrees within half a metre.
@@ -59,7 +59,7 @@ TEST(GroundSurface, FollowsARidge) {
     const double distance = std::abs(x - 2);
     return distance < 0.5 ? -0.364 * distance * distance : -0.364 * (distance - 0.25);
   };
-  EXPECT_LT(worst_of(fit_ground(grid_of(ridge), everywhere(1), kCell_m, {}, Workers(1)), ridge), 0.05);
+  EXPECT_LT(worst_of(fit_ground(grid_of(ridge), everywhere(1), kCell_m, {}, ThreadPool(1)), ridge), 0.05);
 }
 
 TEST(GroundSurface, BridgesHolesAndIsUnknownWithoutData) {
@@ -70,15 +70,15 @@ TEST(GroundSurface, BridgesHolesAndIsUnknownWithoutData) {
       if (std::hypot(x - 40, y - 40) < 6 || y < 3) with_holes(x, y) = nan;
     }
   }
-  EXPECT_LT(worst_of(fit_ground(with_holes, everywhere(1), kCell_m, {}, Workers(1)), kSlope), 1e-3);
+  EXPECT_LT(worst_of(fit_ground(with_holes, everywhere(1), kCell_m, {}, ThreadPool(1)), kSlope), 1e-3);
   const Image<float> nothing(kSide, kSide, nan);
-  EXPECT_TRUE(std::isnan(fit_ground(nothing, everywhere(1), kCell_m, {}, Workers(1))(40, 40)));
+  EXPECT_TRUE(std::isnan(fit_ground(nothing, everywhere(1), kCell_m, {}, ThreadPool(1))(40, 40)));
 }
 
 TEST(GroundSurface, IsDeterministicForAnyNumberOfThreads) {
   const Image<float> grid = grid_of([](double x, double y) { return 0.1 * std::sin(5 * x) * std::cos(3 * y); });
-  const Image<float> one = fit_ground(grid, everywhere(1), kCell_m, {}, Workers(1)),
-                     two = fit_ground(grid, everywhere(1), kCell_m, {}, Workers(2));
+  const Image<float> one = fit_ground(grid, everywhere(1), kCell_m, {}, ThreadPool(1)),
+                     two = fit_ground(grid, everywhere(1), kCell_m, {}, ThreadPool(2));
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) EXPECT_EQ(one(x, y), two(x, y));
   }

@@ -5,12 +5,12 @@
 
 namespace spartan {
 
-GridCell cell_at(const MapPlace& place, double x_m, double y_m) {
+GridCell cell_at(const GeoTransform& place, double x_m, double y_m) {
   return {static_cast<int>(std::floor((x_m - place.west_m) / place.cell_m)),
           static_cast<int>(std::floor((place.north_m - y_m) / place.cell_m))};
 }
 
-Eigen::Vector2d middle_of(const MapPlace& place, int column, int row) {
+Eigen::Vector2d cell_centre(const GeoTransform& place, int column, int row) {
   return {place.west_m + (column + 0.5) * place.cell_m, place.north_m - (row + 0.5) * place.cell_m};
 }
 

@@ -15,8 +15,8 @@ namespace spartan {
 struct GridCell {
   int column = 0, row = 0;
 };
-GridCell cell_at(const MapPlace& place, double x_m, double y_m);
-Eigen::Vector2d middle_of(const MapPlace& place, int column, int row);
+GridCell cell_at(const GeoTransform& place, double x_m, double y_m);
+Eigen::Vector2d cell_centre(const GeoTransform& place, int column, int row);
 
 /// An 8-connected component of obstacle cells.
 struct Obstacle {
@@ -36,11 +36,12 @@ struct MapBands {
 /// otherwise.
 struct LocalMap {
   Pose map_from_body;
-  MapPlace place;
+  GeoTransform place;
   Image<float> elevation_m, elevation_min_m, elevation_max_m;
   Image<float> variance_m2;  ///< Variance of elevation_m.
   Image<float> count;        ///< Number of points; 0 where unobserved.
-  Image<float> ground_m;     ///< Elevation of the ground surface beneath obstacles and above cavities; NaN where too few cells are around.
+  Image<float> ground_m;  ///< Elevation of the ground surface beneath obstacles and above cavities; NaN where too few
+                          ///< cells are around.
   Image<float> slope_rad, roughness_m, step_m;
   Image<GroundClass> kind;         ///< Unobserved cells and cells without ground_m are unknown, free cells are ground.
   Image<float> occupancy_logodds;  ///< Log-odds of an obstacle or a cavity; 0 where the class is unknown.
@@ -48,7 +49,7 @@ struct LocalMap {
   std::vector<Obstacle> obstacles;
 
   ImageSize size() const { return elevation_m.size(); }
-  /// The bands of a map file, with the names of docs/formats.md, "Maps".
+  /// The bands of a map file, with the names of docs/reference/files.md.
   MapBands bands() const;
 };
 

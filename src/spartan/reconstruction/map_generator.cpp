@@ -21,11 +21,11 @@ struct Cell {
   double weights = 0, sum = 0;
   float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
   int count = 0, ground = 0;
-  bool cut = false;
+  bool truncated = false;
 };
 
 struct Grid {
-  MapPlace place;
+  GeoTransform place;
   int width = 0, height = 0;
   std::vector<Cell> cells;
   const Cell& at(int x, int y) const {
@@ -45,7 +45,7 @@ Grid make_grid(const MapOptions& options, const Eigen::Vector3d& middle) {
   return grid;
 }
 
-void throw_points(std::span<const SurfacePoint> points, const Pose& map_from_body, Grid& grid) {
+void rasterize_points(std::span<const SurfacePoint> points, const Pose& map_from_body, Grid& grid) {
   const Eigen::Matrix3f rotation = map_from_body.rotation_matrix().cast<float>();
   const Eigen::Vector3f translation = map_from_body.translation().cast<float>();
   for (const SurfacePoint& point : points) {
@@ -53,7 +53,7 @@ void throw_points(std::span<const SurfacePoint> points, const Pose& map_from_bod
     const GridCell at = cell_at(grid.place, p.x(), p.y());
     if (at.column < 0 || at.row < 0 || at.column >= grid.width || at.row >= grid.height) continue;
     const double sigma =
-        std::max(std::abs(static_cast<double>(rotation.row(2).dot(point.along)) * point.sigma_m), kLeastSigma_m);
+        std::max(std::abs(static_cast<double>(rotation.row(2).dot(point.ray)) * point.sigma_m), kLeastSigma_m);
     Cell& cell = grid.at(at.column, at.row);
     const double weight = 1 / (sigma * sigma);
     cell.weights += weight;
@@ -61,7 +61,7 @@ void throw_points(std::span<const SurfacePoint> points, const Pose& map_from_bod
     cell.lowest = std::min(cell.lowest, p.z());
     cell.highest = std::max(cell.highest, p.z());
     ++cell.count;
-    cell.cut = cell.cut || point.cut;
+    cell.truncated = cell.truncated || point.truncated;
     cell.ground += point.kind == GroundClass::ground ? 1 : 0;
   }
 }
@@ -72,19 +72,19 @@ void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
     for (int x = 0; x < w; ++x) {
       // Without a ground surface nothing is over or under it: the cell stays unknown, its log-odds 0.
       if (!(map.count(x, y) > 0) || !std::isfinite(map.ground_m(x, y))) continue;
-      const double over = map.elevation_max_m(x, y) - map.ground_m(x, y),
-                   under = map.ground_m(x, y) - map.elevation_min_m(x, y);
+      const double height_above = map.elevation_max_m(x, y) - map.ground_m(x, y),
+                   depth_below = map.ground_m(x, y) - map.elevation_min_m(x, y);
       const double sigma = std::sqrt(static_cast<double>(map.variance_m2(x, y))) + kLeastSigma_m;
-      const double obstacle_m = options.obstacle_m * (grid.at(x, y).cut ? options.cut_share : 1);
+      const double obstacle_m = options.obstacle_m * (grid.at(x, y).truncated ? options.truncated_obstacle_factor : 1);
       map.kind(x, y) = GroundClass::ground;
-      if (over > obstacle_m) {
+      if (height_above > obstacle_m) {
         map.kind(x, y) = GroundClass::obstacle;
-      } else if (under > options.cavity_m) {
+      } else if (depth_below > options.cavity_m) {
         map.kind(x, y) = GroundClass::cavity;
       }
       // Log-odds of p = Φ((height − threshold) / σ), where Φ(x) ≈ 1 / (1 + exp(−1.702 x)) within 0.01.
-      const double past = std::max(over - obstacle_m, under - options.cavity_m) / sigma;
-      map.occupancy_logodds(x, y) = std::clamp(static_cast<float>(1.702 * past), -kMostLogodds, kMostLogodds);
+      const double excess = std::max(height_above - obstacle_m, depth_below - options.cavity_m) / sigma;
+      map.occupancy_logodds(x, y) = std::clamp(static_cast<float>(1.702 * excess), -kMostLogodds, kMostLogodds);
     }
   }
 }
@@ -97,11 +97,11 @@ void list_obstacles(LocalMap& map) {
     for (int x = 0; x < w; ++x) mask(x, y) = map.kind(x, y) == GroundClass::obstacle ? 1 : 0;
   }
   for (const std::vector<PixelIndex>& cells : connected_components(mask)) {
-    Eigen::Vector2d low = middle_of(map.place, cells.front().x, cells.front().y), high = low;
+    Eigen::Vector2d low = cell_centre(map.place, cells.front().x, cells.front().y), high = low;
     Obstacle obstacle;
     obstacle.cells = static_cast<int>(cells.size());
     for (const auto [x, y] : cells) {
-      const Eigen::Vector2d at = middle_of(map.place, x, y);
+      const Eigen::Vector2d at = cell_centre(map.place, x, y);
       low = low.cwiseMin(at);
       high = high.cwiseMax(at);
       obstacle.height_m =
@@ -127,9 +127,9 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
       if (!std::isfinite(range)) continue;
       int& top = tops[static_cast<std::size_t>(x)];
       top = std::min(top, y);
-      const Eigen::Vector3d along = rotation * merged.camera.direction(x, y);
-      const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * along;
-      points.push_back({place.cast<float>(), merged.sigma_m(x, y), along.cast<float>(),
+      const Eigen::Vector3d ray = rotation * merged.camera.direction(x, y);
+      const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * ray;
+      points.push_back({place.cast<float>(), merged.sigma_m(x, y), ray.cast<float>(),
                         static_cast<GroundClass>(merged.classes(x, y)), y < top + edge});
     }
   }
@@ -138,7 +138,7 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
 
 LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const {
   Grid grid = make_grid(options_, map_from_body.translation());
-  throw_points(points, map_from_body, grid);
+  rasterize_points(points, map_from_body, grid);
   LocalMap map;
   map.map_from_body = map_from_body;
   map.place = grid.place;
@@ -148,12 +148,12 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
     *layer = Image<float>(w, h, kNaN);
   for (Image<float>* layer : {&map.count, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
   map.kind = Image<GroundClass>(w, h);
-  Image<std::uint8_t> starts(w, h);
+  Image<std::uint8_t> is_ground(w, h);
   bool any_ground = false;
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       const Cell& cell = grid.at(x, y);
-      if (cell.count < options_.fewest_points) continue;
+      if (cell.count < options_.min_points) continue;
       map.elevation_m(x, y) = static_cast<float>(cell.sum / cell.weights);
       map.elevation_min_m(x, y) = cell.lowest;
       map.elevation_max_m(x, y) = cell.highest;
@@ -161,19 +161,19 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
       // Errors of a cell's points are correlated (disparities are smooth), so the variance of their mean is that of
       // one.
       map.variance_m2(x, y) = static_cast<float>(cell.count / cell.weights);
-      starts(x, y) = 2 * cell.ground > cell.count ? 1 : 0;
-      any_ground = any_ground || starts(x, y) != 0;
+      is_ground(x, y) = 2 * cell.ground > cell.count ? 1 : 0;
+      any_ground = any_ground || is_ground(x, y) != 0;
     }
   }
   if (!any_ground) {
     for (int y = 0; y < h; ++y) {
-      for (int x = 0; x < w; ++x) starts(x, y) = map.count(x, y) > 0 ? 1 : 0;
+      for (int x = 0; x < w; ++x) is_ground(x, y) = map.count(x, y) > 0 ? 1 : 0;
     }
   }
-  map.ground_m = fit_ground(map.elevation_m, starts, options_.cell_m, options_.ground, workers_);
+  map.ground_m = fit_ground(map.elevation_m, is_ground, options_.cell_m, options_.ground, workers_);
   classify(options_, grid, map);
-  TerrainShape shape = measure_shape({map.elevation_m, map.elevation_max_m, map.ground_m, map.kind, map.place.cell_m},
-                                     options_.rover, workers_);
+  Traversability shape = compute_traversability(
+      {map.elevation_m, map.elevation_max_m, map.ground_m, map.kind, map.place.cell_m}, options_.rover, workers_);
   map.slope_rad = std::move(shape.slope_rad);
   map.roughness_m = std::move(shape.roughness_m);
   map.step_m = std::move(shape.step_m);

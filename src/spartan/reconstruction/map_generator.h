@@ -10,7 +10,7 @@
 #include "spartan/reconstruction/disparity_merger.h"
 #include "spartan/reconstruction/ground_surface.h"
 #include "spartan/reconstruction/local_map.h"
-#include "spartan/reconstruction/terrain_shape.h"
+#include "spartan/reconstruction/traversability.h"
 #include "spartan/reconstruction/v_disparity.h"
 
 namespace spartan {
@@ -20,8 +20,9 @@ struct MapOptions {
   double cell_m = 0.05;     ///< Side of a cell, m.
   double obstacle_m = 0.1;  ///< Minimum height of an obstacle above the ground surface, m.
   double cavity_m = 0.1;    ///< Minimum depth of a cavity (negative obstacle) below the ground surface, m.
-  double cut_share = 0.3;   ///< Factor on obstacle_m where the upper edge of the view truncates an object.
-  int fewest_points = 1;    ///< Minimum number of points of an observed cell.
+  double truncated_obstacle_factor =
+      0.3;             ///< Factor on obstacle_m where the upper edge of the view truncates an object.
+  int min_points = 1;  ///< Minimum number of points of an observed cell.
   GroundSurfaceOptions ground;
   RoverLimits rover;
 
@@ -44,12 +45,12 @@ struct MapOptions {
             between(0.005, 5));
     v.renamed("cut_share", "truncated_obstacle_factor");
     v.field(
-        "truncated_obstacle_factor", cut_share,
+        "truncated_obstacle_factor", truncated_obstacle_factor,
         "Factor on obstacle_m for points at the upper edge of the view, where an object may continue above what was "
         "seen; raising it misses more truncated rocks and reports fewer false ones.",
         between(0.05, 1));
     v.renamed("fewest_points", "min_points");
-    v.field("min_points", fewest_points,
+    v.field("min_points", min_points,
             "Minimum number of points of an observed cell; raising it leaves sparsely covered cells unknown.",
             between(1, 1000));
     v.group("ground", ground);
@@ -61,9 +62,9 @@ struct MapOptions {
 struct SurfacePoint {
   Eigen::Vector3f in_body;  ///< m, body frame.
   float sigma_m = 0;        ///< Standard deviation along the ray.
-  Eigen::Vector3f along;    ///< Direction of the ray, unit length, body frame.
+  Eigen::Vector3f ray;      ///< Direction of the ray, unit length, body frame.
   GroundClass kind = GroundClass::unknown;
-  bool cut = false;  ///< At the upper edge of the view: the object may continue above.
+  bool truncated = false;  ///< At the upper edge of the view: the object may continue above.
 };
 
 /// The points of all known pixels of a merged range image, in the body frame.
@@ -71,7 +72,7 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged);
 
 class MapGenerator {
  public:
-  MapGenerator(const MapOptions& options, Workers workers) : options_(options), workers_(std::move(workers)) {}
+  MapGenerator(const MapOptions& options, ThreadPool workers) : options_(options), workers_(std::move(workers)) {}
 
   /// `map_from_body`: gravity-aligned; the map is centred on its origin. Cell corners are at integer multiples of the
   /// cell size. A cell's elevation is the inverse-variance weighted mean of its points; its class follows from the
@@ -80,7 +81,7 @@ class MapGenerator {
 
  private:
   MapOptions options_;
-  Workers workers_;
+  ThreadPool workers_;
 };
 
 }  // namespace spartan

@@ -24,8 +24,8 @@ std::vector<SurfacePoint> points_on(const Height& height, double noise_m = 0.002
   for (double x = 0.5; x < 3.5; x += 0.0103) {
     for (double y = -1.5; y < 1.5; y += 0.0107) {
       const Eigen::Vector3d p(x, y, height(x, y) + random.normal(0, noise_m));
-      const Eigen::Vector3d along = (p - Eigen::Vector3d(0, 0, 1)).normalized();
-      points.push_back({p.cast<float>(), 0.005F, along.cast<float>(), GroundClass::ground});
+      const Eigen::Vector3d ray = (p - Eigen::Vector3d(0, 0, 1)).normalized();
+      points.push_back({p.cast<float>(), 0.005F, ray.cast<float>(), GroundClass::ground});
     }
   }
   return points;
@@ -38,10 +38,10 @@ T at(const LocalMap& map, const Image<T>& layer, double x, double y) {
 }
 
 TEST(LocalMap, CellsAndTheirCentresAgree) {
-  const MapPlace place{-1.5, 2.0, 0.25};
+  const GeoTransform place{-1.5, 2.0, 0.25};
   for (int row = 0; row < 9; ++row) {
     for (int column = 0; column < 9; ++column) {
-      const Eigen::Vector2d middle = middle_of(place, column, row);
+      const Eigen::Vector2d middle = cell_centre(place, column, row);
       EXPECT_EQ(cell_at(place, middle.x(), middle.y()).column, column);
       EXPECT_EQ(cell_at(place, middle.x(), middle.y()).row, row);
     }
@@ -59,7 +59,7 @@ TEST(GroundClass, BandHasTheDocumentedValues) {
 }
 
 TEST(LocalMap, BandsHaveTheDocumentedNames) {
-  const LocalMap map = MapGenerator({}, Workers(1)).generate({}, Pose());
+  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate({}, Pose());
   std::string names;
   const MapBands bands = map.bands();
   for (const MapBand& band : bands.list) {
@@ -73,7 +73,7 @@ TEST(LocalMap, BandsHaveTheDocumentedNames) {
 
 TEST(MapGenerator, PlaneGroundIsFreeWithLowCost) {
   const auto slope = [](double x, double y) { return 0.08 * x - 0.05 * y; };
-  const LocalMap map = MapGenerator({}, Workers(1)).generate(points_on(slope), Pose());
+  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points_on(slope), Pose());
   int known = 0;
   for (int row = 0; row < map.size().height; ++row) {
     for (int column = 0; column < map.size().width; ++column) {
@@ -84,7 +84,7 @@ TEST(MapGenerator, PlaneGroundIsFreeWithLowCost) {
         continue;
       }
       ++known;
-      const Eigen::Vector2d middle = middle_of(map.place, column, row);
+      const Eigen::Vector2d middle = cell_centre(map.place, column, row);
       // At the border of the points, those of a cell are not distributed around its centre.
       if (middle.x() < 0.6 || middle.x() > 3.4 || std::abs(middle.y()) > 1.4) continue;
       EXPECT_NEAR(map.elevation_m(column, row), slope(middle.x(), middle.y()), 0.003);
@@ -110,7 +110,7 @@ TEST(MapGenerator, ClassifiesRocksPitsAndOccludedGround) {
   std::erase_if(points, [](const SurfacePoint& p) {  // occluded by the rock
     return p.in_body.x() > 2.2F && p.in_body.x() < 2.5F && std::abs(p.in_body.y() - 0.5F) < 0.15F;
   });
-  const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
+  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
   EXPECT_EQ(at(map, map.kind, 2, 0.5), GroundClass::obstacle);
   EXPECT_EQ(at(map, map.kind, 1.5, -0.7), GroundClass::cavity);
   EXPECT_EQ(at(map, map.kind, 2.35, 0.5), GroundClass::unknown);
@@ -132,10 +132,10 @@ TEST(MapGenerator, ATruncatedObjectNeedsLessHeightToBeAnObstacle) {
     return x > 3.4 && std::abs(y) < 0.2 ? std::min(0.5 * (x - 3.4), 0.05) : 0.0;
   };
   std::vector<SurfacePoint> points = points_on(surface);
-  const LocalMap whole = MapGenerator({}, Workers(1)).generate(points, Pose());
+  const LocalMap whole = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
   EXPECT_EQ(at(whole, whole.kind, 3.47, 0), GroundClass::ground);
-  for (SurfacePoint& p : points) p.cut = p.in_body.x() > 3.4F;
-  const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
+  for (SurfacePoint& p : points) p.truncated = p.in_body.x() > 3.4F;
+  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
   EXPECT_EQ(at(map, map.kind, 3.47, 0), GroundClass::obstacle);
   EXPECT_EQ(at(map, map.kind, 3.2, 0), GroundClass::ground);
   EXPECT_EQ(at(map, map.kind, 3.42, 0), GroundClass::ground)
@@ -153,9 +153,9 @@ TEST(SurfacePoints, TheUpperEndsOfColumnsAreTruncated) {
     for (int y = 0; y < 2 * x; ++y) merged.range_m(x, y) = std::numeric_limits<float>::quiet_NaN();
   }
   merged.range_m(0, 20) = std::numeric_limits<float>::quiet_NaN();
-  int cut = 0;
-  for (const SurfacePoint& p : surface_points(merged)) cut += p.cut ? 1 : 0;
-  EXPECT_EQ(cut, 8 * 4) << "half a degree is four rows; holes are not edges";
+  int truncated = 0;
+  for (const SurfacePoint& p : surface_points(merged)) truncated += p.truncated ? 1 : 0;
+  EXPECT_EQ(truncated, 8 * 4) << "half a degree is four rows; holes are not edges";
 }
 
 // Rotating the points and correcting the attitude accordingly does not change the map.
@@ -169,12 +169,12 @@ TEST(MapGenerator, IsInvariantToTheBodyFrame) {
   std::vector<SurfacePoint> rotated = points;
   for (SurfacePoint& p : rotated) {
     p.in_body = (rotation * p.in_body.cast<double>()).cast<float>();
-    p.along = (rotation.rotation() * p.along.cast<double>()).cast<float>();
+    p.ray = (rotation.rotation() * p.ray.cast<double>()).cast<float>();
   }
   const Pose map_from_body = Pose::from_translation({0.5, 0, 0});
-  const LocalMap a = MapGenerator({}, Workers(1)).generate(points, map_from_body);
+  const LocalMap a = MapGenerator({}, ThreadPool(1)).generate(points, map_from_body);
   // The map frame is the same. The map is centred on the body's origin, so its window may differ, but not its cells.
-  const LocalMap b = MapGenerator({}, Workers(1)).generate(rotated, map_from_body * rotation.inverse());
+  const LocalMap b = MapGenerator({}, ThreadPool(1)).generate(rotated, map_from_body * rotation.inverse());
   int same = 0, different = 0;
   for (double x = 1.2; x < 3.8; x += 0.05) {
     for (double y = -1.3; y < 1.3; y += 0.05) {
@@ -193,10 +193,10 @@ TEST(MapGenerator, IsInvariantToTheBodyFrame) {
 TEST(MapGenerator, MorePointsNeverRaiseTheVariance) {
   const auto flat = [](double, double) { return 0.0; };
   std::vector<SurfacePoint> points = points_on(flat);
-  const LocalMap some = MapGenerator({}, Workers(1)).generate(points, Pose());
+  const LocalMap some = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
   std::vector<SurfacePoint> twice = points;
   twice.insert(twice.end(), points.begin(), points.end());
-  const LocalMap more = MapGenerator({}, Workers(1)).generate(twice, Pose());
+  const LocalMap more = MapGenerator({}, ThreadPool(1)).generate(twice, Pose());
   for (int row = 0; row < some.size().height; ++row) {
     for (int column = 0; column < some.size().width; ++column) {
       if (!(some.count(column, row) > 0)) continue;
@@ -208,16 +208,16 @@ TEST(MapGenerator, MorePointsNeverRaiseTheVariance) {
 TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
   const double rise = std::tan(10 * kDegree);
   const LocalMap map =
-      MapGenerator({}, Workers(1)).generate(points_on([&](double x, double) { return rise * x; }), Pose());
+      MapGenerator({}, ThreadPool(1)).generate(points_on([&](double x, double) { return rise * x; }), Pose());
   EXPECT_NEAR(at(map, map.slope_rad, 2, 0), 10 * kDegree, 0.2 * kDegree);
   EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of at most 20 degrees";
 }
 
 // Three points far from all others: too few cells for the surface of the ground.
 TEST(MapGenerator, AnIslandWithoutGroundIsUnknown) {
-  const Eigen::Vector3f along = Eigen::Vector3f(3.4F, 3.4F, -1).normalized();
-  std::vector<SurfacePoint> points(3, {{3.41F, 3.41F, 0}, 0.005F, along, GroundClass::ground});
-  const LocalMap map = MapGenerator({}, Workers(1)).generate(points, Pose());
+  const Eigen::Vector3f ray = Eigen::Vector3f(3.4F, 3.4F, -1).normalized();
+  std::vector<SurfacePoint> points(3, {{3.41F, 3.41F, 0}, 0.005F, ray, GroundClass::ground});
+  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
   EXPECT_EQ(at(map, map.count, 3.41, 3.41), 3);
   EXPECT_NEAR(at(map, map.elevation_m, 3.41, 3.41), 0, 1e-6) << "its elevation is measured all the same";
   EXPECT_EQ(at(map, map.kind, 3.41, 3.41), 0);

@@ -40,7 +40,7 @@ TEST(PanoramicCamera, ContainsTheFieldsOfViewTightly) {
   const RectifiedStereo g{{320, 320}, 343, {159.5, 159.5}, 0.2};
   std::vector<ViewGeometry> views;
   for (const double pan : {-0.6, 0.0, 0.6})
-    views.push_back({g, testing::looking(1, pan, 0.68, optical_from_forward())});
+    views.push_back({g, testing::camera_pose_at(1, pan, 0.68, optical_from_forward())});
   const Pose centre = Pose::from_translation({0, 0.1, 1});
   for (const Projection projection : {Projection::cylinder, Projection::sphere}) {
     const PanoramicCamera camera = plan_panorama(projection, 300, centre, views, 0.8, 6);

@@ -21,7 +21,7 @@ int round_up(int value, int multiple) {
 
 }  // namespace
 
-SemiGlobalMatcher::SemiGlobalMatcher(const DisparityOptions& options, Workers workers)
+SemiGlobalMatcher::SemiGlobalMatcher(const DisparityOptions& options, ThreadPool workers)
     : options_(options), workers_(std::move(workers)), kernels_(sgm::kernels_for(simd_target_index(options.simd))) {
   // P2 for every gray-level change along a path; see DisparityOptions.
   for (std::size_t step = 0; step < p2_by_step_.size(); ++step) {
@@ -82,8 +82,8 @@ const RawDisparity& SemiGlobalMatcher::match(ImageView<const std::uint8_t> left,
 
   // Both passes sweep their first halves, then, after a barrier, complete the sums in the half of the other pass.
   const int h = size_.height, upper = h / 2, lower = h - upper;
-  workers_.run_both([&] { sweep(passes_[0], 0, upper, false); }, [&] { sweep(passes_[1], 0, lower, false); });
-  workers_.run_both([&] { sweep(passes_[0], upper, h, true); }, [&] { sweep(passes_[1], lower, h, true); });
+  workers_.parallel_invoke([&] { sweep(passes_[0], 0, upper, false); }, [&] { sweep(passes_[1], 0, lower, false); });
+  workers_.parallel_invoke([&] { sweep(passes_[0], upper, h, true); }, [&] { sweep(passes_[1], lower, h, true); });
 
   const double per_pass = workers_.threads() > 1 ? 0.5 : 1.0;
   for (const Pass& pass : passes_) {
@@ -105,7 +105,7 @@ void SemiGlobalMatcher::compute_census(ImageView<const std::uint8_t> image, bool
     std::memset(target + kWindowColumns + w, source[w - 1],
                 static_cast<std::size_t>(framed_.width() - kWindowColumns - w));
   }
-  workers_.for_each_part(0, h, 32, [&](int from, int to) {
+  workers_.parallel_for(0, h, 32, [&](int from, int to) {
     Image<std::uint8_t> forward(mirrored ? w + kVector : 0, mirrored ? sgm::kPlanes : 0);
     for (int y = from; y < to; ++y) {
       sgm::CensusRow row{};

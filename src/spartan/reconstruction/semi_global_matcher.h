@@ -30,7 +30,7 @@ struct RawDisparity {
 
 class SemiGlobalMatcher {
  public:
-  SemiGlobalMatcher(const DisparityOptions& options, Workers workers);
+  SemiGlobalMatcher(const DisparityOptions& options, ThreadPool workers);
 
   /// Both images must have one size, and the range must not be empty. The result is valid until the next call.
   const RawDisparity& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
@@ -64,7 +64,7 @@ class SemiGlobalMatcher {
   std::uint8_t* slot(Pass& pass, int direction, int index) const;
 
   DisparityOptions options_;
-  Workers workers_;
+  ThreadPool workers_;
   sgm::Kernels kernels_;
   std::array<std::uint8_t, 256> p2_by_step_{};
 

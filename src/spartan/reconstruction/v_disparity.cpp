@@ -177,7 +177,7 @@ double GroundProfile::at(double range_m) const {
 
 std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, const RectifiedStereo& geometry,
                                               const GroundPlane& expected, const VDisparityOptions& options,
-                                              const Workers& workers) {
+                                              const ThreadPool& workers) {
   const auto plane = find_ground_plane(disparity, geometry, expected, options.plane);
   if (!plane) return std::nullopt;
   VDisparity result;
@@ -189,7 +189,7 @@ std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, 
   const int knots = knot_before(nearest, farthest) + 2, strips = options.strips;
   const double steepest = std::tan(options.max_slope_deg * std::numbers::pi / 180);
   std::vector<Histogram> histograms(static_cast<std::size_t>(strips), Histogram(knots));
-  workers.for_each_part(0, strips, 1, [&](int from, int to) {
+  workers.parallel_for(0, strips, 1, [&](int from, int to) {
     for (int strip = from; strip < to; ++strip) {
       Histogram& histogram = histograms[static_cast<std::size_t>(strip)];
       for (int y = 0; y < h; ++y) {
@@ -207,7 +207,7 @@ std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, 
   for (const Histogram& histogram : histograms) whole.add(histogram);
   const std::vector<int> prior_path = best_path(whole, {}, nearest, plane->height_m, steepest);
   result.profiles.resize(static_cast<std::size_t>(strips));
-  workers.for_each_part(0, strips, 1, [&](int from, int to) {
+  workers.parallel_for(0, strips, 1, [&](int from, int to) {
     for (int strip = from; strip < to; ++strip) {
       const Histogram& histogram = histograms[static_cast<std::size_t>(strip)];
       const std::vector<int> path = best_path(histogram, prior_path, nearest, plane->height_m, steepest);
@@ -215,7 +215,7 @@ std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, 
     }
   });
   result.classes = Image<std::uint8_t>(w, h);
-  workers.for_each_part(0, h, 16, [&](int from, int to) {
+  workers.parallel_for(0, h, 16, [&](int from, int to) {
     for (int y = from; y < to; ++y) {
       for (int x = 0; x < w; ++x) {
         const double d = disparity(x, y);

@@ -72,6 +72,6 @@ struct VDisparity {
 /// (1 − d₀/d) above the plane, h the height of the camera. Derivation: docs/math/stereo.md.
 std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, const RectifiedStereo& geometry,
                                               const GroundPlane& expected, const VDisparityOptions& options,
-                                              const Workers& workers);
+                                              const ThreadPool& workers);
 
 }  // namespace spartan

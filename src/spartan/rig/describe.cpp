@@ -117,9 +117,9 @@ void describe_pair(const Rig& rig, const StereoPair& pair, std::vector<std::stri
 
 }  // namespace
 
-std::vector<std::string> describe_doubts(const Rig& rig, const StereoPair& pair) {
+std::vector<std::string> describe_plausibility(const Rig& rig, const StereoPair& pair) {
   std::vector<std::string> lines;
-  for (const RigFinding& finding : find_doubts(rig, pair))
+  for (const RigFinding& finding : plausibility_findings(rig, pair))
     lines.push_back(fmt::format("pair {}: SUSPICIOUS ({}): {}", pair.name, finding.id, finding.text));
   return lines;
 }

@@ -30,7 +30,7 @@ PairSummary summarize_pair(const Rig& rig, const StereoPair& pair);
 /// camera relative to the left one, and range resolution at 0.5 … 20 m for 0.3 px of disparity (Δz = z² c / (f b)).
 std::vector<std::string> describe_rig(const Rig& rig);
 
-/// One line per finding of find_doubts(), what is implausible about a pair by its numbers alone.
-std::vector<std::string> describe_doubts(const Rig& rig, const StereoPair& pair);
+/// One line per finding of plausibility_findings(), what is implausible about a pair by its numbers alone.
+std::vector<std::string> describe_plausibility(const Rig& rig, const StereoPair& pair);
 
 }  // namespace spartan

@@ -69,14 +69,14 @@ TEST(Describe, RangeResolution) {
 
 TEST(Describe, CorrectPairsHaveNoFindings) {
   const Rig rig = rig_with(rotated(0.2, 0.5, 0.1, {0.12, 0.001, 0.002}));
-  EXPECT_THAT(describe_doubts(rig, rig.pairs[0]), IsEmpty());
+  EXPECT_THAT(describe_plausibility(rig, rig.pairs[0]), IsEmpty());
 }
 
 TEST(Describe, SuspiciousPairsAreReported) {
   const auto findings = [](const Pose& pose) {
     std::string text;
     const Rig rig = rig_with(pose);
-    for (const std::string& line : describe_doubts(rig, rig.pairs[0])) text += line;
+    for (const std::string& line : describe_plausibility(rig, rig.pairs[0])) text += line;
     return text;
   };
   EXPECT_THAT(findings(Pose::from_translation({-0.12, 0, 0})), HasSubstr("LEFT of the left one"));

@@ -30,7 +30,7 @@ class FaultFinder {
  public:
   explicit FaultFinder(const Rig& rig) : rig_(rig) {}
 
-  std::vector<RigFault> run() && {
+  std::vector<RigValidationError> run() && {
     check_names("pan_tilt_units", rig_.pan_tilt_units);
     check_names("cameras", rig_.cameras);
     check_names("pairs", rig_.pairs);
@@ -81,7 +81,7 @@ class FaultFinder {
 
   void check_model(const std::string& key, const CameraModel& model) {
     const std::size_t before = faults_.size();
-    const auto kinds = parameter_kinds(model);
+    const auto kinds = parameter_specs(model);
     const ModelParameters numbers = parameters(model);
     for (std::size_t i = 0; i < kinds.size(); ++i) {
       check_numbers(fmt::format("{}.{}", key, kinds[i].key), kinds[i], numbers[i]);
@@ -91,7 +91,7 @@ class FaultFinder {
     }
   }
 
-  void check_numbers(const std::string& key, const ModelParameterKind& kind, const std::vector<double>& numbers) {
+  void check_numbers(const std::string& key, const ModelParameterSpec& kind, const std::vector<double>& numbers) {
     for (const double v : numbers) {
       if (!std::isfinite(v)) return add(key, "must be finite");
       if (kind.positive && v <= 0) return add(key, fmt::format("holds {}, must be above zero", v));
@@ -154,7 +154,7 @@ class FaultFinder {
   }
 
   const Rig& rig_;
-  std::vector<RigFault> faults_;
+  std::vector<RigValidationError> faults_;
 };
 
 }  // namespace
@@ -206,16 +206,17 @@ Pose Rig::right_from_left(const StereoPair& pair) const {
   return body_from_camera(pair.right).inverse() * body_from_camera(pair.left);
 }
 
-std::vector<RigFault> Rig::find_faults() const {
+std::vector<RigValidationError> Rig::validation_errors() const {
   return FaultFinder(*this).run();
 }
 
 Status Rig::validate(const std::string& where) const {
-  const std::vector<RigFault> faults = find_faults();
+  const std::vector<RigValidationError> faults = validation_errors();
   if (faults.empty()) return {};
   std::vector<std::string> lines;
   lines.reserve(faults.size());
-  for (const RigFault& fault : faults) lines.push_back(fmt::format("{}: {}: {}", where, fault.key, fault.what));
+  for (const RigValidationError& fault : faults)
+    lines.push_back(fmt::format("{}: {}: {}", where, fault.key, fault.what));
   return failure(ErrorCode::configuration, fmt::format("{}", fmt::join(lines, "\n")));
 }
 

@@ -54,8 +54,8 @@ enum class PoseConvention {
   left_optical,  ///< first left optical frame from left optical frame (KITTI)
 };
 
-/// One error of a rig, as found by Rig::find_faults().
-struct RigFault {
+/// One error of a rig, as found by Rig::validation_errors().
+struct RigValidationError {
   std::string key;  ///< as in rig.yaml, "cameras.left.focal_px"
   std::string what;
 };
@@ -80,8 +80,8 @@ struct Rig {
 
   /// All errors: unknown or duplicate names, sizes and focal lengths that are not positive, values that are not finite,
   /// two cameras of a pair at one position or on different mounts, no pair.
-  std::vector<RigFault> find_faults() const;
-  /// All of find_faults() in one error (code `configuration`), one line each: "where: key: what".
+  std::vector<RigValidationError> validation_errors() const;
+  /// All of validation_errors() in one error (code `configuration`), one line each: "where: key: what".
   Status validate(const std::string& where) const;
   friend bool operator==(const Rig&, const Rig&) = default;
 };

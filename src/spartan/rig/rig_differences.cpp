@@ -8,7 +8,7 @@
 #include <map>
 
 #include "spartan/rig/describe.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {
 namespace {
@@ -143,17 +143,17 @@ class Comparison {
   }
 
   void compare_model(const std::string& key, const CameraModel& wanted, const CameraModel& result) {
-    CameraModel was = plainest(wanted);
-    const CameraModel is = plainest(result);
+    CameraModel was = simplest_equivalent(wanted);
+    const CameraModel is = simplest_equivalent(result);
     // A lost skew is reported as such, not as another camera model.
     if (skew_px(was) != 0 && skew_px(is) == 0) {
       add(key + ".skew_px", fmt::format("[{}], now none", skew_px(was)));
-      was = plainest(without_skew(was));
+      was = simplest_equivalent(without_skew(was));
     }
     if (name_of(was) != name_of(is)) {
       return add(key + ".model", fmt::format("the camera model: {}, now {}", name_of(was), name_of(is)));
     }
-    const auto kinds = parameter_kinds(was);
+    const auto kinds = parameter_specs(was);
     const ModelParameters a = parameters(was), b = parameters(is);
     for (std::size_t i = 0; i < kinds.size(); ++i) {
       if (agree(kinds[i], a[i], b[i], a.front())) continue;
@@ -163,7 +163,7 @@ class Comparison {
   }
 
   // Trailing zeros of a list may be omitted. Values in pixels are rounded in proportion to the focal length.
-  static bool agree(const ModelParameterKind& kind, std::vector<double> a, std::vector<double> b,
+  static bool agree(const ModelParameterSpec& kind, std::vector<double> a, std::vector<double> b,
                     const std::vector<double>& focal_px) {
     a.resize(std::max(a.size(), b.size()));
     b.resize(a.size());

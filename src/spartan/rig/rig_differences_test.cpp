@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "spartan/rig/formats/pair_of_files.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 #include "spartan/testing/camera_model_laws.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -147,7 +147,7 @@ TEST(ModelEquivalents, PlainestModelProjectsEqually) {
   const CahvModel cahv{kPinhole, 0}, skewed{kPinhole, 0.5};
   const struct {
     CameraModel given;
-    std::string_view plainest;
+    std::string_view simplest_equivalent;
   } known[] = {
       {RadialTangentialModel(kPinhole, {}), "pinhole"},
       {RadialTangentialModel(kPinhole, {0, 0, 0.001, 0}), "radial_tangential"},
@@ -169,7 +169,7 @@ TEST(ModelEquivalents, PlainestModelProjectsEqually) {
       {CahvoreModel(cahv, z, {0, -0.1, 0.02}, {}, 0.5), "cahvore"},
   };
   for (const auto& [given, name] : known) {
-    const CameraModel plain = plainest(given);
+    const CameraModel plain = simplest_equivalent(given);
     EXPECT_EQ(name_of(plain), name);
     for (const Eigen::Vector3d& p :
          {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0.3, -0.2, 0.7), Eigen::Vector3d(-1, 1, 5)}) {
@@ -182,11 +182,11 @@ TEST(ModelEquivalents, PlainestModelProjectsEqually) {
 
 template <class Model>
 void expect_expressed(const CameraModel& model) {
-  const auto other = expressed_as<Model>(model);
+  const auto other = converted_to<Model>(model);
   ASSERT_TRUE(other) << name_of(model) << " as " << Model::kName;
   const Eigen::Vector3d p(0.3, -0.2, 0.7);
   EXPECT_LE((*project(model, p) - *other->project(p)).norm(), 1e-10) << name_of(model) << " as " << Model::kName;
-  EXPECT_EQ(plainest(CameraModel(*other)), plainest(model));
+  EXPECT_EQ(simplest_equivalent(CameraModel(*other)), simplest_equivalent(model));
 }
 
 TEST(ModelEquivalents, EquivalentModels) {
@@ -200,11 +200,11 @@ TEST(ModelEquivalents, EquivalentModels) {
   expect_expressed<CahvoreModel>(two);
   expect_expressed<CahvoreModel>(EquidistantModel(kPinhole, {-0.1, 0.02, 0, 0}));
   expect_expressed<CahvoreModel>(CahvModel{kPinhole, 0.5});
-  EXPECT_FALSE(expressed_as<PinholeModel>(two));
-  EXPECT_FALSE(expressed_as<CahvorModel>(RadialTangentialModel(kPinhole, {-0.1, 0.02, 0.001, 0})));
-  EXPECT_FALSE(expressed_as<CahvoreModel>(EquidistantModel(kPinhole, {-0.1, 0.02, 0.01, 0})));
-  EXPECT_FALSE(expressed_as<RadialTangentialModel>(CahvModel{kPinhole, 0.5}));
-  EXPECT_FALSE(expressed_as<EquidistantModel>(kPinhole));
+  EXPECT_FALSE(converted_to<PinholeModel>(two));
+  EXPECT_FALSE(converted_to<CahvorModel>(RadialTangentialModel(kPinhole, {-0.1, 0.02, 0.001, 0})));
+  EXPECT_FALSE(converted_to<CahvoreModel>(EquidistantModel(kPinhole, {-0.1, 0.02, 0.01, 0})));
+  EXPECT_FALSE(converted_to<RadialTangentialModel>(CahvModel{kPinhole, 0.5}));
+  EXPECT_FALSE(converted_to<EquidistantModel>(kPinhole));
 }
 
 // --- pair_of_files.h ---
@@ -239,9 +239,11 @@ TEST(PairOfFiles, AmbiguousNamesAreAnError) {
     EXPECT_EQ(pair.error().code, ErrorCode::configuration);
     return pair.error().message();
   };
-  EXPECT_THAT(message_of("left_left.x"), HasSubstr("could be of the other eye (name both: LEFT,RIGHT)"));
-  EXPECT_THAT(message_of("alone.x"), HasSubstr("the file of the other eye is not known (name both: LEFT,RIGHT)"));
-  EXPECT_THAT(message_of("odd,name.x"), HasSubstr("the file of the other eye is not known"));
+  EXPECT_THAT(message_of("left_left.x"),
+              HasSubstr("could each be the file of the other camera (name both files: LEFT,RIGHT)"));
+  EXPECT_THAT(message_of("alone.x"),
+              HasSubstr("the file of the other camera is not found (name both files: LEFT,RIGHT)"));
+  EXPECT_THAT(message_of("odd,name.x"), HasSubstr("the file of the other camera is not found"));
   const auto named = rig_detail::find_pair_of_files("a.x,b.x");
   EXPECT_EQ(named->left, "a.x");
   EXPECT_EQ(named->right, "b.x");

@@ -191,7 +191,7 @@ std::optional<BaselineUnit> likely_unit(double baseline_m) {
   return std::nullopt;
 }
 
-std::vector<RigFinding> find_doubts(const Rig& rig, const StereoPair& pair, ImageSize image_size) {
+std::vector<RigFinding> plausibility_findings(const Rig& rig, const StereoPair& pair, ImageSize image_size) {
   std::vector<RigFinding> findings;
   const Pose left_from_right = rig.right_from_left(pair).inverse();
   const Eigen::Vector3d& t = left_from_right.translation();

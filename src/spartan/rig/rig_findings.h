@@ -24,7 +24,7 @@ struct RigFinding {
 /// - `eyes_apart`: cameras rotated relative to each other by more than 15°;
 /// - `size_mismatch`: principal point, field of view or fx/fy (more than 5 % apart) suggest another image size, or
 ///   `image_size` differs, where that is known. Reported once for two equal cameras.
-std::vector<RigFinding> find_doubts(const Rig& rig, const StereoPair& pair, ImageSize image_size = {});
+std::vector<RigFinding> plausibility_findings(const Rig& rig, const StereoPair& pair, ImageSize image_size = {});
 
 /// The unit that a baseline which was read as metres probably has.
 struct BaselineUnit {

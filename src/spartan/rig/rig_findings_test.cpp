@@ -25,7 +25,7 @@ Rig rig_with(const Pose& left_from_right, const CameraModel& right = kPinhole) {
   return rig_of_one_pair("front", one, other, left_from_right.inverse());
 }
 std::vector<RigFinding> findings_of(const Rig& rig, ImageSize image_size = {}) {
-  return find_doubts(rig, rig.pairs.front(), image_size);
+  return plausibility_findings(rig, rig.pairs.front(), image_size);
 }
 // Expects exactly one finding, with this value.
 void expect_finding(const Rig& rig, const std::string& id, double value) {

@@ -39,7 +39,7 @@ std::vector<std::string> faults_after(Change change) {
   Rig rig = rig_on_mast();
   change(rig);
   std::vector<std::string> keys;
-  for (const RigFault& fault : rig.find_faults()) keys.push_back(fault.key);
+  for (const RigValidationError& fault : rig.validation_errors()) keys.push_back(fault.key);
   return keys;
 }
 using Keys = std::vector<std::string>;

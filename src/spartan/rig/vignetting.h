@@ -18,10 +18,10 @@ struct Vignetting {
 
   /// Smallest relative illumination that is corrected; amplifying darker pixels (more than 8 times) yields mostly
   /// noise.
-  static constexpr double kLeast = 0.125;
+  static constexpr double kMinIllumination = 0.125;
 
   /// Relative illumination at ρ².
-  double light_at(double rho_squared) const {
+  double relative_illumination(double rho_squared) const {
     double sum = 0;
     for (std::size_t i = coefficients.size(); i-- > 0;) sum = (sum + coefficients[i]) * rho_squared;
     return 1 + sum;

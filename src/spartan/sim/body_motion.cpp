@@ -44,9 +44,9 @@ Vector6d fit_to_ground(const WheelGround& ground, const ChassisOptions& chassis,
 }
 
 BodyMotion::BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis,
-                       const Workers& workers)
+                       const ThreadPool& workers)
     : knots_(static_cast<std::size_t>(std::ceil(drive.seconds() / kKnot_s)) + 1) {
-  workers.for_each_part(0, static_cast<int>(knots_.size()), 256, [&](int from, int to) {
+  workers.parallel_for(0, static_cast<int>(knots_.size()), 256, [&](int from, int to) {
     for (int i = from; i < to; ++i)
       knots_[static_cast<std::size_t>(i)] = fit_to_ground(ground, chassis, drive.at(i * kKnot_s));
   });

@@ -27,7 +27,7 @@ class BodyMotion {
  public:
   static constexpr double kKnot_s = 0.1;  ///< s; spacing of the knots
   /// Borrows nothing: `ground` is used during construction only.
-  BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis, const Workers& workers);
+  BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis, const ThreadPool& workers);
 
   Pose world_from_body(double time_s) const;
   Eigen::Vector3d velocity(double time_s) const;          ///< m/s, world

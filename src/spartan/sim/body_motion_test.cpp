@@ -21,7 +21,7 @@ struct SimulatedDrive {
 SimulatedDrive simulate_drive(const PathOptions& path, const TerrainShapeOptions& terrain = {}) {
   auto drive = Drive::plan(path, {}, Rig());
   TerrainShape shape(terrain, 4);
-  BodyMotion motion(*drive, {shape, WheelLift()}, {}, Workers(1));
+  BodyMotion motion(*drive, {shape, WheelLift()}, {}, ThreadPool(1));
   return {std::move(*drive), shape, motion};
 }
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <set>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/sim/rock_field.h"
 #include "spartan/sim/scenario.h"
 
@@ -118,8 +118,8 @@ TEST(DriveCorridor, HasNoRocksAboveTheClearance) {
 
 TEST(NominalRig, HasTheErrorsOfItsOptions) {
   const Rig rig = rover();
-  EXPECT_EQ(believed_rig(rig, {}), rig);
-  const Rig off = believed_rig(rig, {.yaw_deg = 0.02, .row_offset_px = 0.3, .focal_percent = 0.1});
+  EXPECT_EQ(nominal_rig(rig, {}), rig);
+  const Rig off = nominal_rig(rig, {.yaw_deg = 0.02, .row_offset_px = 0.3, .focal_percent = 0.1});
   const StereoPair& pair = *rig.find_pair("narrow");
   EXPECT_NEAR(rotation_angle(off.right_from_left(pair)) * 180 / std::numbers::pi, 0.02, 1e-9);
   const auto& left = std::get<PinholeModel>(off.find_camera(pair.left)->model);

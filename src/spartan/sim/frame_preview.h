@@ -22,6 +22,6 @@ struct FramePreview {
   std::int64_t rays = 0;
 };
 /// Renders frame number `frame_index` of the request's drive without writing anything.
-FramePreview preview_left(const SimulationRequest& request, std::size_t frame_index, const Workers& workers);
+FramePreview preview_left(const SimulationRequest& request, std::size_t frame_index, const ThreadPool& workers);
 
 }  // namespace spartan::sim

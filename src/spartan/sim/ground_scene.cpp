@@ -70,18 +70,18 @@ struct GroundScene::State {
   std::size_t triangles = 0;
   unsigned rocks_id = RTC_INVALID_GEOMETRY_ID;
 
-  State(const TerrainShape& shape, const Region& requested, const Workers& workers);
+  State(const TerrainShape& shape, const Region& requested, const ThreadPool& workers);
   unsigned attach(RTCGeometry geometry) {
     rtcCommitGeometry(geometry);
     const unsigned id = rtcAttachGeometry(scene.get(), geometry);
     rtcReleaseGeometry(geometry);
     return id;
   }
-  void add_ground(const TerrainShape& shape, const GridPlan& plan, const Workers& workers);
-  void add_rocks(const TerrainShape& shape, const std::vector<Rock>& rocks, const Workers& workers);
+  void add_ground(const TerrainShape& shape, const GridPlan& plan, const ThreadPool& workers);
+  void add_rocks(const TerrainShape& shape, const std::vector<Rock>& rocks, const ThreadPool& workers);
 };
 
-void GroundScene::State::add_ground(const TerrainShape& shape, const GridPlan& plan, const Workers& workers) {
+void GroundScene::State::add_ground(const TerrainShape& shape, const GridPlan& plan, const ThreadPool& workers) {
   const Region r = snapped_to_lattice(plan.region, plan.step_m);
   if (!(r.x1 > r.x0) || !(r.y1 > r.y0)) return;
   const int nx = steps_of(r.x1 - r.x0, plan.step_m) + 1, ny = steps_of(r.y1 - r.y0, plan.step_m) + 1;
@@ -92,7 +92,7 @@ void GroundScene::State::add_ground(const TerrainShape& shape, const GridPlan& p
   auto* const grid = static_cast<RTCGrid*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID, sizeof(RTCGrid), 1));
   *grid = {0, static_cast<unsigned>(nx), static_cast<unsigned short>(nx), static_cast<unsigned short>(ny)};
-  workers.for_each_part(0, ny, 8, [&](int from, int to) {
+  workers.parallel_for(0, ny, 8, [&](int from, int to) {
     const auto n = static_cast<std::size_t>(nx);
     std::vector<double> x(n), y(n), z(n);
     for (int i = 0; i < nx; ++i) x[static_cast<std::size_t>(i)] = r.x0 + plan.step_m * i;
@@ -111,10 +111,11 @@ void GroundScene::State::add_ground(const TerrainShape& shape, const GridPlan& p
   attach(geometry);
 }
 
-void GroundScene::State::add_rocks(const TerrainShape& shape, const std::vector<Rock>& rocks, const Workers& workers) {
+void GroundScene::State::add_rocks(const TerrainShape& shape, const std::vector<Rock>& rocks,
+                                   const ThreadPool& workers) {
   if (rocks.empty()) return;
   std::vector<TriangleMesh> meshes(rocks.size());
-  workers.for_each_part(0, static_cast<int>(rocks.size()), 64, [&](int from, int to) {
+  workers.parallel_for(0, static_cast<int>(rocks.size()), 64, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       const Rock& rock = rocks[static_cast<std::size_t>(i)];
       TriangleMesh& mesh = meshes[static_cast<std::size_t>(i)];
@@ -146,7 +147,7 @@ void GroundScene::State::add_rocks(const TerrainShape& shape, const std::vector<
   rocks_id = attach(geometry);
 }
 
-GroundScene::State::State(const TerrainShape& shape, const Region& requested, const Workers& workers)
+GroundScene::State::State(const TerrainShape& shape, const Region& requested, const ThreadPool& workers)
     : region(snapped_to_lattice(requested, kGrid_m)) {
   const double cx = 0.5 * (requested.x0 + requested.x1), cy = 0.5 * (requested.y0 + requested.y1);
   origin = {cx, cy, shape.height(cx, cy)};
@@ -161,7 +162,7 @@ GroundScene::State::State(const TerrainShape& shape, const Region& requested, co
 GroundScene::GroundScene(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 GroundScene::GroundScene(const TerrainShape& shape, const RockField& rocks, const Region& region,
-                         const Workers& workers)
+                         const ThreadPool& workers)
     : state_(std::make_unique<State>(shape, region, workers)) {
   State& s = *state_;
   s.add_ground(shape, {s.region, kGrid_m, 0}, workers);
@@ -182,7 +183,7 @@ GroundScene::GroundScene(const TerrainShape& shape, const RockField& rocks, cons
 }
 
 GroundScene GroundScene::rocks_only(const TerrainShape& shape, const RockField& rocks, const Region& region,
-                                    const Workers& workers) {
+                                    const ThreadPool& workers) {
   auto state = std::make_unique<State>(shape, region.grown(2), workers);
   state->add_rocks(shape, rocks.rocks_in(region.grown(2), RockField::kLargestPebble_m), workers);
   rtcCommitScene(state->scene.get());

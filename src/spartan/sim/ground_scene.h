@@ -51,10 +51,10 @@ class GroundScene {
   static constexpr double kHorizon_m = 120;  ///< m; extent of the ground around the region
 
   /// Throws std::runtime_error where Embree does not start (no AVX2).
-  GroundScene(const TerrainShape& shape, const RockField& rocks, const Region& region, const Workers& workers);
+  GroundScene(const TerrainShape& shape, const RockField& rocks, const Region& region, const ThreadPool& workers);
   /// The rocks alone, without ground and pebbles: all in the region and those that reach into it.
   static GroundScene rocks_only(const TerrainShape& shape, const RockField& rocks, const Region& region,
-                                const Workers& workers);
+                                const ThreadPool& workers);
   GroundScene(GroundScene&&) noexcept;
   GroundScene& operator=(GroundScene&&) noexcept;
   ~GroundScene();

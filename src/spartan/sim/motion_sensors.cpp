@@ -5,8 +5,8 @@
 #include <numbers>
 #include <optional>
 
+#include "spartan/core/gradient_noise.h"
 #include "spartan/core/random.h"
-#include "spartan/core/smooth_noise.h"
 
 namespace spartan::sim {
 namespace {

@@ -37,7 +37,7 @@ HWY_INLINE V fade(D d, V t) {
   return hn::Mul(hn::Mul(hn::Mul(t, t), t), inner);
 }
 
-// mix() of core: hash of two lattice coordinates, multiplied by their primes, and the seed.
+// hash_coordinates() of core: hash of two lattice coordinates, multiplied by their primes, and the seed.
 template <class DU, class VU>
 HWY_INLINE VU mixed(DU du, VU x, VU y, VU seed) {
   VU h = hn::Xor(hn::Xor(x, y), seed);

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "spartan/core/smooth_noise.h"
+#include "spartan/core/gradient_noise.h"
 
 namespace spartan::sim {
 

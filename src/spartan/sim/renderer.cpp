@@ -214,12 +214,12 @@ void fill_every_other(Image<float>& fine) {
   }
 }
 
-Image<float> Renderer::filtered(const Image<float>& fine, const Workers& workers) const {
+Image<float> Renderer::filtered(const Image<float>& fine, const ThreadPool& workers) const {
   const std::vector<float> weights = point_spread(sampling_.side);
   const int taps = static_cast<int>(weights.size()), side = sampling_.side;
   const auto [w, h] = camera_.size;
   Image<float> upright(width_, h), result(w, h);
-  workers.for_each_part(0, h, 16, [&](int from, int to) {
+  workers.parallel_for(0, h, 16, [&](int from, int to) {
     for (int y = from; y < to; ++y) {
       float* const row = upright.row(y);
       std::fill_n(row, width_, 0.0F);
@@ -239,11 +239,11 @@ Image<float> Renderer::filtered(const Image<float>& fine, const Workers& workers
 }
 
 LuminanceImage Renderer::render(const LitScene& scene, const Poses& world_from_camera, bool split_materials,
-                                const Workers& workers) const {
+                                const ThreadPool& workers) const {
   const std::size_t planes = split_materials ? kMaterials : 1;
   std::array<Image<float>, kMaterials> fine;
   for (std::size_t m = 0; m < planes; ++m) fine[m] = Image<float>(width_, height_);
-  workers.for_each_part(0, height_, 8, [&](int from, int to) {
+  workers.parallel_for(0, height_, 8, [&](int from, int to) {
     for (int row = from; row < to; ++row) {
       Row out;
       out.split = split_materials;
@@ -279,13 +279,13 @@ double Renderer::mean_luminance(const LitScene& scene, const Pose& world_from_ca
 }
 
 Image<float> render_depth(const Camera& camera, const GroundScene& scene, const Pose& world_from_camera,
-                          const Workers& workers) {
+                          const ThreadPool& workers) {
   const auto [w, h] = camera.size;
   const Eigen::Matrix3f rotation = world_from_camera.rotation().toRotationMatrix().cast<float>();
   const Eigen::Vector3d from_origin = world_from_camera.translation() - scene.origin();
   const Eigen::Vector3f centre = from_origin.cast<float>();
   Image<float> result(w, h, std::numeric_limits<float>::quiet_NaN());
-  workers.for_each_part(0, h, 8, [&](int from, int to) {
+  workers.parallel_for(0, h, 8, [&](int from, int to) {
     for (int y = from; y < to; ++y) {
       for (int first = 0; first < w; first += kPacket) {
         RayPacket rays;

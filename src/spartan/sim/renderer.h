@@ -62,7 +62,7 @@ class Renderer {
   /// All are equal where the camera is stationary.
   using Poses = std::array<Pose, kTimes>;
   LuminanceImage render(const LitScene& scene, const Poses& world_from_camera, bool split_materials,
-                        const Workers& workers) const;
+                        const ThreadPool& workers) const;
   /// Mean luminance over every `step`-th row, as an exposure meter measures it.
   double mean_luminance(const LitScene& scene, const Pose& world_from_camera, int step) const;
 
@@ -73,7 +73,7 @@ class Renderer {
  private:
   struct Row;
   void shade_row(const LitScene& s, std::span<const Pose> poses, int row, Row& out) const;
-  Image<float> filtered(const Image<float>& fine, const Workers& workers) const;
+  Image<float> filtered(const Image<float>& fine, const ThreadPool& workers) const;
 
   Camera camera_;
   Sampling sampling_;
@@ -85,6 +85,6 @@ class Renderer {
 
 /// Depth along the optical axis at pixel centres in metres; NaN for the sky.
 Image<float> render_depth(const Camera& camera, const GroundScene& scene, const Pose& world_from_camera,
-                          const Workers& workers);
+                          const ThreadPool& workers);
 
 }  // namespace spartan::sim

@@ -43,7 +43,7 @@ TerrainShapeOptions flat() {
 
 // OpenCV projects the point where a pixel's ray hits the ground back to that pixel.
 TEST(Renderer, HitPointsProjectToTheirPixelsWithOpenCv) {
-  const Workers workers(2);
+  const ThreadPool workers(2);
   const TerrainShape shape({}, 3);
   const RockField rocks({.coverage = 0.1}, 3);
   const GroundScene scene(shape, rocks, {-1, -2, 4, 2}, workers);
@@ -92,7 +92,7 @@ struct Edge {
 };
 
 Edge edge_of_horizon(double roll_deg) {
-  const Workers workers(2);
+  const ThreadPool workers(2);
   const TerrainShape shape(flat(), 1);
   const RockField none({.coverage = 0, .pebbles_per_m2 = 0}, 1);
   const GroundScene scene(shape, none, {-1, -1, 1, 1}, workers);
@@ -180,7 +180,7 @@ double sampled(const FrameImage& image, double x, int y) {
 
 // The right image warped by the true disparity equals the left one, except for the noise of both.
 TEST(TrueDisparity, WarpsRightOntoLeft) {
-  const Workers workers(2);
+  const ThreadPool workers(2);
   const TerrainShape shape({}, 3);
   const RockField rocks({.coverage = 0.1}, 3);
   const GroundScene scene(shape, rocks, {-0.5, -1.5, 3, 1.5}, workers);
@@ -286,7 +286,7 @@ class BruteForce {
 };
 
 TEST(Renderer, AgreesWithABruteForceReference) {
-  const Workers workers(2);
+  const ThreadPool workers(2);
   const TerrainShape shape({}, 8);
   RockFieldOptions pebbly;
   pebbly.coverage = 0.2;
@@ -367,7 +367,7 @@ TEST(Renderer, IsBitIdenticalForAnyNumberOfThreads) {
   const Camera camera = pinhole(160, 120, 120);
   std::vector<Image<float>> images;
   for (const int threads : {1, 2}) {
-    const Workers workers(threads);
+    const ThreadPool workers(threads);
     const GroundScene scene(shape, rocks, {-0.5, -1, 2, 1}, workers);
     const SkyLight sky(scene, shape, workers);
     const Sun sun({});
@@ -383,7 +383,7 @@ TEST(Renderer, IsBitIdenticalForAnyNumberOfThreads) {
 }
 
 TEST(GroundScene, OverlappingScenesAgree) {
-  const Workers workers(2);
+  const ThreadPool workers(2);
   const TerrainShape shape({}, 3);
   const RockField rocks({.coverage = 0.1}, 3);
   const GroundScene a(shape, rocks, {-1, -1, 2, 1}, workers), b(shape, rocks, {0.333, -1.2, 3.1, 1.5}, workers);

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "spartan/core/gradient_noise.h"
 #include "spartan/core/random.h"
-#include "spartan/core/smooth_noise.h"
 
 namespace spartan::sim {
 namespace {
@@ -111,7 +111,9 @@ bool RockField::blocks_corridor(const Rock& rock) const {
 }
 
 void RockField::append_cell(const Stratum& stratum, std::int32_t i, std::int32_t j, std::vector<Rock>& rocks) const {
-  Random random(seed_ ^ (static_cast<std::uint64_t>(mix(i, j, 0x524F434BU)) << 32U | mix(j, i, 0x53U)), stratum.stream);
+  Random random(
+      seed_ ^ (static_cast<std::uint64_t>(hash_coordinates(i, j, 0x524F434BU)) << 32U | hash_coordinates(j, i, 0x53U)),
+      stratum.stream);
   const int count = poisson(stratum.count_per_m2 * kCell_m * kCell_m, random);
   for (int k = 0; k < count; ++k) {
     Rock rock;

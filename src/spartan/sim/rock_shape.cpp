@@ -5,8 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "spartan/core/gradient_noise.h"
 #include "spartan/core/random.h"
-#include "spartan/core/smooth_noise.h"
 #include "spartan/sim/noise_sum.h"
 
 namespace spartan::sim {

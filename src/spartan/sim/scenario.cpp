@@ -20,7 +20,7 @@ class KeyErrors {
  public:
   KeyErrors(const std::string& text, const std::string& name) : text_(text), name_(name) {}
   void add(const std::string& key, const std::string& what) {
-    lines_ += (lines_.empty() ? "" : "\n") + place_of_option(text_, name_, key) + ": " + what;
+    lines_ += (lines_.empty() ? "" : "\n") + option_location(text_, name_, key) + ": " + what;
   }
   Status status() const { return lines_.empty() ? Status{} : Status(failure(ErrorCode::configuration, lines_)); }
 
@@ -76,7 +76,7 @@ Result<Drive> plan_drive(const Scenario& scenario, const Rig& rig, const std::st
   if (!drive) {
     const std::string key =
         drive.error().where.find('.') == std::string::npos ? "path." + drive.error().where : drive.error().where;
-    return failure(ErrorCode::configuration, drive.error().what, place_of_option(text, name, key));
+    return failure(ErrorCode::configuration, drive.error().what, option_location(text, name, key));
   }
   const double limit = scenario.extent_m / 2 - kEdge_m;
   for (const PlanarPose& at : drive->track()) {
@@ -97,7 +97,7 @@ namespace {
 // The model with its focal lengths scaled and its principal point moved, where it has such parameters.
 CameraModel with_errors(const CameraModel& model, double focal_factor, double row_offset_px) {
   ModelParameters values = parameters(model);
-  const std::vector<ModelParameterKind> kinds = parameter_kinds(model);
+  const std::vector<ModelParameterSpec> kinds = parameter_specs(model);
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     if (kinds[i].key == "focal_px") {
       for (double& f : values[i]) f *= focal_factor;
@@ -109,7 +109,7 @@ CameraModel with_errors(const CameraModel& model, double focal_factor, double ro
 
 }  // namespace
 
-Rig believed_rig(const Rig& true_rig, const NominalRigOptions& options) {
+Rig nominal_rig(const Rig& true_rig, const NominalRigOptions& options) {
   Rig rig = true_rig;
   for (const StereoPair& pair : true_rig.pairs) {
     for (Camera& camera : rig.cameras) {

@@ -21,7 +21,7 @@ struct Scenario {
   std::string rig = "rover_square";  ///< a shipped rig's name, or a file beside the scenario
   double gravity_m_s2 = 3.71;        ///< m/s²
   double extent_m = 240;             ///< m; side of the square of terrain around the start
-  NominalRigOptions believed;
+  NominalRigOptions nominal_rig;
   TerrainShapeOptions terrain;
   RockFieldOptions rocks;
   SoilOptions soil;
@@ -51,7 +51,7 @@ struct Scenario {
     v.field("gravity_m_s2", gravity_m_s2, "Gravity in metres per second squared (Mars: 3.71).", between(0.1, 30));
     v.field("extent_m", extent_m, "Side in metres of the square of terrain around the start.", between(20, 20000));
     v.renamed("believed", "nominal_rig");
-    v.group("nominal_rig", believed);
+    v.group("nominal_rig", nominal_rig);
     v.group("terrain", terrain);
     v.group("rocks", rocks);
     v.group("soil", soil);
@@ -79,6 +79,6 @@ Result<Scenario> parse_scenario(const std::string& text, const std::string& name
 Result<Drive> plan_drive(const Scenario& scenario, const Rig& rig, const std::string& text, const std::string& name);
 
 /// The nominal rig that the recording states: the true one with the errors of the options.
-Rig believed_rig(const Rig& true_rig, const NominalRigOptions& options);
+Rig nominal_rig(const Rig& true_rig, const NominalRigOptions& options);
 
 }  // namespace spartan::sim

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "spartan/core/files.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/doc_example.h"
 
 namespace spartan::sim {

@@ -121,14 +121,14 @@ Image<float> Sensor::electrons(const LuminanceImage& image, const Exposure& expo
 }
 
 FrameImage Sensor::expose(const LuminanceImage& luminance, const Exposure& exposure, const ImageFault& fault,
-                          std::uint64_t seed, const Workers& workers) const {
+                          std::uint64_t seed, const ThreadPool& workers) const {
   const Image<float> signal = electrons(luminance, exposure, fault);
   const PixelFormat& format = camera_.pixel_format;
   const double full = (1 << format.bits) - 1, black = options_.black_level * full;
   const int shift = format.bits > 8 && format.alignment == BitAlignment::high ? 16 - format.bits : 0;
   const double levels = levels_per_electron(exposure), read_variance = options_.read_noise_e * options_.read_noise_e;
   const auto develop = [&]<class Pixel>(Image<Pixel> image) {
-    workers.for_each_part(0, image.height(), 16, [&](int from, int to) {
+    workers.parallel_for(0, image.height(), 16, [&](int from, int to) {
       for (int y = from; y < to; ++y) {
         Random random(seed, static_cast<std::uint64_t>(y));
         for (int x = 0; x < image.width(); ++x) {

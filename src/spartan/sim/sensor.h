@@ -42,7 +42,7 @@ class Sensor {
   /// The image in the camera's pixel format: signal, shot noise, read noise, full well, gain, quantization.
   /// The noise depends on seed and pixel alone.
   FrameImage expose(const LuminanceImage& luminance, const Exposure& exposure, const ImageFault& fault,
-                    std::uint64_t seed, const Workers& workers) const;
+                    std::uint64_t seed, const ThreadPool& workers) const;
   /// The same without noise and quantization: gray levels above black, for measurements.
   Image<float> noise_free(const LuminanceImage& luminance, const Exposure& exposure) const;
 

@@ -76,7 +76,7 @@ TEST(Sensor, AutoExposureRaisesTheTimeBeforeTheGain) {
   EXPECT_EQ(dark.gain, sensor.largest_gain);
   const Camera camera = camera_of(64, 64);
   const Sensor detector({.vignetting = 0}, camera);
-  const auto image = detector.expose(uniform(camera, 4000), bright, {}, 1, Workers(1));
+  const auto image = detector.expose(uniform(camera, 4000), bright, {}, 1, ThreadPool(1));
   EXPECT_NEAR(moments(image).mean, 255 * (1.0 / 64 + 0.45 * (1 - 1.0 / 64)), 0.5);
 }
 
@@ -91,7 +91,7 @@ TEST(Sensor, PhotonTransferGivesTheGain) {
     const Exposure exposure{0.002, gain};
     for (const float luminance : {20.0F, 60.0F, 120.0F, 200.0F}) {
       const Moments m = moments(detector.expose(uniform(camera, luminance / static_cast<float>(gain)), exposure, {},
-                                                static_cast<std::uint64_t>(luminance), Workers(2)));
+                                                static_cast<std::uint64_t>(luminance), ThreadPool(2)));
       means.push_back(m.mean);
       variances.push_back(m.variance);
     }
@@ -119,9 +119,9 @@ TEST(Sensor, NoiseDependsOnTheSeedAndNotOnTheNumberOfThreads) {
   const Camera camera = camera_of(64, 48);
   const Sensor detector({}, camera);
   const Exposure exposure{0.001, 1};
-  const auto one = detector.expose(uniform(camera, 800), exposure, {}, 5, Workers(1)),
-             two = detector.expose(uniform(camera, 800), exposure, {}, 5, Workers(2));
-  const auto other = detector.expose(uniform(camera, 800), exposure, {}, 6, Workers(2));
+  const auto one = detector.expose(uniform(camera, 800), exposure, {}, 5, ThreadPool(1)),
+             two = detector.expose(uniform(camera, 800), exposure, {}, 5, ThreadPool(2));
+  const auto other = detector.expose(uniform(camera, 800), exposure, {}, 6, ThreadPool(2));
   int same = 0;
   for (int y = 0; y < 48; ++y) {
     for (int x = 0; x < 64; ++x) {
@@ -136,7 +136,7 @@ TEST(Sensor, FaultsChangeTheImage) {
   const Camera camera = camera_of(200, 200);
   const Sensor detector({.vignetting = 0}, camera);
   const Exposure exposure = choose_exposure({}, 800);
-  const Workers workers(1);
+  const ThreadPool workers(1);
   EXPECT_LT(moments(detector.expose(uniform(camera, 800), exposure, {.light_factor = 0.002}, 1, workers)).mean, 6);
   EXPECT_GT(moments(detector.expose(uniform(camera, 800), exposure, {.light_factor = 8}, 1, workers)).mean, 252);
   const Moments clean = moments(detector.expose(uniform(camera, 800), exposure, {}, 1, workers));
@@ -161,7 +161,7 @@ TEST(Sensor, BayerPixelsHaveTheirColour) {
     luminance_image.split = true;
     for (auto& plane : luminance_image.by_material) plane = Image<float>(64, 64, 0.0F);
     luminance_image.by_material[0] = Image<float>(64, 64, 300.0F);
-    const auto image = detector.expose(luminance_image, {0.001, 1}, {}, 1, Workers(1));
+    const auto image = detector.expose(luminance_image, {0.001, 1}, {}, 1, ThreadPool(1));
     EXPECT_EQ(image.format().layout, layout);
     EXPECT_EQ(image.format().bits, 12);
     double red = 0, green = 0, blue = 0;

@@ -58,7 +58,7 @@ void add_footprint(Region& region, const Camera& camera, const Pose& world_from_
   }
 }
 
-Status write_maps(const SimulationRequest& request, const World& world, const Workers& workers) {
+Status write_maps(const SimulationRequest& request, const World& world, const ThreadPool& workers) {
   const std::string folder = request.folder + "/truth";
   const Region region = bounds_of(request.drive.track()).grown(kMapMargin_m);
   std::string rocks = "x_m,y_m,diameter_m,height_m\n";
@@ -68,7 +68,7 @@ Status write_maps(const SimulationRequest& request, const World& world, const Wo
 
   const TruthOptions& truth = request.scenario.truth;
   const GroundMap map = map_ground(world.shape, world.rocks, region, truth.cell_m, workers);
-  const MapPlace place{map.west_m, map.north_m, map.cell_m};
+  const GeoTransform place{map.west_m, map.north_m, map.cell_m};
   if (Status s = write_geotiff(folder + "/elevation.tif", place,
                                {{"elevation_m", map.surface.view()}, {"ground_m", map.ground.view()}});
       !s)
@@ -92,14 +92,14 @@ struct PairRenderer {
 
 class Simulation {
  public:
-  Simulation(const SimulationRequest& request, const SimulationHooks& hooks, const Workers& workers)
+  Simulation(const SimulationRequest& request, const SimulationHooks& hooks, const ThreadPool& workers)
       : request_(request),
         hooks_(hooks),
         workers_(workers),
         scenario_(request.scenario),
         world_(make_world(request.scenario, request.drive)),
         motion_(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers),
-        nominal_(believed_rig(request.rig, request.scenario.believed)) {}
+        nominal_(nominal_rig(request.rig, request.scenario.nominal_rig)) {}
 
   Result<SimulationReport> run() {
     const RecordingOptions about{scenario_.name, scenario_.description, scenario_.gravity_m_s2,
@@ -233,7 +233,7 @@ class Simulation {
       const PlannedFrame& planned = request_.drive.frames()[i];
       const FrameFaultState fault = fault_at(i);
       if (!fault.dropped) {
-        const auto kept = writer.take_over(planned.pair, left_stamp(i, fault));
+        const auto kept = writer.reuse_frame(planned.pair, left_stamp(i, fault));
         if (!kept) return failure(kept);
         if (!*kept) {
           if (!scene) {
@@ -327,7 +327,7 @@ class Simulation {
 
   const SimulationRequest& request_;
   const SimulationHooks& hooks_;
-  const Workers& workers_;
+  const ThreadPool& workers_;
   const Scenario& scenario_;
   World world_;
   BodyMotion motion_;
@@ -339,13 +339,13 @@ class Simulation {
 
 }  // namespace
 
-FramePreview preview_left(const SimulationRequest& request, std::size_t frame_index, const Workers& workers) {
+FramePreview preview_left(const SimulationRequest& request, std::size_t frame_index, const ThreadPool& workers) {
   const SimulationHooks hooks;
   return Simulation(request, hooks, workers).preview_left(frame_index);
 }
 
 Result<SimulationReport> simulate(const SimulationRequest& request, const SimulationHooks& hooks,
-                                  const Workers& workers) {
+                                  const ThreadPool& workers) {
   return Simulation(request, hooks, workers).run();
 }
 

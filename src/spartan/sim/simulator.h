@@ -27,7 +27,7 @@ struct SimulationRequest {
 };
 
 struct SimulationProgress {
-  int done = 0, shots = 0;  ///< frames done, and all frames
+  int done = 0, frames = 0;  ///< frames done, and all frames
 };
 
 struct SimulationHooks {
@@ -45,6 +45,6 @@ struct SimulationReport {
 /// Renders frame by frame; with `resume`, frames that are complete already are kept. Errors: `output` (the folder
 /// cannot be written, or holds something else), `configuration` (the folder holds another scenario).
 Result<SimulationReport> simulate(const SimulationRequest& request, const SimulationHooks& hooks,
-                                  const Workers& workers);
+                                  const ThreadPool& workers);
 
 }  // namespace spartan::sim

@@ -27,7 +27,7 @@ struct HeightGrid {
 };
 
 // The scene from above by vertical rays, the mean of kSide² samples per cell.
-HeightGrid rasterize_heights(const GroundScene& scene, const Region& region, double step, const Workers& workers) {
+HeightGrid rasterize_heights(const GroundScene& scene, const Region& region, double step, const ThreadPool& workers) {
   HeightGrid grid{region.x0, region.y0, step,
                   Image<float>(static_cast<int>((region.x1 - region.x0) / step) + 2,
                                static_cast<int>((region.y1 - region.y0) / step) + 2)};
@@ -35,7 +35,7 @@ HeightGrid rasterize_heights(const GroundScene& scene, const Region& region, dou
   grid.tops = Image<float>(nx, ny);
   static_assert(kPacket % (kSide * kSide) == 0);
   constexpr int kCells = kPacket / (kSide * kSide);
-  workers.for_each_part(0, ny, 16, [&](int from, int to) {
+  workers.parallel_for(0, ny, 16, [&](int from, int to) {
     for (int j = from; j < to; ++j) {
       for (int first = 0; first < nx; first += kCells) {
         RayPacket rays;
@@ -64,11 +64,11 @@ HeightGrid rasterize_heights(const GroundScene& scene, const Region& region, dou
 }
 
 HeightGrid rasterize_terrain(const TerrainShape& shape, const GroundScene& scene, const Region& region,
-                             const Workers& workers) {
+                             const ThreadPool& workers) {
   HeightGrid grid{region.x0, region.y0, kFarStep_m,
                   Image<float>(static_cast<int>((region.x1 - region.x0) / kFarStep_m) + 2,
                                static_cast<int>((region.y1 - region.y0) / kFarStep_m) + 2)};
-  workers.for_each_part(0, grid.heights.height(), 4, [&](int from, int to) {
+  workers.parallel_for(0, grid.heights.height(), 4, [&](int from, int to) {
     for (int j = from; j < to; ++j) {
       for (int i = 0; i < grid.heights.width(); ++i) {
         grid.heights(i, j) =
@@ -94,12 +94,12 @@ class HorizonSweep {
     minor_ = along_x_ ? grid.heights.height() : grid.heights.width();
   }
 
-  Image<float> slopes(const Workers& workers) const {
+  Image<float> slopes(const ThreadPool& workers) const {
     Image<float> result(grid_.heights.width(), grid_.heights.height(), 0.0F);
     const double total = drift_ * (major_ - 1);
     const int first = static_cast<int>(std::floor(std::min(0.0, -total))) - 1;
     const int last = minor_ + static_cast<int>(std::ceil(std::max(0.0, -total))) + 1;
-    workers.for_each_part(first, last, 64, [&](int from, int to) {
+    workers.parallel_for(first, last, 64, [&](int from, int to) {
       std::vector<Point> hull;
       for (int line = from; line < to; ++line) sweep_line(line, hull, result);
     });
@@ -175,7 +175,7 @@ double sky_irradiance(double azimuth_cos, double azimuth_sin, double slope, cons
 
 }  // namespace
 
-SkyLight::SkyLight(const GroundScene& scene, const TerrainShape& shape, const Workers& workers)
+SkyLight::SkyLight(const GroundScene& scene, const TerrainShape& shape, const ThreadPool& workers)
     : region_(scene.region().grown(kMargin_m)) {
   HeightGrid near = rasterize_heights(scene, region_, kStep_m, workers);
   const HeightGrid far = rasterize_terrain(shape, scene, scene.region().grown(kFar_m), workers);
@@ -185,7 +185,7 @@ SkyLight::SkyLight(const GroundScene& scene, const TerrainShape& shape, const Wo
     const double azimuth = 2 * std::numbers::pi * (k + 0.5) / kAzimuths, c = std::cos(azimuth), s = std::sin(azimuth);
     const Image<float> near_slopes = HorizonSweep(near, azimuth).slopes(workers);
     const Image<float> far_slopes = HorizonSweep(far, azimuth).slopes(workers);
-    workers.for_each_part(0, ny, 16, [&](int from, int to) {
+    workers.parallel_for(0, ny, 16, [&](int from, int to) {
       for (int j = from; j < to; ++j) {
         const double v = (near.y0 + j * kStep_m - far.y0) / kFarStep_m;
         for (int i = 0; i < nx; ++i) {
@@ -197,7 +197,7 @@ SkyLight::SkyLight(const GroundScene& scene, const TerrainShape& shape, const Wo
       }
     });
   }
-  workers.for_each_part(0, ny, 16, [&](int from, int to) {
+  workers.parallel_for(0, ny, 16, [&](int from, int to) {
     for (int j = from; j < to; ++j) {
       for (int i = 0; i < nx; ++i)
         relative_view_factor_(i, j) /= static_cast<float>(0.5 * (1 + normal_at(near, i, j).z()));

@@ -23,7 +23,7 @@ class SkyLight {
  public:
   static constexpr double kStep_m = 0.01;
   static constexpr int kAzimuths = 16;
-  SkyLight(const GroundScene& scene, const TerrainShape& shape, const Workers& workers);
+  SkyLight(const GroundScene& scene, const TerrainShape& shape, const ThreadPool& workers);
 
   /// At a point in the world (interpolated between grid points of its height) on a facet whose normal has this z
   /// component; outside the region that of an open plane.

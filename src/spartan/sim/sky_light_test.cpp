@@ -80,7 +80,7 @@ Errors compare(const GroundScene& scene, const SkyLight& sky, bool rocks) {
 // scenes; with sky light alone, at 200 lux, all noise is 2.0 %. The largest errors are at the feet of pebbles, within
 // half a centimetre.
 TEST(SkyLight, ErrorIsBelowTheSensorNoise) {
-  const Workers workers(2);
+  const ThreadPool workers(2);
   const TerrainShape shape({}, 5);
   const RockField rocks({.coverage = 0.2}, 5);
   const GroundScene scene(shape, rocks, {-3, -3, 3, 3}, workers);

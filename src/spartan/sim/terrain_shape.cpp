@@ -92,12 +92,12 @@ double TerrainShape::cavity_depth(double x, double y) const {
   const double cell = std::max(std::sqrt(50.0 / options_.cavities_per_100m2), 2.2 * options_.cavity_diameter_m);
   const double probability = options_.cavities_per_100m2 / 100 * cell * cell;
   const auto ix = static_cast<std::int32_t>(std::floor(x / cell)), iy = static_cast<std::int32_t>(std::floor(y / cell));
-  if (unit_of(mix(ix, iy, seed_)) >= probability) return 0;
-  const double size = 0.5 + 0.5 * unit_of(mix(ix, iy, seed_ + 1));
+  if (unit_of(hash_coordinates(ix, iy, seed_)) >= probability) return 0;
+  const double size = 0.5 + 0.5 * unit_of(hash_coordinates(ix, iy, seed_ + 1));
   const double radius = 0.5 * size * options_.cavity_diameter_m;
   const double max_offset = 0.5 * cell - 1.05 * radius;
-  const double cx = (ix + 0.5) * cell + max_offset * (2 * unit_of(mix(ix, iy, seed_ + 2)) - 1);
-  const double cy = (iy + 0.5) * cell + max_offset * (2 * unit_of(mix(ix, iy, seed_ + 3)) - 1);
+  const double cx = (ix + 0.5) * cell + max_offset * (2 * unit_of(hash_coordinates(ix, iy, seed_ + 2)) - 1);
+  const double cy = (iy + 0.5) * cell + max_offset * (2 * unit_of(hash_coordinates(ix, iy, seed_ + 3)) - 1);
   const double distance = std::hypot(x - cx, y - cy) / radius;
   return distance >= 1 ? 0 : size * options_.cavity_depth_m * smooth_step((1 - distance) / kWallFraction);
 }

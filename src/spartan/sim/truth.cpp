@@ -21,14 +21,14 @@ bool is_inside(const Eigen::Vector2d& pixel, ImageSize size) {
 
 }  // namespace
 
-DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& believed_rig, const StereoPair& pair,
+DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, const StereoPair& pair,
                                const RectifiedView& view)
     : view_(view),
       true_right_(*true_rig.find_camera(pair.right)),
-      nominal_right_(*believed_rig.find_camera(pair.right)),
+      nominal_right_(*nominal_rig.find_camera(pair.right)),
       right_from_left_(true_rig.right_from_left(pair)) {
   const Camera& true_left = *true_rig.find_camera(pair.left);
-  const Camera& nominal_left = *believed_rig.find_camera(pair.left);
+  const Camera& nominal_left = *nominal_rig.find_camera(pair.left);
   const auto [w, h] = view.geometry.size;
   directions_.assign(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), Eigen::Vector3f(0, 0, 0));
   for (int v = 0; v < h; ++v) {
@@ -95,10 +95,11 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
   }
 }
 
-TrueDisparity DisparityTruth::of(const GroundScene& scene, const Pose& world_from_left, const Workers& workers) const {
+TrueDisparity DisparityTruth::of(const GroundScene& scene, const Pose& world_from_left,
+                                 const ThreadPool& workers) const {
   const auto [w, h] = view_.geometry.size;
   TrueDisparity truth{Image<float>(w, h), Image<std::uint8_t>(w, h)};
-  workers.for_each_part(0, h, 8, [&](int from, int to) {
+  workers.parallel_for(0, h, 8, [&](int from, int to) {
     for (int row = from; row < to; ++row) fill_row(scene, world_from_left, row, truth);
   });
   return truth;
@@ -135,7 +136,7 @@ void fill_tile(const TerrainShape& shape, const GroundScene& scene, GroundMap& m
 }  // namespace
 
 GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Region& region, double cell_m,
-                     const Workers& workers) {
+                     const ThreadPool& workers) {
   GroundMap map;
   constexpr double kRounding = 1e-6;  // in cells: a region that ends on the lattice gets no extra cell
   map.cell_m = cell_m;
@@ -151,7 +152,7 @@ GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Re
       const Region part{map.west_m + i0 * cell_m, map.north_m - j1 * cell_m, map.west_m + i1 * cell_m,
                         map.north_m - j0 * cell_m};
       const GroundScene scene = GroundScene::rocks_only(shape, rocks, part, workers);
-      workers.for_each_part(j0, j1, 16, [&](int from, int to) { fill_tile(shape, scene, map, i0, from, i1, to); });
+      workers.parallel_for(j0, j1, 16, [&](int from, int to) { fill_tile(shape, scene, map, i0, from, i1, to); });
     }
   }
   return map;

@@ -24,9 +24,9 @@ struct TrueDisparity {
 /// the nominal camera: the column where a perfect matcher finds it.
 class DisparityTruth {
  public:
-  DisparityTruth(const Rig& true_rig, const Rig& believed_rig, const StereoPair& pair, const RectifiedView& view);
+  DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, const StereoPair& pair, const RectifiedView& view);
 
-  TrueDisparity of(const GroundScene& scene, const Pose& world_from_left, const Workers& workers) const;
+  TrueDisparity of(const GroundScene& scene, const Pose& world_from_left, const ThreadPool& workers) const;
 
  private:
   void fill_row(const GroundScene& scene, const Pose& world_from_left, int row, TrueDisparity& truth) const;
@@ -46,7 +46,7 @@ struct GroundMap {
 };
 
 GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Region& region, double cell_m,
-                     const Workers& workers);
+                     const ThreadPool& workers);
 
 /// 1 ground, 2 obstacle (the surface is more than `obstacle_m` above the ground), 3 cavity (the surface is more than
 /// `cavity_m` below the ground without cavities).

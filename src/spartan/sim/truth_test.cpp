@@ -25,7 +25,7 @@ TEST(GroundMap, RowsRunSouthwardsAndColumnsEastwards) {
   slope.slope_heading_deg = 30;
   const TerrainShape shape(slope, 1);
   const RockField rocks(no_rocks(), 1);
-  const GroundMap map = map_ground(shape, rocks, {-0.6, 0.2, 1.4, 1.2}, 0.05, Workers(2));
+  const GroundMap map = map_ground(shape, rocks, {-0.6, 0.2, 1.4, 1.2}, 0.05, ThreadPool(2));
   EXPECT_NEAR(map.west_m, -0.6, 1e-9);
   EXPECT_NEAR(map.north_m, 1.2, 1e-9);
   EXPECT_EQ(map.ground.size(), (ImageSize{40, 20}));
@@ -42,7 +42,7 @@ TEST(GroundMap, RocksHaveTheirListedHeightAndTheRestIsGround) {
   const TerrainShape shape(level_ground(), 1);
   const RockField field({.coverage = 0.2, .pebbles_per_m2 = 0}, 5);
   const Region region{-3, -3, 3, 3};
-  const GroundMap map = map_ground(shape, field, region, 0.01, Workers(2));
+  const GroundMap map = map_ground(shape, field, region, 0.01, ThreadPool(2));
   const std::vector<Rock> rocks = field.rocks_in(region.grown(3));
   int large = 0, bare = 0;
   for (const Rock& rock : rocks) {
@@ -79,7 +79,7 @@ TEST(GroundMap, CavitiesAreBelowTheLevel) {
   TerrainShapeOptions pitted = level_ground();
   pitted.cavities_per_100m2 = 20;
   const TerrainShape shape(pitted, 2);
-  const GroundMap map = map_ground(shape, RockField(no_rocks(), 1), {-5, -5, 5, 5}, 0.05, Workers(1));
+  const GroundMap map = map_ground(shape, RockField(no_rocks(), 1), {-5, -5, 5, 5}, 0.05, ThreadPool(1));
   int deep = 0;
   for (int row = 0; row < map.ground.height(); ++row) {
     for (int column = 0; column < map.ground.width(); ++column) {

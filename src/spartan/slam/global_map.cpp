@@ -32,7 +32,7 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
   }
   Eigen::Vector2f slope = grid.slope(column, row);
   if (!slope.allFinite()) slope.setZero();
-  const Eigen::Vector2d at = middle_of(local.place, column, row);
+  const Eigen::Vector2d at = cell_centre(local.place, column, row);
   const Vector6d j =
       elevation_jacobian(slope.cast<double>(), {at.x() - body.x(), at.y() - body.y(), s.elevation_m - body.z()});
   s.variance_m2 = static_cast<float>(local.variance_m2(column, row) + j.dot(world_covariance * j));
@@ -46,7 +46,7 @@ bool is_finite(const CellSurface& s) {
 
 }  // namespace
 
-MapBands MapView::bands(const TerrainShape& shape) const {
+MapBands MapView::bands(const Traversability& shape) const {
   MapBands bands{class_band(kind), {}};
   bands.list = {{"elevation_m", elevation_m.view()},
                 {"elevation_min_m", elevation_min_m.view()},
@@ -62,13 +62,13 @@ MapBands MapView::bands(const TerrainShape& shape) const {
   return bands;
 }
 
-TerrainShape MapView::shape(const MapOptions& options, const Workers& workers) const {
+Traversability MapView::shape(const MapOptions& options, const ThreadPool& workers) const {
   Image<std::uint8_t> free(window.width, window.height);
   for (int r = 0; r < window.height; ++r) {
     for (int c = 0; c < window.width; ++c) free(c, r) = kind(c, r) == GroundClass::ground ? 1 : 0;
   }
   const Image<float> ground_m = fit_ground(elevation_m, free, cell_m, options.ground, workers);
-  return measure_shape({elevation_m, elevation_max_m, ground_m, kind, cell_m}, options.rover, workers);
+  return compute_traversability({elevation_m, elevation_max_m, ground_m, kind, cell_m}, options.rover, workers);
 }
 
 SurfaceGrid MapView::grid() const {

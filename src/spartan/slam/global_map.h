@@ -11,7 +11,7 @@
 #include "spartan/core/geotiff.h"
 #include "spartan/reconstruction/local_map.h"
 #include "spartan/reconstruction/map_generator.h"
-#include "spartan/reconstruction/terrain_shape.h"
+#include "spartan/reconstruction/traversability.h"
 #include "spartan/slam/lattice.h"
 #include "spartan/slam/slam_options.h"
 #include "spartan/slam/tile_store.h"
@@ -28,11 +28,11 @@ struct MapView {
   Image<GroundClass> kind;
   Image<std::int32_t> stop;  ///< The first stop that observed the cell; −1: none.
 
-  MapPlace place() const { return window.place(cell_m); }
-  /// The bands of a map file, with the names of docs/formats.md, "Maps". `shape`: of this view.
-  MapBands bands(const TerrainShape& shape) const;
+  GeoTransform place() const { return window.place(cell_m); }
+  /// The bands of a map file, with the names of docs/reference/files.md. `shape`: of this view.
+  MapBands bands(const Traversability& shape) const;
   /// Slope, roughness, steps and costs. The ground surface is first fitted to the free cells.
-  TerrainShape shape(const MapOptions& options, const Workers& workers) const;
+  Traversability shape(const MapOptions& options, const ThreadPool& workers) const;
   SurfaceGrid grid() const;
 };
 

@@ -23,7 +23,7 @@ using testing::rocky_ground;
 using testing::TemporaryFolder;
 
 LocalMap map_of(const Ground& ground, const Pose& pose, std::uint64_t seed) {
-  return MapGenerator({}, Workers(1)).generate(points_at(ground, pose, seed), pose);
+  return MapGenerator({}, ThreadPool(1)).generate(points_at(ground, pose, seed), pose);
 }
 
 void add(GlobalMap& map, const Ground& ground, const Pose& pose, std::uint64_t seed,
@@ -85,7 +85,7 @@ TEST(GlobalMap, TraversabilityEqualsThatOfTheLocalMap) {
   GlobalMap map({}, 0.05);
   ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
   const MapView view = *map.view(window_of(local.place, local.size()));
-  const TerrainShape shape = view.shape({}, Workers(2));
+  const Traversability shape = view.shape({}, ThreadPool(2));
   int known = 0, close = 0;
   for (int r = 0; r < local.size().height; ++r) {
     for (int c = 0; c < local.size().width; ++c) {
@@ -134,7 +134,7 @@ TEST(GlobalMap, ElevationBetweenCellsIsBilinear) {
   const Ground plane = [](double x, double y) { return 0.1 * x - 0.2 * y; };
   GlobalMap map({}, 0.05);
   const Pose pose = pose_on_ground(plane, 3, 4, 0);
-  ASSERT_TRUE(map.add(MapGenerator({}, Workers(1)).generate(points_at(plane, pose, 1, 0), pose), {}, {pose, {}},
+  ASSERT_TRUE(map.add(MapGenerator({}, ThreadPool(1)).generate(points_at(plane, pose, 1, 0), pose), {}, {pose, {}},
                       Matrix6d::Zero()));
   const auto sample = map.at(5.013, 4.111);
   ASSERT_TRUE(sample && *sample);
@@ -149,7 +149,7 @@ TEST(GlobalMap, ThePoseCovarianceInflatesTheVarianceOfSlopes) {
   Matrix6d relative = Matrix6d::Zero();
   relative.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 0.01;
   GlobalMap certain({}, 0.05), uncertain({}, 0.05);
-  const LocalMap local = MapGenerator({}, Workers(1)).generate(points_at(plane, pose, 1, 0), pose);
+  const LocalMap local = MapGenerator({}, ThreadPool(1)).generate(points_at(plane, pose, 1, 0), pose);
   ASSERT_TRUE(certain.add(local, {}, {pose, relative}, Matrix6d::Zero()));
   ASSERT_TRUE(uncertain.add(local, {}, {pose, relative}, relative));
   const double more = (*uncertain.at(1.5, 1.5))->variance_m2 - (*certain.at(1.5, 1.5))->variance_m2;
@@ -201,7 +201,7 @@ TEST(GlobalMap, MovingAnAnchorMovesItsCells) {
   // Rotated and off the lattice: interpolated.
   const Ground plane = [](double x, double y) { return 0.1 * x + 0.05 * y; };
   GlobalMap level({}, 0.05);
-  ASSERT_TRUE(level.add(MapGenerator({}, Workers(1)).generate(points_at(plane, Pose(), 1, 0), Pose()), {}, {},
+  ASSERT_TRUE(level.add(MapGenerator({}, ThreadPool(1)).generate(points_at(plane, Pose(), 1, 0), Pose()), {}, {},
                         Matrix6d::Zero()));
   const Pose motion = Pose(exp_so3({0.02, 0.03, 0.4}), {0.013, 0.02, 0.1});
   level.move_submap(0, motion * level.submaps()[0].world_from_submap);

@@ -48,12 +48,12 @@ Status GlobalMap::render_aligned(const Submap& submap, MapView& view, std::vecto
 
 Status GlobalMap::render_resampled(const Submap& submap, MapView& view, std::vector<MapCell>& cells) {
   const LatticeWindow& w = view.window;
-  const MapPlace place = view.place();
+  const GeoTransform place = view.place();
   const Pose submap_from_world = submap.world_from_submap.inverse();
   const CellFusion fusion_parameters = fusion();
   for (int row = 0; row < w.height; ++row) {
     for (int column = 0; column < w.width; ++column) {
-      const Eigen::Vector2d at = middle_of(place, column, row);
+      const Eigen::Vector2d at = cell_centre(place, column, row);
       // Intersection of the vertical through the cell's centre with the submap's surface, by fixed-point iteration.
       double z = submap.world_from_submap.translation().z();
       CellSurface interpolated;

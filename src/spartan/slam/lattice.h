@@ -19,7 +19,7 @@ struct LatticeWindow {
 
   ImageSize size() const { return {width, height}; }
   std::int64_t cells() const { return std::int64_t{width} * height; }
-  MapPlace place(double cell_m) const { return {west * cell_m, north * cell_m, cell_m}; }
+  GeoTransform place(double cell_m) const { return {west * cell_m, north * cell_m, cell_m}; }
   friend bool operator==(const LatticeWindow&, const LatticeWindow&) = default;
 };
 
@@ -45,7 +45,7 @@ inline LatticeWindow window_around(const LatticeWindow& a, const LatticeWindow& 
 }
 
 /// The window of a map whose cells lie on the lattice.
-inline LatticeWindow window_of(const MapPlace& place, ImageSize size) {
+inline LatticeWindow window_of(const GeoTransform& place, ImageSize size) {
   return {static_cast<int>(std::lround(place.west_m / place.cell_m)),
           static_cast<int>(std::lround(place.north_m / place.cell_m)), size.width, size.height};
 }

@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include "spartan/slam/jitter_search.h"
 #include "spartan/slam/map_refinement.h"
-#include "spartan/slam/match_evidence.h"
+#include "spartan/slam/match_covariance.h"
+#include "spartan/slam/scan_matching.h"
 
 namespace spartan {
 namespace {
@@ -51,17 +51,17 @@ Matrix6d in_body(const Matrix6d& world_information, const Pose& world_from_body)
 
 }  // namespace
 
-std::string_view name_of(MatchVerdict verdict) {
-  switch (verdict) {
-    case MatchVerdict::decided:
+std::string_view name_of(MatchStatus status) {
+  switch (status) {
+    case MatchStatus::decided:
       return "decided";
-    case MatchVerdict::no_overlap:
+    case MatchStatus::no_overlap:
       return "no_overlap";
-    case MatchVerdict::flat:
+    case MatchStatus::flat:
       return "flat";
-    case MatchVerdict::ambiguous:
+    case MatchStatus::ambiguous:
       return "ambiguous";
-    case MatchVerdict::high_residual:
+    case MatchStatus::high_residual:
       return "misfit";
     default:
       return "at_edge";
@@ -69,29 +69,29 @@ std::string_view name_of(MatchVerdict verdict) {
 }
 
 MapMatch match_map(std::span<const SurfacePoint> points, const LocalMap& local, const MapView& global,
-                   const UncertainPose& world_from_body, int fewest_points, const MatchOptions& options,
-                   const Workers& workers) {
+                   const UncertainPose& world_from_body, int min_points, const MatchOptions& options,
+                   const ThreadPool& workers) {
   MapMatch result;
   result.world_from_body = world_from_body.pose;
   const SurfaceGrid local_grid = grid_of(local), global_grid = global.grid();
   const Eigen::Vector3d centre = world_from_body.pose.translation();
   const SearchWindow window = search_window(world_from_body, options);
-  std::vector<JitterPeak> peaks =
-      jitter_search(coarser(local_grid), coarser(global_grid), centre, window, options, workers);
+  std::vector<ScanMatchPeak> peaks =
+      correlative_scan_match(coarser(local_grid), coarser(global_grid), centre, window, options, workers);
   if (static_cast<int>(peaks.size()) > options.candidates) peaks.resize(static_cast<std::size_t>(options.candidates));
 
   const std::vector<SurfacePoint> sampled = downsampled(points, kDownsampling * global.cell_m);
   std::vector<std::optional<RefinedMatch>> refined(peaks.size());
-  workers.for_each_part(0, static_cast<int>(peaks.size()), 1, [&](int from, int to) {
+  workers.parallel_for(0, static_cast<int>(peaks.size()), 1, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const Pose start = peaks[k].correction * world_from_body.pose;
-      refined[k] = refine_match(sampled, global_grid, start, fewest_points, options);
+      refined[k] = refine_match(sampled, global_grid, start, min_points, options);
     }
   });
   double scale = std::numeric_limits<double>::infinity();
   // All candidates are scored with the residual scale of the one that fits best.
-  for (const auto& match : refined) scale = match ? std::min(scale, match->misfit) : scale;
+  for (const auto& match : refined) scale = match ? std::min(scale, match->normalized_residual) : scale;
   std::vector<Candidate> candidates;
   for (auto& match : refined) {
     if (!match) continue;
@@ -103,36 +103,36 @@ MapMatch match_map(std::span<const SurfacePoint> points, const LocalMap& local, 
   const Candidate& best = *std::min_element(candidates.begin(), candidates.end(),
                                             [](const auto& a, const auto& b) { return a.cost.mean < b.cost.mean; });
   const MatchCovariance covariance = estimate_match_covariance(best.match.cells, global.cell_m, options);
-  result.lead = std::numeric_limits<double>::infinity();
+  result.margin = std::numeric_limits<double>::infinity();
   for (const Candidate& other : candidates) {
     if (same_pose(best.match.world_from_body, other.match.world_from_body, covariance)) continue;
-    const double lead =
+    const double margin =
         (other.cost.mean - best.cost.mean) / std::sqrt(std::max(other.cost.variance + best.cost.variance, 1e-300));
-    result.lead = std::min(result.lead, lead);
+    result.margin = std::min(result.margin, margin);
   }
 
   result.world_from_body = best.match.world_from_body;
   result.cells = covariance.cells;
   result.blocks = covariance.blocks;
   result.overlap = static_cast<double>(covariance.cells) / std::max(best.match.known_cells, 1);
-  result.misfit = covariance.misfit;
+  result.normalized_residual = covariance.normalized_residual;
   result.determined = covariance.determined;
   result.sigma_m = covariance.sigma_m;
   result.sigma_rad = covariance.sigma_rad;
   if (covariance.blocks < options.min_blocks) {
-    result.verdict = MatchVerdict::no_overlap;
+    result.status = MatchStatus::no_overlap;
   } else if (outside(world_from_body.pose, result.world_from_body, window, options)) {
-    result.verdict = MatchVerdict::at_edge;
-  } else if (covariance.misfit > options.max_normalized_residual) {
-    result.verdict = MatchVerdict::high_residual;
+    result.status = MatchStatus::at_edge;
+  } else if (covariance.normalized_residual > options.max_normalized_residual) {
+    result.status = MatchStatus::high_residual;
   } else if (covariance.determined < 6) {
-    result.verdict = MatchVerdict::flat;
-  } else if (result.lead < options.min_margin_sigmas) {
-    result.verdict = MatchVerdict::ambiguous;
+    result.status = MatchStatus::flat;
+  } else if (result.margin < options.min_margin_sigmas) {
+    result.status = MatchStatus::ambiguous;
   } else {
-    result.verdict = MatchVerdict::decided;
+    result.status = MatchStatus::decided;
   }
-  if (result.verdict == MatchVerdict::decided || result.verdict == MatchVerdict::flat)
+  if (result.status == MatchStatus::decided || result.status == MatchStatus::flat)
     result.information = in_body(covariance.information, result.world_from_body);
   return result;
 }

@@ -25,7 +25,7 @@ struct Scene {
 };
 
 Scene scene(const Ground& mapped, const Ground& seen, const Pose& before, const Pose& now) {
-  const Workers workers(2);
+  const ThreadPool workers(2);
   GlobalMap map({}, 0.05);
   static_cast<void>(map.add(MapGenerator({}, workers).generate(points_at(mapped, before, 1), before), {}, {before, {}},
                             Matrix6d::Zero()));
@@ -44,7 +44,7 @@ Vector6d offset(double dx, double dy, double dz, double roll, double pitch, doub
 }
 
 MapMatch match(const Scene& s, const Vector6d& off, int threads = 2) {
-  const Workers workers(threads);
+  const ThreadPool workers(threads);
   const UncertainPose prior{moved(s.now, s.now.translation(), off), covariance_of(0.08, 0.02)};
   return match_map(s.points, MapGenerator({}, workers).generate(s.points, prior.pose), s.global, prior, 2, {}, workers);
 }
@@ -56,7 +56,7 @@ double distance(const Pose& a, const Pose& b) {
 TEST(MapMatcher, AcceptsAMatchOnRockyGround) {
   const Scene s = scene(rocky_ground());
   const MapMatch m = match(s, offset(0.15, -0.1, 0.05, 0.02, -0.01, 0.04));
-  EXPECT_EQ(name_of(m.verdict), "decided");
+  EXPECT_EQ(name_of(m.status), "decided");
   EXPECT_LT(distance(s.now, m.world_from_body), 0.003);
   EXPECT_LT(rotation_angle(s.now.inverse() * m.world_from_body), 0.002);
   EXPECT_EQ(m.determined, 6);
@@ -80,7 +80,7 @@ TEST(MapMatcher, IsDeterministicForAnyNumberOfThreads) {
   const MapMatch one = match(s, off, 1), two = match(s, off, 2);
   EXPECT_EQ(one.world_from_body.matrix(), two.world_from_body.matrix());
   EXPECT_EQ(one.information, two.information);
-  EXPECT_EQ(one.lead, two.lead);
+  EXPECT_EQ(one.margin, two.margin);
 }
 
 TEST(MapMatcher, RejectsAMatchOnAPlane) {
@@ -97,7 +97,7 @@ TEST(MapMatcher, RejectsAMatchOnAPlane) {
 TEST(MapMatcher, OneDirectionIsUndeterminedOnDunes) {
   const Ground dunes = [](double x, double) { return 0.06 * std::sin(2.1 * x) + 0.03 * std::sin(5.3 * x + 1); };
   const MapMatch m = match(scene(dunes), offset(0.1, 0.1, 0.02, 0, 0, 0.02));
-  EXPECT_EQ(name_of(m.verdict), "flat");
+  EXPECT_EQ(name_of(m.status), "flat");
   EXPECT_EQ(m.determined, 5);
   const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(m.information);
   EXPECT_LT(axes.eigenvalues()[0], 1e-6 * axes.eigenvalues()[5]);
@@ -109,7 +109,7 @@ TEST(MapMatcher, OneDirectionIsUndeterminedOnDunes) {
 TEST(MapMatcher, PeriodicGroundIsAmbiguous) {
   const Ground egg_box = [](double x, double y) { return 0.02 * std::sin(21 * x) * std::sin(21 * y); };
   const MapMatch m = match(scene(egg_box), offset(0.1, -0.05, 0.02, 0, 0, 0.01));
-  EXPECT_EQ(name_of(m.verdict), "ambiguous");
+  EXPECT_EQ(name_of(m.status), "ambiguous");
   EXPECT_TRUE(m.information.isZero());
 }
 
@@ -126,7 +126,7 @@ TEST(MapMatcher, ReportsTooLittleOverlap) {
   const Ground ground = rocky_ground();
   const MapMatch m = match(scene(ground, ground, pose_on_ground(ground, 0, 0, 0), pose_on_ground(ground, 4.2, 0, 0)),
                            offset(0, 0, 0, 0, 0, 0));
-  EXPECT_EQ(name_of(m.verdict), "no_overlap");
+  EXPECT_EQ(name_of(m.status), "no_overlap");
   EXPECT_TRUE(m.information.isZero());
 }
 
@@ -171,7 +171,7 @@ std::vector<SurfacePoint> with_island(std::vector<SurfacePoint> points, const Po
 
 TEST(MapMatcher, AnIslandWithoutGroundDoesNotSpoilTheMatch) {
   const Ground ground = rocky_ground();
-  const Workers workers(2);
+  const ThreadPool workers(2);
   const Pose before = standing(ground, 0, 0, 0), now = standing(ground, 1, 0.2, 0.1);
   GlobalMap map({}, 0.05);
   const LocalMap mapped =
@@ -183,7 +183,7 @@ TEST(MapMatcher, AnIslandWithoutGroundDoesNotSpoilTheMatch) {
   EXPECT_EQ(view.occupancy_logodds(cell.column, cell.row), 0);
   EXPECT_EQ(view.kind(cell.column, cell.row), 0) << "no class was observed";
   const Scene s{now, with_island(points_at(ground, now, 2), now.inverse()), *map.view(view.window)};
-  EXPECT_EQ(name_of(match(s, offset(0.15, -0.1, 0.05, 0.02, -0.01, 0.04)).verdict), "decided");
+  EXPECT_EQ(name_of(match(s, offset(0.15, -0.1, 0.05, 0.02, -0.01, 0.04)).status), "decided");
 }
 
 }  // namespace

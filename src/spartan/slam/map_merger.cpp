@@ -30,9 +30,9 @@ Correction updated_by_match(const UncertainPose& prior, const Pose& match, const
   // Perturbations of the match as perturbations of the prior pose: log(prior⁻¹ match Exp δ) = offset + J_r⁻¹ δ.
   const Matrix6d information = jacobian.transpose() * match_information * jacobian;
   const Matrix6d independent =
-      symmetric(prior.covariance * (Matrix6d::Identity() - common_share(prior.covariance, map_covariance)));
+      symmetric(prior.covariance * (Matrix6d::Identity() - shared_fraction(prior.covariance, map_covariance)));
   const Matrix6d difference = independent + map_covariance - (prior.covariance - independent);
-  const Matrix6d gain = independent * blurred(information, difference);
+  const Matrix6d gain = independent * inflated(information, difference);
   const Vector6d step = gain * offset;
   const Matrix6d jacobian_of_step = right_jacobian_se3(step);
   const Matrix6d reduction = gain * independent.transpose(), cross = gain * difference;
@@ -49,7 +49,7 @@ double view_reach(const MapOptions& map, const MatchOptions& match) {
 
 }  // namespace
 
-MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, const Workers& workers)
+MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers)
     : options_(options),
       map_options_(map_options),
       workers_(workers),
@@ -94,7 +94,7 @@ Result<MapMergeResult> MapMerger::add(std::span<const SurfacePoint> points, cons
         map_.view(window_around(at.x(), at.y(), view_reach(map_options_, options_.match), map_options_.cell_m));
     if (!view) return failure(view);
     result.match =
-        match_map(points, result.local, *view, world_from_body, map_options_.fewest_points, options_.match, workers_);
+        match_map(points, result.local, *view, world_from_body, map_options_.min_points, options_.match, workers_);
     const MapMatch& match = result.match;
     const Matrix6d of_map = map_covariance(*view, result.local, match.world_from_body);
     const Correction update = updated_by_match(world_from_body, match.world_from_body, match.information, of_map);

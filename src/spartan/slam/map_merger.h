@@ -32,7 +32,7 @@ struct MapMergeResult {
 /// defines the map frame. Derivation: docs/math/map_merging.md.
 class MapMerger {
  public:
-  MapMerger(const SlamOptions& options, const MapOptions& map_options, const Workers& workers);
+  MapMerger(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers);
 
   /// Adds the points of one stop, in its body frame. `world_from_body`: prior pose of the odometry or the localization.
   /// Errors are those of the store that tiles are read from; after one nothing has changed.
@@ -56,7 +56,7 @@ class MapMerger {
 
   SlamOptions options_;
   MapOptions map_options_;
-  Workers workers_;
+  ThreadPool workers_;
   MapGenerator generator_;
   GlobalMap map_;
 };

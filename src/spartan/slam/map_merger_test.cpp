@@ -27,7 +27,7 @@ Pose off_by(const Pose& pose, double x, double y, double yaw) {
 }
 
 MapMerger make_merger() {
-  return {SlamOptions(), MapOptions(), Workers(2)};
+  return {SlamOptions(), MapOptions(), ThreadPool(2)};
 }
 
 Pose stop(const Ground& ground, int i) {
@@ -110,7 +110,7 @@ TEST(MapMerger, UndeterminedDirectionsKeepThePrior) {
   const UncertainPose prior{Pose::from_translation({0.1, 0.07, 0.02}) * b, covariance_of(0.08, 0.01)};
   const auto second = merger.add(points_at(dunes, b, 2), {}, prior);
   ASSERT_TRUE(second);
-  EXPECT_EQ(name_of(second->match.verdict), "flat");
+  EXPECT_EQ(name_of(second->match.status), "flat");
   const Eigen::Vector3d wrong = second->corrected.pose.translation() - b.translation();
   EXPECT_NEAR(wrong.x(), 0, 0.005);
   EXPECT_NEAR(wrong.y(), 0.07, 0.01);

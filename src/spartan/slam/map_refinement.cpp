@@ -41,7 +41,7 @@ Pose moved(const Pose& world_from_body, const Eigen::Vector3d& centre, const Vec
 std::vector<MatchedCell> matched_cells(const SurfaceGrid& local, const SurfaceGrid& global, const Viewpoint& from,
                                        const ResidualScale& scale, const MatchOptions& options) {
   std::vector<MatchedCell> cells;
-  const MapPlace place = global.window.place(global.cell_m);
+  const GeoTransform place = global.window.place(global.cell_m);
   const double k2 = options.robust_sigmas * options.robust_sigmas,
                rough2 = options.relief_sigma_ratio * options.relief_sigma_ratio;
   for (int r = 0; r < global.window.height; ++r) {
@@ -60,7 +60,7 @@ std::vector<MatchedCell> matched_cells(const SurfaceGrid& local, const SurfaceGr
                    u2 = cell.residual_m * cell.residual_m / (k2 * s2), robust = 1 / (1 + u2);
       cell.weight = robust * robust / s2;
       cell.curvature = cell.weight * (1 - 3 * u2) * robust;
-      const Eigen::Vector2d at = middle_of(place, c, r);
+      const Eigen::Vector2d at = cell_centre(place, c, r);
       const Eigen::Vector3d place_m(at.x(), at.y(), 0.5 * (zl + zg));
       cell.jacobian_by_local = elevation_jacobian(jacobian_by_local.cast<double>(), place_m - from.body);
       cell.jacobian_by_global = elevation_jacobian(jacobian_by_global.cast<double>(), place_m - from.body);
@@ -81,8 +81,8 @@ Eigen::Vector3d ray_origin_of(std::span<const SurfacePoint> points) {
   Eigen::Matrix3d m = Eigen::Matrix3d::Identity() * 1e-9;
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < points.size(); i += std::max<std::size_t>(1, points.size() / 1000)) {
-    const Eigen::Vector3d along = points[i].along.cast<double>();
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along * along.transpose();
+    const Eigen::Vector3d ray = points[i].ray.cast<double>();
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
     m += across;
     v += across * points[i].in_body.cast<double>();
   }
@@ -101,7 +101,7 @@ double median_normalized_residual(std::span<const MatchedCell> cells) {
 
 std::vector<SurfacePoint> downsampled(std::span<const SurfacePoint> points, double side_m) {
   struct Sum {
-    Eigen::Vector3d place = Eigen::Vector3d::Zero(), along = Eigen::Vector3d::Zero();
+    Eigen::Vector3d place = Eigen::Vector3d::Zero(), ray = Eigen::Vector3d::Zero();
     double variance = 0;
     int count = 0;
     GroundClass kind = GroundClass::unknown;
@@ -122,7 +122,7 @@ std::vector<SurfacePoint> downsampled(std::span<const SurfacePoint> points, doub
   for (const SurfacePoint& p : points) {
     Sum& sum = sums[cell_of(p.in_body, 1) * width + cell_of(p.in_body, 0)];
     sum.place += p.in_body.cast<double>();
-    sum.along += p.along.cast<double>();
+    sum.ray += p.ray.cast<double>();
     sum.variance += static_cast<double>(p.sigma_m) * p.sigma_m;
     ++sum.count;
     sum.kind = p.kind;
@@ -131,23 +131,23 @@ std::vector<SurfacePoint> downsampled(std::span<const SurfacePoint> points, doub
   for (const Sum& sum : sums) {
     if (sum.count == 0) continue;
     means.push_back({(sum.place / sum.count).cast<float>(), static_cast<float>(std::sqrt(sum.variance / sum.count)),
-                     sum.along.normalized().cast<float>(), sum.kind});
+                     sum.ray.normalized().cast<float>(), sum.kind});
   }
   return means;
 }
 
 std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, const SurfaceGrid& global,
-                                         const Pose& world_from_body, int fewest_points, const MatchOptions& options) {
+                                         const Pose& world_from_body, int min_points, const MatchOptions& options) {
   RefinedMatch match;
   match.world_from_body = world_from_body;
   const Eigen::Vector3d camera = ray_origin_of(points);
   ResidualScale scale{options.elevation_scale_m, 1};
   for (; match.iterations < kMaxIterations; ++match.iterations) {
-    const SurfaceGrid local = rasterize(points, match.world_from_body, global.window, global.cell_m, fewest_points);
+    const SurfaceGrid local = rasterize(points, match.world_from_body, global.window, global.cell_m, min_points);
     const Viewpoint from{match.world_from_body.translation(), match.world_from_body * camera};
     match.cells = matched_cells(local, global, from, scale, options);
     if (static_cast<int>(match.cells.size()) < options.min_cells) return std::nullopt;
-    match.misfit = median_normalized_residual(match.cells);
+    match.normalized_residual = median_normalized_residual(match.cells);
     if (match.converged || match.iterations + 1 == kMaxIterations) match.known_cells = known_cells(local.elevation_m);
     if (match.converged) break;  // after the cells have been computed at the final pose
     Matrix6d normal = Matrix6d::Zero();
@@ -164,7 +164,7 @@ std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, c
     match.converged =
         scale.inflation_m == 0 && step.head<3>().norm() < kConverged_m && step.tail<3>().norm() < kConverged_rad;
     if (!match.converged) {
-      if (scale.inflation_m == 0) scale.scale = std::clamp(match.misfit, kMinScale, 1.0);
+      if (scale.inflation_m == 0) scale.scale = std::clamp(match.normalized_residual, kMinScale, 1.0);
       scale.inflation_m = scale.inflation_m > kMinInflation_m ? 0.5 * scale.inflation_m : 0;
     }
   }

@@ -57,7 +57,7 @@ struct RefinedMatch {
   Pose world_from_body;
   bool converged = false;
   int iterations = 0;
-  double misfit = 1;
+  double normalized_residual = 1;
   std::vector<MatchedCell> cells;  ///< At that pose, tangents about its body origin.
   int known_cells = 0;             ///< Observed cells of the local map at that pose, overlapping or not.
 };
@@ -67,7 +67,7 @@ struct RefinedMatch {
 /// of both maps' slopes (efficient second-order minimization, Benhimane & Malis, IROS 2004). None where fewer than
 /// min_cells overlap.
 std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, const SurfaceGrid& global,
-                                         const Pose& world_from_body, int fewest_points, const MatchOptions& options);
+                                         const Pose& world_from_body, int min_points, const MatchOptions& options);
 
 /// Applies a world tangent η = (t, θ) about `centre` to a pose: p → c + Exp(θ)(p − c) + t.
 Pose moved(const Pose& world_from_body, const Eigen::Vector3d& centre, const Vector6d& tangent);

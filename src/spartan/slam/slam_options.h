@@ -112,10 +112,9 @@ struct MatchOptions {
             "relative to the standard deviation of the residuals; raising it gives larger covariances.",
             between(0, 10));
     v.renamed("fewest_cells", "min_cells");
-    v.field(
-        "min_cells", min_cells,
-        "Minimum number of cells that both maps have observed; raising it rejects matches of small overlap.",
-        between(20, 1e6));
+    v.field("min_cells", min_cells,
+            "Minimum number of cells that both maps have observed; raising it rejects matches of small overlap.",
+            between(20, 1e6));
     v.renamed("fewest_blocks", "min_blocks");
     v.field("min_blocks", min_blocks,
             "Minimum number of blocks (see block_m) that both maps have observed; raising it rejects matches "

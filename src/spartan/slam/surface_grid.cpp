@@ -50,7 +50,7 @@ float SurfaceGrid::elevation_at(double x_m, double y_m) const {
 }
 
 SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_from_body, const LatticeWindow& window,
-                      double cell_m, int fewest_points) {
+                      double cell_m, int min_points) {
   struct Cell {
     double weights = 0, sum = 0;
     float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
@@ -67,7 +67,7 @@ SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_fr
     const int column = static_cast<int>(std::floor(p.x() * per_m)), row = static_cast<int>(std::floor(-p.y() * per_m));
     if (column < 0 || row < 0 || column >= window.width || row >= window.height) continue;
     const double sigma =
-        std::max(static_cast<double>(std::abs(rotation.row(2).dot(point.along)) * point.sigma_m), kMinSigma_m);
+        std::max(static_cast<double>(std::abs(rotation.row(2).dot(point.ray)) * point.sigma_m), kMinSigma_m);
     Cell& cell = cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(window.width) +
                        static_cast<std::size_t>(column)];
     const double weight = 1 / (sigma * sigma);
@@ -82,7 +82,7 @@ SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_fr
   for (int row = 0; row < window.height; ++row) {
     for (int column = 0; column < window.width; ++column, ++i) {
       const Cell& cell = cells[i];
-      if (cell.count < fewest_points) continue;
+      if (cell.count < min_points) continue;
       grid.elevation_m(column, row) = static_cast<float>(cell.sum / cell.weights);
       grid.variance_m2(column, row) = static_cast<float>(cell.count / cell.weights);
       grid.relief_m(column, row) = cell.highest - cell.lowest;

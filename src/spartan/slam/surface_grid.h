@@ -29,7 +29,7 @@ struct SurfaceGrid {
 /// Rasterizes points into cells: inverse-variance weighted means, as the map generator computes them. A cell with fewer
 /// than `fewest_points` points is unknown. The occupancy is 0.
 SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_from_body, const LatticeWindow& window,
-                      double cell_m, int fewest_points);
+                      double cell_m, int min_points);
 
 /// The grid of a local map.
 SurfaceGrid grid_of(const LocalMap& map);

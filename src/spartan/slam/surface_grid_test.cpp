@@ -32,9 +32,9 @@ TEST(SurfaceGrid, RasterizesAsTheMapGenerator) {
   const Ground ground = rocky_ground();
   const Pose pose = pose_on_ground(ground, 3.21, -1.37, 0.4);
   const std::vector<SurfacePoint> points = points_at(ground, pose, 1);
-  const LocalMap map = MapGenerator({}, Workers(1)).generate(points, pose);
+  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, pose);
   const SurfaceGrid from_map = grid_of(map);
-  const SurfaceGrid rasterized = rasterize(points, pose, from_map.window, 0.05, MapOptions().fewest_points);
+  const SurfaceGrid rasterized = rasterize(points, pose, from_map.window, 0.05, MapOptions().min_points);
   int known = 0, other = 0;
   for (int r = 0; r < from_map.window.height; ++r) {
     for (int c = 0; c < from_map.window.width; ++c) {
@@ -71,7 +71,7 @@ TEST(SurfaceGrid, CoarseCellsLieOnTheCoarseLattice) {
   int known = 0;
   for (int r = 0; r < coarse.window.height; ++r) {
     for (int c = 0; c < coarse.window.width; ++c) {
-      const Eigen::Vector2d at = middle_of(coarse.window.place(0.1), c, r);
+      const Eigen::Vector2d at = cell_centre(coarse.window.place(0.1), c, r);
       const bool whole = c > 0 && r > 0 && c < coarse.window.width - 1 && r < coarse.window.height - 1;
       if (!whole) continue;
       ++known;

@@ -39,11 +39,11 @@ inline std::vector<SurfacePoint> points_at(const Ground& ground, const Pose& wor
   for (double range = 0.6; range < 4; range += kStep) {
     for (double turn = -1.05; turn < 1.05; turn += kStep / range) {
       const double x = camera.x() + range * std::cos(heading + turn), y = camera.y() + range * std::sin(heading + turn);
-      const Eigen::Vector3d place(x, y, ground(x, y)), along = (place - camera).normalized();
+      const Eigen::Vector3d place(x, y, ground(x, y)), ray = (place - camera).normalized();
       const double sigma = 0.001 + 0.0012 * range * range;
-      const Eigen::Vector3d seen = place + noise * sigma * 0.3 * random.normal() * along;
+      const Eigen::Vector3d seen = place + noise * sigma * 0.3 * random.normal() * ray;
       points.push_back({(body_from_world * seen).cast<float>(), static_cast<float>(sigma),
-                        (body_from_world.rotation() * along).cast<float>(), GroundClass::ground});
+                        (body_from_world.rotation() * ray).cast<float>(), GroundClass::ground});
     }
   }
   return points;

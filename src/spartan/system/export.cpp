@@ -9,7 +9,7 @@
 
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/pose_convention.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
@@ -80,7 +80,7 @@ TrajectoryKind best_of(const std::vector<FrameRecord>& frames) {
                        [&](TrajectoryKind kind) { return has_trajectory(frames, kind); });
 }
 
-Status export_map(const std::string& run_folder, const Workers& workers, const std::string& path) {
+Status export_map(const std::string& run_folder, const ThreadPool& workers, const std::string& path) {
   auto saved = SavedMap::open(run_folder);
   if (!saved) return failure(saved);
   const auto view = saved->map().view(saved->map().extent());
@@ -100,7 +100,7 @@ Result<ExportFormat> parse_export_format(std::string_view name) {
 }
 
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
-                  const Workers& workers, const std::string& path) {
+                  const ThreadPool& workers, const std::string& path) {
   if (format == ExportFormat::geotiff) return export_map(run_folder, workers, path);
   const RunFolder folder{run_folder};
   auto store = RunStore::open_read_only(folder.store());

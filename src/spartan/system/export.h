@@ -22,6 +22,6 @@ Result<ExportFormat> parse_export_format(std::string_view name);
 /// `kind` chooses among trajectories; none: the best that the run has. Codes: `input` (no run there, or without what is
 /// asked for), `output`.
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
-                  const Workers& workers, const std::string& path);
+                  const ThreadPool& workers, const std::string& path);
 
 }  // namespace spartan

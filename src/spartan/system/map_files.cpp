@@ -8,7 +8,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/geotiff.h"
 #include "spartan/core/image_io.h"
-#include "spartan/reconstruction/map_pictures.h"
+#include "spartan/reconstruction/map_rendering.h"
 #include "spartan/reconstruction/point_cloud.h"
 
 namespace spartan {
@@ -39,32 +39,32 @@ PointCloud cloud_of(const MergedRange& merged, const Pose& map_from_body) {
   return cloud;
 }
 
-Status write_view(const PositionView& view, const VDisparityOptions& options, const std::string& folder) {
+Status write_view(const StopView& view, const VDisparityOptions& options, const std::string& folder) {
   if (!view.ground) return {};
   const std::string path = fmt::format("{}/{}_{}", folder, view.pair, view.stamp.ns);
-  if (Status s = write_png(path + "_classes.png", draw_classes(view.left, view.ground->classes)); !s) return s;
-  return write_png(path + "_v_disparity.png", draw_v_disparity(*view.ground, view.geometry.stereo, options));
+  if (Status s = write_png(path + "_classes.png", render_classes(view.left, view.ground->classes)); !s) return s;
+  return write_png(path + "_v_disparity.png", render_v_disparity(*view.ground, view.geometry.stereo, options));
 }
 
 }  // namespace
 
 Status write_local_map(const LocalMap& map, const std::string& path) {
   if (Status s = write_geotiff(path + ".tif", map.place, map.bands().list); !s) return s;
-  return write_png(path + ".png", draw_map(map.elevation_m, map.kind, map.place.cell_m));
+  return write_png(path + ".png", render_map(map.elevation_m, map.kind, map.place.cell_m));
 }
 
-Status write_map_geotiff(const MapView& view, const MapOptions& options, const Workers& workers,
+Status write_map_geotiff(const MapView& view, const MapOptions& options, const ThreadPool& workers,
                          const std::string& path) {
-  const TerrainShape shape = view.shape(options, workers);
+  const Traversability shape = view.shape(options, workers);
   return write_geotiff(path, view.place(), view.bands(shape).list);
 }
 
-Status write_global_map(GlobalMap& map, const MapOptions& options, const Workers& workers, const std::string& path) {
+Status write_global_map(GlobalMap& map, const MapOptions& options, const ThreadPool& workers, const std::string& path) {
   if (map.empty()) return {};
   const auto view = map.view(map.extent());
   if (!view) return failure(view);
   if (Status s = write_map_geotiff(*view, options, workers, path + ".tif"); !s) return s;
-  return write_png(path + ".png", draw_map(view->elevation_m, view->kind, view->cell_m));
+  return write_png(path + ".png", render_map(view->elevation_m, view->kind, view->cell_m));
 }
 
 Status remove_map_files(const std::string& path) {
@@ -76,16 +76,16 @@ Status remove_map_files(const std::string& path) {
   return {};
 }
 
-Status write_position(std::span<const PositionView> views, const MergedRange& merged, const LocalMap& map,
+Status write_position(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
                       const MappingOptions& options, const std::string& folder) {
   if (Status s = write_local_map(map, folder + "/map"); !s) return s;
   if (Status s = write_file_atomically(folder + "/obstacles.csv", obstacle_table(map)); !s) return s;
   if (Status s = write_pfm(folder + "/range.pfm", merged.range_m); !s) return s;
   if (Status s = write_pfm(folder + "/range_sigma.pfm", merged.sigma_m); !s) return s;
   if (Status s = write_png(folder + "/panorama.png", merged.gray); !s) return s;
-  if (Status s = write_png(folder + "/coverage.png", draw_coverage(merged.views)); !s) return s;
+  if (Status s = write_png(folder + "/coverage.png", render_view_coverage(merged.views)); !s) return s;
   if (Status s = write_ply(folder + "/points.ply", cloud_of(merged, map.map_from_body)); !s) return s;
-  for (const PositionView& view : views) {
+  for (const StopView& view : views) {
     if (Status s = write_view(view, options.v_disparity, folder); !s) return s;
   }
   return {};

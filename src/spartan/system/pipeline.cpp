@@ -8,7 +8,7 @@
 
 #include "spartan/localization/dead_reckoning.h"
 #include "spartan/localization/start_frame.h"
-#include "spartan/localization/vision_track.h"
+#include "spartan/localization/vision_only_filter.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/system/position_stage.h"
 
@@ -33,7 +33,8 @@ const StereoPair* pair_for_odometry(const Rig& rig, const std::string& wanted) {
 }  // namespace
 
 struct Pipeline::State {
-  State(Rig rig_in, const RunOptions& options_in, Imager imager_in, const StereoPair& pair_in, const Workers& workers)
+  State(Rig rig_in, const RunOptions& options_in, Imager imager_in, const StereoPair& pair_in,
+        const ThreadPool& workers)
       : rig(std::move(rig_in)),
         options(options_in),
         pair(pair_in),
@@ -57,8 +58,8 @@ struct Pipeline::State {
   Odometer odometer;
   DisparityComputer disparity_computer;
   Localizer localizer;
-  VisionTrack odometry_track, slam_track;  // the odometry's poses, without and with the map's corrections
-  DeadReckoning dead_reckoning;            // in the place of all three where the odometry runs alone
+  VisionOnlyFilter odometry_track, slam_track;  // the odometry's poses, without and with the map's corrections
+  DeadReckoning dead_reckoning;                 // in the place of all three where the odometry runs alone
   PositionStage position;
   MapMerger merger;
   bool maps_positions = false, makes_terrain = false;
@@ -117,7 +118,7 @@ RelativeMotion Pipeline::State::body_motion(const RectifiedPair& shot, const Mot
   moved.to = motion.to;
   moved.measured = motion.status != TrackingStatus::lost;
   // That the rover stood is told by the exact identity.
-  if (motion.status != TrackingStatus::standing)
+  if (motion.status != TrackingStatus::stationary)
     moved.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
   moved.covariance = turn * motion.covariance * turn.transpose();
   return moved;
@@ -166,7 +167,7 @@ Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
 
 // Of the poses at a stop the last one is the one that a long stop leaves in the filters.
 void Pipeline::State::hear_map(const PositionSurvey& survey, const PoseConstraint& constraint) {
-  const PoseConstraint last = carried(constraint, survey.since_arrival, survey.last_stamp);
+  const PoseConstraint last = transported(constraint, survey.since_arrival, survey.last_stamp);
   localizer.add(localizer.reaches(constraint.stamp) ? constraint : last);
   slam_track.add(slam_track.reaches(constraint.stamp) ? constraint : last);
 }
@@ -179,7 +180,7 @@ bool Pipeline::State::terrain_is_due() const {
 // Whether the terrain and the map of a stop can be computed from this pair, if they become due.
 Status Pipeline::State::check_disparities(const RectifiedPair& shot) const {
   if (!maps_positions && !makes_terrain) return {};
-  return PositionMapper::check(shot, pair.nearest_m);
+  return StopMapper::check(shot, pair.nearest_m);
 }
 
 // The view is valid until the next call.
@@ -198,7 +199,7 @@ Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const Rec
   return dense_disparity(shot);
 }
 
-Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Workers workers,
+Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, ThreadPool workers,
                                   const std::string& mask_folder) {
   if (Status status = validate(options, "options"); !status) return failure(status);
   const StereoPair* const pair = pair_for_odometry(rig, options.odometry_pair);
@@ -219,7 +220,7 @@ Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
 void Pipeline::level(std::span<const ImuSample> at_rest) {
-  if (const auto rest = read_rest(at_rest, with_gravity(state_->options)))
+  if (const auto rest = static_reading(at_rest, with_gravity(state_->options)))
     state_->up_in_body = rest->accel_m_s2.normalized();
 }
 void Pipeline::add(const ImuSample& sample) {
@@ -323,8 +324,8 @@ GlobalMap& Pipeline::global_map() {
   return state_->merger.map();
 }
 
-std::vector<ShotName> Pipeline::wanted_shots() const {
-  std::vector<ShotName> wanted;
+std::vector<FrameKey> Pipeline::wanted_shots() const {
+  std::vector<FrameKey> wanted;
   if (const auto stamp = state_->position.wanted_arrival()) wanted.push_back({state_->pair.name, *stamp});
   const auto& looks = state_->position.wanted_looks();
   wanted.insert(wanted.end(), looks.begin(), looks.end());

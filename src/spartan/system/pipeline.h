@@ -60,7 +60,7 @@ class Pipeline {
  public:
   /// Codes: `configuration` (rig or options that do not fit; names every option that is out of its bounds).
   /// Self-masks are looked up in `mask_folder` (where the rig file lies).
-  static Result<Pipeline> create(const Rig& rig, const RunOptions& options, Workers workers,
+  static Result<Pipeline> create(const Rig& rig, const RunOptions& options, ThreadPool workers,
                                  const std::string& mask_folder = {});
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
@@ -97,7 +97,7 @@ class Pipeline {
 
   /// After restore(): the shots of the position at hand that must be looked at again before the next is added, and the
   /// way to hand them in, one after the other.
-  std::vector<ShotName> wanted_shots() const;
+  std::vector<FrameKey> wanted_shots() const;
   Status recall(const StereoFrame& frame);
 
   /// world_from_body at a moment without a pose: the last pose, moved on with the last motion's velocity.

@@ -50,7 +50,7 @@ Pose world_from_body(int shot) {
 }
 
 // Rendered when they are asked for first.
-const testing::SyntheticShot& images_of(const std::string& pair, int shot) {
+const testing::SyntheticFrame& images_of(const std::string& pair, int shot) {
   static const testing::SyntheticWorld world = [] {
     testing::SyntheticWorldOptions options;
     options.relief_m = 0.03;
@@ -58,7 +58,7 @@ const testing::SyntheticShot& images_of(const std::string& pair, int shot) {
     options.stone_size_m = 0.2;
     return testing::SyntheticWorld(options);
   }();
-  static std::map<std::pair<std::string, int>, testing::SyntheticShot> rendered;
+  static std::map<std::pair<std::string, int>, testing::SyntheticFrame> rendered;
   const auto key = std::pair(pair, shot);
   const auto found = rendered.find(key);
   if (found != rendered.end()) return found->second;
@@ -69,7 +69,7 @@ const testing::SyntheticShot& images_of(const std::string& pair, int shot) {
       .first->second;
 }
 
-StereoFrame frame_of(const testing::SyntheticShot& images, const std::string& pair, int position, double seconds) {
+StereoFrame frame_of(const testing::SyntheticFrame& images, const std::string& pair, int position, double seconds) {
   StereoFrame frame;
   frame.frame_id = position;
   frame.position_id = position;
@@ -88,19 +88,19 @@ void look_around(Pipeline& pipeline, int shot, double after_s = 1) {
 }
 
 TEST(PipelineMaps, PositionsBecomeMapsThatAreFoundInEachOther) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
   EXPECT_FALSE(drive_to(pipeline, 0).position);
   look_around(pipeline, 0);
   const FrameResult left = drive_to(pipeline, 1);
   ASSERT_TRUE(left.position) << "the first position is known when the rover has gone on";
   EXPECT_EQ(left.position->position_id, 0);
   EXPECT_EQ(left.position->views, 2) << "the narrow shot is one of its views";
-  EXPECT_EQ(left.position->merged.match.verdict, MatchVerdict::no_overlap);
+  EXPECT_EQ(left.position->merged.match.status, MatchStatus::no_overlap);
   for (int i = 2; i < kShots; ++i) EXPECT_FALSE(drive_to(pipeline, i).position) << "nobody looked around";
   look_around(pipeline, kShots - 1);
   const auto last = pipeline.leave_position().value();
   ASSERT_TRUE(last);
-  ASSERT_EQ(last->merged.match.verdict, MatchVerdict::decided) << "60 cm on, most of the ground is known";
+  ASSERT_EQ(last->merged.match.status, MatchStatus::decided) << "60 cm on, most of the ground is known";
   EXPECT_GT(last->merged.match.overlap, 0.4);
   EXPECT_LT((last->merged.corrected.pose.translation() - world_from_body(kShots - 1).translation()).norm(), 0.015);
   ASSERT_TRUE(last->merged.constraint);
@@ -109,7 +109,7 @@ TEST(PipelineMaps, PositionsBecomeMapsThatAreFoundInEachOther) {
 }
 
 TEST(PipelineMaps, TheMapIsHeardByTheLocalization) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
   FrameResult result = drive_to(pipeline, 0);
   look_around(pipeline, 0);
   for (int i = 1; i < kShots; ++i) result = drive_to(pipeline, i);
@@ -134,7 +134,7 @@ TEST(PipelineMaps, AStopMayBeLongAndTheOdometrysPairMayLookOn) {
     SCOPED_TRACE(buffer_s);
     RunOptions options;
     options.localization.buffer_s = buffer_s;
-    Pipeline pipeline = Pipeline::create(rover(), options, Workers(2)).value();
+    Pipeline pipeline = Pipeline::create(rover(), options, ThreadPool(2)).value();
     FrameResult result = drive_to(pipeline, 0);
     look_around(pipeline, 0);
     for (int i = 1; i < kShots; ++i) result = drive_to(pipeline, i);
@@ -164,7 +164,7 @@ TEST(PipelineMaps, AStopMayBeLongAndTheOdometrysPairMayLookOn) {
 }
 
 TEST(PipelineMaps, AViewMayComeBeforeTheOdometrysShot) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
   look_around(pipeline, 0, -1);
   look_around(pipeline, 0, -0.5);
   EXPECT_FALSE(drive_to(pipeline, 0).position);
@@ -181,8 +181,8 @@ TEST(PipelineMaps, AViewMayComeBeforeTheOdometrysShot) {
 
 // Stopped between two looks of the wide pair, at a shot of the narrow one.
 TEST(PipelineMaps, AStopGoesOnFromRestoredMemory) {
-  Pipeline straight = Pipeline::create(rover(), {}, Workers(1)).value(),
-           later = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline straight = Pipeline::create(rover(), {}, ThreadPool(1)).value(),
+           later = Pipeline::create(rover(), {}, ThreadPool(2)).value();
   drive_to(straight, 0);
   look_around(straight, 0);
   ASSERT_TRUE(straight.add(frame_of(images_of("narrow", 0), "narrow", 0, 1.5)).value().has_value());
@@ -195,7 +195,7 @@ TEST(PipelineMaps, AStopGoesOnFromRestoredMemory) {
   EXPECT_EQ(wanted[0].pair, "narrow");
   EXPECT_EQ(wanted[0].left_stamp, Stamp::from_seconds(0)) << "the first shot there is the one that is a view";
   EXPECT_EQ(wanted[1].pair, "wide");
-  for (const ShotName& shot : wanted)
+  for (const FrameKey& shot : wanted)
     ASSERT_TRUE(later.recall(frame_of(images_of(shot.pair, 0), shot.pair, 0, shot.left_stamp.seconds())));
   EXPECT_TRUE(later.wanted_shots().empty());
   EXPECT_EQ(straight.save(), later.save());
@@ -234,8 +234,8 @@ void expect_same_map(const LocalMap& a, const LocalMap& b) {
 
 // More views than a mask of eight bits can tell apart, saved and restored between the ninth and the tenth.
 TEST(PipelineMaps, AStopMayHaveAnyNumberOfViews) {
-  Pipeline straight = Pipeline::create(rover(), {}, Workers(1)).value(),
-           later = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline straight = Pipeline::create(rover(), {}, ThreadPool(1)).value(),
+           later = Pipeline::create(rover(), {}, ThreadPool(2)).value();
   drive_to(straight, 0);
   for (int i = 1; i <= 8; ++i) look_around(straight, 0, 0.1 * i);
   ASSERT_TRUE(straight.add(frame_of(images_of("narrow", 0), "narrow", 0, 1)).value().has_value());
@@ -245,7 +245,7 @@ TEST(PipelineMaps, AStopMayHaveAnyNumberOfViews) {
   ASSERT_TRUE(later.restore(straight.save(), tiles));
   const auto wanted = later.wanted_shots();
   ASSERT_EQ(wanted.size(), 9U);
-  for (const ShotName& shot : wanted)
+  for (const FrameKey& shot : wanted)
     ASSERT_TRUE(later.recall(frame_of(images_of(shot.pair, 0), shot.pair, 0, shot.left_stamp.seconds())));
   for (int i = 1; i <= 4; ++i) {
     look_around(straight, 0, 1 + 0.1 * i);
@@ -264,7 +264,7 @@ struct StoredRover {
   testing::TemporaryFolder folder;
   Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
   TileStore tiles = TileStore::open(db).value();
-  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
 
   // One mapped stop behind, another one at hand; then from restored memory, so that the map's tiles are in the store
   // alone.
@@ -276,10 +276,10 @@ struct StoredRover {
     look_around(pipeline, kShots - 1);
     ASSERT_TRUE(db.execute("BEGIN IMMEDIATE") && pipeline.flush_maps() && db.execute("COMMIT"));
     const Bytes memory = pipeline.save();
-    pipeline = Pipeline::create(rover(), {}, Workers(2)).value();
+    pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
     pipeline.page_maps_to(tiles);
     ASSERT_TRUE(pipeline.restore(memory, tiles));
-    for (const ShotName& shot : pipeline.wanted_shots()) {
+    for (const FrameKey& shot : pipeline.wanted_shots()) {
       const auto& images = images_of(shot.pair, kShots - 1);
       ASSERT_TRUE(pipeline.recall(frame_of(images, shot.pair, kShots - 1, shot.left_stamp.seconds())));
     }
@@ -299,7 +299,7 @@ void expect_same(const FrameResult& a, const FrameResult& b) {
   if (!a.position) return;
   EXPECT_EQ(a.position->position_id, b.position->position_id);
   EXPECT_EQ(a.position->views, b.position->views);
-  EXPECT_EQ(a.position->merged.match.verdict, b.position->merged.match.verdict);
+  EXPECT_EQ(a.position->merged.match.status, b.position->merged.match.status);
   EXPECT_EQ(a.position->merged.corrected.pose.matrix(), b.position->merged.corrected.pose.matrix());
   expect_same_map(a.position->merged.local, b.position->merged.local);
 }
@@ -339,8 +339,8 @@ TEST(PipelineMaps, ADamagedTileAdvancesNothing) {
 }
 
 TEST(PipelineMaps, FramesOfTheWrongSizeAtAStopAdvanceNothing) {
-  Pipeline seeing = Pipeline::create(rover(), {}, Workers(2)).value(),
-           sparing = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline seeing = Pipeline::create(rover(), {}, ThreadPool(2)).value(),
+           sparing = Pipeline::create(rover(), {}, ThreadPool(2)).value();
   const Image<std::uint8_t> cut(100, 100);
   const auto refused = [&](const char* pair, int position, double seconds) {
     StereoFrame frame = frame_of(images_of(pair, 0), pair, position, seconds);
@@ -365,8 +365,8 @@ TEST(PipelineMaps, FramesOfTheWrongSizeAtAStopAdvanceNothing) {
 }
 
 TEST(PipelineMaps, ViewsDoNotPileUpWhereTheOdometryIsDark) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, Workers(2)).value(),
-           other = Pipeline::create(rover(), {}, Workers(2)).value();
+  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value(),
+           other = Pipeline::create(rover(), {}, ThreadPool(2)).value();
   for (int position = 0; position < 4; ++position) {
     const StereoFrame look = frame_of(images_of("wide", 0), "wide", position, 5.0 * (position + 1));
     ASSERT_FALSE(pipeline.add(look).value().has_value());
@@ -382,7 +382,7 @@ TEST(PipelineMaps, ViewsDoNotPileUpWhereTheOdometryIsDark) {
 TEST(PipelineMaps, AreSwitchedOffByOption) {
   RunOptions options;
   options.maps = false;
-  Pipeline pipeline = Pipeline::create(rover(), options, Workers(1)).value();
+  Pipeline pipeline = Pipeline::create(rover(), options, ThreadPool(1)).value();
   drive_to(pipeline, 0);
   look_around(pipeline, 0);
   EXPECT_FALSE(drive_to(pipeline, 1).position);

@@ -14,7 +14,7 @@
 namespace spartan {
 namespace {
 
-using testing::SyntheticShot;
+using testing::SyntheticFrame;
 
 const RectifiedStereo kStereo{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
 constexpr double kHeight_m = 0.5, kTilt_rad = 0.55, kStep_m = 0.05;
@@ -47,11 +47,11 @@ Pose world_from_body(int shot) {
 }
 
 // Rendered once: the rover drives ahead over gentle ground.
-const std::vector<SyntheticShot>& shots() {
-  static const std::vector<SyntheticShot> made = [] {
+const std::vector<SyntheticFrame>& shots() {
+  static const std::vector<SyntheticFrame> made = [] {
     const testing::SyntheticWorld world(testing::SyntheticWorldOptions{});
     const Pose body_from_left = rover().body_from_camera("left");
-    std::vector<SyntheticShot> rendered;
+    std::vector<SyntheticFrame> rendered;
     rendered.reserve(5);
     for (int i = 0; i < 5; ++i) {
       rendered.push_back(world.render(kStereo, world_from_body(i) * body_from_left, static_cast<std::uint64_t>(i)));
@@ -66,14 +66,14 @@ StereoFrame frame_of(int shot) {
   frame.frame_id = shot;
   frame.pair = "narrow";
   frame.left_stamp = frame.right_stamp = Stamp{shot * 1'000'000'000LL};
-  const SyntheticShot& images = shots()[static_cast<std::size_t>(shot)];
+  const SyntheticFrame& images = shots()[static_cast<std::size_t>(shot)];
   frame.left = FrameImage::borrow(images.left.view(), {});
   frame.right = FrameImage::borrow(images.right.view(), {});
   return frame;
 }
 
 Pipeline pipeline_of(const RunOptions& options = {}, int threads = 1) {
-  return Pipeline::create(rover(), options, Workers(threads)).value();
+  return Pipeline::create(rover(), options, ThreadPool(threads)).value();
 }
 
 // A store without any map.
@@ -279,12 +279,12 @@ TEST(Pipeline, LeavesOutFramesThatDoNotFitAndGoesOn) {
 TEST(Pipeline, NeedsAPairForTheOdometry) {
   RunOptions options;
   options.odometry_pair = "rear";
-  const auto unknown = Pipeline::create(rover(), options, Workers(1));
+  const auto unknown = Pipeline::create(rover(), options, ThreadPool(1));
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().code, ErrorCode::configuration);
   Rig only_wide = rover();
   only_wide.pairs.pop_back();
-  EXPECT_FALSE(Pipeline::create(only_wide, {}, Workers(1)));
+  EXPECT_FALSE(Pipeline::create(only_wide, {}, ThreadPool(1)));
 }
 
 TEST(Pipeline, RefusesOptionsOutOfBoundsThatWereSetInCode) {
@@ -295,7 +295,7 @@ TEST(Pipeline, RefusesOptionsOutOfBoundsThatWereSetInCode) {
   options.terrain.every_m = std::numeric_limits<double>::quiet_NaN();
   options.imaging.contrast_high_percent = 101;
   options.localization.vision.drift_sigmas = {1, 2, 3};
-  const auto refused = Pipeline::create(rover(), options, Workers(1));
+  const auto refused = Pipeline::create(rover(), options, ThreadPool(1));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
   for (const char* field : {"reconstruction.p2_flat is 300", "strips is 0", "mapping.map.cell_m is 0",

@@ -24,7 +24,7 @@ Status PositionStage::pass(std::int64_t position_id, const RectifiedPair& shot, 
                            const UncertainPose& standing, const UncertainPose& moved) {
   const bool arrives = position_id >= 0 && position_id != position_id_;
   if (arrives) {
-    if (Status fits = PositionMapper::check(shot, nearest_m); !fits) return fits;
+    if (Status fits = StopMapper::check(shot, nearest_m); !fits) return fits;
   }
   std::erase_if(early_, [&](const EarlyLook& look) { return look.position_id != position_id; });
   if (position_id < 0) return {};
@@ -65,8 +65,8 @@ Status PositionStage::add(const RectifiedPair& shot, double nearest_m) {
 Status PositionStage::look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot,
                            double nearest_m) {
   if (position_id < 0) return {};
-  if (Status fits = PositionMapper::check(shot, nearest_m); !fits) return fits;
-  std::erase_if(wanted_, [&](const ShotName& w) { return w.pair == pair && w.left_stamp == shot.stamp; });
+  if (Status fits = StopMapper::check(shot, nearest_m); !fits) return fits;
+  std::erase_if(wanted_, [&](const FrameKey& w) { return w.pair == pair && w.left_stamp == shot.stamp; });
   if (position_id != position_id_) {
     // Of one position, so that they do not pile up where the odometry's pair has gone dark.
     std::erase_if(early_, [&](const EarlyLook& look) { return look.position_id != position_id; });
@@ -115,13 +115,13 @@ void PositionStage::save(ArchiveWriter& out) const {
   out.put(last_stamp_.ns);
   out.put(since_arrival_.pose);
   out.put(since_arrival_.covariance);
-  std::vector<ShotName> views = looks_;
+  std::vector<FrameKey> views = looks_;
   for (const EarlyLook& look : early_) views.push_back(look.name);
   std::vector<std::int64_t> stamps;
   stamps.reserve(views.size());
-  for (const ShotName& view : views) stamps.push_back(view.left_stamp.ns);
+  for (const FrameKey& view : views) stamps.push_back(view.left_stamp.ns);
   out.put_array(stamps.data(), stamps.size());
-  for (const ShotName& view : views) out.put(view.pair);
+  for (const FrameKey& view : views) out.put(view.pair);
 }
 
 void PositionStage::restore(ArchiveReader& in) {

@@ -12,7 +12,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
 #include "spartan/imaging/rectified_pair.h"
-#include "spartan/reconstruction/position_mapper.h"
+#include "spartan/reconstruction/stop_mapper.h"
 
 namespace spartan {
 
@@ -34,7 +34,7 @@ struct PositionSurvey {
 /// what is kept of it can be matched whenever that is due.
 class PositionStage {
  public:
-  PositionStage(const DisparityOptions& disparity, const MappingOptions& options, Workers workers)
+  PositionStage(const DisparityOptions& disparity, const MappingOptions& options, ThreadPool workers)
       : mapper_(disparity, options, std::move(workers)) {}
 
   /// A shot of the odometry's pair, wherever it is: the first one at a position is a view of it. `standing`: the body
@@ -42,14 +42,14 @@ class PositionStage {
   Status pass(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing,
               const UncertainPose& moved);
   /// A view by the pair of that name. One of a position that the odometry passes by is left out. Code `frame_rejected`
-  /// where the view cannot be matched (PositionMapper::check): nothing has changed then.
+  /// where the view cannot be matched (StopMapper::check): nothing has changed then.
   Status look(std::int64_t position_id, const std::string& pair, const RectifiedPair& shot, double nearest_m);
 
   std::int64_t position_id() const { return position_id_; }
 
   /// After restore(): the stamp of the odometry's first shot, and the looks, each to be handed in again.
   std::optional<Stamp> wanted_arrival() const;
-  const std::vector<ShotName>& wanted_looks() const { return wanted_; }
+  const std::vector<FrameKey>& wanted_looks() const { return wanted_; }
   void recall_arrival(const RectifiedPair& shot, double nearest_m);
 
   /// The position as it was seen, where other pairs looked. It stays the position at hand until leave().
@@ -57,7 +57,7 @@ class PositionStage {
   /// Nothing is kept of the position.
   void leave();
 
-  PositionMapper& mapper() { return mapper_; }
+  StopMapper& mapper() { return mapper_; }
 
   void save(ArchiveWriter& out) const;
   void restore(ArchiveReader& in);
@@ -72,18 +72,18 @@ class PositionStage {
   };
   struct EarlyLook {
     std::int64_t position_id = -1;
-    ShotName name;
+    FrameKey name;
     KeptShot shot;
     double nearest_m = 0;
   };
   Status arrive(std::int64_t position_id, const RectifiedPair& shot, double nearest_m, const UncertainPose& standing);
   Status add(const RectifiedPair& shot, double nearest_m);
 
-  PositionMapper mapper_;
+  StopMapper mapper_;
   std::int64_t position_id_ = -1;
   Stamp stamp_, last_stamp_;
   UncertainPose standing_, since_arrival_;
-  std::vector<ShotName> looks_, wanted_;
+  std::vector<FrameKey> looks_, wanted_;
   std::vector<EarlyLook> early_;  // of a position that is still to come
   std::optional<KeptShot> kept_;
   double kept_nearest_m_ = 0;

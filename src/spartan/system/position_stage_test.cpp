@@ -31,7 +31,7 @@ Bytes saved(const PositionStage& stage) {
 
 // Neither the view nor the first frame of the stop, which would have become a view with it, is kept.
 TEST(PositionStage, AViewThatCannotBeMatchedChangesNothing) {
-  PositionStage stage({}, {}, Workers(1));
+  PositionStage stage({}, {}, ThreadPool(1));
   const Shot shot;
   Shot unfit;
   unfit.right = Image<std::uint8_t>(60, 48);
@@ -46,7 +46,7 @@ TEST(PositionStage, AViewThatCannotBeMatchedChangesNothing) {
 
 // It is refused when it comes, not when the odometry's pair reaches the stop.
 TEST(PositionStage, AnEarlyViewThatCannotBeMatchedIsRefusedAtOnce) {
-  PositionStage stage({}, {}, Workers(1));
+  PositionStage stage({}, {}, ThreadPool(1));
   const Shot shot;
   Shot unfit;
   unfit.left = Image<std::uint8_t>(64, 40);
@@ -61,7 +61,7 @@ TEST(PositionStage, AnEarlyViewThatCannotBeMatchedIsRefusedAtOnce) {
 
 // The odometry's own frame is a view of the stop, too.
 TEST(PositionStage, AFirstFrameThatCannotBeMatchedChangesNothing) {
-  PositionStage stage({}, {}, Workers(1));
+  PositionStage stage({}, {}, ThreadPool(1));
   const Shot shot;
   Shot unfit;
   unfit.right = Image<std::uint8_t>(64, 40);

@@ -10,7 +10,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/process.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run_folder.h"
@@ -32,7 +32,7 @@ std::string fingerprint(const FrameSource& source) {
   mix(name_of(source.info().format));
   for (const StereoPair& pair : source.info().rig.pairs) {
     mix(pair.name);
-    for (const Stamp stamp : source.announced_stamps(pair.name)) mix(std::to_string(stamp.ns));
+    for (const Stamp stamp : source.listed_stamps(pair.name)) mix(std::to_string(stamp.ns));
   }
   return fmt::format("{:016x}", hash);
 }
@@ -134,7 +134,7 @@ Status Drive::begin() {
   shots_ = static_cast<int>(frames->size());
   for (const FrameRecord& frame : *frames) usable_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*memory)->stages, store_.tiles()); !status) return status;
-  for (const ShotName& wanted : pipeline_.wanted_shots()) {
+  for (const FrameKey& wanted : pipeline_.wanted_shots()) {
     const auto shot = source_.frame_at(wanted.pair, wanted.left_stamp);
     if (!shot) return failure(shot);
     if (Status status = pipeline_.recall(*shot); !status) return status;
@@ -194,7 +194,7 @@ Result<MapRecord> Drive::keep(const MappedPosition& position) {
   record.views = position.views;
   record.believed = position.believed;
   record.world_from_body = position.merged.corrected;
-  record.verdict = name_of(position.merged.match.verdict);
+  record.verdict = name_of(position.merged.match.status);
   record.overlap = position.merged.match.overlap;
   record.obstacles = static_cast<int>(map.obstacles.size());
   for (int y = 0; y < map.size().height; ++y) {
@@ -305,7 +305,7 @@ Status write_map(GlobalMap& map, const RunRequest& request, const RunFolder& fol
     log.warning("the global map is too large for one picture; `spartan map export --window` takes a part of it");
     return remove_map_files(folder.global_map());  // of an earlier part of the run
   }
-  return write_global_map(map, request.options.mapping.map, Workers(request.threads), folder.global_map());
+  return write_global_map(map, request.options.mapping.map, ThreadPool(request.threads), folder.global_map());
 }
 
 // What the options leave out of a run.
@@ -353,8 +353,9 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   RunOptions options = request.options;
   if (options.gravity_m_s2 == 0) options.gravity_m_s2 = info.gravity_m_s2.value_or(0);
   if (options.noise_as_stated)
-    options.localization = with_stated(options.localization, info.noise, request.given.in_group("localization"));
-  auto pipeline = Pipeline::create(info.rig, options, Workers(request.threads), mask_folder);
+    options.localization =
+        with_specified_noise(options.localization, info.noise, request.given.in_group("localization"));
+  auto pipeline = Pipeline::create(info.rig, options, ThreadPool(request.threads), mask_folder);
   if (!pipeline) return failure(pipeline);
   const auto prepared = prepare_run_folder(folder, request.resume);
   if (!prepared) return failure(prepared);
@@ -371,7 +372,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   Drive drive(request, hooks, **source, std::move(*pipeline), std::move(*store), folder);
   if (Status s = drive.begin(); !s) return failure(s);
   if (Status s = drive.drive(); !s) return failure(s);
-  if (const std::int64_t rows = (*source)->sensor_samples_left_out(); rows > 0)
+  if (const std::int64_t rows = (*source)->sensor_samples_discarded(); rows > 0)
     hooks.log.warning(fmt::format("{} sensor samples left out: their stamps run against those around them", rows));
   if (drive.usable() == 0 && !drive.stopped()) {
     // There is nothing in it, and it would be in the way of the next try.

@@ -1,4 +1,4 @@
-// The layout of a run folder (docs/formats.md, "Run folder").
+// The layout of a run folder (docs/reference/files.md).
 #pragma once
 
 #include <string>

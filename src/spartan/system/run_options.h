@@ -8,7 +8,7 @@
 #include "spartan/localization/localization_options.h"
 #include "spartan/odometry/odometry_options.h"
 #include "spartan/reconstruction/disparity_options.h"
-#include "spartan/reconstruction/position_mapper.h"
+#include "spartan/reconstruction/stop_mapper.h"
 #include "spartan/slam/slam_options.h"
 
 namespace spartan {

@@ -1,4 +1,4 @@
-// The run's database: what was found frame by frame, crash-safe (docs/formats.md, "run.sqlite").
+// The run's database: what was found frame by frame, crash-safe (docs/reference/files.md).
 #pragma once
 
 #include <functional>
@@ -51,7 +51,7 @@ struct MapRecord {
   int views = 0;
   UncertainPose believed;         ///< world_from_body before the map was looked for in the global one
   UncertainPose world_from_body;  ///< where it was put
-  std::string verdict;            ///< of the match: name_of(MatchVerdict)
+  std::string verdict;            ///< of the match: name_of(MatchStatus)
   double overlap = 0;             ///< share of its cells that the global map knew
   int known_cells = 0, obstacles = 0;
 };

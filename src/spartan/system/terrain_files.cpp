@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "spartan/core/image_io.h"
-#include "spartan/reconstruction/disparity_colour.h"
+#include "spartan/reconstruction/disparity_rendering.h"
 #include "spartan/reconstruction/point_cloud.h"
 
 namespace spartan {

@@ -14,7 +14,7 @@
 namespace spartan::testing {
 
 /// A grid of pixel coordinates over the whole image, including its borders and corners.
-inline std::vector<Eigen::Vector2d> picture_grid(ImageSize size, int steps = 16) {
+inline std::vector<Eigen::Vector2d> image_grid(ImageSize size, int steps = 16) {
   std::vector<Eigen::Vector2d> grid;
   for (int j = 0; j <= steps; ++j) {
     for (int i = 0; i <= steps; ++i)
@@ -27,7 +27,7 @@ inline std::vector<Eigen::Vector2d> picture_grid(ImageSize size, int steps = 16)
 /// the image. Points nearer than `sees_from_m` may have no projection, but never a different one.
 inline void expect_round_trips(const CameraModel& model, ImageSize size, double tolerance_px = 1e-9,
                                double sees_from_m = 0) {
-  for (const Eigen::Vector2d& pixel : picture_grid(size)) {
+  for (const Eigen::Vector2d& pixel : image_grid(size)) {
     const auto ray = unproject(model, pixel);
     ASSERT_TRUE(ray) << pixel.transpose();
     EXPECT_NEAR(ray->direction.norm(), 1, 1e-12);
@@ -45,7 +45,7 @@ inline void expect_round_trips(const CameraModel& model, ImageSize size, double 
 [[nodiscard]] inline double expect_consistent_answers(const CameraModel& model, ImageSize size,
                                                       double tolerance_px = 1e-9) {
   int with_ray = 0, tested = 0;
-  for (const Eigen::Vector2d& pixel : picture_grid({3 * size.width, 3 * size.height}, 48)) {
+  for (const Eigen::Vector2d& pixel : image_grid({3 * size.width, 3 * size.height}, 48)) {
     ++tested;
     const Eigen::Vector2d shifted = pixel - Eigen::Vector2d(size.width, size.height);
     const auto ray = unproject(model, shifted);
@@ -62,7 +62,7 @@ inline void expect_round_trips(const CameraModel& model, ImageSize size, double 
 
 /// ∂pixel/∂point against central differences; the tolerance is relative to its norm.
 inline void expect_true_jacobians(const CameraModel& model, ImageSize size, double tolerance = 1e-6) {
-  for (const Eigen::Vector2d& pixel : picture_grid(size, 6)) {
+  for (const Eigen::Vector2d& pixel : image_grid(size, 6)) {
     const auto ray = unproject(model, pixel);
     ASSERT_TRUE(ray) << pixel.transpose();
     for (const double depth : {0.5, 20.0}) {
@@ -79,7 +79,7 @@ inline void expect_true_jacobians(const CameraModel& model, ImageSize size, doub
 
 /// Points behind a camera with less than 180° field of view, and coordinates that are not finite, have no projection;
 /// no projection and no ray contains NaN.
-inline void expect_honest_limits(const CameraModel& model, bool sees_beside = false) {
+inline void expect_defined_limits(const CameraModel& model, bool sees_beside = false) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(project(model, {0, 0, 0}));
   EXPECT_EQ(project(model, {0.1, 0, 0}).has_value(), sees_beside);

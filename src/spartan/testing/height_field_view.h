@@ -41,7 +41,7 @@ inline Image<float> disparity_of(const std::function<double(double, double)>& he
 }
 
 /// body_from_left of a camera `height_m` above the body's origin, panned to the left and tilted down.
-inline Pose looking(double height_m, double pan_rad, double tilt_rad, const Pose& optical_from_forward) {
+inline Pose camera_pose_at(double height_m, double pan_rad, double tilt_rad, const Pose& optical_from_forward) {
   const Eigen::Quaterniond rotation =
       Eigen::AngleAxisd(pan_rad, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY());
   return Pose(rotation, {0, 0, height_m}) * optical_from_forward.inverse();

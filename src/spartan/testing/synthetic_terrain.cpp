@@ -55,9 +55,9 @@ SyntheticTerrain::SyntheticTerrain(const SyntheticWorldOptions& options) : optio
                           std::ldexp(options.texture_size_m, kTextureOctaves - 1), 1.0, options.contrast);
   double slope_squares = 0, curvature_squares = 0;
   for (const Octave& octave : relief_) {
-    relief_top_ += octave.amplitude * kNoiseHighest;
-    slope_squares += std::pow(octave.amplitude / octave.size * kNoiseSteepest, 2);
-    curvature_squares += std::pow(octave.amplitude / (octave.size * octave.size) * kNoiseMostCurved, 2);
+    relief_top_ += octave.amplitude * kNoiseMaxValue;
+    slope_squares += std::pow(octave.amplitude / octave.size * kNoiseMaxSlope, 2);
+    curvature_squares += std::pow(octave.amplitude / (octave.size * octave.size) * kNoiseMaxCurvature, 2);
   }
   // The octaves do not have their extremes at the same points: the root of the sum of squares is a sufficient bound.
   steepest_ = std::sqrt(slope_squares);
@@ -71,10 +71,11 @@ SyntheticTerrain::SyntheticTerrain(const SyntheticWorldOptions& options) : optio
 // A stone lies wholly inside its cell, so that only one cell has to be searched.
 std::optional<SyntheticTerrain::Stone> SyntheticTerrain::stone_of_cell(double cell_x, double cell_y) const {
   const auto seed = static_cast<std::uint32_t>(options_.seed * 3);
-  const std::uint32_t first = mix(static_cast<std::int32_t>(cell_x), static_cast<std::int32_t>(cell_y), seed);
+  const std::uint32_t first =
+      hash_coordinates(static_cast<std::int32_t>(cell_x), static_cast<std::int32_t>(cell_y), seed);
   if (fraction(first) > kStoneProbability) return std::nullopt;
-  const std::uint32_t second = mix(static_cast<std::int32_t>(first), 1, seed);
-  const std::uint32_t third = mix(static_cast<std::int32_t>(first), 2, seed);
+  const std::uint32_t second = hash_coordinates(static_cast<std::int32_t>(first), 1, seed);
+  const std::uint32_t third = hash_coordinates(static_cast<std::int32_t>(first), 2, seed);
   const double small = fraction(first >> 16U);
   Stone stone{};
   stone.half_long = options_.stone_size_m / 2 * (0.3 + 0.7 * small * small);  // mostly small

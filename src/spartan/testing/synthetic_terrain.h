@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "spartan/core/smooth_noise.h"
+#include "spartan/core/gradient_noise.h"
 
 namespace spartan::testing {
 

@@ -146,8 +146,8 @@ Image<std::uint8_t> SyntheticWorld::render_image(const View& view, ImageView<con
   return image;
 }
 
-SyntheticShot SyntheticWorld::render(const RectifiedStereo& stereo, const Pose& world_from_left,
-                                     std::uint64_t noise_seed) const {
+SyntheticFrame SyntheticWorld::render(const RectifiedStereo& stereo, const Pose& world_from_left,
+                                      std::uint64_t noise_seed) const {
   const Eigen::Matrix3d axes = world_from_left.rotation_matrix();
   const View left{stereo.size, stereo.focal_px, stereo.centre_px, world_from_left.translation(), axes, 0};
   const View right{stereo.size,
@@ -158,9 +158,9 @@ SyntheticShot SyntheticWorld::render(const RectifiedStereo& stereo, const Pose& 
                    1};
   const Image<double> depth = measure_depth(left), right_depth = measure_depth(right);
 
-  SyntheticShot frame{render_image(left, depth, noise_seed), render_image(right, right_depth, noise_seed),
-                      Image<float>(stereo.size.width, stereo.size.height, std::numeric_limits<float>::quiet_NaN()),
-                      Image<std::uint8_t>(stereo.size)};
+  SyntheticFrame frame{render_image(left, depth, noise_seed), render_image(right, right_depth, noise_seed),
+                       Image<float>(stereo.size.width, stereo.size.height, std::numeric_limits<float>::quiet_NaN()),
+                       Image<std::uint8_t>(stereo.size)};
   for (int v = 0; v < stereo.size.height; ++v) {
     for (int u = 0; u < stereo.size.width; ++u) {
       if (depth(u, v) <= 0) continue;

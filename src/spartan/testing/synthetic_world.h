@@ -11,7 +11,7 @@
 namespace spartan::testing {
 
 /// A stereo frame with its ground truth.
-struct SyntheticShot {
+struct SyntheticFrame {
   Image<std::uint8_t> left, right;
   Image<float> disparity;    ///< px of the left image; NaN where the ray hits nothing
   Image<std::uint8_t> mask;  ///< 255 visible in both cameras, 128 in the left one only, 0 no truth
@@ -27,7 +27,7 @@ class SyntheticWorld {
   double relief(double x, double y) const;
   /// `world_from_left`: left optical frame (x right, y down, z forward) in the world (z up). `noise_seed` changes the
   /// image noise only.
-  SyntheticShot render(const RectifiedStereo& stereo, const Pose& world_from_left, std::uint64_t noise_seed) const;
+  SyntheticFrame render(const RectifiedStereo& stereo, const Pose& world_from_left, std::uint64_t noise_seed) const;
 
  private:
   struct View;

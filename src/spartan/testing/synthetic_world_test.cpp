@@ -32,7 +32,7 @@ double sample(const Image<std::uint8_t>& image, double x, int y) {
 }
 
 // Median |left − right warped onto it| with the truth shifted by `error_px`.
-double warp_difference(const SyntheticShot& frame, double error_px) {
+double warp_difference(const SyntheticFrame& frame, double error_px) {
   std::vector<double> differences;
   for (int v = 0; v < frame.left.height(); ++v) {
     for (int u = 0; u < frame.left.width(); ++u) {
@@ -71,10 +71,10 @@ TEST(SmoothNoise, HasItsDocumentedDeviationBoundsAndDerivatives) {
     EXPECT_NEAR(here.dy, (value(x, y + kStep) - value(x, y - kStep)) / (2 * kStep), 1e-6);
   }
   EXPECT_NEAR(std::sqrt(square / kCount), kNoiseSigma, 0.003);
-  EXPECT_LT(steepest, kNoiseSteepest);
-  EXPECT_LT(most_curved, kNoiseMostCurved);
-  EXPECT_GT(most_curved, 0.6 * kNoiseMostCurved);
-  EXPECT_GT(steepest, 0.8 * kNoiseSteepest);
+  EXPECT_LT(steepest, kNoiseMaxSlope);
+  EXPECT_LT(most_curved, kNoiseMaxCurvature);
+  EXPECT_GT(most_curved, 0.6 * kNoiseMaxCurvature);
+  EXPECT_GT(steepest, 0.8 * kNoiseMaxSlope);
 }
 
 TEST(SyntheticTerrain, RaysEndAtTheFirstPointOnTheGround) {
@@ -125,7 +125,7 @@ TEST(SyntheticTerrain, NoRayOfAClearConeHitsTheGround) {
 TEST(SyntheticWorld, TruthDisparityWarpsRightOntoLeft) {
   for (const auto& options : {SyntheticWorldOptions{}, stony()}) {
     const SyntheticWorld world(options);
-    const SyntheticShot frame = world.render(narrow_pair(), looking_down(0.3, 0.55), 7);
+    const SyntheticFrame frame = world.render(narrow_pair(), looking_down(0.3, 0.55), 7);
     const double exact = warp_difference(frame, 0);
     // Noise of 1 level in both images: the median |difference| is about 0.67 · √(1 + 2/3) = 0.87.
     EXPECT_LT(exact, 1.4);
@@ -140,7 +140,7 @@ TEST(SyntheticWorld, KnownPointsProjectWhereTheyShould) {
   const SyntheticWorld world(options);
   const RectifiedStereo stereo = narrow_pair();
   const Pose world_from_left = looking_down(world.relief(1.0, -2.0) + 0.6, 0.55, 1.0, -2.0);
-  const SyntheticShot frame = world.render(stereo, world_from_left, 1);
+  const SyntheticFrame frame = world.render(stereo, world_from_left, 1);
   Random random(3);
   int seen = 0, off = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -164,7 +164,7 @@ TEST(SyntheticWorld, KnownPointsProjectWhereTheyShould) {
 TEST(SyntheticWorld, TrueDisparitiesTriangulateToTheGround) {
   const SyntheticWorld world(stony());
   const Pose world_from_left = looking_down(0.4, 0.55);
-  const SyntheticShot frame = world.render(narrow_pair(), world_from_left, 1);
+  const SyntheticFrame frame = world.render(narrow_pair(), world_from_left, 1);
   for (int v = 60; v < 240; v += 7) {
     for (int u = 0; u < 320; u += 7) {
       const Eigen::Vector3d p =
@@ -178,7 +178,7 @@ TEST(SyntheticWorld, MaskMarksOcclusionsInTheRightImage) {
   const SyntheticWorld world(stony());
   const RectifiedStereo stereo = narrow_pair();
   const Pose world_from_left = looking_down(0.3, 0.4);
-  const SyntheticShot frame = world.render(stereo, world_from_left, 1);
+  const SyntheticFrame frame = world.render(stereo, world_from_left, 1);
   const Eigen::Vector3d right_centre = world_from_left * Eigen::Vector3d(stereo.baseline_m, 0, 0);
   int inside = 0, disagreements = 0, hidden = 0;
   for (int v = 0; v < stereo.size.height; v += 3) {

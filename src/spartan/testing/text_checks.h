@@ -18,7 +18,7 @@ inline std::string replaced(std::string text, const std::string& what, const std
 
 /// The message of an error, whose code must be `configuration`; "nothing" if the result has a value.
 template <class T>
-std::string complaint(const Result<T>& read) {
+std::string error_message(const Result<T>& read) {
   if (read) return "nothing";
   EXPECT_EQ(read.error().code, ErrorCode::configuration);
   return read.error().message();

@@ -114,8 +114,8 @@ void write_tiny_spartan(const TemporaryFolder& folder, int frames, double period
   must(writer->finish());
 }
 
-Played play(FrameSource& source) {
-  Played played;
+CollectedSamples collect_samples(FrameSource& source) {
+  CollectedSamples played;
   for (;;) {
     auto sample = source.next();
     if (!sample) {

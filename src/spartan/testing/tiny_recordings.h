@@ -32,13 +32,13 @@ void write_tiny_euroc(const TemporaryFolder& folder, const std::vector<std::int6
 void write_tiny_spartan(const TemporaryFolder& folder, int frames, double period_s = 0.1);
 
 /// All samples of a source, by kind and in the order of arrival.
-struct Played {
+struct CollectedSamples {
   std::vector<Sample> all;
   std::vector<StereoFrame> frames;
   std::vector<MissingFrame> missing;
   std::string error;  ///< that ended the reading; empty at the end of the source
 };
-Played play(FrameSource& source);
+CollectedSamples collect_samples(FrameSource& source);
 
 /// Frame ids of the frames, or of the missing frames.
 std::vector<std::int64_t> ids_of(const std::vector<StereoFrame>& frames);

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {

@@ -141,11 +141,11 @@ PanRequirements read_pans(YamlMap map) {
 
 PublishedPair read_published(YamlMap map) {
   PublishedPair published;
-  published.shape.baseline_m = bounded(map, "baseline_m", kLength_m).value_or(1);
-  published.shape.nearest_m = bounded(map, "nearest_m", kLength_m).value_or(1);
-  published.shape.hfov_deg = bounded(map, "hfov_deg", kView_deg).value_or(1);
-  published.shape.pixel_size_um = bounded(map, "pixel_size_um", kPixel_um).value_or(1);
-  published.shape.width_px = whole(map, "width_px", kSide_px).value_or(1);
+  published.parameters.baseline_m = bounded(map, "baseline_m", kLength_m).value_or(1);
+  published.parameters.nearest_m = bounded(map, "nearest_m", kLength_m).value_or(1);
+  published.parameters.hfov_deg = bounded(map, "hfov_deg", kView_deg).value_or(1);
+  published.parameters.pixel_size_um = bounded(map, "pixel_size_um", kPixel_um).value_or(1);
+  published.parameters.width_px = whole(map, "width_px", kSide_px).value_or(1);
   if (map.optional_node("height_px")) published.height_px = whole(map, "height_px", kSide_px);
   published.vfov_deg = optional_bounded(map, "vfov_deg", kView_deg);
   published.focal_length_mm = optional_bounded(map, "focal_length_mm", {1e-3, 1e5});
@@ -200,7 +200,7 @@ void read_limits(YamlMap& map, PairRequirements& pair) {
 
 // Consistency of several values; checked only where each value is valid by itself.
 void check_consistency(YamlMap& map, const PairRequirements& pair) {
-  const auto valid = [&](const char* key) { return !map.errors().touches(map.path(key)); };
+  const auto valid = [&](const char* key) { return !map.errors().has_error_near(map.path(key)); };
   if (valid("height_m") && valid("smallest_height_m") && pair.height_m < pair.smallest_height_m) {
     map.add_error("height_m", fmt::format("is {}, below smallest_height_m, {}", pair.height_m, pair.smallest_height_m));
   }
@@ -212,7 +212,7 @@ void check_consistency(YamlMap& map, const PairRequirements& pair) {
   if (!pair.published || !valid("published") || !valid("rows_per_column")) return;
   const PublishedPair& published = *pair.published;
   const double vfov_deg = published.vfov_deg.value_or(
-      vertical_view_rad(published.shape.hfov_deg * kRadiansPerDegree, pair.published_rows_per_column()) /
+      vertical_view_rad(published.parameters.hfov_deg * kRadiansPerDegree, pair.published_rows_per_column()) /
       kRadiansPerDegree);
   if (published.tilt_deg && *published.tilt_deg <= vfov_deg / 2) {
     map.add_error("published.tilt_deg",
@@ -272,7 +272,7 @@ double PanRequirements::widest_step_deg() const {
 
 double PairRequirements::published_rows_per_column() const {
   if (!published || !published->height_px) return rows_per_column;
-  return static_cast<double>(*published->height_px) / published->shape.width_px;
+  return static_cast<double>(*published->height_px) / published->parameters.width_px;
 }
 
 Result<RigRequirements> parse_requirements(const std::string& text, const std::string& name) {

@@ -11,13 +11,13 @@
 namespace spartan {
 
 /// The design parameters of a pair, in the units of the file so that a listed 0.15 stays exactly 0.15.
-struct PairShape {
+struct PairParameters {
   double baseline_m = 0;
   double nearest_m = 0;  ///< d_min, the smallest depth to match
   double hfov_deg = 0;
   double pixel_size_um = 0;
   int width_px = 0;
-  friend bool operator==(const PairShape&, const PairShape&) = default;
+  friend bool operator==(const PairParameters&, const PairParameters&) = default;
 };
 
 /// The candidate values; every combination is evaluated.
@@ -43,7 +43,7 @@ struct PanRequirements {
 
 /// A published pair, as its source describes it, to be checked against the requirements.
 struct PublishedPair {
-  PairShape shape;
+  PairParameters parameters;
   std::optional<int> height_px;  ///< default: by PairRequirements::rows_per_column
   std::optional<double> vfov_deg, focal_length_mm, tilt_deg;
 };

@@ -37,8 +37,8 @@ wide:
   order: [range_margin]
 )";
 
-std::string complaint(const std::string& what, const std::string& with) {
-  return testing::complaint(parse_requirements(replaced(kGood, what, with), "my.yaml"));
+std::string error_message(const std::string& what, const std::string& with) {
+  return testing::error_message(parse_requirements(replaced(kGood, what, with), "my.yaml"));
 }
 
 TEST(Requirements, ReadsAMinimalFile) {
@@ -107,37 +107,37 @@ TEST(Requirements, ShippedFilesHoldThePublishedLists) {
 }
 
 TEST(Requirements, EachErrorIsReportedWithItsLine) {
-  EXPECT_THAT(complaint("range_m: 4", "range_m: nan"), HasSubstr("my.yaml:3: wide.range_m: is nan"));
-  EXPECT_THAT(complaint("range_m: 4", "range_m: -4"), HasSubstr("my.yaml:3: wide.range_m: is -4"));
-  EXPECT_THAT(complaint("  range_m: 4\n", ""), HasSubstr("wide.range_m: is missing"));
-  EXPECT_THAT(complaint("schema: 1", "schema: 2"), HasSubstr("reads schema 1"));
-  EXPECT_THAT(complaint("[780, 1120]", "[780, 780]"),
+  EXPECT_THAT(error_message("range_m: 4", "range_m: nan"), HasSubstr("my.yaml:3: wide.range_m: is nan"));
+  EXPECT_THAT(error_message("range_m: 4", "range_m: -4"), HasSubstr("my.yaml:3: wide.range_m: is -4"));
+  EXPECT_THAT(error_message("  range_m: 4\n", ""), HasSubstr("wide.range_m: is missing"));
+  EXPECT_THAT(error_message("schema: 1", "schema: 2"), HasSubstr("reads schema 1"));
+  EXPECT_THAT(error_message("[780, 1120]", "[780, 780]"),
               HasSubstr("my.yaml:11: wide.candidates.widths_px: holds 780 twice"));
-  EXPECT_THAT(complaint("[780, 1120]", "[780.5]"), HasSubstr("whole numbers"));
-  EXPECT_THAT(complaint("[780, 1120]", "[]"), HasSubstr("must have 1 to"));
-  EXPECT_THAT(complaint("[780, 1120]", "7"), HasSubstr("{from, to, step}"));
-  EXPECT_THAT(complaint("[5.5]", "[wide]"), HasSubstr("numbers only"));
-  EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.305, step: 0.01"),
+  EXPECT_THAT(error_message("[780, 1120]", "[780.5]"), HasSubstr("whole numbers"));
+  EXPECT_THAT(error_message("[780, 1120]", "[]"), HasSubstr("must have 1 to"));
+  EXPECT_THAT(error_message("[780, 1120]", "7"), HasSubstr("{from, to, step}"));
+  EXPECT_THAT(error_message("[5.5]", "[wide]"), HasSubstr("numbers only"));
+  EXPECT_THAT(error_message("to: 0.30, step: 0.01", "to: 0.305, step: 0.01"),
               HasSubstr("does not divide the range from 0.05 to 0.305 evenly"));
-  EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.30, step: 0"), HasSubstr("must be positive"));
-  EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.01, step: 0.01"), HasSubstr("below from"));
-  EXPECT_THAT(complaint("to: 0.30, step: 0.01", "to: 0.30, step: 1e-9"), HasSubstr("more than 1000 values"));
-  EXPECT_THAT(complaint("hfov_deg: [50]", "hfov_deg: [190]"), HasSubstr("between 0.1 and 179"));
-  EXPECT_THAT(complaint("[range_margin]", "[cheapest]"), HasSubstr("wide.order"));
-  EXPECT_THAT(complaint("[range_margin]", "[range_margin, range_margin]"), HasSubstr("twice"));
-  EXPECT_THAT(complaint("height_m: 1", "height_m: 1\n  smallest_height_m: 1.5"),
+  EXPECT_THAT(error_message("to: 0.30, step: 0.01", "to: 0.30, step: 0"), HasSubstr("must be positive"));
+  EXPECT_THAT(error_message("to: 0.30, step: 0.01", "to: 0.01, step: 0.01"), HasSubstr("below from"));
+  EXPECT_THAT(error_message("to: 0.30, step: 0.01", "to: 0.30, step: 1e-9"), HasSubstr("more than 1000 values"));
+  EXPECT_THAT(error_message("hfov_deg: [50]", "hfov_deg: [190]"), HasSubstr("between 0.1 and 179"));
+  EXPECT_THAT(error_message("[range_margin]", "[cheapest]"), HasSubstr("wide.order"));
+  EXPECT_THAT(error_message("[range_margin]", "[range_margin, range_margin]"), HasSubstr("twice"));
+  EXPECT_THAT(error_message("height_m: 1", "height_m: 1\n  smallest_height_m: 1.5"),
               HasSubstr("below smallest_height_m, 1.5"));
-  EXPECT_THAT(complaint("tilt_step_deg: 1", "tilt_step_deg: 15"), HasSubstr("14.036 degrees below the horizon"));
+  EXPECT_THAT(error_message("tilt_step_deg: 1", "tilt_step_deg: 15"), HasSubstr("14.036 degrees below the horizon"));
+  EXPECT_THAT(error_message("  order",
+                            "  pans: {angles_deg: [0, 400], azimuth_deg: 90, smallest_overlap_percent: 25}\n  order"),
+              HasSubstr("wide.pans.angles_deg: holds 400"));
   EXPECT_THAT(
-      complaint("  order", "  pans: {angles_deg: [0, 400], azimuth_deg: 90, smallest_overlap_percent: 25}\n  order"),
-      HasSubstr("wide.pans.angles_deg: holds 400"));
-  EXPECT_THAT(
-      complaint("  order",
-                "  published: {baseline_m: 0.2, nearest_m: 1, hfov_deg: 50, pixel_size_um: 5.5, width_px: 1120, "
-                "tilt_deg: 20}\n  order"),
+      error_message("  order",
+                    "  published: {baseline_m: 0.2, nearest_m: 1, hfov_deg: 50, pixel_size_um: 5.5, width_px: 1120, "
+                    "tilt_deg: 20}\n  order"),
       HasSubstr("wide.published.tilt_deg: is 20, so the top row, 25.00 degrees higher, would be above the horizon"));
-  EXPECT_THAT(complaint("  order", "  nonsense: 1\n  order"), HasSubstr("wide.nonsense: unknown key"));
-  EXPECT_THAT(complaint("wide:", "wide: 3\nmore:"), HasSubstr("wide: must be a group"));
+  EXPECT_THAT(error_message("  order", "  nonsense: 1\n  order"), HasSubstr("wide.nonsense: unknown key"));
+  EXPECT_THAT(error_message("wide:", "wide: 3\nmore:"), HasSubstr("wide: must be a group"));
 }
 
 TEST(Requirements, AllErrorsAreReportedAtOnce) {
@@ -169,15 +169,14 @@ TEST(Requirements, MissingFileIsAnInputError) {
 TEST(Requirements, DocumentationNamesEveryKey) {
   const std::string text = testing::doc_example("requirements.yaml");
   ASSERT_FALSE(text.empty());
-  const auto read = parse_requirements(text, "docs/formats.md");
+  const auto read = parse_requirements(text, "docs/reference/requirements.md");
   ASSERT_TRUE(read) << read.error().message();
-  std::ifstream file(testing::source_folder() + "/docs/formats.md");
-  const std::string page((std::istreambuf_iterator<char>(file)), {});
+  const std::string page = testing::reference_page("requirements");
   const std::string table = page.substr(page.find("| key", page.find("requirements.yaml -->")));
-  const std::string known = complaint("  order", "  nonsense: 1\n  order") +
-                            complaint("    nearest_m", "    nonsense: 1\n    nearest_m") +
-                            complaint("  order", "  pans: {nonsense: 1}\n  order") +
-                            complaint("  order", "  published: {nonsense: 1}\n  order");
+  const std::string known = error_message("  order", "  nonsense: 1\n  order") +
+                            error_message("    nearest_m", "    nonsense: 1\n    nearest_m") +
+                            error_message("  order", "  pans: {nonsense: 1}\n  order") +
+                            error_message("  order", "  published: {nonsense: 1}\n  order");
   for (const char* key : {"range_m",
                           "range_resolution_m",
                           "disparity_accuracy_px",

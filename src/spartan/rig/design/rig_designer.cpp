@@ -35,14 +35,14 @@ double tilt_for_range_deg(double vfov_deg, const PairRequirements& requirements)
 }
 
 // Everything except field of view and tilt.
-PairFigures stereo_figures(const PairShape& shape, const PairRequirements& requirements) {
-  const double hfov_rad = shape.hfov_deg * kRadiansPerDegree;
-  const double angle_rad = stereo_angle_rad(shape.baseline_m, shape.nearest_m);
-  PairFigures pair;
-  pair.shape = shape;
-  pair.range_m =
-      max_range_m({shape.baseline_m, static_cast<double>(shape.width_px), hfov_rad}, accuracy_of(requirements));
-  pair.focal_length_mm = focal_length_mm(shape.pixel_size_um, shape.width_px, hfov_rad);
+PairMetrics stereo_figures(const PairParameters& parameters, const PairRequirements& requirements) {
+  const double hfov_rad = parameters.hfov_deg * kRadiansPerDegree;
+  const double angle_rad = stereo_angle_rad(parameters.baseline_m, parameters.nearest_m);
+  PairMetrics pair;
+  pair.parameters = parameters;
+  pair.range_m = max_range_m({parameters.baseline_m, static_cast<double>(parameters.width_px), hfov_rad},
+                             accuracy_of(requirements));
+  pair.focal_length_mm = focal_length_mm(parameters.pixel_size_um, parameters.width_px, hfov_rad);
   pair.stereo_angle_deg = angle_rad / kRadiansPerDegree;
   pair.search_percent = search_percent(angle_rad, hfov_rad);
   const bool pans = requirements.pans && requirements.pans->angles_deg.size() > 1;
@@ -50,7 +50,7 @@ PairFigures stereo_figures(const PairShape& shape, const PairRequirements& requi
       pans ? overlap_percent(hfov_rad, requirements.pans->widest_step_deg() * kRadiansPerDegree) : kNan;
   pair.margins = {pair.range_m - requirements.range_m, requirements.largest_stereo_angle_deg - pair.stereo_angle_deg,
                   requirements.largest_search_percent - pair.search_percent,
-                  shape.baseline_m - requirements.smallest_baseline_m,
+                  parameters.baseline_m - requirements.smallest_baseline_m,
                   pans ? pair.pan_overlap_percent - requirements.pans->smallest_overlap_percent : kNan};
   const PairMargins& margins = pair.margins;
   pair.feasible = holds(margins.range_m) && holds(margins.stereo_angle_deg) && holds(margins.search_percent) &&
@@ -59,7 +59,7 @@ PairFigures stereo_figures(const PairShape& shape, const PairRequirements& requi
   return pair;
 }
 
-void add_view(PairFigures& pair, double vfov_deg, double tilt_deg, const PairRequirements& requirements) {
+void add_view(PairMetrics& pair, double vfov_deg, double tilt_deg, const PairRequirements& requirements) {
   pair.vfov_deg = vfov_deg;
   pair.tilt_deg = tilt_deg;
   const GroundView view = ground_view(pair, requirements);
@@ -79,7 +79,7 @@ void for_every_shape(const CandidateLists& lists, const Visit& visit) {
       for (const double hfov_deg : lists.hfov_deg) {
         for (const double pixel_size_um : lists.pixel_sizes_um) {
           for (const int width_px : lists.widths_px) {
-            visit(PairShape{baseline_m, nearest_m, hfov_deg, pixel_size_um, width_px});
+            visit(PairParameters{baseline_m, nearest_m, hfov_deg, pixel_size_um, width_px});
           }
         }
       }
@@ -88,7 +88,7 @@ void for_every_shape(const CandidateLists& lists, const Visit& visit) {
 }
 
 // Smallest distance of a computed value from its limit, relative to that limit. The baseline is given, not computed.
-double distance_to_limits(const PairFigures& pair, const PairRequirements& requirements) {
+double distance_to_limits(const PairMetrics& pair, const PairRequirements& requirements) {
   const PairMargins& margins = pair.margins;
   double nearest = std::min({std::abs(margins.range_m) / requirements.range_m,
                              std::abs(margins.stereo_angle_deg) / requirements.largest_stereo_angle_deg,
@@ -99,31 +99,31 @@ double distance_to_limits(const PairFigures& pair, const PairRequirements& requi
 }
 
 void search(const PairRequirements& requirements, PairDesign& design) {
-  for_every_shape(requirements.lists, [&](const PairShape& shape) {
-    const PairFigures pair = stereo_figures(shape, requirements);
-    design.nearest_to_a_limit = std::min(design.nearest_to_a_limit, distance_to_limits(pair, requirements));
-    if (pair.feasible) design.feasible.push_back(metrics_of(shape, requirements));
+  for_every_shape(requirements.lists, [&](const PairParameters& parameters) {
+    const PairMetrics pair = stereo_figures(parameters, requirements);
+    design.smallest_limit_distance = std::min(design.smallest_limit_distance, distance_to_limits(pair, requirements));
+    if (pair.feasible) design.feasible.push_back(metrics_of(parameters, requirements));
   });
 }
 
-double value_of(const PairFigures& pair, DesignCriterion criterion) {
+double value_of(const PairMetrics& pair, DesignCriterion criterion) {
   switch (criterion) {
     case DesignCriterion::range_margin:
       return pair.margins.range_m;
     case DesignCriterion::pan_overlap:
       return std::isnan(pair.pan_overlap_percent) ? 0 : pair.pan_overlap_percent;
     case DesignCriterion::shorter_baseline:
-      return -pair.shape.baseline_m;
+      return -pair.parameters.baseline_m;
   }
   return 0;
 }
 
 // The rank of each pair by one criterion, 0 for the best. Values within the tolerance of their neighbour in sorted
 // order share a rank.
-std::vector<std::uint32_t> ranks_by(DesignCriterion criterion, const std::vector<PairFigures>& pairs) {
+std::vector<std::uint32_t> ranks_by(DesignCriterion criterion, const std::vector<PairMetrics>& pairs) {
   std::vector<std::pair<double, std::uint32_t>> descending;
   descending.reserve(pairs.size());
-  for (const PairFigures& pair : pairs) {
+  for (const PairMetrics& pair : pairs) {
     descending.emplace_back(value_of(pair, criterion), static_cast<std::uint32_t>(descending.size()));
   }
   std::sort(descending.begin(), descending.end(), std::greater<>());
@@ -137,9 +137,9 @@ std::vector<std::uint32_t> ranks_by(DesignCriterion criterion, const std::vector
 }
 
 // Moves to each position i the pair at from[i], in place.
-void permute(std::vector<PairFigures>& pairs, std::vector<std::uint32_t> from) {
+void permute(std::vector<PairMetrics>& pairs, std::vector<std::uint32_t> from) {
   for (std::uint32_t start = 0; start < from.size(); ++start) {
-    const PairFigures first = pairs[start];
+    const PairMetrics first = pairs[start];
     std::uint32_t position = start;
     while (from[position] != start) {
       pairs[position] = pairs[from[position]];
@@ -174,10 +174,11 @@ bool holds_value(const std::vector<Value>& list, Value value) {
   return std::any_of(list.begin(), list.end(), [&](Value listed) { return std::abs(listed - value) < kTolerance; });
 }
 
-bool is_candidate(const PairShape& shape, const CandidateLists& lists) {
-  return holds_value(lists.baselines_m, shape.baseline_m) && holds_value(lists.nearest_m, shape.nearest_m) &&
-         holds_value(lists.hfov_deg, shape.hfov_deg) && holds_value(lists.pixel_sizes_um, shape.pixel_size_um) &&
-         holds_value(lists.widths_px, shape.width_px);
+bool is_candidate(const PairParameters& parameters, const CandidateLists& lists) {
+  return holds_value(lists.baselines_m, parameters.baseline_m) && holds_value(lists.nearest_m, parameters.nearest_m) &&
+         holds_value(lists.hfov_deg, parameters.hfov_deg) &&
+         holds_value(lists.pixel_sizes_um, parameters.pixel_size_um) &&
+         holds_value(lists.widths_px, parameters.width_px);
 }
 
 PairDesign design_pair(const PairRequirements& requirements) {
@@ -186,55 +187,56 @@ PairDesign design_pair(const PairRequirements& requirements) {
   search(requirements, design);
   sort_by_criteria(design, requirements.order);
   if (requirements.pans && requirements.pans->angles_deg.size() > 1) {
-    const auto overlaps = [](const PairFigures& pair) { return pair.with_pan_overlap; };
+    const auto overlaps = [](const PairMetrics& pair) { return pair.with_pan_overlap; };
     design.with_pan_overlap_count = std::count_if(design.feasible.begin(), design.feasible.end(), overlaps);
     const auto best = std::find_if(design.feasible.begin(), design.feasible.end(), overlaps);
     if (best != design.feasible.end()) design.best_with_pan_overlap = *best;
   }
   if (requirements.published) {
     design.published = published_metrics(requirements);
-    design.published_on_offer = is_candidate(requirements.published->shape, requirements.lists);
+    design.published_is_candidate = is_candidate(requirements.published->parameters, requirements.lists);
   }
   return design;
 }
 
 // Whether both cameras of the pair see common ground.
-bool shares_ground(const PairFigures& pair, const PairRequirements& requirements) {
+bool shares_ground(const PairMetrics& pair, const PairRequirements& requirements) {
   return !common_footprint(ground_view(pair, requirements), 0).empty();
 }
 
 }  // namespace
 
-const PairFigures* PairDesign::chosen() const {
+const PairMetrics* PairDesign::selected() const {
   if (published) return &*published;
   return best_with_pan_overlap ? &*best_with_pan_overlap : best();
 }
 
-PairFigures metrics_of(const PairShape& shape, const PairRequirements& requirements) {
-  PairFigures pair = stereo_figures(shape, requirements);
-  const double vfov_deg = square_pixel_view_deg(shape.hfov_deg, requirements.rows_per_column);
+PairMetrics metrics_of(const PairParameters& parameters, const PairRequirements& requirements) {
+  PairMetrics pair = stereo_figures(parameters, requirements);
+  const double vfov_deg = square_pixel_view_deg(parameters.hfov_deg, requirements.rows_per_column);
   add_view(pair, vfov_deg, tilt_for_range_deg(vfov_deg, requirements), requirements);
   return pair;
 }
 
-PairFigures published_metrics(const PairRequirements& requirements) {
+PairMetrics published_metrics(const PairRequirements& requirements) {
   const PublishedPair& published = requirements.published.value();
-  PairFigures pair = stereo_figures(published.shape, requirements);
+  PairMetrics pair = stereo_figures(published.parameters, requirements);
   const double vfov_deg = published.vfov_deg.value_or(
-      square_pixel_view_deg(published.shape.hfov_deg, requirements.published_rows_per_column()));
+      square_pixel_view_deg(published.parameters.hfov_deg, requirements.published_rows_per_column()));
   add_view(pair, vfov_deg, published.tilt_deg.value_or(tilt_for_range_deg(vfov_deg, requirements)), requirements);
   return pair;
 }
 
-GroundView ground_view(const PairFigures& pair, const PairRequirements& requirements) {
-  return {requirements.height_m, pair.tilt_deg * kRadiansPerDegree, pair.shape.hfov_deg * kRadiansPerDegree,
-          pair.vfov_deg * kRadiansPerDegree, pair.shape.baseline_m};
+GroundView ground_view(const PairMetrics& pair, const PairRequirements& requirements) {
+  return {requirements.height_m, pair.tilt_deg * kRadiansPerDegree, pair.parameters.hfov_deg * kRadiansPerDegree,
+          pair.vfov_deg * kRadiansPerDegree, pair.parameters.baseline_m};
 }
 
 std::size_t count_feasible(const PairRequirements& requirements) {
   std::size_t count = 0;
-  for_every_shape(requirements.lists,
-                  [&](const PairShape& shape) { count += stereo_figures(shape, requirements).feasible ? 1 : 0; });
+  for_every_shape(requirements.lists, [&](const PairParameters& parameters) {
+    count += stereo_figures(parameters, requirements).feasible ? 1 : 0;
+  });
   return count;
 }
 
@@ -242,8 +244,8 @@ RigDesign design_rig(const RigRequirements& requirements) {
   RigDesign design;
   design.wide = design_pair(requirements.wide);
   if (requirements.narrow) design.narrow = design_pair(*requirements.narrow);
-  const PairFigures* wide = design.wide.chosen();
-  const PairFigures* narrow = design.narrow ? design.narrow->chosen() : nullptr;
+  const PairMetrics* wide = design.wide.selected();
+  const PairMetrics* narrow = design.narrow ? design.narrow->selected() : nullptr;
   if (wide && requirements.wide.pans) {
     design.pans = pan_coverage(ground_view(*wide, requirements.wide), *requirements.wide.pans);
   }

@@ -7,7 +7,7 @@
 
 #include "spartan/rig/design/design_warning.h"
 #include "spartan/rig/design/ground_view.h"
-#include "spartan/rig/design/pan_view.h"
+#include "spartan/rig/design/pan_coverage.h"
 #include "spartan/rig/design/requirements.h"
 
 namespace spartan {
@@ -19,8 +19,8 @@ struct PairMargins {
 };
 
 /// One pair with all values derived from its parameters (docs/math/rig_design.md).
-struct PairFigures {
-  PairShape shape;
+struct PairMetrics {
+  PairParameters parameters;
   double range_m = 0;          ///< range up to which the required resolution is met
   double focal_length_mm = 0;  ///< from width, pixel size and field of view
   double stereo_angle_deg = 0;
@@ -36,28 +36,28 @@ struct PairFigures {
 /// Result of the search for one pair.
 struct PairDesign {
   std::size_t combinations = 0;
-  std::vector<PairFigures> feasible;  ///< ordered, best first
+  std::vector<PairMetrics> feasible;  ///< ordered, best first
   /// How many of them have sufficient overlap of the pans; none where there are no pans.
   std::optional<std::size_t> with_pan_overlap_count;
   std::size_t equally_good = 0;  ///< how many of them are equal to the best by all criteria, including itself
-  std::optional<PairFigures> best_with_pan_overlap;
-  std::optional<PairFigures> published;
+  std::optional<PairMetrics> best_with_pan_overlap;
+  std::optional<PairMetrics> published;
   /// Smallest distance of any value of any combination from its limit, relative to that limit. Far above 10⁻⁹: rounding
   /// has no influence on feasibility.
-  double nearest_to_a_limit = std::numeric_limits<double>::infinity();
-  bool published_on_offer = false;  ///< whether the published pair is one of the combinations
+  double smallest_limit_distance = std::numeric_limits<double>::infinity();
+  bool published_is_candidate = false;  ///< whether the published pair is one of the combinations
 
-  const PairFigures* best() const { return feasible.empty() ? nullptr : &feasible.front(); }
+  const PairMetrics* best() const { return feasible.empty() ? nullptr : &feasible.front(); }
   /// The pair for which ground coverage is computed and drawn: the published pair, else the best with sufficient
   /// overlap of the pans, else the best; null where there is none.
-  const PairFigures* chosen() const;
+  const PairMetrics* selected() const;
 };
 
 /// Result of design_rig().
 struct RigDesign {
   PairDesign wide;
   std::optional<PairDesign> narrow;
-  std::optional<PanFigures> pans;        ///< coverage of the selected wide pair
+  std::optional<PanCoverage> pans;       ///< coverage of the selected wide pair
   std::optional<double> view_overlap_m;  ///< length of ground visible to both selected pairs, middle column
   std::vector<DesignWarning> warnings;
 };
@@ -67,14 +67,14 @@ RigDesign design_rig(const RigRequirements& requirements);
 
 /// Evaluates one set of parameters. Its tilt is the largest multiple of tilt_step_deg at which the top row still
 /// reaches the required range.
-PairFigures metrics_of(const PairShape& shape, const PairRequirements& requirements);
+PairMetrics metrics_of(const PairParameters& parameters, const PairRequirements& requirements);
 /// Evaluates the published pair, which must exist, with its own rows, field of view and tilt where they are given.
-PairFigures published_metrics(const PairRequirements& requirements);
+PairMetrics published_metrics(const PairRequirements& requirements);
 
 /// Number of feasible combinations.
 std::size_t count_feasible(const PairRequirements& requirements);
 
 /// The ground view of a pair at its tilt.
-GroundView ground_view(const PairFigures& pair, const PairRequirements& requirements);
+GroundView ground_view(const PairMetrics& pair, const PairRequirements& requirements);
 
 }  // namespace spartan

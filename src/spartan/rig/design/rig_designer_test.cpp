@@ -46,7 +46,7 @@ void expect_warning(const RigDesign& design, const std::string& id, double value
 
 using Whole = std::tuple<int, int, int, int, int>;  // cm, dm, degrees, px, hundredths of µm
 
-Whole whole(const PairShape& s) {
+Whole whole(const PairParameters& s) {
   const auto rounded = [](double value) { return static_cast<int>(std::lround(value)); };
   return {rounded(100 * s.baseline_m), rounded(10 * s.nearest_m), rounded(s.hfov_deg), s.width_px,
           rounded(100 * s.pixel_size_um)};
@@ -81,17 +81,17 @@ TEST(RigDesigner, FindsTheFeasibleSetOfThePublishedLists) {
   EXPECT_EQ(wide.with_pan_overlap_count, 8876u);
   EXPECT_EQ(count_feasible(rover().wide), 12592u);
   std::set<Whole> found;
-  for (const PairFigures& pair : wide.feasible) found.insert(whole(pair.shape));
+  for (const PairMetrics& pair : wide.feasible) found.insert(whole(pair.parameters));
   EXPECT_EQ(found, feasible_by_tangents());
   EXPECT_TRUE(found.contains({20, 10, 50, 1120, 550})) << "the published pair";
-  EXPECT_GT(wide.nearest_to_a_limit, 1e-6) << "no value is so close to its limit that rounding matters";
+  EXPECT_GT(wide.smallest_limit_distance, 1e-6) << "no value is so close to its limit that rounding matters";
 }
 
 TEST(RigDesigner, ReproducesThePublishedWidePair) {
   ASSERT_TRUE(rover_design().wide.published);
-  const PairFigures& pair = *rover_design().wide.published;
+  const PairMetrics& pair = *rover_design().wide.published;
   EXPECT_TRUE(pair.feasible);
-  EXPECT_TRUE(rover_design().wide.published_on_offer);
+  EXPECT_TRUE(rover_design().wide.published_is_candidate);
   EXPECT_NEAR(pair.range_m, 4.00, 0.005);
   EXPECT_NEAR(pair.focal_length_mm, 6.6, 0.05);
   EXPECT_NEAR(pair.stereo_angle_deg, 11.4, 0.05);
@@ -102,12 +102,12 @@ TEST(RigDesigner, ReproducesThePublishedWidePair) {
   EXPECT_NEAR(pair.margins.range_m, pair.range_m - 4, 1e-12);
   EXPECT_NEAR(pair.margins.baseline_m, 0.1, 1e-12);
   // The tilt rule yields the published tilt.
-  EXPECT_EQ(metrics_of(pair.shape, rover().wide).tilt_deg, 39);
+  EXPECT_EQ(metrics_of(pair.parameters, rover().wide).tilt_deg, 39);
 }
 
 TEST(RigDesigner, ReproducesThePublishedNarrowPair) {
   ASSERT_TRUE(rover_design().narrow && rover_design().narrow->published);
-  const PairFigures& pair = *rover_design().narrow->published;
+  const PairMetrics& pair = *rover_design().narrow->published;
   EXPECT_FALSE(pair.feasible) << "a resolution of 2 cm only up to 1.99 m";
   EXPECT_NEAR(pair.range_m, 1.99, 0.005);
   EXPECT_NEAR(pair.view_near_m, 0.200, 0.0005);
@@ -122,12 +122,12 @@ TEST(RigDesigner, ReproducesThePublishedNarrowPair) {
 TEST(RigDesigner, SortsTheBestFirst) {
   const PairDesign& wide = rover_design().wide;
   for (std::size_t i = 1; i < wide.feasible.size(); ++i) {
-    const PairFigures &better = wide.feasible[i - 1], &worse = wide.feasible[i];
+    const PairMetrics &better = wide.feasible[i - 1], &worse = wide.feasible[i];
     if (better.range_m > worse.range_m + 1e-8) continue;
     ASSERT_GE(better.range_m, worse.range_m - 1e-8);
     if (better.pan_overlap_percent > worse.pan_overlap_percent + 1e-8) continue;
     ASSERT_GE(better.pan_overlap_percent, worse.pan_overlap_percent - 1e-8);
-    ASSERT_LE(better.shape.baseline_m, worse.shape.baseline_m);
+    ASSERT_LE(better.parameters.baseline_m, worse.parameters.baseline_m);
   }
   // The largest b w / tan(F/2) of the feasible set, by an independent loop.
   double largest = 0;
@@ -138,9 +138,9 @@ TEST(RigDesigner, SortsTheBestFirst) {
   EXPECT_EQ(wide.equally_good, 4u) << "the pixel sizes";
   ASSERT_TRUE(wide.best_with_pan_overlap);
   EXPECT_GE(wide.best_with_pan_overlap->pan_overlap_percent, 25);
-  for (const PairFigures& pair : wide.feasible) {
+  for (const PairMetrics& pair : wide.feasible) {
     if (pair.with_pan_overlap) {
-      EXPECT_EQ(pair.shape, wide.best_with_pan_overlap->shape);
+      EXPECT_EQ(pair.parameters, wide.best_with_pan_overlap->parameters);
       break;
     }
   }
@@ -155,16 +155,16 @@ TEST(RigDesigner, EqualValuesAreDecidedByTheNextCriterion) {
   const RigDesign design = design_after(lists);
   std::vector<Whole> order;
   order.reserve(design.wide.feasible.size());
-  for (const PairFigures& pair : design.wide.feasible) order.push_back(whole(pair.shape));
-  const auto position = [&](const Whole& shape) {
-    return std::find(order.begin(), order.end(), shape) - order.begin();
+  for (const PairMetrics& pair : design.wide.feasible) order.push_back(whole(pair.parameters));
+  const auto position = [&](const Whole& parameters) {
+    return std::find(order.begin(), order.end(), parameters) - order.begin();
   };
   EXPECT_EQ(position({15, 15, 45, 1040, 550}) + 1, position({20, 15, 45, 780, 550}));
   const RigDesign by_overlap = design_after([&](RigRequirements& r) {
     lists(r);
     r.wide.order = {DesignCriterion::pan_overlap, DesignCriterion::shorter_baseline, DesignCriterion::range_margin};
   });
-  EXPECT_EQ(whole(by_overlap.wide.best()->shape), (Whole{15, 15, 50, 1040, 550}));
+  EXPECT_EQ(whole(by_overlap.wide.best()->parameters), (Whole{15, 15, 50, 1040, 550}));
 }
 
 // Values to either side of a multiple of 1e-9 are equal; so are the ends of a chain of such values.
@@ -176,8 +176,8 @@ TEST(RigDesigner, ValuesThatDifferByLessThanOneInABillionAreEqual) {
   });
   ASSERT_EQ(design.wide.feasible.size(), 5u);
   EXPECT_EQ(design.wide.equally_good, 4u);
-  EXPECT_EQ(design.wide.best()->shape.baseline_m, 0.2) << "in the order of the list";
-  EXPECT_EQ(design.wide.feasible.back().shape.baseline_m, 0.21);
+  EXPECT_EQ(design.wide.best()->parameters.baseline_m, 0.2) << "in the order of the list";
+  EXPECT_EQ(design.wide.feasible.back().parameters.baseline_m, 0.21);
 }
 
 TEST(RigDesigner, ValuesOnALimitPassWithAWarning) {
@@ -185,7 +185,7 @@ TEST(RigDesigner, ValuesOnALimitPassWithAWarning) {
     r.wide.lists = {{0.2}, {1}, {60}, {5.5}, {1120}};
     r.wide.range_m = r.wide.height_m = 1;
     r.wide.largest_stereo_angle_deg = 2 * std::atan(0.1) * 180 / std::numbers::pi;
-    r.wide.published->shape.hfov_deg = 60;
+    r.wide.published->parameters.hfov_deg = 60;
     r.wide.published->tilt_deg.reset();
   });
   EXPECT_EQ(design.wide.feasible.size(), 1u);
@@ -226,7 +226,7 @@ TEST(RigDesigner, WarningsFollowTheRequirements) {
     r.narrow->published->focal_length_mm = 3.65;
     r.narrow->published->vfov_deg = 51.9;
     r.narrow->published->tilt_deg = 33;
-    r.narrow->published->shape.nearest_m = 0.3;
+    r.narrow->published->parameters.nearest_m = 0.3;
   });
   for (const char* id :
        {"stereo_angle_limits_disagree", "azimuth_far", "azimuth_far_stereo", "azimuth_held_to", "range_short",
@@ -240,38 +240,38 @@ TEST(RigDesigner, WarningsFollowTheRequirements) {
   EXPECT_EQ(find_warning(binding, "baseline_limit_never_binds"), nullptr);
   EXPECT_LT(binding.wide.feasible.size(), 12592u);
   const RigDesign infeasible = design_after([](RigRequirements& r) {
-    r.wide.published->shape = {0.35, 0.6, 45, 5.5, 1120};
+    r.wide.published->parameters = {0.35, 0.6, 45, 5.5, 1120};
     r.wide.pans->angles_deg = {-50, 0, 50};
     r.wide.smallest_baseline_m = 0.4;
   });
   for (const char* id : {"nothing_feasible", "stereo_angle_large", "search_large", "baseline_short", "pan_overlap"}) {
     EXPECT_NE(find_warning(infeasible, id), nullptr) << id;
   }
-  EXPECT_FALSE(infeasible.wide.published_on_offer);
+  EXPECT_FALSE(infeasible.wide.published_is_candidate);
   EXPECT_EQ(infeasible.wide.best(), nullptr);
 }
 
 TEST(RigDesigner, CandidatesAreInEveryList) {
-  const PairShape published = rover().wide.published->shape;
-  PairShape others[] = {published, published, published, published, published};
+  const PairParameters published = rover().wide.published->parameters;
+  PairParameters others[] = {published, published, published, published, published};
   others[0].baseline_m = 0.205;
   others[1].nearest_m = 1.05;
   others[2].hfov_deg = 50.5;
   others[3].pixel_size_um = 5.6;
   others[4].width_px = 1100;
-  for (const PairShape& shape : others) {
+  for (const PairParameters& parameters : others) {
     const RigDesign design = design_after([&](RigRequirements& r) {
       r.wide.lists = {{0.2}, {1}, {50}, {5.5}, {1120}};
-      r.wide.published->shape = shape;
+      r.wide.published->parameters = parameters;
     });
-    EXPECT_FALSE(design.wide.published_on_offer);
+    EXPECT_FALSE(design.wide.published_is_candidate);
   }
 }
 
 // The published tilt is used, not that of the rule; the nearest ground is straight down.
 TEST(RigDesigner, PublishedTiltIsUsed) {
   const RigDesign steep = design_after([](RigRequirements& r) { r.narrow->published->tilt_deg = 70; });
-  const PairFigures& narrow = *steep.narrow->published;
+  const PairMetrics& narrow = *steep.narrow->published;
   EXPECT_EQ(narrow.tilt_deg, 70);
   EXPECT_NEAR(narrow.view_far_m, 0.3 / std::tan((70 - 49.5 / 2) * std::numbers::pi / 180), 1e-9);
   EXPECT_LT(narrow.view_near_m, 0) << "behind the cameras";
@@ -290,7 +290,7 @@ TEST(RigDesigner, PansOfAFullCircleAndTooFew) {
   EXPECT_EQ(round.pans->azimuth_far.width_deg(), 360);
   EXPECT_EQ(round.pans->azimuth_far_stereo.width_deg(), 360);
   const RigDesign few = design_after([](RigRequirements& r) { r.wide.pans->azimuth_deg = 200; });
-  EXPECT_FALSE(few.pans->azimuth_held);
+  EXPECT_FALSE(few.pans->full_coverage);
   const RigDesign uneven = design_after([](RigRequirements& r) { r.wide.pans->angles_deg = {-35, 0, 20}; });
   EXPECT_NEAR(uneven.pans->overlap->percent(), 30, 1e-9) << "of the widest step";
 }
@@ -301,7 +301,7 @@ TEST(RigDesigner, NearestLimitIsTheOverlap) {
     r.wide.lists = {{0.2}, {1}, {50}, {5.5}, {1120}};
     r.wide.range_m = 3;
   });
-  EXPECT_NEAR(design.wide.nearest_to_a_limit, 0.05, 1e-9);
+  EXPECT_NEAR(design.wide.smallest_limit_distance, 0.05, 1e-9);
 }
 
 TEST(RigDesigner, WithoutAPublishedPairTheBestIsSelected) {
@@ -309,7 +309,7 @@ TEST(RigDesigner, WithoutAPublishedPairTheBestIsSelected) {
     r.wide.published.reset();
     r.narrow.reset();
   });
-  EXPECT_EQ(design.wide.chosen()->shape, rover_design().wide.best_with_pan_overlap->shape);
+  EXPECT_EQ(design.wide.selected()->parameters, rover_design().wide.best_with_pan_overlap->parameters);
   EXPECT_FALSE(design.view_overlap_m);
   ASSERT_TRUE(design.pans);
   EXPECT_GE(design.pans->overlap->percent(), 25);
@@ -323,9 +323,9 @@ TEST(RigDesigner, WithoutAPublishedPairTheBestIsSelected) {
 
 // A baseline of 20 m: all values stay finite.
 TEST(RigDesigner, PairsWithoutCommonGround) {
-  const RigDesign design = design_after([](RigRequirements& r) { r.wide.published->shape.baseline_m = 20; });
+  const RigDesign design = design_after([](RigRequirements& r) { r.wide.published->parameters.baseline_m = 20; });
   EXPECT_TRUE(design.pans->azimuth_far_stereo.empty());
-  EXPECT_FALSE(design.pans->azimuth_held);
+  EXPECT_FALSE(design.pans->full_coverage);
   EXPECT_FALSE(design.pans->far_overlap_stereo);
   EXPECT_EQ(design.view_overlap_m, 0) << "the wide pair sees no common ground";
   expect_warning(design, "azimuth_far_stereo", 0, 0);
@@ -343,8 +343,8 @@ RC_GTEST_PROP(RigDesigner, WarningsHaveFiniteValues, ()) {
   for (std::size_t i = 0; i < count; ++i) r.wide.pans->angles_deg.push_back(*rc::gen::inRange(-36, 37) * 5);
   std::sort(r.wide.pans->angles_deg.begin(), r.wide.pans->angles_deg.end());
   r.wide.pans->azimuth_deg = one_of({1e-6, 10, 120, 359, 360});
-  r.wide.published->shape.baseline_m = one_of({1e-6, 0.2, 1, 20, 1e6});
-  r.wide.published->shape.hfov_deg = one_of({0.1, 50, 120, 179});
+  r.wide.published->parameters.baseline_m = one_of({1e-6, 0.2, 1, 20, 1e6});
+  r.wide.published->parameters.hfov_deg = one_of({0.1, 50, 120, 179});
   r.wide.published->tilt_deg = one_of({25.5, 39, 70, 90});
   for (const DesignWarning& warning : design_rig(r).warnings) {
     RC_ASSERT(std::isfinite(warning.value));
@@ -354,9 +354,9 @@ RC_GTEST_PROP(RigDesigner, WarningsHaveFiniteValues, ()) {
 
 // At the tilt of each candidate the top row reaches the range; one step more, and it would not.
 TEST(RigDesigner, TiltsReachTheRange) {
-  for (const PairFigures& pair : rover_design().wide.feasible) {
+  for (const PairMetrics& pair : rover_design().wide.feasible) {
     ASSERT_GE(pair.view_far_m, 4);
-    PairFigures lower = pair;
+    PairMetrics lower = pair;
     lower.tilt_deg += 1;
     ASSERT_LT(far_edge_m(ground_view(lower, rover().wide)), 4);
   }

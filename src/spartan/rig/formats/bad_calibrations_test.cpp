@@ -8,8 +8,8 @@
 #include <set>
 
 #include "spartan/core/random.h"
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
@@ -73,15 +73,15 @@ class Files {
   void restore() const {
     for (const CalibrationFile& file : files_) put(file, file.content);
   }
-  Result<ReadRig> read() const {
-    const bool two = has_a_file_per_eye(of_.format);
+  Result<LoadedRig> read() const {
+    const bool two = has_file_per_camera(of_.format);
     return read_calibration(two ? files_[0].path + "," + files_[1].path : files_[0].path, kSize);
   }
   // Reads the files: "accepted" for a valid rig, otherwise the message of an error that must name the folder.
   std::string outcome() const {
     const auto read = this->read();
     if (read) {
-      EXPECT_TRUE(read->rig.find_faults().empty());
+      EXPECT_TRUE(read->rig.validation_errors().empty());
       return "accepted";
     }
     EXPECT_EQ(read.error().code, ErrorCode::configuration) << read.error().message();

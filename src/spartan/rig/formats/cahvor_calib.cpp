@@ -8,12 +8,12 @@
 #include <cmath>
 
 #include "spartan/core/strict_yaml.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/formats/text_matrices.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {
 namespace {
@@ -206,11 +206,11 @@ std::string radial_lines(const CahvoreModel& m, const Pose& pose) {
 }
 
 Result<std::string> text_of(const Camera& camera, const Pose& pose) {
-  if (const auto m = expressed_as<CahvModel>(camera.model)) {
+  if (const auto m = converted_to<CahvModel>(camera.model)) {
     return core_lines(camera, "CAHV = perspective, linear", *m, pose);
   }
-  if (const auto m = expressed_as<CahvoreModel>(camera.model)) {
-    if (expressed_as<CahvorModel>(camera.model)) {
+  if (const auto m = converted_to<CahvoreModel>(camera.model)) {
+    if (converted_to<CahvorModel>(camera.model)) {
       return core_lines(camera, "CAHVOR = perspective, distortion", m->cahv(), pose) + radial_lines(*m, pose);
     }
     // L = 1 and L = 0 could be written as types 1 and 2, but mrcal reads only type 3.
@@ -219,7 +219,7 @@ Result<std::string> text_of(const Camera& camera, const Pose& pose) {
            vector_line("E", {m->entrance_m()[0], m->entrance_m()[1], m->entrance_m()[2]}) +
            fmt::format("T = 3\nP = {}\n", l);
   }
-  if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
+  if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     return "# The distortion is in the line LENSMODEL_OPENCV8, which only mrcal reads; other programs read a CAHV "
            "without "
            "distortion.\n" +
@@ -232,7 +232,7 @@ Result<std::string> text_of(const Camera& camera, const Pose& pose) {
 
 }  // namespace
 
-Result<ReadRig> read_cahvor_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
+Result<LoadedRig> read_cahvor_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
   return rig_detail::read_two_files(
       CalibrationFormat::cahvor, left_path, right_path,
       [&](const std::string& path, const std::string& name) { return read_camera(path, name, size); });

@@ -65,15 +65,15 @@ std::vector<std::string_view> calibration_format_names() {
   return names;
 }
 
-bool has_a_file_per_eye(CalibrationFormat format) {
+bool has_file_per_camera(CalibrationFormat format) {
   return kind_of(format).file_per_camera;
 }
 
-bool holds_image_size(CalibrationFormat format) {
+bool contains_image_size(CalibrationFormat format) {
   return kind_of(format).image_size;
 }
 
-std::optional<CalibrationFormat> guess_format(const std::string& path, const std::string& text) {
+std::optional<CalibrationFormat> detect_calibration_format(const std::string& path, const std::string& text) {
   const std::string extension = std::filesystem::path(path).extension().string();
   if (const auto format = format_of_extension(extension)) return format;
   if (has_line(text, "P_rect_00:")) return CalibrationFormat::kitti_raw;
@@ -91,7 +91,7 @@ std::optional<CalibrationFormat> guess_format(const std::string& path, const std
   return std::nullopt;
 }
 
-Result<CalibrationFormat> format_for_name(const std::string& path) {
+Result<CalibrationFormat> calibration_format_for_path(const std::string& path) {
   const std::filesystem::path file(path);
   const std::string name = file.filename().string(), extension = file.extension().string();
   std::error_code error;

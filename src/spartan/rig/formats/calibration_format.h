@@ -21,14 +21,14 @@ std::optional<CalibrationFormat> calibration_format_named(std::string_view name)
 std::vector<std::string_view> calibration_format_names();
 
 /// Whether the format stores each camera of a pair in a file of its own.
-bool has_a_file_per_eye(CalibrationFormat format);
+bool has_file_per_camera(CalibrationFormat format);
 /// Whether the files contain the image size.
-bool holds_image_size(CalibrationFormat format);
+bool contains_image_size(CalibrationFormat format);
 
 /// Detects the format of an existing file from its extension and its text; nullopt if it is unknown.
-std::optional<CalibrationFormat> guess_format(const std::string& path, const std::string& text);
+std::optional<CalibrationFormat> detect_calibration_format(const std::string& path, const std::string& text);
 /// The format to write to a path, from its file name; code `usage` if the name does not determine it. A name without
 /// extension is a folder of EuRoC's layout.
-Result<CalibrationFormat> format_for_name(const std::string& path);
+Result<CalibrationFormat> calibration_format_for_path(const std::string& path);
 
 }  // namespace spartan

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <opencv2/core/persistence.hpp>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
@@ -15,7 +15,7 @@
 namespace spartan {
 namespace {
 
-using testing::complaint;
+using testing::error_message;
 using ::testing::HasSubstr;
 using testing::replaced;
 using testing::right_in_left;
@@ -41,7 +41,7 @@ TEST(KittiCalib, BaselineIsInTheLastColumn) {
 TEST(KittiCalib, ErrorsAreSpecific) {
   const TemporaryFolder folder;
   const auto message_for = [&](const std::string& what, const std::string& with, ImageSize size = {1240, 376}) {
-    return complaint(read_kitti_calib(folder.write("calib.txt", replaced(kKitti, what, with)), size));
+    return error_message(read_kitti_calib(folder.write("calib.txt", replaced(kKitti, what, with)), size));
   };
   EXPECT_THAT(message_for("P1:", "Q1:"), HasSubstr("P1"));
   EXPECT_THAT(message_for("P0: 700", "P0: nan"), HasSubstr("calib.txt:1"));
@@ -52,8 +52,8 @@ TEST(KittiCalib, ErrorsAreSpecific) {
   EXPECT_THAT(message_for("-378", "378"), HasSubstr("baseline of -0.54"));
   EXPECT_THAT(message_for("-378 0 700 180", "-378 0 700 190"), HasSubstr("does not have the rows of P0"));
   EXPECT_THAT(message_for("P0", "P0", ImageSize{}), HasSubstr("image size is not known"));
-  EXPECT_THAT(complaint(read_kitti_calib(folder.path() + "/none.txt", {1240, 376})), HasSubstr("none.txt"));
-  EXPECT_THAT(complaint(read_kitti_calib(folder.write("empty.txt", ""), {1240, 376})), HasSubstr("empty.txt"));
+  EXPECT_THAT(error_message(read_kitti_calib(folder.path() + "/none.txt", {1240, 376})), HasSubstr("none.txt"));
+  EXPECT_THAT(error_message(read_kitti_calib(folder.write("empty.txt", ""), {1240, 376})), HasSubstr("empty.txt"));
 }
 
 // A NaN anywhere makes the file invalid; other cameras are ignored, which is reported.
@@ -63,12 +63,12 @@ TEST(KittiCalib, OtherCamerasAreIgnoredButChecked) {
     return read_calibration(folder.write("calib.txt", replaced(kKitti, what, with) + "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n"),
                             {1240, 376});
   };
-  EXPECT_THAT(complaint(read("P2: 700", "P2: nan")), HasSubstr("calib.txt:3: P2: 'nan' is not a finite number"));
-  EXPECT_THAT(complaint(read("P2: 700", "Tr: nan")), HasSubstr("calib.txt:3: Tr"));
-  EXPECT_THAT(complaint(read("P2: 700", "P3: 1 700")), HasSubstr("calib.txt:3: P3: has 13 numbers, must have 12"));
-  const auto ignored_of = [](const Result<ReadRig>& of) {
+  EXPECT_THAT(error_message(read("P2: 700", "P2: nan")), HasSubstr("calib.txt:3: P2: 'nan' is not a finite number"));
+  EXPECT_THAT(error_message(read("P2: 700", "Tr: nan")), HasSubstr("calib.txt:3: Tr"));
+  EXPECT_THAT(error_message(read("P2: 700", "P3: 1 700")), HasSubstr("calib.txt:3: P3: has 13 numbers, must have 12"));
+  const auto ignored_of = [](const Result<LoadedRig>& of) {
     std::string all;
-    for (const RigDifference& each : of.value().left_out) all += each.key + ": " + each.text + "\n";
+    for (const RigDifference& each : of.value().ignored) all += each.key + ": " + each.text + "\n";
     return all;
   };
   EXPECT_EQ(ignored_of(read("P0", "P0")),
@@ -114,8 +114,8 @@ TEST(KittiRawCalib, UnrectifiedCamerasAreIgnored) {
   const TemporaryFolder folder;
   const auto keys = [&](const std::string& more) {
     std::string all;
-    const ReadRig read = read_calibration(folder.write("calib_cam_to_cam.txt", kRaw + more)).value();
-    for (const RigDifference& each : read.left_out) all += each.key + ";";
+    const LoadedRig read = read_calibration(folder.write("calib_cam_to_cam.txt", kRaw + more)).value();
+    for (const RigDifference& each : read.ignored) all += each.key + ";";
     return all;
   };
   EXPECT_EQ(keys(""), "");
@@ -128,7 +128,7 @@ TEST(KittiRawCalib, UnrectifiedCamerasAreIgnored) {
 TEST(KittiRawCalib, ErrorsAreSpecific) {
   const TemporaryFolder folder;
   const auto message_for = [&](const std::string& what, const std::string& with) {
-    return complaint(read_kitti_raw_calib(folder.write("calib_cam_to_cam.txt", replaced(kRaw, what, with))));
+    return error_message(read_kitti_raw_calib(folder.write("calib_cam_to_cam.txt", replaced(kRaw, what, with))));
   };
   EXPECT_THAT(message_for("S_rect_00: 1242 375", "S_rect_00: 1242"), HasSubstr("calib_cam_to_cam.txt:3"));
   EXPECT_THAT(message_for("S_rect_00: 1242 375", "S_rect_00: 1242.5 375"),
@@ -136,7 +136,7 @@ TEST(KittiRawCalib, ErrorsAreSpecific) {
   EXPECT_THAT(message_for("S_rect_00: 1242 375", "S_rect_00: 1242 -375"), HasSubstr("S_rect_00"));
   folder.write("calib_velo_to_cam.txt", kVeloToCam);
   folder.write("calib_imu_to_velo.txt", replaced(kImuToVelo, "R: 1", "R: 2"));
-  EXPECT_THAT(complaint(read_kitti_raw_calib(folder.write("calib_cam_to_cam.txt", kRaw))),
+  EXPECT_THAT(error_message(read_kitti_raw_calib(folder.write("calib_cam_to_cam.txt", kRaw))),
               HasSubstr("calib_imu_to_velo.txt:1: R: is not a rotation matrix"));
 }
 
@@ -183,7 +183,7 @@ TEST_F(EurocCalib, BodyIsTheOneOfTheFiles) {
 
 TEST_F(EurocCalib, ErrorsAreSpecific) {
   const auto message_for = [&](const std::string& what, const std::string& with) {
-    return complaint(read(replaced(kEuroc, what, with), right_));
+    return error_message(read(replaced(kEuroc, what, with), right_));
   };
   EXPECT_THAT(message_for("intrinsics: [458, ", "intrinsics: [.nan, "), HasSubstr("cam0/sensor.yaml:14: intrinsics"));
   EXPECT_THAT(message_for("intrinsics: [458, ", "intrinsics: ["), HasSubstr("must be a list of 4 numbers"));
@@ -193,12 +193,12 @@ TEST_F(EurocCalib, ErrorsAreSpecific) {
   EXPECT_THAT(message_for("data: [0, 0, 1, 0.1", "data: [0, 0, 2, 0.1"), HasSubstr("T_BS: is not a rigid transform"));
   EXPECT_THAT(message_for("resolution: [752, 480]", "resolution: [752, 0]"), HasSubstr("sensor.yaml:12: resolution"));
   EXPECT_THAT(message_for("T_BS:", "T_SB:"), HasSubstr("T_BS"));
-  EXPECT_THAT(complaint(read(kEuroc, kEuroc)), HasSubstr("baseline is zero"));
-  const std::string both = complaint(read(replaced(kEuroc, "752", "x"), replaced(right_, "752", "y")));
+  EXPECT_THAT(error_message(read(kEuroc, kEuroc)), HasSubstr("baseline is zero"));
+  const std::string both = error_message(read(replaced(kEuroc, "752", "x"), replaced(right_, "752", "y")));
   EXPECT_THAT(both, HasSubstr("cam0"));
   EXPECT_THAT(both, HasSubstr("cam1"));
   std::filesystem::remove(folder_.path() + "/mav0/cam1/sensor.yaml");
-  EXPECT_THAT(complaint(read_euroc_calib(folder_.path() + "/mav0")), HasSubstr("cam1/sensor.yaml"));
+  EXPECT_THAT(error_message(read_euroc_calib(folder_.path() + "/mav0")), HasSubstr("cam1/sensor.yaml"));
 }
 
 // --- OpenCV ---
@@ -234,7 +234,7 @@ TEST(OpencvCalib, ReadsXml) {
 TEST(OpencvCalib, AMatrixWithTooManyRowsIsRejected) {
   const TemporaryFolder folder;
   const std::string text = replaced(opencv_yml(-0.12), "rows: 3", "rows: 200000000");
-  EXPECT_THAT(complaint(read_opencv_calib(folder.write("stereo.yml", text), "", {640, 480})),
+  EXPECT_THAT(error_message(read_opencv_calib(folder.write("stereo.yml", text), "", {640, 480})),
               HasSubstr("M1: does not have rows × cols numbers"));
 }
 
@@ -249,7 +249,7 @@ TEST(OpencvCalib, TheSizeInTheFileHasPrecedence) {
 TEST(OpencvCalib, ErrorsAreSpecific) {
   const TemporaryFolder folder;
   const auto message_for = [&](const std::string& text, ImageSize size = {640, 480}) {
-    return complaint(read_opencv_calib(folder.write("stereo.yml", text), "", size));
+    return error_message(read_opencv_calib(folder.write("stereo.yml", text), "", size));
   };
   EXPECT_THAT(message_for(replaced(opencv_yml(-0.12), "M2", "N2")), HasSubstr("M2"));
   EXPECT_THAT(message_for(replaced(opencv_yml(-0.12), "530.", ".Nan")),
@@ -264,7 +264,7 @@ TEST(OpencvCalib, ErrorsAreSpecific) {
 
 // --- detection of the format ---
 
-TEST(ReadRig, DetectsTheFormatFromTheContent) {
+TEST(LoadedRig, DetectsTheFormatFromTheContent) {
   const TemporaryFolder folder;
   EXPECT_EQ(read_rig(folder.write("a/x.txt", kKitti), {1240, 376}).value().name, "kitti");
   EXPECT_EQ(read_rig(folder.write("b/x.txt", kRaw)).value().name, "kitti_raw");
@@ -273,18 +273,19 @@ TEST(ReadRig, DetectsTheFormatFromTheContent) {
   EXPECT_EQ(read_rig(folder.write("mav0/cam0/sensor.yaml", kEuroc)).value().name, "euroc");
   EXPECT_EQ(read_rig(folder.path()).value().name, "euroc");
   EXPECT_EQ(read_rig(testing::source_folder() + "/config/rigs/rover.yaml").value().name, "rover");
-  EXPECT_THAT(complaint(read_rig(folder.write("poem.txt", "roses are red"))), HasSubstr("poem.txt"));
-  EXPECT_THAT(complaint(read_rig(folder.path() + "/a")), HasSubstr("contains no calibration"));
-  EXPECT_THAT(complaint(read_rig(folder.path() + "/none")), HasSubstr("/none"));
+  EXPECT_THAT(error_message(read_rig(folder.write("poem.txt", "roses are red"))), HasSubstr("poem.txt"));
+  EXPECT_THAT(error_message(read_rig(folder.path() + "/a")), HasSubstr("contains no calibration"));
+  EXPECT_THAT(error_message(read_rig(folder.path() + "/none")), HasSubstr("/none"));
 }
 
 // Independent of the file name.
 TEST(CalibrationFormats, AreDetectedFromTheText) {
   using Format = CalibrationFormat;
-  EXPECT_EQ(guess_format("x.txt", "{\n  'lensmodel': 'LENSMODEL_PINHOLE',\n}\n"), Format::mrcal);
-  EXPECT_EQ(guess_format("x.txt", "VERSION_4\nPINHOLE\nfu = 1\nu_direction = 1 0 0\n"), Format::tsai);
-  EXPECT_EQ(guess_format("x.txt", "Model = CAHV = perspective, linear\nDimensions = 640 480\n"), Format::cahvor);
-  EXPECT_EQ(guess_format("x.txt", "roses are red\n"), std::nullopt);
+  EXPECT_EQ(detect_calibration_format("x.txt", "{\n  'lensmodel': 'LENSMODEL_PINHOLE',\n}\n"), Format::mrcal);
+  EXPECT_EQ(detect_calibration_format("x.txt", "VERSION_4\nPINHOLE\nfu = 1\nu_direction = 1 0 0\n"), Format::tsai);
+  EXPECT_EQ(detect_calibration_format("x.txt", "Model = CAHV = perspective, linear\nDimensions = 640 480\n"),
+            Format::cahvor);
+  EXPECT_EQ(detect_calibration_format("x.txt", "roses are red\n"), std::nullopt);
 }
 
 TEST(CalibrationFormats, AreSelectedByFileNamesForWriting) {
@@ -303,27 +304,28 @@ TEST(CalibrationFormats, AreSelectedByFileNamesForWriting) {
                                                   {"a/calib_cam_to_cam.txt", Format::kitti_raw},
                                                   {"a/mav0", Format::euroc},
                                                   {"a.yaml", Format::rig_yaml}};
-  for (const auto& [name, format] : known) EXPECT_EQ(format_for_name(name).value(), format) << name;
-  EXPECT_EQ(format_for_name("a.odd").error().code, ErrorCode::usage);
+  for (const auto& [name, format] : known) EXPECT_EQ(calibration_format_for_path(name).value(), format) << name;
+  EXPECT_EQ(calibration_format_for_path("a.odd").error().code, ErrorCode::usage);
 }
 
-TEST(ReadRig, IgnoresAByteOrderMark) {
+TEST(LoadedRig, IgnoresAByteOrderMark) {
   const TemporaryFolder folder;
-  EXPECT_EQ(complaint(read_calibration(folder.write("calib.txt", "\xEF\xBB\xBF" + kKitti), {1240, 376})), "nothing");
-  EXPECT_EQ(complaint(read_calibration(folder.write("s.yml", "\xEF\xBB\xBF" + opencv_yml(-0.1)), {640, 480})),
+  EXPECT_EQ(error_message(read_calibration(folder.write("calib.txt", "\xEF\xBB\xBF" + kKitti), {1240, 376})),
+            "nothing");
+  EXPECT_EQ(error_message(read_calibration(folder.write("s.yml", "\xEF\xBB\xBF" + opencv_yml(-0.1)), {640, 480})),
             "nothing");
 }
 
 // A calibration is read more than once, which a pipe does not allow.
-TEST(ReadRig, RejectsPipes) {
+TEST(LoadedRig, RejectsPipes) {
   const TemporaryFolder folder;
   const std::string pipe = folder.path() + "/pipe.yaml";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_THAT(complaint(read_calibration(pipe)), HasSubstr("pipe.yaml: is not a regular file"));
-  EXPECT_THAT(complaint(read_rig_yaml(pipe)), HasSubstr("pipe.yaml: is not a regular file"));
+  EXPECT_THAT(error_message(read_calibration(pipe)), HasSubstr("pipe.yaml: is not a regular file"));
+  EXPECT_THAT(error_message(read_rig_yaml(pipe)), HasSubstr("pipe.yaml: is not a regular file"));
 }
 
-TEST(ReadRig, AFolderIsReadIfItContainsOneCalibration) {
+TEST(LoadedRig, AFolderIsReadIfItContainsOneCalibration) {
   const TemporaryFolder folder;
   const auto name = [&](const std::string& path) {
     return read_rig(folder.path() + "/" + path, {640, 480}).value().name;
@@ -336,10 +338,10 @@ TEST(ReadRig, AFolderIsReadIfItContainsOneCalibration) {
   EXPECT_EQ(name("xml"), "opencv");
   folder.write("two/a.yml", opencv_yml(-0.1));
   folder.write("two/b.yml", opencv_yml(-0.2));
-  EXPECT_THAT(complaint(read_rig(folder.path() + "/two")), HasSubstr("contains more than one calibration"));
+  EXPECT_THAT(error_message(read_rig(folder.path() + "/two")), HasSubstr("contains more than one calibration"));
 }
 
-TEST(ReadRig, RealCalibrations) {
+TEST(LoadedRig, RealCalibrations) {
   const std::string data = testing::data_folder();
   if (!std::filesystem::exists(data + "/kitti_06"))
     GTEST_SKIP() << "no real recordings; SPARTAN_DATA says where they are";

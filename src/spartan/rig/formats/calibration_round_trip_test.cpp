@@ -5,9 +5,9 @@
 #include <cmath>
 #include <set>
 
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
+#include "spartan/rig/models/model_conversion.h"
 #include "spartan/rig/rig_differences.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -160,11 +160,11 @@ Rig any_rig(const std::string& kind, bool body, bool rectified, bool sizes) {
   return rig;
 }
 
-Result<ReadRig> round_trip(const Rig& rig, const FormatCase& format_case, const TemporaryFolder& folder) {
+Result<LoadedRig> round_trip(const Rig& rig, const FormatCase& format_case, const TemporaryFolder& folder) {
   const auto files = to_calibration_files(rig, format_case.format, folder.path() + "/" + format_case.path);
   if (!files) return failure(files);
   for (const CalibrationFile& file : *files) folder.write(file.path.substr(folder.path().size() + 1), file.content);
-  const bool two = has_a_file_per_eye(format_case.format);
+  const bool two = has_file_per_camera(format_case.format);
   const std::string path = two ? (*files)[0].path + "," + (*files)[1].path : (*files)[0].path;
   return read_calibration(path, rig.cameras[0].size);
 }
@@ -189,8 +189,8 @@ void expect_same(const Rig& wanted, const Rig& got) {
   const std::vector<std::pair<std::string, std::string>> names{{wanted.pairs[0].left, got.pairs[0].left},
                                                                {wanted.pairs[0].right, got.pairs[0].right}};
   for (const auto& [a, b] : names) {
-    const ModelParameters numbers = parameters(plainest(wanted.find_camera(a)->model));
-    const ModelParameters others = parameters(plainest(got.find_camera(b)->model));
+    const ModelParameters numbers = parameters(simplest_equivalent(wanted.find_camera(a)->model));
+    const ModelParameters others = parameters(simplest_equivalent(got.find_camera(b)->model));
     RC_ASSERT(numbers.size() == others.size());
     for (std::size_t list = 0; list < numbers.size(); ++list) {
       for (std::size_t i = 0; i < std::max(numbers[list].size(), others[list].size()); ++i) {
@@ -210,7 +210,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, EveryFormatPreservesWhatItSupports, ()) {
   const bool body = format_case.body && (!format_case.left_camera || *rc::gen::arbitrary<bool>());
   const bool rectified = format_case.format == Format::kitti || format_case.format == Format::kitti_raw;
   const Rig rig = any_rig(kind, body, rectified, format_case.sizes);
-  RC_PRE(rig.find_faults().empty());
+  RC_PRE(rig.validation_errors().empty());
   RC_CLASSIFY(true, std::string(format_case.path) + " " + kind);
   const TemporaryFolder folder;
   const auto read = round_trip(rig, format_case, folder);
@@ -231,7 +231,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
   const auto is_kitti = [](const FormatCase& h) { return h.format == Format::kitti || h.format == Format::kitti_raw; };
   const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()), is_kitti(a) || is_kitti(b),
                           a.sizes && b.sizes);
-  RC_PRE(rig.find_faults().empty());
+  RC_PRE(rig.validation_errors().empty());
   const TemporaryFolder first, second, third;
   const auto of_a = round_trip(rig, a, first);
   if (!of_a) RC_FAIL(of_a.error().message());
@@ -286,7 +286,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, RigYamlPreservesEverything, ()) {
     rig.cameras.push_back(camera);
   }
   rig.pairs.push_back({"below", "below_left", "below_right", between(0, 1), *rc::gen::arbitrary<bool>()});
-  RC_PRE(rig.find_faults().empty());
+  RC_PRE(rig.validation_errors().empty());
   const TemporaryFolder folder;
   const auto read = round_trip(rig, kFormatCases[0], folder);
   if (!read) RC_FAIL(read.error().message());
@@ -302,7 +302,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, DroppedPropertiesAreReported, ()) {
   const Rig plain = any_rig(kind, true, rectified, format_case.sizes);
   Rig rig = plain;
   put_on_mast(rig);
-  RC_PRE(rig.find_faults().empty());
+  RC_PRE(rig.validation_errors().empty());
   const TemporaryFolder folder;
   const auto read = round_trip(rig, format_case, folder);
   if (!read) RC_FAIL(std::string(format_case.path) + ", " + kind + ": " + read.error().message());
@@ -330,7 +330,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, AdditionalCamerasAreKept, ()) {
     camera.mount_from_camera = Pose(exp_so3(any_vector(2)), any_vector(3));
     rig.cameras.insert(rig.cameras.begin(), camera);  // before those of the pair
   }
-  RC_PRE(rig.find_faults().empty());
+  RC_PRE(rig.validation_errors().empty());
   const TemporaryFolder folder;
   const auto read = round_trip(rig, format_case, folder);
   if (!read) RC_FAIL(read.error().message());

@@ -1,7 +1,7 @@
 // The writers of each format; to_calibration_files() in rig_writing.h selects one. Internal to rig.
 #pragma once
 
-#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/rig/formats/calibration_writing.h"
 
 namespace spartan::rig_detail {
 

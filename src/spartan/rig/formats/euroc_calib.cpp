@@ -3,9 +3,9 @@
 
 #include <filesystem>
 
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/formats/yaml_camera.h"
 
 namespace spartan {

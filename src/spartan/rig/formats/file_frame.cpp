@@ -36,16 +36,16 @@ std::optional<ForwardFrame> forward_frame_of(const Pose& file_from_camera) {
 }
 
 // The body is the left camera. Its pose in the frame of the files is lost, unless it is the identity.
-ReadRig rig_in_frame_of_camera(CalibrationFormat format, Camera left, Camera right) {
-  ReadRig read;
+LoadedRig rig_in_frame_of_camera(CalibrationFormat format, Camera left, Camera right) {
+  LoadedRig read;
   read.body = std::string(kBodyIsLeftCamera) + " (the frame of the files is not plausible as a body frame)";
   const Pose file_from_left = left.mount_from_camera;
   if (file_from_left.translation().norm() > 1e-12 || rotation_angle(file_from_left) > 1e-12) {
-    read.left_out = {{"body", fmt::format("the frame of the files is not kept; in it, the left camera is at ({:.10g}, "
-                                          "{:.10g}, {:.10g}), rotated by {:.6g} degrees",
-                                          file_from_left.translation().x(), file_from_left.translation().y(),
-                                          file_from_left.translation().z(),
-                                          rotation_angle(file_from_left) * 180 / std::numbers::pi)}};
+    read.ignored = {{"body", fmt::format("the frame of the files is not kept; in it, the left camera is at ({:.10g}, "
+                                         "{:.10g}, {:.10g}), rotated by {:.6g} degrees",
+                                         file_from_left.translation().x(), file_from_left.translation().y(),
+                                         file_from_left.translation().z(),
+                                         rotation_angle(file_from_left) * 180 / std::numbers::pi)}};
   }
   const Pose right_from_left = right.mount_from_camera.inverse() * file_from_left;
   read.rig = rig_of_one_pair(std::string(name_of(format)), std::move(left), std::move(right), right_from_left);
@@ -54,9 +54,9 @@ ReadRig rig_in_frame_of_camera(CalibrationFormat format, Camera left, Camera rig
 
 }  // namespace
 
-ReadRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera right) {
+LoadedRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera right) {
   const auto frame = forward_frame_of(left.mount_from_camera);
-  ReadRig read;
+  LoadedRig read;
   if (frame && right.mount_from_camera.translation().norm() <= kLargestRover_m) {
     if (!frame->z_up) {
       const Pose body_from_file = Pose::from_unit_quaternion({0, 1, 0, 0}, Eigen::Vector3d::Zero());
@@ -76,15 +76,15 @@ ReadRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera righ
   return read;
 }
 
-Result<ReadRig> read_two_files(CalibrationFormat format, const std::string& left_path, const std::string& right_path,
-                               const CameraReader& read_camera) {
+Result<LoadedRig> read_two_files(CalibrationFormat format, const std::string& left_path, const std::string& right_path,
+                                 const CameraReader& read_camera) {
   auto left = read_camera(left_path, "left");
   if (!left) return failure(std::move(left));
   auto right = read_camera(right_path, "right");
   if (!right) return failure(std::move(right));
-  ReadRig read = rig_in_frame_of_files(format, std::move(left->camera), std::move(right->camera));
+  LoadedRig read = rig_in_frame_of_files(format, std::move(left->camera), std::move(right->camera));
   for (const auto* camera : {&*left, &*right}) {
-    read.left_out.insert(read.left_out.end(), camera->left_out.begin(), camera->left_out.end());
+    read.ignored.insert(read.ignored.end(), camera->ignored.begin(), camera->ignored.end());
   }
   read.files = {left_path, right_path};
   if (const Status valid = read.rig.validate(left_path + " and " + right_path); !valid) return failure(valid);

@@ -3,8 +3,8 @@
 
 #include <functional>
 
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_writers.h"
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/rig.h"
 
 namespace spartan::rig_detail {
@@ -15,20 +15,20 @@ namespace spartan::rig_detail {
 ///    of the left camera mainly along −y (it looks forward) or +y (it looks backward), the image y axis downwards (−z),
 ///    both cameras within 100 m of the origin;
 ///  - the frame of the files rotated by 180° about x, if it is forward-right-down: as above with downwards along +z;
-///  - otherwise the left camera, turned to x forward, y left, z up (rig_of_one_pair); `left_out` reports the lost pose.
+///  - otherwise the left camera, turned to x forward, y left, z up (rig_of_one_pair); `ignored` reports the lost pose.
 /// "Mainly" refers to the largest component, so any tilt works except within one degree of vertical. `body` describes
 /// the chosen frame. The pair is named `stereo`.
-ReadRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera right);
+LoadedRig rig_in_frame_of_files(CalibrationFormat format, Camera left, Camera right);
 
 /// A camera whose `mount_from_camera` is its pose in the frame of the file, and the ignored content of the file.
 struct CameraOfFile {
   Camera camera;
-  std::vector<RigDifference> left_out = {};
+  std::vector<RigDifference> ignored = {};
 };
 using CameraReader = std::function<Result<CameraOfFile>(const std::string& path, const std::string& name)>;
 /// Reads the cameras `left` and `right` from two such files into a validated rig.
-Result<ReadRig> read_two_files(CalibrationFormat format, const std::string& left_path, const std::string& right_path,
-                               const CameraReader& read_camera);
+Result<LoadedRig> read_two_files(CalibrationFormat format, const std::string& left_path, const std::string& right_path,
+                                 const CameraReader& read_camera);
 
 /// Formats the file of one camera.
 using CameraWriter = std::function<Result<std::string>(const Camera& camera, const Pose& file_from_camera)>;

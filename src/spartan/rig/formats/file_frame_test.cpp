@@ -5,8 +5,8 @@
 
 #include <numbers>
 
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
@@ -43,9 +43,10 @@ Rig seen_from(const Pose& frame_from_body, Rig rig) {
 }
 
 // Writes and reads `rig` with its body as the frame of the files.
-ReadRig through_files(const Rig& rig, const char* name = "pair.cahvor") {
+LoadedRig through_files(const Rig& rig, const char* name = "pair.cahvor") {
   const TemporaryFolder folder;
-  const auto files = to_calibration_files(rig, format_for_name(name).value(), folder.path() + "/" + name).value();
+  const auto files =
+      to_calibration_files(rig, calibration_format_for_path(name).value(), folder.path() + "/" + name).value();
   for (const CalibrationFile& file : files) folder.write(file.path.substr(folder.path().size() + 1), file.content);
   return read_calibration(files[0].path + "," + files[1].path, {640, 480}).value();
 }
@@ -62,11 +63,11 @@ TEST(FileFrame, SupportsSteepTilts) {
   for (const char* name : {"pair.cahvor", "pair.tsai", "pair.cameramodel"}) {
     for (const double pitch : {-85, -50, -20, 0, 20, 44, 50, 70, 85}) {
       const Rig rig = pair_in_body(10, pitch, {1, 0.06, 1});
-      const ReadRig kept = through_files(rig, name);
+      const LoadedRig kept = through_files(rig, name);
       EXPECT_LE(apart(rig, kept.rig), 1e-9) << name << ", " << pitch;
-      EXPECT_TRUE(kept.left_out.empty());
+      EXPECT_TRUE(kept.ignored.empty());
       // The same files in a frame with z down.
-      const ReadRig turned = through_files(seen_from(kDown, rig), name);
+      const LoadedRig turned = through_files(seen_from(kDown, rig), name);
       EXPECT_LE(apart(rig, turned.rig), 1e-9) << name << ", " << pitch;
       EXPECT_THAT(turned.body, HasSubstr("forward-right-down"));
     }
@@ -78,7 +79,7 @@ TEST(FileFrame, BackwardLookingPairsKeepTheFrame) {
   for (const double yaw : {180, 165, -170}) {
     for (const double pitch : {-30, 0, 37, 60}) {
       const Rig rig = pair_in_body(yaw, pitch, {-0.7, 0.08, 0.5});
-      const ReadRig up = through_files(rig), down = through_files(seen_from(kDown, rig));
+      const LoadedRig up = through_files(rig), down = through_files(seen_from(kDown, rig));
       EXPECT_LE(apart(rig, up.rig), 1e-9) << yaw << ", " << pitch;
       EXPECT_LE(apart(rig, down.rig), 1e-9) << yaw << ", " << pitch;
       EXPECT_THAT(up.body, HasSubstr("looks backward"));
@@ -92,17 +93,17 @@ TEST(FileFrame, OtherFramesAreReportedAsLost) {
   const Rig on_earth = pair_in_body(0, 30, {-2665990.6, -3838640.2, 4312790.1});
   const Rig of_camera = seen_from(optical_from_forward(), pair_in_body(0, 0, {0, 0.5, 0}));
   for (const Rig& rig : {on_earth, of_camera, pair_in_body(0, 90, {1, 0, 1}), pair_in_body(90, 10, {1, 0, 1})}) {
-    const ReadRig read = through_files(rig);
+    const LoadedRig read = through_files(rig);
     EXPECT_THAT(read.body, HasSubstr("the left camera"));
     EXPECT_LE((optical_from_forward() * read.rig.body_from_camera("left")).translation().norm(), 1e-12);
-    ASSERT_EQ(read.left_out.size(), 1u);
-    EXPECT_EQ(read.left_out[0].key, "body");
-    EXPECT_THAT(read.left_out[0].text, HasSubstr("the frame of the files is not kept; in it, the left camera is at ("));
+    ASSERT_EQ(read.ignored.size(), 1u);
+    EXPECT_EQ(read.ignored[0].key, "body");
+    EXPECT_THAT(read.ignored[0].text, HasSubstr("the frame of the files is not kept; in it, the left camera is at ("));
   }
   // The optical frame of the left camera contains no further information.
   const Rig own =
       seen_from(optical_from_forward() * Pose::from_translation({0, -0.06, 0}), pair_in_body(0, 0, {0, 0, 0}));
-  EXPECT_TRUE(through_files(own).left_out.empty());
+  EXPECT_TRUE(through_files(own).ignored.empty());
 }
 
 }  // namespace

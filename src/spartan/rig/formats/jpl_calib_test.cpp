@@ -5,9 +5,9 @@
 
 #include <regex>
 
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
 #include "spartan/rig/formats/read_back.h"
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
 #include "spartan/rig/rig_differences.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
@@ -16,7 +16,7 @@
 namespace spartan {
 namespace {
 
-using testing::complaint;
+using testing::error_message;
 using ::testing::HasSubstr;
 using testing::replaced;
 using testing::right_in_left;
@@ -126,7 +126,7 @@ TEST(MrcalCalib, UnsupportedModelsAreNamed) {
   const TemporaryFolder folder;
   folder.write("right.cameramodel", cameramodel(kMrcalCases[0], false));
   const auto message_for = [&](const std::string& what, const std::string& with) {
-    return complaint(
+    return error_message(
         read_calibration(folder.write("left.cameramodel", replaced(cameramodel(kMrcalCases[0], true), what, with))));
   };
   EXPECT_THAT(message_for("LENSMODEL_PINHOLE", "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3"),
@@ -146,7 +146,7 @@ TEST(CahvorCalib, ReadsEveryNotationOfTheLinearity) {
     const auto text = [&](bool left) { return cahvor(of, left) + further; };
     folder.write("r.cahvore", text(false));
     const auto read = read_calibration(folder.write("l.cahvore", text(true)));
-    if (!read) return complaint(read);
+    if (!read) return error_message(read);
     return fmt::format("{}", std::get<CahvoreModel>(read->rig.cameras[0].model).linearity());
   };
   EXPECT_EQ(linearity("CAHVORE1 = perspective, distortion, pupil", ""), "1");
@@ -228,8 +228,8 @@ TEST(CahvorCalib, CommentsMayFollowNumbers) {
   folder.write("right.cahvor", right);
   const std::string text =
       replaced(cahvor(kMrcalCases[0], true), "Dimensions = 1280 720", "Dimensions = 1280 720 # px");
-  EXPECT_EQ(complaint(read_calibration(folder.write("left.cahvor", text))), "nothing");
-  EXPECT_THAT(complaint(read_calibration(folder.write("left.cahvor", replaced(text, "720 # px", "# 720")))),
+  EXPECT_EQ(error_message(read_calibration(folder.write("left.cahvor", text))), "nothing");
+  EXPECT_THAT(error_message(read_calibration(folder.write("left.cahvor", replaced(text, "720 # px", "# 720")))),
               HasSubstr("left.cahvor:1: Dimensions: has 1 numbers, must have 2"));
 }
 
@@ -238,7 +238,7 @@ TEST(MrcalCalib, OtherContentOfMrcalFilesIsIgnored) {
   folder.write("right.cameramodel", cameramodel(kMrcalCases[0], false));
   const auto read = read_calibration(folder.write("left.cameramodel", cameramodel(kMrcalCases[0], true))).value();
   std::string keys;
-  for (const RigDifference& each : read.left_out) keys += each.key + ";";
+  for (const RigDifference& each : read.ignored) keys += each.key + ";";
   EXPECT_EQ(keys,
             "left.valid_intrinsics_region;left.optimization_inputs;right.valid_intrinsics_region;"
             "right.optimization_inputs;");

@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include "spartan/rig/formats/calibration_readers.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/formats/yaml_camera.h"
 
 namespace spartan {
@@ -44,7 +44,7 @@ struct Chain {
   std::vector<Camera> cameras;
   std::optional<Pose> first_from_imu;
   std::string imu_key;  // the key that gives it
-  std::vector<RigDifference> left_out;
+  std::vector<RigDifference> ignored;
 };
 
 bool consistent(const Pose& a, const Pose& b) {
@@ -107,7 +107,7 @@ Chain read_chain(YamlMap& root) {
     if (entry.has("timeshift_cam_imu")) {
       const auto shift = entry.number("timeshift_cam_imu");
       if (shift && *shift != 0) {
-        chain.left_out.push_back(
+        chain.ignored.push_back(
             {camera.name + ".timeshift_cam_imu", fmt::format("the camera's clock is {} s off the IMU's", *shift)});
       }
     }
@@ -128,7 +128,7 @@ std::string transform_lines(const char* key, const Pose& pose) {
 
 }  // namespace
 
-Result<ReadRig> read_kalibr_calib(const std::string& path) {
+Result<LoadedRig> read_kalibr_calib(const std::string& path) {
   const auto loaded = rig_detail::load_yaml_file(path);
   if (!loaded) return failure(loaded);
   YamlErrors errors(path);
@@ -146,12 +146,12 @@ Result<ReadRig> read_kalibr_calib(const std::string& path) {
   rig.pairs = {{"stereo", camera_key(0), camera_key(1)}};
   auto valid = rig_detail::validated(std::move(rig), path);
   if (!valid) return failure(std::move(valid));
-  return ReadRig{std::move(*valid),
-                 CalibrationFormat::kalibr,
-                 {path},
-                 {},
-                 has_imu ? "the IMU of " + chain.imu_key : rig_detail::kBodyIsLeftCamera,
-                 std::move(chain.left_out)};
+  return LoadedRig{std::move(*valid),
+                   CalibrationFormat::kalibr,
+                   {path},
+                   {},
+                   has_imu ? "the IMU of " + chain.imu_key : rig_detail::kBodyIsLeftCamera,
+                   std::move(chain.ignored)};
 }
 
 Result<CalibrationFiles> rig_detail::write_kalibr_calib(const Rig& rig, const std::string& path) {

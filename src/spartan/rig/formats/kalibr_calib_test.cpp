@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-using testing::complaint;
+using testing::error_message;
 using ::testing::HasSubstr;
 using testing::replaced;
 using testing::right_in_left;
@@ -88,13 +88,13 @@ TEST(KalibrCalib, WithImuTheBodyIsTheImu) {
   EXPECT_LE((right_in_left(read->rig) - Eigen::Vector3d(0.11, -0.002, -0.001)).norm(), 1e-15);
   EXPECT_EQ(read->body, "the IMU of T_cam_imu");
   EXPECT_THAT(read->notes, ::testing::ElementsAre("body: the IMU of T_cam_imu"));
-  ASSERT_EQ(read->left_out.size(), 1u);
-  EXPECT_EQ(read->left_out[0].key, "cam0.timeshift_cam_imu");
-  EXPECT_EQ(read->left_out[0].text, "the camera's clock is -8.121e-05 s off the IMU's");
+  ASSERT_EQ(read->ignored.size(), 1u);
+  EXPECT_EQ(read->ignored[0].key, "cam0.timeshift_cam_imu");
+  EXPECT_EQ(read->ignored[0].text, "the camera's clock is -8.121e-05 s off the IMU's");
   const std::string other = replaced(imu, "0.07", "0.09");
   const std::string both = replaced(replaced(kCamchain, "  rostopic: /cam0/image_raw\n", imu),
                                     "  resolution: [640, 400]\n", other + "  resolution: [640, 400]\n");
-  EXPECT_THAT(complaint(read_calibration(folder.write("camchain.yaml", both))),
+  EXPECT_THAT(error_message(read_calibration(folder.write("camchain.yaml", both))),
               HasSubstr("is inconsistent with T_cn_cnm1"));
 }
 
@@ -125,7 +125,7 @@ TEST(KalibrCalib, AnyCameraMayGiveTheImu) {
       EXPECT_EQ(read->body, text == imu_cam ? "the IMU of T_imu_cam" : "the IMU of T_cam_imu");
     }
   }
-  EXPECT_THAT(complaint(with(1, cam_imu + replaced(imu_cam, "0.07", "0.09"))),
+  EXPECT_THAT(error_message(with(1, cam_imu + replaced(imu_cam, "0.07", "0.09"))),
               HasSubstr("cam1.T_cam_imu: is inconsistent with T_imu_cam"));
 }
 
@@ -139,7 +139,7 @@ TEST(KalibrCalib, ExtrinsicsMayComeFromTheImu) {
     return fmt::format("  T_imu_cam:\n  - [0, 0, 1, 0]\n  - [-1, 0, 0, {}]\n  - [0, -1, 0, 0]\n  - [0, 0, 0, 1]\n", y);
   };
   text = replaced(replaced(text, link, ""), "cam1:\n", "cam1:\n" + pose(-0.05));
-  EXPECT_THAT(complaint(read_calibration(folder.write("camchain.yaml", text))),
+  EXPECT_THAT(error_message(read_calibration(folder.write("camchain.yaml", text))),
               HasSubstr("cam1.T_cn_cnm1: is missing"));
   const auto read = read_calibration(folder.write("camchain.yaml", replaced(text, "cam0:\n", "cam0:\n" + pose(0.05))));
   ASSERT_TRUE(read) << read.error().message();
@@ -149,7 +149,7 @@ TEST(KalibrCalib, ExtrinsicsMayComeFromTheImu) {
 TEST(KalibrCalib, UnsupportedContentIsNamed) {
   const TemporaryFolder folder;
   const auto message_for = [&](const std::string& what, const std::string& with) {
-    return complaint(read_calibration(folder.write("camchain.yaml", replaced(kCamchain, what, with))));
+    return error_message(read_calibration(folder.write("camchain.yaml", replaced(kCamchain, what, with))));
   };
   EXPECT_THAT(
       message_for("distortion_coeffs: [0, 0", "distortion_coeffs: [0.1, 0"),

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "spartan/rig/formats/calibration_readers.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/formats/text_matrices.h"
 
 namespace spartan {
@@ -45,7 +45,7 @@ struct RectifiedPair {
   PinholeModel left, right;
   double left_x_m = 0;  ///< position of the left camera along x of the reference camera
   double baseline_m = 0;
-  std::vector<RigDifference> left_out;
+  std::vector<RigDifference> ignored;
 };
 
 // P = K [I | t] with t = (−x, 0, 0): a camera at x along the common row direction.
@@ -84,9 +84,9 @@ Result<RectifiedPair> read_projections(const TextMatrices& file, const std::stri
   // Below the tolerance above, but not zero.
   const Eigen::Vector2d residual = (*left - *right).col(3).tail<2>();
   if (residual != Eigen::Vector2d::Zero()) {
-    pair.left_out = {{right_key, fmt::format("the last numbers of its rows 2 and 3, {:.6g} and {:.6g}, are set to 0: "
-                                             "cameras at the same height and depth",
-                                             -residual.x(), -residual.y())}};
+    pair.ignored = {{right_key, fmt::format("the last numbers of its rows 2 and 3, {:.6g} and {:.6g}, are set to 0: "
+                                            "cameras at the same height and depth",
+                                            -residual.x(), -residual.y())}};
   }
   return pair;
 }
@@ -132,13 +132,13 @@ Result<ImageSize> read_size(const TextMatrices& file, const std::string& key) {
 // Lines that a Rig cannot represent. Their numbers must be valid too: a file with a NaN is rejected as a whole.
 Result<std::vector<RigDifference>> read_other_cameras(const TextMatrices& file,
                                                       std::initializer_list<std::pair<const char*, const char*>> keys) {
-  std::vector<RigDifference> left_out;
+  std::vector<RigDifference> ignored;
   for (const auto& [key, what] : keys) {
     if (!file.has(key)) continue;
     if (const auto valid = read_matrix<Projection>(file, key); !valid) return failure(valid);
-    left_out.push_back({key, what});
+    ignored.push_back({key, what});
   }
-  return left_out;
+  return ignored;
 }
 
 // Whether the file contains an unrectified camera: K and D that differ from the rectified pinhole.
@@ -152,11 +152,12 @@ Result<bool> has_raw_camera(const TextMatrices& file, const std::string& number,
   return !(raw == rectified) || std::any_of(d->begin(), d->end(), [](double v) { return v != 0; });
 }
 
-ReadRig make_read_rig(Rig rig, CalibrationFormat format, const std::string& path, std::vector<RigDifference> left_out) {
+LoadedRig make_read_rig(Rig rig, CalibrationFormat format, const std::string& path,
+                        std::vector<RigDifference> ignored) {
   const bool left = rig.convention == PoseConvention::left_optical;
   return {
-      std::move(rig),     format, {path}, {}, left ? rig_detail::kBodyIsLeftCamera : "the IMU of calib_imu_to_velo.txt",
-      std::move(left_out)};
+      std::move(rig),    format, {path}, {}, left ? rig_detail::kBodyIsLeftCamera : "the IMU of calib_imu_to_velo.txt",
+      std::move(ignored)};
 }
 
 }  // namespace
@@ -169,39 +170,39 @@ Result<Rig> read_kitti_raw_calib(const std::string& path) {
   return rig_detail::rig_of(rig_detail::read_kitti_raw(path));
 }
 
-Result<ReadRig> rig_detail::read_kitti(const std::string& path, ImageSize size) {
+Result<LoadedRig> rig_detail::read_kitti(const std::string& path, ImageSize size) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
   const auto pair = read_projections(*file, "P0", "P1");
   if (!pair) return failure(pair);
-  auto left_out = read_other_cameras(*file, {{"P2", "a colour camera, which is not read"},
-                                             {"P3", "a colour camera, which is not read"},
-                                             {"Tr", "the place of the laser scanner, which is not read"}});
-  if (!left_out) return failure(left_out);
+  auto ignored = read_other_cameras(*file, {{"P2", "a colour camera, which is not read"},
+                                            {"P3", "a colour camera, which is not read"},
+                                            {"Tr", "the place of the laser scanner, which is not read"}});
+  if (!ignored) return failure(ignored);
   if (size.empty()) return unknown_size(path);
   auto rig =
       validated(rig_of_one_pair("kitti", camera_of("cam0", size, pair->left), camera_of("cam1", size, pair->right),
                                 Pose::from_translation({-pair->baseline_m, 0, 0})),
                 path);
   if (!rig) return failure(std::move(rig));
-  left_out->insert(left_out->begin(), pair->left_out.begin(), pair->left_out.end());
-  return make_read_rig(std::move(*rig), CalibrationFormat::kitti, path, std::move(*left_out));
+  ignored->insert(ignored->begin(), pair->ignored.begin(), pair->ignored.end());
+  return make_read_rig(std::move(*rig), CalibrationFormat::kitti, path, std::move(*ignored));
 }
 
-Result<ReadRig> rig_detail::read_kitti_raw(const std::string& path) {
+Result<LoadedRig> rig_detail::read_kitti_raw(const std::string& path) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
   const auto pair = read_projections(*file, "P_rect_00", "P_rect_01");
   if (!pair) return failure(pair);
-  auto left_out = read_other_cameras(*file, {{"P_rect_02", "a colour camera, which is not read"},
-                                             {"P_rect_03", "a colour camera, which is not read"}});
-  if (!left_out) return failure(left_out);
-  left_out->insert(left_out->begin(), pair->left_out.begin(), pair->left_out.end());
+  auto ignored = read_other_cameras(*file, {{"P_rect_02", "a colour camera, which is not read"},
+                                            {"P_rect_03", "a colour camera, which is not read"}});
+  if (!ignored) return failure(ignored);
+  ignored->insert(ignored->begin(), pair->ignored.begin(), pair->ignored.end());
   for (const auto& [number, rectified] : {std::pair{"00", pair->left}, {"01", pair->right}}) {
     const auto raw = has_raw_camera(*file, number, rectified);
     if (!raw) return failure(raw);
     if (*raw) {
-      left_out->push_back({std::string("K_") + number, "the camera before rectification (K, D, R, T) is not kept"});
+      ignored->push_back({std::string("K_") + number, "the camera before rectification (K, D, R, T) is not kept"});
     }
   }
   const auto left_size = read_size(*file, "S_rect_00");
@@ -225,7 +226,7 @@ Result<ReadRig> rig_detail::read_kitti_raw(const std::string& path) {
   }
   auto valid = validated(std::move(rig), path);
   if (!valid) return failure(std::move(valid));
-  return make_read_rig(std::move(*valid), CalibrationFormat::kitti_raw, path, std::move(*left_out));
+  return make_read_rig(std::move(*valid), CalibrationFormat::kitti_raw, path, std::move(*ignored));
 }
 
 }  // namespace spartan

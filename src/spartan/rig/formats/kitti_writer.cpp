@@ -7,7 +7,7 @@
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan::rig_detail {
 namespace {
@@ -24,10 +24,10 @@ constexpr double kRounding = 1e-9;  // relative tolerance, and rad
 Result<RectifiedPinholes> rectified_pinholes(const Rig& rig, CalibrationFormat format) {
   const auto cameras = single_pair(rig, format);
   if (!cameras) return failure(cameras);
-  const auto left = expressed_as<PinholeModel>(cameras->left->model),
-             right = expressed_as<PinholeModel>(cameras->right->model);
+  const auto left = converted_to<PinholeModel>(cameras->left->model),
+             right = converted_to<PinholeModel>(cameras->right->model);
   for (const Camera* camera : {cameras->left, cameras->right}) {
-    if (expressed_as<PinholeModel>(camera->model)) continue;
+    if (converted_to<PinholeModel>(camera->model)) continue;
     return cannot_hold(*camera, fmt::format("{} supports rectified pinhole cameras only, this one is {}",
                                             name_of(format), name_of(camera->model)));
   }

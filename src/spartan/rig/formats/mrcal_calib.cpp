@@ -9,12 +9,12 @@
 #include <utility>
 
 #include "spartan/core/strict_yaml.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
 #include "spartan/rig/formats/python_dict.h"
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {
 namespace {
@@ -104,7 +104,7 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
   camera.mount_from_camera = Pose(*rotation, {(*e)[3], (*e)[4], (*e)[5]}).inverse();
   CameraOfFile result{std::move(camera)};
   for (const auto& [key, what] : kIgnored) {
-    if (file->has(key)) result.left_out.push_back({fmt::format("{}.{}", name, key), what});
+    if (file->has(key)) result.ignored.push_back({fmt::format("{}.{}", name, key), what});
   }
   return result;
 }
@@ -127,18 +127,18 @@ void append_cahvor(std::vector<double>& numbers, const Eigen::Vector3d& axis, co
 
 Result<Lens> lens_of(const Camera& camera) {
   const auto core = [](const PinholeModel& p) { return std::vector{p.fx, p.fy, p.cx, p.cy}; };
-  if (const auto m = expressed_as<PinholeModel>(camera.model)) return Lens{"PINHOLE", core(*m)};
-  if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
+  if (const auto m = converted_to<PinholeModel>(camera.model)) return Lens{"PINHOLE", core(*m)};
+  if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
     const std::size_t count = is_rational(*m) ? 8 : k[4] != 0 ? 5 : 4;
     Lens lens{fmt::format("OPENCV{}", count), core(m->pinhole())};
     append(lens.numbers, k, count);
     return lens;
   }
-  if (const auto m = expressed_as<CahvoreModel>(camera.model)) {
+  if (const auto m = converted_to<CahvoreModel>(camera.model)) {
     Lens lens{fmt::format("{}{}", kCahvore, m->linearity()), core(m->cahv().core)};
     append_cahvor(lens.numbers, m->optical_axis(), m->radial());
-    if (expressed_as<CahvorModel>(camera.model)) {
+    if (converted_to<CahvorModel>(camera.model)) {
       lens.name = "CAHVOR";
     } else {
       append(lens.numbers, m->entrance_m(), 3);
@@ -162,7 +162,7 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
 
 }  // namespace
 
-Result<ReadRig> read_mrcal_calib(const std::string& left_path, const std::string& right_path) {
+Result<LoadedRig> read_mrcal_calib(const std::string& left_path, const std::string& right_path) {
   return rig_detail::read_two_files(CalibrationFormat::mrcal, left_path, right_path, read_camera);
 }
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "spartan/rig/formats/calibration_readers.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/opencv_storage.h"
-#include "spartan/rig/formats/rig_files.h"
 
 namespace spartan {
 namespace {
@@ -215,11 +215,11 @@ Result<ImageSize> size_in(const Storages& files, ImageSize fallback) {
 // The rectification of the file, which a Rig does not represent. For rectified images P1 and P2 are the cameras
 // themselves.
 std::vector<RigDifference> rectification_in(const Storages& files, bool raw) {
-  std::vector<RigDifference> left_out;
+  std::vector<RigDifference> ignored;
   for (const char* key : raw ? std::vector{"R1", "R2", "P1", "P2", "Q"} : std::vector{"R1", "R2"}) {
-    if (files.has(key)) left_out.push_back({key, "the rectification of the file is not kept"});
+    if (files.has(key)) ignored.push_back({key, "the rectification of the file is not kept"});
   }
-  return left_out;
+  return ignored;
 }
 
 }  // namespace
@@ -228,8 +228,8 @@ Result<Rig> read_opencv_calib(const std::string& intrinsics_path, const std::str
   return rig_detail::rig_of(rig_detail::read_opencv(intrinsics_path, extrinsics_path, size));
 }
 
-Result<ReadRig> rig_detail::read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path,
-                                        ImageSize size) {
+Result<LoadedRig> rig_detail::read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path,
+                                          ImageSize size) {
   Storages files;
   for (const std::string& path : {intrinsics_path, extrinsics_path}) {
     if (path.empty()) continue;
@@ -245,8 +245,8 @@ Result<ReadRig> rig_detail::read_opencv(const std::string& intrinsics_path, cons
   if (!valid) return failure(std::move(valid));
   std::vector<std::string> paths{intrinsics_path};
   if (!extrinsics_path.empty()) paths.push_back(extrinsics_path);
-  return ReadRig{std::move(*valid), CalibrationFormat::opencv,   std::move(paths), {},
-                 kBodyIsLeftCamera, rectification_in(files, raw)};
+  return LoadedRig{std::move(*valid), CalibrationFormat::opencv,   std::move(paths), {},
+                   kBodyIsLeftCamera, rectification_in(files, raw)};
 }
 
 }  // namespace spartan

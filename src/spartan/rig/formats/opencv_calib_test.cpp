@@ -5,7 +5,7 @@
 #include <functional>
 #include <opencv2/core/persistence.hpp>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
@@ -13,7 +13,7 @@
 namespace spartan {
 namespace {
 
-using testing::complaint;
+using testing::error_message;
 using ::testing::HasSubstr;
 using testing::replaced;
 using testing::right_in_left;
@@ -97,7 +97,7 @@ TEST(OpencvFiles, AnInvalidSizeIsReported) {
     file << "R" << row({1, 0, 0, 0, 1, 0, 0, 0, 1}, 3) << "T" << row({-0.1, 0, 0}, 3);
   });
   const auto message_for = [&](const std::string& what, const std::string& with) {
-    return complaint(read_calibration(folder.write("s.yml", replaced(text, what, with)), {111, 222}));
+    return error_message(read_calibration(folder.write("s.yml", replaced(text, what, with)), {111, 222}));
   };
   for (const char* bad : {"abc", "1e300", "0", "-640", "640.5", "[640, 480]"}) {
     EXPECT_THAT(message_for("image_width: 640", std::string("image_width: ") + bad),
@@ -119,13 +119,13 @@ TEST(OpencvFiles, RowsAndColumnsMustBePositive) {
     file << "P2" << row({290, 0, 310, -29, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
   });
   const std::string odd = replaced(replaced(text, "rows: 3", "rows: -3"), "cols: 4", "cols: -4");
-  EXPECT_THAT(complaint(read_calibration(folder.write("s.yml", odd))), HasSubstr("s.yml:5: P1: is not a matrix"));
-  EXPECT_EQ(complaint(read_calibration(folder.write("s.yml", text))), "nothing");
+  EXPECT_THAT(error_message(read_calibration(folder.write("s.yml", odd))), HasSubstr("s.yml:5: P1: is not a matrix"));
+  EXPECT_EQ(error_message(read_calibration(folder.write("s.yml", text))), "nothing");
 }
 
 TEST(OpencvFiles, TheRectificationIsIgnored) {
   const TemporaryFolder folder;
-  const auto left_out = [&](bool with_cameras) {
+  const auto ignored = [&](bool with_cameras) {
     const std::string text = opencv_file([&](cv::FileStorage& file) {
       const cv::Mat p = row({290, 0, 310, 0, 0, 290, 230, 0, 0, 0, 1, 0}, 3);
       cv::Mat right = p.clone();
@@ -138,12 +138,12 @@ TEST(OpencvFiles, TheRectificationIsIgnored) {
       }
     });
     std::string keys;
-    const ReadRig read = read_calibration(folder.write("s.yml", text)).value();
-    for (const RigDifference& each : read.left_out) keys += each.key;
+    const LoadedRig read = read_calibration(folder.write("s.yml", text)).value();
+    for (const RigDifference& each : read.ignored) keys += each.key;
     return keys;
   };
-  EXPECT_EQ(left_out(true), "R1R2P1P2");
-  EXPECT_EQ(left_out(false), "R1R2");
+  EXPECT_EQ(ignored(true), "R1R2P1P2");
+  EXPECT_EQ(ignored(false), "R1R2");
 }
 
 TEST(OpencvFiles, ThinPrismsMustBeZero) {
@@ -160,7 +160,7 @@ TEST(OpencvFiles, ThinPrismsMustBeZero) {
   };
   ASSERT_TRUE(read(0)) << read(0).error().message();
   EXPECT_NEAR(rotation_angle(read(0)->rig.right_from_left(read(0)->rig.pairs[0])), 0.1, 1e-15) << "R as a vector";
-  EXPECT_THAT(complaint(read(1e-9)), HasSubstr("D1: thin-prism"));
+  EXPECT_THAT(error_message(read(1e-9)), HasSubstr("D1: thin-prism"));
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <opencv2/core/persistence.hpp>
 
 #include "spartan/rig/formats/calibration_writers.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan::rig_detail {
 namespace {
@@ -16,10 +16,10 @@ struct Lens {
 
 Result<Lens> lens_of(const Camera& camera, bool fisheye) {
   if (fisheye) {
-    if (const auto m = expressed_as<EquidistantModel>(camera.model)) {
+    if (const auto m = converted_to<EquidistantModel>(camera.model)) {
       return Lens{m->pinhole(), {m->coefficients().begin(), m->coefficients().end()}};
     }
-  } else if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
+  } else if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
     return Lens{m->pinhole(), {k.begin(), k.begin() + (is_rational(*m) ? 8 : 5)}};
   }
@@ -44,8 +44,8 @@ Result<CalibrationFiles> write_opencv_calib(const Rig& rig, const std::string& p
     return cannot_hold(*cameras->right,
                        "OpenCV files have one image size for both cameras, this one differs from the left one");
   }
-  const bool fisheye = expressed_as<EquidistantModel>(cameras->left->model).has_value() ||
-                       expressed_as<EquidistantModel>(cameras->right->model).has_value();
+  const bool fisheye = converted_to<EquidistantModel>(cameras->left->model).has_value() ||
+                       converted_to<EquidistantModel>(cameras->right->model).has_value();
   const auto left = lens_of(*cameras->left, fisheye), right = lens_of(*cameras->right, fisheye);
   if (!left) return failure(left);
   if (!right) return failure(right);

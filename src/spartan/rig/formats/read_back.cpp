@@ -80,7 +80,7 @@ Result<std::vector<std::string>> write_to(const ScratchFolder& scratch, const Ca
   for (const CalibrationFile& file : files) {
     const fs::path destination(file.path);
     const fs::path path =
-        has_a_file_per_eye(format)
+        has_file_per_camera(format)
             ? scratch.folder() / std::to_string(paths.size()) / destination.filename()
             : scratch.folder() / destination.lexically_normal().lexically_relative(folder.lexically_normal());
     if (Status made = make_folder(path.parent_path().string()); !made) return failure(made);
@@ -98,13 +98,13 @@ Result<std::vector<std::string>> write_to(const ScratchFolder& scratch, const Ca
 
 }  // namespace
 
-Result<ReadRig> read_back(const CalibrationFiles& files, CalibrationFormat format, ImageSize size) {
+Result<LoadedRig> read_back(const CalibrationFiles& files, CalibrationFormat format, ImageSize size) {
   const auto scratch = ScratchFolder::make();
   if (!scratch) return failure(scratch);
   const auto paths = write_to(*scratch, files, format);
   if (!paths) return failure(paths);
   auto read =
-      read_calibration_as(format, has_a_file_per_eye(format) ? paths->at(0) + "," + paths->at(1) : paths->at(0), size);
+      read_calibration_as(format, has_file_per_camera(format) ? paths->at(0) + "," + paths->at(1) : paths->at(0), size);
   if (read) return read;
   Error error = read.error();
   for (std::string* text : {&error.what, &error.where}) {

@@ -1,8 +1,8 @@
 // Reading calibration files as they will be after writing, without writing them to their destination.
 #pragma once
 
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
 
 namespace spartan {
 
@@ -10,6 +10,6 @@ namespace spartan {
 /// existing files at their destination that would be read with them: further cameras of EuRoC, the IMU of KITTI raw,
 /// OpenCV's other file. Errors name the files by their destination; code `output` if no temporary folder can be
 /// created.
-Result<ReadRig> read_back(const CalibrationFiles& files, CalibrationFormat format, ImageSize size);
+Result<LoadedRig> read_back(const CalibrationFiles& files, CalibrationFormat format, ImageSize size);
 
 }  // namespace spartan

@@ -85,13 +85,13 @@ CameraModel read_model(YamlMap& map) {
   if (!name) {
     // If the model is unknown, the keys of all models are accepted to avoid follow-up errors.
     for (const std::string_view other : known) {
-      for (const auto& kind : parameter_kinds(*camera_model_named(other))) (void)map.has(kind.key);
+      for (const auto& kind : parameter_specs(*camera_model_named(other))) (void)map.has(kind.key);
     }
     return {};
   }
   const CameraModel model = *camera_model_named(*name);
   ModelParameters numbers = parameters(model);
-  const auto kinds = parameter_kinds(model);
+  const auto kinds = parameter_specs(model);
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     numbers[i] = map.numbers(kinds[i].key, kinds[i].counts).value_or(numbers[i]);
   }
@@ -190,15 +190,15 @@ Rig read_root(YamlMap root, const std::string& default_name) {
   return rig;
 }
 
-// Adds the faults found by Rig::find_faults(), except those that follow from an error reported before.
+// Adds the faults found by Rig::validation_errors(), except those that follow from an error reported before.
 void add_rig_faults(const Rig& rig, YamlErrors& errors) {
-  std::vector<RigFault> found;
-  for (const RigFault& fault : rig.find_faults()) {
+  std::vector<RigValidationError> found;
+  for (const RigValidationError& fault : rig.validation_errors()) {
     const bool about_a_pair = fault.key.starts_with("pairs");
-    if (errors.touches(fault.key) || (about_a_pair && errors.touches("cameras"))) continue;
+    if (errors.has_error_near(fault.key) || (about_a_pair && errors.has_error_near("cameras"))) continue;
     found.push_back(fault);
   }
-  for (const RigFault& fault : found) errors.add(fault.key, fault.what);
+  for (const RigValidationError& fault : found) errors.add(fault.key, fault.what);
 }
 
 // --- writing ---
@@ -215,7 +215,7 @@ std::string pose_lines(const Pose& pose) {
 std::string camera_lines(const Camera& camera) {
   std::string text = fmt::format("  {}:\n    size_px: [{}, {}]\n    model: {}\n", yaml_quoted(camera.name),
                                  camera.size.width, camera.size.height, name_of(camera.model));
-  const auto kinds = parameter_kinds(camera.model);
+  const auto kinds = parameter_specs(camera.model);
   const ModelParameters numbers = parameters(camera.model);
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     text += fmt::format("    {}: [{}]\n", kinds[i].key, fmt::join(numbers[i], ", "));

@@ -1,4 +1,4 @@
-// The native calibration format rig.yaml (docs/formats.md, "rig.yaml").
+// The native calibration format rig.yaml (docs/reference/rig.md).
 #pragma once
 
 #include <string>

@@ -35,7 +35,7 @@ pairs:
 
 // The error message for the valid file after a replacement.
 std::string error_for(const std::string& what, const std::string& with) {
-  return testing::complaint(parse_rig_yaml(replaced(kGood, what, with), "my.yaml"));
+  return testing::error_message(parse_rig_yaml(replaced(kGood, what, with), "my.yaml"));
 }
 
 TEST(RigYaml, ReadsVignetting) {
@@ -66,7 +66,7 @@ TEST(RigYaml, ReadsAMinimalFile) {
 TEST(RigYaml, ReadsTheExampleInTheDocumentation) {
   const std::string text = testing::doc_example("rig.yaml");
   ASSERT_FALSE(text.empty());
-  const auto rig = parse_rig_yaml(text, "docs/formats.md");
+  const auto rig = parse_rig_yaml(text, "docs/reference/rig.md");
   ASSERT_TRUE(rig) << rig.error().message();
   EXPECT_EQ(rig->name, "my_rover");
   ASSERT_EQ(rig->pan_tilt_units.size(), 1u);
@@ -84,8 +84,7 @@ TEST(RigYaml, ReadsTheExampleInTheDocumentation) {
 
 // Every key of the reader is documented, and every documented key is read.
 TEST(RigYaml, TheDocumentationNamesEveryKey) {
-  std::ifstream file(testing::source_folder() + "/docs/formats.md");
-  const std::string page((std::istreambuf_iterator<char>(file)), {});
+  const std::string page = testing::reference_page("rig");
   const std::string section = page.substr(std::min(page.size(), page.find("| `schema` | 1 |")));
   const std::string messages =
       error_for("pairs:", "nonsense: 1\npairs:") + error_for("    model", "    nonsense: 1\n    model") +
@@ -253,7 +252,7 @@ Rig any_rig() {
 
 RC_GTEST_PROP(RigYaml, RoundTrips, ()) {
   const Rig rig = any_rig();
-  RC_PRE(rig.find_faults().empty());
+  RC_PRE(rig.validation_errors().empty());
   const auto read = parse_rig_yaml(to_rig_yaml(rig), "rig.yaml");
   if (!read) RC_FAIL(read.error().message() + "\n" + to_rig_yaml(rig));
   RC_ASSERT(*read == rig);
@@ -268,7 +267,7 @@ RC_GTEST_PROP(RigYaml, SurvivesDamagedFiles, ()) {
     text[*rc::gen::inRange<std::size_t>(0, text.size())] = static_cast<char>(*rc::gen::inRange(0, 256));
   }
   const auto read = parse_rig_yaml(text, "rig.yaml");
-  if (read) RC_ASSERT(read->find_faults().empty());
+  if (read) RC_ASSERT(read->validation_errors().empty());
   if (!read) RC_ASSERT(read.error().code == ErrorCode::configuration);
 }
 

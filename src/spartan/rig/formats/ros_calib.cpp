@@ -6,12 +6,12 @@
 #include <algorithm>
 
 #include "spartan/rig/formats/calibration_readers.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/pair_of_files.h"
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/formats/yaml_camera.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {
 namespace {
@@ -197,12 +197,12 @@ struct Lens {
 };
 
 Result<Lens> lens_of(const Camera& camera) {
-  if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
+  if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
     if (is_rational(*m)) return Lens{m->pinhole(), "rational_polynomial", {k.begin(), k.end()}};
     return Lens{m->pinhole(), "plumb_bob", {k.begin(), k.begin() + 5}};
   }
-  if (const auto m = expressed_as<EquidistantModel>(camera.model)) {
+  if (const auto m = converted_to<EquidistantModel>(camera.model)) {
     return Lens{m->pinhole(), "equidistant", {m->coefficients().begin(), m->coefficients().end()}};
   }
   return rig_detail::cannot_hold(camera,
@@ -211,7 +211,7 @@ Result<Lens> lens_of(const Camera& camera) {
 
 }  // namespace
 
-Result<ReadRig> read_ros_calib(const std::string& left_path, const std::string& right_path) {
+Result<LoadedRig> read_ros_calib(const std::string& left_path, const std::string& right_path) {
   auto left = read_camera_info(left_path, "left");
   if (!left) return failure(std::move(left));
   auto right = read_camera_info(right_path, "right");
@@ -226,12 +226,12 @@ Result<ReadRig> read_ros_calib(const std::string& left_path, const std::string& 
   const Pose right_from_left(right_from_rectified * left->rectified_from_camera, right_from_rectified * -difference);
   auto rig = rig_detail::validated(rig_of_one_pair("ros", left->camera, right->camera, right_from_left), right_path);
   if (!rig) return failure(std::move(rig));
-  return ReadRig{std::move(*rig),
-                 CalibrationFormat::ros,
-                 {left_path, right_path},
-                 {},
-                 rig_detail::kBodyIsLeftCamera,
-                 lost_view(*left, *right, right_from_left.inverse())};
+  return LoadedRig{std::move(*rig),
+                   CalibrationFormat::ros,
+                   {left_path, right_path},
+                   {},
+                   rig_detail::kBodyIsLeftCamera,
+                   lost_view(*left, *right, right_from_left.inverse())};
 }
 
 Result<CalibrationFiles> rig_detail::write_ros_calib(const Rig& rig, const std::string& path) {

@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/rig/formats/rig_files.h"
-#include "spartan/rig/formats/rig_writing.h"
+#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/rig/formats/calibration_writing.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
@@ -12,7 +12,7 @@
 namespace spartan {
 namespace {
 
-using testing::complaint;
+using testing::error_message;
 using ::testing::HasSubstr;
 using testing::replaced;
 using testing::right_in_left;
@@ -64,7 +64,7 @@ TEST(RosCalib, ReadsMessages) {
     EXPECT_EQ(parameters(read->rig.cameras[0].model)[2].size(), 8u);
   }
   const auto binned = replaced(message(true, 0), "binning_x: 0", "binning_x: 2");
-  EXPECT_THAT(complaint(read_calibration(folder.write("l.yaml", binned))), HasSubstr("l.yaml:10: binning_x"));
+  EXPECT_THAT(error_message(read_calibration(folder.write("l.yaml", binned))), HasSubstr("l.yaml:10: binning_x"));
 }
 
 // A region of interest changes the principal point and the image size.
@@ -72,7 +72,7 @@ TEST(RosCalib, RejectsARegionOfInterest) {
   const TemporaryFolder folder;
   folder.write("right.yaml", camera_info("right", -48));
   const auto message_for = [&](const std::string& roi) {
-    return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0) + roi)));
+    return error_message(read_calibration(folder.write("left.yaml", camera_info("left", 0) + roi)));
   };
   EXPECT_THAT(message_for("roi: {x_offset: 100, y_offset: 50, width: 300, height: 200}\n"),
               HasSubstr("left.yaml:21: roi: is a part of the image"));
@@ -91,7 +91,7 @@ TEST(RosCalib, NoDistortionHasNoCoefficients) {
   const TemporaryFolder folder;
   folder.write("right.yaml", camera_info("right", -48));
   const auto message_for = [&](const char* model, const char* d) {
-    return complaint(read_calibration(folder.write("left.yaml", camera_info("left", 0, model, d))));
+    return error_message(read_calibration(folder.write("left.yaml", camera_info("left", 0, model, d))));
   };
   for (const char* model : {"none", "''"}) {
     EXPECT_EQ(message_for(model, "0, 0, 0, 0, 0"), "nothing");
@@ -106,23 +106,23 @@ TEST(RosCalib, NoDistortionHasNoCoefficients) {
 // R and P define a rectification, which a Rig does not represent.
 TEST(RosCalib, AnotherRectificationIsIgnored) {
   const TemporaryFolder folder;
-  const auto left_out = [&](const std::string& left, const std::string& right) {
+  const auto ignored = [&](const std::string& left, const std::string& right) {
     folder.write("right.yaml", right);
     return read_calibration(folder.write("left.yaml", left)).value();
   };
-  const ReadRig read = left_out(camera_info("left", 0), camera_info("right", -48));
-  ASSERT_EQ(read.left_out.size(), 1u);
-  EXPECT_EQ(read.left_out[0].key, "projection_matrix");
-  EXPECT_THAT(read.left_out[0].text, HasSubstr("(fx 400, cx 310; right 400, 310)"));
+  const LoadedRig read = ignored(camera_info("left", 0), camera_info("right", -48));
+  ASSERT_EQ(read.ignored.size(), 1u);
+  EXPECT_EQ(read.ignored[0].key, "projection_matrix");
+  EXPECT_THAT(read.ignored[0].text, HasSubstr("(fx 400, cx 310; right 400, 310)"));
   const auto own = to_calibration_files(read.rig, CalibrationFormat::ros, "left.yaml,right.yaml").value();
-  EXPECT_TRUE(left_out(own[0].content, own[1].content).left_out.empty()) << "the same rectification would be written";
+  EXPECT_TRUE(ignored(own[0].content, own[1].content).ignored.empty()) << "the same rectification would be written";
 }
 
 TEST(RosCalib, ReadsModelsAndReportsErrors) {
   const TemporaryFolder folder;
   folder.write("right.yaml", camera_info("right", -48, "equidistant", "0.1, 0.02, 0.003, 0.004"));
   const auto message_for = [&](const std::string& text) {
-    return complaint(read_calibration(folder.write("left.yaml", text)));
+    return error_message(read_calibration(folder.write("left.yaml", text)));
   };
   EXPECT_EQ(message_for(camera_info("left", 0, "equidistant", "0.1, 0.02, 0.003, 0.004")), "nothing");
   EXPECT_EQ(read_rig(folder.path() + "/left.yaml")->cameras[0].model,

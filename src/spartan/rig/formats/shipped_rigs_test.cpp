@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "spartan/rig/describe.h"
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/rig_differences.h"
 #include "spartan/testing/real_data.h"
 

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
 #include "spartan/rig/formats/file_frame.h"
-#include "spartan/rig/formats/rig_files.h"
 #include "spartan/rig/formats/text_matrices.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {
 namespace {
@@ -112,7 +112,7 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
 }
 
 Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
-  const auto model = expressed_as<RadialTangentialModel>(camera.model);
+  const auto model = converted_to<RadialTangentialModel>(camera.model);
   if (!model) {
     return rig_detail::cannot_hold(camera,
                                    fmt::format(".tsai files do not support the model {}", name_of(camera.model)));
@@ -127,14 +127,14 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
       "w_direction = 0 0 1\nC = {}\nR = {}\npitch = 1\n",
       p.fx, p.fy, p.cx, p.cy, rig_detail::list_of(file_from_camera.translation()),
       rig_detail::rows_of(file_from_camera.rotation_matrix()));
-  if (expressed_as<PinholeModel>(camera.model)) return text + "NULL\n";
+  if (converted_to<PinholeModel>(camera.model)) return text + "NULL\n";
   text += fmt::format("TSAI\nk1 = {}\nk2 = {}\np1 = {}\np2 = {}\n", k[0], k[1], k[2], k[3]);
   return k[4] == 0 ? text : text + fmt::format("k3 = {}\n", k[4]);
 }
 
 }  // namespace
 
-Result<ReadRig> read_tsai_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
+Result<LoadedRig> read_tsai_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
   return rig_detail::read_two_files(
       CalibrationFormat::tsai, left_path, right_path,
       [&](const std::string& path, const std::string& name) { return read_camera(path, name, size); });

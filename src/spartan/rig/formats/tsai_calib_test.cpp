@@ -3,14 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/rig/formats/rig_files.h"
+#include "spartan/rig/formats/calibration_reading.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
 
-using testing::complaint;
+using testing::error_message;
 using ::testing::HasSubstr;
 using testing::replaced;
 using testing::TemporaryFolder;
@@ -25,7 +25,7 @@ const std::string kTsai =
 
 class TsaiCalib : public ::testing::Test {
  protected:
-  Result<ReadRig> read(const std::string& left, ImageSize size = {1024, 768}) {
+  Result<LoadedRig> read(const std::string& left, ImageSize size = {1024, 768}) {
     // The right camera is 10 cm to the right of the left one.
     folder_.write("k_right.tsai", replaced(kTsai, "-0.065", "0.035"));
     return read_calibration(folder_.write("k_left.tsai", left), size);
@@ -74,18 +74,18 @@ TEST_F(TsaiCalib, DistortionAndPitchAreThoseOfTheStereoPipeline) {
 }
 
 TEST_F(TsaiCalib, CommentsMayFollowNumbers) {
-  EXPECT_EQ(complaint(read(replaced(kTsai, "C = 0.0751 -0.065 -0.902", "C = 0.0751 -0.065 -0.902 # centre"))),
+  EXPECT_EQ(error_message(read(replaced(kTsai, "C = 0.0751 -0.065 -0.902", "C = 0.0751 -0.065 -0.902 # centre"))),
             "nothing");
 }
 
 TEST_F(TsaiCalib, ErrorsAreSpecific) {
   const auto message_for = [&](const std::string& what, const std::string& with) {
-    return complaint(read(replaced(kTsai, what, with)));
+    return error_message(read(replaced(kTsai, what, with)));
   };
   for (const char* kind : {"AdjustableTSAI", "BrownConrady", "Photometrix", "RPC"}) {
-    EXPECT_THAT(
-        complaint(read("VERSION_4\nPINHOLE\n" + replaced(kTsai, "k1 =", std::string("pitch = 1\n") + kind + "\nk1 ="))),
-        HasSubstr(fmt::format("k_left.tsai:13: '{}' is not supported", kind)));
+    EXPECT_THAT(error_message(read("VERSION_4\nPINHOLE\n" +
+                                   replaced(kTsai, "k1 =", std::string("pitch = 1\n") + kind + "\nk1 ="))),
+                HasSubstr(fmt::format("k_left.tsai:13: '{}' is not supported", kind)));
   }
   EXPECT_THAT(message_for("R = 0.0007", "R = 0.7"), HasSubstr("k_left.tsai:9: R: is not a rotation matrix"));
   EXPECT_THAT(message_for("u_direction = 1", "u_direction = 2"),
@@ -93,7 +93,7 @@ TEST_F(TsaiCalib, ErrorsAreSpecific) {
   EXPECT_THAT(message_for("k2 = 0.1", "k9 = 0.1"), HasSubstr("k_left.tsai: the line 'k2=' is missing"));
   EXPECT_THAT(message_for("fu = 620", "fu = -620"),
               HasSubstr("k_left.tsai:1: fu: the focal length must be above zero"));
-  EXPECT_THAT(complaint(read(kTsai, {})), HasSubstr("image size is not known"));
+  EXPECT_THAT(error_message(read(kTsai, {})), HasSubstr("image size is not known"));
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 
 #include "spartan/rig/formats/calibration_text.h"
 #include "spartan/rig/formats/calibration_writers.h"
-#include "spartan/rig/models/model_equivalents.h"
+#include "spartan/rig/models/model_conversion.h"
 
 namespace spartan::rig_detail {
 namespace {
@@ -101,14 +101,14 @@ Result<std::string> kalibr_model_lines(const Camera& camera, std::string_view di
         "{0}{8}: [{9}]\n",
         indent, kind, own, p.fx, p.fy, p.cx, p.cy, distortion, distortion_key, fmt::join(d, ", "));
   };
-  if (const auto m = expressed_as<PinholeModel>(camera.model)) return lines("pinhole", "", *m, "none", {});
-  if (const auto m = expressed_as<EquidistantModel>(camera.model)) {
+  if (const auto m = converted_to<PinholeModel>(camera.model)) return lines("pinhole", "", *m, "none", {});
+  if (const auto m = converted_to<EquidistantModel>(camera.model)) {
     return lines("pinhole", "", m->pinhole(), "equidistant", {m->coefficients().begin(), m->coefficients().end()});
   }
-  if (const auto m = expressed_as<DoubleSphereModel>(camera.model)) {
+  if (const auto m = converted_to<DoubleSphereModel>(camera.model)) {
     return lines("ds", fmt::format("{}, {}, ", m->xi, m->alpha), m->pinhole, "none", {});
   }
-  if (const auto m = expressed_as<RadialTangentialModel>(camera.model)) {
+  if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
     if (std::any_of(k.begin() + 4, k.end(), [](double v) { return v != 0; })) {
       return cannot_hold(camera, "this format supports four coefficients of radial_tangential, this camera has more");

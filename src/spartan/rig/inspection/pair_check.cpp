@@ -10,8 +10,8 @@
 #include <optional>
 #include <utility>
 
-#include "spartan/rig/inspection/belief_search.h"
-#include "spartan/rig/inspection/pair_mending.h"
+#include "spartan/rig/inspection/hypothesis_search.h"
+#include "spartan/rig/inspection/pair_correction.h"
 
 namespace spartan {
 namespace {
@@ -19,7 +19,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 constexpr int kMinMatches = 40;  // inliers for a check
-// Limits of the findings, and of the grade `usable` (PairVerdict has those of `good`).
+// Limits of the findings, and of the grade `usable` (PairGrade has those of `good`).
 constexpr double kRowOffset_px = 0.5, kRollOffset_px = 0.5, kFocalRatio = 0.003, kUsableMean_px = 1, kUsableP95_px = 3;
 // Brown's decentering p2 is usually wrong by up to 0.002 in each lens. Its row error 2 p2 x y equals that of a yaw of
 // 2 p2; the errors of two lenses add up in quadrature (0.32°).
@@ -43,7 +43,7 @@ class Checker {
           bool guessed)
       : rig_(rig), pair_(pair), image_size_(image_size), guessed_(guessed) {
     check_.matches = static_cast<int>(matches.size());
-    check_.findings = find_doubts(rig, pair, image_size);
+    check_.findings = plausibility_findings(rig, pair, image_size);
     if (found("not_beside") || too_few(check_.matches)) return;
     fitted_ = find_hypothesis(*rig.find_camera(pair.left), *rig.find_camera(pair.right),
                               rig.right_from_left(pair).inverse(), matches, image_size, !guessed);
@@ -69,8 +69,8 @@ class Checker {
     check_focal_ratio();
     apply_correction();
     // A correction that leaves the rows unusable must at least improve them by a tenth.
-    if (is_unusable(check_.as_corrected) && check_.as_corrected.mean_px > 0.9 * check_.as_given.mean_px)
-      return unexplained(check_.as_corrected.mean_px);
+    if (is_unusable(check_.corrected_rows) && check_.corrected_rows.mean_px > 0.9 * check_.nominal_rows.mean_px)
+      return unexplained(check_.corrected_rows.mean_px);
     return finish();
   }
 
@@ -115,7 +115,7 @@ class Checker {
   void apply_correction();
   void report_rows_apart();
   static bool is_unusable(const RowErrors& rows);
-  PairVerdict grade() const;
+  PairGrade grade() const;
   PairCheck finish();
 
   const Rig& rig_;
@@ -129,10 +129,10 @@ class Checker {
 // Without enough matches the estimates are NaN.
 PairCheck Checker::without_estimates() {
   check_.correction = check_.sigma = kNoCorrection;
-  check_.yaw_doubt_px = kNan;
-  check_.as_given = check_.as_corrected = kNoRows;
-  if (check_.inliers == 0) check_.as_taken = kNoRows;
-  check_.verdict = PairVerdict::bad;
+  check_.yaw_sigma_px = kNan;
+  check_.nominal_rows = check_.corrected_rows = kNoRows;
+  if (check_.inliers == 0) check_.unrectified_rows = kNoRows;
+  check_.grade = PairGrade::bad;
   check_.corrected = rig_;
   return std::move(check_);
 }
@@ -144,9 +144,9 @@ PairCheck Checker::unexplained(double best_rows_px) {
       check_.inliers, check_.matches, best_rows_px);
   add("not_explained", std::move(text), best_rows_px);
   check_.correction = check_.sigma = kNoCorrection;
-  check_.yaw_doubt_px = kNan;
-  check_.as_corrected = kNoRows;
-  check_.verdict = PairVerdict::bad;
+  check_.yaw_sigma_px = kNan;
+  check_.corrected_rows = kNoRows;
+  check_.grade = PairGrade::bad;
   check_.corrected.reset();
   return std::move(check_);
 }
@@ -156,18 +156,18 @@ void Checker::fill_statistics() {
   check_.inliers = fit().inliers;
   check_.correction = fit().correction;
   check_.sigma = fit().sigma;
-  check_.matched = inliers_of(fitted_.matches, fit().inlier);
+  check_.inlier_matches = inliers_of(fitted_.matches, fit().inlier);
   check_.inlier_limit_px = fit().inlier_limit_px;
-  check_.pictures_exchanged = hypothesis.images_swapped;
+  check_.images_swapped = hypothesis.images_swapped;
   const PairHypothesis given = without_row_shift(hypothesis);
   check_.row_error_px =
-      rectify_matches(given.left.model, given.right.model, given.left_from_right, check_.matched).row_error_px;
+      rectify_matches(given.left.model, given.right.model, given.left_from_right, check_.inlier_matches).row_error_px;
   std::vector<double> unrectified;
-  unrectified.reserve(check_.matched.size());
-  for (const PixelMatch& match : check_.matched) unrectified.push_back(match.left.y() - match.right.y());
-  check_.as_taken = row_errors(unrectified);
-  check_.as_given = row_errors(check_.row_error_px);
-  check_.map = map_row_errors(check_.matched, check_.row_error_px, image_size_);
+  unrectified.reserve(check_.inlier_matches.size());
+  for (const PixelMatch& match : check_.inlier_matches) unrectified.push_back(match.left.y() - match.right.y());
+  check_.unrectified_rows = row_errors(unrectified);
+  check_.nominal_rows = row_errors(check_.row_error_px);
+  check_.map = map_row_errors(check_.inlier_matches, check_.row_error_px, image_size_);
 }
 
 bool Checker::has_identical_images() const {
@@ -181,7 +181,7 @@ void Checker::report_gross_errors() {
   report_cameras();
   report_size();
   if (!guessed_) report_distortion();
-  check_.structure_found = found("inverse_transform") || found("swapped_eyes") || found("size_mismatch");
+  check_.has_gross_error = found("inverse_transform") || found("swapped_eyes") || found("size_mismatch");
 }
 
 std::string Checker::row_improvement() const {
@@ -268,7 +268,7 @@ void Checker::report_distortion() {
 void Checker::check_yaw() {
   const double sigma = std::hypot(fit().sigma.yaw_rad, kYawOfLens_rad), yaw = fit().correction.yaw_rad;
   check_.sigma.yaw_rad = sigma;
-  check_.yaw_doubt_px = sigma * fit().rows.focal_px;
+  check_.yaw_sigma_px = sigma * fit().rows.focal_px;
   if (guessed_) return;
   // Disparities without the yaw correction: on the optical axis a yaw shifts them by f · yaw.
   const std::vector<double> corrected = inliers_of(fit().rows.disparity_px, fit().inlier);
@@ -287,7 +287,7 @@ void Checker::check_yaw() {
 }
 
 void Checker::check_rows() {
-  const RowErrors& rows = check_.as_given;
+  const RowErrors& rows = check_.nominal_rows;
   if (std::abs(rows.median_px) > kRowOffset_px) {
     add("row_offset",
         fmt::format("rows of the left image are {:.2f} px {} those of the right image{}", std::abs(rows.median_px),
@@ -333,7 +333,7 @@ bool Checker::needs_correction() const {
 void Checker::apply_correction() {
   if (check_.findings.empty() && !needs_correction()) {
     check_.corrected = rig_;
-    check_.as_corrected = check_.as_given;
+    check_.corrected_rows = check_.nominal_rows;
     return;
   }
   PairCorrection correction;
@@ -346,8 +346,8 @@ void Checker::apply_correction() {
   const StereoPair& pair = *check_.corrected->find_pair(pair_.name);
   const RectifiedMatches seen =
       rectify_matches(check_.corrected->find_camera(pair.left)->model, check_.corrected->find_camera(pair.right)->model,
-                      check_.corrected->right_from_left(pair).inverse(), check_.matched);
-  check_.as_corrected = row_errors(seen.row_error_px);
+                      check_.corrected->right_from_left(pair).inverse(), check_.inlier_matches);
+  check_.corrected_rows = row_errors(seen.row_error_px);
   if (check_.findings.empty()) report_rows_apart();
 }
 
@@ -356,9 +356,9 @@ void Checker::report_rows_apart() {
   constexpr double kImproved = 0.7;  // a correction explains them if it reduces the mean to this share
   const RowErrors fitted = row_errors(inliers_of(fit().rows.row_error_px, fit().inlier));
   std::string why;
-  if (check_.as_corrected.mean_px < kImproved * check_.as_given.mean_px) {
+  if (check_.corrected_rows.mean_px < kImproved * check_.nominal_rows.mean_px) {
     why = "; a rotation and the baseline direction correct that";
-  } else if (fitted.mean_px < kImproved * check_.as_given.mean_px) {
+  } else if (fitted.mean_px < kImproved * check_.nominal_rows.mean_px) {
     why = fmt::format(
         "; the right camera rotated {:.2f}° to the {} would correct that, and so would a lens decentering: rows do not "
         "distinguish the two, and neither is applied",
@@ -367,9 +367,9 @@ void Checker::report_rows_apart() {
     why = ", and no small correction reduces that: check the camera model, and for rolling shutter";
   }
   add("rows_apart",
-      fmt::format("rows differ by {:.2f} px, 95 % below {:.2f} px{}", check_.as_given.mean_px, check_.as_given.p95_px,
-                  why),
-      check_.as_given.mean_px);
+      fmt::format("rows differ by {:.2f} px, 95 % below {:.2f} px{}", check_.nominal_rows.mean_px,
+                  check_.nominal_rows.p95_px, why),
+      check_.nominal_rows.mean_px);
 }
 
 // Rows with which stereo matching does not work.
@@ -377,32 +377,32 @@ bool Checker::is_unusable(const RowErrors& rows) {
   return !(rows.mean_px <= kUsableMean_px && rows.p95_px <= kUsableP95_px);
 }
 
-PairVerdict Checker::grade() const {
+PairGrade Checker::grade() const {
   for (const char* id :
        {"not_beside", "inverse_transform", "swapped_eyes", "size_mismatch", "distortion_ignored", "yaw_offset"}) {
-    if (found(id)) return PairVerdict::bad;
+    if (found(id)) return PairGrade::bad;
   }
   // A baseline of some metres is unusual, but large rigs have it: bad only where another unit is likely.
   const double baseline_m = rig_.right_from_left(pair_).translation().norm();
-  if (found("baseline_unit") && likely_unit(baseline_m)) return PairVerdict::bad;
-  if (is_unusable(check_.as_given)) return PairVerdict::bad;
-  return check_.findings.empty() ? PairVerdict::good : PairVerdict::usable;
+  if (found("baseline_unit") && likely_unit(baseline_m)) return PairGrade::bad;
+  if (is_unusable(check_.nominal_rows)) return PairGrade::bad;
+  return check_.findings.empty() ? PairGrade::good : PairGrade::usable;
 }
 
 PairCheck Checker::finish() {
-  check_.verdict = grade();
+  check_.grade = grade();
   return std::move(check_);
 }
 
 }  // namespace
 
-std::string_view name_of(PairVerdict grade) {
+std::string_view name_of(PairGrade grade) {
   switch (grade) {
-    case PairVerdict::good:
+    case PairGrade::good:
       return "good";
-    case PairVerdict::usable:
+    case PairGrade::usable:
       return "usable";
-    case PairVerdict::bad:
+    case PairGrade::bad:
       break;
   }
   return "bad";
@@ -413,7 +413,7 @@ PairCheck check_pair(const Rig& rig, const StereoPair& pair, const std::vector<P
   return Checker(rig, pair, matches, image_size, false).run();
 }
 
-PairCheck check_pictures(const std::vector<PixelMatch>& matches, ImageSize image_size) {
+PairCheck check_images(const std::vector<PixelMatch>& matches, ImageSize image_size) {
   const Rig rig = guessed_rig(image_size);
   return Checker(rig, rig.pairs.front(), matches, image_size, true).run();
 }

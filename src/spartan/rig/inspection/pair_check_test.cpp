@@ -2,36 +2,36 @@
 
 #include <algorithm>
 
-#include "spartan/rig/models/model_changes.h"
-#include "spartan/testing/seen_pair.h"
+#include "spartan/rig/models/model_modification.h"
+#include "spartan/testing/simulated_pair_matches.h"
 
 namespace spartan {
 namespace {
 
 using testing::check;
 using ::testing::Contains;
+using testing::distortion_free_rig;
 using ::testing::ElementsAre;
-using testing::expect_mended;
+using testing::expect_corrected;
 using testing::ids;
 using ::testing::IsEmpty;
 using testing::kSize;
 using testing::left_from_right;
-using testing::look;
-using testing::straight_rig;
+using testing::simulate_matches;
 using testing::true_rig;
 using testing::with_pose;
 
 TEST(PairCheck, CorrectRigsAreGood) {
-  for (const Rig& rig : {true_rig(), straight_rig()}) {
-    const PairCheck result = check(rig, look(rig));
+  for (const Rig& rig : {true_rig(), distortion_free_rig()}) {
+    const PairCheck result = check(rig, simulate_matches(rig));
     EXPECT_THAT(ids(result), IsEmpty());
-    EXPECT_EQ(result.verdict, PairVerdict::good);
-    EXPECT_NEAR(result.as_given.mean_px, 0.12, 0.03);  // 0.15 √(2/π)
-    EXPECT_NEAR(result.as_given.p95_px, 0.30, 0.1);
-    EXPECT_NEAR(result.as_taken.median_px, 248.4 - 255.2, 4) << "the right principal point is lower";
+    EXPECT_EQ(result.grade, PairGrade::good);
+    EXPECT_NEAR(result.nominal_rows.mean_px, 0.12, 0.03);  // 0.15 √(2/π)
+    EXPECT_NEAR(result.nominal_rows.p95_px, 0.30, 0.1);
+    EXPECT_NEAR(result.unrectified_rows.median_px, 248.4 - 255.2, 4) << "the right principal point is lower";
     EXPECT_GE(result.inliers, 600);
     EXPECT_LE(result.inliers, 660);
-    expect_mended(rig, result);
+    expect_corrected(rig, result);
   }
 }
 
@@ -56,7 +56,7 @@ TEST(PairCheck, CorrectionsAreConsistentWithTheirSigma) {
     for (double& f : numbers[0]) f /= wanted.focal_ratio;
     rig.cameras[1].model = with_parameters(rig.cameras[1].model, numbers);
     const PairFit fit = fit_pair(rig.cameras[0].model, rig.cameras[1].model, left_from_right(rig),
-                                 look(truth, 700, static_cast<std::uint64_t>(trial)));
+                                 simulate_matches(truth, 700, static_cast<std::uint64_t>(trial)));
     const Eigen::Vector4d error((fit.correction.pitch_rad - wanted.pitch_rad) / fit.sigma.pitch_rad,
                                 (fit.correction.roll_rad - wanted.roll_rad) / fit.sigma.roll_rad,
                                 (fit.correction.yaw_rad - wanted.yaw_rad) / fit.sigma.yaw_rad,
@@ -83,14 +83,14 @@ TEST(PairCheck, SignsOfCorrections) {
 
 TEST(PairCheck, ReportsTooFewMatches) {
   const Rig truth = true_rig();
-  const PairCheck few = check(truth, look(truth, 30));
+  const PairCheck few = check(truth, simulate_matches(truth, 30));
   EXPECT_THAT(ids(few), ElementsAre("not_enough_texture"));
-  EXPECT_EQ(few.verdict, PairVerdict::bad);
-  EXPECT_TRUE(std::isnan(few.correction.yaw_rad) && std::isnan(few.as_given.mean_px)) << "unknown values are NaN";
+  EXPECT_EQ(few.grade, PairGrade::bad);
+  EXPECT_TRUE(std::isnan(few.correction.yaw_rad) && std::isnan(few.nominal_rows.mean_px)) << "unknown values are NaN";
   EXPECT_EQ(*few.corrected, truth);
   EXPECT_THAT(ids(check(truth, {})), ElementsAre("not_enough_texture"));
   // Many matches, all in one corner.
-  std::vector<PixelMatch> corner = look(truth, 4000);
+  std::vector<PixelMatch> corner = simulate_matches(truth, 4000);
   std::erase_if(corner, [](const PixelMatch& m) { return m.left.x() > 180 || m.left.y() > 160; });
   EXPECT_THAT(ids(check(truth, corner)), ElementsAre("not_enough_texture"));
 }
@@ -122,8 +122,8 @@ TEST(PairCheck, FindingsAppearAtTheirLimits) {
   const Rig truth = true_rig();
   const auto with = [&](const PairCorrection& off, double rows_px) {
     Rig rig = with_pose(truth, corrected_left_from_right(left_from_right(truth), off));
-    rig.cameras[1].model = with_rows_lower(with_focal_times(rig.cameras[1].model, off.focal_ratio), rows_px);
-    return ids(check(rig, look(truth, 1500)));
+    rig.cameras[1].model = with_row_offset(with_scaled_focal_length(rig.cameras[1].model, off.focal_ratio), rows_px);
+    return ids(check(rig, simulate_matches(truth, 1500)));
   };
   constexpr double kDegree = testing::kDegree;
   EXPECT_THAT(with({}, 0.4), IsEmpty());
@@ -139,18 +139,18 @@ TEST(PairCheck, FindingsAppearAtTheirLimits) {
 // Small distortion is not reported for a pinhole.
 TEST(PairCheck, DistortionIsReportedWhereSignificant) {
   for (const double k1 : {-0.015, -0.04}) {
-    Rig truth = straight_rig();
+    Rig truth = distortion_free_rig();
     truth.cameras[1].model = RadialTangentialModel({457.6, 456.1, 379.9, 255.2}, {k1, 0});
-    const std::vector<std::string> found = ids(check(straight_rig(), look(truth, 1500)));
+    const std::vector<std::string> found = ids(check(distortion_free_rig(), simulate_matches(truth, 1500)));
     EXPECT_EQ(std::count(found.begin(), found.end(), "distortion_ignored"), k1 < -0.02 ? 1 : 0) << k1;
   }
 }
 
 TEST(PairCheck, WorksWithoutACalibration) {
-  const PairCheck result = check_pictures(look(straight_rig()), kSize);
+  const PairCheck result = check_images(simulate_matches(distortion_free_rig()), kSize);
   EXPECT_THAT(ids(result), ::testing::Not(Contains("inverse_transform")));
   EXPECT_NEAR(result.correction.roll_rad, 0.003, 0.001);
-  EXPECT_LT(result.as_corrected.mean_px, 0.2);
+  EXPECT_LT(result.corrected_rows.mean_px, 0.2);
 }
 
 }  // namespace

@@ -163,9 +163,10 @@ Parameters prior_sigmas(const PairFitOptions& o) {
   constexpr double kFixed = 1e-9;  // standard deviation that holds a parameter at its given value
   const auto if_free = [](bool free, double sigma) { return free ? sigma : kFixed; };
   Parameters sigma;
-  sigma << o.turn_sigma_rad, if_free(o.yaw, o.turn_sigma_rad), o.turn_sigma_rad, if_free(o.focal, o.focal_sigma),
-      if_free(o.baseline, o.baseline_sigma_rad), if_free(o.baseline, o.baseline_sigma_rad),
-      if_free(o.left_radial, o.radial_sigma), if_free(o.right_radial, o.radial_sigma);
+  sigma << o.rotation_sigma_rad, if_free(o.yaw, o.rotation_sigma_rad), o.rotation_sigma_rad,
+      if_free(o.focal, o.focal_sigma), if_free(o.baseline, o.baseline_sigma_rad),
+      if_free(o.baseline, o.baseline_sigma_rad), if_free(o.left_radial, o.radial_sigma),
+      if_free(o.right_radial, o.radial_sigma);
   return sigma;
 }
 

@@ -71,7 +71,7 @@ struct PairFitOptions {
   bool left_radial = false, right_radial = false;
   /// Standard deviations of the priors: how wrong a calibration usually is. The priors bound what the images cannot
   /// observe: the yaw of a narrow field of view, the baseline direction where everything is distant.
-  double turn_sigma_rad = 0.05, baseline_sigma_rad = 0.02, focal_sigma = 0.03, radial_sigma = 0.3;
+  double rotation_sigma_rad = 0.05, baseline_sigma_rad = 0.02, focal_sigma = 0.03, radial_sigma = 0.3;
   double match_sigma_px = 0.15;  ///< lower bound of the standard deviation of a row error
 };
 

@@ -2,8 +2,8 @@
 
 namespace spartan {
 
-std::vector<ModelParameterKind> CahvModel::parameter_kinds() {
-  std::vector<ModelParameterKind> kinds = PinholeModel::parameter_kinds();
+std::vector<ModelParameterSpec> CahvModel::parameter_specs() {
+  std::vector<ModelParameterSpec> kinds = PinholeModel::parameter_specs();
   kinds.push_back({"skew_px", {1}});
   return kinds;
 }

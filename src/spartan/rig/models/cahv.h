@@ -22,7 +22,7 @@ struct CahvModel {
   double skew_px = 0;  ///< the x component of V
 
   static constexpr std::string_view kName = "cahv";
-  static std::vector<ModelParameterKind> parameter_kinds();
+  static std::vector<ModelParameterSpec> parameter_specs();
   ModelParameters parameters() const;
   static CahvModel from_parameters(const ModelParameters& parameters);
 

@@ -32,8 +32,8 @@ CahvorModel::CahvorModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, Ra
       radial_(radial),
       largest_radius_(rig_detail::cahvor_monotonic_limit(radial)) {}
 
-std::vector<ModelParameterKind> CahvorModel::parameter_kinds() {
-  std::vector<ModelParameterKind> kinds = CahvModel::parameter_kinds();
+std::vector<ModelParameterSpec> CahvorModel::parameter_specs() {
+  std::vector<ModelParameterSpec> kinds = CahvModel::parameter_specs();
   kinds.push_back({.key = "optical_axis", .counts = {3}, .unit_length = true});
   kinds.push_back({"radial", {3}});
   return kinds;

@@ -24,7 +24,7 @@ class CahvorModel {
   CahvorModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, Radial radial);
 
   static constexpr std::string_view kName = "cahvor";
-  static std::vector<ModelParameterKind> parameter_kinds();
+  static std::vector<ModelParameterSpec> parameter_specs();
   ModelParameters parameters() const;
   static CahvorModel from_parameters(const ModelParameters& parameters);
 

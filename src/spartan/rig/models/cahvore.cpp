@@ -126,8 +126,8 @@ CahvoreModel::CahvoreModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, 
   nearest_ = limits.farthest_m;
 }
 
-std::vector<ModelParameterKind> CahvoreModel::parameter_kinds() {
-  std::vector<ModelParameterKind> kinds = CahvorModel::parameter_kinds();
+std::vector<ModelParameterSpec> CahvoreModel::parameter_specs() {
+  std::vector<ModelParameterSpec> kinds = CahvorModel::parameter_specs();
   kinds.push_back({"entrance_m", {3}});
   kinds.push_back({.key = "linearity", .counts = {1}, .least = -1, .most = 1});
   return kinds;

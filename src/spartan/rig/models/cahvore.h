@@ -33,7 +33,7 @@ class CahvoreModel {
                double linearity);
 
   static constexpr std::string_view kName = "cahvore";
-  static std::vector<ModelParameterKind> parameter_kinds();
+  static std::vector<ModelParameterSpec> parameter_specs();
   ModelParameters parameters() const;
   static CahvoreModel from_parameters(const ModelParameters& parameters);
 

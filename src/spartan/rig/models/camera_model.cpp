@@ -21,8 +21,8 @@ std::string_view name_of(const CameraModel& model) {
   return std::visit([](const auto& m) { return std::decay_t<decltype(m)>::kName; }, model);
 }
 
-std::vector<ModelParameterKind> parameter_kinds(const CameraModel& model) {
-  return std::visit([](const auto& m) { return std::decay_t<decltype(m)>::parameter_kinds(); }, model);
+std::vector<ModelParameterSpec> parameter_specs(const CameraModel& model) {
+  return std::visit([](const auto& m) { return std::decay_t<decltype(m)>::parameter_specs(); }, model);
 }
 
 ModelParameters parameters(const CameraModel& model) {

@@ -39,12 +39,12 @@ inline std::optional<Ray> unproject(const CameraModel& model, const Eigen::Vecto
 std::string_view name_of(const CameraModel& model);
 
 /// The parameters of a model as rig.yaml stores them: the description of each key, and the values in the same order.
-std::vector<ModelParameterKind> parameter_kinds(const CameraModel& model);
+std::vector<ModelParameterSpec> parameter_specs(const CameraModel& model);
 ModelParameters parameters(const CameraModel& model);
 
 /// A model of that name with default parameters; nullopt if the name is unknown.
 std::optional<CameraModel> camera_model_named(std::string_view name);
-/// The same type of model with other parameter values, whose counts must match parameter_kinds().
+/// The same type of model with other parameter values, whose counts must match parameter_specs().
 CameraModel with_parameters(const CameraModel& model, const ModelParameters& numbers);
 /// The names of all models, for error messages.
 std::vector<std::string_view> camera_model_names();

@@ -23,8 +23,8 @@ std::optional<Spheres> spheres_of(const DoubleSphereModel& m, const Eigen::Vecto
 
 }  // namespace
 
-std::vector<ModelParameterKind> DoubleSphereModel::parameter_kinds() {
-  std::vector<ModelParameterKind> kinds = PinholeModel::parameter_kinds();
+std::vector<ModelParameterSpec> DoubleSphereModel::parameter_specs() {
+  std::vector<ModelParameterSpec> kinds = PinholeModel::parameter_specs();
   kinds.push_back({"xi", {1}});
   kinds.push_back({.key = "alpha", .counts = {1}, .least = 0, .most = 1});
   return kinds;

@@ -22,7 +22,7 @@ struct DoubleSphereModel {
   double alpha = 0;  ///< in [0, 1]
 
   static constexpr std::string_view kName = "double_sphere";
-  static std::vector<ModelParameterKind> parameter_kinds();
+  static std::vector<ModelParameterSpec> parameter_specs();
   ModelParameters parameters() const;
   static DoubleSphereModel from_parameters(const ModelParameters& parameters);
 

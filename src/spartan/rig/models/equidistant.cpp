@@ -30,8 +30,8 @@ double monotonic_limit(const Coefficients& k) {
 EquidistantModel::EquidistantModel(PinholeModel pinhole, Coefficients coefficients)
     : pinhole_(pinhole), coefficients_(coefficients), largest_angle_(monotonic_limit(coefficients)) {}
 
-std::vector<ModelParameterKind> EquidistantModel::parameter_kinds() {
-  std::vector<ModelParameterKind> kinds = PinholeModel::parameter_kinds();
+std::vector<ModelParameterSpec> EquidistantModel::parameter_specs() {
+  std::vector<ModelParameterSpec> kinds = PinholeModel::parameter_specs();
   kinds.push_back({"distortion", {4}});
   return kinds;
 }

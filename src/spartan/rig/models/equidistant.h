@@ -24,7 +24,7 @@ class EquidistantModel {
   EquidistantModel(PinholeModel pinhole, Coefficients coefficients);
 
   static constexpr std::string_view kName = "equidistant";
-  static std::vector<ModelParameterKind> parameter_kinds();
+  static std::vector<ModelParameterSpec> parameter_specs();
   ModelParameters parameters() const;
   static EquidistantModel from_parameters(const ModelParameters& parameters);
 

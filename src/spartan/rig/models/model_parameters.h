@@ -8,7 +8,7 @@
 namespace spartan {
 
 /// One parameter of a model: a key in rig.yaml that holds a list of numbers.
-struct ModelParameterKind {
+struct ModelParameterSpec {
   std::string_view key;     ///< with its unit: "focal_px"
   std::vector<int> counts;  ///< the allowed numbers of values
   bool positive = false;    ///< each value must be positive; all must be finite in any case
@@ -17,7 +17,7 @@ struct ModelParameterKind {
   bool unit_length = false;  ///< the values are a unit vector (within 0.001)
 };
 
-/// The values of a model: one list for each ModelParameterKind, in the same order.
+/// The values of a model: one list for each ModelParameterSpec, in the same order.
 using ModelParameters = std::vector<std::vector<double>>;
 
 }  // namespace spartan

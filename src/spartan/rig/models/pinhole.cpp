@@ -2,7 +2,7 @@
 
 namespace spartan {
 
-std::vector<ModelParameterKind> PinholeModel::parameter_kinds() {
+std::vector<ModelParameterSpec> PinholeModel::parameter_specs() {
   // No real lens reaches this value; larger ones indicate a damaged file.
   constexpr double kMost_px = 1e7;
   return {{.key = "focal_px", .counts = {2}, .positive = true, .most = kMost_px},

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "spartan/rig/models/line_of_sight.h"
 #include "spartan/rig/models/model_parameters.h"
+#include "spartan/rig/models/ray.h"
 
 namespace spartan {
 
@@ -16,7 +16,7 @@ struct PinholeModel {
   double cx = 0, cy = 0;  ///< px
 
   static constexpr std::string_view kName = "pinhole";
-  static std::vector<ModelParameterKind> parameter_kinds();
+  static std::vector<ModelParameterSpec> parameter_specs();
   ModelParameters parameters() const;
   static PinholeModel from_parameters(const ModelParameters& parameters);
 

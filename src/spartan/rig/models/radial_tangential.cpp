@@ -79,8 +79,8 @@ double undistorted_radius(const RadialTangentialModel& model, double target) {
 RadialTangentialModel::RadialTangentialModel(PinholeModel pinhole, Coefficients coefficients)
     : pinhole_(pinhole), coefficients_(coefficients), largest_radius_(monotonic_limit(coefficients)) {}
 
-std::vector<ModelParameterKind> RadialTangentialModel::parameter_kinds() {
-  std::vector<ModelParameterKind> kinds = PinholeModel::parameter_kinds();
+std::vector<ModelParameterSpec> RadialTangentialModel::parameter_specs() {
+  std::vector<ModelParameterSpec> kinds = PinholeModel::parameter_specs();
   kinds.push_back({"distortion", {4, 5, 8}});
   return kinds;
 }

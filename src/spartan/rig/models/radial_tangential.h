@@ -27,7 +27,7 @@ class RadialTangentialModel {
   RadialTangentialModel(PinholeModel pinhole, Coefficients coefficients);
 
   static constexpr std::string_view kName = "radial_tangential";
-  static std::vector<ModelParameterKind> parameter_kinds();
+  static std::vector<ModelParameterSpec> parameter_specs();
   ModelParameters parameters() const;
   static RadialTangentialModel from_parameters(const ModelParameters& parameters);
 

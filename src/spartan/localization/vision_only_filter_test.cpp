@@ -1,0 +1,38 @@
+#include "spartan/localization/vision_only_filter.h"
+
+#include <gtest/gtest.h>
+
+#include "spartan/localization/drive_test.h"
+
+namespace spartan {
+namespace {
+
+TEST(VisionOnlyFilter, ComposesTheMotionsInTheGivenWorld) {
+  const TestDrive drive;
+  const Pose first(exp_so3({0.1, -0.2, 0.7}), {1, 2, 3});
+  const LocalizationOptions options;  // with errors that last
+  VisionOnlyFilter track(options);
+  track.start(test_stamp(2.5), first);
+  UncertainPose composed{first, Matrix6d::Zero()};
+  for (const Measurement& m : test_motions(drive, 62.5, 1, 5)) {
+    const auto& motion = std::get<RelativeMotion>(m);
+    EXPECT_TRUE(track.add(motion));
+    composed = compose(composed, {motion.previous_from_current, motion.covariance});
+  }
+  const UncertainPose pose = track.world_from_body();
+  EXPECT_LE(log_se3(pose.pose.inverse() * composed.pose).norm(), 1e-6);
+  for (int i = 0; i < 6; ++i)
+    EXPECT_GT(pose.covariance(i, i), 1.5 * composed.covariance(i, i)) << "errors that last grow faster: " << i;
+  // The map speaks in that world too.
+  const Pose seen = pose.pose * Pose::from_translation({3e-4, -3e-4, 0});
+  EXPECT_TRUE(track.add(PoseConstraint{test_stamp(62.5), seen, 1e12 * Matrix6d::Identity()}));
+  EXPECT_LE(log_se3(track.world_from_body().pose.inverse() * seen).norm(), 1e-5);
+  VisionOnlyFilter other(options);
+  ASSERT_TRUE(other.restore(track.save()));
+  EXPECT_EQ(other.save(), track.save());
+  EXPECT_EQ(other.world_from_body().pose.matrix(), track.world_from_body().pose.matrix());
+  EXPECT_FALSE(other.restore({}));
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,84 @@
+#include "spartan/reconstruction/stop_mapper.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "spartan/core/stage_clock.h"
+
+namespace spartan {
+namespace {
+
+constexpr double kUnknownHeight_m = 1;      // scale of the ground search where the camera's height is unknown
+constexpr double kNearestPanorama_m = 0.3;  // nearest depth that the virtual camera covers
+
+// Midpoint between the left and the right camera.
+Eigen::Vector3d pair_midpoint(const ViewGeometry& view) {
+  return view.body_from_left * Eigen::Vector3d(0.5 * view.stereo.baseline_m, 0, 0);
+}
+
+Pose centre_of(std::span<const StopView> views) {
+  double longest = 0;
+  for (const StopView& view : views) longest = std::max(longest, view.geometry.stereo.baseline_m);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const StopView& view : views) {
+    if (view.geometry.stereo.baseline_m < 0.999 * longest) continue;
+    sum += pair_midpoint(view.geometry);
+    ++count;
+  }
+  return Pose::from_translation(sum / count);
+}
+
+}  // namespace
+
+StopMapper::StopMapper(const DisparityOptions& disparity, const MappingOptions& options, ThreadPool workers)
+    : options_(options), workers_(workers), computer_(disparity, workers), generator_(options.map, workers) {}
+
+Status StopMapper::check(const RectifiedPair& frame, double nearest_m) {
+  return DisparityComputer::check(frame.left, frame.right, disparity_range(frame.geometry, nearest_m), frame.left_mask,
+                                  frame.right_mask);
+}
+
+Status StopMapper::add(const RectifiedPair& frame, double nearest_m, const Eigen::Vector3d& up_in_body) {
+  Stopwatch watch;
+  const auto image = computer_.compute(frame.left, frame.right, disparity_range(frame.geometry, nearest_m),
+                                       frame.left_mask, frame.right_mask);
+  if (!image) return failure(image);
+  times_.disparity += watch.lap();
+  const double height = frame.body_from_left.translation().dot(up_in_body);
+  const GroundPlane expected{frame.body_from_left.rotation().conjugate() * up_in_body,
+                             height > 0.05 ? height : kUnknownHeight_m};
+  auto ground = compute_v_disparity(image->disparity, frame.geometry, expected, options_.v_disparity, workers_);
+  times_.v_disparity += watch.lap();
+  views_.push_back({frame.pair,
+                    frame.stamp,
+                    {frame.geometry, frame.body_from_left},
+                    Image<float>::copy_of(image->disparity),
+                    Image<std::uint8_t>::copy_of(frame.left),
+                    std::move(ground)});
+  return {};
+}
+
+MergedRange StopMapper::merge() {
+  Stopwatch watch;
+  std::vector<ViewGeometry> geometries;
+  std::vector<MergedView> merged_views;
+  for (const StopView& view : views_) {
+    geometries.push_back(view.geometry);
+    merged_views.push_back({view.geometry, view.disparity, view.left,
+                            view.ground ? view.ground->classes.view() : ImageView<const std::uint8_t>()});
+  }
+  const DisparityMerger merger(options_.merging, centre_of(views_), geometries, kNearestPanorama_m, workers_);
+  MergedRange merged = merger.merge(merged_views);
+  times_.merging += watch.lap();
+  return merged;
+}
+
+LocalMap StopMapper::map(std::span<const SurfacePoint> points, const Pose& map_from_body) {
+  Stopwatch watch;
+  LocalMap map = generator_.generate(points, map_from_body);
+  times_.map += watch.lap();
+  return map;
+}
+
+}  // namespace spartan
