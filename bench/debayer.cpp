@@ -2,7 +2,7 @@
 // time on one thread. `make bench-debayer`.
 //
 //   debayer [--repeat N]
-#include "spartan/imaging/debayer.h"
+#include "spartan/imaging/internal/debayer.h"
 
 #include <fmt/format.h>
 

@@ -17,10 +17,10 @@
 #include "spartan/core/threads.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/localization/measurement.h"
-#include "spartan/rig/formats/calibration_reading.h"
-#include "spartan/sim/motion_sensors.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/scenario.h"
-#include "spartan/sim/world.h"
+#include "spartan/sim/internal/world/world.h"
 
 namespace spartan {
 

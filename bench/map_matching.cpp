@@ -22,7 +22,7 @@
 #include "spartan/slam/global_map.h"
 #include "spartan/slam/map_matcher.h"
 #include "spartan/slam/map_merger.h"
-#include "spartan/slam/map_refinement.h"
+#include "spartan/slam/internal/map_refinement.h"
 #include "standard_recordings.h"
 #include "stop_points.h"
 

@@ -21,7 +21,7 @@
 #include "spartan/core/geotiff.h"
 #include "spartan/core/process.h"
 #include "spartan/eval/disparity_truth.h"
-#include "spartan/eval/map_metrics.h"
+#include "spartan/eval/internal/map_metrics.h"
 #include "spartan/reconstruction/stop_mapper.h"
 #include "standard_recordings.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "spartan/sim/renderer.h"
+#include "spartan/sim/internal/camera/renderer.h"
 
 namespace spartan::sim {
 namespace {

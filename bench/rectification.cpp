@@ -21,7 +21,7 @@
 #include "spartan/core/random.h"
 #include "spartan/core/rotation.h"
 #include "spartan/core/simd_target.h"
-#include "spartan/imaging/remap.h"
+#include "spartan/imaging/internal/remap.h"
 #include "timing.h"
 
 namespace {

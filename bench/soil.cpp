@@ -23,8 +23,8 @@
 
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/rig/formats/calibration_reading.h"
-#include "spartan/sim/frame_preview.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/sim/internal/camera/frame_preview.h"
 #include "spectrum_plot.h"
 
 namespace spartan {

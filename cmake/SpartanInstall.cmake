@@ -1,4 +1,4 @@
-# `cmake --install build/release --prefix X`: libraries, headers, program (src/program installs it), configuration,
+# `cmake --install build/release --prefix X`: libraries, public headers, program (src/program installs it), configuration,
 # and the package that `find_package(spartan)` reads. Tests and the test-support library stay out.
 include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/spartan)
@@ -10,7 +10,7 @@ install(TARGETS ${modules} spartan EXPORT spartanTargets)
 install(EXPORT spartanTargets NAMESPACE spartan:: DESTINATION ${package_folder})
 
 install(DIRECTORY src/spartan DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.h" PATTERN "testing" EXCLUDE PATTERN "*_test.h" EXCLUDE)
+  FILES_MATCHING PATTERN "*.h" PATTERN "internal" EXCLUDE PATTERN "testing" EXCLUDE)
 if(EXISTS ${PROJECT_SOURCE_DIR}/config)
   install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/spartan)
 endif()

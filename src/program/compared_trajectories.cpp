@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/rig/pose_convention.h"
 #include "spartan/system/run_folder.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "spartan/core/result.h"
-#include "spartan/rig/design/rig_designer.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
 

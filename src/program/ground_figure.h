@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "program/drawing.h"
-#include "spartan/rig/design/rig_designer.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "program/drawing.h"
-#include "spartan/rig/design/rig_designer.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig/design/ground_view.h"
+#include "spartan/rig_design/ground_view.h"
 
 namespace spartan::program {
 namespace {

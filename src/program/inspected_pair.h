@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "spartan/core/image.h"
-#include "spartan/rig/inspection/pair_check.h"
+#include "spartan/calibration/pair_check.h"
 
 namespace spartan::program {
 

@@ -20,7 +20,7 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/localization/start_frame.h"
 #include "spartan/reconstruction/stop_mapper.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/system/map_files.h"
 
 namespace spartan::program {

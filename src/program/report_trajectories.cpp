@@ -10,7 +10,7 @@
 #include "program/compared_trajectories.h"
 #include "program/html_parts.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::program {

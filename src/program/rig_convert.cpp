@@ -9,9 +9,9 @@
 
 #include "program/json.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/formats/calibration_reading.h"
-#include "spartan/rig/formats/calibration_writing.h"
-#include "spartan/rig/formats/read_back.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_writing.h"
+#include "spartan/calibration_io/read_back.h"
 #include "spartan/rig/rig_differences.h"
 
 namespace spartan::program {

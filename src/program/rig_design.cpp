@@ -8,7 +8,7 @@
 #include "program/ground_figure.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/rig/design/rig_designer.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
 namespace {

@@ -19,8 +19,8 @@
 #include "spartan/core/image_io.h"
 #include "spartan/odometry/view_matching.h"
 #include "spartan/rig/describe.h"
-#include "spartan/rig/formats/calibration_reading.h"
-#include "spartan/rig/inspection/pair_check.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration/pair_check.h"
 
 namespace spartan::program {
 namespace {

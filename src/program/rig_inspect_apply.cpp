@@ -8,7 +8,7 @@
 #include "program/rig_convert.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/rig/inspection/merge_corrections.h"
+#include "spartan/calibration/merge_corrections.h"
 
 namespace spartan::program {
 namespace {

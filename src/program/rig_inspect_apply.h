@@ -6,7 +6,7 @@
 
 #include "program/inspected_pair.h"
 #include "spartan/core/result.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 
 namespace spartan::program {
 

@@ -5,7 +5,7 @@
 #include "spartan/core/pixel_format.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
-#include "spartan/rig/inspection/pair_check.h"
+#include "spartan/calibration/pair_check.h"
 
 namespace spartan::program {
 

@@ -14,7 +14,7 @@
 #include "program/shipped_files.h"
 #include "spartan/core/files.h"
 #include "spartan/imaging/rectification.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/sim/simulator.h"
 
 namespace spartan::program {

@@ -19,7 +19,7 @@
 #include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/disparity_rendering.h"
 #include "spartan/reconstruction/point_cloud.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 
 namespace spartan::program {
 namespace {

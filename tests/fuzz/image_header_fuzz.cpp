@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "input_file.h"
-#include "spartan/camera/image_header.h"
+#include "spartan/camera/internal/layouts/image_header.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const spartan::testing::InputFile input(data, size);

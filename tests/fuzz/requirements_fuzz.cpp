@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "spartan/rig/design/rig_designer.h"
+#include "spartan/rig_design/rig_designer.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);

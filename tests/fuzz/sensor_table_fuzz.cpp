@@ -3,7 +3,7 @@
 #include <variant>
 
 #include "input_file.h"
-#include "spartan/camera/sensor_tables.h"
+#include "spartan/camera/internal/sensor_tables.h"
 
 namespace {
 

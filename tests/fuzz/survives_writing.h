@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <string>
 
-#include "spartan/rig/formats/calibration_reading.h"
-#include "spartan/rig/formats/calibration_writing.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_writing.h"
 #include "spartan/rig/rig_differences.h"
 #include "spartan/testing/temporary_folder.h"
 

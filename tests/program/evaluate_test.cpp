@@ -9,7 +9,7 @@
 
 #include "program.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/rig/pose_convention.h"
 #include "spartan/testing/temporary_folder.h"
 

@@ -11,8 +11,8 @@
 
 #include "program.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/formats/calibration_reading.h"
-#include "spartan/rig/models/model_modification.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration/internal/model_modification.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <filesystem>
 
-#include "spartan/camera/recording_index.h"
+#include "spartan/camera/internal/recording_index.h"
 
 namespace spartan {
 namespace {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "spartan/core/files.h"
-#include "spartan/core/image_file_check.h"
-#include "spartan/core/jpeg_file.h"
+#include "spartan/core/internal/image_file_check.h"
+#include "spartan/core/internal/jpeg_file.h"
 #include "spartan/core/opencv_bridge.h"
 
 namespace spartan {

@@ -10,7 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "spartan/core/image_file_check.h"
+#include "spartan/core/internal/image_file_check.h"
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/core/random.h"
 #include "spartan/testing/temporary_folder.h"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "spartan/eval/association.h"
+#include "spartan/eval/internal/association.h"
 
 namespace spartan {
 namespace {

@@ -5,8 +5,8 @@
 #include <map>
 #include <stdexcept>
 
-#include "spartan/imaging/camera_stage.h"
-#include "spartan/imaging/contrast.h"
+#include "spartan/imaging/internal/camera_stage.h"
+#include "spartan/imaging/internal/contrast.h"
 #include "spartan/imaging/rectification.h"
 
 namespace spartan {

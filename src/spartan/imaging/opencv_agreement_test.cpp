@@ -12,8 +12,8 @@
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/imaging/rectification.h"
-#include "spartan/imaging/remap.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/imaging/internal/remap.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {

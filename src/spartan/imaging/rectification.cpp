@@ -7,7 +7,7 @@
 #include <numbers>
 #include <optional>
 
-#include "spartan/imaging/virtual_view.h"
+#include "spartan/imaging/internal/virtual_view.h"
 #include "spartan/rig/rectifying_axes.h"
 
 namespace spartan {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/localization/replay_filter.h"
+#include "spartan/localization/internal/replay_filter.h"
 
 namespace spartan {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/localization/chi_square.h"
-#include "spartan/localization/drive_test.h"
+#include "spartan/localization/internal/chi_square.h"
+#include "spartan/localization/internal/drive_test.h"
 #include "spartan/localization/localizer.h"
 
 namespace spartan {

@@ -5,8 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "spartan/localization/drive_test.h"
-#include "spartan/localization/error_state_filter.h"
+#include "spartan/localization/internal/drive_test.h"
+#include "spartan/localization/internal/error_state_filter.h"
 
 namespace spartan {
 namespace {

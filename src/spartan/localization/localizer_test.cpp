@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <optional>
 
-#include "spartan/localization/chi_square.h"
-#include "spartan/localization/drive_test.h"
+#include "spartan/localization/internal/chi_square.h"
+#include "spartan/localization/internal/drive_test.h"
 
 namespace spartan {
 namespace {

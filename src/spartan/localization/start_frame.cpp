@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/localization/measurement_models.h"
+#include "spartan/localization/internal/measurement_models.h"
 
 namespace spartan {
 namespace {

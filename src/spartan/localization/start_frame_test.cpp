@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/localization/drive_test.h"
-#include "spartan/localization/measurement_models.h"
+#include "spartan/localization/internal/drive_test.h"
+#include "spartan/localization/internal/measurement_models.h"
 
 namespace spartan {
 namespace {

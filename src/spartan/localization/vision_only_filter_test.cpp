@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "spartan/localization/drive_test.h"
+#include "spartan/localization/internal/drive_test.h"
 
 namespace spartan {
 namespace {

@@ -6,14 +6,14 @@
 #include <cmath>
 
 #include "spartan/core/stage_clock.h"
-#include "spartan/odometry/landmark_detector.h"
-#include "spartan/odometry/landmark_manager.h"
-#include "spartan/odometry/landmark_matcher.h"
-#include "spartan/odometry/landmark_reconstructor.h"
-#include "spartan/odometry/motion_estimator.h"
-#include "spartan/odometry/odometer_memory.h"
+#include "spartan/odometry/internal/detection/landmark_detector.h"
+#include "spartan/odometry/internal/landmark_manager.h"
+#include "spartan/odometry/internal/landmark_matcher.h"
+#include "spartan/odometry/internal/landmark_reconstructor.h"
+#include "spartan/odometry/internal/motion_estimator.h"
+#include "spartan/odometry/internal/landmarks/odometer_memory.h"
 #include "spartan/odometry/odometry_options.h"
-#include "spartan/odometry/smoothed_image.h"
+#include "spartan/odometry/internal/matching/smoothed_image.h"
 
 namespace spartan {
 namespace {

@@ -6,9 +6,9 @@
 #include <memory>
 #include <optional>
 
-#include "spartan/odometry/landmark_detector.h"
-#include "spartan/odometry/patch_alignment.h"
-#include "spartan/odometry/smoothed_image.h"
+#include "spartan/odometry/internal/detection/landmark_detector.h"
+#include "spartan/odometry/internal/matching/patch_alignment.h"
+#include "spartan/odometry/internal/matching/smoothed_image.h"
 
 namespace spartan {
 namespace {

@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "spartan/reconstruction/disparity_filters.h"
+#include "spartan/reconstruction/internal/disparity_filters.h"
 #include "spartan/reconstruction/disparity_options.h"
-#include "spartan/reconstruction/semi_global_matcher.h"
+#include "spartan/reconstruction/internal/semi_global_matcher.h"
 
 namespace spartan {
 

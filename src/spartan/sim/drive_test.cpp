@@ -7,8 +7,8 @@
 #include <numbers>
 #include <set>
 
-#include "spartan/rig/formats/calibration_reading.h"
-#include "spartan/sim/rock_field.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/sim/internal/world/rock_field.h"
 #include "spartan/sim/scenario.h"
 
 namespace spartan::sim {

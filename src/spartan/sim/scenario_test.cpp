@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "spartan/core/files.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/testing/doc_example.h"
 
 namespace spartan::sim {

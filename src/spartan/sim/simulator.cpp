@@ -13,13 +13,13 @@
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 #include "spartan/core/geotiff.h"
-#include "spartan/sim/body_motion.h"
-#include "spartan/sim/faults.h"
-#include "spartan/sim/frame_preview.h"
-#include "spartan/sim/motion_sensors.h"
-#include "spartan/sim/renderer.h"
-#include "spartan/sim/truth.h"
-#include "spartan/sim/world.h"
+#include "spartan/sim/internal/drive/body_motion.h"
+#include "spartan/sim/internal/camera/faults.h"
+#include "spartan/sim/internal/camera/frame_preview.h"
+#include "spartan/sim/internal/drive/motion_sensors.h"
+#include "spartan/sim/internal/camera/renderer.h"
+#include "spartan/sim/internal/camera/truth.h"
+#include "spartan/sim/internal/world/world.h"
 
 namespace spartan::sim {
 namespace {

@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "spartan/slam/map_refinement.h"
-#include "spartan/slam/surface_grid.h"
+#include "spartan/slam/internal/map_refinement.h"
+#include "spartan/slam/internal/surface_grid.h"
 
 namespace spartan {
 namespace {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include "spartan/slam/map_refinement.h"
-#include "spartan/slam/match_covariance.h"
-#include "spartan/slam/scan_matching.h"
+#include "spartan/slam/internal/map_refinement.h"
+#include "spartan/slam/internal/match_covariance.h"
+#include "spartan/slam/internal/scan_matching.h"
 
 namespace spartan {
 namespace {

@@ -5,8 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "spartan/slam/map_refinement.h"
-#include "spartan/slam/synthetic_stop_test.h"
+#include "spartan/slam/internal/map_refinement.h"
+#include "spartan/slam/internal/synthetic_stop_test.h"
 
 namespace spartan {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <Eigen/LU>
 
-#include "spartan/slam/map_refinement.h"
-#include "spartan/slam/synthetic_stop_test.h"
+#include "spartan/slam/internal/map_refinement.h"
+#include "spartan/slam/internal/synthetic_stop_test.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

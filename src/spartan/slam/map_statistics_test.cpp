@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "spartan/slam/synthetic_stop_test.h"
+#include "spartan/slam/internal/synthetic_stop_test.h"
 
 namespace spartan {
 namespace {

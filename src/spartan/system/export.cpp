@@ -9,13 +9,13 @@
 
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/formats/calibration_reading.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/rig/pose_convention.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
 #include "spartan/system/saved_map.h"
-#include "spartan/system/terrain_files.h"
+#include "spartan/system/internal/terrain_files.h"
 
 namespace spartan {
 namespace {

@@ -10,7 +10,7 @@
 #include "spartan/localization/start_frame.h"
 #include "spartan/localization/vision_only_filter.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/system/position_stage.h"
+#include "spartan/system/internal/position_stage.h"
 
 namespace spartan {
 namespace {

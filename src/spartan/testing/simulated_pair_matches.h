@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "spartan/core/random.h"
-#include "spartan/rig/inspection/pair_check.h"
+#include "spartan/calibration/pair_check.h"
 
 namespace spartan::testing {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/rig/models/polynomial.h"
+#include "spartan/rig/internal/models/polynomial.h"
 
 namespace spartan {
 namespace {

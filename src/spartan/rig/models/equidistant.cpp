@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig/models/polynomial.h"
+#include "spartan/rig/internal/models/polynomial.h"
 
 namespace spartan {
 namespace {

@@ -1,0 +1,69 @@
+// Checks the calibration of a stereo pair by matches between its images.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "spartan/calibration/pair_refinement.h"
+#include "spartan/calibration/row_errors.h"
+#include "spartan/rig/rig.h"
+#include "spartan/rig/rig_findings.h"
+
+namespace spartan {
+
+enum class PairGrade {
+  good,    ///< row errors have a mean of at most 0.5 px and a 95th percentile of at most 1.5 px; no findings
+  usable,  ///< at most 1 px and 3 px: stereo works with fewer matches; or only findings that leave the ranges correct
+  bad,     ///< a finding makes ranges or rows wrong, or the images do not suffice for a check
+};
+std::string_view name_of(PairGrade grade);
+
+/// The result of a check. Row errors are signed left − right, in pixels.
+struct PairCheck {
+  int matches = 0, inliers = 0;  ///< inliers agree with the corrected pair
+  /// Row errors of the inliers: in the unrectified images; rectified with the calibration as given (swapped cameras,
+  /// inverse transform and image size corrected, for without that no row is meaningful); rectified with the rig
+  /// `corrected`. NaN where the matches do not suffice.
+  RowErrors unrectified_rows, nominal_rows, corrected_rows;
+  std::vector<RowErrorCell> map;     ///< 8 x 6 cells over the left image, those with at least 3 matches
+  PairCorrection correction, sigma;  ///< sigma of yaw includes a lens decentering that imitates it (0.3°); NaN as above
+  double yaw_sigma_px = 0;  ///< sigma of yaw as a disparity error, px: the uncertainty that rows leave in range
+  std::vector<RigFinding> findings;
+  PairGrade grade = PairGrade::bad;
+  std::vector<PixelMatch> inlier_matches;  ///< the inliers, unrectified
+  std::vector<double> row_error_px;        ///< of each inlier, rectified with the calibration as given
+  double inlier_limit_px = 0;              ///< largest corrected row error of an inlier
+  bool images_swapped = false;   ///< the first image is of the right camera; `matched` and `corrected` account for it
+  bool has_gross_error = false;  ///< cameras, transform or image size are wrong: the rig as given cannot be rectified
+  /// The rig with the findings corrected: swapped cameras, transform, unit, image sizes, distortion; pitch and roll;
+  /// and yaw, focal ratio and baseline direction where the images require it. Without findings the rig as given; none
+  /// where no hypothesis explains the images.
+  std::optional<Rig> corrected;
+};
+
+/// Checks a pair by matches of one or more stereo frames, a share of which may be wrong. `image_size`: size of the
+/// images they come from. Method: docs/math/pair_check.md. Findings, beside those of plausibility_findings() that the
+/// images do not refute:
+/// - `inverse_transform`, `swapped_eyes`, `size_mismatch`, `distortion_ignored`: gross errors (hypothesis search);
+/// - `row_offset`: median row error above 0.5 px;
+/// - `roll_offset`: roll of more than 0.5 px over half the image width;
+/// - `rows_apart`: rows worse than those of a good pair, without another finding;
+/// - `yaw_offset`: yaw beyond 2.6 standard deviations, or one that explains negative disparities. Rows observe yaw only
+///   by the pattern x y, which lens decentering imitates;
+/// - `focal_ratio`: focal lengths inconsistent by more than 0.3 %;
+/// - `not_enough_texture`: fewer than 40 inliers, or inliers in fewer than a quarter of the image cells;
+/// - `same_picture`: both images are the same;
+/// - `not_explained`: no hypothesis makes the rows agree: images of different times, places or rigs.
+PairCheck check_pair(const Rig& rig, const StereoPair& pair, const std::vector<PixelMatch>& matches,
+                     ImageSize image_size);
+
+/// The same for images without a calibration, with guessed_rig(). Yaw, focal ratio and distortion are corrected but not
+/// reported as findings, for they refer to the guess.
+PairCheck check_images(const std::vector<PixelMatch>& matches, ImageSize image_size);
+
+/// A rig for images without a calibration: two equal pinholes with a focal length of 1.2 times the larger image side,
+/// parallel, 1 m apart. Results for rows, pitch and roll hold for any focal length close to it.
+Rig guessed_rig(ImageSize image_size);
+
+}  // namespace spartan

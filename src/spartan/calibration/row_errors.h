@@ -1,0 +1,40 @@
+// Statistics of the row errors (vertical disparities) of a stereo pair.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "spartan/core/image.h"
+#include "spartan/calibration/pair_refinement.h"
+
+namespace spartan {
+
+/// Row errors (left − right) of matches, pixels.
+struct RowErrors {
+  double mean_px = 0, p95_px = 0;  ///< of the absolute values
+  double median_px = 0;            ///< signed
+};
+
+/// What stereo matching needs: a mean of at most 0.5 px, and 95 % of the matches within 1.5 px.
+inline constexpr double kGoodRowsMean_px = 0.5, kGoodRowsP95_px = 1.5;
+inline bool are_good(const RowErrors& rows) {
+  return rows.mean_px <= kGoodRowsMean_px && rows.p95_px <= kGoodRowsP95_px;
+}
+
+/// A cell of the left image.
+struct RowErrorCell {
+  Eigen::Vector2d centre_px;
+  int matches = 0;
+  double median_px = 0;  ///< signed row error in the rectified view of the pair as given
+};
+
+/// Statistics of the finite values (others are matches that cannot be unprojected); NaN where there is none.
+RowErrors row_errors(std::vector<double> signed_px);
+
+/// Row errors in a grid of 8 × 6 cells over the left image: the cells with at least 3 matches, row by row. Empty where
+/// the image size is not known. `signed_px`: one value per match.
+std::vector<RowErrorCell> map_row_errors(const std::vector<PixelMatch>& matches, const std::vector<double>& signed_px,
+                                         ImageSize image_size);
+inline constexpr int kRowErrorCells = 8 * 6;
+
+}  // namespace spartan

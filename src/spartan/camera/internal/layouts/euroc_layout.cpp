@@ -1,0 +1,138 @@
+// EuRoC/ASL layout: cam0/data.csv, cam0/data/<file>, cam1/…, imu0/data.csv, each with a sensor.yaml.
+// Source: Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016.
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+#include <utility>
+
+#include "spartan/camera/internal/frame_tables.h"
+#include "spartan/camera/internal/recording_index.h"
+#include "spartan/camera/internal/sensor_tables.h"
+#include "spartan/camera/internal/stamp_order.h"
+#include "spartan/core/files.h"
+#include "spartan/calibration_io/calibration_reading.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The images of one camera folder, file names expanded to paths.
+Result<EurocImages> read_images(const fs::path& camera) {
+  auto table = TableReader::open((camera / "data.csv").string(), {});
+  if (!table) return failure(table);
+  auto images = read_euroc_images(std::move(*table));
+  if (!images) return failure(images);
+  for (std::string& file : images->files) file = (camera / "data" / file).string();
+  return images;
+}
+
+struct EurocImu {
+  Eigen::Quaterniond body_from_imu = Eigen::Quaterniond::Identity();
+  ImuNoise noise;
+};
+
+// The rotation part of T_BS (body from sensor); identity where the key is missing.
+Result<Eigen::Quaterniond> rotation_of(const YAML::Node& transform, const std::string& path) {
+  if (!transform) return Eigen::Quaterniond::Identity();
+  // Two forms are in use: {rows, cols, data: […]} and a plain list of 16 numbers.
+  const auto data = (transform.IsMap() ? transform["data"] : transform).as<std::vector<double>>();
+  if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS does not have 16 numbers", path);
+  Eigen::Matrix3d rotation;
+  rotation << data[0], data[1], data[2], data[4], data[5], data[6], data[8], data[9], data[10];
+  if (!is_rotation(rotation, 1e-3))
+    return failure(ErrorCode::configuration, "the rotation part of T_BS is not a rotation matrix", path);
+  return Eigen::Quaterniond(nearest_rotation(rotation));
+}
+
+// A noise density; 0 (unknown) where the key is missing.
+Result<double> density(const YAML::Node& file, const char* key, const std::string& path) {
+  const double value = file[key] ? file[key].as<double>() : 0;
+  if (!(value >= 0 && value < 10))
+    return failure(ErrorCode::configuration, fmt::format("{} is {}, expected a number in [0, 10)", key, value), path);
+  return value;
+}
+
+// Reads imu0/sensor.yaml; defaults where the file is missing.
+Result<EurocImu> read_imu(const std::string& path) {
+  EurocImu imu;
+  std::error_code error;
+  if (!fs::exists(path, error)) return imu;
+  auto text = read_file(path);
+  if (!text) return failure(text);
+  if (text->starts_with("%YAML:"))
+    text->erase(0, text->find('\n'));  // the %YAML:1.0 header of OpenCV is not valid YAML
+  try {
+    const YAML::Node file = YAML::Load(*text);
+    const auto rotation = rotation_of(file["T_BS"], path);
+    if (!rotation) return failure(rotation);
+    imu.body_from_imu = *rotation;
+    for (const auto& [key, noise] : {std::pair("gyroscope_noise_density", &imu.noise.gyro_noise_rad_s_sqrt_hz),
+                                     {"gyroscope_random_walk", &imu.noise.gyro_walk_rad_s2_sqrt_hz},
+                                     {"accelerometer_noise_density", &imu.noise.accel_noise_m_s2_sqrt_hz},
+                                     {"accelerometer_random_walk", &imu.noise.accel_walk_m_s3_sqrt_hz}}) {
+      const auto specified = density(file, key, path);
+      if (!specified) return failure(specified);
+      *noise = *specified;
+    }
+  } catch (const YAML::Exception& e) {
+    return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, path);
+  }
+  return imu;
+}
+
+FrameEntry make_entry(const StampMatch& match, const EurocImages& left, const EurocImages& right) {
+  FrameEntry entry;
+  const Stamp any = match.left ? left.stamps[*match.left] : right.stamps[*match.right];
+  entry.left_stamp = entry.right_stamp = any;
+  entry.right_only = !match.left;
+  if (match.left) entry.left_file = left.files[*match.left];
+  if (match.right) {
+    entry.right_file = right.files[*match.right];
+    entry.right_stamp = right.stamps[*match.right];
+  }
+  if (!match.left || !match.right) {
+    const bool no_left = !match.left;
+    entry.fault = no_left ? FrameFault::left_missing : FrameFault::right_missing;
+    entry.message = fmt::format("{}: has no {} image within the pairing tolerance at {} ns",
+                                no_left ? entry.right_file : entry.left_file, no_left ? "left" : "right", any.ns);
+  }
+  return entry;
+}
+
+}  // namespace
+
+Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions& options) {
+  const fs::path folder = layout.folder;
+  RecordingIndex index;
+  const auto left = read_images(folder / "cam0");
+  if (!left) return failure(left);
+  const auto right = read_images(folder / "cam1");
+  if (!right) return failure(right);
+  auto rig = choose_rig(options, (folder / "cam0" / "sensor.yaml").string(), {},
+                        [&] { return read_euroc_calib(folder.string()); });
+  if (!rig) return failure(rig);
+  index.info.rig = std::move(rig->rig);
+  index.info.rig_source = rig->source;
+  const std::string pair = default_pair(index.info.rig);
+  for (const StampMatch& match : match_stamps(left->stamps, right->stamps, options.pair_tolerance_s)) {
+    FrameEntry entry = make_entry(match, *left, *right);
+    entry.frame_id = static_cast<std::int64_t>(index.frames.size());
+    entry.pair = pair;
+    index.frames.push_back(std::move(entry));
+  }
+  std::error_code error;
+  if (const fs::path truth = folder / "state_groundtruth_estimate0" / "data.csv"; fs::exists(truth, error)) {
+    index.info.truth_file = truth.string();
+  }
+  if (const fs::path imu = folder / "imu0" / "data.csv"; fs::exists(imu, error)) {
+    const auto about = read_imu((folder / "imu0" / "sensor.yaml").string());
+    if (!about) return failure(about);
+    index.info.noise.imu = about->noise;
+    index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(about->body_from_imu));
+  }
+  return index;
+}
+
+}  // namespace spartan

@@ -1,0 +1,81 @@
+#include "spartan/camera/internal/layouts/image_header.h"
+
+#include <cstdint>
+#include <fstream>
+#include <sstream>
+#include <string_view>
+
+namespace spartan {
+namespace {
+
+using std::string_view_literals::operator""sv;
+
+constexpr std::size_t kHeaderBytes = 1 << 18;  // a JPEG may hold several 64-KiB metadata segments before the size
+constexpr int kLargestSide = 32768;            // px; larger sizes are taken as damaged headers
+
+// Unsigned big-endian number; 0 where it is larger than kLargestSide.
+int big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char c : bytes) value = (value << 8U) | static_cast<std::uint8_t>(c);
+  return value > static_cast<std::uint32_t>(kLargestSide) ? 0 : static_cast<int>(value);
+}
+
+// The IHDR chunk is the first one: width and height at bytes 16 and 20.
+ImageSize png_size(std::string_view head) {
+  if (head.size() < 24) return {};
+  return {big_endian(head.substr(16, 4)), big_endian(head.substr(20, 4))};
+}
+
+// Skips segments up to the start-of-frame marker (C0 to CF except C4, C8 and CC), which holds height and width.
+ImageSize jpeg_size(std::string_view head) {
+  std::size_t at = 2;
+  while (at + 9 <= head.size() && head[at] == '\xFF') {
+    const auto marker = static_cast<std::uint8_t>(head[at + 1]);
+    if (marker == 0xFF) {
+      ++at;
+      continue;
+    }
+    if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) {
+      return {big_endian(head.substr(at + 7, 2)), big_endian(head.substr(at + 5, 2))};
+    }
+    const auto high = static_cast<std::uint8_t>(head[at + 2]), low = static_cast<std::uint8_t>(head[at + 3]);
+    at += 2 + static_cast<std::size_t>(high) * 256 + low;
+  }
+  return {};
+}
+
+// "P5 # comment\n<width> <height> …"
+ImageSize pnm_size(std::string_view head) {
+  std::string words;
+  for (std::size_t i = 2; i < head.size(); ++i) {
+    if (head[i] == '#') i = std::min(head.find('\n', i), head.size() - 1);
+    words += head[i];
+    if (words.size() > 64) break;
+  }
+  std::istringstream numbers(words);
+  ImageSize size;
+  numbers >> size.width >> size.height;
+  if (!numbers || size.width > kLargestSide || size.height > kLargestSide) return {};
+  return size;
+}
+
+}  // namespace
+
+std::optional<ImageSize> read_image_size(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string content(kHeaderBytes, '\0');
+  file.read(content.data(), static_cast<std::streamsize>(content.size()));
+  content.resize(static_cast<std::size_t>(file.gcount()));
+  return parse_image_size(content);
+}
+
+std::optional<ImageSize> parse_image_size(std::string_view head) {
+  ImageSize size;
+  if (head.starts_with("\x89PNG\r\n\x1a\n"sv)) size = png_size(head);
+  if (head.starts_with("\xFF\xD8"sv)) size = jpeg_size(head);
+  if (head.starts_with("P5"sv) || head.starts_with("P6"sv)) size = pnm_size(head);
+  if (size.empty()) return std::nullopt;
+  return size;
+}
+
+}  // namespace spartan

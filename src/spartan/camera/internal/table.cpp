@@ -1,0 +1,121 @@
+#include "spartan/camera/internal/table.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <numbers>
+#include <sstream>
+
+namespace spartan {
+namespace {
+
+// Half of the range: the difference of two stamps fits 64 bits.
+constexpr std::int64_t kLargestStamp = std::numeric_limits<std::int64_t>::max() / 2;
+constexpr std::string_view kBlanks = " \t\r";
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
+std::string_view trim(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+}
+
+std::vector<std::string_view> split(std::string_view line, char separator) {
+  std::vector<std::string_view> fields;
+  for (;;) {
+    const std::size_t end = separator == ' ' ? line.find_first_of(kBlanks) : line.find(separator);
+    fields.push_back(trim(line.substr(0, end)));
+    if (end == std::string_view::npos) return fields;
+    line.remove_prefix(end + 1);
+    if (separator == ' ') line = trim(line);
+  }
+}
+
+// Quotes file content in an error message: at most 80 characters, non-printable ones replaced.
+std::string quote(std::string_view text) {
+  std::string quoted;
+  for (const char c : text.substr(0, 80)) quoted += c >= ' ' && c <= '~' ? c : '?';
+  return "'" + quoted + (text.size() > 80 ? "…'" : "'");
+}
+
+}  // namespace
+
+Result<TableReader> TableReader::open(const std::string& path, TableFormat format) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    return failure(ErrorCode::input, "is missing or not a file", path);
+  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
+  if (!*file) return failure(ErrorCode::input, "cannot be read", path);
+  return begin(path, std::move(format), std::move(file));
+}
+
+Result<TableReader> TableReader::over(std::string text, const std::string& name, TableFormat format) {
+  return begin(name, std::move(format), std::make_unique<std::istringstream>(std::move(text)));
+}
+
+Result<TableReader> TableReader::begin(std::string path, TableFormat format, std::unique_ptr<std::istream> stream) {
+  TableReader table(std::move(path), std::move(format), std::move(stream));
+  const std::string header = table.format_.header;
+  if (header.empty()) return table;
+  const auto first = table.next();
+  if (!first) return failure(first);
+  if (!*first)
+    return failure(ErrorCode::input, fmt::format("the file is empty, expected the columns '{}'", header), table.path_);
+  if (**first != split(header, table.format_.separator)) {
+    return table.error_in_row(fmt::format("the columns are {}, expected '{}'", quote(trim(table.line_)), header));
+  }
+  return table;
+}
+
+Result<std::optional<std::vector<std::string_view>>> TableReader::next() {
+  while (std::getline(*stream_, line_)) {
+    if (++line_number_ == 1 && line_.starts_with(kByteOrderMark)) line_.erase(0, kByteOrderMark.size());
+    const bool broken_off = stream_->eof();
+    const std::string_view line = trim(line_);
+    if (line.empty() || line.front() == '#') continue;
+    if (broken_off && format_.ends_with_newline) return error_in_row("the file is truncated in this line");
+    return split(line, format_.separator);
+  }
+  if (stream_->bad()) return failure(ErrorCode::input, "cannot be read to the end of the file", path_);
+  return std::nullopt;
+}
+
+Result<std::optional<std::vector<std::string_view>>> TableReader::next(std::size_t fields) {
+  auto row = next();
+  if (row && *row && (*row)->size() < fields) {
+    return error_in_row(fmt::format("{} values, expected {}: {}", (*row)->size(), fields, quote(trim(line_))));
+  }
+  return row;
+}
+
+bool is_in_range(Stamp stamp) {
+  return stamp.ns <= kLargestStamp && stamp.ns >= -kLargestStamp;
+}
+
+std::optional<Stamp> parse_stamp_ns(std::string_view text) {
+  const auto ns = parse_number<std::int64_t>(text);
+  if (!ns || !is_in_range(Stamp{*ns})) return std::nullopt;
+  return Stamp{*ns};
+}
+
+// Not every double of radians has a double of degrees that converts back to it; long double has enough digits.
+std::optional<double> parse_degrees(std::string_view text) {
+  const auto degrees = parse_number<long double>(text);
+  if (!degrees) return std::nullopt;
+  return static_cast<double>(*degrees * (std::numbers::pi_v<long double> / 180));
+}
+
+std::string to_degrees(double radians) {
+  const long double degrees = static_cast<long double>(radians) * (180 / std::numbers::pi_v<long double>);
+  std::string text;
+  // At least three digits: with fewer, 90 would be written as 9e+01.
+  for (int digits = 3; digits <= 21; ++digits) {
+    text = fmt::format("{:.{}g}", degrees, digits);
+    if (parse_degrees(text) == radians) break;
+  }
+  return text;
+}
+
+}  // namespace spartan

@@ -1,0 +1,76 @@
+// Imaging stage of one camera: from the raw image to the rectified image.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "spartan/core/frame_image.h"
+#include "spartan/core/image.h"
+#include "spartan/core/result.h"
+#include "spartan/core/threads.h"
+#include "spartan/imaging/internal/contrast.h"
+#include "spartan/imaging/internal/debayer.h"
+#include "spartan/imaging/imaging_options.h"
+#include "spartan/imaging/internal/local_contrast.h"
+#include "spartan/imaging/rectification.h"
+#include "spartan/imaging/internal/remap.h"
+#include "spartan/imaging/internal/vignetting_correction.h"
+#include "spartan/rig/rig.h"
+
+namespace spartan {
+
+/// Buffers and lookup tables of one camera. The steps must be called in the order of their declaration; the views of
+/// the result are valid until the next image.
+class CameraStage {
+ public:
+  /// Code `configuration` where the self-mask cannot be read, the vignetting correction is out of range or the camera
+  /// sees less than 1 % of the view. `where` names the pair in the last of these errors.
+  static Result<CameraStage> create(const Camera& camera, const Rectification& plan,
+                                    const Eigen::Matrix3d& camera_from_rectified, const ImagingOptions& options,
+                                    const std::string& mask_folder, const ThreadPool& workers,
+                                    const std::string& where);
+
+  /// Code `input` where the size or pixel format differs from the camera's. The image of a gray camera may be RGB.
+  Status check(const FrameImage& image, const std::string& where) const;
+
+  bool has_vignetting() const { return vignetting_.has_value(); }
+  bool has_local_contrast() const { return local_.has_value(); }
+  bool is_resampled() const { return table_.has_value(); }
+
+  /// Raw image → gray image of the same depth.
+  void make_gray(const FrameImage& image, const ThreadPool& workers);
+  void correct_vignetting(const ThreadPool& workers);
+  /// Adds the gray levels inside the rectified view and outside the self-mask to the histogram: neither the rover's own
+  /// body nor the black border of a fisheye image represents the brightness of the ground.
+  void add_to_histogram(GrayHistogram& histogram) const;
+  /// Gray image → 8-bit working image.
+  void apply_contrast(const ContrastMapping& mapping, const ThreadPool& workers);
+  void equalise_locally(const ThreadPool& workers);
+  void rectify(const ThreadPool& workers);
+
+  ImageView<const std::uint8_t> result() const { return table_ ? result_.view() : working(); }
+  ImageView<const std::uint8_t> mask() const { return table_ ? table_->mask() : self_mask_.view(); }
+
+ private:
+  CameraStage(const Camera& camera, const ImagingOptions& options);
+  Status check_mask(const std::string& where) const;
+  void make_gray_buffer();
+  bool is_deep() const { return camera_.pixel_format.bits > 8; }
+  ImageView<const std::uint8_t> working() const { return local_ ? equalised_.view() : mapped_.view(); }
+  template <class T>
+  ImageView<const T> to_gray(const FrameImage& image, Image<T>& buffer, const ThreadPool& workers) const;
+
+  Camera camera_;
+  Debayerer debayerer_;
+  std::optional<VignettingCorrection> vignetting_;
+  std::optional<LocalContrast> local_;
+  std::optional<RemapTable> table_;
+  Image<std::uint8_t> gray8_, mapped_, equalised_, result_;
+  Image<std::uint8_t> self_mask_, histogram_mask_;  ///< size of the sensor, 0: excluded; empty: nothing excluded
+  Image<std::uint16_t> gray16_;
+  ImageView<const std::uint8_t> gray8_view_;
+  ImageView<const std::uint16_t> gray16_view_;
+};
+
+}  // namespace spartan

@@ -1,0 +1,104 @@
+#include "spartan/localization/internal/filter_memory.h"
+
+#include <algorithm>
+#include <type_traits>
+
+namespace spartan {
+namespace {
+
+struct Put {
+  ArchiveWriter& out;
+  template <class T>
+  void operator()(const T& value) {
+    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Pose>) {
+      out.put(value);
+    } else if constexpr (std::is_same_v<T, Stamp>) {
+      out.put(value.ns);
+    } else if constexpr (std::is_same_v<T, Eigen::Quaterniond>) {
+      for (int i = 0; i < 4; ++i) out.put(value.coeffs()[i]);
+    } else {
+      for (Eigen::Index i = 0; i < value.size(); ++i) out.put(value.data()[i]);
+    }
+  }
+};
+
+struct Get {
+  ArchiveReader& in;
+  template <class T>
+  void operator()(T& value) {
+    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+      value = in.get<T>();
+    } else if constexpr (std::is_same_v<T, Stamp>) {
+      value.ns = in.get<std::int64_t>();
+    } else if constexpr (std::is_same_v<T, Pose>) {
+      value = in.get_pose();
+    } else if constexpr (std::is_same_v<T, Eigen::Quaterniond>) {
+      for (int i = 0; i < 4; ++i) value.coeffs()[i] = in.get<double>();
+    } else {
+      for (Eigen::Index i = 0; i < value.size(); ++i) value.data()[i] = in.get<double>();
+    }
+  }
+};
+
+// Every field once, for both directions.
+template <class Each, class State>
+void visit_state(Each& each, State& s) {
+  each(s.world_from_body), each(s.velocity_m_s), each(s.gyro_bias_rad_s), each(s.accel_bias_m_s2);
+  each(s.gravity_tilt_rad), each(s.wheel_scale), each(s.compass_offset_rad), each(s.inclinometer_bias_rad);
+  each(s.vision_drift), each(s.vision_constant), each(s.world_from_vision_clone), each(s.world_from_step_clone);
+}
+
+template <class Each, class Wheels>
+void visit_wheels(Each& each, Wheels& w) {
+  each(w.stamp), each(w.left_m), each(w.right_m);
+}
+
+template <class Each, class Imu>
+void visit_imu(Each& each, Imu& m) {
+  each(m.known), each(m.last.stamp), each(m.last.gyro_rad_s), each(m.last.accel_m_s2), each(m.changed);
+  each(m.levelled), each(m.level_from), each(m.level_count), each(m.level_force);
+  each(m.block.from), each(m.block.count), each(m.block.gyro), each(m.block.accel);
+  each(m.block.gyro_squares), each(m.block.accel_squares);
+  each(m.turn), each(m.turn_s), each(m.turn_whole);
+}
+
+template <class Each, class Judge>
+void visit_judge(Each& each, Judge& j) {
+  each(j.seen), each(j.last), each(j.state), each(j.reason), each(j.square), each(j.limit);
+  each(j.used), each(j.rejected), each(j.passed_in_row), each(j.failed_in_row);
+}
+
+template <class Each, class Memory>
+void visit(Each& each, Memory& m) {
+  each(m.started), each(m.stamp), each(m.belief.covariance), each(m.world_from_odom), each(m.gravity_measured);
+  visit_state(each, m.belief.state);
+  visit_imu(each, m.imu);
+  each(m.vision.clone_stamp), each(m.vision.odom_from_clone), each(m.vision.odom_covariance), each(m.vision.stood);
+  each(m.vision.rate_rad_s), each(m.vision.unmeasured_noise), each(m.vision.unmeasured_s);
+  each(m.step.from), each(m.step.odom_from_clone), each(m.step.has_wheels), visit_wheels(each, m.step.wheels);
+  each(m.step.standing);
+  each(m.wheels.known), visit_wheels(each, m.wheels.last), visit_wheels(each, m.wheels.previous),
+      visit_wheels(each, m.wheels.moved);
+  each(m.wheels.slip_known), each(m.wheels.slip_stamp), each(m.wheels.slip), each(m.wheels.slip_sigma);
+  each(m.compass.heading_east), each(m.compass.offset_known), each(m.compass.pending);
+  for (auto& offset : m.compass.offsets) each(offset);
+  for (auto& sigma : m.compass.sigmas) each(sigma);
+  for (auto& judge : m.judges) visit_judge(each, judge);
+}
+
+}  // namespace
+
+void put(ArchiveWriter& out, const FilterMemory& memory) {
+  Put each{out};
+  visit(each, memory);
+}
+
+FilterMemory get_filter_memory(ArchiveReader& in) {
+  FilterMemory memory;
+  Get each{in};
+  visit(each, memory);
+  memory.compass.pending = std::min<std::uint32_t>(memory.compass.pending, CompassMemory::kPending - 1);
+  return memory;
+}
+
+}  // namespace spartan

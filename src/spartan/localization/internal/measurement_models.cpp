@@ -1,0 +1,187 @@
+#include "spartan/localization/internal/measurement_models.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace spartan {
+namespace {
+
+const Pose& clone_of(const NavigationState& s, int clone) {
+  return clone == error_at::kVisionClone ? s.world_from_vision_clone : s.world_from_step_clone;
+}
+
+const Pose& pose_of(const NavigationState& s, int pose) {
+  return pose == error_at::kPose ? s.world_from_body : clone_of(s, pose);
+}
+
+// The displacement of the step along the mean attitude, and its derivative by the motion's right perturbation:
+//   t' = t + ΔR ρ,  φ' = φ + J_r⁻¹(φ) φ_e,  t_mid = Exp(−φ/2) t
+//   ∂t_mid = Exp(φ/2) ρ_e + ½ [t_mid]× J_l(−φ/2) J_r⁻¹(φ) φ_e        (Exp(−φ/2) ΔR = Exp(φ/2))
+struct MeanStep {
+  Eigen::Vector3d displacement, turn;
+  Eigen::Matrix<double, 3, 6> displacement_by, turn_by;
+};
+
+MeanStep mean_step(const Pose& motion) {
+  MeanStep m;
+  m.turn = log_so3(motion.rotation());
+  const Eigen::Vector3d half = 0.5 * m.turn;
+  m.displacement = exp_so3(-half) * motion.translation();
+  const Eigen::Matrix3d turn_by = left_jacobian_inverse_so3(-m.turn);
+  m.displacement_by << exp_so3(half).toRotationMatrix(),
+      0.5 * skew(m.displacement) * left_jacobian_so3(-half) * turn_by;
+  m.turn_by << Eigen::Matrix3d::Zero(), turn_by;
+  return m;
+}
+
+}  // namespace
+
+MotionSinceClone motion_since_clone(const NavigationState& s, int clone) {
+  MotionSinceClone m;
+  m.clone_from_body = clone_of(s, clone).inverse() * s.world_from_body;
+  m.jacobian.setZero();
+  m.jacobian.middleCols<6>(error_at::kPose).setIdentity();
+  m.jacobian.middleCols<6>(clone) = -adjoint(m.clone_from_body.inverse());
+  return m;
+}
+
+Innovation relative_motion_innovation(const NavigationState& s, int clone, const Pose& measured,
+                                      const Matrix6d& covariance, const Vector6d& drift_scale) {
+  const MotionSinceClone m = motion_since_clone(s, clone);
+  Innovation i(6);
+  const Vector6d drift = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
+  const Vector6d r = log_se3(m.clone_from_body.inverse() * measured * exp_se3(drift));
+  const Matrix6d right = right_jacobian_inverse_se3(r) * right_jacobian_se3(drift),
+                 left = right_jacobian_inverse_se3(-r);
+  i.residual = r;
+  i.jacobian = m.jacobian;
+  i.jacobian.middleCols<6>(clone) = left * m.jacobian.middleCols<6>(clone);
+  i.jacobian.middleCols<6>(error_at::kVisionDrift) = -right * drift_scale.asDiagonal();
+  i.jacobian.middleCols<6>(error_at::kVisionConstant) = i.jacobian.middleCols<6>(error_at::kVisionDrift);
+  i.noise = right * covariance * right.transpose();
+  return i;
+}
+
+Innovation wheel_innovation(const NavigationState& s, const WheelStep& step) {
+  const MotionSinceClone m = motion_since_clone(s, error_at::kStepClone);
+  const MeanStep mean = mean_step(m.clone_from_body);
+  Innovation i(step.turn_known ? 4 : 3);
+  i.residual.head<3>() = Eigen::Vector3d(s.wheel_scale * step.counted_m, 0, 0) - mean.displacement;
+  i.jacobian.topRows<3>() = mean.displacement_by * m.jacobian;
+  i.jacobian(0, error_at::kWheelScale) = -step.counted_m;
+  i.noise.diagonal().head<3>() << step.forward_sigma_m * step.forward_sigma_m, step.side_sigma_m * step.side_sigma_m,
+      step.up_sigma_m * step.up_sigma_m;
+  if (step.turn_known) {
+    i.residual[3] = step.turn_rad - mean.turn.z();
+    i.jacobian.row(3) = mean.turn_by.row(2) * m.jacobian;
+    i.noise(3, 3) = step.turn_sigma_rad * step.turn_sigma_rad;
+  }
+  return i;
+}
+
+StepForward forward_of_step(const NavigationState& s) {
+  const MotionSinceClone m = motion_since_clone(s, error_at::kStepClone);
+  const MeanStep mean = mean_step(m.clone_from_body);
+  return {mean.displacement.x(), mean.displacement_by.row(0) * m.jacobian};
+}
+
+double heading_of(const Pose& world_from_body) {
+  const Eigen::Vector3d ahead = world_from_body.rotation() * Eigen::Vector3d::UnitX();
+  return std::atan2(ahead.y(), ahead.x());
+}
+
+double heading_about_up(const NavigationState& s) {
+  const Eigen::Vector3d tilt(s.gravity_tilt_rad.x(), s.gravity_tilt_rad.y(), 0);
+  return heading_of(Pose::from_rotation(exp_so3(-tilt) * s.world_from_body.rotation()));
+}
+
+// With v = R x̂, a = Exp(−τ) v: δa = Exp(−τ) (−R [x̂]× φ + [v]× J_l(τ) δτ), δψ = (a_x δa_y − a_y δa_x) / (a_x² + a_y²).
+Innovation compass_innovation(const NavigationState& s, double heading_rad, double sigma_rad) {
+  const Eigen::Matrix3d r = s.world_from_body.rotation_matrix();
+  const Eigen::Vector3d tilt(s.gravity_tilt_rad.x(), s.gravity_tilt_rad.y(), 0);
+  const Eigen::Matrix3d level = exp_so3(-tilt).toRotationMatrix();
+  const Eigen::Vector3d ahead = level * r.col(0);
+  const Eigen::RowVector3d by_ahead =
+      Eigen::RowVector3d(-ahead.y(), ahead.x(), 0) / std::max(ahead.head<2>().squaredNorm(), 1e-6);
+  const Eigen::Matrix3d by_tilt = level * skew(r.col(0)) * left_jacobian_so3(tilt);
+  Innovation i(1);
+  i.residual[0] = std::remainder(heading_rad - heading_about_up(s) - s.compass_offset_rad, 2 * std::numbers::pi);
+  i.jacobian.block<1, 3>(0, error_at::kAttitude) = -by_ahead * level * r * skew(Eigen::Vector3d::UnitX());
+  i.jacobian.block<1, 2>(0, error_at::kGravityTilt) = by_ahead * by_tilt.leftCols<2>();
+  i.jacobian(0, error_at::kCompassOffset) = 1;
+  i.noise(0, 0) = sigma_rad * sigma_rad;
+  return i;
+}
+
+Eigen::Vector2d roll_pitch_of_up(const Eigen::Vector3d& up) {
+  return {std::atan2(up.y(), up.z()), std::atan2(-up.x(), std::hypot(up.y(), up.z()))};
+}
+
+Eigen::Vector3d up_of_roll_pitch(double roll, double pitch) {
+  return {-std::sin(pitch), std::sin(roll) * std::cos(pitch), std::cos(roll) * std::cos(pitch)};
+}
+
+// With u = R̂ᵀ up: δu = [u]× φ + Rᵀ ∂up δτ; roll = atan2(u_y, u_z), pitch = atan2(−u_x, |u_yz|).
+Innovation inclinometer_innovation(const NavigationState& s, double roll, double pitch, double sigma) {
+  const Eigen::Matrix3d to_body = s.world_from_body.rotation().conjugate().toRotationMatrix();
+  const Eigen::Vector3d u = to_body * true_up(s.gravity_tilt_rad);
+  const double side = std::max(std::hypot(u.y(), u.z()), 1e-3);
+  Eigen::Matrix<double, 2, 3> by_up;
+  by_up << 0, u.z() / (side * side), -u.y() / (side * side),  //
+      -side, u.x() * u.y() / side, u.x() * u.z() / side;
+  Innovation i(2);
+  i.residual = Eigen::Vector2d(roll, pitch) - roll_pitch_of_up(u) - s.inclinometer_bias_rad;
+  for (Eigen::Index k = 0; k < 2; ++k) i.residual[k] = std::remainder(i.residual[k], 2 * std::numbers::pi);
+  i.jacobian.middleCols<3>(error_at::kAttitude) = by_up * skew(u);
+  i.jacobian.middleCols<2>(error_at::kGravityTilt) = by_up * to_body * true_up_jacobian(s.gravity_tilt_rad);
+  i.jacobian.middleCols<2>(error_at::kInclinometerBias).setIdentity();
+  i.noise.diagonal().setConstant(sigma * sigma);
+  return i;
+}
+
+Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean_accel, double sigma, double gravity) {
+  const Eigen::Matrix3d to_body = s.world_from_body.rotation().conjugate().toRotationMatrix();
+  const Eigen::Vector3d expected = gravity * (to_body * true_up(s.gravity_tilt_rad));
+  Innovation i(3);
+  i.residual = mean_accel - expected - s.accel_bias_m_s2;
+  i.jacobian.middleCols<3>(error_at::kAttitude) = skew(expected);
+  i.jacobian.middleCols<2>(error_at::kGravityTilt) = gravity * to_body * true_up_jacobian(s.gravity_tilt_rad);
+  i.jacobian.middleCols<3>(error_at::kAccelBias).setIdentity();
+  i.noise.diagonal().setConstant(sigma * sigma);
+  return i;
+}
+
+// T = X̂ Exp(ξ) Exp(n): Log(X̂⁻¹ T) = ξ + J_r⁻¹(r) n. Information Λ of n becomes J_rᵀ Λ J_r; its eigenvectors with any
+// information are independent scalar measurements.
+Innovation map_innovation(const Belief& belief, int pose, const PoseConstraint& constraint, double covariance_factor) {
+  constexpr double kLeastInformation = 1e-6, kLeastShare = 1e-12;
+  const Vector6d r = log_se3(pose_of(belief.state, pose).inverse() * constraint.world_from_body);
+  const Matrix6d jacobian = right_jacobian_se3(r);
+  const Matrix6d turned = jacobian.transpose() * constraint.information * jacobian;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (turned + turned.transpose()));
+  const Vector6d values = eigen.eigenvalues() / covariance_factor;
+  const double least = std::max(kLeastInformation, kLeastShare * values[5]);
+  int first = 0;
+  while (first < 6 && !(values[first] > least)) ++first;
+  const int rows = 6 - first;
+  Innovation i(rows);
+  if (rows == 0) return i;
+  const auto directions = eigen.eigenvectors().rightCols(rows).transpose();
+  i.residual = directions * r;
+  i.jacobian.middleCols<6>(pose) = directions;
+  i.noise.diagonal() = values.tail(rows).cwiseInverse();
+
+  const Matrix6d inverse = jacobian.inverse();
+  const Matrix6d map = inverse * constraint.map_covariance * inverse.transpose();
+  i.noise += directions * map * directions.transpose();
+  const Matrix6d believed = belief.covariance.block<6, 6>(pose, pose);
+  // The residual is truth less belief, plus the map's error: where both err alike it is none, hence the sign.
+  i.shared = -belief.covariance.middleCols<6>(pose) * shared_fraction(believed, map) * directions.transpose();
+  return i;
+}
+
+}  // namespace spartan

@@ -1,0 +1,130 @@
+#include "spartan/localization/internal/measurement_models.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "spartan/localization/internal/drive_test.h"
+#include "spartan/testing/numeric_jacobian.h"
+
+namespace spartan {
+namespace {
+
+// Residual = measured − expected: its derivative by the estimate's error is −jacobian.
+template <int Rows>
+void expect_derivative(const NavigationState& s, const std::function<Innovation(const NavigationState&)>& innovation) {
+  const auto numeric = testing::numeric_jacobian<Rows, error_at::kSize>(
+      [&](const ErrorVector& e) -> Eigen::Matrix<double, Rows, 1> { return innovation(add_error(s, e)).residual; },
+      ErrorVector::Zero(), 1e-4);
+  EXPECT_LE((innovation(s).jacobian + numeric).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(MeasurementModels, JacobiansMatchDifferences) {
+  Random random(4);
+  for (int round = 0; round < 10; ++round) {
+    const NavigationState s = random_navigation_state(random);
+    WheelStep step{0.1, 0.2, true, 1, 1, 1, 1};
+    expect_derivative<4>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
+    step.turn_known = false;
+    expect_derivative<3>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
+    const double heading = heading_about_up(s) + s.compass_offset_rad + 0.1;
+    expect_derivative<1>(s, [&](const NavigationState& x) { return compass_innovation(x, heading, 0.1); });
+    const Eigen::Vector2d tilt =
+        roll_pitch_of_up(s.world_from_body.rotation().conjugate() * true_up(s.gravity_tilt_rad));
+    expect_derivative<2>(s,
+                         [&](const NavigationState& x) { return inclinometer_innovation(x, tilt.x(), tilt.y(), 1); });
+    expect_derivative<3>(s, [&](const NavigationState& x) { return rest_innovation(x, {1, 2, 3}, 1, 3.71); });
+  }
+}
+
+TEST(MeasurementModels, ForwardOfStepHasItsDerivative) {
+  Random random(8);
+  const NavigationState s = random_navigation_state(random);
+  const auto numeric = testing::numeric_jacobian<1, error_at::kSize>(
+      [&](const ErrorVector& e) -> Eigen::Matrix<double, 1, 1> {
+        return Eigen::Matrix<double, 1, 1>(forward_of_step(add_error(s, e)).metres);
+      },
+      ErrorVector::Zero());
+  EXPECT_LE((forward_of_step(s).jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+// Far from the mean: the motion measured is that of the true state, X̂ Exp(r) over the clone Ĉ Exp(ξ_c), less the drift.
+TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
+  Random random(5);
+  for (const int clone : {error_at::kVisionClone, error_at::kStepClone}) {
+    const NavigationState s = random_navigation_state(random);
+    Vector6d r, drift_scale;
+    r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
+    drift_scale << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6;
+    const Pose mean = motion_since_clone(s, clone).clone_from_body;
+    const Vector6d believed = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
+    const auto seen = [&](const ErrorVector& e) -> Vector6d {
+      const NavigationState truth = add_error(s, e);
+      const Pose motion = motion_since_clone(truth, clone).clone_from_body *
+                          exp_se3(-drift_scale.cwiseProduct(truth.vision_drift + truth.vision_constant));
+      return log_se3(mean.inverse() * motion * exp_se3(believed));
+    };
+    ErrorVector at = ErrorVector::Zero();
+    at.segment<6>(error_at::kPose) = r;
+    const auto numeric = testing::numeric_jacobian<6, error_at::kSize>(seen, at, 1e-4);
+    const Innovation innovation =
+        relative_motion_innovation(s, clone, mean * exp_se3(r) * exp_se3(-believed), Matrix6d::Identity(), drift_scale);
+    EXPECT_LE((innovation.residual - r).norm(), 1e-12);
+    EXPECT_LE((innovation.jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
+TEST(MeasurementModels, WheelsExpectTheArc) {
+  // A quarter circle of radius 1: the chord √2 lies along the mean attitude, whatever the frame.
+  NavigationState s;
+  s.wheel_scale = 0.5;
+  s.world_from_step_clone = exp_se3((Vector6d() << 1, 2, 3, 0.1, 0.2, 0.3).finished());
+  s.world_from_body = s.world_from_step_clone * Pose(exp_so3({0, 0, std::numbers::pi / 2}), Eigen::Vector3d(1, 1, 0));
+  const Innovation i = wheel_innovation(s, {2 * std::sqrt(2.0), std::numbers::pi / 2, true, 1, 1, 1, 1});
+  EXPECT_LE(i.residual.norm(), 1e-12);
+  EXPECT_NEAR(forward_of_step(s).metres, std::sqrt(2.0), 1e-12);
+}
+
+TEST(MeasurementModels, RollAndPitchAreTheSimulatorsAngles) {
+  const double roll = 0.2, pitch = -0.3, yaw = 1.1;
+  const Eigen::Quaterniond turn = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+                                  Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+                                  Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d up = turn.conjugate() * Eigen::Vector3d::UnitZ();
+  EXPECT_LE((roll_pitch_of_up(up) - Eigen::Vector2d(roll, pitch)).norm(), 1e-12);
+  EXPECT_LE((up_of_roll_pitch(roll, pitch) - up).norm(), 1e-12);
+  EXPECT_NEAR(heading_of(Pose::from_rotation(turn)), yaw, 1e-12);
+}
+
+TEST(MeasurementModels, CompassResidualIsWrapped) {
+  NavigationState s;
+  s.compass_offset_rad = 3;
+  EXPECT_NEAR(compass_innovation(s, -3, 0.1).residual[0], 2 * std::numbers::pi - 6, 1e-12);
+}
+
+TEST(MeasurementModels, PoseConstraintOfAnyRankMeasuresWhatItKnows) {
+  Random random(6);
+  const Belief belief{random_navigation_state(random), ErrorCovariance::Identity()};
+  Vector6d offset;
+  offset << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03;
+  const Pose seen = belief.state.world_from_body * exp_se3(offset);
+  EXPECT_EQ(map_innovation(belief, error_at::kPose, {{}, seen}, 1).rows(), 0);
+  Matrix6d some = Matrix6d::Zero();
+  some(0, 0) = 100;
+  some(5, 5) = 1e4;
+  const Innovation i = map_innovation(belief, error_at::kPose, {{}, seen, some}, 2);
+  ASSERT_EQ(i.rows(), 2);
+  // Its information about the error is that which was handed over, carried to the mean, and halved by the factor.
+  const Matrix6d jacobian = right_jacobian_se3(offset);
+  const Matrix6d information =
+      (i.jacobian.transpose() * i.noise.inverse() * i.jacobian).block<6, 6>(error_at::kPose, error_at::kPose);
+  EXPECT_LE((information - 0.5 * jacobian.transpose() * some * jacobian).cwiseAbs().maxCoeff(), 1e-8);
+  // The whole residual where all is known.
+  const Innovation all = map_innovation(belief, error_at::kPose, {{}, seen, Matrix6d::Identity()}, 1);
+  EXPECT_LE((all.jacobian.leftCols<6>().transpose() * all.residual - offset).norm(), 1e-9);
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,134 @@
+#include "spartan/localization/internal/propagation.h"
+
+namespace spartan {
+namespace {
+
+// Noise that is white in acceleration and angular rate, integrated over the step: the double integral
+// correlates position with velocity.
+void add_white_noise(Transition& t, double accel_variance, double rate_variance, double seconds) {
+  const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
+  t.noise.block<3, 3>(error_at::kPosition, error_at::kPosition) +=
+      identity * (accel_variance * seconds * seconds * seconds / 3);
+  t.noise.block<3, 3>(error_at::kPosition, error_at::kVelocity) += identity * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(error_at::kVelocity, error_at::kPosition) += identity * (accel_variance * seconds * seconds / 2);
+  t.noise.block<3, 3>(error_at::kVelocity, error_at::kVelocity) += identity * (accel_variance * seconds);
+  t.noise.block<3, 3>(error_at::kAttitude, error_at::kAttitude) += identity * (rate_variance * seconds);
+}
+
+Transition blank() {
+  Transition t;
+  t.by_moving.setIdentity();
+  t.by_tilt.setZero();
+  t.noise.setZero();
+  return t;
+}
+
+struct Integrated {
+  Eigen::Vector3d turn;  // rotation vector
+  Eigen::Matrix3d before, after;
+  Eigen::Vector3d force_from, force_to;  // without bias, body
+  Eigen::Vector3d acceleration;          // world
+};
+
+Integrated integrate(const NavigationState& s, const InertialStep& step, double gravity) {
+  Integrated i;
+  i.turn = (0.5 * (step.gyro_from + step.gyro_to) - s.gyro_bias_rad_s) * step.seconds;
+  i.before = s.world_from_body.rotation_matrix();
+  i.after = i.before * exp_so3(i.turn).toRotationMatrix();
+  i.force_from = step.accel_from - s.accel_bias_m_s2;
+  i.force_to = step.accel_to - s.accel_bias_m_s2;
+  i.acceleration = 0.5 * (i.before * i.force_from + i.after * i.force_to) - gravity * true_up(s.gravity_tilt_rad);
+  return i;
+}
+
+}  // namespace
+
+NavigationState propagate(const NavigationState& s, const InertialStep& step, double gravity) {
+  const Integrated i = integrate(s, step, gravity);
+  const Eigen::Vector3d velocity = i.before * s.velocity_m_s;  // world
+  NavigationState r = s;
+  r.world_from_body = {
+      s.world_from_body.rotation() * exp_so3(i.turn),
+      s.world_from_body.translation() + velocity * step.seconds + 0.5 * step.seconds * step.seconds * i.acceleration};
+  r.velocity_m_s = r.world_from_body.rotation().conjugate() * (velocity + i.acceleration * step.seconds);
+  return r;
+}
+
+// With δp = R ρ (to first order), v = R w the velocity in the world, a' = a + δa:
+//   φ' = ΔRᵀ φ − J_r t δb_g
+//   δv = R (ν − [w]× φ)
+//   δa = −½ R [f₀]× φ − ½ R' [f₁]× φ' − ½ (R + R') δb_a − g ∂up δτ
+//   ρ' = ΔRᵀ ρ + R'ᵀ (δv t + ½ δa t²),   ν' = R'ᵀ (δv + δa t) + [w']× φ'
+Transition transition(const NavigationState& s, const InertialStep& step, const InertialNoise& noise, double gravity) {
+  const Integrated i = integrate(s, step, gravity);
+  const double t = step.seconds;
+  Transition r = blank();
+  const Eigen::Matrix3d to_body = i.after.transpose(), back = to_body * i.before;
+  const Eigen::Vector3d after = back * s.velocity_m_s + t * (to_body * i.acceleration);  // w'
+
+  using Rows = Eigen::Matrix<double, 3, error_at::kMoving>;
+  Rows turn = Rows::Zero(), velocity = Rows::Zero(), accel = Rows::Zero();
+  turn.middleCols<3>(error_at::kAttitude) = back;
+  turn.middleCols<3>(error_at::kGyroBias) = -t * left_jacobian_so3(-i.turn);
+  velocity.middleCols<3>(error_at::kVelocity) = i.before;
+  velocity.middleCols<3>(error_at::kAttitude) = -i.before * skew(s.velocity_m_s);
+  accel = -0.5 * i.after * skew(i.force_to) * turn;
+  accel.middleCols<3>(error_at::kAttitude) -= 0.5 * i.before * skew(i.force_from);
+  accel.middleCols<3>(error_at::kAccelBias) = -0.5 * (i.before + i.after);
+  const Eigen::Matrix<double, 3, 2> accel_by_tilt = -gravity * true_up_jacobian(s.gravity_tilt_rad);
+
+  r.by_moving.middleRows<3>(error_at::kAttitude) = turn;
+  r.by_moving.middleRows<3>(error_at::kVelocity) = to_body * (velocity + t * accel) + skew(after) * turn;
+  r.by_moving.middleRows<3>(error_at::kPosition) = to_body * (t * velocity + 0.5 * t * t * accel);
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
+  r.by_tilt.middleRows<3>(error_at::kVelocity) = t * to_body * accel_by_tilt;
+  r.by_tilt.middleRows<3>(error_at::kPosition) = 0.5 * t * t * to_body * accel_by_tilt;
+
+  add_white_noise(r, noise.accel * noise.accel, noise.gyro * noise.gyro, t);
+  r.noise.block<3, 3>(error_at::kGyroBias, error_at::kGyroBias).diagonal().array() +=
+      noise.gyro_walk * noise.gyro_walk * t;
+  r.noise.block<3, 3>(error_at::kAccelBias, error_at::kAccelBias).diagonal().array() +=
+      noise.accel_walk * noise.accel_walk * t;
+  return r;
+}
+
+// The velocity w stays in the body: p' = p + ½ (R + R') w t.
+NavigationState propagate(const NavigationState& s, const SteadyStep& step) {
+  NavigationState r = s;
+  const Eigen::Quaterniond before = s.world_from_body.rotation(),
+                           after = before * exp_so3(step.rate_rad_s * step.seconds);
+  r.world_from_body = {
+      after, s.world_from_body.translation() + 0.5 * step.seconds * (before * s.velocity_m_s + after * s.velocity_m_s)};
+  return r;
+}
+
+// ρ' = ΔRᵀ ρ + ½ t (ΔRᵀ (ν − [w]× φ) + ν − [w]× φ'),   φ' = ΔRᵀ φ,   ν' = ν
+Transition transition(const NavigationState& s, const SteadyStep& step, const SteadyNoise& noise) {
+  const double t = step.seconds;
+  Transition r = blank();
+  const Eigen::Matrix3d back = exp_so3(step.rate_rad_s * t).toRotationMatrix().transpose();
+  const Eigen::Matrix3d speed = skew(s.velocity_m_s);
+  r.by_moving.block<3, 3>(error_at::kAttitude, error_at::kAttitude) = back;
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kVelocity) = 0.5 * t * (back + Eigen::Matrix3d::Identity());
+  r.by_moving.block<3, 3>(error_at::kPosition, error_at::kAttitude) = -0.5 * t * (back * speed + speed * back);
+  add_white_noise(r, noise.velocity_m_s_sqrt_hz * noise.velocity_m_s_sqrt_hz,
+                  noise.attitude_rad_sqrt_hz * noise.attitude_rad_sqrt_hz, t);
+  return r;
+}
+
+void move_on(ErrorCovariance& p, const Transition& t) {
+  constexpr int kRest = error_at::kSize - error_at::kMoving;
+  Eigen::Matrix<double, error_at::kMoving, error_at::kSize> rows;
+  rows.noalias() = t.by_moving * p.topRows<error_at::kMoving>();
+  rows.noalias() += t.by_tilt * p.middleRows<2>(error_at::kGravityTilt);
+  Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> square =
+      rows.leftCols<error_at::kMoving>() * t.by_moving.transpose();
+  square.noalias() += rows.middleCols<2>(error_at::kGravityTilt) * t.by_tilt.transpose();
+  square += t.noise;
+  p.topLeftCorner<error_at::kMoving, error_at::kMoving>() = 0.5 * (square + square.transpose());
+  p.topRightCorner<error_at::kMoving, kRest>() = rows.rightCols<kRest>();
+  p.bottomLeftCorner<kRest, error_at::kMoving>() = rows.rightCols<kRest>().transpose();
+}
+
+}  // namespace spartan

@@ -1,0 +1,257 @@
+#include "spartan/localization/internal/replay_filter.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace spartan {
+namespace {
+
+/// Snapshots stand where time crosses a multiple of this, so that they depend on the samples alone, not on their
+/// arrival.
+constexpr std::int64_t kCell_ns = 500'000'000;
+/// What is kept before the start, to level by.
+constexpr double kBeforeStart_s = 10;
+/// A stamp may be so far ahead of all others, or as far as the buffer is long.
+constexpr double kLeastLead_s = 5;
+
+std::int64_t cell_of(Stamp stamp) {
+  return stamp.ns >= 0 ? stamp.ns / kCell_ns : -((-stamp.ns + kCell_ns - 1) / kCell_ns);
+}
+
+double age(const Measurement& m, Stamp newest) {
+  return seconds_between(stamp_of_measurement(m), newest);
+}
+
+void put_constraint(ArchiveWriter& out, const PoseConstraint& c) {
+  out.put(c.world_from_body);
+  out.put(c.information);
+  out.put(c.map_covariance);
+}
+
+PoseConstraint get_constraint(ArchiveReader& in, Stamp stamp) {
+  const Pose pose = in.get_pose();
+  const Matrix6d information = in.get_matrix6();
+  return {stamp, pose, information, in.get_matrix6()};
+}
+
+// Fields as they are; kinds as their index.
+void put_measurement(ArchiveWriter& out, const Measurement& m) {
+  out.put(static_cast<std::uint8_t>(m.index()));
+  out.put(stamp_of_measurement(m).ns);
+  if (const auto* imu = std::get_if<ImuSample>(&m)) {
+    out.put(imu->gyro_rad_s);
+    out.put(imu->accel_m_s2);
+  } else if (const auto* motion = std::get_if<RelativeMotion>(&m)) {
+    out.put(motion->from.ns);
+    out.put(motion->previous_from_current);
+    out.put(motion->covariance);
+    out.put(motion->measured);
+  } else if (const auto* wheels = std::get_if<WheelSample>(&m)) {
+    out.put(wheels->left_m);
+    out.put(wheels->right_m);
+  } else if (const auto* compass = std::get_if<CompassSample>(&m)) {
+    out.put(compass->heading_rad);
+    out.put(compass->sigma_rad);
+  } else if (const auto* tilt = std::get_if<InclinometerSample>(&m)) {
+    out.put(tilt->roll_rad);
+    out.put(tilt->pitch_rad);
+    out.put(tilt->sigma_rad);
+  } else if (const auto* constraint = std::get_if<PoseConstraint>(&m)) {
+    put_constraint(out, *constraint);
+  } else if (const auto* late = std::get_if<LateConstraint>(&m)) {
+    out.put(late->at_shot.stamp.ns);
+    put_constraint(out, late->at_shot);
+  }
+}
+
+std::optional<Measurement> get_measurement(ArchiveReader& in) {
+  const auto kind = in.get<std::uint8_t>();
+  const Stamp stamp{in.get<std::int64_t>()};
+  switch (kind) {
+    case 0: {
+      const Eigen::Vector3d gyro = in.get_vector3();
+      return ImuSample{stamp, gyro, in.get_vector3()};
+    }
+    case 1: {
+      RelativeMotion motion;
+      motion.to = stamp;
+      motion.from.ns = in.get<std::int64_t>();
+      motion.previous_from_current = in.get_pose();
+      motion.covariance = in.get_matrix6();
+      motion.measured = in.get<bool>();
+      return motion;
+    }
+    case 2: {
+      const auto left = in.get<double>();
+      return WheelSample{stamp, left, in.get<double>()};
+    }
+    case 3: {
+      const auto heading = in.get<double>();
+      return CompassSample{stamp, heading, in.get<double>()};
+    }
+    case 4: {
+      const auto roll = in.get<double>(), pitch = in.get<double>();
+      return InclinometerSample{stamp, roll, pitch, in.get<double>()};
+    }
+    case 5:
+      return get_constraint(in, stamp);
+    case 6: {
+      const Stamp shot{in.get<std::int64_t>()};
+      return LateConstraint{stamp, get_constraint(in, shot)};
+    }
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(options), filter_(options) {}
+
+void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
+                         const std::optional<Eigen::Vector3d>& up_in_body) {
+  if (started()) throw std::logic_error("the localization has started already");
+  std::erase_if(entries_, [&](const Measurement& m) { return std::abs(age(m, stamp)) > kBeforeStart_s; });
+  const auto later = std::partition_point(entries_.begin(), entries_.end(),
+                                          [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
+  filter_.start(stamp, ahead_in_body, std::span(entries_.data(), static_cast<std::size_t>(later - entries_.begin())),
+                up_in_body);
+  entries_.erase(entries_.begin(), later);
+  start_ = newest_ = stamp;
+  for (const Measurement& m : entries_) newest_ = std::max(newest_, stamp_of_measurement(m));
+  snapshots_ = {{0, filter_.memory()}};
+  run_from(0);
+}
+
+bool ReplayFilter::reaches(Stamp stamp) const {
+  return started() && stamp >= start_ && seconds_between(stamp, newest_) <= options_.buffer_s;
+}
+
+std::optional<Refusal> ReplayFilter::add(const Measurement& m) {
+  return started() ? add_started(m) : add_before_start(m);
+}
+
+/// There is no shot yet to say what time it is: a stamp far from all others is refused, a second one beside it
+/// believed.
+std::optional<Refusal> ReplayFilter::add_before_start(const Measurement& m) {
+  const Stamp stamp = stamp_of_measurement(m);
+  const bool odd = !entries_.empty() && std::abs(age(m, newest_)) > kBeforeStart_s;
+  if (odd) {
+    const bool alone = !odd_ || std::abs(age(m, *odd_)) > kBeforeStart_s;
+    odd_ = stamp;
+    if (alone) return stamp > newest_ ? Refusal::too_early : Refusal::too_late;
+    entries_.clear();
+  }
+  odd_.reset();
+  if (!place(m)) return Refusal::duplicate;
+  newest_ = stamp_of_measurement(entries_.back());
+  std::erase_if(entries_, [&](const Measurement& e) { return age(e, newest_) > kBeforeStart_s; });
+  return std::nullopt;
+}
+
+std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
+  const Stamp stamp = stamp_of_measurement(m);
+  if (!reaches(stamp)) {
+    const auto* constraint = std::get_if<PoseConstraint>(&m);
+    if (constraint == nullptr || stamp != filter_.memory().vision.clone_stamp) return Refusal::too_late;
+    // As early as the buffer reaches: a shot that comes late still comes after it.
+    const auto buffer_ns = static_cast<std::int64_t>(options_.buffer_s * 1e9);
+    return take(LateConstraint{{newest_.ns - buffer_ns}, *constraint});
+  }
+  // It would make all others too late. Only the required sensor is believed that so much time has gone by.
+  if (seconds_between(newest_, stamp) > std::max(options_.buffer_s, kLeastLead_s) &&
+      !std::holds_alternative<RelativeMotion>(m))
+    return Refusal::too_early;
+  return take(m);
+}
+
+std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
+  const auto at = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
+  if (at != entries_.end() && !comes_before(m, *at)) return std::nullopt;
+  const auto index = static_cast<std::size_t>(at - entries_.begin());  // the insertion may move all of them
+  entries_.insert(at, m);
+  return index;
+}
+
+std::optional<Refusal> ReplayFilter::take(const Measurement& m) {
+  const auto at = place(m);
+  if (!at) return Refusal::duplicate;
+  newest_ = std::max(newest_, stamp_of_measurement(m));
+  if (*at + 1 == entries_.size()) {
+    run_from(*at);
+  } else {
+    replay_from(*at);
+  }
+  forget_old();
+  return std::nullopt;
+}
+
+bool ReplayFilter::opens_cell(std::size_t entry) const {
+  if (entry == 0) return false;
+  return cell_of(stamp_of_measurement(entries_[entry])) != cell_of(stamp_of_measurement(entries_[entry - 1]));
+}
+
+void ReplayFilter::replay_from(std::size_t entry) {
+  while (snapshots_.size() > 1 && snapshots_.back().count >= entry) snapshots_.pop_back();
+  filter_.set_memory(snapshots_.back().memory);
+  const std::size_t from = snapshots_.back().count;
+  if (snapshots_.size() > 1) snapshots_.pop_back();  // run_from makes it again
+  run_from(from);
+}
+
+void ReplayFilter::run_from(std::size_t entry) {
+  for (; entry < entries_.size(); ++entry) {
+    if (opens_cell(entry)) snapshots_.push_back({entry, filter_.memory()});
+    filter_.process(entries_[entry]);
+  }
+}
+
+/// Drops what no sample that may still come can reach.
+void ReplayFilter::forget_old() {
+  std::size_t first = 0;
+  while (first + 1 < snapshots_.size() &&
+         seconds_between(snapshots_[first + 1].memory.stamp, newest_) > options_.buffer_s)
+    ++first;
+  if (first == 0) return;
+  const std::size_t gone = snapshots_[first].count;
+  entries_.erase(entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(gone));
+  snapshots_.erase(snapshots_.begin(), snapshots_.begin() + static_cast<std::ptrdiff_t>(first));
+  for (Snapshot& snapshot : snapshots_) snapshot.count -= gone;
+}
+
+void ReplayFilter::put(ArchiveWriter& out) const {
+  out.put(started());
+  out.put(odd_.has_value());
+  out.put(odd_.value_or(Stamp()).ns);
+  out.put(start_.ns);
+  out.put(newest_.ns);
+  spartan::put(out, started() ? snapshots_.front().memory : FilterMemory{});
+  out.put(static_cast<std::uint64_t>(entries_.size()));
+  for (const Measurement& m : entries_) put_measurement(out, m);
+}
+
+bool ReplayFilter::get(ArchiveReader& in) {
+  const bool has_started = in.get<bool>();
+  const bool odd = in.get<bool>();
+  odd_ = Stamp{in.get<std::int64_t>()};
+  if (!odd) odd_.reset();
+  start_.ns = in.get<std::int64_t>();
+  newest_.ns = in.get<std::int64_t>();
+  const FilterMemory memory = get_filter_memory(in);
+  const auto count = in.get<std::uint64_t>();
+  entries_.clear();
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto m = get_measurement(in);
+    if (!m || !is_sound(*m)) return false;
+    if (!entries_.empty() && !comes_before(entries_.back(), *m)) return false;
+    entries_.push_back(*m);
+  }
+  filter_.set_memory(memory);
+  snapshots_.clear();
+  if (!has_started || !memory.started) return has_started == memory.started;
+  snapshots_ = {{0, memory}};
+  run_from(0);
+  return true;
+}
+
+}  // namespace spartan

@@ -1,0 +1,33 @@
+// Selection of features that cover the image evenly.
+#pragma once
+
+#include <vector>
+
+#include "spartan/odometry/internal/detection/landmark_detector.h"
+
+namespace spartan {
+
+/// Selects at most `count` features. The image is divided into about count/4 square cells; the strongest feature of
+/// every cell is taken first, then the second strongest of every cell, and so on. No two selected features are nearer
+/// than `spacing_px`. Result in order of decreasing strength; ties are broken by y, then x.
+std::vector<Feature> spread_features(std::vector<Feature> features, ImageSize size, int count, double spacing_px);
+
+/// Keeps a minimum distance between points of an image.
+class Occupancy {
+ public:
+  Occupancy(ImageSize size, double spacing_px);
+  /// True where no point that was taken is nearer than the spacing.
+  bool is_free(double x, double y) const;
+  void take(double x, double y);
+
+ private:
+  struct Point {
+    float x, y;
+  };
+  int cell_of(double v) const { return static_cast<int>(v / cell_px_) + 1; }
+  double spacing_px_, cell_px_;
+  int columns_, rows_;
+  std::vector<std::vector<Point>> cells_;
+};
+
+}  // namespace spartan

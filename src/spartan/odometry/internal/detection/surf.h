@@ -1,0 +1,52 @@
+// Speeded-up robust features (SURF).
+// Source: Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features (SURF)", CVIU 110 (2008) 346-359.
+#pragma once
+
+#include <vector>
+
+#include "spartan/odometry/internal/detection/integral_image.h"
+#include "spartan/odometry/internal/detection/landmark_detector.h"
+
+namespace spartan {
+
+/// Detects blobs as maxima of the determinant of the Hessian over position and scale, with second derivatives from box
+/// filters on the integral image (§3), and describes them by sums of Haar wavelet responses (§4).
+class SurfDetector final : public LandmarkDetector {
+ public:
+  SurfDetector(const DetectionOptions& options, ThreadPool workers);
+  const std::vector<Feature>& detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask) override;
+
+ private:
+  /// det H for one filter size on the grid of an octave; 0 where the filter leaves the image.
+  struct Layer {
+    int filter_px = 0;  ///< side of the filter
+    int step_px = 1;    ///< grid pitch
+    Image<float> response;
+  };
+  void compute_layers(ImageSize size);
+  std::vector<Feature> find_maxima(ImageSize size) const;
+
+  DetectionOptions options_;
+  ThreadPool workers_;
+  IntegralImage integral_;
+  std::vector<Layer> layers_;  ///< four per octave, in order of filter size
+  std::vector<Feature> features_;
+};
+
+/// Box-filter approximation of the Hessian at one pixel, divided by the filter's area (§3.2), with lobes of
+/// filter_px/3. The filter must lie inside the image with a margin of one pixel.
+struct BoxHessian {
+  float xx = 0, yy = 0, xy = 0;
+  /// Dxx Dyy − (0.9 Dxy)² (eq. 3).
+  float determinant() const { return xx * yy - 0.81f * xy * xy; }
+};
+BoxHessian box_hessian(const IntegralImage& integral, int x, int y, int filter_px);
+
+/// Orientation of a feature: direction of the largest sum of Haar responses in a sliding window of π/3 (§4.1), rad.
+float surf_orientation(const IntegralImage& integral, const Feature& feature);
+
+/// 4×4 subregions of 5×5 Haar responses over a square of side 20 s, each summed as (Σdx, Σ|dx|, Σdy, Σ|dy|), normalized
+/// to unit length (§4.2).
+Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature);
+
+}  // namespace spartan

@@ -1,0 +1,58 @@
+// Landmark matching, a sub-module of the published odometry: associates the landmarks of t−1 with the current frame.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "spartan/core/threads.h"
+#include "spartan/odometry/internal/landmarks/landmark.h"
+#include "spartan/odometry/internal/landmark_reconstructor.h"
+#include "spartan/odometry/internal/motion_estimator.h"
+
+namespace spartan {
+
+/// A feature of the current frame and its disparity at the nearest whole pixel, where one was found.
+struct ReconstructedFeature {
+  Feature feature;
+  std::optional<RowAlignment> stereo;
+};
+
+class LandmarkMatcher {
+ public:
+  LandmarkMatcher(const LandmarkMatchingOptions& options, const LandmarkReconstructor& reconstruction,
+                  ThreadPool workers)
+      : options_(options), reconstruction_(reconstruction), workers_(std::move(workers)) {}
+
+  /// For each landmark the index of the feature that matches it, or −1. Features are candidates within the gate around
+  /// the position that `current_from_previous` predicts (without it: in the whole image); the best one must pass the
+  /// maximum descriptor distance and the ratio test (Lowe, IJCV 60, 2004, §7.1). Each feature matches at most one
+  /// landmark.
+  std::vector<int> by_descriptor(const LandmarkMemory& memory, const std::vector<ReconstructedFeature>& features,
+                                 const RectifiedStereo& stereo, const std::optional<Pose>& current_from_previous) const;
+
+  /// Pairs of landmark and feature as measurements for the coarse motion.
+  std::vector<LandmarkMatch> coarse_matches(const LandmarkMemory& memory,
+                                            const std::vector<ReconstructedFeature>& features,
+                                            const std::vector<int>& feature_of) const;
+
+  /// Measures each landmark: its patch, warped by the predicted geometry, is aligned with the left image, and its
+  /// disparity is searched near the predicted one. `current_from_previous` must be accurate to a few pixels.
+  std::vector<LandmarkMatch> by_correlation(const LandmarkMemory& memory, const StereoImages& images,
+                                            const Pose& current_from_previous) const;
+
+ private:
+  std::optional<LandmarkMatch> correlate(const LandmarkMemory& memory, std::size_t index, const StereoImages& images,
+                                         const Pose& current_from_previous) const;
+  LandmarkMatchingOptions options_;
+  LandmarkReconstructor reconstruction_;
+  ThreadPool workers_;
+};
+
+/// Rigidity check: discards matches whose 3D distances to most of their partners have changed by more than the noise
+/// explains, since a rigid scene preserves all distances between its points. Each match is compared with about
+/// `partners` others, spread over the list. Fewer than eight matches are returned unchanged.
+std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector<LandmarkMatch> matches,
+                                      int partners = 24);
+
+}  // namespace spartan

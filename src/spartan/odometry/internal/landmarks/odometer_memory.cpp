@@ -1,0 +1,126 @@
+#include "spartan/odometry/internal/landmarks/odometer_memory.h"
+
+namespace spartan {
+namespace {
+
+constexpr std::uint32_t kVersion = 1;
+
+void put(ArchiveWriter& out, const RectifiedStereo& stereo) {
+  out.put(stereo.size.width);
+  out.put(stereo.size.height);
+  out.put(stereo.focal_px);
+  out.put(stereo.centre_px);
+  out.put(stereo.baseline_m);
+}
+
+RectifiedStereo get_stereo(ArchiveReader& in) {
+  RectifiedStereo stereo;
+  stereo.size.width = in.get<int>();
+  stereo.size.height = in.get<int>();
+  stereo.focal_px = in.get<double>();
+  stereo.centre_px = in.get_vector2();
+  stereo.baseline_m = in.get<double>();
+  return stereo;
+}
+
+void put(ArchiveWriter& out, const Landmark& landmark) {
+  out.put(landmark.anchor_id);
+  out.put(landmark.anchor_pixel);
+  out.put(landmark.disparity);
+  out.put(landmark.variance);
+  out.put(landmark.slant);
+  out.put_array(landmark.patch.data(), landmark.patch.size());
+  out.put(landmark.pixel);
+  out.put(landmark.scale);
+  out.put(landmark.angle);
+  out.put(landmark.sign);
+  out.put_array(landmark.descriptor.data(), landmark.descriptor.size());
+  out.put(landmark.missed_frames);
+}
+
+template <class T, std::size_t N>
+bool fill(std::array<T, N>& array, const std::vector<T>& values) {
+  if (values.size() != N) return false;
+  std::copy(values.begin(), values.end(), array.begin());
+  return true;
+}
+
+/// False where an array has the wrong length.
+bool get(ArchiveReader& in, Landmark& landmark) {
+  landmark.anchor_id = in.get<std::uint32_t>();
+  landmark.anchor_pixel = in.get_vector2();
+  landmark.disparity = in.get<double>();
+  landmark.variance = in.get<double>();
+  landmark.slant = in.get_vector2();
+  bool complete = fill(landmark.patch, in.get_array<std::uint16_t>());
+  landmark.pixel = in.get_vector2();
+  landmark.scale = in.get<float>();
+  landmark.angle = in.get<float>();
+  landmark.sign = in.get<std::int8_t>();
+  complete = fill(landmark.descriptor, in.get_array<std::int8_t>()) && complete;
+  landmark.missed_frames = in.get<std::int32_t>();
+  return complete;
+}
+
+tl::unexpected<Error> damaged(const std::string& what) {
+  return failure(ErrorCode::store_damaged, what, "odometry state", "start a new run instead of resuming this one");
+}
+
+}  // namespace
+
+Bytes OdometerMemory::save() const {
+  ArchiveWriter out;
+  out.put(kVersion);
+  out.put(started);
+  out.put(stamp.ns);
+  put(out, geometry);
+  out.put_array(last_motion.data(), 6);
+  out.put(velocity_span_s);
+  out.put(offset.value);
+  out.put(offset.variance);
+  out.put(map.next_anchor_id);
+  out.put(static_cast<std::uint32_t>(map.anchors.size()));
+  for (const Anchor& anchor : map.anchors) {
+    out.put(anchor.id);
+    out.put(anchor.latest_from_anchor);
+  }
+  out.put(static_cast<std::uint32_t>(map.landmarks.size()));
+  for (const Landmark& landmark : map.landmarks) put(out, landmark);
+  return out.take();
+}
+
+Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
+  ArchiveReader in(bytes);
+  if (const auto version = in.get<std::uint32_t>(); version != kVersion) {
+    return damaged("has version " + std::to_string(version) + ", version " + std::to_string(kVersion) + " is required");
+  }
+  OdometerMemory memory;
+  memory.started = in.get<bool>();
+  memory.stamp.ns = in.get<std::int64_t>();
+  memory.geometry = get_stereo(in);
+  const std::vector<double> motion = in.get_array<double>();
+  if (motion.size() != 6) return damaged("is damaged: the latest motion has not 6 entries");
+  std::copy(motion.begin(), motion.end(), memory.last_motion.data());
+  memory.velocity_span_s = in.get<double>();
+  memory.offset.value = in.get<double>();
+  memory.offset.variance = in.get<double>();
+  memory.map.next_anchor_id = in.get<std::uint32_t>();
+  const auto anchors = in.get<std::uint32_t>();
+  if (anchors > bytes.size()) return damaged("is damaged: more anchors than bytes");
+  for (std::uint32_t i = 0; i < anchors; ++i) {
+    Anchor anchor;
+    anchor.id = in.get<std::uint32_t>();
+    anchor.latest_from_anchor = in.get_pose();
+    memory.map.anchors.push_back(anchor);
+  }
+  const auto landmarks = in.get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < landmarks; ++i) {
+    Landmark landmark;
+    if (!get(in, landmark)) return damaged("is damaged: a patch or descriptor has the wrong length");
+    memory.map.landmarks.push_back(landmark);
+  }
+  if (Status status = in.finish("odometry state"); !status) return failure(status);
+  return memory;
+}
+
+}  // namespace spartan

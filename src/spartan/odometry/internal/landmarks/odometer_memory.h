@@ -1,0 +1,28 @@
+// The state that the odometry keeps from one frame to the next, and its serialization.
+#pragma once
+
+#include "spartan/core/archive.h"
+#include "spartan/core/pose.h"
+#include "spartan/core/result.h"
+#include "spartan/core/time.h"
+#include "spartan/odometry/internal/landmarks/landmark.h"
+#include "spartan/odometry/internal/motion_estimator.h"
+#include "spartan/rig/rectified_stereo.h"
+
+namespace spartan {
+
+struct OdometerMemory {
+  bool started = false;
+  Stamp stamp;  ///< of the latest frame
+  RectifiedStereo geometry;
+  Vector6d last_motion = Vector6d::Zero();  ///< Log of the latest measured previous_from_current, (m, rad)
+  double velocity_span_s = 0;               ///< duration of that motion; 0: none measured yet
+  DisparityOffset offset;                   ///< variance 0 before the first measured motion
+  LandmarkMemory map;
+
+  Bytes save() const;
+  /// Fails with code `store_damaged` where the bytes are of another version or damaged.
+  static Result<OdometerMemory> restore(const Bytes& bytes);
+};
+
+}  // namespace spartan

@@ -1,0 +1,72 @@
+#include "spartan/odometry/internal/landmarks/odometer_memory.h"
+
+#include <gtest/gtest.h>
+
+namespace spartan {
+namespace {
+
+OdometerMemory some_memory() {
+  OdometerMemory memory;
+  memory.started = true;
+  memory.stamp.ns = 1234567890123;
+  memory.geometry = {{640, 480}, 500, {319.5, 239.5}, 0.12};
+  memory.last_motion << 1, 2, 3, 0.1, 0.2, 0.3;
+  memory.velocity_span_s = 0.1;
+  memory.offset = {0.07, 0.001};
+  memory.map.next_anchor_id = 9;
+  memory.map.anchors = {{3, exp_se3(memory.last_motion)}, {8, Pose()}};
+  for (int i = 0; i < 3; ++i) {
+    Landmark l;
+    l.anchor_id = i == 0 ? 3 : 8;
+    l.anchor_pixel = {10.0 + i, 20};
+    l.disparity = 4.25 + i;
+    l.variance = 0.01;
+    l.slant = {0.1, -0.2};
+    l.patch.fill(static_cast<std::uint16_t>(1000 + i));
+    l.pixel = {11.5, 21.25};
+    l.descriptor[5] = static_cast<std::int8_t>(-i);
+    l.missed_frames = i;
+    memory.map.landmarks.push_back(l);
+  }
+  return memory;
+}
+
+TEST(OdometerMemory, RestoresWhatWasSaved) {
+  const Bytes bytes = some_memory().save();
+  const Result<OdometerMemory> restored = OdometerMemory::restore(bytes);
+  ASSERT_TRUE(restored.has_value()) << restored.error().message();
+  EXPECT_EQ(restored->save(), bytes);
+  EXPECT_EQ(restored->map.landmarks[2].patch[0], 1002);
+  EXPECT_EQ(restored->map.landmarks[2].disparity, 6.25);
+  EXPECT_EQ(restored->offset.value, 0.07);
+  EXPECT_EQ(restored->map.anchor(3).latest_from_anchor.translation(),
+            some_memory().map.anchors[0].latest_from_anchor.translation());
+}
+
+TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
+  const Bytes whole = some_memory().save();
+  Bytes other = whole;
+  other[0] = 99;
+  EXPECT_FALSE(OdometerMemory::restore(other).has_value());
+  for (std::size_t length = 0; length < whole.size(); length += 7) {
+    const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length));
+    const auto result = OdometerMemory::restore(cut);
+    ASSERT_FALSE(result.has_value()) << length;
+    EXPECT_EQ(result.error().code, ErrorCode::store_damaged);
+  }
+  Bytes longer = whole;
+  longer.push_back(0);
+  EXPECT_FALSE(OdometerMemory::restore(longer).has_value());
+}
+
+TEST(LandmarkMemory, DropsUnusedAnchors) {
+  LandmarkMemory memory = some_memory().map;
+  std::erase_if(memory.landmarks, [](const Landmark& l) { return l.anchor_id == 3; });
+  memory.drop_unused_anchors();
+  ASSERT_EQ(memory.anchors.size(), 1u);
+  EXPECT_EQ(memory.anchor(8).id, 8u);
+  EXPECT_THROW(memory.anchor(3), std::logic_error);
+}
+
+}  // namespace
+}  // namespace spartan

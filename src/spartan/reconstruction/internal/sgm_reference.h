@@ -1,0 +1,14 @@
+// The kernels of sgm_kernels.h in scalar C++: the reference of the tests, and the implementation on targets without
+// SIMD.
+#pragma once
+
+#include "spartan/reconstruction/internal/sgm_kernels.h"
+
+namespace spartan::sgm::reference {
+
+void census_row(const CensusRow& row);
+void cost_row(const CostRow& row);
+PathMinima pixel_paths(const PixelPaths& paths);
+Winner find_winner(std::uint16_t* sums, int count, int padded);
+
+}  // namespace spartan::sgm::reference

@@ -1,0 +1,17 @@
+#include "spartan/sim/internal/drive/drive_corridor.h"
+
+#include <cmath>
+
+namespace spartan::sim {
+
+DriveCorridor::DriveCorridor(const std::vector<PlanarPose>& track, double half_width_m) : half_width_m_(half_width_m) {
+  for (const PlanarPose& p : track) track_.add(p.x, p.y, p);
+}
+
+bool DriveCorridor::intersects_disc(double x, double y, double radius_m) const {
+  const double reach = half_width_m_ + radius_m;
+  return track_.any_near(Region{x, y, x, y}.grown(reach),
+                         [&](const PlanarPose& p) { return std::hypot(p.x - x, p.y - y) < reach; });
+}
+
+}  // namespace spartan::sim

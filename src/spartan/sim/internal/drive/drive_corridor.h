@@ -1,0 +1,26 @@
+// The strip of ground along the path that the rover's wheels and belly need.
+#pragma once
+
+#include <vector>
+
+#include "spartan/sim/path.h"
+#include "spartan/sim/internal/world/spatial_hash.h"
+
+namespace spartan::sim {
+
+/// The points within a distance of the track.
+class DriveCorridor {
+ public:
+  /// An empty corridor.
+  DriveCorridor() = default;
+  DriveCorridor(const std::vector<PlanarPose>& track, double half_width_m);
+
+  /// Whether a disc overlaps the corridor.
+  bool intersects_disc(double x, double y, double radius_m) const;
+
+ private:
+  double half_width_m_ = 0;
+  SpatialHash<PlanarPose> track_;
+};
+
+}  // namespace spartan::sim

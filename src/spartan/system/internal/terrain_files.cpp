@@ -1,0 +1,53 @@
+#include "spartan/system/internal/terrain_files.h"
+
+#include <cmath>
+
+#include "spartan/core/image_io.h"
+#include "spartan/reconstruction/disparity_rendering.h"
+#include "spartan/reconstruction/point_cloud.h"
+
+namespace spartan {
+namespace {
+
+constexpr double kDisparityStep = 0.3;  // px, the accuracy that the published rig is laid out for
+
+std::string stem(const std::string& folder, Stamp stamp) {
+  return folder + "/" + std::to_string(stamp.ns);
+}
+
+double known_percent(ImageView<const float> disparity) {
+  std::int64_t known = 0;
+  for (int y = 0; y < disparity.height(); ++y) {
+    for (int x = 0; x < disparity.width(); ++x) known += !std::isnan(disparity(x, y));
+  }
+  return 100.0 * static_cast<double>(known) / (static_cast<double>(disparity.width()) * disparity.height());
+}
+
+}  // namespace
+
+Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, const std::string& folder) {
+  const std::string path = stem(folder, view.pair.stamp);
+  // Δz / z = c / d: a share of the range is a bound on the disparity.
+  const double smallest = kDisparityStep / options.largest_range_error;
+  const PointCloud cloud = to_point_cloud(view.disparity, view.pair.left, view.pair.geometry, view.world_from_left,
+                                          options.point_step_px, smallest);
+  if (Status s = write_pfm(path + ".pfm", view.disparity); !s) return failure(s);
+  if (Status s = write_png(path + ".png", colour_disparity(view.disparity)); !s) return failure(s);
+  if (Status s = write_ply(path + ".ply", cloud); !s) return failure(s);
+  return TerrainRecord{view.pair.stamp, view.pair.pair, known_percent(view.disparity),
+                       static_cast<std::int64_t>(cloud.size())};
+}
+
+Status merge_terrain_clouds(const std::string& folder, const std::vector<TerrainRecord>& terrain,
+                            const std::string& path) {
+  if (terrain.empty()) return failure(ErrorCode::input, "holds no terrain", folder, "run without --odometry-only");
+  PointCloud all;
+  for (const TerrainRecord& record : terrain) {
+    const auto cloud = read_ply(stem(folder, record.stamp) + ".ply");
+    if (!cloud) return failure(cloud);
+    all.insert(all.end(), cloud->begin(), cloud->end());
+  }
+  return write_ply(path, all);
+}
+
+}  // namespace spartan
