@@ -260,7 +260,7 @@ void YamlErrors::add(const std::string& key, const std::string& what) {
   errors_.push_back({has_lines_ ? line_of(key) : 0, fmt::format("{}: {}", location(key), what)});
 }
 
-bool YamlErrors::touches(const std::string& key) const {
+bool YamlErrors::has_error_near(const std::string& key) const {
   return std::any_of(keys_.begin(), keys_.end(),
                      [&](const std::string& other) { return contains_key(other, key) || contains_key(key, other); });
 }

@@ -81,7 +81,7 @@ class YamlErrors {
   /// Adds the error "name:line: key: what".
   void add(const std::string& key, const std::string& what);
   /// Whether the key, a key inside it or a group around it has an error.
-  bool touches(const std::string& key) const;
+  bool has_error_near(const std::string& key) const;
   /// All errors in one of code `configuration`, in the order of their lines, at most 50 of them.
   Status status(const std::string& hint = {}) const;
   const std::string& name() const { return name_; }

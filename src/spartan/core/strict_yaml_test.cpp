@@ -155,10 +155,10 @@ TEST(YamlErrors, AreSortedByLineAndLimited) {
   errors.add("", "general");
   EXPECT_EQ(errors.status("a hint").error().message(),
             "a.yaml:1: general\na.yaml:2: a: first\na.yaml:7: b.inner.key: second (a hint)");
-  EXPECT_TRUE(errors.touches("b"));
-  EXPECT_TRUE(errors.touches("b.inner"));
-  EXPECT_TRUE(errors.touches("a.further"));
-  EXPECT_FALSE(YamlErrors("a.yaml").touches("a"));
+  EXPECT_TRUE(errors.has_error_near("b"));
+  EXPECT_TRUE(errors.has_error_near("b.inner"));
+  EXPECT_TRUE(errors.has_error_near("a.further"));
+  EXPECT_FALSE(YamlErrors("a.yaml").has_error_near("a"));
   for (int i = 0; i < 100; ++i) errors.add("c", "more");
   EXPECT_THAT(errors.status().error().message(), HasSubstr("\na.yaml: and 53 more errors"));
 }
