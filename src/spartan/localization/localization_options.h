@@ -8,202 +8,370 @@
 
 namespace spartan {
 
-/// White noise by density, biases by their standard deviation at the start and a random walk.
+/// Noise of the IMU as of an Allan deviation: white noise by density, biases by their initial standard deviation and a
+/// random walk.
 struct InertialOptions {
-  double gyro_noise_rad_s_sqrt_hz = 1.2e-4;
-  double gyro_bias_rad_s = 2e-4;
-  double gyro_walk_rad_s2_sqrt_hz = 3e-6;
-  double accel_noise_m_s2_sqrt_hz = 1.5e-3;
-  double accel_bias_m_s2 = 0.02;
-  double accel_walk_m_s3_sqrt_hz = 1e-4;
-  double timeout_s = 0.25;
-  double frozen_s = 0.5;
-  double level_after_s = 1.0;
-  double still_gyro_rad_s = 0.004;
-  double still_accel_m_s2 = 0.03;
+  double gyro_noise_rad_s_sqrt_hz = 1.2e-4;  ///< rad/s/√Hz, white noise of the gyro
+  double gyro_bias_rad_s = 2e-4;             ///< rad/s, initial standard deviation of the gyro bias
+  double gyro_walk_rad_s2_sqrt_hz = 3e-6;    ///< rad/s²/√Hz, random walk of the gyro bias
+  double accel_noise_m_s2_sqrt_hz = 1.5e-3;  ///< m/s²/√Hz, white noise of the accelerometer
+  double accel_bias_m_s2 = 0.02;             ///< m/s², initial standard deviation of the accelerometer bias
+  double accel_walk_m_s3_sqrt_hz = 1e-4;     ///< m/s³/√Hz, random walk of the accelerometer bias
+  double timeout_s = 0.25;                   ///< s, longest gap that is integrated over
+  double frozen_s = 0.5;                     ///< s, identical readings for this long exclude the IMU
+  double alignment_s = 1.0;                  ///< s, gravity alignment of an IMU that starts during the drive
+  double stationary_gyro_rad_s = 0.004;      ///< rad/s, threshold on scatter and mean rate of a stationary gyro
+  double stationary_accel_m_s2 = 0.03;       ///< m/s², threshold on the scatter of a stationary accelerometer
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("gyro_noise_rad_s_sqrt_hz", gyro_noise_rad_s_sqrt_hz, "white noise, density", between(1e-8, 1));
-    v.field("gyro_bias_rad_s", gyro_bias_rad_s, "standard deviation of the bias at the start", between(0, 1));
-    v.field("gyro_walk_rad_s2_sqrt_hz", gyro_walk_rad_s2_sqrt_hz, "random walk of the bias", between(0, 1));
-    v.field("accel_noise_m_s2_sqrt_hz", accel_noise_m_s2_sqrt_hz, "white noise, density", between(1e-8, 10));
-    v.field("accel_bias_m_s2", accel_bias_m_s2, "standard deviation of the bias at the start", between(0, 10));
-    v.field("accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz, "random walk of the bias", between(0, 10));
-    v.field("timeout_s", timeout_s, "a longer gap between samples is not bridged by them", between(1e-3, 10));
-    v.field("frozen_s", frozen_s, "the same reading for so long: the sensor has frozen", between(0.01, 100));
-    v.field("level_after_s", level_after_s, "an IMU that starts during the drive finds gravity over so long",
+    v.field(
+        "gyro_noise_rad_s_sqrt_hz", gyro_noise_rad_s_sqrt_hz,
+        "White noise density of the gyro, in rad/s/sqrt(Hz); raising it makes the attitude follow vision more and the "
+        "gyro less.",
+        between(1e-8, 1));
+    v.field("gyro_bias_rad_s", gyro_bias_rad_s,
+            "Standard deviation of the gyro bias at the start, in rad/s; raising it lets the first seconds estimate a "
+            "larger bias.",
+            between(0, 1));
+    v.field("gyro_walk_rad_s2_sqrt_hz", gyro_walk_rad_s2_sqrt_hz,
+            "Random walk of the gyro bias, in rad/s^2/sqrt(Hz); raising it lets the estimated bias change faster.",
+            between(0, 1));
+    v.field(
+        "accel_noise_m_s2_sqrt_hz", accel_noise_m_s2_sqrt_hz,
+        "White noise density of the accelerometer, in m/s^2/sqrt(Hz); raising it makes velocity and tilt follow the "
+        "other sensors more.",
+        between(1e-8, 10));
+    v.field("accel_bias_m_s2", accel_bias_m_s2,
+            "Standard deviation of the accelerometer bias at the start, in m/s^2; raising it makes the direction of "
+            "gravity less certain.",
+            between(0, 10));
+    v.field(
+        "accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz,
+        "Random walk of the accelerometer bias, in m/s^3/sqrt(Hz); raising it lets the estimated bias change faster.",
+        between(0, 10));
+    v.field("timeout_s", timeout_s,
+            "Longest gap between two IMU samples that is integrated over, in seconds; beyond it the constant-velocity "
+            "model takes over.",
+            between(1e-3, 10));
+    v.field(
+        "frozen_s", frozen_s,
+        "Identical IMU readings for this many seconds exclude the IMU as frozen; raise it for sensors with a coarse "
+        "resolution.",
+        between(0.01, 100));
+    v.renamed("level_after_s", "alignment_s");
+    v.field("alignment_s", alignment_s,
+            "An IMU that starts during the drive is aligned to gravity by its mean over this many seconds; raising it "
+            "averages out more of the rover's accelerations.",
             between(0.1, 100));
-    v.field("still_gyro_rad_s", still_gyro_rad_s, "scatter below which the rover may be standing", between(0, 1));
-    v.field("still_accel_m_s2", still_accel_m_s2, "scatter below which the rover may be standing", between(0, 10));
+    v.renamed("still_gyro_rad_s", "stationary_gyro_rad_s");
+    v.field("stationary_gyro_rad_s", stationary_gyro_rad_s,
+            "Gyro scatter and mean rate below which the rover may be stationary, in rad/s; raising it triggers "
+            "zero-velocity updates more easily.",
+            between(0, 1));
+    v.renamed("still_accel_m_s2", "stationary_accel_m_s2");
+    v.field(
+        "stationary_accel_m_s2", stationary_accel_m_s2,
+        "Accelerometer scatter below which the rover may be stationary, in m/s^2; raising it triggers zero-velocity "
+        "updates more easily.",
+        between(0, 10));
   }
 };
 
-/// The error of a visual motion is L n + D z: white noise of the stated covariance times `white_factor`, and a lasting
-/// part z in units of the stated standard deviations D, slowly changing and constant (docs/math/localization.md,
-/// "Vision").
+/// The error of a visual motion is L n + D z: white noise n of the measured covariance times `white_factor`, and a
+/// lasting error z in units of the measured standard deviations D, with a slowly changing and a constant part
+/// (docs/math/localization.md, "Vision").
 struct VisionOptions {
-  double white_factor = 1.1;
+  double white_factor = 1.1;  ///< factor on the covariance of visual motions
+  /// Standard deviations of the slowly changing error (Gauss–Markov), in measured standard deviations: x, y, z, about
+  /// x, y, z.
   std::vector<double> drift_sigmas{0.85, 0.61, 0.33, 0.57, 0.46, 0.35};
-  double drift_steps = 57;
+  double drift_steps = 57;  ///< frames, correlation length of that error
+  /// The same of the error that is constant over a drive.
   std::vector<double> constant_sigmas{1.05, 0.76, 0.4, 0.7, 0.57, 0.42};
-  double gate_probability = 0.999999;
+  double gate_probability = 0.999999;  ///< fraction of correct motions that pass the chi-square test
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("white_factor", white_factor, "on the stated covariance, for errors that differ from shot to shot",
-            between(0.01, 1e4));
+    v.field(
+        "white_factor", white_factor,
+        "Factor on the covariance of visual motions, for errors that are independent from frame to frame; raising it "
+        "trusts vision less.",
+        between(0.01, 1e4));
     v.field("drift_sigmas", drift_sigmas,
-            "standard deviation of the errors that last for a while, over the stated ones: x, y, z, about x, y, z",
+            "Standard deviations of the slowly changing error of vision along x, y, z and about x, y, z, in standard "
+            "deviations of a visual motion; raising them makes the covariance of the pose grow faster.",
             between(0, 1e3), Length{6});
-    v.field("drift_steps", drift_steps, "after so many shots such an error has fallen to 1/e", between(1, 1e6));
-    v.field("constant_sigmas", constant_sigmas, "the same of the errors that stay for the whole drive", between(0, 1e3),
-            Length{6});
-    v.field("gate_probability", gate_probability, "share of good motions that the test lets pass",
+    v.field(
+        "drift_steps", drift_steps,
+        "Correlation length of that error in frames: it falls to 1/e after so many; raising it makes the error last "
+        "longer.",
+        between(1, 1e6));
+    v.field("constant_sigmas", constant_sigmas,
+            "Standard deviations of the error of vision that is constant over a drive, axes and unit as drift_sigmas; "
+            "raising them makes the covariance of the pose grow faster.",
+            between(0, 1e3), Length{6});
+    v.field("gate_probability", gate_probability,
+            "Fraction of correct visual motions that pass the chi-square test; raising it rejects fewer motions.",
             between(0.5, 1 - 1e-12));
   }
 };
 
 struct WheelOdometryOptions {
-  double track_m = 0.6;
-  double scale_sigma = 0.1;
-  double scale_walk_sqrt_hz = 0.005;
-  double forward_share = 0.12;
-  double side_share = 0.2;
-  double up_share = 0.3;
-  double turn_share = 0.3;
-  double floor_m = 0.002;
-  double longest_step_s = 2.5;
-  double least_slip_distance_m = 0.02;
+  double track_m = 0.6;               ///< m, between left and right wheels; 0: no rotation from the wheels
+  double scale_sigma = 0.1;           ///< initial standard deviation of travelled over counted distance
+  double scale_walk_sqrt_hz = 0.005;  ///< 1/√Hz, random walk of that scale
+  double forward_share = 0.12;        ///< standard deviation of a step forward, over its length
+  double side_share = 0.2;            ///< standard deviation of a step to the side, over its length
+  double up_share = 0.3;              ///< standard deviation of a step along the body's z, over its length
+  double turn_share = 0.3;            ///< standard deviation of a step's rotation, over that rotation
+  double min_sigma_m = 0.002;         ///< m, minimum standard deviation of a step
+  double max_step_s = 2.5;            ///< s, longest step
+  double min_slip_distance_m = 0.02;  ///< m, shortest step that slip is reported for
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("track_m", track_m, "between left and right wheels; 0: turns are not taken from them", between(0, 10));
-    v.field("scale_sigma", scale_sigma, "of travelled over counted distance (radius, mean slip)", between(0, 1));
-    v.field("scale_walk_sqrt_hz", scale_walk_sqrt_hz, "how it changes", between(0, 1));
-    v.field("forward_share", forward_share, "slip that differs from that of the mean, of the distance", between(0, 1));
-    v.field("side_share", side_share, "motion to the side, of the distance", between(0, 10));
-    v.field("up_share", up_share, "motion along the body's vertical, of the distance", between(0, 10));
-    v.field("turn_share", turn_share, "error of a turn, of the turn", between(0, 10));
-    v.field("floor_m", floor_m, "least standard deviation of a step", between(1e-6, 1));
-    v.field("longest_step_s", longest_step_s, "a step ends with a shot, or after so long", between(0.1, 100));
-    v.field("least_slip_distance_m", least_slip_distance_m, "slip is stated for steps of this length",
-            between(1e-3, 10));
+    v.field(
+        "track_m", track_m,
+        "Distance between left and right wheels in meters, from which rotations follow; 0 ignores the rotation that "
+        "the wheels measure.",
+        between(0, 10));
+    v.field("scale_sigma", scale_sigma,
+            "Standard deviation at the start of travelled over counted distance (wheel radius, mean slip); raising it "
+            "lets the scale be estimated farther from 1.",
+            between(0, 1));
+    v.field("scale_walk_sqrt_hz", scale_walk_sqrt_hz,
+            "Random walk of that scale, in 1/sqrt(Hz); raising it lets the scale follow changing soil faster.",
+            between(0, 1));
+    v.field("forward_share", forward_share,
+            "Standard deviation of a step's length as a fraction of it (slip beyond the mean); raising it trusts the "
+            "wheels less and detects slip later.",
+            between(0, 1));
+    v.field(
+        "side_share", side_share,
+        "Standard deviation of motion to the side as a fraction of the step's length; raising it allows more lateral "
+        "slip.",
+        between(0, 10));
+    v.field(
+        "up_share", up_share,
+        "Standard deviation of motion along the body's z axis as a fraction of the step's length; raising it allows "
+        "for rougher ground.",
+        between(0, 10));
+    v.field("turn_share", turn_share,
+            "Standard deviation of a step's rotation as a fraction of it; raising it trusts the rotation by the wheels "
+            "less.",
+            between(0, 10));
+    v.renamed("floor_m", "min_sigma_m");
+    v.field("min_sigma_m", min_sigma_m,
+            "Minimum standard deviation of a step in meters; raising it lowers the weight of short steps.",
+            between(1e-6, 1));
+    v.renamed("longest_step_s", "max_step_s");
+    v.field("max_step_s", max_step_s,
+            "Longest step of the wheels in seconds where no frame ends it; raising it gives fewer updates over longer "
+            "steps.",
+            between(0.1, 100));
+    v.renamed("least_slip_distance_m", "min_slip_distance_m");
+    v.field(
+        "min_slip_distance_m", min_slip_distance_m,
+        "Minimum length of a step in meters for which slip is reported; raising it gives fewer but more accurate slip "
+        "values.",
+        between(1e-3, 10));
   }
 };
 
 struct HeadingOptions {
-  double least_sigma_rad = 0.002;
-  double offset_sigma_rad = 0.003;
-  double offset_walk_rad_sqrt_hz = 1.5e-4;
+  double min_sigma_rad = 0.002;             ///< rad, minimum standard deviation of a reading
+  double offset_sigma_rad = 0.003;          ///< rad, change of the offset between start and drive
+  double offset_walk_rad_sqrt_hz = 1.5e-4;  ///< rad/√Hz, random walk of the offset
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("least_sigma_rad", least_sigma_rad, "of a reading, whatever it says itself", between(1e-6, 1));
-    v.field("offset_sigma_rad", offset_sigma_rad, "of what changes between start and drive", between(0, 1));
-    v.field("offset_walk_rad_sqrt_hz", offset_walk_rad_sqrt_hz, "random walk of the bias", between(0, 1));
+    v.renamed("least_sigma_rad", "min_sigma_rad");
+    v.field("min_sigma_rad", min_sigma_rad,
+            "Minimum standard deviation of a compass reading in radians, whatever the reading specifies; raising it "
+            "trusts the compass less.",
+            between(1e-6, 1));
+    v.field(
+        "offset_sigma_rad", offset_sigma_rad,
+        "Standard deviation in radians of the change of the compass offset between start and drive; raising it lets "
+        "the offset be estimated farther from its initial value.",
+        between(0, 1));
+    v.field("offset_walk_rad_sqrt_hz", offset_walk_rad_sqrt_hz,
+            "Random walk of the compass offset, in rad/sqrt(Hz); raising it lets the offset change faster.",
+            between(0, 1));
   }
 };
 
 struct TiltOptions {
-  double noise_factor = 1.0;
-  double least_sigma_rad = 0.0005;
-  double bias_rad = 0.0025;
-  double bias_walk_rad_sqrt_hz = 1e-5;
+  double noise_factor = 1.0;            ///< factor on the specified standard deviation of a reading
+  double min_sigma_rad = 0.0005;        ///< rad, minimum standard deviation of a reading
+  double bias_rad = 0.0025;             ///< rad, initial standard deviation of the bias
+  double bias_walk_rad_sqrt_hz = 1e-5;  ///< rad/√Hz, random walk of the bias
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("noise_factor", noise_factor, "on the stated standard deviation, for one that feels accelerations too",
+    v.field("noise_factor", noise_factor,
+            "Factor on the specified standard deviation of inclinometer readings; raise it for an inclinometer that is "
+            "sensitive to accelerations.",
             between(0.1, 100));
-    v.field("least_sigma_rad", least_sigma_rad, "of a reading, whatever it says itself", between(1e-6, 1));
-    v.field("bias_rad", bias_rad, "standard deviation of the bias", between(0, 1));
-    v.field("bias_walk_rad_sqrt_hz", bias_walk_rad_sqrt_hz, "random walk of the bias", between(0, 1));
+    v.renamed("least_sigma_rad", "min_sigma_rad");
+    v.field(
+        "min_sigma_rad", min_sigma_rad,
+        "Minimum standard deviation of an inclinometer reading in radians, whatever the reading specifies; raising it "
+        "trusts the inclinometer less.",
+        between(1e-6, 1));
+    v.field("bias_rad", bias_rad,
+            "Standard deviation of the inclinometer bias at the start, in radians; raising it makes absolute tilt less "
+            "certain.",
+            between(0, 1));
+    v.field("bias_walk_rad_sqrt_hz", bias_walk_rad_sqrt_hz,
+            "Random walk of the inclinometer bias, in rad/sqrt(Hz); raising it lets the bias change faster.",
+            between(0, 1));
   }
 };
 
-struct StandingStillOptions {
-  bool enabled = true;
-  double block_s = 0.5;
-  double wheels_still_s = 1.0;
-  double wheels_still_m = 0.001;
-  double position_m = 5e-4;
-  double attitude_rad = 2e-4;
+/// Zero-velocity updates (ZUPT).
+struct ZeroVelocityOptions {
+  bool enabled = true;                 ///< whether zero-velocity updates are applied
+  double block_s = 0.5;                ///< s, interval over which the scatter of the IMU is computed
+  double wheels_stationary_s = 1.0;    ///< s, minimum time without wheel motion
+  double wheels_stationary_m = 0.001;  ///< m, change of a wheel count that is no motion
+  double position_sigma_m = 5e-4;      ///< m, standard deviation of the position of a stationary rover
+  double attitude_sigma_rad = 2e-4;    ///< rad, standard deviation of the attitude of a stationary rover
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("enabled", enabled, "hold the pose while IMU and wheels (or vision) say that the rover stands");
-    v.field("block_s", block_s, "over which the IMU's scatter is taken", between(0.05, 10));
-    v.field("wheels_still_s", wheels_still_s, "the wheels must have stood for so long", between(0, 100));
-    v.field("wheels_still_m", wheels_still_m, "a count that changes by less stands", between(0, 1));
-    v.field("position_m", position_m, "how still a standing rover is", between(1e-7, 1));
-    v.field("attitude_rad", attitude_rad, "how still a standing rover is", between(1e-8, 1));
+    v.field("enabled", enabled,
+            "Apply zero-velocity updates while IMU and wheels (or, without wheels, vision) detect a stationary rover; "
+            "false disables them.");
+    v.field(
+        "block_s", block_s,
+        "Interval over which the scatter of the IMU is computed, in seconds; raising it detects stops later and more "
+        "reliably.",
+        between(0.05, 10));
+    v.renamed("wheels_still_s", "wheels_stationary_s");
+    v.field(
+        "wheels_stationary_s", wheels_stationary_s,
+        "Minimum time without wheel motion before a zero-velocity update, in seconds; raising it detects stops later.",
+        between(0, 100));
+    v.renamed("wheels_still_m", "wheels_stationary_m");
+    v.field(
+        "wheels_stationary_m", wheels_stationary_m,
+        "Change of a wheel count in meters up to which the wheel counts as stationary; raise it for coarse encoders.",
+        between(0, 1));
+    v.renamed("position_m", "position_sigma_m");
+    v.field("position_sigma_m", position_sigma_m,
+            "Standard deviation of a zero-velocity update's position in meters; raising it holds the position less "
+            "firmly.",
+            between(1e-7, 1));
+    v.renamed("attitude_rad", "attitude_sigma_rad");
+    v.field("attitude_sigma_rad", attitude_sigma_rad,
+            "Standard deviation of a zero-velocity update's attitude in radians; raising it holds the attitude less "
+            "firmly.",
+            between(1e-8, 1));
   }
 };
 
-/// Without an IMU the rover is taken to keep its velocity in the body frame. Densities grow with speed, so that the
-/// same options serve a rover and a car: σ = share · (|v| + floor).
-struct UnmeasuredMotionOptions {
-  double speed_share_sqrt_hz = 0.5;
-  double speed_floor_m_s = 0.05;
-  double turn_share = 0.5;
-  double turn_floor_rad_s = 0.008;
+/// Constant-velocity model for times without an IMU: velocity and angular rate are constant in the body frame. Noise
+/// densities grow with speed, so that one set of options serves a rover and a car: σ = share · (|v| + floor).
+struct ConstantVelocityOptions {
+  double speed_share_sqrt_hz = 0.5;  ///< 1/√Hz, noise density of the velocity over the speed
+  double speed_floor_m_s = 0.05;     ///< m/s, added to the speed
+  double turn_share = 0.5;           ///< error of the last angular rate over that rate
+  double turn_floor_rad_s = 0.008;   ///< rad/s, added to the rate
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("speed_share_sqrt_hz", speed_share_sqrt_hz, "change of velocity in a second, of the speed",
+    v.field("speed_share_sqrt_hz", speed_share_sqrt_hz,
+            "Noise density of the velocity as a fraction of the speed, in 1/sqrt(Hz); raising it makes predictions "
+            "without an IMU less certain.",
             between(0, 100));
-    v.field("speed_floor_m_s", speed_floor_m_s, "the speed counts as so much more", between(0, 100));
-    v.field("turn_share", turn_share, "error of the last rate, of the rate", between(0, 100));
-    v.field("turn_floor_rad_s", turn_floor_rad_s, "the rate counts as so much more", between(0, 100));
+    v.field("speed_floor_m_s", speed_floor_m_s,
+            "Speed in m/s that is added before speed_share_sqrt_hz applies; raising it makes predictions at low speed "
+            "less certain.",
+            between(0, 100));
+    v.field("turn_share", turn_share,
+            "Error of the last angular rate as a fraction of it; raising it makes the predicted attitude less certain.",
+            between(0, 100));
+    v.field("turn_floor_rad_s", turn_floor_rad_s,
+            "Angular rate in rad/s that is added before turn_share applies; raise it for a rover that rocks more.",
+            between(0, 100));
   }
 };
 
+/// Gating and timeouts of the sensors.
 struct HealthOptions {
-  double gate_probability = 0.999;
-  int excluded_after = 3;
-  int back_after = 5;
-  double vision_timeout_s = 10;
-  double wheels_timeout_s = 2;
-  double compass_timeout_s = 10;
-  double inclinometer_timeout_s = 5;
+  double gate_probability = 0.999;    ///< fraction of correct samples that pass the chi-square tests
+  int excluded_after = 3;             ///< consecutive rejections that exclude a sensor
+  int readmit_after = 5;              ///< consecutive consistent samples that readmit it
+  double vision_timeout_s = 10;       ///< s
+  double wheels_timeout_s = 2;        ///< s
+  double compass_timeout_s = 10;      ///< s
+  double inclinometer_timeout_s = 5;  ///< s
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("gate_probability", gate_probability, "share of good samples that the chi-square tests let pass",
-            between(0.5, 1 - 1e-12));
-    v.field("excluded_after", excluded_after, "so many refusals in a row exclude a sensor", between(1, 1000));
-    v.field("back_after", back_after, "so many samples in a row that fit bring it back", between(1, 1000));
-    v.field("vision_timeout_s", vision_timeout_s, "silence that counts as missing", between(0.01, 1e4));
-    v.field("wheels_timeout_s", wheels_timeout_s, "silence that counts as missing", between(0.01, 1e4));
-    v.field("compass_timeout_s", compass_timeout_s, "silence that counts as missing", between(0.01, 1e4));
-    v.field("inclinometer_timeout_s", inclinometer_timeout_s, "silence that counts as missing", between(0.01, 1e4));
+    v.field(
+        "gate_probability", gate_probability,
+        "Fraction of correct samples that pass the chi-square tests of wheels, compass, inclinometer and map; raising "
+        "it rejects fewer samples.",
+        between(0.5, 1 - 1e-12));
+    v.field("excluded_after", excluded_after,
+            "Number of consecutive rejections that exclude a sensor; raising it tolerates longer outliers.",
+            between(1, 1000));
+    v.renamed("back_after", "readmit_after");
+    v.field("readmit_after", readmit_after,
+            "Number of consecutive consistent samples that readmit an excluded sensor; raising it readmits later.",
+            between(1, 1000));
+    v.field(
+        "vision_timeout_s", vision_timeout_s,
+        "Seconds without visual motions after which vision is reported as missing; raising it reports outages later.",
+        between(0.01, 1e4));
+    v.field(
+        "wheels_timeout_s", wheels_timeout_s,
+        "Seconds without samples after which the wheels are reported as missing and no longer needed for zero-velocity "
+        "updates.",
+        between(0.01, 1e4));
+    v.field("compass_timeout_s", compass_timeout_s,
+            "Seconds without samples after which the compass is reported as missing; raising it reports outages later.",
+            between(0.01, 1e4));
+    v.field("inclinometer_timeout_s", inclinometer_timeout_s,
+            "Seconds without samples after which the inclinometer is reported as missing; raising it reports outages "
+            "later.",
+            between(0.01, 1e4));
   }
 };
 
 struct LocalizationOptions {
-  double gravity_m_s2 = 9.81;  ///< of the planet; whoever makes a Localizer knows it
-  double buffer_s = 15;
-  double map_factor = 1;
+  double gravity_m_s2 = 9.81;  ///< m/s², of the planet; not in files: the creator of a Localizer sets it
+  double buffer_s = 15;        ///< s, samples that arrive later are refused
+  double map_factor = 1;       ///< factor on the covariance of map constraints
   InertialOptions imu;
   VisionOptions vision;
   WheelOdometryOptions wheels;
   HeadingOptions compass;
   TiltOptions inclinometer;
-  StandingStillOptions standing;
-  UnmeasuredMotionOptions unmeasured;
+  ZeroVelocityOptions zero_velocity;
+  ConstantVelocityOptions constant_velocity;
   HealthOptions health;
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("buffer_s", buffer_s, "samples that come later than this are refused", between(0, 600));
-    v.field("map_factor", map_factor, "on the covariance of map constraints", between(0.01, 1e4));
+    v.field("buffer_s", buffer_s,
+            "Samples that arrive more than this many seconds late are refused; raising it costs memory and the time to "
+            "replay.",
+            between(0, 600));
+    v.field("map_factor", map_factor, "Factor on the covariance of map constraints; raising it trusts the map less.",
+            between(0.01, 1e4));
     v.group("imu", imu);
     v.group("vision", vision);
     v.group("wheels", wheels);
     v.group("compass", compass);
     v.group("inclinometer", inclinometer);
-    v.group("standing", standing);
-    v.group("unmeasured", unmeasured);
+    v.renamed("standing", "zero_velocity");
+    v.group("zero_velocity", zero_velocity);
+    v.renamed("unmeasured", "constant_velocity");
+    v.group("constant_velocity", constant_velocity);
     v.group("health", health);
   }
 };
@@ -211,14 +379,14 @@ struct LocalizationOptions {
 /// Replaces defaults by the noise that a recording specifies for its sensors. Kept are values whose keys were given (in
 /// a config file or with --set; `given` holds keys of LocalizationOptions), even where they are the default, and values
 /// that differ from the default (set in code).
-inline LocalizationOptions with_specified_noise(LocalizationOptions options, const SensorNoise& stated,
+inline LocalizationOptions with_specified_noise(LocalizationOptions options, const SensorNoise& specified,
                                                 const GivenKeys& given = {}) {
   const LocalizationOptions defaults;
   const auto take = [&](const char* key, double& value, double by_default, double by_recording) {
     if (!given.contains(key) && value == by_default && by_recording > 0) value = by_recording;
   };
   const auto take_imu = [&](const char* key, double InertialOptions::*ours, double ImuNoise::*theirs) {
-    take(key, options.imu.*ours, defaults.imu.*ours, stated.imu.*theirs);
+    take(key, options.imu.*ours, defaults.imu.*ours, specified.imu.*theirs);
   };
   take_imu("imu.gyro_noise_rad_s_sqrt_hz", &InertialOptions::gyro_noise_rad_s_sqrt_hz,
            &ImuNoise::gyro_noise_rad_s_sqrt_hz);
@@ -231,11 +399,11 @@ inline LocalizationOptions with_specified_noise(LocalizationOptions options, con
   take_imu("imu.accel_walk_m_s3_sqrt_hz", &InertialOptions::accel_walk_m_s3_sqrt_hz,
            &ImuNoise::accel_walk_m_s3_sqrt_hz);
   take("compass.offset_walk_rad_sqrt_hz", options.compass.offset_walk_rad_sqrt_hz,
-       defaults.compass.offset_walk_rad_sqrt_hz, stated.compass.offset_walk_rad_sqrt_hz);
+       defaults.compass.offset_walk_rad_sqrt_hz, specified.compass.offset_walk_rad_sqrt_hz);
   take("inclinometer.bias_rad", options.inclinometer.bias_rad, defaults.inclinometer.bias_rad,
-       stated.inclinometer.bias_rad);
+       specified.inclinometer.bias_rad);
   take("inclinometer.bias_walk_rad_sqrt_hz", options.inclinometer.bias_walk_rad_sqrt_hz,
-       defaults.inclinometer.bias_walk_rad_sqrt_hz, stated.inclinometer.bias_walk_rad_sqrt_hz);
+       defaults.inclinometer.bias_walk_rad_sqrt_hz, specified.inclinometer.bias_walk_rad_sqrt_hz);
   return options;
 }
 

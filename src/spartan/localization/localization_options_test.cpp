@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(LocalizationOptions, WhatIsStatedStandsInThePlaceOfTheDefault) {
+TEST(LocalizationOptions, SpecifiedNoiseReplacesDefaults) {
   const LocalizationOptions defaults;
   const LocalizationOptions all = with_specified_noise(defaults, {{1, 2, 3, 4, 5, 6}, {7}, {8, 9}});
   EXPECT_EQ(all.imu.gyro_noise_rad_s_sqrt_hz, 1);

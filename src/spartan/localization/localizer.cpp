@@ -18,7 +18,7 @@ struct Localizer::State {
   bool add(const Measurement& m) {
     std::optional<Refusal> refusal;
     const auto* motion = std::get_if<RelativeMotion>(&m);
-    if (!is_sound(m)) {
+    if (!is_valid(m)) {
       refusal = Refusal::not_finite;
     } else if (motion != nullptr && motion->to <= motion->from) {
       refusal = Refusal::reversed;
@@ -44,7 +44,7 @@ struct Localizer::State {
       case LocalizationSensor::map:
         break;
     }
-    return std::numeric_limits<double>::infinity();  // the map speaks when it has something to say
+    return std::numeric_limits<double>::infinity();  // map constraints come irregularly
   }
 
   LocalizationOptions options;
@@ -75,8 +75,8 @@ bool Localizer::reaches(Stamp stamp) const {
 
 LocalizationEstimate Localizer::estimate() const {
   const FilterMemory& m = state_->filter.filter().memory();
-  const NavigationState& s = m.belief.state;
-  const ErrorCovariance& p = m.belief.covariance;
+  const NavigationState& s = m.estimate.state;
+  const ErrorCovariance& p = m.estimate.covariance;
   LocalizationEstimate e;
   e.stamp = m.stamp;
   e.world_from_body = {s.world_from_body, p.block<6, 6>(error_at::kPose, error_at::kPose)};
@@ -100,7 +100,7 @@ LocalizationEstimate Localizer::estimate() const {
   e.up_in_world = true_up(s.gravity_tilt_rad);
   for (std::size_t i = 0; i < e.health.size(); ++i) {
     const auto sensor = static_cast<LocalizationSensor>(i);
-    e.health[i] = m.judges[i].report(m.stamp, state_->timeout_s(sensor), state_->refusals[i]);
+    e.health[i] = m.monitors[i].report(m.stamp, state_->timeout_s(sensor), state_->refusals[i]);
   }
   return e;
 }
@@ -123,7 +123,8 @@ Status Localizer::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
   const std::string what = "memory of the localization";
   if (in.get<std::uint32_t>() != kStateVersion)
-    return failure(ErrorCode::configuration, "is of another version of the program", what, "run again from the start");
+    return failure(ErrorCode::configuration, "was saved by another version of the program", what,
+                   "run again from the start");
   auto state = std::make_unique<State>(state_->options);
   for (RefusalCounts& r : state->refusals) {
     r.not_finite = in.get<std::int64_t>();
@@ -134,7 +135,7 @@ Status Localizer::restore(const Bytes& bytes) {
   }
   const bool sensible = state->filter.get(in);
   if (Status status = in.finish(what); !status) return status;
-  if (!sensible) return failure(ErrorCode::configuration, "makes no sense", what, "run again from the start");
+  if (!sensible) return failure(ErrorCode::configuration, "is damaged", what, "run again from the start");
   state_ = std::move(state);
   return {};
 }

@@ -1,4 +1,4 @@
-// Localization: where the rover is, from all the sensors that there are.
+// Localization: the pose of the rover from all available sensors.
 #pragma once
 
 #include <array>
@@ -15,44 +15,44 @@
 
 namespace spartan {
 
-/// Of the last step of the wheels that was long enough.
+/// Slip of the last wheel step of at least min_slip_distance_m.
 struct WheelSlip {
   Stamp stamp;
   double slip = 0;  ///< 1 − travelled / counted
   double sigma = 0;
 };
 
-/// What x of the world means, and how far it is from east.
+/// Direction of the world's x axis.
 struct WorldHeading {
-  bool east = false;  ///< a compass said where east is before the start; else x is the start heading
-  /// Compass readings less headings in the world, counter-clockwise; where x is not east, east lies at minus this.
+  bool east = false;  ///< x is east by a compass before the start; else x is the start heading
+  /// Compass reading − heading in the world, counter-clockwise; if x is not east, the heading of east is minus this.
   std::optional<double> compass_offset_rad;
   double compass_offset_sigma_rad = 0;
 };
 
 struct LocalizationEstimate {
   Stamp stamp;                    ///< of the newest sample
-  UncertainPose world_from_body;  ///< the best there is; jumps where the map or a direction corrects it
-  UncertainPose odom_from_body;   ///< never jumps; its covariance gathers all along the way
+  UncertainPose world_from_body;  ///< best estimate; jumps where map, compass or inclinometer correct it
+  UncertainPose odom_from_body;   ///< never jumps; its covariance accumulates over the drive
   Pose world_from_odom;
   Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();  ///< world
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
   std::optional<WheelSlip> slip;
   WorldHeading heading;
-  bool gravity_measured = false;  ///< z is up by a measurement at the start; else along the start attitude
-  Eigen::Vector3d up_in_world = Eigen::Vector3d::UnitZ();  ///< the true vertical, as far as it is known now
-  std::array<SensorHealth, kLocalizationSensors> health;   ///< by LocalizationSensor
+  bool gravity_measured = false;  ///< z was aligned to measured gravity at the start; else to the start attitude
+  Eigen::Vector3d up_in_world = Eigen::Vector3d::UnitZ();  ///< current estimate of the true vertical
+  std::array<SensorHealth, kLocalizationSensors> health;   ///< indexed by LocalizationSensor
 
   const SensorHealth& health_of(LocalizationSensor sensor) const { return health[static_cast<std::size_t>(sensor)]; }
 };
 
-/// Fuses visual motions with whatever else there is. Vision is required, everything else optional: it may be absent,
-/// start late, stop or lie. Samples may come late and in any order within `buffer_s`; what cannot be used is refused
-/// and counted, never thrown. Not thread-safe.
+/// Fuses visual motions with IMU, wheel odometry, compass, inclinometer and map constraints. Vision is required, every
+/// other sensor is optional: it may be absent, start late, fail or give wrong readings. Samples may arrive late and in
+/// any order within `buffer_s`; samples that cannot be used are refused and counted, without an error. Not thread-safe.
 ///
-/// The world stands at the first pose, exactly: z up by what IMU or inclinometer said until then, x along the
-/// horizontal part of the direction ahead, or east where a compass was heard. What is uncertain is where gravity and
-/// north lie in it.
+/// The first pose defines the origin of the world exactly: z up by static alignment with IMU or inclinometer, x along
+/// the horizontal part of `ahead_in_body`, or east if there were compass samples. The directions of gravity and north
+/// in that world are estimated.
 class Localizer {
  public:
   explicit Localizer(const LocalizationOptions& options);
@@ -60,22 +60,23 @@ class Localizer {
   Localizer& operator=(Localizer&&) noexcept;
   ~Localizer();
 
-  /// At the first shot, once. `ahead_in_body`: the first left optical axis. Samples up to `stamp` that were added
-  /// before level the world and are done with; of those only the last 10 s count.
-  /// `up_in_body`: where it is known from elsewhere (to a degree or two); it counts where no sample says better.
+  /// Call once, at the first frame. `ahead_in_body`: the first left optical axis. Samples of the last 10 s up to
+  /// `stamp` that were added before are used for static alignment only. `up_in_body`: an approximate vertical (1° to
+  /// 2°) that is used if neither IMU nor inclinometer give one.
   void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {});
   bool started() const;
 
-  /// Whether it was taken. One RelativeMotion for every shot after the first, measured or not; `from` must be the shot
-  /// before.
+  /// Returns whether the measurement was accepted into the buffer. Add one RelativeMotion for every frame after the
+  /// first, measured or not; `from` must be the stamp of the frame before.
   bool add(const Measurement& measurement);
-  /// Whether the buffer still holds that moment.
+  /// Whether a sample with that stamp is not too late for the buffer.
   bool reaches(Stamp stamp) const;
 
-  /// At the newest sample; identity before the start.
+  /// Estimate at the newest sample; identity before the start.
   LocalizationEstimate estimate() const;
 
-  /// The memory as a versioned value; after restore() of it all that follows is the same, bit for bit.
+  /// The memory as a versioned value; after restore() all further estimates are the same, bit for bit. Code
+  /// `configuration` if the bytes are of another version or damaged.
   Bytes save() const;
   Status restore(const Bytes& bytes);
 

@@ -1,4 +1,4 @@
-// Sensors that are late, silent, broken or lie.
+// Sensors that are late, missing, frozen or wrong.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ bool within(const Measurement& m, double from, double to) {
   return stamp_of_measurement(m) >= test_stamp(from) && stamp_of_measurement(m) < test_stamp(to);
 }
 
-// The world's first attitude is what the readings of the start made it.
+// The attitude of the world follows from the readings at the start.
 Pose first_pose_of(const Samples& all) {
   Samples before;
   std::copy_if(all.begin(), all.end(), std::back_inserter(before),
@@ -52,7 +52,7 @@ SensorHealth health_at(const Samples& all, double t, LocalizationSensor sensor) 
   return driven(test_options(), until).estimate().health_of(sensor);
 }
 
-TEST(LocalizerFaults, CompassThatLiesIsExcludedAndComesBack) {
+TEST(LocalizerFaults, WrongCompassIsExcludedAndReadmitted) {
   Samples all = whole_drive(82.5, {}, 41);
   for (Measurement& m : all) {
     if (auto* compass = std::get_if<CompassSample>(&m); compass && within(m, 20, 35)) compass->heading_rad += 1.0;
@@ -66,7 +66,7 @@ TEST(LocalizerFaults, CompassThatLiesIsExcludedAndComesBack) {
   expect_consistent(end, all);
 }
 
-TEST(LocalizerFaults, CompassThatHasChangedForGoodComesBackWithAnotherOffset) {
+TEST(LocalizerFaults, CompassWithAPermanentChangeIsReadmittedWithANewOffset) {
   Samples all = whole_drive(82.5, {}, 53);
   for (Measurement& m : all) {
     if (auto* compass = std::get_if<CompassSample>(&m); compass && within(m, 20, 1e3)) compass->heading_rad -= 0.5;
@@ -77,7 +77,7 @@ TEST(LocalizerFaults, CompassThatHasChangedForGoodComesBackWithAnotherOffset) {
   expect_consistent(end, all);
 }
 
-TEST(LocalizerFaults, CompassThatStartsLateFindsItsOffset) {
+TEST(LocalizerFaults, CompassThatStartsLateInitializesItsOffset) {
   Samples all = whole_drive(62.5, {}, 42);
   std::erase_if(all, [](const Measurement& m) { return m.index() == 3 && within(m, 0, 20); });
   for (Measurement& m : all) {
@@ -95,7 +95,7 @@ TEST(LocalizerFaults, CompassThatStartsLateFindsItsOffset) {
   expect_consistent(e, all);
 }
 
-TEST(LocalizerFaults, SlippingWheelsAreExcludedAndTheSlipIsStated) {
+TEST(LocalizerFaults, SlippingWheelsAreExcludedAndSlipIsEstimated) {
   Samples all = whole_drive(82.5, {}, 43);
   double slipped = 0;
   WheelSample last{};
@@ -123,7 +123,7 @@ TEST(LocalizerFaults, SlippingWheelsAreExcludedAndTheSlipIsStated) {
   expect_consistent(end, all);
 }
 
-TEST(LocalizerFaults, FrozenImuIsExcludedAndComesBack) {
+TEST(LocalizerFaults, FrozenImuIsExcludedAndReadmitted) {
   Samples all = whole_drive(62.5, {}, 44);
   ImuSample held;
   for (Measurement& m : all) {
@@ -144,7 +144,7 @@ TEST(LocalizerFaults, FrozenImuIsExcludedAndComesBack) {
   expect_consistent(end, all);
 }
 
-TEST(LocalizerFaults, VisionOverrulesAnImuThatLies) {
+TEST(LocalizerFaults, VisionResetsThePredictionOfAWrongImu) {
   Samples all = whole_drive(92.5, {}, 45);
   for (Measurement& m : all) {
     auto* imu = std::get_if<ImuSample>(&m);
@@ -159,7 +159,7 @@ TEST(LocalizerFaults, VisionOverrulesAnImuThatLies) {
   expect_consistent(end, all);
 }
 
-TEST(LocalizerFaults, VisionIsRefusedWhereImuAndWheelsAgreeAgainstIt) {
+TEST(LocalizerFaults, VisionIsRejectedIfImuAndWheelsContradictIt) {
   Samples all = whole_drive(62.5, {}, 46);
   int spoiled = 0;
   for (Measurement& m : all) {
@@ -175,7 +175,7 @@ TEST(LocalizerFaults, VisionIsRefusedWhereImuAndWheelsAgreeAgainstIt) {
   expect_consistent(end, all);
 }
 
-TEST(LocalizerFaults, GoesOnInTheDark) {
+TEST(LocalizerFaults, BridgesAnOutageOfVision) {
   for (const int mask : {0, 1, 2, 3, 15}) {
     SCOPED_TRACE(mask);
     Samples all = whole_drive(62.5, {(mask & 1) != 0, (mask & 2) != 0, (mask & 4) != 0, (mask & 8) != 0}, 47);
@@ -194,8 +194,8 @@ TEST(LocalizerFaults, GoesOnInTheDark) {
   }
 }
 
-TEST(LocalizerFaults, ImuThatStartsLateFindsGravity) {
-  // The rover starts on a slope without any level; its IMU wakes up after 20 s.
+TEST(LocalizerFaults, ImuThatStartsLateIsAlignedToGravity) {
+  // The rover starts on a slope without a measured vertical; its IMU starts after 20 s.
   Samples all = whole_drive(72.5, {true, false, false, false}, 48);
   const TestDrive drive;
   std::erase_if(all, [](const Measurement& m) { return m.index() == 0 && within(m, 0, 20); });
@@ -220,7 +220,7 @@ TEST(LocalizerFaults, ImuThatStartsLateFindsGravity) {
   expect_consistent(e, all);
 }
 
-TEST(LocalizerFaults, RefusesAndCountsWhatMakesNoSense) {
+TEST(LocalizerFaults, RefusesAndCountsInvalidSamples) {
   Localizer localizer(test_options());
   localizer.add(ImuSample{test_stamp(0), {kNan, 0, 0}, {0, 0, 3.71}});
   localizer.start(test_stamp(1), Eigen::Vector3d::UnitX());
@@ -246,10 +246,10 @@ TEST(LocalizerFaults, RefusesAndCountsWhatMakesNoSense) {
   EXPECT_TRUE(e.world_from_body.pose.all_finite());
 }
 
-TEST(LocalizerFaults, AStampFarAheadCostsItselfAlone) {
+TEST(LocalizerFaults, AStampFarAheadIsRefusedAlone) {
   const Samples all = whole_drive(42.5, {}, 53);
   Localizer localizer(test_options());
-  // A clock that is set right after its first two samples, and one stamp far ahead just before the start.
+  // A clock that is corrected after its first two samples, and one stamp far ahead just before the start.
   for (const double t : {0.0, 1.0}) EXPECT_TRUE(localizer.add(CompassSample{{2 * test_stamp(t).ns}, 0.3, 0.1}));
   EXPECT_FALSE(localizer.add(CompassSample{test_stamp(-0.1), 0.3, 0.1}));
   int refused = 0;
@@ -270,13 +270,13 @@ TEST(LocalizerFaults, AStampFarAheadCostsItselfAlone) {
   EXPECT_EQ(e.health_of(LocalizationSensor::compass).refused.too_early, 1);
   EXPECT_EQ(e.health_of(LocalizationSensor::compass).refused.too_late, 1);
   EXPECT_EQ(e.world_from_body.pose.matrix(), expected.world_from_body.pose.matrix());
-  // A shot is believed: the rover slept.
+  // A frame may advance the time that far.
   EXPECT_TRUE(localizer.add(RelativeMotion{test_stamp(42.5), test_stamp(4000), {}, Matrix6d::Identity(), false}));
   EXPECT_TRUE(localizer.add(WheelSample{test_stamp(4000.1), 1, 1}));
 }
 
-TEST(LocalizerFaults, AnImuThatDiesWhileTheRoverStandsLeavesTheWheels) {
-  // It stands for 10 s on; the IMU falls silent, the rover drives off.
+TEST(LocalizerFaults, ImuOutageDuringAStopEndsZeroVelocityUpdates) {
+  // The rover stays stationary for 10 s; the IMU fails, the rover drives on.
   TestDrive drive;
   Samples all = whole_drive(62.5, {}, 54);
   for (Measurement& m : all) {
@@ -292,22 +292,22 @@ TEST(LocalizerFaults, AnImuThatDiesWhileTheRoverStandsLeavesTheWheels) {
         },
         m);
   }
-  Samples standing = test_samples({.speed_m_s = 0}, 12.4, {}, 54);
+  Samples stationary = test_samples({.speed_m_s = 0}, 12.4, {}, 54);
   std::erase_if(all,
                 [](const Measurement& m) { return m.index() == 0 || stamp_of_measurement(m) <= test_stamp(12.4); });
-  all.insert(all.begin(), standing.begin(), standing.end());
+  all.insert(all.begin(), stationary.begin(), stationary.end());
   all.emplace_back(drive.motion(2.5, 2.5, test_motion_covariance()));
   std::get<RelativeMotion>(all.back()).to = test_stamp(12.5);
   std::stable_sort(all.begin(), all.end(), comes_before);
   const LocalizationEstimate e = driven(test_options(), all).estimate();
   EXPECT_EQ(e.health_of(LocalizationSensor::imu).state, SensorState::missing);
-  ASSERT_TRUE(e.slip) << "the wheels' steps go on";
+  ASSERT_TRUE(e.slip) << "wheel steps continue";
   EXPECT_GT(e.slip->stamp, test_stamp(70));
   EXPECT_GT(e.health_of(LocalizationSensor::wheels).used, 20);
 }
 
-TEST(LocalizerFaults, AnImuThatFailedOnceIsBelievedAgain) {
-  // Spikes, each between two shots, with good shots between them.
+TEST(LocalizerFaults, ImuIsReadmittedAfterASingleFailure) {
+  // Spikes between frames, with good frames in between.
   Samples all = whole_drive(92.5, {}, 55);
   for (Measurement& m : all) {
     auto* imu = std::get_if<ImuSample>(&m);
@@ -322,8 +322,8 @@ TEST(LocalizerFaults, AnImuThatFailedOnceIsBelievedAgain) {
   expect_consistent(end, all);
 }
 
-TEST(LocalizerFaults, HoldsStillWhileItStands) {
-  // 10 s without a shot, the IMU noisy, the wheels at rest.
+TEST(LocalizerFaults, ZeroVelocityUpdatesHoldThePose) {
+  // 10 s without a frame, with a noisy IMU and stationary wheels.
   const TestDrive drive;
   Samples all = test_samples(drive, 2.5, {}, 49);
   const auto later = test_samples({.speed_m_s = 0}, 12.5, {}, 49);
@@ -334,12 +334,12 @@ TEST(LocalizerFaults, HoldsStillWhileItStands) {
   EXPECT_LE(moved.translation().norm(), 1.5e-3);
   EXPECT_LE(std::sqrt(e.world_from_body.covariance(0, 0)), 1e-3);
   LocalizationOptions o = test_options();
-  o.standing.enabled = false;
+  o.zero_velocity.enabled = false;
   EXPECT_GT(std::sqrt(driven(o, all).estimate().world_from_body.covariance(0, 0)), 3e-3);
 }
 
-TEST(LocalizerFaults, WheelsThatStandDoNotLockARoverThatSlides) {
-  // Vision and IMU see the drive, the wheels never turn.
+TEST(LocalizerFaults, StationaryWheelsDoNotHoldASlidingRover) {
+  // Vision and IMU measure the motion, the wheels are stationary.
   const TestDrive drive;
   Samples all = test_samples(drive, 62.5, {true, false, false, false}, 50);
   for (double t = 0; t < 62.5; t += 0.05) all.emplace_back(WheelSample{test_stamp(t), 0, 0});
@@ -368,7 +368,7 @@ TEST(LocalizerFaults, SavesAndRestoresItsMemory) {
   Bytes broken = one.save();
   broken[0] = 99;
   EXPECT_FALSE(other.restore(broken).has_value());
-  EXPECT_EQ(other.save(), one.save()) << "a refused memory changes nothing";
+  EXPECT_EQ(other.save(), one.save()) << "a refused memory does not change the state";
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ namespace spartan {
 namespace {
 
 TEST(LocalizerLong, CovarianceStaysPositiveDefiniteOverAMillionSteps) {
-  // 10 000 s of IMU at 100 Hz, the same winding waves again and again, everything else at its rate; constraints of the
-  // map every 200 s, the camera dark for 10 s in each 500.
+  // 10 000 s of IMU at 100 Hz, over a repeated drive, all other sensors at their rates; map constraints
+  // every 200 s, an outage of vision of 10 s in each 500 s.
   const TestDrive drive;
   LocalizationOptions options = test_options();
   options.vision = LocalizationOptions().vision;
@@ -23,7 +23,7 @@ TEST(LocalizerLong, CovarianceStaysPositiveDefiniteOverAMillionSteps) {
   Random random(62);
   double rolled = 0;
   Pose last = drive.at(2.5);
-  double shot = 2.5;
+  double frame = 2.5;
   constexpr int kSteps = 1'000'000;
   for (int i = 251; i < 251 + kSteps; ++i) {
     const double t = i * 0.01;
@@ -35,14 +35,14 @@ TEST(LocalizerLong, CovarianceStaysPositiveDefiniteOverAMillionSteps) {
     rolled += (now.translation() - last.translation()).norm();
     last = now;
     if (i % 150 == 100) {
-      RelativeMotion motion = drive.motion(shot, t, test_motion_covariance());
+      RelativeMotion motion = drive.motion(frame, t, test_motion_covariance());
       for (int k = 0; k < 6; ++k) {
         motion.previous_from_current = motion.previous_from_current * exp_se3(Vector6d::Unit(k) * random.normal() *
                                                                               std::sqrt(motion.covariance(k, k)));
       }
       motion.measured = i % 50'000 > 1000;
       filter.process(motion);
-      shot = t;
+      frame = t;
     }
     if (i % 5 == 0) filter.process(WheelSample{test_stamp(t), rolled / 0.98, rolled / 0.98});
     if (i % 100 == 0) filter.process(CompassSample{test_stamp(t), heading_of(now) + random.normal(0, 0.017), 0.017});
@@ -54,17 +54,17 @@ TEST(LocalizerLong, CovarianceStaysPositiveDefiniteOverAMillionSteps) {
     if (i % 20'000 == 0)
       filter.process(PoseConstraint{test_stamp(t), drive.at(2.5).inverse() * now, 1e6 * Matrix6d::Identity()});
     if (i % 10'000 != 0) continue;
-    const ErrorCovariance& p = filter.memory().belief.covariance;
+    const ErrorCovariance& p = filter.memory().estimate.covariance;
     ASSERT_TRUE(p.allFinite()) << i;
     ASSERT_LE((p - p.transpose()).cwiseAbs().maxCoeff(), 1e-12 * p.cwiseAbs().maxCoeff()) << i;
-    // Clones may coincide with the pose, so that the whole is only semidefinite; without them it is definite.
+    // Clones may coincide with the pose, so that the full covariance is semidefinite; without them it is definite.
     const auto own = p.topLeftCorner<error_at::kVisionClone, error_at::kVisionClone>().eval();
     ASSERT_EQ(own.llt().info(), Eigen::Success) << i;
     const Eigen::SelfAdjointEigenSolver<ErrorCovariance> eigen(p, Eigen::EigenvaluesOnly);
     ASSERT_GE(eigen.eigenvalues()[0], -1e-13 * eigen.eigenvalues()[error_at::kSize - 1]) << i;
   }
   const Pose truth = drive.at(2.5).inverse() * last;
-  EXPECT_LE((filter.memory().belief.state.world_from_body.translation() - truth.translation()).norm(), 0.05);
+  EXPECT_LE((filter.memory().estimate.state.world_from_body.translation() - truth.translation()).norm(), 0.05);
   EXPECT_GT(rolled, 500);
 }
 

@@ -19,7 +19,7 @@ double normalised_error(const UncertainPose& estimate, const Pose& truth) {
   return e.dot(estimate.covariance.inverse() * e);
 }
 
-// The pose relative to the first one, as the world starts at the first pose.
+// The pose relative to the first one, at which the world starts.
 Pose true_pose(const TestDrive& drive, double t) {
   return drive.at(2.5).inverse() * drive.at(t);
 }
@@ -44,7 +44,7 @@ TEST(Localizer, ComposesTheMotionsOfVisionAlone) {
   EXPECT_EQ(e.health_of(LocalizationSensor::imu).state, SensorState::missing);
 }
 
-// The last pose seen from that after `from` motions.
+// The last pose relative to the pose after `from` motions.
 struct Revisit {
   Eigen::Index from = 0;
   Pose from_last;
@@ -125,7 +125,7 @@ TEST(Localizer, AgreesWithBatchLeastSquares) {
   EXPECT_LE((e.world_from_body.covariance - expected.covariance).norm(), 1e-3 * expected.covariance.norm());
 }
 
-TEST(Localizer, AMapOfAnEarlierPoseIsAMotionSinceThen) {
+TEST(Localizer, MapOfAnEarlierPoseEqualsARelativeMotion) {
   const TestDrive drive;
   const auto motions = test_motions(drive, 40, 1, 5);
   constexpr std::size_t kMapped = 12;
@@ -150,7 +150,7 @@ TEST(Localizer, AMapOfAnEarlierPoseIsAMotionSinceThen) {
   EXPECT_LE((e.world_from_body.covariance - expected.covariance).norm(), 0.01 * expected.covariance.norm());
 }
 
-TEST(Localizer, AMapOfTheLastShotIsHeardHoweverLateItComes) {
+TEST(Localizer, MapConstraintOnTheLastFrameIsAppliedHoweverLate) {
   const TestDrive drive;
   LocalizationOptions short_buffer = test_options(), long_buffer = test_options();
   short_buffer.buffer_s = 2;
@@ -158,18 +158,18 @@ TEST(Localizer, AMapOfTheLastShotIsHeardHoweverLateItComes) {
   for (const TestSensors& with : {TestSensors{}, TestSensors{false, true, false, false, 1}}) {
     const auto motions = test_motions(drive, 22, 1, 22);
     const auto all = in_order(test_samples(drive, 31, with, 21), motions);
-    const Stamp shot = stamp_of_measurement(motions.back());
+    const Stamp frame = stamp_of_measurement(motions.back());
     const auto until =
-        std::find_if(all.begin(), all.end(), [&](const auto& m) { return stamp_of_measurement(m) > shot; });
-    const Localizer at_shot = driven(test_options(), {all.begin(), until});
+        std::find_if(all.begin(), all.end(), [&](const auto& m) { return stamp_of_measurement(m) > frame; });
+    const Localizer at_frame = driven(test_options(), {all.begin(), until});
     Localizer late = driven(short_buffer, all), replayed = driven(long_buffer, all);
-    const Pose seen = at_shot.estimate().world_from_body.pose * Pose::from_translation({1e-4, -2e-4, 0});
+    const Pose seen = at_frame.estimate().world_from_body.pose * Pose::from_translation({1e-4, -2e-4, 0});
     Matrix6d information = 1e4 * Matrix6d::Identity();
     information(1, 1) = 1e8;
     const Pose before = late.estimate().world_from_body.pose;
-    EXPECT_FALSE(late.add(PoseConstraint{{shot.ns + 1}, seen, information})) << "it is that of no shot";
-    ASSERT_TRUE(late.add(PoseConstraint{shot, seen, information}));
-    ASSERT_TRUE(replayed.add(PoseConstraint{shot, seen, information}));
+    EXPECT_FALSE(late.add(PoseConstraint{{frame.ns + 1}, seen, information})) << "no frame has that stamp";
+    ASSERT_TRUE(late.add(PoseConstraint{frame, seen, information}));
+    ASSERT_TRUE(replayed.add(PoseConstraint{frame, seen, information}));
     const LocalizationEstimate a = late.estimate(), b = replayed.estimate();
     EXPECT_EQ(a.health_of(LocalizationSensor::map).used, 1);
     const double moved = log_se3(before.inverse() * b.world_from_body.pose).norm();
@@ -177,18 +177,18 @@ TEST(Localizer, AMapOfTheLastShotIsHeardHoweverLateItComes) {
     EXPECT_LE(log_se3(a.world_from_body.pose.inverse() * b.world_from_body.pose).norm(), 0.05 * moved);
     EXPECT_LE((a.world_from_body.covariance - b.world_from_body.covariance).norm(),
               0.05 * b.world_from_body.covariance.norm());
-    // A shot that comes later still, from before the constraint came, stands on it.
-    const auto next = drive.motion(seconds_between(test_stamp(0), shot), 30, test_motion_covariance());
+    // A frame that arrives even later, with an earlier stamp, is processed after the constraint.
+    const auto next = drive.motion(seconds_between(test_stamp(0), frame), 30, test_motion_covariance());
     ASSERT_TRUE(late.add(next));
     ASSERT_TRUE(replayed.add(next));
     EXPECT_EQ(late.estimate().health_of(LocalizationSensor::map).used, 1);
     EXPECT_LE(log_se3(late.estimate().world_from_body.pose.inverse() * replayed.estimate().world_from_body.pose).norm(),
               0.05 * moved);
-    EXPECT_FALSE(late.add(PoseConstraint{shot, seen, information})) << "the last shot is another one now";
+    EXPECT_FALSE(late.add(PoseConstraint{frame, seen, information})) << "it is no longer the last frame";
   }
 }
 
-TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {
+TEST(Localizer, EverySubsetOfSensorsIsConsistent) {
   const TestDrive drive;
   const double limit = chi_square_quantile(0.999, 6);
   for (int mask = 0; mask < 16; ++mask) {
@@ -199,7 +199,7 @@ TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {
     const double t = seconds_between(test_stamp(0), e.stamp);
     EXPECT_LE((e.world_from_body.pose.translation() - e.world_from_odom * e.odom_from_body.pose.translation()).norm(),
               1e-9);
-    // The world's yaw and level are what the first readings said; the truth is taken from the first pose on.
+    // Yaw and level of the world follow from the first readings; the truth is relative to the first pose.
     Localizer at_start(test_options());
     for (const Measurement& m : all) {
       if (stamp_of_measurement(m) <= test_stamp(2.5)) at_start.add(m);
@@ -215,7 +215,7 @@ TEST(Localizer, EverySubsetOfSensorsStaysWithinItsCovariance) {
   }
 }
 
-TEST(Localizer, LevelsTheWorldByGravityAndTurnsItEast) {
+TEST(Localizer, AlignsTheWorldToGravityAndEast) {
   Localizer localizer(test_options());
   const Eigen::Quaterniond tilted = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) *
                                     Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()) *
@@ -232,7 +232,7 @@ TEST(Localizer, LevelsTheWorldByGravityAndTurnsItEast) {
   EXPECT_THROW(localizer.start(test_stamp(3), Eigen::Vector3d::UnitX()), std::logic_error);
 }
 
-TEST(Localizer, OdomDoesNotJumpWhereTheMapCorrectsTheWorld) {
+TEST(Localizer, OdomDoesNotJumpIfTheMapCorrectsTheWorld) {
   const TestDrive drive;
   const auto all = in_order(test_samples(drive, 62.5, {}, 21), test_motions(drive, 62.5, 1, 22));
   Localizer with = driven(test_options(), all), without = driven(test_options(), all);
@@ -248,7 +248,7 @@ TEST(Localizer, OdomDoesNotJumpWhereTheMapCorrectsTheWorld) {
   EXPECT_LE(log_se3(after.odom_from_body.pose.inverse() * before.odom_from_body.pose).norm(), 1e-12);
   EXPECT_LE(log_se3((after.world_from_odom * after.odom_from_body.pose).inverse() * after.world_from_body.pose).norm(),
             1e-12);
-  // And goes on as it would have.
+  // And continues as without the constraint.
   for (const Measurement& m : test_motions(drive, 71.5, 1, 22)) {
     if (std::get<RelativeMotion>(m).from < before.stamp) continue;
     with.add(m);

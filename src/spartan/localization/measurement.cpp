@@ -5,29 +5,29 @@
 namespace spartan {
 namespace {
 
-bool sound(const ImuSample& s) {
+bool valid(const ImuSample& s) {
   return s.gyro_rad_s.allFinite() && s.accel_m_s2.allFinite();
 }
-bool sound(const WheelSample& s) {
+bool valid(const WheelSample& s) {
   return std::isfinite(s.left_m) && std::isfinite(s.right_m);
 }
-bool sound(const CompassSample& s) {
+bool valid(const CompassSample& s) {
   return std::isfinite(s.heading_rad) && std::isfinite(s.sigma_rad);
 }
-bool sound(const InclinometerSample& s) {
+bool valid(const InclinometerSample& s) {
   return std::isfinite(s.roll_rad) && std::isfinite(s.pitch_rad) && std::isfinite(s.sigma_rad);
 }
-bool sound(const RelativeMotion& m) {
+bool valid(const RelativeMotion& m) {
   if (!m.measured) return true;
   return m.previous_from_current.all_finite() && m.covariance.allFinite() &&
          (m.covariance.diagonal().array() >= 0).all();
 }
-bool sound(const PoseConstraint& c) {
+bool valid(const PoseConstraint& c) {
   return c.world_from_body.all_finite() && c.information.allFinite() && c.map_covariance.allFinite() &&
          (c.information.diagonal().array() >= 0).all() && (c.map_covariance.diagonal().array() >= 0).all();
 }
-bool sound(const LateConstraint& c) {
-  return sound(c.at_shot);
+bool valid(const LateConstraint& c) {
+  return valid(c.at_frame);
 }
 
 }  // namespace
@@ -40,8 +40,8 @@ LocalizationSensor sensor_of(const Measurement& m) {
   return kOfIndex[m.index()];
 }
 
-bool is_sound(const Measurement& m) {
-  return std::visit([](const auto& value) { return sound(value); }, m);
+bool is_valid(const Measurement& m) {
+  return std::visit([](const auto& value) { return valid(value); }, m);
 }
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// Everything the localization takes in, as one value with a place in time.
+// The measurements of the localization as one variant with a stamp.
 #pragma once
 
 #include <variant>
@@ -10,15 +10,15 @@
 
 namespace spartan {
 
-/// A constraint on the pose at the last shot that came when the buffer had left that shot behind (the rover stood for
-/// long, and its map is made when it goes on): taken at a later moment, by the clone of that pose.
+/// A map constraint on the pose at the last frame that arrived when that frame was older than the buffer (the map of a
+/// stop is made when the rover drives on): applied at a later time to the clone of that pose.
 struct LateConstraint {
-  Stamp stamp;  ///< when it is taken
-  PoseConstraint at_shot;
+  Stamp stamp;  ///< when it is applied
+  PoseConstraint at_frame;
 };
 
-/// Of several with one stamp the earlier kind comes first: the IMU reaches the moment, vision stands on it, the rest is
-/// judged against both.
+/// Measurements with equal stamps are ordered by their index here: the IMU propagates to that time, vision corrects the
+/// prediction, the others are gated against both.
 using Measurement = std::variant<ImuSample, RelativeMotion, WheelSample, CompassSample, InclinometerSample,
                                  PoseConstraint, LateConstraint>;
 
@@ -34,7 +34,7 @@ inline Stamp stamp_of_measurement(const Measurement& m) {
       m);
 }
 
-/// Whether `a` is taken before `b`.
+/// Whether `a` is processed before `b`.
 inline bool comes_before(const Measurement& a, const Measurement& b) {
   const Stamp at = stamp_of_measurement(a), bt = stamp_of_measurement(b);
   return at != bt ? at < bt : a.index() < b.index();
@@ -42,7 +42,7 @@ inline bool comes_before(const Measurement& a, const Measurement& b) {
 
 LocalizationSensor sensor_of(const Measurement& m);
 
-/// Whether all numbers are finite (and a covariance or information can be one).
-bool is_sound(const Measurement& m);
+/// Whether all numbers are finite and no variance or information is negative.
+bool is_valid(const Measurement& m);
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// What visual odometry tells the localization: how the body moved between two shots.
+// Relative motion of the body between two frames, as measured by visual odometry.
 #pragma once
 
 #include "spartan/core/pose.h"
@@ -7,10 +7,10 @@
 namespace spartan {
 
 struct RelativeMotion {
-  Stamp from, to;                          ///< of the two shots
-  Pose previous_from_current;              ///< body frames; the exact identity says that the rover stood
+  Stamp from, to;                          ///< of the two frames
+  Pose previous_from_current;              ///< body frames; the exact identity means a stationary rover
   Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²
-  bool measured = true;                    ///< false: vision was lost, the motion is worth nothing
+  bool measured = true;                    ///< false: tracking was lost, the motion is not used
 };
 
 }  // namespace spartan

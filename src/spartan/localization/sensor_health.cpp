@@ -56,18 +56,19 @@ void RefusalCounts::count(Refusal refusal) {
   }
 }
 
-void SensorJudge::see(Stamp stamp) {
+void SensorMonitor::see(Stamp stamp) {
   seen = true;
   last = stamp;
 }
 
-bool SensorJudge::judge(double normalised_square, double gate, HealthReason why, int excluded_after, int back_after) {
-  if (!(normalised_square <= gate)) {
+bool SensorMonitor::accept(double normalized_innovation_squared, double gate, HealthReason why, int excluded_after,
+                           int readmit_after) {
+  if (!(normalized_innovation_squared <= gate)) {
     ++rejected;
     ++failed_in_row;
     passed_in_row = 0;
     reason = why;
-    square = normalised_square;
+    nis = normalized_innovation_squared;
     limit = gate;
     state = state == SensorState::excluded || failed_in_row >= excluded_after ? SensorState::excluded
                                                                               : SensorState::suspect;
@@ -75,7 +76,7 @@ bool SensorJudge::judge(double normalised_square, double gate, HealthReason why,
   }
   failed_in_row = 0;
   ++passed_in_row;
-  if (state == SensorState::excluded && passed_in_row < back_after) {
+  if (state == SensorState::excluded && passed_in_row < readmit_after) {
     ++rejected;
     return false;
   }
@@ -84,24 +85,24 @@ bool SensorJudge::judge(double normalised_square, double gate, HealthReason why,
   return true;
 }
 
-void SensorJudge::exclude(HealthReason why) {
+void SensorMonitor::exclude(HealthReason why) {
   state = SensorState::excluded;
   reason = why;
-  square = limit = 0;
+  nis = limit = 0;
   passed_in_row = 0;
 }
 
-void SensorJudge::readmit() {
+void SensorMonitor::readmit() {
   state = SensorState::ok;
   reason = HealthReason::none;
   failed_in_row = 0;
 }
 
-bool SensorJudge::missing(Stamp now, double timeout_s) const {
+bool SensorMonitor::missing(Stamp now, double timeout_s) const {
   return !seen || seconds_between(last, now) > timeout_s;
 }
 
-SensorHealth SensorJudge::report(Stamp now, double timeout_s, const RefusalCounts& refusals) const {
+SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCounts& refusals) const {
   SensorHealth health;
   health.state = missing(now, timeout_s) ? SensorState::missing : state;
   health.used = used;
@@ -113,11 +114,10 @@ SensorHealth SensorJudge::report(Stamp now, double timeout_s, const RefusalCount
     case HealthReason::none:
       break;
     case HealthReason::disagrees:
-      health.reason =
-          fmt::format("disagrees with the other sensors: {:.1f}, at most {:.1f} is expected", square, limit);
+      health.reason = fmt::format("disagrees with the other sensors: {:.1f}, at most {:.1f} is expected", nis, limit);
       break;
     case HealthReason::slips:
-      health.reason = fmt::format("the wheels slip: {:.1f}, at most {:.1f} is expected", square, limit);
+      health.reason = fmt::format("the wheels slip: {:.1f}, at most {:.1f} is expected", nis, limit);
       break;
     case HealthReason::frozen:
       health.reason = "gives the same reading again and again";
@@ -125,8 +125,8 @@ SensorHealth SensorJudge::report(Stamp now, double timeout_s, const RefusalCount
     case HealthReason::out_of_range:
       health.reason = "gives readings that no rover can have";
       break;
-    case HealthReason::overruled:
-      health.reason = fmt::format("vision saw another motion: {:.1f}, at most {:.1f} is expected", square, limit);
+    case HealthReason::contradicted:
+      health.reason = fmt::format("vision saw another motion: {:.1f}, at most {:.1f} is expected", nis, limit);
       break;
     case HealthReason::lost:
       health.reason = "could not measure the last motion";

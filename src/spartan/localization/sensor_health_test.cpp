@@ -6,35 +6,35 @@
 namespace spartan {
 namespace {
 
-bool judge(SensorJudge& judge, double square) {
-  return judge.judge(square, 10, HealthReason::disagrees, 3, 5);
+bool accept(SensorMonitor& monitor, double nis) {
+  return monitor.accept(nis, 10, HealthReason::disagrees, 3, 5);
 }
 
-TEST(SensorJudge, GoesFromOkOverSuspectToExcludedAndBack) {
-  SensorJudge j;
-  EXPECT_TRUE(judge(j, 1));
-  EXPECT_FALSE(judge(j, 11));
+TEST(SensorMonitor, GoesFromOkViaSuspectToExcludedAndBack) {
+  SensorMonitor j;
+  EXPECT_TRUE(accept(j, 1));
+  EXPECT_FALSE(accept(j, 11));
   EXPECT_EQ(j.state, SensorState::suspect);
-  EXPECT_TRUE(judge(j, 1));  // one outlier is forgiven
+  EXPECT_TRUE(accept(j, 1));  // readmitted after one outlier
   EXPECT_EQ(j.state, SensorState::ok);
-  for (int i = 0; i < 3; ++i) EXPECT_FALSE(judge(j, 50));
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(accept(j, 50));
   EXPECT_EQ(j.state, SensorState::excluded);
-  for (int i = 0; i < 4; ++i) EXPECT_FALSE(judge(j, 1)) << "not yet";
-  EXPECT_FALSE(judge(j, 50));  // counting starts again
-  for (int i = 0; i < 4; ++i) EXPECT_FALSE(judge(j, 1));
-  EXPECT_TRUE(judge(j, 1));
+  for (int i = 0; i < 4; ++i) EXPECT_FALSE(accept(j, 1)) << "not yet";
+  EXPECT_FALSE(accept(j, 50));  // the count restarts
+  for (int i = 0; i < 4; ++i) EXPECT_FALSE(accept(j, 1));
+  EXPECT_TRUE(accept(j, 1));
   EXPECT_EQ(j.state, SensorState::ok);
   EXPECT_EQ(j.used, 3);
   EXPECT_EQ(j.rejected, 13);
 }
 
-TEST(SensorJudge, NanFails) {
-  SensorJudge j;
-  EXPECT_FALSE(judge(j, std::numeric_limits<double>::quiet_NaN()));
+TEST(SensorMonitor, NanFails) {
+  SensorMonitor j;
+  EXPECT_FALSE(accept(j, std::numeric_limits<double>::quiet_NaN()));
 }
 
-TEST(SensorJudge, ReportsWithReason) {
-  SensorJudge j;
+TEST(SensorMonitor, ReportsTheReason) {
+  SensorMonitor j;
   const Stamp now{5'000'000'000};
   EXPECT_EQ(j.report(now, 1, {}).state, SensorState::missing);
   EXPECT_THAT(j.report(now, 1, {}).reason, ::testing::HasSubstr("not said"));
@@ -42,7 +42,7 @@ TEST(SensorJudge, ReportsWithReason) {
   EXPECT_EQ(j.report(now, 1, {}).state, SensorState::ok);
   EXPECT_EQ(j.report(now, 1, {}).reason, "");
   EXPECT_THAT(j.report({9'000'000'000}, 1, {}).reason, ::testing::HasSubstr("silent for 4.5 s"));
-  judge(j, 77);
+  accept(j, 77);
   EXPECT_THAT(j.report(now, 1, {}).reason, ::testing::HasSubstr("77.0, at most 10.0"));
   RefusalCounts refusals;
   refusals.count(Refusal::not_finite);
@@ -54,7 +54,7 @@ TEST(SensorJudge, ReportsWithReason) {
   EXPECT_EQ(health.rejected, 1);
 }
 
-TEST(SensorHealth, NamesAreThoseOfTheFormat) {
+TEST(SensorHealth, NamesMatchTheFileFormat) {
   EXPECT_EQ(name_of(SensorState::ok), "ok");
   EXPECT_EQ(name_of(SensorState::suspect), "suspect");
   EXPECT_EQ(name_of(SensorState::excluded), "excluded");

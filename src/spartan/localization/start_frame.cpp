@@ -9,8 +9,9 @@
 namespace spartan {
 namespace {
 
-constexpr std::size_t kFewestSamples = 10;
-constexpr double kLargestLevelError = 0.05, kLargestScatter = 0.10;  // of gravity
+constexpr std::size_t kMinSamples = 10;
+/// Largest deviation of the mean specific force and largest scatter, over gravity.
+constexpr double kMaxGravityError = 0.05, kMaxScatter = 0.10;
 
 double wrapped(double angle) {
   return std::remainder(angle, 2 * std::numbers::pi);
@@ -18,7 +19,7 @@ double wrapped(double angle) {
 
 }  // namespace
 
-std::optional<RestReading> static_reading(std::span<const ImuSample> samples, const LocalizationOptions& o) {
+std::optional<StaticReading> static_reading(std::span<const ImuSample> samples, const LocalizationOptions& o) {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = gyro, gyro_squares = gyro, accel_squares = gyro;
   double count = 0;
   for (const ImuSample& s : samples) {
@@ -29,28 +30,28 @@ std::optional<RestReading> static_reading(std::span<const ImuSample> samples, co
     accel_squares += s.accel_m_s2.cwiseAbs2();
     ++count;
   }
-  if (count < static_cast<double>(kFewestSamples)) return std::nullopt;
-  RestReading r;
+  if (count < static_cast<double>(kMinSamples)) return std::nullopt;
+  StaticReading r;
   r.gyro_rad_s = gyro / count;
   r.accel_m_s2 = accel / count;
   const auto scatter = [&](const Eigen::Vector3d& squares, const Eigen::Vector3d& mean) {
     return std::sqrt((squares / count - mean.cwiseAbs2()).cwiseMax(0).maxCoeff());
   };
   const double accel_scatter = scatter(accel_squares, r.accel_m_s2), gyro_scatter = scatter(gyro_squares, r.gyro_rad_s);
-  if (std::abs(r.accel_m_s2.norm() - o.gravity_m_s2) > kLargestLevelError * o.gravity_m_s2) return std::nullopt;
-  if (accel_scatter > kLargestScatter * o.gravity_m_s2) return std::nullopt;
-  r.still = accel_scatter < o.imu.still_accel_m_s2 && gyro_scatter < o.imu.still_gyro_rad_s &&
-            r.gyro_rad_s.norm() < 3 * (o.imu.gyro_bias_rad_s + o.imu.still_gyro_rad_s / std::sqrt(count));
+  if (std::abs(r.accel_m_s2.norm() - o.gravity_m_s2) > kMaxGravityError * o.gravity_m_s2) return std::nullopt;
+  if (accel_scatter > kMaxScatter * o.gravity_m_s2) return std::nullopt;
+  r.stationary = accel_scatter < o.imu.stationary_accel_m_s2 && gyro_scatter < o.imu.stationary_gyro_rad_s &&
+                 r.gyro_rad_s.norm() < 3 * (o.imu.gyro_bias_rad_s + o.imu.stationary_gyro_rad_s / std::sqrt(count));
   const double seconds = std::max(seconds_between(samples.front().stamp, samples.back().stamp), 1e-3);
   r.gyro_sigma_rad_s = o.imu.gyro_noise_rad_s_sqrt_hz / std::sqrt(seconds) + 1e-7;
-  // A rover that moves accelerates on the way: its mean is worth no more than its scatter over some independent parts.
-  r.accel_sigma_m_s2 = o.imu.accel_noise_m_s2_sqrt_hz / std::sqrt(seconds) + (r.still ? 0 : accel_scatter);
+  // A moving rover accelerates: the error of its mean is of the order of the scatter.
+  r.accel_sigma_m_s2 = o.imu.accel_noise_m_s2_sqrt_hz / std::sqrt(seconds) + (r.stationary ? 0 : accel_scatter);
   return r;
 }
 
-std::optional<Heading> agreed_heading(std::span<const CompassSample> readings, double least_sigma) {
+std::optional<Heading> consensus_heading(std::span<const CompassSample> readings, double min_sigma) {
   std::size_t best = 0, most = 0;
-  const auto sigma = [&](const CompassSample& s) { return std::max(s.sigma_rad, least_sigma); };
+  const auto sigma = [&](const CompassSample& s) { return std::max(s.sigma_rad, min_sigma); };
   const auto agree = [&](const CompassSample& a, const CompassSample& b) {
     return std::abs(wrapped(a.heading_rad - b.heading_rad)) <= 3 * std::hypot(sigma(a), sigma(b));
   };
@@ -73,19 +74,19 @@ std::optional<Heading> agreed_heading(std::span<const CompassSample> readings, d
   return Heading{wrapped(readings[best].heading_rad + sum / weights), 1 / std::sqrt(weights)};
 }
 
-std::optional<Tilt> median_tilt(std::span<const InclinometerSample> readings, double least_sigma) {
+std::optional<Tilt> median_tilt(std::span<const InclinometerSample> readings, double min_sigma) {
   if (readings.empty()) return std::nullopt;
   std::vector<double> rolls, pitches;
   double variance = 0;
   for (const InclinometerSample& s : readings) {
     rolls.push_back(s.roll_rad);
     pitches.push_back(s.pitch_rad);
-    variance = std::max({variance, s.sigma_rad * s.sigma_rad, least_sigma * least_sigma});
+    variance = std::max({variance, s.sigma_rad * s.sigma_rad, min_sigma * min_sigma});
   }
   const auto middle = static_cast<std::ptrdiff_t>(readings.size() / 2);
   std::nth_element(rolls.begin(), rolls.begin() + middle, rolls.end());
   std::nth_element(pitches.begin(), pitches.begin() + middle, pitches.end());
-  // The median of n normal readings varies by π/2 σ²/n.
+  // Variance of the median of n normal readings: π/2 σ²/n.
   const double sigma =
       std::sqrt(variance * (readings.size() > 1 ? 0.5 * std::numbers::pi : 1.0) / static_cast<double>(readings.size()));
   return Tilt{rolls[static_cast<std::size_t>(middle)], pitches[static_cast<std::size_t>(middle)], sigma};
@@ -98,7 +99,7 @@ Pose first_pose(const Eigen::Vector3d& up_in_body, const Eigen::Vector3d& ahead_
   if (ahead.norm() < 1e-3) ahead = horizontal(Eigen::Vector3d::UnitX());
   if (ahead.norm() < 1e-3) ahead = horizontal(Eigen::Vector3d::UnitY());
   ahead.normalize();
-  Eigen::Matrix3d level_from_body;  // rows: axes seen from the body
+  Eigen::Matrix3d level_from_body;  // rows: axes in the body frame
   level_from_body.row(0) = ahead;
   level_from_body.row(1) = up.cross(ahead);
   level_from_body.row(2) = up;

@@ -20,38 +20,38 @@ std::vector<ImuSample> resting(const Eigen::Vector3d& force, double scatter, int
   return samples;
 }
 
-TEST(StartFrame, ReadsRest) {
+TEST(StartFrame, AveragesStaticReadings) {
   const Eigen::Vector3d force(0.1, -0.2, 3.7);
   const auto rest = static_reading(resting(force, 0.01, 400), test_options());
   ASSERT_TRUE(rest.has_value());
-  EXPECT_TRUE(rest->still);
+  EXPECT_TRUE(rest->stationary);
   EXPECT_LE((rest->accel_m_s2 - force).norm(), 5 * 0.01 / 20);
   EXPECT_NEAR(rest->accel_sigma_m_s2, test_options().imu.accel_noise_m_s2_sqrt_hz / 2, 1e-5);
 }
 
-TEST(StartFrame, ReadsNoRestFromOtherUnitsMotionOrTooLittle) {
+TEST(StartFrame, RefusesOtherUnitsMotionAndTooFewSamples) {
   EXPECT_FALSE(static_reading(resting({0, 0, 1}, 0.01, 400), test_options()));
   EXPECT_FALSE(static_reading(resting({0, 0, 3.71}, 0.5, 400), test_options()));
   EXPECT_FALSE(static_reading(resting({0, 0, 3.71}, 0.01, 9), test_options()));
   const auto shaken = static_reading(resting({0, 0, 3.71}, 0.1, 400), test_options());
   ASSERT_TRUE(shaken.has_value());
-  EXPECT_FALSE(shaken->still);
+  EXPECT_FALSE(shaken->stationary);
   EXPECT_GT(shaken->accel_sigma_m_s2, 0.05);
   auto broken = resting({0, 0, 3.71}, 0.01, 400);
   broken[7].accel_m_s2.x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(static_reading(broken, test_options())->accel_m_s2.allFinite());
 }
 
-TEST(StartFrame, HeadingIsTheOneMostAgreeOn) {
+TEST(StartFrame, HeadingIsTheConsensus) {
   const std::vector<CompassSample> readings{{{}, 3.13, 0.02}, {{}, -1.0, 0.02}, {{}, -3.14, 0.02}, {{}, 3.12, 0.02}};
-  const auto heading = agreed_heading(readings, 1e-3);
+  const auto heading = consensus_heading(readings, 1e-3);
   ASSERT_TRUE(heading.has_value());
   EXPECT_NEAR(std::remainder(heading->radians - (3.13 + 3.12 + 2 * std::numbers::pi - 3.14) / 3, 2 * std::numbers::pi),
               0, 1e-9);
   EXPECT_NEAR(heading->sigma_rad, 0.02 / std::sqrt(3.0), 1e-9);
-  EXPECT_FALSE(agreed_heading(std::vector<CompassSample>{{{}, 1, 0.02}, {{}, 2, 0.02}}, 1e-3));
-  EXPECT_FALSE(agreed_heading({}, 1e-3));
-  EXPECT_NEAR(agreed_heading(std::vector<CompassSample>{{{}, 1, 0.02}}, 1e-3)->radians, 1, 1e-12);
+  EXPECT_FALSE(consensus_heading(std::vector<CompassSample>{{{}, 1, 0.02}, {{}, 2, 0.02}}, 1e-3));
+  EXPECT_FALSE(consensus_heading({}, 1e-3));
+  EXPECT_NEAR(consensus_heading(std::vector<CompassSample>{{{}, 1, 0.02}}, 1e-3)->radians, 1, 1e-12);
 }
 
 TEST(StartFrame, TiltIsTheMedian) {
@@ -63,13 +63,13 @@ TEST(StartFrame, TiltIsTheMedian) {
   EXPECT_FALSE(median_tilt({}, 1e-3));
 }
 
-TEST(StartFrame, FirstPoseIsLevelAndLooksAhead) {
+TEST(StartFrame, FirstPoseIsLevelWithTheGivenHeading) {
   const Eigen::Vector3d up = Eigen::Vector3d(0.1, -0.2, 1).normalized(), ahead(1, 0.3, -0.8);
   const Pose pose = first_pose(up, ahead, 0.4);
   EXPECT_LE((pose.rotation() * up - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
   const Eigen::Vector3d looks = pose.rotation() * ahead;
   EXPECT_NEAR(std::atan2(looks.y(), looks.x()), 0.4, 1e-12);
-  // A camera that looks straight down: body x leads.
+  // A camera that looks straight down: body x replaces its axis.
   EXPECT_NEAR(heading_of(first_pose(Eigen::Vector3d::UnitZ(), -Eigen::Vector3d::UnitZ(), 0)), 0, 1e-12);
 }
 

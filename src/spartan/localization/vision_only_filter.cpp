@@ -7,7 +7,7 @@ void VisionOnlyFilter::start(Stamp stamp, const Pose& world_from_body) {
   world_from_own_ = world_from_body * localizer_.estimate().world_from_body.pose.inverse();
 }
 
-// Perturbations stand on the right, so covariances are the same in either world.
+// Right perturbations: covariances are the same in either world.
 bool VisionOnlyFilter::add(PoseConstraint constraint) {
   constraint.world_from_body = world_from_own_.inverse() * constraint.world_from_body;
   return localizer_.add(constraint);
@@ -31,7 +31,7 @@ Status VisionOnlyFilter::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
   const Pose world_from_own = in.get_pose();
   const auto localizer = in.get_array<std::uint8_t>();
-  if (Status s = in.finish("memory of the vision's track"); !s) return s;
+  if (Status s = in.finish("memory of the vision-only filter"); !s) return s;
   if (Status s = localizer_.restore(localizer); !s) return s;
   world_from_own_ = world_from_own;
   return {};

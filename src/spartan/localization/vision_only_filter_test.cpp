@@ -10,7 +10,7 @@ namespace {
 TEST(VisionOnlyFilter, ComposesTheMotionsInTheGivenWorld) {
   const TestDrive drive;
   const Pose first(exp_so3({0.1, -0.2, 0.7}), {1, 2, 3});
-  const LocalizationOptions options;  // with errors that last
+  const LocalizationOptions options;  // with drift
   VisionOnlyFilter track(options);
   track.start(test_stamp(2.5), first);
   UncertainPose composed{first, Matrix6d::Zero()};
@@ -22,8 +22,8 @@ TEST(VisionOnlyFilter, ComposesTheMotionsInTheGivenWorld) {
   const UncertainPose pose = track.world_from_body();
   EXPECT_LE(log_se3(pose.pose.inverse() * composed.pose).norm(), 1e-6);
   for (int i = 0; i < 6; ++i)
-    EXPECT_GT(pose.covariance(i, i), 1.5 * composed.covariance(i, i)) << "errors that last grow faster: " << i;
-  // The map speaks in that world too.
+    EXPECT_GT(pose.covariance(i, i), 1.5 * composed.covariance(i, i)) << "drift grows faster: " << i;
+  // Map constraints are in that world too.
   const Pose seen = pose.pose * Pose::from_translation({3e-4, -3e-4, 0});
   EXPECT_TRUE(track.add(PoseConstraint{test_stamp(62.5), seen, 1e12 * Matrix6d::Identity()}));
   EXPECT_LE(log_se3(track.world_from_body().pose.inverse() * seen).norm(), 1e-5);

@@ -5,7 +5,7 @@
 namespace spartan {
 namespace {
 
-TEST(ChiSquare, HasTheQuantilesOfTheTables) {
+TEST(ChiSquare, MatchesTabulatedQuantiles) {
   EXPECT_NEAR(chi_square_quantile(0.95, 1), 3.841459, 1e-6);
   EXPECT_NEAR(chi_square_quantile(0.99, 2), 9.210340, 1e-6);
   EXPECT_NEAR(chi_square_quantile(0.999, 3), 16.266236, 1e-6);

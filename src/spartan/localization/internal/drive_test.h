@@ -1,4 +1,4 @@
-// For the tests of this module alone: a drive in closed form with the samples of ideal and noisy sensors.
+// Test fixture of this module: a drive in closed form with the samples of ideal and noisy sensors.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ inline Stamp test_stamp(double seconds) {
   return {1'000'000'000'000 + std::llround(seconds * 1e9)};
 }
 
-/// A rover that rests for 2.5 s, then winds over waves at 6 cm/s.
+/// A rover that is stationary for 2.5 s and then drives a winding path over waves at 6 cm/s.
 struct TestDrive {
   double gravity_m_s2 = 3.71;
   double speed_m_s = 0.06;
@@ -49,7 +49,7 @@ struct TestDrive {
     return {test_stamp(t), log_so3(before.rotation().conjugate() * after.rotation()) / (2 * h),
             now.rotation().conjugate() * (acceleration + Eigen::Vector3d(0, 0, gravity_m_s2))};
   }
-  /// Length of the way, by which wheels count.
+  /// Path length, which the wheels count.
   double rolled(double t) const {
     double sum = 0;
     for (double s = 2.5; s < t; s += 0.05)
@@ -112,7 +112,7 @@ inline std::vector<Measurement> test_samples(const TestDrive& drive, double seco
   return samples;
 }
 
-/// Visual motions from 2.5 s on, every 1.5 s, with noise of the covariance that they state.
+/// Visual motions from 2.5 s on, every 1.5 s, with noise of their covariance.
 inline std::vector<Measurement> test_motions(const TestDrive& drive, double seconds, double noise, std::uint64_t seed) {
   Random random(seed, 78);
   std::vector<Measurement> motions;
@@ -126,14 +126,14 @@ inline std::vector<Measurement> test_motions(const TestDrive& drive, double seco
   return motions;
 }
 
-/// The whole drive, as it would come from a rover.
+/// All samples of the drive in order of time.
 inline std::vector<Measurement> in_order(std::vector<Measurement> a, const std::vector<Measurement>& b) {
   a.insert(a.end(), b.begin(), b.end());
   std::stable_sort(a.begin(), a.end(), comes_before);
   return a;
 }
 
-/// Starts at 2.5 s and takes everything.
+/// A localizer that starts at 2.5 s and is given all samples.
 inline Localizer driven(const LocalizationOptions& options, const std::vector<Measurement>& all) {
   Localizer localizer(options);
   bool started = false;

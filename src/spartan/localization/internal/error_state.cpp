@@ -57,10 +57,10 @@ Eigen::Vector2d tilt_of_up(const Eigen::Vector3d& up) {
   return axis * (std::atan2(sine, up.z()) / sine);
 }
 
-void clone_pose(Belief& belief, int index) {
-  (index == error_at::kVisionClone ? belief.state.world_from_vision_clone : belief.state.world_from_step_clone) =
-      belief.state.world_from_body;
-  ErrorCovariance& p = belief.covariance;
+void clone_pose(StateEstimate& estimate, int index) {
+  (index == error_at::kVisionClone ? estimate.state.world_from_vision_clone : estimate.state.world_from_step_clone) =
+      estimate.state.world_from_body;
+  ErrorCovariance& p = estimate.covariance;
   p.middleRows<6>(index) = p.middleRows<6>(error_at::kPose).eval();
   p.middleCols<6>(index) = p.middleCols<6>(error_at::kPose).eval();
 }

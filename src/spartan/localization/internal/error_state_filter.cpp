@@ -12,14 +12,18 @@
 namespace spartan {
 namespace {
 
-constexpr double kLargestRate_rad_s = 35, kLargestForce_m_s2 = 300;
-/// Of what defines the world: only so large that nothing divides by zero.
+/// Physical range of IMU readings of a rover: about 2000 °/s and 30 g; empirical.
+constexpr double kMaxRate_rad_s = 35, kMaxForce_m_s2 = 300;
+/// Standard deviation of the first pose, which defines the world: just large enough to keep the covariance regular.
 constexpr double kExact = 1e-6;
+/// Initial standard deviations: of quantities that were not measured, of the velocity of a stationary rover, and of the
+/// vertical before the static alignment corrects it.
 constexpr double kUnknownSpeed_m_s = 20, kRestingSpeed_m_s = 0.01;
-constexpr double kLevelledTilt_rad = 0.2, kUnknownTilt_rad = 0.35, kUnknownHeading_rad = 10;
-/// How much a rover accelerates on the mean of a second while its IMU finds gravity.
+constexpr double kAlignedTilt_rad = 0.2, kUnknownTilt_rad = 0.35, kUnknownHeading_rad = 10;
+/// Standard deviation of a rover's mean acceleration during gravity alignment.
 constexpr double kLevelError_m_s2 = 0.1;
-constexpr double kLongestStep_s = 60;
+/// Longest step of the constant-velocity model: beyond it the covariance stops growing.
+constexpr double kMaxStep_s = 60;
 
 void set_variance(ErrorCovariance& p, int at, int size, double sigma) {
   p.diagonal().segment(at, size).setConstant(sigma * sigma);
@@ -60,8 +64,8 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   const auto imu = only<ImuSample>(before);
   const auto wheels = only<WheelSample>(before);
   const auto rest = static_reading(imu, options_);
-  const auto tilt = median_tilt(only<InclinometerSample>(before), options_.inclinometer.least_sigma_rad);
-  const auto heading = agreed_heading(only<CompassSample>(before), options_.compass.least_sigma_rad);
+  const auto tilt = median_tilt(only<InclinometerSample>(before), options_.inclinometer.min_sigma_rad);
+  const auto heading = consensus_heading(only<CompassSample>(before), options_.compass.min_sigma_rad);
   const Eigen::Vector3d up = rest   ? rest->accel_m_s2.normalized()
                              : tilt ? up_of_roll_pitch(tilt->roll_rad, tilt->pitch_rad)
                                     : up_in_body.value_or(Eigen::Vector3d::UnitZ());
@@ -69,19 +73,19 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   FilterMemory m;
   m.started = true;
   m.stamp = stamp;
-  m.imu.levelled = rest || tilt;  // what came from elsewhere is good to say where up is, not to integrate by
-  m.gravity_measured = m.imu.levelled || up_in_body;
+  m.imu.aligned = rest || tilt;  // up_in_body alone is not accurate enough for inertial integration
+  m.gravity_measured = m.imu.aligned || up_in_body;
   m.compass.heading_east = m.compass.offset_known = heading.has_value();
-  NavigationState& s = m.belief.state;
+  NavigationState& s = m.estimate.state;
   s.world_from_body = first_pose(up, ahead_in_body, 0);
   if (heading) s.world_from_body = first_pose(up, ahead_in_body, heading->radians - heading_of(s.world_from_body));
 
-  ErrorCovariance& p = m.belief.covariance;
+  ErrorCovariance& p = m.estimate.covariance;
   set_variance(p, error_at::kPose, 6, kExact);
-  set_variance(p, error_at::kVelocity, 3, rest && rest->still ? kRestingSpeed_m_s : kUnknownSpeed_m_s);
+  set_variance(p, error_at::kVelocity, 3, rest && rest->stationary ? kRestingSpeed_m_s : kUnknownSpeed_m_s);
   set_variance(p, error_at::kGyroBias, 3, std::max(options_.imu.gyro_bias_rad_s, 1e-9));
   set_variance(p, error_at::kAccelBias, 3, std::max(options_.imu.accel_bias_m_s2, 1e-9));
-  set_variance(p, error_at::kGravityTilt, 2, m.imu.levelled ? kLevelledTilt_rad : kUnknownTilt_rad);
+  set_variance(p, error_at::kGravityTilt, 2, m.imu.aligned ? kAlignedTilt_rad : kUnknownTilt_rad);
   set_variance(p, error_at::kWheelScale, 1, std::max(options_.wheels.scale_sigma, 1e-6));
   set_variance(p, error_at::kCompassOffset, 1,
                heading ? std::hypot(heading->sigma_rad, options_.compass.offset_sigma_rad) : kUnknownHeading_rad);
@@ -89,37 +93,37 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   p.diagonal().segment<6>(error_at::kVisionDrift) = drift_sigmas_.cwiseAbs2().cwiseMax(1e-12);
   p.diagonal().segment<6>(error_at::kVisionConstant) = constant_sigmas_.cwiseAbs2().cwiseMax(1e-12);
 
-  // What the means say of tilt and biases; the pose defines the world and stays.
+  // Static alignment: the means update tilt and biases; the pose defines the world and is not changed.
   if (rest) {
-    correct(m.belief, rest_innovation(s, rest->accel_m_s2, rest->accel_sigma_m_s2, options_.gravity_m_s2));
-    if (rest->still) {
+    correct(m.estimate, rest_innovation(s, rest->accel_m_s2, rest->accel_sigma_m_s2, options_.gravity_m_s2));
+    if (rest->stationary) {
       Innovation bias(3);
       bias.residual = rest->gyro_rad_s - s.gyro_bias_rad_s;
       bias.jacobian.middleCols<3>(error_at::kGyroBias).setIdentity();
       bias.noise.diagonal().setConstant(rest->gyro_sigma_rad_s * rest->gyro_sigma_rad_s);
-      correct(m.belief, bias);
+      correct(m.estimate, bias);
     }
   }
-  if (tilt) correct(m.belief, inclinometer_innovation(s, tilt->roll_rad, tilt->pitch_rad, tilt->sigma_rad));
+  if (tilt) correct(m.estimate, inclinometer_innovation(s, tilt->roll_rad, tilt->pitch_rad, tilt->sigma_rad));
 
-  clone_pose(m.belief, error_at::kVisionClone);
-  clone_pose(m.belief, error_at::kStepClone);
+  clone_pose(m.estimate, error_at::kVisionClone);
+  clone_pose(m.estimate, error_at::kStepClone);
   m.world_from_odom = Pose();
   m.vision.clone_stamp = m.step.from = stamp;
   m.vision.odom_from_clone = m.step.odom_from_clone = s.world_from_body;
-  for (const Measurement& sample : before) m.judge(sensor_of(sample)).see(stamp_of_measurement(sample));
-  m.judge(LocalizationSensor::vision).see(stamp);
+  for (const Measurement& sample : before) m.monitor(sensor_of(sample)).see(stamp_of_measurement(sample));
+  m.monitor(LocalizationSensor::vision).see(stamp);
   if (!imu.empty()) {
-    m.imu.known = m.imu.turn_whole = true;
+    m.imu.known = m.imu.gyro_rotation_complete = true;
     m.imu.last = imu.back();
-    m.imu.changed = m.imu.block.from = m.imu.level_from = imu.back().stamp;
+    m.imu.changed = m.imu.block.from = m.imu.align_from = imu.back().stamp;
   }
   if (!wheels.empty()) {
     m.wheels.known = true;
     m.wheels.last = m.wheels.previous = wheels.back();
     m.wheels.moved = *std::find_if(wheels.begin(), wheels.end(), [&](const WheelSample& w) {
-      return std::abs(w.left_m - wheels.back().left_m) <= options_.standing.wheels_still_m &&
-             std::abs(w.right_m - wheels.back().right_m) <= options_.standing.wheels_still_m;
+      return std::abs(w.left_m - wheels.back().left_m) <= options_.zero_velocity.wheels_stationary_m &&
+             std::abs(w.right_m - wheels.back().right_m) <= options_.zero_velocity.wheels_stationary_m;
     });
     m.step.has_wheels = seconds_between(wheels.back().stamp, stamp) < options_.health.wheels_timeout_s;
     m.step.wheels = wheels.back();
@@ -128,59 +132,64 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
 }
 
 void ErrorStateFilter::process(const Measurement& measurement) {
-  memory_.judge(sensor_of(measurement)).see(stamp_of_measurement(measurement));
-  std::visit([this](const auto& value) { take(value); }, measurement);
+  memory_.monitor(sensor_of(measurement)).see(stamp_of_measurement(measurement));
+  std::visit([this](const auto& value) { update(value); }, measurement);
 }
 
 bool ErrorStateFilter::inertial_usable() const {
-  return memory_.imu.known && memory_.imu.levelled &&
-         memory_.judge(LocalizationSensor::imu).state != SensorState::excluded;
+  return memory_.imu.known && memory_.imu.aligned &&
+         memory_.monitor(LocalizationSensor::imu).state != SensorState::excluded;
 }
 
-// With an IMU sample at the end of the step both ends are known; else the last reading is held for a while.
-void ErrorStateFilter::move_to(Stamp stamp, const ImuSample* reached) {
+// With an IMU sample at the end of the step both ends are measured; otherwise the last reading is held up to the
+// timeout.
+void ErrorStateFilter::propagate_to(Stamp stamp, const ImuSample* reached) {
   const double seconds = seconds_between(memory_.stamp, stamp);
   if (!(seconds > 0)) return;
   const ImuSample& last = memory_.imu.last;
   if (inertial_usable() && seconds_between(last.stamp, stamp) <= options_.imu.timeout_s) {
     if (reached != nullptr) {
-      move_inertially(seconds, between(last, *reached, memory_.stamp), *reached);
+      propagate_inertially(seconds, between(last, *reached, memory_.stamp), *reached);
     } else {
-      move_inertially(seconds, last, last);
+      propagate_inertially(seconds, last, last);
     }
   } else {
-    move_steadily(std::min(seconds, kLongestStep_s));
+    propagate_at_constant_velocity(std::min(seconds, kMaxStep_s));
   }
-  walk_biases(seconds);
+  propagate_biases(seconds);
   memory_.stamp = stamp;
 }
 
-void ErrorStateFilter::move_inertially(double seconds, const ImuSample& from, const ImuSample& to) {
+void ErrorStateFilter::propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to) {
   const InertialStep step{from.gyro_rad_s, to.gyro_rad_s, from.accel_m_s2, to.accel_m_s2, seconds};
   const InertialNoise noise{options_.imu.gyro_noise_rad_s_sqrt_hz, options_.imu.accel_noise_m_s2_sqrt_hz,
                             options_.imu.gyro_walk_rad_s2_sqrt_hz, options_.imu.accel_walk_m_s3_sqrt_hz};
-  move_on(memory_.belief.covariance, transition(memory_.belief.state, step, noise, options_.gravity_m_s2));
-  memory_.belief.state = propagate(memory_.belief.state, step, options_.gravity_m_s2);
+  propagate_covariance(memory_.estimate.covariance,
+                       transition(memory_.estimate.state, step, noise, options_.gravity_m_s2));
+  memory_.estimate.state = propagate(memory_.estimate.state, step, options_.gravity_m_s2);
 }
 
-void ErrorStateFilter::move_steadily(double seconds) {
-  const UnmeasuredMotionOptions& o = options_.unmeasured;
+void ErrorStateFilter::propagate_at_constant_velocity(double seconds) {
+  const ConstantVelocityOptions& o = options_.constant_velocity;
   VisionMemory& vision = memory_.vision;
-  const SteadyStep step{vision.rate_rad_s, seconds};
-  const double speed = memory_.belief.state.velocity_m_s.norm(), rate = vision.rate_rad_s.norm();
-  // A rover that rocks leaves its last rate slowly: the attitude is off by σ t, and (t + dt)² − t² = (2 t + dt) dt.
-  const double turn = o.turn_share * (rate + o.turn_floor_rad_s) * std::sqrt(2 * vision.unmeasured_s + seconds);
-  const SteadyNoise noise{o.speed_share_sqrt_hz * (speed + o.speed_floor_m_s), turn};
-  const Transition t = transition(memory_.belief.state, step, noise);
+  const ConstantVelocityStep step{vision.rate_rad_s, seconds};
+  const double speed = memory_.estimate.state.velocity_m_s.norm(), rate = vision.rate_rad_s.norm();
+  // The angular rate of a rocking rover changes slowly, so that the attitude error grows as σ t;
+  // (t + dt)² − t² = (2 t + dt) dt.
+  const double rotation =
+      o.turn_share * (rate + o.turn_floor_rad_s) * std::sqrt(2 * vision.constant_velocity_s + seconds);
+  const ConstantVelocityNoise noise{o.speed_share_sqrt_hz * (speed + o.speed_floor_m_s), rotation};
+  const Transition t = transition(memory_.estimate.state, step, noise);
   const Matrix9d by = t.by_moving.topLeftCorner<9, 9>();
-  vision.unmeasured_noise = (by * vision.unmeasured_noise * by.transpose()).eval() + t.noise.topLeftCorner<9, 9>();
-  vision.unmeasured_s += seconds;
-  move_on(memory_.belief.covariance, t);
-  memory_.belief.state = propagate(memory_.belief.state, step);
+  vision.constant_velocity_noise =
+      (by * vision.constant_velocity_noise * by.transpose()).eval() + t.noise.topLeftCorner<9, 9>();
+  vision.constant_velocity_s += seconds;
+  propagate_covariance(memory_.estimate.covariance, t);
+  memory_.estimate.state = propagate(memory_.estimate.state, step);
 }
 
-void ErrorStateFilter::walk_biases(double seconds) {
-  ErrorCovariance& p = memory_.belief.covariance;
+void ErrorStateFilter::propagate_biases(double seconds) {
+  ErrorCovariance& p = memory_.estimate.covariance;
   const auto square = [](double x) { return x * x; };
   if (p(error_at::kWheelScale, error_at::kWheelScale) < square(options_.wheels.scale_sigma))
     p(error_at::kWheelScale, error_at::kWheelScale) += square(options_.wheels.scale_walk_sqrt_hz) * seconds;
@@ -189,122 +198,123 @@ void ErrorStateFilter::walk_biases(double seconds) {
       square(options_.inclinometer.bias_walk_rad_sqrt_hz) * seconds;
 }
 
-void ErrorStateFilter::take(const ImuSample& sample) {
-  judge_reading(sample);
-  turn_by_gyro(sample);
-  move_to(sample.stamp, &sample);
-  if (inertial_usable()) ++memory_.judge(LocalizationSensor::imu).used;
+void ErrorStateFilter::update(const ImuSample& sample) {
+  check_reading(sample);
+  integrate_gyro(sample);
+  propagate_to(sample.stamp, &sample);
+  if (inertial_usable()) ++memory_.monitor(LocalizationSensor::imu).used;
   InertialMemory& imu = memory_.imu;
   if (!imu.known) {
     imu.known = true;
-    imu.changed = imu.block.from = imu.level_from = sample.stamp;
+    imu.changed = imu.block.from = imu.align_from = sample.stamp;
   }
   imu.last = sample;
-  if (!imu.levelled) find_level(sample);
-  watch_stillness(sample);
+  if (!imu.aligned) align_to_gravity(sample);
+  detect_stationary(sample);
 }
 
-/// Readings that no rover can have, or that do not change, exclude the IMU; others bring it back.
-void ErrorStateFilter::judge_reading(const ImuSample& sample) {
-  SensorJudge& judge = memory_.judge(LocalizationSensor::imu);
+/// Readings beyond the physical range of a rover, and frozen ones, exclude the IMU; others readmit it.
+void ErrorStateFilter::check_reading(const ImuSample& sample) {
+  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::imu);
   InertialMemory& imu = memory_.imu;
   const bool same = imu.known && imu.last.gyro_rad_s == sample.gyro_rad_s && imu.last.accel_m_s2 == sample.accel_m_s2;
   if (!same) imu.changed = sample.stamp;
-  const bool possible = sample.gyro_rad_s.cwiseAbs().maxCoeff() < kLargestRate_rad_s &&
-                        sample.accel_m_s2.cwiseAbs().maxCoeff() < kLargestForce_m_s2;
+  const bool possible = sample.gyro_rad_s.cwiseAbs().maxCoeff() < kMaxRate_rad_s &&
+                        sample.accel_m_s2.cwiseAbs().maxCoeff() < kMaxForce_m_s2;
   const bool frozen = same && seconds_between(imu.changed, sample.stamp) >= options_.imu.frozen_s;
   if (!possible || frozen) {
-    ++judge.rejected;
-    judge.exclude(possible ? HealthReason::frozen : HealthReason::out_of_range);
-  } else if (judge.state == SensorState::excluded && judge.reason != HealthReason::overruled && !same) {
-    if (++judge.passed_in_row >= options_.health.back_after) judge.readmit();
+    ++monitor.rejected;
+    monitor.exclude(possible ? HealthReason::frozen : HealthReason::out_of_range);
+  } else if (monitor.state == SensorState::excluded && monitor.reason != HealthReason::contradicted && !same) {
+    if (++monitor.passed_in_row >= options_.health.readmit_after) monitor.readmit();
   }
 }
 
-void ErrorStateFilter::turn_by_gyro(const ImuSample& sample) {
+void ErrorStateFilter::integrate_gyro(const ImuSample& sample) {
   InertialMemory& imu = memory_.imu;
   if (!imu.known) return;
   const Stamp from = std::max(imu.last.stamp, memory_.vision.clone_stamp);
   const double seconds = seconds_between(from, sample.stamp);
-  if (seconds_between(imu.last.stamp, sample.stamp) > options_.imu.timeout_s) imu.turn_whole = false;
+  if (seconds_between(imu.last.stamp, sample.stamp) > options_.imu.timeout_s) imu.gyro_rotation_complete = false;
   if (!(seconds > 0)) return;
-  const Eigen::Vector3d rate = 0.5 * (imu.last.gyro_rad_s + sample.gyro_rad_s) - memory_.belief.state.gyro_bias_rad_s;
-  imu.turn = (imu.turn * exp_so3(rate * seconds)).normalized();
-  imu.turn_s += seconds;
+  const Eigen::Vector3d rate = 0.5 * (imu.last.gyro_rad_s + sample.gyro_rad_s) - memory_.estimate.state.gyro_bias_rad_s;
+  imu.gyro_rotation = (imu.gyro_rotation * exp_so3(rate * seconds)).normalized();
+  imu.gyro_rotation_s += seconds;
 }
 
-/// An IMU that starts during the drive: the mean force over a while points up, but for a rover's accelerations.
-void ErrorStateFilter::find_level(const ImuSample& sample) {
+/// Gravity alignment of an IMU that starts during the drive: the mean specific force points up, but for the rover's
+/// accelerations.
+void ErrorStateFilter::align_to_gravity(const ImuSample& sample) {
   InertialMemory& imu = memory_.imu;
-  NavigationState& s = memory_.belief.state;
-  imu.level_force += s.world_from_body.rotation() * sample.accel_m_s2;
-  ++imu.level_count;
-  if (seconds_between(imu.level_from, sample.stamp) < options_.imu.level_after_s) return;
-  const Eigen::Vector3d mean = imu.level_force / imu.level_count;
-  imu.level_from = sample.stamp;
-  imu.level_force.setZero();
-  imu.level_count = 0;
-  SensorJudge& judge = memory_.judge(LocalizationSensor::imu);
+  NavigationState& s = memory_.estimate.state;
+  imu.align_force_sum += s.world_from_body.rotation() * sample.accel_m_s2;
+  ++imu.align_count;
+  if (seconds_between(imu.align_from, sample.stamp) < options_.imu.alignment_s) return;
+  const Eigen::Vector3d mean = imu.align_force_sum / imu.align_count;
+  imu.align_from = sample.stamp;
+  imu.align_force_sum.setZero();
+  imu.align_count = 0;
+  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::imu);
   if (std::abs(mean.norm() - options_.gravity_m_s2) > 0.05 * options_.gravity_m_s2 || mean.z() <= 0) {
-    judge.state = SensorState::suspect;
-    judge.reason = HealthReason::out_of_range;
+    monitor.state = SensorState::suspect;
+    monitor.reason = HealthReason::out_of_range;
     return;
   }
   s.gravity_tilt_rad = tilt_of_up(mean);
   correct_world(
       rest_innovation(s, s.world_from_body.rotation().conjugate() * mean, kLevelError_m_s2, options_.gravity_m_s2));
-  imu.levelled = true;
-  judge.readmit();
+  imu.aligned = true;
+  monitor.readmit();
 }
 
-void ErrorStateFilter::watch_stillness(const ImuSample& sample) {
-  StillnessBlock& b = memory_.imu.block;
+void ErrorStateFilter::detect_stationary(const ImuSample& sample) {
+  StationaryBlock& b = memory_.imu.block;
   b.gyro += sample.gyro_rad_s;
   b.accel += sample.accel_m_s2;
   b.gyro_squares += sample.gyro_rad_s.cwiseAbs2();
   b.accel_squares += sample.accel_m_s2.cwiseAbs2();
   ++b.count;
-  if (seconds_between(b.from, sample.stamp) < options_.standing.block_s) return;
+  if (seconds_between(b.from, sample.stamp) < options_.zero_velocity.block_s) return;
   const auto scatter = [&](const Eigen::Vector3d& squares, const Eigen::Vector3d& sum) {
     return std::sqrt((squares / b.count - (sum / b.count).cwiseAbs2()).cwiseMax(0).maxCoeff());
   };
-  const Eigen::Vector3d rate = b.gyro / b.count - memory_.belief.state.gyro_bias_rad_s;
-  const bool still = b.count >= 3 && scatter(b.gyro_squares, b.gyro) < options_.imu.still_gyro_rad_s &&
-                     scatter(b.accel_squares, b.accel) < options_.imu.still_accel_m_s2 &&
-                     rate.norm() < options_.imu.still_gyro_rad_s;
+  const Eigen::Vector3d rate = b.gyro / b.count - memory_.estimate.state.gyro_bias_rad_s;
+  const bool stationary = b.count >= 3 && scatter(b.gyro_squares, b.gyro) < options_.imu.stationary_gyro_rad_s &&
+                          scatter(b.accel_squares, b.accel) < options_.imu.stationary_accel_m_s2 &&
+                          rate.norm() < options_.imu.stationary_gyro_rad_s;
   b = {};
   b.from = sample.stamp;
-  hold_still(still);
+  update_zero_velocity(stationary);
 }
 
-bool ErrorStateFilter::judge(LocalizationSensor sensor, double square, int rows, HealthReason why) {
-  return memory_.judge(sensor).judge(square, gates_[static_cast<std::size_t>(rows)], why,
-                                     options_.health.excluded_after, options_.health.back_after);
+bool ErrorStateFilter::accept(LocalizationSensor sensor, double nis, int rows, HealthReason why) {
+  return memory_.monitor(sensor).accept(nis, gates_[static_cast<std::size_t>(rows)], why,
+                                        options_.health.excluded_after, options_.health.readmit_after);
 }
 
 void ErrorStateFilter::correct_world(const Innovation& innovation) {
-  const Pose before = memory_.belief.state.world_from_body;
-  if (correct(memory_.belief, innovation)) keep_odom(before);
+  const Pose before = memory_.estimate.state.world_from_body;
+  if (correct(memory_.estimate, innovation)) preserve_odom(before);
 }
 
-// Matches one after the other err alike (the same rocks, seen from afar first): they are no witness of a drift that
-// vision keeps.
+// Errors of consecutive map matches are correlated (the same rocks, seen from afar first), so they must not update the
+// drift states of vision (Schmidt).
 void ErrorStateFilter::correct_by_map(const Innovation& innovation) {
-  const Pose before = memory_.belief.state.world_from_body;
+  const Pose before = memory_.estimate.state.world_from_body;
   constexpr int kDrift = error_at::kVisionDrift, kCount = error_at::kVisionClone - error_at::kVisionDrift;
-  if (correct_all_but(memory_.belief, innovation, kDrift, kCount)) keep_odom(before);
+  if (correct_all_but(memory_.estimate, innovation, kDrift, kCount)) preserve_odom(before);
 }
 
-// odom_from_body stays as it was with the pose before: world_from_odom takes the change.
-void ErrorStateFilter::keep_odom(const Pose& world_from_body_before) {
+// odom_from_body is preserved: world_from_odom takes the correction.
+void ErrorStateFilter::preserve_odom(const Pose& world_from_body_before) {
   memory_.world_from_odom =
-      memory_.belief.state.world_from_body * world_from_body_before.inverse() * memory_.world_from_odom;
+      memory_.estimate.state.world_from_body * world_from_body_before.inverse() * memory_.world_from_odom;
 }
 
-// odom_from_body becomes what it was at the clone, moved on by the motion as it is now believed.
+// odom_from_body becomes its value at the clone times the corrected motion since.
 void ErrorStateFilter::correct_motion(const Innovation& innovation, int clone) {
-  if (!correct(memory_.belief, innovation)) return;
-  const NavigationState& s = memory_.belief.state;
+  if (!correct(memory_.estimate, innovation)) return;
+  const NavigationState& s = memory_.estimate.state;
   const Pose odom_from_body =
       (clone == error_at::kVisionClone ? memory_.vision.odom_from_clone : memory_.step.odom_from_clone) *
       motion_since_clone(s, clone).clone_from_body;
@@ -312,9 +322,9 @@ void ErrorStateFilter::correct_motion(const Innovation& innovation, int clone) {
 }
 
 UncertainPose ErrorStateFilter::odom_from_body() const {
-  const MotionSinceClone motion = motion_since_clone(memory_.belief.state, error_at::kVisionClone);
-  const Matrix6d covariance = motion.jacobian * memory_.belief.covariance * motion.jacobian.transpose();
-  const Pose odom_from_body = memory_.world_from_odom.inverse() * memory_.belief.state.world_from_body;
+  const MotionSinceClone motion = motion_since_clone(memory_.estimate.state, error_at::kVisionClone);
+  const Matrix6d covariance = motion.jacobian * memory_.estimate.covariance * motion.jacobian.transpose();
+  const Pose odom_from_body = memory_.world_from_odom.inverse() * memory_.estimate.state.world_from_body;
   UncertainPose odom =
       compose({memory_.vision.odom_from_clone, memory_.vision.odom_covariance}, {motion.clone_from_body, covariance});
   odom.pose = odom_from_body;

@@ -1,7 +1,7 @@
-// The localization filter: one measurement after the other, in the order of time.
+// The localization filter: processes measurements one by one in the order of time.
 //
-// An error-state Kalman filter (Solà 2017) with stochastic cloning (Roumeliotis & Burdick 2002) for motions measured
-// between two moments. docs/math/localization.md has the formulas.
+// An error-state Kalman filter (Solà 2017) with stochastic cloning (Roumeliotis & Burdick 2002) for relative motions
+// between two times. docs/math/localization.md has the formulas.
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@
 
 #include "spartan/localization/internal/filter_memory.h"
 #include "spartan/localization/internal/kalman_update.h"
-#include "spartan/localization/localization_options.h"
-#include "spartan/localization/measurement.h"
 #include "spartan/localization/internal/measurement_models.h"
 #include "spartan/localization/internal/propagation.h"
+#include "spartan/localization/localization_options.h"
+#include "spartan/localization/measurement.h"
 
 namespace spartan {
 
@@ -22,69 +22,69 @@ class ErrorStateFilter {
  public:
   explicit ErrorStateFilter(const LocalizationOptions& options);
 
-  /// Lays the world from what the sensors said before, and stands at its origin.
-  /// `before`: samples up to `stamp`, in order of time; motions and constraints among them do not count.
+  /// Initializes the filter at the origin of the world, whose axes follow from static alignment by the samples `before`
+  /// (up to `stamp`, in order of time; motions and constraints among them are ignored).
   void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before,
              const std::optional<Eigen::Vector3d>& up_in_body = {});
 
-  /// In the order of comes_before().
+  /// Measurements must be processed in the order of comes_before().
   void process(const Measurement& measurement);
 
   const FilterMemory& memory() const { return memory_; }
   void set_memory(const FilterMemory& memory) { memory_ = memory; }
 
-  /// odom_from_body with the covariance that has gathered since the start.
+  /// odom_from_body with the covariance accumulated since the start.
   UncertainPose odom_from_body() const;
 
  private:
-  // Time and IMU: error_state_filter.cpp.
-  void move_to(Stamp stamp, const ImuSample* reached);
-  void move_inertially(double seconds, const ImuSample& from, const ImuSample& to);
-  void move_steadily(double seconds);
-  void walk_biases(double seconds);
+  // Propagation and IMU: error_state_filter.cpp.
+  void propagate_to(Stamp stamp, const ImuSample* reached);
+  void propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to);
+  void propagate_at_constant_velocity(double seconds);
+  void propagate_biases(double seconds);
   bool inertial_usable() const;
-  void take(const ImuSample& sample);
-  void judge_reading(const ImuSample& sample);
-  void turn_by_gyro(const ImuSample& sample);
-  void find_level(const ImuSample& sample);
-  void watch_stillness(const ImuSample& sample);
+  void update(const ImuSample& sample);
+  void check_reading(const ImuSample& sample);
+  void integrate_gyro(const ImuSample& sample);
+  void align_to_gravity(const ImuSample& sample);
+  void detect_stationary(const ImuSample& sample);
 
-  // Motions between shots: shot_update.cpp.
-  void take(const RelativeMotion& motion);
-  bool measure_motion(const RelativeMotion& motion);
-  void let_drift(int index, const Vector6d& sigmas, double steps);
-  bool overrule_prediction(const Innovation& innovation, double square, const RelativeMotion& motion);
+  // Visual motions between frames: shot_update.cpp.
+  void update(const RelativeMotion& motion);
+  bool update_by_motion(const RelativeMotion& motion);
+  void propagate_drift(int index, const Vector6d& sigmas, double steps);
+  bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
   bool wheels_confirm_prediction(const RelativeMotion& motion) const;
   void compare_gyro(const RelativeMotion& motion);
-  void begin_shot(Stamp stamp);
+  void begin_frame(Stamp stamp);
 
-  // Wheels and standing: step_update.cpp.
-  void take(const WheelSample& sample);
-  void end_step_at_shot(Stamp stamp);
+  // Wheels and zero-velocity updates: step_update.cpp.
+  void update(const WheelSample& sample);
+  void end_step_at_frame(Stamp stamp);
   std::optional<WheelSample> wheels_at(Stamp stamp) const;
-  void measure_step(const WheelSample& sample);
+  void update_by_step(const WheelSample& sample);
   WheelStep step_to(const WheelSample& sample) const;
-  void state_slip(const WheelStep& step);
+  void estimate_slip(const WheelStep& step);
   void begin_step(const std::optional<WheelSample>& wheels);
-  void hold_still(bool imu_still);
-  bool wheels_stand() const;
-  bool still_stands();
+  void update_zero_velocity(bool imu_stationary);
+  bool wheels_stationary() const;
+  bool still_stationary();
 
-  // Directions and places: absolute_update.cpp.
-  void take(const CompassSample& sample);
-  void find_compass_offset(const CompassSample& sample, double sigma_rad);
-  void take(const InclinometerSample& sample);
-  void allow_for_rocking(const Innovation& innovation);
-  void take(const PoseConstraint& constraint);
-  void take(const LateConstraint& constraint);
-  void hear_map(const PoseConstraint& constraint, int pose);
+  // Absolute measurements: absolute_update.cpp.
+  void update(const CompassSample& sample);
+  void initialize_compass_offset(const CompassSample& sample, double sigma_rad);
+  void update(const InclinometerSample& sample);
+  void inflate_attitude(const Innovation& innovation);
+  void update(const PoseConstraint& constraint);
+  void update(const LateConstraint& constraint);
+  void apply_constraint(const PoseConstraint& constraint, int pose);
 
-  /// Corrections that leave odom where it is, and those that tell the motion since a clone.
+  /// Corrections that preserve odom_from_body, and corrections of the motion since a clone.
   void correct_world(const Innovation& innovation);
   void correct_by_map(const Innovation& innovation);
-  void keep_odom(const Pose& world_from_body_before);
+  void preserve_odom(const Pose& world_from_body_before);
   void correct_motion(const Innovation& innovation, int clone);
-  bool judge(LocalizationSensor sensor, double square, int rows, HealthReason why);
+  bool accept(LocalizationSensor sensor, double nis, int rows, HealthReason why);
 
   LocalizationOptions options_;
   Vector6d drift_sigmas_, constant_sigmas_;

@@ -40,7 +40,7 @@ struct Get {
   }
 };
 
-// Every field once, for both directions.
+// Lists every field once, for writing and reading.
 template <class Each, class State>
 void visit_state(Each& each, State& s) {
   each(s.world_from_body), each(s.velocity_m_s), each(s.gyro_bias_rad_s), each(s.accel_bias_m_s2);
@@ -56,34 +56,34 @@ void visit_wheels(Each& each, Wheels& w) {
 template <class Each, class Imu>
 void visit_imu(Each& each, Imu& m) {
   each(m.known), each(m.last.stamp), each(m.last.gyro_rad_s), each(m.last.accel_m_s2), each(m.changed);
-  each(m.levelled), each(m.level_from), each(m.level_count), each(m.level_force);
+  each(m.aligned), each(m.align_from), each(m.align_count), each(m.align_force_sum);
   each(m.block.from), each(m.block.count), each(m.block.gyro), each(m.block.accel);
   each(m.block.gyro_squares), each(m.block.accel_squares);
-  each(m.turn), each(m.turn_s), each(m.turn_whole);
+  each(m.gyro_rotation), each(m.gyro_rotation_s), each(m.gyro_rotation_complete);
 }
 
-template <class Each, class Judge>
-void visit_judge(Each& each, Judge& j) {
-  each(j.seen), each(j.last), each(j.state), each(j.reason), each(j.square), each(j.limit);
+template <class Each, class Monitor>
+void visit_monitor(Each& each, Monitor& j) {
+  each(j.seen), each(j.last), each(j.state), each(j.reason), each(j.nis), each(j.limit);
   each(j.used), each(j.rejected), each(j.passed_in_row), each(j.failed_in_row);
 }
 
 template <class Each, class Memory>
 void visit(Each& each, Memory& m) {
-  each(m.started), each(m.stamp), each(m.belief.covariance), each(m.world_from_odom), each(m.gravity_measured);
-  visit_state(each, m.belief.state);
+  each(m.started), each(m.stamp), each(m.estimate.covariance), each(m.world_from_odom), each(m.gravity_measured);
+  visit_state(each, m.estimate.state);
   visit_imu(each, m.imu);
-  each(m.vision.clone_stamp), each(m.vision.odom_from_clone), each(m.vision.odom_covariance), each(m.vision.stood);
-  each(m.vision.rate_rad_s), each(m.vision.unmeasured_noise), each(m.vision.unmeasured_s);
+  each(m.vision.clone_stamp), each(m.vision.odom_from_clone), each(m.vision.odom_covariance), each(m.vision.stationary);
+  each(m.vision.rate_rad_s), each(m.vision.constant_velocity_noise), each(m.vision.constant_velocity_s);
   each(m.step.from), each(m.step.odom_from_clone), each(m.step.has_wheels), visit_wheels(each, m.step.wheels);
-  each(m.step.standing);
+  each(m.step.stationary);
   each(m.wheels.known), visit_wheels(each, m.wheels.last), visit_wheels(each, m.wheels.previous),
       visit_wheels(each, m.wheels.moved);
   each(m.wheels.slip_known), each(m.wheels.slip_stamp), each(m.wheels.slip), each(m.wheels.slip_sigma);
   each(m.compass.heading_east), each(m.compass.offset_known), each(m.compass.pending);
   for (auto& offset : m.compass.offsets) each(offset);
   for (auto& sigma : m.compass.sigmas) each(sigma);
-  for (auto& judge : m.judges) visit_judge(each, judge);
+  for (auto& monitor : m.monitors) visit_monitor(each, monitor);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// All that the filter remembers from sample to sample.
+// The memory of the filter from sample to sample.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,8 +13,8 @@ namespace spartan {
 
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
-/// The IMU's readings over a short while, for their scatter.
-struct StillnessBlock {
+/// Sums of IMU readings over a block of time, for their scatter.
+struct StationaryBlock {
   Stamp from;
   double count = 0;
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = Eigen::Vector3d::Zero();
@@ -24,41 +24,42 @@ struct StillnessBlock {
 struct InertialMemory {
   bool known = false;
   ImuSample last;
-  Stamp changed;  ///< since when `last` has been read
-  bool levelled = false;
-  StillnessBlock block;
-  Stamp level_from;
-  double level_count = 0;
-  Eigen::Vector3d level_force = Eigen::Vector3d::Zero();     ///< sum, world
-  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();  ///< by the gyro alone since the last shot
-  double turn_s = 0;
-  bool turn_whole = false;
+  Stamp changed;  ///< when the reading last changed (frozen sensors)
+  bool aligned = false;
+  StationaryBlock block;
+  Stamp align_from;
+  double align_count = 0;
+  Eigen::Vector3d align_force_sum = Eigen::Vector3d::Zero();          ///< sum, world
+  Eigen::Quaterniond gyro_rotation = Eigen::Quaterniond::Identity();  ///< integrated gyro since the last frame
+  double gyro_rotation_s = 0;
+  bool gyro_rotation_complete = false;
 };
 
-/// Since the last shot.
+/// Since the last frame.
 struct VisionMemory {
   Stamp clone_stamp;
   Pose odom_from_clone;
   Matrix6d odom_covariance = Matrix6d::Zero();  ///< of odom_from_clone
-  bool stood = false;                           ///< the last motion was none
+  bool stationary = false;                      ///< the last visual motion was the identity
   Eigen::Vector3d rate_rad_s = Eigen::Vector3d::Zero();
-  Matrix9d unmeasured_noise = Matrix9d::Zero();  ///< of the time without an IMU: position, attitude, velocity
-  double unmeasured_s = 0;
+  /// Accumulated noise of the constant-velocity model (position, attitude, velocity), and for how long it was used.
+  Matrix9d constant_velocity_noise = Matrix9d::Zero();
+  double constant_velocity_s = 0;
 };
 
-/// The present step of the wheels (or of standing).
+/// The current step of the wheels, or the current stop.
 struct StepMemory {
   Stamp from;
   Pose odom_from_clone;
   bool has_wheels = false;
   WheelSample wheels;  ///< at its start
-  bool standing = false;
+  bool stationary = false;
 };
 
 struct WheelMemory {
   bool known = false;
   WheelSample last, previous;
-  WheelSample moved;  ///< the reading (and since when) that the last ones do not differ from
+  WheelSample moved;  ///< the first reading that the later ones do not differ from
   bool slip_known = false;
   Stamp slip_stamp;
   double slip = 0, slip_sigma = 0;
@@ -66,16 +67,16 @@ struct WheelMemory {
 
 struct CompassMemory {
   static constexpr std::size_t kPending = 5;
-  bool heading_east = false;  ///< the world's x is east, as far as the first readings say
+  bool heading_east = false;  ///< the world's x is east by the readings before the start
   bool offset_known = false;
   std::uint32_t pending = 0;
-  std::array<double, kPending> offsets{}, sigmas{};  ///< readings less heading, before the offset is known
+  std::array<double, kPending> offsets{}, sigmas{};  ///< reading − heading, until the offset is initialized
 };
 
 struct FilterMemory {
   bool started = false;
   Stamp stamp;
-  Belief belief;
+  StateEstimate estimate;
   Pose world_from_odom;
   bool gravity_measured = false;
   InertialMemory imu;
@@ -83,10 +84,10 @@ struct FilterMemory {
   StepMemory step;
   WheelMemory wheels;
   CompassMemory compass;
-  std::array<SensorJudge, kLocalizationSensors> judges;
+  std::array<SensorMonitor, kLocalizationSensors> monitors;
 
-  SensorJudge& judge(LocalizationSensor sensor) { return judges[static_cast<std::size_t>(sensor)]; }
-  const SensorJudge& judge(LocalizationSensor sensor) const { return judges[static_cast<std::size_t>(sensor)]; }
+  SensorMonitor& monitor(LocalizationSensor sensor) { return monitors[static_cast<std::size_t>(sensor)]; }
+  const SensorMonitor& monitor(LocalizationSensor sensor) const { return monitors[static_cast<std::size_t>(sensor)]; }
 };
 
 void put(ArchiveWriter& out, const FilterMemory& memory);

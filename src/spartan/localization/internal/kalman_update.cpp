@@ -26,8 +26,8 @@ Projection project(const ErrorCovariance& p, const Innovation& innovation) {
   return {pht, s.llt()};
 }
 
-// The error of a pose after its mean has moved by `step`.
-void carry_over(ErrorCovariance& p, const ErrorVector& step, int index) {
+// Transports the error of a pose to its mean after the correction `step`.
+void transport(ErrorCovariance& p, const ErrorVector& step, int index) {
   const Matrix6d reset = right_jacobian_se3(step.segment<6>(index));
   p.middleRows<6>(index) = (reset * p.middleRows<6>(index)).eval();
   p.middleCols<6>(index) = (p.middleCols<6>(index) * reset.transpose()).eval();
@@ -39,23 +39,23 @@ std::optional<Gain> kalman_gain(const ErrorCovariance& p, const Innovation& inno
   return projection.s.solve(projection.pht.transpose()).transpose();
 }
 
-bool correct_by(Belief& belief, const Innovation& innovation, const Gain& gain) {
+bool correct_by(StateEstimate& estimate, const Innovation& innovation, const Gain& gain) {
   const ErrorVector step = gain * innovation.residual;
   if (!step.allFinite()) return false;
   ErrorCovariance keep = ErrorCovariance::Identity();
   keep.noalias() -= gain * innovation.jacobian;
   ErrorCovariance half;
-  half.noalias() = keep * belief.covariance;
-  belief.covariance.noalias() = half * keep.transpose();
-  belief.covariance += gain * innovation.noise * gain.transpose();
+  half.noalias() = keep * estimate.covariance;
+  estimate.covariance.noalias() = half * keep.transpose();
+  estimate.covariance += gain * innovation.noise * gain.transpose();
   if (innovation.shared.cols() > 0) {
     half.noalias() = keep * innovation.shared * gain.transpose();
-    belief.covariance -= half + half.transpose();
+    estimate.covariance -= half + half.transpose();
   }
   for (const int pose : {error_at::kPose, error_at::kVisionClone, error_at::kStepClone})
-    carry_over(belief.covariance, step, pose);
-  symmetrise(belief.covariance);
-  belief.state = add_error(belief.state, step);
+    transport(estimate.covariance, step, pose);
+  symmetrize(estimate.covariance);
+  estimate.state = add_error(estimate.state, step);
   return true;
 }
 
@@ -67,34 +67,34 @@ Innovation::Innovation(int rows) {
   noise.setZero(rows, rows);
 }
 
-double normalised_square(const ErrorCovariance& covariance, const Innovation& innovation) {
+double normalized_innovation_squared(const ErrorCovariance& covariance, const Innovation& innovation) {
   const Projection projection = project(covariance, innovation);
   if (projection.s.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
-  const double square = innovation.residual.dot(projection.s.solve(innovation.residual));
-  return square >= 0 ? square : std::numeric_limits<double>::infinity();
+  const double nis = innovation.residual.dot(projection.s.solve(innovation.residual));
+  return nis >= 0 ? nis : std::numeric_limits<double>::infinity();
 }
 
-bool correct(Belief& belief, const Innovation& innovation) {
-  const std::optional<Gain> gain = kalman_gain(belief.covariance, innovation);
-  return gain && correct_by(belief, innovation, *gain);
+bool correct(StateEstimate& estimate, const Innovation& innovation) {
+  const std::optional<Gain> gain = kalman_gain(estimate.covariance, innovation);
+  return gain && correct_by(estimate, innovation, *gain);
 }
 
-bool correct_only(Belief& belief, const Innovation& innovation, int index) {
-  const std::optional<Gain> gain = kalman_gain(belief.covariance, innovation);
+bool correct_only(StateEstimate& estimate, const Innovation& innovation, int index) {
+  const std::optional<Gain> gain = kalman_gain(estimate.covariance, innovation);
   if (!gain) return false;
   Gain partial = Gain::Zero(error_at::kSize, innovation.rows());
   partial.row(index) = gain->row(index);
-  return correct_by(belief, innovation, partial);
+  return correct_by(estimate, innovation, partial);
 }
 
-bool correct_all_but(Belief& belief, const Innovation& innovation, int first, int count) {
-  std::optional<Gain> gain = kalman_gain(belief.covariance, innovation);
+bool correct_all_but(StateEstimate& estimate, const Innovation& innovation, int first, int count) {
+  std::optional<Gain> gain = kalman_gain(estimate.covariance, innovation);
   if (!gain) return false;
   gain->middleRows(first, count).setZero();
-  return correct_by(belief, innovation, *gain);
+  return correct_by(estimate, innovation, *gain);
 }
 
-void symmetrise(ErrorCovariance& covariance) {
+void symmetrize(ErrorCovariance& covariance) {
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
 }
 

@@ -18,23 +18,24 @@ const Pose& pose_of(const NavigationState& s, int pose) {
   return pose == error_at::kPose ? s.world_from_body : clone_of(s, pose);
 }
 
-// The displacement of the step along the mean attitude, and its derivative by the motion's right perturbation:
+// The displacement of the step along its mean attitude, and the derivative with respect to the right perturbation of
+// the motion:
 //   t' = t + ΔR ρ,  φ' = φ + J_r⁻¹(φ) φ_e,  t_mid = Exp(−φ/2) t
 //   ∂t_mid = Exp(φ/2) ρ_e + ½ [t_mid]× J_l(−φ/2) J_r⁻¹(φ) φ_e        (Exp(−φ/2) ΔR = Exp(φ/2))
 struct MeanStep {
-  Eigen::Vector3d displacement, turn;
-  Eigen::Matrix<double, 3, 6> displacement_by, turn_by;
+  Eigen::Vector3d displacement, rotation;
+  Eigen::Matrix<double, 3, 6> displacement_by, rotation_by;
 };
 
 MeanStep mean_step(const Pose& motion) {
   MeanStep m;
-  m.turn = log_so3(motion.rotation());
-  const Eigen::Vector3d half = 0.5 * m.turn;
+  m.rotation = log_so3(motion.rotation());
+  const Eigen::Vector3d half = 0.5 * m.rotation;
   m.displacement = exp_so3(-half) * motion.translation();
-  const Eigen::Matrix3d turn_by = left_jacobian_inverse_so3(-m.turn);
+  const Eigen::Matrix3d rotation_by = left_jacobian_inverse_so3(-m.rotation);
   m.displacement_by << exp_so3(half).toRotationMatrix(),
-      0.5 * skew(m.displacement) * left_jacobian_so3(-half) * turn_by;
-  m.turn_by << Eigen::Matrix3d::Zero(), turn_by;
+      0.5 * skew(m.displacement) * left_jacobian_so3(-half) * rotation_by;
+  m.rotation_by << Eigen::Matrix3d::Zero(), rotation_by;
   return m;
 }
 
@@ -69,16 +70,16 @@ Innovation relative_motion_innovation(const NavigationState& s, int clone, const
 Innovation wheel_innovation(const NavigationState& s, const WheelStep& step) {
   const MotionSinceClone m = motion_since_clone(s, error_at::kStepClone);
   const MeanStep mean = mean_step(m.clone_from_body);
-  Innovation i(step.turn_known ? 4 : 3);
+  Innovation i(step.yaw_known ? 4 : 3);
   i.residual.head<3>() = Eigen::Vector3d(s.wheel_scale * step.counted_m, 0, 0) - mean.displacement;
   i.jacobian.topRows<3>() = mean.displacement_by * m.jacobian;
   i.jacobian(0, error_at::kWheelScale) = -step.counted_m;
   i.noise.diagonal().head<3>() << step.forward_sigma_m * step.forward_sigma_m, step.side_sigma_m * step.side_sigma_m,
       step.up_sigma_m * step.up_sigma_m;
-  if (step.turn_known) {
-    i.residual[3] = step.turn_rad - mean.turn.z();
-    i.jacobian.row(3) = mean.turn_by.row(2) * m.jacobian;
-    i.noise(3, 3) = step.turn_sigma_rad * step.turn_sigma_rad;
+  if (step.yaw_known) {
+    i.residual[3] = step.yaw_rad - mean.rotation.z();
+    i.jacobian.row(3) = mean.rotation_by.row(2) * m.jacobian;
+    i.noise(3, 3) = step.yaw_sigma_rad * step.yaw_sigma_rad;
   }
   return i;
 }
@@ -157,14 +158,16 @@ Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean
 
 // T = X̂ Exp(ξ) Exp(n): Log(X̂⁻¹ T) = ξ + J_r⁻¹(r) n. Information Λ of n becomes J_rᵀ Λ J_r; its eigenvectors with any
 // information are independent scalar measurements.
-Innovation map_innovation(const Belief& belief, int pose, const PoseConstraint& constraint, double covariance_factor) {
-  constexpr double kLeastInformation = 1e-6, kLeastShare = 1e-12;
-  const Vector6d r = log_se3(pose_of(belief.state, pose).inverse() * constraint.world_from_body);
+Innovation map_innovation(const StateEstimate& estimate, int pose, const PoseConstraint& constraint,
+                          double covariance_factor) {
+  // Directions with less information, absolutely (1/m², 1/rad²) or relative to the largest, are not measured.
+  constexpr double kMinInformation = 1e-6, kMinInformationRatio = 1e-12;
+  const Vector6d r = log_se3(pose_of(estimate.state, pose).inverse() * constraint.world_from_body);
   const Matrix6d jacobian = right_jacobian_se3(r);
   const Matrix6d turned = jacobian.transpose() * constraint.information * jacobian;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (turned + turned.transpose()));
   const Vector6d values = eigen.eigenvalues() / covariance_factor;
-  const double least = std::max(kLeastInformation, kLeastShare * values[5]);
+  const double least = std::max(kMinInformation, kMinInformationRatio * values[5]);
   int first = 0;
   while (first < 6 && !(values[first] > least)) ++first;
   const int rows = 6 - first;
@@ -178,9 +181,9 @@ Innovation map_innovation(const Belief& belief, int pose, const PoseConstraint& 
   const Matrix6d inverse = jacobian.inverse();
   const Matrix6d map = inverse * constraint.map_covariance * inverse.transpose();
   i.noise += directions * map * directions.transpose();
-  const Matrix6d believed = belief.covariance.block<6, 6>(pose, pose);
-  // The residual is truth less belief, plus the map's error: where both err alike it is none, hence the sign.
-  i.shared = -belief.covariance.middleCols<6>(pose) * shared_fraction(believed, map) * directions.transpose();
+  const Matrix6d pose_covariance = estimate.covariance.block<6, 6>(pose, pose);
+  // The residual is truth minus estimate plus the error of the map: an error that both share cancels, hence the sign.
+  i.shared = -estimate.covariance.middleCols<6>(pose) * shared_fraction(pose_covariance, map) * directions.transpose();
   return i;
 }
 

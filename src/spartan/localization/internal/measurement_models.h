@@ -1,4 +1,4 @@
-// What each measurement says about the error of the state: residuals with their Jacobians.
+// Measurement models: innovations (residual, Jacobian, noise) of each kind of measurement.
 #pragma once
 
 #include "spartan/camera/samples.h"
@@ -9,29 +9,29 @@
 namespace spartan {
 
 /// A motion measured from a clone (`index`: kVisionClone or kStepClone) to the present pose, M = Ĉ⁻¹ X̂ Exp(e) with
-/// noise and the lasting error z on the right, M = … Exp(−D z − n). With its estimate ẑ taken off,
+/// noise n and drift z on the right, M = … Exp(−D z − n). After correction by the estimate ẑ,
 ///   r = Log(M̂⁻¹ M Exp(D ẑ)) = ξ_x − J_l⁻¹(r) Ad(M̂⁻¹) ξ_c − J_r⁻¹(r) J_r(D ẑ) (D δz + n).
-/// `drift_scale` is the diagonal of D (zero: the motion has no lasting error).
+/// `drift_scale` is the diagonal of D (zero: the motion has no drift).
 Innovation relative_motion_innovation(const NavigationState& state, int clone, const Pose& measured,
                                       const Matrix6d& covariance, const Vector6d& drift_scale);
 
-/// The motion since a clone as the filter has it, with the Jacobian of its right perturbation.
+/// The estimated motion since a clone, with the Jacobian of its right perturbation.
 struct MotionSinceClone {
   Pose clone_from_body;
   Eigen::Matrix<double, 6, error_at::kSize> jacobian;
 };
 MotionSinceClone motion_since_clone(const NavigationState& state, int clone);
 
-/// One step of the wheels: forward s·d, nothing to the side or up, turn (d_r − d_l)/track about z. The body moves along
-/// its mean attitude: t_mid = Exp(φ/2)ᵀ t. Rows: forward, side, up, and turn where the track is known.
+/// One step of the wheels: forward s·d, zero to the side and up, rotation (d_r − d_l)/track about z. The body moves
+/// along its mean attitude: t_mid = Exp(φ/2)ᵀ t. Rows: forward, side, up, and yaw if the track is known.
 struct WheelStep {
   double counted_m = 0;  ///< mean of both sides
-  double turn_rad = 0;
-  bool turn_known = false;
-  double forward_sigma_m = 0, side_sigma_m = 0, up_sigma_m = 0, turn_sigma_rad = 0;
+  double yaw_rad = 0;
+  bool yaw_known = false;
+  double forward_sigma_m = 0, side_sigma_m = 0, up_sigma_m = 0, yaw_sigma_rad = 0;
 };
 Innovation wheel_innovation(const NavigationState& state, const WheelStep& step);
-/// Displacement along the mean attitude of the step, body x, and the Jacobian of it.
+/// Displacement along body x of the mean attitude of the step, with its Jacobian.
 struct StepForward {
   double metres = 0;
   Eigen::Matrix<double, 1, error_at::kSize> jacobian;
@@ -45,7 +45,8 @@ double heading_about_up(const NavigationState& state);
 /// Reading = heading about the true vertical + offset; the residual is wrapped to ±π.
 Innovation compass_innovation(const NavigationState& state, double heading_rad, double sigma_rad);
 
-/// Roll and pitch of the body against the true vertical: up in the body is (−sin p, sin r cos p, cos r cos p).
+/// Roll and pitch of the body relative to the true vertical: up in the body frame is (−sin p, sin r cos p, cos r cos
+/// p).
 Eigen::Vector2d roll_pitch_of_up(const Eigen::Vector3d& up_in_body);
 Eigen::Vector3d up_of_roll_pitch(double roll_rad, double pitch_rad);
 Innovation inclinometer_innovation(const NavigationState& state, double roll_rad, double pitch_rad, double sigma_rad);
@@ -54,9 +55,10 @@ Innovation inclinometer_innovation(const NavigationState& state, double roll_rad
 Innovation rest_innovation(const NavigationState& state, const Eigen::Vector3d& mean_accel_m_s2, double sigma_m_s2,
                            double gravity_m_s2);
 
-/// A pose by a map, of the one that stands at `pose` among the errors (kPose or kVisionClone): the directions that
-/// carry information, each independent but for the map's error. What that has in common with the error of the belief
-/// (shared_fraction) reaches the parts of the state through the pose. No rows where there is no information.
-Innovation map_innovation(const Belief& belief, int pose, const PoseConstraint& constraint, double covariance_factor);
+/// Map constraint on the pose whose error is at `pose` (kPose or kVisionClone): one row for each direction with
+/// information. Rows are independent but for the error of the map; its cross-covariance with the error of the estimate
+/// (shared_fraction) acts on the state through the pose. No rows if there is no information.
+Innovation map_innovation(const StateEstimate& estimate, int pose, const PoseConstraint& constraint,
+                          double covariance_factor);
 
 }  // namespace spartan

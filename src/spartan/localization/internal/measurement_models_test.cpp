@@ -12,7 +12,7 @@
 namespace spartan {
 namespace {
 
-// Residual = measured − expected: its derivative by the estimate's error is −jacobian.
+// Residual = measured − expected: its derivative with respect to the error of the estimate is −jacobian.
 template <int Rows>
 void expect_derivative(const NavigationState& s, const std::function<Innovation(const NavigationState&)>& innovation) {
   const auto numeric = testing::numeric_jacobian<Rows, error_at::kSize>(
@@ -21,13 +21,13 @@ void expect_derivative(const NavigationState& s, const std::function<Innovation(
   EXPECT_LE((innovation(s).jacobian + numeric).cwiseAbs().maxCoeff(), 1e-6);
 }
 
-TEST(MeasurementModels, JacobiansMatchDifferences) {
+TEST(MeasurementModels, JacobiansMatchFiniteDifferences) {
   Random random(4);
   for (int round = 0; round < 10; ++round) {
     const NavigationState s = random_navigation_state(random);
     WheelStep step{0.1, 0.2, true, 1, 1, 1, 1};
     expect_derivative<4>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
-    step.turn_known = false;
+    step.yaw_known = false;
     expect_derivative<3>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
     const double heading = heading_about_up(s) + s.compass_offset_rad + 0.1;
     expect_derivative<1>(s, [&](const NavigationState& x) { return compass_innovation(x, heading, 0.1); });
@@ -39,7 +39,7 @@ TEST(MeasurementModels, JacobiansMatchDifferences) {
   }
 }
 
-TEST(MeasurementModels, ForwardOfStepHasItsDerivative) {
+TEST(MeasurementModels, ForwardOfStepMatchesItsJacobian) {
   Random random(8);
   const NavigationState s = random_navigation_state(random);
   const auto numeric = testing::numeric_jacobian<1, error_at::kSize>(
@@ -59,24 +59,24 @@ TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
     r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
     drift_scale << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6;
     const Pose mean = motion_since_clone(s, clone).clone_from_body;
-    const Vector6d believed = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
+    const Vector6d estimated = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
     const auto seen = [&](const ErrorVector& e) -> Vector6d {
       const NavigationState truth = add_error(s, e);
       const Pose motion = motion_since_clone(truth, clone).clone_from_body *
                           exp_se3(-drift_scale.cwiseProduct(truth.vision_drift + truth.vision_constant));
-      return log_se3(mean.inverse() * motion * exp_se3(believed));
+      return log_se3(mean.inverse() * motion * exp_se3(estimated));
     };
     ErrorVector at = ErrorVector::Zero();
     at.segment<6>(error_at::kPose) = r;
     const auto numeric = testing::numeric_jacobian<6, error_at::kSize>(seen, at, 1e-4);
-    const Innovation innovation =
-        relative_motion_innovation(s, clone, mean * exp_se3(r) * exp_se3(-believed), Matrix6d::Identity(), drift_scale);
+    const Innovation innovation = relative_motion_innovation(s, clone, mean * exp_se3(r) * exp_se3(-estimated),
+                                                             Matrix6d::Identity(), drift_scale);
     EXPECT_LE((innovation.residual - r).norm(), 1e-12);
     EXPECT_LE((innovation.jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
   }
 }
 
-TEST(MeasurementModels, WheelsExpectTheArc) {
+TEST(MeasurementModels, WheelsPredictTheChordOfAnArc) {
   // A quarter circle of radius 1: the chord √2 lies along the mean attitude, whatever the frame.
   NavigationState s;
   s.wheel_scale = 0.5;
@@ -87,7 +87,7 @@ TEST(MeasurementModels, WheelsExpectTheArc) {
   EXPECT_NEAR(forward_of_step(s).metres, std::sqrt(2.0), 1e-12);
 }
 
-TEST(MeasurementModels, RollAndPitchAreTheSimulatorsAngles) {
+TEST(MeasurementModels, RollAndPitchMatchTheSimulator) {
   const double roll = 0.2, pitch = -0.3, yaw = 1.1;
   const Eigen::Quaterniond turn = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
                                   Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
@@ -104,25 +104,25 @@ TEST(MeasurementModels, CompassResidualIsWrapped) {
   EXPECT_NEAR(compass_innovation(s, -3, 0.1).residual[0], 2 * std::numbers::pi - 6, 1e-12);
 }
 
-TEST(MeasurementModels, PoseConstraintOfAnyRankMeasuresWhatItKnows) {
+TEST(MeasurementModels, PoseConstraintOfAnyRankHasARowForEachDirection) {
   Random random(6);
-  const Belief belief{random_navigation_state(random), ErrorCovariance::Identity()};
+  const StateEstimate estimate{random_navigation_state(random), ErrorCovariance::Identity()};
   Vector6d offset;
   offset << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03;
-  const Pose seen = belief.state.world_from_body * exp_se3(offset);
-  EXPECT_EQ(map_innovation(belief, error_at::kPose, {{}, seen}, 1).rows(), 0);
+  const Pose seen = estimate.state.world_from_body * exp_se3(offset);
+  EXPECT_EQ(map_innovation(estimate, error_at::kPose, {{}, seen}, 1).rows(), 0);
   Matrix6d some = Matrix6d::Zero();
   some(0, 0) = 100;
   some(5, 5) = 1e4;
-  const Innovation i = map_innovation(belief, error_at::kPose, {{}, seen, some}, 2);
+  const Innovation i = map_innovation(estimate, error_at::kPose, {{}, seen, some}, 2);
   ASSERT_EQ(i.rows(), 2);
-  // Its information about the error is that which was handed over, carried to the mean, and halved by the factor.
+  // Its information about the error is that of the constraint, transported to the mean and halved by the factor.
   const Matrix6d jacobian = right_jacobian_se3(offset);
   const Matrix6d information =
       (i.jacobian.transpose() * i.noise.inverse() * i.jacobian).block<6, 6>(error_at::kPose, error_at::kPose);
   EXPECT_LE((information - 0.5 * jacobian.transpose() * some * jacobian).cwiseAbs().maxCoeff(), 1e-8);
-  // The whole residual where all is known.
-  const Innovation all = map_innovation(belief, error_at::kPose, {{}, seen, Matrix6d::Identity()}, 1);
+  // The full residual at full rank.
+  const Innovation all = map_innovation(estimate, error_at::kPose, {{}, seen, Matrix6d::Identity()}, 1);
   EXPECT_LE((all.jacobian.leftCols<6>().transpose() * all.residual - offset).norm(), 1e-9);
 }
 

@@ -1,4 +1,4 @@
-// Motions between shots.
+// Updates by visual motions between frames.
 #include <Eigen/Dense>
 #include <cmath>
 
@@ -9,162 +9,167 @@
 namespace spartan {
 namespace {
 
-/// Where vision measures, the noise of a prediction without an IMU counts (1 + this) times: the prediction is then
-/// worth nothing, and the filter composes the motions as they come.
-constexpr double kUnmeasuredFactor = 99;
-/// Where vision overrules the prediction, its error is taken to be so many times what was found.
-constexpr double kOverruledFactor = 10;
-/// Even what stays for a drive is forgotten after so many shots, so that the filter never gets too sure of it.
+/// Before an update by vision the noise of the constant-velocity model is scaled by 1 + this, so that the prediction
+/// has no weight and the filter composes the visual motions.
+constexpr double kPredictionNoiseFactor = 99;
+/// Where vision contradicts the prediction, the standard deviation of the reset is this factor times the residual;
+/// empirical.
+constexpr double kResetFactor = 10;
+/// Correlation length of the constant error of vision, in frames: finite, so that the filter does not become
+/// overconfident; empirical.
 constexpr double kConstantSteps = 5000;
-constexpr double kLeastVariance = 1e-14;
+/// Added to the variances of a motion (m², rad²), whose covariance may be singular.
+constexpr double kMinVariance = 1e-14;
 
-Matrix6d usable_covariance(const Matrix6d& stated, double factor) {
-  Matrix6d r = 0.5 * factor * (stated + stated.transpose());
-  r.diagonal().array() += kLeastVariance;
+Matrix6d usable_covariance(const Matrix6d& covariance, double factor) {
+  Matrix6d r = 0.5 * factor * (covariance + covariance.transpose());
+  r.diagonal().array() += kMinVariance;
   return r;
 }
 
-// Position, attitude, velocity stand first among the errors.
+// Position, attitude, velocity are the first errors.
 static_assert(error_at::kPosition == 0 && error_at::kAttitude == 3 && error_at::kVelocity == 6);
 
 }  // namespace
 
-void ErrorStateFilter::take(const RelativeMotion& motion) {
-  move_to(motion.to, nullptr);
-  SensorJudge& judge = memory_.judge(LocalizationSensor::vision);
-  const bool joins = motion.from == memory_.vision.clone_stamp;
-  if (!motion.measured || !joins) {
-    if (judge.state != SensorState::excluded) judge.state = SensorState::suspect;
-    judge.reason = HealthReason::lost;
-    ++judge.rejected;
-    memory_.vision.stood = false;
+void ErrorStateFilter::update(const RelativeMotion& motion) {
+  propagate_to(motion.to, nullptr);
+  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
+  const bool consecutive = motion.from == memory_.vision.clone_stamp;
+  if (!motion.measured || !consecutive) {
+    if (monitor.state != SensorState::excluded) monitor.state = SensorState::suspect;
+    monitor.reason = HealthReason::lost;
+    ++monitor.rejected;
+    memory_.vision.stationary = false;
   } else {
     compare_gyro(motion);
-    if (measure_motion(motion)) {
-      const NavigationState& s = memory_.belief.state;
+    if (update_by_motion(motion)) {
+      const NavigationState& s = memory_.estimate.state;
       const double seconds = seconds_between(motion.from, motion.to);
       memory_.vision.rate_rad_s =
           log_so3(motion_since_clone(s, error_at::kVisionClone).clone_from_body.rotation()) / seconds;
     }
   }
-  end_step_at_shot(motion.to);
-  begin_shot(motion.to);
+  end_step_at_frame(motion.to);
+  begin_frame(motion.to);
 }
 
-/// Whether the motion was used.
-bool ErrorStateFilter::measure_motion(const RelativeMotion& motion) {
+/// Returns whether the motion was used.
+bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   VisionMemory& vision = memory_.vision;
-  ErrorCovariance& p = memory_.belief.covariance;
+  ErrorCovariance& p = memory_.estimate.covariance;
   const Pose& measured = motion.previous_from_current;
-  vision.stood = measured.translation().isZero(1e-12) && measured.rotation().vec().isZero(1e-12);
+  vision.stationary = measured.translation().isZero(1e-12) && measured.rotation().vec().isZero(1e-12);
 
-  if (!vision.stood) {
-    let_drift(error_at::kVisionDrift, drift_sigmas_, options_.vision.drift_steps);
-    let_drift(error_at::kVisionConstant, constant_sigmas_, kConstantSteps);
+  if (!vision.stationary) {
+    propagate_drift(error_at::kVisionDrift, drift_sigmas_, options_.vision.drift_steps);
+    propagate_drift(error_at::kVisionConstant, constant_sigmas_, kConstantSteps);
   }
 
-  const bool predicted = vision.unmeasured_s == 0;
-  p.topLeftCorner<9, 9>() += kUnmeasuredFactor * vision.unmeasured_noise;
+  const bool predicted = vision.constant_velocity_s == 0;
+  p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
 
   const Matrix6d covariance = usable_covariance(motion.covariance, options_.vision.white_factor);
-  const Vector6d drift = vision.stood ? Vector6d::Zero().eval() : motion.covariance.diagonal().cwiseSqrt().eval();
+  const Vector6d drift = vision.stationary ? Vector6d::Zero().eval() : motion.covariance.diagonal().cwiseSqrt().eval();
   const Innovation innovation =
-      relative_motion_innovation(memory_.belief.state, error_at::kVisionClone, measured, covariance, drift);
-  const double square = predicted ? normalised_square(p, innovation) : 0;
-  SensorJudge& judge = memory_.judge(LocalizationSensor::vision);
-  const bool confirmed = square > vision_gate_ && wheels_confirm_prediction(motion);
-  if (square > vision_gate_ && !confirmed) return overrule_prediction(innovation, square, motion);
-  if (!judge.judge(square, vision_gate_, HealthReason::disagrees, options_.health.excluded_after,
-                   options_.health.back_after))
+      relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, drift);
+  const double nis = predicted ? normalized_innovation_squared(p, innovation) : 0;
+  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
+  const bool confirmed = nis > vision_gate_ && wheels_confirm_prediction(motion);
+  if (nis > vision_gate_ && !confirmed) return reset_prediction(innovation, nis, motion);
+  if (!monitor.accept(nis, vision_gate_, HealthReason::disagrees, options_.health.excluded_after,
+                      options_.health.readmit_after))
     return false;
-  SensorJudge& imu = memory_.judge(LocalizationSensor::imu);
-  if (predicted && imu.state == SensorState::suspect) imu.readmit();  // it said what vision saw
+  SensorMonitor& imu = memory_.monitor(LocalizationSensor::imu);
+  if (predicted && imu.state == SensorState::suspect) imu.readmit();  // its prediction agrees with vision
   correct_motion(innovation, error_at::kVisionClone);
   return true;
 }
 
-/// One step of a Gauss-Markov process.
-void ErrorStateFilter::let_drift(int index, const Vector6d& sigmas, double steps) {
+/// One step of a Gauss–Markov process.
+void ErrorStateFilter::propagate_drift(int index, const Vector6d& sigmas, double steps) {
   const double stays = std::exp(-1 / steps);
-  NavigationState& s = memory_.belief.state;
-  ErrorCovariance& p = memory_.belief.covariance;
+  NavigationState& s = memory_.estimate.state;
+  ErrorCovariance& p = memory_.estimate.covariance;
   (index == error_at::kVisionDrift ? s.vision_drift : s.vision_constant) *= stays;
   p.middleRows<6>(index) *= stays;
   p.middleCols<6>(index) *= stays;
   p.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
 }
 
-/// Vision and prediction differ, and nothing speaks for the prediction: it is forgotten, along with the motion since
-/// the last shot, and the IMU answers for it.
-bool ErrorStateFilter::overrule_prediction(const Innovation& innovation, double square, const RelativeMotion& motion) {
+/// Vision contradicts the prediction, and no other sensor confirms the prediction: inflates the covariance of the
+/// motion since the last frame, and counts a rejection of the IMU.
+bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion) {
   const double seconds = std::max(seconds_between(motion.from, motion.to), 1e-3);
-  const double shift = kOverruledFactor * innovation.residual.head<3>().norm(),
-               turn = kOverruledFactor * innovation.residual.tail<3>().norm();
-  const SteadyNoise noise{(shift + 1e-3) * std::sqrt(3 / (seconds * seconds * seconds)),
-                          (turn + 1e-4) / std::sqrt(seconds)};
-  const SteadyStep step{Eigen::Vector3d::Zero(), seconds};
-  memory_.belief.covariance.topLeftCorner<9, 9>() +=
-      transition(memory_.belief.state, step, noise).noise.topLeftCorner<9, 9>();
-  memory_.step.standing = false;
-  memory_.judge(LocalizationSensor::imu)
-      .judge(square, vision_gate_, HealthReason::overruled, options_.health.excluded_after, options_.health.back_after);
-  memory_.judge(LocalizationSensor::vision)
-      .judge(0, vision_gate_, HealthReason::none, options_.health.excluded_after, options_.health.back_after);
+  const double shift = kResetFactor * innovation.residual.head<3>().norm(),
+               turn = kResetFactor * innovation.residual.tail<3>().norm();
+  const ConstantVelocityNoise noise{(shift + 1e-3) * std::sqrt(3 / (seconds * seconds * seconds)),
+                                    (turn + 1e-4) / std::sqrt(seconds)};
+  const ConstantVelocityStep step{Eigen::Vector3d::Zero(), seconds};
+  memory_.estimate.covariance.topLeftCorner<9, 9>() +=
+      transition(memory_.estimate.state, step, noise).noise.topLeftCorner<9, 9>();
+  memory_.step.stationary = false;
+  memory_.monitor(LocalizationSensor::imu)
+      .accept(nis, vision_gate_, HealthReason::contradicted, options_.health.excluded_after,
+              options_.health.readmit_after);
+  memory_.monitor(LocalizationSensor::vision)
+      .accept(0, vision_gate_, HealthReason::none, options_.health.excluded_after, options_.health.readmit_after);
   correct_motion(innovation, error_at::kVisionClone);
   return true;
 }
 
-/// Wheels that agree with the prediction and not with vision: two against one.
+/// Whether the wheels agree with the prediction and contradict vision.
 bool ErrorStateFilter::wheels_confirm_prediction(const RelativeMotion& motion) const {
   const std::optional<WheelSample> wheels = wheels_at(motion.to);
   if (!wheels || !memory_.step.has_wheels || memory_.step.from != motion.from) return false;
-  if (memory_.judge(LocalizationSensor::wheels).state != SensorState::ok) return false;
+  if (memory_.monitor(LocalizationSensor::wheels).state != SensorState::ok) return false;
   const WheelStep step = step_to(*wheels);
-  const double counted = memory_.belief.state.wheel_scale * step.counted_m;
+  const double counted = memory_.estimate.state.wheel_scale * step.counted_m;
   const double sigma =
       std::hypot(step.forward_sigma_m,
-                 std::sqrt(memory_.belief.covariance(error_at::kWheelScale, error_at::kWheelScale)) * step.counted_m);
-  const double predicted = forward_of_step(memory_.belief.state).metres;
+                 std::sqrt(memory_.estimate.covariance(error_at::kWheelScale, error_at::kWheelScale)) * step.counted_m);
+  const double predicted = forward_of_step(memory_.estimate.state).metres;
   return std::abs(counted - predicted) < 3 * sigma &&
          std::abs(counted - motion.previous_from_current.translation().x()) > 5 * sigma;
 }
 
-/// An IMU that was overruled comes back when its gyro turns as vision does.
+/// Readmits an IMU that vision contradicted once its gyro agrees with the rotations by vision.
 void ErrorStateFilter::compare_gyro(const RelativeMotion& motion) {
   InertialMemory& imu = memory_.imu;
-  SensorJudge& judge = memory_.judge(LocalizationSensor::imu);
-  if (judge.state != SensorState::excluded || judge.reason != HealthReason::overruled) return;
-  if (!imu.turn_whole || !(imu.turn_s > 0)) return;
+  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::imu);
+  if (monitor.state != SensorState::excluded || monitor.reason != HealthReason::contradicted) return;
+  if (!imu.gyro_rotation_complete || !(imu.gyro_rotation_s > 0)) return;
   const Eigen::Quaterniond seen = motion.previous_from_current.rotation();
-  const double off = log_so3(imu.turn.conjugate() * seen).norm(), angle = log_so3(seen).norm();
-  const double variance = std::pow(options_.imu.gyro_noise_rad_s_sqrt_hz, 2) * imu.turn_s +
-                          std::pow(2 * options_.imu.gyro_bias_rad_s * imu.turn_s, 2) +
-                          motion.covariance.diagonal().tail<3>().maxCoeff() + std::pow(0.01 * angle, 2);
-  if (off * off > 16 * variance) {
-    judge.passed_in_row = 0;
+  const double off = log_so3(imu.gyro_rotation.conjugate() * seen).norm(), angle = log_so3(seen).norm();
+  const double variance = std::pow(options_.imu.gyro_noise_rad_s_sqrt_hz, 2) * imu.gyro_rotation_s +
+                          std::pow(2 * options_.imu.gyro_bias_rad_s * imu.gyro_rotation_s, 2) +
+                          motion.covariance.diagonal().tail<3>().maxCoeff() +
+                          std::pow(0.01 * angle, 2);  // 1 %: scale error of the gyro
+  if (off * off > 16 * variance) {                    // 4 σ
+    monitor.passed_in_row = 0;
     return;
   }
-  if (++judge.passed_in_row < options_.health.back_after) return;
-  judge.readmit();
-  ErrorCovariance& p = memory_.belief.covariance;
+  if (++monitor.passed_in_row < options_.health.readmit_after) return;
+  monitor.readmit();
+  ErrorCovariance& p = memory_.estimate.covariance;
   p.middleRows<6>(error_at::kGyroBias).setZero();
   p.middleCols<6>(error_at::kGyroBias).setZero();
   p.diagonal().segment<3>(error_at::kGyroBias).setConstant(std::pow(options_.imu.gyro_bias_rad_s, 2));
   p.diagonal().segment<3>(error_at::kAccelBias).setConstant(std::pow(options_.imu.accel_bias_m_s2, 2));
 }
 
-/// The next motion will be measured from here.
-void ErrorStateFilter::begin_shot(Stamp stamp) {
+/// The next visual motion starts at this pose.
+void ErrorStateFilter::begin_frame(Stamp stamp) {
   const UncertainPose odom = odom_from_body();
   memory_.vision.odom_from_clone = odom.pose;
   memory_.vision.odom_covariance = odom.covariance;
   memory_.vision.clone_stamp = stamp;
-  memory_.vision.unmeasured_noise.setZero();
-  memory_.vision.unmeasured_s = 0;
-  memory_.imu.turn.setIdentity();
-  memory_.imu.turn_s = 0;
-  memory_.imu.turn_whole = memory_.imu.known;
-  clone_pose(memory_.belief, error_at::kVisionClone);
+  memory_.vision.constant_velocity_noise.setZero();
+  memory_.vision.constant_velocity_s = 0;
+  memory_.imu.gyro_rotation.setIdentity();
+  memory_.imu.gyro_rotation_s = 0;
+  memory_.imu.gyro_rotation_complete = memory_.imu.known;
+  clone_pose(memory_.estimate, error_at::kVisionClone);
 }
 
 }  // namespace spartan

@@ -3,8 +3,8 @@
 namespace spartan {
 namespace {
 
-// Noise that is white in acceleration and angular rate, integrated over the step: the double integral
-// correlates position with velocity.
+// White noise of acceleration and angular rate integrated over the step; the double integral correlates position with
+// velocity.
 void add_white_noise(Transition& t, double accel_variance, double rate_variance, double seconds) {
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
   t.noise.block<3, 3>(error_at::kPosition, error_at::kPosition) +=
@@ -15,7 +15,7 @@ void add_white_noise(Transition& t, double accel_variance, double rate_variance,
   t.noise.block<3, 3>(error_at::kAttitude, error_at::kAttitude) += identity * (rate_variance * seconds);
 }
 
-Transition blank() {
+Transition identity_transition() {
   Transition t;
   t.by_moving.setIdentity();
   t.by_tilt.setZero();
@@ -24,7 +24,7 @@ Transition blank() {
 }
 
 struct Integrated {
-  Eigen::Vector3d turn;  // rotation vector
+  Eigen::Vector3d rotation;  // rotation vector
   Eigen::Matrix3d before, after;
   Eigen::Vector3d force_from, force_to;  // without bias, body
   Eigen::Vector3d acceleration;          // world
@@ -32,9 +32,9 @@ struct Integrated {
 
 Integrated integrate(const NavigationState& s, const InertialStep& step, double gravity) {
   Integrated i;
-  i.turn = (0.5 * (step.gyro_from + step.gyro_to) - s.gyro_bias_rad_s) * step.seconds;
+  i.rotation = (0.5 * (step.gyro_from + step.gyro_to) - s.gyro_bias_rad_s) * step.seconds;
   i.before = s.world_from_body.rotation_matrix();
-  i.after = i.before * exp_so3(i.turn).toRotationMatrix();
+  i.after = i.before * exp_so3(i.rotation).toRotationMatrix();
   i.force_from = step.accel_from - s.accel_bias_m_s2;
   i.force_to = step.accel_to - s.accel_bias_m_s2;
   i.acceleration = 0.5 * (i.before * i.force_from + i.after * i.force_to) - gravity * true_up(s.gravity_tilt_rad);
@@ -48,7 +48,7 @@ NavigationState propagate(const NavigationState& s, const InertialStep& step, do
   const Eigen::Vector3d velocity = i.before * s.velocity_m_s;  // world
   NavigationState r = s;
   r.world_from_body = {
-      s.world_from_body.rotation() * exp_so3(i.turn),
+      s.world_from_body.rotation() * exp_so3(i.rotation),
       s.world_from_body.translation() + velocity * step.seconds + 0.5 * step.seconds * step.seconds * i.acceleration};
   r.velocity_m_s = r.world_from_body.rotation().conjugate() * (velocity + i.acceleration * step.seconds);
   return r;
@@ -62,23 +62,23 @@ NavigationState propagate(const NavigationState& s, const InertialStep& step, do
 Transition transition(const NavigationState& s, const InertialStep& step, const InertialNoise& noise, double gravity) {
   const Integrated i = integrate(s, step, gravity);
   const double t = step.seconds;
-  Transition r = blank();
+  Transition r = identity_transition();
   const Eigen::Matrix3d to_body = i.after.transpose(), back = to_body * i.before;
   const Eigen::Vector3d after = back * s.velocity_m_s + t * (to_body * i.acceleration);  // w'
 
   using Rows = Eigen::Matrix<double, 3, error_at::kMoving>;
-  Rows turn = Rows::Zero(), velocity = Rows::Zero(), accel = Rows::Zero();
-  turn.middleCols<3>(error_at::kAttitude) = back;
-  turn.middleCols<3>(error_at::kGyroBias) = -t * left_jacobian_so3(-i.turn);
+  Rows rotation = Rows::Zero(), velocity = Rows::Zero(), accel = Rows::Zero();
+  rotation.middleCols<3>(error_at::kAttitude) = back;
+  rotation.middleCols<3>(error_at::kGyroBias) = -t * left_jacobian_so3(-i.rotation);
   velocity.middleCols<3>(error_at::kVelocity) = i.before;
   velocity.middleCols<3>(error_at::kAttitude) = -i.before * skew(s.velocity_m_s);
-  accel = -0.5 * i.after * skew(i.force_to) * turn;
+  accel = -0.5 * i.after * skew(i.force_to) * rotation;
   accel.middleCols<3>(error_at::kAttitude) -= 0.5 * i.before * skew(i.force_from);
   accel.middleCols<3>(error_at::kAccelBias) = -0.5 * (i.before + i.after);
   const Eigen::Matrix<double, 3, 2> accel_by_tilt = -gravity * true_up_jacobian(s.gravity_tilt_rad);
 
-  r.by_moving.middleRows<3>(error_at::kAttitude) = turn;
-  r.by_moving.middleRows<3>(error_at::kVelocity) = to_body * (velocity + t * accel) + skew(after) * turn;
+  r.by_moving.middleRows<3>(error_at::kAttitude) = rotation;
+  r.by_moving.middleRows<3>(error_at::kVelocity) = to_body * (velocity + t * accel) + skew(after) * rotation;
   r.by_moving.middleRows<3>(error_at::kPosition) = to_body * (t * velocity + 0.5 * t * t * accel);
   r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
   r.by_tilt.middleRows<3>(error_at::kVelocity) = t * to_body * accel_by_tilt;
@@ -92,8 +92,8 @@ Transition transition(const NavigationState& s, const InertialStep& step, const 
   return r;
 }
 
-// The velocity w stays in the body: p' = p + ½ (R + R') w t.
-NavigationState propagate(const NavigationState& s, const SteadyStep& step) {
+// The velocity w is constant in the body frame: p' = p + ½ (R + R') w t.
+NavigationState propagate(const NavigationState& s, const ConstantVelocityStep& step) {
   NavigationState r = s;
   const Eigen::Quaterniond before = s.world_from_body.rotation(),
                            after = before * exp_so3(step.rate_rad_s * step.seconds);
@@ -103,9 +103,9 @@ NavigationState propagate(const NavigationState& s, const SteadyStep& step) {
 }
 
 // ρ' = ΔRᵀ ρ + ½ t (ΔRᵀ (ν − [w]× φ) + ν − [w]× φ'),   φ' = ΔRᵀ φ,   ν' = ν
-Transition transition(const NavigationState& s, const SteadyStep& step, const SteadyNoise& noise) {
+Transition transition(const NavigationState& s, const ConstantVelocityStep& step, const ConstantVelocityNoise& noise) {
   const double t = step.seconds;
-  Transition r = blank();
+  Transition r = identity_transition();
   const Eigen::Matrix3d back = exp_so3(step.rate_rad_s * t).toRotationMatrix().transpose();
   const Eigen::Matrix3d speed = skew(s.velocity_m_s);
   r.by_moving.block<3, 3>(error_at::kAttitude, error_at::kAttitude) = back;
@@ -117,7 +117,7 @@ Transition transition(const NavigationState& s, const SteadyStep& step, const St
   return r;
 }
 
-void move_on(ErrorCovariance& p, const Transition& t) {
+void propagate_covariance(ErrorCovariance& p, const Transition& t) {
   constexpr int kRest = error_at::kSize - error_at::kMoving;
   Eigen::Matrix<double, error_at::kMoving, error_at::kSize> rows;
   rows.noalias() = t.by_moving * p.topRows<error_at::kMoving>();

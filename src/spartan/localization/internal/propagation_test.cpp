@@ -35,7 +35,7 @@ InertialStep random_step(Random& random) {
   return {normal3(random, 1), normal3(random, 1), normal3(random, 5), normal3(random, 5), random.uniform(0.002, 0.2)};
 }
 
-TEST(Propagation, InertialJacobianMatchesDifferences) {
+TEST(Propagation, InertialJacobianMatchesFiniteDifferences) {
   Random random(1);
   for (int round = 0; round < 10; ++round) {
     const NavigationState s = random_navigation_state(random);
@@ -45,13 +45,13 @@ TEST(Propagation, InertialJacobianMatchesDifferences) {
   }
 }
 
-TEST(Propagation, SteadyJacobianMatchesDifferences) {
+TEST(Propagation, ConstantVelocityJacobianMatchesFiniteDifferences) {
   Random random(2);
   for (int round = 0; round < 10; ++round) {
     const NavigationState s = random_navigation_state(random);
-    const SteadyStep step{normal3(random, 0.5), random.uniform(0.01, 2)};
+    const ConstantVelocityStep step{normal3(random, 0.5), random.uniform(0.01, 2)};
     const Full differences = numeric(s, [&](const NavigationState& x) { return propagate(x, step); });
-    EXPECT_LE((whole(transition(s, step, SteadyNoise{})) - differences).cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_LE((whole(transition(s, step, ConstantVelocityNoise{})) - differences).cwiseAbs().maxCoeff(), 1e-6);
   }
 }
 
@@ -80,23 +80,23 @@ TEST(Propagation, FollowsTheTestDrive) {
   EXPECT_LE((s.world_from_body.rotation() * s.velocity_m_s - drive.velocity(20)).norm(), 3e-4);
 }
 
-TEST(Propagation, SteadyMotionIsAnArc) {
+TEST(Propagation, ConstantVelocityMotionIsAnArc) {
   NavigationState s;
   s.velocity_m_s = {0.5, 0, 0};
-  for (int i = 0; i < 500; ++i) s = propagate(s, SteadyStep{{0, 0, 0.4}, 0.01});
+  for (int i = 0; i < 500; ++i) s = propagate(s, ConstantVelocityStep{{0, 0, 0.4}, 0.01});
   EXPECT_LE(
       (s.world_from_body.translation() - Eigen::Vector3d(1.25 * std::sin(2.0), 1.25 * (1 - std::cos(2.0)), 0)).norm(),
       1e-4);
 }
 
-TEST(Propagation, NoiseGrowsAsItsIntegrals) {
+TEST(Propagation, NoiseMatchesItsIntegrals) {
   // White acceleration: σ² t³/3 of the position, σ² t²/2 between, σ² t of the velocity, whatever the steps.
   NavigationState s;
   ErrorCovariance p = ErrorCovariance::Zero();
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero(), up = Eigen::Vector3d::UnitZ();
   const InertialStep still{zero, zero, up, up, 0.05};
   for (int i = 0; i < 40; ++i) {
-    move_on(p, transition(s, still, {0, 0.3, 0, 0}, 1));
+    propagate_covariance(p, transition(s, still, {0, 0.3, 0, 0}, 1));
     s = propagate(s, still, 1);
   }
   EXPECT_NEAR(p(error_at::kPosition, error_at::kPosition), 0.09 * 8 / 3, 1e-9);
@@ -104,7 +104,7 @@ TEST(Propagation, NoiseGrowsAsItsIntegrals) {
   EXPECT_NEAR(p(error_at::kVelocity, error_at::kVelocity), 0.09 * 2, 1e-9);
 }
 
-TEST(Propagation, MovesCovarianceAsTheWholeMatrixWould) {
+TEST(Propagation, PropagatesTheCovarianceAsTheFullMatrix) {
   Random random(5);
   const NavigationState s = random_navigation_state(random);
   const Transition t = transition(s, random_step(random), {0.1, 0.2, 0.3, 0.4}, 3.71);
@@ -115,7 +115,7 @@ TEST(Propagation, MovesCovarianceAsTheWholeMatrixWould) {
   f.topRows<error_at::kMoving>() = whole(t);
   q.topLeftCorner<error_at::kMoving, error_at::kMoving>() = t.noise;
   const ErrorCovariance expected = f * p * f.transpose() + q;
-  move_on(p, t);
+  propagate_covariance(p, t);
   EXPECT_LE((p - expected).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_LE((p - p.transpose()).norm(), 1e-12);
 }

@@ -6,13 +6,13 @@
 namespace spartan {
 namespace {
 
-/// Snapshots stand where time crosses a multiple of this, so that they depend on the samples alone, not on their
-/// arrival.
+/// Snapshots are taken where time crosses a multiple of this, so that they depend on the samples only, not on the order
+/// of their arrival.
 constexpr std::int64_t kCell_ns = 500'000'000;
-/// What is kept before the start, to level by.
+/// Samples before the start that are kept for static alignment.
 constexpr double kBeforeStart_s = 10;
-/// A stamp may be so far ahead of all others, or as far as the buffer is long.
-constexpr double kLeastLead_s = 5;
+/// A stamp may be ahead of all others by this, or by the length of the buffer if that is longer.
+constexpr double kMinLead_s = 5;
 
 std::int64_t cell_of(Stamp stamp) {
   return stamp.ns >= 0 ? stamp.ns / kCell_ns : -((-stamp.ns + kCell_ns - 1) / kCell_ns);
@@ -34,7 +34,7 @@ PoseConstraint get_constraint(ArchiveReader& in, Stamp stamp) {
   return {stamp, pose, information, in.get_matrix6()};
 }
 
-// Fields as they are; kinds as their index.
+// The index of the kind in the variant, then the fields.
 void put_measurement(ArchiveWriter& out, const Measurement& m) {
   out.put(static_cast<std::uint8_t>(m.index()));
   out.put(stamp_of_measurement(m).ns);
@@ -59,8 +59,8 @@ void put_measurement(ArchiveWriter& out, const Measurement& m) {
   } else if (const auto* constraint = std::get_if<PoseConstraint>(&m)) {
     put_constraint(out, *constraint);
   } else if (const auto* late = std::get_if<LateConstraint>(&m)) {
-    out.put(late->at_shot.stamp.ns);
-    put_constraint(out, late->at_shot);
+    out.put(late->at_frame.stamp.ns);
+    put_constraint(out, late->at_frame);
   }
 }
 
@@ -96,8 +96,8 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
     case 5:
       return get_constraint(in, stamp);
     case 6: {
-      const Stamp shot{in.get<std::int64_t>()};
-      return LateConstraint{stamp, get_constraint(in, shot)};
+      const Stamp frame{in.get<std::int64_t>()};
+      return LateConstraint{stamp, get_constraint(in, frame)};
     }
     default:
       return std::nullopt;
@@ -110,7 +110,7 @@ ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(option
 
 void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
                          const std::optional<Eigen::Vector3d>& up_in_body) {
-  if (started()) throw std::logic_error("the localization has started already");
+  if (started()) throw std::logic_error("Localizer::start: called twice");
   std::erase_if(entries_, [&](const Measurement& m) { return std::abs(age(m, stamp)) > kBeforeStart_s; });
   const auto later = std::partition_point(entries_.begin(), entries_.end(),
                                           [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
@@ -131,18 +131,18 @@ std::optional<Refusal> ReplayFilter::add(const Measurement& m) {
   return started() ? add_started(m) : add_before_start(m);
 }
 
-/// There is no shot yet to say what time it is: a stamp far from all others is refused, a second one beside it
-/// believed.
+/// No frame defines the time yet: an isolated stamp far from all others is refused, a second one near it is accepted
+/// and replaces the earlier samples.
 std::optional<Refusal> ReplayFilter::add_before_start(const Measurement& m) {
   const Stamp stamp = stamp_of_measurement(m);
-  const bool odd = !entries_.empty() && std::abs(age(m, newest_)) > kBeforeStart_s;
-  if (odd) {
-    const bool alone = !odd_ || std::abs(age(m, *odd_)) > kBeforeStart_s;
-    odd_ = stamp;
-    if (alone) return stamp > newest_ ? Refusal::too_early : Refusal::too_late;
+  const bool isolated = !entries_.empty() && std::abs(age(m, newest_)) > kBeforeStart_s;
+  if (isolated) {
+    const bool first = !isolated_ || std::abs(age(m, *isolated_)) > kBeforeStart_s;
+    isolated_ = stamp;
+    if (first) return stamp > newest_ ? Refusal::too_early : Refusal::too_late;
     entries_.clear();
   }
-  odd_.reset();
+  isolated_.reset();
   if (!place(m)) return Refusal::duplicate;
   newest_ = stamp_of_measurement(entries_.back());
   std::erase_if(entries_, [&](const Measurement& e) { return age(e, newest_) > kBeforeStart_s; });
@@ -154,26 +154,26 @@ std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
   if (!reaches(stamp)) {
     const auto* constraint = std::get_if<PoseConstraint>(&m);
     if (constraint == nullptr || stamp != filter_.memory().vision.clone_stamp) return Refusal::too_late;
-    // As early as the buffer reaches: a shot that comes late still comes after it.
+    // At the far end of the buffer: a late frame still comes after it.
     const auto buffer_ns = static_cast<std::int64_t>(options_.buffer_s * 1e9);
-    return take(LateConstraint{{newest_.ns - buffer_ns}, *constraint});
+    return insert(LateConstraint{{newest_.ns - buffer_ns}, *constraint});
   }
-  // It would make all others too late. Only the required sensor is believed that so much time has gone by.
-  if (seconds_between(newest_, stamp) > std::max(options_.buffer_s, kLeastLead_s) &&
+  // It would make all other samples too late. Only vision, the required sensor, may advance the time that far.
+  if (seconds_between(newest_, stamp) > std::max(options_.buffer_s, kMinLead_s) &&
       !std::holds_alternative<RelativeMotion>(m))
     return Refusal::too_early;
-  return take(m);
+  return insert(m);
 }
 
 std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
   const auto at = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
   if (at != entries_.end() && !comes_before(m, *at)) return std::nullopt;
-  const auto index = static_cast<std::size_t>(at - entries_.begin());  // the insertion may move all of them
+  const auto index = static_cast<std::size_t>(at - entries_.begin());  // insert() invalidates the iterator
   entries_.insert(at, m);
   return index;
 }
 
-std::optional<Refusal> ReplayFilter::take(const Measurement& m) {
+std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
   const auto at = place(m);
   if (!at) return Refusal::duplicate;
   newest_ = std::max(newest_, stamp_of_measurement(m));
@@ -182,7 +182,7 @@ std::optional<Refusal> ReplayFilter::take(const Measurement& m) {
   } else {
     replay_from(*at);
   }
-  forget_old();
+  discard_old();
   return std::nullopt;
 }
 
@@ -195,7 +195,7 @@ void ReplayFilter::replay_from(std::size_t entry) {
   while (snapshots_.size() > 1 && snapshots_.back().count >= entry) snapshots_.pop_back();
   filter_.set_memory(snapshots_.back().memory);
   const std::size_t from = snapshots_.back().count;
-  if (snapshots_.size() > 1) snapshots_.pop_back();  // run_from makes it again
+  if (snapshots_.size() > 1) snapshots_.pop_back();  // run_from() takes it again
   run_from(from);
 }
 
@@ -206,8 +206,8 @@ void ReplayFilter::run_from(std::size_t entry) {
   }
 }
 
-/// Drops what no sample that may still come can reach.
-void ReplayFilter::forget_old() {
+/// Discards snapshots and entries that are older than any sample that is still accepted.
+void ReplayFilter::discard_old() {
   std::size_t first = 0;
   while (first + 1 < snapshots_.size() &&
          seconds_between(snapshots_[first + 1].memory.stamp, newest_) > options_.buffer_s)
@@ -221,8 +221,8 @@ void ReplayFilter::forget_old() {
 
 void ReplayFilter::put(ArchiveWriter& out) const {
   out.put(started());
-  out.put(odd_.has_value());
-  out.put(odd_.value_or(Stamp()).ns);
+  out.put(isolated_.has_value());
+  out.put(isolated_.value_or(Stamp()).ns);
   out.put(start_.ns);
   out.put(newest_.ns);
   spartan::put(out, started() ? snapshots_.front().memory : FilterMemory{});
@@ -232,9 +232,9 @@ void ReplayFilter::put(ArchiveWriter& out) const {
 
 bool ReplayFilter::get(ArchiveReader& in) {
   const bool has_started = in.get<bool>();
-  const bool odd = in.get<bool>();
-  odd_ = Stamp{in.get<std::int64_t>()};
-  if (!odd) odd_.reset();
+  const bool has_isolated = in.get<bool>();
+  isolated_ = Stamp{in.get<std::int64_t>()};
+  if (!has_isolated) isolated_.reset();
   start_.ns = in.get<std::int64_t>();
   newest_.ns = in.get<std::int64_t>();
   const FilterMemory memory = get_filter_memory(in);
@@ -242,7 +242,7 @@ bool ReplayFilter::get(ArchiveReader& in) {
   entries_.clear();
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto m = get_measurement(in);
-    if (!m || !is_sound(*m)) return false;
+    if (!m || !is_valid(*m)) return false;
     if (!entries_.empty() && !comes_before(entries_.back(), *m)) return false;
     entries_.push_back(*m);
   }

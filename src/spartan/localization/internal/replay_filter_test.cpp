@@ -22,7 +22,7 @@ Bytes saved(const ReplayFilter& filter) {
   return out.take();
 }
 
-// A short drive with everything, 4.5 s after the start, the IMU at 20 Hz.
+// A short drive with all sensors, 4.5 s after the start, the IMU at 20 Hz.
 const std::vector<Measurement>& short_drive() {
   static const std::vector<Measurement> all = [] {
     const TestDrive drive;
@@ -77,7 +77,7 @@ RC_GTEST_PROP(ReplayFilter, OrderOfArrivalDoesNotMatterWithinTheBuffer, (std::ui
   RC_ASSERT(bytes_of(filter.filter().memory()) == in_order_result());
 }
 
-RC_GTEST_PROP(ReplayFilter, GoesOnAsBeforeFromASavedMemory, (std::uint32_t seed)) {
+RC_GTEST_PROP(ReplayFilter, ContinuesBitForBitFromASavedMemory, (std::uint32_t seed)) {
   Random random(seed);
   const auto rest = after_start();
   const std::size_t until = random.below(static_cast<std::uint32_t>(rest.size()));
@@ -89,7 +89,7 @@ RC_GTEST_PROP(ReplayFilter, GoesOnAsBeforeFromASavedMemory, (std::uint32_t seed)
   RC_ASSERT(other.get(in));
   RC_ASSERT(in.finish("").has_value());
   RC_ASSERT(saved(other) == bytes);
-  // One late sample among the rest.
+  // One late sample.
   for (ReplayFilter* each : {&filter, &other}) {
     for (std::size_t i = until; i < rest.size(); ++i) each->add(rest[i]);
     each->add(CompassSample{test_stamp(5.123), 0.01, 0.02});
@@ -97,7 +97,7 @@ RC_GTEST_PROP(ReplayFilter, GoesOnAsBeforeFromASavedMemory, (std::uint32_t seed)
   RC_ASSERT(saved(other) == saved(filter));
 }
 
-TEST(ReplayFilter, RefusesWhatIsTooLateOrDouble) {
+TEST(ReplayFilter, RefusesLateAndDuplicateSamples) {
   LocalizationOptions o = test_options();
   o.buffer_s = 1;
   ReplayFilter filter = started_filter(o);
@@ -109,29 +109,29 @@ TEST(ReplayFilter, RefusesWhatIsTooLateOrDouble) {
   EXPECT_EQ(wide.add(WheelSample{test_stamp(2.4), 0, 0}), Refusal::too_late);  // before the start
 }
 
-TEST(ReplayFilter, KeepsAConstraintThatCameAfterTheBuffer) {
+TEST(ReplayFilter, AppliesAConstraintThatIsOlderThanTheBuffer) {
   LocalizationOptions o = test_options();
   o.buffer_s = 0.5;
   ReplayFilter filter = started_filter(o);
   for (const Measurement& m : after_start()) {
     if (stamp_of_measurement(m) < test_stamp(7)) filter.add(m);
   }
-  const Stamp shot = filter.filter().memory().vision.clone_stamp;
-  ASSERT_GT(seconds_between(shot, test_stamp(6.9)), o.buffer_s);
-  const Pose seen = filter.filter().memory().belief.state.world_from_vision_clone;
-  ASSERT_FALSE(filter.add(PoseConstraint{shot, seen, 1e6 * Matrix6d::Identity()}));
+  const Stamp frame = filter.filter().memory().vision.clone_stamp;
+  ASSERT_GT(seconds_between(frame, test_stamp(6.9)), o.buffer_s);
+  const Pose seen = filter.filter().memory().estimate.state.world_from_vision_clone;
+  ASSERT_FALSE(filter.add(PoseConstraint{frame, seen, 1e6 * Matrix6d::Identity()}));
   const Bytes bytes = saved(filter);
   ReplayFilter other(o);
   ArchiveReader in(bytes);
   ASSERT_TRUE(other.get(in));
   ASSERT_TRUE(in.finish(""));
-  // Both take it again behind a sample that is later still.
+  // Both replay it after a sample that arrives even later.
   for (ReplayFilter* each : {&filter, &other}) each->add(CompassSample{test_stamp(6.501), 0.01, 0.02});
   EXPECT_EQ(saved(other), saved(filter));
-  EXPECT_EQ(other.filter().memory().judge(LocalizationSensor::map).used, 2) << "that of the drive, and this one";
+  EXPECT_EQ(other.filter().memory().monitor(LocalizationSensor::map).used, 2) << "the one of the drive and this one";
 }
 
-TEST(ReplayFilter, ForgetsWhatIsOld) {
+TEST(ReplayFilter, DiscardsOldEntries) {
   LocalizationOptions o = test_options();
   o.buffer_s = 1;
   ReplayFilter filter = started_filter(o);
@@ -146,7 +146,7 @@ TEST(ReplayFilter, ForgetsWhatIsOld) {
   EXPECT_EQ(bytes_of(filter.filter().memory()), bytes_of(all.filter().memory()));
 }
 
-TEST(ReplayFilter, TellsNonsenseFromAMemory) {
+TEST(ReplayFilter, RefusesADamagedMemory) {
   Bytes bytes = saved(started_filter(test_options()));
   bytes.resize(bytes.size() / 2);
   ReplayFilter filter(test_options());
