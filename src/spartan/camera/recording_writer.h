@@ -15,10 +15,10 @@ namespace spartan {
 
 /// Contents of recording.yaml.
 struct RecordingOptions {
-  std::string name;
-  std::string description;
-  double gravity_m_s2 = 9.81;
-  SensorNoise noise = {};  ///< specified (nominal) sensor noise
+  std::string name;            ///< shown in reports
+  std::string description;     ///< free text
+  double gravity_m_s2 = 9.81;  ///< gravitational acceleration at the site
+  SensorNoise noise = {};      ///< specified (nominal) sensor noise
 };
 
 /// Creates the folder and appends samples. Kinds of samples may be interleaved in any order; within a kind (and within

@@ -426,5 +426,16 @@ TEST(Imager, RefusesOptionsOutOfBoundsThatWereSetInCode) {
   EXPECT_THAT(refused.error().message(), HasSubstr("local_contrast.tiles is 0"));
 }
 
+TEST(ImagingOptions, AcceptsFormerKeysWithAWarning) {
+  const std::string text = "balance: false\nlocal_contrast: {clip: 3}\nview: {policy: all_valid}\ndebayer: bilinear\n";
+  const auto options = parse_options<ImagingOptions>(text, "options");
+  ASSERT_TRUE(options) << options.error().message();
+  EXPECT_FALSE(options->gain_compensation);
+  EXPECT_EQ(options->local_contrast.clip_limit, 3);
+  EXPECT_EQ(options->view.policy, ViewPolicy::all_valid);
+  EXPECT_EQ(options->debayer, DebayerMethod::bilinear);
+  EXPECT_EQ(renamed_options<ImagingOptions>(text, "options").size(), 2U);
+}
+
 }  // namespace
 }  // namespace spartan

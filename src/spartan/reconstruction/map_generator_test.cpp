@@ -220,7 +220,7 @@ TEST(MapGenerator, AnIslandWithoutGroundIsUnknown) {
   const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
   EXPECT_EQ(at(map, map.count, 3.41, 3.41), 3);
   EXPECT_NEAR(at(map, map.elevation_m, 3.41, 3.41), 0, 1e-6) << "its elevation is measured all the same";
-  EXPECT_EQ(at(map, map.kind, 3.41, 3.41), 0);
+  EXPECT_EQ(at(map, map.kind, 3.41, 3.41), GroundClass::unknown);
   EXPECT_EQ(at(map, map.occupancy_logodds, 3.41, 3.41), 0);
 }
 

@@ -354,7 +354,7 @@ TEST(GlobalMap, ACellThatIsNotFiniteDoesNotEnterIt) {
   ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
   const MapView view = *map.view(window_of(local.place, local.size()));
   EXPECT_EQ(view.occupancy_logodds(no_class.column, no_class.row), 0);
-  EXPECT_EQ(view.kind(no_class.column, no_class.row), 0);
+  EXPECT_EQ(view.kind(no_class.column, no_class.row), GroundClass::unknown);
   EXPECT_EQ(view.count(no_variance.column, no_variance.row), 0);
 }
 

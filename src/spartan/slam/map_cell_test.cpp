@@ -109,11 +109,11 @@ TEST(MapCell, WithoutAnObservedClassItIsUnknownUntilOneIsObserved) {
   CellSurface unclassified = seen(0.1F, 1e-4F);
   unclassified.occupancy_logodds = 0;
   unclassified.votes = 0;
-  MapCell cell = observed({}, unclassified, {});
-  EXPECT_TRUE(cell.surface.seen());
-  EXPECT_EQ(cell.kind(), 0);
-  cell = observed(cell, seen(0.1F, 1e-4F), {});
-  EXPECT_EQ(cell.kind(), 1);
+  MapCell cell = fuse_observation({}, unclassified, {});
+  EXPECT_TRUE(cell.surface.observed());
+  EXPECT_EQ(cell.kind(), GroundClass::unknown);
+  cell = fuse_observation(cell, seen(0.1F, 1e-4F), {});
+  EXPECT_EQ(cell.kind(), GroundClass::ground);
 }
 
 }  // namespace

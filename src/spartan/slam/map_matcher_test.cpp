@@ -158,14 +158,10 @@ TEST(MapMatcher, IsEquivariantToMotionsOfTheWorld) {
   }
 }
 
-// And a stone that is too far from all ground for the surface of the ground to be fitted there.
-std::vector<SurfacePoint> with_island(std::vector<SurfacePoint> points, const Pose& body_from_world) {
-  for (double x = -2.49; x < -2; x += 0.02) {
-    for (double y = -2.49; y < -2; y += 0.02) {
-      const Eigen::Vector3d p = body_from_world * Eigen::Vector3d(x, y, 0.1), along = p - Eigen::Vector3d(0, 0, 1);
-      points.push_back({p.cast<float>(), 0.005F, along.normalized().cast<float>(), GroundClass::unknown});
-    }
-  }
+// Three points that are too far from all others for the ground surface to be fitted there.
+std::vector<SurfacePoint> with_island(std::vector<SurfacePoint> points, const Eigen::Vector3d& in_body) {
+  const Eigen::Vector3f along = (in_body - Eigen::Vector3d(0, 0, 1)).normalized().cast<float>();
+  for (int i = 0; i < 3; ++i) points.push_back({in_body.cast<float>(), 0.005F, along, GroundClass::ground});
   return points;
 }
 
@@ -173,16 +169,17 @@ TEST(MapMatcher, AnIslandWithoutGroundDoesNotSpoilTheMatch) {
   const Ground ground = rocky_ground();
   const ThreadPool workers(2);
   const Pose before = standing(ground, 0, 0, 0), now = standing(ground, 1, 0.2, 0.1);
+  const Eigen::Vector3d island(-2.02, -2.02, 0.1);
   GlobalMap map({}, 0.05);
-  const LocalMap mapped =
-      MapGenerator({}, workers).generate(with_island(points_at(ground, before, 1), before.inverse()), before);
+  const LocalMap mapped = MapGenerator({}, workers).generate(with_island(points_at(ground, before, 1), island), before);
   ASSERT_TRUE(map.add(mapped, {}, {before, {}}, Matrix6d::Zero()));
+  const Eigen::Vector3d in_world = before * island;
   const MapView view = *map.view(window_around(now.translation().x(), now.translation().y(), 5, 0.05));
-  const GridCell cell = cell_at(view.place(), -2.23, -2.23);
+  const GridCell cell = cell_at(view.place(), in_world.x(), in_world.y());
   EXPECT_GT(view.count(cell.column, cell.row), 0);
   EXPECT_EQ(view.occupancy_logodds(cell.column, cell.row), 0);
-  EXPECT_EQ(view.kind(cell.column, cell.row), 0) << "no class was observed";
-  const Scene s{now, with_island(points_at(ground, now, 2), now.inverse()), *map.view(view.window)};
+  EXPECT_EQ(view.kind(cell.column, cell.row), GroundClass::unknown) << "no class was observed";
+  const Scene s{now, with_island(points_at(ground, now, 2), now.inverse() * in_world), *map.view(view.window)};
   EXPECT_EQ(name_of(match(s, offset(0.15, -0.1, 0.05, 0.02, -0.01, 0.04)).status), "decided");
 }
 
