@@ -50,8 +50,8 @@ class RecordingWriter {
 
   /// Writes the ground truth: truth/rig.yaml and truth/poses.tum (world_from_body).
   Status write_truth(const Rig& true_rig, const Trajectory& poses);
-  /// Writes truth/disparity/<pair>/<stamp>.png (16 bits, disparity × 256 in px, 0 unknown) and
-  /// truth/mask/<pair>/<stamp>.png (255 seen by both cameras, 128 by the left one only, 0 by none).
+  /// Writes `truth/disparity/<pair>/<stamp>.png` (16 bits, disparity × 256 in px, 0 unknown) and
+  /// `truth/mask/<pair>/<stamp>.png` (255 seen by both cameras, 128 by the left one only, 0 by none).
   Status write_truth_disparity(const std::string& pair, Stamp left_stamp, ImageView<const float> disparity,
                                ImageView<const std::uint8_t> mask);
 

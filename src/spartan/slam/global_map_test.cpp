@@ -343,7 +343,7 @@ RC_GTEST_PROP(GlobalMap, ObservationsNeverRaiseAVarianceAndUnobservedCellsAreNev
 TEST(GlobalMap, ACellThatIsNotFiniteDoesNotEnterIt) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const Ground ground = rocky_ground();
-  const Pose pose = standing(ground, 0, 0, 0);
+  const Pose pose = pose_on_ground(ground, 0, 0, 0);
   LocalMap local = map_of(ground, pose, 1);
   const GridCell no_class = cell_at(local.place, 2.02, 0.02), no_variance = cell_at(local.place, 2.02, 0.52);
   ASSERT_GT(local.count(no_class.column, no_class.row), 0);

@@ -168,7 +168,7 @@ std::vector<SurfacePoint> with_island(std::vector<SurfacePoint> points, const Ei
 TEST(MapMatcher, AnIslandWithoutGroundDoesNotSpoilTheMatch) {
   const Ground ground = rocky_ground();
   const ThreadPool workers(2);
-  const Pose before = standing(ground, 0, 0, 0), now = standing(ground, 1, 0.2, 0.1);
+  const Pose before = pose_on_ground(ground, 0, 0, 0), now = pose_on_ground(ground, 1, 0.2, 0.1);
   const Eigen::Vector3d island(-2.02, -2.02, 0.1);
   GlobalMap map({}, 0.05);
   const LocalMap mapped = MapGenerator({}, workers).generate(with_island(points_at(ground, before, 1), island), before);

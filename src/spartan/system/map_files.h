@@ -25,7 +25,7 @@ Status write_map_geotiff(const MapView& view, const MapOptions& options, const T
 
 /// All of a position's 3D reconstruction, into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
 /// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; of each view
-/// <pair>_<stamp_ns>_classes.png and _v_disparity.png where ground was found. Code `output`.
+/// `<pair>_<stamp_ns>_classes.png` and `_v_disparity.png` where ground was found. Code `output`.
 Status write_position(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
                       const MappingOptions& options, const std::string& folder);
 

@@ -25,7 +25,7 @@ Drawn draw(Random& random, double slope, double slope_noise, double across = 1) 
   for (int row = 0; row < 80; ++row) {
     for (int column = 0; column < 80; ++column) {
       const Eigen::Vector2d s(slope * random.normal(), across * slope * random.normal());
-      const auto seen = [&] {
+      const auto measured_slope = [&] {
         return Eigen::Vector2d(s.x() + slope_noise * random.normal(), s.y() + slope_noise * random.normal());
       };
       const Eigen::Vector3d at((column - 40) * 0.05 + 1, (40 - row) * 0.05, 0);
@@ -35,8 +35,8 @@ Drawn draw(Random& random, double slope, double slope_noise, double across = 1) 
       cell.sigma_m = kNoise_m;
       cell.weight = cell.curvature = 1 / (kNoise_m * kNoise_m);
       cell.residual_m = kNoise_m * random.normal();
-      cell.jacobian_by_local = elevation_jacobian(observed(), at);
-      cell.jacobian_by_global = elevation_jacobian(observed(), at);
+      cell.jacobian_by_local = elevation_jacobian(measured_slope(), at);
+      cell.jacobian_by_global = elevation_jacobian(measured_slope(), at);
       const Vector6d j = cell.jacobian();
       normal += j * j.transpose();
       right += cell.residual_m * j;

@@ -69,14 +69,14 @@ TEST(ScanMatching, OccupancyDecidesWhereElevationsAreEqual) {
   EXPECT_NEAR((peaks.front().correction * Eigen::Vector3d(2, 0, 0)).x(), 1.8, 0.051);
 }
 
-TEST(JitterSearch, ASearchThatIsTooLargeIsRefused) {
+TEST(ScanMatching, RejectsASearchThatIsTooLarge) {
   MatchOptions options;
   EXPECT_TRUE(validate(options, "match"));
-  options.widest_m = 10;
+  options.max_search_m = 10;
   EXPECT_TRUE(validate(options, "match")) << "401 x 401 shifts, 17 rotations";
   options.step_m = 0.005;
   options.step_deg = 0.05;
-  options.widest_deg = 60;  // 4001 x 4001 shifts, 2401 rotations: more trials than an int counts
+  options.max_search_deg = 60;  // 4001 x 4001 shifts, 2401 rotations: more trials than an int counts
   const Status refused = validate(options, "match");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
