@@ -60,6 +60,8 @@ struct EnumName {
   Enum value;
   const char* name;
 };
+template <class Enum>
+EnumName(Enum, const char*) -> EnumName<Enum>;
 
 /// The name of an enum value; empty if enum_names() does not list it.
 template <class Enum>
