@@ -80,9 +80,8 @@ struct Pipeline::State {
   void advance(const MotionEstimate& motion);
   RelativeMotion body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const;
   void add_sensor_sample(const Measurement& sample);
-  void localize(const RelativeMotion& body_motion);
-  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified,
-                            const RelativeMotion& body_motion);
+  void localize(const RelativeMotion& motion);
+  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
   void apply_map_constraint(const StopSurvey& survey, const PoseConstraint& constraint);
   Status add_view(const StereoFrame& frame);
   Result<std::optional<MappedStop>> finish_stop();
@@ -131,18 +130,18 @@ void Pipeline::State::add_sensor_sample(const Measurement& sample) {
   if (!options.odometry_only || !started) localizer.add(sample);
 }
 
-void Pipeline::State::localize(const RelativeMotion& body_motion) {
-  localizer.add(body_motion);
-  odometry_filter.add(body_motion);
-  slam_filter.add(body_motion);
+void Pipeline::State::localize(const RelativeMotion& motion) {
+  localizer.add(motion);
+  odometry_filter.add(motion);
+  slam_filter.add(motion);
 }
 
 Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified,
-                                           const RelativeMotion& body_motion) {
+                                           const RelativeMotion& motion) {
   if (!maps_stops) return {};
   return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
                                        localizer.estimate().world_from_body,
-                                       {body_motion.previous_from_current, body_motion.covariance});
+                                       {motion.previous_from_current, motion.covariance});
 }
 
 // Adds a frame of another pair to the stop that it belongs to.
