@@ -270,7 +270,7 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   const MergedRange merged = mapper.merge();
   const LocalMap map = mapper.map(surface_points(merged), first_pose(up, ahead_in_body, 0));
   if (Status s = make_folder(a.output); !s) return failure(s);
-  if (Status s = write_position(mapper.views(), merged, map, options->mapping, a.output); !s) return failure(s);
+  if (Status s = write_stop_files(mapper.views(), merged, map, options->mapping, a.output); !s) return failure(s);
   const Json json = to_json(mapper, map, *stop, up);
   if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json, a.output)); !s) return failure(s);
   return kDone;

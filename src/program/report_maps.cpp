@@ -87,7 +87,7 @@ Result<std::string> map_images(const std::string& run) {
     const auto image = image_of(
         folder.local_map(map.stamp) + ".png",
         fmt::format("Position {}: {} views, {} cells known, {} obstacles (red), north up. In the global map: {}{}",
-                    map.position_id, map.views, map.known_cells, map.obstacles, status_text(map.verdict), overlap),
+                    map.position_id, map.views, map.known_cells, map.obstacles, status_text(map.status), overlap),
         360);
     if (!image) return failure(image);
     html += *image;

@@ -5,19 +5,19 @@
 #include <algorithm>
 
 #include "program/html_parts.h"
-#include "spartan/system/sensor_spells.h"
+#include "spartan/system/sensor_outages.h"
 
 namespace spartan::program {
 namespace {
 
 constexpr std::size_t kMostOutages = 20;  // listed per sensor
 
-std::string outage_table(const std::string& sensor, const std::vector<SensorSpell>& outages, Stamp begin) {
+std::string outage_table(const std::string& sensor, const std::vector<SensorOutage>& outages, Stamp begin) {
   std::vector<std::vector<std::string>> rows{{sensor, "from, s", "to, s", "frame id", "frames"}};
   const std::size_t shown = std::min(kMostOutages, outages.size());
   rows.reserve(shown + 2);
   for (std::size_t i = 0; i < shown; ++i) {
-    const SensorSpell& s = outages[i];
+    const SensorOutage& s = outages[i];
     rows.push_back(
         {s.state + ": " + s.reason, fmt::format("{:.1f}", seconds_between(begin, s.from)),
          fmt::format("{:.1f}", seconds_between(begin, s.to)),
@@ -38,7 +38,7 @@ std::string sensor_tables(const Json& summary, const std::vector<FrameRecord>& f
     for (std::size_t i = 1; i < counts.front().size(); ++i)
       row.push_back(std::to_string(states[counts.front()[i]].get<int>()));
     counts.push_back(std::move(row));
-    const std::vector<SensorSpell> outages = sensor_spells(frames, sensor);
+    const std::vector<SensorOutage> outages = sensor_outages(frames, sensor);
     if (!outages.empty()) outages_html += outage_table(sensor, outages, frames.front().stamp);
   }
   std::string html = "<p>Number of frames by state of each sensor of the localization.</p>\n" + html_table(counts);

@@ -1,4 +1,4 @@
-// `spartan run` from outside: good drives, bad input, full disks, kills.
+// `spartan run` as a program: results, resuming, invalid input, full disk, kills.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ std::string number(int i) {
   return std::string(6 - digits.size(), '0') + digits;
 }
 
-// Each test works on a copy of its own of the drive that make_small_drive has rendered.
+// Each test works on its own copy of the drive that make_small_drive has rendered.
 class Run : public ::testing::Test {
  protected:
   Run() { fs::copy(testing::small_drive_folder(), drive(), fs::copy_options::recursive); }
@@ -58,7 +58,7 @@ class Run : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(Run, LeavesTrajectoryTerrainAndSummary) {
+TEST_F(Run, WritesTrajectoryTerrainAndSummary) {
   const ProgramResult result = run("out", {"--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto summary = summary_of(path("out"));
@@ -83,7 +83,7 @@ TEST_F(Run, LeavesTrajectoryTerrainAndSummary) {
   EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.01);
 }
 
-TEST_F(Run, TakesTheOdometrysDisparitiesFromTheDenseImageWhereTheOptionAsksForIt) {
+TEST_F(Run, OptionSelectsDenseDisparitiesForTheOdometry) {
   ASSERT_EQ(run("row").exit_code, 0);
   const ProgramResult dense = run("dense", {"--set", "odometry.reconstruction.source=dense", "--json"});
   ASSERT_EQ(dense.exit_code, 0) << dense.err;
@@ -102,7 +102,7 @@ TEST_F(Run, GivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(byte_stable_content(path("one")), byte_stable_content(path("two")));
 }
 
-TEST_F(Run, GoesOnAfterAKillAsIfNothingHadHappened) {
+TEST_F(Run, ResumedRunGivesTheSameBytesAfterAKill) {
   const auto start = std::chrono::steady_clock::now();
   ASSERT_EQ(run("whole").exit_code, 0);
   const auto took = std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() - start);
@@ -119,7 +119,7 @@ TEST_F(Run, GoesOnAfterAKillAsIfNothingHadHappened) {
   }
 }
 
-TEST_F(Run, ResumesWithoutDecodingWhatWasCommitted) {
+TEST_F(Run, ResumesWithoutDecodingCommittedFrames) {
   ASSERT_EQ(run("whole").exit_code, 0);
   ASSERT_EQ(run("part", {"--max-frames", "8"}).exit_code, 0);
   for (int i = 0; i < 8; ++i) {
@@ -132,7 +132,7 @@ TEST_F(Run, ResumesWithoutDecodingWhatWasCommitted) {
   EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("whole")));
 }
 
-TEST_F(Run, StopsCleanlyWhenInterrupted) {
+TEST_F(Run, CanBeResumedAfterAnInterruption) {
   ProgramLimits limits;
   limits.interrupt_once_there = path("out/run.sqlite");
   const ProgramResult stopped = run("out", {}, limits);
@@ -143,10 +143,10 @@ TEST_F(Run, StopsCleanlyWhenInterrupted) {
   EXPECT_EQ(byte_stable_content(path("out")), byte_stable_content(path("whole")));
 }
 
-TEST_F(Run, KeepsWhatWasCommittedWhenTheDiskIsFull) {
+TEST_F(Run, RetainsCommittedFramesWhenTheDiskIsFull) {
   ASSERT_EQ(run("whole").exit_code, 0);
   ProgramLimits limits;
-  limits.largest_file_bytes = 1'500'000;  // holds some frames of the store, not all
+  limits.largest_file_bytes = 1'500'000;  // enough for some frames of the store, not for all
   const ProgramResult full = run("full", {}, limits);
   ASSERT_EQ(full.exit_code, 5) << full.err;
   EXPECT_THAT(full.err, HasSubstr(path("full")));
@@ -156,7 +156,7 @@ TEST_F(Run, KeepsWhatWasCommittedWhenTheDiskIsFull) {
   EXPECT_EQ(byte_stable_content(path("full")), byte_stable_content(path("whole")));
 }
 
-TEST_F(Run, LeavesAnExistingFolderAlone) {
+TEST_F(Run, DoesNotOverwriteAnExistingFolder) {
   ASSERT_EQ(run("out").exit_code, 0);
   const auto before = byte_stable_content(path("out"));
   const ProgramResult again = run("out");
@@ -165,14 +165,14 @@ TEST_F(Run, LeavesAnExistingFolderAlone) {
   EXPECT_EQ(byte_stable_content(path("out")), before);
 }
 
-TEST_F(Run, RefusesToResumeAnotherRun) {
+TEST_F(Run, RejectsResumingAnotherRun) {
   ASSERT_EQ(run("out").exit_code, 0);
   EXPECT_EQ(run("out", {"--resume", "--set", "terrain.every_m=2"}).exit_code, 4) << "other options";
   std::ofstream(drive() + "/times.txt", std::ios::app) << "99.0\n";
   EXPECT_EQ(run("out", {"--resume"}).exit_code, 4) << "another input";
 }
 
-TEST_F(Run, RefusesWhatIsNoRecording) {
+TEST_F(Run, RejectsFoldersThatAreNoRecording) {
   const ProgramResult missing = run_program({"run", path("nowhere"), "-o", path("out")});
   EXPECT_EQ(missing.exit_code, 3);
   EXPECT_THAT(missing.err, HasSubstr(path("nowhere")));
@@ -205,17 +205,17 @@ TEST_F(Run, SkipsPairsOfDifferentSize) {
   EXPECT_EQ(run_program({"stereo", image(0, 5), image(1, 5), "-o", path("stereo2")}).exit_code, 3);
 }
 
-TEST_F(Run, StereoShowsTheViewThatIsAskedFor) {
+TEST_F(Run, StereoUsesTheViewOptions) {
   const auto stereo = [&](std::vector<std::string> more) {
     std::vector<std::string> words{"stereo",       image(0, 0), image(1, 0),           "-o",
                                    path("stereo"), "--rig",     drive() + "/calib.txt"};
     words.insert(words.end(), more.begin(), more.end());
     return run_program(words);
   };
-  const ProgramResult chosen =
+  const ProgramResult valid =
       stereo({"--json", "--set", "imaging.view.width_px=200", "--set", "imaging.view.policy=all_valid"});
-  ASSERT_EQ(chosen.exit_code, 0) << chosen.err;
-  EXPECT_EQ(nlohmann::json::parse(chosen.out)["width"], 200);
+  ASSERT_EQ(valid.exit_code, 0) << valid.err;
+  EXPECT_EQ(nlohmann::json::parse(valid.out)["width"], 200);
   const ProgramResult impossible =
       stereo({"--set", "imaging.view.focal_px=90000", "--set", "imaging.view.policy=whole_view"});
   EXPECT_EQ(impossible.exit_code, 4) << impossible.err;
@@ -231,12 +231,12 @@ TEST_F(Run, FailsWhereNoFrameIsUsable) {
   for (int i = 0; i < 14; ++i) cut(image(1, i), 0.5);
   const ProgramResult result = run("out");
   EXPECT_EQ(result.exit_code, 3) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("no usable frame; the first one: "));
+  EXPECT_THAT(result.err, HasSubstr("no usable frame; first error: "));
   EXPECT_THAT(result.err, HasSubstr("image_1/000000.png"));
-  EXPECT_FALSE(fs::exists(path("out"))) << "nothing is left that would be in the way of the next try";
+  EXPECT_FALSE(fs::exists(path("out"))) << "an empty run folder would block the next attempt";
 }
 
-TEST_F(Run, WritesWhatItSaysIntoTheLog) {
+TEST_F(Run, WritesMessagesToTheLogFile) {
   fs::remove(image(1, 4));
   ASSERT_EQ(run("out", {"-q"}).exit_code, 0);
   std::ifstream file(path("out/log.txt"));
@@ -245,7 +245,7 @@ TEST_F(Run, WritesWhatItSaysIntoTheLog) {
   EXPECT_THAT(log, HasSubstr("frame 4 skipped (right_missing)"));
 }
 
-TEST_F(Run, ComparesWithTheTruth) {
+TEST_F(Run, EvaluatesAgainstTheTruth) {
   const ProgramResult result = run("out", {"--truth", drive(), "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto summary = summary_of(path("out"));
@@ -253,14 +253,14 @@ TEST_F(Run, ComparesWithTheTruth) {
   EXPECT_EQ(summary["truth"]["align"], "se3");
   EXPECT_EQ(summary["truth"]["frames"], 14);
   EXPECT_LT(summary["truth"]["ate_m"]["rmse"], 0.005);
-  // A truth that cannot be read is printed before the drive begins.
+  // A truth file that cannot be read is reported before the first frame.
   const ProgramResult refused = run("other", {"--truth", path("none.txt")});
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.err, HasSubstr("none.txt"));
   EXPECT_FALSE(fs::exists(path("other")));
 }
 
-TEST_F(Run, BridgesMissingFramesWhereTheViewsStillOverlap) {
+TEST_F(Run, BridgesMissingFramesIfTheViewsOverlap) {
   for (int i = 3; i < 13; ++i) fs::remove(image(1, i));
   const ProgramResult result = run("out");
   const auto summary = summary_of(path("out"));
@@ -269,8 +269,8 @@ TEST_F(Run, BridgesMissingFramesWhereTheViewsStillOverlap) {
   EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
 }
 
-TEST_F(Run, SaysThatItWasLostWhereTheyDoNot) {
-  // Behind the gap the world is another one: the same drive seen upside down.
+TEST_F(Run, ReportsALossIfTheViewsDoNotOverlap) {
+  // After the gap the images are upside down, so no landmark matches.
   for (int i = 3; i < 8; ++i) fs::remove(image(1, i));
   for (int i = 8; i < 14; ++i) {
     testing::turn_upside_down(image(0, i), image(1, i));
@@ -279,11 +279,11 @@ TEST_F(Run, SaysThatItWasLostWhereTheyDoNot) {
   EXPECT_EQ(result.exit_code, 6) << result.err;
   const auto summary = summary_of(path("out"));
   EXPECT_EQ(summary["lost_spans"].size(), 1U);
-  EXPECT_EQ(summary["health"]["odometry"]["lost"], 1) << "it goes on from the next frame";
+  EXPECT_EQ(summary["health"]["odometry"]["lost"], 1) << "tracking continues from the next frame";
   EXPECT_THAT(summary["lost_spans"][0]["reason"].get<std::string>(), ::testing::Not(::testing::IsEmpty()));
 }
 
-TEST_F(Run, SkipsStampsThatRunBackwards) {
+TEST_F(Run, SkipsFramesWithReversedStamps) {
   std::ifstream in(drive() + "/times.txt");
   std::string times, line;
   for (int i = 0; std::getline(in, line); ++i) times += (i == 6 ? std::string("0.1") : line) + "\n";
@@ -293,7 +293,7 @@ TEST_F(Run, SkipsStampsThatRunBackwards) {
   EXPECT_EQ(summary_of(path("out"))["skipped"]["stamp_reversed"], 1);
 }
 
-TEST_F(Run, RefusesABrokenCalibration) {
+TEST_F(Run, RejectsAnInvalidCalibration) {
   std::ofstream(drive() + "/calib.txt")
       << "P0: nan 0 160 0 0 260 120 0 0 0 1 0\nP1: 260 0 160 -30 0 260 120 0 0 0 1 0\n";
   const ProgramResult result = run("out");
@@ -302,7 +302,7 @@ TEST_F(Run, RefusesABrokenCalibration) {
   EXPECT_FALSE(fs::exists(path("out")));
 }
 
-TEST_F(Run, RefusesUnknownOptions) {
+TEST_F(Run, RejectsUnknownOptions) {
   std::ofstream(path("options.yaml")) << "terrain:\n  every_m: 2\n  colour: red\nodometry:\n  speed: 3\n";
   const ProgramResult result = run("out", {"--config", path("options.yaml")});
   EXPECT_EQ(result.exit_code, 4);
@@ -316,7 +316,7 @@ TEST_F(Run, RefusesUnknownOptions) {
   EXPECT_EQ(run_program({"config", "check", path("all.yaml")}).exit_code, 0);
 }
 
-TEST_F(Run, SaysWhereItCannotWrite) {
+TEST_F(Run, ReportsWhereItCannotWrite) {
   std::ofstream(path("file")) << "not a folder";
   const ProgramResult result = run("file/out");
   EXPECT_EQ(result.exit_code, 5);
@@ -330,7 +330,7 @@ TEST_F(Run, ExportsForOtherTools) {
     const ProgramResult result = run_program({"export", path("out"), "--format", format, "-o", path("x." + format)});
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
-  EXPECT_FALSE(fs::exists(path("out/run.sqlite-wal"))) << "looking leaves nothing behind";
+  EXPECT_FALSE(fs::exists(path("out/run.sqlite-wal"))) << "reading leaves no files";
   const auto lines = [&](const std::string& name) {
     const std::string text = testing::content_of(path(name));
     return std::count(text.begin(), text.end(), '\n');
@@ -342,7 +342,7 @@ TEST_F(Run, ExportsForOtherTools) {
   const ProgramResult score =
       run_program({"evaluate", path("poses.txt"), "--truth", drive() + "/poses.txt", "--align", "none", "--json"});
   ASSERT_EQ(score.exit_code, 0) << score.err;
-  EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.02) << "in KITTI's own frame, without any alignment";
+  EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.02) << "in KITTI's pose convention, without alignment";
   EXPECT_EQ(run_program({"export", path("out"), "--format", "xyz", "-o", path("x")}).exit_code, 2);
   EXPECT_EQ(run_program({"export", path("nowhere"), "--format", "tum", "-o", path("x")}).exit_code, 3);
 }

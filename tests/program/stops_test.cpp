@@ -1,4 +1,4 @@
-// `spartan run` over a rover that stops and looks around: maps, all sensors, kills in the middle of a stop.
+// `spartan run` on a drive with stops: maps, all sensors, resuming after a kill during a stop.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ class Stops : public ::testing::Test {
   testing::TemporaryFolder folder_;
 };
 
-TEST_F(Stops, BecomeMapsAndAllSensorsAreUsed) {
+TEST_F(Stops, AreMappedAndAllSensorsAreUsed) {
   const ProgramResult result = run("out", {"--json"});
   ASSERT_TRUE(finished(result)) << result.err;
   const auto summary = nlohmann::json::parse(result.out);
@@ -75,7 +75,7 @@ TEST_F(Stops, BecomeMapsAndAllSensorsAreUsed) {
   EXPECT_EQ(map->bands.front().width(), 160);
 }
 
-// The recording ends at the second stop: its pans are not followed by a frame.
+// The recording ends at the second stop: no frame of the odometry pair follows its pans.
 TEST_F(Stops, EveryFrameAndStopIsTimed) {
   std::string table = testing::content_of(path("rec/frames.csv"));
   table.erase(table.rfind('\n', table.size() - 2) + 1);
@@ -89,7 +89,7 @@ TEST_F(Stops, EveryFrameAndStopIsTimed) {
   for (const char* stage : {"camera", "imaging"}) EXPECT_EQ(times_run("out", stage), frames) << stage;
   for (const char* stage : {"mapping", "slam", "maps"}) EXPECT_EQ(times_run("out", stage), 2) << stage << ", two stops";
   ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
-  EXPECT_EQ(times_run("part", "maps"), 1) << "it goes on in the second stop";
+  EXPECT_EQ(times_run("part", "maps"), 1) << "the second stop is not finished";
   ASSERT_TRUE(finished(run("part", {"--resume"})));
   EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("out")));
   ASSERT_TRUE(finished(run("no_maps", {"--set", "maps=false"})));
@@ -126,7 +126,7 @@ TEST_F(Stops, AreReportedWithOneAlignment) {
   EXPECT_NE(fitted.find(">position error, SE3 alignment, mm<"), std::string::npos);
 }
 
-TEST_F(Stops, TheirMapIsDescribedMergedAndExported) {
+TEST_F(Stops, TheGlobalMapIsDescribedMergedAndExported) {
   ASSERT_TRUE(finished(run("out")));
   const ProgramResult info = run_program({"map", "info", path("out"), "--json"});
   ASSERT_EQ(info.exit_code, 0) << info.err;
@@ -136,7 +136,7 @@ TEST_F(Stops, TheirMapIsDescribedMergedAndExported) {
   const auto tif = read_geotiff(path("out/maps/global.tif"));
   ASSERT_TRUE(tif) << tif.error().message();
   EXPECT_EQ(printed["columns"], tif->bands.front().width());
-  EXPECT_EQ(tif->names.size(), 11u) << "as a local map's";
+  EXPECT_EQ(tif->names.size(), 11u) << "as in a local map";
 
   const ProgramResult merged =
       run_program({"map", "merge", path("out"), path("out"), "-o", path("both.map"), "--json"});
@@ -166,7 +166,7 @@ TEST_F(Stops, TheirMapIsDescribedMergedAndExported) {
   EXPECT_EQ(run_program({"map", "merge", path("out"), path("out"), "-o", path("no/x.map")}).exit_code, 5);
 }
 
-// A tile of the map goes to a place 6 km to the east.
+// Moves a tile of the map 6 km to the east.
 void stretch_map(const std::string& run) {
   auto db = Database::open(run + "/run.sqlite", Database::Mode::open);
   ASSERT_TRUE(db) << db.error().message();
@@ -190,7 +190,7 @@ TEST_F(Stops, AMapTooLargeForOneImageRemovesTheOldOne) {
   EXPECT_EQ(page.find("Points per cell"), std::string::npos);
 }
 
-// A tile that fails its checksum ends the run where it is read; nothing of that is committed.
+// A tile with a wrong checksum ends the run when it is read; that step is not committed.
 TEST_F(Stops, ADamagedTileEndsTheRun) {
   ASSERT_TRUE(finished(run("whole")));
   ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
@@ -223,18 +223,18 @@ TEST_F(Stops, ADamagedStoreEndsTheRun) {
   EXPECT_NE(damaged.err.find("is damaged or not a database"), std::string::npos) << damaged.err;
 }
 
-TEST_F(Stops, OdometryAloneGivesTheSameOdometry) {
+TEST_F(Stops, OdometryOnlyGivesTheSameOdometry) {
   ASSERT_TRUE(finished(run("whole")));
   const ProgramResult alone = run("alone", {"--odometry-only", "--json"});
   ASSERT_TRUE(finished(alone)) << alone.err;
   EXPECT_EQ(testing::content_of(path("alone/trajectory_odometry.tum")),
             testing::content_of(path("whole/trajectory_odometry.tum")));
   const auto summary = nlohmann::json::parse(alone.out);
-  EXPECT_EQ(summary["world"]["gravity"], "measured") << "the start attitude is";
+  EXPECT_EQ(summary["world"]["gravity"], "measured") << "the start attitude";
   EXPECT_EQ(summary["world"]["heading"], "east");
   for (const char* stage : {"localization", "mapping", "slam", "maps", "reconstruction", "terrain"})
     EXPECT_FALSE(summary["stages"].contains(stage)) << stage;
-  EXPECT_EQ(summary["stages"]["imaging"]["count"], summary["frames"]) << "images of the wide pair are not touched";
+  EXPECT_EQ(summary["stages"]["imaging"]["count"], summary["frames"]) << "images of the wide pair are not processed";
   EXPECT_EQ(summary["absent"], nlohmann::json::parse(R"(["localization", "slam", "maps", "terrain"])"));
   EXPECT_TRUE(summary["health"]["localization"].empty());
   EXPECT_TRUE(maps_of("alone").empty());
@@ -257,7 +257,7 @@ TEST_F(Stops, OdometryAloneGivesTheSameOdometry) {
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_NE(refused.err.find("holds no localization trajectory"), std::string::npos) << refused.err;
   EXPECT_EQ(exported({"--trajectory", "slam"}).exit_code, 3);
-  ASSERT_EQ(exported({}).exit_code, 0) << "the best there is";
+  ASSERT_EQ(exported({}).exit_code, 0) << "the best available trajectory";
   EXPECT_EQ(testing::content_of(path("x.tum")), testing::content_of(path("alone/trajectory_odometry.tum")));
   const ProgramResult score = run_program({"evaluate", path("alone"), "--truth", path("rec"), "--json"});
   ASSERT_EQ(score.exit_code, 0) << score.err;
@@ -276,26 +276,26 @@ TEST_F(Stops, EachTrajectoryIsExported) {
   EXPECT_EQ(testing::content_of(path("best")), testing::content_of(path("localization")));
 }
 
-TEST_F(Stops, SensorNoiseIsThatOfTheRecording) {
-  ASSERT_TRUE(finished(run("stated")));
-  ASSERT_TRUE(finished(run("not_stated", {"--set", "noise_as_stated=false"})));
+TEST_F(Stops, SpecifiedSensorNoiseIsUsed) {
+  ASSERT_TRUE(finished(run("specified")));
+  ASSERT_TRUE(finished(run("ignored", {"--set", "use_specified_noise=false"})));
   const std::string about = testing::content_of(path("rec/recording.yaml"));
   const auto noise = about.find("imu_noise:");
   ASSERT_NE(noise, std::string::npos);
   EXPECT_NE(about.find("inclinometer_noise:"), std::string::npos);
   std::ofstream(path("rec/recording.yaml")) << about.substr(0, noise);
-  ASSERT_TRUE(finished(run("silent")));
+  ASSERT_TRUE(finished(run("unspecified")));
   const auto localized = [&](const std::string& output) {
     return testing::content_of(path(output + "/trajectory_localization.tum"));
   };
-  EXPECT_NE(localized("stated"), localized("not_stated"));
-  const std::string used = testing::content_of(path("stated/config.yaml"));
+  EXPECT_NE(localized("specified"), localized("ignored"));
+  const std::string used = testing::content_of(path("specified/config.yaml"));
   for (const char* line : {"gravity_m_s2: 3.71", "offset_walk_rad_sqrt_hz: 1e-07", "bias_rad: 0.00174532"})
     EXPECT_NE(used.find(line), std::string::npos) << line;
-  EXPECT_EQ(localized("silent"), localized("not_stated"));
+  EXPECT_EQ(localized("unspecified"), localized("ignored"));
 }
 
-TEST_F(Stops, ADefaultThatIsGivenIsNotOverruledByTheRecording) {
+TEST_F(Stops, GivenOptionsAreNotReplacedBySpecifiedNoise) {
   ASSERT_TRUE(finished(run("specified")));
   ASSERT_TRUE(finished(run("set", {"--set", "localization.inclinometer.bias_rad=0.0025"})));
   std::ofstream(path("options.yaml")) << "localization: {compass: {offset_walk_rad_sqrt_hz: 0.00015}}\n";
@@ -340,7 +340,7 @@ TEST_F(Stops, GiveTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(byte_stable_content(path("one")), byte_stable_content(path("two")));
 }
 
-TEST_F(Stops, MapsCanBeSwitchedOff) {
+TEST_F(Stops, OptionDisablesMaps) {
   ASSERT_TRUE(finished(run("out", {"--set", "maps=false"})));
   EXPECT_TRUE(maps_of("out").empty());
 }

@@ -31,7 +31,8 @@ Result<std::string> kitti_text(const RunFolder& folder, const std::vector<FrameR
   const auto rig = read_rig_yaml(folder.rig());
   if (!rig) return failure(rig);
   const StereoPair* const pair = rig->find_pair(frames.front().pair);
-  if (pair == nullptr) return failure(ErrorCode::input, "does not know the pair " + frames.front().pair, folder.rig());
+  if (pair == nullptr)
+    return failure(ErrorCode::input, "has no pair named '" + frames.front().pair + "'", folder.rig());
   return to_kitti(in_left_optical_convention(*rig, *pair, trajectory_without_gaps(frames, kind)));
 }
 
@@ -72,7 +73,7 @@ Result<std::string> trajectory_text(const RunFolder& folder, ExportFormat format
     case ExportFormat::ply:
       break;
   }
-  return failure(ErrorCode::internal, "is not a format for trajectories", folder.path);
+  return failure(ErrorCode::internal, "is not a trajectory format", folder.path);
 }
 
 TrajectoryKind best_of(const std::vector<FrameRecord>& frames) {
@@ -96,7 +97,7 @@ Result<ExportFormat> parse_export_format(std::string_view name) {
     if (text == name) return format;
     known += (known.empty() ? "" : ", ") + std::string(text);
   }
-  return failure(ErrorCode::usage, fmt::format("'{}' is not a format; known: {}", name, known), "--format");
+  return failure(ErrorCode::usage, fmt::format("unknown export format '{}'; known: {}", name, known), "--format");
 }
 
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
@@ -112,7 +113,7 @@ Status export_run(const std::string& run_folder, ExportFormat format, std::optio
   }
   const auto frames = store->frames();
   if (!frames) return failure(frames);
-  if (frames->empty()) return failure(ErrorCode::input, "holds no frames", folder.store());
+  if (frames->empty()) return failure(ErrorCode::input, "contains no frames", folder.store());
   if (kind && !has_trajectory(*frames, *kind)) {
     return failure(ErrorCode::input, fmt::format("holds no {} trajectory", name_of(*kind)), folder.path,
                    "run without --odometry-only");

@@ -23,7 +23,7 @@ std::string obstacle_table(const LocalMap& map) {
   return text;
 }
 
-// Gray levels as colours, in the frame of the map.
+// Points in the map frame, with gray levels as colours.
 PointCloud cloud_of(const MergedRange& merged, const Pose& map_from_body) {
   PointCloud cloud;
   const Pose map_from_centre = map_from_body * merged.body_from_centre;
@@ -31,9 +31,9 @@ PointCloud cloud_of(const MergedRange& merged, const Pose& map_from_body) {
     for (int x = 0; x < merged.range_m.width(); ++x) {
       const double range = merged.range_m(x, y);
       if (!std::isfinite(range)) continue;
-      const Eigen::Vector3d place = map_from_centre * Eigen::Vector3d(range * merged.camera.direction(x, y));
+      const Eigen::Vector3d position = map_from_centre * Eigen::Vector3d(range * merged.camera.direction(x, y));
       const std::uint8_t gray = merged.gray(x, y);
-      cloud.push_back({place.cast<float>(), {gray, gray, gray}});
+      cloud.push_back({position.cast<float>(), {gray, gray, gray}});
     }
   }
   return cloud;
@@ -68,16 +68,16 @@ Status write_global_map(GlobalMap& map, const MapOptions& options, const ThreadP
 }
 
 Status remove_map_files(const std::string& path) {
-  for (const char* ending : {".tif", ".png"}) {
+  for (const char* extension : {".tif", ".png"}) {
     std::error_code error;
-    std::filesystem::remove(path + ending, error);
-    if (error) return failure(ErrorCode::output, "cannot be removed: " + error.message(), path + ending);
+    std::filesystem::remove(path + extension, error);
+    if (error) return failure(ErrorCode::output, "cannot be removed: " + error.message(), path + extension);
   }
   return {};
 }
 
-Status write_position(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
-                      const MappingOptions& options, const std::string& folder) {
+Status write_stop_files(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
+                        const MappingOptions& options, const std::string& folder) {
   if (Status s = write_local_map(map, folder + "/map"); !s) return s;
   if (Status s = write_file_atomically(folder + "/obstacles.csv", obstacle_table(map)); !s) return s;
   if (Status s = write_pfm(folder + "/range.pfm", merged.range_m); !s) return s;

@@ -1,4 +1,4 @@
-// What a map leaves on the disk: GeoTIFF, pictures, point cloud.
+// Files of a map: GeoTIFF, images, point cloud (docs/reference/files.md).
 #pragma once
 
 #include <span>
@@ -10,23 +10,24 @@
 
 namespace spartan {
 
-/// `path` without ending: .tif (bands of docs/formats.md) and .png (relief with classes). Code `output`.
+/// Writes `path`.tif (all layers, docs/reference/files.md) and `path`.png (shaded elevation with classes). Code
+/// `output`.
 Status write_local_map(const LocalMap& map, const std::string& path);
 
-/// The same of everything that the global map knows; nothing where it is empty. Codes: GlobalMap::view's, `output`.
+/// Writes the same files of the whole global map; none if it is empty. Codes: those of GlobalMap::view, `output`.
 Status write_global_map(GlobalMap& map, const MapOptions& options, const ThreadPool& workers, const std::string& path);
 
-/// Removes what one of them wrote to `path`, where it is there. Code `output`.
+/// Removes the files that write_local_map() or write_global_map() wrote to `path`, if they exist. Code `output`.
 Status remove_map_files(const std::string& path);
 
-/// A part of the global map as a GeoTIFF of all layers. Code `output`.
+/// Writes a part of the global map as a GeoTIFF with all layers. Code `output`.
 Status write_map_geotiff(const MapView& view, const MapOptions& options, const ThreadPool& workers,
                          const std::string& path);
 
-/// All of a position's 3D reconstruction, into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
-/// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; of each view
-/// `<pair>_<stamp_ns>_classes.png` and `_v_disparity.png` where ground was found. Code `output`.
-Status write_position(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
-                      const MappingOptions& options, const std::string& folder);
+/// Writes the 3D reconstruction of a stop into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
+/// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; `<pair>_<stamp_ns>_classes.png` and
+/// `<pair>_<stamp_ns>_v_disparity.png` of each view in which ground was found. Code `output`.
+Status write_stop_files(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
+                        const MappingOptions& options, const std::string& folder);
 
 }  // namespace spartan

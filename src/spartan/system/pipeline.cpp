@@ -10,12 +10,12 @@
 #include "spartan/localization/start_frame.h"
 #include "spartan/localization/vision_only_filter.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/system/internal/position_stage.h"
+#include "spartan/system/internal/stop_stage.h"
 
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 5;
+constexpr std::uint32_t kStateVersion = 5;  // of save(); raise it when the saved state changes
 constexpr double kGravityOnEarth_m_s2 = 9.81;
 
 LocalizationOptions with_gravity(const RunOptions& options) {
@@ -24,8 +24,8 @@ LocalizationOptions with_gravity(const RunOptions& options) {
   return localization;
 }
 
-const StereoPair* pair_for_odometry(const Rig& rig, const std::string& wanted) {
-  if (!wanted.empty()) return rig.find_pair(wanted);
+const StereoPair* pair_for_odometry(const Rig& rig, const std::string& name) {
+  if (!name.empty()) return rig.find_pair(name);
   const auto found = std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const auto& p) { return p.for_odometry; });
   return found == rig.pairs.end() ? nullptr : &*found;
 }
@@ -42,13 +42,13 @@ struct Pipeline::State {
         odometer(options_in.odometry, workers),
         disparity_computer(options_in.reconstruction, workers),
         localizer(with_gravity(options_in)),
-        odometry_track(with_gravity(options_in)),
-        slam_track(with_gravity(options_in)),
+        odometry_filter(with_gravity(options_in)),
+        slam_filter(with_gravity(options_in)),
         dead_reckoning(options_in.localization.vision),
-        position(options_in.reconstruction, options_in.mapping, workers),
+        stop_stage(options_in.reconstruction, options_in.mapping, workers),
         merger(options_in.slam, options_in.mapping.map, workers) {
-    maps_positions = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
-    makes_terrain = options.terrain.enabled && !options.odometry_only;
+    maps_stops = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
+    computes_terrain = options.terrain.enabled && !options.odometry_only;
   }
 
   Rig rig;
@@ -58,47 +58,47 @@ struct Pipeline::State {
   Odometer odometer;
   DisparityComputer disparity_computer;
   Localizer localizer;
-  VisionOnlyFilter odometry_track, slam_track;  // the odometry's poses, without and with the map's corrections
-  DeadReckoning dead_reckoning;                 // in the place of all three where the odometry runs alone
-  PositionStage position;
+  VisionOnlyFilter odometry_filter, slam_filter;  // poses of the odometry, without and with map corrections
+  DeadReckoning dead_reckoning;                   // replaces the three filters if the odometry runs alone
+  StopStage stop_stage;
   MapMerger merger;
-  bool maps_positions = false, makes_terrain = false;
+  bool maps_stops = false, computes_terrain = false;
   StageClock clock;
 
-  std::optional<Eigen::Vector3d> up_in_body;  // at the start, as level() was told
+  std::optional<Eigen::Vector3d> up_in_body;  // at the start, by align_with_gravity()
 
-  // The memory from frame to frame.
+  // State from frame to frame.
   bool started = false;
   Stamp last_stamp;
-  Pose world_from_left;  // by the odometry
+  Pose world_from_left;  // by odometry alone
   Pose left_from_body;
   Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the left frame, per second
   double distance_m = 0;
   double distance_of_last_terrain_m = -1;
 
-  void start(const RectifiedPair& shot);
+  void start(const RectifiedPair& rectified);
   void advance(const MotionEstimate& motion);
-  RelativeMotion body_motion(const RectifiedPair& shot, const MotionEstimate& motion) const;
-  void take(const Measurement& sample);
-  void localize(const RelativeMotion& moved);
-  Status pass(const StereoFrame& frame, const RectifiedPair& shot, const RelativeMotion& moved);
-  void hear_map(const PositionSurvey& survey, const PoseConstraint& constraint);
-  Status look(const StereoFrame& frame);
-  Result<std::optional<MappedPosition>> leave_position();
+  RelativeMotion body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const;
+  void add_sensor_sample(const Measurement& sample);
+  void localize(const RelativeMotion& motion);
+  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
+  void apply_map_constraint(const StopSurvey& survey, const PoseConstraint& constraint);
+  Status add_view(const StereoFrame& frame);
+  Result<std::optional<MappedStop>> finish_stop();
   bool terrain_is_due() const;
-  Status check_disparities(const RectifiedPair& shot) const;
-  Result<ImageView<const float>> dense_disparity(const RectifiedPair& shot);
-  Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& shot);
+  Status check_disparities(const RectifiedPair& rectified) const;
+  Result<ImageView<const float>> dense_disparity(const RectifiedPair& rectified);
+  Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& rectified);
 };
 
-void Pipeline::State::start(const RectifiedPair& shot) {
-  localizer.start(shot.stamp, shot.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body);
+void Pipeline::State::start(const RectifiedPair& rectified) {
+  localizer.start(rectified.stamp, rectified.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body);
   const Pose first = localizer.estimate().world_from_body.pose;
   if (!options.odometry_only) {
-    odometry_track.start(shot.stamp, first);
-    slam_track.start(shot.stamp, first);
+    odometry_filter.start(rectified.stamp, first);
+    slam_filter.start(rectified.stamp, first);
   }
-  world_from_left = first * shot.body_from_left;
+  world_from_left = first * rectified.body_from_left;
   started = true;
 }
 
@@ -109,94 +109,100 @@ void Pipeline::State::advance(const MotionEstimate& motion) {
   if (seconds > 0) velocity = log_se3(motion.previous_from_current) / seconds;
 }
 
-// M moves the left eye: B M B⁻¹ moves the body, and B M Exp(ξ) B⁻¹ = B M B⁻¹ Exp(Ad_B ξ).
-RelativeMotion Pipeline::State::body_motion(const RectifiedPair& shot, const MotionEstimate& motion) const {
-  const Pose& body_from_left = shot.body_from_left;
-  const Matrix6d turn = adjoint(body_from_left);
-  RelativeMotion moved;
-  moved.from = motion.from;
-  moved.to = motion.to;
-  moved.measured = motion.status != TrackingStatus::lost;
-  // That the rover stood is told by the exact identity.
+// Transports the motion M of the left camera to the body, with B = body_from_left:
+// B M Exp(ξ) B⁻¹ = (B M B⁻¹) Exp(Ad_B ξ), so the covariance becomes Ad_B Σ Ad_Bᵀ.
+RelativeMotion Pipeline::State::body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const {
+  const Pose& body_from_left = rectified.body_from_left;
+  const Matrix6d ad = adjoint(body_from_left);
+  RelativeMotion result;
+  result.from = motion.from;
+  result.to = motion.to;
+  result.measured = motion.status != TrackingStatus::lost;
+  // The exact identity marks a stationary rover.
   if (motion.status != TrackingStatus::stationary)
-    moved.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
-  moved.covariance = turn * motion.covariance * turn.transpose();
-  return moved;
+    result.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
+  result.covariance = ad * motion.covariance * ad.transpose();
+  return result;
 }
 
-// The odometry alone needs to know only how the world lies at the start.
-void Pipeline::State::take(const Measurement& sample) {
+// The odometry alone needs sensor samples only to initialize the world frame.
+void Pipeline::State::add_sensor_sample(const Measurement& sample) {
   if (!options.odometry_only || !started) localizer.add(sample);
 }
 
-void Pipeline::State::localize(const RelativeMotion& moved) {
-  localizer.add(moved);
-  odometry_track.add(moved);
-  slam_track.add(moved);
+void Pipeline::State::localize(const RelativeMotion& motion) {
+  localizer.add(motion);
+  odometry_filter.add(motion);
+  slam_filter.add(motion);
 }
 
-Status Pipeline::State::pass(const StereoFrame& frame, const RectifiedPair& shot, const RelativeMotion& moved) {
-  if (!maps_positions) return {};
-  return position.pass(frame.position_id, shot, pair.nearest_m, localizer.estimate().world_from_body,
-                       {moved.previous_from_current, moved.covariance});
+Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified,
+                                           const RelativeMotion& motion) {
+  if (!maps_stops) return {};
+  return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
+                                       localizer.estimate().world_from_body,
+                                       {motion.previous_from_current, motion.covariance});
 }
 
-// A further view of the position at hand.
-Status Pipeline::State::look(const StereoFrame& frame) {
-  if (!maps_positions || frame.position_id < 0) return {};
-  const auto shot = clock.measure("imaging", [&] { return imager.process(frame); });
-  if (!shot) return failure(shot);
-  clock.add(shot->times);
+// Adds a frame of another pair to the stop that it belongs to.
+Status Pipeline::State::add_view(const StereoFrame& frame) {
+  if (!maps_stops || frame.position_id < 0) return {};
+  const auto rectified = clock.measure("imaging", [&] { return imager.process(frame); });
+  if (!rectified) return failure(rectified);
+  clock.add(rectified->times);
   const double nearest_m = rig.find_pair(frame.pair)->nearest_m;
   return clock.measure("reconstruction",
-                       [&] { return position.look(frame.position_id, frame.pair, *shot, nearest_m); });
+                       [&] { return stop_stage.add_view(frame.position_id, frame.pair, *rectified, nearest_m); });
 }
 
-Result<std::optional<MappedPosition>> Pipeline::State::leave_position() {
-  if (position.mapper().views().empty()) {
-    position.leave();
+Result<std::optional<MappedStop>> Pipeline::State::finish_stop() {
+  if (stop_stage.mapper().views().empty()) {
+    stop_stage.clear();
     return std::nullopt;
   }
-  const auto survey = clock.measure("mapping", [&] { return position.survey(); });
-  auto merged = clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->standing); });
-  if (!merged) return failure(merged);  // the position stays at hand
-  position.leave();
-  if (merged->constraint) hear_map(*survey, *merged->constraint);
-  return MappedPosition{survey->position_id, survey->stamp, survey->views, survey->standing, std::move(*merged)};
+  const auto survey = clock.measure("mapping", [&] { return stop_stage.survey(); });
+  auto merged =
+      clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->world_from_body); });
+  if (!merged) return failure(merged);  // the stop stays the current one
+  stop_stage.clear();
+  if (merged->constraint) apply_map_constraint(*survey, *merged->constraint);
+  return MappedStop{survey->position_id, survey->stamp, survey->views, survey->world_from_body, std::move(*merged)};
 }
 
-// Of the poses at a stop the last one is the one that a long stop leaves in the filters.
-void Pipeline::State::hear_map(const PositionSurvey& survey, const PoseConstraint& constraint) {
-  const PoseConstraint last = transported(constraint, survey.since_arrival, survey.last_stamp);
+// The constraint is on the pose at the first frame of the stop. During a long stop that frame leaves the buffer of a
+// filter; the constraint is then transported to the last frame, whose pose the filter still has.
+void Pipeline::State::apply_map_constraint(const StopSurvey& survey, const PoseConstraint& constraint) {
+  const PoseConstraint last = transported(constraint, survey.first_from_last, survey.last_stamp);
   localizer.add(localizer.reaches(constraint.stamp) ? constraint : last);
-  slam_track.add(slam_track.reaches(constraint.stamp) ? constraint : last);
+  slam_filter.add(slam_filter.reaches(constraint.stamp) ? constraint : last);
 }
 
 bool Pipeline::State::terrain_is_due() const {
-  if (!makes_terrain) return false;
+  if (!computes_terrain) return false;
   return distance_of_last_terrain_m < 0 || distance_m - distance_of_last_terrain_m >= options.terrain.every_m;
 }
 
-// Whether the terrain and the map of a stop can be computed from this pair, if they become due.
-Status Pipeline::State::check_disparities(const RectifiedPair& shot) const {
-  if (!maps_positions && !makes_terrain) return {};
-  return StopMapper::check(shot, pair.nearest_m);
+// Whether the disparities of this frame can be computed, if terrain or the map of a stop needs them.
+Status Pipeline::State::check_disparities(const RectifiedPair& rectified) const {
+  if (!maps_stops && !computes_terrain) return {};
+  return StopMapper::check(rectified, pair.nearest_m);
 }
 
-// The view is valid until the next call.
-Result<ImageView<const float>> Pipeline::State::dense_disparity(const RectifiedPair& shot) {
+// The returned view is valid until the next call.
+Result<ImageView<const float>> Pipeline::State::dense_disparity(const RectifiedPair& rectified) {
   return clock.measure("reconstruction", [&]() -> Result<ImageView<const float>> {
-    const DisparityRange range = disparity_range(shot.geometry, pair.nearest_m);
-    auto image = disparity_computer.compute(shot.left, shot.right, range, shot.left_mask, shot.right_mask);
+    const DisparityRange range = disparity_range(rectified.geometry, pair.nearest_m);
+    auto image =
+        disparity_computer.compute(rectified.left, rectified.right, range, rectified.left_mask, rectified.right_mask);
     if (!image) return failure(image);
     return image->disparity;
   });
 }
 
 // Empty if the odometry computes the disparities of its landmarks itself.
-Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const RectifiedPair& shot) {
+Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const RectifiedPair& rectified) {
   if (options.odometry.reconstruction.source != DisparitySource::dense) return ImageView<const float>();
-  return dense_disparity(shot);
+  return dense_disparity(rectified);
 }
 
 Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, ThreadPool workers,
@@ -205,7 +211,8 @@ Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Thr
   const StereoPair* const pair = pair_for_odometry(rig, options.odometry_pair);
   if (pair == nullptr) {
     return options.odometry_pair.empty()
-               ? failure(ErrorCode::configuration, "the rig has no pair for the odometry", rig.name)
+               ? failure(ErrorCode::configuration, "the rig has no pair for the odometry", rig.name,
+                         "set for_odometry of a pair in the rig file, or the option odometry_pair")
                : failure(ErrorCode::configuration, "the rig has no pair named '" + options.odometry_pair + "'",
                          "odometry_pair");
   }
@@ -219,81 +226,81 @@ Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
-void Pipeline::level(std::span<const ImuSample> at_rest) {
-  if (const auto rest = static_reading(at_rest, with_gravity(state_->options)))
-    state_->up_in_body = rest->accel_m_s2.normalized();
+void Pipeline::align_with_gravity(std::span<const ImuSample> stationary_samples) {
+  if (const auto reading = static_reading(stationary_samples, with_gravity(state_->options)))
+    state_->up_in_body = reading->accel_m_s2.normalized();
 }
 void Pipeline::add(const ImuSample& sample) {
-  state_->take(sample);
+  state_->add_sensor_sample(sample);
 }
 void Pipeline::add(const WheelSample& sample) {
-  state_->take(sample);
+  state_->add_sensor_sample(sample);
 }
 void Pipeline::add(const CompassSample& sample) {
-  state_->take(sample);
+  state_->add_sensor_sample(sample);
 }
 void Pipeline::add(const InclinometerSample& sample) {
-  state_->take(sample);
+  state_->add_sensor_sample(sample);
 }
 
 Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   State& s = *state_;
   if (frame.pair != s.pair.name) {
     if (s.rig.find_pair(frame.pair) != nullptr) {
-      if (Status status = s.look(frame); !status) return failure(status);
+      if (Status status = s.add_view(frame); !status) return failure(status);
       return std::nullopt;
     }
     return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair),
-                   fmt::format("frame {}", frame.frame_id), "frames carry the name of their pair in the rig");
+                   fmt::format("frame {}", frame.frame_id), "StereoFrame::pair must be the name of a pair of the rig");
   }
-  const auto shot = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
-  if (!shot) return failure(shot);
-  s.clock.add(shot->times);
-  auto disparity = s.disparity_for_odometry(*shot);
+  const auto rectified = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
+  if (!rectified) return failure(rectified);
+  s.clock.add(rectified->times);
+  auto disparity = s.disparity_for_odometry(*rectified);
   if (!disparity) return failure(disparity);
 
-  // What can fail comes first, here and in leave_position(); behind it every stage moves on, and none of them fails.
-  if (Status fits = s.check_disparities(*shot); !fits) return failure(fits);
+  // All steps that can fail come first, here and in finish_stop(); the stages advance only after them.
+  if (Status valid = s.check_disparities(*rectified); !valid) return failure(valid);
   FrameResult result;
-  // Before the stages move on: the map belongs to where the rover still stands.
-  if (s.maps_positions && frame.position_id != s.position.position_id()) {
-    auto position = s.leave_position();
-    if (!position) return failure(position);
-    result.position = std::move(*position);
+  // Before the stages advance: the map constraint applies to the pose at the stop.
+  if (s.maps_stops && frame.position_id != s.stop_stage.position_id()) {
+    auto stop = s.finish_stop();
+    if (!stop) return failure(stop);
+    result.stop = std::move(*stop);
   }
-  if (!s.started) s.start(*shot);
-  s.left_from_body = shot->body_from_left.inverse();
+  if (!s.started) s.start(*rectified);
+  s.left_from_body = rectified->body_from_left.inverse();
 
-  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*shot, {}, *disparity); });
-  const RelativeMotion moved = s.body_motion(*shot, result.motion);
+  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*rectified, {}, *disparity); });
+  const RelativeMotion body_motion = s.body_motion(*rectified, result.motion);
   if (!result.motion.first) {
     s.advance(result.motion);
-    if (s.options.odometry_only) s.dead_reckoning.add(moved);
+    if (s.options.odometry_only) s.dead_reckoning.add(body_motion);
   }
   if (!s.options.odometry_only) {
     s.clock.measure("localization", [&] {
-      if (!result.motion.first) s.localize(moved);
+      if (!result.motion.first) s.localize(body_motion);
     });
   }
-  s.last_stamp = shot->stamp;
+  s.last_stamp = rectified->stamp;
   result.frame_id = frame.frame_id;
   result.pair = frame.pair;
-  result.stamp = shot->stamp;
+  result.stamp = rectified->stamp;
   result.world_from_body.pose = s.world_from_left * s.left_from_body;
   if (s.options.odometry_only) {
     result.world_from_body.covariance = s.dead_reckoning.covariance();
   } else {
-    result.world_from_body.covariance = s.odometry_track.world_from_body().covariance;
+    result.world_from_body.covariance = s.odometry_filter.world_from_body().covariance;
     result.localization = s.localizer.estimate();
-    result.slam = s.slam_track.world_from_body();
+    result.slam = s.slam_filter.world_from_body();
   }
-  if (Status status = s.pass(frame, *shot, moved); !status) return failure(status);
+  if (Status status = s.add_odometry_frame(frame, *rectified, body_motion); !status) return failure(status);
 
   if (s.terrain_is_due()) {
-    if (disparity->empty()) disparity = s.dense_disparity(*shot);
+    if (disparity->empty()) disparity = s.dense_disparity(*rectified);
     if (!disparity) return failure(disparity);
     s.distance_of_last_terrain_m = s.distance_m;
-    result.terrain = TerrainView{*shot, *disparity, s.world_from_left};
+    result.terrain = TerrainView{*rectified, *disparity, s.world_from_left};
   }
   result.times = s.clock.take();
   return result;
@@ -306,15 +313,15 @@ std::optional<Pose> Pipeline::predict(Stamp stamp) const {
   return s.world_from_left * exp_se3(s.velocity * seconds) * s.left_from_body;
 }
 
-Result<std::optional<MappedPosition>> Pipeline::leave_position() {
-  return state_->leave_position();
+Result<std::optional<MappedStop>> Pipeline::finish_stop() {
+  return state_->finish_stop();
 }
 
-std::vector<StageTime> Pipeline::take_times() {
+std::vector<StageTime> Pipeline::take_stage_times() {
   return state_->clock.take();
 }
 
-void Pipeline::page_maps_to(TileStore& store) {
+void Pipeline::store_maps_in(TileStore& store) {
   state_->merger.page_to(&store);
 }
 Status Pipeline::flush_maps() {
@@ -324,23 +331,26 @@ GlobalMap& Pipeline::global_map() {
   return state_->merger.map();
 }
 
-std::vector<FrameKey> Pipeline::wanted_shots() const {
-  std::vector<FrameKey> wanted;
-  if (const auto stamp = state_->position.wanted_arrival()) wanted.push_back({state_->pair.name, *stamp});
-  const auto& looks = state_->position.wanted_looks();
-  wanted.insert(wanted.end(), looks.begin(), looks.end());
-  return wanted;
+std::vector<FrameKey> Pipeline::pending_frames() const {
+  const State& s = *state_;
+  std::vector<FrameKey> pending;
+  if (const auto stamp = s.stop_stage.pending_first_frame()) pending.push_back({s.pair.name, *stamp});
+  const auto& views = s.stop_stage.pending_views();
+  pending.insert(pending.end(), views.begin(), views.end());
+  return pending;
 }
 
-Status Pipeline::recall(const StereoFrame& frame) {
+Status Pipeline::restore_frame(const StereoFrame& frame) {
   State& s = *state_;
   const StereoPair* const pair = s.rig.find_pair(frame.pair);
   if (pair == nullptr)
-    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair), "recall");
-  const auto shot = s.imager.process(frame);
-  if (!shot) return failure(shot);
-  if (pair->name != s.pair.name) return s.position.look(frame.position_id, pair->name, *shot, pair->nearest_m);
-  s.position.recall_arrival(*shot, s.pair.nearest_m);
+    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair),
+                   fmt::format("frame {}", frame.frame_id));
+  const auto rectified = s.imager.process(frame);
+  if (!rectified) return failure(rectified);
+  if (pair->name != s.pair.name)
+    return s.stop_stage.add_view(frame.position_id, pair->name, *rectified, pair->nearest_m);
+  s.stop_stage.restore_first_frame(*rectified, s.pair.nearest_m);
   return {};
 }
 
@@ -367,11 +377,11 @@ Bytes Pipeline::save() const {
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
-  s.position.save(out);
-  const bool alone = s.options.odometry_only;
+  s.stop_stage.save(out);
+  const bool odometry_only = s.options.odometry_only;
   for (const Bytes& stage :
-       {s.odometer.save(), s.localizer.save(), alone ? s.dead_reckoning.save() : s.odometry_track.save(),
-        alone ? Bytes() : s.slam_track.save(), s.merger.save()})
+       {s.odometer.save(), s.localizer.save(), odometry_only ? s.dead_reckoning.save() : s.odometry_filter.save(),
+        odometry_only ? Bytes() : s.slam_filter.save(), s.merger.save()})
     out.put_array(stage.data(), stage.size());
   return out.take();
 }
@@ -379,8 +389,8 @@ Bytes Pipeline::save() const {
 Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   ArchiveReader in(state);
   if (in.get<std::uint32_t>() != kStateVersion) {
-    return failure(ErrorCode::configuration, "the saved state is of another version of the program", "run.sqlite",
-                   "run again into a new folder");
+    return failure(ErrorCode::configuration, "the saved state was written by another version of the program",
+                   "run.sqlite", "run again into a new folder");
   }
   State& s = *state_;
   s.started = in.get<bool>();
@@ -394,17 +404,17 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get<double>();
   s.distance_of_last_terrain_m = in.get<double>();
-  s.position.restore(in);
+  s.stop_stage.restore(in);
   std::array<Bytes, 5> stages;
   for (Bytes& stage : stages) stage = in.get_array<std::uint8_t>();
-  if (Status status = in.finish("run.sqlite: memory of the pipeline"); !status) return status;
+  if (Status status = in.finish("run.sqlite: state of the pipeline"); !status) return status;
   if (Status status = s.odometer.restore(stages[0]); !status) return status;
   if (Status status = s.localizer.restore(stages[1]); !status) return status;
   if (s.options.odometry_only) {
     if (Status status = s.dead_reckoning.restore(stages[2]); !status) return status;
   } else {
-    if (Status status = s.odometry_track.restore(stages[2]); !status) return status;
-    if (Status status = s.slam_track.restore(stages[3]); !status) return status;
+    if (Status status = s.odometry_filter.restore(stages[2]); !status) return status;
+    if (Status status = s.slam_filter.restore(stages[3]); !status) return status;
   }
   return s.merger.restore(stages[4], maps);
 }

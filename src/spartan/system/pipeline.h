@@ -1,4 +1,4 @@
-// The whole system as one object that samples are pushed into.
+// Pipeline: all stages from stereo frames and sensor samples to poses, terrain and maps in one object.
 #pragma once
 
 #include <memory>
@@ -23,96 +23,96 @@
 
 namespace spartan {
 
-/// The ground as seen from one place. The views borrow the pipeline's buffers until the next frame.
+/// Dense disparity of one frame with its pose. The views borrow the pipeline's buffers until the next frame.
 struct TerrainView {
   RectifiedPair pair;
   ImageView<const float> disparity;  ///< px, NaN unknown
   Pose world_from_left;              ///< rectified left optical frame
 };
 
-/// What a position became when the rover left it.
-struct MappedPosition {
+/// Result of mapping a stop, computed when the rover leaves it.
+struct MappedStop {
   std::int64_t position_id = -1;
-  Stamp stamp;  ///< of the shot of the odometry's pair there
+  Stamp stamp;  ///< of the odometry pair's first frame at the stop
   int views = 0;
-  UncertainPose believed;  ///< world_from_body before the map was looked for in the global one
-  MapMergeResult merged;   ///< where it lies there, and the local map at that place
+  UncertainPose prior;    ///< world_from_body before map matching
+  MapMergeResult merged;  ///< match, corrected pose, and the local map at that pose
 };
 
-/// What one stereo shot told. `slam`, `localization`, terrain and position are absent in a run by odometry alone
-/// (RunOptions::odometry_only).
+/// Result of one frame of the odometry pair. `slam`, `localization`, `terrain` and `stop` are empty in a run by
+/// odometry alone (RunOptions::odometry_only).
 struct FrameResult {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
-  UncertainPose world_from_body;  ///< by odometry alone; the covariance tells of its lasting errors too
+  UncertainPose world_from_body;  ///< by odometry alone; the covariance includes its constant errors
   MotionEstimate motion;
-  std::optional<UncertainPose> slam;                 ///< world_from_body: odometry, corrected by the map
+  std::optional<UncertainPose> slam;                 ///< world_from_body: odometry corrected by map matching
   std::optional<LocalizationEstimate> localization;  ///< by all sensors
-  std::optional<TerrainView> terrain;                ///< where one was due
-  std::optional<MappedPosition> position;            ///< the one that was left for this shot
+  std::optional<TerrainView> terrain;                ///< if due, see TerrainOptions::every_m
+  std::optional<MappedStop> stop;                    ///< the stop that ended with this frame, if it was mapped
   std::vector<StageTime> times;
 };
 
-/// Samples in, poses and terrain out. Used by `spartan run` over a recording; a live camera or a ROS node pushes in
-/// the same way, over memory it owns. Not thread-safe; one pipeline per rover.
+/// Computes poses, terrain and maps from pushed samples. `spartan run` feeds it from a recording; a live camera or a
+/// ROS node can push samples from memory that it owns. Not thread-safe; one pipeline per rover.
 class Pipeline {
  public:
-  /// Codes: `configuration` (rig or options that do not fit; names every option that is out of its bounds).
-  /// Self-masks are looked up in `mask_folder` (where the rig file lies).
+  /// Self-masks are read from `mask_folder` (the folder of the rig file). Code `configuration`: rig or options are
+  /// invalid; the error names every option that is out of bounds.
   static Result<Pipeline> create(const Rig& rig, const RunOptions& options, ThreadPool workers,
                                  const std::string& mask_folder = {});
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
 
-  /// Samples of a rover that surely rests, where they cannot be added before the first frame: they say where up is if
-  /// no other sample does.
-  void level(std::span<const ImuSample> at_rest);
+  /// Gravity alignment from IMU samples of a stationary rover that cannot be added before the first frame. Used only if
+  /// no sample that is added before the first frame measures gravity.
+  void align_with_gravity(std::span<const ImuSample> stationary_samples);
 
-  /// Those that come before the first frame level the world and tell where east is.
+  /// Sensor samples. Those before the first frame also initialize gravity and heading of the world frame.
   void add(const ImuSample& sample);
   void add(const WheelSample& sample);
   void add(const CompassSample& sample);
   void add(const InclinometerSample& sample);
 
-  /// One shot. Those of pairs that do not drive the odometry give nothing by themselves: they are views of the position
-  /// whose id they carry, which becomes a map when the odometry's pair reports another position. After an error nothing
-  /// has advanced, as if the shot had never been: the pipeline may go on with the next one, or get this one again.
-  /// Codes: `frame_rejected` where the images do not fit the rig, or it has no such pair; those of the store that tiles
-  /// of the map are read from (`store_damaged`).
+  /// Processes one stereo frame. Only frames of the odometry pair have a result. Frames of other pairs are views of the
+  /// stop whose position_id they carry; the stop is mapped when the odometry pair reports another position_id. After an
+  /// error the state is as before the call: the next frame, or the same frame again, may be added.
+  /// Codes: `frame_rejected` (the images do not fit the rig, or the rig has no such pair), `store_damaged` (a map tile
+  /// cannot be read).
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
 
-  /// The global map's tiles may live in the store from now on; what has changed is written by flush_maps(), inside the
-  /// transaction that the store's database is in. Borrowed; it holds this pipeline's map or none.
-  void page_maps_to(TileStore& store);
+  /// From now on tiles of the global map may be paged out to `store`, which must contain this pipeline's map or be
+  /// empty. Borrowed. flush_maps() writes all changes, inside the current transaction of the store's database.
+  void store_maps_in(TileStore& store);
   Status flush_maps();
   GlobalMap& global_map();
 
-  /// The position at hand, where it is a map already: at the end of a drive. After an error it stays at hand.
-  Result<std::optional<MappedPosition>> leave_position();
+  /// Maps the current stop if it has views; for the end of a drive. After an error the stop stays the current one.
+  Result<std::optional<MappedStop>> finish_stop();
 
-  /// What took its time since the last result: views of a position, leaving it.
-  std::vector<StageTime> take_times();
+  /// Times of the stages since the last result: views of a stop and its mapping.
+  std::vector<StageTime> take_stage_times();
 
-  /// After restore(): the shots of the position at hand that must be looked at again before the next is added, and the
-  /// way to hand them in, one after the other.
-  std::vector<FrameKey> wanted_shots() const;
-  Status recall(const StereoFrame& frame);
+  /// After restore(): frames of the current stop whose images must be passed to restore_frame() again, in this order,
+  /// before the next frame is added.
+  std::vector<FrameKey> pending_frames() const;
+  Status restore_frame(const StereoFrame& frame);
 
-  /// world_from_body at a moment without a pose: the last pose, moved on with the last motion's velocity.
+  /// world_from_body at a time without a pose: the last pose extrapolated at constant velocity.
   std::optional<Pose> predict(Stamp stamp) const;
 
-  /// How the world lies: whether gravity and east were measured.
+  /// Whether the world frame was initialized by measured gravity and a measured heading.
   bool gravity_measured() const;
   bool heading_east() const;
 
-  /// The pair that drives the odometry.
+  /// Name of the pair that drives the odometry.
   const std::string& odometry_pair() const;
 
-  /// All stages' memory as a versioned value, but for the maps that were flushed.
+  /// State of all stages, versioned; without the map tiles that were flushed.
   Bytes save() const;
-  /// `maps`: the store as it was flushed with that memory.
+  /// `maps`: the store as it was flushed with that state.
   Status restore(const Bytes& state, TileStore& maps);
 
  private:

@@ -27,7 +27,7 @@ Camera camera(const std::string& name) {
   return made;
 }
 
-// One pair that looks down by kTilt_rad from half a metre, and a second one that only looks where the rover stops.
+// The narrow pair looks down by kTilt_rad from a height of half a metre; the wide pair is for stops only.
 Rig rover() {
   const Pose body_from_left =
       Pose(exp_so3({0, kTilt_rad, 0}), {0.1, 0, kHeight_m}) * Pose(optical_from_forward().inverse());
@@ -42,12 +42,12 @@ Rig rover() {
   return rig;
 }
 
-Pose world_from_body(int shot) {
-  return Pose::from_translation({kStep_m * shot, 0, 0});
+Pose world_from_body(int index) {
+  return Pose::from_translation({kStep_m * index, 0, 0});
 }
 
-// Rendered once: the rover drives ahead over gentle ground.
-const std::vector<SyntheticFrame>& shots() {
+// Rendered once: the rover drives straight ahead over gentle terrain.
+const std::vector<SyntheticFrame>& rendered_frames() {
   static const std::vector<SyntheticFrame> made = [] {
     const testing::SyntheticWorld world(testing::SyntheticWorldOptions{});
     const Pose body_from_left = rover().body_from_camera("left");
@@ -61,12 +61,12 @@ const std::vector<SyntheticFrame>& shots() {
   return made;
 }
 
-StereoFrame frame_of(int shot) {
+StereoFrame frame_of(int index) {
   StereoFrame frame;
-  frame.frame_id = shot;
+  frame.frame_id = index;
   frame.pair = "narrow";
-  frame.left_stamp = frame.right_stamp = Stamp{shot * 1'000'000'000LL};
-  const SyntheticFrame& images = shots()[static_cast<std::size_t>(shot)];
+  frame.left_stamp = frame.right_stamp = Stamp{index * 1'000'000'000LL};
+  const SyntheticFrame& images = rendered_frames()[static_cast<std::size_t>(index)];
   frame.left = FrameImage::borrow(images.left.view(), {});
   frame.right = FrameImage::borrow(images.right.view(), {});
   return frame;
@@ -76,18 +76,18 @@ Pipeline pipeline_of(const RunOptions& options = {}, int threads = 1) {
   return Pipeline::create(rover(), options, ThreadPool(threads)).value();
 }
 
-// A store without any map.
+// An empty map store.
 struct EmptyMaps {
   testing::TemporaryFolder folder;
   Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
   TileStore tiles = TileStore::open(db).value();
 };
 
-FrameResult push(Pipeline& pipeline, int shot) {
-  return pipeline.add(frame_of(shot)).value().value();
+FrameResult push(Pipeline& pipeline, int index) {
+  return pipeline.add(frame_of(index)).value().value();
 }
 
-TEST(Pipeline, FollowsTheRoverFromImagesInMemory) {
+TEST(Pipeline, TracksMotionFromImagesInMemory) {
   Pipeline pipeline = pipeline_of();
   FrameResult last;
   for (int i = 0; i < 5; ++i) last = push(pipeline, i);
@@ -99,32 +99,32 @@ TEST(Pipeline, FollowsTheRoverFromImagesInMemory) {
   EXPECT_FALSE(pipeline.gravity_measured());
 }
 
-TEST(Pipeline, TheFirstFrameShowsTheGround) {
+TEST(Pipeline, FirstFrameHasTerrain) {
   Pipeline pipeline = pipeline_of();
   const FrameResult first = push(pipeline, 0);
   ASSERT_TRUE(first.terrain);
-  int seen = 0, right = 0;
+  int known = 0, correct = 0;
   for (int y = 0; y < 240; y += 3) {
     for (int x = 0; x < 320; x += 3) {
-      const float found = first.terrain->disparity(x, y);
-      if (std::isnan(found) || shots()[0].mask(x, y) != 255) continue;
-      ++seen;
-      right += std::abs(found - shots()[0].disparity(x, y)) < 1 ? 1 : 0;
+      const float measured = first.terrain->disparity(x, y);
+      if (std::isnan(measured) || rendered_frames()[0].mask(x, y) != 255) continue;
+      ++known;
+      correct += std::abs(measured - rendered_frames()[0].disparity(x, y)) < 1 ? 1 : 0;
     }
   }
-  EXPECT_GT(seen, 5000);
-  EXPECT_GT(right, 0.95 * seen);
-  // A point of it lies on the ground.
+  EXPECT_GT(known, 5000);
+  EXPECT_GT(correct, 0.95 * known);
+  // A triangulated point lies on the ground.
   const RectifiedStereo& geometry = first.terrain->pair.geometry;
   const Eigen::Vector3d in_left = geometry.triangulate(160, 200, first.terrain->disparity(160, 200));
   const Eigen::Vector3d point = first.terrain->world_from_left * in_left;
   EXPECT_NEAR(point.z(), 0, 0.2);
-  EXPECT_FALSE(push(pipeline, 1).terrain) << "the next one is due five metres on";
+  EXPECT_FALSE(push(pipeline, 1).terrain) << "the next one is due after five metres";
 }
 
-TEST(Pipeline, DenseDisparitiesReachTheOdometryAndAreComputedOncePerFrame) {
+TEST(Pipeline, DenseDisparitiesAreSharedByOdometryAndTerrain) {
   RunOptions options;
-  options.terrain.every_m = 0;  // with every frame
+  options.terrain.every_m = 0;  // terrain for every frame
   Pipeline row = pipeline_of(options);
   const auto set = set_option(options, "odometry.reconstruction.source=dense");
   ASSERT_TRUE(set) << set.error().message();
@@ -150,22 +150,22 @@ TEST(Pipeline, DenseDisparitiesReachTheOdometryAndAreComputedOncePerFrame) {
   }
 }
 
-TEST(Pipeline, RestoredMemoryGoesOnInTheSameWay) {
-  Pipeline straight = pipeline_of();
-  for (int i = 0; i < 3; ++i) push(straight, i);
-  Pipeline later = pipeline_of({}, 2);
+TEST(Pipeline, RestoredStateGivesTheSameResults) {
+  Pipeline uninterrupted = pipeline_of();
+  for (int i = 0; i < 3; ++i) push(uninterrupted, i);
+  Pipeline resumed = pipeline_of({}, 2);
   EmptyMaps maps;
-  ASSERT_TRUE(later.restore(straight.save(), maps.tiles));
+  ASSERT_TRUE(resumed.restore(uninterrupted.save(), maps.tiles));
   for (int i = 3; i < 5; ++i) {
-    const FrameResult one = push(straight, i), other = push(later, i);
+    const FrameResult one = push(uninterrupted, i), other = push(resumed, i);
     EXPECT_EQ(one.world_from_body.pose.translation(), other.world_from_body.pose.translation());
     EXPECT_EQ(one.world_from_body.covariance, other.world_from_body.covariance);
     EXPECT_EQ(one.terrain.has_value(), other.terrain.has_value());
   }
-  EXPECT_EQ(straight.save(), later.save());
+  EXPECT_EQ(uninterrupted.save(), resumed.save());
 }
 
-TEST(Pipeline, RefusesMemoryOfAnotherKind) {
+TEST(Pipeline, RejectsInvalidState) {
   Pipeline pipeline = pipeline_of();
   push(pipeline, 0);
   EmptyMaps maps;
@@ -179,7 +179,7 @@ TEST(Pipeline, RefusesMemoryOfAnotherKind) {
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
 }
 
-TEST(Pipeline, PredictsAtTheLatestVelocity) {
+TEST(Pipeline, PredictsWithConstantVelocity) {
   Pipeline pipeline = pipeline_of();
   EXPECT_FALSE(pipeline.predict({0}));
   for (int i = 0; i < 3; ++i) push(pipeline, i);
@@ -188,7 +188,7 @@ TEST(Pipeline, PredictsAtTheLatestVelocity) {
   EXPECT_NEAR(predicted->translation().x(), 2.5 * kStep_m, 0.003);
 }
 
-TEST(Pipeline, MeasuresGravityBeforeTheFirstFrame) {
+TEST(Pipeline, AlignsWithGravityBeforeTheFirstFrame) {
   Pipeline pipeline = pipeline_of();
   const double tilt = 0.1;  // nose up
   for (int i = 0; i < 50; ++i) {
@@ -199,24 +199,24 @@ TEST(Pipeline, MeasuresGravityBeforeTheFirstFrame) {
   EXPECT_NEAR((first.world_from_body.pose.rotation() * Eigen::Vector3d::UnitX()).z(), std::sin(tilt), 1e-9);
 }
 
-// A recording whose IMU begins with the camera.
-TEST(Pipeline, IsLevelledByTheFirstSecondWhereNothingCameBefore) {
+// As in a recording whose IMU starts together with the camera.
+TEST(Pipeline, AlignsWithGravityFromSamplesAfterTheFirstFrame) {
   Pipeline pipeline = pipeline_of();
   const double tilt = 0.1;
   std::vector<ImuSample> first_second;
   first_second.reserve(50);
   for (int i = 0; i < 50; ++i)
     first_second.push_back({{i * 10'000'000LL}, {0, 0, 0}, 9.81 * Eigen::Vector3d(std::sin(tilt), 0, std::cos(tilt))});
-  pipeline.level(first_second);
+  pipeline.align_with_gravity(first_second);
   const FrameResult first = push(pipeline, 0);
   EXPECT_TRUE(pipeline.gravity_measured());
   EXPECT_NEAR((first.world_from_body.pose.rotation() * Eigen::Vector3d::UnitX()).z(), std::sin(tilt), 1e-9);
 }
 
-TEST(Pipeline, OdometryAloneGivesTheSamePoses) {
+TEST(Pipeline, OdometryOnlyGivesTheSamePoses) {
   RunOptions options;
   options.odometry_only = true;
-  Pipeline whole = pipeline_of(), alone = pipeline_of(options), later = pipeline_of(options, 2);
+  Pipeline whole = pipeline_of(), alone = pipeline_of(options), resumed = pipeline_of(options, 2);
   for (Pipeline* pipeline : {&whole, &alone}) {
     for (int i = 0; i < 50; ++i) {
       pipeline->add(ImuSample{{i * 10'000'000LL - 500'000'000LL}, {0, 0, 0}, 9.81 * Eigen::Vector3d(0.1, 0, 0.99)});
@@ -226,29 +226,29 @@ TEST(Pipeline, OdometryAloneGivesTheSamePoses) {
   EmptyMaps maps;
   for (int i = 0; i < 5; ++i) {
     if (i == 3) {
-      ASSERT_TRUE(later.restore(alone.save(), maps.tiles));
+      ASSERT_TRUE(resumed.restore(alone.save(), maps.tiles));
     }
     const FrameResult all = push(whole, i), one = push(alone, i);
     EXPECT_EQ(one.world_from_body.pose.matrix(), all.world_from_body.pose.matrix());
     for (int k = 0; k < 6 && i > 0; ++k) {
-      const double wanted = all.world_from_body.covariance(k, k);
-      EXPECT_NEAR(one.world_from_body.covariance(k, k), wanted, 0.05 * wanted + 1e-11) << i << ", " << k;
+      const double expected = all.world_from_body.covariance(k, k);
+      EXPECT_NEAR(one.world_from_body.covariance(k, k), expected, 0.05 * expected + 1e-11) << i << ", " << k;
     }
-    EXPECT_FALSE(one.slam || one.localization || one.terrain || one.position);
+    EXPECT_FALSE(one.slam || one.localization || one.terrain || one.stop);
     EXPECT_TRUE(all.slam && all.localization);
     for (const StageTime& time : one.times)
       EXPECT_TRUE(time.stage.starts_with("imaging") || time.stage == "odometry") << time.stage;
     if (i < 3) continue;
-    const FrameResult again = push(later, i);
+    const FrameResult again = push(resumed, i);
     EXPECT_EQ(again.world_from_body.pose.matrix(), one.world_from_body.pose.matrix());
     EXPECT_EQ(again.world_from_body.covariance, one.world_from_body.covariance);
   }
-  EXPECT_EQ(alone.save(), later.save());
+  EXPECT_EQ(alone.save(), resumed.save());
   EXPECT_TRUE(alone.gravity_measured());
   EXPECT_TRUE(alone.heading_east());
 }
 
-TEST(Pipeline, OtherPairsOfTheRigGiveNothingByThemselves) {
+TEST(Pipeline, FramesOfOtherPairsHaveNoResult) {
   Pipeline pipeline = pipeline_of();
   EXPECT_EQ(pipeline.odometry_pair(), "narrow");
   StereoFrame wide = frame_of(0);
@@ -258,12 +258,12 @@ TEST(Pipeline, OtherPairsOfTheRigGiveNothingByThemselves) {
   EXPECT_FALSE(result->has_value());
 }
 
-TEST(Pipeline, LeavesOutFramesThatDoNotFitAndGoesOn) {
+TEST(Pipeline, RejectsFramesThatDoNotFitTheRigAndContinues) {
   Pipeline pipeline = pipeline_of();
   push(pipeline, 0);
-  StereoFrame stranger = frame_of(1);
-  stranger.pair = "rear";
-  const auto unknown = pipeline.add(stranger);
+  StereoFrame unknown_pair = frame_of(1);
+  unknown_pair.pair = "rear";
+  const auto unknown = pipeline.add(unknown_pair);
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().code, ErrorCode::frame_rejected);
   EXPECT_NE(unknown.error().message().find("rear"), std::string::npos);
@@ -276,7 +276,7 @@ TEST(Pipeline, LeavesOutFramesThatDoNotFitAndGoesOn) {
   EXPECT_NEAR(push(pipeline, 1).world_from_body.pose.translation().x(), kStep_m, 0.002);
 }
 
-TEST(Pipeline, NeedsAPairForTheOdometry) {
+TEST(Pipeline, RequiresAPairForTheOdometry) {
   RunOptions options;
   options.odometry_pair = "rear";
   const auto unknown = Pipeline::create(rover(), options, ThreadPool(1));
@@ -287,7 +287,7 @@ TEST(Pipeline, NeedsAPairForTheOdometry) {
   EXPECT_FALSE(Pipeline::create(only_wide, {}, ThreadPool(1)));
 }
 
-TEST(Pipeline, RefusesOptionsOutOfBoundsThatWereSetInCode) {
+TEST(Pipeline, RejectsOptionsOutOfBounds) {
   RunOptions options;
   options.reconstruction.p2_flat = 300;
   options.mapping.v_disparity.strips = 0;

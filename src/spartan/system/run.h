@@ -1,4 +1,4 @@
-// The main job: a recording in, a run folder out.
+// Runs the pipeline over a recording and writes a run folder (`spartan run`).
 #pragma once
 
 #include <functional>
@@ -12,41 +12,42 @@
 
 namespace spartan {
 
+/// What to run, and with which options.
 struct RunRequest {
-  std::string input;
-  std::string output;
+  std::string input;                      ///< folder of the recording
+  std::string output;                     ///< run folder
   std::string rig_file;                   ///< empty: the recording's own calibration
-  std::optional<RecordingFormat> format;  ///< none: guess
+  std::optional<RecordingFormat> format;  ///< none: detect it
   RunOptions options;
-  GivenKeys given;  ///< keys of `options` that the user gave: the recording's noise does not replace them
-  bool resume = false;
+  GivenKeys given;      ///< keys of `options` that the user gave: the recording's noise does not replace them
+  bool resume = false;  ///< continue the run in `output`, if there is one
   int threads = 1;
-  int max_frames = 0;  ///< stereo shots taken from the recording; 0: all
+  int max_frames = 0;  ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all
   std::string version;
 };
 
 struct RunProgress {
-  int done = 0;
-  int announced = 0;
-  std::string status;
+  int done = 0;        ///< frames processed
+  int announced = 0;   ///< stereo frames listed by the recording, over all pairs
+  std::string status;  ///< of the last frame: FrameRecord::status
 };
 
-/// How the program listens and speaks while it works.
+/// Callbacks of a run.
 struct RunHooks {
   Log log;
-  std::function<void(const RunProgress&)> progress;  ///< after each shot; may be empty
-  std::function<bool()> should_stop;                 ///< asked between shots; may be empty
+  std::function<void(const RunProgress&)> progress;  ///< called after each frame; may be empty
+  std::function<bool()> should_stop;                 ///< called between samples; may be empty
 };
 
 struct RunOutcome {
   std::string summary_json;
-  bool lost = false;         ///< for part of the drive
-  bool interrupted = false;  ///< stopped on request; `--resume` goes on
+  bool lost = false;         ///< the odometry was lost at least once
+  bool interrupted = false;  ///< stopped by should_stop; can be resumed
 };
 
-/// Codes: `input` (no recording, no usable frame), `store_damaged` (the run that is resumed), `configuration` (rig,
-/// options, or a resume of another run), `output` (the folder exists already, cannot be written, disk full). What was
-/// committed before an error stays.
+/// Codes: `input` (no recording, no usable frame), `store_damaged` (the run to be resumed), `configuration` (rig,
+/// options, or resuming another run), `output` (the folder already exists, cannot be written, disk full). Everything
+/// that was committed before an error remains.
 Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks);
 
 }  // namespace spartan

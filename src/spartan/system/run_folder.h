@@ -1,4 +1,4 @@
-// The layout of a run folder (docs/reference/files.md).
+// File layout of a run folder (docs/reference/files.md).
 #pragma once
 
 #include <string>
@@ -9,6 +9,7 @@
 
 namespace spartan {
 
+/// Paths of the files of a run.
 struct RunFolder {
   std::string path;
 
@@ -17,9 +18,9 @@ struct RunFolder {
   std::string rig() const { return path + "/rig.yaml"; }
   std::string terrain() const { return path + "/terrain"; }
   std::string maps() const { return path + "/maps"; }
-  /// Without ending.
+  /// Without extension.
   std::string local_map(Stamp stamp) const { return maps() + "/local_" + std::to_string(stamp.ns); }
-  /// Without ending.
+  /// Without extension.
   std::string global_map() const { return maps() + "/global"; }
   std::string trajectory(TrajectoryKind kind) const {
     return path + "/trajectory_" + std::string(name_of(kind)) + ".tum";
@@ -29,13 +30,13 @@ struct RunFolder {
   std::string log() const { return path + "/log.txt"; }
 };
 
-enum class FolderState { made, was_there };
+enum class FolderState { created, existed };
 
-/// Makes a new folder, or with `resume` accepts one that is there. Code `output` where it exists and is not to be
-/// resumed (it is left untouched), or where it cannot be made.
+/// Creates a new folder; with `resume` an existing one is accepted. Code `output` if it exists and `resume` is false
+/// (it stays untouched), or if it cannot be created.
 Result<FolderState> prepare_run_folder(const RunFolder& folder, bool resume);
 
-/// Removes a folder that was made for a run which came to nothing.
+/// Removes the folder of a run that failed without any result.
 void remove_run_folder(const RunFolder& folder);
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// Every option of a run, as one tree (`spartan config dump`).
+// All options of a run as one tree (`spartan config dump`).
 #pragma once
 
 #include <string>
@@ -13,53 +13,70 @@
 
 namespace spartan {
 
-/// When and how the ground is reconstructed along the way.
+/// When the terrain along the path is reconstructed, and which points its clouds contain.
 struct TerrainOptions {
-  bool enabled = true;
-  double every_m = 5.0;
-  int point_step_px = 2;
-  double largest_range_error = 0.05;
+  bool enabled = true;            ///< write terrain files
+  double every_m = 5.0;           ///< path length between two terrain views, m; 0: every frame
+  int point_step_px = 2;          ///< subsampling of the point cloud, px
+  double max_range_error = 0.05;  ///< maximum relative range error of a point at 0.3 px of disparity error
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("enabled", enabled, "false: the trajectory only");
-    v.field("every_m", every_m, "distance between two terrain pictures; the first frame always gives one", at_least(0));
-    v.field("point_step_px", point_step_px, "every so many columns and rows give a point of the cloud", between(1, 64));
-    v.field("largest_range_error", largest_range_error,
-            "points whose range is off by more than this share at 0.3 px of disparity are left out", between(0.001, 1));
+    v.field("enabled", enabled,
+            "True writes a disparity image and a point cloud of the terrain along the path; false omits them.");
+    v.field("every_m", every_m,
+            "Path length between two terrain views in metres, starting with the first frame; raising it writes fewer "
+            "files and saves time, 0 writes one for every frame.",
+            at_least(0));
+    v.field("point_step_px", point_step_px,
+            "Column and row step between the pixels that become points of the cloud, in pixels; raising it makes the "
+            "point clouds smaller and sparser.",
+            between(1, 64));
+    v.renamed("largest_range_error", "max_range_error");
+    v.field("max_range_error", max_range_error,
+            "Maximum relative range error of a point of the cloud, for a disparity error of 0.3 px; raising it keeps "
+            "more distant, less accurate points.",
+            between(0.001, 1));
   }
 };
 
+/// The options of all modules, and which of them run.
 struct RunOptions {
-  double gravity_m_s2 = 0;
-  bool noise_as_stated = true;
-  std::string odometry_pair;
-  bool odometry_only = false;
+  double gravity_m_s2 = 0;          ///< magnitude of gravity, m/s²; 0: as the recording specifies, else 9.81
+  bool use_specified_noise = true;  ///< sensor noise of the recording replaces defaults of `localization`
+  std::string odometry_pair;        ///< name of the pair that drives the odometry; empty: the rig's choice
+  bool odometry_only = false;       ///< run only the visual odometry
   ImagingOptions imaging;
   OdometryOptions odometry;
-  DisparityOptions reconstruction;
-  MappingOptions mapping;
-  bool maps = true;
-  SlamOptions slam;
+  DisparityOptions reconstruction;  ///< dense disparities of terrain and stops
+  MappingOptions mapping;           ///< local maps of stops
+  bool maps = true;                 ///< map the stops
+  SlamOptions slam;                 ///< map matching and the global map
   LocalizationOptions localization;
   TerrainOptions terrain;
 
   template <class Visitor>
   void describe(Visitor& v) {
     v.field("gravity_m_s2", gravity_m_s2,
-            "9.81 on Earth, 3.71 on Mars; the IMU's mean must agree within 5 %; 0: as the recording says, else 9.81",
+            "Magnitude of gravity in m/s² (9.81 on Earth, 3.71 on Mars), with which the mean of the accelerometer must "
+            "agree within 5 %; 0 takes the value of the recording, or 9.81 if it has none.",
             between(0, 30));
-    v.field(
-        "noise_as_stated", noise_as_stated,
-        "what the recording states of its sensors' noise and biases stands in the place of localization's defaults");
-    v.field("odometry_pair", odometry_pair, "which pair drives the odometry; empty: the rig's first one made for it");
+    v.renamed("noise_as_stated", "use_specified_noise");
+    v.field("use_specified_noise", use_specified_noise,
+            "True lets the sensor noise and biases that the recording specifies replace the defaults of localization "
+            "(not values that are set explicitly); false ignores them.");
+    v.field("odometry_pair", odometry_pair,
+            "Name of the stereo pair that drives the odometry; empty selects the first pair of the rig with "
+            "for_odometry.");
     v.field("odometry_only", odometry_only,
-            "true runs the visual odometry alone: no localization, no maps, no SLAM and no terrain; the start attitude "
-            "is still measured");
+            "True runs the visual odometry alone, without localization, maps, SLAM and terrain (the start attitude is "
+            "still measured); false runs all stages.");
     v.group("imaging", imaging);
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);
-    v.field("maps", maps, "a map wherever the rover stands and further pairs look around; false: none");
+    v.field("maps", maps,
+            "True makes a map of every stop of which another pair than that of the odometry has views, and merges it "
+            "into the global map; false makes no maps, so map matching never corrects the poses.");
     v.group("mapping", mapping);
     v.group("slam", slam);
     v.group("localization", localization);

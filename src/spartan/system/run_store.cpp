@@ -13,7 +13,7 @@ namespace {
 constexpr int kApplicationId = 0x5350544E;  // "SPTN"
 constexpr int kUserVersion = 2;
 
-// Columns named wall_ms and cpu_ms are the only ones that differ from run to run.
+// All columns are the same in every run of the same input, except wall_ms and cpu_ms.
 constexpr const char* kSchema = R"(
 CREATE TABLE identity (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE frames (
@@ -61,11 +61,11 @@ Status check_version(Database& db) {
   if (!application) return failure(application);
   const auto version = pragma(db, "user_version");
   if (!version) return failure(version);
-  if (*application != kApplicationId) return failure(ErrorCode::input, "is not the store of a run", db.path());
+  if (*application != kApplicationId) return failure(ErrorCode::input, "is not the database of a run", db.path());
   if (*version != kUserVersion) {
     return failure(ErrorCode::configuration,
-                   fmt::format("has version {}, this program writes {}", *version, kUserVersion), db.path(),
-                   "run again into a new folder");
+                   fmt::format("has schema version {}, but this program writes version {}", *version, kUserVersion),
+                   db.path(), "run again into a new folder");
   }
   return {};
 }
@@ -83,8 +83,8 @@ Status expect_identity(Database& db, const std::string& key, const std::string& 
   const auto row = select->step();
   if (!row) return failure(row);
   if (*row && select->text(0) == value) return {};
-  return failure(ErrorCode::configuration, "the run was made with " + what, db.path(),
-                 "resume with the same, or run into a new folder");
+  return failure(ErrorCode::configuration, "was written by a run with " + what, db.path(),
+                 "resume with the same input, rig and options, or run into a new folder");
 }
 
 }  // namespace
@@ -94,7 +94,7 @@ struct RunStore::State {
   std::optional<TileStore> tiles;
   Database db;
   std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health,
-      insert_terrain, insert_map, replace_memory;
+      insert_terrain, insert_map, replace_checkpoint;
 
   Status prepare();
   Status write(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken);
@@ -128,7 +128,7 @@ Status RunStore::State::prepare() {
   if (Status s = make(insert_health, "INSERT INTO health VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s) return s;
   if (Status s = make(insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?,?,?,?,?)"); !s) return s;
   if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
-  return make(replace_memory, "INSERT OR REPLACE INTO memory VALUES (1,?,?)");
+  return make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)");
 }
 
 Status RunStore::State::write(const Step& step, const std::function<Result<Bytes>()>& save,
@@ -143,9 +143,9 @@ Status RunStore::State::write(const Step& step, const std::function<Result<Bytes
     if (Status s = write(*step.map); !s) return s;
   }
   if (Status s = write(step.times); !s) return s;
-  const auto memory = save();
-  if (!memory) return failure(memory);
-  return replace_memory->bind(1, samples_taken).bind(2, *memory).run();
+  const auto pipeline_state = save();
+  if (!pipeline_state) return failure(pipeline_state);
+  return replace_checkpoint->bind(1, samples_taken).bind(2, *pipeline_state).run();
 }
 
 Status RunStore::State::write(const LocalizationRecord& l) {
@@ -169,11 +169,11 @@ Status RunStore::State::write(const MapRecord& map) {
   i.bind(1, map.stamp.ns).bind(2, map.position_id).bind(3, std::int64_t{map.views});
   i.bind(4, bytes_of(map.world_from_body.pose)).bind(5, bytes_of(map.world_from_body.covariance));
   i.bind(6, std::int64_t{map.known_cells}).bind(7, std::int64_t{map.obstacles});
-  i.bind(8, bytes_of(map.believed.pose)).bind(9, bytes_of(map.believed.covariance));
-  return i.bind(10, map.verdict).bind(11, map.overlap).run();
+  i.bind(8, bytes_of(map.prior.pose)).bind(9, bytes_of(map.prior.covariance));
+  return i.bind(10, map.status).bind(11, map.overlap).run();
 }
 
-// Of the newest frame.
+// Times of the latest frame.
 Status RunStore::State::write(const std::vector<StageTime>& times) {
   for (const StageTime& time : times) {
     if (Status s = insert_time->bind(1, time.stage).bind(2, time.wall_ms).bind(3, time.cpu_ms).run(); !s) return s;
@@ -207,7 +207,7 @@ RunStore::RunStore(RunStore&&) noexcept = default;
 RunStore& RunStore::operator=(RunStore&&) noexcept = default;
 RunStore::~RunStore() = default;
 
-Result<bool> RunStore::holds_a_run(const std::string& path) {
+Result<bool> RunStore::contains_run(const std::string& path) {
   if (!std::filesystem::exists(path)) return false;
   auto db = Database::open(path, Database::Mode::open);
   if (!db) return failure(db);
@@ -248,7 +248,7 @@ Result<RunStore> RunStore::resume(const std::string& path, const RunIdentity& id
 
 Result<RunStore> RunStore::open_read_only(const std::string& path) {
   if (!std::filesystem::exists(path))
-    return failure(ErrorCode::input, "is not there: this is not the folder of a run", path);
+    return failure(ErrorCode::input, "does not exist: this is not a run folder", path);
   auto db = Database::open(path, Database::Mode::read_only);
   if (!db) return failure(db);
   if (Status s = check_version(*db); !s) return failure(s);
@@ -263,14 +263,14 @@ Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& 
   if (Status s = state_->db.execute("BEGIN IMMEDIATE"); !s) return s;
   Status written = state_->write(step, save, samples_taken);
   if (written) written = state_->db.execute("COMMIT");
-  if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // may fail too: SQLite has then rolled back itself
+  if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // fails if SQLite has already rolled back
   return written;
 }
 
 namespace {
 
-// One query over a table whose first column is a frame's `seq`, read along with the frames: its rows stand in the order
-// of the frames, so each is read once, whatever the number of frames.
+// A query over a table whose first column is a frame's `seq`, read in parallel with the frames (merge join): its rows
+// are in the order of the frames, so each row is read once, for any number of frames.
 class RowsOfFrames {
  public:
   static Result<RowsOfFrames> open(Database& db, const char* sql) {
@@ -281,7 +281,7 @@ class RowsOfFrames {
     return rows;
   }
 
-  /// Calls `read(row)` for each row of this frame. Frames are asked for in their order.
+  /// Calls `read(row)` for each row of this frame. Must be called for the frames in their order.
   template <class Read>
   Status of(std::int64_t seq, const Read& read) {
     while (more_ && seq_ <= seq) {
@@ -352,7 +352,7 @@ TileStore& RunStore::tiles() {
   return *state_->tiles;
 }
 
-// Tables of several rows a frame are written in its transaction, so their rows stand in the order of the frames.
+// Tables with several rows per frame are written in its transaction, so their rows are in the order of the frames.
 Result<std::vector<FrameRecord>> RunStore::frames() {
   Database& db = state_->db;
   auto select = db.prepare("SELECT * FROM frames ORDER BY seq");
@@ -410,12 +410,12 @@ Result<std::vector<MapRecord>> RunStore::maps() {
     const auto row = select->step();
     if (!row) return failure(row);
     if (!*row) return records;
-    const Bytes pose = select->blob(3), covariance = select->blob(4), believed = select->blob(7),
-                believed_covariance = select->blob(8);
+    const Bytes pose = select->blob(3), covariance = select->blob(4), prior = select->blob(7),
+                prior_covariance = select->blob(8);
     records.push_back({Stamp{select->integer(0)},
                        select->integer(1),
                        static_cast<int>(select->integer(2)),
-                       {ArchiveReader(believed).get_pose(), ArchiveReader(believed_covariance).get_matrix6()},
+                       {ArchiveReader(prior).get_pose(), ArchiveReader(prior_covariance).get_matrix6()},
                        {ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()},
                        select->text(9),
                        select->real(10),
@@ -424,13 +424,13 @@ Result<std::vector<MapRecord>> RunStore::maps() {
   }
 }
 
-Result<std::optional<RunStore::Memory>> RunStore::memory() {
+Result<std::optional<RunStore::Checkpoint>> RunStore::checkpoint() {
   auto select = state_->db.prepare("SELECT samples_taken, stages FROM memory");
   if (!select) return failure(select);
   const auto row = select->step();
   if (!row) return failure(row);
   if (!*row) return std::nullopt;
-  return Memory{select->blob(1), select->integer(0)};
+  return Checkpoint{select->blob(1), select->integer(0)};
 }
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-// The run's database: what was found frame by frame, crash-safe (docs/reference/files.md).
+// RunStore: the SQLite database of a run, crash-safe, one transaction a frame (docs/reference/files.md).
 #pragma once
 
 #include <functional>
@@ -18,99 +18,102 @@
 
 namespace spartan {
 
-/// Where all sensors together put the rover, and what each of them was worth.
+/// Localization at one frame, from all sensors, with the state of each sensor.
 struct LocalizationRecord {
   UncertainPose world_from_body, odom_from_body;
   std::optional<double> slip, slip_sigma;
   struct Sensor {
-    std::string name, state, reason;
+    std::string name, state, reason;  ///< as LocalizationEstimate::health
   };
   std::vector<Sensor> sensors;
 };
 
-/// One row of the store: a shot that was processed, or one that was announced and is not there.
+/// One row of the store: a frame that was processed, or one that the recording lists but that is not usable.
 struct FrameRecord {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
   std::string status;     ///< name_of(TrackingStatus), or "missing"
-  std::string fault;      ///< why it is missing: name_of(FrameFault), or "rejected"; empty otherwise
-  std::string message;    ///< what to tell people; empty where there is nothing to say
-  bool has_pose = false;  ///< false: `world_from_body` is predicted
+  std::string fault;      ///< why it is missing: name_of(FrameFault); empty otherwise
+  std::string message;    ///< reason for the user to read; may be empty
+  bool has_pose = false;  ///< false: `world_from_body` is predicted; no covariance
   UncertainPose world_from_body;
   MotionEstimate motion;
-  std::optional<UncertainPose> slam;               ///< odometry with the latest correction by the map; as the next
-  std::optional<LocalizationRecord> localization;  ///< none where the shot is missing
+  std::optional<UncertainPose> slam;               ///< odometry corrected by map matching; none if missing
+  std::optional<LocalizationRecord> localization;  ///< none if the frame is missing
   std::vector<StageTime> times;
 };
 
-/// A position's map on the disk.
+/// The local map of a stop.
 struct MapRecord {
   Stamp stamp;
   std::int64_t position_id = -1;
   int views = 0;
-  UncertainPose believed;         ///< world_from_body before the map was looked for in the global one
-  UncertainPose world_from_body;  ///< where it was put
-  std::string verdict;            ///< of the match: name_of(MatchStatus)
-  double overlap = 0;             ///< share of its cells that the global map knew
+  UncertainPose prior;            ///< world_from_body before map matching
+  UncertainPose world_from_body;  ///< after map matching: the pose of the map
+  std::string status;             ///< of the match: name_of(MatchStatus)
+  double overlap = 0;             ///< fraction of its cells that the global map contained
   int known_cells = 0, obstacles = 0;
 };
 
-/// What a terrain view left on the disk.
+/// The files of a terrain view (terrain_files.h).
 struct TerrainRecord {
   Stamp stamp;
   std::string pair;
-  double density_percent = 0;
-  std::int64_t points = 0;
+  double density_percent = 0;  ///< share of pixels with a disparity
+  std::int64_t points = 0;     ///< of the point cloud
 };
 
-/// What must be the same for a run to be resumed.
+/// Identifies a run: a run can only be resumed with the same identity.
 struct RunIdentity {
   std::string input;    ///< fingerprint of the recording
   std::string options;  ///< config.yaml
   std::string rig;      ///< rig.yaml
 };
 
+/// Results of a run by frame, and the state from which it can be resumed.
 class RunStore {
  public:
-  /// Whether a run was begun in this file: false where it is missing, or was left before its first transaction.
-  static Result<bool> holds_a_run(const std::string& path);
-  /// A new store; takes the place of one that holds no run. Code `output`.
+  /// Whether the file contains a run; false if it is missing, or if the program ended before the first transaction.
+  static Result<bool> contains_run(const std::string& path);
+  /// Creates a store; replaces a file without a run. Code `output`.
   static Result<RunStore> create(const std::string& path, const RunIdentity& identity);
-  /// An existing one, to go on with. Code `configuration` where it belongs to another input, other options or another
-  /// version of the program.
+  /// Opens a store to resume its run. Codes: `configuration` if it was written with another input, rig or options, or
+  /// by another version of the program; `store_damaged`.
   static Result<RunStore> resume(const std::string& path, const RunIdentity& identity);
-  /// An existing one, to read from.
+  /// Opens a store to read it. Codes: `input` (missing, or not the store of a run), `configuration` (another version),
+  /// `store_damaged`.
   static Result<RunStore> open_read_only(const std::string& path);
   RunStore(RunStore&&) noexcept;
   RunStore& operator=(RunStore&&) noexcept;
   ~RunStore();
 
-  /// What one step of the drive left behind.
+  /// Results of one step of the run.
   struct Step {
     std::optional<FrameRecord> frame;
     std::optional<TerrainRecord> terrain;
     std::optional<MapRecord> map;
-    std::vector<StageTime> times;  ///< since the last frame, where the step has none itself; kept with that frame
+    std::vector<StageTime> times;  ///< for the last frame of the store, if the step has no frame
   };
-  /// One transaction: the step, what `save` does inside it (the map's tiles) and gives back, the stages' memory behind
-  /// the step (only the newest is kept), and how many samples of the source were taken. All of it is in the file
-  /// afterwards, or nothing.
+  /// Writes in one transaction, completely or not at all: the step; the map tiles that `save` flushes; the pipeline
+  /// state after the step that `save` returns (only the latest is kept); the number of samples read from the source.
   Status commit(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken);
 
-  /// The global map's tables.
+  /// Tables of the global map.
   TileStore& tiles();
 
+  /// All records, in time order. Code `store_damaged`.
   Result<std::vector<FrameRecord>> frames();
   Result<std::vector<TerrainRecord>> terrain();
   Result<std::vector<MapRecord>> maps();
 
-  struct Memory {
-    Bytes stages;
-    std::int64_t samples_taken = 0;
+  /// State from which a run is resumed.
+  struct Checkpoint {
+    Bytes pipeline_state;            ///< Pipeline::save()
+    std::int64_t samples_taken = 0;  ///< number of samples read from the source, for FrameSource::seek()
   };
-  /// Nothing where no frame was committed.
-  Result<std::optional<Memory>> memory();
+  /// The latest checkpoint; none before the first commit.
+  Result<std::optional<Checkpoint>> checkpoint();
 
  private:
   struct State;

@@ -34,7 +34,7 @@ FrameRecord some_frame(int i) {
   frame.motion.inliers = 40 + i;
   frame.motion.rms_px = random.uniform();
   frame.times = {{"imaging", 1.5, 2.5}, {"odometry", 3.0, 3.0}};
-  if (i == 3) return frame;  // one that was not localized
+  if (i == 3) return frame;  // without localization
   frame.slam = UncertainPose{exp_se3(0.3 * tangent), 4e-4 * Matrix6d::Identity()};
   LocalizationRecord& localization = frame.localization.emplace();
   localization.world_from_body = {exp_se3(0.5 * tangent), 2e-4 * Matrix6d::Identity()};
@@ -51,15 +51,15 @@ MapRecord some_map(int i) {
   map.position_id = 40 + i;
   map.views = 4;
   map.world_from_body = some_frame(i).world_from_body;
-  map.believed = {exp_se3(Vector6d::Constant(0.01)), 5e-4 * Matrix6d::Identity()};
-  map.verdict = "decided";
+  map.prior = {exp_se3(Vector6d::Constant(0.01)), 5e-4 * Matrix6d::Identity()};
+  map.status = "decided";
   map.overlap = 0.4;
   map.known_cells = 7000;
   map.obstacles = 12;
   return map;
 }
 
-TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
+TEST(RunStore, ReadsCommittedRecordsBitForBit) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
   {
@@ -82,7 +82,7 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
           return Bytes{1, 2, 4};
         },
         40))
-        << "the last position's";
+        << "the last stop";
   }
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
@@ -99,7 +99,7 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
     EXPECT_EQ(read.motion.previous_from_current.matrix(), expected.motion.previous_from_current.matrix());
     EXPECT_EQ(read.motion.inliers, expected.motion.inliers);
     EXPECT_EQ(read.motion.rms_px, expected.motion.rms_px);
-    ASSERT_EQ(read.times.size(), i == 4 ? 3U : 2U) << "with the last position's";
+    ASSERT_EQ(read.times.size(), i == 4 ? 3U : 2U) << "with the times of the last stop";
     EXPECT_EQ(read.times[1].stage, "odometry");
     EXPECT_EQ(read.times[0].cpu_ms, 2.5);
     ASSERT_EQ(read.localization.has_value(), expected.localization.has_value());
@@ -107,13 +107,13 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
     ASSERT_TRUE(read.slam);
     EXPECT_EQ(read.slam->pose.matrix(), expected.slam->pose.matrix());
     EXPECT_EQ(read.slam->covariance, expected.slam->covariance);
-    const LocalizationRecord &localized = *read.localization, &wanted = *expected.localization;
-    EXPECT_EQ(localized.world_from_body.pose.matrix(), wanted.world_from_body.pose.matrix());
-    EXPECT_EQ(localized.world_from_body.covariance, wanted.world_from_body.covariance);
-    EXPECT_EQ(localized.odom_from_body.pose.matrix(), wanted.odom_from_body.pose.matrix());
-    EXPECT_EQ(localized.odom_from_body.covariance, wanted.odom_from_body.covariance);
-    EXPECT_EQ(localized.slip, wanted.slip);
-    EXPECT_EQ(localized.slip_sigma, wanted.slip_sigma);
+    const LocalizationRecord &localized = *read.localization, &expected_localization = *expected.localization;
+    EXPECT_EQ(localized.world_from_body.pose.matrix(), expected_localization.world_from_body.pose.matrix());
+    EXPECT_EQ(localized.world_from_body.covariance, expected_localization.world_from_body.covariance);
+    EXPECT_EQ(localized.odom_from_body.pose.matrix(), expected_localization.odom_from_body.pose.matrix());
+    EXPECT_EQ(localized.odom_from_body.covariance, expected_localization.odom_from_body.covariance);
+    EXPECT_EQ(localized.slip, expected_localization.slip);
+    EXPECT_EQ(localized.slip_sigma, expected_localization.slip_sigma);
     ASSERT_EQ(localized.sensors.size(), 2U);
     EXPECT_EQ(localized.sensors[1].name, "imu");
     EXPECT_EQ(localized.sensors[1].state, "excluded");
@@ -129,46 +129,46 @@ TEST(RunStore, GivesBackWhatWasCommittedBitForBit) {
   EXPECT_EQ(maps->front().known_cells, 7000);
   EXPECT_EQ(maps->front().obstacles, 12);
   EXPECT_EQ(maps->back().world_from_body.pose.matrix(), some_map(4).world_from_body.pose.matrix());
-  EXPECT_EQ(maps->back().believed.pose.matrix(), some_map(4).believed.pose.matrix());
-  EXPECT_EQ(maps->back().believed.covariance, some_map(4).believed.covariance);
-  EXPECT_EQ(maps->back().verdict, "decided");
+  EXPECT_EQ(maps->back().prior.pose.matrix(), some_map(4).prior.pose.matrix());
+  EXPECT_EQ(maps->back().prior.covariance, some_map(4).prior.covariance);
+  EXPECT_EQ(maps->back().status, "decided");
   EXPECT_EQ(maps->back().overlap, 0.4);
   EXPECT_EQ(maps->back().world_from_body.covariance, some_map(4).world_from_body.covariance);
-  const auto memory = store->memory();
-  ASSERT_TRUE(memory && *memory);
-  EXPECT_EQ((*memory)->stages, (Bytes{1, 2, 4})) << "only the newest is kept";
-  EXPECT_EQ((*memory)->samples_taken, 40);
+  const auto checkpoint = store->checkpoint();
+  ASSERT_TRUE(checkpoint && *checkpoint);
+  EXPECT_EQ((*checkpoint)->pipeline_state, (Bytes{1, 2, 4})) << "only the latest is retained";
+  EXPECT_EQ((*checkpoint)->samples_taken, 40);
   const auto terrain = store->terrain();
   ASSERT_TRUE(terrain);
   ASSERT_EQ(terrain->size(), 1U);
   EXPECT_EQ(terrain->front().points, 1234);
 }
 
-// Steps of SQLite's virtual machine, over all databases that are opened while it lives. Statements that take more than
-// `most` are interrupted.
+// Counts the steps of SQLite's virtual machine over all databases that are opened during its lifetime. Statements are
+// interrupted once there are more than `max_steps`.
 class StepCounter {
  public:
-  explicit StepCounter(std::int64_t most) {
+  explicit StepCounter(std::int64_t max_steps) {
     steps_ = 0;
-    most_ = most;
-    sqlite3_auto_extension(reinterpret_cast<void (*)()>(&watch));
+    max_steps_ = max_steps;
+    sqlite3_auto_extension(reinterpret_cast<void (*)()>(&install));
   }
   StepCounter(const StepCounter&) = delete;
   StepCounter& operator=(const StepCounter&) = delete;
-  ~StepCounter() { sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(&watch)); }
+  ~StepCounter() { sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(&install)); }
   std::int64_t steps() const { return steps_; }
 
  private:
   static constexpr int kGranularity = 10;
-  static int watch(sqlite3* db, const char**, const void*) {
+  static int install(sqlite3* db, const char**, const void*) {
     sqlite3_progress_handler(
-        db, kGranularity, [](void*) { return (steps_ += kGranularity) > most_ ? 1 : 0; }, nullptr);
+        db, kGranularity, [](void*) { return (steps_ += kGranularity) > max_steps_ ? 1 : 0; }, nullptr);
     return SQLITE_OK;
   }
-  static inline std::int64_t steps_ = 0, most_ = 0;
+  static inline std::int64_t steps_ = 0, max_steps_ = 0;
 };
 
-// Five frames, doubled as often as asked.
+// Writes five frames and doubles them `doublings` times.
 void fill(const std::string& path, int doublings) {
   {
     auto store = RunStore::create(path, kIdentity);
@@ -191,7 +191,7 @@ void fill(const std::string& path, int doublings) {
   ASSERT_TRUE(db->execute("COMMIT"));
 }
 
-TEST(RunStore, IsReadInStepsLinearInItsFrames) {
+TEST(RunStore, ReadTimeIsLinearInTheNumberOfFrames) {
   const testing::TemporaryFolder folder;
   const auto steps_of = [&](int doublings) -> std::int64_t {
     const std::string path = folder.path() + "/" + std::to_string(doublings) + ".sqlite";
@@ -220,7 +220,7 @@ TEST(RunStore, IsReadInStepsLinearInItsFrames) {
   EXPECT_LT(static_cast<double>(many), 8.5 * static_cast<double>(few));
 }
 
-TEST(RunStore, RefusesAnotherRun) {
+TEST(RunStore, RejectsResumingAnotherRun) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
   ASSERT_TRUE(RunStore::create(path, kIdentity));
@@ -235,31 +235,31 @@ TEST(RunStore, RefusesAnotherRun) {
   EXPECT_TRUE(RunStore::resume(path, kIdentity));
 }
 
-TEST(RunStore, TellsABegunRunFromAnEmptyFile) {
+TEST(RunStore, DistinguishesARunFromAnEmptyFile) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
-  EXPECT_FALSE(RunStore::holds_a_run(path).value());
+  EXPECT_FALSE(RunStore::contains_run(path).value());
   std::FILE* const file = std::fopen(path.c_str(), "w");
   std::fclose(file);
-  EXPECT_FALSE(RunStore::holds_a_run(path).value());
+  EXPECT_FALSE(RunStore::contains_run(path).value());
   ASSERT_TRUE(RunStore::create(path, kIdentity));
-  EXPECT_TRUE(RunStore::holds_a_run(path).value());
+  EXPECT_TRUE(RunStore::contains_run(path).value());
 }
 
-TEST(RunStore, RefusesWhatIsNoStore) {
+TEST(RunStore, RejectsFilesThatAreNoStore) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
   EXPECT_EQ(RunStore::open_read_only(path).error().code, ErrorCode::input);
   std::FILE* const file = std::fopen(path.c_str(), "w");
-  std::fputs("this is no database, whatever its name says; it is long enough to be looked at", file);
+  std::fputs("not a database, although the name says so; long enough for a header to be read", file);
   std::fclose(file);
   const auto opened = RunStore::open_read_only(path);
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::store_damaged);
 }
 
-// A process that is killed between two statements of a transaction leaves the frames before it, and nothing else.
-TEST(RunStore, LosesNothingCommittedWhenKilled) {
+// After a process is killed, the store contains all committed frames.
+TEST(RunStore, RetainsCommittedFramesWhenKilled) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
   const pid_t child = ::fork();
@@ -278,7 +278,7 @@ TEST(RunStore, LosesNothingCommittedWhenKilled) {
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
   EXPECT_EQ(store->frames()->size(), 7U);
-  EXPECT_EQ((*store->memory())->samples_taken, 6);
+  EXPECT_EQ((*store->checkpoint())->samples_taken, 6);
 }
 
 }  // namespace

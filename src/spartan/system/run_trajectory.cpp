@@ -49,7 +49,7 @@ Trajectory trajectory_of(const std::vector<FrameRecord>& frames, TrajectoryKind 
 Trajectory trajectory_without_gaps(const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
   Trajectory trajectory;
   trajectory.reserve(frames.size());
-  Pose from_odometry;  // the kind's world from the odometry's, as of the last pose
+  Pose from_odometry;  // world of this kind from world of the odometry, at the last pose
   for (const FrameRecord& frame : frames) {
     const Pose& predicted = frame.world_from_body.pose;
     const auto pose = pose_of(frame, kind);

@@ -14,24 +14,26 @@ Result<SavedMap> SavedMap::open_run(const std::string& path) {
   auto options = load_options<RunOptions>(folder.config());
   if (!options) return failure(options);
   SavedMap saved(std::move(*options));
-  saved.run_ = std::make_unique<RunStore>(std::move(*store));
-  auto map = GlobalMap::from_store(saved.options_.slam.map, saved.options_.mapping.map.cell_m, saved.run_->tiles());
+  saved.run_store_ = std::make_unique<RunStore>(std::move(*store));
+  auto map =
+      GlobalMap::from_store(saved.options_.slam.map, saved.options_.mapping.map.cell_m, saved.run_store_->tiles());
   if (!map) return failure(map);
-  saved.of_run_ = std::make_unique<GlobalMap>(std::move(*map));
+  saved.run_map_ = std::make_unique<GlobalMap>(std::move(*map));
   return saved;
 }
 
 Result<SavedMap> SavedMap::open(const std::string& path) {
-  const bool run = std::filesystem::is_directory(path);
-  auto saved = run ? open_run(path) : Result<SavedMap>(SavedMap(RunOptions()));
+  const bool is_run = std::filesystem::is_directory(path);
+  auto saved = is_run ? open_run(path) : Result<SavedMap>(SavedMap(RunOptions()));
   if (!saved) return failure(saved);
-  if (!run) {
+  if (!is_run) {
     auto file = MapFile::open(path, saved->options_.slam.map, Database::Mode::read_only);
     if (!file) return failure(file);
     saved->file_ = std::make_unique<MapFile>(std::move(*file));
   }
   if (saved->map().empty()) {
-    return failure(ErrorCode::input, "holds no map", path, "maps are made where the rover stops and looks around");
+    return failure(ErrorCode::input, "contains no map", path,
+                   "a run makes maps at stops of which another pair than that of the odometry has frames");
   }
   return saved;
 }

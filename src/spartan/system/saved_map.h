@@ -1,4 +1,4 @@
-// A global map on the disk, to look at: a map file, or the map of a run.
+// Opens a global map for reading: a map file, or the map of a run.
 #pragma once
 
 #include <memory>
@@ -11,14 +11,15 @@
 
 namespace spartan {
 
+/// Read-only access to a saved global map.
 class SavedMap {
  public:
-  /// `path`: a map file or a run folder; it is only read. Codes: `input` (missing, damaged, no map in it),
-  /// `configuration` (of another version).
+  /// `path`: a map file or a run folder. Codes: `input` (missing, damaged, or without a map), `configuration` (of
+  /// another version).
   static Result<SavedMap> open(const std::string& path);
 
-  GlobalMap& map() { return file_ ? file_->map() : *of_run_; }
-  /// As the run had them; the defaults for a map file.
+  GlobalMap& map() { return file_ ? file_->map() : *run_map_; }
+  /// Options of the run; the defaults for a map file.
   const RunOptions& options() const { return options_; }
 
  private:
@@ -27,8 +28,8 @@ class SavedMap {
 
   RunOptions options_;
   std::unique_ptr<MapFile> file_;
-  std::unique_ptr<RunStore> run_;
-  std::unique_ptr<GlobalMap> of_run_;
+  std::unique_ptr<RunStore> run_store_;
+  std::unique_ptr<GlobalMap> run_map_;
 };
 
 }  // namespace spartan

@@ -13,11 +13,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Nearest-rank percentile of values that need not be sorted.
-double percentile(std::vector<double> values, double share) {
+// Nearest-rank percentile; `fraction` in 0 … 1. The values need not be sorted.
+double percentile(std::vector<double> values, double fraction) {
   if (values.empty()) return 0;
   std::sort(values.begin(), values.end());
-  const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
+  const auto rank = static_cast<std::size_t>(std::ceil(fraction * static_cast<double>(values.size())));
   return values[std::clamp<std::size_t>(rank, 1, values.size()) - 1];
 }
 
@@ -48,7 +48,7 @@ Json stages(const std::vector<FrameRecord>& frames) {
   return json;
 }
 
-bool is_loss(const FrameRecord& frame) {
+bool is_lost(const FrameRecord& frame) {
   return frame.status == name_of(TrackingStatus::lost);
 }
 
@@ -59,12 +59,12 @@ std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames) {
   bool open = false;
   std::optional<Stamp> last_pose;
   for (const FrameRecord& frame : frames) {
-    if (is_loss(frame) && !open) {
+    if (is_lost(frame) && !open) {
       spans.push_back({last_pose.value_or(frame.stamp), frame.stamp, frame.message});
       open = true;
     } else if (open && frame.status != "missing") {
       spans.back().to = frame.stamp;
-      open = is_loss(frame);
+      open = is_lost(frame);
     }
     if (frame.has_pose) last_pose = frame.stamp;
   }
@@ -85,7 +85,7 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
     }
     if (!frame.has_pose) predicted.push_back(frame.frame_id);
   }
-  // Frames by the state of each sensor of the localization.
+  // Number of frames per state of each sensor of the localization.
   Json sensors = Json::object();
   for (const FrameRecord& frame : frames) {
     if (!frame.localization) continue;

@@ -1,4 +1,4 @@
-// What a run has to say about itself: summary.json (docs/formats.md).
+// Summary of a run: summary.json (docs/reference/json.md).
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace spartan {
 
-/// What only the running program knows.
+/// Facts about a run that are not in its store.
 struct RunFacts {
   std::string version;
   std::string input;
@@ -19,22 +19,22 @@ struct RunFacts {
   bool gravity_measured = false;
   bool heading_east = false;
   int threads = 1;
-  std::vector<std::string> absent;           ///< what the options leave out of the run
-  double wall_seconds = 0, cpu_seconds = 0;  ///< of this call of the program
+  std::vector<std::string> absent;           ///< stages that the options disable
+  double wall_seconds = 0, cpu_seconds = 0;  ///< of this execution of the program
   std::int64_t peak_memory_bytes = 0;
-  std::optional<std::int64_t> resumed_from_frame;  ///< frame_id of the first frame that was processed after --resume
+  std::optional<std::int64_t> resumed_from_frame;  ///< frame_id of the first frame processed after --resume
 };
 
-/// A stretch of time without a measured pose.
+/// An interval in which the odometry was lost.
 struct LostSpan {
   Stamp from, to;
   std::string reason;
 };
 
-/// Spans between the last pose before and the first pose after each loss (or the end of the drive).
+/// The interval of each loss, from the last pose before it to the first pose after it (or the end of the run).
 std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames);
 
-/// The text of summary.json.
+/// The content of summary.json.
 std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord>& frames);
 
 }  // namespace spartan

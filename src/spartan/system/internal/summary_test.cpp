@@ -21,7 +21,7 @@ FrameRecord frame(int i, const std::string& status) {
   return record;
 }
 
-TEST(Summary, CountsAndNamesWhatHappened) {
+TEST(Summary, CountsFramesByStatus) {
   const std::vector<FrameRecord> frames{frame(0, "tracking"), frame(1, "standing"), frame(2, "lost"),
                                         frame(3, "missing"),  frame(4, "lost"),     frame(5, "tracking"),
                                         frame(6, "missing"),  frame(7, "degraded")};
@@ -44,7 +44,7 @@ TEST(Summary, CountsAndNamesWhatHappened) {
   EXPECT_DOUBLE_EQ(json["stages"]["odometry"]["cpu_ms"]["total"], 16.0);
 }
 
-TEST(Summary, JoinsNeighbouringLossesToOneSpan) {
+TEST(Summary, JoinsConsecutiveLossesToOneSpan) {
   const std::vector<FrameRecord> frames{frame(0, "tracking"), frame(1, "lost"),     frame(2, "missing"),
                                         frame(3, "lost"),     frame(4, "tracking"), frame(5, "lost")};
   const auto spans = lost_spans(frames);
@@ -55,7 +55,7 @@ TEST(Summary, JoinsNeighbouringLossesToOneSpan) {
   EXPECT_EQ(spans[1].from.ns, 400);
   EXPECT_EQ(spans[1].to.ns, 500);
   EXPECT_TRUE(lost_spans({frame(0, "tracking"), frame(1, "missing"), frame(2, "tracking")}).empty())
-      << "a skipped frame alone is no loss";
+      << "a missing frame alone is not a loss";
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace spartan {
 namespace {
 
-constexpr double kDisparityStep = 0.3;  // px, the accuracy that the published rig is laid out for
+constexpr double kDisparityErrorPx = 0.3;  // disparity accuracy that the published rig is designed for
 
 std::string stem(const std::string& folder, Stamp stamp) {
   return folder + "/" + std::to_string(stamp.ns);
@@ -27,10 +27,10 @@ double known_percent(ImageView<const float> disparity) {
 
 Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, const std::string& folder) {
   const std::string path = stem(folder, view.pair.stamp);
-  // Δz / z = c / d: a share of the range is a bound on the disparity.
-  const double smallest = kDisparityStep / options.largest_range_error;
+  // Δz / z = Δd / d: a bound on the relative range error is a lower bound on the disparity.
+  const double min_disparity = kDisparityErrorPx / options.max_range_error;
   const PointCloud cloud = to_point_cloud(view.disparity, view.pair.left, view.pair.geometry, view.world_from_left,
-                                          options.point_step_px, smallest);
+                                          options.point_step_px, min_disparity);
   if (Status s = write_pfm(path + ".pfm", view.disparity); !s) return failure(s);
   if (Status s = write_png(path + ".png", colour_disparity(view.disparity)); !s) return failure(s);
   if (Status s = write_ply(path + ".ply", cloud); !s) return failure(s);
@@ -40,7 +40,7 @@ Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOption
 
 Status merge_terrain_clouds(const std::string& folder, const std::vector<TerrainRecord>& terrain,
                             const std::string& path) {
-  if (terrain.empty()) return failure(ErrorCode::input, "holds no terrain", folder, "run without --odometry-only");
+  if (terrain.empty()) return failure(ErrorCode::input, "contains no terrain", folder, "run without --odometry-only");
   PointCloud all;
   for (const TerrainRecord& record : terrain) {
     const auto cloud = read_ply(stem(folder, record.stamp) + ".ply");

@@ -1,4 +1,4 @@
-// The terrain along the way as files: disparity, its picture, a coloured point cloud in the world.
+// Files of the terrain along the path: disparity image, its rendering, coloured point cloud (docs/reference/files.md).
 #pragma once
 
 #include <string>
@@ -11,11 +11,12 @@
 
 namespace spartan {
 
-/// Writes <folder>/<stamp_ns>.pfm (disparity, px), .png (the same in colours) and .ply (points, metres, world frame).
+/// Writes <folder>/<stamp_ns>.pfm (disparity, px), .png (colour-coded disparity) and .ply (points, metres, world
+/// frame; only those within the maximum range error).
 /// Code `output`.
 Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, const std::string& folder);
 
-/// All clouds of a run in one PLY file. Codes: `input` (none there, or damaged), `output`.
+/// Merges all point clouds of a run into one PLY file. Codes: `input` (no terrain, or a damaged file), `output`.
 Status merge_terrain_clouds(const std::string& folder, const std::vector<TerrainRecord>& terrain,
                             const std::string& path);
 

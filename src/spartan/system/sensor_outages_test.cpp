@@ -1,11 +1,11 @@
-#include "spartan/system/sensor_spells.h"
+#include "spartan/system/sensor_outages.h"
 
 #include <gtest/gtest.h>
 
 namespace spartan {
 namespace {
 
-// A frame for which the compass is in this state; an empty state: a shot that is missing.
+// A frame at which the compass is in this state; an empty state: a missing frame.
 FrameRecord frame(int i, const std::string& state, const std::string& reason = "") {
   FrameRecord record;
   record.frame_id = 2 * i;
@@ -15,7 +15,7 @@ FrameRecord frame(int i, const std::string& state, const std::string& reason = "
   return record;
 }
 
-TEST(SensorSpells, JoinFramesWithTheSameStateAndKindOfReason) {
+TEST(SensorOutages, JoinConsecutiveFramesOfSameStateAndReason) {
   const std::vector<FrameRecord> frames{frame(0, "missing", "has not said anything"),
                                         frame(1, "missing", "has not said anything"),
                                         frame(2, "ok"),
@@ -29,15 +29,15 @@ TEST(SensorSpells, JoinFramesWithTheSameStateAndKindOfReason) {
                                         frame(10, "excluded", "gives readings that no rover can have"),
                                         frame(11, "ok"),
                                         frame(12, "excluded", "gives readings that no rover can have")};
-  const auto spells = sensor_spells(frames, "compass");
-  ASSERT_EQ(spells.size(), 7U);
+  const auto outages = sensor_outages(frames, "compass");
+  ASSERT_EQ(outages.size(), 7U);
   const auto expect = [&](std::size_t i, const std::string& state, int first, int last, int count) {
-    EXPECT_EQ(spells[i].state, state) << i;
-    EXPECT_EQ(spells[i].from.ns, 100 * first) << i;
-    EXPECT_EQ(spells[i].to.ns, 100 * last) << i;
-    EXPECT_EQ(spells[i].first_frame_id, 2 * first) << i;
-    EXPECT_EQ(spells[i].last_frame_id, 2 * last) << i;
-    EXPECT_EQ(spells[i].frames, count) << i;
+    EXPECT_EQ(outages[i].state, state) << i;
+    EXPECT_EQ(outages[i].from.ns, 100 * first) << i;
+    EXPECT_EQ(outages[i].to.ns, 100 * last) << i;
+    EXPECT_EQ(outages[i].first_frame_id, 2 * first) << i;
+    EXPECT_EQ(outages[i].last_frame_id, 2 * last) << i;
+    EXPECT_EQ(outages[i].frames, count) << i;
   };
   expect(0, "missing", 0, 1, 2);
   expect(1, "suspect", 3, 5, 2);
@@ -46,15 +46,15 @@ TEST(SensorSpells, JoinFramesWithTheSameStateAndKindOfReason) {
   expect(4, "excluded", 9, 9, 1);
   expect(5, "excluded", 10, 10, 1);
   expect(6, "excluded", 12, 12, 1);
-  EXPECT_EQ(spells[1].reason, frames[3].localization->sensors[1].reason);
-  EXPECT_EQ(spells[3].reason, "silent for 1.2 s");
+  EXPECT_EQ(outages[1].reason, frames[3].localization->sensors[1].reason);
+  EXPECT_EQ(outages[3].reason, "silent for 1.2 s");
 }
 
-TEST(SensorSpells, ThereAreNoneOfASensorThatWasOkOrUnknown) {
+TEST(SensorOutages, NoneForSensorThatWasOkOrIsUnknown) {
   const std::vector<FrameRecord> frames{frame(0, "suspect", "x"), frame(1, "ok")};
-  EXPECT_TRUE(sensor_spells(frames, "imu").empty());
-  EXPECT_TRUE(sensor_spells(frames, "sonar").empty());
-  EXPECT_EQ(sensor_spells(frames, "compass").size(), 1U);
+  EXPECT_TRUE(sensor_outages(frames, "imu").empty());
+  EXPECT_TRUE(sensor_outages(frames, "sonar").empty());
+  EXPECT_EQ(sensor_outages(frames, "compass").size(), 1U);
 }
 
 }  // namespace
