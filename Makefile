@@ -1,5 +1,5 @@
-# The newcomer's door. Every target installs what it needs first (./setup, quick where nothing is missing).
-.PHONY: help demo test build bench recordings format lint coverage clean
+# Entry points. Every target installs what it needs first (./setup, quick where nothing is missing).
+.PHONY: help demo test build bench recordings format lint docs coverage clean
 
 help:
 	@echo "make demo      build, then a drive over a simulated Mars (or INPUT=path); demo_output/report.html shows it"
@@ -9,6 +9,7 @@ help:
 	@echo "make recordings  the standard simulated recordings, once, into ~/.cache/spartan (an hour)"
 	@echo "make format    format the C++ files"
 	@echo "make lint      clang-tidy on what changed since the commit in .ci/lint-base (or LINT_BASE=commit, LINT_BASE=all)"
+	@echo "make docs      API reference of the public headers: build/docs/html/index.html"
 	@echo "make coverage  line coverage of the fast tests"
 	@echo "make clean     remove what was built"
 
@@ -48,6 +49,12 @@ format:
 lint:
 	./setup
 	scripts/lint
+
+docs:
+	./setup develop
+	mkdir -p build/docs
+	doxygen docs/Doxyfile
+	@echo "open build/docs/html/index.html"
 
 coverage:
 	./setup

@@ -12,15 +12,15 @@
 #include <string>
 #include <vector>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/core/files.h"
 #include "spartan/core/random.h"
 #include "spartan/core/threads.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/localization/measurement.h"
-#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/sim/internal/drive/motion_sensors.h"
-#include "spartan/sim/scenario.h"
 #include "spartan/sim/internal/world/world.h"
+#include "spartan/sim/scenario.h"
 
 namespace spartan {
 

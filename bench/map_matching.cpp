@@ -20,9 +20,9 @@
 
 #include "spartan/core/random.h"
 #include "spartan/slam/global_map.h"
+#include "spartan/slam/internal/map_refinement.h"
 #include "spartan/slam/map_matcher.h"
 #include "spartan/slam/map_merger.h"
-#include "spartan/slam/internal/map_refinement.h"
 #include "standard_recordings.h"
 #include "stop_points.h"
 

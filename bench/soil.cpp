@@ -21,9 +21,9 @@
 #include <string>
 #include <vector>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/sim/internal/camera/frame_preview.h"
 #include "spectrum_plot.h"
 

@@ -8,7 +8,7 @@
 
 namespace spartan::program {
 
-/// docs/formats.md, `stereo`, "scores". Without a mask `nonocc` is null and `reasons` says so.
+/// "scores" in docs/reference/json.md. Without a mask `nonocc` is null and `reasons` says so.
 Json to_json(const DisparityMetrics& metrics);
 /// The same for people, one column a kind of pixels.
 std::string table_of(const DisparityMetrics& metrics);

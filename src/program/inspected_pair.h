@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/image.h"
 #include "spartan/calibration/pair_check.h"
+#include "spartan/core/image.h"
 
 namespace spartan::program {
 

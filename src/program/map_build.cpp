@@ -12,6 +12,7 @@
 #include "program/json.h"
 #include "program/map.h"
 #include "program/run_arguments.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/camera/interpretation.h"
 #include "spartan/core/files.h"
@@ -20,7 +21,6 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/localization/start_frame.h"
 #include "spartan/reconstruction/stop_mapper.h"
-#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/system/map_files.h"
 
 namespace spartan::program {

@@ -9,8 +9,8 @@
 
 #include "program/compared_trajectories.h"
 #include "program/html_parts.h"
-#include "spartan/core/trajectory.h"
 #include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/core/trajectory.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::program {

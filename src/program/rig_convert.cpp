@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "program/json.h"
-#include "spartan/core/files.h"
 #include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/calibration_io/calibration_writing.h"
 #include "spartan/calibration_io/read_back.h"
+#include "spartan/core/files.h"
 #include "spartan/rig/rig_differences.h"
 
 namespace spartan::program {

@@ -57,7 +57,7 @@ void add_rig_design(CLI::App& rig, Context& context) {
                                   "Find the stereo pairs that meet a rover's requirements, and the ground they see",
                                   "rig design config/requirements/rover.yaml -o rover_design",
                                   [&context, a] { return design_command(context, *a); });
-  command->add_option("requirements", a->requirements, "Requirements file (docs/formats.md).")
+  command->add_option("requirements", a->requirements, "Requirements file (docs/reference/requirements.md).")
       ->required()
       ->option_text("REQ");
   command->add_option("-o,--output", a->output, "Folder for ground.svg, ground.png and feasible.csv.");

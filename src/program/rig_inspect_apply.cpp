@@ -6,9 +6,9 @@
 #include <filesystem>
 
 #include "program/rig_convert.h"
+#include "spartan/calibration/merge_corrections.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
-#include "spartan/calibration/merge_corrections.h"
 
 namespace spartan::program {
 namespace {

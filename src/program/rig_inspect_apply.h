@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "program/inspected_pair.h"
-#include "spartan/core/result.h"
 #include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/core/result.h"
 
 namespace spartan::program {
 

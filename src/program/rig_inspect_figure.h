@@ -1,11 +1,11 @@
 // The figure of `rig inspect`: the row errors of a pair before and after correction.
 #pragma once
 
+#include "spartan/calibration/pair_check.h"
 #include "spartan/core/image.h"
 #include "spartan/core/pixel_format.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
-#include "spartan/calibration/pair_check.h"
 
 namespace spartan::program {
 

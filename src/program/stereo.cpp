@@ -9,6 +9,7 @@
 #include "program/disparity_scores.h"
 #include "program/json.h"
 #include "program/run_arguments.h"
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/camera/interpretation.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
@@ -19,7 +20,6 @@
 #include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/disparity_rendering.h"
 #include "spartan/reconstruction/point_cloud.h"
-#include "spartan/calibration_io/calibration_reading.h"
 
 namespace spartan::program {
 namespace {

@@ -1,4 +1,4 @@
-// A comparison with ground truth as JSON (docs/formats.md, `evaluate`) and as a table.
+// A comparison with ground truth as JSON (docs/reference/json.md, `evaluate`) and as a table.
 #pragma once
 
 #include <string>

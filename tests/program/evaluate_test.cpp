@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "program.h"
-#include "spartan/core/trajectory.h"
 #include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/core/trajectory.h"
 #include "spartan/rig/pose_convention.h"
 #include "spartan/testing/temporary_folder.h"
 

@@ -10,9 +10,9 @@
 #include <numbers>
 
 #include "program.h"
-#include "spartan/core/files.h"
-#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/calibration/internal/model_modification.h"
+#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/core/files.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 

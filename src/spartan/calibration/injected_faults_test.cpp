@@ -1,6 +1,6 @@
 // Fault injection: common calibration errors must be found under their id and corrected.
-#include "spartan/calibration/pair_check.h"
 #include "spartan/calibration/internal/model_modification.h"
+#include "spartan/calibration/pair_check.h"
 #include "spartan/testing/simulated_pair_matches.h"
 
 namespace spartan {

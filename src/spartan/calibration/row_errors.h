@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "spartan/core/image.h"
 #include "spartan/calibration/pair_refinement.h"
+#include "spartan/core/image.h"
 
 namespace spartan {
 

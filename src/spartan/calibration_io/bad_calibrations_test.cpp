@@ -7,9 +7,9 @@
 #include <map>
 #include <set>
 
-#include "spartan/core/random.h"
 #include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/calibration_io/calibration_writing.h"
+#include "spartan/core/random.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

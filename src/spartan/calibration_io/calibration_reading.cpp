@@ -8,8 +8,8 @@
 #include <fstream>
 
 #include "spartan/calibration_io/internal/calibration_readers.h"
-#include "spartan/rig/calibration_text.h"
 #include "spartan/calibration_io/internal/pair_of_files.h"
+#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
 namespace {

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/result.h"
 #include "spartan/calibration_io/calibration_format.h"
-#include "spartan/rig/rig_yaml.h"  // IWYU pragma: export
+#include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
 #include "spartan/rig/rig_differences.h"
+#include "spartan/rig/rig_yaml.h"  // IWYU pragma: export
 
 namespace spartan {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/result.h"
 #include "spartan/calibration_io/calibration_format.h"
+#include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
 
 namespace spartan {

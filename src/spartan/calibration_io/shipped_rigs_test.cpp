@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "spartan/rig/describe.h"
 #include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/rig/describe.h"
 #include "spartan/rig/rig_differences.h"
 #include "spartan/testing/real_data.h"
 

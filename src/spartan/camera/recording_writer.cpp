@@ -13,12 +13,12 @@
 #include <optional>
 #include <vector>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/camera/internal/layouts/spartan_format.h"
 #include "spartan/camera/internal/table.h"
 #include "spartan/core/files.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/options.h"
-#include "spartan/calibration_io/calibration_reading.h"
 
 namespace spartan {
 namespace {

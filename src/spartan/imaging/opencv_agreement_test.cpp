@@ -8,12 +8,12 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/core/image_io.h"
 #include "spartan/core/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
-#include "spartan/imaging/rectification.h"
 #include "spartan/imaging/internal/remap.h"
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/imaging/rectification.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {

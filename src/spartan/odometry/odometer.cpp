@@ -10,10 +10,10 @@
 #include "spartan/odometry/internal/landmark_manager.h"
 #include "spartan/odometry/internal/landmark_matcher.h"
 #include "spartan/odometry/internal/landmark_reconstructor.h"
-#include "spartan/odometry/internal/motion_estimator.h"
 #include "spartan/odometry/internal/landmarks/odometer_memory.h"
-#include "spartan/odometry/odometry_options.h"
 #include "spartan/odometry/internal/matching/smoothed_image.h"
+#include "spartan/odometry/internal/motion_estimator.h"
+#include "spartan/odometry/odometry_options.h"
 
 namespace spartan {
 namespace {

@@ -6,8 +6,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "spartan/reconstruction/internal/disparity_filters.h"
 #include "spartan/reconstruction/disparity_options.h"
+#include "spartan/reconstruction/internal/disparity_filters.h"
 #include "spartan/reconstruction/internal/semi_global_matcher.h"
 
 namespace spartan {

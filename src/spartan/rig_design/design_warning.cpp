@@ -7,9 +7,9 @@
 #include <numbers>
 #include <tuple>
 
+#include "spartan/rig_design/internal/stereo_relations.h"
 #include "spartan/rig_design/pan_text.h"
 #include "spartan/rig_design/rig_designer.h"
-#include "spartan/rig_design/internal/stereo_relations.h"
 
 namespace spartan {
 namespace {

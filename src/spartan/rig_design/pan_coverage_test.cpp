@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig_design/pan_text.h"
 #include "spartan/rig/rig_yaml.h"
+#include "spartan/rig_design/pan_text.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {

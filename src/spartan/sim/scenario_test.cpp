@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "spartan/core/files.h"
 #include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/core/files.h"
 #include "spartan/testing/doc_example.h"
 
 namespace spartan::sim {

@@ -13,12 +13,12 @@
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 #include "spartan/core/geotiff.h"
-#include "spartan/sim/internal/drive/body_motion.h"
 #include "spartan/sim/internal/camera/faults.h"
 #include "spartan/sim/internal/camera/frame_preview.h"
-#include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/internal/camera/renderer.h"
 #include "spartan/sim/internal/camera/truth.h"
+#include "spartan/sim/internal/drive/body_motion.h"
+#include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/internal/world/world.h"
 
 namespace spartan::sim {

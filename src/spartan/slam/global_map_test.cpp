@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/slam/map_file.h"
 #include "spartan/slam/internal/synthetic_stop_test.h"
+#include "spartan/slam/map_file.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

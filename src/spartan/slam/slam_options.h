@@ -8,7 +8,7 @@
 namespace spartan {
 
 /// How a local map is matched to the global map, and when the match is accepted (docs/math/map_merging.md). The
-/// defaults were chosen on simulated drives (docs/results.md).
+/// defaults were chosen on simulated drives (docs/notes/map_merging.md).
 struct MatchOptions {
   double window_sigmas = 3;            ///< Half size of the search window, standard deviations of the prior pose.
   double max_search_m = 0.5;           ///< Upper bound of the half size of the window along x and y, m.

@@ -7,15 +7,15 @@
 #include <cmath>
 #include <utility>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/rig/pose_convention.h"
+#include "spartan/system/internal/terrain_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
 #include "spartan/system/saved_map.h"
-#include "spartan/system/internal/terrain_files.h"
 
 namespace spartan {
 namespace {

@@ -7,16 +7,16 @@
 #include <utility>
 #include <vector>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/core/files.h"
 #include "spartan/core/process.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/system/internal/summary.h"
+#include "spartan/system/internal/terrain_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
-#include "spartan/system/internal/summary.h"
-#include "spartan/system/internal/terrain_files.h"
 
 namespace spartan {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/random.h"
 #include "spartan/calibration/pair_check.h"
+#include "spartan/core/random.h"
 
 namespace spartan::testing {
 

@@ -6,15 +6,15 @@
 #include <numbers>
 #include <utility>
 
-#include "spartan/calibration/row_errors.h"
 #include "spartan/calibration/internal/model_modification.h"
+#include "spartan/calibration/row_errors.h"
 #include "spartan/rig/rig_findings.h"
 
 namespace spartan {
 namespace {
 
 // The constants of this search are empirical; the tests with injected calibration errors and the real pairs of
-// docs/results.md check them.
+// docs/benchmarks/calibration.md check them.
 //
 // Cost ratios. A hypothesis with one more error is preferred if its cost is below kClearlyLower of the present cost. A
 // size that the calibration's own numbers suggest is applied unless its cost is above kClearlyHigher of that without

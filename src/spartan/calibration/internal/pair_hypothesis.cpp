@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "spartan/calibration/row_errors.h"
 #include "spartan/calibration/internal/model_modification.h"
+#include "spartan/calibration/row_errors.h"
 
 namespace spartan {
 namespace {

@@ -4,9 +4,9 @@
 #include <filesystem>
 
 #include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/yaml_camera.h"
+#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
 namespace {

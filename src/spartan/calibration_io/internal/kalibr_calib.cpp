@@ -1,12 +1,12 @@
 // Reader and writer of Kalibr's camchain.yaml and camchain-imucam.yaml (Furgale et al.; Kalibr wiki, "Yaml formats").
 #include <fmt/format.h>
 
-#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/calibration_text.h"
+#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
 #include "spartan/calibration_io/internal/yaml_camera.h"
+#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
 namespace {

@@ -7,10 +7,10 @@
 #include <initializer_list>
 #include <utility>
 
-#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/calibration_text.h"
+#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/internal/text_matrices.h"
+#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "spartan/rig/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/models/model_conversion.h"
 
 namespace spartan::rig_detail {

@@ -8,12 +8,12 @@
 #include <cmath>
 #include <utility>
 
-#include "spartan/core/strict_yaml.h"
 #include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
 #include "spartan/calibration_io/internal/python_dict.h"
+#include "spartan/core/strict_yaml.h"
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {

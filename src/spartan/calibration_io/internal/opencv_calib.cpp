@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/calibration_text.h"
+#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/internal/opencv_storage.h"
+#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
 namespace {

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 
-#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/calibration_text.h"
+#include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/pair_of_files.h"
 #include "spartan/calibration_io/internal/yaml_camera.h"
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {

@@ -5,10 +5,10 @@
 #include <array>
 
 #include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
 #include "spartan/calibration_io/internal/text_matrices.h"
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/models/model_conversion.h"
 
 namespace spartan {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "spartan/rig/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
+#include "spartan/rig/calibration_text.h"
 #include "spartan/rig/models/model_conversion.h"
 
 namespace spartan::rig_detail {

@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "spartan/camera/internal/increasing_stream.h"
-#include "spartan/camera/interpretation.h"
 #include "spartan/camera/internal/recording_index.h"
+#include "spartan/camera/interpretation.h"
 #include "spartan/core/image_io.h"
 
 namespace spartan {

@@ -7,8 +7,8 @@
 #include <limits>
 #include <map>
 
-#include "spartan/camera/internal/stamp_order.h"
 #include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/camera/internal/stamp_order.h"
 
 namespace spartan {
 namespace {

@@ -9,13 +9,13 @@
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
+#include "spartan/imaging/imaging_options.h"
 #include "spartan/imaging/internal/contrast.h"
 #include "spartan/imaging/internal/debayer.h"
-#include "spartan/imaging/imaging_options.h"
 #include "spartan/imaging/internal/local_contrast.h"
-#include "spartan/imaging/rectification.h"
 #include "spartan/imaging/internal/remap.h"
 #include "spartan/imaging/internal/vignetting_correction.h"
+#include "spartan/imaging/rectification.h"
 #include "spartan/rig/rig.h"
 
 namespace spartan {

@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "spartan/imaging/rectification.h"
 #include "spartan/imaging/internal/remap.h"
+#include "spartan/imaging/rectification.h"
 
 namespace spartan {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "spartan/odometry/internal/landmarks/landmark.h"
 #include "spartan/odometry/internal/landmark_matcher.h"
 #include "spartan/odometry/internal/landmark_reconstructor.h"
+#include "spartan/odometry/internal/landmarks/landmark.h"
 #include "spartan/odometry/internal/motion_estimator.h"
 #include "spartan/odometry/odometry_options.h"
 

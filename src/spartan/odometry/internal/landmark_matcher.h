@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "spartan/core/threads.h"
-#include "spartan/odometry/internal/landmarks/landmark.h"
 #include "spartan/odometry/internal/landmark_reconstructor.h"
+#include "spartan/odometry/internal/landmarks/landmark.h"
 #include "spartan/odometry/internal/motion_estimator.h"
 
 namespace spartan {

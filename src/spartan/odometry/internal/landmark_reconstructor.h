@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "spartan/core/image.h"
-#include "spartan/odometry/odometry_options.h"
 #include "spartan/odometry/internal/matching/patch_alignment.h"
+#include "spartan/odometry/odometry_options.h"
 #include "spartan/rig/rectified_stereo.h"
 
 namespace spartan {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "spartan/core/pose.h"
-#include "spartan/slam/slam_options.h"
 #include "spartan/slam/internal/surface_grid.h"
+#include "spartan/slam/slam_options.h"
 
 namespace spartan {
 

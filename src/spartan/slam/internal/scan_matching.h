@@ -6,8 +6,8 @@
 
 #include "spartan/core/pose.h"
 #include "spartan/core/threads.h"
-#include "spartan/slam/slam_options.h"
 #include "spartan/slam/internal/surface_grid.h"
+#include "spartan/slam/slam_options.h"
 
 namespace spartan {
 

@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <utility>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/camera/internal/frame_tables.h"
 #include "spartan/camera/internal/recording_index.h"
 #include "spartan/camera/internal/sensor_tables.h"
 #include "spartan/camera/internal/stamp_order.h"
 #include "spartan/core/files.h"
-#include "spartan/calibration_io/calibration_reading.h"
 
 namespace spartan {
 namespace {

@@ -5,10 +5,10 @@
 
 #include <filesystem>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/camera/internal/frame_tables.h"
 #include "spartan/camera/internal/layouts/image_folder.h"
 #include "spartan/camera/internal/recording_index.h"
-#include "spartan/calibration_io/calibration_reading.h"
 
 namespace spartan {
 namespace {

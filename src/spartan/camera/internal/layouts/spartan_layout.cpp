@@ -1,11 +1,11 @@
 // Spartan layout: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/reference/recording.md).
 #include <filesystem>
 
+#include "spartan/calibration_io/calibration_reading.h"
 #include "spartan/camera/internal/frame_tables.h"
+#include "spartan/camera/internal/layouts/spartan_format.h"
 #include "spartan/camera/internal/recording_index.h"
 #include "spartan/camera/internal/sensor_tables.h"
-#include "spartan/camera/internal/layouts/spartan_format.h"
-#include "spartan/calibration_io/calibration_reading.h"
 
 namespace spartan {
 namespace {

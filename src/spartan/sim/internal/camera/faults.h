@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "spartan/sim/scenario_options.h"
 #include "spartan/sim/internal/camera/sensor.h"
+#include "spartan/sim/scenario_options.h"
 
 namespace spartan::sim {
 

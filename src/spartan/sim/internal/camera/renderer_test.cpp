@@ -12,9 +12,9 @@
 
 #include "spartan/core/random.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/sim/internal/world/rock_shape.h"
 #include "spartan/sim/internal/camera/sensor.h"
 #include "spartan/sim/internal/camera/truth.h"
+#include "spartan/sim/internal/world/rock_shape.h"
 
 namespace spartan::sim {
 namespace {

@@ -7,9 +7,9 @@
 #include "spartan/core/pose.h"
 #include "spartan/core/threads.h"
 #include "spartan/sim/drive.h"
-#include "spartan/sim/scenario_options.h"
-#include "spartan/sim/internal/world/terrain_shape.h"
 #include "spartan/sim/internal/drive/wheel_lift.h"
+#include "spartan/sim/internal/world/terrain_shape.h"
+#include "spartan/sim/scenario_options.h"
 
 namespace spartan::sim {
 

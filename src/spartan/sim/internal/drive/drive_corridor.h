@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "spartan/sim/path.h"
 #include "spartan/sim/internal/world/spatial_hash.h"
+#include "spartan/sim/path.h"
 
 namespace spartan::sim {
 

@@ -4,12 +4,12 @@
 #include <vector>
 
 #include "spartan/sim/internal/camera/light.h"
+#include "spartan/sim/internal/drive/wheel_lift.h"
 #include "spartan/sim/internal/world/region.h"
 #include "spartan/sim/internal/world/rock_field.h"
-#include "spartan/sim/scenario.h"
 #include "spartan/sim/internal/world/soil.h"
 #include "spartan/sim/internal/world/terrain_shape.h"
-#include "spartan/sim/internal/drive/wheel_lift.h"
+#include "spartan/sim/scenario.h"
 
 namespace spartan::sim {
 
