@@ -350,7 +350,7 @@ TEST(RecordingWriter, WritesGroundTruthInTheDocumentedFormat) {
   EXPECT_EQ(open_recording(folder.path() + "/rec").value()->info().truth_file, truth + "/poses.tum");
 }
 
-// The example tables of docs/formats.md, written to a folder unchanged.
+// The example tables of docs/reference/recording.md, written to a folder unchanged.
 TEST(SpartanRecording, ReadsTheExamplesOfTheDocumentation) {
   const TemporaryFolder folder;
   for (const char* name : {"recording.yaml", "frames.csv"})

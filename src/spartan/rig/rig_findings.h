@@ -10,7 +10,7 @@
 
 namespace spartan {
 
-/// A suspected error of a calibration. `id` is one of those in docs/formats.md ("rig inspect").
+/// A suspected error of a calibration. `id` is one of those in docs/reference/json.md.
 struct RigFinding {
   std::string id;
   std::string text;  ///< one sentence: what is suspicious, and what to check

@@ -1,5 +1,4 @@
-// Requirements of a rover on its stereo pairs, and the candidates to choose from (docs/formats.md, "Requirements of a
-// rig").
+// Requirements of a rover on its stereo pairs, and the candidates to choose from (docs/reference/requirements.md).
 #pragma once
 
 #include <optional>

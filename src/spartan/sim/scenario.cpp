@@ -46,7 +46,7 @@ Result<Scenario> parse_scenario(const std::string& text, const std::string& name
   auto scenario = parse_options<Scenario>(text, name);
   if (!scenario) {
     scenario.error().hint =
-        "docs/formats.md has an example; truth/scenario.yaml of a simulated recording lists every key";
+        "docs/reference/scenario.md has an example; truth/scenario.yaml of a simulated recording lists every key";
     return scenario;
   }
   KeyErrors errors(text, name);
