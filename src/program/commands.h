@@ -7,6 +7,7 @@
 
 namespace spartan::program {
 
+void add_completion(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 void add_stereo(CLI::App& app, Context& context);
 void add_run(CLI::App& app, Context& context);

@@ -28,7 +28,7 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   if (Status s = print(simulated->text); !s) return failure(s);
 
   if (Status s = say("Processing the recording: " + run_folder); !s) return failure(s);
-  auto options = run_options("", {});
+  auto options = run_options(context, "", {});
   if (!options) return failure(options);
   RunRequest request;
   request.input = recording;

@@ -28,6 +28,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_config(app, context);
   add_export(app, context);
   add_simulate(app, context);
+  add_completion(app, context);
 }
 
 int run(int argc, char** argv) {

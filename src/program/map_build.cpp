@@ -123,8 +123,8 @@ Result<Stop> load_stop(const BuildArguments& a) {
   return stop;
 }
 
-Result<RunOptions> options_of(const BuildArguments& a) {
-  auto options = run_options(a.config, a.set);
+Result<RunOptions> options_of(const Context& context, const BuildArguments& a) {
+  auto options = run_options(context, a.config, a.set);
   if (!options) return failure(options);
   MappingOptions& mapping = options->mapping;
   if (a.extent_m) {
@@ -246,7 +246,7 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   if (Status s = check(a); !s) return failure(s);
   const auto gravity = parse_gravity(a.gravity);
   if (!gravity) return failure(gravity);
-  const auto options = options_of(a);
+  const auto options = options_of(context, a);
   if (!options) return failure(options);
   auto stop = a.recording.empty() ? load_pair(a) : load_stop(a);
   if (!stop) return failure(stop);

@@ -297,7 +297,9 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
       add_command(rig, context, "inspect", "Print a calibration, and check and correct it with images of its pairs",
                   "rig inspect rig.yaml left.png right.png --figure rows.png --apply corrected.yaml",
                   [&context, a] { return inspect(context, *a); });
-  command->add_option("rig", a->rig, "Calibration in any supported format (docs/reference/calibration_files.md), or - for none.")
+  command
+      ->add_option("rig", a->rig,
+                   "Calibration in any supported format (docs/reference/calibration_files.md), or - for none.")
       ->required()
       ->option_text("RIG");
   command->add_option("left", a->left, "Left image, a folder of images, or a quoted pattern (\"left*.jpg\").")

@@ -80,9 +80,10 @@ Status write_report(const RunRequest& request, const std::string& truth) {
 
 Result<ExitCode> run_command(const Context& context, const RunArguments& arguments) {
   RunRequest request;
-  auto options = run_options(arguments.config, arguments.set, &request.given);
-  if (!options) return failure(options);
-  request.options = std::move(*options);
+  auto chosen = choose_options(context, arguments.config, arguments.set);
+  if (!chosen) return failure(chosen);
+  request.options = std::move(chosen->options);
+  request.given = std::move(chosen->given);
   if (arguments.odometry_only) request.options.odometry_only = true;
   if (!arguments.format.empty()) {
     const auto format = parse_recording_format(arguments.format);

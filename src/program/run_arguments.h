@@ -4,14 +4,24 @@
 #include <string>
 #include <vector>
 
+#include "program/context.h"
 #include "spartan/core/result.h"
 #include "spartan/system/run_options.h"
 
 namespace spartan::program {
 
-/// `file` may be empty. The keys that file and assignments name are added to `given`. Codes: `configuration` (the file,
-/// or options that do not fit each other), `usage` (an assignment).
-Result<RunOptions> run_options(const std::string& file, const std::vector<std::string>& assignments,
-                               GivenKeys* given = nullptr);
+struct ChosenOptions {
+  RunOptions options;
+  GivenKeys given;  ///< keys that the file or an assignment names
+};
+
+/// `file` may be empty. Warns of former names of options. Codes: `configuration` (the file, or values that contradict
+/// each other), `usage` (an assignment).
+Result<ChosenOptions> choose_options(const Context& context, const std::string& file,
+                                     const std::vector<std::string>& assignments);
+
+/// The same without the keys.
+Result<RunOptions> run_options(const Context& context, const std::string& file,
+                               const std::vector<std::string>& assignments);
 
 }  // namespace spartan::program

@@ -152,7 +152,7 @@ Result<std::optional<DisparityMetrics>> score(const StereoArguments& a, ImageVie
 }
 
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
-  const auto options = run_options(a.config, a.set);
+  const auto options = run_options(context, a.config, a.set);
   if (!options) return failure(options);
   auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!pair) return failure(pair);

@@ -161,7 +161,7 @@ void Reader::close_list() {
 
 Status Reader::finish() {
   tree_->levels.back().reject_unknown_keys();
-  return tree_->errors.status("`spartan config dump` lists every option with its meaning");
+  return tree_->errors.status("`spartan config dump --all` lists every option with its description");
 }
 
 std::vector<std::string> Reader::warnings() const {
@@ -198,7 +198,7 @@ void Validator::field(std::string_view key, const std::vector<double>& value, st
 Status Validator::finish(std::string_view name) const {
   if (errors_.empty()) return {};
   return failure(ErrorCode::configuration, errors_, std::string(name),
-                 "`spartan config dump` lists every option with its meaning");
+                 "`spartan config dump --all` lists every option with its description");
 }
 
 void Lister::field(std::string_view key, const bool& value, std::string_view meaning) {

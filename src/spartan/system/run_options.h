@@ -1,7 +1,9 @@
-// All options of a run as one tree (`spartan config dump`).
+// All options of a run as one tree (`spartan config dump --all`).
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "spartan/core/options.h"
 #include "spartan/imaging/imager.h"
@@ -83,5 +85,11 @@ struct RunOptions {
     v.group("terrain", terrain);
   }
 };
+
+/// Keys of the options that an operator needs, at most 30; the others are for experts.
+std::span<const std::string_view> basic_options();
+
+/// YAML of the basic options with their descriptions as comments.
+std::string dump_basic_options(const RunOptions& options);
 
 }  // namespace spartan

@@ -1,0 +1,58 @@
+#include "spartan/system/run_options.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+namespace spartan {
+namespace {
+
+// What an operator of a rover sets: geometry of the rover, sensor noise, map size and thresholds, what is computed.
+constexpr std::array<std::string_view, 30> kBasicOptions{
+    "gravity_m_s2",
+    "odometry_pair",
+    "odometry_only",
+    "use_specified_noise",
+    "maps",
+    "terrain.enabled",
+    "terrain.every_m",
+    "imaging.debayer",
+    "imaging.view.policy",
+    "odometry.detection.landmarks",
+    "mapping.map.extent_m",
+    "mapping.map.cell_m",
+    "mapping.map.obstacle_m",
+    "mapping.map.cavity_m",
+    "mapping.map.rover.wheel_radius_m",
+    "mapping.map.rover.clearance_m",
+    "mapping.map.rover.track_m",
+    "mapping.map.rover.max_slope_deg",
+    "mapping.map.rover.max_step_m",
+    "slam.map.memory_mb",
+    "localization.imu.gyro_noise_rad_s_sqrt_hz",
+    "localization.imu.gyro_bias_rad_s",
+    "localization.imu.gyro_walk_rad_s2_sqrt_hz",
+    "localization.imu.accel_noise_m_s2_sqrt_hz",
+    "localization.imu.accel_bias_m_s2",
+    "localization.imu.accel_walk_m_s3_sqrt_hz",
+    "localization.wheels.track_m",
+    "localization.wheels.scale_sigma",
+    "localization.compass.offset_sigma_rad",
+    "localization.inclinometer.bias_rad",
+};
+
+}  // namespace
+
+std::span<const std::string_view> basic_options() {
+  return kBasicOptions;
+}
+
+std::string dump_basic_options(const RunOptions& options) {
+  std::vector<OptionLine> lines = list_options(options);
+  std::erase_if(lines, [](const OptionLine& line) {
+    return std::find(kBasicOptions.begin(), kBasicOptions.end(), line.key) == kBasicOptions.end();
+  });
+  return options_detail::to_yaml(lines);
+}
+
+}  // namespace spartan
