@@ -97,9 +97,8 @@ TEST_F(RigInspectImages, WithoutACalibration) {
   EXPECT_EQ(ids(json::parse(swapped.out)["pairs"].front()), std::vector<std::string>{"swapped_eyes"});
 }
 
-// The right side is printed to be turned 0.5° up and 1° clockwise, with a focal length 1 % too large: the images want
-// it back.
-TEST_F(RigInspectImages, SaysHowTheEyeWantsToBeTurned) {
+// The rig has the right camera rotated by 0.5° up and 1° clockwise, with a focal length 1 % too large.
+TEST_F(RigInspectImages, PrintsTheCorrectionOfTheRightCamera) {
   std::string text = fmt::format(kRig, 0.12);
   text.replace(text.rfind("axes: optical"), 0, "roll_pitch_yaw_deg: [0.5, 0, 1], ");
   text.replace(text.rfind("[260, 260]"), 10, "[262.6, 262.6]");
@@ -129,9 +128,9 @@ TEST_F(RigInspectImages, SaysHowTheEyeWantsToBeTurned) {
   const std::string words = inspect(rig, {image(0), image(1)}).out;
   const std::string figure = "[0-9.]+° ± [0-9.]+° ";
   EXPECT_THAT(words, ContainsRegex("mean row error unrectified 0\\.[01]"));
-  EXPECT_THAT(words, ContainsRegex("turned 0\\.[45]" + figure + "down, "));
+  EXPECT_THAT(words, ContainsRegex("rotation 0\\.[45]" + figure + "down, "));
   EXPECT_THAT(words, ContainsRegex(", [01]\\." + figure +
-                                   "counter-clockwise; its focal length -(0\\.[89]|1\\.[01])[0-9]* % ± 0"));
+                                   "counter-clockwise; focal length -(0\\.[89]|1\\.[01])[0-9]* % ± 0"));
   for (const std::string& id : ids(pair)) EXPECT_THAT(words, HasSubstr("pair stereo: finding " + id + ": "));
 }
 

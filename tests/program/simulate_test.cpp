@@ -189,8 +189,8 @@ TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
   expect_refused("soil: {contrast: -0.1}", "soil.contrast");
   expect_refused("imu: {gyro_bias_rad_s: -1}", "imu.gyro_bias_rad_s");
   expect_refused("sensor_faults: [{sensor: sonar, from_s: 1, to_s: 2}]", "'sonar'");
-  expect_refused("sensor_faults: [{sensor: imu, from_s: 2, to_s: 1}]", "ends at 1 s");
-  expect_refused("camera_faults: [{pair: rear, from_s: 1, to_s: 2}]", "no pair 'rear'");
+  expect_refused("sensor_faults: [{sensor: imu, from_s: 2, to_s: 1}]", "to_s (1) must be greater than from_s (2)");
+  expect_refused("camera_faults: [{pair: rear, from_s: 1, to_s: 2}]", "has no pair named 'rear'");
   expect_refused("light: {sun_lux: 0, sky_lux: 0}", "both 0");
   expect_refused("light: {sun_lux: -5}", "light.sun_lux");
   expect_refused("colour: red", "unknown key");
@@ -207,7 +207,7 @@ TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, HasSubstr("small.yaml:3: path:"));
   EXPECT_THAT(result.err, HasSubstr("leaves the terrain"));
-  write("small.yaml", "schema: 1\nrig: small_rig.yaml\nshots:\n  stops_m: [99]\n");
+  write("small.yaml", "schema: 1\nrig: small_rig.yaml\ncapture:\n  stops_m: [99]\n");
   result = simulate("bad");
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, HasSubstr("small.yaml:4: capture.stops_m"));
@@ -235,7 +235,7 @@ TEST_F(Simulate, LeavesExistingFoldersAlone) {
 }
 
 TEST_F(Simulate, RecordsTheRigAsItIsBelieved) {
-  write("small.yaml", std::string(kSmallScenario) + "believed: {yaw_deg: 0.02, rows_px: 0.3, focal_percent: 0.1}\n");
+  write("small.yaml", std::string(kSmallScenario) + "nominal_rig: {yaw_deg: 0.02, row_offset_px: 0.3, focal_percent: 0.1}\n");
   ASSERT_EQ(simulate("rec").exit_code, 0);
   auto files = content_of(path("rec"));
   EXPECT_NE(files["rig.yaml"], files["truth/rig.yaml"]);

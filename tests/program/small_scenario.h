@@ -23,7 +23,7 @@ name: small
 samples: 1
 rig: small_rig.yaml
 path: {length_m: 0.3}
-shots: {stops_m: [0]}
+capture: {stops_m: [0]}
 rocks: {share: 0.03}
 truth: {cell_m: 0.1}
 )";
