@@ -131,7 +131,7 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
   auto start = Clock::now();
   Outcome o;
   const LocalMap local = MapGenerator({}, kWorkers).generate(setting.stop->points.points, prior.pose);
-  o.match = match_map(setting.stop->points.points, local, view, prior, MapOptions().fewest_points, g_options, kWorkers);
+  o.match = match_map(setting.stop->points.points, local, view, prior, MapOptions().min_points, g_options, kWorkers);
   accumulate_time(start, o.seconds);
   const Pose error = truth.inverse() * o.match.world_from_body;
   o.error_m = error.translation().norm();
