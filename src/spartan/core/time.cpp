@@ -1,5 +1,7 @@
 #include "spartan/core/time.h"
 
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cmath>
 
@@ -9,7 +11,7 @@ namespace {
 constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 
 tl::unexpected<Error> not_a_time(std::string_view text) {
-  return failure(ErrorCode::input, "'" + std::string(text) + "' is not a time in seconds");
+  return failure(ErrorCode::input, fmt::format("'{}' is not a time in seconds", text));
 }
 
 }  // namespace
@@ -23,9 +25,7 @@ std::string to_decimal_seconds(Stamp stamp) {
   const std::uint64_t magnitude =
       negative ? 0 - static_cast<std::uint64_t>(stamp.ns) : static_cast<std::uint64_t>(stamp.ns);
   const std::uint64_t whole = magnitude / kNanosecondsPerSecond;
-  std::string fraction = std::to_string(magnitude % kNanosecondsPerSecond);
-  fraction.insert(0, 9 - fraction.size(), '0');
-  return (negative ? "-" : "") + std::to_string(whole) + "." + fraction;
+  return fmt::format("{}{}.{:09}", negative ? "-" : "", whole, magnitude % kNanosecondsPerSecond);
 }
 
 Result<Stamp> parse_decimal_seconds(std::string_view text) {
