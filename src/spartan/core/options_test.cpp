@@ -307,11 +307,15 @@ TEST(EnumOptions, AreReadAndListedByName) {
   EXPECT_EQ(parse_filter("filter: bilateral")->filter, Filter::bilateral);
   EXPECT_EQ(parse_filter("radius_px: 2")->filter, Filter::median) << "not named: the default stays";
   EXPECT_EQ(set_option(FilterOptions{}, "filter=none")->filter, Filter::none);
-  const auto lines = list_options(FilterOptions{Filter::bilateral});
+  FilterOptions options;
+  options.filter = Filter::bilateral;
+  const auto lines = list_options(options);
   EXPECT_EQ(lines[0].value, "\"bilateral\"");
   EXPECT_EQ(lines[0].meaning, "how disparities are filtered (none | median | bilateral)");
-  for (const Filter filter : {Filter::none, Filter::median, Filter::bilateral})
-    EXPECT_EQ(parse_filter(dump_options(FilterOptions{filter}))->filter, filter);
+  for (const Filter filter : {Filter::none, Filter::median, Filter::bilateral}) {
+    options.filter = filter;
+    EXPECT_EQ(parse_filter(dump_options(options))->filter, filter);
+  }
 }
 
 TEST(EnumOptions, OtherNamesAreRefused) {

@@ -58,7 +58,8 @@ Result<Rig> read_euroc_calib(const std::string& mav0_folder) {
     if (camera) {
       rig.cameras.push_back(std::move(*camera));
     } else {
-      errors.what += (errors.what.empty() ? "" : "\n") + camera.error().message();
+      if (!errors.what.empty()) errors.what += '\n';
+      errors.what += camera.error().message();
     }
   }
   if (!errors.what.empty()) return tl::unexpected<Error>(errors);

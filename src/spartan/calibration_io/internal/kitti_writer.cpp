@@ -80,7 +80,9 @@ Result<CalibrationFiles> write_kitti_raw_calib(const Rig& rig, const std::string
   };
   add_camera("00", *pair->cameras.left, pair->left, 0);
   add_camera("01", *pair->cameras.right, pair->right, pair->baseline_m);
-  CalibrationFiles files{{path, text}};
+  CalibrationFiles files;
+  files.reserve(3);
+  files.push_back({path, text});
   if (body_is_left_camera(rig, *pair->cameras.pair)) return files;
   // The files need a laser scanner between camera and IMU: it is placed at the left camera, with x forward, y left, z
   // up.
