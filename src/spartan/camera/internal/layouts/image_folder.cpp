@@ -77,7 +77,7 @@ NumberedImages number_images(const std::string& left_folder, const std::string& 
   const Stems left = list_images(left_folder), right = list_images(right_folder);
   auto numbers = numbers_of(left, right, announced.value_or(0));
   if (!numbers) {
-    images.remarks.push_back("the image names are not frame numbers; images are used in the order of their names");
+    images.remarks.emplace_back("the image names are not frame numbers; images are used in the order of their names");
     numbers = ranks_of(left, right);
   }
   std::int64_t low = std::numeric_limits<std::int64_t>::max(), high = -1;
