@@ -284,7 +284,7 @@ GivenKeys GivenKeys::in_group(std::string_view group) const {
 }
 
 std::string option_location(const std::string& text, const std::string& name, const std::string& key) {
-  const std::string without_line = fmt::format("{}: {}", name, key);
+  std::string without_line = fmt::format("{}: {}", name, key);
   const auto root = parse_yaml(text, name);
   if (!root) return without_line;
   YamlNode node = *root;

@@ -122,9 +122,10 @@ Bytes Localizer::save() const {
 Status Localizer::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
   const std::string what = "memory of the localization";
-  if (in.get<std::uint32_t>() != kStateVersion)
+  if (in.get<std::uint32_t>() != kStateVersion) {
     return failure(ErrorCode::configuration, "was saved by another version of the program", what,
                    "run again from the start");
+  }
   auto state = std::make_unique<State>(state_->options);
   for (RefusalCounts& r : state->refusals) {
     r.not_finite = in.get<std::int64_t>();

@@ -133,9 +133,10 @@ std::string describe_baseline(double baseline_m) {
         baseline_m, cm, mm);
   }
   const std::string likely = describe_length(unit->metres * baseline_m);
-  if (baseline_m < 1)
+  if (baseline_m < 1) {
     return fmt::format("a baseline of {:.4g} m was probably divided by 1000 twice: it would then be {}", baseline_m,
                        likely);
+  }
   const bool in_mm = unit->metres < 0.01;
   return fmt::format("a baseline of {:.4g} m is probably given in {}: it would then be {} (in {} {})", baseline_m,
                      unit->name, likely, in_mm ? "centimetres" : "millimetres", in_mm ? cm : mm);

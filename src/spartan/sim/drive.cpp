@@ -85,9 +85,10 @@ class Drive::Planner {
     for (const double pan_deg : options_.pans_deg) {
       add(Motion::stationary(here_, options_.pan_period_s));
       for (const StereoPair& pair : rig_.pairs) {
-        if (!pair.for_odometry)
+        if (!pair.for_odometry) {
           drive_.frames_.push_back(
               {drive_.seconds_, pair.name, position_id_, pan_deg * kRadiansPerDegree, tilt_of(pair)});
+        }
       }
     }
     add(Motion::stationary(here_, kSettle_s));

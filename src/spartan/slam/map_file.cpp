@@ -61,9 +61,10 @@ Result<MapFile> MapFile::open(const std::string& path, const GlobalMapOptions& o
   if (*id != kApplicationId) return failure(ErrorCode::input, "is not a map file of this program", path);
   const auto version = pragma(*db, "user_version");
   if (!version) return failure(version);
-  if (mode == Database::Mode::read_only && *version < steps().back().to)
+  if (mode == Database::Mode::read_only && *version < steps().back().to) {
     return failure(ErrorCode::configuration, fmt::format("has version {}", *version), path,
                    "open it once for writing to migrate it");
+  }
   if (Status s = migrate(*db, steps()); !s) return failure(s);
   auto store = TileStore::open_existing(*db);
   if (!store) return failure(store);

@@ -129,9 +129,10 @@ Status MapMerger::restore(const Bytes& bytes, TileStore& store) {
   if (Status s = in.finish("map memory"); !s) return s;
   auto map = GlobalMap::from_store(options_.map, map_options_.cell_m, store);
   if (!map) return failure(map);
-  if (map->submaps().size() != submaps || map->stops().size() != stops || map->tiles() != tiles)
+  if (map->submaps().size() != submaps || map->stops().size() != stops || map->tiles() != tiles) {
     return failure(ErrorCode::store_damaged, "does not fit the map tables of the store", "map memory",
                    "restart the run from its beginning");
+  }
   map_ = std::move(*map);
   return {};
 }

@@ -343,9 +343,10 @@ std::vector<FrameKey> Pipeline::pending_frames() const {
 Status Pipeline::restore_frame(const StereoFrame& frame) {
   State& s = *state_;
   const StereoPair* const pair = s.rig.find_pair(frame.pair);
-  if (pair == nullptr)
+  if (pair == nullptr) {
     return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair),
                    fmt::format("frame {}", frame.frame_id));
+  }
   const auto rectified = s.imager.process(frame);
   if (!rectified) return failure(rectified);
   if (pair->name != s.pair.name)

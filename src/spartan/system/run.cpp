@@ -357,9 +357,10 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
   RunOptions options = request.options;
   if (options.gravity_m_s2 == 0) options.gravity_m_s2 = info.gravity_m_s2.value_or(0);
-  if (options.use_specified_noise)
+  if (options.use_specified_noise) {
     options.localization =
         with_specified_noise(options.localization, info.noise, request.given.in_group("localization"));
+  }
   auto pipeline = Pipeline::create(info.rig, options, ThreadPool(request.threads), mask_folder);
   if (!pipeline) return failure(pipeline);
   const auto prepared = prepare_run_folder(folder, request.resume);

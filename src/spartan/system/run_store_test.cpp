@@ -173,9 +173,10 @@ void fill(const std::string& path, int doublings) {
   {
     auto store = RunStore::create(path, kIdentity);
     ASSERT_TRUE(store) << store.error().message();
-    for (int i = 0; i < 5; ++i)
+    for (int i = 0; i < 5; ++i) {
       ASSERT_TRUE(store->commit(
           {some_frame(i), {}, {}, {}}, [] { return Bytes{1}; }, i));
+    }
   }
   auto db = Database::open(path, Database::Mode::open);
   ASSERT_TRUE(db);

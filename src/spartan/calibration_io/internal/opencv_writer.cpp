@@ -23,10 +23,11 @@ Result<Lens> lens_of(const Camera& camera, bool fisheye) {
     const auto& k = m->coefficients();
     return Lens{m->pinhole(), {k.begin(), k.begin() + (is_rational(*m) ? 8 : 5)}};
   }
-  if (fisheye)
+  if (fisheye) {
     return cannot_hold(
         camera, fmt::format("the other camera is a fisheye, this one is {}; OpenCV files have one model for both",
                             name_of(camera.model)));
+  }
   return cannot_hold(camera, fmt::format("OpenCV files do not support the model {}", name_of(camera.model)));
 }
 

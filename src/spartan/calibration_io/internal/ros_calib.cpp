@@ -113,9 +113,10 @@ void read_rectification(YamlMap& root, CameraInfo& info) {
   }
   if (const auto p = numbers(root, p_key, {12})) {
     if (!((*p)[0] > 0 && (*p)[5] > 0)) return root.add_error(p_key, "the focal lengths must be above zero");
-    if ((*p)[11] != 0)
+    if ((*p)[11] != 0) {
       return root.add_error(p_key,
                             "its last number must be 0: the cameras must be side by side or one above the other");
+    }
     info.position_m = {-(*p)[3] / (*p)[0], -(*p)[7] / (*p)[5], 0};
     info.rectified = {(*p)[0], (*p)[5], (*p)[2], (*p)[6]};
   }

@@ -159,9 +159,10 @@ std::vector<ScanMatchPeak> correlative_scan_match(const SurfaceGrid& local, cons
         for (int i = 0; i < x_count; ++i) {
           const double dx = (i - nx) * options.step_m, dy = (j - ny) * options.step_m;
           pairs_here.clear();
-          for (const LocalCell& cell : cells)
+          for (const LocalCell& cell : cells) {
             ground.add_pair(cell, cosine * cell.x - sine * cell.y + dx, sine * cell.x + cosine * cell.y + dy,
                             pairs_here);
+          }
           if (pairs_here.size() < kFewestCells) continue;
           Trial& trial = at(a, j, i);
           trial.plane = fit_plane(pairs_here, start, 4 * options.elevation_scale_m);
