@@ -193,7 +193,7 @@ class Lister {
   template <class Group>
   void group(std::string_view key, Group& value) {
     const std::size_t length = prefix_.size();
-    prefix_ += std::string(key) + ".";
+    prefix_.append(key).append(".");
     value.describe(*this);
     prefix_.resize(length);
   }
@@ -237,7 +237,7 @@ class Validator {
   template <class Group>
   void group(std::string_view key, Group& value) {
     const std::size_t length = prefix_.size();
-    prefix_ += std::string(key) + ".";
+    prefix_.append(key).append(".");
     value.describe(*this);
     prefix_.resize(length);
   }
