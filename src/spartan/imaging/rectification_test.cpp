@@ -13,7 +13,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-Camera camera_with(CameraModel model) {
+Camera camera_with(const CameraModel& model) {
   Camera camera;
   camera.name = "camera";
   camera.size = {640, 480};

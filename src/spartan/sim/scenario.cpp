@@ -20,7 +20,10 @@ class KeyErrors {
  public:
   KeyErrors(const std::string& text, const std::string& name) : text_(text), name_(name) {}
   void add(const std::string& key, const std::string& what) {
-    lines_ += (lines_.empty() ? "" : "\n") + option_location(text_, name_, key) + ": " + what;
+    if (!lines_.empty()) lines_ += '\n';
+    lines_ += option_location(text_, name_, key);
+    lines_ += ": ";
+    lines_ += what;
   }
   Status status() const { return lines_.empty() ? Status{} : Status(failure(ErrorCode::configuration, lines_)); }
 
