@@ -100,18 +100,18 @@ double Sensor::levels_per_electron(const Exposure& exposure) const {
   return exposure.gain * full * (1 - options_.black_level) / options_.full_well_e;
 }
 
-Image<float> Sensor::electrons(const LuminanceImage& luminance, const Exposure& exposure, const ImageFault& fault) const {
+Image<float> Sensor::electrons(const LuminanceImage& image, const Exposure& exposure, const ImageFault& fault) const {
   const auto per_luminance = static_cast<float>(electrons_per_second(options_) * exposure.seconds * fault.light_factor);
-  const bool colour = camera_.pixel_format.is_bayer() && luminance.split;
+  const bool colour = camera_.pixel_format.is_bayer() && image.split;
   const Dust dust(fault.dust_seed, camera_.size);
   Image<float> result(camera_.size.width, camera_.size.height);
   for (int y = 0; y < result.height(); ++y) {
     for (int x = 0; x < result.width(); ++x) {
-      float luminance = luminance.total(x, y);
+      float luminance = image.total(x, y);
       if (colour) {
         const auto c = static_cast<std::size_t>(channel_of(camera_.pixel_format.layout, x, y));
         luminance = 0;
-        for (std::size_t m = 0; m < kMaterials; ++m) luminance += luminance.by_material[m](x, y) * kTints[m].rgb[c];
+        for (std::size_t m = 0; m < kMaterials; ++m) luminance += image.by_material[m](x, y) * kTints[m].rgb[c];
       }
       result(x, y) = luminance * per_luminance * vignetting_(x, y);
       if (fault.dust) result(x, y) *= dust.transmission(x, y);

@@ -49,7 +49,7 @@ class Sensor {
   double levels_per_electron(const Exposure& exposure) const;
 
  private:
-  Image<float> electrons(const LuminanceImage& luminance, const Exposure& exposure, const ImageFault& fault) const;
+  Image<float> electrons(const LuminanceImage& image, const Exposure& exposure, const ImageFault& fault) const;
 
   SensorOptions options_;
   Camera camera_;
