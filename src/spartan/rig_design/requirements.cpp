@@ -75,7 +75,7 @@ std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, con
 }
 
 std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, const YamlNode& node) {
-  if (node.items().size() == 0 || node.items().size() > kMaxListLength) {
+  if (node.items().empty() || node.items().size() > kMaxListLength) {
     map.add_error(key, fmt::format("has {} entries, must have 1 to {}", node.items().size(), kMaxListLength));
     return std::nullopt;
   }
@@ -164,7 +164,7 @@ std::vector<DesignCriterion> read_order(YamlMap& map) {
   std::vector<DesignCriterion> order;
   const auto node = map.node("order");
   if (!node) return order;
-  if (!node->is_list() || node->items().size() == 0) {
+  if (!node->is_list() || node->items().empty()) {
     map.add_error("order", "must be a list of: range_margin, pan_overlap, shorter_baseline");
     return order;
   }
