@@ -375,17 +375,20 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
     Status read = times->of(seq, [&](const SqlStatement& time) {
       r.times.push_back({time.text(1), time.real(2), time.real(3)});
     });
-    if (read)
+    if (read) {
       read = slam->of(seq, [&](const SqlStatement& corrected) {
         const Bytes pose = corrected.blob(1), covariance = corrected.blob(2);
         r.slam = UncertainPose{ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()};
       });
-    if (read)
+    }
+    if (read) {
       read = localization->of(seq, [&](const SqlStatement& localized) { r.localization = localization_of(localized); });
-    if (read)
+    }
+    if (read) {
       read = health->of(seq, [&](const SqlStatement& sensor) {
         if (r.localization) r.localization->sensors.push_back({sensor.text(1), sensor.text(2), sensor.text(3)});
       });
+    }
     if (!read) return failure(read);
   }
 }

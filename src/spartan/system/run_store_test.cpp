@@ -1,5 +1,6 @@
 #include "spartan/system/run_store.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 #include <sys/wait.h>
@@ -184,8 +185,9 @@ void fill(const std::string& path, int doublings) {
   for (int i = 0; i < doublings; ++i) {
     for (const std::string table : {"frames", "stage_times", "localization", "slam", "health"}) {
       const Status doubled = db->execute(
-          "CREATE TEMP TABLE more AS SELECT * FROM " + table + " ORDER BY rowid; UPDATE more SET seq = seq + " +
-          std::to_string(5 << i) + "; INSERT INTO " + table + " SELECT * FROM more ORDER BY rowid; DROP TABLE more");
+          fmt::format("CREATE TEMP TABLE more AS SELECT * FROM {0} ORDER BY rowid; UPDATE more SET seq = seq + {1}; "
+                      "INSERT INTO {0} SELECT * FROM more ORDER BY rowid; DROP TABLE more",
+                      table, 5 << i));
       ASSERT_TRUE(doubled) << doubled.error().message();
     }
   }
