@@ -28,7 +28,7 @@ class AlignmentTemplate {
  public:
   explicit AlignmentTemplate(const ImagePatch& patch);
   /// Around a sub-pixel position of a smoothed image; std::nullopt where the window leaves the image.
-  static std::optional<AlignmentTemplate> around(ImageView<const std::uint16_t> image, const Eigen::Vector2d& centre);
+  static std::optional<AlignmentTemplate> around(ImageView<const std::uint16_t> image, const Eigen::Vector2d& center);
 
   /// Gray levels without their weighted mean; `deviation` is the weighted standard deviation.
   std::array<float, kWindowArea> value, gradient_x, gradient_y;
@@ -40,7 +40,7 @@ class AlignmentTemplate {
 
 /// Result of an alignment.
 struct PatchAlignment {
-  Eigen::Vector2d position;    ///< of the template's centre, pixels
+  Eigen::Vector2d position;    ///< of the template's center, pixels
   Eigen::Matrix2d covariance;  ///< from the residual and the gradients, pixels²
   double correlation = 0;      ///< normalized cross-correlation at the result
 };
