@@ -129,8 +129,8 @@ TEST_F(RigInspectImages, PrintsTheCorrectionOfTheRightCamera) {
   const std::string figure = "[0-9.]+° ± [0-9.]+° ";
   EXPECT_THAT(words, ContainsRegex("mean row error unrectified 0\\.[01]"));
   EXPECT_THAT(words, ContainsRegex("rotation 0\\.[45]" + figure + "down, "));
-  EXPECT_THAT(words, ContainsRegex(", [01]\\." + figure +
-                                   "counter-clockwise; focal length -(0\\.[89]|1\\.[01])[0-9]* % ± 0"));
+  EXPECT_THAT(words,
+              ContainsRegex(", [01]\\." + figure + "counter-clockwise; focal length -(0\\.[89]|1\\.[01])[0-9]* % ± 0"));
   for (const std::string& id : ids(pair)) EXPECT_THAT(words, HasSubstr("pair stereo: finding " + id + ": "));
 }
 

@@ -235,7 +235,8 @@ TEST_F(Simulate, LeavesExistingFoldersAlone) {
 }
 
 TEST_F(Simulate, RecordsTheRigAsItIsBelieved) {
-  write("small.yaml", std::string(kSmallScenario) + "nominal_rig: {yaw_deg: 0.02, row_offset_px: 0.3, focal_percent: 0.1}\n");
+  write("small.yaml",
+        std::string(kSmallScenario) + "nominal_rig: {yaw_deg: 0.02, row_offset_px: 0.3, focal_percent: 0.1}\n");
   ASSERT_EQ(simulate("rec").exit_code, 0);
   auto files = content_of(path("rec"));
   EXPECT_NE(files["rig.yaml"], files["truth/rig.yaml"]);

@@ -28,7 +28,8 @@ struct EurocImages {
 /// EuRoC, data.csv: a time in nanoseconds and a file name per row.
 Result<EurocImages> read_euroc_images(TableReader table);
 
-/// Spartan, frames.csv (docs/reference/recording.md). `folder` is prepended to the image paths; an empty field stays empty.
+/// Spartan, frames.csv (docs/reference/recording.md). `folder` is prepended to the image paths; an empty field stays
+/// empty.
 Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std::string& folder, const Rig& rig);
 /// Table format of frames.csv.
 TableFormat spartan_frames_format();

@@ -40,8 +40,8 @@ class GrayHistogram {
 
 /// Ratio of left to right brightness: the median of left level / right level over the percentiles 10, 15 … 90. Both
 /// cameras see the same ground except for strips at the sides, so their histograms differ mostly by exposure and gain;
-/// the strips cause an error of some percent (docs/benchmarks/imaging.md). 1 where fewer than five percentiles are usable (too
-/// dark or saturated). Both histograms must have the same depth.
+/// the strips cause an error of some percent (docs/benchmarks/imaging.md). 1 where fewer than five percentiles are
+/// usable (too dark or saturated). Both histograms must have the same depth.
 double brightness_ratio(const GrayHistogram& left, const GrayHistogram& right);
 
 /// Gain for the gray levels of the right image that matches the brightness of the left image. With the brightness ratio
