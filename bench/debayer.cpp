@@ -22,17 +22,17 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/opencv_bridge.h"
-#include "spartan/core/simd_target.h"
+#include "spartan/image_io/opencv_bridge.h"
+#include "spartan/numerics/simd_target.h"
 #include "timing.h"
 
 namespace {
 
-using spartan::Debayerer;
 using spartan::DebayerMethod;
 using spartan::Image;
 using spartan::PixelLayout;
 using spartan::Rgb8;
+using spartan::internal::Debayerer;
 namespace fs = std::filesystem;
 
 constexpr int kBorder = 8;  // pixels ignored at every side, for all methods

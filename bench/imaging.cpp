@@ -20,18 +20,19 @@
 #include <vector>
 
 #include "spartan/camera/frame_source.h"
-#include "spartan/core/image_io.h"
-#include "spartan/core/opencv_bridge.h"
-#include "spartan/core/random.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/imaging/internal/contrast.h"
 #include "spartan/imaging/internal/debayer.h"
+#include "spartan/numerics/random.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/reconstruction/disparity_options.h"
 #include "stereo_pairs.h"
 #include "timing.h"
 
 namespace spartan {
+
+using namespace internal;
 namespace {
 
 struct Variant {

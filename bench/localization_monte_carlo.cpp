@@ -145,7 +145,9 @@ std::vector<Arrival> without_vision(const TrueDrive& drive, std::uint64_t seed, 
                                     double to_s) {
   DrawnDrive d = draw(drive, {}, drive.scenario.compass, seed);
   for (RelativeMotion& m : d.motions) {
-    const auto dark = [&](Stamp s) { return s >= sim::stamp_at(from_s) && s < sim::stamp_at(to_s); };
+    const auto dark = [&](Stamp s) {
+      return s >= sim::internal::stamp_at(from_s) && s < sim::internal::stamp_at(to_s);
+    };
     m.measured = !dark(m.from) && !dark(m.to);
   }
   return arrivals(d, subset);
@@ -159,7 +161,7 @@ std::vector<Arrival> slipping(const TrueDrive& drive, std::uint64_t seed, const 
   WheelSample last = d.wheels.front();
   for (WheelSample& w : d.wheels) {
     const WheelSample now = w;
-    const double factor = w.stamp >= sim::stamp_at(from_s) && w.stamp < sim::stamp_at(to_s) ? 5 : 1;
+    const double factor = w.stamp >= sim::internal::stamp_at(from_s) && w.stamp < sim::internal::stamp_at(to_s) ? 5 : 1;
     left += factor * (now.left_m - last.left_m);
     right += factor * (now.right_m - last.right_m);
     w.left_m = left;
@@ -192,7 +194,7 @@ std::vector<Arrival> with_reordered_stamps(const TrueDrive& drive, std::uint64_t
   Random random(seed, 402);
   for (std::size_t i = 0; i < all.size(); ++i) {
     Arrival& a = all[i];
-    if (a.at_ns < sim::stamp_at(from_s).ns || a.at_ns >= sim::stamp_at(to_s).ns) continue;
+    if (a.at_ns < sim::internal::stamp_at(from_s).ns || a.at_ns >= sim::internal::stamp_at(to_s).ns) continue;
     if (std::holds_alternative<RelativeMotion>(a.measurement)) continue;
     if (random.uniform() < 0.02) {
       std::visit(

@@ -51,7 +51,7 @@ std::optional<RecordedDrive> open_recorded(const std::string& recording, const s
     const auto truth = std::min_element(poses->poses.begin(), poses->poses.end(), [&](const auto& a, const auto& b) {
       return std::abs(a.stamp.ns - frame.stamp.ns) < std::abs(b.stamp.ns - frame.stamp.ns);
     });
-    drive.truth.frames_s.push_back(seconds_between(sim::stamp_at(0), frame.stamp));
+    drive.truth.frames_s.push_back(seconds_between(sim::internal::stamp_at(0), frame.stamp));
     drive.truth.poses.push_back(truth->pose);
     if (frame.motion.first) continue;
     const Matrix6d ad = adjoint(body_from_left);

@@ -12,12 +12,11 @@
 #include <string>
 #include <vector>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
-#include "spartan/core/random.h"
 #include "spartan/core/threads.h"
 #include "spartan/localization/localizer.h"
-#include "spartan/localization/measurement.h"
+#include "spartan/numerics/random.h"
 #include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/internal/world/world.h"
 #include "spartan/sim/scenario.h"
@@ -41,8 +40,8 @@ struct Subset {
 /// The true motion of a scenario and the times of its odometry frames.
 struct TrueDrive {
   sim::Scenario scenario;
-  std::unique_ptr<sim::World> world;  // borrowed during construction of the motion
-  std::unique_ptr<sim::BodyMotion> motion;
+  std::unique_ptr<sim::internal::World> world;  // borrowed during construction of the motion
+  std::unique_ptr<sim::internal::BodyMotion> motion;
   std::vector<double> frames_s;
   std::vector<Pose> poses;  ///< at the frames
   double length_m = 0;      ///< of the polyline through the poses
@@ -60,9 +59,9 @@ inline std::optional<TrueDrive> open_true_drive(const std::string& folder, const
   if (!plan) return std::nullopt;
   TrueDrive drive;
   drive.scenario = *scenario;
-  drive.world = std::make_unique<sim::World>(sim::make_world(*scenario, *plan));
-  drive.motion = std::make_unique<sim::BodyMotion>(*plan, sim::WheelGround{drive.world->shape, drive.world->wheel_lift},
-                                                   scenario->chassis, ThreadPool(2));
+  drive.world = std::make_unique<sim::internal::World>(sim::internal::make_world(*scenario, *plan));
+  drive.motion = std::make_unique<sim::internal::BodyMotion>(
+      *plan, sim::internal::WheelGround{drive.world->shape, drive.world->wheel_lift}, scenario->chassis, ThreadPool(2));
   for (const sim::PlannedFrame& frame : plan->frames()) {
     const auto pair =
         std::find_if(rig->pairs.begin(), rig->pairs.end(), [&](const auto& p) { return p.name == frame.pair; });
@@ -118,7 +117,7 @@ struct MeasuredOdometryError {
     for (std::size_t i = 1; i < drive.poses.size(); ++i) {
       markov_part = keep * markov_part + std::sqrt(1 - keep * keep) * correlated_sigma.cwiseProduct(normal6());
       const Vector6d error = std::sqrt(white) * (root * normal6()) + sigma.cwiseProduct(constant_part + markov_part);
-      motions.push_back({sim::stamp_at(drive.frames_s[i - 1]), sim::stamp_at(drive.frames_s[i]),
+      motions.push_back({sim::internal::stamp_at(drive.frames_s[i - 1]), sim::internal::stamp_at(drive.frames_s[i]),
                          drive.poses[i - 1].inverse() * drive.poses[i] * exp_se3(-error), covariance, true});
     }
     return motions;
@@ -129,10 +128,10 @@ inline DrawnDrive draw(const TrueDrive& drive, const sim::SensorFaults& faults, 
                        std::uint64_t seed) {
   const sim::Scenario& s = drive.scenario;
   DrawnDrive d;
-  d.imu = sim::measure_imu(*drive.motion, s.imu, s.gravity_m_s2, faults, seed);
-  d.wheels = sim::measure_wheels(*drive.motion, s.chassis, s.wheels, faults, seed);
-  d.compass = sim::measure_compass(*drive.motion, compass, faults, seed);
-  d.inclinometer = sim::measure_inclinometer(*drive.motion, s.inclinometer, faults, seed);
+  d.imu = sim::internal::measure_imu(*drive.motion, s.imu, s.gravity_m_s2, faults, seed);
+  d.wheels = sim::internal::measure_wheels(*drive.motion, s.chassis, s.wheels, faults, seed);
+  d.compass = sim::internal::measure_compass(*drive.motion, compass, faults, seed);
+  d.inclinometer = sim::internal::measure_inclinometer(*drive.motion, s.inclinometer, faults, seed);
   d.motions = MeasuredOdometryError().draw(drive, seed);
   return d;
 }
@@ -176,14 +175,14 @@ inline LocalizationOptions options_for(const TrueDrive& drive) {
   // A recording specifies it.
   options.gravity_m_s2 = drive.scenario.gravity_m_s2;
   const sim::Scenario& s = drive.scenario;
-  return with_specified_noise(options, sim::specified_noise(s.imu, s.compass, s.inclinometer));
+  return with_specified_noise(options, sim::internal::specified_noise(s.imu, s.compass, s.inclinometer));
 }
 
 inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {
   Localizer localizer(options_for(drive));
   TrialResult result;
   Pose first;  // of the localization, relative to which errors are measured
-  const std::int64_t start_ns = sim::stamp_at(drive.frames_s.front()).ns;
+  const std::int64_t start_ns = sim::internal::stamp_at(drive.frames_s.front()).ns;
   std::size_t frame = 0;
   double squares = 0;
   for (const Arrival& arrival : all) {

@@ -18,15 +18,16 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/slam/global_map.h"
 #include "spartan/slam/internal/map_refinement.h"
-#include "spartan/slam/map_matcher.h"
 #include "spartan/slam/map_merger.h"
 #include "standard_recordings.h"
 #include "stop_points.h"
 
 namespace spartan {
+
+using namespace internal;
 namespace {
 
 using Clock = std::chrono::steady_clock;

@@ -18,14 +18,16 @@
 #include <vector>
 
 #include "mars_stops.h"
-#include "spartan/core/geotiff.h"
-#include "spartan/core/process.h"
-#include "spartan/eval/disparity_truth.h"
+#include "spartan/core/image.h"
+#include "spartan/core/stage_clock.h"
+#include "spartan/eval/disparity_metrics.h"
 #include "spartan/eval/internal/map_metrics.h"
 #include "spartan/reconstruction/stop_mapper.h"
 #include "standard_recordings.h"
 
 namespace spartan {
+
+using namespace internal;
 namespace {
 
 // What the cameras can see of the cells of a map.

@@ -15,11 +15,10 @@
 #include <vector>
 
 #include "spartan/camera/frame_source.h"
-#include "spartan/core/opencv_bridge.h"
-#include "spartan/eval/disparity_truth.h"
+#include "spartan/eval/disparity_metrics.h"
+#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/reconstruction/disparity_options.h"
 #include "standard_recordings.h"
 
 namespace spartan {

@@ -12,10 +12,10 @@
 
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
-#include "spartan/core/geotiff.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/stop_mapper.h"
+#include "spartan/storage/geotiff.h"
 
 namespace spartan {
 

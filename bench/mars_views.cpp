@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "mars_stops.h"
-#include "spartan/core/median.h"
-#include "spartan/eval/disparity_truth.h"
+#include "spartan/eval/disparity_metrics.h"
+#include "spartan/numerics/median.h"
 #include "standard_recordings.h"
 
 namespace spartan {

@@ -9,6 +9,8 @@
 #include "spartan/sim/internal/camera/renderer.h"
 
 namespace spartan::sim {
+
+using namespace internal;
 namespace {
 
 // A view of the wide camera: 0.9 to 4 m ahead, over ground with 7 % of rocks.

@@ -17,11 +17,11 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/opencv_bridge.h"
-#include "spartan/core/random.h"
-#include "spartan/core/rotation.h"
-#include "spartan/core/simd_target.h"
+#include "spartan/core/pose.h"
+#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/internal/remap.h"
+#include "spartan/numerics/random.h"
+#include "spartan/numerics/simd_target.h"
 #include "timing.h"
 
 namespace {
@@ -97,8 +97,8 @@ struct Accuracy {
 
 // Over the pixels inside the mask of the table, in gray levels.
 template <class Sample>
-Accuracy accuracy(const Scene& scene, const Maps& maps, const spartan::RemapTable& table, const cv::Mat& source,
-                  const cv::Mat& result) {
+Accuracy accuracy(const Scene& scene, const Maps& maps, const spartan::internal::RemapTable& table,
+                  const cv::Mat& source, const cv::Mat& result) {
   Accuracy sum;
   const int channels = source.channels();
   for (int y = 0; y < result.rows; ++y) {
@@ -128,7 +128,7 @@ void compare(const Scene& scene, const char* kind, const std::string& simd, int 
   using Sample = std::conditional_t<sizeof(Pixel) / kChannels == 1, std::uint8_t, std::uint16_t>;
   const spartan::ThreadPool one(1);
   const Maps maps = maps_of(scene);
-  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, one, 1, simd);
+  const spartan::internal::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, one, 1, simd);
   auto source = make_image<Pixel, kChannels>(scene.size, sizeof(Sample) == 1 ? 255 : 65535);
   Image<Pixel> spartan_result(scene.view.size), opencv_result(scene.view.size);
   const cv::Mat from = spartan::as_mat(source);
@@ -152,7 +152,8 @@ void compare(const Scene& scene, const char* kind, const std::string& simd, int 
 
 // Memory bandwidth limit: memcpy of as many bytes as the rectification reads and writes (table, source, result).
 void print_memory_limit(const Scene& scene, const char* kind, std::size_t pixel_bytes, int repeat) {
-  const spartan::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {}, spartan::ThreadPool(1));
+  const spartan::internal::RemapTable table(scene.camera, scene.size, scene.view, scene.rotation, {},
+                                            spartan::ThreadPool(1));
   const auto pixels = static_cast<std::size_t>(scene.size.width) * static_cast<std::size_t>(scene.size.height);
   const std::size_t bytes = table.bytes() + 2 * pixel_bytes * pixels;
   std::vector<std::uint8_t> from(bytes / 2, 1), to(bytes / 2);

@@ -21,13 +21,14 @@
 #include <string>
 #include <vector>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/sim/internal/camera/frame_preview.h"
 #include "spectrum_plot.h"
 
 namespace spartan {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -225,7 +226,8 @@ void measure(const fs::path& file, const std::string& images, std::vector<cv::Ma
       return s.pair == pair && (pair == "narrow" || s.pan_rad == 0);
     });
     if (frame == frames.end()) continue;
-    const auto preview = sim::preview_left(*request, static_cast<std::size_t>(frame - frames.begin()), ThreadPool(2));
+    const auto preview =
+        sim::internal::preview_left(*request, static_cast<std::size_t>(frame - frames.begin()), ThreadPool(2));
     const Image<float> noisy = to_float(preview.recorded);
     const double black = request->scenario.sensor.black_level * ((1 << preview.recorded.format().bits) - 1);
     Image<float> over_black(noisy.width(), noisy.height());

@@ -17,12 +17,11 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/opencv_bridge.h"
-#include "spartan/core/simd_target.h"
 #include "spartan/core/threads.h"
 #include "spartan/eval/disparity_metrics.h"
+#include "spartan/image_io/opencv_bridge.h"
+#include "spartan/numerics/simd_target.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/reconstruction/disparity_options.h"
 #include "stereo_pairs.h"
 
 namespace {

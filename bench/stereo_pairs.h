@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "spartan/core/image.h"
-#include "spartan/core/image_io.h"
 #include "spartan/core/result.h"
 #include "spartan/eval/disparity_metrics.h"
-#include "spartan/eval/disparity_truth.h"
+#include "spartan/image_io/image_io.h"
 
 namespace spartan {
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "spartan/core/median.h"
+#include "spartan/numerics/median.h"
 
 namespace spartan {
 

@@ -1,35 +1,37 @@
 # Every third-party package the project links, found once. `setup` installs them.
-# The libraries' own list is handed on to those who link an installed Spartan (SpartanInstall.cmake).
-set(SPARTAN_PACKAGES
-  "Eigen3 3.4 NO_MODULE"
-  "OpenCV 4.6 COMPONENTS core imgproc imgcodecs"
-  "libjpeg-turbo CONFIG"
-  "hwy CONFIG"
-  "TBB"
-  "tl-expected"
-  "yaml-cpp"
-  "nlohmann_json"
-  "fmt"
-  "spdlog"
-  "SQLite3 3.40"
-  "Threads")
-foreach(package IN LISTS SPARTAN_PACKAGES)
-  separate_arguments(arguments UNIX_COMMAND "${package}")
-  find_package(${arguments} REQUIRED)
-endforeach()
-set(SPARTAN_OPENCV opencv_core opencv_imgproc opencv_imgcodecs)
 
+# spartan_package("PACKAGE AND ARGUMENTS OF FIND_PACKAGE" [OPTIONAL] LIBRARIES targets…)
+# An installed Spartan looks for the package of each library that the wanted modules link (SpartanInstall.cmake).
+# A macro: the targets and variables of the package must be seen by the caller.
+macro(spartan_package package)
+  cmake_parse_arguments(A "OPTIONAL" "" "LIBRARIES" ${ARGN})
+  separate_arguments(arguments UNIX_COMMAND "${package}")
+  if(A_OPTIONAL)
+    find_package(${arguments} QUIET)
+  else()
+    find_package(${arguments} REQUIRED)
+  endif()
+  foreach(library IN LISTS A_LIBRARIES)
+    set(SPARTAN_PACKAGE_OF_${library} "${package}")
+  endforeach()
+endmacro()
+
+set(SPARTAN_OPENCV opencv_core opencv_imgproc opencv_imgcodecs)
+spartan_package("Eigen3 3.4 NO_MODULE" LIBRARIES Eigen3::Eigen)
+spartan_package("OpenCV 4.6 COMPONENTS core imgproc imgcodecs" LIBRARIES ${SPARTAN_OPENCV})
+spartan_package("libjpeg-turbo CONFIG" LIBRARIES libjpeg-turbo::turbojpeg)
+spartan_package("hwy CONFIG" LIBRARIES hwy::hwy)
+spartan_package("TBB" LIBRARIES TBB::tbb)
+spartan_package("tl-expected" LIBRARIES tl::expected)
+spartan_package("yaml-cpp" LIBRARIES yaml-cpp)
+spartan_package("nlohmann_json" LIBRARIES nlohmann_json::nlohmann_json)
+spartan_package("fmt" LIBRARIES fmt::fmt)
+spartan_package("spdlog" LIBRARIES spdlog::spdlog_header_only)
+spartan_package("SQLite3 3.40" LIBRARIES SQLite::SQLite3)
 
 # Optional; what needs them says so when they are absent.
-set(SPARTAN_OPTIONAL_PACKAGES "embree 3.13" "GDAL 3.6")  # the simulator; GeoTIFF
-foreach(package IN LISTS SPARTAN_OPTIONAL_PACKAGES)
-  separate_arguments(arguments UNIX_COMMAND "${package}")
-  find_package(${arguments} QUIET)
-  list(GET arguments 0 name)
-  if(${name}_FOUND)
-    list(APPEND SPARTAN_PACKAGES "${package}")
-  endif()
-endforeach()
+spartan_package("embree 3.13" OPTIONAL LIBRARIES embree)  # the simulator
+spartan_package("GDAL 3.6" OPTIONAL LIBRARIES GDAL::GDAL)  # GeoTIFF
 if(GDAL_FOUND)
   set(SPARTAN_GDAL GDAL::GDAL)
 endif()

@@ -87,6 +87,8 @@ function(spartan_module name)
   target_link_libraries(${target} ${scope} ${A_PUBLIC})
   target_link_libraries(${target} ${hidden} ${A_PRIVATE})
   set_property(GLOBAL APPEND PROPERTY SPARTAN_MODULES ${name})
+  set_property(GLOBAL PROPERTY SPARTAN_USES_${name} ${A_USES})
+  set_property(GLOBAL PROPERTY SPARTAN_LIBRARIES_${name} ${A_PUBLIC} ${A_PRIVATE})
 
   if(SPARTAN_TESTS AND tests)
     spartan_test(${target}_test SOURCES ${tests} LINKS ${target} spartan_testing ${A_TEST_LIBRARIES} ${A_PRIVATE})

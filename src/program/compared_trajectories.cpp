@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/rig/pose_convention.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/rig/rig.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::program {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "spartan/rig_design/pan_text.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
 namespace {

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "program/html_parts.h"
-#include "spartan/core/opencv_bridge.h"
+#include "spartan/image_io/opencv_bridge.h"
 
 namespace spartan::program {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "program/ground_plan.h"
 #include "program/ground_side.h"
-#include "spartan/rig_design/pan_text.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig_design/ground_view.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 
 namespace spartan::program {
 namespace {

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <optional>
 
-#include "spartan/camera/interpretation.h"
-#include "spartan/core/image_io.h"
+#include "spartan/camera/frame_source.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/imaging/imager.h"
 
 namespace spartan::program {

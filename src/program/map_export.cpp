@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "program/map.h"
-#include "spartan/core/image_io.h"
-#include "spartan/reconstruction/map_rendering.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/reconstruction/point_cloud.h"
+#include "spartan/reconstruction/rendering.h"
 #include "spartan/system/map_files.h"
-#include "spartan/system/saved_map.h"
 
 namespace spartan::program {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "program/json.h"
 #include "program/map.h"
-#include "spartan/slam/map_statistics.h"
-#include "spartan/system/saved_map.h"
+#include "spartan/slam/global_map.h"
+#include "spartan/system/map_files.h"
 
 namespace spartan::program {
 namespace {

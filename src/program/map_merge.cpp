@@ -9,8 +9,8 @@
 
 #include "program/json.h"
 #include "program/map.h"
-#include "spartan/core/median.h"
-#include "spartan/system/saved_map.h"
+#include "spartan/numerics/median.h"
+#include "spartan/system/map_files.h"
 
 namespace spartan::program {
 namespace {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "program/html_parts.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
-#include "spartan/system/saved_map.h"
 
 namespace spartan::program {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "program/html_parts.h"
-#include "spartan/system/sensor_outages.h"
+#include "spartan/system/run_store.h"
 
 namespace spartan::program {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "program/compared_trajectories.h"
 #include "program/html_parts.h"
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/run_folder.h"
 

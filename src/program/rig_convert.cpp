@@ -8,11 +8,9 @@
 #include <vector>
 
 #include "program/json.h"
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/calibration_io/calibration_writing.h"
-#include "spartan/calibration_io/read_back.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
-#include "spartan/rig/rig_differences.h"
+#include "spartan/rig/describe.h"
 
 namespace spartan::program {
 namespace {

@@ -7,7 +7,7 @@
 #include "program/design_report.h"
 #include "program/ground_figure.h"
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {

@@ -17,8 +17,8 @@
 #include "program/rig_inspect_apply.h"
 #include "program/rig_inspect_figure.h"
 #include "spartan/calibration/pair_check.h"
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/core/image_io.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/odometry/view_matching.h"
 #include "spartan/rig/describe.h"
 

@@ -6,9 +6,9 @@
 #include <filesystem>
 
 #include "program/rig_convert.h"
-#include "spartan/calibration/merge_corrections.h"
+#include "spartan/calibration/pair_check.h"
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 
 namespace spartan::program {
 namespace {

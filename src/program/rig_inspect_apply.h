@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "program/inspected_pair.h"
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/result.h"
 
 namespace spartan::program {

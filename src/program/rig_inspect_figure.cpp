@@ -7,9 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "spartan/core/opencv_bridge.h"
+#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
-#include "spartan/imaging/rectification.h"
 
 namespace spartan::program {
 namespace {

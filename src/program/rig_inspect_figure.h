@@ -2,8 +2,8 @@
 #pragma once
 
 #include "spartan/calibration/pair_check.h"
+#include "spartan/core/frame_image.h"
 #include "spartan/core/image.h"
-#include "spartan/core/pixel_format.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
 

@@ -12,9 +12,9 @@
 #include "program/json.h"
 #include "program/progress.h"
 #include "program/shipped_files.h"
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
-#include "spartan/imaging/rectification.h"
+#include "spartan/imaging/imager.h"
 #include "spartan/sim/simulator.h"
 
 namespace spartan::program {

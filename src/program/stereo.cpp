@@ -9,17 +9,15 @@
 #include "program/disparity_scores.h"
 #include "program/json.h"
 #include "program/run_arguments.h"
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/camera/interpretation.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
 #include "spartan/eval/disparity_metrics.h"
-#include "spartan/eval/disparity_truth.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/reconstruction/disparity_options.h"
-#include "spartan/reconstruction/disparity_rendering.h"
 #include "spartan/reconstruction/point_cloud.h"
+#include "spartan/reconstruction/rendering.h"
 
 namespace spartan::program {
 namespace {

@@ -1,6 +1,6 @@
 // What somebody else writes to use Spartan with images of their own: a rig, a pipeline, frames pushed in.
 //
-// The "rover" looks at a textured wall 3 m away and moves 6 cm to the right from shot to shot, which is 6 pixels.
+// The "rover" looks at a textured wall 3 m away and moves 6 cm to the right from frame to frame, which is 6 pixels.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWidth = 640, kHeight = 480;
 constexpr double kFocal_px = 300, kWall_m = 3, kBaseline_m = 0.12, kStep_m = 0.06;
-constexpr int kShots = 5;
+constexpr int kFrames = 5;
 
 double noise(int x, int y) {
   std::uint32_t h = static_cast<std::uint32_t>(x) * 0x9E3779B1u + static_cast<std::uint32_t>(y) * 0x85EBCA77u;
@@ -23,7 +23,7 @@ double noise(int x, int y) {
   return (h ^ (h >> 15)) / 4294967296.0;
 }
 
-double blotches(double x, double y, double size) {
+double texture(double x, double y, double size) {
   const double u = x / size, v = y / size;
   const int i = static_cast<int>(std::floor(u)), j = static_cast<int>(std::floor(v));
   const double a = u - i, b = v - j;
@@ -31,13 +31,13 @@ double blotches(double x, double y, double size) {
          b * ((1 - a) * noise(i, j + 1) + a * noise(i + 1, j + 1));
 }
 
-/// The wall as an eye sees it that stands `eye_m` to the right of the start.
-std::vector<std::uint8_t> photograph(double eye_m) {
+/// The image of a camera that is `camera_m` to the right of the start.
+std::vector<std::uint8_t> render_wall(double camera_m) {
   std::vector<std::uint8_t> pixels(kWidth * kHeight);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      const double on_wall_px = x + eye_m * kFocal_px / kWall_m;
-      const double level = 0.6 * blotches(on_wall_px, y, 13) + 0.4 * blotches(on_wall_px, y, 5);
+      const double on_wall_px = x + camera_m * kFocal_px / kWall_m;
+      const double level = 0.6 * texture(on_wall_px, y, 13) + 0.4 * texture(on_wall_px, y, 5);
       pixels[static_cast<std::size_t>(y * kWidth + x)] = static_cast<std::uint8_t>(20 + 215 * level);
     }
   }
@@ -69,17 +69,17 @@ int main() {
   }
   spartan::Pose world_from_body;
   double wall_m = 0;
-  for (int shot = 0; shot < kShots; ++shot) {
-    const auto left = photograph(shot * kStep_m), right = photograph(shot * kStep_m + kBaseline_m);
+  for (int k = 0; k < kFrames; ++k) {
+    const auto left = render_wall(k * kStep_m), right = render_wall(k * kStep_m + kBaseline_m);
     spartan::StereoFrame frame;
-    frame.frame_id = shot;
+    frame.frame_id = k;
     frame.pair = rig.pairs.front().name;
-    frame.left_stamp = frame.right_stamp = spartan::Stamp{shot * 1'000'000'000LL};
+    frame.left_stamp = frame.right_stamp = spartan::Stamp{k * 1'000'000'000LL};
     frame.left = borrow(left);
     frame.right = borrow(right);
     const auto result = pipeline->add(frame);
     if (!result || !*result) {
-      std::fprintf(stderr, "shot %d: %s\n", shot, result ? "nothing" : result.error().message().c_str());
+      std::fprintf(stderr, "frame %d: %s\n", k, result ? "nothing" : result.error().message().c_str());
       return 1;
     }
     world_from_body = (*result)->world_from_body.pose;
@@ -91,7 +91,7 @@ int main() {
   // The body looks along x with y to the left.
   const double driven_m = -world_from_body.translation().y();
   std::printf("driven %.4f m to the right (truth %.2f), wall at %.3f m (truth %.1f)\n", driven_m,
-              (kShots - 1) * kStep_m, wall_m, kWall_m);
-  const bool right = std::abs(driven_m - (kShots - 1) * kStep_m) < 0.002 && std::abs(wall_m - kWall_m) < 0.05;
-  return right ? 0 : 1;
+              (kFrames - 1) * kStep_m, wall_m, kWall_m);
+  const bool accurate = std::abs(driven_m - (kFrames - 1) * kStep_m) < 0.002 && std::abs(wall_m - kWall_m) < 0.05;
+  return accurate ? 0 : 1;
 }

@@ -1,21 +1,40 @@
-# Installs BUILD to a fresh prefix under WORK, then configures, builds and runs the consumer project against it,
-# from a copy of its sources, so that nothing but the installed files can help.
+# Installs BUILD to a fresh prefix under WORK, then configures, builds and runs the consumer projects against it, from
+# copies of their sources, so that nothing but the installed files can help.
 set(prefix "${WORK}/prefix")
-set(source "${WORK}/source")
 file(REMOVE_RECURSE "${WORK}")
-file(COPY "${CMAKE_CURRENT_LIST_DIR}/CMakeLists.txt" "${CMAKE_CURRENT_LIST_DIR}/main.cpp" DESTINATION "${source}")
+file(COPY "${CMAKE_CURRENT_LIST_DIR}/" DESTINATION "${WORK}/source" PATTERN "run.cmake" EXCLUDE)
 
 function(run)
   execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
+# build(SOURCE FOLDER arguments…): configures and builds a project.
+function(build source folder)
+  run("${CMAKE_COMMAND}" -S "${source}" -B "${folder}" -G Ninja "-DCMAKE_PREFIX_PATH=${prefix}"
+    -DCMAKE_BUILD_TYPE=Release "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" ${ARGN})
+  run("${CMAKE_COMMAND}" --build "${folder}")
+endfunction()
+
 run("${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}")
-run("${CMAKE_COMMAND}" -S "${source}" -B "${WORK}/build" -G Ninja "-DCMAKE_PREFIX_PATH=${prefix}"
-  -DCMAKE_BUILD_TYPE=Release "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}")
-run("${CMAKE_COMMAND}" --build "${WORK}/build")
+build("${WORK}/source" "${WORK}/build")
 run("${WORK}/build/consumer")
 run("${prefix}/bin/spartan" --help)
 
-file(GLOB_RECURSE intruders "${prefix}/*_test*" "${prefix}/*/testing/*" "${prefix}/lib/*testing*")
+# Camera models alone: none of these packages may be needed.
+set(hidden)
+foreach(package OpenCV GDAL SQLite3 embree libjpeg-turbo hwy nlohmann_json)
+  list(APPEND hidden "-DCMAKE_DISABLE_FIND_PACKAGE_${package}=TRUE")
+endforeach()
+build("${WORK}/source/rig" "${WORK}/build_rig" ${hidden})
+run("${WORK}/build_rig/rig_consumer" "${prefix}/share/spartan/config/rigs/euroc.yaml")
+
+file(GLOB_RECURSE headers "${prefix}/include/*.h")
+list(LENGTH headers count)
+message(STATUS "${count} installed headers")
+if(count GREATER 60)
+  message(FATAL_ERROR "at most 60 headers may be installed; move what no user needs to internal/")
+endif()
+file(GLOB_RECURSE intruders "${prefix}/*_test*" "${prefix}/*/testing/*" "${prefix}/lib/*testing*"
+  "${prefix}/include/*/internal/*" "${prefix}/include/*/numerics/*")
 if(intruders)
-  message(FATAL_ERROR "tests and their library must not be installed: ${intruders}")
+  message(FATAL_ERROR "tests, their library and internal headers must not be installed: ${intruders}")
 endif()

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string>
 
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string content(reinterpret_cast<const char*>(data), size);

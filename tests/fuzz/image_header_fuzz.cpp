@@ -4,9 +4,11 @@
 #include "input_file.h"
 #include "spartan/camera/internal/layouts/image_header.h"
 
+using namespace spartan::internal;
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const spartan::testing::InputFile input(data, size);
-  const auto found = spartan::read_image_size(input.path());
+  const auto found = read_image_size(input.path());
   if (found && found->empty()) __builtin_trap();
   return 0;
 }

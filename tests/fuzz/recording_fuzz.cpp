@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <string>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/frame_source.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace {

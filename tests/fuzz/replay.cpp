@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "spartan/core/files.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 

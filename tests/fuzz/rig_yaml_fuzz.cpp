@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto rig = spartan::parse_rig_yaml(std::string(reinterpret_cast<const char*>(data), size), "rig.yaml");

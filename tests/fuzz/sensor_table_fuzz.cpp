@@ -5,9 +5,11 @@
 #include "input_file.h"
 #include "spartan/camera/internal/sensor_tables.h"
 
+using namespace spartan::internal;
+
 namespace {
 
-void read_all(const spartan::SampleStreamFactory& open) {
+void read_all(const SampleStreamFactory& open) {
   const auto stream = open();
   if (!stream) return;
   for (;;) {
@@ -23,11 +25,11 @@ void read_all(const spartan::SampleStreamFactory& open) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const spartan::testing::InputFile input(data, size);
-  const spartan::TableFormat format{.separator = ',', .header = {}, .ends_with_newline = true};
-  read_all(spartan::stream_of_table(input.path(), format, 7, spartan::read_imu_row(Eigen::Quaterniond::Identity())));
-  read_all(spartan::stream_of_table(input.path(), format, 3, spartan::read_wheel_row));
-  read_all(spartan::stream_of_table(input.path(), format, 3, spartan::read_compass_row));
-  read_all(spartan::stream_of_table(input.path(), {.separator = ' ', .header = {}, .ends_with_newline = false}, 4,
-                                    spartan::read_inclinometer_row));
+  const TableFormat format{.separator = ',', .header = {}, .ends_with_newline = true};
+  read_all(stream_of_table(input.path(), format, 7, read_imu_row(Eigen::Quaterniond::Identity())));
+  read_all(stream_of_table(input.path(), format, 3, read_wheel_row));
+  read_all(stream_of_table(input.path(), format, 3, read_compass_row));
+  read_all(stream_of_table(input.path(), {.separator = ' ', .header = {}, .ends_with_newline = false}, 4,
+                           read_inclinometer_row));
   return 0;
 }

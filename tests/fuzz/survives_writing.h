@@ -7,9 +7,8 @@
 #include <filesystem>
 #include <string>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/calibration_io/calibration_writing.h"
-#include "spartan/rig/rig_differences.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/rig/describe.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan::testing {

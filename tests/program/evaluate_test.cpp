@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "program.h"
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/pose_convention.h"
+#include "spartan/rig/rig.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

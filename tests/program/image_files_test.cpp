@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "program.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

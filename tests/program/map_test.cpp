@@ -9,8 +9,8 @@
 #include "program.h"
 #include "small_drive.h"
 #include "spartan/core/files.h"
-#include "spartan/core/geotiff.h"
-#include "spartan/slam/map_file.h"
+#include "spartan/slam/global_map.h"
+#include "spartan/storage/geotiff.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

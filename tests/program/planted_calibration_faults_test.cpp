@@ -11,12 +11,14 @@
 
 #include "program.h"
 #include "spartan/calibration/internal/model_modification.h"
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
+
+using namespace internal;
 namespace {
 
 using nlohmann::json;

@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "program.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"

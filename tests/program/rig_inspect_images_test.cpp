@@ -9,7 +9,7 @@
 
 #include "program.h"
 #include "small_drive.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

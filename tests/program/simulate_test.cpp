@@ -11,7 +11,7 @@
 
 #include "program.h"
 #include "small_scenario.h"
-#include "spartan/core/geotiff.h"
+#include "spartan/storage/geotiff.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/synthetic_world.h"
 

@@ -13,8 +13,8 @@
 #include "program.h"
 #include "run_results.h"
 #include "small_scenario.h"
-#include "spartan/core/database.h"
-#include "spartan/core/geotiff.h"
+#include "spartan/storage/database.h"
+#include "spartan/storage/geotiff.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

@@ -1,7 +1,7 @@
-#include "spartan/calibration/merge_corrections.h"
-
 #include <algorithm>
 #include <set>
+
+#include "spartan/calibration/pair_check.h"
 
 namespace spartan {
 namespace {

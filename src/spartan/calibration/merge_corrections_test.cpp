@@ -1,7 +1,7 @@
-#include "spartan/calibration/merge_corrections.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "spartan/calibration/pair_check.h"
 
 namespace spartan {
 namespace {

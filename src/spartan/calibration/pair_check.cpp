@@ -12,8 +12,12 @@
 
 #include "spartan/calibration/internal/hypothesis_search.h"
 #include "spartan/calibration/internal/pair_correction.h"
+#include "spartan/calibration/internal/row_errors.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

@@ -1,17 +1,49 @@
-// Checks the calibration of a stereo pair by matches between its images.
+// Checks the calibration of stereo pairs by matches between their images, and corrects it.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
-#include "spartan/calibration/pair_refinement.h"
-#include "spartan/calibration/row_errors.h"
+#include "spartan/core/image.h"
+#include "spartan/rig/describe.h"
 #include "spartan/rig/rig.h"
-#include "spartan/rig/rig_findings.h"
 
 namespace spartan {
 
+/// The same point in both images, unrectified, pixels.
+struct PixelMatch {
+  Eigen::Vector2d left, right;
+};
+
+/// A small correction of a stereo calibration. The rotation is that of the right camera about its own axes,
+/// left_from_right' = left_from_right · Ry(yaw) Rx(pitch) Rz(roll), positive to the right, up and clockwise as in
+/// `describe_relative_pose`. `baseline_down_rad` and `baseline_ahead_rad` rotate the direction of the baseline.
+struct PairCorrection {
+  double pitch_rad = 0, yaw_rad = 0, roll_rad = 0;
+  double baseline_down_rad = 0, baseline_ahead_rad = 0;
+  double focal_ratio = 1;  ///< factor on the focal length of the right camera
+  /// Radial distortion that a pinhole model lacks, k of r → r/(1 + k r²), which undistorts its rays; k is close to
+  /// Brown's k1. 0 where it is not estimated.
+  double left_radial = 0, right_radial = 0;
+};
+
+/// Row errors (left − right) of matches, pixels.
+struct RowErrors {
+  double mean_px = 0, p95_px = 0;  ///< of the absolute values
+  double median_px = 0;            ///< signed
+};
+
+/// A cell of the left image.
+struct RowErrorCell {
+  Eigen::Vector2d centre_px;
+  int matches = 0;
+  double median_px = 0;  ///< signed row error in the rectified view of the pair as given
+};
+
+/// The quality of a calibration as its images show it.
 enum class PairGrade {
   good,    ///< row errors have a mean of at most 0.5 px and a 95th percentile of at most 1.5 px; no findings
   usable,  ///< at most 1 px and 3 px: stereo works with fewer matches; or only findings that leave the ranges correct
@@ -65,5 +97,23 @@ PairCheck check_images(const std::vector<PixelMatch>& matches, ImageSize image_s
 /// A rig for images without a calibration: two equal pinholes with a focal length of 1.2 times the larger image side,
 /// parallel, 1 m apart. Results for rows, pitch and roll hold for any focal length close to it.
 Rig guessed_rig(ImageSize image_size);
+
+/// The rig as corrected for one pair (PairCheck::corrected).
+struct CorrectedPair {
+  std::string pair;
+  Rig rig;
+};
+
+struct MergedRig {
+  Rig rig;
+  std::vector<std::string> discarded;  ///< pairs whose correction contradicts that of an earlier pair
+};
+
+/// Applies the correction of every pair to the rig, in the given order. The images of a pair determine the pose of its
+/// cameras relative to each other only. A camera shared by two pairs therefore keeps the pose that the first pair gave
+/// it, and the other camera of the second pair moves instead. A correction is discarded where that is impossible: both
+/// cameras belong to earlier pairs, or the shared camera's intrinsics would change again. All rigs have the cameras and
+/// pairs of `given`.
+MergedRig merge_corrections(const Rig& given, const std::vector<CorrectedPair>& pairs);
 
 }  // namespace spartan

@@ -3,9 +3,13 @@
 #include <algorithm>
 
 #include "spartan/calibration/internal/model_modification.h"
+#include "spartan/calibration/internal/pair_refinement.h"
 #include "spartan/testing/simulated_pair_matches.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using testing::check;

@@ -7,9 +7,8 @@
 #include <map>
 #include <set>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/calibration_io/calibration_writing.h"
-#include "spartan/core/random.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

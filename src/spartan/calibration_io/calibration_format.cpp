@@ -1,10 +1,10 @@
-#include "spartan/calibration_io/calibration_format.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <array>
 #include <filesystem>
+
+#include "spartan/calibration_io/calibration_files.h"
 
 namespace spartan {
 namespace {

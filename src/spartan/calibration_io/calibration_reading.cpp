@@ -1,17 +1,20 @@
 // Detection of calibrations in files and folders, and selection of their reader.
-#include "spartan/calibration_io/calibration_reading.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_readers.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/pair_of_files.h"
-#include "spartan/rig/calibration_text.h"
+#include "spartan/core/files.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -24,7 +27,7 @@ bool path_exists(const fs::path& path) {
 // The size of the images in image_0 (KITTI odometry) or image_00/data (KITTI raw) beside the file.
 ImageSize size_of_recording_beside(const fs::path& file) {
   for (const char* folder : {"image_0", "image_00/data", "../image_0"}) {
-    const ImageSize size = rig_detail::size_of_images_in((file.parent_path() / folder).string());
+    const ImageSize size = size_of_images_in((file.parent_path() / folder).string());
     if (!size.empty()) return size;
   }
   return {};
@@ -32,7 +35,7 @@ ImageSize size_of_recording_beside(const fs::path& file) {
 
 ImageSize size_of_images_beside(const fs::path& file) {
   const fs::path folder = file.parent_path();
-  return rig_detail::size_of_images_in(folder.empty() ? "." : folder.string());
+  return size_of_images_in(folder.empty() ? "." : folder.string());
 }
 
 // A rig whose reader ignored nothing.
@@ -46,7 +49,7 @@ Result<LoadedRig> complete(Result<Rig> rig, CalibrationFormat format, const std:
   return read;
 }
 
-Result<LoadedRig> read_opencv(const fs::path& file, ImageSize size_hint) {
+Result<LoadedRig> read_opencv_files(const fs::path& file, ImageSize size_hint) {
   const std::string extension = file.extension().string();
   const fs::path intrinsics = file.parent_path() / ("intrinsics" + extension);
   const fs::path extrinsics = file.parent_path() / ("extrinsics" + extension);
@@ -54,11 +57,11 @@ Result<LoadedRig> read_opencv(const fs::path& file, ImageSize size_hint) {
                         path_exists(extrinsics);
   const fs::path& first = separate ? intrinsics : file;
   if (size_hint.empty()) size_hint = size_of_images_beside(file);
-  return rig_detail::read_opencv(first.string(), separate ? extrinsics.string() : "", size_hint);
+  return internal::read_opencv(first.string(), separate ? extrinsics.string() : "", size_hint);
 }
 
 Result<LoadedRig> read_file_per_camera(CalibrationFormat format, const std::string& path, ImageSize size) {
-  const auto pair = rig_detail::find_pair_of_files(path);
+  const auto pair = find_pair_of_files(path);
   if (!pair) return failure(pair);
   if (format == CalibrationFormat::ros) return read_ros_calib(pair->left, pair->right);
   if (format == CalibrationFormat::mrcal) return read_mrcal_calib(pair->left, pair->right);
@@ -73,9 +76,9 @@ Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, Ima
     case CalibrationFormat::rig_yaml:
       return complete(read_rig_yaml(path), format, path, "");
     case CalibrationFormat::kitti:
-      return rig_detail::read_kitti(path, size_hint.empty() ? size_of_recording_beside(file) : size_hint);
+      return read_kitti(path, size_hint.empty() ? size_of_recording_beside(file) : size_hint);
     case CalibrationFormat::kitti_raw:
-      return rig_detail::read_kitti_raw(path);
+      return read_kitti_raw(path);
     case CalibrationFormat::euroc: {
       const std::string folder = fs::absolute(file).parent_path().parent_path().string();
       return complete(read_euroc_calib(folder), format, folder, "that of T_BS");
@@ -83,7 +86,7 @@ Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, Ima
     case CalibrationFormat::kalibr:
       return read_kalibr_calib(path);
     case CalibrationFormat::opencv:
-      return read_opencv(file, size_hint);
+      return read_opencv_files(file, size_hint);
     default:
       return read_file_per_camera(format, path, size_hint);
   }
@@ -93,7 +96,7 @@ Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, Ima
 bool is_opencv_file(const fs::path& file) {
   const std::string extension = file.extension().string();
   if (extension != ".yml" && extension != ".xml") return false;
-  const auto text = rig_detail::read_calibration_text(file.string());
+  const auto text = read_calibration_text(file.string());
   return text && text->find("opencv-matrix") != std::string::npos &&
          detect_calibration_format(file.string(), *text) == CalibrationFormat::opencv;
 }
@@ -119,7 +122,7 @@ Result<std::string> find_in_folder(const fs::path& folder) {
   std::sort(candidates.begin(), candidates.end());
   if (candidates.size() == 1) return candidates.front();
   if (candidates.size() == 2) {
-    const auto pair = rig_detail::find_pair_of_files(candidates.front());
+    const auto pair = find_pair_of_files(candidates.front());
     if (pair) return pair->left + "," + pair->right;
   }
   if (!candidates.empty()) {
@@ -155,8 +158,8 @@ Result<LoadedRig> read_calibration(const std::string& path, ImageSize size_hint)
   // For "LEFT,RIGHT" the first file determines the format. An existing file whose name contains a comma is that file.
   std::string first = path;
   if (!path_exists(path) && path.find(',') != std::string::npos) first.resize(path.find(','));
-  const auto text = rig_detail::read_calibration_text(
-      first, begins_as_mrcal(first) ? rig_detail::kLargestModelFile_bytes : rig_detail::kLargestCalibration_bytes);
+  const auto text =
+      read_calibration_text(first, begins_as_mrcal(first) ? kLargestModelFile_bytes : kLargestCalibration_bytes);
   if (!text) return failure(text);
   const auto format = detect_calibration_format(first, *text);
   if (!format) {
@@ -179,10 +182,10 @@ Result<LoadedRig> read_calibration_as(CalibrationFormat format, const std::strin
 }
 
 Result<Rig> read_rig(const std::string& path, ImageSize size_hint) {
-  return rig_detail::rig_of(read_calibration(path, size_hint));
+  return rig_of(read_calibration(path, size_hint));
 }
 
-Result<Rig> rig_detail::rig_of(Result<LoadedRig> read) {
+Result<Rig> internal::rig_of(Result<LoadedRig> read) {
   if (!read) return failure(std::move(read));
   return std::move(read->rig);
 }

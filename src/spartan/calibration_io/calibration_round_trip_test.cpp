@@ -5,10 +5,9 @@
 #include <cmath>
 #include <set>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/calibration_io/calibration_writing.h"
-#include "spartan/rig/models/model_conversion.h"
-#include "spartan/rig/rig_differences.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/rig/describe.h"
+#include "spartan/rig/models/camera_model.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

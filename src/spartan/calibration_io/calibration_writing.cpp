@@ -1,17 +1,15 @@
-#include "spartan/calibration_io/calibration_writing.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
 
-namespace rig_detail {
+namespace internal {
 
 tl::unexpected<Error> cannot_hold(const Camera& camera, const std::string& why) {
   return failure(ErrorCode::configuration, why, "cameras." + camera.name);
@@ -95,7 +93,9 @@ Result<CalibrationFiles> write_as(const Rig& rig, CalibrationFormat format, cons
 
 }  // namespace
 
-}  // namespace rig_detail
+}  // namespace internal
+
+using namespace internal;
 
 Rig rig_of_pair(const Rig& rig, const StereoPair& pair) {
   Rig only = rig;
@@ -111,11 +111,11 @@ Rig rig_of_pair(const Rig& rig, const StereoPair& pair) {
 Result<CalibrationFiles> to_calibration_files(const Rig& rig, CalibrationFormat format, const std::string& path) {
   if (Status valid = rig.validate("the rig"); !valid) return failure(std::move(valid));
   if (format == CalibrationFormat::rig_yaml || format == CalibrationFormat::cahvor) {
-    return rig_detail::write_as(rig, format, path);
+    return write_as(rig, format, path);
   }
-  const auto unskewed = rig_detail::without_skews(rig, format);
+  const auto unskewed = without_skews(rig, format);
   if (!unskewed) return failure(unskewed);
-  return rig_detail::write_as(*unskewed, format, path);
+  return write_as(*unskewed, format, path);
 }
 
 }  // namespace spartan

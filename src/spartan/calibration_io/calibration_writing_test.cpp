@@ -1,10 +1,8 @@
 // Rigs that a format does not support are rejected with the name of the camera.
-#include "spartan/calibration_io/calibration_writing.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 
 namespace spartan {
 namespace {

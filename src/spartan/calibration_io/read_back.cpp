@@ -1,5 +1,3 @@
-#include "spartan/calibration_io/read_back.h"
-
 #include <fmt/format.h>
 #include <stdlib.h>
 
@@ -7,6 +5,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
 
 namespace spartan {

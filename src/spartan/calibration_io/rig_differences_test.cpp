@@ -1,14 +1,16 @@
-#include "spartan/rig/rig_differences.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "spartan/calibration_io/internal/pair_of_files.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/describe.h"
+#include "spartan/rig/models/camera_model.h"
 #include "spartan/testing/camera_model_laws.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using ::testing::HasSubstr;
@@ -214,7 +216,7 @@ TEST(PairOfFiles, FindsTheOtherFile) {
   const auto partner = [&](const std::string& given, const std::string& other) {
     folder.write(given, "x");
     folder.write(other, "x");
-    const auto pair = rig_detail::find_pair_of_files(folder.path() + "/" + given);
+    const auto pair = find_pair_of_files(folder.path() + "/" + given);
     if (!pair) return pair.error().message();
     return (pair->left + "," + pair->right).erase(0, folder.path().size() + 1);
   };
@@ -234,7 +236,7 @@ TEST(PairOfFiles, AmbiguousNamesAreAnError) {
   for (const char* name : {"left_left.x", "right_left.x", "left_right.x", "alone.x", "odd,name.x"})
     folder.write(name, "x");
   const auto message_of = [&](const std::string& name) {
-    const auto pair = rig_detail::find_pair_of_files(folder.path() + "/" + name);
+    const auto pair = find_pair_of_files(folder.path() + "/" + name);
     EXPECT_FALSE(pair);
     EXPECT_EQ(pair.error().code, ErrorCode::configuration);
     return pair.error().message();
@@ -244,15 +246,15 @@ TEST(PairOfFiles, AmbiguousNamesAreAnError) {
   EXPECT_THAT(message_of("alone.x"),
               HasSubstr("the file of the other camera is not found (name both files: LEFT,RIGHT)"));
   EXPECT_THAT(message_of("odd,name.x"), HasSubstr("the file of the other camera is not found"));
-  const auto named = rig_detail::find_pair_of_files("a.x,b.x");
+  const auto named = find_pair_of_files("a.x,b.x");
   EXPECT_EQ(named->left, "a.x");
   EXPECT_EQ(named->right, "b.x");
 }
 
 TEST(PairOfFiles, NamesOfWrittenFiles) {
-  EXPECT_EQ(rig_detail::names_of_pair("a/b.tsai").left, "a/b_left.tsai");
-  EXPECT_EQ(rig_detail::names_of_pair("a/b.tsai").right, "a/b_right.tsai");
-  EXPECT_EQ(rig_detail::names_of_pair("x.y,z.y").right, "z.y");
+  EXPECT_EQ(names_of_pair("a/b.tsai").left, "a/b_left.tsai");
+  EXPECT_EQ(names_of_pair("a/b.tsai").right, "a/b_right.tsai");
+  EXPECT_EQ(names_of_pair("x.y,z.y").right, "z.y");
 }
 
 }  // namespace

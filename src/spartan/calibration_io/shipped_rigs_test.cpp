@@ -5,9 +5,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/rig/describe.h"
-#include "spartan/rig/rig_differences.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 

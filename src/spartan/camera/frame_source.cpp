@@ -8,6 +8,9 @@
 #include "spartan/camera/internal/recording_index.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 namespace fs = std::filesystem;

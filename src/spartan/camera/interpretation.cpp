@@ -1,4 +1,4 @@
-#include "spartan/camera/interpretation.h"
+#include "spartan/camera/frame_source.h"
 
 namespace spartan {
 

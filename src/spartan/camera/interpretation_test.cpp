@@ -1,6 +1,6 @@
-#include "spartan/camera/interpretation.h"
-
 #include <gtest/gtest.h>
+
+#include "spartan/camera/frame_source.h"
 
 namespace spartan {
 namespace {

@@ -13,14 +13,17 @@
 #include <optional>
 #include <vector>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/layouts/spartan_format.h"
 #include "spartan/camera/internal/table.h"
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
 #include "spartan/core/options.h"
+#include "spartan/image_io/image_io.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 namespace fs = std::filesystem;

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "spartan/camera/samples.h"
-#include "spartan/camera/sensor_noise.h"
 #include "spartan/core/result.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/rig.h"

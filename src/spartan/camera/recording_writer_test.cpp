@@ -9,8 +9,8 @@
 #include <limits>
 
 #include "spartan/camera/frame_source.h"
-#include "spartan/core/image_io.h"
-#include "spartan/core/random.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/tiny_recordings.h"
 
 namespace spartan {

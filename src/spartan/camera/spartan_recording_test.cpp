@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <limits>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
-#include "spartan/core/random.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
 

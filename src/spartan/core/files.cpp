@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -44,6 +45,31 @@ Result<std::string> read_file(const std::string& path) {
   content << file.rdbuf();
   if (file.bad()) return failure(ErrorCode::input, "cannot be read completely", path);
   return content.str();
+}
+
+Result<std::string> read_calibration_text(const std::string& path, std::size_t largest) {
+  const auto error_at = [&](const std::string& what) { return failure(ErrorCode::configuration, what, path); };
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return error_at("is a folder, not a file");
+  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
+    return error_at("is not a regular file: a calibration is read more than once, which a pipe does not allow");
+  }
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  if (!error && bytes > largest)
+    return error_at("is larger than " + std::to_string(largest >> 20U) + " MB, so it is not a calibration file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return error_at(std::string("cannot be read: ") + std::strerror(errno));
+  std::string content;
+  std::array<char, 65536> buffer{};
+  while (file.read(buffer.data(), buffer.size()), file.gcount() > 0) {
+    content.append(buffer.data(), static_cast<std::size_t>(file.gcount()));
+    if (content.size() > largest)
+      return error_at("is larger than " + std::to_string(largest >> 20U) + " MB, so it is not a calibration file");
+  }
+  if (file.bad()) return error_at("cannot be read completely");
+  // Some editors write a UTF-8 byte order mark.
+  if (content.starts_with("\xEF\xBB\xBF")) content.erase(0, 3);
+  return content;
 }
 
 Status write_file_atomically(const std::string& path, std::string_view content) {

@@ -1,4 +1,4 @@
-// Images that own their pixels, and non-owning views.
+// Images that own their pixels, non-owning views, and the georeference of raster maps.
 #pragma once
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <memory>
 #include <new>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 
@@ -150,6 +151,18 @@ class Image {
   int height_ = 0;
   std::ptrdiff_t stride_ = 0;
   std::unique_ptr<T, Free> data_;
+};
+
+/// One band of a raster map. Row 0 is the northernmost (largest y); NaN means "no data".
+struct MapBand {
+  std::string name;
+  ImageView<const float> values;
+};
+
+/// Georeference of a north-up raster in the world plane, metres: x and y of its north-west corner and the side of a
+/// cell (GDAL's geotransform without rotation).
+struct GeoTransform {
+  double west_m = 0, north_m = 0, cell_m = 1;
 };
 
 }  // namespace spartan

@@ -1,4 +1,4 @@
-#include "spartan/core/pixel_format.h"
+#include "spartan/core/frame_image.h"
 
 namespace spartan {
 

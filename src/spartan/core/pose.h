@@ -1,17 +1,34 @@
-// Rigid transforms SE(3) and their uncertainty.
+// The rotation group SO(3), rigid transforms SE(3), and their uncertainty.
 //
 // A transform is named `a_from_b`: p_a = a_from_b * p_b. A tangent vector is ξ = (translation ρ, rotation φ), in m and
 // rad; perturbations are applied on the right: T ⊕ ξ = T · Exp(ξ) with the full SE(3) exponential.
-// Sources: Solà et al. 2018, appendix D; Barfoot & Furgale, "Associating uncertainty with three-dimensional
-// poses for use in estimation problems", T-RO 2014.
+// Sources: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", 2018, appendices B and D;
+// Barfoot & Furgale, "Associating uncertainty with three-dimensional poses for use in estimation problems", T-RO 2014.
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "spartan/core/rotation.h"
-
 namespace spartan {
+
+/// The skew-symmetric matrix [v]× with [v]× w = v × w.
+Eigen::Matrix3d skew(const Eigen::Vector3d& v);
+
+/// Exp: rotation vector (axis · angle, rad) → unit quaternion.
+Eigen::Quaterniond exp_so3(const Eigen::Vector3d& rotation_vector);
+
+/// Log: the rotation vector with angle in [0, π], the inverse of exp_so3. Accurate near 0 and near π.
+Eigen::Vector3d log_so3(const Eigen::Quaterniond& rotation);
+
+/// Left Jacobian J_l(θ): Exp(θ + δ) ≈ Exp(J_l(θ) δ) Exp(θ) (eq. 145). The right one is J_r(θ) = J_l(−θ).
+Eigen::Matrix3d left_jacobian_so3(const Eigen::Vector3d& rotation_vector);
+/// J_l(θ)⁻¹ (eq. 146); defined for angles below 2π.
+Eigen::Matrix3d left_jacobian_inverse_so3(const Eigen::Vector3d& rotation_vector);
+
+/// Whether |RᵀR − I| ≤ `tolerance` per element and det R > 0.
+bool is_rotation(const Eigen::Matrix3d& matrix, double tolerance = 1e-6);
+/// The rotation nearest to the matrix in the Frobenius norm (by SVD).
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -82,5 +99,16 @@ struct UncertainPose {
 UncertainPose compose(const UncertainPose& a_from_b, const UncertainPose& b_from_c);
 /// The inverse b_from_a; Σ' = Ad(a_from_b) Σ Adᵀ.
 UncertainPose invert(const UncertainPose& a_from_b);
+
+/// A similarity transform x ↦ s R x + t. Applied to a pose, the scale acts on the position only.
+struct Similarity {
+  double scale = 1;
+  Pose pose;  ///< R, t (metres)
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
+    return scale * (pose.rotation() * point) + pose.translation();
+  }
+  Pose operator*(const Pose& other) const { return {pose.rotation() * other.rotation(), *this * other.translation()}; }
+};
 
 }  // namespace spartan

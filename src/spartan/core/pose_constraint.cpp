@@ -1,8 +1,8 @@
-#include "spartan/core/pose_constraint.h"
-
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+
+#include "spartan/core/trajectory.h"
 
 namespace spartan {
 

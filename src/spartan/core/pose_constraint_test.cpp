@@ -1,10 +1,9 @@
-#include "spartan/core/pose_constraint.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 
-#include "spartan/core/random.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan {
 namespace {

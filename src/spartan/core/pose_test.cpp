@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/laws.h"
 #include "spartan/testing/numeric_jacobian.h"
 

@@ -1,8 +1,8 @@
-#include "spartan/core/process.h"
-
 #include <sys/resource.h>
 
 #include <ctime>
+
+#include "spartan/core/stage_clock.h"
 
 namespace spartan {
 

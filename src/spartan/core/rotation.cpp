@@ -1,8 +1,8 @@
-#include "spartan/core/rotation.h"
-
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <cmath>
+
+#include "spartan/core/pose.h"
 
 namespace spartan {
 namespace {

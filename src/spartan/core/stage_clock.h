@@ -1,7 +1,8 @@
-// Timing of pipeline stages, for reports only; no result depends on it.
+// Timing of pipeline stages and resource usage, for reports only; no result depends on them.
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <ctime>
 #include <string>
 #include <utility>
@@ -69,5 +70,10 @@ class StageClock {
 
   std::vector<StageTime> times_;
 };
+
+/// CPU time of all threads since the start of the process, s.
+double cpu_seconds();
+/// The peak resident memory of the process, bytes.
+std::int64_t peak_memory_bytes();
 
 }  // namespace spartan

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

@@ -1,10 +1,11 @@
-#include "spartan/eval/alignment.h"
-
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
+
+#include "spartan/eval/trajectory_metrics.h"
+#include "spartan/numerics/umeyama.h"
 
 namespace spartan {
 namespace {

@@ -1,11 +1,10 @@
-#include "spartan/eval/alignment.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "spartan/core/random.h"
+#include "spartan/eval/trajectory_metrics.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan {
 namespace {

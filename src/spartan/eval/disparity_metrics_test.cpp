@@ -6,9 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/core/image_io.h"
-#include "spartan/core/random.h"
-#include "spartan/eval/disparity_truth.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

@@ -1,13 +1,11 @@
-#include "spartan/eval/disparity_truth.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
 #include <limits>
 
 #include "spartan/core/files.h"
-#include "spartan/core/image_io.h"
 #include "spartan/eval/disparity_metrics.h"
+#include "spartan/image_io/image_io.h"
 
 namespace spartan {
 namespace {

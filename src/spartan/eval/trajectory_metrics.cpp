@@ -8,6 +8,9 @@
 #include "spartan/eval/internal/association.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;

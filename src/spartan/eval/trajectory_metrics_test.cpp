@@ -12,7 +12,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

@@ -7,9 +7,11 @@
 
 #include "spartan/imaging/internal/camera_stage.h"
 #include "spartan/imaging/internal/contrast.h"
-#include "spartan/imaging/rectification.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 /// Stages, histograms and mappings of one stereo pair.

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/synthetic_world.h"
 #include "spartan/testing/temporary_folder.h"
 

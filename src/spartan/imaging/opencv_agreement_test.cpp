@@ -8,15 +8,17 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/core/image_io.h"
-#include "spartan/core/opencv_bridge.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/imaging/internal/remap.h"
-#include "spartan/imaging/rectification.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 cv::Mat to_mat(const Eigen::Matrix3d& m) {

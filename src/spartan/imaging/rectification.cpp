@@ -1,5 +1,3 @@
-#include "spartan/imaging/rectification.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,10 +5,14 @@
 #include <numbers>
 #include <optional>
 
+#include "spartan/imaging/imager.h"
 #include "spartan/imaging/internal/virtual_view.h"
-#include "spartan/rig/rectifying_axes.h"
+#include "spartan/rig/rectified_stereo.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // Largest image error in px of cameras that count as rectified; empirical.

@@ -1,12 +1,11 @@
-#include "spartan/imaging/rectification.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
 
-#include "spartan/core/random.h"
+#include "spartan/imaging/imager.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan {
 namespace {

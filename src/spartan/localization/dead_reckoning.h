@@ -5,7 +5,7 @@
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
 #include "spartan/localization/localization_options.h"
-#include "spartan/localization/relative_motion.h"
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
 

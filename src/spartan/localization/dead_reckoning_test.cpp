@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "spartan/localization/internal/drive_test.h"
-#include "spartan/localization/vision_only_filter.h"
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // The filter of the same model, with nothing to correct it, is the oracle.

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "spartan/camera/sensor_noise.h"
+#include "spartan/camera/samples.h"
 #include "spartan/core/options.h"
 
 namespace spartan {

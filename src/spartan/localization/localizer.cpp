@@ -6,6 +6,9 @@
 #include "spartan/localization/internal/replay_filter.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr std::uint32_t kStateVersion = 2;

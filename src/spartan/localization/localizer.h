@@ -1,19 +1,162 @@
-// Localization: the pose of the rover from all available sensors.
+// Localization: fuses vision, inertial sensors, wheels and absolute sensors into one pose.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
 
+#include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
+#include "spartan/core/trajectory.h"
 #include "spartan/localization/localization_options.h"
-#include "spartan/localization/measurement.h"
-#include "spartan/localization/sensor_health.h"
 
 namespace spartan {
+
+/// The relative motion of the body between two frames, as measured by visual odometry.
+struct RelativeMotion {
+  Stamp from, to;                          ///< of the two frames
+  Pose previous_from_current;              ///< body frames; the exact identity means a stationary rover
+  Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²
+  bool measured = true;                    ///< false: tracking was lost, the motion is not used
+};
+
+/// The sensors that are monitored: whether one is used, and why not.
+enum class LocalizationSensor : std::uint8_t { vision, imu, wheels, compass, inclinometer, map };
+inline constexpr int kLocalizationSensors = 6;
+std::string_view name_of(LocalizationSensor sensor);
+
+enum class SensorState : std::uint8_t {
+  ok,
+  suspect,   ///< its last sample was rejected
+  excluded,  ///< not used; its samples are still gated, and enough consistent ones readmit it
+  missing,   ///< no samples within its timeout
+};
+std::string_view name_of(SensorState state);
+
+enum class HealthReason : std::uint8_t {
+  none,
+  disagrees,     ///< failed a chi-square test
+  slips,         ///< the wheels' count differs from the motion of the rover
+  frozen,        ///< identical readings
+  out_of_range,  ///< rate or specific force beyond the physical range of a rover
+  contradicted,  ///< vision contradicts its prediction
+  lost,          ///< vision could not measure the motion
+  never_seen,
+  silent,
+};
+
+/// Why a sample is refused before it reaches the filter.
+enum class Refusal : std::uint8_t { not_finite, too_late, too_early, duplicate, reversed };
+
+/// Number of refused samples by reason.
+struct RefusalCounts {
+  std::int64_t not_finite = 0, too_late = 0, too_early = 0, duplicates = 0, reversed = 0;
+  void count(Refusal refusal);
+};
+
+/// Report on a sensor at a time.
+struct SensorHealth {
+  SensorState state = SensorState::missing;
+  std::string reason;                   ///< empty if the state is ok
+  std::int64_t used = 0, rejected = 0;  ///< by the filter
+  RefusalCounts refused;                ///< before the filter
+};
+
+/// Monitors one sensor by gating: ok → suspect at the first rejection, excluded after `excluded_after` consecutive
+/// ones, readmitted after `readmit_after` consecutive samples that pass.
+struct SensorMonitor {
+  bool seen = false;
+  Stamp last;
+  SensorState state = SensorState::ok;  ///< never `missing`, which follows from `last`
+  HealthReason reason = HealthReason::none;
+  double nis = 0;  ///< normalized innovation squared that failed, and its gate
+  double limit = 0;
+  std::int64_t used = 0, rejected = 0;
+  int passed_in_row = 0, failed_in_row = 0;
+
+  void see(Stamp stamp);
+  /// Returns whether the sample is used: it passes the gate and the sensor is not, or no longer, excluded.
+  bool accept(double normalized_innovation_squared, double gate, HealthReason why, int excluded_after,
+              int readmit_after);
+  void exclude(HealthReason why);
+  void readmit();
+
+  bool missing(Stamp now, double timeout_s) const;
+  SensorHealth report(Stamp now, double timeout_s, const RefusalCounts& refusals) const;
+};
+
+/// A map constraint on the pose at the last frame that arrived when that frame was older than the buffer (the map of a
+/// stop is made when the rover drives on): applied at a later time to the clone of that pose.
+struct LateConstraint {
+  Stamp stamp;  ///< when it is applied
+  PoseConstraint at_frame;
+};
+
+/// Measurements with equal stamps are ordered by their index here: the IMU propagates to that time, vision corrects the
+/// prediction, the others are gated against both.
+using Measurement = std::variant<ImuSample, RelativeMotion, WheelSample, CompassSample, InclinometerSample,
+                                 PoseConstraint, LateConstraint>;
+
+inline Stamp stamp_of_measurement(const Measurement& m) {
+  return std::visit(
+      [](const auto& value) {
+        if constexpr (requires { value.stamp; }) {
+          return value.stamp;
+        } else {
+          return value.to;
+        }
+      },
+      m);
+}
+
+/// Whether `a` is processed before `b`.
+inline bool comes_before(const Measurement& a, const Measurement& b) {
+  const Stamp at = stamp_of_measurement(a), bt = stamp_of_measurement(b);
+  return at != bt ? at < bt : a.index() < b.index();
+}
+
+LocalizationSensor sensor_of(const Measurement& m);
+
+/// Whether all numbers are finite and no variance or information is negative.
+bool is_valid(const Measurement& m);
+
+/// Mean IMU reading before the start.
+struct StaticReading {
+  Eigen::Vector3d gyro_rad_s, accel_m_s2;
+  double accel_sigma_m_s2 = 0, gyro_sigma_rad_s = 0;  ///< of the means
+  bool stationary = false;                            ///< the rover was certainly stationary
+};
+/// Mean of samples in order of time. Nothing if there are fewer than 10 finite ones, their mean differs from gravity by
+/// more than 5 % or they scatter by more than 10 % of it: the rover moved, or the readings have other units.
+std::optional<StaticReading> static_reading(std::span<const ImuSample> samples, const LocalizationOptions& options);
+
+struct Heading {
+  double radians = 0;
+  double sigma_rad = 0;  ///< of the mean, without a common offset of the readings
+};
+/// Mean of the readings that agree with the largest number of others within 3 σ (consensus). Nothing without readings,
+/// or if not more than half of several agree.
+std::optional<Heading> consensus_heading(std::span<const CompassSample> readings, double min_sigma_rad);
+
+struct Tilt {
+  double roll_rad = 0, pitch_rad = 0, sigma_rad = 0;
+};
+/// Median of the readings; nothing without readings.
+std::optional<Tilt> median_tilt(std::span<const InclinometerSample> readings, double min_sigma_rad);
+
+/// world_from_body at the start: origin at the body, z along `up_in_body`, the horizontal part of `ahead_in_body` at
+/// `ahead_heading_rad` from x. If that axis is vertical, body x replaces it.
+Pose first_pose(const Eigen::Vector3d& up_in_body, const Eigen::Vector3d& ahead_in_body, double ahead_heading_rad);
 
 /// Slip of the last wheel step of at least min_slip_distance_m.
 struct WheelSlip {
@@ -83,6 +226,29 @@ class Localizer {
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+/// A Localizer without any other sensor, in the world of one with all sensors. Without constraints its pose is the
+/// product of the visual motions; its covariance accumulates theirs and the drift (docs/math/localization.md,
+/// "Vision").
+class VisionOnlyFilter {
+ public:
+  explicit VisionOnlyFilter(const LocalizationOptions& options) : localizer_(options) {}
+
+  void start(Stamp stamp, const Pose& world_from_body);
+  /// As Localizer::add.
+  bool add(const RelativeMotion& motion) { return localizer_.add(motion); }
+  bool add(PoseConstraint constraint);
+  bool reaches(Stamp stamp) const { return localizer_.reaches(stamp); }
+
+  UncertainPose world_from_body() const;
+
+  Bytes save() const;
+  Status restore(const Bytes& bytes);
+
+ private:
+  Localizer localizer_;
+  Pose world_from_own_;  // between the worlds: the own one always starts level and ahead
 };
 
 }  // namespace spartan

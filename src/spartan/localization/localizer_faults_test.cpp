@@ -11,6 +11,9 @@
 #include "spartan/localization/localizer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using Samples = std::vector<Measurement>;

@@ -9,6 +9,9 @@
 #include "spartan/localization/internal/error_state_filter.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 TEST(LocalizerLong, CovarianceStaysPositiveDefiniteOverAMillionSteps) {

@@ -12,6 +12,9 @@
 #include "spartan/localization/internal/drive_test.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 double normalised_error(const UncertainPose& estimate, const Pose& truth) {

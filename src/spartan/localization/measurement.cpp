@@ -1,6 +1,6 @@
-#include "spartan/localization/measurement.h"
-
 #include <cmath>
+
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
 namespace {

@@ -1,6 +1,6 @@
-#include "spartan/localization/sensor_health.h"
-
 #include <fmt/format.h>
+
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
 

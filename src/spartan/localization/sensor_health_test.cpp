@@ -1,7 +1,7 @@
-#include "spartan/localization/sensor_health.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
 namespace {

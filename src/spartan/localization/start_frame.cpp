@@ -1,12 +1,14 @@
-#include "spartan/localization/start_frame.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "spartan/localization/internal/measurement_models.h"
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr std::size_t kMinSamples = 10;

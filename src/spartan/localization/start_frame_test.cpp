@@ -1,5 +1,3 @@
-#include "spartan/localization/start_frame.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,8 +5,12 @@
 
 #include "spartan/localization/internal/drive_test.h"
 #include "spartan/localization/internal/measurement_models.h"
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 std::vector<ImuSample> resting(const Eigen::Vector3d& force, double scatter, int count) {

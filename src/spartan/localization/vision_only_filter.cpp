@@ -1,4 +1,4 @@
-#include "spartan/localization/vision_only_filter.h"
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
 

@@ -1,10 +1,12 @@
-#include "spartan/localization/vision_only_filter.h"
-
 #include <gtest/gtest.h>
 
 #include "spartan/localization/internal/drive_test.h"
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 TEST(VisionOnlyFilter, ComposesTheMotionsInTheGivenWorld) {

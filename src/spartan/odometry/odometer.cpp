@@ -13,9 +13,11 @@
 #include "spartan/odometry/internal/landmarks/odometer_memory.h"
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 #include "spartan/odometry/internal/motion_estimator.h"
-#include "spartan/odometry/odometry_options.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 /// Standard deviations of a motion that was not measured; larger than any motion between two frames of a rover.

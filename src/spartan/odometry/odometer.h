@@ -1,6 +1,7 @@
 // Visual odometry: the motion of the rover from one stereo frame to the next.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,9 +12,264 @@
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
 #include "spartan/core/time.h"
-#include "spartan/imaging/rectified_pair.h"
+#include "spartan/imaging/imager.h"
 
 namespace spartan {
+
+/// Options of the SURF detector and descriptors.
+struct SurfOptions {
+  int octaves = 3;         ///< octaves of the scale space
+  double threshold = 0.3;  ///< minimum determinant of the Hessian, gray levels²
+  bool upright = true;     ///< U-SURF: no orientation is assigned
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field(
+        "octaves", octaves,
+        "Number of octaves of the scale space, each with four box filters, the smallest 9 px wide; raising it finds "
+        "larger blobs (three octaves: filters up to 99 px) and costs little time.",
+        between(1, 5));
+    v.field(
+        "threshold", threshold,
+        "Minimum determinant of the Hessian for a feature, in squared gray levels; raising it keeps fewer, stronger "
+        "features.",
+        at_least(0));
+    v.field("upright", upright,
+            "True skips the orientation assignment (U-SURF): faster and more distinctive, for rovers that do not roll "
+            "over; set false where the image rotates by more than about 15 degrees between frames.");
+  }
+};
+
+/// Which landmark detector runs.
+enum class DetectorType {
+  surf,  ///< SurfDetector
+};
+constexpr auto enum_names(DetectorType) {
+  return std::array{EnumName<DetectorType>{DetectorType::surf, "surf"}};
+}
+
+struct DetectionOptions {
+  DetectorType detector = DetectorType::surf;  ///< which detector finds the landmarks
+  int landmarks = 1200;                        ///< maximum number of features of an image and of tracked landmarks
+  double spacing_px = 5;                       ///< minimum distance between two landmarks, pixels
+  SurfOptions surf;
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("detector", detector, "Detector that finds the landmarks.");
+    v.field("landmarks", landmarks,
+            "Maximum number of features detected in an image, and of landmarks tracked, spread evenly over the image; "
+            "raising it lowers the noise of the motion and costs time in proportion.",
+            between(20, 100000));
+    v.field("spacing_px", spacing_px,
+            "Minimum distance between two landmarks in pixels; raising it spreads them more evenly and keeps fewer.",
+            between(0, 100));
+    v.group("surf", surf);
+  }
+};
+
+/// Where the disparities of landmarks come from.
+enum class DisparitySource {
+  row,    ///< search along the image row of each landmark
+  dense,  ///< read from the dense disparity image, where one is given
+};
+constexpr auto enum_names(DisparitySource) {
+  return std::array{EnumName<DisparitySource>{DisparitySource::row, "row"},
+                    EnumName<DisparitySource>{DisparitySource::dense, "dense"}};
+}
+
+struct LandmarkReconstructionOptions {
+  DisparitySource source = DisparitySource::row;  ///< where disparities come from
+  double max_disparity_fraction = 0.3;            ///< largest disparity, fraction of the image width
+  double min_disparity_px = 0.0;                  ///< smallest disparity, pixels
+  double min_correlation = 0.7;                   ///< minimum normalized cross-correlation, −1 … 1
+  double uniqueness = 0.05;                       ///< minimum lead of the best correlation peak over all others
+  bool left_right_check = true;                   ///< the match must also be the best one from right to left
+  bool slant = true;                              ///< estimate the disparity gradient of the surface patch
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("source", source,
+            "Source of the landmarks' disparities: `row` searches along the image row of each landmark, `dense` reads "
+            "the dense disparity image where one is given.");
+    v.renamed("max_disparity_share", "max_disparity_fraction");
+    v.field("max_disparity_fraction", max_disparity_fraction,
+            "Largest disparity of the row search as a fraction of the image width; raising it finds nearer landmarks "
+            "and costs time in proportion.",
+            between(0.01, 1));
+    v.field("min_disparity_px", min_disparity_px,
+            "Smallest accepted disparity in pixels; raising it discards distant landmarks, a negative value accepts "
+            "points beyond infinity of a pair whose cameras are slightly miscalibrated.",
+            between(-100, 1000));
+    v.field("min_correlation", min_correlation,
+            "Minimum normalized cross-correlation of the left and right patch; raising it keeps fewer, more reliable "
+            "disparities.",
+            between(0, 1));
+    v.field("uniqueness", uniqueness,
+            "Minimum difference between the best correlation along the row and that of any other peak; raising it "
+            "rejects more ambiguous matches on repetitive texture.",
+            between(0, 1));
+    v.field("left_right_check", left_right_check,
+            "True requires that the search from right to left returns to the same pixel within 1 px; false saves a "
+            "search and accepts more occluded points.");
+    v.field(
+        "slant", slant,
+        "True estimates the disparity gradient of the surface together with the disparity, as needed on ground that "
+        "is seen at a low angle; false assumes fronto-parallel patches.");
+  }
+};
+
+struct LandmarkMatchingOptions {
+  bool descriptors = true;                ///< match descriptors first, for a coarse motion
+  double gate_px = 40;                    ///< half side of the descriptor search window around the prediction, pixels
+  double max_descriptor_distance = 0.35;  ///< maximum Euclidean distance of two unit descriptors
+  double descriptor_ratio = 0.85;         ///< maximum ratio of best to second best descriptor distance
+  bool correlation = true;                ///< locate landmarks to sub-pixel accuracy by patch alignment
+  double min_correlation = 0.7;           ///< minimum normalized cross-correlation with the landmark's patch
+  double correlation_radius_px = 4;       ///< maximum distance of the aligned patch from its predicted position, pixels
+  double max_scale_change = 1.35;         ///< relative change of size at which a landmark is re-anchored
+  double disparity_radius_px = 3;         ///< half range of the stereo search around the predicted disparity, pixels
+  bool rigidity = true;                   ///< reject matches whose distances to other landmarks have changed
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("descriptors", descriptors,
+            "True matches descriptors first and computes a coarse motion from them; false relies on the predicted "
+            "motion alone, which suffices where it is good to correlation_radius_px.");
+    v.field("gate_px", gate_px,
+            "Half side of the window around a landmark's predicted position in which descriptors are compared, in "
+            "pixels; raising it tolerates larger prediction errors at the cost of more false matches.",
+            at_least(1));
+    v.field(
+        "max_descriptor_distance", max_descriptor_distance,
+        "Maximum Euclidean distance between two descriptors (unit vectors, so 0 to 2); raising it accepts more, less "
+        "similar matches.",
+        between(0, 2));
+    v.field("descriptor_ratio", descriptor_ratio,
+            "Maximum ratio of the best to the second best descriptor distance (ratio test); raising it accepts more "
+            "ambiguous matches.",
+            between(0, 1));
+    v.field("correlation", correlation,
+            "True locates each landmark to sub-pixel accuracy by aligning its image patch; false uses the positions of "
+            "the matched features, which is faster and several times less accurate.");
+    v.field("min_correlation", min_correlation,
+            "Minimum normalized cross-correlation with the landmark's patch; raising it keeps fewer, more reliable "
+            "matches.",
+            between(0, 1));
+    v.renamed("correlation_reach_px", "correlation_radius_px");
+    v.field(
+        "correlation_radius_px", correlation_radius_px,
+        "Maximum distance between the predicted and the aligned position of a patch in pixels; raising it tolerates "
+        "a worse coarse motion and accepts more false matches.",
+        between(0.5, 100));
+    v.field("max_scale_change", max_scale_change,
+            "Factor by which a landmark may appear larger or smaller than in its anchor frame before it is re-anchored "
+            "with a new patch; raising it keeps anchors longer, which lowers drift but weakens the alignment.",
+            between(1, 4));
+    v.renamed("narrow_stereo_px", "disparity_radius_px");
+    v.field("disparity_radius_px", disparity_radius_px,
+            "Half range in pixels of the stereo search around the predicted disparity of a landmark; raising it "
+            "tolerates worse predictions and accepts more false disparities.",
+            between(1, 100));
+    v.field("rigidity", rigidity,
+            "True discards matches whose 3D distances to most other landmarks have changed, such as points on moving "
+            "objects, before the motion is estimated.");
+  }
+};
+
+struct MotionEstimationOptions {
+  int ransac_iterations = 200;       ///< maximum number of RANSAC samples of the coarse motion
+  double ransac_threshold_px = 3.0;  ///< largest reprojection residual of a RANSAC inlier, pixels
+  double pixel_sigma_px = 0.10;      ///< noise floor of an image position, standard deviation, pixels
+  double disparity_sigma_px = 0.10;  ///< noise floor of a disparity, standard deviation, pixels
+  double inlier_sigmas = 4.0;        ///< largest normalized residual of an inlier, standard deviations
+  bool robust = true;                ///< Cauchy loss instead of least squares
+  double offset_sigma_px = 0.15;     ///< prior standard deviation of the disparity offset, pixels
+  double offset_drift_px = 0.005;    ///< random walk of the disparity offset, pixels per frame
+  int min_inliers = 12;              ///< with fewer inliers the status is `lost`
+  int min_tracking_inliers = 40;     ///< with fewer inliers the status is `degraded`
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.renamed("ransac_rounds", "ransac_iterations");
+    v.field("ransac_iterations", ransac_iterations,
+            "Maximum number of RANSAC samples of three landmarks for the coarse motion; fewer are drawn once three "
+            "inliers have been sampled with a probability of 0.9999, and raising it tolerates more outliers.",
+            between(1, 100000));
+    v.renamed("coarse_tolerance_px", "ransac_threshold_px");
+    v.field("ransac_threshold_px", ransac_threshold_px,
+            "Largest reprojection residual (u, v, disparity) of a RANSAC inlier in pixels; raising it accepts less "
+            "accurate features and more outliers.",
+            at_least(0.1));
+    v.field("pixel_sigma_px", pixel_sigma_px,
+            "Standard deviation in pixels that is added to the alignment's own uncertainty of every image position; "
+            "raising it enlarges the covariance and lets near and distant landmarks count more alike.",
+            between(0.001, 10));
+    v.field("disparity_sigma_px", disparity_sigma_px,
+            "Standard deviation in pixels that is added to the alignment's own uncertainty of every disparity; raising "
+            "it lets image positions determine the motion more than disparities.",
+            between(0.001, 10));
+    v.field("inlier_sigmas", inlier_sigmas,
+            "Largest normalized residual of an inlier, in standard deviations of the observed noise; raising it keeps "
+            "more measurements, including outliers.",
+            between(1, 100));
+    v.field("robust", robust,
+            "True minimizes a Cauchy loss, which bounds the influence of outliers; false is plain least squares on the "
+            "inliers, for experiments.");
+    v.field("offset_sigma_px", offset_sigma_px,
+            "Prior standard deviation in pixels of a constant error of all disparities (from the relative yaw of the "
+            "cameras), which is estimated along with the motion; raise it for poor calibrations, 0 switches the "
+            "estimation off.",
+            between(0, 10));
+    v.field("offset_drift_px", offset_drift_px,
+            "Standard deviation in pixels by which that disparity offset may change from one frame to the next (random "
+            "walk); raising it follows thermal changes faster and lowers the accuracy of a constant offset.",
+            between(0, 10));
+    v.field(
+        "min_inliers", min_inliers,
+        "Minimum number of inliers of a measured motion; with fewer the status is `lost` and the predicted motion is "
+        "returned.",
+        between(6, 10000));
+    v.renamed("few_inliers", "min_tracking_inliers");
+    v.field("min_tracking_inliers", min_tracking_inliers,
+            "Minimum number of inliers for the status `tracking`; with fewer the motion is measured but its status is "
+            "`degraded`.",
+            between(6, 10000));
+  }
+};
+
+struct StationaryOptions {
+  bool detect = true;         ///< detect that the rover is stationary and hold its pose
+  double max_flow_px = 0.25;  ///< largest mean image flow of a stationary rover, pixels
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("detect", detect,
+            "True holds the pose exactly while the images show no motion, so that noise does not add up to drift.");
+    v.field("max_flow_px", max_flow_px,
+            "Largest mean image flow in pixels, accumulated since the rover stopped, that still counts as stationary; "
+            "raising it tolerates vibration and hides slow motion for longer.",
+            between(0, 10));
+  }
+};
+
+struct OdometryOptions {
+  DetectionOptions detection;
+  LandmarkReconstructionOptions reconstruction;
+  LandmarkMatchingOptions matching;
+  MotionEstimationOptions motion;
+  StationaryOptions stationary;
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.group("detection", detection);
+    v.group("reconstruction", reconstruction);
+    v.group("matching", matching);
+    v.group("motion", motion);
+    v.renamed("standing", "stationary");
+    v.group("stationary", stationary);
+  }
+};
 
 enum class TrackingStatus : std::uint8_t {
   tracking,    ///< the motion is measured

@@ -6,9 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "spartan/core/image_io.h"
-#include "spartan/core/random.h"
-#include "spartan/odometry/odometry_options.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/synthetic_world.h"
 

@@ -11,6 +11,9 @@
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // Nearest of `others` by descriptor distance, with the distance of the second nearest.

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "spartan/core/median.h"
+#include "spartan/numerics/median.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/synthetic_world.h"
 

@@ -6,11 +6,12 @@
 #include <chrono>
 #include <cmath>
 
-#include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/internal/disparity_filters.h"
 #include "spartan/reconstruction/internal/semi_global_matcher.h"
 
 namespace spartan {
+
+using namespace internal;
 
 struct DisparityComputer::State {
   State(const DisparityOptions& options_in, const ThreadPool& workers_in)

@@ -9,6 +9,7 @@
 #include "spartan/core/options.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
+#include "spartan/rig/rectified_stereo.h"
 
 namespace spartan {
 
@@ -58,5 +59,77 @@ class DisparityComputer {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// Matching costs are Hamming distances of 62-bit census signatures (0 … 62). Semi-global matching penalizes a
+/// disparity step of one pixel by P1 and a larger step by P2. P2 falls from p2_flat to p2_edge with the gray-level
+/// change ΔI along the path (Hirschmüller 2008):
+///   P2(ΔI) = max(p2_edge, p2_flat / (1 + |ΔI| / p2_falloff_levels)).
+struct DisparityOptions {
+  int p1 = 36;                    ///< Penalty of a disparity step of one pixel, census bits.
+  int p2_flat = 180;              ///< Penalty of a larger step where the gray level is constant, census bits.
+  int p2_edge = 50;               ///< Lower bound of the penalty of a larger step, census bits.
+  double p2_falloff_levels = 10;  ///< Gray-level change that halves P2, levels of an 8-bit image.
+  int out_of_view_cost = 22;      ///< Matching cost where x − d lies outside of the right image, census bits.
+  double uniqueness_percent = 0;  ///< Required excess of the second-best aggregated cost, percent; 0: no check.
+  double left_right_px = 4;       ///< Tolerance of the left-right consistency check, pixels; negative: no check.
+  bool median = true;             ///< Whether to apply a 3×3 median filter.
+  int speckle_size_px = 100;      ///< Minimum size of a connected component, pixels; 0: no speckle filter.
+  double speckle_step_px = 2;     ///< Largest disparity difference within a component, pixels.
+  std::string simd = "auto";      ///< SIMD instruction set; see simd_target_index().
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("p1", p1,
+            "Penalty P1 of semi-global matching for a disparity step of one pixel between neighbouring pixels, in bits "
+            "of the 62-bit census cost; raising it makes slanted surfaces smoother and flatter.",
+            between(0, 60));
+    v.field("p2_flat", p2_flat,
+            "Penalty P2 for a disparity step of more than one pixel where the gray level is constant, in census bits; "
+            "raising it bridges surfaces with little texture, but smooths over small objects.",
+            between(1, 190));
+    v.field("p2_edge", p2_edge,
+            "Lower bound of P2 where the gray level changes, in census bits; raising it allows fewer depth "
+            "discontinuities at image edges.",
+            between(1, 190));
+    v.field(
+        "p2_falloff_levels", p2_falloff_levels,
+        "Gray-level change between neighbouring pixels that halves P2, in levels of an 8-bit image; raising it keeps "
+        "P2 high at weak edges.",
+        between(0.1, 1000));
+    v.field("out_of_view_cost", out_of_view_cost,
+            "Matching cost of disparities that lead outside of the right image, in census bits; raising it makes such "
+            "disparities less likely at the left border.",
+            between(0, 62));
+    v.field(
+        "uniqueness_percent", uniqueness_percent,
+        "Required excess of the second-best aggregated cost over the best one, in percent; raising it discards more "
+        "ambiguous pixels, and 0 disables the check.",
+        between(0, 100));
+    v.field("left_right_px", left_right_px,
+            "Tolerance of the left-right consistency check in pixels: the disparity of a right pixel is that of the "
+            "cheapest left pixel matched to it; raising it discards fewer pixels at occlusions, and a negative value "
+            "disables the check.");
+    v.field("median", median,
+            "Whether to apply a 3x3 median filter to the disparities, which removes single outliers and keeps edges.");
+    v.field("speckle_size_px", speckle_size_px,
+            "Minimum size of a connected component of the disparity image in pixels; smaller components are discarded, "
+            "and 0 disables the speckle filter.",
+            at_least(0));
+    v.field(
+        "speckle_step_px", speckle_step_px,
+        "Largest disparity difference between neighbouring pixels of one component of the speckle filter, in pixels; "
+        "raising it joins more pixels, so that fewer components are discarded.",
+        at_least(0));
+    v.field(
+        "simd", simd,
+        "SIMD instruction set of the matching kernels; it affects the speed only, results are the same bit for bit.",
+        {"auto", "sse4", "avx2", "avx3"});
+  }
+};
+
+/// The search range of a pair: from 0 to f b / nearest_m, or to a quarter of the image width where `nearest_m` is not
+/// given (≤ 0; the search range of the published rover), at most three quarters of the width, rounded up so that the
+/// count is a multiple of 16.
+DisparityRange disparity_range(const RectifiedStereo& geometry, double nearest_m);
 
 }  // namespace spartan

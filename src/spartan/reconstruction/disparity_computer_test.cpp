@@ -7,9 +7,8 @@
 #include <cstring>
 #include <vector>
 
-#include "spartan/core/random.h"
-#include "spartan/core/simd_target.h"
-#include "spartan/reconstruction/disparity_options.h"
+#include "spartan/numerics/random.h"
+#include "spartan/numerics/simd_target.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/synthetic_world.h"
 

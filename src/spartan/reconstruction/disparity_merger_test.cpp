@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/height_field_view.h"
 

@@ -1,11 +1,10 @@
-#include "spartan/reconstruction/disparity_rendering.h"
-
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "spartan/core/opencv_bridge.h"
+#include "spartan/image_io/opencv_bridge.h"
+#include "spartan/reconstruction/rendering.h"
 
 namespace spartan {
 

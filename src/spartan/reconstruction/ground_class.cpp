@@ -1,4 +1,4 @@
-#include "spartan/reconstruction/ground_class.h"
+#include "spartan/reconstruction/local_map.h"
 
 namespace spartan {
 

@@ -1,10 +1,10 @@
-#include "spartan/reconstruction/ground_plane.h"
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "spartan/reconstruction/v_disparity.h"
 
 namespace spartan {
 namespace {

@@ -1,5 +1,3 @@
-#include "spartan/reconstruction/ground_plane.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -7,7 +5,8 @@
 #include <limits>
 #include <numbers>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
+#include "spartan/reconstruction/v_disparity.h"
 #include "spartan/rig/rig.h"
 
 namespace spartan {

@@ -1,9 +1,9 @@
-#include "spartan/reconstruction/ground_surface.h"
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "spartan/reconstruction/map_generator.h"
 
 namespace spartan {
 namespace {

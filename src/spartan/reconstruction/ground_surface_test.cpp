@@ -1,10 +1,10 @@
-#include "spartan/reconstruction/ground_surface.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <limits>
+
+#include "spartan/reconstruction/map_generator.h"
 
 namespace spartan {
 namespace {

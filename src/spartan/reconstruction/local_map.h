@@ -2,14 +2,20 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
-#include "spartan/core/geotiff.h"
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"
-#include "spartan/reconstruction/ground_class.h"
 
 namespace spartan {
+
+/// Class of a pixel or a map cell. A map cell of class `ground` is free; a cavity is a negative obstacle. The values
+/// are those of the band "class" of map files (docs/reference/files.md).
+enum class GroundClass : std::uint8_t { unknown = 0, ground = 1, obstacle = 2, cavity = 3 };
+
+/// The band "class" of a map file.
+Image<float> class_band(ImageView<const GroundClass> classes);
 
 /// A cell of a map: row 0 lies in the north (largest y), column 0 in the west (smallest x).
 struct GridCell {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "spartan/core/connected_components.h"
+#include "spartan/numerics/connected_components.h"
 
 namespace spartan {
 namespace {

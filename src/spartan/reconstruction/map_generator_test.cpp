@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan {
 namespace {

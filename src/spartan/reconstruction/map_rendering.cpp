@@ -1,12 +1,11 @@
-#include "spartan/reconstruction/map_rendering.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "spartan/core/opencv_bridge.h"
+#include "spartan/image_io/opencv_bridge.h"
+#include "spartan/reconstruction/rendering.h"
 
 namespace spartan {
 namespace {

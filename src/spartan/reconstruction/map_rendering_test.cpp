@@ -1,10 +1,9 @@
-#include "spartan/reconstruction/map_rendering.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
+#include "spartan/reconstruction/rendering.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/height_field_view.h"
 

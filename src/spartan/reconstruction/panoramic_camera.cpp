@@ -1,7 +1,7 @@
-#include "spartan/reconstruction/panoramic_camera.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "spartan/reconstruction/disparity_merger.h"
 
 namespace spartan {
 namespace {

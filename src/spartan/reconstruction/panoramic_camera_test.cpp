@@ -1,11 +1,10 @@
-#include "spartan/reconstruction/panoramic_camera.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
 #include <vector>
 
+#include "spartan/reconstruction/disparity_merger.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/height_field_view.h"
 

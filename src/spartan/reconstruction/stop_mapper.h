@@ -9,10 +9,9 @@
 #include "spartan/core/options.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
-#include "spartan/imaging/rectified_pair.h"
+#include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/disparity_merger.h"
-#include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/map_generator.h"
 #include "spartan/reconstruction/v_disparity.h"
 

@@ -1,11 +1,11 @@
-#include "spartan/reconstruction/traversability.h"
-
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "spartan/reconstruction/map_generator.h"
 
 namespace spartan {
 namespace {

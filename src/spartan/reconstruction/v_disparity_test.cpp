@@ -6,7 +6,7 @@
 #include <functional>
 #include <numbers>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/height_field_view.h"
 

@@ -9,8 +9,6 @@
 #include <limits>
 #include <numbers>
 
-#include "spartan/rig/rig_findings.h"
-
 namespace spartan {
 namespace {
 

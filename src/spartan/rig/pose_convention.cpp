@@ -1,6 +1,6 @@
-#include "spartan/rig/pose_convention.h"
-
 #include <utility>
+
+#include "spartan/rig/rig.h"
 
 namespace spartan {
 

@@ -1,6 +1,6 @@
-#include "spartan/rig/pose_convention.h"
-
 #include <gtest/gtest.h>
+
+#include "spartan/rig/rig.h"
 
 namespace spartan {
 namespace {

@@ -1,18 +1,39 @@
-// The rig: cameras, their poses on the rover, and the stereo pairs they form.
+// The rig: cameras, their poses on the rover, and the stereo pairs they form; its native file format rig.yaml.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "spartan/core/frame_image.h"
 #include "spartan/core/image.h"
-#include "spartan/core/pixel_format.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
+#include "spartan/core/trajectory.h"
 #include "spartan/rig/models/camera_model.h"
-#include "spartan/rig/vignetting.h"
 
 namespace spartan {
+
+/// Relative illumination, light at a pixel over light at the centre: 1 + a1 ρ² + a2 ρ⁴ + a3 ρ⁶, where ρ is the distance
+/// from the centre over half the image diagonal. No coefficients: no vignetting.
+struct Vignetting {
+  std::vector<double> coefficients;          ///< a1, a2, a3; missing ones are 0
+  std::optional<Eigen::Vector2d> centre_px;  ///< none: the principal point
+
+  /// Smallest relative illumination that is corrected; amplifying darker pixels (more than 8 times) yields mostly
+  /// noise.
+  static constexpr double kMinIllumination = 0.125;
+
+  /// Relative illumination at ρ².
+  double relative_illumination(double rho_squared) const {
+    double sum = 0;
+    for (std::size_t i = coefficients.size(); i-- > 0;) sum = (sum + coefficients[i]) * rho_squared;
+    return 1 + sum;
+  }
+  friend bool operator==(const Vignetting&, const Vignetting&) = default;
+};
 
 /// A pan-tilt unit. Its head frame is named like the unit and coincides with the base at pan = tilt = 0.
 /// Pan turns about the base's z (positive to the left), then tilt about the panned y (positive looks down).
@@ -92,5 +113,21 @@ Pose optical_from_forward();
 /// A rig of one pair without a body frame of its own: the body is the left camera, rotated to x forward, y left, z up
 /// (docs/conventions.md: recordings without a body frame). Poses follow the `left_optical` convention.
 Rig rig_of_one_pair(const std::string& name, Camera left, Camera right, const Pose& right_from_left);
+
+/// Reads a rig.yaml (docs/reference/rig.md) into a validated rig. Code `configuration` if the file cannot be read or is
+/// invalid; the error lists all errors of the file, each with its line and key.
+Result<Rig> read_rig_yaml(const std::string& path);
+/// The same from memory; `name` is the name of the file in errors.
+Result<Rig> parse_rig_yaml(const std::string& text, const std::string& name);
+/// The rig as rig.yaml; parse_rig_yaml() restores it bit for bit.
+std::string to_rig_yaml(const Rig& rig);
+
+/// Converts world_from_body to the recording's convention (Rig::convention). `body`: unchanged. `left_optical`:
+/// first_left_from_left, the left camera of the first pair relative to its pose at the first entry,
+/// (T₀ B)⁻¹ Tᵢ B with B = body_from_left; independent of the world frame.
+Trajectory in_recording_convention(const Rig& rig, Trajectory world_from_body);
+
+/// Converts world_from_body to first_left_from_left of a pair, the convention of KITTI's pose files.
+Trajectory in_left_optical_convention(const Rig& rig, const StereoPair& pair, Trajectory world_from_body);
 
 }  // namespace spartan

@@ -1,5 +1,3 @@
-#include "spartan/rig/rig_differences.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,7 +6,7 @@
 #include <map>
 
 #include "spartan/rig/describe.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
 namespace {

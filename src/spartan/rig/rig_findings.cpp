@@ -1,5 +1,3 @@
-#include "spartan/rig/rig_findings.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>

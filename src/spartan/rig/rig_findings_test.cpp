@@ -1,10 +1,10 @@
-#include "spartan/rig/rig_findings.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+
+#include "spartan/rig/describe.h"
 
 namespace spartan {
 namespace {

@@ -1,5 +1,3 @@
-#include "spartan/rig/rig_yaml.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,10 +5,12 @@
 #include <filesystem>
 #include <numbers>
 
+#include "spartan/core/files.h"
 #include "spartan/core/strict_yaml.h"
-#include "spartan/rig/calibration_text.h"
+#include "spartan/rig/rig.h"
 
 namespace spartan {
+
 namespace {
 
 constexpr int kSchema = 1;
@@ -253,7 +253,7 @@ Result<Rig> parse_rig_yaml(const std::string& text, const std::string& name) {
 }
 
 Result<Rig> read_rig_yaml(const std::string& path) {
-  const auto text = rig_detail::read_calibration_text(path);
+  const auto text = read_calibration_text(path);
   if (!text) return failure(text);
   return parse_rig_yaml(*text, path);
 }

@@ -1,5 +1,3 @@
-#include "spartan/rig/rig_yaml.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -7,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "spartan/rig/rig.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"

@@ -1,7 +1,7 @@
-#include "spartan/rig_design/azimuth_set.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan {
 namespace {

@@ -1,10 +1,10 @@
-#include "spartan/rig_design/azimuth_set.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan {
 namespace {

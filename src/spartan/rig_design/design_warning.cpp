@@ -1,5 +1,3 @@
-#include "spartan/rig_design/design_warning.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,10 +6,12 @@
 #include <tuple>
 
 #include "spartan/rig_design/internal/stereo_relations.h"
-#include "spartan/rig_design/pan_text.h"
 #include "spartan/rig_design/rig_designer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;

@@ -1,5 +1,3 @@
-#include "spartan/rig_design/ground_view.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -7,8 +5,12 @@
 #include <stdexcept>
 
 #include "spartan/rig_design/internal/stereo_relations.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;

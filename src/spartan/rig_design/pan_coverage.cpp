@@ -1,12 +1,14 @@
-#include "spartan/rig_design/pan_coverage.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "spartan/rig_design/internal/stereo_relations.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;

@@ -1,5 +1,3 @@
-#include "spartan/rig_design/pan_coverage.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -7,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/rig/rig_yaml.h"
-#include "spartan/rig_design/pan_text.h"
+#include "spartan/rig/rig.h"
+#include "spartan/rig_design/rig_designer.h"
 #include "spartan/testing/real_data.h"
 
 namespace spartan {

@@ -1,6 +1,6 @@
-#include "spartan/rig_design/pan_text.h"
-
 #include <fmt/format.h>
+
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan {
 

@@ -12,6 +12,9 @@
 #include "spartan/rig_design/internal/stereo_relations.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;

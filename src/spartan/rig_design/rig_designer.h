@@ -1,16 +1,129 @@
 // Rig design: exhaustive search for the stereo pairs that meet requirements, and evaluation of a published pair.
 #pragma once
 
+#include <Eigen/Core>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
-#include "spartan/rig_design/design_warning.h"
-#include "spartan/rig_design/ground_view.h"
-#include "spartan/rig_design/pan_coverage.h"
 #include "spartan/rig_design/requirements.h"
 
 namespace spartan {
+
+/// An interval of azimuths, degrees, positive to the left of straight ahead; from < to.
+struct AzimuthSector {
+  double from_deg = 0, to_deg = 0;
+  double width_deg() const { return to_deg - from_deg; }
+};
+
+/// A set of azimuths. Intervals and gaps of less than 10⁻⁹ degrees are ignored.
+class AzimuthSet {
+ public:
+  AzimuthSet() = default;  ///< empty
+  static AzimuthSet all();
+  /// Azimuths within `half_deg` of the middle, modulo 360°; empty for 0 and less, all for 180 and more.
+  static AzimuthSet around(double middle_deg, double half_deg);
+
+  /// Disjoint, ascending, within −180 … 180; an interval across ±180 is split there.
+  const std::vector<AzimuthSector>& sectors() const { return sectors_; }
+  double width_deg() const;
+  bool empty() const { return sectors_.empty(); }
+  bool contains(double azimuth_deg) const;
+  /// Whether the other set is a subset of this one.
+  bool covers(const AzimuthSet& other) const;
+
+  /// The union of this set rotated by each of the angles (positive to the left).
+  AzimuthSet rotated_by(const std::vector<double>& angles_deg) const;
+  /// The intersection of both sets.
+  AzimuthSet intersected_with(const AzimuthSet& other) const;
+
+ private:
+  explicit AzimuthSet(const std::vector<AzimuthSector>& sectors);  // in any order, possibly overlapping, any range
+
+  std::vector<AzimuthSector> sectors_;
+};
+
+/// A pair over level ground: both cameras at the same height, half a baseline left and right of the pan axis, pointing
+/// ahead and down by `tilt`.
+struct GroundView {
+  double height_m = 0;
+  double tilt_rad = 0;  ///< of the optical axes below the horizontal
+  double hfov_rad = 0, vfov_rad = 0;
+  double baseline_m = 0;
+};
+
+/// Corners on the ground, counter-clockwise from above, (x ahead, y to the left) of the foot of the pan axis, m.
+using GroundPolygon = std::vector<Eigen::Vector2d>;
+
+/// Whether the top row, and with it the whole image, is below the horizon.
+bool is_below_horizon(const GroundView& view);
+
+/// Distance of the ground in the middle column, ahead of the foot of the camera, m: of the bottom row, and of the top
+/// row (infinite at the horizon).
+double near_edge_m(const GroundView& view);
+double far_edge_m(const GroundView& view);
+
+/// The ground in the image of one camera, `camera_left_m` to the left of the pan axis, at a pan angle (positive to the
+/// left): the image corners projected onto the plane. Throws std::invalid_argument where is_below_horizon() is false.
+GroundPolygon footprint(const GroundView& view, double camera_left_m, double pan_rad);
+/// The ground that both cameras see; may be empty.
+GroundPolygon common_footprint(const GroundView& view, double pan_rad);
+
+/// The intersection of two convex polygons; may be empty.
+GroundPolygon intersection(const GroundPolygon& a, const GroundPolygon& b);
+double area_m2(const GroundPolygon& polygon);
+
+/// Half of the azimuth that the far edge of a footprint at pan 0 spans from the origin, rad; none for an empty one.
+std::optional<double> far_edge_half_azimuth_rad(const GroundPolygon& polygon);
+/// The azimuths at which a circle around the origin lies inside a convex polygon.
+AzimuthSet azimuths_at(const GroundPolygon& polygon, double distance_m);
+
+/// Overlap of two neighbouring views that are one pan step apart.
+struct PanOverlap {
+  double view_rad = 0, step_rad = 0;
+  double percent() const;  ///< share of the field of view; negative: a gap
+  double gap_deg() const;  ///< between the views; negative: an overlap
+};
+
+/// A range of distances on the ground from the pan axis.
+struct DistanceSpan {
+  double from_m = 0, to_m = 0;
+};
+
+/// Coverage of all pans together. Azimuths are clipped to the required azimuth, which is centred straight ahead.
+struct PanCoverage {
+  std::optional<PanOverlap> overlap;             ///< nominal, from the field of view; none for a single pan
+  std::optional<PanOverlap> far_overlap;         ///< at the top row, one camera; none for a single pan
+  std::optional<PanOverlap> far_overlap_stereo;  ///< the same for both cameras; also none without common ground
+  AzimuthSet azimuth_far;                        ///< azimuths at which the far edge (top row) is seen, one camera
+  AzimuthSet azimuth_far_stereo;                 ///< the same for both cameras
+  /// Distances at which both cameras cover the whole required azimuth: the longest such range; none if there is none.
+  std::optional<DistanceSpan> full_coverage;
+};
+
+PanCoverage pan_coverage(const GroundView& view, const PanRequirements& pans);
+
+/// The azimuth that the requirements demand.
+AzimuthSet required_azimuth(const PanRequirements& pans);
+/// The part of the required azimuth that the pans cover at a distance from the pan axis. `at_pan_0` is a footprint at
+/// pan 0, of one camera or of both.
+AzimuthSet covered_azimuth(const GroundPolygon& at_pan_0, const PanRequirements& pans, double distance_m);
+
+/// "-58.5 to 58.5 deg", a list of the sectors, or "nowhere".
+std::string to_text(const AzimuthSet& set, const std::string& degrees = " deg");
+/// "overlap by 30.0 %", or "leave a gap of 30.0 deg".
+std::string to_text(const PanOverlap& overlap, const std::string& degrees = " deg");
+/// One sentence about the overlap of neighbouring pans, of which there must be at least two.
+std::string describe_overlaps(const PanCoverage& pans, const std::string& degrees = " deg");
+
+/// One warning. `value` is the quantity that `text` reports, in the unit of the text.
+struct DesignWarning {
+  std::string id;  ///< docs/math/rig_design.md, "Warnings"
+  std::string pair;
+  std::string text;
+  double value = 0;
+};
 
 /// Margin of a pair to each limit; negative: violated. NaN where nothing is required.
 struct PairMargins {
@@ -76,5 +189,8 @@ std::size_t count_feasible(const PairRequirements& requirements);
 
 /// The ground view of a pair at its tilt.
 GroundView ground_view(const PairMetrics& pair, const PairRequirements& requirements);
+
+/// All warnings about a design; ignores the field `warnings` of `design`.
+std::vector<DesignWarning> find_design_warnings(const RigRequirements& requirements, const RigDesign& design);
 
 }  // namespace spartan

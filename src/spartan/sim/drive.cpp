@@ -1,10 +1,10 @@
-#include "spartan/sim/drive.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "spartan/sim/scenario.h"
 
 namespace spartan::sim {
 namespace {

@@ -1,5 +1,3 @@
-#include "spartan/sim/drive.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,11 +5,14 @@
 #include <numbers>
 #include <set>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/sim/internal/world/rock_field.h"
 #include "spartan/sim/scenario.h"
 
 namespace spartan::sim {
+
+using namespace internal;
+
 namespace {
 
 Rig rover() {

@@ -1,11 +1,11 @@
-#include "spartan/sim/path.h"
-
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
+
+#include "spartan/sim/scenario.h"
 
 namespace spartan::sim {
 namespace {

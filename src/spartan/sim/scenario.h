@@ -1,15 +1,100 @@
 // A scenario: everything that defines a simulated drive.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "spartan/core/options.h"
 #include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
-#include "spartan/sim/drive.h"
 #include "spartan/sim/scenario_options.h"
 
 namespace spartan::sim {
+
+/// Position and heading in the world plane; the heading is counter-clockwise from x.
+struct PlanarPose {
+  double x = 0, y = 0, heading = 0;  ///< m, m, rad
+};
+
+/// One uninterrupted motion: driving along a curve, turning in place, or being stationary.
+/// The speed profile is twice continuously differentiable and begins and ends at zero.
+class Motion {
+ public:
+  static constexpr double kStep_m = 0.01;  ///< m; spacing of a curve's points
+  static Motion stationary(const PlanarPose& at, double seconds);
+  static Motion turn(const PlanarPose& at, double angle_rad, double rate_rad_s, double ramp_s);
+  /// Along points spaced kStep_m; the last step may be shorter.
+  static Motion drive(std::vector<PlanarPose> curve, double speed_m_s, double ramp_s);
+
+  double seconds() const { return seconds_; }
+  /// Metres driven, or radians turned, at a time since the start of the motion.
+  double progress(double t) const;
+  PlanarPose at(double t) const;
+  bool drives() const { return !curve_.empty(); }
+  /// Metres or radians of the whole motion.
+  double amount() const { return amount_; }
+  /// The time at which a progress is reached, to 1 µs.
+  double time_of(double target_progress) const;
+
+ private:
+  PlanarPose start_;
+  std::vector<PlanarPose> curve_;
+  double amount_ = 0, turn_sign_ = 1;  // metres or radians
+  double rate_ = 0, ramp_s_ = 0, seconds_ = 0;
+};
+
+/// A curve to drive, a turn in place, or a pause.
+struct PathLeg {
+  std::vector<PlanarPose> curve;  ///< empty: a turn in place or a pause
+  double turn_rad = 0;
+  double rest_s = 0;
+};
+/// The legs of a path in order. Errors: `configuration` for waypoints that make no path.
+Result<std::vector<PathLeg>> lay_path(const PathOptions& options);
+
+/// Driven length of a curve.
+double curve_length(const std::vector<PlanarPose>& curve);
+/// The first `metres` of a curve, and the remainder.
+std::pair<std::vector<PlanarPose>, std::vector<PlanarPose>> cut(const std::vector<PlanarPose>& curve, double metres);
+
+/// One stereo frame of one pair.
+struct PlannedFrame {
+  double time_s = 0;  ///< middle of the exposure
+  std::string pair;
+  std::int64_t position_id = 0;  ///< shared by all frames taken at one place
+  double pan_rad = 0, tilt_rad = 0;
+};
+
+/// Planar motion over time and the frames to take. A rover that follows it exactly is simulated by BodyMotion.
+class Drive {
+ public:
+  /// The rover is stationary for this time before it moves, so that gravity can be measured.
+  static constexpr double kInitialStop_s = 2;
+
+  /// Lays the path and plans the frames of the rig's pairs. Errors: `configuration` for a path that cannot be built, or
+  /// that is shorter than the distance of a stop.
+  static Result<Drive> plan(const PathOptions& path, const CaptureOptions& capture, const Rig& rig);
+
+  double seconds() const { return seconds_; }
+  /// Planar pose at a time, clamped to the drive.
+  PlanarPose at(double time_s) const;
+  /// In order of time.
+  const std::vector<PlannedFrame>& frames() const { return frames_; }
+  /// Points along the driven path, at most 2 · Motion::kStep_m apart.
+  std::vector<PlanarPose> track() const;
+
+ private:
+  struct Segment {
+    double from_s;
+    Motion motion;
+  };
+  class Planner;
+  std::vector<Segment> segments_;
+  std::vector<PlannedFrame> frames_;
+  double seconds_ = 0;
+};
 
 /// The contents of scenario.yaml.
 struct Scenario {

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
 #include "spartan/testing/doc_example.h"
 

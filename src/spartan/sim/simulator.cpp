@@ -12,7 +12,6 @@
 
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
-#include "spartan/core/geotiff.h"
 #include "spartan/sim/internal/camera/faults.h"
 #include "spartan/sim/internal/camera/frame_preview.h"
 #include "spartan/sim/internal/camera/renderer.h"
@@ -20,8 +19,12 @@
 #include "spartan/sim/internal/drive/body_motion.h"
 #include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/internal/world/world.h"
+#include "spartan/storage/geotiff.h"
 
 namespace spartan::sim {
+
+using namespace internal;
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -339,7 +342,8 @@ class Simulation {
 
 }  // namespace
 
-FramePreview preview_left(const SimulationRequest& request, std::size_t frame_index, const ThreadPool& workers) {
+FramePreview internal::preview_left(const SimulationRequest& request, std::size_t frame_index,
+                                    const ThreadPool& workers) {
   const SimulationHooks hooks;
   return Simulation(request, hooks, workers).preview_left(frame_index);
 }

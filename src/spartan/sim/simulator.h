@@ -1,6 +1,7 @@
 // Simulates a drive and writes it as a recording.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -8,12 +9,19 @@
 
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
+#include "spartan/rig/rectified_stereo.h"
 #include "spartan/rig/rig.h"
-#include "spartan/sim/drive.h"
-#include "spartan/sim/rectified_view.h"
 #include "spartan/sim/scenario.h"
 
 namespace spartan::sim {
+
+/// Rectified geometry of a pair and its rotations, as the reader of the recording will compute them from the nominal
+/// rig.
+struct RectifiedView {
+  RectifiedStereo geometry;
+  Eigen::Matrix3d left_from_rectified = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d right_from_rectified = Eigen::Matrix3d::Identity();
+};
 
 /// What to simulate, and where to write it.
 struct SimulationRequest {

@@ -11,6 +11,9 @@
 #include "spartan/slam/internal/surface_grid.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr int kSide = Tile::kSide;

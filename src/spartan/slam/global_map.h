@@ -1,24 +1,69 @@
-// The global map: submaps of tiled cells, with a limited number of tiles in memory.
+// The global map: submaps of tiled cells, with a limited number of tiles in memory; in a run or in a file of its own.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
-#include "spartan/core/geotiff.h"
+#include "spartan/core/image.h"
 #include "spartan/reconstruction/local_map.h"
 #include "spartan/reconstruction/map_generator.h"
-#include "spartan/reconstruction/traversability.h"
-#include "spartan/slam/lattice.h"
 #include "spartan/slam/slam_options.h"
 #include "spartan/slam/tile_store.h"
+#include "spartan/storage/database.h"
 
 namespace spartan {
 
+/// A rectangle of the world lattice of map cells, whose corners are integer multiples of the cell size, so that the
+/// cells of all maps coincide. Column c holds x in [(west + c) s, (west + c + 1) s), row r holds y in
+/// [(north − r − 1) s, (north − r) s), s the cell size: row 0 lies in the north, as in map files.
+struct LatticeWindow {
+  int west = 0, north = 0;
+  int width = 0, height = 0;
+
+  ImageSize size() const { return {width, height}; }
+  std::int64_t cells() const { return std::int64_t{width} * height; }
+  GeoTransform place(double cell_m) const { return {west * cell_m, north * cell_m, cell_m}; }
+  friend bool operator==(const LatticeWindow&, const LatticeWindow&) = default;
+};
+
+/// All cells that intersect a rectangle of the world.
+inline LatticeWindow window_between(double west_m, double south_m, double east_m, double north_m, double cell_m) {
+  const int west = static_cast<int>(std::floor(west_m / cell_m)), east = static_cast<int>(std::ceil(east_m / cell_m)),
+            south = static_cast<int>(std::floor(south_m / cell_m)),
+            north = static_cast<int>(std::ceil(north_m / cell_m));
+  return {west, north, east - west, north - south};
+}
+
+/// All cells within `reach_m` of a point, measured along x and y.
+inline LatticeWindow window_around(double x_m, double y_m, double reach_m, double cell_m) {
+  return window_between(x_m - reach_m, y_m - reach_m, x_m + reach_m, y_m + reach_m, cell_m);
+}
+
+/// The smallest window that contains both.
+inline LatticeWindow window_around(const LatticeWindow& a, const LatticeWindow& b) {
+  const int west = std::min(a.west, b.west), north = std::max(a.north, b.north),
+            east = std::max(a.west + a.width, b.west + b.width),
+            south = std::min(a.north - a.height, b.north - b.height);
+  return {west, north, east - west, north - south};
+}
+
+/// The window of a map whose cells lie on the lattice.
+inline LatticeWindow window_of(const GeoTransform& place, ImageSize size) {
+  return {static_cast<int>(std::lround(place.west_m / place.cell_m)),
+          static_cast<int>(std::lround(place.north_m / place.cell_m)), size.width, size.height};
+}
+
+namespace internal {
 struct SurfaceGrid;
+}
 
 /// A rectangular part of the global map in the world frame. Unobserved cells are NaN (count and log-odds: 0).
 struct MapView {
@@ -33,7 +78,7 @@ struct MapView {
   MapBands bands(const Traversability& shape) const;
   /// Slope, roughness, steps and costs. The ground surface is first fitted to the free cells.
   Traversability shape(const MapOptions& options, const ThreadPool& workers) const;
-  SurfaceGrid grid() const;
+  internal::SurfaceGrid grid() const;
 };
 
 /// The map at one position.
@@ -110,6 +155,38 @@ class GlobalMap {
   std::size_t submaps_stored_ = 0, stops_stored_ = 0;
   std::map<TileKey, Slot> tiles_;
   std::uint64_t clock_ = 0;
+};
+
+/// Statistics of the observed cells; all 0 where there are none.
+struct MapStatistics {
+  std::array<std::int64_t, 4> cells{};             ///< Number of cells by GroundClass.
+  std::int64_t known = 0;                          ///< Number of observed cells.
+  float min_elevation_m = 0, max_elevation_m = 0;  ///< Lowest and highest elevation.
+  float median_variance_m2 = 0;  ///< Of the elevations; the upper of the two middle values of an even number.
+};
+
+/// Processes windows of at most `side` by `side` cells one after the other, in two passes. Codes: GlobalMap::view's.
+Result<MapStatistics> map_statistics(GlobalMap& map, int side = 512);
+
+/// An open map file and its map, whose tiles are read from it on demand.
+class MapFile {
+ public:
+  /// Writes the whole map under a temporary name and renames it; an existing file is replaced. Code `output`.
+  static Status save(GlobalMap& map, const std::string& path);
+  /// Codes: `input` (missing, damaged, not a map), `configuration` (of a newer version of the program). Files of older
+  /// versions are migrated first; opened read-only, they are rejected with code `configuration`.
+  static Result<MapFile> open(const std::string& path, const GlobalMapOptions& options, Database::Mode mode);
+
+  GlobalMap& map() { return *map_; }
+  /// Writes all changes in one transaction.
+  Status commit();
+
+ private:
+  explicit MapFile(std::unique_ptr<Database> db, std::unique_ptr<TileStore> store, std::unique_ptr<GlobalMap> map)
+      : db_(std::move(db)), store_(std::move(store)), map_(std::move(map)) {}
+  std::unique_ptr<Database> db_;
+  std::unique_ptr<TileStore> store_;
+  std::unique_ptr<GlobalMap> map_;
 };
 
 }  // namespace spartan

@@ -8,10 +8,12 @@
 #include <limits>
 
 #include "spartan/slam/internal/synthetic_stop_test.h"
-#include "spartan/slam/map_file.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using testing::covariance_of;

@@ -1,7 +1,7 @@
-#include "spartan/slam/map_cell.h"
-
 #include <algorithm>
 #include <limits>
+
+#include "spartan/slam/tile_store.h"
 
 namespace spartan {
 namespace {

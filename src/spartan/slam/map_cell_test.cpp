@@ -1,10 +1,10 @@
-#include "spartan/slam/map_cell.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+
+#include "spartan/slam/tile_store.h"
 
 namespace spartan {
 namespace {

@@ -1,9 +1,9 @@
-#include "spartan/slam/map_file.h"
-
 #include <fmt/format.h>
 
 #include <filesystem>
 #include <vector>
+
+#include "spartan/slam/global_map.h"
 
 namespace spartan {
 namespace {

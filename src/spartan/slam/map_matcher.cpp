@@ -1,5 +1,3 @@
-#include "spartan/slam/map_matcher.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,8 +8,12 @@
 #include "spartan/slam/internal/map_refinement.h"
 #include "spartan/slam/internal/match_covariance.h"
 #include "spartan/slam/internal/scan_matching.h"
+#include "spartan/slam/map_merger.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kDownsampling = 0.25;  // grid size for downsampling the points, in cell sizes

@@ -1,5 +1,3 @@
-#include "spartan/slam/map_matcher.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -7,8 +5,12 @@
 
 #include "spartan/slam/internal/map_refinement.h"
 #include "spartan/slam/internal/synthetic_stop_test.h"
+#include "spartan/slam/map_merger.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using testing::covariance_of;

@@ -10,6 +10,9 @@
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using testing::covariance_of;

@@ -1,8 +1,8 @@
-#include "spartan/slam/map_statistics.h"
-
 #include <algorithm>
 #include <bit>
 #include <vector>
+
+#include "spartan/slam/global_map.h"
 
 namespace spartan {
 namespace {

@@ -1,13 +1,15 @@
-#include "spartan/slam/map_statistics.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <vector>
 
+#include "spartan/slam/global_map.h"
 #include "spartan/slam/internal/synthetic_stop_test.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using testing::points_at;

@@ -1,6 +1,6 @@
-#include "spartan/slam/submap.h"
-
 #include <cmath>
+
+#include "spartan/slam/tile_store.h"
 
 namespace spartan {
 namespace {

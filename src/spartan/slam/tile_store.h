@@ -1,16 +1,111 @@
-// Persistent storage of the global map: tables of tiles, submaps and stops, in a run's store or in a map file.
+// Cells, tiles and submaps of the global map, and their persistent storage.
 #pragma once
 
+#include <array>
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "spartan/core/database.h"
-#include "spartan/slam/submap.h"
+#include "spartan/core/archive.h"
+#include "spartan/core/pose.h"
+#include "spartan/core/result.h"
+#include "spartan/core/time.h"
+#include "spartan/reconstruction/local_map.h"
+#include "spartan/storage/database.h"
 
 namespace spartan {
+
+/// A surface in a cell, fused from the observations of one or more stops. Elevations are relative to the submap's
+/// anchor.
+struct CellSurface {
+  float elevation_m = 0;
+  float variance_m2 = 0;  ///< Variance of elevation_m.
+  float lowest_m = 0, highest_m = 0;
+  float count = 0;              ///< Number of points; 0: not observed.
+  float occupancy_logodds = 0;  ///< Log-odds of an obstacle or a cavity.
+  std::int32_t stop = -1;       ///< The first stop that observed it.
+  std::int16_t shape = 0;       ///< Observations as an obstacle minus observations as a cavity.
+  std::uint16_t votes = 0;      ///< Number of observations of the class; 0: the class is unknown.
+
+  bool observed() const { return count > 0; }
+  void shift_elevation(float by_m) {
+    elevation_m += by_m;
+    lowest_m += by_m;
+    highest_m += by_m;
+  }
+  friend bool operator==(const CellSurface&, const CellSurface&) = default;
+};
+
+struct MapCell {
+  CellSurface surface;
+  CellSurface alternative;  ///< Fused from observations that contradict the surface.
+
+  /// Cells that were never observed, or only without a class, are unknown; free cells are ground.
+  GroundClass kind() const;
+  friend bool operator==(const MapCell&, const MapCell&) = default;
+};
+
+/// Parameters of the fusion of elevations; see GlobalMapOptions.
+struct CellFusion {
+  double gate_sigmas = 3;
+  double relief_sigma_ratio = 0.15;  ///< Standard deviation of a cell's elevation over its relief.
+  double least_variance_m2 = 4e-6;
+};
+
+/// Fuses one observation into a cell. If it passes the gate of the surface, both are fused with inverse-variance
+/// weights (the variance has a lower bound), and the alternative loses a vote. Otherwise the surface does not change:
+/// if the observation passes the gate of the alternative, it is fused into that; if not, the alternative loses a vote.
+/// An alternative without votes is discarded. When its variance is at most that of the surface, the two are swapped. So
+/// a variance never rises, and repeated contradiction replaces the surface.
+MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion);
+
+/// Translation in whole cells.
+struct LatticeOffset {
+  int x = 0, y = 0;
+};
+
+/// A gravity-aligned submap. Its cells cover x in [c s, (c + 1) s) and y in [r s, (r + 1) s) of the submap frame, s the
+/// cell size. A new anchor has no rotation and lies on the world lattice, so that the cells of world and submap
+/// coincide. Moving the anchor moves all cells without rewriting them.
+struct Submap {
+  std::int32_t id = 0;
+  Pose world_from_submap;
+
+  /// Offset in cells of the submap's origin from the world's; none where the anchor is rotated or off the lattice.
+  std::optional<LatticeOffset> lattice_offset(double cell_m) const;
+};
+
+/// A stop that was fused into the map, with its corrected pose (covariance of the right perturbation).
+struct MapStop {
+  std::int32_t id = 0;
+  Stamp stamp;
+  UncertainPose world_from_body;
+};
+
+struct TileKey {
+  std::int32_t submap = 0, x = 0, y = 0;
+  friend auto operator<=>(const TileKey&, const TileKey&) = default;
+};
+
+/// A square of cells: columns [kSide · key.x, kSide · (key.x + 1)) of the submap, and rows alike.
+struct Tile {
+  static constexpr int kSide = 32;
+  /// Index of the tile that contains a cell of the submap.
+  static constexpr int of(int cell) { return cell >= 0 ? cell / kSide : -((kSide - 1 - cell) / kSide); }
+  std::array<MapCell, kSide * kSide> cells;
+
+  MapCell& at(int x, int y) { return cells[static_cast<std::size_t>(y * kSide + x)]; }
+  const MapCell& at(int x, int y) const { return cells[static_cast<std::size_t>(y * kSide + x)]; }
+  friend bool operator==(const Tile&, const Tile&) = default;
+};
+
+/// Serializes the observed cells only. Versioned.
+Bytes to_bytes(const Tile& tile);
+/// Code `input` where the bytes are of another version or damaged; `what` names them in the error.
+Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what);
 
 /// Writes take part in the current transaction of the database; its owner commits. Tables (all `map_…`):
 /// map_tiles (submap, ix, iy, revision → checksum, cells), map_submaps (id → anchor), map_stops (id → stamp, pose,

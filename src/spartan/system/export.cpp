@@ -7,17 +7,19 @@
 #include <cmath>
 #include <utility>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/rig/pose_convention.h"
+#include "spartan/rig/rig.h"
 #include "spartan/system/internal/terrain_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
-#include "spartan/system/saved_map.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr std::array<std::pair<std::string_view, ExportFormat>, 6> kFormats{{{"tum", ExportFormat::tum},

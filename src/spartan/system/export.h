@@ -7,7 +7,7 @@
 
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
-#include "spartan/system/run_trajectory.h"
+#include "spartan/system/run_folder.h"
 
 namespace spartan {
 

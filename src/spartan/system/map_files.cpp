@@ -6,10 +6,10 @@
 #include <filesystem>
 
 #include "spartan/core/files.h"
-#include "spartan/core/geotiff.h"
-#include "spartan/core/image_io.h"
-#include "spartan/reconstruction/map_rendering.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/reconstruction/point_cloud.h"
+#include "spartan/reconstruction/rendering.h"
+#include "spartan/storage/geotiff.h"
 
 namespace spartan {
 namespace {

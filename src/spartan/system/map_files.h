@@ -1,12 +1,15 @@
 // Files of a map: GeoTIFF, images, point cloud (docs/reference/files.md).
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 
 #include "spartan/core/result.h"
 #include "spartan/reconstruction/stop_mapper.h"
 #include "spartan/slam/global_map.h"
+#include "spartan/system/run_options.h"
+#include "spartan/system/run_store.h"
 
 namespace spartan {
 
@@ -29,5 +32,26 @@ Status write_map_geotiff(const MapView& view, const MapOptions& options, const T
 /// `<pair>_<stamp_ns>_v_disparity.png` of each view in which ground was found. Code `output`.
 Status write_stop_files(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
                         const MappingOptions& options, const std::string& folder);
+
+/// Read-only access to a saved global map.
+class SavedMap {
+ public:
+  /// `path`: a map file or a run folder. Codes: `input` (missing, damaged, or without a map), `configuration` (of
+  /// another version).
+  static Result<SavedMap> open(const std::string& path);
+
+  GlobalMap& map() { return file_ ? file_->map() : *run_map_; }
+  /// Options of the run; the defaults for a map file.
+  const RunOptions& options() const { return options_; }
+
+ private:
+  explicit SavedMap(RunOptions options) : options_(std::move(options)) {}
+  static Result<SavedMap> open_run(const std::string& path);
+
+  RunOptions options_;
+  std::unique_ptr<MapFile> file_;
+  std::unique_ptr<RunStore> run_store_;
+  std::unique_ptr<GlobalMap> run_map_;
+};
 
 }  // namespace spartan

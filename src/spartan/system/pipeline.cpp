@@ -7,12 +7,14 @@
 #include <cmath>
 
 #include "spartan/localization/dead_reckoning.h"
-#include "spartan/localization/start_frame.h"
-#include "spartan/localization/vision_only_filter.h"
+#include "spartan/localization/localizer.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/system/internal/stop_stage.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr std::uint32_t kStateVersion = 5;  // of save(); raise it when the saved state changes

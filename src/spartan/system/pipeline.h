@@ -14,7 +14,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/threads.h"
-#include "spartan/imaging/rectified_pair.h"
+#include "spartan/imaging/imager.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/odometry/odometer.h"
 #include "spartan/rig/rig.h"

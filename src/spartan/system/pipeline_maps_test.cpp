@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "spartan/core/database.h"
 #include "spartan/rig/rig.h"
+#include "spartan/storage/database.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/testing/synthetic_world.h"
 #include "spartan/testing/temporary_folder.h"

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "spartan/core/database.h"
+#include "spartan/storage/database.h"
 #include "spartan/testing/synthetic_world.h"
 #include "spartan/testing/temporary_folder.h"
 

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
-#include "spartan/core/process.h"
+#include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/internal/summary.h"
 #include "spartan/system/internal/terrain_files.h"
@@ -19,6 +19,9 @@
 #include "spartan/system/run_store.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // Length of the interval from the first IMU sample that initializes gravity if no sample comes before the first frame:

@@ -8,8 +8,8 @@
 #include "spartan/core/options.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/localization/localization_options.h"
-#include "spartan/odometry/odometry_options.h"
-#include "spartan/reconstruction/disparity_options.h"
+#include "spartan/odometry/odometer.h"
+#include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/stop_mapper.h"
 #include "spartan/slam/slam_options.h"
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "spartan/core/database.h"
+#include "spartan/storage/database.h"
 
 namespace spartan {
 namespace {

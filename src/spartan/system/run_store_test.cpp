@@ -9,8 +9,8 @@
 #include <csignal>
 #include <filesystem>
 
-#include "spartan/core/database.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
+#include "spartan/storage/database.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

@@ -1,6 +1,6 @@
-#include "spartan/system/run_trajectory.h"
-
 #include <algorithm>
+
+#include "spartan/system/run_folder.h"
 
 namespace spartan {
 

@@ -1,8 +1,7 @@
-#include "spartan/system/saved_map.h"
-
 #include <filesystem>
 #include <utility>
 
+#include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan {

@@ -1,7 +1,7 @@
-#include "spartan/system/sensor_outages.h"
-
 #include <algorithm>
 #include <string_view>
+
+#include "spartan/system/run_store.h"
 
 namespace spartan {
 namespace {

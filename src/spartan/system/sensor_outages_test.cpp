@@ -1,6 +1,6 @@
-#include "spartan/system/sensor_outages.h"
-
 #include <gtest/gtest.h>
+
+#include "spartan/system/run_store.h"
 
 namespace spartan {
 namespace {

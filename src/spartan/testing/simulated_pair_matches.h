@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "spartan/calibration/pair_check.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan::testing {
 

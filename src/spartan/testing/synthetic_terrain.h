@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "spartan/core/gradient_noise.h"
+#include "spartan/numerics/gradient_noise.h"
 
 namespace spartan::testing {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan::testing {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "spartan/core/median.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/median.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan::testing {
 namespace {

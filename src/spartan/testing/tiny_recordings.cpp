@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "spartan/camera/recording_writer.h"
-#include "spartan/core/image_io.h"
-#include "spartan/core/random.h"
+#include "spartan/image_io/image_io.h"
+#include "spartan/numerics/random.h"
 
 namespace spartan::testing {
 namespace {

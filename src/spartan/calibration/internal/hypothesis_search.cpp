@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "spartan/calibration/internal/model_modification.h"
-#include "spartan/calibration/row_errors.h"
-#include "spartan/rig/rig_findings.h"
+#include "spartan/calibration/internal/row_errors.h"
+#include "spartan/rig/describe.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // The constants of this search are empirical; the tests with injected calibration errors and the real pairs of
@@ -383,4 +383,4 @@ FittedHypothesis find_hypothesis(const Camera& left, const Camera& right, const 
   return best;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "spartan/calibration/internal/pair_hypothesis.h"
-#include "spartan/calibration/pair_refinement.h"
+#include "spartan/calibration/internal/pair_refinement.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// A hypothesis with its small correction estimated from the matches.
 struct FittedHypothesis {
@@ -40,4 +40,4 @@ FittedHypothesis find_hypothesis(const Camera& left, const Camera& right, const 
 
 PairFitOptions fit_options(const PairHypothesis& hypothesis);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 #include <functional>
 #include <initializer_list>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // Applies `change` to the values of the named parameters.
@@ -79,4 +79,4 @@ CameraModel with_division_distortion(const CameraModel& model, double k, ImageSi
       pinhole, {c[0] / reach, c[1] / (reach * reach), 0, 0, 0, c[2] / reach, c[3] / (reach * reach), 0});
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

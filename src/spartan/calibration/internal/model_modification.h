@@ -4,7 +4,7 @@
 #include "spartan/core/image.h"
 #include "spartan/rig/models/camera_model.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Multiplies focal lengths and skew by `factor`; the principal point is unchanged.
 CameraModel with_scaled_focal_length(const CameraModel& model, double factor);
@@ -23,4 +23,4 @@ CameraModel with_square_pixels(const CameraModel& model, bool by_x);
 /// size, with an error below 0.01 px. Other models are returned unchanged.
 CameraModel with_division_distortion(const CameraModel& model, double k, ImageSize size);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr PinholeModel kPinhole{500, 510, 320, 240};
@@ -46,4 +46,4 @@ TEST(ModelChanges, DivisionModelIsApproximated) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

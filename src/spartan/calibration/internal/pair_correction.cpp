@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "spartan/calibration/internal/model_modification.h"
-#include "spartan/rig/rig_findings.h"
+#include "spartan/rig/describe.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // A further parameter is freed where that lowers the cost by a tenth, and by at least 25 squared normalized row errors
@@ -85,4 +85,4 @@ Rig corrected_rig(Rig rig, const StereoPair& pair, const PairHypothesis& hypothe
   return rig;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,7 +4,7 @@
 #include "spartan/calibration/internal/hypothesis_search.h"
 #include "spartan/rig/rig.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Errors that were found beside swapped cameras and sizes.
 struct FoundErrors {
@@ -22,4 +22,4 @@ PairCorrection minimal_correction(const FittedHypothesis& fitted, const FoundErr
 Rig corrected_rig(Rig rig, const StereoPair& pair, const PairHypothesis& hypothesis, const PairCorrection& correction,
                   bool wrong_unit);
 
-}  // namespace spartan
+}  // namespace spartan::internal

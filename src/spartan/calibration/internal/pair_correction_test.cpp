@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // A pair of 640 x 480 px whose left camera has a vignetting with its own centre.
@@ -62,4 +62,4 @@ TEST(PairCorrection, VignettingCentreMovesWithTheRowShift) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "spartan/calibration/internal/model_modification.h"
-#include "spartan/calibration/row_errors.h"
+#include "spartan/calibration/internal/row_errors.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 void scale_to_size(Camera& camera, ImageSize image_size) {
@@ -113,4 +113,4 @@ std::vector<PairHypothesis> square_pixel_hypotheses(const PairHypothesis& hypoth
   return hypotheses;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -3,11 +3,11 @@
 
 #include <vector>
 
-#include "spartan/calibration/pair_refinement.h"
+#include "spartan/calibration/internal/pair_refinement.h"
+#include "spartan/rig/describe.h"
 #include "spartan/rig/rig.h"
-#include "spartan/rig/rig_findings.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Corrects a calibration made for another image size: scales the focal lengths, and with `scale_centre` the principal
 /// point too.
@@ -65,4 +65,4 @@ PairHypothesis with_size(PairHypothesis hypothesis, const SizeChange& size, cons
 /// to fy.
 std::vector<PairHypothesis> square_pixel_hypotheses(const PairHypothesis& hypothesis, AspectDeviation least);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,19 +7,19 @@
 #include <algorithm>
 #include <cmath>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
 #include "spartan/calibration_io/internal/text_matrices.h"
 #include "spartan/core/strict_yaml.h"
-#include "spartan/rig/calibration_text.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
-namespace {
 
-using rig_detail::CameraOfFile;
-using rig_detail::TextMatrices;
+using namespace internal;
+
+namespace {
 
 // Skews relative to the focal length. In files with nine or more digits a skew below kNoSkew is a rounding error and is
 // set to 0; the rounding errors of files with fewer digits are kept, and formats without skew drop them
@@ -180,18 +180,18 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
   if (file->has("Dimensions")) {
     const auto sides = file->numbers("Dimensions", 2);
     if (!sides) return failure(sides);
-    const auto known = rig_detail::whole_size((*sides)[0], (*sides)[1]);
+    const auto known = whole_size((*sides)[0], (*sides)[1]);
     if (!known) return file->error_at("Dimensions", "must be two whole numbers above zero");
     camera.size = *known;
   }
-  if (camera.size.empty()) return rig_detail::unknown_size(path);
+  if (camera.size.empty()) return unknown_size(path);
   return CameraOfFile{std::move(camera)};
 }
 
 // --- writing ---
 
 std::string vector_line(const char* key, const Eigen::Vector3d& v) {
-  return fmt::format("{} = {}\n", key, rig_detail::list_of(v));
+  return fmt::format("{} = {}\n", key, list_of(v));
 }
 
 std::string core_lines(const Camera& camera, const std::string& model, const CahvModel& m, const Pose& pose) {
@@ -226,19 +226,18 @@ Result<std::string> text_of(const Camera& camera, const Pose& pose) {
            core_lines(camera, "CAHV = perspective, linear", {m->pinhole(), 0}, pose) +
            fmt::format("LENSMODEL_OPENCV8 = {}\n", fmt::join(m->coefficients(), " "));
   }
-  return rig_detail::cannot_hold(camera,
-                                 fmt::format(".cahvor files do not support the model {}", name_of(camera.model)));
+  return cannot_hold(camera, fmt::format(".cahvor files do not support the model {}", name_of(camera.model)));
 }
 
 }  // namespace
 
 Result<LoadedRig> read_cahvor_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
-  return rig_detail::read_two_files(
+  return read_two_files(
       CalibrationFormat::cahvor, left_path, right_path,
       [&](const std::string& path, const std::string& name) { return read_camera(path, name, size); });
 }
 
-Result<CalibrationFiles> rig_detail::write_cahvor_calib(const Rig& rig, const std::string& path) {
+Result<CalibrationFiles> internal::write_cahvor_calib(const Rig& rig, const std::string& path) {
   return write_two_files(rig, CalibrationFormat::cahvor, path, text_of);
 }
 

@@ -1,9 +1,9 @@
 // Readers that also report ignored information; those in rig_files.h return the rig alone. Internal to rig.
 #pragma once
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 /// `LoadedRig::body` of a rig whose files define no body frame.
 constexpr const char* kBodyIsLeftCamera = "the left camera, turned to x forward, y left, z up";
@@ -15,4 +15,4 @@ Result<LoadedRig> read_opencv(const std::string& intrinsics_path, const std::str
 /// Returns the rig of a LoadedRig.
 Result<Rig> rig_of(Result<LoadedRig> read);
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

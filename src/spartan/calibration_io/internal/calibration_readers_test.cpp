@@ -6,13 +6,13 @@
 #include <filesystem>
 #include <opencv2/core/persistence.hpp>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::error_message;
@@ -357,4 +357,4 @@ TEST(LoadedRig, RealCalibrations) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

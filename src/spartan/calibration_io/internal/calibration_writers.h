@@ -1,9 +1,9 @@
 // The writers of each format; to_calibration_files() in rig_writing.h selects one. Internal to rig.
 #pragma once
 
-#include "spartan/calibration_io/calibration_writing.h"
+#include "spartan/calibration_io/calibration_files.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 Result<CalibrationFiles> write_kitti_calib(const Rig& rig, const std::string& path);
 Result<CalibrationFiles> write_kitti_raw_calib(const Rig& rig, const std::string& path);
@@ -29,4 +29,4 @@ std::vector<const Camera*> cameras_pair_first(const Rig& rig);
 /// An error of code `configuration` for a camera that a format cannot represent: "cameras.NAME: why".
 tl::unexpected<Error> cannot_hold(const Camera& camera, const std::string& why);
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -3,12 +3,15 @@
 
 #include <filesystem>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/yaml_camera.h"
-#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -25,18 +28,18 @@ std::optional<Pose> read_body_from_sensor(YamlMap& root) {
   if (!node) return std::nullopt;
   const auto numbers = node->is_map() ? YamlMap(*node, root.path("T_BS"), root.errors()).numbers("data", {16})
                                       : root.numbers("T_BS", {16});
-  return numbers ? rig_detail::read_rigid(root, "T_BS", *numbers) : std::nullopt;
+  return numbers ? read_rigid(root, "T_BS", *numbers) : std::nullopt;
 }
 
 Result<Camera> read_sensor(const std::string& path, const std::string& name) {
-  const auto loaded = rig_detail::load_yaml_file(path);
+  const auto loaded = load_yaml_file(path);
   if (!loaded) return failure(loaded);
   YamlErrors errors(path);
   YamlMap root(*loaded, "", errors);
   Camera camera;
   camera.name = name;
-  camera.size = rig_detail::read_resolution(root, "resolution");
-  camera.model = rig_detail::read_kalibr_model(root, "distortion_coefficients");
+  camera.size = read_resolution(root, "resolution");
+  camera.model = read_kalibr_model(root, "distortion_coefficients");
   camera.mount_from_camera = read_body_from_sensor(root).value_or(Pose());
   if (const Status status = errors.status(); !status) return failure(status);
   return camera;
@@ -63,10 +66,10 @@ Result<Rig> read_euroc_calib(const std::string& mav0_folder) {
     }
   }
   if (!errors.what.empty()) return tl::unexpected<Error>(errors);
-  return rig_detail::validated(std::move(rig), mav0_folder);
+  return validated(std::move(rig), mav0_folder);
 }
 
-Result<CalibrationFiles> rig_detail::write_euroc_calib(const Rig& rig, const std::string& folder) {
+Result<CalibrationFiles> internal::write_euroc_calib(const Rig& rig, const std::string& folder) {
   CalibrationFiles files;
   for (const Camera* camera : cameras_pair_first(rig)) {
     const auto model = kalibr_model_lines(*camera, "distortion_coefficients", "");

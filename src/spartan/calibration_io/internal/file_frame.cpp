@@ -9,7 +9,7 @@
 #include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/internal/pair_of_files.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 // Maximum distance of a camera from the body origin; farther cameras are in a world frame, often Earth-centred.
@@ -110,4 +110,4 @@ bool body_is_left_camera(const Rig& rig, const StereoPair& pair) {
   return off.translation().norm() < 1e-12 && rotation_angle(off) < 1e-12;
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -3,11 +3,11 @@
 
 #include <functional>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/rig/rig.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 /// A rig of two cameras whose `mount_from_camera` is the pose in the frame of their files. The body frame is
 ///  - the frame of the files, if it is plausible as a body frame with x forward, y left, z up (REP-103): the image x
@@ -40,4 +40,4 @@ Result<CalibrationFiles> write_two_files(const Rig& rig, CalibrationFormat forma
 /// Whether the body frame is the left camera turned to x forward, y left, z up, and poses follow `left_optical`.
 bool body_is_left_camera(const Rig& rig, const StereoPair& pair);
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

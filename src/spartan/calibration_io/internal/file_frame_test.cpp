@@ -5,11 +5,10 @@
 
 #include <numbers>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/calibration_io/calibration_writing.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/testing/temporary_folder.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -107,4 +106,4 @@ TEST(FileFrame, OtherFramesAreReportedAsLost) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,15 +5,13 @@
 
 #include <regex>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/calibration_io/calibration_writing.h"
-#include "spartan/calibration_io/read_back.h"
-#include "spartan/rig/rig_differences.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/rig/describe.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::error_message;
@@ -273,4 +271,4 @@ TEST(CahvorCalib, TheSkewIsKept) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

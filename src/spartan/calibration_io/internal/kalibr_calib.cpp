@@ -1,14 +1,17 @@
 // Reader and writer of Kalibr's camchain.yaml and camchain-imucam.yaml (Furgale et al.; Kalibr wiki, "Yaml formats").
 #include <fmt/format.h>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_readers.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
 #include "spartan/calibration_io/internal/yaml_camera.h"
-#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // Tolerance in m and rad between the transforms of the chain and those of the IMU, which are results of one
@@ -34,7 +37,7 @@ std::optional<Pose> read_transform(YamlMap& camera, std::string_view key) {
       }
     }
   }
-  if (rows.size() == 16) return rig_detail::read_rigid(camera, key, rows);
+  if (rows.size() == 16) return read_rigid(camera, key, rows);
   camera.add_error(key, "must be four rows of four finite numbers");
   return std::nullopt;
 }
@@ -102,8 +105,8 @@ Chain read_chain(YamlMap& root) {
     YamlMap entry(*node, root.path(camera_key(i)), root.errors());
     Camera camera;
     camera.name = camera_key(i);
-    camera.size = rig_detail::read_resolution(entry, "resolution");
-    camera.model = rig_detail::read_kalibr_model(entry, "distortion_coeffs");
+    camera.size = read_resolution(entry, "resolution");
+    camera.model = read_kalibr_model(entry, "distortion_coeffs");
     if (entry.has("timeshift_cam_imu")) {
       const auto shift = entry.number("timeshift_cam_imu");
       if (shift && *shift != 0) {
@@ -121,7 +124,7 @@ std::string transform_lines(const char* key, const Pose& pose) {
   std::string text = fmt::format("  {}:\n", key);
   const Eigen::Matrix4d matrix = pose.matrix();
   for (int row = 0; row < 4; ++row) {
-    text += fmt::format("  - [{}]\n", rig_detail::list_of(matrix.row(row).transpose(), ", "));
+    text += fmt::format("  - [{}]\n", list_of(matrix.row(row).transpose(), ", "));
   }
   return text;
 }
@@ -129,7 +132,7 @@ std::string transform_lines(const char* key, const Pose& pose) {
 }  // namespace
 
 Result<LoadedRig> read_kalibr_calib(const std::string& path) {
-  const auto loaded = rig_detail::load_yaml_file(path);
+  const auto loaded = load_yaml_file(path);
   if (!loaded) return failure(loaded);
   YamlErrors errors(path);
   YamlMap root(*loaded, "", errors);
@@ -144,17 +147,17 @@ Result<LoadedRig> read_kalibr_calib(const std::string& path) {
   rig.convention = has_imu ? PoseConvention::body : PoseConvention::left_optical;
   rig.cameras = std::move(chain.cameras);
   rig.pairs = {{"stereo", camera_key(0), camera_key(1)}};
-  auto valid = rig_detail::validated(std::move(rig), path);
+  auto valid = validated(std::move(rig), path);
   if (!valid) return failure(std::move(valid));
   return LoadedRig{std::move(*valid),
                    CalibrationFormat::kalibr,
                    {path},
                    {},
-                   has_imu ? "the IMU of " + chain.imu_key : rig_detail::kBodyIsLeftCamera,
+                   has_imu ? "the IMU of " + chain.imu_key : kBodyIsLeftCamera,
                    std::move(chain.ignored)};
 }
 
-Result<CalibrationFiles> rig_detail::write_kalibr_calib(const Rig& rig, const std::string& path) {
+Result<CalibrationFiles> internal::write_kalibr_calib(const Rig& rig, const std::string& path) {
   const bool with_body = !body_is_left_camera(rig, rig.pairs.front());
   std::string text;
   Pose body_from_previous;

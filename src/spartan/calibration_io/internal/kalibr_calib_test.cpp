@@ -3,12 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::error_message;
@@ -163,4 +163,4 @@ TEST(KalibrCalib, UnsupportedContentIsNamed) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,16 +7,17 @@
 #include <initializer_list>
 #include <utility>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_readers.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/text_matrices.h"
-#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
-using rig_detail::TextMatrices;
-using rig_detail::validated;
 namespace fs = std::filesystem;
 
 using Projection = Eigen::Matrix<double, 3, 4>;
@@ -124,7 +125,7 @@ Result<Pose> read_rectified_from_imu(const TextMatrices& file, const fs::path& f
 Result<ImageSize> read_size(const TextMatrices& file, const std::string& key) {
   const auto size = read_matrix<Eigen::Vector2d>(file, key);
   if (!size) return failure(size);
-  const auto known = rig_detail::whole_size(size->x(), size->y());
+  const auto known = whole_size(size->x(), size->y());
   if (!known) return file.error_at(key, "must be two whole numbers above zero");
   return *known;
 }
@@ -155,22 +156,21 @@ Result<bool> has_raw_camera(const TextMatrices& file, const std::string& number,
 LoadedRig make_read_rig(Rig rig, CalibrationFormat format, const std::string& path,
                         std::vector<RigDifference> ignored) {
   const bool left = rig.convention == PoseConvention::left_optical;
-  return {
-      std::move(rig),    format, {path}, {}, left ? rig_detail::kBodyIsLeftCamera : "the IMU of calib_imu_to_velo.txt",
-      std::move(ignored)};
+  return {std::move(rig),    format, {path}, {}, left ? kBodyIsLeftCamera : "the IMU of calib_imu_to_velo.txt",
+          std::move(ignored)};
 }
 
 }  // namespace
 
 Result<Rig> read_kitti_calib(const std::string& path, ImageSize size) {
-  return rig_detail::rig_of(rig_detail::read_kitti(path, size));
+  return rig_of(read_kitti(path, size));
 }
 
 Result<Rig> read_kitti_raw_calib(const std::string& path) {
-  return rig_detail::rig_of(rig_detail::read_kitti_raw(path));
+  return rig_of(read_kitti_raw(path));
 }
 
-Result<LoadedRig> rig_detail::read_kitti(const std::string& path, ImageSize size) {
+Result<LoadedRig> internal::read_kitti(const std::string& path, ImageSize size) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
   const auto pair = read_projections(*file, "P0", "P1");
@@ -189,7 +189,7 @@ Result<LoadedRig> rig_detail::read_kitti(const std::string& path, ImageSize size
   return make_read_rig(std::move(*rig), CalibrationFormat::kitti, path, std::move(*ignored));
 }
 
-Result<LoadedRig> rig_detail::read_kitti_raw(const std::string& path) {
+Result<LoadedRig> internal::read_kitti_raw(const std::string& path) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
   const auto pair = read_projections(*file, "P_rect_00", "P_rect_01");

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <filesystem>
 
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
-#include "spartan/rig/calibration_text.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 struct RectifiedPinholes {
@@ -94,4 +94,4 @@ Result<CalibrationFiles> write_kitti_raw_calib(const Rig& rig, const std::string
   return files;
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -8,19 +8,20 @@
 #include <cmath>
 #include <utility>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
 #include "spartan/calibration_io/internal/python_dict.h"
+#include "spartan/core/files.h"
 #include "spartan/core/strict_yaml.h"
-#include "spartan/rig/calibration_text.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
-namespace {
 
-using rig_detail::CameraOfFile;
-using rig_detail::PythonDict;
+using namespace internal;
+
+namespace {
 
 // Content of the files that a Rig cannot represent.
 constexpr std::array<std::pair<const char*, const char*>, 2> kIgnored{
@@ -83,7 +84,7 @@ Result<CameraModel> read_model(const PythonDict& file) {
 }
 
 Result<CameraOfFile> read_camera(const std::string& path, const std::string& name) {
-  const auto text = rig_detail::read_calibration_text(path, rig_detail::kLargestModelFile_bytes);
+  const auto text = read_calibration_text(path, kLargestModelFile_bytes);
   if (!text) return failure(text);
   const auto file = PythonDict::parse(*text, path);
   if (!file) return failure(file);
@@ -94,12 +95,12 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
   camera.model = std::move(*model);
   const auto size = file->numbers("imagersize", 2);
   if (!size) return failure(size);
-  const auto known = rig_detail::whole_size((*size)[0], (*size)[1]);
+  const auto known = whole_size((*size)[0], (*size)[1]);
   if (!known) return file->error_at("imagersize", "must be two whole numbers above zero");
   camera.size = *known;
   const auto e = file->numbers("extrinsics", 6);
   if (!e) return failure(e);
-  const auto rotation = rig_detail::rotation_of_vector({(*e)[0], (*e)[1], (*e)[2]});
+  const auto rotation = rotation_of_vector({(*e)[0], (*e)[1], (*e)[2]});
   if (!rotation) return file->error_at("extrinsics", "its first three numbers are not a rotation");
   camera.mount_from_camera = Pose(*rotation, {(*e)[3], (*e)[4], (*e)[5]}).inverse();
   CameraOfFile result{std::move(camera)};
@@ -145,7 +146,7 @@ Result<Lens> lens_of(const Camera& camera) {
     }
     return lens;
   }
-  return rig_detail::cannot_hold(camera, fmt::format("mrcal files do not support the model {}", name_of(camera.model)));
+  return cannot_hold(camera, fmt::format("mrcal files do not support the model {}", name_of(camera.model)));
 }
 
 Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
@@ -156,17 +157,17 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
       "{{\n    'lensmodel':  'LENSMODEL_{}',\n\n    # fx, fy, cx, cy, distortion\n    'intrinsics': [{}],\n\n"
       "    # rotation vector and translation from the reference frame\n    'extrinsics': [{}, {}],\n\n"
       "    'imagersize': [{}, {}],\n}}\n",
-      lens->name, fmt::join(lens->numbers, ", "), rig_detail::list_of(log_so3(from_reference.rotation()), ", "),
-      rig_detail::list_of(from_reference.translation(), ", "), camera.size.width, camera.size.height);
+      lens->name, fmt::join(lens->numbers, ", "), list_of(log_so3(from_reference.rotation()), ", "),
+      list_of(from_reference.translation(), ", "), camera.size.width, camera.size.height);
 }
 
 }  // namespace
 
 Result<LoadedRig> read_mrcal_calib(const std::string& left_path, const std::string& right_path) {
-  return rig_detail::read_two_files(CalibrationFormat::mrcal, left_path, right_path, read_camera);
+  return read_two_files(CalibrationFormat::mrcal, left_path, right_path, read_camera);
 }
 
-Result<CalibrationFiles> rig_detail::write_mrcal_calib(const Rig& rig, const std::string& path) {
+Result<CalibrationFiles> internal::write_mrcal_calib(const Rig& rig, const std::string& path) {
   return write_two_files(rig, CalibrationFormat::mrcal, path, text_of);
 }
 

@@ -4,15 +4,17 @@
 
 #include <algorithm>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_readers.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/opencv_storage.h"
-#include "spartan/rig/calibration_text.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
-using rig_detail::OpencvStorage;
 using Names = std::vector<std::string>;
 
 // One or two files, searched in order for a key under any of its common names.
@@ -74,7 +76,7 @@ bool is_fisheye(const Storages& files) {
 Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& names) {
   const auto values = files.matrix(names, {9});
   if (!values) return failure(values);
-  const auto pinhole = rig_detail::pinhole_of_rows(*values);
+  const auto pinhole = pinhole_of_rows(*values);
   if (!pinhole || !(pinhole->fx > 0 && pinhole->fy > 0)) {
     return files.error_at(names, "is not a camera matrix (fx 0 cx; 0 fy cy; 0 0 1)");
   }
@@ -108,7 +110,7 @@ Result<Eigen::Quaterniond> read_rotation(const Storages& files, const std::strin
   const auto r = files.matrix({name}, {3, 9});
   if (!r) return failure(r);
   if (r->size() == 3) {
-    const auto rotation = rig_detail::rotation_of_vector({(*r)[0], (*r)[1], (*r)[2]});
+    const auto rotation = rotation_of_vector({(*r)[0], (*r)[1], (*r)[2]});
     if (!rotation) return files.error_at({name}, "is not a rotation");
     return *rotation;
   }
@@ -225,11 +227,11 @@ std::vector<RigDifference> rectification_in(const Storages& files, bool raw) {
 }  // namespace
 
 Result<Rig> read_opencv_calib(const std::string& intrinsics_path, const std::string& extrinsics_path, ImageSize size) {
-  return rig_detail::rig_of(rig_detail::read_opencv(intrinsics_path, extrinsics_path, size));
+  return rig_of(read_opencv(intrinsics_path, extrinsics_path, size));
 }
 
-Result<LoadedRig> rig_detail::read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path,
-                                          ImageSize size) {
+Result<LoadedRig> internal::read_opencv(const std::string& intrinsics_path, const std::string& extrinsics_path,
+                                        ImageSize size) {
   Storages files;
   for (const std::string& path : {intrinsics_path, extrinsics_path}) {
     if (path.empty()) continue;

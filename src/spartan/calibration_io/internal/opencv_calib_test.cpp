@@ -5,12 +5,12 @@
 #include <functional>
 #include <opencv2/core/persistence.hpp>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::error_message;
@@ -164,4 +164,4 @@ TEST(OpencvFiles, ThinPrismsMustBeZero) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

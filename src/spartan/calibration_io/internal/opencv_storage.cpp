@@ -5,10 +5,11 @@
 
 #include <algorithm>
 
+#include "spartan/calibration_io/internal/calibration_text.h"
+#include "spartan/core/files.h"
 #include "spartan/core/strict_yaml.h"
-#include "spartan/rig/calibration_text.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 using Entry = OpencvStorage::Entry;
@@ -121,4 +122,4 @@ std::string OpencvStorage::text(const std::string& key) const {
   return found == entries_.end() || found->second.words.empty() ? "" : found->second.words.front();
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

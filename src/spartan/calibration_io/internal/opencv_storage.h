@@ -9,7 +9,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 /// Replaces cv::FileStorage, whose parser reads out of bounds in truncated XML, has no limit of recursion, and does not
 /// report line numbers.
@@ -45,4 +45,4 @@ class OpencvStorage {
 /// The entries of an XML file; code `configuration` with "name:line".
 Result<std::map<std::string, OpencvStorage::Entry>> parse_opencv_xml(const std::string& text, const std::string& name);
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -4,9 +4,9 @@
 #include <opencv2/core/persistence.hpp>
 
 #include "spartan/calibration_io/internal/calibration_writers.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 struct Lens {
@@ -70,4 +70,4 @@ Result<CalibrationFiles> write_opencv_calib(const Rig& rig, const std::string& p
   }
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -5,7 +5,7 @@
 
 #include "spartan/calibration_io/internal/opencv_storage.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 using Entries = std::map<std::string, OpencvStorage::Entry>;
@@ -99,4 +99,4 @@ Result<Entries> parse_opencv_xml(const std::string& text, const std::string& nam
   return std::move(reader.entries);
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -91,4 +91,4 @@ PairOfFiles names_of_pair(const std::string& path) {
   return {with("left"), with("right")};
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

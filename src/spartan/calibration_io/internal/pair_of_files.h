@@ -5,7 +5,7 @@
 
 #include "spartan/core/result.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 struct PairOfFiles {
   std::string left, right;
@@ -18,4 +18,4 @@ Result<PairOfFiles> find_pair_of_files(const std::string& path);
 /// The paths to write: "LEFT,RIGHT" unchanged; for "pair.ext", pair_left.ext and pair_right.ext.
 PairOfFiles names_of_pair(const std::string& path);
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 
 #include "spartan/core/strict_yaml.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 using Value = decltype(PythonDict::Entry::value);
@@ -171,4 +171,4 @@ Result<std::vector<double>> PythonDict::numbers(const std::string& key, std::siz
   return list;
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

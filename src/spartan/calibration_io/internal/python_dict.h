@@ -9,7 +9,7 @@
 
 #include "spartan/core/result.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 /// Values are strings, numbers and flat lists of numbers. Nested lists, bytes, None, True and False are skipped but
 /// must be well formed. Comments (#) are allowed.
@@ -37,4 +37,4 @@ class PythonDict {
   std::map<std::string, Entry> entries_;
 };
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -5,15 +5,18 @@
 
 #include <algorithm>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_readers.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/pair_of_files.h"
 #include "spartan/calibration_io/internal/yaml_camera.h"
-#include "spartan/rig/calibration_text.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // One file: the camera, its rotation into the rectified frame, its position there, and the rectified pinhole.
@@ -59,7 +62,7 @@ CameraModel read_model(YamlMap& root) {
   const std::string k_key = key_of(root, "camera_matrix", "K"), d_key = key_of(root, "distortion_coefficients", "D");
   PinholeModel pinhole;
   if (const auto k = numbers(root, k_key, {9})) {
-    pinhole = rig_detail::read_camera_matrix(root, k_key, *k).value_or(PinholeModel{});
+    pinhole = read_camera_matrix(root, k_key, *k).value_or(PinholeModel{});
   }
   // In messages of cameras without distortion the name is empty.
   const auto named = root.optional_node("distortion_model");
@@ -123,7 +126,7 @@ void read_rectification(YamlMap& root, CameraInfo& info) {
 }
 
 Result<CameraInfo> read_camera_info(const std::string& path, const std::string& name) {
-  const auto loaded = rig_detail::load_yaml_file(path);
+  const auto loaded = load_yaml_file(path);
   if (!loaded) return failure(loaded);
   YamlErrors errors(path);
   YamlMap root(*loaded, "", errors);
@@ -206,8 +209,7 @@ Result<Lens> lens_of(const Camera& camera) {
   if (const auto m = converted_to<EquidistantModel>(camera.model)) {
     return Lens{m->pinhole(), "equidistant", {m->coefficients().begin(), m->coefficients().end()}};
   }
-  return rig_detail::cannot_hold(camera,
-                                 fmt::format("camera_info does not support the model {}", name_of(camera.model)));
+  return cannot_hold(camera, fmt::format("camera_info does not support the model {}", name_of(camera.model)));
 }
 
 }  // namespace
@@ -225,17 +227,14 @@ Result<LoadedRig> read_ros_calib(const std::string& left_path, const std::string
   }
   const Eigen::Quaterniond right_from_rectified = right->rectified_from_camera.conjugate();
   const Pose right_from_left(right_from_rectified * left->rectified_from_camera, right_from_rectified * -difference);
-  auto rig = rig_detail::validated(rig_of_one_pair("ros", left->camera, right->camera, right_from_left), right_path);
+  auto rig = validated(rig_of_one_pair("ros", left->camera, right->camera, right_from_left), right_path);
   if (!rig) return failure(std::move(rig));
-  return LoadedRig{std::move(*rig),
-                   CalibrationFormat::ros,
-                   {left_path, right_path},
-                   {},
-                   rig_detail::kBodyIsLeftCamera,
-                   lost_view(*left, *right, right_from_left.inverse())};
+  return LoadedRig{std::move(*rig),         CalibrationFormat::ros,
+                   {left_path, right_path}, {},
+                   kBodyIsLeftCamera,       lost_view(*left, *right, right_from_left.inverse())};
 }
 
-Result<CalibrationFiles> rig_detail::write_ros_calib(const Rig& rig, const std::string& path) {
+Result<CalibrationFiles> internal::write_ros_calib(const Rig& rig, const std::string& path) {
   const auto cameras = single_pair(rig, CalibrationFormat::ros);
   if (!cameras) return failure(cameras);
   const auto left = lens_of(*cameras->left), right = lens_of(*cameras->right);

@@ -3,13 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/calibration_io/calibration_reading.h"
-#include "spartan/calibration_io/calibration_writing.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/testing/first_pair.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::error_message;
@@ -136,4 +135,4 @@ TEST(RosCalib, ReadsModelsAndReportsErrors) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,10 +4,11 @@
 
 #include <sstream>
 
+#include "spartan/calibration_io/internal/calibration_text.h"
+#include "spartan/core/files.h"
 #include "spartan/core/strict_yaml.h"
-#include "spartan/rig/calibration_text.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 std::string trimmed(const std::string& text) {
@@ -83,4 +84,4 @@ tl::unexpected<Error> TextMatrices::error_at(const std::string& key, const std::
   return failure(ErrorCode::configuration, fmt::format("{}: {}", key, what), where(key));
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 
 #include "spartan/core/result.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 /// The lines of such a file. Values are parsed when they are requested; other lines may contain anything.
 class TextMatrices {
@@ -52,4 +52,4 @@ class TextMatrices {
   std::vector<Word> words_;
 };
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

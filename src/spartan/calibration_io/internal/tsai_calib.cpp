@@ -4,18 +4,18 @@
 #include <algorithm>
 #include <array>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
 #include "spartan/calibration_io/internal/file_frame.h"
 #include "spartan/calibration_io/internal/text_matrices.h"
-#include "spartan/rig/calibration_text.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
-namespace {
 
-using rig_detail::CameraOfFile;
-using rig_detail::TextMatrices;
+using namespace internal;
+
+namespace {
 
 Result<Eigen::Matrix3d> rotation_or_error(const TextMatrices& file, const char* key, const Eigen::Matrix3d& matrix) {
   constexpr double kTolerance = 1e-4;  // for matrices rounded to a few digits
@@ -102,7 +102,7 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
   if (!model) return failure(std::move(model));
   const auto pose = read_pose(*file);
   if (!pose) return failure(pose);
-  if (size.empty()) return rig_detail::unknown_size(path);
+  if (size.empty()) return unknown_size(path);
   Camera camera;
   camera.name = name;
   camera.size = size;
@@ -114,19 +114,17 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
 Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
   const auto model = converted_to<RadialTangentialModel>(camera.model);
   if (!model) {
-    return rig_detail::cannot_hold(camera,
-                                   fmt::format(".tsai files do not support the model {}", name_of(camera.model)));
+    return cannot_hold(camera, fmt::format(".tsai files do not support the model {}", name_of(camera.model)));
   }
   const auto& k = model->coefficients();
   if (is_rational(*model)) {
-    return rig_detail::cannot_hold(camera, ".tsai files do not support the coefficients k4, k5, k6");
+    return cannot_hold(camera, ".tsai files do not support the coefficients k4, k5, k6");
   }
   const PinholeModel& p = model->pinhole();
   std::string text = fmt::format(
       "VERSION_4\nPINHOLE\nfu = {}\nfv = {}\ncu = {}\ncv = {}\nu_direction = 1 0 0\nv_direction = 0 1 0\n"
       "w_direction = 0 0 1\nC = {}\nR = {}\npitch = 1\n",
-      p.fx, p.fy, p.cx, p.cy, rig_detail::list_of(file_from_camera.translation()),
-      rig_detail::rows_of(file_from_camera.rotation_matrix()));
+      p.fx, p.fy, p.cx, p.cy, list_of(file_from_camera.translation()), rows_of(file_from_camera.rotation_matrix()));
   if (converted_to<PinholeModel>(camera.model)) return text + "NULL\n";
   text += fmt::format("TSAI\nk1 = {}\nk2 = {}\np1 = {}\np2 = {}\n", k[0], k[1], k[2], k[3]);
   return k[4] == 0 ? text : text + fmt::format("k3 = {}\n", k[4]);
@@ -135,12 +133,12 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
 }  // namespace
 
 Result<LoadedRig> read_tsai_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
-  return rig_detail::read_two_files(
+  return read_two_files(
       CalibrationFormat::tsai, left_path, right_path,
       [&](const std::string& path, const std::string& name) { return read_camera(path, name, size); });
 }
 
-Result<CalibrationFiles> rig_detail::write_tsai_calib(const Rig& rig, const std::string& path) {
+Result<CalibrationFiles> internal::write_tsai_calib(const Rig& rig, const std::string& path) {
   return write_two_files(rig, CalibrationFormat::tsai, path, text_of);
 }
 

@@ -3,11 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::error_message;
@@ -97,4 +97,4 @@ TEST_F(TsaiCalib, ErrorsAreSpecific) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
-#include "spartan/rig/calibration_text.h"
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/core/files.h"
+#include "spartan/rig/models/camera_model.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 bool positive_focal_lengths(YamlMap& map, std::string_view key, double fx, double fy) {
@@ -138,4 +139,4 @@ std::optional<PinholeModel> read_camera_matrix(YamlMap& map, std::string_view ke
   return pinhole;
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

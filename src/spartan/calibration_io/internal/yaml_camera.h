@@ -10,7 +10,7 @@
 #include "spartan/rig/models/camera_model.h"
 #include "spartan/rig/rig.h"
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 /// Loads a YAML file. A first line "%YAML:1.0" of OpenCV, which is not a valid YAML directive, is ignored.
 Result<YamlNode> load_yaml_file(const std::string& path);
@@ -32,4 +32,4 @@ std::optional<Pose> read_rigid(YamlMap& map, std::string_view key, const std::ve
 /// fx, fy, cx, cy from a row-major 3×3 camera matrix; an invalid one is reported under `key`.
 std::optional<PinholeModel> read_camera_matrix(YamlMap& map, std::string_view key, const std::vector<double>& rows);
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

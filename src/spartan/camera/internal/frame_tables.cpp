@@ -7,7 +7,7 @@
 
 #include "spartan/camera/internal/layouts/spartan_format.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using Row = std::vector<std::string_view>;
@@ -149,4 +149,4 @@ TableFormat spartan_frames_format() {
   return {.separator = ',', .header = kFramesHeader, .ends_with_newline = true};
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 #include "spartan/camera/internal/recording_index.h"
 #include "spartan/camera/internal/table.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// KITTI odometry, times.txt: one time in seconds per row.
 Result<std::vector<Stamp>> read_kitti_times(TableReader table);
@@ -34,4 +34,4 @@ Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std
 /// Table format of frames.csv.
 TableFormat spartan_frames_format();
 
-}  // namespace spartan
+}  // namespace spartan::internal

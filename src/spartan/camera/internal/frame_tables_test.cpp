@@ -6,7 +6,7 @@
 #include "spartan/camera/internal/layouts/spartan_format.h"
 #include "spartan/testing/tiny_recordings.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -108,4 +108,4 @@ TEST_F(SpartanFrames, ErrorsNameLineAndColumn) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 
 #include "spartan/camera/internal/stamp_order.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 void IncreasingStream::look_ahead() {
   while (ahead_.size() < kLookAhead && !ended_ && !fault_) {
@@ -51,4 +51,4 @@ Result<std::optional<Sample>> IncreasingStream::next() {
   return std::nullopt;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -8,7 +8,7 @@
 
 #include "spartan/camera/internal/recording_index.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Discards as few samples as possible within a sliding window so that stamps strictly increase (longest increasing
 /// subsequence, see find_reversals()). An isolated stamp far in the future or in the past is discarded alone; it does
@@ -38,4 +38,4 @@ class IncreasingStream : public SampleStream {
   std::int64_t discarded_ = 0;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

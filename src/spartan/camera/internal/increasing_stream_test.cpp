@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -78,4 +78,4 @@ RC_GTEST_PROP(IncreasingStream, DiscardsIsolatedBurstsOnly, ()) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "spartan/camera/frame_source.h"
 #include "spartan/camera/internal/increasing_stream.h"
 #include "spartan/camera/internal/recording_index.h"
-#include "spartan/camera/interpretation.h"
-#include "spartan/core/image_io.h"
+#include "spartan/image_io/image_io.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // A sensor stream with its next sample.
@@ -195,4 +195,4 @@ std::unique_ptr<FrameSource> make_indexed_source(RecordingIndex index) {
   return std::make_unique<IndexedSource>(std::move(index));
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

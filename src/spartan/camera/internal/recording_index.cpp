@@ -7,10 +7,10 @@
 #include <limits>
 #include <map>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/stamp_order.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -142,4 +142,4 @@ Result<RigChoice> choose_rig(const OpenOptions& options, const std::string& own_
   return RigChoice{std::move(*rig), own ? own_file : options.rig_file};
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 
 #include "spartan/camera/frame_source.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// One stereo frame as listed by the recording.
 struct FrameEntry {
@@ -77,4 +77,4 @@ struct RigChoice {
 Result<RigChoice> choose_rig(const OpenOptions& options, const std::string& own_file, ImageSize size_hint,
                              const std::function<Result<Rig>()>& read_own);
 
-}  // namespace spartan
+}  // namespace spartan::internal

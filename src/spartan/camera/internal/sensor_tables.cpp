@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 class TableStream : public SampleStream {
@@ -85,4 +85,4 @@ Result<Sample> read_inclinometer_row(const std::vector<std::string_view>& row) {
   return read_row<3>(row, [](Stamp stamp, const auto& v) { return InclinometerSample{stamp, v[0], v[1], v[2]}; });
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

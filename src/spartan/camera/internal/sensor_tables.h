@@ -7,7 +7,7 @@
 #include "spartan/camera/internal/recording_index.h"
 #include "spartan/camera/internal/table.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Parses the fields of a row into a sample. An error describes the field; the caller adds file and line.
 using RowReader = std::function<Result<Sample>(const std::vector<std::string_view>&)>;
@@ -26,4 +26,4 @@ Result<Sample> read_compass_row(const std::vector<std::string_view>& row);
 /// Inclinometer rows: stamp_ns, roll_rad, pitch_rad, sigma_rad.
 Result<Sample> read_inclinometer_row(const std::vector<std::string_view>& row);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 
 #include "spartan/testing/temporary_folder.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -89,4 +89,4 @@ TEST_F(SensorTables, ReadsWheelsCompassAndInclinometer) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr double kGapFactor = 3;  // a gap is longer than this multiple of the median interval
@@ -94,4 +94,4 @@ StepReport report_steps(const std::vector<Stamp>& stamps) {
   return report;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

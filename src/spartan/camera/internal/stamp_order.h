@@ -6,7 +6,7 @@
 
 #include "spartan/core/time.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Marks (true) the smallest set of stamps without which the rest strictly increases: the complement of a longest
 /// increasing subsequence. Among sets of equal size the later stamps are marked. A single stamp far in the future is
@@ -31,4 +31,4 @@ struct StepReport {
 };
 StepReport report_steps(const std::vector<Stamp>& stamps);
 
-}  // namespace spartan
+}  // namespace spartan::internal

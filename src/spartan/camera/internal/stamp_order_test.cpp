@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 std::vector<Stamp> stamps(const std::vector<std::int64_t>& ns) {
@@ -102,4 +102,4 @@ TEST(Steps, GapsAreLongerThanThreeMedianIntervals) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

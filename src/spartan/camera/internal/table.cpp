@@ -8,7 +8,7 @@
 #include <numbers>
 #include <sstream>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // Half of the range: the difference of two stamps fits 64 bits.
@@ -118,4 +118,4 @@ std::string to_degrees(double radians) {
   return text;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -15,7 +15,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Syntax of a table.
 struct TableFormat {
@@ -79,4 +79,4 @@ std::string to_degrees(double radians);
 /// Converts decimal degrees to radians in long double (64-bit mantissa or more), rounded once.
 std::optional<double> parse_degrees(std::string_view text);
 
-}  // namespace spartan
+}  // namespace spartan::internal

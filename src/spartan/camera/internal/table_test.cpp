@@ -8,7 +8,7 @@
 
 #include "spartan/testing/temporary_folder.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -87,4 +87,4 @@ TEST(Table, WritesShortDegrees) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 double distance_s(const StampedPose& a, const StampedPose& b) {
@@ -44,4 +44,4 @@ Result<AssociatedTrajectories> associate(const Trajectory& estimate, const Traje
   return pairs;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,7 +4,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/trajectory.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Two trajectories of equal length whose poses correspond one to one.
 struct AssociatedTrajectories {
@@ -16,4 +16,4 @@ struct AssociatedTrajectories {
 /// found.
 Result<AssociatedTrajectories> associate(const Trajectory& estimate, const Trajectory& truth, double max_dt_s);
 
-}  // namespace spartan
+}  // namespace spartan::internal

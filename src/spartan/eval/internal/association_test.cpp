@@ -5,7 +5,7 @@
 
 #include <set>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 Trajectory at_seconds(const std::vector<double>& seconds) {
@@ -73,4 +73,4 @@ RC_GTEST_PROP(Association, AgreesWithBruteForce, ()) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

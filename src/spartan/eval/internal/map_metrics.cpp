@@ -6,9 +6,9 @@
 #include <numbers>
 #include <optional>
 
-#include "spartan/core/connected_components.h"
+#include "spartan/numerics/connected_components.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // Ground truth within one cell of the map.
@@ -159,4 +159,4 @@ MapMetrics evaluate_map(const EvaluatedMap& map, const TerrainTruth& truth, cons
   return m;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,10 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "spartan/core/geotiff.h"
 #include "spartan/core/image.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Ground truth of the terrain, with cells smaller than the map's; row 0 in the north.
 struct TerrainTruth {
@@ -63,4 +62,4 @@ struct MapMetrics {
 /// Evaluates a map. Cells that reach beyond the ground truth are ignored. "Near" an obstacle: at most one cell away.
 MapMetrics evaluate_map(const EvaluatedMap& map, const TerrainTruth& truth, const MapMetricsOptions& scoring);
 
-}  // namespace spartan
+}  // namespace spartan::internal

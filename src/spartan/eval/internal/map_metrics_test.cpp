@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // Level ground of 4 m x 4 m at 2 cm with a rock of 0.2 m height and 0.4 m side around (1, 1) and a pit of 0.3 m depth
@@ -145,4 +145,4 @@ TEST(MapMetrics, CellsOutsideTheTruthAreIgnored) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

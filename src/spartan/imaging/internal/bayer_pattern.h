@@ -3,9 +3,9 @@
 
 #include <stdexcept>
 
-#include "spartan/core/pixel_format.h"
+#include "spartan/core/frame_image.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Column and row of red in the top-left 2×2 block. Blue is diagonal to it, green at the other two.
 struct BayerPhase {
@@ -33,4 +33,4 @@ inline BayerPhase bayer_phase(PixelLayout layout) {
   throw std::invalid_argument("debayer: the layout is not a Bayer pattern");
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

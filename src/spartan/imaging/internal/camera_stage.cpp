@@ -4,11 +4,11 @@
 
 #include <filesystem>
 
-#include "spartan/core/image_io.h"
-#include "spartan/core/luma.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/imaging/internal/view_footprint.h"
+#include "spartan/numerics/luma.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kRowsPerPart = 64;  // rows per task; does not affect results
@@ -179,4 +179,4 @@ void CameraStage::rectify(const ThreadPool& workers) {
   if (table_) table_->apply(working(), result_, workers);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,16 +9,15 @@
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
-#include "spartan/imaging/imaging_options.h"
+#include "spartan/imaging/imager.h"
 #include "spartan/imaging/internal/contrast.h"
 #include "spartan/imaging/internal/debayer.h"
 #include "spartan/imaging/internal/local_contrast.h"
 #include "spartan/imaging/internal/remap.h"
 #include "spartan/imaging/internal/vignetting_correction.h"
-#include "spartan/imaging/rectification.h"
 #include "spartan/rig/rig.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Buffers and lookup tables of one camera. The steps must be called in the order of their declaration; the views of
 /// the result are valid until the next image.
@@ -73,4 +72,4 @@ class CameraStage {
   ImageView<const std::uint16_t> gray16_view_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

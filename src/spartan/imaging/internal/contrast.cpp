@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kRowsPerPart = 64;  // rows per task; does not affect results
@@ -178,4 +178,4 @@ void ContrastMapping::apply(ImageView<const std::uint16_t> image, ImageView<std:
   map_rows(image, result, workers, table_, shift_);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

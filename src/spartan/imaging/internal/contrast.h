@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "spartan/core/frame_image.h"
 #include "spartan/core/image.h"
-#include "spartan/core/pixel_format.h"
 #include "spartan/core/threads.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Histogram of gray levels. The sum of the left and right histogram determines the common mapping.
 class GrayHistogram {
@@ -78,4 +78,4 @@ class ContrastMapping {
   std::vector<std::uint8_t> table_;  ///< indexed by the sample, shifted down to its significant bits
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

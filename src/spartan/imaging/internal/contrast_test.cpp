@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // A horizontal ramp from `low` to `high`, shifted up by `shift` bits.
@@ -204,4 +204,4 @@ TEST(Contrast, StrayBitsStayInsideTheTable) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,10 +4,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include "spartan/core/simd_target.h"
 #include "spartan/imaging/internal/debayer_kernels.h"
+#include "spartan/numerics/simd_target.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
@@ -129,4 +129,4 @@ void Debayerer::apply(ImageView<const std::uint16_t> mosaic, const PixelFormat& 
   state_->run(mosaic, format, result, workers);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,12 +5,12 @@
 #include <memory>
 #include <string>
 
+#include "spartan/core/frame_image.h"
 #include "spartan/core/image.h"
-#include "spartan/core/pixel_format.h"
 #include "spartan/core/threads.h"
-#include "spartan/imaging/imaging_options.h"
+#include "spartan/imaging/imager.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Interpolates RGB, or the luma of the same RGB, from mosaics of 8 to 16 bits. Reuses its buffers; one object may be
 /// used by several threads at once. Beyond the borders the mosaic is mirrored about its outermost samples, which keeps
@@ -39,4 +39,4 @@ class Debayerer {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

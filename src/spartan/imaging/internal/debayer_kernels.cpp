@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "spartan/core/luma.h"
 #include "spartan/imaging/internal/mirrored.h"
+#include "spartan/numerics/luma.h"
 
 // Compiled once per instruction set: Highway includes this file again for each.
 #undef HWY_TARGET_INCLUDE
@@ -13,7 +13,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace spartan::bayer::HWY_NAMESPACE {
+namespace spartan::internal::bayer::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int kChunk = 256;  // columns per chunk, so that its colours fit on the stack
@@ -307,11 +307,11 @@ void edge_aware_luma16(const Band<std::uint16_t, std::uint16_t>& band, BandBuffe
   edge_aware(band, buffers);
 }
 
-}  // namespace spartan::bayer::HWY_NAMESPACE
+}  // namespace spartan::internal::bayer::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace spartan::bayer {
+namespace spartan::internal::bayer {
 
 HWY_EXPORT(bilinear_colour8);
 HWY_EXPORT(bilinear_luma8);
@@ -344,5 +344,5 @@ BandBuffers::BandBuffers(int width)
   }
 }
 
-}  // namespace spartan::bayer
+}  // namespace spartan::internal::bayer
 #endif  // HWY_ONCE

@@ -9,7 +9,7 @@
 #include "spartan/core/image.h"
 #include "spartan/imaging/internal/bayer_pattern.h"
 
-namespace spartan::bayer {
+namespace spartan::internal::bayer {
 
 /// One row of the mosaic with the rows above and below, for bilinear interpolation.
 template <class T>
@@ -81,4 +81,4 @@ struct Kernels {
 template <class T>
 Kernels<T> kernels_for(std::size_t target_index);
 
-}  // namespace spartan::bayer
+}  // namespace spartan::internal::bayer

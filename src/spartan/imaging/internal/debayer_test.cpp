@@ -7,12 +7,12 @@
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
-#include "spartan/core/luma.h"
-#include "spartan/core/opencv_bridge.h"
-#include "spartan/core/random.h"
-#include "spartan/core/simd_target.h"
+#include "spartan/image_io/opencv_bridge.h"
+#include "spartan/numerics/luma.h"
+#include "spartan/numerics/random.h"
+#include "spartan/numerics/simd_target.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 struct Pattern {
@@ -315,4 +315,4 @@ TEST(Debayer, RejectsImagesThatAreNotMosaics) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 
 #include "spartan/imaging/internal/mirrored.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
@@ -93,4 +93,4 @@ void LocalContrast::apply(ImageView<const std::uint8_t> image, ImageView<std::ui
   });
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/threads.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Contrast-limited adaptive histogram equalisation (CLAHE; Zuiderveld, "Contrast Limited Adaptive Histogram
 /// Equalization", Graphics Gems IV, 1994), as cv::createCLAHE. The image is divided into tiles × tiles rectangles
@@ -40,4 +40,4 @@ class LocalContrast {
   std::vector<std::uint8_t> mappings_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

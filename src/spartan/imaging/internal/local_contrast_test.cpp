@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
-#include "spartan/core/opencv_bridge.h"
-#include "spartan/core/random.h"
+#include "spartan/image_io/opencv_bridge.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 Image<std::uint8_t> test_image(ImageSize size) {
@@ -85,4 +85,4 @@ TEST(LocalContrast, RejectsInvalidParameters) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

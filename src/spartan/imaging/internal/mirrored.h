@@ -1,7 +1,7 @@
 // Border extrapolation by reflection.
 #pragma once
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Reflects an index at the outermost samples without repeating them (as cv::BORDER_REFLECT_101):
 /// 0, 1 … size − 1, size − 2 … 1, 0, 1 … for any integer. `size` > 0.
@@ -12,4 +12,4 @@ inline int mirrored(int i, int size) {
   return i < size ? i : period - i;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 TEST(Mirrored, ReflectsAtBothEnds) {
@@ -18,4 +18,4 @@ TEST(Mirrored, ReflectsAtBothEnds) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,9 +7,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "spartan/core/simd_target.h"
+#include "spartan/numerics/simd_target.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using remap::Cell;
@@ -187,4 +187,4 @@ void RemapTable::apply(ImageView<const Rgb16> source, ImageView<Rgb16> result, c
   apply_any(source, result, workers);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

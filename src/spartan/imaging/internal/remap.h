@@ -14,7 +14,7 @@
 #include "spartan/rig/models/camera_model.h"
 #include "spartan/rig/rectified_stereo.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// For every pixel of the rectified view its position in the camera image, in fixed point with 7 fraction bits (at most
 /// 1/256 px of rounding error per axis). One table serves gray and colour images of 8 to 16 bits.
@@ -73,4 +73,4 @@ class RemapTable {
   bool all_valid_ = true;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -14,7 +14,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace spartan::remap::HWY_NAMESPACE {
+namespace spartan::internal::remap::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int kOverwrite = 2;  // pixels after a cell, of which the widest store may overwrite up to four bytes
@@ -365,11 +365,11 @@ void colour16(const Cell* cells, const Cell* prefetched, int width, const Source
   remap_row(cells, prefetched, width, source, out);
 }
 
-}  // namespace spartan::remap::HWY_NAMESPACE
+}  // namespace spartan::internal::remap::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace spartan::remap {
+namespace spartan::internal::remap {
 
 HWY_EXPORT(gray8);
 HWY_EXPORT(gray16);
@@ -381,5 +381,5 @@ Kernels kernels_for(std::size_t target_index) {
           HWY_DISPATCH_TABLE(colour8)[target_index], HWY_DISPATCH_TABLE(colour16)[target_index]};
 }
 
-}  // namespace spartan::remap
+}  // namespace spartan::internal::remap
 #endif  // HWY_ONCE

@@ -10,7 +10,7 @@
 
 #include "spartan/core/image.h"
 
-namespace spartan::remap {
+namespace spartan::internal::remap {
 
 inline constexpr int kFractionBits = 7;
 inline constexpr int kOne = 1 << kFractionBits;
@@ -97,4 +97,4 @@ struct Kernels {
 /// The kernels of one instruction set; see simd_target_index().
 Kernels kernels_for(std::size_t target_index);
 
-}  // namespace spartan::remap
+}  // namespace spartan::internal::remap

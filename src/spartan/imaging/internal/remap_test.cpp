@@ -7,11 +7,11 @@
 #include <cmath>
 #include <vector>
 
-#include "spartan/core/random.h"
-#include "spartan/core/rotation.h"
-#include "spartan/core/simd_target.h"
+#include "spartan/core/pose.h"
+#include "spartan/numerics/random.h"
+#include "spartan/numerics/simd_target.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr ImageSize kSource{160, 120};
@@ -297,4 +297,4 @@ TEST(RemapTable, RejectsOtherSizes) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

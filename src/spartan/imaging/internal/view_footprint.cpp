@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kBlock = 8;  // px
@@ -36,4 +36,4 @@ Image<std::uint8_t> view_footprint(const Camera& camera, const RectifiedStereo& 
   return footprint;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

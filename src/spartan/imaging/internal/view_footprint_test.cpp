@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "spartan/core/rotation.h"
+#include "spartan/core/pose.h"
 #include "spartan/imaging/internal/remap.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // The table maps from the view to the camera, the footprint from the camera to the view.
@@ -62,4 +62,4 @@ TEST(ViewFootprint, ExcludesPixelsOutsideTheModelDomain) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

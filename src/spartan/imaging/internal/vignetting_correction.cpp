@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
@@ -76,4 +76,4 @@ void VignettingCorrection::apply(ImageView<const std::uint16_t> image, ImageView
   apply_any(image, result, workers);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

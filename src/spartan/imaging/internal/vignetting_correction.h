@@ -8,7 +8,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/rig/rig.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Multiplies each pixel by 1 / Vignetting::relative_illumination, in fixed point with 13 fraction bits. The black
 /// level is taken to be 0.
@@ -35,4 +35,4 @@ class VignettingCorrection {
   int full_scale_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -87,4 +87,4 @@ TEST(VignettingCorrection, RejectsIlluminationOutOfRange) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

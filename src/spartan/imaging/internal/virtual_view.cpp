@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -275,4 +275,4 @@ Result<RectifiedStereo> choose_view(const RotatedCamera& left, const RotatedCame
   return RectifiedStereo{size, focal, middle_of(size) - focal * centre, 0};
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

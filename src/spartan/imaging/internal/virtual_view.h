@@ -6,11 +6,11 @@
 #include <string>
 
 #include "spartan/core/result.h"
-#include "spartan/imaging/rectification.h"
+#include "spartan/imaging/imager.h"
 #include "spartan/rig/rectified_stereo.h"
 #include "spartan/rig/rig.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// The depth to project at, m: `depth_m`, or for infinity 2²⁰ m, where ray origins do not matter.
 double effective_depth(const VirtualView& view);
@@ -35,4 +35,4 @@ Result<RectifiedStereo> choose_view(const RotatedCamera& left, const RotatedCame
 /// cannot project the axis.
 std::optional<double> resolution_on_axis(const Camera& camera, double depth_m = 1);
 
-}  // namespace spartan
+}  // namespace spartan::internal

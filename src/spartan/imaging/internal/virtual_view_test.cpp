@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 
+#include "spartan/imaging/imager.h"
 #include "spartan/imaging/internal/remap.h"
-#include "spartan/imaging/rectification.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -215,4 +215,4 @@ TEST(VirtualView, RectifiedImagesPassUnlessSizeOrFocalLengthIsGiven) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,9 +5,9 @@
 #include "spartan/localization/internal/error_state_filter.h"
 #include "spartan/localization/internal/kalman_update.h"
 #include "spartan/localization/internal/measurement_models.h"
-#include "spartan/localization/start_frame.h"
+#include "spartan/localization/localizer.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// While a sensor is excluded, this fraction of each squared residual r² is added to the variance of its bias, so that
@@ -120,4 +120,4 @@ void ErrorStateFilter::apply_constraint(const PoseConstraint& constraint, int po
   if (accept(LocalizationSensor::map, nis, innovation.rows(), HealthReason::disagrees)) correct_by_map(innovation);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

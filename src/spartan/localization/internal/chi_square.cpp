@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace spartan {
+namespace spartan::internal {
 
 // Q = 1 − P is, for even k, e^{−x/2} Σ_{i<k/2} (x/2)^i / i!; for odd k, erfc(√(x/2)) + e^{−x/2} Σ (x/2)^{i−1/2} /
 // Γ(i+1/2).
@@ -28,4 +28,4 @@ double chi_square_quantile(double probability, int degrees) {
   return 0.5 * (low + high);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 TEST(ChiSquare, MatchesTabulatedQuantiles) {
@@ -22,4 +22,4 @@ TEST(ChiSquare, QuantileInvertsProbability) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

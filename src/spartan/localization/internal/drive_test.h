@@ -6,12 +6,11 @@
 #include <numbers>
 #include <vector>
 
-#include "spartan/core/random.h"
 #include "spartan/localization/internal/error_state.h"
 #include "spartan/localization/localizer.h"
-#include "spartan/localization/measurement.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 inline Stamp test_stamp(double seconds) {
   return {1'000'000'000'000 + std::llround(seconds * 1e9)};
@@ -176,4 +175,4 @@ inline NavigationState random_navigation_state(Random& random) {
   return s;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace spartan {
+namespace spartan::internal {
 
 NavigationState add_error(const NavigationState& s, const ErrorVector& e) {
   NavigationState r = s;
@@ -65,4 +65,4 @@ void clone_pose(StateEstimate& estimate, int index) {
   p.middleCols<6>(index) = p.middleCols<6>(error_at::kPose).eval();
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -8,7 +8,7 @@
 
 #include "spartan/core/pose.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Index of the first element of each part of the error.
 namespace error_at {
@@ -71,4 +71,4 @@ Eigen::Vector2d tilt_of_up(const Eigen::Vector3d& up_in_world);
 /// Source: Roumeliotis & Burdick, "Stochastic cloning", ICRA 2002.
 void clone_pose(StateEstimate& estimate, int index);
 
-}  // namespace spartan
+}  // namespace spartan::internal

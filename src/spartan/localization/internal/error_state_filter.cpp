@@ -7,9 +7,9 @@
 #include "spartan/localization/internal/chi_square.h"
 #include "spartan/localization/internal/kalman_update.h"
 #include "spartan/localization/internal/measurement_models.h"
-#include "spartan/localization/start_frame.h"
+#include "spartan/localization/localizer.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Physical range of IMU readings of a rover: about 2000 °/s and 30 g; empirical.
@@ -331,4 +331,4 @@ UncertainPose ErrorStateFilter::odom_from_body() const {
   return odom;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

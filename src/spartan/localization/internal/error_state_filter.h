@@ -14,9 +14,9 @@
 #include "spartan/localization/internal/measurement_models.h"
 #include "spartan/localization/internal/propagation.h"
 #include "spartan/localization/localization_options.h"
-#include "spartan/localization/measurement.h"
+#include "spartan/localization/localizer.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 class ErrorStateFilter {
  public:
@@ -93,4 +93,4 @@ class ErrorStateFilter {
   FilterMemory memory_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 
 #include "spartan/localization/internal/drive_test.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 ErrorStateFilter started(const LocalizationOptions& options, const TestSensors& with) {
@@ -112,4 +112,4 @@ TEST(ErrorStateFilter, VerticalIsUncertainWithoutReadingsAtTheStart) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 #include "spartan/localization/internal/drive_test.h"
 #include "spartan/testing/numeric_jacobian.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 TEST(ErrorState, ErrorBetweenInvertsAddError) {
@@ -72,4 +72,4 @@ TEST(ErrorState, CloneCopiesTheCorrelationsOfThePose) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 struct Put {
@@ -101,4 +101,4 @@ FilterMemory get_filter_memory(ArchiveReader& in) {
   return memory;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

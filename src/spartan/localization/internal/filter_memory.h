@@ -7,9 +7,9 @@
 #include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
 #include "spartan/localization/internal/error_state.h"
-#include "spartan/localization/sensor_health.h"
+#include "spartan/localization/localizer.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
@@ -93,4 +93,4 @@ struct FilterMemory {
 void put(ArchiveWriter& out, const FilterMemory& memory);
 FilterMemory get_filter_memory(ArchiveReader& in);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,7 +4,7 @@
 #include <limits>
 #include <optional>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using Gain = Eigen::Matrix<double, error_at::kSize, Eigen::Dynamic, 0, error_at::kSize, 6>;
@@ -98,4 +98,4 @@ void symmetrize(ErrorCovariance& covariance) {
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

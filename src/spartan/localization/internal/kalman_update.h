@@ -5,7 +5,7 @@
 
 #include "spartan/localization/internal/error_state.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Innovation of a measurement: residual = jacobian · error + noise. At most 6 rows; no heap allocation.
 struct Innovation {
@@ -40,4 +40,4 @@ bool correct_all_but(StateEstimate& estimate, const Innovation& innovation, int 
 /// Restores the symmetry that rounding destroys.
 void symmetrize(ErrorCovariance& covariance);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 
 #include "spartan/localization/internal/drive_test.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 StateEstimate random_estimate(Random& random, double sigma) {
@@ -133,4 +133,4 @@ TEST(KalmanUpdate, LeavesTheEstimateUnchangedIfSIsNotPositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

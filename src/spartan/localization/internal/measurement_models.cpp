@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 const Pose& clone_of(const NavigationState& s, int clone) {
@@ -187,4 +187,4 @@ Innovation map_innovation(const StateEstimate& estimate, int pose, const PoseCon
   return i;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "spartan/camera/samples.h"
-#include "spartan/core/pose_constraint.h"
+#include "spartan/core/trajectory.h"
 #include "spartan/localization/internal/error_state.h"
 #include "spartan/localization/internal/kalman_update.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// A motion measured from a clone (`index`: kVisionClone or kStepClone) to the present pose, M = Ĉ⁻¹ X̂ Exp(e) with
 /// noise n and drift z on the right, M = … Exp(−D z − n). After correction by the estimate ẑ,
@@ -61,4 +61,4 @@ Innovation rest_innovation(const NavigationState& state, const Eigen::Vector3d& 
 Innovation map_innovation(const StateEstimate& estimate, int pose, const PoseConstraint& constraint,
                           double covariance_factor);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 #include "spartan/localization/internal/drive_test.h"
 #include "spartan/testing/numeric_jacobian.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // Residual = measured − expected: its derivative with respect to the error of the estimate is −jacobian.
@@ -127,4 +127,4 @@ TEST(MeasurementModels, PoseConstraintOfAnyRankHasARowForEachDirection) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 #include "spartan/localization/internal/kalman_update.h"
 #include "spartan/localization/internal/measurement_models.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Before an update by vision the noise of the constant-velocity model is scaled by 1 + this, so that the prediction
@@ -172,4 +172,4 @@ void ErrorStateFilter::begin_frame(Stamp stamp) {
   clone_pose(memory_.estimate, error_at::kVisionClone);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -1,6 +1,6 @@
 #include "spartan/localization/internal/propagation.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // White noise of acceleration and angular rate integrated over the step; the double integral correlates position with
@@ -131,4 +131,4 @@ void propagate_covariance(ErrorCovariance& p, const Transition& t) {
   p.bottomLeftCorner<kRest, error_at::kMoving>() = rows.rightCols<kRest>().transpose();
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

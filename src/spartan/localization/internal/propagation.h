@@ -5,7 +5,7 @@
 
 #include "spartan/localization/internal/error_state.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// IMU readings at both ends of a step.
 struct InertialStep {
@@ -49,4 +49,4 @@ Transition transition(const NavigationState& state, const ConstantVelocityStep& 
 /// P → F P Fᵀ + Q on the rows and columns that change.
 void propagate_covariance(ErrorCovariance& p, const Transition& t);
 
-}  // namespace spartan
+}  // namespace spartan::internal

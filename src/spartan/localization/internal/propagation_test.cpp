@@ -8,7 +8,7 @@
 #include "spartan/localization/internal/drive_test.h"
 #include "spartan/testing/numeric_jacobian.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 using MovingVector = Eigen::Matrix<double, error_at::kMoving, 1>;
 using Full = Eigen::Matrix<double, error_at::kMoving, error_at::kSize>;
@@ -121,4 +121,4 @@ TEST(Propagation, PropagatesTheCovarianceAsTheFullMatrix) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Snapshots are taken where time crosses a multiple of this, so that they depend on the samples only, not on the order
@@ -225,7 +225,7 @@ void ReplayFilter::put(ArchiveWriter& out) const {
   out.put(isolated_.value_or(Stamp()).ns);
   out.put(start_.ns);
   out.put(newest_.ns);
-  spartan::put(out, started() ? snapshots_.front().memory : FilterMemory{});
+  internal::put(out, started() ? snapshots_.front().memory : FilterMemory{});
   out.put(static_cast<std::uint64_t>(entries_.size()));
   for (const Measurement& m : entries_) put_measurement(out, m);
 }
@@ -254,4 +254,4 @@ bool ReplayFilter::get(ArchiveReader& in) {
   return true;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -10,7 +10,7 @@
 #include "spartan/core/result.h"
 #include "spartan/localization/internal/error_state_filter.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 class ReplayFilter {
  public:
@@ -61,4 +61,4 @@ class ReplayFilter {
   std::optional<Stamp> isolated_;  ///< stamp of the sample before if it was refused as far from all others
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 
 #include "spartan/localization/internal/drive_test.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 Bytes bytes_of(const FilterMemory& memory) {
@@ -156,4 +156,4 @@ TEST(ReplayFilter, RefusesADamagedMemory) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

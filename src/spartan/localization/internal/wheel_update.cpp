@@ -5,7 +5,7 @@
 #include "spartan/localization/internal/kalman_update.h"
 #include "spartan/localization/internal/measurement_models.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Shorter steps are not measured; steps longer than this many max_step_s have no meaningful mean attitude.
@@ -168,4 +168,4 @@ void ErrorStateFilter::update_zero_velocity(bool imu_stationary) {
   correct_motion(innovation, error_at::kStepClone);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,7 +5,7 @@
 
 #include "spartan/odometry/internal/detection/feature_spread.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// A landmark is removed after so many consecutive frames without an inlier measurement; empirical.
@@ -107,4 +107,4 @@ void LandmarkManager::add(LandmarkMemory& memory, const StereoImages& images,
   memory.drop_unused_anchors();
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

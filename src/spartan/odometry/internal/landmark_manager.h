@@ -8,9 +8,9 @@
 #include "spartan/odometry/internal/landmark_reconstructor.h"
 #include "spartan/odometry/internal/landmarks/landmark.h"
 #include "spartan/odometry/internal/motion_estimator.h"
-#include "spartan/odometry/odometry_options.h"
+#include "spartan/odometry/odometer.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Makes the current frame the latest one: latest_from_anchor ← previous_from_current⁻¹ · latest_from_anchor.
 void move_anchors(LandmarkMemory& memory, const Pose& previous_from_current);
@@ -35,4 +35,4 @@ class LandmarkManager {
   OdometryOptions options_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

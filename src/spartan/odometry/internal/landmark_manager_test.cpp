@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 const RectifiedStereo kStereo{{200, 150}, 150, {99.5, 74.5}, 0.1};
@@ -116,4 +116,4 @@ TEST_F(LandmarkManagerTest, AddsFeaturesThatAreFarFromLandmarksAndHaveADisparity
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Standard deviation of a detected feature's (u, v, d); used for the coarse motion only; empirical.
@@ -190,4 +190,4 @@ std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector
   return kept;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -10,7 +10,7 @@
 #include "spartan/odometry/internal/landmarks/landmark.h"
 #include "spartan/odometry/internal/motion_estimator.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// A feature of the current frame and its disparity at the nearest whole pixel, where one was found.
 struct ReconstructedFeature {
@@ -55,4 +55,4 @@ class LandmarkMatcher {
 std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector<LandmarkMatch> matches,
                                       int partners = 24);
 
-}  // namespace spartan
+}  // namespace spartan::internal

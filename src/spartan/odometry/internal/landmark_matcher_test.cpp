@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 const RectifiedStereo kStereo{{640, 480}, 500, {319.5, 239.5}, 0.12};
@@ -96,4 +96,4 @@ TEST(LandmarkMatcher, RigidityCheckRejectsPointsThatMoveAgainstTheOthers) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,7 +5,7 @@
 
 #include "spartan/odometry/internal/reconstruction/row_correlation.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Standard deviation of a disparity from the dense image; empirical.
@@ -118,4 +118,4 @@ std::optional<RowAlignment> LandmarkReconstructor::from_dense(const StereoImages
   return found;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,10 +7,10 @@
 
 #include "spartan/core/image.h"
 #include "spartan/odometry/internal/matching/patch_alignment.h"
-#include "spartan/odometry/odometry_options.h"
+#include "spartan/odometry/odometer.h"
 #include "spartan/rig/rectified_stereo.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// The images of one rectified stereo frame; all views are borrowed.
 struct StereoImages {
@@ -43,4 +43,4 @@ class LandmarkReconstructor {
   LandmarkReconstructionOptions options_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

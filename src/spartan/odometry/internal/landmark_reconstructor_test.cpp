@@ -9,7 +9,7 @@
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 #include "spartan/testing/synthetic_world.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::SyntheticFrame;
@@ -128,4 +128,4 @@ TEST(LandmarkReconstructor, RejectsMaskedPixelsFlatImagesAndBorders) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

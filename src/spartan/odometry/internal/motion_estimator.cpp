@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include "spartan/core/levenberg_marquardt.h"
-#include "spartan/core/random.h"
-#include "spartan/core/umeyama.h"
+#include "spartan/numerics/levenberg_marquardt.h"
+#include "spartan/numerics/random.h"
+#include "spartan/numerics/umeyama.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Seed of the RANSAC samples; any constant makes them reproducible.
@@ -301,4 +301,4 @@ std::optional<MotionFit> MotionEstimator::fine(const RectifiedStereo& stereo, co
   return fit;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -8,10 +8,10 @@
 
 #include "spartan/core/pose.h"
 #include "spartan/odometry/internal/motion/anchored_point.h"
-#include "spartan/odometry/odometry_options.h"
+#include "spartan/odometry/odometer.h"
 #include "spartan/rig/rectified_stereo.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// A landmark and its measurement in the current frame.
 struct LandmarkMatch {
@@ -61,4 +61,4 @@ class MotionEstimator {
   MotionEstimationOptions options_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,9 +5,9 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 const RectifiedStereo kStereo{{640, 480}, 500, {319.5, 239.5}, 0.12};
@@ -146,4 +146,4 @@ TEST(MotionEstimator, RejectsTooFewMatches) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

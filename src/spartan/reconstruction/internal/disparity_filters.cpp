@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
@@ -166,4 +166,4 @@ void SpeckleFilter::apply(int size_px, double step_px, ImageView<float> disparit
   }
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

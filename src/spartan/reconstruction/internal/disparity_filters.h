@@ -8,7 +8,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/reconstruction/internal/semi_global_matcher.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Left-right consistency check. Discards a disparity d where the right image's own match differs,
 /// |d − d_right(x − d)| > tolerance_px + 0.5 (the right disparities are whole pixels), where the right pixel has no
@@ -44,4 +44,4 @@ class SpeckleFilter {
   std::vector<int> above_, here_;  ///< Run of each pixel in the row above and in this row; −1: unknown.
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

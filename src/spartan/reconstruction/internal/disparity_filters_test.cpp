@@ -7,9 +7,9 @@
 #include <limits>
 #include <vector>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
@@ -154,4 +154,4 @@ TEST(Masks, DiscardExcludedPixelsOfEitherImage) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

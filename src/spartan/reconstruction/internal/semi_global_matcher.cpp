@@ -5,11 +5,11 @@
 #include <cstring>
 #include <limits>
 
-#include "spartan/core/simd_target.h"
 #include "spartan/core/stage_clock.h"
+#include "spartan/numerics/simd_target.h"
 #include "spartan/reconstruction/internal/subpixel.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kWindowColumns = 4, kWindowRows = 3;  // half sizes of the 9×7 census window
@@ -225,4 +225,4 @@ void SemiGlobalMatcher::select_row(Pass& pass, int y) {
   }
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

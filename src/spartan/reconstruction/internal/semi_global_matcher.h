@@ -15,10 +15,9 @@
 #include "spartan/core/image.h"
 #include "spartan/core/threads.h"
 #include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/reconstruction/disparity_options.h"
 #include "spartan/reconstruction/internal/sgm_kernels.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Raw matches before any check except the one against the image border.
 struct RawDisparity {
@@ -82,4 +81,4 @@ class SemiGlobalMatcher {
   DisparityTimes times_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

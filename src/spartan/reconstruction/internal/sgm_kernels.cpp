@@ -12,7 +12,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace spartan::sgm::HWY_NAMESPACE {
+namespace spartan::internal::sgm::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
@@ -168,11 +168,11 @@ Winner find_winner(std::uint16_t* sums, int count, int padded) {
 }
 #endif  // HWY_TARGET == HWY_SCALAR
 
-}  // namespace spartan::sgm::HWY_NAMESPACE
+}  // namespace spartan::internal::sgm::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace spartan::sgm {
+namespace spartan::internal::sgm {
 
 HWY_EXPORT(census_row);
 HWY_EXPORT(cost_row);
@@ -184,5 +184,5 @@ Kernels kernels_for(std::size_t target_index) {
           HWY_DISPATCH_TABLE(pixel_paths)[target_index], HWY_DISPATCH_TABLE(find_winner)[target_index]};
 }
 
-}  // namespace spartan::sgm
+}  // namespace spartan::internal::sgm
 #endif  // HWY_ONCE

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace spartan::sgm {
+namespace spartan::internal::sgm {
 
 inline constexpr int kPlanes = 8;
 inline constexpr int kCensusBits = 62;
@@ -78,4 +78,4 @@ struct Kernels {
 /// The kernels of one instruction set; see simd_target_index().
 Kernels kernels_for(std::size_t target_index);
 
-}  // namespace spartan::sgm
+}  // namespace spartan::internal::sgm

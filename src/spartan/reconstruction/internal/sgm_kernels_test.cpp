@@ -4,11 +4,11 @@
 
 #include <vector>
 
-#include "spartan/core/random.h"
-#include "spartan/core/simd_target.h"
+#include "spartan/numerics/random.h"
+#include "spartan/numerics/simd_target.h"
 #include "spartan/reconstruction/internal/sgm_reference.h"
 
-namespace spartan::sgm {
+namespace spartan::internal::sgm {
 namespace {
 
 std::vector<std::uint8_t> random_bytes(std::uint64_t seed, std::size_t count, std::uint32_t below) {
@@ -128,4 +128,4 @@ INSTANTIATE_TEST_SUITE_P(Simd, KernelsOnEveryTarget, ::testing::ValuesIn(availab
                          [](const auto& test) { return test.param; });
 
 }  // namespace
-}  // namespace spartan::sgm
+}  // namespace spartan::internal::sgm

@@ -4,7 +4,7 @@
 #include <bit>
 #include <vector>
 
-namespace spartan::sgm::reference {
+namespace spartan::internal::sgm::reference {
 
 void census_row(const CensusRow& row) {
   for (int x = 0; x < row.width; ++x) {
@@ -63,4 +63,4 @@ Winner find_winner(std::uint16_t* sums, int count, int padded) {
   return {index, *best, runner_up};
 }
 
-}  // namespace spartan::sgm::reference
+}  // namespace spartan::internal::sgm::reference

@@ -4,11 +4,11 @@
 
 #include "spartan/reconstruction/internal/sgm_kernels.h"
 
-namespace spartan::sgm::reference {
+namespace spartan::internal::sgm::reference {
 
 void census_row(const CensusRow& row);
 void cost_row(const CostRow& row);
 PathMinima pixel_paths(const PixelPaths& paths);
 Winner find_winner(std::uint16_t* sums, int count, int padded);
 
-}  // namespace spartan::sgm::reference
+}  // namespace spartan::internal::sgm::reference

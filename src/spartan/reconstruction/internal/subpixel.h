@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Offset in (−½, ½) of the minimum near `index`, from the sums on both sides. Hamming distances rise about linearly on
 /// both sides of the minimum, so two lines of equal and opposite slope are intersected ("equiangular" fit: Shimizu &
@@ -18,4 +18,4 @@ inline float subpixel_offset(const std::uint16_t* sums, int index, int count) {
   return rise <= 0 ? 0.0F : 0.5F * static_cast<float>(a - c) / static_cast<float>(rise);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

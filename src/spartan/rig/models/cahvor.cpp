@@ -1,23 +1,26 @@
-#include "spartan/rig/models/cahvor.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "spartan/rig/internal/models/cahvor_radial.h"
 #include "spartan/rig/internal/models/polynomial.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // μ(τ) with dμ/dτ.
-rig_detail::ValueWithDerivative mu_of(const CahvorModel::Radial& r, double tau) {
+ValueWithDerivative mu_of(const CahvorModel::Radial& r, double tau) {
   return {r[0] + tau * (r[1] + tau * r[2]), r[1] + 2 * tau * r[2]};
 }
 
 }  // namespace
 
-double rig_detail::cahvor_monotonic_limit(const CahvorModel::Radial& r) {
+double internal::cahvor_monotonic_limit(const CahvorModel::Radial& r) {
   if (!std::all_of(r.begin(), r.end(), [](double v) { return std::isfinite(v); }) || !(1 + r[0] > 0)) return 0;
   // At a radius of 10⁶ a ray is 0.2″ from the image plane: nothing beyond is visible.
   constexpr double kLargestSquare = 1e12;
@@ -30,7 +33,7 @@ CahvorModel::CahvorModel(CahvModel cahv, const Eigen::Vector3d& optical_axis, Ra
       given_axis_(optical_axis),
       axis_(optical_axis.normalized()),
       radial_(radial),
-      largest_radius_(rig_detail::cahvor_monotonic_limit(radial)) {}
+      largest_radius_(cahvor_monotonic_limit(radial)) {}
 
 std::vector<ModelParameterSpec> CahvorModel::parameter_specs() {
   std::vector<ModelParameterSpec> kinds = CahvModel::parameter_specs();
@@ -66,7 +69,7 @@ std::optional<ProjectionWithJacobian> CahvorModel::project_with_jacobian(const E
   const double omega = point.dot(axis_);
   const Eigen::Vector3d lambda = point - omega * axis_;
   const double tau = lambda.squaredNorm() / (omega * omega);
-  const rig_detail::ValueWithDerivative mu = mu_of(radial_, tau);
+  const ValueWithDerivative mu = mu_of(radial_, tau);
   // ∂λ = I − O Oᵀ, ∂τ = 2 (λ − τ ω O)/ω², ∂P' = I + μ ∂λ + λ μ' ∂τ.
   const Eigen::Matrix3d perpendicular = Eigen::Matrix3d::Identity() - axis_ * axis_.transpose();
   const Eigen::RowVector3d by_tau = 2 / (omega * omega) * (lambda - tau * omega * axis_).transpose();
@@ -88,10 +91,10 @@ std::optional<Ray> CahvorModel::unproject(const Eigen::Vector2d& pixel) const {
   const double radius = side.norm();
   if (radius == 0) return Ray{Eigen::Vector3d::Zero(), axis_};
   const auto radial = [&](double x) {
-    const rig_detail::ValueWithDerivative mu = mu_of(radial_, x * x);
-    return rig_detail::ValueWithDerivative{x * (1 + mu.value), 1 + mu.value + 2 * x * x * mu.derivative};
+    const ValueWithDerivative mu = mu_of(radial_, x * x);
+    return ValueWithDerivative{x * (1 + mu.value), 1 + mu.value + 2 * x * x * mu.derivative};
   };
-  const auto x = rig_detail::solve_increasing(radial, radius, 0, largest_radius_, radius);
+  const auto x = solve_increasing(radial, radius, 0, largest_radius_, radius);
   if (!x || !(*x < largest_radius_)) return std::nullopt;
   return Ray{Eigen::Vector3d::Zero(), (axis_ + side * (*x / radius)).normalized()};
 }

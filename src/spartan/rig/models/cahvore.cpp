@@ -1,16 +1,17 @@
-#include "spartan/rig/models/cahvore.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "spartan/rig/internal/models/cahvor_radial.h"
 #include "spartan/rig/internal/models/polynomial.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
-namespace {
 
-using rig_detail::ValueWithDerivative;
+using namespace internal;
+
+namespace {
 
 // χ(θ) with dχ/dθ.
 ValueWithDerivative chi_of(double linearity, double angle) {
@@ -49,7 +50,7 @@ ValueWithDerivative pupil_of(const CahvoreModel::Entrance& e, const Angle& t) {
 double monotonic_limit(const CahvoreModel::Radial& r, double linearity) {
   double end = std::numbers::pi;
   if (linearity != 0) end = std::min(end, 0.5 * std::numbers::pi / std::abs(linearity));
-  const double chi = rig_detail::cahvor_monotonic_limit(r);
+  const double chi = cahvor_monotonic_limit(r);
   if (linearity > 0) return std::min(end, std::atan(chi * linearity) / linearity);
   if (linearity < 0) return chi * -linearity < 1 ? std::asin(chi * -linearity) / -linearity : end;
   return std::min(end, chi);
@@ -159,9 +160,8 @@ std::optional<CahvoreModel::AxialPoint> CahvoreModel::axial_point_of(const Eigen
   axial.side = lambda / axial.lambda;
   // Beyond `nearest_` f has at most one zero and increases there. The pupil moves by millimetres, so the angle at C is
   // a good initial value.
-  const auto angle =
-      rig_detail::solve_increasing([&](double a) { return ray_distance(entrance_, axial.omega, axial.lambda, a); }, 0,
-                                   0, largest_angle_, std::atan2(axial.lambda, axial.omega));
+  const auto angle = solve_increasing([&](double a) { return ray_distance(entrance_, axial.omega, axial.lambda, a); },
+                                      0, 0, largest_angle_, std::atan2(axial.lambda, axial.omega));
   if (!angle) return std::nullopt;
   axial.angle = *angle;
   return axial;
@@ -201,8 +201,8 @@ std::optional<Ray> CahvoreModel::unproject(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector3d lambda = (linear->direction - omega * axis_) / omega;
   const double radius = lambda.norm();
   if (radius == 0) return Ray{Eigen::Vector3d::Zero(), axis_};
-  const auto angle = rig_detail::solve_increasing([&](double a) { return distorted_radius(radial_, linearity_, a); },
-                                                  radius, 0, largest_angle_, std::atan(radius));
+  const auto angle = solve_increasing([&](double a) { return distorted_radius(radial_, linearity_, a); }, radius, 0,
+                                      largest_angle_, std::atan(radius));
   if (!angle) return std::nullopt;
   const Angle t(*angle);
   const double offset = t.sine > 0 ? pupil_of(entrance_, t).value / t.sine : 0;

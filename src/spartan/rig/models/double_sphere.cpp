@@ -1,7 +1,7 @@
-#include "spartan/rig/models/double_sphere.h"
-
 #include <Eigen/Geometry>
 #include <cmath>
+
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
 namespace {

@@ -1,18 +1,20 @@
-#include "spartan/rig/models/equidistant.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "spartan/rig/internal/models/polynomial.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using Coefficients = EquidistantModel::Coefficients;
 
 // ρ(θ) with dρ/dθ.
-rig_detail::ValueWithDerivative image_radius(const Coefficients& k, double angle) {
+ValueWithDerivative image_radius(const Coefficients& k, double angle) {
   const double s = angle * angle;
   return {angle * (1 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))),
           1 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3])))};
@@ -20,8 +22,8 @@ rig_detail::ValueWithDerivative image_radius(const Coefficients& k, double angle
 
 double monotonic_limit(const Coefficients& k) {
   if (!std::all_of(k.begin(), k.end(), [](double v) { return std::isfinite(v); })) return 0;
-  const rig_detail::Polynomial derivative{1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]};  // dρ/dθ as a polynomial in θ²
-  const auto ends = rig_detail::sign_changes(derivative, 0, std::numbers::pi * std::numbers::pi);
+  const Polynomial derivative{1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]};  // dρ/dθ as a polynomial in θ²
+  const auto ends = sign_changes(derivative, 0, std::numbers::pi * std::numbers::pi);
   return ends.empty() ? std::numbers::pi : std::sqrt(ends.front());
 }
 
@@ -69,7 +71,7 @@ std::optional<ProjectionWithJacobian> EquidistantModel::project_with_jacobian(co
   Eigen::Matrix<double, 2, 3> by_point;
   if (side > 0) {
     // m = ρ(θ) (x, y)/side with ∂θ/∂side = z/|p|², ∂θ/∂z = −side/|p|².
-    const rig_detail::ValueWithDerivative rho = image_radius(coefficients_, std::atan2(side, z));
+    const ValueWithDerivative rho = image_radius(coefficients_, std::atan2(side, z));
     const double cosine = x / side, sine = y / side, across = rho.value / side, along = rho.derivative * z / square;
     by_point << across * sine * sine + along * cosine * cosine, (along - across) * sine * cosine,
         -rho.derivative * side / square * cosine, (along - across) * sine * cosine,
@@ -87,8 +89,8 @@ std::optional<Ray> EquidistantModel::unproject(const Eigen::Vector2d& pixel) con
   if (!target.allFinite()) return std::nullopt;
   const double radius = target.norm();
   if (radius == 0) return Ray{};
-  const auto angle = rig_detail::solve_increasing([&](double a) { return image_radius(coefficients_, a); }, radius, 0,
-                                                  largest_angle_, radius);
+  const auto angle =
+      solve_increasing([&](double a) { return image_radius(coefficients_, a); }, radius, 0, largest_angle_, radius);
   if (!angle || !(*angle < largest_angle_)) return std::nullopt;
   const Eigen::Vector2d side = target * (std::sin(*angle) / radius);
   return Ray{Eigen::Vector3d::Zero(), Eigen::Vector3d(side.x(), side.y(), std::cos(*angle)).normalized()};

@@ -1,4 +1,4 @@
-#include "spartan/rig/models/model_conversion.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
 namespace {

@@ -1,20 +1,16 @@
-#include "spartan/rig/models/radial_tangential.h"
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "spartan/rig/internal/models/polynomial.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
-namespace {
 
-using rig_detail::derivative;
-using rig_detail::Polynomial;
-using rig_detail::product;
-using rig_detail::sign_changes;
-using rig_detail::value;
+using namespace internal;
+
+namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -67,11 +63,10 @@ double undistorted_radius(const RadialTangentialModel& model, double target) {
     const double n = 1 + s * (k[0] + s * (k[1] + s * k[4])), d = 1 + s * (k[5] + s * (k[6] + s * k[7]));
     const double dn = k[0] + s * (2 * k[1] + s * 3 * k[4]), dd = k[5] + s * (2 * k[6] + s * 3 * k[7]);
     const double c = n / d;
-    return rig_detail::ValueWithDerivative{r * c, c + 2 * s * (dn - c * dd) / d};
+    return ValueWithDerivative{r * c, c + 2 * s * (dn - c * dd) / d};
   };
   // Tangential terms can map slightly beyond the range of the radial map.
-  return rig_detail::solve_increasing(radial, target, 0, model.largest_radius(), target)
-      .value_or(0.999 * model.largest_radius());
+  return solve_increasing(radial, target, 0, model.largest_radius(), target).value_or(0.999 * model.largest_radius());
 }
 
 }  // namespace

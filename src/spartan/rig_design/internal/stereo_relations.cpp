@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace spartan {
+namespace spartan::internal {
 
 double focal_length_px(double width_px, double hfov_rad) {
   return 0.5 * width_px / std::tan(hfov_rad / 2);
@@ -60,4 +60,4 @@ double overlap_percent(double hfov_rad, double step_rad) {
   return 100 * (hfov_rad - step_rad) / hfov_rad;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

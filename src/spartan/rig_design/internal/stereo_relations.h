@@ -3,7 +3,7 @@
 // one.
 #pragma once
 
-namespace spartan {
+namespace spartan::internal {
 
 /// The parameters of a parallel pair that determine its range resolution.
 struct StereoGeometry {
@@ -51,4 +51,4 @@ double tilt_to_reach_rad(double height_m, double range_m, double vfov_rad);
 /// gap.
 double overlap_percent(double hfov_rad, double step_rad);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -101,4 +101,4 @@ TEST(StereoRelations, HorizonIsInfinitelyFar) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

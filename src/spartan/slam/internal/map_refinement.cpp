@@ -6,7 +6,7 @@
 #include <limits>
 #include <optional>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // All empirical.
@@ -171,4 +171,4 @@ std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, c
   return match;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 #include "spartan/slam/internal/surface_grid.h"
 #include "spartan/slam/slam_options.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// A cell that both maps have observed. The tangent η = (t, θ) moves the local map by p → p + t + θ × (p − c).
 struct MatchedCell {
@@ -72,4 +72,4 @@ std::optional<RefinedMatch> refine_match(std::span<const SurfacePoint> points, c
 /// Applies a world tangent η = (t, θ) about `centre` to a pose: p → c + Exp(θ)(p − c) + t.
 Pose moved(const Pose& world_from_body, const Eigen::Vector3d& centre, const Vector6d& tangent);
 
-}  // namespace spartan
+}  // namespace spartan::internal

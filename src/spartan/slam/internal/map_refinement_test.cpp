@@ -5,7 +5,7 @@
 #include "spartan/slam/internal/synthetic_stop_test.h"
 #include "spartan/testing/numeric_jacobian.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::Ground;
@@ -114,4 +114,4 @@ TEST(MapRefinement, GivesNothingWithoutOverlap) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

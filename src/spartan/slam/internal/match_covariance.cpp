@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "spartan/core/median.h"
+#include "spartan/numerics/median.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -189,4 +189,4 @@ MatchCost cost_of(std::span<const MatchedCell> cells, double cell_m, double scal
   return result;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

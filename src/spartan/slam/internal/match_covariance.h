@@ -5,7 +5,7 @@
 
 #include "spartan/slam/internal/map_refinement.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Covariance of a refined match from blocks of cells with independent errors (docs/math/map_merging.md,
 /// "Information").
@@ -30,4 +30,4 @@ struct MatchCost {
 };
 MatchCost cost_of(std::span<const MatchedCell> cells, double cell_m, double scale, const MatchOptions& options);
 
-}  // namespace spartan
+}  // namespace spartan::internal

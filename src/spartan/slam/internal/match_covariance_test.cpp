@@ -5,9 +5,9 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr double kNoise_m = 0.02;
@@ -157,4 +157,4 @@ TEST(MatchCost, IsTheMeanOfTheCells) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr double kNone = 2;       // cost of a pose with too little overlap; costs are at most 1
@@ -198,4 +198,4 @@ std::vector<ScanMatchPeak> correlative_scan_match(const SurfaceGrid& local, cons
   return peaks;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 #include "spartan/slam/internal/surface_grid.h"
 #include "spartan/slam/slam_options.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Half sizes of the search window around the prior pose.
 struct SearchWindow {
@@ -35,4 +35,4 @@ std::vector<ScanMatchPeak> correlative_scan_match(const SurfaceGrid& local, cons
                                                   const Eigen::Vector3d& centre, const SearchWindow& window,
                                                   const MatchOptions& options, const ThreadPool& workers);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 
 #include "spartan/slam/internal/synthetic_stop_test.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::covariance_of;
@@ -89,4 +89,4 @@ TEST(ScanMatching, RejectsASearchThatIsTooLarge) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

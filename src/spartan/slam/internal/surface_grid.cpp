@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -145,4 +145,4 @@ SurfaceGrid coarser(const SurfaceGrid& grid) {
   return coarse;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

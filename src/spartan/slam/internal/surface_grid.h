@@ -7,9 +7,9 @@
 #include "spartan/core/image.h"
 #include "spartan/core/pose.h"
 #include "spartan/reconstruction/map_generator.h"
-#include "spartan/slam/lattice.h"
+#include "spartan/slam/global_map.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// All images have the size of the window. Unknown cells are NaN.
 struct SurfaceGrid {
@@ -37,4 +37,4 @@ SurfaceGrid grid_of(const LocalMap& map);
 /// Halves the resolution: inverse-variance weighted means of 2×2 cells, of which at least two must be known.
 SurfaceGrid coarser(const SurfaceGrid& grid);
 
-}  // namespace spartan
+}  // namespace spartan::internal

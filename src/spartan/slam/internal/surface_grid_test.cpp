@@ -6,7 +6,7 @@
 
 #include "spartan/slam/internal/synthetic_stop_test.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using testing::Ground;
@@ -82,4 +82,4 @@ TEST(SurfaceGrid, CoarseCellsLieOnTheCoarseLattice) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "spartan/core/pose.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/reconstruction/map_generator.h"
 #include "spartan/testing/synthetic_terrain.h"
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace spartan {
+namespace spartan::internal {
 
 StopStage::StoredPair::StoredPair(const RectifiedPair& source)
     : pair(source),
@@ -140,4 +140,4 @@ void StopStage::restore(ArchiveReader& in) {
   first_frame_.reset();
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -11,10 +11,10 @@
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
-#include "spartan/imaging/rectified_pair.h"
+#include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/stop_mapper.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Merged views of one stop, in the body frame at the odometry pair's first frame there.
 struct StopSurvey {
@@ -96,4 +96,4 @@ class StopStage {
   double first_frame_nearest_m_ = 0;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

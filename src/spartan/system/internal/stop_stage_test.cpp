@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 const RectifiedStereo kStereo{{64, 48}, 60, {31.5, 23.5}, 0.1};
@@ -73,4 +73,4 @@ TEST(StopStage, RejectedFirstFrameLeavesStateUnchanged) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

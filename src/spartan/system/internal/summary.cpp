@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "spartan/core/trajectory.h"
-#include "spartan/system/run_trajectory.h"
+#include "spartan/system/run_folder.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -124,4 +124,4 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
   return json.dump(2) + "\n";
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

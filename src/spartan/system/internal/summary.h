@@ -9,7 +9,7 @@
 #include "spartan/core/time.h"
 #include "spartan/system/run_store.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Facts about a run that are not in its store.
 struct RunFacts {
@@ -37,4 +37,4 @@ std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames);
 /// The content of summary.json.
 std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord>& frames);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 FrameRecord frame(int i, const std::string& status) {
@@ -59,4 +59,4 @@ TEST(Summary, JoinsConsecutiveLossesToOneSpan) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

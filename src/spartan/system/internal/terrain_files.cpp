@@ -2,11 +2,11 @@
 
 #include <cmath>
 
-#include "spartan/core/image_io.h"
-#include "spartan/reconstruction/disparity_rendering.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/reconstruction/point_cloud.h"
+#include "spartan/reconstruction/rendering.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr double kDisparityErrorPx = 0.3;  // disparity accuracy that the published rig is designed for
@@ -50,4 +50,4 @@ Status merge_terrain_clouds(const std::string& folder, const std::vector<Terrain
   return write_ply(path, all);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

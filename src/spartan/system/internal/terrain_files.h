@@ -9,7 +9,7 @@
 #include "spartan/system/run_options.h"
 #include "spartan/system/run_store.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Writes <folder>/<stamp_ns>.pfm (disparity, px), .png (colour-coded disparity) and .ply (points, metres, world
 /// frame; only those within the maximum range error).
@@ -20,4 +20,4 @@ Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOption
 Status merge_terrain_clouds(const std::string& folder, const std::vector<TerrainRecord>& terrain,
                             const std::string& path);
 
-}  // namespace spartan
+}  // namespace spartan::internal

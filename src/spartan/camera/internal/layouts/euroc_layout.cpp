@@ -6,14 +6,14 @@
 #include <filesystem>
 #include <utility>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/frame_tables.h"
 #include "spartan/camera/internal/recording_index.h"
 #include "spartan/camera/internal/sensor_tables.h"
 #include "spartan/camera/internal/stamp_order.h"
 #include "spartan/core/files.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -135,4 +135,4 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
   return index;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -11,7 +11,7 @@
 #include "spartan/camera/internal/layouts/image_header.h"
 #include "spartan/camera/internal/table.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -129,4 +129,4 @@ std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& frames
   return ImageSize{most->first.first, most->first.second};
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -8,7 +8,7 @@
 
 #include "spartan/core/image.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Image files of one frame; an empty path where the image is missing.
 struct ImageFiles {
@@ -30,4 +30,4 @@ NumberedImages number_images(const std::string& left_folder, const std::string& 
 /// The most frequent size of the left images, from the headers of up to 16 files spread over the recording.
 std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& frames);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 
 #include "spartan/testing/tiny_recordings.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -104,4 +104,4 @@ TEST_F(ImageFolder, FindsTheMostFrequentImageSize) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string_view>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using std::string_view_literals::operator""sv;
@@ -78,4 +78,4 @@ std::optional<ImageSize> parse_image_size(std::string_view head) {
   return size;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

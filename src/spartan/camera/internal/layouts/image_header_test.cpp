@@ -6,7 +6,7 @@
 
 #include "spartan/testing/temporary_folder.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 using std::string_view_literals::operator""sv;
@@ -63,4 +63,4 @@ TEST(ImageHeader, ReadsAFile) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

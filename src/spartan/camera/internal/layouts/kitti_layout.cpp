@@ -4,12 +4,12 @@
 
 #include <filesystem>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/frame_tables.h"
 #include "spartan/camera/internal/layouts/image_folder.h"
 #include "spartan/camera/internal/recording_index.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -82,4 +82,4 @@ Result<RecordingIndex> index_kitti(const LayoutChoice& layout, const OpenOptions
   return index;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,12 +5,12 @@
 
 #include <filesystem>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/frame_tables.h"
 #include "spartan/camera/internal/layouts/image_folder.h"
 #include "spartan/camera/internal/recording_index.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -110,4 +110,4 @@ Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOpt
   return index;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/options.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 inline constexpr const char* kFramesHeader =
     "frame_id,position_id,pair,left_stamp_ns,right_stamp_ns,left,right,pan_deg,tilt_deg,exposure_us,gain,bits";
@@ -34,4 +34,4 @@ struct RecordingFile {
   }
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

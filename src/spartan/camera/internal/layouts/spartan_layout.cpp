@@ -1,13 +1,13 @@
 // Spartan layout: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/reference/recording.md).
 #include <filesystem>
 
-#include "spartan/calibration_io/calibration_reading.h"
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/frame_tables.h"
 #include "spartan/camera/internal/layouts/spartan_format.h"
 #include "spartan/camera/internal/recording_index.h"
 #include "spartan/camera/internal/sensor_tables.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -61,4 +61,4 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   return index;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

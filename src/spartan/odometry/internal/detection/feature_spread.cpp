@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 bool stronger(const Feature& a, const Feature& b) {
@@ -66,4 +66,4 @@ std::vector<Feature> spread_features(std::vector<Feature> features, ImageSize si
   return kept;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

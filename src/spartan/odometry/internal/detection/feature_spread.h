@@ -5,7 +5,7 @@
 
 #include "spartan/odometry/internal/detection/landmark_detector.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Selects at most `count` features. The image is divided into about count/4 square cells; the strongest feature of
 /// every cell is taken first, then the second strongest of every cell, and so on. No two selected features are nearer
@@ -30,4 +30,4 @@ class Occupancy {
   std::vector<std::vector<Point>> cells_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 // Strong features are clustered in one corner, weak ones lie everywhere.
@@ -52,4 +52,4 @@ TEST(FeatureSpread, KeepsAllWhereThereAreFew) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

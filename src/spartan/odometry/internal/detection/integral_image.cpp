@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace spartan {
+namespace spartan::internal {
 
 void IntegralImage::compute(ImageView<const std::uint8_t> image) {
   const ImageSize size{image.width() + 1, image.height() + 1};
@@ -28,4 +28,4 @@ std::uint32_t IntegralImage::clipped_box(int x0, int y0, int x1, int y1) const {
   return box(x0, y0, x1, y1);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

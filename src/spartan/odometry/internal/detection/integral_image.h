@@ -5,7 +5,7 @@
 
 #include "spartan/core/image.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// I(x, y) = Σ of the pixels left of x and above y; one column and one row more than the image. Sums wrap modulo 2³²;
 /// their differences are exact as long as the true sum fits (always for 8-bit images of up to 16 megapixels).
@@ -30,4 +30,4 @@ class IntegralImage {
   Image<std::uint32_t> sums_;
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 Image<std::uint8_t> random_image(int width, int height) {
@@ -58,4 +58,4 @@ TEST(IntegralImage, AcceptsAnImageOfAnotherSize) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

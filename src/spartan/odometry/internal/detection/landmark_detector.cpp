@@ -4,7 +4,7 @@
 
 #include "spartan/odometry/internal/detection/surf.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 double squared_distance(const Descriptor& a, const Descriptor& b) {
   int sum = 0;
@@ -23,4 +23,4 @@ std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions&
   throw std::invalid_argument("make_landmark_detector: unknown detector");
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

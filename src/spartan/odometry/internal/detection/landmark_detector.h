@@ -9,9 +9,9 @@
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
-#include "spartan/odometry/odometry_options.h"
+#include "spartan/odometry/odometer.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// A unit vector with 64 entries, each multiplied by 254 and rounded (entries beyond ±1/2 saturate).
 using Descriptor = std::array<std::int8_t, 64>;
@@ -43,4 +43,4 @@ class LandmarkDetector {
 /// Makes the detector that the options select. Throws std::invalid_argument where the value is none of DetectorType.
 std::unique_ptr<LandmarkDetector> make_landmark_detector(const DetectionOptions& options, ThreadPool workers);
 
-}  // namespace spartan
+}  // namespace spartan::internal

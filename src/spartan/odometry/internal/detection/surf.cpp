@@ -6,7 +6,7 @@
 
 #include "spartan/odometry/internal/detection/feature_spread.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kLayersPerOctave = 4;
@@ -275,4 +275,4 @@ const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> i
   return features_;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -7,7 +7,7 @@
 #include "spartan/odometry/internal/detection/integral_image.h"
 #include "spartan/odometry/internal/detection/landmark_detector.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Detects blobs as maxima of the determinant of the Hessian over position and scale, with second derivatives from box
 /// filters on the integral image (§3), and describes them by sums of Haar wavelet responses (§4).
@@ -49,4 +49,4 @@ float surf_orientation(const IntegralImage& integral, const Feature& feature);
 /// to unit length (§4.2).
 Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature);
 
-}  // namespace spartan
+}  // namespace spartan::internal

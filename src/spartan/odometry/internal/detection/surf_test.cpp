@@ -5,9 +5,9 @@
 #include <cmath>
 #include <functional>
 
-#include "spartan/core/gradient_noise.h"
+#include "spartan/numerics/gradient_noise.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 Image<std::uint8_t> rendered(int width, int height, const std::function<double(double, double)>& gray) {
@@ -184,4 +184,4 @@ TEST(Surf, FindsNothingInTinyOrFlatImages) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace spartan {
+namespace spartan::internal {
 
 const Anchor& LandmarkMemory::anchor(std::uint32_t id) const {
   // Anchors get increasing ids and are never reordered.
@@ -19,4 +19,4 @@ void LandmarkMemory::drop_unused_anchors() {
   });
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

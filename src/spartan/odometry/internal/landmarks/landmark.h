@@ -9,7 +9,7 @@
 #include "spartan/odometry/internal/detection/landmark_detector.h"
 #include "spartan/odometry/internal/matching/patch_alignment.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// A past stereo frame in which landmarks were first observed.
 struct Anchor {
@@ -47,4 +47,4 @@ struct LandmarkMemory {
   void drop_unused_anchors();
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -1,6 +1,6 @@
 #include "spartan/odometry/internal/landmarks/odometer_memory.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr std::uint32_t kVersion = 1;
@@ -123,4 +123,4 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   return memory;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

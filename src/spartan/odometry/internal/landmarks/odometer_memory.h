@@ -9,7 +9,7 @@
 #include "spartan/odometry/internal/motion_estimator.h"
 #include "spartan/rig/rectified_stereo.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 struct OdometerMemory {
   bool started = false;
@@ -25,4 +25,4 @@ struct OdometerMemory {
   static Result<OdometerMemory> restore(const Bytes& bytes);
 };
 
-}  // namespace spartan
+}  // namespace spartan::internal

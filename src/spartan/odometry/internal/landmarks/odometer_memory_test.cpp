@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 OdometerMemory some_memory() {
@@ -69,4 +69,4 @@ TEST(LandmarkMemory, DropsUnusedAnchors) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,7 +5,7 @@
 
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kMaxIterations = 15;
@@ -326,4 +326,4 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference
   return std::nullopt;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 
 #include "spartan/core/image.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Windows are 13×13 pixels; patches carry one more pixel on each side for the gradients.
 inline constexpr int kWindowRadius = 6;
@@ -79,4 +79,4 @@ struct SlantedAlignment {
 std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,
                                               const Eigen::Vector2d& start, double radius_px);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -5,11 +5,11 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "spartan/core/gradient_noise.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/gradient_noise.h"
+#include "spartan/numerics/random.h"
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kSide = 64;
@@ -166,4 +166,4 @@ TEST(PatchAlignment, RejectsBordersFlatPatchesAndLargeSteps) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 constexpr int kRowsPerPart = 32;
@@ -42,4 +42,4 @@ void SmoothedImage::compute(ImageView<const std::uint8_t> image, const ThreadPoo
   });
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -6,7 +6,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/threads.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Gray levels times 256 after the binomial filter [1 4 6 4 1]/16 in both directions (σ = 1 px; the weights sum to
 /// 256, so nothing is rounded). Smoothing makes bilinear interpolation nearly exact, which keeps the alignment free of
@@ -32,4 +32,4 @@ inline float sample(ImageView<const std::uint16_t> image, float x, float y) {
   return (upper + fy * (lower - upper)) * (1.0f / 256.0f);
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

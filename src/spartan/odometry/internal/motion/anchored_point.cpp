@@ -2,7 +2,7 @@
 
 #include <Eigen/Dense>
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 /// Smallest depth relative to the depth in the anchor at which a point counts as in front of the camera; empirical.
@@ -44,4 +44,4 @@ AnchoredWarp warp_of(const AnchoredProjection& projection, const Eigen::Vector2d
   return warp;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -9,7 +9,7 @@
 #include "spartan/core/pose.h"
 #include "spartan/rig/rectified_stereo.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Pixel and disparity of a point in the left image of its anchor frame.
 struct AnchoredPoint {
@@ -41,4 +41,4 @@ struct AnchoredWarp {
 };
 AnchoredWarp warp_of(const AnchoredProjection& projection, const Eigen::Vector2d& slant);
 
-}  // namespace spartan
+}  // namespace spartan::internal

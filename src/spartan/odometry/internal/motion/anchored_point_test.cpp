@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 #include "spartan/testing/numeric_jacobian.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 const RectifiedStereo kStereo{{640, 480}, 500, {319.5, 239.5}, 0.12};
@@ -95,4 +95,4 @@ TEST(AnchoredPoint, WarpAgreesWithTheProjectionOfAPlane) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

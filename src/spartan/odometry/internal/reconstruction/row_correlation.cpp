@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace spartan {
+namespace spartan::internal {
 
 std::vector<float> correlate_row(ImageView<const std::uint8_t> image, int x, int y, ImageView<const std::uint8_t> other,
                                  int from, int to) {
@@ -52,4 +52,4 @@ std::vector<float> correlate_row(ImageView<const std::uint8_t> image, int x, int
   return correlation;
 }
 
-}  // namespace spartan
+}  // namespace spartan::internal

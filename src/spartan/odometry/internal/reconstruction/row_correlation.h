@@ -6,7 +6,7 @@
 
 #include "spartan/core/image.h"
 
-namespace spartan {
+namespace spartan::internal {
 
 /// Windows are 15 pixels wide and 7 high: low, because the disparity of the ground changes from row to row.
 inline constexpr int kCorrelationRadiusX = 7;
@@ -18,4 +18,4 @@ inline constexpr int kCorrelationRadiusY = 3;
 std::vector<float> correlate_row(ImageView<const std::uint8_t> image, int x, int y, ImageView<const std::uint8_t> other,
                                  int from, int to);
 
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan {
+namespace spartan::internal {
 namespace {
 
 Image<std::uint8_t> random_image(std::uint64_t seed) {
@@ -56,4 +56,4 @@ TEST(RowCorrelation, IsInvariantToContrastAndMinusOneWithoutTexture) {
 }
 
 }  // namespace
-}  // namespace spartan
+}  // namespace spartan::internal

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 double value(const Polynomial& p, double s) {
   double sum = 0;
@@ -48,4 +48,4 @@ std::vector<double> sign_changes(Polynomial p, double low, double high) {
   return roots;
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

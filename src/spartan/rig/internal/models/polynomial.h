@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 
 /// Coefficients in ascending order, beginning with the constant term.
 using Polynomial = std::vector<double>;
@@ -48,4 +48,4 @@ std::optional<double> solve_increasing(const Function& f, double target, double 
   return x;
 }
 
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

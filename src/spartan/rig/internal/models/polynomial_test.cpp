@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace spartan::rig_detail {
+namespace spartan::internal {
 namespace {
 
 TEST(Polynomial, FindsExactlyTheSignChanges) {
@@ -39,4 +39,4 @@ TEST(SolveIncreasing, ConvergesOnFlatParts) {
 }
 
 }  // namespace
-}  // namespace spartan::rig_detail
+}  // namespace spartan::internal

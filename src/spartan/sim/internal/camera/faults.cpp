@@ -1,8 +1,8 @@
 #include "spartan/sim/internal/camera/faults.h"
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr double kDarkness = 0.002;  // fraction of the light that reaches a covered camera
@@ -52,4 +52,4 @@ FrameFaultState fault_state(const CameraFaults& faults, const std::string& pair,
   return result;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -7,7 +7,7 @@
 #include "spartan/sim/internal/camera/sensor.h"
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Combined effect of all faults on one stereo frame.
 struct FrameFaultState {
@@ -21,4 +21,4 @@ struct FrameFaultState {
 FrameFaultState fault_state(const CameraFaults& faults, const std::string& pair, double time_s,
                             std::uint64_t frame_index, std::uint64_t seed);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 TEST(CameraFaults, AreActiveFromTheirStartUpToTheirEnd) {
@@ -70,4 +70,4 @@ TEST(CameraFaults, JitterIsNormalAndDustIsConstant) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -10,7 +10,7 @@
 #include "spartan/sim/internal/camera/sensor.h"
 #include "spartan/sim/simulator.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// The left image of one frame.
 struct FramePreview {
@@ -24,4 +24,4 @@ struct FramePreview {
 /// Renders frame number `frame_index` of the request's drive without writing anything.
 FramePreview preview_left(const SimulationRequest& request, std::size_t frame_index, const ThreadPool& workers);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -15,7 +15,7 @@
 
 #include "spartan/sim/internal/world/rock_shape.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr int kAllRays[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
@@ -266,4 +266,4 @@ std::uint32_t GroundScene::occluded(const RayPacket& rays) const {
   return blocked;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

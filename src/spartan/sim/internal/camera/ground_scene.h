@@ -11,7 +11,7 @@
 #include "spartan/sim/internal/world/rock_field.h"
 #include "spartan/sim/internal/world/terrain_shape.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Number of rays in a packet; the rays of a packet should be coherent (similar origins and directions).
 inline constexpr int kPacket = 8;
@@ -75,4 +75,4 @@ class GroundScene {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

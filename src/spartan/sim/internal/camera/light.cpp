@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
@@ -35,4 +35,4 @@ double Sun::horizontal_lux(double sky_lux) const {
   return sky_lux + lux_ * std::max(up, 0.0);
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

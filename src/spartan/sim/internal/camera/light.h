@@ -6,7 +6,7 @@
 
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// The sun's disc, sampled at kPoints points. Ray s of a pixel is lit by point s, the same for both cameras and every
 /// frame, so that soft shadows agree between images.
@@ -26,4 +26,4 @@ class Sun {
   double lux_;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <stdexcept>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr float kFarthest_m = 400;        // beyond the corner of the horizon square
@@ -307,4 +307,4 @@ Image<float> render_depth(const Camera& camera, const GroundScene& scene, const 
   return result;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -16,7 +16,7 @@
 #include "spartan/sim/internal/camera/sky_light.h"
 #include "spartan/sim/internal/world/soil.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Geometry, light and materials around one place of a drive. Borrowed.
 struct LitScene {
@@ -87,4 +87,4 @@ class Renderer {
 Image<float> render_depth(const Camera& camera, const GroundScene& scene, const Pose& world_from_camera,
                           const ThreadPool& workers);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -10,13 +10,13 @@
 #include <opencv2/calib3d.hpp>
 #include <vector>
 
-#include "spartan/core/random.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/numerics/random.h"
 #include "spartan/sim/internal/camera/sensor.h"
 #include "spartan/sim/internal/camera/truth.h"
 #include "spartan/sim/internal/world/rock_shape.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 // A camera above (0, 0), looking along x and down.
@@ -403,4 +403,4 @@ TEST(GroundScene, OverlappingScenesAgree) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr double kPlanckTimesLight_Jm = 6.62607015e-34 * 299792458.0;
@@ -156,4 +156,4 @@ Image<float> Sensor::noise_free(const LuminanceImage& luminance, const Exposure&
   return image;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -11,7 +11,7 @@
 #include "spartan/sim/internal/camera/renderer.h"
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Exposure time and gain of one frame, the same for both cameras.
 struct Exposure {
@@ -56,4 +56,4 @@ class Sensor {
   Image<float> vignetting_;  // relative illumination of each pixel
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 Camera camera_of(int width, int height, int bits = 8) {
@@ -178,4 +178,4 @@ TEST(Sensor, BayerPixelsHaveTheirColour) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 // Empirical constants; sky_light_test.cpp compares the result with ray casting.
@@ -228,4 +228,4 @@ float SkyLight::view_factor(const Eigen::Vector3d& point, float normal_z) const 
   return under * tilted * sum / weights;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -9,7 +9,7 @@
 #include "spartan/sim/internal/world/region.h"
 #include "spartan/sim/internal/world/terrain_shape.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Sky view factor: the irradiance of a uniform sky on a surface over that on open level ground. Precomputed for a
 /// scene on a grid fixed to the world: the heights of ground and rocks from above every kStep_m, and their horizons in
@@ -36,4 +36,4 @@ class SkyLight {
   Image<float> relative_view_factor_;  // over that of an open plane
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -9,9 +9,9 @@
 #include <cmath>
 #include <vector>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 // Sky view factor at a point by casting rays in many directions, randomly rotated.
@@ -98,4 +98,4 @@ TEST(SkyLight, ErrorIsBelowTheSensorNoise) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr float kFarthest_m = 400;        // beyond the corner of the horizon square
@@ -173,4 +173,4 @@ Image<float> classify_ground(const GroundMap& map, double obstacle_m, double cav
   return kinds;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

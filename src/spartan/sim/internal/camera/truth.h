@@ -10,9 +10,9 @@
 #include "spartan/core/threads.h"
 #include "spartan/rig/rig.h"
 #include "spartan/sim/internal/camera/ground_scene.h"
-#include "spartan/sim/rectified_view.h"
+#include "spartan/sim/simulator.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 struct TrueDisparity {
   Image<float> disparity;    ///< px of the rectified left image; NaN where there is no truth
@@ -52,4 +52,4 @@ GroundMap map_ground(const TerrainShape& shape, const RockField& rocks, const Re
 /// `cavity_m` below the ground without cavities).
 Image<float> classify_ground(const GroundMap& map, double obstacle_m, double cavity_m);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

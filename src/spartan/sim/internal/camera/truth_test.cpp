@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 TerrainShapeOptions level_ground() {
@@ -119,4 +119,4 @@ TEST(GroundMap, ClassesFollowHeightAboveGroundAndDepthBelowLevel) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 // Points in a disc of radius 1 whose mean approximates the mean over the disc.
@@ -99,4 +99,4 @@ Eigen::Vector3d BodyMotion::angular_velocity(double time_s) const {
           rate[5] * std::cos(r) * std::cos(p) - rate[4] * std::sin(r)};
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

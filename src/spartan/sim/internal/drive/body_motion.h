@@ -6,12 +6,12 @@
 
 #include "spartan/core/pose.h"
 #include "spartan/core/threads.h"
-#include "spartan/sim/drive.h"
 #include "spartan/sim/internal/drive/wheel_lift.h"
 #include "spartan/sim/internal/world/terrain_shape.h"
+#include "spartan/sim/scenario.h"
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// The ground that the wheels roll on. Borrowed.
 struct WheelGround {
@@ -45,4 +45,4 @@ class BodyMotion {
 /// Pose of the body on the ground at a planar pose, as BodyMotion samples it: x, y, z (m), roll, pitch, yaw (rad).
 Vector6d fit_to_ground(const WheelGround& ground, const ChassisOptions& chassis, const PlanarPose& at);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -9,7 +9,7 @@
 #include "spartan/rig/rig.h"
 #include "spartan/sim/internal/drive/motion_sensors.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 struct SimulatedDrive {
@@ -159,4 +159,4 @@ TEST(Compass, MeasuresTheHeadingWithItsErrors) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

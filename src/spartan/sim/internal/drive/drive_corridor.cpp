@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 DriveCorridor::DriveCorridor(const std::vector<PlanarPose>& track, double half_width_m) : half_width_m_(half_width_m) {
   for (const PlanarPose& p : track) track_.add(p.x, p.y, p);
@@ -14,4 +14,4 @@ bool DriveCorridor::intersects_disc(double x, double y, double radius_m) const {
                          [&](const PlanarPose& p) { return std::hypot(p.x - x, p.y - y) < reach; });
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "spartan/sim/internal/world/spatial_hash.h"
-#include "spartan/sim/path.h"
+#include "spartan/sim/scenario.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// The points within a distance of the track.
 class DriveCorridor {
@@ -23,4 +23,4 @@ class DriveCorridor {
   SpatialHash<PlanarPose> track_;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -5,10 +5,10 @@
 #include <numbers>
 #include <optional>
 
-#include "spartan/core/gradient_noise.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/gradient_noise.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
@@ -147,4 +147,4 @@ std::vector<InclinometerSample> measure_inclinometer(const BodyMotion& motion, c
   });
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

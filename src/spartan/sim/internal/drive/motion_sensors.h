@@ -5,11 +5,10 @@
 #include <vector>
 
 #include "spartan/camera/samples.h"
-#include "spartan/camera/sensor_noise.h"
 #include "spartan/sim/internal/drive/body_motion.h"
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// The specified noise that the recording states.
 SensorNoise specified_noise(const ImuOptions& imu, const CompassOptions& compass,
@@ -32,4 +31,4 @@ std::vector<CompassSample> measure_compass(const BodyMotion& motion, const Compa
 std::vector<InclinometerSample> measure_inclinometer(const BodyMotion& motion, const InclinometerOptions& options,
                                                      const SensorFaults& faults, std::uint64_t seed);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

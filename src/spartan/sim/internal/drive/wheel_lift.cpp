@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr int kAlong = 8, kAcross = 1;  // samples to either side of the wheel's centre
@@ -54,4 +54,4 @@ double WheelLift::at(double x, double y, double heading) const {
   return lift;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

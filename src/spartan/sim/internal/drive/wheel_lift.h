@@ -6,7 +6,7 @@
 #include "spartan/sim/internal/world/rock_field.h"
 #include "spartan/sim/internal/world/spatial_hash.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// A rigid wheel over rocks approximated by half ellipsoids of their size. Rocks lower than kPressedIn_m are pressed
 /// into the soil.
@@ -28,4 +28,4 @@ class WheelLift {
   SpatialHash<Rock> rocks_;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

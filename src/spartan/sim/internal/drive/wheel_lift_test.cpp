@@ -6,7 +6,7 @@
 
 #include "spartan/sim/internal/drive/body_motion.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 Rock dome(double x, double y, double radius_m) {
@@ -66,4 +66,4 @@ TEST(WheelLift, TheBodyTiltsAwayFromTheRock) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

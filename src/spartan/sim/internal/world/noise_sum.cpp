@@ -12,7 +12,7 @@
 
 #ifndef SPARTAN_SIM_NOISE_SUM_POINTS
 #define SPARTAN_SIM_NOISE_SUM_POINTS
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 // Points in struct-of-arrays form; `footprint` may be null.
 struct NoisePoints {
@@ -23,11 +23,11 @@ struct NoisePoints {
   std::size_t count;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace spartan::sim::HWY_NAMESPACE {
+namespace spartan::sim::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Perlin's quintic fade 6t⁵ − 15t⁴ + 10t³.
@@ -110,11 +110,11 @@ void add_noise(std::span<const Octave> octaves, const NoisePoints& p) {
   for (; at < p.count; ++at) add_block(one, octaves, p, at);
 }
 
-}  // namespace spartan::sim::HWY_NAMESPACE
+}  // namespace spartan::sim::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 HWY_EXPORT(add_noise);
 
@@ -132,5 +132,5 @@ double NoiseSum::value(double x, double y) const {
   return sum;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal
 #endif

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "spartan/core/gradient_noise.h"
+#include "spartan/numerics/gradient_noise.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Octaves of core's gradient noise, evaluated with SIMD: the same bits as the scalar functions on every instruction
 /// set.
@@ -27,4 +27,4 @@ class NoiseSum {
   std::vector<Octave> octaves_;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -1,7 +1,7 @@
 // A rectangle in the world plane.
 #pragma once
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Bounds in metres.
 struct Region {
@@ -10,4 +10,4 @@ struct Region {
   Region grown(double by_m) const { return {x0 - by_m, y0 - by_m, x1 + by_m, y1 + by_m}; }
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

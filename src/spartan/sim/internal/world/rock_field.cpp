@@ -7,10 +7,10 @@
 #include <numbers>
 #include <utility>
 
-#include "spartan/core/gradient_noise.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/gradient_noise.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr int kSteps = 400;                              // of numerical integration over diameters
@@ -147,4 +147,4 @@ std::vector<Rock> RockField::rocks_in(const Region& region, double smallest_m) c
   return found;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -8,7 +8,7 @@
 #include "spartan/sim/internal/world/region.h"
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// q(k) of Golombek & Rapp (JGR 1997); `coverage` is their k.
 double golombek_q(double coverage);
@@ -59,4 +59,4 @@ class RockField {
   double clearance_m_ = 0;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 TEST(Golombek, CoverMatchesTheModel) {
@@ -60,4 +60,4 @@ TEST(RockField, QueriesOfTheSamePlaceReturnTheSameRocks) {
 }
 
 }  // namespace
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -5,11 +5,11 @@
 #include <map>
 #include <utility>
 
-#include "spartan/core/gradient_noise.h"
-#include "spartan/core/random.h"
+#include "spartan/numerics/gradient_noise.h"
+#include "spartan/numerics/random.h"
 #include "spartan/sim/internal/world/noise_sum.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr double kCentreHeight = 0.08;  // of the centre above the ground, over the height of the rock
@@ -137,4 +137,4 @@ TriangleMesh make_rock(const Rock& rock, double edge_m) {
   return mesh;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -8,7 +8,7 @@
 
 #include "spartan/sim/internal/world/rock_field.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 struct TriangleMesh {
   std::vector<Eigen::Vector3f> vertices;
@@ -20,4 +20,4 @@ struct TriangleMesh {
 /// rock.height_m, its mean diameter at the ground is rock.diameter_m. It extends below the ground.
 TriangleMesh make_rock(const Rock& rock, double edge_m);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

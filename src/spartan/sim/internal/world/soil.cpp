@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr double kLargest_m = 2.4;        // longest wavelength on soil
@@ -44,4 +44,4 @@ double Soil::reflectance(double cos_incidence, double cos_emission) const {
   return 2 * l * cos_incidence / (cos_incidence + emission + 1e-6) + (1 - l) * cos_incidence;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

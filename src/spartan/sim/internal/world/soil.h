@@ -7,7 +7,7 @@
 #include "spartan/sim/internal/world/noise_sum.h"
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Albedo and scattering of soil and rocks; see SoilOptions for the model.
 class Soil {
@@ -32,4 +32,4 @@ class Soil {
   NoiseSum ground_, rock_;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -9,7 +9,7 @@
 
 #include "spartan/sim/internal/world/region.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Items in square cells of kCell_m.
 template <class Item>
@@ -43,4 +43,4 @@ class SpatialHash {
   std::unordered_map<std::uint64_t, std::vector<Item>> cells_;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <numbers>
 
-#include "spartan/core/random.h"
+#include "spartan/numerics/random.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
@@ -122,4 +122,4 @@ double TerrainShape::height(double x, double y) const {
   return z;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -7,7 +7,7 @@
 #include "spartan/sim/internal/world/noise_sum.h"
 #include "spartan/sim/scenario_options.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 /// Height function; see TerrainShapeOptions for its parts.
 class TerrainShape {
@@ -33,4 +33,4 @@ class TerrainShape {
   double slope_x_ = 0, slope_y_ = 0, datum_m_ = 0;
 };
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

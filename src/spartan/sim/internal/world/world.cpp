@@ -5,7 +5,7 @@
 
 #include "spartan/sim/internal/drive/body_motion.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 Region bounds_of(const std::vector<PlanarPose>& track) {
   Region region{track.front().x, track.front().y, track.front().x, track.front().y};
@@ -33,4 +33,4 @@ World make_world(const Scenario& scenario, const Drive& drive) {
   return world;
 }
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal

@@ -11,7 +11,7 @@
 #include "spartan/sim/internal/world/terrain_shape.h"
 #include "spartan/sim/scenario.h"
 
-namespace spartan::sim {
+namespace spartan::sim::internal {
 
 struct World {
   TerrainShape shape;
@@ -29,4 +29,4 @@ World make_world(const Scenario& scenario, const Drive& drive);
 /// Bounding rectangle of a track.
 Region bounds_of(const std::vector<PlanarPose>& track);
 
-}  // namespace spartan::sim
+}  // namespace spartan::sim::internal
