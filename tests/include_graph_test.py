@@ -16,7 +16,7 @@ BASE = {"core", "numerics", "image_io", "storage"}
 BELOW_STAGES = BASE | {"rig", "calibration_io", "camera", "imaging"}
 STAGES = BELOW_STAGES | {"reconstruction", "odometry"}
 SYSTEM = STAGES | {"slam", "localization"}
-ALL = SYSTEM | {"eval", "calibration", "rig_design", "system", "sim"}
+ALL = SYSTEM | {"eval", "calibration", "rig_design", "system", "report", "sim"}
 MAY_INCLUDE = {
     "core": set(),
     "numerics": {"core"},
@@ -25,17 +25,18 @@ MAY_INCLUDE = {
     "rig": {"core"},
     "calibration_io": {"core", "image_io", "rig"},
     "rig_design": {"core", "rig"},
-    "calibration": {"core", "numerics", "rig"},
     "camera": BASE | {"rig", "calibration_io"},
     "imaging": BELOW_STAGES,
     "reconstruction": BELOW_STAGES,
     "odometry": BELOW_STAGES,
+    "calibration": BELOW_STAGES | {"odometry"},
     "slam": BELOW_STAGES | {"reconstruction"},
     "localization": BASE | {"rig", "calibration_io", "camera"},
     "eval": BASE,
     "sim": BASE | {"rig", "calibration_io", "camera"},
-    "testing": BASE | {"rig", "calibration_io", "camera", "calibration"},
+    "testing": BASE | {"rig", "calibration_io", "camera"},
     "system": SYSTEM,
+    "report": SYSTEM | {"calibration", "rig_design", "eval", "system"},
     "program": ALL,
     "tests": ALL | {"testing"},
 }

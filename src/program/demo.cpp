@@ -6,10 +6,10 @@
 #include "program/commands.h"
 #include "program/interrupt.h"
 #include "program/progress.h"
-#include "program/report.h"
 #include "program/run_arguments.h"
 #include "program/simulation.h"
 #include "spartan/core/files.h"
+#include "spartan/report/report.h"
 #include "spartan/system/run.h"
 
 namespace spartan::program {

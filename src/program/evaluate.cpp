@@ -4,9 +4,9 @@
 #include <memory>
 
 #include "program/commands.h"
-#include "program/compared_trajectories.h"
 #include "program/trajectory_report.h"
 #include "spartan/eval/trajectory_metrics.h"
+#include "spartan/report/report.h"
 
 namespace spartan::program {
 namespace {

@@ -5,9 +5,9 @@
 #include <memory>
 
 #include "program/design_report.h"
-#include "program/ground_figure.h"
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
+#include "spartan/report/report.h"
 #include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::program {
@@ -24,13 +24,13 @@ Status write_files(const Context& context, const std::string& folder, const RigR
                    const RigDesign& design) {
   if (Status s = make_folder(folder); !s) return s;
   if (Status s = write_file_atomically(folder + "/feasible.csv", design_csv(design)); !s) return s;
-  const auto drawing = draw_ground(requirements, design);
-  if (!drawing) {
+  const auto figure = draw_ground(requirements, design);
+  if (!figure) {
     context.log.warning("no wide pair is feasible or published: no figure is written");
     return {};
   }
-  if (Status s = write_file_atomically(folder + "/ground.svg", drawing->to_svg()); !s) return s;
-  return write_png(folder + "/ground.png", drawing->to_image());
+  if (Status s = write_file_atomically(folder + "/ground.svg", figure->svg); !s) return s;
+  return write_png(folder + "/ground.png", figure->image);
 }
 
 Result<ExitCode> design_command(const Context& context, const DesignArguments& a) {

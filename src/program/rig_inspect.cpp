@@ -15,11 +15,10 @@
 #include "program/progress.h"
 #include "program/rig_convert.h"
 #include "program/rig_inspect_apply.h"
-#include "program/rig_inspect_figure.h"
-#include "spartan/calibration/pair_check.h"
+#include "spartan/calibration/pair_inspection.h"
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/image_io/image_io.h"
-#include "spartan/odometry/view_matching.h"
+#include "spartan/report/report.h"
 #include "spartan/rig/describe.h"
 
 namespace spartan::program {
@@ -32,33 +31,27 @@ struct InspectArguments {
   int frames = 12;
 };
 
-InspectedPair inspect_pair(const Rig& rig, const StereoPair& pair, std::vector<ImagePair> images, bool guessed,
-                           const ThreadPool& workers, bool quiet) {
-  std::vector<PixelMatch> all;
-  InspectedPair result;
-  result.pair = pair;
-  const int frames = static_cast<int>(images.size());
-  Progress progress(quiet || frames == 1);
-  for (int frame = 0; frame < frames; ++frame) {
-    progress.show(frame, frames, fmt::format("frames of pair {}", pair.name));
-    ImagePair& image = images[static_cast<std::size_t>(frame)];
-    std::vector<PixelMatch> matches;
-    for (const ViewMatch& match : match_views(std::as_const(image.left).view(), std::as_const(image.right).view(),
-                                              ViewMatchingOptions(), workers)) {
-      matches.push_back({match.left, match.right});
-    }
-    all.insert(all.end(), matches.begin(), matches.end());
-    // The figure shows the frame with the most matches.
-    if (result.frame.empty() || matches.size() > result.matches.size()) {
-      result.frame = image.name;
-      result.left = std::move(image.left);
-      result.right = std::move(image.right);
-      result.matches = std::move(matches);
-    }
-  }
-  progress.show(frames, frames, fmt::format("frames of pair {} matched, checking the calibration", pair.name));
-  result.check = guessed ? check_images(all, result.left.size()) : check_pair(rig, pair, all, result.left.size());
-  return result;
+Result<InspectedPair> check_with_images(const Rig& rig, const StereoPair& pair, std::vector<ImagePair> images,
+                                        bool guessed, const ThreadPool& workers, bool quiet) {
+  const int count = static_cast<int>(images.size());
+  std::vector<StereoViews> frames;
+  for (const ImagePair& image : images) frames.push_back({image.left.view(), image.right.view()});
+  Progress progress(quiet || count == 1);
+  const auto show = [&](std::size_t matched) {
+    progress.show(static_cast<int>(matched), count, fmt::format("frames of pair {} matched", pair.name));
+  };
+  auto inspection = guessed ? inspect_images(frames, workers, show) : inspect_pair(rig, pair, frames, workers, show);
+  if (!inspection) return failure(inspection);
+  // The figure shows the frame with the most matches.
+  const auto best = std::max_element(inspection->matches.begin(), inspection->matches.end(),
+                                     [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  ImagePair& shown = images[static_cast<std::size_t>(best - inspection->matches.begin())];
+  return InspectedPair{pair,
+                       std::move(inspection->check),
+                       std::move(shown.name),
+                       std::move(shown.left),
+                       std::move(shown.right),
+                       std::move(*best)};
 }
 
 Json rows_json(const RowErrors& rows) {
@@ -163,8 +156,9 @@ std::string to_text(const InspectedPair& one, bool guessed) {
 }
 
 // Checks the requested pairs, with images of the recording, or with the given images of one pair.
-Result<std::vector<InspectedPair>> inspect_images(const InspectArguments& a, const Rig& rig,
-                                                  std::vector<ImagePair> given, const ThreadPool& workers, bool quiet) {
+Result<std::vector<InspectedPair>> check_requested_pairs(const InspectArguments& a, const Rig& rig,
+                                                         std::vector<ImagePair> given, const ThreadPool& workers,
+                                                         bool quiet) {
   std::vector<InspectedPair> inspected;
   const auto wanted = [&](const StereoPair& pair) { return a.pair.empty() || pair.name == a.pair; };
   if (!a.pair.empty() && !rig.find_pair(a.pair)) {
@@ -177,7 +171,9 @@ Result<std::vector<InspectedPair>> inspect_images(const InspectArguments& a, con
       if (!wanted(pair) || !(*source)->info().rig.find_pair(pair.name)) continue;
       auto images = load_frames(**source, pair.name, a.frames, workers);
       if (!images) return failure(images);
-      inspected.push_back(inspect_pair(rig, pair, std::move(*images), a.rig == "-", workers, quiet));
+      auto checked = check_with_images(rig, pair, std::move(*images), a.rig == "-", workers, quiet);
+      if (!checked) return failure(checked);
+      inspected.push_back(std::move(*checked));
     }
     if (inspected.empty()) return failure(ErrorCode::input, "has no pair of this rig", a.recording);
     return inspected;
@@ -189,7 +185,9 @@ Result<std::vector<InspectedPair>> inspect_images(const InspectArguments& a, con
     if (!decoded) return failure(decoded);
     given = std::move(*decoded);
   }
-  inspected.push_back(inspect_pair(rig, *pair, std::move(given), a.rig == "-", workers, quiet));
+  auto checked = check_with_images(rig, *pair, std::move(given), a.rig == "-", workers, quiet);
+  if (!checked) return failure(checked);
+  inspected.push_back(std::move(*checked));
   return inspected;
 }
 
@@ -267,7 +265,7 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   const ThreadPool workers(context.threads);
   std::vector<InspectedPair> inspected;
   if (!a.left.empty() || !a.recording.empty()) {
-    auto result = inspect_images(a, read->rig, std::move(images), workers, context.quiet);
+    auto result = check_requested_pairs(a, read->rig, std::move(images), workers, context.quiet);
     if (!result) return failure(result);
     inspected = std::move(*result);
   }

@@ -7,14 +7,13 @@
 #include <nlohmann/json.hpp>
 
 #include "program/commands.h"
-#include "program/compared_trajectories.h"
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/progress.h"
-#include "program/report.h"
 #include "program/run_arguments.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
+#include "spartan/report/report.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::program {

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "program/compared_trajectories.h"
 #include "program/json.h"
 #include "spartan/eval/trajectory_metrics.h"
+#include "spartan/report/report.h"
 
 namespace spartan::program {
 

@@ -1,8 +1,8 @@
 // Fault injection: common calibration errors must be found under their id and corrected.
 #include "spartan/calibration/internal/model_modification.h"
 #include "spartan/calibration/internal/pair_refinement.h"
+#include "spartan/calibration/internal/simulated_pair_matches_test.h"
 #include "spartan/calibration/pair_check.h"
-#include "spartan/testing/simulated_pair_matches.h"
 
 namespace spartan {
 

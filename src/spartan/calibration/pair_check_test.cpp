@@ -4,7 +4,7 @@
 
 #include "spartan/calibration/internal/model_modification.h"
 #include "spartan/calibration/internal/pair_refinement.h"
-#include "spartan/testing/simulated_pair_matches.h"
+#include "spartan/calibration/internal/simulated_pair_matches_test.h"
 
 namespace spartan {
 

@@ -297,8 +297,6 @@ struct MotionEstimate {
   OdometryTimes times;
 };
 
-struct OdometryOptions;  // odometry_options.h
-
 /// Stereo visual odometry of the SPARTAN paper (Kostavelis et al., ICCV Workshops 2011): landmark detection → landmark
 /// 3D reconstruction → landmark matching → motion estimation. It keeps the landmarks of t−1 (the published "1/z"
 /// block). Derivation: docs/math/odometry.md.

@@ -33,7 +33,7 @@ struct DisparityImage {
   std::size_t buffer_bytes = 0;  ///< Bytes of all buffers held for this image size and search range.
 };
 
-struct DisparityOptions;  // disparity_options.h
+struct DisparityOptions;
 
 /// Dense disparities by census matching (Zabih & Woodfill 1994) and semi-global matching (Hirschmüller 2008), followed
 /// by a left-right consistency check, masks, a median filter and a speckle filter. Derivation: docs/math/stereo.md. The

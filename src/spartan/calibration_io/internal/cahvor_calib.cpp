@@ -23,7 +23,7 @@ namespace {
 
 // Skews relative to the focal length. In files with nine or more digits a skew below kNoSkew is a rounding error and is
 // set to 0; the rounding errors of files with fewer digits are kept, and formats without skew drop them
-// (rig_writing.h). OpenCV's distortion models have no skew; with them up to kNoSkewBesideOpencv is ignored.
+// (to_calibration_files()). OpenCV's distortion models have no skew; with them up to kNoSkewBesideOpencv is ignored.
 constexpr double kNoSkew = 1e-9, kNoSkewBesideOpencv = 1e-5;
 
 struct CahvWithPose {

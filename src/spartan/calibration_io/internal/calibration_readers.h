@@ -1,4 +1,4 @@
-// Readers that also report ignored information; those in rig_files.h return the rig alone. Internal to rig.
+// Readers that also report ignored information; those in calibration_files.h return the rig alone.
 #pragma once
 
 #include "spartan/calibration_io/calibration_files.h"

@@ -1,4 +1,4 @@
-// The writers of each format; to_calibration_files() in rig_writing.h selects one. Internal to rig.
+// The writers of each format; to_calibration_files() selects one.
 #pragma once
 
 #include "spartan/calibration_io/calibration_files.h"

@@ -1,4 +1,4 @@
-// Rigs from formats that give camera poses in an undocumented frame. Internal to rig.
+// Rigs from formats that give camera poses in an undocumented frame. Internal to calibration_io.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// The matrices and values at the top level of an OpenCV FileStorage file, YAML or XML. Internal to rig.
+// The matrices and values at the top level of an OpenCV FileStorage file, YAML or XML. Internal to calibration_io.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// The two files of a stereo pair in formats with one file per camera. Internal to rig.
+// The two files of a stereo pair in formats with one file per camera. Internal to calibration_io.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Parser of Python dict literals {'key': value, …}, the format of mrcal's files. Internal to rig.
+// Parser of Python dict literals {'key': value, …}, the format of mrcal's files. Internal to calibration_io.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// Common parts of the YAML files of EuRoC, Kalibr and ROS. Internal to rig.
+// Common parts of the YAML files of EuRoC, Kalibr and ROS. Internal to calibration_io.
 #pragma once
 
 #include <optional>

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "program/drawing.h"
+#include "spartan/report/internal/drawing.h"
 #include "spartan/rig_design/rig_designer.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 
 using Point = Eigen::Vector2d;
 using Points = Drawing::Points;
@@ -44,4 +44,4 @@ std::vector<double> marks(double px_per_m, double to_m);
 /// The way around, back to the first point.
 Points closed(Points points);
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

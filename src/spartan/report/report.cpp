@@ -1,4 +1,4 @@
-#include "program/report.h"
+#include "spartan/report/report.h"
 
 #include <fmt/format.h>
 
@@ -7,12 +7,6 @@
 #include <filesystem>
 #include <vector>
 
-#include "program/compared_trajectories.h"
-#include "program/html_parts.h"
-#include "program/json.h"
-#include "program/report_maps.h"
-#include "program/report_sensors.h"
-#include "program/report_trajectories.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
@@ -21,11 +15,18 @@
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/rendering.h"
+#include "spartan/report/internal/html_parts.h"
+#include "spartan/report/internal/map_section.h"
+#include "spartan/report/internal/sensor_section.h"
+#include "spartan/report/internal/trajectory_section.h"
 #include "spartan/storage/geotiff.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
 
-namespace spartan::program {
+namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr int kDriveImages = 6;
@@ -242,4 +243,4 @@ Result<std::string> make_report(ReportRequest request) {
   return html_page("Spartan: " + info.name, body);
 }
 
-}  // namespace spartan::program
+}  // namespace spartan

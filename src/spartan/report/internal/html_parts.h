@@ -6,7 +6,7 @@
 
 #include "spartan/core/image.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 
 /// Escapes the characters that are special in HTML.
 std::string html_text(const std::string& text);
@@ -39,4 +39,4 @@ std::string html_table(const std::vector<std::vector<std::string>>& rows);
 /// The whole page.
 std::string html_page(const std::string& title, const std::string& body);
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

@@ -1,4 +1,4 @@
-#include "program/ground_plan.h"
+#include "spartan/report/internal/ground_plan.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "spartan/rig_design/rig_designer.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
@@ -234,4 +234,4 @@ double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& 
   return layout.lower_end_px;
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

@@ -1,4 +1,4 @@
-#include "program/report_trajectories.h"
+#include "spartan/report/internal/trajectory_section.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -7,13 +7,13 @@
 #include <iterator>
 #include <vector>
 
-#include "program/compared_trajectories.h"
-#include "program/html_parts.h"
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/report/internal/html_parts.h"
+#include "spartan/report/report.h"
 #include "spartan/system/run_folder.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 namespace {
 
 struct Kind {
@@ -136,4 +136,4 @@ Result<std::string> trajectory_plots(const std::string& run, const std::vector<F
   return html + "<p>Position errors here, and of the best trajectory at the top of the page: " + aligned + ".</p>\n";
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "program/ground_parts.h"
+#include "spartan/report/internal/ground_parts.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 
 /// `shared_m` of the middle column is seen by both pairs. Gives the row, px, below which nothing is drawn.
 double draw_side(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs, std::optional<double> shared_m);
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

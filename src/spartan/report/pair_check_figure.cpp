@@ -1,5 +1,3 @@
-#include "program/rig_inspect_figure.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,11 +7,13 @@
 
 #include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
+#include "spartan/report/report.h"
 
-namespace spartan::program {
+namespace spartan {
 namespace {
 
 constexpr int kWidest_px = 640, kLines = 12, kHeading_px = 22;
+constexpr int kArrowScale = 10;
 
 // One strip of the figure: two images with their matches; without images, only the heading.
 struct Strip {
@@ -170,4 +170,4 @@ Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, cons
   return figure;
 }
 
-}  // namespace spartan::program
+}  // namespace spartan

@@ -1,8 +1,8 @@
-#include "program/ground_parts.h"
+#include "spartan/report/internal/ground_parts.h"
 
 #include <algorithm>
 
-namespace spartan::program {
+namespace spartan::internal {
 
 std::vector<double> marks(double px_per_m, double to_m) {
   constexpr double kRoom_px = 110;
@@ -18,4 +18,4 @@ Points closed(Points points) {
   return points;
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

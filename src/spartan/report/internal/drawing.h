@@ -8,7 +8,7 @@
 
 #include "spartan/core/image.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 
 struct Paint {
   Rgb8 colour;
@@ -64,4 +64,4 @@ class Drawing {
   std::vector<Part> parts_;
 };
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

@@ -1,4 +1,4 @@
-#include "program/report_maps.h"
+#include "spartan/report/internal/map_section.h"
 
 #include <fmt/format.h>
 
@@ -6,13 +6,13 @@
 #include <cmath>
 #include <vector>
 
-#include "program/html_parts.h"
 #include "spartan/image_io/image_io.h"
+#include "spartan/report/internal/html_parts.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_store.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 namespace {
 
 constexpr int kMostMaps = 6, kGlobalWidth_px = 1100;
@@ -100,4 +100,4 @@ Result<std::string> map_images(const std::string& run) {
   return html + *global;
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

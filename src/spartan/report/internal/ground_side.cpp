@@ -1,10 +1,10 @@
-#include "program/ground_side.h"
+#include "spartan/report/internal/ground_side.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-namespace spartan::program {
+namespace spartan::internal {
 namespace {
 
 constexpr double kLabels_px = 270;  // column for labels beside the side view
@@ -92,4 +92,4 @@ double draw_side(Drawing& drawing, double top_px, const std::vector<DrawnPair>& 
   return ground_px + 40 + 24.0 * static_cast<double>(pairs.size() + 2) + 30;
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

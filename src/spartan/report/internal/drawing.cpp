@@ -1,14 +1,14 @@
-#include "program/drawing.h"
+#include "spartan/report/internal/drawing.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "program/html_parts.h"
 #include "spartan/image_io/opencv_bridge.h"
+#include "spartan/report/internal/html_parts.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 namespace {
 
 using Points = Drawing::Points;
@@ -173,4 +173,4 @@ Image<Rgb8> Drawing::to_image() const {
   return image;
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

@@ -1,14 +1,16 @@
-#include "program/ground_figure.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "program/ground_plan.h"
-#include "program/ground_side.h"
+#include "spartan/report/internal/ground_plan.h"
+#include "spartan/report/internal/ground_side.h"
+#include "spartan/report/report.h"
 #include "spartan/rig_design/rig_designer.h"
 
-namespace spartan::program {
+namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 void draw_legend(Drawing& drawing, double y_px, bool pans, bool narrow) {
@@ -43,7 +45,7 @@ std::string caption(const DrawnPair& pair) {
 
 }  // namespace
 
-std::optional<Drawing> draw_ground(const RigRequirements& requirements, const RigDesign& design) {
+std::optional<GroundFigure> draw_ground(const RigRequirements& requirements, const RigDesign& design) {
   const PairMetrics* wide = design.wide.selected();
   if (!wide) return std::nullopt;
   constexpr Lettering kTitle{kInk, 22};
@@ -67,7 +69,7 @@ std::optional<Drawing> draw_ground(const RigRequirements& requirements, const Ri
   Drawing endless(kWidth_px, 1);
   Drawing drawing(kWidth_px, draw_on(endless));
   draw_on(drawing);
-  return drawing;
+  return GroundFigure{drawing.to_svg(), drawing.to_image()};
 }
 
-}  // namespace spartan::program
+}  // namespace spartan

@@ -4,12 +4,12 @@
 #include <optional>
 #include <vector>
 
-#include "program/ground_parts.h"
+#include "spartan/report/internal/ground_parts.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 
 /// The first pair is the wide one, `pans` its figures. Gives the row, px, below which nothing is drawn.
 double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs,
                  const std::optional<PanCoverage>& pans);
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

@@ -1,4 +1,4 @@
-#include "program/html_parts.h"
+#include "spartan/report/internal/html_parts.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "spartan/image_io/image_io.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 namespace {
 
 std::string base64(const std::string& bytes) {
@@ -215,4 +215,4 @@ svg { background: #fff; border-radius: 4px; margin: 0 12px 12px 0; } svg text { 
          "</body></html>\n";
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

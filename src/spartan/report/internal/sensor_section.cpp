@@ -1,13 +1,13 @@
-#include "program/report_sensors.h"
+#include "spartan/report/internal/sensor_section.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "program/html_parts.h"
+#include "spartan/report/internal/html_parts.h"
 #include "spartan/system/run_store.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 namespace {
 
 constexpr std::size_t kMostOutages = 20;  // listed per sensor
@@ -49,4 +49,4 @@ std::string sensor_tables(const Json& summary, const std::vector<FrameRecord>& f
   return html;
 }
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

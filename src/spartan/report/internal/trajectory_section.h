@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "program/compared_trajectories.h"
 #include "spartan/core/result.h"
 #include "spartan/eval/trajectory_metrics.h"
+#include "spartan/report/report.h"
 #include "spartan/system/run_store.h"
 
-namespace spartan::program {
+namespace spartan::internal {
 
 /// Errors of a trajectory with the first poses aligned, or, if the truth has no rotation, after an SE3 fit. Codes as
 /// compare_trajectories().
@@ -20,4 +20,4 @@ std::string alignment_text(Alignment alignment);
 Result<std::string> trajectory_plots(const std::string& run, const std::vector<FrameRecord>& frames,
                                      const std::string& truth);
 
-}  // namespace spartan::program
+}  // namespace spartan::internal

@@ -1,12 +1,11 @@
-#include "program/compared_trajectories.h"
-
 #include <filesystem>
 
 #include "spartan/calibration_io/calibration_files.h"
+#include "spartan/report/report.h"
 #include "spartan/rig/rig.h"
 #include "spartan/system/run_folder.h"
 
-namespace spartan::program {
+namespace spartan {
 namespace {
 
 namespace fs = std::filesystem;
@@ -116,4 +115,4 @@ Result<ComparedTrajectories> find_trajectories(const std::string& estimate_path,
                               estimate->kind};
 }
 
-}  // namespace spartan::program
+}  // namespace spartan

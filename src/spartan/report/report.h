@@ -1,0 +1,70 @@
+// The report page of a run, the comparison of trajectories behind it, and figures of rigs.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spartan/calibration/pair_check.h"
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/image.h"
+#include "spartan/core/result.h"
+#include "spartan/core/threads.h"
+#include "spartan/core/trajectory.h"
+#include "spartan/rig_design/rig_designer.h"
+#include "spartan/system/run_options.h"
+
+namespace spartan {
+
+/// What a report page shows.
+struct ReportRequest {
+  std::string run;           ///< run folder
+  std::string recording;     ///< the recording it was made from
+  OpenOptions open;          ///< how the recording was opened
+  RunOptions options;        ///< options of the run
+  std::string truth;         ///< truth for find_trajectories(); empty: that of the recording, if any
+  bool whole_truth = false;  ///< also show disparity errors and the true elevation of a simulation
+  int threads = 1;
+};
+
+/// The report of a run as one self-contained HTML page: images, trajectories, sensors, maps, and errors where the truth
+/// is known. Codes: `input`, `store_damaged`, `configuration` as those who read run and recording.
+Result<std::string> make_report(ReportRequest request);
+
+/// The two trajectories of a comparison.
+struct ComparedTrajectories {
+  Trajectory estimate, truth;             ///< poses of the same frame, in the convention of the truth
+  std::string estimate_path, truth_path;  ///< the files that were read
+  std::string kind;                       ///< "localization", "slam", "odometry", or "file"
+};
+
+/// `estimate`: a run folder, of which the trajectory `kind` is taken (empty: the best there is), or a trajectory file.
+/// `truth`: a trajectory file or a recording with truth. Poses of a run are converted to the convention that its
+/// rig.yaml states. Where only one side has time stamps and both have a pose for every frame (KITTI), the other one
+/// takes them over line by line. Codes: `input` for what is missing or unreadable, `usage` for a kind requested of a
+/// plain file, `configuration` for a run whose rig is invalid.
+Result<ComparedTrajectories> find_trajectories(const std::string& estimate, const std::string& truth,
+                                               const std::string& kind);
+
+/// The file of a truth that is a recording or a file, read to see that it can be: the same errors before a long run.
+Result<std::string> load_truth(const std::string& path);
+
+/// The ground that the pairs of a rig design see: side view, and plan with the pans.
+struct GroundFigure {
+  std::string svg;
+  Image<Rgb8> image;
+};
+/// Of the selected pairs (PairDesign::selected); none where there is no wide pair to draw.
+std::optional<GroundFigure> draw_ground(const RigRequirements& requirements, const RigDesign& design);
+
+/// The row errors of a pair before and after correction: both images of one frame side by side, in three strips from
+/// top to bottom: unrectified, rectified with the given rig (only a heading if that is impossible), rectified with the
+/// corrected rig (omitted if there is none). Lines mark common rows. An arrow at each match points from the left row to
+/// the right row, enlarged 10 times; gray circles are outliers. `matches` are in pixels of the given images. Each image
+/// is reduced to at most 640 px in width.
+Result<Image<Rgb8>> draw_pair_check(const Rig& rig, const StereoPair& pair, const PairCheck& check,
+                                    ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                    const std::vector<PixelMatch>& matches, const ThreadPool& workers);
+
+}  // namespace spartan
