@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Fails on an include against the order of the modules (docs/architecture.md), on an internal header that is included
-from outside its module, and on CMake links that are missing or not used.
+from outside its module, on a using-directive in a header, and on CMake links that are missing or not used.
 
     include_graph_test.py PROJECT            checks
     include_graph_test.py PROJECT --draw     prints the graph of modules as Mermaid
@@ -54,6 +54,7 @@ COMPONENTS = {
 # Headers of third parties that stay out of public headers, except in headers named *_bridge.h.
 HEAVY = re.compile(r"^(opencv2|ceres|sqlite3|yaml-cpp|embree3|gdal|octomap|nlohmann|spdlog|tbb|hwy|CLI)\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+USING = re.compile(r"^\s*using namespace\b", re.MULTILINE)
 MODULE_CALL = re.compile(r"^\s*spartan_module\(\s*(\w+)([^)]*)\)", re.MULTILINE)
 
 
@@ -85,6 +86,14 @@ def fault_of_components(path, included, project):
     if other != own and other not in components[own]:
         return f"{parts[0]}/{own} includes {included}, which is not below it"
     return None
+
+
+def using_directives(project):
+    """Headers that hold a using-directive, which would open a namespace for everyone who includes them."""
+    for folder in ("src", "tests", "bench"):
+        for path in sorted((project / folder).rglob("*.h")):
+            if USING.search(path.read_text(encoding="utf-8")):
+                yield f"{path.relative_to(project)}: a using-directive in a header"
 
 
 def is_internal(included):
@@ -132,6 +141,7 @@ def faults(project):
         elif not linked[name] <= MAY_INCLUDE[name]:
             found.append(f"CMakeLists.txt: {name} links {sorted(linked[name] - MAY_INCLUDE[name])}, which it may not include")
 
+    found.extend(using_directives(project))
     count, used_by = 0, {}
     for path, line, quote, included in includes(project):
         where = f"{path.relative_to(project)}:{line}"
@@ -196,6 +206,8 @@ def self_test():
         ("src/spartan/eval/inside.cpp", '#include "spartan/core/internal/detail.h"', "is internal to core"),
         ("src/program/inside.cpp", '#include "spartan/core/internal/detail.h"', "is internal to core"),
         ("src/spartan/core/leak.h", '#include "spartan/core/internal/detail.h"', "which is not installed"),
+        ("src/spartan/eval/open.h", "using namespace std;", "using-directive in a header"),
+        ("src/spartan/eval/open.cpp", "using namespace std;", None),
         ("src/spartan/eval/leak.h", '#include "spartan/numerics/median.h"', "which is not installed"),
         ("CMakeLists.txt", good_cmake + "spartan_module(camera USES core eval)", "may not include|includes nothing of it"),
         ("CMakeLists.txt", good_cmake + "spartan_module(imaging USES core)", "includes nothing of it"),

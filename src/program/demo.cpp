@@ -21,10 +21,11 @@ Status say(const std::string& text) {
 
 Result<ExitCode> demo(const Context& context, const std::string& scenario, const std::string& folder) {
   const std::string recording = folder + "/recording", run_folder = folder + "/run";
-  if (Status s = say("Simulating a drive over Mars: " + recording); !s) return failure(s);
+  if (Status s = say("Simulating a drive on Martian terrain: " + recording); !s) return failure(s);
   const auto simulated = simulate_scenario(context, {scenario, recording, std::nullopt, false});
   if (!simulated) return failure(simulated);
-  if (simulated->interrupted) return failure(ErrorCode::interrupted, "interrupted by the user", folder);
+  if (simulated->interrupted)
+    return failure(ErrorCode::interrupted, "interrupted by the user", folder, "delete the folder and start again");
   if (Status s = print(simulated->text); !s) return failure(s);
 
   if (Status s = say("Processing the recording: " + run_folder); !s) return failure(s);
@@ -43,7 +44,8 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   hooks.progress = [&progress](const RunProgress& p) { progress.show(p.done, p.announced, p.status); };
   const auto outcome = run(request, hooks);
   if (!outcome) return failure(outcome);
-  if (outcome->interrupted) return failure(ErrorCode::interrupted, "interrupted by the user", folder);
+  if (outcome->interrupted)
+    return failure(ErrorCode::interrupted, "interrupted by the user", folder, "delete the folder and start again");
 
   ReportRequest about;
   about.run = run_folder;
@@ -64,9 +66,9 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
 void add_demo(CLI::App& app, Context& context) {
   auto folder = std::make_shared<std::string>("spartan_demo");
   auto scenario = std::make_shared<std::string>("quick");
-  CLI::App* command =
-      add_command(app, context, "demo", "Simulate a short drive over Mars, process it, and write a report page",
-                  "demo -o spartan_demo", [&context, scenario, folder] { return demo(context, *scenario, *folder); });
+  CLI::App* command = add_command(
+      app, context, "demo", "Simulate a short drive on Martian terrain, process it, and write a report page",
+      "demo -o spartan_demo", [&context, scenario, folder] { return demo(context, *scenario, *folder); });
   command->add_option("scenario", *scenario, "Scenario: the name of a shipped one, or a file (default quick).");
   command->add_option("-o,--output", *folder, "Folder to create (default spartan_demo).");
   add_threads_option(*command, context);

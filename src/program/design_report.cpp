@@ -11,7 +11,8 @@ namespace spartan::program {
 namespace {
 
 constexpr const char* kHead =
-    "                b [m]  d_min [m]   F [deg]  w [px]  s [um]  f [mm]  range [m]  stereo [deg]  search [%]  "
+    "             base [m]   near [m]  hfov [deg]  width [px]  pixel [um]  focal [mm]  range [m]  stereo [deg]  search "
+    "[%]  "
     "pans [%]  tilt [deg]  ground [m]\n";
 
 std::string percent_or_dash(double value) {
@@ -20,7 +21,7 @@ std::string percent_or_dash(double value) {
 
 std::string row(const std::string& name, const PairMetrics& pair) {
   return fmt::format(
-      "{:>14}  {:>5}  {:>9}  {:>8}  {:>6}  {:>6}  {:6.2f}  {:9.3f}  {:12.2f}  {:10.2f}  {:>8}  {:>10}  {:.3f} - "
+      "{:>14}  {:>6}  {:>8}  {:>10}  {:>10}  {:>10}  {:10.2f}  {:9.3f}  {:12.2f}  {:10.2f}  {:>8}  {:>10}  {:.3f} - "
       "{:.3f}\n",
       name, pair.parameters.baseline_m, pair.parameters.nearest_m, pair.parameters.hfov_deg, pair.parameters.width_px,
       pair.parameters.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg, pair.search_percent,
@@ -61,7 +62,8 @@ std::string pair_text(const std::string& name, const PairRequirements& required,
                         required.pans->smallest_overlap_percent, *design.with_pan_overlap_count);
   }
   text += fmt::format(
-      "\nrequired: {} m resolution to {} m at c = {} px, stereo angle at most {} deg, search range at most "
+      "\nrequired: {} m resolution to {} m at a disparity accuracy of {} px, stereo angle at most {} deg, search range "
+      "at most "
       "{} %, baseline at least {} m, camera height at least {} m (it is {} m)\n",
       required.range_resolution_m, required.range_m, required.disparity_accuracy_px, required.largest_stereo_angle_deg,
       required.largest_search_percent, required.smallest_baseline_m, required.smallest_height_m, required.height_m);
@@ -96,11 +98,11 @@ std::string ground_text(const RigDesign& design) {
   const PanCoverage& pans = *design.pans;
   if (pans.overlap) text += describe_overlaps(pans) + "\n";
   text += fmt::format(
-      "azimuth seen by the pans at the far edge, of the required one: {:.1f} deg (one camera), {:.1f} deg (both)\n",
+      "part of the required azimuth that the pans cover at the far edge: {:.1f} deg (one camera), {:.1f} deg (both)\n",
       pans.azimuth_far.width_deg(), pans.azimuth_far_stereo.width_deg());
-  if (!pans.full_coverage) return text + "both cameras see all of it at no distance\n";
-  return text + fmt::format("both cameras see all of it from {:.2f} m to {:.2f} m\n", pans.full_coverage->from_m,
-                            pans.full_coverage->to_m);
+  if (!pans.full_coverage) return text + "there is no distance at which both cameras cover the required azimuth\n";
+  return text + fmt::format("both cameras cover the required azimuth from {:.2f} m to {:.2f} m\n",
+                            pans.full_coverage->from_m, pans.full_coverage->to_m);
 }
 
 }  // namespace

@@ -41,6 +41,11 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
+    const auto is_named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
+      std::cerr << "error: '" << argv[1] << "' is not a spartan command; see `spartan --help`\n";
+      return kUsage;
+    }
     const bool help_requested = app.exit(e, std::cout, std::cerr) == 0;
     return help_requested ? kDone : kUsage;
   }
@@ -66,7 +71,8 @@ int main(int argc, char** argv) {
   try {
     return spartan::program::run(argc, argv);
   } catch (const std::exception& e) {
-    std::cerr << "error: internal fault: " << e.what() << '\n';
+    std::cerr << "error: internal error: " << e.what()
+              << " (this is a bug of Spartan: please report the command line)\n";
     return spartan::program::kInternalFault;
   }
 }

@@ -103,8 +103,8 @@ Result<Stop> load_stop(const BuildArguments& a) {
   stop.mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
   const auto frames_of_stop = (*source)->frames_at(*a.position);
   if (frames_of_stop.empty()) {
-    return failure(ErrorCode::input, fmt::format("has no frame at position {}", *a.position), a.recording,
-                   "frames.csv lists the position_id of every frame");
+    return failure(ErrorCode::input, fmt::format("has no frame of the stop with position_id {}", *a.position),
+                   a.recording, "frames.csv lists the position_id of every frame");
   }
   for (const FrameKey& name : frames_of_stop) {
     auto frame = (*source)->frame_at(name.pair, name.left_stamp);
@@ -245,10 +245,11 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   if (Status s = check(a); !s) return failure(s);
   const auto gravity = parse_gravity(a.gravity);
   if (!gravity) return failure(gravity);
-  const auto options = options_of(context, a);
+  auto options = options_of(context, a);
   if (!options) return failure(options);
   auto stop = a.recording.empty() ? load_pair(a) : load_stop(a);
   if (!stop) return failure(stop);
+  options = resolved_options(std::move(*options), stop->rig);
   if (*gravity) {
     stop->up_in_body = *gravity;
     stop->up_source = "given";
@@ -288,14 +289,20 @@ void add_map_build(CLI::App& map, Context& context) {
   command->add_option("--rig", a->rig, "Rig or calibration file of the two images, in any supported format.");
   command->add_option("--recording", a->recording, "Recording to take one stop from.");
   command->add_option("--position", a->position, "position_id of the stop; all frames with it are merged.");
-  command->add_option("--extent-m", a->extent_m, "Side length of the map in metres (default 8).")
+  command
+      ->add_option(
+          "--extent-m", a->extent_m,
+          "Side length of the map in metres (default 8). A larger one covers more terrain and costs memory and time; "
+          "overrides mapping.map.extent_m.")
       ->check(CLI::Range(0.5, 1000.0));
   command
       ->add_option("--cell-m", a->cell_m,
                    "Side length of a cell in metres (default 0.05). A smaller one costs time and memory.")
       ->check(CLI::Range(0.005, 10.0));
-  command->add_option("--gravity", a->gravity,
-                      "Direction of gravity in the body frame, x,y,z (default: from the IMU, else straight down).");
+  command->add_option(
+      "--gravity", a->gravity,
+      "Direction of gravity in the body frame, x,y,z (default: from the IMU; without one, from the fitted ground "
+      "plane if the rig has no body frame, else 0,0,-1).");
   command->add_option("--config", a->config,
                       "YAML file with options that differ from the defaults (see `spartan config dump`).");
   command

@@ -29,7 +29,7 @@ Result<LatticeWindow> window_of(const ExportArguments& a, const GlobalMap& map) 
   return window_between(west, south, east, north, map.cell_m());
 }
 
-// The centers of the cells, in the colors of the image.
+// The centres of the cells, in the colors of the image.
 PointCloud cloud_of(const MapView& view) {
   const Image<Rgb8> colours = render_map(view.elevation_m, view.kind, view.cell_m, 1);
   PointCloud cloud;
@@ -77,7 +77,7 @@ void add_map_export(CLI::App& map, Context& context) {
   command
       ->add_option("-o,--output", a->output,
                    "File to write; its extension selects the format: .tif (all layers), .png (an image), .ply (cell "
-                   "centers), .map.")
+                   "centres), .map.")
       ->required();
   command
       ->add_option("--window", a->window_m,

@@ -52,7 +52,7 @@ std::string to_text(const Json& json) {
   std::string text = fmt::format(
       "{} x {} cells of {} m in {} tiles of {} submaps; north-west corner at {:.2f}, {:.2f} m\n"
       "{:.1f} m2 mapped: {} cells free, {} obstacle, {} cavity\n"
-      "elevation {:.3f} m to {:.3f} m, standard deviation {:.1f} mm (median)\n"
+      "elevation {:.3f} m to {:.3f} m, median standard deviation of a cell {:.1f} mm\n"
       "{} stops:\n",
       json["columns"].get<int>(), json["rows"].get<int>(), json["cell_m"].get<double>(),
       json["tiles"].get<std::size_t>(), json["submaps"].get<std::size_t>(), json["west_m"].get<double>(),

@@ -103,7 +103,8 @@ void add_map_merge(CLI::App& map, Context& context) {
       add_command(map, context, "merge", "Merge two global maps that share a world frame",
                   "map merge run_monday run_tuesday -o site.map", [&context, a] { return merge(context, *a); });
   command->add_option("a", a->a, "Saved map (.map) or run folder.")->required();
-  command->add_option("b", a->b, "Second map, in the same world frame. Nothing is searched or moved.")->required();
+  command->add_option("b", a->b, "Second map, in the same world frame. The maps are not aligned by matching.")
+      ->required();
   command->add_option("-o,--output", a->output, "Map file to write.")->required();
   add_json_flag(*command, context);
 }

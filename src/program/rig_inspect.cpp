@@ -38,8 +38,10 @@ Result<InspectedPair> check_with_images(const Rig& rig, const StereoPair& pair, 
   for (const ImagePair& image : images) frames.push_back({image.left.view(), image.right.view()});
   Progress progress(quiet || count == 1);
   const auto show = [&](std::size_t matched) {
-    progress.show(static_cast<int>(matched), count, fmt::format("frames of pair {} matched", pair.name));
+    const char* next = static_cast<int>(matched) == count ? " matched, checking the calibration" : "";
+    progress.show(static_cast<int>(matched), count, fmt::format("frames of pair {}{}", pair.name, next));
   };
+  show(0);
   auto inspection = guessed ? inspect_images(frames, workers, show) : inspect_pair(rig, pair, frames, workers, show);
   if (!inspection) return failure(inspection);
   // The figure shows the frame with the most matches.
@@ -147,8 +149,9 @@ std::string to_text(const InspectedPair& one, bool guessed) {
         rotation_text(c.roll_rad, s.roll_rad, "clockwise", "counter-clockwise"), hundredths(100 * (c.focal_ratio - 1)),
         100 * s.focal_ratio);
     text += fmt::format(
-        "{}row errors determine the yaw no better than that ±, because distortion has the same effect: ±{:.1f} px of "
-        "disparity, so they do not verify long ranges\n",
+        "{}yaw is weakly observable from row errors (correlated with distortion): its standard deviation is {:.1f} px "
+        "of "
+        "disparity, so long ranges are not verified\n",
         pair, check.yaw_sigma_px);
   }
   for (const RigFinding& f : check.findings) text += fmt::format("{}finding {}: {}\n", pair, f.id, f.text);
@@ -246,7 +249,7 @@ std::string to_text(const InspectArguments& a, const LoadedRig& read, const std:
   const bool correctable = std::any_of(inspected.begin(), inspected.end(), [&](const InspectedPair& one) {
     return one.checked() && one.check.corrected && *one.check.corrected != read.rig;
   });
-  if (correctable && !guessed && a.apply.empty()) text += "--apply FILE writes the corrected rig\n";
+  if (correctable && !guessed && a.apply.empty()) text += "use --apply FILE to write the corrected rig\n";
   return text;
 }
 
@@ -311,10 +314,12 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
                       "Check only this pair of the rig (default with LEFT and RIGHT: the first one).");
   command
       ->add_option("--frames", a->frames,
-                   "Maximum number of frames of a pair, spread over all (default 12). More give smaller errors.")
+                   "Maximum number of frames of a pair, spread evenly over all (default 12). More lower the standard "
+                   "deviations of "
+                   "the correction and take longer.")
       ->check(CLI::Range(1, 1000));
   command->add_option("--apply", a->apply,
-                      "Write the corrected rig as rig.yaml. Nothing is changed beyond what the findings require.");
+                      "Write the corrected rig as rig.yaml. Only parameters that the findings name are changed.");
   command->add_option("--figure", a->figure,
                       "Write a PNG that shows the row errors of the first pair, before and after.");
   add_former_name(*command, context, "--shots", "--frames", a->frames);

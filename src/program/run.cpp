@@ -29,14 +29,15 @@ struct RunArguments {
 std::string summary_for_people(const std::string& summary_json, const std::string& folder) {
   const auto s = nlohmann::json::parse(summary_json);
   const auto& health = s["health"]["odometry"];
-  std::string text = fmt::format("{} frames, {:.2f} m in {:.1f} s ({:.1f} s of CPU), {:.0f} MB\n",
-                                 s["frames"].get<int>(), s["distance_m"].get<double>(), s["wall_seconds"].get<double>(),
-                                 s["cpu_seconds"].get<double>(), s["peak_memory_bytes"].get<double>() / 1e6);
+  std::string text =
+      fmt::format("{} frames, path length {:.2f} m; processed in {:.1f} s ({:.1f} s of CPU), peak memory {:.0f} MB\n",
+                  s["frames"].get<int>(), s["distance_m"].get<double>(), s["wall_seconds"].get<double>(),
+                  s["cpu_seconds"].get<double>(), s["peak_memory_bytes"].get<double>() / 1e6);
   text += fmt::format("odometry: {} tracking, {} degraded, {} stationary, {} lost\n", health["tracking"].get<int>(),
                       health["degraded"].get<int>(), health["standing"].get<int>(), health["lost"].get<int>());
   std::string absent;
   for (const auto& part : s["absent"]) absent += (absent.empty() ? "" : ", ") + part.get<std::string>();
-  if (!absent.empty()) text += "not part of this run: " + absent + "\n";
+  if (!absent.empty()) text += "disabled: " + absent + "\n";
   for (const auto& [reason, count] : s["skipped"].items())
     text += fmt::format("skipped: {} {}\n", count.get<int>(), reason);
   for (const auto& span : s["lost_spans"]) {

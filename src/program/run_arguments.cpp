@@ -1,7 +1,5 @@
 #include "program/run_arguments.h"
 
-#include "spartan/core/files.h"
-
 namespace spartan::program {
 namespace {
 
@@ -15,16 +13,18 @@ Result<ChosenOptions> choose_options(const Context& context, const std::string& 
                                      const std::vector<std::string>& assignments) {
   ChosenOptions chosen;
   if (!file.empty()) {
-    auto loaded = load_options<RunOptions>(file, {}, &chosen.given);
+    auto loaded = read_options_file<RunOptions>(file);
     if (!loaded) return failure(loaded);
-    chosen.options = std::move(*loaded);
-    if (const auto text = read_file(file)) warn(context, renamed_options<RunOptions>(*text, file));
+    chosen.options = std::move(loaded->options);
+    chosen.given = std::move(loaded->given);
+    warn(context, loaded->warnings);
   }
   for (const std::string& assignment : assignments) {
-    auto changed = set_option(chosen.options, assignment, &chosen.given);
+    auto changed = read_assignment(assignment, std::move(chosen.options));
     if (!changed) return failure(changed);
-    chosen.options = std::move(*changed);
-    warn(context, renamed_options<RunOptions>(assignment));
+    chosen.options = std::move(changed->options);
+    chosen.given.add(changed->given);
+    warn(context, changed->warnings);
   }
   if (Status status = validate(chosen.options, file.empty() ? "--set" : file); !status) return failure(status);
   return chosen;

@@ -21,7 +21,7 @@ Result<ExitCode> simulate_command(const Context& context, const SimulationArgume
 void add_simulate(CLI::App& app, Context& context) {
   auto a = std::make_shared<SimulationArguments>();
   CLI::App* command =
-      add_command(app, context, "simulate", "Simulate a drive over Mars: a recording with exact ground truth",
+      add_command(app, context, "simulate", "Simulate a drive on Martian terrain: a recording with exact ground truth",
                   "simulate quick -o quick_recording", [&context, a] { return simulate_command(context, *a); });
   command->add_option("scenario", a->scenario, "Scenario: the name of a shipped one, or a file.")->required();
   command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();

@@ -71,16 +71,16 @@ std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectorie
   text += fmt::format(
       "aligned   {}{}\n\n", name_of(metrics.alignment),
       metrics.alignment == Alignment::sim3 ? fmt::format(", scale {:.5f}", metrics.truth_from_estimate.scale) : "");
-  text += fmt::format("{:<18}{:>10}{:>10}{:>10}{:>10}\n", "error", "rmse", "mean", "median", "max");
-  text += line_of("position, m", metrics.ate_m);
-  text += line_of("step, m", metrics.rpe_translation_m);
-  text += line_of("step, deg", metrics.rpe_rotation_deg);
-  if (metrics.drift_percent) text += fmt::format("\ndrift of the end, %{:>10.3f}\n", *metrics.drift_percent);
+  text += fmt::format("{:<20}{:>10}{:>10}{:>10}{:>10}\n", "error", "rmse", "mean", "median", "max");
+  text += line_of("ATE, m", metrics.ate_m);
+  text += line_of("RPE translation, m", metrics.rpe_translation_m);
+  text += line_of("RPE rotation, deg", metrics.rpe_rotation_deg);
+  if (metrics.drift_percent) text += fmt::format("\nend-point drift, %{:>12.3f}\n", *metrics.drift_percent);
   if (metrics.segments) {
-    text += fmt::format("\n{:<18}{:>10}{:>15}{:>15}\n", "segments, m", "count", "translation, %", "rotation, deg/m");
+    text += fmt::format("\n{:<20}{:>10}{:>17}{:>17}\n", "segments, m", "count", "translation, %", "rotation, deg/m");
     for (const SegmentErrors& s : *metrics.segments) {
       if (s.count == 0) continue;
-      text += fmt::format("{:<18g}{:>10}{:>15.3f}{:>15.5f}\n", s.length_m, s.count, *s.translation_percent,
+      text += fmt::format("{:<20g}{:>10}{:>17.3f}{:>17.5f}\n", s.length_m, s.count, *s.translation_percent,
                           *s.rotation_deg_per_m);
     }
   }

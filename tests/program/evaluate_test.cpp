@@ -145,7 +145,7 @@ TEST_F(Evaluate, PrintsATableForPeople) {
   const ProgramResult result = run_program({"evaluate", path("run"), "--truth", path("kitti")});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.out, HasSubstr("trajectory_slam.tum (slam)"));
-  EXPECT_THAT(result.out, HasSubstr("position, m"));
+  EXPECT_THAT(result.out, HasSubstr("ATE, m"));
   EXPECT_EQ(result.err, "");
 }
 

@@ -100,7 +100,7 @@ TEST_F(MapBuild, WhatItCannotDoIsSaid) {
   const auto none =
       run_program({"map", "build", "-o", folder_.path() + "/out", "--recording", drive_, "--position", "9"});
   EXPECT_EQ(none.exit_code, 3);
-  EXPECT_THAT(none.err, HasSubstr("has no frame at position 9"));
+  EXPECT_THAT(none.err, HasSubstr("has no frame of the stop with position_id 9"));
   const auto gravity = build("out", {"--gravity", "0,0"});
   EXPECT_EQ(gravity.exit_code, 2);
   EXPECT_THAT(gravity.err, HasSubstr("--gravity: '0,0' is not three numbers"));

@@ -97,7 +97,7 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_THAT(some.out, HasSubstr("published pair (feasible, in the lists): margins: range +0.002 m"));
   EXPECT_THAT(some.out, HasSubstr("published pair (not feasible, in the lists): margins: range -0.515 m"));
   EXPECT_THAT(some.out, HasSubstr("ground seen by both pairs, middle column: 2.03 m\n"));
-  EXPECT_THAT(some.out, HasSubstr("of the required one: 117.1 deg (one camera), 114.6 deg (both)\n"));
+  EXPECT_THAT(some.out, HasSubstr("at the far edge: 117.1 deg (one camera), 114.6 deg (both)\n"));
   EXPECT_LT(lines_of(some.out), 70u);
   EXPECT_THAT(run_program({"rig", "design", rover(), "--rows", "3"}).out, HasSubstr("...  12589 more;"));
   const auto all = run_program({"rig", "design", rover(), "--all"});

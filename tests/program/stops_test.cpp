@@ -100,7 +100,7 @@ TEST_F(Stops, ArePartOfTheReport) {
   ASSERT_TRUE(finished(run("out")));
   const std::string page = testing::content_of(path("out/report/index.html"));
   for (const char* part : {"Images", "truth", "localization, 3σ", "inclinometer", "Global map of all stops",
-                           "Points per cell of the global map", "missing: has not said anything"})
+                           "Points per cell of the global map", "missing: no measurement received yet"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
 }
 
@@ -203,7 +203,7 @@ TEST_F(Stops, ADamagedTileEndsTheRun) {
   for (int i = 0; i < 2; ++i) {
     const ProgramResult damaged = run("part", {"--resume"});
     EXPECT_EQ(damaged.exit_code, 3) << damaged.err;
-    EXPECT_NE(damaged.err.find("is damaged: its checksum does not fit"), std::string::npos) << damaged.err;
+    EXPECT_NE(damaged.err.find("is damaged: checksum mismatch"), std::string::npos) << damaged.err;
     EXPECT_NE(damaged.err.find("run.sqlite"), std::string::npos) << damaged.err;
     EXPECT_EQ(damaged.err.find("skipped"), std::string::npos) << damaged.err;
   }

@@ -118,6 +118,14 @@ void Reader::renamed(std::string_view old_key, std::string_view key) {
       fmt::format("{} is now called {}; the former name is accepted for this version only", where, key));
 }
 
+void Reader::former(std::string_view key, double& value, double, std::string_view place, Bounds bounds) {
+  YamlMap& map = tree_->levels.back();
+  if (!map.has(key)) return;
+  tree_->warnings.push_back(fmt::format("{} is now stated as {}; the former key is accepted for this version only",
+                                        tree_->errors.location(map.path(key)), place));
+  field(key, value, {}, bounds);
+}
+
 void Reader::check(std::string_view key, bool good, std::string_view fault) {
   // A command line sets one option at a time, so combinations are checked by validate() in the end.
   if (!good && tree_->errors.has_lines()) tree_->levels.back().add_error(key, std::string(fault));
@@ -168,9 +176,10 @@ std::vector<std::string> Reader::warnings() const {
   return tree_->warnings;
 }
 
-void Reader::add_given(GivenKeys* given) const {
-  if (given == nullptr) return;
-  for (const std::string& key : tree_->given) given->add(key);
+GivenKeys Reader::given() const {
+  GivenKeys given;
+  for (const std::string& key : tree_->given) given.add(key);
+  return given;
 }
 
 void Validator::add_error(std::string_view key, std::string_view what) {

@@ -12,8 +12,9 @@
 //
 // Groups nest with `v.group("speckle", speckle)`; `v.list("faults", faults, "…")` is a list of groups. An enum is a
 // field where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field
-// or a group accepts the key's former name, with a warning. `v.check("key", good, "is …")` after the fields rejects
-// combinations of values. A key carries its unit (docs/conventions.md).
+// or a group accepts the key's former name, with a warning; `v.former("key", field, 0.3, "place")` accepts a key whose
+// value is now stated elsewhere, with a warning that names the place. `v.check("key", good, "is …")` after the fields
+// rejects combinations of values. A key carries its unit (docs/conventions.md).
 #pragma once
 
 #include <array>
@@ -87,12 +88,21 @@ constexpr std::optional<Enum> value_named(std::string_view name) {
 class GivenKeys {
  public:
   void add(std::string key) { keys_.insert(std::move(key)); }
+  void add(const GivenKeys& other) { keys_.insert(other.keys_.begin(), other.keys_.end()); }
   bool contains(const std::string& key) const { return keys_.contains(key); }
   /// The keys inside a group, without its name.
   GivenKeys in_group(std::string_view group) const;
 
  private:
   std::set<std::string> keys_;
+};
+
+/// Options that were read, and what else the reading tells.
+template <class Options>
+struct OptionsRead {
+  Options options;
+  GivenKeys given;                    ///< keys that the text or the assignment contains
+  std::vector<std::string> warnings;  ///< one for each former name: "name:line: group.old is now called new; …"
 };
 
 /// One line of an option listing: the full key ("reconstruction.sgm.p1"), the value as YAML text, and the meaning.
@@ -134,6 +144,7 @@ class Reader {
     value = value_named<Enum>(name).value_or(value);
   }
   void renamed(std::string_view old_key, std::string_view key);
+  void former(std::string_view key, double& value, double by_default, std::string_view place, Bounds bounds = {});
   /// Not for single options of a command line: the next one may make the values fit.
   void check(std::string_view key, bool good, std::string_view fault);
   template <class Group>
@@ -161,8 +172,8 @@ class Reader {
   Status finish();
   /// A warning for each former name in the document.
   std::vector<std::string> warnings() const;
-  /// Adds the keys of the fields that were read.
-  void add_given(GivenKeys* given) const;
+  /// The keys of the fields that were read.
+  GivenKeys given() const;
 
  private:
   bool enter(std::string_view key);
@@ -189,6 +200,10 @@ class Lister {
     field(key, std::string(name_of(value)), meaning, choices_of<Enum>());
   }
   void renamed(std::string_view, std::string_view) {}
+  /// Listed only where the value is not the default, so that nothing that was set is lost.
+  void former(std::string_view key, const double& value, double by_default, std::string_view place, Bounds = {}) {
+    if (value != by_default) field(key, value, "Former key, now stated as " + std::string(place) + ".");
+  }
   void check(std::string_view, bool, std::string_view) {}
   template <class Group>
   void group(std::string_view key, Group& value) {
@@ -231,6 +246,9 @@ class Validator {
     if (name_of(value).empty()) add_error(key, "is not one of the values of its enum");
   }
   void renamed(std::string_view, std::string_view) {}
+  void former(std::string_view key, const double& value, double, std::string_view, Bounds bounds = {}) {
+    field(key, value, {}, bounds);
+  }
   void check(std::string_view key, bool good, std::string_view what) {
     if (!good) add_error(key, what);
   }
@@ -265,46 +283,59 @@ std::string to_yaml(const std::vector<OptionLine>& lines);
 /// if the text does not have the key.
 std::string option_location(const std::string& text, const std::string& name, const std::string& key);
 
-/// Reads options from YAML text. Fields that the text does not contain keep their values in `defaults`. Unknown and
-/// repeated keys, wrong types and values out of bounds are errors (code `configuration`), all reported in one Error,
-/// each on a line "name:line: key: reason". The keys that the text contains are added to `given`.
+namespace options_detail {
+
 template <class Options>
-Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {},
-                              GivenKeys* given = nullptr) {
-  auto tree = options_detail::parse(text, name);
+Result<OptionsRead<Options>> read(const Result<std::shared_ptr<Tree>>& tree, Options defaults) {
   if (!tree) return failure(tree);
-  options_detail::Reader reader(*tree);
+  Reader reader(*tree);
   defaults.describe(reader);
   if (Status status = reader.finish(); !status) return failure(status);
-  reader.add_given(given);
-  return defaults;
+  return OptionsRead<Options>{std::move(defaults), reader.given(), reader.warnings()};
+}
+
+template <class Options>
+Result<Options> options_of(Result<OptionsRead<Options>> read) {
+  if (!read) return failure(read);
+  return std::move(read->options);
+}
+
+}  // namespace options_detail
+
+/// Reads options from YAML text. Fields that the text does not contain keep their values in `defaults`. Unknown and
+/// repeated keys, wrong types and values out of bounds are errors (code `configuration`), all reported in one Error,
+/// each on a line "name:line: key: reason". Former names of keys are accepted for one version, with a warning.
+template <class Options>
+Result<OptionsRead<Options>> read_options(const std::string& text, const std::string& name, Options defaults = {}) {
+  return options_detail::read(options_detail::parse(text, name), std::move(defaults));
 }
 
 /// The same from a file; code `configuration` also if the file cannot be read.
 template <class Options>
-Result<Options> load_options(const std::string& path, Options defaults = {}, GivenKeys* given = nullptr) {
-  auto tree = options_detail::load(path);
-  if (!tree) return failure(tree);
-  options_detail::Reader reader(*tree);
-  defaults.describe(reader);
-  if (Status status = reader.finish(); !status) return failure(status);
-  reader.add_given(given);
-  return defaults;
+Result<OptionsRead<Options>> read_options_file(const std::string& path, Options defaults = {}) {
+  return options_detail::read(options_detail::load(path), std::move(defaults));
 }
 
-/// Applies one assignment "group.key=value" of a command line; its key is added to `given`. Errors have code `usage`.
+/// Applies one assignment "group.key=value" of a command line. Errors have code `usage`.
 template <class Options>
-Result<Options> set_option(Options options, const std::string& assignment, GivenKeys* given = nullptr) {
-  auto tree = options_detail::from_assignment(assignment);
-  if (!tree) return failure(tree);
-  options_detail::Reader reader(*tree);
-  options.describe(reader);
-  if (Status status = reader.finish(); !status) {
-    status.error().code = ErrorCode::usage;
-    return failure(status);
-  }
-  reader.add_given(given);
-  return options;
+Result<OptionsRead<Options>> read_assignment(const std::string& assignment, Options options = {}) {
+  auto read = options_detail::read(options_detail::from_assignment(assignment), std::move(options));
+  if (!read) read.error().code = ErrorCode::usage;
+  return read;
+}
+
+/// The options alone, of read_options(), read_options_file() and read_assignment().
+template <class Options>
+Result<Options> parse_options(const std::string& text, const std::string& name, Options defaults = {}) {
+  return options_detail::options_of(read_options(text, name, std::move(defaults)));
+}
+template <class Options>
+Result<Options> load_options(const std::string& path, Options defaults = {}) {
+  return options_detail::options_of(read_options_file(path, std::move(defaults)));
+}
+template <class Options>
+Result<Options> set_option(Options options, const std::string& assignment) {
+  return options_detail::options_of(read_assignment(assignment, std::move(options)));
 }
 
 /// Checks values that were set in code against the bounds and choices of their description. `name` names the options in
@@ -315,27 +346,6 @@ Status validate(Options options, std::string_view name) {
   options_detail::Validator validator;
   options.describe(validator);
   return validator.finish(name);
-}
-
-/// A warning "name:line: group.old is now called new" for each former name of an option in the text; parse_options()
-/// accepts former names for one version. Empty if the text cannot be parsed.
-template <class Options>
-std::vector<std::string> renamed_options(const std::string& text, const std::string& name, Options options = {}) {
-  auto tree = options_detail::parse(text, name);
-  if (!tree) return {};
-  options_detail::Reader reader(*tree);
-  options.describe(reader);
-  return reader.warnings();
-}
-
-/// The same for one assignment "group.key=value".
-template <class Options>
-std::vector<std::string> renamed_options(const std::string& assignment, Options options = {}) {
-  auto tree = options_detail::from_assignment(assignment);
-  if (!tree) return {};
-  options_detail::Reader reader(*tree);
-  options.describe(reader);
-  return reader.warnings();
 }
 
 /// Every option with its value and meaning, in the order of the description.

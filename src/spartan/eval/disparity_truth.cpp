@@ -29,7 +29,7 @@ Result<Image<std::uint8_t>> gray_from_rgb(ImageView<const Rgb8> image, const std
     for (int x = 0; x < image.width(); ++x) {
       const Rgb8 pixel = image(x, y);
       if (pixel.r != pixel.g || pixel.g != pixel.b) {
-        return failure(ErrorCode::input, "is a color image; a disparity image is gray, or RGB with equal channels",
+        return failure(ErrorCode::input, "is a colour image; a disparity image is gray, or RGB with equal channels",
                        path);
       }
       gray(x, y) = pixel.r;
@@ -57,7 +57,7 @@ Result<Image<float>> read_disparity(const std::string& path, double scale_of_8_b
     if (!gray) return failure(gray);
     return divided(gray->view(), scale_of_8_bit);
   }
-  return failure(ErrorCode::input, "is a 16-bit color image; a disparity image is PFM, 16-bit gray PNG or 8-bit PNG",
+  return failure(ErrorCode::input, "is a 16-bit colour image; a disparity image is PFM, 16-bit gray PNG or 8-bit PNG",
                  path);
 }
 

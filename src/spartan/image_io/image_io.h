@@ -24,7 +24,10 @@ Result<Image<std::uint8_t>> read_gray8(const std::string& path);
 Status write_png(const std::string& path, ImageView<const std::uint8_t> image);
 Status write_png(const std::string& path, ImageView<const std::uint16_t> image);
 Status write_png(const std::string& path, ImageView<const Rgb8> image);
+// Doxygen takes the two RGB overloads for one.
+/// @cond
 Status write_png(const std::string& path, ImageView<const Rgb16> image);
+/// @endcond
 
 /// Encodes an image as PNG in memory.
 Result<std::string> encode_png(ImageView<const std::uint8_t> image);

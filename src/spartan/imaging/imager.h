@@ -53,10 +53,10 @@ struct LocalContrastOptions {
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field(
-        "enabled", enabled,
-        "Applies contrast-limited adaptive histogram equalisation (CLAHE) to each image on its own; false is better "
-        "for stereo matching, since the same surface may get different gray levels in the left and right image.");
+    v.field("enabled", enabled,
+            "True applies contrast-limited adaptive histogram equalisation (CLAHE) to each image on its own; false is "
+            "better "
+            "for stereo matching, since the same surface may get different gray levels in the left and right image.");
     v.field("tiles", tiles,
             "Number of CLAHE tiles along each side of the image; raising it adapts the contrast to smaller regions and "
             "amplifies noise there.",
@@ -81,7 +81,7 @@ struct ViewOptions {
         "policy", policy,
         "Part of the fields of view that the rectified images cover: keep_resolution keeps the resolution of the "
         "cameras and masks pixels outside of a sensor, all_valid is the widest view in which both cameras see every "
-        "pixel, whole_view covers all that either camera sees at lower resolution.");
+        "pixel, whole_view covers the union of both fields of view at a lower resolution.");
     v.field("width_px", width_px,
             "Width of the rectified images in px; 0 takes the width of the left camera, raising it covers more (or "
             "finer) ground and costs time.",
@@ -117,16 +117,18 @@ struct ImagingOptions {
     v.field("debayer", debayer,
             "Interpolation of Bayer mosaics: bilinear is faster, edge_aware keeps edges sharper and free of false "
             "colours.");
+    v.field("vignetting", vignetting,
+            "True corrects the vignetting that the rig gives for a camera; false leaves the image darker towards its "
+            "edges.");
     v.field(
-        "vignetting", vignetting,
-        "Corrects the vignetting that the rig gives for a camera; false leaves the image darker towards its edges.");
-    v.field("contrast", contrast,
-            "Stretches the gray levels linearly between two percentiles, with the same mapping for both images; false "
-            "scales the full range of the sensor to 8 bits and also disables gain_compensation.");
+        "contrast", contrast,
+        "True stretches the gray levels linearly between two percentiles, with the same mapping for both images; false "
+        "scales the full range of the sensor to 8 bits and also disables gain_compensation.");
     v.renamed("balance", "gain_compensation");
-    v.field("gain_compensation", gain_compensation,
-            "Multiplies the gray levels of the right image by a gain that matches the left image before the stretch, "
-            "where their histograms differ by more than 5 %; false keeps the brightness difference of the cameras.");
+    v.field(
+        "gain_compensation", gain_compensation,
+        "True multiplies the gray levels of the right image by a gain that matches the left image before the stretch, "
+        "where their histograms differ by more than 5 %; false keeps the brightness difference of the cameras.");
     v.field("contrast_low_percent", contrast_low_percent,
             "Percentile of the gray levels in % that is mapped to black; raising it darkens more pixels to black and "
             "raises the contrast of the rest.",

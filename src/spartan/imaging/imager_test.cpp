@@ -434,7 +434,7 @@ TEST(ImagingOptions, AcceptsFormerKeysWithAWarning) {
   EXPECT_EQ(options->local_contrast.clip_limit, 3);
   EXPECT_EQ(options->view.policy, ViewPolicy::all_valid);
   EXPECT_EQ(options->debayer, DebayerMethod::bilinear);
-  EXPECT_EQ(renamed_options<ImagingOptions>(text, "options").size(), 2U);
+  EXPECT_EQ(read_options<ImagingOptions>(text, "options")->warnings.size(), 2U);
 }
 
 }  // namespace

@@ -98,15 +98,16 @@ struct VisionOptions {
         "Factor on the covariance of visual motions, for errors that are independent from frame to frame; raising it "
         "trusts vision less.",
         between(0.01, 1e4));
-    v.field("drift_sigmas", drift_sigmas,
-            "Standard deviations of the slowly changing error of vision along x, y, z and about x, y, z, in standard "
-            "deviations of a visual motion; raising them makes the covariance of the pose grow faster.",
-            between(0, 1e3), Length{6});
     v.field(
-        "drift_steps", drift_steps,
-        "Correlation length of that error in frames: it falls to 1/e after so many; raising it makes the error last "
-        "longer.",
-        between(1, 1e6));
+        "drift_sigmas", drift_sigmas,
+        "Standard deviations of the slowly changing error of vision (a first-order Gauss-Markov process) along x, y, z "
+        "and about x, y, z, as multiples of the standard deviation of a visual motion; raising them makes the "
+        "covariance of the pose grow faster.",
+        between(0, 1e3), Length{6});
+    v.field("drift_steps", drift_steps,
+            "Correlation time of that error in frames, after which it falls to 1/e; raising it makes the error last "
+            "longer.",
+            between(1, 1e6));
     v.field("constant_sigmas", constant_sigmas,
             "Standard deviations of the error of vision that is constant over a drive, axes and unit as drift_sigmas; "
             "raising them makes the covariance of the pose grow faster.",
@@ -118,7 +119,8 @@ struct VisionOptions {
 };
 
 struct WheelOdometryOptions {
-  double track_m = 0.6;               ///< m, between left and right wheels; 0: no rotation from the wheels
+  double track_m = 0.6;               ///< m, between left and right wheels, of the rig file (Rig::rover)
+  bool use_rotation = true;           ///< whether the difference of the wheels measures a rotation
   double scale_sigma = 0.1;           ///< initial standard deviation of travelled over counted distance
   double scale_walk_sqrt_hz = 0.005;  ///< 1/√Hz, random walk of that scale
   double forward_share = 0.12;        ///< standard deviation of a step forward, over its length
@@ -131,17 +133,19 @@ struct WheelOdometryOptions {
 
   template <class Visitor>
   void describe(Visitor& v) {
+    v.former("track_m", track_m, WheelOdometryOptions().track_m,
+             "rover.track_m in the rig file, and localization.wheels.use_rotation", between(0, 10));
     v.field(
-        "track_m", track_m,
-        "Distance between left and right wheels in meters, from which rotations follow; 0 ignores the rotation that "
-        "the wheels measure.",
-        between(0, 10));
-    v.field("scale_sigma", scale_sigma,
-            "Standard deviation at the start of travelled over counted distance (wheel radius, mean slip); raising it "
-            "lets the scale be estimated farther from 1.",
-            between(0, 1));
+        "use_rotation", use_rotation,
+        "True derives the rotation of the rover from the difference of the left and right wheels and their distance "
+        "(rover.track_m of the rig file); false ignores it.");
+    v.field(
+        "scale_sigma", scale_sigma,
+        "Initial standard deviation of the wheel scale factor, true over measured distance (wheel radius, mean slip); "
+        "raising it lets the scale be estimated farther from 1.",
+        between(0, 1));
     v.field("scale_walk_sqrt_hz", scale_walk_sqrt_hz,
-            "Random walk of that scale, in 1/sqrt(Hz); raising it lets the scale follow changing soil faster.",
+            "Random walk of that scale, in 1/sqrt(s); raising it lets the scale follow changing soil faster.",
             between(0, 1));
     v.field("forward_share", forward_share,
             "Standard deviation of a step's length as a fraction of it (slip beyond the mean); raising it trusts the "
@@ -163,7 +167,7 @@ struct WheelOdometryOptions {
             between(0, 10));
     v.renamed("floor_m", "min_sigma_m");
     v.field("min_sigma_m", min_sigma_m,
-            "Minimum standard deviation of a step in meters; raising it lowers the weight of short steps.",
+            "Minimum standard deviation of a step in metres; raising it lowers the weight of short steps.",
             between(1e-6, 1));
     v.renamed("longest_step_s", "max_step_s");
     v.field("max_step_s", max_step_s,
@@ -173,7 +177,7 @@ struct WheelOdometryOptions {
     v.renamed("least_slip_distance_m", "min_slip_distance_m");
     v.field(
         "min_slip_distance_m", min_slip_distance_m,
-        "Minimum length of a step in meters for which slip is reported; raising it gives fewer but more accurate slip "
+        "Minimum length of a step in metres for which slip is reported; raising it gives fewer but more accurate slip "
         "values.",
         between(1e-3, 10));
   }
@@ -197,7 +201,7 @@ struct HeadingOptions {
         "the offset be estimated farther from its initial value.",
         between(0, 1));
     v.field("offset_walk_rad_sqrt_hz", offset_walk_rad_sqrt_hz,
-            "Random walk of the compass offset, in rad/sqrt(Hz); raising it lets the offset change faster.",
+            "Random walk of the compass offset, in rad/sqrt(s); raising it lets the offset change faster.",
             between(0, 1));
   }
 };
@@ -225,7 +229,7 @@ struct TiltOptions {
             "certain.",
             between(0, 1));
     v.field("bias_walk_rad_sqrt_hz", bias_walk_rad_sqrt_hz,
-            "Random walk of the inclinometer bias, in rad/sqrt(Hz); raising it lets the bias change faster.",
+            "Random walk of the inclinometer bias, in rad/sqrt(s); raising it lets the bias change faster.",
             between(0, 1));
   }
 };
@@ -257,17 +261,17 @@ struct ZeroVelocityOptions {
     v.renamed("wheels_still_m", "wheels_stationary_m");
     v.field(
         "wheels_stationary_m", wheels_stationary_m,
-        "Change of a wheel count in meters up to which the wheel counts as stationary; raise it for coarse encoders.",
+        "Change of a wheel count in metres up to which the wheel counts as stationary; raise it for coarse encoders.",
         between(0, 1));
     v.renamed("position_m", "position_sigma_m");
     v.field("position_sigma_m", position_sigma_m,
-            "Standard deviation of a zero-velocity update's position in meters; raising it holds the position less "
-            "firmly.",
+            "Standard deviation of a zero-velocity update's position in metres; raising it constrains the position "
+            "less.",
             between(1e-7, 1));
     v.renamed("attitude_rad", "attitude_sigma_rad");
     v.field("attitude_sigma_rad", attitude_sigma_rad,
-            "Standard deviation of a zero-velocity update's attitude in radians; raising it holds the attitude less "
-            "firmly.",
+            "Standard deviation of a zero-velocity update's attitude in radians; raising it constrains the attitude "
+            "less.",
             between(1e-8, 1));
   }
 };
@@ -283,7 +287,7 @@ struct ConstantVelocityOptions {
   template <class Visitor>
   void describe(Visitor& v) {
     v.field("speed_share_sqrt_hz", speed_share_sqrt_hz,
-            "Noise density of the velocity as a fraction of the speed, in 1/sqrt(Hz); raising it makes predictions "
+            "Noise density of the velocity as a fraction of the speed, in 1/sqrt(s); raising it makes predictions "
             "without an IMU less certain.",
             between(0, 100));
     v.field("speed_floor_m_s", speed_floor_m_s,
@@ -294,7 +298,8 @@ struct ConstantVelocityOptions {
             "Error of the last angular rate as a fraction of it; raising it makes the predicted attitude less certain.",
             between(0, 100));
     v.field("turn_floor_rad_s", turn_floor_rad_s,
-            "Angular rate in rad/s that is added before turn_share applies; raise it for a rover that rocks more.",
+            "Angular rate in rad/s that is added before turn_share applies; raise it for a rover that pitches and "
+            "rolls more.",
             between(0, 100));
   }
 };
@@ -317,7 +322,7 @@ struct HealthOptions {
         "it rejects fewer samples.",
         between(0.5, 1 - 1e-12));
     v.field("excluded_after", excluded_after,
-            "Number of consecutive rejections that exclude a sensor; raising it tolerates longer outliers.",
+            "Number of consecutive rejections that exclude a sensor; raising it tolerates longer runs of outliers.",
             between(1, 1000));
     v.renamed("back_after", "readmit_after");
     v.field("readmit_after", readmit_after,
@@ -357,10 +362,11 @@ struct LocalizationOptions {
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("buffer_s", buffer_s,
-            "Samples that arrive more than this many seconds late are refused; raising it costs memory and the time to "
-            "replay.",
-            between(0, 600));
+    v.field(
+        "buffer_s", buffer_s,
+        "Samples that arrive more than this many seconds late are discarded; raising it costs memory and the time to "
+        "replay.",
+        between(0, 600));
     v.field("map_factor", map_factor, "Factor on the covariance of map constraints; raising it trusts the map less.",
             between(0.01, 1e4));
     v.group("imu", imu);

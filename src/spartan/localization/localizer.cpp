@@ -124,10 +124,10 @@ Bytes Localizer::save() const {
 
 Status Localizer::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
-  const std::string what = "memory of the localization";
+  const std::string what = "saved state of the localization";
   if (in.get<std::uint32_t>() != kStateVersion) {
     return failure(ErrorCode::configuration, "was saved by another version of the program", what,
-                   "run again from the start");
+                   "run again into a new folder");
   }
   auto state = std::make_unique<State>(state_->options);
   for (RefusalCounts& r : state->refusals) {
@@ -139,7 +139,7 @@ Status Localizer::restore(const Bytes& bytes) {
   }
   const bool sensible = state->filter.get(in);
   if (Status status = in.finish(what); !status) return status;
-  if (!sensible) return failure(ErrorCode::configuration, "is damaged", what, "run again from the start");
+  if (!sensible) return failure(ErrorCode::configuration, "is damaged", what, "run again into a new folder");
   state_ = std::move(state);
   return {};
 }

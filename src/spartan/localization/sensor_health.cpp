@@ -114,28 +114,30 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
     case HealthReason::none:
       break;
     case HealthReason::disagrees:
-      health.reason = fmt::format("disagrees with the other sensors: {:.1f}, at most {:.1f} is expected", nis, limit);
+      health.reason =
+          fmt::format("disagrees with the other sensors: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
       break;
     case HealthReason::slips:
-      health.reason = fmt::format("the wheels slip: {:.1f}, at most {:.1f} is expected", nis, limit);
+      health.reason = fmt::format("the wheels slip: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
       break;
     case HealthReason::frozen:
-      health.reason = "gives the same reading again and again";
+      health.reason = "readings are frozen (identical values)";
       break;
     case HealthReason::out_of_range:
-      health.reason = "gives readings that no rover can have";
+      health.reason = "readings are outside of the physical range";
       break;
     case HealthReason::contradicted:
-      health.reason = fmt::format("vision saw another motion: {:.1f}, at most {:.1f} is expected", nis, limit);
+      health.reason =
+          fmt::format("contradicts visual odometry: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
       break;
     case HealthReason::lost:
-      health.reason = "could not measure the last motion";
+      health.reason = "no motion estimate for the last frame";
       break;
     case HealthReason::never_seen:
-      health.reason = "has not said anything";
+      health.reason = "no measurement received yet";
       break;
     case HealthReason::silent:
-      health.reason = fmt::format("silent for {:.1f} s", seconds_between(last, now));
+      health.reason = fmt::format("no measurement for {:.1f} s", seconds_between(last, now));
       break;
   }
   return health;

@@ -41,7 +41,7 @@ TEST(SensorMonitor, ReportsTheReason) {
   j.see({4'500'000'000});
   EXPECT_EQ(j.report(now, 1, {}).state, SensorState::ok);
   EXPECT_EQ(j.report(now, 1, {}).reason, "");
-  EXPECT_THAT(j.report({9'000'000'000}, 1, {}).reason, ::testing::HasSubstr("silent for 4.5 s"));
+  EXPECT_THAT(j.report({9'000'000'000}, 1, {}).reason, ::testing::HasSubstr("no measurement for 4.5 s"));
   accept(j, 77);
   EXPECT_THAT(j.report(now, 1, {}).reason, ::testing::HasSubstr("77.0, at most 10.0"));
   RefusalCounts refusals;

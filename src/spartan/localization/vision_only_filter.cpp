@@ -31,7 +31,7 @@ Status VisionOnlyFilter::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
   const Pose world_from_own = in.get_pose();
   const auto localizer = in.get_array<std::uint8_t>();
-  if (Status s = in.finish("memory of the vision-only filter"); !s) return s;
+  if (Status s = in.finish("saved state of the vision-only filter"); !s) return s;
   if (Status s = localizer_.restore(localizer); !s) return s;
   world_from_own_ = world_from_own;
   return {};

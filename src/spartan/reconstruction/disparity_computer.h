@@ -110,7 +110,9 @@ struct DisparityOptions {
             "cheapest left pixel matched to it; raising it discards fewer pixels at occlusions, and a negative value "
             "disables the check.");
     v.field("median", median,
-            "Whether to apply a 3x3 median filter to the disparities, which removes single outliers and keeps edges.");
+            "True applies a 3x3 median filter to the disparities, which removes single outliers and keeps edges; false "
+            "keeps "
+            "outliers and thin structures.");
     v.field("speckle_size_px", speckle_size_px,
             "Minimum size of a connected component of the disparity image in pixels; smaller components are discarded, "
             "and 0 disables the speckle filter.",
@@ -120,10 +122,10 @@ struct DisparityOptions {
         "Largest disparity difference between neighbouring pixels of one component of the speckle filter, in pixels; "
         "raising it joins more pixels, so that fewer components are discarded.",
         at_least(0));
-    v.field(
-        "simd", simd,
-        "SIMD instruction set of the matching kernels; it affects the speed only, results are the same bit for bit.",
-        {"auto", "sse4", "avx2", "avx3"});
+    v.field("simd", simd,
+            "SIMD instruction set of the matching kernels; avx3 is AVX-512; it affects the speed only, results are the "
+            "same bit for bit.",
+            {"auto", "sse4", "avx2", "avx3"});
   }
 };
 

@@ -77,11 +77,8 @@ struct MergingOptions {
     v.field("max_range_m", max_range_m,
             "Maximum range of a point from the virtual camera in metres; farther points are discarded.",
             between(0.5, 10000));
-    v.field(
-        "disparity_sigma_px", disparity_sigma_px,
-        "Standard deviation of a disparity in pixels, from which the variance of a range follows; raising it merges "
-        "surfaces that are farther apart.",
-        between(0.01, 5));
+    v.former("disparity_sigma_px", disparity_sigma_px, MergingOptions().disparity_sigma_px,
+             "mapping.disparity_sigma_px", between(0.01, 5));
     v.field("gate_sigmas", gate_sigmas,
             "Gate on the difference of two ranges in standard deviations; ranges that differ by more belong to "
             "different surfaces, and raising it averages more of them.",

@@ -11,6 +11,7 @@
 #include "spartan/reconstruction/disparity_merger.h"
 #include "spartan/reconstruction/local_map.h"
 #include "spartan/reconstruction/v_disparity.h"
+#include "spartan/rig/rig.h"
 
 namespace spartan {
 
@@ -42,7 +43,7 @@ struct GroundSurfaceOptions {
     v.renamed("fine_m", "final_scale_m");
     v.field("final_scale_m", final_scale_m,
             "Scale of the Geman-McClure weights in the last round, in metres; raising it lets low rocks and shallow "
-            "pits pull the surface.",
+            "pits bias the fitted surface.",
             between(0.001, 10));
     v.renamed("doubtful_weight", "non_ground_weight");
     v.field("non_ground_weight", non_ground_weight,
@@ -59,29 +60,21 @@ struct GroundSurfaceOptions {
 Image<float> fit_ground(ImageView<const float> elevation_m, ImageView<const std::uint8_t> ground, double cell_m,
                         const GroundSurfaceOptions& options, const ThreadPool& workers);
 
-/// Limits of the rover for which traversal costs are computed.
+/// Limits of the rover for which traversal costs are computed: a roughness of half the wheel radius, an object as high
+/// as the ground clearance, a slope of max_slope_deg or a step of max_step_m has cost 1. Slope and roughness are fitted
+/// over a square of half the track.
 struct RoverLimits {
-  double wheel_radius_m = 0.1;  ///< m
-  double clearance_m = 0.1;     ///< Ground clearance, m.
-  double track_m = 0.6;         ///< Distance between the left and the right wheels, m.
-  double max_slope_deg = 20;    ///< degrees
-  double max_step_m = 0.08;     ///< m
+  RoverGeometry geometry;     ///< of the rig file (Rig::rover)
+  double max_slope_deg = 20;  ///< degrees
+  double max_step_m = 0.08;   ///< m
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("wheel_radius_m", wheel_radius_m,
-            "Wheel radius of the rover in metres; a roughness of half of it has cost 1, and raising it lowers the cost "
-            "of rough ground.",
-            between(0.01, 5));
-    v.field(
-        "clearance_m", clearance_m,
-        "Ground clearance of the rover in metres; an object that high has cost 1, and raising it lowers the cost of "
-        "rocks.",
-        between(0.01, 5));
-    v.field("track_m", track_m,
-            "Distance between the left and the right wheels in metres; slope and roughness are fitted over a square of "
-            "half of it, so raising it smooths them.",
-            between(0.05, 10));
+    v.former("wheel_radius_m", geometry.wheel_radius_m, RoverGeometry().wheel_radius_m,
+             "rover.wheel_radius_m in the rig file", between(0.01, 5));
+    v.former("clearance_m", geometry.clearance_m, RoverGeometry().clearance_m, "rover.clearance_m in the rig file",
+             between(0.01, 5));
+    v.former("track_m", geometry.track_m, RoverGeometry().track_m, "rover.track_m in the rig file", between(0.05, 10));
     v.renamed("steepest_deg", "max_slope_deg");
     v.field("max_slope_deg", max_slope_deg,
             "Steepest traversable slope in degrees; a slope that steep has cost 1, and raising it lowers the cost of "

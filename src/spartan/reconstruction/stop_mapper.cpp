@@ -31,8 +31,23 @@ Pose centre_of(std::span<const StopView> views) {
 
 }  // namespace
 
+MappingOptions with_shared_values(MappingOptions options) {
+  const MappingOptions defaults;
+  const auto share = [](double& value, double by_default, double shared) {
+    if (value == by_default) value = shared;
+  };
+  share(options.v_disparity.plane.disparity_sigma_px, defaults.v_disparity.plane.disparity_sigma_px,
+        options.disparity_sigma_px);
+  share(options.merging.disparity_sigma_px, defaults.merging.disparity_sigma_px, options.disparity_sigma_px);
+  share(options.v_disparity.obstacle_m, defaults.v_disparity.obstacle_m, 4 * options.map.obstacle_m / 5);
+  return options;
+}
+
 StopMapper::StopMapper(const DisparityOptions& disparity, const MappingOptions& options, ThreadPool workers)
-    : options_(options), workers_(workers), computer_(disparity, workers), generator_(options.map, workers) {}
+    : options_(with_shared_values(options)),
+      workers_(workers),
+      computer_(disparity, workers),
+      generator_(options.map, workers) {}
 
 Status StopMapper::check(const RectifiedPair& frame, double nearest_m) {
   return DisparityComputer::check(frame.left, frame.right, disparity_range(frame.geometry, nearest_m), frame.left_mask,

@@ -19,17 +19,28 @@ namespace spartan {
 
 /// Options of the steps from the disparity images of a stop to its local map.
 struct MappingOptions {
+  double disparity_sigma_px = 0.3;  ///< standard deviation of a disparity, pixels
   VDisparityOptions v_disparity;
   MergingOptions merging;
   MapOptions map;
 
   template <class Visitor>
   void describe(Visitor& v) {
+    v.field("disparity_sigma_px", disparity_sigma_px,
+            "Standard deviation of a disparity in pixels, from which the variance of ranges and elevations follows; "
+            "raising it merges surfaces that are farther apart and tolerates more noise in the ground plane.",
+            between(0.01, 5));
     v.group("v_disparity", v_disparity);
     v.group("merging", merging);
     v.group("map", map);
   }
 };
+
+/// Copies the quantities that are stated once to the steps that use them: the standard deviation of a disparity to the
+/// ground plane and to the merging, and four fifths of the obstacle height of the map to v-disparity, whose obstacles
+/// must not miss any of the map's. Values of the steps that differ from their defaults (set in code or under a former
+/// key) are retained. StopMapper calls it.
+MappingOptions with_shared_values(MappingOptions options);
 
 /// One view of a stop: a stereo frame with its disparities and its ground profile.
 struct StopView {

@@ -51,7 +51,7 @@ Traversability compute_traversability(const TerrainSurface& s, const RoverLimits
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
   Traversability shape{Image<float>(w, h, kNaN), Image<float>(w, h, kNaN), Image<float>(w, h, kNaN),
                        Image<float>(w, h, kNaN)};
-  const int radius = std::max(1, static_cast<int>(std::lround(0.25 * rover.track_m / s.cell_m)));
+  const int radius = std::max(1, static_cast<int>(std::lround(0.25 * rover.geometry.track_m / s.cell_m)));
   const double steepest = rover.max_slope_deg * std::numbers::pi / 180;
   workers.parallel_for(0, h, 16, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
@@ -65,8 +65,8 @@ Traversability compute_traversability(const TerrainSurface& s, const RoverLimits
         shape.roughness_m(x, y) = static_cast<float>(std::sqrt(
             std::max(0.0, neighbourhood.squares - neighbourhood.right.dot(plane)) / neighbourhood.normal(2, 2)));
         const double worst = std::max({shape.slope_rad(x, y) / steepest, shape.step_m(x, y) / rover.max_step_m,
-                                       shape.roughness_m(x, y) / (0.5 * rover.wheel_radius_m),
-                                       (s.elevation_max_m(x, y) - s.ground_m(x, y)) / rover.clearance_m,
+                                       shape.roughness_m(x, y) / (0.5 * rover.geometry.wheel_radius_m),
+                                       (s.elevation_max_m(x, y) - s.ground_m(x, y)) / rover.geometry.clearance_m,
                                        s.kind(x, y) == GroundClass::cavity ? 1.0 : 0.0});
         shape.cost(x, y) = static_cast<float>(std::clamp(worst, 0.0, 1.0));
       }

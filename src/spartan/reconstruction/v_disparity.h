@@ -42,14 +42,12 @@ struct GroundPlaneOptions {
         "Side of the square image blocks to which planes are fitted, in pixels; raising it makes the gradients less "
         "noisy, but fewer blocks lie on the ground alone.",
         between(4, 128));
-    v.field("disparity_sigma_px", disparity_sigma_px,
-            "Standard deviation of a disparity in pixels; blocks whose residuals are larger than three of it are "
-            "discarded as not planar, and the gates on obstacles and cavities follow from it.",
-            between(0.01, 5));
+    v.former("disparity_sigma_px", disparity_sigma_px, GroundPlaneOptions().disparity_sigma_px,
+             "mapping.disparity_sigma_px", between(0.01, 5));
     v.renamed("steepest_deg", "max_tilt_deg");
     v.field("max_tilt_deg", max_tilt_deg,
             "Largest angle between the plane of a block and the expected ground plane, in degrees; blocks that are "
-            "tilted more have no vote, so raise it for rough ground or an uncertain attitude.",
+            "tilted more are not used, so raise it for rough ground or an uncertain attitude.",
             between(1, 80));
   }
 };
@@ -76,10 +74,7 @@ struct VDisparityOptions {
             "Number of vertical strips of the image, each with its own ground profile (1: one profile for the whole "
             "image); raising it follows ground that is higher on one side, with fewer pixels per profile.",
             between(1, 32));
-    v.field("obstacle_m", obstacle_m,
-            "Minimum height of an obstacle pixel above the ground profile in metres; raising it marks fewer pixels as "
-            "obstacles.",
-            between(0.005, 5));
+    v.former("obstacle_m", obstacle_m, VDisparityOptions().obstacle_m, "mapping.map.obstacle_m", between(0.005, 5));
     v.field("cavity_m", cavity_m,
             "Minimum depth of a cavity (negative obstacle) pixel below the ground profile in metres; raising it marks "
             "fewer pixels as cavities.",

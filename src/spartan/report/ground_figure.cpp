@@ -37,10 +37,10 @@ void draw_legend(Drawing& drawing, double y_px, bool pans, bool narrow) {
 
 std::string caption(const DrawnPair& pair) {
   const PairParameters& parameters = pair.figures.parameters;
-  return fmt::format("{}: baseline {} m, {} px of {} um, {}° wide, {:.2f} mm; {} m resolution holds to {:.2f} m",
-                     pair.name, parameters.baseline_m, parameters.width_px, parameters.pixel_size_um,
-                     parameters.hfov_deg, pair.figures.focal_length_mm, pair.requirements.range_resolution_m,
-                     pair.figures.range_m);
+  return fmt::format(
+      "{}: baseline {} m, {} px of {} um, HFOV {}°, focal length {:.2f} mm; range resolution {} m up to {:.2f} m",
+      pair.name, parameters.baseline_m, parameters.width_px, parameters.pixel_size_um, parameters.hfov_deg,
+      pair.figures.focal_length_mm, pair.requirements.range_resolution_m, pair.figures.range_m);
 }
 
 }  // namespace

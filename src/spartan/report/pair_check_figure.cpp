@@ -24,7 +24,7 @@ struct Strip {
 
 std::string to_text(const RowErrors& rows) {
   if (!std::isfinite(rows.mean_px)) return "too few matches";
-  return fmt::format("mean row error {:.2f} px, 95 %: {:.2f} px", rows.mean_px, rows.p95_px);
+  return fmt::format("mean row error {:.2f} px, 95th percentile {:.2f} px", rows.mean_px, rows.p95_px);
 }
 
 // Green up to half a pixel, then yellow, red from 3 px on.

@@ -98,7 +98,7 @@ Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoP
   std::string html =
       html_image(shrunk(left.view(), 360), fmt::format("{} pair, left camera, rectified", pair.name), 360);
   html += html_image(shrunk(colour_disparity(image->disparity).view(), 360),
-                     "Disparity: near is warm, far is cold, black is unknown", 360);
+                     "Disparity: near is red, far is violet, black is unknown", 360);
   html +=
       html_image(shrunk(error_image(image->disparity, *truth).view(), 360),
                  fmt::format("Disparity error: white 0, blue −{0} px, red +{0} px, gray unknown", kErrorScale_px), 360);
@@ -143,15 +143,15 @@ std::string elevation_of(const std::string& recording, const Trajectory& truth) 
       }
     }
   }
-  return html_image(
-      shrunk(image.view(), 720),
-      fmt::format("True elevation, {:.2f} m (blue) to {:.2f} m (red), {:.1f} m × {:.1f} m, north up; black: the frames",
-                  low, high, z.width() * map->place.cell_m, z.height() * map->place.cell_m),
-      720);
+  return html_image(shrunk(image.view(), 720),
+                    fmt::format("True elevation, {:.2f} m (blue) to {:.2f} m (red), {:.1f} m × {:.1f} m, north up; "
+                                "black: true positions of the rover",
+                                low, high, z.width() * map->place.cell_m, z.height() * map->place.cell_m),
+                    720);
 }
 
 std::string stage_table(const Json& summary) {
-  std::vector<std::vector<std::string>> rows{{"stage", "count", "median, ms", "95 %, ms", "CPU median, ms"}};
+  std::vector<std::vector<std::string>> rows{{"stage", "count", "median, ms", "95th percentile, ms", "CPU median, ms"}};
   for (const auto& [name, stage] : summary["stages"].items()) {
     rows.push_back({name, std::to_string(stage["count"].get<int>()),
                     fmt::format("{:.1f}", stage["wall_ms"]["median"].get<double>()),

@@ -89,9 +89,9 @@ std::string describe_camera(const Rig& rig, const Camera& c) {
   if (!c.vignetting.coefficients.empty()) pixels += ", with vignetting";
   if (!c.self_mask.empty()) pixels += ", with a self-mask";
   return fmt::format(
-      "camera {}: {}, {} x {} px, {}; field of view {:.2f}° x {:.2f}°, {:.1f} px per radian on the axis; {}", c.name,
-      name_of(c.model), c.size.width, c.size.height, pixels, horizontal_view_deg(c), vertical_view_deg(c), focal_px(c),
-      describe_pose(rig, c));
+      "camera {}: {}, {} x {} px, {}; field of view {:.2f}° x {:.2f}°, focal length {:.1f} px on the optical axis; {}",
+      c.name, name_of(c.model), c.size.width, c.size.height, pixels, horizontal_view_deg(c), vertical_view_deg(c),
+      focal_px(c), describe_pose(rig, c));
 }
 
 void describe_pair(const Rig& rig, const StereoPair& pair, std::vector<std::string>& lines) {

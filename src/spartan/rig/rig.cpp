@@ -35,6 +35,7 @@ class FaultFinder {
     check_names("cameras", rig_.cameras);
     check_names("pairs", rig_.pairs);
     if (rig_.pairs.empty()) add("pairs", "there is no stereo pair");
+    check(rig_.rover);
     for (const PanTiltUnit& unit : rig_.pan_tilt_units) check(unit);
     for (const Camera& camera : rig_.cameras) check(camera);
     for (const StereoPair& pair : rig_.pairs) check(pair);
@@ -106,6 +107,16 @@ class FaultFinder {
     if (kind.unit_length && !(std::abs(length - 1) <= 1e-3)) {
       add(key, fmt::format("has length {:.6g}, must have length 1", length));
     }
+  }
+
+  void check(const RoverGeometry& rover) {
+    const auto check_length = [&](const char* key, double value, double low, double high) {
+      if (!(value >= low && value <= high))
+        add(std::string("rover.") + key, fmt::format("is {}, must be between {} and {} m", value, low, high));
+    };
+    check_length("track_m", rover.track_m, 0.05, 10);
+    check_length("wheel_radius_m", rover.wheel_radius_m, 0.01, 5);
+    check_length("clearance_m", rover.clearance_m, 0.01, 5);
   }
 
   void check(const Camera& camera) {

@@ -75,6 +75,14 @@ enum class PoseConvention {
   left_optical,  ///< first left optical frame from left optical frame (KITTI)
 };
 
+/// Dimensions of the rover that maps and wheel odometry need.
+struct RoverGeometry {
+  double track_m = 0.6;         ///< distance between the left and the right wheels
+  double wheel_radius_m = 0.1;  ///< radius of the wheels
+  double clearance_m = 0.1;     ///< ground clearance
+  friend bool operator==(const RoverGeometry&, const RoverGeometry&) = default;
+};
+
 /// One error of a rig, as found by Rig::validation_errors().
 struct RigValidationError {
   std::string key;  ///< as in rig.yaml, "cameras.left.focal_px"
@@ -85,6 +93,7 @@ struct RigValidationError {
 struct Rig {
   std::string name;
   PoseConvention convention = PoseConvention::body;
+  RoverGeometry rover;
   std::vector<PanTiltUnit> pan_tilt_units;
   std::vector<Camera> cameras;
   std::vector<StereoPair> pairs;

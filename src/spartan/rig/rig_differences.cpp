@@ -27,6 +27,9 @@ class Comparison {
     compare("name", "the name", wanted_.name, result_.name);
     compare("pose_convention", "the pose convention of the recording", text_of(wanted_.convention),
             text_of(result_.convention));
+    compare("rover.track_m", "the distance between the wheels", wanted_.rover.track_m, result_.rover.track_m);
+    compare("rover.wheel_radius_m", "the wheel radius", wanted_.rover.wheel_radius_m, result_.rover.wheel_radius_m);
+    compare("rover.clearance_m", "the ground clearance", wanted_.rover.clearance_m, result_.rover.clearance_m);
     compare_units();
     compare_body();
     for (const Camera& camera : wanted_.cameras) compare_camera(camera);

@@ -173,6 +173,15 @@ std::vector<T> read_group(YamlMap& root, const char* key, bool required, Read re
   return items;
 }
 
+RoverGeometry read_rover(YamlMap map) {
+  RoverGeometry rover;
+  if (map.has("track_m")) rover.track_m = map.number("track_m").value_or(rover.track_m);
+  if (map.has("wheel_radius_m")) rover.wheel_radius_m = map.number("wheel_radius_m").value_or(rover.wheel_radius_m);
+  if (map.has("clearance_m")) rover.clearance_m = map.number("clearance_m").value_or(rover.clearance_m);
+  map.reject_unknown_keys();
+  return rover;
+}
+
 Rig read_root(YamlMap root, const std::string& default_name) {
   Rig rig;
   rig.name = default_name;
@@ -183,6 +192,7 @@ Rig read_root(YamlMap root, const std::string& default_name) {
   if (root.has("pose_convention") && root.choice("pose_convention", {"body", "left_optical"}) == "left_optical") {
     rig.convention = PoseConvention::left_optical;
   }
+  if (const auto rover = root.optional_node("rover")) rig.rover = read_rover(YamlMap(*rover, "rover", root.errors()));
   rig.pan_tilt_units = read_group<PanTiltUnit>(root, "pan_tilt_units", false, read_pan_tilt_unit);
   rig.cameras = read_group<Camera>(root, "cameras", true, read_camera);
   rig.pairs = read_group<StereoPair>(root, "pairs", true, read_pair);
@@ -261,6 +271,10 @@ Result<Rig> read_rig_yaml(const std::string& path) {
 std::string to_rig_yaml(const Rig& rig) {
   std::string text = fmt::format("schema: {}\nname: {}\npose_convention: {}\n", kSchema, yaml_quoted(rig.name),
                                  rig.convention == PoseConvention::left_optical ? "left_optical" : "body");
+  if (rig.rover != RoverGeometry()) {
+    text += fmt::format("rover:\n  track_m: {}\n  wheel_radius_m: {}\n  clearance_m: {}\n", rig.rover.track_m,
+                        rig.rover.wheel_radius_m, rig.rover.clearance_m);
+  }
   if (!rig.pan_tilt_units.empty()) text += "pan_tilt_units:\n";
   for (const PanTiltUnit& unit : rig.pan_tilt_units) {
     text += fmt::format("  {}:\n{}    rest_angles_rad: [{}, {}]\n", yaml_quoted(unit.name),

@@ -48,6 +48,20 @@ TEST(RigYaml, ReadsVignetting) {
   EXPECT_THAT(error_for("axes: optical, ", "vignetting: [.nan], axes: optical, "), HasSubstr("cameras.l.vignetting"));
 }
 
+TEST(RigYaml, ReadsTheGeometryOfTheRover) {
+  EXPECT_EQ(parse_rig_yaml(kGood, "my.yaml")->rover, RoverGeometry());
+  const auto rig = parse_rig_yaml(kGood + "rover: {track_m: 0.35, clearance_m: 0.06}\n", "my.yaml");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->rover, (RoverGeometry{0.35, 0.1, 0.06})) << "a missing key keeps its default";
+  EXPECT_EQ(parse_rig_yaml(to_rig_yaml(*rig), "again.yaml")->rover, rig->rover);
+  const auto fault = [](const std::string& rover) {
+    return testing::error_message(parse_rig_yaml(kGood + "rover: " + rover + "\n", "my.yaml"));
+  };
+  EXPECT_THAT(fault("{track_m: 0}"), HasSubstr("rover.track_m: is 0, must be between 0.05 and 10 m"));
+  EXPECT_THAT(fault("{wheel_radius_m: .inf}"), HasSubstr("rover.wheel_radius_m"));
+  EXPECT_THAT(fault("{wheelbase_m: 1}"), HasSubstr("wheelbase_m"));
+}
+
 TEST(RigYaml, ReadsAMinimalFile) {
   const auto rig = parse_rig_yaml(kGood, "some/my.yaml");
   ASSERT_TRUE(rig) << rig.error().message();

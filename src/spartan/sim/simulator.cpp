@@ -102,7 +102,10 @@ class Simulation {
         scenario_(request.scenario),
         world_(make_world(request.scenario, request.drive)),
         motion_(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers),
-        nominal_(nominal_rig(request.rig, request.scenario.nominal_rig)) {}
+        nominal_(nominal_rig(request.rig, request.scenario.nominal_rig)) {
+    nominal_.rover.track_m = request.scenario.chassis.track_m;
+    nominal_.rover.wheel_radius_m = request.scenario.chassis.wheel_radius_m;
+  }
 
   Result<SimulationReport> run() {
     const RecordingOptions about{scenario_.name, scenario_.description, scenario_.gravity_m_s2,

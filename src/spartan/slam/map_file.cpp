@@ -62,8 +62,9 @@ Result<MapFile> MapFile::open(const std::string& path, const GlobalMapOptions& o
   const auto version = pragma(*db, "user_version");
   if (!version) return failure(version);
   if (mode == Database::Mode::read_only && *version < steps().back().to) {
-    return failure(ErrorCode::configuration, fmt::format("has version {}", *version), path,
-                   "open it once for writing to migrate it");
+    return failure(ErrorCode::configuration,
+                   fmt::format("has map format version {}, older than {}", *version, steps().back().to), path,
+                   "run again into a new folder to rebuild the map");
   }
   if (Status s = migrate(*db, steps()); !s) return failure(s);
   auto store = TileStore::open_existing(*db);

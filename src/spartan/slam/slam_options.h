@@ -90,7 +90,7 @@ struct MatchOptions {
             between(0, 1));
     v.field("robust_sigmas", robust_sigmas,
             "Scale of the Geman-McClure cost of the refinement in standard deviations: a residual that large has a "
-            "quarter of the full weight; raising it lets outliers pull more.",
+            "quarter of the full weight; raising it increases the influence of outliers.",
             between(0.5, 20));
     v.field("block_m", block_m,
             "Side in metres of the blocks of the jackknife, within which errors of cells are correlated; raising it "

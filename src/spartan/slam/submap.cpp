@@ -64,14 +64,16 @@ Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
   if (version != kVersion) {
     return failure(ErrorCode::input,
                    "has version " + std::to_string(version) + ", expected " + std::to_string(kVersion), what,
-                   "rebuild the map");
+                   "run again into a new folder to rebuild the map");
   }
   Tile tile;
   const auto seen = in.get<std::uint32_t>();
-  if (seen > tile.cells.size()) return failure(ErrorCode::store_damaged, "is damaged", what, "rebuild the map");
+  if (seen > tile.cells.size())
+    return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder to rebuild the map");
   for (std::uint32_t i = 0; i < seen; ++i) {
     const auto index = in.get<std::uint16_t>();
-    if (index >= tile.cells.size()) return failure(ErrorCode::store_damaged, "is damaged", what, "rebuild the map");
+    if (index >= tile.cells.size())
+      return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder to rebuild the map");
     const bool has_rival = in.get<bool>();
     tile.cells[index].surface = get_surface(in);
     if (has_rival) tile.cells[index].alternative = get_surface(in);

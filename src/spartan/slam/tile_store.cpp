@@ -119,14 +119,15 @@ Result<Tile> TileStore::read(const Entry& e) {
   if (!row || !*row) {
     select.reset();
     if (!row) return failure(row);
-    return failure(ErrorCode::store_damaged, name_of(e) + " is missing", db_->path(), "make the map anew");
+    return failure(ErrorCode::store_damaged, name_of(e) + " is missing", db_->path(),
+                   "run again into a new folder to rebuild the map");
   }
   const std::int64_t checksum = select.integer(0);
   const Bytes bytes = select.blob(1);
   select.reset();
   if (checksum != checksum_of(e, bytes)) {
-    return failure(ErrorCode::store_damaged, name_of(e) + " is damaged: its checksum does not fit", db_->path(),
-                   "make the map anew");
+    return failure(ErrorCode::store_damaged, name_of(e) + " is damaged: checksum mismatch", db_->path(),
+                   "run again into a new folder to rebuild the map");
   }
   return tile_from_bytes(bytes, db_->path() + ": " + name_of(e));
 }
@@ -197,8 +198,9 @@ Status migrate(Database& db, const std::vector<MapMigration>& steps) {
       !s)
     return s;
   if (const int newest = steps.empty() ? 0 : steps.back().to; version > newest) {
-    return failure(ErrorCode::configuration, fmt::format("has version {}, this program knows {}", version, newest),
-                   db.path(), "use a newer program");
+    return failure(ErrorCode::configuration,
+                   fmt::format("has version {}, this program supports up to version {}", version, newest), db.path(),
+                   "use a newer program");
   }
   for (const MapMigration& step : steps) {
     if (step.to <= version) continue;

@@ -152,7 +152,8 @@ TEST(Migration, RunsMissingStepsInOrder) {
   auto select = db.prepare("SELECT x FROM a");
   ASSERT_TRUE(*select->step());
   EXPECT_EQ(select->integer(0), 2);
-  EXPECT_THAT(migrate(db, {steps[0]}).error().message(), HasSubstr("has version 3, this program knows 1"));
+  EXPECT_THAT(migrate(db, {steps[0]}).error().message(),
+              HasSubstr("has version 3, this program supports up to version 1"));
 }
 
 TEST(Migration, AFailingStepChangesNothing) {

@@ -220,7 +220,7 @@ Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Thr
   }
   auto imager = Imager::create(rig, options.imaging, workers, mask_folder);
   if (!imager) return failure(imager);
-  return Pipeline(std::make_unique<State>(rig, options, std::move(*imager), *pair, workers));
+  return Pipeline(std::make_unique<State>(rig, resolved_options(options, rig), std::move(*imager), *pair, workers));
 }
 
 Pipeline::Pipeline(std::unique_ptr<State> state) : state_(std::move(state)) {}

@@ -308,12 +308,13 @@ Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, 
   return RunStore::create(folder.store(), identity);
 }
 
-Status write_map(GlobalMap& map, const RunRequest& request, const RunFolder& folder, const Log& log) {
+Status write_map(GlobalMap& map, const RunRequest& request, const Rig& rig, const RunFolder& folder, const Log& log) {
   if (map.extent().cells() > GlobalMap::kMostCells) {
     log.warning("the global map is too large for one image; `spartan map export --window` exports a part of it");
     return remove_map_files(folder.global_map());  // of the run before it was resumed
   }
-  return write_global_map(map, request.options.mapping.map, ThreadPool(request.threads), folder.global_map());
+  const RunOptions options = resolved_options(request.options, rig);
+  return write_global_map(map, options.mapping.map, ThreadPool(request.threads), folder.global_map());
 }
 
 // Stages that the options disable.
@@ -326,8 +327,8 @@ std::vector<std::string> disabled_stages(const RunOptions& options) {
 }
 
 // Trajectories and maps are written from the store alone, so a resumed run writes the same bytes.
-Result<RunOutcome> write_results(RunLoop& run_loop, const RunRequest& request, const RunFolder& folder, RunFacts facts,
-                                 const Log& log) {
+Result<RunOutcome> write_results(RunLoop& run_loop, const RunRequest& request, const Rig& rig, const RunFolder& folder,
+                                 RunFacts facts, const Log& log) {
   const auto frames = run_loop.store().frames();
   if (!frames) return failure(frames);
   for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
@@ -335,7 +336,7 @@ Result<RunOutcome> write_results(RunLoop& run_loop, const RunRequest& request, c
     if (Status s = write_file_atomically(folder.trajectory(kind), to_tum(trajectory_of(*frames, kind))); !s)
       return failure(s);
   }
-  if (Status s = write_map(run_loop.global_map(), request, folder, log); !s) return failure(s);
+  if (Status s = write_map(run_loop.global_map(), request, rig, folder, log); !s) return failure(s);
   facts.peak_memory_bytes = peak_memory_bytes();
   RunOutcome outcome;
   outcome.summary_json = to_summary_json(facts, *frames);
@@ -401,7 +402,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   facts.resumed_from_frame = run_loop.resumed_from_frame();
   facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   facts.cpu_seconds = cpu_seconds();
-  return write_results(run_loop, request, folder, facts, hooks.log);
+  return write_results(run_loop, request, info.rig, folder, facts, hooks.log);
 }
 
 }  // namespace spartan

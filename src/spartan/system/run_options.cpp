@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <utility>
 
 namespace spartan {
 namespace {
@@ -19,13 +20,11 @@ constexpr std::array<std::string_view, 30> kBasicOptions{
     "imaging.debayer",
     "imaging.view.policy",
     "odometry.detection.landmarks",
+    "mapping.disparity_sigma_px",
     "mapping.map.extent_m",
     "mapping.map.cell_m",
     "mapping.map.obstacle_m",
     "mapping.map.cavity_m",
-    "mapping.map.rover.wheel_radius_m",
-    "mapping.map.rover.clearance_m",
-    "mapping.map.rover.track_m",
     "mapping.map.rover.max_slope_deg",
     "mapping.map.rover.max_step_m",
     "slam.map.memory_mb",
@@ -35,13 +34,30 @@ constexpr std::array<std::string_view, 30> kBasicOptions{
     "localization.imu.accel_noise_m_s2_sqrt_hz",
     "localization.imu.accel_bias_m_s2",
     "localization.imu.accel_walk_m_s3_sqrt_hz",
-    "localization.wheels.track_m",
+    "localization.wheels.use_rotation",
+    "localization.compass.offset_walk_rad_sqrt_hz",
+    "localization.inclinometer.bias_walk_rad_sqrt_hz",
     "localization.wheels.scale_sigma",
     "localization.compass.offset_sigma_rad",
     "localization.inclinometer.bias_rad",
 };
 
 }  // namespace
+
+RunOptions resolved_options(RunOptions options, const Rig& rig) {
+  const RunOptions defaults;
+  const auto share = [](double& value, double by_default, double shared) {
+    if (value == by_default) value = shared;
+  };
+  RoverGeometry& rover = options.mapping.map.rover.geometry;
+  const RoverGeometry by_default;
+  share(rover.track_m, by_default.track_m, rig.rover.track_m);
+  share(rover.wheel_radius_m, by_default.wheel_radius_m, rig.rover.wheel_radius_m);
+  share(rover.clearance_m, by_default.clearance_m, rig.rover.clearance_m);
+  share(options.localization.wheels.track_m, defaults.localization.wheels.track_m, rig.rover.track_m);
+  options.mapping = with_shared_values(std::move(options.mapping));
+  return options;
+}
 
 std::span<const std::string_view> basic_options() {
   return kBasicOptions;

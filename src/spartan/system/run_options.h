@@ -11,6 +11,7 @@
 #include "spartan/odometry/odometer.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/stop_mapper.h"
+#include "spartan/rig/rig.h"
 #include "spartan/slam/slam_options.h"
 
 namespace spartan {
@@ -68,7 +69,7 @@ struct RunOptions {
             "True lets the sensor noise and biases that the recording specifies replace the defaults of localization "
             "(not values that are set explicitly); false ignores them.");
     v.field("odometry_pair", odometry_pair,
-            "Name of the stereo pair that drives the odometry; empty selects the first pair of the rig with "
+            "Name of the stereo pair used for visual odometry; empty selects the first pair of the rig with "
             "for_odometry.");
     v.field("odometry_only", odometry_only,
             "True runs the visual odometry alone, without localization, maps, SLAM and terrain (the start attitude is "
@@ -77,14 +78,19 @@ struct RunOptions {
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);
     v.field("maps", maps,
-            "True makes a map of every stop of which another pair than that of the odometry has views, and merges it "
-            "into the global map; false makes no maps, so map matching never corrects the poses.");
+            "True builds a local map at every stop that has views of a stereo pair other than the odometry pair, and "
+            "merges it into the global map; false makes no maps, so map matching never corrects the poses.");
     v.group("mapping", mapping);
     v.group("slam", slam);
     v.group("localization", localization);
     v.group("terrain", terrain);
   }
 };
+
+/// The options for a rig, with each quantity that is stated once copied to the modules that use it: the geometry of the
+/// rover (Rig::rover) to traversal costs and wheel odometry, and with_shared_values(). Values of the modules that
+/// differ from their defaults (set in code or under a former key) are retained.
+RunOptions resolved_options(RunOptions options, const Rig& rig);
 
 /// Keys of the options that an operator needs, at most 30; the others are for experts.
 std::span<const std::string_view> basic_options();

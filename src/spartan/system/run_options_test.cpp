@@ -29,5 +29,45 @@ TEST(RunOptions, BasicOptionsAreDumpedAndReadBack) {
   EXPECT_EQ(read->odometry.motion.inlier_sigmas, RunOptions().odometry.motion.inlier_sigmas);
 }
 
+Rig rig_of_a_small_rover() {
+  Rig rig;
+  rig.rover = {0.35, 0.05, 0.06};
+  return rig;
+}
+
+TEST(ResolvedOptions, TakeTheGeometryOfTheRoverFromTheRig) {
+  const RunOptions options = resolved_options({}, rig_of_a_small_rover());
+  EXPECT_EQ(options.mapping.map.rover.geometry, (RoverGeometry{0.35, 0.05, 0.06}));
+  EXPECT_EQ(options.localization.wheels.track_m, 0.35);
+}
+
+TEST(ResolvedOptions, KeepWhatWasSetUnderAFormerKey) {
+  const auto set = read_assignment<RunOptions>("mapping.map.rover.track_m=0.5");
+  ASSERT_TRUE(set) << set.error().message();
+  EXPECT_EQ(set->warnings.size(), 1U);
+  const RunOptions options = resolved_options(set->options, rig_of_a_small_rover());
+  EXPECT_EQ(options.mapping.map.rover.geometry.track_m, 0.5);
+  EXPECT_EQ(options.mapping.map.rover.geometry.wheel_radius_m, 0.05);
+}
+
+TEST(ResolvedOptions, ShareObstacleHeightAndDisparitySigma) {
+  RunOptions options;
+  options.mapping.disparity_sigma_px = 0.5;
+  options.mapping.map.obstacle_m = 0.05;
+  const MappingOptions mapping = resolved_options(options, Rig()).mapping;
+  EXPECT_EQ(mapping.v_disparity.plane.disparity_sigma_px, 0.5);
+  EXPECT_EQ(mapping.merging.disparity_sigma_px, 0.5);
+  EXPECT_DOUBLE_EQ(mapping.v_disparity.obstacle_m, 0.04);
+}
+
+// What is stated once is what the modules had before, to the last bit.
+TEST(ResolvedOptions, ChangeNoDefault) {
+  const RunOptions defaults, resolved = resolved_options({}, Rig());
+  EXPECT_EQ(dump_options(resolved), dump_options(defaults));
+  EXPECT_EQ(resolved.mapping.v_disparity.obstacle_m, 0.08);
+  EXPECT_EQ(resolved.mapping.v_disparity.plane.disparity_sigma_px, 0.3);
+  EXPECT_EQ(resolved.mapping.merging.disparity_sigma_px, 0.3);
+}
+
 }  // namespace
 }  // namespace spartan

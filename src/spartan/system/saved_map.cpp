@@ -12,7 +12,9 @@ Result<SavedMap> SavedMap::open_run(const std::string& path) {
   if (!store) return failure(store);
   auto options = load_options<RunOptions>(folder.config());
   if (!options) return failure(options);
-  SavedMap saved(std::move(*options));
+  const auto rig = read_rig_yaml(folder.rig());
+  if (!rig) return failure(rig);
+  SavedMap saved(resolved_options(std::move(*options), *rig));
   saved.run_store_ = std::make_unique<RunStore>(std::move(*store));
   auto map =
       GlobalMap::from_store(saved.options_.slam.map, saved.options_.mapping.map.cell_m, saved.run_store_->tiles());
@@ -32,7 +34,7 @@ Result<SavedMap> SavedMap::open(const std::string& path) {
   }
   if (saved->map().empty()) {
     return failure(ErrorCode::input, "contains no map", path,
-                   "a run makes maps at stops of which another pair than that of the odometry has frames");
+                   "a run makes maps at stops that have frames of a stereo pair other than the odometry pair");
   }
   return saved;
 }

@@ -16,19 +16,19 @@ FrameRecord frame(int i, const std::string& state, const std::string& reason = "
 }
 
 TEST(SensorOutages, JoinConsecutiveFramesOfSameStateAndReason) {
-  const std::vector<FrameRecord> frames{frame(0, "missing", "has not said anything"),
-                                        frame(1, "missing", "has not said anything"),
+  const std::vector<FrameRecord> frames{frame(0, "missing", "no measurement received yet"),
+                                        frame(1, "missing", "no measurement received yet"),
                                         frame(2, "ok"),
                                         frame(3, "suspect", "disagrees with the other sensors: 14.3, at most 10.8"),
                                         frame(4, ""),
                                         frame(5, "suspect", "disagrees with the other sensors: inf, at most 10.8"),
                                         frame(6, "excluded", "disagrees with the other sensors: 25.0, at most 10.8"),
-                                        frame(7, "missing", "silent for 1.2 s"),
-                                        frame(8, "missing", "silent for 2.2 s"),
-                                        frame(9, "excluded", "gives the same reading again and again"),
-                                        frame(10, "excluded", "gives readings that no rover can have"),
+                                        frame(7, "missing", "no measurement for 1.2 s"),
+                                        frame(8, "missing", "no measurement for 2.2 s"),
+                                        frame(9, "excluded", "readings are frozen (identical values)"),
+                                        frame(10, "excluded", "readings are outside of the physical range"),
                                         frame(11, "ok"),
-                                        frame(12, "excluded", "gives readings that no rover can have")};
+                                        frame(12, "excluded", "readings are outside of the physical range")};
   const auto outages = sensor_outages(frames, "compass");
   ASSERT_EQ(outages.size(), 7U);
   const auto expect = [&](std::size_t i, const std::string& state, int first, int last, int count) {
@@ -47,7 +47,7 @@ TEST(SensorOutages, JoinConsecutiveFramesOfSameStateAndReason) {
   expect(5, "excluded", 10, 10, 1);
   expect(6, "excluded", 12, 12, 1);
   EXPECT_EQ(outages[1].reason, frames[3].localization->sensors[1].reason);
-  EXPECT_EQ(outages[3].reason, "silent for 1.2 s");
+  EXPECT_EQ(outages[3].reason, "no measurement for 1.2 s");
 }
 
 TEST(SensorOutages, NoneForSensorThatWasOkOrIsUnknown) {

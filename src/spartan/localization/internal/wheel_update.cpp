@@ -65,7 +65,7 @@ WheelStep ErrorStateFilter::step_to(const WheelSample& sample) const {
   step.forward_sigma_m = std::hypot(o.min_sigma_m, o.forward_share * distance);
   step.side_sigma_m = std::hypot(o.min_sigma_m, o.side_share * distance);
   step.up_sigma_m = std::hypot(o.min_sigma_m, o.up_share * distance);
-  if (o.track_m > 0) {
+  if (o.use_rotation && o.track_m > 0) {
     step.yaw_known = true;
     step.yaw_rad = (right - left) / o.track_m;
     step.yaw_sigma_rad = std::hypot(std::sqrt(2.0) * step.forward_sigma_m / o.track_m, o.turn_share * step.yaw_rad);

@@ -21,10 +21,10 @@ void draw_pair_from_side(Drawing& drawing, const Scale& at, const DrawnPair& pai
     drawing.text(camera + Point(-22, below_px), text, {pair.colour, 14, Anchor::end});
   };
   label(0, fmt::format("{} pair, {} m high", pair.name, height));
-  label(17, fmt::format("{}° down, {:.1f}° high", pair.figures.tilt_deg, pair.figures.vfov_deg));
+  label(17, fmt::format("tilt {}° down, vertical FOV {:.1f}°", pair.figures.tilt_deg, pair.figures.vfov_deg));
 }
 
-// The ground seen by a pair as a bar: full color up to where the required resolution holds, a mark at the required
+// The ground seen by a pair as a bar: full colour up to where the required resolution holds, a mark at the required
 // range.
 void draw_bar(Drawing& drawing, const Scale& at, double y_px, const DrawnPair& pair) {
   const auto bar = [&](double from_m, double to_m, double opacity) {
@@ -63,7 +63,7 @@ void draw_bars(Drawing& drawing, const Scale& at, double y_px, const std::vector
     y_px += 24;
   }
   if (near > 0) draw_plain_bar(drawing, at, y_px, 0, near, kFaint, fmt::format("blind: up to {:.3f} m", near));
-  drawing.text({at(0, 0).x(), y_px + 38}, "full color: required resolution met; black mark: required range", kSmall);
+  drawing.text({at(0, 0).x(), y_px + 38}, "full colour: required resolution met; black mark: required range", kSmall);
 }
 
 }  // namespace

@@ -86,8 +86,9 @@ Result<std::string> map_images(const std::string& run) {
     const std::string overlap = map.overlap > 0 ? fmt::format(" ({:.0f} % overlap)", 100 * map.overlap) : "";
     const auto image = image_of(
         folder.local_map(map.stamp) + ".png",
-        fmt::format("Position {}: {} views, {} cells known, {} obstacles (red), north up. In the global map: {}{}",
-                    map.position_id, map.views, map.known_cells, map.obstacles, status_text(map.status), overlap),
+        fmt::format(
+            "Stop {}: {} views, {} observed cells, {} obstacle cells (red), north up. Match with the global map: {}{}",
+            map.position_id, map.views, map.known_cells, map.obstacles, status_text(map.status), overlap),
         360);
     if (!image) return failure(image);
     html += *image;
