@@ -37,13 +37,13 @@ TEST(SensorMonitor, ReportsTheReason) {
   SensorMonitor j;
   const Stamp now{5'000'000'000};
   EXPECT_EQ(j.report(now, 1, {}).state, SensorState::missing);
-  EXPECT_THAT(j.report(now, 1, {}).reason, ::testing::HasSubstr("not said"));
+  EXPECT_THAT(j.report(now, 1, {}).reason, ::testing::HasSubstr("no measurement received"));
   j.see({4'500'000'000});
   EXPECT_EQ(j.report(now, 1, {}).state, SensorState::ok);
   EXPECT_EQ(j.report(now, 1, {}).reason, "");
   EXPECT_THAT(j.report({9'000'000'000}, 1, {}).reason, ::testing::HasSubstr("no measurement for 4.5 s"));
   accept(j, 77);
-  EXPECT_THAT(j.report(now, 1, {}).reason, ::testing::HasSubstr("77.0, at most 10.0"));
+  EXPECT_THAT(j.report(now, 1, {}).reason, ::testing::HasSubstr("NIS 77.0 above the chi-square gate of 10.0"));
   RefusalCounts refusals;
   refusals.count(Refusal::not_finite);
   refusals.count(Refusal::too_late);
