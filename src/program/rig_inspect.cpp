@@ -35,6 +35,7 @@ Result<InspectedPair> check_with_images(const Rig& rig, const StereoPair& pair, 
                                         bool guessed, const ThreadPool& workers, bool quiet) {
   const int count = static_cast<int>(images.size());
   std::vector<StereoViews> frames;
+  frames.reserve(images.size());
   for (const ImagePair& image : images) frames.push_back({image.left.view(), image.right.view()});
   Progress progress(quiet || count == 1);
   const auto show = [&](std::size_t matched) {
