@@ -4,6 +4,12 @@ set(prefix "${WORK}/prefix")
 file(REMOVE_RECURSE "${WORK}")
 file(COPY "${CMAKE_CURRENT_LIST_DIR}/" DESTINATION "${WORK}/source" PATTERN "run.cmake" EXCLUDE)
 
+file(READ "${CMAKE_CURRENT_LIST_DIR}/../../README.md" readme)
+if(NOT readme MATCHES "```cpp\n([^`]*)```")
+  message(FATAL_ERROR "README.md has no C++ example")
+endif()
+file(WRITE "${WORK}/source/readme.cpp" "${CMAKE_MATCH_1}")
+
 function(run)
   execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
