@@ -45,6 +45,7 @@ std::vector<testing::SyntheticFrame> rendered_frames() {
 
 std::vector<StereoViews> views_of(const std::vector<testing::SyntheticFrame>& frames) {
   std::vector<StereoViews> views;
+  views.reserve(frames.size());
   for (const testing::SyntheticFrame& frame : frames) views.push_back({frame.left.view(), frame.right.view()});
   return views;
 }
