@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
-#include <utility>
 
 namespace spartan {
 namespace {
@@ -55,7 +54,7 @@ RunOptions resolved_options(RunOptions options, const Rig& rig) {
   share(rover.wheel_radius_m, by_default.wheel_radius_m, rig.rover.wheel_radius_m);
   share(rover.clearance_m, by_default.clearance_m, rig.rover.clearance_m);
   share(options.localization.wheels.track_m, defaults.localization.wheels.track_m, rig.rover.track_m);
-  options.mapping = with_shared_values(std::move(options.mapping));
+  options.mapping = with_shared_values(options.mapping);
   return options;
 }
 
