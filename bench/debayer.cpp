@@ -32,6 +32,7 @@ using spartan::DebayerMethod;
 using spartan::Image;
 using spartan::PixelLayout;
 using spartan::Rgb8;
+using spartan::SimdTarget;
 using spartan::internal::Debayerer;
 namespace fs = std::filesystem;
 
@@ -82,7 +83,7 @@ struct Method {
   int row_offset = 0;  // row of the result that belongs to row 0 of the image
 };
 
-Method spartan_method(const std::string& name, DebayerMethod method, const std::string& simd = "auto") {
+Method spartan_method(const std::string& name, DebayerMethod method, SimdTarget simd = SimdTarget::automatic) {
   auto debayerer = std::make_shared<Debayerer>(method, simd);
   return {name, [debayerer](const cv::Mat& mosaic, const Pattern& pattern, cv::Mat& result) {
             result.create(mosaic.size(), CV_8UC3);
@@ -190,11 +191,11 @@ void time_targets(int repeat) {
   };
   for (const auto& [name, method] :
        {std::pair{"bilinear", DebayerMethod::bilinear}, {"edge_aware", DebayerMethod::edge_aware}}) {
-    for (const std::string& simd : spartan::available_simd_targets()) {
+    for (const SimdTarget simd : spartan::available_simd_targets()) {
       const Debayerer d(method, simd);
-      fmt::print("{:<11} {:<5} {:11.3f} {:8.3f} {:8.3f} {:8.3f}\n", name, simd, time(d, std::as_const(mosaic8), rgb8),
-                 time(d, std::as_const(mosaic8), luma8), time(d, std::as_const(mosaic16), rgb16),
-                 time(d, std::as_const(mosaic16), luma16));
+      fmt::print("{:<11} {:<5} {:11.3f} {:8.3f} {:8.3f} {:8.3f}\n", name, name_of(simd),
+                 time(d, std::as_const(mosaic8), rgb8), time(d, std::as_const(mosaic8), luma8),
+                 time(d, std::as_const(mosaic16), rgb16), time(d, std::as_const(mosaic16), luma16));
     }
   }
   for (const auto& [name, code] :

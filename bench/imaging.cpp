@@ -92,7 +92,7 @@ Scores score(const Pair& pair, const RawPair& raw, const ImagingOptions& options
     for (const StageTime& t : rectified.times) sum += t.wall_ms;
     times.push_back(sum);
   }
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(threads));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(threads)).value();
   const auto image = must(computer.compute(rectified.left, rectified.right, {0, pair.disparities - 1}));
   const auto all = must(compare_disparities(image.disparity, pair.truth, pair.mask)).all;
   return {all.bad_2.value_or(0), all.matched_bad_2.value_or(0), all.density_percent.value_or(0),
@@ -211,7 +211,7 @@ void compare_debayering(const std::vector<Pair>& pairs, int threads) {
 
 /// The median ratio of left to right gray level over pixels matched by stereo.
 double matched_ratio(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, int threads) {
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(threads));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(threads)).value();
   const auto image = must(computer.compute(left, right, {0, 127}));
   Random random(1);
   std::vector<double> ratios;

@@ -179,7 +179,7 @@ inline LocalizationOptions options_for(const TrueDrive& drive) {
 }
 
 inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {
-  Localizer localizer(options_for(drive));
+  Localizer localizer = Localizer::create(options_for(drive)).value();
   TrialResult result;
   Pose first;  // of the localization, relative to which errors are measured
   const std::int64_t start_ns = sim::internal::stamp_at(drive.frames_s.front()).ns;

@@ -14,10 +14,10 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
-#include <numbers>
 #include <string>
 #include <vector>
 
+#include "spartan/core/pose.h"
 #include "spartan/numerics/random.h"
 #include "spartan/slam/global_map.h"
 #include "spartan/slam/internal/map_refinement.h"
@@ -39,7 +39,6 @@ void accumulate_time(Clock::time_point& start, double& sum) {
   start = now;
 }
 
-constexpr double kDegree = std::numbers::pi / 180;
 const ThreadPool kWorkers(2);
 MatchOptions g_options;
 
@@ -127,7 +126,8 @@ struct Outcome {
 Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
   GlobalMap map = build(setting.others);
   const Pose truth = setting.stop->points.world_from_body;
-  const UncertainPose prior{moved(truth, truth.translation(), offset), covariance_of(0.3, 5 * kDegree)};
+  const UncertainPose prior{moved(truth, truth.translation(), offset),
+                            covariance_of(0.3, 5 * spartan::kRadiansPerDegree)};
   const MapView view = view_around(map, prior.pose);
   auto start = Clock::now();
   Outcome o;
@@ -136,7 +136,7 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
   accumulate_time(start, o.seconds);
   const Pose error = truth.inverse() * o.match.world_from_body;
   o.error_m = error.translation().norm();
-  o.error_deg = rotation_angle(error) / kDegree;
+  o.error_deg = rotation_angle(error) / spartan::kRadiansPerDegree;
   const Vector6d xi = log_se3(o.match.world_from_body.inverse() * truth);
   o.nees = xi.dot(o.match.information * xi);
   if (verbose) {
@@ -145,8 +145,8 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
         "{} "
         "cells {} blocks {} misfit {:.2f} lead {:.1f} cand {} {:.2f} s\n",
         setting.scenario, setting.incoming, setting.overlap, name_of(o.match.status), 1000 * o.error_m, o.error_deg,
-        1000 * o.match.sigma_m, o.match.sigma_rad / kDegree, o.nees, o.match.determined, o.match.cells, o.match.blocks,
-        o.match.normalized_residual, o.match.margin, o.match.candidates, o.seconds);
+        1000 * o.match.sigma_m, o.match.sigma_rad / spartan::kRadiansPerDegree, o.nees, o.match.determined,
+        o.match.cells, o.match.blocks, o.match.normalized_residual, o.match.margin, o.match.candidates, o.seconds);
   }
   return o;
 }
@@ -256,7 +256,7 @@ void wrong_start(const Recordings& recordings, const std::vector<std::string>& n
     for (int i = 0; i < trials / static_cast<int>(classes.size()); ++i) {
       const Setting& setting = c.settings[random.below(static_cast<std::uint32_t>(c.settings.size()))];
       Vector6d offset;
-      offset << in_ball(random, 0.3), in_ball(random, 5 * kDegree);
+      offset << in_ball(random, 0.3), in_ball(random, 5 * spartan::kRadiansPerDegree);
       const Outcome o = attempt(setting, offset, verbose);
       tally.add(o);
       all.add(o);
@@ -288,7 +288,7 @@ void flat(const Recordings& recordings, int trials, bool verbose) {
       }
       if (kind.steps.empty() && k < repeated.size()) setting.others.push_back(&repeated[k]);
       Vector6d offset;
-      offset << in_ball(random, 0.3), in_ball(random, 5 * kDegree);
+      offset << in_ball(random, 0.3), in_ball(random, 5 * spartan::kRadiansPerDegree);
       if (setting.others.empty()) continue;
       tally.add(attempt(setting, offset, verbose));
     }
@@ -323,7 +323,7 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
   double length = 0;
   for (std::size_t i = 1; i < stops.size(); ++i) length += step_between(stops, i).translation().norm();
   Vector6d sigma;
-  sigma << Eigen::Vector3d::Constant(0.015), Eigen::Vector3d::Constant(0.5 * kDegree);
+  sigma << Eigen::Vector3d::Constant(0.015), Eigen::Vector3d::Constant(0.5 * spartan::kRadiansPerDegree);
   fmt::print("loop, {:.1f} m between {} stops; odometry errors scaled to an ATE of 1.25 % = {:.3f} m\n", length,
              stops.size(), 0.0125 * length);
   fmt::print(
@@ -345,7 +345,7 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
     const Matrix6d covariance = (scale * sigma).cwiseAbs2().asDiagonal();
     SlamOptions options;
     options.match = g_options;
-    MapMerger merger(options, {}, kWorkers);
+    MapMerger merger = MapMerger::create(options, {}, kWorkers).value();
     UncertainPose at{stops.front().points.world_from_body, Matrix6d::Zero()};
     std::vector<Pose> poses;
     int decided = 0;
@@ -365,7 +365,7 @@ void drift(const Recordings& recordings, int seeds, bool verbose) {
             "  {:>2} {:<10} error before {:6.1f} mm, corrected {:6.1f} mm {:5.2f} deg, sigma {:.1f} mm, nees {:.1f}\n",
             i, name_of(result->match.status),
             1000 * (at.pose.translation() - stops[i].points.world_from_body.translation()).norm(),
-            1000 * off.translation().norm(), rotation_angle(off) / kDegree,
+            1000 * off.translation().norm(), rotation_angle(off) / spartan::kRadiansPerDegree,
             1000 * std::sqrt(result->corrected.covariance.diagonal().head<3>().maxCoeff()),
             i == 0 ? 0.0 : xi.dot(result->corrected.covariance.inverse() * xi));
       }

@@ -143,7 +143,7 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
   }
   auto imager = Imager::create(drive->rig, ImagingOptions(), ThreadPool(2));
   if (!imager) return;
-  StopMapper mapper({}, {}, ThreadPool(2));
+  StopMapper mapper = StopMapper::create({}, {}, ThreadPool(2)).value();
   std::array<Sums, 4> sums;  // three bins of range, all
   int stops = 0;
   Image<float> level(drive->elevation.bands[0].size());

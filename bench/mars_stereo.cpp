@@ -100,7 +100,7 @@ void compare_pair(FrameSource& source, Imager& imager, const StereoPair& pair, S
   if (!view) return;
   const DisparityRange range = disparity_range(view->geometry, pair.nearest_m);
   const int disparities = (range.max + 15) / 16 * 16;
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(2));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(2)).value();
   if (const auto ours = computer.compute(view->left, view->right, range, view->left_mask, view->right_mask))
     add_scores(ours->disparity, *truth, *mask, view->geometry, scores["Spartan"]);
   add_scores(opencv_disparity(view->left, view->right, disparities, cv::StereoSGBM::MODE_SGBM), *truth, *mask,

@@ -11,13 +11,13 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mars_stops.h"
+#include "spartan/core/pose.h"
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/numerics/median.h"
 #include "standard_recordings.h"
@@ -25,7 +25,6 @@
 namespace spartan {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFarthest_m = 4;  // range of the points of the true ground plane
 
 // Least-squares plane through the true points.
@@ -112,7 +111,7 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
   }
   auto imager = Imager::create(drive->rig, ImagingOptions(), ThreadPool(2));
   if (!imager) return;
-  StopMapper mapper({}, {}, ThreadPool(2));
+  StopMapper mapper = StopMapper::create({}, {}, ThreadPool(2)).value();
   std::map<std::string, GroundErrors> ground_errors;
   std::vector<double> gains, steps;
   int stops = 0;
@@ -127,7 +126,8 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
       if (!plane || !view.ground) continue;
       GroundErrors& errors = ground_errors[view.pair];
       errors.height_m.push_back(std::abs(view.ground->plane.height_m - plane->height_m));
-      errors.pitch_deg.push_back(std::abs(view.ground->plane.pitch_rad() - plane->pitch_rad()) / kDegree);
+      errors.pitch_deg.push_back(std::abs(view.ground->plane.pitch_rad() - plane->pitch_rad()) /
+                                 spartan::kRadiansPerDegree);
     }
     const MergedRange merged = mapper.merge();
     gains.push_back(static_cast<double>(known_cells(mapper.map(surface_points(merged), pose))) / best);

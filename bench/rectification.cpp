@@ -124,7 +124,7 @@ Accuracy accuracy(const Scene& scene, const Maps& maps, const spartan::internal:
 }
 
 template <class Pixel, int kChannels>
-void compare(const Scene& scene, const char* kind, const std::string& simd, int repeat) {
+void compare(const Scene& scene, const char* kind, spartan::SimdTarget simd, int repeat) {
   using Sample = std::conditional_t<sizeof(Pixel) / kChannels == 1, std::uint8_t, std::uint16_t>;
   const spartan::ThreadPool one(1);
   const Maps maps = maps_of(scene);
@@ -145,7 +145,7 @@ void compare(const Scene& scene, const char* kind, const std::string& simd, int 
   const Accuracy b = accuracy<Sample>(scene, maps, table, from, into);
   const double pixels = static_cast<double>(scene.size.width) * scene.size.height;
   fmt::print("{:>4} x {:<4} {:<8} {:<5} {:8.3f} {:10.3f} {:7.1f} {:8.2f} {:7.2f} {:9.3f} {:9.3f} {:9.3f} {:9.3f}\n",
-             scene.size.width, scene.size.height, kind, simd, median(spartan_times), median(opencv_times),
+             scene.size.width, scene.size.height, kind, name_of(simd), median(spartan_times), median(opencv_times),
              median(ratios), median(spartan_times) * 1e6 / pixels, static_cast<double>(table.bytes()) / pixels, a.rms(),
              b.rms(), a.largest, b.largest);
 }
@@ -180,7 +180,7 @@ int main(int argc, char** argv) try {
              "Spartan", "OpenCV ms", "ratio", "ns/px", "B/px", "rms", "cv rms", "largest", "cv larg.");
   const Scene small = scene_of(640, 480), large = scene_of(1120, 1120);
   for (const Scene& scene : {small, large}) {
-    for (const std::string& simd : spartan::available_simd_targets()) {
+    for (const spartan::SimdTarget simd : spartan::available_simd_targets()) {
       compare<std::uint8_t, 1>(scene, "gray 8", simd, repeat);
       compare<std::uint16_t, 1>(scene, "gray 16", simd, repeat);
       compare<spartan::Rgb8, 3>(scene, "RGB 8", simd, repeat);

@@ -169,7 +169,8 @@ class Means {
 
 Scores run_spartan(const Pair& pair, const spartan::DisparityOptions& options, int threads, int repeat,
                    const std::string& images) {
-  spartan::DisparityComputer computer(options, spartan::ThreadPool(threads));
+  spartan::DisparityComputer computer =
+      spartan::DisparityComputer::create(options, spartan::ThreadPool(threads)).value();
   spartan::DisparityImage image;
   const double ms = time_of(repeat + 1, [&] {
     image = must(computer.compute(pair.left, pair.right, {0, pair.disparities - 1}));
@@ -209,11 +210,12 @@ void time_targets(const std::vector<Pair>& pairs, const Arguments& arguments) {
   });
   fmt::print("\n{}: {}x{}, {} disparities\n", largest->name, largest->left.width(), largest->left.height(),
              largest->disparities);
-  for (const std::string& simd : spartan::available_simd_targets()) {
+  for (const spartan::SimdTarget simd : spartan::available_simd_targets()) {
     for (const int threads : {1, 2}) {
       spartan::DisparityOptions options = arguments.options;
       options.simd = simd;
-      spartan::DisparityComputer computer(options, spartan::ThreadPool(threads));
+      spartan::DisparityComputer computer =
+          spartan::DisparityComputer::create(options, spartan::ThreadPool(threads)).value();
       spartan::DisparityImage image;
       const double ms = time_of(arguments.repeat + 2, [&] {
         image = must(computer.compute(largest->left, largest->right, {0, largest->disparities - 1}));
@@ -222,7 +224,7 @@ void time_targets(const std::vector<Pair>& pairs, const Arguments& arguments) {
       fmt::print(
           "{:<5} {} threads {:7.1f} ms (cost {:.1f}, aggregate {:.1f}, select {:.1f}, check {:.1f}, filter {:.1f}), "
           "{:.0f} MB\n",
-          simd, threads, ms, t.cost, t.aggregate, t.select, t.check, t.filter,
+          name_of(simd), threads, ms, t.cost, t.aggregate, t.select, t.check, t.filter,
           static_cast<double>(image.buffer_bytes) / 1e6);
     }
   }

@@ -127,7 +127,7 @@ inline std::vector<StopPoints> points_of_stops(const std::string& recording, con
   if (!drive) return {};
   auto imager = Imager::create(drive->rig, imaging, ThreadPool(2));
   if (!imager) return {};
-  StopMapper mapper(disparity, mapping, ThreadPool(2));
+  StopMapper mapper = StopMapper::create(disparity, mapping, ThreadPool(2)).value();
   if (folder) std::filesystem::create_directories(*folder);
   std::size_t number = 0;
   for (const auto& [position, frames] : drive->stops) {

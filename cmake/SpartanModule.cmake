@@ -6,6 +6,7 @@ add_library(spartan_flags INTERFACE)
 target_compile_options(spartan_flags INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overflow>
+  $<$<AND:$<BOOL:${CMAKE_UNITY_BUILD}>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage>  # it takes the sources for headers
   $<$<BOOL:${SPARTAN_WERROR}>:-Werror>
   $<$<AND:$<BOOL:${SPARTAN_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=array-bounds>)
 if(SPARTAN_SANITIZE)
@@ -23,6 +24,18 @@ if(SPARTAN_TESTS)
   find_package(rapidcheck CONFIG REQUIRED)
 endif()
 include(SpartanPrecompiled)
+
+# In a unity build (CMAKE_UNITY_BUILD, as most presets have it) several sources of a target are compiled as one file, which
+# halves the time; the names in their unnamed namespaces must differ. Kernels that Highway compiles once for each
+# instruction set stay files of their own.
+function(spartan_exclude_from_unity)
+  foreach(source IN LISTS ARGN)
+    file(STRINGS ${source} kernels REGEX "foreach_target\\.h" LIMIT_COUNT 1)
+    if(kernels)
+      set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+endfunction()
 
 # spartan_test(NAME SOURCES … LINKS … [LABEL fast|long] [TIMEOUT s] [FIXTURE name])
 function(spartan_test name)
@@ -64,11 +77,14 @@ function(spartan_module name)
 
   set(target spartan_${name})
   if(sources)
+    spartan_exclude_from_unity(${sources})
     set(scope PUBLIC)
     set(hidden PRIVATE)
     add_library(${target} STATIC ${sources})
     set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-    target_include_directories(${target} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+    if(opencv_core IN_LIST A_PUBLIC OR opencv_core IN_LIST A_PRIVATE OR image_io IN_LIST A_USES)
+      target_include_directories(${target} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+    endif()
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:spartan_flags>)
     target_precompile_headers(${target} REUSE_FROM spartan_precompiled_library)
   else()

@@ -1,8 +1,10 @@
 #include "program/context.h"
 
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <functional>
 
 namespace spartan::program {
 
@@ -46,6 +48,27 @@ void add_threads_option(CLI::App& command, Context& context) {
       .add_option("--threads", context.threads,
                   "Maximum number of threads (default: number of cores). Results do not depend on it.")
       ->check(CLI::Range(1, 1024));
+}
+
+namespace {
+
+CLI::Validator number_check(const std::string& wanted, const std::function<bool(double)>& accepts) {
+  const auto check = [wanted, accepts](const std::string& text) -> std::string {
+    double value = 0;
+    const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && accepts(value);
+    return good ? "" : "'" + text + "' is not a " + wanted;
+  };
+  return CLI::Validator(check, "");
+}
+
+}  // namespace
+
+CLI::Validator positive_number() {
+  return number_check("positive number", [](double value) { return value > 0; });
+}
+
+CLI::Validator non_negative_number() {
+  return number_check("number of at least 0", [](double value) { return value >= 0; });
 }
 
 Status print(const std::string& text) {

@@ -45,6 +45,10 @@ void add_json_flag(CLI::App& command, Context& context);
 /// `--threads N`, for commands that have it.
 void add_threads_option(CLI::App& command, Context& context);
 
+/// Checks of numeric options.
+CLI::Validator positive_number();
+CLI::Validator non_negative_number();
+
 /// Accepts the former name of an option for one version, with a warning; help does not show it.
 template <class T>
 void add_former_name(CLI::App& command, Context& context, const std::string& former, const std::string& name,

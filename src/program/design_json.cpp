@@ -31,7 +31,7 @@ Json figures_json(const PairMetrics& pair) {
 
 Json published_json(const PairDesign& design) {
   if (!design.published) return nullptr;
-  Json json = {{"feasible", design.published->feasible}, {"on_offer", design.published_is_candidate}};
+  Json json = {{"feasible", design.published->feasible}, {"is_candidate", design.published_is_candidate}};
   json.update(figures_json(*design.published));
   return json;
 }

@@ -22,7 +22,7 @@ constexpr std::array<Score, 9> kScores{{{"bad_0_5", "bad over 0.5 px, %", &Dispa
                                         {"rms_in_1px", "rms up to 1 px, px", &DisparityScores::rms_in_1px},
                                         {"mean_abs_px", "mean error, px", &DisparityScores::mean_abs_px}}};
 
-Json to_json(const DisparityScores& scores) {
+Json scores_to_json(const DisparityScores& scores) {
   Json json{{"truth_pixels", scores.truth_pixels}, {"matched_pixels", scores.matched_pixels}};
   for (const Score& score : kScores) json[score.key] = number(scores.*score.value);
   return json;
@@ -36,9 +36,9 @@ std::string cell(const std::optional<DisparityScores>& scores, const Score& scor
 }  // namespace
 
 Json to_json(const DisparityMetrics& metrics) {
-  Json json{{"all", to_json(metrics.all)}, {"nonocc", nullptr}};
+  Json json{{"all", scores_to_json(metrics.all)}, {"nonocc", nullptr}};
   if (metrics.nonocc) {
-    json["nonocc"] = to_json(*metrics.nonocc);
+    json["nonocc"] = scores_to_json(*metrics.nonocc);
   } else {
     json["reasons"] = {{"nonocc", "no mask that marks occluded pixels was given"}};
   }

@@ -24,7 +24,7 @@ Result<ExitCode> evaluate(const Context& context, const Arguments& arguments) {
   if (!compared) return failure(compared);
   TrajectoryMetricsOptions options = arguments.options;
   options.alignment = *alignment_named(arguments.align);
-  if (arguments.kitti) use_kitti_segments(options);
+  if (arguments.kitti) options = with_kitti_segments(std::move(options));
   const auto metrics = compare_trajectories(compared->estimate, compared->truth, options);
   if (!metrics) return failure(metrics);
   const Status printed =
@@ -69,7 +69,7 @@ void add_evaluate(CLI::App& app, Context& context) {
                                     "Lengths in metres of the segments over which relative errors are averaged "
                                     "(default: 1,2,5,10,20,40,100).")
                        ->delimiter(',')
-                       ->check(CLI::PositiveNumber)
+                       ->check(positive_number())
                        ->option_text("M,M,…");
   command
       ->add_flag("--kitti", arguments->kitti,
@@ -78,7 +78,7 @@ void add_evaluate(CLI::App& app, Context& context) {
   command
       ->add_option("--max-dt", arguments->options.max_dt_s,
                    "Maximum time difference in seconds of two poses that are compared (default 0.02).")
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->option_text("S");
   add_json_flag(*command, context);
 }

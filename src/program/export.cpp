@@ -1,8 +1,7 @@
-#include "spartan/system/export.h"
-
 #include <memory>
 
 #include "program/commands.h"
+#include "spartan/system/run_folder.h"
 
 namespace spartan::program {
 namespace {

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <opencv2/core/utility.hpp>
 #include <thread>
 
 #include "program/commands.h"
 #include "program/context.h"
 #include "program/interrupt.h"
-#include "spartan/core/threads.h"
 
 namespace spartan::program {
 namespace {
@@ -51,7 +51,7 @@ int run(int argc, char** argv) {
   }
 
   context.log = Log::to_terminal(level_of(context));
-  limit_third_party_threads(context.threads);
+  cv::setNumThreads(context.threads);
   listen_for_interrupts();
   if (!context.chosen) {
     context.log.error("this command needs a subcommand; see --help");

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
+#include "spartan/core/pose.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/imaging/imager.h"
@@ -25,7 +25,6 @@
 namespace spartan::program {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kRestSeconds = 1;  // of IMU samples from the first frame of the stop on
 constexpr double kReach = 0.75;     // of the side of the map: slightly more than half of its diagonal
 
@@ -160,10 +159,10 @@ Json views_of(const StopMapper& mapper, const Eigen::Vector3d& up) {
                              view.geometry.body_from_left.translation().dot(up)};
     Json json{{"pair", view.pair},
               {"stamp_ns", view.stamp.ns},
-              {"rig", {{"pitch_deg", by_rig.pitch_rad() / kDegree}, {"height_m", by_rig.height_m}}},
+              {"rig", {{"pitch_deg", by_rig.pitch_rad() / kRadiansPerDegree}, {"height_m", by_rig.height_m}}},
               {"ground", nullptr}};
     if (view.ground) {
-      json["ground"] = {{"pitch_deg", view.ground->plane.pitch_rad() / kDegree},
+      json["ground"] = {{"pitch_deg", view.ground->plane.pitch_rad() / kRadiansPerDegree},
                         {"height_m", view.ground->plane.height_m}};
     }
     views.push_back(std::move(json));
@@ -171,29 +170,30 @@ Json views_of(const StopMapper& mapper, const Eigen::Vector3d& up) {
   return views;
 }
 
-Json to_json(const StopMapper& mapper, const LocalMap& map, const Stop& stop, const Eigen::Vector3d& up) {
+Json stop_to_json(const StopMapper& mapper, const LocalMap& map, const Stop& stop, const Eigen::Vector3d& up) {
   const Tilt tilt = tilt_of(up);
-  return {
-      {"schema", 1},
-      {"cell_m", map.place.cell_m},
-      {"west_m", map.place.west_m},
-      {"north_m", map.place.north_m},
-      {"columns", map.size().width},
-      {"rows", map.size().height},
-      {"cells",
-       {{"free", count_of(map, GroundClass::ground)},
-        {"obstacle", count_of(map, GroundClass::obstacle)},
-        {"cavity", count_of(map, GroundClass::cavity)}}},
-      {"obstacles", map.obstacles.size()},
-      {"attitude",
-       {{"roll_deg", tilt.roll_rad / kDegree}, {"pitch_deg", tilt.pitch_rad / kDegree}, {"source", stop.up_source}}},
-      {"views", views_of(mapper, up)},
-      {"time_ms",
-       {{"disparity", mapper.times().disparity},
-        {"v_disparity", mapper.times().v_disparity},
-        {"merging", mapper.times().merging},
-        {"map", mapper.times().map}}},
-      {"peak_memory_bytes", peak_memory_bytes()}};
+  return {{"schema", 1},
+          {"cell_m", map.place.cell_m},
+          {"west_m", map.place.west_m},
+          {"north_m", map.place.north_m},
+          {"columns", map.size().width},
+          {"rows", map.size().height},
+          {"cells",
+           {{"free", count_of(map, GroundClass::ground)},
+            {"obstacle", count_of(map, GroundClass::obstacle)},
+            {"cavity", count_of(map, GroundClass::cavity)}}},
+          {"obstacles", map.obstacles.size()},
+          {"attitude",
+           {{"roll_deg", tilt.roll_rad / kRadiansPerDegree},
+            {"pitch_deg", tilt.pitch_rad / kRadiansPerDegree},
+            {"source", stop.up_source}}},
+          {"views", views_of(mapper, up)},
+          {"time_ms",
+           {{"disparity", mapper.times().disparity},
+            {"v_disparity", mapper.times().v_disparity},
+            {"merging", mapper.times().merging},
+            {"map", mapper.times().map}}},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 std::string to_text(const Json& json, const std::string& folder) {
@@ -257,7 +257,9 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   const ThreadPool workers(context.threads);
   auto imager = Imager::create(stop->rig, options->imaging, workers, stop->mask_folder);
   if (!imager) return failure(imager);
-  StopMapper mapper(options->reconstruction, options->mapping, workers);
+  auto created = StopMapper::create(options->reconstruction, options->mapping, workers);
+  if (!created) return failure(created);
+  StopMapper& mapper = *created;
   Eigen::Vector3d ahead_in_body = Eigen::Vector3d::UnitX();
   for (const StereoFrame& frame : stop->frames) {
     const auto pair = imager->process(frame);
@@ -271,7 +273,7 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   const LocalMap map = mapper.map(surface_points(merged), first_pose(up, ahead_in_body, 0));
   if (Status s = make_folder(a.output); !s) return failure(s);
   if (Status s = write_stop_files(mapper.views(), merged, map, options->mapping, a.output); !s) return failure(s);
-  const Json json = to_json(mapper, map, *stop, up);
+  const Json json = stop_to_json(mapper, map, *stop, up);
   if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json, a.output)); !s) return failure(s);
   return kDone;
 }
@@ -288,7 +290,8 @@ void add_map_build(CLI::App& map, Context& context) {
   command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
   command->add_option("--rig", a->rig, "Rig or calibration file of the two images, in any supported format.");
   command->add_option("--recording", a->recording, "Recording to take one stop from.");
-  command->add_option("--position", a->position, "position_id of the stop; all frames with it are merged.");
+  command->add_option("--position", a->position,
+                      "Number of the stop: the position_id of its frames, all of which are merged.");
   command
       ->add_option(
           "--extent-m", a->extent_m,

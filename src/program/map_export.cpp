@@ -14,12 +14,12 @@
 namespace spartan::program {
 namespace {
 
-struct ExportArguments {
+struct MapExportArguments {
   std::string map, output;
   std::vector<double> window_m;  // west, south, east, north
 };
 
-Result<LatticeWindow> window_of(const ExportArguments& a, const GlobalMap& map) {
+Result<LatticeWindow> window_of(const MapExportArguments& a, const GlobalMap& map) {
   if (a.window_m.empty()) return map.extent();
   const double west = a.window_m[0], south = a.window_m[1], east = a.window_m[2], north = a.window_m[3];
   if (!(east > west) || !(north > south)) {
@@ -29,7 +29,7 @@ Result<LatticeWindow> window_of(const ExportArguments& a, const GlobalMap& map) 
   return window_between(west, south, east, north, map.cell_m());
 }
 
-// The centres of the cells, in the colors of the image.
+// The centres of the cells, in the colours of the image.
 PointCloud cloud_of(const MapView& view) {
   const Image<Rgb8> colours = render_map(view.elevation_m, view.kind, view.cell_m, 1);
   PointCloud cloud;
@@ -43,7 +43,7 @@ PointCloud cloud_of(const MapView& view) {
   return cloud;
 }
 
-Status write(SavedMap& saved, const ExportArguments& a, const ThreadPool& workers) {
+Status write_map(SavedMap& saved, const MapExportArguments& a, const ThreadPool& workers) {
   const std::string ending = std::filesystem::path(a.output).extension().string();
   if (ending == ".map") {
     if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map file always holds the whole map", "--window");
@@ -59,17 +59,17 @@ Status write(SavedMap& saved, const ExportArguments& a, const ThreadPool& worker
   return failure(ErrorCode::usage, "has an unknown extension", a.output, "known extensions: .tif, .png, .ply, .map");
 }
 
-Result<ExitCode> export_map(const Context& context, const ExportArguments& a) {
+Result<ExitCode> export_map(const Context& context, const MapExportArguments& a) {
   auto saved = SavedMap::open(a.map);
   if (!saved) return failure(saved);
-  if (Status s = write(*saved, a, ThreadPool(context.threads)); !s) return failure(s);
+  if (Status s = write_map(*saved, a, ThreadPool(context.threads)); !s) return failure(s);
   return kDone;
 }
 
 }  // namespace
 
 void add_map_export(CLI::App& map, Context& context) {
-  auto a = std::make_shared<ExportArguments>();
+  auto a = std::make_shared<MapExportArguments>();
   CLI::App* command =
       add_command(map, context, "export", "Export a global map as GeoTIFF, image, point cloud or map file",
                   "map export my_run -o site.tif", [&context, a] { return export_map(context, *a); });

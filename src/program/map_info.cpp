@@ -26,7 +26,7 @@ Json stop_json(const MapStop& stop) {
           {"sigma_m", std::sqrt(std::max(0.0, variance))}};
 }
 
-Json to_json(const GlobalMap& map, const MapStatistics& statistics) {
+Json map_to_json(const GlobalMap& map, const MapStatistics& statistics) {
   Json stops = Json::array();
   for (const MapStop& stop : map.stops()) stops.push_back(stop_json(stop));
   const LatticeWindow extent = map.extent();
@@ -73,7 +73,7 @@ Result<ExitCode> info(const Context& context, const std::string& path) {
   if (!saved) return failure(saved);
   const auto statistics = map_statistics(saved->map());
   if (!statistics) return failure(statistics);
-  const Json json = to_json(saved->map(), *statistics);
+  const Json json = map_to_json(saved->map(), *statistics);
   if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json)); !s) return failure(s);
   return kDone;
 }

@@ -135,8 +135,8 @@ Result<std::vector<RigDifference>> losses(const LoadedRig& source, const Rig& wr
   return lost;
 }
 
-std::string to_text(const LoadedRig& read, CalibrationFormat format, const CalibrationFiles& files,
-                    const std::vector<RigDifference>& lost) {
+std::string conversion_to_text(const LoadedRig& read, CalibrationFormat format, const CalibrationFiles& files,
+                               const std::vector<RigDifference>& lost) {
   std::string text = fmt::format("read {}: {}\n", name_of(read.format), fmt::join(read.files, ", "));
   for (const std::string& note : read.notes) text += "  " + note + "\n";
   text += fmt::format("wrote {}:", name_of(format));
@@ -146,8 +146,8 @@ std::string to_text(const LoadedRig& read, CalibrationFormat format, const Calib
   return text;
 }
 
-std::string to_json(const LoadedRig& read, CalibrationFormat format, const CalibrationFiles& files,
-                    const std::vector<RigDifference>& lost) {
+std::string conversion_to_json(const LoadedRig& read, CalibrationFormat format, const CalibrationFiles& files,
+                               const std::vector<RigDifference>& lost) {
   Json paths = Json::array(), losses = Json::array();
   for (const CalibrationFile& file : files) paths.push_back(file.path);
   for (const RigDifference& each : lost) losses.push_back({{"key", each.key}, {"text", each.text}});
@@ -176,8 +176,8 @@ Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {
   const auto lost = losses(*read, *rig, *format, *files);
   if (!lost) return failure(lost);
   if (const Status written = write_all(*files); !written) return failure(written);
-  const std::string text =
-      context.json ? to_json(*read, *format, *files, *lost) : to_text(*read, *format, *files, *lost);
+  const std::string text = context.json ? conversion_to_json(*read, *format, *files, *lost)
+                                        : conversion_to_text(*read, *format, *files, *lost);
   if (Status printed = print(text); !printed) return failure(printed);
   return kDone;
 }

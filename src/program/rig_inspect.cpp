@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <optional>
 
 #include "program/inspected_pair.h"
@@ -17,14 +16,13 @@
 #include "program/rig_inspect_apply.h"
 #include "spartan/calibration/pair_inspection.h"
 #include "spartan/calibration_io/calibration_files.h"
+#include "spartan/core/pose.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/report/report.h"
 #include "spartan/rig/describe.h"
 
 namespace spartan::program {
 namespace {
-
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 struct InspectArguments {
   std::string rig, left, right, recording, pair, apply, figure;
@@ -75,7 +73,7 @@ Json findings_json(const std::vector<RigFinding>& findings) {
 }
 
 // Without a calibration, figures that the images do not tell are null.
-Json to_json(const LoadedRig& read, const std::vector<InspectedPair>& inspected, bool guessed) {
+Json inspection_to_json(const LoadedRig& read, const std::vector<InspectedPair>& inspected, bool guessed) {
   const Rig& rig = read.rig;
   Json pairs = Json::object();
   for (const StereoPair& pair : rig.pairs) {
@@ -99,7 +97,7 @@ Json to_json(const LoadedRig& read, const std::vector<InspectedPair>& inspected,
                             {"corrected", rows_json(check.corrected_rows)}};
     pair["corrections"] = corrections_json(check.correction, check.correction.focal_ratio);
     pair["corrections"]["sigma"] = corrections_json(check.sigma, check.sigma.focal_ratio);
-    pair["yaw_doubt_px"] = number(check.yaw_sigma_px);
+    pair["yaw_sigma_px"] = number(check.yaw_sigma_px);
     Json map = Json::array();
     for (const RowErrorCell& cell : check.map) {
       map.push_back({{"x_px", number(cell.centre_px.x())},
@@ -114,7 +112,7 @@ Json to_json(const LoadedRig& read, const std::vector<InspectedPair>& inspected,
   return {{"schema", 1},
           {"body", read.body.empty() ? Json(nullptr) : Json(read.body)},
           {"notes", read.notes},
-          {"left_out", std::move(ignored)},
+          {"ignored", std::move(ignored)},
           {"pairs", std::move(pairs)}};
 }
 
@@ -128,7 +126,7 @@ std::string rotation_text(double radians, double sigma, const char* above, const
                      radians > 0 ? above : below);
 }
 
-std::string to_text(const InspectedPair& one, bool guessed) {
+std::string inspection_to_text(const InspectedPair& one, bool guessed) {
   const PairCheck& check = one.check;
   const std::string pair = fmt::format("pair {}: ", one.pair.name);
   std::string text = fmt::format("{}{} matches, {} inliers\n", pair, check.matches, check.inliers);
@@ -227,7 +225,8 @@ Status write_figure(const std::string& path, const Rig& rig, const InspectedPair
   return write_png(path, std::as_const(*figure).view());
 }
 
-std::string to_text(const InspectArguments& a, const LoadedRig& read, const std::vector<InspectedPair>& inspected) {
+std::string inspection_to_text(const InspectArguments& a, const LoadedRig& read,
+                               const std::vector<InspectedPair>& inspected) {
   const bool guessed = a.rig == "-";
   std::string text;
   if (guessed) {
@@ -246,7 +245,7 @@ std::string to_text(const InspectArguments& a, const LoadedRig& read, const std:
     for (const std::string& note : read.notes) text += note + "\n";
     for (const RigDifference& d : read.ignored) text += fmt::format("not used: {}: {}\n", d.key, d.text);
   }
-  for (const InspectedPair& one : inspected) text += to_text(one, guessed);
+  for (const InspectedPair& one : inspected) text += inspection_to_text(one, guessed);
   const bool correctable = std::any_of(inspected.begin(), inspected.end(), [&](const InspectedPair& one) {
     return one.checked() && one.check.corrected && *one.check.corrected != read.rig;
   });
@@ -273,8 +272,8 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
     if (!result) return failure(result);
     inspected = std::move(*result);
   }
-  const std::string text =
-      context.json ? to_json(*read, inspected, a.rig == "-").dump(2) + "\n" : to_text(a, *read, inspected);
+  const std::string text = context.json ? inspection_to_json(*read, inspected, a.rig == "-").dump(2) + "\n"
+                                        : inspection_to_text(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
   if (!a.figure.empty()) {
     if (Status drawn = write_figure(a.figure, read->rig, inspected.front(), workers); !drawn) return failure(drawn);

@@ -48,7 +48,7 @@ std::string summary_for_people(const std::string& summary_json, const std::strin
 }
 
 // Compares the run's trajectory with the truth; the summary gets the figures under "truth".
-Result<std::string> score(const RunArguments& arguments, RunOutcome& outcome) {
+Result<std::string> score_trajectory(const RunArguments& arguments, RunOutcome& outcome) {
   const auto compared = find_trajectories(arguments.output, arguments.truth, "");
   if (!compared) return failure(compared);
   const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
@@ -110,7 +110,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   if (!outcome) return failure(outcome);
   std::string text = summary_for_people(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {
-    const auto table = score(arguments, *outcome);
+    const auto table = score_trajectory(arguments, *outcome);
     if (!table) return failure(table);
     text += "\n" + *table;
   }
@@ -155,7 +155,7 @@ void add_run(CLI::App& app, Context& context) {
       "--resume", a->resume,
       "Continue an interrupted run in this folder. The results are the same as without the interruption.");
   command->add_option("--max-frames", a->max_frames, "Stop after this number of stereo frames (default 0: all).")
-      ->check(CLI::NonNegativeNumber);
+      ->check(non_negative_number());
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM or terrain.");
   add_threads_option(*command, context);

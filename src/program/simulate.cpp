@@ -26,7 +26,7 @@ void add_simulate(CLI::App& app, Context& context) {
   command->add_option("scenario", a->scenario, "Scenario: the name of a shipped one, or a file.")->required();
   command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();
   command->add_option("--seed", a->seed, "Seed of all random numbers, instead of the scenario's.")
-      ->check(CLI::NonNegativeNumber);
+      ->check(non_negative_number());
   command->add_flag(
       "--resume", a->resume,
       "Continue an interrupted simulation in this folder. The files are the same as without the interruption.");

@@ -134,7 +134,7 @@ Json times_of(const DisparityTimes& t) {
           {"refine", t.refine}, {"check", t.check}, {"filter", t.filter}};
 }
 
-Result<std::optional<DisparityMetrics>> score(const StereoArguments& a, ImageView<const float> disparity) {
+Result<std::optional<DisparityMetrics>> score_disparity(const StereoArguments& a, ImageView<const float> disparity) {
   if (a.truth.empty()) return std::nullopt;
   const auto truth = read_disparity(a.truth, a.truth_scale);
   if (!truth) return failure(truth);
@@ -154,15 +154,16 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (!options) return failure(options);
   auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!pair) return failure(pair);
-  DisparityComputer computer(options->reconstruction, ThreadPool(context.threads));
+  auto computer = DisparityComputer::create(options->reconstruction, ThreadPool(context.threads));
+  if (!computer) return failure(computer);
   const auto image =
-      computer.compute(pair->left, pair->right, search_range(a, *pair), pair->left_mask, pair->right_mask);
+      computer->compute(pair->left, pair->right, search_range(a, *pair), pair->left_mask, pair->right_mask);
   if (!image) {
     Error error = image.error();
     if (error.where.empty()) error.where = a.left + ", " + a.right;
     return tl::unexpected<Error>(error);
   }
-  const auto metrics = score(a, image->disparity);
+  const auto metrics = score_disparity(a, image->disparity);
   if (!metrics) return failure(metrics);
   if (Status s = write_results(a, *pair, image->disparity, context.log); !s) return failure(s);
 

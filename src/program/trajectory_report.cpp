@@ -5,7 +5,7 @@
 namespace spartan::program {
 namespace {
 
-Json to_json(const std::optional<ErrorStatistics>& errors) {
+Json statistics_to_json(const std::optional<ErrorStatistics>& errors) {
   if (!errors) return nullptr;
   return {{"rmse", number(errors->rmse)},
           {"mean", number(errors->mean)},
@@ -13,7 +13,7 @@ Json to_json(const std::optional<ErrorStatistics>& errors) {
           {"max", number(errors->max)}};
 }
 
-Json to_json(const std::optional<std::vector<SegmentErrors>>& segments) {
+Json segments_to_json(const std::optional<std::vector<SegmentErrors>>& segments) {
   if (!segments) return nullptr;
   Json list = Json::array();
   for (const SegmentErrors& segment : *segments) {
@@ -27,7 +27,7 @@ Json to_json(const std::optional<std::vector<SegmentErrors>>& segments) {
   return list;
 }
 
-Json to_json(const Similarity& similarity) {
+Json similarity_to_json(const Similarity& similarity) {
   const auto& t = similarity.pose.translation();
   const auto& q = similarity.pose.rotation();
   return {{"scale", number(similarity.scale)},
@@ -52,14 +52,14 @@ Json to_json(const TrajectoryMetrics& metrics, const ComparedTrajectories& compa
           {"truth", compared.truth_path},
           {"frames", metrics.frames},
           {"path_length_m", number(metrics.path_length_m)},
-          {"ate_m", to_json(std::optional(metrics.ate_m))},
+          {"ate_m", statistics_to_json(std::optional(metrics.ate_m))},
           {"drift_percent", number(metrics.drift_percent)},
-          {"segments", to_json(metrics.segments)},
+          {"segments", segments_to_json(metrics.segments)},
           {"rpe",
-           {{"translation_m", to_json(metrics.rpe_translation_m)},
-            {"rotation_deg", to_json(metrics.rpe_rotation_deg)},
+           {{"translation_m", statistics_to_json(metrics.rpe_translation_m)},
+            {"rotation_deg", statistics_to_json(metrics.rpe_rotation_deg)},
             {"delta_frames", metrics.rpe_delta_frames}}},
-          {"truth_from_estimate", to_json(metrics.truth_from_estimate)},
+          {"truth_from_estimate", similarity_to_json(metrics.truth_from_estimate)},
           {"reasons", std::move(reasons)}};
 }
 

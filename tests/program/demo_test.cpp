@@ -5,8 +5,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "program.h"
 #include "small_scenario.h"
@@ -17,14 +15,9 @@ namespace spartan {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::content_of;
 using ::testing::HasSubstr;
 using testing::run_program;
-
-std::string content_of(const std::string& path) {
-  std::stringstream content;
-  content << std::ifstream(path, std::ios::binary).rdbuf();
-  return content.str();
-}
 
 TEST(Demo, LeavesARecordingARunAndAPageWithoutErrors) {
   const testing::TemporaryFolder folder;

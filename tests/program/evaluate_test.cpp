@@ -195,5 +195,14 @@ TEST(Program, HelpAndVersionAreNoFaults) {
   EXPECT_EQ(run_program({"fly"}).exit_code, 2);
 }
 
+TEST_F(Evaluate, RejectsSegmentsThatAreNoLengths) {
+  for (const std::string bad : {"a", "-1", "0", "inf"}) {
+    const auto result =
+        testing::run_program({"evaluate", path("run"), "--truth", path("kitti"), "--segments", "1," + bad});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, ::testing::HasSubstr("'" + bad + "' is not a positive number"));
+  }
+}
+
 }  // namespace
 }  // namespace spartan

@@ -25,12 +25,12 @@ using ::testing::Not;
 using testing::replaced;
 using testing::run_program;
 
-const std::string& rover() {
+const std::string& required_rover() {
   static const std::string path = testing::source_folder() + "/config/requirements/rover.yaml";
   return path;
 }
 std::string rover_text() {
-  return testing::content_of(rover());
+  return testing::content_of(required_rover());
 }
 std::size_t lines_of(const std::string& text) {
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
@@ -38,7 +38,7 @@ std::size_t lines_of(const std::string& text) {
 
 // The keys that scripts rely on (docs/reference/json.md).
 TEST(RigDesign, JsonHoldsThePublishedFigures) {
-  const auto result = run_program({"rig", "design", rover(), "--json"});
+  const auto result = run_program({"rig", "design", required_rover(), "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json design = json::parse(result.out);
   EXPECT_EQ(design["schema"], 1);
@@ -56,7 +56,7 @@ TEST(RigDesign, JsonHoldsThePublishedFigures) {
   EXPECT_NEAR(wide["published"]["margins"]["stereo_angle_deg"], 15 - 11.42, 0.005);
   EXPECT_NEAR(wide["published"]["margins"]["search_percent"], 25 - 22.84, 0.005);
   EXPECT_NEAR(wide["published"]["margins"]["pan_overlap_percent"], 5, 1e-9);
-  EXPECT_EQ(wide["published"]["on_offer"], true);
+  EXPECT_EQ(wide["published"]["is_candidate"], true);
   EXPECT_LT(wide["best"]["pan_overlap_percent"], 25);
   EXPECT_GE(wide["best_with_pan_overlap"]["pan_overlap_percent"], 25);
   const json& narrow = design["narrow"];
@@ -83,11 +83,11 @@ TEST(RigDesign, JsonHoldsThePublishedFigures) {
     EXPECT_THAT(warning["pair"], ::testing::AnyOf("wide", "narrow"));
   }
   EXPECT_FALSE(wide.contains("feasible"));
-  EXPECT_EQ(run_program({"rig", "design", rover(), "--json"}).out, result.out) << "the same in every run";
+  EXPECT_EQ(run_program({"rig", "design", required_rover(), "--json"}).out, result.out) << "the same in every run";
 }
 
 TEST(RigDesign, ListsTheFeasibleSet) {
-  const auto some = run_program({"rig", "design", rover()});
+  const auto some = run_program({"rig", "design", required_rover()});
   ASSERT_EQ(some.exit_code, 0) << some.err;
   EXPECT_THAT(some.out, HasSubstr("12592 of 128960 combinations are feasible"));
   EXPECT_THAT(some.out, HasSubstr("12591 other combinations"));
@@ -99,13 +99,13 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_THAT(some.out, HasSubstr("ground seen by both pairs, middle column: 2.03 m\n"));
   EXPECT_THAT(some.out, HasSubstr("at the far edge: 117.1 deg (one camera), 114.6 deg (both)\n"));
   EXPECT_LT(lines_of(some.out), 70u);
-  EXPECT_THAT(run_program({"rig", "design", rover(), "--rows", "3"}).out, HasSubstr("...  12589 more;"));
-  const auto all = run_program({"rig", "design", rover(), "--all"});
+  EXPECT_THAT(run_program({"rig", "design", required_rover(), "--rows", "3"}).out, HasSubstr("...  12589 more;"));
+  const auto all = run_program({"rig", "design", required_rover(), "--all"});
   EXPECT_EQ(all.exit_code, 0);
   EXPECT_GT(lines_of(all.out), 12592u);
   EXPECT_THAT(all.out, HasSubstr(" 12592.  "));
   EXPECT_THAT(all.out, Not(HasSubstr(" more;")));
-  const auto result = run_program({"rig", "design", rover(), "--all", "--json"});
+  const auto result = run_program({"rig", "design", required_rover(), "--all", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json whole = json::parse(result.out);
   ASSERT_EQ(whole["wide"]["feasible"].size(), 12592u);
@@ -121,13 +121,13 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   nlohmann::ordered_json without = nlohmann::ordered_json::parse(result.out);
   EXPECT_TRUE(without.dump(2) + "\n" == result.out);  // too long to be shown side by side
   for (const char* pair : {"wide", "narrow"}) without[pair].erase("feasible");
-  EXPECT_EQ(without.dump(2) + "\n", run_program({"rig", "design", rover(), "--json"}).out);
+  EXPECT_EQ(without.dump(2) + "\n", run_program({"rig", "design", required_rover(), "--json"}).out);
 }
 
 TEST(RigDesign, DrawsTheGround) {
   const testing::TemporaryFolder folder;
   const std::string out = folder.path() + "/deep/design";
-  ASSERT_EQ(run_program({"rig", "design", rover(), "-o", out, "-q"}).exit_code, 0);
+  ASSERT_EQ(run_program({"rig", "design", required_rover(), "-o", out, "-q"}).exit_code, 0);
   const std::string csv = testing::content_of(out + "/feasible.csv");
   EXPECT_EQ(lines_of(csv), 1u + 12592 + 1);
   EXPECT_THAT(csv, HasSubstr("enough_pan_overlap,tilt_deg,view_near_m,view_far_m\nwide,1,"));
@@ -203,7 +203,7 @@ TEST(RigDesign, TheGroundIsDrawnToScale) {
 // The pixels show what the SVG says: words in the title's line, the colours of both pairs.
 TEST(RigDesign, ThePixelsAreThoseOfTheDrawing) {
   const testing::TemporaryFolder folder;
-  ASSERT_EQ(run_program({"rig", "design", rover(), "-o", folder.path(), "-q"}).exit_code, 0);
+  ASSERT_EQ(run_program({"rig", "design", required_rover(), "-o", folder.path(), "-q"}).exit_code, 0);
   const auto read = read_image(folder.path() + "/ground.png");
   ASSERT_TRUE(read) << read.error().message();
   const auto pixels = read->as<Rgb8>();
@@ -241,7 +241,7 @@ TEST(RigDesign, DrawsWhatIsAskedOfOthers) {
   }
   const auto off = run_program(
       {"rig", "design", folder.write("off.yaml", replaced(wide_only, "hfov_deg: 50", "hfov_deg: 50.5")), "--json"});
-  EXPECT_EQ(json::parse(off.out)["wide"]["published"]["on_offer"], false) << off.out;
+  EXPECT_EQ(json::parse(off.out)["wide"]["published"]["is_candidate"], false) << off.out;
   // Nothing to draw is a warning, not an error.
   const auto none =
       run_program({"rig", "design", folder.write("none.yaml", replaced(unpublished, "range_m: 4.0", "range_m: 12")),
@@ -304,7 +304,7 @@ TEST(RigDesign, CamerasWithoutCommonGroundGiveNoNan) {
 TEST(RigDesign, BadInputIsNamed) {
   const testing::TemporaryFolder folder;
   EXPECT_EQ(run_program({"rig", "design"}).exit_code, 2);
-  EXPECT_EQ(run_program({"rig", "design", rover(), "--rows", "-3"}).exit_code, 2);
+  EXPECT_EQ(run_program({"rig", "design", required_rover(), "--rows", "-3"}).exit_code, 2);
   const auto missing = run_program({"rig", "design", folder.path() + "/none.yaml"});
   EXPECT_EQ(missing.exit_code, 3);
   EXPECT_THAT(missing.err, HasSubstr("none.yaml"));
@@ -322,10 +322,10 @@ TEST(RigDesign, BadInputIsNamed) {
 TEST(RigDesign, AnOutputThatCannotBeWrittenIsSaid) {
   const testing::TemporaryFolder folder;
   const std::string in_the_way = folder.write("file", "");
-  EXPECT_EQ(run_program({"rig", "design", rover(), "-o", in_the_way}).exit_code, 5);
+  EXPECT_EQ(run_program({"rig", "design", required_rover(), "-o", in_the_way}).exit_code, 5);
   testing::ProgramLimits disk;
   disk.largest_file_bytes = 4096;
-  const auto full = run_program({"rig", "design", rover(), "-o", folder.path() + "/full"}, disk);
+  const auto full = run_program({"rig", "design", required_rover(), "-o", folder.path() + "/full"}, disk);
   EXPECT_EQ(full.exit_code, 5) << full.err;
   EXPECT_FALSE(std::filesystem::exists(folder.path() + "/full/feasible.csv"));
 }

@@ -168,7 +168,7 @@ TEST_F(RigInspectImages, AppliesExchangedEyes) {
   EXPECT_THAT(testing::content_of(corrected), HasSubstr("self_mask: \"a/masks/left.png\""));
 }
 
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
+std::string replaced_everywhere(std::string text, const std::string& from, const std::string& to) {
   for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
     text.replace(at, from.size(), to);
   return text;
@@ -190,7 +190,7 @@ TEST_F(RigInspectImages, SaysWhatTheWrittenFileIs) {
               HasSubstr("\nno pair could be checked: " + corrected + " holds the given rig\n"));
   EXPECT_THAT(applied("-", gray, gray),
               HasSubstr("\nno pair could be checked: " + corrected + " holds the assumed rig\n"));
-  const std::string above = replaced(fmt::format(kRig, 0.5), "[0.5, 0, 0]", "[0, 0.12, 0]");
+  const std::string above = replaced_everywhere(fmt::format(kRig, 0.5), "[0.5, 0, 0]", "[0, 0.12, 0]");
   EXPECT_THAT(applied(folder_.write("above.yaml", above), image(0), image(1)),
               HasSubstr("\nno pair could be checked: "));
   const std::string large = folder_.write("large.yaml", fmt::format(kRig, 4.2));
@@ -202,8 +202,8 @@ TEST_F(RigInspectImages, SaysWhatTheWrittenFileIs) {
 
 // A calibration of images twice as large, with a mask of that size.
 TEST_F(RigInspectImages, NotesMasksOfAnotherSize) {
-  std::string text = replaced(fmt::format(kRig, 0.12), "[320, 240]", "[640, 480]");
-  text = replaced(replaced(text, "[260, 260]", "[520, 520]"), "[159.5, 119.5]", "[319.5, 239.5]");
+  std::string text = replaced_everywhere(fmt::format(kRig, 0.12), "[320, 240]", "[640, 480]");
+  text = replaced_everywhere(replaced_everywhere(text, "[260, 260]", "[520, 520]"), "[159.5, 119.5]", "[319.5, 239.5]");
   text.replace(text.find("axes: optical"), 0, "self_mask: mask.png, ");
   const std::string rig = folder_.write("rig.yaml", text), corrected = folder_.path() + "/corrected.yaml";
   const auto printed = [&] { return inspect(rig, {image(0), image(1), "--apply", corrected}).out; };

@@ -167,7 +167,9 @@ TEST_F(Run, DoesNotOverwriteAnExistingFolder) {
 
 TEST_F(Run, RejectsResumingAnotherRun) {
   ASSERT_EQ(run("out").exit_code, 0);
-  EXPECT_EQ(run("out", {"--resume", "--set", "terrain.every_m=2"}).exit_code, 4) << "other options";
+  const ProgramResult other_options = run("out", {"--resume", "--set", "terrain.every_m=2"});
+  EXPECT_EQ(other_options.exit_code, 4);
+  EXPECT_THAT(other_options.err, HasSubstr("other options: terrain.every_m was 0.15, is 2"));
   std::ofstream(drive() + "/times.txt", std::ios::app) << "99.0\n";
   EXPECT_EQ(run("out", {"--resume"}).exit_code, 4) << "another input";
 }

@@ -26,7 +26,7 @@ using testing::ProgramResult;
 using testing::run_program;
 
 // Path below the folder → content.
-std::map<std::string, std::string> content_of(const std::string& folder) {
+std::map<std::string, std::string> files_below(const std::string& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     if (!entry.is_regular_file()) continue;
@@ -76,11 +76,11 @@ class Simulate : public ::testing::Test {
 TEST_F(Simulate, LeavesARecordingThatRunReadsWithItsTruth) {
   const ProgramResult result = simulate("rec", {"--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto json = nlohmann::json::parse(result.out);
-  EXPECT_EQ(json["schema"], 1);
-  EXPECT_EQ(json["frames"], 4 + 3);
-  EXPECT_GT(json["rays"], 0);
-  EXPECT_GT(json["rays_per_second_per_core"], 0);
+  const auto summary = nlohmann::json::parse(result.out);
+  EXPECT_EQ(summary["schema"], 1);
+  EXPECT_EQ(summary["frames"], 4 + 3);
+  EXPECT_GT(summary["rays"], 0);
+  EXPECT_GT(summary["rays_per_second_per_core"], 0);
   for (const char* file : {"recording.yaml", "rig.yaml", "frames.csv", "sensors/imu.csv", "sensors/wheels.csv",
                            "sensors/compass.csv", "sensors/inclinometer.csv", "truth/rig.yaml", "truth/poses.tum",
                            "truth/rocks.csv", "truth/elevation.tif", "truth/obstacles.tif", "truth/scenario.yaml"}) {
@@ -90,7 +90,7 @@ TEST_F(Simulate, LeavesARecordingThatRunReadsWithItsTruth) {
   for (const auto& entry : fs::recursive_directory_iterator(path("rec/truth/disparity")))
     disparities += entry.is_regular_file() ? 1 : 0;
   EXPECT_EQ(disparities, 7);
-  EXPECT_EQ(content_of(path("rec"))["rig.yaml"], content_of(path("rec"))["truth/rig.yaml"]);
+  EXPECT_EQ(files_below(path("rec"))["rig.yaml"], files_below(path("rec"))["truth/rig.yaml"]);
   const ProgramResult run = run_program({"run", path("rec"), "-o", path("out"), "--truth", path("rec"), "--json"});
   ASSERT_EQ(run.exit_code == 0 || run.exit_code == 6, true) << run.err;
   EXPECT_EQ(nlohmann::json::parse(run.out)["frames"], 4);
@@ -123,18 +123,18 @@ TEST_F(Simulate, ElevationIsAGeoTiffWithTheGround) {
 TEST_F(Simulate, TheSameSeedGivesTheSameBytesWhateverTheThreads) {
   ASSERT_EQ(simulate("one", {"--threads", "1"}).exit_code, 0);
   ASSERT_EQ(simulate("two", {"--threads", "2"}).exit_code, 0);
-  const auto one = content_of(path("one")), two = content_of(path("two"));
+  const auto one = files_below(path("one")), two = files_below(path("two"));
   ASSERT_EQ(one.size(), two.size());
   for (const auto& [name, content] : one) EXPECT_TRUE(two.at(name) == content) << name;
   ASSERT_EQ(simulate("other", {"--seed", "2"}).exit_code, 0);
-  EXPECT_NE(content_of(path("other"))["truth/poses.tum"], one.at("truth/poses.tum"));
+  EXPECT_NE(files_below(path("other"))["truth/poses.tum"], one.at("truth/poses.tum"));
 }
 
 TEST_F(Simulate, AnotherNoiseSeedChangesTheImagesAlone) {
   write("noisy.yaml", std::string(kSmallScenario) + "\nsensor: {noise_seed: 3}\n");
   ASSERT_EQ(simulate("one").exit_code, 0);
   ASSERT_EQ(run_program({"simulate", path("noisy.yaml"), "-o", path("other")}).exit_code, 0);
-  const auto one = content_of(path("one")), other = content_of(path("other"));
+  const auto one = files_below(path("one")), other = files_below(path("other"));
   ASSERT_EQ(one.size(), other.size());
   for (const auto& [name, content] : other) {
     const bool image = name.starts_with("images/");
@@ -145,7 +145,7 @@ TEST_F(Simulate, AnotherNoiseSeedChangesTheImagesAlone) {
 
 TEST_F(Simulate, GoesOnAfterKillsAsIfNothingHadHappened) {
   ASSERT_EQ(simulate("whole").exit_code, 0);
-  const auto whole = content_of(path("whole"));
+  const auto whole = files_below(path("whole"));
   int cut_off = 0;
   for (int ms = 40; ms < 5000 && !fs::exists(path("killed/recording.yaml")); ms = ms * 3 / 2) {
     cut_off += simulate("killed", {"--resume"}, killed_after(ms)).signal == SIGKILL ? 1 : 0;
@@ -154,7 +154,7 @@ TEST_F(Simulate, GoesOnAfterKillsAsIfNothingHadHappened) {
   const ProgramResult resumed =
       fs::exists(path("killed/recording.yaml")) ? ProgramResult{0, 0, "", ""} : simulate("killed", {"--resume"});
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  const auto killed = content_of(path("killed"));
+  const auto killed = files_below(path("killed"));
   ASSERT_EQ(killed.size(), whole.size());
   for (const auto& [name, content] : whole) EXPECT_TRUE(killed.contains(name) && killed.at(name) == content) << name;
 }
@@ -176,11 +176,11 @@ TEST_F(Simulate, KeepsWhatWasDoneWhenTheDiskIsFull) {
   const ProgramResult full = simulate("rec", {}, full_disk);
   ASSERT_EQ(full.exit_code, 5) << full.err;
   EXPECT_THAT(full.err, HasSubstr("rec/"));
-  const auto before = content_of(path("rec"));
+  const auto before = files_below(path("rec"));
   EXPECT_FALSE(before.contains("recording.yaml"));
   ASSERT_EQ(simulate("rec", {"--resume"}).exit_code, 0);
   ASSERT_EQ(simulate("whole").exit_code, 0);
-  const auto whole = content_of(path("whole")), after = content_of(path("rec"));
+  const auto whole = files_below(path("whole")), after = files_below(path("rec"));
   ASSERT_EQ(after.size(), whole.size());
   for (const auto& [name, content] : whole) EXPECT_TRUE(after.at(name) == content) << name;
 }
@@ -220,10 +220,10 @@ TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
 
 TEST_F(Simulate, LeavesExistingFoldersAlone) {
   ASSERT_EQ(simulate("rec").exit_code, 0);
-  const auto before = content_of(path("rec"));
+  const auto before = files_below(path("rec"));
   EXPECT_EQ(simulate("rec").exit_code, 5);
   EXPECT_EQ(simulate("rec", {"--resume"}).exit_code, 5) << "it is whole";
-  EXPECT_EQ(content_of(path("rec")), before);
+  EXPECT_EQ(files_below(path("rec")), before);
   fs::remove(path("rec/recording.yaml"));
   const ProgramResult other = simulate("rec", {"--resume", "--seed", "9"});
   EXPECT_EQ(other.exit_code, 4);
@@ -238,7 +238,7 @@ TEST_F(Simulate, RecordsTheRigAsItIsBelieved) {
   write("small.yaml",
         std::string(kSmallScenario) + "nominal_rig: {yaw_deg: 0.02, row_offset_px: 0.3, focal_percent: 0.1}\n");
   ASSERT_EQ(simulate("rec").exit_code, 0);
-  auto files = content_of(path("rec"));
+  auto files = files_below(path("rec"));
   EXPECT_NE(files["rig.yaml"], files["truth/rig.yaml"]);
   EXPECT_THAT(files["rig.yaml"], HasSubstr("130.13"));
 }

@@ -20,7 +20,6 @@ using testing::expect_corrected;
 using ::testing::HasSubstr;
 using testing::ids;
 using ::testing::IsEmpty;
-using testing::kDegree;
 using testing::left_from_right;
 using ::testing::Not;
 using testing::simulate_matches;
@@ -77,8 +76,8 @@ TEST(InjectedFault, BaselineInOtherUnits) {
 
 TEST(InjectedFault, CamerasRotatedApart) {
   const Rig truth = true_rig();
-  const PairCheck result = check(with_pose(truth, Pose(exp_so3({0, 20 * kDegree, 0}), {0.11, 0, 0})), {});
-  EXPECT_THAT(ids(result), ElementsAre("eyes_apart", "not_enough_texture"));
+  const PairCheck result = check(with_pose(truth, Pose(exp_so3({0, 20 * kRadiansPerDegree, 0}), {0.11, 0, 0})), {});
+  EXPECT_THAT(ids(result), ElementsAre("large_rotation", "not_enough_texture"));
   EXPECT_EQ(result.grade, PairGrade::bad);
 }
 
@@ -162,7 +161,7 @@ TEST(InjectedFault, RowShift) {
     EXPECT_EQ(result.grade, PairGrade::bad);
     EXPECT_NEAR(focal_px(*result.corrected), focal_px(truth), 1e-9);
     // A pitch explains small shifts equally well: two rows are 0.25°.
-    expect_corrected(truth, result, std::max(0.4, std::abs(rows_px) / focal_px(truth) / kDegree + 0.15));
+    expect_corrected(truth, result, std::max(0.4, std::abs(rows_px) / focal_px(truth) / kRadiansPerDegree + 0.15));
   }
 }
 
@@ -195,11 +194,11 @@ TEST(InjectedFault, YawOfOneDegree) {
   for (const Rig& truth : {true_rig(), distortion_free_rig()}) {
     for (const double yaw_deg : {1.0, -1.0}) {
       PairCorrection off;
-      off.yaw_rad = yaw_deg * kDegree;
+      off.yaw_rad = yaw_deg * kRadiansPerDegree;
       const PairCheck result =
           check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), simulate_matches(truth));
       EXPECT_THAT(ids(result), ElementsAre("yaw_offset")) << yaw_deg;
-      EXPECT_NEAR(result.correction.yaw_rad / kDegree, -yaw_deg, 0.1);
+      EXPECT_NEAR(result.correction.yaw_rad / kRadiansPerDegree, -yaw_deg, 0.1);
       EXPECT_NEAR(result.findings.at(0).value, -yaw_deg, 0.1);
       EXPECT_THAT(result.findings.at(0).text, HasSubstr(yaw_deg > 0 ? "further to the left" : "further to the right"));
       EXPECT_EQ(result.grade, PairGrade::bad);
@@ -213,15 +212,15 @@ TEST(InjectedFault, YawOfHalfADegree) {
   const Rig truth = true_rig();
   const auto injected = [&](double yaw_deg) {
     PairCorrection off;
-    off.yaw_rad = yaw_deg * kDegree;
+    off.yaw_rad = yaw_deg * kRadiansPerDegree;
     return check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), simulate_matches(truth));
   };
   const PairCheck ambiguous = injected(-0.5);
-  EXPECT_THAT(ids(ambiguous), ElementsAre("rows_apart"));
+  EXPECT_THAT(ids(ambiguous), ElementsAre("row_residuals"));
   EXPECT_THAT(ambiguous.findings.at(0).text, HasSubstr("rows do not distinguish the two"));
   EXPECT_EQ(ambiguous.grade, PairGrade::usable);
   const Pose apart = left_from_right(truth).inverse() * left_from_right(*ambiguous.corrected);
-  EXPECT_NEAR(rotation_angle(apart) / kDegree, 0.5, 0.1);
+  EXPECT_NEAR(rotation_angle(apart) / kRadiansPerDegree, 0.5, 0.1);
   const PairCheck observable = injected(0.5);
   EXPECT_THAT(ids(observable), ElementsAre("yaw_offset"));
   EXPECT_THAT(observable.findings.at(0).text, HasSubstr("have negative disparity"));
@@ -310,7 +309,7 @@ TEST(InjectedFault, SwappedImagesAndYaw) {
   std::vector<PixelMatch> matches = simulate_matches(truth);
   for (PixelMatch& match : matches) std::swap(match.left, match.right);
   PairCorrection off;
-  off.yaw_rad = kDegree;
+  off.yaw_rad = kRadiansPerDegree;
   const PairCheck result = check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), matches);
   EXPECT_THAT(ids(result), Contains("swapped_eyes"));
   EXPECT_THAT(ids(result), Not(Contains("size_mismatch")));
@@ -375,7 +374,7 @@ TEST(InjectedFault, DistortionIgnoredInOneCamera) {
 TEST(InjectedFault, RollOfOneDegree) {
   const Rig truth = true_rig();
   PairCorrection off;
-  off.roll_rad = kDegree;
+  off.roll_rad = kRadiansPerDegree;
   const PairCheck result =
       check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), simulate_matches(truth));
   EXPECT_THAT(ids(result), ElementsAre("roll_offset"));
@@ -397,7 +396,7 @@ TEST(InjectedFault, BaselineDirection) {
 TEST(InjectedFault, CameraUpsideDown) {
   const Rig truth = true_rig();
   PairCorrection off;
-  off.roll_rad = 180 * kDegree;
+  off.roll_rad = 180 * kRadiansPerDegree;
   const Rig rig = with_pose(truth, corrected_left_from_right(left_from_right(truth), off));
   const PairCheck result = check(rig, simulate_matches(truth));
   EXPECT_EQ(result.grade, PairGrade::bad);
@@ -431,7 +430,7 @@ TEST(InjectedFault, UnrelatedImages) {
 TEST(InjectedFault, SameImageTwice) {
   std::vector<PixelMatch> matches = simulate_matches(distortion_free_rig());
   for (PixelMatch& match : matches) match.right = match.left;
-  EXPECT_THAT(ids(check(distortion_free_rig(), matches)), ElementsAre("same_picture"));
+  EXPECT_THAT(ids(check(distortion_free_rig(), matches)), ElementsAre("identical_images"));
 }
 
 // A correct rig is returned unchanged: corrections within their uncertainty would degrade range.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -13,6 +12,7 @@
 #include "spartan/calibration/internal/hypothesis_search.h"
 #include "spartan/calibration/internal/pair_correction.h"
 #include "spartan/calibration/internal/row_errors.h"
+#include "spartan/core/pose.h"
 
 namespace spartan {
 
@@ -20,8 +20,6 @@ using namespace internal;
 
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 constexpr int kMinMatches = 40;  // inliers for a check
 // Limits of the findings, and of the grade `usable` (PairGrade has those of `good`).
 constexpr double kRowOffset_px = 0.5, kRollOffset_px = 0.5, kFocalRatio = 0.003, kUsableMean_px = 1, kUsableP95_px = 3;
@@ -48,16 +46,16 @@ class Checker {
       : rig_(rig), pair_(pair), image_size_(image_size), guessed_(guessed) {
     check_.matches = static_cast<int>(matches.size());
     check_.findings = plausibility_findings(rig, pair, image_size);
-    if (found("not_beside") || too_few(check_.matches)) return;
+    if (found("not_side_by_side") || too_few(check_.matches)) return;
     fitted_ = find_hypothesis(*rig.find_camera(pair.left), *rig.find_camera(pair.right),
                               rig.right_from_left(pair).inverse(), matches, image_size, !guessed);
   }
 
   PairCheck run() && {
-    if (found("not_beside") || too_few(check_.matches)) return without_estimates();
+    if (found("not_side_by_side") || too_few(check_.matches)) return without_estimates();
     fill_statistics();
     if (has_identical_images()) {
-      add("same_picture",
+      add("identical_images",
           "both images are the same, without any disparity: check that they are from the left and the right camera",
           check_.inliers);
       return without_estimates();
@@ -117,7 +115,7 @@ class Checker {
   void check_focal_ratio();
   bool needs_correction() const;
   void apply_correction();
-  void report_rows_apart();
+  void report_row_residuals();
   static bool is_unusable(const RowErrors& rows);
   PairGrade grade() const;
   PairCheck finish();
@@ -352,11 +350,11 @@ void Checker::apply_correction() {
       rectify_matches(check_.corrected->find_camera(pair.left)->model, check_.corrected->find_camera(pair.right)->model,
                       check_.corrected->right_from_left(pair).inverse(), check_.inlier_matches);
   check_.corrected_rows = row_errors(seen.row_error_px);
-  if (check_.findings.empty()) report_rows_apart();
+  if (check_.findings.empty()) report_row_residuals();
 }
 
 // Row errors for which there is no other finding.
-void Checker::report_rows_apart() {
+void Checker::report_row_residuals() {
   constexpr double kImproved = 0.7;  // a correction explains them if it reduces the mean to this share
   const RowErrors fitted = row_errors(inliers_of(fit().rows.row_error_px, fit().inlier));
   std::string why;
@@ -370,7 +368,7 @@ void Checker::report_rows_apart() {
   } else {
     why = ", and no small correction reduces that: check the camera model, and for rolling shutter";
   }
-  add("rows_apart",
+  add("row_residuals",
       fmt::format("rows differ by {:.2f} px, 95 % below {:.2f} px{}", check_.nominal_rows.mean_px,
                   check_.nominal_rows.p95_px, why),
       check_.nominal_rows.mean_px);
@@ -383,7 +381,7 @@ bool Checker::is_unusable(const RowErrors& rows) {
 
 PairGrade Checker::grade() const {
   for (const char* id :
-       {"not_beside", "inverse_transform", "swapped_eyes", "size_mismatch", "distortion_ignored", "yaw_offset"}) {
+       {"not_side_by_side", "inverse_transform", "swapped_eyes", "size_mismatch", "distortion_ignored", "yaw_offset"}) {
     if (found(id)) return PairGrade::bad;
   }
   // A baseline of some metres is unusual, but large rigs have it: bad only where another unit is likely.

@@ -80,12 +80,12 @@ struct PairCheck {
 /// - `inverse_transform`, `swapped_eyes`, `size_mismatch`, `distortion_ignored`: gross errors (hypothesis search);
 /// - `row_offset`: median row error above 0.5 px;
 /// - `roll_offset`: roll of more than 0.5 px over half the image width;
-/// - `rows_apart`: rows worse than those of a good pair, without another finding;
+/// - `row_residuals`: rows worse than those of a good pair, without another finding;
 /// - `yaw_offset`: yaw beyond 2.6 standard deviations, or one that explains negative disparities. Rows observe yaw only
 ///   by the pattern x y, which lens decentering imitates;
 /// - `focal_ratio`: focal lengths inconsistent by more than 0.3 %;
 /// - `not_enough_texture`: fewer than 40 inliers, or inliers in fewer than a quarter of the image cells;
-/// - `same_picture`: both images are the same;
+/// - `identical_images`: both images are the same;
 /// - `not_explained`: no hypothesis makes the rows agree: images of different times, places or rigs.
 PairCheck check_pair(const Rig& rig, const StereoPair& pair, const std::vector<PixelMatch>& matches,
                      ImageSize image_size);

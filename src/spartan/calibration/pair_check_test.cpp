@@ -5,6 +5,7 @@
 #include "spartan/calibration/internal/model_modification.h"
 #include "spartan/calibration/internal/pair_refinement.h"
 #include "spartan/calibration/internal/simulated_pair_matches_test.h"
+#include "spartan/core/pose.h"
 
 namespace spartan {
 
@@ -115,7 +116,7 @@ TEST(PairCheck, DistantScenesDoNotRevealSwappedCameras) {
   }
   for (const double yaw_deg : {0.0, 0.05, 0.1}) {
     PairCorrection off;
-    off.yaw_rad = yaw_deg * testing::kDegree;
+    off.yaw_rad = yaw_deg * kRadiansPerDegree;
     const PairCheck result = check(with_pose(truth, corrected_left_from_right(left_from_right(truth), off)), far);
     EXPECT_THAT(ids(result), IsEmpty()) << yaw_deg;
   }
@@ -129,15 +130,15 @@ TEST(PairCheck, FindingsAppearAtTheirLimits) {
     rig.cameras[1].model = with_row_offset(with_scaled_focal_length(rig.cameras[1].model, off.focal_ratio), rows_px);
     return ids(check(rig, simulate_matches(truth, 1500)));
   };
-  constexpr double kDegree = testing::kDegree;
   EXPECT_THAT(with({}, 0.4), IsEmpty());
   EXPECT_THAT(with({}, 0.5), ElementsAre("row_offset")) << "0.57 px after undistortion";
-  EXPECT_THAT(with({.roll_rad = 0.05 * kDegree}, 0.8), ElementsAre("row_offset")) << "0.33 px at the sides";
-  EXPECT_THAT(with({.roll_rad = 0.10 * kDegree}, 0.8), ElementsAre("row_offset", "roll_offset")) << "0.66 px";
+  EXPECT_THAT(with({.roll_rad = 0.05 * kRadiansPerDegree}, 0.8), ElementsAre("row_offset")) << "0.33 px at the sides";
+  EXPECT_THAT(with({.roll_rad = 0.10 * kRadiansPerDegree}, 0.8), ElementsAre("row_offset", "roll_offset")) << "0.66 px";
   EXPECT_THAT(with({.focal_ratio = 1.0022}, 0), IsEmpty());
   EXPECT_THAT(with({.focal_ratio = 1.0040}, 0), ElementsAre("focal_ratio"));
-  EXPECT_THAT(with({.yaw_rad = -0.75 * kDegree}, 0), ElementsAre("rows_apart")) << "may be lens decentering";
-  EXPECT_THAT(with({.yaw_rad = -0.95 * kDegree}, 0), ElementsAre("yaw_offset"));
+  EXPECT_THAT(with({.yaw_rad = -0.75 * kRadiansPerDegree}, 0), ElementsAre("row_residuals"))
+      << "may be lens decentering";
+  EXPECT_THAT(with({.yaw_rad = -0.95 * kRadiansPerDegree}, 0), ElementsAre("yaw_offset"));
 }
 
 // Small distortion is not reported for a pinhole.

@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
+#include "spartan/core/pose.h"
 #include "spartan/testing/synthetic_world.h"
 
 namespace spartan {
@@ -17,7 +17,6 @@ using ::testing::Contains;
 using ::testing::Field;
 using ::testing::HasSubstr;
 
-constexpr double kDegree = std::numbers::pi / 180;
 const RectifiedStereo kStereo{{640, 480}, 520.0, {319.5, 239.5}, 0.12};
 
 // The rig whose images the synthetic world renders, with the right camera pitched by an angle.
@@ -68,11 +67,11 @@ TEST_F(PairInspectionOfImages, FindsNoFaultInATrueCalibration) {
 }
 
 TEST_F(PairInspectionOfImages, FindsAndCorrectsAPitch) {
-  const Rig rig = rig_with_pitch(0.3 * kDegree);
+  const Rig rig = rig_with_pitch(0.3 * kRadiansPerDegree);
   const auto result = inspect_pair(rig, rig.pairs.front(), views_, ThreadPool(1));
   ASSERT_TRUE(result) << result.error().message();
   EXPECT_THAT(result->check.findings, Contains(Field(&RigFinding::id, "row_offset")));
-  EXPECT_NEAR(std::abs(result->check.correction.pitch_rad), 0.3 * kDegree, 0.02 * kDegree);
+  EXPECT_NEAR(std::abs(result->check.correction.pitch_rad), 0.3 * kRadiansPerDegree, 0.02 * kRadiansPerDegree);
   ASSERT_TRUE(result->check.corrected);
   const auto again = inspect_pair(*result->check.corrected, rig.pairs.front(), views_, ThreadPool(1));
   ASSERT_TRUE(again) << again.error().message();

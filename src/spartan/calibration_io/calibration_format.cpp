@@ -9,12 +9,12 @@
 namespace spartan {
 namespace {
 
-struct Kind {
+struct FormatKind {
   CalibrationFormat format;
   std::string_view name;
   bool file_per_camera, image_size;
 };
-constexpr std::array<Kind, 10> kKinds{{
+constexpr std::array<FormatKind, 10> kKinds{{
     {CalibrationFormat::rig_yaml, "rig.yaml", false, true},
     {CalibrationFormat::kitti, "kitti", false, false},
     {CalibrationFormat::kitti_raw, "kitti-raw", false, true},
@@ -28,7 +28,7 @@ constexpr std::array<Kind, 10> kKinds{{
 }};
 static_assert(kKinds[static_cast<std::size_t>(CalibrationFormat::cahvor)].format == CalibrationFormat::cahvor);
 
-const Kind& kind_of(CalibrationFormat format) {
+const FormatKind& kind_of(CalibrationFormat format) {
   return kKinds[static_cast<std::size_t>(format)];
 }
 
@@ -52,7 +52,7 @@ std::string_view name_of(CalibrationFormat format) {
 }
 
 std::optional<CalibrationFormat> calibration_format_named(std::string_view name) {
-  for (const Kind& kind : kKinds) {
+  for (const FormatKind& kind : kKinds) {
     if (kind.name == name) return kind.format;
   }
   return std::nullopt;
@@ -61,7 +61,7 @@ std::optional<CalibrationFormat> calibration_format_named(std::string_view name)
 std::vector<std::string_view> calibration_format_names() {
   std::vector<std::string_view> names;
   names.reserve(kKinds.size());
-  for (const Kind& kind : kKinds) names.push_back(kind.name);
+  for (const FormatKind& kind : kKinds) names.push_back(kind.name);
   return names;
 }
 

@@ -45,10 +45,10 @@ std::vector<fs::path> companion_files(CalibrationFormat format, const fs::path& 
     case CalibrationFormat::opencv:
       return {"intrinsics" + file.extension().string(), "extrinsics" + file.extension().string()};
     case CalibrationFormat::euroc: {
-      constexpr int kMaxCameras = 100;
+      constexpr int kMaxFolders = 100;
       std::vector<fs::path> cameras;
-      cameras.reserve(kMaxCameras);
-      for (int i = 0; i < kMaxCameras; ++i) cameras.push_back(fs::path(fmt::format("cam{}", i)) / "sensor.yaml");
+      cameras.reserve(kMaxFolders);
+      for (int i = 0; i < kMaxFolders; ++i) cameras.push_back(fs::path(fmt::format("cam{}", i)) / "sensor.yaml");
       return cameras;
     }
     default:

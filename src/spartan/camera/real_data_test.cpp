@@ -14,7 +14,7 @@ struct Counts {
   int frames = 0, missing = 0, imu = 0;
 };
 
-Counts collect_samples(FrameSource& source) {
+Counts count_samples(FrameSource& source) {
   Counts counts;
   for (;;) {
     auto sample = source.next();
@@ -49,7 +49,7 @@ TEST_P(RealData, MatchesItsReadme) {
   EXPECT_FALSE(info.truth_file.empty());
   ASSERT_EQ(info.rig.cameras.size(), 2U);
   EXPECT_EQ(info.rig.cameras[0].size, expected.size);
-  const Counts counts = collect_samples(**source);
+  const Counts counts = count_samples(**source);
   EXPECT_EQ(counts.frames, expected.counts.frames);
   EXPECT_EQ(counts.missing, 0);
   EXPECT_EQ(counts.imu, expected.counts.imu);

@@ -285,7 +285,7 @@ struct FilterOptions {
     v.field("filter", filter, "how disparities are filtered");
     v.renamed("radius", "radius_px");
     v.field("radius_px", radius_px, "half the window", between(1, 9));
-    v.field("weights", weights, "of three neighbors", between(0, 10));
+    v.field("weights", weights, "of three neighbours", between(0, 10));
     v.renamed("islands", "speckle");
     v.group("speckle", speckle);
   }

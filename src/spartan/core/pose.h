@@ -8,8 +8,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <numbers>
 
 namespace spartan {
+
+inline constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+inline constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 /// The skew-symmetric matrix [v]× with [v]× w = v × w.
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);

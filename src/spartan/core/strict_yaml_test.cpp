@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-YamlNode parse(const std::string& text) {
+YamlNode parse_node(const std::string& text) {
   return parse_yaml(text, "a.yaml").value();
 }
 std::string parse_error(const std::string& text) {
@@ -24,7 +24,7 @@ std::string parse_error(const std::string& text) {
 template <class Read>
 std::string errors_of(const std::string& text, const Read& read) {
   YamlErrors errors("a.yaml");
-  YamlMap map(parse(text), "", errors);
+  YamlMap map(parse_node(text), "", errors);
   read(map);
   map.reject_unknown_keys();
   const Status status = errors.status();
@@ -32,7 +32,7 @@ std::string errors_of(const std::string& text, const Read& read) {
 }
 
 TEST(ParseYaml, BuildsATreeWithLines) {
-  const YamlNode root = parse("# comment\nname: 'a b'\nlist:\n  - 1\n  - [x, ~]\nempty:\n");
+  const YamlNode root = parse_node("# comment\nname: 'a b'\nlist:\n  - 1\n  - [x, ~]\nempty:\n");
   ASSERT_TRUE(root.is_map());
   ASSERT_EQ(root.entries().size(), 3U);
   EXPECT_EQ(root.entries()[0].key.scalar(), "name");
@@ -45,9 +45,9 @@ TEST(ParseYaml, BuildsATreeWithLines) {
   EXPECT_EQ(list.items()[1].items()[0].scalar(), "x");
   EXPECT_TRUE(list.items()[1].items()[1].is_null());
   EXPECT_TRUE(root.entries()[2].value.is_null());
-  EXPECT_TRUE(parse("").is_null());
-  EXPECT_TRUE(parse("---\n").is_null());
-  EXPECT_EQ(parse("first\n---\nsecond\n").scalar(), "first");
+  EXPECT_TRUE(parse_node("").is_null());
+  EXPECT_TRUE(parse_node("---\n").is_null());
+  EXPECT_EQ(parse_node("first\n---\nsecond\n").scalar(), "first");
 }
 
 TEST(ParseYaml, InvalidTextIsReportedWithItsLine) {
@@ -59,14 +59,14 @@ TEST(ParseYaml, InvalidTextIsReportedWithItsLine) {
 }
 
 TEST(ParseYaml, AliasesShareTheirAnchor) {
-  const YamlNode root = parse("a: &x [1, 2]\nb: *x\n");
+  const YamlNode root = parse_node("a: &x [1, 2]\nb: *x\n");
   EXPECT_EQ(root.entries()[1].value.items().at(1).scalar(), "2");
   EXPECT_THAT(parse_error("a: &x [1, *x]\n"), HasSubstr("a.yaml:1: not valid YAML: "));
   EXPECT_THAT(parse_error("a: *none\n"), HasSubstr("a.yaml:1: not valid YAML: "));
   // Aliases of aliases: each level doubles the number of values that a full expansion would have.
   std::string doubling = "a0: &a0 [1, 1]\n";
   for (int i = 1; i < 60; ++i) doubling += fmt::format("a{0}: &a{0} [*a{1}, *a{1}]\n", i, i - 1);
-  EXPECT_EQ(parse(doubling).entries().size(), 60U);
+  EXPECT_EQ(parse_node(doubling).entries().size(), 60U);
   std::string nested = "a0: &a0 [1]\n";
   for (int i = 1; i < 5000; ++i) nested += fmt::format("a{0}: &a{0} [*a{1}]\n", i, i - 1);
   EXPECT_THAT(parse_error(nested), HasSubstr("nested too deeply"));
@@ -75,7 +75,7 @@ TEST(ParseYaml, AliasesShareTheirAnchor) {
 
 TEST(YamlMap, GettersReturnValues) {
   YamlErrors errors("a.yaml");
-  YamlMap map(parse("t: word\nb: False\nx: +1.5e1\ni: 3.0\nl: [1, -2]\nc: red\nn: {k: 7}\n"), "", errors);
+  YamlMap map(parse_node("t: word\nb: False\nx: +1.5e1\ni: 3.0\nl: [1, -2]\nc: red\nn: {k: 7}\n"), "", errors);
   EXPECT_EQ(map.text("t"), "word");
   EXPECT_EQ(map.boolean("b"), false);
   EXPECT_EQ(map.number("x"), 15.0);
@@ -132,7 +132,7 @@ TEST(YamlMap, StructureOfMapsIsChecked) {
 
 TEST(YamlMap, FormerNamesAreRenamed) {
   YamlErrors errors("a.yaml");
-  YamlMap map(parse("x: 1\nold: wide\nboth: 1\nformer: 2\n"), "", errors);
+  YamlMap map(parse_node("x: 1\nold: wide\nboth: 1\nformer: 2\n"), "", errors);
   EXPECT_TRUE(map.rename("old", "new"));
   EXPECT_FALSE(map.rename("absent", "x"));
   EXPECT_FALSE(map.rename("former", "both"));
@@ -165,7 +165,7 @@ TEST(YamlErrors, AreSortedByLineAndLimited) {
 
 TEST(YamlErrors, TextOfACommandLineHasNoLines) {
   YamlErrors errors("--set a=x", false);
-  YamlMap map(YamlNode::map_of({{YamlNode::text("a"), parse("x")}}), "", errors);
+  YamlMap map(YamlNode::map_of({{YamlNode::text("a"), parse_node("x")}}), "", errors);
   EXPECT_FALSE(map.number("a"));
   EXPECT_EQ(errors.status().error().message(), "--set a=x: a: 'x' is not a number");
 }
@@ -181,7 +181,7 @@ TEST(ParseFiniteNumber, RequiresThatTheWholeTextIsANumber) {
 
 RC_GTEST_PROP(YamlQuoted, RoundTrips, ()) {
   const auto text = *rc::gen::container<std::string>(rc::gen::inRange<char>(' ', 127));
-  const YamlNode root = parse("a: " + yaml_quoted(text) + "\n");
+  const YamlNode root = parse_node("a: " + yaml_quoted(text) + "\n");
   RC_ASSERT(root.entries().at(0).value.scalar() == text);
 }
 

@@ -7,7 +7,6 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -95,10 +94,6 @@ void ThreadPool::parallel_invoke(const std::function<void()>& first, const std::
     return;
   }
   arena_->run(2, [&](int part) { part == 0 ? first() : second(); });
-}
-
-void limit_third_party_threads(int threads) {
-  cv::setNumThreads(threads);
 }
 
 }  // namespace spartan

@@ -26,7 +26,4 @@ class ThreadPool {
   std::shared_ptr<Arena> arena_;
 };
 
-/// Limits the threads of third-party libraries (OpenCV) in the whole process; called once by the program.
-void limit_third_party_threads(int threads);
-
 }  // namespace spartan

@@ -86,11 +86,11 @@ TEST(DisparityTruth, ReadsEveryFormat) {
   eight(1, 0) = 90;
   Image<std::uint16_t> sixteen(2, 1);
   sixteen(1, 0) = 2600;
-  Image<Rgb8> grey_rgb(2, 1);
-  grey_rgb(1, 0) = {90, 90, 90};
+  Image<Rgb8> gray_rgb(2, 1);
+  gray_rgb(1, 0) = {90, 90, 90};
   ASSERT_TRUE(write_png(folder.file("8.png"), eight));
   ASSERT_TRUE(write_png(folder.file("16.png"), sixteen));
-  ASSERT_TRUE(write_png(folder.file("rgb.png"), grey_rgb));
+  ASSERT_TRUE(write_png(folder.file("rgb.png"), gray_rgb));
   ASSERT_TRUE(write_pfm(folder.file("a.pfm"), row_of({kHole, 12.25F})));
   const auto expect = [&](const char* name, double scale, float value) {
     const auto truth = read_disparity(folder.file(name), scale);

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
+#include "spartan/core/pose.h"
 #include "spartan/eval/internal/association.h"
 
 namespace spartan {
@@ -12,8 +12,6 @@ namespace spartan {
 using namespace internal;
 
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 bool has_rotation(const Trajectory& trajectory) {
   return std::any_of(trajectory.begin(), trajectory.end(),
@@ -78,7 +76,7 @@ SegmentErrors segment_errors(const Trajectory& estimate, const Trajectory& truth
   }
   if (errors.count > 0) {
     errors.translation_percent = 100.0 * translation / errors.count;
-    errors.rotation_deg_per_m = kDegrees * rotation / errors.count;
+    errors.rotation_deg_per_m = kDegreesPerRadian * rotation / errors.count;
   }
   return errors;
 }
@@ -91,7 +89,7 @@ void add_relative_errors(TrajectoryMetrics& metrics, const Trajectory& estimate,
     if (truth_has_rotation) {
       const Pose error = relative_error(estimate, truth, i, i + delta);
       translations.push_back(error.translation().norm());
-      rotations.push_back(kDegrees * rotation_angle(error));
+      rotations.push_back(kDegreesPerRadian * rotation_angle(error));
     } else {
       const auto displacement = [&](const Trajectory& t) -> Eigen::Vector3d {
         return t[i + delta].pose.translation() - t[i].pose.translation();
@@ -135,9 +133,10 @@ ErrorStatistics statistics_of(std::vector<double> errors) {
   return result;
 }
 
-void use_kitti_segments(TrajectoryMetricsOptions& options) {
+TrajectoryMetricsOptions with_kitti_segments(TrajectoryMetricsOptions options) {
   options.segment_lengths_m = {100, 200, 300, 400, 500, 600, 700, 800};
   options.segment_step = 10;
+  return options;
 }
 
 Result<TrajectoryMetrics> compare_trajectories(const Trajectory& estimate, const Trajectory& truth,

@@ -59,8 +59,8 @@ struct TrajectoryMetricsOptions {
   int segment_step = 1;      ///< frames between the starts of consecutive segments
   int rpe_delta_frames = 1;  ///< frames between the two poses of a relative pose error
 };
-/// Sets the segments of the KITTI odometry benchmark: 100, 200 … 800 m, starting at every 10th frame.
-void use_kitti_segments(TrajectoryMetricsOptions& options);
+/// The options with the segments of the KITTI odometry benchmark: 100, 200 … 800 m, starting at every 10th frame.
+TrajectoryMetricsOptions with_kitti_segments(TrajectoryMetricsOptions options);
 
 /// A metric that could not be computed, by its name in the JSON output, and the reason.
 struct MissingMetric {

@@ -62,7 +62,7 @@ TEST(ErrorStatistics, OfShortLists) {
   EXPECT_THROW(statistics_of({}), std::invalid_argument);
 }
 
-// Straight for 20 m in steps of 1 m; the estimate is 2 % too long and turns 0.1° about z per meter.
+// Straight for 20 m in steps of 1 m; the estimate is 2 % too long and turns 0.1° about z per metre.
 Drive straight_drive() {
   Drive drive;
   const double turn = 0.1 * std::numbers::pi / 180;
@@ -153,9 +153,9 @@ SegmentErrors brute_force_segments(const Drive& drive, double length, int step) 
 TEST(TrajectoryMetrics, SegmentsAgreeWithBruteForce) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Drive drive = noisy_drive(seed, 1600);
-    TrajectoryMetricsOptions every, kitti;
-    every.alignment = kitti.alignment = Alignment::none;
-    use_kitti_segments(kitti);
+    TrajectoryMetricsOptions every;
+    every.alignment = Alignment::none;
+    const TrajectoryMetricsOptions kitti = with_kitti_segments(every);
     for (const auto& options : {every, kitti}) {
       const TrajectoryMetrics m = compare(drive, options);
       ASSERT_EQ(m.segments->size(), options.segment_lengths_m.size());

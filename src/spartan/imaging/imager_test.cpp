@@ -14,12 +14,12 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr ImageSize kSize{64, 48};
+constexpr ImageSize kImageSize{64, 48};
 
 Camera camera(const std::string& name, PixelFormat format, const CameraModel& model = PinholeModel{60, 60, 32, 24}) {
   Camera result;
   result.name = name;
-  result.size = kSize;
+  result.size = kImageSize;
   result.model = model;
   result.pixel_format = format;
   return result;
@@ -32,9 +32,9 @@ Rig rig_with(const PixelFormat& format, const Eigen::Vector3d& rotation = Eigen:
 
 template <class T>
 Image<T> ramp(int factor) {
-  Image<T> image(kSize);
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) image(x, y) = static_cast<T>((x + y) * factor);
+  Image<T> image(kImageSize);
+  for (int y = 0; y < kImageSize.height; ++y) {
+    for (int x = 0; x < kImageSize.width; ++x) image(x, y) = static_cast<T>((x + y) * factor);
   }
   return image;
 }
@@ -59,8 +59,8 @@ TEST(Imager, ARectifiedPairIsNotChanged) {
   const auto pair =
       imager->process(frame_of(FrameImage::borrow(left.view(), {}), FrameImage::borrow(right.view(), {})));
   ASSERT_TRUE(pair) << pair.error().message();
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) {
+  for (int y = 0; y < kImageSize.height; ++y) {
+    for (int x = 0; x < kImageSize.width; ++x) {
       ASSERT_EQ(pair->left(x, y), left(x, y));
       ASSERT_EQ(pair->right(x, y), right(x, y));
     }
@@ -83,9 +83,9 @@ TEST(Imager, EveryDepthAndLayoutGivesTheSameWorkingImage) {
   };
   const PixelFormat bayer12{PixelLayout::bayer_grbg, 12, BitAlignment::high}, rgb16{PixelLayout::rgb, 16},
       gray10{PixelLayout::gray, 10};
-  Image<Rgb16> colour(kSize);
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) {
+  Image<Rgb16> colour(kImageSize);
+  for (int y = 0; y < kImageSize.height; ++y) {
+    for (int x = 0; x < kImageSize.width; ++x) {
       const auto level = static_cast<std::uint16_t>((x + y) * 300);
       colour(x, y) = {level, level, level};
     }
@@ -94,8 +94,8 @@ TEST(Imager, EveryDepthAndLayoutGivesTheSameWorkingImage) {
   const auto gray = working_image(gray10, FrameImage::own(ramp<std::uint16_t>(7), gray10));
   const auto rgb = working_image(rgb16, FrameImage::own(std::move(colour), rgb16));
   const auto bayer = working_image(bayer12, FrameImage::own(ramp<std::uint16_t>(30 * 16), bayer12));
-  for (int y = 1; y + 1 < kSize.height; ++y) {
-    for (int x = 1; x + 1 < kSize.width; ++x) {
+  for (int y = 1; y + 1 < kImageSize.height; ++y) {
+    for (int x = 1; x + 1 < kImageSize.width; ++x) {
       ASSERT_NEAR(gray(x, y), plain(x, y), 1);
       ASSERT_NEAR(rgb(x, y), plain(x, y), 1);
       ASSERT_NEAR(bayer(x, y), plain(x, y), 3);
@@ -128,9 +128,9 @@ TEST(Imager, RgbImagesOfAGrayCameraBecomeGray) {
   auto imager = Imager::create(rig_with({}), {}, ThreadPool(1));
   ASSERT_TRUE(imager);
   const auto gray = ramp<std::uint8_t>(2);
-  Image<Rgb8> colour(kSize);
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) colour(x, y) = {gray(x, y), gray(x, y), gray(x, y)};
+  Image<Rgb8> colour(kImageSize);
+  for (int y = 0; y < kImageSize.height; ++y) {
+    for (int x = 0; x < kImageSize.width; ++x) colour(x, y) = {gray(x, y), gray(x, y), gray(x, y)};
   }
   const auto from_gray =
       imager->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::borrow(gray.view(), {})));
@@ -139,8 +139,8 @@ TEST(Imager, RgbImagesOfAGrayCameraBecomeGray) {
   const auto from_colour =
       imager->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::own(std::move(colour), rgb)));
   ASSERT_TRUE(from_colour) << from_colour.error().message();
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) ASSERT_EQ(from_colour->right(x, y), expected(x, y));
+  for (int y = 0; y < kImageSize.height; ++y) {
+    for (int x = 0; x < kImageSize.width; ++x) ASSERT_EQ(from_colour->right(x, y), expected(x, y));
   }
   EXPECT_FALSE(Imager::create(rig_with(rgb), {}, ThreadPool(1))
                    ->process(frame_of(FrameImage::borrow(gray.view(), {}), FrameImage::borrow(gray.view(), {}))));
@@ -148,8 +148,8 @@ TEST(Imager, RgbImagesOfAGrayCameraBecomeGray) {
 
 TEST(Imager, LoadsSelfMasks) {
   const testing::TemporaryFolder folder;
-  Image<std::uint8_t> mask(kSize.width, kSize.height, 255);
-  for (int x = 0; x < kSize.width; ++x) mask(x, 47) = 0;
+  Image<std::uint8_t> mask(kImageSize.width, kImageSize.height, 255);
+  for (int x = 0; x < kImageSize.width; ++x) mask(x, 47) = 0;
   ASSERT_TRUE(write_png(folder.file("masks/left.png"), mask.view()));
   const auto good = FrameImage::own(ramp<std::uint8_t>(1), {});
   for (const bool rotated : {false, true}) {
@@ -174,11 +174,11 @@ TEST(Imager, LoadsSelfMasks) {
 // Both cameras see the same, except for the rover's body at the lower border of the right image.
 TEST(Imager, TheSelfMaskIsExcludedFromGainCompensation) {
   const testing::TemporaryFolder folder;
-  Image<std::uint8_t> scene(kSize), with_body(kSize), mask(kSize.width, kSize.height, 255);
+  Image<std::uint8_t> scene(kImageSize), with_body(kImageSize), mask(kImageSize.width, kImageSize.height, 255);
   for (const double fraction : {0.1, 0.2, 0.3}) {
-    for (int y = 0; y < kSize.height; ++y) {
-      for (int x = 0; x < kSize.width; ++x) {
-        const bool body = y >= (1 - fraction) * kSize.height;
+    for (int y = 0; y < kImageSize.height; ++y) {
+      for (int x = 0; x < kImageSize.width; ++x) {
+        const bool body = y >= (1 - fraction) * kImageSize.height;
         scene(x, y) = static_cast<std::uint8_t>(90 + (x * 37 + y * 11) % 101);
         with_body(x, y) = body ? 25 : scene(x, y);
         mask(x, y) = body ? 0 : 255;
@@ -210,8 +210,8 @@ TEST(Imager, PixelsOutsideOfTheViewDoNotAffectTheContrast) {
   ASSERT_TRUE(imager) << imager.error().message();
   const auto seen_with = [&](int surround) {
     auto pixels = ramp<std::uint8_t>(1);
-    for (int y = 0; y < kSize.height; ++y) {
-      for (int x = 0; x < kSize.width; ++x) {
+    for (int y = 0; y < kImageSize.height; ++y) {
+      for (int x = 0; x < kImageSize.width; ++x) {
         if (std::hypot(x - 31.5, y - 23.5) > 33) pixels(x, y) = static_cast<std::uint8_t>(surround);
       }
     }
@@ -219,8 +219,8 @@ TEST(Imager, PixelsOutsideOfTheViewDoNotAffectTheContrast) {
     return Image<std::uint8_t>::copy_of(imager->process(frame_of(image, image))->left);
   };
   const auto black = seen_with(0), white = seen_with(255);
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) ASSERT_EQ(black(x, y), white(x, y)) << x << ", " << y;
+  for (int y = 0; y < kImageSize.height; ++y) {
+    for (int x = 0; x < kImageSize.width; ++x) ASSERT_EQ(black(x, y), white(x, y)) << x << ", " << y;
   }
 }
 
@@ -261,7 +261,7 @@ TEST(Imager, RejectsAViewThatACameraDoesNotSee) {
                         {}),
               HasSubstr("camera 'left' sees 0.0 % of the view"));
   const testing::TemporaryFolder folder;
-  ASSERT_TRUE(write_png(folder.file("all.png"), Image<std::uint8_t>(kSize).view()));
+  ASSERT_TRUE(write_png(folder.file("all.png"), Image<std::uint8_t>(kImageSize).view()));
   for (const double rotation : {0.0, 0.02}) {
     Rig rig = rig_with({}, {0, rotation, 0});
     rig.cameras[1].self_mask = "all.png";
@@ -276,7 +276,7 @@ TEST(Imager, CorrectsTheVignetting) {
   Rig rig = rig_with({});
   ImagingOptions options;
   options.contrast = options.gain_compensation = false;
-  const auto flat = FrameImage::own(Image<std::uint8_t>(kSize.width, kSize.height, 100), {});
+  const auto flat = FrameImage::own(Image<std::uint8_t>(kImageSize.width, kImageSize.height, 100), {});
   const auto corner = [&](bool undo) -> int {
     options.vignetting = undo;
     auto imager = Imager::create(rig, options, ThreadPool(2));

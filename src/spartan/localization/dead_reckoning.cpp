@@ -1,7 +1,7 @@
-#include "spartan/localization/dead_reckoning.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "spartan/localization/localizer.h"
 
 namespace spartan {
 namespace {

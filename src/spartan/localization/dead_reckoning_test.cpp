@@ -1,5 +1,3 @@
-#include "spartan/localization/dead_reckoning.h"
-
 #include <gtest/gtest.h>
 
 #include "spartan/localization/internal/drive_test.h"
@@ -12,10 +10,10 @@ using namespace internal;
 namespace {
 
 // The filter of the same model, with nothing to correct it, is the oracle.
-TEST(DeadReckoning, IsTheCovarianceOfTheFilterThatHearsVisionAlone) {
+TEST(DeadReckoning, HasTheCovarianceOfAVisionOnlyFilter) {
   const TestDrive drive;
   const LocalizationOptions options;  // with errors that last
-  VisionOnlyFilter track(options);
+  VisionOnlyFilter track = VisionOnlyFilter::create(options).value();
   track.start(test_stamp(2.5), Pose());
   DeadReckoning reckoned(options.vision);
   int compared = 0;

@@ -1,5 +1,7 @@
 #include "spartan/localization/localizer.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 
@@ -55,7 +57,16 @@ struct Localizer::State {
   std::array<RefusalCounts, kLocalizationSensors> refusals;
 };
 
-Localizer::Localizer(const LocalizationOptions& options) : state_(std::make_unique<State>(options)) {}
+Result<Localizer> Localizer::create(const LocalizationOptions& options) {
+  if (Status valid = validate(options, "localization options"); !valid) return failure(valid);
+  if (!(options.gravity_m_s2 > 0) || !std::isfinite(options.gravity_m_s2)) {
+    return failure(ErrorCode::configuration, fmt::format("{} is not a positive number", options.gravity_m_s2),
+                   "localization options: gravity_m_s2");
+  }
+  return Localizer(std::make_unique<State>(options));
+}
+
+Localizer::Localizer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Localizer::Localizer(Localizer&&) noexcept = default;
 Localizer& Localizer::operator=(Localizer&&) noexcept = default;
 Localizer::~Localizer() = default;

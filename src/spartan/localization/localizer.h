@@ -198,7 +198,8 @@ struct LocalizationEstimate {
 /// in that world are estimated.
 class Localizer {
  public:
-  explicit Localizer(const LocalizationOptions& options);
+  /// Code `configuration` where an option is out of bounds.
+  static Result<Localizer> create(const LocalizationOptions& options);
   Localizer(Localizer&&) noexcept;
   Localizer& operator=(Localizer&&) noexcept;
   ~Localizer();
@@ -225,6 +226,7 @@ class Localizer {
 
  private:
   struct State;
+  explicit Localizer(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 
@@ -233,7 +235,8 @@ class Localizer {
 /// "Vision").
 class VisionOnlyFilter {
  public:
-  explicit VisionOnlyFilter(const LocalizationOptions& options) : localizer_(options) {}
+  /// Code `configuration` where an option is out of bounds.
+  static Result<VisionOnlyFilter> create(const LocalizationOptions& options);
 
   void start(Stamp stamp, const Pose& world_from_body);
   /// As Localizer::add.
@@ -247,8 +250,40 @@ class VisionOnlyFilter {
   Status restore(const Bytes& bytes);
 
  private:
+  explicit VisionOnlyFilter(Localizer localizer) : localizer_(std::move(localizer)) {}
   Localizer localizer_;
   Pose world_from_own_;  // between the worlds: the own one always starts level and ahead
+};
+
+/// Propagates the covariance of a pose that is the product of motions, with the errors that last: white noise n and two
+/// first-order Gauss–Markov processes z₁ and z₂ in units of each motion's standard deviations D,
+///
+///     ξ' = Ad(M⁻¹) ξ + D (z₁ + z₂) + n
+///
+/// (docs/math/localization.md, "Vision"). Nothing is estimated: a fixed amount of arithmetic for each motion. Equals
+/// the covariance of VisionOnlyFilter without constraints to first order; where vision is lost, the motion's own
+/// covariance counts.
+class DeadReckoning {
+ public:
+  explicit DeadReckoning(const VisionOptions& options);
+
+  /// The next motion; each begins where the last one ended.
+  void add(const RelativeMotion& motion);
+  /// Of the right perturbation of the pose since the start, which is exact; order (translation, rotation).
+  Matrix6d covariance() const { return covariance_.topLeftCorner<6, 6>(); }
+
+  /// The memory as a versioned value. Code `store_damaged` where it is not one.
+  Bytes save() const;
+  Status restore(const Bytes& bytes);
+
+ private:
+  static constexpr int kSize = 18;  // ξ, z₁, z₂
+  using Covariance = Eigen::Matrix<double, kSize, kSize>;
+  void age(int index, const Vector6d& sigmas, double steps);
+
+  double white_factor_, drift_steps_;
+  Vector6d drift_sigmas_ = Vector6d::Zero(), constant_sigmas_ = Vector6d::Zero();
+  Covariance covariance_ = Covariance::Zero();
 };
 
 }  // namespace spartan

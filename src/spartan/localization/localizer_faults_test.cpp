@@ -33,7 +33,7 @@ Pose first_pose_of(const Samples& all) {
   Samples before;
   std::copy_if(all.begin(), all.end(), std::back_inserter(before),
                [](const Measurement& m) { return stamp_of_measurement(m) <= test_stamp(2.5); });
-  Localizer localizer(test_options());
+  Localizer localizer = Localizer::create(test_options()).value();
   for (const Measurement& m : before) localizer.add(m);
   localizer.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
   return localizer.estimate().world_from_body.pose;
@@ -224,7 +224,7 @@ TEST(LocalizerFaults, ImuThatStartsLateIsAlignedToGravity) {
 }
 
 TEST(LocalizerFaults, RefusesAndCountsInvalidSamples) {
-  Localizer localizer(test_options());
+  Localizer localizer = Localizer::create(test_options()).value();
   localizer.add(ImuSample{test_stamp(0), {kNan, 0, 0}, {0, 0, 3.71}});
   localizer.start(test_stamp(1), Eigen::Vector3d::UnitX());
   EXPECT_FALSE(localizer.add(WheelSample{test_stamp(1.1), kNan, 0}));
@@ -251,7 +251,7 @@ TEST(LocalizerFaults, RefusesAndCountsInvalidSamples) {
 
 TEST(LocalizerFaults, AStampFarAheadIsRefusedAlone) {
   const Samples all = whole_drive(42.5, {}, 53);
-  Localizer localizer(test_options());
+  Localizer localizer = Localizer::create(test_options()).value();
   // A clock that is corrected after its first two samples, and one stamp far ahead just before the start.
   for (const double t : {0.0, 1.0}) EXPECT_TRUE(localizer.add(CompassSample{{2 * test_stamp(t).ns}, 0.3, 0.1}));
   EXPECT_FALSE(localizer.add(CompassSample{test_stamp(-0.1), 0.3, 0.1}));
@@ -358,7 +358,7 @@ TEST(LocalizerFaults, SavesAndRestoresItsMemory) {
   const std::size_t half = all.size() / 2;
   Localizer one = driven(test_options(), Samples(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(half)));
   one.add(CompassSample{test_stamp(5), kNan, 0.1});
-  Localizer other(test_options());
+  Localizer other = Localizer::create(test_options()).value();
   ASSERT_TRUE(other.restore(one.save()).has_value());
   EXPECT_EQ(other.save(), one.save());
   for (std::size_t i = half; i < all.size(); ++i) {

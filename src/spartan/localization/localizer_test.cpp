@@ -10,6 +10,7 @@
 
 #include "spartan/localization/internal/chi_square.h"
 #include "spartan/localization/internal/drive_test.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 
@@ -203,7 +204,7 @@ TEST(Localizer, EverySubsetOfSensorsIsConsistent) {
     EXPECT_LE((e.world_from_body.pose.translation() - e.world_from_odom * e.odom_from_body.pose.translation()).norm(),
               1e-9);
     // Yaw and level of the world follow from the first readings; the truth is relative to the first pose.
-    Localizer at_start(test_options());
+    Localizer at_start = Localizer::create(test_options()).value();
     for (const Measurement& m : all) {
       if (stamp_of_measurement(m) <= test_stamp(2.5)) at_start.add(m);
     }
@@ -219,7 +220,7 @@ TEST(Localizer, EverySubsetOfSensorsIsConsistent) {
 }
 
 TEST(Localizer, AlignsTheWorldToGravityAndEast) {
-  Localizer localizer(test_options());
+  Localizer localizer = Localizer::create(test_options()).value();
   const Eigen::Quaterniond tilted = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) *
                                     Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()) *
                                     Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitX());
@@ -261,6 +262,18 @@ TEST(Localizer, OdomDoesNotJumpIfTheMapCorrectsTheWorld) {
   const Pose b = before.odom_from_body.pose.inverse() * without.estimate().odom_from_body.pose;
   EXPECT_GT(a.translation().norm(), 0.3);
   EXPECT_LE(log_se3(a.inverse() * b).norm(), 0.05 * aside);
+}
+
+TEST(Localizer, RefusesOptionsOutOfBounds) {
+  LocalizationOptions options;
+  options.map_factor = 0;
+  const std::string expected = "localization options: map_factor is 0, must be between 0.01 and 10000";
+  EXPECT_THAT(testing::error_message(Localizer::create(options)), ::testing::HasSubstr(expected));
+  EXPECT_THAT(testing::error_message(VisionOnlyFilter::create(options)), ::testing::HasSubstr(expected));
+  options = {};
+  options.gravity_m_s2 = 0;
+  EXPECT_EQ(testing::error_message(Localizer::create(options)),
+            "localization options: gravity_m_s2: 0 is not a positive number");
 }
 
 }  // namespace

@@ -2,6 +2,12 @@
 
 namespace spartan {
 
+Result<VisionOnlyFilter> VisionOnlyFilter::create(const LocalizationOptions& options) {
+  auto localizer = Localizer::create(options);
+  if (!localizer) return failure(localizer);
+  return VisionOnlyFilter(std::move(*localizer));
+}
+
 void VisionOnlyFilter::start(Stamp stamp, const Pose& world_from_body) {
   localizer_.start(stamp, Eigen::Vector3d::UnitX());
   world_from_own_ = world_from_body * localizer_.estimate().world_from_body.pose.inverse();

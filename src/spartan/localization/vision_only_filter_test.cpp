@@ -13,7 +13,7 @@ TEST(VisionOnlyFilter, ComposesTheMotionsInTheGivenWorld) {
   const TestDrive drive;
   const Pose first(exp_so3({0.1, -0.2, 0.7}), {1, 2, 3});
   const LocalizationOptions options;  // with drift
-  VisionOnlyFilter track(options);
+  VisionOnlyFilter track = VisionOnlyFilter::create(options).value();
   track.start(test_stamp(2.5), first);
   UncertainPose composed{first, Matrix6d::Zero()};
   for (const Measurement& m : test_motions(drive, 62.5, 1, 5)) {
@@ -29,7 +29,7 @@ TEST(VisionOnlyFilter, ComposesTheMotionsInTheGivenWorld) {
   const Pose seen = pose.pose * Pose::from_translation({3e-4, -3e-4, 0});
   EXPECT_TRUE(track.add(PoseConstraint{test_stamp(62.5), seen, 1e12 * Matrix6d::Identity()}));
   EXPECT_LE(log_se3(track.world_from_body().pose.inverse() * seen).norm(), 1e-5);
-  VisionOnlyFilter other(options);
+  VisionOnlyFilter other = VisionOnlyFilter::create(options).value();
   ASSERT_TRUE(other.restore(track.save()));
   EXPECT_EQ(other.save(), track.save());
   EXPECT_EQ(other.world_from_body().pose.matrix(), track.world_from_body().pose.matrix());

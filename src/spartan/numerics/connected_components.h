@@ -14,7 +14,7 @@ struct PixelIndex {
 };
 
 /// The 8-connected components of the pixels that are not 0, in raster order of their first pixel. The pixels of a
-/// component are in the order of a depth-first flood fill from that pixel (the neighbors of a pixel are pushed in
+/// component are in the order of a depth-first flood fill from that pixel (the neighbours of a pixel are pushed in
 /// raster order and visited last in, first out), so sums over them have reproducible rounding.
 std::vector<std::vector<PixelIndex>> connected_components(ImageView<const std::uint8_t> mask);
 

@@ -13,28 +13,28 @@ std::int64_t at_most(std::int64_t best) {
   return ~(best - 1);
 }
 
-std::int64_t allowed(const std::string& name) {
-  if (name == "sse4") return at_most(HWY_SSE4);
-  if (name == "avx2") return at_most(HWY_AVX2);
+std::int64_t allowed(SimdTarget target) {
+  if (target == SimdTarget::sse4) return at_most(HWY_SSE4);
+  if (target == SimdTarget::avx2) return at_most(HWY_AVX2);
   return ~std::int64_t{0};
 }
 
 }  // namespace
 
-std::size_t simd_target_index(const std::string& name) {
+std::size_t simd_target_index(SimdTarget target) {
   hwy::ChosenTarget chosen;
-  const std::int64_t mask = hwy::SupportedTargets() & allowed(name);
+  const std::int64_t mask = hwy::SupportedTargets() & allowed(target);
   chosen.Update(mask != 0 ? mask : hwy::SupportedTargets());
   return chosen.GetIndex();
 }
 
-std::vector<std::string> available_simd_targets() {
-  std::vector<std::string> names;
+std::vector<SimdTarget> available_simd_targets() {
+  std::vector<SimdTarget> available;
   const std::int64_t targets = hwy::SupportedTargets();
-  if ((targets & HWY_SSE4) != 0) names.emplace_back("sse4");
-  if ((targets & HWY_AVX2) != 0) names.emplace_back("avx2");
-  if ((targets & (HWY_AVX3 | HWY_AVX3_DL)) != 0) names.emplace_back("avx3");
-  return names;
+  if ((targets & HWY_SSE4) != 0) available.push_back(SimdTarget::sse4);
+  if ((targets & HWY_AVX2) != 0) available.push_back(SimdTarget::avx2);
+  if ((targets & (HWY_AVX3 | HWY_AVX3_DL)) != 0) available.push_back(SimdTarget::avx3);
+  return available;
 }
 
 }  // namespace spartan

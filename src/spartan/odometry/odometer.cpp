@@ -221,8 +221,12 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   estimate.times.estimate = watch.lap();
 }
 
-Odometer::Odometer(const OdometryOptions& options, ThreadPool workers)
-    : state_(std::make_unique<State>(options, std::move(workers))) {}
+Result<Odometer> Odometer::create(const OdometryOptions& options, ThreadPool workers) {
+  if (Status valid = validate(options, "odometry options"); !valid) return failure(valid);
+  return Odometer(std::make_unique<State>(options, std::move(workers)));
+}
+
+Odometer::Odometer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Odometer::Odometer(Odometer&&) noexcept = default;
 Odometer& Odometer::operator=(Odometer&&) noexcept = default;
 Odometer::~Odometer() = default;

@@ -302,7 +302,8 @@ struct MotionEstimate {
 /// block). Derivation: docs/math/odometry.md.
 class Odometer {
  public:
-  Odometer(const OdometryOptions& options, ThreadPool workers);
+  /// Code `configuration` where an option is out of bounds.
+  static Result<Odometer> create(const OdometryOptions& options, ThreadPool workers);
   Odometer(Odometer&&) noexcept;
   Odometer& operator=(Odometer&&) noexcept;
   ~Odometer();
@@ -321,6 +322,7 @@ class Odometer {
 
  private:
   struct State;
+  explicit Odometer(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 

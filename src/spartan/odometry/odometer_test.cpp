@@ -1,5 +1,6 @@
 #include "spartan/odometry/odometer.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -10,6 +11,7 @@
 #include "spartan/numerics/random.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/synthetic_world.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
@@ -17,9 +19,9 @@ namespace {
 using testing::SyntheticFrame;
 using testing::SyntheticWorld;
 
-const RectifiedStereo kStereo{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
+const RectifiedStereo kCameras{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
 
-// A camera half a meter above level ground, tilted 32° down, heading `heading_rad` to the left of world x.
+// A camera half a metre above level ground, tilted 32° down, heading `heading_rad` to the left of world x.
 Pose camera_at(double x, double y, double heading_rad) {
   const double s = std::sin(0.55), c = std::cos(0.55);
   Eigen::Matrix3d body_from_optical;
@@ -39,7 +41,8 @@ const SyntheticFrame& frame_of(int index) {
     const SyntheticWorld world(testing::SyntheticWorldOptions{});
     std::vector<SyntheticFrame> rendered;
     rendered.reserve(10);
-    for (int i = 0; i < 10; ++i) rendered.push_back(world.render(kStereo, true_pose(i), static_cast<std::uint64_t>(i)));
+    for (int i = 0; i < 10; ++i)
+      rendered.push_back(world.render(kCameras, true_pose(i), static_cast<std::uint64_t>(i)));
     return rendered;
   }();
   return frames[static_cast<std::size_t>(index)];
@@ -48,7 +51,7 @@ const SyntheticFrame& frame_of(int index) {
 RectifiedPair pair_of(const SyntheticFrame& frame, int time) {
   RectifiedPair pair;
   pair.stamp.ns = time * 1'000'000'000LL;
-  pair.geometry = kStereo;
+  pair.geometry = kCameras;
   pair.left = frame.left;
   pair.right = frame.right;
   return pair;
@@ -89,7 +92,7 @@ double rotation_error(const MotionEstimate& estimate, int from, int to) {
 }
 
 std::vector<MotionEstimate> drive(const OdometryOptions& options, int threads = 1) {
-  Odometer odometer(options, ThreadPool(threads));
+  Odometer odometer = Odometer::create(options, ThreadPool(threads)).value();
   std::vector<MotionEstimate> estimates;
   estimates.reserve(10);
   for (int i = 0; i < 10; ++i) estimates.push_back(odometer.add(pair_of(i), {}, frame_of(i).disparity));
@@ -147,9 +150,9 @@ TEST(Odometer, IsBitIdenticalForAnyNumberOfThreads) {
 }
 
 TEST(Odometer, ResumesFromItsSavedStateBitForBit) {
-  Odometer whole({}, ThreadPool(1));
+  Odometer whole = Odometer::create({}, ThreadPool(1)).value();
   for (int i = 0; i < 5; ++i) whole.add(pair_of(i));
-  Odometer resumed({}, ThreadPool(1));
+  Odometer resumed = Odometer::create({}, ThreadPool(1)).value();
   ASSERT_TRUE(resumed.restore(whole.save()).has_value());
   for (int i = 5; i < 10; ++i) {
     EXPECT_TRUE(same_bits(whole.add(pair_of(i)), resumed.add(pair_of(i)))) << i;
@@ -165,7 +168,7 @@ TEST(Odometer, IsStationaryOnImagesThatDifferInNoiseOnly) {
     Random random(1);
     OdometryOptions options;
     options.stationary.detect = detect;
-    Odometer odometer(options, ThreadPool(1));
+    Odometer odometer = Odometer::create(options, ThreadPool(1)).value();
     Pose travelled;
     for (int i = 0; i < 8; ++i) {
       const Image<std::uint8_t> left = noisy(frame_of(0).left, random), right = noisy(frame_of(0).right, random);
@@ -190,12 +193,12 @@ TEST(Odometer, SlowMotionIsNotTakenForStationary) {
   // 0.3 mm per frame is 0.05 px: stationary at first, but it accumulates until it exceeds a quarter of a pixel (1.6
   // mm).
   const SyntheticWorld world(testing::SyntheticWorldOptions{});
-  Odometer odometer({}, ThreadPool(1));
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
   Pose travelled;
   int stationary = 0;
   for (int i = 0; i < 9; ++i) {
     const SyntheticFrame frame =
-        world.render(kStereo, camera_at(0.0003 * i, 0, 0), static_cast<std::uint64_t>(200 + i));
+        world.render(kCameras, camera_at(0.0003 * i, 0, 0), static_cast<std::uint64_t>(200 + i));
     const MotionEstimate e = odometer.add(pair_of(frame, i));
     stationary += e.status == TrackingStatus::stationary;
     travelled = travelled * e.previous_from_current;
@@ -206,7 +209,7 @@ TEST(Odometer, SlowMotionIsNotTakenForStationary) {
 }
 
 TEST(Odometer, IsLostWithAReasonAndRecoversTwoFramesLater) {
-  Odometer odometer({}, ThreadPool(1));
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
   for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
   const Image<std::uint8_t> blank(320, 240, 90);
   const MotionEstimate lost = odometer.add(blank_pair(blank, 4));
@@ -225,7 +228,8 @@ TEST(Odometer, UsesAGivenPrediction) {
   // A motion of five frames at once, without descriptors: found only with the prediction.
   OdometryOptions options;
   options.matching.descriptors = false;
-  Odometer predicted(options, ThreadPool(1)), unpredicted(options, ThreadPool(1));
+  Odometer predicted = Odometer::create(options, ThreadPool(1)).value();
+  Odometer unpredicted = Odometer::create(options, ThreadPool(1)).value();
   predicted.add(pair_of(0));
   unpredicted.add(pair_of(0));
   const MotionEstimate found = predicted.add(pair_of(5), true_motion(0, 5));
@@ -235,7 +239,7 @@ TEST(Odometer, UsesAGivenPrediction) {
 }
 
 TEST(Odometer, FindsALargeUnpredictedMotion) {
-  Odometer odometer({}, ThreadPool(1));
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
   odometer.add(pair_of(0));
   const MotionEstimate found = odometer.add(pair_of(6));
   EXPECT_EQ(found.status, TrackingStatus::tracking) << found.reason;
@@ -244,7 +248,7 @@ TEST(Odometer, FindsALargeUnpredictedMotion) {
 
 TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 200}, {12, 12}, {30, 20}, {64, 48}}) {
-    Odometer odometer({}, ThreadPool(2));
+    Odometer odometer = Odometer::create({}, ThreadPool(2)).value();
     const Image<std::uint8_t> tiny(width, height, 60);
     RectifiedPair pair = blank_pair(tiny, 0);
     pair.geometry.size = tiny.size();
@@ -252,7 +256,7 @@ TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
     pair.stamp.ns = 1;
     EXPECT_EQ(odometer.add(pair).status, TrackingStatus::lost);
   }
-  Odometer odometer({}, ThreadPool(1));
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
   EXPECT_EQ(odometer.add(RectifiedPair{}).status, TrackingStatus::lost);
   odometer.add(pair_of(0));
   RectifiedPair uneven = pair_of(1);
@@ -266,7 +270,7 @@ TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
 TEST(Odometer, MeasuresTheFirstMetersOfKitti) {
   const std::string folder = testing::data_folder() + "/kitti_06";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "set SPARTAN_DATA to the folder with kitti_06";
-  Odometer odometer({}, ThreadPool(2));
+  Odometer odometer = Odometer::create({}, ThreadPool(2)).value();
   Pose travelled;
   for (int i = 0; i < 6; ++i) {
     const auto left = read_gray8(folder + "/image_0/00000" + std::to_string(i) + ".png"),
@@ -283,6 +287,14 @@ TEST(Odometer, MeasuresTheFirstMetersOfKitti) {
   }
   // poses.txt, line 6.
   EXPECT_LT((travelled.translation() - Eigen::Vector3d(-0.0697, -0.1402, 5.9623)).norm(), 0.1);
+}
+
+TEST(Odometer, RefusesOptionsOutOfBounds) {
+  OdometryOptions options;
+  options.detection.surf.octaves = 0;
+  const auto created = Odometer::create(options, ThreadPool(1));
+  EXPECT_THAT(testing::error_message(created),
+              ::testing::HasSubstr("odometry options: detection.surf.octaves is 0, must be between 1 and 5"));
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ struct ViewMatchingOptions {
   double correlation_radius_px = 3;  ///< maximum distance of the alignment from the detected feature, pixels
 };
 
-/// Matches SURF features of both images: mutual nearest neighbors that pass the ratio test (Lowe, IJCV 60, 2004) are
+/// Matches SURF features of both images: mutual nearest neighbours that pass the ratio test (Lowe, IJCV 60, 2004) are
 /// aligned to sub-pixel accuracy. Neither rows nor a range of disparities are assumed, so a few of the matches are
 /// wrong and callers must be robust against them. In order of the strength of the left features; identical for any
 /// number of threads.

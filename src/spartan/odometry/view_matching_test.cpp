@@ -13,12 +13,12 @@
 namespace spartan {
 namespace {
 
-const RectifiedStereo kStereo{{320, 240}, 260.0, {159.5, 119.5}, 0.12};
+const RectifiedStereo kViews{{320, 240}, 260.0, {159.5, 119.5}, 0.12};
 
 testing::SyntheticFrame synthetic_frame() {
   const testing::SyntheticWorld world{testing::SyntheticWorldOptions()};
   const Pose tilted = Pose(exp_so3({0, 0.4, 0}), {0, 0, 0.5});
-  return world.render(kStereo, tilted * optical_from_forward().inverse(), 1);
+  return world.render(kViews, tilted * optical_from_forward().inverse(), 1);
 }
 
 // Corresponding points of a rectified pair lie in the same row, which the matching does not assume.

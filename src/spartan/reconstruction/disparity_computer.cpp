@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "spartan/reconstruction/internal/disparity_filters.h"
 #include "spartan/reconstruction/internal/semi_global_matcher.h"
@@ -23,8 +24,12 @@ struct DisparityComputer::State {
   Image<float> checked, smoothed;
 };
 
-DisparityComputer::DisparityComputer(const DisparityOptions& options, ThreadPool workers)
-    : state_(std::make_unique<State>(options, workers)) {}
+Result<DisparityComputer> DisparityComputer::create(const DisparityOptions& options, ThreadPool workers) {
+  if (Status valid = validate(options, "disparity options"); !valid) return failure(valid);
+  return DisparityComputer(std::make_unique<State>(options, std::move(workers)));
+}
+
+DisparityComputer::DisparityComputer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 DisparityComputer::DisparityComputer(DisparityComputer&&) noexcept = default;
 DisparityComputer& DisparityComputer::operator=(DisparityComputer&&) noexcept = default;
 DisparityComputer::~DisparityComputer() = default;

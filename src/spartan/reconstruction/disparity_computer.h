@@ -3,11 +3,11 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "spartan/core/image.h"
 #include "spartan/core/options.h"
 #include "spartan/core/result.h"
+#include "spartan/core/simd.h"
 #include "spartan/core/threads.h"
 #include "spartan/rig/rectified_stereo.h"
 
@@ -40,7 +40,8 @@ struct DisparityOptions;
 /// result is the same, bit for bit, for any number of threads and on every SIMD instruction set.
 class DisparityComputer {
  public:
-  DisparityComputer(const DisparityOptions& options, ThreadPool workers);
+  /// Code `configuration` where an option is out of bounds.
+  static Result<DisparityComputer> create(const DisparityOptions& options, ThreadPool workers);
   DisparityComputer(DisparityComputer&&) noexcept;
   DisparityComputer& operator=(DisparityComputer&&) noexcept;
   ~DisparityComputer();
@@ -57,6 +58,7 @@ class DisparityComputer {
 
  private:
   struct State;
+  explicit DisparityComputer(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 
@@ -75,7 +77,7 @@ struct DisparityOptions {
   bool median = true;             ///< Whether to apply a 3×3 median filter.
   int speckle_size_px = 100;      ///< Minimum size of a connected component, pixels; 0: no speckle filter.
   double speckle_step_px = 2;     ///< Largest disparity difference within a component, pixels.
-  std::string simd = "auto";      ///< SIMD instruction set; see simd_target_index().
+  SimdTarget simd = SimdTarget::automatic;  ///< SIMD instruction set
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -124,8 +126,7 @@ struct DisparityOptions {
         at_least(0));
     v.field("simd", simd,
             "SIMD instruction set of the matching kernels; avx3 is AVX-512; it affects the speed only, results are the "
-            "same bit for bit.",
-            {"auto", "sse4", "avx2", "avx3"});
+            "same bit for bit.");
   }
 };
 

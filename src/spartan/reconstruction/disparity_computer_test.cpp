@@ -1,5 +1,6 @@
 #include "spartan/reconstruction/disparity_computer.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include "spartan/numerics/simd_target.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/synthetic_world.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
@@ -34,7 +36,7 @@ std::vector<float> values(ImageView<const float> image) {
 }
 
 std::vector<float> disparity_of_ground(const DisparityOptions& options, int threads, int count = 96) {
-  DisparityComputer computer(options, ThreadPool(threads));
+  DisparityComputer computer = DisparityComputer::create(options, ThreadPool(threads)).value();
   const auto image = computer.compute(ground().left, ground().right, {0, count - 1});
   EXPECT_TRUE(image) << image.error().message();
   return image ? values(image->disparity) : std::vector<float>{};
@@ -70,16 +72,16 @@ TEST(DisparityComputer, IsDeterministicOnEveryInstructionSetAndNumberOfThreads) 
     DisparityOptions options;
     const std::vector<float> expected = disparity_of_ground(options, 1, count);
     EXPECT_TRUE(same_bytes(disparity_of_ground(options, 2, count), expected)) << "two threads";
-    for (const std::string& simd : available_simd_targets()) {
+    for (const SimdTarget simd : available_simd_targets()) {
       options.simd = simd;
       EXPECT_TRUE(same_bytes(disparity_of_ground(options, 1, count), expected))
-          << simd << ", " << count << " disparities";
+          << name_of(simd) << ", " << count << " disparities";
     }
   }
 }
 
 TEST(DisparityComputer, DoesNotDependOnThePreviousCall) {
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(1)).value();
   const auto first = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
   ASSERT_TRUE(computer.compute(ground().right, ground().left, {-40, 10}));
   const auto again = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
@@ -96,7 +98,7 @@ TEST(DisparityComputer, FindsNegativeDisparities) {
   for (int y = 0; y < 60; ++y) {
     for (int x = 0; x < 120; ++x) right(x, y) = left(std::max(0, x - 7), y);  // x_left − x_right = −7
   }
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(1)).value();
   const auto image = computer.compute(left, right, {-16, 15});
   ASSERT_TRUE(image);
   for (int y = 5; y < 55; ++y) {
@@ -107,7 +109,7 @@ TEST(DisparityComputer, FindsNegativeDisparities) {
 TEST(DisparityComputer, DiscardsMaskedPixels) {
   Image<std::uint8_t> mask(320, 240, 255);
   for (int y = 0; y < 240; ++y) std::fill(mask.row(y) + 100, mask.row(y) + 140, std::uint8_t{0});
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(1)).value();
   const auto image = computer.compute(ground().left, ground().right, {0, 95}, mask, {});
   ASSERT_TRUE(image);
   for (int y = 0; y < 240; ++y) {
@@ -116,7 +118,7 @@ TEST(DisparityComputer, DiscardsMaskedPixels) {
 }
 
 TEST(DisparityComputer, RejectsInvalidSizesAndRanges) {
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(1));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(1)).value();
   const Image<std::uint8_t> small(40, 30), other(41, 30);
   EXPECT_TRUE(DisparityComputer::check(small, small, {0, 15}));
   EXPECT_EQ(computer.compute(small, other, {0, 15}).error().code, ErrorCode::frame_rejected);
@@ -127,7 +129,7 @@ TEST(DisparityComputer, RejectsInvalidSizesAndRanges) {
 }
 
 TEST(DisparityComputer, AcceptsTinyImages) {
-  DisparityComputer computer(DisparityOptions{}, ThreadPool(2));
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(2)).value();
   for (const int width : {1, 2, 5, 17, 33}) {
     for (const int height : {1, 2, 3, 9}) {
       const Image<std::uint8_t> image(width, height, 100);
@@ -136,6 +138,14 @@ TEST(DisparityComputer, AcceptsTinyImages) {
       EXPECT_EQ(result->disparity.size(), image.size());
     }
   }
+}
+
+TEST(DisparityComputer, RefusesOptionsOutOfBounds) {
+  DisparityOptions options;
+  options.p1 = 61;
+  const auto created = DisparityComputer::create(options, ThreadPool(1));
+  EXPECT_THAT(testing::error_message(created),
+              ::testing::HasSubstr("disparity options: p1 is 61, must be between 0 and 60"));
 }
 
 TEST(DisparityRange, FollowsFromTheNearestDepthOrTheWidth) {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/numerics/random.h"
 #include "spartan/reconstruction/v_disparity.h"
 #include "spartan/rig/rig.h"
@@ -12,12 +12,11 @@
 namespace spartan {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 const RectifiedStereo kView{{400, 400}, 430, {199.5, 199.5}, 0.2};
 
 // A plane seen by a camera that is pitched down and rolled.
 GroundPlane plane_seen(double height_m, double pitch_deg, double roll_deg) {
-  const double p = pitch_deg * kDegree, r = roll_deg * kDegree;
+  const double p = pitch_deg * kRadiansPerDegree, r = roll_deg * kRadiansPerDegree;
   // Up in the optical frame of a camera without roll: (0, −cos p, −sin p).
   return {{std::cos(p) * std::sin(r), -std::cos(p) * std::cos(r), -std::sin(p)}, height_m};
 }
@@ -60,16 +59,16 @@ TEST(GroundPlane, DisparityTriangulatesToAPointOnThePlane) {
       EXPECT_NEAR(plane.up.dot(p), -1.1, 1e-9);
     }
   }
-  EXPECT_NEAR(plane.pitch_rad(), 35 * kDegree, 1e-9);
-  EXPECT_NEAR(plane.roll_rad(), 7 * kDegree, 1e-9);
+  EXPECT_NEAR(plane.pitch_rad(), 35 * kRadiansPerDegree, 1e-9);
+  EXPECT_NEAR(plane.roll_rad(), 7 * kRadiansPerDegree, 1e-9);
 }
 
 TEST(GroundPlane, PitchAndRollAreThoseOfTheMountedCamera) {
   const Pose body_from_left =
-      Pose::from_rotation(Eigen::Quaterniond(Eigen::AngleAxisd(39 * kDegree, Eigen::Vector3d::UnitY()))) *
+      Pose::from_rotation(Eigen::Quaterniond(Eigen::AngleAxisd(39 * kRadiansPerDegree, Eigen::Vector3d::UnitY()))) *
       optical_from_forward().inverse();
   const GroundPlane plane{body_from_left.rotation().conjugate() * Eigen::Vector3d::UnitZ(), 1};
-  EXPECT_NEAR(plane.pitch_rad(), 39 * kDegree, 1e-9);
+  EXPECT_NEAR(plane.pitch_rad(), 39 * kRadiansPerDegree, 1e-9);
   EXPECT_NEAR(plane.roll_rad(), 0, 1e-9);
 }
 
@@ -81,7 +80,7 @@ RC_GTEST_PROP(GroundPlane, IsEstimatedWithNoiseHolesAndRocks, ()) {
                                        kView, plane_seen(0.9 * height, pitch + 4, roll + 5), {});
   RC_ASSERT(found.has_value());
   RC_ASSERT(std::abs(found->height_m / height - 1) < 0.01);
-  RC_ASSERT(std::acos(std::min(1.0, found->up.dot(truth.up))) < 0.3 * kDegree);
+  RC_ASSERT(std::acos(std::min(1.0, found->up.dot(truth.up))) < 0.3 * kRadiansPerDegree);
 }
 
 TEST(GroundPlane, IsExactWithoutNoise) {

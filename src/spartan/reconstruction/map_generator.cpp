@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoHeight = std::numeric_limits<float>::quiet_NaN();
 constexpr double kLeastSigma_m = 0.001;  // lower bound of a point's vertical standard deviation; empirical
 constexpr float kMostLogodds = 5;        // saturation of a cell's log-odds: a probability of 0.993
 constexpr double kCut_rad = 0.5 * std::numbers::pi / 180;  // height of the margin at the upper edge of the view
@@ -145,7 +145,7 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
   const int w = grid.width, h = grid.height;
   for (Image<float>* layer :
        {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2, &map.ground_m})
-    *layer = Image<float>(w, h, kNaN);
+    *layer = Image<float>(w, h, kNoHeight);
   for (Image<float>* layer : {&map.count, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
   map.kind = Image<GroundClass>(w, h);
   Image<std::uint8_t> is_ground(w, h);

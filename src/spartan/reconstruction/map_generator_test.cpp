@@ -9,12 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "spartan/core/pose.h"
 #include "spartan/numerics/random.h"
 
 namespace spartan {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // Points of a surface z(x, y) ahead of the rover, 1 cm apart, seen from 1 m above its origin.
 template <class Height>
@@ -206,10 +205,10 @@ TEST(MapGenerator, MorePointsNeverRaiseTheVariance) {
 }
 
 TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
-  const double rise = std::tan(10 * kDegree);
+  const double rise = std::tan(10 * kRadiansPerDegree);
   const LocalMap map =
       MapGenerator({}, ThreadPool(1)).generate(points_on([&](double x, double) { return rise * x; }), Pose());
-  EXPECT_NEAR(at(map, map.slope_rad, 2, 0), 10 * kDegree, 0.2 * kDegree);
+  EXPECT_NEAR(at(map, map.slope_rad, 2, 0), 10 * kRadiansPerDegree, 0.2 * kRadiansPerDegree);
   EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of at most 20 degrees";
 }
 

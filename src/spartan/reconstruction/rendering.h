@@ -25,7 +25,7 @@ Image<Rgb8> render_classes(ImageView<const std::uint8_t> left, ImageView<const s
 Image<Rgb8> render_v_disparity(const VDisparity& v_disparity, const RectifiedStereo& geometry,
                                const VDisparityOptions& options);
 
-/// The views that contributed to each cell, a color for each set of them, the same for every eighth view. `views` as
+/// The views that contributed to each cell, a colour for each set of them, the same for every eighth view. `views` as
 /// MergedRange::views.
 Image<Rgb8> render_view_coverage(ImageView<const std::uint8_t> views);
 

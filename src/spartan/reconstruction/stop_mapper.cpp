@@ -43,10 +43,18 @@ MappingOptions with_shared_values(MappingOptions options) {
   return options;
 }
 
-StopMapper::StopMapper(const DisparityOptions& disparity, const MappingOptions& options, ThreadPool workers)
+Result<StopMapper> StopMapper::create(const DisparityOptions& disparity, const MappingOptions& options,
+                                      ThreadPool workers) {
+  if (Status valid = validate(options, "mapping options"); !valid) return failure(valid);
+  auto computer = DisparityComputer::create(disparity, workers);
+  if (!computer) return failure(computer);
+  return StopMapper(std::move(*computer), options, workers);
+}
+
+StopMapper::StopMapper(DisparityComputer computer, const MappingOptions& options, const ThreadPool& workers)
     : options_(with_shared_values(options)),
       workers_(workers),
-      computer_(disparity, workers),
+      computer_(std::move(computer)),
       generator_(options.map, workers) {}
 
 Status StopMapper::check(const RectifiedPair& frame, double nearest_m) {

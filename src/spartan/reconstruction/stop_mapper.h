@@ -61,7 +61,9 @@ struct StopMapperTimes {
 /// Local maps are generated from the merged range image at the pose that the caller gives (MapGenerator is cheap).
 class StopMapper {
  public:
-  StopMapper(const DisparityOptions& disparity, const MappingOptions& options, ThreadPool workers);
+  /// Code `configuration` where an option is out of bounds.
+  static Result<StopMapper> create(const DisparityOptions& disparity, const MappingOptions& options,
+                                   ThreadPool workers);
 
   /// Whether add() of that view would succeed, without computing. Codes as DisparityComputer::check().
   static Status check(const RectifiedPair& frame, double nearest_m);
@@ -86,6 +88,8 @@ class StopMapper {
   const StopMapperTimes& times() const { return times_; }
 
  private:
+  StopMapper(DisparityComputer computer, const MappingOptions& options, const ThreadPool& workers);
+
   MappingOptions options_;
   ThreadPool workers_;
   DisparityComputer computer_;

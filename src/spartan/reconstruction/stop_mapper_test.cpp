@@ -1,5 +1,6 @@
 #include "spartan/reconstruction/stop_mapper.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,11 +9,12 @@
 #include "spartan/rig/rig.h"
 #include "spartan/testing/height_field_view.h"
 #include "spartan/testing/synthetic_world.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
 
-const RectifiedStereo kWide{{320, 320}, 340, {159.5, 159.5}, 0.2};
+const RectifiedStereo kStopPair{{320, 320}, 340, {159.5, 159.5}, 0.2};
 const RectifiedStereo kNarrow{{240, 180}, 190, {119.5, 89.5}, 0.1};
 constexpr double kNearest_m = 0.5;
 
@@ -27,8 +29,8 @@ testing::SyntheticWorldOptions gentle_ground() {
 struct Views {
   Views() {
     add("narrow", kNarrow, testing::camera_pose_at(0.4, 0, 0.55, optical_from_forward()));
-    add("wide", kWide, testing::camera_pose_at(1, 0.35, 0.68, optical_from_forward()));
-    add("wide", kWide, testing::camera_pose_at(1, -0.35, 0.68, optical_from_forward()));
+    add("wide", kStopPair, testing::camera_pose_at(1, 0.35, 0.68, optical_from_forward()));
+    add("wide", kStopPair, testing::camera_pose_at(1, -0.35, 0.68, optical_from_forward()));
   }
   void add(const std::string& name, const RectifiedStereo& stereo, const Pose& body_from_left) {
     frames.push_back(world.render(stereo, body_from_left, frames.size()));
@@ -64,7 +66,7 @@ int known_cells(const LocalMap& map) {
 }
 
 TEST(StopMapper, MapsTheGroundAroundAStop) {
-  StopMapper mapper({}, {}, ThreadPool(2));
+  StopMapper mapper = StopMapper::create({}, {}, ThreadPool(2)).value();
   std::vector<int> cells;
   for (std::size_t i = 0; i < views().pairs.size(); ++i) {
     ASSERT_TRUE(mapper.add(views().pair(i), kNearest_m));
@@ -90,14 +92,14 @@ TEST(StopMapper, MapsTheGroundAroundAStop) {
   EXPECT_GT(count, 1500);
   EXPECT_LT(std::sqrt(squares / count), 0.015);
   for (std::size_t i = 0; i < views().pairs.size(); ++i) {
-    StopMapper alone({}, {}, ThreadPool(2));
+    StopMapper alone = StopMapper::create({}, {}, ThreadPool(2)).value();
     ASSERT_TRUE(alone.add(views().pair(i), kNearest_m));
     EXPECT_GT(known_cells(map), 1.3 * known_cells(alone.map(surface_points(alone.merge()), Pose())));
   }
 }
 
 TEST(StopMapper, DiscardsTheViewsOfThePreviousStop) {
-  StopMapper mapper({}, {}, ThreadPool(1));
+  StopMapper mapper = StopMapper::create({}, {}, ThreadPool(1)).value();
   ASSERT_TRUE(mapper.add(views().pair(1), kNearest_m));
   mapper.leave();
   EXPECT_TRUE(mapper.views().empty());
@@ -106,13 +108,24 @@ TEST(StopMapper, DiscardsTheViewsOfThePreviousStop) {
 }
 
 TEST(StopMapper, RejectsImagesOfDifferentSizes) {
-  StopMapper mapper({}, {}, ThreadPool(1));
+  StopMapper mapper = StopMapper::create({}, {}, ThreadPool(1)).value();
   RectifiedPair pair = views().pair(0);
   pair.right = views().pair(1).right;
   const Status refused = mapper.add(pair, kNearest_m);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::frame_rejected);
   EXPECT_TRUE(mapper.views().empty());
+}
+
+TEST(StopMapper, RefusesOptionsOutOfBounds) {
+  MappingOptions mapping;
+  mapping.map.cell_m = 0;
+  EXPECT_THAT(testing::error_message(StopMapper::create({}, mapping, ThreadPool(1))),
+              ::testing::HasSubstr("mapping options: map.cell_m is 0"));
+  DisparityOptions disparity;
+  disparity.p1 = 61;
+  EXPECT_THAT(testing::error_message(StopMapper::create(disparity, {}, ThreadPool(1))),
+              ::testing::HasSubstr("disparity options: p1 is 61"));
 }
 
 }  // namespace

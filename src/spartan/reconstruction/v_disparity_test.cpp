@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/numerics/random.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/height_field_view.h"
@@ -13,8 +13,7 @@
 namespace spartan {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-const RectifiedStereo kView{{373, 373}, 400, {186, 186}, 0.2};
+const RectifiedStereo kGroundView{{373, 373}, 400, {186, 186}, 0.2};
 
 struct Scene {
   Image<float> disparity;
@@ -27,23 +26,25 @@ using Height = std::function<double(double, double)>;
 
 // The view of a rover that may be rolled; `surface` is `ground` with rocks and pits.
 Scene look_at(const Height& ground, const Height& surface, double roll_deg = 0, double noise_px = 0.15) {
-  const Pose world_from_body =
-      Pose::from_rotation(Eigen::Quaterniond(Eigen::AngleAxisd(roll_deg * kDegree, Eigen::Vector3d::UnitX())));
-  const Pose world_from_left = world_from_body * testing::camera_pose_at(1, 0, 39 * kDegree, optical_from_forward());
-  Scene seen{testing::disparity_of(surface, kView, world_from_left),
+  const Pose world_from_body = Pose::from_rotation(
+      Eigen::Quaterniond(Eigen::AngleAxisd(roll_deg * kRadiansPerDegree, Eigen::Vector3d::UnitX())));
+  const Pose world_from_left =
+      world_from_body * testing::camera_pose_at(1, 0, 39 * kRadiansPerDegree, optical_from_forward());
+  Scene seen{testing::disparity_of(surface, kGroundView, world_from_left),
              Image<std::uint8_t>(373, 373),
              {},
              world_from_left.rotation().conjugate() * Eigen::Vector3d::UnitZ()};
   // The prediction of the rig, without the roll.
-  seen.expected = {testing::camera_pose_at(1, 0, 39 * kDegree, optical_from_forward()).rotation().conjugate() *
-                       Eigen::Vector3d::UnitZ(),
-                   1};
+  seen.expected = {
+      testing::camera_pose_at(1, 0, 39 * kRadiansPerDegree, optical_from_forward()).rotation().conjugate() *
+          Eigen::Vector3d::UnitZ(),
+      1};
   Random random(1, 5);
   for (int y = 0; y < 373; ++y) {
     for (int x = 0; x < 373; ++x) {
       const double d = seen.disparity(x, y);
       if (!(d > 0)) continue;
-      const Eigen::Vector3d p = world_from_left * kView.triangulate(x, y, d);
+      const Eigen::Vector3d p = world_from_left * kGroundView.triangulate(x, y, d);
       const double over = p.z() - ground(p.x(), p.y());
       seen.truth(x, y) = over > 0.12 ? 2 : over < -0.12 ? 3 : std::abs(over) < 0.04 ? 1 : 0;  // 0: not scored
       seen.disparity(x, y) = static_cast<float>(d + random.normal(0, noise_px));
@@ -74,10 +75,10 @@ const Height kFlat = [](double, double) { return 0.0; };
 
 TEST(VDisparity, LevelGroundGivesCameraHeightAndPitch) {
   const Scene seen = look_at(kFlat, kFlat);
-  const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, ThreadPool(2));
+  const auto found = compute_v_disparity(seen.disparity, kGroundView, seen.expected, {}, ThreadPool(2));
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->plane.height_m, 1, 0.005);
-  EXPECT_NEAR(found->plane.pitch_rad(), 39 * kDegree, 0.2 * kDegree);
+  EXPECT_NEAR(found->plane.pitch_rad(), 39 * kRadiansPerDegree, 0.2 * kRadiansPerDegree);
   EXPECT_GT(recall(seen, *found, 1).of(), 0.999);
 }
 
@@ -89,14 +90,14 @@ TEST(VDisparity, RocksAreObstaclesAndPitsAreCavities) {
   };
   for (const double roll_deg : {0.0, 12.0, -12.0}) {
     const Scene seen = look_at(kFlat, surface, roll_deg);
-    const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, ThreadPool(2));
+    const auto found = compute_v_disparity(seen.disparity, kGroundView, seen.expected, {}, ThreadPool(2));
     ASSERT_TRUE(found) << roll_deg;
     ASSERT_GT(recall(seen, *found, 2).all, 500);
     ASSERT_GT(recall(seen, *found, 3).all, 300);
     EXPECT_GT(recall(seen, *found, 1).of(), 0.995) << roll_deg;
     EXPECT_GT(recall(seen, *found, 2).of(), 0.97) << roll_deg;
     EXPECT_GT(recall(seen, *found, 3).of(), 0.9) << roll_deg;
-    EXPECT_LT(std::acos(std::min(1.0, found->plane.up.dot(seen.up))), 0.3 * kDegree);
+    EXPECT_LT(std::acos(std::min(1.0, found->plane.up.dot(seen.up))), 0.3 * kRadiansPerDegree);
   }
 }
 
@@ -107,7 +108,7 @@ TEST(VDisparity, TheProfileFollowsUnevenGround) {
     return hills(x, y) + (std::hypot(x - 2.6, y) < 0.15 ? 0.25 : 0.0);
   };
   const Scene seen = look_at(hills, with_rock);
-  const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, ThreadPool(2));
+  const auto found = compute_v_disparity(seen.disparity, kGroundView, seen.expected, {}, ThreadPool(2));
   ASSERT_TRUE(found);
   EXPECT_GT(recall(seen, *found, 1).of(), 0.98);
   EXPECT_GT(recall(seen, *found, 2).of(), 0.9);
@@ -122,15 +123,15 @@ TEST(VDisparity, StripsFollowGroundThatIsHigherOnOneSide) {
   VDisparityOptions one, many;
   one.strips = 1;
   many.strips = 9;
-  const auto narrow = compute_v_disparity(seen.disparity, kView, seen.expected, many, ThreadPool(2));
-  const auto wide = compute_v_disparity(seen.disparity, kView, seen.expected, one, ThreadPool(2));
+  const auto narrow = compute_v_disparity(seen.disparity, kGroundView, seen.expected, many, ThreadPool(2));
+  const auto wide = compute_v_disparity(seen.disparity, kGroundView, seen.expected, one, ThreadPool(2));
   ASSERT_TRUE(narrow && wide);
   EXPECT_LT(1 - recall(seen, *narrow, 1).of(), 0.2 * (1 - recall(seen, *wide, 1).of()));
 }
 
 TEST(VDisparity, TheHistogramContainsEveryKnownPixelOnce) {
   const Scene seen = look_at(kFlat, kFlat, 8);
-  const auto found = compute_v_disparity(seen.disparity, kView, seen.expected, {}, ThreadPool(1));
+  const auto found = compute_v_disparity(seen.disparity, kGroundView, seen.expected, {}, ThreadPool(1));
   ASSERT_TRUE(found);
   int in_histogram = 0, known = 0, widest = 0;
   for (int y = 0; y < found->histogram.height(); ++y) {
@@ -153,8 +154,8 @@ TEST(VDisparity, TheHistogramContainsEveryKnownPixelOnce) {
 
 TEST(VDisparity, IsDeterministicForAnyNumberOfThreads) {
   const Scene seen = look_at(kFlat, [](double x, double y) { return std::hypot(x - 1.4, y) < 0.2 ? 0.2 : 0.0; });
-  const auto a = compute_v_disparity(seen.disparity, kView, seen.expected, {}, ThreadPool(1)),
-             b = compute_v_disparity(seen.disparity, kView, seen.expected, {}, ThreadPool(2));
+  const auto a = compute_v_disparity(seen.disparity, kGroundView, seen.expected, {}, ThreadPool(1)),
+             b = compute_v_disparity(seen.disparity, kGroundView, seen.expected, {}, ThreadPool(2));
   ASSERT_TRUE(a && b);
   for (std::size_t i = 0; i < a->profiles.size(); ++i) EXPECT_EQ(a->profiles[i].height_m, b->profiles[i].height_m);
   for (int y = 0; y < 373; ++y) {

@@ -89,9 +89,10 @@ Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoP
   const auto view = imager.process(*frame);
   if (!view) return failure(view);
   const Image<std::uint8_t> left = Image<std::uint8_t>::copy_of(view->left);
-  DisparityComputer computer(request.options.reconstruction, ThreadPool(request.threads));
-  const auto image = computer.compute(view->left, view->right, disparity_range(view->geometry, pair.nearest_m),
-                                      view->left_mask, view->right_mask);
+  auto computer = DisparityComputer::create(request.options.reconstruction, ThreadPool(request.threads));
+  if (!computer) return failure(computer);
+  const auto image = computer->compute(view->left, view->right, disparity_range(view->geometry, pair.nearest_m),
+                                       view->left_mask, view->right_mask);
   if (!image) return failure(image);
   const auto scores = compare_disparities(image->disparity, *truth, *mask);
   if (!scores) return failure(scores);
@@ -113,7 +114,7 @@ Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoP
   return html + html_table(rows);
 }
 
-// Elevation in color, shaded from the north-west.
+// Elevation in colour, shaded from the north-west.
 std::string elevation_of(const std::string& recording, const Trajectory& truth) {
   const auto map = read_geotiff(recording + "/truth/elevation.tif");
   if (!map || map->bands.empty()) return "";

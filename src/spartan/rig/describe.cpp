@@ -7,12 +7,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "spartan/core/pose.h"
 
 namespace spartan {
 namespace {
 
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 constexpr double kDisparityStep_px = 0.3;
 constexpr std::array<double, 6> kRanges_m{0.5, 1, 2, 5, 10, 20};
 // Smaller components are omitted.

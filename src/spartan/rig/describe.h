@@ -20,9 +20,9 @@ struct RigFinding {
 
 /// Plausibility findings of a pair:
 /// - `inverse_transform` and `swapped_eyes`, always together: the right camera is on the left (only images can decide);
-/// - `not_beside`: the baseline is not mainly along x of the left camera (the sides are then not checked);
+/// - `not_side_by_side`: the baseline is not mainly along x of the left camera (the sides are then not checked);
 /// - `baseline_unit`: a baseline beyond 3 m or below 5 mm;
-/// - `eyes_apart`: cameras rotated relative to each other by more than 15°;
+/// - `large_rotation`: cameras rotated relative to each other by more than 15°;
 /// - `size_mismatch`: principal point, field of view or fx/fy (more than 5 % apart) suggest another image size, or
 ///   `image_size` differs, where that is known. Reported once for two equal cameras.
 std::vector<RigFinding> plausibility_findings(const Rig& rig, const StereoPair& pair, ImageSize image_size = {});

@@ -4,7 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numbers>
+
+#include "spartan/core/pose.h"
 
 namespace spartan {
 namespace {
@@ -12,8 +13,6 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 Camera camera(const std::string& name) {
   Camera made;
@@ -29,7 +28,8 @@ Rig rig_with(const Pose& left_from_right) {
 }
 
 Pose rotated(double about_x_deg, double about_y_deg, double about_z_deg, const Eigen::Vector3d& t = {0, 0, 0}) {
-  return {exp_so3({about_x_deg * kDegree, about_y_deg * kDegree, about_z_deg * kDegree}), t};
+  return {exp_so3({about_x_deg * kRadiansPerDegree, about_y_deg * kRadiansPerDegree, about_z_deg * kRadiansPerDegree}),
+          t};
 }
 
 TEST(Describe, RelativePositions) {
@@ -55,8 +55,8 @@ TEST(Describe, SummaryOfAPair) {
   const PairSummary summary = summarize_pair(rig, rig.pairs[0]);
   EXPECT_NEAR(summary.baseline_m, 0.12, 1e-15);
   EXPECT_NEAR(summary.focal_px, 500, 1e-9);
-  EXPECT_NEAR(summary.hfov_deg, 2 * std::atan(320.0 / 500) / kDegree, 1e-9);
-  EXPECT_NEAR(summary.vfov_deg, 2 * std::atan(240.0 / 490) / kDegree, 1e-9);
+  EXPECT_NEAR(summary.hfov_deg, 2 * std::atan(320.0 / 500) / kRadiansPerDegree, 1e-9);
+  EXPECT_NEAR(summary.vfov_deg, 2 * std::atan(240.0 / 490) / kRadiansPerDegree, 1e-9);
 }
 
 TEST(Describe, RangeResolution) {
@@ -88,7 +88,7 @@ TEST(Describe, SuspiciousPairsAreReported) {
 
 TEST(Describe, CamerasAndMast) {
   Rig rig = rig_with(Pose::from_translation({0.2, 0, 0}));
-  rig.pan_tilt_units = {{"mast", Pose::from_translation({0, 0, 1}), 0.0, 39 * kDegree}};
+  rig.pan_tilt_units = {{"mast", Pose::from_translation({0, 0, 1}), 0.0, 39 * kRadiansPerDegree}};
   for (Camera& c : rig.cameras) c.mount = "mast";
   rig.cameras[0].self_mask = "mask.png";
   rig.cameras[1].pixel_format.bits = 12;

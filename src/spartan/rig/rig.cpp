@@ -11,7 +11,7 @@
 namespace spartan {
 namespace {
 
-bool same(const Pose& a, const Pose& b) {
+bool equal_bits(const Pose& a, const Pose& b) {
   return a.rotation().coeffs() == b.rotation().coeffs() && a.translation() == b.translation();
 }
 
@@ -176,14 +176,14 @@ Pose PanTiltUnit::body_from_head(double pan_rad, double tilt_rad) const {
 }
 
 bool operator==(const PanTiltUnit& a, const PanTiltUnit& b) {
-  return a.name == b.name && same(a.body_from_base, b.body_from_base) && a.rest_pan_rad == b.rest_pan_rad &&
+  return a.name == b.name && equal_bits(a.body_from_base, b.body_from_base) && a.rest_pan_rad == b.rest_pan_rad &&
          a.rest_tilt_rad == b.rest_tilt_rad;
 }
 
 bool operator==(const Camera& a, const Camera& b) {
   return a.name == b.name && a.size == b.size && a.model == b.model && a.pixel_format == b.pixel_format &&
          a.vignetting == b.vignetting && a.self_mask == b.self_mask && a.mount == b.mount &&
-         same(a.mount_from_camera, b.mount_from_camera);
+         equal_bits(a.mount_from_camera, b.mount_from_camera);
 }
 
 const Camera* Rig::find_camera(const std::string& camera) const {

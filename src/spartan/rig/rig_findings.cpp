@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig/describe.h"
 
 namespace spartan {
 namespace {
 
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 // The limits in this file are empirical.
 // Beyond these a calibration error is more likely than such a rig.
 constexpr double kLongBaseline_m = 3, kShortBaseline_m = 0.005, kMaxRotation_deg = 15;
@@ -196,7 +195,7 @@ std::vector<RigFinding> plausibility_findings(const Rig& rig, const StereoPair& 
   const Eigen::Vector3d& t = left_from_right.translation();
   const double off_axis_m = std::max(std::abs(t.y()), std::abs(t.z()));
   if (std::abs(t.x()) < off_axis_m) {
-    findings.push_back({"not_beside",
+    findings.push_back({"not_side_by_side",
                         "the right camera is not beside the left one: check the axis convention of the transform",
                         off_axis_m});
   } else if (t.x() < 0) {
@@ -209,7 +208,7 @@ std::vector<RigFinding> plausibility_findings(const Rig& rig, const StereoPair& 
     findings.push_back({"baseline_unit", describe_baseline(t.norm()), t.norm()});
   const double rotation_deg = rotation_angle(left_from_right) * kDegreesPerRadian;
   if (rotation_deg > kMaxRotation_deg) {
-    findings.push_back({"eyes_apart",
+    findings.push_back({"large_rotation",
                         fmt::format("the cameras are rotated by {:.2f}° relative to each other", rotation_deg),
                         rotation_deg});
   }

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig/describe.h"
 
 namespace spartan {
@@ -12,15 +12,14 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr double kDegree = std::numbers::pi / 180;
-constexpr PinholeModel kPinhole{500, 500, 319.5, 239.5};
+constexpr PinholeModel kCamera{500, 500, 319.5, 239.5};
 
-Rig rig_with(const Pose& left_from_right, const CameraModel& right = kPinhole) {
+Rig rig_of(const Pose& left_from_right, const CameraModel& right = kCamera) {
   Camera one, other;
   one.name = "left";
   other.name = "right";
   one.size = other.size = {640, 480};
-  one.model = kPinhole;
+  one.model = kCamera;
   other.model = right;
   return rig_of_one_pair("front", one, other, left_from_right.inverse());
 }
@@ -36,17 +35,17 @@ void expect_finding(const Rig& rig, const std::string& id, double value) {
 }
 
 TEST(RigFindings, RelativePoses) {
-  EXPECT_TRUE(findings_of(rig_with(Pose::from_translation({0.12, 0.01, -0.02}))).empty());
-  expect_finding(rig_with(Pose::from_translation({0.01, 0.12, 0})), "not_beside", 0.12);
-  expect_finding(rig_with(Pose::from_translation({0.01, 0, -0.12})), "not_beside", 0.12);
+  EXPECT_TRUE(findings_of(rig_of(Pose::from_translation({0.12, 0.01, -0.02}))).empty());
+  expect_finding(rig_of(Pose::from_translation({0.01, 0.12, 0})), "not_side_by_side", 0.12);
+  expect_finding(rig_of(Pose::from_translation({0.01, 0, -0.12})), "not_side_by_side", 0.12);
   // For cameras above or behind each other the sides are not checked.
-  expect_finding(rig_with(Pose::from_translation({-1e-18, 0.12, 0})), "not_beside", 0.12);
-  expect_finding(rig_with(Pose::from_translation({-0.01, 0, 0.12})), "not_beside", 0.12);
-  expect_finding(rig_with(Pose::from_translation({120, 0, 0})), "baseline_unit", 120);
-  expect_finding(rig_with(Pose::from_translation({0.00012, 0, 0})), "baseline_unit", 0.00012);
-  expect_finding(rig_with({exp_so3({0, 16 * kDegree, 0}), {0.12, 0, 0}}), "eyes_apart", 16);
-  EXPECT_TRUE(findings_of(rig_with({exp_so3({0, 14 * kDegree, 0}), {0.12, 0, 0}})).empty());
-  const auto left = findings_of(rig_with(Pose::from_translation({-0.12, 0, 0})));
+  expect_finding(rig_of(Pose::from_translation({-1e-18, 0.12, 0})), "not_side_by_side", 0.12);
+  expect_finding(rig_of(Pose::from_translation({-0.01, 0, 0.12})), "not_side_by_side", 0.12);
+  expect_finding(rig_of(Pose::from_translation({120, 0, 0})), "baseline_unit", 120);
+  expect_finding(rig_of(Pose::from_translation({0.00012, 0, 0})), "baseline_unit", 0.00012);
+  expect_finding(rig_of({exp_so3({0, 16 * kRadiansPerDegree, 0}), {0.12, 0, 0}}), "large_rotation", 16);
+  EXPECT_TRUE(findings_of(rig_of({exp_so3({0, 14 * kRadiansPerDegree, 0}), {0.12, 0, 0}})).empty());
+  const auto left = findings_of(rig_of(Pose::from_translation({-0.12, 0, 0})));
   ASSERT_EQ(left.size(), 2u) << "only images can decide";
   EXPECT_EQ(left[0].id, "inverse_transform");
   EXPECT_EQ(left[1].id, "swapped_eyes");
@@ -55,24 +54,25 @@ TEST(RigFindings, RelativePoses) {
 // Of either camera; here of the right one.
 TEST(RigFindings, IntrinsicsOfAnotherImageSize) {
   const Pose beside = Pose::from_translation({0.12, 0, 0});
-  expect_finding(rig_with(beside, PinholeModel{1000, 1000, 639, 479}), "size_mismatch", 0.5);
-  expect_finding(rig_with(beside, PinholeModel{250, 250, 159.75, 119.75}), "size_mismatch", 2);
-  expect_finding(rig_with(beside, PinholeModel{500, 250, 319.5, 239.5}), "size_mismatch", 2);
-  expect_finding(rig_with(beside, PinholeModel{20, 20, 319.5, 239.5}), "size_mismatch", 2 * std::atan(16) / kDegree);
-  expect_finding(rig_with(beside, PinholeModel{20000, 20000, 319.5, 239.5}), "size_mismatch",
-                 2 * std::atan(0.016) / kDegree);
-  expect_finding(rig_with(beside, RadialTangentialModel({6, 6, 319.5, 239.5}, {-0.28, 0.07})), "size_mismatch", 6);
+  expect_finding(rig_of(beside, PinholeModel{1000, 1000, 639, 479}), "size_mismatch", 0.5);
+  expect_finding(rig_of(beside, PinholeModel{250, 250, 159.75, 119.75}), "size_mismatch", 2);
+  expect_finding(rig_of(beside, PinholeModel{500, 250, 319.5, 239.5}), "size_mismatch", 2);
+  expect_finding(rig_of(beside, PinholeModel{20, 20, 319.5, 239.5}), "size_mismatch",
+                 2 * std::atan(16) / kRadiansPerDegree);
+  expect_finding(rig_of(beside, PinholeModel{20000, 20000, 319.5, 239.5}), "size_mismatch",
+                 2 * std::atan(0.016) / kRadiansPerDegree);
+  expect_finding(rig_of(beside, RadialTangentialModel({6, 6, 319.5, 239.5}, {-0.28, 0.07})), "size_mismatch", 6);
   // An off-centre principal point or another focal length is plausible.
-  EXPECT_TRUE(findings_of(rig_with(beside, PinholeModel{500, 500, 400, 180})).empty());
-  EXPECT_TRUE(findings_of(rig_with(beside, PinholeModel{600, 600, 319.5, 239.5})).empty());
-  const auto with_image_size = findings_of(rig_with(beside), {320, 240});
+  EXPECT_TRUE(findings_of(rig_of(beside, PinholeModel{500, 500, 400, 180})).empty());
+  EXPECT_TRUE(findings_of(rig_of(beside, PinholeModel{600, 600, 319.5, 239.5})).empty());
+  const auto with_image_size = findings_of(rig_of(beside), {320, 240});
   ASSERT_EQ(with_image_size.size(), 1u) << "once, for both cameras are equal";
   EXPECT_EQ(with_image_size[0].value, 0.5);
 }
 
 // One finding per camera; one for both where they are equal.
 TEST(RigFindings, EqualCamerasAreReportedOnce) {
-  Rig rig = rig_with(Pose::from_translation({0.12, 0, 0}));
+  Rig rig = rig_of(Pose::from_translation({0.12, 0, 0}));
   for (Camera& c : rig.cameras) c.model = PinholeModel{492.8, 520.6, 319.5, 239.5};
   const auto equal = findings_of(rig);
   ASSERT_EQ(equal.size(), 1u);
@@ -87,7 +87,7 @@ TEST(RigFindings, EqualCamerasAreReportedOnce) {
 // A cropped image has an off-centre principal point; in the corner or outside of the image it is reported.
 TEST(RigFindings, PrincipalPointsOutsideOfTheImage) {
   const auto of_centre = [](double cx, double cy) {
-    return findings_of(rig_with(Pose::from_translation({0.12, 0, 0}), PinholeModel{500, 500, cx, cy}));
+    return findings_of(rig_of(Pose::from_translation({0.12, 0, 0}), PinholeModel{500, 500, cx, cy}));
   };
   for (const auto& [cx, cy] : {std::pair{-2000., -3000.},
                                {0., 0.},
@@ -113,7 +113,7 @@ TEST(RigFindings, PrincipalPointsOutsideOfTheImage) {
 
 // The length in other units; the first one is used for the correction.
 TEST(RigFindings, UnitsOfBaselines) {
-  const auto text = [](double metres) { return findings_of(rig_with(Pose::from_translation({metres, 0, 0})))[0].text; };
+  const auto text = [](double metres) { return findings_of(rig_of(Pose::from_translation({metres, 0, 0})))[0].text; };
   EXPECT_EQ(text(120),
             "a baseline of 120 m is probably given in millimetres: it would then be 120.0 mm (in centimetres 1.200 m)");
   EXPECT_EQ(text(12),

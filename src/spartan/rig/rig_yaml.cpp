@@ -3,9 +3,9 @@
 
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 
 #include "spartan/core/files.h"
+#include "spartan/core/pose.h"
 #include "spartan/core/strict_yaml.h"
 #include "spartan/rig/rig.h"
 
@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kSchema = 1;
 constexpr std::size_t kMaxEntries = 1000;  // cameras, pairs or pan-tilt units of a rig
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr PixelLayout kLayouts[] = {PixelLayout::gray,       PixelLayout::rgb,        PixelLayout::bayer_rggb,
                                     PixelLayout::bayer_grbg, PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr};
 

@@ -3,8 +3,8 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/doc_example.h"
 #include "spartan/testing/temporary_folder.h"
@@ -15,8 +15,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using testing::replaced;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 const std::string kGood = R"(schema: 1
 cameras:
@@ -83,7 +81,7 @@ TEST(RigYaml, ReadsTheExampleInTheDocumentation) {
   ASSERT_TRUE(rig) << rig.error().message();
   EXPECT_EQ(rig->name, "my_rover");
   ASSERT_EQ(rig->pan_tilt_units.size(), 1u);
-  EXPECT_NEAR(rig->pan_tilt_units[0].rest_tilt_rad, 39 * kDegree, 1e-15);
+  EXPECT_NEAR(rig->pan_tilt_units[0].rest_tilt_rad, 39 * kRadiansPerDegree, 1e-15);
   ASSERT_EQ(rig->cameras.size(), 4u);
   const Camera& left = rig->cameras[0];
   EXPECT_EQ(left.pixel_format, (PixelFormat{PixelLayout::bayer_rggb, 12, BitAlignment::low}));
@@ -171,6 +169,9 @@ TEST(RigYaml, ErrorsNameFileLineAndKey) {
       error_for("[0.1, 0, 0]\n", "[0.1, 0, 0]\n    quaternion_xyzw: [0, 0, 0, 1]\n    roll_pitch_yaw_deg: [0, 0, 0]\n"),
       HasSubstr("the rotation is given twice"));
   EXPECT_THAT(error_for("right: r", "right: x"), HasSubstr("my.yaml:12: pairs.p.right: there is no camera 'x'"));
+  EXPECT_THAT(error_for("right: r", "right: l"), HasSubstr("pairs.p.right: left and right are the same camera"));
+  EXPECT_THAT(error_for("[0.1, 0, 0]\n", "[0, 0, 0]\n"),
+              HasSubstr("pairs.p: both cameras are at the same position: the baseline is zero"));
   EXPECT_THAT(error_for("pairs:\n  p: {left: l, right: r}\n", "pairs: {}\n"),
               HasSubstr("pairs: there is no stereo pair"));
   EXPECT_THAT(error_for("  r:\n", "  l:\n"), HasSubstr("my.yaml:3: cameras.l: is given twice, again in line 4"));

@@ -9,7 +9,7 @@
 namespace spartan {
 namespace {
 
-double random_in(double low, double high) {
+double uniform(double low, double high) {
   return low + (high - low) * 1e-6 * *rc::gen::inRange(0, 1'000'001);
 }
 
@@ -20,7 +20,7 @@ double difference_deg(double a, double b) {
 
 std::vector<double> random_angles() {
   std::vector<double> angles(*rc::gen::inRange<std::size_t>(1, 8));
-  for (double& angle : angles) angle = random_in(-400, 400);
+  for (double& angle : angles) angle = uniform(-400, 400);
   return angles;
 }
 
@@ -52,7 +52,7 @@ TEST(AzimuthSet, TouchingSectorsAreMerged) {
 
 RC_GTEST_PROP(AzimuthSet, ContainsAzimuthsAroundItsMiddles, ()) {
   const std::vector<double> angles = random_angles();
-  const double half = random_in(0, 100), azimuth = random_in(-400, 400);
+  const double half = uniform(0, 100), azimuth = uniform(-400, 400);
   double nearest = 360;
   for (const double angle : angles) nearest = std::min(nearest, difference_deg(angle, azimuth));
   RC_PRE(std::abs(nearest - half) > 1e-6);
@@ -60,10 +60,10 @@ RC_GTEST_PROP(AzimuthSet, ContainsAzimuthsAroundItsMiddles, ()) {
 }
 
 RC_GTEST_PROP(AzimuthSet, IntersectionContainsWhatBothContain, ()) {
-  const AzimuthSet a = AzimuthSet::around(0, random_in(1, 60)).rotated_by(random_angles()),
-                   b = AzimuthSet::around(0, random_in(1, 60)).rotated_by(random_angles());
+  const AzimuthSet a = AzimuthSet::around(0, uniform(1, 60)).rotated_by(random_angles()),
+                   b = AzimuthSet::around(0, uniform(1, 60)).rotated_by(random_angles());
   const AzimuthSet both = a.intersected_with(b);
-  const double azimuth = random_in(-180, 180);
+  const double azimuth = uniform(-180, 180);
   RC_PRE(a.contains(azimuth - 1e-6) == a.contains(azimuth + 1e-6));
   RC_PRE(b.contains(azimuth - 1e-6) == b.contains(azimuth + 1e-6));
   RC_ASSERT(both.contains(azimuth) == (a.contains(azimuth) && b.contains(azimuth)));
@@ -72,7 +72,7 @@ RC_GTEST_PROP(AzimuthSet, IntersectionContainsWhatBothContain, ()) {
 }
 
 RC_GTEST_PROP(AzimuthSet, SectorsAreAscendingAndDisjoint, ()) {
-  const AzimuthSet set = AzimuthSet::around(0, random_in(0, 30)).rotated_by(random_angles());
+  const AzimuthSet set = AzimuthSet::around(0, uniform(0, 30)).rotated_by(random_angles());
   double before = -181;
   for (const AzimuthSector& sector : set.sectors()) {
     RC_ASSERT(sector.from_deg > before && sector.to_deg > sector.from_deg);

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig_design/internal/stereo_relations.h"
 #include "spartan/rig_design/rig_designer.h"
 
@@ -14,11 +15,10 @@ using namespace internal;
 
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 // Published values are rounded: relative differences below this are accepted.
 constexpr double kRoundingTolerance = 0.01;
 // A limit is violated where it is exceeded by more than rounding errors.
-constexpr double kTolerance = 1e-9;
+constexpr double kMarginTolerance = 1e-9;
 
 // One pair with its requirements and results, and the list that receives its warnings.
 struct PairContext {
@@ -98,7 +98,7 @@ void warn_about_stereo_angles(const PairContext& c) {
 }
 
 void warn_about_rounding(const PairContext& c) {
-  if (!(c.design.smallest_limit_distance < kTolerance)) return;
+  if (!(c.design.smallest_limit_distance < kMarginTolerance)) return;
   c.warn("on_a_limit", c.design.smallest_limit_distance,
          "a combination is within 1e-9 of a limit; values on a limit count as feasible");
 }
@@ -107,18 +107,18 @@ void warn_about_rounding(const PairContext& c) {
 
 void warn_about_limits(const PairContext& c, const PairMetrics& pair) {
   const PairRequirements& required = c.requirements;
-  if (pair.margins.stereo_angle_deg < -kTolerance) {
+  if (pair.margins.stereo_angle_deg < -kMarginTolerance) {
     c.warn("stereo_angle_large", pair.stereo_angle_deg,
            fmt::format("the published pair has a stereo angle of {:.1f} deg, at most {} deg are allowed",
                        pair.stereo_angle_deg, required.largest_stereo_angle_deg));
   }
-  if (pair.margins.search_percent < -kTolerance) {
+  if (pair.margins.search_percent < -kMarginTolerance) {
     c.warn("search_large", pair.search_percent,
            fmt::format(
                "the published pair has a disparity search range of {:.1f} % of the width, at most {} % are allowed",
                pair.search_percent, required.largest_search_percent));
   }
-  if (pair.margins.baseline_m < -kTolerance) {
+  if (pair.margins.baseline_m < -kMarginTolerance) {
     c.warn("baseline_short", pair.parameters.baseline_m,
            fmt::format("the published pair has a baseline of {} m, at least {} m are required",
                        pair.parameters.baseline_m, required.smallest_baseline_m));
@@ -127,7 +127,7 @@ void warn_about_limits(const PairContext& c, const PairMetrics& pair) {
 
 // The range at which the resolution is met, if it is too short, and two remedies.
 void warn_about_range(const PairContext& c, const PairMetrics& pair) {
-  if (pair.margins.range_m >= -kTolerance) return;
+  if (pair.margins.range_m >= -kMarginTolerance) return;
   const PairRequirements& required = c.requirements;
   const double hfov_rad = pair.parameters.hfov_deg * kRadiansPerDegree;
   const StereoGeometry parameters{pair.parameters.baseline_m, static_cast<double>(pair.parameters.width_px), hfov_rad};
@@ -223,7 +223,7 @@ void warn_about_azimuth(const PairContext& c, const PanCoverage& pans) {
 void warn_about_overlap(const PairContext& c, const PanCoverage& pans) {
   if (!pans.overlap) return;
   const double required_percent = c.requirements.pans->smallest_overlap_percent, percent = pans.overlap->percent();
-  if (percent < required_percent - kTolerance) {
+  if (percent < required_percent - kMarginTolerance) {
     c.warn("pan_overlap", percent,
            fmt::format("neighbouring pans {}{}, an overlap of {} % is required", to_text(*pans.overlap),
                        percent >= 0 ? " of the view" : "", required_percent));

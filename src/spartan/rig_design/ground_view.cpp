@@ -1,9 +1,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig_design/internal/stereo_relations.h"
 #include "spartan/rig_design/rig_designer.h"
 
@@ -12,8 +12,6 @@ namespace spartan {
 using namespace internal;
 
 namespace {
-
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 // Twice the signed area of the triangle o, a, b; positive if counter-clockwise.
 double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {

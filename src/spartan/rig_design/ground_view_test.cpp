@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig/rig.h"
 #include "spartan/rig_design/rig_designer.h"
 #include "spartan/testing/real_data.h"
@@ -12,9 +12,8 @@
 namespace spartan {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-const GroundView kWide{1.0, 39 * kDegree, 50 * kDegree, 50 * kDegree, 0.20};
-const GroundView kNarrow{0.30, 31.55 * kDegree, 66 * kDegree, 49.5 * kDegree, 0.12};
+const GroundView kWide{1.0, 39 * kRadiansPerDegree, 50 * kRadiansPerDegree, 50 * kRadiansPerDegree, 0.20};
+const GroundView kNarrow{0.30, 31.55 * kRadiansPerDegree, 66 * kRadiansPerDegree, 49.5 * kRadiansPerDegree, 0.12};
 
 double random_in(double low, double high) {
   return low + (high - low) * 1e-6 * *rc::gen::inRange(0, 1'000'001);
@@ -27,7 +26,7 @@ const Rig& rover() {
 }
 Pose body_from(const std::string& camera, double pan_rad) {
   const bool on_mast = rover().find_camera(camera)->mount == "mast";
-  return on_mast ? rover().body_from_camera(camera, pan_rad, 39 * kDegree) : rover().body_from_camera(camera);
+  return on_mast ? rover().body_from_camera(camera, pan_rad, 39 * kRadiansPerDegree) : rover().body_from_camera(camera);
 }
 
 // Intersection of the ray of a pixel with the ground.
@@ -73,13 +72,13 @@ void expect_corners(const GroundView& view, const std::string& pair, double pan_
 }
 
 TEST(GroundView, CornersAgreeWithTheShippedRig) {
-  for (const double pan_deg : {-35.0, 0.0, 35.0}) expect_corners(kWide, "wide", pan_deg * kDegree);
+  for (const double pan_deg : {-35.0, 0.0, 35.0}) expect_corners(kWide, "wide", pan_deg * kRadiansPerDegree);
   expect_corners(kNarrow, "narrow", 0);
 }
 
 // Points all around: in the polygon exactly where both cameras of the shipped rig have them in the image.
 RC_GTEST_PROP(GroundView, CommonFootprintIsWhatBothCamerasSee, (bool wide)) {
-  const double pan = wide ? random_in(-60, 60) * kDegree : 0;
+  const double pan = wide ? random_in(-60, 60) * kRadiansPerDegree : 0;
   const Eigen::Vector2d p(random_in(-2, 5), random_in(-5, 5));
   const std::string name = wide ? "wide" : "narrow";
   const double inside =
@@ -90,9 +89,9 @@ RC_GTEST_PROP(GroundView, CommonFootprintIsWhatBothCamerasSee, (bool wide)) {
 
 TEST(GroundView, PublishedValuesOfTheFarEdge) {
   const GroundPolygon one_camera = footprint(kWide, 0, 0), both = common_footprint(kWide, 0);
-  EXPECT_NEAR(far_edge_half_azimuth_rad(one_camera).value() / kDegree, 23.54, 0.005);
+  EXPECT_NEAR(far_edge_half_azimuth_rad(one_camera).value() / kRadiansPerDegree, 23.54, 0.005);
   EXPECT_NEAR(one_camera[1].norm(), 4.37, 0.006);
-  EXPECT_NEAR(2 * (35 + far_edge_half_azimuth_rad(both).value() / kDegree), 114.6, 0.05);
+  EXPECT_NEAR(2 * (35 + far_edge_half_azimuth_rad(both).value() / kRadiansPerDegree), 114.6, 0.05);
   EXPECT_NEAR(near_edge_m(kWide), 0.488, 0.0005);
   EXPECT_NEAR(far_edge_m(kNarrow), 2.516, 0.0005);
   // From the pixels: the left corner of the right camera limits the common footprint on the left.
@@ -121,8 +120,8 @@ RC_GTEST_PROP(GroundView, RectanglesIntersectInARectangle, ()) {
 }
 
 RC_GTEST_PROP(GroundView, IntersectionLiesInBothFootprints, ()) {
-  const GroundPolygon a = common_footprint(kWide, random_in(-40, 0) * kDegree),
-                      b = common_footprint(kWide, random_in(0, 40) * kDegree);
+  const GroundPolygon a = common_footprint(kWide, random_in(-40, 0) * kRadiansPerDegree),
+                      b = common_footprint(kWide, random_in(0, 40) * kRadiansPerDegree);
   const GroundPolygon common = intersection(a, b);
   RC_ASSERT(area_m2(common) <= std::min(area_m2(a), area_m2(b)) + 1e-12);
   RC_ASSERT(std::abs(area_m2(common) - area_m2(intersection(b, a))) < 1e-9);
@@ -133,13 +132,13 @@ RC_GTEST_PROP(GroundView, IntersectionLiesInBothFootprints, ()) {
 // Footprints ahead of the rover, around it (the bottom row points backwards), and with many corners.
 RC_GTEST_PROP(GroundView, AzimuthsAgreeWithPointInPolygon, (bool around)) {
   GroundView view = kWide;
-  if (around) view.tilt_rad = random_in(70, 90) * kDegree;
-  GroundPolygon polygon = common_footprint(view, random_in(-180, 180) * kDegree);
-  if (!around) polygon = intersection(polygon, common_footprint(view, random_in(-180, 180) * kDegree));
-  const double azimuth = random_in(-180, 180) * kDegree, r = random_in(0, 6);
+  if (around) view.tilt_rad = random_in(70, 90) * kRadiansPerDegree;
+  GroundPolygon polygon = common_footprint(view, random_in(-180, 180) * kRadiansPerDegree);
+  if (!around) polygon = intersection(polygon, common_footprint(view, random_in(-180, 180) * kRadiansPerDegree));
+  const double azimuth = random_in(-180, 180) * kRadiansPerDegree, r = random_in(0, 6);
   const auto at = [&](double a) { return Eigen::Vector2d(r * std::cos(a), r * std::sin(a)); };
   RC_PRE(contains(polygon, at(azimuth - 1e-9)) == contains(polygon, at(azimuth + 1e-9)));  // not on a border
-  RC_ASSERT(azimuths_at(polygon, r).contains(azimuth / kDegree) == contains(polygon, at(azimuth)));
+  RC_ASSERT(azimuths_at(polygon, r).contains(azimuth / kRadiansPerDegree) == contains(polygon, at(azimuth)));
 }
 
 TEST(GroundView, CircleThroughARectangle) {
@@ -162,7 +161,7 @@ TEST(GroundView, FootprintsOfAWideBaselineDoNotOverlap) {
 
 TEST(GroundView, ViewsOfTheHorizonHaveNoFootprint) {
   GroundView level = kWide;
-  level.tilt_rad = 25 * kDegree;
+  level.tilt_rad = 25 * kRadiansPerDegree;
   EXPECT_FALSE(is_below_horizon(level));
   EXPECT_THROW(footprint(level, 0, 0), std::invalid_argument);
   EXPECT_TRUE(std::isinf(far_edge_m(level)));

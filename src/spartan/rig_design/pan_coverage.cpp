@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig_design/internal/stereo_relations.h"
 #include "spartan/rig_design/rig_designer.h"
 
@@ -11,7 +11,6 @@ using namespace internal;
 
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 // Samples between two critical distances: the resolution with which full coverage is searched (empirical).
 constexpr int kSamplesPerInterval = 64;
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 
 #include "spartan/core/files.h"
+#include "spartan/core/pose.h"
 #include "spartan/core/strict_yaml.h"
 #include "spartan/rig_design/internal/stereo_relations.h"
 
@@ -19,7 +19,6 @@ namespace {
 
 constexpr int kSchema = 1;
 constexpr std::size_t kMaxListLength = 1000;
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 // Bounds of a value, both included.
 struct Limits {

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <utility>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig_design/internal/stereo_relations.h"
 
 namespace spartan {
@@ -17,7 +17,6 @@ using namespace internal;
 
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 // Tolerance of limits and of equality: more than rounding errors, less than any relevant difference.
 constexpr double kTolerance = 1e-9;

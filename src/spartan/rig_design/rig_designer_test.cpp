@@ -15,19 +15,19 @@
 namespace spartan {
 namespace {
 
-const RigRequirements& rover() {
+const RigRequirements& rover_requirements() {
   static const RigRequirements requirements =
       read_requirements(testing::source_folder() + "/config/requirements/rover.yaml").value();
   return requirements;
 }
 const RigDesign& rover_design() {
-  static const RigDesign design = design_rig(rover());
+  static const RigDesign design = design_rig(rover_requirements());
   return design;
 }
 
 // The design after a change of the requirements.
 RigDesign design_after(const std::function<void(RigRequirements&)>& change) {
-  RigRequirements requirements = rover();
+  RigRequirements requirements = rover_requirements();
   change(requirements);
   return design_rig(requirements);
 }
@@ -79,7 +79,7 @@ TEST(RigDesigner, FindsTheFeasibleSetOfThePublishedLists) {
   EXPECT_EQ(wide.combinations, 128960u);
   EXPECT_EQ(wide.feasible.size(), 12592u);
   EXPECT_EQ(wide.with_pan_overlap_count, 8876u);
-  EXPECT_EQ(count_feasible(rover().wide), 12592u);
+  EXPECT_EQ(count_feasible(rover_requirements().wide), 12592u);
   std::set<Whole> found;
   for (const PairMetrics& pair : wide.feasible) found.insert(whole(pair.parameters));
   EXPECT_EQ(found, feasible_by_tangents());
@@ -102,7 +102,7 @@ TEST(RigDesigner, ReproducesThePublishedWidePair) {
   EXPECT_NEAR(pair.margins.range_m, pair.range_m - 4, 1e-12);
   EXPECT_NEAR(pair.margins.baseline_m, 0.1, 1e-12);
   // The tilt rule yields the published tilt.
-  EXPECT_EQ(metrics_of(pair.parameters, rover().wide).tilt_deg, 39);
+  EXPECT_EQ(metrics_of(pair.parameters, rover_requirements().wide).tilt_deg, 39);
 }
 
 TEST(RigDesigner, ReproducesThePublishedNarrowPair) {
@@ -114,7 +114,7 @@ TEST(RigDesigner, ReproducesThePublishedNarrowPair) {
   EXPECT_NEAR(pair.view_far_m, 2.516, 0.0005);
   EXPECT_NEAR(rover_design().view_overlap_m.value(), 2.03, 0.005);
   EXPECT_EQ(rover_design().narrow->with_pan_overlap_count, std::nullopt);
-  RigRequirements without_tilt = rover();
+  RigRequirements without_tilt = rover_requirements();
   without_tilt.narrow->published->tilt_deg.reset();
   EXPECT_EQ(published_metrics(*without_tilt.narrow).tilt_deg, 31.55) << "the tilt rule yields the published tilt";
 }
@@ -252,7 +252,7 @@ TEST(RigDesigner, WarningsFollowTheRequirements) {
 }
 
 TEST(RigDesigner, CandidatesAreInEveryList) {
-  const PairParameters published = rover().wide.published->parameters;
+  const PairParameters published = rover_requirements().wide.published->parameters;
   PairParameters others[] = {published, published, published, published, published};
   others[0].baseline_m = 0.205;
   others[1].nearest_m = 1.05;
@@ -336,7 +336,7 @@ TEST(RigDesigner, PairsWithoutCommonGround) {
 
 RC_GTEST_PROP(RigDesigner, WarningsHaveFiniteValues, ()) {
   const auto one_of = [](std::initializer_list<double> values) { return *rc::gen::elementOf(std::vector(values)); };
-  RigRequirements r = rover();
+  RigRequirements r = rover_requirements();
   r.wide.lists = r.narrow->lists = {{0.1, 0.2}, {1}, {50}, {5.5}, {1120}};
   const std::size_t count = *rc::gen::inRange<std::size_t>(1, 6);
   r.wide.pans->angles_deg.clear();
@@ -358,7 +358,7 @@ TEST(RigDesigner, TiltsReachTheRange) {
     ASSERT_GE(pair.view_far_m, 4);
     PairMetrics lower = pair;
     lower.tilt_deg += 1;
-    ASSERT_LT(far_edge_m(ground_view(lower, rover().wide)), 4);
+    ASSERT_LT(far_edge_m(ground_view(lower, rover_requirements().wide)), 4);
   }
 }
 

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/sim/scenario.h"
 
 namespace spartan::sim {
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr double kSettle_s = 0.5;  // stationary before and after the frames of a stop; empirical
 constexpr double kSame_m = 0.005;  // tolerance between distances: half of Motion::kStep_m
 

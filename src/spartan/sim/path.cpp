@@ -5,12 +5,11 @@
 #include <functional>
 #include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/sim/scenario.h"
 
 namespace spartan::sim {
 namespace {
-
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 // Distance covered during the acceleration phase, as a fraction of (full speed × ramp time): the integral of the
 // smooth step t³(6t² − 15t + 10) from 0 to t in 0 … 1.

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
+
+#include "spartan/core/pose.h"
 
 namespace spartan::sim {
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr double kEdge_m = 10;  // minimum distance of the path from the edge of the terrain
 
 // Collects errors with the line of their key.

@@ -10,6 +10,7 @@
 #include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
 #include "spartan/sim/scenario_options.h"
+#include "spartan/sim/sensor_options.h"
 
 namespace spartan::sim {
 

@@ -9,7 +9,7 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kMergerVersion = 1;
 
 Matrix6d symmetric(const Matrix6d& m) {
   return 0.5 * (m + m.transpose());
@@ -48,6 +48,13 @@ double view_reach(const MapOptions& map, const MatchOptions& match) {
 }
 
 }  // namespace
+
+Result<MapMerger> MapMerger::create(const SlamOptions& options, const MapOptions& map_options,
+                                    const ThreadPool& workers) {
+  if (Status valid = validate(options, "SLAM options"); !valid) return failure(valid);
+  if (Status valid = validate(map_options, "map options"); !valid) return failure(valid);
+  return MapMerger(options, map_options, workers);
+}
 
 MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers)
     : options_(options),
@@ -111,7 +118,7 @@ Result<MapMergeResult> MapMerger::add(std::span<const SurfacePoint> points, cons
 
 Bytes MapMerger::save() const {
   ArchiveWriter out;
-  out.put(kVersion);
+  out.put(kMergerVersion);
   out.put(static_cast<std::uint64_t>(map_.submaps().size()));
   out.put(static_cast<std::uint64_t>(map_.stops().size()));
   out.put(static_cast<std::uint64_t>(map_.tiles()));
@@ -120,9 +127,9 @@ Bytes MapMerger::save() const {
 
 Status MapMerger::restore(const Bytes& bytes, TileStore& store) {
   ArchiveReader in(bytes);
-  if (const auto version = in.get<std::uint32_t>(); version != kVersion) {
+  if (const auto version = in.get<std::uint32_t>(); version != kMergerVersion) {
     return failure(ErrorCode::input,
-                   "has version " + std::to_string(version) + ", expected " + std::to_string(kVersion),
+                   "has version " + std::to_string(version) + ", expected " + std::to_string(kMergerVersion),
                    "saved state of the map merging", "run again into a new folder");
   }
   const auto submaps = in.get<std::uint64_t>(), stops = in.get<std::uint64_t>(), tiles = in.get<std::uint64_t>();

@@ -68,7 +68,8 @@ struct MapMergeResult {
 /// defines the map frame. Derivation: docs/math/map_merging.md.
 class MapMerger {
  public:
-  MapMerger(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers);
+  /// Code `configuration` where an option is out of bounds.
+  static Result<MapMerger> create(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers);
 
   /// Adds the points of one stop, in its body frame. `world_from_body`: prior pose of the odometry or the localization.
   /// Errors are those of the store that tiles are read from; after one nothing has changed.
@@ -88,6 +89,7 @@ class MapMerger {
   Status restore(const Bytes& bytes, TileStore& store);
 
  private:
+  MapMerger(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers);
   Matrix6d map_covariance(const MapView& view, const LocalMap& local, const Pose& world_from_body) const;
 
   SlamOptions options_;

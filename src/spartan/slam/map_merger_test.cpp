@@ -8,6 +8,7 @@
 #include "spartan/slam/internal/map_refinement.h"
 #include "spartan/slam/internal/synthetic_stop_test.h"
 #include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 
@@ -30,7 +31,7 @@ Pose off_by(const Pose& pose, double x, double y, double yaw) {
 }
 
 MapMerger make_merger() {
-  return {SlamOptions(), MapOptions(), ThreadPool(2)};
+  return MapMerger::create({}, {}, ThreadPool(2)).value();
 }
 
 Pose stop(const Ground& ground, int i) {
@@ -177,6 +178,16 @@ TEST(MapMerger, ResumesAfterSavingWithTheSameResult) {
   memory[0] = 7;
   EXPECT_THAT(make_merger().restore(memory, store).error().message(), HasSubstr("version 7"));
   EXPECT_FALSE(make_merger().restore({}, store));
+}
+
+TEST(MapMerger, RefusesOptionsOutOfBounds) {
+  SlamOptions slam;
+  slam.match.step_m = 0;
+  EXPECT_THAT(testing::error_message(MapMerger::create(slam, {}, ThreadPool(1))),
+              HasSubstr("SLAM options: match.step_m is 0"));
+  MapOptions map;
+  map.cell_m = 0;
+  EXPECT_THAT(testing::error_message(MapMerger::create({}, map, ThreadPool(1))), HasSubstr("map options: cell_m is 0"));
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kSubmapVersion = 1;
 
 void put(ArchiveWriter& out, const CellSurface& s) {
   for (const float value : {s.elevation_m, s.variance_m2, s.lowest_m, s.highest_m, s.count, s.occupancy_logodds})
@@ -43,7 +43,7 @@ std::optional<LatticeOffset> Submap::lattice_offset(double cell_m) const {
 
 Bytes to_bytes(const Tile& tile) {
   ArchiveWriter out;
-  out.put(kVersion);
+  out.put(kSubmapVersion);
   std::uint32_t seen = 0;
   for (const MapCell& cell : tile.cells) seen += cell.surface.observed() ? 1 : 0;
   out.put(seen);
@@ -61,9 +61,9 @@ Bytes to_bytes(const Tile& tile) {
 Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
   ArchiveReader in(bytes);
   const auto version = in.get<std::uint32_t>();
-  if (version != kVersion) {
+  if (version != kSubmapVersion) {
     return failure(ErrorCode::input,
-                   "has version " + std::to_string(version) + ", expected " + std::to_string(kVersion), what,
+                   "has version " + std::to_string(version) + ", expected " + std::to_string(kSubmapVersion), what,
                    "run again into a new folder to rebuild the map");
   }
   Tile tile;

@@ -1,5 +1,3 @@
-#include "spartan/system/export.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>

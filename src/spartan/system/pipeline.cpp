@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "spartan/localization/dead_reckoning.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/system/internal/stop_stage.h"
@@ -35,20 +34,21 @@ const StereoPair* pair_for_odometry(const Rig& rig, const std::string& name) {
 }  // namespace
 
 struct Pipeline::State {
+  // The options are valid, so that create() of a stage cannot fail.
   State(Rig rig_in, const RunOptions& options_in, Imager imager_in, const StereoPair& pair_in,
         const ThreadPool& workers)
       : rig(std::move(rig_in)),
         options(options_in),
         pair(pair_in),
         imager(std::move(imager_in)),
-        odometer(options_in.odometry, workers),
-        disparity_computer(options_in.reconstruction, workers),
-        localizer(with_gravity(options_in)),
-        odometry_filter(with_gravity(options_in)),
-        slam_filter(with_gravity(options_in)),
+        odometer(Odometer::create(options_in.odometry, workers).value()),
+        disparity_computer(DisparityComputer::create(options_in.reconstruction, workers).value()),
+        localizer(Localizer::create(with_gravity(options_in)).value()),
+        odometry_filter(VisionOnlyFilter::create(with_gravity(options_in)).value()),
+        slam_filter(VisionOnlyFilter::create(with_gravity(options_in)).value()),
         dead_reckoning(options_in.localization.vision),
-        stop_stage(options_in.reconstruction, options_in.mapping, workers),
-        merger(options_in.slam, options_in.mapping.map, workers) {
+        stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers).value()),
+        merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers).value()) {
     maps_stops = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
     computes_terrain = options.terrain.enabled && !options.odometry_only;
   }
@@ -220,7 +220,9 @@ Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Thr
   }
   auto imager = Imager::create(rig, options.imaging, workers, mask_folder);
   if (!imager) return failure(imager);
-  return Pipeline(std::make_unique<State>(rig, resolved_options(options, rig), std::move(*imager), *pair, workers));
+  const RunOptions resolved = resolved_options(options, rig);
+  if (Status status = validate(resolved, "options with the values of the rig"); !status) return failure(status);
+  return Pipeline(std::make_unique<State>(rig, resolved, std::move(*imager), *pair, workers));
 }
 
 Pipeline::Pipeline(std::unique_ptr<State> state) : state_(std::move(state)) {}

@@ -18,11 +18,11 @@ namespace {
 
 const RectifiedStereo kWide{{320, 320}, 340, {159.5, 159.5}, 0.2};
 const RectifiedStereo kNarrow{{320, 240}, 250, {159.5, 119.5}, 0.12};
-constexpr double kStep_m = 0.15;
+constexpr double kStopDistance_m = 0.15;
 constexpr int kFrames = 5;  // of the narrow pair; the wide pair has views at the first and the last
 
 // Wide cameras on a mast, 1 m high and 35° down, narrow ones at half a metre.
-Rig rover() {
+Rig mapping_rover() {
   const auto add = [](Rig& rig, const std::string& pair, const RectifiedStereo& stereo, const Pose& body_from_left) {
     for (const char* side : {"left", "right"}) {
       Camera camera;
@@ -45,8 +45,8 @@ Rig rover() {
   return rig;
 }
 
-Pose world_from_body(int index) {
-  return Pose::from_translation({kStep_m * index, 0, 0});
+Pose pose_at(int index) {
+  return Pose::from_translation({kStopDistance_m * index, 0, 0});
 }
 
 // Rendered at the first call, then cached.
@@ -62,9 +62,9 @@ const testing::SyntheticFrame& images_of(const std::string& pair, int index) {
   const auto key = std::pair(pair, index);
   const auto found = rendered.find(key);
   if (found != rendered.end()) return found->second;
-  const Pose body_from_left = rover().body_from_camera(pair + "_left");
+  const Pose body_from_left = mapping_rover().body_from_camera(pair + "_left");
   return rendered
-      .emplace(key, world.render(pair == "wide" ? kWide : kNarrow, world_from_body(index) * body_from_left,
+      .emplace(key, world.render(pair == "wide" ? kWide : kNarrow, pose_at(index) * body_from_left,
                                  static_cast<std::uint64_t>(pair == "wide" ? 100 + index : index)))
       .first->second;
 }
@@ -89,7 +89,7 @@ void add_wide_view(Pipeline& pipeline, int index, double after_s = 1) {
 }
 
 TEST(PipelineMaps, StopsAreMappedAndMatchedToEachOther) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
   EXPECT_FALSE(drive_to(pipeline, 0).stop);
   add_wide_view(pipeline, 0);
   const FrameResult next = drive_to(pipeline, 1);
@@ -103,14 +103,14 @@ TEST(PipelineMaps, StopsAreMappedAndMatchedToEachOther) {
   ASSERT_TRUE(last);
   ASSERT_EQ(last->merged.match.status, MatchStatus::decided) << "after 60 cm the maps overlap";
   EXPECT_GT(last->merged.match.overlap, 0.4);
-  EXPECT_LT((last->merged.corrected.pose.translation() - world_from_body(kFrames - 1).translation()).norm(), 0.015);
+  EXPECT_LT((last->merged.corrected.pose.translation() - pose_at(kFrames - 1).translation()).norm(), 0.015);
   ASSERT_TRUE(last->merged.constraint);
   EXPECT_EQ(last->merged.constraint->stamp, Stamp::from_seconds(3.0 * (kFrames - 1)));
   EXPECT_FALSE(pipeline.finish_stop().value()) << "a stop is finished once";
 }
 
 TEST(PipelineMaps, MapConstraintUpdatesTheLocalization) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
   FrameResult result = drive_to(pipeline, 0);
   add_wide_view(pipeline, 0);
   for (int i = 1; i < kFrames; ++i) result = drive_to(pipeline, i);
@@ -135,7 +135,7 @@ TEST(PipelineMaps, ConstraintIsAppliedAfterLongStopWithOdometryFrames) {
     SCOPED_TRACE(buffer_s);
     RunOptions options;
     options.localization.buffer_s = buffer_s;
-    Pipeline pipeline = Pipeline::create(rover(), options, ThreadPool(2)).value();
+    Pipeline pipeline = Pipeline::create(mapping_rover(), options, ThreadPool(2)).value();
     FrameResult result = drive_to(pipeline, 0);
     add_wide_view(pipeline, 0);
     for (int i = 1; i < kFrames; ++i) result = drive_to(pipeline, i);
@@ -154,7 +154,7 @@ TEST(PipelineMaps, ConstraintIsAppliedAfterLongStopWithOdometryFrames) {
     EXPECT_EQ(result.stop->stamp, Stamp::from_seconds(arrival_s));
     EXPECT_EQ(result.localization->health_of(LocalizationSensor::map).used, 1);
     EXPECT_EQ(result.localization->health_of(LocalizationSensor::map).refused.too_late, 0);
-    const Eigen::Vector3d truth = world_from_body(kFrames).translation();
+    const Eigen::Vector3d truth = pose_at(kFrames).translation();
     EXPECT_LT((result.localization->world_from_body.pose.translation() - truth).norm(), 0.015);
     EXPECT_LT((result.slam->pose.translation() - truth).norm(), 0.015);
     const auto relative = [](const UncertainPose& a, const UncertainPose& b) { return a.pose.inverse() * b.pose; };
@@ -165,7 +165,7 @@ TEST(PipelineMaps, ConstraintIsAppliedAfterLongStopWithOdometryFrames) {
 }
 
 TEST(PipelineMaps, ViewsMayComeBeforeTheOdometryFrame) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
   add_wide_view(pipeline, 0, -1);
   add_wide_view(pipeline, 0, -0.5);
   EXPECT_FALSE(drive_to(pipeline, 0).stop);
@@ -182,8 +182,8 @@ TEST(PipelineMaps, ViewsMayComeBeforeTheOdometryFrame) {
 
 // Saved at a narrow frame between two wide views.
 TEST(PipelineMaps, StopContinuesFromRestoredState) {
-  Pipeline uninterrupted = Pipeline::create(rover(), {}, ThreadPool(1)).value(),
-           resumed = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline uninterrupted = Pipeline::create(mapping_rover(), {}, ThreadPool(1)).value(),
+           resumed = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
   drive_to(uninterrupted, 0);
   add_wide_view(uninterrupted, 0);
   ASSERT_TRUE(uninterrupted.add(frame_of(images_of("narrow", 0), "narrow", 0, 1.5)).value().has_value());
@@ -235,8 +235,8 @@ void expect_same_map(const LocalMap& a, const LocalMap& b) {
 
 // More views than an eight-bit mask can distinguish, saved and restored between the ninth and the tenth.
 TEST(PipelineMaps, StopMayHaveAnyNumberOfViews) {
-  Pipeline uninterrupted = Pipeline::create(rover(), {}, ThreadPool(1)).value(),
-           resumed = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline uninterrupted = Pipeline::create(mapping_rover(), {}, ThreadPool(1)).value(),
+           resumed = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
   drive_to(uninterrupted, 0);
   for (int i = 1; i <= 8; ++i) add_wide_view(uninterrupted, 0, 0.1 * i);
   ASSERT_TRUE(uninterrupted.add(frame_of(images_of("narrow", 0), "narrow", 0, 1)).value().has_value());
@@ -265,7 +265,7 @@ struct StoredRover {
   testing::TemporaryFolder folder;
   Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
   TileStore tiles = TileStore::open(db).value();
-  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
 
   // Maps the first stop and collects views of the second; then restores the state, so that map tiles are only in the
   // store.
@@ -277,7 +277,7 @@ struct StoredRover {
     add_wide_view(pipeline, kFrames - 1);
     ASSERT_TRUE(db.execute("BEGIN IMMEDIATE") && pipeline.flush_maps() && db.execute("COMMIT"));
     const Bytes memory = pipeline.save();
-    pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+    pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
     pipeline.store_maps_in(tiles);
     ASSERT_TRUE(pipeline.restore(memory, tiles));
     for (const FrameKey& key : pipeline.pending_frames()) {
@@ -344,8 +344,8 @@ TEST(PipelineMaps, DamagedTileLeavesStateUnchanged) {
 }
 
 TEST(PipelineMaps, FramesOfWrongSizeLeaveStateUnchanged) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value(),
-           reference = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value(),
+           reference = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
   const Image<std::uint8_t> cut(100, 100);
   const auto expect_rejected = [&](const char* pair, int position_id, double seconds) {
     StereoFrame frame = frame_of(images_of(pair, 0), pair, position_id, seconds);
@@ -370,8 +370,8 @@ TEST(PipelineMaps, FramesOfWrongSizeLeaveStateUnchanged) {
 }
 
 TEST(PipelineMaps, EarlyViewsOfOnlyOneStopAreRetained) {
-  Pipeline pipeline = Pipeline::create(rover(), {}, ThreadPool(2)).value(),
-           other = Pipeline::create(rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value(),
+           other = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
   for (int id = 0; id < 4; ++id) {
     const StereoFrame view = frame_of(images_of("wide", 0), "wide", id, 5.0 * (id + 1));
     ASSERT_FALSE(pipeline.add(view).value().has_value());
@@ -387,7 +387,7 @@ TEST(PipelineMaps, EarlyViewsOfOnlyOneStopAreRetained) {
 TEST(PipelineMaps, OptionDisablesMaps) {
   RunOptions options;
   options.maps = false;
-  Pipeline pipeline = Pipeline::create(rover(), options, ThreadPool(1)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), options, ThreadPool(1)).value();
   drive_to(pipeline, 0);
   add_wide_view(pipeline, 0);
   EXPECT_FALSE(drive_to(pipeline, 1).stop);

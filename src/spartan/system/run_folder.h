@@ -1,4 +1,4 @@
-// A run folder: its files (docs/reference/files.md) and its trajectories.
+// A run folder: its files (docs/reference/files.md), its trajectories, and their export in formats of other tools.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "spartan/core/result.h"
+#include "spartan/core/threads.h"
 #include "spartan/core/time.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/run_store.h"
@@ -64,5 +65,18 @@ Result<FolderState> prepare_run_folder(const RunFolder& folder, bool resume);
 
 /// Removes the folder of a run that failed without any result.
 void remove_run_folder(const RunFolder& folder);
+
+enum class ExportFormat { tum, kitti, euroc, csv, geotiff, ply };
+
+/// Code `usage` for an unknown name.
+Result<ExportFormat> parse_export_format(std::string_view name);
+
+/// tum, euroc: world_from_body of every measured pose. kitti: first left optical frame from left optical frame, one
+/// line for every listed frame; a frame without a pose has the predicted one. csv: every frame with status, pose and
+/// standard deviations (empty without a pose). geotiff: the global map. ply: all terrain point clouds in one file.
+/// `kind` selects the trajectory; none: the best that the run has. Codes: `input` (no run, or a run without the
+/// requested result), `output`.
+Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
+                  const ThreadPool& workers, const std::string& path);
 
 }  // namespace spartan

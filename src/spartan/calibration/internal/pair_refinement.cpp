@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "spartan/numerics/levenberg_marquardt.h"
@@ -14,7 +13,6 @@
 namespace spartan::internal {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kParameters = 8, kRotationAndFocal = 4, kAllButRadial = 6;
 // Levenberg-Marquardt steps per scale of the robust loss (empirical): few while the scale shrinks without the baseline
 // direction, then up to 20 with all parameters at each of three more scales.

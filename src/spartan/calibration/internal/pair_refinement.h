@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 #include "spartan/calibration/pair_check.h"
@@ -9,6 +10,8 @@
 #include "spartan/rig/models/camera_model.h"
 
 namespace spartan::internal {
+
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// left_from_right with the rotation and the baseline direction of the correction applied.
 Pose corrected_left_from_right(const Pose& left_from_right, const PairCorrection& correction);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "spartan/numerics/median.h"
@@ -10,7 +9,6 @@
 namespace spartan::internal {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kColumns = 8, kRows = 6, kMinMatchesPerCell = 3;
 static_assert(kColumns * kRows == kRowErrorCells);
 

@@ -5,16 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include "spartan/calibration/pair_check.h"
+#include "spartan/core/pose.h"
 #include "spartan/numerics/random.h"
 
 namespace spartan::testing {
 
-inline constexpr double kDegree = std::numbers::pi / 180;
 inline constexpr ImageSize kSize{752, 480};
 
 inline Camera camera(const std::string& name, const CameraModel& model) {
@@ -91,7 +90,7 @@ inline void expect_corrected(const Rig& truth, const PairCheck& result, double a
   EXPECT_THAT(ids(again), ::testing::IsEmpty());
   EXPECT_EQ(again.grade, PairGrade::good);
   const Pose difference = left_from_right(truth).inverse() * left_from_right(*result.corrected);
-  EXPECT_LE(rotation_angle(difference) / kDegree, angle_deg);
+  EXPECT_LE(rotation_angle(difference) / kRadiansPerDegree, angle_deg);
 }
 
 }  // namespace spartan::testing

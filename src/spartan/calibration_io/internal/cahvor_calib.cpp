@@ -63,18 +63,18 @@ Result<CahvWithPose> read_cahv(const TextMatrices& file) {
 
 // The model type of the line "Model" or the keys T and P: CAHVORE type 1 is perspective, 2 is fisheye, 3 is general
 // with its linearity after a comma or in P.
-struct Kind {
+struct CahvorKind {
   bool cahvore = false;
   double linearity = 1;
 };
-Result<Kind> linearity_of(const TextMatrices& file, int type, const std::optional<double>& own, const char* key) {
-  if (type == 1) return Kind{true, 1};
-  if (type == 2) return Kind{true, 0};
-  if (type == 3 && own && std::abs(*own) <= 1) return Kind{true, *own};
+Result<CahvorKind> linearity_of(const TextMatrices& file, int type, const std::optional<double>& own, const char* key) {
+  if (type == 1) return CahvorKind{true, 1};
+  if (type == 2) return CahvorKind{true, 0};
+  if (type == 3 && own && std::abs(*own) <= 1) return CahvorKind{true, *own};
   return file.error_at(key, "must be CAHVORE of type 1, 2, or 3 with a linearity between -1 and 1");
 }
 
-Result<Kind> read_kind(const TextMatrices& file) {
+Result<CahvorKind> read_kind(const TextMatrices& file) {
   std::string model;
   if (file.has("Model")) {
     const auto values = file.text("Model");
@@ -109,7 +109,7 @@ Result<Kind> read_kind(const TextMatrices& file) {
     return file.error_at(
         "E", "a CAHVORE file must state its type, for example \"Model = CAHVORE2 = fish-eye\" or \"T = 2\"");
   }
-  return Kind{};
+  return CahvorKind{};
 }
 
 // The line in which mrcal stores an OpenCV distortion, which JPL's models do not have.
@@ -134,7 +134,7 @@ Result<std::optional<CameraModel>> read_opencv_line(const TextMatrices& file, co
   return std::optional<CameraModel>();
 }
 
-Result<CameraModel> read_model(const TextMatrices& file, const CahvWithPose& cahv_with_pose) {
+Result<CameraModel> read_cahvor_model(const TextMatrices& file, const CahvWithPose& cahv_with_pose) {
   auto by_opencv = read_opencv_line(file, cahv_with_pose.cahv.core);
   if (!by_opencv) return failure(std::move(by_opencv));
   if (*by_opencv) {
@@ -165,14 +165,14 @@ Result<CameraModel> read_model(const TextMatrices& file, const CahvWithPose& cah
   return CahvoreModel(cahv_with_pose.cahv, axis, radial, {e->x(), e->y(), e->z()}, kind->linearity);
 }
 
-Result<CameraOfFile> read_camera(const std::string& path, const std::string& name, ImageSize size) {
+Result<CameraOfFile> read_cahvor_camera(const std::string& path, const std::string& name, ImageSize size) {
   const auto file = TextMatrices::read(path, '=');
   if (!file) return failure(file);
   Camera camera;
   camera.name = name;
   const auto cahv_with_pose = read_cahv(*file);
   if (!cahv_with_pose) return failure(cahv_with_pose);
-  auto model = read_model(*file, *cahv_with_pose);
+  auto model = read_cahvor_model(*file, *cahv_with_pose);
   if (!model) return failure(std::move(model));
   camera.model = std::move(*model);
   camera.mount_from_camera = cahv_with_pose->file_from_camera;
@@ -205,7 +205,7 @@ std::string radial_lines(const CahvoreModel& m, const Pose& pose) {
   return vector_line("O", pose.rotation() * m.optical_axis().normalized()) + vector_line("R", radial);
 }
 
-Result<std::string> text_of(const Camera& camera, const Pose& pose) {
+Result<std::string> cahvor_text(const Camera& camera, const Pose& pose) {
   if (const auto m = converted_to<CahvModel>(camera.model)) {
     return core_lines(camera, "CAHV = perspective, linear", *m, pose);
   }
@@ -234,11 +234,11 @@ Result<std::string> text_of(const Camera& camera, const Pose& pose) {
 Result<LoadedRig> read_cahvor_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
   return read_two_files(
       CalibrationFormat::cahvor, left_path, right_path,
-      [&](const std::string& path, const std::string& name) { return read_camera(path, name, size); });
+      [&](const std::string& path, const std::string& name) { return read_cahvor_camera(path, name, size); });
 }
 
 Result<CalibrationFiles> internal::write_cahvor_calib(const Rig& rig, const std::string& path) {
-  return write_two_files(rig, CalibrationFormat::cahvor, path, text_of);
+  return write_two_files(rig, CalibrationFormat::cahvor, path, cahvor_text);
 }
 
 }  // namespace spartan

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxCameras = 100;
+constexpr int kMaxCameraFolders = 100;
 
 fs::path sensor_file(const std::string& folder, const std::string& camera) {
   return fs::path(folder) / camera / "sensor.yaml";
@@ -53,7 +53,7 @@ Result<Rig> read_euroc_calib(const std::string& mav0_folder) {
   rig.pairs = {{"stereo", "cam0", "cam1"}};
   Error errors{ErrorCode::configuration, "", "", ""};
   std::error_code error;
-  for (int i = 0; i < kMaxCameras; ++i) {
+  for (int i = 0; i < kMaxCameraFolders; ++i) {
     const std::string name = fmt::format("cam{}", i);
     const fs::path file = sensor_file(mav0_folder, name);
     if (i > 1 && !fs::exists(file, error)) break;

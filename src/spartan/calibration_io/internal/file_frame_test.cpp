@@ -3,9 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include "spartan/calibration_io/calibration_files.h"
+#include "spartan/core/pose.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan::internal {
@@ -13,8 +12,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
-
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 // Two pinhole cameras in a frame with x forward, y left, z up, rotated by yaw and then by pitch (positive looks down).
 Rig pair_in_body(double yaw_deg, double pitch_deg, const Eigen::Vector3d& position) {

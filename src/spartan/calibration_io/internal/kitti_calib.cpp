@@ -92,7 +92,7 @@ Result<RectifiedPair> read_projections(const TextMatrices& file, const std::stri
   return pair;
 }
 
-Camera camera_of(const std::string& name, ImageSize size, const PinholeModel& model) {
+Camera pinhole_camera(const std::string& name, ImageSize size, const PinholeModel& model) {
   Camera camera;
   camera.name = name;
   camera.size = size;
@@ -180,10 +180,10 @@ Result<LoadedRig> internal::read_kitti(const std::string& path, ImageSize size) 
                                             {"Tr", "the place of the laser scanner, which is not read"}});
   if (!ignored) return failure(ignored);
   if (size.empty()) return unknown_size(path);
-  auto rig =
-      validated(rig_of_one_pair("kitti", camera_of("cam0", size, pair->left), camera_of("cam1", size, pair->right),
-                                Pose::from_translation({-pair->baseline_m, 0, 0})),
-                path);
+  auto rig = validated(
+      rig_of_one_pair("kitti", pinhole_camera("cam0", size, pair->left), pinhole_camera("cam1", size, pair->right),
+                      Pose::from_translation({-pair->baseline_m, 0, 0})),
+      path);
   if (!rig) return failure(std::move(rig));
   ignored->insert(ignored->begin(), pair->ignored.begin(), pair->ignored.end());
   return make_read_rig(std::move(*rig), CalibrationFormat::kitti, path, std::move(*ignored));
@@ -209,9 +209,9 @@ Result<LoadedRig> internal::read_kitti_raw(const std::string& path) {
   if (!left_size) return failure(left_size);
   const auto right_size = file->has("S_rect_01") ? read_size(*file, "S_rect_01") : left_size;
   if (!right_size) return failure(right_size);
-  Rig rig =
-      rig_of_one_pair("kitti_raw", camera_of("cam0", *left_size, pair->left),
-                      camera_of("cam1", *right_size, pair->right), Pose::from_translation({-pair->baseline_m, 0, 0}));
+  Rig rig = rig_of_one_pair("kitti_raw", pinhole_camera("cam0", *left_size, pair->left),
+                            pinhole_camera("cam1", *right_size, pair->right),
+                            Pose::from_translation({-pair->baseline_m, 0, 0}));
 
   const fs::path folder = fs::path(path).parent_path();
   std::error_code missing;

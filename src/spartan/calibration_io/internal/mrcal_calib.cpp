@@ -47,7 +47,7 @@ Eigen::Vector3d axis_from_angles(double alpha, double beta) {
   return {std::sin(alpha) * std::cos(beta), std::sin(beta), std::cos(alpha) * std::cos(beta)};
 }
 
-Result<CameraModel> read_model(const PythonDict& file) {
+Result<CameraModel> read_mrcal_model(const PythonDict& file) {
   const char* key = file.has("lensmodel") ? "lensmodel" : file.has("lens_model") ? "lens_model" : "distortion_model";
   const auto name = file.text(file.has(key) ? key : "lensmodel");
   if (!name) return failure(name);
@@ -83,14 +83,14 @@ Result<CameraModel> read_model(const PythonDict& file) {
   return CahvoreModel({pinhole, 0}, axis, {k[6], k[7], k[8]}, {k[9], k[10], k[11]}, *linearity);
 }
 
-Result<CameraOfFile> read_camera(const std::string& path, const std::string& name) {
+Result<CameraOfFile> read_mrcal_camera(const std::string& path, const std::string& name) {
   const auto text = read_calibration_text(path, kLargestModelFile_bytes);
   if (!text) return failure(text);
   const auto file = PythonDict::parse(*text, path);
   if (!file) return failure(file);
   Camera camera;
   camera.name = name;
-  auto model = read_model(*file);
+  auto model = read_mrcal_model(*file);
   if (!model) return failure(std::move(model));
   camera.model = std::move(*model);
   const auto size = file->numbers("imagersize", 2);
@@ -110,7 +110,7 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
   return result;
 }
 
-struct Lens {
+struct MrcalLens {
   std::string name;
   std::vector<double> numbers;
 };
@@ -126,18 +126,18 @@ void append_cahvor(std::vector<double>& numbers, const Eigen::Vector3d& axis, co
   append(numbers, radial, radial.size());
 }
 
-Result<Lens> lens_of(const Camera& camera) {
+Result<MrcalLens> mrcal_lens(const Camera& camera) {
   const auto core = [](const PinholeModel& p) { return std::vector{p.fx, p.fy, p.cx, p.cy}; };
-  if (const auto m = converted_to<PinholeModel>(camera.model)) return Lens{"PINHOLE", core(*m)};
+  if (const auto m = converted_to<PinholeModel>(camera.model)) return MrcalLens{"PINHOLE", core(*m)};
   if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
     const std::size_t count = is_rational(*m) ? 8 : k[4] != 0 ? 5 : 4;
-    Lens lens{fmt::format("OPENCV{}", count), core(m->pinhole())};
+    MrcalLens lens{fmt::format("OPENCV{}", count), core(m->pinhole())};
     append(lens.numbers, k, count);
     return lens;
   }
   if (const auto m = converted_to<CahvoreModel>(camera.model)) {
-    Lens lens{fmt::format("{}{}", kCahvore, m->linearity()), core(m->cahv().core)};
+    MrcalLens lens{fmt::format("{}{}", kCahvore, m->linearity()), core(m->cahv().core)};
     append_cahvor(lens.numbers, m->optical_axis(), m->radial());
     if (converted_to<CahvorModel>(camera.model)) {
       lens.name = "CAHVOR";
@@ -149,8 +149,8 @@ Result<Lens> lens_of(const Camera& camera) {
   return cannot_hold(camera, fmt::format("mrcal files do not support the model {}", name_of(camera.model)));
 }
 
-Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
-  const auto lens = lens_of(camera);
+Result<std::string> mrcal_text(const Camera& camera, const Pose& file_from_camera) {
+  const auto lens = mrcal_lens(camera);
   if (!lens) return failure(lens);
   const Pose from_reference = file_from_camera.inverse();
   return fmt::format(
@@ -164,11 +164,11 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
 }  // namespace
 
 Result<LoadedRig> read_mrcal_calib(const std::string& left_path, const std::string& right_path) {
-  return read_two_files(CalibrationFormat::mrcal, left_path, right_path, read_camera);
+  return read_two_files(CalibrationFormat::mrcal, left_path, right_path, read_mrcal_camera);
 }
 
 Result<CalibrationFiles> internal::write_mrcal_calib(const Rig& rig, const std::string& path) {
-  return write_two_files(rig, CalibrationFormat::mrcal, path, text_of);
+  return write_two_files(rig, CalibrationFormat::mrcal, path, mrcal_text);
 }
 
 }  // namespace spartan

@@ -73,7 +73,7 @@ bool is_fisheye(const Storages& files) {
          model_name.find("equidistant") != std::string::npos;
 }
 
-Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& names) {
+Result<PinholeModel> read_opencv_matrix(const Storages& files, const Names& names) {
   const auto values = files.matrix(names, {9});
   if (!values) return failure(values);
   const auto pinhole = pinhole_of_rows(*values);
@@ -83,9 +83,9 @@ Result<PinholeModel> read_camera_matrix(const Storages& files, const Names& name
   return *pinhole;
 }
 
-Result<CameraModel> read_model(const Storages& files, const std::string& number) {
+Result<CameraModel> read_opencv_model(const Storages& files, const std::string& number) {
   const auto pinhole =
-      read_camera_matrix(files, {"M" + number, "K" + number, "cameraMatrix" + number, "camera_matrix_" + number});
+      read_opencv_matrix(files, {"M" + number, "K" + number, "cameraMatrix" + number, "camera_matrix_" + number});
   if (!pinhole) return failure(pinhole);
   const Names names{"D" + number, "distCoeffs" + number, "dist_coeffs_" + number};
   if (is_fisheye(files)) {
@@ -171,9 +171,9 @@ Camera camera_of(const char* name, ImageSize size, CameraModel model) {
 }
 
 Result<Rig> read_unrectified(const Storages& files, ImageSize size) {
-  auto left = read_model(files, "1");
+  auto left = read_opencv_model(files, "1");
   if (!left) return failure(std::move(left));
-  auto right = read_model(files, "2");
+  auto right = read_opencv_model(files, "2");
   if (!right) return failure(std::move(right));
   const auto right_from_left = read_right_from_left(files);
   if (!right_from_left) return failure(right_from_left);

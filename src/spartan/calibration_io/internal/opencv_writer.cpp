@@ -9,19 +9,19 @@
 namespace spartan::internal {
 namespace {
 
-struct Lens {
+struct OpencvLens {
   PinholeModel pinhole;
   std::vector<double> coefficients;
 };
 
-Result<Lens> lens_of(const Camera& camera, bool fisheye) {
+Result<OpencvLens> opencv_lens(const Camera& camera, bool fisheye) {
   if (fisheye) {
     if (const auto m = converted_to<EquidistantModel>(camera.model)) {
-      return Lens{m->pinhole(), {m->coefficients().begin(), m->coefficients().end()}};
+      return OpencvLens{m->pinhole(), {m->coefficients().begin(), m->coefficients().end()}};
     }
   } else if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
-    return Lens{m->pinhole(), {k.begin(), k.begin() + (is_rational(*m) ? 8 : 5)}};
+    return OpencvLens{m->pinhole(), {k.begin(), k.begin() + (is_rational(*m) ? 8 : 5)}};
   }
   if (fisheye) {
     return cannot_hold(
@@ -47,7 +47,7 @@ Result<CalibrationFiles> write_opencv_calib(const Rig& rig, const std::string& p
   }
   const bool fisheye = converted_to<EquidistantModel>(cameras->left->model).has_value() ||
                        converted_to<EquidistantModel>(cameras->right->model).has_value();
-  const auto left = lens_of(*cameras->left, fisheye), right = lens_of(*cameras->right, fisheye);
+  const auto left = opencv_lens(*cameras->left, fisheye), right = opencv_lens(*cameras->right, fisheye);
   if (!left) return failure(left);
   if (!right) return failure(right);
   const Pose right_from_left = rig.right_from_left(*cameras->pair);

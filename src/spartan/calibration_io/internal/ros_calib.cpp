@@ -58,7 +58,7 @@ ImageSize read_size(YamlMap& root) {
   return size;
 }
 
-CameraModel read_model(YamlMap& root) {
+CameraModel read_ros_model(YamlMap& root) {
   const std::string k_key = key_of(root, "camera_matrix", "K"), d_key = key_of(root, "distortion_coefficients", "D");
   PinholeModel pinhole;
   if (const auto k = numbers(root, k_key, {9})) {
@@ -133,7 +133,7 @@ Result<CameraInfo> read_camera_info(const std::string& path, const std::string& 
   CameraInfo info;
   info.camera.name = name;
   info.camera.size = read_size(root);
-  info.camera.model = read_model(root);
+  info.camera.model = read_ros_model(root);
   read_rectification(root, info);
   reject_roi_and_binning(root, info.camera.size);
   if (const Status status = errors.status(); !status) return failure(status);
@@ -194,20 +194,20 @@ std::string matrix_lines(const char* key, int rows, int columns, const std::stri
   return fmt::format("{}:\n  rows: {}\n  cols: {}\n  data: [{}]\n", key, rows, columns, data);
 }
 
-struct Lens {
+struct RosLens {
   PinholeModel pinhole;
   const char* kind;
   std::vector<double> coefficients;
 };
 
-Result<Lens> lens_of(const Camera& camera) {
+Result<RosLens> ros_lens(const Camera& camera) {
   if (const auto m = converted_to<RadialTangentialModel>(camera.model)) {
     const auto& k = m->coefficients();
-    if (is_rational(*m)) return Lens{m->pinhole(), "rational_polynomial", {k.begin(), k.end()}};
-    return Lens{m->pinhole(), "plumb_bob", {k.begin(), k.begin() + 5}};
+    if (is_rational(*m)) return RosLens{m->pinhole(), "rational_polynomial", {k.begin(), k.end()}};
+    return RosLens{m->pinhole(), "plumb_bob", {k.begin(), k.begin() + 5}};
   }
   if (const auto m = converted_to<EquidistantModel>(camera.model)) {
-    return Lens{m->pinhole(), "equidistant", {m->coefficients().begin(), m->coefficients().end()}};
+    return RosLens{m->pinhole(), "equidistant", {m->coefficients().begin(), m->coefficients().end()}};
   }
   return cannot_hold(camera, fmt::format("camera_info does not support the model {}", name_of(camera.model)));
 }
@@ -237,13 +237,13 @@ Result<LoadedRig> read_ros_calib(const std::string& left_path, const std::string
 Result<CalibrationFiles> internal::write_ros_calib(const Rig& rig, const std::string& path) {
   const auto cameras = single_pair(rig, CalibrationFormat::ros);
   if (!cameras) return failure(cameras);
-  const auto left = lens_of(*cameras->left), right = lens_of(*cameras->right);
+  const auto left = ros_lens(*cameras->left), right = ros_lens(*cameras->right);
   if (!left) return failure(left);
   if (!right) return failure(right);
   const Pose left_from_right = rig.right_from_left(*cameras->pair).inverse();
   const RectifiedView view = rectified_view(left->pinhole, right->pinhole, left_from_right);
   const PinholeModel& p = view.pinhole;
-  const auto text = [&](const Camera& camera, const Lens& lens, const Eigen::Matrix3d& r, double x_m) {
+  const auto text = [&](const Camera& camera, const RosLens& lens, const Eigen::Matrix3d& r, double x_m) {
     const PinholeModel& k = lens.pinhole;
     const int count = static_cast<int>(lens.coefficients.size());
     return fmt::format("image_width: {}\nimage_height: {}\ncamera_name: {}\n", camera.size.width, camera.size.height,

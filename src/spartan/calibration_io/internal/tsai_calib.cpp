@@ -64,7 +64,7 @@ Result<std::string> distortion_name(const TextMatrices& file) {
   return name.empty() ? "tsai" : name;
 }
 
-Result<CameraModel> read_model(const TextMatrices& file) {
+Result<CameraModel> read_tsai_model(const TextMatrices& file) {
   double pitch = 1;
   if (file.has("pitch")) {
     const auto values = file.numbers("pitch", 1);
@@ -95,10 +95,10 @@ Result<CameraModel> read_model(const TextMatrices& file) {
   return RadialTangentialModel(pinhole, k);
 }
 
-Result<CameraOfFile> read_camera(const std::string& path, const std::string& name, ImageSize size) {
+Result<CameraOfFile> read_tsai_camera(const std::string& path, const std::string& name, ImageSize size) {
   const auto file = TextMatrices::read(path, '=');
   if (!file) return failure(file);
-  auto model = read_model(*file);
+  auto model = read_tsai_model(*file);
   if (!model) return failure(std::move(model));
   const auto pose = read_pose(*file);
   if (!pose) return failure(pose);
@@ -111,7 +111,7 @@ Result<CameraOfFile> read_camera(const std::string& path, const std::string& nam
   return CameraOfFile{std::move(camera)};
 }
 
-Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) {
+Result<std::string> tsai_text(const Camera& camera, const Pose& file_from_camera) {
   const auto model = converted_to<RadialTangentialModel>(camera.model);
   if (!model) {
     return cannot_hold(camera, fmt::format(".tsai files do not support the model {}", name_of(camera.model)));
@@ -135,11 +135,11 @@ Result<std::string> text_of(const Camera& camera, const Pose& file_from_camera) 
 Result<LoadedRig> read_tsai_calib(const std::string& left_path, const std::string& right_path, ImageSize size) {
   return read_two_files(
       CalibrationFormat::tsai, left_path, right_path,
-      [&](const std::string& path, const std::string& name) { return read_camera(path, name, size); });
+      [&](const std::string& path, const std::string& name) { return read_tsai_camera(path, name, size); });
 }
 
 Result<CalibrationFiles> internal::write_tsai_calib(const Rig& rig, const std::string& path) {
-  return write_two_files(rig, CalibrationFormat::tsai, path, text_of);
+  return write_two_files(rig, CalibrationFormat::tsai, path, tsai_text);
 }
 
 }  // namespace spartan

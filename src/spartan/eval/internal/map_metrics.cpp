@@ -22,7 +22,7 @@ struct IndexRange {
   int from, to;
 };
 
-// Indices of the cells of width `cell` whose centers lie in [low, low + side).
+// Indices of the cells of width `cell` whose centres lie in [low, low + side).
 IndexRange cells_within(double low, double side, double cell) {
   return {static_cast<int>(std::ceil(low / cell - 0.5 - 1e-9)),
           static_cast<int>(std::ceil((low + side) / cell - 0.5 - 1e-9))};

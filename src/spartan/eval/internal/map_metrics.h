@@ -39,7 +39,7 @@ struct MapMetricsOptions {
 
 /// A true obstacle or cavity and how the map shows it.
 struct HazardScore {
-  Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();  ///< mean of its cells' centers
+  Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();  ///< mean of its cells' centres
   double height_m = 0;                                 ///< largest height of an obstacle, depth of a cavity
   double diameter_m = 0;                               ///< of a disc of equal area
   int visible_cells = 0, marked_cells = 0;

@@ -11,7 +11,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr int kRowsPerPart = 64;  // rows per task; does not affect results
+constexpr int kLumaRowsPerPart = 64;  // rows per task; does not affect results
 
 std::string describe(ImageSize size, const PixelFormat& format) {
   std::string text = fmt::format("{} × {} {} of {} bits", size.width, size.height, name_of(format.layout), format.bits);
@@ -21,7 +21,7 @@ std::string describe(ImageSize size, const PixelFormat& format) {
 
 template <class T>
 void reduce_to_luma(ImageView<const Rgb<T>> colour, ImageView<T> gray, const ThreadPool& workers) {
-  workers.parallel_for(0, colour.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, colour.height(), kLumaRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       const Rgb<T>* const in = colour.row(y);
       T* const out = gray.row(y);

@@ -7,7 +7,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr int kRowsPerPart = 64;  // rows per task; does not affect results
+constexpr int kTableRowsPerPart = 64;  // rows per task; does not affect results
 
 int levels_of(PixelFormat format) {
   if (format.bits < 8 || format.bits > 16) throw std::invalid_argument("contrast: samples must have 8 to 16 bits");
@@ -24,7 +24,7 @@ void map_rows(ImageView<const T> image, ImageView<std::uint8_t> result, const Th
   if (image.size() != result.size()) throw std::invalid_argument("contrast: the sizes differ");
   // Stray bits above the significant ones must not index beyond the table.
   const unsigned last = static_cast<unsigned>(table.size()) - 1;
-  workers.parallel_for(0, image.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, image.height(), kTableRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       const T* in = image.row(y);
       std::uint8_t* out = result.row(y);

@@ -10,8 +10,8 @@
 namespace spartan::internal {
 namespace {
 
-constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
-constexpr int kRowsPerBand = 64;  // a band also processes up to seven rows above and below it
+constexpr int kDebayerRowsPerPart = 32;  // rows per task; does not affect results
+constexpr int kRowsPerBand = 64;         // a band also processes up to seven rows above and below it
 
 /// Idle band buffers for reuse: at most one per thread is ever allocated.
 class BufferPool {
@@ -39,7 +39,7 @@ template <class T>
 void run_bilinear(ImageView<const T> mosaic, BayerPhase phase, const bayer::Kernels<T>& kernels, auto result,
                   const ThreadPool& workers) {
   const int height = mosaic.height();
-  workers.parallel_for(0, height, kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, height, kDebayerRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       const bayer::BilinearRow<T> row{mosaic.row(y > 0 ? y - 1 : 1),
                                       mosaic.row(y),
@@ -101,7 +101,7 @@ struct Debayerer::State {
   }
 };
 
-Debayerer::Debayerer(DebayerMethod method, const std::string& simd) : state_(std::make_unique<State>()) {
+Debayerer::Debayerer(DebayerMethod method, SimdTarget simd) : state_(std::make_unique<State>()) {
   const std::size_t target = simd_target_index(simd);
   state_->method = method;
   state_->kernels8 = bayer::kernels_for<std::uint8_t>(target);

@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "spartan/core/frame_image.h"
 #include "spartan/core/image.h"
+#include "spartan/core/simd.h"
 #include "spartan/core/threads.h"
 #include "spartan/imaging/imager.h"
 
@@ -19,8 +19,8 @@ namespace spartan::internal {
 /// its samples have another type.
 class Debayerer {
  public:
-  /// `simd`: instruction set, see simd_target_index(); all give the same bits.
-  explicit Debayerer(DebayerMethod method = DebayerMethod::bilinear, const std::string& simd = "auto");
+  /// `simd`: instruction set; all give the same bits.
+  explicit Debayerer(DebayerMethod method = DebayerMethod::bilinear, SimdTarget simd = SimdTarget::automatic);
   Debayerer(Debayerer&&) noexcept;
   Debayerer& operator=(Debayerer&&) noexcept;
   ~Debayerer();

@@ -80,5 +80,9 @@ struct Kernels {
 /// The kernels of one instruction set; see simd_target_index().
 template <class T>
 Kernels<T> kernels_for(std::size_t target_index);
+template <>
+Kernels<std::uint8_t> kernels_for(std::size_t target_index);
+template <>
+Kernels<std::uint16_t> kernels_for(std::size_t target_index);
 
 }  // namespace spartan::internal::bayer

@@ -93,7 +93,7 @@ Image<T> mosaic_of(ImageView<const Rgb<T>> colours, PixelLayout layout) {
 
 template <class T>
 Image<Rgb<T>> debayered(DebayerMethod method, ImageView<const T> mosaic, PixelLayout layout, int threads = 1,
-                        const std::string& simd = "auto") {
+                        SimdTarget simd = SimdTarget::automatic) {
   Image<Rgb<T>> result(mosaic.size());
   Debayerer(method, simd).apply(mosaic, format_of<T>(layout), result, ThreadPool(threads));
   return result;
@@ -173,13 +173,13 @@ void expect_same_bytes_everywhere(int largest) {
   for (const DebayerMethod method : kMethods) {
     for (const ImageSize size : {ImageSize{2, 2}, ImageSize{5, 131}, ImageSize{613, 67}}) {
       const auto mosaic = random_mosaic<T>(size.width, size.height, largest);
-      const auto expected = debayered<T>(method, mosaic, PixelLayout::bayer_gbrg, 1, "sse4");
+      const auto expected = debayered<T>(method, mosaic, PixelLayout::bayer_gbrg, 1, SimdTarget::sse4);
       Image<T> gray(size), expected_gray(size);
       for (int y = 0; y < size.height; ++y) {
         for (int x = 0; x < size.width; ++x) expected_gray(x, y) = luma(expected(x, y));
       }
-      for (const std::string& simd : available_simd_targets()) {
-        SCOPED_TRACE(simd);
+      for (const SimdTarget simd : available_simd_targets()) {
+        SCOPED_TRACE(name_of(simd));
         expect_same<Rgb<T>>(debayered<T>(method, mosaic, PixelLayout::bayer_gbrg, 2, simd), expected);
         Debayerer(method, simd).apply(mosaic, format_of<T>(PixelLayout::bayer_gbrg), gray, ThreadPool(2));
         expect_same<T>(gray, expected_gray);

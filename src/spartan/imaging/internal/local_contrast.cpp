@@ -9,8 +9,8 @@
 namespace spartan::internal {
 namespace {
 
-constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
-constexpr int kWeightBits = 11;   // fraction bits of the bilinear weights
+constexpr int kBlendRowsPerPart = 32;  // rows per task; does not affect results
+constexpr int kWeightBits = 11;        // fraction bits of the bilinear weights
 
 }  // namespace
 
@@ -72,7 +72,7 @@ void LocalContrast::apply(ImageView<const std::uint8_t> image, ImageView<std::ui
       for (int x = 0; x < tiles_; ++x) make_mapping(image, tile, x, y);
     }
   });
-  workers.parallel_for(0, image.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, image.height(), kBlendRowsPerPart, [&](int begin, int end) {
     constexpr int kOne = 1 << kWeightBits, kHalf = 1 << (2 * kWeightBits - 1);
     for (int y = begin; y < end; ++y) {
       const TilePair rows = tiles_around(y, tile.height);

@@ -18,8 +18,8 @@ using remap::kCell;
 using remap::kOne;
 using remap::SourcePixel;
 
-constexpr int kRowsPerPart = 16;  // rows per task; does not affect results
-constexpr int kPrefetchRows = 4;  // rows between prefetch and use of the source pixels; empirical
+constexpr int kRemapRowsPerPart = 16;  // rows per task; does not affect results
+constexpr int kPrefetchRows = 4;       // rows between prefetch and use of the source pixels; empirical
 
 template <class Pixel>
 auto kernel_of(const remap::Kernels& kernels) {
@@ -33,7 +33,7 @@ auto kernel_of(const remap::Kernels& kernels) {
 
 RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
                        const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
-                       const ThreadPool& workers, double depth_m, const std::string& simd)
+                       const ThreadPool& workers, double depth_m, SimdTarget simd)
     : source_size_(source_size),
       kernels_(remap::kernels_for(simd_target_index(simd))),
       cells_((view.size.width + kCell - 1) / kCell, view.size.height),
@@ -61,7 +61,7 @@ RemapTable::RemapTable(const CameraModel& camera, ImageSize source_size, const R
                                   self_mask(p.x, below) == 0 || self_mask(p.x + 1, below) == 0);
   };
   std::atomic<bool> all_valid = true;
-  workers.parallel_for(0, view.size.height, kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, view.size.height, kRemapRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       for (int left = 0; left < view.size.width; left += kCell) {
         CellEntries entries{};
@@ -153,7 +153,7 @@ void RemapTable::apply_any(ImageView<const Pixel> source, ImageView<Pixel> resul
   if (source.size() != source_size_ || result.size() != size()) {
     throw std::invalid_argument("RemapTable: the images have other sizes than the table");
   }
-  workers.parallel_for(0, result.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, result.height(), kRemapRowsPerPart, [&](int begin, int end) {
     const remap::Source<Pixel> from{source.data(), source.stride(), source.width(), source.height()};
     for (int y = begin; y < end; ++y) {
       Pixel* const out = result.row(y);

@@ -205,7 +205,7 @@ CameraModel lens_for(const Case& c) {
   return RadialTangentialModel({130, 131, c.source.width / 2.0, c.source.height / 2.0}, {-0.28, 0.07, 2e-4, 3e-5});
 }
 
-RemapTable table_for(const Case& c, const std::string& simd, ImageView<const std::uint8_t> self_mask = {}) {
+RemapTable table_for(const Case& c, SimdTarget simd, ImageView<const std::uint8_t> self_mask = {}) {
   const RectifiedStereo view{c.view, c.focal_px, {(c.view.width - 1) / 2.0, (c.view.height - 1) / 2.0}, 0.1};
   return {lens_for(c), c.source, view, exp_so3(c.rotation).toRotationMatrix(), self_mask, ThreadPool(2), 1, simd};
 }
@@ -251,8 +251,8 @@ void expect_reference_formula_on_every_target() {
     for (int y = 0; y < c.source.height; ++y) {
       for (int x = 0; x < c.source.width; ++x) holes(x, y) = random.below(16) == 0 && x + y > 2 ? 0 : 255;
     }
-    for (const std::string& simd : available_simd_targets()) {
-      SCOPED_TRACE(std::string(c.what) + ", " + simd);
+    for (SimdTarget simd : available_simd_targets()) {
+      SCOPED_TRACE(std::string(c.what) + ", " + std::string(name_of(simd)));
       expect_reference_formula<Pixel>(table_for(c, simd));
       expect_reference_formula<Pixel>(table_for(c, simd, holes));
     }
@@ -277,7 +277,7 @@ TEST(RemapTable, EveryTargetMatchesTheReferenceRgb16) {
 
 TEST(RemapTable, AConstantImageStaysConstant) {
   for (const Case& c : kCases) {
-    const RemapTable table = table_for(c, "auto");
+    const RemapTable table = table_for(c, SimdTarget::automatic);
     const Image<Rgb16> source(c.source.width, c.source.height, Rgb16{65535, 1, 40000});
     Image<Rgb16> result(c.view);
     table.apply(source, result, ThreadPool(1));

@@ -5,7 +5,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr int kBlock = 8;  // px
+constexpr int kFootprintBlock = 8;  // px
 
 bool is_in_view(const Camera& camera, const RectifiedStereo& view, const Eigen::Matrix3d& camera_from_rectified,
                 double depth_m, const Eigen::Vector2d& pixel) {
@@ -24,10 +24,10 @@ bool is_in_view(const Camera& camera, const RectifiedStereo& view, const Eigen::
 Image<std::uint8_t> view_footprint(const Camera& camera, const RectifiedStereo& view,
                                    const Eigen::Matrix3d& camera_from_rectified, double depth_m) {
   Image<std::uint8_t> footprint(camera.size);
-  for (int top = 0; top < camera.size.height; top += kBlock) {
-    const int below = std::min(top + kBlock, camera.size.height);
-    for (int left = 0; left < camera.size.width; left += kBlock) {
-      const int right = std::min(left + kBlock, camera.size.width);
+  for (int top = 0; top < camera.size.height; top += kFootprintBlock) {
+    const int below = std::min(top + kFootprintBlock, camera.size.height);
+    for (int left = 0; left < camera.size.width; left += kFootprintBlock) {
+      const int right = std::min(left + kFootprintBlock, camera.size.width);
       const Eigen::Vector2d centre((left + right - 1) / 2.0, (top + below - 1) / 2.0);
       if (!is_in_view(camera, view, camera_from_rectified, depth_m, centre)) continue;
       for (int y = top; y < below; ++y) std::fill(footprint.row(y) + left, footprint.row(y) + right, std::uint8_t{255});

@@ -9,7 +9,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr int kRowsPerPart = 32;  // rows per task; does not affect results
+constexpr int kVignettingRowsPerPart = 32;  // rows per task; does not affect results
 
 }  // namespace
 
@@ -23,7 +23,7 @@ Result<VignettingCorrection> VignettingCorrection::create(const Camera& camera, 
                                                    (half_diagonal * half_diagonal));
   };
   Image<std::uint16_t> factors(camera.size);
-  workers.parallel_for(0, camera.size.height, kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, camera.size.height, kVignettingRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       for (int x = 0; x < camera.size.width; ++x) {
         const double factor = (1 << kFractionBits) / light(x, y);
@@ -53,7 +53,7 @@ void VignettingCorrection::apply_any(ImageView<const T> image, ImageView<T> resu
     throw std::invalid_argument("LightCorrection: the images have another size than the camera");
   }
   const auto full_scale = static_cast<std::uint32_t>(full_scale_);
-  workers.parallel_for(0, image.height(), kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, image.height(), kVignettingRowsPerPart, [&](int begin, int end) {
     constexpr std::uint32_t kHalf = 1U << (kFractionBits - 1);
     for (int y = begin; y < end; ++y) {
       const T* const in = image.row(y);

@@ -134,7 +134,7 @@ inline std::vector<Measurement> in_order(std::vector<Measurement> a, const std::
 
 /// A localizer that starts at 2.5 s and is given all samples.
 inline Localizer driven(const LocalizationOptions& options, const std::vector<Measurement>& all) {
-  Localizer localizer(options);
+  Localizer localizer = Localizer::create(options).value();
   bool started = false;
   for (const Measurement& m : all) {
     if (!started && stamp_of_measurement(m) > test_stamp(2.5)) {

@@ -10,7 +10,7 @@
 namespace spartan::internal {
 namespace {
 
-const RectifiedStereo kStereo{{200, 150}, 150, {99.5, 74.5}, 0.1};
+const RectifiedStereo kSmallStereo{{200, 150}, 150, {99.5, 74.5}, 0.1};
 
 class LandmarkManagerTest : public ::testing::Test {
  protected:
@@ -28,7 +28,7 @@ class LandmarkManagerTest : public ::testing::Test {
     memory_.landmarks.push_back(landmark);
   }
 
-  StereoImages images() const { return {kStereo, image_, image_, smooth_.view(), smooth_.view(), {}, {}, {}}; }
+  StereoImages images() const { return {kSmallStereo, image_, image_, smooth_.view(), smooth_.view(), {}, {}, {}}; }
 
   // The rover moves and measures the landmark, whose true disparity in the anchor is `truth`, without noise.
   void measure(const Pose& previous_from_current, double truth, bool inlier = true, double offset = 0) {
@@ -37,7 +37,7 @@ class LandmarkManagerTest : public ::testing::Test {
     match.disparity_variance = memory_.landmarks[0].variance;
     match.previous_from_anchor = memory_.anchors[0].latest_from_anchor;
     const Pose current_from_anchor = previous_from_current.inverse() * match.previous_from_anchor;
-    match.measured = project_anchored(kStereo, {match.point.pixel, truth}, current_from_anchor)->measured;
+    match.measured = project_anchored(kSmallStereo, {match.point.pixel, truth}, current_from_anchor)->measured;
     match.measured.z() -= offset;
     match.covariance = 0.01 * Eigen::Matrix3d::Identity();
     MotionFit fit;
@@ -84,7 +84,7 @@ TEST_F(LandmarkManagerTest, ReanchorsALandmarkWhoseScaleHasChanged) {
   measure(ahead, 10);
   const Landmark& l = memory_.landmarks[0];
   EXPECT_EQ(l.anchor_id, 1u);
-  const Eigen::Vector3d expected = project_anchored(kStereo, {{120, 80}, 10}, ahead.inverse())->measured;
+  const Eigen::Vector3d expected = project_anchored(kSmallStereo, {{120, 80}, 10}, ahead.inverse())->measured;
   EXPECT_EQ(l.anchor_pixel.x(), std::round(expected.x()));
   EXPECT_EQ(l.anchor_pixel.y(), std::round(expected.y()));
   EXPECT_NEAR(l.disparity, expected.z(), 1e-6);

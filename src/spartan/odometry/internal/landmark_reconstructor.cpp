@@ -71,7 +71,7 @@ std::optional<double> LandmarkReconstructor::search(const StereoImages& images, 
     if (std::abs(back_from + static_cast<int>(index_of_best(back)) - x) > kLeftRightTolerance_px) return std::nullopt;
   }
 
-  // Parabola through the maximum and its neighbors.
+  // Parabola through the maximum and its neighbours.
   double peak = static_cast<double>(best);
   if (best > 0 && best + 1 < scores.size()) {
     const double curvature = scores[best - 1] + scores[best + 1] - 2.0 * scores[best];

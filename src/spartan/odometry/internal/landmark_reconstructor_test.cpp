@@ -14,7 +14,7 @@ namespace {
 
 using testing::SyntheticFrame;
 
-// A camera half a meter above rough ground, tilted 32° down; disparities from 12 to 60 px.
+// A camera half a metre above rough ground, tilted 32° down; disparities from 12 to 60 px.
 struct Scene {
   Scene() {
     const double s = std::sin(0.55), c = std::cos(0.55);

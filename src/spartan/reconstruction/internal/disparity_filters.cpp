@@ -8,7 +8,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr float kUnknownDisparity = std::numeric_limits<float>::quiet_NaN();
 constexpr int kRowsAtOnce = 32;  // rows of one work item of a thread
 
 }  // namespace
@@ -20,12 +20,12 @@ void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const Threa
     for (int y = from; y < to; ++y) {
       for (int x = 0; x < w; ++x) {
         float d = raw.left(x, y);
-        if (raw.unique(x, y) == 0) d = kUnknown;
+        if (raw.unique(x, y) == 0) d = kUnknownDisparity;
         if (tolerance_px >= 0 && !std::isnan(d)) {
           const int matched = std::clamp(x - static_cast<int>(std::lround(d)), 0, w - 1);
           const std::int16_t other = raw.right(matched, y);
           if (other == RawDisparity::kNoMatch || std::abs(static_cast<double>(d) - other) > tolerance_px + 0.5)
-            d = kUnknown;
+            d = kUnknownDisparity;
         }
         disparity(x, y) = d;
       }
@@ -40,10 +40,10 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
     for (int x = 0; x < disparity.width(); ++x) {
       float& d = disparity(x, y);
       if (std::isnan(d)) continue;
-      if (!left_mask.empty() && left_mask(x, y) == 0) d = kUnknown;
+      if (!left_mask.empty() && left_mask(x, y) == 0) d = kUnknownDisparity;
       if (right_mask.empty() || std::isnan(d)) continue;
       const int matched = std::clamp(x - static_cast<int>(std::lround(d)), 0, disparity.width() - 1);
-      if (right_mask(matched, y) == 0) d = kUnknown;
+      if (right_mask(matched, y) == 0) d = kUnknownDisparity;
     }
   }
 }
@@ -71,7 +71,7 @@ float median_of(float a, float b, float c) {
 
 // The three values of a window column, sorted; all NaN where one of them is NaN.
 struct Column {
-  float low = kUnknown, middle = kUnknown, high = kUnknown;
+  float low = kUnknownDisparity, middle = kUnknownDisparity, high = kUnknownDisparity;
 };
 Column column_of(float a, float b, float c) {
   if (std::isnan(a + b + c)) return {};
@@ -90,7 +90,7 @@ void median_row(ImageView<const float> in, int y, ImageView<float> out) {
   for (int x = 0; x < w; ++x) {
     const Column right = column(x + 1);
     if (std::isnan(in(x, y))) {
-      out(x, y) = kUnknown;
+      out(x, y) = kUnknownDisparity;
     } else if (std::isnan(left.low + centre.low + right.low)) {
       out(x, y) = median_of_known(in, x, y);
     } else {
@@ -162,7 +162,7 @@ void SpeckleFilter::apply(int size_px, double step_px, ImageView<float> disparit
   for (int r = 0; r < static_cast<int>(runs_.size()); ++r) {
     if (runs_[static_cast<std::size_t>(root_of(r))].pixels >= size_px) continue;
     const Run& run = runs_[static_cast<std::size_t>(r)];
-    std::fill(&disparity(run.from, run.y), &disparity(run.to - 1, run.y) + 1, kUnknown);
+    std::fill(&disparity(run.from, run.y), &disparity(run.to - 1, run.y) + 1, kUnknownDisparity);
   }
 }
 

@@ -12,7 +12,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr float kUnknownDisparity = std::numeric_limits<float>::quiet_NaN();
 
 // Regions of a few disparity levels with holes: components of all sizes.
 Image<float> blobs(int width, int height, double holes, std::uint64_t seed) {
@@ -21,7 +21,7 @@ Image<float> blobs(int width, int height, double holes, std::uint64_t seed) {
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const double draw = random.uniform();
-      image(x, y) = draw < holes ? kUnknown : static_cast<float>(random.below(3) * 3 + random.uniform());
+      image(x, y) = draw < holes ? kUnknownDisparity : static_cast<float>(random.below(3) * 3 + random.uniform());
       const bool copied = x > 0 && random.uniform() < 0.6;
       if (copied) image(x, y) = image(x - 1, y);
       if (y > 0 && random.uniform() < 0.5) image(x, y) = image(x, y - 1);
@@ -44,7 +44,7 @@ void expect_same(ImageView<const float> found, ImageView<const float> wanted) {
 
 // Reference implementation by sorting.
 Image<float> median_by_sorting(ImageView<const float> in) {
-  Image<float> out(in.width(), in.height(), kUnknown);
+  Image<float> out(in.width(), in.height(), kUnknownDisparity);
   for (int y = 0; y < in.height(); ++y) {
     for (int x = 0; x < in.width(); ++x) {
       if (std::isnan(in(x, y))) continue;
@@ -64,7 +64,7 @@ Image<float> median_by_sorting(ImageView<const float> in) {
 
 // Reference implementation by flood fill.
 Image<float> despeckled_by_flooding(ImageView<const float> in, int size_px, double step_px) {
-  Image<float> out(in.width(), in.height(), kUnknown);
+  Image<float> out(in.width(), in.height(), kUnknownDisparity);
   Image<std::uint8_t> seen(in.width(), in.height(), 0);
   for (int y0 = 0; y0 < in.height(); ++y0) {
     for (int x0 = 0; x0 < in.width(); ++x0) {
@@ -119,7 +119,7 @@ TEST(SpeckleFilter, ADifferenceEqualToTheLimitConnects) {
     SpeckleFilter().apply(4, 2, kept);
     expect_same(kept, image);
     SpeckleFilter().apply(4, 1.99, kept);
-    expect_same(kept, Image<float>(size.width, size.height, kUnknown));
+    expect_same(kept, Image<float>(size.width, size.height, kUnknownDisparity));
   }
 }
 

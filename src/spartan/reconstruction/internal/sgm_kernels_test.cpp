@@ -19,7 +19,7 @@ std::vector<std::uint8_t> random_bytes(std::uint64_t seed, std::size_t count, st
 }
 
 // Every instruction set against the scalar reference, for odd widths and both vector widths of the disparities.
-class KernelsOnEveryTarget : public ::testing::TestWithParam<std::string> {
+class KernelsOnEveryTarget : public ::testing::TestWithParam<SimdTarget> {
  protected:
   Kernels kernels() const { return kernels_for(simd_target_index(GetParam())); }
 };
@@ -125,7 +125,7 @@ TEST_P(KernelsOnEveryTarget, WinnersEqualTheReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Simd, KernelsOnEveryTarget, ::testing::ValuesIn(available_simd_targets()),
-                         [](const auto& test) { return test.param; });
+                         [](const auto& test) { return std::string(name_of(test.param)); });
 
 }  // namespace
 }  // namespace spartan::internal::sgm

@@ -24,7 +24,7 @@ struct Lettering {
   Rgb8 colour;
   double size_px = 14;
   Anchor anchor = Anchor::start;
-  bool halo = false;  ///< white outline, for text on colors
+  bool halo = false;  ///< white outline, for text on colours
 };
 
 /// Coordinates in pixels of the result, x right, y down. Later parts cover earlier ones.

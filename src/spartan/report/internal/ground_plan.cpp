@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::internal {
 namespace {
-
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 // Ahead is up, left is left.
 struct Plan {

@@ -17,7 +17,7 @@
 namespace spartan {
 namespace {
 
-constexpr ImageSize kSize{1024, 768};
+constexpr ImageSize kOracleSize{1024, 768};
 const PinholeModel kCore{400.5, 398.25, 517.3, 379.1};
 
 cv::Matx33d matrix_of(const PinholeModel& p) {
@@ -32,7 +32,7 @@ TEST(Equidistant, ProjectsAsOpenCv) {
        {EquidistantModel::Coefficients{0, 0, 0, 0}, {-0.012, 0.031, -0.024, 0.006}, {0.05, 0.01, 0, 0}}) {
     const EquidistantModel model(kCore, k);
     int compared = 0;
-    for (const Eigen::Vector2d& pixel : testing::image_grid(kSize, 24)) {
+    for (const Eigen::Vector2d& pixel : testing::image_grid(kOracleSize, 24)) {
       const auto ray = model.unproject(pixel);
       ASSERT_TRUE(ray);
       if (ray->direction.z() < 0.01) continue;  // OpenCV divides by z
@@ -50,7 +50,7 @@ TEST(Equidistant, ProjectsAsOpenCv) {
 TEST(DoubleSphere, WithoutAlphaProjectsAsOmnidirOfOpenCv) {
   for (const double xi : {0.0, 0.4, 0.9}) {
     const DoubleSphereModel model{kCore, xi, 0};
-    for (const Eigen::Vector2d& pixel : testing::image_grid(kSize, 24)) {
+    for (const Eigen::Vector2d& pixel : testing::image_grid(kOracleSize, 24)) {
       const auto ray = model.unproject(pixel);
       ASSERT_TRUE(ray);
       std::vector<cv::Point2d> seen;
@@ -70,7 +70,7 @@ TEST(Cahvor, ProjectsAsMrcal) {
     const testing::MrcalModel oracle(
         "LENSMODEL_CAHVOR",
         {kCore.fx, kCore.fy, kCore.cx, kCore.cy, std::atan2(o.x(), o.z()), std::asin(o.y()), 0.002, -0.11, 0.03});
-    for (const Eigen::Vector2d& pixel : testing::image_grid(kSize, 24)) {
+    for (const Eigen::Vector2d& pixel : testing::image_grid(kOracleSize, 24)) {
       const auto ray = model.unproject(pixel);
       ASSERT_TRUE(ray) << pixel.transpose();
       EXPECT_LE((oracle.project(3 * ray->direction) - pixel).norm(), 1e-9) << pixel.transpose();
@@ -85,7 +85,7 @@ TEST(Cahvore, ProjectsAsMrcal) {
     const testing::MrcalModel oracle("LENSMODEL_CAHVORE_linearity=" + std::to_string(linearity),
                                      {kCore.fx, kCore.fy, kCore.cx, kCore.cy, std::atan2(o.x(), o.z()),
                                       std::asin(o.y()), 0.001, -0.02, 0.004, 0.006, 0.002, -0.0005});
-    for (const Eigen::Vector2d& pixel : testing::image_grid(kSize, 24)) {
+    for (const Eigen::Vector2d& pixel : testing::image_grid(kOracleSize, 24)) {
       const auto ray = model.unproject(pixel);
       ASSERT_TRUE(ray) << pixel.transpose() << " linearity " << linearity;
       // mrcal normalizes every point to the distance 1 from C before it projects, so only such points can be compared.

@@ -6,14 +6,14 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "spartan/core/pose.h"
 
 namespace spartan::internal {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-const StereoGeometry kWide{0.20, 1120, 50 * kDegree};
-const StereoGeometry kNarrow{0.12, 640, 66 * kDegree};
+const StereoGeometry kWide{0.20, 1120, 50 * kRadiansPerDegree};
+const StereoGeometry kNarrow{0.12, 640, 66 * kRadiansPerDegree};
 const DepthAccuracy kRequired{0.02, 0.3};
 
 // A random number in [low, high] with three decimals.
@@ -21,27 +21,27 @@ double random_in(double low, double high) {
   return 0.001 * *rc::gen::inRange(static_cast<int>(1000 * low), static_cast<int>(1000 * high) + 1);
 }
 StereoGeometry random_pair() {
-  return {random_in(0.05, 1), random_in(100, 4000), random_in(5, 150) * kDegree};
+  return {random_in(0.05, 1), random_in(100, 4000), random_in(5, 150) * kRadiansPerDegree};
 }
 bool near(double a, double b, double relative = 1e-12) {
   return std::abs(a - b) <= relative * std::max(std::abs(a), std::abs(b));
 }
 
 TEST(StereoRelations, ReproduceThePublishedValues) {
-  EXPECT_NEAR(focal_length_px(1120, 50 * kDegree), 1200.9239, 1e-4);
-  EXPECT_NEAR(focal_length_mm(5.5, 1120, 50 * kDegree), 6.6, 0.05);
+  EXPECT_NEAR(focal_length_px(1120, 50 * kRadiansPerDegree), 1200.9239, 1e-4);
+  EXPECT_NEAR(focal_length_mm(5.5, 1120, 50 * kRadiansPerDegree), 6.6, 0.05);
   EXPECT_NEAR(max_range_m(kWide, kRequired), 4.00, 0.005);
   EXPECT_NEAR(max_range_m(kNarrow, kRequired), 1.99, 0.005);
-  EXPECT_NEAR(max_range_m({0.12, 1024, 66 * kDegree}, kRequired), 2.51, 0.005);
+  EXPECT_NEAR(max_range_m({0.12, 1024, 66 * kRadiansPerDegree}, kRequired), 2.51, 0.005);
   EXPECT_NEAR(accuracy_for_range_px(kNarrow, 0.02, 2.5), 0.19, 0.005);
-  EXPECT_NEAR(stereo_angle_rad(0.20, 1.0) / kDegree, 11.4, 0.05);
-  EXPECT_NEAR(search_percent(stereo_angle_rad(0.20, 1.0), 50 * kDegree), 22.8, 0.05);
-  EXPECT_NEAR(overlap_percent(50 * kDegree, 35 * kDegree), 30, 1e-9);
-  EXPECT_NEAR(ground_ahead_m(1.0, 64 * kDegree), 0.488, 0.0005);
-  EXPECT_NEAR(ground_ahead_m(1.0, 14 * kDegree), 4.011, 0.0005);
-  EXPECT_NEAR(ground_ahead_m(0.30, (31.55 + 24.75) * kDegree), 0.200, 0.0005);
-  EXPECT_NEAR(ground_ahead_m(0.30, (31.55 - 24.75) * kDegree), 2.516, 0.0005);
-  EXPECT_NEAR(vertical_view_rad(66 * kDegree, 0.75) / kDegree, 51.9, 0.05);
+  EXPECT_NEAR(stereo_angle_rad(0.20, 1.0) / kRadiansPerDegree, 11.4, 0.05);
+  EXPECT_NEAR(search_percent(stereo_angle_rad(0.20, 1.0), 50 * kRadiansPerDegree), 22.8, 0.05);
+  EXPECT_NEAR(overlap_percent(50 * kRadiansPerDegree, 35 * kRadiansPerDegree), 30, 1e-9);
+  EXPECT_NEAR(ground_ahead_m(1.0, 64 * kRadiansPerDegree), 0.488, 0.0005);
+  EXPECT_NEAR(ground_ahead_m(1.0, 14 * kRadiansPerDegree), 4.011, 0.0005);
+  EXPECT_NEAR(ground_ahead_m(0.30, (31.55 + 24.75) * kRadiansPerDegree), 0.200, 0.0005);
+  EXPECT_NEAR(ground_ahead_m(0.30, (31.55 - 24.75) * kRadiansPerDegree), 2.516, 0.0005);
+  EXPECT_NEAR(vertical_view_rad(66 * kRadiansPerDegree, 0.75) / kRadiansPerDegree, 51.9, 0.05);
 }
 
 // Projects a point at the image border.
@@ -86,8 +86,8 @@ RC_GTEST_PROP(StereoRelations, StereoAngleIsTheAngleBetweenTheRays, ()) {
 
 // A ray intersected with the plane z = 0.
 RC_GTEST_PROP(StereoRelations, GroundDistanceIsTheRayIntersection, ()) {
-  const double height = random_in(0.1, 5), down = random_in(0.5, 150) * kDegree, range = random_in(0.5, 30),
-               view = random_in(5, 80) * kDegree;
+  const double height = random_in(0.1, 5), down = random_in(0.5, 150) * kRadiansPerDegree, range = random_in(0.5, 30),
+               view = random_in(5, 80) * kRadiansPerDegree;
   const double ahead = ground_ahead_m(height, down), length = std::hypot(ahead, height);
   RC_ASSERT(std::abs(height - length * std::sin(down)) < 1e-9);
   RC_ASSERT(std::abs(ahead - length * std::cos(down)) < 1e-9);
@@ -97,7 +97,7 @@ RC_GTEST_PROP(StereoRelations, GroundDistanceIsTheRayIntersection, ()) {
 TEST(StereoRelations, HorizonIsInfinitelyFar) {
   EXPECT_EQ(ground_ahead_m(1, 0), std::numeric_limits<double>::infinity());
   EXPECT_EQ(ground_ahead_m(1, -0.1), std::numeric_limits<double>::infinity());
-  EXPECT_LT(overlap_percent(30 * kDegree, 35 * kDegree), 0) << "a gap";
+  EXPECT_LT(overlap_percent(30 * kRadiansPerDegree, 35 * kRadiansPerDegree), 0) << "a gap";
 }
 
 }  // namespace

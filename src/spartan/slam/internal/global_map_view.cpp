@@ -13,7 +13,7 @@ namespace spartan {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr int kSide = Tile::kSide;
+constexpr int kTileSide = Tile::kSide;
 
 }  // namespace
 
@@ -27,11 +27,11 @@ Status GlobalMap::render_aligned(const Submap& submap, MapView& view, std::vecto
       const auto tile = load({submap.id, tx, ty});
       if (!tile) return failure(tile);
       if (*tile == nullptr) continue;
-      for (int y = 0; y < kSide; ++y) {
-        const int row = w.north - 1 - (ty * kSide + y + offset.y);
+      for (int y = 0; y < kTileSide; ++y) {
+        const int row = w.north - 1 - (ty * kTileSide + y + offset.y);
         if (row < 0 || row >= w.height) continue;
-        for (int x = 0; x < kSide; ++x) {
-          const int column = tx * kSide + x + offset.x - w.west;
+        for (int x = 0; x < kTileSide; ++x) {
+          const int column = tx * kTileSide + x + offset.x - w.west;
           if (column < 0 || column >= w.width) continue;
           CellSurface surface = (*tile)->at(x, y).surface;
           if (!surface.observed()) continue;
@@ -69,8 +69,9 @@ Status GlobalMap::render_resampled(const Submap& submap, MapView& view, std::vec
           const int x = x0 + k % 2, y = y0 + k / 2;
           const auto tile = load({submap.id, Tile::of(x), Tile::of(y)});
           if (!tile) return failure(tile);
-          const CellSurface* s =
-              *tile == nullptr ? nullptr : &(*tile)->at(x - kSide * Tile::of(x), y - kSide * Tile::of(y)).surface;
+          const CellSurface* s = *tile == nullptr
+                                     ? nullptr
+                                     : &(*tile)->at(x - kTileSide * Tile::of(x), y - kTileSide * Tile::of(y)).surface;
           complete = s != nullptr && s->observed();
           if (!complete) break;
           const double weight = (k % 2 == 1 ? a : 1 - a) * (k / 2 == 1 ? b : 1 - b);
@@ -141,7 +142,8 @@ LatticeWindow GlobalMap::window_of_tile(const TileKey& key) const {
       std::find_if(submaps_.begin(), submaps_.end(), [&](const Submap& s) { return s.id == key.submap; });
   double west = 1e300, east = -1e300, south = 1e300, north = -1e300;
   for (const auto& [x, y] : {std::pair{key.x, key.y}, {key.x + 1, key.y}, {key.x, key.y + 1}, {key.x + 1, key.y + 1}}) {
-    const Eigen::Vector3d p = submap->world_from_submap * Eigen::Vector3d(x * kSide * cell_m_, y * kSide * cell_m_, 0);
+    const Eigen::Vector3d p =
+        submap->world_from_submap * Eigen::Vector3d(x * kTileSide * cell_m_, y * kTileSide * cell_m_, 0);
     west = std::min(west, p.x());
     east = std::max(east, p.x());
     south = std::min(south, p.y());

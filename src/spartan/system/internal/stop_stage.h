@@ -35,8 +35,7 @@ struct StopSurvey {
 /// stored views can be matched later.
 class StopStage {
  public:
-  StopStage(const DisparityOptions& disparity, const MappingOptions& options, ThreadPool workers)
-      : mapper_(disparity, options, std::move(workers)) {}
+  explicit StopStage(StopMapper mapper) : mapper_(std::move(mapper)) {}
 
   /// Adds a frame of the odometry pair, at a stop or between stops (position_id < 0); the first frame at a stop is one
   /// of its views. `world_from_body`: at this frame. `motion`: previous_from_current of the body since the previous

@@ -31,7 +31,7 @@ Bytes saved(const StopStage& stage) {
 
 // Neither the view nor the first frame of the stop is retained; the first frame becomes a view only with another one.
 TEST(StopStage, RejectedViewLeavesStateUnchanged) {
-  StopStage stage({}, {}, ThreadPool(1));
+  StopStage stage(StopMapper::create({}, {}, ThreadPool(1)).value());
   const TestImages images;
   TestImages wrong_size;
   wrong_size.right = Image<std::uint8_t>(60, 48);
@@ -46,7 +46,7 @@ TEST(StopStage, RejectedViewLeavesStateUnchanged) {
 
 // The check is done when the view is added, not when the odometry pair reaches the stop.
 TEST(StopStage, EarlyViewIsRejectedWhenAdded) {
-  StopStage stage({}, {}, ThreadPool(1));
+  StopStage stage(StopMapper::create({}, {}, ThreadPool(1)).value());
   const TestImages images;
   TestImages wrong_size;
   wrong_size.left = Image<std::uint8_t>(64, 40);
@@ -61,7 +61,7 @@ TEST(StopStage, EarlyViewIsRejectedWhenAdded) {
 
 // The odometry pair's first frame is also a view of the stop.
 TEST(StopStage, RejectedFirstFrameLeavesStateUnchanged) {
-  StopStage stage({}, {}, ThreadPool(1));
+  StopStage stage(StopMapper::create({}, {}, ThreadPool(1)).value());
   const TestImages images;
   TestImages wrong_size;
   wrong_size.right = Image<std::uint8_t>(64, 40);

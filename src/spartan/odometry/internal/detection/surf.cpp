@@ -10,7 +10,7 @@ namespace spartan::internal {
 namespace {
 
 constexpr int kLayersPerOctave = 4;
-constexpr int kRowsPerPart = 16;
+constexpr int kSurfRowsPerPart = 16;
 
 /// Filter sides 9, 15, 21, 27 / 15, 27, 39, 51 / … (§3.3).
 int filter_size(int octave, int layer) {
@@ -72,7 +72,7 @@ void hessian_row(const IntegralImage& integral, int y, int x0, int count, int fi
 struct Cube {
   float v[3][3][3];
 
-  /// True where the center is larger than all 26 neighbors (non-maximum suppression).
+  /// True where the centre is larger than all 26 neighbours (non-maximum suppression).
   bool is_maximum() const {
     const float centre = v[1][1][1];
     for (int s = 0; s < 3; ++s) {
@@ -84,7 +84,7 @@ struct Cube {
     return true;
   }
 
-  /// Maximum of the quadratic through the cube, (x, y, scale) in grid units from the center (Brown & Lowe, "Invariant
+  /// Maximum of the quadratic through the cube, (x, y, scale) in grid units from the centre (Brown & Lowe, "Invariant
   /// features from interest point groups", BMVC 2002).
   Eigen::Vector3f peak() const {
     const auto& c = v[1];
@@ -206,7 +206,7 @@ void SurfDetector::compute_layers(ImageSize size) {
     const int columns = (size.width - 1 - margin) / step - first + 1;
     const int rows = (size.height - 1 - margin) / step - first + 1;
     if (columns <= 0 || rows <= 0) continue;
-    workers_.parallel_for(first, first + rows, kRowsPerPart, [&](int begin, int end) {
+    workers_.parallel_for(first, first + rows, kSurfRowsPerPart, [&](int begin, int end) {
       for (int r = begin; r < end; ++r) {
         hessian_row(integral_, r * step, first * step, columns, layer.filter_px, step, layer.response.row(r) + first);
       }
@@ -222,7 +222,7 @@ std::vector<Feature> SurfDetector::find_maxima(ImageSize size) const {
       const Layer* layer = &layers_[static_cast<std::size_t>(octave * kLayersPerOctave + middle)];
       const int step = layer->step_px, filter_step = layer[1].filter_px - layer[0].filter_px;
       const int first =
-          (layer[1].filter_px / 2 + 1 + step - 1) / step + 1;  // room for the largest filter and a neighbor
+          (layer[1].filter_px / 2 + 1 + step - 1) / step + 1;  // room for the largest filter and a neighbour
       const int last_x = (size.width - 1 - layer[1].filter_px / 2 - 1) / step - 1;
       const int last_y = (size.height - 1 - layer[1].filter_px / 2 - 1) / step - 1;
       for (int y = first; y <= last_y; ++y) {

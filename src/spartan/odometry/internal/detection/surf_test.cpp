@@ -25,7 +25,7 @@ Image<std::uint8_t> blob(double x0, double y0, double sigma, double height) {
   });
 }
 
-// A texture under a similarity: image(x) = texture(R(−angle) (x − center) / zoom).
+// A texture under a similarity: image(x) = texture(R(−angle) (x − centre) / zoom).
 Image<std::uint8_t> texture(double angle, double zoom) {
   const auto octaves = make_octaves(3, 3, 24, 0.7, 45);
   const double c = std::cos(angle), s = std::sin(angle);

@@ -11,7 +11,7 @@ namespace {
 constexpr int kMaxIterations = 15;
 /// The iteration has converged where a step is smaller than this.
 constexpr double kConverged_px = 0.005;
-/// Smoothing correlates the noise of neighboring pixels: the variance of a sum over many of them is the variance of
+/// Smoothing correlates the noise of neighbouring pixels: the variance of a sum over many of them is the variance of
 /// one pixel divided by Σ kernel² = (70/256)² of the binomial filter [1 4 6 4 1]/16 in two dimensions.
 constexpr double kNoiseCorrelation = 1.0 / ((70.0 / 256.0) * (70.0 / 256.0));
 /// Effective number of pixels under the Gaussian window: about half of its area.
@@ -77,16 +77,16 @@ float weighted_dot(const Window& a, const Window& b) {
 
 /// Samples the image over the warped window; std::nullopt where a corner leaves the image.
 std::optional<Window> warped_window(ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
-                                    const Eigen::Vector2d& center) {
+                                    const Eigen::Vector2d& centre) {
   const double radius_x = kWindowRadius * (std::abs(warp(0, 0)) + std::abs(warp(0, 1)));
   const double radius_y = kWindowRadius * (std::abs(warp(1, 0)) + std::abs(warp(1, 1)));
-  if (!(center.x() - radius_x >= 0 && center.x() + radius_x < image.width() - 1.01 && center.y() - radius_y >= 0 &&
-        center.y() + radius_y < image.height() - 1.01)) {
+  if (!(centre.x() - radius_x >= 0 && centre.x() + radius_x < image.width() - 1.01 && centre.y() - radius_y >= 0 &&
+        centre.y() + radius_y < image.height() - 1.01)) {
     return std::nullopt;
   }
   Window window;
   const Eigen::Matrix2f a = warp.cast<float>();
-  const Eigen::Vector2f c = center.cast<float>();
+  const Eigen::Vector2f c = centre.cast<float>();
   std::size_t i = 0;
   for (int y = -kWindowRadius; y <= kWindowRadius; ++y) {
     const auto fy = static_cast<float>(y);
@@ -111,8 +111,8 @@ struct WindowDifference {
 /// std::nullopt where the window leaves the image or has no texture.
 std::optional<WindowDifference> difference_from(const AlignmentTemplate& reference,
                                                 ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
-                                                const Eigen::Vector2d& center) {
-  const std::optional<Window> observed = warped_window(image, warp, center);
+                                                const Eigen::Vector2d& centre) {
+  const std::optional<Window> observed = warped_window(image, warp, centre);
   if (!observed) return std::nullopt;
   WindowDifference difference{*observed, {}, 0};
   difference.deviation = subtract_mean(difference.observed);
@@ -177,14 +177,14 @@ AlignmentTemplate::AlignmentTemplate(const ImagePatch& patch)
       }()) {}
 
 std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::uint16_t> image,
-                                                           const Eigen::Vector2d& center) {
+                                                           const Eigen::Vector2d& centre) {
   constexpr int r = kWindowRadius + 1;
-  if (!(center.x() >= r && center.y() >= r && center.x() + r < image.width() - 1.01 &&
-        center.y() + r < image.height() - 1.01)) {
+  if (!(centre.x() >= r && centre.y() >= r && centre.x() + r < image.width() - 1.01 &&
+        centre.y() + r < image.height() - 1.01)) {
     return std::nullopt;
   }
   std::array<float, kPatchSide * kPatchSide> pixels;
-  const Eigen::Vector2f c = center.cast<float>();
+  const Eigen::Vector2f c = centre.cast<float>();
   std::size_t i = 0;
   for (int y = -r; y <= r; ++y) {
     for (int x = -r; x <= r; ++x, ++i)
@@ -229,7 +229,7 @@ std::optional<PatchAlignment> align_translation(const AlignmentTemplate& referen
 }
 
 std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,
-                                            const Eigen::Vector2d& center, const RowAlignment& start,
+                                            const Eigen::Vector2d& centre, const RowAlignment& start,
                                             bool estimate_slant, double radius_px) {
   if (reference.deviation < kMinDeviation) return std::nullopt;
   // right(x − d − s·offset) ≈ template(x): the derivative by d is −∂x, by the slant −offset ∂x.
@@ -256,7 +256,7 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, 
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     Eigen::Matrix2d warp;
     warp << 1 - x[1], -x[2], 0, 1;
-    const auto difference = difference_from(reference, right, warp, center - Eigen::Vector2d(x[0], 0));
+    const auto difference = difference_from(reference, right, warp, centre - Eigen::Vector2d(x[0], 0));
     if (!difference) return std::nullopt;
     Eigen::Vector3d gradient = gradient_of(j, difference->residual);
     gradient[1] += prior * (x[1] - start.slant.x());

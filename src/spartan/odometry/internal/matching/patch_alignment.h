@@ -28,7 +28,7 @@ class AlignmentTemplate {
  public:
   explicit AlignmentTemplate(const ImagePatch& patch);
   /// Around a sub-pixel position of a smoothed image; std::nullopt where the window leaves the image.
-  static std::optional<AlignmentTemplate> around(ImageView<const std::uint16_t> image, const Eigen::Vector2d& center);
+  static std::optional<AlignmentTemplate> around(ImageView<const std::uint16_t> image, const Eigen::Vector2d& centre);
 
   /// Gray levels without their weighted mean; `deviation` is the weighted standard deviation.
   std::array<float, kWindowArea> value, gradient_x, gradient_y;
@@ -40,12 +40,12 @@ class AlignmentTemplate {
 
 /// Result of an alignment.
 struct PatchAlignment {
-  Eigen::Vector2d position;    ///< of the template's center, pixels
+  Eigen::Vector2d position;    ///< of the template's centre, pixels
   Eigen::Matrix2d covariance;  ///< from the residual and the gradients, pixels²
   double correlation = 0;      ///< normalized cross-correlation at the result
 };
 
-/// Estimates the center so that image(center + warp · offset) ≈ template(offset) up to brightness and contrast
+/// Estimates the centre so that image(centre + warp · offset) ≈ template(offset) up to brightness and contrast
 /// (translation only; inverse-compositional Gauss-Newton, Baker & Matthews §3.2). std::nullopt where the window leaves
 /// the image, the iteration does not converge or moves farther than `radius_px` from the start.
 std::optional<PatchAlignment> align_translation(const AlignmentTemplate& reference,
@@ -60,11 +60,11 @@ struct RowAlignment {
   double correlation = 0;                           ///< normalized cross-correlation at the result
 };
 
-/// Estimates disparity and slant so that right(center + offset − (disparity + slant · offset, 0)) ≈ template(offset),
-/// for a template around `center` of the left image. A weak Gaussian prior keeps the slant near its start; with
+/// Estimates disparity and slant so that right(centre + offset − (disparity + slant · offset, 0)) ≈ template(offset),
+/// for a template around `centre` of the left image. A weak Gaussian prior keeps the slant near its start; with
 /// `estimate_slant` false the slant is fixed. std::nullopt as for align_translation().
 std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,
-                                            const Eigen::Vector2d& center, const RowAlignment& start,
+                                            const Eigen::Vector2d& centre, const RowAlignment& start,
                                             bool estimate_slant, double radius_px);
 
 /// Alignment of a left template in the right image where neither row nor slant is known.
@@ -73,7 +73,7 @@ struct SlantedAlignment {
   Eigen::Vector2d slant = Eigen::Vector2d::Zero();  ///< disparity gradient ∂d/∂(x, y) in the left image
 };
 
-/// align_translation() that estimates the slant of the surface as well: right(center + offset − (slant · offset, 0)) ≈
+/// align_translation() that estimates the slant of the surface as well: right(centre + offset − (slant · offset, 0)) ≈
 /// template(offset). Without the slant, oblique edges on slanted ground bias the row of the match. A weak Gaussian
 /// prior keeps the slant near 0.
 std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference, ImageView<const std::uint16_t> right,

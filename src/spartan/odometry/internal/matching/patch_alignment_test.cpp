@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kSide = 64;
 
-// texture(A⁻¹ (x − center − shift)) with noise, smoothed.
+// texture(A⁻¹ (x − centre − shift)) with noise, smoothed.
 class WarpedTexture {
  public:
   WarpedTexture(const Eigen::Matrix2d& warp, const Eigen::Vector2d& shift, double gain = 1, double noise = 0,

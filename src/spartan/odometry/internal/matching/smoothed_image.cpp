@@ -5,7 +5,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr int kRowsPerPart = 32;
+constexpr int kSmoothingRowsPerPart = 32;
 
 template <class In>
 int binomial(In a, In b, In c, In d, In e) {
@@ -20,7 +20,7 @@ void SmoothedImage::compute(ImageView<const std::uint8_t> image, const ThreadPoo
     pixels_ = Image<std::uint16_t>(image.size());
     rows_ = Image<std::uint16_t>(image.size());
   }
-  workers.parallel_for(0, height, kRowsPerPart, [&](int begin, int end) {
+  workers.parallel_for(0, height, kSmoothingRowsPerPart, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
       const auto source = [&](int dy) { return image.row(std::clamp(y + dy, 0, height - 1)); };
       const std::uint8_t *a = source(-2), *b = source(-1), *c = source(0), *d = source(1), *e = source(2);

@@ -9,7 +9,7 @@
 namespace spartan::internal {
 namespace {
 
-const RectifiedStereo kStereo{{640, 480}, 500, {319.5, 239.5}, 0.12};
+const RectifiedStereo kAnchorStereo{{640, 480}, 500, {319.5, 239.5}, 0.12};
 
 struct Case {
   AnchoredPoint point;
@@ -29,7 +29,7 @@ Case random_case(std::uint32_t seed) {
 }
 
 Eigen::Vector3d projected(const Case& c) {
-  return project_anchored(kStereo, c.point, c.previous_from_current.inverse() * c.previous_from_anchor)->measured;
+  return project_anchored(kAnchorStereo, c.point, c.previous_from_current.inverse() * c.previous_from_anchor)->measured;
 }
 
 RC_GTEST_PROP(AnchoredPoint, AgreesWithTriangulationTransformAndProjection, (std::uint32_t seed)) {
@@ -37,14 +37,14 @@ RC_GTEST_PROP(AnchoredPoint, AgreesWithTriangulationTransformAndProjection, (std
   c.point.disparity += 0.5;
   const Pose current_from_anchor = c.previous_from_current.inverse() * c.previous_from_anchor;
   const Eigen::Vector3d point =
-      current_from_anchor * kStereo.triangulate(c.point.pixel.x(), c.point.pixel.y(), c.point.disparity);
+      current_from_anchor * kAnchorStereo.triangulate(c.point.pixel.x(), c.point.pixel.y(), c.point.disparity);
   RC_PRE(point.z() > 0.1);
-  RC_ASSERT((projected(c) - kStereo.project(point)).norm() < 1e-8);
+  RC_ASSERT((projected(c) - kAnchorStereo.project(point)).norm() < 1e-8);
 }
 
 RC_GTEST_PROP(AnchoredPoint, JacobiansAgreeWithNumericalDerivatives, (std::uint32_t seed)) {
   const Case c = random_case(seed);
-  const auto p = project_anchored(kStereo, c.point, c.previous_from_current.inverse() * c.previous_from_anchor);
+  const auto p = project_anchored(kAnchorStereo, c.point, c.previous_from_current.inverse() * c.previous_from_anchor);
   RC_PRE(p.has_value());
   RC_PRE(1 / p->by_disparity.z() > 0);
   const auto by_motion = testing::numeric_jacobian<3, 6>(
@@ -69,26 +69,27 @@ RC_GTEST_PROP(AnchoredPoint, JacobiansAgreeWithNumericalDerivatives, (std::uint3
 
 TEST(AnchoredPoint, IsRegularAtInfinityAndRejectsPointsBehindTheCamera) {
   const Pose rotated = exp_se3((Vector6d() << 5, 0, 0, 0, 0.01, 0).finished());
-  const auto far = project_anchored(kStereo, {{319.5, 239.5}, 0.0}, rotated);
+  const auto far = project_anchored(kAnchorStereo, {{319.5, 239.5}, 0.0}, rotated);
   ASSERT_TRUE(far.has_value());
   EXPECT_NEAR(far->measured.x(), 319.5 + 500 * std::tan(0.01), 1e-6);  // only the rotation moves a point at infinity
   EXPECT_EQ(far->measured.z(), 0);
   const Pose driven_past = Pose::from_translation({0, 0, -3});
   EXPECT_FALSE(
-      project_anchored(kStereo, {{300, 200}, 30}, driven_past).has_value());  // 2 m ahead, 3 m driven: now behind
+      project_anchored(kAnchorStereo, {{300, 200}, 30}, driven_past).has_value());  // 2 m ahead, 3 m driven: now behind
 }
 
 TEST(AnchoredPoint, WarpAgreesWithTheProjectionOfAPlane) {
   const AnchoredPoint point{{350, 300}, 20};
   const Eigen::Vector2d slant(0.02, 0.3);
   const Pose motion = exp_se3((Vector6d() << 0.05, 0.02, -0.4, 0.02, -0.03, 0.01).finished());
-  const AnchoredWarp warp = warp_of(*project_anchored(kStereo, point, motion), slant);
+  const AnchoredWarp warp = warp_of(*project_anchored(kAnchorStereo, point, motion), slant);
   const auto projection_of = [&](const Eigen::Vector2d& offset) {
-    return project_anchored(kStereo, {point.pixel + offset, point.disparity + slant.dot(offset)}, motion)->measured;
+    return project_anchored(kAnchorStereo, {point.pixel + offset, point.disparity + slant.dot(offset)}, motion)
+        ->measured;
   };
-  const Eigen::Vector3d center = projection_of(Eigen::Vector2d::Zero());
+  const Eigen::Vector3d centre = projection_of(Eigen::Vector2d::Zero());
   for (const Eigen::Vector2d& offset : {Eigen::Vector2d(0.01, 0), Eigen::Vector2d(0, 0.01)}) {
-    const Eigen::Vector3d change = projection_of(offset) - center;
+    const Eigen::Vector3d change = projection_of(offset) - centre;
     EXPECT_LT((change.head<2>() - warp.pixels * offset).norm(), 1e-4 * 0.01 * 10);
     EXPECT_NEAR(change.z(), warp.slant.dot(change.head<2>()), 1e-5);
   }

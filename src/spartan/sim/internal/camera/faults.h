@@ -5,7 +5,7 @@
 #include <string>
 
 #include "spartan/sim/internal/camera/sensor.h"
-#include "spartan/sim/scenario_options.h"
+#include "spartan/sim/sensor_options.h"
 
 namespace spartan::sim::internal {
 

@@ -5,15 +5,12 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
+#include "spartan/core/pose.h"
+
 namespace spartan::sim::internal {
-namespace {
-
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-
-}  // namespace
+namespace {}  // namespace
 
 Sun::Sun(const LightOptions& options) : lux_(options.sun_lux) {
   const double elevation = options.sun_elevation_deg * kRadiansPerDegree;

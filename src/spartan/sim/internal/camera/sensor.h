@@ -9,7 +9,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/rig/rig.h"
 #include "spartan/sim/internal/camera/renderer.h"
-#include "spartan/sim/scenario_options.h"
+#include "spartan/sim/sensor_options.h"
 
 namespace spartan::sim::internal {
 

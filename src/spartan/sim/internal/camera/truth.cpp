@@ -10,7 +10,7 @@
 namespace spartan::sim::internal {
 namespace {
 
-constexpr float kFarthest_m = 400;        // beyond the corner of the horizon square
+constexpr float kFarthestTruth_m = 400;   // beyond the corner of the horizon square
 constexpr float kGroundOffset_m = 1e-3F;  // visibility rays end this far before the ground, against self-intersection
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr double kTile_m = 8;  // side of the tiles in which maps are rasterized
@@ -61,7 +61,7 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
                              static_cast<std::size_t>(std::min(first + k, w - 1));
       directions[static_cast<std::size_t>(k)] = directions_[at];
       const bool valid = first + k < w && directions_[at].z() != 0;
-      rays.set(k, left_centre, rotation * directions_[at], valid ? kFarthest_m : -1.0F);
+      rays.set(k, left_centre, rotation * directions_[at], valid ? kFarthestTruth_m : -1.0F);
     }
     const HitPacket hits = scene.intersect(rays);
     std::array<float, kPacket> disparity{};

@@ -5,13 +5,13 @@
 #include <numbers>
 #include <optional>
 
+#include "spartan/core/pose.h"
 #include "spartan/numerics/gradient_noise.h"
 #include "spartan/numerics/random.h"
 
 namespace spartan::sim::internal {
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr std::int64_t kEpoch_ns = 1'000'000'000'000;  // stamp of the start of every drive: 1000 s
 
 Eigen::Vector3d normal_vector(Random& random, double sigma) {

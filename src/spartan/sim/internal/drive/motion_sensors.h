@@ -7,6 +7,7 @@
 #include "spartan/camera/samples.h"
 #include "spartan/sim/internal/drive/body_motion.h"
 #include "spartan/sim/scenario_options.h"
+#include "spartan/sim/sensor_options.h"
 
 namespace spartan::sim::internal {
 

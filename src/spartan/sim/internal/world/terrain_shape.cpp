@@ -6,12 +6,12 @@
 #include <cstddef>
 #include <numbers>
 
+#include "spartan/core/pose.h"
 #include "spartan/numerics/random.h"
 
 namespace spartan::sim::internal {
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr double kFinestRelief_m = 0.02;  // shortest wavelength of the relief
 constexpr std::size_t kBlock = 256;       // points evaluated together
 constexpr double kWallFraction = 0.35;    // width of a cavity's wall over its radius; empirical

@@ -1,0 +1,253 @@
+// Options of a scenario (scenario.yaml): cameras, motion sensors and their faults, one struct per group of keys.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "spartan/core/options.h"
+
+namespace spartan::sim {
+
+// --- Cameras ---
+
+/// Image sensor, lens and exposure rule, the same for all cameras of the rig.
+struct SensorOptions {
+  double pixel_um = 5.5;            ///< µm; pixel pitch
+  double f_number = 2.0;            ///< focal length over aperture
+  double transmission = 0.9;        ///< of the lens
+  double vignetting = 0.7;          ///< exponent applied to cos⁴ of the field angle
+  double quantum_efficiency = 0.5;  ///< electrons per photon
+  double full_well_e = 15000;       ///< e⁻
+  double read_noise_e = 15;         ///< e⁻; standard deviation
+  double black_level = 1.0 / 64;    ///< fraction of full scale
+  double target_level = 0.45;       ///< fraction of the full well
+  double longest_exposure_ms = 20;  ///< ms
+  double largest_gain = 16;         ///< 1: the full well is full scale
+  int noise_seed = 0;               ///< seed of the image noise alone
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("pixel_um", pixel_um, "Pixel pitch of the image sensor in micrometres; larger pixels collect more light.",
+            between(0.5, 50));
+    v.field("f_number", f_number, "F-number of the lens; raising it makes images darker.", between(0.7, 32));
+    v.field("transmission", transmission, "Fraction of the light that the lens transmits.", between(0.05, 1));
+    v.field("vignetting", vignetting,
+            "Exponent of the vignetting, applied to cos^4 of the field angle: 0 is none, 1 is natural vignetting.",
+            between(0, 3));
+    v.field("quantum_efficiency", quantum_efficiency, "Electrons per photon.", between(0.01, 1));
+    v.field("full_well_e", full_well_e, "Full-well capacity of a pixel in electrons.", between(500, 200000));
+    v.field("read_noise_e", read_noise_e, "Standard deviation of the read noise in electrons.", between(0, 500));
+    v.field("black_level", black_level, "Gray level without light, as a fraction of full scale.", between(0, 0.25));
+    v.field("target_level", target_level,
+            "Mean signal that auto exposure aims at, as a fraction of the full well; raising it gives brighter images.",
+            between(0.01, 0.9));
+    v.field("longest_exposure_ms", longest_exposure_ms,
+            "Longest exposure time in milliseconds; auto exposure raises the gain beyond it. Raising it reduces noise "
+            "and adds motion blur.",
+            between(0.01, 10000));
+    v.field("largest_gain", largest_gain,
+            "Largest gain of auto exposure; with a gain of 1 the full well is full scale.", between(1, 1000));
+    v.field("noise_seed", noise_seed,
+            "Seed of the image noise alone; another one gives the same world and drive with other noise.", at_least(0));
+  }
+};
+
+/// Difference between the nominal rig, which the recording states, and the true one. Errors are those of the right
+/// camera relative to the left one, except for the focal length, which is wrong in both.
+struct NominalRigOptions {
+  double yaw_deg = 0;        ///< deg; right camera about its y axis
+  double row_offset_px = 0;  ///< px; principal point of the right camera
+  double focal_percent = 0;  ///< %; both cameras
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("yaw_deg", yaw_deg,
+            "Rotation error of the right camera about its y axis in the nominal calibration, in degrees.",
+            between(-5, 5));
+    v.renamed("rows_px", "row_offset_px");
+    v.field("row_offset_px", row_offset_px,
+            "Error of the right camera's principal point in rows in the nominal calibration, in pixels.",
+            between(-50, 50));
+    v.field("focal_percent", focal_percent, "Error of both focal lengths in the nominal calibration, in percent.",
+            between(-20, 20));
+  }
+};
+
+enum class CameraFaultKind {
+  dropped,
+  left_dark,
+  right_dark,
+  overexposed,
+  left_dust,
+  right_dust,
+  brightness_step,
+  stamp_jitter
+};
+constexpr auto enum_names(CameraFaultKind) {
+  using enum CameraFaultKind;
+  return std::array{EnumName{dropped, "dropped"},
+                    EnumName{left_dark, "left_dark"},
+                    EnumName{right_dark, "right_dark"},
+                    EnumName{overexposed, "overexposed"},
+                    EnumName{left_dust, "left_dust"},
+                    EnumName{right_dust, "right_dust"},
+                    EnumName{brightness_step, "brightness_step"},
+                    EnumName{stamp_jitter, "stamp_jitter"}};
+}
+
+/// A fault of a pair's cameras during an interval.
+struct CameraFault {
+  CameraFaultKind kind = CameraFaultKind::dropped;
+  std::string pair;             ///< empty: all pairs
+  double from_s = 0, to_s = 0;  ///< s since the start of the recording
+  double amount = 0;            ///< by kind: factor on the light, or standard deviation in s
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("kind", kind,
+            "Kind of fault: frames dropped, left or right camera dark, both overexposed, dust on the left or right "
+            "lens, a step of brightness, or jitter of the time stamps.");
+    v.field("pair", pair, "Name of the pair that fails; empty for all pairs.");
+    v.field("from_s", from_s, "Start of the fault in seconds since the start of the recording.", at_least(0));
+    v.field("to_s", to_s, "End of the fault in seconds since the start of the recording.", at_least(0));
+    v.field("amount", amount,
+            "Size of the fault: for overexposed and brightness_step the factor on the light that auto exposure does "
+            "not see; for stamp_jitter the standard deviation of the time stamps in seconds.",
+            at_least(0));
+  }
+};
+using CameraFaults = std::vector<CameraFault>;
+
+// --- Motion sensors ---
+
+/// Errors as from an Allan deviation: white noise by its density, the bias as a constant of the drive plus a random
+/// walk.
+struct ImuOptions {
+  bool enabled = true;
+  double rate_hz = 100;                    ///< Hz
+  double gyro_noise_rad_s_sqrt_hz = 1e-4;  ///< rad/s/√Hz
+  double gyro_bias_rad_s = 5e-5;           ///< rad/s; standard deviation at the start
+  double gyro_walk_rad_s2_sqrt_hz = 2e-6;  ///< rad/s²/√Hz
+  double accel_noise_m_s2_sqrt_hz = 1e-3;  ///< m/s²/√Hz
+  double accel_bias_m_s2 = 5e-3;           ///< m/s²; standard deviation at the start
+  double accel_walk_m_s3_sqrt_hz = 5e-5;   ///< m/s³/√Hz
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has an IMU.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(1, 2000));
+    v.field("gyro_noise_rad_s_sqrt_hz", gyro_noise_rad_s_sqrt_hz,
+            "Density of the gyroscopes' white noise in rad/s/sqrt(Hz).", at_least(0));
+    v.field("gyro_bias_rad_s", gyro_bias_rad_s, "Standard deviation of the gyroscopes' bias at the start in rad/s.",
+            at_least(0));
+    v.field("gyro_walk_rad_s2_sqrt_hz", gyro_walk_rad_s2_sqrt_hz,
+            "Density of the random walk of the gyroscopes' bias in rad/s^2/sqrt(Hz).", at_least(0));
+    v.field("accel_noise_m_s2_sqrt_hz", accel_noise_m_s2_sqrt_hz,
+            "Density of the accelerometers' white noise in m/s^2/sqrt(Hz).", at_least(0));
+    v.field("accel_bias_m_s2", accel_bias_m_s2, "Standard deviation of the accelerometers' bias at the start in m/s^2.",
+            at_least(0));
+    v.field("accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz,
+            "Density of the random walk of the accelerometers' bias in m/s^3/sqrt(Hz).", at_least(0));
+  }
+};
+
+/// Wheel odometry with slip, the fraction of the rolled distance that does not move the rover:
+///   slip = level + by_slope · tan(climb) + sand · noise(x, y),  rolled = travelled / (1 − slip).
+struct WheelOptions {
+  bool enabled = true;
+  double rate_hz = 20;           ///< Hz
+  double slip_level = 0.02;      ///< slip on level ground
+  double slip_by_slope = 1;      ///< slip per tan(climb)
+  double slip_sand = 0.03;       ///< standard deviation of the slip between patches of sand
+  double sand_size_m = 2;        ///< m; size of the patches
+  double radius_error = 0.005;   ///< standard deviation of each side's scale
+  double resolution_m = 0.0005;  ///< m; encoder step
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has wheel encoders.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(0.1, 1000));
+    v.field("slip_level", slip_level, "Slip on level ground, as a fraction of the rolled distance.",
+            between(-0.5, 0.9));
+    v.field("slip_by_slope", slip_by_slope, "Additional slip on a climb of 45 degrees; it grows with tan(climb).",
+            between(0, 5));
+    v.field("slip_sand", slip_sand, "Standard deviation of the slip between patches of sand.", between(0, 0.5));
+    v.field("sand_size_m", sand_size_m, "Size of the patches of sand in metres.", between(0.1, 100));
+    v.field("radius_error", radius_error,
+            "Standard deviation of the scale error of each side, as a fraction of the distance.", between(0, 0.2));
+    v.field("resolution_m", resolution_m, "Resolution of the encoders in metres of rolled distance; 0 is exact.",
+            between(0, 0.1));
+  }
+};
+
+/// A compass or sun sensor.
+struct CompassOptions {
+  bool enabled = true;
+  double rate_hz = 1;              ///< Hz
+  double sigma_deg = 1;            ///< deg; standard deviation of the noise
+  double bias_deg = 1;             ///< deg; standard deviation of the bias
+  double outlier_fraction = 0.02;  ///< fraction of samples with a random heading
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has a compass.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(0.01, 100));
+    v.field("sigma_deg", sigma_deg, "Standard deviation of the noise of a sample in degrees, as recorded with it.",
+            between(0, 90));
+    v.field("bias_deg", bias_deg, "Standard deviation in degrees of the bias, which is constant over the drive.",
+            between(0, 90));
+    v.renamed("outlier_share", "outlier_fraction");
+    v.field("outlier_fraction", outlier_fraction, "Fraction of samples whose heading is uniformly random.",
+            between(0, 1));
+  }
+};
+
+/// An inclinometer for roll and pitch.
+struct InclinometerOptions {
+  bool enabled = true;
+  double rate_hz = 5;      ///< Hz
+  double sigma_deg = 0.2;  ///< deg; standard deviation of the noise
+  double bias_deg = 0.1;   ///< deg; standard deviation of the bias
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("enabled", enabled, "Whether the rover has an inclinometer.");
+    v.field("rate_hz", rate_hz, "Samples per second.", between(0.01, 1000));
+    v.field("sigma_deg", sigma_deg, "Standard deviation of the noise of a sample in degrees, as recorded with it.",
+            between(0, 45));
+    v.field("bias_deg", bias_deg,
+            "Standard deviation in degrees of the biases of roll and pitch, which are constant over the drive.",
+            between(0, 45));
+  }
+};
+
+enum class MotionSensor { imu, wheels, compass, inclinometer };
+constexpr auto enum_names(MotionSensor) {
+  using enum MotionSensor;
+  return std::array{EnumName{imu, "imu"}, EnumName{wheels, "wheels"}, EnumName{compass, "compass"},
+                    EnumName{inclinometer, "inclinometer"}};
+}
+
+enum class SensorFaultKind { drop, freeze };
+constexpr auto enum_names(SensorFaultKind) {
+  return std::array{EnumName{SensorFaultKind::drop, "drop"}, EnumName{SensorFaultKind::freeze, "freeze"}};
+}
+
+/// An interval in which a sensor sends nothing, or repeats its last sample.
+struct SensorFault {
+  MotionSensor sensor = MotionSensor::imu;
+  SensorFaultKind kind = SensorFaultKind::drop;
+  double from_s = 0, to_s = 0;  ///< s since the start of the recording
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("sensor", sensor, "Sensor that fails.");
+    v.field("kind", kind, "Kind of fault: drop sends no samples, freeze repeats the last one.");
+    v.field("from_s", from_s, "Start of the fault in seconds since the start of the recording.", at_least(0));
+    v.field("to_s", to_s, "End of the fault in seconds since the start of the recording.", at_least(0));
+  }
+};
+using SensorFaults = std::vector<SensorFault>;
+
+}  // namespace spartan::sim
