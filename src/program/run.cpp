@@ -41,9 +41,10 @@ std::string summary_for_people(const std::string& summary_json, const std::strin
   for (const auto& [reason, count] : s["skipped"].items())
     text += fmt::format("skipped: {} {}\n", count.get<int>(), reason);
   for (const auto& span : s["lost_spans"]) {
-    text += fmt::format("lost from {} to {} ns: {}\n", span["from_ns"].get<std::int64_t>(),
+    text += fmt::format("odometry lost from {} ns to {} ns: {}\n", span["from_ns"].get<std::int64_t>(),
                         span["to_ns"].get<std::int64_t>(), span["reason"].get<std::string>());
   }
+  if (!s["lost_spans"].empty()) text += "there the poses are predictions, and the exit code is 6\n";
   return text + "results in " + folder + "\n";
 }
 

@@ -279,6 +279,7 @@ TEST_F(Run, ReportsALossIfTheViewsDoNotOverlap) {
   }
   const ProgramResult result = run("out");
   EXPECT_EQ(result.exit_code, 6) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("there the poses are predictions, and the exit code is 6"));
   const auto summary = summary_of(path("out"));
   EXPECT_EQ(summary["lost_spans"].size(), 1U);
   EXPECT_EQ(summary["health"]["odometry"]["lost"], 1) << "tracking continues from the next frame";
