@@ -14,7 +14,7 @@ endif()
 
 # Optimizing the tests' own code would only make the build slower.
 add_library(spartan_test_flags INTERFACE)
-target_compile_options(spartan_test_flags INTERFACE $<$<CONFIG:Release>:-O1>)
+target_compile_options(spartan_test_flags INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 
 # spartan_precompiled(NAME LINKS libraries… HEADERS headers…): compiles the headers for targets to REUSE_FROM it.
 function(spartan_precompiled name)
