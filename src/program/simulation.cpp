@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <filesystem>
 #include <utility>
 
@@ -14,6 +13,7 @@
 #include "program/shipped_files.h"
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/files.h"
+#include "spartan/core/stage_clock.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/sim/simulator.h"
 
@@ -90,12 +90,12 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   sim::SimulationHooks hooks;
   hooks.should_stop = interrupted;
   hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.frames, "frames"); };
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   const auto report =
       sim::simulate({*scenario, *rig, std::move(*drive), std::move(*views), arguments.output, arguments.resume}, hooks,
                     ThreadPool(context.threads));
   if (!report) return failure(report);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = 1e-3 * watch.lap();
   const double rate =
       report->render_seconds > 0 ? static_cast<double>(report->rays) / report->render_seconds / context.threads : 0;
   const Json json{

@@ -282,8 +282,13 @@ TEST_F(EurocLayout, ReadsTheNoiseOfTheImu) {
     return rejected.error().message();
   };
   EXPECT_THAT(error_message(densities + "accelerometer_random_walk: -1\n"),
-              HasSubstr("imu0/sensor.yaml: accelerometer_random_walk is -1, expected a number in [0, 10)"));
-  EXPECT_THAT(error_message("gyroscope_noise_density: small\n"), HasSubstr("imu0/sensor.yaml: not valid YAML"));
+              HasSubstr("imu0/sensor.yaml:5: accelerometer_random_walk: is -1, must be at least 0 and below 10"));
+  EXPECT_THAT(error_message("gyroscope_noise_density: small\n"),
+              HasSubstr("imu0/sensor.yaml:1: gyroscope_noise_density: 'small' is not a number"));
+  EXPECT_THAT(error_message("T_BS: [1, 2]\n"), HasSubstr("imu0/sensor.yaml:1: T_BS: has 2 entries"));
+  EXPECT_THAT(error_message("T_BS: [2,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n"),
+              HasSubstr("imu0/sensor.yaml:1: T_BS: its rotation part is not a rotation matrix"));
+  EXPECT_THAT(error_message(""), HasSubstr("imu0/sensor.yaml"));
 }
 
 TEST_F(EurocLayout, ErrorsNameFileAndLine) {

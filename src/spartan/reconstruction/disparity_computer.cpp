@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
+#include "spartan/core/stage_clock.h"
 #include "spartan/reconstruction/internal/disparity_filters.h"
 #include "spartan/reconstruction/internal/semi_global_matcher.h"
 
@@ -59,11 +59,7 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
                                                   ImageView<const std::uint8_t> left_mask,
                                                   ImageView<const std::uint8_t> right_mask) {
   if (Status fits = check(left, right, range, left_mask, right_mask); !fits) return failure(fits);
-  using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-  };
-  const auto start = Clock::now();
+  Stopwatch all, watch;
   State& s = *state_;
   if (s.checked.size() != left.size()) {
     s.checked = Image<float>(left.size());
@@ -72,19 +68,18 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   DisparityImage result;
   const RawDisparity& raw = s.matcher.match(left, right, range);
   result.times = s.matcher.times();
-  const auto check_start = Clock::now();
+  watch.lap();
   drop_inconsistent(raw, s.options.left_right_px, s.workers, s.checked);
   apply_masks(left_mask, right_mask, s.checked);
-  result.times.check = since(check_start);
-  const auto filter_start = Clock::now();
+  result.times.check = watch.lap();
   if (s.options.median) {
     median_3x3(s.checked, s.workers, s.smoothed);
   } else {
     std::swap(s.checked, s.smoothed);
   }
   s.speckles.apply(s.options.speckle_size_px, s.options.speckle_step_px, s.smoothed);
-  result.times.filter = since(filter_start);
-  result.times.total = since(start);
+  result.times.filter = watch.lap();
+  result.times.total = all.lap();
   result.disparity = s.smoothed.view();
   result.buffer_bytes = s.matcher.buffer_bytes();
   return result;

@@ -48,9 +48,9 @@ Neighbourhood neighbourhood_of(ImageView<const float> z, int x, int y, int radiu
 
 Traversability compute_traversability(const TerrainSurface& s, const RoverLimits& rover, const ThreadPool& workers) {
   const int w = s.elevation_m.width(), h = s.elevation_m.height();
-  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-  Traversability shape{Image<float>(w, h, kNaN), Image<float>(w, h, kNaN), Image<float>(w, h, kNaN),
-                       Image<float>(w, h, kNaN)};
+  constexpr float kUnknownShape = std::numeric_limits<float>::quiet_NaN();
+  Traversability shape{Image<float>(w, h, kUnknownShape), Image<float>(w, h, kUnknownShape),
+                       Image<float>(w, h, kUnknownShape), Image<float>(w, h, kUnknownShape)};
   const int radius = std::max(1, static_cast<int>(std::lround(0.25 * rover.geometry.track_m / s.cell_m)));
   const double steepest = rover.max_slope_deg * std::numbers::pi / 180;
   workers.parallel_for(0, h, 16, [&](int first, int last) {

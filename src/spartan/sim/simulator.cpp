@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -12,6 +11,7 @@
 
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
+#include "spartan/core/stage_clock.h"
 #include "spartan/sim/internal/camera/faults.h"
 #include "spartan/sim/internal/camera/frame_preview.h"
 #include "spartan/sim/internal/camera/renderer.h"
@@ -141,10 +141,10 @@ class Simulation {
     const Pose pose = camera_pose(planned, pair.left, planned.time_s);
     FramePreview preview;
     preview.exposure = choose_exposure(scenario_.sensor, renderer.mean_luminance(lit, pose, kMeteredRow));
-    const auto start = std::chrono::steady_clock::now();
+    Stopwatch watch;
     const LuminanceImage luminance =
         renderer.render(lit, exposure_poses(planned, pair.left, preview.exposure.seconds), true, workers_);
-    preview.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    preview.seconds = 1e-3 * watch.lap();
     preview.rays = renderer.rays();
     preview.recorded = sensor.expose(luminance, preview.exposure, {}, 1, workers_);
     preview.noise_free = sensor.noise_free(luminance, preview.exposure);
@@ -267,7 +267,7 @@ class Simulation {
   }
 
   Status render_frame(RecordingWriter& writer, std::size_t i, const LitScene& lit, const FrameFaultState& fault) {
-    const auto start = std::chrono::steady_clock::now();
+    Stopwatch watch;
     const PlannedFrame& planned = request_.drive.frames()[i];
     const PairRenderer& tools = pair_renderers_.at(planned.pair);
     const StereoPair& pair = *request_.rig.find_pair(planned.pair);
@@ -299,7 +299,7 @@ class Simulation {
         return s;
     }
     report_.rays += tools.left.rays() + tools.right.rays();
-    report_.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report_.render_seconds += 1e-3 * watch.lap();
     return writer.add(frame);
   }
 

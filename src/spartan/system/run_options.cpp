@@ -1,8 +1,13 @@
 #include "spartan/system/run_options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+#include <map>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace spartan {
 namespace {
@@ -68,6 +73,24 @@ std::string dump_basic_options(const RunOptions& options) {
     return std::find(kBasicOptions.begin(), kBasicOptions.end(), line.key) == kBasicOptions.end();
   });
   return options_detail::to_yaml(lines);
+}
+
+std::string option_differences(const RunOptions& before, const RunOptions& now) {
+  constexpr std::size_t kMost = 5;
+  std::map<std::string, std::string> former_values;
+  for (const OptionLine& line : list_options(before)) former_values[line.key] = line.value;
+  std::vector<std::string> differences;
+  for (const OptionLine& line : list_options(now)) {
+    const auto found = former_values.find(line.key);
+    const std::string was = found == former_values.end() ? std::string("not set") : found->second;
+    if (was == line.value) continue;
+    if (differences.size() == kMost) {
+      differences.emplace_back("…");
+      break;
+    }
+    differences.push_back(fmt::format("{} was {}, is {}", line.key, was, line.value));
+  }
+  return fmt::format("{}", fmt::join(differences, "; "));
 }
 
 }  // namespace spartan

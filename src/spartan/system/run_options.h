@@ -92,6 +92,9 @@ struct RunOptions {
 /// differ from their defaults (set in code or under a former key) are retained.
 RunOptions resolved_options(RunOptions options, const Rig& rig);
 
+/// "odometry.detection.landmarks was 1200, is 800; …": what differs, at most five options.
+std::string option_differences(const RunOptions& before, const RunOptions& now);
+
 /// Keys of the options that an operator needs, at most 30; the others are for experts.
 std::span<const std::string_view> basic_options();
 

@@ -69,5 +69,19 @@ TEST(ResolvedOptions, ChangeNoDefault) {
   EXPECT_EQ(resolved.mapping.merging.disparity_sigma_px, 0.3);
 }
 
+TEST(RunOptions, DifferencesNameKeyAndBothValues) {
+  const RunOptions before;
+  RunOptions now;
+  EXPECT_EQ(option_differences(before, now), "");
+  now.odometry.detection.landmarks = 800;
+  EXPECT_EQ(option_differences(before, now), "odometry.detection.landmarks was 1200, is 800");
+  now.maps = !before.maps;
+  now.terrain.enabled = !before.terrain.enabled;
+  now.reconstruction.p1 = now.reconstruction.p2_flat = now.reconstruction.p2_edge = 51;
+  const std::string six = option_differences(before, now);
+  EXPECT_EQ(std::count(six.begin(), six.end(), ';'), 5) << six;
+  EXPECT_TRUE(six.ends_with("; …")) << six;
+}
+
 }  // namespace
 }  // namespace spartan

@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "spartan/core/options.h"
 #include "spartan/storage/database.h"
@@ -81,25 +79,6 @@ Status write_identity(Database& db, const std::string& key, const std::string& v
   return insert->bind(1, key).bind(2, value).run();
 }
 
-// "odometry.detection.landmarks was 1200, is 800; …", at most five; empty where the stored options are not those of
-// this version.
-std::string option_differences(const std::string& stored, const std::string& given) {
-  const auto was = parse_options<RunOptions>(stored, "stored options");
-  const auto is = parse_options<RunOptions>(given, "given options");
-  if (!was || !is) return {};
-  const std::vector<OptionLine> before = list_options(*was), now = list_options(*is);
-  std::vector<std::string> differences;
-  for (std::size_t i = 0; i < std::min(before.size(), now.size()); ++i) {
-    if (before[i].key != now[i].key || before[i].value == now[i].value) continue;
-    if (differences.size() == 5) {
-      differences.emplace_back("…");
-      break;
-    }
-    differences.push_back(fmt::format("{} was {}, is {}", now[i].key, before[i].value, now[i].value));
-  }
-  return fmt::format("{}", fmt::join(differences, "; "));
-}
-
 Status expect_identity(Database& db, const std::string& key, const std::string& value, std::string what) {
   auto select = db.prepare("SELECT value FROM identity WHERE key = ?");
   if (!select) return failure(select);
@@ -107,8 +86,11 @@ Status expect_identity(Database& db, const std::string& key, const std::string& 
   const auto row = select->step();
   if (!row) return failure(row);
   if (*row && select->text(0) == value) return {};
-  const std::string differences = *row && key == "options" ? option_differences(select->text(0), value) : std::string();
-  if (!differences.empty()) what += ": " + differences;
+  if (*row && key == "options") {
+    const auto before = parse_options<RunOptions>(select->text(0), db.path()),
+               now = parse_options<RunOptions>(value, key);
+    if (before && now) what += ": " + option_differences(*before, *now);
+  }
   return failure(ErrorCode::configuration, "was written by a run with " + what, db.path(),
                  "resume with the same input, rig and options, or run into a new folder");
 }

@@ -1,10 +1,11 @@
 // EuRoC/ASL layout: cam0/data.csv, cam0/data/<file>, cam1/…, imu0/data.csv, each with a sensor.yaml.
 // Source: Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016.
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <filesystem>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/frame_tables.h"
@@ -12,6 +13,7 @@
 #include "spartan/camera/internal/sensor_tables.h"
 #include "spartan/camera/internal/stamp_order.h"
 #include "spartan/core/files.h"
+#include "spartan/core/strict_yaml.h"
 
 namespace spartan::internal {
 namespace {
@@ -33,24 +35,27 @@ struct EurocImu {
   ImuNoise noise;
 };
 
-// The rotation part of T_BS (body from sensor); identity where the key is missing.
-Result<Eigen::Quaterniond> rotation_of(const YAML::Node& transform, const std::string& path) {
-  if (!transform) return Eigen::Quaterniond::Identity();
-  // Two forms are in use: {rows, cols, data: […]} and a plain list of 16 numbers.
-  const auto data = (transform.IsMap() ? transform["data"] : transform).as<std::vector<double>>();
-  if (data.size() != 16) return failure(ErrorCode::configuration, "T_BS does not have 16 numbers", path);
+// The rotation part of T_BS (body from sensor). Two notations are in use: {rows, cols, data: […]} and a plain list.
+std::optional<Eigen::Quaterniond> rotation_of(YamlMap& root) {
+  const auto node = root.optional_node("T_BS");
+  if (!node) return Eigen::Quaterniond::Identity();
+  const auto data = node->is_map() ? YamlMap(*node, root.path("T_BS"), root.errors()).numbers("data", {16})
+                                   : root.numbers("T_BS", {16});
+  if (!data) return std::nullopt;
+  const std::vector<double>& m = *data;
   Eigen::Matrix3d rotation;
-  rotation << data[0], data[1], data[2], data[4], data[5], data[6], data[8], data[9], data[10];
-  if (!is_rotation(rotation, 1e-3))
-    return failure(ErrorCode::configuration, "the rotation part of T_BS is not a rotation matrix", path);
+  rotation << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
+  if (!is_rotation(rotation, 1e-3)) {
+    root.add_error("T_BS", "its rotation part is not a rotation matrix");
+    return std::nullopt;
+  }
   return Eigen::Quaterniond(nearest_rotation(rotation));
 }
 
 // A noise density; 0 (unknown) where the key is missing.
-Result<double> density(const YAML::Node& file, const char* key, const std::string& path) {
-  const double value = file[key] ? file[key].as<double>() : 0;
-  if (!(value >= 0 && value < 10))
-    return failure(ErrorCode::configuration, fmt::format("{} is {}, expected a number in [0, 10)", key, value), path);
+double density(YamlMap& root, const char* key) {
+  const double value = root.has(key) ? root.number(key).value_or(0) : 0;
+  if (!(value >= 0 && value < 10)) root.add_error(key, fmt::format("is {}, must be at least 0 and below 10", value));
   return value;
 }
 
@@ -63,22 +68,16 @@ Result<EurocImu> read_imu(const std::string& path) {
   if (!text) return failure(text);
   if (text->starts_with("%YAML:"))
     text->erase(0, text->find('\n'));  // the %YAML:1.0 header of OpenCV is not valid YAML
-  try {
-    const YAML::Node file = YAML::Load(*text);
-    const auto rotation = rotation_of(file["T_BS"], path);
-    if (!rotation) return failure(rotation);
-    imu.body_from_imu = *rotation;
-    for (const auto& [key, noise] : {std::pair("gyroscope_noise_density", &imu.noise.gyro_noise_rad_s_sqrt_hz),
-                                     {"gyroscope_random_walk", &imu.noise.gyro_walk_rad_s2_sqrt_hz},
-                                     {"accelerometer_noise_density", &imu.noise.accel_noise_m_s2_sqrt_hz},
-                                     {"accelerometer_random_walk", &imu.noise.accel_walk_m_s3_sqrt_hz}}) {
-      const auto specified = density(file, key, path);
-      if (!specified) return failure(specified);
-      *noise = *specified;
-    }
-  } catch (const YAML::Exception& e) {
-    return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, path);
-  }
+  const auto file = parse_yaml(*text, path);
+  if (!file) return failure(file);
+  YamlErrors errors(path);
+  YamlMap root(*file, "", errors);
+  imu.body_from_imu = rotation_of(root).value_or(Eigen::Quaterniond::Identity());
+  imu.noise.gyro_noise_rad_s_sqrt_hz = density(root, "gyroscope_noise_density");
+  imu.noise.gyro_walk_rad_s2_sqrt_hz = density(root, "gyroscope_random_walk");
+  imu.noise.accel_noise_m_s2_sqrt_hz = density(root, "accelerometer_noise_density");
+  imu.noise.accel_walk_m_s3_sqrt_hz = density(root, "accelerometer_random_walk");
+  if (Status status = errors.status(); !status) return failure(status);
   return imu;
 }
 
