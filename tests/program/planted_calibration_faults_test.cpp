@@ -168,7 +168,7 @@ TEST_P(PlantedCalibrationFaults, RowsAndLenses) {
       0.005, 0.5);
 }
 
-INSTANTIATE_TEST_SUITE_P(RealPictures, PlantedCalibrationFaults, ::testing::Values("euroc_v101", "k10_pair"),
+INSTANTIATE_TEST_SUITE_P(RealImages, PlantedCalibrationFaults, ::testing::Values("euroc_v101", "k10_pair"),
                          [](const auto& tested) { return std::string(tested.param); });
 
 }  // namespace
