@@ -55,6 +55,7 @@ COMPONENTS = {
 HEAVY = re.compile(r"^(opencv2|ceres|sqlite3|yaml-cpp|embree3|gdal|octomap|nlohmann|spdlog|tbb|hwy|CLI)\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 USING = re.compile(r"^\s*using namespace\b", re.MULTILINE)
+UNNAMED = re.compile(r"^\s*namespace\s*\{", re.MULTILINE)
 MODULE_CALL = re.compile(r"^\s*spartan_module\(\s*(\w+)([^)]*)\)", re.MULTILINE)
 
 
@@ -88,12 +89,15 @@ def fault_of_components(path, included, project):
     return None
 
 
-def using_directives(project):
-    """Headers that hold a using-directive, which would open a namespace for everyone who includes them."""
+def namespace_faults(project):
+    """Headers with a using-directive, which opens a namespace for all includers, or an unnamed namespace, whose types
+    differ from file to file (GCC warns of that with -Wsubobject-linkage, but not in unity builds)."""
     for folder in ("src", "tests", "bench"):
         for path in sorted((project / folder).rglob("*.h")):
             if USING.search(path.read_text(encoding="utf-8")):
                 yield f"{path.relative_to(project)}: a using-directive in a header"
+            if UNNAMED.search(path.read_text(encoding="utf-8")):
+                yield f"{path.relative_to(project)}: an unnamed namespace in a header"
 
 
 def is_internal(included):
@@ -141,7 +145,7 @@ def faults(project):
         elif not linked[name] <= MAY_INCLUDE[name]:
             found.append(f"CMakeLists.txt: {name} links {sorted(linked[name] - MAY_INCLUDE[name])}, which it may not include")
 
-    found.extend(using_directives(project))
+    found.extend(namespace_faults(project))
     count, used_by = 0, {}
     for path, line, quote, included in includes(project):
         where = f"{path.relative_to(project)}:{line}"
@@ -208,6 +212,8 @@ def self_test():
         ("src/spartan/core/leak.h", '#include "spartan/core/internal/detail.h"', "which is not installed"),
         ("src/spartan/eval/open.h", "using namespace std;", "using-directive in a header"),
         ("src/spartan/eval/open.cpp", "using namespace std;", None),
+        ("src/spartan/eval/hidden.h", "namespace {", "an unnamed namespace in a header"),
+        ("src/spartan/eval/hidden.cpp", "namespace {", None),
         ("src/spartan/eval/leak.h", '#include "spartan/numerics/median.h"', "which is not installed"),
         ("CMakeLists.txt", good_cmake + "spartan_module(camera USES core eval)", "may not include|includes nothing of it"),
         ("CMakeLists.txt", good_cmake + "spartan_module(imaging USES core)", "includes nothing of it"),
