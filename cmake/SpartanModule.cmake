@@ -13,6 +13,9 @@ target_compile_options(spartan_flags INTERFACE
   $<$<AND:$<BOOL:${SPARTAN_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=array-bounds>)
 if(SPARTAN_SANITIZE)
   target_compile_options(spartan_flags INTERFACE -fsanitize=${SPARTAN_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
+  if(SPARTAN_SANITIZE_EXCEPT)
+    target_compile_options(spartan_flags INTERFACE -fno-sanitize=${SPARTAN_SANITIZE_EXCEPT})
+  endif()
   target_link_options(spartan_flags INTERFACE -fsanitize=${SPARTAN_SANITIZE})
 endif()
 if(SPARTAN_COVERAGE)
@@ -56,10 +59,30 @@ function(spartan_test name)
   if(A_FIXTURE)
     set(fixture FIXTURES_REQUIRED ${A_FIXTURE})
   endif()
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES LABELS ${A_LABEL} TIMEOUT ${A_TIMEOUT} ${fixture}
+  set(properties LABELS ${A_LABEL} TIMEOUT ${A_TIMEOUT} ${fixture}
     ENVIRONMENT "SPARTAN_SOURCE_DIR=${PROJECT_SOURCE_DIR}"  # the discovery tears a list of two apart
     ENVIRONMENT_MODIFICATION "SPARTAN_PROGRAM=set:${CMAKE_BINARY_DIR}/bin/spartan")
+  if(SPARTAN_TEST_BY_SUITE AND NOT A_FIXTURE)
+    spartan_add_suites(${name} SOURCES ${A_SOURCES} PROPERTIES ${properties})
+  else()
+    gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES ${properties})
+  endif()
+endfunction()
+
+# One test of CTest for each test suite in the sources.
+function(spartan_add_suites name)
+  cmake_parse_arguments(A "" "" "SOURCES;PROPERTIES" ${ARGN})
+  set(suites)
+  foreach(source IN LISTS A_SOURCES)
+    file(STRINGS ${source} tests REGEX "^(TEST|TEST_F|TEST_P|TYPED_TEST|RC_GTEST_PROP|RC_GTEST_FIXTURE_PROP)\\(")
+    list(TRANSFORM tests REPLACE "^[A-Z_]+\\(([A-Za-z0-9_]+).*" "\\1")
+    list(APPEND suites ${tests})
+  endforeach()
+  list(REMOVE_DUPLICATES suites)
+  foreach(suite IN LISTS suites)
+    add_test(NAME ${suite} COMMAND ${name} --gtest_filter=${suite}.*:*/${suite}.*:*/${suite}/*)
+    set_tests_properties(${suite} PROPERTIES ${A_PROPERTIES})
+  endforeach()
 endfunction()
 
 # spartan_module(NAME USES modules… PUBLIC libraries… PRIVATE libraries… TEST_LIBRARIES libraries…)

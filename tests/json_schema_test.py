@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Validates the JSON that the program prints against the schemas in docs/reference/schemas.
 
-    json_schema_test.py PROGRAM SOURCE DRIVE     DRIVE: a small recording in the KITTI layout
-    json_schema_test.py --self-test SOURCE       shows that each schema can fail
+    json_schema_test.py PROGRAM SOURCE SMALL_RUNS   SMALL_RUNS: the folder that make_small_runs has filled
+    json_schema_test.py --self-test SOURCE          shows that each schema can fail
 
 Exit code 77 (skipped) without the Python package jsonschema, which ./setup installs into .venv.
 """
@@ -23,32 +23,6 @@ except ImportError:
     print("skipped: the Python package jsonschema is missing (./setup installs it)")
     sys.exit(77)
 
-SCENARIO = """schema: 1
-name: schema_test
-seed: 3
-samples: 1
-rig: rig.yaml
-extent_m: 30
-path: {kind: straight, length_m: 1, speed_m_s: 0.1}
-capture: {frame_step_m: 0.25, stop_every_m: 0.5, pans_deg: [0]}
-imu: {rate_hz: 50}
-"""
-CAMERA = ("{{size_px: [160, 120], model: pinhole, focal_px: [130, 130], centre_px: [79.5, 59.5], axes: forward, "
-          "mount: {0}, translation_m: [0, {1}, {2}], roll_pitch_yaw_deg: [0, {3}, 0]}}")
-RIG = f"""schema: 1
-pan_tilt_units:
-  mast: {{translation_m: [0, 0, 1.0], rest_angles_deg: [0, 39]}}
-cameras:
-  wide_left: {CAMERA.format('mast', 0.1, 0, 0)}
-  wide_right: {CAMERA.format('mast', -0.1, 0, 0)}
-  narrow_left: {CAMERA.format('body', 0.06, 0.3, 31.5)}
-  narrow_right: {CAMERA.format('body', -0.06, 0.3, 31.5)}
-pairs:
-  wide: {{left: wide_left, right: wide_right, nearest_m: 0.9, for_odometry: false}}
-  narrow: {{left: narrow_left, right: narrow_right, nearest_m: 0.3}}
-"""
-
-
 def schema(source, name):
     found = json.loads((source / "docs/reference/schemas" / f"{name}.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator.check_schema(found)
@@ -62,8 +36,9 @@ def output_of(program, *arguments, codes=(0,)):
     return json.loads(done.stdout)
 
 
-def outputs(program, source, drive, work):
+def outputs(program, source, small_runs, work):
     """Pairs of a schema's name and an output of the program, one or more for each schema."""
+    drive, stops = small_runs / "drive", small_runs / "stops"
     left, right = (sorted((drive / f"image_{side}").glob("*.png"))[0] for side in (0, 1))
     rig, design = source / "config/rigs/rover.yaml", source / "config/requirements/rover.yaml"
     yield "run", output_of(program, "run", drive, "-o", work / "run", "--truth", drive)
@@ -81,23 +56,18 @@ def outputs(program, source, drive, work):
     yield "rig_convert", output_of(program, "rig", "convert", drive / "calib.txt", work / "rig.yaml", "--size-px",
                                    "320,240")
     yield "rig_design", output_of(program, "rig", "design", design)
-    (work / "scenario.yaml").write_text(SCENARIO, encoding="utf-8")
-    (work / "scenario").mkdir()
-    (work / "scenario/rig.yaml").write_text(RIG, encoding="utf-8")
-    (work / "scenario/scenario.yaml").write_text(SCENARIO, encoding="utf-8")
-    if "no simulator" in subprocess.run([program, "simulate", "none", "-o", work / "none"], capture_output=True,
-                                        text=True).stderr:
-        return
-    yield "simulate", output_of(program, "simulate", work / "scenario/scenario.yaml", "-o", work / "recording")
-    yield "run", output_of(program, "run", work / "recording", "-o", work / "drive", codes=(0, 6))
-    yield "map_info", output_of(program, "map", "info", work / "drive")
-    yield "map_merge", output_of(program, "map", "merge", work / "drive", work / "drive", "-o", work / "merged.map")
+    if not (stops / "rec").exists():
+        return  # built without Embree
+    yield "simulate", output_of(program, "simulate", stops / "small.yaml", "-o", work / "recording")
+    yield "run", json.loads((stops / "whole/summary.json").read_text(encoding="utf-8"))
+    yield "map_info", output_of(program, "map", "info", stops / "whole")
+    yield "map_merge", output_of(program, "map", "merge", stops / "whole", stops / "whole", "-o", work / "merged.map")
 
 
-def validate(program, source, drive):
+def validate(program, source, small_runs):
     checked, faults = set(), []
     with tempfile.TemporaryDirectory() as folder:
-        for name, output in outputs(program, source, drive, Path(folder)):
+        for name, output in outputs(program, source, small_runs, Path(folder)):
             checked.add(name)
             for error in schema(source, name).iter_errors(output):
                 faults.append(f"{name}: {error.json_path}: {error.message}")

@@ -22,7 +22,7 @@ using testing::run_program;
 class ImageFiles : public ::testing::Test {
  protected:
   static Image<std::uint8_t> seen_by(int side) {
-    return read_gray8(fmt::format("{}/image_{}/000000.png", testing::small_drive_folder(), side)).value();
+    return read_gray8(fmt::format("{}/drive/image_{}/000000.png", testing::small_runs_folder(), side)).value();
   }
   template <class Pixel>
   void write_images(auto pixel_of) {

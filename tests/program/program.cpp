@@ -91,10 +91,10 @@ ProgramResult run_program(const std::vector<std::string>& arguments, const Progr
   return result;
 }
 
-std::string small_drive_folder() {
+std::string small_runs_folder() {
   const char* const program = std::getenv("SPARTAN_PROGRAM");
   if (program == nullptr) throw std::runtime_error("SPARTAN_PROGRAM is not set; run through ctest");
-  return (std::filesystem::path(program).parent_path().parent_path() / "tests" / "small_drive").string();
+  return (std::filesystem::path(program).parent_path().parent_path() / "tests" / "small_runs").string();
 }
 
 }  // namespace spartan::testing

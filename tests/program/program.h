@@ -24,7 +24,10 @@ struct ProgramLimits {
 /// The program of this build (environment variable SPARTAN_PROGRAM).
 ProgramResult run_program(const std::vector<std::string>& arguments, const ProgramLimits& limits = {});
 
-/// The drive that make_small_drive has rendered once for all tests; not to be written to.
-std::string small_drive_folder();
+/// What make_small_runs has made once for all tests; not to be written to.
+///   drive, drive_run: write_small_drive() and its run with kSmallDriveOptions and two threads
+///   stops: a simulated drive with two stops (small.yaml, small_rig.yaml, rec) and its run (whole) with two threads;
+///          without rec if built without Embree
+std::string small_runs_folder();
 
 }  // namespace spartan::testing

@@ -51,7 +51,7 @@ class RigInspectImages : public ::testing::Test {
       "translation_m: [{}, 0, 0]}}\n"
       "pairs:\n  stereo: {{left: left, right: right}}\n";
   testing::TemporaryFolder folder_;
-  const std::string drive_ = testing::small_drive_folder();  // only read
+  const std::string drive_ = testing::small_runs_folder() + "/drive";  // only read
 };
 
 TEST_F(RigInspectImages, AcceptsAGoodPair) {
@@ -278,7 +278,7 @@ TEST_F(RigInspectImages, DrawsTheRowsOfBothEyes) {
   ASSERT_TRUE(read) << read.error().message();
   ASSERT_EQ(read->size(), (ImageSize{640, 3 * (240 + 22)}));
   const auto pixels = read->as<Rgb8>();
-  // How far the gray of a strip's side is from its picture, and how much of it is red: rows 3 px apart.
+  // How far the gray of a strip's side is from its image, and how much of it is red: rows 3 px apart.
   const auto compare = [&](int strip, int side) {
     const auto taken = read_gray8(image(side)).value();
     double difference = 0;

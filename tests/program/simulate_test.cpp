@@ -234,7 +234,7 @@ TEST_F(Simulate, LeavesExistingFoldersAlone) {
   EXPECT_EQ(simulate("mine", {"--resume"}).exit_code, 5);
 }
 
-TEST_F(Simulate, RecordsTheRigAsItIsBelieved) {
+TEST_F(Simulate, RecordsTheNominalRig) {
   write("small.yaml",
         std::string(kSmallScenario) + "nominal_rig: {yaw_deg: 0.02, row_offset_px: 0.3, focal_percent: 0.1}\n");
   ASSERT_EQ(simulate("rec").exit_code, 0);

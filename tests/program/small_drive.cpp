@@ -51,9 +51,9 @@ void write_small_drive(const std::string& folder, const SmallDrive& drive) {
   const Pose start = world_from_left(drive, 0);
   for (int i = 0; i < drive.frames; ++i) {
     const Pose pose = world_from_left(drive, i);
-    const SyntheticFrame shot = world.render(camera, pose, static_cast<std::uint64_t>(i));
-    must(write_png(fmt::format("{}/image_0/{:06}.png", folder, i), shot.left));
-    must(write_png(fmt::format("{}/image_1/{:06}.png", folder, i), shot.right));
+    const SyntheticFrame frame = world.render(camera, pose, static_cast<std::uint64_t>(i));
+    must(write_png(fmt::format("{}/image_0/{:06}.png", folder, i), frame.left));
+    must(write_png(fmt::format("{}/image_1/{:06}.png", folder, i), frame.right));
     times += fmt::format("{:.9f}\n", drive.period_s * i);
     truth.push_back({Stamp::from_seconds(drive.period_s * i), start.inverse() * pose});
   }

@@ -1,9 +1,13 @@
 // A short drive over the synthetic world in KITTI's layout, for tests of the whole program.
 #pragma once
 
+#include <array>
 #include <string>
 
 namespace spartan::testing {
+
+/// With which `spartan run` makes the finished run of the drive.
+inline constexpr std::array<const char*, 2> kSmallDriveOptions{"--set", "terrain.every_m=0.15"};
 
 struct SmallDrive {
   int frames = 14;

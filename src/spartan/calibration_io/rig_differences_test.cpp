@@ -142,7 +142,7 @@ TEST(RigDifferences, TextsNameBothValues) {
               HasSubstr("the old one is 1.000 m ahead"));
 }
 
-// --- model_equivalents.h ---
+// --- camera_model.h ---
 
 TEST(ModelEquivalents, PlainestModelProjectsEqually) {
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ(), tilted = Eigen::Vector3d(0.1, 0, 1).normalized();

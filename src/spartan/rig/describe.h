@@ -86,7 +86,7 @@ struct RigDifference {
 
 /// Where the resulting rig differs from the wanted one, in the order of rig.yaml, then what only the resulting one has.
 /// Cameras are matched by their role in the pairs, then by name. Camera models are equal if they project equally
-/// (model_equivalents.h), numbers if they agree to 12 digits, poses if they agree to 1e-11 m and rad, which is the
+/// (models/camera_model.h), numbers if they agree to 12 digits, poses if they agree to 1e-11 m and rad, which is the
 /// rounding of a conversion between representations of a rotation.
 std::vector<RigDifference> describe_differences(const Rig& wanted, const Rig& result);
 

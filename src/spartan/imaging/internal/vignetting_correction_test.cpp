@@ -20,7 +20,7 @@ Camera camera_with(std::vector<double> coefficients, PixelFormat format = {}) {
   return camera;
 }
 
-// The formula of rig/vignetting.h.
+// The formula of Vignetting in rig/rig.h.
 double light(const Camera& camera, double cx, double cy, int x, int y) {
   const double rho2 = ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (0.25 * (64 * 64 + 48 * 48));
   const auto& a = camera.vignetting.coefficients;

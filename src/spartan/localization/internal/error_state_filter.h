@@ -49,7 +49,7 @@ class ErrorStateFilter {
   void align_to_gravity(const ImuSample& sample);
   void detect_stationary(const ImuSample& sample);
 
-  // Visual motions between frames: shot_update.cpp.
+  // Visual motions between frames: motion_update.cpp.
   void update(const RelativeMotion& motion);
   bool update_by_motion(const RelativeMotion& motion);
   void propagate_drift(int index, const Vector6d& sigmas, double steps);
@@ -58,7 +58,7 @@ class ErrorStateFilter {
   void compare_gyro(const RelativeMotion& motion);
   void begin_frame(Stamp stamp);
 
-  // Wheels and zero-velocity updates: step_update.cpp.
+  // Wheels and zero-velocity updates: wheel_update.cpp.
   void update(const WheelSample& sample);
   void end_step_at_frame(Stamp stamp);
   std::optional<WheelSample> wheels_at(Stamp stamp) const;
