@@ -52,7 +52,7 @@ using Stops = std::vector<StopWithMap>;
 Stops load(const std::string& recording, const std::string& cache) {
   Stops stops;
   for (StopPoints& points : points_of_stops(recording, cache)) {
-    LocalMap map = MapGenerator({}, kWorkers).generate(points.points, points.world_from_body);
+    LocalMap map = MapGenerator::create({}, kWorkers)->generate(points.points, points.world_from_body);
     stops.push_back({std::move(points), std::move(map)});
   }
   return stops;
@@ -67,7 +67,7 @@ int known_cells(const LocalMap& map) {
 }
 
 GlobalMap build(const std::vector<const StopWithMap*>& stops) {
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   for (const StopWithMap* stop : stops) {
     static_cast<void>(
         map.add(stop->map, stop->points.stamp, {stop->points.world_from_body, Matrix6d::Zero()}, Matrix6d::Zero()));
@@ -131,7 +131,7 @@ Outcome attempt(const Setting& setting, const Vector6d& offset, bool verbose) {
   const MapView view = view_around(map, prior.pose);
   auto start = Clock::now();
   Outcome o;
-  const LocalMap local = MapGenerator({}, kWorkers).generate(setting.stop->points.points, prior.pose);
+  const LocalMap local = MapGenerator::create({}, kWorkers)->generate(setting.stop->points.points, prior.pose);
   o.match = match_map(setting.stop->points.points, local, view, prior, MapOptions().min_points, g_options, kWorkers);
   accumulate_time(start, o.seconds);
   const Pose error = truth.inverse() * o.match.world_from_body;

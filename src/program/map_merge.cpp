@@ -70,7 +70,9 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
   }
   const auto agreement = compare(a->map(), b->map());
   if (!agreement) return failure(agreement);
-  GlobalMap both(a->options().slam.map, a->map().cell_m());
+  auto created = GlobalMap::create(a->options().slam.map, a->map().cell_m());
+  if (!created) return failure(created);
+  GlobalMap& both = *created;
   for (GlobalMap* map : {&a->map(), &b->map()}) {
     if (Status s = both.merge(*map); !s) return failure(s);
   }

@@ -127,7 +127,7 @@ LocalMap small_map(double x_m, double y_m, float elevation_m) {
 
 TEST(MapInfo, DescribesAMapOfAnySize) {
   const testing::TemporaryFolder folder;
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   for (const double x : {0.0, 500.0}) {
     const Pose pose = Pose::from_translation({x, x, 0});
     ASSERT_TRUE(map.add(small_map(x, x, static_cast<float>(x) / 100), {}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));

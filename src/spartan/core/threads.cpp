@@ -68,12 +68,12 @@ struct ThreadPool::Arena {
 #endif
 
 ThreadPool::ThreadPool(int threads) : threads_(threads) {
-  if (threads < 1) throw std::invalid_argument("Workers: the number of threads must be at least 1");
+  if (threads < 1) throw std::invalid_argument("ThreadPool: the number of threads must be at least 1");
   if (threads > 1) arena_ = std::make_shared<Arena>(threads);
 }
 
 void ThreadPool::parallel_for(int begin, int end, int grain, const std::function<void(int, int)>& body) const {
-  if (grain < 1) throw std::invalid_argument("Workers: the grain must be at least 1");
+  if (grain < 1) throw std::invalid_argument("ThreadPool: the grain must be at least 1");
   if (end <= begin) return;
   const int parts = (end - begin + grain - 1) / grain;
   const auto run_part = [&](int part) {

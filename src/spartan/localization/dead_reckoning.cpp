@@ -19,6 +19,11 @@ Vector6d six_of(const std::vector<double>& values) {
 
 }  // namespace
 
+Result<DeadReckoning> DeadReckoning::create(const VisionOptions& options) {
+  if (Status valid = validate(options, "vision options"); !valid) return failure(valid);
+  return DeadReckoning(options);
+}
+
 DeadReckoning::DeadReckoning(const VisionOptions& options)
     : white_factor_(options.white_factor),
       drift_steps_(options.drift_steps),

@@ -1,7 +1,9 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "spartan/localization/internal/drive_test.h"
 #include "spartan/localization/localizer.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 
@@ -15,7 +17,7 @@ TEST(DeadReckoning, HasTheCovarianceOfAVisionOnlyFilter) {
   const LocalizationOptions options;  // with errors that last
   VisionOnlyFilter track = VisionOnlyFilter::create(options).value();
   track.start(test_stamp(2.5), Pose());
-  DeadReckoning reckoned(options.vision);
+  DeadReckoning reckoned = DeadReckoning::create(options.vision).value();
   int compared = 0;
   for (const Measurement& m : test_motions(drive, 122.5, 1, 5)) {
     const auto& motion = std::get<RelativeMotion>(m);
@@ -33,7 +35,7 @@ TEST(DeadReckoning, ComposesIndependentErrors) {
   VisionOptions white;
   white.white_factor = 1;
   white.drift_sigmas = white.constant_sigmas = {0, 0, 0, 0, 0, 0};
-  DeadReckoning reckoned(white);
+  DeadReckoning reckoned = DeadReckoning::create(white).value();
   UncertainPose composed;
   for (const Measurement& m : test_motions(drive, 62.5, 1, 6)) {
     const auto& motion = std::get<RelativeMotion>(m);
@@ -51,7 +53,7 @@ TEST(DeadReckoning, LastingErrorsHaveNoPartWhereTheRoverIsStationaryOrVisionIsLo
     motion.covariance = test_motion_covariance();
     motion.measured = measured;
     if (!measured) motion.previous_from_current = Pose::from_translation({0.1, 0, 0});
-    DeadReckoning reckoned(vision);
+    DeadReckoning reckoned = DeadReckoning::create(vision).value();
     reckoned.add(motion);
     EXPECT_TRUE(reckoned.covariance().isApprox(motion.covariance, 1e-12)) << measured;
   }
@@ -60,7 +62,8 @@ TEST(DeadReckoning, LastingErrorsHaveNoPartWhereTheRoverIsStationaryOrVisionIsLo
 TEST(DeadReckoning, GoesOnFromRestoredMemory) {
   const TestDrive drive;
   const VisionOptions options;
-  DeadReckoning straight(options), later(options);
+  DeadReckoning straight = DeadReckoning::create(options).value();
+  DeadReckoning later = DeadReckoning::create(options).value();
   const auto motions = test_motions(drive, 32.5, 1, 7);
   for (std::size_t i = 0; i < motions.size(); ++i) {
     if (i == motions.size() / 2) {
@@ -76,6 +79,13 @@ TEST(DeadReckoning, GoesOnFromRestoredMemory) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::store_damaged);
   EXPECT_EQ(straight.save(), later.save()) << "a refused memory changes nothing";
+}
+
+TEST(DeadReckoning, RefusesOptionsOutOfBounds) {
+  VisionOptions options;
+  options.drift_steps = 0;
+  EXPECT_THAT(testing::error_message(DeadReckoning::create(options)),
+              ::testing::HasSubstr("vision options: drift_steps is 0"));
 }
 
 }  // namespace

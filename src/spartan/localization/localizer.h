@@ -265,7 +265,8 @@ class VisionOnlyFilter {
 /// covariance counts.
 class DeadReckoning {
  public:
-  explicit DeadReckoning(const VisionOptions& options);
+  /// Code `configuration` where an option is out of bounds.
+  static Result<DeadReckoning> create(const VisionOptions& options);
 
   /// The next motion; each begins where the last one ended.
   void add(const RelativeMotion& motion);
@@ -277,6 +278,8 @@ class DeadReckoning {
   Status restore(const Bytes& bytes);
 
  private:
+  explicit DeadReckoning(const VisionOptions& options);
+
   static constexpr int kSize = 18;  // ξ, z₁, z₂
   using Covariance = Eigen::Matrix<double, kSize, kSize>;
   void age(int index, const Vector6d& sigmas, double steps);

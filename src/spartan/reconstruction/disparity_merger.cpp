@@ -60,6 +60,13 @@ struct DisparityMerger::Layer {
   }
 };
 
+Result<DisparityMerger> DisparityMerger::create(const MergingOptions& options, const Pose& body_from_centre,
+                                                std::span<const ViewGeometry> views, double nearest_m,
+                                                ThreadPool workers) {
+  if (Status valid = validate(options, "merging options"); !valid) return failure(valid);
+  return DisparityMerger(options, body_from_centre, views, nearest_m, std::move(workers));
+}
+
 DisparityMerger::DisparityMerger(const MergingOptions& options, const Pose& body_from_centre,
                                  std::span<const ViewGeometry> views, double nearest_m, ThreadPool workers)
     : options_(options), body_from_centre_(body_from_centre), workers_(std::move(workers)) {

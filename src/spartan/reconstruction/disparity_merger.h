@@ -114,16 +114,20 @@ struct MergedRange {
 /// docs/math/stereo.md.
 class DisparityMerger {
  public:
-  /// Any number of views; merge() holds one layer of the panorama's size for each.
-  DisparityMerger(const MergingOptions& options, const Pose& body_from_centre, std::span<const ViewGeometry> views,
-                  double nearest_m, ThreadPool workers);
+  /// Any number of views; merge() holds one layer of the panorama's size for each. `nearest_m`: nearest depth that the
+  /// virtual camera covers. Code `configuration` where an option is out of bounds.
+  static Result<DisparityMerger> create(const MergingOptions& options, const Pose& body_from_centre,
+                                        std::span<const ViewGeometry> views, double nearest_m, ThreadPool workers);
 
-  /// Views in the order and with the geometry of the constructor; a view with an empty disparity image is skipped.
+  /// Views in the order and with the geometry of create(); a view with an empty disparity image is skipped.
   MergedRange merge(std::span<const MergedView> views) const;
 
   const PanoramicCamera& camera() const { return camera_; }
 
  private:
+  DisparityMerger(const MergingOptions& options, const Pose& body_from_centre, std::span<const ViewGeometry> views,
+                  double nearest_m, ThreadPool workers);
+
   struct Layer;
   void rasterize_view(const MergedView& view, Layer& layer) const;
   void fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row, MergedRange& merged) const;

@@ -1,5 +1,6 @@
 #include "spartan/reconstruction/disparity_merger.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -10,6 +11,7 @@
 #include "spartan/numerics/random.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/height_field_view.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
@@ -35,7 +37,9 @@ struct Stop {
     return views;
   }
   MergedRange merge(const MergingOptions& options = {}, int threads = 2) const {
-    const DisparityMerger merger(options, Pose::from_translation({0, 0, 1}), geometries, 0.8, ThreadPool(threads));
+    const auto merger =
+        DisparityMerger::create(options, Pose::from_translation({0, 0, 1}), geometries, 0.8, ThreadPool(threads))
+            .value();
     return merger.merge(views());
   }
 };
@@ -211,7 +215,8 @@ TEST(DisparityMerger, ClassesComeFromTheViewWithTheMostPixels) {
   views[0].classes = all_ground;
   views[1].classes = all_rock;
   views[2].classes = all_ground;
-  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, ThreadPool(1));
+  const auto merger =
+      DisparityMerger::create({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, ThreadPool(1)).value();
   const MergedRange merged = merger.merge(views);
   for (int y = 0; y < merged.views.height(); ++y) {
     for (int x = 0; x < merged.views.width(); ++x) {
@@ -236,12 +241,20 @@ TEST(DisparityMerger, IsDeterministicForAnyNumberOfThreadsAndSkipsEmptyViews) {
   }
   std::vector<MergedView> views = stop.views();
   views[1].disparity = {};
-  const DisparityMerger merger({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, ThreadPool(1));
+  const auto merger =
+      DisparityMerger::create({}, Pose::from_translation({0, 0, 1}), stop.geometries, 0.8, ThreadPool(1)).value();
   const MergedRange without = merger.merge(views);
   EXPECT_LT(known(without.range_m), known(one.range_m));
   for (int y = 0; y < without.views.height(); ++y) {
     for (int x = 0; x < without.views.width(); ++x) EXPECT_EQ(without.views(x, y) & 2, 0);
   }
+}
+
+TEST(DisparityMerger, RefusesOptionsOutOfBounds) {
+  MergingOptions options;
+  options.max_range_m = 0;
+  EXPECT_THAT(testing::error_message(DisparityMerger::create(options, Pose(), {}, 0.8, ThreadPool(1))),
+              ::testing::HasSubstr("merging options: max_range_m is 0"));
 }
 
 }  // namespace

@@ -136,6 +136,11 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
   return points;
 }
 
+Result<MapGenerator> MapGenerator::create(const MapOptions& options, ThreadPool workers) {
+  if (Status valid = validate(options, "map options"); !valid) return failure(valid);
+  return MapGenerator(options, std::move(workers));
+}
+
 LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const {
   Grid grid = make_grid(options_, map_from_body.translation());
   rasterize_points(points, map_from_body, grid);

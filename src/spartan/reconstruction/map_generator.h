@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "spartan/core/image.h"
@@ -162,7 +163,8 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged);
 
 class MapGenerator {
  public:
-  MapGenerator(const MapOptions& options, ThreadPool workers) : options_(options), workers_(std::move(workers)) {}
+  /// Code `configuration` where an option is out of bounds.
+  static Result<MapGenerator> create(const MapOptions& options, ThreadPool workers);
 
   /// `map_from_body`: gravity-aligned; the map is centred on its origin. Cell corners are at integer multiples of the
   /// cell size. A cell's elevation is the inverse-variance weighted mean of its points; its class follows from the
@@ -170,6 +172,8 @@ class MapGenerator {
   LocalMap generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const;
 
  private:
+  MapGenerator(const MapOptions& options, ThreadPool workers) : options_(options), workers_(std::move(workers)) {}
+
   MapOptions options_;
   ThreadPool workers_;
 };

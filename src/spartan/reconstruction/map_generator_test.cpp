@@ -1,5 +1,6 @@
 #include "spartan/reconstruction/map_generator.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 
 #include "spartan/core/pose.h"
 #include "spartan/numerics/random.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 namespace {
@@ -58,7 +60,7 @@ TEST(GroundClass, BandHasTheDocumentedValues) {
 }
 
 TEST(LocalMap, BandsHaveTheDocumentedNames) {
-  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate({}, Pose());
+  const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate({}, Pose());
   std::string names;
   const MapBands bands = map.bands();
   for (const MapBand& band : bands.list) {
@@ -72,7 +74,7 @@ TEST(LocalMap, BandsHaveTheDocumentedNames) {
 
 TEST(MapGenerator, PlaneGroundIsFreeWithLowCost) {
   const auto slope = [](double x, double y) { return 0.08 * x - 0.05 * y; };
-  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points_on(slope), Pose());
+  const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate(points_on(slope), Pose());
   int known = 0;
   for (int row = 0; row < map.size().height; ++row) {
     for (int column = 0; column < map.size().width; ++column) {
@@ -109,7 +111,7 @@ TEST(MapGenerator, ClassifiesRocksPitsAndOccludedGround) {
   std::erase_if(points, [](const SurfacePoint& p) {  // occluded by the rock
     return p.in_body.x() > 2.2F && p.in_body.x() < 2.5F && std::abs(p.in_body.y() - 0.5F) < 0.15F;
   });
-  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
+  const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
   EXPECT_EQ(at(map, map.kind, 2, 0.5), GroundClass::obstacle);
   EXPECT_EQ(at(map, map.kind, 1.5, -0.7), GroundClass::cavity);
   EXPECT_EQ(at(map, map.kind, 2.35, 0.5), GroundClass::unknown);
@@ -131,10 +133,10 @@ TEST(MapGenerator, ATruncatedObjectNeedsLessHeightToBeAnObstacle) {
     return x > 3.4 && std::abs(y) < 0.2 ? std::min(0.5 * (x - 3.4), 0.05) : 0.0;
   };
   std::vector<SurfacePoint> points = points_on(surface);
-  const LocalMap whole = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
+  const LocalMap whole = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
   EXPECT_EQ(at(whole, whole.kind, 3.47, 0), GroundClass::ground);
   for (SurfacePoint& p : points) p.truncated = p.in_body.x() > 3.4F;
-  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
+  const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
   EXPECT_EQ(at(map, map.kind, 3.47, 0), GroundClass::obstacle);
   EXPECT_EQ(at(map, map.kind, 3.2, 0), GroundClass::ground);
   EXPECT_EQ(at(map, map.kind, 3.42, 0), GroundClass::ground)
@@ -171,9 +173,9 @@ TEST(MapGenerator, IsInvariantToTheBodyFrame) {
     p.ray = (rotation.rotation() * p.ray.cast<double>()).cast<float>();
   }
   const Pose map_from_body = Pose::from_translation({0.5, 0, 0});
-  const LocalMap a = MapGenerator({}, ThreadPool(1)).generate(points, map_from_body);
+  const LocalMap a = MapGenerator::create({}, ThreadPool(1))->generate(points, map_from_body);
   // The map frame is the same. The map is centred on the body's origin, so its window may differ, but not its cells.
-  const LocalMap b = MapGenerator({}, ThreadPool(1)).generate(rotated, map_from_body * rotation.inverse());
+  const LocalMap b = MapGenerator::create({}, ThreadPool(1))->generate(rotated, map_from_body * rotation.inverse());
   int same = 0, different = 0;
   for (double x = 1.2; x < 3.8; x += 0.05) {
     for (double y = -1.3; y < 1.3; y += 0.05) {
@@ -192,10 +194,10 @@ TEST(MapGenerator, IsInvariantToTheBodyFrame) {
 TEST(MapGenerator, MorePointsNeverRaiseTheVariance) {
   const auto flat = [](double, double) { return 0.0; };
   std::vector<SurfacePoint> points = points_on(flat);
-  const LocalMap some = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
+  const LocalMap some = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
   std::vector<SurfacePoint> twice = points;
   twice.insert(twice.end(), points.begin(), points.end());
-  const LocalMap more = MapGenerator({}, ThreadPool(1)).generate(twice, Pose());
+  const LocalMap more = MapGenerator::create({}, ThreadPool(1))->generate(twice, Pose());
   for (int row = 0; row < some.size().height; ++row) {
     for (int column = 0; column < some.size().width; ++column) {
       if (!(some.count(column, row) > 0)) continue;
@@ -207,7 +209,7 @@ TEST(MapGenerator, MorePointsNeverRaiseTheVariance) {
 TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
   const double rise = std::tan(10 * kRadiansPerDegree);
   const LocalMap map =
-      MapGenerator({}, ThreadPool(1)).generate(points_on([&](double x, double) { return rise * x; }), Pose());
+      MapGenerator::create({}, ThreadPool(1))->generate(points_on([&](double x, double) { return rise * x; }), Pose());
   EXPECT_NEAR(at(map, map.slope_rad, 2, 0), 10 * kRadiansPerDegree, 0.2 * kRadiansPerDegree);
   EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of at most 20 degrees";
 }
@@ -216,11 +218,18 @@ TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
 TEST(MapGenerator, AnIslandWithoutGroundIsUnknown) {
   const Eigen::Vector3f ray = Eigen::Vector3f(3.4F, 3.4F, -1).normalized();
   std::vector<SurfacePoint> points(3, {{3.41F, 3.41F, 0}, 0.005F, ray, GroundClass::ground});
-  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, Pose());
+  const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
   EXPECT_EQ(at(map, map.count, 3.41, 3.41), 3);
   EXPECT_NEAR(at(map, map.elevation_m, 3.41, 3.41), 0, 1e-6) << "its elevation is measured all the same";
   EXPECT_EQ(at(map, map.kind, 3.41, 3.41), GroundClass::unknown);
   EXPECT_EQ(at(map, map.occupancy_logodds, 3.41, 3.41), 0);
+}
+
+TEST(MapGenerator, RefusesOptionsOutOfBounds) {
+  MapOptions options;
+  options.cell_m = 0;
+  EXPECT_THAT(testing::error_message(MapGenerator::create(options, ThreadPool(1))),
+              ::testing::HasSubstr("map options: cell_m is 0"));
 }
 
 }  // namespace

@@ -48,14 +48,17 @@ Result<StopMapper> StopMapper::create(const DisparityOptions& disparity, const M
   if (Status valid = validate(options, "mapping options"); !valid) return failure(valid);
   auto computer = DisparityComputer::create(disparity, workers);
   if (!computer) return failure(computer);
-  return StopMapper(std::move(*computer), options, workers);
+  auto generator = MapGenerator::create(options.map, workers);
+  if (!generator) return failure(generator);
+  return StopMapper(std::move(*computer), std::move(*generator), options, workers);
 }
 
-StopMapper::StopMapper(DisparityComputer computer, const MappingOptions& options, const ThreadPool& workers)
+StopMapper::StopMapper(DisparityComputer computer, MapGenerator generator, const MappingOptions& options,
+                       const ThreadPool& workers)
     : options_(with_shared_values(options)),
       workers_(workers),
       computer_(std::move(computer)),
-      generator_(options.map, workers) {}
+      generator_(std::move(generator)) {}
 
 Status StopMapper::check(const RectifiedPair& frame, double nearest_m) {
   return DisparityComputer::check(frame.left, frame.right, disparity_range(frame.geometry, nearest_m), frame.left_mask,
@@ -91,7 +94,8 @@ MergedRange StopMapper::merge() {
     merged_views.push_back({view.geometry, view.disparity, view.left,
                             view.ground ? view.ground->classes.view() : ImageView<const std::uint8_t>()});
   }
-  const DisparityMerger merger(options_.merging, centre_of(views_), geometries, kNearestPanorama_m, workers_);
+  const auto merger =  // StopMapper::create() has validated the options
+      DisparityMerger::create(options_.merging, centre_of(views_), geometries, kNearestPanorama_m, workers_).value();
   MergedRange merged = merger.merge(merged_views);
   times_.merging += watch.lap();
   return merged;

@@ -88,7 +88,8 @@ class StopMapper {
   const StopMapperTimes& times() const { return times_; }
 
  private:
-  StopMapper(DisparityComputer computer, const MappingOptions& options, const ThreadPool& workers);
+  StopMapper(DisparityComputer computer, MapGenerator generator, const MappingOptions& options,
+             const ThreadPool& workers);
 
   MappingOptions options_;
   ThreadPool workers_;

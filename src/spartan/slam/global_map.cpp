@@ -93,8 +93,18 @@ SurfaceGrid MapView::grid() const {
 
 GlobalMap::GlobalMap(const GlobalMapOptions& options, double cell_m) : options_(options), cell_m_(cell_m) {}
 
+Result<GlobalMap> GlobalMap::create(const GlobalMapOptions& options, double cell_m) {
+  if (Status valid = validate(options, "global map options"); !valid) return failure(valid);
+  if (!(cell_m > 0) || !std::isfinite(cell_m)) {
+    return failure(ErrorCode::configuration, fmt::format("the cell size is {} m and must be positive", cell_m));
+  }
+  return GlobalMap(options, cell_m);
+}
+
 Result<GlobalMap> GlobalMap::from_store(const GlobalMapOptions& options, double cell_m, TileStore& store) {
-  GlobalMap map(options, cell_m);
+  auto created = create(options, cell_m);
+  if (!created) return failure(created);
+  GlobalMap& map = *created;
   map.store_ = &store;
   const auto cell = store.property("cell_m");
   if (!cell) return failure(cell);
@@ -114,7 +124,7 @@ Result<GlobalMap> GlobalMap::from_store(const GlobalMapOptions& options, double 
   map.submaps_stored_ = map.submaps_.size();
   map.stops_stored_ = map.stops_.size();
   for (const TileStore::Entry& entry : *index) map.tiles_[entry.key].revision = entry.revision;
-  return map;
+  return created;
 }
 
 CellFusion GlobalMap::fusion() const {

@@ -89,11 +89,13 @@ struct MapSample {
 
 class GlobalMap {
  public:
-  GlobalMap(const GlobalMapOptions& options, double cell_m);
+  /// An empty map. Code `configuration` where an option is out of bounds or the cell size is not positive.
+  static Result<GlobalMap> create(const GlobalMapOptions& options, double cell_m);
 
   /// From now on tiles may be paged out to the store. Borrowed; it must contain this map or be empty.
   void page_to(TileStore* store) { store_ = store; }
-  /// Opens the map of a store. Codes: the store's; `configuration` where its cell size differs.
+  /// Opens the map of a store. Codes: the store's; `configuration` where its cell size differs, and as
+  /// create().
   static Result<GlobalMap> from_store(const GlobalMapOptions& options, double cell_m, TileStore& store);
 
   /// Fuses a local map that was generated at `world_from_body`, cell by cell, and appends a stop with the next number.
@@ -131,6 +133,7 @@ class GlobalMap {
   std::size_t tiles_in_memory() const;
 
  private:
+  GlobalMap(const GlobalMapOptions& options, double cell_m);
   struct Slot {
     std::int64_t revision = 0;   // 0: not yet in the store
     std::unique_ptr<Tile> tile;  // null: evicted

@@ -1,5 +1,6 @@
 #include "spartan/slam/global_map.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
@@ -9,6 +10,7 @@
 
 #include "spartan/slam/internal/synthetic_stop_test.h"
 #include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
 
 namespace spartan {
 
@@ -25,7 +27,7 @@ using testing::rocky_ground;
 using testing::TemporaryFolder;
 
 LocalMap map_of(const Ground& ground, const Pose& pose, std::uint64_t seed) {
-  return MapGenerator({}, ThreadPool(1)).generate(points_at(ground, pose, seed), pose);
+  return MapGenerator::create({}, ThreadPool(1))->generate(points_at(ground, pose, seed), pose);
 }
 
 void add(GlobalMap& map, const Ground& ground, const Pose& pose, std::uint64_t seed,
@@ -55,7 +57,7 @@ TEST(GlobalMap, AViewOfOneStopEqualsItsLocalMap) {
   const Ground ground = rocky_ground();
   const Pose pose = pose_on_ground(ground, -17.3, 9.1, 2.2);
   const LocalMap local = map_of(ground, pose, 1);
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
   const MapView view = *map.view(window_of(local.place, local.size()));
   int known = 0;
@@ -84,7 +86,7 @@ TEST(GlobalMap, TraversabilityEqualsThatOfTheLocalMap) {
   const Ground ground = rocky_ground();
   const Pose pose = pose_on_ground(ground, -17.3, 9.1, 2.2);
   const LocalMap local = map_of(ground, pose, 1);
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
   const MapView view = *map.view(window_of(local.place, local.size()));
   const Traversability shape = view.shape({}, ThreadPool(2));
@@ -105,14 +107,14 @@ TEST(GlobalMap, TraversabilityEqualsThatOfTheLocalMap) {
 }
 
 TEST(GlobalMap, RejectsViewsOfTooManyCells) {
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   EXPECT_EQ(map.view({0, 0, 2000, 4001}).error().code, ErrorCode::usage);
   EXPECT_TRUE(map.view({0, 0, 2000, 1}));
 }
 
 TEST(GlobalMap, PiecesAreDisjointAndCoverTheTilesOnly) {
   const Ground ground = rocky_ground();
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   EXPECT_TRUE(map.pieces(64).empty());
   add(map, ground, pose_on_ground(ground, 0, 0, 0), 1);
   add(map, ground, pose_on_ground(ground, 400, -300, 1), 2);
@@ -134,10 +136,10 @@ TEST(GlobalMap, PiecesAreDisjointAndCoverTheTilesOnly) {
 
 TEST(GlobalMap, ElevationBetweenCellsIsBilinear) {
   const Ground plane = [](double x, double y) { return 0.1 * x - 0.2 * y; };
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   const Pose pose = pose_on_ground(plane, 3, 4, 0);
-  ASSERT_TRUE(map.add(MapGenerator({}, ThreadPool(1)).generate(points_at(plane, pose, 1, 0), pose), {}, {pose, {}},
-                      Matrix6d::Zero()));
+  ASSERT_TRUE(map.add(MapGenerator::create({}, ThreadPool(1))->generate(points_at(plane, pose, 1, 0), pose), {},
+                      {pose, {}}, Matrix6d::Zero()));
   const auto sample = map.at(5.013, 4.111);
   ASSERT_TRUE(sample && *sample);
   EXPECT_NEAR((*sample)->elevation_m, 0.1 * 5.013 - 0.2 * 4.111, 0.003);
@@ -150,8 +152,9 @@ TEST(GlobalMap, ThePoseCovarianceInflatesTheVarianceOfSlopes) {
   const Pose pose = pose_at(0, 0, 0, 0.8);
   Matrix6d relative = Matrix6d::Zero();
   relative.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 0.01;
-  GlobalMap certain({}, 0.05), uncertain({}, 0.05);
-  const LocalMap local = MapGenerator({}, ThreadPool(1)).generate(points_at(plane, pose, 1, 0), pose);
+  GlobalMap certain = GlobalMap::create({}, 0.05).value();
+  GlobalMap uncertain = GlobalMap::create({}, 0.05).value();
+  const LocalMap local = MapGenerator::create({}, ThreadPool(1))->generate(points_at(plane, pose, 1, 0), pose);
   ASSERT_TRUE(certain.add(local, {}, {pose, relative}, Matrix6d::Zero()));
   ASSERT_TRUE(uncertain.add(local, {}, {pose, relative}, relative));
   const double more = (*uncertain.at(1.5, 1.5))->variance_m2 - (*certain.at(1.5, 1.5))->variance_m2;
@@ -162,7 +165,8 @@ TEST(GlobalMap, SubmapsFollowTheDriveAndShareTheLattice) {
   const Ground ground = rocky_ground();
   GlobalMapOptions options;
   options.submap_m = 2;
-  GlobalMap small(options, 0.05), one({}, 0.05);
+  GlobalMap small = GlobalMap::create(options, 0.05).value();
+  GlobalMap one = GlobalMap::create({}, 0.05).value();
   for (int i = 0; i < 4; ++i) {
     const Pose pose = pose_on_ground(ground, 1.5 * i, 0.3 * i, 0.1 * i);
     add(small, ground, pose, static_cast<std::uint64_t>(i + 1));
@@ -187,7 +191,7 @@ TEST(GlobalMap, SubmapsFollowTheDriveAndShareTheLattice) {
 TEST(GlobalMap, MovingAnAnchorMovesItsCells) {
   const Ground ground = rocky_ground();
   const Pose pose = pose_on_ground(ground, 0, 0, 0);
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   add(map, ground, pose, 1);
   const LatticeWindow window = map.extent();
   const MapView before = *map.view(window);
@@ -202,9 +206,9 @@ TEST(GlobalMap, MovingAnAnchorMovesItsCells) {
   }
   // Rotated and off the lattice: interpolated.
   const Ground plane = [](double x, double y) { return 0.1 * x + 0.05 * y; };
-  GlobalMap level({}, 0.05);
-  ASSERT_TRUE(level.add(MapGenerator({}, ThreadPool(1)).generate(points_at(plane, Pose(), 1, 0), Pose()), {}, {},
-                        Matrix6d::Zero()));
+  GlobalMap level = GlobalMap::create({}, 0.05).value();
+  ASSERT_TRUE(level.add(MapGenerator::create({}, ThreadPool(1))->generate(points_at(plane, Pose(), 1, 0), Pose()), {},
+                        {}, Matrix6d::Zero()));
   const Pose motion = Pose(exp_so3({0.02, 0.03, 0.4}), {0.013, 0.02, 0.1});
   level.move_submap(0, motion * level.submaps()[0].world_from_submap);
   const Eigen::Vector3d from(2, 0.4, plane(2, 0.4)), to = motion * from;
@@ -214,19 +218,21 @@ TEST(GlobalMap, MovingAnAnchorMovesItsCells) {
 TEST(GlobalMap, MergedMapsContainBoth) {
   const Ground ground = rocky_ground();
   const Pose a = pose_on_ground(ground, 0, 0, 0), b = pose_on_ground(ground, 2, 0.5, 0.2);
-  GlobalMap first({}, 0.05), second({}, 0.05), different({}, 0.05);
+  GlobalMap first = GlobalMap::create({}, 0.05).value();
+  GlobalMap second = GlobalMap::create({}, 0.05).value();
+  GlobalMap different = GlobalMap::create({}, 0.05).value();
   add(first, ground, a, 1);
   add(second, ground, b, 2);
   GlobalMapOptions two;
   two.submap_m = 1;
-  GlobalMap both(two, 0.05);
+  GlobalMap both = GlobalMap::create(two, 0.05).value();
   add(both, ground, a, 1);
   add(both, ground, b, 2);
   ASSERT_TRUE(first.merge(second));
   EXPECT_EQ(first.stops().size(), 2U);
   EXPECT_EQ(first.stops()[1].id, 1);
   EXPECT_EQ(bytes_of(*first.view(both.extent())), all_of(both));
-  GlobalMap coarse({}, 0.1);
+  GlobalMap coarse = GlobalMap::create({}, 0.1).value();
   EXPECT_FALSE(first.merge(coarse));
 }
 
@@ -242,7 +248,7 @@ TEST(GlobalMap, ResultsDoNotDependOnTheMemoryLimit) {
     const std::string path = folder.file(tiny == 1 ? "tiny" : "large");
     Database db = *Database::open(path, Database::Mode::create);
     TileStore store = *TileStore::open(db);
-    GlobalMap map(options, 0.05);
+    GlobalMap map = GlobalMap::create(options, 0.05).value();
     map.page_to(&store);
     for (int i = 0; i < 6; ++i) {
       add(map, ground, pose_on_ground(ground, 1.5 * i, 0, 0.2 * i), static_cast<std::uint64_t>(i + 1));
@@ -272,7 +278,7 @@ TEST(GlobalMap, SavingAndLoadingDoesNotChangeTheResult) {
   const TemporaryFolder folder;
   const std::string path = folder.file("map.sqlite");
   const Pose a = pose_on_ground(ground, 0, 0, 0), b = pose_on_ground(ground, 1.5, 0, 0.1);
-  GlobalMap uninterrupted({}, 0.05);
+  GlobalMap uninterrupted = GlobalMap::create({}, 0.05).value();
   add(uninterrupted, ground, a, 1);
   ASSERT_TRUE(MapFile::save(uninterrupted, path));
   add(uninterrupted, ground, b, 2);
@@ -299,7 +305,7 @@ TEST(GlobalMap, RejectsAStoreOfAnotherCellSize) {
   const TemporaryFolder folder;
   Database db = *Database::open(folder.file("map.sqlite"), Database::Mode::create);
   TileStore store = *TileStore::open(db);
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   map.page_to(&store);
   add(map, rocky_ground(), Pose(), 1);
   ASSERT_TRUE(map.flush());
@@ -310,7 +316,7 @@ TEST(GlobalMap, RejectsAStoreOfAnotherCellSize) {
 RC_GTEST_PROP(GlobalMap, ObservationsNeverRaiseAVarianceAndUnobservedCellsAreNeverFree, ()) {
   GlobalMapOptions options;
   options.submap_m = 1e4;
-  GlobalMap map(options, 0.05);
+  GlobalMap map = GlobalMap::create(options, 0.05).value();
   Image<float> before(8, 8, INFINITY);
   for (int i = *rc::gen::inRange(1, 6); i > 0; --i) {
     LocalMap local;
@@ -352,12 +358,20 @@ TEST(GlobalMap, ACellThatIsNotFiniteDoesNotEnterIt) {
   ASSERT_GT(local.count(no_variance.column, no_variance.row), 0);
   local.occupancy_logodds(no_class.column, no_class.row) = nan;
   local.variance_m2(no_variance.column, no_variance.row) = nan;
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   ASSERT_TRUE(map.add(local, {5}, {pose, Matrix6d::Zero()}, Matrix6d::Zero()));
   const MapView view = *map.view(window_of(local.place, local.size()));
   EXPECT_EQ(view.occupancy_logodds(no_class.column, no_class.row), 0);
   EXPECT_EQ(view.kind(no_class.column, no_class.row), GroundClass::unknown);
   EXPECT_EQ(view.count(no_variance.column, no_variance.row), 0);
+}
+
+TEST(GlobalMap, RefusesOptionsOutOfBounds) {
+  GlobalMapOptions options;
+  options.gate_sigmas = 0;
+  EXPECT_THAT(testing::error_message(GlobalMap::create(options, 0.05)),
+              ::testing::HasSubstr("global map options: gate_sigmas is 0"));
+  EXPECT_EQ(testing::error_message(GlobalMap::create({}, 0)), "the cell size is 0 m and must be positive");
 }
 
 }  // namespace

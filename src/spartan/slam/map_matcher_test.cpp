@@ -28,9 +28,9 @@ struct Scene {
 
 Scene scene(const Ground& mapped, const Ground& seen, const Pose& before, const Pose& now) {
   const ThreadPool workers(2);
-  GlobalMap map({}, 0.05);
-  static_cast<void>(map.add(MapGenerator({}, workers).generate(points_at(mapped, before, 1), before), {}, {before, {}},
-                            Matrix6d::Zero()));
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
+  static_cast<void>(map.add(MapGenerator::create({}, workers)->generate(points_at(mapped, before, 1), before), {},
+                            {before, {}}, Matrix6d::Zero()));
   return {now, points_at(seen, now, 2),
           *map.view(window_around(now.translation().x(), now.translation().y(), 5, 0.05))};
 }
@@ -48,7 +48,8 @@ Vector6d offset(double dx, double dy, double dz, double roll, double pitch, doub
 MapMatch match(const Scene& s, const Vector6d& off, int threads = 2) {
   const ThreadPool workers(threads);
   const UncertainPose prior{moved(s.now, s.now.translation(), off), covariance_of(0.08, 0.02)};
-  return match_map(s.points, MapGenerator({}, workers).generate(s.points, prior.pose), s.global, prior, 2, {}, workers);
+  return match_map(s.points, MapGenerator::create({}, workers)->generate(s.points, prior.pose), s.global, prior, 2, {},
+                   workers);
 }
 
 double distance(const Pose& a, const Pose& b) {
@@ -172,8 +173,9 @@ TEST(MapMatcher, AnIslandWithoutGroundDoesNotSpoilTheMatch) {
   const ThreadPool workers(2);
   const Pose before = pose_on_ground(ground, 0, 0, 0), now = pose_on_ground(ground, 1, 0.2, 0.1);
   const Eigen::Vector3d island(-2.02, -2.02, 0.1);
-  GlobalMap map({}, 0.05);
-  const LocalMap mapped = MapGenerator({}, workers).generate(with_island(points_at(ground, before, 1), island), before);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
+  const LocalMap mapped =
+      MapGenerator::create({}, workers)->generate(with_island(points_at(ground, before, 1), island), before);
   ASSERT_TRUE(map.add(mapped, {}, {before, {}}, Matrix6d::Zero()));
   const Eigen::Vector3d in_world = before * island;
   const MapView view = *map.view(window_around(now.translation().x(), now.translation().y(), 5, 0.05));

@@ -52,16 +52,20 @@ double view_reach(const MapOptions& map, const MatchOptions& match) {
 Result<MapMerger> MapMerger::create(const SlamOptions& options, const MapOptions& map_options,
                                     const ThreadPool& workers) {
   if (Status valid = validate(options, "SLAM options"); !valid) return failure(valid);
-  if (Status valid = validate(map_options, "map options"); !valid) return failure(valid);
-  return MapMerger(options, map_options, workers);
+  auto generator = MapGenerator::create(map_options, workers);
+  if (!generator) return failure(generator);
+  auto map = GlobalMap::create(options.map, map_options.cell_m);
+  if (!map) return failure(map);
+  return MapMerger(options, map_options, std::move(*generator), std::move(*map), workers);
 }
 
-MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers)
+MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, MapGenerator generator, GlobalMap map,
+                     const ThreadPool& workers)
     : options_(options),
       map_options_(map_options),
       workers_(workers),
-      generator_(map_options, workers),
-      map_(options.map, map_options.cell_m) {}
+      generator_(std::move(generator)),
+      map_(std::move(map)) {}
 
 // Covariance of the map under the local map: the mean of the covariances of the stops that observed it, weighted by
 // cells, each transported rigidly to this body frame.

@@ -89,7 +89,8 @@ class MapMerger {
   Status restore(const Bytes& bytes, TileStore& store);
 
  private:
-  MapMerger(const SlamOptions& options, const MapOptions& map_options, const ThreadPool& workers);
+  MapMerger(const SlamOptions& options, const MapOptions& map_options, MapGenerator generator, GlobalMap map,
+            const ThreadPool& workers);
   Matrix6d map_covariance(const MapView& view, const LocalMap& local, const Pose& world_from_body) const;
 
   SlamOptions options_;

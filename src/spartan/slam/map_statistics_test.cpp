@@ -20,7 +20,7 @@ using testing::rocky_ground;
 LatticeWindow add_stop(GlobalMap& map, double x, double y, double yaw) {
   const auto ground = rocky_ground();
   const Pose pose = pose_on_ground(ground, x, y, yaw);
-  LocalMap local = MapGenerator({}, ThreadPool(1)).generate(points_at(ground, pose, 1), pose);
+  LocalMap local = MapGenerator::create({}, ThreadPool(1))->generate(points_at(ground, pose, 1), pose);
   for (int r = 0; r < local.size().height; ++r) {
     for (int c = 0; c < local.size().width; c += 10) {
       local.kind(c, r) = GroundClass::obstacle;
@@ -65,7 +65,7 @@ void expect_same(const MapStatistics& a, const MapStatistics& b) {
 TEST(MapStatistics, DoNotDependOnTheSizeOfTheWindows) {
   GlobalMapOptions options;
   options.submap_m = 2;
-  GlobalMap map(options, 0.05);
+  GlobalMap map = GlobalMap::create(options, 0.05).value();
   for (int i = 0; i < 4; ++i) add_stop(map, 1.5 * i, 0.3 * i, 0.4 * i);
   ASSERT_GT(map.submaps().size(), 1U);
   const MapStatistics whole = expected_figures(map, {map.extent()});
@@ -80,7 +80,7 @@ TEST(MapStatistics, DoNotDependOnTheSizeOfTheWindows) {
 }
 
 TEST(MapStatistics, OfAMapThatIsTooLargeForOneView) {
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   const LatticeWindow one = add_stop(map, -3, 2, 0.3), other = add_stop(map, 300, 200, 2);
   ASSERT_GT(map.extent().cells(), GlobalMap::kMostCells);
   ASSERT_FALSE(map.view(map.extent()));
@@ -90,7 +90,7 @@ TEST(MapStatistics, OfAMapThatIsTooLargeForOneView) {
 }
 
 TEST(MapStatistics, OfAnEmptyMapAreZero) {
-  GlobalMap map({}, 0.05);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
   const auto statistics = map_statistics(map);
   ASSERT_TRUE(statistics);
   expect_same(*statistics, {});

@@ -46,7 +46,7 @@ struct Pipeline::State {
         localizer(Localizer::create(with_gravity(options_in)).value()),
         odometry_filter(VisionOnlyFilter::create(with_gravity(options_in)).value()),
         slam_filter(VisionOnlyFilter::create(with_gravity(options_in)).value()),
-        dead_reckoning(options_in.localization.vision),
+        dead_reckoning(DeadReckoning::create(options_in.localization.vision).value()),
         stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers).value()),
         merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers).value()) {
     maps_stops = options.maps && rig.pairs.size() > 1 && !options.odometry_only;

@@ -23,8 +23,7 @@ class RemapTable {
   /// Computes the table for a view of a camera. `self_mask` (0: the rover itself) has the size of the source or is
   /// empty. A pixel is invalid where its position is outside the sensor (by more than the rounding error of 1/256 px),
   /// outside the domain of the camera model, or touches the self-mask. `depth_m`: depth at which the table is exact,
-  /// which only matters for non-central cameras. `simd`: instruction set; all give the same
-  /// bits.
+  /// which only matters for non-central cameras. `simd`: instruction set; all give the same bits.
   RemapTable(const CameraModel& camera, ImageSize source_size, const RectifiedStereo& view,
              const Eigen::Matrix3d& camera_from_rectified, ImageView<const std::uint8_t> self_mask,
              const ThreadPool& workers, double depth_m = 1, SimdTarget simd = SimdTarget::automatic);

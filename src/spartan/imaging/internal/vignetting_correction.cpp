@@ -50,7 +50,7 @@ Result<VignettingCorrection> VignettingCorrection::create(const Camera& camera, 
 template <class T>
 void VignettingCorrection::apply_any(ImageView<const T> image, ImageView<T> result, const ThreadPool& workers) const {
   if (image.size() != factors_.size() || result.size() != factors_.size()) {
-    throw std::invalid_argument("LightCorrection: the images have another size than the camera");
+    throw std::invalid_argument("VignettingCorrection: the images have another size than the camera");
   }
   const auto full_scale = static_cast<std::uint32_t>(full_scale_);
   workers.parallel_for(0, image.height(), kVignettingRowsPerPart, [&](int begin, int end) {

@@ -95,7 +95,8 @@ TEST(MapRefinement, WeightsAreDerivativesOfTheRobustCost) {
 TEST(MapRefinement, ConvergesFromAnOffset) {
   const Ground ground = rocky_ground();
   const Pose before = pose_on_ground(ground, 0, 0, 0), now = pose_on_ground(ground, 1, 0.2, 0.1);
-  const SurfaceGrid global = grid_of(MapGenerator({}, ThreadPool(1)).generate(points_at(ground, before, 1), before));
+  const SurfaceGrid global =
+      grid_of(MapGenerator::create({}, ThreadPool(1))->generate(points_at(ground, before, 1), before));
   Vector6d eta;
   eta << 0.03, -0.02, 0.02, 0.01, -0.01, 0.015;
   const auto match = refine_match(points_at(ground, now, 2), global, moved(now, now.translation(), eta), 2, {});
@@ -109,7 +110,8 @@ TEST(MapRefinement, ConvergesFromAnOffset) {
 TEST(MapRefinement, GivesNothingWithoutOverlap) {
   const Ground ground = rocky_ground();
   const Pose before = pose_on_ground(ground, 0, 0, 0), far = pose_on_ground(ground, 30, 0, 0);
-  const SurfaceGrid global = grid_of(MapGenerator({}, ThreadPool(1)).generate(points_at(ground, before, 1), before));
+  const SurfaceGrid global =
+      grid_of(MapGenerator::create({}, ThreadPool(1))->generate(points_at(ground, before, 1), before));
   EXPECT_FALSE(refine_match(points_at(ground, far, 2), global, far, 2, {}));
 }
 

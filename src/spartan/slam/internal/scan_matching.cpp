@@ -139,7 +139,7 @@ std::vector<ScanMatchPeak> correlative_scan_match(const SurfaceGrid& local, cons
   const int x_count = 2 * nx + 1, y_count = 2 * ny + 1, yaw_count = 2 * na + 1;
   const std::int64_t count = std::int64_t{x_count} * y_count * yaw_count;
   if (static_cast<double>(count) > MatchOptions::kMostTrials)
-    throw std::invalid_argument("jitter_search: the window exceeds MatchOptions::kMostTrials");
+    throw std::invalid_argument("correlative_scan_match: the window exceeds MatchOptions::kMostTrials");
 
   // Approximate height and tilt, so that the robust fits start within their basin of convergence.
   std::vector<Pair> pairs;

@@ -17,7 +17,7 @@ using testing::pose_on_ground;
 using testing::rocky_ground;
 
 SurfaceGrid map_at(const std::vector<SurfacePoint>& points, const Pose& pose) {
-  return coarser(grid_of(MapGenerator({}, ThreadPool(1)).generate(points, pose)));
+  return coarser(grid_of(MapGenerator::create({}, ThreadPool(1))->generate(points, pose)));
 }
 
 TEST(ScanMatching, WindowFollowsTheCovarianceInWorldAxes) {

@@ -32,7 +32,7 @@ TEST(SurfaceGrid, RasterizesAsTheMapGenerator) {
   const Ground ground = rocky_ground();
   const Pose pose = pose_on_ground(ground, 3.21, -1.37, 0.4);
   const std::vector<SurfacePoint> points = points_at(ground, pose, 1);
-  const LocalMap map = MapGenerator({}, ThreadPool(1)).generate(points, pose);
+  const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate(points, pose);
   const SurfaceGrid from_map = grid_of(map);
   const SurfaceGrid rasterized = rasterize(points, pose, from_map.window, 0.05, MapOptions().min_points);
   int known = 0, other = 0;
