@@ -23,6 +23,7 @@ except ImportError:
     print("skipped: the Python package jsonschema is missing (./setup installs it)")
     sys.exit(77)
 
+
 def schema(source, name):
     found = json.loads((source / "docs/reference/schemas" / f"{name}.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator.check_schema(found)
