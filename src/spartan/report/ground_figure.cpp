@@ -20,7 +20,7 @@ void draw_legend(Drawing& drawing, double y_px, bool pans, bool narrow) {
     const char* text;
     bool shown;
   };
-  const Entry entries[] = {{kWideOneEye, 1, "wide, one camera only", true},
+  const Entry entries[] = {{kWideOneCamera, 1, "wide, one camera only", true},
                            {kWideBoth, 1, "wide, both cameras", true},
                            {kWideTwice, 1, "wide, from two pans", pans},
                            {kNarrow, 0.45, "narrow, both cameras", narrow},

@@ -17,7 +17,7 @@ constexpr double kMargin_px = 40;
 
 /// Colors for color-blind readers (Okabe and Ito), lighter where fewer cameras see.
 inline constexpr Rgb8 kInk{30, 30, 30}, kFaint{150, 150, 150}, kSoil{120, 100, 80}, kUnseen{222, 222, 222};
-inline constexpr Rgb8 kWide{0, 114, 178}, kWideOneEye{200, 226, 243}, kWideBoth{134, 187, 222},
+inline constexpr Rgb8 kWide{0, 114, 178}, kWideOneCamera{200, 226, 243}, kWideBoth{134, 187, 222},
     kWideTwice{58, 134, 188};
 inline constexpr Rgb8 kNarrow{213, 94, 0}, kShared{0, 158, 115};
 

@@ -36,7 +36,7 @@ struct Plan {
 
 // The views of one pair at its pans, or ahead only.
 struct Views {
-  std::vector<GroundPolygon> one_eye, both_eyes, twice;
+  std::vector<GroundPolygon> one_camera, both_cameras, twice;
 };
 
 Views views_of(const DrawnPair& pair) {
@@ -46,12 +46,12 @@ Views views_of(const DrawnPair& pair) {
   Views views;
   for (const double pan_deg : pans_deg) {
     const double pan_rad = pan_deg * kRadiansPerDegree;
-    for (const double side : {0.5, -0.5}) views.one_eye.push_back(footprint(view, side * view.baseline_m, pan_rad));
-    views.both_eyes.push_back(common_footprint(view, pan_rad));
+    for (const double side : {0.5, -0.5}) views.one_camera.push_back(footprint(view, side * view.baseline_m, pan_rad));
+    views.both_cameras.push_back(common_footprint(view, pan_rad));
   }
-  for (std::size_t i = 0; i < views.both_eyes.size(); ++i) {
+  for (std::size_t i = 0; i < views.both_cameras.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      const GroundPolygon shared = intersection(views.both_eyes[j], views.both_eyes[i]);
+      const GroundPolygon shared = intersection(views.both_cameras[j], views.both_cameras[i]);
       if (!shared.empty()) views.twice.push_back(shared);
     }
   }
@@ -59,10 +59,10 @@ Views views_of(const DrawnPair& pair) {
 }
 
 void draw_views(Drawing& drawing, const Plan& plan, const Views& views) {
-  for (const GroundPolygon& polygon : views.one_eye) drawing.fill(plan(polygon), {kWideOneEye});
-  for (const GroundPolygon& polygon : views.both_eyes) drawing.fill(plan(polygon), {kWideBoth});
+  for (const GroundPolygon& polygon : views.one_camera) drawing.fill(plan(polygon), {kWideOneCamera});
+  for (const GroundPolygon& polygon : views.both_cameras) drawing.fill(plan(polygon), {kWideBoth});
   for (const GroundPolygon& polygon : views.twice) drawing.fill(plan(polygon), {kWideTwice});
-  for (const GroundPolygon& polygon : views.both_eyes) drawing.line(closed(plan(polygon)), {kWide, 1.2});
+  for (const GroundPolygon& polygon : views.both_cameras) drawing.line(closed(plan(polygon)), {kWide, 1.2});
 }
 
 void draw_rings(Drawing& drawing, const Plan& plan, double radius_m, double half_deg) {
@@ -97,15 +97,15 @@ struct Meaning {
   std::string text;
 };
 
-constexpr Pen kRequiredPen{kInk, 1.8}, kOneEyePen{kWide, 1.8, 5}, kBothEyesPen{kWide, 1.8}, kHeldPen{kInk, 3};
+constexpr Pen kRequiredPen{kInk, 1.8}, kOneCameraPen{kWide, 1.8, 5}, kBothCamerasPen{kWide, 1.8}, kHeldPen{kInk, 3};
 constexpr double kArcs_px = 92;  // distance of the azimuth arcs from the ground
 constexpr double kMeanings_px = 44;
 
 std::vector<Meaning> meanings_of(const PanRequirements& required, const PanCoverage& seen) {
   const auto& held = seen.full_coverage;
   return {{kRequiredPen, fmt::format("required: {}°", required.azimuth_deg)},
-          {kOneEyePen, fmt::format("far edge, one camera: {:.1f}°", seen.azimuth_far.width_deg())},
-          {kBothEyesPen, fmt::format("far edge, both cameras: {:.1f}°", seen.azimuth_far_stereo.width_deg())},
+          {kOneCameraPen, fmt::format("far edge, one camera: {:.1f}°", seen.azimuth_far.width_deg())},
+          {kBothCamerasPen, fmt::format("far edge, both cameras: {:.1f}°", seen.azimuth_far_stereo.width_deg())},
           {held ? kHeldPen : Pen{kInk, 0},
            held ? fmt::format("both cameras see all {}°: {:.2f} to {:.2f} m", required.azimuth_deg, held->from_m,
                               held->to_m)
@@ -140,8 +140,8 @@ void draw_azimuths(Drawing& drawing, const Plan& plan, double radius_m, const Pa
   for (const double end : {-half, half}) {
     if (half < 180) drawing.line({plan.polar(0, 0), plan.polar(radius_m + 3.4 * gap, end)}, {kInk, 1.2, 7});
   }
-  draw_sectors(drawing, plan, radius_m + gap, seen.azimuth_far_stereo, kBothEyesPen);
-  draw_sectors(drawing, plan, radius_m + 2 * gap, seen.azimuth_far, kOneEyePen);
+  draw_sectors(drawing, plan, radius_m + gap, seen.azimuth_far_stereo, kBothCamerasPen);
+  draw_sectors(drawing, plan, radius_m + 2 * gap, seen.azimuth_far, kOneCameraPen);
   draw_sectors(drawing, plan, radius_m + 3 * gap, azimuth, kRequiredPen);
   if (!seen.full_coverage) return;
   const DistanceSpan& held = *seen.full_coverage;
@@ -175,12 +175,12 @@ struct PlanLayout {
 PlanLayout lay_out_plan(double top_px, const DrawnPair& wide, const Views& views) {
   constexpr double kTallest_px = 700;
   const bool pans = wide.requirements.pans.has_value();
-  const double radius = std::max(farthest_corner_m(views.both_eyes), wide.requirements.range_m);
+  const double radius = std::max(farthest_corner_m(views.both_cameras), wide.requirements.range_m);
   const double half_deg = (pans ? wide.requirements.pans->azimuth_deg : wide.figures.parameters.hfov_deg) / 2;
   const double outside_px = pans ? kArcs_px : 0;
 
   Extent extent;
-  for (const GroundPolygon& polygon : views.one_eye) extent.add(polygon);
+  for (const GroundPolygon& polygon : views.one_camera) extent.add(polygon);
   GroundPolygon arc;
   for (double a = -half_deg; a <= half_deg; a += 1) {
     arc.emplace_back(radius * std::cos(a * kRadiansPerDegree), radius * std::sin(a * kRadiansPerDegree));
