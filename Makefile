@@ -47,11 +47,11 @@ format:
 	scripts/format
 
 lint:
-	./setup
+	./setup build test develop
 	scripts/lint
 
 docs:
-	./setup develop
+	./setup docs
 	mkdir -p build/docs
 	doxygen docs/Doxyfile
 	@echo "open build/docs/html/index.html"

@@ -73,7 +73,8 @@ inline std::optional<std::uint64_t> hash_of_sources() {
   namespace fs = std::filesystem;
   const fs::path root = testing::source_folder();
   std::vector<fs::path> files{root / "bench/mars_stops.h", root / "bench/stop_points.h"};
-  for (const char* module : {"core", "rig", "camera", "imaging", "reconstruction"}) {
+  for (const char* module :
+       {"core", "numerics", "image_io", "calibration_io", "rig", "camera", "imaging", "reconstruction"}) {
     std::error_code error;
     const auto before = files.size();
     for (const auto& entry : fs::recursive_directory_iterator(root / "src/spartan" / module, error)) {

@@ -32,7 +32,8 @@ CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, 
                       const std::string& example, CommandBody body) {
   CLI::App* command = app.add_subcommand(name, summary);
   command->footer("Example:\n  spartan " + example);
-  auto* quiet = command->add_flag("-q,--quiet", context.quiet, "Print errors only.");
+  auto* quiet = command->add_flag("-q,--quiet", context.quiet,
+                                  "Print errors and results only: no progress, information or warnings.");
   command->add_flag("-v,--verbose", context.verbose, "Print debug messages, too.")->excludes(quiet);
   command->callback([&context, body = std::move(body)] { context.chosen = body; });
   return command;

@@ -51,13 +51,13 @@ CLI::Validator non_negative_number();
 
 /// Accepts the former name of an option for one version, with a warning; help does not show it.
 template <class T>
-void add_former_name(CLI::App& command, Context& context, const std::string& former, const std::string& name,
-                     T& value) {
+CLI::Option* add_former_name(CLI::App& command, Context& context, const std::string& former, const std::string& name,
+                             T& value) {
   const auto warn = [&context, former, name](const std::string&) {
     context.warnings.push_back(former + " is now called " + name +
                                "; the former name is accepted for this version only");
   };
-  command.add_option(former, value)->group("")->each(warn);
+  return command.add_option(former, value)->group("")->each(warn);
 }
 
 /// Writes to standard output and flushes; code `output` where that fails (a full disk behind a pipe).

@@ -45,12 +45,12 @@ void add_evaluate(CLI::App& app, Context& context) {
       ->add_option("estimate", arguments->estimate,
                    "Estimated trajectory: a run folder, or a file (TUM, KITTI, EuRoC csv).")
       ->required()
-      ->option_text("EST");
+      ->option_text("EST REQUIRED");
   command
       ->add_option("--truth", arguments->truth,
                    "Ground truth: a trajectory file (TUM, KITTI, EuRoC csv), or a recording that has one.")
       ->required()
-      ->option_text("GT");
+      ->option_text("GT REQUIRED");
   command
       ->add_option("--align", arguments->align,
                    "Alignment of the estimate before comparing: none, first (first pose), yaw (yaw and translation), "

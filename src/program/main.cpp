@@ -31,6 +31,23 @@ void add_commands(CLI::App& app, Context& context) {
   add_completion(app, context);
 }
 
+// The error text for a word in the place of a command, e.g. `spartan map foo`; empty where every such word is one.
+std::string unknown_command(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* group = &app;
+  std::string path = "spartan";
+  for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
+    const auto commands = group->get_subcommands([](const CLI::App*) { return true; });
+    if (commands.empty()) return {};
+    const auto named = std::find_if(commands.begin(), commands.end(),
+                                    [&](const CLI::App* command) { return command->check_name(argv[i]); });
+    if (named == commands.end())
+      return std::string("error: '") + argv[i] + "' is not a " + path + " command; see `" + path + " --help`\n";
+    group = *named;
+    path += std::string(" ") + argv[i];
+  }
+  return {};
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Stereo vision for rovers: visual odometry, dense stereo, terrain maps and localization.", "spartan"};
   app.set_version_flag("--version", SPARTAN_VERSION);
@@ -41,9 +58,8 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    const auto is_named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
-    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
-      std::cerr << "error: '" << argv[1] << "' is not a spartan command; see `spartan --help`\n";
+    if (const std::string message = unknown_command(app, argc, argv); !message.empty()) {
+      std::cerr << message;
       return kUsage;
     }
     const bool help_requested = app.exit(e, std::cout, std::cerr) == 0;

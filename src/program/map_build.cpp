@@ -25,8 +25,9 @@
 namespace spartan::program {
 namespace {
 
-constexpr double kRestSeconds = 1;  // of IMU samples from the first frame of the stop on
-constexpr double kReach = 0.75;     // of the side of the map: slightly more than half of its diagonal
+constexpr double kRestSeconds = 1;   // of IMU samples from the first frame of the stop on
+constexpr double kMinRange_m = 0.5;  // smallest mapping.merging.max_range_m
+constexpr double kReach = 0.75;      // of the side of the map: slightly more than half of its diagonal
 
 struct BuildArguments {
   std::string left, right, output, rig, recording, gravity, config;
@@ -64,7 +65,7 @@ Result<std::optional<Eigen::Vector3d>> parse_gravity(const std::string& text) {
     from = to + 1;
   }
   const Eigen::Vector3d down(g[0], g[1], g[2]);
-  if (down.norm() < 1e-9) return failure(ErrorCode::usage, "is zero", "--gravity");
+  if (down.norm() < 1e-9) return failure(ErrorCode::usage, "the vector is zero", "--gravity", "give e.g. 0,0,-1");
   return Eigen::Vector3d(-down.normalized());
 }
 
@@ -127,7 +128,7 @@ Result<RunOptions> options_of(const Context& context, const BuildArguments& a) {
   MappingOptions& mapping = options->mapping;
   if (a.extent_m) {
     mapping.map.extent_m = *a.extent_m;
-    mapping.merging.max_range_m = kReach * *a.extent_m;
+    mapping.merging.max_range_m = std::max(kMinRange_m, kReach * *a.extent_m);
   }
   if (a.cell_m) mapping.map.cell_m = *a.cell_m;
   return options;
@@ -224,7 +225,9 @@ std::string to_text(const Json& json, const std::string& folder) {
 Status check(const BuildArguments& a) {
   const bool pair = !a.left.empty() || !a.right.empty() || !a.rig.empty();
   if (pair == !a.recording.empty()) {
-    return failure(ErrorCode::usage, "give two images with --rig, or --recording with --position", "map build");
+    return failure(ErrorCode::usage,
+                   "give two images with --rig, or --recording with --position (a recording has its own calibration)",
+                   "map build");
   }
   if (pair && (a.right.empty() || a.rig.empty())) {
     return failure(ErrorCode::usage, "give both LEFT and RIGHT, and --rig", "map build");

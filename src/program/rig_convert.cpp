@@ -214,14 +214,14 @@ void add_rig_convert(CLI::App& rig, Context& context) {
       "rig convert $SPARTAN_DATA/k10_pair k10.cahvor", [&context, a] { return convert(context, *a); });
   command->add_option("from", a->from, "Calibration to read: a file, LEFT,RIGHT, or a folder that holds one.")
       ->required()
-      ->option_text("A");
+      ->option_text("A REQUIRED");
   command
       ->add_option(
           "to", a->to,
           "File to write; for formats with one file per camera LEFT,RIGHT or one name for both; for EuRoC a folder. "
           "Existing files are an error without --force.")
       ->required()
-      ->option_text("B");
+      ->option_text("B REQUIRED");
   std::vector<std::string> names;
   for (const std::string_view name : calibration_format_names()) names.emplace_back(name);
   command->add_option("--to", a->format, "Format of B (default: from its name).")->check(CLI::IsMember(names));

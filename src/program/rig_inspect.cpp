@@ -302,7 +302,7 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
       ->add_option("rig", a->rig,
                    "Calibration in any supported format (docs/reference/calibration_files.md), or - for none.")
       ->required()
-      ->option_text("RIG");
+      ->option_text("RIG REQUIRED");
   command->add_option("left", a->left, "Left image, a folder of images, or a quoted pattern (\"left*.jpg\").")
       ->option_text("LEFT");
   command
@@ -322,7 +322,7 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
                       "Write the corrected rig as rig.yaml. Only parameters that the findings name are changed.");
   command->add_option("--figure", a->figure,
                       "Write a PNG that shows the row errors of the first pair, before and after.");
-  add_former_name(*command, context, "--shots", "--frames", a->frames);
+  add_former_name(*command, context, "--shots", "--frames", a->frames)->check(CLI::Range(1, 1000));
   add_former_name(*command, context, "--picture", "--figure", a->figure);
   add_threads_option(*command, context);
   add_json_flag(*command, context);

@@ -155,7 +155,10 @@ void add_run(CLI::App& app, Context& context) {
   command->add_flag(
       "--resume", a->resume,
       "Continue an interrupted run in this folder. The results are the same as without the interruption.");
-  command->add_option("--max-frames", a->max_frames, "Stop after this number of stereo frames (default 0: all).")
+  command
+      ->add_option("--max-frames", a->max_frames,
+                   "Maximum number of stereo frames of the odometry pair, missing ones and those before a resume "
+                   "included (default 0: all).")
       ->check(non_negative_number());
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM or terrain.");

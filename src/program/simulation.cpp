@@ -76,8 +76,10 @@ Result<std::map<std::string, sim::RectifiedView>> rectified_views(const Rig& rig
 Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments) {
   const auto text = find_scenario(arguments.scenario);
   if (!text) return failure(text);
-  auto scenario = sim::parse_scenario(text->content, text->name);
-  if (!scenario) return failure(scenario);
+  auto read = sim::read_scenario(text->content, text->name);
+  if (!read) return failure(read);
+  for (const std::string& warning : read->warnings) context.log.warning(warning);
+  sim::Scenario* const scenario = &read->options;
   if (arguments.seed) scenario->seed = *arguments.seed;
   const auto rig = find_rig(*scenario, *text);
   if (!rig) return failure(rig);

@@ -87,11 +87,23 @@ Result<Pair> load_and_rectify(const StereoArguments& a, const ImagingOptions& op
   return pair;
 }
 
-DisparityRange search_range(const StereoArguments& a, const Pair& pair) {
+Result<DisparityRange> search_range(const StereoArguments& a, const Pair& pair) {
   const RectifiedStereo geometry = pair.geometry.value_or(RectifiedStereo{pair.left.size(), 1, {0, 0}, 1});
   DisparityRange range = disparity_range(geometry, pair.geometry ? pair.nearest_m : 0);
   if (a.min_disparity) range.min = *a.min_disparity;
   if (a.max_disparity) range.max = *a.max_disparity;
+  if (!a.min_disparity && !a.max_disparity) return range;
+  const std::string place = "--min-disparity, --max-disparity";
+  if (range.min > range.max) {
+    return failure(ErrorCode::usage, fmt::format("the range from {} to {} px is empty", range.min, range.max), place,
+                   "the minimum must not be greater than the maximum");
+  }
+  if (range.max >= pair.left.width() || range.min <= -pair.left.width()) {
+    return failure(ErrorCode::usage,
+                   fmt::format("the range from {} to {} px exceeds the image, which is {} px wide", range.min,
+                               range.max, pair.left.width()),
+                   place, "disparities are less than the width of the image");
+  }
   return range;
 }
 
@@ -156,8 +168,9 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (!pair) return failure(pair);
   auto computer = DisparityComputer::create(options->reconstruction, ThreadPool(context.threads));
   if (!computer) return failure(computer);
-  const auto image =
-      computer->compute(pair->left, pair->right, search_range(a, *pair), pair->left_mask, pair->right_mask);
+  const auto range = search_range(a, *pair);
+  if (!range) return failure(range);
+  const auto image = computer->compute(pair->left, pair->right, *range, pair->left_mask, pair->right_mask);
   if (!image) {
     Error error = image.error();
     if (error.where.empty()) error.where = a.left + ", " + a.right;

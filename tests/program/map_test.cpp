@@ -40,7 +40,7 @@ class MapBuild : public ::testing::Test {
 };
 
 // The camera is 0.5 m above level ground, pitched down by 25°.
-TEST_F(MapBuild, FindsHowTheEyeStandsAndMapsTheGround) {
+TEST_F(MapBuild, FindsTheAttitudeAndMapsTheGround) {
   const auto result = build("map", {"--extent-m", "4", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json summary = json::parse(result.out);
@@ -70,7 +70,16 @@ TEST_F(MapBuild, FindsHowTheEyeStandsAndMapsTheGround) {
     EXPECT_TRUE(std::filesystem::exists(folder_.path() + "/map/" + file)) << file;
 }
 
-TEST_F(MapBuild, TakesTheGravityThatItIsTold) {
+TEST_F(MapBuild, AcceptsTheSmallestExtent) {
+  const auto result = build("small", {"--extent-m", "0.5", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(json::parse(result.out)["columns"], 10);
+  const auto too_fine = build("fine", {"--extent-m", "1000", "--cell-m", "0.01"});
+  EXPECT_EQ(too_fine.exit_code, 4);
+  EXPECT_THAT(too_fine.err, HasSubstr("map.cell_m"));
+}
+
+TEST_F(MapBuild, TakesTheGivenGravity) {
   const auto result = build("map", {"--gravity", "0.5,0,-0.8660254", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json summary = json::parse(result.out);

@@ -76,7 +76,7 @@ TEST_F(RigInspectImages, ThreadsDoNotMatter) {
   EXPECT_EQ(inspect(drive_ + "/calib.txt", one).out, inspect(drive_ + "/calib.txt", two).out);
 }
 
-TEST_F(RigInspectImages, TakesShotsFromARecordingOrAPattern) {
+TEST_F(RigInspectImages, TakesFramesFromARecordingOrAPattern) {
   const auto recording = inspect(drive_ + "/calib.txt", {"--recording", drive_, "--json"});
   ASSERT_EQ(recording.exit_code, 0) << recording.err;
   const auto pattern = inspect(drive_ + "/calib.txt", {drive_ + "/image_0/*.png", drive_ + "/image_1", "--json"});
@@ -134,7 +134,7 @@ TEST_F(RigInspectImages, PrintsTheCorrectionOfTheRightCamera) {
   for (const std::string& id : ids(pair)) EXPECT_THAT(words, HasSubstr("pair stereo: finding " + id + ": "));
 }
 
-TEST_F(RigInspectImages, LooksAtThePairAndTheShotsThatAreAskedFor) {
+TEST_F(RigInspectImages, ChecksTheRequestedPairAndFrames) {
   const auto matches = [&](const std::vector<std::string>& words) {
     const auto result = inspect(drive_ + "/calib.txt", words);
     EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -156,7 +156,7 @@ TEST_F(RigInspectImages, LooksAtThePairAndTheShotsThatAreAskedFor) {
 }
 
 // The cameras of the rig are exchanged, and so are the images; mask paths are relative to the new file.
-TEST_F(RigInspectImages, AppliesExchangedEyes) {
+TEST_F(RigInspectImages, AppliesExchangedCameras) {
   std::string text = fmt::format(kRig, 0.12);
   text.replace(text.find("{left: left, right: right}"), 26, "{left: right, right: left}");
   text.replace(text.find("axes: optical"), 0, "self_mask: masks/left.png, ");
@@ -263,7 +263,7 @@ TEST_F(RigInspectImages, ShowsItsProgress) {
 
 // Three pairs of images on top of each other: as taken, rectified as given, corrected. The one of two frames is drawn
 // that shows more.
-TEST_F(RigInspectImages, DrawsTheRowsOfBothEyes) {
+TEST_F(RigInspectImages, DrawsTheRowsOfBothCameras) {
   std::string text = fmt::format(kRig, 0.12);
   text.replace(text.rfind("axes: optical"), 0, "roll_pitch_yaw_deg: [1, 0, 2], ");
   for (const int side : {0, 1}) {
@@ -302,7 +302,7 @@ TEST_F(RigInspectImages, DrawsTheRowsOfBothEyes) {
   }
 }
 
-TEST_F(RigInspectImages, NamesPlantedFaultsAndMendsThem) {
+TEST_F(RigInspectImages, NamesInjectedFaultsAndCorrectsThem) {
   EXPECT_EQ(ids(pair_with_right_camera_at(0.12)), std::vector<std::string>());
   // With two equal cameras the finding is ambiguous.
   EXPECT_EQ(ids(pair_with_right_camera_at(-0.12)), (std::vector<std::string>{"inverse_transform", "swapped_eyes"}));

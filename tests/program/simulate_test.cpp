@@ -185,19 +185,31 @@ TEST_F(Simulate, KeepsWhatWasDoneWhenTheDiskIsFull) {
   for (const auto& [name, content] : whole) EXPECT_TRUE(after.at(name) == content) << name;
 }
 
+TEST_F(Simulate, WarnsOfFormerKeys) {
+  write("small.yaml", std::string(kSmallScenario) + "believed: {rows_px: 0}\n");
+  const ProgramResult result = simulate("former");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("believed is now called nominal_rig"));
+}
+
 TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
   expect_refused("soil: {contrast: -0.1}", "soil.contrast");
   expect_refused("imu: {gyro_bias_rad_s: -1}", "imu.gyro_bias_rad_s");
   expect_refused("sensor_faults: [{sensor: sonar, from_s: 1, to_s: 2}]", "'sonar'");
-  expect_refused("sensor_faults: [{sensor: imu, from_s: 2, to_s: 1}]", "to_s (1) must be greater than from_s (2)");
+  expect_refused("sensor_faults: [{sensor: imu, from_s: 2, to_s: 1}]",
+                 "sensor_faults[0].to_s: must be greater than from_s");
   expect_refused("camera_faults: [{pair: rear, from_s: 1, to_s: 2}]", "has no pair named 'rear'");
-  expect_refused("light: {sun_lux: 0, sky_lux: 0}", "both 0");
+  expect_refused("light: {sun_lux: 0, sky_lux: 0}", "light.sky_lux: is 0, and so is sun_lux");
   expect_refused("light: {sun_lux: -5}", "light.sun_lux");
   expect_refused("colour: red", "unknown key");
   write("small.yaml", "schema: 1\nrig: small_rig.yaml\nsamples: 0\n");
   ProgramResult result = simulate("bad");
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, HasSubstr("small.yaml:3: samples"));
+  write("small.yaml", "schema: 1\nrig: small_rig.yaml\nrocks: {smallest_m: 0.5, largest_m: 0.4}\n");
+  result = simulate("bad");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("small.yaml:3: rocks.largest_m: must be greater than smallest_m"));
   write("small.yaml", "schema: 1\nrig: small_rig.yaml\nsamples: 3\npath:\n  length_m: 300\n");
   result = simulate("bad");
   EXPECT_EQ(result.exit_code, 4);

@@ -215,6 +215,7 @@ Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const R
                                               const RecordingOptions& options,
                                               std::map<std::string, std::string> previous_rows) {
   if (Status s = nominal_rig.validate("rig of the recording"); !s) return failure(s);
+  if (Status s = validate(internal::RecordingFile{1, options}, "description of the recording"); !s) return failure(s);
   for (const StereoPair& pair : nominal_rig.pairs) {
     if (is_folder_name(pair.name)) continue;
     return failure(ErrorCode::configuration, "the name of pair '" + pair.name + "' is not usable as a folder name",

@@ -28,7 +28,8 @@ struct RecordingOptions {
 class RecordingWriter {
  public:
   /// Starts a recording. `nominal_rig` is written to rig.yaml. Code `output` where the folder exists and is not empty,
-  /// or cannot be created; `configuration` where the rig is invalid or a pair name is not usable as a folder name.
+  /// or cannot be created; `configuration` where the rig is invalid, an option is out of the bounds of
+  /// recording.yaml or a pair name is not usable as a folder name.
   static Result<RecordingWriter> create(const std::string& folder, const Rig& nominal_rig,
                                         const RecordingOptions& options);
   /// Resumes an unfinished recording that `create` started for the same rig. Frames with a complete row and both images

@@ -350,6 +350,18 @@ TEST(RecordingWriterFolder, IsNotCreatedForAnInvalidRig) {
   EXPECT_FALSE(fs::exists(path));
 }
 
+TEST(RecordingWriterFolder, IsNotCreatedForADescriptionThatTheReaderRefuses) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/recording";
+  RecordingOptions options;
+  options.noise.imu.gyro_bias_rad_s = 2;
+  const auto writer = RecordingWriter::create(path, tiny_rig(), options);
+  ASSERT_FALSE(writer);
+  EXPECT_EQ(writer.error().code, ErrorCode::configuration);
+  EXPECT_THAT(writer.error().message(), HasSubstr("imu_noise.gyro_bias_rad_s is 2, must be between 0 and 1"));
+  EXPECT_FALSE(fs::exists(path));
+}
+
 TEST(RecordingWriterFolder, ReportsAFullDisk) {
   const TemporaryFolder folder;
   auto writer = RecordingWriter::create(folder.path() + "/r", tiny_rig(), {});

@@ -60,6 +60,15 @@ Matrix6d ArchiveReader::get_matrix6() {
   return m;
 }
 
+Status ArchiveReader::expect_version(std::uint32_t version, const std::string& what) {
+  const auto found = get<std::uint32_t>();
+  if (!ok_) return failure(ErrorCode::store_damaged, "the saved state is truncated", what);
+  if (found == version) return {};
+  return failure(ErrorCode::configuration,
+                 "has version " + std::to_string(found) + ", but this program reads version " + std::to_string(version),
+                 what, "run again into a new folder");
+}
+
 Status ArchiveReader::finish(const std::string& what) const {
   if (!ok_) return failure(ErrorCode::store_damaged, "the saved state is truncated", what);
   if (offset_ != bytes_.size())

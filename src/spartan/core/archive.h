@@ -82,6 +82,9 @@ class ArchiveReader {
     return values;
   }
 
+  /// Reads the version that a saved state begins with. Code `configuration` where it is another one, `store_damaged`
+  /// where the bytes end before it; `what` names the state.
+  Status expect_version(std::uint32_t version, const std::string& what);
   /// Checks that every value was present and no byte is left over; otherwise an error of code `store_damaged` at
   /// `what`.
   Status finish(const std::string& what) const;

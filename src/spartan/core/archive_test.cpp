@@ -54,6 +54,18 @@ TEST(Archive, RoundTripsEveryTypeOfValue) {
   EXPECT_TRUE(reader.finish("example"));
 }
 
+TEST(Archive, TellsAnotherVersionFromDamage) {
+  ArchiveWriter writer;
+  writer.put(std::uint32_t{7});
+  const Bytes bytes = writer.take(), cut(bytes.begin(), bytes.begin() + 3);
+  EXPECT_TRUE(ArchiveReader(bytes).expect_version(7, "state"));
+  const Status other = ArchiveReader(bytes).expect_version(8, "state");
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::configuration);
+  EXPECT_EQ(other.error().what, "has version 7, but this program reads version 8");
+  EXPECT_EQ(ArchiveReader(cut).expect_version(7, "state").error().code, ErrorCode::store_damaged);
+}
+
 TEST(Archive, DetectsEveryTruncation) {
   const Bytes whole = example();
   for (std::size_t size = 0; size < whole.size(); ++size) {

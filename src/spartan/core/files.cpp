@@ -32,6 +32,8 @@ tl::unexpected<Error> write_failure(const std::string& path, int error) {
   std::string hint = "check the permissions and the free disk space";
   if (error == ENOSPC) hint = "free disk space, or choose another folder with -o";
   if (error == EACCES || error == EROFS) hint = "choose a writable folder with -o";
+  if (error == ENOTDIR || error == EISDIR || error == EEXIST)
+    hint = "a file stands where a folder is needed, or a folder where a file is";
   if (error == EFBIG) hint = "raise the file size limit (ulimit -f)";
   return failure(ErrorCode::output, std::string("cannot be written: ") + std::strerror(error), path, hint);
 }

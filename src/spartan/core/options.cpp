@@ -44,10 +44,17 @@ std::string number(double value) {
 }
 
 std::string bounds_text(Bounds bounds) {
+  if (bounds.low == bounds.high) return fmt::format("{}", bounds.low);
   if (std::isfinite(bounds.low) && std::isfinite(bounds.high)) {
     return fmt::format("between {} and {}", bounds.low, bounds.high);
   }
   return std::isfinite(bounds.low) ? fmt::format("at least {}", bounds.low) : fmt::format("at most {}", bounds.high);
+}
+
+// The meaning of a numeric option, followed by its range if it has one.
+std::string with_range(std::string_view meaning, Bounds bounds) {
+  if (!std::isfinite(bounds.low) && !std::isfinite(bounds.high)) return std::string(meaning);
+  return fmt::format("{} ({})", meaning, bounds_text(bounds));
 }
 
 // "a.b.c" → a, b, c
@@ -213,11 +220,11 @@ Status Validator::finish(std::string_view name) const {
 void Lister::field(std::string_view key, const bool& value, std::string_view meaning) {
   lines.push_back({prefix_ + std::string(key), value ? "true" : "false", std::string(meaning)});
 }
-void Lister::field(std::string_view key, const int& value, std::string_view meaning, Bounds) {
-  lines.push_back({prefix_ + std::string(key), std::to_string(value), std::string(meaning)});
+void Lister::field(std::string_view key, const int& value, std::string_view meaning, Bounds bounds) {
+  lines.push_back({prefix_ + std::string(key), std::to_string(value), with_range(meaning, bounds)});
 }
-void Lister::field(std::string_view key, const double& value, std::string_view meaning, Bounds) {
-  lines.push_back({prefix_ + std::string(key), number(value), std::string(meaning)});
+void Lister::field(std::string_view key, const double& value, std::string_view meaning, Bounds bounds) {
+  lines.push_back({prefix_ + std::string(key), number(value), with_range(meaning, bounds)});
 }
 void Lister::field(std::string_view key, const std::string& value, std::string_view meaning,
                    const std::vector<std::string>& choices) {
@@ -225,8 +232,10 @@ void Lister::field(std::string_view key, const std::string& value, std::string_v
   if (!choices.empty()) text += fmt::format(" ({})", fmt::join(choices, " | "));
   lines.push_back({prefix_ + std::string(key), yaml_quoted(value), text});
 }
-void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds, Length) {
-  lines.push_back({prefix_ + std::string(key), fmt::format("[{}]", fmt::join(value, ", ")), std::string(meaning)});
+void Lister::field(std::string_view key, const std::vector<double>& value, std::string_view meaning, Bounds bounds,
+                   Length) {
+  lines.push_back(
+      {prefix_ + std::string(key), fmt::format("[{}]", fmt::join(value, ", ")), with_range(meaning, bounds)});
 }
 
 std::string Lister::in_flow_style(const std::vector<OptionLine>& lines) {

@@ -14,7 +14,8 @@
 // field where `enum_names(Enum)` lists the names of its values (see EnumName). `v.renamed("old", "new")` before a field
 // or a group accepts the key's former name, with a warning; `v.former("key", field, 0.3, "place")` accepts a key whose
 // value is now stated elsewhere, with a warning that names the place. `v.check("key", good, "is …")` after the fields
-// rejects combinations of values. A key carries its unit (docs/conventions.md).
+// rejects combinations of values. A former key that is set to `0.3`, its default, counts as not given. A key carries
+// its unit (docs/conventions.md).
 #pragma once
 
 #include <array>

@@ -183,6 +183,7 @@ TEST(Options, ListsEveryOptionInOrder) {
   EXPECT_EQ(lines[1].meaning, "Matching method. (sgm | block)");
   EXPECT_EQ(lines[5].key, "matcher.speckle.size_px");
   EXPECT_EQ(lines[5].value, "100");
+  EXPECT_TRUE(lines[5].meaning.ends_with(" (at least 0)")) << lines[5].meaning;
   EXPECT_EQ(lines[7].key, "threads");
 }
 

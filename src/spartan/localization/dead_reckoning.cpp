@@ -71,12 +71,12 @@ Bytes DeadReckoning::save() const {
 
 Status DeadReckoning::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
-  const auto version = in.get<std::uint32_t>();
-  const auto values = in.get_array<double>();
   const std::string what = "saved state of the dead reckoning";
+  if (Status s = in.expect_version(kVersion, what); !s) return s;
+  const auto values = in.get_array<double>();
   if (Status s = in.finish(what); !s) return s;
-  if (version != kVersion || values.size() != static_cast<std::size_t>(covariance_.size()))
-    return failure(ErrorCode::store_damaged, "is of another version or damaged", what, "run again into a new folder");
+  if (values.size() != static_cast<std::size_t>(covariance_.size()))
+    return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
   covariance_ = Eigen::Map<const Covariance>(values.data());
   return {};
 }

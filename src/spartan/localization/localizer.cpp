@@ -136,10 +136,7 @@ Bytes Localizer::save() const {
 Status Localizer::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
   const std::string what = "saved state of the localization";
-  if (in.get<std::uint32_t>() != kStateVersion) {
-    return failure(ErrorCode::configuration, "was saved by another version of the program", what,
-                   "run again into a new folder");
-  }
+  if (Status s = in.expect_version(kStateVersion, what); !s) return s;
   auto state = std::make_unique<State>(state_->options);
   for (RefusalCounts& r : state->refusals) {
     r.not_finite = in.get<std::int64_t>();
@@ -150,7 +147,7 @@ Status Localizer::restore(const Bytes& bytes) {
   }
   const bool sensible = state->filter.get(in);
   if (Status status = in.finish(what); !status) return status;
-  if (!sensible) return failure(ErrorCode::configuration, "is damaged", what, "run again into a new folder");
+  if (!sensible) return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
   state_ = std::move(state);
   return {};
 }

@@ -220,7 +220,7 @@ class Localizer {
   LocalizationEstimate estimate() const;
 
   /// The memory as a versioned value; after restore() all further estimates are the same, bit for bit. Code
-  /// `configuration` if the bytes are of another version or damaged.
+  /// `configuration` where the bytes are of another version, `store_damaged` where they are damaged.
   Bytes save() const;
   Status restore(const Bytes& bytes);
 
@@ -273,7 +273,7 @@ class DeadReckoning {
   /// Of the right perturbation of the pose since the start, which is exact; order (translation, rotation).
   Matrix6d covariance() const { return covariance_.topLeftCorner<6, 6>(); }
 
-  /// The memory as a versioned value. Code `store_damaged` where it is not one.
+  /// The memory as a versioned value. Codes as Localizer::restore.
   Bytes save() const;
   Status restore(const Bytes& bytes);
 

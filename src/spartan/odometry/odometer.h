@@ -89,9 +89,10 @@ struct LandmarkReconstructionOptions {
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("source", source,
-            "Source of the landmarks' disparities: `row` searches along the image row of each landmark, `dense` reads "
-            "the dense disparity image where one is given.");
+    v.field(
+        "source", source,
+        "Source of the landmarks' disparities: `row` searches along the image row of each landmark, `dense` computes "
+        "the dense disparity image of every frame and reads it there, which takes more time.");
     v.renamed("max_disparity_share", "max_disparity_fraction");
     v.field("max_disparity_fraction", max_disparity_fraction,
             "Largest disparity of the row search as a fraction of the image width; raising it finds nearer landmarks "
@@ -316,7 +317,8 @@ class Odometer {
                      ImageView<const float> disparity = {});
 
   /// The state as a versioned value; after restore() the following estimates are the same, bit for bit. restore() fails
-  /// with code `input` where the bytes are damaged or of another version, and then changes nothing.
+  /// with code `configuration` where the bytes are of another version, `store_damaged` where they are damaged, and then
+  /// changes nothing.
   Bytes save() const;
   Status restore(const Bytes& state);
 

@@ -126,6 +126,8 @@ struct MapOptions {
     v.field("cell_m", cell_m,
             "Side of a map cell in metres; raising it averages more points per cell and loses small obstacles.",
             between(0.005, 10));
+    v.check("cell_m", extent_m <= 10000 * cell_m,
+            "is less than 1/10000 of extent_m; the map would have too many cells");
     v.field("obstacle_m", obstacle_m,
             "Minimum height of an obstacle above the ground surface in metres; raising it reports fewer, higher "
             "obstacles.",

@@ -74,7 +74,7 @@ struct VDisparityOptions {
             "Number of vertical strips of the image, each with its own ground profile (1: one profile for the whole "
             "image); raising it follows ground that is higher on one side, with fewer pixels per profile.",
             between(1, 32));
-    v.former("obstacle_m", obstacle_m, VDisparityOptions().obstacle_m, "mapping.map.obstacle_m", between(0.005, 5));
+    v.former("obstacle_m", obstacle_m, VDisparityOptions().obstacle_m, "mapping.map.obstacle_m", between(0.004, 5));
     v.field("cavity_m", cavity_m,
             "Minimum depth of a cavity (negative obstacle) pixel below the ground profile in metres; raising it marks "
             "fewer pixels as cavities.",

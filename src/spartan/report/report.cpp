@@ -54,6 +54,7 @@ Result<std::string> drive_images(FrameSource& source, Imager& imager) {
       const auto frame = source.frame_at(pair.name, stamp);
       if (!frame) continue;
       const auto view = imager.process(*frame);
+      if (!view && view.error().code == ErrorCode::frame_rejected) continue;  // the run has skipped it as well
       if (!view) return failure(view);
       html += html_image(
           shrunk(view->left, 360),

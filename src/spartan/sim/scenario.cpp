@@ -33,39 +33,21 @@ class KeyErrors {
   std::string lines_;
 };
 
-template <class Faults>
-void check_spans(const Faults& faults, const std::string& key, KeyErrors& errors) {
-  for (std::size_t i = 0; i < faults.size(); ++i) {
-    if (!(faults[i].to_s > faults[i].from_s)) {
-      errors.add(key, fmt::format("item {}: to_s ({}) must be greater than from_s ({})", i + 1, faults[i].to_s,
-                                  faults[i].from_s));
-    }
-  }
-}
-
 }  // namespace
 
-Result<Scenario> parse_scenario(const std::string& text, const std::string& name) {
-  auto scenario = parse_options<Scenario>(text, name);
+Result<OptionsRead<Scenario>> read_scenario(const std::string& text, const std::string& name) {
+  auto scenario = read_options<Scenario>(text, name);
   if (!scenario) {
     scenario.error().hint =
         "docs/reference/scenario.md has an example; truth/scenario.yaml of a simulated recording lists every key";
-    return scenario;
   }
-  KeyErrors errors(text, name);
-  constexpr std::array<int, 5> kGrids{1, 2, 4, 9, 16};
-  if (std::find(kGrids.begin(), kGrids.end(), scenario->samples) == kGrids.end())
-    errors.add("samples", fmt::format("is {}, must be 1, 2, 4, 9 or 16", scenario->samples));
-  if (scenario->light.sun_lux <= 0 && scenario->light.sky_lux <= 0)
-    errors.add("light", "sun_lux and sky_lux are both 0; at least one must be positive");
-  if (!(scenario->rocks.largest_m > scenario->rocks.smallest_m)) {
-    errors.add("rocks", fmt::format("largest_m ({}) must be greater than smallest_m ({})", scenario->rocks.largest_m,
-                                    scenario->rocks.smallest_m));
-  }
-  check_spans(scenario->sensor_faults, "sensor_faults", errors);
-  check_spans(scenario->camera_faults, "camera_faults", errors);
-  if (Status s = errors.status(); !s) return failure(s);
   return scenario;
+}
+
+Result<Scenario> parse_scenario(const std::string& text, const std::string& name) {
+  auto read = read_scenario(text, name);
+  if (!read) return failure(read);
+  return std::move(read->options);
 }
 
 Result<Drive> plan_drive(const Scenario& scenario, const Rig& rig, const std::string& text, const std::string& name) {

@@ -133,6 +133,8 @@ struct Scenario {
     v.field("samples", samples,
             "Rays per pixel: 1, 2, 4, 9 or 16; more rays give less aliasing and take proportionally longer.",
             between(1, 16));
+    v.check("samples", samples == 1 || samples == 2 || samples == 4 || samples == 9 || samples == 16,
+            "must be 1, 2, 4, 9 or 16");
     v.field("rig", rig, "Name of a shipped rig, or of a file beside the scenario.");
     v.field("gravity_m_s2", gravity_m_s2, "Gravity in metres per second squared (Mars: 3.71).", between(0.1, 30));
     v.field("extent_m", extent_m, "Side in metres of the square of terrain around the start.", between(20, 20000));
@@ -157,8 +159,11 @@ struct Scenario {
   }
 };
 
-/// Reads a scenario. Reports all faults of keys at once, then inconsistent values: a number of samples that is no
-/// grid, faults that end before they begin, no light at all. Errors: `configuration`, each with its line.
+/// Reads a scenario; the warnings name former keys. All errors are reported at once, each with its line, inconsistent
+/// values included: a number of samples that is no grid, faults that end before they begin, no light at all. Code
+/// `configuration`.
+Result<OptionsRead<Scenario>> read_scenario(const std::string& text, const std::string& name);
+/// The scenario alone.
 Result<Scenario> parse_scenario(const std::string& text, const std::string& name);
 /// Plans the drive and checks what depends on the rig: pairs named by faults, stops beyond the path, a path that leaves
 /// the terrain. Errors: `configuration`, with the line in `text`.

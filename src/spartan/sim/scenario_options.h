@@ -92,6 +92,7 @@ struct RockFieldOptions {
             between(0, 0.3));
     v.field("smallest_m", smallest_m, "Diameter of the smallest rocks of the model in metres.", between(0.003, 1));
     v.field("largest_m", largest_m, "Diameter of the largest rocks in metres.", between(0.01, 5));
+    v.check("largest_m", largest_m > smallest_m, "must be greater than smallest_m");
     v.field("pebbles_per_m2", pebbles_per_m2,
             "Number of pebbles of 4 to 10 mm diameter on a square metre, in addition to the rocks of the model.",
             between(0, 5000));
@@ -146,6 +147,7 @@ struct LightOptions {
     v.field("sun_diameter_deg", sun_diameter_deg,
             "Angular diameter of the sun in degrees; raising it gives softer shadows.", between(0, 5));
     v.field("sky_lux", sky_lux, "Illuminance by the whole sky in lux, on a horizontal plane.", between(0, 100000));
+    v.check("sky_lux", sun_lux > 0 || sky_lux > 0, "is 0, and so is sun_lux; at least one must be positive");
   }
 };
 

@@ -63,7 +63,20 @@ TEST(Scenario, AcceptsFormerKeys) {
   ASSERT_TRUE(again) << again.error().message();
   EXPECT_EQ(dump_options(*again), dump_options(*scenario));
   EXPECT_NE(dump_options(*scenario), dump_options(Scenario()));
-  EXPECT_EQ(read_options<Scenario>(former, "former")->warnings.size(), 8U);
+  EXPECT_EQ(read_scenario(former, "former")->warnings.size(), 8U);
+}
+
+TEST(Scenario, ValidatesValuesThatWereSetInCode) {
+  Scenario scenario;
+  EXPECT_TRUE(validate(scenario, "scenario"));
+  scenario.samples = 3;
+  scenario.rocks.largest_m = scenario.rocks.smallest_m;
+  scenario.light.sun_lux = scenario.light.sky_lux = 0;
+  scenario.camera_faults = {{CameraFaultKind::dropped, "", 3, 2}};
+  const Status status = validate(scenario, "scenario");
+  ASSERT_FALSE(status);
+  for (const char* key : {"samples must be", "rocks.largest_m", "light.sky_lux", "camera_faults[0].to_s"})
+    EXPECT_NE(status.error().message().find(key), std::string::npos) << key << "\n" << status.error().message();
 }
 
 TEST(Scenario, ShippedScenariosCanBePlanned) {

@@ -111,6 +111,7 @@ struct CameraFault {
     v.field("pair", pair, "Name of the pair that fails; empty for all pairs.");
     v.field("from_s", from_s, "Start of the fault in seconds since the start of the recording.", at_least(0));
     v.field("to_s", to_s, "End of the fault in seconds since the start of the recording.", at_least(0));
+    v.check("to_s", to_s > from_s, "must be greater than from_s");
     v.field("amount", amount,
             "Size of the fault: for overexposed and brightness_step the factor on the light that auto exposure does "
             "not see; for stamp_jitter the standard deviation of the time stamps in seconds.",
@@ -138,17 +139,17 @@ struct ImuOptions {
     v.field("enabled", enabled, "Whether the rover has an IMU.");
     v.field("rate_hz", rate_hz, "Samples per second.", between(1, 2000));
     v.field("gyro_noise_rad_s_sqrt_hz", gyro_noise_rad_s_sqrt_hz,
-            "Density of the gyroscopes' white noise in rad/s/sqrt(Hz).", at_least(0));
+            "Density of the gyroscopes' white noise in rad/s/sqrt(Hz).", between(0, 1));
     v.field("gyro_bias_rad_s", gyro_bias_rad_s, "Standard deviation of the gyroscopes' bias at the start in rad/s.",
-            at_least(0));
+            between(0, 1));
     v.field("gyro_walk_rad_s2_sqrt_hz", gyro_walk_rad_s2_sqrt_hz,
-            "Density of the random walk of the gyroscopes' bias in rad/s^2/sqrt(Hz).", at_least(0));
+            "Density of the random walk of the gyroscopes' bias in rad/s^2/sqrt(Hz).", between(0, 1));
     v.field("accel_noise_m_s2_sqrt_hz", accel_noise_m_s2_sqrt_hz,
-            "Density of the accelerometers' white noise in m/s^2/sqrt(Hz).", at_least(0));
+            "Density of the accelerometers' white noise in m/s^2/sqrt(Hz).", between(0, 10));
     v.field("accel_bias_m_s2", accel_bias_m_s2, "Standard deviation of the accelerometers' bias at the start in m/s^2.",
-            at_least(0));
+            between(0, 10));
     v.field("accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz,
-            "Density of the random walk of the accelerometers' bias in m/s^3/sqrt(Hz).", at_least(0));
+            "Density of the random walk of the accelerometers' bias in m/s^3/sqrt(Hz).", between(0, 10));
   }
 };
 
@@ -246,6 +247,7 @@ struct SensorFault {
     v.field("kind", kind, "Kind of fault: drop sends no samples, freeze repeats the last one.");
     v.field("from_s", from_s, "Start of the fault in seconds since the start of the recording.", at_least(0));
     v.field("to_s", to_s, "End of the fault in seconds since the start of the recording.", at_least(0));
+    v.check("to_s", to_s > from_s, "must be greater than from_s");
   }
 };
 using SensorFaults = std::vector<SensorFault>;

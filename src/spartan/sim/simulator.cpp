@@ -353,6 +353,7 @@ FramePreview internal::preview_left(const SimulationRequest& request, std::size_
 
 Result<SimulationReport> simulate(const SimulationRequest& request, const SimulationHooks& hooks,
                                   const ThreadPool& workers) {
+  if (Status valid = validate(request.scenario, "scenario"); !valid) return failure(valid);
   return Simulation(request, hooks, workers).run();
 }
 

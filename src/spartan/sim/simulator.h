@@ -51,7 +51,8 @@ struct SimulationReport {
 };
 
 /// Renders frame by frame; with `resume`, frames that are complete already are kept. Errors: `output` (the folder
-/// cannot be written, or holds something else), `configuration` (the folder holds another scenario).
+/// cannot be written, or holds something else), `configuration` (the scenario is out of bounds, or the folder holds
+/// another one).
 Result<SimulationReport> simulate(const SimulationRequest& request, const SimulationHooks& hooks,
                                   const ThreadPool& workers);
 

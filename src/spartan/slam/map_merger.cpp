@@ -131,18 +131,15 @@ Bytes MapMerger::save() const {
 
 Status MapMerger::restore(const Bytes& bytes, TileStore& store) {
   ArchiveReader in(bytes);
-  if (const auto version = in.get<std::uint32_t>(); version != kMergerVersion) {
-    return failure(ErrorCode::input,
-                   "has version " + std::to_string(version) + ", expected " + std::to_string(kMergerVersion),
-                   "saved state of the map merging", "run again into a new folder");
-  }
+  const std::string what = "saved state of the map merging";
+  if (Status s = in.expect_version(kMergerVersion, what); !s) return s;
   const auto submaps = in.get<std::uint64_t>(), stops = in.get<std::uint64_t>(), tiles = in.get<std::uint64_t>();
-  if (Status s = in.finish("saved state of the map merging"); !s) return s;
+  if (Status s = in.finish(what); !s) return s;
   auto map = GlobalMap::from_store(options_.map, map_options_.cell_m, store);
   if (!map) return failure(map);
   if (map->submaps().size() != submaps || map->stops().size() != stops || map->tiles() != tiles) {
-    return failure(ErrorCode::store_damaged, "does not fit the map tables of the store",
-                   "saved state of the map merging", "run again into a new folder");
+    return failure(ErrorCode::store_damaged, "does not fit the map tables of the store", what,
+                   "run again into a new folder");
   }
   map_ = std::move(*map);
   return {};

@@ -46,7 +46,7 @@ struct MapMatch {
 };
 
 /// Matches the points of a stop to the global map. `local` is the local map of the points at the prior pose
-/// `world_from_body`; a cell needs `fewest_points` points. Method: docs/math/map_merging.md.
+/// `world_from_body`; a cell needs `min_points` points. Method: docs/math/map_merging.md.
 MapMatch match_map(std::span<const SurfacePoint> points, const LocalMap& local, const MapView& global,
                    const UncertainPose& world_from_body, int min_points, const MatchOptions& options,
                    const ThreadPool& workers);
@@ -85,7 +85,7 @@ class MapMerger {
   /// The state that belongs to the flushed tables, versioned.
   Bytes save() const;
   /// Restores the state of `save()` with the tables of that moment. Codes: `store_damaged` where the bytes
-  /// are damaged or do not fit the tables, `input` where they are of another version.
+  /// are damaged or do not fit the tables, `configuration` where they are of another version.
   Status restore(const Bytes& bytes, TileStore& store);
 
  private:

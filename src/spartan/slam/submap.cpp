@@ -60,12 +60,7 @@ Bytes to_bytes(const Tile& tile) {
 
 Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
   ArchiveReader in(bytes);
-  const auto version = in.get<std::uint32_t>();
-  if (version != kSubmapVersion) {
-    return failure(ErrorCode::input,
-                   "has version " + std::to_string(version) + ", expected " + std::to_string(kSubmapVersion), what,
-                   "run again into a new folder to rebuild the map");
-  }
+  if (Status s = in.expect_version(kSubmapVersion, what); !s) return failure(s);
   Tile tile;
   const auto seen = in.get<std::uint32_t>();
   if (seen > tile.cells.size())

@@ -24,8 +24,10 @@ Error error_of(sqlite3* db, const std::string& path) {
     case SQLITE_LOCKED:
       return {ErrorCode::output, "is in use by another process", path, "wait until the other process has finished"};
     case SQLITE_NOTADB:
+      return {ErrorCode::store_damaged, "is damaged or not a database: " + what, path,
+              "give a saved map (.map) or a run folder; a damaged one must be made again"};
     case SQLITE_CORRUPT:
-      return {ErrorCode::store_damaged, "is damaged or not a database: " + what, path, "run again into a new folder"};
+      return {ErrorCode::store_damaged, "is damaged: " + what, path, "run again into a new folder"};
     default:
       return {ErrorCode::internal, what, path, ""};
   }

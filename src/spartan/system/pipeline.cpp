@@ -393,10 +393,8 @@ Bytes Pipeline::save() const {
 
 Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   ArchiveReader in(state);
-  if (in.get<std::uint32_t>() != kStateVersion) {
-    return failure(ErrorCode::configuration, "the saved state was written by another version of the program",
-                   "run.sqlite", "run again into a new folder");
-  }
+  const std::string what = "run.sqlite: saved state of the pipeline";
+  if (Status status = in.expect_version(kStateVersion, what); !status) return status;
   State& s = *state_;
   s.started = in.get<bool>();
   s.last_stamp.ns = in.get<std::int64_t>();
@@ -412,7 +410,7 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   s.stop_stage.restore(in);
   std::array<Bytes, 5> stages;
   for (Bytes& stage : stages) stage = in.get_array<std::uint8_t>();
-  if (Status status = in.finish("run.sqlite: state of the pipeline"); !status) return status;
+  if (Status status = in.finish(what); !status) return status;
   if (Status status = s.odometer.restore(stages[0]); !status) return status;
   if (Status status = s.localizer.restore(stages[1]); !status) return status;
   if (s.options.odometry_only) {

@@ -112,7 +112,8 @@ class Pipeline {
 
   /// State of all stages, versioned; without the map tiles that were flushed.
   Bytes save() const;
-  /// `maps`: the store as it was flushed with that state.
+  /// `maps`: the store as it was flushed with that state. Codes: `configuration` where the state is of another version,
+  /// `store_damaged`.
   Status restore(const Bytes& state, TileStore& maps);
 
  private:

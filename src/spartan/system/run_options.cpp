@@ -68,9 +68,12 @@ std::span<const std::string_view> basic_options() {
 }
 
 std::string dump_basic_options(const RunOptions& options) {
+  std::map<std::string, std::string> by_default;
+  for (const OptionLine& line : list_options(RunOptions())) by_default[line.key] = line.value;
   std::vector<OptionLine> lines = list_options(options);
-  std::erase_if(lines, [](const OptionLine& line) {
-    return std::find(kBasicOptions.begin(), kBasicOptions.end(), line.key) == kBasicOptions.end();
+  std::erase_if(lines, [&](const OptionLine& line) {
+    const bool is_basic = std::find(kBasicOptions.begin(), kBasicOptions.end(), line.key) != kBasicOptions.end();
+    return !is_basic && by_default[line.key] == line.value;
   });
   return options_detail::to_yaml(lines);
 }

@@ -98,7 +98,7 @@ std::string option_differences(const RunOptions& before, const RunOptions& now);
 /// Keys of the options that an operator needs, at most 30; the others are for experts.
 std::span<const std::string_view> basic_options();
 
-/// YAML of the basic options with their descriptions as comments.
+/// YAML of the basic options, and of the others that differ from their defaults, with descriptions as comments.
 std::string dump_basic_options(const RunOptions& options);
 
 }  // namespace spartan

@@ -89,7 +89,11 @@ Status expect_identity(Database& db, const std::string& key, const std::string& 
   if (*row && key == "options") {
     const auto before = parse_options<RunOptions>(select->text(0), db.path()),
                now = parse_options<RunOptions>(value, key);
-    if (before && now) what += ": " + option_differences(*before, *now);
+    if (before && now) {
+      const std::string differences = option_differences(*before, *now);
+      if (differences.empty()) return {};  // only descriptions differ
+      what += ": " + differences;
+    }
   }
   return failure(ErrorCode::configuration, "was written by a run with " + what, db.path(),
                  "resume with the same input, rig and options, or run into a new folder");

@@ -236,6 +236,9 @@ TEST(RunStore, RejectsResumingAnotherRun) {
     EXPECT_NE(resumed.error().message().find(path), std::string::npos);
   }
   EXPECT_TRUE(RunStore::resume(path, kIdentity));
+  RunIdentity commented = kIdentity;
+  commented.options = "# another description\n" + commented.options;
+  EXPECT_TRUE(RunStore::resume(path, commented)) << "the same values";
 }
 
 TEST(RunStore, DistinguishesARunFromAnEmptyFile) {

@@ -4,6 +4,7 @@ namespace spartan::internal {
 namespace {
 
 constexpr std::uint32_t kVersion = 1;
+constexpr const char* kWhat = "saved state of the odometry";
 
 void put(ArchiveWriter& out, const RectifiedStereo& stereo) {
   out.put(stereo.size.width);
@@ -63,7 +64,7 @@ bool get(ArchiveReader& in, Landmark& landmark) {
 }
 
 tl::unexpected<Error> damaged(const std::string& what) {
-  return failure(ErrorCode::store_damaged, what, "odometry state", "start a new run instead of resuming this one");
+  return failure(ErrorCode::store_damaged, what, kWhat, "run again into a new folder");
 }
 
 }  // namespace
@@ -91,9 +92,7 @@ Bytes OdometerMemory::save() const {
 
 Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
-  if (const auto version = in.get<std::uint32_t>(); version != kVersion) {
-    return damaged("has version " + std::to_string(version) + ", version " + std::to_string(kVersion) + " is required");
-  }
+  if (Status s = in.expect_version(kVersion, kWhat); !s) return failure(s);
   OdometerMemory memory;
   memory.started = in.get<bool>();
   memory.stamp.ns = in.get<std::int64_t>();

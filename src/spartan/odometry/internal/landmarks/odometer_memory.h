@@ -21,7 +21,7 @@ struct OdometerMemory {
   LandmarkMemory map;
 
   Bytes save() const;
-  /// Fails with code `store_damaged` where the bytes are of another version or damaged.
+  /// Codes: `configuration` where the bytes are of another version, `store_damaged` where they are damaged.
   static Result<OdometerMemory> restore(const Bytes& bytes);
 };
 

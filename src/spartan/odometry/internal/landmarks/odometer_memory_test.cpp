@@ -47,7 +47,8 @@ TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
   const Bytes whole = some_memory().save();
   Bytes other = whole;
   other[0] = 99;
-  EXPECT_FALSE(OdometerMemory::restore(other).has_value());
+  ASSERT_FALSE(OdometerMemory::restore(other).has_value());
+  EXPECT_EQ(OdometerMemory::restore(other).error().code, ErrorCode::configuration);
   for (std::size_t length = 0; length < whole.size(); length += 7) {
     const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length));
     const auto result = OdometerMemory::restore(cut);

@@ -1,0 +1,82 @@
+// The command line itself: unknown commands, former flags, shell completion, the manual page.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "program.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::run_program;
+
+constexpr const char* kCommands[] = {"demo",    "run",    "stereo", "map",      "evaluate",   "rig",
+                                     "config",  "export", "info",   "simulate", "completion", "man",
+                                     "convert", "design", "dump",   "check",    "inspect",    "merge"};
+
+TEST(CommandLine, NamesAWordThatIsNoCommand) {
+  const auto command = run_program({"fly"});
+  EXPECT_EQ(command.exit_code, 2);
+  EXPECT_THAT(command.err, HasSubstr("'fly' is not a spartan command; see `spartan --help`"));
+  const auto in_group = run_program({"map", "fold", "--json"});
+  EXPECT_EQ(in_group.exit_code, 2);
+  EXPECT_THAT(in_group.err, HasSubstr("'fold' is not a spartan map command; see `spartan map --help`"));
+}
+
+TEST(CommandLine, AcceptsFormerFlagsWithAWarning) {
+  const std::string drive = testing::small_runs_folder() + "/drive";
+  const testing::TemporaryFolder folder;
+  const auto result = run_program({"rig", "inspect", drive + "/calib.txt", "--recording", drive, "--shots", "2",
+                                   "--picture", folder.path() + "/rows.png"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("--shots is now called --frames"));
+  EXPECT_THAT(result.err, HasSubstr("--picture is now called --figure"));
+  EXPECT_EQ(run_program({"rig", "inspect", drive + "/calib.txt", "--recording", drive, "--shots", "0"}).exit_code, 2);
+}
+
+TEST(CommandLine, DisparityRangeThatCannotBeSearchedIsAWrongOption) {
+  const std::string drive = testing::small_runs_folder() + "/drive";
+  const testing::TemporaryFolder folder;
+  const auto stereo = [&](std::vector<std::string> range) {
+    std::vector<std::string> words{"stereo", drive + "/image_0/000000.png", drive + "/image_1/000000.png", "-o",
+                                   folder.path() + "/out"};
+    words.insert(words.end(), range.begin(), range.end());
+    return run_program(words);
+  };
+  const auto empty = stereo({"--min-disparity", "5", "--max-disparity", "2"});
+  EXPECT_EQ(empty.exit_code, 2);
+  EXPECT_THAT(empty.err, HasSubstr("--min-disparity, --max-disparity: the range from 5 to 2 px is empty"));
+  const auto wide = stereo({"--max-disparity", "320"});
+  EXPECT_EQ(wide.exit_code, 2);
+  EXPECT_THAT(wide.err, HasSubstr("exceeds the image, which is 320 px wide"));
+}
+
+TEST(CommandLine, CompletionKnowsEveryCommandAndIsValidBash) {
+  const testing::TemporaryFolder folder;
+  for (const char* shell : {"bash", "zsh", "fish"}) {
+    const auto script = run_program({"completion", shell});
+    ASSERT_EQ(script.exit_code, 0) << script.err;
+    for (const char* command : kCommands) EXPECT_THAT(script.out, HasSubstr(command)) << shell;
+    EXPECT_THAT(script.out, HasSubstr("max-disparity")) << shell;
+    if (shell != std::string("bash")) continue;
+    const std::string file = folder.write("spartan.bash", script.out);
+    EXPECT_EQ(std::system(fmt::format("bash -n '{}'", file).c_str()), 0);
+  }
+}
+
+TEST(CommandLine, ManualPageDescribesEveryCommandAndFlag) {
+  const auto page = run_program({"man"});
+  ASSERT_EQ(page.exit_code, 0) << page.err;
+  EXPECT_TRUE(page.out.starts_with(".TH"));
+  for (const char* command : kCommands) EXPECT_THAT(page.out, HasSubstr(command));
+  EXPECT_THAT(page.out, HasSubstr("\\-\\-max\\-disparity"));
+}
+
+}  // namespace
+}  // namespace spartan
