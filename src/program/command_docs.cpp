@@ -120,7 +120,7 @@ std::string roff_option(const CLI::Option& option) {
   const std::vector<std::string> flags = flags_of(option);
   std::string name = flags.empty() ? option.get_name(true) : fmt::format("{}", fmt::join(flags, ", "));
   if (!flags.empty() && option.get_items_expected_max() > 0) {
-    const std::string text = option.get_option_text();
+    const std::string& text = option.get_option_text();
     name += " " + (text.empty() ? option.get_type_name() : text.substr(0, text.find(' ')));
   }
   return fmt::format(".TP\n.B {}\n{}\n", roff(name), roff(option.get_description()));

@@ -1,4 +1,6 @@
 // The program `spartan`: reads the command line and runs the command that it names.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
@@ -41,9 +43,9 @@ std::string unknown_command(const CLI::App& app, int argc, char** argv) {
     const auto named = std::find_if(commands.begin(), commands.end(),
                                     [&](const CLI::App* command) { return command->check_name(argv[i]); });
     if (named == commands.end())
-      return std::string("error: '") + argv[i] + "' is not a " + path + " command; see `" + path + " --help`\n";
+      return fmt::format("error: '{0}' is not a {1} command; see `{1} --help`\n", argv[i], path);
     group = *named;
-    path += std::string(" ") + argv[i];
+    path += fmt::format(" {}", argv[i]);
   }
   return {};
 }
