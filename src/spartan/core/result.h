@@ -7,8 +7,8 @@
 
 namespace spartan {
 
-/// What kind of thing went wrong: what a caller can act on. The program's exit codes follow from it (docs/formats.md,
-/// "Exit codes").
+/// What kind of thing went wrong: what a caller can act on. The program's exit codes follow from it
+/// (docs/reference/command_line.md).
 enum class ErrorCode {
   internal,        ///< a fault of the program itself
   usage,           ///< the caller asked for something that does not exist
