@@ -26,7 +26,7 @@ spartan_package("tl-expected" LIBRARIES tl::expected)
 spartan_package("yaml-cpp" LIBRARIES yaml-cpp)
 spartan_package("nlohmann_json" LIBRARIES nlohmann_json::nlohmann_json)
 spartan_package("fmt" LIBRARIES fmt::fmt)
-spartan_package("spdlog" LIBRARIES spdlog::spdlog_header_only)
+spartan_package("spdlog" LIBRARIES spdlog::spdlog)
 spartan_package("SQLite3 3.40" LIBRARIES SQLite::SQLite3)
 
 # Optional; what needs them says so when they are absent.

@@ -37,6 +37,16 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
+// Decompositions of covariances and information matrices. They are compiled once: Eigen's templates take seconds each.
+/// Eigenvalues of a symmetric matrix in ascending order, and its eigenvectors as columns.
+struct SymmetricEigen {
+  Vector6d values;
+  Matrix6d vectors;
+};
+SymmetricEigen eigen_of_symmetric(const Matrix6d& matrix);
+/// The inverse by LU decomposition with partial pivoting; not finite for a singular matrix.
+Matrix6d inverse_of(const Matrix6d& matrix);
+
 /// A rigid transform with a unit quaternion and a translation in metres.
 class Pose {
  public:

@@ -14,6 +14,15 @@ PoseConstraint transported(const PoseConstraint& constraint, const UncertainPose
           forth * constraint.map_covariance * forth.transpose()};
 }
 
+SymmetricEigen eigen_of_symmetric(const Matrix6d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Matrix6d inverse_of(const Matrix6d& matrix) {
+  return matrix.inverse();
+}
+
 // (Λ⁻¹ + C)⁻¹ = (I + Λ C)⁻¹ Λ, which exists for a Λ of any rank.
 Matrix6d inflated(const Matrix6d& information, const Matrix6d& covariance) {
   const Matrix6d m = (Matrix6d::Identity() + information * covariance).partialPivLu().solve(information);
@@ -25,9 +34,9 @@ Matrix6d shared_fraction(const Matrix6d& pose, const Matrix6d& map) {
   const Matrix6d root = Eigen::LLT<Matrix6d>(pose + kLeastVariance * Matrix6d::Identity()).matrixL();
   const auto lower = root.triangularView<Eigen::Lower>();
   const Matrix6d half = lower.solve(map), whitened = lower.solve(half.transpose());
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(0.5 * (whitened + whitened.transpose()));
-  const Vector6d smaller = axes.eigenvalues().cwiseMax(0).cwiseMin(1);
-  const Matrix6d common = axes.eigenvectors() * smaller.asDiagonal() * axes.eigenvectors().transpose();
+  const SymmetricEigen axes = eigen_of_symmetric(0.5 * (whitened + whitened.transpose()));
+  const Vector6d smaller = axes.values.cwiseMax(0).cwiseMin(1);
+  const Matrix6d common = axes.vectors * smaller.asDiagonal() * axes.vectors.transpose();
   return lower.transpose().solve(common * root.transpose());
 }
 

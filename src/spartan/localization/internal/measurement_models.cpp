@@ -1,8 +1,5 @@
 #include "spartan/localization/internal/measurement_models.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -165,20 +162,20 @@ Innovation map_innovation(const StateEstimate& estimate, int pose, const PoseCon
   const Vector6d r = log_se3(pose_of(estimate.state, pose).inverse() * constraint.world_from_body);
   const Matrix6d jacobian = right_jacobian_se3(r);
   const Matrix6d turned = jacobian.transpose() * constraint.information * jacobian;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (turned + turned.transpose()));
-  const Vector6d values = eigen.eigenvalues() / covariance_factor;
+  const SymmetricEigen eigen = eigen_of_symmetric(0.5 * (turned + turned.transpose()));
+  const Vector6d values = eigen.values / covariance_factor;
   const double least = std::max(kMinInformation, kMinInformationRatio * values[5]);
   int first = 0;
   while (first < 6 && !(values[first] > least)) ++first;
   const int rows = 6 - first;
   Innovation i(rows);
   if (rows == 0) return i;
-  const auto directions = eigen.eigenvectors().rightCols(rows).transpose();
+  const auto directions = eigen.vectors.rightCols(rows).transpose();
   i.residual = directions * r;
   i.jacobian.middleCols<6>(pose) = directions;
   i.noise.diagonal() = values.tail(rows).cwiseInverse();
 
-  const Matrix6d inverse = jacobian.inverse();
+  const Matrix6d inverse = inverse_of(jacobian);
   const Matrix6d map = inverse * constraint.map_covariance * inverse.transpose();
   i.noise += directions * map * directions.transpose();
   const Matrix6d pose_covariance = estimate.covariance.block<6, 6>(pose, pose);

@@ -130,14 +130,14 @@ MatchCovariance estimate_match_covariance(std::span<const MatchedCell> cells, do
   const CommonScores common = common_scores(cells, cell_m, unit, result.normalized_residual, options);
   Matrix6d total = Matrix6d::Zero();
   for (const Block& block : blocks) total += block.curvature;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(total);
+  const SymmetricEigen axes = eigen_of_symmetric(total);
   std::vector<Eigen::Index> kept;
   for (Eigen::Index k = 0; k < 6; ++k) {
-    if (curvature_significance(blocks, axes.eigenvectors().col(k)) >= options.min_relief_sigmas) kept.push_back(k);
+    if (curvature_significance(blocks, axes.vectors.col(k)) >= options.min_relief_sigmas) kept.push_back(k);
   }
   // Directions of the smallest curvature are discarded until none of the others depends on a single block.
   for (; !kept.empty(); kept.erase(kept.begin())) {
-    const Eigen::MatrixXd basis = axes.eigenvectors()(Eigen::all, kept);
+    const Eigen::MatrixXd basis = axes.vectors(Eigen::all, kept);
     const auto covariance = jackknife(blocks, common.areas, total, basis);
     if (!covariance) continue;
     // Eigenvalues are in ascending order: the determined directions come first.
