@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "spartan/numerics/random.h"
 #include "spartan/testing/laws.h"
 #include "spartan/testing/numeric_jacobian.h"
@@ -84,6 +86,19 @@ TEST(Pose, CovariancePropagationAgreesWithSampling) {
   }
   EXPECT_LE((sampled_product - product.covariance).norm(), 0.03 * product.covariance.norm());
   EXPECT_LE((sampled_inverse - inverse.covariance).norm(), 0.03 * inverse.covariance.norm());
+}
+
+TEST(Matrix6, DecompositionsReproduceTheMatrix) {
+  Random random(3);
+  for (int round = 0; round < 20; ++round) {
+    Matrix6d m;
+    for (double& value : m.reshaped()) value = random.uniform(-1, 1);
+    EXPECT_LT((m * inverse_of(m) - Matrix6d::Identity()).norm(), 1e-9 * inverse_of(m).norm());
+    const Matrix6d symmetric = m + m.transpose();
+    const SymmetricEigen eigen = eigen_of_symmetric(symmetric);
+    EXPECT_LT((eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose() - symmetric).norm(), 1e-13);
+    EXPECT_TRUE(std::is_sorted(eigen.values.begin(), eigen.values.end()));
+  }
 }
 
 TEST(Pose, NearestRotationProjectsOntoSO3) {
