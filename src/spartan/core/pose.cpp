@@ -1,5 +1,6 @@
 #include "spartan/core/pose.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 
@@ -109,6 +110,15 @@ UncertainPose compose(const UncertainPose& a_from_b, const UncertainPose& b_from
 UncertainPose invert(const UncertainPose& a_from_b) {
   const Matrix6d ad = adjoint(a_from_b.pose);
   return {a_from_b.pose.inverse(), ad * a_from_b.covariance * ad.transpose()};
+}
+
+SymmetricEigen eigen_of_symmetric(const Matrix6d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Matrix6d inverse_of(const Matrix6d& matrix) {
+  return matrix.inverse();
 }
 
 }  // namespace spartan

@@ -1,5 +1,4 @@
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "spartan/core/trajectory.h"
@@ -12,15 +11,6 @@ PoseConstraint transported(const PoseConstraint& constraint, const UncertainPose
   return {stamp, constraint.world_from_body * motion.pose,
           inflated(back.transpose() * constraint.information * back, motion.covariance),
           forth * constraint.map_covariance * forth.transpose()};
-}
-
-SymmetricEigen eigen_of_symmetric(const Matrix6d& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
-  return {solver.eigenvalues(), solver.eigenvectors()};
-}
-
-Matrix6d inverse_of(const Matrix6d& matrix) {
-  return matrix.inverse();
 }
 
 // (Λ⁻¹ + C)⁻¹ = (I + Λ C)⁻¹ Λ, which exists for a Λ of any rank.
