@@ -17,6 +17,10 @@
 namespace spartan::internal {
 namespace {
 
+// Over the kept directions: at most six, which spares the large-matrix products of Eigen.
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
+
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kMinVariance = 1e-4;  // lower bound, in squares of the largest determined standard deviations
 
@@ -97,18 +101,18 @@ double curvature_significance(const std::vector<Block>& blocks, const Vector6d& 
 
 // Covariance in the directions of the basis: the change of the estimate, to first order, when each of the blocks is
 // left out (jackknife), and by the common errors of each area. None where a direction depends on a single block.
-std::optional<Eigen::MatrixXd> jackknife(const std::vector<Block>& blocks, const std::vector<Vector6d>& common,
-                                         const Matrix6d& total, const Eigen::MatrixXd& basis) {
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
+std::optional<SmallMatrix> jackknife(const std::vector<Block>& blocks, const std::vector<Vector6d>& common,
+                                         const Matrix6d& total, const SmallMatrix& basis) {
+  SmallMatrix covariance = SmallMatrix::Zero(basis.cols(), basis.cols());
   for (const Block& block : blocks) {
-    const Eigen::LLT<Eigen::MatrixXd> rest(basis.transpose() * (total - block.curvature) * basis);
+    const Eigen::LLT<SmallMatrix> rest(basis.transpose() * (total - block.curvature) * basis);
     if (rest.info() != Eigen::Success) return std::nullopt;
-    const Eigen::VectorXd change = rest.solve(basis.transpose() * block.score);
+    const SmallVector change = rest.solve(basis.transpose() * block.score);
     covariance += change * change.transpose();
   }
-  const Eigen::LLT<Eigen::MatrixXd> all(basis.transpose() * total * basis);
+  const Eigen::LLT<SmallMatrix> all(basis.transpose() * total * basis);
   for (const Vector6d& score : common) {
-    const Eigen::VectorXd change = all.solve(basis.transpose() * score);
+    const SmallVector change = all.solve(basis.transpose() * score);
     covariance += change * change.transpose();
   }
   return covariance;
@@ -137,17 +141,17 @@ MatchCovariance estimate_match_covariance(std::span<const MatchedCell> cells, do
   }
   // Directions of the smallest curvature are discarded until none of the others depends on a single block.
   for (; !kept.empty(); kept.erase(kept.begin())) {
-    const Eigen::MatrixXd basis = axes.vectors(Eigen::all, kept);
+    const SmallMatrix basis = axes.vectors(Eigen::all, kept);
     const auto covariance = jackknife(blocks, common.areas, total, basis);
     if (!covariance) continue;
     // Eigenvalues are in ascending order: the determined directions come first.
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spread(*covariance);
+    const Eigen::SelfAdjointEigenSolver<SmallMatrix> spread(*covariance);
     result.determined = static_cast<int>((spread.eigenvalues().array() <= 1).count());
-    const Eigen::MatrixXd determined = spread.eigenvectors().leftCols(result.determined);
-    Eigen::MatrixXd variance = spread.eigenvalues().head(result.determined).cwiseMax(kMinVariance).asDiagonal();
+    const SmallMatrix determined = spread.eigenvectors().leftCols(result.determined);
+    SmallMatrix variance = spread.eigenvalues().head(result.determined).cwiseMax(kMinVariance).asDiagonal();
     // The fronto-parallel bias of the relief moves the estimate by millimetres. It does not average out, so it is added
     // to the covariance, but it has no influence on which directions are determined.
-    const Eigen::VectorXd moved =
+    const SmallVector moved =
         determined.transpose() * (basis.transpose() * total * basis).llt().solve(basis.transpose() * common.relief);
     variance += moved * moved.transpose();
     result.information = basis * determined * variance.inverse() * determined.transpose() * basis.transpose();
