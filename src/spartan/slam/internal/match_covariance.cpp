@@ -102,7 +102,7 @@ double curvature_significance(const std::vector<Block>& blocks, const Vector6d& 
 // Covariance in the directions of the basis: the change of the estimate, to first order, when each of the blocks is
 // left out (jackknife), and by the common errors of each area. None where a direction depends on a single block.
 std::optional<SmallMatrix> jackknife(const std::vector<Block>& blocks, const std::vector<Vector6d>& common,
-                                         const Matrix6d& total, const SmallMatrix& basis) {
+                                     const Matrix6d& total, const SmallMatrix& basis) {
   SmallMatrix covariance = SmallMatrix::Zero(basis.cols(), basis.cols());
   for (const Block& block : blocks) {
     const Eigen::LLT<SmallMatrix> rest(basis.transpose() * (total - block.curvature) * basis);
