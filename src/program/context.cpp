@@ -1,10 +1,13 @@
 #include "program/context.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <functional>
+
+#include "spartan/core/stage_clock.h"
 
 namespace spartan::program {
 
@@ -17,10 +20,12 @@ ExitCode exit_code(ErrorCode code) {
     case ErrorCode::input:
     case ErrorCode::frame_rejected:
     case ErrorCode::store_damaged:
+    case ErrorCode::read_error:
       return kInput;
     case ErrorCode::configuration:
       return kConfiguration;
     case ErrorCode::output:
+    case ErrorCode::resources:
       return kOutput;
     case ErrorCode::interrupted:
       return kInterrupted;
@@ -51,6 +56,19 @@ void add_threads_option(CLI::App& command, Context& context) {
       ->check(CLI::Range(1, 1024));
 }
 
+void add_memory_option(CLI::App& command, Context& context) {
+  command
+      .add_option("--memory", context.memory_mb,
+                  "Memory in MB that images and disparities may need (default: 80 % of what is available). What needs "
+                  "more is refused before it begins, with exit code 5.")
+      ->check(positive_number());
+}
+
+std::int64_t memory_bound(const Context& context) {
+  if (context.memory_mb > 0) return static_cast<std::int64_t>(std::min(1e6 * context.memory_mb, 1e18));
+  return available_memory_bytes() / 5 * 4;
+}
+
 namespace {
 
 CLI::Validator number_check(const std::string& wanted, const std::function<bool(double)>& accepts) {
@@ -70,6 +88,10 @@ CLI::Validator positive_number() {
 
 CLI::Validator non_negative_number() {
   return number_check("number of at least 0", [](double value) { return value >= 0; });
+}
+
+CLI::Validator path_to_write() {
+  return CLI::Validator([](const std::string& text) { return text.empty() ? "the path is empty" : std::string(); }, "");
 }
 
 Status print(const std::string& text) {

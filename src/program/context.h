@@ -29,9 +29,10 @@ ExitCode exit_code(ErrorCode code);
 using CommandBody = std::function<Result<ExitCode>()>;
 
 struct Context {
-  Log log;            ///< ready when a CommandBody runs
-  int threads = 1;    ///< `--threads`; all cores without it
-  bool json = false;  ///< `--json`: only JSON goes to standard output
+  Log log;               ///< ready when a CommandBody runs
+  double memory_mb = 0;  ///< `--memory`; 0: 80 % of what is available
+  int threads = 1;       ///< `--threads`; all cores without it
+  bool json = false;     ///< `--json`: only JSON goes to standard output
   bool quiet = false, verbose = false;
   CommandBody chosen;                 ///< body of the selected command
   std::vector<std::string> warnings;  ///< printed before the body runs: former names of flags
@@ -59,6 +60,15 @@ CLI::Option* add_former_name(CLI::App& command, Context& context, const std::str
   };
   return command.add_option(former, value)->group("")->each(warn);
 }
+
+/// `--memory`, for commands that compute disparity images.
+void add_memory_option(CLI::App& command, Context& context);
+/// The bound that it sets, bytes; without it 80 % of the memory that is available.
+std::int64_t memory_bound(const Context& context);
+
+/// Check of an option that names a file or folder to write: an empty one (of an unset shell variable) would be the root
+/// folder.
+CLI::Validator path_to_write();
 
 /// Writes to standard output and flushes; code `output` where that fails (a full disk behind a pipe).
 Status print(const std::string& text);

@@ -142,7 +142,7 @@ class Pieces {
 // The text of a value nested `levels` deep. Line ends inside its strings are escaped.
 std::string dump_inside(const Json& json, std::size_t levels) {
   std::string text;
-  for (const char letter : json.dump(2)) {
+  for (const char letter : text_of(json)) {
     text += letter;
     if (letter == '\n') text.append(2 * levels, ' ');
   }
@@ -184,7 +184,7 @@ Status write_design_json(const RigDesign& design, bool whole_set,
   rest["reasons"] = ground.reasons();
   rest["warnings"] = warnings_json(design);
   // Its members go on where those above end: without its opening brace.
-  pieces.add("," + rest.dump(2).substr(1) + "\n");
+  pieces.add("," + text_of(rest).substr(1) + "\n");
   return pieces.finish();
 }
 

@@ -28,7 +28,7 @@ Result<ExitCode> evaluate(const Context& context, const Arguments& arguments) {
   const auto metrics = compare_trajectories(compared->estimate, compared->truth, options);
   if (!metrics) return failure(metrics);
   const Status printed =
-      print(context.json ? to_json(*metrics, *compared).dump(2) + "\n" : table_of(*metrics, *compared));
+      print(context.json ? text_of(to_json(*metrics, *compared)) + "\n" : table_of(*metrics, *compared));
   if (!printed) return failure(printed);
   return kDone;
 }

@@ -1,5 +1,8 @@
 #include "program/interrupt.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <csignal>
 
 namespace spartan::program {
@@ -22,6 +25,24 @@ void listen_for_interrupts() {
 
 bool interrupted() {
   return stop_requested != 0;
+}
+
+Status expect_not_interrupted() {
+  if (interrupted()) return failure(ErrorCode::interrupted, "interrupted by the user");
+  return {};
+}
+
+void ignore_write_signals() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+void reserve_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(stream, F_GETFD) != -1) continue;
+    // open() takes the lowest free number. The wrong direction makes each use fail with EBADF, as if it were closed.
+    static_cast<void>(::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY));
+  }
 }
 
 }  // namespace spartan::program

@@ -1,5 +1,7 @@
-// Ctrl-C stops a command after its current step.
+// Signals: Ctrl-C stops a command after its current step.
 #pragma once
+
+#include "spartan/core/result.h"
 
 namespace spartan::program {
 
@@ -8,5 +10,13 @@ void listen_for_interrupts();
 /// Whether the user interrupted the program. Long loops check it between steps and return an error of code
 /// `interrupted`.
 bool interrupted();
+/// The same as an error, for steps that follow each other.
+Status expect_not_interrupted();
+
+/// Ignores SIGPIPE and SIGXFSZ: a closed pipe and the limit of the file size (ulimit -f) are errors of the write.
+void ignore_write_signals();
+/// Opens the standard streams that are closed, so that no file that the program opens takes their place. Reading from
+/// and writing to them fails.
+void reserve_standard_streams();
 
 }  // namespace spartan::program

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 
 namespace spartan::program {
 
@@ -16,6 +17,11 @@ inline Json number(double value) {
 }
 inline Json number(const std::optional<double>& value) {
   return value ? number(*value) : Json(nullptr);
+}
+
+/// The text of an object, indented by two blanks. Paths need not be UTF-8: other bytes are replaced by U+FFFD.
+inline std::string text_of(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace spartan::program

@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <new>
+#include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <thread>
 
 #include "program/commands.h"
 #include "program/context.h"
 #include "program/interrupt.h"
+#include "spartan/core/stage_clock.h"
 
 namespace spartan::program {
 namespace {
@@ -76,21 +79,38 @@ int run(int argc, char** argv) {
     return kUsage;
   }
   for (const std::string& warning : context.warnings) context.log.warning(warning);
-  const Result<ExitCode> result = context.chosen();
+  Result<ExitCode> result = context.chosen();
+  // Commands of one short step ask here only.
+  if (result && *result != kInterrupted) {
+    if (Status status = expect_not_interrupted(); !status) result = failure(status);
+  }
   if (result) return *result;
   context.log.error(result.error().message());
   return exit_code(result.error().code);
+}
+
+// The exit code of an exception, which is a bug of Spartan unless memory ran out.
+int exit_code_of(const std::exception& e) {
+  const auto* opencv = dynamic_cast<const cv::Exception*>(&e);
+  const bool opencv_memory = opencv != nullptr && opencv->code == cv::Error::StsNoMem;
+  if (const auto* memory = dynamic_cast<const std::bad_alloc*>(&e); memory != nullptr || opencv_memory) {
+    const Error error = out_of_memory(memory != nullptr ? *memory : std::bad_alloc());
+    std::cerr << "error: " << error.message() << '\n';
+    return exit_code(error.code);
+  }
+  std::cerr << "error: internal error: " << e.what() << " (this is a bug of Spartan: please report the command line)\n";
+  return kInternalFault;
 }
 
 }  // namespace
 }  // namespace spartan::program
 
 int main(int argc, char** argv) {
+  spartan::program::reserve_standard_streams();
+  spartan::program::ignore_write_signals();
   try {
     return spartan::program::run(argc, argv);
   } catch (const std::exception& e) {
-    std::cerr << "error: internal error: " << e.what()
-              << " (this is a bug of Spartan: please report the command line)\n";
-    return spartan::program::kInternalFault;
+    return spartan::program::exit_code_of(e);
   }
 }

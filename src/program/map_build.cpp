@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "program/interrupt.h"
 #include "program/json.h"
 #include "program/map.h"
 #include "program/run_arguments.h"
@@ -19,6 +20,7 @@
 #include "spartan/image_io/image_io.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/localization/localizer.h"
+#include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/stop_mapper.h"
 #include "spartan/system/map_files.h"
 
@@ -260,11 +262,17 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   const ThreadPool workers(context.threads);
   auto imager = Imager::create(stop->rig, options->imaging, workers, stop->mask_folder);
   if (!imager) return failure(imager);
+  for (const StereoFrame& frame : stop->frames) {
+    const RectifiedStereo geometry = imager->geometry(frame.pair);
+    const DisparityRange range = disparity_range(geometry, stop->rig.find_pair(frame.pair)->nearest_m);
+    if (Status s = DisparityComputer::check_memory(geometry.size, range, memory_bound(context)); !s) return failure(s);
+  }
   auto created = StopMapper::create(options->reconstruction, options->mapping, workers);
   if (!created) return failure(created);
   StopMapper& mapper = *created;
   Eigen::Vector3d ahead_in_body = Eigen::Vector3d::UnitX();
   for (const StereoFrame& frame : stop->frames) {
+    if (Status s = expect_not_interrupted(); !s) return failure(s);
     const auto pair = imager->process(frame);
     if (!pair) return failure(pair);
     if (mapper.views().empty()) ahead_in_body = pair->body_from_left.rotation() * Eigen::Vector3d::UnitZ();
@@ -272,12 +280,14 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
     if (Status s = mapper.add(*pair, stop->rig.find_pair(frame.pair)->nearest_m, expected); !s) return failure(s);
   }
   const Eigen::Vector3d up = choose_up(*stop, mapper.views().front());
+  if (Status s = expect_not_interrupted(); !s) return failure(s);
   const MergedRange merged = mapper.merge();
   const LocalMap map = mapper.map(surface_points(merged), first_pose(up, ahead_in_body, 0));
+  if (Status s = expect_not_interrupted(); !s) return failure(s);
   if (Status s = make_folder(a.output); !s) return failure(s);
   if (Status s = write_stop_files(mapper.views(), merged, map, options->mapping, a.output); !s) return failure(s);
   const Json json = stop_to_json(mapper, map, *stop, up);
-  if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json, a.output)); !s) return failure(s);
+  if (Status s = print(context.json ? text_of(json) + "\n" : to_text(json, a.output)); !s) return failure(s);
   return kDone;
 }
 
@@ -290,7 +300,9 @@ void add_map_build(CLI::App& map, Context& context) {
                   "map build --recording drive --position 15 -o map", [&context, a] { return build(context, *a); });
   command->add_option("left", a->left, "Left image.");
   command->add_option("right", a->right, "Right image.");
-  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
+  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")
+      ->check(path_to_write())
+      ->required();
   command->add_option("--rig", a->rig, "Rig or calibration file of the two images, in any supported format.");
   command->add_option("--recording", a->recording, "Recording to take one stop from.");
   command->add_option("--position", a->position,
@@ -315,6 +327,7 @@ void add_map_build(CLI::App& map, Context& context) {
       ->add_option("--set", a->set, "Set one option, e.g. mapping.map.obstacle_m=0.03. Repeatable; overrides --config.")
       ->allow_extra_args(false);
   add_threads_option(*command, context);
+  add_memory_option(*command, context);
   add_json_flag(*command, context);
 }
 

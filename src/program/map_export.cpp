@@ -1,6 +1,8 @@
 // spartan map export: a global map in the formats of other programs.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -14,6 +16,8 @@
 namespace spartan::program {
 namespace {
 
+constexpr double kFarthestCell = 5e8;  // cells are counted in int
+
 struct MapExportArguments {
   std::string map, output;
   std::vector<double> window_m;  // west, south, east, north
@@ -24,6 +28,11 @@ Result<LatticeWindow> window_of(const MapExportArguments& a, const GlobalMap& ma
   const double west = a.window_m[0], south = a.window_m[1], east = a.window_m[2], north = a.window_m[3];
   if (!(east > west) || !(north > south)) {
     return failure(ErrorCode::usage, "is empty: east must exceed west, and north south", "--window",
+                   "give west,south,east,north in metres");
+  }
+  const double farthest_m = kFarthestCell * map.cell_m();
+  if (std::max({std::abs(west), std::abs(south), std::abs(east), std::abs(north)}) > farthest_m) {
+    return failure(ErrorCode::usage, fmt::format("exceeds {:.0f} m from the origin", farthest_m), "--window",
                    "give west,south,east,north in metres");
   }
   return window_between(west, south, east, north, map.cell_m());
@@ -78,6 +87,7 @@ void add_map_export(CLI::App& map, Context& context) {
       ->add_option("-o,--output", a->output,
                    "File to write; its extension selects the format: .tif (all layers), .png (an image), .ply (cell "
                    "centres), .map.")
+      ->check(path_to_write())
       ->required();
   command
       ->add_option("--window", a->window_m,

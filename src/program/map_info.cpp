@@ -74,7 +74,7 @@ Result<ExitCode> info(const Context& context, const std::string& path) {
   const auto statistics = map_statistics(saved->map());
   if (!statistics) return failure(statistics);
   const Json json = map_to_json(saved->map(), *statistics);
-  if (Status s = print(context.json ? json.dump(2) + "\n" : to_text(json)); !s) return failure(s);
+  if (Status s = print(context.json ? text_of(json) + "\n" : to_text(json)); !s) return failure(s);
   return kDone;
 }
 

@@ -93,7 +93,7 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
       "there (median; spread {:.1f} mm)\n",
       both.stops().size(), both.submaps().size(), both.tiles(), arguments.output, agreement->cells,
       1e3 * agreement->median_m, 1e3 * agreement->spread_m);
-  if (Status s = print(context.json ? json.dump(2) + "\n" : text); !s) return failure(s);
+  if (Status s = print(context.json ? text_of(json) + "\n" : text); !s) return failure(s);
   return kDone;
 }
 
@@ -107,7 +107,7 @@ void add_map_merge(CLI::App& map, Context& context) {
   command->add_option("a", a->a, "Saved map (.map) or run folder.")->required();
   command->add_option("b", a->b, "Second map, in the same world frame. The maps are not aligned by matching.")
       ->required();
-  command->add_option("-o,--output", a->output, "Map file to write.")->required();
+  command->add_option("-o,--output", a->output, "Map file to write.")->check(path_to_write())->required();
   add_json_flag(*command, context);
 }
 

@@ -6,12 +6,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string>
 
 namespace spartan::program {
 namespace {
 
 constexpr int kBarWidth = 30;
 constexpr std::chrono::milliseconds kRedrawEvery{100};
+
+// A full disk or a closed terminal does not end the work whose progress is shown. fmt::print() would throw.
+void write(const std::string& text) {
+  static_cast<void>(std::fputs(text.c_str(), stderr));
+}
 
 }  // namespace
 
@@ -40,15 +46,16 @@ void Progress::show(int done, int total, const std::string& note) {
     const int tenth = total > 0 ? 10 * done / total : done / 100;
     if (tenth == last_tenth_) return;
     last_tenth_ = tenth;
-    fmt::print(stderr, "{}/{} {}{}\n", done, total, note, time_left(done, total));
+    write(fmt::format("{}/{} {}{}\n", done, total, note, time_left(done, total)));
     return;
   }
   const auto now = std::chrono::steady_clock::now();
   if (done < total && now - last_shown_ < kRedrawEvery) return;
   last_shown_ = now;
   const int filled = total > 0 ? std::clamp(kBarWidth * done / total, 0, kBarWidth) : 0;
-  fmt::print(stderr, "\r[{}{}] {}/{} {}{}\033[K", std::string(static_cast<std::size_t>(filled), '#'),
-             std::string(static_cast<std::size_t>(kBarWidth - filled), '.'), done, total, note, time_left(done, total));
+  write(fmt::format("\r[{}{}] {}/{} {}{}\033[K", std::string(static_cast<std::size_t>(filled), '#'),
+                    std::string(static_cast<std::size_t>(kBarWidth - filled), '.'), done, total, note,
+                    time_left(done, total)));
   std::fflush(stderr);
   line_open_ = true;
 }

@@ -154,7 +154,7 @@ std::string conversion_to_json(const LoadedRig& read, CalibrationFormat format, 
   const Json all = {{"schema", 1},         {"format", name_of(format)},
                     {"files", paths},      {"body", read.body.empty() ? Json(nullptr) : Json(read.body)},
                     {"notes", read.notes}, {"lost", losses}};
-  return all.dump(2) + "\n";
+  return text_of(all) + "\n";
 }
 
 Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {

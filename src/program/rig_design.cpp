@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "program/design_report.h"
+#include "program/interrupt.h"
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/report/report.h"
@@ -37,6 +38,7 @@ Result<ExitCode> design_command(const Context& context, const DesignArguments& a
   const auto requirements = read_requirements(a.requirements);
   if (!requirements) return failure(requirements);
   const RigDesign design = design_rig(*requirements);
+  if (Status s = expect_not_interrupted(); !s) return failure(s);
   if (!a.output.empty()) {
     if (Status s = write_files(context, a.output, *requirements, design); !s) return failure(s);
   }
@@ -60,7 +62,8 @@ void add_rig_design(CLI::App& rig, Context& context) {
   command->add_option("requirements", a->requirements, "Requirements file (docs/reference/requirements.md).")
       ->required()
       ->option_text("REQ REQUIRED");
-  command->add_option("-o,--output", a->output, "Folder for ground.svg, ground.png and feasible.csv.");
+  command->add_option("-o,--output", a->output, "Folder for ground.svg, ground.png and feasible.csv.")
+      ->check(path_to_write());
   command->add_option("--rows", a->rows, "Number of feasible combinations to print (default 10).")
       ->check(CLI::Range(0, 2'000'000));
   command->add_flag("--all", a->all, "Print all feasible combinations, also with --json.");

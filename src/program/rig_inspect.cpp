@@ -272,7 +272,7 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
     if (!result) return failure(result);
     inspected = std::move(*result);
   }
-  const std::string text = context.json ? inspection_to_json(*read, inspected, a.rig == "-").dump(2) + "\n"
+  const std::string text = context.json ? text_of(inspection_to_json(*read, inspected, a.rig == "-")) + "\n"
                                         : inspection_to_text(a, *read, inspected);
   if (Status printed = print(text); !printed) return failure(printed);
   if (!a.figure.empty()) {

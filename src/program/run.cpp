@@ -56,7 +56,7 @@ Result<std::string> score_trajectory(const RunArguments& arguments, RunOutcome& 
   if (!metrics) return failure(metrics);
   Json summary = Json::parse(outcome.summary_json);
   summary["truth"] = to_json(*metrics, *compared);
-  outcome.summary_json = summary.dump(2) + "\n";
+  outcome.summary_json = text_of(summary) + "\n";
   if (Status s = write_file_atomically(RunFolder{arguments.output}.summary(), outcome.summary_json); !s)
     return failure(s);
   return table_of(*metrics, *compared);
@@ -96,6 +96,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.rig_file = arguments.rig;
   request.resume = arguments.resume;
   request.threads = context.threads;
+  request.memory_bytes = memory_bound(context);
   request.max_frames = arguments.max_frames;
   request.version = SPARTAN_VERSION;
 
@@ -140,6 +141,7 @@ void add_run(CLI::App& app, Context& context) {
                    "and printed.")
       ->required();
   command->add_option("-o,--output", a->output, "Run folder to create. An existing one is an error without --resume.")
+      ->check(path_to_write())
       ->required();
   command->add_option("--rig", a->rig,
                       "Calibration file to use instead of the recording's own, in any supported format.");
@@ -163,6 +165,7 @@ void add_run(CLI::App& app, Context& context) {
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM or terrain.");
   add_threads_option(*command, context);
+  add_memory_option(*command, context);
   add_json_flag(*command, context);
 }
 

@@ -104,7 +104,7 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
       {"schema", 1},        {"recording", arguments.output},   {"frames", report->frames}, {"rays", report->rays},
       {"seconds", seconds}, {"rays_per_second_per_core", rate}};
   SimulationOutcome outcome;
-  outcome.json = json.dump(2) + "\n";
+  outcome.json = text_of(json) + "\n";
   outcome.text = fmt::format("{} frames in {:.1f} s, {:.2f} million rays per second and core\nrecording in {}\n",
                              report->frames, seconds, rate / 1e6, arguments.output);
   outcome.interrupted = report->interrupted;

@@ -7,6 +7,7 @@
 
 #include "program/commands.h"
 #include "program/disparity_scores.h"
+#include "program/interrupt.h"
 #include "program/json.h"
 #include "program/run_arguments.h"
 #include "spartan/calibration_io/calibration_files.h"
@@ -59,6 +60,22 @@ Result<Pair> load_rectified(const StereoArguments& a) {
   pair.geometry = RectifiedStereo{camera.size, pinhole->fx, {pinhole->cx, pinhole->cy}, baseline};
   pair.nearest_m = stereo_pair.nearest_m;
   return pair;
+}
+
+// Before anything is decoded: a small file may hold a huge image. Decoding and rectifying a pixel takes up to four
+// copies of three samples of 16 bits.
+Status check_images_fit(const std::vector<std::string>& files, std::int64_t most_bytes) {
+  for (const std::string& file : files) {
+    const auto size = read_image_size(file);
+    const std::int64_t needed = size ? std::int64_t{24} * size->width * size->height : 0;
+    if (needed <= most_bytes) continue;
+    return failure(
+        ErrorCode::resources,
+        fmt::format("an image of {}x{} px needs {:.0f} MB of memory, more than the bound of {:.0f} MB", size->width,
+                    size->height, 1e-6 * static_cast<double>(needed), 1e-6 * static_cast<double>(most_bytes)),
+        file, "use smaller images, or raise --memory");
+  }
+  return {};
 }
 
 Result<Pair> load_and_rectify(const StereoArguments& a, const ImagingOptions& options, int threads) {
@@ -164,18 +181,23 @@ Result<std::optional<DisparityMetrics>> score_disparity(const StereoArguments& a
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   const auto options = run_options(context, a.config, a.set);
   if (!options) return failure(options);
+  if (Status s = check_images_fit({a.left, a.right}, memory_bound(context)); !s) return failure(s);
   auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!pair) return failure(pair);
   auto computer = DisparityComputer::create(options->reconstruction, ThreadPool(context.threads));
   if (!computer) return failure(computer);
   const auto range = search_range(a, *pair);
   if (!range) return failure(range);
+  if (Status s = DisparityComputer::check_memory(pair->left.size(), *range, memory_bound(context)); !s)
+    return failure(s);
+  if (Status s = expect_not_interrupted(); !s) return failure(s);
   const auto image = computer->compute(pair->left, pair->right, *range, pair->left_mask, pair->right_mask);
   if (!image) {
     Error error = image.error();
     if (error.where.empty()) error.where = a.left + ", " + a.right;
     return tl::unexpected<Error>(error);
   }
+  if (Status s = expect_not_interrupted(); !s) return failure(s);
   const auto metrics = score_disparity(a, image->disparity);
   if (!metrics) return failure(metrics);
   if (Status s = write_results(a, *pair, image->disparity, context.log); !s) return failure(s);
@@ -187,7 +209,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
             {"time_ms", times_of(image->times)},
             {"peak_bytes", image->buffer_bytes}};
   if (*metrics) json["scores"] = to_json(**metrics);
-  std::string text = json.dump(2) + "\n";
+  std::string text = text_of(json) + "\n";
   if (!context.json) {
     text = fmt::format("{} x {} px, density {:.1f} %, {:.1f} ms; results in {}\n", image->disparity.width(),
                        image->disparity.height(), known_percent(image->disparity), image->times.total, a.output);
@@ -206,7 +228,9 @@ void add_stereo(CLI::App& app, Context& context) {
                   "stereo left.png right.png -o out --calib calib.txt", [&context, a] { return stereo(context, *a); });
   command->add_option("left", a->left, "Left image.")->required();
   command->add_option("right", a->right, "Right image.")->required();
-  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
+  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")
+      ->check(path_to_write())
+      ->required();
   auto* rig = command->add_option("--rig", a->rig, "Calibration of unrectified images; they are rectified first.");
   command->add_option("--calib", a->calib, "Calibration of images that are already rectified (for the point cloud).")
       ->excludes(rig);
@@ -226,6 +250,7 @@ void add_stereo(CLI::App& app, Context& context) {
                    "Set one option, e.g. imaging.view.policy=all_valid. Repeatable; overrides --config.")
       ->allow_extra_args(false);
   add_threads_option(*command, context);
+  add_memory_option(*command, context);
   add_json_flag(*command, context);
 }
 

@@ -2,9 +2,9 @@
 #include <cstdint>
 
 #include "input_file.h"
-#include "spartan/camera/internal/layouts/image_header.h"
+#include "spartan/image_io/image_io.h"
 
-using namespace spartan::internal;
+using spartan::read_image_size;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const spartan::testing::InputFile input(data, size);

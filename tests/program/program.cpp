@@ -27,7 +27,6 @@ struct Pipe {
   ::dup2(out.ends[1], STDOUT_FILENO);
   ::dup2(err.ends[1], STDERR_FILENO);
   if (limits.largest_file_bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{*limits.largest_file_bytes, *limits.largest_file_bytes};
     ::setrlimit(RLIMIT_FSIZE, &limit);
   }
@@ -69,11 +68,15 @@ void listen(pid_t child, const ProgramLimits& limits, const Pipe& out, const Pip
 
 }  // namespace
 
-ProgramResult run_program(const std::vector<std::string>& arguments, const ProgramLimits& limits) {
+namespace {
+
+std::string program_path() {
   const char* const program = std::getenv("SPARTAN_PROGRAM");
   if (program == nullptr) throw std::runtime_error("SPARTAN_PROGRAM is not set; run through ctest");
-  std::vector<std::string> words{program};
-  words.insert(words.end(), arguments.begin(), arguments.end());
+  return program;
+}
+
+ProgramResult run_words(const std::vector<std::string>& words, const ProgramLimits& limits) {
   const Pipe out, err;
   const pid_t child = ::fork();
   if (child < 0) throw std::runtime_error("no process can be made");
@@ -91,10 +94,22 @@ ProgramResult run_program(const std::vector<std::string>& arguments, const Progr
   return result;
 }
 
+}  // namespace
+
+ProgramResult run_program(const std::vector<std::string>& arguments, const ProgramLimits& limits) {
+  std::vector<std::string> words{program_path()};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return run_words(words, limits);
+}
+
+ProgramResult run_in_shell(const std::string& script, const std::vector<std::string>& arguments) {
+  std::vector<std::string> words{"/bin/sh", "-c", script, program_path()};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return run_words(words, {});
+}
+
 std::string small_runs_folder() {
-  const char* const program = std::getenv("SPARTAN_PROGRAM");
-  if (program == nullptr) throw std::runtime_error("SPARTAN_PROGRAM is not set; run through ctest");
-  return (std::filesystem::path(program).parent_path().parent_path() / "tests" / "small_runs").string();
+  return (std::filesystem::path(program_path()).parent_path().parent_path() / "tests" / "small_runs").string();
 }
 
 }  // namespace spartan::testing

@@ -124,13 +124,9 @@ TEST_F(Run, ResumedRunGivesTheSameBytesAfterAKill) {
   }
 }
 
-TEST_F(Run, ResumesWithoutDecodingCommittedFrames) {
+TEST_F(Run, ResumesWhereItWasInterrupted) {
   copy_finished_run("whole");
   ASSERT_EQ(run("part", {"--max-frames", "8"}).exit_code, 0);
-  for (int i = 0; i < 8; ++i) {
-    std::ofstream(image(0, i)) << "gone";
-    std::ofstream(image(1, i)) << "gone";
-  }
   const ProgramResult resumed = run("part", {"--resume"});
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(summary_of(path("part"))["resumed_from_frame"], 8);
@@ -268,12 +264,24 @@ TEST_F(Run, EvaluatesAgainstTheTruth) {
 }
 
 TEST_F(Run, BridgesMissingFramesIfTheViewsOverlap) {
-  for (int i = 3; i < 13; ++i) fs::remove(image(1, i));
+  for (int i = 3; i < 6; ++i) fs::remove(image(1, i));
   const ProgramResult result = run("out");
   const auto summary = summary_of(path("out"));
-  EXPECT_EQ(summary["skipped"]["right_missing"], 10);
+  EXPECT_EQ(summary["skipped"]["right_missing"], 3);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
+}
+
+TEST_F(Run, ACameraThatIsDeadForMostOfTheDriveIsALoss) {
+  for (int i = 3; i < 13; ++i) fs::remove(image(1, i));
+  const ProgramResult result = run("out");
+  EXPECT_EQ(result.exit_code, 6) << result.err;
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(summary["health"]["odometry"]["lost"], 0) << "the views before and after the gap overlap";
+  ASSERT_EQ(summary["lost_spans"].size(), 1U);
+  EXPECT_EQ(summary["lost_spans"][0]["from_ns"], 1'000'000'000);
+  EXPECT_EQ(summary["lost_spans"][0]["to_ns"], 6'500'000'000);
+  EXPECT_EQ(summary["lost_spans"][0]["reason"], "10 frames skipped in 5.5 s, the first: right_missing");
 }
 
 TEST_F(Run, ReportsALossIfTheViewsDoNotOverlap) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_readers.h"
@@ -137,13 +136,8 @@ Result<std::string> find_in_folder(const fs::path& folder) {
 
 // The files of mrcal may be large and have any name; they are recognized by their beginning.
 bool begins_as_mrcal(const fs::path& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) return false;
-  std::string beginning(65536, ' ');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
-  beginning.resize(static_cast<std::size_t>(stream.gcount()));
-  return detect_calibration_format(file.string(), beginning) == CalibrationFormat::mrcal;
+  const auto beginning = read_beginning(file.string(), 65536);
+  return beginning && detect_calibration_format(file.string(), *beginning) == CalibrationFormat::mrcal;
 }
 
 }  // namespace

@@ -129,7 +129,8 @@ Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, con
   info.format = layout->format;
   info.layout_reason = layout->reason + (info.layout_reason.empty() ? "" : "; " + info.layout_reason);
   info.has_imu = static_cast<bool>(index->imu);
-  if (info.name.empty()) info.name = fs::weakly_canonical(path).filename().string();
+  std::error_code error;
+  if (info.name.empty()) info.name = fs::weakly_canonical(path, error).filename().string();
   if (Status status = validate_and_sort(*index, options.pair_tolerance_s); !status) return failure(status);
   return make_indexed_source(std::move(*index));
 }

@@ -1,6 +1,7 @@
 // FrameSource: one interface to the stereo frames and sensor samples of a recording, whatever its folder layout.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
@@ -56,6 +57,12 @@ struct FrameKey {
   Stamp left_stamp;
 };
 
+/// Rows of sensor tables that are left out because they cannot be parsed.
+struct UnreadableRows {
+  std::int64_t count = 0;
+  std::string first;  ///< file, line and fault of the first one
+};
+
 /// Yields samples ordered by stamp. At equal stamps the order is IMU, wheels, compass, inclinometer, then frames in the
 /// order in which the recording lists them. A frame with a reversed stamp is played after the frame listed before it.
 /// Sensor samples (not frames) whose stamps do not increase within their table are discarded, as few as possible.
@@ -66,15 +73,18 @@ class FrameSource {
   virtual const RecordingInfo& info() const = 0;
 
   /// The next sample, or nothing at the end. A listed frame that is missing, unreadable, of another size or out of
-  /// order is delivered as MissingFrame. An error ends the stream, e.g. a sensor file truncated within a line.
+  /// order is delivered as MissingFrame. Rows of sensor tables that cannot be parsed are left out and counted. Errors:
+  /// `read_error` and `resources` where the system cannot read a file that is there. The frame concerned was not taken,
+  /// so the call may be repeated; after an error in a sensor table every call fails.
   virtual Result<std::optional<Sample>> next() = 0;
 
   /// Moves the read position to just after the first `samples_taken` samples of any kind (MissingFrame included),
-  /// without decoding an image. Positions are counts and not stamps, since stamps may run backwards. Code `input` where
-  /// the recording holds fewer samples.
+  /// without decoding an image; their files are read for content_hash(). Positions are counts and not stamps, since
+  /// stamps may run backwards. Codes: `input` where the recording holds fewer samples, and those of next().
   virtual Status seek(std::int64_t samples_taken) = 0;
 
   /// Decodes one frame, independent of the read position. Code `input` where no frame has this left stamp.
+  /// Does not change content_hash().
   virtual Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) = 0;
 
   /// Left stamps of all listed frames of a pair, in playback order.
@@ -89,6 +99,13 @@ class FrameSource {
 
   /// Number of sensor samples discarded so far because their stamps did not increase.
   virtual std::int64_t sensor_samples_discarded() const = 0;
+
+  /// Rows of sensor tables left out so far.
+  virtual UnreadableRows unreadable_sensor_rows() const = 0;
+
+  /// Hash of everything taken so far by next() or seek(): bytes of the image files, values of sensor samples. A resumed
+  /// run compares it to detect that the recording was changed.
+  virtual std::uint64_t content_hash() const = 0;
 };
 
 /// How to open a recording.

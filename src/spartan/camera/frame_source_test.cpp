@@ -82,9 +82,9 @@ TEST_F(Layouts, UsesTheRequestedFormat) {
   EXPECT_EQ(info.layout_reason, "euroc requested");
   fs::remove_all(folder_.path() + "/mav0");
   EXPECT_THAT(error_of(folder_.path(), {.format = RecordingFormat::euroc, .rig_file = {}}),
-              HasSubstr("cam0/data.csv: is missing"));
+              HasSubstr("cam0/data.csv: cannot be read"));
   EXPECT_THAT(error_of(folder_.path(), {.format = RecordingFormat::kitti_raw, .rig_file = {}}),
-              HasSubstr("image_00/timestamps.txt: is missing"));
+              HasSubstr("image_00/timestamps.txt: cannot be read"));
   EXPECT_THAT(error_of(folder_.path(), {.format = RecordingFormat::spartan, .rig_file = {}}),
               HasSubstr("has no recording.yaml"));
 }

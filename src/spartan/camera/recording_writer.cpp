@@ -120,6 +120,7 @@ bool all_finite(std::initializer_list<double> values) {
 
 struct RecordingWriter::State {
   std::string folder;
+  FolderLock lock;
   RecordingOptions options;
   Rig rig;
   std::optional<TableFile> frames;
@@ -186,14 +187,20 @@ Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const
   if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
     return failure(ErrorCode::output, "already exists and is not overwritten", folder, "choose another folder");
   }
-  return open(folder, nominal_rig, options, {});
+  return open(folder, nominal_rig, options, {}, {});
 }
 
 Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const Rig& nominal_rig,
                                                 const RecordingOptions& options) {
   std::error_code error;
   std::map<std::string, std::string> rows;
-  if (const auto table = read_file(folder + "/frames.csv")) {
+  FolderLock lock;
+  if (fs::exists(folder + "/frames.csv", error)) {
+    auto acquired = FolderLock::acquire(folder);
+    if (!acquired) return failure(acquired);
+    lock = std::move(*acquired);
+    const auto table = read_file(folder + "/frames.csv");
+    if (!table) return failure(table);
     if (fs::exists(folder + "/recording.yaml", error)) {
       return failure(ErrorCode::output, "is a finished recording and is not overwritten", folder,
                      "choose another folder");
@@ -208,12 +215,12 @@ Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const
     return failure(ErrorCode::output, "is not an unfinished recording and is not overwritten", folder,
                    "choose another folder");
   }
-  return open(folder, nominal_rig, options, std::move(rows));
+  return open(folder, nominal_rig, options, std::move(rows), std::move(lock));
 }
 
 Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const Rig& nominal_rig,
                                               const RecordingOptions& options,
-                                              std::map<std::string, std::string> previous_rows) {
+                                              std::map<std::string, std::string> previous_rows, FolderLock lock) {
   if (Status s = nominal_rig.validate("rig of the recording"); !s) return failure(s);
   if (Status s = validate(internal::RecordingFile{1, options}, "description of the recording"); !s) return failure(s);
   for (const StereoPair& pair : nominal_rig.pairs) {
@@ -222,6 +229,11 @@ Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const R
                    folder);
   }
   if (Status s = make_folder(folder); !s) return failure(s);
+  if (!lock.owns()) {
+    auto acquired = FolderLock::acquire(folder);
+    if (!acquired) return failure(acquired);
+    lock = std::move(*acquired);
+  }
   // The first file to be created: resume() recognises an unfinished recording by it, however early it was interrupted.
   auto frames = TableFile::create(folder + "/frames.csv", kFramesHeader);
   if (!frames) return failure(frames);
@@ -231,6 +243,7 @@ Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const R
   if (Status s = write_file_atomically(folder + "/rig.yaml", to_rig_yaml(nominal_rig)); !s) return failure(s);
   auto state = std::make_unique<State>();
   state->folder = folder;
+  state->lock = std::move(lock);
   state->options = options;
   state->rig = nominal_rig;
   state->frames.emplace(std::move(*frames));
@@ -315,7 +328,9 @@ Status RecordingWriter::finish() {
   std::error_code ignored;
   fs::remove(state_->folder + kPreviousRowsFile, ignored);
   const RecordingFile file{.schema = 1, .about = state_->options};
-  return write_file_atomically(state_->folder + "/recording.yaml", dump_options(file));
+  Status written = write_file_atomically(state_->folder + "/recording.yaml", dump_options(file));
+  if (written) state_->lock = {};  // nothing is written to a finished recording
+  return written;
 }
 
 }  // namespace spartan

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "spartan/camera/samples.h"
+#include "spartan/core/files.h"
 #include "spartan/core/result.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/rig.h"
@@ -62,8 +63,8 @@ class RecordingWriter {
   struct State;
   explicit RecordingWriter(std::unique_ptr<State> state);
   static Result<RecordingWriter> open(const std::string& folder, const Rig& nominal_rig,
-                                      const RecordingOptions& options,
-                                      std::map<std::string, std::string> previous_rows);
+                                      const RecordingOptions& options, std::map<std::string, std::string> previous_rows,
+                                      FolderLock lock);
   std::unique_ptr<State> state_;
 };
 

@@ -1,6 +1,21 @@
 #include "spartan/core/archive.h"
 
+#include <algorithm>
+
 namespace spartan {
+
+void Hash64::add(const void* data, std::size_t size) {
+  add(size);
+  const auto* bytes = static_cast<const std::uint8_t*>(data);
+  while (size > 0) {
+    std::uint64_t word = 0;
+    const std::size_t count = std::min(size, sizeof word);
+    std::memcpy(&word, bytes, count);
+    add(word);
+    bytes += count;
+    size -= count;
+  }
+}
 
 void ArchiveWriter::raw(const void* data, std::size_t size) {
   if (size == 0) return;

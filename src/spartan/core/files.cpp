@@ -1,17 +1,30 @@
 #include "spartan/core/files.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
+#include <optional>
 
 namespace spartan {
 namespace {
+
+bool is_shortage(int error) {
+  return error == ENOMEM || error == EMFILE || error == ENFILE || error == EAGAIN;
+}
+
+tl::unexpected<Error> read_failure(const std::string& path, int error) {
+  const std::string what = std::string("cannot be read: ") + std::strerror(error);
+  if (is_shortage(error))
+    return failure(ErrorCode::resources, what, path, "free memory or raise the limits (ulimit -v, ulimit -n)");
+  const bool absent = error == ENOENT || error == ENOTDIR || error == ELOOP || error == ENAMETOOLONG || error == ENXIO;
+  return failure(absent ? ErrorCode::input : ErrorCode::read_error, what, path,
+                 error == EACCES ? "check the permissions" : "");
+}
 
 // Returns 0, or errno of the first call that failed.
 int write_all(int file, std::string_view content) {
@@ -26,6 +39,20 @@ int write_all(int file, std::string_view content) {
   return ::fsync(file) == 0 ? 0 : errno;
 }
 
+// Whether the name has the form of temporary_name(): NAME.PID.part.
+bool is_temporary_name(std::string_view name) {
+  constexpr std::string_view kEnd = ".part";
+  if (!name.ends_with(kEnd)) return false;
+  name.remove_suffix(kEnd.size());
+  const std::size_t dot = name.find_last_not_of("0123456789");
+  return dot != std::string_view::npos && dot > 0 && name[dot] == '.' && dot + 1 < name.size();
+}
+
+std::string folder_of(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
 }  // namespace
 
 tl::unexpected<Error> write_failure(const std::string& path, int error) {
@@ -35,43 +62,105 @@ tl::unexpected<Error> write_failure(const std::string& path, int error) {
   if (error == ENOTDIR || error == EISDIR || error == EEXIST)
     hint = "a file stands where a folder is needed, or a folder where a file is";
   if (error == EFBIG) hint = "raise the file size limit (ulimit -f)";
-  return failure(ErrorCode::output, std::string("cannot be written: ") + std::strerror(error), path, hint);
+  if (is_shortage(error)) hint = "free memory or raise the limits (ulimit -v, ulimit -n)";
+  return failure(is_shortage(error) ? ErrorCode::resources : ErrorCode::output,
+                 std::string("cannot be written: ") + std::strerror(error), path, hint);
 }
 
-Result<std::string> read_file(const std::string& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return failure(ErrorCode::input, "is a folder, not a file", path);
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return failure(ErrorCode::input, std::string("cannot be read: ") + std::strerror(errno), path);
-  std::stringstream content;
-  content << file.rdbuf();
-  if (file.bad()) return failure(ErrorCode::input, "cannot be read completely", path);
-  return content.str();
+Result<InputFile> InputFile::open(const std::string& path) {
+  // O_NONBLOCK: opening a pipe that nobody writes to would wait for ever.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return read_failure(path, errno);
+  InputFile file(descriptor, 0, path);
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0) return read_failure(path, errno);
+  if (S_ISDIR(status.st_mode)) return failure(ErrorCode::input, "is a folder, not a file", path);
+  if (!S_ISREG(status.st_mode)) {
+    return failure(ErrorCode::input, "is not a regular file", path, "save a pipe or a device to a file first");
+  }
+  file.size_ = static_cast<std::size_t>(status.st_size);
+  return file;
+}
+
+InputFile::InputFile(InputFile&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), size_(other.size_), path_(std::move(other.path_)) {}
+InputFile& InputFile::operator=(InputFile&& other) noexcept {
+  std::swap(descriptor_, other.descriptor_);
+  std::swap(size_, other.size_);
+  std::swap(path_, other.path_);
+  return *this;
+}
+InputFile::~InputFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+Result<std::size_t> InputFile::read(std::span<char> space) {
+  std::size_t filled = 0;
+  while (filled < space.size()) {
+    const ssize_t count = ::read(descriptor_, space.data() + filled, space.size() - filled);
+    if (count == 0) break;
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return read_failure(path_, errno);
+    filled += static_cast<std::size_t>(count);
+  }
+  return filled;
+}
+
+Result<std::string> read_file(const std::string& path, std::size_t largest) {
+  auto file = InputFile::open(path);
+  if (!file) return failure(file);
+  // One byte more than the size: a file that grows meanwhile is read on.
+  std::string content;
+  std::size_t filled = 0;
+  for (std::size_t space = file->size() + 1;; space = 2 * content.size()) {
+    if (filled > largest || file->size() > largest) {
+      return failure(ErrorCode::input, "is larger than " + std::to_string(largest >> 20U) + " MB", path);
+    }
+    content.resize(std::min(space, largest + 1));
+    const auto count = file->read(std::span(content).subspan(filled));
+    if (!count) return failure(count);
+    filled += *count;
+    if (filled < content.size()) break;
+  }
+  content.resize(filled);
+  return content;
+}
+
+Result<std::string> read_beginning(const std::string& path, std::size_t most) {
+  auto file = InputFile::open(path);
+  if (!file) return failure(file);
+  std::string content(std::min(most, file->size()), '\0');
+  const auto count = file->read(content);
+  if (!count) return failure(count);
+  content.resize(*count);
+  return content;
 }
 
 Result<std::string> read_calibration_text(const std::string& path, std::size_t largest) {
-  const auto error_at = [&](const std::string& what) { return failure(ErrorCode::configuration, what, path); };
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return error_at("is a folder, not a file");
-  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
-    return error_at("is not a regular file: a calibration is read more than once, which a pipe does not allow");
+  auto content = read_file(path, largest);
+  if (!content && content.error().code == ErrorCode::resources) return failure(content);
+  if (!content) {
+    Error error = std::move(content).error();
+    error.code = ErrorCode::configuration;
+    return tl::unexpected(std::move(error));
   }
-  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
-  if (!error && bytes > largest)
-    return error_at("is larger than " + std::to_string(largest >> 20U) + " MB, so it is not a calibration file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return error_at(std::string("cannot be read: ") + std::strerror(errno));
-  std::string content;
-  std::array<char, 65536> buffer{};
-  while (file.read(buffer.data(), buffer.size()), file.gcount() > 0) {
-    content.append(buffer.data(), static_cast<std::size_t>(file.gcount()));
-    if (content.size() > largest)
-      return error_at("is larger than " + std::to_string(largest >> 20U) + " MB, so it is not a calibration file");
-  }
-  if (file.bad()) return error_at("cannot be read completely");
   // Some editors write a UTF-8 byte order mark.
-  if (content.starts_with("\xEF\xBB\xBF")) content.erase(0, 3);
+  if (content->starts_with("\xEF\xBB\xBF")) content->erase(0, 3);
   return content;
+}
+
+std::string temporary_name(const std::string& path) {
+  return path + "." + std::to_string(::getpid()) + ".part";
+}
+
+void remove_temporary_files(const std::string& folder) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code ignored;
+    if (is_temporary_name(entry->path().filename().string()) && entry->is_regular_file(ignored)) {
+      std::filesystem::remove(entry->path(), ignored);
+    }
+  }
 }
 
 Status write_file_atomically(const std::string& path, std::string_view content) {
@@ -87,7 +176,7 @@ Status write_files_atomically(const std::vector<NewFile>& files) {
   for (const NewFile& file : files) {
     std::error_code ignored;
     if (std::filesystem::is_directory(file.path, ignored)) return abort_with(file.path, EISDIR);
-    const std::string temporary = file.path + ".part";
+    const std::string temporary = temporary_name(file.path);
     const int opened = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
     if (opened < 0) return abort_with(file.path, errno);
     temporaries.push_back(temporary);
@@ -98,13 +187,50 @@ Status write_files_atomically(const std::vector<NewFile>& files) {
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (::rename(temporaries[i].c_str(), files[i].path.c_str()) != 0) return abort_with(files[i].path, errno);
   }
+  std::vector<std::string> folders;
+  for (const NewFile& file : files) folders.push_back(folder_of(file.path));
+  std::sort(folders.begin(), folders.end());
+  folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
+  for (const std::string& folder : folders) {
+    if (Status synced = sync_folder(folder); !synced) return synced;
+  }
+  return {};
+}
+
+Status publish_file(const std::string& temporary, const std::string& path) {
+  const int opened = ::open(temporary.c_str(), O_WRONLY | O_CLOEXEC);
+  if (opened < 0) return write_failure(path, errno);
+  const int error = ::fsync(opened) == 0 ? 0 : errno;
+  ::close(opened);
+  if (error != 0) return write_failure(path, error);
+  if (::rename(temporary.c_str(), path.c_str()) != 0) return write_failure(path, errno);
+  return sync_folder(folder_of(path));
+}
+
+Status sync_folder(const std::string& path) {
+  const int opened = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (opened < 0) return errno == EACCES ? Status() : Status(write_failure(path, errno));
+  // EINVAL: a file system that cannot flush folders.
+  const int error = ::fsync(opened) == 0 || errno == EINVAL ? 0 : errno;
+  ::close(opened);
+  if (error != 0) return write_failure(path, error);
   return {};
 }
 
 Status make_folder(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> parents;  // of the folders that are created
   std::error_code error;
-  std::filesystem::create_directories(path, error);
+  for (fs::path level(path); !level.empty() && !fs::exists(level, error); level = level.parent_path()) {
+    if (error) return write_failure(path, error.value());
+    parents.push_back(folder_of(level.string()));
+    if (level == level.parent_path()) break;
+  }
+  fs::create_directories(path, error);
   if (error) return write_failure(path, error.value());
+  for (const std::string& parent : parents) {
+    if (Status synced = sync_folder(parent); !synced) return synced;
+  }
   return {};
 }
 

@@ -17,6 +17,8 @@ enum class ErrorCode {
   store_damaged,   ///< a database, map tile or saved state is damaged; nothing that rests on it can go on
   configuration,   ///< a calibration, rig, option file or scenario is invalid
   output,          ///< something cannot be written
+  read_error,      ///< the system cannot read an existing file (EIO, EACCES …); this does not mean that it is damaged
+  resources,       ///< memory, file descriptors or disk blocks of the system ran out; the same may succeed later
   interrupted,     ///< the user asked to stop
 };
 

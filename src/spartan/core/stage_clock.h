@@ -4,9 +4,12 @@
 #include <chrono>
 #include <cstdint>
 #include <ctime>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "spartan/core/result.h"
 
 namespace spartan {
 
@@ -16,6 +19,20 @@ struct StageTime {
   double wall_ms = 0;
   double cpu_ms = 0;  ///< of all threads of the process
 };
+
+/// Thrown by StageClock::measure() in place of std::bad_alloc: tells the stage in which memory ran out.
+class OutOfMemory : public std::bad_alloc {
+ public:
+  /// `stage` must be a string literal: there is no memory for a copy.
+  explicit OutOfMemory(const char* stage) : stage_(stage) {}
+  const char* stage() const { return stage_; }
+
+ private:
+  const char* stage_;
+};
+
+/// The error of code `resources` for a failed allocation; names the stage if it is known.
+Error out_of_memory(const std::bad_alloc& exception);
 
 /// Wall-clock time between laps.
 class Stopwatch {
@@ -39,7 +56,13 @@ class StageClock {
   template <class Work>
   auto measure(const char* stage, Work&& work) {
     const Lap lap(*this, stage);
-    return std::forward<Work>(work)();
+    try {
+      return std::forward<Work>(work)();
+    } catch (const OutOfMemory&) {
+      throw;  // of a stage inside this one
+    } catch (const std::bad_alloc&) {
+      throw OutOfMemory(stage);
+    }
   }
   /// Appends times measured elsewhere.
   void add(const std::vector<StageTime>& times) { times_.insert(times_.end(), times.begin(), times.end()); }
@@ -70,6 +93,11 @@ class StageClock {
 
   std::vector<StageTime> times_;
 };
+
+/// Memory that this process can still allocate, bytes: the least of what the machine has available (MemAvailable), what
+/// the control group leaves (cgroup v1 and v2; page cache that can be dropped counts as free) and what the limits of
+/// the process leave (ulimit -v). At least 1.
+std::int64_t available_memory_bytes();
 
 /// CPU time of all threads since the start of the process, s.
 double cpu_seconds();

@@ -217,7 +217,8 @@ Result<LoadedTrajectory> load_trajectory(const std::string& path) {
     loaded.format = TrajectoryFormat::kitti;
     const std::string times = (std::filesystem::path(path).parent_path() / "times.txt").string();
     std::vector<Stamp> stamps;
-    if (std::filesystem::exists(times)) {
+    std::error_code unreadable;
+    if (std::filesystem::exists(times, unreadable)) {
       auto read = read_times(times);
       if (!read) return failure(read);
       stamps = std::move(*read);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
@@ -29,9 +30,37 @@ cv::Mat decode(const std::string& content, int flags) {
   const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8UC1, const_cast<char*>(content.data()));
   try {
     return cv::imdecode(bytes, flags);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& e) {
+    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
     return {};
   }
+}
+
+// The decoders report a failed allocation as a damaged file. So a decoder that fails gets a second try, after this much
+// memory was seen to be there: what fails again is damaged. Throws std::bad_alloc if it is not there.
+constexpr std::size_t kDecoderMemory_bytes = std::size_t{64} << 20U;
+
+template <class Decode>
+auto decode_with_second_try(const Decode& decode_once) {
+  auto image = decode_once();
+  if (image) return image;
+  {
+    std::vector<std::uint8_t> probe(kDecoderMemory_bytes);
+    static_cast<volatile std::uint8_t&>(probe.back()) = 1;  // keeps the compiler from removing the allocation
+  }
+  return decode_once();
+}
+
+Result<cv::Mat> decode_png_or_pnm(const std::string& content, int flags) {
+  return decode_with_second_try([&]() -> Result<cv::Mat> {
+    cv::Mat mat = decode(content, flags);
+    if (mat.empty()) return failure(ErrorCode::input, "is damaged or cannot be decoded");
+    return mat;
+  });
+}
+
+Result<FrameImage> decode_jpeg_file(const std::string& content, JpegColour colour) {
+  return decode_with_second_try([&] { return decode_jpeg(content, colour); });
 }
 
 template <class Pixel>
@@ -43,8 +72,10 @@ FrameImage own(cv::Mat& mat, PixelLayout layout) {
 Result<std::string> png_of(const cv::Mat& mat) {
   std::vector<std::uint8_t> png;
   try {
-    cv::imencode(".png", mat, png);
+    // The encoder returns false for a failed allocation only: size and type of the image are valid.
+    if (!cv::imencode(".png", mat, png)) throw std::bad_alloc();
   } catch (const cv::Exception& e) {
+    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
     return failure(ErrorCode::internal, "cannot encode the image as PNG: " + e.msg);
   }
   return std::string(png.begin(), png.end());
@@ -85,12 +116,13 @@ Result<FrameImage> decode_image(const std::string& content, const std::string& n
   if (const std::string error = image_file_error(content); !error.empty())
     return failure(ErrorCode::input, error, name, hint);
   if (is_jpeg(content)) {
-    auto image = decode_jpeg(content, JpegColour::as_stored);
+    auto image = decode_jpeg_file(content, JpegColour::as_stored);
     if (!image) return failure(image.error().code, image.error().what, name, hint);
     return image;
   }
-  cv::Mat mat = decode(content, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
-  if (mat.empty()) return failure(ErrorCode::input, "is damaged or cannot be decoded", name, hint);
+  const auto decoded = decode_png_or_pnm(content, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
+  if (!decoded) return failure(decoded.error().code, decoded.error().what, name, hint);
+  cv::Mat mat = *decoded;
   if (mat.channels() == 3) cv::cvtColor(mat, mat, cv::COLOR_BGR2RGB);
   switch (mat.type()) {
     case CV_8UC1:
@@ -118,13 +150,13 @@ Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
   if (const std::string error = image_file_error(*content); !error.empty())
     return failure(ErrorCode::input, error, path);
   if (is_jpeg(*content)) {
-    const auto image = decode_jpeg(*content, JpegColour::gray);
+    const auto image = decode_jpeg_file(*content, JpegColour::gray);
     if (!image) return failure(image.error().code, image.error().what, path);
     return Image<std::uint8_t>::copy_of(image->as<std::uint8_t>());
   }
-  const cv::Mat mat = decode(*content, cv::IMREAD_GRAYSCALE);
-  if (mat.empty()) return failure(ErrorCode::input, "is damaged or cannot be decoded", path);
-  return Image<std::uint8_t>::copy_of(as_view<std::uint8_t>(mat));
+  const auto mat = decode_png_or_pnm(*content, cv::IMREAD_GRAYSCALE);
+  if (!mat) return failure(mat.error().code, mat.error().what, path);
+  return Image<std::uint8_t>::copy_of(as_view<std::uint8_t>(*mat));
 }
 
 Result<std::string> encode_png(ImageView<const std::uint8_t> image) {

@@ -1,7 +1,9 @@
 // Image files: reads PNG, JPEG, PGM/PPM and PFM; writes PNG and PFM.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "spartan/core/frame_image.h"
 #include "spartan/core/result.h"
@@ -16,6 +18,11 @@ Result<FrameImage> read_image(const std::string& path);
 
 /// The same from memory; `name` is used in error messages.
 Result<FrameImage> decode_image(const std::string& content, const std::string& name);
+
+/// Size from the header of a PNG, JPEG or PGM/PPM file; nothing where the header is of none of these.
+std::optional<ImageSize> read_image_size(const std::string& path);
+/// The same from the first bytes of a file.
+std::optional<ImageSize> parse_image_size(std::string_view head);
 
 /// Decodes an image file into 8-bit gray: colour is converted to luma (Rec. 601), 16 bits are reduced to 8.
 Result<Image<std::uint8_t>> read_gray8(const std::string& path);

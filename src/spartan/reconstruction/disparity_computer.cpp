@@ -85,6 +85,23 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   return result;
 }
 
+std::int64_t DisparityComputer::memory_bytes(ImageSize size, DisparityRange range) {
+  // Per pixel: the checked and the smoothed disparity (4 bytes each), labels and stack of the speckle filter (12
+  // bytes).
+  return SemiGlobalMatcher::memory_bytes(size, range) + std::int64_t{20} * size.width * size.height;
+}
+
+Status DisparityComputer::check_memory(ImageSize size, DisparityRange range, std::int64_t most_bytes) {
+  const std::int64_t needed = memory_bytes(size, range);
+  if (most_bytes <= 0 || needed <= most_bytes) return {};
+  return failure(ErrorCode::resources,
+                 fmt::format("images of {}x{} px with {} disparities need {:.0f} MB of memory, more than the bound of "
+                             "{:.0f} MB",
+                             size.width, size.height, range.count(), 1e-6 * static_cast<double>(needed),
+                             1e-6 * static_cast<double>(most_bytes)),
+                 "", "use smaller images or a smaller disparity range (nearest_m of the pair), or raise --memory");
+}
+
 DisparityRange disparity_range(const RectifiedStereo& geometry, double nearest_m) {
   const double wanted =
       nearest_m > 0 ? geometry.focal_px * geometry.baseline_m / nearest_m : 0.25 * geometry.size.width;

@@ -56,6 +56,11 @@ class DisparityComputer {
   static Status check(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range,
                       ImageView<const std::uint8_t> left_mask = {}, ImageView<const std::uint8_t> right_mask = {});
 
+  /// Upper bound of the memory that compute() needs for images of this size and this range, bytes.
+  static std::int64_t memory_bytes(ImageSize size, DisparityRange range);
+  /// Code `resources`, with both figures, where memory_bytes() exceeds `most_bytes` (0: no bound). Allocates nothing.
+  static Status check_memory(ImageSize size, DisparityRange range, std::int64_t most_bytes);
+
  private:
   struct State;
   explicit DisparityComputer(std::unique_ptr<State> state);

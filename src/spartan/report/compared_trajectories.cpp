@@ -10,6 +10,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Without exceptions: what may not be looked at is taken as absent, and reading it says why.
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
 struct Estimate {
   LoadedTrajectory loaded;
   std::string path;
@@ -21,7 +31,7 @@ Result<TrajectoryKind> choose_kind(const RunFolder& run, const std::string& requ
   if (const auto kind = parse_trajectory_kind(requested)) return *kind;
   if (!requested.empty()) return failure(ErrorCode::usage, "is not a trajectory of a run", requested);
   for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
-    if (fs::exists(run.trajectory(kind))) return kind;
+    if (is_there(run.trajectory(kind))) return kind;
   }
   return failure(ErrorCode::input, "contains no trajectory", run.path,
                  "a run folder has trajectory_odometry.tum and others");
@@ -37,7 +47,7 @@ std::string kind_of_file(const fs::path& path) {
 
 Result<Estimate> load_estimate(const std::string& path, const std::string& kind) {
   Estimate estimate;
-  if (fs::is_directory(path)) {
+  if (is_folder(path)) {
     const RunFolder run{path};
     const auto chosen = choose_kind(run, kind);
     if (!chosen) return failure(chosen);
@@ -55,7 +65,7 @@ Result<Estimate> load_estimate(const std::string& path, const std::string& kind)
   estimate.loaded = std::move(*loaded);
   // Trajectories of a run are poses of the body; the rig states which frame the truth of the recording uses.
   const fs::path rig_path = fs::path(estimate.path).parent_path() / "rig.yaml";
-  if (estimate.kind != "file" && fs::exists(rig_path)) {
+  if (estimate.kind != "file" && is_there(rig_path)) {
     const auto rig = read_rig_yaml(rig_path.string());
     if (!rig) return failure(rig);
     estimate.loaded.poses = in_recording_convention(*rig, std::move(estimate.loaded.poses));
@@ -64,10 +74,10 @@ Result<Estimate> load_estimate(const std::string& path, const std::string& kind)
 }
 
 Result<std::string> find_truth(const std::string& path) {
-  if (!fs::is_directory(path)) return path;
+  if (!is_folder(path)) return path;
   for (const char* name : {"truth/poses.tum", "poses.txt", "mav0/state_groundtruth_estimate0/data.csv",
                            "state_groundtruth_estimate0/data.csv"}) {
-    if (fs::exists(fs::path(path) / name)) return (fs::path(path) / name).string();
+    if (is_there(fs::path(path) / name)) return (fs::path(path) / name).string();
   }
   return failure(ErrorCode::input, "is a folder without a ground-truth trajectory", path,
                  "expected truth/poses.tum, poses.txt and mav0/state_groundtruth_estimate0/data.csv");

@@ -59,7 +59,8 @@ class Drive::Planner {
   }
 
   bool is_stop(double metres) const {
-    return std::any_of(stops_.begin(), stops_.end(), [&](double s) { return std::abs(s - metres) < kSame_m; });
+    const auto stop = std::upper_bound(stops_.begin(), stops_.end(), metres - kSame_m);
+    return stop != stops_.end() && *stop < metres + kSame_m;
   }
 
   void add(const Motion& motion) {

@@ -226,6 +226,7 @@ struct CaptureOptions {
     v.field("stop_every_m", stop_every_m,
             "Distance in metres between stops with panoramas, the first at the start; 0 for no regular stops.",
             between(0, 10000));
+    v.check("stop_every_m", stop_every_m == 0 || stop_every_m >= 0.05, "must be 0 or at least 0.05 m");
     v.field("stops_m", stops_m, "Distances in metres along the path of further stops with panoramas.", at_least(0));
     v.field("pans_deg", pans_deg, "Pan angles of a panorama in degrees, positive to the left.", between(-180, 180));
     v.renamed("seconds_a_pan", "pan_period_s");

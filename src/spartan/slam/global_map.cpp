@@ -42,6 +42,14 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
   return s;
 }
 
+// Bounds of a stored map, so that cells count in int: 5e8 cells of 1 mm are 500 km.
+constexpr double kLeastCell_m = 1e-3, kLargestCell_m = 1e3, kFarthestAnchor_cells = 5e8;
+
+tl::unexpected<Error> damaged_store(const std::string& what) {
+  return failure(ErrorCode::store_damaged, "the map is damaged: " + what, "",
+                 "run again into a new folder to rebuild the map");
+}
+
 bool is_finite(const CellSurface& s) {
   return std::isfinite(s.elevation_m) && std::isfinite(s.variance_m2) && std::isfinite(s.lowest_m) &&
          std::isfinite(s.highest_m);
@@ -108,6 +116,9 @@ Result<GlobalMap> GlobalMap::from_store(const GlobalMapOptions& options, double 
   map.store_ = &store;
   const auto cell = store.property("cell_m");
   if (!cell) return failure(cell);
+  if (*cell && !(**cell >= kLeastCell_m && **cell <= kLargestCell_m)) {
+    return damaged_store(fmt::format("the cell size is {} m", **cell));
+  }
   if (*cell && **cell != cell_m) {
     return failure(ErrorCode::configuration,
                    fmt::format("the map has cells of {} m, the options say {} m", **cell, cell_m), "",
@@ -119,6 +130,15 @@ Result<GlobalMap> GlobalMap::from_store(const GlobalMapOptions& options, double 
   if (!stops) return failure(stops);
   const auto index = store.index();
   if (!index) return failure(index);
+  for (const Submap& submap : *submaps) {
+    if (submap.world_from_submap.translation().cwiseAbs().maxCoeff() > kFarthestAnchor_cells * cell_m)
+      return damaged_store(fmt::format("the anchor of submap {} is too far away", submap.id));
+  }
+  for (const TileStore::Entry& entry : *index) {
+    const auto is_submap = [&](const Submap& submap) { return submap.id == entry.key.submap; };
+    if (std::none_of(submaps->begin(), submaps->end(), is_submap))
+      return damaged_store(fmt::format("table 'map_submaps' has no submap {}, but it has tiles", entry.key.submap));
+  }
   map.submaps_ = std::move(*submaps);
   map.stops_ = std::move(*stops);
   map.submaps_stored_ = map.submaps_.size();

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "spartan/core/files.h"
 #include "spartan/slam/global_map.h"
 
 namespace spartan {
@@ -40,19 +41,16 @@ Status write(GlobalMap& map, const std::string& path) {
 }  // namespace
 
 Status MapFile::save(GlobalMap& map, const std::string& path) {
-  const std::string part = path + ".part";
+  const std::string temporary = temporary_name(path);
   std::error_code ignored;
-  fs::remove(part, ignored);
-  Status status = write(map, part);
-  std::error_code error;
-  if (status) fs::rename(part, path, error);
-  if (!status || error) fs::remove(part, ignored);
-  if (status && error) return failure(ErrorCode::output, "cannot be written: " + error.message(), path);
+  fs::remove(temporary, ignored);
+  Status status = write(map, temporary);
+  if (status) status = publish_file(temporary, path);
+  if (!status) fs::remove(temporary, ignored);
   return status;
 }
 
 Result<MapFile> MapFile::open(const std::string& path, const GlobalMapOptions& options, Database::Mode mode) {
-  if (!fs::exists(path)) return failure(ErrorCode::input, "does not exist", path);
   auto opened = Database::open(path, mode);
   if (!opened) return failure(opened);
   auto db = std::make_unique<Database>(std::move(*opened));
@@ -72,8 +70,17 @@ Result<MapFile> MapFile::open(const std::string& path, const GlobalMapOptions& o
   auto owned = std::make_unique<TileStore>(std::move(*store));
   const auto cell = owned->property("cell_m");
   if (!cell) return failure(cell);
-  auto map = GlobalMap::from_store(options, cell->value_or(0.05), *owned);
-  if (!map) return failure(map);
+  const double cell_m = cell->value_or(0.05);
+  if (!(cell_m > 0)) {
+    return failure(ErrorCode::store_damaged, fmt::format("is damaged: the cell size is {} m", cell_m), path,
+                   "run again into a new folder to rebuild the map");
+  }
+  auto map = GlobalMap::from_store(options, cell_m, *owned);
+  if (!map) {
+    Error error = map.error();
+    if (error.where.empty()) error.where = path;
+    return tl::unexpected(std::move(error));
+  }
   return MapFile(std::move(db), std::move(owned), std::make_unique<GlobalMap>(std::move(*map)));
 }
 

@@ -31,6 +31,13 @@ CellSurface get_surface(ArchiveReader& in) {
   return s;
 }
 
+// Ids are bounded as in TileStore.
+bool is_sensible(const CellSurface& s) {
+  return std::isfinite(s.elevation_m) && std::isfinite(s.variance_m2) && std::isfinite(s.lowest_m) &&
+         std::isfinite(s.highest_m) && std::isfinite(s.count) && std::isfinite(s.occupancy_logodds) && s.stop >= -1 &&
+         s.stop <= 1'000'000'000;
+}
+
 }  // namespace
 
 std::optional<LatticeOffset> Submap::lattice_offset(double cell_m) const {
@@ -72,6 +79,8 @@ Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
     const bool has_rival = in.get<bool>();
     tile.cells[index].surface = get_surface(in);
     if (has_rival) tile.cells[index].alternative = get_surface(in);
+    if (!is_sensible(tile.cells[index].surface) || !is_sensible(tile.cells[index].alternative))
+      return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder to rebuild the map");
   }
   if (Status status = in.finish(what); !status) return failure(status);
   return tile;

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace spartan {
 namespace {
 
@@ -46,16 +50,24 @@ std::string name_of(const TileStore::Entry& e) {
   return fmt::format("tile {}, {} of submap {}, revision {}", e.key.x, e.key.y, e.key.submap, e.revision);
 }
 
-template <class Read>
-Status for_each_row(Database& db, const std::string& sql, const Read& read) {
-  auto select = db.prepare(sql);
-  if (!select) return failure(select);
-  for (;;) {
-    const auto row = select->step();
-    if (!row) return failure(row);
-    if (!*row) return {};
-    if (Status s = read(*select); !s) return s;
-  }
+// Bounds of what a map may contain, far beyond what a rover drives: products of these with the side of a tile fit an
+// int.
+constexpr std::int64_t kMostSubmaps = 1'000'000'000, kFarthestTile = 1'000'000;
+
+tl::unexpected<Error> damaged_map(const std::string& path, const std::string& what) {
+  return failure(ErrorCode::store_damaged, "is damaged: " + what, path,
+                 "run again into a new folder to rebuild the map");
+}
+
+// An id of a submap or a stop.
+Result<std::int32_t> id_in(const SqlStatement& row, int column, const std::string& path, const char* table) {
+  const std::int64_t id = row.integer(column);
+  if (id < 0 || id > kMostSubmaps) return damaged_map(path, fmt::format("table '{}' has the id {}", table, id));
+  return static_cast<std::int32_t>(id);
+}
+
+bool is_valid(const Pose& pose) {
+  return pose.translation().allFinite() && std::abs(pose.rotation().norm() - 1) < 1e-6;
 }
 
 }  // namespace
@@ -66,6 +78,7 @@ Result<TileStore> TileStore::open(Database& db) {
 }
 
 Result<TileStore> TileStore::open_existing(Database& db) {
+  if (Status s = db.expect_tables(kSchema); !s) return failure(s);
   TileStore store(db);
   if (Status s = store.prepare(); !s) return failure(s);
   return store;
@@ -91,9 +104,15 @@ Result<std::vector<TileStore::Entry>> TileStore::index() {
   const Status status = for_each_row(
       *db_, "SELECT submap, ix, iy, max(revision) FROM map_tiles GROUP BY submap, ix, iy ORDER BY submap, ix, iy",
       [&](const SqlStatement& row) -> Status {
-        entries.push_back({{static_cast<std::int32_t>(row.integer(0)), static_cast<std::int32_t>(row.integer(1)),
-                            static_cast<std::int32_t>(row.integer(2))},
-                           row.integer(3)});
+        const auto submap = id_in(row, 0, db_->path(), "map_tiles");
+        if (!submap) return failure(submap);
+        const std::int64_t x = row.integer(1), y = row.integer(2), revision = row.integer(3);
+        if (std::min(x, y) < -kFarthestTile || std::max(x, y) > kFarthestTile || revision < 1 ||
+            revision > std::numeric_limits<std::int64_t>::max() / 2) {
+          return damaged_map(db_->path(), fmt::format("table 'map_tiles' has tile {}, {} of submap {}, revision {}", x,
+                                                      y, *submap, revision));
+        }
+        entries.push_back({{*submap, static_cast<std::int32_t>(x), static_cast<std::int32_t>(y)}, revision});
         return {};
       });
   if (!status) return failure(status);
@@ -141,11 +160,15 @@ Status TileStore::write(const Submap& submap) {
 Result<std::vector<Submap>> TileStore::submaps() {
   std::vector<Submap> submaps;
   const Status status =
-      for_each_row(*db_, "SELECT id, anchor FROM map_submaps ORDER BY id", [&](const SqlStatement& row) {
+      for_each_row(*db_, "SELECT id, anchor FROM map_submaps ORDER BY id", [&](const SqlStatement& row) -> Status {
+        const auto id = id_in(row, 0, db_->path(), "map_submaps");
+        if (!id) return failure(id);
         const Bytes bytes = row.blob(1);
         ArchiveReader in(bytes);
-        submaps.push_back({static_cast<std::int32_t>(row.integer(0)), in.get_pose()});
-        return in.finish(fmt::format("{}: submap {}", db_->path(), submaps.back().id));
+        submaps.push_back({*id, in.get_pose()});
+        if (Status s = in.finish(fmt::format("{}: submap {}", db_->path(), *id)); !s) return s;
+        if (is_valid(submaps.back().world_from_submap)) return {};
+        return damaged_map(db_->path(), fmt::format("the anchor of submap {} is no pose", *id));
       });
   if (!status) return failure(status);
   return submaps;
@@ -163,12 +186,16 @@ Result<std::vector<MapStop>> TileStore::stops() {
   const Status status = for_each_row(
       *db_, "SELECT id, stamp_ns, pose, covariance FROM map_stops ORDER BY id", [&](const SqlStatement& row) -> Status {
         const Bytes pose = row.blob(2), covariance = row.blob(3);
+        const auto id = id_in(row, 0, db_->path(), "map_stops");
+        if (!id) return failure(id);
         ArchiveReader in(pose), more(covariance);
-        stops.push_back(
-            {static_cast<std::int32_t>(row.integer(0)), {row.integer(1)}, {in.get_pose(), more.get_matrix6()}});
-        const std::string what = fmt::format("{}: stop {}", db_->path(), stops.back().id);
+        stops.push_back({*id, {row.integer(1)}, {in.get_pose(), more.get_matrix6()}});
+        const std::string what = fmt::format("{}: stop {}", db_->path(), *id);
         if (Status s = in.finish(what); !s) return s;
-        return more.finish(what);
+        if (Status s = more.finish(what); !s) return s;
+        const UncertainPose& read = stops.back().world_from_body;
+        if (is_valid(read.pose) && read.covariance.allFinite()) return {};
+        return damaged_map(db_->path(), fmt::format("the pose of stop {} is not finite", *id));
       });
   if (!status) return failure(status);
   return stops;

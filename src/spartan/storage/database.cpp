@@ -1,16 +1,27 @@
 #include "spartan/storage/database.h"
 
+#include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <utility>
+
+#include "spartan/core/files.h"
 
 namespace spartan {
 namespace {
 
 Error error_of(sqlite3* db, const std::string& path) {
-  const int code = db == nullptr ? SQLITE_NOMEM : sqlite3_errcode(db);
+  const int code = db == nullptr ? SQLITE_NOMEM : sqlite3_extended_errcode(db);
   const std::string what = db == nullptr ? "out of memory" : sqlite3_errmsg(db);
+  if (code == SQLITE_IOERR_READ || code == SQLITE_IOERR_FSTAT)
+    return {ErrorCode::read_error, "cannot be read: " + what, path, "try again, or check the disk"};
+  const int system_error = db == nullptr ? ENOMEM : sqlite3_system_errno(db);
+  if ((code & 0xFF) == SQLITE_NOMEM || code == SQLITE_IOERR_NOMEM ||
+      ((code & 0xFF) == SQLITE_CANTOPEN && (system_error == EMFILE || system_error == ENFILE))) {
+    return {ErrorCode::resources, what, path, "free memory or raise the limits (ulimit -v, ulimit -n)"};
+  }
   switch (code & 0xFF) {
     case SQLITE_FULL:
     case SQLITE_IOERR:
@@ -26,11 +37,70 @@ Error error_of(sqlite3* db, const std::string& path) {
     case SQLITE_NOTADB:
       return {ErrorCode::store_damaged, "is damaged or not a database: " + what, path,
               "give a saved map (.map) or a run folder; a damaged one must be made again"};
+    case SQLITE_INTERRUPT:
+      return {ErrorCode::store_damaged, "is damaged: a query does not end", path, "run again into a new folder"};
+    case SQLITE_ERROR:
+    case SQLITE_SCHEMA:
+    case SQLITE_CONSTRAINT:
+    case SQLITE_MISMATCH:
+    case SQLITE_TOOBIG:
+    case SQLITE_AUTH:
     case SQLITE_CORRUPT:
       return {ErrorCode::store_damaged, "is damaged: " + what, path, "run again into a new folder"};
     default:
       return {ErrorCode::internal, what, path, ""};
   }
+}
+
+// Ends queries that need too many steps of SQLite's virtual machine before their next row. A table of 10^7 rows needs
+// some 10^8 steps to be sorted. No clock: the same file gives the same result on every machine.
+class StepLimit {
+ public:
+  explicit StepLimit(sqlite3* db) : db_(db) {
+    sqlite3_progress_handler(db_, kStepsPerCall, &StepLimit::count, &calls_);
+  }
+  StepLimit(const StepLimit&) = delete;
+  StepLimit& operator=(const StepLimit&) = delete;
+  ~StepLimit() { sqlite3_progress_handler(db_, 0, nullptr, nullptr); }
+
+ private:
+  static constexpr int kStepsPerCall = 10'000'000, kMostCalls = 100;
+  static int count(void* calls) { return ++*static_cast<int*>(calls) > kMostCalls ? 1 : 0; }
+  sqlite3* db_;
+  int calls_ = 0;
+};
+
+void distrust_schema(sqlite3* db) {
+  for (const auto& [option, value] : {std::pair{SQLITE_DBCONFIG_DEFENSIVE, 1},
+                                      {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
+                                      {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0},
+                                      {SQLITE_DBCONFIG_ENABLE_VIEW, 0}}) {
+    sqlite3_db_config(db, option, value, nullptr);
+  }
+  sqlite3_limit(db, SQLITE_LIMIT_LENGTH, 1 << 28);
+}
+
+// One line a column: name, type, key, hidden or generated.
+Result<std::string> columns_of(Database& db, const std::string& table) {
+  auto select = db.prepare("SELECT name, type, pk, hidden FROM pragma_table_xinfo(?)");
+  if (!select) return failure(select);
+  select->bind(1, table);
+  std::string columns;
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return failure(row);
+    if (!*row) return columns;
+    columns += fmt::format("{} {} {} {}\n", select->text(0), select->text(1), select->integer(2), select->integer(3));
+  }
+}
+
+// "table", "view", "virtual" or "shadow"; empty if there is no such table.
+Result<std::string> type_of(Database& db, const std::string& table) {
+  auto select = db.prepare("SELECT type FROM pragma_table_list WHERE schema = 'main' AND name = ?");
+  if (!select) return failure(select);
+  const auto row = select->bind(1, table).step();
+  if (!row) return failure(row);
+  return *row ? select->text(0) : std::string();
 }
 
 // Percent-encodes the characters that have a meaning in a URI.
@@ -80,6 +150,7 @@ SqlStatement& SqlStatement::bind(int index, const std::optional<double>& value) 
 }
 
 Result<bool> SqlStatement::step() {
+  const StepLimit limit(db_);
   const int code = sqlite3_step(statement_);
   if (code == SQLITE_ROW) return true;
   if (code == SQLITE_DONE) return false;
@@ -128,11 +199,15 @@ Result<Database> Database::open(const std::string& path, Mode mode) {
   int flags = SQLITE_OPEN_READWRITE;
   if (mode == Mode::create) flags |= SQLITE_OPEN_CREATE;
   std::string name = path;
+  if (mode != Mode::create) {
+    if (const auto file = InputFile::open(path); !file) return failure(file);
+  }
   if (mode == Mode::read_only) {
+    std::error_code error;
     flags = SQLITE_OPEN_READONLY;
     // Without a write-ahead log no process is writing. With `immutable` SQLite creates no -wal and -shm files beside
     // the database and so needs no write permission for the folder.
-    if (!std::filesystem::exists(path + "-wal")) {
+    if (!std::filesystem::exists(path + "-wal", error)) {
       flags |= SQLITE_OPEN_URI;
       name = "file:" + percent_encoded(path) + "?immutable=1";
     }
@@ -141,6 +216,7 @@ Result<Database> Database::open(const std::string& path, Mode mode) {
   const int code = sqlite3_open_v2(name.c_str(), &handle, flags, nullptr);
   Database db(handle, path);
   if (code != SQLITE_OK) return tl::unexpected<Error>(error_of(handle, path));
+  distrust_schema(handle);
   sqlite3_busy_timeout(handle, 5000);  // ms; waits for short locks of other processes
   // NORMAL: with a write-ahead log, committed data survive when the process is killed.
   if (mode != Mode::read_only) {
@@ -162,8 +238,37 @@ Database::~Database() {
 }
 
 Status Database::execute(const std::string& sql) {
+  const StepLimit limit(db_);
   if (sqlite3_exec(db_, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK) return {};
   return tl::unexpected<Error>(error_of(db_, path_));
+}
+
+Status Database::expect_tables(const std::string& schema) {
+  auto expected = open(":memory:", Mode::create);
+  if (!expected) return failure(expected);
+  if (Status s = expected->execute(schema); !s) return s;
+  return for_each_row(*expected, "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name",
+                      [&](const SqlStatement& row) -> Status {
+                        const std::string table = row.text(0);
+                        const auto damaged = [&](const std::string& how) {
+                          return failure(ErrorCode::store_damaged, "is damaged: table '" + table + "' " + how, path_,
+                                         "run again into a new folder");
+                        };
+                        const auto type = type_of(*this, table);
+                        if (!type) return failure(type);
+                        if (type->empty()) return damaged("is missing");
+                        if (*type != "table") return damaged("is not a table but of type '" + *type + "'");
+                        const auto wanted = columns_of(*expected, table), found = columns_of(*this, table);
+                        if (!wanted) return failure(wanted);
+                        if (!found) return failure(found);
+                        if (*wanted != *found) return damaged("has other columns than expected");
+                        return {};
+                      });
+}
+
+bool Database::was_moved() const {
+  int moved = 0;
+  return sqlite3_file_control(db_, nullptr, SQLITE_FCNTL_HAS_MOVED, &moved) == SQLITE_OK && moved != 0;
 }
 
 Result<SqlStatement> Database::prepare(const std::string& sql) {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "spartan/core/archive.h"
 #include "spartan/core/result.h"
@@ -52,8 +53,10 @@ class SqlStatement {
 class Database {
  public:
   enum class Mode { create, open, read_only };
-  /// Opens the database, with a write-ahead log unless it is read-only. Codes: `output` (cannot be created or written),
-  /// `store_damaged` (missing, damaged or not a database).
+  /// Opens the database, with a write-ahead log unless it is read-only. Files may come from strangers: views, triggers
+  /// and functions with side effects are disabled, and a query that needs more than about 10^9 steps for a row ends.
+  /// Codes: `input` and `read_error` (an existing file is expected, see read_file()), `output` (cannot be created or
+  /// written), `store_damaged` (damaged or not a database), `resources`.
   static Result<Database> open(const std::string& path, Mode mode);
   Database(Database&&) noexcept;
   Database& operator=(Database&&) noexcept;
@@ -62,11 +65,32 @@ class Database {
   Status execute(const std::string& sql);
   Result<SqlStatement> prepare(const std::string& sql);
   const std::string& path() const { return path_; }
+  /// Compares the tables that the statements of `schema` create (CREATE TABLE) with those of this database: names of
+  /// tables, and names, types and keys of their columns in their order. Code `store_damaged`, with the name of the
+  /// table that is missing, differs, or is a view or a virtual table.
+  Status expect_tables(const std::string& schema);
+
+  /// Whether the file was removed or renamed, or replaced by another one, since it was opened.
+  bool was_moved() const;
 
  private:
   Database(sqlite3* db, std::string path) : db_(db), path_(std::move(path)) {}
   sqlite3* db_ = nullptr;
   std::string path_;
 };
+
+/// Calls `read(row)` for each row of a query until it returns an error. Codes as SqlStatement::step(), and those of
+/// `read`.
+template <class Read>
+Status for_each_row(Database& db, const std::string& sql, const Read& read) {
+  auto select = db.prepare(sql);
+  if (!select) return failure(select);
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return failure(row);
+    if (!*row) return {};
+    if (Status s = read(std::as_const(*select)); !s) return s;
+  }
+}
 
 }  // namespace spartan

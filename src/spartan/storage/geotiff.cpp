@@ -51,7 +51,7 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
   }
   GDALRegister_GTiff();
   CPLPushErrorHandler(CPLQuietErrorHandler);
-  const std::string temporary = path + ".part";
+  const std::string temporary = temporary_name(path);
   auto written = [&]() -> Status {
     GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
     const std::array<const char*, 6> options{"COMPRESS=DEFLATE", "PREDICTOR=3",      "TILED=YES",
@@ -67,7 +67,7 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
     dataset.reset();  // writes the last blocks: a full disk is reported here
     if (CPLGetLastErrorType() >= CE_Failure)
       return failure(ErrorCode::output, std::string("cannot be written: ") + CPLGetLastErrorMsg(), path);
-    return std::rename(temporary.c_str(), path.c_str()) == 0 ? Status{} : Status(write_failure(path, errno));
+    return publish_file(temporary, path);
   }();
   CPLPopErrorHandler();
   if (!written) std::remove(temporary.c_str());

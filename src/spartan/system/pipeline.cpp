@@ -230,6 +230,22 @@ Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
+Status Pipeline::check_memory(std::int64_t most_bytes) const {
+  const State& s = *state_;
+  const bool odometry_needs = s.computes_terrain || s.options.odometry.reconstruction.source == DisparitySource::dense;
+  for (const StereoPair& pair : s.rig.pairs) {
+    if (!s.maps_stops && !(odometry_needs && pair.name == s.pair.name)) continue;
+    const RectifiedStereo geometry = s.imager.geometry(pair.name);
+    const DisparityRange range = disparity_range(geometry, pair.nearest_m);
+    if (Status fits = DisparityComputer::check_memory(geometry.size, range, most_bytes); !fits) {
+      Error error = fits.error();
+      error.where = "pair '" + pair.name + "'";
+      return tl::unexpected(std::move(error));
+    }
+  }
+  return {};
+}
+
 void Pipeline::align_with_gravity(std::span<const ImuSample> stationary_samples) {
   if (const auto reading = static_reading(stationary_samples, with_gravity(state_->options)))
     state_->up_in_body = reading->accel_m_s2.normalized();

@@ -66,6 +66,9 @@ class Pipeline {
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
 
+  /// Code `resources` where the disparity images of a pair need more than `most_bytes` (0: no bound); names the pair.
+  Status check_memory(std::int64_t most_bytes) const;
+
   /// Gravity alignment from IMU samples of a stationary rover that cannot be added before the first frame. Used only if
   /// no sample that is added before the first frame measures gravity.
   void align_with_gravity(std::span<const ImuSample> stationary_samples);

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -139,6 +140,10 @@ Status RunLoop::begin() {
   }
   const auto frames = store_.frames();
   if (!frames) return failure(frames);
+  if (frames->empty()) {
+    return failure(ErrorCode::store_damaged, "is damaged: it has a saved state, but table 'frames' is empty",
+                   folder_.store(), "run again into a new folder");
+  }
   frames_ = static_cast<int>(frames->size());
   for (const FrameRecord& frame : *frames) usable_frames_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, store_.tiles()); !status) return status;
@@ -147,10 +152,15 @@ Status RunLoop::begin() {
     if (!frame) return failure(frame);
     if (Status status = pipeline_.restore_frame(*frame); !status) return status;
   }
-  samples_taken_ = (*checkpoint)->samples_taken;
+  samples_taken_ = (*checkpoint)->source.samples_taken;
   resumed_ = true;
   hooks_.log.info(fmt::format("resuming after frame {}", frames->back().frame_id));
-  return source_.seek(samples_taken_);
+  if (Status sought = source_.seek(samples_taken_); !sought) return sought;
+  if (source_.content_hash() == (*checkpoint)->source.content_hash) return {};
+  return failure(ErrorCode::configuration,
+                 "the recording is not the one that the run began with: an image or a row of a sensor table that was "
+                 "processed has changed",
+                 source_.info().path, "restore the recording, or run into a new folder");
 }
 
 Status RunLoop::process_samples() {
@@ -292,7 +302,7 @@ Status RunLoop::commit(const RunStore::Step& step) {
     if (Status flushed = pipeline_.flush_maps(); !flushed) return failure(flushed);
     return pipeline_.save();
   };
-  Status status = store_.commit(step, save, samples_taken_);
+  Status status = store_.commit(step, save, {samples_taken_, source_.content_hash()});
   if (!step.frame) return status;
   ++frames_;
   if (status && hooks_.progress) hooks_.progress({frames_, source_.info().sequence.announced, step.frame->status});
@@ -346,9 +356,17 @@ Result<RunOutcome> write_results(RunLoop& run_loop, const RunRequest& request, c
   return outcome;
 }
 
-}  // namespace
+void report_sensor_rows(const FrameSource& source, const Log& log) {
+  if (const std::int64_t rows = source.sensor_samples_discarded(); rows > 0)
+    log.warning(fmt::format("{} sensor samples discarded: their time stamps are not in increasing order", rows));
+  const UnreadableRows unreadable = source.unreadable_sensor_rows();
+  if (unreadable.count > 0) {
+    log.warning(fmt::format("{} rows of sensor tables left out: they cannot be parsed; the first: {}", unreadable.count,
+                            unreadable.first));
+  }
+}
 
-Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
+Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& given_hooks) {
   const auto start = std::chrono::steady_clock::now();
   OpenOptions open;
   open.format = request.format;
@@ -367,7 +385,8 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   }
   auto pipeline = Pipeline::create(info.rig, options, ThreadPool(request.threads), mask_folder);
   if (!pipeline) return failure(pipeline);
-  const auto prepared = prepare_run_folder(folder, request.resume);
+  if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
+  auto prepared = prepare_run_folder(folder, request.resume);
   if (!prepared) return failure(prepared);
   RunHooks hooks = given_hooks;
   hooks.log = given_hooks.log.with_file(folder.log());
@@ -382,11 +401,10 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   RunLoop run_loop(request, hooks, **source, std::move(*pipeline), std::move(*store), folder);
   if (Status s = run_loop.begin(); !s) return failure(s);
   if (Status s = run_loop.process_samples(); !s) return failure(s);
-  if (const std::int64_t rows = (*source)->sensor_samples_discarded(); rows > 0)
-    hooks.log.warning(fmt::format("{} sensor samples discarded: their time stamps are not in increasing order", rows));
+  report_sensor_rows(**source, hooks.log);
   if (run_loop.usable_frames() == 0 && !run_loop.stopped()) {
     // An empty run folder would block the next attempt.
-    if (*prepared == FolderState::created) remove_run_folder(folder);
+    if (prepared->state == FolderState::created) remove_run_folder(folder);
     return failure(ErrorCode::input, "the recording has no usable frame; first error: " + run_loop.first_error(),
                    info.path);
   }
@@ -399,10 +417,24 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& given_hooks) {
   facts.heading_east = run_loop.heading_east();
   facts.threads = request.threads;
   facts.absent = disabled_stages(options);
+  facts.sensor_rows_reversed = (*source)->sensor_samples_discarded();
+  facts.sensor_rows_unreadable = (*source)->unreadable_sensor_rows().count;
   facts.resumed_from_frame = run_loop.resumed_from_frame();
   facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   facts.cpu_seconds = cpu_seconds();
-  return write_results(run_loop, request, info.rig, folder, facts, hooks.log);
+  auto outcome = write_results(run_loop, request, info.rig, folder, facts, hooks.log);
+  if (outcome) outcome->lock = std::move(prepared->lock);
+  return outcome;
+}
+
+}  // namespace
+
+Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
+  try {
+    return run_recording(request, hooks);
+  } catch (const std::bad_alloc& exception) {
+    return tl::unexpected(out_of_memory(exception));
+  }
 }
 
 }  // namespace spartan

@@ -1,11 +1,13 @@
 // Runs the pipeline over a recording and writes a run folder (`spartan run`).
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 
 #include "spartan/camera/frame_source.h"
+#include "spartan/core/files.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
 #include "spartan/system/run_options.h"
@@ -22,6 +24,7 @@ struct RunRequest {
   GivenKeys given;      ///< keys of `options` that the user gave: the recording's noise does not replace them
   bool resume = false;  ///< continue the run in `output`, if there is one
   int threads = 1;
+  std::int64_t memory_bytes = 0;  ///< refuse recordings that need more, see Pipeline::check_memory(); 0: no bound
   int max_frames = 0;  ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all
   std::string version;
 };
@@ -43,11 +46,14 @@ struct RunOutcome {
   std::string summary_json;
   bool lost = false;         ///< the odometry was lost at least once
   bool interrupted = false;  ///< stopped by should_stop; can be resumed
+  /// Keeps other processes out of the run folder. Declared last: files that the caller adds are written before.
+  FolderLock lock;
 };
 
 /// Codes: `input` (no recording, no usable frame), `store_damaged` (the run to be resumed), `configuration` (rig,
-/// options, or resuming another run), `output` (the folder already exists, cannot be written, disk full). Everything
-/// that was committed before an error remains.
+/// options, or resuming another run), `output` (the folder already exists, is in use by another process, cannot be
+/// written, disk full), `read_error` and `resources` (a file of the recording cannot be read now, or memory ran out:
+/// the run can be resumed). Everything that was committed before an error remains.
 Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks);
 
 }  // namespace spartan

@@ -1,30 +1,52 @@
 #include "spartan/system/run_folder.h"
 
+#include <sys/stat.h>
+
+#include <cerrno>
 #include <filesystem>
+#include <utility>
 
 #include "spartan/core/files.h"
 
 namespace spartan {
 
-Result<FolderState> prepare_run_folder(const RunFolder& folder, bool resume) {
+namespace fs = std::filesystem;
+
+Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) {
+  const fs::path parent = (fs::path(folder.path) / "").parent_path().parent_path();  // also of "path/"
+  if (!parent.empty()) {
+    if (Status made = make_folder(parent.string()); !made)
+      return failure(made.error().code, made.error().what, folder.path, made.error().hint);
+  }
+  // mkdir: of two processes only one creates the folder.
+  const bool created = ::mkdir(folder.path.c_str(), 0777) == 0;
+  if (!created && errno != EEXIST) return write_failure(folder.path, errno);
   std::error_code error;
-  const bool exists = std::filesystem::exists(folder.path, error);
-  if (exists && !std::filesystem::is_directory(folder.path, error)) {
+  if (!created && !fs::is_directory(folder.path, error)) {
     return failure(ErrorCode::output, "is not a folder", folder.path, "choose another folder with -o");
   }
-  if (exists && !resume) {
+  const auto exists = [&] {
     return failure(ErrorCode::output, "already exists and is not overwritten", folder.path,
                    "choose another folder with -o, or continue the run with --resume");
-  }
+  };
+  if (!created && !resume) return exists();
+  auto lock = FolderLock::acquire(folder.path);
+  if (!lock) return failure(lock);
+  // Another process with --resume may have been the first to lock the folder that this one created.
+  if (!resume && fs::exists(folder.store(), error)) return exists();
+  if (Status synced = sync_folder(parent.empty() ? "." : parent.string()); !synced) return failure(synced);
   for (const std::string& part : {folder.terrain(), folder.maps()}) {
     if (Status made = make_folder(part); !made) return failure(made);
   }
-  return exists ? FolderState::existed : FolderState::created;
+  for (const std::string& part : {folder.path, folder.terrain(), folder.maps(), folder.report()}) {
+    remove_temporary_files(part);
+  }
+  return OwnedRunFolder{created ? FolderState::created : FolderState::existed, std::move(*lock)};
 }
 
 void remove_run_folder(const RunFolder& folder) {
   std::error_code ignored;
-  std::filesystem::remove_all(folder.path, ignored);
+  fs::remove_all(folder.path, ignored);
 }
 
 }  // namespace spartan

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "spartan/core/files.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
 #include "spartan/core/time.h"
@@ -59,9 +60,16 @@ struct RunFolder {
 
 enum class FolderState { created, existed };
 
-/// Creates a new folder; with `resume` an existing one is accepted. Code `output` if it exists and `resume` is false
-/// (it stays untouched), or if it cannot be created.
-Result<FolderState> prepare_run_folder(const RunFolder& folder, bool resume);
+/// A run folder that no other process works on while this value lives.
+struct OwnedRunFolder {
+  FolderState state = FolderState::created;
+  FolderLock lock;
+};
+
+/// Creates a new folder; with `resume` an existing one is accepted, and temporary files that a killed process left
+/// there are removed. Codes: `output` if it exists and `resume` is false (it stays untouched), if another process works
+/// on it, or if it cannot be created; `resources`.
+Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume);
 
 /// Removes the folder of a run that failed without any result.
 void remove_run_folder(const RunFolder& folder);

@@ -125,11 +125,39 @@ Status RunStore::State::prepare() {
   if (Status s = make(insert_health, "INSERT INTO health VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s) return s;
   if (Status s = make(insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?,?,?,?,?)"); !s) return s;
   if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
-  return make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)");
+  if (Status s = make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)"); !s) return s;
+  if (Status s = make(replace_content, "INSERT OR REPLACE INTO identity VALUES ('content',?)"); !s) return s;
+  if (Status s = make(select_checkpoint, "SELECT samples_taken FROM memory"); !s) return s;
+  const auto stored = stored_samples();
+  if (!stored) return failure(stored);
+  samples_taken = *stored;
+  return {};
+}
+
+Result<std::optional<std::int64_t>> RunStore::State::stored_samples() {
+  select_checkpoint->reset();
+  const auto row = select_checkpoint->step();
+  std::optional<std::int64_t> samples;
+  if (row && *row) samples = select_checkpoint->integer(0);
+  select_checkpoint->reset();
+  if (!row) return failure(row);
+  return samples;
+}
+
+Status RunStore::State::expect_unchanged() {
+  if (db.was_moved()) {
+    return failure(ErrorCode::output, "was removed or replaced during the run", db.path(),
+                   "run again into a new folder");
+  }
+  const auto stored = stored_samples();
+  if (!stored) return failure(stored);
+  if (*stored == samples_taken) return {};
+  return failure(ErrorCode::output, "was changed by another process during the run", db.path(),
+                 "let one process work on a run folder, then continue with --resume");
 }
 
 Status RunStore::State::write(const Step& step, const std::function<Result<Bytes>()>& save,
-                              std::int64_t samples_taken) {
+                              const SourcePosition& source) {
   if (step.frame) {
     if (Status s = write(*step.frame); !s) return s;
   }
@@ -142,7 +170,10 @@ Status RunStore::State::write(const Step& step, const std::function<Result<Bytes
   if (Status s = write(step.times); !s) return s;
   const auto pipeline_state = save();
   if (!pipeline_state) return failure(pipeline_state);
-  return replace_checkpoint->bind(1, samples_taken).bind(2, *pipeline_state).run();
+  Bytes memory = *pipeline_state;
+  append_checksum(memory);
+  if (Status s = replace_checkpoint->bind(1, source.samples_taken).bind(2, memory).run(); !s) return s;
+  return replace_content->bind(1, fmt::format("{:016x}", source.content_hash)).run();
 }
 
 Status RunStore::State::write(const LocalizationRecord& l) {
@@ -205,7 +236,8 @@ RunStore& RunStore::operator=(RunStore&&) noexcept = default;
 RunStore::~RunStore() = default;
 
 Result<bool> RunStore::contains_run(const std::string& path) {
-  if (!std::filesystem::exists(path)) return false;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return false;
   auto db = Database::open(path, Database::Mode::open);
   if (!db) return failure(db);
   auto tables = db->prepare("SELECT count(*) FROM sqlite_master");
@@ -235,6 +267,7 @@ Result<RunStore> RunStore::resume(const std::string& path, const RunIdentity& id
   auto db = Database::open(path, Database::Mode::open);
   if (!db) return failure(db);
   if (Status s = check_version(*db); !s) return failure(s);
+  if (Status s = db->expect_tables(kSchema); !s) return failure(s);
   if (Status s = expect_identity(*db, "input", identity.input, "another input"); !s) return failure(s);
   if (Status s = expect_identity(*db, "rig", identity.rig, "another rig"); !s) return failure(s);
   if (Status s = expect_identity(*db, "options", identity.options, "other options"); !s) return failure(s);
@@ -244,11 +277,13 @@ Result<RunStore> RunStore::resume(const std::string& path, const RunIdentity& id
 }
 
 Result<RunStore> RunStore::open_read_only(const std::string& path) {
-  if (!std::filesystem::exists(path))
+  std::error_code error;
+  if (!std::filesystem::exists(path, error))
     return failure(ErrorCode::input, "does not exist: this is not a run folder", path);
   auto db = Database::open(path, Database::Mode::read_only);
   if (!db) return failure(db);
   if (Status s = check_version(*db); !s) return failure(s);
+  if (Status s = db->expect_tables(kSchema); !s) return failure(s);
   auto state = std::make_unique<State>(std::move(*db));
   auto tiles = TileStore::open_existing(state->db);
   if (!tiles) return failure(tiles);
@@ -256,10 +291,12 @@ Result<RunStore> RunStore::open_read_only(const std::string& path) {
   return RunStore(std::move(state));
 }
 
-Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken) {
+Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source) {
   if (Status s = state_->db.execute("BEGIN IMMEDIATE"); !s) return s;
-  Status written = state_->write(step, save, samples_taken);
+  Status written = state_->expect_unchanged();
+  if (written) written = state_->write(step, save, source);
   if (written) written = state_->db.execute("COMMIT");
+  if (written) state_->samples_taken = source.samples_taken;
   if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // fails if SQLite has already rolled back
   return written;
 }

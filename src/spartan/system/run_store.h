@@ -96,9 +96,15 @@ class RunStore {
     std::optional<MapRecord> map;
     std::vector<StageTime> times;  ///< for the last frame of the store, if the step has no frame
   };
+  /// How far the recording was read.
+  struct SourcePosition {
+    std::int64_t samples_taken = 0;  ///< for FrameSource::seek()
+    std::uint64_t content_hash = 0;  ///< FrameSource::content_hash()
+  };
   /// Writes in one transaction, completely or not at all: the step; the map tiles that `save` flushes; the pipeline
-  /// state after the step that `save` returns (only the latest is kept); the number of samples read from the source.
-  Status commit(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken);
+  /// state after the step that `save` returns and the position in the recording (only the latest are kept). Codes:
+  /// `output` if the file cannot be written, was removed, or was changed by another process; those of `save`.
+  Status commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source);
 
   /// Tables of the global map.
   TileStore& tiles();
@@ -110,8 +116,8 @@ class RunStore {
 
   /// State from which a run is resumed.
   struct Checkpoint {
-    Bytes pipeline_state;            ///< Pipeline::save()
-    std::int64_t samples_taken = 0;  ///< number of samples read from the source, for FrameSource::seek()
+    Bytes pipeline_state;  ///< Pipeline::save()
+    SourcePosition source;
   };
   /// The latest checkpoint; none before the first commit.
   Result<std::optional<Checkpoint>> checkpoint();

@@ -1,5 +1,10 @@
 // Reading the records of a run store.
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "spartan/system/internal/run_store_state.h"
@@ -50,17 +55,40 @@ class RowsOfFrames {
   bool more_ = false;
 };
 
-LocalizationRecord localization_of(const SqlStatement& row) {
+tl::unexpected<Error> damaged_table(const Database& db, const char* table, const char* what) {
+  return failure(ErrorCode::store_damaged, std::string("is damaged: table '") + table + "': " + what, db.path(),
+                 "run again into a new folder");
+}
+
+bool is_pose(const Pose& pose) {
+  return pose.translation().allFinite() && std::abs(pose.rotation().norm() - 1) < 1e-6;
+}
+
+constexpr const char* kNoPose = "a pose is incomplete or not finite";
+
+// A pose and, in the column behind it, its covariance; none if they are incomplete or the pose is not finite.
+std::optional<UncertainPose> uncertain_pose_of(const SqlStatement& row, int column) {
+  const Bytes pose = row.blob(column), covariance = row.blob(column + 1);
+  ArchiveReader pose_in(pose), covariance_in(covariance);
+  const UncertainPose read{pose_in.get_pose(), covariance_in.get_matrix6()};
+  if (!pose_in.finish("") || !covariance_in.finish("")) return std::nullopt;
+  return is_pose(read.pose) ? std::optional(read) : std::nullopt;
+}
+
+std::optional<LocalizationRecord> localization_of(const SqlStatement& row) {
+  const auto world = uncertain_pose_of(row, 1), odom = uncertain_pose_of(row, 3);
+  if (!world || !odom) return std::nullopt;
   LocalizationRecord l;
-  const Bytes pose = row.blob(1), covariance = row.blob(2), odom = row.blob(3), odom_covariance = row.blob(4);
-  l.world_from_body = {ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()};
-  l.odom_from_body = {ArchiveReader(odom).get_pose(), ArchiveReader(odom_covariance).get_matrix6()};
+  l.world_from_body = *world;
+  l.odom_from_body = *odom;
   if (!row.is_null(5)) l.slip = row.real(5);
   if (!row.is_null(6)) l.slip_sigma = row.real(6);
   return l;
 }
 
-FrameRecord frame_of(const SqlStatement& row) {
+// None if a pose or a covariance is incomplete, a pose is not finite, or a stamp is out of range.
+std::optional<FrameRecord> frame_of(const SqlStatement& row) {
+  constexpr std::int64_t kLatest_ns = std::numeric_limits<std::int64_t>::max() / 2;  // differences of stamps fit
   FrameRecord r;
   r.frame_id = row.integer(1);
   r.pair = row.text(2);
@@ -71,13 +99,19 @@ FrameRecord frame_of(const SqlStatement& row) {
   r.has_pose = row.integer(7) != 0;
   const Eigen::Quaterniond q(row.real(14), row.real(11), row.real(12), row.real(13));
   r.world_from_body.pose = Pose::from_unit_quaternion(q, {row.real(8), row.real(9), row.real(10)});
-  const Bytes covariance = row.blob(15), motion = row.blob(18), motion_covariance = row.blob(19);
-  r.world_from_body.covariance = ArchiveReader(covariance).get_matrix6();
+  const Bytes covariance = row.blob(15);
+  ArchiveReader covariance_in(covariance);
+  r.world_from_body.covariance = covariance_in.get_matrix6();
+  const auto motion = uncertain_pose_of(row, 18);
+  if (!motion || !covariance_in.finish("") || !is_pose(r.world_from_body.pose)) return std::nullopt;
   r.motion.from.ns = row.integer(16);
+  for (const std::int64_t ns : {r.stamp.ns, r.motion.from.ns}) {
+    if (ns > kLatest_ns || ns < -kLatest_ns) return std::nullopt;
+  }
   r.motion.to = r.stamp;
   r.motion.first = row.integer(17) != 0;
-  r.motion.previous_from_current = ArchiveReader(motion).get_pose();
-  r.motion.covariance = ArchiveReader(motion_covariance).get_matrix6();
+  r.motion.previous_from_current = motion->pose;
+  r.motion.covariance = motion->covariance;
   r.motion.landmarks = static_cast<int>(row.integer(20));
   r.motion.matches = static_cast<int>(row.integer(21));
   r.motion.inliers = static_cast<int>(row.integer(22));
@@ -86,6 +120,25 @@ FrameRecord frame_of(const SqlStatement& row) {
 }
 
 }  // namespace
+
+void append_checksum(Bytes& bytes) {
+  Hash64 hash;
+  hash.add(bytes.data(), bytes.size());
+  ArchiveWriter out;
+  out.put(hash.value());
+  const Bytes checksum = out.take();
+  bytes.insert(bytes.end(), checksum.begin(), checksum.end());
+}
+
+bool remove_checksum(Bytes& bytes) {
+  if (bytes.size() < sizeof(std::uint64_t)) return false;
+  Bytes before(bytes.begin(), bytes.end() - sizeof(std::uint64_t));
+  Bytes expected = before;
+  append_checksum(expected);
+  if (expected != bytes) return false;
+  bytes = std::move(before);
+  return true;
+}
 
 TileStore& RunStore::tiles() {
   return *state_->tiles;
@@ -110,18 +163,24 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
     if (!row) return failure(row);
     if (!*row) return records;
     const std::int64_t seq = select->integer(0);
-    FrameRecord& r = records.emplace_back(frame_of(*select));
+    auto frame = frame_of(*select);
+    if (!frame) return damaged_table(db, "frames", kNoPose);
+    FrameRecord& r = records.emplace_back(std::move(*frame));
+    const char* damaged = nullptr;  // name of a table
     Status read = times->of(seq, [&](const SqlStatement& time) {
       r.times.push_back({time.text(1), time.real(2), time.real(3)});
     });
     if (read) {
       read = slam->of(seq, [&](const SqlStatement& corrected) {
-        const Bytes pose = corrected.blob(1), covariance = corrected.blob(2);
-        r.slam = UncertainPose{ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()};
+        r.slam = uncertain_pose_of(corrected, 1);
+        if (!r.slam) damaged = "slam";
       });
     }
     if (read) {
-      read = localization->of(seq, [&](const SqlStatement& localized) { r.localization = localization_of(localized); });
+      read = localization->of(seq, [&](const SqlStatement& localized) {
+        r.localization = localization_of(localized);
+        if (!r.localization) damaged = "localization";
+      });
     }
     if (read) {
       read = health->of(seq, [&](const SqlStatement& sensor) {
@@ -129,50 +188,49 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
       });
     }
     if (!read) return failure(read);
+    if (damaged != nullptr) return damaged_table(db, damaged, kNoPose);
   }
 }
 
 Result<std::vector<TerrainRecord>> RunStore::terrain() {
-  auto select = state_->db.prepare("SELECT * FROM terrain ORDER BY stamp_ns");
-  if (!select) return failure(select);
   std::vector<TerrainRecord> records;
-  for (;;) {
-    const auto row = select->step();
-    if (!row) return failure(row);
-    if (!*row) return records;
-    records.push_back({Stamp{select->integer(0)}, select->text(1), select->real(2), select->integer(3)});
-  }
+  const Status status =
+      for_each_row(state_->db, "SELECT * FROM terrain ORDER BY stamp_ns", [&](const SqlStatement& row) {
+        records.push_back({Stamp{row.integer(0)}, row.text(1), row.real(2), row.integer(3)});
+        return Status();
+      });
+  if (!status) return failure(status);
+  return records;
 }
 
 Result<std::vector<MapRecord>> RunStore::maps() {
-  auto select = state_->db.prepare("SELECT * FROM maps ORDER BY stamp_ns");
-  if (!select) return failure(select);
   std::vector<MapRecord> records;
-  for (;;) {
-    const auto row = select->step();
-    if (!row) return failure(row);
-    if (!*row) return records;
-    const Bytes pose = select->blob(3), covariance = select->blob(4), prior = select->blob(7),
-                prior_covariance = select->blob(8);
-    records.push_back({Stamp{select->integer(0)},
-                       select->integer(1),
-                       static_cast<int>(select->integer(2)),
-                       {ArchiveReader(prior).get_pose(), ArchiveReader(prior_covariance).get_matrix6()},
-                       {ArchiveReader(pose).get_pose(), ArchiveReader(covariance).get_matrix6()},
-                       select->text(9),
-                       select->real(10),
-                       static_cast<int>(select->integer(5)),
-                       static_cast<int>(select->integer(6))});
-  }
+  const Status status =
+      for_each_row(state_->db, "SELECT * FROM maps ORDER BY stamp_ns", [&](const SqlStatement& row) -> Status {
+        const auto prior = uncertain_pose_of(row, 7), corrected = uncertain_pose_of(row, 3);
+        if (!prior || !corrected) return damaged_table(state_->db, "maps", kNoPose);
+        records.push_back({Stamp{row.integer(0)}, row.integer(1), static_cast<int>(row.integer(2)), *prior, *corrected,
+                           row.text(9), row.real(10), static_cast<int>(row.integer(5)),
+                           static_cast<int>(row.integer(6))});
+        return {};
+      });
+  if (!status) return failure(status);
+  return records;
 }
 
 Result<std::optional<RunStore::Checkpoint>> RunStore::checkpoint() {
-  auto select = state_->db.prepare("SELECT samples_taken, stages FROM memory");
+  auto select = state_->db.prepare(
+      "SELECT samples_taken, stages, (SELECT value FROM identity WHERE key = 'content') FROM memory");
   if (!select) return failure(select);
   const auto row = select->step();
   if (!row) return failure(row);
   if (!*row) return std::nullopt;
-  return Checkpoint{select->blob(1), select->integer(0)};
+  Checkpoint checkpoint{select->blob(1), {select->integer(0), 0}};
+  if (!remove_checksum(checkpoint.pipeline_state)) return damaged_table(state_->db, "memory", "the checksum differs");
+  const std::string hash = select->text(2);
+  const auto [end, error] = std::from_chars(hash.data(), hash.data() + hash.size(), checkpoint.source.content_hash, 16);
+  if (error == std::errc() && end == hash.data() + hash.size()) return checkpoint;
+  return damaged_table(state_->db, "identity", "'content' is missing or not a number");
 }
 
 }  // namespace spartan

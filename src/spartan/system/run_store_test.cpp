@@ -70,19 +70,17 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
       const std::optional<TerrainRecord> terrain =
           i == 2 ? std::optional(TerrainRecord{some_frame(i).stamp, "narrow", 91.5, 1234}) : std::nullopt;
       const std::optional<MapRecord> map = i == 1 ? std::optional(some_map(i)) : std::nullopt;
-      ASSERT_TRUE(store->commit(
-          {some_frame(i), terrain, map, {}},
-          [&] {
-            return Bytes{1, 2, static_cast<std::uint8_t>(i)};
-          },
-          10 * i));
+      ASSERT_TRUE(store->commit({some_frame(i), terrain, map, {}},
+                                [&] {
+                                  return Bytes{1, 2, static_cast<std::uint8_t>(i)};
+                                },
+                                {10 * i, 0}));
     }
-    ASSERT_TRUE(store->commit(
-        {{}, {}, some_map(4), {{"maps", 7.0, 6.0}}},
-        [] {
-          return Bytes{1, 2, 4};
-        },
-        40))
+    ASSERT_TRUE(store->commit({{}, {}, some_map(4), {{"maps", 7.0, 6.0}}},
+                              [] {
+                                return Bytes{1, 2, 4};
+                              },
+                              {40, 0}))
         << "the last stop";
   }
   auto store = RunStore::resume(path, kIdentity);
@@ -138,20 +136,19 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
   const auto checkpoint = store->checkpoint();
   ASSERT_TRUE(checkpoint && *checkpoint);
   EXPECT_EQ((*checkpoint)->pipeline_state, (Bytes{1, 2, 4})) << "only the latest is retained";
-  EXPECT_EQ((*checkpoint)->samples_taken, 40);
+  EXPECT_EQ((*checkpoint)->source.samples_taken, 40);
   const auto terrain = store->terrain();
   ASSERT_TRUE(terrain);
   ASSERT_EQ(terrain->size(), 1U);
   EXPECT_EQ(terrain->front().points, 1234);
 }
 
-// Counts the steps of SQLite's virtual machine over all databases that are opened during its lifetime. Statements are
-// interrupted once there are more than `max_steps`.
+// Counts the steps of SQLite's virtual machine in all finished statements of databases that are opened during its
+// lifetime.
 class StepCounter {
  public:
-  explicit StepCounter(std::int64_t max_steps) {
+  StepCounter() {
     steps_ = 0;
-    max_steps_ = max_steps;
     sqlite3_auto_extension(reinterpret_cast<void (*)()>(&install));
   }
   StepCounter(const StepCounter&) = delete;
@@ -160,13 +157,14 @@ class StepCounter {
   std::int64_t steps() const { return steps_; }
 
  private:
-  static constexpr int kGranularity = 10;
   static int install(sqlite3* db, const char**, const void*) {
-    sqlite3_progress_handler(
-        db, kGranularity, [](void*) { return (steps_ += kGranularity) > max_steps_ ? 1 : 0; }, nullptr);
-    return SQLITE_OK;
+    const auto count = [](unsigned, void*, void* statement, void*) {
+      steps_ += sqlite3_stmt_status(static_cast<sqlite3_stmt*>(statement), SQLITE_STMTSTATUS_VM_STEP, 1);
+      return 0;
+    };
+    return sqlite3_trace_v2(db, SQLITE_TRACE_PROFILE, count, nullptr);
   }
-  static inline std::int64_t steps_ = 0, max_steps_ = 0;
+  static inline std::int64_t steps_ = 0;
 };
 
 // Writes five frames and doubles them `doublings` times.
@@ -175,8 +173,7 @@ void fill(const std::string& path, int doublings) {
     auto store = RunStore::create(path, kIdentity);
     ASSERT_TRUE(store) << store.error().message();
     for (int i = 0; i < 5; ++i) {
-      ASSERT_TRUE(store->commit(
-          {some_frame(i), {}, {}, {}}, [] { return Bytes{1}; }, i));
+      ASSERT_TRUE(store->commit({some_frame(i), {}, {}, {}}, [] { return Bytes{1}; }, {i, 0}));
     }
   }
   auto db = Database::open(path, Database::Mode::open);
@@ -200,11 +197,11 @@ TEST(RunStore, ReadTimeIsLinearInTheNumberOfFrames) {
     const std::string path = folder.path() + "/" + std::to_string(doublings) + ".sqlite";
     fill(path, doublings);
     const std::size_t count = std::size_t{5} << doublings;
-    const StepCounter counter(static_cast<std::int64_t>(500 * count));
+    const StepCounter counter;
     auto store = RunStore::open_read_only(path);
     EXPECT_TRUE(store);
     const auto frames = store->frames();
-    EXPECT_TRUE(frames) << count << " frames: " << frames.error().message() << " after " << counter.steps() << " steps";
+    EXPECT_TRUE(frames) << count << " frames: " << frames.error().message();
     if (!frames) return -1;
     EXPECT_EQ(frames->size(), count);
     for (std::size_t i = 0; i < count; i += 1003) {
@@ -272,9 +269,7 @@ TEST(RunStore, RetainsCommittedFramesWhenKilled) {
   if (child == 0) {
     auto store = RunStore::create(path, kIdentity);
     for (int i = 0; store && i < 7; ++i) {
-      if (!store->commit(
-              {some_frame(i), {}, {}, {}}, [] { return Bytes(100'000, 1); }, i))
-        ::_exit(1);
+      if (!store->commit({some_frame(i), {}, {}, {}}, [] { return Bytes(100'000, 1); }, {i, 0})) ::_exit(1);
     }
     ::kill(::getpid(), SIGKILL);
   }
@@ -284,7 +279,7 @@ TEST(RunStore, RetainsCommittedFramesWhenKilled) {
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
   EXPECT_EQ(store->frames()->size(), 7U);
-  EXPECT_EQ((*store->checkpoint())->samples_taken, 6);
+  EXPECT_EQ((*store->checkpoint())->source.samples_taken, 6);
 }
 
 }  // namespace

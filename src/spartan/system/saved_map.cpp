@@ -24,7 +24,8 @@ Result<SavedMap> SavedMap::open_run(const std::string& path) {
 }
 
 Result<SavedMap> SavedMap::open(const std::string& path) {
-  const bool is_run = std::filesystem::is_directory(path);
+  std::error_code error;
+  const bool is_run = std::filesystem::is_directory(path, error);
   auto saved = is_run ? open_run(path) : Result<SavedMap>(SavedMap(RunOptions()));
   if (!saved) return failure(saved);
   if (!is_run) {

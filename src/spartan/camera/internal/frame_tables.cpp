@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 
@@ -55,6 +56,12 @@ std::optional<Stamp> parse_date(std::string_view date, std::string_view time) {
   return Stamp{whole.count() + second->ns};
 }
 
+// Whether a file name of a table stays inside the folder that it is relative to.
+bool stays_inside(std::string_view name) {
+  const std::filesystem::path path(name);
+  return path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
+}
+
 // Parses one row of frames.csv; errors name the column.
 Result<FrameEntry> read_spartan_frame(const std::filesystem::path& folder, const Rig& rig, const Row& row) {
   const auto wrong = [](const char* column, std::string_view text) {
@@ -75,6 +82,8 @@ Result<FrameEntry> read_spartan_frame(const std::filesystem::path& folder, const
   if (!exposure) return wrong("exposure_us", row[9]);
   if (!gain) return wrong("gain", row[10]);
   if (!bits || *bits < 8 || *bits > 16) return wrong("bits", row[11]);
+  if (!stays_inside(row[5])) return wrong("left (outside of the recording)", row[5]);
+  if (!stays_inside(row[6])) return wrong("right (outside of the recording)", row[6]);
   FrameEntry entry;
   entry.frame_id = *frame_id;
   entry.position_id = *position_id;
@@ -125,6 +134,7 @@ Result<EurocImages> read_euroc_images(TableReader table) {
     const auto stamp = parse_stamp_ns(row[0]);
     if (!stamp) return input_error("the first column is not a time in nanoseconds");
     if (row[1].empty()) return input_error("the file name is empty");
+    if (!stays_inside(row[1])) return input_error("the file name leads out of the recording");
     images.stamps.push_back(*stamp);
     images.files.emplace_back(row[1]);
     return {};

@@ -23,6 +23,7 @@ class IncreasingStream : public SampleStream {
 
   /// Number of samples discarded so far.
   std::int64_t discarded() const { return discarded_; }
+  UnreadableRows unreadable_rows() const override { return rows_->unreadable_rows(); }
 
   static constexpr std::size_t kLookAhead = 64;  ///< samples; empirical
 

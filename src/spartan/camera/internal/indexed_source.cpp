@@ -2,10 +2,15 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <string_view>
+#include <variant>
 
 #include "spartan/camera/frame_source.h"
+#include "spartan/camera/internal/content_hash.h"
 #include "spartan/camera/internal/increasing_stream.h"
 #include "spartan/camera/internal/recording_index.h"
+#include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 
 namespace spartan::internal {
@@ -30,6 +35,7 @@ class SensorHead {
   }
   const std::optional<Sample>& head() const { return head_; }
   std::int64_t discarded() const { return stream_ ? stream_->discarded() : 0; }
+  UnreadableRows unreadable_rows() const { return stream_ ? stream_->unreadable_rows() : UnreadableRows{}; }
 
  private:
   SampleStreamFactory open_;
@@ -39,6 +45,28 @@ class SensorHead {
 
 MissingFrame missing(const FrameEntry& entry, FrameFault fault, std::string message) {
   return {entry.frame_id, entry.pair, entry.left_stamp, fault, std::move(message)};
+}
+
+// The bytes of the image files of a frame, or why a file has none (code `input`: missing, not a regular file).
+struct FrameFiles {
+  Result<std::string> left, right;
+};
+
+// Codes `read_error` and `resources`: the files may be good, but cannot be read now.
+Result<FrameFiles> read_files(const FrameEntry& entry) {
+  FrameFiles files;
+  // A frame whose stamps are wrong is never delivered.
+  if (entry.fault == FrameFault::stamp_reversed || entry.fault == FrameFault::stamps_apart) return files;
+  files = {read_file(entry.left_file), read_file(entry.right_file)};
+  for (const Result<std::string>& content : {std::cref(files.left), std::cref(files.right)}) {
+    if (!content && content.error().code != ErrorCode::input) return failure(content);
+  }
+  return files;
+}
+
+void add(ContentHash& hash, const FrameFiles& files) {
+  hash.add(std::string_view(files.left ? *files.left : ""));
+  hash.add(std::string_view(files.right ? *files.right : ""));
 }
 
 class IndexedSource : public FrameSource {
@@ -55,14 +83,27 @@ class IndexedSource : public FrameSource {
     if (!taken) return failure(taken);
     if (taken->sensor) return std::move(taken->sensor);
     if (!taken->entry) return std::nullopt;
-    return load(*taken->entry);
+    const auto files = read_files(*taken->entry);
+    auto sample = files ? decode(*taken->entry, *files) : Result<Sample>(failure(files));
+    if (!sample) {
+      --next_frame_;
+      return failure(sample);
+    }
+    add(content_hash_, *files);
+    return std::move(*sample);
   }
 
   Status seek(std::int64_t samples_taken) override {
     started_ = false;
+    content_hash_ = {};
     for (std::int64_t i = 0; i < samples_taken; ++i) {
       const auto taken = take();
       if (!taken) return failure(taken);
+      if (taken->entry) {
+        const auto files = read_files(*taken->entry);
+        if (!files) return failure(files);
+        add(content_hash_, *files);
+      }
       if (!taken->sensor && !taken->entry) {
         return failure(ErrorCode::input,
                        fmt::format("the recording holds only {} samples, cannot seek to sample {}", i, samples_taken),
@@ -75,9 +116,12 @@ class IndexedSource : public FrameSource {
   Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) override {
     for (const FrameEntry& entry : index_.frames) {
       if (entry.pair != pair || entry.left_stamp != left_stamp || entry.fault == FrameFault::stamp_reversed) continue;
-      Sample sample = load(entry);
-      if (auto* frame = std::get_if<StereoFrame>(&sample)) return std::move(*frame);
-      return failure(ErrorCode::input, std::get<MissingFrame>(sample).message);
+      const auto files = read_files(entry);
+      if (!files) return failure(files);
+      auto sample = decode(entry, *files);
+      if (!sample) return failure(sample);
+      if (auto* frame = std::get_if<StereoFrame>(&*sample)) return std::move(*frame);
+      return failure(ErrorCode::input, std::get<MissingFrame>(*sample).message);
     }
     return failure(ErrorCode::input,
                    fmt::format("has no frame of pair '{}' at {} s", pair, to_decimal_seconds(left_stamp)),
@@ -122,6 +166,18 @@ class IndexedSource : public FrameSource {
     return sum;
   }
 
+  UnreadableRows unreadable_sensor_rows() const override {
+    UnreadableRows all;
+    for (const SensorHead& sensor : sensors_) {
+      const UnreadableRows rows = sensor.unreadable_rows();
+      if (all.count == 0) all.first = rows.first;
+      all.count += rows.count;
+    }
+    return all;
+  }
+
+  std::uint64_t content_hash() const override { return content_hash_.value(); }
+
  private:
   // The next item: a sensor sample or a listed frame; neither at the end.
   struct Taken {
@@ -146,45 +202,60 @@ class IndexedSource : public FrameSource {
     if (first && (!entry || stamp_of(*first->head()) <= entry->playback_stamp)) {
       Taken taken{*first->head(), nullptr};
       if (Status status = first->advance(); !status) return failure(status);
+      content_hash_.add(*taken.sensor);
       return taken;
     }
     if (entry) ++next_frame_;
     return Taken{std::nullopt, entry};
   }
 
-  Sample load(const FrameEntry& entry) const {
+  // The frame, or a MissingFrame that says why there is none. Code `resources`: no memory to decode an image.
+  Result<Sample> decode(const FrameEntry& entry, const FrameFiles& files) const {
     if (entry.fault) return missing(entry, *entry.fault, entry.message);
     const StereoPair* pair = index_.info.rig.find_pair(entry.pair);
     const Camera* left_camera = index_.info.rig.find_camera(pair->left);
     const Camera* right_camera = index_.info.rig.find_camera(pair->right);
-    auto left = load_image(entry, entry.left_file, *left_camera, FrameFault::left_missing);
-    if (!left) return left.error();
-    auto right = load_image(entry, entry.right_file, *right_camera, FrameFault::right_missing);
-    if (!right) return right.error();
-    return StereoFrame{entry.frame_id,    entry.position_id, entry.pair,        entry.left_stamp,
-                       entry.right_stamp, std::move(*left),  std::move(*right), entry.pan_rad,
-                       entry.tilt_rad,    entry.exposure_us, entry.gain};
+    auto left = decode_image_of(entry, entry.left_file, files.left, *left_camera, FrameFault::left_missing);
+    if (!left) return failure(left);
+    if (auto* fault = std::get_if<MissingFrame>(&*left)) return std::move(*fault);
+    auto right = decode_image_of(entry, entry.right_file, files.right, *right_camera, FrameFault::right_missing);
+    if (!right) return failure(right);
+    if (auto* fault = std::get_if<MissingFrame>(&*right)) return std::move(*fault);
+    return StereoFrame{entry.frame_id,
+                       entry.position_id,
+                       entry.pair,
+                       entry.left_stamp,
+                       entry.right_stamp,
+                       std::get<FrameImage>(std::move(*left)),
+                       std::get<FrameImage>(std::move(*right)),
+                       entry.pan_rad,
+                       entry.tilt_rad,
+                       entry.exposure_us,
+                       entry.gain};
   }
 
-  static tl::expected<FrameImage, MissingFrame> load_image(const FrameEntry& entry, const std::string& file,
-                                                           const Camera& camera, FrameFault when_missing) {
-    auto image = read_image(file);
+  static Result<std::variant<FrameImage, MissingFrame>> decode_image_of(const FrameEntry& entry,
+                                                                        const std::string& file,
+                                                                        const Result<std::string>& content,
+                                                                        const Camera& camera, FrameFault when_missing) {
+    auto image = content ? decode_image(*content, file) : Result<FrameImage>(failure(content));
+    if (!image && image.error().code != ErrorCode::input) return failure(image);
     if (!image) {
       std::error_code error;
       const bool there = std::filesystem::exists(file, error);
-      return tl::unexpected(missing(entry, there ? FrameFault::unreadable : when_missing, image.error().message()));
+      return missing(entry, there ? FrameFault::unreadable : when_missing, image.error().message());
     }
     if (image->size() != camera.size) {
-      return tl::unexpected(
-          missing(entry, FrameFault::wrong_size,
-                  fmt::format("{}: the image is {}x{}, but camera '{}' in the rig is {}x{}", file, image->width(),
-                              image->height(), camera.name, camera.size.width, camera.size.height)));
+      return missing(entry, FrameFault::wrong_size,
+                     fmt::format("{}: the image is {}x{}, but camera '{}' in the rig is {}x{}", file, image->width(),
+                                 image->height(), camera.name, camera.size.width, camera.size.height));
     }
     return interpret(*image, camera.pixel_format, entry.bits);
   }
 
   RecordingIndex index_;
   std::vector<SensorHead> sensors_;
+  ContentHash content_hash_;
   std::size_t next_frame_ = 0;
   bool started_ = false;
 };

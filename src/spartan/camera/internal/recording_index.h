@@ -32,6 +32,8 @@ class SampleStream {
  public:
   virtual ~SampleStream() = default;
   virtual Result<std::optional<Sample>> next() = 0;
+  /// Rows left out so far because they cannot be parsed.
+  virtual UnreadableRows unreadable_rows() const { return {}; }
 };
 /// Opens a stream at its first sample.
 using SampleStreamFactory = std::function<Result<std::unique_ptr<SampleStream>>()>;

@@ -13,18 +13,31 @@ class TableStream : public SampleStream {
       : table_(std::move(table)), fields_(fields), read_row_(std::move(read_row)) {}
 
   Result<std::optional<Sample>> next() override {
-    const auto row = table_.next(fields_);
-    if (!row) return failure(row);
-    if (!*row) return std::nullopt;
-    auto sample = read_row_(**row);
-    if (!sample) return table_.error_in_row(sample.error().what);
-    return std::move(*sample);
+    for (;;) {
+      const auto row = table_.next(fields_);
+      if (!row && row.error().code != ErrorCode::input) return failure(row);
+      if (!row) {
+        leave_out(row.error().message());
+        continue;
+      }
+      if (!*row) return std::nullopt;
+      auto sample = read_row_(**row);
+      if (sample) return std::move(*sample);
+      leave_out(table_.error_in_row(sample.error().what).value().message());
+    }
   }
 
+  UnreadableRows unreadable_rows() const override { return unreadable_; }
+
  private:
+  void leave_out(const std::string& fault) {
+    if (++unreadable_.count == 1) unreadable_.first = fault;
+  }
+
   TableReader table_;
   std::size_t fields_;
   RowReader read_row_;
+  UnreadableRows unreadable_;
 };
 
 Result<Stamp> stamp_field(std::string_view text) {

@@ -32,11 +32,15 @@ class SensorTables : public ::testing::Test {
                                   const Eigen::Quaterniond& body_from_imu = Eigen::Quaterniond::Identity()) {
     return read_all(stream_of_table(folder_.write("imu.csv", text), {}, 7, read_imu_row(body_from_imu)));
   }
-  std::string imu_error(const std::string& text) {
-    const auto samples = imu(text);
-    if (samples) return "no fault";
-    EXPECT_EQ(samples.error().code, ErrorCode::input);
-    return samples.error().message();
+  // The first row that was left out, and the number of rows of both kinds.
+  std::string first_unreadable(const std::string& text, std::int64_t unreadable, int read) {
+    const auto stream = stream_of_table(folder_.write("imu.csv", text), {}, 7, read_imu_row({1, 0, 0, 0}))();
+    EXPECT_TRUE(stream);
+    int count = 0;
+    for (auto sample = (*stream)->next(); sample && *sample; sample = (*stream)->next()) ++count;
+    EXPECT_EQ(count, read);
+    EXPECT_EQ((*stream)->unreadable_rows().count, unreadable);
+    return (*stream)->unreadable_rows().first;
   }
   TemporaryFolder folder_;
 };
@@ -52,18 +56,22 @@ TEST_F(SensorTables, RotatesImuSamplesIntoTheBodyFrame) {
   EXPECT_TRUE(first.accel_m_s2.isApprox(Eigen::Vector3d(-5, 4, 6)));
 }
 
-TEST_F(SensorTables, ErrorsNameFileAndLine) {
-  EXPECT_THAT(imu_error("1,0,0,0,0,0,1\n2,0,0,nan,0,0,1\n"), HasSubstr("imu.csv:2: 'nan' is not a finite number"));
-  EXPECT_THAT(imu_error("1,0,0,0,0,0,1e999\n"), HasSubstr("imu.csv:1: '1e999' is not a finite number"));
-  EXPECT_THAT(imu_error("1,0,0,0,0,0,\n"), HasSubstr("imu.csv:1: '' is not a finite number"));
-  EXPECT_THAT(imu_error("1.5,0,0,0,0,0,1\n"), HasSubstr("imu.csv:1: '1.5' is not a time in nanoseconds"));
-  EXPECT_THAT(imu_error("\n1,0,0,0,0,0\n"), HasSubstr("imu.csv:2: 6 values, expected 7"));
+TEST_F(SensorTables, UnreadableRowsAreLeftOutAndNamed) {
+  EXPECT_THAT(first_unreadable("1,0,0,0,0,0,1\n2,0,0,nan,0,0,1\n3,0,0,0,0,0,1\n", 1, 2),
+              HasSubstr("imu.csv:2: 'nan' is not a finite number"));
+  EXPECT_THAT(first_unreadable("1,0,0,0,0,0,1e999\n1.5,x\n", 2, 0),
+              HasSubstr("imu.csv:1: '1e999' is not a finite number"));
+  EXPECT_THAT(first_unreadable("1,0,0,0,0,0,\n", 1, 0), HasSubstr("imu.csv:1: '' is not a finite number"));
+  EXPECT_THAT(first_unreadable("1.5,0,0,0,0,0,1\n", 1, 0), HasSubstr("imu.csv:1: '1.5' is not a time in nanoseconds"));
+  EXPECT_THAT(first_unreadable("\n1,0,0,0,0,0\n", 1, 0), HasSubstr("imu.csv:2: 6 values, expected 7"));
+  EXPECT_THAT(first_unreadable("1,0,0,0,0,0,1\n" + std::string(3 << 20U, '7') + "\n2,0,0,0,0,0,1\n", 1, 2),
+              HasSubstr("imu.csv:2: the line is too long"));
 }
 
 TEST_F(SensorTables, OpeningReportsAMissingFile) {
   const auto samples = read_all(stream_of_table(folder_.path() + "/none.csv", {}, 3, read_wheel_row));
   ASSERT_FALSE(samples);
-  EXPECT_THAT(samples.error().message(), HasSubstr("none.csv: is missing"));
+  EXPECT_THAT(samples.error().message(), HasSubstr("none.csv: cannot be read"));
 }
 
 TEST_F(SensorTables, ReadsWheelsCompassAndInclinometer) {

@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <numbers>
-#include <sstream>
 
 namespace spartan::internal {
 namespace {
@@ -43,20 +40,17 @@ std::string quote(std::string_view text) {
 }  // namespace
 
 Result<TableReader> TableReader::open(const std::string& path, TableFormat format) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error))
-    return failure(ErrorCode::input, "is missing or not a file", path);
-  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (!*file) return failure(ErrorCode::input, "cannot be read", path);
-  return begin(path, std::move(format), std::move(file));
+  auto lines = LineReader::open(path);
+  if (!lines) return failure(lines);
+  return begin(path, std::move(format), std::move(*lines));
 }
 
 Result<TableReader> TableReader::over(std::string text, const std::string& name, TableFormat format) {
-  return begin(name, std::move(format), std::make_unique<std::istringstream>(std::move(text)));
+  return begin(name, std::move(format), LineReader::over(std::move(text)));
 }
 
-Result<TableReader> TableReader::begin(std::string path, TableFormat format, std::unique_ptr<std::istream> stream) {
-  TableReader table(std::move(path), std::move(format), std::move(stream));
+Result<TableReader> TableReader::begin(std::string path, TableFormat format, LineReader lines) {
+  TableReader table(std::move(path), std::move(format), std::move(lines));
   const std::string header = table.format_.header;
   if (header.empty()) return table;
   const auto first = table.next();
@@ -64,28 +58,30 @@ Result<TableReader> TableReader::begin(std::string path, TableFormat format, std
   if (!*first)
     return failure(ErrorCode::input, fmt::format("the file is empty, expected the columns '{}'", header), table.path_);
   if (**first != split(header, table.format_.separator)) {
-    return table.error_in_row(fmt::format("the columns are {}, expected '{}'", quote(trim(table.line_)), header));
+    return table.error_in_row(fmt::format("the columns are {}, expected '{}'", quote(table.line_), header));
   }
   return table;
 }
 
 Result<std::optional<std::vector<std::string_view>>> TableReader::next() {
-  while (std::getline(*stream_, line_)) {
-    if (++line_number_ == 1 && line_.starts_with(kByteOrderMark)) line_.erase(0, kByteOrderMark.size());
-    const bool broken_off = stream_->eof();
-    const std::string_view line = trim(line_);
-    if (line.empty() || line.front() == '#') continue;
-    if (broken_off && format_.ends_with_newline) return error_in_row("the file is truncated in this line");
-    return split(line, format_.separator);
+  for (;;) {
+    auto line = lines_.next();
+    if (!line) return failure(line);
+    if (!*line) return std::nullopt;
+    line_ = (*line)->text;
+    if (++line_number_ == 1 && line_.starts_with(kByteOrderMark)) line_.remove_prefix(kByteOrderMark.size());
+    line_ = trim(line_);
+    if ((*line)->is_too_long) return error_in_row("the line is too long");
+    if (line_.empty() || line_.front() == '#') continue;
+    if (!(*line)->has_newline && format_.ends_with_newline) return error_in_row("the file is truncated in this line");
+    return split(line_, format_.separator);
   }
-  if (stream_->bad()) return failure(ErrorCode::input, "cannot be read to the end of the file", path_);
-  return std::nullopt;
 }
 
 Result<std::optional<std::vector<std::string_view>>> TableReader::next(std::size_t fields) {
   auto row = next();
   if (row && *row && (*row)->size() < fields) {
-    return error_in_row(fmt::format("{} values, expected {}: {}", (*row)->size(), fields, quote(trim(line_))));
+    return error_in_row(fmt::format("{} values, expected {}: {}", (*row)->size(), fields, quote(line_)));
   }
   return row;
 }

@@ -4,14 +4,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <istream>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
 
+#include "spartan/camera/internal/line_reader.h"
 #include "spartan/core/result.h"
 #include "spartan/core/time.h"
 
@@ -28,12 +27,14 @@ struct TableFormat {
 /// carriage returns and a byte-order mark.
 class TableReader {
  public:
-  /// Opens a file. Code `input` where it cannot be read or its header differs.
+  /// Opens a file. Codes as read_file(); `input` where its header differs.
   static Result<TableReader> open(const std::string& path, TableFormat format);
   /// Reads text in memory; errors call it `name`.
   static Result<TableReader> over(std::string text, const std::string& name, TableFormat format);
 
-  /// The fields of the next row, valid until the next call; nothing at the end.
+  /// The fields of the next row, valid until the next call; nothing at the end. Codes: `input` for a row that is too
+  /// long or truncated, after which reading can go on with the row behind it; `read_error` and `resources` end the
+  /// table.
   Result<std::optional<std::vector<std::string_view>>> next();
   /// The same; a row with fewer than `fields` fields is an error of code `input`.
   Result<std::optional<std::vector<std::string_view>>> next(std::size_t fields);
@@ -47,13 +48,13 @@ class TableReader {
   }
 
  private:
-  static Result<TableReader> begin(std::string path, TableFormat format, std::unique_ptr<std::istream> stream);
-  TableReader(std::string path, TableFormat format, std::unique_ptr<std::istream> stream)
-      : path_(std::move(path)), format_(std::move(format)), stream_(std::move(stream)) {}
+  static Result<TableReader> begin(std::string path, TableFormat format, LineReader lines);
+  TableReader(std::string path, TableFormat format, LineReader lines)
+      : path_(std::move(path)), format_(std::move(format)), lines_(std::move(lines)) {}
   std::string path_;
   TableFormat format_;
-  std::unique_ptr<std::istream> stream_;
-  std::string line_;
+  LineReader lines_;
+  std::string_view line_;  // the current one, without blanks at its ends
   int line_number_ = 0;
 };
 

@@ -33,7 +33,7 @@ SemiGlobalMatcher::SemiGlobalMatcher(const DisparityOptions& options, ThreadPool
 
 void SemiGlobalMatcher::resize(ImageSize size, DisparityRange range) {
   if (size == size_ && range.min == range_.min && range.max == range_.max) return;
-  size_ = size;
+  size_ = {};  // stays so if an allocation fails
   range_ = range;
   padded_ = round_up(range.count(), 32);
   mirror_pad_ = std::max(0, -range.min);
@@ -54,6 +54,16 @@ void SemiGlobalMatcher::resize(ImageSize size, DisparityRange range) {
   raw_.left = Image<float>(w, h);
   raw_.unique = Image<std::uint8_t>(w, h);
   raw_.right = Image<std::int16_t>(w, h);
+  size_ = size;
+}
+
+std::int64_t SemiGlobalMatcher::memory_bytes(ImageSize size, DisparityRange range) {
+  const std::int64_t w = size.width, h = size.height, padded = round_up(range.count(), 32);
+  const std::int64_t shift = std::max(0, -range.min) + std::max(0, range.min) + padded;
+  const std::int64_t volume = 2 * w * h * padded;
+  const std::int64_t rows = 16 * w * (padded + 2 * sgm::kGuard);  // of both passes
+  const std::int64_t planes = sgm::kPlanes * h * (2 * w + shift + 4 * kVector);
+  return volume + rows + planes + 9 * w * h;
 }
 
 std::size_t SemiGlobalMatcher::buffer_bytes() const {

@@ -38,6 +38,8 @@ class SemiGlobalMatcher {
   /// Times of the last call in milliseconds; for steps that run on two threads, the mean of both.
   const DisparityTimes& times() const { return times_; }
   std::size_t buffer_bytes() const;
+  /// An upper bound of buffer_bytes() for images of this size and this range.
+  static std::int64_t memory_bytes(ImageSize size, DisparityRange range);
 
  private:
   // State of one sweep.

@@ -17,15 +17,25 @@ struct RunStore::State {
   std::optional<TileStore> tiles;
   Database db;
   std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health,
-      insert_terrain, insert_map, replace_checkpoint;
+      insert_terrain, insert_map, select_checkpoint, replace_checkpoint, replace_content;
+  std::optional<std::int64_t> samples_taken;  // of the last checkpoint; none before the first
 
   Status prepare();
-  Status write(const Step& step, const std::function<Result<Bytes>()>& save, std::int64_t samples_taken);
+  /// Number of samples of the stored checkpoint.
+  Result<std::optional<std::int64_t>> stored_samples();
+  /// Code `output` if the database is no longer the one that this process wrote last.
+  Status expect_unchanged();
+  Status write(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source);
   Status write(const FrameRecord& frame);
   Status write(const LocalizationRecord& localization);
   Status write(const TerrainRecord& terrain);
   Status write(const MapRecord& map);
   Status write(const std::vector<StageTime>& times);
 };
+
+/// Appends the Hash64 of the bytes to them: stage memory is not parsed unless it is as it was written.
+void append_checksum(Bytes& bytes);
+/// Removes the checksum; false if it does not fit.
+bool remove_checksum(Bytes& bytes);
 
 }  // namespace spartan

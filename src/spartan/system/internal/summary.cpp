@@ -1,10 +1,13 @@
 #include "spartan/system/internal/summary.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "spartan/core/time.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/run_folder.h"
 
@@ -48,26 +51,52 @@ Json stages(const std::vector<FrameRecord>& frames) {
   return json;
 }
 
-bool is_lost(const FrameRecord& frame) {
-  return frame.status == name_of(TrackingStatus::lost);
-}
+// Consecutive frames without a pose.
+struct GapWithoutPose {
+  int frames = 0;
+  Stamp from;  // of the last pose before it
+  const FrameRecord* first_lost = nullptr;
+  const FrameRecord* first = nullptr;
+
+  void add(const FrameRecord& frame, Stamp last_pose) {
+    if (frames++ == 0) {
+      from = last_pose;
+      first = &frame;
+    }
+    if (first_lost == nullptr && frame.status == name_of(TrackingStatus::lost)) first_lost = &frame;
+  }
+
+  // Why the rover counts as lost in the gap that ends at `to`; none if it does not.
+  std::optional<std::string> reason_of_loss(Stamp to) const {
+    if (first_lost != nullptr) return first_lost->message;
+    const double seconds = seconds_between(from, to);
+    if (frames < kFewestSkippedFrames || seconds <= kLongestSkippedSpan_s) return std::nullopt;
+    return fmt::format("{} frames skipped in {:.1f} s, the first: {}", frames, seconds, first->fault);
+  }
+};
 
 }  // namespace
 
 std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames) {
   std::vector<LostSpan> spans;
-  bool open = false;
+  GapWithoutPose gap;
   std::optional<Stamp> last_pose;
+  const auto close = [&](Stamp to) {
+    if (const auto reason = gap.reason_of_loss(to)) spans.push_back({gap.from, to, *reason});
+    gap = {};
+  };
+  Stamp last;
   for (const FrameRecord& frame : frames) {
-    if (is_lost(frame) && !open) {
-      spans.push_back({last_pose.value_or(frame.stamp), frame.stamp, frame.message});
-      open = true;
-    } else if (open && frame.status != "missing") {
-      spans.back().to = frame.stamp;
-      open = is_lost(frame);
+    if (frame.fault == name_of(FrameFault::stamp_reversed)) continue;  // its stamp tells no time
+    last = frame.stamp;
+    if (!frame.has_pose) {
+      gap.add(frame, last_pose.value_or(frame.stamp));
+      continue;
     }
-    if (frame.has_pose) last_pose = frame.stamp;
+    close(frame.stamp);
+    last_pose = frame.stamp;
   }
+  close(last);
   return spans;
 }
 
@@ -110,6 +139,7 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"frames", processed},
       {"skipped", skipped},
       {"predicted_frames", predicted},
+      {"skipped_sensor_rows", {{"reversed", facts.sensor_rows_reversed}, {"unreadable", facts.sensor_rows_unreadable}}},
       {"distance_m", path_length(trajectory_of(frames, TrajectoryKind::odometry))},
       {"wall_seconds", facts.wall_seconds},
       {"cpu_seconds", facts.cpu_seconds},
@@ -121,7 +151,8 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"lost_spans", spans},
       {"resumed_from_frame", facts.resumed_from_frame ? Json(*facts.resumed_from_frame) : Json(nullptr)},
   };
-  return json.dump(2) + "\n";
+  // Paths need not be UTF-8: their other bytes are replaced.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace spartan::internal

@@ -22,16 +22,24 @@ struct RunFacts {
   std::vector<std::string> absent;           ///< stages that the options disable
   double wall_seconds = 0, cpu_seconds = 0;  ///< of this execution of the program
   std::int64_t peak_memory_bytes = 0;
+  /// Rows of sensor tables that were left out: stamps that do not increase, and rows that cannot be parsed.
+  std::int64_t sensor_rows_reversed = 0, sensor_rows_unreadable = 0;
   std::optional<std::int64_t> resumed_from_frame;  ///< frame_id of the first frame processed after --resume
 };
 
-/// An interval in which the odometry was lost.
+/// Skipped frames in a row count as a loss if they are at least this many and leave the rover without a pose for longer
+/// than this. Fewer or shorter ones are bridged by the odometry.
+constexpr int kFewestSkippedFrames = 3;
+constexpr double kLongestSkippedSpan_s = 2;
+
+/// An interval in which the odometry was lost or had no frames.
 struct LostSpan {
   Stamp from, to;
   std::string reason;
 };
 
-/// The interval of each loss, from the last pose before it to the first pose after it (or the end of the run).
+/// The interval of each loss, from the last pose before it to the first pose after it (or the end of the run). Frames
+/// with reversed stamps do not count.
 std::vector<LostSpan> lost_spans(const std::vector<FrameRecord>& frames);
 
 /// The content of summary.json.

@@ -58,5 +58,57 @@ TEST(Summary, JoinsConsecutiveLossesToOneSpan) {
       << "a missing frame alone is not a loss";
 }
 
+FrameRecord frame_at(double seconds, const std::string& status) {
+  FrameRecord record = frame(0, status);
+  record.stamp = Stamp::from_seconds(seconds);
+  return record;
+}
+
+TEST(Summary, SkippedFramesBeyondTwoSecondsAreALoss) {
+  const auto drive = [](double step_s) {
+    std::vector<FrameRecord> frames{frame_at(0, "tracking")};
+    for (int i = 1; i <= 4; ++i) frames.push_back(frame_at(i * step_s, "missing"));
+    frames.push_back(frame_at(5 * step_s, "tracking"));
+    return frames;
+  };
+  EXPECT_TRUE(lost_spans(drive(0.4)).empty()) << "2 s are bridged";
+  const auto spans = lost_spans(drive(0.5));
+  ASSERT_EQ(spans.size(), 1U);
+  EXPECT_EQ(spans[0].from, Stamp{0});
+  EXPECT_EQ(spans[0].to, Stamp::from_seconds(2.5));
+  EXPECT_EQ(spans[0].reason, "4 frames skipped in 2.5 s, the first: left_missing");
+  EXPECT_TRUE(
+      lost_spans({frame_at(0, "tracking"), frame_at(1.5, "missing"), frame_at(3, "missing"), frame_at(4.5, "tracking")})
+          .empty())
+      << "two frames of a slow camera are bridged";
+}
+
+TEST(Summary, ACameraThatIsDeadToTheEndIsALoss) {
+  std::vector<FrameRecord> frames{frame_at(0, "tracking")};
+  for (int i = 1; i <= 30; ++i) frames.push_back(frame_at(0.1 * i, "missing"));
+  const auto spans = lost_spans(frames);
+  ASSERT_EQ(spans.size(), 1U);
+  EXPECT_EQ(spans[0].to, Stamp::from_seconds(3));
+}
+
+TEST(Summary, AReversedStampDoesNotHideALoss) {
+  std::vector<FrameRecord> frames{frame_at(10, "tracking"), frame_at(11, "missing"), frame_at(12, "missing"),
+                                  frame_at(1, "missing"),   frame_at(13, "missing"), frame_at(14, "tracking")};
+  frames[3].fault = "stamp_reversed";
+  ASSERT_EQ(lost_spans(frames).size(), 1U);
+  frames = {frame_at(10, "tracking"), frame_at(11, "missing"), frame_at(12, "missing"), frame_at(13, "missing"),
+            frame_at(1, "missing")};
+  frames[4].fault = "stamp_reversed";
+  ASSERT_EQ(lost_spans(frames).size(), 1U);
+  EXPECT_EQ(lost_spans(frames)[0].to, Stamp::from_seconds(13));
+}
+
+TEST(Summary, PathsThatAreNotUtf8AreReplaced) {
+  RunFacts facts;
+  facts.input = "bad\xff";
+  const auto json = nlohmann::json::parse(to_summary_json(facts, {}));
+  EXPECT_EQ(json["input"], "bad\xEF\xBF\xBD");
+}
+
 }  // namespace
 }  // namespace spartan::internal

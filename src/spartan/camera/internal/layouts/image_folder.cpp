@@ -8,8 +8,8 @@
 #include <limits>
 #include <map>
 
-#include "spartan/camera/internal/layouts/image_header.h"
 #include "spartan/camera/internal/table.h"
+#include "spartan/image_io/image_io.h"
 
 namespace spartan::internal {
 namespace {

@@ -1,5 +1,7 @@
 #include "spartan/odometry/internal/landmarks/odometer_memory.h"
 
+#include <algorithm>
+
 namespace spartan::internal {
 namespace {
 
@@ -109,6 +111,8 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   for (std::uint32_t i = 0; i < anchors; ++i) {
     Anchor anchor;
     anchor.id = in.get<std::uint32_t>();
+    if (!memory.map.anchors.empty() && anchor.id <= memory.map.anchors.back().id)
+      return damaged("is damaged: the anchors are not in the order of their ids");
     anchor.latest_from_anchor = in.get_pose();
     memory.map.anchors.push_back(anchor);
   }
@@ -116,6 +120,9 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   for (std::uint32_t i = 0; i < landmarks; ++i) {
     Landmark landmark;
     if (!get(in, landmark)) return damaged("is damaged: a patch or descriptor has the wrong length");
+    const auto is_its_anchor = [&](const Anchor& anchor) { return anchor.id == landmark.anchor_id; };
+    if (std::none_of(memory.map.anchors.begin(), memory.map.anchors.end(), is_its_anchor))
+      return damaged("is damaged: a landmark has no anchor");
     memory.map.landmarks.push_back(landmark);
   }
   if (Status status = in.finish("odometry state"); !status) return failure(status);

@@ -1,12 +1,11 @@
-#include "spartan/camera/internal/layouts/image_header.h"
-
 #include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/temporary_folder.h"
 
-namespace spartan::internal {
+namespace spartan {
 namespace {
 
 using std::string_view_literals::operator""sv;
@@ -63,4 +62,4 @@ TEST(ImageHeader, ReadsAFile) {
 }
 
 }  // namespace
-}  // namespace spartan::internal
+}  // namespace spartan

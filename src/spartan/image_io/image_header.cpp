@@ -1,11 +1,13 @@
-#include "spartan/camera/internal/layouts/image_header.h"
+// Image size from the header of an image file, without decoding it.
 
 #include <cstdint>
-#include <fstream>
 #include <sstream>
 #include <string_view>
 
-namespace spartan::internal {
+#include "spartan/core/files.h"
+#include "spartan/image_io/image_io.h"
+
+namespace spartan {
 namespace {
 
 using std::string_view_literals::operator""sv;
@@ -14,7 +16,7 @@ constexpr std::size_t kHeaderBytes = 1 << 18;  // a JPEG may hold several 64-KiB
 constexpr int kLargestSide = 32768;            // px; larger sizes are taken as damaged headers
 
 // Unsigned big-endian number; 0 where it is larger than kLargestSide.
-int big_endian(std::string_view bytes) {
+int side_of(std::string_view bytes) {
   std::uint32_t value = 0;
   for (const char c : bytes) value = (value << 8U) | static_cast<std::uint8_t>(c);
   return value > static_cast<std::uint32_t>(kLargestSide) ? 0 : static_cast<int>(value);
@@ -23,7 +25,7 @@ int big_endian(std::string_view bytes) {
 // The IHDR chunk is the first one: width and height at bytes 16 and 20.
 ImageSize png_size(std::string_view head) {
   if (head.size() < 24) return {};
-  return {big_endian(head.substr(16, 4)), big_endian(head.substr(20, 4))};
+  return {side_of(head.substr(16, 4)), side_of(head.substr(20, 4))};
 }
 
 // Skips segments up to the start-of-frame marker (C0 to CF except C4, C8 and CC), which holds height and width.
@@ -36,7 +38,7 @@ ImageSize jpeg_size(std::string_view head) {
       continue;
     }
     if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) {
-      return {big_endian(head.substr(at + 7, 2)), big_endian(head.substr(at + 5, 2))};
+      return {side_of(head.substr(at + 7, 2)), side_of(head.substr(at + 5, 2))};
     }
     const auto high = static_cast<std::uint8_t>(head[at + 2]), low = static_cast<std::uint8_t>(head[at + 3]);
     at += 2 + static_cast<std::size_t>(high) * 256 + low;
@@ -62,11 +64,8 @@ ImageSize pnm_size(std::string_view head) {
 }  // namespace
 
 std::optional<ImageSize> read_image_size(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string content(kHeaderBytes, '\0');
-  file.read(content.data(), static_cast<std::streamsize>(content.size()));
-  content.resize(static_cast<std::size_t>(file.gcount()));
-  return parse_image_size(content);
+  const auto content = read_beginning(path, kHeaderBytes);
+  return content ? parse_image_size(*content) : std::nullopt;
 }
 
 std::optional<ImageSize> parse_image_size(std::string_view head) {
@@ -78,4 +77,4 @@ std::optional<ImageSize> parse_image_size(std::string_view head) {
   return size;
 }
 
-}  // namespace spartan::internal
+}  // namespace spartan

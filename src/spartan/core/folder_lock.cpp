@@ -1,0 +1,79 @@
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <string>
+#include <utility>
+
+#include "spartan/core/files.h"
+
+namespace spartan {
+namespace {
+
+constexpr const char* kLockFile = "/owner.lock";
+
+// The id that the owner has written; empty if it has not come to it yet.
+std::string owner_of(const std::string& lock_file) {
+  const auto content = read_beginning(lock_file, 32);
+  if (!content) return {};
+  return content->substr(0, content->find_first_not_of("0123456789"));
+}
+
+// Whether the open file still has its name: the owner before may have removed it after this process opened it.
+bool has_name(int descriptor, const std::string& path) {
+  struct stat opened {
+  }, named{};
+  return ::fstat(descriptor, &opened) == 0 && ::stat(path.c_str(), &named) == 0 && opened.st_dev == named.st_dev &&
+         opened.st_ino == named.st_ino;
+}
+
+Status write_owner(int descriptor, const std::string& path) {
+  const std::string id = std::to_string(::getpid()) + "\n";
+  errno = 0;
+  const bool written = ::ftruncate(descriptor, 0) == 0 &&
+                       ::pwrite(descriptor, id.data(), id.size(), 0) == static_cast<ssize_t>(id.size());
+  return written ? Status() : Status(write_failure(path, errno == 0 ? ENOSPC : errno));
+}
+
+}  // namespace
+
+Result<FolderLock> FolderLock::acquire(const std::string& folder) {
+  const std::string path = folder + kLockFile;
+  for (;;) {
+    const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (descriptor < 0) return write_failure(path, errno);
+    FolderLock lock(descriptor, "");  // removes nothing yet
+    int error = 0;
+    do {
+      error = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
+    } while (error == EINTR);
+    if (error == EWOULDBLOCK) {
+      const std::string owner = owner_of(path);
+      return failure(ErrorCode::output,
+                     "is in use by another process" + (owner.empty() ? std::string() : " (id " + owner + ")"), folder,
+                     "wait until it has finished, or choose another folder with -o");
+    }
+    if (error != 0) return write_failure(path, error);
+    if (!has_name(descriptor, path)) continue;
+    lock.path_ = path;
+    if (Status written = write_owner(descriptor, path); !written) return failure(written);
+    return lock;
+  }
+}
+
+FolderLock::FolderLock(FolderLock&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), path_(std::move(other.path_)) {}
+FolderLock& FolderLock::operator=(FolderLock&& other) noexcept {
+  std::swap(descriptor_, other.descriptor_);
+  std::swap(path_, other.path_);
+  return *this;
+}
+FolderLock::~FolderLock() {
+  if (descriptor_ < 0) return;
+  if (!path_.empty() && has_name(descriptor_, path_)) ::unlink(path_.c_str());
+  ::close(descriptor_);
+}
+
+}  // namespace spartan

@@ -1,0 +1,149 @@
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <filesystem>
+
+#include "spartan/core/files.h"
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::TemporaryFolder;
+
+ErrorCode failure_code_of(const Result<std::string>& content) {
+  EXPECT_FALSE(content);
+  return content ? ErrorCode::internal : content.error().code;
+}
+
+TEST(InputFile, DevicesAndPipesAreNotRead) {
+  const TemporaryFolder folder;
+  const std::string pipe = folder.file("pipe");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(failure_code_of(read_file(pipe)), ErrorCode::input) << "opening it would wait for a writer";
+  EXPECT_EQ(failure_code_of(read_file("/dev/zero")), ErrorCode::input) << "it has no end";
+  EXPECT_EQ(failure_code_of(read_calibration_text(pipe)), ErrorCode::configuration);
+}
+
+TEST(InputFile, AnErrorOfTheSystemIsNotTheEndOfTheFile) {
+  // A regular file which every read() at its beginning answers with EIO.
+  EXPECT_EQ(failure_code_of(read_file("/proc/self/mem")), ErrorCode::read_error);
+  EXPECT_EQ(failure_code_of(read_calibration_text("/proc/self/mem")), ErrorCode::configuration);
+}
+
+TEST(InputFile, TheSizeMayBeUnknown) {
+  // The size of files in /proc is 0.
+  EXPECT_NE(read_file("/proc/self/status").value().find("VmSize"), std::string::npos);
+}
+
+TEST(InputFile, LargeFilesAreNotRead) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a", "12345");
+  EXPECT_EQ(read_file(path, 5).value(), "12345");
+  EXPECT_EQ(failure_code_of(read_file(path, 4)), ErrorCode::input);
+  fs::resize_file(path, kLargestFile_bytes + 1);
+  EXPECT_EQ(failure_code_of(read_file(path)), ErrorCode::input);
+}
+
+TEST(InputFile, ABeginningIsAtMostTheWholeFile) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a", "12345");
+  EXPECT_EQ(read_beginning(path, 3).value(), "123");
+  EXPECT_EQ(read_beginning(path, 99).value(), "12345");
+}
+
+TEST(InputFile, MissingDescriptorsAreAShortage) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a", "text");
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit none = before;
+  none.rlim_cur = 0;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const auto read = read_file(path);
+  const Status written = write_file_atomically(path, "new");
+  const auto locked = FolderLock::acquire(folder.path());
+  ::setrlimit(RLIMIT_NOFILE, &before);
+  EXPECT_EQ(failure_code_of(read), ErrorCode::resources);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::resources);
+  ASSERT_FALSE(locked);
+  EXPECT_EQ(locked.error().code, ErrorCode::resources);
+}
+
+TEST(TemporaryFiles, OnlyThoseOfThisProgramAreRemoved) {
+  const TemporaryFolder folder;
+  for (const char* name :
+       {"a.txt", "a.part", "a.txt.12.part", ".12.part", "12.part", "a.12.part.txt", "a.12x.part", "below/b.7.part"}) {
+    folder.write(name, "x");
+  }
+  remove_temporary_files(folder.path());
+  EXPECT_FALSE(fs::exists(folder.path() + "/a.txt.12.part"));
+  for (const char* name : {"a.txt", "a.part", ".12.part", "12.part", "a.12.part.txt", "a.12x.part", "below/b.7.part"}) {
+    EXPECT_TRUE(fs::exists(folder.path() + "/" + name)) << name;
+  }
+  const std::string own = temporary_name(folder.file("c.png"));
+  folder.write(fs::path(own).filename().string(), "x");
+  remove_temporary_files(folder.path());
+  EXPECT_FALSE(fs::exists(own));
+}
+
+TEST(FolderLock, HasOneOwner) {
+  const TemporaryFolder folder;
+  {
+    const auto first = FolderLock::acquire(folder.path());
+    ASSERT_TRUE(first) << first.error().message();
+    const auto second = FolderLock::acquire(folder.path());
+    ASSERT_FALSE(second);
+    EXPECT_EQ(second.error().code, ErrorCode::output);
+    EXPECT_NE(second.error().what.find("(id " + std::to_string(::getpid()) + ")"), std::string::npos)
+        << second.error().message();
+  }
+  EXPECT_TRUE(fs::is_empty(folder.path())) << "the file is removed with the lock";
+  EXPECT_TRUE(FolderLock::acquire(folder.path()));
+}
+
+TEST(FolderLock, EndsWithAKilledProcess) {
+  const TemporaryFolder folder;
+  std::array<int, 2> ready{};
+  ASSERT_EQ(::pipe(ready.data()), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const auto lock = FolderLock::acquire(folder.path());
+    const char done = lock ? 'y' : 'n';
+    static_cast<void>(!::write(ready[1], &done, 1));
+    ::pause();
+    ::_exit(0);
+  }
+  char done = 0;
+  ASSERT_EQ(::read(ready[0], &done, 1), 1);
+  EXPECT_EQ(done, 'y');
+  EXPECT_FALSE(FolderLock::acquire(folder.path()));
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  EXPECT_TRUE(FolderLock::acquire(folder.path()));
+  ::close(ready[0]);
+  ::close(ready[1]);
+}
+
+TEST(FolderLock, MovesWithItsValue) {
+  const TemporaryFolder folder;
+  FolderLock kept;
+  EXPECT_FALSE(kept.owns());
+  {
+    auto lock = FolderLock::acquire(folder.path());
+    ASSERT_TRUE(lock);
+    kept = std::move(*lock);
+  }
+  EXPECT_TRUE(kept.owns());
+  EXPECT_FALSE(FolderLock::acquire(folder.path()));
+}
+
+}  // namespace
+}  // namespace spartan
