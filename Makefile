@@ -1,9 +1,10 @@
 # Entry points. Every target installs what it needs first (./setup, quick where nothing is missing).
-.PHONY: help demo test build bench recordings format lint docs coverage clean
+.PHONY: help demo test faults build bench recordings format lint docs coverage clean
 
 help:
 	@echo "make demo      build, then a drive over a simulated Mars (or INPUT=path); demo_output/report.html shows it"
 	@echo "make test      build, then run the fast tests"
+	@echo "make faults    long runs under injected faults and with damaged inputs; prints both tables (hours)"
 	@echo "make build     the program: build/release/bin/spartan"
 	@echo "make bench     all benchmarks; make bench-NAME: the one of bench/NAME.cpp"
 	@echo "make recordings  the standard simulated recordings, once, into ~/.cache/spartan (an hour)"
@@ -26,6 +27,11 @@ test:
 	./setup build test
 	scripts/build release
 	ctest --preset release -j $$(nproc)
+
+faults:
+	./setup build test
+	scripts/build release
+	ctest --preset long -R '^(make_small_.*|faults)' --verbose
 
 bench:
 	./setup build develop
