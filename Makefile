@@ -11,7 +11,7 @@ help:
 	@echo "make format    format the C++ files"
 	@echo "make lint      clang-tidy on what changed since the commit in .ci/lint-base (or LINT_BASE=commit, LINT_BASE=all)"
 	@echo "make docs      API reference of the public headers: build/docs/html/index.html"
-	@echo "make coverage  line coverage of the fast tests"
+	@echo "make coverage  lines and branches that the fast tests reach, by module"
 	@echo "make clean     remove what was built"
 
 build:

@@ -19,7 +19,8 @@ if(SPARTAN_SANITIZE)
   target_link_options(spartan_flags INTERFACE -fsanitize=${SPARTAN_SANITIZE})
 endif()
 if(SPARTAN_COVERAGE)
-  target_compile_options(spartan_flags INTERFACE --coverage)
+  # Counters that threads share: without atomic additions gcov derives negative counts of branches.
+  target_compile_options(spartan_flags INTERFACE --coverage -fprofile-update=atomic)
   target_link_options(spartan_flags INTERFACE --coverage)
 endif()
 
