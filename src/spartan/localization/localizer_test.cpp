@@ -48,6 +48,62 @@ TEST(Localizer, ComposesTheMotionsOfVisionAlone) {
   EXPECT_EQ(e.health_of(LocalizationSensor::imu).state, SensorState::missing);
 }
 
+// Σ_ij a^|i−j| over n equal steps: the variance of their sum if neighbours are correlated by a.
+double correlated_sum(int n, double a) {
+  double sum = n;
+  for (int k = 1; k < n; ++k) sum += 2 * (n - k) * std::pow(a, k);
+  return sum;
+}
+
+// Vision alone: ten frames stationary, a gap, then equal motions straight ahead. Their sum and its variance have a
+// closed form, with the drift of vision too.
+TEST(Localizer, FollowsVisionAloneAfterAStop) {
+  constexpr double kPeriod_s = 0.1;
+  constexpr int kStops = 10, kMoves = 8;
+  const LocalizationOptions options;
+  for (const int dropped : {0, 10, 100}) {
+    for (const double step_m : {1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0}) {
+      for (const double sigma_m : {1e-5, 1e-3, 0.02}) {
+        SCOPED_TRACE(::testing::Message() << dropped << " dropped, " << step_m << " m, sigma " << sigma_m);
+        Localizer localizer = Localizer::create(options).value();
+        localizer.start(test_stamp(0), Eigen::Vector3d::UnitX());
+        RelativeMotion motion;
+        motion.measured = true;
+        motion.covariance = (sigma_m * sigma_m) * Matrix6d::Identity();
+        motion.covariance.diagonal().tail<3>().setConstant(1e-10);
+        double t = 0;
+        const auto add = [&](double x, double seconds) {
+          motion.from = test_stamp(t);
+          motion.to = test_stamp(t += seconds);
+          motion.previous_from_current = Pose::from_translation({x, 0, 0});
+          ASSERT_TRUE(localizer.add(motion));
+        };
+        for (int i = 0; i < kStops; ++i) add(0, kPeriod_s);
+        const UncertainPose stopped = localizer.estimate().world_from_body;
+        for (int i = 0; i < kMoves; ++i) add(step_m, i == 0 ? kPeriod_s * (1 + dropped) : kPeriod_s);
+
+        const LocalizationEstimate e = localizer.estimate();
+        const double variance =
+            sigma_m * sigma_m *
+            (options.vision.white_factor * kMoves +
+             std::pow(options.vision.drift_sigmas[0], 2) *
+                 correlated_sum(kMoves, std::exp(-1 / options.vision.drift_steps)) +
+             std::pow(options.vision.constant_sigmas[0], 2) * correlated_sum(kMoves, std::exp(-1 / 5000.0)));
+        const double error_m = e.world_from_body.pose.translation().x() - kMoves * step_m;
+        // Steps below the noise of the constant-velocity model are partly predicted.
+        const bool large = step_m >= 0.1;
+        EXPECT_LT(std::abs(error_m), (large ? 0.1 : 0.5) * std::sqrt(variance));
+        const double added = e.world_from_body.covariance(0, 0) - stopped.covariance(0, 0);
+        EXPECT_LT(added, 1.1 * variance);
+        if (large) {
+          EXPECT_GT(added, 0.9 * variance);
+        }
+        EXPECT_EQ(e.health_of(LocalizationSensor::vision).state, SensorState::ok);
+      }
+    }
+  }
+}
+
 // The last pose relative to the pose after `from` motions.
 struct Revisit {
   Eigen::Index from = 0;

@@ -53,6 +53,8 @@ class ErrorStateFilter {
   void update(const RelativeMotion& motion);
   bool update_by_motion(const RelativeMotion& motion);
   void propagate_drift(int index, const Vector6d& sigmas, double steps);
+  bool prediction_contradicted(const Innovation& innovation) const;
+  void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
   bool wheels_confirm_prediction(const RelativeMotion& motion) const;
   void compare_gyro(const RelativeMotion& motion);

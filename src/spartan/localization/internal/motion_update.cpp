@@ -12,9 +12,12 @@ namespace {
 /// Before an update by vision the noise of the constant-velocity model is scaled by 1 + this, so that the prediction
 /// has no weight and the filter composes the visual motions.
 constexpr double kPredictionNoiseFactor = 99;
-/// Where vision contradicts the prediction, the standard deviation of the reset is this factor times the residual;
+/// Where vision contradicts the prediction, the standard deviation of the inflation is this factor times the residual;
 /// empirical.
-constexpr double kResetFactor = 10;
+constexpr double kInflationFactor = 10;
+/// A constant-velocity prediction is inflated where the residual exceeds its standard deviation in any direction. With
+/// kPredictionNoiseFactor the expected value is 6/100.
+constexpr double kMaxPredictionNis = 1;
 /// Correlation length of the constant error of vision, in frames: finite, so that the filter does not become
 /// overconfident; empirical.
 constexpr double kConstantSteps = 5000;
@@ -66,14 +69,17 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
     propagate_drift(error_at::kVisionConstant, constant_sigmas_, kConstantSteps);
   }
 
-  const bool predicted = vision.constant_velocity_s == 0;
+  const bool inertial = vision.constant_velocity_s == 0;
   p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
 
   const Matrix6d covariance = usable_covariance(motion.covariance, options_.vision.white_factor);
   const Vector6d drift = vision.stationary ? Vector6d::Zero().eval() : motion.covariance.diagonal().cwiseSqrt().eval();
   const Innovation innovation =
       relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, drift);
-  const double nis = predicted ? normalized_innovation_squared(p, innovation) : 0;
+  // The noise of the constant-velocity model grows with the speed: after a stop it is small, and the update would put
+  // the residual of a true motion into the drift of vision.
+  if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
+  const double nis = inertial ? normalized_innovation_squared(p, innovation) : 0;
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
   const bool confirmed = nis > vision_gate_ && wheels_confirm_prediction(motion);
   if (nis > vision_gate_ && !confirmed) return reset_prediction(innovation, nis, motion);
@@ -81,7 +87,7 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
                       options_.health.readmit_after))
     return false;
   SensorMonitor& imu = memory_.monitor(LocalizationSensor::imu);
-  if (predicted && imu.state == SensorState::suspect) imu.readmit();  // its prediction agrees with vision
+  if (inertial && imu.state == SensorState::suspect) imu.readmit();  // its prediction agrees with vision
   correct_motion(innovation, error_at::kVisionClone);
   return true;
 }
@@ -97,17 +103,32 @@ void ErrorStateFilter::propagate_drift(int index, const Vector6d& sigmas, double
   p.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
 }
 
-/// Vision contradicts the prediction, and no other sensor confirms the prediction: inflates the covariance of the
-/// motion since the last frame, and counts a rejection of the IMU.
-bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion) {
+/// Whether the residual exceeds the predicted covariance of the motion itself, without the errors of vision.
+bool ErrorStateFilter::prediction_contradicted(const Innovation& innovation) const {
+  Innovation exact = innovation;
+  exact.jacobian.middleCols<6>(error_at::kVisionDrift).setZero();
+  exact.jacobian.middleCols<6>(error_at::kVisionConstant).setZero();
+  exact.noise = kMinVariance * Matrix6d::Identity();
+  return normalized_innovation_squared(memory_.estimate.covariance, exact) > kMaxPredictionNis;
+}
+
+/// Inflates the covariance of the motion since the last frame until the prediction has no weight against a motion with
+/// that innovation.
+void ErrorStateFilter::inflate_prediction(const Innovation& innovation, const RelativeMotion& motion) {
   const double seconds = std::max(seconds_between(motion.from, motion.to), 1e-3);
-  const double shift = kResetFactor * innovation.residual.head<3>().norm(),
-               turn = kResetFactor * innovation.residual.tail<3>().norm();
+  const double shift = kInflationFactor * innovation.residual.head<3>().norm(),
+               turn = kInflationFactor * innovation.residual.tail<3>().norm();
   const ConstantVelocityNoise noise{(shift + 1e-3) * std::sqrt(3 / (seconds * seconds * seconds)),
                                     (turn + 1e-4) / std::sqrt(seconds)};
   const ConstantVelocityStep step{Eigen::Vector3d::Zero(), seconds};
   memory_.estimate.covariance.topLeftCorner<9, 9>() +=
       transition(memory_.estimate.state, step, noise).noise.topLeftCorner<9, 9>();
+}
+
+/// Vision contradicts the prediction by the IMU, and no other sensor confirms it: inflates the prediction, and counts a
+/// rejection of the IMU.
+bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion) {
+  inflate_prediction(innovation, motion);
   memory_.step.stationary = false;
   memory_.monitor(LocalizationSensor::imu)
       .accept(nis, vision_gate_, HealthReason::contradicted, options_.health.excluded_after,
