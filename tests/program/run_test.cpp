@@ -208,6 +208,34 @@ TEST_F(Run, SkipsPairsOfDifferentSize) {
   EXPECT_EQ(run_program({"stereo", image(0, 5), image(1, 5), "-o", path("stereo2")}).exit_code, 3);
 }
 
+TEST_F(Run, SkipsFramesOfAFrozenCamera) {
+  const auto repeat = [&](int side, int of, int at) {
+    fs::copy_file(image(side, of), image(side, at), fs::copy_options::overwrite_existing);
+  };
+  for (const int side : {0, 1}) {
+    for (int i = 5; i <= 8; ++i) repeat(side, 4, i);
+  }
+  repeat(1, 10, 11);
+  const ProgramResult result = run("out");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("frame 5 skipped (frozen): frame 5: left and right image of pair"));
+  EXPECT_THAT(result.err, HasSubstr("frame 11 skipped (frozen): frame 11: right image of pair"));
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(summary["skipped"], nlohmann::json::parse(R"({"frozen": 5})"));
+  EXPECT_EQ(summary["predicted_frames"], nlohmann::json::parse("[5, 6, 7, 8, 11]"));
+  EXPECT_EQ(summary["health"]["odometry"]["standing"], 0);
+  const ProgramResult score = run_program({"evaluate", path("out"), "--truth", drive(), "--align", "first", "--json"});
+  ASSERT_EQ(score.exit_code, 0) << score.err;
+  EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.01);
+  // Interrupted between two equal images, the run remembers the first one.
+  for (const char* frames : {"5", "7"}) {
+    const std::string part = std::string("part") + frames;
+    ASSERT_EQ(run(part, {"--max-frames", frames}).exit_code, 0);
+    ASSERT_EQ(run(part, {"--resume"}).exit_code, 0);
+    EXPECT_EQ(byte_stable_content(path(part)), byte_stable_content(path("out"))) << frames;
+  }
+}
+
 TEST_F(Run, StereoUsesTheViewOptions) {
   const auto stereo = [&](std::vector<std::string> more) {
     std::vector<std::string> words{"stereo",       image(0, 0), image(1, 0),           "-o",

@@ -133,6 +133,7 @@ TEST(FaultNames, AreTheKeysOfTheSummary) {
   EXPECT_EQ(name_of(FrameFault::right_missing), "right_missing");
   EXPECT_EQ(name_of(FrameFault::unreadable), "unreadable");
   EXPECT_EQ(name_of(FrameFault::wrong_size), "wrong_size");
+  EXPECT_EQ(name_of(FrameFault::frozen), "frozen");
   EXPECT_EQ(name_of(FrameFault::stamp_reversed), "stamp_reversed");
   EXPECT_EQ(name_of(FrameFault::stamps_apart), "stamps_apart");
 }

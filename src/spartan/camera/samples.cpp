@@ -16,6 +16,8 @@ std::string_view name_of(FrameFault fault) {
       return "stamp_reversed";
     case FrameFault::stamps_apart:
       return "stamps_apart";
+    case FrameFault::frozen:
+      return "frozen";
   }
   return "unreadable";
 }

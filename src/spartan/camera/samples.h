@@ -107,8 +107,16 @@ struct InclinometerSample {
   double roll_rad = 0, pitch_rad = 0, sigma_rad = 0;
 };
 
-/// Why a listed frame cannot be delivered.
-enum class FrameFault { left_missing, right_missing, unreadable, wrong_size, stamp_reversed, stamps_apart };
+/// Why a frame cannot be delivered or is not processed.
+enum class FrameFault {
+  left_missing,    ///< the left image is missing
+  right_missing,   ///< the right image is missing
+  unreadable,      ///< an image cannot be decoded
+  wrong_size,      ///< an image does not fit the rig
+  stamp_reversed,  ///< the stamp is not after the one before
+  stamps_apart,    ///< left and right stamp differ too much
+  frozen,          ///< an image equals the previous one of its camera, bit for bit
+};
 
 /// The key under `skipped` in summary.json, e.g. "left_missing".
 std::string_view name_of(FrameFault fault);

@@ -8,6 +8,7 @@
 
 #include "spartan/localization/localizer.h"
 #include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/system/internal/frozen_cameras.h"
 #include "spartan/system/internal/stop_stage.h"
 
 namespace spartan {
@@ -16,7 +17,7 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t kStateVersion = 5;  // of save(); raise it when the saved state changes
+constexpr std::uint32_t kStateVersion = 6;  // of save(); raise it when the saved state changes
 constexpr double kGravityOnEarth_m_s2 = 9.81;
 
 LocalizationOptions with_gravity(const RunOptions& options) {
@@ -48,7 +49,8 @@ struct Pipeline::State {
         slam_filter(VisionOnlyFilter::create(with_gravity(options_in)).value()),
         dead_reckoning(DeadReckoning::create(options_in.localization.vision).value()),
         stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers).value()),
-        merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers).value()) {
+        merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers).value()),
+        frozen_cameras(rig.pairs.size()) {
     maps_stops = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
     computes_terrain = options.terrain.enabled && !options.odometry_only;
   }
@@ -64,6 +66,7 @@ struct Pipeline::State {
   DeadReckoning dead_reckoning;                   // replaces the three filters if the odometry runs alone
   StopStage stop_stage;
   MapMerger merger;
+  FrozenCameras frozen_cameras;
   bool maps_stops = false, computes_terrain = false;
   StageClock clock;
 
@@ -78,6 +81,8 @@ struct Pipeline::State {
   double distance_m = 0;
   double distance_of_last_terrain_m = -1;
 
+  std::size_t index_of(const StereoPair& of) const { return static_cast<std::size_t>(&of - rig.pairs.data()); }
+  Status check_new(const StereoFrame& frame, std::size_t pair_index, const FrozenCameras::Fingerprints& images) const;
   void start(const RectifiedPair& rectified);
   void advance(const MotionEstimate& motion);
   RelativeMotion body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const;
@@ -92,6 +97,15 @@ struct Pipeline::State {
   Result<ImageView<const float>> dense_disparity(const RectifiedPair& rectified);
   Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& rectified);
 };
+
+// Before the frame is processed: a camera that repeats its image would look like a stationary rover.
+Status Pipeline::State::check_new(const StereoFrame& frame, std::size_t pair_index,
+                                  const FrozenCameras::Fingerprints& images) const {
+  const auto frozen = frozen_cameras.find(pair_index, images);
+  if (!frozen) return {};
+  return failure(ErrorCode::frame_rejected, fmt::format("{} of pair '{}' repeated bit for bit", *frozen, frame.pair),
+                 fmt::format("frame {}", frame.frame_id), "check whether the camera or its driver has stalled");
+}
 
 void Pipeline::State::start(const RectifiedPair& rectified) {
   localizer.start(rectified.stamp, rectified.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body);
@@ -149,12 +163,16 @@ Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const Recti
 // Adds a frame of another pair to the stop that it belongs to.
 Status Pipeline::State::add_view(const StereoFrame& frame) {
   if (!maps_stops || frame.position_id < 0) return {};
+  const StereoPair& of = *rig.find_pair(frame.pair);
+  const auto images = FrozenCameras::fingerprints_of(frame);
+  if (Status status = check_new(frame, index_of(of), images); !status) return status;
   const auto rectified = clock.measure("imaging", [&] { return imager.process(frame); });
   if (!rectified) return failure(rectified);
   clock.add(rectified->times);
-  const double nearest_m = rig.find_pair(frame.pair)->nearest_m;
-  return clock.measure("reconstruction",
-                       [&] { return stop_stage.add_view(frame.position_id, frame.pair, *rectified, nearest_m); });
+  Status added = clock.measure(
+      "reconstruction", [&] { return stop_stage.add_view(frame.position_id, frame.pair, *rectified, of.nearest_m); });
+  if (added) frozen_cameras.remember(index_of(of), images);
+  return added;
 }
 
 Result<std::optional<MappedStop>> Pipeline::State::finish_stop() {
@@ -273,6 +291,9 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair),
                    fmt::format("frame {}", frame.frame_id), "StereoFrame::pair must be the name of a pair of the rig");
   }
+  const std::size_t pair_index = s.index_of(*s.rig.find_pair(frame.pair));
+  const auto images = FrozenCameras::fingerprints_of(frame);
+  if (Status status = s.check_new(frame, pair_index, images); !status) return failure(status);
   const auto rectified = s.clock.measure("imaging", [&] { return s.imager.process(frame); });
   if (!rectified) return failure(rectified);
   s.clock.add(rectified->times);
@@ -288,6 +309,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     if (!stop) return failure(stop);
     result.stop = std::move(*stop);
   }
+  s.frozen_cameras.remember(pair_index, images);
   if (!s.started) s.start(*rectified);
   s.left_from_body = rectified->body_from_left.inverse();
 
@@ -324,6 +346,14 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   }
   result.times = s.clock.take();
   return result;
+}
+
+FrameFault Pipeline::fault_of(const StereoFrame& frame) const {
+  const State& s = *state_;
+  const StereoPair* const pair = s.rig.find_pair(frame.pair);
+  if (pair == nullptr) return FrameFault::wrong_size;
+  const bool frozen = s.frozen_cameras.find(s.index_of(*pair), FrozenCameras::fingerprints_of(frame)).has_value();
+  return frozen ? FrameFault::frozen : FrameFault::wrong_size;
 }
 
 std::optional<Pose> Pipeline::predict(Stamp stamp) const {
@@ -398,6 +428,7 @@ Bytes Pipeline::save() const {
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
+  s.frozen_cameras.save(out);
   s.stop_stage.save(out);
   const bool odometry_only = s.options.odometry_only;
   for (const Bytes& stage :
@@ -423,6 +454,7 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get<double>();
   s.distance_of_last_terrain_m = in.get<double>();
+  s.frozen_cameras.restore(in);
   s.stop_stage.restore(in);
   std::array<Bytes, 5> stages;
   for (Bytes& stage : stages) stage = in.get_array<std::uint8_t>();

@@ -82,9 +82,13 @@ class Pipeline {
   /// Processes one stereo frame. Only frames of the odometry pair have a result. Frames of other pairs are views of the
   /// stop whose position_id they carry; the stop is mapped when the odometry pair reports another position_id. After an
   /// error the state is as before the call: the next frame, or the same frame again, may be added.
-  /// Codes: `frame_rejected` (the images do not fit the rig, or the rig has no such pair), `store_damaged` (a map tile
-  /// cannot be read).
+  /// Codes: `frame_rejected` (the images do not fit the rig, the rig has no such pair, or an image equals the previous
+  /// one of its camera bit for bit, which the noise of a sensor excludes; images with one value in all pixels are
+  /// exempt), `store_damaged` (a map tile cannot be read).
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
+
+  /// Why add() has just rejected the frame with the code `frame_rejected`: `frozen` or `wrong_size`.
+  FrameFault fault_of(const StereoFrame& frame) const;
 
   /// From now on tiles of the global map may be paged out to `store`, which must contain this pipeline's map or be
   /// empty. Borrowed. flush_maps() writes all changes, inside the current transaction of the store's database.

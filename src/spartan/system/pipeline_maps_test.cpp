@@ -75,8 +75,14 @@ StereoFrame frame_of(const testing::SyntheticFrame& images, const std::string& p
   frame.position_id = position_id;
   frame.pair = pair;
   frame.left_stamp = frame.right_stamp = Stamp::from_seconds(seconds);
-  frame.left = FrameImage::borrow(images.left.view(), {});
-  frame.right = FrameImage::borrow(images.right.view(), {});
+  // The noise of a real camera differs at any time; equal images would be rejected as frozen.
+  const auto noisy = [seconds](const Image<std::uint8_t>& image) {
+    Image<std::uint8_t> copy = image.clone();
+    copy(0, 0) = static_cast<std::uint8_t>(std::lround(10 * seconds) & 255);
+    return FrameImage::own(std::move(copy), {});
+  };
+  frame.left = noisy(images.left);
+  frame.right = noisy(images.right);
   return frame;
 }
 

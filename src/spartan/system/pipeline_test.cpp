@@ -273,7 +273,53 @@ TEST(Pipeline, RejectsFramesThatDoNotFitTheRigAndContinues) {
   const auto unfit = pipeline.add(small);
   ASSERT_FALSE(unfit);
   EXPECT_EQ(unfit.error().code, ErrorCode::frame_rejected);
+  EXPECT_EQ(pipeline.fault_of(small), FrameFault::wrong_size);
   EXPECT_NEAR(push(pipeline, 1).world_from_body.pose.translation().x(), kStep_m, 0.002);
+}
+
+TEST(Pipeline, RejectsImagesThatRepeatBitForBit) {
+  Pipeline pipeline = pipeline_of();
+  push(pipeline, 0);
+  push(pipeline, 1);
+  const Bytes before = pipeline.save();
+  Pipeline resumed = pipeline_of();
+  EmptyMaps maps;
+  ASSERT_TRUE(resumed.restore(before, maps.tiles));
+  const StereoFrame first = frame_of(1), second = frame_of(2);
+  for (const bool left : {true, false}) {
+    for (const bool right : {true, false}) {
+      if (!left && !right) continue;
+      StereoFrame repeated = second;
+      if (left) repeated.left = first.left;
+      if (right) repeated.right = first.right;
+      for (Pipeline* each : {&pipeline, &resumed}) {
+        const auto refused = each->add(repeated);
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().code, ErrorCode::frame_rejected);
+        const char* which = left && right ? "left and right image of" : left ? "left image of" : "right image of";
+        EXPECT_TRUE(refused.error().message().find(which) != std::string::npos) << refused.error().message();
+        EXPECT_EQ(each->fault_of(repeated), FrameFault::frozen);
+        EXPECT_EQ(each->save(), before) << "nothing has advanced";
+      }
+    }
+  }
+  // Only the previous image counts: an earlier one may come again.
+  EXPECT_NEAR(push(pipeline, 2).world_from_body.pose.translation().x(), 2 * kStep_m, 0.003);
+  StereoFrame later = first;
+  later.left_stamp = later.right_stamp = Stamp{3'000'000'000LL};
+  const auto back = pipeline.add(later);
+  ASSERT_TRUE(back);
+  EXPECT_NEAR((*back)->world_from_body.pose.translation().x(), kStep_m, 0.003);
+}
+
+TEST(Pipeline, UniformImagesMayRepeat) {
+  Pipeline pipeline = pipeline_of();
+  const Image<std::uint8_t> dark(kStereo.size);
+  for (int i = 0; i < 3; ++i) {
+    StereoFrame frame = frame_of(i);
+    frame.left = frame.right = FrameImage::borrow(dark.view(), {});
+    EXPECT_TRUE(pipeline.add(frame)) << i;
+  }
 }
 
 TEST(Pipeline, RequiresAPairForTheOdometry) {

@@ -235,10 +235,11 @@ Status RunLoop::process(const Sample& sample) {
 Status RunLoop::process_frame(const StereoFrame& frame) {
   auto result = pipeline_.add(frame);
   if (!result) {
-    // A frame that does not fit the rig is reported, counted and skipped. Any other error ends the run.
+    // A frame that does not fit the rig or repeats an image is reported, counted and skipped. Any other error ends the
+    // run.
     if (result.error().code != ErrorCode::frame_rejected) return failure(result);
     return process_missing(
-        {frame.frame_id, frame.pair, frame.left_stamp, FrameFault::wrong_size, result.error().message()});
+        {frame.frame_id, frame.pair, frame.left_stamp, pipeline_.fault_of(frame), result.error().message()});
   }
   if (!*result) {
     view_times_ = take_stage_times();
