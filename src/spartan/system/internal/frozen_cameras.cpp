@@ -1,30 +1,10 @@
 #include "spartan/system/internal/frozen_cameras.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 namespace spartan::internal {
 namespace {
-
-/// One step of a multiplicative hash; the factor is 2⁶⁴ divided by the golden ratio (Knuth, TAOCP 3, 6.4).
-std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) {
-  hash = (hash ^ word) * 0x9E3779B97F4A7C15U;
-  return hash ^ (hash >> 32U);
-}
-
-/// The bytes eight at a time, since every image of a run is hashed.
-std::uint64_t hash_row(std::uint64_t hash, const void* row, std::size_t bytes) {
-  const auto* at = static_cast<const unsigned char*>(row);
-  std::uint64_t word = 0;
-  for (; bytes >= sizeof word; at += sizeof word, bytes -= sizeof word) {
-    std::memcpy(&word, at, sizeof word);
-    hash = mixed(hash, word);
-  }
-  word = 0;
-  std::memcpy(&word, at, bytes);
-  return mixed(hash, word);
-}
 
 template <class Pixel>
 bool is_uniform(ImageView<const Pixel> image) {
@@ -39,11 +19,10 @@ bool is_uniform(ImageView<const Pixel> image) {
 template <class Pixel>
 std::uint64_t fingerprint_of(ImageView<const Pixel> image) {
   if (is_uniform(image)) return 0;
-  std::uint64_t hash = mixed(mixed(0, static_cast<std::uint64_t>(image.width())),
-                             static_cast<std::uint64_t>(image.height()) * sizeof(Pixel));
+  Hash64 hash;
   const auto bytes = static_cast<std::size_t>(image.width()) * sizeof(Pixel);
-  for (int y = 0; y < image.height(); ++y) hash = hash_row(hash, image.row(y), bytes);
-  return hash == 0 ? 1 : hash;
+  for (int y = 0; y < image.height(); ++y) hash.add(image.row(y), bytes);
+  return std::max<std::uint64_t>(hash.value(), 1);
 }
 
 }  // namespace
