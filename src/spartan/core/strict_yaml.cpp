@@ -212,11 +212,15 @@ Result<YamlNode> parse_yaml(const std::string& text, const std::string& name) {
     return failure(ErrorCode::configuration, fmt::format("holds more than {} values", kMaxValues), name);
   }
   try {
-    std::istringstream stream(text);
+    // The parser accepts a quoted text without its closing quote at the end of the input, but not before an end marker.
+    std::istringstream stream(text + (text.ends_with('\n') ? "...\n" : "\n...\n"));
     YAML::Parser parser(stream);
-    YamlBuilder builder;
-    parser.HandleNextDocument(builder);
-    return builder.take_root();
+    YamlBuilder first, second;
+    parser.HandleNextDocument(first);
+    while (parser.HandleNextDocument(second)) {
+      if (!second.take_root().is_null()) return failure(ErrorCode::configuration, "holds more than one document", name);
+    }
+    return first.take_root();
   } catch (const YAML::Exception& e) {
     const std::string where = e.mark.is_null() ? name : fmt::format("{}:{}", name, e.mark.line + 1);
     return failure(ErrorCode::configuration, "not valid YAML: " + e.msg, where);

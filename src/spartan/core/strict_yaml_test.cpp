@@ -58,6 +58,20 @@ TEST(ParseYaml, InvalidTextIsReportedWithItsLine) {
   EXPECT_EQ(parse_error(list + "1]"), "a.yaml: holds more than 100000 values");
 }
 
+TEST(ParseYaml, AnUnfinishedQuoteIsAnError) {
+  for (const char* text : {"name: 'x\n", "name: 'x", "name: \"x\n\n", "a: 1\nlist: ['x\n"})
+    EXPECT_THAT(parse_error(text), HasSubstr("not valid YAML")) << text;
+  EXPECT_EQ(parse_node("a: |\n  text\n").entries()[0].value.scalar(), "text\n") << "the end of the text stays as it is";
+  EXPECT_EQ(parse_node("a: |\n  text").entries()[0].value.scalar(), "text\n");
+}
+
+TEST(ParseYaml, ThereIsOneDocument) {
+  EXPECT_THAT(parse_error("a: 1\n---\nb: 2\n"), HasSubstr("a.yaml: holds more than one document"));
+  for (const char* text : {"---\na: 1\n", "a: 1\n...\n", "a: 1\n---\n", "---\na: 1\n...\n"})
+    EXPECT_EQ(parse_node(text).entries().size(), 1U) << text;
+  EXPECT_TRUE(parse_node("").is_null());
+}
+
 TEST(ParseYaml, AliasesShareTheirAnchor) {
   const YamlNode root = parse_node("a: &x [1, 2]\nb: *x\n");
   EXPECT_EQ(root.entries()[1].value.items().at(1).scalar(), "2");
