@@ -13,6 +13,8 @@
 namespace spartan {
 namespace {
 
+constexpr const char* kTooLarge = "is larger than ";
+
 bool is_shortage(int error) {
   return error == ENOMEM || error == EMFILE || error == ENFILE || error == EAGAIN;
 }
@@ -114,7 +116,7 @@ Result<std::string> read_file(const std::string& path, std::size_t largest) {
   std::size_t filled = 0;
   for (std::size_t space = file->size() + 1;; space = 2 * content.size()) {
     if (filled > largest || file->size() > largest) {
-      return failure(ErrorCode::input, "is larger than " + std::to_string(largest >> 20U) + " MB", path);
+      return failure(ErrorCode::input, kTooLarge + std::to_string(largest >> 20U) + " MB", path);
     }
     content.resize(std::min(space, largest + 1));
     const auto count = file->read(std::span(content).subspan(filled));
@@ -142,6 +144,7 @@ Result<std::string> read_calibration_text(const std::string& path, std::size_t l
   if (!content) {
     Error error = std::move(content).error();
     error.code = ErrorCode::configuration;
+    if (error.what.starts_with(kTooLarge)) error.what += ", so it is not a calibration file";
     return tl::unexpected(std::move(error));
   }
   // Some editors write a UTF-8 byte order mark.

@@ -47,7 +47,6 @@ TEST(ParseYaml, BuildsATreeWithLines) {
   EXPECT_TRUE(root.entries()[2].value.is_null());
   EXPECT_TRUE(parse_node("").is_null());
   EXPECT_TRUE(parse_node("---\n").is_null());
-  EXPECT_EQ(parse_node("first\n---\nsecond\n").scalar(), "first");
 }
 
 TEST(ParseYaml, InvalidTextIsReportedWithItsLine) {
