@@ -13,6 +13,7 @@
 #include "spartan/odometry/internal/landmarks/odometer_memory.h"
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 #include "spartan/odometry/internal/motion_estimator.h"
+#include "spartan/odometry/internal/rival_motion.h"
 
 namespace spartan {
 
@@ -91,11 +92,12 @@ struct Odometer::State {
     Pose previous_from_current;
     std::vector<LandmarkMatch> matches;
     std::vector<int> feature_of;  ///< index of the feature of each landmark; −1: none
+    std::string doubt;            ///< why this may be the motion of an object; empty otherwise
   };
   CoarseMotion coarse_motion(const RectifiedStereo& stereo, const Pose& predicted);
   void add_noise_floor(std::vector<LandmarkMatch>& matches) const;
   void decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
-                     MotionEstimate& estimate) const;
+                     const std::string& doubt, MotionEstimate& estimate) const;
 };
 
 /// Why a pair cannot be used; std::nullopt where it can.
@@ -139,7 +141,7 @@ void Odometer::State::reconstruct(const StereoImages& images) {
 
 /// Coarse motion from descriptor matches; the prediction where too few of them agree.
 Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedStereo& stereo, const Pose& predicted) {
-  if (!options.matching.descriptors) return {predicted, {}, {}};
+  if (!options.matching.descriptors) return {predicted, {}, {}, {}};
   struct Attempt {
     std::vector<int> feature_of;
     std::vector<LandmarkMatch> matches;
@@ -158,8 +160,16 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedSter
     Attempt ungated = attempt(std::nullopt);
     if (ungated.inliers() > best.inliers()) best = std::move(ungated);
   }
+  std::string doubt;
+  if (best.inliers() >= kMinCoarseInliers && memory.velocity_span_s > 0) {
+    if (const auto rival = find_rival(estimation, stereo, best.matches, *best.fit, predicted)) {
+      ChosenMotion chosen = choose_motion(best.matches, *best.fit, *rival);
+      best.fit = std::move(chosen.fit);
+      doubt = std::move(chosen.reason);
+    }
+  }
   const Pose motion = best.inliers() >= kMinCoarseInliers ? best.fit->previous_from_current : predicted;
-  return {motion, std::move(best.matches), std::move(best.feature_of)};
+  return {motion, std::move(best.matches), std::move(best.feature_of), std::move(doubt)};
 }
 
 /// Adds the specified noise, which the residual of a single patch alignment does not show.
@@ -171,7 +181,7 @@ void Odometer::State::add_noise_floor(std::vector<LandmarkMatch>& matches) const
 }
 
 void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
-                                    const MotionFit& fit, MotionEstimate& estimate) const {
+                                    const MotionFit& fit, const std::string& doubt, MotionEstimate& estimate) const {
   estimate.previous_from_current = fit.previous_from_current;
   estimate.covariance = fit.covariance;
   if (fit.inliers < options.motion.min_tracking_inliers) {
@@ -182,6 +192,11 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
   if (2 * fit.inliers < static_cast<int>(matches.size())) {
     estimate.status = TrackingStatus::degraded;
     estimate.reason = fmt::format("only {} of {} matches agree on the motion", fit.inliers, matches.size());
+    return;
+  }
+  if (!doubt.empty()) {
+    estimate.status = TrackingStatus::degraded;
+    estimate.reason = doubt;
     return;
   }
   estimate.status = TrackingStatus::tracking;
@@ -196,7 +211,7 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
 
 void Odometer::State::measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate,
                               Stopwatch& watch) {
-  const auto [start, coarse_matches, feature_of] = coarse_motion(images.geometry, predicted);
+  const auto [start, coarse_matches, feature_of, doubt] = coarse_motion(images.geometry, predicted);
   std::vector<LandmarkMatch> matches =
       options.matching.correlation ? matching.by_correlation(memory.map, images, start.inverse()) : coarse_matches;
   if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
@@ -214,7 +229,7 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
   }
   estimate.inliers = fit->inliers;
   estimate.rms_px = fit->rms_px;
-  decide_status(images.geometry, matches, *fit, estimate);
+  decide_status(images.geometry, matches, *fit, doubt, estimate);
   memory.offset = fit->offset;
   move_anchors(memory.map, estimate.previous_from_current);
   manager.update(memory.map, images, matches, *fit, features, feature_of);

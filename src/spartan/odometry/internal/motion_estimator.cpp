@@ -177,6 +177,13 @@ Matrix7d covariance_of(const Problem& problem, const std::vector<bool>& used, co
   return 0.5 * (covariance + covariance.transpose());
 }
 
+/// Number of samples of which one consists of inliers with the probability 1 − kRansacFailure, where `fraction` of the
+/// matches are inliers.
+int samples_for(double fraction) {
+  const double all_inliers = std::pow(fraction, 3);
+  return 1 + static_cast<int>(std::min(1e6, std::log(kRansacFailure) / std::log(1 - std::min(all_inliers, 0.999))));
+}
+
 /// Sets `inlier`, `inliers` and `rms_px`: a match is an inlier where its squared normalized residual is within `limit`.
 void classify_inliers(MotionFit& fit, const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
                       double limit) {
@@ -196,8 +203,20 @@ void classify_inliers(MotionFit& fit, const RectifiedStereo& stereo, const std::
 
 }  // namespace
 
+std::vector<bool> MotionEstimator::agreeing(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                                            const Pose& previous_from_current) const {
+  const double limit = options_.ransac_threshold_px * options_.ransac_threshold_px;
+  std::vector<bool> agrees(matches.size(), false);
+  const Pose current_from_previous = previous_from_current.inverse();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const auto p = project_anchored(stereo, matches[i].point, current_from_previous * matches[i].previous_from_anchor);
+    agrees[i] = p && (p->measured - matches[i].measured).squaredNorm() <= limit;
+  }
+  return agrees;
+}
+
 std::optional<MotionFit> MotionEstimator::coarse(const RectifiedStereo& stereo,
-                                                 const std::vector<LandmarkMatch>& matches) const {
+                                                 const std::vector<LandmarkMatch>& matches, int least_inliers) const {
   std::vector<Eigen::Vector3d> previous, current;
   std::vector<double> weights;
   std::vector<std::size_t> usable;
@@ -213,19 +232,9 @@ std::optional<MotionFit> MotionEstimator::coarse(const RectifiedStereo& stereo,
   }
   if (usable.size() < 3) return std::nullopt;
 
-  const double limit = options_.ransac_threshold_px * options_.ransac_threshold_px;
   const auto inliers_of = [&](const Pose& motion) {
-    std::vector<bool> inlier(matches.size(), false);
-    int count = 0;
-    const Pose current_from_previous = motion.inverse();
-    for (std::size_t i = 0; i < matches.size(); ++i) {
-      const auto p =
-          project_anchored(stereo, matches[i].point, current_from_previous * matches[i].previous_from_anchor);
-      if (p && (p->measured - matches[i].measured).squaredNorm() <= limit) {
-        inlier[i] = true;
-        ++count;
-      }
-    }
+    std::vector<bool> inlier = agreeing(stereo, matches, motion);
+    const auto count = static_cast<int>(std::count(inlier.begin(), inlier.end(), true));
     return std::pair(count, std::move(inlier));
   };
   const auto fit_of = [&](const std::vector<std::size_t>& chosen) -> std::optional<Pose> {
@@ -245,7 +254,9 @@ std::optional<MotionFit> MotionEstimator::coarse(const RectifiedStereo& stereo,
   MotionFit best;
   Random random(kSeed);
   const auto count = static_cast<std::uint32_t>(usable.size());
+  const auto all = static_cast<double>(matches.size());
   int iterations = options_.ransac_iterations;
+  if (least_inliers > 0) iterations = std::min(iterations, samples_for(least_inliers / all));
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const std::size_t i = random.below(count), j = random.below(count), k = random.below(count);
     if (i == j || j == k || i == k) continue;
@@ -256,10 +267,8 @@ std::optional<MotionFit> MotionEstimator::coarse(const RectifiedStereo& stereo,
     best.previous_from_current = *motion;
     best.inliers = inliers;
     best.inlier = std::move(inlier);
-    const double all_inliers = std::pow(static_cast<double>(inliers) / static_cast<double>(matches.size()), 3);
-    if (all_inliers > 0.999) break;
-    iterations =
-        std::min(iterations, iteration + 1 + static_cast<int>(std::log(kRansacFailure) / std::log(1 - all_inliers)));
+    if (std::pow(inliers / all, 3) > 0.999) break;
+    iterations = std::min(iterations, iteration + samples_for(inliers / all));
   }
   if (best.inliers < 3) return std::nullopt;
 

@@ -47,8 +47,14 @@ class MotionEstimator {
 
   /// Coarse motion without a start value, by RANSAC (Fischler & Bolles, CACM 24, 1981): samples of three landmarks are
   /// fitted 3D-3D and scored by the reprojection of all (u, v, d); the best sample is refined by a weighted 3D-3D fit
-  /// of its inliers. std::nullopt with fewer than three inliers. Deterministic: the same for the same matches.
-  std::optional<MotionFit> coarse(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches) const;
+  /// of its inliers. std::nullopt with fewer than three inliers. Deterministic: the same for the same matches. Where
+  /// only a motion of at least `least_inliers` is of interest, fewer samples are drawn.
+  std::optional<MotionFit> coarse(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                                  int least_inliers = 0) const;
+
+  /// Which matches a motion explains to within `ransac_threshold_px`: the inliers of coarse().
+  std::vector<bool> agreeing(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                             const Pose& previous_from_current) const;
 
   /// Minimizes Σ ρ(rᵀ S⁻¹ r) + (δ − offset)²/σ_δ² over the motion and the disparity offset δ, with
   /// r = measured + (0, 0, δ) − h(motion, disparity + δ), S = covariance + ∂h/∂d σ_d² ∂h/∂dᵀ and ρ the Cauchy loss, by

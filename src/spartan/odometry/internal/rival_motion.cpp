@@ -1,0 +1,113 @@
+#include "spartan/odometry/internal/rival_motion.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+namespace spartan::internal {
+namespace {
+
+/// A first motion that deviates less than this from the prediction is that of the scene; empirical, the threshold of
+/// RANSAC by default.
+constexpr double kPredicted_px = 3;
+/// A rival has at least this many inliers, and this fraction of those of the first motion: an object near the camera is
+/// matched better than a scene that changes its scale. Empirical.
+constexpr int kMinRivalInliers = 15;
+constexpr double kMinRivalFraction = 0.05;
+/// A rival is searched among matches that lie this near to the prediction; empirical, several times its usual error.
+constexpr double kPredictionRadius_px = 12;
+/// A rival that explains more than this fraction of the first motion's inliers is the same motion, less accurate.
+constexpr double kMaxShared = 0.3;
+/// The rival deviates from the prediction less than the first motion by this factor; empirical.
+constexpr double kDeviationRatio = 2;
+/// The inliers of an object are not spread over this many times the area of the scene's.
+constexpr double kAreaRatio = 1.3;
+
+/// Median distance in pixels between the image positions by a motion and by the prediction, over the inliers of either.
+double deviation_from(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                      const std::vector<bool>& used, const Pose& motion, const Pose& predicted) {
+  const Pose by_motion = motion.inverse(), by_prediction = predicted.inverse();
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!used[i]) continue;
+    const auto a = project_anchored(stereo, matches[i].point, by_motion * matches[i].previous_from_anchor);
+    const auto b = project_anchored(stereo, matches[i].point, by_prediction * matches[i].previous_from_anchor);
+    if (a && b) distances.push_back((a->measured - b->measured).head<2>().norm());
+  }
+  if (distances.empty()) return 0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+/// Area over which the inliers spread in pixels²: the square root of the determinant of their covariance.
+double area_of(const std::vector<LandmarkMatch>& matches, const std::vector<bool>& inlier) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  double count = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!inlier[i]) continue;
+    const Eigen::Vector2d at = matches[i].measured.head<2>();
+    sum += at;
+    squares += at * at.transpose();
+    ++count;
+  }
+  const Eigen::Vector2d mean = sum / count;
+  const Eigen::Matrix2d covariance = squares / count - mean * mean.transpose();
+  return std::sqrt(std::max(0.0, covariance(0, 0) * covariance(1, 1) - covariance(0, 1) * covariance(1, 0)));
+}
+
+}  // namespace
+
+std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const RectifiedStereo& stereo,
+                                    const std::vector<LandmarkMatch>& matches, const MotionFit& first,
+                                    const Pose& predicted) {
+  const int least = std::max(kMinRivalInliers, static_cast<int>(std::ceil(kMinRivalFraction * first.inliers)));
+  if (static_cast<int>(matches.size()) - first.inliers < least) return std::nullopt;
+  if (deviation_from(stereo, matches, first.inlier, first.previous_from_current, predicted) < kPredicted_px)
+    return std::nullopt;
+  std::vector<LandmarkMatch> outliers;
+  std::vector<std::size_t> index;
+  const Pose by_prediction = predicted.inverse();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (first.inlier[i]) continue;
+    const auto p = project_anchored(stereo, matches[i].point, by_prediction * matches[i].previous_from_anchor);
+    if (!p || (p->measured - matches[i].measured).norm() > kPredictionRadius_px) continue;
+    outliers.push_back(matches[i]);
+    index.push_back(i);
+  }
+  if (static_cast<int>(outliers.size()) < least) return std::nullopt;
+  std::optional<MotionFit> rival = estimator.coarse(stereo, outliers, least);
+  if (!rival || rival->inliers < least) return std::nullopt;
+
+  const std::vector<bool> agreeing = estimator.agreeing(stereo, matches, rival->previous_from_current);
+  int shared = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) shared += agreeing[i] && first.inlier[i];
+  if (shared > kMaxShared * first.inliers) return std::nullopt;
+  std::vector<bool> inlier(matches.size(), false), either = first.inlier;
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    inlier[index[k]] = rival->inlier[k];
+    either[index[k]] = rival->inlier[k];
+  }
+  rival->inlier = std::move(inlier);
+  const auto deviation = [&](const MotionFit& fit) {
+    return deviation_from(stereo, matches, either, fit.previous_from_current, predicted);
+  };
+  if (kDeviationRatio * deviation(*rival) > deviation(first)) return std::nullopt;
+  return rival;
+}
+
+ChosenMotion choose_motion(const std::vector<LandmarkMatch>& matches, const MotionFit& first, const MotionFit& rival) {
+  const bool ambiguous = area_of(matches, first.inlier) > kAreaRatio * area_of(matches, rival.inlier);
+  if (ambiguous) {
+    return {first, fmt::format("{} matches follow one motion, {} another, as predicted; which one is of the scene is "
+                               "ambiguous",
+                               first.inliers, rival.inliers)};
+  }
+  return {rival,
+          fmt::format("{} matches follow the predicted motion, {} that of an object", rival.inliers, first.inliers)};
+}
+
+}  // namespace spartan::internal

@@ -1,0 +1,112 @@
+#include "spartan/odometry/internal/rival_motion.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "spartan/numerics/random.h"
+
+namespace spartan::internal {
+namespace {
+
+using ::testing::HasSubstr;
+
+const RectifiedStereo kPair{{640, 480}, 500, {319.5, 239.5}, 0.12};
+const Pose kScene = Pose::from_translation({0, 0, 0.1});
+// 2 m away: 10 px a frame to the right of where the scene would be.
+const Pose kObject = kScene * Pose::from_translation({-0.04, 0, 0});
+
+struct Part {
+  int count;
+  Eigen::Vector2d from, to;  // pixels
+  Pose motion;
+};
+const Part kWholeView{100, {0, 0}, {639, 479}, kScene};
+const Part kCompact{150, {220, 140}, {420, 340}, kObject};
+
+std::vector<LandmarkMatch> matches_of(const std::vector<Part>& parts, double noise_px = 0.2) {
+  Random random(5);
+  std::vector<LandmarkMatch> matches;
+  for (const Part& part : parts) {
+    for (int i = 0; i < part.count;) {
+      LandmarkMatch m;
+      m.point.pixel = {random.uniform(part.from.x(), part.to.x()), random.uniform(part.from.y(), part.to.y())};
+      m.point.disparity = 60 / random.uniform(1.8, 2.2);
+      const auto p = project_anchored(kPair, m.point, part.motion.inverse());
+      if (!p) continue;
+      m.measured = p->measured;
+      for (int k = 0; k < 3; ++k) m.measured[k] += noise_px * random.normal();
+      m.covariance = 0.04 * Eigen::Matrix3d::Identity();
+      m.landmark = matches.size();
+      matches.push_back(m);
+      ++i;
+    }
+  }
+  return matches;
+}
+
+double apart(const Pose& a, const Pose& b) {
+  return (a.inverse() * b).translation().norm();
+}
+
+struct Found {
+  std::vector<LandmarkMatch> matches;
+  MotionFit first;
+  std::optional<MotionFit> rival;
+};
+
+Found search(const std::vector<Part>& parts, const Pose& predicted = kScene, double noise_px = 0.2) {
+  const MotionEstimator estimator{MotionEstimationOptions{}};
+  Found found{matches_of(parts, noise_px), {}, {}};
+  found.first = estimator.coarse(kPair, found.matches).value();
+  found.rival = find_rival(estimator, kPair, found.matches, found.first, predicted);
+  return found;
+}
+
+TEST(RivalMotion, IsFoundAmongTheOutliers) {
+  const Found found = search({kWholeView, kCompact});
+  EXPECT_LT(apart(found.first.previous_from_current, kObject), 0.008);
+  ASSERT_TRUE(found.rival);
+  EXPECT_LT(apart(found.rival->previous_from_current, kScene), 0.008);
+  EXPECT_EQ(found.rival->inliers, kWholeView.count);
+  for (std::size_t i = 0; i < found.matches.size(); ++i) EXPECT_NE(found.rival->inlier[i], found.first.inlier[i]) << i;
+}
+
+TEST(RivalMotion, AgreesWithThePredictionBetterThanTheFirstMotion) {
+  EXPECT_FALSE(search({kWholeView}).rival);
+  EXPECT_FALSE(search({kCompact}).rival);
+  EXPECT_FALSE(search({kWholeView, kCompact}, kObject).rival) << "the first motion is the predicted one";
+  EXPECT_FALSE(search({kWholeView, kCompact}, Pose::from_translation({0, 0.3, 0})).rival) << "neither is";
+  Part few = kWholeView;
+  few.count = 30;
+  EXPECT_TRUE(search({few, kCompact}).rival) << "30 against 150";
+  few.count = 12;
+  EXPECT_FALSE(search({few, kCompact}).rival);
+  // Outliers without a common motion.
+  std::vector<Part> scattered{kCompact};
+  for (int i = 0; i < 80; ++i)
+    scattered.push_back({1, {0, 0}, {639, 479}, Pose::from_translation({0.02 * (i - 40), 0.04 * (i % 9 - 4), 0})});
+  EXPECT_FALSE(search(scattered).rival);
+  // Noise of the size of the threshold leaves outliers, but they agree with the same motion.
+  Part noisy = kCompact;
+  noisy.count = 300;
+  EXPECT_FALSE(search({noisy}, kScene, 2.0).rival);
+}
+
+TEST(RivalMotion, IsChosenUnlessItIsCompactInAWideScene) {
+  const Found found = search({kWholeView, kCompact});
+  ASSERT_TRUE(found.rival);
+  const ChosenMotion scene = choose_motion(found.matches, found.first, *found.rival);
+  EXPECT_LT(apart(scene.fit.previous_from_current, kScene), 0.008);
+  EXPECT_EQ(scene.reason, "100 matches follow the predicted motion, 150 that of an object");
+  // A rover that has just started to follow another one: what moves with the camera was predicted.
+  Part scenery = kWholeView;
+  scenery.count = 200;
+  const Found started = search({scenery, kCompact}, kObject);
+  ASSERT_TRUE(started.rival);
+  const ChosenMotion kept = choose_motion(started.matches, started.first, *started.rival);
+  EXPECT_LT(apart(kept.fit.previous_from_current, kScene), 0.008);
+  EXPECT_THAT(kept.reason, HasSubstr("ambiguous"));
+}
+
+}  // namespace
+}  // namespace spartan::internal
