@@ -134,8 +134,9 @@ FAULTS = {
 
 
 def evaluate(spartan, run, recording, trajectory):
-    result = subprocess.run([spartan, "evaluate", str(run), "--truth", str(recording.source), "--trajectory", trajectory,
-                             "--align", ALIGNMENTS.get(recording.source.name, "se3"), "--json"],
+    align = ALIGNMENTS.get(recording.source.name, "se3")
+    result = subprocess.run([spartan, "evaluate", str(run), "--truth", str(recording.source),
+                             "--trajectory", trajectory, "--align", align, "--json"],
                             capture_output=True, text=True)
     return f"{json.loads(result.stdout)['ate_m']['rmse']:.3f}" if result.returncode == 0 else "-"
 
