@@ -217,9 +217,9 @@ Result<YamlNode> parse_yaml(const std::string& text, const std::string& name) {
     YAML::Parser parser(stream);
     YamlBuilder first, second;
     parser.HandleNextDocument(first);
-    while (parser.HandleNextDocument(second)) {
-      if (!second.take_root().is_null()) return failure(ErrorCode::configuration, "holds more than one document", name);
-    }
+    // Once only: the parser may hand out empty documents without end.
+    if (parser.HandleNextDocument(second) && !second.take_root().is_null())
+      return failure(ErrorCode::configuration, "holds more than one document", name);
     return first.take_root();
   } catch (const YAML::Exception& e) {
     const std::string where = e.mark.is_null() ? name : fmt::format("{}:{}", name, e.mark.line + 1);
