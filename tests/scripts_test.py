@@ -41,7 +41,8 @@ class CoverageByModule(unittest.TestCase):
 
     def test_adds_the_files_of_a_module(self):
         line = {"gcovr/noncode": False, "gcovr/excluded": False}
-        branches = [{"count": 5, "fallthrough": True, "throw": False}, {"count": 0, "fallthrough": False, "throw": False}]
+        branches = [{"count": 5, "fallthrough": True, "throw": False},
+                    {"count": 0, "fallthrough": False, "throw": False}]
         lines = [{**line, "line_number": 1, "count": 5, "branches": branches},
                  {**line, "line_number": 2, "count": 0, "branches": []},
                  {**line, "line_number": 3, "count": 0, "branches": [], "gcovr/noncode": True}]
