@@ -12,28 +12,31 @@
 namespace spartan {
 namespace {
 
-const PinholeModel kPinhole{400, 405, 320, 240};
-const CahvModel kCahv{kPinhole, 0.2};
+const PinholeModel kAxisPinhole{400, 405, 320, 240};
+const CahvModel kAxisCahv{kAxisPinhole, 0.2};
 
 // One camera of each model, and variants that differ from it in one parameter each.
 std::vector<std::vector<CameraModel>> cameras_and_variants() {
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ(), tilted = Eigen::Vector3d(0.01, 0, 1).normalized();
   const PinholeModel other{401, 405, 320, 240};
   return {
-      {kPinhole, other, PinholeModel{400, 406, 320, 240}, PinholeModel{400, 405, 321, 240},
+      {kAxisPinhole, other, PinholeModel{400, 406, 320, 240}, PinholeModel{400, 405, 321, 240},
        PinholeModel{400, 405, 320, 241}},
-      {RadialTangentialModel(kPinhole, {0.1, 0.01}), RadialTangentialModel(other, {0.1, 0.01}),
-       RadialTangentialModel(kPinhole, {0.1, 0.02})},
-      {EquidistantModel(kPinhole, {0.1, 0.01}), EquidistantModel(other, {0.1, 0.01}),
-       EquidistantModel(kPinhole, {0.1, 0.02})},
-      {DoubleSphereModel{kPinhole, 0.1, 0.5}, DoubleSphereModel{other, 0.1, 0.5}, DoubleSphereModel{kPinhole, 0.2, 0.5},
-       DoubleSphereModel{kPinhole, 0.1, 0.6}},
-      {kCahv, CahvModel{other, 0.2}, CahvModel{kPinhole, 0.3}},
-      {CahvorModel(kCahv, z, {0, 0.1, 0}), CahvorModel({other, 0.2}, z, {0, 0.1, 0}),
-       CahvorModel(kCahv, tilted, {0, 0.1, 0}), CahvorModel(kCahv, z, {0, 0.2, 0})},
-      {CahvoreModel(kCahv, z, {0, 0.1, 0}, {0, 0, 0}, 0.5), CahvoreModel({other, 0.2}, z, {0, 0.1, 0}, {0, 0, 0}, 0.5),
-       CahvoreModel(kCahv, tilted, {0, 0.1, 0}, {0, 0, 0}, 0.5), CahvoreModel(kCahv, z, {0, 0.2, 0}, {0, 0, 0}, 0.5),
-       CahvoreModel(kCahv, z, {0, 0.1, 0}, {0.01, 0, 0}, 0.5), CahvoreModel(kCahv, z, {0, 0.1, 0}, {0, 0, 0}, 0.6)},
+      {RadialTangentialModel(kAxisPinhole, {0.1, 0.01}), RadialTangentialModel(other, {0.1, 0.01}),
+       RadialTangentialModel(kAxisPinhole, {0.1, 0.02})},
+      {EquidistantModel(kAxisPinhole, {0.1, 0.01}), EquidistantModel(other, {0.1, 0.01}),
+       EquidistantModel(kAxisPinhole, {0.1, 0.02})},
+      {DoubleSphereModel{kAxisPinhole, 0.1, 0.5}, DoubleSphereModel{other, 0.1, 0.5},
+       DoubleSphereModel{kAxisPinhole, 0.2, 0.5}, DoubleSphereModel{kAxisPinhole, 0.1, 0.6}},
+      {kAxisCahv, CahvModel{other, 0.2}, CahvModel{kAxisPinhole, 0.3}},
+      {CahvorModel(kAxisCahv, z, {0, 0.1, 0}), CahvorModel({other, 0.2}, z, {0, 0.1, 0}),
+       CahvorModel(kAxisCahv, tilted, {0, 0.1, 0}), CahvorModel(kAxisCahv, z, {0, 0.2, 0})},
+      {CahvoreModel(kAxisCahv, z, {0, 0.1, 0}, {0, 0, 0}, 0.5),
+       CahvoreModel({other, 0.2}, z, {0, 0.1, 0}, {0, 0, 0}, 0.5),
+       CahvoreModel(kAxisCahv, tilted, {0, 0.1, 0}, {0, 0, 0}, 0.5),
+       CahvoreModel(kAxisCahv, z, {0, 0.2, 0}, {0, 0, 0}, 0.5),
+       CahvoreModel(kAxisCahv, z, {0, 0.1, 0}, {0.01, 0, 0}, 0.5),
+       CahvoreModel(kAxisCahv, z, {0, 0.1, 0}, {0, 0, 0}, 0.6)},
   };
 }
 
@@ -64,10 +67,11 @@ TEST(CameraModel, TheOpticalAxisIsARay) {
 // O = A: the pixel of the axis is exact, so the ray is the axis itself, without a direction across it.
 TEST(CameraModel, ThePixelOfACentredAxisGivesTheAxis) {
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  const Eigen::Vector2d centre(kPinhole.cx, kPinhole.cy);
-  const std::vector<CameraModel> models{CahvorModel({kPinhole, 0}, z, {0.01, 0.1, 0}),
-                                        CahvoreModel({kPinhole, 0}, z, {0.01, 0.1, 0}, {0.01, 0, 0}, 0.3),
-                                        EquidistantModel(kPinhole, {0.1}), RadialTangentialModel(kPinhole, {0.1})};
+  const Eigen::Vector2d centre(kAxisPinhole.cx, kAxisPinhole.cy);
+  const std::vector<CameraModel> models{CahvorModel({kAxisPinhole, 0}, z, {0.01, 0.1, 0}),
+                                        CahvoreModel({kAxisPinhole, 0}, z, {0.01, 0.1, 0}, {0.01, 0, 0}, 0.3),
+                                        EquidistantModel(kAxisPinhole, {0.1}),
+                                        RadialTangentialModel(kAxisPinhole, {0.1})};
   for (const CameraModel& model : models) {
     const auto ray = unproject(model, centre);
     ASSERT_TRUE(ray) << name_of(model);
@@ -80,7 +84,7 @@ std::vector<std::string> faults_of_unit(const PanTiltUnit& unit) {
   Camera left;
   left.name = "left";
   left.size = {640, 480};
-  left.model = kPinhole;
+  left.model = kAxisPinhole;
   left.mount = unit.name;
   Camera right = left;
   right.name = "right";
