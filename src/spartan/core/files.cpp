@@ -191,6 +191,7 @@ Status write_files_atomically(const std::vector<NewFile>& files) {
     if (::rename(temporaries[i].c_str(), files[i].path.c_str()) != 0) return abort_with(files[i].path, errno);
   }
   std::vector<std::string> folders;
+  folders.reserve(files.size());
   for (const NewFile& file : files) folders.push_back(folder_of(file.path));
   std::sort(folders.begin(), folders.end());
   folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
