@@ -31,7 +31,7 @@ test:
 faults:
 	./setup build test
 	scripts/build release
-	ctest --preset long -R '^(make_small_.*|faults)' --verbose
+	scripts/faults $(ARGS)
 
 bench:
 	./setup build develop

@@ -178,9 +178,10 @@ void read_plan() {
   copy_variable("FAULT_PATH", plan.path);
   copy_variable("FAULT_REPORT", plan.report);
   copy_variable("FAULT_TRACE_FOLDER", plan.trace_folder);
-  if (const char* trace_file = std::getenv("FAULT_TRACE"))
+  if (const char* trace_file = std::getenv("FAULT_TRACE")) {
     plan.trace =
         static_cast<int>(syscall(SYS_openat, AT_FDCWD, trace_file, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644));
+  }
 }
 
 using Main = int (*)(int, char**, char**);
@@ -221,6 +222,8 @@ int open_file(const char* name, const char* path, int flags, mode_t mode) {
 
 }  // namespace
 
+// NOLINTBEGIN(readability-inconsistent-declaration-parameter-name): the names in the headers of the C library are
+// reserved
 extern "C" {
 
 int __libc_start_main(Main main, int argc, char** argv, void (*init)(), void (*fini)(), void (*rtld_fini)(),
@@ -348,3 +351,4 @@ int gettimeofday(timeval* time, void*) {
 }
 
 }  // extern "C"
+// NOLINTEND(readability-inconsistent-declaration-parameter-name)

@@ -103,6 +103,7 @@ TEST_F(DamagedStores, OfRunsAreNamed) {
            Damage{"UPDATE frames SET stamp_ns = 9223372036854775807", "table 'frames'"},
            Damage{"UPDATE localization SET pose = x'00'", "table 'localization': a pose"},
            Damage{"UPDATE slam SET covariance = x'00'", "table 'slam': a pose"},
+           Damage{"UPDATE health SET state = 'fine'", "table 'health'"},
            Damage{"DELETE FROM map_submaps", "'map_submaps' has no submap"},
        }) {
     fs::remove_all(path("run"));

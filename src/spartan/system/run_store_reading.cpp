@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -65,6 +66,12 @@ bool is_pose(const Pose& pose) {
 }
 
 constexpr const char* kNoPose = "a pose is incomplete or not finite";
+constexpr const char* kDamagedRow = "a pose is incomplete or not finite, or a state is unknown";
+
+// The names of SensorState.
+bool is_sensor_state(std::string_view name) {
+  return name == "ok" || name == "suspect" || name == "excluded" || name == "missing";
+}
 
 // A pose and, in the column behind it, its covariance; none if they are incomplete or the pose is not finite.
 std::optional<UncertainPose> uncertain_pose_of(const SqlStatement& row, int column) {
@@ -184,11 +191,12 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
     }
     if (read) {
       read = health->of(seq, [&](const SqlStatement& sensor) {
+        if (!is_sensor_state(sensor.text(2))) damaged = "health";
         if (r.localization) r.localization->sensors.push_back({sensor.text(1), sensor.text(2), sensor.text(3)});
       });
     }
     if (!read) return failure(read);
-    if (damaged != nullptr) return damaged_table(db, damaged, kNoPose);
+    if (damaged != nullptr) return damaged_table(db, damaged, kDamagedRow);
   }
 }
 

@@ -25,6 +25,7 @@ LandmarkMatch match_at(const Eigen::Vector2d& pixel, double disparity, const Pos
 std::vector<LandmarkMatch> spread_matches(int count, const Pose& current_from_previous) {
   Random random(8);
   std::vector<LandmarkMatch> matches;
+  matches.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     matches.push_back(match_at({random.uniform(50, 590), random.uniform(50, 430)}, 60 / random.uniform(2, 12),
                                current_from_previous));
@@ -53,6 +54,7 @@ TEST(DegenerateMotion, ThreeLandmarksAreNeededForACoarseAndSixForAFineMotion) {
 
 TEST(DegenerateMotion, LandmarksOnALineGiveNoCoarseMotion) {
   std::vector<LandmarkMatch> line;
+  line.reserve(20);
   for (int i = 0; i < 20; ++i) line.push_back(match_at({100.0 + 20 * i, 239.5}, 12, kForward.inverse()));
   EXPECT_FALSE(kEstimator.coarse(kGeometry, line));
 }
@@ -62,6 +64,7 @@ TEST(DegenerateMotion, DistantLandmarksAreNotPartOfTheCoarseFit) {
   Random random(9);
   for (const double forward_m : {33.3, -33.3}) {
     std::vector<LandmarkMatch> distant;
+    distant.reserve(20);
     for (int i = 0; i < 20; ++i) {
       distant.push_back(match_at({random.uniform(200, 440), random.uniform(150, 330)}, forward_m > 0 ? 0.45 : 0.6,
                                  Pose::from_translation({0, 0, -forward_m})));
