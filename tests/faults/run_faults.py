@@ -170,7 +170,7 @@ def two_processes(bench):
 
 def signals(bench):
     """SIGINT and SIGTERM once: 130. What was done stays."""
-    seconds = bench.seconds_of_a_run()
+    seconds = dict.fromkeys(("run", "simulate"), bench.seconds_of_a_run())
     left, right = (str(bench.drive / f"image_{camera}/000000.png") for camera in (0, 1))
     rig = str(bench.drive / "calib.txt")
     commands = {
@@ -181,10 +181,24 @@ def signals(bench):
         "simulate": [bench.program, "simulate", "quick", "-o", str(bench.folder / "rec")],
     }
 
+    def remove_outputs():
+        for output in ("stereo", "map", "rec"):
+            shutil.rmtree(bench.folder / output, ignore_errors=True)
+
+    def seconds_of(name):
+        start = time.monotonic()
+        bench.execute(commands[name], allowed={0})
+        return time.monotonic() - start
+
+    remove_outputs()
+    # A simulation takes a minute; its signals come within the time of a run.
+    seconds |= {name: seconds_of(name) for name in ("stereo", "map build", "rig design")}
+
     def trial(name, number):
+        remove_outputs()
         process = bench.spawn(commands[name], stdout=subprocess.DEVNULL)
         # Before main() has begun the default action applies, which is 130 in a shell as well.
-        time.sleep(0.15 + bench.random.uniform(0, 0.5 * seconds if name == "run" else 0.05))
+        time.sleep(bench.random.uniform(0.05, 0.4) * seconds[name])
         if process.poll() is not None:
             raise Skipped("ended before the signal")
         process.send_signal(number)
