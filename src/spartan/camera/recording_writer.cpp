@@ -199,6 +199,10 @@ Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const
     auto acquired = FolderLock::acquire(folder);
     if (!acquired) return failure(acquired);
     lock = std::move(*acquired);
+    remove_temporary_files(folder);
+    for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+      if (entry->is_directory(error)) remove_temporary_files(entry->path().string());
+    }
     const auto table = read_file(folder + "/frames.csv");
     if (!table) return failure(table);
     if (fs::exists(folder + "/recording.yaml", error)) {
@@ -328,9 +332,8 @@ Status RecordingWriter::finish() {
   std::error_code ignored;
   fs::remove(state_->folder + kPreviousRowsFile, ignored);
   const RecordingFile file{.schema = 1, .about = state_->options};
-  Status written = write_file_atomically(state_->folder + "/recording.yaml", dump_options(file));
-  if (written) state_->lock = {};  // nothing is written to a finished recording
-  return written;
+  state_->lock = {};  // before the last file: a process that is killed after it leaves a finished recording
+  return write_file_atomically(state_->folder + "/recording.yaml", dump_options(file));
 }
 
 }  // namespace spartan
