@@ -6,6 +6,7 @@
 #include <ctime>
 #include <new>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -52,12 +53,20 @@ class Stopwatch {
 /// Measures the times of consecutive stages.
 class StageClock {
  public:
-  /// Runs `work`, records its time under the name `stage`, and returns its result.
+  /// Runs `work`, records its time under the name `stage`, and returns its result. Nothing is recorded where `work`
+  /// throws.
   template <class Work>
   auto measure(const char* stage, Work&& work) {
-    const Lap lap(*this, stage);
+    const Lap lap;
     try {
-      return std::forward<Work>(work)();
+      if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
+        std::forward<Work>(work)();
+        record(stage, lap);
+      } else {
+        auto result = std::forward<Work>(work)();
+        record(stage, lap);
+        return result;
+      }
     } catch (const OutOfMemory&) {
       throw;  // of a stage inside this one
     } catch (const std::bad_alloc&) {
@@ -75,21 +84,13 @@ class StageClock {
     ::clock_gettime(clock, &t);
     return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
   }
-  class Lap {
-   public:
-    Lap(StageClock& clock, const char* stage)
-        : clock_(clock), stage_(stage), wall_(now_ms(CLOCK_MONOTONIC)), cpu_(now_ms(CLOCK_PROCESS_CPUTIME_ID)) {}
-    Lap(const Lap&) = delete;
-    Lap& operator=(const Lap&) = delete;
-    ~Lap() {
-      clock_.times_.push_back({stage_, now_ms(CLOCK_MONOTONIC) - wall_, now_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu_});
-    }
-
-   private:
-    StageClock& clock_;
-    const char* stage_;
-    double wall_, cpu_;
+  struct Lap {
+    double wall_ms = now_ms(CLOCK_MONOTONIC), cpu_ms = now_ms(CLOCK_PROCESS_CPUTIME_ID);
   };
+  // Not in a destructor, which must not throw: it allocates.
+  void record(const char* stage, const Lap& begin) {
+    times_.push_back({stage, now_ms(CLOCK_MONOTONIC) - begin.wall_ms, now_ms(CLOCK_PROCESS_CPUTIME_ID) - begin.cpu_ms});
+  }
 
   std::vector<StageTime> times_;
 };

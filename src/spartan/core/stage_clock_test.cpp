@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <functional>
+#include <new>
+#include <string>
 #include <thread>
 
 namespace spartan {
@@ -30,6 +33,27 @@ TEST(StageClock, RecordsStagesInOrderAndReturnsTheirResults) {
   EXPECT_GE(times[1].wall_ms, 2);
   EXPECT_EQ(times[2].cpu_ms, 0.5);
   EXPECT_TRUE(clock.take().empty());
+}
+
+std::string stage_without_memory(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const OutOfMemory& e) {
+    return e.stage();
+  }
+  return "";
+}
+
+TEST(StageClock, AFailedAllocationNamesTheInnermostStage) {
+  StageClock clock;
+  EXPECT_EQ(stage_without_memory([&] { clock.measure("map", [] { throw std::bad_alloc(); }); }), "map");
+  EXPECT_EQ(stage_without_memory([&] {
+              clock.measure("slam", [&] { return clock.measure("match", []() -> int { throw std::bad_alloc(); }); });
+            }),
+            "match");
+  EXPECT_TRUE(clock.take().empty()) << "a stage that fails has no time";
+  EXPECT_EQ(out_of_memory(OutOfMemory("map")).what, "out of memory in the stage 'map'");
+  EXPECT_EQ(out_of_memory(std::bad_alloc()).code, ErrorCode::resources);
 }
 
 }  // namespace
