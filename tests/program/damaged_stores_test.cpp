@@ -61,12 +61,13 @@ TEST_F(DamagedStores, OfMapsAreNamed) {
            Damage{"UPDATE map_tiles SET cells = x'00'", "checksum mismatch"},
            Damage{"UPDATE map_submaps SET id = -7", "table 'map_submaps' has the id -7"},
            Damage{"UPDATE map_submaps SET anchor = x'0011'", "submap 0"},
-           Damage{"UPDATE map_submaps SET anchor = zeroblob(56)", "the anchor of submap 0 is no pose"},
+           Damage{"UPDATE map_submaps SET anchor = zeroblob(56)", "submap 0: is damaged: a number is out of bounds"},
            Damage{"UPDATE map_submaps SET anchor = x'000000000000000000000000000000000000000000000000000000000000F03F"
                   "00000000000000000000000000000000000000000000F07F'",
-                  "the anchor of submap 0 is no pose"},
-           Damage{"UPDATE map_submaps SET anchor = x'000000000000000000000000000000000000000000000000000000000000F03F"
-                  "9C7500883CE4377E00000000000000000000000000000000'",
+                  "submap 0: is damaged: a number is out of bounds"},
+           Damage{"UPDATE map_properties SET value = 0.005 WHERE key = 'cell_m';"
+                  "UPDATE map_submaps SET anchor = x'000000000000000000000000000000000000000000000000000000000000F03F"
+                  "00000000882A614100000000000000000000000000000000'",
                   "the anchor of submap 0 is too far away"},
            Damage{"UPDATE map_stops SET pose = x''", "stop 0"},
        }) {

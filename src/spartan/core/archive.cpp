@@ -1,6 +1,7 @@
 #include "spartan/core/archive.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace spartan {
 
@@ -54,24 +55,39 @@ std::string ArchiveReader::get_string() {
   const std::vector<char> text = get_array<char>();
   return {text.begin(), text.end()};
 }
+Stamp ArchiveReader::get_stamp() {
+  const Stamp stamp{get<std::int64_t>()};
+  plausible_ = plausible_ && std::abs(stamp.seconds()) <= kMostSeconds;
+  return stamp;
+}
+double ArchiveReader::get_finite() {
+  const auto value = get<double>();
+  plausible_ = plausible_ && std::isfinite(value);
+  return value;
+}
 Eigen::Vector2d ArchiveReader::get_vector2() {
   Eigen::Vector2d v = Eigen::Vector2d::Zero();
   raw(v.data(), sizeof(double) * 2);
+  plausible_ = plausible_ && v.allFinite();
   return v;
 }
 Eigen::Vector3d ArchiveReader::get_vector3() {
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   raw(v.data(), sizeof(double) * 3);
+  plausible_ = plausible_ && v.allFinite();
   return v;
 }
 Pose ArchiveReader::get_pose() {
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
   raw(q.coeffs().data(), sizeof(double) * 4);
-  return Pose::from_unit_quaternion(q, get_vector3());
+  const Eigen::Vector3d translation = get_vector3();
+  plausible_ = plausible_ && std::abs(q.norm() - 1) < 1e-6 && translation.norm() < kFarthest_m;
+  return Pose::from_unit_quaternion(q, translation);
 }
 Matrix6d ArchiveReader::get_matrix6() {
   Matrix6d m = Matrix6d::Zero();
   raw(m.data(), sizeof(double) * 36);
+  plausible_ = plausible_ && m.allFinite();
   return m;
 }
 
@@ -86,6 +102,7 @@ Status ArchiveReader::expect_version(std::uint32_t version, const std::string& w
 
 Status ArchiveReader::finish(const std::string& what) const {
   if (!ok_) return failure(ErrorCode::store_damaged, "the saved state is truncated", what);
+  if (!plausible_) return failure(ErrorCode::store_damaged, "is damaged: a number is out of bounds", what);
   if (offset_ != bytes_.size())
     return failure(ErrorCode::store_damaged, "the saved state has unexpected bytes at its end", what);
   return {};

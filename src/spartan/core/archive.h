@@ -11,6 +11,7 @@
 
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
+#include "spartan/core/time.h"
 
 namespace spartan {
 
@@ -63,9 +64,15 @@ class ArchiveWriter {
 };
 
 /// Reads what ArchiveWriter wrote, in the same order. After the first value beyond the end of the bytes, that value and
-/// all following ones are zero; call finish() at the end to check for errors.
+/// all following ones are zero; call finish() at the end to check for errors. Values that no program saves are errors
+/// as well: vectors, matrices and poses with numbers that are not finite, poses without a unit quaternion or beyond
+/// kFarthest_m, stamps beyond kMostSeconds.
 class ArchiveReader {
  public:
+  /// Bounds of poses and stamps: cells of 5 mm and differences of stamps in nanoseconds can be counted.
+  static constexpr double kFarthest_m = 1e7;
+  static constexpr std::int64_t kMostSeconds = 4'000'000'000;
+
   /// Keeps a reference to the bytes, which must outlive the reader.
   explicit ArchiveReader(const Bytes& bytes) : bytes_(bytes) {}
   explicit ArchiveReader(Bytes&&) = delete;
@@ -82,6 +89,8 @@ class ArchiveReader {
     }
   }
   std::string get_string();
+  Stamp get_stamp();
+  double get_finite();
   Eigen::Vector2d get_vector2();
   Eigen::Vector3d get_vector3();
   Pose get_pose();
@@ -102,8 +111,10 @@ class ArchiveReader {
   /// Reads the version that a saved state begins with. Code `configuration` where it is another one, `store_damaged`
   /// where the bytes end before it; `what` names the state.
   Status expect_version(std::uint32_t version, const std::string& what);
-  /// Checks that every value was present and no byte is left over; otherwise an error of code `store_damaged` at
-  /// `what`.
+  /// Whether all values so far were present and possible.
+  bool ok() const { return ok_ && plausible_; }
+  /// Checks that every value was present and possible and no byte is left over; otherwise an error of code
+  /// `store_damaged` at `what`.
   Status finish(const std::string& what) const;
 
  private:
@@ -111,7 +122,8 @@ class ArchiveReader {
   void raw(void* data, std::size_t size);
   const Bytes& bytes_;
   std::size_t offset_ = 0;
-  bool ok_ = true;
+  bool ok_ = true;         // no value was beyond the end
+  bool plausible_ = true;  // all values were such as a program saves
 };
 
 }  // namespace spartan

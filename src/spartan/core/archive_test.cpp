@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 namespace spartan {
 namespace {
@@ -64,6 +65,42 @@ TEST(Archive, TellsAnotherVersionFromDamage) {
   EXPECT_EQ(other.error().code, ErrorCode::configuration);
   EXPECT_EQ(other.error().what, "has version 7, but this program reads version 8");
   EXPECT_EQ(ArchiveReader(cut).expect_version(7, "state").error().code, ErrorCode::store_damaged);
+}
+
+// The bytes of a value, read by `read`.
+template <class Value, class Read>
+bool is_accepted(const Value& value, const Read& read) {
+  ArchiveWriter writer;
+  writer.put(value);
+  const Bytes bytes = writer.take();
+  ArchiveReader reader(bytes);
+  read(reader);
+  const Status status = reader.finish("state");
+  EXPECT_EQ(status.has_value(), reader.ok());
+  if (!status) {
+    EXPECT_EQ(status.error().what, "is damaged: a number is out of bounds");
+  }
+  return status.has_value();
+}
+
+TEST(Archive, RefusesValuesThatNoProgramSaves) {
+  const double nan = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+  const auto pose = [](ArchiveReader& reader) { reader.get_pose(); };
+  EXPECT_TRUE(is_accepted(Pose::from_translation({1e6, 0, 0}), pose));
+  EXPECT_FALSE(is_accepted(Pose::from_translation({1e8, 0, 0}), pose));
+  EXPECT_FALSE(is_accepted(Pose::from_translation({nan, 0, 0}), pose));
+  EXPECT_FALSE(is_accepted(Pose::from_unit_quaternion({0, 0, 0, 0}, {1, 2, 3}), pose));
+  const auto vector = [](ArchiveReader& reader) { reader.get_vector3(); };
+  EXPECT_TRUE(is_accepted(Eigen::Vector3d(1, 2, 3), vector));
+  EXPECT_FALSE(is_accepted(Eigen::Vector3d(1, infinite, 3), vector));
+  EXPECT_FALSE(is_accepted(Eigen::Vector2d(nan, 1), [](ArchiveReader& reader) { reader.get_vector2(); }));
+  EXPECT_FALSE(is_accepted(Matrix6d(nan * Matrix6d::Identity()), [](ArchiveReader& reader) { reader.get_matrix6(); }));
+  const auto number = [](ArchiveReader& reader) { reader.get_finite(); };
+  EXPECT_TRUE(is_accepted(1e300, number));
+  EXPECT_FALSE(is_accepted(infinite, number));
+  const auto stamp = [](ArchiveReader& reader) { reader.get_stamp(); };
+  EXPECT_TRUE(is_accepted(std::int64_t{1'700'000'000'000'000'000}, stamp)) << "of the year 2023";
+  EXPECT_FALSE(is_accepted(std::numeric_limits<std::int64_t>::min(), stamp));
 }
 
 TEST(Archive, DetectsEveryTruncation) {

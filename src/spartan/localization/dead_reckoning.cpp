@@ -75,7 +75,8 @@ Status DeadReckoning::restore(const Bytes& bytes) {
   if (Status s = in.expect_version(kVersion, what); !s) return s;
   const auto values = in.get_array<double>();
   if (Status s = in.finish(what); !s) return s;
-  if (values.size() != static_cast<std::size_t>(covariance_.size()))
+  const bool finite = std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  if (!finite || values.size() != static_cast<std::size_t>(covariance_.size()))
     return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
   covariance_ = Eigen::Map<const Covariance>(values.data());
   return {};

@@ -138,16 +138,22 @@ Status Localizer::restore(const Bytes& bytes) {
   const std::string what = "saved state of the localization";
   if (Status s = in.expect_version(kStateVersion, what); !s) return s;
   auto state = std::make_unique<State>(state_->options);
+  bool possible = true;
+  const auto count = [&] {
+    const auto value = in.get<std::int64_t>();
+    possible = possible && value >= 0 && value <= std::numeric_limits<std::int64_t>::max() / 2;
+    return value;
+  };
   for (RefusalCounts& r : state->refusals) {
-    r.not_finite = in.get<std::int64_t>();
-    r.too_late = in.get<std::int64_t>();
-    r.too_early = in.get<std::int64_t>();
-    r.duplicates = in.get<std::int64_t>();
-    r.reversed = in.get<std::int64_t>();
+    r.not_finite = count();
+    r.too_late = count();
+    r.too_early = count();
+    r.duplicates = count();
+    r.reversed = count();
   }
-  const bool sensible = state->filter.get(in);
+  possible = possible && state->filter.get(in);
   if (Status status = in.finish(what); !status) return status;
-  if (!sensible) return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
+  if (!possible) return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
   state_ = std::move(state);
   return {};
 }

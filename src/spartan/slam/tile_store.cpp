@@ -66,10 +66,6 @@ Result<std::int32_t> id_in(const SqlStatement& row, int column, const std::strin
   return static_cast<std::int32_t>(id);
 }
 
-bool is_valid(const Pose& pose) {
-  return pose.translation().allFinite() && std::abs(pose.rotation().norm() - 1) < 1e-6;
-}
-
 }  // namespace
 
 Result<TileStore> TileStore::open(Database& db) {
@@ -166,9 +162,7 @@ Result<std::vector<Submap>> TileStore::submaps() {
         const Bytes bytes = row.blob(1);
         ArchiveReader in(bytes);
         submaps.push_back({*id, in.get_pose()});
-        if (Status s = in.finish(fmt::format("{}: submap {}", db_->path(), *id)); !s) return s;
-        if (is_valid(submaps.back().world_from_submap)) return {};
-        return damaged_map(db_->path(), fmt::format("the anchor of submap {} is no pose", *id));
+        return in.finish(fmt::format("{}: submap {}", db_->path(), *id));
       });
   if (!status) return failure(status);
   return submaps;
@@ -183,20 +177,17 @@ Status TileStore::write(const MapStop& stop) {
 
 Result<std::vector<MapStop>> TileStore::stops() {
   std::vector<MapStop> stops;
-  const Status status = for_each_row(
-      *db_, "SELECT id, stamp_ns, pose, covariance FROM map_stops ORDER BY id", [&](const SqlStatement& row) -> Status {
-        const Bytes pose = row.blob(2), covariance = row.blob(3);
-        const auto id = id_in(row, 0, db_->path(), "map_stops");
-        if (!id) return failure(id);
-        ArchiveReader in(pose), more(covariance);
-        stops.push_back({*id, {row.integer(1)}, {in.get_pose(), more.get_matrix6()}});
-        const std::string what = fmt::format("{}: stop {}", db_->path(), *id);
-        if (Status s = in.finish(what); !s) return s;
-        if (Status s = more.finish(what); !s) return s;
-        const UncertainPose& read = stops.back().world_from_body;
-        if (is_valid(read.pose) && read.covariance.allFinite()) return {};
-        return damaged_map(db_->path(), fmt::format("the pose of stop {} is not finite", *id));
-      });
+  const Status status = for_each_row(*db_, "SELECT id, stamp_ns, pose, covariance FROM map_stops ORDER BY id",
+                                     [&](const SqlStatement& row) -> Status {
+                                       const Bytes pose = row.blob(2), covariance = row.blob(3);
+                                       const auto id = id_in(row, 0, db_->path(), "map_stops");
+                                       if (!id) return failure(id);
+                                       ArchiveReader in(pose), more(covariance);
+                                       stops.push_back({*id, {row.integer(1)}, {in.get_pose(), more.get_matrix6()}});
+                                       const std::string what = fmt::format("{}: stop {}", db_->path(), *id);
+                                       if (Status s = in.finish(what); !s) return s;
+                                       return more.finish(what);
+                                     });
   if (!status) return failure(status);
   return stops;
 }

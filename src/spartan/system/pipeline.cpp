@@ -3,13 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "spartan/localization/localizer.h"
-#include "spartan/reconstruction/disparity_computer.h"
-#include "spartan/system/internal/frozen_cameras.h"
-#include "spartan/system/internal/stop_stage.h"
+#include "spartan/system/internal/pipeline_state.h"
 
 namespace spartan {
 
@@ -17,14 +13,7 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t kStateVersion = 6;  // of save(); raise it when the saved state changes
 constexpr double kGravityOnEarth_m_s2 = 9.81;
-
-LocalizationOptions with_gravity(const RunOptions& options) {
-  LocalizationOptions localization = options.localization;
-  localization.gravity_m_s2 = options.gravity_m_s2 > 0 ? options.gravity_m_s2 : kGravityOnEarth_m_s2;
-  return localization;
-}
 
 const StereoPair* pair_for_odometry(const Rig& rig, const std::string& name) {
   if (!name.empty()) return rig.find_pair(name);
@@ -34,69 +23,11 @@ const StereoPair* pair_for_odometry(const Rig& rig, const std::string& name) {
 
 }  // namespace
 
-struct Pipeline::State {
-  // The options are valid, so that create() of a stage cannot fail.
-  State(Rig rig_in, const RunOptions& options_in, Imager imager_in, const StereoPair& pair_in,
-        const ThreadPool& workers)
-      : rig(std::move(rig_in)),
-        options(options_in),
-        pair(pair_in),
-        imager(std::move(imager_in)),
-        odometer(Odometer::create(options_in.odometry, workers).value()),
-        disparity_computer(DisparityComputer::create(options_in.reconstruction, workers).value()),
-        localizer(Localizer::create(with_gravity(options_in)).value()),
-        odometry_filter(VisionOnlyFilter::create(with_gravity(options_in)).value()),
-        slam_filter(VisionOnlyFilter::create(with_gravity(options_in)).value()),
-        dead_reckoning(DeadReckoning::create(options_in.localization.vision).value()),
-        stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers).value()),
-        merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers).value()),
-        frozen_cameras(rig.pairs.size()) {
-    maps_stops = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
-    computes_terrain = options.terrain.enabled && !options.odometry_only;
-  }
-
-  Rig rig;
-  RunOptions options;
-  StereoPair pair;
-  Imager imager;
-  Odometer odometer;
-  DisparityComputer disparity_computer;
-  Localizer localizer;
-  VisionOnlyFilter odometry_filter, slam_filter;  // poses of the odometry, without and with map corrections
-  DeadReckoning dead_reckoning;                   // replaces the three filters if the odometry runs alone
-  StopStage stop_stage;
-  MapMerger merger;
-  FrozenCameras frozen_cameras;
-  bool maps_stops = false, computes_terrain = false;
-  StageClock clock;
-
-  std::optional<Eigen::Vector3d> up_in_body;  // at the start, by align_with_gravity()
-
-  // State from frame to frame.
-  bool started = false;
-  Stamp last_stamp;
-  Pose world_from_left;  // by odometry alone
-  Pose left_from_body;
-  Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the left frame, per second
-  double distance_m = 0;
-  double distance_of_last_terrain_m = -1;
-
-  std::size_t index_of(const StereoPair& of) const { return static_cast<std::size_t>(&of - rig.pairs.data()); }
-  Status check_new(const StereoFrame& frame, std::size_t pair_index, const FrozenCameras::Fingerprints& images) const;
-  void start(const RectifiedPair& rectified);
-  void advance(const MotionEstimate& motion);
-  RelativeMotion body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const;
-  void add_sensor_sample(const Measurement& sample);
-  void localize(const RelativeMotion& motion);
-  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
-  void apply_map_constraint(const StopSurvey& survey, const PoseConstraint& constraint);
-  Status add_view(const StereoFrame& frame);
-  Result<std::optional<MappedStop>> finish_stop();
-  bool terrain_is_due() const;
-  Status check_disparities(const RectifiedPair& rectified) const;
-  Result<ImageView<const float>> dense_disparity(const RectifiedPair& rectified);
-  Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& rectified);
-};
+LocalizationOptions internal::with_gravity(const RunOptions& options) {
+  LocalizationOptions localization = options.localization;
+  localization.gravity_m_s2 = options.gravity_m_s2 > 0 ? options.gravity_m_s2 : kGravityOnEarth_m_s2;
+  return localization;
+}
 
 // Before the frame is processed: a camera that repeats its image would look like a stationary rover.
 Status Pipeline::State::check_new(const StereoFrame& frame, std::size_t pair_index,
@@ -381,30 +312,6 @@ GlobalMap& Pipeline::global_map() {
   return state_->merger.map();
 }
 
-std::vector<FrameKey> Pipeline::pending_frames() const {
-  const State& s = *state_;
-  std::vector<FrameKey> pending;
-  if (const auto stamp = s.stop_stage.pending_first_frame()) pending.push_back({s.pair.name, *stamp});
-  const auto& views = s.stop_stage.pending_views();
-  pending.insert(pending.end(), views.begin(), views.end());
-  return pending;
-}
-
-Status Pipeline::restore_frame(const StereoFrame& frame) {
-  State& s = *state_;
-  const StereoPair* const pair = s.rig.find_pair(frame.pair);
-  if (pair == nullptr) {
-    return failure(ErrorCode::frame_rejected, fmt::format("the rig has no pair named '{}'", frame.pair),
-                   fmt::format("frame {}", frame.frame_id));
-  }
-  const auto rectified = s.imager.process(frame);
-  if (!rectified) return failure(rectified);
-  if (pair->name != s.pair.name)
-    return s.stop_stage.add_view(frame.position_id, pair->name, *rectified, pair->nearest_m);
-  s.stop_stage.restore_first_frame(*rectified, s.pair.nearest_m);
-  return {};
-}
-
 bool Pipeline::gravity_measured() const {
   return state_->localizer.estimate().gravity_measured;
 }
@@ -413,61 +320,6 @@ bool Pipeline::heading_east() const {
 }
 const std::string& Pipeline::odometry_pair() const {
   return state_->pair.name;
-}
-
-Bytes Pipeline::save() const {
-  const State& s = *state_;
-  ArchiveWriter out;
-  out.put(kStateVersion);
-  out.put(s.started);
-  out.put(s.last_stamp.ns);
-  out.put(s.up_in_body.has_value());
-  out.put(s.up_in_body.value_or(Eigen::Vector3d::UnitZ()));
-  out.put(s.world_from_left);
-  out.put(s.left_from_body);
-  out.put_array(s.velocity.data(), 6);
-  out.put(s.distance_m);
-  out.put(s.distance_of_last_terrain_m);
-  s.frozen_cameras.save(out);
-  s.stop_stage.save(out);
-  const bool odometry_only = s.options.odometry_only;
-  for (const Bytes& stage :
-       {s.odometer.save(), s.localizer.save(), odometry_only ? s.dead_reckoning.save() : s.odometry_filter.save(),
-        odometry_only ? Bytes() : s.slam_filter.save(), s.merger.save()})
-    out.put_array(stage.data(), stage.size());
-  return out.take();
-}
-
-Status Pipeline::restore(const Bytes& state, TileStore& maps) {
-  ArchiveReader in(state);
-  const std::string what = "run.sqlite: saved state of the pipeline";
-  if (Status status = in.expect_version(kStateVersion, what); !status) return status;
-  State& s = *state_;
-  s.started = in.get<bool>();
-  s.last_stamp.ns = in.get<std::int64_t>();
-  const bool has_up = in.get<bool>();
-  s.up_in_body = in.get_vector3();
-  if (!has_up) s.up_in_body.reset();
-  s.world_from_left = in.get_pose();
-  s.left_from_body = in.get_pose();
-  const std::vector<double> velocity = in.get_array<double>();
-  if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
-  s.distance_m = in.get<double>();
-  s.distance_of_last_terrain_m = in.get<double>();
-  s.frozen_cameras.restore(in);
-  s.stop_stage.restore(in);
-  std::array<Bytes, 5> stages;
-  for (Bytes& stage : stages) stage = in.get_array<std::uint8_t>();
-  if (Status status = in.finish(what); !status) return status;
-  if (Status status = s.odometer.restore(stages[0]); !status) return status;
-  if (Status status = s.localizer.restore(stages[1]); !status) return status;
-  if (s.options.odometry_only) {
-    if (Status status = s.dead_reckoning.restore(stages[2]); !status) return status;
-  } else {
-    if (Status status = s.odometry_filter.restore(stages[2]); !status) return status;
-    if (Status status = s.slam_filter.restore(stages[3]); !status) return status;
-  }
-  return s.merger.restore(stages[4], maps);
 }
 
 }  // namespace spartan

@@ -1,6 +1,6 @@
 #include "spartan/localization/internal/filter_memory.h"
 
-#include <algorithm>
+#include <limits>
 #include <type_traits>
 
 namespace spartan::internal {
@@ -22,20 +22,26 @@ struct Put {
   }
 };
 
+// Reads into the fields. Counters are far from their largest value, so that they can go on counting.
 struct Get {
   ArchiveReader& in;
+  bool plausible = true;
   template <class T>
   void operator()(T& value) {
-    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+    if constexpr (std::is_same_v<T, double>) {
+      value = in.get_finite();
+    } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
       value = in.get<T>();
+      if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>)
+        plausible = plausible && value >= 0 && value <= std::numeric_limits<T>::max() / 2;
     } else if constexpr (std::is_same_v<T, Stamp>) {
-      value.ns = in.get<std::int64_t>();
+      value = in.get_stamp();
     } else if constexpr (std::is_same_v<T, Pose>) {
       value = in.get_pose();
     } else if constexpr (std::is_same_v<T, Eigen::Quaterniond>) {
-      for (int i = 0; i < 4; ++i) value.coeffs()[i] = in.get<double>();
+      for (int i = 0; i < 4; ++i) value.coeffs()[i] = in.get_finite();
     } else {
-      for (Eigen::Index i = 0; i < value.size(); ++i) value.data()[i] = in.get<double>();
+      for (Eigen::Index i = 0; i < value.size(); ++i) value.data()[i] = in.get_finite();
     }
   }
 };
@@ -93,11 +99,11 @@ void put(ArchiveWriter& out, const FilterMemory& memory) {
   visit(each, memory);
 }
 
-FilterMemory get_filter_memory(ArchiveReader& in) {
+std::optional<FilterMemory> get_filter_memory(ArchiveReader& in) {
   FilterMemory memory;
   Get each{in};
   visit(each, memory);
-  memory.compass.pending = std::min<std::uint32_t>(memory.compass.pending, CompassMemory::kPending - 1);
+  if (!each.plausible || memory.compass.pending >= CompassMemory::kPending) return std::nullopt;
   return memory;
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 
 #include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
@@ -91,6 +92,7 @@ struct FilterMemory {
 };
 
 void put(ArchiveWriter& out, const FilterMemory& memory);
-FilterMemory get_filter_memory(ArchiveReader& in);
+/// std::nullopt where a counter cannot be; other errors are those of the reader.
+std::optional<FilterMemory> get_filter_memory(ArchiveReader& in);
 
 }  // namespace spartan::internal

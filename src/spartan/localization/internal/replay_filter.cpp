@@ -66,7 +66,7 @@ void put_measurement(ArchiveWriter& out, const Measurement& m) {
 
 std::optional<Measurement> get_measurement(ArchiveReader& in) {
   const auto kind = in.get<std::uint8_t>();
-  const Stamp stamp{in.get<std::int64_t>()};
+  const Stamp stamp = in.get_stamp();
   switch (kind) {
     case 0: {
       const Eigen::Vector3d gyro = in.get_vector3();
@@ -75,7 +75,7 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
     case 1: {
       RelativeMotion motion;
       motion.to = stamp;
-      motion.from.ns = in.get<std::int64_t>();
+      motion.from = in.get_stamp();
       motion.previous_from_current = in.get_pose();
       motion.covariance = in.get_matrix6();
       motion.measured = in.get<bool>();
@@ -96,7 +96,7 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
     case 5:
       return get_constraint(in, stamp);
     case 6: {
-      const Stamp frame{in.get<std::int64_t>()};
+      const Stamp frame = in.get_stamp();
       return LateConstraint{stamp, get_constraint(in, frame)};
     }
     default:
@@ -233,11 +233,12 @@ void ReplayFilter::put(ArchiveWriter& out) const {
 bool ReplayFilter::get(ArchiveReader& in) {
   const bool has_started = in.get<bool>();
   const bool has_isolated = in.get<bool>();
-  isolated_ = Stamp{in.get<std::int64_t>()};
+  isolated_ = in.get_stamp();
   if (!has_isolated) isolated_.reset();
-  start_.ns = in.get<std::int64_t>();
-  newest_.ns = in.get<std::int64_t>();
-  const FilterMemory memory = get_filter_memory(in);
+  start_ = in.get_stamp();
+  newest_ = in.get_stamp();
+  const std::optional<FilterMemory> memory = get_filter_memory(in);
+  if (!memory) return false;
   const auto count = in.get<std::uint64_t>();
   entries_.clear();
   for (std::uint64_t i = 0; i < count; ++i) {
@@ -246,10 +247,11 @@ bool ReplayFilter::get(ArchiveReader& in) {
     if (!entries_.empty() && !comes_before(entries_.back(), *m)) return false;
     entries_.push_back(*m);
   }
-  filter_.set_memory(memory);
+  if (!in.ok()) return false;
+  filter_.set_memory(*memory);
   snapshots_.clear();
-  if (!has_started || !memory.started) return has_started == memory.started;
-  snapshots_ = {{0, memory}};
+  if (!has_started || !memory->started) return has_started == memory->started;
+  snapshots_ = {{0, *memory}};
   run_from(0);
   return true;
 }

@@ -126,10 +126,10 @@ void StopStage::save(ArchiveWriter& out) const {
 
 void StopStage::restore(ArchiveReader& in) {
   position_id_ = in.get<std::int64_t>();
-  stamp_.ns = in.get<std::int64_t>();
+  stamp_ = in.get_stamp();
   world_from_body_.pose = in.get_pose();
   world_from_body_.covariance = in.get_matrix6();
-  last_stamp_.ns = in.get<std::int64_t>();
+  last_stamp_ = in.get_stamp();
   first_from_last_.pose = in.get_pose();
   first_from_last_.covariance = in.get_matrix6();
   early_.clear();

@@ -1,0 +1,88 @@
+// The stages of a Pipeline and their state from frame to frame, shared by processing (pipeline.cpp) and by saving and
+// restoring (pipeline_saving.cpp).
+#pragma once
+
+#include <optional>
+#include <utility>
+
+#include "spartan/localization/localizer.h"
+#include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/system/internal/frozen_cameras.h"
+#include "spartan/system/internal/stop_stage.h"
+#include "spartan/system/pipeline.h"
+
+namespace spartan {
+
+namespace internal {
+
+/// The localization options with the gravity of the run's options, or that of the Earth if they state none.
+LocalizationOptions with_gravity(const RunOptions& options);
+
+}  // namespace internal
+
+struct Pipeline::State {
+  // The options are valid, so that create() of a stage cannot fail.
+  State(Rig rig_in, const RunOptions& options_in, Imager imager_in, const StereoPair& pair_in,
+        const ThreadPool& workers)
+      : rig(std::move(rig_in)),
+        options(options_in),
+        pair(pair_in),
+        imager(std::move(imager_in)),
+        odometer(Odometer::create(options_in.odometry, workers).value()),
+        disparity_computer(DisparityComputer::create(options_in.reconstruction, workers).value()),
+        localizer(Localizer::create(internal::with_gravity(options_in)).value()),
+        odometry_filter(VisionOnlyFilter::create(internal::with_gravity(options_in)).value()),
+        slam_filter(VisionOnlyFilter::create(internal::with_gravity(options_in)).value()),
+        dead_reckoning(DeadReckoning::create(options_in.localization.vision).value()),
+        stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers).value()),
+        merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers).value()),
+        frozen_cameras(rig.pairs.size()) {
+    maps_stops = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
+    computes_terrain = options.terrain.enabled && !options.odometry_only;
+  }
+
+  Rig rig;
+  RunOptions options;
+  StereoPair pair;
+  Imager imager;
+  Odometer odometer;
+  DisparityComputer disparity_computer;
+  Localizer localizer;
+  VisionOnlyFilter odometry_filter, slam_filter;  // poses of the odometry, without and with map corrections
+  DeadReckoning dead_reckoning;                   // replaces the three filters if the odometry runs alone
+  internal::StopStage stop_stage;
+  MapMerger merger;
+  internal::FrozenCameras frozen_cameras;
+  bool maps_stops = false, computes_terrain = false;
+  StageClock clock;
+
+  std::optional<Eigen::Vector3d> up_in_body;  // at the start, by align_with_gravity()
+
+  // State from frame to frame.
+  bool started = false;
+  Stamp last_stamp;
+  Pose world_from_left;  // by odometry alone
+  Pose left_from_body;
+  Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the left frame, per second
+  double distance_m = 0;
+  double distance_of_last_terrain_m = -1;
+
+  std::size_t index_of(const StereoPair& of) const { return static_cast<std::size_t>(&of - rig.pairs.data()); }
+  Status check_new(const StereoFrame& frame, std::size_t pair_index,
+                   const internal::FrozenCameras::Fingerprints& images) const;
+  void start(const RectifiedPair& rectified);
+  void advance(const MotionEstimate& motion);
+  RelativeMotion body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const;
+  void add_sensor_sample(const Measurement& sample);
+  void localize(const RelativeMotion& motion);
+  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
+  void apply_map_constraint(const StopSurvey& survey, const PoseConstraint& constraint);
+  Status add_view(const StereoFrame& frame);
+  Result<std::optional<MappedStop>> finish_stop();
+  bool terrain_is_due() const;
+  Status check_disparities(const RectifiedPair& rectified) const;
+  Result<ImageView<const float>> dense_disparity(const RectifiedPair& rectified);
+  Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& rectified);
+};
+
+}  // namespace spartan
