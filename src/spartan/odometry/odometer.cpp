@@ -28,6 +28,11 @@ constexpr int kMinCoarseInliers = 10;
 /// With fewer inliers inside of the gates, the descriptors are matched over the whole image as well; empirical.
 constexpr int kSufficientCoarseInliers = 30;
 
+/// The prediction is kept over so many consecutive frames whose motion may be that of an object; empirical.
+constexpr int kMaxAmbiguousFrames = 3;
+/// A motion that this fraction of all landmarks follows is not that of an object; empirical.
+constexpr double kMinUndisputedFraction = 0.4;
+
 /// Mean image flow in pixels that a motion causes at the inlier landmarks.
 double mean_flow(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit) {
   const Pose current_from_previous = fit.previous_from_current.inverse();
@@ -84,6 +89,10 @@ struct Odometer::State {
 
   std::optional<std::string> defect_of(const RectifiedPair& pair) const;
   Pose predict(Stamp now) const;
+  /// Whether the latest motion may be that of an object.
+  bool keeps_prediction() const {
+    return memory.ambiguous_frames > 0 && memory.ambiguous_frames <= kMaxAmbiguousFrames;
+  }
   DisparityOffset predicted_offset() const;
   void detect(const RectifiedPair& pair);
   void reconstruct(const StereoImages& images);
@@ -93,8 +102,11 @@ struct Odometer::State {
     std::vector<LandmarkMatch> matches;
     std::vector<int> feature_of;  ///< index of the feature of each landmark; −1: none
     std::string doubt;            ///< why this may be the motion of an object; empty otherwise
+    std::optional<Pose> object;   ///< its motion, where it is known
   };
   CoarseMotion coarse_motion(const RectifiedStereo& stereo, const Pose& predicted);
+  std::vector<LandmarkMatch> discard_object(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                                            const Pose& scene, const Pose& object);
   void add_noise_floor(std::vector<LandmarkMatch>& matches) const;
   void decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
                      const std::string& doubt, MotionEstimate& estimate) const;
@@ -141,7 +153,7 @@ void Odometer::State::reconstruct(const StereoImages& images) {
 
 /// Coarse motion from descriptor matches; the prediction where too few of them agree.
 Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedStereo& stereo, const Pose& predicted) {
-  if (!options.matching.descriptors) return {predicted, {}, {}, {}};
+  if (!options.matching.descriptors) return {predicted, {}, {}, {}, {}};
   struct Attempt {
     std::vector<int> feature_of;
     std::vector<LandmarkMatch> matches;
@@ -161,15 +173,34 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedSter
     if (ungated.inliers() > best.inliers()) best = std::move(ungated);
   }
   std::string doubt;
+  std::optional<Pose> object;
   if (best.inliers() >= kMinCoarseInliers && memory.velocity_span_s > 0) {
     if (const auto rival = find_rival(estimation, stereo, best.matches, *best.fit, predicted)) {
       ChosenMotion chosen = choose_motion(best.matches, *best.fit, *rival);
       best.fit = std::move(chosen.fit);
       doubt = std::move(chosen.reason);
+      object = chosen.object;
     }
   }
   const Pose motion = best.inliers() >= kMinCoarseInliers ? best.fit->previous_from_current : predicted;
-  return {motion, std::move(best.matches), std::move(best.feature_of), std::move(doubt)};
+  return {motion, std::move(best.matches), std::move(best.feature_of), std::move(doubt), object};
+}
+
+/// The matches of the scene. Landmarks of the object are removed with the next update, because an anchor on it does not
+/// move with the scene.
+std::vector<LandmarkMatch> Odometer::State::discard_object(const RectifiedStereo& stereo,
+                                                           const std::vector<LandmarkMatch>& matches, const Pose& scene,
+                                                           const Pose& object) {
+  const std::vector<bool> follows = follows_object(stereo, matches, scene, object);
+  std::vector<LandmarkMatch> kept;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (follows[i]) {
+      discard(memory.map.landmarks[matches[i].landmark]);
+    } else {
+      kept.push_back(matches[i]);
+    }
+  }
+  return kept;
 }
 
 /// Adds the specified noise, which the residual of a single patch alignment does not show.
@@ -211,9 +242,14 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
 
 void Odometer::State::measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate,
                               Stopwatch& watch) {
-  const auto [start, coarse_matches, feature_of, doubt] = coarse_motion(images.geometry, predicted);
+  const std::size_t landmarks = memory.map.landmarks.size();
+  auto [start, coarse_matches, feature_of, doubt, object] = coarse_motion(images.geometry, predicted);
   std::vector<LandmarkMatch> matches =
       options.matching.correlation ? matching.by_correlation(memory.map, images, start.inverse()) : coarse_matches;
+  if (object) {
+    discard_object(images.geometry, coarse_matches, start, *object);
+    matches = discard_object(images.geometry, matches, start, *object);
+  }
   if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
   add_noise_floor(matches);
   estimate.matches = static_cast<int>(matches.size());
@@ -227,6 +263,9 @@ void Odometer::State::measure(const StereoImages& images, const Pose& predicted,
     estimate.times.estimate = watch.lap();
     return;
   }
+  const bool undisputed = fit->inliers >= kMinUndisputedFraction * static_cast<double>(landmarks);
+  if (undisputed && !object) doubt.clear();
+  memory.ambiguous_frames = doubt.empty() || object ? 0 : memory.ambiguous_frames + 1;
   estimate.inliers = fit->inliers;
   estimate.rms_px = fit->rms_px;
   decide_status(images.geometry, matches, *fit, doubt, estimate);
@@ -288,7 +327,7 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
     estimate.previous_from_current = prediction;
     estimate.covariance.diagonal() << Eigen::Vector3d::Constant(kLostTranslation_m * kLostTranslation_m),
         Eigen::Vector3d::Constant(kLostRotation_rad * kLostRotation_rad);
-  } else if (!estimate.first) {
+  } else if (!estimate.first && !s.keeps_prediction()) {
     s.memory.last_motion = log_se3(estimate.previous_from_current);
     s.memory.velocity_span_s = seconds_between(estimate.from, estimate.to);
   }

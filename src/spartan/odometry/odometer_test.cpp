@@ -246,6 +246,47 @@ TEST(Odometer, FindsALargeUnpredictedMotion) {
   EXPECT_LT(translation_error(found, 0, 6), 0.004);
 }
 
+// Pastes a textured board into both images: 31 % of the view, nearer than the ground, its left edge at `left_px`.
+SyntheticFrame with_board(const SyntheticFrame& scene, int left_px) {
+  SyntheticFrame frame{scene.left.clone(), scene.right.clone(), scene.disparity.clone(), scene.mask.clone()};
+  constexpr int kWidth = 184, kHeight = 130, kTop = 50, kDisparity = 45, kBlob_px = 5;
+  Random random(11);
+  Image<float> blobs(kWidth / kBlob_px + 2, kHeight / kBlob_px + 2);
+  for (int y = 0; y < blobs.height(); ++y) {
+    for (int x = 0; x < blobs.width(); ++x) blobs(x, y) = static_cast<float>(random.uniform(20, 235));
+  }
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const int i = x / kBlob_px, j = y / kBlob_px;
+      const float a = static_cast<float>(x % kBlob_px) / kBlob_px, b = static_cast<float>(y % kBlob_px) / kBlob_px;
+      const float upper = (1 - a) * blobs(i, j) + a * blobs(i + 1, j);
+      const float lower = (1 - a) * blobs(i, j + 1) + a * blobs(i + 1, j + 1);
+      const auto gray = static_cast<std::uint8_t>((1 - b) * upper + b * lower);
+      frame.left(left_px + x, kTop + y) = gray;
+      frame.right(left_px + x - kDisparity, kTop + y) = gray;
+    }
+  }
+  return frame;
+}
+
+// A board keeps its distance from the rover, so that it moves in the images as no part of the ground does.
+TEST(Odometer, DoesNotFollowAMovingObject) {
+  constexpr int kFirst = 3;
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+  int warned = 0;
+  Pose start_from_current;
+  for (int i = 0; i < 10; ++i) {
+    const SyntheticFrame disturbed = with_board(frame_of(i), 70 + 3 * (i - kFirst));
+    const MotionEstimate estimate = odometer.add(pair_of(i < kFirst ? frame_of(i) : disturbed, i));
+    start_from_current = start_from_current * estimate.previous_from_current;
+    warned += estimate.status == TrackingStatus::degraded && i > 0;
+  }
+  const Pose error = true_motion(0, 9).inverse() * start_from_current;
+  EXPECT_LT(error.translation().norm(), 0.02) << "of 36 cm";
+  EXPECT_LT(rotation_angle(error), 0.02);
+  EXPECT_GE(warned, 4) << "of the 6 motions of the board";
+}
+
 TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 200}, {12, 12}, {30, 20}, {64, 48}}) {
     Odometer odometer = Odometer::create({}, ThreadPool(2)).value();

@@ -42,6 +42,10 @@ void refresh_descriptor(Landmark& landmark, const Feature& feature) {
 
 }  // namespace
 
+void discard(Landmark& landmark) {
+  landmark.missed_frames = kMaxMissedFrames;
+}
+
 void move_anchors(LandmarkMemory& memory, const Pose& previous_from_current) {
   const Pose current_from_previous = previous_from_current.inverse();
   for (Anchor& anchor : memory.anchors) anchor.latest_from_anchor = current_from_previous * anchor.latest_from_anchor;

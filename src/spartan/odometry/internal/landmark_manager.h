@@ -12,6 +12,9 @@
 
 namespace spartan::internal {
 
+/// Marks a landmark: update() removes it, unless it is an inlier.
+void discard(Landmark& landmark);
+
 /// Makes the current frame the latest one: latest_from_anchor ← previous_from_current⁻¹ · latest_from_anchor.
 void move_anchors(LandmarkMemory& memory, const Pose& previous_from_current);
 

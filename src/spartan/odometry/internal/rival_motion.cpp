@@ -19,11 +19,17 @@ constexpr double kMinRivalFraction = 0.05;
 /// A rival is searched among matches that lie this near to the prediction; empirical, several times its usual error.
 constexpr double kPredictionRadius_px = 12;
 /// A rival that explains more than this fraction of the first motion's inliers is the same motion, less accurate.
-constexpr double kMaxShared = 0.3;
+constexpr double kMaxShared = 0.6;
 /// The rival deviates from the prediction less than the first motion by this factor; empirical.
 constexpr double kDeviationRatio = 2;
 /// The inliers of an object are not spread over this many times the area of the scene's.
 constexpr double kAreaRatio = 1.3;
+
+/// Motions among the outliers of the first one that are tried as its rival: an object has several, where landmarks of
+/// different age follow it.
+constexpr int kMostRivals = 3;
+/// Matches that two motions predict within this distance belong to both.
+constexpr double kSamePlace_px = 1;
 
 /// Median distance in pixels between the image positions by a motion and by the prediction, over the inliers of either.
 double deviation_from(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
@@ -59,6 +65,21 @@ double area_of(const std::vector<LandmarkMatch>& matches, const std::vector<bool
   return std::sqrt(std::max(0.0, covariance(0, 0) * covariance(1, 1) - covariance(0, 1) * covariance(1, 0)));
 }
 
+// Whether the motion contradicts the first one and is nearer to the prediction. Each deviation is that of a motion's
+// own inliers: elsewhere a motion of few distant points may be far off.
+bool is_rival(const MotionEstimator& estimator, const RectifiedStereo& stereo,
+              const std::vector<LandmarkMatch>& matches, const MotionFit& first, const MotionFit& other,
+              const Pose& predicted) {
+  const std::vector<bool> agreeing = estimator.agreeing(stereo, matches, other.previous_from_current);
+  int shared = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) shared += agreeing[i] && first.inlier[i];
+  if (shared > kMaxShared * first.inliers) return false;
+  const auto deviation = [&](const MotionFit& fit) {
+    return deviation_from(stereo, matches, fit.inlier, fit.previous_from_current, predicted);
+  };
+  return kDeviationRatio * deviation(other) <= deviation(first);
+}
+
 }  // namespace
 
 std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const RectifiedStereo& stereo,
@@ -78,36 +99,50 @@ std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const Rect
     outliers.push_back(matches[i]);
     index.push_back(i);
   }
-  if (static_cast<int>(outliers.size()) < least) return std::nullopt;
-  std::optional<MotionFit> rival = estimator.coarse(stereo, outliers, least);
-  if (!rival || rival->inliers < least) return std::nullopt;
-
-  const std::vector<bool> agreeing = estimator.agreeing(stereo, matches, rival->previous_from_current);
-  int shared = 0;
-  for (std::size_t i = 0; i < matches.size(); ++i) shared += agreeing[i] && first.inlier[i];
-  if (shared > kMaxShared * first.inliers) return std::nullopt;
-  std::vector<bool> inlier(matches.size(), false), either = first.inlier;
-  for (std::size_t k = 0; k < index.size(); ++k) {
-    inlier[index[k]] = rival->inlier[k];
-    either[index[k]] = rival->inlier[k];
+  for (int attempt = 0; attempt < kMostRivals; ++attempt) {
+    if (static_cast<int>(outliers.size()) < least) return std::nullopt;
+    std::optional<MotionFit> rival = estimator.coarse(stereo, outliers, least);
+    if (!rival || rival->inliers < least) return std::nullopt;
+    std::vector<bool> inlier(matches.size(), false);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < index.size(); ++k) {
+      inlier[index[k]] = rival->inlier[k];
+      if (rival->inlier[k]) continue;
+      outliers[kept] = outliers[k];
+      index[kept++] = index[k];
+    }
+    outliers.resize(kept);
+    index.resize(kept);
+    rival->inlier = std::move(inlier);
+    if (is_rival(estimator, stereo, matches, first, *rival, predicted)) return rival;
   }
-  rival->inlier = std::move(inlier);
-  const auto deviation = [&](const MotionFit& fit) {
-    return deviation_from(stereo, matches, either, fit.previous_from_current, predicted);
-  };
-  if (kDeviationRatio * deviation(*rival) > deviation(first)) return std::nullopt;
-  return rival;
+  return std::nullopt;
 }
 
 ChosenMotion choose_motion(const std::vector<LandmarkMatch>& matches, const MotionFit& first, const MotionFit& rival) {
   const bool ambiguous = area_of(matches, first.inlier) > kAreaRatio * area_of(matches, rival.inlier);
   if (ambiguous) {
-    return {first, fmt::format("{} matches follow one motion, {} another, as predicted; which one is of the scene is "
-                               "ambiguous",
-                               first.inliers, rival.inliers)};
+    return {first, std::nullopt,
+            fmt::format("{} matches follow one motion, {} another, as predicted; which one is of the scene is "
+                        "ambiguous",
+                        first.inliers, rival.inliers)};
   }
-  return {rival,
+  return {rival, first.previous_from_current,
           fmt::format("{} matches follow the predicted motion, {} that of an object", rival.inliers, first.inliers)};
+}
+
+std::vector<bool> follows_object(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                                 const Pose& scene, const Pose& object) {
+  const Pose by_scene = scene.inverse(), by_object = object.inverse();
+  std::vector<bool> follows(matches.size(), false);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const LandmarkMatch& match = matches[i];
+    const auto a = project_anchored(stereo, match.point, by_scene * match.previous_from_anchor);
+    const auto b = project_anchored(stereo, match.point, by_object * match.previous_from_anchor);
+    if (!a || !b || (a->measured - b->measured).norm() < kSamePlace_px) continue;
+    follows[i] = (b->measured - match.measured).norm() < (a->measured - match.measured).norm();
+  }
+  return follows;
 }
 
 }  // namespace spartan::internal

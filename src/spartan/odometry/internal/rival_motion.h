@@ -14,13 +14,14 @@ namespace spartan::internal {
 /// The motion of the camera against the static scene, where the matches contain two motions of comparable support.
 struct ChosenMotion {
   MotionFit fit;
-  std::string reason;  ///< names the two motions, and whether they could be told apart; for a status
+  std::optional<Pose> object;  ///< previous_from_current of the object; std::nullopt where the choice is ambiguous
+  std::string reason;          ///< names the two motions, and whether they could be told apart; for a status
 };
 
 /// A second motion among the outliers of `first`, with an inlier for each match. It is searched only where `first`
-/// deviates from `predicted` (previous_from_current), which costs another RANSAC. A rival agrees with the prediction
-/// better than `first`, has at least a twentieth of its inliers, and contradicts most of them. std::nullopt where there
-/// is none.
+/// deviates from `predicted` (previous_from_current), which costs up to three more RANSACs. The inliers of a rival
+/// agree with the prediction better than those of `first`, are at least a twentieth of them, and contradict most of
+/// them. std::nullopt where there is none.
 std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const RectifiedStereo& stereo,
                                     const std::vector<LandmarkMatch>& matches, const MotionFit& first,
                                     const Pose& predicted);
@@ -28,5 +29,10 @@ std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const Rect
 /// The rival, which is the predicted motion, unless its inliers are compact and those of `first` spread over the image:
 /// then it may be an object that moves with the camera, and `first` is chosen.
 ChosenMotion choose_motion(const std::vector<LandmarkMatch>& matches, const MotionFit& first, const MotionFit& rival);
+
+/// Which matches the motion of an object explains better than that of the scene (both previous_from_current). Those
+/// that both motions predict within a pixel belong to the scene.
+std::vector<bool> follows_object(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                                 const Pose& scene, const Pose& object);
 
 }  // namespace spartan::internal

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "spartan/numerics/random.h"
 
 namespace spartan::internal {
@@ -19,6 +21,7 @@ struct Part {
   int count;
   Eigen::Vector2d from, to;  // pixels
   Pose motion;
+  double distance_m = 2;
 };
 const Part kWholeView{100, {0, 0}, {639, 479}, kScene};
 const Part kCompact{150, {220, 140}, {420, 340}, kObject};
@@ -30,7 +33,7 @@ std::vector<LandmarkMatch> matches_of(const std::vector<Part>& parts, double noi
     for (int i = 0; i < part.count;) {
       LandmarkMatch m;
       m.point.pixel = {random.uniform(part.from.x(), part.to.x()), random.uniform(part.from.y(), part.to.y())};
-      m.point.disparity = 60 / random.uniform(1.8, 2.2);
+      m.point.disparity = 60 / (part.distance_m * random.uniform(0.9, 1.1));
       const auto p = project_anchored(kPair, m.point, part.motion.inverse());
       if (!p) continue;
       m.measured = p->measured;
@@ -92,11 +95,33 @@ TEST(RivalMotion, AgreesWithThePredictionBetterThanTheFirstMotion) {
   EXPECT_FALSE(search({noisy}, kScene, 2.0).rival);
 }
 
+// Few points at 8 m leave the translation undetermined: their motion is off at the distance of the object.
+TEST(RivalMotion, IsFoundByDistantPoints) {
+  Part distant{60, {0, 0}, {639, 200}, kScene, 8}, object = kCompact;
+  object.motion = kScene * Pose::from_translation({-0.3, 0, 0});
+  const Found found = search({distant, object}, kScene, 0.2);
+  ASSERT_TRUE(found.rival);
+  EXPECT_GE(found.rival->inliers, 20);
+  EXPECT_GT(apart(found.rival->previous_from_current, kScene), 0.03) << "otherwise this tests nothing";
+}
+
+TEST(RivalMotion, MatchesOfTheObjectAreTold) {
+  std::vector<LandmarkMatch> matches = matches_of({kWholeView, kCompact});
+  const std::vector<bool> follows = follows_object(kPair, matches, kScene, kObject);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    EXPECT_EQ(follows[i], i >= static_cast<std::size_t>(kWholeView.count)) << i;
+  }
+  const std::vector<bool> same = follows_object(kPair, matches, kScene, kScene * Pose::from_translation({0.001, 0, 0}));
+  EXPECT_EQ(std::count(same.begin(), same.end(), true), 0) << "both motions predict the same places";
+}
+
 TEST(RivalMotion, IsChosenUnlessItIsCompactInAWideScene) {
   const Found found = search({kWholeView, kCompact});
   ASSERT_TRUE(found.rival);
   const ChosenMotion scene = choose_motion(found.matches, found.first, *found.rival);
   EXPECT_LT(apart(scene.fit.previous_from_current, kScene), 0.008);
+  ASSERT_TRUE(scene.object);
+  EXPECT_LT(apart(*scene.object, kObject), 0.008);
   EXPECT_EQ(scene.reason, "100 matches follow the predicted motion, 150 that of an object");
   // A rover that has just started to follow another one: what moves with the camera was predicted.
   Part scenery = kWholeView;
@@ -106,6 +131,7 @@ TEST(RivalMotion, IsChosenUnlessItIsCompactInAWideScene) {
   const ChosenMotion kept = choose_motion(started.matches, started.first, *started.rival);
   EXPECT_LT(apart(kept.fit.previous_from_current, kScene), 0.008);
   EXPECT_THAT(kept.reason, HasSubstr("ambiguous"));
+  EXPECT_FALSE(kept.object);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr const char* kWhat = "saved state of the odometry";
 
 void put(ArchiveWriter& out, const RectifiedStereo& stereo) {
@@ -20,9 +20,9 @@ RectifiedStereo get_stereo(ArchiveReader& in) {
   RectifiedStereo stereo;
   stereo.size.width = in.get<int>();
   stereo.size.height = in.get<int>();
-  stereo.focal_px = in.get<double>();
+  stereo.focal_px = in.get_finite();
   stereo.centre_px = in.get_vector2();
-  stereo.baseline_m = in.get<double>();
+  stereo.baseline_m = in.get_finite();
   return stereo;
 }
 
@@ -48,12 +48,20 @@ bool fill(std::array<T, N>& array, const std::vector<T>& values) {
   return true;
 }
 
-/// False where an array has the wrong length.
+/// Far beyond the side of an image and what a counter reaches, so that neither overflows.
+constexpr double kMostPixels = 1e6;
+constexpr std::int32_t kMostFrames = 1'000'000;
+
+bool is_count(std::int32_t value) {
+  return value >= 0 && value <= kMostFrames;
+}
+
+/// False where an array has the wrong length, or a value is not possible.
 bool get(ArchiveReader& in, Landmark& landmark) {
   landmark.anchor_id = in.get<std::uint32_t>();
   landmark.anchor_pixel = in.get_vector2();
-  landmark.disparity = in.get<double>();
-  landmark.variance = in.get<double>();
+  landmark.disparity = in.get_finite();
+  landmark.variance = in.get_finite();
   landmark.slant = in.get_vector2();
   bool complete = fill(landmark.patch, in.get_array<std::uint16_t>());
   landmark.pixel = in.get_vector2();
@@ -62,7 +70,9 @@ bool get(ArchiveReader& in, Landmark& landmark) {
   landmark.sign = in.get<std::int8_t>();
   complete = fill(landmark.descriptor, in.get_array<std::int8_t>()) && complete;
   landmark.missed_frames = in.get<std::int32_t>();
-  return complete;
+  return complete && landmark.pixel.cwiseAbs().maxCoeff() < kMostPixels &&
+         landmark.anchor_pixel.cwiseAbs().maxCoeff() < kMostPixels && landmark.variance >= 0 &&
+         is_count(landmark.missed_frames);
 }
 
 tl::unexpected<Error> damaged(const std::string& what) {
@@ -79,6 +89,7 @@ Bytes OdometerMemory::save() const {
   put(out, geometry);
   out.put_array(last_motion.data(), 6);
   out.put(velocity_span_s);
+  out.put(ambiguous_frames);
   out.put(offset.value);
   out.put(offset.variance);
   out.put(map.next_anchor_id);
@@ -97,14 +108,17 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   if (Status s = in.expect_version(kVersion, kWhat); !s) return failure(s);
   OdometerMemory memory;
   memory.started = in.get<bool>();
-  memory.stamp.ns = in.get<std::int64_t>();
+  memory.stamp = in.get_stamp();
   memory.geometry = get_stereo(in);
   const std::vector<double> motion = in.get_array<double>();
   if (motion.size() != 6) return damaged("is damaged: the latest motion has not 6 entries");
   std::copy(motion.begin(), motion.end(), memory.last_motion.data());
-  memory.velocity_span_s = in.get<double>();
-  memory.offset.value = in.get<double>();
-  memory.offset.variance = in.get<double>();
+  memory.velocity_span_s = in.get_finite();
+  memory.ambiguous_frames = in.get<std::int32_t>();
+  memory.offset.value = in.get_finite();
+  memory.offset.variance = in.get_finite();
+  if (!memory.last_motion.allFinite() || !is_count(memory.ambiguous_frames) || !(memory.offset.variance >= 0))
+    return damaged("is damaged: the latest motion is not possible");
   memory.map.next_anchor_id = in.get<std::uint32_t>();
   const auto anchors = in.get<std::uint32_t>();
   if (anchors > bytes.size()) return damaged("is damaged: more anchors than bytes");
@@ -119,13 +133,13 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   const auto landmarks = in.get<std::uint32_t>();
   for (std::uint32_t i = 0; i < landmarks; ++i) {
     Landmark landmark;
-    if (!get(in, landmark)) return damaged("is damaged: a patch or descriptor has the wrong length");
+    if (!get(in, landmark)) return damaged("is damaged: a landmark is not possible");
     const auto is_its_anchor = [&](const Anchor& anchor) { return anchor.id == landmark.anchor_id; };
     if (std::none_of(memory.map.anchors.begin(), memory.map.anchors.end(), is_its_anchor))
       return damaged("is damaged: a landmark has no anchor");
     memory.map.landmarks.push_back(landmark);
   }
-  if (Status status = in.finish("odometry state"); !status) return failure(status);
+  if (Status status = in.finish(kWhat); !status) return failure(status);
   return memory;
 }
 

@@ -17,6 +17,7 @@ struct OdometerMemory {
   RectifiedStereo geometry;
   Vector6d last_motion = Vector6d::Zero();  ///< Log of the latest measured previous_from_current, (m, rad)
   double velocity_span_s = 0;               ///< duration of that motion; 0: none measured yet
+  std::int32_t ambiguous_frames = 0;        ///< latest frames with two motions of which neither was clearly the scene's
   DisparityOffset offset;                   ///< variance 0 before the first measured motion
   LandmarkMemory map;
 

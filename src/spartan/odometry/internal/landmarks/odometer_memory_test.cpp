@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace spartan::internal {
 namespace {
 
@@ -12,6 +14,7 @@ OdometerMemory some_memory() {
   memory.geometry = {{640, 480}, 500, {319.5, 239.5}, 0.12};
   memory.last_motion << 1, 2, 3, 0.1, 0.2, 0.3;
   memory.velocity_span_s = 0.1;
+  memory.ambiguous_frames = 2;
   memory.offset = {0.07, 0.001};
   memory.map.next_anchor_id = 9;
   memory.map.anchors = {{3, exp_se3(memory.last_motion)}, {8, Pose()}};
@@ -58,6 +61,24 @@ TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
   Bytes longer = whole;
   longer.push_back(0);
   EXPECT_FALSE(OdometerMemory::restore(longer).has_value());
+}
+
+// A state with a valid checksum may come from anyone.
+TEST(OdometerMemory, RejectsValuesThatAreNotPossible) {
+  const auto is_rejected = [](auto change) {
+    OdometerMemory memory = some_memory();
+    change(memory);
+    const auto restored = OdometerMemory::restore(memory.save());
+    return !restored && restored.error().code == ErrorCode::store_damaged;
+  };
+  EXPECT_FALSE(is_rejected([](OdometerMemory&) {}));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].pixel.x() = -1e285; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].anchor_pixel.y() = std::nan(""); }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].variance = -1; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].missed_frames = 2'147'483'647; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.last_motion[4] = std::nan(""); }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.ambiguous_frames = -1; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.stamp.ns = -9'223'372'036'854'775'807; }));
 }
 
 TEST(LandmarkMemory, DropsUnusedAnchors) {
