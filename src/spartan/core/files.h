@@ -93,6 +93,9 @@ class FolderLock {
  public:
   /// Codes: `output` if another process owns the folder (its id is named) or the file cannot be written, `resources`.
   static Result<FolderLock> acquire(const std::string& folder);
+  /// The error of acquire() if another process owns the folder; nothing if none does. Changes nothing in the folder.
+  static Status expect_free(const std::string& folder);
+
   FolderLock() = default;  ///< owns nothing
   FolderLock(FolderLock&& other) noexcept;
   FolderLock& operator=(FolderLock&& other) noexcept;

@@ -21,6 +21,13 @@ std::string owner_of(const std::string& lock_file) {
   return content->substr(0, content->find_first_not_of("0123456789"));
 }
 
+tl::unexpected<Error> in_use(const std::string& folder) {
+  const std::string owner = owner_of(folder + kLockFile);
+  return failure(ErrorCode::output,
+                 "is in use by another process" + (owner.empty() ? std::string() : " (id " + owner + ")"), folder,
+                 "wait until it has finished, or choose another folder with -o");
+}
+
 // Whether the open file still has its name: the owner before may have removed it after this process opened it.
 bool has_name(int descriptor, const std::string& path) {
   struct stat opened {
@@ -39,6 +46,16 @@ Status write_owner(int descriptor, const std::string& path) {
 
 }  // namespace
 
+Status FolderLock::expect_free(const std::string& folder) {
+  const std::string path = folder + kLockFile;
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return {};
+  const FolderLock opened(descriptor, "");
+  // A shared lock is refused by an exclusive one; it ends with `opened`.
+  if (::flock(descriptor, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK) return {};
+  return in_use(folder);
+}
+
 Result<FolderLock> FolderLock::acquire(const std::string& folder) {
   const std::string path = folder + kLockFile;
   for (;;) {
@@ -49,12 +66,7 @@ Result<FolderLock> FolderLock::acquire(const std::string& folder) {
     do {
       error = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
     } while (error == EINTR);
-    if (error == EWOULDBLOCK) {
-      const std::string owner = owner_of(path);
-      return failure(ErrorCode::output,
-                     "is in use by another process" + (owner.empty() ? std::string() : " (id " + owner + ")"), folder,
-                     "wait until it has finished, or choose another folder with -o");
-    }
+    if (error == EWOULDBLOCK) return in_use(folder);
     if (error != 0) return write_failure(path, error);
     if (!has_name(descriptor, path)) continue;
     lock.path_ = path;

@@ -109,6 +109,19 @@ TEST(FolderLock, HasOneOwner) {
   EXPECT_TRUE(FolderLock::acquire(folder.path()));
 }
 
+TEST(FolderLock, AskingForTheOwnerChangesNothing) {
+  const TemporaryFolder folder;
+  EXPECT_TRUE(FolderLock::expect_free(folder.path()));
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+  const auto lock = FolderLock::acquire(folder.path());
+  ASSERT_TRUE(lock);
+  const Status owned = FolderLock::expect_free(folder.path());
+  ASSERT_FALSE(owned);
+  EXPECT_EQ(owned.error().code, ErrorCode::output);
+  EXPECT_NE(owned.error().what.find("(id " + std::to_string(::getpid()) + ")"), std::string::npos);
+  EXPECT_FALSE(FolderLock::acquire(folder.path())) << "the owner still has it";
+}
+
 TEST(FolderLock, EndsWithAKilledProcess) {
   const TemporaryFolder folder;
   std::array<int, 2> ready{};

@@ -1,5 +1,6 @@
 #include "spartan/core/threads.h"
 
+#include <sched.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -66,6 +67,14 @@ struct ThreadPool::Arena {
 };
 
 #endif
+
+// std::thread::hardware_concurrency() counts the cores of the machine.
+int available_cores() {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  if (::sched_getaffinity(0, sizeof cores, &cores) == 0) return std::max(1, CPU_COUNT(&cores));
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
 
 ThreadPool::ThreadPool(int threads) : threads_(threads) {
   if (threads < 1) throw std::invalid_argument("ThreadPool: the number of threads must be at least 1");

@@ -6,6 +6,9 @@
 
 namespace spartan {
 
+/// Number of cores that this process may run on (`taskset`, containers), at least 1.
+int available_cores();
+
 /// A bounded set of worker threads (a TBB task arena). Copies share the threads.
 class ThreadPool {
  public:

@@ -29,7 +29,10 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
     return failure(ErrorCode::output, "already exists and is not overwritten", folder.path,
                    "choose another folder with -o, or continue the run with --resume");
   };
-  if (!created && !resume) return exists();
+  if (!created && !resume) {
+    if (Status free = FolderLock::expect_free(folder.path); !free) return failure(free);
+    return exists();
+  }
   auto lock = FolderLock::acquire(folder.path);
   if (!lock) return failure(lock);
   // Another process with --resume may have been the first to lock the folder that this one created.
