@@ -94,6 +94,21 @@ TEST(ContentHash, CoversSensorSamples) {
   EXPECT_NE(hash_after(folder, 3), before);
 }
 
+TEST(ListingHash, IsOfTheListAndNotOfThePlace) {
+  const auto hash_of = [](int frames, const std::string& with, const std::string& what) {
+    const TemporaryFolder folder;
+    testing::write_tiny_spartan(folder, frames);
+    std::string text = testing::content_of(folder.path() + "/frames.csv");
+    if (!what.empty()) text.replace(text.rfind(what), what.size(), with);
+    folder.write("frames.csv", text);
+    return open_tiny(folder)->listing_hash();
+  };
+  const std::uint64_t before = hash_of(3, "", "");
+  EXPECT_EQ(hash_of(3, "", ""), before) << "another folder";
+  EXPECT_NE(hash_of(4, "", ""), before);
+  EXPECT_NE(hash_of(3, "_other.png", "_right.png"), before) << "another image in the last row";
+}
+
 TEST(UnreadableFiles, AFrameThatCannotBeReadIsTakenByTheNextCall) {
   const TemporaryFolder folder;
   testing::write_tiny_kitti(folder, 3);

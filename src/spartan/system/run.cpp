@@ -29,20 +29,6 @@ namespace {
 // a recording often starts its camera and its IMU together, while the rover is stationary. Empirical.
 constexpr double kAlignmentSeconds = 1;
 
-// FNV-1a hash of the layout, the pairs and the listed stamps: identifies a recording without reading its images.
-std::string fingerprint(const FrameSource& source) {
-  std::uint64_t hash = 14695981039346656037ULL;
-  const auto mix = [&hash](std::string_view bytes) {
-    for (const char c : bytes) hash = (hash ^ static_cast<std::uint8_t>(c)) * 1099511628211ULL;
-  };
-  mix(name_of(source.info().format));
-  for (const StereoPair& pair : source.info().rig.pairs) {
-    mix(pair.name);
-    for (const Stamp stamp : source.listed_stamps(pair.name)) mix(std::to_string(stamp.ns));
-  }
-  return fmt::format("{:016x}", hash);
-}
-
 void report_sequence(const RecordingInfo& info, const Log& log) {
   const SequenceReport& s = info.sequence;
   log.info(fmt::format("{}: {} recording ({}), rig from {}, {} stereo frames", info.path, name_of(info.format),
@@ -393,7 +379,8 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   hooks.log = given_hooks.log.with_file(folder.log());
   report_sequence(info, hooks.log);
   if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
-  const RunIdentity identity{fingerprint(**source), dump_options(options), to_rig_yaml(info.rig)};
+  const RunIdentity identity{fmt::format("{:016x}", (*source)->listing_hash()), dump_options(options),
+                             to_rig_yaml(info.rig)};
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <filesystem>
 #include <functional>
 #include <string_view>
@@ -10,11 +11,14 @@
 #include "spartan/camera/internal/content_hash.h"
 #include "spartan/camera/internal/increasing_stream.h"
 #include "spartan/camera/internal/recording_index.h"
+#include "spartan/core/archive.h"
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 
 namespace spartan::internal {
 namespace {
+
+namespace fs = std::filesystem;
 
 // A sensor stream with its next sample.
 class SensorHead {
@@ -176,6 +180,21 @@ class IndexedSource : public FrameSource {
     return all;
   }
 
+  std::uint64_t listing_hash() const override {
+    Hash64 hash;
+    const auto add = [&hash](std::string_view text) { hash.add(text.data(), text.size()); };
+    add(name_of(index_.info.format));
+    for (const FrameEntry& entry : index_.frames) {
+      add(entry.pair);
+      for (const Stamp stamp : {entry.left_stamp, entry.right_stamp}) hash.add(static_cast<std::uint64_t>(stamp.ns));
+      for (const std::string* file : {&entry.left_file, &entry.right_file})
+        add(file->empty() ? "" : fs::path(*file).lexically_relative(index_.info.path).string());
+      for (const double value : {entry.pan_rad, entry.tilt_rad, entry.exposure_us, entry.gain})
+        hash.add(std::bit_cast<std::uint64_t>(value));
+    }
+    return hash.value();
+  }
+
   std::uint64_t content_hash() const override { return content_hash_.value(); }
 
  private:
@@ -242,7 +261,7 @@ class IndexedSource : public FrameSource {
     if (!image && image.error().code != ErrorCode::input) return failure(image);
     if (!image) {
       std::error_code error;
-      const bool there = std::filesystem::exists(file, error);
+      const bool there = fs::exists(file, error);
       return missing(entry, there ? FrameFault::unreadable : when_missing, image.error().message());
     }
     if (image->size() != camera.size) {
