@@ -90,10 +90,6 @@ CLI::Validator non_negative_number() {
   return number_check("number of at least 0", [](double value) { return value >= 0; });
 }
 
-CLI::Validator path_to_write() {
-  return CLI::Validator([](const std::string& text) { return text.empty() ? "the path is empty" : std::string(); }, "");
-}
-
 Status print(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
     return failure(ErrorCode::output, std::string("cannot write: ") + std::strerror(errno), "standard output");

@@ -66,10 +66,6 @@ void add_memory_option(CLI::App& command, Context& context);
 /// The bound that it sets, bytes; without it 80 % of the memory that is available.
 std::int64_t memory_bound(const Context& context);
 
-/// Check of an option that names a file or folder to write: an empty one (of an unset shell variable) would be the root
-/// folder.
-CLI::Validator path_to_write();
-
 /// Writes to standard output and flushes; code `output` where that fails (a full disk behind a pipe).
 Status print(const std::string& text);
 

@@ -31,7 +31,7 @@ void add_export(CLI::App& app, Context& context) {
       ->add_option("--format", a->format,
                    "Format: tum, kitti, euroc or csv (trajectory), geotiff (global map), ply (terrain point cloud).")
       ->required();
-  command->add_option("-o,--output", a->output, "File to write.")->check(path_to_write())->required();
+  command->add_option("-o,--output", a->output, "File to write.")->required();
   command
       ->add_option("--trajectory", a->trajectory,
                    "Trajectory: odometry, slam or localization (default: the last of these that exists).")

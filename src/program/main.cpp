@@ -8,12 +8,12 @@
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
-#include <thread>
 
 #include "program/commands.h"
 #include "program/context.h"
 #include "program/interrupt.h"
 #include "spartan/core/stage_clock.h"
+#include "spartan/core/threads.h"
 
 namespace spartan::program {
 namespace {
@@ -34,6 +34,15 @@ void add_commands(CLI::App& app, Context& context) {
   add_export(app, context);
   add_simulate(app, context);
   add_completion(app, context);
+}
+
+// An empty argument, e.g. of a shell variable that is not set, would count as an option that is not given, or name the
+// root folder.
+void refuse_empty_arguments(CLI::App& app) {
+  const CLI::Validator not_empty(
+      [](const std::string& text) { return text.empty() ? "the argument is empty" : std::string(); }, "");
+  for (CLI::Option* option : app.get_options()) option->check(not_empty);
+  for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) refuse_empty_arguments(*command);
 }
 
 // The error text for a word in the place of a command, e.g. `spartan map foo`; empty where every such word is one.
@@ -58,8 +67,9 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", SPARTAN_VERSION);
   app.require_subcommand(1);
   Context context;
-  context.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  context.threads = available_cores();
   add_commands(app, context);
+  refuse_empty_arguments(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -300,9 +300,7 @@ void add_map_build(CLI::App& map, Context& context) {
                   "map build --recording drive --position 15 -o map", [&context, a] { return build(context, *a); });
   command->add_option("left", a->left, "Left image.");
   command->add_option("right", a->right, "Right image.");
-  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")
-      ->check(path_to_write())
-      ->required();
+  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
   command->add_option("--rig", a->rig, "Rig or calibration file of the two images, in any supported format.");
   command->add_option("--recording", a->recording, "Recording to take one stop from.");
   command->add_option("--position", a->position,

@@ -87,7 +87,6 @@ void add_map_export(CLI::App& map, Context& context) {
       ->add_option("-o,--output", a->output,
                    "File to write; its extension selects the format: .tif (all layers), .png (an image), .ply (cell "
                    "centres), .map.")
-      ->check(path_to_write())
       ->required();
   command
       ->add_option("--window", a->window_m,

@@ -107,7 +107,7 @@ void add_map_merge(CLI::App& map, Context& context) {
   command->add_option("a", a->a, "Saved map (.map) or run folder.")->required();
   command->add_option("b", a->b, "Second map, in the same world frame. The maps are not aligned by matching.")
       ->required();
-  command->add_option("-o,--output", a->output, "Map file to write.")->check(path_to_write())->required();
+  command->add_option("-o,--output", a->output, "Map file to write.")->required();
   add_json_flag(*command, context);
 }
 

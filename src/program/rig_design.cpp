@@ -62,8 +62,7 @@ void add_rig_design(CLI::App& rig, Context& context) {
   command->add_option("requirements", a->requirements, "Requirements file (docs/reference/requirements.md).")
       ->required()
       ->option_text("REQ REQUIRED");
-  command->add_option("-o,--output", a->output, "Folder for ground.svg, ground.png and feasible.csv.")
-      ->check(path_to_write());
+  command->add_option("-o,--output", a->output, "Folder for ground.svg, ground.png and feasible.csv.");
   command->add_option("--rows", a->rows, "Number of feasible combinations to print (default 10).")
       ->check(CLI::Range(0, 2'000'000));
   command->add_flag("--all", a->all, "Print all feasible combinations, also with --json.");

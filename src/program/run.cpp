@@ -141,7 +141,6 @@ void add_run(CLI::App& app, Context& context) {
                    "and printed.")
       ->required();
   command->add_option("-o,--output", a->output, "Run folder to create. An existing one is an error without --resume.")
-      ->check(path_to_write())
       ->required();
   command->add_option("--rig", a->rig,
                       "Calibration file to use instead of the recording's own, in any supported format.");

@@ -228,9 +228,7 @@ void add_stereo(CLI::App& app, Context& context) {
                   "stereo left.png right.png -o out --calib calib.txt", [&context, a] { return stereo(context, *a); });
   command->add_option("left", a->left, "Left image.")->required();
   command->add_option("right", a->right, "Right image.")->required();
-  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")
-      ->check(path_to_write())
-      ->required();
+  command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
   auto* rig = command->add_option("--rig", a->rig, "Calibration of unrectified images; they are rectified first.");
   command->add_option("--calib", a->calib, "Calibration of images that are already rectified (for the point cloud).")
       ->excludes(rig);

@@ -61,9 +61,11 @@ TEST_F(RunFaults, OnlyOneProcessWorksOnAFolder) {
   {
     const auto lock = FolderLock::acquire(path("out"));
     ASSERT_TRUE(lock) << lock.error().message();
-    const ProgramResult second = run("out", {"--resume"});
-    EXPECT_EQ(second.exit_code, 5);
-    EXPECT_THAT(second.err, HasSubstr("in use by another process (id " + std::to_string(::getpid()) + ")"));
+    for (const std::vector<std::string>& more : {std::vector<std::string>{"--resume"}, {}}) {
+      const ProgramResult second = run("out", more);
+      EXPECT_EQ(second.exit_code, 5);
+      EXPECT_THAT(second.err, HasSubstr("in use by another process (id " + std::to_string(::getpid()) + ")"));
+    }
   }
   ASSERT_EQ(run("out", {"--resume"}).exit_code, 0) << "the lock ends with its owner";
   EXPECT_EQ(byte_stable_content(path("out")), expected_content());
@@ -94,16 +96,19 @@ TEST_F(RunFaults, TemporaryFilesOfAKilledProcessAreRemoved) {
   EXPECT_TRUE(fs::exists(path("out/notes.part")));
 }
 
-TEST_F(RunFaults, AnEmptyOutputPathIsAUsageError) {
+TEST_F(RunFaults, AnEmptyArgumentIsAUsageError) {
   for (const std::vector<std::string>& command : {words(""),
                                                   {"demo", "-o", ""},
                                                   {"simulate", "quick", "-o", ""},
                                                   {"map", "merge", "a", "b", "-o", ""},
                                                   {"stereo", image(0, 0), image(1, 0), "-o", ""},
+                                                  {"stereo", image(0, 0), image(1, 0), "-o", path("out"), "--mask", ""},
+                                                  {"evaluate", "run", "--truth", ""},
+                                                  {"map", "info", ""},
                                                   {"export", "run", "--format", "tum", "-o", ""}}) {
     const ProgramResult result = run_program(command);
     EXPECT_EQ(result.exit_code, 2) << command.front();
-    EXPECT_THAT(result.err, HasSubstr("the path is empty"));
+    EXPECT_THAT(result.err, HasSubstr("the argument is empty"));
   }
 }
 

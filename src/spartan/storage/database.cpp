@@ -199,7 +199,8 @@ Bytes SqlStatement::blob(int column) const {
 Result<Database> Database::open(const std::string& path, Mode mode) {
   int flags = SQLITE_OPEN_READWRITE;
   if (mode == Mode::create) flags |= SQLITE_OPEN_CREATE;
-  std::string name = path;
+  // A name that begins with "file:" would be read as a URI where SQLite was compiled so.
+  std::string name = path.starts_with("file:") ? "./" + path : path;
   if (mode != Mode::create) {
     if (const auto file = InputFile::open(path); !file) return failure(file);
   }
@@ -210,7 +211,8 @@ Result<Database> Database::open(const std::string& path, Mode mode) {
     // the database and so needs no write permission for the folder.
     if (!std::filesystem::exists(path + "-wal", error)) {
       flags |= SQLITE_OPEN_URI;
-      name = "file:" + percent_encoded(path) + "?immutable=1";
+      // "//": what follows is the whole path, even if it begins with two slashes.
+      name = (path.starts_with('/') ? "file://" : "file:") + percent_encoded(path) + "?immutable=1";
     }
   }
   sqlite3* handle = nullptr;

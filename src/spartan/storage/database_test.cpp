@@ -136,5 +136,26 @@ TEST_F(ForeignDatabase, KnowsThatItsFileWasRemoved) {
   EXPECT_TRUE(db.was_moved());
 }
 
+TEST(Database, APathMayBeginWithTwoSlashes) {
+  const TemporaryFolder folder;
+  const std::string path = "/" + folder.path() + "/a.sqlite";
+  ASSERT_TRUE(Database::open(path, Database::Mode::create));
+  const auto read = Database::open(path, Database::Mode::read_only);
+  EXPECT_TRUE(read) << read.error().message();
+}
+
+TEST(Database, ANameThatLooksLikeAUriIsAPath) {
+  const TemporaryFolder folder;
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  const auto made = Database::open("file:a?mode=memory", Database::Mode::create);
+  const bool exists = std::filesystem::exists("file:a?mode=memory");
+  const auto read = Database::open("file:a?mode=memory", Database::Mode::read_only);
+  std::filesystem::current_path(before);
+  ASSERT_TRUE(made) << made.error().message();
+  EXPECT_TRUE(exists);
+  EXPECT_TRUE(read) << read.error().message();
+}
+
 }  // namespace
 }  // namespace spartan
