@@ -95,23 +95,39 @@ def texture(rng, height, width):
     return np.clip(110 + 28 * result, 5, 250)
 
 
-def moving_object(recording, step_px):
-    """A textured board parallel to the images that moves by `step_px` (right, down) a frame in both of them."""
+def resized(board, scale):
+    """A bilinear resampling about the centre, at the same size."""
+    height, width = board.shape
+    y = np.clip((np.arange(height) - height / 2) / scale + height / 2, 0, height - 1.001)
+    x = np.clip((np.arange(width) - width / 2) / scale + width / 2, 0, width - 1.001)
+    iy, ix = y.astype(int), x.astype(int)
+    fy, fx = (y - iy)[:, None], (x - ix)[None, :]
+    rows = board[iy][:, ix] * (1 - fx) + board[iy][:, ix + 1] * fx
+    below = board[iy + 1][:, ix] * (1 - fx) + board[iy + 1][:, ix + 1] * fx
+    return rows * (1 - fy) + below * fy
+
+
+def moving_object(recording, step_px, size=(WIDTH, HEIGHT), growth=1.0):
+    """A textured board parallel to the images that moves by `step_px` (right, down) a frame in both of them.
+
+    `growth`: factor of its disparity and of the size of its texture from frame to frame, as of a board that comes
+    nearer."""
     rng = np.random.default_rng(7)
     shape = recording.read(0, recording.names[0]).shape
-    height, width = int(HEIGHT * shape[0]), int(WIDTH * shape[1])
-    disparity = int(DISPARITY * shape[1])
+    height, width = int(size[1] * shape[0]), int(size[0] * shape[1])
     board = texture(rng, height, width)
     frames = recording.middle(OBJECT_FRAMES)
     path = np.outer(np.arange(len(frames)) - (len(frames) - 1) / 2, step_px)
-    for name, (dx, dy) in zip(frames, np.rint(path).astype(int)):
+    for index, (name, (dx, dy)) in enumerate(zip(frames, np.rint(path).astype(int))):
         left, top = (shape[1] - width) // 2 + dx, (shape[0] - height) // 2 + dy
+        disparity = round(DISPARITY * shape[1] * growth ** index)
+        content = board if growth == 1 else resized(board, growth ** index)
         for side in (0, 1):
             pixels = recording.read(side, name)
             x0 = left - side * disparity
             a, b = max(0, x0), min(shape[1], x0 + width)
             c, d = max(0, top), min(shape[0], top + height)
-            seen = board[c - top:d - top, a - x0:b - x0]
+            seen = content[c - top:d - top, a - x0:b - x0]
             seen = seen + rng.normal(0, 1.5, seen.shape)
             pixels[c:d, a:b] = np.clip(np.rint(seen), 0, 255).astype(np.uint8)
             recording.write(side, name, pixels)
@@ -130,6 +146,12 @@ FAULTS = {
     "object, 7 px to the left, 2 px down": lambda r: moving_object(r, (-7, 2)),
     "object, 3 px a frame to the right": lambda r: moving_object(r, (3, 0)),
     "object at rest in the image": lambda r: moving_object(r, (0, 0)),
+    # On these no constant was chosen.
+    "object, 16 px a frame to the right": lambda r: moving_object(r, (16, 0)),
+    "object, 5 px up, 3 px to the left": lambda r: moving_object(r, (-3, -5)),
+    "object that comes nearer, 3 % a frame": lambda r: moving_object(r, (0, 0), growth=1.03),
+    "object over 20 % of the view": lambda r: moving_object(r, (5, 1), size=(0.48, 0.42)),
+    "object over half of the view": lambda r: moving_object(r, (6, 0), size=(0.75, 0.67)),
 }
 
 

@@ -132,7 +132,7 @@ def descriptor_limit(lab, trials):
 # In CI 60 values of n in all; in the long test every call on a file of the short run, every allocation of
 # 4 KB and more, and 1000 allocations of any size.
 CLASSES = {
-    "malloc_once": (malloc_once, 8, 1000),
+    "malloc_once": (malloc_once, 16, 1000),
     "malloc_large": (malloc_large, 8, 10000),
     "open_input": (open_input, 8, 10000),
     "read_input": (read_input, 8, 10000),
