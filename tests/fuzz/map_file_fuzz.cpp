@@ -166,6 +166,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   auto file = MapFile::open(path, {}, Database::Mode::read_only);
   if (!file) return 0;
   use(file->map());
+  if (file->map().add(plane_around(Pose()), {1}, {}, Matrix6d::Zero())) use(file->map());
   auto own = GlobalMap::create({}, file->map().cell_m());
   if (own && own->merge(file->map())) use(*own);
   return 0;

@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "spartan/core/files.h"
@@ -14,11 +16,17 @@ namespace {
 
 constexpr const char* kLockFile = "/owner.lock";
 
-// The id that the owner has written; empty if it has not come to it yet.
+// The id that the owner has written. It does so right after it has locked the file, so it is waited for, but not long:
+// its disk may be full. Empty if it is missing.
 std::string owner_of(const std::string& lock_file) {
-  const auto content = read_beginning(lock_file, 32);
-  if (!content) return {};
-  return content->substr(0, content->find_first_not_of("0123456789"));
+  constexpr int kTries = 50;
+  for (int i = 0; i < kTries; ++i) {
+    const auto content = read_beginning(lock_file, 32);
+    if (!content) return {};
+    if (content->ends_with('\n')) return content->substr(0, content->find_first_not_of("0123456789"));
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return {};
 }
 
 tl::unexpected<Error> in_use(const std::string& folder) {

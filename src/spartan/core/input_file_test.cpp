@@ -1,12 +1,17 @@
+#include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <thread>
 
 #include "spartan/core/files.h"
 #include "spartan/testing/temporary_folder.h"
@@ -15,6 +20,7 @@ namespace spartan {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
 ErrorCode failure_code_of(const Result<std::string>& content) {
@@ -107,6 +113,22 @@ TEST(FolderLock, HasOneOwner) {
   }
   EXPECT_TRUE(fs::is_empty(folder.path())) << "the file is removed with the lock";
   EXPECT_TRUE(FolderLock::acquire(folder.path()));
+}
+
+TEST(FolderLock, TheIdOfTheOwnerIsWaitedFor) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/owner.lock";
+  const int owner = ::open(path.c_str(), O_RDWR | O_CREAT, 0644);
+  ASSERT_EQ(::flock(owner, LOCK_EX | LOCK_NB), 0);
+  std::thread late([owner] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_EQ(::write(owner, "4711\n", 5), 5);
+  });
+  const auto second = FolderLock::acquire(folder.path());
+  late.join();
+  ::close(owner);
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().what, HasSubstr("(id 4711)"));
 }
 
 TEST(FolderLock, AskingForTheOwnerChangesNothing) {

@@ -243,6 +243,7 @@ class VisionOnlyFilter {
   bool add(const RelativeMotion& motion) { return localizer_.add(motion); }
   bool add(PoseConstraint constraint);
   bool reaches(Stamp stamp) const { return localizer_.reaches(stamp); }
+  bool started() const { return localizer_.started(); }
 
   UncertainPose world_from_body() const;
 

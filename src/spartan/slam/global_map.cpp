@@ -197,9 +197,12 @@ void GlobalMap::evict_tiles() {
 }
 
 const Submap& GlobalMap::submap_for(const Eigen::Vector3d& place) {
-  const bool far = submaps_.empty() ||
-                   (submaps_.back().world_from_submap.translation() - place).head<2>().norm() > options_.submap_m;
-  if (far) {
+  // Local maps are fused cell by cell, which needs a common lattice; a submap may have been moved off it.
+  const auto suits = [&](const Submap& submap) {
+    return (submap.world_from_submap.translation() - place).head<2>().norm() <= options_.submap_m &&
+           submap.lattice_offset(cell_m_).has_value();
+  };
+  if (submaps_.empty() || !suits(submaps_.back())) {
     const Eigen::Vector3d anchor(std::round(place.x() / cell_m_) * cell_m_, std::round(place.y() / cell_m_) * cell_m_,
                                  place.z());
     const std::int32_t id = submaps_.empty() ? 0 : submaps_.back().id + 1;
@@ -212,8 +215,7 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
                       const Matrix6d& relative) {
   const Eigen::Vector3d body = world_from_body.pose.translation();
   const Submap submap = submap_for(body);  // a new one has no tiles that could fail to load
-  const auto offset = submap.lattice_offset(cell_m_);
-  if (!offset) throw std::logic_error("GlobalMap::add: the newest submap was moved off the lattice");
+  const LatticeOffset offset = submap.lattice_offset(cell_m_).value();
   const auto minus_anchor_height = static_cast<float>(-submap.world_from_submap.translation().z());
   // Covariance of the right perturbation, transformed to world axes about the body.
   const Matrix6d rotation = [&] {
@@ -225,9 +227,9 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
   const SurfaceGrid grid = grid_of(local);
   const LatticeWindow& window = grid.window;
   const CellFusion fusion_parameters = fusion();
-  const int south_tile = Tile::of(window.north - window.height - offset->y),
-            north_tile = Tile::of(window.north - 1 - offset->y), west_tile = Tile::of(window.west - offset->x),
-            east_tile = Tile::of(window.west + window.width - 1 - offset->x);
+  const int south_tile = Tile::of(window.north - window.height - offset.y),
+            north_tile = Tile::of(window.north - 1 - offset.y), west_tile = Tile::of(window.west - offset.x),
+            east_tile = Tile::of(window.west + window.width - 1 - offset.x);
   // Everything that can fail comes first, so that an error leaves the map unchanged.
   for (int ty = south_tile; ty <= north_tile; ++ty) {
     for (int tx = west_tile; tx <= east_tile; ++tx) {
@@ -240,10 +242,10 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
     for (int tx = west_tile; tx <= east_tile; ++tx) {
       Tile* tile = nullptr;
       for (int y = 0; y < kSide; ++y) {
-        const int row = window.north - 1 - (ty * kSide + y + offset->y);
+        const int row = window.north - 1 - (ty * kSide + y + offset.y);
         if (row < 0 || row >= window.height) continue;
         for (int x = 0; x < kSide; ++x) {
-          const int column = tx * kSide + x + offset->x - window.west;
+          const int column = tx * kSide + x + offset.x - window.west;
           if (column < 0 || column >= window.width || !(local.count(column, row) > 0)) continue;
           CellSurface observation = surface_of(local, column, row, world_covariance, grid, body);
           if (!is_finite(observation)) continue;

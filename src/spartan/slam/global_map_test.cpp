@@ -53,6 +53,19 @@ Bytes all_of(GlobalMap& map) {
   return bytes_of(*map.view(map.extent()));
 }
 
+TEST(GlobalMap, ASubmapThatWasMovedIsFollowedByANewOne) {
+  const Ground ground = rocky_ground();
+  const Pose pose = pose_on_ground(ground, 0, 0, 0);
+  GlobalMap map = GlobalMap::create({}, 0.05).value();
+  add(map, ground, pose, 1);
+  add(map, ground, pose, 2);
+  EXPECT_EQ(map.submaps().size(), 1U);
+  map.move_submap(0, Pose(exp_so3({0, 0, 0.1}), {0.01, 0, 0}));
+  add(map, ground, pose, 3);
+  EXPECT_EQ(map.submaps().size(), 2U);
+  EXPECT_TRUE(map.submaps().back().lattice_offset(0.05));
+}
+
 TEST(GlobalMap, AViewOfOneStopEqualsItsLocalMap) {
   const Ground ground = rocky_ground();
   const Pose pose = pose_on_ground(ground, -17.3, 9.1, 2.2);

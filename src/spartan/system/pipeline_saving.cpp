@@ -71,6 +71,12 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
     if (Status status = s.odometry_filter.restore(stages[2]); !status) return status;
     if (Status status = s.slam_filter.restore(stages[3]); !status) return status;
   }
+  const bool same_start =
+      s.localizer.started() == s.started &&
+      (s.options.odometry_only || (s.odometry_filter.started() == s.started && s.slam_filter.started() == s.started));
+  if (!same_start)
+    return failure(ErrorCode::store_damaged, "is damaged: not all stages have started", what,
+                   "run again into a new folder");
   return s.merger.restore(stages[4], maps);
 }
 

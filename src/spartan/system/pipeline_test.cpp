@@ -350,5 +350,20 @@ TEST(Pipeline, RejectsOptionsOutOfBounds) {
     EXPECT_NE(refused.error().message().find(field), std::string::npos) << field;
 }
 
+// A state with a valid checksum may come from anyone.
+TEST(Pipeline, AStateWhoseStagesHaveNotAllStartedIsDamaged) {
+  Pipeline pipeline = pipeline_of();
+  push(pipeline, 0);
+  Bytes state = pipeline.save();
+  constexpr std::size_t kStarted = 4;  // behind the version
+  ASSERT_EQ(state[kStarted], 1);
+  state[kStarted] = 0;
+  EmptyMaps maps;
+  Pipeline restored = pipeline_of();
+  const Status status = restored.restore(state, maps.tiles);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::store_damaged);
+}
+
 }  // namespace
 }  // namespace spartan
