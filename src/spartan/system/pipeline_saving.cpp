@@ -60,9 +60,10 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   std::array<Bytes, 5> stages;
   for (Bytes& stage : stages) stage = in.get_array<std::uint8_t>();
   if (Status status = in.finish(what); !status) return status;
-  if (velocity.size() != 6 || !s.velocity.allFinite())
+  if (velocity.size() != 6 || !s.velocity.allFinite()) {
     return failure(ErrorCode::store_damaged, "is damaged: the velocity is not possible", what,
                    "run again into a new folder");
+  }
   if (Status status = s.odometer.restore(stages[0]); !status) return status;
   if (Status status = s.localizer.restore(stages[1]); !status) return status;
   if (s.options.odometry_only) {
@@ -74,9 +75,10 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   const bool same_start =
       s.localizer.started() == s.started &&
       (s.options.odometry_only || (s.odometry_filter.started() == s.started && s.slam_filter.started() == s.started));
-  if (!same_start)
+  if (!same_start) {
     return failure(ErrorCode::store_damaged, "is damaged: not all stages have started", what,
                    "run again into a new folder");
+  }
   return s.merger.restore(stages[4], maps);
 }
 

@@ -76,7 +76,7 @@ struct Pipeline::State {
   void add_sensor_sample(const Measurement& sample);
   void localize(const RelativeMotion& motion);
   Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
-  void apply_map_constraint(const StopSurvey& survey, const PoseConstraint& constraint);
+  void apply_map_constraint(const internal::StopSurvey& survey, const PoseConstraint& constraint);
   Status add_view(const StereoFrame& frame);
   Result<std::optional<MappedStop>> finish_stop();
   bool terrain_is_due() const;
