@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "spartan/camera/frame_source.h"
+#include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/imaging/imager.h"
 
@@ -31,13 +32,13 @@ Result<std::vector<std::string>> files_of(const std::string& argument) {
   const std::string pattern = folder ? "*" : path.filename().string();
   if (!folder && pattern.find_first_of("*?[") == std::string::npos) return std::vector<std::string>{argument};
   const fs::path where = folder ? path : path.parent_path().empty() ? fs::path(".") : path.parent_path();
+  const auto names = list_folder(where.string());
+  if (!names) return failure(names);
   std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(where, error)) {
-    if (!is_image(entry.path())) continue;
-    if (::fnmatch(pattern.c_str(), entry.path().filename().c_str(), 0) == 0) files.push_back(entry.path().string());
+  for (const std::string& name : *names) {
+    if (is_image(name) && ::fnmatch(pattern.c_str(), name.c_str(), 0) == 0) files.push_back((where / name).string());
   }
   if (files.empty()) return failure(ErrorCode::input, "no image file matches (png, jpg, pgm, ppm)", argument);
-  std::sort(files.begin(), files.end());
   return files;
 }
 

@@ -107,18 +107,18 @@ Result<std::string> find_in_folder(const fs::path& folder) {
     if (path_exists(folder / name)) return (folder / name).string();
   }
   std::vector<std::string> candidates;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string(), extension = entry.path().extension().string();
+  const auto names = list_folder(folder.string());
+  if (!names && names.error().code == ErrorCode::resources) return failure(names);
+  for (const std::string& name : names.value_or(std::vector<std::string>())) {
+    const std::string extension = fs::path(name).extension().string();
     const bool of_one_camera = extension == ".tsai" || extension == ".cahv" || extension == ".cahvor" ||
                                extension == ".cahvore" || extension == ".cameramodel";
     const bool yaml = extension == ".yaml" || extension == ".yml";
     const bool is_camchain = yaml && name.find("camchain") != std::string::npos;
     const bool of_ros = name == "left.yaml" && path_exists(folder / "right.yaml");
-    if (of_one_camera || is_camchain || of_ros || is_opencv_file(entry.path()))
-      candidates.push_back(entry.path().string());
+    if (of_one_camera || is_camchain || of_ros || is_opencv_file(folder / name))
+      candidates.push_back((folder / name).string());
   }
-  std::sort(candidates.begin(), candidates.end());
   if (candidates.size() == 1) return candidates.front();
   if (candidates.size() == 2) {
     const auto pair = find_pair_of_files(candidates.front());

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "spartan/camera/internal/recording_index.h"
+#include "spartan/core/files.h"
 
 namespace spartan {
 
@@ -84,9 +85,9 @@ Result<LayoutChoice> choose_layout(const std::string& path, const OpenOptions& o
   if (!fs::exists(path, error)) return failure(ErrorCode::input, "no such folder", path, kLookedFor);
   if (!fs::is_directory(path, error))
     return failure(ErrorCode::input, "is a file, not the folder of a recording", path);
-  if (fs::directory_iterator(path, error) == fs::directory_iterator()) {
-    return failure(ErrorCode::input, error ? "the folder cannot be read" : "the folder is empty", path, kLookedFor);
-  }
+  const auto names = list_folder(path);
+  if (!names) return failure(names);
+  if (names->empty()) return failure(ErrorCode::input, "the folder is empty", path, kLookedFor);
   if (options.format) {
     auto layout = entry_of(*options.format).recognise(path, options);
     if (!layout) layout = LayoutChoice{*options.format, path, ""};

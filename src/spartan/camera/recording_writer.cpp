@@ -116,6 +116,16 @@ bool all_finite(std::initializer_list<double> values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
+// In the folder and in all folders below it.
+void remove_temporary_files_below(const std::string& folder) {
+  remove_temporary_files(folder);
+  for (const std::string& name : list_folder(folder).value_or(std::vector<std::string>())) {
+    const std::string path = (folder / fs::path(name)).string();
+    std::error_code ignored;
+    if (fs::is_directory(fs::symlink_status(path, ignored))) remove_temporary_files_below(path);
+  }
+}
+
 }  // namespace
 
 struct RecordingWriter::State {
@@ -199,10 +209,7 @@ Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const
     auto acquired = FolderLock::acquire(folder);
     if (!acquired) return failure(acquired);
     lock = std::move(*acquired);
-    remove_temporary_files(folder);
-    for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-      if (entry->is_directory(error)) remove_temporary_files(entry->path().string());
-    }
+    remove_temporary_files_below(folder);
     const auto table = read_file(folder + "/frames.csv");
     if (!table) return failure(table);
     if (fs::exists(folder + "/recording.yaml", error)) {

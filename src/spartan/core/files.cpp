@@ -1,5 +1,6 @@
 #include "spartan/core/files.h"
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <optional>
 
 namespace spartan {
@@ -152,17 +154,33 @@ Result<std::string> read_calibration_text(const std::string& path, std::size_t l
   return content;
 }
 
+// Not by std::filesystem::directory_iterator: in libstdc++ it ends the program where memory runs out.
+Result<std::vector<std::string>> list_folder(const std::string& path) {
+  const std::unique_ptr<DIR, int (*)(DIR*)> folder(::opendir(path.c_str()), &::closedir);
+  if (!folder) return read_failure(path, errno);
+  std::vector<std::string> names;
+  for (;;) {
+    errno = 0;
+    const dirent* const entry = ::readdir(folder.get());
+    if (entry == nullptr) break;
+    const std::string_view name = entry->d_name;
+    if (name != "." && name != "..") names.emplace_back(name);
+  }
+  if (errno != 0) return read_failure(path, errno);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 std::string temporary_name(const std::string& path) {
   return path + "." + std::to_string(::getpid()) + ".part";
 }
 
 void remove_temporary_files(const std::string& folder) {
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (const std::string& name : list_folder(folder).value_or(std::vector<std::string>())) {
+    const std::filesystem::path path = folder / std::filesystem::path(name);
     std::error_code ignored;
-    if (is_temporary_name(entry->path().filename().string()) && entry->is_regular_file(ignored)) {
-      std::filesystem::remove(entry->path(), ignored);
-    }
+    if (is_temporary_name(name) && std::filesystem::is_regular_file(path, ignored))
+      std::filesystem::remove(path, ignored);
   }
 }
 

@@ -44,6 +44,10 @@ class InputFile {
   std::string path_;
 };
 
+/// Names of the entries of a folder, sorted, without "." and "..". Codes as read_file(): an error in the middle is not
+/// taken for the end of the folder.
+Result<std::vector<std::string>> list_folder(const std::string& path);
+
 /// Maximum size of a calibration file; larger files are rejected before they are read.
 constexpr std::size_t kLargestCalibration_bytes = std::size_t{4} << 20U;
 /// Maximum size of mrcal's files, which may contain all inputs of the optimization.

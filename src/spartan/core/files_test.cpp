@@ -61,6 +61,20 @@ TEST(Files, ReadErrorsNameTheFile) {
   EXPECT_FALSE(read_file(folder.path())) << "a folder is not a file";
 }
 
+TEST(Files, AFolderIsListedInTheOrderOfTheNames) {
+  const TemporaryFolder folder;
+  for (const char* name : {"b", "a.png", ".hidden"}) folder.write(name, "");
+  std::filesystem::create_directory(folder.path() + "/below");
+  EXPECT_EQ(list_folder(folder.path()).value(), (std::vector<std::string>{".hidden", "a.png", "b", "below"}));
+  EXPECT_TRUE(list_folder(folder.path() + "/below")->empty());
+  for (const char* name : {"/none", "/b"}) {
+    const auto names = list_folder(folder.path() + name);
+    ASSERT_FALSE(names) << name;
+    EXPECT_EQ(names.error().code, ErrorCode::input);
+    EXPECT_EQ(names.error().where, folder.path() + name);
+  }
+}
+
 TEST(Files, WritingIntoAMissingFolderFails) {
   const TemporaryFolder folder;
   const Status status = write_file_atomically(folder.path() + "/none/a.txt", "text");

@@ -61,6 +61,7 @@ std::string with_range(std::string_view meaning, Bounds bounds) {
 std::vector<std::string> split_key(const std::string& key) {
   std::vector<std::string> parts;
   std::stringstream rest(key);
+  rest.exceptions(std::ios::badbit);  // out of memory is not the end of the text
   for (std::string part; std::getline(rest, part, '.');) parts.push_back(part);
   return parts;
 }

@@ -55,6 +55,7 @@ ImageSize pnm_size(std::string_view head) {
     if (words.size() > 64) break;
   }
   std::istringstream numbers(words);
+  numbers.exceptions(std::ios::badbit);  // out of memory is not the end of the text
   ImageSize size;
   numbers >> size.width >> size.height;
   if (!numbers || size.width > kLargestSide || size.height > kLargestSide) return {};

@@ -72,10 +72,10 @@ FrameImage own(cv::Mat& mat, PixelLayout layout) {
 Result<std::string> png_of(const cv::Mat& mat) {
   std::vector<std::uint8_t> png;
   try {
-    // The encoder returns false for a failed allocation only: size and type of the image are valid.
+    // The encoder fails for a failed allocation only, with false or an assertion: size and type of the image are valid.
     if (!cv::imencode(".png", mat, png)) throw std::bad_alloc();
   } catch (const cv::Exception& e) {
-    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
+    if (e.code == cv::Error::StsNoMem || e.code == cv::Error::StsAssert) throw std::bad_alloc();
     return failure(ErrorCode::internal, "cannot encode the image as PNG: " + e.msg);
   }
   return std::string(png.begin(), png.end());

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <filesystem>
+#include <new>
 #include <utility>
 
 #include "spartan/core/files.h"
@@ -116,41 +117,55 @@ std::string percent_encoded(const std::string& path) {
 SqlStatement::SqlStatement(sqlite3* db, sqlite3_stmt* statement, std::string path)
     : db_(db), statement_(statement), path_(std::move(path)) {}
 SqlStatement::SqlStatement(SqlStatement&& other) noexcept
-    : db_(other.db_), statement_(std::exchange(other.statement_, nullptr)), path_(std::move(other.path_)) {}
+    : db_(other.db_),
+      statement_(std::exchange(other.statement_, nullptr)),
+      path_(std::move(other.path_)),
+      bind_error_(other.bind_error_) {}
 SqlStatement& SqlStatement::operator=(SqlStatement&& other) noexcept {
   std::swap(db_, other.db_);
   std::swap(statement_, other.statement_);
   std::swap(path_, other.path_);
+  std::swap(bind_error_, other.bind_error_);
   return *this;
 }
 SqlStatement::~SqlStatement() {
   sqlite3_finalize(statement_);
 }
 
+// The first error of a bind is reported by step(): otherwise NULL would be stored in place of the value.
+void SqlStatement::keep(int code) {
+  if (bind_error_ == SQLITE_OK) bind_error_ = code;
+}
+
 SqlStatement& SqlStatement::bind(int index, std::int64_t value) {
-  sqlite3_bind_int64(statement_, index, value);
+  keep(sqlite3_bind_int64(statement_, index, value));
   return *this;
 }
 SqlStatement& SqlStatement::bind(int index, double value) {
-  sqlite3_bind_double(statement_, index, value);
+  keep(sqlite3_bind_double(statement_, index, value));
   return *this;
 }
 SqlStatement& SqlStatement::bind(int index, const std::string& text) {
-  sqlite3_bind_text64(statement_, index, text.data(), text.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
+  keep(sqlite3_bind_text64(statement_, index, text.data(), text.size(), SQLITE_TRANSIENT, SQLITE_UTF8));
   return *this;
 }
 SqlStatement& SqlStatement::bind(int index, const Bytes& blob) {
-  sqlite3_bind_blob64(statement_, index, blob.data(), blob.size(), SQLITE_TRANSIENT);
+  keep(sqlite3_bind_blob64(statement_, index, blob.data(), blob.size(), SQLITE_TRANSIENT));
   return *this;
 }
 
 SqlStatement& SqlStatement::bind(int index, const std::optional<double>& value) {
   if (value) return bind(index, *value);
-  sqlite3_bind_null(statement_, index);
+  keep(sqlite3_bind_null(statement_, index));
   return *this;
 }
 
 Result<bool> SqlStatement::step() {
+  if (bind_error_ != SQLITE_OK) {
+    const bool no_memory = bind_error_ == SQLITE_NOMEM;
+    return failure(no_memory ? ErrorCode::resources : ErrorCode::internal, sqlite3_errstr(bind_error_), path_,
+                   no_memory ? "free memory or raise the limit (ulimit -v)" : "");
+  }
   const StepLimit limit(db_);
   const int code = sqlite3_step(statement_);
   if (code == SQLITE_ROW) return true;
@@ -174,6 +189,7 @@ Status SqlStatement::run() {
 void SqlStatement::reset() {
   sqlite3_reset(statement_);
   sqlite3_clear_bindings(statement_);
+  bind_error_ = SQLITE_OK;
 }
 
 std::int64_t SqlStatement::integer(int column) const {
@@ -182,8 +198,13 @@ std::int64_t SqlStatement::integer(int column) const {
 double SqlStatement::real(int column) const {
   return sqlite3_column_double(statement_, column);
 }
+// A null pointer stands for NULL, for an empty value, and for a failed allocation.
+void SqlStatement::expect_memory(const void* data) const {
+  if (data == nullptr && sqlite3_errcode(db_) == SQLITE_NOMEM) throw std::bad_alloc();
+}
 std::string SqlStatement::text(int column) const {
   const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+  expect_memory(data);
   return data == nullptr ? std::string{}
                          : std::string(data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column)));
 }
@@ -192,6 +213,7 @@ bool SqlStatement::is_null(int column) const {
 }
 Bytes SqlStatement::blob(int column) const {
   const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(statement_, column));
+  expect_memory(data);
   const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_, column));
   return data == nullptr ? Bytes{} : Bytes(data, data + size);
 }

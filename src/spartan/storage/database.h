@@ -44,9 +44,12 @@ class SqlStatement {
   bool is_null(int column) const;
 
  private:
+  void keep(int code);
+  void expect_memory(const void* data) const;
   sqlite3* db_ = nullptr;
   sqlite3_stmt* statement_ = nullptr;
   std::string path_;
+  int bind_error_ = 0;
 };
 
 /// A connection to an SQLite database file.

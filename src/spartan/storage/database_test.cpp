@@ -136,6 +136,19 @@ TEST_F(ForeignDatabase, KnowsThatItsFileWasRemoved) {
   EXPECT_TRUE(db.was_moved());
 }
 
+TEST_F(ForeignDatabase, AValueThatCannotBeBoundIsNotStoredAsNull) {
+  Database db = open(Database::Mode::create);
+  ASSERT_TRUE(db.execute("CREATE TABLE u (x)"));
+  auto insert = db.prepare("INSERT INTO u VALUES (?1)");
+  ASSERT_TRUE(insert);
+  const Status status = insert->bind(2, std::string("no such parameter")).run();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().where, path_);
+  insert->reset();
+  EXPECT_TRUE(insert->bind(1, 1.5).run()) << "the error ends with reset()";
+  EXPECT_EQ(db.prepare("SELECT x FROM u")->step(), true) << "one row";
+}
+
 TEST(Database, APathMayBeginWithTwoSlashes) {
   const TemporaryFolder folder;
   const std::string path = "/" + folder.path() + "/a.sqlite";

@@ -9,7 +9,9 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <new>
 
 #include "spartan/core/files.h"
 #endif
@@ -24,7 +26,46 @@ struct CloseDataset {
   void operator()(GDALDataset* dataset) const { GDALClose(dataset); }
 };
 
-Status write_bands(GDALDataset& dataset, const std::string& path, const std::vector<MapBand>& bands) {
+// GDAL ends the process where small allocations fail, and writes what it has where large ones fail. What it needs
+// (twice the image, and its drivers) must therefore be free before it is called.
+void expect_memory_for_gdal(ImageSize size, std::size_t bands) {
+  constexpr std::size_t kOfDrivers_bytes = std::size_t{8} << 20U;
+  const std::size_t bytes = kOfDrivers_bytes + 2 * static_cast<std::size_t>(size.width) *
+                                                   static_cast<std::size_t>(size.height) * bands * sizeof(float);
+  void* volatile memory = std::malloc(bytes);  // volatile: an unused allocation may otherwise be left out
+  if (memory == nullptr) throw std::bad_alloc();
+  std::free(memory);
+}
+
+// Keeps the first error while it exists: GDALClose() and destructors of GDAL do not return theirs, and the last error
+// may be a consequence.
+class GdalErrors {
+ public:
+  GdalErrors() { CPLPushErrorHandlerEx(&GdalErrors::keep, this); }
+  ~GdalErrors() { CPLPopErrorHandler(); }
+  GdalErrors(const GdalErrors&) = delete;
+  GdalErrors& operator=(const GdalErrors&) = delete;
+  GdalErrors(GdalErrors&&) = delete;
+  GdalErrors& operator=(GdalErrors&&) = delete;
+
+  bool any() const { return number_ != CPLE_None; }
+  tl::unexpected<Error> error(ErrorCode code, const char* what, const std::string& path) const {
+    if (number_ == CPLE_OutOfMemory) throw std::bad_alloc();
+    return failure(code, std::string(what) + text_.data(), path);
+  }
+
+ private:
+  static void keep(CPLErr severity, CPLErrorNum number, const char* text) {
+    auto& self = *static_cast<GdalErrors*>(CPLGetErrorHandlerUserData());
+    if (severity < CE_Failure || self.any()) return;
+    self.number_ = number;
+    std::snprintf(self.text_.data(), self.text_.size(), "%s", text);
+  }
+  CPLErrorNum number_ = CPLE_None;
+  std::array<char, 512> text_{};
+};
+
+void write_bands(GDALDataset& dataset, const std::vector<MapBand>& bands) {
   for (std::size_t i = 0; i < bands.size(); ++i) {
     GDALRasterBand* const band = dataset.GetRasterBand(static_cast<int>(i) + 1);
     const ImageView<const float>& values = bands[i].values;
@@ -35,10 +76,8 @@ Status write_bands(GDALDataset& dataset, const std::string& path, const std::vec
         band->RasterIO(GF_Write, 0, 0, values.width(), values.height(), const_cast<float*>(values.data()),
                        values.width(), values.height(), GDT_Float32, 0,
                        static_cast<GSpacing>(values.stride()) * static_cast<GSpacing>(sizeof(float)), nullptr);
-    if (error != CE_None)
-      return failure(ErrorCode::output, std::string("cannot be written: ") + CPLGetLastErrorMsg(), path);
+    if (error != CE_None) return;  // kept by GdalErrors
   }
-  return {};
 }
 
 }  // namespace
@@ -49,58 +88,49 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
     if (band.values.size() != size || size.empty())
       throw std::invalid_argument("write_geotiff: empty bands, or bands of different sizes");
   }
+  expect_memory_for_gdal(size, bands.size());
   GDALRegister_GTiff();
-  CPLPushErrorHandler(CPLQuietErrorHandler);
+  const GdalErrors errors;
   const std::string temporary = temporary_name(path);
-  auto written = [&]() -> Status {
-    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
-    const std::array<const char*, 6> options{"COMPRESS=DEFLATE", "PREDICTOR=3",      "TILED=YES",
-                                             "NUM_THREADS=1",    "BIGTIFF=IF_SAFER", nullptr};
-    std::unique_ptr<GDALDataset, CloseDataset> dataset(driver->Create(temporary.c_str(), size.width, size.height,
-                                                                      static_cast<int>(bands.size()), GDT_Float32,
-                                                                      const_cast<char**>(options.data())));
-    if (!dataset) return failure(ErrorCode::output, std::string("cannot be written: ") + CPLGetLastErrorMsg(), path);
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  const std::array<const char*, 6> options{"COMPRESS=DEFLATE", "PREDICTOR=3",      "TILED=YES",
+                                           "NUM_THREADS=1",    "BIGTIFF=IF_SAFER", nullptr};
+  std::unique_ptr<GDALDataset, CloseDataset> dataset(driver->Create(temporary.c_str(), size.width, size.height,
+                                                                    static_cast<int>(bands.size()), GDT_Float32,
+                                                                    const_cast<char**>(options.data())));
+  if (dataset) {
     std::array<double, 6> transform{place.west_m, place.cell_m, 0, place.north_m, 0, -place.cell_m};
     dataset->SetGeoTransform(transform.data());
-    if (Status s = write_bands(*dataset, path, bands); !s) return s;
-    CPLErrorReset();
+    write_bands(*dataset, bands);
     dataset.reset();  // writes the last blocks: a full disk is reported here
-    if (CPLGetLastErrorType() >= CE_Failure)
-      return failure(ErrorCode::output, std::string("cannot be written: ") + CPLGetLastErrorMsg(), path);
-    return publish_file(temporary, path);
-  }();
-  CPLPopErrorHandler();
-  if (!written) std::remove(temporary.c_str());
-  return written;
+    if (!errors.any()) return publish_file(temporary, path);
+  }
+  std::remove(temporary.c_str());
+  return errors.error(ErrorCode::output, "cannot be written: ", path);
 }
 
 Result<LoadedMap> read_geotiff(const std::string& path) {
   GDALRegister_GTiff();
-  CPLPushErrorHandler(CPLQuietErrorHandler);
-  auto loaded = [&]() -> Result<LoadedMap> {
-    const std::array<const char*, 2> drivers{"GTiff", nullptr};
-    const std::unique_ptr<GDALDataset, CloseDataset> dataset(
-        GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers.data()));
-    std::array<double, 6> transform{};
-    if (!dataset || dataset->GetGeoTransform(transform.data()) != CE_None)
-      return failure(ErrorCode::input, std::string("is not a GeoTIFF: ") + CPLGetLastErrorMsg(), path);
-    LoadedMap map;
-    map.place = {transform[0], transform[3], transform[1]};
-    for (int i = 1; i <= dataset->GetRasterCount(); ++i) {
-      GDALRasterBand* const band = dataset->GetRasterBand(i);
-      Image<float> values(dataset->GetRasterXSize(), dataset->GetRasterYSize());
-      const CPLErr error = band->RasterIO(
-          GF_Read, 0, 0, values.width(), values.height(), values.row(0), values.width(), values.height(), GDT_Float32,
-          0, static_cast<GSpacing>(values.view().stride()) * static_cast<GSpacing>(sizeof(float)), nullptr);
-      if (error != CE_None)
-        return failure(ErrorCode::input, std::string("cannot be read: ") + CPLGetLastErrorMsg(), path);
-      map.names.emplace_back(band->GetDescription());
-      map.bands.push_back(std::move(values));
-    }
-    return map;
-  }();
-  CPLPopErrorHandler();
-  return loaded;
+  const GdalErrors errors;
+  const std::array<const char*, 2> drivers{"GTiff", nullptr};
+  const std::unique_ptr<GDALDataset, CloseDataset> dataset(
+      GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers.data()));
+  std::array<double, 6> transform{};
+  if (!dataset || dataset->GetGeoTransform(transform.data()) != CE_None)
+    return errors.error(ErrorCode::input, "is not a GeoTIFF: ", path);
+  LoadedMap map;
+  map.place = {transform[0], transform[3], transform[1]};
+  for (int i = 1; i <= dataset->GetRasterCount(); ++i) {
+    GDALRasterBand* const band = dataset->GetRasterBand(i);
+    Image<float> values(dataset->GetRasterXSize(), dataset->GetRasterYSize());
+    const CPLErr error = band->RasterIO(
+        GF_Read, 0, 0, values.width(), values.height(), values.row(0), values.width(), values.height(), GDT_Float32, 0,
+        static_cast<GSpacing>(values.view().stride()) * static_cast<GSpacing>(sizeof(float)), nullptr);
+    if (error != CE_None) return errors.error(ErrorCode::input, "cannot be read: ", path);
+    map.names.emplace_back(band->GetDescription());
+    map.bands.push_back(std::move(values));
+  }
+  return map;
 }
 
 #else

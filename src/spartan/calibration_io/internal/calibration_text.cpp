@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <set>
 
+#include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 
 namespace spartan::internal {
@@ -56,11 +57,10 @@ std::string rows_of(const Eigen::Matrix3d& matrix, const char* separator) {
 ImageSize size_of_images_in(const std::string& folder) {
   constexpr std::size_t kMaxImages = 8;
   static const std::set<std::string> endings{".png", ".jpg", ".jpeg", ".pgm", ".ppm"};
-  std::error_code error;
-  std::set<std::string> paths;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (endings.contains(entry.path().extension().string())) paths.insert(entry.path().string());
-    if (paths.size() > kMaxImages) paths.erase(std::prev(paths.end()));
+  std::vector<std::string> paths;
+  for (const std::string& name : list_folder(folder).value_or(std::vector<std::string>())) {
+    if (paths.size() == kMaxImages) break;
+    if (endings.contains(fs::path(name).extension().string())) paths.push_back((folder / fs::path(name)).string());
   }
   ImageSize common;
   for (const std::string& path : paths) {

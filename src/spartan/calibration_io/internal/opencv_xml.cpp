@@ -40,6 +40,7 @@ class XmlReader {
     if (open_.size() < 2 || open_.size() > 3) return;
     OpencvStorage::Entry& entry = entries[open_[1]];
     std::istringstream stream(words);
+    stream.exceptions(std::ios::badbit);  // out of memory is not the end of the text
     for (std::string word; stream >> word;) {
       if (word.size() > 1 && word.front() == '"' && word.back() == '"') word = word.substr(1, word.size() - 2);
       if (open_.size() == 2 || open_[2] == "data") entry.words.push_back(word);

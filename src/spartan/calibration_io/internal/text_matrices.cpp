@@ -30,6 +30,7 @@ TextMatrices TextMatrices::parse(const std::string& text, const std::string& nam
   result.name_ = name;
   result.separator_ = separator;
   std::istringstream lines(text);
+  lines.exceptions(std::ios::badbit);  // out of memory is not the end of the text
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
@@ -60,6 +61,7 @@ Result<std::vector<double>> TextMatrices::numbers(const std::string& key, std::s
   if (!content) return failure(content);
   std::vector<double> values;
   std::istringstream words(*content);
+  words.exceptions(std::ios::badbit);  // out of memory is not the end of the text
   for (std::string word; words >> word && !word.starts_with('#');) {
     const auto value = parse_finite_number(word);
     if (!value) return error_at(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));

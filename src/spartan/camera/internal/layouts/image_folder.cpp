@@ -9,6 +9,7 @@
 #include <map>
 
 #include "spartan/camera/internal/table.h"
+#include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 
 namespace spartan::internal {
@@ -23,15 +24,19 @@ constexpr std::size_t kSizeProbes = 16;  // image headers read to find the commo
 // Stem → path. Of several files with the same stem, the first extension in the order of list_images() is used.
 using Stems = std::map<std::string, std::string>;
 
-Stems list_images(const std::string& folder) {
+// A folder that does not exist has none.
+Result<Stems> list_images(const std::string& folder) {
   Stems stems;
+  const auto names = list_folder(folder);
+  if (!names && names.error().code == ErrorCode::input) return stems;
+  if (!names) return failure(names);
   for (const std::string_view wanted : {".png", ".jpg", ".jpeg", ".pgm"}) {
-    std::error_code error;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-      std::string extension = entry.path().extension().string();
+    for (const std::string& name : *names) {
+      const fs::path path(name);
+      std::string extension = path.extension().string();
       std::transform(extension.begin(), extension.end(), extension.begin(),
                      [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (extension == wanted) stems.emplace(entry.path().stem().string(), entry.path().string());
+      if (extension == wanted) stems.emplace(path.stem().string(), (folder / path).string());
     }
   }
   return stems;
@@ -71,10 +76,13 @@ std::map<std::string, std::int64_t> ranks_of(const Stems& left, const Stems& rig
 
 }  // namespace
 
-NumberedImages number_images(const std::string& left_folder, const std::string& right_folder,
-                             std::optional<std::size_t> announced) {
+Result<NumberedImages> number_images(const std::string& left_folder, const std::string& right_folder,
+                                     std::optional<std::size_t> announced) {
   NumberedImages images;
-  const Stems left = list_images(left_folder), right = list_images(right_folder);
+  const auto left_images = list_images(left_folder), right_images = list_images(right_folder);
+  if (!left_images) return failure(left_images);
+  if (!right_images) return failure(right_images);
+  const Stems &left = *left_images, &right = *right_images;
   auto numbers = numbers_of(left, right, announced.value_or(0));
   if (!numbers) {
     images.remarks.emplace_back("the image names are not frame numbers; images are used in the order of their names");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "spartan/core/image.h"
+#include "spartan/core/result.h"
 
 namespace spartan::internal {
 
@@ -24,8 +25,9 @@ struct NumberedImages {
 /// Assigns the files of two folders (png, jpg, jpeg, pgm) to frames. The file number is the frame index; where no
 /// number lies in [0, announced), indices are relative to the lowest number. Where names are not such numbers, the rank
 /// among the sorted names is the index. Without `announced` there are as many frames as the range of the numbers holds.
-NumberedImages number_images(const std::string& left_folder, const std::string& right_folder,
-                             std::optional<std::size_t> announced);
+/// Codes: `read_error`, `resources`; a folder that does not exist has no images.
+Result<NumberedImages> number_images(const std::string& left_folder, const std::string& right_folder,
+                                     std::optional<std::size_t> announced);
 
 /// The most frequent size of the left images, from the headers of up to 16 files spread over the recording.
 std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& frames);

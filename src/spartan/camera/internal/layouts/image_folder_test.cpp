@@ -26,7 +26,7 @@ class ImageFolder : public ::testing::Test {
     if (!right.empty()) folder_.write("r/" + right, "");
   }
   std::vector<std::string> number(std::optional<std::size_t> announced) {
-    images_ = number_images(folder_.path() + "/l", folder_.path() + "/r", announced);
+    images_ = number_images(folder_.path() + "/l", folder_.path() + "/r", announced).value();
     const auto name = [](const std::string& path) {
       return path.empty() ? std::string("-") : std::filesystem::path(path).filename().string();
     };
@@ -88,7 +88,7 @@ TEST_F(ImageFolder, IgnoresOtherFilesAndPrefersPng) {
 
 TEST_F(ImageFolder, EmptyAndMissingFoldersHoldNoImages) {
   EXPECT_THAT(number(std::nullopt), IsEmpty());
-  EXPECT_EQ(number_images(folder_.path() + "/none", folder_.path() + "/none", 3).frames.size(), 3U);
+  EXPECT_EQ(number_images(folder_.path() + "/none", folder_.path() + "/none", 3)->frames.size(), 3U);
 }
 
 TEST_F(ImageFolder, FindsTheMostFrequentImageSize) {

@@ -49,7 +49,9 @@ Result<RecordingIndex> index_kitti(const LayoutChoice& layout, const OpenOptions
     index.info.layout_reason = "no times.txt: frames are assumed to be 0.1 s apart";
   }
   const std::string left = (folder / "image_0").string(), right = (folder / "image_1").string();
-  NumberedImages images = number_images(left, right, stamps ? std::optional(stamps->size()) : std::nullopt);
+  auto numbered = number_images(left, right, stamps ? std::optional(stamps->size()) : std::nullopt);
+  if (!numbered) return failure(numbered);
+  NumberedImages& images = *numbered;
   index.info.sequence.remarks = std::move(images.remarks);
   const auto size = common_image_size(images.frames);
   if (!size) {

@@ -72,8 +72,10 @@ Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOpt
   if (!left) return failure(left);
   const auto right = read_stamps((folder / "image_01" / "timestamps.txt").string());
   if (!right) return failure(right);
-  NumberedImages images =
+  auto numbered =
       number_images((folder / "image_00" / "data").string(), (folder / "image_01" / "data").string(), left->size());
+  if (!numbered) return failure(numbered);
+  NumberedImages& images = *numbered;
   index.info.sequence.remarks = std::move(images.remarks);
   const auto size = common_image_size(images.frames);
   if (!size) return failure(ErrorCode::input, "holds no readable image", (folder / "image_00" / "data").string());
