@@ -24,15 +24,15 @@ bool path_exists(const fs::path& path) {
 }
 
 // The size of the images in image_0 (KITTI odometry) or image_00/data (KITTI raw) beside the file.
-ImageSize size_of_recording_beside(const fs::path& file) {
+Result<ImageSize> size_of_recording_beside(const fs::path& file) {
   for (const char* folder : {"image_0", "image_00/data", "../image_0"}) {
-    const ImageSize size = size_of_images_in((file.parent_path() / folder).string());
-    if (!size.empty()) return size;
+    auto size = size_of_images_in((file.parent_path() / folder).string());
+    if (!size || !size->empty()) return size;
   }
-  return {};
+  return ImageSize{};
 }
 
-ImageSize size_of_images_beside(const fs::path& file) {
+Result<ImageSize> size_of_images_beside(const fs::path& file) {
   const fs::path folder = file.parent_path();
   return size_of_images_in(folder.empty() ? "." : folder.string());
 }
@@ -55,18 +55,20 @@ Result<LoadedRig> read_opencv_files(const fs::path& file, ImageSize size_hint) {
   const bool separate = (file.stem() == "intrinsics" || file.stem() == "extrinsics") && path_exists(intrinsics) &&
                         path_exists(extrinsics);
   const fs::path& first = separate ? intrinsics : file;
-  if (size_hint.empty()) size_hint = size_of_images_beside(file);
-  return internal::read_opencv(first.string(), separate ? extrinsics.string() : "", size_hint);
+  const auto size = size_hint.empty() ? size_of_images_beside(file) : size_hint;
+  if (!size) return failure(size);
+  return internal::read_opencv(first.string(), separate ? extrinsics.string() : "", *size);
 }
 
-Result<LoadedRig> read_file_per_camera(CalibrationFormat format, const std::string& path, ImageSize size) {
+Result<LoadedRig> read_file_per_camera(CalibrationFormat format, const std::string& path, ImageSize size_hint) {
   const auto pair = find_pair_of_files(path);
   if (!pair) return failure(pair);
   if (format == CalibrationFormat::ros) return read_ros_calib(pair->left, pair->right);
   if (format == CalibrationFormat::mrcal) return read_mrcal_calib(pair->left, pair->right);
-  if (size.empty()) size = size_of_images_beside(pair->left);
-  if (format == CalibrationFormat::tsai) return read_tsai_calib(pair->left, pair->right, size);
-  return read_cahvor_calib(pair->left, pair->right, size);
+  const auto size = size_hint.empty() ? size_of_images_beside(pair->left) : size_hint;
+  if (!size) return failure(size);
+  if (format == CalibrationFormat::tsai) return read_tsai_calib(pair->left, pair->right, *size);
+  return read_cahvor_calib(pair->left, pair->right, *size);
 }
 
 Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, ImageSize size_hint) {
@@ -74,8 +76,11 @@ Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, Ima
   switch (format) {
     case CalibrationFormat::rig_yaml:
       return complete(read_rig_yaml(path), format, path, "");
-    case CalibrationFormat::kitti:
-      return read_kitti(path, size_hint.empty() ? size_of_recording_beside(file) : size_hint);
+    case CalibrationFormat::kitti: {
+      const auto size = size_hint.empty() ? size_of_recording_beside(file) : size_hint;
+      if (!size) return failure(size);
+      return read_kitti(path, *size);
+    }
     case CalibrationFormat::kitti_raw:
       return read_kitti_raw(path);
     case CalibrationFormat::euroc: {
@@ -108,7 +113,7 @@ Result<std::string> find_in_folder(const fs::path& folder) {
   }
   std::vector<std::string> candidates;
   const auto names = list_folder(folder.string());
-  if (!names && names.error().code == ErrorCode::resources) return failure(names);
+  if (!names && names.error().code != ErrorCode::input) return failure(names);
   for (const std::string& name : names.value_or(std::vector<std::string>())) {
     const std::string extension = fs::path(name).extension().string();
     const bool of_one_camera = extension == ".tsai" || extension == ".cahv" || extension == ".cahvor" ||

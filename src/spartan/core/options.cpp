@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <sstream>
 
 #include "spartan/core/files.h"
 #include "spartan/core/strict_yaml.h"
@@ -60,9 +59,11 @@ std::string with_range(std::string_view meaning, Bounds bounds) {
 // "a.b.c" → a, b, c
 std::vector<std::string> split_key(const std::string& key) {
   std::vector<std::string> parts;
-  std::stringstream rest(key);
-  rest.exceptions(std::ios::badbit);  // out of memory is not the end of the text
-  for (std::string part; std::getline(rest, part, '.');) parts.push_back(part);
+  for (std::size_t at = 0; at < key.size();) {
+    const std::size_t end = std::min(key.find('.', at), key.size());
+    parts.push_back(key.substr(at, end - at));
+    at = end + 1;
+  }
   return parts;
 }
 

@@ -161,11 +161,8 @@ SqlStatement& SqlStatement::bind(int index, const std::optional<double>& value) 
 }
 
 Result<bool> SqlStatement::step() {
-  if (bind_error_ != SQLITE_OK) {
-    const bool no_memory = bind_error_ == SQLITE_NOMEM;
-    return failure(no_memory ? ErrorCode::resources : ErrorCode::internal, sqlite3_errstr(bind_error_), path_,
-                   no_memory ? "free memory or raise the limit (ulimit -v)" : "");
-  }
+  if (bind_error_ == SQLITE_NOMEM) throw std::bad_alloc();
+  if (bind_error_ != SQLITE_OK) return failure(ErrorCode::internal, sqlite3_errstr(bind_error_), path_);
   const StepLimit limit(db_);
   const int code = sqlite3_step(statement_);
   if (code == SQLITE_ROW) return true;

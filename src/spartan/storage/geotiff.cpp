@@ -6,12 +6,15 @@
 #ifdef SPARTAN_HAS_GDAL
 #include <gdal_priv.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <new>
+#include <optional>
 
 #include "spartan/core/files.h"
 #endif
@@ -51,7 +54,7 @@ class GdalErrors {
   bool any() const { return number_ != CPLE_None; }
   tl::unexpected<Error> error(ErrorCode code, const char* what, const std::string& path) const {
     if (number_ == CPLE_OutOfMemory) throw std::bad_alloc();
-    return failure(code, std::string(what) + text_.data(), path);
+    return failure(code, what + (any() ? std::string(text_.data()) : "GDAL reports no reason"), path);
   }
 
  private:
@@ -65,7 +68,7 @@ class GdalErrors {
   std::array<char, 512> text_{};
 };
 
-void write_bands(GDALDataset& dataset, const std::vector<MapBand>& bands) {
+bool write_bands(GDALDataset& dataset, const std::vector<MapBand>& bands) {
   for (std::size_t i = 0; i < bands.size(); ++i) {
     GDALRasterBand* const band = dataset.GetRasterBand(static_cast<int>(i) + 1);
     const ImageView<const float>& values = bands[i].values;
@@ -76,8 +79,45 @@ void write_bands(GDALDataset& dataset, const std::vector<MapBand>& bands) {
         band->RasterIO(GF_Write, 0, 0, values.width(), values.height(), const_cast<float*>(values.data()),
                        values.width(), values.height(), GDT_Float32, 0,
                        static_cast<GSpacing>(values.stride()) * static_cast<GSpacing>(sizeof(float)), nullptr);
-    if (error != CE_None) return;  // kept by GdalErrors
+    if (error != CE_None) return false;
   }
+  return true;
+}
+
+using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
+
+Dataset open_geotiff(const std::string& path) {
+  const std::array<const char*, 2> drivers{"GTiff", nullptr};
+  return Dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers.data()));
+}
+
+// Of the dataset's size; nullopt on errors.
+std::optional<Image<float>> read_band(GDALRasterBand& band) {
+  Image<float> values(band.GetXSize(), band.GetYSize());
+  const CPLErr error = band.RasterIO(
+      GF_Read, 0, 0, values.width(), values.height(), values.row(0), values.width(), values.height(), GDT_Float32, 0,
+      static_cast<GSpacing>(values.view().stride()) * static_cast<GSpacing>(sizeof(float)), nullptr);
+  if (error != CE_None) return std::nullopt;
+  return values;
+}
+
+bool same_values(const ImageView<const float>& a, const ImageView<const float>& b) {
+  const auto same = [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); };
+  for (int y = 0; y < a.height(); ++y) {
+    if (!std::equal(a.row(y), a.row(y) + a.width(), b.row(y), same)) return false;
+  }
+  return true;
+}
+
+// libtiff reports no error where the row buffer of its predictor cannot be allocated, and writes elevations of 1e37 m.
+// Only what can be read again was written.
+bool holds(const std::string& path, const std::vector<MapBand>& bands) {
+  const Dataset dataset = open_geotiff(path);
+  for (std::size_t i = 0; dataset && i < bands.size(); ++i) {
+    const auto values = read_band(*dataset->GetRasterBand(static_cast<int>(i) + 1));
+    if (!values || !same_values(values->view(), bands[i].values)) return false;
+  }
+  return dataset != nullptr;
 }
 
 }  // namespace
@@ -90,20 +130,18 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
   }
   expect_memory_for_gdal(size, bands.size());
   GDALRegister_GTiff();
-  const GdalErrors errors;
+  GdalErrors errors;  // not const: the error handler of GDAL writes to it
   const std::string temporary = temporary_name(path);
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
   const std::array<const char*, 6> options{"COMPRESS=DEFLATE", "PREDICTOR=3",      "TILED=YES",
                                            "NUM_THREADS=1",    "BIGTIFF=IF_SAFER", nullptr};
-  std::unique_ptr<GDALDataset, CloseDataset> dataset(driver->Create(temporary.c_str(), size.width, size.height,
-                                                                    static_cast<int>(bands.size()), GDT_Float32,
-                                                                    const_cast<char**>(options.data())));
+  Dataset dataset(driver->Create(temporary.c_str(), size.width, size.height, static_cast<int>(bands.size()),
+                                 GDT_Float32, const_cast<char**>(options.data())));
   if (dataset) {
     std::array<double, 6> transform{place.west_m, place.cell_m, 0, place.north_m, 0, -place.cell_m};
-    dataset->SetGeoTransform(transform.data());
-    write_bands(*dataset, bands);
+    const bool complete = dataset->SetGeoTransform(transform.data()) == CE_None && write_bands(*dataset, bands);
     dataset.reset();  // writes the last blocks: a full disk is reported here
-    if (!errors.any()) return publish_file(temporary, path);
+    if (complete && !errors.any() && holds(temporary, bands)) return publish_file(temporary, path);
   }
   std::remove(temporary.c_str());
   return errors.error(ErrorCode::output, "cannot be written: ", path);
@@ -111,10 +149,8 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
 
 Result<LoadedMap> read_geotiff(const std::string& path) {
   GDALRegister_GTiff();
-  const GdalErrors errors;
-  const std::array<const char*, 2> drivers{"GTiff", nullptr};
-  const std::unique_ptr<GDALDataset, CloseDataset> dataset(
-      GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers.data()));
+  GdalErrors errors;  // not const: the error handler of GDAL writes to it
+  const Dataset dataset = open_geotiff(path);
   std::array<double, 6> transform{};
   if (!dataset || dataset->GetGeoTransform(transform.data()) != CE_None)
     return errors.error(ErrorCode::input, "is not a GeoTIFF: ", path);
@@ -122,13 +158,10 @@ Result<LoadedMap> read_geotiff(const std::string& path) {
   map.place = {transform[0], transform[3], transform[1]};
   for (int i = 1; i <= dataset->GetRasterCount(); ++i) {
     GDALRasterBand* const band = dataset->GetRasterBand(i);
-    Image<float> values(dataset->GetRasterXSize(), dataset->GetRasterYSize());
-    const CPLErr error = band->RasterIO(
-        GF_Read, 0, 0, values.width(), values.height(), values.row(0), values.width(), values.height(), GDT_Float32, 0,
-        static_cast<GSpacing>(values.view().stride()) * static_cast<GSpacing>(sizeof(float)), nullptr);
-    if (error != CE_None) return errors.error(ErrorCode::input, "cannot be read: ", path);
+    auto values = read_band(*band);
+    if (!values) return errors.error(ErrorCode::input, "cannot be read: ", path);
     map.names.emplace_back(band->GetDescription());
-    map.bands.push_back(std::move(values));
+    map.bands.push_back(std::move(*values));
   }
   return map;
 }

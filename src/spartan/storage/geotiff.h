@@ -10,7 +10,8 @@
 namespace spartan {
 
 /// Writes float32 bands of equal size, compressed, without a map projection. The file is written atomically.
-/// Code `output` if it cannot be written, `usage` if Spartan was built without GDAL.
+/// It is read back before it replaces an older one. Code `output` if it cannot be written, `usage` if Spartan was built
+/// without GDAL.
 Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands);
 
 /// The content of such a GeoTIFF; bands as float32.

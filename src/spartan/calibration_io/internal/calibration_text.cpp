@@ -54,11 +54,24 @@ std::string rows_of(const Eigen::Matrix3d& matrix, const char* separator) {
   return fmt::format("{}", fmt::join(rows.data(), rows.data() + rows.size(), separator));
 }
 
-ImageSize size_of_images_in(const std::string& folder) {
+std::vector<std::string> split_words(const std::string& text) {
+  constexpr const char* kSpace = " \t\n\v\f\r";
+  std::vector<std::string> words;
+  for (std::size_t at = text.find_first_not_of(kSpace); at != std::string::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kSpace, at), text.size());
+    words.push_back(text.substr(at, end - at));
+    at = text.find_first_not_of(kSpace, end);
+  }
+  return words;
+}
+
+Result<ImageSize> size_of_images_in(const std::string& folder) {
   constexpr std::size_t kMaxImages = 8;
   static const std::set<std::string> endings{".png", ".jpg", ".jpeg", ".pgm", ".ppm"};
   std::vector<std::string> paths;
-  for (const std::string& name : list_folder(folder).value_or(std::vector<std::string>())) {
+  const auto names = list_folder(folder);
+  if (!names && names.error().code == ErrorCode::resources) return failure(names);
+  for (const std::string& name : names.value_or(std::vector<std::string>())) {
     if (paths.size() == kMaxImages) break;
     if (endings.contains(fs::path(name).extension().string())) paths.push_back((folder / fs::path(name)).string());
   }

@@ -31,8 +31,12 @@ std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& rota
 std::string list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers, const char* separator = " ");
 std::string rows_of(const Eigen::Matrix3d& matrix, const char* separator = " ");
 
+/// The words of a text, which are separated by white space. Not by a stream: in a stream, a failed allocation looks
+/// like the end of the text.
+std::vector<std::string> split_words(const std::string& text);
+
 /// The common size of the first 8 images of a folder in alphabetical order; empty if there are none or their sizes
-/// differ.
-ImageSize size_of_images_in(const std::string& folder);
+/// differ. Code: `resources`.
+Result<ImageSize> size_of_images_in(const std::string& folder);
 
 }  // namespace spartan::internal

@@ -1,8 +1,9 @@
 // Parser of OpenCV's XML: <opencv_storage> <KEY> text </KEY> … , a matrix with <rows>, <cols> and <data> inside.
 #include <fmt/format.h>
 
-#include <sstream>
+#include <algorithm>
 
+#include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/calibration_io/internal/opencv_storage.h"
 
 namespace spartan::internal {
@@ -39,9 +40,7 @@ class XmlReader {
     move_to(end);
     if (open_.size() < 2 || open_.size() > 3) return;
     OpencvStorage::Entry& entry = entries[open_[1]];
-    std::istringstream stream(words);
-    stream.exceptions(std::ios::badbit);  // out of memory is not the end of the text
-    for (std::string word; stream >> word;) {
+    for (std::string word : split_words(words)) {
       if (word.size() > 1 && word.front() == '"' && word.back() == '"') word = word.substr(1, word.size() - 2);
       if (open_.size() == 2 || open_[2] == "data") entry.words.push_back(word);
       if (open_.size() == 3 && open_[2] == "rows") entry.rows = word;

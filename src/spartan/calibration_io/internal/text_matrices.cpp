@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <sstream>
+#include <algorithm>
 
 #include "spartan/calibration_io/internal/calibration_text.h"
 #include "spartan/core/files.h"
@@ -29,10 +29,11 @@ TextMatrices TextMatrices::parse(const std::string& text, const std::string& nam
   TextMatrices result;
   result.name_ = name;
   result.separator_ = separator;
-  std::istringstream lines(text);
-  lines.exceptions(std::ios::badbit);  // out of memory is not the end of the text
   int number = 0;
-  for (std::string line; std::getline(lines, line);) {
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string line = text.substr(begin, end - begin);
+    begin = end + 1;
     ++number;
     const std::size_t at = line.find(separator);
     const std::string key = trimmed(line.substr(0, at));
@@ -60,9 +61,8 @@ Result<std::vector<double>> TextMatrices::numbers(const std::string& key, std::s
   const auto content = text(key);
   if (!content) return failure(content);
   std::vector<double> values;
-  std::istringstream words(*content);
-  words.exceptions(std::ios::badbit);  // out of memory is not the end of the text
-  for (std::string word; words >> word && !word.starts_with('#');) {
+  for (const std::string& word : split_words(*content)) {
+    if (word.starts_with('#')) break;
     const auto value = parse_finite_number(word);
     if (!value) return error_at(key, fmt::format("'{}' is not a finite number", word.substr(0, 40)));
     values.push_back(*value);
