@@ -1,9 +1,11 @@
 #include "fault_plan.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <unistd.h>
+#include <unwind.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -63,6 +65,20 @@ __attribute__((constructor)) void read_environment() {
   }
 }
 
+// Whether a function of GDAL is among the callers.
+bool inside_gdal() {
+  bool found = false;
+  const auto look = [](_Unwind_Context* frame, void* result) {
+    Dl_info about{};
+    if (::dladdr(reinterpret_cast<void*>(_Unwind_GetIP(frame)), &about) != 0 &&
+        std::strstr(about.dli_fname, "/libgdal") != nullptr)
+      *static_cast<bool*>(result) = true;
+    return _URC_NO_REASON;
+  };
+  _Unwind_Backtrace(look, &found);
+  return found;
+}
+
 }  // namespace
 
 PathOf::PathOf(int file) {
@@ -78,6 +94,7 @@ bool fails(Call call, const char* path, std::uint64_t bytes) {
   const std::uint64_t n = report->calls.fetch_add(1) + 1;
   if (plan.at == 0 || (plan.always ? n < plan.at : n != plan.at)) return false;
   report->injected.fetch_add(1);
+  if (call == Call::malloc && !plan.always && inside_gdal()) report->inside_gdal = 1;
   if (plan.signal != 0) {
     ::syscall(SYS_kill, ::getpid(), plan.signal);
     return false;

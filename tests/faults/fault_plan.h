@@ -14,7 +14,7 @@ namespace spartan::faults {
 enum class Call { none, malloc, open, read, write, fsync, rename };
 
 struct Report {
-  std::atomic<std::uint64_t> calls, injected, delays, clock_readings, main_reached;
+  std::atomic<std::uint64_t> calls, injected, delays, clock_readings, main_reached, inside_gdal;
 };
 
 // Constant-initialized: malloc() is called before any constructor runs.

@@ -13,8 +13,9 @@
 //   FAULT_CLOCK_S    each reading of the real-time clock is off by up to this many seconds
 //   FAULT_TRACE      file that receives every change of files below FAULT_FOLDER, in order, with its bytes
 //   FAULT_FOLDER     absolute path of that folder
-//   FAULT_REPORT     file that receives the number of calls, injected faults, delays and clock readings, and
-//                    whether main() was reached (5 x uint64); it is mapped, so the numbers survive a kill
+//   FAULT_REPORT     file that receives the number of calls, injected faults, delays and clock readings, whether
+//                    main() was reached, and whether GDAL made or caused the allocation that failed (6 x uint64); it
+//                    is mapped, so the numbers survive a kill
 //
 // Calls between functions of the C library itself cannot be intercepted; what stdio writes is traced at fclose().
 #ifndef _GNU_SOURCE

@@ -60,6 +60,7 @@ class Report:
     delays: int = 0
     clock_readings: int = 0
     main_reached: int = 0
+    inside_gdal: int = 0
 
 
 @dataclass
@@ -189,7 +190,7 @@ class Lab:
     def read_report(file):
         data = file.read_bytes() if file.exists() else b""
         file.unlink(missing_ok=True)
-        return Report(*struct.unpack("<5Q", data)) if len(data) == 40 else Report()
+        return Report(*struct.unpack("<6Q", data)) if len(data) == 48 else Report()
 
     def hashes(self, folder):
         stable = [file for file in sorted(folder.rglob("*"))

@@ -109,6 +109,20 @@ TEST(ListingHash, IsOfTheListAndNotOfThePlace) {
   EXPECT_NE(hash_of(3, "_other.png", "_right.png"), before) << "another image in the last row";
 }
 
+TEST(ListingHash, CoversSensorTablesThatAreNotYetRead) {
+  const std::string header = "stamp_ns,left_m,right_m\n";
+  const auto hash_of = [&](const std::string& table) {
+    const TemporaryFolder folder;
+    testing::write_tiny_spartan(folder, 3);
+    if (!table.empty()) folder.write("sensors/wheels.csv", table);
+    return open_tiny(folder)->listing_hash();
+  };
+  const std::uint64_t before = hash_of(header + "1,0.5,0.5\n9000000000,0.6,0.6\n");
+  EXPECT_EQ(hash_of(header + "1,0.5,0.5\n9000000000,0.6,0.6\n"), before) << "another folder";
+  EXPECT_NE(hash_of(header + "1,0.5,0.5\n"), before) << "one row shorter";
+  EXPECT_NE(hash_of(""), before) << "removed";
+}
+
 TEST(UnreadableFiles, AFrameThatCannotBeReadIsTakenByTheNextCall) {
   const TemporaryFolder folder;
   testing::write_tiny_kitti(folder, 3);

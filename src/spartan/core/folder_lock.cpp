@@ -3,9 +3,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -16,21 +19,23 @@ namespace {
 
 constexpr const char* kLockFile = "/owner.lock";
 
-// The id that the owner has written. It does so right after it has locked the file, so it is waited for, but not long:
-// its disk may be full. Empty if it is missing.
-std::string owner_of(const std::string& lock_file) {
+// The id that the owner has written into its lock file, which has no name any more when the owner is about to end. It
+// is written right after the file was locked, so it is waited for, but not long: the owner's disk may be full. Empty if
+// it is missing.
+std::string owner_of(int lock_file) {
   constexpr int kTries = 50;
   for (int i = 0; i < kTries; ++i) {
-    const auto content = read_beginning(lock_file, 32);
-    if (!content) return {};
-    if (content->ends_with('\n')) return content->substr(0, content->find_first_not_of("0123456789"));
+    std::array<char, 32> buffer{};
+    const ssize_t size = ::pread(lock_file, buffer.data(), buffer.size(), 0);
+    const std::string_view content(buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+    if (content.ends_with('\n')) return std::string(content.substr(0, content.find_first_not_of("0123456789")));
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   return {};
 }
 
-tl::unexpected<Error> in_use(const std::string& folder) {
-  const std::string owner = owner_of(folder + kLockFile);
+tl::unexpected<Error> in_use(const std::string& folder, int lock_file) {
+  const std::string owner = owner_of(lock_file);
   return failure(ErrorCode::output,
                  "is in use by another process" + (owner.empty() ? std::string() : " (id " + owner + ")"), folder,
                  "wait until it has finished, or choose another folder with -o");
@@ -61,7 +66,7 @@ Status FolderLock::expect_free(const std::string& folder) {
   const FolderLock opened(descriptor, "");
   // A shared lock is refused by an exclusive one; it ends with `opened`.
   if (::flock(descriptor, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK) return {};
-  return in_use(folder);
+  return in_use(folder, descriptor);
 }
 
 Result<FolderLock> FolderLock::acquire(const std::string& folder) {
@@ -74,7 +79,7 @@ Result<FolderLock> FolderLock::acquire(const std::string& folder) {
     do {
       error = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
     } while (error == EINTR);
-    if (error == EWOULDBLOCK) return in_use(folder);
+    if (error == EWOULDBLOCK) return in_use(folder, descriptor);
     if (error != 0) return write_failure(path, error);
     if (!has_name(descriptor, path)) continue;
     lock.path_ = path;

@@ -131,6 +131,23 @@ TEST(FolderLock, TheIdOfTheOwnerIsWaitedFor) {
   EXPECT_THAT(second.error().what, HasSubstr("(id 4711)"));
 }
 
+TEST(FolderLock, AnOwnerThatIsAboutToEndIsNamedToo) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/owner.lock";
+  const int owner = ::open(path.c_str(), O_RDWR | O_CREAT, 0644);
+  ASSERT_EQ(::flock(owner, LOCK_EX | LOCK_NB), 0);
+  std::thread ends([owner, &path] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    fs::remove(path);
+    EXPECT_EQ(::write(owner, "4711\n", 5), 5);
+  });
+  const auto second = FolderLock::acquire(folder.path());
+  ends.join();
+  ::close(owner);
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().what, HasSubstr("(id 4711)"));
+}
+
 TEST(FolderLock, AskingForTheOwnerChangesNothing) {
   const TemporaryFolder folder;
   EXPECT_TRUE(FolderLock::expect_free(folder.path()));

@@ -183,14 +183,22 @@ class IndexedSource : public FrameSource {
   std::uint64_t listing_hash() const override {
     Hash64 hash;
     const auto add = [&hash](std::string_view text) { hash.add(text.data(), text.size()); };
+    const auto inside = [this](const std::string& file) {
+      return fs::path(file).lexically_relative(index_.info.path).string();
+    };
     add(name_of(index_.info.format));
     for (const FrameEntry& entry : index_.frames) {
       add(entry.pair);
       for (const Stamp stamp : {entry.left_stamp, entry.right_stamp}) hash.add(static_cast<std::uint64_t>(stamp.ns));
-      for (const std::string* file : {&entry.left_file, &entry.right_file})
-        add(file->empty() ? "" : fs::path(*file).lexically_relative(index_.info.path).string());
+      for (const std::string* file : {&entry.left_file, &entry.right_file}) add(file->empty() ? "" : inside(*file));
       for (const double value : {entry.pan_rad, entry.tilt_rad, entry.exposure_us, entry.gain})
         hash.add(std::bit_cast<std::uint64_t>(value));
+    }
+    for (const std::string& file : index_.sensor_files) {
+      std::error_code error;
+      const std::uintmax_t bytes = fs::file_size(file, error);
+      add(inside(file));
+      hash.add(static_cast<std::uint64_t>(error ? 0 : bytes));
     }
     return hash.value();
   }

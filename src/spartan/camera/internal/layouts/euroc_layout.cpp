@@ -129,6 +129,7 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
     const auto about = read_imu((folder / "imu0" / "sensor.yaml").string());
     if (!about) return failure(about);
     index.info.noise.imu = about->noise;
+    index.sensor_files.push_back(imu.string());
     index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(about->body_from_imu));
   }
   return index;

@@ -103,6 +103,7 @@ Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOpt
   // Without the IMU-to-camera calibration the body frame is the left camera and the orientation of the IMU is unknown.
   const bool body_is_imu = index.info.rig.convention == PoseConvention::body;
   if (const fs::path oxts = folder / "oxts"; body_is_imu && fs::exists(oxts / "timestamps.txt", error)) {
+    index.sensor_files.push_back((oxts / "timestamps.txt").string());
     index.imu = [oxts]() -> Result<std::unique_ptr<SampleStream>> {
       auto stamps = read_stamps((oxts / "timestamps.txt").string());
       if (!stamps) return failure(stamps);

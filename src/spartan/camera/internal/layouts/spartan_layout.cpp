@@ -49,6 +49,7 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   const auto stream = [&](const char* name, const char* header, std::size_t fields,
                           const RowReader& reader) -> SampleStreamFactory {
     if (!fs::exists(sensors / name, error)) return {};
+    index.sensor_files.push_back((sensors / name).string());
     return stream_of_table((sensors / name).string(), {.separator = ',', .header = header, .ends_with_newline = true},
                            fields, reader);
   };
