@@ -165,16 +165,16 @@ class Trace:
         self.durable_frames = {end: self._frames_at(end) for end in syncs}
 
     def _frames_at(self, end):
-        folder = self.rebuild(end)
+        folder = self.rebuild(end, keep=lambda: False)
         frames = frames_in(folder)
         self.lab.clean(folder)
         return frames
 
-    def rebuild(self, end):
-        """Everything up to a change, nothing lost."""
+    def rebuild(self, end, keep=None):
+        """Everything up to a change: nothing lost, or only that part of what was not synced which `keep` keeps."""
         changes, folder = self.changes[:end], self.lab.new_folder("whole")
-        files = surviving_files(changes, None)
-        names, folders = surviving_names(changes, lambda: True)
+        files = surviving_files(changes, keep)
+        names, folders = surviving_names(changes, keep or (lambda: True))
         build(folder, files, names, folders)
         return folder
 

@@ -57,6 +57,24 @@ std::string folder_of(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
+Status flush_and_rename(const std::string& temporary, const std::string& path) {
+  const int opened = ::open(temporary.c_str(), O_WRONLY | O_CLOEXEC);
+  if (opened < 0) return write_failure(path, errno);
+  const int error = ::fsync(opened) == 0 ? 0 : errno;
+  ::close(opened);
+  if (error != 0) return write_failure(path, error);
+  if (::rename(temporary.c_str(), path.c_str()) != 0) return write_failure(path, errno);
+  return sync_folder(folder_of(path));
+}
+
+// A rename would replace a FIFO or a device, even /dev/null.
+Status expect_replaceable(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode)) return {};
+  if (S_ISDIR(status.st_mode)) return write_failure(path, EISDIR);
+  return failure(ErrorCode::output, "is not a regular file and is not replaced", path, "choose another path with -o");
+}
+
 }  // namespace
 
 tl::unexpected<Error> write_failure(const std::string& path, int error) {
@@ -190,23 +208,23 @@ Status write_file_atomically(const std::string& path, std::string_view content) 
 
 Status write_files_atomically(const std::vector<NewFile>& files) {
   std::vector<std::string> temporaries;
-  const auto abort_with = [&](const std::string& path, int error) {
+  const auto abandoned = [&](Status status) {
     for (const std::string& temporary : temporaries) ::unlink(temporary.c_str());
-    return write_failure(path, error);
+    return status;
   };
   for (const NewFile& file : files) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(file.path, ignored)) return abort_with(file.path, EISDIR);
+    if (Status replaceable = expect_replaceable(file.path); !replaceable) return abandoned(std::move(replaceable));
     const std::string temporary = temporary_name(file.path);
     const int opened = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (opened < 0) return abort_with(file.path, errno);
+    if (opened < 0) return abandoned(write_failure(file.path, errno));
     temporaries.push_back(temporary);
     int error = write_all(opened, file.content);
     if (::close(opened) != 0 && error == 0) error = errno;
-    if (error != 0) return abort_with(file.path, error);
+    if (error != 0) return abandoned(write_failure(file.path, error));
   }
   for (std::size_t i = 0; i < files.size(); ++i) {
-    if (::rename(temporaries[i].c_str(), files[i].path.c_str()) != 0) return abort_with(files[i].path, errno);
+    if (::rename(temporaries[i].c_str(), files[i].path.c_str()) != 0)
+      return abandoned(write_failure(files[i].path, errno));
   }
   std::vector<std::string> folders;
   folders.reserve(files.size());
@@ -220,13 +238,10 @@ Status write_files_atomically(const std::vector<NewFile>& files) {
 }
 
 Status publish_file(const std::string& temporary, const std::string& path) {
-  const int opened = ::open(temporary.c_str(), O_WRONLY | O_CLOEXEC);
-  if (opened < 0) return write_failure(path, errno);
-  const int error = ::fsync(opened) == 0 ? 0 : errno;
-  ::close(opened);
-  if (error != 0) return write_failure(path, error);
-  if (::rename(temporary.c_str(), path.c_str()) != 0) return write_failure(path, errno);
-  return sync_folder(folder_of(path));
+  Status status = expect_replaceable(path);
+  if (status) status = flush_and_rename(temporary, path);
+  if (!status) ::unlink(temporary.c_str());
+  return status;
 }
 
 Status sync_folder(const std::string& path) {

@@ -65,7 +65,7 @@ void remove_temporary_files(const std::string& folder);
 
 /// Writes to a temporary file in the same folder, flushes it to the disk (fsync), renames it and flushes the folder: a
 /// reader sees either the old content or the complete new one, also after a loss of power. Codes with the path:
-/// `output` (permission, disk full, size limit), `resources`.
+/// `output` (permission, disk full, size limit; `path` is a folder, a FIFO or a device), `resources`.
 Status write_file_atomically(const std::string& path, std::string_view content);
 
 /// A file to write.
@@ -81,7 +81,8 @@ Status write_files_atomically(const std::vector<NewFile>& files);
 /// memory or file descriptors ran out, else `output`.
 tl::unexpected<Error> write_failure(const std::string& path, int error_number);
 
-/// Flushes a finished temporary file, renames it to `path` and flushes the folder. Codes as write_file_atomically().
+/// Flushes a finished temporary file, renames it to `path` and flushes the folder; the temporary file is removed if
+/// that fails. Codes as write_file_atomically().
 Status publish_file(const std::string& temporary, const std::string& path);
 
 /// Flushes to the disk that files of the folder were created, renamed or removed. Where the folder may not be opened

@@ -1,7 +1,9 @@
 #include "spartan/core/files.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <csignal>
 #include <filesystem>
@@ -12,6 +14,7 @@ namespace spartan {
 namespace {
 
 using testing::content_of;
+using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
 std::size_t entries(const std::string& folder) {
@@ -121,6 +124,28 @@ TEST(Files, CreatesFoldersWithParents) {
     ASSERT_FALSE(status) << path;
     EXPECT_EQ(status.error().code, ErrorCode::output);
   }
+}
+
+TEST(Files, OnlyRegularFilesAreReplaced) {
+  const TemporaryFolder folder;
+  const std::string fifo = folder.path() + "/fifo", other = folder.path() + "/other";
+  const std::string device = folder.path() + "/device";  // a link, since a failing test must not replace the device
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  std::filesystem::create_symlink("/dev/null", device);
+  for (const std::string& path : {fifo, device}) {
+    const Status written = write_files_atomically({{other, "x"}, {path, "x"}});
+    ASSERT_FALSE(written) << path;
+    EXPECT_EQ(written.error().code, ErrorCode::output);
+    EXPECT_THAT(written.error().message(), HasSubstr(path + ": is not a regular file"));
+    const std::string temporary = folder.write("new.part", "x");
+    EXPECT_FALSE(publish_file(temporary, path));
+    EXPECT_FALSE(std::filesystem::exists(temporary)) << path;
+    EXPECT_FALSE(std::filesystem::is_regular_file(path)) << path;
+  }
+  EXPECT_FALSE(std::filesystem::exists(other)) << "and its temporary file is removed";
+  std::filesystem::create_symlink("nowhere", other);
+  EXPECT_TRUE(write_file_atomically(other, "x")) << "a link is replaced";
+  EXPECT_TRUE(std::filesystem::is_regular_file(other));
 }
 
 }  // namespace

@@ -37,6 +37,20 @@ TEST(Pose, ObeysGroupLaws) {
   testing::expect_group_laws<Pose, 6>(group, tricky_tangents(), 2e-8);
 }
 
+TEST(Similarity, IsScaleRotationAndTranslation) {
+  const Similarity s{2.5, exp_se3((Vector6d() << 1, -2, 3, 0.2, -0.4, 0.3).finished())};
+  const Eigen::Vector3d point(0.7, -0.2, 0.4);
+  Eigen::Matrix4d matrix = s.pose.matrix();
+  matrix.topLeftCorner<3, 3>() *= 2.5;
+  EXPECT_LE((s * point - (matrix * point.homogeneous()).head<3>()).norm(), 1e-12);
+  const Pose other = exp_se3((Vector6d() << 0.3, 0.1, -2, -0.5, 0.1, 0.2).finished());
+  EXPECT_LE(((s * other).translation() - s * other.translation()).norm(), 1e-12);
+  EXPECT_LE(((s * other).rotation().toRotationMatrix() -
+             s.pose.rotation().toRotationMatrix() * other.rotation().toRotationMatrix())
+                .norm(),
+            1e-12);
+}
+
 TEST(Pose, AdjointTransportsAPerturbation) {
   Random random(3);
   for (const Vector6d& tangent : tricky_tangents()) {

@@ -76,6 +76,14 @@ TEST(Rig, EveryKindOfFaultIsFound) {
               r.cameras[0].model = PinholeModel{500, 500, kNan, 0};
             }),
             Keys{"cameras.left.centre_px"});
+  EXPECT_EQ(faults_after([](Rig& r) {
+              r.cameras[0].model = CahvorModel({}, {0, 0, 1.01}, {0, 0.1, 0});
+            }),
+            Keys{"cameras.left.optical_axis"});
+  EXPECT_EQ(faults_after([](Rig& r) {
+              r.cameras[0].model = DoubleSphereModel{{}, 0, -0.1};
+            }),
+            Keys{"cameras.left.alpha"});
   EXPECT_EQ(faults_after([](Rig& r) { r.cameras[0].pixel_format.bits = 17; }), Keys{"cameras.left.bits"});
   EXPECT_EQ(faults_after([](Rig& r) {
               r.cameras[0].mount_from_camera = Pose::from_translation({kNan, 0, 0});

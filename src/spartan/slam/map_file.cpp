@@ -45,8 +45,8 @@ Status MapFile::save(GlobalMap& map, const std::string& path) {
   std::error_code ignored;
   fs::remove(temporary, ignored);
   Status status = write(map, temporary);
-  if (status) status = publish_file(temporary, path);
-  if (!status) fs::remove(temporary, ignored);
+  if (status) return publish_file(temporary, path);
+  fs::remove(temporary, ignored);
   return status;
 }
 

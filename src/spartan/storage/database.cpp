@@ -17,7 +17,9 @@ Error error_of(sqlite3* db, const std::string& path) {
   const int code = db == nullptr ? SQLITE_NOMEM : sqlite3_extended_errcode(db);
   const std::string what = db == nullptr ? "out of memory" : sqlite3_errmsg(db);
   const bool only_read = db != nullptr && sqlite3_db_readonly(db, "main") == 1;
-  if (code == SQLITE_IOERR_READ || code == SQLITE_IOERR_FSTAT || (only_read && (code & 0xFF) == SQLITE_IOERR))
+  // CORRUPTFS: what SQLite makes of EIO, ENXIO and ERANGE while it reads.
+  if (code == SQLITE_IOERR_READ || code == SQLITE_IOERR_CORRUPTFS || code == SQLITE_IOERR_FSTAT ||
+      (only_read && (code & 0xFF) == SQLITE_IOERR))
     return {ErrorCode::read_error, "cannot be read: " + what, path, "try again, or check the disk"};
   const int system_error = db == nullptr ? ENOMEM : sqlite3_system_errno(db);
   if ((code & 0xFF) == SQLITE_NOMEM || code == SQLITE_IOERR_NOMEM ||

@@ -170,5 +170,13 @@ TEST(Database, ANameThatLooksLikeAUriIsAPath) {
   EXPECT_TRUE(read) << read.error().message();
 }
 
+// /proc/self/mem is a regular file; read() answers with EIO.
+TEST(Database, AFileThatCannotBeReadIsAnErrorOfReading) {
+  const auto db = Database::open("/proc/self/mem", Database::Mode::read_only);
+  ASSERT_FALSE(db);
+  EXPECT_EQ(db.error().code, ErrorCode::read_error) << db.error().message();
+  EXPECT_NE(db.error().message().find("/proc/self/mem: cannot be read"), std::string::npos) << db.error().message();
+}
+
 }  // namespace
 }  // namespace spartan

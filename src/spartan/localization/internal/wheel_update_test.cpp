@@ -1,0 +1,74 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "spartan/localization/internal/drive_test.h"
+
+namespace spartan::internal {
+namespace {
+
+constexpr double kTrack_m = 0.5, kWheelPeriod_s = 0.5;
+
+double yaw_of(const Pose& pose) {
+  const Eigen::Vector3d ahead = pose.rotation() * Eigen::Vector3d::UnitX();
+  return std::atan2(ahead.y(), ahead.x());
+}
+
+// A winding drive in the plane, measured by both wheels and the inclinometer only.
+std::vector<Measurement> turning_wheels(const TestDrive& drive, double seconds) {
+  std::vector<Measurement> samples;
+  double rolled = 0;
+  for (int i = 0; i <= static_cast<int>(seconds / kWheelPeriod_s); ++i) {
+    const double t = i * kWheelPeriod_s;
+    rolled += (drive.at(t).translation() - drive.at(t - kWheelPeriod_s).translation()).norm();
+    const double half = 0.5 * kTrack_m * yaw_of(drive.at(t));
+    samples.emplace_back(WheelSample{test_stamp(t), rolled - half, rolled + half});
+    samples.emplace_back(InclinometerSample{test_stamp(t), 0, 0, 0.0035});
+  }
+  return samples;
+}
+
+LocalizationOptions wheel_options() {
+  LocalizationOptions options = test_options();
+  options.wheels.track_m = kTrack_m;
+  options.wheels.max_step_s = 2 * kWheelPeriod_s;
+  options.constant_velocity.turn_floor_rad_s = 0.2;  // the wheels are the source of the rotation
+  return options;
+}
+
+UncertainPose end_of(const TestDrive& drive, double seconds, const LocalizationOptions& options) {
+  return driven(options, turning_wheels(drive, seconds)).estimate().world_from_body;
+}
+
+TestDrive flat_drive() {
+  TestDrive drive;
+  drive.relief_m = drive.roll_rad = 0;
+  return drive;
+}
+
+// Steps of two samples end at 3.5 s, 4.5 s …
+TEST(WheelUpdate, DifferenceOfTheWheelsIsARotation) {
+  const TestDrive drive = flat_drive();
+  for (const double seconds : {4.5, 12.5, 44.5}) {
+    LocalizationOptions options = wheel_options();
+    const double truth = yaw_of(drive.at(seconds));
+    ASSERT_GT(truth, 0.04);
+    EXPECT_NEAR(yaw_of(end_of(drive, seconds, options).pose), truth, 0.08 * truth) << seconds;
+    options.wheels.use_rotation = false;
+    EXPECT_EQ(yaw_of(end_of(drive, seconds, options).pose), 0) << seconds;
+  }
+}
+
+TEST(WheelUpdate, RotationIsAsUncertainAsTheWheels) {
+  TestDrive straight = flat_drive();
+  straight.swing_m = 0;
+  const LocalizationOptions options = wheel_options();
+  const double length = straight.travelled(3.5);  // of the first step
+  const double forward = std::hypot(options.wheels.min_sigma_m, options.wheels.forward_share * length);
+  const double yaw = std::sqrt(2.0) * forward / kTrack_m;  // of two wheels with that error each
+  EXPECT_NEAR(std::sqrt(end_of(straight, 3.5, options).covariance(5, 5)), yaw, 0.02 * yaw);
+}
+
+}  // namespace
+}  // namespace spartan::internal
