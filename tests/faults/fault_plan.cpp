@@ -70,6 +70,7 @@ bool inside_gdal() {
   bool found = false;
   const auto look = [](_Unwind_Context* frame, void* result) {
     Dl_info about{};
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): libgcc gives addresses as numbers
     if (::dladdr(reinterpret_cast<void*>(_Unwind_GetIP(frame)), &about) != 0 &&
         std::strstr(about.dli_fname, "/libgdal") != nullptr)
       *static_cast<bool*>(result) = true;
