@@ -1,12 +1,14 @@
 #include "fault_plan.h"
 
 #include <dlfcn.h>
+#include <execinfo.h>
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <unistd.h>
-#include <unwind.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -67,17 +69,12 @@ __attribute__((constructor)) void read_environment() {
 
 // Whether a function of GDAL is among the callers.
 bool inside_gdal() {
-  bool found = false;
-  const auto look = [](_Unwind_Context* frame, void* result) {
+  std::array<void*, 128> callers{};
+  const int count = ::backtrace(callers.data(), static_cast<int>(callers.size()));
+  return std::any_of(callers.begin(), callers.begin() + count, [](const void* caller) {
     Dl_info about{};
-    // NOLINTNEXTLINE(performance-no-int-to-ptr): libgcc gives addresses as numbers
-    if (::dladdr(reinterpret_cast<void*>(_Unwind_GetIP(frame)), &about) != 0 &&
-        std::strstr(about.dli_fname, "/libgdal") != nullptr)
-      *static_cast<bool*>(result) = true;
-    return _URC_NO_REASON;
-  };
-  _Unwind_Backtrace(look, &found);
-  return found;
+    return ::dladdr(caller, &about) != 0 && std::strstr(about.dli_fname, "/libgdal") != nullptr;
+  });
 }
 
 }  // namespace
