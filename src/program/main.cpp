@@ -1,13 +1,16 @@
 // The program `spartan`: reads the command line and runs the command that it names.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
+#include <string_view>
 
 #include "program/commands.h"
 #include "program/context.h"
@@ -112,12 +115,31 @@ int exit_code_of(const std::exception& e) {
   return kInternalFault;
 }
 
+// Memory may also run out in a function that must not throw, e.g. a destructor. The exception then ends here, where
+// nothing may be allocated, and not in main().
+[[noreturn]] void end_by_exception() noexcept {
+  constexpr std::string_view kMessage =
+      "error: out of memory: free memory, or use smaller images, a smaller disparity range or fewer threads; --resume "
+      "continues a run\n";
+  try {
+    if (const std::exception_ptr exception = std::current_exception()) std::rethrow_exception(exception);
+  } catch (const std::bad_alloc&) {
+    // Nothing can be done about a message that cannot be written.
+    [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kMessage.data(), kMessage.size());
+    std::_Exit(exit_code(ErrorCode::resources));
+  } catch (const std::exception& e) {
+    exit_code_of(e);
+  }
+  std::abort();
+}
+
 }  // namespace
 }  // namespace spartan::program
 
 int main(int argc, char** argv) {
   spartan::program::reserve_standard_streams();
   spartan::program::ignore_write_signals();
+  std::set_terminate(spartan::program::end_by_exception);
   try {
     return spartan::program::run(argc, argv);
   } catch (const std::exception& e) {

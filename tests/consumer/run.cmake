@@ -27,7 +27,7 @@ run("${prefix}/bin/spartan" --help)
 
 # Camera models alone: none of these packages may be needed.
 set(hidden)
-foreach(package OpenCV GDAL SQLite3 embree libjpeg-turbo hwy nlohmann_json)
+foreach(package OpenCV PNG GDAL SQLite3 embree libjpeg-turbo hwy nlohmann_json)
   list(APPEND hidden "-DCMAKE_DISABLE_FIND_PACKAGE_${package}=TRUE")
 endforeach()
 build("${WORK}/source/rig" "${WORK}/build_rig" ${hidden})

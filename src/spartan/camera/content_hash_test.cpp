@@ -101,7 +101,7 @@ TEST(ListingHash, IsOfTheListAndNotOfThePlace) {
     std::string text = testing::content_of(folder.path() + "/frames.csv");
     if (!what.empty()) text.replace(text.rfind(what), what.size(), with);
     folder.write("frames.csv", text);
-    return open_tiny(folder)->listing_hash();
+    return open_tiny(folder)->listing_hash().value();
   };
   const std::uint64_t before = hash_of(3, "", "");
   EXPECT_EQ(hash_of(3, "", ""), before) << "another folder";
@@ -115,11 +115,12 @@ TEST(ListingHash, CoversSensorTablesThatAreNotYetRead) {
     const TemporaryFolder folder;
     testing::write_tiny_spartan(folder, 3);
     if (!table.empty()) folder.write("sensors/wheels.csv", table);
-    return open_tiny(folder)->listing_hash();
+    return open_tiny(folder)->listing_hash().value();
   };
   const std::uint64_t before = hash_of(header + "1,0.5,0.5\n9000000000,0.6,0.6\n");
   EXPECT_EQ(hash_of(header + "1,0.5,0.5\n9000000000,0.6,0.6\n"), before) << "another folder";
   EXPECT_NE(hash_of(header + "1,0.5,0.5\n"), before) << "one row shorter";
+  EXPECT_NE(hash_of(header + "1,0.5,0.5\n9000000000,0.6,0.7\n"), before) << "another value, of the same length";
   EXPECT_NE(hash_of(""), before) << "removed";
 }
 

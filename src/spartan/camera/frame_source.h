@@ -104,9 +104,9 @@ class FrameSource {
   virtual UnreadableRows unreadable_sensor_rows() const = 0;
 
   /// Hash of the layout, of all listed frames, with their stamps and the names of their files inside the recording, and
-  /// of the names and sizes of the sensor tables. Identifies a recording without reading its images or tables, wherever
-  /// its folder is.
-  virtual std::uint64_t listing_hash() const = 0;
+  /// of the names and bytes of the sensor tables. Identifies a recording without reading its images, wherever its
+  /// folder is. Codes: `read_error`, `resources` (a table cannot be read).
+  virtual Result<std::uint64_t> listing_hash() const = 0;
 
   /// Hash of everything taken so far by next() or seek(): bytes of the image files, values of sensor samples. A resumed
   /// run compares it to detect that the recording was changed.

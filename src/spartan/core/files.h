@@ -99,6 +99,7 @@ class FolderLock {
   /// Codes: `output` if another process owns the folder (its id is named) or the file cannot be written, `resources`.
   static Result<FolderLock> acquire(const std::string& folder);
   /// The error of acquire() if another process owns the folder; nothing if none does. Changes nothing in the folder.
+  /// An empty folder is watched for half a second: the process that created it may be about to lock it.
   static Status expect_free(const std::string& folder);
 
   FolderLock() = default;  ///< owns nothing

@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -19,19 +20,26 @@ namespace {
 
 constexpr const char* kLockFile = "/owner.lock";
 
+// What another process does in a moment is waited for: kTries times kPause.
+constexpr int kTries = 50;
+constexpr std::chrono::milliseconds kPause(10);
+
+// The id of a process in a lock file; empty if it is missing.
+std::string id_in(int lock_file) {
+  std::array<char, 32> buffer{};
+  const ssize_t size = ::pread(lock_file, buffer.data(), buffer.size(), 0);
+  const std::string_view content(buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+  return content.ends_with('\n') ? std::string(content.substr(0, content.find_first_not_of("0123456789")))
+                                 : std::string();
+}
+
 // The id that the owner has written into its lock file, which has no name any more when the owner is about to end. It
 // is written right after the file was locked, so it is waited for, but not long: the owner's disk may be full. Empty if
 // it is missing.
 std::string owner_of(int lock_file) {
-  constexpr int kTries = 50;
-  for (int i = 0; i < kTries; ++i) {
-    std::array<char, 32> buffer{};
-    const ssize_t size = ::pread(lock_file, buffer.data(), buffer.size(), 0);
-    const std::string_view content(buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-    if (content.ends_with('\n')) return std::string(content.substr(0, content.find_first_not_of("0123456789")));
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return {};
+  std::string id;
+  for (int i = 0; i < kTries && (id = id_in(lock_file)).empty(); ++i) std::this_thread::sleep_for(kPause);
+  return id;
 }
 
 tl::unexpected<Error> in_use(const std::string& folder, int lock_file) {
@@ -61,17 +69,26 @@ Status write_owner(int descriptor, const std::string& path) {
 
 Status FolderLock::expect_free(const std::string& folder) {
   const std::string path = folder + kLockFile;
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor < 0) return {};
-  const FolderLock opened(descriptor, "");
-  // A shared lock is refused by an exclusive one; it ends with `opened`.
-  if (::flock(descriptor, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK) return {};
-  return in_use(folder, descriptor);
+  for (int i = 0; i < kTries; ++i) {
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    std::error_code error;
+    if (descriptor < 0 && !std::filesystem::is_empty(folder, error)) return {};
+    if (descriptor >= 0) {
+      const FolderLock opened(descriptor, "");
+      // A shared lock is refused by an exclusive one; it ends with `opened`.
+      if (::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK) return in_use(folder, descriptor);
+      if (!id_in(descriptor).empty()) return {};  // left by a process that was killed
+    }
+    // Another process has created the folder or the file, and is about to lock it.
+    std::this_thread::sleep_for(kPause);
+  }
+  return {};
 }
 
 Result<FolderLock> FolderLock::acquire(const std::string& folder) {
+  constexpr int kLocks = 5;  // expect_free() of another process may hold its lock for a moment
   const std::string path = folder + kLockFile;
-  for (;;) {
+  for (int refused = 0;;) {
     const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
     if (descriptor < 0) return write_failure(path, errno);
     FolderLock lock(descriptor, "");  // removes nothing yet
@@ -79,6 +96,10 @@ Result<FolderLock> FolderLock::acquire(const std::string& folder) {
     do {
       error = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
     } while (error == EINTR);
+    if (error == EWOULDBLOCK && ++refused < kLocks) {
+      std::this_thread::sleep_for(kPause);
+      continue;
+    }
     if (error == EWOULDBLOCK) return in_use(folder, descriptor);
     if (error != 0) return write_failure(path, error);
     if (!has_name(descriptor, path)) continue;

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <optional>
 #include <thread>
 
 #include "spartan/core/files.h"
@@ -137,7 +138,7 @@ TEST(FolderLock, AnOwnerThatIsAboutToEndIsNamedToo) {
   const int owner = ::open(path.c_str(), O_RDWR | O_CREAT, 0644);
   ASSERT_EQ(::flock(owner, LOCK_EX | LOCK_NB), 0);
   std::thread ends([owner, &path] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
     fs::remove(path);
     EXPECT_EQ(::write(owner, "4711\n", 5), 5);
   });
@@ -146,6 +147,33 @@ TEST(FolderLock, AnOwnerThatIsAboutToEndIsNamedToo) {
   ::close(owner);
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error().what, HasSubstr("(id 4711)"));
+}
+
+TEST(FolderLock, TheProcessThatCreatedTheFolderIsWaitedFor) {
+  const TemporaryFolder folder;
+  std::optional<FolderLock> lock;
+  std::thread late([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    lock = FolderLock::acquire(folder.path()).value();
+  });
+  const Status owned = FolderLock::expect_free(folder.path());
+  late.join();
+  ASSERT_FALSE(owned);
+  EXPECT_THAT(owned.error().what, HasSubstr("(id " + std::to_string(::getpid()) + ")"));
+}
+
+TEST(FolderLock, IsNotRefusedForAnotherProcessThatOnlyLooks) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/owner.lock";
+  const int other = ::open(path.c_str(), O_RDWR | O_CREAT, 0644);
+  ASSERT_EQ(::flock(other, LOCK_SH | LOCK_NB), 0);
+  std::thread looks([other] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(15));
+    ::close(other);
+  });
+  const auto lock = FolderLock::acquire(folder.path());
+  looks.join();
+  EXPECT_TRUE(lock) << lock.error().message();
 }
 
 TEST(FolderLock, AskingForTheOwnerChangesNothing) {

@@ -1,13 +1,17 @@
 // Image size from the header of an image file, without decoding it.
 
+#include <algorithm>
 #include <cstdint>
-#include <sstream>
 #include <string_view>
 
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
+#include "spartan/image_io/internal/pnm_file.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 using std::string_view_literals::operator""sv;
@@ -46,20 +50,9 @@ ImageSize jpeg_size(std::string_view head) {
   return {};
 }
 
-// "P5 # comment\n<width> <height> …"
-ImageSize pnm_size(std::string_view head) {
-  std::string words;
-  for (std::size_t i = 2; i < head.size(); ++i) {
-    if (head[i] == '#') i = std::min(head.find('\n', i), head.size() - 1);
-    words += head[i];
-    if (words.size() > 64) break;
-  }
-  std::istringstream numbers(words);
-  numbers.exceptions(std::ios::badbit);  // out of memory is not the end of the text
-  ImageSize size;
-  numbers >> size.width >> size.height;
-  if (!numbers || size.width > kLargestSide || size.height > kLargestSide) return {};
-  return size;
+ImageSize pnm_size(const PnmHeader& header) {
+  if (std::max(header.width, header.height) > static_cast<std::size_t>(kLargestSide)) return {};
+  return {static_cast<int>(header.width), static_cast<int>(header.height)};
 }
 
 }  // namespace
@@ -73,7 +66,7 @@ std::optional<ImageSize> parse_image_size(std::string_view head) {
   ImageSize size;
   if (head.starts_with("\x89PNG\r\n\x1a\n"sv)) size = png_size(head);
   if (head.starts_with("\xFF\xD8"sv)) size = jpeg_size(head);
-  if (head.starts_with("P5"sv) || head.starts_with("P6"sv)) size = pnm_size(head);
+  if (const auto pnm = parse_pnm_header(head)) size = pnm_size(*pnm);
   if (size.empty()) return std::nullopt;
   return size;
 }

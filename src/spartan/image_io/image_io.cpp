@@ -1,20 +1,20 @@
 #include "spartan/image_io/image_io.h"
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <new>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "spartan/core/files.h"
 #include "spartan/image_io/internal/image_file_check.h"
 #include "spartan/image_io/internal/jpeg_file.h"
-#include "spartan/image_io/opencv_bridge.h"
+#include "spartan/image_io/internal/png_file.h"
+#include "spartan/image_io/internal/pnm_file.h"
 
 namespace spartan {
 
@@ -25,71 +25,53 @@ namespace {
 bool is_jpeg(std::string_view content) {
   return content.starts_with("\xFF\xD8");
 }
-
-cv::Mat decode(const std::string& content, int flags) {
-  const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8UC1, const_cast<char*>(content.data()));
-  try {
-    return cv::imdecode(bytes, flags);
-  } catch (const cv::Exception& e) {
-    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
-    return {};
-  }
+bool is_pnm(std::string_view content) {
+  return content.starts_with('P');
 }
 
-// The decoders report a failed allocation as a damaged file. So a decoder that fails gets a second try, after this much
+// The JPEG decoder reports a failed allocation as a damaged file. So if it fails it gets a second try, after this much
 // memory was seen to be there: what fails again is damaged. Throws std::bad_alloc if it is not there.
 constexpr std::size_t kDecoderMemory_bytes = std::size_t{64} << 20U;
 
-template <class Decode>
-auto decode_with_second_try(const Decode& decode_once) {
-  auto image = decode_once();
+Result<FrameImage> decode_jpeg_file(const std::string& content, JpegColour colour) {
+  auto image = decode_jpeg(content, colour);
   if (image) return image;
   {
     std::vector<std::uint8_t> probe(kDecoderMemory_bytes);
     static_cast<volatile std::uint8_t&>(probe.back()) = 1;  // keeps the compiler from removing the allocation
   }
-  return decode_once();
+  return decode_jpeg(content, colour);
 }
 
-Result<cv::Mat> decode_png_or_pnm(const std::string& content, int flags) {
-  return decode_with_second_try([&]() -> Result<cv::Mat> {
-    cv::Mat mat = decode(content, flags);
-    if (mat.empty()) return failure(ErrorCode::input, "is damaged or cannot be decoded");
-    return mat;
-  });
-}
-
-Result<FrameImage> decode_jpeg_file(const std::string& content, JpegColour colour) {
-  return decode_with_second_try([&] { return decode_jpeg(content, colour); });
+// The upper 8 of 16 bits; the luma of colour (Rec. 601) with weights of 14 bits.
+Image<std::uint8_t> gray8_of(const FrameImage& image) {
+  Image<std::uint8_t> gray(image.size());
+  const auto convert = [&gray](const auto& view, const auto& value_of) {
+    for (int y = 0; y < gray.height(); ++y)
+      std::transform(view.row(y), view.row(y) + view.width(), gray.row(y), value_of);
+  };
+  constexpr auto kUpper = [](std::uint16_t value) { return static_cast<std::uint8_t>(value >> 8U); };
+  constexpr auto kLuma = [](unsigned r, unsigned g, unsigned b) {
+    return static_cast<std::uint8_t>((4899 * r + 9617 * g + 1868 * b + 8192) >> 14U);
+  };
+  const bool deep = image.format().bits > 8;
+  if (image.format().layout == PixelLayout::gray && deep) {
+    convert(image.as<std::uint16_t>(), kUpper);
+  } else if (image.format().layout == PixelLayout::gray) {
+    convert(image.as<std::uint8_t>(), [](std::uint8_t value) { return value; });
+  } else if (deep) {
+    convert(image.as<Rgb16>(), [&](const Rgb16& p) { return kLuma(kUpper(p.r), kUpper(p.g), kUpper(p.b)); });
+  } else {
+    convert(image.as<Rgb8>(), [&](const Rgb8& p) { return kLuma(p.r, p.g, p.b); });
+  }
+  return gray;
 }
 
 template <class Pixel>
-FrameImage own(cv::Mat& mat, PixelLayout layout) {
-  return FrameImage::own(Image<Pixel>::copy_of(as_view<Pixel>(mat)),
-                         {layout, mat.depth() == CV_16U ? 16 : 8, BitAlignment::low});
-}
-
-Result<std::string> png_of(const cv::Mat& mat) {
-  std::vector<std::uint8_t> png;
-  try {
-    // The encoder fails for a failed allocation only, with false or an assertion: size and type of the image are valid.
-    if (!cv::imencode(".png", mat, png)) throw std::bad_alloc();
-  } catch (const cv::Exception& e) {
-    if (e.code == cv::Error::StsNoMem || e.code == cv::Error::StsAssert) throw std::bad_alloc();
-    return failure(ErrorCode::internal, "cannot encode the image as PNG: " + e.msg);
-  }
-  return std::string(png.begin(), png.end());
-}
-
-Result<std::string> png_of_rgb(const cv::Mat& rgb) {
-  cv::Mat bgr;
-  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  return png_of(bgr);
-}
-
-Status write_encoded(const std::string& path, const Result<std::string>& png) {
-  if (!png) return failure(ErrorCode::internal, png.error().what, path);
-  return write_file_atomically(path, *png);
+std::string png_of(const ImageView<const Pixel>& image) {
+  constexpr bool kRgb = std::is_same_v<Pixel, Rgb8> || std::is_same_v<Pixel, Rgb16>;
+  return internal::encode_png({image.data(), image.size(), static_cast<std::size_t>(image.stride()) * sizeof(Pixel),
+                               static_cast<int>(8 * sizeof(Pixel) / (kRgb ? 3 : 1)), kRgb});
 }
 
 // The next word of the PFM header "Pf\n<width> <height>\n<scale>\n"; removes it and its separator from `rest`.
@@ -120,22 +102,9 @@ Result<FrameImage> decode_image(const std::string& content, const std::string& n
     if (!image) return failure(image.error().code, image.error().what, name, hint);
     return image;
   }
-  const auto decoded = decode_png_or_pnm(content, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
-  if (!decoded) return failure(decoded.error().code, decoded.error().what, name, hint);
-  cv::Mat mat = *decoded;
-  if (mat.channels() == 3) cv::cvtColor(mat, mat, cv::COLOR_BGR2RGB);
-  switch (mat.type()) {
-    case CV_8UC1:
-      return own<std::uint8_t>(mat, PixelLayout::gray);
-    case CV_16UC1:
-      return own<std::uint16_t>(mat, PixelLayout::gray);
-    case CV_8UC3:
-      return own<Rgb8>(mat, PixelLayout::rgb);
-    case CV_16UC3:
-      return own<Rgb16>(mat, PixelLayout::rgb);
-    default:
-      return failure(ErrorCode::input, "has neither 8 nor 16 bits per sample", name);
-  }
+  auto image = is_pnm(content) ? decode_pnm(content) : decode_png(content, PngColour::as_stored);
+  if (!image) return failure(image.error().code, image.error().what, name, hint);
+  return image;
 }
 
 Result<FrameImage> read_image(const std::string& path) {
@@ -149,34 +118,31 @@ Result<Image<std::uint8_t>> read_gray8(const std::string& path) {
   if (!content) return failure(content);
   if (const std::string error = image_file_error(*content); !error.empty())
     return failure(ErrorCode::input, error, path);
-  if (is_jpeg(*content)) {
-    const auto image = decode_jpeg_file(*content, JpegColour::gray);
-    if (!image) return failure(image.error().code, image.error().what, path);
-    return Image<std::uint8_t>::copy_of(image->as<std::uint8_t>());
-  }
-  const auto mat = decode_png_or_pnm(*content, cv::IMREAD_GRAYSCALE);
-  if (!mat) return failure(mat.error().code, mat.error().what, path);
-  return Image<std::uint8_t>::copy_of(as_view<std::uint8_t>(*mat));
+  const auto image = is_jpeg(*content)  ? decode_jpeg_file(*content, JpegColour::gray)
+                     : is_pnm(*content) ? decode_pnm(*content)
+                                        : decode_png(*content, PngColour::gray);
+  if (!image) return failure(image.error().code, image.error().what, path);
+  return gray8_of(*image);
 }
 
 Result<std::string> encode_png(ImageView<const std::uint8_t> image) {
-  return png_of(as_mat(image));
+  return png_of(image);
 }
 Result<std::string> encode_png(ImageView<const Rgb8> image) {
-  return png_of_rgb(as_mat(image));
+  return png_of(image);
 }
 
 Status write_png(const std::string& path, ImageView<const std::uint8_t> image) {
-  return write_encoded(path, png_of(as_mat(image)));
+  return write_file_atomically(path, png_of(image));
 }
 Status write_png(const std::string& path, ImageView<const std::uint16_t> image) {
-  return write_encoded(path, png_of(as_mat(image)));
+  return write_file_atomically(path, png_of(image));
 }
 Status write_png(const std::string& path, ImageView<const Rgb8> image) {
-  return write_encoded(path, png_of_rgb(as_mat(image)));
+  return write_file_atomically(path, png_of(image));
 }
 Status write_png(const std::string& path, ImageView<const Rgb16> image) {
-  return write_encoded(path, png_of_rgb(as_mat(image)));
+  return write_file_atomically(path, png_of(image));
 }
 
 Status write_pfm(const std::string& path, ImageView<const float> image) {

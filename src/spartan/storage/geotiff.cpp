@@ -29,8 +29,8 @@ struct CloseDataset {
   void operator()(GDALDataset* dataset) const { GDALClose(dataset); }
 };
 
-// GDAL ends the process where small allocations fail, and writes what it has where large ones fail. What it needs
-// (twice the image, and its drivers) must therefore be free before it is called.
+// GDAL gives up where small allocations fail, and writes what it has where large ones fail. What it needs (twice the
+// image, and its drivers) must therefore be free before it is called.
 void expect_memory_for_gdal(ImageSize size, std::size_t bands) {
   constexpr std::size_t kOfDrivers_bytes = std::size_t{8} << 20U;
   const std::size_t bytes = kOfDrivers_bytes + 2 * static_cast<std::size_t>(size.width) *
@@ -41,7 +41,8 @@ void expect_memory_for_gdal(ImageSize size, std::size_t bands) {
 }
 
 // Keeps the first error while it exists: GDALClose() and destructors of GDAL do not return theirs, and the last error
-// may be a consequence.
+// may be a consequence. A failed allocation leaves GDAL by std::bad_alloc, and what GDAL had allocated is then lost:
+// GDAL would call abort() or use a null pointer.
 class GdalErrors {
  public:
   GdalErrors() { CPLPushErrorHandlerEx(&GdalErrors::keep, this); }
@@ -53,12 +54,12 @@ class GdalErrors {
 
   bool any() const { return number_ != CPLE_None; }
   tl::unexpected<Error> error(ErrorCode code, const char* what, const std::string& path) const {
-    if (number_ == CPLE_OutOfMemory) throw std::bad_alloc();
     return failure(code, what + (any() ? std::string(text_.data()) : "GDAL reports no reason"), path);
   }
 
  private:
   static void keep(CPLErr severity, CPLErrorNum number, const char* text) {
+    if (severity == CE_Fatal || (severity == CE_Failure && number == CPLE_OutOfMemory)) throw std::bad_alloc();
     auto& self = *static_cast<GdalErrors*>(CPLGetErrorHandlerUserData());
     if (severity < CE_Failure || self.any()) return;
     self.number_ = number;
@@ -129,8 +130,8 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
       throw std::invalid_argument("write_geotiff: empty bands, or bands of different sizes");
   }
   expect_memory_for_gdal(size, bands.size());
-  GDALRegister_GTiff();
   GdalErrors errors;  // not const: the error handler of GDAL writes to it
+  GDALRegister_GTiff();
   const std::string temporary = temporary_name(path);
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
   const std::array<const char*, 6> options{"COMPRESS=DEFLATE", "PREDICTOR=3",      "TILED=YES",
@@ -148,8 +149,8 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
 }
 
 Result<LoadedMap> read_geotiff(const std::string& path) {
-  GDALRegister_GTiff();
   GdalErrors errors;  // not const: the error handler of GDAL writes to it
+  GDALRegister_GTiff();
   const Dataset dataset = open_geotiff(path);
   std::array<double, 6> transform{};
   if (!dataset || dataset->GetGeoTransform(transform.data()) != CE_None)

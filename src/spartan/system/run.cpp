@@ -379,8 +379,9 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   hooks.log = given_hooks.log.with_file(folder.log());
   report_sequence(info, hooks.log);
   if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
-  const RunIdentity identity{fmt::format("{:016x}", (*source)->listing_hash()), dump_options(options),
-                             to_rig_yaml(info.rig)};
+  const auto listing = (*source)->listing_hash();
+  if (!listing) return failure(listing);
+  const RunIdentity identity{fmt::format("{:016x}", *listing), dump_options(options), to_rig_yaml(info.rig)};
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);

@@ -6,6 +6,7 @@
 #include <functional>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "spartan/camera/frame_source.h"
 #include "spartan/camera/internal/content_hash.h"
@@ -71,6 +72,18 @@ Result<FrameFiles> read_files(const FrameEntry& entry) {
 void add(ContentHash& hash, const FrameFiles& files) {
   hash.add(std::string_view(files.left ? *files.left : ""));
   hash.add(std::string_view(files.right ? *files.right : ""));
+}
+
+Status add_content(Hash64& hash, const std::string& path) {
+  auto file = InputFile::open(path);
+  if (!file) return failure(file);
+  std::vector<char> block(std::size_t{64} << 10U);
+  for (;;) {
+    const auto count = file->read(block);
+    if (!count) return failure(count);
+    if (*count == 0) return {};
+    hash.add(block.data(), *count);
+  }
 }
 
 class IndexedSource : public FrameSource {
@@ -180,7 +193,7 @@ class IndexedSource : public FrameSource {
     return all;
   }
 
-  std::uint64_t listing_hash() const override {
+  Result<std::uint64_t> listing_hash() const override {
     Hash64 hash;
     const auto add = [&hash](std::string_view text) { hash.add(text.data(), text.size()); };
     const auto inside = [this](const std::string& file) {
@@ -195,10 +208,8 @@ class IndexedSource : public FrameSource {
         hash.add(std::bit_cast<std::uint64_t>(value));
     }
     for (const std::string& file : index_.sensor_files) {
-      std::error_code error;
-      const std::uintmax_t bytes = fs::file_size(file, error);
       add(inside(file));
-      hash.add(static_cast<std::uint64_t>(error ? 0 : bytes));
+      if (Status added = add_content(hash, file); !added) return failure(added);
     }
     return hash.value();
   }

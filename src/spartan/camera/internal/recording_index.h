@@ -44,7 +44,7 @@ struct RecordingIndex {
   std::vector<FrameEntry> frames;                  ///< in file order until validate_and_sort()
   SampleStreamFactory imu;                         ///< empty: no IMU
   std::vector<SampleStreamFactory> other_sensors;  ///< wheels, compass, inclinometer
-  std::vector<std::string> sensor_files;           ///< tables of all sensors; their sizes are part of listing_hash()
+  std::vector<std::string> sensor_files;           ///< tables of all sensors; their bytes are part of listing_hash()
 };
 
 /// A detected folder layout and the reason for it.

@@ -1,10 +1,9 @@
 #include "spartan/image_io/internal/image_file_check.h"
 
-#include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cstdint>
 #include <limits>
+
+#include "spartan/image_io/internal/pnm_file.h"
 
 namespace spartan::internal {
 namespace {
@@ -101,35 +100,13 @@ std::string jpeg_error(std::string_view jpeg) {
   return truncated;
 }
 
-// The next number of a PNM header; skips white space and comments before it and one separator after it.
-std::size_t next_number(std::string_view& rest) {
-  for (;;) {
-    while (!rest.empty() && std::isspace(static_cast<unsigned char>(rest.front()))) rest.remove_prefix(1);
-    if (rest.empty() || rest.front() != '#') break;
-    rest.remove_prefix(std::min(rest.find('\n'), rest.size()));
-  }
-  std::size_t value = 0;
-  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
-  if (error != std::errc{}) return 0;
-  rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
-  if (!rest.empty()) rest.remove_prefix(1);
-  return value;
-}
-
-std::string pnm_error(std::string_view pnm) {
-  const bool binary = pnm[1] == '5' || pnm[1] == '6', colour = pnm[1] == '3' || pnm[1] == '6';
-  std::string_view rest = pnm.substr(2);
-  const std::size_t width = next_number(rest), height = next_number(rest), largest = next_number(rest);
-  if (!is_plausible(width, height) || largest == 0 || largest > 65535) return "PGM/PPM header is invalid";
+std::string pnm_error(const PnmHeader& header) {
+  if (!is_plausible(header.width, header.height) || header.largest == 0 || header.largest > 65535)
+    return "PGM/PPM header is invalid";
   // In the text formats every sample but the last takes at least two characters.
-  const std::size_t samples = width * height * (colour ? 3 : 1);
-  const std::size_t least = binary ? samples * (largest > 255 ? 2 : 1) : 2 * samples - 1;
-  return rest.size() < least ? "PGM/PPM file is truncated" : "";
-}
-
-bool is_pnm(std::string_view content) {
-  return content.size() >= 3 && content[0] == 'P' && "2356"sv.find(content[1]) != std::string_view::npos &&
-         std::isspace(static_cast<unsigned char>(content[2]));
+  const std::size_t samples = header.width * header.height * (header.colour ? 3 : 1);
+  const std::size_t least = header.binary ? samples * (header.largest > 255 ? 2 : 1) : 2 * samples - 1;
+  return header.samples.size() < least ? "PGM/PPM file is truncated" : "";
 }
 
 }  // namespace
@@ -139,7 +116,7 @@ std::string image_file_error(std::string_view content) {
   if (content.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) return "file is too large";
   if (content.starts_with(kPngMagic)) return png_error(content);
   if (content.starts_with(kJpegMagic)) return jpeg_error(content);
-  if (is_pnm(content)) return pnm_error(content);
+  if (const auto pnm = parse_pnm_header(content)) return pnm_error(*pnm);
   return "is not a PNG, JPEG, PGM or PPM image";
 }
 
