@@ -58,9 +58,10 @@ void add_threads_option(CLI::App& command, Context& context) {
 
 void add_memory_option(CLI::App& command, Context& context) {
   command
-      .add_option("--memory", context.memory_mb,
-                  "Memory in MB that images and disparities may need (default: 80 % of what is available). What needs "
-                  "more is refused before it begins, with exit code 5.")
+      .add_option(
+          "--memory", context.memory_mb,
+          "Memory limit in MB for images and disparities (default: 80 % of what is available). Input that would "
+          "exceed it is refused at the start, with exit code 5.")
       ->check(positive_number());
 }
 

@@ -65,10 +65,19 @@ std::string unknown_command(const CLI::App& app, int argc, char** argv) {
   return {};
 }
 
+// "spartan rig inspect": the command that was parsed, as far as it was.
+std::string command_of(const CLI::App& app) {
+  const auto parsed = app.get_subcommands();
+  return app.get_name() + (parsed.empty() ? "" : " " + command_of(*parsed.front()));
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Stereo vision for rovers: visual odometry, dense stereo, terrain maps and localization.", "spartan"};
   app.set_version_flag("--version", SPARTAN_VERSION);
   app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done; 1 internal fault; 2 the command line is wrong; 3 input; 4 calibration or configuration;\n"
+      "5 output, memory or file descriptors; 6 done, but the rover was lost for part of the drive; 130 interrupted.");
   Context context;
   context.threads = available_cores();
   add_commands(app, context);
@@ -80,8 +89,11 @@ int run(int argc, char** argv) {
       std::cerr << message;
       return kUsage;
     }
-    const bool help_requested = app.exit(e, std::cout, std::cerr) == 0;
-    return help_requested ? kDone : kUsage;
+    if (e.get_exit_code() != static_cast<int>(CLI::ExitCodes::Success)) {
+      std::cerr << fmt::format("error: {}; see `{} --help`\n", e.what(), command_of(app));
+      return kUsage;
+    }
+    return app.exit(e, std::cout, std::cerr) == 0 ? kDone : kUsage;
   }
 
   context.log = Log::to_terminal(level_of(context));

@@ -304,7 +304,7 @@ void add_map_build(CLI::App& map, Context& context) {
   command->add_option("--rig", a->rig, "Rig or calibration file of the two images, in any supported format.");
   command->add_option("--recording", a->recording, "Recording to take one stop from.");
   command->add_option("--position", a->position,
-                      "Number of the stop: the position_id of its frames, all of which are merged.");
+                      "Id of the stop: the position_id in frames.csv; all of its frames are merged.");
   command
       ->add_option(
           "--extent-m", a->extent_m,

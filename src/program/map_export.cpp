@@ -89,8 +89,9 @@ void add_map_export(CLI::App& map, Context& context) {
                    "centres), .map.")
       ->required();
   command
-      ->add_option("--window", a->window_m,
-                   "Export only this part: west,south,east,north in metres of the world frame.")
+      ->add_option(
+          "--window", a->window_m,
+          "Export only this part: the smallest x, smallest y, largest x and largest y in metres of the world frame.")
       ->delimiter(',')
       ->expected(4);
   add_threads_option(*command, context);

@@ -47,19 +47,23 @@ Json map_to_json(const GlobalMap& map, const MapStatistics& statistics) {
       {"stops", std::move(stops)}};
 }
 
+std::string counted(std::size_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
 std::string to_text(const Json& json) {
   const Json& cells = json["cells"];
   std::string text = fmt::format(
-      "{} x {} cells of {} m in {} tiles of {} submaps; north-west corner at {:.2f}, {:.2f} m\n"
+      "{} x {} cells of {} m in {} tiles of {}; smallest x {:.2f} m, largest y {:.2f} m\n"
       "{:.1f} m2 mapped: {} cells free, {} obstacle, {} cavity\n"
       "elevation {:.3f} m to {:.3f} m, median standard deviation of a cell {:.1f} mm\n"
-      "{} stops:\n",
+      "{}:\n",
       json["columns"].get<int>(), json["rows"].get<int>(), json["cell_m"].get<double>(),
-      json["tiles"].get<std::size_t>(), json["submaps"].get<std::size_t>(), json["west_m"].get<double>(),
-      json["north_m"].get<double>(), json["known_m2"].get<double>(), cells["free"].get<std::int64_t>(),
-      cells["obstacle"].get<std::int64_t>(), cells["cavity"].get<std::int64_t>(),
+      json["tiles"].get<std::size_t>(), counted(json["submaps"].get<std::size_t>(), "submap"),
+      json["west_m"].get<double>(), json["north_m"].get<double>(), json["known_m2"].get<double>(),
+      cells["free"].get<std::int64_t>(), cells["obstacle"].get<std::int64_t>(), cells["cavity"].get<std::int64_t>(),
       json["elevation_m"]["least"].get<double>(), json["elevation_m"]["most"].get<double>(),
-      1e3 * json["sigma_m"]["median"].get<double>(), json["stops"].size());
+      1e3 * json["sigma_m"]["median"].get<double>(), counted(json["stops"].size(), "stop"));
   for (const Json& stop : json["stops"]) {
     text += fmt::format("  {} ns at {:.3f}, {:.3f}, {:.3f} m, yaw {:.1f} deg, standard deviation {:.1f} mm\n",
                         stop["stamp_ns"].get<std::int64_t>(), stop["x_m"].get<double>(), stop["y_m"].get<double>(),

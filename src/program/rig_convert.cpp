@@ -224,7 +224,8 @@ void add_rig_convert(CLI::App& rig, Context& context) {
       ->option_text("B REQUIRED");
   std::vector<std::string> names;
   for (const std::string_view name : calibration_format_names()) names.emplace_back(name);
-  command->add_option("--to", a->format, "Format of B (default: from its name).")->check(CLI::IsMember(names));
+  command->add_option("--to", a->format, "Format of the written calibration B (default: from its name).")
+      ->check(CLI::IsMember(names));
   command->add_option("--pair", a->pair, "Convert only this pair of the rig.");
   command->add_option("--size-px", a->size_px, "Image size W,H in pixels, for formats that do not hold it.")
       ->delimiter(',')

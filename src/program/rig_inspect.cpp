@@ -314,12 +314,11 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
                       "Check only this pair of the rig (default with LEFT and RIGHT: the first one).");
   command
       ->add_option("--frames", a->frames,
-                   "Maximum number of frames of a pair, spread evenly over all (default 12). More lower the standard "
-                   "deviations of "
-                   "the correction and take longer.")
+                   "Maximum number of frames of a pair, spread evenly over all (default 12). More frames "
+                   "give a more certain correction and take longer.")
       ->check(CLI::Range(1, 1000));
   command->add_option("--apply", a->apply,
-                      "Write the corrected rig as rig.yaml. Only parameters that the findings name are changed.");
+                      "Write the corrected rig as rig.yaml. Only parameters that are reported as wrong are changed.");
   command->add_option("--figure", a->figure,
                       "Write a PNG that shows the row errors of the first pair, before and after.");
   add_former_name(*command, context, "--shots", "--frames", a->frames)->check(CLI::Range(1, 1000));

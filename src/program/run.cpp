@@ -152,14 +152,16 @@ void add_run(CLI::App& app, Context& context) {
       ->allow_extra_args(false);
   command->add_option(
       "--truth", a->truth,
-      "Compare the result with this trajectory, or that of this recording, as `spartan evaluate` does.");
+      "Ground truth to evaluate the result against, as `spartan evaluate` does: a trajectory file (TUM, KITTI, EuRoC "
+      "csv), or a recording with ground truth.");
   command->add_flag(
       "--resume", a->resume,
-      "Continue an interrupted run in this folder. The results are the same as without the interruption.");
+      "Continue an interrupted run in this folder. Trajectories, maps and terrain have the same bytes as without the "
+      "interruption.");
   command
       ->add_option("--max-frames", a->max_frames,
-                   "Maximum number of stereo frames of the odometry pair, missing ones and those before a resume "
-                   "included (default 0: all).")
+                   "Stop after this many stereo frames of the odometry pair, counted from the start of the recording; "
+                   "frames with missing images count (default 0: all).")
       ->check(non_negative_number());
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM or terrain.");

@@ -230,7 +230,11 @@ void add_stereo(CLI::App& app, Context& context) {
   command->add_option("right", a->right, "Right image.")->required();
   command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
   auto* rig = command->add_option("--rig", a->rig, "Calibration of unrectified images; they are rectified first.");
-  command->add_option("--calib", a->calib, "Calibration of images that are already rectified (for the point cloud).")
+  command
+      ->add_option("--calib", a->calib,
+                   "Calibration of images that are already rectified (for the point cloud). Without --rig and --calib "
+                   "images are "
+                   "taken as rectified, and there is no point cloud.")
       ->excludes(rig);
   command->add_option("--min-disparity", a->min_disparity, "Minimum disparity in pixels (default 0).");
   command->add_option(

@@ -35,9 +35,9 @@ Json similarity_to_json(const Similarity& similarity) {
           {"rotation_xyzw", {number(q.x()), number(q.y()), number(q.z()), number(q.w())}}};
 }
 
-std::string line_of(const char* name, const std::optional<ErrorStatistics>& e) {
-  if (!e) return fmt::format("{:<18}{:>10}\n", name, "-");
-  return fmt::format("{:<18}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name, e->rmse, e->mean, e->median, e->max);
+std::string line_of(const std::string& name, const std::optional<ErrorStatistics>& e) {
+  if (!e) return fmt::format("{:<30}{:>10}\n", name, "-");
+  return fmt::format("{:<30}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name, e->rmse, e->mean, e->median, e->max);
 }
 
 }  // namespace
@@ -71,10 +71,12 @@ std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectorie
   text += fmt::format(
       "aligned   {}{}\n\n", name_of(metrics.alignment),
       metrics.alignment == Alignment::sim3 ? fmt::format(", scale {:.5f}", metrics.truth_from_estimate.scale) : "");
-  text += fmt::format("{:<20}{:>10}{:>10}{:>10}{:>10}\n", "error", "rmse", "mean", "median", "max");
+  text += fmt::format("{:<30}{:>10}{:>10}{:>10}{:>10}\n", "error", "rmse", "mean", "median", "max");
   text += line_of("ATE, m", metrics.ate_m);
-  text += line_of("RPE translation, m", metrics.rpe_translation_m);
-  text += line_of("RPE rotation, deg", metrics.rpe_rotation_deg);
+  const std::string delta =
+      metrics.rpe_delta_frames == 1 ? "1 frame" : fmt::format("{} frames", metrics.rpe_delta_frames);
+  text += line_of("RPE translation (" + delta + "), m", metrics.rpe_translation_m);
+  text += line_of("RPE rotation (" + delta + "), deg", metrics.rpe_rotation_deg);
   if (metrics.drift_percent) text += fmt::format("\nend-point drift, %{:>12.3f}\n", *metrics.drift_percent);
   if (metrics.segments) {
     text += fmt::format("\n{:<20}{:>10}{:>17}{:>17}\n", "segments, m", "count", "translation, %", "rotation, deg/m");

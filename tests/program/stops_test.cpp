@@ -275,23 +275,23 @@ TEST_F(Stops, SpecifiedSensorNoiseIsUsed) {
   };
   EXPECT_NE(localized("whole"), localized("ignored"));
   const std::string used = testing::content_of(path("whole/config.yaml"));
-  for (const char* line : {"gravity_m_s2: 3.71", "offset_walk_rad_sqrt_hz: 1e-07", "bias_rad: 0.00174532"})
+  for (const char* line : {"gravity_m_s2: 3.71", "offset_walk_rad_per_sqrt_s: 1e-07", "bias_sigma_rad: 0.00174532"})
     EXPECT_NE(used.find(line), std::string::npos) << line;
   EXPECT_EQ(localized("unspecified"), localized("ignored"));
 }
 
 TEST_F(Stops, GivenOptionsAreNotReplacedBySpecifiedNoise) {
-  ASSERT_TRUE(finished(run("set", {"--set", "localization.inclinometer.bias_rad=0.0025"})));
+  ASSERT_TRUE(finished(run("set", {"--set", "localization.inclinometer.bias_sigma_rad=0.0025"})));
   std::ofstream(path("options.yaml")) << "localization: {compass: {offset_walk_rad_sqrt_hz: 0.00015}}\n";
   ASSERT_TRUE(finished(run("file", {"--config", path("options.yaml")})));
   const auto has = [&](const std::string& output, const char* line) {
     return testing::content_of(path(output + "/config.yaml")).find(line) != std::string::npos;
   };
-  EXPECT_TRUE(has("whole", " bias_rad: 0.00174532") && has("whole", "offset_walk_rad_sqrt_hz: 1e-07"));
-  EXPECT_TRUE(has("set", " bias_rad: 0.0025 ")) << "given with --set";
-  EXPECT_TRUE(has("set", "offset_walk_rad_sqrt_hz: 1e-07")) << "not given: as the recording specifies";
-  EXPECT_TRUE(has("file", "offset_walk_rad_sqrt_hz: 0.00015 ")) << "given in the file";
-  EXPECT_TRUE(has("file", " bias_rad: 0.00174532"));
+  EXPECT_TRUE(has("whole", " bias_sigma_rad: 0.00174532") && has("whole", "offset_walk_rad_per_sqrt_s: 1e-07"));
+  EXPECT_TRUE(has("set", " bias_sigma_rad: 0.0025 ")) << "given with --set";
+  EXPECT_TRUE(has("set", "offset_walk_rad_per_sqrt_s: 1e-07")) << "not given: as the recording specifies";
+  EXPECT_TRUE(has("file", "offset_walk_rad_per_sqrt_s: 0.00015 ")) << "given in the file, under its former name";
+  EXPECT_TRUE(has("file", " bias_sigma_rad: 0.00174532"));
 }
 
 // The narrow frame of the first stop is the last commit.

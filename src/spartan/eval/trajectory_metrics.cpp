@@ -103,7 +103,7 @@ void add_relative_errors(TrajectoryMetrics& metrics, const Trajectory& estimate,
 
 void explain_missing(TrajectoryMetrics& metrics, bool truth_has_rotation) {
   const std::string too_few = "fewer frames than the step of the relative error";
-  const std::string no_rotation = "the truth has no rotation";
+  const std::string no_rotation = "the truth has no rotation (all are the identity)";
   const auto explain = [&](bool there, const char* name, const std::string& reason) {
     if (!there) metrics.missing.push_back({name, reason});
   };

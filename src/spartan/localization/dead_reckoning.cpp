@@ -25,12 +25,12 @@ Result<DeadReckoning> DeadReckoning::create(const VisionOptions& options) {
 }
 
 DeadReckoning::DeadReckoning(const VisionOptions& options)
-    : white_factor_(options.white_factor),
-      drift_steps_(options.drift_steps),
-      drift_sigmas_(six_of(options.drift_sigmas)),
-      constant_sigmas_(six_of(options.constant_sigmas)) {
-  covariance_.diagonal().segment<6>(kDrift) = drift_sigmas_.cwiseAbs2();
-  covariance_.diagonal().segment<6>(kConstant) = constant_sigmas_.cwiseAbs2();
+    : white_noise_factor_(options.white_noise_factor),
+      drift_correlation_frames_(options.drift_correlation_frames),
+      drift_sigma_ratios_(six_of(options.drift_sigma_ratios)),
+      constant_sigma_ratios_(six_of(options.constant_sigma_ratios)) {
+  covariance_.diagonal().segment<6>(kDrift) = drift_sigma_ratios_.cwiseAbs2();
+  covariance_.diagonal().segment<6>(kConstant) = constant_sigma_ratios_.cwiseAbs2();
 }
 
 void DeadReckoning::age(int index, const Vector6d& sigmas, double steps) {
@@ -46,8 +46,8 @@ void DeadReckoning::add(const RelativeMotion& motion) {
   const bool stationary = moved.translation().isZero(1e-12) && moved.rotation().vec().isZero(1e-12);
   const bool drifts = motion.measured && !stationary;
   if (drifts) {
-    age(kDrift, drift_sigmas_, drift_steps_);
-    age(kConstant, constant_sigmas_, kConstantSteps);
+    age(kDrift, drift_sigma_ratios_, drift_correlation_frames_);
+    age(kConstant, constant_sigma_ratios_, kConstantSteps);
   }
   Covariance by = Covariance::Identity();
   by.topLeftCorner<6, 6>() = adjoint(moved.inverse());
@@ -59,7 +59,7 @@ void DeadReckoning::add(const RelativeMotion& motion) {
   const Covariance propagated = by * covariance_ * by.transpose();
   covariance_ = 0.5 * (propagated + propagated.transpose());
   covariance_.topLeftCorner<6, 6>() +=
-      0.5 * (motion.measured ? white_factor_ : 1.0) * (motion.covariance + motion.covariance.transpose());
+      0.5 * (motion.measured ? white_noise_factor_ : 1.0) * (motion.covariance + motion.covariance.transpose());
 }
 
 Bytes DeadReckoning::save() const {

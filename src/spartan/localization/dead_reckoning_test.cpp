@@ -33,8 +33,8 @@ TEST(DeadReckoning, HasTheCovarianceOfAVisionOnlyFilter) {
 TEST(DeadReckoning, ComposesIndependentErrors) {
   const TestDrive drive;
   VisionOptions white;
-  white.white_factor = 1;
-  white.drift_sigmas = white.constant_sigmas = {0, 0, 0, 0, 0, 0};
+  white.white_noise_factor = 1;
+  white.drift_sigma_ratios = white.constant_sigma_ratios = {0, 0, 0, 0, 0, 0};
   DeadReckoning reckoned = DeadReckoning::create(white).value();
   UncertainPose composed;
   for (const Measurement& m : test_motions(drive, 62.5, 1, 6)) {
@@ -47,7 +47,7 @@ TEST(DeadReckoning, ComposesIndependentErrors) {
 
 TEST(DeadReckoning, LastingErrorsHaveNoPartWhereTheRoverIsStationaryOrVisionIsLost) {
   VisionOptions vision;
-  vision.white_factor = 1;
+  vision.white_noise_factor = 1;
   for (const bool measured : {true, false}) {
     RelativeMotion motion;
     motion.covariance = test_motion_covariance();
@@ -83,9 +83,9 @@ TEST(DeadReckoning, GoesOnFromRestoredMemory) {
 
 TEST(DeadReckoning, RefusesOptionsOutOfBounds) {
   VisionOptions options;
-  options.drift_steps = 0;
+  options.drift_correlation_frames = 0;
   EXPECT_THAT(testing::error_message(DeadReckoning::create(options)),
-              ::testing::HasSubstr("vision options: drift_steps is 0"));
+              ::testing::HasSubstr("vision options: drift_correlation_frames is 0"));
 }
 
 }  // namespace

@@ -12,16 +12,16 @@ namespace spartan {
 /// random walk.
 struct InertialOptions {
   double gyro_noise_rad_s_sqrt_hz = 1.2e-4;  ///< rad/s/√Hz, white noise of the gyro
-  double gyro_bias_rad_s = 2e-4;             ///< rad/s, initial standard deviation of the gyro bias
+  double gyro_bias_sigma_rad_s = 2e-4;       ///< rad/s, initial standard deviation of the gyro bias
   double gyro_walk_rad_s2_sqrt_hz = 3e-6;    ///< rad/s²/√Hz, random walk of the gyro bias
   double accel_noise_m_s2_sqrt_hz = 1.5e-3;  ///< m/s²/√Hz, white noise of the accelerometer
-  double accel_bias_m_s2 = 0.02;             ///< m/s², initial standard deviation of the accelerometer bias
+  double accel_bias_sigma_m_s2 = 0.02;       ///< m/s², initial standard deviation of the accelerometer bias
   double accel_walk_m_s3_sqrt_hz = 1e-4;     ///< m/s³/√Hz, random walk of the accelerometer bias
   double timeout_s = 0.25;                   ///< s, longest gap that is integrated over
   double frozen_s = 0.5;                     ///< s, identical readings for this long exclude the IMU
   double alignment_s = 1.0;                  ///< s, gravity alignment of an IMU that starts during the drive
-  double stationary_gyro_rad_s = 0.004;      ///< rad/s, threshold on scatter and mean rate of a stationary gyro
-  double stationary_accel_m_s2 = 0.03;       ///< m/s², threshold on the scatter of a stationary accelerometer
+  double stationary_gyro_rad_s = 0.004;      ///< rad/s, threshold on standard deviation and mean of a stationary gyro
+  double stationary_accel_m_s2 = 0.03;  ///< m/s², threshold on the standard deviation of a stationary accelerometer
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -30,7 +30,8 @@ struct InertialOptions {
         "White noise density of the gyro, in rad/s/sqrt(Hz); raising it makes the attitude follow vision more and the "
         "gyro less.",
         between(1e-8, 1));
-    v.field("gyro_bias_rad_s", gyro_bias_rad_s,
+    v.renamed("gyro_bias_rad_s", "gyro_bias_sigma_rad_s");
+    v.field("gyro_bias_sigma_rad_s", gyro_bias_sigma_rad_s,
             "Standard deviation of the gyro bias at the start, in rad/s; raising it lets the first seconds estimate a "
             "larger bias.",
             between(0, 1));
@@ -42,7 +43,8 @@ struct InertialOptions {
         "White noise density of the accelerometer, in m/s^2/sqrt(Hz); raising it makes velocity and tilt follow the "
         "other sensors more.",
         between(1e-8, 10));
-    v.field("accel_bias_m_s2", accel_bias_m_s2,
+    v.renamed("accel_bias_m_s2", "accel_bias_sigma_m_s2");
+    v.field("accel_bias_sigma_m_s2", accel_bias_sigma_m_s2,
             "Standard deviation of the accelerometer bias at the start, in m/s^2; raising it makes the direction of "
             "gravity less certain.",
             between(0, 10));
@@ -66,50 +68,56 @@ struct InertialOptions {
             between(0.1, 100));
     v.renamed("still_gyro_rad_s", "stationary_gyro_rad_s");
     v.field("stationary_gyro_rad_s", stationary_gyro_rad_s,
-            "Gyro scatter and mean rate below which the rover may be stationary, in rad/s; raising it triggers "
+            "Standard deviation and mean of the gyro rate below which the rover may be stationary, in rad/s; raising "
+            "it triggers "
             "zero-velocity updates more easily.",
             between(0, 1));
     v.renamed("still_accel_m_s2", "stationary_accel_m_s2");
-    v.field(
-        "stationary_accel_m_s2", stationary_accel_m_s2,
-        "Accelerometer scatter below which the rover may be stationary, in m/s^2; raising it triggers zero-velocity "
-        "updates more easily.",
-        between(0, 10));
+    v.field("stationary_accel_m_s2", stationary_accel_m_s2,
+            "Standard deviation of the accelerometer below which the rover may be stationary, in m/s^2; raising it "
+            "triggers zero-velocity "
+            "updates more easily.",
+            between(0, 10));
   }
 };
 
-/// The error of a visual motion is L n + D z: white noise n of the measured covariance times `white_factor`, and a
-/// lasting error z in units of the measured standard deviations D, with a slowly changing and a constant part
+/// The error of a visual motion is L n + D z: white noise n of the measured covariance times `white_noise_factor`, and
+/// a lasting error z in units of the measured standard deviations D, with a slowly changing and a constant part
 /// (docs/math/localization.md, "Vision").
 struct VisionOptions {
-  double white_factor = 1.1;  ///< factor on the covariance of visual motions
+  double white_noise_factor = 1.1;  ///< factor on the covariance of visual motions
   /// Standard deviations of the slowly changing error (Gauss–Markov), in measured standard deviations: x, y, z, about
   /// x, y, z.
-  std::vector<double> drift_sigmas{0.85, 0.61, 0.33, 0.57, 0.46, 0.35};
-  double drift_steps = 57;  ///< frames, correlation length of that error
+  std::vector<double> drift_sigma_ratios{0.85, 0.61, 0.33, 0.57, 0.46, 0.35};
+  double drift_correlation_frames = 57;  ///< frames, correlation length of that error
   /// The same of the error that is constant over a drive.
-  std::vector<double> constant_sigmas{1.05, 0.76, 0.4, 0.7, 0.57, 0.42};
+  std::vector<double> constant_sigma_ratios{1.05, 0.76, 0.4, 0.7, 0.57, 0.42};
   double gate_probability = 0.999999;  ///< fraction of correct motions that pass the chi-square test
 
   template <class Visitor>
   void describe(Visitor& v) {
+    v.renamed("white_factor", "white_noise_factor");
     v.field(
-        "white_factor", white_factor,
+        "white_noise_factor", white_noise_factor,
         "Factor on the covariance of visual motions, for errors that are independent from frame to frame; raising it "
         "trusts vision less.",
         between(0.01, 1e4));
+    v.renamed("drift_sigmas", "drift_sigma_ratios");
     v.field(
-        "drift_sigmas", drift_sigmas,
+        "drift_sigma_ratios", drift_sigma_ratios,
         "Standard deviations of the slowly changing error of vision (a first-order Gauss-Markov process) along x, y, z "
         "and about x, y, z, as multiples of the standard deviation of a visual motion; raising them makes the "
         "covariance of the pose grow faster.",
         between(0, 1e3), Length{6});
-    v.field("drift_steps", drift_steps,
+    v.renamed("drift_steps", "drift_correlation_frames");
+    v.field("drift_correlation_frames", drift_correlation_frames,
             "Correlation time of that error in frames, after which it falls to 1/e; raising it makes the error last "
             "longer.",
             between(1, 1e6));
-    v.field("constant_sigmas", constant_sigmas,
-            "Standard deviations of the error of vision that is constant over a drive, axes and unit as drift_sigmas; "
+    v.renamed("constant_sigmas", "constant_sigma_ratios");
+    v.field("constant_sigma_ratios", constant_sigma_ratios,
+            "Standard deviations of the error of vision that is constant over a drive, axes and unit as "
+            "drift_sigma_ratios; "
             "raising them makes the covariance of the pose grow faster.",
             between(0, 1e3), Length{6});
     v.field("gate_probability", gate_probability,
@@ -119,17 +127,17 @@ struct VisionOptions {
 };
 
 struct WheelOdometryOptions {
-  double track_m = 0.6;               ///< m, between left and right wheels, of the rig file (Rig::rover)
-  bool use_rotation = true;           ///< whether the difference of the wheels measures a rotation
-  double scale_sigma = 0.1;           ///< initial standard deviation of travelled over counted distance
-  double scale_walk_sqrt_hz = 0.005;  ///< 1/√Hz, random walk of that scale
-  double forward_share = 0.12;        ///< standard deviation of a step forward, over its length
-  double side_share = 0.2;            ///< standard deviation of a step to the side, over its length
-  double up_share = 0.3;              ///< standard deviation of a step along the body's z, over its length
-  double turn_share = 0.3;            ///< standard deviation of a step's rotation, over that rotation
-  double min_sigma_m = 0.002;         ///< m, minimum standard deviation of a step
-  double max_step_s = 2.5;            ///< s, longest step
-  double min_slip_distance_m = 0.02;  ///< m, shortest step that slip is reported for
+  double track_m = 0.6;                  ///< m, between left and right wheels, of the rig file (Rig::rover)
+  bool use_rotation = true;              ///< whether the difference of the wheels measures a rotation
+  double scale_sigma = 0.1;              ///< initial standard deviation of travelled over counted distance
+  double scale_walk_per_sqrt_s = 0.005;  ///< 1/√s, random walk of that scale
+  double forward_sigma_ratio = 0.12;     ///< standard deviation of a step forward, over its length
+  double side_sigma_ratio = 0.2;         ///< standard deviation of a step to the side, over its length
+  double up_sigma_ratio = 0.3;           ///< standard deviation of a step along the body's z, over its length
+  double turn_sigma_ratio = 0.3;         ///< standard deviation of a step's rotation, over that rotation
+  double min_sigma_m = 0.002;            ///< m, minimum standard deviation of a step
+  double max_step_s = 2.5;               ///< s, longest step
+  double min_slip_distance_m = 0.02;     ///< m, shortest step that slip is reported for
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -144,24 +152,29 @@ struct WheelOdometryOptions {
         "Initial standard deviation of the wheel scale factor, true over measured distance (wheel radius, mean slip); "
         "raising it lets the scale be estimated farther from 1.",
         between(0, 1));
-    v.field("scale_walk_sqrt_hz", scale_walk_sqrt_hz,
+    v.renamed("scale_walk_sqrt_hz", "scale_walk_per_sqrt_s");
+    v.field("scale_walk_per_sqrt_s", scale_walk_per_sqrt_s,
             "Random walk of that scale, in 1/sqrt(s); raising it lets the scale follow changing soil faster.",
             between(0, 1));
-    v.field("forward_share", forward_share,
+    v.renamed("forward_share", "forward_sigma_ratio");
+    v.field("forward_sigma_ratio", forward_sigma_ratio,
             "Standard deviation of a step's length as a fraction of it (slip beyond the mean); raising it trusts the "
             "wheels less and detects slip later.",
             between(0, 1));
+    v.renamed("side_share", "side_sigma_ratio");
     v.field(
-        "side_share", side_share,
+        "side_sigma_ratio", side_sigma_ratio,
         "Standard deviation of motion to the side as a fraction of the step's length; raising it allows more lateral "
         "slip.",
         between(0, 10));
+    v.renamed("up_share", "up_sigma_ratio");
     v.field(
-        "up_share", up_share,
+        "up_sigma_ratio", up_sigma_ratio,
         "Standard deviation of motion along the body's z axis as a fraction of the step's length; raising it allows "
         "for rougher ground.",
         between(0, 10));
-    v.field("turn_share", turn_share,
+    v.renamed("turn_share", "turn_sigma_ratio");
+    v.field("turn_sigma_ratio", turn_sigma_ratio,
             "Standard deviation of a step's rotation as a fraction of it; raising it trusts the rotation by the wheels "
             "less.",
             between(0, 10));
@@ -184,9 +197,9 @@ struct WheelOdometryOptions {
 };
 
 struct HeadingOptions {
-  double min_sigma_rad = 0.002;             ///< rad, minimum standard deviation of a reading
-  double offset_sigma_rad = 0.003;          ///< rad, change of the offset between start and drive
-  double offset_walk_rad_sqrt_hz = 1.5e-4;  ///< rad/√Hz, random walk of the offset
+  double min_sigma_rad = 0.002;                ///< rad, minimum standard deviation of a reading
+  double offset_sigma_rad = 0.003;             ///< rad, initial standard deviation of the offset
+  double offset_walk_rad_per_sqrt_s = 1.5e-4;  ///< rad/√s, random walk of the offset
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -197,20 +210,21 @@ struct HeadingOptions {
             between(1e-6, 1));
     v.field(
         "offset_sigma_rad", offset_sigma_rad,
-        "Standard deviation in radians of the change of the compass offset between start and drive; raising it lets "
-        "the offset be estimated farther from its initial value.",
+        "Initial standard deviation of the compass offset in radians, relative to the heading at the start; raising it "
+        "lets the offset be estimated farther from zero.",
         between(0, 1));
-    v.field("offset_walk_rad_sqrt_hz", offset_walk_rad_sqrt_hz,
+    v.renamed("offset_walk_rad_sqrt_hz", "offset_walk_rad_per_sqrt_s");
+    v.field("offset_walk_rad_per_sqrt_s", offset_walk_rad_per_sqrt_s,
             "Random walk of the compass offset, in rad/sqrt(s); raising it lets the offset change faster.",
             between(0, 1));
   }
 };
 
 struct TiltOptions {
-  double noise_factor = 1.0;            ///< factor on the specified standard deviation of a reading
-  double min_sigma_rad = 0.0005;        ///< rad, minimum standard deviation of a reading
-  double bias_rad = 0.0025;             ///< rad, initial standard deviation of the bias
-  double bias_walk_rad_sqrt_hz = 1e-5;  ///< rad/√Hz, random walk of the bias
+  double noise_factor = 1.0;               ///< factor on the specified standard deviation of a reading
+  double min_sigma_rad = 0.0005;           ///< rad, minimum standard deviation of a reading
+  double bias_sigma_rad = 0.0025;          ///< rad, initial standard deviation of the bias
+  double bias_walk_rad_per_sqrt_s = 1e-5;  ///< rad/√s, random walk of the bias
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -224,11 +238,13 @@ struct TiltOptions {
         "Minimum standard deviation of an inclinometer reading in radians, whatever the reading specifies; raising it "
         "trusts the inclinometer less.",
         between(1e-6, 1));
-    v.field("bias_rad", bias_rad,
+    v.renamed("bias_rad", "bias_sigma_rad");
+    v.field("bias_sigma_rad", bias_sigma_rad,
             "Standard deviation of the inclinometer bias at the start, in radians; raising it makes absolute tilt less "
             "certain.",
             between(0, 1));
-    v.field("bias_walk_rad_sqrt_hz", bias_walk_rad_sqrt_hz,
+    v.renamed("bias_walk_rad_sqrt_hz", "bias_walk_rad_per_sqrt_s");
+    v.field("bias_walk_rad_per_sqrt_s", bias_walk_rad_per_sqrt_s,
             "Random walk of the inclinometer bias, in rad/sqrt(s); raising it lets the bias change faster.",
             between(0, 1));
   }
@@ -237,7 +253,7 @@ struct TiltOptions {
 /// Zero-velocity updates (ZUPT).
 struct ZeroVelocityOptions {
   bool enabled = true;                 ///< whether zero-velocity updates are applied
-  double block_s = 0.5;                ///< s, interval over which the scatter of the IMU is computed
+  double block_s = 0.5;                ///< s, interval of the standard deviation of the IMU
   double wheels_stationary_s = 1.0;    ///< s, minimum time without wheel motion
   double wheels_stationary_m = 0.001;  ///< m, change of a wheel count that is no motion
   double position_sigma_m = 5e-4;      ///< m, standard deviation of the position of a stationary rover
@@ -248,11 +264,11 @@ struct ZeroVelocityOptions {
     v.field("enabled", enabled,
             "Apply zero-velocity updates while IMU and wheels (or, without wheels, vision) detect a stationary rover; "
             "false disables them.");
-    v.field(
-        "block_s", block_s,
-        "Interval over which the scatter of the IMU is computed, in seconds; raising it detects stops later and more "
-        "reliably.",
-        between(0.05, 10));
+    v.field("block_s", block_s,
+            "Interval over which the standard deviation of the IMU is computed, in seconds; raising it detects stops "
+            "later and more "
+            "reliably.",
+            between(0.05, 10));
     v.renamed("wheels_still_s", "wheels_stationary_s");
     v.field(
         "wheels_stationary_s", wheels_stationary_s,
@@ -277,30 +293,36 @@ struct ZeroVelocityOptions {
 };
 
 /// Constant-velocity model for times without an IMU: velocity and angular rate are constant in the body frame. Noise
-/// densities grow with speed, so that one set of options serves a rover and a car: σ = share · (|v| + floor).
+/// densities grow with speed, so that one set of options serves a rover and a car: σ = ratio · (|v| + offset).
 struct ConstantVelocityOptions {
-  double speed_share_sqrt_hz = 0.5;  ///< 1/√Hz, noise density of the velocity over the speed
-  double speed_floor_m_s = 0.05;     ///< m/s, added to the speed
-  double turn_share = 0.5;           ///< error of the last angular rate over that rate
-  double turn_floor_rad_s = 0.008;   ///< rad/s, added to the rate
+  double speed_sigma_ratio_per_sqrt_s = 0.5;  ///< 1/√s, noise density of the velocity over the speed
+  double speed_offset_m_s = 0.05;             ///< m/s, added to the speed
+  double rate_sigma_ratio = 0.5;              ///< error of the last angular rate over that rate
+  double rate_offset_rad_s = 0.008;           ///< rad/s, added to the rate
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("speed_share_sqrt_hz", speed_share_sqrt_hz,
+    v.renamed("speed_share_sqrt_hz", "speed_sigma_ratio_per_sqrt_s");
+    v.field("speed_sigma_ratio_per_sqrt_s", speed_sigma_ratio_per_sqrt_s,
             "Noise density of the velocity as a fraction of the speed, in 1/sqrt(s); raising it makes predictions "
             "without an IMU less certain.",
             between(0, 100));
-    v.field("speed_floor_m_s", speed_floor_m_s,
-            "Speed in m/s that is added before speed_share_sqrt_hz applies; raising it makes predictions at low speed "
+    v.renamed("speed_floor_m_s", "speed_offset_m_s");
+    v.field("speed_offset_m_s", speed_offset_m_s,
+            "Speed in m/s that is added before speed_sigma_ratio_per_sqrt_s applies; raising it makes predictions at "
+            "low speed "
             "less certain.",
             between(0, 100));
-    v.field("turn_share", turn_share,
+    v.renamed("turn_share", "rate_sigma_ratio");
+    v.field("rate_sigma_ratio", rate_sigma_ratio,
             "Error of the last angular rate as a fraction of it; raising it makes the predicted attitude less certain.",
             between(0, 100));
-    v.field("turn_floor_rad_s", turn_floor_rad_s,
-            "Angular rate in rad/s that is added before turn_share applies; raise it for a rover that pitches and "
-            "rolls more.",
-            between(0, 100));
+    v.renamed("turn_floor_rad_s", "rate_offset_rad_s");
+    v.field(
+        "rate_offset_rad_s", rate_offset_rad_s,
+        "Angular rate in rad/s that is added before rate_sigma_ratio applies; raise it for a rover that pitches and "
+        "rolls more.",
+        between(0, 100));
   }
 };
 
@@ -396,20 +418,20 @@ inline LocalizationOptions with_specified_noise(LocalizationOptions options, con
   };
   take_imu("imu.gyro_noise_rad_s_sqrt_hz", &InertialOptions::gyro_noise_rad_s_sqrt_hz,
            &ImuNoise::gyro_noise_rad_s_sqrt_hz);
-  take_imu("imu.gyro_bias_rad_s", &InertialOptions::gyro_bias_rad_s, &ImuNoise::gyro_bias_rad_s);
+  take_imu("imu.gyro_bias_sigma_rad_s", &InertialOptions::gyro_bias_sigma_rad_s, &ImuNoise::gyro_bias_rad_s);
   take_imu("imu.gyro_walk_rad_s2_sqrt_hz", &InertialOptions::gyro_walk_rad_s2_sqrt_hz,
            &ImuNoise::gyro_walk_rad_s2_sqrt_hz);
   take_imu("imu.accel_noise_m_s2_sqrt_hz", &InertialOptions::accel_noise_m_s2_sqrt_hz,
            &ImuNoise::accel_noise_m_s2_sqrt_hz);
-  take_imu("imu.accel_bias_m_s2", &InertialOptions::accel_bias_m_s2, &ImuNoise::accel_bias_m_s2);
+  take_imu("imu.accel_bias_sigma_m_s2", &InertialOptions::accel_bias_sigma_m_s2, &ImuNoise::accel_bias_m_s2);
   take_imu("imu.accel_walk_m_s3_sqrt_hz", &InertialOptions::accel_walk_m_s3_sqrt_hz,
            &ImuNoise::accel_walk_m_s3_sqrt_hz);
-  take("compass.offset_walk_rad_sqrt_hz", options.compass.offset_walk_rad_sqrt_hz,
-       defaults.compass.offset_walk_rad_sqrt_hz, specified.compass.offset_walk_rad_sqrt_hz);
-  take("inclinometer.bias_rad", options.inclinometer.bias_rad, defaults.inclinometer.bias_rad,
+  take("compass.offset_walk_rad_per_sqrt_s", options.compass.offset_walk_rad_per_sqrt_s,
+       defaults.compass.offset_walk_rad_per_sqrt_s, specified.compass.offset_walk_rad_sqrt_hz);
+  take("inclinometer.bias_sigma_rad", options.inclinometer.bias_sigma_rad, defaults.inclinometer.bias_sigma_rad,
        specified.inclinometer.bias_rad);
-  take("inclinometer.bias_walk_rad_sqrt_hz", options.inclinometer.bias_walk_rad_sqrt_hz,
-       defaults.inclinometer.bias_walk_rad_sqrt_hz, specified.inclinometer.bias_walk_rad_sqrt_hz);
+  take("inclinometer.bias_walk_rad_per_sqrt_s", options.inclinometer.bias_walk_rad_per_sqrt_s,
+       defaults.inclinometer.bias_walk_rad_per_sqrt_s, specified.inclinometer.bias_walk_rad_sqrt_hz);
   return options;
 }
 

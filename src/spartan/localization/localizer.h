@@ -285,8 +285,8 @@ class DeadReckoning {
   using Covariance = Eigen::Matrix<double, kSize, kSize>;
   void age(int index, const Vector6d& sigmas, double steps);
 
-  double white_factor_, drift_steps_;
-  Vector6d drift_sigmas_ = Vector6d::Zero(), constant_sigmas_ = Vector6d::Zero();
+  double white_noise_factor_, drift_correlation_frames_;
+  Vector6d drift_sigma_ratios_ = Vector6d::Zero(), constant_sigma_ratios_ = Vector6d::Zero();
   Covariance covariance_ = Covariance::Zero();
 };
 

@@ -85,10 +85,10 @@ TEST(Localizer, FollowsVisionAloneAfterAStop) {
         const LocalizationEstimate e = localizer.estimate();
         const double variance =
             sigma_m * sigma_m *
-            (options.vision.white_factor * kMoves +
-             std::pow(options.vision.drift_sigmas[0], 2) *
-                 correlated_sum(kMoves, std::exp(-1 / options.vision.drift_steps)) +
-             std::pow(options.vision.constant_sigmas[0], 2) * correlated_sum(kMoves, std::exp(-1 / 5000.0)));
+            (options.vision.white_noise_factor * kMoves +
+             std::pow(options.vision.drift_sigma_ratios[0], 2) *
+                 correlated_sum(kMoves, std::exp(-1 / options.vision.drift_correlation_frames)) +
+             std::pow(options.vision.constant_sigma_ratios[0], 2) * correlated_sum(kMoves, std::exp(-1 / 5000.0)));
         const double error_m = e.world_from_body.pose.translation().x() - kMoves * step_m;
         // Steps below the noise of the constant-velocity model are partly predicted.
         const bool large = step_m >= 0.1;

@@ -42,8 +42,9 @@ std::optional<StaticReading> static_reading(std::span<const ImuSample> samples, 
   const double accel_scatter = scatter(accel_squares, r.accel_m_s2), gyro_scatter = scatter(gyro_squares, r.gyro_rad_s);
   if (std::abs(r.accel_m_s2.norm() - o.gravity_m_s2) > kMaxGravityError * o.gravity_m_s2) return std::nullopt;
   if (accel_scatter > kMaxScatter * o.gravity_m_s2) return std::nullopt;
-  r.stationary = accel_scatter < o.imu.stationary_accel_m_s2 && gyro_scatter < o.imu.stationary_gyro_rad_s &&
-                 r.gyro_rad_s.norm() < 3 * (o.imu.gyro_bias_rad_s + o.imu.stationary_gyro_rad_s / std::sqrt(count));
+  r.stationary =
+      accel_scatter < o.imu.stationary_accel_m_s2 && gyro_scatter < o.imu.stationary_gyro_rad_s &&
+      r.gyro_rad_s.norm() < 3 * (o.imu.gyro_bias_sigma_rad_s + o.imu.stationary_gyro_rad_s / std::sqrt(count));
   const double seconds = std::max(seconds_between(samples.front().stamp, samples.back().stamp), 1e-3);
   r.gyro_sigma_rad_s = o.imu.gyro_noise_rad_s_sqrt_hz / std::sqrt(seconds) + 1e-7;
   // A moving rover accelerates: the error of its mean is of the order of the scatter.

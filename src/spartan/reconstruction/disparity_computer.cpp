@@ -94,12 +94,13 @@ std::int64_t DisparityComputer::memory_bytes(ImageSize size, DisparityRange rang
 Status DisparityComputer::check_memory(ImageSize size, DisparityRange range, std::int64_t most_bytes) {
   const std::int64_t needed = memory_bytes(size, range);
   if (most_bytes <= 0 || needed <= most_bytes) return {};
-  return failure(ErrorCode::resources,
-                 fmt::format("images of {}x{} px with {} disparities need {:.0f} MB of memory, more than the bound of "
-                             "{:.0f} MB",
-                             size.width, size.height, range.count(), 1e-6 * static_cast<double>(needed),
-                             1e-6 * static_cast<double>(most_bytes)),
-                 "", "use smaller images or a smaller disparity range (nearest_m of the pair), or raise --memory");
+  return failure(
+      ErrorCode::resources,
+      fmt::format("images of {}x{} px with {} disparities need {:.0f} MB of memory, more than the bound of "
+                  "{:.0f} MB",
+                  size.width, size.height, range.count(), 1e-6 * static_cast<double>(needed),
+                  1e-6 * static_cast<double>(most_bytes)),
+      "", "use smaller images or a smaller disparity range (nearest_m of the pair in rig.yaml), or raise --memory");
 }
 
 DisparityRange disparity_range(const RectifiedStereo& geometry, double nearest_m) {

@@ -114,7 +114,8 @@ struct DisparityOptions {
         between(0, 100));
     v.field("left_right_px", left_right_px,
             "Tolerance of the left-right consistency check in pixels: the disparity of a right pixel is that of the "
-            "cheapest left pixel matched to it; raising it discards fewer pixels at occlusions, and a negative value "
+            "left pixel of the lowest cost that is matched to it; raising it discards fewer pixels at occlusions, and "
+            "a negative value "
             "disables the check.");
     v.field("median", median,
             "True applies a 3x3 median filter to the disparities, which removes single outliers and keeps edges; false "

@@ -143,10 +143,11 @@ struct MatchOptions {
         "1 %, one-sided); raising it declares more matches ambiguous.",
         between(1, 20));
     v.renamed("largest_misfit", "max_normalized_residual");
-    v.field("max_normalized_residual", max_normalized_residual,
-            "Largest accepted median of the absolute residuals over their standard deviations, scaled to 1 for normal "
-            "residuals; raising it accepts matches that fit worse.",
-            between(1, 100));
+    v.field(
+        "max_normalized_residual", max_normalized_residual,
+        "Largest accepted normalized MAD of the residuals over their standard deviations (1 for Gaussian residuals); "
+        " raising it accepts matches that fit worse.",
+        between(1, 100));
     v.check(
         "step_m", trials() <= kMostTrials,
         "is too small for max_search_m: (2 max_search_m / step_m + 1)^2 shifts times (2 max_search_deg / step_deg + 1) "
@@ -184,8 +185,8 @@ struct GlobalMapOptions {
             between(0, 1));
     v.renamed("least_sigma_m", "min_sigma_m");
     v.field("min_sigma_m", min_sigma_m,
-            "Lower bound of the standard deviation of a fused elevation in metres; raising it keeps cells open to "
-            "change.",
+            "Lower bound of the standard deviation of a fused elevation in metres; raising it lets later "
+            "observations change fused cells more.",
             between(1e-5, 1));
   }
 };

@@ -340,13 +340,13 @@ TEST(Pipeline, RejectsOptionsOutOfBounds) {
   options.mapping.map.cell_m = 0;
   options.terrain.every_m = std::numeric_limits<double>::quiet_NaN();
   options.imaging.contrast_high_percent = 101;
-  options.localization.vision.drift_sigmas = {1, 2, 3};
+  options.localization.vision.drift_sigma_ratios = {1, 2, 3};
   const auto refused = Pipeline::create(rover(), options, ThreadPool(1));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::configuration);
   for (const char* field : {"reconstruction.p2_flat is 300", "strips is 0", "mapping.map.cell_m is 0",
                             "terrain.every_m must be a finite number", "imaging.contrast_high_percent is 101",
-                            "localization.vision.drift_sigmas has 3 numbers, must have 6"})
+                            "localization.vision.drift_sigma_ratios has 3 numbers, must have 6"})
     EXPECT_NE(refused.error().message().find(field), std::string::npos) << field;
 }
 

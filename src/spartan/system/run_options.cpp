@@ -33,17 +33,17 @@ constexpr std::array<std::string_view, 30> kBasicOptions{
     "mapping.map.rover.max_step_m",
     "slam.map.memory_mb",
     "localization.imu.gyro_noise_rad_s_sqrt_hz",
-    "localization.imu.gyro_bias_rad_s",
+    "localization.imu.gyro_bias_sigma_rad_s",
     "localization.imu.gyro_walk_rad_s2_sqrt_hz",
     "localization.imu.accel_noise_m_s2_sqrt_hz",
-    "localization.imu.accel_bias_m_s2",
+    "localization.imu.accel_bias_sigma_m_s2",
     "localization.imu.accel_walk_m_s3_sqrt_hz",
     "localization.wheels.use_rotation",
-    "localization.compass.offset_walk_rad_sqrt_hz",
-    "localization.inclinometer.bias_walk_rad_sqrt_hz",
+    "localization.compass.offset_walk_rad_per_sqrt_s",
+    "localization.inclinometer.bias_walk_rad_per_sqrt_s",
     "localization.wheels.scale_sigma",
     "localization.compass.offset_sigma_rad",
-    "localization.inclinometer.bias_rad",
+    "localization.inclinometer.bias_sigma_rad",
 };
 
 }  // namespace

@@ -72,8 +72,8 @@ struct RunOptions {
             "Name of the stereo pair used for visual odometry; empty selects the first pair of the rig with "
             "for_odometry.");
     v.field("odometry_only", odometry_only,
-            "True runs the visual odometry alone, without localization, maps, SLAM and terrain (the start attitude is "
-            "still measured); false runs all stages.");
+            "True runs the visual odometry alone, without localization, maps, SLAM and terrain (initial roll and "
+            "pitch are still taken from the IMU); false runs all stages.");
     v.group("imaging", imaging);
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);

@@ -127,8 +127,8 @@ class PngReader {
                        static_cast<int>(png_get_image_height(png_, info_)));
     if (png_get_rowbytes(png_, info_) != static_cast<std::size_t>(image.width()) * sizeof(Pixel))
       throw std::logic_error("decode_png: libpng gives rows of another size");
-    std::vector<png_bytep> rows;
-    for (int y = 0; y < image.height(); ++y) rows.push_back(reinterpret_cast<png_bytep>(image.row(y)));
+    std::vector<png_bytep> rows(static_cast<std::size_t>(image.height()));
+    for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = reinterpret_cast<png_bytep>(image.row(static_cast<int>(y)));
     const bool complete = run(png_, [&] {
       png_read_image(png_, rows.data());
       png_read_end(png_, nullptr);

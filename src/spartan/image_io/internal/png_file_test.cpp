@@ -81,8 +81,8 @@ std::string png_with(int colour_type, int bits, bool interlaced, int width, int 
   const std::size_t row_bytes = png_get_rowbytes(png, info);
   std::vector<png_byte> data(row_bytes * static_cast<std::size_t>(height));
   for (std::size_t i = 0; i < data.size(); ++i) data[i] = static_cast<png_byte>(i * 29 + i / row_bytes * 7);
-  std::vector<png_bytep> rows;
-  for (int y = 0; y < height; ++y) rows.push_back(data.data() + static_cast<std::size_t>(y) * row_bytes);
+  std::vector<png_bytep> rows(static_cast<std::size_t>(height));
+  for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = data.data() + y * row_bytes;
   png_write_image(png, rows.data());
   png_write_end(png, info);
   png_destroy_write_struct(&png, &info);

@@ -63,7 +63,7 @@ Result<FrameImage> decode_as(const PnmHeader& header) {
   std::string_view rest = header.samples;
   for (int y = 0; y < image.height(); ++y) {
     auto* const row = reinterpret_cast<Sample*>(image.row(y));
-    if (!read_row<Sample>(header.binary, rest, {row, header.width * (sizeof(Pixel) / sizeof(Sample))}))
+    if (!read_row<Sample>(header.binary, rest, {row, header.width * (header.colour ? 3 : 1)}))
       return failure(ErrorCode::input, "PGM/PPM file is damaged: a sample is missing or too large");
   }
   return FrameImage::own(std::move(image), {std::is_same_v<Pixel, Sample> ? PixelLayout::gray : PixelLayout::rgb,

@@ -149,8 +149,8 @@ inline Localizer driven(const LocalizationOptions& options, const std::vector<Me
 inline LocalizationOptions test_options() {
   LocalizationOptions o;
   o.gravity_m_s2 = 3.71;
-  o.vision.white_factor = 1;
-  o.vision.drift_sigmas = o.vision.constant_sigmas = {0, 0, 0, 0, 0, 0};
+  o.vision.white_noise_factor = 1;
+  o.vision.drift_sigma_ratios = o.vision.constant_sigma_ratios = {0, 0, 0, 0, 0, 0};
   return o;
 }
 

@@ -52,8 +52,8 @@ ImuSample between(const ImuSample& a, const ImuSample& b, Stamp at) {
 }  // namespace
 
 ErrorStateFilter::ErrorStateFilter(const LocalizationOptions& options) : options_(options) {
-  drift_sigmas_ = six_of(options.vision.drift_sigmas);
-  constant_sigmas_ = six_of(options.vision.constant_sigmas);
+  drift_sigma_ratios_ = six_of(options.vision.drift_sigma_ratios);
+  constant_sigma_ratios_ = six_of(options.vision.constant_sigma_ratios);
   for (int rows = 1; rows <= 6; ++rows)
     gates_[static_cast<std::size_t>(rows)] = chi_square_quantile(options.health.gate_probability, rows);
   vision_gate_ = chi_square_quantile(options.vision.gate_probability, 6);
@@ -83,15 +83,15 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   ErrorCovariance& p = m.estimate.covariance;
   set_variance(p, error_at::kPose, 6, kExact);
   set_variance(p, error_at::kVelocity, 3, rest && rest->stationary ? kRestingSpeed_m_s : kUnknownSpeed_m_s);
-  set_variance(p, error_at::kGyroBias, 3, std::max(options_.imu.gyro_bias_rad_s, 1e-9));
-  set_variance(p, error_at::kAccelBias, 3, std::max(options_.imu.accel_bias_m_s2, 1e-9));
+  set_variance(p, error_at::kGyroBias, 3, std::max(options_.imu.gyro_bias_sigma_rad_s, 1e-9));
+  set_variance(p, error_at::kAccelBias, 3, std::max(options_.imu.accel_bias_sigma_m_s2, 1e-9));
   set_variance(p, error_at::kGravityTilt, 2, m.imu.aligned ? kAlignedTilt_rad : kUnknownTilt_rad);
   set_variance(p, error_at::kWheelScale, 1, std::max(options_.wheels.scale_sigma, 1e-6));
   set_variance(p, error_at::kCompassOffset, 1,
                heading ? std::hypot(heading->sigma_rad, options_.compass.offset_sigma_rad) : kUnknownHeading_rad);
-  set_variance(p, error_at::kInclinometerBias, 2, std::max(options_.inclinometer.bias_rad, 1e-9));
-  p.diagonal().segment<6>(error_at::kVisionDrift) = drift_sigmas_.cwiseAbs2().cwiseMax(1e-12);
-  p.diagonal().segment<6>(error_at::kVisionConstant) = constant_sigmas_.cwiseAbs2().cwiseMax(1e-12);
+  set_variance(p, error_at::kInclinometerBias, 2, std::max(options_.inclinometer.bias_sigma_rad, 1e-9));
+  p.diagonal().segment<6>(error_at::kVisionDrift) = drift_sigma_ratios_.cwiseAbs2().cwiseMax(1e-12);
+  p.diagonal().segment<6>(error_at::kVisionConstant) = constant_sigma_ratios_.cwiseAbs2().cwiseMax(1e-12);
 
   // Static alignment: the means update tilt and biases; the pose defines the world and is not changed.
   if (rest) {
@@ -177,8 +177,8 @@ void ErrorStateFilter::propagate_at_constant_velocity(double seconds) {
   // The angular rate of a rocking rover changes slowly, so that the attitude error grows as σ t;
   // (t + dt)² − t² = (2 t + dt) dt.
   const double rotation =
-      o.turn_share * (rate + o.turn_floor_rad_s) * std::sqrt(2 * vision.constant_velocity_s + seconds);
-  const ConstantVelocityNoise noise{o.speed_share_sqrt_hz * (speed + o.speed_floor_m_s), rotation};
+      o.rate_sigma_ratio * (rate + o.rate_offset_rad_s) * std::sqrt(2 * vision.constant_velocity_s + seconds);
+  const ConstantVelocityNoise noise{o.speed_sigma_ratio_per_sqrt_s * (speed + o.speed_offset_m_s), rotation};
   const Transition t = transition(memory_.estimate.state, step, noise);
   const Matrix9d by = t.by_moving.topLeftCorner<9, 9>();
   vision.constant_velocity_noise =
@@ -192,10 +192,11 @@ void ErrorStateFilter::propagate_biases(double seconds) {
   ErrorCovariance& p = memory_.estimate.covariance;
   const auto square = [](double x) { return x * x; };
   if (p(error_at::kWheelScale, error_at::kWheelScale) < square(options_.wheels.scale_sigma))
-    p(error_at::kWheelScale, error_at::kWheelScale) += square(options_.wheels.scale_walk_sqrt_hz) * seconds;
-  p(error_at::kCompassOffset, error_at::kCompassOffset) += square(options_.compass.offset_walk_rad_sqrt_hz) * seconds;
+    p(error_at::kWheelScale, error_at::kWheelScale) += square(options_.wheels.scale_walk_per_sqrt_s) * seconds;
+  p(error_at::kCompassOffset, error_at::kCompassOffset) +=
+      square(options_.compass.offset_walk_rad_per_sqrt_s) * seconds;
   p.diagonal().segment<2>(error_at::kInclinometerBias).array() +=
-      square(options_.inclinometer.bias_walk_rad_sqrt_hz) * seconds;
+      square(options_.inclinometer.bias_walk_rad_per_sqrt_s) * seconds;
 }
 
 void ErrorStateFilter::update(const ImuSample& sample) {

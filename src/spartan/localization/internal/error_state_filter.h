@@ -89,7 +89,7 @@ class ErrorStateFilter {
   bool accept(LocalizationSensor sensor, double nis, int rows, HealthReason why);
 
   LocalizationOptions options_;
-  Vector6d drift_sigmas_, constant_sigmas_;
+  Vector6d drift_sigma_ratios_, constant_sigma_ratios_;
   std::array<double, 7> gates_{};  ///< by degrees of freedom
   double vision_gate_ = 0;
   FilterMemory memory_;

@@ -24,7 +24,7 @@ TEST(ErrorStateFilter, StaticAlignmentCorrelatesTiltWithAccelerometerBias) {
   const LocalizationOptions o = test_options();
   const ErrorStateFilter filter = started(o, {true, false, false, false});
   const ErrorCovariance& p = filter.memory().estimate.covariance;
-  const double by_bias = o.imu.accel_bias_m_s2 / o.gravity_m_s2;
+  const double by_bias = o.imu.accel_bias_sigma_m_s2 / o.gravity_m_s2;
   EXPECT_NEAR(std::sqrt(p(error_at::kGravityTilt, error_at::kGravityTilt)), by_bias, 0.02 * by_bias);
   const auto correlation = [&](int i, int j) { return p(i, j) / std::sqrt(p(i, i) * p(j, j)); };
   EXPECT_GT(std::abs(correlation(error_at::kGravityTilt, error_at::kAccelBias + 1)), 0.99);
@@ -57,7 +57,7 @@ std::vector<Measurement> drifting_motions(const TestDrive& drive, double seconds
 
 TEST(ErrorStateFilter, DriftOfVisionIsEstimated) {
   LocalizationOptions o = test_options();
-  o.vision.constant_sigmas = {1, 1, 1, 1, 1, 1};
+  o.vision.constant_sigma_ratios = {1, 1, 1, 1, 1, 1};
   const TestSensors with{true, false, false, true, 0.1};
   const TestDrive drive;
   Vector6d z;
@@ -78,7 +78,7 @@ TEST(ErrorStateFilter, DriftOfVisionIsEstimated) {
 
 TEST(ErrorStateFilter, MapConstraintsDoNotUpdateTheDriftOfVision) {
   LocalizationOptions o = test_options();
-  o.vision.constant_sigmas = {1, 1, 1, 1, 1, 1};
+  o.vision.constant_sigma_ratios = {1, 1, 1, 1, 1, 1};
   ErrorStateFilter filter = started(o, {false, false, false, false});
   for (const Measurement& m : test_motions(TestDrive(), 60, 1, 3)) filter.process(m);
   const NavigationState before = filter.memory().estimate.state;

@@ -65,14 +65,14 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   vision.stationary = measured.translation().isZero(1e-12) && measured.rotation().vec().isZero(1e-12);
 
   if (!vision.stationary) {
-    propagate_drift(error_at::kVisionDrift, drift_sigmas_, options_.vision.drift_steps);
-    propagate_drift(error_at::kVisionConstant, constant_sigmas_, kConstantSteps);
+    propagate_drift(error_at::kVisionDrift, drift_sigma_ratios_, options_.vision.drift_correlation_frames);
+    propagate_drift(error_at::kVisionConstant, constant_sigma_ratios_, kConstantSteps);
   }
 
   const bool inertial = vision.constant_velocity_s == 0;
   p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
 
-  const Matrix6d covariance = usable_covariance(motion.covariance, options_.vision.white_factor);
+  const Matrix6d covariance = usable_covariance(motion.covariance, options_.vision.white_noise_factor);
   const Vector6d drift = vision.stationary ? Vector6d::Zero().eval() : motion.covariance.diagonal().cwiseSqrt().eval();
   const Innovation innovation =
       relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, drift);
@@ -163,7 +163,7 @@ void ErrorStateFilter::compare_gyro(const RelativeMotion& motion) {
   const Eigen::Quaterniond seen = motion.previous_from_current.rotation();
   const double off = log_so3(imu.gyro_rotation.conjugate() * seen).norm(), angle = log_so3(seen).norm();
   const double variance = std::pow(options_.imu.gyro_noise_rad_s_sqrt_hz, 2) * imu.gyro_rotation_s +
-                          std::pow(2 * options_.imu.gyro_bias_rad_s * imu.gyro_rotation_s, 2) +
+                          std::pow(2 * options_.imu.gyro_bias_sigma_rad_s * imu.gyro_rotation_s, 2) +
                           motion.covariance.diagonal().tail<3>().maxCoeff() +
                           std::pow(0.01 * angle, 2);  // 1 %: scale error of the gyro
   if (off * off > 16 * variance) {                    // 4 σ
@@ -175,8 +175,8 @@ void ErrorStateFilter::compare_gyro(const RelativeMotion& motion) {
   ErrorCovariance& p = memory_.estimate.covariance;
   p.middleRows<6>(error_at::kGyroBias).setZero();
   p.middleCols<6>(error_at::kGyroBias).setZero();
-  p.diagonal().segment<3>(error_at::kGyroBias).setConstant(std::pow(options_.imu.gyro_bias_rad_s, 2));
-  p.diagonal().segment<3>(error_at::kAccelBias).setConstant(std::pow(options_.imu.accel_bias_m_s2, 2));
+  p.diagonal().segment<3>(error_at::kGyroBias).setConstant(std::pow(options_.imu.gyro_bias_sigma_rad_s, 2));
+  p.diagonal().segment<3>(error_at::kAccelBias).setConstant(std::pow(options_.imu.accel_bias_sigma_m_s2, 2));
 }
 
 /// The next visual motion starts at this pose.

@@ -62,13 +62,14 @@ WheelStep ErrorStateFilter::step_to(const WheelSample& sample) const {
   WheelStep step;
   step.counted_m = 0.5 * (left + right);
   const double distance = std::abs(step.counted_m);
-  step.forward_sigma_m = std::hypot(o.min_sigma_m, o.forward_share * distance);
-  step.side_sigma_m = std::hypot(o.min_sigma_m, o.side_share * distance);
-  step.up_sigma_m = std::hypot(o.min_sigma_m, o.up_share * distance);
+  step.forward_sigma_m = std::hypot(o.min_sigma_m, o.forward_sigma_ratio * distance);
+  step.side_sigma_m = std::hypot(o.min_sigma_m, o.side_sigma_ratio * distance);
+  step.up_sigma_m = std::hypot(o.min_sigma_m, o.up_sigma_ratio * distance);
   if (o.use_rotation && o.track_m > 0) {
     step.yaw_known = true;
     step.yaw_rad = (right - left) / o.track_m;
-    step.yaw_sigma_rad = std::hypot(std::sqrt(2.0) * step.forward_sigma_m / o.track_m, o.turn_share * step.yaw_rad);
+    step.yaw_sigma_rad =
+        std::hypot(std::sqrt(2.0) * step.forward_sigma_m / o.track_m, o.turn_sigma_ratio * step.yaw_rad);
   }
   return step;
 }

@@ -33,7 +33,7 @@ LocalizationOptions wheel_options() {
   LocalizationOptions options = test_options();
   options.wheels.track_m = kTrack_m;
   options.wheels.max_step_s = 2 * kWheelPeriod_s;
-  options.constant_velocity.turn_floor_rad_s = 0.2;  // the wheels are the source of the rotation
+  options.constant_velocity.rate_offset_rad_s = 0.2;  // the wheels are the source of the rotation
   return options;
 }
 
@@ -65,7 +65,7 @@ TEST(WheelUpdate, RotationIsAsUncertainAsTheWheels) {
   straight.swing_m = 0;
   const LocalizationOptions options = wheel_options();
   const double length = straight.travelled(3.5);  // of the first step
-  const double forward = std::hypot(options.wheels.min_sigma_m, options.wheels.forward_share * length);
+  const double forward = std::hypot(options.wheels.min_sigma_m, options.wheels.forward_sigma_ratio * length);
   const double yaw = std::sqrt(2.0) * forward / kTrack_m;  // of two wheels with that error each
   EXPECT_NEAR(std::sqrt(end_of(straight, 3.5, options).covariance(5, 5)), yaw, 0.02 * yaw);
 }

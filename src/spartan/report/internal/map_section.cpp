@@ -20,6 +20,7 @@ constexpr double kMostDecades = 4;  // of points in a cell
 
 // The names of MatchStatus with spaces.
 std::string status_text(std::string status) {
+  if (status == "decided") return "accepted";
   std::replace(status.begin(), status.end(), '_', ' ');
   return status;
 }
