@@ -247,7 +247,10 @@ class Lab:
             shutil.copy2(self.program, copy)
             copy.chmod(0o755)
         options = {"program": copy, "before": become_nobody}
-        return options if self.run("--version", **options).code == 0 else None
+        try:
+            return options if self.run("--version", **options).code == 0 else None
+        except PermissionError:  # a folder on the way is closed to others
+            return None
 
     @staticmethod
     def give_away(folder):
