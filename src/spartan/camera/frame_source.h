@@ -57,7 +57,7 @@ struct FrameKey {
   Stamp left_stamp;
 };
 
-/// Rows of sensor tables that are left out because they cannot be parsed.
+/// Rows of sensor tables that are discarded because they cannot be parsed.
 struct UnreadableRows {
   std::int64_t count = 0;
   std::string first;  ///< file, line and fault of the first one
@@ -73,7 +73,7 @@ class FrameSource {
   virtual const RecordingInfo& info() const = 0;
 
   /// The next sample, or nothing at the end. A listed frame that is missing, unreadable, of another size or out of
-  /// order is delivered as MissingFrame. Rows of sensor tables that cannot be parsed are left out and counted. Errors:
+  /// order is delivered as MissingFrame. Rows of sensor tables that cannot be parsed are discarded and counted. Errors:
   /// `read_error` and `resources` where the system cannot read a file that is there. The frame concerned was not taken,
   /// so the call may be repeated; after an error in a sensor table every call fails.
   virtual Result<std::optional<Sample>> next() = 0;
@@ -100,7 +100,7 @@ class FrameSource {
   /// Number of sensor samples discarded so far because their stamps did not increase.
   virtual std::int64_t sensor_samples_discarded() const = 0;
 
-  /// Rows of sensor tables left out so far.
+  /// Rows of sensor tables discarded so far.
   virtual UnreadableRows unreadable_sensor_rows() const = 0;
 
   /// Hash of the layout, of all listed frames, with their stamps and the names of their files inside the recording, and

@@ -348,8 +348,8 @@ void report_sensor_rows(const FrameSource& source, const Log& log) {
     log.warning(fmt::format("{} sensor samples discarded: their time stamps are not in increasing order", rows));
   const UnreadableRows unreadable = source.unreadable_sensor_rows();
   if (unreadable.count > 0) {
-    log.warning(fmt::format("{} rows of sensor tables left out: they cannot be parsed; the first: {}", unreadable.count,
-                            unreadable.first));
+    log.warning(fmt::format("{} rows of sensor tables discarded: they cannot be parsed; the first: {}",
+                            unreadable.count, unreadable.first));
   }
 }
 

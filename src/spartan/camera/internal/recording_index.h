@@ -32,7 +32,7 @@ class SampleStream {
  public:
   virtual ~SampleStream() = default;
   virtual Result<std::optional<Sample>> next() = 0;
-  /// Rows left out so far because they cannot be parsed.
+  /// Rows discarded so far because they cannot be parsed.
   virtual UnreadableRows unreadable_rows() const { return {}; }
 };
 /// Opens a stream at its first sample.

@@ -12,7 +12,7 @@ namespace spartan::internal {
 /// Parses the fields of a row into a sample. An error describes the field; the caller adds file and line.
 using RowReader = std::function<Result<Sample>(const std::vector<std::string_view>&)>;
 
-/// Opens a stream over a table whose rows have at least `fields` fields. Rows that cannot be parsed are left out and
+/// Opens a stream over a table whose rows have at least `fields` fields. Rows that cannot be parsed are discarded and
 /// counted. Codes as TableReader::open().
 SampleStreamFactory stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
                                     const RowReader& read_row);

@@ -32,7 +32,7 @@ class SensorTables : public ::testing::Test {
                                   const Eigen::Quaterniond& body_from_imu = Eigen::Quaterniond::Identity()) {
     return read_all(stream_of_table(folder_.write("imu.csv", text), {}, 7, read_imu_row(body_from_imu)));
   }
-  // The first row that was left out, and the number of rows of both kinds.
+  // The first row that was discarded, and the number of rows of both kinds.
   std::string first_unreadable(const std::string& text, std::int64_t unreadable, int read) {
     const auto stream = stream_of_table(folder_.write("imu.csv", text), {}, 7, read_imu_row({1, 0, 0, 0}))();
     EXPECT_TRUE(stream);

@@ -22,7 +22,7 @@ struct RunFacts {
   std::vector<std::string> absent;           ///< stages that the options disable
   double wall_seconds = 0, cpu_seconds = 0;  ///< of this execution of the program
   std::int64_t peak_memory_bytes = 0;
-  /// Rows of sensor tables that were left out: stamps that do not increase, and rows that cannot be parsed.
+  /// Rows of sensor tables that were discarded: stamps that do not increase, and rows that cannot be parsed.
   std::int64_t sensor_rows_reversed = 0, sensor_rows_unreadable = 0;
   std::optional<std::int64_t> resumed_from_frame;  ///< frame_id of the first frame processed after --resume
 };
