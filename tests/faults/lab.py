@@ -1,5 +1,4 @@
 """Where faults are injected: the program under test, short recordings with their undisturbed runs, and verdicts."""
-import contextlib
 import importlib.machinery
 import importlib.util
 import os
@@ -7,7 +6,6 @@ import random
 import resource
 import shutil
 import signal
-import sqlite3
 import struct
 import subprocess
 import time
@@ -76,7 +74,6 @@ class Recording:
     seconds: float = 0
     hashes: dict = field(default_factory=dict)
     run: Path | None = None  # its folder
-    last_frame: int = 0  # its frame_id
 
 
 def load_run_hashes(source):
@@ -115,8 +112,6 @@ class Lab:
             raise RuntimeError(f"the undisturbed run of {recording.name} fails: {done.err}")
         recording.code, recording.seconds, recording.hashes = done.code, done.seconds, self.hashes(folder)
         recording.run = folder
-        with contextlib.closing(sqlite3.connect(folder / "run.sqlite")) as store:
-            recording.last_frame = store.execute("SELECT frame_id FROM frames ORDER BY rowid DESC").fetchone()[0]
 
     def new_folder(self, prefix="t"):
         """A path below `work` that does not exist yet."""

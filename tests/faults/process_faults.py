@@ -117,18 +117,11 @@ def two_processes(lab, trials):
         overlap = pair[0].poll() is None
         ends = [lab.end(process) for process in pair]
         what = f"{recording.name}, {'+'.join(kind)}"
-        if not overlap or _in_turn(ends, kind, recording, folder):
+        if not overlap:
             yield Verdict(VOID, what)
         else:
             yield judge(_one_owner(ends, recording) + lab.resume(folder, recording), what)
         lab.clean(folder)
-
-
-def _in_turn(ends, kind, recording, folder):
-    """Whether the second process took the folder when the first had left it: it found no frame to process."""
-    if kind[1] != "resume" or [end.code for end in ends] != [recording.code] * 2:
-        return False
-    return f"resuming after frame {recording.last_frame}" in ends[1].err
 
 
 def _one_owner(ends, recording):
