@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <condition_variable>
 #include <exception>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #if defined(__has_feature)
@@ -48,6 +50,7 @@ struct ThreadPool::Arena {
     for (std::thread& other : others) other.join();
     if (error) std::rethrow_exception(error);
   }
+  static void enqueue(std::function<void()> work) { std::thread(std::move(work)).detach(); }
 
  private:
   int threads_;
@@ -61,12 +64,59 @@ struct ThreadPool::Arena {
   void run(int parts, const std::function<void(int)>& part) {
     tasks_.execute([&] { tbb::parallel_for(0, parts, 1, part, tbb::simple_partitioner{}); });
   }
+  void enqueue(std::function<void()> work) { tasks_.enqueue(std::move(work)); }
 
  private:
   tbb::task_arena tasks_;
 };
 
 #endif
+
+struct BackgroundTask::State {
+  explicit State(std::function<void()> work_in) : work(std::move(work_in)) {}
+
+  // Whether the caller is the first that wants to run it.
+  bool claim() { return !claimed.exchange(true); }
+  void run() {
+    try {
+      work();
+    } catch (...) {
+      error = std::current_exception();
+    }
+    const std::lock_guard lock(mutex);
+    done = true;
+    changed.notify_all();
+  }
+  void wait_for_end() {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [this] { return done; });
+  }
+
+  std::function<void()> work;
+  std::exception_ptr error;
+  std::atomic<bool> claimed{false};
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool done = false;
+};
+
+BackgroundTask& BackgroundTask::operator=(BackgroundTask&& other) noexcept {
+  abandon();
+  state_ = std::move(other.state_);
+  return *this;
+}
+
+void BackgroundTask::wait() {
+  if (!state_) return;
+  if (state_->claim()) state_->run();
+  state_->wait_for_end();
+  if (state_->error) std::rethrow_exception(state_->error);
+}
+
+void BackgroundTask::abandon() noexcept {
+  if (state_ && !state_->claim()) state_->wait_for_end();
+  state_.reset();
+}
 
 // std::thread::hardware_concurrency() counts the cores of the machine.
 int available_cores() {
@@ -94,6 +144,17 @@ void ThreadPool::parallel_for(int begin, int end, int grain, const std::function
     return;
   }
   arena_->run(parts, run_part);
+}
+
+BackgroundTask ThreadPool::start(std::function<void()> work) const {
+  BackgroundTask task;
+  task.state_ = std::make_shared<BackgroundTask::State>(std::move(work));
+  if (arena_) {
+    arena_->enqueue([state = task.state_] {
+      if (state->claim()) state->run();
+    });
+  }
+  return task;
 }
 
 void ThreadPool::parallel_invoke(const std::function<void()>& first, const std::function<void()>& second) const {

@@ -9,6 +9,27 @@ namespace spartan {
 /// Number of cores that this process may run on (`taskset`, containers), at least 1.
 int available_cores();
 
+/// A function that runs once, beside its caller, as ThreadPool::start() says. Empty, or to be waited for.
+class BackgroundTask {
+ public:
+  BackgroundTask() = default;
+  BackgroundTask(BackgroundTask&&) noexcept = default;
+  BackgroundTask& operator=(BackgroundTask&& other) noexcept;
+  /// Waits for the end of a function that has begun; one that has not begun never runs.
+  ~BackgroundTask() { abandon(); }
+
+  bool empty() const { return state_ == nullptr; }
+  /// Returns when the function has returned. Runs it in this thread where no worker has begun it. Rethrows what it has
+  /// thrown, at each call. Does nothing where the task is empty.
+  void wait();
+
+ private:
+  friend class ThreadPool;
+  struct State;
+  void abandon() noexcept;
+  std::shared_ptr<State> state_;
+};
+
 /// A bounded set of worker threads (a TBB task arena). Copies share the threads.
 class ThreadPool {
  public:
@@ -22,6 +43,9 @@ class ThreadPool {
   void parallel_for(int begin, int end, int grain, const std::function<void(int, int)>& body) const;
   /// Runs both functions, in parallel if there is more than one thread.
   void parallel_invoke(const std::function<void()>& first, const std::function<void()>& second) const;
+  /// Lets a worker run `work` while the caller goes on; with one thread it runs in BackgroundTask::wait(). The worker
+  /// is one of the pool: meanwhile its loops have a thread less.
+  BackgroundTask start(std::function<void()> work) const;
 
  private:
   struct Arena;

@@ -5,9 +5,11 @@
 #include <sched.h>
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -77,6 +79,65 @@ TEST(ThreadPool, NestWithoutDeadlock) {
   std::atomic<int> count = 0;
   workers.parallel_for(0, 8, 1, [&](int, int) { workers.parallel_for(0, 8, 1, [&](int, int) { ++count; }); });
   EXPECT_EQ(count, 64);
+}
+
+TEST(BackgroundTask, RunsOnceBesideTheCaller) {
+  for (const int threads : {1, 2}) {
+    const ThreadPool workers(threads);
+    for (int i = 0; i < 200; ++i) {
+      int runs = 0;
+      BackgroundTask task = workers.start([&] { ++runs; });
+      workers.parallel_for(0, 4, 1, [](int, int) {});
+      task.wait();
+      task.wait();
+      ASSERT_EQ(runs, 1);
+      EXPECT_FALSE(task.empty());
+    }
+  }
+}
+
+TEST(BackgroundTask, RunsInWaitWithOneThread) {
+  bool ran = false;
+  BackgroundTask task = ThreadPool(1).start([&] { ran = true; });
+  EXPECT_FALSE(ran);
+  task.wait();
+  EXPECT_TRUE(ran);
+}
+
+TEST(BackgroundTask, RethrowsAtEachWait) {
+  for (const int threads : {1, 2}) {
+    BackgroundTask task = ThreadPool(threads).start([] { throw std::runtime_error("in the background"); });
+    EXPECT_THROW(task.wait(), std::runtime_error);
+    EXPECT_THROW(task.wait(), std::runtime_error);
+  }
+}
+
+TEST(BackgroundTask, IsFinishedOrNeverRunsAfterItsDestruction) {
+  for (const int threads : {1, 2}) {
+    const ThreadPool workers(threads);
+    for (int i = 0; i < 200; ++i) {
+      auto value = std::make_unique<int>(0);
+      {
+        BackgroundTask task = workers.start([&] { ++*value; });
+        if (i % 2 == 0) task = {};
+      }
+      value.reset();  // an access after this is found by the address sanitizer
+    }
+  }
+}
+
+// The loops of the pool go on while a task runs in it.
+TEST(BackgroundTask, LeavesTheLoopsOfThePoolRunning) {
+  const ThreadPool workers(2);
+  std::atomic<bool> stop = false;
+  BackgroundTask task = workers.start([&] {
+    while (!stop) std::this_thread::yield();
+  });
+  std::atomic<int> count = 0;
+  for (int i = 0; i < 100; ++i) workers.parallel_for(0, 8, 1, [&](int, int) { ++count; });
+  EXPECT_EQ(count, 800);
+  stop = true;
+  task.wait();
 }
 
 TEST(ThreadPool, RejectInvalidArguments) {
