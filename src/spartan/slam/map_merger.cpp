@@ -41,35 +41,10 @@ Correction updated_by_match(const UncertainPose& prior, const Pose& match, const
           symmetric(difference - cross - cross.transpose() + reduction)};
 }
 
-// Half side of the part of the global map that a local map can overlap anywhere in the search window.
-double view_reach(const MapOptions& map, const MatchOptions& match) {
-  const double half = 0.5 * map.extent_m;
-  return half + match.max_search_m + 1.5 * half * std::sin(match.max_search_deg * std::numbers::pi / 180);
-}
-
-}  // namespace
-
-Result<MapMerger> MapMerger::create(const SlamOptions& options, const MapOptions& map_options,
-                                    const ThreadPool& workers) {
-  if (Status valid = validate(options, "SLAM options"); !valid) return failure(valid);
-  auto generator = MapGenerator::create(map_options, workers);
-  if (!generator) return failure(generator);
-  auto map = GlobalMap::create(options.map, map_options.cell_m);
-  if (!map) return failure(map);
-  return MapMerger(options, map_options, std::move(*generator), std::move(*map), workers);
-}
-
-MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, MapGenerator generator, GlobalMap map,
-                     const ThreadPool& workers)
-    : options_(options),
-      map_options_(map_options),
-      workers_(workers),
-      generator_(std::move(generator)),
-      map_(std::move(map)) {}
-
 // Covariance of the map under the local map: the mean of the covariances of the stops that observed it, weighted by
 // cells, each transported rigidly to this body frame.
-Matrix6d MapMerger::map_covariance(const MapView& view, const LocalMap& local, const Pose& world_from_body) const {
+Matrix6d map_covariance(const MapExcerpt& global, const LocalMap& local, const Pose& world_from_body) {
+  const MapView& view = global.view;
   std::map<std::int32_t, int> cells;
   const LatticeWindow local_window = window_of(local.place, local.size());
   int all = 0;
@@ -84,40 +59,78 @@ Matrix6d MapMerger::map_covariance(const MapView& view, const LocalMap& local, c
   Matrix6d mean = Matrix6d::Zero();
   for (const auto& [id, count] : cells) {
     const auto stop =
-        std::find_if(map_.stops().begin(), map_.stops().end(), [&](const MapStop& s) { return s.id == id; });
-    if (stop == map_.stops().end()) continue;
+        std::find_if(global.stops.begin(), global.stops.end(), [&](const MapStop& s) { return s.id == id; });
+    if (stop == global.stops.end()) continue;
     const Matrix6d transport = adjoint(world_from_body.inverse() * stop->world_from_body.pose);
     mean += (static_cast<double>(count) / all) * transport * stop->world_from_body.covariance * transport.transpose();
   }
   return symmetric(mean);
 }
 
+// Half side of the part of the global map that a local map can overlap anywhere in the search window.
+double view_reach(const MapOptions& map, const MatchOptions& match) {
+  const double half = 0.5 * map.extent_m;
+  return half + match.max_search_m + 1.5 * half * std::sin(match.max_search_deg * std::numbers::pi / 180);
+}
+
+}  // namespace
+
+Result<MapMerger> MapMerger::create(const SlamOptions& options, const MapOptions& map_options,
+                                    const ThreadPool& workers) {
+  if (Status valid = validate(options, "SLAM options"); !valid) return failure(valid);
+  if (Status valid = validate(map_options, "map options"); !valid) return failure(valid);
+  auto map = GlobalMap::create(options.map, map_options.cell_m);
+  if (!map) return failure(map);
+  return MapMerger(options, map_options, std::move(*map), workers);
+}
+
+MapMerger::MapMerger(const SlamOptions& options, const MapOptions& map_options, GlobalMap map,
+                     const ThreadPool& workers)
+    : options_(options), map_options_(map_options), workers_(workers), map_(std::move(map)) {}
+
 Result<MapMergeResult> MapMerger::add(std::span<const SurfacePoint> points, const Stamp& stamp,
                                       const UncertainPose& world_from_body) {
+  const auto global = excerpt_around(world_from_body.pose);
+  if (!global) return failure(global);
+  MapMergeResult result = match(points, stamp, world_from_body, *global, workers_);
+  if (Status s = fuse(result); !s) return failure(s);
+  return result;
+}
+
+Result<std::optional<MapExcerpt>> MapMerger::excerpt_around(const Pose& world_from_body) {
+  if (map_.empty()) return std::nullopt;
+  const Eigen::Vector3d& at = world_from_body.translation();
+  auto view = map_.view(window_around(at.x(), at.y(), view_reach(map_options_, options_.match), map_options_.cell_m));
+  if (!view) return failure(view);
+  return MapExcerpt{std::move(*view), map_.stops()};
+}
+
+MapMergeResult MapMerger::match(std::span<const SurfacePoint> points, const Stamp& stamp,
+                                const UncertainPose& world_from_body, const std::optional<MapExcerpt>& global,
+                                const ThreadPool& workers) const {
+  const MapGenerator generator = MapGenerator::create(map_options_, workers).value();  // create() has validated them
   MapMergeResult result;
+  result.stamp = stamp;
   result.corrected = world_from_body;
   result.match.world_from_body = world_from_body.pose;
-  Matrix6d relative = Matrix6d::Zero();
-  result.local = generator_.generate(points, world_from_body.pose);
-  if (!map_.empty()) {
-    const Eigen::Vector3d& at = world_from_body.pose.translation();
-    const auto view =
-        map_.view(window_around(at.x(), at.y(), view_reach(map_options_, options_.match), map_options_.cell_m));
-    if (!view) return failure(view);
-    result.match =
-        match_map(points, result.local, *view, world_from_body, map_options_.min_points, options_.match, workers_);
-    const MapMatch& match = result.match;
-    const Matrix6d of_map = map_covariance(*view, result.local, match.world_from_body);
-    const Correction update = updated_by_match(world_from_body, match.world_from_body, match.information, of_map);
-    relative = update.relative;
-    if (!match.information.isZero()) {
-      result.constraint = PoseConstraint{stamp, match.world_from_body, match.information, of_map};
-      result.corrected = update.corrected;
-      result.local = generator_.generate(points, result.corrected.pose);
-    }
+  result.local = generator.generate(points, world_from_body.pose);
+  if (!global) return result;
+  result.match =
+      match_map(points, result.local, global->view, world_from_body, map_options_.min_points, options_.match, workers);
+  const MapMatch& match = result.match;
+  const Matrix6d of_map = map_covariance(*global, result.local, match.world_from_body);
+  const Correction update = updated_by_match(world_from_body, match.world_from_body, match.information, of_map);
+  result.relative_covariance = update.relative;
+  if (!match.information.isZero()) {
+    result.constraint = PoseConstraint{stamp, match.world_from_body, match.information, of_map};
+    result.corrected = update.corrected;
+    result.local = generator.generate(points, result.corrected.pose);
   }
-  if (Status s = map_.add(result.local, stamp, result.corrected, relative); !s) return failure(s);
   return result;
+}
+
+Status MapMerger::fuse(const MapMergeResult& matched) {
+  return map_.add(matched.local, matched.stamp, matched.corrected, matched.relative_covariance);
 }
 
 Bytes MapMerger::save() const {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
@@ -59,8 +60,17 @@ struct MapMergeResult {
   /// are determined.
   std::optional<PoseConstraint> constraint;
   LocalMap local;  ///< At the corrected pose.
+  Stamp stamp;
+  /// Covariance of the corrected pose relative to the global map (right perturbation).
+  Matrix6d relative_covariance = Matrix6d::Zero();
 
   bool decided() const { return match.decided(); }
+};
+
+/// A part of the global map, and the stops that made it.
+struct MapExcerpt {
+  MapView view;
+  std::vector<MapStop> stops;
 };
 
 /// Its state is the global map of the stops up to t−1. Where the match is rejected, the local map is fused at the prior
@@ -76,6 +86,14 @@ class MapMerger {
   Result<MapMergeResult> add(std::span<const SurfacePoint> points, const Stamp& stamp,
                              const UncertainPose& world_from_body);
 
+  /// The steps of add(). What match() needs of the global map: none where that is empty. Codes as add().
+  Result<std::optional<MapExcerpt>> excerpt_around(const Pose& world_from_body);
+  /// Uses nothing that the other functions change, so it may run beside them. `workers`: for its loops.
+  MapMergeResult match(std::span<const SurfacePoint> points, const Stamp& stamp, const UncertainPose& world_from_body,
+                       const std::optional<MapExcerpt>& global, const ThreadPool& workers) const;
+  /// Adds a matched local map to the global map. Codes as add(); after an error nothing has changed.
+  Status fuse(const MapMergeResult& matched);
+
   GlobalMap& map() { return map_; }
 
   /// From now on tiles of the map may be paged out to the store, which must contain this map or be empty. Borrowed.
@@ -89,14 +107,11 @@ class MapMerger {
   Status restore(const Bytes& bytes, TileStore& store);
 
  private:
-  MapMerger(const SlamOptions& options, const MapOptions& map_options, MapGenerator generator, GlobalMap map,
-            const ThreadPool& workers);
-  Matrix6d map_covariance(const MapView& view, const LocalMap& local, const Pose& world_from_body) const;
+  MapMerger(const SlamOptions& options, const MapOptions& map_options, GlobalMap map, const ThreadPool& workers);
 
   SlamOptions options_;
   MapOptions map_options_;
   ThreadPool workers_;
-  MapGenerator generator_;
   GlobalMap map_;
 };
 
