@@ -60,6 +60,7 @@ Json to_json(const TrajectoryMetrics& metrics, const ComparedTrajectories& compa
             {"rotation_deg", statistics_to_json(metrics.rpe_rotation_deg)},
             {"delta_frames", metrics.rpe_delta_frames}}},
           {"truth_from_estimate", similarity_to_json(metrics.truth_from_estimate)},
+          {"axes_rotation_deg", number(metrics.axes_rotation_deg)},
           {"reasons", std::move(reasons)}};
 }
 
@@ -85,6 +86,15 @@ std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectorie
       text += fmt::format("{:<20g}{:>10}{:>17.3f}{:>17.5f}\n", s.length_m, s.count, *s.translation_percent,
                           *s.rotation_deg_per_m);
     }
+  }
+  if (metrics.axes_rotation_deg) {
+    text += fmt::format(
+        "\nnote: the body axes of the trajectories differ by a constant rotation, {:.0f} deg for the motions (x "
+        "forward "
+        "against z forward, of a camera?): only the ATE compares them; RPE, segments and drift need a truth of the "
+        "same "
+        "axes\n",
+        *metrics.axes_rotation_deg);
   }
   for (const MissingMetric& missing : metrics.missing) text += fmt::format("no {}: {}\n", missing.name, missing.reason);
   return text;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "spartan/core/pose.h"
@@ -101,6 +102,39 @@ void add_relative_errors(TrajectoryMetrics& metrics, const Trajectory& estimate,
   if (!rotations.empty()) metrics.rpe_rotation_deg = statistics_of(std::move(rotations));
 }
 
+constexpr double kMotionsOfPath = 20;
+constexpr double kLeastAxesRotation_deg = 20, kMostUnexplained = 0.1;
+
+// Motions in body axes over equal parts of the path: u of the estimate, v of the truth. With the same axes u = v; with
+// axes that differ by a rotation R, v = R u.
+std::optional<double> axes_rotation_deg(const Trajectory& estimate, const Trajectory& truth,
+                                        const std::vector<double>& path_m) {
+  std::vector<Eigen::Vector3d> of_estimate, of_truth;
+  for (std::size_t i = 0, j = 0; j < path_m.size(); ++j) {
+    if (path_m[j] - path_m[i] < path_m.back() / kMotionsOfPath || path_m.back() == 0) continue;
+    of_estimate.push_back((estimate[i].pose.inverse() * estimate[j].pose).translation());
+    of_truth.push_back((truth[i].pose.inverse() * truth[j].pose).translation());
+    i = j;
+  }
+  if (of_truth.size() < 3) return std::nullopt;
+  // Each motion and its opposite: the fit is then a rotation alone.
+  for (std::vector<Eigen::Vector3d>* motions : {&of_estimate, &of_truth}) {
+    const std::size_t count = motions->size();
+    for (std::size_t i = 0; i < count; ++i) motions->push_back(-(*motions)[i]);
+  }
+  const Eigen::Matrix3d rotation = fit_similarity(of_estimate, of_truth, false).pose.rotation_matrix();
+  double unexplained = 0, same_axes = 0, all = 0;
+  for (std::size_t i = 0; i < of_truth.size(); ++i) {
+    unexplained += (of_truth[i] - rotation * of_estimate[i]).squaredNorm();
+    same_axes += (of_truth[i] - of_estimate[i]).squaredNorm();
+    all += of_truth[i].squaredNorm();
+  }
+  // Motions along a line leave the rotation about it free; then this is the angle between the lines.
+  const double angle_deg = 2 * std::asin(std::min(1.0, 0.5 * std::sqrt(same_axes / all))) * 180 / std::numbers::pi;
+  const bool explained = unexplained < kMostUnexplained * kMostUnexplained * all;
+  return explained && angle_deg > kLeastAxesRotation_deg ? std::optional(angle_deg) : std::nullopt;
+}
+
 void explain_missing(TrajectoryMetrics& metrics, bool truth_has_rotation) {
   const std::string too_few = "fewer frames than the step of the relative error";
   const std::string no_rotation = "the truth has no rotation (all are the identity)";
@@ -167,6 +201,7 @@ Result<TrajectoryMetrics> compare_trajectories(const Trajectory& estimate, const
       const Pose error = relative_error(pairs->estimate, pairs->truth, 0, metrics.frames - 1);
       metrics.drift_percent = 100.0 * error.translation().norm() / metrics.path_length_m;
     }
+    metrics.axes_rotation_deg = axes_rotation_deg(pairs->estimate, pairs->truth, path_m);
   }
   explain_missing(metrics, truth_has_rotation);
   return metrics;

@@ -79,6 +79,10 @@ struct TrajectoryMetrics {
   int rpe_delta_frames = 1;
   std::optional<ErrorStatistics> rpe_translation_m;
   std::optional<ErrorStatistics> rpe_rotation_deg;
+  /// Angle of the rotation between the body axes of both trajectories where they are not the same axes, e.g. x forward
+  /// and z forward: of the motions over segments of a 20th of the path, above 20°, with at most 10 % of them not
+  /// explained. RPE, segments and drift then compare different axes.
+  std::optional<double> axes_rotation_deg;
   std::vector<MissingMetric> missing;
 };
 
