@@ -51,6 +51,8 @@ inline const char* file_name(CalibrationFormat format) {
       return "pair.tsai";
     case CalibrationFormat::cahvor:
       return "pair.cahvor";
+    case CalibrationFormat::middlebury:
+      return "calib.txt";
   }
   return "";
 }

@@ -13,10 +13,22 @@
 namespace spartan {
 
 /// The supported formats of calibration files.
-enum class CalibrationFormat { rig_yaml, kitti, kitti_raw, euroc, kalibr, opencv, ros, mrcal, tsai, cahvor };
+enum class CalibrationFormat {
+  rig_yaml,
+  kitti,
+  kitti_raw,
+  euroc,
+  kalibr,
+  opencv,
+  ros,
+  mrcal,
+  tsai,
+  cahvor,
+  middlebury
+};
 
 /// The name of a format: "rig.yaml", "kitti", "kitti-raw", "euroc", "kalibr", "opencv", "ros", "mrcal", "tsai",
-/// "cahvor".
+/// "cahvor", "middlebury".
 std::string_view name_of(CalibrationFormat format);
 /// The format with that name, if there is one.
 std::optional<CalibrationFormat> calibration_format_named(std::string_view name);
@@ -58,12 +70,21 @@ Result<LoadedRig> read_calibration_as(CalibrationFormat format, const std::strin
 /// read_calibration() without the additional information.
 Result<Rig> read_rig(const std::string& path, ImageSize size_hint = {});
 
-/// KITTI odometry `calib.txt` (P0 and P1; baseline −P1[3]/P1[0]). The file does not contain the image size.
-Result<Rig> read_kitti_calib(const std::string& path, ImageSize size);
+/// The gray or the colour cameras of KITTI.
+enum class KittiPair { gray, colour };
 
-/// KITTI raw `calib_cam_to_cam.txt`: the rectified gray pair (P_rect_00, P_rect_01, S_rect_00), with the IMU as body if
-/// `calib_imu_to_velo.txt` and `calib_velo_to_cam.txt` are in the same folder.
-Result<Rig> read_kitti_raw_calib(const std::string& path);
+/// KITTI odometry `calib.txt`: P0 and P1 (baseline −P1[3]/P1[0]), or P2 and P3 of the colour cameras, whose heights
+/// differ by some millimetres. The file does not contain the image size.
+Result<Rig> read_kitti_calib(const std::string& path, ImageSize size, KittiPair pair = KittiPair::gray);
+
+/// KITTI raw `calib_cam_to_cam.txt`: the rectified gray pair (P_rect_00, P_rect_01, S_rect_00) or the colour pair
+/// (P_rect_02, P_rect_03, S_rect_02), with the IMU as body if `calib_imu_to_velo.txt` and `calib_velo_to_cam.txt` are
+/// in the same folder.
+Result<Rig> read_kitti_raw_calib(const std::string& path, KittiPair pair = KittiPair::gray);
+
+/// Middlebury (2014 on) and ETH3D two-view `calib.txt`: cam0, cam1, baseline in millimetres, width, height. doffs must
+/// be the difference of the principal points; other keys are ignored.
+Result<LoadedRig> read_middlebury_calib(const std::string& path);
 
 /// EuRoC/ASL: `mav0/cam0/sensor.yaml`, `mav0/cam1/sensor.yaml` and further cameras; the body is the body frame of
 /// T_BS. Models as in Kalibr's files. The first two cameras are the pair.

@@ -14,7 +14,7 @@ struct FormatKind {
   std::string_view name;
   bool file_per_camera, image_size;
 };
-constexpr std::array<FormatKind, 10> kKinds{{
+constexpr std::array<FormatKind, 11> kKinds{{
     {CalibrationFormat::rig_yaml, "rig.yaml", false, true},
     {CalibrationFormat::kitti, "kitti", false, false},
     {CalibrationFormat::kitti_raw, "kitti-raw", false, true},
@@ -25,8 +25,9 @@ constexpr std::array<FormatKind, 10> kKinds{{
     {CalibrationFormat::mrcal, "mrcal", true, true},
     {CalibrationFormat::tsai, "tsai", true, false},
     {CalibrationFormat::cahvor, "cahvor", true, true},
+    {CalibrationFormat::middlebury, "middlebury", false, true},
 }};
-static_assert(kKinds[static_cast<std::size_t>(CalibrationFormat::cahvor)].format == CalibrationFormat::cahvor);
+static_assert(kKinds[static_cast<std::size_t>(CalibrationFormat::middlebury)].format == CalibrationFormat::middlebury);
 
 const FormatKind& kind_of(CalibrationFormat format) {
   return kKinds[static_cast<std::size_t>(format)];
@@ -78,6 +79,7 @@ std::optional<CalibrationFormat> detect_calibration_format(const std::string& pa
   if (const auto format = format_of_extension(extension)) return format;
   if (has_line(text, "P_rect_00:")) return CalibrationFormat::kitti_raw;
   if (has_line(text, "P0:")) return CalibrationFormat::kitti;
+  if (has_line(text, "cam0=[") || has_line(text, "cam0 = [")) return CalibrationFormat::middlebury;
   if (has_line(text, "T_BS:")) return CalibrationFormat::euroc;
   if (has_line(text, "schema:")) return CalibrationFormat::rig_yaml;
   if (text.find("opencv-matrix") != std::string::npos) return CalibrationFormat::opencv;

@@ -87,6 +87,8 @@ Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, Ima
       const std::string folder = fs::absolute(file).parent_path().parent_path().string();
       return complete(read_euroc_calib(folder), format, folder, "that of T_BS");
     }
+    case CalibrationFormat::middlebury:
+      return read_middlebury_calib(path);
     case CalibrationFormat::kalibr:
       return read_kalibr_calib(path);
     case CalibrationFormat::opencv:
@@ -162,10 +164,10 @@ Result<LoadedRig> read_calibration(const std::string& path, ImageSize size_hint)
   if (!text) return failure(text);
   const auto format = detect_calibration_format(first, *text);
   if (!format) {
-    return failure(
-        ErrorCode::configuration, "is not a calibration file of a known format", first,
-        "known formats: rig.yaml, KITTI calib.txt and calib_cam_to_cam.txt, EuRoC sensor.yaml, Kalibr camchain, "
-        "OpenCV yml or xml, ROS camera_info, mrcal .cameramodel, Ames .tsai, JPL .cahvor");
+    return failure(ErrorCode::configuration, "is not a calibration file of a known format", first,
+                   "known formats: rig.yaml, KITTI calib.txt and calib_cam_to_cam.txt, Middlebury calib.txt, EuRoC "
+                   "sensor.yaml, Kalibr camchain, "
+                   "OpenCV yml or xml, ROS camera_info, mrcal .cameramodel, Ames .tsai, JPL .cahvor");
   }
   if (first != path && !has_file_per_camera(*format)) {
     return failure(ErrorCode::configuration, fmt::format("{} does not use one file per camera", name_of(*format)), path,

@@ -65,6 +65,7 @@ const std::vector<FormatCase> kFormatCases{
      true,
      true},
     {Format::tsai, "pair.tsai", {"pinhole", "radtan4", "two_terms", "radtan5"}, true, true, false},
+    {Format::middlebury, "calib.txt", {"pinhole"}, false, true, false},
     {Format::cahvor,
      "pair.cahvor",
      {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "cahv", "cahvor", "cahvore"},
@@ -72,6 +73,11 @@ const std::vector<FormatCase> kFormatCases{
      true,
      true},
 };
+
+// Formats of rectified pairs only.
+bool is_rectified(Format format) {
+  return format == Format::kitti || format == Format::kitti_raw || format == Format::middlebury;
+}
 
 double between(double low, double high) {
   constexpr int kSteps = 1 << 30;
@@ -207,7 +213,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, EveryFormatPreservesWhatItSupports, ()) {
   const FormatCase format_case = *rc::gen::elementOf(kFormatCases);
   const std::string kind = *rc::gen::elementOf(format_case.models);
   const bool body = format_case.body && (!format_case.left_camera || *rc::gen::arbitrary<bool>());
-  const bool rectified = format_case.format == Format::kitti || format_case.format == Format::kitti_raw;
+  const bool rectified = is_rectified(format_case.format);
   const Rig rig = any_rig(kind, body, rectified, format_case.sizes);
   RC_PRE(rig.validation_errors().empty());
   RC_CLASSIFY(true, std::string(format_case.path) + " " + kind);
@@ -227,9 +233,8 @@ RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
   const bool held = std::any_of(b.models.begin(), b.models.end(), [&](const char* m) { return kind == m; });
   const bool by_body = a.body && b.body, by_left = a.left_camera && b.left_camera;
   RC_PRE(held && (by_body || by_left));
-  const auto is_kitti = [](const FormatCase& h) { return h.format == Format::kitti || h.format == Format::kitti_raw; };
-  const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()), is_kitti(a) || is_kitti(b),
-                          a.sizes && b.sizes);
+  const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()),
+                          is_rectified(a.format) || is_rectified(b.format), a.sizes && b.sizes);
   RC_PRE(rig.validation_errors().empty());
   const TemporaryFolder first, second, third;
   const auto of_a = round_trip(rig, a, first);
@@ -297,7 +302,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, RigYamlPreservesEverything, ()) {
 RC_GTEST_PROP(CalibrationRoundTrip, DroppedPropertiesAreReported, ()) {
   const FormatCase format_case = kFormatCases[*rc::gen::inRange<std::size_t>(1, kFormatCases.size())];
   const std::string kind = *rc::gen::elementOf(format_case.models);
-  const bool rectified = format_case.format == Format::kitti || format_case.format == Format::kitti_raw;
+  const bool rectified = is_rectified(format_case.format);
   const Rig plain = any_rig(kind, true, rectified, format_case.sizes);
   Rig rig = plain;
   put_on_mast(rig);

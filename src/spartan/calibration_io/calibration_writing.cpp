@@ -73,6 +73,8 @@ Result<CalibrationFiles> write_as(const Rig& rig, CalibrationFormat format, cons
       return write_kitti_calib(rig, path);
     case CalibrationFormat::kitti_raw:
       return write_kitti_raw_calib(rig, path);
+    case CalibrationFormat::middlebury:
+      return write_middlebury_calib(rig, path);
     case CalibrationFormat::euroc:
       return write_euroc_calib(rig, path);
     case CalibrationFormat::kalibr:

@@ -20,6 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char *kColour = "a colour camera, which is not read", *kGray = "a gray camera, which is not read",
+                     *kScanner = "the place of the laser scanner, which is not read";
+
 using Projection = Eigen::Matrix<double, 3, 4>;
 
 template <class Matrix>
@@ -44,14 +47,38 @@ Result<Eigen::Matrix3d> read_rotation(const TextMatrices& file, const std::strin
 // The rectified cameras of a pair.
 struct RectifiedPair {
   PinholeModel left, right;
-  double left_x_m = 0;  ///< position of the left camera along x of the reference camera
-  double baseline_m = 0;
+  Eigen::Vector3d left_m = Eigen::Vector3d::Zero();           ///< position of the left camera in the reference camera
+  Eigen::Vector3d left_to_right_m = Eigen::Vector3d::Zero();  ///< from the left to the right camera
   std::vector<RigDifference> ignored;
 };
 
+struct PairKeys {
+  const char *left, *right;
+};
+
+PinholeModel pinhole_of(const Projection& p) {
+  return {p(0, 0), p(1, 1), p(0, 2), p(1, 2)};
+}
+
+// P = K [I | t]: the camera is at −t.
+Eigen::Vector3d position_of(const Projection& p) {
+  const double z = p(2, 3);
+  return -Eigen::Vector3d((p(0, 3) - p(0, 2) * z) / p(0, 0), (p(1, 3) - p(1, 2) * z) / p(1, 1), z);
+}
+
+// The colour cameras are parallel, but at slightly different heights and depths.
+RectifiedPair colour_pair(const Projection& left, const Projection& right) {
+  RectifiedPair pair;
+  pair.left = pinhole_of(left);
+  pair.right = pinhole_of(right);
+  pair.left_m = position_of(left);
+  pair.left_to_right_m = position_of(right) - pair.left_m;
+  return pair;
+}
+
 // P = K [I | t] with t = (−x, 0, 0): a camera at x along the common row direction.
-Result<RectifiedPair> read_projections(const TextMatrices& file, const std::string& left_key,
-                                       const std::string& right_key) {
+Result<RectifiedPair> read_projections(const TextMatrices& file, const PairKeys& keys, KittiPair kind) {
+  const std::string left_key = keys.left, right_key = keys.right;
   const auto left = read_matrix<Projection>(file, left_key);
   if (!left) return failure(left);
   const auto right = read_matrix<Projection>(file, right_key);
@@ -65,6 +92,11 @@ Result<RectifiedPair> read_projections(const TextMatrices& file, const std::stri
       return error_at(key, "is not the projection of a rectified camera (fx 0 cx −fx·x; 0 fy cy 0; 0 0 1 0)");
     }
   }
+  if (kind == KittiPair::colour) {
+    RectifiedPair pair = colour_pair(*left, *right);
+    if (pair.left_to_right_m.x() > 1e-6) return pair;
+    return error_at(right_key, "gives a baseline that is not above zero");
+  }
   // Tolerances for rounded files: 1e-6 of the focal length, 1e-3 px for the row, 1e-3 m for height and depth.
   const double f = (*left)(0, 0);
   const bool same_rows =
@@ -75,12 +107,13 @@ Result<RectifiedPair> read_projections(const TextMatrices& file, const std::stri
     return error_at(right_key, fmt::format("does not have the rows of {}: the pair is not rectified", left_key));
   }
   RectifiedPair pair;
-  pair.left = {(*left)(0, 0), (*left)(1, 1), (*left)(0, 2), (*left)(1, 2)};
-  pair.right = {(*right)(0, 0), (*right)(1, 1), (*right)(0, 2), (*right)(1, 2)};
-  pair.left_x_m = -(*left)(0, 3) / (*left)(0, 0);
-  pair.baseline_m = -(*right)(0, 3) / (*right)(0, 0) - pair.left_x_m;
-  if (!(pair.baseline_m > 1e-6)) {
-    return error_at(right_key, fmt::format("gives a baseline of {:.6g} m, must be above zero", pair.baseline_m));
+  pair.left = pinhole_of(*left);
+  pair.right = pinhole_of(*right);
+  pair.left_m.x() = -(*left)(0, 3) / (*left)(0, 0);
+  const double baseline_m = -(*right)(0, 3) / (*right)(0, 0) - pair.left_m.x();
+  pair.left_to_right_m.x() = baseline_m;
+  if (!(baseline_m > 1e-6)) {
+    return error_at(right_key, fmt::format("gives a baseline of {:.6g} m, must be above zero", baseline_m));
   }
   // Below the tolerance above, but not zero.
   const Eigen::Vector2d residual = (*left - *right).col(3).tail<2>();
@@ -162,56 +195,60 @@ LoadedRig make_read_rig(Rig rig, CalibrationFormat format, const std::string& pa
 
 }  // namespace
 
-Result<Rig> read_kitti_calib(const std::string& path, ImageSize size) {
-  return rig_of(read_kitti(path, size));
+Result<Rig> read_kitti_calib(const std::string& path, ImageSize size, KittiPair pair) {
+  return rig_of(read_kitti(path, size, pair));
 }
 
-Result<Rig> read_kitti_raw_calib(const std::string& path) {
-  return rig_of(read_kitti_raw(path));
+Result<Rig> read_kitti_raw_calib(const std::string& path, KittiPair pair) {
+  return rig_of(read_kitti_raw(path, pair));
 }
 
-Result<LoadedRig> internal::read_kitti(const std::string& path, ImageSize size) {
+Result<LoadedRig> internal::read_kitti(const std::string& path, ImageSize size, KittiPair kind) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
-  const auto pair = read_projections(*file, "P0", "P1");
+  const bool gray = kind == KittiPair::gray;
+  const auto pair = read_projections(*file, gray ? PairKeys{"P0", "P1"} : PairKeys{"P2", "P3"}, kind);
   if (!pair) return failure(pair);
-  auto ignored = read_other_cameras(*file, {{"P2", "a colour camera, which is not read"},
-                                            {"P3", "a colour camera, which is not read"},
-                                            {"Tr", "the place of the laser scanner, which is not read"}});
+  auto ignored = gray ? read_other_cameras(*file, {{"P2", kColour}, {"P3", kColour}, {"Tr", kScanner}})
+                      : read_other_cameras(*file, {{"P0", kGray}, {"P1", kGray}, {"Tr", kScanner}});
   if (!ignored) return failure(ignored);
   if (size.empty()) return unknown_size(path);
   auto rig = validated(
       rig_of_one_pair("kitti", pinhole_camera("cam0", size, pair->left), pinhole_camera("cam1", size, pair->right),
-                      Pose::from_translation({-pair->baseline_m, 0, 0})),
+                      Pose::from_translation(-pair->left_to_right_m)),
       path);
   if (!rig) return failure(std::move(rig));
   ignored->insert(ignored->begin(), pair->ignored.begin(), pair->ignored.end());
   return make_read_rig(std::move(*rig), CalibrationFormat::kitti, path, std::move(*ignored));
 }
 
-Result<LoadedRig> internal::read_kitti_raw(const std::string& path) {
+Result<LoadedRig> internal::read_kitti_raw(const std::string& path, KittiPair kind) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
-  const auto pair = read_projections(*file, "P_rect_00", "P_rect_01");
+  const bool gray = kind == KittiPair::gray;
+  const auto pair =
+      read_projections(*file, gray ? PairKeys{"P_rect_00", "P_rect_01"} : PairKeys{"P_rect_02", "P_rect_03"}, kind);
   if (!pair) return failure(pair);
-  auto ignored = read_other_cameras(*file, {{"P_rect_02", "a colour camera, which is not read"},
-                                            {"P_rect_03", "a colour camera, which is not read"}});
+  auto ignored = gray ? read_other_cameras(*file, {{"P_rect_02", kColour}, {"P_rect_03", kColour}})
+                      : read_other_cameras(*file, {{"P_rect_00", kGray}, {"P_rect_01", kGray}});
   if (!ignored) return failure(ignored);
   ignored->insert(ignored->begin(), pair->ignored.begin(), pair->ignored.end());
-  for (const auto& [number, rectified] : {std::pair{"00", pair->left}, {"01", pair->right}}) {
+  const std::string left_number = gray ? "00" : "02", right_number = gray ? "01" : "03";
+  for (const auto& [number, rectified] : {std::pair{left_number, pair->left}, {right_number, pair->right}}) {
     const auto raw = has_raw_camera(*file, number, rectified);
     if (!raw) return failure(raw);
     if (*raw) {
-      ignored->push_back({std::string("K_") + number, "the camera before rectification (K, D, R, T) is not kept"});
+      ignored->push_back({"K_" + number, "the camera before rectification (K, D, R, T) is not kept"});
     }
   }
-  const auto left_size = read_size(*file, "S_rect_00");
+  const auto left_size = read_size(*file, "S_rect_" + left_number);
   if (!left_size) return failure(left_size);
-  const auto right_size = file->has("S_rect_01") ? read_size(*file, "S_rect_01") : left_size;
+  const std::string right_key = "S_rect_" + right_number;
+  const auto right_size = file->has(right_key) ? read_size(*file, right_key) : left_size;
   if (!right_size) return failure(right_size);
-  Rig rig = rig_of_one_pair("kitti_raw", pinhole_camera("cam0", *left_size, pair->left),
-                            pinhole_camera("cam1", *right_size, pair->right),
-                            Pose::from_translation({-pair->baseline_m, 0, 0}));
+  Rig rig =
+      rig_of_one_pair("kitti_raw", pinhole_camera("cam0", *left_size, pair->left),
+                      pinhole_camera("cam1", *right_size, pair->right), Pose::from_translation(-pair->left_to_right_m));
 
   const fs::path folder = fs::path(path).parent_path();
   std::error_code missing;
@@ -220,9 +257,9 @@ Result<LoadedRig> internal::read_kitti_raw(const std::string& path) {
     if (!rectified_from_imu) return failure(rectified_from_imu);
     const Pose imu_from_rectified = rectified_from_imu->inverse();
     rig.convention = PoseConvention::body;
-    rig.cameras[0].mount_from_camera = imu_from_rectified * Pose::from_translation({pair->left_x_m, 0, 0});
+    rig.cameras[0].mount_from_camera = imu_from_rectified * Pose::from_translation(pair->left_m);
     rig.cameras[1].mount_from_camera =
-        imu_from_rectified * Pose::from_translation({pair->left_x_m + pair->baseline_m, 0, 0});
+        imu_from_rectified * Pose::from_translation(pair->left_m + pair->left_to_right_m);
   }
   auto valid = validated(std::move(rig), path);
   if (!valid) return failure(std::move(valid));

@@ -12,15 +12,18 @@
 namespace spartan::internal {
 namespace {
 
-struct RectifiedPinholes {
-  PairCameras cameras;
-  PinholeModel left, right;
-  double baseline_m = 0;
-};
-
 constexpr double kRounding = 1e-9;  // relative tolerance, and rad
 
-// Checks that both cameras are pinholes, side by side, with equal orientation, focal lengths and rows.
+std::string projection(const PinholeModel& m, double x_m) {
+  return fmt::format("{} 0 {} {} 0 {} {} 0 0 0 1 0", m.fx, m.cx, 0 - m.fx * x_m, m.fy, m.cy);
+}
+
+std::string transform(const Pose& pose) {
+  return fmt::format("R: {}\nT: {}\n", rows_of(pose.rotation_matrix()), list_of(pose.translation()));
+}
+
+}  // namespace
+
 Result<RectifiedPinholes> rectified_pinholes(const Rig& rig, CalibrationFormat format) {
   const auto cameras = single_pair(rig, format);
   if (!cameras) return failure(cameras);
@@ -49,16 +52,6 @@ Result<RectifiedPinholes> rectified_pinholes(const Rig& rig, CalibrationFormat f
   }
   return RectifiedPinholes{*cameras, *left, *right, t.x()};
 }
-
-std::string projection(const PinholeModel& m, double x_m) {
-  return fmt::format("{} 0 {} {} 0 {} {} 0 0 0 1 0", m.fx, m.cx, 0 - m.fx * x_m, m.fy, m.cy);
-}
-
-std::string transform(const Pose& pose) {
-  return fmt::format("R: {}\nT: {}\n", rows_of(pose.rotation_matrix()), list_of(pose.translation()));
-}
-
-}  // namespace
 
 Result<CalibrationFiles> write_kitti_calib(const Rig& rig, const std::string& path) {
   const auto pair = rectified_pinholes(rig, CalibrationFormat::kitti);
