@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "spartan/camera/internal/recording_index.h"
+#include "spartan/camera/internal/sample_depth.h"
 #include "spartan/core/files.h"
 
 namespace spartan {
@@ -30,12 +31,15 @@ bool path_exists(const fs::path& path) {
 }
 
 std::optional<LayoutChoice> recognise_kitti(const fs::path& folder, const OpenOptions& options) {
-  if (!path_exists(folder / "image_0")) return std::nullopt;
-  if (path_exists(folder / "calib.txt")) {
-    return LayoutChoice{RecordingFormat::kitti, folder.string(), "calib.txt and image_0 found"};
+  for (const char* images : {"image_0", "image_2"}) {
+    if (!path_exists(folder / images)) continue;
+    const bool own_rig = path_exists(folder / "calib.txt");
+    if (!own_rig && options.rig_file.empty()) continue;
+    return LayoutChoice{
+        RecordingFormat::kitti, folder.string(),
+        own_rig ? fmt::format("calib.txt and {} found", images) : fmt::format("{} found and a rig given", images)};
   }
-  if (options.rig_file.empty()) return std::nullopt;
-  return LayoutChoice{RecordingFormat::kitti, folder.string(), "image_0 found and a rig given"};
+  return std::nullopt;
 }
 
 std::optional<LayoutChoice> recognise_spartan(const fs::path& folder, const OpenOptions&) {
@@ -47,8 +51,11 @@ std::optional<LayoutChoice> recognise_spartan(const fs::path& folder, const Open
 }
 
 std::optional<LayoutChoice> recognise_kitti_raw(const fs::path& folder, const OpenOptions&) {
-  if (!path_exists(folder / "image_00")) return std::nullopt;
-  return LayoutChoice{RecordingFormat::kitti_raw, folder.string(), "image_00 found"};
+  for (const char* images : {"image_00", "image_02"}) {
+    if (path_exists(folder / images / "timestamps.txt"))
+      return LayoutChoice{RecordingFormat::kitti_raw, folder.string(), fmt::format("{} found", images)};
+  }
+  return std::nullopt;
 }
 
 std::optional<LayoutChoice> recognise_euroc(const fs::path& folder, const OpenOptions&) {
@@ -61,17 +68,37 @@ std::optional<LayoutChoice> recognise_euroc(const fs::path& folder, const OpenOp
   return std::nullopt;
 }
 
+std::optional<LayoutChoice> recognise_video(const fs::path& folder, const OpenOptions& options) {
+  if (!is_video_name(options.left_images) || !is_video_name(options.right_images)) return std::nullopt;
+  return LayoutChoice{RecordingFormat::video, folder.string(), "left and right videos given"};
+}
+
 // In order of detection: a folder with calib.txt and image_0 is KITTI odometry, whatever else it contains.
-constexpr std::array<FormatEntry, 4> kFormats{{
+constexpr std::array<FormatEntry, 6> kFormats{{
     {RecordingFormat::kitti, "kitti", index_kitti, recognise_kitti},
     {RecordingFormat::spartan, "spartan", index_spartan, recognise_spartan},
     {RecordingFormat::kitti_raw, "kitti-raw", index_kitti_raw, recognise_kitti_raw},
     {RecordingFormat::euroc, "euroc", index_euroc, recognise_euroc},
+    {RecordingFormat::images, "images", index_images, recognise_images},
+    {RecordingFormat::video, "video", index_video, recognise_video},
 }};
 
 constexpr const char* kLookedFor =
-    "looked for calib.txt with image_0 and image_1 (KITTI odometry), image_00/data with image_00/timestamps.txt (KITTI "
-    "raw), mav0/cam0/data.csv (EuRoC) and recording.yaml (Spartan)";
+    "looked for calib.txt with image_0 and image_1 or image_2 and image_3 (KITTI odometry), image_00/timestamps.txt "
+    "(KITTI raw), mav0/cam0/data.csv (EuRoC, TUM-VI), recording.yaml (Spartan), and image folders such as left and "
+    "right or cam0 and cam1; name others with --left and --right";
+
+// Files and folders that are no recording of images, and how to make one of them.
+std::optional<Error> known_but_not_read(const fs::path& path) {
+  const std::string extension = path.extension().string();
+  const bool ros1 = extension == ".bag";
+  const bool ros2 = extension == ".db3" || extension == ".mcap" ||
+                    (path_exists(path / "metadata.yaml") && !path_exists(path / "images"));
+  if (!ros1 && !ros2) return std::nullopt;
+  return Error{ErrorCode::input, ros1 ? "is a ROS 1 bag, which is not read" : "is a ROS 2 bag, which is not read",
+               path.string(),
+               "extract its images first: scripts/bag_to_images.py BAG FOLDER --left TOPIC --right TOPIC"};
+}
 
 const FormatEntry& entry_of(RecordingFormat format) {
   for (const FormatEntry& entry : kFormats) {
@@ -83,11 +110,20 @@ const FormatEntry& entry_of(RecordingFormat format) {
 Result<LayoutChoice> choose_layout(const std::string& path, const OpenOptions& options) {
   std::error_code error;
   if (!fs::exists(path, error)) return failure(ErrorCode::input, "no such folder", path, kLookedFor);
-  if (!fs::is_directory(path, error))
-    return failure(ErrorCode::input, "is a file, not the folder of a recording", path);
+  if (auto known = known_but_not_read(path)) return tl::unexpected(std::move(*known));
+  if (!fs::is_directory(path, error)) {
+    if (is_video_name(path)) return LayoutChoice{RecordingFormat::video, path, "a video, images side by side"};
+    return failure(ErrorCode::input, "is a file, neither the folder of a recording nor a video", path);
+  }
   const auto names = list_folder(path);
   if (!names) return failure(names);
   if (names->empty()) return failure(ErrorCode::input, "the folder is empty", path, kLookedFor);
+  if (options.left_images.empty() != options.right_images.empty())
+    return failure(ErrorCode::usage, "--left and --right belong together", path);
+  if (!options.left_images.empty() && !options.format) {
+    const auto videos = recognise_video(path, options);
+    return videos ? *videos : *recognise_images(path, options);
+  }
   if (options.format) {
     auto layout = entry_of(*options.format).recognise(path, options);
     if (!layout) layout = LayoutChoice{*options.format, path, ""};
@@ -97,7 +133,7 @@ Result<LayoutChoice> choose_layout(const std::string& path, const OpenOptions& o
   std::optional<LayoutChoice> chosen;
   for (const FormatEntry& entry : kFormats) {
     const auto layout = entry.recognise(path, options);
-    if (layout && chosen)
+    if (layout && chosen && entry.format != RecordingFormat::images)
       chosen->reason += fmt::format("; --format {} is also possible: {}", entry.name, layout->reason);
     if (layout && !chosen) chosen = layout;
   }
@@ -133,6 +169,7 @@ Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, con
   std::error_code error;
   if (info.name.empty()) info.name = fs::weakly_canonical(path, error).filename().string();
   if (Status status = validate_and_sort(*index, options.pair_tolerance_s); !status) return failure(status);
+  if (Status status = set_sample_depth(*index, options.bits); !status) return failure(status);
   return make_indexed_source(std::move(*index));
 }
 

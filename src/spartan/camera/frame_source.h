@@ -15,9 +15,10 @@
 
 namespace spartan {
 
-enum class RecordingFormat { spartan, kitti, kitti_raw, euroc };
+enum class RecordingFormat { spartan, kitti, kitti_raw, euroc, images, video };
 
-/// The name that --format takes: "spartan", "kitti", "kitti-raw" or "euroc".
+/// The name that --format takes: "spartan", "kitti", "kitti-raw", "euroc", "images" or
+/// "video".
 std::string_view name_of(RecordingFormat format);
 /// The format with that name. Code `usage` where there is none.
 Result<RecordingFormat> parse_recording_format(std::string_view name);
@@ -32,7 +33,8 @@ struct SequenceReport {
   int gaps = 0;              ///< intervals between complete frames of an odometry pair above three times the median
   double median_step_s = 0;  ///< median interval between complete frames
   double longest_gap_s = 0;  ///< the longest of the gaps; 0 without a gap
-  std::vector<std::string> remarks;  ///< other irregularities, e.g. images that times.txt does not list
+  std::vector<std::string> remarks;   ///< other irregularities, e.g. images that times.txt does not list
+  std::vector<std::string> warnings;  ///< what the recording does not state and is assumed, e.g. the frame rate
 };
 
 /// Properties of an open recording.
@@ -118,9 +120,16 @@ struct OpenOptions {
   std::optional<RecordingFormat> format;  ///< layout of the folder; none: detect it
   std::string rig_file;                   ///< calibration to use instead of the recording's own; empty: its own
   double pair_tolerance_s = 0.005;        ///< largest difference of left and right stamps of one frame, s
+  /// Images of the left and the right camera: folders, patterns of file names such as "img/l*.png", or video files,
+  /// relative to the folder of the recording. Both or none; none: found by their usual names.
+  std::string left_images{}, right_images{};
+  std::string times_file{};  ///< times of the frames, read by docs/reference/recording.md; empty: the recording's own
+  double fps = 0;            ///< frames per second, instead of the recording's own times; 0: not stated
+  int bits = 0;              ///< significant bits of a sample of 16-bit images; 0: by the calibration or the images
 };
 
-/// Opens a recording folder. Codes: `input` (missing, empty or of unknown layout), `configuration` (calibration).
+/// Opens a recording: a folder, or a video file with the left and the right image side by side. Codes: `input`
+/// (missing, empty or of unknown layout), `configuration` (calibration).
 Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, const OpenOptions& options = {});
 
 /// Relabels an image of read_image() with the pixel format of the camera that took it. An image file states only the

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <filesystem>
+#include <optional>
+#include <string>
 
 #include "spartan/camera/internal/layouts/spartan_format.h"
 
@@ -12,6 +15,8 @@ namespace spartan::internal {
 namespace {
 
 using Row = std::vector<std::string_view>;
+
+constexpr std::size_t kFrameIdColumn = 0, kRightStampColumn = 4;  // of frames.csv
 
 // Calls `take` with every row; adds file and line to its errors.
 template <class Take>
@@ -62,7 +67,7 @@ bool stays_inside(std::string_view name) {
   return path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
 }
 
-// Parses one row of frames.csv; errors name the column.
+// Parses one row of frames.csv, complete; errors name the column.
 Result<FrameEntry> read_spartan_frame(const std::filesystem::path& folder, const Rig& rig, const Row& row) {
   const auto wrong = [](const char* column, std::string_view text) {
     return input_error(fmt::format("{} is '{}'", column, text.substr(0, 40)));
@@ -81,7 +86,7 @@ Result<FrameEntry> read_spartan_frame(const std::filesystem::path& folder, const
   if (!tilt) return wrong("tilt_deg", row[8]);
   if (!exposure) return wrong("exposure_us", row[9]);
   if (!gain) return wrong("gain", row[10]);
-  if (!bits || *bits < 8 || *bits > 16) return wrong("bits", row[11]);
+  if (!bits || (*bits != 0 && (*bits < 8 || *bits > 16))) return wrong("bits", row[11]);
   if (!stays_inside(row[5])) return wrong("left (outside of the recording)", row[5]);
   if (!stays_inside(row[6])) return wrong("right (outside of the recording)", row[6]);
   FrameEntry entry;
@@ -145,7 +150,18 @@ Result<EurocImages> read_euroc_images(TableReader table) {
 
 Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std::string& folder, const Rig& rig) {
   std::vector<FrameEntry> frames;
-  const Status status = for_each_row(table, 12, [&](const Row& row) -> Status {
+  const std::vector<std::optional<std::size_t>> columns = table.columns();
+  const std::string pair = default_pair(rig);
+  // Columns that the file does not have, in the order of the header; frame_id counts, the right stamp is the left one.
+  const std::array<std::string_view, 12> defaults{"", "-1", pair, "", "", "", "", "0", "0", "0", "0", "0"};
+  std::size_t fields = 0;
+  for (const auto& column : columns) fields = std::max(fields, column ? *column + 1 : 0);
+  const Status status = for_each_row(table, fields, [&](const Row& given) -> Status {
+    const std::string number = std::to_string(frames.size());
+    Row row;
+    for (std::size_t i = 0; i < columns.size(); ++i) row.push_back(columns[i] ? given[*columns[i]] : defaults[i]);
+    if (!columns[kFrameIdColumn]) row[kFrameIdColumn] = number;
+    if (!columns[kRightStampColumn]) row[kRightStampColumn] = row[kRightStampColumn - 1];
     auto entry = read_spartan_frame(folder, rig, row);
     if (!entry) return failure(entry);
     frames.push_back(std::move(*entry));
@@ -156,7 +172,7 @@ Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std
 }
 
 TableFormat spartan_frames_format() {
-  return {.separator = ',', .header = kFramesHeader, .ends_with_newline = true};
+  return {.separator = ',', .header = kFramesHeader, .required = kLeastFramesHeader, .ends_with_newline = true};
 }
 
 }  // namespace spartan::internal

@@ -52,24 +52,44 @@ MissingFrame missing(const FrameEntry& entry, FrameFault fault, std::string mess
   return {entry.frame_id, entry.pair, entry.left_stamp, fault, std::move(message)};
 }
 
-// The bytes of the image files of a frame, or why a file has none (code `input`: missing, not a regular file).
+// The bytes of the image files of a frame, or why a file has none (code `input`: missing, not a regular file); of a
+// video, the images.
 struct FrameFiles {
   Result<std::string> left, right;
+  std::optional<Result<StereoVideo::Images>> video;
 };
 
 // Codes `read_error` and `resources`: the files may be good, but cannot be read now.
-Result<FrameFiles> read_files(const FrameEntry& entry) {
+Result<FrameFiles> read_files(const FrameEntry& entry, StereoVideo* video) {
   FrameFiles files;
   // A frame whose stamps are wrong is never delivered.
   if (entry.fault == FrameFault::stamp_reversed || entry.fault == FrameFault::stamps_apart) return files;
-  files = {read_file(entry.left_file), read_file(entry.right_file)};
+  if (video != nullptr) {
+    files.video = video->read(entry.video_frame);
+    if (!*files.video && files.video->error().code != ErrorCode::input) return failure(*files.video);
+    return files;
+  }
+  files.left = read_file(entry.left_file);
+  files.right = read_file(entry.right_file);
   for (const Result<std::string>& content : {std::cref(files.left), std::cref(files.right)}) {
     if (!content && content.error().code != ErrorCode::input) return failure(content);
   }
   return files;
 }
 
+std::string_view row_of(const FrameImage& image, int y) {
+  const ImageView<const std::uint8_t> view = image.as<std::uint8_t>();
+  return {reinterpret_cast<const char*>(&view(0, y)), static_cast<std::size_t>(view.width())};
+}
+
 void add(ContentHash& hash, const FrameFiles& files) {
+  if (files.video) {
+    if (!*files.video) return;
+    for (const FrameImage* image : {&(*files.video)->left, &(*files.video)->right}) {
+      for (int y = 0; y < image->height(); ++y) hash.add(row_of(*image, y));
+    }
+    return;
+  }
   hash.add(std::string_view(files.left ? *files.left : ""));
   hash.add(std::string_view(files.right ? *files.right : ""));
 }
@@ -100,7 +120,7 @@ class IndexedSource : public FrameSource {
     if (!taken) return failure(taken);
     if (taken->sensor) return std::move(taken->sensor);
     if (!taken->entry) return std::nullopt;
-    const auto files = read_files(*taken->entry);
+    const auto files = read_files(*taken->entry, index_.video.get());
     auto sample = files ? decode(*taken->entry, *files) : Result<Sample>(failure(files));
     if (!sample) {
       --next_frame_;
@@ -117,7 +137,7 @@ class IndexedSource : public FrameSource {
       const auto taken = take();
       if (!taken) return failure(taken);
       if (taken->entry) {
-        const auto files = read_files(*taken->entry);
+        const auto files = read_files(*taken->entry, index_.video.get());
         if (!files) return failure(files);
         add(content_hash_, *files);
       }
@@ -133,7 +153,7 @@ class IndexedSource : public FrameSource {
   Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) override {
     for (const FrameEntry& entry : index_.frames) {
       if (entry.pair != pair || entry.left_stamp != left_stamp || entry.fault == FrameFault::stamp_reversed) continue;
-      const auto files = read_files(entry);
+      const auto files = read_files(entry, index_.video.get());
       if (!files) return failure(files);
       auto sample = decode(entry, *files);
       if (!sample) return failure(sample);
@@ -204,6 +224,7 @@ class IndexedSource : public FrameSource {
       add(entry.pair);
       for (const Stamp stamp : {entry.left_stamp, entry.right_stamp}) hash.add(static_cast<std::uint64_t>(stamp.ns));
       for (const std::string* file : {&entry.left_file, &entry.right_file}) add(file->empty() ? "" : inside(*file));
+      if (index_.video) hash.add(static_cast<std::uint64_t>(entry.video_frame));
       for (const double value : {entry.pan_rad, entry.tilt_rad, entry.exposure_us, entry.gain})
         hash.add(std::bit_cast<std::uint64_t>(value));
     }
@@ -253,23 +274,20 @@ class IndexedSource : public FrameSource {
     const StereoPair* pair = index_.info.rig.find_pair(entry.pair);
     const Camera* left_camera = index_.info.rig.find_camera(pair->left);
     const Camera* right_camera = index_.info.rig.find_camera(pair->right);
+    if (files.video && !*files.video) return missing(entry, FrameFault::unreadable, files.video->error().message());
+    if (files.video) return frame_of(entry, (*files.video)->left, (*files.video)->right);
     auto left = decode_image_of(entry, entry.left_file, files.left, *left_camera, FrameFault::left_missing);
     if (!left) return failure(left);
     if (auto* fault = std::get_if<MissingFrame>(&*left)) return std::move(*fault);
     auto right = decode_image_of(entry, entry.right_file, files.right, *right_camera, FrameFault::right_missing);
     if (!right) return failure(right);
     if (auto* fault = std::get_if<MissingFrame>(&*right)) return std::move(*fault);
-    return StereoFrame{entry.frame_id,
-                       entry.position_id,
-                       entry.pair,
-                       entry.left_stamp,
-                       entry.right_stamp,
-                       std::get<FrameImage>(std::move(*left)),
-                       std::get<FrameImage>(std::move(*right)),
-                       entry.pan_rad,
-                       entry.tilt_rad,
-                       entry.exposure_us,
-                       entry.gain};
+    return frame_of(entry, std::get<FrameImage>(std::move(*left)), std::get<FrameImage>(std::move(*right)));
+  }
+
+  static StereoFrame frame_of(const FrameEntry& entry, FrameImage left, FrameImage right) {
+    return {entry.frame_id,   entry.position_id, entry.pair,     entry.left_stamp,  entry.right_stamp, std::move(left),
+            std::move(right), entry.pan_rad,     entry.tilt_rad, entry.exposure_us, entry.gain};
   }
 
   static Result<std::variant<FrameImage, MissingFrame>> decode_image_of(const FrameEntry& entry,

@@ -1,6 +1,7 @@
 // Index of a recording before any image is decoded. Each folder layout is read into an index, which one source plays.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "spartan/camera/frame_source.h"
+#include "spartan/camera/internal/video.h"
 
 namespace spartan::internal {
 
@@ -21,6 +23,7 @@ struct FrameEntry {
   double pan_rad = 0, tilt_rad = 0;
   double exposure_us = 0, gain = 0;
   int bits = 0;                     ///< significant bits of a sample; 0: as in the rig
+  std::int64_t video_frame = 0;     ///< number of the frame where the files are videos
   bool right_only = false;          ///< right image without a left one; ignored in the order of left stamps
   Stamp playback_stamp;             ///< merges the frame with other samples; set by validate_and_sort()
   std::optional<FrameFault> fault;  ///< a fault known before decoding
@@ -44,6 +47,7 @@ struct RecordingIndex {
   std::vector<FrameEntry> frames;                  ///< in file order until validate_and_sort()
   SampleStreamFactory imu;                         ///< empty: no IMU
   std::vector<SampleStreamFactory> other_sensors;  ///< wheels, compass, inclinometer
+  std::shared_ptr<StereoVideo> video;              ///< decodes the frames; null: the files are images
   std::vector<std::string> sensor_files;           ///< tables of all sensors; their bytes are part of listing_hash()
 };
 
@@ -59,6 +63,11 @@ Result<RecordingIndex> index_kitti(const LayoutChoice& layout, const OpenOptions
 Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOptions& options);
 Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions& options);
 Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptions& options);
+Result<RecordingIndex> index_images(const LayoutChoice& layout, const OpenOptions& options);
+Result<RecordingIndex> index_video(const LayoutChoice& layout, const OpenOptions& options);
+
+/// The layout of image folders, if `folder` has folders with usual names or `options` name the images.
+std::optional<LayoutChoice> recognise_images(const std::filesystem::path& folder, const OpenOptions& options);
 
 /// Marks frames with missing files, reversed stamps, or left and right stamps more than `pair_tolerance_s` apart; sorts
 /// the frames of all pairs into playback order; fills `info.sequence`. Code `input` where no frame is usable as far as

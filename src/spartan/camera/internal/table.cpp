@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <numbers>
 
@@ -28,6 +29,11 @@ std::vector<std::string_view> split(std::string_view line, char separator) {
     line.remove_prefix(end + 1);
     if (separator == ' ') line = trim(line);
   }
+}
+
+std::optional<std::size_t> index_of(const std::vector<std::string_view>& names, std::string_view name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  return found == names.end() ? std::nullopt : std::optional(static_cast<std::size_t>(found - names.begin()));
 }
 
 // Quotes file content in an error message: at most 80 characters, non-printable ones replaced.
@@ -57,10 +63,19 @@ Result<TableReader> TableReader::begin(std::string path, TableFormat format, Lin
   if (!first) return failure(first);
   if (!*first)
     return failure(ErrorCode::input, fmt::format("the file is empty, expected the columns '{}'", header), table.path_);
-  if (**first != split(header, table.format_.separator)) {
-    return table.error_in_row(fmt::format("the columns are {}, expected '{}'", quote(table.line_), header));
-  }
-  return table;
+  const std::vector<std::string_view> expected = split(header, table.format_.separator);
+  for (const std::string_view name : expected) table.columns_.push_back(index_of(**first, name));
+  table.has_all_columns_ = **first == expected;
+  if (table.has_all_columns_) return table;
+  const std::string& required = table.format_.required;
+  const auto is_in = [](const std::vector<std::string_view>& names) {
+    return [&names](std::string_view name) { return index_of(names, name).has_value(); };
+  };
+  const auto needed = split(required, table.format_.separator);
+  const bool all_known = std::all_of((*first)->begin(), (*first)->end(), is_in(expected));
+  if (!required.empty() && all_known && std::all_of(needed.begin(), needed.end(), is_in(**first))) return table;
+  return table.error_in_row(fmt::format("the columns are {}, expected '{}'{}", quote(table.line_), header,
+                                        required.empty() ? "" : " or some of them, at least '" + required + "'"));
 }
 
 Result<std::optional<std::vector<std::string_view>>> TableReader::next() {

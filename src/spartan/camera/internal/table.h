@@ -20,6 +20,7 @@ namespace spartan::internal {
 struct TableFormat {
   char separator = ',';            ///< ' ': any run of blanks
   std::string header;              ///< expected column names in the first row; empty: no header
+  std::string required{};          ///< the first row need not hold more of the names than these; empty: all of them
   bool ends_with_newline = false;  ///< true: a last line without a newline is an error (truncated file)
 };
 
@@ -42,6 +43,10 @@ class TableReader {
   const std::string& path() const { return path_; }
   /// "file:line" of the row that next() returned last.
   std::string location() const { return path_ + ":" + std::to_string(line_number_); }
+  /// The place in a row of each column of TableFormat::header; none where the file does not have it.
+  const std::vector<std::optional<std::size_t>>& columns() const { return columns_; }
+  /// Whether the file has all of them, in their order.
+  bool has_all_columns() const { return has_all_columns_; }
   /// An error of code `input` at the row that next() returned last.
   tl::unexpected<Error> error_in_row(std::string what) const {
     return failure(ErrorCode::input, std::move(what), location());
@@ -56,6 +61,8 @@ class TableReader {
   LineReader lines_;
   std::string_view line_;  // the current one, without blanks at its ends
   int line_number_ = 0;
+  std::vector<std::optional<std::size_t>> columns_;
+  bool has_all_columns_ = true;
 };
 
 /// Parses all of `text` as a number; nothing where it is not a number or not finite.

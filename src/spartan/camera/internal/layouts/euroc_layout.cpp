@@ -81,6 +81,20 @@ Result<EurocImu> read_imu(const std::string& path) {
   return imu;
 }
 
+// cam0/sensor.yaml; where it is missing, the camchain of Kalibr that TUM-VI keeps in the folder dso beside mav0.
+std::string find_camera_calibration(const fs::path& mav) {
+  const std::string own = (mav / "cam0" / "sensor.yaml").string();
+  std::error_code error;
+  if (fs::exists(own, error)) return own;
+  const fs::path above = fs::absolute(mav, error).lexically_normal().parent_path();
+  for (const fs::path& folder : {mav, above, above / "dso"}) {
+    for (const std::string& name : list_folder(folder.string()).value_or(std::vector<std::string>())) {
+      if (name.starts_with("camchain") && name.ends_with(".yaml")) return (folder / name).string();
+    }
+  }
+  return own;
+}
+
 FrameEntry make_entry(const StampMatch& match, const EurocImages& left, const EurocImages& right) {
   FrameEntry entry;
   const Stamp any = match.left ? left.stamps[*match.left] : right.stamps[*match.right];
@@ -109,8 +123,10 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
   if (!left) return failure(left);
   const auto right = read_images(folder / "cam1");
   if (!right) return failure(right);
-  auto rig = choose_rig(options, (folder / "cam0" / "sensor.yaml").string(), {},
-                        [&] { return read_euroc_calib(folder.string()); });
+  const std::string calibration = find_camera_calibration(folder);
+  const bool camchain = !calibration.ends_with("sensor.yaml");
+  auto rig = choose_rig(options, calibration, {},
+                        [&] { return camchain ? read_rig(calibration) : read_euroc_calib(folder.string()); });
   if (!rig) return failure(rig);
   index.info.rig = std::move(rig->rig);
   index.info.rig_source = rig->source;

@@ -1,12 +1,15 @@
 #include "spartan/camera/internal/layouts/image_folder.h"
 
 #include <fmt/format.h>
+#include <fnmatch.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <string_view>
 
 #include "spartan/camera/internal/table.h"
 #include "spartan/core/files.h"
@@ -21,26 +24,9 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kLargestNumber = 100'000'000;
 constexpr std::size_t kSizeProbes = 16;  // image headers read to find the common size
 
-// Stem → path. Of several files with the same stem, the first extension in the order of list_images() is used.
-using Stems = std::map<std::string, std::string>;
+constexpr std::array<std::string_view, 5> kExtensions{".png", ".jpg", ".jpeg", ".pgm", ".ppm"};
 
-// A folder that does not exist has none.
-Result<Stems> list_images(const std::string& folder) {
-  Stems stems;
-  const auto names = list_folder(folder);
-  if (!names && names.error().code == ErrorCode::input) return stems;
-  if (!names) return failure(names);
-  for (const std::string_view wanted : {".png", ".jpg", ".jpeg", ".pgm"}) {
-    for (const std::string& name : *names) {
-      const fs::path path(name);
-      std::string extension = path.extension().string();
-      std::transform(extension.begin(), extension.end(), extension.begin(),
-                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (extension == wanted) stems.emplace(path.stem().string(), (folder / path).string());
-    }
-  }
-  return stems;
-}
+using Stems = std::map<std::string, std::string>;  // as list_images()
 
 // The number of each stem; nothing where names are not frame numbers: they hold a letter, or the numbers span far more
 // than the number of files.
@@ -75,6 +61,24 @@ std::map<std::string, std::int64_t> ranks_of(const Stems& left, const Stems& rig
 }
 
 }  // namespace
+
+Result<std::map<std::string, std::string>> list_images(const std::string& folder, const std::string& pattern) {
+  std::map<std::string, std::string> images;
+  const auto names = list_folder(folder);
+  if (!names && names.error().code == ErrorCode::input) return images;
+  if (!names) return failure(names);
+  for (const std::string_view wanted : kExtensions) {
+    for (const std::string& name : *names) {
+      const fs::path path(name);
+      std::string extension = path.extension().string();
+      std::transform(extension.begin(), extension.end(), extension.begin(),
+                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+      if (extension == wanted && ::fnmatch(pattern.c_str(), name.c_str(), 0) == 0)
+        images.emplace(path.stem().string(), (folder / path).string());
+    }
+  }
+  return images;
+}
 
 Result<NumberedImages> number_images(const std::string& left_folder, const std::string& right_folder,
                                      std::optional<std::size_t> announced) {
@@ -121,11 +125,10 @@ Result<NumberedImages> number_images(const std::string& left_folder, const std::
   return images;
 }
 
-std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& frames) {
+std::optional<ImageSize> common_image_size(const std::map<std::string, std::string>& images) {
   std::vector<const std::string*> files;
-  for (const ImageFiles& entry : frames) {
-    if (!entry.left.empty()) files.push_back(&entry.left);
-  }
+  files.reserve(images.size());
+  for (const auto& [stem, path] : images) files.push_back(&path);
   const std::size_t probes = std::min(files.size(), kSizeProbes);
   std::map<std::pair<int, int>, int> votes;
   for (std::size_t k = 0; k < probes; ++k) {

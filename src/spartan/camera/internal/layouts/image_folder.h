@@ -1,7 +1,8 @@
-// Image folders of the left and right camera of a KITTI recording, whose file numbers are frame numbers.
+// Folders of images of the left and the right camera.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,11 @@
 #include "spartan/core/result.h"
 
 namespace spartan::internal {
+
+/// Image files (png, jpg, jpeg, pgm, ppm) of a folder whose names match a pattern of fnmatch(3): stem → path. Of files
+/// with the same stem, the first extension in that order counts. A folder that does not exist has none. Codes:
+/// `read_error`, `resources`.
+Result<std::map<std::string, std::string>> list_images(const std::string& folder, const std::string& pattern = "*");
 
 /// Image files of one frame; an empty path where the image is missing.
 struct ImageFiles {
@@ -29,7 +35,7 @@ struct NumberedImages {
 Result<NumberedImages> number_images(const std::string& left_folder, const std::string& right_folder,
                                      std::optional<std::size_t> announced);
 
-/// The most frequent size of the left images, from the headers of up to 16 files spread over the recording.
-std::optional<ImageSize> common_image_size(const std::vector<ImageFiles>& frames);
+/// The most frequent size of images, from the headers of up to 16 files spread over the list.
+std::optional<ImageSize> common_image_size(const std::map<std::string, std::string>& images);
 
 }  // namespace spartan::internal

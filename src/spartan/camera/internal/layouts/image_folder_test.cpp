@@ -98,9 +98,9 @@ TEST_F(ImageFolder, FindsTheMostFrequentImageSize) {
   }
   folder_.write("l/5.png", "nonsense");
   number(std::nullopt);
-  EXPECT_EQ(common_image_size(images_.frames), (ImageSize{12, 8}));
+  EXPECT_EQ(common_image_size(list_images(folder_.path() + "/l").value()), (ImageSize{12, 8}));
   EXPECT_FALSE(common_image_size({}));
-  EXPECT_FALSE(common_image_size({{"none.png", "none.png"}}));
+  EXPECT_FALSE(common_image_size({{"none", "none.png"}}));
 }
 
 }  // namespace

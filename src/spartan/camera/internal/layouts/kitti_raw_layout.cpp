@@ -68,19 +68,26 @@ std::string find_calibration(const fs::path& drive) {
 Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOptions& options) {
   const fs::path folder = layout.folder;
   RecordingIndex index;
-  const auto left = read_stamps((folder / "image_00" / "timestamps.txt").string());
+  std::error_code error;
+  const bool gray = fs::exists(folder / "image_00", error) || !fs::exists(folder / "image_02", error);
+  const fs::path left_folder = folder / (gray ? "image_00" : "image_02"),
+                 right_folder = folder / (gray ? "image_01" : "image_03");
+  const auto left = read_stamps((left_folder / "timestamps.txt").string());
   if (!left) return failure(left);
-  const auto right = read_stamps((folder / "image_01" / "timestamps.txt").string());
+  const auto right = read_stamps((right_folder / "timestamps.txt").string());
   if (!right) return failure(right);
-  auto numbered =
-      number_images((folder / "image_00" / "data").string(), (folder / "image_01" / "data").string(), left->size());
+  const std::string left_images = (left_folder / "data").string();
+  auto numbered = number_images(left_images, (right_folder / "data").string(), left->size());
   if (!numbered) return failure(numbered);
   NumberedImages& images = *numbered;
   index.info.sequence.remarks = std::move(images.remarks);
-  const auto size = common_image_size(images.frames);
-  if (!size) return failure(ErrorCode::input, "holds no readable image", (folder / "image_00" / "data").string());
+  const auto listed = list_images(left_images);
+  if (!listed) return failure(listed);
+  const auto size = common_image_size(*listed);
+  if (!size) return failure(ErrorCode::input, "holds no readable image", left_images);
   const std::string calib = find_calibration(folder);
-  auto rig = choose_rig(options, calib, *size, [&] { return read_kitti_raw_calib(calib); });
+  const KittiPair cameras = gray ? KittiPair::gray : KittiPair::colour;
+  auto rig = choose_rig(options, calib, *size, [&] { return read_kitti_raw_calib(calib, cameras); });
   if (!rig) return failure(rig);
   index.info.rig = std::move(rig->rig);
   index.info.rig_source = rig->source;
@@ -99,7 +106,6 @@ Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOpt
     }
     index.frames.push_back(std::move(entry));
   }
-  std::error_code error;
   // Without the IMU-to-camera calibration the body frame is the left camera and the orientation of the IMU is unknown.
   const bool body_is_imu = index.info.rig.convention == PoseConvention::body;
   if (const fs::path oxts = folder / "oxts"; body_is_imu && fs::exists(oxts / "timestamps.txt", error)) {

@@ -10,6 +10,7 @@ namespace spartan::internal {
 
 inline constexpr const char* kFramesHeader =
     "frame_id,position_id,pair,left_stamp_ns,right_stamp_ns,left,right,pan_deg,tilt_deg,exposure_us,gain,bits";
+inline constexpr const char* kLeastFramesHeader = "left_stamp_ns,left,right";  ///< of a list that is written by hand
 inline constexpr const char* kImuHeader =
     "stamp_ns,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2";
 inline constexpr const char* kWheelsHeader = "stamp_ns,left_m,right_m";

@@ -12,10 +12,33 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<std::vector<FrameEntry>> read_frames(const fs::path& folder, const Rig& rig) {
-  auto table = TableReader::open((folder / "frames.csv").string(), spartan_frames_format());
-  if (!table) return failure(table);
-  return read_spartan_frames(std::move(*table), folder.string(), rig);
+// The calibration: rig.yaml, in any format, or the one of another name in the folder.
+Result<RigChoice> rig_of(const fs::path& folder, const OpenOptions& options) {
+  std::error_code error;
+  const std::string own = (folder / "rig.yaml").string();
+  if (!options.rig_file.empty() || fs::exists(own, error))
+    return choose_rig(options, own, {}, [&] { return read_rig(own); });
+  auto found = read_calibration(folder.string());
+  if (found) return RigChoice{std::move(found->rig), found->files.empty() ? folder.string() : found->files.front()};
+  return failure(ErrorCode::input, "is missing: the recording has no calibration", own,
+                 "add the file, or give a calibration with --rig");
+}
+
+// Properties from recording.yaml. A list of frames that was written by hand needs none.
+Status read_properties(const fs::path& folder, bool is_complete_table, RecordingInfo& info) {
+  std::error_code error;
+  if (!fs::exists(folder / "recording.yaml", error)) {
+    if (!is_complete_table) return {};
+    return failure(ErrorCode::input, "has no recording.yaml: the recording was not finished", folder.string(),
+                   "resume or repeat the recording");
+  }
+  auto file = load_options<RecordingFile>((folder / "recording.yaml").string());
+  if (!file) return failure(file);
+  info.name = file->about.name;
+  info.description = file->about.description;
+  info.gravity_m_s2 = file->about.gravity_m_s2;
+  info.noise = file->about.noise;
+  return {};
 }
 
 }  // namespace
@@ -23,23 +46,16 @@ Result<std::vector<FrameEntry>> read_frames(const fs::path& folder, const Rig& r
 Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptions& options) {
   const fs::path folder = layout.folder;
   std::error_code error;
-  if (!fs::exists(folder / "recording.yaml", error)) {
-    return failure(ErrorCode::input, "has no recording.yaml: the recording was not finished", folder.string(),
-                   "resume or repeat the recording");
-  }
-  auto file = load_options<RecordingFile>((folder / "recording.yaml").string());
-  if (!file) return failure(file);
   RecordingIndex index;
-  index.info.name = file->about.name;
-  index.info.description = file->about.description;
-  index.info.gravity_m_s2 = file->about.gravity_m_s2;
-  index.info.noise = file->about.noise;
-  const std::string rig_file = (folder / "rig.yaml").string();
-  auto rig = choose_rig(options, rig_file, {}, [&] { return read_rig_yaml(rig_file); });
+  auto table = TableReader::open((folder / "frames.csv").string(), spartan_frames_format());
+  const bool is_complete = !table || table->has_all_columns();
+  if (Status status = read_properties(folder, is_complete, index.info); !status) return failure(status);
+  auto rig = rig_of(folder, options);
   if (!rig) return failure(rig);
   index.info.rig = std::move(rig->rig);
   index.info.rig_source = rig->source;
-  auto frames = read_frames(folder, index.info.rig);
+  if (!table) return failure(table);
+  auto frames = read_spartan_frames(std::move(*table), folder.string(), index.info.rig);
   if (!frames) return failure(frames);
   index.frames = std::move(*frames);
   if (const fs::path truth = folder / "truth" / "poses.tum"; fs::exists(truth, error))
