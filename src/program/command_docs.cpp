@@ -146,7 +146,7 @@ std::string man_page(const CLI::App& app, const std::string& version) {
   }
   return page +
          ".SH EXIT STATUS\n0 success, 1 internal fault, 2 wrong command line, 3 input, 4 calibration or configuration, "
-         "5 output, 6 lost for part of the drive, 130 interrupted.\n";
+         "5 output, 6 lost for part of the drive, 7 bad calibration, 130 interrupted.\n";
 }
 
 void add_completion(CLI::App& app, Context& context) {

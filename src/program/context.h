@@ -19,7 +19,8 @@ enum ExitCode : int {
   kInput = 3,
   kConfiguration = 4,
   kOutput = 5,
-  kLost = 6,  ///< finished, but the rover was lost for part of the drive
+  kLost = 6,            ///< finished, but the rover was lost for part of the drive
+  kBadCalibration = 7,  ///< `rig inspect --check`: the images show that the calibration is bad
   kInterrupted = 130,
 };
 ExitCode exit_code(ErrorCode code);

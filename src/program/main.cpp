@@ -77,7 +77,8 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done; 1 internal fault; 2 the command line is wrong; 3 input; 4 calibration or configuration;\n"
-      "5 output, memory or file descriptors; 6 done, but the rover was lost for part of the drive; 130 interrupted.");
+      "5 output, memory or file descriptors; 6 done, but the rover was lost for part of the drive; 7 a bad calibration "
+      "(`rig inspect --check`); 130 interrupted.");
   Context context;
   context.threads = available_cores();
   add_commands(app, context);

@@ -11,6 +11,7 @@
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/map.h"
+#include "program/recording_arguments.h"
 #include "program/run_arguments.h"
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/frame_source.h"
@@ -29,12 +30,15 @@ namespace {
 
 constexpr double kRestSeconds = 1;   // of IMU samples from the first frame of the stop on
 constexpr double kMinRange_m = 0.5;  // smallest mapping.merging.max_range_m
-constexpr double kReach = 0.75;      // of the side of the map: slightly more than half of its diagonal
+constexpr double kHeightTolerance = 0.05, kPitchTolerance_deg = 2;  // ground by the rig against that of the images
+constexpr double kReach = 0.75;  // of the side of the map: slightly more than half of its diagonal
 
 struct BuildArguments {
-  std::string left, right, output, rig, recording, gravity, config;
+  std::string left, right, output, recording, gravity, config;
+  RecordingArguments of_recording;
   std::vector<std::string> set;
   std::optional<std::int64_t> position;
+  std::optional<int> frame;
   std::optional<double> extent_m, cell_m;
 };
 
@@ -76,10 +80,10 @@ Result<Stop> load_pair(const BuildArguments& a) {
   if (!left) return failure(left);
   auto right = read_image(a.right);
   if (!right) return failure(right);
-  auto rig = read_rig(a.rig, left->size());
+  auto rig = read_rig(a.of_recording.rig, left->size());
   if (!rig) return failure(rig);
   Stop stop;
-  stop.mask_folder = std::filesystem::path(a.rig).parent_path().string();
+  stop.mask_folder = std::filesystem::path(a.of_recording.rig).parent_path().string();
   StereoFrame frame;
   const StereoPair& pair = rig->pairs.front();
   const Camera& camera = *rig->find_camera(pair.left);
@@ -96,18 +100,36 @@ Result<Stop> load_pair(const BuildArguments& a) {
   return stop;
 }
 
-Result<Stop> load_stop(const BuildArguments& a) {
-  auto source = open_recording(a.recording);
+// The frames of the requested stop, or the requested frame of the odometry pair.
+Result<std::vector<FrameKey>> frames_to_map(const FrameSource& source, const BuildArguments& a) {
+  if (a.frame) {
+    const StereoPair* const pair = odometry_pair_of(source.info().rig, {});
+    if (pair == nullptr) return failure(ErrorCode::configuration, "the rig has no pair for the odometry", a.recording);
+    const std::vector<Stamp> stamps = source.listed_stamps(pair->name);
+    if (static_cast<std::size_t>(*a.frame) < stamps.size())
+      return std::vector<FrameKey>{{pair->name, stamps[static_cast<std::size_t>(*a.frame)]}};
+    return failure(ErrorCode::input, fmt::format("has no frame {}, it lists {}", *a.frame, stamps.size()), a.recording,
+                   "frames count from 0");
+  }
+  std::vector<FrameKey> frames = source.frames_at(*a.position);
+  if (!frames.empty()) return frames;
+  return failure(ErrorCode::input, fmt::format("has no frame of the stop with position_id {}", *a.position),
+                 a.recording, "frames.csv lists the position_id of every frame; --frame maps a single frame");
+}
+
+Result<Stop> load_stop(const Context& context, const BuildArguments& a) {
+  const auto open = open_options(a.of_recording);
+  if (!open) return failure(open);
+  auto source = open_recording(a.recording, *open);
   if (!source) return failure(source);
+  log_remarks((*source)->info(), context.log);
   const RecordingInfo& info = (*source)->info();
   Stop stop;
   stop.rig = info.rig;
   stop.mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
-  const auto frames_of_stop = (*source)->frames_at(*a.position);
-  if (frames_of_stop.empty()) {
-    return failure(ErrorCode::input, fmt::format("has no frame of the stop with position_id {}", *a.position),
-                   a.recording, "frames.csv lists the position_id of every frame");
-  }
+  const auto listed = frames_to_map(**source, a);
+  if (!listed) return failure(listed);
+  const std::vector<FrameKey>& frames_of_stop = *listed;
   for (const FrameKey& name : frames_of_stop) {
     auto frame = (*source)->frame_at(name.pair, name.left_stamp);
     if (!frame) return failure(frame);
@@ -155,15 +177,35 @@ int count_of(const LocalMap& map, GroundClass kind) {
 }
 
 // Height and pitch of the left camera of each view: from the rig, and from the ground profile.
-Json views_of(const StopMapper& mapper, const Eigen::Vector3d& up) {
+// The camera over the ground as the rig states it; none where the rig has no body on the ground.
+std::optional<GroundPlane> ground_by_rig(const StopView& view, const Rig& rig, const Eigen::Vector3d& up) {
+  if (rig.convention == PoseConvention::left_optical) return std::nullopt;
+  return GroundPlane{view.geometry.body_from_left.rotation().conjugate() * up,
+                     view.geometry.body_from_left.translation().dot(up)};
+}
+
+// Warns where the ground in the images is not where the rig says.
+void compare_grounds(const StopMapper& mapper, const Rig& rig, const Eigen::Vector3d& up, const Log& log) {
+  for (const StopView& view : mapper.views()) {
+    const auto by_rig = ground_by_rig(view, rig, up);
+    if (!by_rig || !view.ground) continue;
+    const GroundPlane& seen = view.ground->plane;
+    const double height_ratio = seen.height_m / by_rig->height_m - 1,
+                 pitch_deg = (seen.pitch_rad() - by_rig->pitch_rad()) / kRadiansPerDegree;
+    if (std::abs(height_ratio) <= kHeightTolerance && std::abs(pitch_deg) <= kPitchTolerance_deg) continue;
+    log.warning(fmt::format(
+        "pair {}: the ground in the images and the rig disagree: height of the camera {:.3f} m, not {:.3f} m ({:+.0f} "
+        "%), pitch {:+.1f} deg; check the mounts of the cameras, and the attitude (--gravity)",
+        view.pair, seen.height_m, by_rig->height_m, 100 * height_ratio, pitch_deg));
+  }
+}
+
+Json views_of(const StopMapper& mapper, const Rig& rig, const Eigen::Vector3d& up) {
   Json views = Json::array();
   for (const StopView& view : mapper.views()) {
-    const GroundPlane by_rig{view.geometry.body_from_left.rotation().conjugate() * up,
-                             view.geometry.body_from_left.translation().dot(up)};
-    Json json{{"pair", view.pair},
-              {"stamp_ns", view.stamp.ns},
-              {"rig", {{"pitch_deg", by_rig.pitch_rad() / kRadiansPerDegree}, {"height_m", by_rig.height_m}}},
-              {"ground", nullptr}};
+    const auto by_rig = ground_by_rig(view, rig, up);
+    Json json{{"pair", view.pair}, {"stamp_ns", view.stamp.ns}, {"rig", nullptr}, {"ground", nullptr}};
+    if (by_rig) json["rig"] = {{"pitch_deg", by_rig->pitch_rad() / kRadiansPerDegree}, {"height_m", by_rig->height_m}};
     if (view.ground) {
       json["ground"] = {{"pitch_deg", view.ground->plane.pitch_rad() / kRadiansPerDegree},
                         {"height_m", view.ground->plane.height_m}};
@@ -190,7 +232,7 @@ Json stop_to_json(const StopMapper& mapper, const LocalMap& map, const Stop& sto
            {{"roll_deg", tilt.roll_rad / kRadiansPerDegree},
             {"pitch_deg", tilt.pitch_rad / kRadiansPerDegree},
             {"source", stop.up_source}}},
-          {"views", views_of(mapper, up)},
+          {"views", views_of(mapper, stop.rig, up)},
           {"time_ms",
            {{"disparity", mapper.times().disparity},
             {"v_disparity", mapper.times().v_disparity},
@@ -205,8 +247,11 @@ std::string to_text(const Json& json, const std::string& folder) {
       fmt::format("attitude: roll {:.2f} deg, pitch {:.2f} deg ({})\n", json["attitude"]["roll_deg"].get<double>(),
                   json["attitude"]["pitch_deg"].get<double>(), json["attitude"]["source"].get<std::string>());
   for (const Json& view : json["views"]) {
-    text += fmt::format("{:<12} camera height {:.3f} m, pitch {:.2f} deg down (rig); ", view["pair"].get<std::string>(),
-                        view["rig"]["height_m"].get<double>(), view["rig"]["pitch_deg"].get<double>());
+    text += fmt::format("{:<12} ", view["pair"].get<std::string>());
+    text += view["rig"].is_null()
+                ? std::string("camera over the ground: unknown (rig); ")
+                : fmt::format("camera height {:.3f} m, pitch {:.2f} deg down (rig); ",
+                              view["rig"]["height_m"].get<double>(), view["rig"]["pitch_deg"].get<double>());
     text += view["ground"].is_null()
                 ? std::string("no ground found\n")
                 : fmt::format("{:.3f} m, {:.2f} deg (ground profile)\n", view["ground"]["height_m"].get<double>(),
@@ -225,16 +270,17 @@ std::string to_text(const Json& json, const std::string& folder) {
 }
 
 Status check(const BuildArguments& a) {
-  const bool pair = !a.left.empty() || !a.right.empty() || !a.rig.empty();
+  const bool pair = !a.left.empty() || !a.right.empty();
   if (pair == !a.recording.empty()) {
-    return failure(ErrorCode::usage,
-                   "give two images with --rig, or --recording with --position (a recording has its own calibration)",
+    return failure(ErrorCode::usage, "give two images with --rig, or --recording with --position or --frame",
                    "map build");
   }
-  if (pair && (a.right.empty() || a.rig.empty())) {
+  if (pair && (a.right.empty() || a.of_recording.rig.empty())) {
     return failure(ErrorCode::usage, "give both LEFT and RIGHT, and --rig", "map build");
   }
-  if (!pair && !a.position) return failure(ErrorCode::usage, "--recording needs --position", "map build");
+  if (!pair && a.position.has_value() == a.frame.has_value()) {
+    return failure(ErrorCode::usage, "--recording needs either --position or --frame", "map build");
+  }
   return {};
 }
 
@@ -252,7 +298,7 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   if (!gravity) return failure(gravity);
   auto options = options_of(context, a);
   if (!options) return failure(options);
-  auto stop = a.recording.empty() ? load_pair(a) : load_stop(a);
+  auto stop = a.recording.empty() ? load_pair(a) : load_stop(context, a);
   if (!stop) return failure(stop);
   options = resolved_options(std::move(*options), stop->rig);
   if (*gravity) {
@@ -286,6 +332,7 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   if (Status s = expect_not_interrupted(); !s) return failure(s);
   if (Status s = make_folder(a.output); !s) return failure(s);
   if (Status s = write_stop_files(mapper.views(), merged, map, options->mapping, a.output); !s) return failure(s);
+  compare_grounds(mapper, stop->rig, up, context.log);
   const Json json = stop_to_json(mapper, map, *stop, up);
   if (Status s = print(context.json ? text_of(json) + "\n" : to_text(json, a.output)); !s) return failure(s);
   return kDone;
@@ -301,10 +348,14 @@ void add_map_build(CLI::App& map, Context& context) {
   command->add_option("left", a->left, "Left image.");
   command->add_option("right", a->right, "Right image.");
   command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
-  command->add_option("--rig", a->rig, "Rig or calibration file of the two images, in any supported format.");
-  command->add_option("--recording", a->recording, "Recording to take one stop from.");
+  command->add_option("--rig", a->of_recording.rig,
+                      "Rig or calibration file, in any supported format (default: the recording's own).");
+  command->add_option("--recording", a->recording, "Recording to take one stop or one frame from.");
+  add_recording_options(*command, a->of_recording);
   command->add_option("--position", a->position,
                       "Id of the stop: the position_id in frames.csv; all of its frames are merged.");
+  command->add_option("--frame", a->frame, "Number of a frame of the odometry pair, from 0, instead of a stop.")
+      ->check(non_negative_number());
   command
       ->add_option(
           "--extent-m", a->extent_m,

@@ -12,6 +12,7 @@
 #include "program/inspection_images.h"
 #include "program/json.h"
 #include "program/progress.h"
+#include "program/recording_arguments.h"
 #include "program/rig_convert.h"
 #include "program/rig_inspect_apply.h"
 #include "spartan/calibration/pair_inspection.h"
@@ -26,7 +27,9 @@ namespace {
 
 struct InspectArguments {
   std::string rig, left, right, recording, pair, apply, figure;
+  RecordingArguments of_recording;
   int frames = 12;
+  bool check = false;
 };
 
 Result<InspectedPair> check_with_images(const Rig& rig, const StereoPair& pair, std::vector<ImagePair> images,
@@ -167,7 +170,10 @@ Result<std::vector<InspectedPair>> check_requested_pairs(const InspectArguments&
     return failure(ErrorCode::usage, fmt::format("the rig has no pair '{}'", a.pair), "--pair");
   }
   if (!a.recording.empty()) {
-    auto source = open_recording(a.recording);
+    auto open = open_options(a.of_recording);
+    if (!open) return failure(open);
+    open->rig_file = a.rig;  // a recording without a calibration will do
+    auto source = open_recording(a.recording, *open);
     if (!source) return failure(source);
     for (const StereoPair& pair : rig.pairs) {
       if (!wanted(pair) || !(*source)->info().rig.find_pair(pair.name)) continue;
@@ -209,8 +215,8 @@ Status check_usage(const InspectArguments& a) {
   if (!files && a.rig == "-") {
     return failure(ErrorCode::usage, "without a calibration (-) give LEFT and RIGHT", "rig inspect");
   }
-  if (!files && !recording && (!a.apply.empty() || !a.figure.empty())) {
-    return failure(ErrorCode::usage, "--apply and --figure need images", "rig inspect");
+  if (!files && !recording && (!a.apply.empty() || !a.figure.empty() || a.check)) {
+    return failure(ErrorCode::usage, "--apply, --figure and --check need images", "rig inspect");
   }
   if (!a.figure.empty() && std::filesystem::path(a.figure).extension() != ".png") {
     return failure(ErrorCode::usage, "the figure is a PNG: give it a name that ends in .png", "--figure");
@@ -253,6 +259,12 @@ std::string inspection_to_text(const InspectArguments& a, const LoadedRig& read,
   return text;
 }
 
+Result<ExitCode> verdict(const InspectArguments& a, const std::vector<InspectedPair>& inspected) {
+  const bool bad = std::any_of(inspected.begin(), inspected.end(),
+                               [](const InspectedPair& one) { return one.check.grade == PairGrade::bad; });
+  return a.check && bad ? kBadCalibration : kDone;
+}
+
 Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   if (Status usage = check_usage(a); !usage) return failure(usage);
   if (Status there = a.rig == "-" ? Status() : calibration_is_there(a.rig); !there) return failure(there);
@@ -278,16 +290,16 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   if (!a.figure.empty()) {
     if (Status drawn = write_figure(a.figure, read->rig, inspected.front(), workers); !drawn) return failure(drawn);
   }
-  if (a.apply.empty()) return kDone;
+  if (a.apply.empty()) return verdict(a, inspected);
   const auto sentences = write_corrected_rig(*read, inspected, a.apply);
   if (!sentences) return failure(sentences);
   if (context.json) {
     // The findings in the JSON tell the first; the rest are warnings.
     for (std::size_t i = 1; i < sentences->size(); ++i) context.log.warning((*sentences)[i]);
-    return kDone;
+    return verdict(a, inspected);
   }
   if (Status printed = print(fmt::format("{}\n", fmt::join(*sentences, "\n"))); !printed) return failure(printed);
-  return kDone;
+  return verdict(a, inspected);
 }
 
 }  // namespace
@@ -310,6 +322,7 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
                    "Right image, folder or pattern; paired with the left ones in the order of their names.")
       ->option_text("RIGHT");
   command->add_option("--recording", a->recording, "Take the images from this recording, for every pair of the rig.");
+  add_recording_options(*command, a->of_recording);
   command->add_option("--pair", a->pair,
                       "Check only this pair of the rig (default with LEFT and RIGHT: the first one).");
   command
@@ -319,6 +332,8 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
       ->check(CLI::Range(1, 1000));
   command->add_option("--apply", a->apply,
                       "Write the corrected rig as rig.yaml. Only parameters that are reported as wrong are changed.");
+  command->add_flag("--check", a->check,
+                    "Return exit code 7 where the calibration of a pair is bad, or the images do not suffice.");
   command->add_option("--figure", a->figure,
                       "Write a PNG that shows the row errors of the first pair, before and after.");
   add_former_name(*command, context, "--shots", "--frames", a->frames)->check(CLI::Range(1, 1000));

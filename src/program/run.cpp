@@ -6,10 +6,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "program/calibration_advice.h"
 #include "program/commands.h"
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/progress.h"
+#include "program/recording_arguments.h"
 #include "program/run_arguments.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
@@ -20,7 +22,8 @@ namespace spartan::program {
 namespace {
 
 struct RunArguments {
-  std::string input, output, rig, format, config, truth;
+  std::string input, output, config, truth;
+  RecordingArguments recording;
   std::vector<std::string> set;
   bool resume = false, odometry_only = false;
   int max_frames = 0;
@@ -67,8 +70,7 @@ Status write_report(const RunRequest& request, const std::string& truth) {
   ReportRequest about;
   about.run = request.output;
   about.recording = request.input;
-  about.open.format = request.format;
-  about.open.rig_file = request.rig_file;
+  about.open = request.open;
   about.options = request.options;
   about.truth = truth;
   about.threads = request.threads;
@@ -79,6 +81,19 @@ Status write_report(const RunRequest& request, const std::string& truth) {
   return write_file_atomically(folder.report() + "/index.html", *page);
 }
 
+// Where most frames were lost, the calibration may be wrong, or the cameras exchanged.
+void advise(const RunRequest& request, const RunOutcome& outcome, const Context& context) {
+  const auto summary = nlohmann::json::parse(outcome.summary_json);
+  const int lost = summary["health"]["odometry"]["lost"].get<int>(), frames = summary["frames"].get<int>();
+  if (2 * lost < frames) return;
+  const std::string advice =
+      calibration_advice(request.input, request.open, request.options.odometry_pair, ThreadPool(request.threads));
+  context.log.warning(fmt::format("the odometry was lost in {} of {} frames; {}", lost, frames,
+                                  advice.empty() ? "the calibration fits the images: dark or blurred images, little "
+                                                   "texture, or a low frame rate"
+                                                 : advice));
+}
+
 Result<ExitCode> run_command(const Context& context, const RunArguments& arguments) {
   RunRequest request;
   auto chosen = choose_options(context, arguments.config, arguments.set);
@@ -86,14 +101,11 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.options = std::move(chosen->options);
   request.given = std::move(chosen->given);
   if (arguments.odometry_only) request.options.odometry_only = true;
-  if (!arguments.format.empty()) {
-    const auto format = parse_recording_format(arguments.format);
-    if (!format) return failure(format);
-    request.format = *format;
-  }
+  auto open = open_options(arguments.recording);
+  if (!open) return failure(open);
+  request.open = std::move(*open);
   request.input = arguments.input;
   request.output = arguments.output;
-  request.rig_file = arguments.rig;
   request.resume = arguments.resume;
   request.threads = context.threads;
   request.memory_bytes = memory_bound(context);
@@ -120,6 +132,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
     if (Status s = write_report(request, arguments.truth); !s)
       context.log.warning("no report was written: " + s.error().message());
   }
+  if (outcome->lost && !outcome->interrupted) advise(request, *outcome, context);
   const Status printed = print(context.json ? outcome->summary_json : text);
   if (!printed) return failure(printed);
   if (outcome->interrupted) {
@@ -136,16 +149,16 @@ void add_run(CLI::App& app, Context& context) {
       app, context, "run", "Process a recording: trajectories, disparity images, terrain maps, and a report",
       "run $SPARTAN_DATA/kitti_06 -o run_06", [&context, a] { return run_command(context, *a); });
   command
-      ->add_option("input", a->input,
-                   "Folder of the recording. Its layout (Spartan, KITTI odometry, KITTI raw, EuRoC/ASL) is detected "
-                   "and printed.")
+      ->add_option(
+          "input", a->input,
+          "Folder of the recording, whose layout (Spartan, KITTI odometry, KITTI raw, EuRoC/ASL, image folders) is "
+          "detected and printed, or a video with the images of both cameras side by side.")
       ->required();
   command->add_option("-o,--output", a->output, "Run folder to create. An existing one is an error without --resume.")
       ->required();
-  command->add_option("--rig", a->rig,
+  command->add_option("--rig", a->recording.rig,
                       "Calibration file to use instead of the recording's own, in any supported format.");
-  command->add_option("--format", a->format,
-                      "Layout of the recording: spartan, kitti, kitti-raw or euroc (default: detected).");
+  add_recording_options(*command, a->recording);
   command->add_option("--config", a->config,
                       "YAML file with options that differ from the defaults (see `spartan config dump`).");
   command->add_option("--set", a->set, "Set one option, as group.key=value. Repeatable; overrides --config.")

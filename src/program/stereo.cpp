@@ -1,6 +1,7 @@
 // spartan stereo: computes the disparity image of one pair of images.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -10,6 +11,7 @@
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/run_arguments.h"
+#include "spartan/calibration/pair_inspection.h"
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/files.h"
@@ -23,10 +25,13 @@
 namespace spartan::program {
 namespace {
 
+constexpr double kLowDensity_percent = 50;  // of good pairs of the usual data sets: above 80
+constexpr double kLargestRowError_px = 1;   // mean; of rectified images: below 0.5
+
 struct StereoArguments {
   std::string left, right, output, rig, calib, truth, mask;
   std::optional<int> min_disparity, max_disparity;
-  double truth_scale = 1;
+  std::optional<double> truth_scale;
   std::string config;
   std::vector<std::string> set;
 };
@@ -124,6 +129,16 @@ Result<DisparityRange> search_range(const StereoArguments& a, const Pair& pair) 
   return range;
 }
 
+constexpr float kLargestFixedPoint = 65535.0F / 256;  // of disparity.png
+
+std::int64_t saturated_pixels(ImageView<const float> disparity) {
+  std::int64_t count = 0;
+  for (int y = 0; y < disparity.height(); ++y) {
+    for (int x = 0; x < disparity.width(); ++x) count += disparity(x, y) > kLargestFixedPoint ? 1 : 0;
+  }
+  return count;
+}
+
 Image<std::uint16_t> to_fixed_point(ImageView<const float> disparity) {
   Image<std::uint16_t> fixed(disparity.size());
   for (int y = 0; y < disparity.height(); ++y) {
@@ -165,7 +180,7 @@ Json times_of(const DisparityTimes& t) {
 
 Result<std::optional<DisparityMetrics>> score_disparity(const StereoArguments& a, ImageView<const float> disparity) {
   if (a.truth.empty()) return std::nullopt;
-  const auto truth = read_disparity(a.truth, a.truth_scale);
+  const auto truth = read_disparity(a.truth, a.truth_scale.value_or(1));
   if (!truth) return failure(truth);
   Image<std::uint8_t> mask;
   if (!a.mask.empty()) {
@@ -176,6 +191,48 @@ Result<std::optional<DisparityMetrics>> score_disparity(const StereoArguments& a
   const auto metrics = compare_disparities(disparity, *truth, mask);
   if (!metrics) return failure(metrics);
   return *metrics;
+}
+
+// Images that are not rectified or exchanged give few disparities, many of them wrong: says what the images show.
+void check_images(const StereoArguments& a, const Pair& pair, double density_percent, const Context& context) {
+  const bool few = density_percent < kLowDensity_percent;
+  if (!few && !a.rig.empty()) return;
+  const std::array<StereoViews, 1> views{{{pair.left, pair.right}}};
+  const auto inspection = inspect_images(views, ThreadPool(context.threads));
+  const std::string check = fmt::format("spartan rig inspect {} {} {}", a.rig.empty() ? "-" : a.rig, a.left, a.right);
+  bool explained = false;
+  if (inspection && inspection->sufficient()) {
+    const PairCheck& result = inspection->check;
+    explained = result.images_swapped || result.unrectified_rows.mean_px > kLargestRowError_px;
+    if (result.images_swapped) {
+      context.log.warning("left and right are exchanged: the left image was taken by the right camera");
+    } else if (explained) {
+      context.log.warning(
+          fmt::format("the images are not rectified: rows differ by {:.1f} px (95 % below {:.1f} px){}; check with: {}",
+                      result.unrectified_rows.mean_px, result.unrectified_rows.p95_px,
+                      a.rig.empty() ? "; give their calibration with --rig" : " with this calibration", check));
+    }
+  }
+  if (few && !explained) {
+    context.log.warning(fmt::format(
+        "only {:.0f} % of the pixels have a disparity: left and right exchanged, images that are not rectified or of "
+        "different times, too small a range (--max-disparity), or little texture; check with: {}",
+        density_percent, check));
+  }
+}
+
+// 8-bit truth of some data sets is scaled.
+Status check_truth_scale(const StereoArguments& a, const Log& log) {
+  if (a.truth.empty() || a.truth_scale || std::filesystem::path(a.truth).extension() == ".pfm") return {};
+  const auto image = read_image(a.truth);
+  if (!image) return failure(image);
+  if (image->format().bits == 8) {
+    log.warning(fmt::format(
+        "{}: 8-bit true disparities are taken as whole pixels; state their scale with --truth-scale (Middlebury: 2, 4 "
+        "or 8, or 1)",
+        a.truth));
+  }
+  return {};
 }
 
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
@@ -198,6 +255,15 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
     return tl::unexpected<Error>(error);
   }
   if (Status s = expect_not_interrupted(); !s) return failure(s);
+  const double density_percent = known_percent(image->disparity);
+  check_images(a, *pair, density_percent, context);
+  if (const std::int64_t saturated = saturated_pixels(image->disparity); saturated > 0) {
+    context.log.warning(
+        fmt::format("{} disparities of more than {:.0f} px are saturated in disparity.png; "
+                    "disparity.pfm has their values",
+                    saturated, kLargestFixedPoint));
+  }
+  if (Status s = check_truth_scale(a, context.log); !s) return failure(s);
   const auto metrics = score_disparity(a, image->disparity);
   if (!metrics) return failure(metrics);
   if (Status s = write_results(a, *pair, image->disparity, context.log); !s) return failure(s);
@@ -205,14 +271,14 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   Json json{{"schema", 1},
             {"width", image->disparity.width()},
             {"height", image->disparity.height()},
-            {"density_percent", known_percent(image->disparity)},
+            {"density_percent", density_percent},
             {"time_ms", times_of(image->times)},
             {"peak_bytes", image->buffer_bytes}};
   if (*metrics) json["scores"] = to_json(**metrics);
   std::string text = text_of(json) + "\n";
   if (!context.json) {
     text = fmt::format("{} x {} px, density {:.1f} %, {:.1f} ms; results in {}\n", image->disparity.width(),
-                       image->disparity.height(), known_percent(image->disparity), image->times.total, a.output);
+                       image->disparity.height(), density_percent, image->times.total, a.output);
     if (*metrics) text += table_of(**metrics);
   }
   if (Status s = print(text); !s) return failure(s);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "spartan/system/internal/pipeline_state.h"
@@ -14,12 +13,6 @@ using namespace internal;
 namespace {
 
 constexpr double kGravityOnEarth_m_s2 = 9.81;
-
-const StereoPair* pair_for_odometry(const Rig& rig, const std::string& name) {
-  if (!name.empty()) return rig.find_pair(name);
-  const auto found = std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const auto& p) { return p.for_odometry; });
-  return found == rig.pairs.end() ? nullptr : &*found;
-}
 
 }  // namespace
 
@@ -83,51 +76,6 @@ void Pipeline::State::localize(const RelativeMotion& motion) {
   slam_filter.add(motion);
 }
 
-Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified,
-                                           const RelativeMotion& motion) {
-  if (!maps_stops) return {};
-  return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
-                                       localizer.estimate().world_from_body,
-                                       {motion.previous_from_current, motion.covariance});
-}
-
-// Adds a frame of another pair to the stop that it belongs to.
-Status Pipeline::State::add_view(const StereoFrame& frame) {
-  if (!maps_stops || frame.position_id < 0) return {};
-  const StereoPair& of = *rig.find_pair(frame.pair);
-  const auto images = FrozenCameras::fingerprints_of(frame);
-  if (Status status = check_new(frame, index_of(of), images); !status) return status;
-  const auto rectified = clock.measure("imaging", [&] { return imager.process(frame); });
-  if (!rectified) return failure(rectified);
-  clock.add(rectified->times);
-  Status added = clock.measure(
-      "reconstruction", [&] { return stop_stage.add_view(frame.position_id, frame.pair, *rectified, of.nearest_m); });
-  if (added) frozen_cameras.remember(index_of(of), images);
-  return added;
-}
-
-Result<std::optional<MappedStop>> Pipeline::State::finish_stop() {
-  if (stop_stage.mapper().views().empty()) {
-    stop_stage.clear();
-    return std::nullopt;
-  }
-  const auto survey = clock.measure("mapping", [&] { return stop_stage.survey(); });
-  auto merged =
-      clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->world_from_body); });
-  if (!merged) return failure(merged);  // the stop stays the current one
-  stop_stage.clear();
-  if (merged->constraint) apply_map_constraint(*survey, *merged->constraint);
-  return MappedStop{survey->position_id, survey->stamp, survey->views, survey->world_from_body, std::move(*merged)};
-}
-
-// The constraint is on the pose at the first frame of the stop. During a long stop that frame leaves the buffer of a
-// filter; the constraint is then transported to the last frame, whose pose the filter still has.
-void Pipeline::State::apply_map_constraint(const StopSurvey& survey, const PoseConstraint& constraint) {
-  const PoseConstraint last = transported(constraint, survey.first_from_last, survey.last_stamp);
-  localizer.add(localizer.reaches(constraint.stamp) ? constraint : last);
-  slam_filter.add(slam_filter.reaches(constraint.stamp) ? constraint : last);
-}
-
 bool Pipeline::State::terrain_is_due() const {
   if (!computes_terrain) return false;
   return distance_of_last_terrain_m < 0 || distance_m - distance_of_last_terrain_m >= options.terrain.every_m;
@@ -135,7 +83,7 @@ bool Pipeline::State::terrain_is_due() const {
 
 // Whether the disparities of this frame can be computed, if terrain or the map of a stop needs them.
 Status Pipeline::State::check_disparities(const RectifiedPair& rectified) const {
-  if (!maps_stops && !computes_terrain) return {};
+  if (!maps_stops && !maps_keyframes && !computes_terrain) return {};
   return StopMapper::check(rectified, pair.nearest_m);
 }
 
@@ -159,7 +107,7 @@ Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const Rec
 Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, ThreadPool workers,
                                   const std::string& mask_folder) {
   if (Status status = validate(options, "options"); !status) return failure(status);
-  const StereoPair* const pair = pair_for_odometry(rig, options.odometry_pair);
+  const StereoPair* const pair = odometry_pair_of(rig, options);
   if (pair == nullptr) {
     return options.odometry_pair.empty()
                ? failure(ErrorCode::configuration, "the rig has no pair for the odometry", rig.name,
@@ -183,7 +131,7 @@ Status Pipeline::check_memory(std::int64_t most_bytes) const {
   const State& s = *state_;
   const bool odometry_needs = s.computes_terrain || s.options.odometry.reconstruction.source == DisparitySource::dense;
   for (const StereoPair& pair : s.rig.pairs) {
-    if (!s.maps_stops && !(odometry_needs && pair.name == s.pair.name)) continue;
+    if (!s.maps_stops && !((odometry_needs || s.maps_keyframes) && pair.name == s.pair.name)) continue;
     const RectifiedStereo geometry = s.imager.geometry(pair.name);
     const DisparityRange range = disparity_range(geometry, pair.nearest_m);
     if (Status fits = DisparityComputer::check_memory(geometry.size, range, most_bytes); !fits) {
@@ -240,6 +188,13 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     if (!stop) return failure(stop);
     result.stop = std::move(*stop);
   }
+  if (s.keyframe_stage.is_ready()) {
+    auto map = s.finish_keyframe();
+    if (!map) return failure(map);
+    result.stop = std::move(*map);
+  } else if (Status status = s.start_keyframe_map(); !status) {
+    return failure(status);
+  }
   s.frozen_cameras.remember(pair_index, images);
   if (!s.started) s.start(*rectified);
   s.left_from_body = rectified->body_from_left.inverse();
@@ -268,6 +223,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     result.slam = s.slam_filter.world_from_body();
   }
   if (Status status = s.add_odometry_frame(frame, *rectified, body_motion); !status) return failure(status);
+  s.update_keyframes(*rectified, result.motion, body_motion);
 
   if (s.terrain_is_due()) {
     if (disparity->empty()) disparity = s.dense_disparity(*rectified);
@@ -295,7 +251,10 @@ std::optional<Pose> Pipeline::predict(Stamp stamp) const {
 }
 
 Result<std::optional<MappedStop>> Pipeline::finish_stop() {
-  return state_->finish_stop();
+  if (!state_->keyframe_stage.is_pending()) return state_->finish_stop();
+  auto map = state_->finish_keyframe();
+  if (!map) return failure(map);
+  return std::move(*map);
 }
 
 std::vector<StageTime> Pipeline::take_stage_times() {

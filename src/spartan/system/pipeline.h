@@ -30,10 +30,10 @@ struct TerrainView {
   Pose world_from_left;              ///< rectified left optical frame
 };
 
-/// Result of mapping a stop, computed when the rover leaves it.
+/// Result of mapping a stop, computed when the rover leaves it, or of mapping a keyframe, computed some frames later.
 struct MappedStop {
-  std::int64_t position_id = -1;
-  Stamp stamp;  ///< of the odometry pair's first frame at the stop
+  std::int64_t position_id = -1;  ///< -1: a keyframe
+  Stamp stamp;                    ///< of the odometry pair's first frame at the stop, or of the keyframe
   int views = 0;
   UncertainPose prior;    ///< world_from_body before map matching
   MapMergeResult merged;  ///< match, corrected pose, and the local map at that pose
@@ -50,7 +50,7 @@ struct FrameResult {
   std::optional<UncertainPose> slam;                 ///< world_from_body: odometry corrected by map matching
   std::optional<LocalizationEstimate> localization;  ///< by all sensors
   std::optional<TerrainView> terrain;                ///< if due, see TerrainOptions::every_m
-  std::optional<MappedStop> stop;                    ///< the stop that ended with this frame, if it was mapped
+  std::optional<MappedStop> stop;  ///< the stop that ended with this frame, or an earlier keyframe, if it was mapped
   std::vector<StageTime> times;
 };
 
@@ -96,7 +96,8 @@ class Pipeline {
   Status flush_maps();
   GlobalMap& global_map();
 
-  /// Maps the current stop if it has views; for the end of a drive. After an error the stop stays the current one.
+  /// Maps the current stop if it has views, or the pending keyframe; for the end of a drive. After an error the stop
+  /// stays the current one.
   Result<std::optional<MappedStop>> finish_stop();
 
   /// Times of the stages since the last result: views of a stop and its mapping.

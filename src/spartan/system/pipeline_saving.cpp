@@ -12,7 +12,7 @@ namespace spartan {
 
 namespace {
 
-constexpr std::uint32_t kPipelineVersion = 6;  // of save(); raise it when the saved state changes
+constexpr std::uint32_t kPipelineVersion = 7;  // of save(); raise it when the saved state changes
 
 }  // namespace
 
@@ -31,6 +31,7 @@ Bytes Pipeline::save() const {
   out.put(s.distance_of_last_terrain_m);
   s.frozen_cameras.save(out);
   s.stop_stage.save(out);
+  s.keyframe_stage.save(out);
   const bool odometry_only = s.options.odometry_only;
   for (const Bytes& stage :
        {s.odometer.save(), s.localizer.save(), odometry_only ? s.dead_reckoning.save() : s.odometry_filter.save(),
@@ -44,6 +45,7 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   const std::string what = "run.sqlite: saved state of the pipeline";
   if (Status status = in.expect_version(kPipelineVersion, what); !status) return status;
   State& s = *state_;
+  s.keyframe_task = {};
   s.started = in.get<bool>();
   s.last_stamp = in.get_stamp();
   const bool has_up = in.get<bool>();
@@ -57,6 +59,7 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   s.distance_of_last_terrain_m = in.get_finite();
   s.frozen_cameras.restore(in);
   s.stop_stage.restore(in);
+  s.keyframe_stage.restore(in);
   std::array<Bytes, 5> stages;
   for (Bytes& stage : stages) stage = in.get_array<std::uint8_t>();
   if (Status status = in.finish(what); !status) return status;
@@ -86,6 +89,7 @@ std::vector<FrameKey> Pipeline::pending_frames() const {
   const State& s = *state_;
   std::vector<FrameKey> pending;
   if (const auto stamp = s.stop_stage.pending_first_frame()) pending.push_back({s.pair.name, *stamp});
+  if (const auto stamp = s.keyframe_stage.pending_frame()) pending.push_back({s.pair.name, *stamp});
   const auto& views = s.stop_stage.pending_views();
   pending.insert(pending.end(), views.begin(), views.end());
   return pending;
@@ -102,7 +106,11 @@ Status Pipeline::restore_frame(const StereoFrame& frame) {
   if (!rectified) return failure(rectified);
   if (pair->name != s.pair.name)
     return s.stop_stage.add_view(frame.position_id, pair->name, *rectified, pair->nearest_m);
-  s.stop_stage.restore_first_frame(*rectified, s.pair.nearest_m);
+  if (s.keyframe_stage.pending_frame() == rectified->stamp) {
+    s.keyframe_stage.restore_frame(*rectified);
+  } else {
+    s.stop_stage.restore_first_frame(*rectified, s.pair.nearest_m);
+  }
   return {};
 }
 

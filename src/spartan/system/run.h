@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <string>
 
 #include "spartan/camera/frame_source.h"
@@ -16,10 +15,9 @@ namespace spartan {
 
 /// What to run, and with which options.
 struct RunRequest {
-  std::string input;                      ///< folder of the recording
-  std::string output;                     ///< run folder
-  std::string rig_file;                   ///< empty: the recording's own calibration
-  std::optional<RecordingFormat> format;  ///< none: detect it
+  std::string input;   ///< folder of the recording
+  OpenOptions open;    ///< how to read it
+  std::string output;  ///< run folder
   RunOptions options;
   GivenKeys given;      ///< keys of `options` that the user gave: the recording's noise does not replace them
   bool resume = false;  ///< continue the run in `output`, if there is one

@@ -48,6 +48,12 @@ constexpr std::array<std::string_view, 30> kBasicOptions{
 
 }  // namespace
 
+const StereoPair* odometry_pair_of(const Rig& rig, const RunOptions& options) {
+  if (!options.odometry_pair.empty()) return rig.find_pair(options.odometry_pair);
+  const auto found = std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const auto& p) { return p.for_odometry; });
+  return found == rig.pairs.end() ? nullptr : &*found;
+}
+
 RunOptions resolved_options(RunOptions options, const Rig& rig) {
   const RunOptions defaults;
   const auto share = [](double& value, double by_default, double shared) {

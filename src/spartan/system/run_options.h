@@ -1,6 +1,8 @@
 // All options of a run as one tree (`spartan config dump --all`).
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -43,6 +45,47 @@ struct TerrainOptions {
   }
 };
 
+/// Of which frames local maps are made.
+enum class MapSource : std::uint8_t {
+  automatic,  ///< of stops where the rig (in run(): the recording) has another pair than that of the odometry, else of
+              ///< keyframes
+  stops,      ///< of the views of each stop
+  keyframes,  ///< of single frames of the odometry pair while the rover drives
+};
+constexpr auto enum_names(MapSource) {
+  return std::array{EnumName{MapSource::automatic, "auto"}, EnumName{MapSource::stops, "stops"},
+                    EnumName{MapSource::keyframes, "keyframes"}};
+}
+
+/// When a frame of the odometry pair becomes a keyframe, of which a local map is made.
+struct KeyframeOptions {
+  double every_m = 0;       ///< distance from the last keyframe, m; 0: a quarter of the side of the map
+  double turn_deg = 20;     ///< rotation since the last keyframe, degrees
+  double new_ground = 0.4;  ///< fraction of the visible ground that the last keyframe did not see
+  int delay_frames = 10;    ///< most frames between a keyframe and the frame whose pose its map corrects
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("every_m", every_m,
+            "Distance from the last keyframe in metres at which a frame becomes a keyframe; raising it makes fewer "
+            "maps that overlap less, and 0 takes a quarter of the side of the map.",
+            at_least(0));
+    v.field("turn_deg", turn_deg,
+            "Rotation since the last keyframe in degrees at which a frame becomes a keyframe; raising it makes fewer "
+            "maps in turns.",
+            between(1, 180));
+    v.field("new_ground", new_ground,
+            "Fraction of the visible ground, as far as half of the side of the map, that the last keyframe did not see "
+            "at which a frame becomes a keyframe; raising it makes fewer maps that overlap less.",
+            between(0.01, 1));
+    v.field(
+        "delay_frames", delay_frames,
+        "Most frames between a keyframe and the frame whose pose its map corrects. Meanwhile one thread makes the map "
+        "beside the odometry; raising it lets slow cores keep up, and corrects the pose later.",
+        between(0, 100));
+  }
+};
+
 /// The options of all modules, and which of them run.
 struct RunOptions {
   double gravity_m_s2 = 0;          ///< magnitude of gravity, m/s²; 0: as the recording specifies, else 9.81
@@ -51,10 +94,12 @@ struct RunOptions {
   bool odometry_only = false;       ///< run only the visual odometry
   ImagingOptions imaging;
   OdometryOptions odometry;
-  DisparityOptions reconstruction;  ///< dense disparities of terrain and stops
-  MappingOptions mapping;           ///< local maps of stops
-  bool maps = true;                 ///< map the stops
-  SlamOptions slam;                 ///< map matching and the global map
+  DisparityOptions reconstruction;             ///< dense disparities of terrain and stops
+  MappingOptions mapping;                      ///< local maps of stops or keyframes
+  bool maps = true;                            ///< make local maps
+  MapSource maps_from = MapSource::automatic;  ///< of which frames
+  KeyframeOptions keyframes;
+  SlamOptions slam;  ///< map matching and the global map
   LocalizationOptions localization;
   TerrainOptions terrain;
 
@@ -78,8 +123,13 @@ struct RunOptions {
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);
     v.field("maps", maps,
-            "True builds a local map at every stop that has views of a stereo pair other than the odometry pair, and "
-            "merges it into the global map; false makes no maps, so map matching never corrects the poses.");
+            "True builds local maps and merges them into the global map; false makes no maps, so map matching never "
+            "corrects the poses.");
+    v.field("maps_from", maps_from,
+            "Frames of which local maps are made: stops merges all views of each stop that has views of a stereo pair "
+            "other than the odometry pair, keyframes maps single frames of the odometry pair while the rover drives, "
+            "auto takes stops where the recording has frames of another pair, else keyframes.");
+    v.group("keyframes", keyframes);
     v.group("mapping", mapping);
     v.group("slam", slam);
     v.group("localization", localization);
@@ -91,6 +141,9 @@ struct RunOptions {
 /// rover (Rig::rover) to traversal costs and wheel odometry, and with_shared_values(). Values of the modules that
 /// differ from their defaults (set in code or under a former key) are retained.
 RunOptions resolved_options(RunOptions options, const Rig& rig);
+
+/// The stereo pair for visual odometry, borrowed from the rig; null where there is none.
+const StereoPair* odometry_pair_of(const Rig& rig, const RunOptions& options);
 
 /// "odometry.detection.landmarks was 1200, is 800; …": what differs, at most five options.
 std::string option_differences(const RunOptions& before, const RunOptions& now);

@@ -85,12 +85,13 @@ Result<std::string> map_images(const std::string& run) {
   for (std::size_t i = 0; i < count; ++i) {
     const MapRecord& map = (*maps)[count > 1 ? i * (maps->size() - 1) / (count - 1) : 0];
     const std::string overlap = map.overlap > 0 ? fmt::format(" ({:.0f} % overlap)", 100 * map.overlap) : "";
-    const auto image = image_of(
-        folder.local_map(map.stamp) + ".png",
-        fmt::format(
-            "Stop {}: {} views, {} observed cells, {} obstacle cells (red), north up. Match with the global map: {}{}",
-            map.position_id, map.views, map.known_cells, map.obstacles, status_text(map.status), overlap),
-        360);
+    const auto image =
+        image_of(folder.local_map(map.stamp) + ".png",
+                 fmt::format("{}, {} observed cells, {} obstacles (red), north up. Match with the global map: {}{}",
+                             map.position_id >= 0 ? fmt::format("Stop {}: {} views", map.position_id, map.views)
+                                                  : fmt::format("Keyframe at {} s", to_decimal_seconds(map.stamp)),
+                             map.known_cells, map.obstacles, status_text(map.status), overlap),
+                 360);
     if (!image) return failure(image);
     html += *image;
   }

@@ -2,12 +2,14 @@
 // restoring (pipeline_saving.cpp).
 #pragma once
 
+#include <ctime>
 #include <optional>
 #include <utility>
 
 #include "spartan/localization/localizer.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/system/internal/frozen_cameras.h"
+#include "spartan/system/internal/keyframe_stage.h"
 #include "spartan/system/internal/stop_stage.h"
 #include "spartan/system/pipeline.h"
 
@@ -23,21 +25,27 @@ LocalizationOptions with_gravity(const RunOptions& options);
 struct Pipeline::State {
   // The options are valid, so that create() of a stage cannot fail.
   State(Rig rig_in, const RunOptions& options_in, Imager imager_in, const StereoPair& pair_in,
-        const ThreadPool& workers)
+        const ThreadPool& workers_in)
       : rig(std::move(rig_in)),
         options(options_in),
         pair(pair_in),
         imager(std::move(imager_in)),
-        odometer(Odometer::create(options_in.odometry, workers).value()),
-        disparity_computer(DisparityComputer::create(options_in.reconstruction, workers).value()),
+        odometer(Odometer::create(options_in.odometry, workers_in).value()),
+        disparity_computer(DisparityComputer::create(options_in.reconstruction, workers_in).value()),
         localizer(Localizer::create(internal::with_gravity(options_in)).value()),
         odometry_filter(VisionOnlyFilter::create(internal::with_gravity(options_in)).value()),
         slam_filter(VisionOnlyFilter::create(internal::with_gravity(options_in)).value()),
         dead_reckoning(DeadReckoning::create(options_in.localization.vision).value()),
-        stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers).value()),
-        merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers).value()),
-        frozen_cameras(rig.pairs.size()) {
-    maps_stops = options.maps && rig.pairs.size() > 1 && !options.odometry_only;
+        stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers_in).value()),
+        keyframe_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, ThreadPool(1)).value(),
+                       options_in.keyframes, options_in.mapping.map.extent_m),
+        merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers_in).value()),
+        frozen_cameras(rig.pairs.size()),
+        workers(workers_in) {
+    const bool several = rig.pairs.size() > 1, maps = options.maps && !options.odometry_only;
+    maps_keyframes =
+        maps && (options.maps_from == MapSource::keyframes || (options.maps_from == MapSource::automatic && !several));
+    maps_stops = maps && !maps_keyframes && several;
     computes_terrain = options.terrain.enabled && !options.odometry_only;
   }
 
@@ -51,9 +59,11 @@ struct Pipeline::State {
   VisionOnlyFilter odometry_filter, slam_filter;  // poses of the odometry, without and with map corrections
   DeadReckoning dead_reckoning;                   // replaces the three filters if the odometry runs alone
   internal::StopStage stop_stage;
+  internal::KeyframeStage keyframe_stage;
   MapMerger merger;
   internal::FrozenCameras frozen_cameras;
-  bool maps_stops = false, computes_terrain = false;
+  ThreadPool workers;
+  bool maps_stops = false, maps_keyframes = false, computes_terrain = false;
   StageClock clock;
 
   std::optional<Eigen::Vector3d> up_in_body;  // at the start, by align_with_gravity()
@@ -79,10 +89,24 @@ struct Pipeline::State {
   void apply_map_constraint(const internal::StopSurvey& survey, const PoseConstraint& constraint);
   Status add_view(const StereoFrame& frame);
   Result<std::optional<MappedStop>> finish_stop();
+  Status start_keyframe_map();
+  void make_keyframe_map(const std::optional<MapExcerpt>& global);
+  Result<MappedStop> finish_keyframe();
+  MappedStop apply(const internal::StopSurvey& survey, MapMergeResult merged);
+  void update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion,
+                        const RelativeMotion& body_motion);
   bool terrain_is_due() const;
   Status check_disparities(const RectifiedPair& rectified) const;
   Result<ImageView<const float>> dense_disparity(const RectifiedPair& rectified);
   Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& rectified);
+
+  // The map of the pending keyframe, made by one thread beside the frames that follow it.
+  struct KeyframeMap {
+    Result<MapMergeResult> matched;
+    StageClock clock{CLOCK_THREAD_CPUTIME_ID};
+  };
+  KeyframeMap keyframe_map;
+  BackgroundTask keyframe_task;  // the last member: it uses the others and ends before them
 };
 
 }  // namespace spartan

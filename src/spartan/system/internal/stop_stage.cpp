@@ -4,22 +4,6 @@
 
 namespace spartan::internal {
 
-StopStage::StoredPair::StoredPair(const RectifiedPair& source)
-    : pair(source),
-      left(Image<std::uint8_t>::copy_of(source.left)),
-      right(Image<std::uint8_t>::copy_of(source.right)),
-      left_mask(Image<std::uint8_t>::copy_of(source.left_mask)),
-      right_mask(Image<std::uint8_t>::copy_of(source.right_mask)) {}
-
-RectifiedPair StopStage::StoredPair::view() const {
-  RectifiedPair copy = pair;
-  copy.left = left;
-  copy.right = right;
-  copy.left_mask = left_mask;
-  copy.right_mask = right_mask;
-  return copy;
-}
-
 Status StopStage::add_odometry_frame(std::int64_t position_id, const RectifiedPair& frame, double nearest_m,
                                      const UncertainPose& world_from_body, const UncertainPose& motion) {
   const bool begins = position_id >= 0 && position_id != position_id_;
@@ -94,8 +78,7 @@ std::optional<StopSurvey> StopStage::survey() {
   survey.first_from_last = first_from_last_;
   survey.world_from_body = world_from_body_;
   survey.views = static_cast<int>(mapper_.views().size());
-  survey.merged = mapper_.merge();
-  survey.points = surface_points(survey.merged);
+  survey.points = surface_points(mapper_.merge());
   return survey;
 }
 

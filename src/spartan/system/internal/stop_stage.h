@@ -13,19 +13,19 @@
 #include "spartan/core/threads.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/stop_mapper.h"
+#include "spartan/system/internal/stored_pair.h"
 
 namespace spartan::internal {
 
-/// Merged views of one stop, in the body frame at the odometry pair's first frame there.
+/// Merged views of one stop, in the body frame at the odometry pair's first frame there; or the view of a keyframe.
 struct StopSurvey {
-  std::int64_t position_id = -1;
+  std::int64_t position_id = -1;  ///< -1: a keyframe
   Stamp stamp;                    ///< of the odometry pair's first frame at the stop
   UncertainPose world_from_body;  ///< at that frame
   Stamp last_stamp;               ///< of the odometry pair's last frame at the stop
   /// Body motion between the two frames: a halted rover may sink, or be rocked by its mast.
   UncertainPose first_from_last;
   int views = 0;
-  MergedRange merged;
   std::vector<SurfacePoint> points;
 };
 
@@ -66,13 +66,6 @@ class StopStage {
   void restore(ArchiveReader& in);
 
  private:
-  // A deep copy of a pair, since its images are borrowed.
-  struct StoredPair {
-    explicit StoredPair(const RectifiedPair& source);
-    RectifiedPair view() const;
-    RectifiedPair pair;
-    Image<std::uint8_t> left, right, left_mask, right_mask;
-  };
   // A view of a stop that the odometry pair has not reached yet.
   struct EarlyView {
     std::int64_t position_id = -1;

@@ -1,0 +1,46 @@
+#include "program/recording_arguments.h"
+
+namespace spartan::program {
+
+void add_recording_options(CLI::App& command, RecordingArguments& a) {
+  command.add_option("--format", a.format,
+                     "Layout of the recording: spartan, kitti, kitti-raw, euroc, images or video (default: detected).");
+  command.add_option("--left", a.left,
+                     "Images of the left camera: a folder, a quoted pattern of file names (\"l*.png\") or a video, "
+                     "relative to the recording. Needs --right.");
+  command.add_option("--right", a.right,
+                     "Images of the right camera, likewise. Images with the same number or time stamp in their names "
+                     "are pairs.");
+  command.add_option("--times", a.times,
+                     "File of frame times, one a row, alone or beside file names: decimal seconds, or integers in a "
+                     "unit that follows from their values (default: times.txt of the recording, else the file names).");
+  command.add_option("--fps", a.fps, "Frames per second, instead of times (default: times of the recording).")
+      ->check(CLI::Range(0.001, 10000.0));
+  command
+      .add_option("--bits", a.bits,
+                  "Significant bits of the samples of 16-bit images (default: by the calibration, else by the images).")
+      ->check(CLI::Range(9, 16));
+}
+
+Result<OpenOptions> open_options(const RecordingArguments& a) {
+  OpenOptions open;
+  if (!a.format.empty()) {
+    const auto format = parse_recording_format(a.format);
+    if (!format) return failure(format);
+    open.format = *format;
+  }
+  open.rig_file = a.rig;
+  open.left_images = a.left;
+  open.right_images = a.right;
+  open.times_file = a.times;
+  open.fps = a.fps;
+  open.bits = a.bits;
+  return open;
+}
+
+void log_remarks(const RecordingInfo& info, const Log& log) {
+  for (const std::string& warning : info.sequence.warnings) log.warning(warning);
+  for (const std::string& remark : info.sequence.remarks) log.info(remark);
+}
+
+}  // namespace spartan::program

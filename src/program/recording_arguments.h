@@ -1,0 +1,25 @@
+// Command-line options that say how a recording is read.
+#pragma once
+
+#include <string>
+
+#include "program/context.h"
+#include "spartan/camera/frame_source.h"
+
+namespace spartan::program {
+
+struct RecordingArguments {
+  std::string rig, format, left, right, times;
+  double fps = 0;
+  int bits = 0;
+};
+
+/// `--format`, `--left`, `--right`, `--times`, `--fps`, `--bits`, for commands that read a recording.
+void add_recording_options(CLI::App& command, RecordingArguments& arguments);
+/// Code `usage` for an unknown format.
+Result<OpenOptions> open_options(const RecordingArguments& arguments);
+
+/// Logs what a recording does not state and is assumed, and irregularities of its files.
+void log_remarks(const RecordingInfo& info, const Log& log);
+
+}  // namespace spartan::program

@@ -1,0 +1,75 @@
+// The loop of a run over the samples of its recording.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/result.h"
+#include "spartan/core/stage_clock.h"
+#include "spartan/system/pipeline.h"
+#include "spartan/system/run.h"
+#include "spartan/system/run_folder.h"
+#include "spartan/system/run_store.h"
+
+namespace spartan::internal {
+
+/// Feeds the samples of a recording to the pipeline and commits every result to the store.
+class RunLoop {
+ public:
+  RunLoop(const RunRequest& request, const RunHooks& hooks, FrameSource& source, Pipeline pipeline, RunStore store,
+          RunFolder folder)
+      : request_(request),
+        hooks_(hooks),
+        source_(source),
+        pipeline_(std::move(pipeline)),
+        store_(std::move(store)),
+        folder_(std::move(folder)) {}
+
+  /// Restores the state of the run to be resumed, or initializes a new one.
+  Status begin();
+  /// Processes samples until the end, the frame limit or a request to stop.
+  Status process_samples();
+  int usable_frames() const { return usable_frames_; }
+  /// Error message of the first frame that was skipped.
+  const std::string& first_error() const { return first_error_; }
+  bool stopped() const { return stopped_; }
+  /// Whether the whole recording was processed.
+  bool complete() const { return complete_; }
+  bool gravity_measured() const { return pipeline_.gravity_measured(); }
+  bool heading_east() const { return pipeline_.heading_east(); }
+  std::optional<std::int64_t> resumed_from_frame() const { return resumed_from_frame_; }
+  RunStore& store() { return store_; }
+  GlobalMap& global_map() { return pipeline_.global_map(); }
+
+ private:
+  Status process(const Sample& sample);
+  Status finish();
+  Result<MapRecord> write_map_of(const MappedStop& stop);
+  Status process_frame(const StereoFrame& frame);
+  Status process_missing(const MissingFrame& missing);
+  Status commit(const RunStore::Step& step);
+  std::vector<StageTime> take_stage_times();
+
+  const RunRequest& request_;
+  const RunHooks& hooks_;
+  FrameSource& source_;
+  Pipeline pipeline_;
+  RunStore store_;
+  RunFolder folder_;
+  StageClock clock_;
+  std::vector<StageTime> view_times_;  // of views of a stop since the last frame of the odometry pair
+  std::int64_t samples_taken_ = 0;     // number of samples read from the source
+  int frames_ = 0;                     // frames of the odometry pair, missing ones included
+  int usable_frames_ = 0;              // frames of the odometry pair that were processed
+  std::string first_error_;
+  bool stopped_ = false;
+  bool complete_ = false;
+  bool resumed_ = false;
+  std::optional<std::int64_t> resumed_from_frame_;
+};
+
+}  // namespace spartan::internal
