@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "mars_scores.h"
 #include "mars_stops.h"
 #include "spartan/core/image.h"
 #include "spartan/core/stage_clock.h"
@@ -29,62 +30,6 @@ namespace spartan {
 
 using namespace internal;
 namespace {
-
-// What the cameras can see of the cells of a map.
-struct Visibility {
-  explicit Visibility(ImageSize size)
-      : pixels(size), lowest_m(size.width, size.height, std::numeric_limits<float>::quiet_NaN()) {}
-  Image<std::uint16_t> pixels;  // visible in both cameras of a pair, maximum over the pairs
-  Image<float> lowest_m;        // of the visible true surface
-};
-
-// Adds the true disparities of one frame.
-void add_true_view(const Drive& drive, const std::string& pair, Stamp stamp, const ViewGeometry& view,
-                   const Pose& world_from_body, const GeoTransform& place, Visibility& visibility) {
-  const std::string name = fmt::format("/{}/{}.png", pair, stamp.ns);
-  const auto disparity = read_disparity(drive.folder + "/truth/disparity" + name);
-  const auto mask = read_truth_mask(drive.folder + "/truth/mask" + name);
-  if (!disparity || !mask) return;
-  Image<std::uint16_t> counts(visibility.pixels.size());
-  for (int y = 0; y < disparity->height(); ++y) {
-    for (int x = 0; x < disparity->width(); ++x) {
-      if ((*mask)(x, y) != 255) continue;
-      const Eigen::Vector3d p =
-          world_from_body * view.body_from_left * view.stereo.triangulate(x, y, (*disparity)(x, y));
-      const GridCell cell = cell_at(place, p.x(), p.y());
-      if (!counts.contains(cell.column, cell.row)) continue;
-      if (counts(cell.column, cell.row) != 0xFFFF) ++counts(cell.column, cell.row);
-      float& lowest = visibility.lowest_m(cell.column, cell.row);
-      lowest = std::fmin(lowest, static_cast<float>(p.z()));
-    }
-  }
-  for (int y = 0; y < counts.height(); ++y) {
-    for (int x = 0; x < counts.width(); ++x) visibility.pixels(x, y) = std::max(visibility.pixels(x, y), counts(x, y));
-  }
-}
-
-struct Sums {
-  double cells = 0, error = 0, squares = 0, visible = 0, covered = 0, free = 0, false_marks = 0;
-  int obstacles = 0, found = 0, cavities = 0, cavities_found = 0;
-  void add(const MapMetrics& m) {
-    cells += m.elevation_cells;
-    error += m.elevation_cells * m.bias_m;
-    squares += m.elevation_cells * m.rms_m * m.rms_m;
-    visible += m.visible_cells;
-    covered += m.covered_cells;
-    free += m.free_cells;
-    false_marks += m.false_cells;
-    for (const HazardScore& thing : m.obstacles) {
-      if (thing.height_m < 0.15) continue;
-      ++obstacles;
-      found += thing.found ? 1 : 0;
-    }
-    for (const HazardScore& thing : m.cavities) {
-      ++cavities;
-      cavities_found += thing.found ? 1 : 0;
-    }
-  }
-};
 
 // Detected obstacles by height, and the confusion matrix of visible cells, over all scenarios.
 struct Totals {
@@ -146,13 +91,8 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
   StopMapper mapper = StopMapper::create({}, {}, ThreadPool(2)).value();
   std::array<Sums, 4> sums;  // three bins of range, all
   int stops = 0;
-  Image<float> level(drive->elevation.bands[0].size());
-  for (int y = 0; y < level.height(); ++y) {
-    // height_m of obstacles.tif is the surface above the level.
-    for (int x = 0; x < level.width(); ++x)
-      level(x, y) = drive->elevation.bands[0](x, y) - drive->obstacles.bands[1](x, y);
-  }
-  const TerrainTruth truth{drive->elevation.place, drive->elevation.bands[0], drive->elevation.bands[1], level};
+  const DriveTruth of_drive(*drive);
+  const TerrainTruth truth = of_drive.view();
   for (const auto& [position, frames] : drive->stops) {
     if (stops == wanted) break;
     ++stops;
@@ -181,9 +121,7 @@ void evaluate(const std::string& folder, const std::string& scenario, int wanted
   for (std::size_t bin = 0; bin < sums.size(); ++bin) {
     const Sums& s = sums[bin];
     const std::string range = bin < 3 ? fmt::format("{:.1f}-{:.1f} m", kBorders_m[bin], kBorders_m[bin + 1]) : "all";
-    fmt::print("{:<18} {:<10} {:>7.1f} {:>7.1f} {:>9.1f} {:>6}/{:<5} {:>9.3f} {:>6}/{:<5}\n", scenario, range,
-               1000 * s.error / s.cells, 1000 * std::sqrt(s.squares / s.cells), 100 * s.covered / s.visible, s.found,
-               s.obstacles, 100 * s.false_marks / s.free, s.cavities_found, s.cavities);
+    print_row(scenario, range, s);
   }
   const StopMapperTimes& times = mapper.times();
   fmt::print("{:<18} seconds a stop on two threads: disparity {:.2f}, v-disparity {:.2f}, merging {:.2f}, map {:.2f}\n",
@@ -196,8 +134,7 @@ void run(const std::vector<std::string>& words) {
   RecordingArguments arguments = read_arguments(words, {{"--stops", "10"}, {"--list", "0"}});
   std::vector<std::string>& scenarios = arguments.scenarios;
   if (scenarios.empty()) scenarios = {"rocky_20pct", "crater_rim", "flat_featureless", "diffuse_200lux"};
-  fmt::print("{:<18} {:<10} {:>7} {:>7} {:>9} {:>12} {:>9} {:>12}\n", "scenario", "range", "bias mm", "RMS mm",
-             "covered %", "obstacles", "false %", "cavities");
+  print_header("range");
   Totals totals;
   for (const std::string& scenario : scenarios) {
     evaluate(arguments.folder, scenario, arguments.number("--stops"), arguments.number("--list") != 0, totals);
