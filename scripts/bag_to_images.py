@@ -77,10 +77,7 @@ def main():
         sys.exit(f"{out} exists and is not empty")
     cameras = {arguments.left: ("cam0", "left"), arguments.right: ("cam1", "right")}
     infos = {topic.rsplit("/", 1)[0] + "/camera_info": names for topic, names in cameras.items()}
-    tables = {}
-    for folder, _ in cameras.values():
-        (out / "mav0" / folder / "data").mkdir(parents=True)
-        tables[folder] = ["#timestamp [ns],filename"]
+    tables = {folder: ["#timestamp [ns],filename"] for folder, _ in cameras.values()}
     imu = ["#timestamp [ns],w_x [rad/s],w_y,w_z,a_x [m/s^2],a_y,a_z"]
     with AnyReader([pathlib.Path(arguments.bag)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         wanted = [c for c in reader.connections if c.topic in {*cameras, *infos, arguments.imu}]
@@ -88,6 +85,8 @@ def main():
         if missing:
             sys.exit(f"{arguments.bag} has no topic {', '.join(sorted(missing))}; it has: "
                      + ", ".join(sorted({c.topic for c in reader.connections})))
+        for folder in tables:
+            (out / "mav0" / folder / "data").mkdir(parents=True)
         for connection, _, raw in reader.messages(connections=wanted):
             message = reader.deserialize(raw, connection.msgtype)
             if connection.topic in cameras:

@@ -91,9 +91,12 @@ constexpr const char* kLookedFor =
 // Files and folders that are no recording of images, and how to make one of them.
 std::optional<Error> known_but_not_read(const fs::path& path) {
   const std::string extension = path.extension().string();
-  const bool ros1 = extension == ".bag";
-  const bool ros2 = extension == ".db3" || extension == ".mcap" ||
-                    (path_exists(path / "metadata.yaml") && !path_exists(path / "images"));
+  std::error_code error;
+  const bool is_file = fs::is_regular_file(path, error);
+  const auto metadata = is_file ? Result<std::string>() : read_file((path / "metadata.yaml").string());
+  const bool ros1 = is_file && extension == ".bag";
+  const bool ros2 = (is_file && (extension == ".db3" || extension == ".mcap")) ||
+                    (metadata && metadata->find("rosbag2") != std::string::npos);
   if (!ros1 && !ros2) return std::nullopt;
   return Error{ErrorCode::input, ros1 ? "is a ROS 1 bag, which is not read" : "is a ROS 2 bag, which is not read",
                path.string(),

@@ -284,5 +284,41 @@ TEST(TrajectoryMetrics, AgreesWithEvo) {
   }
 }
 
+// A winding drive of a body with x forward.
+Trajectory winding_drive() {
+  Trajectory drive;
+  Pose pose;
+  for (int i = 0; i < 100; ++i) {
+    drive.push_back({Stamp::from_seconds(0.1 * i), pose});
+    pose = pose * Pose(exp_so3({0, 0.01 * std::sin(0.1 * i), 0.05 * std::cos(0.07 * i)}), {0.5, 0, 0.01});
+  }
+  return drive;
+}
+
+TEST(AxesRotation, IsFoundForAnyMountAndAlignment) {
+  const Trajectory body = winding_drive();
+  const Pose mount(exp_so3({0.9, -1.1, 0.7}), {0.1, 0.2, 0.3});
+  Trajectory camera = body;
+  for (StampedPose& entry : camera) entry.pose = mount.inverse() * entry.pose * mount;
+  for (const Alignment alignment : {Alignment::none, Alignment::se3, Alignment::sim3}) {
+    TrajectoryMetricsOptions options;
+    options.alignment = alignment;
+    const auto other = compare_trajectories(body, camera, options);
+    ASSERT_TRUE(other && other->axes_rotation_deg);
+    EXPECT_GT(*other->axes_rotation_deg, 45);
+    EXPECT_FALSE(compare_trajectories(body, body, options)->axes_rotation_deg);
+  }
+}
+
+TEST(AxesRotation, IsNotClaimedOfABadEstimate) {
+  const Trajectory truth = winding_drive();
+  Trajectory estimate = truth;
+  for (std::size_t i = 0; i < estimate.size(); ++i)
+    estimate[i].pose =
+        Pose::from_translation({0.3 * std::sin(0.9 * static_cast<double>(i * i)), 0.1, 0}) * estimate[i].pose;
+  for (std::size_t i = 50; i < estimate.size(); ++i) estimate[i].pose = estimate[50].pose;  // lost
+  EXPECT_FALSE(compare_trajectories(estimate, truth, {})->axes_rotation_deg);
+}
+
 }  // namespace
 }  // namespace spartan
