@@ -139,8 +139,8 @@ void write_video(const Frames& frames, const std::string& path, const std::vecto
 
 using Arguments = std::vector<std::string>;
 
-const std::vector<Layout>& layouts() {
-  static const std::vector<Layout> list{
+std::vector<Layout> image_folders() {
+  return {
       {"LeftRightWithTimes",
        [](const Frames& f, const std::string& to) -> Arguments {
          f.write_both(to + "/left", to + "/right", six_digits);
@@ -195,6 +195,11 @@ const std::vector<Layout>& layouts() {
          return {"--rig", f.calibration(), "--times", to + "/frames_of_logger.csv"};
        },
        "times in nanoseconds from frames_of_logger.csv"},
+  };
+}
+
+std::vector<Layout> data_sets() {
+  return {
       {"KittiColour",
        [](const Frames& f, const std::string& to) -> Arguments {
          f.write_both(to + "/image_2", to + "/image_3", six_digits, [](const cv::Mat& gray) {
@@ -218,6 +223,11 @@ const std::vector<Layout>& layouts() {
          return {};
        },
        "frames are assumed to be 0.1 s apart", false},
+  };
+}
+
+std::vector<Layout> deep_images() {
+  return {
       {"SixteenBits",
        [](const Frames& f, const std::string& to) -> Arguments {
          f.write_both(
@@ -280,6 +290,11 @@ const std::vector<Layout>& layouts() {
          return {};
        },
        "camchain.yaml"},
+  };
+}
+
+std::vector<Layout> short_tables_and_calibrations() {
+  return {
       {"ShortFramesTable",
        [](const Frames& f, const std::string& to) -> Arguments {
          f.write_both(to + "/left", to + "/right", six_digits);
@@ -318,6 +333,11 @@ const std::vector<Layout>& layouts() {
          return {};
        },
        "intrinsics.yml"},
+  };
+}
+
+std::vector<Layout> videos() {
+  return {
       {"SideBySideVideo",
        [](const Frames& f, const std::string& to) -> Arguments {
          fs::create_directories(to);
@@ -334,6 +354,15 @@ const std::vector<Layout>& layouts() {
        },
        "left and right videos given", false},
   };
+}
+
+const std::vector<Layout>& layouts() {
+  static const std::vector<Layout> list = [] {
+    std::vector<Layout> all;
+    for (const auto& part : {image_folders(), data_sets(), deep_images(), short_tables_and_calibrations(), videos()})
+      all.insert(all.end(), part.begin(), part.end());
+    return all;
+  }();
   return list;
 }
 

@@ -313,9 +313,10 @@ TEST(AxesRotation, IsFoundForAnyMountAndAlignment) {
 TEST(AxesRotation, IsNotClaimedOfABadEstimate) {
   const Trajectory truth = winding_drive();
   Trajectory estimate = truth;
-  for (std::size_t i = 0; i < estimate.size(); ++i)
+  for (std::size_t i = 0; i < estimate.size(); ++i) {
     estimate[i].pose =
         Pose::from_translation({0.3 * std::sin(0.9 * static_cast<double>(i * i)), 0.1, 0}) * estimate[i].pose;
+  }
   for (std::size_t i = 50; i < estimate.size(); ++i) estimate[i].pose = estimate[50].pose;  // lost
   EXPECT_FALSE(compare_trajectories(estimate, truth, {})->axes_rotation_deg);
 }

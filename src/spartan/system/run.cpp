@@ -14,6 +14,7 @@
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/internal/map_scale.h"
+#include "spartan/system/internal/run_loop.h"
 #include "spartan/system/internal/summary.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/pipeline.h"

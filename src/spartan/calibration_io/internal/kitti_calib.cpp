@@ -203,38 +203,38 @@ Result<Rig> read_kitti_raw_calib(const std::string& path, KittiPair pair) {
   return rig_of(read_kitti_raw(path, pair));
 }
 
-Result<LoadedRig> internal::read_kitti(const std::string& path, ImageSize size, KittiPair kind) {
+Result<LoadedRig> internal::read_kitti(const std::string& path, ImageSize size, KittiPair pair) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
-  const bool gray = kind == KittiPair::gray;
-  const auto pair = read_projections(*file, gray ? PairKeys{"P0", "P1"} : PairKeys{"P2", "P3"}, kind);
-  if (!pair) return failure(pair);
+  const bool gray = pair == KittiPair::gray;
+  const auto cameras = read_projections(*file, gray ? PairKeys{"P0", "P1"} : PairKeys{"P2", "P3"}, pair);
+  if (!cameras) return failure(cameras);
   auto ignored = gray ? read_other_cameras(*file, {{"P2", kColour}, {"P3", kColour}, {"Tr", kScanner}})
                       : read_other_cameras(*file, {{"P0", kGray}, {"P1", kGray}, {"Tr", kScanner}});
   if (!ignored) return failure(ignored);
   if (size.empty()) return unknown_size(path);
   auto rig = validated(
-      rig_of_one_pair("kitti", pinhole_camera("cam0", size, pair->left), pinhole_camera("cam1", size, pair->right),
-                      Pose::from_translation(-pair->left_to_right_m)),
+      rig_of_one_pair("kitti", pinhole_camera("cam0", size, cameras->left),
+                      pinhole_camera("cam1", size, cameras->right), Pose::from_translation(-cameras->left_to_right_m)),
       path);
   if (!rig) return failure(std::move(rig));
-  ignored->insert(ignored->begin(), pair->ignored.begin(), pair->ignored.end());
+  ignored->insert(ignored->begin(), cameras->ignored.begin(), cameras->ignored.end());
   return make_read_rig(std::move(*rig), CalibrationFormat::kitti, path, std::move(*ignored));
 }
 
-Result<LoadedRig> internal::read_kitti_raw(const std::string& path, KittiPair kind) {
+Result<LoadedRig> internal::read_kitti_raw(const std::string& path, KittiPair pair) {
   const auto file = TextMatrices::read(path);
   if (!file) return failure(file);
-  const bool gray = kind == KittiPair::gray;
-  const auto pair =
-      read_projections(*file, gray ? PairKeys{"P_rect_00", "P_rect_01"} : PairKeys{"P_rect_02", "P_rect_03"}, kind);
-  if (!pair) return failure(pair);
+  const bool gray = pair == KittiPair::gray;
+  const auto cameras =
+      read_projections(*file, gray ? PairKeys{"P_rect_00", "P_rect_01"} : PairKeys{"P_rect_02", "P_rect_03"}, pair);
+  if (!cameras) return failure(cameras);
   auto ignored = gray ? read_other_cameras(*file, {{"P_rect_02", kColour}, {"P_rect_03", kColour}})
                       : read_other_cameras(*file, {{"P_rect_00", kGray}, {"P_rect_01", kGray}});
   if (!ignored) return failure(ignored);
-  ignored->insert(ignored->begin(), pair->ignored.begin(), pair->ignored.end());
+  ignored->insert(ignored->begin(), cameras->ignored.begin(), cameras->ignored.end());
   const std::string left_number = gray ? "00" : "02", right_number = gray ? "01" : "03";
-  for (const auto& [number, rectified] : {std::pair{left_number, pair->left}, {right_number, pair->right}}) {
+  for (const auto& [number, rectified] : {std::pair{left_number, cameras->left}, {right_number, cameras->right}}) {
     const auto raw = has_raw_camera(*file, number, rectified);
     if (!raw) return failure(raw);
     if (*raw) {
@@ -246,9 +246,9 @@ Result<LoadedRig> internal::read_kitti_raw(const std::string& path, KittiPair ki
   const std::string right_key = "S_rect_" + right_number;
   const auto right_size = file->has(right_key) ? read_size(*file, right_key) : left_size;
   if (!right_size) return failure(right_size);
-  Rig rig =
-      rig_of_one_pair("kitti_raw", pinhole_camera("cam0", *left_size, pair->left),
-                      pinhole_camera("cam1", *right_size, pair->right), Pose::from_translation(-pair->left_to_right_m));
+  Rig rig = rig_of_one_pair("kitti_raw", pinhole_camera("cam0", *left_size, cameras->left),
+                            pinhole_camera("cam1", *right_size, cameras->right),
+                            Pose::from_translation(-cameras->left_to_right_m));
 
   const fs::path folder = fs::path(path).parent_path();
   std::error_code missing;
@@ -257,9 +257,9 @@ Result<LoadedRig> internal::read_kitti_raw(const std::string& path, KittiPair ki
     if (!rectified_from_imu) return failure(rectified_from_imu);
     const Pose imu_from_rectified = rectified_from_imu->inverse();
     rig.convention = PoseConvention::body;
-    rig.cameras[0].mount_from_camera = imu_from_rectified * Pose::from_translation(pair->left_m);
+    rig.cameras[0].mount_from_camera = imu_from_rectified * Pose::from_translation(cameras->left_m);
     rig.cameras[1].mount_from_camera =
-        imu_from_rectified * Pose::from_translation(pair->left_m + pair->left_to_right_m);
+        imu_from_rectified * Pose::from_translation(cameras->left_m + cameras->left_to_right_m);
   }
   auto valid = validated(std::move(rig), path);
   if (!valid) return failure(std::move(valid));

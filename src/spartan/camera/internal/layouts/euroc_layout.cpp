@@ -83,7 +83,7 @@ Result<EurocImu> read_imu(const std::string& path) {
 
 // cam0/sensor.yaml; where it is missing, the camchain of Kalibr that TUM-VI keeps in the folder dso beside mav0.
 std::string find_camera_calibration(const fs::path& mav) {
-  const std::string own = (mav / "cam0" / "sensor.yaml").string();
+  std::string own = (mav / "cam0" / "sensor.yaml").string();
   std::error_code error;
   if (fs::exists(own, error)) return own;
   const fs::path above = fs::absolute(mav, error).lexically_normal().parent_path();
