@@ -1,4 +1,4 @@
-// The index files of recordings: frames.csv and recording.yaml, KITTI's times.txt, EuRoC's data.csv.
+// The index files of recordings: frames.csv and recording.yaml, KITTI's times.txt, lists of times, EuRoC's data.csv.
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -28,8 +28,9 @@ struct Recording {
       if (!spartan::write_png(folder.file(name), image.view())) __builtin_trap();
     }
   }
-  void open(spartan::RecordingFormat format) const {
+  void open(spartan::RecordingFormat format, const std::string& times = "") const {
     spartan::OpenOptions options;
+    options.times_file = times;
     options.format = format;
     options.rig_file = folder.path() + "/rig.yaml";
     const auto source = spartan::open_recording(folder.path(), options);
@@ -54,6 +55,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   recording.open(spartan::RecordingFormat::spartan);
   recording.folder.write("times.txt", text);
   recording.open(spartan::RecordingFormat::kitti);
+  recording.open(spartan::RecordingFormat::kitti, recording.folder.path() + "/times.txt");
   for (const char* camera : {"cam0", "cam1"}) recording.folder.write(std::string(camera) + "/data.csv", text);
   recording.open(spartan::RecordingFormat::euroc);
   return 0;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "program.h"
+#include "run_results.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
@@ -431,6 +432,26 @@ TEST(InputsOfKitti, GiveTheSameTrajectoryInEveryLayout) {
   const Frames frames(kitti, 20);
   const Trajectory own = own_trajectory(frames, folder.path());
   for (const Layout& layout : layouts()) expect_same_trajectory(layout, frames, own);
+}
+
+// Also seeks, hashes the images and draws the report.
+TEST(VideoInput, ResumesWithTheSameBytes) {
+  const testing::TemporaryFolder folder;
+  const Frames frames(testing::small_runs_folder() + "/drive", 8);
+  write_video(frames, folder.path() + "/drive.avi", {0, 1});
+  const auto run = [&](const std::string& output, const Arguments& more) {
+    Arguments words{"run",   folder.path() + "/drive.avi", "-o", folder.path() + "/" + output,
+                    "--rig", frames.calibration()};
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult result = run_program(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  };
+  run("whole", {});
+  EXPECT_TRUE(fs::exists(folder.path() + "/whole/report/index.html"));
+  run("part", {"--max-frames", "5"});
+  run("part", {"--resume"});
+  EXPECT_EQ(testing::byte_stable_content(folder.path() + "/whole"),
+            testing::byte_stable_content(folder.path() + "/part"));
 }
 
 TEST(InputErrors, NameWhatIsThereAndWhatToDo) {
