@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <deque>
 #include <exception>
 #include <mutex>
 #include <stdexcept>
@@ -22,12 +23,15 @@
 
 namespace spartan {
 
+namespace {
+
 #ifdef SPARTAN_THREAD_SANITIZER
 
 // The installed TBB is not instrumented for the thread sanitizer, which would report its tasks as data races.
 // Plain threads replace it.
-struct ThreadPool::Arena {
-  explicit Arena(int threads) : threads_(threads) {}
+class Workers {
+ public:
+  explicit Workers(int threads) : threads_(threads) {}
 
   void run(int parts, const std::function<void(int)>& part) const {
     std::atomic<int> next{0};
@@ -50,7 +54,10 @@ struct ThreadPool::Arena {
     for (std::thread& other : others) other.join();
     if (error) std::rethrow_exception(error);
   }
-  static void enqueue(std::function<void()> work) { std::thread(std::move(work)).detach(); }
+  template <typename Work>
+  static void enqueue(Work work) {
+    std::thread(work).detach();
+  }
 
  private:
   int threads_;
@@ -58,19 +65,25 @@ struct ThreadPool::Arena {
 
 #else
 
-struct ThreadPool::Arena {
-  explicit Arena(int threads) : tasks_(threads) {}
+class Workers {
+ public:
+  explicit Workers(int threads) : tasks_(threads) {}
 
   void run(int parts, const std::function<void(int)>& part) {
     tasks_.execute([&] { tbb::parallel_for(0, parts, 1, part, tbb::simple_partitioner{}); });
   }
-  void enqueue(std::function<void()> work) { tasks_.enqueue(std::move(work)); }
+  template <typename Work>
+  void enqueue(const Work& work) {
+    tasks_.enqueue(work);
+  }
 
  private:
   tbb::task_arena tasks_;
 };
 
 #endif
+
+}  // namespace
 
 struct BackgroundTask::State {
   explicit State(std::function<void()> work_in) : work(std::move(work_in)) {}
@@ -100,6 +113,43 @@ struct BackgroundTask::State {
   bool done = false;
 };
 
+struct ThreadPool::Arena {
+  using Task = std::shared_ptr<BackgroundTask::State>;
+
+  explicit Arena(int threads) : workers(threads) {}
+  // The queue of TBB outlives a program that ends, with the tasks in it that nobody waits for any more.
+  ~Arena() {
+    std::unique_lock lock(mutex);
+    drained.wait(lock, [this] { return unfinished == 0; });
+  }
+
+  void start(Task task) {
+    {
+      const std::lock_guard lock(mutex);
+      waiting.push_back(std::move(task));
+      ++unfinished;
+    }
+    workers.enqueue([this] { run_next(); });
+  }
+  void run_next() {
+    if (Task task = next(); task->claim()) task->run();
+    const std::lock_guard lock(mutex);
+    if (--unfinished == 0) drained.notify_all();
+  }
+  Task next() {
+    const std::lock_guard lock(mutex);
+    Task task = std::move(waiting.front());
+    waiting.pop_front();
+    return task;
+  }
+
+  Workers workers;
+  std::mutex mutex;
+  std::condition_variable drained;
+  std::deque<Task> waiting;
+  int unfinished = 0;
+};
+
 BackgroundTask& BackgroundTask::operator=(BackgroundTask&& other) noexcept {
   abandon();
   state_ = std::move(other.state_);
@@ -110,11 +160,14 @@ void BackgroundTask::wait() {
   if (!state_) return;
   if (state_->claim()) state_->run();
   state_->wait_for_end();
+  state_->work = nullptr;  // freed by the owner, not by a worker: it may hold the pool
   if (state_->error) std::rethrow_exception(state_->error);
 }
 
 void BackgroundTask::abandon() noexcept {
-  if (state_ && !state_->claim()) state_->wait_for_end();
+  if (!state_) return;
+  if (!state_->claim()) state_->wait_for_end();
+  state_->work = nullptr;
   state_.reset();
 }
 
@@ -143,17 +196,13 @@ void ThreadPool::parallel_for(int begin, int end, int grain, const std::function
     for (int part = 0; part < parts; ++part) run_part(part);
     return;
   }
-  arena_->run(parts, run_part);
+  arena_->workers.run(parts, run_part);
 }
 
 BackgroundTask ThreadPool::start(std::function<void()> work) const {
   BackgroundTask task;
   task.state_ = std::make_shared<BackgroundTask::State>(std::move(work));
-  if (arena_) {
-    arena_->enqueue([state = task.state_] {
-      if (state->claim()) state->run();
-    });
-  }
+  if (arena_) arena_->start(task.state_);
   return task;
 }
 
@@ -163,7 +212,7 @@ void ThreadPool::parallel_invoke(const std::function<void()>& first, const std::
     second();
     return;
   }
-  arena_->run(2, [&](int part) { part == 0 ? first() : second(); });
+  arena_->workers.run(2, [&](int part) { part == 0 ? first() : second(); });
 }
 
 }  // namespace spartan

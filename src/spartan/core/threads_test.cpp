@@ -5,6 +5,7 @@
 #include <sched.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -122,6 +123,25 @@ TEST(BackgroundTask, IsFinishedOrNeverRunsAfterItsDestruction) {
         if (i % 2 == 0) task = {};
       }
       value.reset();  // an access after this is found by the address sanitizer
+    }
+  }
+}
+
+// Also where the queue of the pool still holds the task.
+TEST(BackgroundTask, FreesWhatItsFunctionHoldsAtItsEnd) {
+  for (const int threads : {1, 2}) {
+    for (int i = 0; i < 200; ++i) {
+      std::weak_ptr<ThreadPool> pool;
+      BackgroundTask task;
+      {
+        auto workers = std::make_shared<ThreadPool>(threads);
+        pool = workers;
+        task = workers->start([workers] {});
+        if (i % 3 == 0) std::this_thread::sleep_for(std::chrono::microseconds(200));  // a worker begins it
+      }
+      if (i % 2 == 0) task.wait();
+      task = {};
+      EXPECT_TRUE(pool.expired());
     }
   }
 }
