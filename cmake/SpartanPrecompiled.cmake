@@ -12,9 +12,9 @@ else()
   target_compile_options(spartan_flags INTERFACE "SHELL:-Xclang -fno-pch-timestamp")
 endif()
 
-# Optimizing the tests' own code would only make the build slower.
-add_library(spartan_test_flags INTERFACE)
-target_compile_options(spartan_test_flags INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
+# Code around the libraries, of the tests and the commands: optimizing it would only make the build slower.
+add_library(spartan_glue_flags INTERFACE)
+target_compile_options(spartan_glue_flags INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 
 # spartan_precompiled(NAME LINKS libraries… HEADERS headers…): compiles the headers for targets to REUSE_FROM it.
 function(spartan_precompiled name)
@@ -28,9 +28,9 @@ endfunction()
 
 spartan_precompiled(spartan_precompiled_library)
 set_target_properties(spartan_precompiled_library PROPERTIES POSITION_INDEPENDENT_CODE ON)
-spartan_precompiled(spartan_precompiled_program LINKS CLI11::CLI11 nlohmann_json::nlohmann_json
+spartan_precompiled(spartan_precompiled_program LINKS spartan_glue_flags CLI11::CLI11 nlohmann_json::nlohmann_json
   HEADERS <CLI/CLI.hpp> <nlohmann/json.hpp>)
 if(SPARTAN_TESTS)
-  spartan_precompiled(spartan_precompiled_test LINKS spartan_test_flags GTest::gmock rapidcheck
+  spartan_precompiled(spartan_precompiled_test LINKS spartan_glue_flags GTest::gmock rapidcheck
     HEADERS <gtest/gtest.h> <gmock/gmock.h> <rapidcheck/gtest.h>)
 endif()
