@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "program/json.h"
@@ -73,7 +75,10 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
   auto created = GlobalMap::create(a->options().slam.map, a->map().cell_m());
   if (!created) return failure(created);
   GlobalMap& both = *created;
-  for (GlobalMap* map : {&a->map(), &b->map()}) {
+  const std::size_t shared = a->map().shared_stops(b->map());
+  std::array<GlobalMap*, 2> maps{&a->map(), &b->map()};
+  if (shared == a->map().stops().size()) std::swap(maps[0], maps[1]);  // b contains a
+  for (GlobalMap* map : maps) {
     if (Status s = both.merge(*map); !s) return failure(s);
   }
   if (Status s = MapFile::save(both, arguments.output); !s) return failure(s);
@@ -82,8 +87,10 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
         fmt::format("the elevations of {} are {:.0f} mm above those of {}: check that both maps share a world frame",
                     arguments.b, 1e3 * agreement->median_m, arguments.a));
   }
+  if (shared > 0) context.log.warning(fmt::format("{} stops are in both maps and count once", shared));
   const Json json{{"schema", 1},
                   {"stops", both.stops().size()},
+                  {"shared_stops", shared},
                   {"submaps", both.submaps().size()},
                   {"tiles", both.tiles()},
                   {"both_know_cells", agreement->cells},

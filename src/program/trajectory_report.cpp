@@ -53,6 +53,7 @@ Json to_json(const TrajectoryMetrics& metrics, const ComparedTrajectories& compa
           {"frames", metrics.frames},
           {"path_length_m", number(metrics.path_length_m)},
           {"ate_m", statistics_to_json(std::optional(metrics.ate_m))},
+          {"ate_first_rmse_m", number(metrics.ate_first_rmse_m)},
           {"drift_percent", number(metrics.drift_percent)},
           {"segments", segments_to_json(metrics.segments)},
           {"rpe",
@@ -74,6 +75,8 @@ std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectorie
       metrics.alignment == Alignment::sim3 ? fmt::format(", scale {:.5f}", metrics.truth_from_estimate.scale) : "");
   text += fmt::format("{:<30}{:>10}{:>10}{:>10}{:>10}\n", "error", "rmse", "mean", "median", "max");
   text += line_of("ATE, m", metrics.ate_m);
+  if (metrics.ate_first_rmse_m && metrics.alignment != Alignment::first)
+    text += fmt::format("{:<30}{:>10.4f}\n", "ATE, first poses aligned, m", *metrics.ate_first_rmse_m);
   const std::string delta =
       metrics.rpe_delta_frames == 1 ? "1 frame" : fmt::format("{} frames", metrics.rpe_delta_frames);
   text += line_of("RPE translation (" + delta + "), m", metrics.rpe_translation_m);

@@ -127,9 +127,12 @@ TEST_F(Run, ResumedRunGivesTheSameBytesAfterAKill) {
 TEST_F(Run, ResumesWhereItWasInterrupted) {
   copy_finished_run("whole");
   ASSERT_EQ(run("part", {"--max-frames", "8"}).exit_code, 0);
+  const auto first = summary_of(path("part"));
   const ProgramResult resumed = run("part", {"--resume"});
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(summary_of(path("part"))["resumed_from_frame"], 8);
+  for (const char* time : {"wall_seconds", "cpu_seconds"})
+    EXPECT_GT(summary_of(path("part"))[time], first[time]) << "of both executions";
   EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("whole")));
 }
 

@@ -102,6 +102,15 @@ void add_relative_errors(TrajectoryMetrics& metrics, const Trajectory& estimate,
   if (!rotations.empty()) metrics.rpe_rotation_deg = statistics_of(std::move(rotations));
 }
 
+constexpr double kLeastMotionForDrift_m = 0.5;
+
+double farthest_from_start(const Trajectory& truth) {
+  double farthest = 0;
+  for (const StampedPose& entry : truth)
+    farthest = std::max(farthest, (entry.pose.translation() - truth.front().pose.translation()).norm());
+  return farthest;
+}
+
 constexpr double kMotionsOfPath = 20;
 constexpr double kLeastAxesRotation_deg = 20, kMostUnexplained = 0.1;
 
@@ -145,7 +154,8 @@ void explain_missing(TrajectoryMetrics& metrics, bool truth_has_rotation) {
   explain(metrics.rpe_rotation_deg.has_value(), "rpe.rotation_deg", truth_has_rotation ? too_few : no_rotation);
   explain(metrics.segments.has_value(), "segments", no_rotation);
   explain(metrics.drift_percent.has_value(), "drift_percent",
-          truth_has_rotation ? "the truth does not move" : no_rotation);
+          truth_has_rotation ? "the truth stays within 0.5 m of its start" : no_rotation);
+  explain(metrics.ate_first_rmse_m.has_value(), "ate_first_rmse_m", no_rotation);
 }
 
 }  // namespace
@@ -197,7 +207,11 @@ Result<TrajectoryMetrics> compare_trajectories(const Trajectory& estimate, const
     for (const double length : options.segment_lengths_m) {
       metrics.segments->push_back(segment_errors(aligned, pairs->truth, path_m, length, step));
     }
-    if (metrics.path_length_m > 0) {
+    metrics.ate_first_rmse_m =
+        absolute_errors(transformed(align(pairs->estimate, pairs->truth, Alignment::first), pairs->estimate),
+                        pairs->truth)
+            .rmse;
+    if (farthest_from_start(pairs->truth) >= kLeastMotionForDrift_m) {
       const Pose error = relative_error(pairs->estimate, pairs->truth, 0, metrics.frames - 1);
       metrics.drift_percent = 100.0 * error.translation().norm() / metrics.path_length_m;
     }

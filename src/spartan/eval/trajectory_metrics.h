@@ -71,9 +71,11 @@ struct MissingMetric {
 struct TrajectoryMetrics {
   Alignment alignment = Alignment::none;
   Similarity truth_from_estimate;
-  std::size_t frames = 0;               ///< number of associated poses
-  double path_length_m = 0;             ///< of the polyline through the associated true positions
-  ErrorStatistics ate_m;                ///< absolute trajectory error
+  std::size_t frames = 0;    ///< number of associated poses
+  double path_length_m = 0;  ///< of the polyline through the associated true positions
+  ErrorStatistics ate_m;     ///< absolute trajectory error
+  /// RMS position error with the first poses aligned: what has accumulated since the start.
+  std::optional<double> ate_first_rmse_m;
   std::optional<double> drift_percent;  ///< error of the last position, percent of the path length
   std::optional<std::vector<SegmentErrors>> segments;
   int rpe_delta_frames = 1;
@@ -93,9 +95,10 @@ struct TrajectoryMetrics {
 /// - Segments: the same E between frame i and the first frame at or beyond the length along the true path, divided
 ///   by the length (Geiger et al., CVPR 2012; their development kit ends one frame later where a frame lies exactly
 ///   at the length).
-/// - Drift: |trans((Q_0⁻¹ Q_n)⁻¹ (P_0⁻¹ P_n))| / path length, with P the estimate before alignment.
+/// - Drift: |trans((Q_0⁻¹ Q_n)⁻¹ (P_0⁻¹ P_n))| / path length, with P the estimate before alignment. A percentage of
+///   the noise of a truth at rest means nothing: missing where the truth stays within 0.5 m of its start.
 /// Where all true rotations are the identity, the truth is taken to have positions only: RPE then compares the
-/// displacements as vectors of the true world frame, and rotation, segments and drift are listed in `missing`.
+/// displacements as vectors of the true world frame, and what needs rotations is listed in `missing`.
 /// Fails with code `input` where no poses can be associated, and `usage` where the alignment `first` is requested for a
 /// truth without rotation, or lengths or steps are not positive.
 Result<TrajectoryMetrics> compare_trajectories(const Trajectory& estimate, const Trajectory& truth,

@@ -182,8 +182,8 @@ TEST(TrajectoryMetrics, MetricsThatNeedTrueRotationsAreMissing) {
   EXPECT_LT(m.rpe_translation_m->max, 0.2) << "displacements of 0.7 m, compared as vectors of the true world frame";
   std::map<std::string, std::string> reasons;
   for (const MissingMetric& missing : m.missing) reasons[missing.name] = missing.reason;
-  EXPECT_EQ(reasons.size(), 3U);
-  for (const char* name : {"drift_percent", "segments", "rpe.rotation_deg"}) {
+  EXPECT_EQ(reasons.size(), 4U);
+  for (const char* name : {"drift_percent", "segments", "rpe.rotation_deg", "ate_first_rmse_m"}) {
     EXPECT_THAT(reasons[name], HasSubstr("no rotation")) << name;
   }
   options.alignment = Alignment::first;
@@ -199,6 +199,10 @@ TEST(TrajectoryMetrics, AcceptsStationaryTruthAndSingleFrames) {
   EXPECT_EQ(stationary.path_length_m, 0);
   EXPECT_FALSE(stationary.drift_percent);
   EXPECT_EQ(stationary.segments->front().count, 0);
+  // Noise of a truth at rest: a path of 4 mm.
+  for (std::size_t i = 0; i < drive.truth.size(); ++i)
+    drive.truth[i].pose = drive.truth[i].pose * Pose::from_translation({1e-3 * static_cast<double>(i % 2), 0, 0});
+  EXPECT_FALSE(compare(drive, {}).drift_percent);
   drive.truth.resize(1);
   drive.estimate.resize(1);
   const TrajectoryMetrics one = compare(drive, {});

@@ -265,7 +265,23 @@ Status GlobalMap::add(const LocalMap& local, const Stamp& stamp, const Uncertain
   return {};
 }
 
+std::size_t GlobalMap::shared_stops(const GlobalMap& other) const {
+  const auto same = [](const MapStop& a, const MapStop& b) {
+    const Pose &p = a.world_from_body.pose, &q = b.world_from_body.pose;
+    return a.stamp == b.stamp && p.translation() == q.translation() && p.rotation().coeffs() == q.rotation().coeffs();
+  };
+  return static_cast<std::size_t>(std::count_if(other.stops_.begin(), other.stops_.end(), [&](const MapStop& stop) {
+    return std::any_of(stops_.begin(), stops_.end(), [&](const MapStop& known) { return same(known, stop); });
+  }));
+}
+
 Status GlobalMap::merge(GlobalMap& other) {
+  if (const std::size_t shared = shared_stops(other); shared > 0) {
+    if (shared == other.stops_.size()) return {};
+    return failure(ErrorCode::usage,
+                   fmt::format("{} of {} stops are in both maps and would count twice", shared, other.stops_.size()),
+                   {}, "merge maps that share no stop, or of which one contains the other");
+  }
   const std::int32_t first_submap = submaps_.empty() ? 0 : submaps_.back().id + 1,
                      first_stop = stops_.empty() ? 0 : stops_.back().id + 1;
   if (other.cell_m_ != cell_m_) return failure(ErrorCode::usage, "maps of different cell sizes cannot be merged");

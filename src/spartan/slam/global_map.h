@@ -103,8 +103,11 @@ class GlobalMap {
   /// observations by J relative Jᵀ, J the Jacobian of the elevation with respect to the pose.
   /// After an error of the store nothing has changed.
   Status add(const LocalMap& local, const Stamp& stamp, const UncertainPose& world_from_body, const Matrix6d& relative);
-  /// Appends another map's submaps and stops. Overlapping submaps are fused in views.
+  /// Appends another map's submaps and stops. Overlapping submaps are fused in views. A map whose stops are all in this
+  /// one adds nothing: observations count once. Code `usage` where only some are, because cells do not tell them apart.
   Status merge(GlobalMap& other);
+  /// How many stops of another map are in this one, with the same stamp and pose.
+  std::size_t shared_stops(const GlobalMap& other) const;
 
   /// Renders a window. Codes: the store's; `usage` for more than kMostCells cells, which would need more than a
   /// gigabyte.

@@ -245,6 +245,12 @@ TEST(GlobalMap, MergedMapsContainBoth) {
   EXPECT_EQ(first.stops().size(), 2U);
   EXPECT_EQ(first.stops()[1].id, 1);
   EXPECT_EQ(bytes_of(*first.view(both.extent())), all_of(both));
+  ASSERT_TRUE(first.merge(second)) << "its stop is known already";
+  EXPECT_EQ(first.stops().size(), 2U);
+  EXPECT_EQ(bytes_of(*first.view(both.extent())), all_of(both));
+  const auto partly = second.merge(first);
+  ASSERT_FALSE(partly);
+  EXPECT_EQ(partly.error().code, ErrorCode::usage);
   GlobalMap coarse = GlobalMap::create({}, 0.1).value();
   EXPECT_FALSE(first.merge(coarse));
 }

@@ -130,6 +130,7 @@ void report_sensor_rows(const FrameSource& source, const Log& log) {
 
 Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& given_hooks) {
   const auto start = std::chrono::steady_clock::now();
+  const double start_cpu_s = cpu_seconds();
   auto source = open_recording(request.input, request.open);
   if (!source) return failure(source);
   const RecordingInfo& info = (*source)->info();
@@ -171,7 +172,7 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
   if (Status s = write_file_atomically(folder.rig(), identity.rig); !s) return failure(s);
 
-  RunLoop run_loop(request, hooks, **source, std::move(*pipeline), std::move(*store), folder);
+  RunLoop run_loop(request, hooks, **source, std::move(*pipeline), std::move(*store), folder, start, start_cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   if (Status s = run_loop.process_samples(); !s) return failure(s);
   report_sensor_rows(**source, hooks.log);
@@ -194,8 +195,9 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   facts.sensor_rows_reversed = (*source)->sensor_samples_discarded();
   facts.sensor_rows_unreadable = (*source)->unreadable_sensor_rows().count;
   facts.resumed_from_frame = run_loop.resumed_from_frame();
-  facts.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  facts.cpu_seconds = cpu_seconds();
+  const ElapsedTime elapsed = run_loop.elapsed();
+  facts.wall_seconds = elapsed.wall_s;
+  facts.cpu_seconds = elapsed.cpu_s;
   auto outcome = write_results(run_loop, resolved_options(options, info.rig), workers, folder, facts, hooks.log);
   if (outcome) outcome->lock = std::move(prepared->lock);
   return outcome;

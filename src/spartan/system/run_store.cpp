@@ -40,6 +40,10 @@ CREATE TABLE maps (
   believed_covariance BLOB NOT NULL, verdict TEXT NOT NULL, overlap REAL NOT NULL);
 CREATE TABLE memory (id INTEGER PRIMARY KEY CHECK (id = 1), samples_taken INTEGER NOT NULL, stages BLOB NOT NULL);
 )";
+// Added to stores of version 2 that are without it.
+constexpr const char* kElapsedTable =
+    "CREATE TABLE IF NOT EXISTS elapsed (id INTEGER PRIMARY KEY CHECK (id = 1), wall_ms REAL NOT NULL, "
+    "cpu_ms REAL NOT NULL)";
 
 Bytes bytes_of(const Matrix6d& m) {
   ArchiveWriter out;
@@ -106,6 +110,7 @@ Status RunStore::State::prepare() {
   auto opened = TileStore::open_existing(db);
   if (!opened) return failure(opened);
   tiles.emplace(std::move(*opened));
+  if (Status s = db.execute(kElapsedTable); !s) return s;
   const auto make = [&](std::optional<SqlStatement>& statement, const char* sql) -> Status {
     auto prepared = db.prepare(sql);
     if (!prepared) return failure(prepared);
@@ -127,6 +132,7 @@ Status RunStore::State::prepare() {
   if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
   if (Status s = make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)"); !s) return s;
   if (Status s = make(replace_content, "INSERT OR REPLACE INTO identity VALUES ('content',?)"); !s) return s;
+  if (Status s = make(replace_elapsed, "INSERT OR REPLACE INTO elapsed VALUES (1,?,?)"); !s) return s;
   if (Status s = make(select_checkpoint, "SELECT samples_taken FROM memory"); !s) return s;
   const auto stored = stored_samples();
   if (!stored) return failure(stored);
@@ -157,7 +163,7 @@ Status RunStore::State::expect_unchanged() {
 }
 
 Status RunStore::State::write(const Step& step, const std::function<Result<Bytes>()>& save,
-                              const SourcePosition& source) {
+                              const SourcePosition& source, const ElapsedTime& elapsed) {
   if (step.frame) {
     if (Status s = write(*step.frame); !s) return s;
   }
@@ -173,6 +179,7 @@ Status RunStore::State::write(const Step& step, const std::function<Result<Bytes
   Bytes memory = *pipeline_state;
   append_checksum(memory);
   if (Status s = replace_checkpoint->bind(1, source.samples_taken).bind(2, memory).run(); !s) return s;
+  if (Status s = replace_elapsed->bind(1, 1e3 * elapsed.wall_s).bind(2, 1e3 * elapsed.cpu_s).run(); !s) return s;
   return replace_content->bind(1, fmt::format("{:016x}", source.content_hash)).run();
 }
 
@@ -291,10 +298,11 @@ Result<RunStore> RunStore::open_read_only(const std::string& path) {
   return RunStore(std::move(state));
 }
 
-Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source) {
+Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
+                        const ElapsedTime& elapsed) {
   if (Status s = state_->db.execute("BEGIN IMMEDIATE"); !s) return s;
   Status written = state_->expect_unchanged();
-  if (written) written = state_->write(step, save, source);
+  if (written) written = state_->write(step, save, source, elapsed);
   if (written) written = state_->db.execute("COMMIT");
   if (written) state_->samples_taken = source.samples_taken;
   if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // fails if SQLite has already rolled back

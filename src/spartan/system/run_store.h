@@ -72,6 +72,11 @@ struct RunIdentity {
   std::string rig;      ///< rig.yaml
 };
 
+/// Time that a run has taken, interrupted executions of the program included.
+struct ElapsedTime {
+  double wall_s = 0, cpu_s = 0;
+};
+
 /// Results of a run by frame, and the state from which it can be resumed.
 class RunStore {
  public:
@@ -102,9 +107,10 @@ class RunStore {
     std::uint64_t content_hash = 0;  ///< FrameSource::content_hash()
   };
   /// Writes in one transaction, completely or not at all: the step; the map tiles that `save` flushes; the pipeline
-  /// state after the step that `save` returns and the position in the recording (only the latest are kept). Codes:
-  /// `output` if the file cannot be written, was removed, or was changed by another process; those of `save`.
-  Status commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source);
+  /// state after the step that `save` returns, the position in the recording and the time (only the latest are kept).
+  /// Codes: `output` if the file cannot be written, was removed, or was changed by another process; those of `save`.
+  Status commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
+                const ElapsedTime& elapsed = {});
 
   /// Tables of the global map.
   TileStore& tiles();
@@ -118,6 +124,7 @@ class RunStore {
   struct Checkpoint {
     Bytes pipeline_state;  ///< Pipeline::save()
     SourcePosition source;
+    ElapsedTime elapsed;
   };
   /// The latest checkpoint; none before the first commit.
   Result<std::optional<Checkpoint>> checkpoint();

@@ -228,12 +228,13 @@ Result<std::vector<MapRecord>> RunStore::maps() {
 
 Result<std::optional<RunStore::Checkpoint>> RunStore::checkpoint() {
   auto select = state_->db.prepare(
-      "SELECT samples_taken, stages, (SELECT value FROM identity WHERE key = 'content') FROM memory");
+      "SELECT samples_taken, stages, (SELECT value FROM identity WHERE key = 'content'), wall_ms, cpu_ms "
+      "FROM memory LEFT JOIN elapsed USING (id)");
   if (!select) return failure(select);
   const auto row = select->step();
   if (!row) return failure(row);
   if (!*row) return std::nullopt;
-  Checkpoint checkpoint{select->blob(1), {select->integer(0), 0}};
+  Checkpoint checkpoint{select->blob(1), {select->integer(0), 0}, {1e-3 * select->real(3), 1e-3 * select->real(4)}};
   if (!remove_checksum(checkpoint.pipeline_state)) return damaged_table(state_->db, "memory", "the checksum differs");
   const std::string hash = select->text(2);
   const auto [end, error] = std::from_chars(hash.data(), hash.data() + hash.size(), checkpoint.source.content_hash, 16);

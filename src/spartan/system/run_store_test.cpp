@@ -80,7 +80,7 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
                               [] {
                                 return Bytes{1, 2, 4};
                               },
-                              {40, 0}))
+                              {40, 0}, {12.5, 20}))
         << "the last stop";
   }
   auto store = RunStore::resume(path, kIdentity);
@@ -137,10 +137,26 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
   ASSERT_TRUE(checkpoint && *checkpoint);
   EXPECT_EQ((*checkpoint)->pipeline_state, (Bytes{1, 2, 4})) << "only the latest is retained";
   EXPECT_EQ((*checkpoint)->source.samples_taken, 40);
+  EXPECT_EQ((*checkpoint)->elapsed.wall_s, 12.5);
+  EXPECT_EQ((*checkpoint)->elapsed.cpu_s, 20);
   const auto terrain = store->terrain();
   ASSERT_TRUE(terrain);
   ASSERT_EQ(terrain->size(), 1U);
   EXPECT_EQ(terrain->front().points, 1234);
+}
+
+// Older programs have not stored it.
+TEST(RunStore, IsResumedWithoutTheElapsedTime) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  const auto save = [] { return Bytes{1}; };
+  ASSERT_TRUE(RunStore::create(path, kIdentity)->commit({some_frame(0), {}, {}, {}}, save, {1, 0}, {3, 4}));
+  ASSERT_TRUE(Database::open(path, Database::Mode::open)->execute("DROP TABLE elapsed"));
+  auto store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_EQ((*store->checkpoint())->elapsed.wall_s, 0);
+  ASSERT_TRUE(store->commit({some_frame(1), {}, {}, {}}, save, {2, 0}, {5, 6}));
+  EXPECT_EQ((*store->checkpoint())->elapsed.wall_s, 5);
 }
 
 // Counts the steps of SQLite's virtual machine in all finished statements of databases that are opened during its

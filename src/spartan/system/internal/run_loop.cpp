@@ -59,6 +59,7 @@ Status RunLoop::begin() {
     if (Status status = pipeline_.restore_frame(*frame); !status) return status;
   }
   samples_taken_ = (*checkpoint)->source.samples_taken;
+  elapsed_before_ = (*checkpoint)->elapsed;
   resumed_ = true;
   hooks_.log.info(fmt::format("resuming after frame {}", frames->back().frame_id));
   if (Status sought = source_.seek(samples_taken_); !sought) return sought;
@@ -67,6 +68,11 @@ Status RunLoop::begin() {
                  "the recording is not the one that the run began with: an image or a row of a sensor table that was "
                  "processed has changed",
                  source_.info().path, "restore the recording, or run into a new folder");
+}
+
+ElapsedTime RunLoop::elapsed() const {
+  const std::chrono::duration<double> here = std::chrono::steady_clock::now() - start_;
+  return {elapsed_before_.wall_s + here.count(), elapsed_before_.cpu_s + cpu_seconds() - start_cpu_s_};
 }
 
 Status RunLoop::process_samples() {
@@ -210,7 +216,7 @@ Status RunLoop::commit(const RunStore::Step& step) {
     if (Status flushed = pipeline_.flush_maps(); !flushed) return failure(flushed);
     return pipeline_.save();
   };
-  Status status = store_.commit(step, save, {samples_taken_, source_.content_hash()});
+  Status status = store_.commit(step, save, {samples_taken_, source_.content_hash()}, elapsed());
   if (!step.frame) return status;
   ++frames_;
   if (status && hooks_.progress) hooks_.progress({frames_, source_.info().sequence.announced, step.frame->status});

@@ -1,6 +1,7 @@
 // The loop of a run over the samples of its recording.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -20,14 +21,17 @@ namespace spartan::internal {
 /// Feeds the samples of a recording to the pipeline and commits every result to the store.
 class RunLoop {
  public:
+  /// `start`, `start_cpu_s`: when this execution of the run began (core/stage_clock.h).
   RunLoop(const RunRequest& request, const RunHooks& hooks, FrameSource& source, Pipeline pipeline, RunStore store,
-          RunFolder folder)
+          RunFolder folder, std::chrono::steady_clock::time_point start, double start_cpu_s)
       : request_(request),
         hooks_(hooks),
         source_(source),
         pipeline_(std::move(pipeline)),
         store_(std::move(store)),
-        folder_(std::move(folder)) {}
+        folder_(std::move(folder)),
+        start_(start),
+        start_cpu_s_(start_cpu_s) {}
 
   /// Restores the state of the run to be resumed, or initializes a new one.
   Status begin();
@@ -42,6 +46,8 @@ class RunLoop {
   bool gravity_measured() const { return pipeline_.gravity_measured(); }
   bool heading_east() const { return pipeline_.heading_east(); }
   std::optional<std::int64_t> resumed_from_frame() const { return resumed_from_frame_; }
+  /// Since the run began, without what an interrupted execution did after its last commit.
+  ElapsedTime elapsed() const;
   RunStore& store() { return store_; }
   GlobalMap& global_map() { return pipeline_.global_map(); }
 
@@ -60,6 +66,9 @@ class RunLoop {
   Pipeline pipeline_;
   RunStore store_;
   RunFolder folder_;
+  std::chrono::steady_clock::time_point start_;
+  double start_cpu_s_;
+  ElapsedTime elapsed_before_;  // this execution
   StageClock clock_;
   std::vector<StageTime> view_times_;  // of views of a stop since the last frame of the odometry pair
   std::int64_t samples_taken_ = 0;     // number of samples read from the source

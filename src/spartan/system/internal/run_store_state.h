@@ -17,7 +17,7 @@ struct RunStore::State {
   std::optional<TileStore> tiles;
   Database db;
   std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health,
-      insert_terrain, insert_map, select_checkpoint, replace_checkpoint, replace_content;
+      insert_terrain, insert_map, select_checkpoint, replace_checkpoint, replace_content, replace_elapsed;
   std::optional<std::int64_t> samples_taken;  // of the last checkpoint; none before the first
 
   Status prepare();
@@ -25,7 +25,8 @@ struct RunStore::State {
   Result<std::optional<std::int64_t>> stored_samples();
   /// Code `output` if the database is no longer the one that this process wrote last.
   Status expect_unchanged();
-  Status write(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source);
+  Status write(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
+               const ElapsedTime& elapsed);
   Status write(const FrameRecord& frame);
   Status write(const LocalizationRecord& localization);
   Status write(const TerrainRecord& terrain);

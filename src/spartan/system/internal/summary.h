@@ -20,7 +20,7 @@ struct RunFacts {
   bool heading_east = false;
   int threads = 1;
   std::vector<std::string> absent;           ///< stages that the options disable
-  double wall_seconds = 0, cpu_seconds = 0;  ///< of this execution of the program
+  double wall_seconds = 0, cpu_seconds = 0;  ///< of the whole run
   std::int64_t peak_memory_bytes = 0;
   /// Rows of sensor tables that were discarded: stamps that do not increase, and rows that cannot be parsed.
   std::int64_t sensor_rows_reversed = 0, sensor_rows_unreadable = 0;
