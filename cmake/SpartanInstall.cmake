@@ -10,7 +10,7 @@ install(TARGETS ${modules} spartan EXPORT spartanTargets)
 install(EXPORT spartanTargets NAMESPACE spartan:: DESTINATION ${package_folder})
 
 install(DIRECTORY src/spartan DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.h" PATTERN "internal" EXCLUDE PATTERN "testing" EXCLUDE PATTERN "numerics" EXCLUDE)
+  FILES_MATCHING PATTERN "*.h" PATTERN "internal" EXCLUDE PATTERN "testing" EXCLUDE PATTERN "numerics" EXCLUDE PATTERN "figures" EXCLUDE)
 if(EXISTS ${PROJECT_SOURCE_DIR}/config)
   install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/spartan)
 endif()

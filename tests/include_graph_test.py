@@ -28,6 +28,7 @@ MAY_INCLUDE = {
     "camera": BASE | {"rig", "calibration_io"},
     "imaging": BELOW_STAGES,
     "reconstruction": BELOW_STAGES,
+    "figures": BELOW_STAGES | {"reconstruction"},
     "odometry": BELOW_STAGES,
     "calibration": BELOW_STAGES | {"odometry"},
     "slam": BELOW_STAGES | {"reconstruction"},
@@ -35,13 +36,13 @@ MAY_INCLUDE = {
     "eval": BASE,
     "sim": BASE | {"rig", "calibration_io", "camera"},
     "testing": BASE | {"rig", "calibration_io", "camera"},
-    "system": SYSTEM,
-    "report": SYSTEM | {"calibration", "rig_design", "eval", "system"},
+    "system": SYSTEM | {"figures"},
+    "report": SYSTEM | {"figures", "calibration", "rig_design", "eval", "system"},
     "program": ALL,
-    "tests": ALL | {"testing"},
+    "tests": ALL | {"figures", "testing"},
 }
 # Modules whose headers are not installed: no public header may include them.
-PRIVATE_MODULES = {"numerics", "testing"}
+PRIVATE_MODULES = {"numerics", "figures", "testing"}
 # Components of a module that may not include each other freely: what each may include of its own module ("." is the
 # module's own folder). Other modules have no such rule.
 COMPONENTS = {

@@ -1,10 +1,14 @@
 #include "program/context.h"
 
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <functional>
 
 #include "spartan/core/stage_clock.h"
@@ -89,6 +93,10 @@ CLI::Validator positive_number() {
 
 CLI::Validator non_negative_number() {
   return number_check("number of at least 0", [](double value) { return value >= 0; });
+}
+
+std::string date_and_time() {
+  return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
 }
 
 Status print(const std::string& text) {

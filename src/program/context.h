@@ -35,6 +35,7 @@ struct Context {
   int threads = 1;       ///< `--threads`; all cores without it
   bool json = false;     ///< `--json`: only JSON goes to standard output
   bool quiet = false, verbose = false;
+  std::string command_line;           ///< as a shell takes it
   CommandBody chosen;                 ///< body of the selected command
   std::vector<std::string> warnings;  ///< printed before the body runs: former names of flags
 };
@@ -66,6 +67,9 @@ CLI::Option* add_former_name(CLI::App& command, Context& context, const std::str
 void add_memory_option(CLI::App& command, Context& context);
 /// The bound that it sets, bytes; without it 80 % of the memory that is available.
 std::int64_t memory_bound(const Context& context);
+
+/// "2026-03-01 12:30 UTC"
+std::string date_and_time();
 
 /// Writes to standard output and flushes; code `output` where that fails (a full disk behind a pipe).
 Status print(const std::string& text);

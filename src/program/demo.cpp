@@ -7,8 +7,11 @@
 #include "program/interrupt.h"
 #include "program/progress.h"
 #include "program/run_arguments.h"
+#include "program/run_summary_text.h"
 #include "program/simulation.h"
+#include "program/trajectory_report.h"
 #include "spartan/core/files.h"
+#include "spartan/eval/trajectory_metrics.h"
 #include "spartan/report/report.h"
 #include "spartan/system/run.h"
 
@@ -54,11 +57,20 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   about.options = request.options;
   about.whole_truth = true;
   about.threads = context.threads;
+  about.command_line = context.command_line;
+  about.date = date_and_time();
+  about.page = folder + "/report.html";
   const auto report = make_report(about);
   if (!report) return failure(report);
-  const std::string page = folder + "/report.html";
-  if (Status s = write_file_atomically(page, *report); !s) return failure(s);
-  if (Status s = say("Report: " + page); !s) return failure(s);
+  if (Status s = write_file_atomically(about.page, *report); !s) return failure(s);
+  if (Status s = say("Result"); !s) return failure(s);
+  const auto compared = find_trajectories(run_folder, recording, "");
+  if (!compared) return failure(compared);
+  const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
+  if (!metrics) return failure(metrics);
+  if (Status s = print(run_summary_text(outcome->summary_json, run_folder) + "\n" + table_of(*metrics, *compared)); !s)
+    return failure(s);
+  if (Status s = say("Report: " + about.page); !s) return failure(s);
   return outcome->lost ? kLost : kDone;
 }
 

@@ -71,6 +71,21 @@ std::string command_of(const CLI::App& app) {
   return app.get_name() + (parsed.empty() ? "" : " " + command_of(*parsed.front()));
 }
 
+// The command line as a shell takes it: words with other characters than these in single quotes.
+std::string command_line(int argc, char** argv) {
+  std::string line = "spartan";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool plain = !word.empty() && word.find_first_not_of(
+                                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                            "0123456789_-+=./:,@%") == std::string::npos;
+    std::string quoted;
+    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    line += plain ? " " + word : " '" + quoted + "'";
+  }
+  return line;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Stereo vision for rovers: visual odometry, dense stereo, terrain maps and localization.", "spartan"};
   app.set_version_flag("--version", SPARTAN_VERSION);
@@ -81,6 +96,7 @@ int run(int argc, char** argv) {
       "(`rig inspect --check`); 130 interrupted.");
   Context context;
   context.threads = available_cores();
+  context.command_line = command_line(argc, argv);
   add_commands(app, context);
   refuse_empty_arguments(app);
   try {

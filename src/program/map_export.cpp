@@ -40,7 +40,7 @@ Result<LatticeWindow> window_of(const MapExportArguments& a, const GlobalMap& ma
 
 // The centres of the cells, in the colours of the image.
 PointCloud cloud_of(const MapView& view) {
-  const Image<Rgb8> colours = render_map(view.elevation_m, view.kind, view.cell_m, 1);
+  const Image<Rgb8> colours = render_map(view.elevation_m, view.kind, view.cell_m);
   PointCloud cloud;
   for (int r = 0; r < view.window.height; ++r) {
     for (int c = 0; c < view.window.width; ++c) {
@@ -63,7 +63,7 @@ Status write_map(SavedMap& saved, const MapExportArguments& a, const ThreadPool&
   const auto view = saved.map().view(*window);
   if (!view) return failure(view);
   if (ending == ".tif") return write_map_geotiff(*view, saved.options().mapping.map, workers, a.output);
-  if (ending == ".png") return write_png(a.output, render_map(view->elevation_m, view->kind, view->cell_m));
+  if (ending == ".png") return write_png(a.output, draw_map(*view, "Map"));
   if (ending == ".ply") return write_ply(a.output, cloud_of(*view));
   return failure(ErrorCode::usage, "has an unknown extension", a.output, "known extensions: .tif, .png, .ply, .map");
 }

@@ -13,6 +13,7 @@
 #include "program/progress.h"
 #include "program/recording_arguments.h"
 #include "program/run_arguments.h"
+#include "program/run_summary_text.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
 #include "spartan/report/report.h"
@@ -29,28 +30,6 @@ struct RunArguments {
   int max_frames = 0;
 };
 
-std::string summary_for_people(const std::string& summary_json, const std::string& folder) {
-  const auto s = nlohmann::json::parse(summary_json);
-  const auto& health = s["health"]["odometry"];
-  std::string text =
-      fmt::format("{} frames, path length {:.2f} m; processed in {:.1f} s ({:.1f} s of CPU), peak memory {:.0f} MB\n",
-                  s["frames"].get<int>(), s["distance_m"].get<double>(), s["wall_seconds"].get<double>(),
-                  s["cpu_seconds"].get<double>(), s["peak_memory_bytes"].get<double>() / 1e6);
-  text += fmt::format("odometry: {} tracking, {} degraded, {} stationary, {} lost\n", health["tracking"].get<int>(),
-                      health["degraded"].get<int>(), health["standing"].get<int>(), health["lost"].get<int>());
-  std::string absent;
-  for (const auto& part : s["absent"]) absent += (absent.empty() ? "" : ", ") + part.get<std::string>();
-  if (!absent.empty()) text += "disabled: " + absent + "\n";
-  for (const auto& [reason, count] : s["skipped"].items())
-    text += fmt::format("skipped: {} {}\n", count.get<int>(), reason);
-  for (const auto& span : s["lost_spans"]) {
-    text += fmt::format("odometry lost from {} ns to {} ns: {}\n", span["from_ns"].get<std::int64_t>(),
-                        span["to_ns"].get<std::int64_t>(), span["reason"].get<std::string>());
-  }
-  if (!s["lost_spans"].empty()) text += "there the poses are predictions, and the exit code is 6\n";
-  return text + "results in " + folder + "\n";
-}
-
 // Compares the run's trajectory with the truth; the summary gets the figures under "truth".
 Result<std::string> score_trajectory(const RunArguments& arguments, RunOutcome& outcome) {
   const auto compared = find_trajectories(arguments.output, arguments.truth, "");
@@ -66,7 +45,7 @@ Result<std::string> score_trajectory(const RunArguments& arguments, RunOutcome& 
 }
 
 // A failure to write the report does not fail the run.
-Status write_report(const RunRequest& request, const std::string& truth) {
+Status write_report(const RunRequest& request, const std::string& truth, const Context& context) {
   ReportRequest about;
   about.run = request.output;
   about.recording = request.input;
@@ -74,11 +53,14 @@ Status write_report(const RunRequest& request, const std::string& truth) {
   about.options = request.options;
   about.truth = truth;
   about.threads = request.threads;
+  about.command_line = context.command_line;
+  about.date = date_and_time();
+  const RunFolder folder{request.output};
+  about.page = folder.report() + "/index.html";
   const auto page = make_report(about);
   if (!page) return failure(page);
-  const RunFolder folder{request.output};
   if (Status s = make_folder(folder.report()); !s) return s;
-  return write_file_atomically(folder.report() + "/index.html", *page);
+  return write_file_atomically(about.page, *page);
 }
 
 // Where most frames were lost, the calibration may be wrong, or the cameras exchanged.
@@ -122,14 +104,14 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   }
   auto outcome = run(request, hooks);
   if (!outcome) return failure(outcome);
-  std::string text = summary_for_people(outcome->summary_json, arguments.output);
+  std::string text = run_summary_text(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {
     const auto table = score_trajectory(arguments, *outcome);
     if (!table) return failure(table);
     text += "\n" + *table;
   }
   if (!outcome->interrupted) {
-    if (Status s = write_report(request, arguments.truth); !s)
+    if (Status s = write_report(request, arguments.truth, context); !s)
       context.log.warning("no report was written: " + s.error().message());
   }
   if (outcome->lost && !outcome->interrupted) advise(request, *outcome, context);

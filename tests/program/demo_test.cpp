@@ -29,10 +29,13 @@ TEST(Demo, LeavesARecordingARunAndAPageWithoutErrors) {
   EXPECT_TRUE(fs::exists(out + "/recording/recording.yaml"));
   EXPECT_TRUE(fs::exists(out + "/run/summary.json"));
   const std::string page = content_of(out + "/report.html");
-  for (const char* part : {"Images", "Trajectories", "Stereo matching", "True elevation", "Time and memory",
-                           "position error, RMS, first poses aligned"}) {
+  for (const char* part : {"Images", "Trajectories on the global map", "Disparity errors", "True elevation",
+                           "Time and memory", "position error, RMS, SE3 alignment",
+                           "position error, RMS, first poses aligned", "run/summary.json", "spartan demo "}) {
     EXPECT_THAT(page, HasSubstr(part));
   }
+  for (const char* part : {"frames/s", "ATE, m", "ATE, first poses aligned, m"})
+    EXPECT_THAT(result.out, HasSubstr(part));
   const std::string check = testing::source_folder() + "/scripts/check_page " + out + "/report.html";
   const int status = std::system(check.c_str());
   ASSERT_TRUE(WIFEXITED(status));

@@ -91,12 +91,12 @@ TEST_F(Stops, EveryFrameAndStopIsTimed) {
 
 TEST_F(Stops, ArePartOfTheReport) {
   const std::string page = testing::content_of(path("whole/report/index.html"));
-  for (const char* part : {"Images", "truth", "localization, 3σ", "inclinometer", "Global map of all stops",
-                           "Points per cell of the global map", "missing: no measurement received yet"})
+  for (const char* part : {"Images", "truth", "localization, 3σ", "inclinometer", "Trajectories on the global map",
+                           "Points in each cell of the global map", "Without a measurement in this run: map"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
 }
 
-TEST_F(Stops, AreReportedWithOneAlignment) {
+TEST_F(Stops, AreReportedWithTheNumbersOfEvaluate) {
   const auto headline = [&](const std::string& truth, const std::string& align, const std::string& words) {
     const ProgramResult score = run_program({"evaluate", path("whole"), "--truth", truth, "--align", align, "--json"});
     const double error_m = nlohmann::json::parse(score.out)["ate_m"]["rmse"];
@@ -104,7 +104,8 @@ TEST_F(Stops, AreReportedWithOneAlignment) {
   };
   const std::string page = testing::content_of(path("whole/report/index.html"));
   EXPECT_NE(page.find(headline(path("rec"), "first", "first poses aligned")), std::string::npos);
-  EXPECT_NE(page.find(">position error, first poses aligned, mm<"), std::string::npos);
+  EXPECT_NE(page.find(headline(path("rec"), "se3", "SE3 alignment")), std::string::npos) << "as in the terminal";
+  EXPECT_NE(page.find(">Position error and 3σ, first poses aligned<"), std::string::npos);
 
   std::ifstream poses(path("rec/truth/poses.tum"));
   std::ofstream places(path("places.tum"));
@@ -114,7 +115,8 @@ TEST_F(Stops, AreReportedWithOneAlignment) {
   ASSERT_TRUE(finished(run("whole", {"--resume", "--truth", path("places.tum")})));
   const std::string fitted = testing::content_of(path("whole/report/index.html"));
   EXPECT_NE(fitted.find(headline(path("places.tum"), "se3", "SE3 alignment")), std::string::npos);
-  EXPECT_NE(fitted.find(">position error, SE3 alignment, mm<"), std::string::npos);
+  EXPECT_NE(fitted.find(">Position error, SE3 alignment<"), std::string::npos);
+  EXPECT_EQ(fitted.find(", first poses aligned"), std::string::npos);
 }
 
 TEST_F(Stops, TheGlobalMapIsDescribedMergedAndExported) {
@@ -128,11 +130,23 @@ TEST_F(Stops, TheGlobalMapIsDescribedMergedAndExported) {
   EXPECT_EQ(printed["columns"], tif->bands.front().width());
   EXPECT_EQ(tif->names.size(), 11u) << "as in a local map";
 
+  const ProgramResult same =
+      run_program({"map", "merge", path("whole"), path("whole"), "-o", path("same.map"), "--json"});
+  ASSERT_EQ(same.exit_code, 0) << same.err;
+  EXPECT_NE(same.err.find("2 stops are in both maps"), std::string::npos) << same.err;
+  EXPECT_EQ(nlohmann::json::parse(same.out)["stops"], 2);
+  EXPECT_EQ(nlohmann::json::parse(same.out)["shared_stops"], 2);
+
+  // The same ground at another time.
+  fs::copy(path("whole"), path("later"), fs::copy_options::recursive);
+  auto later = Database::open(path("later/run.sqlite"), Database::Mode::open);
+  ASSERT_TRUE(later && later->execute("UPDATE map_stops SET stamp_ns = stamp_ns + 1"));
   const ProgramResult merged =
-      run_program({"map", "merge", path("whole"), path("whole"), "-o", path("both.map"), "--json"});
+      run_program({"map", "merge", path("whole"), path("later"), "-o", path("both.map"), "--json"});
   ASSERT_EQ(merged.exit_code, 0) << merged.err;
   const auto both = nlohmann::json::parse(merged.out);
   EXPECT_EQ(both["stops"], 4);
+  EXPECT_EQ(both["shared_stops"], 0);
   EXPECT_EQ(both["apart_m"]["median"], 0);
   EXPECT_GT(both["both_know_cells"], 0);
   const ProgramResult again = run_program({"map", "info", path("both.map"), "--json"});
@@ -176,7 +190,7 @@ TEST_F(Stops, AMapTooLargeForOneImageRemovesTheOldOne) {
   EXPECT_FALSE(fs::exists(path("whole/maps/global.png")));
   const std::string page = testing::content_of(path("whole/report/index.html"));
   EXPECT_NE(page.find("too large for one image"), std::string::npos);
-  EXPECT_EQ(page.find("Points per cell"), std::string::npos);
+  EXPECT_EQ(page.find("Points in each cell"), std::string::npos);
 }
 
 // A tile with a wrong checksum ends the run when it is read; that step is not committed.

@@ -159,6 +159,12 @@ struct MapBand {
   ImageView<const float> values;
 };
 
+/// From a lowest to a highest value.
+struct Range {
+  double low = 0, high = 1;
+  double span() const { return high - low; }
+};
+
 /// Georeference of a north-up raster in the world plane, metres: x and y of its north-west corner and the side of a
 /// cell (GDAL's geotransform without rotation).
 struct GeoTransform {

@@ -10,7 +10,9 @@
 namespace spartan {
 namespace {
 
-constexpr Rgb8 kUnknown{30, 30, 34}, kObstacle{220, 50, 40}, kCavity{40, 90, 230}, kGround{70, 190, 80};
+constexpr Rgb8 kUnknown = kUnknownColour, kObstacle = kObstacleColour, kCavity = kCavityColour, kGround{70, 190, 80};
+
+constexpr double kLevelLight = 0.05 + 1.05 * 0.7071;
 
 Rgb8 mixed(Rgb8 a, Rgb8 b, double fraction_of_b) {
   const auto mix = [&](std::uint8_t x, std::uint8_t y) {
@@ -19,8 +21,9 @@ Rgb8 mixed(Rgb8 a, Rgb8 b, double fraction_of_b) {
   return {mix(a.r, b.r), mix(a.g, b.g), mix(a.b, b.b)};
 }
 
-// Lambertian shading by a light source 45° high in the north-west; the slope comes from the known neighbours.
-std::uint8_t shade(ImageView<const float> z, int x, int y, double cell_m) {
+// Lambertian shading by a light source 45° high in the upper left, about 0.8 on level ground; the slope comes from the
+// known neighbours.
+double shade(ImageView<const float> z, int x, int y, double cell_m) {
   const auto rise = [&](int dx, int dy) {
     const bool before = z.contains(x - dx, y - dy) && std::isfinite(z(x - dx, y - dy)),
                behind = z.contains(x + dx, y + dy) && std::isfinite(z(x + dx, y + dy));
@@ -30,7 +33,15 @@ std::uint8_t shade(ImageView<const float> z, int x, int y, double cell_m) {
   };
   const double east = rise(1, 0), south = rise(0, 1);
   const double facing = (0.5 * east + 0.5 * south + std::sqrt(0.5)) / std::sqrt(1 + east * east + south * south);
-  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(0.05 + 1.05 * facing, 0.0, 1.0)));
+  return std::clamp(0.05 + 1.05 * facing, 0.0, 1.0);
+}
+
+// Level ground keeps its colour.
+Rgb8 lit(const Rgb8& colour, double light) {
+  const auto scaled = [&](std::uint8_t v) {
+    return static_cast<std::uint8_t>(std::clamp(std::lround(v * light / kLevelLight), 0L, 255L));
+  };
+  return {scaled(colour.r), scaled(colour.g), scaled(colour.b)};
 }
 
 // Column and row in the v-disparity image of a point straight ahead at a range and a height above the plane.
@@ -61,19 +72,20 @@ void draw_curve(cv::Mat& image, const std::vector<cv::Point>& curve, Rgb8 colour
 
 }  // namespace
 
-Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m,
-                       int scale) {
-  Image<Rgb8> image(elevation_m.width() * scale, elevation_m.height() * scale);
+Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m) {
+  const Range range = elevation_colour_range(elevation_m, kind);
+  Image<Rgb8> image(elevation_m.size());
   for (int y = 0; y < elevation_m.height(); ++y) {
     for (int x = 0; x < elevation_m.width(); ++x) {
       Rgb8 colour = kUnknown;
       if (std::isfinite(elevation_m(x, y))) {
-        const std::uint8_t light = shade(elevation_m, x, y, cell_m);
-        colour = {light, light, light};
-        if (kind(x, y) == GroundClass::obstacle) colour = mixed(colour, kObstacle, 0.6);
-        if (kind(x, y) == GroundClass::cavity) colour = mixed(colour, kCavity, 0.6);
+        const GroundClass cell = kind(x, y);
+        colour = lit(cell == GroundClass::obstacle ? kObstacle
+                     : cell == GroundClass::cavity ? kCavity
+                                                   : elevation_colour((elevation_m(x, y) - range.low) / range.span()),
+                     shade(elevation_m, x, y, cell_m));
       }
-      for (int j = 0; j < scale; ++j) std::fill_n(image.row(y * scale + j) + x * scale, scale, colour);
+      image(x, y) = colour;
     }
   }
   return image;

@@ -14,7 +14,26 @@ bool same(Rgb8 a, Rgb8 b) {
   return a.r == b.r && a.g == b.g && a.b == b.b;
 }
 
-TEST(MapPictures, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreDark) {
+double luminance(const Rgb8& c) {
+  return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
+}
+
+TEST(MapPictures, ElevationColoursGrowBrighterInEvenSteps) {
+  for (int i = 0; i < 10; ++i) {
+    const double step = luminance(elevation_colour(0.1 * (i + 1))) - luminance(elevation_colour(0.1 * i));
+    EXPECT_GT(step, 10) << i;
+    EXPECT_LT(step, 35) << i;
+  }
+  EXPECT_EQ(elevation_colour(2), elevation_colour(1));
+}
+
+TEST(MapPictures, DisparityColoursRunFromBlueOverGreenToRed) {
+  EXPECT_GT(disparity_colour(0.1).b, disparity_colour(0.1).r);
+  EXPECT_GT(disparity_colour(0.5).g, disparity_colour(0.5).r);
+  EXPECT_GT(disparity_colour(0.95).r, disparity_colour(0.95).b + 50);
+}
+
+TEST(MapPictures, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreLight) {
   Image<float> elevation(9, 3);
   Image<GroundClass> kind(9, 3, GroundClass::ground);
   for (int y = 0; y < 3; ++y) {
@@ -23,11 +42,11 @@ TEST(MapPictures, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreDark) {
   elevation(8, 0) = std::numeric_limits<float>::quiet_NaN();
   kind(4, 1) = GroundClass::obstacle;
   kind(2, 1) = GroundClass::cavity;
-  const Image<Rgb8> image = render_map(elevation, kind, 0.05, 2);
-  EXPECT_EQ(image.width(), 18);
-  const auto at = [&](int x, int y) { return image(2 * x + 1, 2 * y + 1); };
-  EXPECT_GT(at(1, 1).g, at(7, 1).g) << "the light comes from the north-west";
-  EXPECT_LT(at(8, 0).g, 50);
+  const Image<Rgb8> image = render_map(elevation, kind, 0.05);
+  EXPECT_EQ(image.width(), 9);
+  const auto at = [&](int x, int y) { return image(x, y); };
+  EXPECT_GT(at(1, 1).g, at(7, 1).g) << "the light comes from the upper left";
+  EXPECT_GT(at(8, 0).g, 200);
   EXPECT_GT(at(4, 1).r, at(4, 1).b + 50) << "an obstacle is red";
   EXPECT_GT(at(2, 1).b, at(2, 1).r + 50) << "a cavity is blue";
 }

@@ -8,14 +8,23 @@
 
 namespace spartan {
 
-/// Renders disparities with Google's "turbo" colour map: large disparities (near) are red, small ones (far) blue,
-/// unknown pixels (NaN) black. The colour range spans the 1st to the 99th percentile of the known disparities.
+/// Google's "turbo" colour map: blue over green to red; `value` 0 … 1.
+Rgb8 disparity_colour(double value);
+/// The 1st to the 99th percentile of the known disparities, px: what the colours of colour_disparity() span.
+Range disparity_colour_range(ImageView<const float> disparity);
+/// Renders disparities: large ones (near) are red, small ones (far) blue, unknown pixels (NaN) black.
 Image<Rgb8> colour_disparity(ImageView<const float> disparity);
 
-/// Shaded relief lit from the north-west, obstacles tinted red and cavities blue; unknown cells are dark. `kind` as
-/// LocalMap::kind. Each cell becomes `scale` x `scale` pixels.
-Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m,
-                       int scale = 4);
+/// Dark blue over gray to yellow; `value` 0 … 1. Even steps of lightness, also for colour-blind readers; close to
+/// "cividis" (Nuñez, Anderton & Renslow, PLOS ONE 2018). Red and blue remain free for obstacles and cavities.
+Rgb8 elevation_colour(double value);
+inline constexpr Rgb8 kObstacleColour{220, 50, 40}, kCavityColour{40, 90, 230}, kUnknownColour{236, 233, 228};
+/// The 2nd to the 98th percentile of the elevations of the ground (of all cells where there is none), at least 5 cm:
+/// what the colours of render_map() span.
+Range elevation_colour_range(ImageView<const float> elevation_m, ImageView<const GroundClass> kind);
+/// Elevations in colour, lit from the upper left; obstacles are red, cavities blue, unknown cells light gray. A pixel
+/// for each cell. `kind` as LocalMap::kind.
+Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m);
 
 /// The left image with the ground tinted green, obstacles red and cavities blue; unknown pixels stay gray.
 Image<Rgb8> render_classes(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> classes);

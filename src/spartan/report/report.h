@@ -26,10 +26,13 @@ struct ReportRequest {
   std::string truth;         ///< truth for find_trajectories(); empty: that of the recording, if any
   bool whole_truth = false;  ///< also show disparity errors and the true elevation of a simulation
   int threads = 1;
+  std::string command_line, date;  ///< shown on the page; may be empty
+  std::string page;                ///< where the page will be written, for links to the files of the run; empty: none
 };
 
-/// The report of a run as one self-contained HTML page: images, trajectories, sensors, maps, and errors where the truth
-/// is known. Codes: `input`, `store_damaged`, `configuration` as those who read run and recording.
+/// The report of a run as one HTML page that loads nothing: images, trajectories, disparities, maps, sensors, errors
+/// where the truth is known, times, and links to the files of the run. Codes: `input`, `store_damaged`, `configuration`
+/// as those who read run and recording.
 Result<std::string> make_report(ReportRequest request);
 
 /// The two trajectories of a comparison.

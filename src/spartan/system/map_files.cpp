@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "spartan/core/files.h"
+#include "spartan/figures/map_plot.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/reconstruction/point_cloud.h"
 #include "spartan/reconstruction/rendering.h"
@@ -50,7 +51,8 @@ Status write_view(const StopView& view, const VDisparityOptions& options, const 
 
 Status write_local_map(const LocalMap& map, const std::string& path) {
   if (Status s = write_geotiff(path + ".tif", map.place, map.bands().list); !s) return s;
-  return write_png(path + ".png", render_map(map.elevation_m, map.kind, map.place.cell_m));
+  const std::string title = "Map " + std::filesystem::path(path).filename().string();
+  return write_png(path + ".png", to_image(map_plot(map.elevation_m, map.kind, map.place, title)));
 }
 
 Status write_map_geotiff(const MapView& view, const MapOptions& options, const ThreadPool& workers,
@@ -64,7 +66,11 @@ Status write_global_map(GlobalMap& map, const MapOptions& options, const ThreadP
   const auto view = map.view(map.extent());
   if (!view) return failure(view);
   if (Status s = write_map_geotiff(*view, options, workers, path + ".tif"); !s) return s;
-  return write_png(path + ".png", render_map(view->elevation_m, view->kind, view->cell_m));
+  return write_png(path + ".png", draw_map(*view, "Global map"));
+}
+
+Image<Rgb8> draw_map(const MapView& view, const std::string& title) {
+  return to_image(map_plot(view.elevation_m, view.kind, view.place(), title));
 }
 
 Status remove_map_files(const std::string& path) {

@@ -13,8 +13,8 @@
 
 namespace spartan {
 
-/// Writes `path`.tif (all layers, docs/reference/files.md) and `path`.png (shaded elevation with classes). Code
-/// `output`.
+/// Writes `path`.tif (all layers, docs/reference/files.md) and `path`.png (elevation and classes with axes, scale and
+/// legend). Code `output`.
 Status write_local_map(const LocalMap& map, const std::string& path);
 
 /// Writes the same files of the whole global map; none if it is empty. Codes: those of GlobalMap::view, `output`.
@@ -26,6 +26,9 @@ Status remove_map_files(const std::string& path);
 /// Writes a part of the global map as a GeoTIFF with all layers. Code `output`.
 Status write_map_geotiff(const MapView& view, const MapOptions& options, const ThreadPool& workers,
                          const std::string& path);
+
+/// Elevation and classes in colour, with axes, scale and legend.
+Image<Rgb8> draw_map(const MapView& view, const std::string& title);
 
 /// Writes the 3D reconstruction of a stop into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
 /// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; `<pair>_<stamp_ns>_classes.png` and

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/report/internal/drawing.h"
+#include "spartan/figures/drawing.h"
 #include "spartan/rig_design/rig_designer.h"
 
 namespace spartan::internal {

@@ -1,23 +1,27 @@
-// The report's section on trajectories: each with the truth, its error and its 3σ bound.
+// The report's section on trajectories: on the global map, with the truth; errors beside their 3σ.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "spartan/core/result.h"
-#include "spartan/eval/trajectory_metrics.h"
-#include "spartan/report/report.h"
+#include "spartan/figures/plot.h"
 #include "spartan/system/run_store.h"
 
 namespace spartan::internal {
 
-/// Errors of a trajectory with the first poses aligned, or, if the truth has no rotation, after an SE3 fit. Codes as
-/// compare_trajectories().
-Result<TrajectoryMetrics> errors_of(const ComparedTrajectories& compared);
-std::string alignment_text(Alignment alignment);
+struct TrajectorySectionInput {
+  std::string run;    ///< folder
+  std::string truth;  ///< for find_trajectories(); empty: none
+  const std::vector<FrameRecord>& frames;
+  std::optional<Plot> map;    ///< of the global map, to draw the trajectories on
+  bool heading_east = false;  ///< x of the world is east
+};
 
-/// Plots of each trajectory of the run, with the truth if not empty, aligned as in errors_of().
-Result<std::string> trajectory_plots(const std::string& run, const std::vector<FrameRecord>& frames,
-                                     const std::string& truth);
+/// Plots of the trajectories of the run, with the truth if there is one. The first poses are aligned, because the
+/// covariances are relative to the start; if the truth has no rotation, SE3. The truth is cut to the time of the
+/// trajectory. Says where an error leaves its 3σ.
+Result<std::string> trajectory_section(TrajectorySectionInput input);
 
 }  // namespace spartan::internal

@@ -3,12 +3,13 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "spartan/core/image.h"
 
-namespace spartan::internal {
+namespace spartan {
 
 struct Paint {
   Rgb8 colour;
@@ -41,6 +42,11 @@ class Drawing {
     parts_.emplace_back(Text{foot, text, lettering});
   }
 
+  /// An image whose corner pixels fill the corners of a rectangle from `top_left` to `bottom_right`.
+  void picture(const Eigen::Vector2d& top_left, const Eigen::Vector2d& bottom_right, Image<Rgb8> pixels) {
+    parts_.emplace_back(Picture{top_left, bottom_right, std::move(pixels)});
+  }
+
   std::string to_svg() const;
   Image<Rgb8> to_image() const;
 
@@ -58,10 +64,14 @@ class Drawing {
     std::string text;
     Lettering lettering;
   };
-  using Part = std::variant<Area, Line, Text>;
+  struct Picture {
+    Eigen::Vector2d top_left, bottom_right;
+    Image<Rgb8> pixels;
+  };
+  using Part = std::variant<Area, Line, Text, Picture>;
 
   int width_px_, height_px_;
   std::vector<Part> parts_;
 };
 
-}  // namespace spartan::internal
+}  // namespace spartan

@@ -1,11 +1,12 @@
-#include "spartan/report/internal/drawing.h"
+#include "spartan/figures/drawing.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "spartan/report/report.h"
+#include <cstdlib>
+#include <utility>
 
-namespace spartan::internal {
+namespace spartan {
 namespace {
 
 using ::testing::HasSubstr;
@@ -65,11 +66,19 @@ TEST(Drawing, TextIsEscapedAndAnchored) {
   EXPECT_THAT(svg, HasSubstr("text-anchor=\"end\""));
 }
 
-TEST(GroundFigure, IsNotDrawnWithoutAPair) {
-  RigRequirements requirements;
-  requirements.name = "test rover";
-  EXPECT_FALSE(draw_ground(requirements, RigDesign()));
+TEST(Drawing, PicturesFillTheirRectangle) {
+  Image<Rgb8> pixels(2, 1);
+  pixels(0, 0) = kRed;
+  pixels(1, 0) = kBlue;
+  Drawing drawing(60, 40);
+  drawing.picture({10, 10}, {50, 30}, std::move(pixels));
+  const Image<Rgb8> image = drawing.to_image();
+  EXPECT_TRUE(is_near(image(12, 12), kRed));
+  EXPECT_TRUE(is_near(image(28, 28), kRed));
+  EXPECT_TRUE(is_near(image(32, 12), kBlue));
+  EXPECT_TRUE(is_near(image(52, 20), {255, 255, 255}));
+  EXPECT_THAT(drawing.to_svg(), HasSubstr("href=\"data:image/png;base64,"));
 }
 
 }  // namespace
-}  // namespace spartan::internal
+}  // namespace spartan

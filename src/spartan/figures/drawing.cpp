@@ -1,21 +1,18 @@
-#include "spartan/report/internal/drawing.h"
+#include "spartan/figures/drawing.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "spartan/figures/colours.h"
+#include "spartan/figures/html.h"
 #include "spartan/image_io/opencv_bridge.h"
-#include "spartan/report/internal/html_parts.h"
 
-namespace spartan::internal {
+namespace spartan {
 namespace {
 
 using Points = Drawing::Points;
-
-std::string hex(const Rgb8& c) {
-  return fmt::format("#{:02x}{:02x}{:02x}", c.r, c.g, c.b);
-}
 
 std::string svg_points(const Points& points) {
   std::string text;
@@ -126,6 +123,17 @@ void paint_text(cv::Mat& canvas, const Eigen::Vector2d& foot, const std::string&
   stroke_text(&canvas, start, text, scale, thickness, scalar(lettering.colour));
 }
 
+void paint_picture(cv::Mat& canvas, const Eigen::Vector2d& top_left, const Eigen::Vector2d& bottom_right,
+                   const Image<Rgb8>& pixels) {
+  const cv::Point from(cvRound(kOversampling * top_left.x()), cvRound(kOversampling * top_left.y())),
+      to(cvRound(kOversampling * bottom_right.x()), cvRound(kOversampling * bottom_right.y()));
+  const cv::Rect place = cv::Rect(from, to) & cv::Rect(0, 0, canvas.cols, canvas.rows);
+  if (place != cv::Rect(from, to) || place.empty() || pixels.empty()) return;
+  // Larger: pixels stay sharp. Smaller: each pixel is the mean of what it covers.
+  const bool larger = place.width >= pixels.width();
+  cv::resize(as_mat(pixels.view()), canvas(place), place.size(), 0, 0, larger ? cv::INTER_NEAREST : cv::INTER_AREA);
+}
+
 }  // namespace
 
 std::string Drawing::to_svg() const {
@@ -149,6 +157,13 @@ std::string Drawing::to_svg() const {
           w.foot.y(), w.lettering.size_px, anchors[static_cast<int>(w.lettering.anchor)], hex(w.lettering.colour), halo,
           html_text(w.text));
     }
+    std::string operator()(const Picture& p) const {
+      const Eigen::Vector2d size = p.bottom_right - p.top_left;
+      return fmt::format(
+          "<image x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" preserveAspectRatio=\"none\" "
+          "style=\"image-rendering:pixelated\" href=\"{}\"/>\n",
+          p.top_left.x(), p.top_left.y(), size.x(), size.y(), data_url(p.pixels.view()));
+    }
   };
   std::string text = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
@@ -165,6 +180,7 @@ Image<Rgb8> Drawing::to_image() const {
     void operator()(const Area& a) const { paint_area(canvas, a.corners, a.paint); }
     void operator()(const Line& l) const { paint_line(canvas, l.points, l.pen); }
     void operator()(const Text& w) const { paint_text(canvas, w.foot, w.text, w.lettering); }
+    void operator()(const Picture& p) const { paint_picture(canvas, p.top_left, p.bottom_right, p.pixels); }
   };
   for (const Part& part : parts_) std::visit(PaintPart{canvas}, part);
   Image<Rgb8> image(width_px_, height_px_);
@@ -173,4 +189,4 @@ Image<Rgb8> Drawing::to_image() const {
   return image;
 }
 
-}  // namespace spartan::internal
+}  // namespace spartan

@@ -1,0 +1,64 @@
+#include "spartan/figures/map_plot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "spartan/figures/html.h"
+#include "spartan/reconstruction/rendering.h"
+
+namespace spartan {
+namespace {
+
+constexpr int kMostPixels = 1600, kWantedPixels = 640;  // of the picture
+
+// The cells between the outermost known ones; all where none is known.
+struct Part {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+Part known_part(ImageView<const float> elevation_m) {
+  int left = elevation_m.width(), right = -1, top = elevation_m.height(), bottom = -1;
+  for (int y = 0; y < elevation_m.height(); ++y) {
+    for (int x = 0; x < elevation_m.width(); ++x) {
+      if (!std::isfinite(elevation_m(x, y))) continue;
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
+    }
+  }
+  if (right < 0) return {0, 0, elevation_m.width(), elevation_m.height()};
+  return {left, top, right - left + 1, bottom - top + 1};
+}
+
+}  // namespace
+
+Plot map_plot(ImageView<const float> all_elevation_m, ImageView<const GroundClass> all_kind, const GeoTransform& whole,
+              const std::string& title) {
+  const Part part = known_part(all_elevation_m);
+  const auto elevation_m = all_elevation_m.crop(part.x, part.y, part.width, part.height);
+  const auto kind = all_kind.crop(part.x, part.y, part.width, part.height);
+  const GeoTransform place{whole.west_m + part.x * whole.cell_m, whole.north_m - part.y * whole.cell_m, whole.cell_m};
+  Plot plot;
+  plot.title = title;
+  plot.x_label = "x, m";
+  plot.y_label = "y, m";
+  plot.equal_axes = true;
+  Image<Rgb8> pixels = render_map(elevation_m, kind, place.cell_m);
+  const int block = std::max(1, (pixels.width() + kMostPixels - 1) / kMostPixels);
+  if (block > 1) pixels = shrunk(pixels.view(), kMostPixels);
+  const int scale = std::max(1, kWantedPixels / std::max({1, pixels.width(), pixels.height()}));
+  plot.width_px = kPlotMargin_px + scale * pixels.width();
+  plot.height_px = kPlotHeading_px + scale * pixels.height();
+  // Blocks that are not complete are cut off.
+  const double width_m = pixels.width() * block * place.cell_m, height_m = pixels.height() * block * place.cell_m;
+  plot.picture = PlotPicture{"elevation",
+                             std::move(pixels),
+                             {place.west_m, place.west_m + width_m},
+                             {place.north_m - height_m, place.north_m}};
+  plot.colour_bar = ColourBar{"elevation, m", elevation_colour_range(elevation_m, kind), elevation_colour};
+  plot.keys = {{"obstacle", kObstacleColour}, {"cavity", kCavityColour}, {"unknown", kUnknownColour}};
+  return plot;
+}
+
+}  // namespace spartan
