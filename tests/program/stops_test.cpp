@@ -92,7 +92,7 @@ TEST_F(Stops, EveryFrameAndStopIsTimed) {
 TEST_F(Stops, ArePartOfTheReport) {
   const std::string page = testing::content_of(path("whole/report/index.html"));
   for (const char* part : {"Images", "truth", "localization, 3σ", "inclinometer", "Trajectories on the global map",
-                           "Points in each cell of the global map", "Without a measurement in this run: map"})
+                           "Points in each cell of the global map", "Frames by the state of each sensor"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
 }
 

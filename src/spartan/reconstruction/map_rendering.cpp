@@ -79,11 +79,17 @@ Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const Groun
     for (int x = 0; x < elevation_m.width(); ++x) {
       Rgb8 colour = kUnknown;
       if (std::isfinite(elevation_m(x, y))) {
-        const GroundClass cell = kind(x, y);
-        colour = lit(cell == GroundClass::obstacle ? kObstacle
-                     : cell == GroundClass::cavity ? kCavity
-                                                   : elevation_colour((elevation_m(x, y) - range.low) / range.span()),
-                     shade(elevation_m, x, y, cell_m));
+        const double light = shade(elevation_m, x, y, cell_m);
+        switch (kind(x, y)) {
+          case GroundClass::obstacle:  // steep, but to be seen as red also in the shade
+            colour = lit(kObstacle, 0.5 * (kLevelLight + light));
+            break;
+          case GroundClass::cavity:
+            colour = lit(kCavity, 0.5 * (kLevelLight + light));
+            break;
+          default:
+            colour = lit(elevation_colour((elevation_m(x, y) - range.low) / range.span()), light);
+        }
       }
       image(x, y) = colour;
     }

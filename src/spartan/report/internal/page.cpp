@@ -25,6 +25,7 @@ a { color: var(--accent); }
 nav ul { display: flex; flex-wrap: wrap; gap: .25rem 1.25rem; list-style: none; padding: 0; margin: .5rem 0; }
 figure { margin: 0; min-width: 0; }
 figcaption { font-size: .875rem; color: var(--soft); }
+.plot { margin-bottom: 1.25rem; }
 .plot > figcaption { font-size: 1rem; font-weight: 600; color: var(--ink); }
 .images { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 310px), 1fr)); gap: 1.25rem; }
 .image { max-width: 460px; }

@@ -140,7 +140,9 @@ std::vector<double> scaled(std::vector<double> values, double factor) {
 Plot error_plot(const std::vector<ErrorSeries>& all, const std::string& aligned) {
   double most = 0;
   for (const ErrorSeries& s : all) {
-    for (const double e : s.error_m) most = std::max(most, std::isfinite(e) ? e : 0.0);
+    for (const auto* values : {&s.error_m, &s.bound_m}) {
+      for (const double value : *values) most = std::max(most, std::isfinite(value) ? value : 0.0);
+    }
   }
   const double factor = most < 1 ? 1000 : 1;
   Plot plot;
