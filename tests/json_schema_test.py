@@ -51,6 +51,7 @@ def outputs(program, source, small_runs, work):
     yield "stereo", output_of(program, "stereo", left, right, "-o", work / "scored", "--truth",
                               work / "stereo/disparity.pfm")
     yield "map_build", output_of(program, "map", "build", left, right, "-o", work / "map", "--rig", drive / "calib.txt")
+    yield "error", output_of(program, "evaluate", work / "missing", "--truth", drive, codes=(3,))
     yield "rig_inspect", output_of(program, "rig", "inspect", rig)
     yield "rig_inspect", output_of(program, "rig", "inspect", drive / "calib.txt", left, right)
     yield "rig_inspect", output_of(program, "rig", "inspect", "-", left, right)

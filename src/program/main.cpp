@@ -3,18 +3,21 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
+#include <string>
 #include <string_view>
+#include <vector>
 
+#include "program/command_line.h"
 #include "program/commands.h"
 #include "program/context.h"
 #include "program/interrupt.h"
+#include "program/json.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/threads.h"
 
@@ -39,53 +42,6 @@ void add_commands(CLI::App& app, Context& context) {
   add_completion(app, context);
 }
 
-// An empty argument, e.g. of a shell variable that is not set, would count as an option that is not given, or name the
-// root folder.
-void refuse_empty_arguments(CLI::App& app) {
-  const CLI::Validator not_empty(
-      [](const std::string& text) { return text.empty() ? "the argument is empty" : std::string(); }, "");
-  for (CLI::Option* option : app.get_options()) option->check(not_empty);
-  for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) refuse_empty_arguments(*command);
-}
-
-// The error text for a word in the place of a command, e.g. `spartan map foo`; empty where every such word is one.
-std::string unknown_command(const CLI::App& app, int argc, char** argv) {
-  const CLI::App* group = &app;
-  std::string path = "spartan";
-  for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
-    const auto commands = group->get_subcommands([](const CLI::App*) { return true; });
-    if (commands.empty()) return {};
-    const auto named = std::find_if(commands.begin(), commands.end(),
-                                    [&](const CLI::App* command) { return command->check_name(argv[i]); });
-    if (named == commands.end())
-      return fmt::format("error: '{0}' is not a {1} command; see `{1} --help`\n", argv[i], path);
-    group = *named;
-    path += fmt::format(" {}", argv[i]);
-  }
-  return {};
-}
-
-// "spartan rig inspect": the command that was parsed, as far as it was.
-std::string command_of(const CLI::App& app) {
-  const auto parsed = app.get_subcommands();
-  return app.get_name() + (parsed.empty() ? "" : " " + command_of(*parsed.front()));
-}
-
-// The command line as a shell takes it: words with other characters than these in single quotes.
-std::string command_line(int argc, char** argv) {
-  std::string line = "spartan";
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    const bool plain = !word.empty() && word.find_first_not_of(
-                                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                            "0123456789_-+=./:,@%") == std::string::npos;
-    std::string quoted;
-    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    line += plain ? " " + word : " '" + quoted + "'";
-  }
-  return line;
-}
-
 int run(int argc, char** argv) {
   CLI::App app{"Stereo vision for rovers: visual odometry, dense stereo, terrain maps and localization.", "spartan"};
   app.set_version_flag("--version", SPARTAN_VERSION);
@@ -99,11 +55,17 @@ int run(int argc, char** argv) {
   context.command_line = command_line(argc, argv);
   add_commands(app, context);
   refuse_empty_arguments(app);
+  const std::vector<std::string> words = words_of(argc, argv);
   try {
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them from the end
   } catch (const CLI::ParseError& e) {
-    if (const std::string message = unknown_command(app, argc, argv); !message.empty()) {
+    if (const std::string message = unknown_command(app, words); !message.empty()) {
       std::cerr << message;
+      return kUsage;
+    }
+    const CLI::App* const group = group_without_command(app);
+    if (group != nullptr && dynamic_cast<const CLI::RequiredError*>(&e) != nullptr) {
+      std::cout << group->help();
       return kUsage;
     }
     if (e.get_exit_code() != static_cast<int>(CLI::ExitCodes::Success)) {
@@ -117,7 +79,7 @@ int run(int argc, char** argv) {
   cv::setNumThreads(context.threads);
   listen_for_interrupts();
   if (!context.chosen) {
-    context.log.error("this command needs a subcommand; see --help");
+    std::cout << group_without_command(app)->help();
     return kUsage;
   }
   for (const std::string& warning : context.warnings) context.log.warning(warning);
@@ -128,7 +90,12 @@ int run(int argc, char** argv) {
   }
   if (result) return *result;
   context.log.error(result.error().message());
-  return exit_code(result.error().code);
+  const ExitCode code = exit_code(result.error().code);
+  // An interrupted run has printed its summary.
+  if (context.json && code != kInterrupted)
+    std::cout << text_of(Json{{"schema", 1}, {"error", {{"exit_code", code}, {"message", result.error().message()}}}})
+              << '\n';
+  return code;
 }
 
 // The exit code of an exception, which is a bug of Spartan unless memory ran out.

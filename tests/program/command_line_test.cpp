@@ -29,6 +29,28 @@ TEST(CommandLine, NamesAWordThatIsNoCommand) {
   EXPECT_THAT(in_group.err, HasSubstr("'fold' is not a spartan map command; see `spartan map --help`"));
 }
 
+TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
+  EXPECT_THAT(run_program({"simulat"}).err, HasSubstr("'simulat' is not a spartan command; did you mean `simulate`?"));
+  EXPECT_THAT(run_program({"rig", "inspekt"}).err, HasSubstr("did you mean `inspect`? see `spartan rig --help`"));
+}
+
+TEST(CommandLine, WithoutACommandListsTheCommands) {
+  const auto program = run_program({}), group = run_program({"map"});
+  EXPECT_EQ(program.exit_code, 2);
+  EXPECT_EQ(group.exit_code, 2);
+  EXPECT_EQ(program.out, run_program({"--help"}).out);
+  EXPECT_EQ(group.out, run_program({"map", "--help"}).out);
+  EXPECT_THAT(group.out, HasSubstr("merge"));
+}
+
+TEST(CommandLine, HelpIsACommandToo) {
+  EXPECT_EQ(run_program({"help"}).out, run_program({"--help"}).out);
+  const auto help = run_program({"help", "rig", "inspect"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_EQ(help.out, run_program({"rig", "inspect", "--help"}).out);
+  EXPECT_THAT(run_program({"help", "fly"}).err, HasSubstr("'fly' is not a spartan command"));
+}
+
 TEST(CommandLine, AcceptsFormerFlagsWithAWarning) {
   const std::string drive = testing::small_runs_folder() + "/drive";
   const testing::TemporaryFolder folder;

@@ -21,6 +21,10 @@
 
 namespace spartan {
 
+/// The name that a misspelt word probably means: the closest of `names` by insertions, deletions, substitutions and
+/// exchanges of neighbours (optimal string alignment distance), at most a third of its letters away; else empty.
+std::string closest_name(std::string_view word, const std::vector<std::string>& names);
+
 struct YamlEntry;
 
 /// A value of a YAML document: null, a scalar, a list or a map. Copies share their content, which is immutable.

@@ -205,5 +205,17 @@ RC_GTEST_PROP(ParseYaml, SurvivesAnyText, ()) {
   if (!root) RC_ASSERT(root.error().code == ErrorCode::configuration);
 }
 
+TEST(ClosestName, IsAtMostAThirdOfTheLettersAway) {
+  const std::vector<std::string> names{"width_px", "height_px", "run", "rig"};
+  EXPECT_EQ(closest_name("widht_px", names), "width_px") << "neighbours exchanged";
+  EXPECT_EQ(closest_name("heigth", {"height"}), "height");
+  EXPECT_EQ(closest_name("runn", names), "run");
+  EXPECT_EQ(closest_name("rum", names), "run");
+  EXPECT_EQ(closest_name("fly", names), "");
+  EXPECT_EQ(closest_name("b", {"a"}), "");
+  EXPECT_EQ(closest_name("", names), "");
+  EXPECT_EQ(closest_name("run", {}), "");
+}
+
 }  // namespace
 }  // namespace spartan

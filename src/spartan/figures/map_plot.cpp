@@ -33,18 +33,18 @@ Part known_part(ImageView<const float> elevation_m) {
 
 }  // namespace
 
-Plot map_plot(ImageView<const float> all_elevation_m, ImageView<const GroundClass> all_kind, const GeoTransform& whole,
+Plot map_plot(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, const GeoTransform& place,
               const std::string& title) {
-  const Part part = known_part(all_elevation_m);
-  const auto elevation_m = all_elevation_m.crop(part.x, part.y, part.width, part.height);
-  const auto kind = all_kind.crop(part.x, part.y, part.width, part.height);
-  const GeoTransform place{whole.west_m + part.x * whole.cell_m, whole.north_m - part.y * whole.cell_m, whole.cell_m};
+  const Part part = known_part(elevation_m);
+  const auto elevations = elevation_m.crop(part.x, part.y, part.width, part.height);
+  const auto kinds = kind.crop(part.x, part.y, part.width, part.height);
+  const double left_m = place.west_m + part.x * place.cell_m, top_m = place.north_m - part.y * place.cell_m;
   Plot plot;
   plot.title = title;
   plot.x_label = "x, m";
   plot.y_label = "y, m";
   plot.equal_axes = true;
-  Image<Rgb8> pixels = render_map(elevation_m, kind, place.cell_m);
+  Image<Rgb8> pixels = render_map(elevations, kinds, place.cell_m);
   const int block = std::max(1, (pixels.width() + kMostPixels - 1) / kMostPixels);
   if (block > 1) pixels = shrunk(pixels.view(), kMostPixels);
   const int scale = std::max(1, kWantedPixels / std::max({1, pixels.width(), pixels.height()}));
@@ -52,11 +52,8 @@ Plot map_plot(ImageView<const float> all_elevation_m, ImageView<const GroundClas
   plot.height_px = kPlotHeading_px + scale * pixels.height();
   // Blocks that are not complete are cut off.
   const double width_m = pixels.width() * block * place.cell_m, height_m = pixels.height() * block * place.cell_m;
-  plot.picture = PlotPicture{"elevation",
-                             std::move(pixels),
-                             {place.west_m, place.west_m + width_m},
-                             {place.north_m - height_m, place.north_m}};
-  plot.colour_bar = ColourBar{"elevation, m", elevation_colour_range(elevation_m, kind), elevation_colour};
+  plot.picture = PlotPicture{"elevation", std::move(pixels), {left_m, left_m + width_m}, {top_m - height_m, top_m}};
+  plot.colour_bar = ColourBar{"elevation, m", elevation_colour_range(elevations, kinds), elevation_colour};
   plot.keys = {{"obstacle", kObstacleColour}, {"cavity", kCavityColour}, {"unknown", kUnknownColour}};
   return plot;
 }

@@ -87,7 +87,7 @@ class Legend {
       x_ = left_;
       y_ += kKey_px;
     }
-    const Eigen::Vector2d at(x_ + 12, y_ - 4);
+    Eigen::Vector2d at(x_ + 12, y_ - 4);
     drawing_.text({x_ + 30, y_}, name, {kInk, kLetter_px});
     x_ += width + 14;
     return at;

@@ -152,7 +152,7 @@ TEST(RigYaml, ErrorsNameFileLineAndKey) {
   EXPECT_EQ(error_for("schema: 1", "schema: 2"), "my.yaml:1: schema: is 2; this version reads schema 1");
   EXPECT_THAT(error_for("    model: pinhole", "    model: fisheye"), HasSubstr("my.yaml:6: cameras.r.model: "));
   EXPECT_THAT(error_for("    model: pinhole", "    modell: pinhole"),
-              HasSubstr("my.yaml:6: cameras.r.modell: unknown key; known keys: "));
+              HasSubstr("my.yaml:6: cameras.r.modell: unknown key; did you mean model? known keys: "));
   EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50]"),
               HasSubstr("my.yaml:7: cameras.r.focal_px: has 1 entries, must be a list of 2 numbers"));
   EXPECT_THAT(error_for("    focal_px: [50, 50]", "    focal_px: [50, .nan]"),

@@ -44,9 +44,10 @@ std::string file_list(const std::string& run, const fs::path& from) {
   fs::path group;
   int count = 0;
   const auto close = [&] {
-    if (count > 0)
+    if (count > 0) {
       list += fmt::format("<details><summary>{}/ ({} files)</summary><ul class=\"files\">{}</ul></details>\n",
                           html_text(group.string()), count, nested);
+    }
     nested.clear();
     count = 0;
   };

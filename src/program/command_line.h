@@ -1,0 +1,29 @@
+// Words of the command line that CLI11 does not know: misspelt commands, `spartan help run`, groups without a command.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace spartan::program {
+
+/// An empty argument, e.g. of a shell variable that is not set, would count as an option that is not given, or name the
+/// root folder.
+void refuse_empty_arguments(CLI::App& app);
+
+/// The error text for a word in the place of a command, e.g. `spartan map foo`; empty where every such word is one.
+std::string unknown_command(const CLI::App& app, const std::vector<std::string>& words);
+
+/// "spartan rig inspect": the command that was parsed, as far as it was.
+std::string command_of(const CLI::App& app);
+
+/// The program or the group of which no command was named, as in `spartan` and `spartan map`; null otherwise.
+const CLI::App* group_without_command(const CLI::App& app);
+
+/// The words after the program's name; `help rig inspect` becomes `rig inspect --help`.
+std::vector<std::string> words_of(int argc, char** argv);
+
+/// The command line as a shell takes it.
+std::string command_line(int argc, char** argv);
+
+}  // namespace spartan::program
