@@ -16,6 +16,7 @@ std::vector<const CLI::App*> commands_of(const CLI::App& app) {
 // "did you mean `run`? "
 std::string suggestion(const std::string& word, const std::vector<const CLI::App*>& commands) {
   std::vector<std::string> names;
+  names.reserve(commands.size());
   for (const CLI::App* command : commands) names.push_back(command->get_name());
   const std::string meant = closest_name(word, names);
   return meant.empty() ? "" : fmt::format("did you mean `{}`? ", meant);
@@ -39,9 +40,10 @@ std::string unknown_command(const CLI::App& app, const std::vector<std::string>&
     if (commands.empty()) return {};
     const auto named = std::find_if(commands.begin(), commands.end(),
                                     [&](const CLI::App* command) { return command->check_name(word); });
-    if (named == commands.end())
+    if (named == commands.end()) {
       return fmt::format("error: '{0}' is not a {1} command; {2}see `{1} --help`\n", word, path,
                          suggestion(word, commands));
+    }
     group = *named;
     path += " " + word;
   }
@@ -53,10 +55,10 @@ std::string command_of(const CLI::App& app) {
   return app.get_name() + (parsed.empty() ? "" : " " + command_of(*parsed.front()));
 }
 
-const CLI::App* group_without_command(const CLI::App& app) {
+bool lacks_command(const CLI::App& app) {
   const CLI::App* group = &app;
   while (!group->get_subcommands().empty()) group = group->get_subcommands().front();
-  return commands_of(*group).empty() ? nullptr : group;
+  return !commands_of(*group).empty();
 }
 
 std::vector<std::string> words_of(int argc, char** argv) {

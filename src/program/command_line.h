@@ -17,8 +17,8 @@ std::string unknown_command(const CLI::App& app, const std::vector<std::string>&
 /// "spartan rig inspect": the command that was parsed, as far as it was.
 std::string command_of(const CLI::App& app);
 
-/// The program or the group of which no command was named, as in `spartan` and `spartan map`; null otherwise.
-const CLI::App* group_without_command(const CLI::App& app);
+/// Whether no command of the program or of a group was named, as in `spartan` and `spartan map`.
+bool lacks_command(const CLI::App& app);
 
 /// The words after the program's name; `help rig inspect` becomes `rig inspect --help`.
 std::vector<std::string> words_of(int argc, char** argv);

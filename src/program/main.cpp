@@ -63,9 +63,8 @@ int run(int argc, char** argv) {
       std::cerr << message;
       return kUsage;
     }
-    const CLI::App* const group = group_without_command(app);
-    if (group != nullptr && dynamic_cast<const CLI::RequiredError*>(&e) != nullptr) {
-      std::cout << group->help();
+    if (lacks_command(app) && dynamic_cast<const CLI::RequiredError*>(&e) != nullptr) {
+      std::cout << app.help();
       return kUsage;
     }
     if (e.get_exit_code() != static_cast<int>(CLI::ExitCodes::Success)) {
@@ -79,7 +78,7 @@ int run(int argc, char** argv) {
   cv::setNumThreads(context.threads);
   listen_for_interrupts();
   if (!context.chosen) {
-    std::cout << group_without_command(app)->help();
+    std::cout << app.help();
     return kUsage;
   }
   for (const std::string& warning : context.warnings) context.log.warning(warning);
@@ -92,9 +91,10 @@ int run(int argc, char** argv) {
   context.log.error(result.error().message());
   const ExitCode code = exit_code(result.error().code);
   // An interrupted run has printed its summary.
-  if (context.json && code != kInterrupted)
+  if (context.json && code != kInterrupted) {
     std::cout << text_of(Json{{"schema", 1}, {"error", {{"exit_code", code}, {"message", result.error().message()}}}})
               << '\n';
+  }
   return code;
 }
 
