@@ -45,7 +45,9 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   RunHooks hooks;
   hooks.log = context.log;
   hooks.should_stop = interrupted;
-  hooks.progress = [&progress](const RunProgress& p) { progress.show(p.done, p.announced, p.status); };
+  hooks.progress = [&progress](const RunProgress& p) {
+    progress.show(p.done, p.total, fmt::format("{}, {:.1f} m", p.status, p.distance_m));
+  };
   const auto outcome = run(request, hooks);
   if (!outcome) return failure(outcome);
   if (outcome->interrupted)

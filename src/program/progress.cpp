@@ -28,12 +28,15 @@ Progress::~Progress() {
   if (line_open_) std::fputc('\n', stderr);
 }
 
-std::string Progress::time_left(int done, int total) const {
+std::string Progress::speed(int done, int total) const {
   const int here = done - first_;
-  if (here < 1 || total <= done) return "";
+  if (here < 1) return "";
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  std::string text = seconds > 0 ? fmt::format(", {:.1f} frames/s", here / seconds) : "";
+  if (total <= done) return text;
   const int left = static_cast<int>(std::lround(seconds / here * (total - done)));
-  return left >= 60 ? fmt::format(", {} min {:02d} s left", left / 60, left % 60) : fmt::format(", {} s left", left);
+  return text +
+         (left >= 60 ? fmt::format(", {} min {:02d} s left", left / 60, left % 60) : fmt::format(", {} s left", left));
 }
 
 void Progress::show(int done, int total, const std::string& note) {
@@ -46,7 +49,7 @@ void Progress::show(int done, int total, const std::string& note) {
     const int tenth = total > 0 ? 10 * done / total : done / 100;
     if (tenth == last_tenth_) return;
     last_tenth_ = tenth;
-    write(fmt::format("{}/{} {}{}\n", done, total, note, time_left(done, total)));
+    write(fmt::format("{}/{} {}{}\n", done, total, note, speed(done, total)));
     return;
   }
   const auto now = std::chrono::steady_clock::now();
@@ -55,7 +58,7 @@ void Progress::show(int done, int total, const std::string& note) {
   const int filled = total > 0 ? std::clamp(kBarWidth * done / total, 0, kBarWidth) : 0;
   write(fmt::format("\r[{}{}] {}/{} {}{}\033[K", std::string(static_cast<std::size_t>(filled), '#'),
                     std::string(static_cast<std::size_t>(kBarWidth - filled), '.'), done, total, note,
-                    time_left(done, total)));
+                    speed(done, total)));
   std::fflush(stderr);
   line_open_ = true;
 }

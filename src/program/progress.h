@@ -15,11 +15,12 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `total` is 0 if unknown.
+  /// `done` and `total` count frames; `total` is 0 if unknown.
   void show(int done, int total, const std::string& note);
 
  private:
-  std::string time_left(int done, int total) const;
+  /// ", 6.5 frames/s, 12 s left"
+  std::string speed(int done, int total) const;
 
   bool quiet_;
   bool terminal_;

@@ -98,7 +98,9 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   RunHooks hooks;
   hooks.log = context.log;
   hooks.should_stop = interrupted;
-  hooks.progress = [&progress](const RunProgress& p) { progress.show(p.done, p.announced, p.status); };
+  hooks.progress = [&progress](const RunProgress& p) {
+    progress.show(p.done, p.total, fmt::format("{}, {:.1f} m", p.status, p.distance_m));
+  };
   if (!arguments.truth.empty()) {
     if (const auto truth = load_truth(arguments.truth); !truth) return failure(truth);
   }

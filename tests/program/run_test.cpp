@@ -18,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::byte_stable_content;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using testing::ProgramLimits;
 using testing::ProgramResult;
@@ -122,6 +123,13 @@ TEST_F(Run, ResumedRunGivesTheSameBytesAfterAKill) {
     ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
     EXPECT_EQ(byte_stable_content(path(out)), whole) << "killed after " << share << " of the run";
   }
+}
+
+TEST_F(Run, ShowsItsProgressUpToTheLastFrameToProcess) {
+  const ProgramResult part = run("part", {"--max-frames", "5"});
+  ASSERT_EQ(part.exit_code, 0) << part.err;
+  EXPECT_THAT(part.err, ContainsRegex("1/5 tracking, 0.0 m"));
+  EXPECT_THAT(part.err, ContainsRegex("5/5 [a-z]+, [0-9.]+ m, [0-9.]+ frames/s"));
 }
 
 TEST_F(Run, ResumesWhereItWasInterrupted) {

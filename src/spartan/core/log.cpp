@@ -4,6 +4,7 @@
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 
+#include <cstdlib>
 #include <vector>
 
 namespace spartan {
@@ -29,6 +30,8 @@ std::shared_ptr<spdlog::sinks::sink> terminal_sink(LogLevel level) {
   auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
   sink->set_level(to_spdlog(level));
   sink->set_pattern("%^%l%$: %v");
+  const char* const no_colour = std::getenv("NO_COLOR");  // https://no-color.org
+  if (no_colour != nullptr && *no_colour != '\0') sink->set_color_mode(spdlog::color_mode::never);
   return sink;
 }
 

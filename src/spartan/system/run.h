@@ -28,9 +28,10 @@ struct RunRequest {
 };
 
 struct RunProgress {
-  int done = 0;        ///< frames processed
-  int announced = 0;   ///< stereo frames listed by the recording, over all pairs
-  std::string status;  ///< of the last frame: FrameRecord::status
+  int done = 0;           ///< frames of the odometry pair, missing ones included
+  int total = 0;          ///< those that the recording lists, at most RunRequest::max_frames
+  double distance_m = 0;  ///< path length of the odometry
+  std::string status;     ///< of the last frame: FrameRecord::status
 };
 
 /// Callbacks of a run.

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "spartan/core/trajectory.h"
 #include "spartan/system/internal/terrain_files.h"
 #include "spartan/system/map_files.h"
 
@@ -36,6 +38,8 @@ LocalizationRecord localization_record(const LocalizationEstimate& estimate) {
 
 Status RunLoop::begin() {
   pipeline_.store_maps_in(store_.tiles());
+  total_frames_ = static_cast<int>(source_.listed_stamps(pipeline_.odometry_pair()).size());
+  if (request_.max_frames > 0) total_frames_ = std::min(total_frames_, request_.max_frames);
   auto checkpoint = store_.checkpoint();
   if (!checkpoint) return failure(checkpoint);
   if (!*checkpoint) {
@@ -51,6 +55,9 @@ Status RunLoop::begin() {
                    folder_.store(), "run again into a new folder");
   }
   frames_ = static_cast<int>(frames->size());
+  const Trajectory so_far = trajectory_of(*frames, TrajectoryKind::odometry);
+  distance_m_ = path_length(so_far);
+  if (!so_far.empty()) last_position_ = so_far.back().pose.translation();
   for (const FrameRecord& frame : *frames) usable_frames_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, store_.tiles()); !status) return status;
   for (const FrameKey& key : pipeline_.pending_frames()) {
@@ -219,7 +226,12 @@ Status RunLoop::commit(const RunStore::Step& step) {
   Status status = store_.commit(step, save, {samples_taken_, source_.content_hash()}, elapsed());
   if (!step.frame) return status;
   ++frames_;
-  if (status && hooks_.progress) hooks_.progress({frames_, source_.info().sequence.announced, step.frame->status});
+  if (step.frame->has_pose) {
+    const Eigen::Vector3d& position = step.frame->world_from_body.pose.translation();
+    if (last_position_) distance_m_ += (position - *last_position_).norm();
+    last_position_ = position;
+  }
+  if (status && hooks_.progress) hooks_.progress({frames_, total_frames_, distance_m_, step.frame->status});
   return status;
 }
 

@@ -73,7 +73,10 @@ class RunLoop {
   std::vector<StageTime> view_times_;  // of views of a stop since the last frame of the odometry pair
   std::int64_t samples_taken_ = 0;     // number of samples read from the source
   int frames_ = 0;                     // frames of the odometry pair, missing ones included
-  int usable_frames_ = 0;              // frames of the odometry pair that were processed
+  int total_frames_ = 0;               // listed frames of the odometry pair, at most max_frames
+  double distance_m_ = 0;              // path length of the odometry
+  std::optional<Eigen::Vector3d> last_position_;
+  int usable_frames_ = 0;  // frames of the odometry pair that were processed
   std::string first_error_;
   bool stopped_ = false;
   bool complete_ = false;
