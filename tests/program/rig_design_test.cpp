@@ -313,7 +313,7 @@ TEST(RigDesign, BadInputIsNamed) {
   const auto refused =
       run_program({"rig", "design", folder.write("wrong.yaml", wrong), "-o", folder.path() + "/out", "--json"});
   EXPECT_EQ(refused.exit_code, 4);
-  EXPECT_EQ(refused.out, "");
+  EXPECT_THAT(refused.out, HasSubstr("\"exit_code\": 4"));
   EXPECT_THAT(refused.err, HasSubstr("wide.range_m: 'far' is not a number"));
   EXPECT_THAT(refused.err, HasSubstr("wide.candidates.widths_px: holds -780"));
   EXPECT_FALSE(std::filesystem::exists(folder.path() + "/out"));
