@@ -40,7 +40,8 @@ Result<LatticeWindow> window_of(const MapExportArguments& a, const GlobalMap& ma
 
 // The centres of the cells, in the colours of the image.
 PointCloud cloud_of(const MapView& view) {
-  const Image<Rgb8> colours = render_map(view.elevation_m, view.kind, view.cell_m);
+  const Image<Rgb8> colours =
+      render_map(view.elevation_m, view.kind, view.cell_m, elevation_colour_range(view.elevation_m, view.kind));
   PointCloud cloud;
   for (int r = 0; r < view.window.height; ++r) {
     for (int c = 0; c < view.window.width; ++c) {

@@ -403,34 +403,6 @@ std::optional<std::vector<double>> YamlMap::numbers(std::string_view key, const 
   return values;
 }
 
-std::string closest_name(std::string_view word, const std::vector<std::string>& names) {
-  const auto distance = [&](const std::string& name) {
-    // Rows of the table of distances between the first letters of both.
-    std::vector<std::vector<std::size_t>> d(word.size() + 1, std::vector<std::size_t>(name.size() + 1));
-    for (std::size_t i = 0; i <= word.size(); ++i) {
-      for (std::size_t k = 0; k <= name.size(); ++k) {
-        if (i == 0 || k == 0) {
-          d[i][k] = i + k;
-          continue;
-        }
-        d[i][k] = std::min({d[i - 1][k] + 1, d[i][k - 1] + 1, d[i - 1][k - 1] + (word[i - 1] == name[k - 1] ? 0 : 1)});
-        if (i > 1 && k > 1 && word[i - 1] == name[k - 2] && word[i - 2] == name[k - 1])
-          d[i][k] = std::min(d[i][k], d[i - 2][k - 2] + 1);
-      }
-    }
-    return d[word.size()][name.size()];
-  };
-  std::string closest;
-  std::size_t least = word.size() / 3 + 1;
-  for (const std::string& name : names) {
-    if (const std::size_t d = distance(name); d < least) {
-      least = d;
-      closest = name;
-    }
-  }
-  return closest;
-}
-
 bool YamlMap::rename(std::string_view old_key, std::string_view key) {
   const auto find = [&](std::string_view name) {
     return std::find_if(entries_.begin(), entries_.end(), [&](const auto& entry) { return entry.first == name; });

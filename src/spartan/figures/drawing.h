@@ -35,6 +35,9 @@ class Drawing {
 
   Drawing(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
 
+  /// Of the result: known late where text decides it.
+  void set_height(int height_px) { height_px_ = height_px; }
+
   void fill(Points corners, const Paint& paint) { parts_.emplace_back(Area{std::move(corners), paint}); }
   void line(Points points, const Pen& pen) { parts_.emplace_back(Line{std::move(points), pen}); }
   /// One line of text, anchored at `foot` on its baseline. ASCII and the degree sign.

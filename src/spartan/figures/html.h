@@ -15,8 +15,8 @@ std::string html_text(const std::string& text);
 /// "data:image/png;base64,…"; of no bytes where the image cannot be encoded.
 std::string data_url(ImageView<const Rgb8> image);
 
-/// A figure of an image, embedded as PNG, with a caption. The width on the page is that of the image, or less where
-/// there is less room. `below`: HTML under the image.
+/// A figure of an image, embedded as PNG, with a caption; the style of the page gives it its width. `below`: HTML under
+/// the image.
 std::string html_image(ImageView<const std::uint8_t> image, const std::string& caption, const std::string& below = "");
 std::string html_image(ImageView<const Rgb8> image, const std::string& caption, const std::string& below = "");
 

@@ -33,27 +33,32 @@ Part known_part(ImageView<const float> elevation_m) {
 
 }  // namespace
 
-Plot map_plot(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, const GeoTransform& place,
-              const std::string& title) {
-  const Part part = known_part(elevation_m);
-  const auto elevations = elevation_m.crop(part.x, part.y, part.width, part.height);
-  const auto kinds = kind.crop(part.x, part.y, part.width, part.height);
-  const double left_m = place.west_m + part.x * place.cell_m, top_m = place.north_m - part.y * place.cell_m;
+Plot ground_plot(Image<Rgb8> pixels, const GeoTransform& place, const std::string& title, const std::string& name) {
+  const int block = std::max(1, (pixels.width() + kMostPixels - 1) / kMostPixels);
+  if (block > 1) pixels = shrunk(pixels.view(), kMostPixels);  // without the blocks that are not complete
+  const double width_m = pixels.width() * block * place.cell_m, height_m = pixels.height() * block * place.cell_m;
+  const int scale = std::max(1, kWantedPixels / std::max({1, pixels.width(), pixels.height()}));
   Plot plot;
   plot.title = title;
   plot.x_label = "x, m";
   plot.y_label = "y, m";
   plot.equal_axes = true;
-  Image<Rgb8> pixels = render_map(elevations, kinds, place.cell_m);
-  const int block = std::max(1, (pixels.width() + kMostPixels - 1) / kMostPixels);
-  if (block > 1) pixels = shrunk(pixels.view(), kMostPixels);
-  const int scale = std::max(1, kWantedPixels / std::max({1, pixels.width(), pixels.height()}));
   plot.width_px = kPlotMargin_px + scale * pixels.width();
   plot.height_px = kPlotHeading_px + scale * pixels.height();
-  // Blocks that are not complete are cut off.
-  const double width_m = pixels.width() * block * place.cell_m, height_m = pixels.height() * block * place.cell_m;
-  plot.picture = PlotPicture{"elevation", std::move(pixels), {left_m, left_m + width_m}, {top_m - height_m, top_m}};
-  plot.colour_bar = ColourBar{"elevation, m", elevation_colour_range(elevations, kinds), elevation_colour};
+  plot.picture = PlotPicture{
+      name, std::move(pixels), {place.west_m, place.west_m + width_m}, {place.north_m - height_m, place.north_m}};
+  return plot;
+}
+
+Plot map_plot(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, const GeoTransform& place,
+              const std::string& title) {
+  const Part part = known_part(elevation_m);
+  const auto elevations = elevation_m.crop(part.x, part.y, part.width, part.height);
+  const auto kinds = kind.crop(part.x, part.y, part.width, part.height);
+  const Range range = elevation_colour_range(elevations, kinds);
+  const GeoTransform corner{place.west_m + part.x * place.cell_m, place.north_m - part.y * place.cell_m, place.cell_m};
+  Plot plot = ground_plot(render_map(elevations, kinds, place.cell_m, range), corner, title, "elevation");
+  plot.colour_bar = ColourBar{"elevation, m", range, elevation_colour};
   plot.keys = {{"obstacle", kObstacleColour}, {"cavity", kCavityColour}, {"unknown", kUnknownColour}};
   return plot;
 }

@@ -31,6 +31,11 @@ std::string grid(const PlotLayout& l) {
   return svg + "</g>\n";
 }
 
+std::string stroke_of(const PlotLine& line, double width_px) {
+  const std::string dash = line.dash_px > 0 ? fmt::format(" stroke-dasharray=\"{}\"", line.dash_px) : "";
+  return fmt::format("stroke=\"{}\" stroke-width=\"{}\"{}", hex(line.colour), width_px, dash);
+}
+
 // In units of the axes, with y down.
 std::string polyline(const PlotLine& line, std::size_t layer) {
   const std::size_t step = std::max<std::size_t>(1, (line.x.size() + kMostPoints - 1) / kMostPoints);
@@ -41,11 +46,9 @@ std::string polyline(const PlotLine& line, std::size_t layer) {
     if (known) path += fmt::format("{}{:.7g} {:.7g}", pen_down ? "L" : "M", line.x[i], -line.y[i]);
     pen_down = known;
   }
-  const std::string dash = line.dash_px > 0 ? fmt::format(" stroke-dasharray=\"{}\"", line.dash_px) : "";
   return fmt::format(
-      "<path class=\"line\" data-layer=\"{}\" d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"{} "
-      "vector-effect=\"non-scaling-stroke\"/>\n",
-      layer, path, hex(line.colour), line.width_px, dash);
+      "<path class=\"line\" data-layer=\"{}\" d=\"{}\" fill=\"none\" {} vector-effect=\"non-scaling-stroke\"/>\n",
+      layer, path, stroke_of(line, line.width_px));
 }
 
 std::string marker(const PlotMarker& m, const PlotLayout& l, std::size_t layer) {
@@ -55,8 +58,7 @@ std::string marker(const PlotMarker& m, const PlotLayout& l, std::size_t layer) 
                                 : std::string("<circle r=\"4\"/>");
   return fmt::format(
       "<g class=\"marker\" data-layer=\"{}\" data-x=\"{:.7g}\" data-y=\"{:.7g}\" transform=\"translate({:.1f} "
-      "{:.1f})\" "
-      "fill=\"{}\" stroke=\"#fff\">{}</g>\n",
+      "{:.1f})\" fill=\"{}\" stroke=\"#fff\">{}</g>\n",
       layer, m.x, m.y, l.px(m.x), l.py(m.y), hex(m.colour), shape);
 }
 
@@ -65,46 +67,38 @@ std::string scale_bar(const PlotLayout& l) {
   const double left = right - length_m / l.x.span() * l.width;
   return fmt::format(
       "<g class=\"scale\" data-right=\"{1:.1f}\" data-y=\"{2:.1f}\"><path d=\"M{0:.1f} "
-      "{3:.1f}V{2:.1f}H{1:.1f}V{3:.1f}\"/>"
-      "<text x=\"{4:.1f}\" y=\"{5:.1f}\" text-anchor=\"middle\">{6} m</text></g>\n",
+      "{3:.1f}V{2:.1f}H{1:.1f}V{3:.1f}\"/><text x=\"{4:.1f}\" y=\"{5:.1f}\" text-anchor=\"middle\">{6} m</text></g>\n",
       left, right, y, y - 6, (left + right) / 2, y - 8, internal::tick_text(length_m));
 }
 
-std::string key(const std::string& name, const std::string& sample, std::size_t layer) {
-  return fmt::format(
-      "<button type=\"button\" class=\"key\" aria-pressed=\"true\" data-layer=\"{}\"><svg viewBox=\"0 0 26 12\" "
-      "width=\"26\" height=\"12\" aria-hidden=\"true\">{}</svg>{}</button>\n",
-      layer, sample, html_text(name));
+std::string sample(const std::string& shape) {
+  return "<svg viewBox=\"0 0 26 12\" width=\"26\" height=\"12\" aria-hidden=\"true\">" + shape + "</svg>";
 }
 
-// Layers are numbered in this order: lines, markers, the picture. Markers of one name are one layer.
-std::string legend(const Plot& plot) {
+std::string layer_key(const std::string& name, const std::string& shape, std::size_t layer) {
+  return fmt::format("<button type=\"button\" class=\"key\" aria-pressed=\"true\" data-layer=\"{}\">{}{}</button>\n",
+                     layer, sample(shape), html_text(name));
+}
+
+std::string legend(const Plot& plot, const internal::PlotLayers& layers) {
   std::string html = "<div class=\"legend\">";
-  std::size_t layer = 0;
-  for (const PlotLine& line : plot.lines) {
-    const std::string dash = line.dash_px > 0 ? fmt::format(" stroke-dasharray=\"{}\"", line.dash_px) : "";
-    html += key(line.name,
-                fmt::format("<path d=\"M0 6H26\" stroke=\"{}\" stroke-width=\"{}\"{}/>", hex(line.colour),
-                            std::max(2.0, line.width_px), dash),
-                layer++);
+  for (std::size_t i = 0; i < plot.lines.size(); ++i) {
+    const PlotLine& line = plot.lines[i];
+    html +=
+        layer_key(line.name, fmt::format("<path d=\"M0 6H26\" {}/>", stroke_of(line, std::max(2.0, line.width_px))), i);
   }
   for (std::size_t i = 0; i < plot.markers.size(); ++i) {
+    if (i > 0 && layers.markers[i] == layers.markers[i - 1]) continue;
     const PlotMarker& m = plot.markers[i];
-    if (i > 0 && plot.markers[i - 1].name == m.name) continue;
-    html += key(m.name,
-                fmt::format("{} fill=\"{}\"/>",
-                            m.heading_rad ? "<path d=\"M22 6L5 0L9 6L5 12Z\"" : "<circle cx=\"13\" cy=\"6\" r=\"4\"",
-                            hex(m.colour)),
-                layer++);
+    const char* const shape = m.heading_rad ? "<path d=\"M22 6L5 0L9 6L5 12Z\"" : "<circle cx=\"13\" cy=\"6\" r=\"4\"";
+    html += layer_key(m.name, fmt::format("{} fill=\"{}\"/>", shape, hex(m.colour)), layers.markers[i]);
   }
-  if (plot.picture) {
-    html += key(plot.picture->name, "<rect x=\"3\" width=\"20\" height=\"12\" fill=\"#8a8478\"/>", layer++);
-  }
+  const auto box = [](const std::string& colour) {
+    return fmt::format("<rect x=\"3\" width=\"20\" height=\"12\" fill=\"{}\"/>", colour);
+  };
+  if (plot.picture) html += layer_key(plot.picture->name, box("#8a8478"), layers.picture);
   for (const ColourKey& k : plot.keys) {
-    html += fmt::format(
-        "<span class=\"key\"><svg viewBox=\"0 0 26 12\" width=\"26\" height=\"12\" aria-hidden=\"true\"><rect x=\"3\" "
-        "width=\"20\" height=\"12\" fill=\"{}\"/></svg>{}</span>\n",
-        hex(k.colour), html_text(k.name));
+    html += fmt::format("<span class=\"key\">{}{}</span>\n", sample(box(hex(k.colour))), html_text(k.name));
   }
   return html + "</div>\n";
 }
@@ -116,8 +110,7 @@ std::string to_html(const ColourBar& bar) {
   constexpr double kWidth = 240;
   std::string svg = fmt::format(
       "<svg class=\"bar\" viewBox=\"-20 0 280 30\" width=\"280\" height=\"30\" role=\"img\" aria-label=\"{}: colours "
-      "from "
-      "{:.3g} to {:.3g}\">",
+      "from {:.3g} to {:.3g}\">",
       html_text(bar.label), bar.range.low, bar.range.high);
   for (int i = 0; i < kSteps; ++i) {
     svg += fmt::format("<rect x=\"{:.1f}\" width=\"{:.1f}\" height=\"12\" fill=\"{}\"/>", i * kWidth / kSteps,
@@ -132,34 +125,29 @@ std::string to_html(const ColourBar& bar) {
 
 std::string to_html(const Plot& plot) {
   const PlotLayout l = internal::layout_of(plot, 10);
+  const internal::PlotLayers layers = internal::layers_of(plot);
   std::string html = fmt::format(
       "<figure class=\"plot\" style=\"max-width:{7:.0f}px\"{1}><figcaption>{2}</figcaption>\n{3}"
       "<svg class=\"chart\" viewBox=\"0 0 {0:.0f} {4:.0f}\" width=\"{0:.0f}\" height=\"{4:.0f}\" role=\"img\" "
       "aria-label=\"{2}; {5} over {6}\">\n",
-      l.total_width, plot.equal_axes ? " data-equal=\"1\"" : "", html_text(plot.title), legend(plot), l.total_height,
-      html_text(plot.y_label), html_text(plot.x_label),
+      l.total_width, plot.equal_axes ? " data-equal=\"1\"" : "", html_text(plot.title), legend(plot, layers),
+      l.total_height, html_text(plot.y_label), html_text(plot.x_label),
       plot.shown_px > 0 ? l.total_width * plot.shown_px / plot.width_px : l.total_width);
   html += grid(l);
   html += fmt::format(
       "<svg class=\"area\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" viewBox=\"{:.9g} {:.9g} {:.9g} "
       "{:.9g}\" preserveAspectRatio=\"none\">\n",
       l.left, l.top, l.width, l.height, l.x.low, -l.y.high, l.x.span(), l.y.span());
-  std::size_t layer = plot.lines.size();
-  std::string markers;
-  for (std::size_t i = 0; i < plot.markers.size(); ++i) {
-    if (i > 0 && plot.markers[i - 1].name != plot.markers[i].name) ++layer;
-    markers += marker(plot.markers[i], l, layer);
-  }
-  if (!plot.markers.empty()) ++layer;
   if (plot.picture) {
     const PlotPicture& p = *plot.picture;
     html += fmt::format(
         "<image data-layer=\"{}\" x=\"{:.7g}\" y=\"{:.7g}\" width=\"{:.7g}\" height=\"{:.7g}\" "
         "preserveAspectRatio=\"none\" href=\"{}\"/>\n",
-        layer, p.x.low, -p.y.high, p.x.span(), p.y.span(), data_url(p.pixels.view()));
+        layers.picture, p.x.low, -p.y.high, p.x.span(), p.y.span(), data_url(p.pixels.view()));
   }
   for (std::size_t i = 0; i < plot.lines.size(); ++i) html += polyline(plot.lines[i], i);
-  html += "</svg>\n" + markers;
+  html += "</svg>\n";
+  for (std::size_t i = 0; i < plot.markers.size(); ++i) html += marker(plot.markers[i], l, layers.markers[i]);
   if (plot.equal_axes) html += scale_bar(l);
   html += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", l.left + l.width / 2,
                       l.total_height - 8, html_text(plot.x_label));

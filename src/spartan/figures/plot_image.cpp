@@ -138,28 +138,21 @@ double draw_colour_bar(Drawing& d, const ColourBar& bar, double top) {
 
 Image<Rgb8> to_image(const Plot& plot) {
   const PlotLayout l = internal::layout_of(plot, kAbove_px);
-  // The height of the legend is known when it is drawn.
-  const auto draw = [&](Drawing& d) {
-    d.text({12, 22}, plot.title, {kInk, 16});
-    draw_axes(d, plot, l);
-    if (plot.picture) {
-      const PlotPicture& p = *plot.picture;
-      d.picture({l.px(p.x.low), l.py(p.y.high)}, {l.px(p.x.high), l.py(p.y.low)},
-                Image<Rgb8>::copy_of(p.pixels.view()));
-    }
-    for (const PlotLine& line : plot.lines) draw_line(d, line, l);
-    for (const PlotMarker& m : plot.markers) draw_marker(d, m, {l.px(m.x), l.py(m.y)});
-    d.line(box(l.left, l.top, l.left + l.width, l.top + l.height), {kFrame, 1});
-    if (plot.equal_axes) draw_scale_bar(d, l);
-    double bottom = draw_legend(d, plot, l);
-    if (plot.colour_bar) bottom = draw_colour_bar(d, *plot.colour_bar, bottom + 6);
-    return static_cast<int>(std::ceil(bottom));
-  };
-  const int width = static_cast<int>(std::lround(l.total_width));
-  Drawing measured(width, 1);
-  Drawing drawing(width, draw(measured));
-  draw(drawing);
-  return drawing.to_image();
+  Drawing d(static_cast<int>(std::lround(l.total_width)), 0);
+  d.text({12, 22}, plot.title, {kInk, 16});
+  draw_axes(d, plot, l);
+  if (plot.picture) {
+    const PlotPicture& p = *plot.picture;
+    d.picture({l.px(p.x.low), l.py(p.y.high)}, {l.px(p.x.high), l.py(p.y.low)}, Image<Rgb8>::copy_of(p.pixels.view()));
+  }
+  for (const PlotLine& line : plot.lines) draw_line(d, line, l);
+  for (const PlotMarker& m : plot.markers) draw_marker(d, m, {l.px(m.x), l.py(m.y)});
+  d.line(box(l.left, l.top, l.left + l.width, l.top + l.height), {kFrame, 1});
+  if (plot.equal_axes) draw_scale_bar(d, l);
+  double bottom = draw_legend(d, plot, l);
+  if (plot.colour_bar) bottom = draw_colour_bar(d, *plot.colour_bar, bottom + 6);
+  d.set_height(static_cast<int>(std::ceil(bottom)));
+  return d.to_image();
 }
 
 }  // namespace spartan

@@ -84,6 +84,17 @@ PlotLayout layout_of(const Plot& plot, double top_px) {
   return layout;
 }
 
+PlotLayers layers_of(const Plot& plot) {
+  PlotLayers layers;
+  std::size_t layer = plot.lines.size();
+  for (std::size_t i = 0; i < plot.markers.size(); ++i) {
+    if (i > 0 && plot.markers[i - 1].name != plot.markers[i].name) ++layer;
+    layers.markers.push_back(layer);
+  }
+  layers.picture = plot.markers.empty() ? layer : layer + 1;
+  return layers;
+}
+
 double scale_bar_m(const PlotLayout& layout) {
   const double most = layout.x.span() / 3;
   const double step = tick_step(most, 1);

@@ -1,6 +1,7 @@
 // Ranges, ticks and places of the parts of a plot, shared by its outputs.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,14 @@ struct PlotLayout {
 };
 /// `top_px`: height of what is above the data.
 PlotLayout layout_of(const Plot& plot, double top_px);
+
+/// Layers of a plot that can be switched: first the lines, then the markers, those of one name in a row together, then
+/// the picture.
+struct PlotLayers {
+  std::vector<std::size_t> markers;  ///< of each marker
+  std::size_t picture = 0;
+};
+PlotLayers layers_of(const Plot& plot);
 
 /// Length in metres of a scale bar of at most a third of the width.
 double scale_bar_m(const PlotLayout& layout);

@@ -72,8 +72,8 @@ void draw_curve(cv::Mat& image, const std::vector<cv::Point>& curve, Rgb8 colour
 
 }  // namespace
 
-Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m) {
-  const Range range = elevation_colour_range(elevation_m, kind);
+Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m,
+                       const Range& range_m) {
   Image<Rgb8> image(elevation_m.size());
   for (int y = 0; y < elevation_m.height(); ++y) {
     for (int x = 0; x < elevation_m.width(); ++x) {
@@ -88,7 +88,7 @@ Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const Groun
             colour = lit(kCavity, 0.5 * (kLevelLight + light));
             break;
           default:
-            colour = lit(elevation_colour((elevation_m(x, y) - range.low) / range.span()), light);
+            colour = lit(elevation_colour((elevation_m(x, y) - range_m.low) / range_m.span()), light);
         }
       }
       image(x, y) = colour;

@@ -42,7 +42,7 @@ TEST(MapPictures, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreLight) {
   elevation(8, 0) = std::numeric_limits<float>::quiet_NaN();
   kind(4, 1) = GroundClass::obstacle;
   kind(2, 1) = GroundClass::cavity;
-  const Image<Rgb8> image = render_map(elevation, kind, 0.05);
+  const Image<Rgb8> image = render_map(elevation, kind, 0.05, elevation_colour_range(elevation, kind));
   EXPECT_EQ(image.width(), 9);
   const auto at = [&](int x, int y) { return image(x, y); };
   EXPECT_GT(at(1, 1).g, at(7, 1).g) << "the light comes from the upper left";

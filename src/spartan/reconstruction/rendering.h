@@ -20,11 +20,12 @@ Image<Rgb8> colour_disparity(ImageView<const float> disparity);
 Rgb8 elevation_colour(double value);
 inline constexpr Rgb8 kObstacleColour{220, 50, 40}, kCavityColour{40, 90, 230}, kUnknownColour{236, 233, 228};
 /// The 2nd to the 98th percentile of the elevations of the ground (of all cells where there is none), at least 5 cm:
-/// what the colours of render_map() span.
+/// what the colours of a map span.
 Range elevation_colour_range(ImageView<const float> elevation_m, ImageView<const GroundClass> kind);
-/// Elevations in colour, lit from the upper left; obstacles are red, cavities blue, unknown cells light gray. A pixel
-/// for each cell. `kind` as LocalMap::kind.
-Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m);
+/// Elevations in colours that span `range_m`, lit from the upper left; obstacles are red, cavities blue, unknown cells
+/// light gray. A pixel for each cell. `kind` as LocalMap::kind.
+Image<Rgb8> render_map(ImageView<const float> elevation_m, ImageView<const GroundClass> kind, double cell_m,
+                       const Range& range_m);
 
 /// The left image with the ground tinted green, obstacles red and cavities blue; unknown pixels stay gray.
 Image<Rgb8> render_classes(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> classes);

@@ -105,8 +105,10 @@ Result<std::string> make_report(ReportRequest request) {
   const std::string masks = std::filesystem::path(info.rig_source).parent_path().string();
   auto imager = Imager::create(info.rig, request.options.imaging, ThreadPool(request.threads), masks);
   if (!imager) return failure(imager);
-  auto map = global_map_plot(request.run);
-  if (!map) return failure(map);
+  auto global_map = global_map_figures(request.run, *store, heading_east);
+  if (!global_map) return failure(global_map);
+  const auto local_maps = local_map_figures(request.run, *store, heading_east);
+  if (!local_maps) return failure(local_maps);
   const auto numbers = key_numbers(summary, request);
   if (!numbers) return failure(numbers);
 
@@ -114,9 +116,10 @@ Result<std::string> make_report(ReportRequest request) {
   header += *numbers + lost_text(summary);
   const Section sections[] = {
       {"Images", image_section(**source, *imager)},
-      {"Trajectories", trajectory_section({request.run, request.truth, *frames, std::move(*map), heading_east})},
+      {"Trajectories",
+       trajectory_section({request.run, request.truth, *frames, std::move(global_map->map), heading_east})},
       {"Terrain", terrain_section(**source, *imager, request.run, *store)},
-      {"Maps", map_section(request.run, heading_east)},
+      {"Maps", global_map->coverage + *local_maps},
       {"Sensors", summary["health"]["localization"].empty() ? std::string() : sensor_tables(summary, *frames)},
       {"Truth", request.whole_truth ? truth_section(**source, *imager, request) : std::string()},
       {"Cameras", rig_section(info.rig)},

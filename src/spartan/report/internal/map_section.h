@@ -1,4 +1,4 @@
-// The report's section on maps: local maps of stops and keyframes, coverage of the global map.
+// The report's section on maps: the global map, how often its cells were observed, local maps of stops and keyframes.
 #pragma once
 
 #include <optional>
@@ -6,15 +6,20 @@
 
 #include "spartan/core/result.h"
 #include "spartan/figures/plot.h"
+#include "spartan/system/run_store.h"
 
 namespace spartan::internal {
 
-/// The global map of a run; none if it is empty or too large for one image (GlobalMap::kMostCells). Codes: those of
-/// SavedMap::open() and GlobalMap::view().
-Result<std::optional<Plot>> global_map_plot(const std::string& run);
+/// The global map of a run.
+struct GlobalMapFigures {
+  std::optional<Plot> map;  ///< none where it is empty or too large for one image (GlobalMap::kMostCells)
+  std::string coverage;     ///< HTML: the number of points in each cell, or why there is no image; empty without a map
+};
+/// `heading_east`: whether x of the world is east, by a compass. Codes: those of SavedMap::open() and
+/// GlobalMap::view().
+Result<GlobalMapFigures> global_map_figures(const std::string& run, RunStore& store, bool heading_east);
 
-/// At most six local maps over the drive, and how often each cell of the global map was observed; empty without maps.
-/// `heading_east`: whether x of the world is east, by a compass.
-Result<std::string> map_section(const std::string& run, bool heading_east);
+/// At most six local maps over the drive; empty without maps.
+Result<std::string> local_map_figures(const std::string& run, RunStore& store, bool heading_east);
 
 }  // namespace spartan::internal

@@ -14,7 +14,7 @@
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/eval/trajectory_metrics.h"
-#include "spartan/figures/html.h"
+#include "spartan/report/internal/page_parts.h"
 #include "spartan/report/report.h"
 #include "spartan/system/run_folder.h"
 
@@ -126,8 +126,8 @@ std::string consistency_text(const ErrorSeries& s) {
     return fmt::format("<p>{}: the error stays within its 3σ in all {} frames compared.</p>\n", s.name, compared);
   return fmt::format(
       "<p class=\"warning\">{}: the error leaves its 3σ in {} of {} frames ({:.1f} %), first after {:.2f} m, by up to "
-      "{:.1f} "
-      "times 3σ. There the stated uncertainty is too small, or the true attitude of the first pose, to which all is "
+      "{:.1f} times 3σ. There the stated uncertainty is too small, or the true attitude of the first pose, to which "
+      "all is "
       "aligned, is inaccurate.</p>\n",
       s.name, beyond, compared, 100.0 * beyond / compared, first_m, most);
 }
@@ -177,18 +177,16 @@ std::string alignment_text(Alignment alignment) {
   return alignment == Alignment::first ? "first poses aligned" : "SE3 alignment";
 }
 
-// The rover at the end of the trajectory.
-PlotMarker rover_at(const StampedPose& last) {
-  const Eigen::Vector3d at = last.pose.translation(), ahead = last.pose.rotation() * Eigen::Vector3d::UnitX();
-  return {"rover at the end", {20, 20, 20}, at.x(), at.y(), std::atan2(ahead.y(), ahead.x())};
-}
-
-Plot empty_track_plot(bool heading_east) {
-  Plot plot;
-  plot.title = "Trajectories from above";
+// What the trajectories are drawn on: the global map, if there is one.
+Plot ground_of(std::optional<Plot> map, bool heading_east) {
+  const bool on_map = map.has_value();
+  Plot plot = on_map ? std::move(*map) : Plot();
+  plot.title = on_map ? "Trajectories on the global map" : "Trajectories from above";
   plot.equal_axes = true;
-  plot.x_label = heading_east ? "x (east), m" : "x (start heading), m";
-  plot.y_label = heading_east ? "y (north), m" : "y, m";
+  name_world_axes(plot, heading_east);
+  plot.width_px = 740;
+  plot.height_px = 560;
+  plot.shown_px = 1040;
   return plot;
 }
 
@@ -197,25 +195,15 @@ Plot empty_track_plot(bool heading_east) {
 Result<std::string> trajectory_section(TrajectorySectionInput input) {
   const auto rig = read_rig_yaml(RunFolder{input.run}.rig());
   if (!rig) return failure(rig);
-  Plot tracks = empty_track_plot(input.heading_east);
-  if (input.map) {
-    Plot& map = *input.map;
-    tracks.title = "Trajectories on the global map";
-    tracks.picture = std::move(map.picture);
-    tracks.colour_bar = map.colour_bar;
-    tracks.keys = map.keys;
-  }
-  tracks.width_px = 740;
-  tracks.height_px = 560;
-  tracks.shown_px = 1040;
+  Plot tracks = ground_of(std::move(input.map), input.heading_east);
   std::vector<ErrorSeries> errors;
-  std::string aligned;
+  Alignment alignment = Alignment::first;
   for (const Kind& kind : kKinds) {
     if (!has_trajectory(input.frames, kind.kind)) continue;
     const Trajectory poses = trajectory_of(input.frames, kind.kind);
     if (poses.empty()) continue;
     tracks.lines.push_back(track(poses, Pose(), PoseConvention::body, std::string(name_of(kind.kind)), kind.colour));
-    tracks.markers = {rover_at(poses.back())};
+    tracks.markers = {rover_marker("rover at the end", poses.back().pose)};
     if (input.truth.empty()) continue;
     const auto compared = find_trajectories(input.run, input.truth, std::string(name_of(kind.kind)));
     if (!compared) return failure(compared);
@@ -223,7 +211,7 @@ Result<std::string> trajectory_section(TrajectorySectionInput input) {
     const auto metrics = metrics_since_start(*compared);
     if (!metrics) return failure(metrics);
     const Pose& truth_from_estimate = metrics->truth_from_estimate.pose;
-    aligned = alignment_text(metrics->alignment);
+    alignment = metrics->alignment;
     if (errors.empty()) {
       tracks.lines.insert(tracks.lines.begin(),
                           track(while_estimated(compared->truth, compared->estimate), truth_from_estimate.inverse(),
@@ -231,17 +219,17 @@ Result<std::string> trajectory_section(TrajectorySectionInput input) {
     }
     ErrorSeries series = errors_of(kind, *compared, truth_from_estimate, input.frames);
     // A fit to the whole trajectory says nothing of what accumulates since the start.
-    if (metrics->alignment != Alignment::first) std::fill(series.bound_m.begin(), series.bound_m.end(), kNone);
+    if (alignment != Alignment::first) std::fill(series.bound_m.begin(), series.bound_m.end(), kNone);
     errors.push_back(std::move(series));
   }
   std::string html = to_html(tracks);
   if (errors.empty()) return html;
-  html += to_html(error_plot(errors, aligned));
+  html += to_html(error_plot(errors, alignment_text(alignment)));
   for (const ErrorSeries& s : errors) html += consistency_text(s);
-  return html + fmt::format("<p>Truth and errors in these plots: {}.{}</p>\n", aligned,
-                            aligned == alignment_text(Alignment::first)
-                                ? " The covariances are relative to the start."
-                                : " The truth has no attitude: errors since the start, and their 3σ, need one.");
+  return html + fmt::format("<p>Truth and errors in these plots: {}. {}</p>\n", alignment_text(alignment),
+                            alignment == Alignment::first
+                                ? "The covariances are relative to the start."
+                                : "The truth has no attitude: errors since the start, and their 3σ, need one.");
 }
 
 }  // namespace spartan::internal

@@ -14,12 +14,12 @@
 #include "spartan/figures/map_plot.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "spartan/reconstruction/rendering.h"
+#include "spartan/report/internal/page_parts.h"
 #include "spartan/storage/geotiff.h"
 
 namespace spartan::internal {
 namespace {
 
-constexpr int kTruthImageWidth_px = 440;
 constexpr double kErrorScale_px = 2;
 
 std::string percent(std::optional<double> value) {
@@ -60,11 +60,11 @@ Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoP
   const auto scores = compare_disparities(image->disparity, *truth, *mask);
   if (!scores) return failure(scores);
   std::string html =
-      html_image(shrunk(left.view(), kTruthImageWidth_px), fmt::format("{} pair, left camera, rectified", pair.name));
-  html += html_image(shrunk(colour_disparity(image->disparity).view(), kTruthImageWidth_px),
+      html_image(shrunk(left.view(), kPageImage_px), fmt::format("{} pair, left camera, rectified", pair.name));
+  html += html_image(shrunk(colour_disparity(image->disparity).view(), kPageImage_px),
                      "Disparity: near is red, far is blue, unknown is black",
                      to_html(ColourBar{"disparity, px", disparity_colour_range(image->disparity), disparity_colour}));
-  html += html_image(shrunk(error_image(image->disparity, *truth).view(), kTruthImageWidth_px),
+  html += html_image(shrunk(error_image(image->disparity, *truth).view(), kPageImage_px),
                      "Disparity error; unknown is gray",
                      to_html(ColourBar{"error, px", {-kErrorScale_px, kErrorScale_px}, cold_to_hot}));
   std::vector<std::vector<std::string>> rows{
