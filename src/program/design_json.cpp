@@ -1,4 +1,8 @@
 // A rig design as JSON.
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "program/design_report.h"
 #include "program/json.h"
 
@@ -44,6 +48,7 @@ Json pair_json(const PairDesign& design) {
   json["best"] = or_null(design.best());
   json["equally_good"] = design.equally_good;
   json["best_with_pan_overlap"] = or_null(design.best_with_pan_overlap ? &*design.best_with_pan_overlap : nullptr);
+  json["nearest"] = or_null(design.nearest ? &*design.nearest : nullptr);
   json["published"] = published_json(design);
   json["nearest_to_a_limit"] = number(design.smallest_limit_distance);
   return json;
@@ -59,9 +64,11 @@ Json sectors_json(const AzimuthSet& set) {
 class GroundJson {
  public:
   explicit GroundJson(const RigDesign& design) {
-    const char* no_pair = design.wide.selected() ? nullptr : "no wide pair is feasible or published";
-    const char* no_narrow = design.narrow ? "no narrow pair is feasible or published" : "there is no narrow pair";
-    add("view_overlap_m", number(design.view_overlap_m), no_pair ? no_pair : no_narrow);
+    const auto none = std::find_if(design.pairs.begin(), design.pairs.end(),
+                                   [](const PairDesign& pair) { return pair.selected() == nullptr; });
+    const std::string no_pair =
+        none == design.pairs.end() ? "" : fmt::format("no {} pair is feasible or published", none->name);
+    add("view_overlap_m", number(design.view_overlap_m), no_pair.empty() ? "there is only one pair" : no_pair);
     if (design.pans) {
       add_pans(*design.pans);
       return;
@@ -69,7 +76,7 @@ class GroundJson {
     for (const char* key : {"pan_overlap_percent", "pan_overlap_far_percent", "pan_overlap_far_stereo_percent",
                             "azimuth_far_deg", "azimuth_far_stereo_deg", "azimuth_held_from_m", "azimuth_held_to_m",
                             "azimuth_far_sectors_deg", "azimuth_far_stereo_sectors_deg"}) {
-      add(key, nullptr, no_pair ? no_pair : "no pans are required");
+      add(key, nullptr, no_pair.empty() ? "no pans are required" : no_pair);
     }
   }
   const Json& figures() const { return figures_; }
@@ -94,7 +101,7 @@ class GroundJson {
     add("azimuth_far_stereo_sectors_deg", sectors_json(pans.azimuth_far_stereo));
   }
 
-  void add(const char* key, const Json& figure, const char* why_null = "it is not finite") {
+  void add(const char* key, const Json& figure, const std::string& why_null = "it is not finite") {
     figures_[key] = figure;
     if (figure.is_null()) reasons_[key] = why_null;
   }
@@ -171,16 +178,16 @@ void add_pair(Pieces& pieces, const PairDesign& design, bool whole_set) {
 Status write_design_json(const RigDesign& design, bool whole_set,
                          const std::function<Status(const std::string&)>& write) {
   Pieces pieces(write);
-  pieces.add("{\n  \"schema\": 1,\n  \"wide\": ");
-  add_pair(pieces, design.wide, whole_set);
-  pieces.add(",\n  \"narrow\": ");
-  if (design.narrow) {
-    add_pair(pieces, *design.narrow, whole_set);
-  } else {
-    pieces.add("null");
+  pieces.add("{\n  \"schema\": 1");
+  Json names = Json::array();
+  for (const PairDesign& pair : design.pairs) {
+    names.push_back(pair.name);
+    pieces.add(",\n  " + text_of(Json(pair.name)) + ": ");
+    add_pair(pieces, pair, whole_set);
   }
   const GroundJson ground(design);
   Json rest = ground.figures();
+  rest["pairs"] = names;
   rest["reasons"] = ground.reasons();
   rest["warnings"] = warnings_json(design);
   // Its members go on where those above end: without its opening brace.

@@ -50,13 +50,12 @@ std::string name_of(DesignCriterion criterion) {
   return "";
 }
 
-std::string pair_text(const std::string& name, const PairRequirements& required, const PairDesign& design,
-                      std::size_t rows) {
+std::string pair_text(const PairRequirements& required, const PairDesign& design, std::size_t rows) {
   std::vector<std::string> order;
   order.reserve(required.order.size());
   for (const DesignCriterion criterion : required.order) order.push_back(name_of(criterion));
-  std::string text =
-      fmt::format("{} pair: {} of {} combinations are feasible", name, design.feasible.size(), design.combinations);
+  std::string text = fmt::format("{} pair: {} of {} combinations are feasible", required.name, design.feasible.size(),
+                                 design.combinations);
   if (design.with_pan_overlap_count) {
     text += fmt::format("; with neighbouring pans that overlap by at least {} %: {}",
                         required.pans->smallest_overlap_percent, *design.with_pan_overlap_count);
@@ -77,8 +76,10 @@ std::string pair_text(const std::string& name, const PairRequirements& required,
   }
   if (const PairMetrics* best = design.best()) text += row("best", *best);
   if (design.best_with_pan_overlap) text += row("best + overlap", *design.best_with_pan_overlap);
+  if (design.nearest) text += row("nearest", *design.nearest);
   if (design.published) text += row("published", *design.published);
   if (const PairMetrics* best = design.best()) text += "margins of the best: " + margins_of(*best) + "\n";
+  if (design.nearest) text += "margins of the nearest candidate: " + margins_of(*design.nearest) + "\n";
   if (design.best_with_pan_overlap) {
     text += "margins of the best with enough overlap: " + margins_of(*design.best_with_pan_overlap) + "\n";
   }
@@ -93,7 +94,8 @@ std::string pair_text(const std::string& name, const PairRequirements& required,
 std::string ground_text(const RigDesign& design) {
   std::string text;
   if (design.view_overlap_m)
-    text += fmt::format("ground seen by both pairs, middle column: {:.2f} m\n", *design.view_overlap_m);
+    text += fmt::format("ground seen by {} pairs, middle column: {:.2f} m\n", design.pairs.size() == 2 ? "both" : "all",
+                        *design.view_overlap_m);
   if (!design.pans) return text;
   const PanCoverage& pans = *design.pans;
   if (pans.overlap) text += describe_overlaps(pans) + "\n";
@@ -108,8 +110,8 @@ std::string ground_text(const RigDesign& design) {
 }  // namespace
 
 std::string design_text(const RigRequirements& requirements, const RigDesign& design, std::size_t rows) {
-  std::string text = pair_text("wide", requirements.wide, design.wide, rows);
-  if (design.narrow) text += pair_text("narrow", *requirements.narrow, *design.narrow, rows);
+  std::string text;
+  for (std::size_t i = 0; i < design.pairs.size(); ++i) text += pair_text(requirements.pairs[i], design.pairs[i], rows);
   text += ground_text(design);
   if (!design.warnings.empty()) text += "\nwarnings:\n";
   for (const DesignWarning& warning : design.warnings) text += fmt::format("  {}: {}\n", warning.id, warning.text);
@@ -121,19 +123,17 @@ std::string design_csv(const RigDesign& design) {
       "pair,rank,baseline_m,nearest_m,hfov_deg,width_px,pixel_size_um,focal_length_mm,range_m,stereo_angle_deg,search_"
       "percent,"
       "pan_overlap_percent,enough_pan_overlap,tilt_deg,view_near_m,view_far_m\n";
-  const auto add = [&](const char* name, const PairDesign& pairs) {
+  for (const PairDesign& pairs : design.pairs) {
     std::size_t rank = 0;
     for (const PairMetrics& pair : pairs.feasible) {
-      text += fmt::format("{},{},{},{},{},{},{},{:.4f},{:.6f},{:.5f},{:.5f},{},{},{},{:.5f},{:.5f}\n", name, ++rank,
-                          pair.parameters.baseline_m, pair.parameters.nearest_m, pair.parameters.hfov_deg,
+      text += fmt::format("{},{},{},{},{},{},{},{:.4f},{:.6f},{:.5f},{:.5f},{},{},{},{:.5f},{:.5f}\n", pairs.name,
+                          ++rank, pair.parameters.baseline_m, pair.parameters.nearest_m, pair.parameters.hfov_deg,
                           pair.parameters.width_px, pair.parameters.pixel_size_um, pair.focal_length_mm, pair.range_m,
                           pair.stereo_angle_deg, pair.search_percent,
                           std::isnan(pair.pan_overlap_percent) ? "" : fmt::format("{:.5f}", pair.pan_overlap_percent),
                           pair.with_pan_overlap ? 1 : 0, pair.tilt_deg, pair.view_near_m, pair.view_far_m);
     }
-  };
-  add("wide", design.wide);
-  if (design.narrow) add("narrow", *design.narrow);
+  }
   return text;
 }
 

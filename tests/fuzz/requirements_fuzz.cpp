@@ -11,11 +11,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!requirements) return 0;
   // A design search with accepted requirements must give finite values.
   constexpr std::size_t kMaxCombinations = 5000;
-  if (requirements->wide.lists.combinations() > kMaxCombinations) return 0;
-  if (requirements->narrow && requirements->narrow->lists.combinations() > kMaxCombinations) return 0;
+  for (const spartan::PairRequirements& pair : requirements->pairs) {
+    if (pair.lists.combinations() > kMaxCombinations) return 0;
+  }
   const spartan::RigDesign design = spartan::design_rig(*requirements);
-  if (design.wide.feasible.size() > design.wide.combinations) __builtin_trap();
-  for (const spartan::PairMetrics& pair : design.wide.feasible) {
+  if (design.pairs[0].feasible.size() > design.pairs[0].combinations) __builtin_trap();
+  for (const spartan::PairMetrics& pair : design.pairs[0].feasible) {
     if (!std::isfinite(pair.range_m) || !std::isfinite(pair.view_near_m) || !std::isfinite(pair.view_far_m))
       __builtin_trap();
   }

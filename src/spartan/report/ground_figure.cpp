@@ -13,26 +13,42 @@ using namespace internal;
 
 namespace {
 
-void draw_legend(Drawing& drawing, double y_px, bool pans, bool narrow) {
+void draw_legend(Drawing& drawing, double y_px, const std::vector<DrawnPair>& pairs, bool pans) {
   struct Entry {
     Rgb8 colour;
     double opacity;
-    const char* text;
-    bool shown;
+    std::string text;
   };
-  const Entry entries[] = {{kWideOneCamera, 1, "wide, one camera only", true},
-                           {kWideBoth, 1, "wide, both cameras", true},
-                           {kWideTwice, 1, "wide, from two pans", pans},
-                           {kNarrow, 0.45, "narrow, both cameras", narrow},
-                           {kUnseen, 1, "required, not seen", pans}};
+  const std::string& first = pairs.front().name;
+  std::vector<Entry> entries{{kWideOneCamera, 1, first + ", one camera only"},
+                             {kWideBoth, 1, first + ", both cameras"}};
+  if (pans) entries.push_back({kWideTwice, 1, first + ", from two pans"});
+  for (std::size_t i = 1; i < pairs.size(); ++i)
+    entries.push_back({pairs[i].colour, 0.45, pairs[i].name + ", both cameras"});
+  if (pans) entries.push_back({kUnseen, 1, "required, not seen"});
   double x = kMargin_px;
   for (const Entry& entry : entries) {
-    if (!entry.shown) continue;
     drawing.fill({{x, y_px}, {x + 22, y_px}, {x + 22, y_px + 14}, {x, y_px + 14}}, {entry.colour, entry.opacity});
     drawing.line(closed({{x, y_px}, {x + 22, y_px}, {x + 22, y_px + 14}, {x, y_px + 14}}), {kFaint, 0.8});
     drawing.text({x + 30, y_px + 12}, entry.text, {kInk, 14});
     x += 230;
   }
+}
+
+// The pair with pans first. Pairs without a selection are not drawn.
+std::vector<DrawnPair> drawn_pairs(const RigRequirements& requirements, const RigDesign& design) {
+  std::vector<DrawnPair> pairs;
+  const std::size_t first = requirements.panned();
+  const PairMetrics* const primary = design.pairs[first].selected();
+  if (primary == nullptr) return pairs;
+  pairs.push_back({design.pairs[first].name, kWide, requirements.pairs[first], *primary});
+  for (std::size_t i = 0; i < design.pairs.size(); ++i) {
+    const PairMetrics* const pair = design.pairs[i].selected();
+    if (i == first || pair == nullptr) continue;
+    pairs.push_back(
+        {design.pairs[i].name, kOtherPairs[(pairs.size() - 1) % kOtherPairs.size()], requirements.pairs[i], *pair});
+  }
+  return pairs;
 }
 
 std::string caption(const DrawnPair& pair) {
@@ -46,12 +62,9 @@ std::string caption(const DrawnPair& pair) {
 }  // namespace
 
 std::optional<GroundFigure> draw_ground(const RigRequirements& requirements, const RigDesign& design) {
-  const PairMetrics* wide = design.wide.selected();
-  if (!wide) return std::nullopt;
+  const std::vector<DrawnPair> pairs = drawn_pairs(requirements, design);
+  if (pairs.empty()) return std::nullopt;
   constexpr Lettering kTitle{kInk, 22};
-  std::vector<DrawnPair> pairs{{"wide", kWide, requirements.wide, *wide}};
-  const PairMetrics* narrow = design.narrow ? design.narrow->selected() : nullptr;
-  if (narrow) pairs.push_back({"narrow", kNarrow, *requirements.narrow, *narrow});
 
   // Drawn once to find the height.
   const auto draw_on = [&](Drawing& drawing) {
@@ -63,7 +76,7 @@ std::optional<GroundFigure> draw_ground(const RigRequirements& requirements, con
     if (design.pans && design.pans->overlap) {
       drawing.text({kMargin_px, y += 16}, describe_overlaps(*design.pans, "°"), {kInk, 14});
     }
-    draw_legend(drawing, y += 18, design.pans.has_value(), narrow != nullptr);
+    draw_legend(drawing, y += 18, pairs, design.pans.has_value());
     return static_cast<int>(std::ceil(y)) + 34;
   };
   Drawing endless(kWidth_px, 1);

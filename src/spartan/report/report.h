@@ -58,7 +58,8 @@ struct GroundFigure {
   std::string svg;
   Image<Rgb8> image;
 };
-/// Of the selected pairs (PairDesign::selected); none where there is no wide pair to draw.
+/// Of the selected pairs (PairDesign::selected); none where the pair with pans (the first one without pans) has no
+/// selection.
 std::optional<GroundFigure> draw_ground(const RigRequirements& requirements, const RigDesign& design);
 
 /// The row errors of a pair before and after correction: both images of one frame side by side, in three strips from

@@ -1,9 +1,12 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <tuple>
+#include <vector>
 
 #include "spartan/core/pose.h"
 #include "spartan/rig_design/internal/stereo_relations.h"
@@ -34,10 +37,41 @@ struct PairContext {
 
 // --- the search ---
 
+// Which limits no combination meets by itself, and what the nearest one violates, by how much.
+std::string why_nothing(const PairContext& c) {
+  const PairRequirements& required = c.requirements;
+  const LimitCounts& meeting = c.design.meeting;
+  std::vector<std::string> never;
+  if (meeting.range == 0) never.push_back(fmt::format("a range of {} m", required.range_m));
+  if (meeting.stereo_angle == 0)
+    never.push_back(fmt::format("a stereo angle of at most {} deg", required.largest_stereo_angle_deg));
+  if (meeting.search == 0)
+    never.push_back(fmt::format("a search range of at most {} %", required.largest_search_percent));
+  if (meeting.baseline == 0) never.push_back(fmt::format("a baseline of at least {} m", required.smallest_baseline_m));
+  std::string text = never.empty() ? "each limit can be met, but not all together"
+                                   : fmt::format("none has {}", fmt::join(never, ", nor "));
+  if (!c.design.nearest) return text;
+  const PairMetrics& nearest = *c.design.nearest;
+  std::vector<std::string> short_of;
+  const auto add = [&](const char* what, double margin, double limit, const char* unit) {
+    if (margin < -kMarginTolerance)
+      short_of.push_back(fmt::format("{} by {:.3g} {} ({:.0f} %)", what, -margin, unit, -100 * margin / limit));
+  };
+  add("range", nearest.margins.range_m, required.range_m, "m");
+  add("stereo angle", nearest.margins.stereo_angle_deg, required.largest_stereo_angle_deg, "deg");
+  add("search range", nearest.margins.search_percent, required.largest_search_percent, "% of the width");
+  add("baseline", nearest.margins.baseline_m, required.smallest_baseline_m, "m");
+  const PairParameters& p = nearest.parameters;
+  return text + fmt::format("; the nearest candidate (baseline {} m, nearest {} m, {} deg, {} px of {} um) misses: {}",
+                            p.baseline_m, p.nearest_m, p.hfov_deg, p.width_px, p.pixel_size_um,
+                            fmt::join(short_of, ", "));
+}
+
 void warn_about_choice(const PairContext& c) {
   const std::size_t count = c.design.feasible.size();
   if (count == 0) {
-    c.warn("nothing_feasible", 0, fmt::format("none of the {} combinations is feasible", c.design.combinations));
+    c.warn("nothing_feasible", 0,
+           fmt::format("none of the {} combinations is feasible: {}", c.design.combinations, why_nothing(c)));
     return;
   }
   const bool published_is_solution =
@@ -255,15 +289,17 @@ void add_warnings(const PairContext& c) {
 
 std::vector<DesignWarning> find_design_warnings(const RigRequirements& requirements, const RigDesign& design) {
   std::vector<DesignWarning> warnings;
-  const PairContext wide{"wide", requirements.wide, design.wide, warnings};
-  add_warnings(wide);
-  if (design.pans) {
-    warn_about_azimuth(wide, *design.pans);
-    warn_about_overlap(wide, *design.pans);
-  }
-  if (requirements.narrow && design.narrow) add_warnings({"narrow", *requirements.narrow, *design.narrow, warnings});
-  if (design.view_overlap_m && !(*design.view_overlap_m > 0)) {
-    wide.warn("views_apart", 0, "no ground is visible to both the wide and the narrow pair");
+  for (std::size_t i = 0; i < requirements.pairs.size(); ++i) {
+    const PairContext context{requirements.pairs[i].name, requirements.pairs[i], design.pairs[i], warnings};
+    add_warnings(context);
+    if (i != requirements.panned()) continue;
+    if (design.pans) {
+      warn_about_azimuth(context, *design.pans);
+      warn_about_overlap(context, *design.pans);
+    }
+    if (design.view_overlap_m && !(*design.view_overlap_m > 0)) {
+      context.warn("views_apart", 0, "no ground is visible to all pairs");
+    }
   }
   return warnings;
 }

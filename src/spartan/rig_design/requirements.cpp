@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <string_view>
+#include <utility>
 
 #include "spartan/core/files.h"
 #include "spartan/core/pose.h"
@@ -49,8 +52,16 @@ std::optional<int> whole(YamlMap& map, const char* key, const Limits& limits) {
   return std::nullopt;
 }
 
-// {from, to, step}. Rounded to 9 decimals, so that each value is the double nearest to its decimal: 0.05 + 10 · 0.01 is
-// exactly 0.15.
+// Rounded to 9 decimals, so that each value is the double nearest to its decimal: 0.05 + 10 · 0.01 is exactly 0.15.
+std::vector<double> stepped(double from, double to, double step) {
+  const auto count = static_cast<int>(std::round((to - from) / step));
+  std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(count) + 1);
+  for (int i = 0; i <= count; ++i) values.push_back(std::round((from + i * step) * 1e9) / 1e9);
+  return values;
+}
+
+// {from, to, step}.
 std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, const YamlNode& node) {
   YamlMap steps(node, map.path(key), map.errors());
   const auto from = steps.number("from"), to = steps.number("to"), step = steps.number("step");
@@ -69,11 +80,7 @@ std::optional<std::vector<double>> read_steps(YamlMap& map, const char* key, con
     steps.add_error("step", fmt::format("does not divide the range from {} to {} evenly", *from, *to));
     return std::nullopt;
   }
-  std::vector<double> values;
-  values.reserve(static_cast<std::size_t>(count) + 2);
-  for (int i = 0; i <= static_cast<int>(std::round(count)); ++i)
-    values.push_back(std::round((*from + i * *step) * 1e9) / 1e9);
-  return values;
+  return stepped(*from, *to, *step);
 }
 
 std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, const YamlNode& node) {
@@ -93,10 +100,12 @@ std::optional<std::vector<double>> read_listed(YamlMap& map, const char* key, co
   return values;
 }
 
-// A list [a, b, …] or {from, to, step}; every value within limits, without duplicates.
-std::vector<double> read_values(YamlMap& map, const char* key, const Limits& limits) {
-  const auto node = map.node(key);
-  if (!node) return {};
+// A list [a, b, …] or {from, to, step}; every value within limits, without duplicates. `absent`: where the key is
+// missing; empty: it must be there.
+std::vector<double> read_values(YamlMap& map, const char* key, const Limits& limits,
+                                const std::vector<double>& absent = {}) {
+  const auto node = absent.empty() ? map.node(key) : map.optional_node(key);
+  if (!node) return absent;
   if (!node->is_list() && !node->is_map()) {
     map.add_error(key, "must be a list of numbers, or {from, to, step}");
     return {};
@@ -119,11 +128,11 @@ std::vector<double> read_values(YamlMap& map, const char* key, const Limits& lim
 
 CandidateLists read_lists(YamlMap map) {
   CandidateLists lists;
-  lists.baselines_m = read_values(map, "baselines_m", kLength_m);
-  lists.nearest_m = read_values(map, "nearest_m", kLength_m);
-  lists.hfov_deg = read_values(map, "hfov_deg", kView_deg);
-  lists.pixel_sizes_um = read_values(map, "pixel_sizes_um", kPixel_um);
-  for (const double width : read_values(map, "widths_px", kSide_px)) {
+  lists.baselines_m = read_values(map, "baselines_m", kLength_m, stepped(0.05, 0.50, 0.05));
+  lists.nearest_m = read_values(map, "nearest_m", kLength_m, stepped(0.5, 1.5, 0.1));
+  lists.hfov_deg = read_values(map, "hfov_deg", kView_deg, stepped(40, 90, 5));
+  lists.pixel_sizes_um = read_values(map, "pixel_sizes_um", kPixel_um, {3.45, 5.5});
+  for (const double width : read_values(map, "widths_px", kSide_px, {640, 1024, 1280, 1920})) {
     if (width != std::floor(width)) map.add_error("widths_px", fmt::format("holds {}, must be whole numbers", width));
     lists.widths_px.push_back(static_cast<int>(width));
   }
@@ -136,7 +145,7 @@ PanRequirements read_pans(YamlMap map) {
   pans.angles_deg = read_values(map, "angles_deg", kPan_deg);
   std::sort(pans.angles_deg.begin(), pans.angles_deg.end());
   pans.azimuth_deg = bounded(map, "azimuth_deg", {1e-6, 360}).value_or(0);
-  pans.smallest_overlap_percent = bounded(map, "smallest_overlap_percent", {0, 100}).value_or(0);
+  pans.smallest_overlap_percent = optional_bounded(map, "smallest_overlap_percent", {0, 100}).value_or(0);
   map.reject_unknown_keys();
   return pans;
 }
@@ -164,8 +173,8 @@ std::vector<DesignCriterion> read_order(YamlMap& map) {
                 {"pan_overlap", DesignCriterion::pan_overlap},
                 {"shorter_baseline", DesignCriterion::shorter_baseline}};
   std::vector<DesignCriterion> order;
-  const auto node = map.node("order");
-  if (!node) return order;
+  const auto node = map.optional_node("order");
+  if (!node) return {DesignCriterion::range_margin, DesignCriterion::pan_overlap, DesignCriterion::shorter_baseline};
   if (!node->is_list() || node->items().empty()) {
     map.add_error("order", "must be a list of: range_margin, pan_overlap, shorter_baseline");
     return order;
@@ -188,15 +197,16 @@ std::vector<DesignCriterion> read_order(YamlMap& map) {
 
 void read_limits(YamlMap& map, PairRequirements& pair) {
   pair.range_m = bounded(map, "range_m", kLength_m).value_or(1);
-  pair.range_resolution_m = bounded(map, "range_resolution_m", kLength_m).value_or(1);
-  pair.disparity_accuracy_px = bounded(map, "disparity_accuracy_px", kAccuracy_px).value_or(1);
-  pair.largest_stereo_angle_deg = bounded(map, "largest_stereo_angle_deg", kAngle_deg).value_or(1);
+  // Defaults are what the published rover requires, docs/reference/requirements.md.
+  pair.range_resolution_m = optional_bounded(map, "range_resolution_m", kLength_m).value_or(0.005 * pair.range_m);
+  pair.disparity_accuracy_px = optional_bounded(map, "disparity_accuracy_px", kAccuracy_px).value_or(0.3);
+  pair.largest_stereo_angle_deg = optional_bounded(map, "largest_stereo_angle_deg", kAngle_deg).value_or(15);
   pair.contradicting_stereo_angle_deg = optional_bounded(map, "contradicting_stereo_angle_deg", kAngle_deg);
-  pair.largest_search_percent = bounded(map, "largest_search_percent", kPercent).value_or(1);
+  pair.largest_search_percent = optional_bounded(map, "largest_search_percent", kPercent).value_or(25);
   pair.smallest_baseline_m = optional_bounded(map, "smallest_baseline_m", {0, 1e6}).value_or(0);
   pair.smallest_height_m = optional_bounded(map, "smallest_height_m", {0, 1e6}).value_or(0);
   pair.height_m = bounded(map, "height_m", kLength_m).value_or(1);
-  pair.tilt_step_deg = bounded(map, "tilt_step_deg", {1e-3, 90}).value_or(1);
+  pair.tilt_step_deg = optional_bounded(map, "tilt_step_deg", {1e-3, 90}).value_or(1);
   pair.rows_per_column = optional_bounded(map, "rows_per_column", {0.01, 100}).value_or(1);
 }
 
@@ -226,11 +236,11 @@ void check_consistency(YamlMap& map, const PairRequirements& pair) {
 PairRequirements read_pair(YamlMap map) {
   PairRequirements pair;
   read_limits(map, pair);
-  if (const auto lists = map.node("candidates")) {
-    pair.lists = read_lists(YamlMap(*lists, map.path("candidates"), map.errors()));
-    if (const std::size_t count = pair.lists.combinations(); count > kMostCombinations) {
-      map.add_error("candidates", fmt::format("has {} combinations, at most {} are allowed", count, kMostCombinations));
-    }
+  // Without candidates those of an empty group.
+  const YamlNode lists = map.optional_node("candidates").value_or(YamlNode::map_of({}));
+  pair.lists = read_lists(YamlMap(lists, map.path("candidates"), map.errors()));
+  if (const std::size_t count = pair.lists.combinations(); count > kMostCombinations) {
+    map.add_error("candidates", fmt::format("has {} combinations, at most {} are allowed", count, kMostCombinations));
   }
   pair.order = read_order(map);
   if (const auto pans = map.optional_node("pans"))
@@ -243,21 +253,62 @@ PairRequirements read_pair(YamlMap map) {
   return pair;
 }
 
+// Keys of the JSON of a design beside the names of its pairs.
+bool is_reserved(const std::string& name) {
+  constexpr std::array<std::string_view, 6> kReserved{"schema",   "name",    "pairs",
+                                                      "warnings", "reasons", "view_overlap_m"};
+  return name.empty() || name.starts_with("pan_") || name.starts_with("azimuth_") ||
+         std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end();
+}
+
+std::vector<PairRequirements> read_pairs(YamlMap map) {
+  std::vector<PairRequirements> pairs;
+  for (const auto& [name, node] : map.entries()) {
+    if (is_reserved(name)) {
+      map.add_error(name, "cannot be the name of a pair: it has another meaning in the JSON of a design");
+      continue;
+    }
+    PairRequirements pair = read_pair(YamlMap(node, map.path(name), map.errors()));
+    pair.name = name;
+    pairs.push_back(std::move(pair));
+  }
+  return pairs;
+}
+
 RigRequirements read_root(YamlMap root, const std::string& default_name) {
   RigRequirements requirements;
   if (const auto schema = root.integer("schema"); schema && *schema != kSchema) {
     root.add_error("schema", fmt::format("is {}; this version reads schema {}", *schema, kSchema));
   }
   requirements.name = root.optional_node("name") ? root.text("name").value_or(default_name) : default_name;
-  if (const auto wide = root.node("wide")) requirements.wide = read_pair(YamlMap(*wide, "wide", root.errors()));
-  if (const auto narrow = root.optional_node("narrow")) {
-    requirements.narrow = read_pair(YamlMap(*narrow, "narrow", root.errors()));
+  if (const auto pairs = root.optional_node("pairs")) {
+    requirements.pairs = read_pairs(YamlMap(*pairs, "pairs", root.errors()));
+  }
+  // Files of version 0.1 have these two pairs at the top.
+  for (const char* name : {"wide", "narrow"}) {
+    const auto node = root.optional_node(name);
+    if (!node) continue;
+    requirements.pairs.push_back(read_pair(YamlMap(*node, name, root.errors())));
+    requirements.pairs.back().name = name;
   }
   root.reject_unknown_keys();
+  if (requirements.pairs.empty() && !root.errors().has_error_near("pairs"))
+    root.add_error("pairs", "is missing: name at least one pair, with its requirements");
+  for (std::size_t i = 0; i < requirements.pairs.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (requirements.pairs[j].name == requirements.pairs[i].name)
+        root.add_error("pairs." + requirements.pairs[i].name, "is given twice, once outside of pairs");
+    }
+  }
   return requirements;
 }
 
 }  // namespace
+
+std::size_t RigRequirements::panned() const {
+  const auto found = std::find_if(pairs.begin(), pairs.end(), [](const PairRequirements& pair) { return pair.pans; });
+  return found == pairs.end() ? 0 : static_cast<std::size_t>(found - pairs.begin());
+}
 
 std::size_t CandidateLists::combinations() const {
   return baselines_m.size() * nearest_m.size() * hfov_deg.size() * pixel_sizes_um.size() * widths_px.size();

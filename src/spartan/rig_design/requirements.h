@@ -49,6 +49,7 @@ struct PublishedPair {
 
 /// Requirements on one stereo pair.
 struct PairRequirements {
+  std::string name;                     ///< of the pair
   double range_m = 0;                   ///< range up to which range_resolution_m is required
   double range_resolution_m = 0;        ///< largest depth change of a disparity step of disparity_accuracy_px
   double disparity_accuracy_px = 0;     ///< c, accuracy of the stereo matching
@@ -71,8 +72,9 @@ struct PairRequirements {
 /// Requirements on the pairs of a rover.
 struct RigRequirements {
   std::string name;
-  PairRequirements wide;                   ///< on the mast, for maps
-  std::optional<PairRequirements> narrow;  ///< at the foot of the mast, for odometry
+  std::vector<PairRequirements> pairs;  ///< at least one, with different names
+  /// The first pair with pans, whose coverage is computed; the first pair where none has pans.
+  std::size_t panned() const;
 };
 
 /// Parses requirements. All errors of the text are reported at once, each with its line; code `configuration`.

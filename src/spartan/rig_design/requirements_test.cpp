@@ -45,19 +45,19 @@ TEST(Requirements, ReadsAMinimalFile) {
   const auto read = parse_requirements(kGood, "some/my.yaml");
   ASSERT_TRUE(read) << read.error().message();
   EXPECT_EQ(read->name, "my");
-  EXPECT_FALSE(read->narrow);
-  EXPECT_FALSE(read->wide.pans);
-  EXPECT_FALSE(read->wide.published);
-  EXPECT_EQ(read->wide.smallest_baseline_m, 0);
-  EXPECT_EQ(read->wide.rows_per_column, 1);
-  EXPECT_EQ(read->wide.lists.combinations(), 2u * 1 * 26 * 10 * 1);
+  EXPECT_FALSE(read->pairs.size() > 1);
+  EXPECT_FALSE(read->pairs[0].pans);
+  EXPECT_FALSE(read->pairs[0].published);
+  EXPECT_EQ(read->pairs[0].smallest_baseline_m, 0);
+  EXPECT_EQ(read->pairs[0].rows_per_column, 1);
+  EXPECT_EQ(read->pairs[0].lists.combinations(), 2u * 1 * 26 * 10 * 1);
 }
 
 // Equal to the decimals as typed, whatever the rounding of the steps.
 TEST(Requirements, StepsAreExactDecimals) {
   const auto read = parse_requirements(kGood, "my.yaml");
   ASSERT_TRUE(read);
-  const CandidateLists& lists = read->wide.lists;
+  const CandidateLists& lists = read->pairs[0].lists;
   ASSERT_EQ(lists.baselines_m.size(), 26u);
   for (int i = 0; i < 26; ++i) EXPECT_EQ(lists.baselines_m[static_cast<std::size_t>(i)], (5 + i) / 100.0);
   EXPECT_THAT(lists.nearest_m, ElementsAre(0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5));
@@ -67,8 +67,8 @@ TEST(Requirements, PansMayBeInAnyOrder) {
   const auto read = parse_requirements(
       kGood + "  pans: {angles_deg: [10, -50, 0], azimuth_deg: 90, smallest_overlap_percent: 5}\n", "my.yaml");
   ASSERT_TRUE(read) << read.error().message();
-  EXPECT_THAT(read->wide.pans->angles_deg, ElementsAre(-50, 0, 10));
-  EXPECT_EQ(read->wide.pans->widest_step_deg(), 50);
+  EXPECT_THAT(read->pairs[0].pans->angles_deg, ElementsAre(-50, 0, 10));
+  EXPECT_EQ(read->pairs[0].pans->widest_step_deg(), 50);
 }
 
 TEST(Requirements, RowsOfThePublishedPair) {
@@ -76,7 +76,7 @@ TEST(Requirements, RowsOfThePublishedPair) {
       "  rows_per_column: 0.5\n"
       "  published: {baseline_m: 0.2, nearest_m: 1, hfov_deg: 50, pixel_size_um: 5.5, width_px: 1000}\n";
   const auto rows = [](const std::string& text) {
-    return parse_requirements(text, "my.yaml").value().wide.published_rows_per_column();
+    return parse_requirements(text, "my.yaml").value().pairs[0].published_rows_per_column();
   };
   EXPECT_EQ(rows(kGood + published), 0.5);
   EXPECT_EQ(rows(kGood + replaced(published, "width_px: 1000", "width_px: 1000, height_px: 800")), 0.8);
@@ -92,18 +92,18 @@ TEST(Requirements, ShippedFilesHoldThePublishedLists) {
   }
   EXPECT_GE(count, 1);
   const auto rover = read_requirements(testing::source_folder() + "/config/requirements/rover.yaml").value();
-  EXPECT_EQ(rover.wide.lists.combinations(), 26u * 10 * 31 * 4 * 4);
-  EXPECT_THAT(rover.wide.lists.widths_px, ElementsAre(780, 1040, 1120, 1280));
-  EXPECT_THAT(rover.wide.lists.pixel_sizes_um, ElementsAre(4.54, 5.5, 7.4, 9));
-  EXPECT_EQ(rover.wide.lists.baselines_m.front(), 0.05);
-  EXPECT_EQ(rover.wide.lists.baselines_m.back(), 0.30);
-  EXPECT_EQ(rover.wide.lists.hfov_deg.front(), 40);
-  EXPECT_EQ(rover.wide.lists.hfov_deg.back(), 70);
-  EXPECT_EQ(rover.wide.smallest_baseline_m, 0.1);
-  EXPECT_EQ(rover.wide.smallest_height_m, 1);
-  EXPECT_THAT(rover.wide.order, ElementsAre(DesignCriterion::range_margin, DesignCriterion::pan_overlap,
-                                            DesignCriterion::shorter_baseline));
-  EXPECT_EQ(rover.wide.pans->widest_step_deg(), 35);
+  EXPECT_EQ(rover.pairs[0].lists.combinations(), 26u * 10 * 31 * 4 * 4);
+  EXPECT_THAT(rover.pairs[0].lists.widths_px, ElementsAre(780, 1040, 1120, 1280));
+  EXPECT_THAT(rover.pairs[0].lists.pixel_sizes_um, ElementsAre(4.54, 5.5, 7.4, 9));
+  EXPECT_EQ(rover.pairs[0].lists.baselines_m.front(), 0.05);
+  EXPECT_EQ(rover.pairs[0].lists.baselines_m.back(), 0.30);
+  EXPECT_EQ(rover.pairs[0].lists.hfov_deg.front(), 40);
+  EXPECT_EQ(rover.pairs[0].lists.hfov_deg.back(), 70);
+  EXPECT_EQ(rover.pairs[0].smallest_baseline_m, 0.1);
+  EXPECT_EQ(rover.pairs[0].smallest_height_m, 1);
+  EXPECT_THAT(rover.pairs[0].order, ElementsAre(DesignCriterion::range_margin, DesignCriterion::pan_overlap,
+                                                DesignCriterion::shorter_baseline));
+  EXPECT_EQ(rover.pairs[0].pans->widest_step_deg(), 35);
 }
 
 TEST(Requirements, EachErrorIsReportedWithItsLine) {
@@ -157,6 +157,41 @@ TEST(Requirements, TooManyCombinationsAreRejected) {
   const auto read = parse_requirements(text, "my.yaml");
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().message(), HasSubstr("my.yaml:10: wide.candidates: has 13750282 combinations"));
+}
+
+TEST(Requirements, PairsHaveFreeNamesAndDefaults) {
+  const std::string text =
+      "schema: 1\npairs:\n  mast: {range_m: 4, height_m: 1}\n  hazard: {range_m: 2, height_m: 0.3}\n";
+  const auto read = parse_requirements(text, "my.yaml");
+  ASSERT_TRUE(read) << read.error().message();
+  ASSERT_EQ(read->pairs.size(), 2u);
+  EXPECT_EQ(read->pairs[0].name, "mast");
+  EXPECT_EQ(read->pairs[1].name, "hazard");
+  EXPECT_EQ(read->pairs[0].range_resolution_m, 0.02);
+  EXPECT_EQ(read->pairs[1].disparity_accuracy_px, 0.3);
+  EXPECT_EQ(read->pairs[1].largest_stereo_angle_deg, 15);
+  EXPECT_THAT(read->pairs[0].lists.widths_px, ElementsAre(640, 1024, 1280, 1920));
+  EXPECT_EQ(read->pairs[0].lists.baselines_m.size(), 10u);
+  EXPECT_EQ(read->pairs[0].order.size(), 3u);
+  EXPECT_EQ(read->panned(), 0u) << "without pans the first pair";
+  const auto panned =
+      parse_requirements(text.substr(0, text.rfind('}')) + ", pans: {angles_deg: [0], azimuth_deg: 40}}\n", "my.yaml");
+  ASSERT_TRUE(panned) << panned.error().message();
+  EXPECT_EQ(panned->panned(), 1u);
+}
+
+TEST(Requirements, PairsNeedNamesOfTheirOwn) {
+  const auto message = [](const std::string& pairs) {
+    return testing::error_message(parse_requirements("schema: 1\n" + pairs, "my.yaml"));
+  };
+  const std::string pair = "{range_m: 4, height_m: 1}\n";
+  EXPECT_THAT(message(""), HasSubstr("pairs: is missing"));
+  EXPECT_THAT(message("pairs: {}\n"), HasSubstr("pairs: is missing"));
+  EXPECT_THAT(message("pairs: 3\n"), HasSubstr("must be a group"));
+  EXPECT_THAT(message("pairs:\n  mast: 3\n"), HasSubstr("my.yaml:3: pairs.mast: must be a group"));
+  EXPECT_THAT(message("pairs:\n  warnings: " + pair), HasSubstr("my.yaml:3: pairs.warnings: cannot be the name"));
+  EXPECT_THAT(message("pairs:\n  wide: " + pair + "wide: " + pair), HasSubstr("pairs.wide: is given twice"));
+  EXPECT_THAT(message("pairs:\n  mast: {range_m: 4}\n"), HasSubstr("my.yaml:3: pairs.mast.height_m: is missing"));
 }
 
 TEST(Requirements, MissingFileIsAnInputError) {
@@ -223,9 +258,9 @@ RC_GTEST_PROP(Requirements, DamagedFilesDoNotCrash, ()) {
   }
   const auto read = parse_requirements(text, "my.yaml");
   if (!read) RC_ASSERT(read.error().code == ErrorCode::configuration);
-  if (read && read->wide.lists.combinations() < 10000) {
+  if (read && read->pairs[0].lists.combinations() < 10000) {
     const RigDesign design = design_rig(*read);
-    RC_ASSERT(design.wide.feasible.size() <= design.wide.combinations);
+    RC_ASSERT(design.pairs[0].feasible.size() <= design.pairs[0].combinations);
   }
 }
 

@@ -100,12 +100,33 @@ double distance_to_limits(const PairMetrics& pair, const PairRequirements& requi
   return nearest;
 }
 
+// The largest violation of a limit, relative to that limit; 0 where all limits are met.
+double violation(const PairMetrics& pair, const PairRequirements& requirements) {
+  const PairMargins& margins = pair.margins;
+  const auto relative = [](double margin, double limit) { return holds(margin) ? 0 : -margin / limit; };
+  return std::max({relative(margins.range_m, requirements.range_m),
+                   relative(margins.stereo_angle_deg, requirements.largest_stereo_angle_deg),
+                   relative(margins.search_percent, requirements.largest_search_percent),
+                   relative(margins.baseline_m, requirements.smallest_baseline_m)});
+}
+
 void search(const PairRequirements& requirements, PairDesign& design) {
+  double least = std::numeric_limits<double>::infinity();
   for_every_shape(requirements.lists, [&](const PairParameters& parameters) {
     const PairMetrics pair = stereo_figures(parameters, requirements);
     design.smallest_limit_distance = std::min(design.smallest_limit_distance, distance_to_limits(pair, requirements));
-    if (pair.feasible) design.feasible.push_back(metrics_of(parameters, requirements));
+    design.meeting.range += holds(pair.margins.range_m) ? 1 : 0;
+    design.meeting.stereo_angle += holds(pair.margins.stereo_angle_deg) ? 1 : 0;
+    design.meeting.search += holds(pair.margins.search_percent) ? 1 : 0;
+    design.meeting.baseline += holds(pair.margins.baseline_m) ? 1 : 0;
+    if (pair.feasible) {
+      design.feasible.push_back(metrics_of(parameters, requirements));
+    } else if (const double worst = violation(pair, requirements); design.feasible.empty() && worst < least) {
+      least = worst;
+      design.nearest = metrics_of(parameters, requirements);
+    }
   });
+  if (!design.feasible.empty()) design.nearest.reset();
 }
 
 double value_of(const PairMetrics& pair, DesignCriterion criterion) {
@@ -185,6 +206,7 @@ bool is_candidate(const PairParameters& parameters, const CandidateLists& lists)
 
 PairDesign design_pair(const PairRequirements& requirements) {
   PairDesign design;
+  design.name = requirements.name;
   design.combinations = requirements.lists.combinations();
   search(requirements, design);
   sort_by_criteria(design, requirements.order);
@@ -204,6 +226,21 @@ PairDesign design_pair(const PairRequirements& requirements) {
 // Whether both cameras of the pair see common ground.
 bool shares_ground(const PairMetrics& pair, const PairRequirements& requirements) {
   return !common_footprint(ground_view(pair, requirements), 0).empty();
+}
+
+// The ground in the middle column that all pairs see; none for a single pair, or where a pair has no selection.
+std::optional<double> view_overlap_m(const RigRequirements& requirements, const RigDesign& design) {
+  if (design.pairs.size() < 2) return std::nullopt;
+  double from_m = -std::numeric_limits<double>::infinity(), to_m = std::numeric_limits<double>::infinity();
+  bool all_see = true;
+  for (std::size_t i = 0; i < design.pairs.size(); ++i) {
+    const PairMetrics* const pair = design.pairs[i].selected();
+    if (pair == nullptr) return std::nullopt;
+    all_see = all_see && shares_ground(*pair, requirements.pairs[i]);
+    from_m = std::max(from_m, pair->view_near_m);
+    to_m = std::min(to_m, pair->view_far_m);
+  }
+  return all_see ? std::max(0.0, to_m - from_m) : 0;
 }
 
 }  // namespace
@@ -244,19 +281,11 @@ std::size_t count_feasible(const PairRequirements& requirements) {
 
 RigDesign design_rig(const RigRequirements& requirements) {
   RigDesign design;
-  design.wide = design_pair(requirements.wide);
-  if (requirements.narrow) design.narrow = design_pair(*requirements.narrow);
-  const PairMetrics* wide = design.wide.selected();
-  const PairMetrics* narrow = design.narrow ? design.narrow->selected() : nullptr;
-  if (wide && requirements.wide.pans) {
-    design.pans = pan_coverage(ground_view(*wide, requirements.wide), *requirements.wide.pans);
-  }
-  if (wide && narrow) {
-    const bool both_see = shares_ground(*wide, requirements.wide) && shares_ground(*narrow, *requirements.narrow);
-    const double from_m = std::max(wide->view_near_m, narrow->view_near_m);
-    const double to_m = std::min(wide->view_far_m, narrow->view_far_m);
-    design.view_overlap_m = both_see ? std::max(0.0, to_m - from_m) : 0;
-  }
+  for (const PairRequirements& pair : requirements.pairs) design.pairs.push_back(design_pair(pair));
+  const PairRequirements& panned = requirements.pairs[requirements.panned()];
+  const PairMetrics* const selected = design.pairs[requirements.panned()].selected();
+  if (selected && panned.pans) design.pans = pan_coverage(ground_view(*selected, panned), *panned.pans);
+  design.view_overlap_m = view_overlap_m(requirements, design);
   design.warnings = find_design_warnings(requirements, design);
   return design;
 }

@@ -146,8 +146,14 @@ struct PairMetrics {
   bool with_pan_overlap = false;  ///< feasible, and the overlap of the pans is sufficient; false without pans
 };
 
+/// Numbers of combinations.
+struct LimitCounts {
+  std::size_t range = 0, stereo_angle = 0, search = 0, baseline = 0;
+};
+
 /// Result of the search for one pair.
 struct PairDesign {
+  std::string name;  ///< of the pair
   std::size_t combinations = 0;
   std::vector<PairMetrics> feasible;  ///< ordered, best first
   /// How many of them have sufficient overlap of the pans; none where there are no pans.
@@ -160,6 +166,11 @@ struct PairDesign {
   double smallest_limit_distance = std::numeric_limits<double>::infinity();
   bool published_is_candidate = false;  ///< whether the published pair is one of the combinations
 
+  /// How many combinations meet each limit by itself.
+  LimitCounts meeting;
+  /// Where none is feasible: the combination whose largest violation, relative to the limit, is the smallest.
+  std::optional<PairMetrics> nearest;
+
   const PairMetrics* best() const { return feasible.empty() ? nullptr : &feasible.front(); }
   /// The pair for which ground coverage is computed and drawn: the published pair, else the best with sufficient
   /// overlap of the pans, else the best; null where there is none.
@@ -168,14 +179,13 @@ struct PairDesign {
 
 /// Result of design_rig().
 struct RigDesign {
-  PairDesign wide;
-  std::optional<PairDesign> narrow;
-  std::optional<PanCoverage> pans;       ///< coverage of the selected wide pair
-  std::optional<double> view_overlap_m;  ///< length of ground visible to both selected pairs, middle column
+  std::vector<PairDesign> pairs;         ///< in the order of the requirements
+  std::optional<PanCoverage> pans;       ///< coverage of the pair RigRequirements::panned(), if it has pans
+  std::optional<double> view_overlap_m;  ///< length of ground visible to all selected pairs, middle column
   std::vector<DesignWarning> warnings;
 };
 
-/// Searches all combinations of the wide and of the narrow pair, computes ground coverage, and collects warnings.
+/// Searches all combinations of every pair, computes ground coverage, and collects warnings.
 RigDesign design_rig(const RigRequirements& requirements);
 
 /// Evaluates one set of parameters. Its tilt is the largest multiple of tilt_step_deg at which the top row still

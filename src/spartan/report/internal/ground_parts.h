@@ -1,6 +1,7 @@
 // What the parts of the ground figure share.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,9 @@ constexpr double kMargin_px = 40;
 inline constexpr Rgb8 kInk{30, 30, 30}, kFaint{150, 150, 150}, kSoil{120, 100, 80}, kUnseen{222, 222, 222};
 inline constexpr Rgb8 kWide{0, 114, 178}, kWideOneCamera{200, 226, 243}, kWideBoth{134, 187, 222},
     kWideTwice{58, 134, 188};
-inline constexpr Rgb8 kNarrow{213, 94, 0}, kShared{0, 158, 115};
+inline constexpr Rgb8 kShared{0, 158, 115};
+/// Of the other pairs than the one whose views are drawn in blue; they repeat.
+inline constexpr std::array<Rgb8, 4> kOtherPairs{{{213, 94, 0}, {204, 121, 167}, {230, 159, 0}, {0, 114, 178}}};
 
 /// One pair as it is drawn.
 struct DrawnPair {

@@ -210,10 +210,10 @@ double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& 
     drawing.fill(asked_for, {kUnseen});
   }
   draw_views(drawing, plan, views);
-  if (pairs.size() > 1) {
-    const GroundPolygon narrow = common_footprint(pairs[1].view(), 0);
-    drawing.fill(plan(narrow), {kNarrow, 0.45});
-    drawing.line(closed(plan(narrow)), {kNarrow, 1.5});
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    const GroundPolygon seen = common_footprint(pairs[i].view(), 0);
+    drawing.fill(plan(seen), {pairs[i].colour, 0.45});
+    drawing.line(closed(plan(seen)), {pairs[i].colour, 1.5});
   }
   draw_rings(drawing, plan, layout.radius_m, layout.half_deg);
   if (pans) {
@@ -221,8 +221,9 @@ double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& 
     name_pans(drawing, plan, 0.85 * wide.figures.view_far_m, wide.requirements.pans->angles_deg);
     draw_meanings(drawing, top_px + 20, meanings_of(*wide.requirements.pans, *pans));
   }
-  if (pairs.size() > 1) {
-    drawing.text(plan.polar(0.85 * pairs[1].figures.view_far_m, 0), "narrow pair", {kInk, 15, Anchor::middle, true});
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    drawing.text(plan.polar(0.85 * pairs[i].figures.view_far_m, 0), pairs[i].name + " pair",
+                 {kInk, 15, Anchor::middle, true});
   }
   const Point rover = plan.polar(0, 0);
   if (wide.figures.view_near_m > 0) {

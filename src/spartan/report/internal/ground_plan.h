@@ -8,7 +8,8 @@
 
 namespace spartan::internal {
 
-/// The first pair is the wide one, `pans` its figures. Gives the row, px, below which nothing is drawn.
+/// The first pair is drawn with its pans, `pans` its figures; of the others the common view straight ahead. Gives the
+/// row, px, below which nothing is drawn.
 double draw_plan(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs,
                  const std::optional<PanCoverage>& pans);
 

@@ -59,7 +59,8 @@ void draw_bars(Drawing& drawing, const Scale& at, double y_px, const std::vector
     from = std::max(from, pair.figures.view_near_m);
   }
   if (shared_m && *shared_m > 0) {
-    draw_plain_bar(drawing, at, y_px, from, from + *shared_m, kShared, fmt::format("both: {:.2f} m", *shared_m));
+    draw_plain_bar(drawing, at, y_px, from, from + *shared_m, kShared,
+                   fmt::format("{}: {:.2f} m", pairs.size() == 2 ? "both" : "all", *shared_m));
     y_px += 24;
   }
   if (near > 0) draw_plain_bar(drawing, at, y_px, 0, near, kFaint, fmt::format("blind: up to {:.3f} m", near));

@@ -8,7 +8,7 @@
 
 namespace spartan::internal {
 
-/// `shared_m` of the middle column is seen by both pairs. Gives the row, px, below which nothing is drawn.
+/// `shared_m` of the middle column is seen by all pairs. Gives the row, px, below which nothing is drawn.
 double draw_side(Drawing& drawing, double top_px, const std::vector<DrawnPair>& pairs, std::optional<double> shared_m);
 
 }  // namespace spartan::internal
