@@ -130,7 +130,9 @@ std::string roff_option(const CLI::Option& option) {
 
 std::string completion_script(const CLI::App& app, const std::string& shell) {
   if (shell == "fish") return fish_script(app);
-  return (shell == "zsh" ? "autoload -U +X bashcompinit && bashcompinit\n" : "") + bash_script(app);
+  // As a file of $fpath, zsh runs it at the first completion of the command that its first line names.
+  if (shell == "zsh") return "#compdef spartan\nautoload -U +X bashcompinit && bashcompinit\n" + bash_script(app);
+  return bash_script(app);
 }
 
 std::string man_page(const CLI::App& app, const std::string& version) {

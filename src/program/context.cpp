@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
 #include <functional>
 
 #include "spartan/core/stage_clock.h"
@@ -51,6 +52,20 @@ CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, 
 void add_json_flag(CLI::App& command, Context& context) {
   command.add_flag("--json", context.json,
                    "Print one JSON object to standard output and nothing else; messages go to standard error.");
+}
+
+CLI::Option* add_force_flag(CLI::App& command, Context& context) {
+  return command.add_flag("--force", context.force, "Replace output that exists. Without it that is exit code 5.");
+}
+
+Status expect_replaceable(const Context& context, const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const bool file = fs::is_regular_file(path, error);
+  const bool used_folder = fs::is_directory(path, error) && !fs::is_empty(path, error);
+  if (context.force || (!file && !used_folder)) return {};
+  return failure(ErrorCode::output, file ? "exists already" : "exists already and is not empty", path,
+                 "--force replaces it");
 }
 
 void add_threads_option(CLI::App& command, Context& context) {

@@ -34,6 +34,7 @@ struct Context {
   double memory_mb = 0;  ///< `--memory`; 0: 80 % of what is available
   int threads = 1;       ///< `--threads`; all cores without it
   bool json = false;     ///< `--json`: only JSON goes to standard output
+  bool force = false;    ///< `--force`: output that exists is replaced
   bool quiet = false, verbose = false;
   std::string command_line;           ///< as a shell takes it
   CommandBody chosen;                 ///< body of the selected command
@@ -45,6 +46,10 @@ CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, 
                       const std::string& example, CommandBody body);
 /// `--json`, for commands that have it.
 void add_json_flag(CLI::App& command, Context& context);
+/// `--force`, for commands that write files or folders.
+CLI::Option* add_force_flag(CLI::App& command, Context& context);
+/// Code `output` if `path` is a file, or a folder with files in it, and `--force` is not given. An empty path is none.
+Status expect_replaceable(const Context& context, const std::string& path);
 /// `--threads N`, for commands that have it.
 void add_threads_option(CLI::App& command, Context& context);
 

@@ -8,6 +8,7 @@
 #include "program/progress.h"
 #include "program/run_arguments.h"
 #include "program/run_summary_text.h"
+#include "program/sample_recording.h"
 #include "program/simulation.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
@@ -17,6 +18,8 @@
 
 namespace spartan::program {
 namespace {
+
+constexpr int kSampleFrames = 25;  // of the recording in the KITTI layout
 
 Status say(const std::string& text) {
   return print("\n== " + text + "\n");
@@ -41,6 +44,7 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   request.threads = context.threads;
   request.memory_bytes = memory_bound(context);
   request.version = SPARTAN_VERSION;
+  request.replace = context.force;
   Progress progress(context.quiet);
   RunHooks hooks;
   hooks.log = context.log;
@@ -52,6 +56,9 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   if (!outcome) return failure(outcome);
   if (outcome->interrupted)
     return failure(ErrorCode::interrupted, "interrupted by the user", folder, "delete the folder and start again");
+
+  if (Status s = write_kitti_sample(recording, kSampleFrames, ThreadPool(context.threads), folder + "/kitti"); !s)
+    return failure(s);
 
   ReportRequest about;
   about.run = run_folder;
@@ -73,6 +80,11 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   if (Status s = print(run_summary_text(outcome->summary_json, run_folder) + "\n" + table_of(*metrics, *compared)); !s)
     return failure(s);
   if (Status s = say("Report: " + about.page); !s) return failure(s);
+  if (Status s = say("Recordings to try the other commands on: " + recording + ", and in the KITTI layout " + folder +
+                     "/kitti");
+      !s) {
+    return failure(s);
+  }
   return outcome->lost ? kLost : kDone;
 }
 
@@ -86,6 +98,7 @@ void add_demo(CLI::App& app, Context& context) {
       "demo -o spartan_demo", [&context, scenario, folder] { return demo(context, *scenario, *folder); });
   command->add_option("scenario", *scenario, "Scenario: the name of a shipped one, or a file (default quick).");
   command->add_option("-o,--output", *folder, "Folder to create (default spartan_demo).");
+  add_force_flag(*command, context);
   add_threads_option(*command, context);
 }
 

@@ -13,6 +13,7 @@ struct ExportArguments {
 Result<ExitCode> export_command(const Context& context, const ExportArguments& arguments) {
   const auto format = parse_export_format(arguments.format);
   if (!format) return failure(format);
+  if (Status s = expect_replaceable(context, arguments.output); !s) return failure(s);
   const auto kind = parse_trajectory_kind(arguments.trajectory);
   const ThreadPool workers(context.threads);
   if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);
@@ -29,13 +30,15 @@ void add_export(CLI::App& app, Context& context) {
   command->add_option("run", a->run, "Run folder.")->required();
   command
       ->add_option("--format", a->format,
-                   "Format: tum, kitti, euroc or csv (trajectory), geotiff (global map), ply (terrain point cloud).")
+                   "Format: tum, kitti, euroc or csv (trajectory), geotiff or octomap (global map), ply or pcd "
+                   "(terrain point cloud).")
       ->required();
   command->add_option("-o,--output", a->output, "File to write.")->required();
   command
       ->add_option("--trajectory", a->trajectory,
                    "Trajectory: odometry, slam or localization (default: the last of these that exists).")
       ->check(CLI::IsMember({"odometry", "slam", "localization"}));
+  add_force_flag(*command, context);
   add_threads_option(*command, context);
 }
 

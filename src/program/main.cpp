@@ -18,6 +18,7 @@
 #include "program/context.h"
 #include "program/interrupt.h"
 #include "program/json.h"
+#include "program/version.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/threads.h"
 
@@ -44,7 +45,7 @@ void add_commands(CLI::App& app, Context& context) {
 
 int run(int argc, char** argv) {
   CLI::App app{"Stereo vision for rovers: visual odometry, dense stereo, terrain maps and localization.", "spartan"};
-  app.set_version_flag("--version", SPARTAN_VERSION);
+  app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done; 1 internal fault; 2 the command line is wrong; 3 input; 4 calibration or configuration;\n"

@@ -294,6 +294,7 @@ Eigen::Vector3d choose_up(Stop& stop, const StopView& view) {
 
 Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   if (Status s = check(a); !s) return failure(s);
+  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
   const auto gravity = parse_gravity(a.gravity);
   if (!gravity) return failure(gravity);
   auto options = options_of(context, a);
@@ -344,17 +345,21 @@ void add_map_build(CLI::App& map, Context& context) {
   auto a = std::make_shared<BuildArguments>();
   CLI::App* command =
       add_command(map, context, "build", "Build the terrain map of one pair of images or of one stop",
-                  "map build --recording drive --position 15 -o map", [&context, a] { return build(context, *a); });
+                  "map build --recording drive --position 1 -o map", [&context, a] { return build(context, *a); });
   command->add_option("left", a->left, "Left image.");
   command->add_option("right", a->right, "Right image.");
   command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
   command->add_option("--rig", a->of_recording.rig,
                       "Rig or calibration file, in any supported format (default: the recording's own).");
-  command->add_option("--recording", a->recording, "Recording to take one stop or one frame from.");
+  command->add_option("--recording", a->recording,
+                      "Recording to take one stop or one frame from (default: none, the images LEFT and RIGHT).");
   add_recording_options(*command, a->of_recording);
   command->add_option("--position", a->position,
-                      "Id of the stop: the position_id in frames.csv; all of its frames are merged.");
-  command->add_option("--frame", a->frame, "Number of a frame of the odometry pair, from 0, instead of a stop.")
+                      "Id of the stop: the position_id in frames.csv; all of its frames are merged (default: none, "
+                      "see --frame).");
+  command
+      ->add_option("--frame", a->frame,
+                   "Number of a frame of the odometry pair, from 0, instead of a stop (default: none).")
       ->check(non_negative_number());
   command
       ->add_option(
@@ -375,6 +380,7 @@ void add_map_build(CLI::App& map, Context& context) {
   command
       ->add_option("--set", a->set, "Set one option, e.g. mapping.map.obstacle_m=0.03. Repeatable; overrides --config.")
       ->allow_extra_args(false);
+  add_force_flag(*command, context);
   add_threads_option(*command, context);
   add_memory_option(*command, context);
   add_json_flag(*command, context);

@@ -8,9 +8,6 @@
 #include <vector>
 
 #include "program/map.h"
-#include "spartan/image_io/image_io.h"
-#include "spartan/reconstruction/point_cloud.h"
-#include "spartan/reconstruction/rendering.h"
 #include "spartan/system/map_files.h"
 
 namespace spartan::program {
@@ -20,6 +17,7 @@ constexpr double kFarthestCell = 5e8;  // cells are counted in int
 
 struct MapExportArguments {
   std::string map, output;
+  std::vector<std::string> layers;
   std::vector<double> window_m;  // west, south, east, north
 };
 
@@ -38,38 +36,28 @@ Result<LatticeWindow> window_of(const MapExportArguments& a, const GlobalMap& ma
   return window_between(west, south, east, north, map.cell_m());
 }
 
-// The centres of the cells, in the colours of the image.
-PointCloud cloud_of(const MapView& view) {
-  const Image<Rgb8> colours =
-      render_map(view.elevation_m, view.kind, view.cell_m, elevation_colour_range(view.elevation_m, view.kind));
-  PointCloud cloud;
-  for (int r = 0; r < view.window.height; ++r) {
-    for (int c = 0; c < view.window.width; ++c) {
-      if (!(view.count(c, r) > 0)) continue;
-      const Eigen::Vector2f at = cell_centre(view.place(), c, r).cast<float>();
-      cloud.push_back({{at.x(), at.y(), view.elevation_m(c, r)}, colours(c, r)});
-    }
-  }
-  return cloud;
-}
-
 Status write_map(SavedMap& saved, const MapExportArguments& a, const ThreadPool& workers) {
-  const std::string ending = std::filesystem::path(a.output).extension().string();
-  if (ending == ".map") {
+  if (std::filesystem::path(a.output).extension() == ".map") {
     if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map file always holds the whole map", "--window");
+    if (!a.layers.empty()) return failure(ErrorCode::usage, "a .map file always holds all layers", "--layer");
     return MapFile::save(saved.map(), a.output);
   }
+  const auto format = map_format_of(a.output);
+  if (!format) return failure(format);
   const auto window = window_of(a, saved.map());
   if (!window) return failure(window);
   const auto view = saved.map().view(*window);
   if (!view) return failure(view);
-  if (ending == ".tif") return write_map_geotiff(*view, saved.options().mapping.map, workers, a.output);
-  if (ending == ".png") return write_png(a.output, draw_map(*view, "Map"));
-  if (ending == ".ply") return write_ply(a.output, cloud_of(*view));
-  return failure(ErrorCode::usage, "has an unknown extension", a.output, "known extensions: .tif, .png, .ply, .map");
+  return export_map(*view, {*format, a.layers, saved.options().mapping.map, saved.about()}, workers, a.output);
 }
 
-Result<ExitCode> export_map(const Context& context, const MapExportArguments& a) {
+Result<ExitCode> export_command(const Context& context, const MapExportArguments& a) {
+  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
+  const std::filesystem::path output = a.output;
+  if (output.extension() == ".yaml") {
+    const std::string image = std::filesystem::path(output).replace_extension(".pgm").string();
+    if (Status s = expect_replaceable(context, image); !s) return failure(s);
+  }
   auto saved = SavedMap::open(a.map);
   if (!saved) return failure(saved);
   if (Status s = write_map(*saved, a, ThreadPool(context.threads)); !s) return failure(s);
@@ -81,20 +69,29 @@ Result<ExitCode> export_map(const Context& context, const MapExportArguments& a)
 void add_map_export(CLI::App& map, Context& context) {
   auto a = std::make_shared<MapExportArguments>();
   CLI::App* command =
-      add_command(map, context, "export", "Export a global map as GeoTIFF, image, point cloud or map file",
-                  "map export my_run -o site.tif", [&context, a] { return export_map(context, *a); });
+      add_command(map, context, "export", "Export a global map for GIS, ROS, point cloud viewers, or as an image",
+                  "map export my_run -o my_map.tif", [&context, a] { return export_command(context, *a); });
   command->add_option("map", a->map, "Saved map (.map) or run folder.")->required();
   command
-      ->add_option("-o,--output", a->output,
-                   "File to write; its extension selects the format: .tif (all layers), .png (an image), .ply (cell "
-                   "centres), .map.")
+      ->add_option(
+          "-o,--output", a->output,
+          "File to write; its extension selects the format: .tif (GeoTIFF), .png (figure), .ply or .pcd "
+          "(points, one a cell), .bt (OctoMap), .asc (ESRI ASCII grid), .yaml (occupancy grid of ROS and Nav2, "
+          "with a .pgm beside it), .map.")
       ->required();
+  command
+      ->add_option("--layer", a->layers,
+                   "Layer to write, e.g. class, which as the only one is a GeoTIFF of bytes with a colour table. "
+                   "Repeatable (default: all for .tif, elevation_m for .asc).")
+      ->allow_extra_args(false);
   command
       ->add_option(
           "--window", a->window_m,
-          "Export only this part: the smallest x, smallest y, largest x and largest y in metres of the world frame.")
+          "Export only this part: the smallest x, smallest y, largest x and largest y in metres of the world frame "
+          "(default: the whole map).")
       ->delimiter(',')
       ->expected(4);
+  add_force_flag(*command, context);
   add_threads_option(*command, context);
 }
 

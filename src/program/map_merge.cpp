@@ -61,6 +61,7 @@ struct MergeArguments {
 };
 
 Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) {
+  if (Status s = expect_replaceable(context, arguments.output); !s) return failure(s);
   auto a = SavedMap::open(arguments.a);
   if (!a) return failure(a);
   auto b = SavedMap::open(arguments.b);
@@ -115,6 +116,7 @@ void add_map_merge(CLI::App& map, Context& context) {
   command->add_option("b", a->b, "Second map, in the same world frame. The maps are not aligned by matching.")
       ->required();
   command->add_option("-o,--output", a->output, "Map file to write.")->required();
+  add_force_flag(*command, context);
   add_json_flag(*command, context);
 }
 

@@ -7,10 +7,10 @@ void add_recording_options(CLI::App& command, RecordingArguments& a) {
                      "Layout of the recording: spartan, kitti, kitti-raw, euroc, images or video (default: detected).");
   command.add_option("--left", a.left,
                      "Images of the left camera: a folder, a quoted pattern of file names (\"l*.png\") or a video, "
-                     "relative to the recording. Needs --right.");
+                     "relative to the recording. Needs --right (default: as the layout has them).");
   command.add_option("--right", a.right,
                      "Images of the right camera, likewise. Images with the same number or time stamp in their names "
-                     "are pairs.");
+                     "are pairs (default: as the layout has them).");
   command.add_option("--times", a.times,
                      "File of frame times, one a row, alone or beside file names: decimal seconds, or integers in a "
                      "unit that follows from their values (default: times.txt of the recording, else the file names).");

@@ -20,7 +20,6 @@ namespace fs = std::filesystem;
 struct ConvertArguments {
   std::string from, to, format, pair;
   std::vector<int> size_px;
-  bool force = false;
 };
 
 bool is_there(const std::string& path) {
@@ -76,11 +75,9 @@ Status check_names(const CalibrationFiles& files, CalibrationFormat format, cons
   return {};
 }
 
-Status check_places(const CalibrationFiles& files, bool force) {
+Status check_places(const CalibrationFiles& files, const Context& context) {
   for (const CalibrationFile& file : files) {
-    if (!force && is_there(file.path)) {
-      return failure(ErrorCode::output, "exists already", file.path, "--force overwrites it");
-    }
+    if (Status s = expect_replaceable(context, file.path); !s) return s;
   }
   return {};
 }
@@ -172,7 +169,7 @@ Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {
   const auto files = to_calibration_files(*rig, *format, a.to);
   if (!files) return failure(files);
   if (const Status names = check_names(*files, *format, a.to); !names) return failure(names);
-  if (const Status places = check_places(*files, a.force); !places) return failure(places);
+  if (const Status places = check_places(*files, context); !places) return failure(places);
   const auto lost = losses(*read, *rig, *format, *files);
   if (!lost) return failure(lost);
   if (const Status written = write_all(*files); !written) return failure(written);
@@ -226,12 +223,14 @@ void add_rig_convert(CLI::App& rig, Context& context) {
   for (const std::string_view name : calibration_format_names()) names.emplace_back(name);
   command->add_option("--to", a->format, "Format of the written calibration B (default: from its name).")
       ->check(CLI::IsMember(names));
-  command->add_option("--pair", a->pair, "Convert only this pair of the rig.");
-  command->add_option("--size-px", a->size_px, "Image size W,H in pixels, for formats that do not hold it.")
+  command->add_option("--pair", a->pair, "Convert only this pair of the rig (default: all).");
+  command
+      ->add_option("--size-px", a->size_px,
+                   "Image size W,H in pixels, for formats that do not hold it (default: that of the calibration).")
       ->delimiter(',')
       ->expected(2)
       ->check(CLI::Range(1, 32767));
-  command->add_flag("--force", a->force, "Overwrite existing files.");
+  add_force_flag(*command, context);
   add_json_flag(*command, context);
 }
 

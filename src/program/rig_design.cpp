@@ -27,7 +27,7 @@ Status write_files(const Context& context, const std::string& folder, const RigR
   if (Status s = write_file_atomically(folder + "/feasible.csv", design_csv(design)); !s) return s;
   const auto figure = draw_ground(requirements, design);
   if (!figure) {
-    context.log.warning("no wide pair is feasible or published: no figure is written");
+    context.log.warning("no pair to draw is feasible or published: no figure is written");
     return {};
   }
   if (Status s = write_file_atomically(folder + "/ground.svg", figure->svg); !s) return s;
@@ -35,6 +35,7 @@ Status write_files(const Context& context, const std::string& folder, const RigR
 }
 
 Result<ExitCode> design_command(const Context& context, const DesignArguments& a) {
+  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
   const auto requirements = read_requirements(a.requirements);
   if (!requirements) return failure(requirements);
   const RigDesign design = design_rig(*requirements);
@@ -62,10 +63,12 @@ void add_rig_design(CLI::App& rig, Context& context) {
   command->add_option("requirements", a->requirements, "Requirements file (docs/reference/requirements.md).")
       ->required()
       ->option_text("REQ REQUIRED");
-  command->add_option("-o,--output", a->output, "Folder for ground.svg, ground.png and feasible.csv.");
+  command->add_option("-o,--output", a->output,
+                      "Folder for ground.svg, ground.png and feasible.csv (default: none is written).");
   command->add_option("--rows", a->rows, "Number of feasible combinations to print (default 10).")
       ->check(CLI::Range(0, 2'000'000));
   command->add_flag("--all", a->all, "Print all feasible combinations, also with --json.");
+  add_force_flag(*command, context);
   add_json_flag(*command, context);
 }
 

@@ -268,6 +268,9 @@ Result<ExitCode> verdict(const InspectArguments& a, const std::vector<InspectedP
 Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   if (Status usage = check_usage(a); !usage) return failure(usage);
   if (Status there = a.rig == "-" ? Status() : calibration_is_there(a.rig); !there) return failure(there);
+  for (const std::string& output : {a.figure, a.apply}) {
+    if (Status s = expect_replaceable(context, output); !s) return failure(s);
+  }
   std::vector<ImagePair> images;
   if (!a.left.empty()) {
     auto loaded = load_images(a.left, a.right, a.frames);
@@ -321,7 +324,9 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
       ->add_option("right", a->right,
                    "Right image, folder or pattern; paired with the left ones in the order of their names.")
       ->option_text("RIGHT");
-  command->add_option("--recording", a->recording, "Take the images from this recording, for every pair of the rig.");
+  command->add_option(
+      "--recording", a->recording,
+      "Take the images from this recording, for every pair of the rig (default: none, LEFT and RIGHT).");
   add_recording_options(*command, a->of_recording);
   command->add_option("--pair", a->pair,
                       "Check only this pair of the rig (default with LEFT and RIGHT: the first one).");
@@ -330,14 +335,17 @@ void add_rig_inspect(CLI::App& rig, Context& context) {
                    "Maximum number of frames of a pair, spread evenly over all (default 12). More frames "
                    "give a more certain correction and take longer.")
       ->check(CLI::Range(1, 1000));
-  command->add_option("--apply", a->apply,
-                      "Write the corrected rig as rig.yaml. Only parameters that are reported as wrong are changed.");
+  command->add_option(
+      "--apply", a->apply,
+      "Write the corrected rig to this rig.yaml (default: none is written). Only parameters that are reported "
+      "as wrong are changed.");
   command->add_flag("--check", a->check,
                     "Return exit code 7 where the calibration of a pair is bad, or the images do not suffice.");
   command->add_option("--figure", a->figure,
-                      "Write a PNG that shows the row errors of the first pair, before and after.");
+                      "Write a PNG that shows the row errors of the first pair, before and after (default: none).");
   add_former_name(*command, context, "--shots", "--frames", a->frames)->check(CLI::Range(1, 1000));
   add_former_name(*command, context, "--picture", "--figure", a->figure);
+  add_force_flag(*command, context);
   add_threads_option(*command, context);
   add_json_flag(*command, context);
 }

@@ -89,6 +89,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.input = arguments.input;
   request.output = arguments.output;
   request.resume = arguments.resume;
+  request.replace = context.force;
   request.threads = context.threads;
   request.memory_bytes = memory_bound(context);
   request.max_frames = arguments.max_frames;
@@ -138,10 +139,12 @@ void add_run(CLI::App& app, Context& context) {
           "Folder of the recording, whose layout (Spartan, KITTI odometry, KITTI raw, EuRoC/ASL, image folders) is "
           "detected and printed, or a video with the images of both cameras side by side.")
       ->required();
-  command->add_option("-o,--output", a->output, "Run folder to create. An existing one is an error without --resume.")
+  command
+      ->add_option("-o,--output", a->output,
+                   "Run folder to create. An existing one is an error without --resume or --force.")
       ->required();
   command->add_option("--rig", a->recording.rig,
-                      "Calibration file to use instead of the recording's own, in any supported format.");
+                      "Calibration file to use, in any supported format (default: the recording's own).");
   add_recording_options(*command, a->recording);
   command->add_option("--config", a->config,
                       "YAML file with options that differ from the defaults (see `spartan config dump`).");
@@ -150,8 +153,8 @@ void add_run(CLI::App& app, Context& context) {
   command->add_option(
       "--truth", a->truth,
       "Ground truth to evaluate the result against, as `spartan evaluate` does: a trajectory file (TUM, KITTI, EuRoC "
-      "csv), or a recording with ground truth.");
-  command->add_flag(
+      "csv), or a recording with ground truth (default: none).");
+  auto* resume = command->add_flag(
       "--resume", a->resume,
       "Continue an interrupted run in this folder. Trajectories, maps and terrain have the same bytes as without the "
       "interruption.");
@@ -162,6 +165,7 @@ void add_run(CLI::App& app, Context& context) {
       ->check(non_negative_number());
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM or terrain.");
+  add_force_flag(*command, context)->excludes(resume);
   add_threads_option(*command, context);
   add_memory_option(*command, context);
   add_json_flag(*command, context);

@@ -25,11 +25,12 @@ void add_simulate(CLI::App& app, Context& context) {
                   "simulate quick -o quick_recording", [&context, a] { return simulate_command(context, *a); });
   command->add_option("scenario", a->scenario, "Scenario: the name of a shipped one, or a file.")->required();
   command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();
-  command->add_option("--seed", a->seed, "Seed of all random numbers, instead of the scenario's.")
+  command->add_option("--seed", a->seed, "Seed of all random numbers (default: that of the scenario).")
       ->check(non_negative_number());
-  command->add_flag(
+  auto* resume = command->add_flag(
       "--resume", a->resume,
       "Continue an interrupted simulation in this folder. The files are the same as without the interruption.");
+  add_force_flag(*command, context)->excludes(resume);
   add_threads_option(*command, context);
   add_json_flag(*command, context);
 }

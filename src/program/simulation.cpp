@@ -71,6 +71,16 @@ Result<std::map<std::string, sim::RectifiedView>> rectified_views(const Rig& rig
   return views;
 }
 
+// A recording of the simulator; any other folder stays as it is.
+Status remove_recording(const std::string& folder) {
+  std::error_code error;
+  if (!fs::exists(folder + "/frames.csv", error) || !fs::exists(folder + "/truth", error)) return {};
+  if (Status free = FolderLock::expect_free(folder); !free) return free;
+  fs::remove_all(folder, error);
+  if (!error) return {};
+  return failure(ErrorCode::output, "cannot be removed: " + error.message(), folder);
+}
+
 }  // namespace
 
 Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments) {
@@ -87,6 +97,10 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   if (!drive) return failure(drive);
   auto views = rectified_views(sim::nominal_rig(*rig, scenario->nominal_rig));
   if (!views) return failure(views);
+
+  if (context.force) {
+    if (Status s = remove_recording(arguments.output); !s) return failure(s);
+  }
 
   Progress progress(context.quiet);
   sim::SimulationHooks hooks;

@@ -32,6 +32,7 @@ struct StereoArguments {
   std::string left, right, output, rig, calib, truth, mask;
   std::optional<int> min_disparity, max_disparity;
   std::optional<double> truth_scale;
+  double max_range_m = 0;
   std::string config;
   std::vector<std::string> set;
 };
@@ -162,7 +163,10 @@ Status write_results(const StereoArguments& a, const Pair& pair, ImageView<const
     log.info("points.ply is not written: the scale is unknown without --rig or --calib");
     return {};
   }
-  return write_ply(a.output + "/points.ply", to_point_cloud(disparity, pair.left, *pair.geometry, Pose(), 1, 0.5));
+  CloudSampling sampling;
+  sampling.max_range_m = a.max_range_m;
+  return write_ply(a.output + "/points.ply",
+                   to_point_cloud(disparity, pair.left, *pair.geometry, Pose(), Stamp(), sampling));
 }
 
 double known_percent(ImageView<const float> disparity) {
@@ -238,6 +242,7 @@ Status check_truth_scale(const StereoArguments& a, const Log& log) {
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   const auto options = run_options(context, a.config, a.set);
   if (!options) return failure(options);
+  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
   if (Status s = check_images_fit({a.left, a.right}, memory_bound(context)); !s) return failure(s);
   auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!pair) return failure(pair);
@@ -248,6 +253,8 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (Status s = DisparityComputer::check_memory(pair->left.size(), *range, memory_bound(context)); !s)
     return failure(s);
   if (Status s = expect_not_interrupted(); !s) return failure(s);
+  context.log.info(fmt::format("matching {} x {} px, disparities {} to {}", pair->left.width(), pair->left.height(),
+                               range->min, range->max));
   const auto image = computer->compute(pair->left, pair->right, *range, pair->left_mask, pair->right_mask);
   if (!image) {
     Error error = image.error();
@@ -295,28 +302,35 @@ void add_stereo(CLI::App& app, Context& context) {
   command->add_option("left", a->left, "Left image.")->required();
   command->add_option("right", a->right, "Right image.")->required();
   command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
-  auto* rig = command->add_option("--rig", a->rig, "Calibration of unrectified images; they are rectified first.");
+  auto* rig = command->add_option("--rig", a->rig,
+                                  "Calibration of unrectified images, which are rectified first (default: none).");
   command
-      ->add_option("--calib", a->calib,
-                   "Calibration of images that are already rectified (for the point cloud). Without --rig and --calib "
-                   "images are "
-                   "taken as rectified, and there is no point cloud.")
+      ->add_option(
+          "--calib", a->calib,
+          "Calibration of images that are already rectified, for the point cloud (default: none). Without --rig and "
+          "--calib images are taken as rectified, and there is no point cloud.")
       ->excludes(rig);
   command->add_option("--min-disparity", a->min_disparity, "Minimum disparity in pixels (default 0).");
   command->add_option(
       "--max-disparity", a->max_disparity,
       "Maximum disparity in pixels (default: from the rig, else a quarter of the width). A larger one costs time.");
-  command->add_option("--truth", a->truth, "True disparities (PFM or PNG) to compare with.");
+  command
+      ->add_option("--max-range-m", a->max_range_m,
+                   "Maximum distance of the points of points.ply from the camera in metres (default: no limit).")
+      ->check(positive_number());
+  command->add_option("--truth", a->truth, "True disparities (PFM or PNG) to compare with (default: none).");
   command->add_option("--truth-scale", a->truth_scale, "Divisor of 8-bit true disparities (default 1).");
-  command->add_option("--mask", a->mask,
-                      "Mask of the true disparities: 255 scored and non-occluded, 128 occluded, 0 no truth.");
   command->add_option(
-      "--config", a->config,
-      "YAML file with options as for `spartan run`; `imaging` (with --rig) and `reconstruction` apply.");
+      "--mask", a->mask,
+      "Mask of the true disparities: 255 scored and non-occluded, 128 occluded, 0 no truth (default: all scored).");
+  command->add_option("--config", a->config,
+                      "YAML file with options as for `spartan run`; `imaging` (with --rig) and `reconstruction` apply "
+                      "(default: none).");
   command
       ->add_option("--set", a->set,
                    "Set one option, e.g. imaging.view.policy=all_valid. Repeatable; overrides --config.")
       ->allow_extra_args(false);
+  add_force_flag(*command, context);
   add_threads_option(*command, context);
   add_memory_option(*command, context);
   add_json_flag(*command, context);

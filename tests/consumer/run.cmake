@@ -25,6 +25,14 @@ build("${WORK}/source" "${WORK}/build")
 run("${WORK}/build/consumer")
 run("${prefix}/bin/spartan" --help)
 
+foreach(file IN ITEMS doc/spartan/LICENSE doc/spartan/example/CMakeLists.txt doc/spartan/example/main.cpp
+    bash-completion/completions/spartan zsh/site-functions/_spartan fish/vendor_completions.d/spartan.fish
+    man/man1/spartan.1)
+  if(NOT EXISTS "${prefix}/share/${file}")
+    message(FATAL_ERROR "share/${file} is not installed")
+  endif()
+endforeach()
+
 # Camera models alone: none of these packages may be needed.
 set(hidden)
 foreach(package OpenCV PNG GDAL SQLite3 embree libjpeg-turbo hwy nlohmann_json)

@@ -4,10 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "program.h"
+#include "spartan/core/files.h"
+#include "spartan/testing/real_data.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
@@ -77,6 +84,89 @@ TEST(CommandLine, DisparityRangeThatCannotBeSearchedIsAWrongOption) {
   const auto wide = stereo({"--max-disparity", "320"});
   EXPECT_EQ(wide.exit_code, 2);
   EXPECT_THAT(wide.err, HasSubstr("exceeds the image, which is 320 px wide"));
+}
+
+// The words of an option line of a help text: "  --fps FLOAT   Frames per second …", with the lines that continue it.
+std::vector<std::string> option_texts(const std::string& help) {
+  std::vector<std::string> texts;
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("  -")) {
+      texts.push_back(line);
+    } else if (line.starts_with("    ") && !texts.empty()) {
+      texts.back() += " " + line.substr(line.find_first_not_of(' '));
+    } else {
+      texts.emplace_back();
+    }
+  }
+  return texts;
+}
+
+TEST(CommandLine, HelpStatesTheDefaultOfEveryOptionWithAValue) {
+  const std::regex takes_value(" (TEXT|INT|UINT|FLOAT|HOW|WHICH|S|M,M,…)(:| |$)");
+  int options = 0;
+  for (const std::string command :
+       {"demo", "run", "stereo", "map build", "map info", "map merge", "map export", "evaluate", "rig inspect",
+        "rig convert", "rig design", "config dump", "config check", "export", "simulate"}) {
+    std::vector<std::string> words;
+    std::istringstream parts(command);
+    for (std::string word; parts >> word;) words.push_back(word);
+    words.emplace_back("--help");
+    const auto result = run_program(words);
+    ASSERT_EQ(result.exit_code, 0) << command;
+    for (const std::string& text : option_texts(result.out)) {
+      if (!std::regex_search(text, takes_value) || text.find("REQUIRED") != std::string::npos) continue;
+      ++options;
+      EXPECT_THAT(text, ::testing::AnyOf(HasSubstr("default"), HasSubstr("Repeatable"))) << command;
+    }
+  }
+  EXPECT_GT(options, 40);
+}
+
+TEST(CommandLine, VersionNamesTheCommitAndTheLibraries) {
+  const auto result = run_program({"--version"});
+  ASSERT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, ::testing::ContainsRegex("^spartan [0-9.]+ \\(commit [0-9a-z-]+\\)"));
+  for (const char* library : {"OpenCV 4.", "Eigen 3.", "Highway 1."}) EXPECT_THAT(result.out, HasSubstr(library));
+}
+
+// What is there stays, byte by byte, and is replaced with --force.
+TEST(CommandLine, OutputThatExistsIsReplacedWithForceOnly) {
+  const std::string runs = testing::small_runs_folder(), drive = runs + "/drive", run = runs + "/drive_run";
+  const std::string left = drive + "/image_0/000000.png", right = drive + "/image_1/000000.png";
+  const std::string source = testing::source_folder();
+  const testing::TemporaryFolder folder;
+  const std::vector<std::pair<std::string, std::vector<std::string>>> commands{
+      {"trajectory.tum", {"export", run, "--format", "tum"}},
+      {"stereo/disparity.pfm", {"stereo", left, right}},
+      {"map/map.tif", {"map", "build", left, right, "--rig", drive + "/calib.txt"}},
+      {"design/feasible.csv", {"rig", "design", source + "/config/requirements/rover.yaml"}},
+      {"run/run.sqlite", {"run", drive, "--max-frames", "2", "--odometry-only"}},
+  };
+  for (auto [output, words] : commands) {
+    const std::string file = folder.path() + "/" + output;
+    std::filesystem::create_directories(std::filesystem::path(file).parent_path());
+    std::ofstream(file) << "mine";
+    const std::string parent = output.substr(0, output.find('/'));
+    words.insert(words.end(), {"-o", folder.path() + "/" + parent});
+    const auto refused = run_program(words);
+    EXPECT_EQ(refused.exit_code, 5) << output;
+    EXPECT_THAT(refused.err, HasSubstr("--force")) << output;
+    EXPECT_EQ(read_file(file).value(), "mine") << output;
+    words.emplace_back("--force");
+    const auto replaced = run_program(words);
+    EXPECT_TRUE(replaced.exit_code == 0 || replaced.exit_code == 6) << output << ": " << replaced.err;
+    EXPECT_NE(read_file(file).value(), "mine") << output;
+  }
+}
+
+TEST(CommandLine, ForceLeavesAFolderAloneThatHoldsNoRun) {
+  const testing::TemporaryFolder folder;
+  const std::string note = folder.write("note.txt", "mine");
+  const std::string drive = testing::small_runs_folder() + "/drive";
+  const auto result = run_program({"run", drive, "-o", folder.path(), "--force"});
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_EQ(read_file(note).value(), "mine");
 }
 
 TEST(CommandLine, CompletionKnowsEveryCommandAndIsValidBash) {

@@ -123,7 +123,7 @@ TEST_F(InputWarnings, MapBuildComparesTheGroundWithTheRig) {
     rig.cameras[1].mount_from_camera = body_from_left * Pose::from_translation({0.12, 0, 0});
     folder_.write("mounted.yaml", to_rig_yaml(rig));
     const ProgramResult built =
-        run_program({"map", "build", image(0), image(1), "--rig", path("mounted.yaml"), "-o", path("map")});
+        run_program({"map", "build", image(0), image(1), "--rig", path("mounted.yaml"), "-o", path("map"), "--force"});
     ASSERT_EQ(built.exit_code, 0) << built.err;
     if (height_m == 0.5) {
       EXPECT_THAT(built.err, Not(HasSubstr("disagree")));

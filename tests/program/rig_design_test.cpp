@@ -177,7 +177,7 @@ double x_of(const std::string& svg, const std::string& words) {
 TEST(RigDesign, TheGroundIsDrawnToScale) {
   const testing::TemporaryFolder folder;
   const std::string required = folder.write("required.yaml", replaced(rover_text(), "name: ", "name: a<b "));
-  ASSERT_EQ(run_program({"rig", "design", required, "-o", folder.path(), "-q"}).exit_code, 0);
+  ASSERT_EQ(run_program({"rig", "design", required, "-o", folder.path(), "--force", "-q"}).exit_code, 0);
   const std::string svg = testing::content_of(folder.path() + "/ground.svg");
   EXPECT_THAT(svg, HasSubstr("a&lt;b"));
   EXPECT_LT(x_of(svg, "pan 35°"), x_of(svg, "pan 0°"));
@@ -203,7 +203,7 @@ TEST(RigDesign, TheGroundIsDrawnToScale) {
 // The pixels show what the SVG says: words in the title's line, the colours of both pairs.
 TEST(RigDesign, ThePixelsAreThoseOfTheDrawing) {
   const testing::TemporaryFolder folder;
-  ASSERT_EQ(run_program({"rig", "design", required_rover(), "-o", folder.path(), "-q"}).exit_code, 0);
+  ASSERT_EQ(run_program({"rig", "design", required_rover(), "-o", folder.path(), "--force", "-q"}).exit_code, 0);
   const auto read = read_image(folder.path() + "/ground.png");
   ASSERT_TRUE(read) << read.error().message();
   const auto pixels = read->as<Rgb8>();
@@ -233,8 +233,8 @@ TEST(RigDesign, DrawsWhatIsAskedOfOthers) {
   for (const std::string& required :
        {wide_only, unpublished, without_pans, all_round,
         replaced(replaced(unpublished, "  height_m: 1.0", "  height_m: 30"), "range_m: 4", "range_m: 3")}) {
-    const auto result =
-        run_program({"rig", "design", folder.write("required.yaml", required), "-o", folder.path() + "/out"});
+    const auto result = run_program(
+        {"rig", "design", folder.write("required.yaml", required), "-o", folder.path() + "/out", "--force"});
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_TRUE(read_image(folder.path() + "/out/ground.png"));
     EXPECT_THAT(testing::content_of(folder.path() + "/out/ground.svg"), Not(HasSubstr("nan")));
@@ -257,7 +257,7 @@ TEST(RigDesign, DrawsWhatIsAskedOfOthers) {
 // The text of a ground figure.
 std::string drawn(const testing::TemporaryFolder& folder, const std::string& required) {
   const auto result =
-      run_program({"rig", "design", folder.write("required.yaml", required), "-o", folder.path() + "/out"});
+      run_program({"rig", "design", folder.write("required.yaml", required), "-o", folder.path() + "/out", "--force"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, Not(HasSubstr("nan")));
   std::string svg = testing::content_of(folder.path() + "/out/ground.svg");

@@ -165,7 +165,7 @@ TEST_F(Stops, TheGlobalMapIsDescribedMergedAndExported) {
   EXPECT_EQ(run_program({"map", "info", path("nowhere")}).exit_code, 3);
   EXPECT_EQ(run_program({"map", "info", path("x.png")}).exit_code, 3);
   EXPECT_EQ(run_program({"map", "export", path("whole"), "-o", path("x.xyz")}).exit_code, 2);
-  EXPECT_EQ(run_program({"map", "export", path("whole"), "-o", path("x.tif"), "--window", "1,0,0,1"}).exit_code, 2);
+  EXPECT_EQ(run_program({"map", "export", path("whole"), "-o", path("none.tif"), "--window", "1,0,0,1"}).exit_code, 2);
   EXPECT_EQ(run_program({"map", "export", path("whole"), "-o", path("no/x.tif")}).exit_code, 5);
   EXPECT_EQ(run_program({"map", "merge", path("whole"), path("whole"), "-o", path("no/x.map")}).exit_code, 5);
 }

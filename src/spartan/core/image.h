@@ -11,6 +11,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace spartan {
 
@@ -153,10 +154,17 @@ class Image {
   std::unique_ptr<T, Free> data_;
 };
 
+/// What a value of a band means.
+struct MapCategory {
+  std::string name;
+  Rgb8 colour;
+};
+
 /// One band of a raster map. Row 0 is the northernmost (largest y); NaN means "no data".
 struct MapBand {
-  std::string name;
+  std::string name;  ///< ends with the unit: `_m`, `_m2`, `_rad`
   ImageView<const float> values;
+  std::vector<MapCategory> categories = {};  ///< of the values 0, 1, 2 …; empty: the values are quantities
 };
 
 /// From a lowest to a highest value.

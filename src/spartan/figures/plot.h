@@ -67,4 +67,7 @@ std::string to_html(const Plot& plot);
 /// The plot with its title and legend.
 Image<Rgb8> to_image(const Plot& plot);
 
+/// Pixels with a title above them and a legend below, without axes.
+Image<Rgb8> titled_image(Image<Rgb8> pixels, const std::string& title, const std::vector<ColourKey>& keys);
+
 }  // namespace spartan

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "spartan/figures/drawing.h"
 #include "spartan/figures/plot.h"
@@ -99,6 +100,13 @@ class Legend {
   double x_, y_, left_, right_;
 };
 
+void draw_keys(Drawing& d, const std::vector<ColourKey>& keys, Legend& legend) {
+  for (const ColourKey& key : keys) {
+    const Eigen::Vector2d at = legend.next(key.name);
+    d.fill(box(at.x() - 10, at.y() - 6, at.x() + 10, at.y() + 6), {key.colour});
+  }
+}
+
 double draw_legend(Drawing& d, const Plot& plot, const PlotLayout& l) {
   Legend legend(d, l.total_height, 12, l.total_width - 8);
   for (const PlotLine& line : plot.lines) {
@@ -112,10 +120,7 @@ double draw_legend(Drawing& d, const Plot& plot, const PlotLayout& l) {
     if (m.heading_rad) sample.heading_rad = 0;
     draw_marker(d, sample, legend.next(m.name));
   }
-  for (const ColourKey& key : plot.keys) {
-    const Eigen::Vector2d at = legend.next(key.name);
-    d.fill(box(at.x() - 10, at.y() - 6, at.x() + 10, at.y() + 6), {key.colour});
-  }
+  draw_keys(d, plot.keys, legend);
   return plot.lines.empty() && plot.markers.empty() && plot.keys.empty() ? l.total_height : legend.bottom();
 }
 
@@ -152,6 +157,18 @@ Image<Rgb8> to_image(const Plot& plot) {
   double bottom = draw_legend(d, plot, l);
   if (plot.colour_bar) bottom = draw_colour_bar(d, *plot.colour_bar, bottom + 6);
   d.set_height(static_cast<int>(std::ceil(bottom)));
+  return d.to_image();
+}
+
+Image<Rgb8> titled_image(Image<Rgb8> pixels, const std::string& title, const std::vector<ColourKey>& keys) {
+  constexpr int kTitle_px = 36, kLeastWidth_px = 420;
+  const double width = pixels.width(), bottom = kTitle_px + pixels.height();
+  Drawing d(std::max(pixels.width(), kLeastWidth_px), 0);
+  d.text({12, 22}, title, {kInk, 16});
+  d.picture({0, kTitle_px}, {width, bottom}, std::move(pixels));
+  Legend legend(d, bottom + 8, 12, std::max(width, double{kLeastWidth_px}) - 8);
+  draw_keys(d, keys, legend);
+  d.set_height(static_cast<int>(std::ceil(keys.empty() ? bottom : legend.bottom())));
   return d.to_image();
 }
 

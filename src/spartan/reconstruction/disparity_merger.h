@@ -32,6 +32,7 @@ class PanoramicCamera {
   /// the number of columns per radian, and of rows per unit of slope or per radian.
   PanoramicCamera(Projection projection, ImageSize size, double per_radian, double left_rad, double top);
 
+  Projection projection() const { return projection_; }
   ImageSize size() const { return size_; }
   double per_radian() const { return per_radian_; }
   /// Pixel of a direction (not zero) in this camera's axes: x forward, y left, z up. It may lie outside of the image.

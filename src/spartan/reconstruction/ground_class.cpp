@@ -1,4 +1,5 @@
 #include "spartan/reconstruction/local_map.h"
+#include "spartan/reconstruction/rendering.h"
 
 namespace spartan {
 
@@ -8,6 +9,11 @@ Image<float> class_band(ImageView<const GroundClass> classes) {
     for (int x = 0; x < classes.width(); ++x) band(x, y) = static_cast<float>(classes(x, y));
   }
   return band;
+}
+
+std::vector<MapCategory> class_categories() {
+  constexpr Rgb8 kFreeColour{140, 170, 120};
+  return {{"unknown", kUnknownColour}, {"free", kFreeColour}, {"obstacle", kObstacleColour}, {"cavity", kCavityColour}};
 }
 
 }  // namespace spartan

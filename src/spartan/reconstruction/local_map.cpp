@@ -24,7 +24,7 @@ MapBands LocalMap::bands() const {
                 {"slope_rad", slope_rad.view()},
                 {"roughness_m", roughness_m.view()},
                 {"step_m", step_m.view()},
-                {"class", std::as_const(bands.classes).view()},
+                {"class", std::as_const(bands.classes).view(), class_categories()},
                 {"occupancy_logodds", occupancy_logodds.view()},
                 {"cost", cost.view()}};
   return bands;

@@ -16,6 +16,8 @@ enum class GroundClass : std::uint8_t { unknown = 0, ground = 1, obstacle = 2, c
 
 /// The band "class" of a map file.
 Image<float> class_band(ImageView<const GroundClass> classes);
+/// Names and colours of its values.
+std::vector<MapCategory> class_categories();
 
 /// A cell of a map: row 0 lies in the north (largest y), column 0 in the west (smallest x).
 struct GridCell {

@@ -10,7 +10,7 @@
 namespace spartan {
 namespace {
 
-constexpr Rgb8 kUnknown = kUnknownColour, kObstacle = kObstacleColour, kCavity = kCavityColour, kGround{70, 190, 80};
+constexpr Rgb8 kUnknown = kUnknownColour, kObstacle = kObstacleColour, kCavity = kCavityColour, kGround = kGroundColour;
 
 constexpr double kLevelLight = 0.05 + 1.05 * 0.7071;
 
@@ -136,15 +136,14 @@ Image<Rgb8> render_v_disparity(const VDisparity& v_disparity, const RectifiedSte
   }
   cv::Mat mat = as_mat(image);
   for (const GroundProfile& profile : v_disparity.profiles)
-    draw_curve(mat, curve_of(v_disparity, geometry, profile, 0), {235, 205, 40});
+    draw_curve(mat, curve_of(v_disparity, geometry, profile, 0), kGroundProfileColour);
   const GroundProfile& middle = v_disparity.profiles[v_disparity.profiles.size() / 2];
   draw_curve(mat, curve_of(v_disparity, geometry, middle, options.obstacle_m), kObstacle);
   draw_curve(mat, curve_of(v_disparity, geometry, middle, -options.cavity_m), kCavity);
   return image;
 }
 
-Image<Rgb8> render_view_coverage(ImageView<const std::uint8_t> views) {
-  // Colours of single views; sets of views have their mean colour.
+Rgb8 view_colour(std::size_t view) {
   constexpr std::array<Rgb8, 8> kColours{{{230, 80, 60},
                                           {80, 190, 80},
                                           {70, 110, 230},
@@ -153,15 +152,20 @@ Image<Rgb8> render_view_coverage(ImageView<const std::uint8_t> views) {
                                           {80, 200, 210},
                                           {240, 150, 60},
                                           {150, 150, 150}}};
+  return kColours[view % kColours.size()];
+}
+
+Image<Rgb8> render_view_coverage(ImageView<const std::uint8_t> views) {
   Image<Rgb8> image(views.size());
   for (int y = 0; y < views.height(); ++y) {
     for (int x = 0; x < views.width(); ++x) {
       int r = 0, g = 0, b = 0, count = 0;
-      for (std::size_t i = 0; i < kColours.size(); ++i) {
+      for (std::size_t i = 0; i < 8; ++i) {
         if ((views(x, y) >> i & 1U) == 0) continue;
-        r += kColours[i].r;
-        g += kColours[i].g;
-        b += kColours[i].b;
+        const Rgb8 colour = view_colour(i);
+        r += colour.r;
+        g += colour.g;
+        b += colour.b;
         ++count;
       }
       image(x, y) = count == 0 ? kUnknown

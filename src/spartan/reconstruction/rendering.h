@@ -19,6 +19,7 @@ Image<Rgb8> colour_disparity(ImageView<const float> disparity);
 /// "cividis" (Nuñez, Anderton & Renslow, PLOS ONE 2018). Red and blue remain free for obstacles and cavities.
 Rgb8 elevation_colour(double value);
 inline constexpr Rgb8 kObstacleColour{220, 50, 40}, kCavityColour{40, 90, 230}, kUnknownColour{236, 233, 228};
+inline constexpr Rgb8 kGroundColour{70, 190, 80}, kGroundProfileColour{235, 205, 40};
 /// The 2nd to the 98th percentile of the elevations of the ground (of all cells where there is none), at least 5 cm:
 /// what the colours of a map span.
 Range elevation_colour_range(ImageView<const float> elevation_m, ImageView<const GroundClass> kind);
@@ -35,7 +36,9 @@ Image<Rgb8> render_classes(ImageView<const std::uint8_t> left, ImageView<const s
 Image<Rgb8> render_v_disparity(const VDisparity& v_disparity, const RectifiedStereo& geometry,
                                const VDisparityOptions& options);
 
-/// The views that contributed to each cell, a colour for each set of them, the same for every eighth view. `views` as
+/// The colour of one view in render_view_coverage(), the same for every eighth view.
+Rgb8 view_colour(std::size_t view);
+/// The views that contributed to each cell; the colour of several views is the mean of theirs. `views` as
 /// MergedRange::views.
 Image<Rgb8> render_view_coverage(ImageView<const std::uint8_t> views);
 

@@ -67,7 +67,7 @@ MapBands MapView::bands(const Traversability& shape) const {
                 {"slope_rad", shape.slope_rad.view()},
                 {"roughness_m", shape.roughness_m.view()},
                 {"step_m", shape.step_m.view()},
-                {"class", std::as_const(bands.classes).view()},
+                {"class", std::as_const(bands.classes).view(), class_categories()},
                 {"occupancy_logodds", occupancy_logodds.view()},
                 {"cost", shape.cost.view()}};
   return bands;

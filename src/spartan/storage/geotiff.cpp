@@ -5,6 +5,7 @@
 
 #ifdef SPARTAN_HAS_GDAL
 #include <gdal_priv.h>
+#include <ogr_spatialref.h>
 
 #include <algorithm>
 #include <array>
@@ -69,12 +70,53 @@ class GdalErrors {
   std::array<char, 512> text_{};
 };
 
+using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
+
+// A raster of classes alone: bytes, for which TIFF has colour tables.
+bool is_classes(const std::vector<MapBand>& bands) {
+  return bands.size() == 1 && !bands.front().categories.empty();
+}
+
+constexpr int kLargestWithoutOverviews = 512;  // cells a side
+
+// "m2" of "variance_m2".
+std::string unit_of(const std::string& name) {
+  const std::string unit = name.substr(std::min(name.size(), name.rfind('_') + 1));
+  const std::array<const char*, 3> known{"m", "m2", "rad"};
+  return std::find(known.begin(), known.end(), unit) == known.end() ? std::string() : unit;
+}
+
+bool describe(GDALDataset& dataset, const GeoTransform& place, const MapDescription& description) {
+  std::array<double, 6> transform{place.west_m, place.cell_m, 0, place.north_m, 0, -place.cell_m};
+  OGRSpatialReference local;
+  if (local.SetLocalCS(description.coordinate_system.c_str()) != OGRERR_NONE ||
+      local.SetLinearUnits(SRS_UL_METER, 1) != OGRERR_NONE || dataset.SetSpatialRef(&local) != CE_None ||
+      dataset.SetGeoTransform(transform.data()) != CE_None) {
+    return false;
+  }
+  return std::all_of(description.items.begin(), description.items.end(), [&](const auto& item) {
+    return dataset.SetMetadataItem(item.first.c_str(), item.second.c_str()) == CE_None;
+  });
+}
+
+bool set_colours(GDALRasterBand& band, const std::vector<MapCategory>& categories) {
+  GDALColorTable colours;
+  for (std::size_t i = 0; i < categories.size(); ++i) {
+    const Rgb8 colour = categories[i].colour;
+    const GDALColorEntry entry{colour.r, colour.g, colour.b, 255};
+    colours.SetColorEntry(static_cast<int>(i), &entry);
+  }
+  return band.SetColorTable(&colours) == CE_None;
+}
+
 bool write_bands(GDALDataset& dataset, const std::vector<MapBand>& bands) {
   for (std::size_t i = 0; i < bands.size(); ++i) {
     GDALRasterBand* const band = dataset.GetRasterBand(static_cast<int>(i) + 1);
     const ImageView<const float>& values = bands[i].values;
     band->SetDescription(bands[i].name.c_str());
-    band->SetNoDataValue(std::numeric_limits<double>::quiet_NaN());
+    band->SetUnitType(unit_of(bands[i].name).c_str());
+    band->SetNoDataValue(is_classes(bands) ? 0 : std::numeric_limits<double>::quiet_NaN());
+    if (is_classes(bands) && !set_colours(*band, bands[i].categories)) return false;
     // RasterIO takes a void* in both directions; with GF_Write it does not change the data.
     const CPLErr error =
         band->RasterIO(GF_Write, 0, 0, values.width(), values.height(), const_cast<float*>(values.data()),
@@ -85,7 +127,38 @@ bool write_bands(GDALDataset& dataset, const std::vector<MapBand>& bands) {
   return true;
 }
 
-using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
+bool build_overviews(GDALDataset& dataset) {
+  std::vector<int> factors;
+  const int side = std::max(dataset.GetRasterXSize(), dataset.GetRasterYSize());
+  for (int factor = 2; side > kLargestWithoutOverviews * factor / 2; factor *= 2) factors.push_back(factor);
+  if (factors.empty()) return true;
+  dataset.FlushCache(false);  // a failure reaches the error handler
+  return dataset.BuildOverviews("NEAREST", static_cast<int>(factors.size()), factors.data(), 0, nullptr, nullptr,
+                                nullptr) == CE_None;
+}
+
+// GDAL keeps names of categories in a file beside a GeoTIFF; empty where there are none.
+std::string sidecar_text(const std::vector<MapBand>& bands) {
+  std::string text;
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    if (bands[i].categories.empty()) continue;
+    text += "  <PAMRasterBand band=\"" + std::to_string(i + 1) + "\">\n    <CategoryNames>\n";
+    for (const MapCategory& category : bands[i].categories)
+      text += "      <Category>" + category.name + "</Category>\n";
+    text += "    </CategoryNames>\n  </PAMRasterBand>\n";
+  }
+  return text.empty() ? text : "<PAMDataset>\n" + text + "</PAMDataset>\n";
+}
+
+Status publish(const std::string& temporary, const std::string& path, const std::vector<MapBand>& bands) {
+  if (const std::string sidecar = sidecar_text(bands); !sidecar.empty()) {
+    if (Status s = write_file_atomically(geotiff_sidecar(path), sidecar); !s) {
+      std::remove(temporary.c_str());
+      return s;
+    }
+  }
+  return publish_file(temporary, path);
+}
 
 Dataset open_geotiff(const std::string& path) {
   const std::array<const char*, 2> drivers{"GTiff", nullptr};
@@ -102,8 +175,10 @@ std::optional<Image<float>> read_band(GDALRasterBand& band) {
   return values;
 }
 
-bool same_values(const ImageView<const float>& a, const ImageView<const float>& b) {
-  const auto same = [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); };
+bool same_values(const ImageView<const float>& a, const ImageView<const float>& b, bool nan_is_0) {
+  const auto same = [nan_is_0](float x, float y) {
+    return x == y || (std::isnan(y) && (nan_is_0 ? x == 0 : std::isnan(x)));
+  };
   for (int y = 0; y < a.height(); ++y) {
     if (!std::equal(a.row(y), a.row(y) + a.width(), b.row(y), same)) return false;
   }
@@ -116,14 +191,15 @@ bool holds(const std::string& path, const std::vector<MapBand>& bands) {
   const Dataset dataset = open_geotiff(path);
   for (std::size_t i = 0; dataset && i < bands.size(); ++i) {
     const auto values = read_band(*dataset->GetRasterBand(static_cast<int>(i) + 1));
-    if (!values || !same_values(values->view(), bands[i].values)) return false;
+    if (!values || !same_values(values->view(), bands[i].values, is_classes(bands))) return false;
   }
   return dataset != nullptr;
 }
 
 }  // namespace
 
-Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands) {
+Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands,
+                     const MapDescription& description) {
   const ImageSize size = bands.empty() ? ImageSize{} : bands.front().values.size();
   for (const MapBand& band : bands) {
     if (band.values.size() != size || size.empty())
@@ -134,15 +210,16 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
   GDALRegister_GTiff();
   const std::string temporary = temporary_name(path);
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
-  const std::array<const char*, 6> options{"COMPRESS=DEFLATE", "PREDICTOR=3",      "TILED=YES",
-                                           "NUM_THREADS=1",    "BIGTIFF=IF_SAFER", nullptr};
+  const std::array<const char*, 6> options{"COMPRESS=DEFLATE", is_classes(bands) ? "PREDICTOR=1" : "PREDICTOR=3",
+                                           "TILED=YES",        "NUM_THREADS=1",
+                                           "BIGTIFF=IF_SAFER", nullptr};
   Dataset dataset(driver->Create(temporary.c_str(), size.width, size.height, static_cast<int>(bands.size()),
-                                 GDT_Float32, const_cast<char**>(options.data())));
+                                 is_classes(bands) ? GDT_Byte : GDT_Float32, const_cast<char**>(options.data())));
   if (dataset) {
-    std::array<double, 6> transform{place.west_m, place.cell_m, 0, place.north_m, 0, -place.cell_m};
-    const bool complete = dataset->SetGeoTransform(transform.data()) == CE_None && write_bands(*dataset, bands);
+    const bool complete =
+        describe(*dataset, place, description) && write_bands(*dataset, bands) && build_overviews(*dataset);
     dataset.reset();  // writes the last blocks: a full disk is reported here
-    if (complete && !errors.any() && holds(temporary, bands)) return publish_file(temporary, path);
+    if (complete && !errors.any() && holds(temporary, bands)) return publish(temporary, path, bands);
   }
   std::remove(temporary.c_str());
   return errors.error(ErrorCode::output, "cannot be written: ", path);
@@ -169,7 +246,7 @@ Result<LoadedMap> read_geotiff(const std::string& path) {
 
 #else
 
-Status write_geotiff(const std::string& path, const GeoTransform&, const std::vector<MapBand>&) {
+Status write_geotiff(const std::string& path, const GeoTransform&, const std::vector<MapBand>&, const MapDescription&) {
   return failure(ErrorCode::usage, "cannot write GeoTIFF: Spartan was built without GDAL", path,
                  "install libgdal-dev and rebuild");
 }
@@ -179,5 +256,9 @@ Result<LoadedMap> read_geotiff(const std::string& path) {
 }
 
 #endif
+
+std::string geotiff_sidecar(const std::string& path) {
+  return path + ".aux.xml";
+}
 
 }  // namespace spartan

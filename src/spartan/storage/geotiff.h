@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "spartan/core/image.h"
@@ -9,10 +10,21 @@
 
 namespace spartan {
 
-/// Writes float32 bands of equal size, compressed, without a map projection. The file is written atomically.
-/// It is read back before it replaces an older one. Code `output` if it cannot be written, `usage` if Spartan was built
-/// without GDAL.
-Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands);
+/// What a raster map states about itself: the name of its coordinate system and items of the default metadata domain.
+struct MapDescription {
+  std::string coordinate_system = "world frame of Spartan, metres";
+  std::vector<std::pair<std::string, std::string>> items = {};  ///< name and value
+};
+
+/// Writes float32 bands of equal size, compressed, with nodata NaN, in a local (engineering) coordinate system in
+/// metres. Bands have their names, units and, in `path`.aux.xml, the names of their categories. A single band with
+/// categories is written as bytes with a colour table and nodata 0; NaN is then 0. Maps of more than 512 cells a side
+/// have overviews (nearest neighbour). The files are written atomically, and the map is read back before it replaces an
+/// older one. Code `output` if it cannot be written, `usage` if Spartan was built without GDAL.
+Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands,
+                     const MapDescription& description = {});
+/// The file beside a GeoTIFF that GDAL reads with it: names of categories.
+std::string geotiff_sidecar(const std::string& path);
 
 /// The content of such a GeoTIFF; bands as float32.
 struct LoadedMap {

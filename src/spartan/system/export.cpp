@@ -20,12 +20,14 @@ using namespace internal;
 
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ExportFormat>, 6> kFormats{{{"tum", ExportFormat::tum},
+constexpr std::array<std::pair<std::string_view, ExportFormat>, 8> kFormats{{{"tum", ExportFormat::tum},
                                                                              {"kitti", ExportFormat::kitti},
                                                                              {"euroc", ExportFormat::euroc},
                                                                              {"csv", ExportFormat::csv},
                                                                              {"geotiff", ExportFormat::geotiff},
-                                                                             {"ply", ExportFormat::ply}}};
+                                                                             {"octomap", ExportFormat::octomap},
+                                                                             {"ply", ExportFormat::ply},
+                                                                             {"pcd", ExportFormat::pcd}}};
 
 Result<std::string> kitti_text(const RunFolder& folder, const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
   const auto rig = read_rig_yaml(folder.rig());
@@ -70,7 +72,9 @@ Result<std::string> trajectory_text(const RunFolder& folder, ExportFormat format
     case ExportFormat::csv:
       return csv_text(frames, kind);
     case ExportFormat::geotiff:
+    case ExportFormat::octomap:
     case ExportFormat::ply:
+    case ExportFormat::pcd:
       break;
   }
   return failure(ErrorCode::internal, "is not a trajectory format", folder.path);
@@ -81,12 +85,21 @@ TrajectoryKind best_of(const std::vector<FrameRecord>& frames) {
                        [&](TrajectoryKind kind) { return has_trajectory(frames, kind); });
 }
 
-Status export_map(const std::string& run_folder, const ThreadPool& workers, const std::string& path) {
+Status export_whole_map(const std::string& run_folder, MapFormat format, const ThreadPool& workers,
+                        const std::string& path) {
   auto saved = SavedMap::open(run_folder);
   if (!saved) return failure(saved);
   const auto view = saved->map().view(saved->map().extent());
   if (!view) return failure(view);
-  return write_map_geotiff(*view, saved->options().mapping.map, workers, path);
+  return export_map(*view, {format, {}, saved->options().mapping.map, saved->about()}, workers, path);
+}
+
+Status export_terrain(const RunFolder& folder, RunStore& store, ExportFormat format, const std::string& path) {
+  const auto terrain = store.terrain();
+  if (!terrain) return failure(terrain);
+  const auto cloud = terrain_cloud(folder.terrain(), *terrain);
+  if (!cloud) return failure(cloud);
+  return format == ExportFormat::pcd ? write_pcd(path, *cloud) : write_ply(path, *cloud);
 }
 
 }  // namespace
@@ -102,15 +115,12 @@ Result<ExportFormat> parse_export_format(std::string_view name) {
 
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
                   const ThreadPool& workers, const std::string& path) {
-  if (format == ExportFormat::geotiff) return export_map(run_folder, workers, path);
+  if (format == ExportFormat::geotiff) return export_whole_map(run_folder, MapFormat::geotiff, workers, path);
+  if (format == ExportFormat::octomap) return export_whole_map(run_folder, MapFormat::octomap, workers, path);
   const RunFolder folder{run_folder};
   auto store = RunStore::open_read_only(folder.store());
   if (!store) return failure(store);
-  if (format == ExportFormat::ply) {
-    const auto terrain = store->terrain();
-    if (!terrain) return failure(terrain);
-    return merge_terrain_clouds(folder.terrain(), *terrain, path);
-  }
+  if (format == ExportFormat::ply || format == ExportFormat::pcd) return export_terrain(folder, *store, format, path);
   const auto frames = store->frames();
   if (!frames) return failure(frames);
   if (frames->empty()) return failure(ErrorCode::input, "contains no frames", folder.store());

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "spartan/core/result.h"
 #include "spartan/reconstruction/stop_mapper.h"
@@ -13,22 +15,41 @@
 
 namespace spartan {
 
+/// What the files of a map state about it.
+struct MapContext {
+  std::optional<bool> x_is_east;  ///< else x is the start heading; none: not known
+  std::vector<MapStop> stops;     ///< those that the map was made of
+};
+
 /// Writes `path`.tif (all layers, docs/reference/files.md) and `path`.png (elevation and classes with axes, scale and
 /// legend). Code `output`.
-Status write_local_map(const LocalMap& map, const std::string& path);
+Status write_local_map(const LocalMap& map, const MapContext& about, const std::string& path);
 
 /// Writes the same files of the whole global map; none if it is empty. Codes: those of GlobalMap::view, `output`.
-Status write_global_map(GlobalMap& map, const MapOptions& options, const ThreadPool& workers, const std::string& path);
+Status write_global_map(GlobalMap& map, const MapOptions& options, std::optional<bool> x_is_east,
+                        const ThreadPool& workers, const std::string& path);
 
 /// Removes the files that write_local_map() or write_global_map() wrote to `path`, if they exist. Code `output`.
 Status remove_map_files(const std::string& path);
 
-/// Writes a part of the global map as a GeoTIFF with all layers. Code `output`.
-Status write_map_geotiff(const MapView& view, const MapOptions& options, const ThreadPool& workers,
-                         const std::string& path);
+/// figure: elevation and classes with axes, scale and legend. ply, pcd: centres of cells. octomap: a binary OcTree.
+/// ascii_grid: one layer as an ESRI ASCII grid. occupancy_grid: the YAML file of map_server (ROS) and Nav2, with an
+/// image .pgm beside it.
+enum class MapFormat { geotiff, figure, ply, pcd, octomap, ascii_grid, occupancy_grid };
 
-/// Elevation and classes in colour, with axes, scale and legend.
-Image<Rgb8> draw_map(const MapView& view, const std::string& title);
+/// By the extension: .tif, .png, .ply, .pcd, .bt, .asc or .yaml. Code `usage` for others.
+Result<MapFormat> map_format_of(const std::string& path);
+
+/// What export_map() writes.
+struct MapExport {
+  MapFormat format = MapFormat::geotiff;
+  std::vector<std::string> layers = {};  ///< names of the bands of a GeoTIFF or grid; empty: all, or elevation_m
+  MapOptions options = {};               ///< of the slopes and costs
+  MapContext about = {};
+};
+
+/// Writes a part of the global map. Codes: `usage` (unknown layers), `output`.
+Status export_map(const MapView& view, const MapExport& request, const ThreadPool& workers, const std::string& path);
 
 /// Writes the 3D reconstruction of a stop into an existing folder: map.tif, map.png, obstacles.csv; range.pfm,
 /// range_sigma.pfm, panorama.png, coverage.png and points.ply of the merged view; `<pair>_<stamp_ns>_classes.png` and
@@ -46,12 +67,15 @@ class SavedMap {
   GlobalMap& map() { return file_ ? file_->map() : *run_map_; }
   /// Options of the run; the defaults for a map file.
   const RunOptions& options() const { return options_; }
+  /// The stops of the map, and where its x axis points if the run has stated it.
+  MapContext about() const;
 
  private:
   explicit SavedMap(RunOptions options) : options_(std::move(options)) {}
   static Result<SavedMap> open_run(const std::string& path);
 
   RunOptions options_;
+  std::optional<bool> x_is_east_;
   std::unique_ptr<MapFile> file_;
   std::unique_ptr<RunStore> run_store_;
   std::unique_ptr<GlobalMap> run_map_;

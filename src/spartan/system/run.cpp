@@ -55,13 +55,13 @@ Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, 
   return RunStore::create(folder.store(), identity);
 }
 
-Status write_map(GlobalMap& map, const MapOptions& options, const ThreadPool& workers, const RunFolder& folder,
-                 const Log& log) {
+Status write_map(GlobalMap& map, const MapOptions& options, bool x_is_east, const ThreadPool& workers,
+                 const RunFolder& folder, const Log& log) {
   if (map.extent().cells() > GlobalMap::kMostCells) {
     log.warning("the global map is too large for one image; `spartan map export --window` exports a part of it");
     return remove_map_files(folder.global_map());  // of the run before it was resumed
   }
-  return write_global_map(map, options, workers, folder.global_map());
+  return write_global_map(map, options, x_is_east, workers, folder.global_map());
 }
 
 // Stages that the options disable.
@@ -108,7 +108,10 @@ Result<RunOutcome> write_results(RunLoop& run_loop, const RunOptions& options, c
     if (Status s = write_file_atomically(folder.trajectory(kind), to_tum(trajectory_of(*frames, kind))); !s)
       return failure(s);
   }
-  if (Status s = write_map(run_loop.global_map(), options.mapping.map, workers, folder, log); !s) return failure(s);
+  if (Status s = write_map(run_loop.global_map(), options.mapping.map, run_loop.heading_east(), workers, folder, log);
+      !s) {
+    return failure(s);
+  }
   facts.peak_memory_bytes = peak_memory_bytes();
   RunOutcome outcome;
   outcome.summary_json = to_summary_json(facts, *frames);
@@ -156,6 +159,9 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
     map_text = to_text(*scale, options);
     pipeline = Pipeline::create(info.rig, options, workers, mask_folder);
     if (!pipeline) return failure(pipeline);
+  }
+  if (request.replace) {
+    if (Status s = replace_run_folder(folder); !s) return failure(s);
   }
   auto prepared = prepare_run_folder(folder, request.resume);
   if (!prepared) return failure(prepared);

@@ -27,7 +27,7 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
   }
   const auto exists = [&] {
     return failure(ErrorCode::output, "already exists and is not overwritten", folder.path,
-                   "choose another folder with -o, or continue the run with --resume");
+                   "choose another folder with -o, continue the run with --resume, or replace it with --force");
   };
   if (!created && !resume) {
     if (Status free = FolderLock::expect_free(folder.path); !free) return failure(free);
@@ -45,6 +45,15 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
     remove_temporary_files(part);
   }
   return OwnedRunFolder{created ? FolderState::created : FolderState::existed, std::move(*lock)};
+}
+
+Status replace_run_folder(const RunFolder& folder) {
+  std::error_code error;
+  if (!fs::exists(folder.store(), error)) return {};
+  if (Status free = FolderLock::expect_free(folder.path); !free) return free;
+  fs::remove_all(folder.path, error);
+  if (!error) return {};
+  return failure(ErrorCode::output, "cannot be removed: " + error.message(), folder.path);
 }
 
 void remove_run_folder(const RunFolder& folder) {

@@ -71,19 +71,23 @@ struct OwnedRunFolder {
 /// on it, or if it cannot be created; `resources`.
 Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume);
 
+/// Removes a folder that holds a run; any other one stays as it is. Code `output` if another process works on it, or it
+/// cannot be removed.
+Status replace_run_folder(const RunFolder& folder);
+
 /// Removes the folder of a run that failed without any result.
 void remove_run_folder(const RunFolder& folder);
 
-enum class ExportFormat { tum, kitti, euroc, csv, geotiff, ply };
+enum class ExportFormat { tum, kitti, euroc, csv, geotiff, octomap, ply, pcd };
 
 /// Code `usage` for an unknown name.
 Result<ExportFormat> parse_export_format(std::string_view name);
 
 /// tum, euroc: world_from_body of every measured pose. kitti: first left optical frame from left optical frame, one
 /// line for every listed frame; a frame without a pose has the predicted one. csv: every frame with status, pose and
-/// standard deviations (empty without a pose). geotiff: the global map. ply: all terrain point clouds in one file.
-/// `kind` selects the trajectory; none: the best that the run has. Codes: `input` (no run, or a run without the
-/// requested result), `output`.
+/// standard deviations (empty without a pose). geotiff, octomap: the global map. ply, pcd: all terrain point clouds in
+/// one file. `kind` selects the trajectory; none: the best that the run has. Codes: `input` (no run, or a run without
+/// the requested result), `output`.
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
                   const ThreadPool& workers, const std::string& path);
 

@@ -24,6 +24,7 @@ struct TerrainOptions {
   double every_m = 5.0;           ///< path length between two terrain views, m; 0: every frame
   int point_step_px = 2;          ///< subsampling of the point cloud, px
   double max_range_error = 0.05;  ///< maximum relative range error of a point at 0.3 px of disparity error
+  double max_range_m = 0;         ///< maximum distance of a point from the camera, m; 0: no limit
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -42,6 +43,10 @@ struct TerrainOptions {
             "Maximum relative range error of a point of the cloud, for a disparity error of 0.3 px; raising it keeps "
             "more distant, less accurate points.",
             between(0.001, 1));
+    v.field("max_range_m", max_range_m,
+            "Maximum distance of a point of the cloud from the camera in metres; raising it keeps more distant points, "
+            "0 keeps all that max_range_error allows.",
+            at_least(0));
   }
 };
 

@@ -1,10 +1,29 @@
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "spartan/core/files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan {
+namespace {
+
+// As the summary states it; none before a run has written one.
+std::optional<bool> x_is_east(const RunFolder& folder) {
+  const auto text = read_file(folder.summary());
+  if (!text) return std::nullopt;
+  const auto json = nlohmann::json::parse(*text, nullptr, false);
+  const auto heading = json.is_object() ? json.find("world") : json.end();
+  if (json.is_discarded() || heading == json.end() || !heading->is_object()) return std::nullopt;
+  return heading->value("heading", "") == "east";
+}
+
+}  // namespace
+
+MapContext SavedMap::about() const {
+  return {x_is_east_, (file_ ? file_->map() : *run_map_).stops()};
+}
 
 Result<SavedMap> SavedMap::open_run(const std::string& path) {
   const RunFolder folder{path};
@@ -15,6 +34,7 @@ Result<SavedMap> SavedMap::open_run(const std::string& path) {
   const auto rig = read_rig_yaml(folder.rig());
   if (!rig) return failure(rig);
   SavedMap saved(resolved_options(std::move(*options), *rig));
+  saved.x_is_east_ = x_is_east(folder);
   saved.run_store_ = std::make_unique<RunStore>(std::move(*store));
   auto map =
       GlobalMap::from_store(saved.options_.slam.map, saved.options_.mapping.map.cell_m, saved.run_store_->tiles());

@@ -124,7 +124,9 @@ std::vector<StageTime> RunLoop::take_stage_times() {
 
 Result<MapRecord> RunLoop::write_map_of(const MappedStop& stop) {
   const LocalMap& map = stop.merged.local;
-  const Status written = clock_.measure("maps", [&] { return write_local_map(map, folder_.local_map(stop.stamp)); });
+  const MapContext about{heading_east(), {{0, stop.stamp, stop.merged.corrected}}};
+  const Status written =
+      clock_.measure("maps", [&] { return write_local_map(map, about, folder_.local_map(stop.stamp)); });
   if (!written) return failure(written);
   MapRecord record;
   record.stamp = stop.stamp;
@@ -183,8 +185,10 @@ Status RunLoop::process_frame(const StereoFrame& frame) {
     hooks_.log.warning(fmt::format("frame {}: odometry lost: {}", output.frame_id, output.motion.reason));
   }
   if (output.terrain) {
-    auto written = clock_.measure(
-        "terrain", [&] { return write_terrain(*output.terrain, request_.options.terrain, folder_.terrain()); });
+    auto written = clock_.measure("terrain", [&] {
+      return write_terrain(*output.terrain, request_.options.terrain, request_.options.mapping.disparity_sigma_px,
+                           folder_.terrain());
+    });
     if (!written) return failure(written);
     step.terrain = *written;
   }

@@ -25,12 +25,14 @@ double known_percent(ImageView<const float> disparity) {
 
 }  // namespace
 
-Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, const std::string& folder) {
+Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, double disparity_sigma_px,
+                                    const std::string& folder) {
   const std::string path = stem(folder, view.pair.stamp);
   // Δz / z = Δd / d: a bound on the relative range error is a lower bound on the disparity.
-  const double min_disparity = kDisparityErrorPx / options.max_range_error;
+  const CloudSampling sampling{options.point_step_px, kDisparityErrorPx / options.max_range_error, options.max_range_m,
+                               disparity_sigma_px};
   const PointCloud cloud = to_point_cloud(view.disparity, view.pair.left, view.pair.geometry, view.world_from_left,
-                                          options.point_step_px, min_disparity);
+                                          view.pair.stamp, sampling);
   if (Status s = write_pfm(path + ".pfm", view.disparity); !s) return failure(s);
   if (Status s = write_png(path + ".png", colour_disparity(view.disparity)); !s) return failure(s);
   if (Status s = write_ply(path + ".ply", cloud); !s) return failure(s);
@@ -38,8 +40,7 @@ Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOption
                        static_cast<std::int64_t>(cloud.size())};
 }
 
-Status merge_terrain_clouds(const std::string& folder, const std::vector<TerrainRecord>& terrain,
-                            const std::string& path) {
+Result<PointCloud> terrain_cloud(const std::string& folder, const std::vector<TerrainRecord>& terrain) {
   if (terrain.empty()) return failure(ErrorCode::input, "contains no terrain", folder, "run without --odometry-only");
   PointCloud all;
   for (const TerrainRecord& record : terrain) {
@@ -47,7 +48,7 @@ Status merge_terrain_clouds(const std::string& folder, const std::vector<Terrain
     if (!cloud) return failure(cloud);
     all.insert(all.end(), cloud->begin(), cloud->end());
   }
-  return write_ply(path, all);
+  return all;
 }
 
 }  // namespace spartan::internal

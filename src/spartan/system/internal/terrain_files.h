@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "spartan/core/result.h"
+#include "spartan/reconstruction/point_cloud.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run_options.h"
 #include "spartan/system/run_store.h"
@@ -14,10 +15,10 @@ namespace spartan::internal {
 /// Writes <folder>/<stamp_ns>.pfm (disparity, px), .png (colour-coded disparity) and .ply (points, metres, world
 /// frame; only those within the maximum range error).
 /// Code `output`.
-Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, const std::string& folder);
+Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, double disparity_sigma_px,
+                                    const std::string& folder);
 
-/// Merges all point clouds of a run into one PLY file. Codes: `input` (no terrain, or a damaged file), `output`.
-Status merge_terrain_clouds(const std::string& folder, const std::vector<TerrainRecord>& terrain,
-                            const std::string& path);
+/// All point clouds of a run. Code `input` (no terrain, or a damaged file).
+Result<PointCloud> terrain_cloud(const std::string& folder, const std::vector<TerrainRecord>& terrain);
 
 }  // namespace spartan::internal

@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""Runs the command lines of README.md, of the other documents and of `--help`, as they are written.
+
+    documented_commands_test.py [--long] PROGRAM SOURCE SMALL_RUNS   SMALL_RUNS: the folder that make_small_runs filled
+
+A command line is a line of a code block, or an example of --help, that starts with `spartan`. Lines with placeholders
+in capitals, brackets or "…" are synopses. They run in the order of the documents, in a folder that holds what `make
+demo` leaves and the other files that they name. Lines that render a shipped scenario take a minute: --long runs them
+alone. Lines with $SPARTAN_DATA need the recordings. Exit code 77 (skipped) where the program has no simulator.
+"""
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+PLACEHOLDER = re.compile(r"(?<![$\w])[A-Z][A-Z_]+\b|[\[\]…]|<\w+>|\w\|\w")
+RENDERS = re.compile(r"^spartan (demo|simulate)\b")
+
+
+def lines_of_documents(source):
+    for document in [source / "README.md", *sorted((source / "docs").rglob("*.md"))]:
+        inside = False
+        text = document.read_text(encoding="utf-8")
+        text = re.sub(r"\\\n", lambda _: "\\\0", text)  # a line that continues is one line, with the number of its first
+        for number, line in enumerate(text.split("\n"), 1):
+            line = line.replace("\\\0", " ")
+            if line.lstrip().startswith("```"):
+                inside = not inside
+            elif inside and line.startswith("spartan ") and not PLACEHOLDER.search(line.split("  #")[0]):
+                yield f"{document.relative_to(source)}:{number}", line
+
+
+def helps(program, words=()):
+    text = subprocess.run([program, *words, "--help"], check=True, capture_output=True, text=True, timeout=60).stdout
+    commands = re.findall(r"^  ([a-z]+) ", text.partition("Subcommands:")[2], re.MULTILINE)
+    if not commands:
+        yield words, text
+    for command in commands:
+        yield from helps(program, (*words, command))
+
+
+def lines_of_help(program):
+    for words, text in helps(program):
+        example = re.search(r"Example:\s+(spartan .*)", text)
+        if example is None:
+            sys.exit(f"failed: spartan {' '.join(words)} --help has no example")
+        yield f"spartan {' '.join(words)} --help", example[1]
+
+
+def prepare(program, source, small_runs, work):
+    """What `make demo` leaves, from a smaller scenario, and the files that the examples name."""
+    def spartan(*arguments):
+        done = subprocess.run([program, *map(str, arguments), "-q"], cwd=work, capture_output=True, text=True, timeout=300)
+        if done.returncode not in (0, 6):  # 6: lost for a part of the small drive
+            sys.exit(f"failed: spartan {' '.join(map(str, arguments))}: {done.stderr}")
+    for name in ("small.yaml", "small_rig.yaml"):
+        shutil.copy(small_runs / "stops" / name, work)
+    spartan("demo", "small.yaml", "-o", ".")
+    (work / "config").symlink_to(source / "config")
+    (work / "drive").symlink_to(small_runs / "stops/rec")
+    for name in ("run_monday", "run_tuesday"):
+        shutil.copytree(small_runs / "stops/whole", work / name)
+    spartan("rig", "convert", "kitti/calib.txt", "rig.yaml", "--size-px", "320,240")
+    shutil.copy(work / "kitti/calib.txt", work)
+    for side, camera in (("left", 0), ("right", 1)):
+        shutil.copy(work / f"kitti/image_{camera}/000000.png", work / f"{side}.png")
+    (work / ".local/share/bash-completion/completions").mkdir(parents=True)
+
+
+def run(where, line, program, work):
+    """Whether the line ran."""
+    environment = {**os.environ, "HOME": str(work), "PATH": f"{Path(program).parent}:{os.environ['PATH']}"}
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=work, env=environment, capture_output=True,
+                          text=True, timeout=600)
+    if done.returncode not in (0, 6):
+        sys.exit(f"failed: {where}: {line}\nexit code {done.returncode}\n{done.stdout}{done.stderr}")
+
+
+def main():
+    long = sys.argv[1] == "--long"
+    program, source, small_runs = (Path(word).resolve() for word in sys.argv[1 + long:])
+    if not (small_runs / "stops/whole").exists():
+        print("skipped: built without the simulator")
+        return 77
+    lines = [*lines_of_documents(source), *lines_of_help(program)]
+    if len(lines) < 20:
+        sys.exit(f"failed: only {len(lines)} command lines were found")
+    count = 0
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        prepare(program, source, small_runs, work)
+        for where, line in lines:
+            if bool(RENDERS.match(line)) != long:
+                continue
+            if "$SPARTAN_DATA" in line and "SPARTAN_DATA" not in os.environ or "run_06" in line and not (
+                    work / "run_06").exists() and "-o run_06" not in line:
+                print(f"not run without the recordings: {where}: {line}")
+                continue
+            if "| man " in line and shutil.which("man") is None:
+                print(f"not run without man: {where}: {line}")
+                continue
+            run(where, line, program, work)
+            count += 1
+    print(f"{count} command lines")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
