@@ -67,7 +67,7 @@ std::string bash_script(const CLI::App& app) {
                             fmt::join(flags_of(*command), " "));
   }
   return "_spartan() {\n  local current=${COMP_WORDS[COMP_CWORD]} path= word words=\n"
-         "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n    case \"${path:+$path }$word\" in\n" +
+         "  for word in \"${COMP_WORDS[@]:1:$((COMP_CWORD-1))}\"; do\n    case \"${path:+$path }$word\" in\n" +
          select + "    esac\n  done\n  case $path in\n" + complete +
          "  esac\n  COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
          "  [[ $current == -* ]] || COMPREPLY+=($(compgen -f -- \"$current\"))\n}\n"
@@ -131,7 +131,10 @@ std::string roff_option(const CLI::Option& option) {
 std::string completion_script(const CLI::App& app, const std::string& shell) {
   if (shell == "fish") return fish_script(app);
   // As a file of $fpath, zsh runs it at the first completion of the command that its first line names.
-  if (shell == "zsh") return "#compdef spartan\nautoload -U +X bashcompinit && bashcompinit\n" + bash_script(app);
+  if (shell == "zsh") {
+    return "#compdef spartan\nautoload -U +X bashcompinit && bashcompinit\n" + bash_script(app) +
+           "[[ ${funcstack[1]} != _spartan ]] || _bash_complete -o filenames -F _spartan\n";
+  }
   return bash_script(app);
 }
 

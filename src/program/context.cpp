@@ -58,14 +58,20 @@ CLI::Option* add_force_flag(CLI::App& command, Context& context) {
   return command.add_flag("--force", context.force, "Replace output that exists. Without it that is exit code 5.");
 }
 
-Status expect_replaceable(const Context& context, const std::string& path) {
-  namespace fs = std::filesystem;
+Status expect_new_file(const Context& context, const std::string& path) {
   std::error_code error;
-  const bool file = fs::is_regular_file(path, error);
-  const bool used_folder = fs::is_directory(path, error) && !fs::is_empty(path, error);
-  if (context.force || (!file && !used_folder)) return {};
-  return failure(ErrorCode::output, file ? "exists already" : "exists already and is not empty", path,
-                 "--force replaces it");
+  if (std::filesystem::is_directory(path, error))
+    return failure(ErrorCode::output, "is a folder, not a file", path, "choose another name");
+  if (context.force || !std::filesystem::is_regular_file(path, error)) return {};
+  return failure(ErrorCode::output, "exists already", path, "--force replaces it");
+}
+
+Status expect_new_folder(const Context& context, const std::string& path) {
+  std::error_code error;
+  if (std::filesystem::is_regular_file(path, error))
+    return failure(ErrorCode::output, "is a file, not a folder", path, "choose another name");
+  if (context.force || !std::filesystem::is_directory(path, error) || std::filesystem::is_empty(path, error)) return {};
+  return failure(ErrorCode::output, "exists already and is not empty", path, "--force replaces the files in it");
 }
 
 void add_threads_option(CLI::App& command, Context& context) {

@@ -48,8 +48,10 @@ CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, 
 void add_json_flag(CLI::App& command, Context& context);
 /// `--force`, for commands that write files or folders.
 CLI::Option* add_force_flag(CLI::App& command, Context& context);
-/// Code `output` if `path` is a file, or a folder with files in it, and `--force` is not given. An empty path is none.
-Status expect_replaceable(const Context& context, const std::string& path);
+/// Code `output` if the file exists and `--force` is not given, or if it is a folder. An empty path is none.
+Status expect_new_file(const Context& context, const std::string& path);
+/// Code `output` if the folder holds anything and `--force` is not given, or if it is a file. An empty path is none.
+Status expect_new_folder(const Context& context, const std::string& path);
 /// `--threads N`, for commands that have it.
 void add_threads_option(CLI::App& command, Context& context);
 

@@ -73,10 +73,12 @@ class GroundJson {
       add_pans(*design.pans);
       return;
     }
+    const bool without_pans = std::none_of(design.pairs.begin(), design.pairs.end(),
+                                           [](const PairDesign& pair) { return pair.pans_required; });
     for (const char* key : {"pan_overlap_percent", "pan_overlap_far_percent", "pan_overlap_far_stereo_percent",
                             "azimuth_far_deg", "azimuth_far_stereo_deg", "azimuth_held_from_m", "azimuth_held_to_m",
                             "azimuth_far_sectors_deg", "azimuth_far_stereo_sectors_deg"}) {
-      add(key, nullptr, no_pair.empty() ? "no pans are required" : no_pair);
+      add(key, nullptr, without_pans ? "no pans are required" : "the pair with pans is neither feasible nor published");
     }
   }
   const Json& figures() const { return figures_; }

@@ -93,9 +93,10 @@ std::string pair_text(const PairRequirements& required, const PairDesign& design
 
 std::string ground_text(const RigDesign& design) {
   std::string text;
-  if (design.view_overlap_m)
+  if (design.view_overlap_m) {
     text += fmt::format("ground seen by {} pairs, middle column: {:.2f} m\n", design.pairs.size() == 2 ? "both" : "all",
                         *design.view_overlap_m);
+  }
   if (!design.pans) return text;
   const PanCoverage& pans = *design.pans;
   if (pans.overlap) text += describe_overlaps(pans) + "\n";

@@ -13,7 +13,7 @@ struct ExportArguments {
 Result<ExitCode> export_command(const Context& context, const ExportArguments& arguments) {
   const auto format = parse_export_format(arguments.format);
   if (!format) return failure(format);
-  if (Status s = expect_replaceable(context, arguments.output); !s) return failure(s);
+  if (Status s = expect_new_file(context, arguments.output); !s) return failure(s);
   const auto kind = parse_trajectory_kind(arguments.trajectory);
   const ThreadPool workers(context.threads);
   if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);

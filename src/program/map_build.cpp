@@ -294,7 +294,7 @@ Eigen::Vector3d choose_up(Stop& stop, const StopView& view) {
 
 Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   if (Status s = check(a); !s) return failure(s);
-  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
+  if (Status s = expect_new_folder(context, a.output); !s) return failure(s);
   const auto gravity = parse_gravity(a.gravity);
   if (!gravity) return failure(gravity);
   auto options = options_of(context, a);

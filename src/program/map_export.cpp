@@ -36,6 +36,13 @@ Result<LatticeWindow> window_of(const MapExportArguments& a, const GlobalMap& ma
   return window_between(west, south, east, north, map.cell_m());
 }
 
+// The second file that some formats have; empty for the others.
+std::string file_beside(const std::string& output) {
+  std::filesystem::path path = output;
+  if (path.extension() == ".yaml") return path.replace_extension(".pgm").string();
+  return path.extension() == ".tif" ? output + ".aux.xml" : std::string();
+}
+
 Status write_map(SavedMap& saved, const MapExportArguments& a, const ThreadPool& workers) {
   if (std::filesystem::path(a.output).extension() == ".map") {
     if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map file always holds the whole map", "--window");
@@ -52,11 +59,9 @@ Status write_map(SavedMap& saved, const MapExportArguments& a, const ThreadPool&
 }
 
 Result<ExitCode> export_command(const Context& context, const MapExportArguments& a) {
-  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
-  const std::filesystem::path output = a.output;
-  if (output.extension() == ".yaml") {
-    const std::string image = std::filesystem::path(output).replace_extension(".pgm").string();
-    if (Status s = expect_replaceable(context, image); !s) return failure(s);
+  if (Status s = expect_new_file(context, a.output); !s) return failure(s);
+  if (const std::string beside = file_beside(a.output); !beside.empty()) {
+    if (Status s = expect_new_file(context, beside); !s) return failure(s);
   }
   auto saved = SavedMap::open(a.map);
   if (!saved) return failure(saved);

@@ -61,7 +61,7 @@ struct MergeArguments {
 };
 
 Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) {
-  if (Status s = expect_replaceable(context, arguments.output); !s) return failure(s);
+  if (Status s = expect_new_file(context, arguments.output); !s) return failure(s);
   auto a = SavedMap::open(arguments.a);
   if (!a) return failure(a);
   auto b = SavedMap::open(arguments.b);

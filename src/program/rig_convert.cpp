@@ -77,7 +77,7 @@ Status check_names(const CalibrationFiles& files, CalibrationFormat format, cons
 
 Status check_places(const CalibrationFiles& files, const Context& context) {
   for (const CalibrationFile& file : files) {
-    if (Status s = expect_replaceable(context, file.path); !s) return s;
+    if (Status s = expect_new_file(context, file.path); !s) return s;
   }
   return {};
 }

@@ -35,7 +35,7 @@ Status write_files(const Context& context, const std::string& folder, const RigR
 }
 
 Result<ExitCode> design_command(const Context& context, const DesignArguments& a) {
-  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
+  if (Status s = expect_new_folder(context, a.output); !s) return failure(s);
   const auto requirements = read_requirements(a.requirements);
   if (!requirements) return failure(requirements);
   const RigDesign design = design_rig(*requirements);

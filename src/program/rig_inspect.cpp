@@ -269,7 +269,7 @@ Result<ExitCode> inspect(const Context& context, const InspectArguments& a) {
   if (Status usage = check_usage(a); !usage) return failure(usage);
   if (Status there = a.rig == "-" ? Status() : calibration_is_there(a.rig); !there) return failure(there);
   for (const std::string& output : {a.figure, a.apply}) {
-    if (Status s = expect_replaceable(context, output); !s) return failure(s);
+    if (Status s = expect_new_file(context, output); !s) return failure(s);
   }
   std::vector<ImagePair> images;
   if (!a.left.empty()) {

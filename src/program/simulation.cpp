@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <filesystem>
+#include <string_view>
 #include <utility>
 
 #include "program/interrupt.h"
@@ -71,14 +73,16 @@ Result<std::map<std::string, sim::RectifiedView>> rectified_views(const Rig& rig
   return views;
 }
 
-// A recording of the simulator; any other folder stays as it is.
-Status remove_recording(const std::string& folder) {
+// A recording of the simulator is set aside for a new one.
+Result<ReplacedFolder> replace_recording(const std::string& folder) {
+  constexpr std::array<std::string_view, 6> kEntries{"frames.csv", "recording.yaml", "rig.yaml",
+                                                     "images",     "sensors",        "truth"};
   std::error_code error;
-  if (!fs::exists(folder + "/frames.csv", error) || !fs::exists(folder + "/truth", error)) return {};
-  if (Status free = FolderLock::expect_free(folder); !free) return free;
-  fs::remove_all(folder, error);
-  if (!error) return {};
-  return failure(ErrorCode::output, "cannot be removed: " + error.message(), folder);
+  if (fs::exists(folder + "/frames.csv", error) && !fs::exists(folder + "/truth/scenario.yaml", error)) {
+    return failure(ErrorCode::output, "holds a recording that was not simulated: it is not replaced", folder,
+                   "choose another folder with -o");
+  }
+  return ReplacedFolder::set_aside(folder, kEntries);
 }
 
 }  // namespace
@@ -98,9 +102,11 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   auto views = rectified_views(sim::nominal_rig(*rig, scenario->nominal_rig));
   if (!views) return failure(views);
 
-  if (context.force) {
-    if (Status s = remove_recording(arguments.output); !s) return failure(s);
+  if (!arguments.resume) {
+    if (Status s = expect_new_folder(context, arguments.output); !s) return failure(s);
   }
+  auto replaced = context.force ? replace_recording(arguments.output) : Result<ReplacedFolder>();
+  if (!replaced) return failure(replaced);
 
   Progress progress(context.quiet);
   sim::SimulationHooks hooks;
@@ -111,6 +117,7 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
       sim::simulate({*scenario, *rig, std::move(*drive), std::move(*views), arguments.output, arguments.resume}, hooks,
                     ThreadPool(context.threads));
   if (!report) return failure(report);
+  replaced->discard();
   const double seconds = 1e-3 * watch.lap();
   const double rate =
       report->render_seconds > 0 ? static_cast<double>(report->rays) / report->render_seconds / context.threads : 0;

@@ -151,11 +151,14 @@ Image<std::uint16_t> to_fixed_point(ImageView<const float> disparity) {
   return fixed;
 }
 
-Status write_results(const StereoArguments& a, const Pair& pair, ImageView<const float> disparity, const Log& log) {
+Status write_results(const StereoArguments& a, const Pair& pair, ImageView<const float> disparity,
+                     double disparity_sigma_px, const Log& log) {
   if (Status s = make_folder(a.output); !s) return s;
   if (Status s = write_pfm(a.output + "/disparity.pfm", disparity); !s) return s;
   if (Status s = write_png(a.output + "/disparity.png", to_fixed_point(disparity)); !s) return s;
   if (Status s = write_png(a.output + "/disparity_colour.png", colour_disparity(disparity)); !s) return s;
+  std::error_code ignored;  // files of an earlier pair that this one does not have
+  for (const char* name : {"/left_rectified.png", "/points.ply"}) std::filesystem::remove(a.output + name, ignored);
   if (!a.rig.empty()) {
     if (Status s = write_png(a.output + "/left_rectified.png", pair.left); !s) return s;
   }
@@ -165,6 +168,7 @@ Status write_results(const StereoArguments& a, const Pair& pair, ImageView<const
   }
   CloudSampling sampling;
   sampling.max_range_m = a.max_range_m;
+  sampling.disparity_sigma_px = disparity_sigma_px;
   return write_ply(a.output + "/points.ply",
                    to_point_cloud(disparity, pair.left, *pair.geometry, Pose(), Stamp(), sampling));
 }
@@ -242,7 +246,7 @@ Status check_truth_scale(const StereoArguments& a, const Log& log) {
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   const auto options = run_options(context, a.config, a.set);
   if (!options) return failure(options);
-  if (Status s = expect_replaceable(context, a.output); !s) return failure(s);
+  if (Status s = expect_new_folder(context, a.output); !s) return failure(s);
   if (Status s = check_images_fit({a.left, a.right}, memory_bound(context)); !s) return failure(s);
   auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!pair) return failure(pair);
@@ -273,7 +277,8 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (Status s = check_truth_scale(a, context.log); !s) return failure(s);
   const auto metrics = score_disparity(a, image->disparity);
   if (!metrics) return failure(metrics);
-  if (Status s = write_results(a, *pair, image->disparity, context.log); !s) return failure(s);
+  if (Status s = write_results(a, *pair, image->disparity, options->mapping.disparity_sigma_px, context.log); !s)
+    return failure(s);
 
   Json json{{"schema", 1},
             {"width", image->disparity.width()},

@@ -169,6 +169,34 @@ TEST(CommandLine, ForceLeavesAFolderAloneThatHoldsNoRun) {
   EXPECT_EQ(read_file(note).value(), "mine");
 }
 
+// The former run is lost only when a frame of the new one was processed.
+TEST(CommandLine, ForceKeepsTheFormerRunWhereTheNewOneCannotStart) {
+  const testing::TemporaryFolder folder;
+  const std::string drive = testing::small_runs_folder() + "/drive", run = folder.path() + "/run";
+  const auto again = [&](const std::string& recording) {
+    return run_program({"run", recording, "-o", run, "--max-frames", "2", "--odometry-only", "--force"});
+  };
+  ASSERT_EQ(again(drive).exit_code, 0) << "nothing is there yet";
+  const std::string former = read_file(run + "/trajectory_odometry.tum").value();
+  std::filesystem::copy(drive, folder.path() + "/broken", std::filesystem::copy_options::recursive);
+  for (const char* side : {"image_0", "image_1"}) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path() + "/broken/" + side))
+      std::ofstream(entry.path()) << "no image";
+  }
+  EXPECT_EQ(again(folder.path() + "/broken").exit_code, 3);
+  EXPECT_EQ(again(folder.path() + "/missing").exit_code, 3);
+  EXPECT_EQ(read_file(run + "/trajectory_odometry.tum").value(), former);
+  // A recording inside of the folder that it would replace.
+  std::filesystem::copy(drive, run + "/recording", std::filesystem::copy_options::recursive);
+  const auto inside = again(run + "/recording");
+  EXPECT_EQ(inside.exit_code, 5);
+  EXPECT_THAT(inside.err, HasSubstr("holds 'recording', which is not of this command"));
+  EXPECT_TRUE(std::filesystem::exists(run + "/recording/calib.txt"));
+  std::filesystem::remove_all(run + "/recording");
+  EXPECT_EQ(again(drive).exit_code, 0);
+  EXPECT_EQ(list_folder(folder.path()).value(), (std::vector<std::string>{"broken", "run"})) << "nothing is left";
+}
+
 TEST(CommandLine, CompletionKnowsEveryCommandAndIsValidBash) {
   const testing::TemporaryFolder folder;
   for (const char* shell : {"bash", "zsh", "fish"}) {

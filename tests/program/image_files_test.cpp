@@ -55,8 +55,8 @@ class ImageFiles : public ::testing::Test {
     return folder_.write("rig.yaml", fmt::format(kRig, format));
   }
   testing::ProgramResult run(std::vector<std::string> words, const std::string& format) const {
-    const std::vector<std::string> rest{file_of(0), file_of(1),          "--rig", rig_file(format),
-                                        "-o",       folder_.file("out"), "--json"};
+    const std::vector<std::string> rest{file_of(0), file_of(1),          "--rig",  rig_file(format),
+                                        "-o",       folder_.file("out"), "--json", "--force"};
     words.insert(words.end(), rest.begin(), rest.end());
     return run_program(words);
   }

@@ -31,7 +31,7 @@ class InputWarnings : public ::testing::Test {
   std::string image(int side) const { return drive() + "/image_" + std::to_string(side) + "/000000.png"; }
 
   ProgramResult stereo(const std::string& left, const std::string& right, std::vector<std::string> more = {}) const {
-    std::vector<std::string> words{"stereo", left, right, "-o", path("out")};
+    std::vector<std::string> words{"stereo", left, right, "-o", path("out"), "--force"};
     words.insert(words.end(), more.begin(), more.end());
     ProgramResult result = run_program(words);
     EXPECT_EQ(result.exit_code, 0) << result.err;

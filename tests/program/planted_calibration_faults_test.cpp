@@ -74,7 +74,7 @@ class PlantedCalibrationFaults : public ::testing::TestWithParam<const char*> {
     Rig planted = rig_;
     plant(planted);
     const std::string corrected = folder_.path() + "/corrected.yaml";
-    const json found = inspect(planted, {"--apply", corrected});
+    const json found = inspect(planted, {"--force", "--apply", corrected});
     EXPECT_THAT(ids(found), Contains(id));
     EXPECT_EQ(found["verdict"], "bad");
     const auto rig = read_rig(corrected);
@@ -114,7 +114,7 @@ class PlantedCalibrationFaults : public ::testing::TestWithParam<const char*> {
 
 TEST_P(PlantedCalibrationFaults, None) {
   const std::string corrected = folder_.path() + "/corrected.yaml";
-  const json found = inspect(rig_, {"--apply", corrected});
+  const json found = inspect(rig_, {"--force", "--apply", corrected});
   EXPECT_EQ(found["verdict"], "good") << found["findings"];
   EXPECT_EQ(*read_rig(corrected), rig_) << "nothing is changed where nothing is wrong";
 }

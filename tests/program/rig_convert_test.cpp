@@ -130,7 +130,7 @@ TEST(RigConvert, FilesThatAreThereAreKept) {
   const std::string kitti = folder.write("calib.txt", kKitti), to = folder.write("rig.yaml", "mine");
   const auto kept = run_program({"rig", "convert", kitti, to, "--size-px", "640,480"});
   EXPECT_EQ(kept.exit_code, 5);
-  EXPECT_THAT(kept.err, HasSubstr("rig.yaml: exists already (--force overwrites it)"));
+  EXPECT_THAT(kept.err, HasSubstr("rig.yaml: exists already (--force replaces it)"));
   EXPECT_EQ(content_of(to), "mine");
   EXPECT_EQ(run_program({"rig", "convert", kitti, to, "--size-px", "640,480", "--force"}).exit_code, 0);
   EXPECT_NE(content_of(to), "mine");

@@ -161,7 +161,7 @@ TEST_F(RigInspectImages, AppliesExchangedCameras) {
   text.replace(text.find("{left: left, right: right}"), 26, "{left: right, right: left}");
   text.replace(text.find("axes: optical"), 0, "self_mask: masks/left.png, ");
   const std::string rig = folder_.write("a/rig.yaml", text), corrected = folder_.path() + "/corrected.yaml";
-  const auto result = inspect(rig, {image(1), image(0), "--apply", corrected, "--json"});
+  const auto result = inspect(rig, {image(1), image(0), "--force", "--apply", corrected, "--json"});
   EXPECT_EQ(ids(json::parse(result.out)["pairs"]["stereo"]), std::vector<std::string>{"swapped_eyes"});
   const auto again = inspect(corrected, {image(0), image(1), "--json"});
   EXPECT_EQ(json::parse(again.out)["pairs"]["stereo"]["verdict"], "good") << again.out;
@@ -177,7 +177,7 @@ std::string replaced_everywhere(std::string text, const std::string& from, const
 TEST_F(RigInspectImages, SaysWhatTheWrittenFileIs) {
   const std::string corrected = folder_.path() + "/corrected.yaml";
   const auto applied = [&](const std::string& rig, const std::string& left, const std::string& right) {
-    const auto result = inspect(rig, {left, right, "--apply", corrected});
+    const auto result = inspect(rig, {left, right, "--force", "--apply", corrected});
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.out;
   };
@@ -206,12 +206,12 @@ TEST_F(RigInspectImages, NotesMasksOfAnotherSize) {
   text = replaced_everywhere(replaced_everywhere(text, "[260, 260]", "[520, 520]"), "[159.5, 119.5]", "[319.5, 239.5]");
   text.replace(text.find("axes: optical"), 0, "self_mask: mask.png, ");
   const std::string rig = folder_.write("rig.yaml", text), corrected = folder_.path() + "/corrected.yaml";
-  const auto printed = [&] { return inspect(rig, {image(0), image(1), "--apply", corrected}).out; };
+  const auto printed = [&] { return inspect(rig, {image(0), image(1), "--force", "--apply", corrected}).out; };
   const std::string sentence =
       "\ncamera left: its self-mask mask.png does not have the corrected size 320 x 240 px: replace it\n";
   testing::write_gray_png(folder_.path() + "/mask.png", 640, 480);
   EXPECT_THAT(printed(), HasSubstr(sentence));
-  EXPECT_THAT(inspect(rig, {image(0), image(1), "--apply", corrected, "--json"}).err,
+  EXPECT_THAT(inspect(rig, {image(0), image(1), "--force", "--apply", corrected, "--json"}).err,
               HasSubstr("camera left: its self-mask mask.png"));
   testing::write_gray_png(folder_.path() + "/mask.png", 320, 240);
   EXPECT_THAT(printed(), Not(HasSubstr(sentence)));
@@ -242,7 +242,7 @@ TEST_F(RigInspectImages, CorrectsPairsThatShareACamera) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return json::parse(result.out)["pairs"];
   };
-  const json found = pairs(folder_.write("off.yaml", rig(0.5)), {"--apply", corrected});
+  const json found = pairs(folder_.write("off.yaml", rig(0.5)), {"--force", "--apply", corrected});
   EXPECT_EQ(ids(found["first"]), std::vector<std::string>{"row_offset"});
   EXPECT_EQ(found["second"]["verdict"], "good");
   const json again = pairs(corrected, {});
@@ -310,7 +310,7 @@ TEST_F(RigInspectImages, NamesInjectedFaultsAndCorrectsThem) {
   const std::string rig = folder_.write("rig.yaml", fmt::format(kRig, -0.12)),
                     corrected = folder_.path() + "/corrected.yaml";
   const std::string drawn = folder_.path() + "/rows.png";
-  ASSERT_EQ(inspect(rig, {image(0), image(1), "--apply", corrected, "--figure", drawn}).exit_code, 0);
+  ASSERT_EQ(inspect(rig, {image(0), image(1), "--force", "--apply", corrected, "--figure", drawn}).exit_code, 0);
   const auto again = inspect(corrected, {image(0), image(1), "--json"});
   EXPECT_EQ(json::parse(again.out)["pairs"]["stereo"]["verdict"], "good") << again.out;
   const auto figure = read_image(drawn);

@@ -72,7 +72,10 @@ TEST_F(Run, WritesTrajectoryTerrainAndSummary) {
   EXPECT_EQ(summary["schema"], 1);
   EXPECT_EQ(summary["frames"], 14);
   EXPECT_EQ(summary["format"], "kitti");
-  EXPECT_EQ(summary["world"]["gravity"], "assumed");
+  EXPECT_EQ(summary["world"]["gravity"], "ground");
+  EXPECT_THAT(result.err, HasSubstr("world: z is the normal of the ground in the first images (body pitched 25."));
+  const Trajectory driven = load_trajectory(path("out/trajectory_localization.tum")).value().poses;
+  EXPECT_NEAR(driven.back().pose.translation().z(), 0, 0.01) << "level, though the camera looks down by 25°";
   EXPECT_NEAR(summary["distance_m"], 0.53, 0.03);
   EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
   EXPECT_TRUE(summary["stages"].contains("odometry"));
@@ -249,8 +252,8 @@ TEST_F(Run, SkipsFramesOfAFrozenCamera) {
 
 TEST_F(Run, StereoUsesTheViewOptions) {
   const auto stereo = [&](std::vector<std::string> more) {
-    std::vector<std::string> words{"stereo",       image(0, 0), image(1, 0),           "-o",
-                                   path("stereo"), "--rig",     drive() + "/calib.txt"};
+    std::vector<std::string> words{"stereo", "--force",      image(0, 0), image(1, 0),
+                                   "-o",     path("stereo"), "--rig",     drive() + "/calib.txt"};
     words.insert(words.end(), more.begin(), more.end());
     return run_program(words);
   };

@@ -195,8 +195,7 @@ Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const
                                                 const RecordingOptions& options) {
   std::error_code error;
   if (fs::exists(folder, error) && !(fs::is_directory(folder, error) && fs::is_empty(folder, error))) {
-    return failure(ErrorCode::output, "already exists and is not overwritten", folder,
-                   "choose another folder, or replace it with --force");
+    return failure(ErrorCode::output, "already exists and is not overwritten", folder, "choose another folder");
   }
   return open(folder, nominal_rig, options, {}, {});
 }

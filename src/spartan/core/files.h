@@ -115,4 +115,27 @@ class FolderLock {
   std::string path_;  // of the file
 };
 
+/// A folder that a new one replaces. It is renamed to NAME.PID.replaced in the same parent, and comes back, in the
+/// place of what was made since, unless discard() removes it.
+class ReplacedFolder {
+ public:
+  /// Does nothing where `path` does not exist or is an empty folder. `known`: the names of all entries that such a
+  /// folder may have. Code `output` for a folder with any other entry, a link, a file, the current folder or one around
+  /// it, and if another process owns the folder.
+  static Result<ReplacedFolder> set_aside(const std::string& path, std::span<const std::string_view> known);
+
+  ReplacedFolder() = default;  ///< replaces nothing
+  ReplacedFolder(ReplacedFolder&& other) noexcept;
+  ReplacedFolder& operator=(ReplacedFolder&& other) noexcept;
+  ~ReplacedFolder();
+
+  /// The new folder stays; removes the former one.
+  void discard();
+
+ private:
+  ReplacedFolder(std::string path, std::string aside) : path_(std::move(path)), aside_(std::move(aside)) {}
+  void restore();
+  std::string path_, aside_;
+};
+
 }  // namespace spartan

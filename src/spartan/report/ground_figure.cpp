@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "spartan/report/internal/ground_plan.h"
@@ -13,35 +14,46 @@ using namespace internal;
 
 namespace {
 
-void draw_legend(Drawing& drawing, double y_px, const std::vector<DrawnPair>& pairs, bool pans) {
+// Gives the row, px, below which nothing is drawn.
+double draw_legend(Drawing& drawing, double y_px, const std::vector<DrawnPair>& pairs, bool pans) {
   struct Entry {
     Rgb8 colour;
     double opacity;
     std::string text;
   };
   const std::string& first = pairs.front().name;
-  std::vector<Entry> entries{{kWideOneCamera, 1, first + ", one camera only"},
-                             {kWideBoth, 1, first + ", both cameras"}};
-  if (pans) entries.push_back({kWideTwice, 1, first + ", from two pans"});
+  std::vector<Entry> entries{{kFirstPairOneCamera, 1, first + ", one camera only"},
+                             {kFirstPairBoth, 1, first + ", both cameras"}};
+  if (pans) entries.push_back({kFirstPairTwice, 1, first + ", from two pans"});
   for (std::size_t i = 1; i < pairs.size(); ++i)
     entries.push_back({pairs[i].colour, 0.45, pairs[i].name + ", both cameras"});
   if (pans) entries.push_back({kUnseen, 1, "required, not seen"});
+  constexpr double kRow_px = 24, kLetter_px = 7.5;
   double x = kMargin_px;
   for (const Entry& entry : entries) {
+    const double width = std::max(230.0, 52 + kLetter_px * static_cast<double>(entry.text.size()));
+    if (x > kMargin_px && x + width > kWidth_px) {
+      x = kMargin_px;
+      y_px += kRow_px;
+    }
     drawing.fill({{x, y_px}, {x + 22, y_px}, {x + 22, y_px + 14}, {x, y_px + 14}}, {entry.colour, entry.opacity});
     drawing.line(closed({{x, y_px}, {x + 22, y_px}, {x + 22, y_px + 14}, {x, y_px + 14}}), {kFaint, 0.8});
     drawing.text({x + 30, y_px + 12}, entry.text, {kInk, 14});
-    x += 230;
+    x += width;
   }
+  return y_px;
 }
 
-// The pair with pans first. Pairs without a selection are not drawn.
+// The pair with pans first, or, without pans, the first one. Pairs without a selection are not drawn.
 std::vector<DrawnPair> drawn_pairs(const RigRequirements& requirements, const RigDesign& design) {
   std::vector<DrawnPair> pairs;
-  const std::size_t first = requirements.panned();
-  const PairMetrics* const primary = design.pairs[first].selected();
+  std::size_t first = requirements.panned();
+  if (!requirements.pairs[first].pans) {
+    while (first < design.pairs.size() && design.pairs[first].selected() == nullptr) ++first;
+  }
+  const PairMetrics* const primary = first < design.pairs.size() ? design.pairs[first].selected() : nullptr;
   if (primary == nullptr) return pairs;
-  pairs.push_back({design.pairs[first].name, kWide, requirements.pairs[first], *primary});
+  pairs.push_back({design.pairs[first].name, kFirstPair, requirements.pairs[first], *primary});
   for (std::size_t i = 0; i < design.pairs.size(); ++i) {
     const PairMetrics* const pair = design.pairs[i].selected();
     if (i == first || pair == nullptr) continue;
@@ -76,7 +88,7 @@ std::optional<GroundFigure> draw_ground(const RigRequirements& requirements, con
     if (design.pans && design.pans->overlap) {
       drawing.text({kMargin_px, y += 16}, describe_overlaps(*design.pans, "°"), {kInk, 14});
     }
-    draw_legend(drawing, y += 18, pairs, design.pans.has_value());
+    y = draw_legend(drawing, y + 18, pairs, design.pans.has_value());
     return static_cast<int>(std::ceil(y)) + 34;
   };
   Drawing endless(kWidth_px, 1);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <string_view>
@@ -22,6 +23,8 @@ namespace {
 
 constexpr int kSchema = 1;
 constexpr std::size_t kMaxListLength = 1000;
+constexpr std::size_t kLongestName = 24;  // letters
+constexpr double kTiltSteps = 0.1;        // default step, of the angle of the ground at the range below the horizon
 
 // Bounds of a value, both included.
 struct Limits {
@@ -206,7 +209,9 @@ void read_limits(YamlMap& map, PairRequirements& pair) {
   pair.smallest_baseline_m = optional_bounded(map, "smallest_baseline_m", {0, 1e6}).value_or(0);
   pair.smallest_height_m = optional_bounded(map, "smallest_height_m", {0, 1e6}).value_or(0);
   pair.height_m = bounded(map, "height_m", kLength_m).value_or(1);
-  pair.tilt_step_deg = optional_bounded(map, "tilt_step_deg", {1e-3, 90}).value_or(1);
+  const double below_horizon_deg = std::atan(pair.height_m / pair.range_m) / kRadiansPerDegree;
+  pair.tilt_step_deg =
+      optional_bounded(map, "tilt_step_deg", {1e-3, 90}).value_or(std::min(1.0, kTiltSteps * below_horizon_deg));
   pair.rows_per_column = optional_bounded(map, "rows_per_column", {0.01, 100}).value_or(1);
 }
 
@@ -253,19 +258,35 @@ PairRequirements read_pair(YamlMap map) {
   return pair;
 }
 
-// Keys of the JSON of a design beside the names of its pairs.
-bool is_reserved(const std::string& name) {
-  constexpr std::array<std::string_view, 6> kReserved{"schema",   "name",    "pairs",
-                                                      "warnings", "reasons", "view_overlap_m"};
-  return name.empty() || name.starts_with("pan_") || name.starts_with("azimuth_") ||
-         std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end();
+// Why a pair cannot have this name; empty if it can. The JSON of a design has it as a key, its table as a word.
+std::string fault_of_name(const std::string& name) {
+  constexpr std::array<std::string_view, 14> kReserved{"schema",
+                                                       "pairs",
+                                                       "view_overlap_m",
+                                                       "warnings",
+                                                       "reasons",
+                                                       "azimuth_far_deg",
+                                                       "azimuth_held_to_m",
+                                                       "azimuth_held_from_m",
+                                                       "azimuth_far_stereo_deg",
+                                                       "pan_overlap_percent",
+                                                       "pan_overlap_far_percent",
+                                                       "pan_overlap_far_stereo_percent",
+                                                       "azimuth_far_sectors_deg",
+                                                       "azimuth_far_stereo_sectors_deg"};
+  if (std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end())
+    return "cannot be the name of a pair: it has another meaning in the JSON of a design";
+  const auto allowed = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-'; };
+  if (name.empty() || name.size() > kLongestName || !std::all_of(name.begin(), name.end(), allowed))
+    return fmt::format("is not a name of a pair: use 1 to {} letters, digits, '_' and '-'", kLongestName);
+  return {};
 }
 
 std::vector<PairRequirements> read_pairs(YamlMap map) {
   std::vector<PairRequirements> pairs;
   for (const auto& [name, node] : map.entries()) {
-    if (is_reserved(name)) {
-      map.add_error(name, "cannot be the name of a pair: it has another meaning in the JSON of a design");
+    if (const std::string fault = fault_of_name(name); !fault.empty()) {
+      map.add_error(name, fault);
       continue;
     }
     PairRequirements pair = read_pair(YamlMap(node, map.path(name), map.errors()));

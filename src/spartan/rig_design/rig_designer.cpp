@@ -207,6 +207,7 @@ bool is_candidate(const PairParameters& parameters, const CandidateLists& lists)
 PairDesign design_pair(const PairRequirements& requirements) {
   PairDesign design;
   design.name = requirements.name;
+  design.pans_required = requirements.pans.has_value();
   design.combinations = requirements.lists.combinations();
   search(requirements, design);
   sort_by_criteria(design, requirements.order);

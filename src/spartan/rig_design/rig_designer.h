@@ -153,7 +153,8 @@ struct LimitCounts {
 
 /// Result of the search for one pair.
 struct PairDesign {
-  std::string name;  ///< of the pair
+  std::string name;            ///< of the pair
+  bool pans_required = false;  ///< PairRequirements::pans
   std::size_t combinations = 0;
   std::vector<PairMetrics> feasible;  ///< ordered, best first
   /// How many of them have sufficient overlap of the pans; none where there are no pans.

@@ -150,14 +150,13 @@ std::string sidecar_text(const std::vector<MapBand>& bands) {
   return text.empty() ? text : "<PAMDataset>\n" + text + "</PAMDataset>\n";
 }
 
+// The map first; names of categories of a former map do not stay.
 Status publish(const std::string& temporary, const std::string& path, const std::vector<MapBand>& bands) {
-  if (const std::string sidecar = sidecar_text(bands); !sidecar.empty()) {
-    if (Status s = write_file_atomically(geotiff_sidecar(path), sidecar); !s) {
-      std::remove(temporary.c_str());
-      return s;
-    }
-  }
-  return publish_file(temporary, path);
+  if (Status s = publish_file(temporary, path); !s) return s;
+  const std::string sidecar = sidecar_text(bands);
+  if (!sidecar.empty()) return write_file_atomically(geotiff_sidecar(path), sidecar);
+  std::remove(geotiff_sidecar(path).c_str());
+  return {};
 }
 
 Dataset open_geotiff(const std::string& path) {

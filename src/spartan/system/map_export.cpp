@@ -26,21 +26,19 @@ using namespace internal;
 namespace {
 
 // The centres of the cells, in the colours of the image, with the time of the stop that observed them first.
-PointCloud cloud_of(const MapView& view, const std::vector<MapStop>& stops) {
+PointCloud cloud_of(const MapView& view, const std::map<std::int32_t, Stamp>& stops) {
   const Image<Rgb8> colours =
       render_map(view.elevation_m, view.kind, view.cell_m, elevation_colour_range(view.elevation_m, view.kind));
-  std::map<std::int32_t, double> time_s;
-  for (const MapStop& stop : stops) time_s[stop.id] = stop.stamp.seconds();
   PointCloud cloud;
   for (int r = 0; r < view.window.height; ++r) {
     for (int c = 0; c < view.window.width; ++c) {
       if (!(view.count(c, r) > 0)) continue;
       const Eigen::Vector2f at = cell_centre(view.place(), c, r).cast<float>();
-      const auto time = time_s.find(view.stop(c, r));
+      const auto stop = stops.find(view.stop(c, r));
       cloud.push_back({{at.x(), at.y(), view.elevation_m(c, r)},
                        colours(c, r),
                        std::sqrt(view.variance_m2(c, r)),
-                       time == time_s.end() ? 0 : time->second});
+                       stop == stops.end() ? 0 : stop->second.seconds()});
     }
   }
   return cloud;
@@ -49,6 +47,7 @@ PointCloud cloud_of(const MapView& view, const std::vector<MapStop>& stops) {
 // The named bands in their own order; all if `names` is empty.
 Result<std::vector<MapBand>> select(const std::vector<MapBand>& all, const std::vector<std::string>& names) {
   std::vector<std::string> known;
+  known.reserve(all.size());
   for (const MapBand& band : all) known.push_back(band.name);
   for (const std::string& name : names) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {
@@ -77,6 +76,12 @@ Status write_layers(const MapView& view, const MapExport& request, const ThreadP
 }
 
 }  // namespace
+
+std::map<std::int32_t, Stamp> stamps_of(const GlobalMap& map) {
+  std::map<std::int32_t, Stamp> stamps;
+  for (const MapStop& stop : map.stops()) stamps[stop.id] = stop.stamp;
+  return stamps;
+}
 
 Result<MapFormat> map_format_of(const std::string& path) {
   constexpr std::array<std::pair<std::string_view, MapFormat>, 7> kExtensions{{{".tif", MapFormat::geotiff},

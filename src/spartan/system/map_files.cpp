@@ -82,6 +82,17 @@ Status write_view(const StopView& view, const VDisparityOptions& options, const 
   return write_png(path + "_v_disparity.png", v_disparity);
 }
 
+// Figures of the views of an earlier stop.
+void remove_views(const std::string& folder) {
+  const auto names = list_folder(folder);
+  if (!names) return;
+  std::error_code ignored;
+  for (const std::string& name : *names) {
+    if (name.ends_with("_classes.png") || name.ends_with("_v_disparity.png"))
+      std::filesystem::remove(folder + "/" + name, ignored);
+  }
+}
+
 }  // namespace
 
 Status write_local_map(const LocalMap& map, const MapContext& about, const std::string& path) {
@@ -95,7 +106,7 @@ Status write_global_map(GlobalMap& map, const MapOptions& options, std::optional
   if (map.empty()) return {};
   const auto view = map.view(map.extent());
   if (!view) return failure(view);
-  MapExport request{MapFormat::geotiff, {}, options, {x_is_east, map.stops()}};
+  MapExport request{MapFormat::geotiff, {}, options, {x_is_east, stamps_of(map)}};
   if (Status s = export_map(*view, request, workers, path + ".tif"); !s) return s;
   request.format = MapFormat::figure;
   return export_map(*view, request, workers, path + ".png");
@@ -113,7 +124,8 @@ Status remove_map_files(const std::string& path) {
 Status write_stop_files(std::span<const StopView> views, const MergedRange& merged, const LocalMap& map,
                         const MappingOptions& options, const std::string& folder) {
   const Stamp stamp = views.empty() ? Stamp() : views.front().stamp;
-  const MapContext about{std::nullopt, {{0, stamp, {map.map_from_body, Matrix6d::Zero()}}}};
+  MapContext about;
+  if (stamp.ns != 0) about.stops[0] = stamp;  // images of a pair alone have no time
   if (Status s = write_local_map(map, about, folder + "/map"); !s) return s;
   if (Status s = write_file_atomically(folder + "/obstacles.csv", obstacle_table(map)); !s) return s;
   if (Status s = write_pfm(folder + "/range.pfm", merged.range_m); !s) return s;
@@ -121,6 +133,7 @@ Status write_stop_files(std::span<const StopView> views, const MergedRange& merg
   if (Status s = write_png(folder + "/panorama.png", merged.gray); !s) return s;
   if (Status s = write_png(folder + "/coverage.png", draw_coverage(merged, views)); !s) return s;
   if (Status s = write_ply(folder + "/points.ply", cloud_of(merged, map.map_from_body, stamp)); !s) return s;
+  remove_views(folder);
   for (const StopView& view : views) {
     if (Status s = write_view(view, options.v_disparity, folder); !s) return s;
   }

@@ -1,6 +1,8 @@
 // Files of a map: GeoTIFF, images, point cloud (docs/reference/files.md).
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,8 +19,8 @@ namespace spartan {
 
 /// What the files of a map state about it.
 struct MapContext {
-  std::optional<bool> x_is_east;  ///< else x is the start heading; none: not known
-  std::vector<MapStop> stops;     ///< those that the map was made of
+  std::optional<bool> x_is_east = {};        ///< else x is the start heading; none: not known
+  std::map<std::int32_t, Stamp> stops = {};  ///< of the stops that the map was made of, by their ids
 };
 
 /// Writes `path`.tif (all layers, docs/reference/files.md) and `path`.png (elevation and classes with axes, scale and
@@ -47,6 +49,9 @@ struct MapExport {
   MapOptions options = {};               ///< of the slopes and costs
   MapContext about = {};
 };
+
+/// The stops of a global map as MapContext has them.
+std::map<std::int32_t, Stamp> stamps_of(const GlobalMap& map);
 
 /// Writes a part of the global map. Codes: `usage` (unknown layers), `output`.
 Status export_map(const MapView& view, const MapExport& request, const ThreadPool& workers, const std::string& path);

@@ -147,6 +147,9 @@ void Pipeline::align_with_gravity(std::span<const ImuSample> stationary_samples)
   if (const auto reading = static_reading(stationary_samples, with_gravity(state_->options)))
     state_->up_in_body = reading->accel_m_s2.normalized();
 }
+void Pipeline::align_with_ground(const Eigen::Vector3d& up_in_body) {
+  state_->up_in_body = up_in_body.normalized();
+}
 void Pipeline::add(const ImuSample& sample) {
   state_->add_sensor_sample(sample);
 }

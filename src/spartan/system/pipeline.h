@@ -111,6 +111,9 @@ class Pipeline {
   /// world_from_body at a time without a pose: the last pose extrapolated at constant velocity.
   std::optional<Pose> predict(Stamp stamp) const;
 
+  /// The vertical of the world where no sensor measures it, e.g. the normal of the ground in the first images. Call
+  /// before the first frame.
+  void align_with_ground(const Eigen::Vector3d& up_in_body);
   /// Whether the world frame was initialized by measured gravity and a measured heading.
   bool gravity_measured() const;
   bool heading_east() const;

@@ -21,7 +21,7 @@ struct RunRequest {
   RunOptions options;
   GivenKeys given;       ///< keys of `options` that the user gave: the recording's noise does not replace them
   bool resume = false;   ///< continue the run in `output`, if there is one
-  bool replace = false;  ///< remove the run in `output`, if there is one, after the checks of the request
+  bool replace = false;  ///< replace the run in `output`, if there is one, once a frame was processed
   int threads = 1;
   std::int64_t memory_bytes = 0;  ///< refuse recordings that need more, see Pipeline::check_memory(); 0: no bound
   int max_frames = 0;  ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all

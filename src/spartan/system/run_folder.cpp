@@ -2,8 +2,10 @@
 
 #include <sys/stat.h>
 
+#include <array>
 #include <cerrno>
 #include <filesystem>
+#include <string_view>
 #include <utility>
 
 #include "spartan/core/files.h"
@@ -26,12 +28,15 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
     return failure(ErrorCode::output, "is not a folder", folder.path, "choose another folder with -o");
   }
   const auto exists = [&] {
-    return failure(ErrorCode::output, "already exists and is not overwritten", folder.path,
-                   "choose another folder with -o, continue the run with --resume, or replace it with --force");
+    const bool is_run = fs::exists(folder.store(), error);
+    return failure(ErrorCode::output,
+                   is_run ? "already exists and is not overwritten" : "already exists, and is not a run", folder.path,
+                   is_run ? "choose another folder with -o, continue the run with --resume, or replace it with --force"
+                          : "choose another folder with -o");
   };
   if (!created && !resume) {
     if (Status free = FolderLock::expect_free(folder.path); !free) return failure(free);
-    return exists();
+    if (!fs::is_empty(folder.path, error)) return exists();
   }
   auto lock = FolderLock::acquire(folder.path);
   if (!lock) return failure(lock);
@@ -47,13 +52,23 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
   return OwnedRunFolder{created ? FolderState::created : FolderState::existed, std::move(*lock)};
 }
 
-Status replace_run_folder(const RunFolder& folder) {
+Result<ReplacedFolder> replace_run_folder(const RunFolder& folder) {
+  constexpr std::array<std::string_view, 13> kEntries{"run.sqlite",
+                                                      "run.sqlite-wal",
+                                                      "run.sqlite-shm",
+                                                      "config.yaml",
+                                                      "rig.yaml",
+                                                      "log.txt",
+                                                      "summary.json",
+                                                      "trajectory_odometry.tum",
+                                                      "trajectory_slam.tum",
+                                                      "trajectory_localization.tum",
+                                                      "maps",
+                                                      "terrain",
+                                                      "report"};
   std::error_code error;
-  if (!fs::exists(folder.store(), error)) return {};
-  if (Status free = FolderLock::expect_free(folder.path); !free) return free;
-  fs::remove_all(folder.path, error);
-  if (!error) return {};
-  return failure(ErrorCode::output, "cannot be removed: " + error.message(), folder.path);
+  if (!fs::exists(folder.store(), error)) return ReplacedFolder();  // prepare_run_folder() tells
+  return ReplacedFolder::set_aside(folder.path, kEntries);
 }
 
 void remove_run_folder(const RunFolder& folder) {

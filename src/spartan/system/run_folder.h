@@ -71,9 +71,9 @@ struct OwnedRunFolder {
 /// on it, or if it cannot be created; `resources`.
 Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume);
 
-/// Removes a folder that holds a run; any other one stays as it is. Code `output` if another process works on it, or it
-/// cannot be removed.
-Status replace_run_folder(const RunFolder& folder);
+/// Sets a run folder aside for a new one. Code `output` if it holds anything that a run does not write, or if another
+/// process works on it.
+Result<ReplacedFolder> replace_run_folder(const RunFolder& folder);
 
 /// Removes the folder of a run that failed without any result.
 void remove_run_folder(const RunFolder& folder);

@@ -14,15 +14,16 @@ std::optional<bool> x_is_east(const RunFolder& folder) {
   const auto text = read_file(folder.summary());
   if (!text) return std::nullopt;
   const auto json = nlohmann::json::parse(*text, nullptr, false);
-  const auto heading = json.is_object() ? json.find("world") : json.end();
-  if (json.is_discarded() || heading == json.end() || !heading->is_object()) return std::nullopt;
-  return heading->value("heading", "") == "east";
+  if (!json.is_object() || !json.contains("world") || !json["world"].is_object()) return std::nullopt;
+  const auto heading = json["world"].find("heading");
+  if (heading == json["world"].end() || (*heading != "east" && *heading != "start")) return std::nullopt;
+  return *heading == "east";
 }
 
 }  // namespace
 
 MapContext SavedMap::about() const {
-  return {x_is_east_, (file_ ? file_->map() : *run_map_).stops()};
+  return {x_is_east_, stamps_of(file_ ? file_->map() : *run_map_)};
 }
 
 Result<SavedMap> SavedMap::open_run(const std::string& path) {

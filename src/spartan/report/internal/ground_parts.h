@@ -18,11 +18,11 @@ constexpr double kMargin_px = 40;
 
 /// Colors for color-blind readers (Okabe and Ito), lighter where fewer cameras see.
 inline constexpr Rgb8 kInk{30, 30, 30}, kFaint{150, 150, 150}, kSoil{120, 100, 80}, kUnseen{222, 222, 222};
-inline constexpr Rgb8 kWide{0, 114, 178}, kWideOneCamera{200, 226, 243}, kWideBoth{134, 187, 222},
-    kWideTwice{58, 134, 188};
+inline constexpr Rgb8 kFirstPair{0, 114, 178}, kFirstPairOneCamera{200, 226, 243}, kFirstPairBoth{134, 187, 222},
+    kFirstPairTwice{58, 134, 188};
 inline constexpr Rgb8 kShared{0, 158, 115};
-/// Of the other pairs than the one whose views are drawn in blue; they repeat.
-inline constexpr std::array<Rgb8, 4> kOtherPairs{{{213, 94, 0}, {204, 121, 167}, {230, 159, 0}, {0, 114, 178}}};
+/// Of the pairs beside the first one; they repeat.
+inline constexpr std::array<Rgb8, 4> kOtherPairs{{{213, 94, 0}, {204, 121, 167}, {230, 159, 0}, {90, 90, 90}}};
 
 /// One pair as it is drawn.
 struct DrawnPair {

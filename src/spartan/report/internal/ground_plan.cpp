@@ -59,10 +59,10 @@ Views views_of(const DrawnPair& pair) {
 }
 
 void draw_views(Drawing& drawing, const Plan& plan, const Views& views) {
-  for (const GroundPolygon& polygon : views.one_camera) drawing.fill(plan(polygon), {kWideOneCamera});
-  for (const GroundPolygon& polygon : views.both_cameras) drawing.fill(plan(polygon), {kWideBoth});
-  for (const GroundPolygon& polygon : views.twice) drawing.fill(plan(polygon), {kWideTwice});
-  for (const GroundPolygon& polygon : views.both_cameras) drawing.line(closed(plan(polygon)), {kWide, 1.2});
+  for (const GroundPolygon& polygon : views.one_camera) drawing.fill(plan(polygon), {kFirstPairOneCamera});
+  for (const GroundPolygon& polygon : views.both_cameras) drawing.fill(plan(polygon), {kFirstPairBoth});
+  for (const GroundPolygon& polygon : views.twice) drawing.fill(plan(polygon), {kFirstPairTwice});
+  for (const GroundPolygon& polygon : views.both_cameras) drawing.line(closed(plan(polygon)), {kFirstPair, 1.2});
 }
 
 void draw_rings(Drawing& drawing, const Plan& plan, double radius_m, double half_deg) {
@@ -97,7 +97,8 @@ struct Meaning {
   std::string text;
 };
 
-constexpr Pen kRequiredPen{kInk, 1.8}, kOneCameraPen{kWide, 1.8, 5}, kBothCamerasPen{kWide, 1.8}, kHeldPen{kInk, 3};
+constexpr Pen kRequiredPen{kInk, 1.8}, kOneCameraPen{kFirstPair, 1.8, 5}, kBothCamerasPen{kFirstPair, 1.8},
+    kHeldPen{kInk, 3};
 constexpr double kArcs_px = 92;  // distance of the azimuth arcs from the ground
 constexpr double kMeanings_px = 44;
 

@@ -14,10 +14,10 @@ MapDescription map_description(const MapContext& about) {
     description.coordinate_system = "Spartan map frame: z up; metres";
   }
   if (about.stops.empty()) return description;
-  const auto earlier = [](const MapStop& a, const MapStop& b) { return a.stamp < b.stamp; };
+  const auto earlier = [](const auto& a, const auto& b) { return a.second < b.second; };
   const auto [first, last] = std::minmax_element(about.stops.begin(), about.stops.end(), earlier);
-  description.items.emplace_back("FIRST_STAMP_NS", std::to_string(first->stamp.ns));
-  description.items.emplace_back("LAST_STAMP_NS", std::to_string(last->stamp.ns));
+  description.items.emplace_back("FIRST_STAMP_NS", std::to_string(first->second.ns));
+  description.items.emplace_back("LAST_STAMP_NS", std::to_string(last->second.ns));
   description.items.emplace_back("STOPS", std::to_string(about.stops.size()));
   return description;
 }

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "spartan/core/files.h"
+#include "spartan/core/strict_yaml.h"
 
 namespace spartan::internal {
 
@@ -35,14 +36,14 @@ Status write_occupancy_map(const MapView& view, const std::string& path) {
     }
   }
   const std::filesystem::path image_path = std::filesystem::path(path).replace_extension(".pgm");
-  if (Status s = write_file_atomically(image_path.string(), image); !s) return s;
   const GeoTransform place = view.place();
   // A value of 205 is (255 - 205) / 255 = 0.1961: unknown only if free_thresh is below it.
-  return write_file_atomically(path,
-                               fmt::format("image: {}\nmode: trinary\nresolution: {}\norigin: [{}, {}, 0]\nnegate: 0\n"
-                                           "occupied_thresh: 0.65\nfree_thresh: 0.196\n",
-                                           image_path.filename().string(), view.cell_m, place.west_m,
-                                           place.north_m - view.window.height * view.cell_m));
+  const std::string yaml = fmt::format(
+      "image: {}\nmode: trinary\nresolution: {}\norigin: [{}, {}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
+      "free_thresh: 0.196\n",
+      yaml_quoted(image_path.filename().string()), view.cell_m, place.west_m,
+      place.north_m - view.window.height * view.cell_m);
+  return write_files_atomically({{image_path.string(), image}, {path, yaml}});
 }
 
 }  // namespace spartan::internal

@@ -19,6 +19,7 @@ constexpr double kRelativeRangeSigma = 0.022;
 constexpr double kCellsPerSide = 160, kCellsPerHeight = 8;
 constexpr double kCellOfDefaults_m = 0.05;  // for which the defaults of mapping and slam were chosen
 constexpr double kLeastHeight_m = 0.05;     // of a camera; a rig that states less does not state it
+constexpr double kLeastUpright = 0.5;       // of the up axis of the image along the normal of the ground: 60°
 constexpr int kMostFrames = 5;              // that are searched for a ground plane
 
 // The nearest of 1, 1.2, 1.5 … 8 times a power of ten, by ratio.
@@ -51,6 +52,7 @@ double half_side_m(const PairOverGround& pair) {
 struct SeenPair {
   PairOverGround over_ground;
   bool height_by_images = false;
+  std::optional<Eigen::Vector3d> up_in_body;  // with height_by_images
 };
 
 Result<std::optional<SeenPair>> look(FrameSource& source, Imager& imager, StopMapper& mapper, const StereoPair& pair) {
@@ -76,6 +78,7 @@ Result<std::optional<SeenPair>> look(FrameSource& source, Imager& imager, StopMa
       seen->over_ground.up_in_left = ground->plane.up;
       seen->over_ground.height_m = ground->plane.height_m;
       seen->height_by_images = true;
+      if (-ground->plane.up.y() > kLeastUpright) seen->up_in_body = body_from_left.rotation() * ground->plane.up;
       return seen;
     }
   }
@@ -104,6 +107,8 @@ Result<MapScale> map_scale_of(FrameSource& source, const RunOptions& options, co
   auto mapper = StopMapper::create(options.reconstruction, options.mapping, workers);
   if (!mapper) return failure(mapper);
   std::vector<PairOverGround> pairs;
+  std::optional<Eigen::Vector3d> up_in_body;
+  const StereoPair* const odometry_pair = odometry_pair_of(rig, options);
   bool by_images = false;
   for (const StereoPair& pair : rig.pairs) {
     auto seen = look(source, *imager, *mapper, pair);
@@ -111,9 +116,11 @@ Result<MapScale> map_scale_of(FrameSource& source, const RunOptions& options, co
     if (!*seen) continue;
     pairs.push_back((*seen)->over_ground);
     by_images = by_images || (*seen)->height_by_images;
+    if (&pair == odometry_pair) up_in_body = (*seen)->up_in_body;
   }
   MapScale scale = map_scale(pairs);
   scale.height_by_images = by_images;
+  scale.up_in_body = up_in_body;
   return scale;
 }
 

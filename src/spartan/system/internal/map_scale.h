@@ -27,6 +27,9 @@ struct MapScale {
   double side_m = 8, cell_m = 0.05;
   std::optional<double> camera_height_m;
   bool height_by_images = false;  ///< the rig does not state it
+  /// Normal of the ground in the images of the odometry pair; none where the rig has a body on the ground, where no
+  /// ground was found, or where it is more than 60° from the up axis of the image.
+  std::optional<Eigen::Vector3d> up_in_body = {};
 };
 
 /// For the pair that sees farthest. Half of the side is where the range of a point, at 0.3 px of disparity error, has a

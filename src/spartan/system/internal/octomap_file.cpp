@@ -3,15 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 namespace spartan::internal {
 namespace {
 
+constexpr std::size_t kMostVoxels = 50'000'000;          // 400 MB
 constexpr int kDepth = 16, kOrigin = 1 << (kDepth - 1);  // levels of the tree, and the key of coordinate 0
 
 // The path from the root to a voxel: three bits a level, x in the lowest, the root's children in the highest.
@@ -37,22 +41,37 @@ Range column_of(const MapView& view, int c, int r) {
   return column;
 }
 
+// Keys of the voxels of one cell: those of its place, and from the lowest to the highest one.
+struct VoxelColumn {
+  std::uint32_t x = 0, y = 0, low = 0, high = 0;
+};
+
+// Nothing for a cell that is beyond the keys of OctoMap.
+std::optional<VoxelColumn> voxels_of(const MapView& view, int c, int r) {
+  const Range column = column_of(view, c, r);
+  const double x = view.window.west + c, y = view.window.north - 1 - r;
+  const double low = std::floor(column.low / view.cell_m), high = std::floor(column.high / view.cell_m);
+  if (std::max({std::abs(x), std::abs(y), std::abs(low), std::abs(high)}) >= kOrigin - 1) return std::nullopt;
+  const auto key = [](double cell) { return static_cast<std::uint32_t>(static_cast<int>(cell) + kOrigin); };
+  return VoxelColumn{key(x), key(y), key(low), key(high)};
+}
+
 Result<std::vector<VoxelPath>> occupied_voxels(const MapView& view) {
+  const char* const remedy = "export a part of the map: `spartan map export --window`";
   std::vector<VoxelPath> voxels;
   for (int r = 0; r < view.window.height; ++r) {
     for (int c = 0; c < view.window.width; ++c) {
       if (!(view.count(c, r) > 0)) continue;
-      const Range column = column_of(view, c, r);
-      const double x = view.window.west + c, y = view.window.north - 1 - r;
-      const double low = std::floor(column.low / view.cell_m), high = std::floor(column.high / view.cell_m);
-      if (std::max({std::abs(x), std::abs(y), std::abs(low), std::abs(high)}) >= kOrigin - 1) {
+      const auto column = voxels_of(view, c, r);
+      if (!column) {
         return failure(
             ErrorCode::usage,
             fmt::format("an OctoMap of {} m cells ends {:.0f} m from the origin", view.cell_m, kOrigin * view.cell_m),
-            "--window", "export a part of the map that is closer to the origin");
+            "", remedy);
       }
-      const auto key = [](double cell) { return static_cast<std::uint32_t>(static_cast<int>(cell) + kOrigin); };
-      for (double z = low; z <= high; ++z) voxels.push_back(path_of(key(x), key(y), key(z)));
+      if (voxels.size() + (column->high - column->low) > kMostVoxels)
+        return failure(ErrorCode::usage, fmt::format("the map has more than {} voxels", kMostVoxels), "", remedy);
+      for (std::uint32_t z = column->low; z <= column->high; ++z) voxels.push_back(path_of(column->x, column->y, z));
     }
   }
   std::sort(voxels.begin(), voxels.end());

@@ -124,7 +124,7 @@ std::vector<StageTime> RunLoop::take_stage_times() {
 
 Result<MapRecord> RunLoop::write_map_of(const MappedStop& stop) {
   const LocalMap& map = stop.merged.local;
-  const MapContext about{heading_east(), {{0, stop.stamp, stop.merged.corrected}}};
+  const MapContext about{heading_east(), {{0, stop.stamp}}};
   const Status written =
       clock_.measure("maps", [&] { return write_local_map(map, about, folder_.local_map(stop.stamp)); });
   if (!written) return failure(written);

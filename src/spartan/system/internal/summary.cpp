@@ -135,7 +135,9 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"format", facts.format},
       {"world",
        {{"heading", facts.heading_east ? "east" : "start"},
-        {"gravity", facts.gravity_measured ? "measured" : "assumed"}}},
+        {"gravity", facts.level_by_ground    ? "ground"
+                    : facts.gravity_measured ? "measured"
+                                             : "assumed"}}},
       {"frames", processed},
       {"skipped", skipped},
       {"predicted_frames", predicted},

@@ -17,6 +17,7 @@ struct RunFacts {
   std::string input;
   std::string format;
   bool gravity_measured = false;
+  bool level_by_ground = false;  ///< not measured by a sensor: z of the world is the normal of the first ground
   bool heading_east = false;
   int threads = 1;
   std::vector<std::string> absent;           ///< stages that the options disable
