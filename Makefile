@@ -67,4 +67,4 @@ coverage:
 	scripts/coverage
 
 clean:
-	rm -rf build demo_output
+	rm -rf build demo_output/recording demo_output/run demo_output/kitti demo_output/report.html

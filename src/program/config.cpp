@@ -8,6 +8,11 @@
 namespace spartan::program {
 namespace {
 
+const std::string kHeading =
+    "# Keep only the lines that you change. Options that a file states are not derived by a run: sizes of maps follow "
+    "the\n"
+    "# height and range of the cameras, noise of sensors the recording.\n";
+
 struct ConfigArguments {
   std::string file;
   std::vector<std::string> set;
@@ -18,7 +23,7 @@ Result<ExitCode> dump(const Context& context, const ConfigArguments& arguments) 
   const auto options = run_options(context, arguments.file, arguments.set);
   if (!options) return failure(options);
   const std::string text = arguments.all ? dump_options(*options) : dump_basic_options(*options);
-  if (Status printed = print(text); !printed) return failure(printed);
+  if (Status printed = print(kHeading + text); !printed) return failure(printed);
   return kDone;
 }
 

@@ -48,8 +48,10 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(
-      "Exit codes: 0 done; 1 internal fault; 2 the command line is wrong; 3 input; 4 calibration or configuration;\n"
-      "5 output, memory or file descriptors; 6 done, but the rover was lost for part of the drive; 7 a bad calibration "
+      "Exit codes: 0 done; 1 internal fault; 2 the command line is wrong; 3 the input is missing or unusable; 4 a "
+      "calibration or option file is missing or invalid;\n"
+      "5 the output exists or cannot be written, or memory or file descriptors ran out; 6 done, but the rover was lost "
+      "for part of the drive; 7 a bad calibration "
       "(`rig inspect --check`); 130 interrupted.");
   Context context;
   context.threads = available_cores();

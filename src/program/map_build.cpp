@@ -113,8 +113,9 @@ Result<std::vector<FrameKey>> frames_to_map(const FrameSource& source, const Bui
   }
   std::vector<FrameKey> frames = source.frames_at(*a.position);
   if (!frames.empty()) return frames;
-  return failure(ErrorCode::input, fmt::format("has no frame of the stop with position_id {}", *a.position),
-                 a.recording, "frames.csv lists the position_id of every frame; --frame maps a single frame");
+  return failure(
+      ErrorCode::input, fmt::format("has no frame of the stop with position_id {}", *a.position), a.recording,
+      "recordings of Spartan list the position_id of every frame in frames.csv; --frame maps a single frame");
 }
 
 Result<Stop> load_stop(const Context& context, const BuildArguments& a) {
@@ -276,10 +277,12 @@ Status check(const BuildArguments& a) {
                    "map build");
   }
   if (pair && (a.right.empty() || a.of_recording.rig.empty())) {
-    return failure(ErrorCode::usage, "give both LEFT and RIGHT, and --rig", "map build");
+    return failure(ErrorCode::usage,
+                   a.right.empty() || a.left.empty() ? "give both LEFT and RIGHT" : "LEFT and RIGHT need --rig",
+                   "map build", "their calibration");
   }
   if (!pair && a.position.has_value() == a.frame.has_value()) {
-    return failure(ErrorCode::usage, "--recording needs either --position or --frame", "map build");
+    return failure(ErrorCode::usage, "--recording needs one of --position and --frame", "map build");
   }
   return {};
 }
@@ -350,7 +353,8 @@ void add_map_build(CLI::App& map, Context& context) {
   command->add_option("right", a->right, "Right image.");
   command->add_option("-o,--output", a->output, "Folder for the results; created if missing.")->required();
   command->add_option("--rig", a->of_recording.rig,
-                      "Rig or calibration file, in any supported format (default: the recording's own).");
+                      "Rig or calibration file, in any supported format; required with LEFT and RIGHT (default: the "
+                      "recording's own).");
   command->add_option("--recording", a->recording,
                       "Recording to take one stop or one frame from (default: none, the images LEFT and RIGHT).");
   add_recording_options(*command, a->of_recording);

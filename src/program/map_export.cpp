@@ -15,6 +15,8 @@ namespace {
 
 constexpr double kFarthestCell = 5e8;  // cells are counted in int
 
+constexpr const char* kWindowHint = "give the smallest x, smallest y, largest x and largest y in metres";
+
 struct MapExportArguments {
   std::string map, output;
   std::vector<std::string> layers;
@@ -25,13 +27,13 @@ Result<LatticeWindow> window_of(const MapExportArguments& a, const GlobalMap& ma
   if (a.window_m.empty()) return map.extent();
   const double west = a.window_m[0], south = a.window_m[1], east = a.window_m[2], north = a.window_m[3];
   if (!(east > west) || !(north > south)) {
-    return failure(ErrorCode::usage, "is empty: east must exceed west, and north south", "--window",
-                   "give west,south,east,north in metres");
+    return failure(ErrorCode::usage, "is empty: the third number must exceed the first, and the fourth the second",
+                   "--window", kWindowHint);
   }
   const double farthest_m = kFarthestCell * map.cell_m();
   if (std::max({std::abs(west), std::abs(south), std::abs(east), std::abs(north)}) > farthest_m) {
     return failure(ErrorCode::usage, fmt::format("exceeds {:.0f} m from the origin", farthest_m), "--window",
-                   "give west,south,east,north in metres");
+                   kWindowHint);
   }
   return window_between(west, south, east, north, map.cell_m());
 }
@@ -43,7 +45,15 @@ std::string file_beside(const std::string& output) {
   return path.extension() == ".tif" ? output + ".aux.xml" : std::string();
 }
 
-Status write_map(SavedMap& saved, const MapExportArguments& a, const ThreadPool& workers) {
+bool knows_a_cell(const MapView& view) {
+  for (int r = 0; r < view.window.height; ++r) {
+    if (std::any_of(view.count.row(r), view.count.row(r) + view.window.width, [](float n) { return n > 0; }))
+      return true;
+  }
+  return false;
+}
+
+Status write_map(SavedMap& saved, const MapExportArguments& a, const Context& context) {
   if (std::filesystem::path(a.output).extension() == ".map") {
     if (!a.window_m.empty()) return failure(ErrorCode::usage, "a .map file always holds the whole map", "--window");
     if (!a.layers.empty()) return failure(ErrorCode::usage, "a .map file always holds all layers", "--layer");
@@ -55,7 +65,9 @@ Status write_map(SavedMap& saved, const MapExportArguments& a, const ThreadPool&
   if (!window) return failure(window);
   const auto view = saved.map().view(*window);
   if (!view) return failure(view);
-  return export_map(*view, {*format, a.layers, saved.options().mapping.map, saved.about()}, workers, a.output);
+  if (!knows_a_cell(*view)) context.log.warning("--window: no cell of it is known");
+  return export_map(*view, {*format, a.layers, saved.options().mapping.map, saved.about()}, ThreadPool(context.threads),
+                    a.output);
 }
 
 Result<ExitCode> export_command(const Context& context, const MapExportArguments& a) {
@@ -65,7 +77,7 @@ Result<ExitCode> export_command(const Context& context, const MapExportArguments
   }
   auto saved = SavedMap::open(a.map);
   if (!saved) return failure(saved);
-  if (Status s = write_map(*saved, a, ThreadPool(context.threads)); !s) return failure(s);
+  if (Status s = write_map(*saved, a, context); !s) return failure(s);
   return kDone;
 }
 
@@ -85,17 +97,20 @@ void add_map_export(CLI::App& map, Context& context) {
           "with a .pgm beside it), .map.")
       ->required();
   command
-      ->add_option("--layer", a->layers,
-                   "Layer to write, e.g. class, which as the only one is a GeoTIFF of bytes with a colour table. "
-                   "Repeatable (default: all for .tif, elevation_m for .asc).")
+      ->add_option(
+          "--layer", a->layers,
+          "Layer to write, for .tif and .asc (one): elevation_m, elevation_min_m, elevation_max_m, variance_m2, "
+          "count, slope_rad, roughness_m, step_m, class, occupancy_logodds or cost. class as the only one is a "
+          "GeoTIFF of bytes with a colour table. Repeatable (default: all for .tif, elevation_m for .asc).")
       ->allow_extra_args(false);
   command
       ->add_option(
           "--window", a->window_m,
           "Export only this part: the smallest x, smallest y, largest x and largest y in metres of the world frame "
-          "(default: the whole map).")
+          "(default: the whole map). It is enlarged to whole cells.")
       ->delimiter(',')
-      ->expected(4);
+      ->expected(4)
+      ->allow_extra_args(false);
   add_force_flag(*command, context);
   add_threads_option(*command, context);
 }

@@ -11,9 +11,10 @@ void add_recording_options(CLI::App& command, RecordingArguments& a) {
   command.add_option("--right", a.right,
                      "Images of the right camera, likewise. Images with the same number or time stamp in their names "
                      "are pairs (default: as the layout has them).");
-  command.add_option("--times", a.times,
-                     "File of frame times, one a row, alone or beside file names: decimal seconds, or integers in a "
-                     "unit that follows from their values (default: times.txt of the recording, else the file names).");
+  command.add_option(
+      "--times", a.times,
+      "File of frame times, one a row, alone or beside file names: decimal seconds, or integers of s, ms, us "
+      "or ns, which is found by their size and printed (default: times.txt of the recording, else the file names).");
   command.add_option("--fps", a.fps, "Frames per second, instead of times (default: times of the recording).")
       ->check(CLI::Range(0.001, 10000.0));
   command

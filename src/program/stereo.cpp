@@ -316,9 +316,9 @@ void add_stereo(CLI::App& app, Context& context) {
           "--calib images are taken as rectified, and there is no point cloud.")
       ->excludes(rig);
   command->add_option("--min-disparity", a->min_disparity, "Minimum disparity in pixels (default 0).");
-  command->add_option(
-      "--max-disparity", a->max_disparity,
-      "Maximum disparity in pixels (default: from the rig, else a quarter of the width). A larger one costs time.");
+  command->add_option("--max-disparity", a->max_disparity,
+                      "Maximum disparity in pixels (default: of the nearest distance that the rig states, else a "
+                      "quarter of the width, rounded up to a multiple of 16, less 1). A larger one costs time.");
   command
       ->add_option("--max-range-m", a->max_range_m,
                    "Maximum distance of the points of points.ply from the camera in metres (default: no limit).")

@@ -11,6 +11,7 @@
 #include "program.h"
 #include "run_results.h"
 #include "small_drive.h"
+#include "spartan/core/trajectory.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {

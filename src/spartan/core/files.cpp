@@ -80,7 +80,7 @@ Status expect_replaceable(const std::string& path) {
 tl::unexpected<Error> write_failure(const std::string& path, int error) {
   std::string hint = "check the permissions and the free disk space";
   if (error == ENOSPC) hint = "free disk space, or choose another folder with -o";
-  if (error == ENOENT) hint = "create the folder of the file first, or choose another one";
+  if (error == ENOENT) hint = "create its parent folder first, or choose another one";
   if (error == EACCES || error == EROFS) hint = "choose a writable folder with -o";
   if (error == ENOTDIR || error == EISDIR || error == EEXIST)
     hint = "a file stands where a folder is needed, or a folder where a file is";

@@ -80,7 +80,7 @@ Result<std::string> find_truth(const std::string& path) {
     if (is_there(fs::path(path) / name)) return (fs::path(path) / name).string();
   }
   return failure(ErrorCode::input, "is a folder without a ground-truth trajectory", path,
-                 "expected truth/poses.tum, poses.txt and mav0/state_groundtruth_estimate0/data.csv");
+                 "expected truth/poses.tum, poses.txt or mav0/state_groundtruth_estimate0/data.csv");
 }
 
 void copy_stamps(Trajectory& to, const Trajectory& from) {

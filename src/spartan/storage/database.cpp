@@ -40,7 +40,7 @@ Error error_of(sqlite3* db, const std::string& path) {
       return {ErrorCode::output, "is in use by another process", path, "wait until the other process has finished"};
     case SQLITE_NOTADB:
       return {ErrorCode::store_damaged, "is damaged or not a database: " + what, path,
-              "give a saved map (.map) or a run folder; a damaged one must be made again"};
+              "give a saved map (.map) or a run folder, not a GeoTIFF; a damaged one must be made again"};
     case SQLITE_INTERRUPT:
       return {ErrorCode::store_damaged, "is damaged: a query does not end", path, "run again into a new folder"};
     case SQLITE_ERROR:

@@ -32,7 +32,8 @@ std::vector<fs::path> files_of(const fs::path& folder) {
   std::error_code error;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     std::error_code unreadable;
-    if (it->is_regular_file(unreadable)) files.push_back(it->path());
+    const bool kept = it->path().filename() != "owner.lock";  // it ends with the run
+    if (kept && it->is_regular_file(unreadable)) files.push_back(it->path());
   }
   std::sort(files.begin(), files.end());
   return files;
