@@ -29,11 +29,10 @@ tl::unexpected<Error> not_replaced(const std::string& path, const std::string& w
 
 }  // namespace
 
-Result<ReplacedFolder> ReplacedFolder::set_aside(const std::string& given, std::span<const std::string_view> known) {
-  std::string path = given;
-  while (path.size() > 1 && path.ends_with('/')) path.pop_back();
+Result<ReplacedFolder> ReplacedFolder::set_aside(const std::string& path, std::span<const std::string_view> known) {
+  const std::string name_alone = path.substr(0, std::max<std::size_t>(1, path.find_last_not_of('/') + 1));
   std::error_code error;
-  if (fs::is_symlink(path, error)) return not_replaced(path, "is a link");
+  if (fs::is_symlink(name_alone, error)) return not_replaced(path, "is a link");
   if (!fs::exists(path, error)) return ReplacedFolder();
   if (!fs::is_directory(path, error)) return not_replaced(path, "is not a folder");
   const auto entries = list_folder(path);

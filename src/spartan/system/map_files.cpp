@@ -89,7 +89,7 @@ void remove_views(const std::string& folder) {
   std::error_code ignored;
   for (const std::string& name : *names) {
     if (name.ends_with("_classes.png") || name.ends_with("_v_disparity.png"))
-      std::filesystem::remove(folder + "/" + name, ignored);
+      std::filesystem::remove(std::filesystem::path(folder) / name, ignored);
   }
 }
 
