@@ -85,7 +85,7 @@ def formats_of(lab):
             _run("IN"), _stereo("IN/image_0/000000.png", right)]), 60),
         "images": Format(_mutated_file(seeds / "image", _names(seeds / "image"), binary, [
             _stereo("IN/FILE", "IN/FILE")]), 90),
-        "image headers": Format(_fixed_files(mutations.picture_attacks(), [
+        "image headers": Format(_fixed_files(mutations.image_attacks(), [
             _stereo("IN", "IN"), _stereo(left, right, "--truth", "IN"), 
             _stereo(left, right, "--truth", terrain, "--mask", "IN")]), 60),
         "PFM": Format(_mutated_file(drive.run / "terrain", terrain.name, binary, [

@@ -169,7 +169,7 @@ def of_stage_memory(file, rng):
     database.close()
 
 
-def picture_attacks():
+def image_attacks():
     """Headers that claim far more than the file holds, by name of the file."""
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))

@@ -123,8 +123,8 @@ void paint_text(cv::Mat& canvas, const Eigen::Vector2d& foot, const std::string&
   stroke_text(&canvas, start, text, scale, thickness, scalar(lettering.colour));
 }
 
-void paint_picture(cv::Mat& canvas, const Eigen::Vector2d& top_left, const Eigen::Vector2d& bottom_right,
-                   const Image<Rgb8>& pixels) {
+void paint_image(cv::Mat& canvas, const Eigen::Vector2d& top_left, const Eigen::Vector2d& bottom_right,
+                 const Image<Rgb8>& pixels) {
   const cv::Point from(cvRound(kOversampling * top_left.x()), cvRound(kOversampling * top_left.y())),
       to(cvRound(kOversampling * bottom_right.x()), cvRound(kOversampling * bottom_right.y()));
   const cv::Rect place = cv::Rect(from, to) & cv::Rect(0, 0, canvas.cols, canvas.rows);
@@ -157,7 +157,7 @@ std::string Drawing::to_svg() const {
           w.foot.y(), w.lettering.size_px, anchors[static_cast<int>(w.lettering.anchor)], hex(w.lettering.colour), halo,
           html_text(w.text));
     }
-    std::string operator()(const Picture& p) const {
+    std::string operator()(const PlacedImage& p) const {
       const Eigen::Vector2d size = p.bottom_right - p.top_left;
       return fmt::format(
           "<image x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" preserveAspectRatio=\"none\" "
@@ -180,7 +180,7 @@ Image<Rgb8> Drawing::to_image() const {
     void operator()(const Area& a) const { paint_area(canvas, a.corners, a.paint); }
     void operator()(const Line& l) const { paint_line(canvas, l.points, l.pen); }
     void operator()(const Text& w) const { paint_text(canvas, w.foot, w.text, w.lettering); }
-    void operator()(const Picture& p) const { paint_picture(canvas, p.top_left, p.bottom_right, p.pixels); }
+    void operator()(const PlacedImage& p) const { paint_image(canvas, p.top_left, p.bottom_right, p.pixels); }
   };
   for (const Part& part : parts_) std::visit(PaintPart{canvas}, part);
   Image<Rgb8> image(width_px_, height_px_);

@@ -46,8 +46,8 @@ class Drawing {
   }
 
   /// An image whose corner pixels fill the corners of a rectangle from `top_left` to `bottom_right`.
-  void picture(const Eigen::Vector2d& top_left, const Eigen::Vector2d& bottom_right, Image<Rgb8> pixels) {
-    parts_.emplace_back(Picture{top_left, bottom_right, std::move(pixels)});
+  void image(const Eigen::Vector2d& top_left, const Eigen::Vector2d& bottom_right, Image<Rgb8> pixels) {
+    parts_.emplace_back(PlacedImage{top_left, bottom_right, std::move(pixels)});
   }
 
   std::string to_svg() const;
@@ -67,11 +67,11 @@ class Drawing {
     std::string text;
     Lettering lettering;
   };
-  struct Picture {
+  struct PlacedImage {
     Eigen::Vector2d top_left, bottom_right;
     Image<Rgb8> pixels;
   };
-  using Part = std::variant<Area, Line, Text, Picture>;
+  using Part = std::variant<Area, Line, Text, PlacedImage>;
 
   int width_px_, height_px_;
   std::vector<Part> parts_;

@@ -66,12 +66,12 @@ TEST(Drawing, TextIsEscapedAndAnchored) {
   EXPECT_THAT(svg, HasSubstr("text-anchor=\"end\""));
 }
 
-TEST(Drawing, PicturesFillTheirRectangle) {
+TEST(Drawing, ImagesFillTheirRectangle) {
   Image<Rgb8> pixels(2, 1);
   pixels(0, 0) = kRed;
   pixels(1, 0) = kBlue;
   Drawing drawing(60, 40);
-  drawing.picture({10, 10}, {50, 30}, std::move(pixels));
+  drawing.image({10, 10}, {50, 30}, std::move(pixels));
   const Image<Rgb8> image = drawing.to_image();
   EXPECT_TRUE(is_near(image(12, 12), kRed));
   EXPECT_TRUE(is_near(image(28, 28), kRed));

@@ -10,7 +10,7 @@
 namespace spartan {
 namespace {
 
-constexpr int kMostPixels = 1600, kWantedPixels = 640;  // of the picture
+constexpr int kMostPixels = 1600, kWantedPixels = 640;  // of the image
 
 // The cells between the outermost known ones; all where none is known.
 struct Part {
@@ -45,7 +45,7 @@ Plot ground_plot(Image<Rgb8> pixels, const GeoTransform& place, const std::strin
   plot.equal_axes = true;
   plot.width_px = kPlotMargin_px + scale * pixels.width();
   plot.height_px = kPlotHeading_px + scale * pixels.height();
-  plot.picture = PlotPicture{
+  plot.image = PlotImage{
       name, std::move(pixels), {place.west_m, place.west_m + width_m}, {place.north_m - height_m, place.north_m}};
   return plot;
 }

@@ -26,13 +26,13 @@ struct PlotMarker {
 };
 
 /// An image below the lines; its borders in units of the axes.
-struct PlotPicture {
+struct PlotImage {
   std::string name;
   Image<Rgb8> pixels;
   Range x, y;
 };
 
-/// What the colours of the picture mean.
+/// What the colours of the image mean.
 struct ColourBar {
   std::string label;
   Range range;
@@ -49,7 +49,7 @@ struct Plot {
   bool equal_axes = false;
   std::vector<PlotLine> lines;
   std::vector<PlotMarker> markers;
-  std::optional<PlotPicture> picture;
+  std::optional<PlotImage> image;
   std::optional<ColourBar> colour_bar;
   std::vector<ColourKey> keys;
   int width_px = 640, height_px = 400;

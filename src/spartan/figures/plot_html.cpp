@@ -96,7 +96,7 @@ std::string legend(const Plot& plot, const internal::PlotLayers& layers) {
   const auto box = [](const std::string& colour) {
     return fmt::format("<rect x=\"3\" width=\"20\" height=\"12\" fill=\"{}\"/>", colour);
   };
-  if (plot.picture) html += layer_key(plot.picture->name, box("#8a8478"), layers.picture);
+  if (plot.image) html += layer_key(plot.image->name, box("#8a8478"), layers.image);
   for (const ColourKey& k : plot.keys) {
     html += fmt::format("<span class=\"key\">{}{}</span>\n", sample(box(hex(k.colour))), html_text(k.name));
   }
@@ -138,12 +138,12 @@ std::string to_html(const Plot& plot) {
       "<svg class=\"area\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" viewBox=\"{:.9g} {:.9g} {:.9g} "
       "{:.9g}\" preserveAspectRatio=\"none\">\n",
       l.left, l.top, l.width, l.height, l.x.low, -l.y.high, l.x.span(), l.y.span());
-  if (plot.picture) {
-    const PlotPicture& p = *plot.picture;
+  if (plot.image) {
+    const PlotImage& p = *plot.image;
     html += fmt::format(
         "<image data-layer=\"{}\" x=\"{:.7g}\" y=\"{:.7g}\" width=\"{:.7g}\" height=\"{:.7g}\" "
         "preserveAspectRatio=\"none\" href=\"{}\"/>\n",
-        layers.picture, p.x.low, -p.y.high, p.x.span(), p.y.span(), data_url(p.pixels.view()));
+        layers.image, p.x.low, -p.y.high, p.x.span(), p.y.span(), data_url(p.pixels.view()));
   }
   for (std::size_t i = 0; i < plot.lines.size(); ++i) html += polyline(plot.lines[i], i);
   html += "</svg>\n";

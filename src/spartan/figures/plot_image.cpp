@@ -146,9 +146,9 @@ Image<Rgb8> to_image(const Plot& plot) {
   Drawing d(static_cast<int>(std::lround(l.total_width)), 0);
   d.text({12, 22}, plot.title, {kInk, 16});
   draw_axes(d, plot, l);
-  if (plot.picture) {
-    const PlotPicture& p = *plot.picture;
-    d.picture({l.px(p.x.low), l.py(p.y.high)}, {l.px(p.x.high), l.py(p.y.low)}, Image<Rgb8>::copy_of(p.pixels.view()));
+  if (plot.image) {
+    const PlotImage& p = *plot.image;
+    d.image({l.px(p.x.low), l.py(p.y.high)}, {l.px(p.x.high), l.py(p.y.low)}, Image<Rgb8>::copy_of(p.pixels.view()));
   }
   for (const PlotLine& line : plot.lines) draw_line(d, line, l);
   for (const PlotMarker& m : plot.markers) draw_marker(d, m, {l.px(m.x), l.py(m.y)});
@@ -165,7 +165,7 @@ Image<Rgb8> titled_image(Image<Rgb8> pixels, const std::string& title, const std
   const double width = pixels.width(), bottom = kTitle_px + pixels.height();
   Drawing d(std::max(pixels.width(), kLeastWidth_px), 0);
   d.text({12, 22}, title, {kInk, 16});
-  d.picture({0, kTitle_px}, {width, bottom}, std::move(pixels));
+  d.image({0, kTitle_px}, {width, bottom}, std::move(pixels));
   Legend legend(d, bottom + 8, 12, std::max(width, double{kLeastWidth_px}) - 8);
   draw_keys(d, keys, legend);
   d.set_height(static_cast<int>(std::ceil(keys.empty() ? bottom : legend.bottom())));

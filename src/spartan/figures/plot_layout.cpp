@@ -61,13 +61,13 @@ PlotLayout layout_of(const Plot& plot, double top_px) {
     extend(x, marker.x);
     extend(y, marker.y);
   }
-  if (plot.picture) {
-    for (const double value : {plot.picture->x.low, plot.picture->x.high}) extend(x, value);
-    for (const double value : {plot.picture->y.low, plot.picture->y.high}) extend(y, value);
+  if (plot.image) {
+    for (const double value : {plot.image->x.low, plot.image->x.high}) extend(x, value);
+    for (const double value : {plot.image->y.low, plot.image->y.high}) extend(y, value);
   }
   PlotLayout layout;
-  layout.x = with_margin(x, plot.picture ? 0 : 0.05);
-  layout.y = with_margin(y, plot.picture ? 0 : 0.05);
+  layout.x = with_margin(x, plot.image ? 0 : 0.05);
+  layout.y = with_margin(y, plot.image ? 0 : 0.05);
   layout.left = kLeft_px;
   layout.top = top_px;
   layout.width = plot.width_px - kLeft_px - kRight_px;
@@ -91,7 +91,7 @@ PlotLayers layers_of(const Plot& plot) {
     if (i > 0 && plot.markers[i - 1].name != plot.markers[i].name) ++layer;
     layers.markers.push_back(layer);
   }
-  layers.picture = plot.markers.empty() ? layer : layer + 1;
+  layers.image = plot.markers.empty() ? layer : layer + 1;
   return layers;
 }
 

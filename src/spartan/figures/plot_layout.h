@@ -30,10 +30,10 @@ struct PlotLayout {
 PlotLayout layout_of(const Plot& plot, double top_px);
 
 /// Layers of a plot that can be switched: first the lines, then the markers, those of one name in a row together, then
-/// the picture.
+/// the image.
 struct PlotLayers {
   std::vector<std::size_t> markers;  ///< of each marker
-  std::size_t picture = 0;
+  std::size_t image = 0;
 };
 PlotLayers layers_of(const Plot& plot);
 

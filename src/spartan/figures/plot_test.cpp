@@ -105,10 +105,10 @@ TEST(PlotHtml, APlotWithoutPointsIsStillAPlot) {
   }
 }
 
-TEST(PlotHtml, AMapHasAPictureAScaleBarAColourBarAndMarkers) {
+TEST(PlotHtml, AMapHasAnImageAScaleBarAColourBarAndMarkers) {
   Plot plot = plot_of({0, 4}, {0, 2});
   plot.equal_axes = true;
-  plot.picture = PlotPicture{"elevation", Image<Rgb8>(4, 2), {0, 4}, {0, 2}};
+  plot.image = PlotImage{"elevation", Image<Rgb8>(4, 2), {0, 4}, {0, 2}};
   plot.colour_bar = ColourBar{"elevation, m", {-1, 1}, [](double v) { return v < 0.5 ? kGroundColour : kLineColour; }};
   plot.markers = {
       {"rover", kGroundColour, 1, 1, 0.5}, {"stop", kLineColour, 2, 1, {}}, {"stop", kLineColour, 3, 1, {}}};
@@ -119,7 +119,7 @@ TEST(PlotHtml, AMapHasAPictureAScaleBarAColourBarAndMarkers) {
   EXPECT_THAT(html, HasSubstr("class=\"bar\""));
   EXPECT_THAT(html, HasSubstr(">obstacle</span>"));
   for (const char* key : {"data-layer=\"1\"><svg", "data-layer=\"2\"><svg", "data-layer=\"3\"><svg"})
-    EXPECT_THAT(html, HasSubstr(key)) << "one entry for the rover, one for both stops, one for the picture";
+    EXPECT_THAT(html, HasSubstr(key)) << "one entry for the rover, one for both stops, one for the image";
   EXPECT_THAT(html, Not(HasSubstr("data-layer=\"4\"")));
 }
 
@@ -127,7 +127,7 @@ TEST(PlotImage, HasItsPartsWhereTheLayoutPutsThem) {
   Plot plot = plot_of({1, 1}, {0.5, 1.5});
   plot.equal_axes = true;
   plot.lines[0].width_px = 6;
-  plot.picture = PlotPicture{"ground", Image<Rgb8>(4, 2, kGroundColour), {0, 4}, {0, 2}};
+  plot.image = PlotImage{"ground", Image<Rgb8>(4, 2, kGroundColour), {0, 4}, {0, 2}};
   const PlotLayout layout = layout_of(plot, 54);
   const Image<Rgb8> image = to_image(plot);
   EXPECT_EQ(image.width(), static_cast<int>(std::lround(layout.total_width)));

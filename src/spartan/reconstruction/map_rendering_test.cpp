@@ -18,7 +18,7 @@ double luminance(const Rgb8& c) {
   return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
 }
 
-TEST(MapPictures, ElevationColoursGrowBrighterInEvenSteps) {
+TEST(MapRendering, ElevationColoursGrowBrighterInEvenSteps) {
   for (int i = 0; i < 10; ++i) {
     const double step = luminance(elevation_colour(0.1 * (i + 1))) - luminance(elevation_colour(0.1 * i));
     EXPECT_GT(step, 10) << i;
@@ -27,13 +27,13 @@ TEST(MapPictures, ElevationColoursGrowBrighterInEvenSteps) {
   EXPECT_EQ(elevation_colour(2), elevation_colour(1));
 }
 
-TEST(MapPictures, DisparityColoursRunFromBlueOverGreenToRed) {
+TEST(MapRendering, DisparityColoursRunFromBlueOverGreenToRed) {
   EXPECT_GT(disparity_colour(0.1).b, disparity_colour(0.1).r);
   EXPECT_GT(disparity_colour(0.5).g, disparity_colour(0.5).r);
   EXPECT_GT(disparity_colour(0.95).r, disparity_colour(0.95).b + 50);
 }
 
-TEST(MapPictures, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreLight) {
+TEST(MapRendering, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreLight) {
   Image<float> elevation(9, 3);
   Image<GroundClass> kind(9, 3, GroundClass::ground);
   for (int y = 0; y < 3; ++y) {
@@ -51,7 +51,7 @@ TEST(MapPictures, SlopesTowardsTheLightAreBrighterAndUnknownCellsAreLight) {
   EXPECT_GT(at(2, 1).b, at(2, 1).r + 50) << "a cavity is blue";
 }
 
-TEST(MapPictures, ClassesTintTheImage) {
+TEST(MapRendering, ClassesTintTheImage) {
   const Image<std::uint8_t> left(4, 1, 100);
   Image<std::uint8_t> classes(4, 1);
   for (int x = 0; x < 4; ++x) classes(x, 0) = static_cast<std::uint8_t>(x);
@@ -62,7 +62,7 @@ TEST(MapPictures, ClassesTintTheImage) {
   EXPECT_GT(image(3, 0).b, image(3, 0).r);
 }
 
-TEST(MapPictures, EachSetOfViewsHasItsOwnColour) {
+TEST(MapRendering, EachSetOfViewsHasItsOwnColour) {
   Image<std::uint8_t> views(4, 1);
   for (int x = 0; x < 4; ++x) views(x, 0) = static_cast<std::uint8_t>(x);
   const Image<Rgb8> image = render_view_coverage(views);
@@ -72,7 +72,7 @@ TEST(MapPictures, EachSetOfViewsHasItsOwnColour) {
 }
 
 // On level ground the yellow profile coincides with the bright line of the v-disparity image in every row.
-TEST(MapPictures, TheProfileCoincidesWithTheGroundLine) {
+TEST(MapRendering, TheProfileCoincidesWithTheGroundLine) {
   const RectifiedStereo stereo{{120, 120}, 130, {59.5, 59.5}, 0.2};
   const Pose body_from_left = testing::camera_pose_at(1, 0, 0.68, optical_from_forward());
   const Image<float> disparity = testing::disparity_of([](double, double) { return 0.0; }, stereo, body_from_left);

@@ -62,7 +62,7 @@ Image<Rgb8> draw_coverage(const MergedRange& merged, std::span<const StopView> v
   plot.y_label = sphere ? "elevation, deg" : "tangent of the elevation";
   plot.width_px = kPlotMargin_px + pixels.width();
   plot.height_px = kPlotHeading_px + pixels.height();
-  plot.picture = PlotPicture{"views", std::move(pixels), columns, rows};
+  plot.image = PlotImage{"views", std::move(pixels), columns, rows};
   for (std::size_t i = 0; i < views.size(); ++i)
     plot.keys.push_back({fmt::format("view {}: {}", i + 1, views[i].pair), view_colour(i)});
   return to_image(plot);
