@@ -94,13 +94,7 @@ Result<ExitCode> demo(const Context& context, const std::string& scenario, const
   const RunRequest request = run_request(context, recording, folder + "/run", *options);
   if (Status s = say("Processing the recording: " + request.output); !s) return failure(s);
   Progress progress(context.quiet);
-  RunHooks hooks;
-  hooks.log = context.log;
-  hooks.should_stop = interrupted;
-  hooks.progress = [&progress](const RunProgress& p) {
-    progress.show(p.done, p.total, fmt::format("{}, {:.1f} m", p.status, p.distance_m));
-  };
-  const auto outcome = run(request, hooks);
+  const auto outcome = run(request, run_hooks(context, progress));
   if (!outcome) return failure(outcome);
   if (outcome->interrupted) return demo_interrupted(folder);
   if (Status s = write_page(context, request, page); !s) return failure(s);

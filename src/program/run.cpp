@@ -96,16 +96,10 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.version = SPARTAN_VERSION;
 
   Progress progress(context.quiet);
-  RunHooks hooks;
-  hooks.log = context.log;
-  hooks.should_stop = interrupted;
-  hooks.progress = [&progress](const RunProgress& p) {
-    progress.show(p.done, p.total, fmt::format("{}, {:.1f} m", p.status, p.distance_m));
-  };
   if (!arguments.truth.empty()) {
     if (const auto truth = load_truth(arguments.truth); !truth) return failure(truth);
   }
-  auto outcome = run(request, hooks);
+  auto outcome = run(request, run_hooks(context, progress));
   if (!outcome) return failure(outcome);
   std::string text = run_summary_text(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {

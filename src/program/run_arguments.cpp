@@ -1,5 +1,9 @@
 #include "program/run_arguments.h"
 
+#include <fmt/format.h>
+
+#include "program/interrupt.h"
+
 namespace spartan::program {
 namespace {
 
@@ -35,6 +39,16 @@ Result<RunOptions> run_options(const Context& context, const std::string& file,
   auto chosen = choose_options(context, file, assignments);
   if (!chosen) return failure(chosen);
   return std::move(chosen->options);
+}
+
+RunHooks run_hooks(const Context& context, Progress& progress) {
+  RunHooks hooks;
+  hooks.log = context.log;
+  hooks.should_stop = interrupted;
+  hooks.progress = [&progress](const RunProgress& p) {
+    progress.show(p.done, p.total, fmt::format("{}, {:.1f} m", p.status, p.distance_m));
+  };
+  return hooks;
 }
 
 }  // namespace spartan::program

@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "program/context.h"
+#include "program/progress.h"
 #include "spartan/core/result.h"
+#include "spartan/system/run.h"
 #include "spartan/system/run_options.h"
 
 namespace spartan::program {
@@ -23,5 +25,8 @@ Result<ChosenOptions> choose_options(const Context& context, const std::string& 
 /// The same without the keys.
 Result<RunOptions> run_options(const Context& context, const std::string& file,
                                const std::vector<std::string>& assignments);
+
+/// Log, progress and interrupt of a run. Borrows `progress`.
+RunHooks run_hooks(const Context& context, Progress& progress);
 
 }  // namespace spartan::program
