@@ -31,7 +31,6 @@ Rig rig_with_pitch(double pitch_rad) {
   return rig_of_one_pair("front", left, right, left_from_right.inverse());
 }
 
-// Two frames of one rectified pair, from different places.
 std::vector<testing::SyntheticFrame> rendered_frames() {
   const testing::SyntheticWorld world{testing::SyntheticWorldOptions()};
   std::vector<testing::SyntheticFrame> frames;
@@ -39,6 +38,12 @@ std::vector<testing::SyntheticFrame> rendered_frames() {
     const Pose tilted = Pose(exp_so3({0, 0.3, 0}), {x, 0, 0.6});
     frames.push_back(world.render(kStereo, tilted * optical_from_forward().inverse(), 1));
   }
+  return frames;
+}
+
+// Two frames of one rectified pair, from different places; rendered once.
+const std::vector<testing::SyntheticFrame>& two_frames() {
+  static const std::vector<testing::SyntheticFrame> frames = rendered_frames();
   return frames;
 }
 
@@ -51,8 +56,7 @@ std::vector<StereoViews> views_of(const std::vector<testing::SyntheticFrame>& fr
 
 class PairInspectionOfImages : public ::testing::Test {
  protected:
-  std::vector<testing::SyntheticFrame> frames_ = rendered_frames();
-  std::vector<StereoViews> views_ = views_of(frames_);
+  std::vector<StereoViews> views_ = views_of(two_frames());
 };
 
 TEST_F(PairInspectionOfImages, FindsNoFaultInATrueCalibration) {
