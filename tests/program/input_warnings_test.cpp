@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -66,6 +68,24 @@ TEST_F(InputWarnings, StereoSaysThatEightBitTruthHasNoScale) {
   EXPECT_THAT(stereo(image(0), image(1), {"--truth", path("truth.png")}).err, HasSubstr("--truth-scale"));
   EXPECT_THAT(stereo(image(0), image(1), {"--truth", path("truth.png"), "--truth-scale", "1"}).err,
               Not(HasSubstr("--truth-scale")));
+}
+
+// disparity.png has 16 bits of 1/256 px.
+TEST_F(InputWarnings, StereoCountsDisparitiesThatThePngSaturates) {
+  constexpr int kWidth = 480, kShift = 300;
+  Image<std::uint8_t> left(kWidth, 64), right(kWidth, 64);
+  std::minstd_rand random(1);
+  for (int y = 0; y < left.height(); ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      left(x, y) = static_cast<std::uint8_t>(random() >> 8U);
+      right(x, y) = static_cast<std::uint8_t>(random() >> 8U);
+    }
+    std::copy_n(&left(kShift, y), kWidth - kShift, &right(0, y));
+  }
+  ASSERT_TRUE(write_png(path("l.png"), left) && write_png(path("r.png"), right));
+  const std::string saturated = "of more than 256 px are saturated in disparity.png";
+  EXPECT_THAT(stereo(path("l.png"), path("r.png"), {"--max-disparity", "319"}).err, HasSubstr(saturated));
+  EXPECT_THAT(stereo(path("l.png"), path("r.png"), {"--max-disparity", "240"}).err, Not(HasSubstr(saturated)));
 }
 
 TEST_F(InputWarnings, RunNamesExchangedCameras) {

@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using testing::kSmallRig;
 using testing::kSmallScenario;
+using ::testing::Not;
 using testing::ProgramLimits;
 using testing::ProgramResult;
 using testing::run_program;
@@ -230,6 +231,15 @@ TEST_F(Simulate, RefusesImpossibleScenariosWithLineAndReason) {
   EXPECT_FALSE(fs::exists(path("bad")));
 }
 
+TEST_F(Simulate, RecognisesACalibrationGivenAsAScenario) {
+  write("small.yaml", "cam0:\n  camera_model: pinhole\n  intrinsics: [1, 1, 1, 1]\n");
+  const ProgramResult result = simulate("bad");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("this is a calibration (kalibr), not a scenario"));
+  write("small.yaml", "schema: 1\nrig: small_rig.yaml\ncolour: red\n");
+  EXPECT_THAT(simulate("bad").err, Not(HasSubstr("calibration")));
+}
+
 TEST_F(Simulate, LeavesExistingFoldersAlone) {
   ASSERT_EQ(simulate("rec").exit_code, 0);
   const auto before = files_below(path("rec"));
@@ -253,6 +263,33 @@ TEST_F(Simulate, RecordsTheNominalRig) {
   auto files = files_below(path("rec"));
   EXPECT_NE(files["rig.yaml"], files["truth/rig.yaml"]);
   EXPECT_THAT(files["rig.yaml"], HasSubstr("130.13"));
+}
+
+TEST_F(Simulate, AnotherRoverIsDrawnOnTheSameDrive) {
+  ASSERT_EQ(simulate("exact").exit_code, 0);
+  ASSERT_EQ(simulate("one", {"--set", "rover=ordinary"}).exit_code, 0);
+  ASSERT_EQ(simulate("two", {"--set", "rover=ordinary", "--set", "rover_errors.seed=1"}).exit_code, 0);
+  auto exact = files_below(path("exact")), one = files_below(path("one")), two = files_below(path("two"));
+  for (const char* same : {"rig.yaml", "truth/poses.tum", "truth/rocks.csv", "sensors/imu.csv"}) {
+    EXPECT_EQ(exact[same], one[same]) << same;
+    EXPECT_EQ(one[same], two[same]) << same;
+  }
+  EXPECT_EQ(exact["truth/rig.yaml"], exact["rig.yaml"]);
+  EXPECT_NE(one["truth/rig.yaml"], exact["truth/rig.yaml"]);
+  EXPECT_NE(one["truth/rig.yaml"], two["truth/rig.yaml"]);
+  EXPECT_THAT(one["truth/scenario.yaml"], HasSubstr("rover: \"ordinary\""));
+  const auto resumed = simulate("one", {"--set", "rover=poor", "--resume"});
+  EXPECT_EQ(resumed.exit_code, 4) << "resumed with another rover";
+}
+
+TEST_F(Simulate, SetsKeysOfTheScenario) {
+  const ProgramResult unknown = simulate("bad", {"--set", "rover.colour=red"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_EQ(simulate("bad", {"--set", "samples=3"}).exit_code, 4);
+  EXPECT_FALSE(fs::exists(path("bad")));
+  ASSERT_EQ(simulate("rec", {"--set", "sensor.jpeg_quality=50", "--set", "truth.disparity=false"}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(path("rec/truth/disparity")));
+  EXPECT_THAT(files_below(path("rec"))["truth/scenario.yaml"], HasSubstr("jpeg_quality: 50"));
 }
 
 TEST_F(Simulate, NamesTheShippedScenarios) {

@@ -20,6 +20,7 @@ namespace spartan {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::TemporaryFolder;
 
 constexpr ImageSize kSize{24, 16};
@@ -222,6 +223,18 @@ TEST_F(SpartanRecordingFaults, ErrorsInTablesNameFileLineAndColumn) {
   change("frames.csv", "frame_id", "id");
   EXPECT_THAT(error_message(), HasSubstr("frames.csv:1: the columns are"));
   change("frames.csv", "id", "frame_id");
+}
+
+TEST_F(SpartanRecordingFaults, TablesOfOtherProgramsAreRecognised) {
+  for (const char* table : {"#timestamp [ns],filename\n1403715273262142976,1403715273262142976.png\n",
+                            "1403715273262142976,1403715273262142976.png\n"}) {
+    folder_.write("rec/frames.csv", table);
+    EXPECT_THAT(error_message(), HasSubstr("give the folder that holds mav0")) << table;
+  }
+  folder_.write("rec/frames.csv", "%time,field.header.seq,field.header.stamp\n1,2,3\n");
+  EXPECT_THAT(error_message(), HasSubstr("bag_to_images.py"));
+  folder_.write("rec/frames.csv", "number,pair\n1,front\n");
+  EXPECT_THAT(error_message(), Not(HasSubstr("mav0")));
 }
 
 TEST_F(SpartanRecordingFaults, ErrorsInYamlFilesNameTheFile) {

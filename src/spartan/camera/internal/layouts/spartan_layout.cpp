@@ -1,16 +1,21 @@
 // Spartan layout: recording.yaml, rig.yaml, frames.csv, images/, sensors/, truth/ (docs/reference/recording.md).
+#include <algorithm>
 #include <filesystem>
+#include <string>
 
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/frame_tables.h"
 #include "spartan/camera/internal/layouts/spartan_format.h"
 #include "spartan/camera/internal/recording_index.h"
 #include "spartan/camera/internal/sensor_tables.h"
+#include "spartan/core/files.h"
 
 namespace spartan::internal {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kLeastDigits_ns = 16;  // of a time since 1970 in nanoseconds
 
 // The calibration: rig.yaml, in any format, or the one of another name in the folder.
 Result<RigChoice> rig_of(const fs::path& folder, const OpenOptions& options) {
@@ -41,6 +46,19 @@ Status read_properties(const fs::path& folder, bool is_complete_table, Recording
   return {};
 }
 
+// What to do with a table of another program under the name frames.csv; empty where it is not recognised.
+std::string hint_of_other_table(const fs::path& path) {
+  const auto text = read_beginning(path.string(), 256);
+  if (!text) return {};
+  if (text->starts_with("%time")) return "a ROS topic as text; scripts/bag_to_images.py converts the bag itself";
+  const std::size_t digits = std::min(text->find_first_not_of("0123456789"), text->size());
+  if (text->starts_with("#timestamp") || (digits >= kLeastDigits_ns && text->substr(digits, 1) == ",")) {
+    return "the table of one camera as in mav0/cam0/data.csv of EuRoC: give the folder that holds mav0, or the folders "
+           "of the images with --left and --right";
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptions& options) {
@@ -50,11 +68,14 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   auto table = TableReader::open((folder / "frames.csv").string(), spartan_frames_format());
   const bool is_complete = !table || table->has_all_columns();
   if (Status status = read_properties(folder, is_complete, index.info); !status) return failure(status);
+  if (!table) {
+    table.error().hint = hint_of_other_table(folder / "frames.csv");
+    return failure(table);
+  }
   auto rig = rig_of(folder, options);
   if (!rig) return failure(rig);
   index.info.rig = std::move(rig->rig);
   index.info.rig_source = rig->source;
-  if (!table) return failure(table);
   auto frames = read_spartan_frames(std::move(*table), folder.string(), index.info.rig);
   if (!frames) return failure(frames);
   index.frames = std::move(*frames);
