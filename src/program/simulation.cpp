@@ -91,9 +91,23 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   const auto text = find_scenario(arguments.scenario);
   if (!text) return failure(text);
   auto read = sim::read_scenario(text->content, text->name);
-  if (!read) return failure(read);
+  if (!read) {
+    const auto format = detect_calibration_format(text->name, text->content);
+    // Scenarios and rigs have the keys schema and name in common.
+    if (format && (*format != CalibrationFormat::rig_yaml || text->content.find("\ncameras:") != std::string::npos)) {
+      read.error().hint = fmt::format("this is a calibration ({}), not a scenario; the key rig of a scenario names one",
+                                      name_of(*format));
+    }
+    return failure(read);
+  }
   for (const std::string& warning : read->warnings) context.log.warning(warning);
   sim::Scenario* const scenario = &read->options;
+  for (const std::string& assignment : arguments.set) {
+    auto changed = sim::set_scenario_option(*scenario, assignment);
+    if (!changed) return failure(changed);
+    *scenario = std::move(*changed);
+  }
+  if (Status valid = validate(*scenario, "--set"); !valid) return failure(valid);
   if (arguments.seed) scenario->seed = *arguments.seed;
   const auto rig = find_rig(*scenario, *text);
   if (!rig) return failure(rig);

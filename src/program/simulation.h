@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "program/context.h"
 #include "spartan/core/result.h"
@@ -13,6 +14,7 @@ struct SimulationArguments {
   std::string scenario, output;
   std::optional<int> seed;
   bool resume = false;
+  std::vector<std::string> set = {};  ///< assignments "group.key=value"
 };
 
 /// Rays cast and time, as `simulate --json` prints them.

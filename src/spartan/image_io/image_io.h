@@ -40,6 +40,9 @@ Status write_png(const std::string& path, ImageView<const Rgb16> image);
 Result<std::string> encode_png(ImageView<const std::uint8_t> image);
 Result<std::string> encode_png(ImageView<const Rgb8> image);
 
+/// Encodes a gray image as JPEG in memory, with a quality from 1 to 100. Code `internal` if the encoder fails.
+Result<std::string> encode_jpeg(ImageView<const std::uint8_t> image, int quality);
+
 /// Writes a single-channel PFM ("Pf"), little-endian, bottom row first; NaN (unknown) is written as +inf. Code
 /// `output`.
 Status write_pfm(const std::string& path, ImageView<const float> image);

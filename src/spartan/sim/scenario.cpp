@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
+#include <type_traits>
 #include <vector>
-
-#include "spartan/core/pose.h"
 
 namespace spartan::sim {
 namespace {
@@ -33,15 +32,79 @@ class KeyErrors {
   std::string lines_;
 };
 
+// Visitor that lists the numbers of a group, or sets those that were not given.
+class Numbers {
+ public:
+  void field(std::string_view, double& value, std::string_view, Bounds = {}) { values_.push_back(value); }
+  template <class Other, class... Rest>
+    requires(!std::is_same_v<Other, double>)
+  void field(std::string_view, Other&, std::string_view, Rest&&...) {}
+  void check(std::string_view, bool, std::string_view) {}
+  const std::vector<double>& values() const { return values_; }
+
+ private:
+  std::vector<double> values_;
+};
+
+class Completion {
+ public:
+  Completion(const GivenKeys& given, const std::vector<double>& values) : given_(given), next_(values.begin()) {}
+  void field(std::string_view key, double& value, std::string_view, Bounds = {}) {
+    if (!given_.contains(std::string(key))) value = *next_;
+    ++next_;
+  }
+  template <class Other, class... Rest>
+    requires(!std::is_same_v<Other, double>)
+  void field(std::string_view, Other&, std::string_view, Rest&&...) {}
+  void check(std::string_view, bool, std::string_view) {}
+
+ private:
+  const GivenKeys& given_;
+  std::vector<double>::const_iterator next_;
+};
+
+// The numbers of `group` that were not given become those of `preset`.
+template <class Group>
+void complete(Group& group, Group preset, const GivenKeys& given) {
+  Numbers numbers;
+  preset.describe(numbers);
+  Completion completion(given, numbers.values());
+  group.describe(completion);
+}
+
+// What was not given follows from the grade of the rover.
+void complete_rover(Scenario& scenario, const GivenKeys& given) {
+  complete(scenario.rover_errors, rover_errors(scenario.rover), given.in_group("rover_errors"));
+  if (!given.contains("sensor.jpeg_quality")) scenario.sensor.jpeg_quality = jpeg_quality(scenario.rover);
+}
+
+void complete_imu(Scenario& scenario, const GivenKeys& given) {
+  if (scenario.imu.grade == ImuGrade::given) return;
+  ImuOptions preset = imu_of_grade(scenario.imu.grade);
+  preset.rate_hz = scenario.imu.rate_hz;
+  complete(scenario.imu, preset, given.in_group("imu"));
+}
+
 }  // namespace
 
 Result<OptionsRead<Scenario>> read_scenario(const std::string& text, const std::string& name) {
-  auto scenario = read_options<Scenario>(text, name);
-  if (!scenario) {
-    scenario.error().hint =
+  auto read = read_options<Scenario>(text, name);
+  if (!read) {
+    read.error().hint =
         "docs/reference/scenario.md has an example; truth/scenario.yaml of a simulated recording lists every key";
+    return read;
   }
-  return scenario;
+  complete_rover(read->options, read->given);
+  complete_imu(read->options, read->given);
+  return read;
+}
+
+Result<Scenario> set_scenario_option(Scenario scenario, const std::string& assignment) {
+  auto read = read_assignment(assignment, std::move(scenario));
+  if (!read) return failure(read);
+  if (read->given.contains("rover")) complete_rover(read->options, {});
+  if (read->given.contains("imu.grade")) complete_imu(read->options, {});
+  return std::move(read->options);
 }
 
 Result<Scenario> parse_scenario(const std::string& text, const std::string& name) {
@@ -75,38 +138,6 @@ Result<Drive> plan_drive(const Scenario& scenario, const Rig& rig, const std::st
   }
   if (Status s = errors.status(); !s) return failure(s);
   return drive;
-}
-
-namespace {
-
-// The model with its focal lengths scaled and its principal point moved, where it has such parameters.
-CameraModel with_errors(const CameraModel& model, double focal_factor, double row_offset_px) {
-  ModelParameters values = parameters(model);
-  const std::vector<ModelParameterSpec> kinds = parameter_specs(model);
-  for (std::size_t i = 0; i < kinds.size(); ++i) {
-    if (kinds[i].key == "focal_px") {
-      for (double& f : values[i]) f *= focal_factor;
-    }
-    if (kinds[i].key == "centre_px") values[i].back() += row_offset_px;
-  }
-  return with_parameters(model, values);
-}
-
-}  // namespace
-
-Rig nominal_rig(const Rig& true_rig, const NominalRigOptions& options) {
-  Rig rig = true_rig;
-  for (const StereoPair& pair : true_rig.pairs) {
-    for (Camera& camera : rig.cameras) {
-      const bool right = camera.name == pair.right;
-      if (!right && camera.name != pair.left) continue;
-      camera.model = with_errors(camera.model, 1 + options.focal_percent / 100, right ? options.row_offset_px : 0);
-      if (!right || options.yaw_deg == 0) continue;
-      const Eigen::Quaterniond yaw(Eigen::AngleAxisd(options.yaw_deg * kRadiansPerDegree, Eigen::Vector3d::UnitY()));
-      camera.mount_from_camera = camera.mount_from_camera * Pose::from_rotation(yaw);
-    }
-  }
-  return rig;
 }
 
 }  // namespace spartan::sim

@@ -108,6 +108,8 @@ struct Scenario {
   double gravity_m_s2 = 3.71;        ///< m/s²
   double extent_m = 240;             ///< m; side of the square of terrain around the start
   NominalRigOptions nominal_rig;
+  RoverGrade rover = RoverGrade::exact;
+  RoverErrorOptions rover_errors;  ///< what a file does not give follows from `rover`, as sensor.jpeg_quality
   TerrainShapeOptions terrain;
   RockFieldOptions rocks;
   SoilOptions soil;
@@ -140,6 +142,10 @@ struct Scenario {
     v.field("extent_m", extent_m, "Side in metres of the square of terrain around the start.", between(20, 20000));
     v.renamed("believed", "nominal_rig");
     v.group("nominal_rig", nominal_rig);
+    v.field("rover", rover,
+            "How well the rover is built and calibrated: sets the values of rover_errors and sensor.jpeg_quality that "
+            "are not given.");
+    v.group("rover_errors", rover_errors);
     v.group("terrain", terrain);
     v.group("rocks", rocks);
     v.group("soil", soil);
@@ -169,7 +175,15 @@ Result<Scenario> parse_scenario(const std::string& text, const std::string& name
 /// the terrain. Errors: `configuration`, with the line in `text`.
 Result<Drive> plan_drive(const Scenario& scenario, const Rig& rig, const std::string& text, const std::string& name);
 
-/// The nominal rig that the recording states: the true one with the errors of the options.
-Rig nominal_rig(const Rig& true_rig, const NominalRigOptions& options);
+/// Applies one assignment "group.key=value" of a command line. `rover` and `imu.grade` set all keys that follow from
+/// them; single ones are to be assigned after them. Errors have code `usage`.
+Result<Scenario> set_scenario_option(Scenario scenario, const std::string& assignment);
+
+/// The nominal rig that the recording states: the rig of the scenario with fixed errors.
+Rig nominal_rig(const Rig& rig, const NominalRigOptions& options);
+/// The rig that takes the images, at the start of the drive: the rig of the scenario with a draw of its errors.
+Rig true_rig(const Rig& rig, const RoverErrorOptions& errors, int scenario_seed);
+/// The drawn response of a camera of the rig to light; 1 without errors.
+double camera_gain(const Rig& rig, const std::string& camera, const RoverErrorOptions& errors, int scenario_seed);
 
 }  // namespace spartan::sim

@@ -13,18 +13,26 @@ namespace spartan::sim {
 
 /// Image sensor, lens and exposure rule, the same for all cameras of the rig.
 struct SensorOptions {
-  double pixel_um = 5.5;            ///< µm; pixel pitch
-  double f_number = 2.0;            ///< focal length over aperture
-  double transmission = 0.9;        ///< of the lens
-  double vignetting = 0.7;          ///< exponent applied to cos⁴ of the field angle
-  double quantum_efficiency = 0.5;  ///< electrons per photon
-  double full_well_e = 15000;       ///< e⁻
-  double read_noise_e = 15;         ///< e⁻; standard deviation
-  double black_level = 1.0 / 64;    ///< fraction of full scale
-  double target_level = 0.45;       ///< fraction of the full well
-  double longest_exposure_ms = 20;  ///< ms
-  double largest_gain = 16;         ///< 1: the full well is full scale
-  int noise_seed = 0;               ///< seed of the image noise alone
+  double pixel_um = 5.5;              ///< µm; pixel pitch
+  double f_number = 2.0;              ///< focal length over aperture
+  double transmission = 0.9;          ///< of the lens
+  double vignetting = 0.7;            ///< exponent applied to cos⁴ of the field angle
+  double quantum_efficiency = 0.5;    ///< electrons per photon
+  double full_well_e = 15000;         ///< e⁻
+  double read_noise_e = 15;           ///< e⁻; standard deviation
+  double black_level = 1.0 / 64;      ///< fraction of full scale
+  double target_level = 0.45;         ///< fraction of the full well
+  double longest_exposure_ms = 20;    ///< ms
+  double largest_gain = 16;           ///< 1: the full well is full scale
+  int noise_seed = 0;                 ///< seed of the image noise alone
+  double pixel_response_percent = 0;  ///< %; fixed pattern: standard deviation of the response of pixels
+  double dark_offset_e = 0;           ///< e⁻; fixed pattern: standard deviation of the level without light
+  double row_noise_e = 0;             ///< e⁻; standard deviation of the noise that a row has in common
+  double hot_pixel_fraction = 0;      ///< pixels with 0.1 to 1 full wells without light
+  double delay_ms = 0;                ///< ms; of the exposure after the stamp, all cameras
+  double right_delay_ms = 0;          ///< ms; the same, right cameras in addition
+  bool meter_lags = false;            ///< auto exposure uses the frame before
+  int jpeg_quality = 0;               ///< 1 to 100; 0: lossless
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -50,6 +58,25 @@ struct SensorOptions {
             "Largest gain of auto exposure; with a gain of 1 the full well is full scale.", between(1, 1000));
     v.field("noise_seed", noise_seed,
             "Seed of the image noise alone; another one gives the same world and drive with other noise.", at_least(0));
+    v.field("pixel_response_percent", pixel_response_percent,
+            "Standard deviation of the response of single pixels in percent (fixed pattern).", between(0, 50));
+    v.field("dark_offset_e", dark_offset_e,
+            "Standard deviation of the level of single pixels without light in electrons (fixed pattern).",
+            between(0, 5000));
+    v.field("row_noise_e", row_noise_e,
+            "Standard deviation in electrons of the noise that all pixels of a row of one image have in common.",
+            between(0, 5000));
+    v.field("hot_pixel_fraction", hot_pixel_fraction,
+            "Fraction of the pixels that show 0.1 to 1 full wells without light.", between(0, 0.1));
+    v.field("delay_ms", delay_ms, "Delay of the exposure of all cameras after the time stamp in milliseconds.",
+            between(-1000, 1000));
+    v.field("right_delay_ms", right_delay_ms,
+            "Delay of the exposure of the right cameras after that of the left ones in milliseconds.",
+            between(-1000, 1000));
+    v.field("meter_lags", meter_lags, "Whether auto exposure uses the light of the previous frame of the pair.");
+    v.field("jpeg_quality", jpeg_quality,
+            "Quality of the JPEG compression of the images, 1 to 100, for cameras of 8-bit gray; 0 is lossless.",
+            between(0, 100));
   }
 };
 
@@ -73,6 +100,85 @@ struct NominalRigOptions {
             between(-20, 20));
   }
 };
+
+/// How well the rover is built and calibrated: standard deviations of RoverErrorOptions (docs/reference/scenario.md).
+enum class RoverGrade { exact, ordinary, poor };
+constexpr auto enum_names(RoverGrade) {
+  using enum RoverGrade;
+  return std::array{EnumName{exact, "exact"}, EnumName{ordinary, "ordinary"}, EnumName{poor, "poor"}};
+}
+
+/// Standard deviations of the differences between the true rover and its calibration. One normal draw of each belongs
+/// to a drive (per pair, camera or mount), except for the noise of the pan-tilt unit. The recording states the
+/// calibration; truth/rig.yaml is the true rig at the start.
+struct RoverErrorOptions {
+  int seed = 0;                         ///< another rover on the same drive
+  double pair_rotation_deg = 0;         ///< deg; right camera about each of its axes
+  double baseline_percent = 0;          ///< %; length of the baseline
+  double focal_percent = 0;             ///< %; both cameras of a pair together
+  double focal_difference_percent = 0;  ///< %; each camera
+  double centre_px = 0;                 ///< px; principal point of each camera, in x and y
+  double row_offset_px = 0;             ///< px; rows of the right camera, besides centre_px
+  double distortion_px = 0;             ///< px; residual radial distortion of each camera, at the image corner
+  double mount_rotation_deg = 0;        ///< deg; pan-tilt unit, or pair on the body, about each axis
+  double mount_mm = 0;                  ///< mm; the same along each axis
+  double pan_tilt_bias_deg = 0;         ///< deg; pan and tilt, constant
+  double pan_tilt_noise_deg = 0;        ///< deg; pan and tilt, at each positioning
+  double drift_deg = 0;                 ///< deg; right camera about each axis, from 0 at the start to this at the end
+  double gain_percent = 0;              ///< %; response of each camera to light
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("seed", seed, "Seed of these errors; another one gives another rover on the same drive.", at_least(0));
+    v.field("pair_rotation_deg", pair_rotation_deg,
+            "Standard deviation of the rotation of the right camera about each of its axes relative to the "
+            "calibration, in degrees.",
+            between(0, 5));
+    v.field("baseline_percent", baseline_percent,
+            "Standard deviation of the baseline length relative to the calibration, in percent.", between(0, 20));
+    v.field("focal_percent", focal_percent,
+            "Standard deviation of the focal length of both cameras of a pair relative to the calibration, in percent.",
+            between(0, 20));
+    v.field("focal_difference_percent", focal_difference_percent,
+            "Standard deviation of the focal length of each camera, in addition to focal_percent, in percent.",
+            between(0, 20));
+    v.field("centre_px", centre_px,
+            "Standard deviation of the principal point of each camera relative to the calibration, in x and y, in "
+            "pixels.",
+            between(0, 50));
+    v.field("row_offset_px", row_offset_px,
+            "Standard deviation of the rows of the right camera, in addition to centre_px, in pixels.", between(0, 50));
+    v.field("distortion_px", distortion_px,
+            "Standard deviation of the radial distortion that the calibration of each camera leaves, in pixels at the "
+            "image corner; for pinhole and radial-tangential cameras.",
+            between(0, 50));
+    v.field("mount_rotation_deg", mount_rotation_deg,
+            "Standard deviation of the rotation of a pan-tilt unit, or of a pair on the body, about each axis relative "
+            "to the calibration, in degrees.",
+            between(0, 20));
+    v.field("mount_mm", mount_mm,
+            "Standard deviation of the position of a pan-tilt unit, or of a pair on the body, along each axis relative "
+            "to the calibration, in millimetres.",
+            between(0, 200));
+    v.field("pan_tilt_bias_deg", pan_tilt_bias_deg,
+            "Standard deviation of the constant errors of the pan and tilt angles in degrees.", between(0, 20));
+    v.field("pan_tilt_noise_deg", pan_tilt_noise_deg,
+            "Standard deviation of the errors of the pan and tilt angles at each positioning in degrees.",
+            between(0, 20));
+    v.field("drift_deg", drift_deg,
+            "Standard deviation of the rotation of the right camera about each of its axes that grows linearly from 0 "
+            "at the start to its value at the end of the drive, in degrees.",
+            between(0, 5));
+    v.field("gain_percent", gain_percent, "Standard deviation of the response of each camera to light in percent.",
+            between(0, 50));
+  }
+  friend bool operator==(const RoverErrorOptions&, const RoverErrorOptions&) = default;
+};
+
+/// The standard deviations of a grade.
+RoverErrorOptions rover_errors(RoverGrade grade);
+/// The quality of JPEG images of a grade, as SensorOptions::jpeg_quality.
+int jpeg_quality(RoverGrade grade);
 
 enum class CameraFaultKind {
   dropped,
@@ -122,10 +228,19 @@ using CameraFaults = std::vector<CameraFault>;
 
 // --- Motion sensors ---
 
+/// Noise and errors of typical IMUs (docs/reference/scenario.md); `given`: those of the keys.
+enum class ImuGrade { given, tactical, industrial, mems };
+constexpr auto enum_names(ImuGrade) {
+  using enum ImuGrade;
+  return std::array{EnumName{given, "given"}, EnumName{tactical, "tactical"}, EnumName{industrial, "industrial"},
+                    EnumName{mems, "mems"}};
+}
+
 /// Errors as from an Allan deviation: white noise by its density, the bias as a constant of the drive plus a random
-/// walk.
+/// walk. Scale errors and misalignment of the axes are constants of the drive.
 struct ImuOptions {
   bool enabled = true;
+  ImuGrade grade = ImuGrade::given;
   double rate_hz = 100;                    ///< Hz
   double gyro_noise_rad_s_sqrt_hz = 1e-4;  ///< rad/s/√Hz
   double gyro_bias_rad_s = 5e-5;           ///< rad/s; standard deviation at the start
@@ -133,10 +248,19 @@ struct ImuOptions {
   double accel_noise_m_s2_sqrt_hz = 1e-3;  ///< m/s²/√Hz
   double accel_bias_m_s2 = 5e-3;           ///< m/s²; standard deviation at the start
   double accel_walk_m_s3_sqrt_hz = 5e-5;   ///< m/s³/√Hz
+  double scale_percent = 0;                ///< %; standard deviation of the scale of each axis
+  double misalignment_deg = 0;             ///< deg; standard deviation of the angles between the axes
+  double gyro_step_rad_s = 0;              ///< rad/s; quantization
+  double accel_step_m_s2 = 0;              ///< m/s²; quantization
+  double gyro_vibration_rad_m = 0;         ///< rad/s per m/s; standard deviation of white noise while driving
+  double accel_vibration_1_s = 0;          ///< m/s² per m/s; the same
+  double delay_ms = 0;                     ///< ms; of the stamp after the measurement
+  std::vector<double> position_m = {};     ///< m; body; the recording does not state it. Empty: the origin
 
   template <class Visitor>
   void describe(Visitor& v) {
     v.field("enabled", enabled, "Whether the rover has an IMU.");
+    v.field("grade", grade, "Typical IMU whose noise and errors the keys below have where they are not given.");
     v.field("rate_hz", rate_hz, "Samples per second.", between(1, 2000));
     v.field("gyro_noise_rad_s_sqrt_hz", gyro_noise_rad_s_sqrt_hz,
             "Density of the gyroscopes' white noise in rad/s/sqrt(Hz).", between(0, 1));
@@ -150,8 +274,30 @@ struct ImuOptions {
             between(0, 10));
     v.field("accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz,
             "Density of the random walk of the accelerometers' bias in m/s^3/sqrt(Hz).", between(0, 10));
+    v.field("scale_percent", scale_percent, "Standard deviation of the scale errors of the axes in percent.",
+            between(0, 20));
+    v.field("misalignment_deg", misalignment_deg,
+            "Standard deviation of the angles by which axes are tilted towards each other, in degrees.",
+            between(0, 10));
+    v.field("gyro_step_rad_s", gyro_step_rad_s, "Resolution of the gyroscopes in rad/s; 0 is exact.", between(0, 1));
+    v.field("accel_step_m_s2", accel_step_m_s2, "Resolution of the accelerometers in m/s^2; 0 is exact.",
+            between(0, 10));
+    v.field("gyro_vibration_rad_m", gyro_vibration_rad_m,
+            "Standard deviation of the gyroscopes' vibration in rad/s for each m/s of driving speed.", between(0, 100));
+    v.field("accel_vibration_1_s", accel_vibration_1_s,
+            "Standard deviation of the accelerometers' vibration in m/s^2 for each m/s of driving speed.",
+            between(0, 1000));
+    v.field("delay_ms", delay_ms, "Time in milliseconds by which the stamps are later than the measurements.",
+            between(-1000, 1000));
+    v.field("position_m", position_m,
+            "Position x, y, z of the IMU in the body frame in metres, which the recording does not state; empty for "
+            "the origin.");
+    v.check("position_m", position_m.empty() || position_m.size() == 3, "must have three values");
   }
 };
+
+/// The noise and errors of a grade; `given`: the defaults.
+ImuOptions imu_of_grade(ImuGrade grade);
 
 /// Wheel odometry with slip, the fraction of the rolled distance that does not move the rover:
 ///   slip = level + by_slope · tan(climb) + sand · noise(x, y),  rolled = travelled / (1 − slip).

@@ -17,7 +17,9 @@
 #include "spartan/sim/internal/camera/renderer.h"
 #include "spartan/sim/internal/camera/truth.h"
 #include "spartan/sim/internal/drive/body_motion.h"
+#include "spartan/sim/internal/drive/camera_poses.h"
 #include "spartan/sim/internal/drive/motion_sensors.h"
+#include "spartan/sim/internal/drive/rover_seed.h"
 #include "spartan/sim/internal/world/world.h"
 #include "spartan/storage/geotiff.h"
 
@@ -102,7 +104,9 @@ class Simulation {
         scenario_(request.scenario),
         world_(make_world(request.scenario, request.drive)),
         motion_(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers),
-        nominal_(nominal_rig(request.rig, request.scenario.nominal_rig)) {
+        nominal_(nominal_rig(request.rig, request.scenario.nominal_rig)),
+        rig_(true_rig(request.rig, request.scenario.rover_errors, request.scenario.seed)),
+        camera_poses_(rig_, request.scenario.rover_errors, request.scenario.seed, request.drive.seconds()) {
     nominal_.rover.track_m = request.scenario.chassis.track_m;
     nominal_.rover.wheel_radius_m = request.scenario.chassis.wheel_radius_m;
   }
@@ -131,8 +135,8 @@ class Simulation {
 
   FramePreview preview_left(std::size_t i) {
     const PlannedFrame& planned = request_.drive.frames()[i];
-    const StereoPair& pair = *request_.rig.find_pair(planned.pair);
-    const Camera& camera = *request_.rig.find_camera(pair.left);
+    const StereoPair& pair = *rig_.find_pair(planned.pair);
+    const Camera& camera = *rig_.find_camera(pair.left);
     const Renderer renderer(camera, Sampling::of(scenario_.samples));
     const Sensor sensor(scenario_.sensor, camera);
     const GroundScene scene(world_.shape, world_.rocks, region_of(i, i + 1), workers_);
@@ -171,19 +175,25 @@ class Simulation {
     return {};
   }
 
+  SensorIdentity identity_of(const Camera& camera) const {
+    const std::uint64_t seed = rover_seed(scenario_.rover_errors, scenario_.seed);
+    const auto number = static_cast<std::uint64_t>(&camera - rig_.cameras.data());
+    return {camera_gain(rig_, camera.name, scenario_.rover_errors, scenario_.seed), seed + (number + 1) * kNoiseStride};
+  }
+
   void make_pair_renderers() {
     const Sampling sampling = Sampling::of(scenario_.samples);
-    for (const StereoPair& pair : request_.rig.pairs) {
-      const Camera &left = *request_.rig.find_camera(pair.left), &right = *request_.rig.find_camera(pair.right);
+    for (const StereoPair& pair : rig_.pairs) {
+      const Camera &left = *rig_.find_camera(pair.left), &right = *rig_.find_camera(pair.right);
       PairRenderer tools{Renderer(left, sampling),
                          Renderer(right, sampling),
-                         Sensor(scenario_.sensor, left),
-                         Sensor(scenario_.sensor, right),
+                         Sensor(scenario_.sensor, left, identity_of(left)),
+                         Sensor(scenario_.sensor, right, identity_of(right)),
                          std::nullopt,
                          left.pixel_format.is_bayer() || right.pixel_format.is_bayer()};
       const auto view = request_.views.find(pair.name);
       if (scenario_.truth.disparity && view != request_.views.end())
-        tools.truth.emplace(request_.rig, nominal_, pair, view->second);
+        tools.truth.emplace(rig_, nominal_, pair, view->second);
       pair_renderers_.emplace(pair.name, std::move(tools));
     }
   }
@@ -201,7 +211,7 @@ class Simulation {
   }
 
   Pose camera_pose(const PlannedFrame& planned, const std::string& camera, double time_s) const {
-    return motion_.world_from_body(time_s) * request_.rig.body_from_camera(camera, planned.pan_rad, planned.tilt_rad);
+    return motion_.world_from_body(time_s) * camera_poses_.body_from_camera(camera, planned, time_s);
   }
 
   Region region_of(std::size_t from, std::size_t to) const {
@@ -209,10 +219,10 @@ class Simulation {
     Region region{start.x, start.y, start.x, start.y};
     for (std::size_t i = from; i < to; ++i) {
       const PlannedFrame& planned = request_.drive.frames()[i];
-      const StereoPair& pair = *request_.rig.find_pair(planned.pair);
+      const StereoPair& pair = *rig_.find_pair(planned.pair);
       const double ground = motion_.world_from_body(planned.time_s).translation().z();
       for (const std::string& name : {pair.left, pair.right}) {
-        add_footprint(region, *request_.rig.find_camera(name), camera_pose(planned, name, planned.time_s), ground);
+        add_footprint(region, *rig_.find_camera(name), camera_pose(planned, name, planned.time_s), ground);
       }
     }
     return region.grown(0.3);
@@ -257,22 +267,47 @@ class Simulation {
     return {};
   }
 
+  // The middle of the exposure of a camera.
+  double exposure_time(const PlannedFrame& planned, const std::string& camera) const {
+    const double right_ms = camera == rig_.find_pair(planned.pair)->right ? scenario_.sensor.right_delay_ms : 0;
+    return planned.time_s + 1e-3 * (scenario_.sensor.delay_ms + right_ms);
+  }
+
   Renderer::Poses exposure_poses(const PlannedFrame& planned, const std::string& camera, double seconds) const {
     Renderer::Poses poses;
     for (std::size_t t = 0; t < poses.size(); ++t) {
       const double part = (static_cast<double>(t) + 0.5) / Renderer::kTimes - 0.5;
-      poses[t] = camera_pose(planned, camera, planned.time_s + part * seconds);
+      poses[t] = camera_pose(planned, camera, exposure_time(planned, camera) + part * seconds);
     }
     return poses;
+  }
+
+  // right_from_left between the exposures of the two cameras of a frame.
+  Pose exposed_right_from_left(const PlannedFrame& planned, const StereoPair& pair) const {
+    const double left_s = exposure_time(planned, pair.left), right_s = exposure_time(planned, pair.right);
+    if (left_s == right_s) return camera_poses_.right_from_left(pair, left_s);
+    return camera_pose(planned, pair.right, right_s).inverse() * camera_pose(planned, pair.left, left_s);
+  }
+
+  // The frame whose light auto exposure measures.
+  const PlannedFrame& metered_frame(std::size_t i) const {
+    const auto& frames = request_.drive.frames();
+    for (std::size_t before = i; scenario_.sensor.meter_lags && before-- > 0;) {
+      if (frames[before].pair == frames[i].pair) return frames[before];
+    }
+    return frames[i];
   }
 
   Status render_frame(RecordingWriter& writer, std::size_t i, const LitScene& lit, const FrameFaultState& fault) {
     Stopwatch watch;
     const PlannedFrame& planned = request_.drive.frames()[i];
     const PairRenderer& tools = pair_renderers_.at(planned.pair);
-    const StereoPair& pair = *request_.rig.find_pair(planned.pair);
-    const Pose left_pose = camera_pose(planned, pair.left, planned.time_s);
-    const Exposure exposure = choose_exposure(scenario_.sensor, tools.left.mean_luminance(lit, left_pose, kMeteredRow));
+    const StereoPair& pair = *rig_.find_pair(planned.pair);
+    const Pose left_pose = camera_pose(planned, pair.left, exposure_time(planned, pair.left));
+    const PlannedFrame& metered = metered_frame(i);
+    const Pose metered_pose = camera_pose(metered, pair.left, exposure_time(metered, pair.left));
+    const Exposure exposure =
+        choose_exposure(scenario_.sensor, tools.left.mean_luminance(lit, metered_pose, kMeteredRow));
     const auto seed = static_cast<std::uint64_t>(scenario_.seed) * 1000003 + 2 * i +
                       static_cast<std::uint64_t>(scenario_.sensor.noise_seed) * kNoiseStride;
     StereoFrame frame;
@@ -292,7 +327,8 @@ class Simulation {
     frame.left = tools.left_sensor.expose(left, exposure, fault.left, seed, workers_);
     frame.right = tools.right_sensor.expose(right, exposure, fault.right, seed + 1, workers_);
     if (tools.truth) {
-      const TrueDisparity truth = tools.truth->of(lit.scene, left_pose, workers_);
+      const TrueDisparity truth =
+          tools.truth->of(lit.scene, left_pose, exposed_right_from_left(planned, pair), workers_);
       if (Status s =
               writer.write_truth_disparity(planned.pair, frame.left_stamp, truth.disparity.view(), truth.mask.view());
           !s)
@@ -326,7 +362,7 @@ class Simulation {
     poses_.erase(std::unique(poses_.begin(), poses_.end(),
                              [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; }),
                  poses_.end());
-    if (Status s = writer.write_truth(request_.rig, poses_); !s) return s;
+    if (Status s = writer.write_truth(rig_, poses_); !s) return s;
     if (Status s = write_maps(request_, world_, workers_); !s) return s;
     return writer.finish();
   }
@@ -337,7 +373,8 @@ class Simulation {
   const Scenario& scenario_;
   World world_;
   BodyMotion motion_;
-  Rig nominal_;
+  Rig nominal_, rig_;  // as the recording states it; as it is at the start
+  CameraPoses camera_poses_;
   std::map<std::string, PairRenderer> pair_renderers_;
   Trajectory poses_;
   SimulationReport report_;

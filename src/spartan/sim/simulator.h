@@ -26,9 +26,9 @@ struct RectifiedView {
 /// What to simulate, and where to write it.
 struct SimulationRequest {
   Scenario scenario;
-  Rig rig;      ///< the true rig
+  Rig rig;      ///< the rig of the scenario: calibration and truth differ from it by its errors
   Drive drive;  ///< from plan_drive()
-  /// Rectification of the nominal rig's pairs; pairs without one get no true disparity.
+  /// Rectification of the pairs of nominal_rig(); pairs without one get no true disparity.
   std::map<std::string, RectifiedView> views;
   std::string folder;
   bool resume = false;

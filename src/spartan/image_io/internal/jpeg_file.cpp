@@ -6,15 +6,18 @@
 #include <string>
 #include <type_traits>
 
+#include "spartan/image_io/image_io.h"
 #include "spartan/image_io/internal/image_file_check.h"
 
-namespace spartan::internal {
+namespace spartan {
+
+namespace internal {
 namespace {
 
 struct Destroy {
   void operator()(void* decoder) const { tjDestroy(decoder); }
 };
-using Decoder = std::unique_ptr<void, Destroy>;
+using Decoder = std::unique_ptr<void, Destroy>;  // or encoder
 
 // Some cameras pad the image data. If only the end marker (0xd9) follows the padding, all data were read. The decoder
 // reports only its first warning.
@@ -58,4 +61,19 @@ Result<FrameImage> decode_jpeg(std::string_view content, JpegColour colour) {
   return decode_as<Rgb8>(decoder, content, size, PixelLayout::rgb);
 }
 
-}  // namespace spartan::internal
+}  // namespace internal
+
+Result<std::string> encode_jpeg(ImageView<const std::uint8_t> image, int quality) {
+  const internal::Decoder encoder(tjInitCompress());
+  if (!encoder) return failure(ErrorCode::internal, "cannot create the JPEG encoder");
+  unsigned char* bytes = nullptr;
+  unsigned long count = 0;
+  const int error = tjCompress2(encoder.get(), image.data(), image.width(), static_cast<int>(image.stride()),
+                                image.height(), TJPF_GRAY, &bytes, &count, TJSAMP_GRAY, quality, TJFLAG_ACCURATEDCT);
+  const std::unique_ptr<unsigned char, decltype(&tjFree)> owner(bytes, &tjFree);
+  if (error != 0)
+    return failure(ErrorCode::internal, std::string("cannot encode a JPEG: ") + tjGetErrorStr2(encoder.get()));
+  return std::string(reinterpret_cast<const char*>(bytes), count);
+}
+
+}  // namespace spartan

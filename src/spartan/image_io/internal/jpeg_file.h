@@ -1,4 +1,4 @@
-// Strict JPEG decoding: warnings of the decoder are errors.
+// JPEG files. Decoding is strict: warnings of the decoder are errors.
 #pragma once
 
 #include <string_view>

@@ -199,7 +199,9 @@ TEST(TrueDisparity, WarpsRightOntoLeft) {
         .expose(renderer.render(lit, {pose, pose, pose, pose}, false, workers), exposure, {}, seed, workers);
   };
   const FrameImage left_image = expose(left, left_pose, 1), right_image = expose(right, right_pose, 2);
-  const TrueDisparity truth = DisparityTruth(s.rig, s.rig, s.rig.pairs[0], s.view).of(scene, left_pose, workers);
+  const StereoPair& pair = s.rig.pairs[0];
+  const TrueDisparity truth =
+      DisparityTruth(s.rig, s.rig, pair, s.view).of(scene, left_pose, s.rig.right_from_left(pair), workers);
   std::vector<double> differences;
   int both = 0, left_only = 0;
   for (int y = 0; y < 240; ++y) {

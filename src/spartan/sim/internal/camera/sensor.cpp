@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "spartan/image_io/image_io.h"
 #include "spartan/numerics/random.h"
 
 namespace spartan::sim::internal {
@@ -13,6 +14,8 @@ namespace {
 constexpr double kPlanckTimesLight_Jm = 6.62607015e-34 * 299792458.0;
 constexpr double kWavelength_m = 555e-9;
 constexpr double kLumensPerWatt = 683.0;  // at 555 nm
+
+constexpr std::uint64_t kPatternStream = 1U << 20U, kRowStream = 1U << 21U;  // of random numbers; added to the row
 
 // Responses of the red, green and blue filters to soil, rock and sky, relative to luminance: dust is butterscotch,
 // basalt nearly gray, the dusty sky between them. Empirical.
@@ -66,6 +69,12 @@ class Dust {
   std::array<Speck, 14> specks_;
 };
 
+// The image as a JPEG file of it is read again.
+FrameImage compressed(const FrameImage& image, int quality) {
+  const auto file = encode_jpeg(image.as<std::uint8_t>(), quality);
+  return decode_image(file.value(), "JPEG").value().with_format(image.format());
+}
+
 }  // namespace
 
 double electrons_per_second(const SensorOptions& s) {
@@ -84,13 +93,23 @@ Exposure choose_exposure(const SensorOptions& s, double mean_luminance) {
   return exposure;
 }
 
-Sensor::Sensor(const SensorOptions& options, const Camera& camera)
-    : options_(options), camera_(camera), vignetting_(camera.size.width, camera.size.height, 1.0F) {
+Sensor::Sensor(const SensorOptions& options, const Camera& camera, const SensorIdentity& identity)
+    : options_(options), camera_(camera), response_(camera.size.width, camera.size.height, 1.0F) {
+  const bool has_dark_levels = options.dark_offset_e > 0 || options.hot_pixel_fraction > 0;
+  if (has_dark_levels) dark_level_e_ = Image<float>(camera.size);
   for (int y = 0; y < camera.size.height; ++y) {
+    Random random(identity.pattern_seed, kPatternStream + static_cast<std::uint64_t>(y));
     for (int x = 0; x < camera.size.width; ++x) {
       const auto ray = unproject(camera.model, Eigen::Vector2d(x, y));
-      vignetting_(x, y) =
+      response_(x, y) =
           ray ? static_cast<float>(std::pow(std::max(0.0, ray->direction.z()), 4 * options.vignetting)) : 0.0F;
+      const double pattern = 1 + 0.01 * random.normal(0, options.pixel_response_percent);
+      response_(x, y) *= static_cast<float>(identity.gain * std::max(0.0, pattern));
+      if (!has_dark_levels) continue;
+      const double offset = random.normal(0, options.dark_offset_e);
+      const bool hot = random.uniform() < options.hot_pixel_fraction;
+      const double leak = random.uniform(0.1, 1) * options.full_well_e;
+      dark_level_e_(x, y) = static_cast<float>(offset + (hot ? leak : 0));
     }
   }
 }
@@ -113,7 +132,7 @@ Image<float> Sensor::electrons(const LuminanceImage& image, const Exposure& expo
         luminance = 0;
         for (std::size_t m = 0; m < kMaterials; ++m) luminance += image.by_material[m](x, y) * kTints[m].rgb[c];
       }
-      result(x, y) = luminance * per_luminance * vignetting_(x, y);
+      result(x, y) = luminance * per_luminance * response_(x, y);
       if (fault.dust) result(x, y) *= dust.transmission(x, y);
     }
   }
@@ -130,12 +149,16 @@ FrameImage Sensor::expose(const LuminanceImage& luminance, const Exposure& expos
   const auto develop = [&]<class Pixel>(Image<Pixel> image) {
     workers.parallel_for(0, image.height(), 16, [&](int from, int to) {
       for (int y = from; y < to; ++y) {
-        Random random(seed, static_cast<std::uint64_t>(y));
+        const auto row = static_cast<std::uint64_t>(y);
+        Random random(seed, row);
+        const double row_noise = Random(seed, kRowStream + row).normal(0, options_.row_noise_e);
         for (int x = 0; x < image.width(); ++x) {
           // Shot noise is Poisson-distributed, read noise Gaussian; their sum is Gaussian at the levels where noise
           // shows.
           const double mean = signal(x, y);
-          const double e = std::min(mean + std::sqrt(mean + read_variance) * random.normal(), options_.full_well_e);
+          const double fixed = row_noise + (dark_level_e_.empty() ? 0.0 : static_cast<double>(dark_level_e_(x, y)));
+          const double noisy = mean + std::sqrt(mean + read_variance) * random.normal() + fixed;
+          const double e = std::min(noisy, options_.full_well_e);
           const auto level = static_cast<int>(std::clamp(std::round(black + levels * e), 0.0, full));
           image(x, y) = static_cast<Pixel>(level << shift);
         }
@@ -144,7 +167,10 @@ FrameImage Sensor::expose(const LuminanceImage& luminance, const Exposure& expos
     return FrameImage::own(std::move(image), format);
   };
   const auto [w, h] = camera_.size;
-  return format.bits > 8 ? develop(Image<std::uint16_t>(w, h)) : develop(Image<std::uint8_t>(w, h));
+  if (format.bits > 8) return develop(Image<std::uint16_t>(w, h));
+  const FrameImage image = develop(Image<std::uint8_t>(w, h));
+  return options_.jpeg_quality > 0 && format.layout == PixelLayout::gray ? compressed(image, options_.jpeg_quality)
+                                                                         : image;
 }
 
 Image<float> Sensor::noise_free(const LuminanceImage& luminance, const Exposure& exposure) const {

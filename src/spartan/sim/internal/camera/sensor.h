@@ -34,13 +34,19 @@ struct ImageFault {
   std::uint64_t dust_seed = 0;
 };
 
+/// What distinguishes one camera from others of its kind.
+struct SensorIdentity {
+  double gain = 1;                 ///< response to light over the nominal one
+  std::uint64_t pattern_seed = 0;  ///< of its fixed pattern
+};
+
 /// The image sensor behind one camera's lens.
 class Sensor {
  public:
-  Sensor(const SensorOptions& options, const Camera& camera);
+  Sensor(const SensorOptions& options, const Camera& camera, const SensorIdentity& identity = {});
 
-  /// The image in the camera's pixel format: signal, shot noise, read noise, full well, gain, quantization.
-  /// The noise depends on seed and pixel alone.
+  /// The image in the camera's pixel format: signal, shot noise, read noise, row noise, fixed pattern, full well, gain,
+  /// quantization, and the losses of JPEG. The noise depends on seed and pixel alone.
   FrameImage expose(const LuminanceImage& luminance, const Exposure& exposure, const ImageFault& fault,
                     std::uint64_t seed, const ThreadPool& workers) const;
   /// The same without noise and quantization: gray levels above black, for measurements.
@@ -53,7 +59,8 @@ class Sensor {
 
   SensorOptions options_;
   Camera camera_;
-  Image<float> vignetting_;  // relative illumination of each pixel
+  Image<float> response_;      // of each pixel: vignetting, fixed pattern, gain of the camera
+  Image<float> dark_level_e_;  // of each pixel; empty: 0
 };
 
 }  // namespace spartan::sim::internal

@@ -177,5 +177,64 @@ TEST(Sensor, BayerPixelsHaveTheirColour) {
   }
 }
 
+// Levels per electron from black: what a dark image shows of each kind of noise, and what repeats from image to image.
+TEST(Sensor, FixedPatternRepeatsAndRowNoiseIsCommonToARow) {
+  const Camera camera = camera_of(200, 160, 12);
+  const Exposure exposure{0.001, 1};
+  const ThreadPool workers(1);
+  const auto image_of = [&](SensorOptions options, float luminance, std::uint64_t seed) {
+    options.vignetting = options.read_noise_e = 0;
+    return Sensor(options, camera, {.pattern_seed = 4}).expose(uniform(camera, luminance), exposure, {}, seed, workers);
+  };
+  const double levels = Sensor({}, camera).levels_per_electron(exposure);
+  const FrameImage first = image_of({.dark_offset_e = 100}, 0, 1), second = image_of({.dark_offset_e = 100}, 0, 2);
+  EXPECT_NEAR(std::sqrt(moments(first).variance), 100 * levels, 5 * levels);
+  for (int x = 0; x < 200; ++x) EXPECT_EQ(level(first, x, 7), level(second, x, 7));
+  const FrameImage rows = image_of({.row_noise_e = 100}, 0, 1);
+  for (int x = 1; x < 200; ++x) EXPECT_EQ(level(rows, x, 9), level(rows, 0, 9));
+  EXPECT_NEAR(std::sqrt(moments(rows).variance), 100 * levels, 20 * levels) << "160 rows";
+  EXPECT_NE(level(rows, 0, 9), level(image_of({.row_noise_e = 100}, 0, 2), 0, 9));
+  int hot = 0;
+  const FrameImage spots = image_of({.hot_pixel_fraction = 0.01}, 0, 1);
+  for (int y = 0; y < 160; ++y) {
+    for (int x = 0; x < 200; ++x) hot += level(spots, x, y) > 4095 * (1.0 / 64 + 0.09) ? 1 : 0;
+  }
+  EXPECT_NEAR(hot, 320, 60);
+  const double signal = moments(image_of({}, 800, 1)).mean, shot = moments(image_of({}, 800, 1)).variance;
+  const double patterned = moments(image_of({.pixel_response_percent = 5}, 800, 1)).variance;
+  EXPECT_NEAR(std::sqrt(patterned - shot), 0.05 * (signal - 4095.0 / 64), 0.003 * signal);
+}
+
+TEST(Sensor, GainOfTheCameraScalesTheSignal) {
+  const Camera camera = camera_of(64, 64, 12);
+  const Exposure exposure{0.001, 1};
+  const auto signal = [&](double gain) {
+    const Sensor sensor({.vignetting = 0}, camera, {.gain = gain});
+    return moments(sensor.expose(uniform(camera, 800), exposure, {}, 1, ThreadPool(1))).mean - 4095.0 / 64;
+  };
+  EXPECT_NEAR(signal(1.1) / signal(1), 1.1, 0.005);
+}
+
+// JPEG changes single pixels and keeps the mean; the better the quality, the smaller the change.
+TEST(Sensor, JpegLosesFineDetail) {
+  const Camera camera = camera_of(160, 160);
+  const ThreadPool workers(1);
+  const auto image_of = [&](int quality) {
+    return Sensor({.jpeg_quality = quality}, camera).expose(uniform(camera, 800), {0.001, 1}, {}, 1, workers);
+  };
+  const FrameImage lossless = image_of(0);
+  double before = 0;
+  for (const int quality : {95, 80, 50}) {
+    const FrameImage lossy = image_of(quality);
+    double squares = 0;
+    for (int y = 0; y < 160; ++y) {
+      for (int x = 0; x < 160; ++x) squares += std::pow(level(lossy, x, y) - level(lossless, x, y), 2);
+    }
+    EXPECT_GT(squares, before) << quality;
+    EXPECT_NEAR(moments(lossy).mean, moments(lossless).mean, 0.5);
+    before = squares;
+  }
+}
+
 }  // namespace
 }  // namespace spartan::sim::internal

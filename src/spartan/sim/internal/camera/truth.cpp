@@ -25,8 +25,7 @@ DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, cons
                                const RectifiedView& view)
     : view_(view),
       true_right_(*true_rig.find_camera(pair.right)),
-      nominal_right_(*nominal_rig.find_camera(pair.right)),
-      right_from_left_(true_rig.right_from_left(pair)) {
+      nominal_right_(*nominal_rig.find_camera(pair.right)) {
   const Camera& true_left = *true_rig.find_camera(pair.left);
   const Camera& nominal_left = *nominal_rig.find_camera(pair.left);
   const auto [w, h] = view.geometry.size;
@@ -46,10 +45,10 @@ DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, cons
   }
 }
 
-void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_left, int row,
-                              TrueDisparity& truth) const {
+void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_left, const Pose& right_from_left,
+                              int row, TrueDisparity& truth) const {
   const int w = view_.geometry.size.width;
-  const Pose world_from_right = world_from_left * right_from_left_.inverse();
+  const Pose world_from_right = world_from_left * right_from_left.inverse();
   const Eigen::Matrix3f rotation = world_from_left.rotation_matrix().cast<float>();
   const Eigen::Vector3f left_centre = (world_from_left.translation() - scene.origin()).cast<float>();
   const Eigen::Vector3f right_centre = (world_from_right.translation() - scene.origin()).cast<float>();
@@ -71,7 +70,7 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
       back.set(k, left_centre, Eigen::Vector3f::UnitZ(), -1.0F);
       if (rays.max_distance[k] < 0 || !std::isfinite(hits.distance[k])) continue;
       const Eigen::Vector3d in_left = static_cast<double>(hits.distance[k]) * directions[i].cast<double>();
-      const auto recorded = project(true_right_.model, right_from_left_ * in_left);
+      const auto recorded = project(true_right_.model, right_from_left * in_left);
       if (!recorded) continue;
       const auto nominal = unproject(nominal_right_.model, *recorded);
       if (!nominal) continue;
@@ -95,12 +94,12 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
   }
 }
 
-TrueDisparity DisparityTruth::of(const GroundScene& scene, const Pose& world_from_left,
+TrueDisparity DisparityTruth::of(const GroundScene& scene, const Pose& world_from_left, const Pose& right_from_left,
                                  const ThreadPool& workers) const {
   const auto [w, h] = view_.geometry.size;
   TrueDisparity truth{Image<float>(w, h), Image<std::uint8_t>(w, h)};
   workers.parallel_for(0, h, 8, [&](int from, int to) {
-    for (int row = from; row < to; ++row) fill_row(scene, world_from_left, row, truth);
+    for (int row = from; row < to; ++row) fill_row(scene, world_from_left, right_from_left, row, truth);
   });
   return truth;
 }

@@ -21,19 +21,21 @@ struct TrueDisparity {
 
 /// True disparities of one pair. A pixel of the rectified left view is mapped to the recorded image by the nominal
 /// camera, to a ray by the true camera, to the ground, into the true right camera, and to the rectified right view by
-/// the nominal camera: the column where a perfect matcher finds it.
+/// the nominal camera: the column where a perfect matcher finds it. The pose of the right camera is given with each
+/// frame, since it may drift.
 class DisparityTruth {
  public:
   DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, const StereoPair& pair, const RectifiedView& view);
 
-  TrueDisparity of(const GroundScene& scene, const Pose& world_from_left, const ThreadPool& workers) const;
+  TrueDisparity of(const GroundScene& scene, const Pose& world_from_left, const Pose& right_from_left,
+                   const ThreadPool& workers) const;
 
  private:
-  void fill_row(const GroundScene& scene, const Pose& world_from_left, int row, TrueDisparity& truth) const;
+  void fill_row(const GroundScene& scene, const Pose& world_from_left, const Pose& right_from_left, int row,
+                TrueDisparity& truth) const;
 
   RectifiedView view_;
   Camera true_right_, nominal_right_;
-  Pose right_from_left_;
   std::vector<Eigen::Vector3f> directions_;  // in the true left camera; zero outside the recorded image
 };
 

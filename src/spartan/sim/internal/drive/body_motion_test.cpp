@@ -123,6 +123,78 @@ TEST(Imu, AllanDeviationMatchesTheNoiseDensity) {
   EXPECT_NEAR(allan, noisy.gyro_noise_rad_s_sqrt_hz, 0.1 * noisy.gyro_noise_rad_s_sqrt_hz);
 }
 
+ImuOptions without_noise() {
+  ImuOptions imu;
+  imu.gyro_noise_rad_s_sqrt_hz = imu.gyro_bias_rad_s = imu.gyro_walk_rad_s2_sqrt_hz = 0;
+  imu.accel_noise_m_s2_sqrt_hz = imu.accel_bias_m_s2 = imu.accel_walk_m_s3_sqrt_hz = 0;
+  return imu;
+}
+
+// At a distance r from the axis of a turn the acceleration is that of the second derivative of the position.
+TEST(Imu, PositionAddsTheAccelerationOfTheLeverArm) {
+  const SimulatedDrive r = simulate_drive({.kind = PathKind::turn_in_place, .turn_deg = 180, .turn_rate_deg_s = 40});
+  ImuOptions imu = without_noise();
+  imu.position_m = {0.3, -0.2, 0.4};
+  const Eigen::Vector3d arm(0.3, -0.2, 0.4);
+  const auto samples = measure_imu(r.motion, imu, 3.71, {}, 1);
+  double largest = 0;
+  for (std::size_t i = 100; i + 100 < samples.size(); i += 7) {
+    const double t = seconds_between(samples[0].stamp, samples[i].stamp), h = 0.002;
+    const auto place = [&](double time_s) { return Eigen::Vector3d(r.motion.world_from_body(time_s) * arm); };
+    const Eigen::Vector3d acceleration = (place(t + h) - 2 * place(t) + place(t - h)) / (h * h);
+    const Eigen::Vector3d force = r.motion.world_from_body(t).rotation().conjugate() *
+                                  Eigen::Vector3d(acceleration + Eigen::Vector3d(0, 0, 3.71));
+    EXPECT_LT((samples[i].accel_m_s2 - force).norm(), 5e-3) << t;
+    largest = std::max(largest, (samples[i].accel_m_s2 - true_imu(r.motion, t, 3.71).accel_m_s2).norm());
+  }
+  EXPECT_GT(largest, 0.1);
+}
+
+TEST(Imu, ScaleMisalignmentAndDelayAreConstantsOfTheDrive) {
+  const SimulatedDrive r = simulate_drive({.kind = PathKind::turn_in_place, .turn_deg = 90, .turn_rate_deg_s = 20});
+  const auto samples_of = [&](const ImuOptions& imu, std::uint64_t seed) {
+    return measure_imu(r.motion, imu, 3.71, {}, seed);
+  };
+  const auto exact = samples_of(without_noise(), 1);
+  ImuOptions scaled = without_noise(), tilted = without_noise(), late = without_noise(), stepped = without_noise();
+  scaled.scale_percent = 2;
+  tilted.misalignment_deg = 1;
+  late.delay_ms = 20;
+  stepped.gyro_step_rad_s = 0.01;
+  double scale_squares = 0, tilt_squares = 0;
+  constexpr int kSeeds = 200;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const auto a = samples_of(scaled, static_cast<std::uint64_t>(seed)),
+               b = samples_of(tilted, static_cast<std::uint64_t>(seed));
+    scale_squares += std::pow(a[300].gyro_rad_s.z() / exact[300].gyro_rad_s.z() - 1, 2);
+    EXPECT_NEAR(a[350].gyro_rad_s.z() / exact[350].gyro_rad_s.z(), a[300].gyro_rad_s.z() / exact[300].gyro_rad_s.z(),
+                1e-9);
+    tilt_squares += std::pow((b[300].gyro_rad_s.x() - exact[300].gyro_rad_s.x()) / exact[300].gyro_rad_s.z(), 2);
+  }
+  EXPECT_NEAR(std::sqrt(scale_squares / kSeeds), 0.02, 0.004);
+  EXPECT_NEAR(std::sqrt(tilt_squares / kSeeds), std::numbers::pi / 180, 0.25 * std::numbers::pi / 180);
+  EXPECT_EQ(samples_of(late, 1)[302].gyro_rad_s, exact[300].gyro_rad_s) << "two samples at 100 Hz";
+  const double step = samples_of(stepped, 1)[300].gyro_rad_s.z() / 0.01;
+  EXPECT_NEAR(step, std::round(step), 1e-9);
+}
+
+TEST(Imu, VibrationGrowsWithSpeed) {
+  ImuOptions imu = without_noise();
+  imu.accel_vibration_1_s = 5;
+  const auto deviation = [&](double speed) {
+    const SimulatedDrive r = simulate_drive({.kind = PathKind::straight, .length_m = 20 * speed, .speed_m_s = speed});
+    const auto samples = measure_imu(r.motion, imu, 3.71, {}, 1);
+    double squares = 0;
+    for (std::size_t i = 600; i < 1600; ++i) {
+      const double t = seconds_between(samples[0].stamp, samples[i].stamp);
+      squares += std::pow(samples[i].accel_m_s2.y() - true_imu(r.motion, t, 3.71).accel_m_s2.y(), 2);
+    }
+    return std::sqrt(squares / 1000);
+  };
+  EXPECT_NEAR(deviation(0.1), 0.5, 0.04);
+  EXPECT_NEAR(deviation(0.2), 1.0, 0.08);
+}
+
 TEST(Wheels, RolledDistanceFollowsTheSlipModel) {
   TerrainShapeOptions slope;
   slope.relief_m = slope.ripple_height_m = slope.dune_height_m = 0;

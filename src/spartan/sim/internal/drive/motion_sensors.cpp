@@ -75,17 +75,56 @@ SensorNoise specified_noise(const ImuOptions& imu, const CompassOptions& compass
   return noise;
 }
 
+namespace {
+
+ImuSample imu_at(const BodyMotion& motion, double time_s, double gravity_m_s2, const std::vector<double>& position_m) {
+  ImuSample sample = true_imu(motion, time_s, gravity_m_s2);
+  if (position_m.empty()) return sample;
+  constexpr double kStep_s = 1e-3;
+  const Eigen::Vector3d arm(position_m[0], position_m[1], position_m[2]), &rate = sample.gyro_rad_s;
+  const Eigen::Vector3d angular_acceleration =
+      (motion.angular_velocity(time_s + kStep_s) - motion.angular_velocity(time_s - kStep_s)) / (2 * kStep_s);
+  sample.accel_m_s2 += angular_acceleration.cross(arm) + rate.cross(rate.cross(arm));
+  return sample;
+}
+
+// Scale errors on the diagonal, and the tilts of each axis towards the others beside it.
+Eigen::Matrix3d axis_errors(Random& random, const ImuOptions& o) {
+  Eigen::Matrix3d errors;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      errors(row, column) = row == column ? random.normal(0, 0.01 * o.scale_percent)
+                                          : random.normal(0, o.misalignment_deg * kRadiansPerDegree);
+    }
+  }
+  return errors;
+}
+
+Eigen::Vector3d quantized(const Eigen::Vector3d& value, double step) {
+  if (step <= 0) return value;
+  return (value / step).array().round().matrix() * step;
+}
+
+}  // namespace
+
 std::vector<ImuSample> measure_imu(const BodyMotion& motion, const ImuOptions& o, double gravity_m_s2,
                                    const SensorFaults& faults, std::uint64_t seed) {
   if (!o.enabled) return {};
-  Random random(seed, 201);
+  Random random(seed, 201), axes(seed, 211), vibration(seed, 212);
   Eigen::Vector3d gyro_bias = normal_vector(random, o.gyro_bias_rad_s);
   Eigen::Vector3d accel_bias = normal_vector(random, o.accel_bias_m_s2);
+  const Eigen::Matrix3d gyro_axes = axis_errors(axes, o), accel_axes = axis_errors(axes, o);
   const double root_rate = std::sqrt(o.rate_hz);
   return sample_sensor<ImuSample>(motion, o.rate_hz, MotionSensor::imu, faults, [&](double t) {
-    ImuSample sample = true_imu(motion, t, gravity_m_s2);
+    const double measured_s = t - 1e-3 * o.delay_ms;
+    ImuSample sample = imu_at(motion, measured_s, gravity_m_s2, o.position_m);
+    const double speed = motion.velocity(measured_s).norm();
+    sample.gyro_rad_s += gyro_axes * sample.gyro_rad_s + normal_vector(vibration, o.gyro_vibration_rad_m * speed);
+    sample.accel_m_s2 += accel_axes * sample.accel_m_s2 + normal_vector(vibration, o.accel_vibration_1_s * speed);
     sample.gyro_rad_s += gyro_bias + normal_vector(random, o.gyro_noise_rad_s_sqrt_hz * root_rate);
     sample.accel_m_s2 += accel_bias + normal_vector(random, o.accel_noise_m_s2_sqrt_hz * root_rate);
+    sample.gyro_rad_s = quantized(sample.gyro_rad_s, o.gyro_step_rad_s);
+    sample.accel_m_s2 = quantized(sample.accel_m_s2, o.accel_step_m_s2);
     gyro_bias += normal_vector(random, o.gyro_walk_rad_s2_sqrt_hz / root_rate);
     accel_bias += normal_vector(random, o.accel_walk_m_s3_sqrt_hz / root_rate);
     return sample;
