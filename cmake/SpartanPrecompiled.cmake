@@ -12,15 +12,9 @@ else()
   target_compile_options(spartan_flags INTERFACE "SHELL:-Xclang -fno-pch-timestamp")
 endif()
 
-# Code around the libraries, of the tests and the commands: optimizing it would only make the build slower. With
-# sanitizers the optimizer takes more than half of the time to compile it.
+# Code around the libraries, of the tests and the commands: optimizing it would only make the build slower.
 add_library(spartan_glue_flags INTERFACE)
-set(SPARTAN_GLUE_OPTIMIZATION -O1)
-if(SPARTAN_SANITIZE)
-  set(SPARTAN_GLUE_OPTIMIZATION -O0)
-endif()
-target_compile_options(spartan_glue_flags INTERFACE
-  $<$<CONFIG:Release,RelWithDebInfo>:${SPARTAN_GLUE_OPTIMIZATION}>)
+target_compile_options(spartan_glue_flags INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 
 # spartan_precompiled(NAME LINKS libraries… HEADERS headers…): compiles the headers for targets to REUSE_FROM it.
 function(spartan_precompiled name)
