@@ -42,7 +42,7 @@ def with_black_images(drive, folder):
 
 def main():
     program, source = (Path(word).resolve() for word in sys.argv[1:3])
-    shots = Path(sys.argv[3]).resolve() if len(sys.argv) > 3 else None
+    screenshots = Path(sys.argv[3]).resolve() if len(sys.argv) > 3 else None
     data = os.environ.get("SPARTAN_DATA")
     if not data:
         print("skipped: SPARTAN_DATA is not set")
@@ -60,9 +60,9 @@ def main():
             if code != (6 if name == "lost" else 0):
                 sys.exit(f"failed: run of {name}: exit code {code}")
             command = [source / "scripts/check_page", run / "report/index.html"]
-            if shots:
-                (shots / name).mkdir(parents=True, exist_ok=True)
-                command.append(shots / name)
+            if screenshots:
+                (screenshots / name).mkdir(parents=True, exist_ok=True)
+                command.append(screenshots / name)
             status = subprocess.run(command, timeout=600).returncode
             if status == 77:
                 return 77

@@ -96,23 +96,39 @@ Pose displacement(const Eigen::Vector3d& place, const RoverErrorOptions& errors,
 }  // namespace
 
 RoverErrorOptions rover_errors(RoverGrade grade) {
-  RoverErrorOptions errors;
-  if (grade == RoverGrade::exact) return errors;
-  const bool ordinary = grade == RoverGrade::ordinary;
-  errors.pair_rotation_deg = ordinary ? 0.025 : 0.08;
-  errors.baseline_percent = ordinary ? 0.1 : 0.3;
-  errors.focal_percent = ordinary ? 0.1 : 0.3;
-  errors.focal_difference_percent = ordinary ? 0.02 : 0.06;
-  errors.centre_px = ordinary ? 0.15 : 0.5;
-  errors.row_offset_px = ordinary ? 0.1 : 0.3;
-  errors.distortion_px = ordinary ? 0.15 : 0.5;
-  errors.mount_rotation_deg = ordinary ? 0.15 : 0.5;
-  errors.mount_mm = ordinary ? 2 : 6;
-  errors.pan_tilt_bias_deg = ordinary ? 0.1 : 0.3;
-  errors.pan_tilt_noise_deg = ordinary ? 0.03 : 0.1;
-  errors.drift_deg = ordinary ? 0.01 : 0.04;
-  errors.gain_percent = ordinary ? 5 : 15;
-  return errors;
+  switch (grade) {
+    case RoverGrade::exact:
+      break;
+    case RoverGrade::ordinary:
+      return {.pair_rotation_deg = 0.025,
+              .baseline_percent = 0.1,
+              .focal_percent = 0.1,
+              .focal_difference_percent = 0.02,
+              .centre_px = 0.15,
+              .row_offset_px = 0.1,
+              .distortion_px = 0.15,
+              .mount_rotation_deg = 0.15,
+              .mount_mm = 2,
+              .pan_tilt_bias_deg = 0.1,
+              .pan_tilt_noise_deg = 0.03,
+              .drift_deg = 0.01,
+              .gain_percent = 5};
+    case RoverGrade::poor:
+      return {.pair_rotation_deg = 0.08,
+              .baseline_percent = 0.3,
+              .focal_percent = 0.3,
+              .focal_difference_percent = 0.06,
+              .centre_px = 0.5,
+              .row_offset_px = 0.3,
+              .distortion_px = 0.5,
+              .mount_rotation_deg = 0.5,
+              .mount_mm = 6,
+              .pan_tilt_bias_deg = 0.3,
+              .pan_tilt_noise_deg = 0.1,
+              .drift_deg = 0.04,
+              .gain_percent = 15};
+  }
+  return {};
 }
 
 int jpeg_quality(RoverGrade grade) {

@@ -200,9 +200,9 @@ TEST(Sensor, FixedPatternRepeatsAndRowNoiseIsCommonToARow) {
     for (int x = 0; x < 200; ++x) hot += level(spots, x, y) > 4095 * (1.0 / 64 + 0.09) ? 1 : 0;
   }
   EXPECT_NEAR(hot, 320, 60);
-  const double signal = moments(image_of({}, 800, 1)).mean, shot = moments(image_of({}, 800, 1)).variance;
+  const double signal = moments(image_of({}, 800, 1)).mean, plain = moments(image_of({}, 800, 1)).variance;
   const double patterned = moments(image_of({.pixel_response_percent = 5}, 800, 1)).variance;
-  EXPECT_NEAR(std::sqrt(patterned - shot), 0.05 * (signal - 4095.0 / 64), 0.003 * signal);
+  EXPECT_NEAR(std::sqrt(patterned - plain), 0.05 * (signal - 4095.0 / 64), 0.003 * signal);
 }
 
 TEST(Sensor, GainOfTheCameraScalesTheSignal) {
