@@ -96,9 +96,8 @@ BENCHMARK(EmbreeShadow)->Unit(benchmark::kMillisecond);
 // With shadows, sky light, soil, motion blur and point spread function.
 void WholeImage(benchmark::State& state) {
   const Renderer renderer(test_scene().camera, Sampling::of(4));
-  Renderer::Poses poses;
-  poses.fill(test_scene().world_from_camera);
-  for (auto _ : state) benchmark::DoNotOptimize(renderer.render(test_scene().lit(), poses, false, ThreadPool(1)));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(renderer.render(test_scene().lit(), test_scene().world_from_camera, false, ThreadPool(1)));
   count(state, static_cast<std::size_t>(renderer.rays()));
 }
 BENCHMARK(WholeImage)->Unit(benchmark::kMillisecond);

@@ -16,6 +16,10 @@ inline std::uint32_t hash_coordinates(std::int32_t x, std::int32_t y, std::uint3
   h *= 0x846ca68bU;
   return h ^ (h >> 16U);
 }
+/// The same as a fraction from 0 to 1.
+inline double hash_fraction(std::int32_t x, std::int32_t y, std::uint32_t seed) {
+  return hash_coordinates(x, y, seed) * 0x1p-32;
+}
 
 /// A function value and its gradient.
 struct NoiseSample {

@@ -23,10 +23,11 @@ class Drive::Planner {
   Result<Drive> plan() {
     auto legs = lay_path(path_);
     if (!legs) return failure(legs);
+    if (path_.end_after_m > 0) shorten(*legs, path_.end_after_m);
     double length = 0;
     for (const PathLeg& leg : *legs) length += curve_length(leg.curve);
     if (Status s = find_stops(length); !s) return failure(s);
-    add(Motion::stationary(here_, kInitialStop_s));
+    if (path_.initial_stop_s > 0) add(Motion::stationary(here_, path_.initial_stop_s));
     capture_at_halt();
     for (const PathLeg& leg : *legs) {
       if (!leg.curve.empty()) {
@@ -42,6 +43,19 @@ class Drive::Planner {
   }
 
  private:
+  // Removes what is beyond a distance along the legs.
+  static void shorten(std::vector<PathLeg>& legs, double length_m) {
+    for (auto leg = legs.begin(); leg != legs.end(); ++leg) {
+      const double here_m = curve_length(leg->curve);
+      if (here_m >= length_m - kSame_m) {
+        if (here_m > length_m + kSame_m) leg->curve = cut(leg->curve, length_m).first;
+        legs.erase(leg + 1, legs.end());
+        return;
+      }
+      length_m -= here_m;
+    }
+  }
+
   Status find_stops(double length) {
     for (const double at : options_.stops_m) {
       if (at > length + kSame_m) {

@@ -48,7 +48,24 @@ TEST(Path, EveryKindHasTheExpectedEndPose) {
   EXPECT_NEAR(spiral.x, 1 - 2, 1e-6);
   EXPECT_NEAR(spiral.y, 1.5 - 2.5, 1e-6);
   EXPECT_NEAR(Drive::plan({.kind = PathKind::stationary, .stationary_s = 12}, {}, rover())->seconds(),
-              Drive::kInitialStop_s + 12 + 1, 0.1);
+              PathOptions().initial_stop_s + 12 + 1, 0.1);
+}
+
+TEST(Path, EndsEarlyOnTheSamePath) {
+  PathOptions path{.kind = PathKind::loop, .length_m = 12};
+  const auto whole = Drive::plan(path, {}, rover());
+  path.end_after_m = 3;
+  const auto early = Drive::plan(path, {}, rover());
+  const PlanarPose end = early->at(early->seconds());
+  const std::vector<PlanarPose> track = whole->track();
+  EXPECT_TRUE(std::any_of(track.begin(), track.end(), [&](const PlanarPose& p) {
+    return std::hypot(p.x - end.x, p.y - end.y) < 0.02 && std::abs(p.heading - end.heading) < 0.02;
+  }));
+  EXPECT_NEAR(end.heading, std::numbers::pi / 2, 1e-3) << "a quarter of the circle";
+  path = {.kind = PathKind::square_spiral, .leg_m = 1, .growth_m = 0.5, .legs = 4};
+  path.end_after_m = 1.8;
+  const auto spiral = Drive::plan(path, {}, rover());
+  EXPECT_NEAR(spiral->at(spiral->seconds()).y, 0.8, 1e-3) << "after the first corner";
 }
 
 TEST(Path, SpeedStaysBelowItsLimitAndBeginsAndEndsAtZero) {

@@ -71,9 +71,6 @@ struct PlannedFrame {
 /// Planar motion over time and the frames to take. A rover that follows it exactly is simulated by BodyMotion.
 class Drive {
  public:
-  /// The rover is stationary for this time before it moves, so that gravity can be measured.
-  static constexpr double kInitialStop_s = 2;
-
   /// Lays the path and plans the frames of the rig's pairs. Errors: `configuration` for a path that cannot be built, or
   /// that is shorter than the distance of a stop.
   static Result<Drive> plan(const PathOptions& path, const CaptureOptions& capture, const Rig& rig);
@@ -113,6 +110,7 @@ struct Scenario {
   TerrainShapeOptions terrain;
   RockFieldOptions rocks;
   SoilOptions soil;
+  GroundCoverOptions cover;
   LightOptions light;
   SensorOptions sensor;
   PathOptions path;
@@ -149,6 +147,7 @@ struct Scenario {
     v.group("terrain", terrain);
     v.group("rocks", rocks);
     v.group("soil", soil);
+    v.group("cover", cover);
     v.group("light", light);
     v.group("sensor", sensor);
     v.group("path", path);

@@ -17,23 +17,25 @@ namespace spartan::sim {
 /// with walls of fixed steepness. A crater is a paraboloid inside its rim and an ejecta apron outside, which falls
 /// with the cube of the distance.
 struct TerrainShapeOptions {
-  double relief_m = 0.06;          ///< m; standard deviation of the height
-  double relief_size_m = 8;        ///< m; longest wavelength
-  double relief_gain = 0.42;       ///< amplitude ratio of successive octaves
-  double slope_deg = 0;            ///< deg; overall inclination
-  double slope_heading_deg = 0;    ///< deg; uphill direction, counter-clockwise from x
-  double ripple_height_m = 0.008;  ///< m; crest to trough
-  double ripple_length_m = 0.14;   ///< m; crest to crest
-  double dune_height_m = 0.1;      ///< m; crest to trough
-  double dune_length_m = 7;        ///< m; crest to crest
-  double cavities_per_100m2 = 0;   ///< 1/(100 m²)
-  double cavity_diameter_m = 0.6;  ///< m; largest cavity
-  double cavity_depth_m = 0.25;    ///< m; largest cavity
-  double crater_radius_m = 0;      ///< m; centre to rim crest; 0: no crater
-  double crater_rim_m = 1;         ///< m; rim crest above the plain
-  double crater_depth_m = 2;       ///< m; floor below the plain
-  double crater_x_m = 0;           ///< m; centre, world x
-  double crater_y_m = 0;           ///< m; centre, world y
+  double relief_m = 0.06;           ///< m; standard deviation of the height
+  double relief_size_m = 8;         ///< m; longest wavelength
+  double relief_gain = 0.42;        ///< amplitude ratio of successive octaves
+  double slope_deg = 0;             ///< deg; overall inclination
+  double slope_heading_deg = 0;     ///< deg; uphill direction, counter-clockwise from x
+  double ripple_height_m = 0.008;   ///< m; crest to trough
+  double ripple_length_m = 0.14;    ///< m; crest to crest
+  double ripple_heading_deg = -26;  ///< deg; across the crests, counter-clockwise from x
+  double ripple_wander_rad = 1.8;   ///< rad; standard deviation of the phase over six lengths
+  double dune_height_m = 0.1;       ///< m; crest to trough
+  double dune_length_m = 7;         ///< m; crest to crest
+  double cavities_per_100m2 = 0;    ///< 1/(100 m²)
+  double cavity_diameter_m = 0.6;   ///< m; largest cavity
+  double cavity_depth_m = 0.25;     ///< m; largest cavity
+  double crater_radius_m = 0;       ///< m; centre to rim crest; 0: no crater
+  double crater_rim_m = 1;          ///< m; rim crest above the plain
+  double crater_depth_m = 2;        ///< m; floor below the plain
+  double crater_x_m = 0;            ///< m; centre, world x
+  double crater_y_m = 0;            ///< m; centre, world y
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -53,6 +55,12 @@ struct TerrainShapeOptions {
             between(0, 0.1));
     v.field("ripple_length_m", ripple_length_m, "Crest-to-crest length of the wind ripples in metres.",
             between(0.05, 2));
+    v.field("ripple_heading_deg", ripple_heading_deg,
+            "Direction across the crests of the ripples in degrees, counter-clockwise from the world's x axis.");
+    v.field("ripple_wander_rad", ripple_wander_rad,
+            "Standard deviation of the phase of the ripples in radians; raising it makes their length and direction "
+            "vary more.",
+            between(0, 20));
     v.field("dune_height_m", dune_height_m, "Crest-to-trough height of the dunes in metres; 0 for none.",
             between(0, 5));
     v.field("dune_length_m", dune_length_m, "Crest-to-crest length of the dunes in metres.", between(1, 100));
@@ -82,6 +90,8 @@ struct RockFieldOptions {
   double largest_m = 2.5;       ///< m; largest diameter
   double height_ratio = 0.5;    ///< mean height over diameter
   double pebbles_per_m2 = 300;  ///< 1/m²; pebbles of 4 to 10 mm besides the model
+  double buried_fraction = 0;   ///< fraction of the rocks of which only the top shows
+  double layered_fraction = 0;  ///< fraction of the rocks with layers that stand out
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -97,6 +107,10 @@ struct RockFieldOptions {
             "Number of pebbles of 4 to 10 mm diameter on a square metre, in addition to the rocks of the model.",
             between(0, 5000));
     v.field("height_ratio", height_ratio, "Mean height of a rock above the ground over its diameter.", between(0.1, 1));
+    v.field("buried_fraction", buried_fraction,
+            "Fraction of the rocks that are buried in the ground by more than half; these are lower.", between(0, 1));
+    v.field("layered_fraction", layered_fraction,
+            "Fraction of the rocks that have layers, of which each stands out over the one below.", between(0, 1));
   }
 };
 
@@ -108,6 +122,8 @@ struct SoilOptions {
   double albedo = 0.2;             ///< mean albedo of the soil
   double contrast = 0.14;          ///< standard deviation of the albedo over its mean
   double octave_gain = 1.15;       ///< amplitude ratio of successive octaves of the albedo
+  double contrast_spread = 0;      ///< standard deviation of the logarithm of the contrast between places
+  double contrast_size_m = 1.5;    ///< m; size of these places
   double rock_albedo_ratio = 0.8;  ///< mean albedo of rocks over that of the soil
   double lunar_weight = 0.5;       ///< L of the Lunar–Lambert law
 
@@ -122,9 +138,61 @@ struct SoilOptions {
             "Amplitude of an octave of the albedo over that of the next longer one; raising it moves contrast to "
             "finer scales.",
             between(0.5, 1.5));
+    v.field("contrast_spread", contrast_spread,
+            "Standard deviation of the natural logarithm of the contrast between places; raising it gives more places "
+            "without texture beside others that have more.",
+            between(0, 3));
+    v.field("contrast_size_m", contrast_size_m, "Size in metres of the places that differ in contrast.",
+            between(0.1, 100));
     v.field("rock_albedo_ratio", rock_albedo_ratio, "Mean albedo of the rocks over that of the soil.", between(0.1, 3));
     v.field("lunar_weight", lunar_weight,
             "Weight L of the Lunar-Lambert scattering law: 0 is Lambert, 1 is Lommel-Seeliger.", between(0, 1));
+  }
+};
+
+/// Flat polygonal plates on the soil.
+struct SlabOptions {
+  double cover = 0;     ///< fraction of the area
+  double size_m = 0.5;  ///< m; mean spacing of the plates
+  double height_m = 0;  ///< m; mean height of their tops above the soil; single ones differ by up to half of it
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("cover", cover, "Fraction of the ground that is covered by plates.", between(0, 1));
+    v.field("size_m", size_m, "Mean size of the plates in metres.", between(0.05, 5));
+    v.field("height_m", height_m, "Mean height of the tops of the plates above the soil in metres.", between(0, 0.3));
+  }
+};
+
+/// Smooth drifts of fine dust, which bury pebbles and texture.
+struct DustOptions {
+  double cover = 0;             ///< fraction of the area
+  double size_m = 2;            ///< m; wavelength of the drifts
+  double depth_m = 0.01;        ///< m
+  double albedo_ratio = 1.4;    ///< mean albedo over that of the soil
+  double contrast_ratio = 0.2;  ///< contrast over that of the soil
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("cover", cover, "Fraction of the ground that is covered by drifts of dust.", between(0, 1));
+    v.field("size_m", size_m, "Size of the drifts in metres.", between(0.1, 50));
+    v.field("depth_m", depth_m, "Depth of the dust in metres; lower rocks disappear in it.", between(0, 0.3));
+    v.field("albedo_ratio", albedo_ratio, "Mean albedo of the dust over that of the soil.", between(0.2, 4));
+    v.field("contrast_ratio", contrast_ratio, "Contrast of the dust over that of the soil.", between(0, 1));
+  }
+};
+
+/// What covers the soil.
+struct GroundCoverOptions {
+  SlabOptions bedrock{0, 0.5, 0.03};  ///< slabs of bedrock
+  SlabOptions crust{0, 0.12, 0.004};  ///< plates of hardened soil
+  DustOptions dust;
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.group("bedrock", bedrock);
+    v.group("crust", crust);
+    v.group("dust", dust);
   }
 };
 
@@ -181,6 +249,8 @@ struct PathOptions {
   double speed_m_s = 0.06;               ///< m/s
   double turn_rate_deg_s = 5;            ///< deg/s; turns in place
   double ramp_s = 2;                     ///< s; acceleration and deceleration
+  double end_after_m = 0;                ///< m; the drive ends after this distance; 0: at the end of the path
+  double initial_stop_s = 2;             ///< s; at rest before the drive, as gravity is measured there
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -201,6 +271,12 @@ struct PathOptions {
     v.field("speed_m_s", speed_m_s, "Driving speed in metres per second; raising it adds motion blur.",
             between(0.001, 5));
     v.field("turn_rate_deg_s", turn_rate_deg_s, "Rate of turns in place in degrees per second.", between(0.1, 180));
+    v.field("end_after_m", end_after_m,
+            "Distance in metres after which the drive ends before the end of its path; 0 drives all of it.",
+            between(0, 20000));
+    v.field("initial_stop_s", initial_stop_s,
+            "Time in seconds at rest at the start; filters level themselves in it. 0 begins with the first frame.",
+            between(0, 1000));
     v.field("ramp_s", ramp_s, "Time in seconds to accelerate to full speed, and to stop from it.", between(0.1, 60));
   }
 };
@@ -235,6 +311,12 @@ struct CaptureOptions {
   }
 };
 
+/// Where rocks are removed from the rover's way: the whole width of the rover, or what wheels and body need.
+enum class CorridorKind { full, wheels };
+constexpr auto enum_names(CorridorKind) {
+  return std::array{EnumName{CorridorKind::full, "full"}, EnumName{CorridorKind::wheels, "wheels"}};
+}
+
 /// Geometry of the four-wheeled rover.
 struct ChassisOptions {
   double wheelbase_m = 0.7;     ///< m; front to rear axle
@@ -242,6 +324,10 @@ struct ChassisOptions {
   double wheel_radius_m = 0.1;  ///< m
   double wheel_width_m = 0.08;  ///< m
   double clearance_m = 0.05;    ///< m; height of rocks that wheels can climb
+  CorridorKind corridor = CorridorKind::full;
+  double body_clearance_m = 0.2;  ///< m; height of rocks that the body passes over; for corridor `wheels`
+  bool visible = false;           ///< the rover and its shadow in the images
+  double track_depth_m = 0;       ///< m; of the tracks of its wheels
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -255,6 +341,20 @@ struct ChassisOptions {
     v.field("clearance_m", clearance_m,
             "Height of rocks in metres above which they are removed from the rover's path; wheels climb lower ones.",
             between(0, 5));
+    v.field(
+        "corridor", corridor,
+        "Where rocks are removed: full clears the whole width of the rover; wheels clears the tracks of the wheels, "
+        "and between them only rocks higher than body_clearance_m.");
+    v.field("body_clearance_m", body_clearance_m,
+            "Height in metres of rocks that the rover drives over between its wheels, where corridor is wheels.",
+            between(0, 5));
+    v.field("visible", visible,
+            "Whether the cameras see the rover (deck, wheels, suspension, masts, camera housings) and its shadow.");
+    v.field(
+        "track_depth_m", track_depth_m,
+        "Depth in metres of the tracks that the wheels leave, as far as the rover has driven when it enters a scene "
+        "of 2 m; the true maps are of the ground before the drive.",
+        between(0, 0.1));
   }
 };
 
@@ -264,7 +364,7 @@ struct ChassisOptions {
 struct TruthOptions {
   bool disparity = true;
   double cell_m = 0.02;     ///< m
-  double obstacle_m = 0.1;  ///< m; above the ground without rocks
+  double obstacle_m = 0.1;  ///< m; above the ground without rocks and cavities
   double cavity_m = 0.1;    ///< m; below the ground without cavities
 
   template <class Visitor>
@@ -272,7 +372,8 @@ struct TruthOptions {
     v.field("disparity", disparity, "Whether to write the true disparity image and its mask of every frame.");
     v.field("cell_m", cell_m, "Cell size of elevation.tif and obstacles.tif in metres.", between(0.005, 1));
     v.field("obstacle_m", obstacle_m,
-            "Height in metres above the ground without rocks from which on a cell is an obstacle.", between(0.01, 5));
+            "Height in metres above the ground without rocks and cavities from which on a cell is an obstacle.",
+            between(0.01, 5));
     v.field("cavity_m", cavity_m, "Depth in metres below the ground without cavities from which on a cell is a cavity.",
             between(0.01, 5));
   }

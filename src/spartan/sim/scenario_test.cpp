@@ -96,7 +96,7 @@ TEST(Scenario, ShippedScenariosCanBePlanned) {
     EXPECT_EQ(scenario->samples, scenario->name == "quick" ? 2 : 4) << scenario->name;
     ++count;
   }
-  EXPECT_EQ(count, 10);
+  EXPECT_EQ(count, 14);
 }
 
 TEST(Scenario, ErrorsInListsNameTheirLine) {

@@ -31,8 +31,11 @@ struct SensorOptions {
   double hot_pixel_fraction = 0;      ///< pixels with 0.1 to 1 full wells without light
   double delay_ms = 0;                ///< ms; of the exposure after the stamp, all cameras
   double right_delay_ms = 0;          ///< ms; the same, right cameras in addition
+  double rolling_shutter_ms = 0;      ///< ms; from the exposure of the first row to that of the last; 0: all at once
   bool meter_lags = false;            ///< auto exposure uses the frame before
   int jpeg_quality = 0;               ///< 1 to 100; 0: lossless
+  double wavelet_bits = 0;            ///< per pixel, compressed by wavelets (JPEG 2000, as ICER); 0: lossless
+  bool vignetting_stated = false;     ///< the recorded rig states the vignetting
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -77,6 +80,16 @@ struct SensorOptions {
     v.field("jpeg_quality", jpeg_quality,
             "Quality of the JPEG compression of the images, 1 to 100, for cameras of 8-bit gray; 0 is lossless.",
             between(0, 100));
+    v.field("wavelet_bits", wavelet_bits,
+            "Bits per pixel of images of 8-bit gray that are compressed by wavelets (JPEG 2000, similar to ICER), "
+            "instead of by JPEG; 0 is lossless.",
+            between(0, 8));
+    v.field("rolling_shutter_ms", rolling_shutter_ms,
+            "Time in milliseconds from the exposure of the first row to that of the last one, whose middle is the "
+            "stamp; 0 exposes all rows at once.",
+            between(0, 1000));
+    v.field("vignetting_stated", vignetting_stated,
+            "Whether the recorded rig states the vignetting, so that it is corrected.");
   }
 };
 
@@ -301,6 +314,8 @@ ImuOptions imu_of_grade(ImuGrade grade);
 
 /// Wheel odometry with slip, the fraction of the rolled distance that does not move the rover:
 ///   slip = level + by_slope · tan(climb) + sand · noise(x, y),  rolled = travelled / (1 − slip).
+/// Side slip and creep move the body, whether or not it has encoders: the rover follows its path with its heading
+/// turned uphill by atan(side_slip · tan(cross slope)), and slides downhill at creep · tan(slope) while it stands.
 struct WheelOptions {
   bool enabled = true;
   double rate_hz = 20;           ///< Hz
@@ -308,6 +323,9 @@ struct WheelOptions {
   double slip_by_slope = 1;      ///< slip per tan(climb)
   double slip_sand = 0.03;       ///< standard deviation of the slip between patches of sand
   double sand_size_m = 2;        ///< m; size of the patches
+  double turn_skid = 0;          ///< rolled by turns more than without skid, as a fraction
+  double side_slip = 0;          ///< lateral slip per tan(cross slope)
+  double creep_m_s = 0;          ///< m/s per tan(slope)
   double radius_error = 0.005;   ///< standard deviation of each side's scale
   double resolution_m = 0.0005;  ///< m; encoder step
 
@@ -321,6 +339,16 @@ struct WheelOptions {
             between(0, 5));
     v.field("slip_sand", slip_sand, "Standard deviation of the slip between patches of sand.", between(0, 0.5));
     v.field("sand_size_m", sand_size_m, "Size of the patches of sand in metres.", between(0.1, 100));
+    v.field("turn_skid", turn_skid,
+            "Fraction of the difference between left and right wheels that they roll more in turns, as they skid.",
+            between(0, 2));
+    v.field(
+        "side_slip", side_slip,
+        "Lateral slip over the distance on a cross slope of 45 degrees; the rover heads uphill to stay on its path.",
+        between(0, 2));
+    v.field("creep_m_s", creep_m_s,
+            "Downhill speed in metres per second at which the rover slides on a slope of 45 degrees while it stands.",
+            between(0, 0.1));
     v.field("radius_error", radius_error,
             "Standard deviation of the scale error of each side, as a fraction of the distance.", between(0, 0.2));
     v.field("resolution_m", resolution_m, "Resolution of the encoders in metres of rolled distance; 0 is exact.",

@@ -5,21 +5,25 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <optional>
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/sim/internal/camera/faults.h"
+#include "spartan/sim/internal/camera/frame_geometry.h"
 #include "spartan/sim/internal/camera/frame_preview.h"
 #include "spartan/sim/internal/camera/renderer.h"
+#include "spartan/sim/internal/camera/rover_body.h"
+#include "spartan/sim/internal/camera/scene_around.h"
 #include "spartan/sim/internal/camera/truth.h"
 #include "spartan/sim/internal/drive/body_motion.h"
-#include "spartan/sim/internal/drive/camera_poses.h"
 #include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/internal/drive/rover_seed.h"
+#include "spartan/sim/internal/world/wheel_tracks.h"
 #include "spartan/sim/internal/world/world.h"
 #include "spartan/storage/geotiff.h"
 
@@ -103,12 +107,17 @@ class Simulation {
         workers_(workers),
         scenario_(request.scenario),
         world_(make_world(request.scenario, request.drive)),
-        motion_(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers),
         nominal_(nominal_rig(request.rig, request.scenario.nominal_rig)),
         rig_(true_rig(request.rig, request.scenario.rover_errors, request.scenario.seed)),
-        camera_poses_(rig_, request.scenario.rover_errors, request.scenario.seed, request.drive.seconds()) {
+        geometry_(rig_, request.scenario,
+                  BodyMotion(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers,
+                             request.scenario.wheels)) {
     nominal_.rover.track_m = request.scenario.chassis.track_m;
     nominal_.rover.wheel_radius_m = request.scenario.chassis.wheel_radius_m;
+    if (scenario_.sensor.vignetting_stated) {
+      for (Camera& camera : nominal_.cameras)
+        camera.vignetting = fitted_vignetting(camera, scenario_.sensor.vignetting);
+    }
   }
 
   Result<SimulationReport> run() {
@@ -139,15 +148,15 @@ class Simulation {
     const Camera& camera = *rig_.find_camera(pair.left);
     const Renderer renderer(camera, Sampling::of(scenario_.samples));
     const Sensor sensor(scenario_.sensor, camera);
-    const GroundScene scene(world_.shape, world_.rocks, region_of(i, i + 1), workers_);
-    const SkyLight sky(scene, world_.shape, workers_);
-    const LitScene lit{scene, sky, world_.sun, world_.soil, world_.sky_lux};
-    const Pose pose = camera_pose(planned, pair.left, planned.time_s);
+    const SceneAround around = scene_around(i, i + 1);
+    const std::optional<RoverBody> rover = geometry_.visible_rover(planned);
     FramePreview preview;
-    preview.exposure = choose_exposure(scenario_.sensor, renderer.mean_luminance(lit, pose, kMeteredRow));
+    preview.exposure = choose_exposure(
+        scenario_.sensor,
+        renderer.mean_luminance(around.lit(), geometry_.exposing(planned, pair.left, 0, rover), kMeteredRow));
     Stopwatch watch;
-    const LuminanceImage luminance =
-        renderer.render(lit, exposure_poses(planned, pair.left, preview.exposure.seconds), true, workers_);
+    const LuminanceImage luminance = renderer.render(
+        around.lit(), geometry_.exposing(planned, pair.left, preview.exposure.seconds, rover), true, workers_);
     preview.seconds = 1e-3 * watch.lap();
     preview.rays = renderer.rays();
     preview.recorded = sensor.expose(luminance, preview.exposure, {}, 1, workers_);
@@ -210,8 +219,14 @@ class Simulation {
     return to;
   }
 
-  Pose camera_pose(const PlannedFrame& planned, const std::string& camera, double time_s) const {
-    return motion_.world_from_body(time_s) * camera_poses_.body_from_camera(camera, planned, time_s);
+  SceneAround scene_around(std::size_t from, std::size_t to) const {
+    const Region region = region_of(from, to);
+    std::shared_ptr<const WheelTracks> tracks;
+    if (scenario_.chassis.track_depth_m > 0) {
+      tracks = std::make_shared<const WheelTracks>(request_.drive, request_.drive.frames()[from].time_s,
+                                                   scenario_.chassis, region);
+    }
+    return {world_, region, std::move(tracks), workers_};
   }
 
   Region region_of(std::size_t from, std::size_t to) const {
@@ -220,9 +235,9 @@ class Simulation {
     for (std::size_t i = from; i < to; ++i) {
       const PlannedFrame& planned = request_.drive.frames()[i];
       const StereoPair& pair = *rig_.find_pair(planned.pair);
-      const double ground = motion_.world_from_body(planned.time_s).translation().z();
+      const double ground = geometry_.motion().world_from_body(planned.time_s).translation().z();
       for (const std::string& name : {pair.left, pair.right}) {
-        add_footprint(region, *rig_.find_camera(name), camera_pose(planned, name, planned.time_s), ground);
+        add_footprint(region, *rig_.find_camera(name), geometry_.camera_pose(planned, name, planned.time_s), ground);
       }
     }
     return region.grown(0.3);
@@ -239,8 +254,7 @@ class Simulation {
   }
 
   Status render_scene_frames(RecordingWriter& writer, std::size_t from, std::size_t to) {
-    std::optional<GroundScene> scene;
-    std::optional<SkyLight> sky;
+    std::optional<SceneAround> around;
     for (std::size_t i = from; i < to; ++i) {
       if (hooks_.should_stop && hooks_.should_stop()) {
         report_.interrupted = true;
@@ -252,41 +266,15 @@ class Simulation {
         const auto kept = writer.reuse_frame(planned.pair, left_stamp(i, fault));
         if (!kept) return failure(kept);
         if (!*kept) {
-          if (!scene) {
-            scene.emplace(world_.shape, world_.rocks, region_of(from, to), workers_);
-            sky.emplace(*scene, world_.shape, workers_);
-          }
-          const LitScene lit{*scene, *sky, world_.sun, world_.soil, world_.sky_lux};
-          if (Status s = render_frame(writer, i, lit, fault); !s) return s;
+          if (!around) around.emplace(scene_around(from, to));
+          if (Status s = render_frame(writer, i, around->lit(), fault); !s) return s;
         }
-        poses_.push_back({left_stamp(i, fault), motion_.world_from_body(planned.time_s)});
+        poses_.push_back({left_stamp(i, fault), geometry_.motion().world_from_body(planned.time_s)});
         ++report_.frames;
       }
       if (hooks_.progress) hooks_.progress({static_cast<int>(i) + 1, static_cast<int>(request_.drive.frames().size())});
     }
     return {};
-  }
-
-  // The middle of the exposure of a camera.
-  double exposure_time(const PlannedFrame& planned, const std::string& camera) const {
-    const double right_ms = camera == rig_.find_pair(planned.pair)->right ? scenario_.sensor.right_delay_ms : 0;
-    return planned.time_s + 1e-3 * (scenario_.sensor.delay_ms + right_ms);
-  }
-
-  Renderer::Poses exposure_poses(const PlannedFrame& planned, const std::string& camera, double seconds) const {
-    Renderer::Poses poses;
-    for (std::size_t t = 0; t < poses.size(); ++t) {
-      const double part = (static_cast<double>(t) + 0.5) / Renderer::kTimes - 0.5;
-      poses[t] = camera_pose(planned, camera, exposure_time(planned, camera) + part * seconds);
-    }
-    return poses;
-  }
-
-  // right_from_left between the exposures of the two cameras of a frame.
-  Pose exposed_right_from_left(const PlannedFrame& planned, const StereoPair& pair) const {
-    const double left_s = exposure_time(planned, pair.left), right_s = exposure_time(planned, pair.right);
-    if (left_s == right_s) return camera_poses_.right_from_left(pair, left_s);
-    return camera_pose(planned, pair.right, right_s).inverse() * camera_pose(planned, pair.left, left_s);
   }
 
   // The frame whose light auto exposure measures.
@@ -303,11 +291,9 @@ class Simulation {
     const PlannedFrame& planned = request_.drive.frames()[i];
     const PairRenderer& tools = pair_renderers_.at(planned.pair);
     const StereoPair& pair = *rig_.find_pair(planned.pair);
-    const Pose left_pose = camera_pose(planned, pair.left, exposure_time(planned, pair.left));
-    const PlannedFrame& metered = metered_frame(i);
-    const Pose metered_pose = camera_pose(metered, pair.left, exposure_time(metered, pair.left));
-    const Exposure exposure =
-        choose_exposure(scenario_.sensor, tools.left.mean_luminance(lit, metered_pose, kMeteredRow));
+    const std::optional<RoverBody> rover = geometry_.visible_rover(planned);
+    const Exposing metering = geometry_.exposing(metered_frame(i), pair.left, 0, rover);
+    const Exposure exposure = choose_exposure(scenario_.sensor, tools.left.mean_luminance(lit, metering, kMeteredRow));
     const auto seed = static_cast<std::uint64_t>(scenario_.seed) * 1000003 + 2 * i +
                       static_cast<std::uint64_t>(scenario_.sensor.noise_seed) * kNoiseStride;
     StereoFrame frame;
@@ -320,15 +306,14 @@ class Simulation {
     frame.tilt_rad = planned.tilt_rad;
     frame.exposure_us = exposure.seconds * 1e6;
     frame.gain = exposure.gain;
-    const LuminanceImage left =
-        tools.left.render(lit, exposure_poses(planned, pair.left, exposure.seconds), tools.colour, workers_);
-    const LuminanceImage right =
-        tools.right.render(lit, exposure_poses(planned, pair.right, exposure.seconds), tools.colour, workers_);
+    const auto render = [&](const Renderer& renderer, const std::string& camera) {
+      return renderer.render(lit, geometry_.exposing(planned, camera, exposure.seconds, rover), tools.colour, workers_);
+    };
+    const LuminanceImage left = render(tools.left, pair.left), right = render(tools.right, pair.right);
     frame.left = tools.left_sensor.expose(left, exposure, fault.left, seed, workers_);
     frame.right = tools.right_sensor.expose(right, exposure, fault.right, seed + 1, workers_);
     if (tools.truth) {
-      const TrueDisparity truth =
-          tools.truth->of(lit.scene, left_pose, exposed_right_from_left(planned, pair), workers_);
+      const TrueDisparity truth = tools.truth->of(lit.scene, geometry_.pair_poses(planned, pair, rover), workers_);
       if (Status s =
               writer.write_truth_disparity(planned.pair, frame.left_stamp, truth.disparity.view(), truth.mask.view());
           !s)
@@ -350,12 +335,17 @@ class Simulation {
   Status finish_recording(RecordingWriter& writer) {
     const auto seed = static_cast<std::uint64_t>(scenario_.seed);
     const SensorFaults& faults = scenario_.sensor_faults;
-    if (Status s = add_all(writer, measure_imu(motion_, scenario_.imu, scenario_.gravity_m_s2, faults, seed)); !s)
+    if (Status s =
+            add_all(writer, measure_imu(geometry_.motion(), scenario_.imu, scenario_.gravity_m_s2, faults, seed));
+        !s)
       return s;
-    if (Status s = add_all(writer, measure_wheels(motion_, scenario_.chassis, scenario_.wheels, faults, seed)); !s)
+    if (Status s =
+            add_all(writer, measure_wheels(geometry_.motion(), scenario_.chassis, scenario_.wheels, faults, seed));
+        !s)
       return s;
-    if (Status s = add_all(writer, measure_compass(motion_, scenario_.compass, faults, seed)); !s) return s;
-    if (Status s = add_all(writer, measure_inclinometer(motion_, scenario_.inclinometer, faults, seed)); !s) return s;
+    if (Status s = add_all(writer, measure_compass(geometry_.motion(), scenario_.compass, faults, seed)); !s) return s;
+    if (Status s = add_all(writer, measure_inclinometer(geometry_.motion(), scenario_.inclinometer, faults, seed)); !s)
+      return s;
     // Pairs that take frames at the same time share one pose.
     std::sort(poses_.begin(), poses_.end(),
               [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; });
@@ -372,9 +362,8 @@ class Simulation {
   const ThreadPool& workers_;
   const Scenario& scenario_;
   World world_;
-  BodyMotion motion_;
   Rig nominal_, rig_;  // as the recording states it; as it is at the start
-  CameraPoses camera_poses_;
+  FrameGeometry geometry_;
   std::map<std::string, PairRenderer> pair_renderers_;
   Trajectory poses_;
   SimulationReport report_;

@@ -1,39 +1,73 @@
 #include "spartan/sim/internal/camera/ground_scene.h"
 
-#include <embree3/rtcore.h>
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "spartan/sim/internal/camera/embree.h"
 #include "spartan/sim/internal/world/rock_shape.h"
 
 namespace spartan::sim::internal {
 namespace {
 
-constexpr int kAllRays[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
 constexpr double kOverlap_m = 0.5;     // overlap of the coarse ground with the fine one, so that no gaps open …
 constexpr double kSunk_m = 0.02;       // … and its depth below it there, so that it stays hidden; empirical
 constexpr double kRockEdge_m = 0.007;  // edge length of rocks in the region, about kGrid_m
 constexpr double kFarRockEdge = 0.13;  // edge length over diameter, outside the region
-
-struct Release {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
 
 // A rectangle of ground, one Embree grid geometry.
 struct GridPlan {
   Region region;
   double step_m;
   double sunk_m;
+};
+
+// Slopes (∂z/∂x, ∂z/∂y) of the ground at the vertices of a grid, by central differences, and between them by bilinear
+// interpolation. Normals of the facets instead would show the grid where the sun is low.
+class SlopeGrid {
+ public:
+  SlopeGrid() = default;
+  SlopeGrid(const float* vertices, int nx, int ny, double step_m, const ThreadPool& workers)
+      : x0_(vertices[0]), y0_(vertices[1]), per_metre_(static_cast<float>(1 / step_m)), nx_(nx), ny_(ny) {
+    slopes_.resize(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny));
+    const auto height = [&](int i, int j) { return vertices[3 * at(i, j) + 2]; };
+    workers.parallel_for(0, ny, 16, [&](int from, int to) {
+      for (int j = from; j < to; ++j) {
+        const int j0 = std::max(j - 1, 0), j1 = std::min(j + 1, ny_ - 1);
+        for (int i = 0; i < nx_; ++i) {
+          const int i0 = std::max(i - 1, 0), i1 = std::min(i + 1, nx_ - 1);
+          slopes_[at(i, j)] = {per_metre_ * (height(i1, j) - height(i0, j)) / static_cast<float>(i1 - i0),
+                               per_metre_ * (height(i, j1) - height(i, j0)) / static_cast<float>(j1 - j0)};
+        }
+      }
+    });
+  }
+
+  /// Unit normal at a point of the ground; x, y as those of the vertices.
+  Eigen::Vector3f normal(float x, float y) const {
+    const float u = std::clamp((x - x0_) * per_metre_, 0.0F, static_cast<float>(nx_ - 1)),
+                v = std::clamp((y - y0_) * per_metre_, 0.0F, static_cast<float>(ny_ - 1));
+    const int i = std::min(static_cast<int>(u), nx_ - 2), j = std::min(static_cast<int>(v), ny_ - 2);
+    const float a = u - static_cast<float>(i), b = v - static_cast<float>(j);
+    const Eigen::Vector2f* const corner = &slopes_[at(i, j)];
+    const Eigen::Vector2f below = corner[0] + a * (corner[1] - corner[0]),
+                          above = corner[nx_] + a * (corner[nx_ + 1] - corner[nx_]);
+    const Eigen::Vector2f slope = below + b * (above - below);
+    return Eigen::Vector3f(-slope.x(), -slope.y(), 1).normalized();
+  }
+
+ private:
+  std::size_t at(int i, int j) const {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i);
+  }
+  float x0_ = 0, y0_ = 0, per_metre_ = 0;
+  int nx_ = 0, ny_ = 0;
+  std::vector<Eigen::Vector2f> slopes_;
 };
 
 int steps_of(double length_m, double step_m) {
@@ -65,18 +99,13 @@ std::vector<Rock> visible_rocks(const RockField& rocks, const Region& region) {
 struct GroundScene::State {
   Region region;
   Eigen::Vector3d origin;
-  std::unique_ptr<RTCDeviceTy, Release> device;
-  std::unique_ptr<RTCSceneTy, Release> scene;
+  EmbreeDevice device;
+  EmbreeScene scene;
   std::size_t triangles = 0;
   unsigned rocks_id = RTC_INVALID_GEOMETRY_ID;
+  std::vector<SlopeGrid> slopes;  // by geometry id of the ground
 
   State(const TerrainShape& shape, const Region& requested, const ThreadPool& workers);
-  unsigned attach(RTCGeometry geometry) {
-    rtcCommitGeometry(geometry);
-    const unsigned id = rtcAttachGeometry(scene.get(), geometry);
-    rtcReleaseGeometry(geometry);
-    return id;
-  }
   void add_ground(const TerrainShape& shape, const GridPlan& plan, const ThreadPool& workers);
   void add_rocks(const TerrainShape& shape, const std::vector<Rock>& rocks, const ThreadPool& workers);
 };
@@ -108,7 +137,10 @@ void GroundScene::State::add_ground(const TerrainShape& shape, const GridPlan& p
     }
   });
   triangles += 2 * static_cast<std::size_t>(nx - 1) * static_cast<std::size_t>(ny - 1);
-  attach(geometry);
+  SlopeGrid grid_slopes(vertices, nx, ny, plan.step_m, workers);
+  const unsigned id = attach(scene, geometry);
+  slopes.resize(std::max(slopes.size(), static_cast<std::size_t>(id) + 1));
+  slopes[id] = std::move(grid_slopes);
 }
 
 void GroundScene::State::add_rocks(const TerrainShape& shape, const std::vector<Rock>& rocks,
@@ -144,19 +176,15 @@ void GroundScene::State::add_rocks(const TerrainShape& shape, const std::vector<
     first += static_cast<unsigned>(mesh.vertices.size());
   }
   triangles += triangle_count;
-  rocks_id = attach(geometry);
+  rocks_id = attach(scene, geometry);
 }
 
 GroundScene::State::State(const TerrainShape& shape, const Region& requested, const ThreadPool& workers)
     : region(snapped_to_lattice(requested, kGrid_m)) {
   const double cx = 0.5 * (requested.x0 + requested.x1), cy = 0.5 * (requested.y0 + requested.y1);
   origin = {cx, cy, shape.height(cx, cy)};
-  // A fixed instruction set gives the same hits on every machine. The threads build the BVH only.
-  device.reset(rtcNewDevice(fmt::format("threads={},isa=avx2", workers.threads()).c_str()));
-  if (!device)
-    throw std::runtime_error("GroundScene: cannot create an Embree device; a processor with AVX2 is required");
-  scene.reset(rtcNewScene(device.get()));
-  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+  device = make_embree_device(workers.threads());
+  scene = make_embree_scene(device);
 }
 
 GroundScene::GroundScene(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -204,32 +232,11 @@ std::size_t GroundScene::triangles() const {
   return state_->triangles;
 }
 
-namespace {
-
-RTCRay8 embree_rays(const RayPacket& rays) {
-  RTCRay8 r{};
-  for (int i = 0; i < kPacket; ++i) {
-    r.org_x[i] = rays.origin_x[i];
-    r.org_y[i] = rays.origin_y[i];
-    r.org_z[i] = rays.origin_z[i];
-    r.dir_x[i] = rays.direction_x[i];
-    r.dir_y[i] = rays.direction_y[i];
-    r.dir_z[i] = rays.direction_z[i];
-    r.tfar[i] = rays.max_distance[i];
-    r.mask[i] = ~0U;
-  }
-  return r;
-}
-
-}  // namespace
-
 HitPacket GroundScene::intersect(const RayPacket& rays) const {
   RTCRayHit8 query;
   query.ray = embree_rays(rays);
   std::fill(std::begin(query.hit.geomID), std::end(query.hit.geomID), RTC_INVALID_GEOMETRY_ID);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  RTCIntersectContext context = coherent_rays();
   rtcIntersect8(kAllRays, state_->scene.get(), &context, &query);
   HitPacket hits;
   for (int i = 0; i < kPacket; ++i) {
@@ -240,10 +247,16 @@ HitPacket GroundScene::intersect(const RayPacket& rays) const {
       hits.rock[i] = false;
       continue;
     }
-    Eigen::Vector3f n(query.hit.Ng_x[i], query.hit.Ng_y[i], query.hit.Ng_z[i]);
-    n.normalize();
-    // Make the normal face the ray, whatever the winding order of the triangle.
-    if (n.dot(Eigen::Vector3f(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i])) > 0) n = -n;
+    const unsigned id = query.hit.geomID[i];
+    const Eigen::Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
+    Eigen::Vector3f n;
+    if (id < state_->slopes.size()) {
+      n = state_->slopes[id].normal(rays.origin_x[i] + query.ray.tfar[i] * direction.x(),
+                                    rays.origin_y[i] + query.ray.tfar[i] * direction.y());
+    } else {
+      n = Eigen::Vector3f(query.hit.Ng_x[i], query.hit.Ng_y[i], query.hit.Ng_z[i]).normalized();
+      if (n.dot(direction) > 0) n = -n;  // to face the ray, whatever the winding order of the triangle
+    }
     hits.distance[i] = query.ray.tfar[i];
     hits.normal_x[i] = n.x();
     hits.normal_y[i] = n.y();
@@ -254,16 +267,7 @@ HitPacket GroundScene::intersect(const RayPacket& rays) const {
 }
 
 std::uint32_t GroundScene::occluded(const RayPacket& rays) const {
-  RTCRay8 query = embree_rays(rays);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcOccluded8(kAllRays, state_->scene.get(), &context, &query);
-  std::uint32_t blocked = 0;
-  for (int i = 0; i < kPacket; ++i) {
-    if (rays.max_distance[i] >= 0 && query.tfar[i] < 0) blocked |= 1U << i;
-  }
-  return blocked;
+  return occluded_by(state_->scene, rays);
 }
 
 }  // namespace spartan::sim::internal

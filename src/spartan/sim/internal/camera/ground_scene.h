@@ -37,14 +37,15 @@ struct RayPacket {
 /// The hits of a RayPacket.
 struct HitPacket {
   alignas(32) float distance[kPacket];                                        ///< m; infinity without a hit
-  alignas(32) float normal_x[kPacket], normal_y[kPacket], normal_z[kPacket];  ///< of the triangle, unit length
+  alignas(32) float normal_x[kPacket], normal_y[kPacket], normal_z[kPacket];  ///< unit length; see GroundScene
   bool rock[kPacket];                                                         ///< true: a rock, false: the ground
 };
 
 /// Triangle scene of ground and rocks. Rays are relative to origin(), which is near enough for single precision.
 /// Inside the region the ground is a grid of kGrid_m with all rocks; around it, coarser ground with the larger rocks
-/// up to kHorizon_m. The triangles, not the functions that they sample, are the ground truth. Vertices lie on one
-/// lattice of the world, so two scenes agree where their regions overlap.
+/// up to kHorizon_m. The triangles, not the functions that they sample, are the ground truth. Normals are those of the
+/// triangles on rocks, and interpolated on the ground. Vertices lie on one lattice of the world, so two scenes agree
+/// where their regions overlap.
 class GroundScene {
  public:
   static constexpr double kGrid_m = 0.005;   ///< m; vertex spacing inside the region

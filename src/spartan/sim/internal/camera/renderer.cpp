@@ -46,7 +46,7 @@ struct Hits {
   std::array<Eigen::Vector3f, kPacket> look;
   std::array<bool, kPacket> hit;
   std::uint32_t lit = 0;
-  std::array<float, kPacket> albedo{};
+  std::array<float, kPacket> albedo{}, rover_albedo{};  // rover: 0 where a ray does not hit it
 };
 
 // Albedos of a packet. A footprint is elongated by 1/cos of the emission angle: it is averaged over up to
@@ -63,7 +63,8 @@ void find_albedos(const LitScene& s, const Eigen::Vector3d& camera_centre, doubl
   std::array<int, kPacket> parts{};
   for (int k = 0; k < kPacket; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    if (!h.hit[i]) continue;
+    if (h.rover_albedo[i] > 0) h.albedo[i] = h.rover_albedo[i];
+    if (!h.hit[i] || h.rover_albedo[i] > 0) continue;
     const Eigen::Vector3f n(h.at.normal_x[k], h.at.normal_y[k], h.at.normal_z[k]);
     const Eigen::Vector3f& look = h.look[i];
     const double distance = h.at.distance[k], across = distance * radians_per_ray;
@@ -93,6 +94,31 @@ void find_albedos(const LitScene& s, const Eigen::Vector3d& camera_centre, doubl
 }
 
 }  // namespace
+
+namespace {
+
+Pose interpolated(const Pose& top, const Pose& bottom, double part) {
+  return {top.rotation().slerp(part, bottom.rotation()), (1 - part) * top.translation() + part * bottom.translation()};
+}
+
+}  // namespace
+
+Pose ShutterPose::at(double part) const {
+  return rolls ? interpolated(top, bottom, part) : top;
+}
+
+ExposurePoses ShutterPoses::at(double part) const {
+  if (!rolls) return top;
+  ExposurePoses poses;
+  for (std::size_t t = 0; t < poses.size(); ++t) poses[t] = interpolated(top[t], bottom[t], part);
+  return poses;
+}
+
+Exposing at_rest(const Pose& world_from_camera) {
+  Exposing exposing;
+  exposing.world_from_camera.top.fill(world_from_camera);
+  return exposing;
+}
 
 Sampling Sampling::of(int per_pixel) {
   switch (per_pixel) {
@@ -145,29 +171,51 @@ std::int64_t Renderer::rays() const {
   return static_cast<std::int64_t>(width_) * height_ / (sampling_.every_other ? 2 : 1);
 }
 
-void Renderer::shade_row(const LitScene& s, std::span<const Pose> poses, int row, Row& out) const {
+// Poses that the rays of one row use.
+struct Renderer::RowPoses {
   std::array<Eigen::Matrix3f, kTimes> rotations;
-  std::array<Eigen::Vector3f, kTimes> centres;
+  std::array<Eigen::Vector3f, kTimes> centres;  // relative to the scene's origin
+  Eigen::Vector3d middle;                       // of the camera, world
+  ExposurePoses body_from_origin;
+};
+
+Renderer::RowPoses Renderer::poses_of_row(const LitScene& s, const Exposing& exposing, int row) const {
+  const double part = std::clamp((row - border_ + 0.5) / (height_ - 2 * border_), 0.0, 1.0);
+  const ExposurePoses camera = exposing.world_from_camera.at(part);
+  RowPoses poses;
   for (std::size_t t = 0; t < kTimes; ++t) {
-    rotations[t] = poses[t].rotation().toRotationMatrix().cast<float>();
-    centres[t] = (poses[t].translation() - s.scene.origin()).cast<float>();
+    poses.rotations[t] = camera[t].rotation().toRotationMatrix().cast<float>();
+    poses.centres[t] = (camera[t].translation() - s.scene.origin()).cast<float>();
   }
-  const Eigen::Vector3d middle = poses[kTimes / 2].translation();
+  poses.middle = camera[kTimes / 2].translation();
+  if (exposing.rover) {
+    const ExposurePoses body = exposing.world_from_body.at(part);
+    for (std::size_t t = 0; t < kTimes; ++t)
+      poses.body_from_origin[t] = body[t].inverse() * Pose::from_translation(s.scene.origin());
+  }
+  return poses;
+}
+
+void Renderer::shade_row(const LitScene& s, const Exposing& exposing, int row, Row& out) const {
+  const RowPoses poses = poses_of_row(s, exposing, row);
   const Eigen::Vector3f* const directions =
       directions_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
   const int step = sampling_.every_other ? 2 : 1;
   const double bounce_lux = s.soil.mean_albedo() * s.sun.horizontal_lux(s.sky_lux);
   for (int first = sampling_.every_other ? row & 1 : 0; first < width_; first += kPacket * step) {
     RayPacket rays, shadows;
+    RoverBody::Poses bodies{};
     Hits h;
     for (int k = 0; k < kPacket; ++k) {
       const int column = first + k * step;
       const auto t = static_cast<std::size_t>(sample_index(column, row));
       const Eigen::Vector3f& direction = directions[column];
-      h.look[static_cast<std::size_t>(k)] = rotations[t] * direction;
-      rays.set(k, centres[t], h.look[static_cast<std::size_t>(k)], direction.z() != 0 ? kFarthest_m : -1.0F);
+      h.look[static_cast<std::size_t>(k)] = poses.rotations[t] * direction;
+      bodies[static_cast<std::size_t>(k)] = &poses.body_from_origin[t];
+      rays.set(k, poses.centres[t], h.look[static_cast<std::size_t>(k)], direction.z() != 0 ? kFarthest_m : -1.0F);
     }
     h.at = s.scene.intersect(rays);
+    if (exposing.rover) h.rover_albedo = exposing.rover->intersect(rays, bodies, h.at);
     for (int k = 0; k < kPacket; ++k) {
       const auto i = static_cast<std::size_t>(k);
       const Eigen::Vector3f n(h.at.normal_x[k], h.at.normal_y[k], h.at.normal_z[k]);
@@ -181,7 +229,8 @@ void Renderer::shade_row(const LitScene& s, std::span<const Pose> poses, int row
       h.lit |= faces_sun ? 1U << k : 0U;
     }
     if (h.lit != 0) h.lit &= ~s.scene.occluded(shadows);
-    find_albedos(s, middle, radians_per_ray_, h);
+    if (h.lit != 0 && exposing.rover) h.lit &= ~exposing.rover->occluded(shadows, bodies);
+    find_albedos(s, poses.middle, radians_per_ray_, h);
     for (int k = 0; k < kPacket; ++k) {
       const auto i = static_cast<std::size_t>(k);
       const int column = first + k * step;
@@ -190,7 +239,7 @@ void Renderer::shade_row(const LitScene& s, std::span<const Pose> poses, int row
         continue;
       }
       const Eigen::Vector3f n(h.at.normal_x[k], h.at.normal_y[k], h.at.normal_z[k]);
-      const Eigen::Vector3d place = middle + static_cast<double>(h.at.distance[k]) * h.look[i].cast<double>();
+      const Eigen::Vector3d place = poses.middle + static_cast<double>(h.at.distance[k]) * h.look[i].cast<double>();
       const bool rock = h.at.rock[k];
       const double view_factor = s.sky.view_factor(place, n.z());
       const double emission = -n.dot(h.look[i]);
@@ -238,7 +287,12 @@ Image<float> Renderer::filtered(const Image<float>& fine, const ThreadPool& work
   return result;
 }
 
-LuminanceImage Renderer::render(const LitScene& scene, const Poses& world_from_camera, bool split_materials,
+LuminanceImage Renderer::render(const LitScene& scene, const Pose& world_from_camera, bool split_materials,
+                                const ThreadPool& workers) const {
+  return render(scene, at_rest(world_from_camera), split_materials, workers);
+}
+
+LuminanceImage Renderer::render(const LitScene& scene, const Exposing& exposing, bool split_materials,
                                 const ThreadPool& workers) const {
   const std::size_t planes = split_materials ? kMaterials : 1;
   std::array<Image<float>, kMaterials> fine;
@@ -248,7 +302,7 @@ LuminanceImage Renderer::render(const LitScene& scene, const Poses& world_from_c
       Row out;
       out.split = split_materials;
       for (std::size_t m = 0; m < planes; ++m) out.values[m] = fine[m].row(row);
-      shade_row(scene, world_from_camera, row, out);
+      shade_row(scene, exposing, row, out);
     }
   });
   LuminanceImage luminance;
@@ -260,15 +314,14 @@ LuminanceImage Renderer::render(const LitScene& scene, const Poses& world_from_c
   return luminance;
 }
 
-double Renderer::mean_luminance(const LitScene& scene, const Pose& world_from_camera, int step) const {
-  const Poses poses{world_from_camera, world_from_camera, world_from_camera, world_from_camera};
+double Renderer::mean_luminance(const LitScene& scene, const Exposing& exposing, int step) const {
   std::vector<float> values(static_cast<std::size_t>(width_));
   Row row;
   row.values[0] = values.data();
   double sum = 0;
   std::int64_t count = 0;
   for (int j = border_; j < height_ - border_; j += step * sampling_.side) {
-    shade_row(scene, poses, j, row);
+    shade_row(scene, exposing, j, row);
     const int every = sampling_.every_other ? 2 : 1;
     for (int i = sampling_.every_other ? j & 1 : 0; i < width_; i += every) {
       sum += values[static_cast<std::size_t>(i)];

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "spartan/core/image.h"
@@ -13,6 +12,7 @@
 #include "spartan/rig/rig.h"
 #include "spartan/sim/internal/camera/ground_scene.h"
 #include "spartan/sim/internal/camera/light.h"
+#include "spartan/sim/internal/camera/rover_body.h"
 #include "spartan/sim/internal/camera/sky_light.h"
 #include "spartan/sim/internal/world/soil.h"
 
@@ -26,6 +26,35 @@ struct LitScene {
   const Soil& soil;
   double sky_lux = 0;
 };
+
+/// Poses of a frame at kTimes times of the exposure: the middle of each quarter. Rays use them in turn, which gives
+/// motion blur. All are equal where the frame is stationary.
+inline constexpr int kTimes = 4;
+using ExposurePoses = std::array<Pose, kTimes>;
+
+/// Poses while a shutter runs over the rows of an image; both are equal where it opens for all rows at once.
+struct ShutterPoses {
+  ExposurePoses top, bottom;
+  bool rolls = false;
+  /// At a fraction of the image's height, interpolated.
+  ExposurePoses at(double part) const;
+};
+/// The same for the middle of the exposure alone.
+struct ShutterPose {
+  Pose top, bottom;
+  bool rolls = false;
+  Pose at(double part) const;
+};
+
+/// What moves during an exposure: the camera, and the rover where it is visible.
+struct Exposing {
+  ShutterPoses world_from_camera;
+  const RoverBody* rover = nullptr;  ///< borrowed; none: not visible
+  ShutterPoses world_from_body;
+};
+
+/// A camera at rest that does not see the rover.
+Exposing at_rest(const Pose& world_from_camera);
 
 /// What a sample shows; each material has its own colour.
 enum class Material : std::uint8_t { soil, rock, sky };
@@ -54,17 +83,16 @@ struct Sampling {
 class Renderer {
  public:
   static constexpr double kPointSpread_px = 0.5;  ///< px; standard deviation
-  static constexpr int kTimes = 4;                ///< poses across an exposure
 
   Renderer(const Camera& camera, const Sampling& sampling);
 
-  /// The camera's poses at the middle of each quarter of the exposure; rays use them in turn, which gives motion blur.
-  /// All are equal where the camera is stationary.
-  using Poses = std::array<Pose, kTimes>;
-  LuminanceImage render(const LitScene& scene, const Poses& world_from_camera, bool split_materials,
+  LuminanceImage render(const LitScene& scene, const Exposing& exposing, bool split_materials,
+                        const ThreadPool& workers) const;
+  /// The same, at_rest().
+  LuminanceImage render(const LitScene& scene, const Pose& world_from_camera, bool split_materials,
                         const ThreadPool& workers) const;
   /// Mean luminance over every `step`-th row, as an exposure meter measures it.
-  double mean_luminance(const LitScene& scene, const Pose& world_from_camera, int step) const;
+  double mean_luminance(const LitScene& scene, const Exposing& exposing, int step) const;
 
   /// Number of rays of an image.
   std::int64_t rays() const;
@@ -72,7 +100,9 @@ class Renderer {
 
  private:
   struct Row;
-  void shade_row(const LitScene& s, std::span<const Pose> poses, int row, Row& out) const;
+  struct RowPoses;
+  RowPoses poses_of_row(const LitScene& s, const Exposing& exposing, int row) const;
+  void shade_row(const LitScene& s, const Exposing& exposing, int row, Row& out) const;
   Image<float> filtered(const Image<float>& fine, const ThreadPool& workers) const;
 
   Camera camera_;

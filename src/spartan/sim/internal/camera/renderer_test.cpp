@@ -103,7 +103,7 @@ Edge edge_of_horizon(double roll_deg) {
   const Camera camera = pinhole(200, 200, 300);
   const Renderer renderer(camera, Sampling::of(4));
   const Pose pose = looking_down(1, 0, roll_deg);
-  const LuminanceImage image = renderer.render(lit, {pose, pose, pose, pose}, false, workers);
+  const LuminanceImage image = renderer.render(lit, pose, false, workers);
   // Distance of a pixel from the horizon: directions below z = 0 by the dip of the edge of the ground at 120 m.
   const double dip = std::atan2(1.0, GroundScene::kHorizon_m + 1);
   std::vector<std::pair<double, double>> profile;
@@ -178,8 +178,13 @@ double sampled(const FrameImage& image, double x, int y) {
   return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)));
 }
 
-// The right image warped by the true disparity equals the left one, except for the noise of both.
-TEST(TrueDisparity, WarpsRightOntoLeft) {
+// The right image warped by the true disparity against the left one, while the rig moves from the first to the last
+// row. The median of the absolute differences, and what the noise of both images makes of it, in gray levels.
+struct WarpDifference {
+  double median = 0, noise_floor = 0;
+  int both = 0, left_only = 0;
+};
+WarpDifference warp_right_onto_left(const Pose& rig_top_from_bottom) {
   const ThreadPool workers(2);
   const TerrainShape shape({}, 3);
   const RockField rocks({.coverage = 0.1}, 3);
@@ -190,47 +195,70 @@ TEST(TrueDisparity, WarpsRightOntoLeft) {
   const Soil soil({}, 3);
   const LitScene lit{scene, sky, sun, soil, light.sky_lux};
   const Stereo s = parallel_pair(320, 240, 300, 0.1);
-  const Pose left_pose = s.rig.cameras[0].mount_from_camera, right_pose = s.rig.cameras[1].mount_from_camera;
   const SensorOptions sensor{.vignetting = 0};
-  const Renderer left(s.rig.cameras[0], Sampling::of(4)), right(s.rig.cameras[1], Sampling::of(4));
-  const Exposure exposure = choose_exposure(sensor, left.mean_luminance(lit, left_pose, 8));
-  const auto expose = [&](const Renderer& renderer, const Pose& pose, std::uint64_t seed) {
-    return Sensor(sensor, renderer.camera())
-        .expose(renderer.render(lit, {pose, pose, pose, pose}, false, workers), exposure, {}, seed, workers);
+  const bool rolls = rig_top_from_bottom.translation().norm() > 0;
+  const auto pose_of = [&](int camera) {
+    const Pose& pose = s.rig.cameras[static_cast<std::size_t>(camera)].mount_from_camera;
+    return ShutterPose{pose, rig_top_from_bottom * pose, rolls};
   };
-  const FrameImage left_image = expose(left, left_pose, 1), right_image = expose(right, right_pose, 2);
-  const StereoPair& pair = s.rig.pairs[0];
-  const TrueDisparity truth =
-      DisparityTruth(s.rig, s.rig, pair, s.view).of(scene, left_pose, s.rig.right_from_left(pair), workers);
+  const Renderer left(s.rig.cameras[0], Sampling::of(4)), right(s.rig.cameras[1], Sampling::of(4));
+  const Exposure exposure = choose_exposure(sensor, left.mean_luminance(lit, at_rest(pose_of(0).top), 8));
+  const auto expose = [&](const Renderer& renderer, const ShutterPose& pose, std::uint64_t seed) {
+    Exposing exposing;
+    exposing.world_from_camera.rolls = rolls;
+    exposing.world_from_camera.top.fill(pose.top);
+    exposing.world_from_camera.bottom.fill(pose.bottom);
+    return Sensor(sensor, renderer.camera())
+        .expose(renderer.render(lit, exposing, false, workers), exposure, {}, seed, workers);
+  };
+  const FrameImage left_image = expose(left, pose_of(0), 1), right_image = expose(right, pose_of(1), 2);
+  PairPoses poses;
+  poses.world_from_left = pose_of(0);
+  poses.world_from_right = pose_of(1);
+  const TrueDisparity truth = DisparityTruth(s.rig, s.rig, s.rig.pairs[0], s.view).of(scene, poses, workers);
+  WarpDifference result;
   std::vector<double> differences;
-  int both = 0, left_only = 0;
   for (int y = 0; y < 240; ++y) {
     for (int x = 0; x < 320; ++x) {
-      left_only += truth.mask(x, y) == 128 ? 1 : 0;
+      result.left_only += truth.mask(x, y) == 128 ? 1 : 0;
       if (truth.mask(x, y) != 255) continue;
-      ++both;
+      ++result.both;
       const double there = sampled(right_image, x - static_cast<double>(truth.disparity(x, y)), y);
       if (there >= 0) differences.push_back(std::abs(left_image.as<std::uint8_t>()(x, y) - there));
     }
   }
-  EXPECT_GT(both, 320 * 240 / 2);
-  EXPECT_GT(left_only, 1000);
   std::nth_element(differences.begin(), differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2),
                    differences.end());
-  const double median = differences[differences.size() / 2];
+  result.median = differences[differences.size() / 2];
   // Noise of one image at the mean level: shot noise, read noise, quantization. The median of the absolute difference
   // of two images is 0.6745 √2 times it.
   const double electrons = 0.45 * 15000, levels = 255 * (1 - 1.0 / 64) / 15000;
-  const double noise_floor = 0.6745 * std::sqrt(2 * (levels * levels * (electrons + 225) + 1.0 / 12));
-  fmt::print("right warped onto left: median difference {:.3f} gray levels, noise floor {:.3f}\n", median, noise_floor);
-  EXPECT_LT(median, 1.35 * noise_floor);
-  EXPECT_GT(median, 0.5 * noise_floor);
+  result.noise_floor = 0.6745 * std::sqrt(2 * (levels * levels * (electrons + 225) + 1.0 / 12));
+  fmt::print("right warped onto left: median difference {:.3f} gray levels, noise floor {:.3f}\n", result.median,
+             result.noise_floor);
+  return result;
+}
+
+TEST(TrueDisparity, WarpsRightOntoLeft) {
+  const WarpDifference at_rest = warp_right_onto_left({});
+  EXPECT_GT(at_rest.both, 320 * 240 / 2);
+  EXPECT_GT(at_rest.left_only, 1000);
+  EXPECT_LT(at_rest.median, 1.35 * at_rest.noise_floor);
+  EXPECT_GT(at_rest.median, 0.5 * at_rest.noise_floor);
+}
+
+// With a shutter that rolls while the rig drives and turns: rows of both images that are exposed at the same time
+// match.
+TEST(TrueDisparity, HoldsForARollingShutter) {
+  const Pose motion(Eigen::Quaterniond(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitZ())), {0.03, 0.01, 0});
+  const WarpDifference rolling = warp_right_onto_left(motion);
+  EXPECT_LT(rolling.median, 1.35 * rolling.noise_floor);
 }
 
 // A reference renderer without acceleration structure: every triangle, double precision.
 class BruteForce {
  public:
-  BruteForce(const TerrainShape& shape, const std::vector<Rock>& rocks, const Region& region) {
+  BruteForce(const TerrainShape& shape, const std::vector<Rock>& rocks, const Region& region) : shape_(shape) {
     constexpr double kStep = GroundScene::kGrid_m;
     const int nx = static_cast<int>(std::lround((region.x1 - region.x0) / kStep)),
               ny = static_cast<int>(std::lround((region.y1 - region.y0) / kStep));
@@ -275,11 +303,28 @@ class BruteForce {
       if (v < 0 || u + v > 1 || along < nearest || along > hit.distance) continue;
       hit = {along, e1.cross(e2).normalized(), t.rock};
     }
+    if (hit.distance < 1e8 && !hit.rock) hit.normal = ground_normal(from + hit.distance * d);
     if (hit.normal.dot(d) > 0) hit.normal = -hit.normal;
     return hit;
   }
 
  private:
+  // Slopes by central differences at the corners of the cell, and bilinear between them.
+  Eigen::Vector3d ground_normal(const Eigen::Vector3d& at) const {
+    constexpr double kStep = GroundScene::kGrid_m;
+    const double u = at.x() / kStep, v = at.y() / kStep;
+    Eigen::Vector3d normal(0, 0, 1);
+    for (const double j : {std::floor(v), std::floor(v) + 1}) {
+      for (const double i : {std::floor(u), std::floor(u) + 1}) {
+        const double weight = (1 - std::abs(u - i)) * (1 - std::abs(v - j)), x = i * kStep, y = j * kStep;
+        normal.x() -= weight * (shape_.height(x + kStep, y) - shape_.height(x - kStep, y)) / (2 * kStep);
+        normal.y() -= weight * (shape_.height(x, y + kStep) - shape_.height(x, y - kStep)) / (2 * kStep);
+      }
+    }
+    return normal.normalized();
+  }
+
+  const TerrainShape& shape_;
   struct Triangle {
     Eigen::Vector3d a, b, c;
     bool rock;
@@ -305,7 +350,7 @@ TEST(Renderer, AgreesWithABruteForceReference) {
   const Camera camera = pinhole(36, 28, 120);
   const Pose pose(Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX())),
                   Eigen::Vector3d(0, 0, shape.height(0, 0) + 0.6));
-  const LuminanceImage fast = Renderer(camera, Sampling::of(16)).render(lit, {pose, pose, pose, pose}, false, workers);
+  const LuminanceImage fast = Renderer(camera, Sampling::of(16)).render(lit, pose, false, workers);
 
   const BruteForce brute(shape, rocks.rocks_in(region.grown(0.1)), scene.region());
   const double bounce = soil.mean_albedo() * sun.horizontal_lux(0);
@@ -375,9 +420,8 @@ TEST(Renderer, IsBitIdenticalForAnyNumberOfThreads) {
     const Sun sun({});
     const Soil soil({}, 3);
     const Pose pose = looking_down(0.5, 40);
-    images.push_back(std::move(Renderer(camera, Sampling::of(2))
-                                   .render({scene, sky, sun, soil, 5000}, {pose, pose, pose, pose}, false, workers)
-                                   .by_material[0]));
+    images.push_back(std::move(
+        Renderer(camera, Sampling::of(2)).render({scene, sky, sun, soil, 5000}, pose, false, workers).by_material[0]));
   }
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) ASSERT_EQ(images[0](x, y), images[1](x, y)) << x << ", " << y;
@@ -402,6 +446,61 @@ TEST(GroundScene, OverlappingScenesAgree) {
     };
     EXPECT_NEAR(height(a), height(b), 2e-5);
   }
+}
+
+// At a low sun the grid of the ground must not show: the power of the shading at the period of its vertices, over that
+// of the neighbouring frequencies.
+TEST(GroundScene, ItsGridDoesNotShowAtALowSun) {
+  const ThreadPool workers(2);
+  const TerrainShape shape({}, 8);
+  const GroundScene scene(shape, RockField({.coverage = 0, .pebbles_per_m2 = 0}, 8), {0, 0, 2.2, 0.3}, workers);
+  const Sun sun({.sun_elevation_deg = 8, .sun_azimuth_deg = 20, .sun_diameter_deg = 0.35});
+  constexpr double kStep_m = 0.0005;
+  constexpr int kCount = 4000, kLine = 400;  // kLine: index of the frequency 1/kGrid_m
+  const auto wave = [](int k, int i) {
+    const double phase = 2 * std::numbers::pi * k * i / kCount;
+    return std::complex<double>(std::cos(phase), -std::sin(phase));
+  };
+  std::array<double, 41> power{};  // around kLine
+  for (int row = 0; row < 24; ++row) {
+    std::vector<double> shade(kCount);
+    for (int first = 0; first < kCount; first += kPacket) {
+      RayPacket rays, shadows;
+      for (int k = 0; k < kPacket; ++k) {
+        const Eigen::Vector3d from(0.1 + kStep_m * (first + k), 0.02 + 0.0113 * row, 5);
+        rays.set(k, (from - scene.origin()).cast<float>(), -Eigen::Vector3f::UnitZ(), 20);
+      }
+      const HitPacket hits = scene.intersect(rays);
+      for (int t = 0; t < Sun::kPoints; ++t) {
+        for (int k = 0; k < kPacket; ++k) {
+          const Eigen::Vector3f n(hits.normal_x[k], hits.normal_y[k], hits.normal_z[k]);
+          const Eigen::Vector3f place(rays.origin_x[k], rays.origin_y[k], rays.origin_z[k] - hits.distance[k]);
+          shadows.set(k, place + 2e-4F * n, sun.direction(t), n.dot(sun.direction(t)) > 0 ? 20 : -1.0F);
+        }
+        const std::uint32_t dark = scene.occluded(shadows);
+        for (int k = 0; k < kPacket; ++k) {
+          const Eigen::Vector3f n(hits.normal_x[k], hits.normal_y[k], hits.normal_z[k]);
+          if (shadows.max_distance[k] > 0 && (dark >> k & 1U) == 0)
+            shade[static_cast<std::size_t>(first + k)] += static_cast<double>(n.dot(sun.direction(t)));
+        }
+      }
+    }
+    // Hann window, so that low frequencies do not leak into these.
+    for (int i = 0; i < kCount; ++i)
+      shade[static_cast<std::size_t>(i)] *= 0.5 - 0.5 * std::cos(2 * std::numbers::pi * i / kCount);
+    for (int k = 0; k < static_cast<int>(power.size()); ++k) {
+      std::complex<double> sum = 0;
+      for (int i = 0; i < kCount; ++i) sum += shade[static_cast<std::size_t>(i)] * wave(kLine - 20 + k, i);
+      power[static_cast<std::size_t>(k)] += std::norm(sum);
+    }
+  }
+  const double line = std::max({power[19], power[20], power[21]});
+  std::vector<double> around(power.begin(), power.begin() + 17);
+  around.insert(around.end(), power.begin() + 24, power.end());
+  std::nth_element(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2), around.end());
+  fmt::print("shading at 8 degrees: power at the grid's period over its surroundings {:.2f}\n",
+             line / around[around.size() / 2]);
+  EXPECT_LT(line, 3 * around[around.size() / 2]);
 }
 
 }  // namespace

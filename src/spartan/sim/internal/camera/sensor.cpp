@@ -1,12 +1,14 @@
 #include "spartan/sim/internal/camera/sensor.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include "spartan/image_io/image_io.h"
 #include "spartan/numerics/random.h"
+#include "spartan/sim/internal/camera/compression.h"
 
 namespace spartan::sim::internal {
 namespace {
@@ -69,13 +71,33 @@ class Dust {
   std::array<Speck, 14> specks_;
 };
 
-// The image as a JPEG file of it is read again.
-FrameImage compressed(const FrameImage& image, int quality) {
-  const auto file = encode_jpeg(image.as<std::uint8_t>(), quality);
-  return decode_image(file.value(), "JPEG").value().with_format(image.format());
+// Relative illumination of the lens at the cosine of a field angle.
+double illumination(double cosine, double vignetting) {
+  return std::pow(std::max(0.0, cosine), 4 * vignetting);
 }
 
 }  // namespace
+
+Vignetting fitted_vignetting(const Camera& camera, double vignetting) {
+  constexpr int kSide = 24;  // places along each edge of the image
+  const Eigen::Vector2d centre = project(camera.model, Eigen::Vector3d::UnitZ()).value();
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  const double half_diagonal_squared = 0.25 * Eigen::Vector2d(camera.size.width, camera.size.height).squaredNorm();
+  for (int j = 0; j <= kSide; ++j) {
+    for (int i = 0; i <= kSide; ++i) {
+      const Eigen::Vector2d pixel(i * (camera.size.width - 1.0) / kSide, j * (camera.size.height - 1.0) / kSide);
+      const auto ray = unproject(camera.model, pixel);
+      if (!ray) continue;
+      const double r = (pixel - centre).squaredNorm() / half_diagonal_squared;
+      const Eigen::Vector3d powers(r, r * r, r * r * r);
+      normal += powers * powers.transpose();
+      right += powers * (illumination(ray->direction.z(), vignetting) - 1);
+    }
+  }
+  const Eigen::Vector3d coefficients = normal.ldlt().solve(right);
+  return {{coefficients[0], coefficients[1], coefficients[2]}, centre};
+}
 
 double electrons_per_second(const SensorOptions& s) {
   const double lux = std::numbers::pi * s.transmission / (4 * s.f_number * s.f_number);
@@ -101,8 +123,7 @@ Sensor::Sensor(const SensorOptions& options, const Camera& camera, const SensorI
     Random random(identity.pattern_seed, kPatternStream + static_cast<std::uint64_t>(y));
     for (int x = 0; x < camera.size.width; ++x) {
       const auto ray = unproject(camera.model, Eigen::Vector2d(x, y));
-      response_(x, y) =
-          ray ? static_cast<float>(std::pow(std::max(0.0, ray->direction.z()), 4 * options.vignetting)) : 0.0F;
+      response_(x, y) = ray ? static_cast<float>(illumination(ray->direction.z(), options.vignetting)) : 0.0F;
       const double pattern = 1 + 0.01 * random.normal(0, options.pixel_response_percent);
       response_(x, y) *= static_cast<float>(identity.gain * std::max(0.0, pattern));
       if (!has_dark_levels) continue;
@@ -169,8 +190,9 @@ FrameImage Sensor::expose(const LuminanceImage& luminance, const Exposure& expos
   const auto [w, h] = camera_.size;
   if (format.bits > 8) return develop(Image<std::uint16_t>(w, h));
   const FrameImage image = develop(Image<std::uint8_t>(w, h));
-  return options_.jpeg_quality > 0 && format.layout == PixelLayout::gray ? compressed(image, options_.jpeg_quality)
-                                                                         : image;
+  if (format.layout != PixelLayout::gray) return image;
+  if (options_.wavelet_bits > 0) return compressed_by_wavelets(image, options_.wavelet_bits);
+  return options_.jpeg_quality > 0 ? compressed_by_jpeg(image, options_.jpeg_quality) : image;
 }
 
 Image<float> Sensor::noise_free(const LuminanceImage& luminance, const Exposure& exposure) const {

@@ -27,6 +27,10 @@ double electrons_per_second(const SensorOptions& sensor);
 /// up to its limit.
 Exposure choose_exposure(const SensorOptions& sensor, double mean_luminance);
 
+/// The vignetting of the lens as a rig states it: the polynomial that fits SensorOptions::vignetting best over the
+/// image.
+Vignetting fitted_vignetting(const Camera& camera, double vignetting);
+
 /// Fault of one image.
 struct ImageFault {
   double light_factor = 1;  ///< on all light; 0: dark
@@ -46,7 +50,7 @@ class Sensor {
   Sensor(const SensorOptions& options, const Camera& camera, const SensorIdentity& identity = {});
 
   /// The image in the camera's pixel format: signal, shot noise, read noise, row noise, fixed pattern, full well, gain,
-  /// quantization, and the losses of JPEG. The noise depends on seed and pixel alone.
+  /// quantization, and the losses of compression. The noise depends on seed and pixel alone.
   FrameImage expose(const LuminanceImage& luminance, const Exposure& exposure, const ImageFault& fault,
                     std::uint64_t seed, const ThreadPool& workers) const;
   /// The same without noise and quantization: gray levels above black, for measurements.

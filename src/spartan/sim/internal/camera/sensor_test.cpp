@@ -5,7 +5,10 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
+
+#include "spartan/numerics/random.h"
 
 namespace spartan::sim::internal {
 namespace {
@@ -233,6 +236,55 @@ TEST(Sensor, JpegLosesFineDetail) {
     EXPECT_GT(squares, before) << quality;
     EXPECT_NEAR(moments(lossy).mean, moments(lossless).mean, 0.5);
     before = squares;
+  }
+}
+
+// A textured image: noise of several pixels and an edge.
+LuminanceImage textured(const Camera& camera) {
+  LuminanceImage image = uniform(camera, 1000);
+  Random random(5, 1);
+  for (int y = 0; y < camera.size.height; ++y) {
+    for (int x = 0; x < camera.size.width; ++x) {
+      const double wave = std::sin(0.7 * x) * std::cos(0.45 * y) + (x > 60 ? 1.5 : 0);
+      image.by_material[0](x, y) *= static_cast<float>(1 + 0.2 * wave + 0.05 * random.normal());
+    }
+  }
+  return image;
+}
+
+double rms_difference(const FrameImage& a, const FrameImage& b) {
+  double squares = 0;
+  for (int y = 0; y < a.height(); ++y) {
+    for (int x = 0; x < a.width(); ++x) squares += std::pow(level(a, x, y) - level(b, x, y), 2);
+  }
+  return std::sqrt(squares / (static_cast<double>(a.width()) * a.height()));
+}
+
+TEST(Sensor, FewerBitsOfTheWaveletsLoseMore) {
+  const Camera camera = camera_of(128, 96);
+  const LuminanceImage luminance = textured(camera);
+  const auto expose = [&](double bits) {
+    return Sensor({.wavelet_bits = bits}, camera).expose(luminance, {0.0005, 1}, {}, 1, ThreadPool(1));
+  };
+  const FrameImage lossless = expose(0);
+  const double fine = rms_difference(expose(3), lossless), coarse = rms_difference(expose(0.5), lossless);
+  EXPECT_GT(fine, 0.05);
+  EXPECT_GT(coarse, 2 * fine);
+  EXPECT_LT(coarse, 30);
+  const FrameImage jpeg =
+      Sensor({.jpeg_quality = 60, .wavelet_bits = 3}, camera).expose(luminance, {0.0005, 1}, {}, 1, ThreadPool(1));
+  EXPECT_EQ(rms_difference(jpeg, expose(3)), 0) << "wavelets instead of JPEG";
+}
+
+TEST(Sensor, StatedVignettingIsThatOfTheImages) {
+  const Camera camera = camera_of(240, 180);
+  const SensorOptions options{.vignetting = 1, .read_noise_e = 0, .black_level = 0};
+  const Image<float> image = Sensor(options, camera).noise_free(uniform(camera, 1000), {0.001, 1});
+  const Vignetting stated = fitted_vignetting(camera, options.vignetting);
+  const double centre = static_cast<double>(image(120, 90)), half_diagonal_squared = 0.25 * (240 * 240 + 180 * 180);
+  for (const auto& [x, y] : {std::pair{0, 0}, std::pair{239, 0}, std::pair{60, 150}, std::pair{119, 20}}) {
+    const double r = (Eigen::Vector2d(x, y) - *stated.centre_px).squaredNorm() / half_diagonal_squared;
+    EXPECT_NEAR(stated.relative_illumination(r), static_cast<double>(image(x, y)) / centre, 0.003) << x << ' ' << y;
   }
 }
 

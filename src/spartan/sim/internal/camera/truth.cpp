@@ -19,6 +19,11 @@ bool is_inside(const Eigen::Vector2d& pixel, ImageSize size) {
   return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < size.width - 0.5 && pixel.y() < size.height - 0.5;
 }
 
+// A row as a fraction of the image's height.
+double row_part(double row, ImageSize size) {
+  return std::clamp((row + 0.5) / size.height, 0.0, 1.0);
+}
+
 }  // namespace
 
 DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, const StereoPair& pair,
@@ -30,6 +35,7 @@ DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, cons
   const Camera& nominal_left = *nominal_rig.find_camera(pair.left);
   const auto [w, h] = view.geometry.size;
   directions_.assign(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), Eigen::Vector3f(0, 0, 0));
+  row_parts_.assign(directions_.size(), 0.0F);
   for (int v = 0; v < h; ++v) {
     for (int u = 0; u < w; ++u) {
       const Eigen::Vector3d rectified((u - view.geometry.centre_px.x()) / view.geometry.focal_px,
@@ -37,40 +43,58 @@ DisparityTruth::DisparityTruth(const Rig& true_rig, const Rig& nominal_rig, cons
       const auto recorded = project(nominal_left.model, view.left_from_rectified * rectified);
       if (!recorded || !is_inside(*recorded, true_left.size)) continue;
       const auto ray = unproject(true_left.model, *recorded);
-      if (ray) {
-        directions_[static_cast<std::size_t>(v) * static_cast<std::size_t>(w) + static_cast<std::size_t>(u)] =
-            ray->direction.cast<float>();
-      }
+      if (!ray) continue;
+      const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(w) + static_cast<std::size_t>(u);
+      directions_[at] = ray->direction.cast<float>();
+      row_parts_[at] = static_cast<float>(row_part(recorded->y(), true_left.size));
     }
   }
 }
 
-void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_left, const Pose& right_from_left,
-                              int row, TrueDisparity& truth) const {
+std::optional<Eigen::Vector2d> DisparityTruth::right_pixel(const PairPoses& poses, const Eigen::Vector3d& point) const {
+  const auto pixel_at = [&](double part) {
+    return project(true_right_.model, poses.world_from_right.at(part).inverse() * point);
+  };
+  auto pixel = pixel_at(0.5);
+  // The row depends on the pose and the pose on the row; the camera moves little between rows.
+  constexpr int kSteps = 3;
+  for (int step = 0; poses.world_from_right.rolls && pixel && step < kSteps; ++step)
+    pixel = pixel_at(row_part(pixel->y(), true_right_.size));
+  return pixel;
+}
+
+void DisparityTruth::fill_row(const GroundScene& scene, const PairPoses& poses, int row, TrueDisparity& truth) const {
   const int w = view_.geometry.size.width;
-  const Pose world_from_right = world_from_left * right_from_left.inverse();
-  const Eigen::Matrix3f rotation = world_from_left.rotation_matrix().cast<float>();
-  const Eigen::Vector3f left_centre = (world_from_left.translation() - scene.origin()).cast<float>();
-  const Eigen::Vector3f right_centre = (world_from_right.translation() - scene.origin()).cast<float>();
   for (int first = 0; first < w; first += kPacket) {
     RayPacket rays, back;
-    std::array<Eigen::Vector3f, kPacket> directions;
+    RoverBody::Poses bodies{};
+    std::array<Pose, kPacket> left, body_from_origin;
     for (int k = 0; k < kPacket; ++k) {
+      const auto i = static_cast<std::size_t>(k);
       const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(w) +
                              static_cast<std::size_t>(std::min(first + k, w - 1));
-      directions[static_cast<std::size_t>(k)] = directions_[at];
+      const double part = static_cast<double>(row_parts_[at]);
+      left[i] = poses.world_from_left.at(part);
+      if (poses.rover) {
+        body_from_origin[i] = poses.world_from_body.at(part).inverse() * Pose::from_translation(scene.origin());
+        bodies[i] = &body_from_origin[i];
+      }
       const bool valid = first + k < w && directions_[at].z() != 0;
-      rays.set(k, left_centre, rotation * directions_[at], valid ? kFarthestTruth_m : -1.0F);
+      rays.set(k, (left[i].translation() - scene.origin()).cast<float>(),
+               left[i].rotation().cast<float>() * directions_[at], valid ? kFarthestTruth_m : -1.0F);
     }
-    const HitPacket hits = scene.intersect(rays);
-    std::array<float, kPacket> disparity{};
+    HitPacket hits = scene.intersect(rays);
+    std::array<float, kPacket> disparity{}, rover{};
+    if (poses.rover) rover = poses.rover->intersect(rays, bodies, hits);
     for (int k = 0; k < kPacket; ++k) {
       const auto i = static_cast<std::size_t>(k);
       disparity[i] = kNaN;
-      back.set(k, left_centre, Eigen::Vector3f::UnitZ(), -1.0F);
-      if (rays.max_distance[k] < 0 || !std::isfinite(hits.distance[k])) continue;
-      const Eigen::Vector3d in_left = static_cast<double>(hits.distance[k]) * directions[i].cast<double>();
-      const auto recorded = project(true_right_.model, right_from_left * in_left);
+      back.set(k, Eigen::Vector3f::Zero(), Eigen::Vector3f::UnitZ(), -1.0F);
+      if (rays.max_distance[k] < 0 || !std::isfinite(hits.distance[k]) || rover[i] > 0) continue;
+      const Eigen::Vector3f along(rays.direction_x[k], rays.direction_y[k], rays.direction_z[k]);
+      const Eigen::Vector3d place =
+          left[i].translation() + static_cast<double>(hits.distance[k]) * along.cast<double>();
+      const auto recorded = right_pixel(poses, place);
       if (!recorded) continue;
       const auto nominal = unproject(nominal_right_.model, *recorded);
       if (!nominal) continue;
@@ -78,12 +102,13 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
       const double u = view_.geometry.focal_px * rectified.x() / rectified.z() + view_.geometry.centre_px.x();
       disparity[i] = static_cast<float>(first + k - u);
       if (!is_inside(*recorded, true_right_.size)) continue;
-      const Eigen::Vector3f place = left_centre + hits.distance[k] * Eigen::Vector3f(rotation * directions[i]);
-      const Eigen::Vector3f to_point = place - right_centre;
+      const Eigen::Vector3d centre = poses.world_from_right.at(row_part(recorded->y(), true_right_.size)).translation();
+      const Eigen::Vector3f to_point = (place - centre).cast<float>();
       const float distance = to_point.norm();
-      back.set(k, right_centre, to_point / distance, distance - kGroundOffset_m);
+      back.set(k, (centre - scene.origin()).cast<float>(), to_point / distance, distance - kGroundOffset_m);
     }
-    const std::uint32_t hidden = scene.occluded(back);
+    std::uint32_t hidden = scene.occluded(back);
+    if (poses.rover) hidden |= poses.rover->occluded(back, bodies);
     for (int k = 0; k < kPacket && first + k < w; ++k) {
       const float d = disparity[static_cast<std::size_t>(k)];
       const bool known = std::isfinite(d) && d > 0;
@@ -94,12 +119,11 @@ void DisparityTruth::fill_row(const GroundScene& scene, const Pose& world_from_l
   }
 }
 
-TrueDisparity DisparityTruth::of(const GroundScene& scene, const Pose& world_from_left, const Pose& right_from_left,
-                                 const ThreadPool& workers) const {
+TrueDisparity DisparityTruth::of(const GroundScene& scene, const PairPoses& poses, const ThreadPool& workers) const {
   const auto [w, h] = view_.geometry.size;
   TrueDisparity truth{Image<float>(w, h), Image<std::uint8_t>(w, h)};
   workers.parallel_for(0, h, 8, [&](int from, int to) {
-    for (int row = from; row < to; ++row) fill_row(scene, world_from_left, right_from_left, row, truth);
+    for (int row = from; row < to; ++row) fill_row(scene, poses, row, truth);
   });
   return truth;
 }
@@ -162,7 +186,7 @@ Image<float> classify_ground(const GroundMap& map, double obstacle_m, double cav
   Image<float> kinds(w, h, 1.0F);
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
-      if (map.surface(x, y) - map.ground(x, y) > obstacle_m) {
+      if (map.surface(x, y) - map.level(x, y) > obstacle_m) {
         kinds(x, y) = 2;
       } else if (map.level(x, y) - map.surface(x, y) > cavity_m) {
         kinds(x, y) = 3;

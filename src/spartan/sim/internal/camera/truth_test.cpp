@@ -97,8 +97,9 @@ TEST(GroundMap, CavitiesAreBelowTheLevel) {
   EXPECT_EQ(classed, deep);
 }
 
-// Cells of bare ground, a low and a high rock, a shallow and a deep cavity, a high and a low rock in a cavity.
-TEST(GroundMap, ClassesFollowHeightAboveGroundAndDepthBelowLevel) {
+// Cells of bare ground, a low and a high rock, a shallow and a deep cavity, and rocks in a cavity: below the level of
+// the ground around it, and above it.
+TEST(GroundMap, ClassesFollowHeightAboveAndDepthBelowTheLevel) {
   GroundMap map;
   for (Image<float>* image : {&map.surface, &map.ground, &map.level}) *image = Image<float>(7, 1);
   const auto cell = [&](int i, float surface, float ground, float level) {
@@ -112,9 +113,9 @@ TEST(GroundMap, ClassesFollowHeightAboveGroundAndDepthBelowLevel) {
   cell(3, 4.81F, 4.81F, 5.0F);
   cell(4, 4.79F, 4.79F, 5.0F);
   cell(5, 4.91F, 4.79F, 5.0F);
-  cell(6, 4.85F, 4.79F, 5.0F);
+  cell(6, 5.12F, 4.79F, 5.0F);
   const Image<float> kinds = classify_ground(map, 0.1, 0.2);
-  const std::vector<float> expected{1, 1, 2, 1, 3, 2, 1};
+  const std::vector<float> expected{1, 1, 2, 1, 3, 1, 2};
   for (int i = 0; i < 7; ++i) EXPECT_EQ(kinds(i, 0), expected[static_cast<std::size_t>(i)]) << i;
 }
 

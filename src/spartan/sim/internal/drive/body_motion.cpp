@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 namespace spartan::sim::internal {
 namespace {
@@ -43,13 +44,52 @@ Vector6d fit_to_ground(const WheelGround& ground, const ChassisOptions& chassis,
   return result;
 }
 
+namespace {
+
+// Uphill slope (rise over run) of the plane under a body in the directions of its heading and to the left of it.
+Eigen::Vector2d slopes_under(const Vector6d& body) {
+  return {-std::tan(body[4]), std::tan(body[3]) / std::cos(body[4])};
+}
+
+// Where the rover is off its path by creep: at rest it moves downhill, driving it steers back within kReturn_m.
+std::vector<Eigen::Vector2d> creep_offsets(const std::vector<PlanarPose>& path, const std::vector<Vector6d>& bodies,
+                                           double creep_m_s) {
+  constexpr double kReturn_m = 2, kAtRest_m_s = 1e-3;
+  std::vector<Eigen::Vector2d> offsets(path.size(), Eigen::Vector2d::Zero());
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const PlanarPose &before = path[i - 1], &here = path[i];
+    const double step_m = std::hypot(here.x - before.x, here.y - before.y);
+    offsets[i] = offsets[i - 1] * std::exp(-step_m / kReturn_m);
+    if (step_m > kAtRest_m_s * BodyMotion::kKnot_s) continue;
+    const Eigen::Vector2d uphill = Eigen::Rotation2Dd(here.heading) * slopes_under(bodies[i]);
+    offsets[i] -= creep_m_s * BodyMotion::kKnot_s * uphill;
+  }
+  return offsets;
+}
+
+}  // namespace
+
 BodyMotion::BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis,
-                       const ThreadPool& workers)
+                       const ThreadPool& workers, const WheelOptions& wheels)
     : knots_(static_cast<std::size_t>(std::ceil(drive.seconds() / kKnot_s)) + 1) {
-  workers.parallel_for(0, static_cast<int>(knots_.size()), 256, [&](int from, int to) {
-    for (int i = from; i < to; ++i)
-      knots_[static_cast<std::size_t>(i)] = fit_to_ground(ground, chassis, drive.at(i * kKnot_s));
-  });
+  std::vector<PlanarPose> path(knots_.size());
+  for (std::size_t i = 0; i < path.size(); ++i) path[i] = drive.at(static_cast<double>(i) * kKnot_s);
+  const auto fit_all = [&] {
+    workers.parallel_for(0, static_cast<int>(knots_.size()), 256, [&](int from, int to) {
+      for (auto i = static_cast<std::size_t>(from); i < static_cast<std::size_t>(to); ++i)
+        knots_[i] = fit_to_ground(ground, chassis, path[i]);
+    });
+  };
+  fit_all();
+  if (wheels.creep_m_s == 0 && wheels.side_slip == 0) return;
+  const std::vector<Eigen::Vector2d> offsets = creep_offsets(path, knots_, wheels.creep_m_s);
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    path[i].x += offsets[i].x();
+    path[i].y += offsets[i].y();
+    // Heading uphill of the path by the angle at which it slips downhill keeps the rover on the path.
+    path[i].heading += std::atan(wheels.side_slip * slopes_under(knots_[i]).y());
+  }
+  fit_all();
 }
 
 // Uniform cubic B-spline of the four knots around the time, or its derivative.

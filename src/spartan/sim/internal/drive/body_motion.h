@@ -10,6 +10,7 @@
 #include "spartan/sim/internal/world/terrain_shape.h"
 #include "spartan/sim/scenario.h"
 #include "spartan/sim/scenario_options.h"
+#include "spartan/sim/sensor_options.h"
 
 namespace spartan::sim::internal {
 
@@ -26,8 +27,10 @@ struct WheelGround {
 class BodyMotion {
  public:
   static constexpr double kKnot_s = 0.1;  ///< s; spacing of the knots
-  /// Borrows nothing: `ground` is used during construction only.
-  BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis, const ThreadPool& workers);
+  /// Borrows nothing: `ground` is used during construction only. Of `wheels` the slip that moves the body: side slip
+  /// and creep.
+  BodyMotion(const Drive& drive, const WheelGround& ground, const ChassisOptions& chassis, const ThreadPool& workers,
+             const WheelOptions& wheels = {});
 
   Pose world_from_body(double time_s) const;
   Eigen::Vector3d velocity(double time_s) const;          ///< m/s, world

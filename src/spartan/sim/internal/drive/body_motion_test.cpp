@@ -230,5 +230,65 @@ TEST(Compass, MeasuresTheHeadingWithItsErrors) {
   EXPECT_NEAR(outliers, 0.5 * static_cast<double>(wild.size()), 0.2 * static_cast<double>(wild.size()));
 }
 
+TerrainShapeOptions slope_to_the_left() {
+  TerrainShapeOptions plane;
+  plane.relief_m = plane.ripple_height_m = plane.dune_height_m = 0;
+  plane.slope_deg = 15;
+  plane.slope_heading_deg = 90;
+  return plane;
+}
+
+TEST(BodyMotion, SideSlipTurnsTheHeadingUphillAndKeepsThePath) {
+  const auto drive = Drive::plan({.kind = PathKind::straight, .length_m = 3}, {}, Rig());
+  const TerrainShape shape(slope_to_the_left(), 4);
+  const WheelOptions slipping{.side_slip = 0.4};
+  const BodyMotion motion(*drive, {shape, WheelLift()}, {}, ThreadPool(1), slipping);
+  const double crab = std::atan(0.4 * std::tan(15 * std::numbers::pi / 180));
+  for (double t = 4; t < motion.seconds() - 3; t += 5) {
+    EXPECT_NEAR(motion.roll_pitch_yaw(t).z(), crab, 0.002);
+    const Eigen::Vector3d v = motion.velocity(t);
+    EXPECT_NEAR(v.y(), 0, 1e-4) << "along the path";
+    EXPECT_NEAR((motion.world_from_body(t).rotation().conjugate() * v).y(), -v.norm() * std::sin(crab), 2e-3)
+        << "sideways, downhill";
+  }
+}
+
+TEST(BodyMotion, CreepsDownhillAtRestAndComesBackToThePath) {
+  PathOptions path{.kind = PathKind::straight, .length_m = 12};
+  path.initial_stop_s = 20;
+  const auto drive = Drive::plan(path, {}, Rig());
+  const TerrainShape shape(slope_to_the_left(), 4);
+  const BodyMotion motion(*drive, {shape, WheelLift()}, {}, ThreadPool(1), {.creep_m_s = 0.002});
+  const double rate = 0.002 * std::tan(15 * std::numbers::pi / 180);
+  const auto left_m = [&](double t) { return motion.world_from_body(t).translation().y(); };
+  EXPECT_NEAR(left_m(15) - left_m(5), -10 * rate, 1e-4);
+  EXPECT_LT(left_m(20), -0.009);
+  EXPECT_NEAR(left_m(motion.seconds() - 1), 0, 5e-4);
+}
+
+TEST(Wheels, SkidMakesThemRollMoreInTurnsAlone) {
+  const auto rolled = [](const PathOptions& path, double skid) {
+    const auto drive = Drive::plan(path, {}, Rig());
+    TerrainShapeOptions level = slope_to_the_left();
+    level.slope_deg = 0;
+    const TerrainShape shape(level, 4);
+    const BodyMotion motion(*drive, {shape, WheelLift()}, {}, ThreadPool(1));
+    const WheelOptions wheels{.slip_level = 0, .slip_sand = 0, .turn_skid = skid, .radius_error = 0, .resolution_m = 0};
+    return measure_wheels(motion, {}, wheels, {}, 1).back();
+  };
+  const PathOptions straight{.kind = PathKind::straight, .length_m = 2},
+      turn{.kind = PathKind::turn_in_place, .turn_deg = 90};
+  EXPECT_NEAR(rolled(straight, 0.2).right_m, rolled(straight, 0).right_m, 1e-9);
+  EXPECT_NEAR(rolled(turn, 0.2).right_m, 1.2 * rolled(turn, 0).right_m, 1e-6);
+  EXPECT_NEAR(rolled(turn, 0).right_m, std::numbers::pi / 2 * 0.3, 1e-3);
+}
+
+TEST(Drive, CanBeginWithoutRest) {
+  PathOptions path{.kind = PathKind::straight, .length_m = 1};
+  const double with_rest = Drive::plan(path, {}, Rig())->seconds();
+  path.initial_stop_s = 0;
+  EXPECT_NEAR(Drive::plan(path, {}, Rig())->seconds(), with_rest - 2, 1e-9);
+}
+
 }  // namespace
 }  // namespace spartan::sim::internal

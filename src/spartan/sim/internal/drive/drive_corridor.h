@@ -8,12 +8,13 @@
 
 namespace spartan::sim::internal {
 
-/// The points within a distance of the track.
+/// The points within a distance of the track, or of a line beside it.
 class DriveCorridor {
  public:
   /// An empty corridor.
   DriveCorridor() = default;
-  DriveCorridor(const std::vector<PlanarPose>& track, double half_width_m);
+  /// `left_m`: of the corridor's middle from the track; negative to the right.
+  DriveCorridor(const std::vector<PlanarPose>& track, double half_width_m, double left_m = 0);
 
   /// Whether a disc overlaps the corridor.
   bool intersects_disc(double x, double y, double radius_m) const;

@@ -18,6 +18,9 @@ constexpr double kCell_m = 2;                            // rocks are drawn per 
 constexpr std::array<double, 2> kBorders_m{0.04, 0.15};  // diameters that separate the strata
 constexpr double kSmallestPebble_m = 0.004;
 constexpr double kMaxElongation = 1.6;  // length over width
+constexpr double kBuriedHeight = 0.4;   // height of buried rocks over that of others
+constexpr int kFewestLayers = 3;
+constexpr std::uint32_t kLayerChoices = 5;  // from kFewestLayers on
 
 double density(double coverage, double q, double diameter) {
   return coverage * q * std::exp(-q * diameter) * 4 / (std::numbers::pi * diameter * diameter);
@@ -92,8 +95,7 @@ void RockField::add_stratum(double from_m, double to_m, std::uint64_t stream) {
 }
 
 void RockField::clear_corridor(DriveCorridor corridor, double clearance_m) {
-  corridor_ = std::move(corridor);
-  clearance_m_ = clearance_m;
+  corridors_.push_back({std::move(corridor), clearance_m});
 }
 
 double RockField::Stratum::diameter_at(double count_fraction) const {
@@ -105,9 +107,13 @@ double RockField::Stratum::diameter_at(double count_fraction) const {
   return diameter_of_step(from_m, to_m, static_cast<double>(i) + std::clamp(part, 0.0, 1.0));
 }
 
-bool RockField::blocks_corridor(const Rock& rock) const {
-  return rock.height_m > clearance_m_ &&
-         corridor_.intersects_disc(rock.x, rock.y, 0.5 * rock.diameter_m * std::sqrt(kMaxElongation) * 1.1);
+bool RockField::is_removed(const Rock& rock) const {
+  const double reach_m = 0.5 * rock.diameter_m * std::sqrt(kMaxElongation) * 1.1;
+  const auto blocks = [&](const ClearedCorridor& c) {
+    return rock.height_m > c.clearance_m && c.corridor.intersects_disc(rock.x, rock.y, reach_m);
+  };
+  return std::any_of(corridors_.begin(), corridors_.end(), blocks) ||
+         (!cover_.none() && rock.height_m < cover_.dust_depth(rock.x, rock.y));
 }
 
 void RockField::append_cell(const Stratum& stratum, std::int32_t i, std::int32_t j, std::vector<Rock>& rocks) const {
@@ -124,6 +130,13 @@ void RockField::append_cell(const Stratum& stratum, std::int32_t i, std::int32_t
     rock.turn_rad = random.uniform(0, 2 * std::numbers::pi);
     rock.elongation = random.uniform(1, kMaxElongation);
     rock.shape = random.next();
+    // Drawn from the seed of the shape, so that these fractions change no other rock.
+    if (hash_fraction(1, 0, rock.shape) < options_.buried_fraction) {
+      rock.buried = true;
+      rock.height_m *= kBuriedHeight;
+    }
+    if (hash_fraction(2, 0, rock.shape) < options_.layered_fraction)
+      rock.layers = kFewestLayers + static_cast<int>(hash_coordinates(3, 0, rock.shape) % kLayerChoices);
     rocks.push_back(rock);
   }
 }
@@ -139,7 +152,7 @@ std::vector<Rock> RockField::rocks_in(const Region& region, double smallest_m) c
         append_cell(stratum, i, j, here);
         std::copy_if(here.begin(), here.end(), std::back_inserter(found), [&](const Rock& rock) {
           return rock.x >= region.x0 && rock.x < region.x1 && rock.y >= region.y0 && rock.y < region.y1 &&
-                 !blocks_corridor(rock);
+                 !is_removed(rock);
         });
       }
     }

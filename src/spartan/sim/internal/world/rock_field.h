@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "spartan/sim/internal/drive/drive_corridor.h"
+#include "spartan/sim/internal/world/ground_cover.h"
 #include "spartan/sim/internal/world/region.h"
 #include "spartan/sim/scenario_options.h"
 
@@ -19,11 +21,13 @@ double golombek_count_per_m2(double coverage, double from_m, double to_m);
 
 struct Rock {
   double x = 0, y = 0;      ///< m, world
-  double diameter_m = 0;    ///< mean horizontal extent
+  double diameter_m = 0;    ///< of the circle with the area that the rock covers, seen from above
   double height_m = 0;      ///< above the ground
   double turn_rad = 0;      ///< rotation about the vertical
   double elongation = 1;    ///< length over width
   std::uint32_t shape = 0;  ///< seed of the shape
+  bool buried = false;      ///< only its top shows
+  int layers = 0;           ///< that stand out; 0: none
 };
 
 /// A random, infinite field of rocks. They are drawn in strata of size, so that distant views need not generate the
@@ -33,8 +37,10 @@ class RockField {
   RockField(const RockFieldOptions& options, std::uint64_t seed);
   static constexpr double kLargestPebble_m = 0.01;  ///< m; diameter of the pebbles besides the model
 
-  /// Removes rocks higher than `clearance_m` that reach into the corridor.
+  /// Removes rocks higher than `clearance_m` that reach into the corridor. Of several calls each removes rocks.
   void clear_corridor(DriveCorridor corridor, double clearance_m);
+  /// Removes rocks lower than the dust at their place.
+  void bury_under_dust(GroundCover cover) { cover_ = std::move(cover); }
 
   /// Rocks whose centre lies in the region; strata without rocks above `smallest_m` are skipped. A rock is the same
   /// whatever region is queried.
@@ -50,13 +56,17 @@ class RockField {
   };
   void add_stratum(double from_m, double to_m, std::uint64_t stream);
   void append_cell(const Stratum& stratum, std::int32_t i, std::int32_t j, std::vector<Rock>& rocks) const;
-  bool blocks_corridor(const Rock& rock) const;
+  bool is_removed(const Rock& rock) const;
 
   RockFieldOptions options_;
   std::uint64_t seed_ = 0;
   std::vector<Stratum> strata_;
-  DriveCorridor corridor_;
-  double clearance_m_ = 0;
+  struct ClearedCorridor {
+    DriveCorridor corridor;
+    double clearance_m;
+  };
+  std::vector<ClearedCorridor> corridors_;
+  GroundCover cover_;
 };
 
 }  // namespace spartan::sim::internal

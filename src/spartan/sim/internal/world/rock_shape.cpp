@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
 
 #include "spartan/numerics/gradient_noise.h"
@@ -12,8 +13,11 @@
 namespace spartan::sim::internal {
 namespace {
 
-constexpr double kCentreHeight = 0.08;  // of the centre above the ground, over the height of the rock
-constexpr int kPlanes = 14;             // random cutting planes
+// Height of the ground at the rock over that of its top, both above the rock's centre.
+constexpr float kGround = -0.087F;
+constexpr float kGroundIfBuried = 0.4F;
+constexpr float kLayerStep = 0.14F;  // by how much a layer stands out over the one below, over the radius
+constexpr int kPlanes = 14;          // random cutting planes
 
 TriangleMesh icosahedron() {
   const float g = 1.6180340F;
@@ -110,29 +114,89 @@ class RockSurface {
   std::array<NoiseSum, 3> rough_;
 };
 
+// The outline of what stands above the ground, seen from above: its distance from the centre in each direction. Edges
+// of the mesh cross directions at exact points.
+class Outline {
+ public:
+  void add_triangle(const std::array<Eigen::Vector3f, 3>& corners, float ground) {
+    std::array<Eigen::Vector3f, 2> cut;  // the ends of the line in which the ground cuts the triangle
+    std::size_t cuts = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      Eigen::Vector3f from = corners[k], to = corners[(k + 1) % 3];
+      if (from.z() > to.z()) std::swap(from, to);
+      if (to.z() <= ground) continue;
+      if (from.z() < ground) {
+        from += (ground - from.z()) / (to.z() - from.z()) * (to - from);
+        if (cuts < 2) cut[cuts++] = from;
+      }
+      add_edge(from, to);
+    }
+    if (cuts == 2) add_edge(cut[0], cut[1]);
+  }
+  double area() const {
+    double sum = 0;
+    for (std::size_t i = 0; i < radii_.size(); ++i) sum += radii_[i] * radii_[(i + 1) % radii_.size()];
+    return 0.5 * std::sin(2 * std::numbers::pi / kDirections) * sum;
+  }
+
+ private:
+  static constexpr int kDirections = 96;
+  void add_edge(const Eigen::Vector3f& from, const Eigen::Vector3f& to) {
+    const double start = direction_of(from);
+    double turn = direction_of(to) - start;
+    turn -= kDirections * std::round(turn / kDirections);
+    const double low = std::min(start, start + turn), high = std::max(start, start + turn);
+    const Eigen::Vector2d p = from.head<2>().cast<double>(), along = to.head<2>().cast<double>() - p;
+    for (int i = static_cast<int>(std::ceil(low)); i <= static_cast<int>(std::floor(high)); ++i) {
+      const double angle = 2 * std::numbers::pi * i / kDirections;
+      const Eigen::Vector2d ray(std::cos(angle), std::sin(angle));
+      // p + t along is parallel to the ray.
+      const double across = ray.x() * along.y() - ray.y() * along.x();
+      const double t = across == 0 ? 0 : std::clamp((ray.y() * p.x() - ray.x() * p.y()) / across, 0.0, 1.0);
+      double& radius = radii_[static_cast<std::size_t>((i % kDirections + kDirections) % kDirections)];
+      radius = std::max(radius, ray.dot(p + t * along));
+    }
+  }
+  static double direction_of(const Eigen::Vector3f& v) {
+    return std::atan2(static_cast<double>(v.y()), static_cast<double>(v.x())) * kDirections / (2 * std::numbers::pi);
+  }
+  std::array<double, kDirections> radii_{};
+};
+
+// The area that the mesh covers above the ground, seen from above.
+double footprint(const TriangleMesh& mesh, float ground) {
+  Outline outline;
+  for (const auto& [a, b, c] : mesh.triangles)
+    outline.add_triangle({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}, ground);
+  return outline.area();
+}
+
+// Widens each layer towards its top.
+void add_layers(TriangleMesh& mesh, int layers, float top) {
+  for (Eigen::Vector3f& v : mesh.vertices) {
+    const float layer = v.z() / top * static_cast<float>(layers);
+    const float within = layer - std::floor(layer);
+    v.head<2>() *= 1 + kLayerStep * (within * within - 0.5F);
+  }
+}
+
 }  // namespace
 
 TriangleMesh make_rock(const Rock& rock, double edge_m) {
   TriangleMesh mesh = sphere(subdivisions_for(rock.diameter_m, edge_m));
   const std::vector<double> radii = RockSurface(rock.shape).radii(mesh.vertices);
   for (std::size_t i = 0; i < radii.size(); ++i) mesh.vertices[i] *= static_cast<float>(radii[i]);
-  // Scale to the requested height and diameter at the ground.
-  float top = 0, foot = 0;
+  float top = 0;
   for (const Eigen::Vector3f& v : mesh.vertices) top = std::max(top, v.z());
-  const float ground = -top * static_cast<float>(kCentreHeight / (1 - kCentreHeight));
-  int counted = 0;
-  for (const Eigen::Vector3f& v : mesh.vertices) {
-    if (std::abs(v.z() - ground) > 0.25F) continue;
-    foot += v.head<2>().norm();
-    ++counted;
-  }
-  const double wide = 0.5 * rock.diameter_m / (foot / static_cast<float>(counted));
+  if (rock.layers > 0) add_layers(mesh, rock.layers, top);
+  const float ground = top * (rock.buried ? kGroundIfBuried : kGround);
+  const double wide = 0.5 * rock.diameter_m * std::sqrt(std::numbers::pi / footprint(mesh, ground));
   const double along = wide * std::sqrt(rock.elongation), across = wide / std::sqrt(rock.elongation);
-  const double up = rock.height_m * (1 - kCentreHeight) / top;
+  const double up = rock.height_m / static_cast<double>(top - ground);
   const double c = std::cos(rock.turn_rad), s = std::sin(rock.turn_rad);
   for (Eigen::Vector3f& v : mesh.vertices) {
     const double x = along * v.x(), y = across * v.y();
-    v = Eigen::Vector3d(c * x - s * y, s * x + c * y, up * v.z() + kCentreHeight * rock.height_m).cast<float>();
+    v = Eigen::Vector3d(c * x - s * y, s * x + c * y, up * static_cast<double>(v.z() - ground)).cast<float>();
   }
   return mesh;
 }

@@ -17,7 +17,8 @@ struct TriangleMesh {
 
 /// A sphere of 20 · 4^n triangles, cut by random planes and roughened by noise. Edges are about `edge_m` long where the
 /// rock is large enough. World axes, relative to the rock's foot: z = 0 is the ground under its centre, its top is at
-/// rock.height_m, its mean diameter at the ground is rock.diameter_m. It extends below the ground.
+/// rock.height_m. Seen from above, what stands above the ground covers the area of a circle of rock.diameter_m. It
+/// extends below the ground.
 TriangleMesh make_rock(const Rock& rock, double edge_m);
 
 }  // namespace spartan::sim::internal

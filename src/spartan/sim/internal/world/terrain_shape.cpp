@@ -5,9 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 
 #include "spartan/core/pose.h"
+#include "spartan/numerics/gradient_noise.h"
 #include "spartan/numerics/random.h"
+#include "spartan/sim/internal/world/smooth_step.h"
 
 namespace spartan::sim::internal {
 namespace {
@@ -20,24 +23,16 @@ int octaves_down_to(double largest, double finest) {
   return std::max(1, static_cast<int>(std::ceil(std::log2(largest / finest))) + 1);
 }
 
-double smooth_step(double t) {
-  t = std::clamp(t, 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
-
 // A wave of unit height with crests sharper than troughs, as in aeolian ripples.
 double crest(double phase) {
   const double s = 0.5 + 0.5 * std::sin(phase);
   return s * std::sqrt(s) - 0.5;
 }
 
-double unit_of(std::uint32_t bits) {
-  return bits * 0x1p-32;
-}
-
 }  // namespace
 
-TerrainShape::TerrainShape(const TerrainShapeOptions& options, std::uint64_t seed) : options_(options) {
+TerrainShape::TerrainShape(const TerrainShapeOptions& options, std::uint64_t seed, GroundCover cover)
+    : options_(options), cover_(std::move(cover)) {
   Random random(seed, 101);
   seed_ = random.next();
   const auto wander = [&](std::uint64_t stream, double size_m) {
@@ -51,6 +46,8 @@ TerrainShape::TerrainShape(const TerrainShapeOptions& options, std::uint64_t see
   const double rise = std::tan(options.slope_deg * kRadiansPerDegree);
   slope_x_ = rise * std::cos(options.slope_heading_deg * kRadiansPerDegree);
   slope_y_ = rise * std::sin(options.slope_heading_deg * kRadiansPerDegree);
+  ripple_x_ = std::cos(options.ripple_heading_deg * kRadiansPerDegree);
+  ripple_y_ = std::sin(options.ripple_heading_deg * kRadiansPerDegree);
 }
 
 void TerrainShape::add_dunes(std::span<const double> x, std::span<const double> y, std::span<double> heights) const {
@@ -69,9 +66,9 @@ void TerrainShape::add_ripples(std::span<const double> x, std::span<const double
   ripple_wander_.add_to(std::span(wander).first(x.size()), x, y);
   ripple_strength_.add_to(std::span(strength).first(x.size()), x, y);
   for (std::size_t k = 0; k < x.size(); ++k) {
-    const double phase = 2 * std::numbers::pi * (0.9 * x[k] - 0.43 * y[k]) / options_.ripple_length_m;
+    const double phase = 2 * std::numbers::pi * (ripple_x_ * x[k] + ripple_y_ * y[k]) / options_.ripple_length_m;
     const double height_m = options_.ripple_height_m * smooth_step(0.5 + 0.6 * strength[k]);
-    heights[k] += height_m * crest(phase + 1.8 * wander[k]);
+    heights[k] += height_m * crest(phase + options_.ripple_wander_rad * wander[k]);
   }
 }
 
@@ -92,12 +89,12 @@ double TerrainShape::cavity_depth(double x, double y) const {
   const double cell = std::max(std::sqrt(50.0 / options_.cavities_per_100m2), 2.2 * options_.cavity_diameter_m);
   const double probability = options_.cavities_per_100m2 / 100 * cell * cell;
   const auto ix = static_cast<std::int32_t>(std::floor(x / cell)), iy = static_cast<std::int32_t>(std::floor(y / cell));
-  if (unit_of(hash_coordinates(ix, iy, seed_)) >= probability) return 0;
-  const double size = 0.5 + 0.5 * unit_of(hash_coordinates(ix, iy, seed_ + 1));
+  if (hash_fraction(ix, iy, seed_) >= probability) return 0;
+  const double size = 0.5 + 0.5 * hash_fraction(ix, iy, seed_ + 1);
   const double radius = 0.5 * size * options_.cavity_diameter_m;
   const double max_offset = 0.5 * cell - 1.05 * radius;
-  const double cx = (ix + 0.5) * cell + max_offset * (2 * unit_of(hash_coordinates(ix, iy, seed_ + 2)) - 1);
-  const double cy = (iy + 0.5) * cell + max_offset * (2 * unit_of(hash_coordinates(ix, iy, seed_ + 3)) - 1);
+  const double cx = (ix + 0.5) * cell + max_offset * (2 * hash_fraction(ix, iy, seed_ + 2) - 1);
+  const double cy = (iy + 0.5) * cell + max_offset * (2 * hash_fraction(ix, iy, seed_ + 3) - 1);
   const double distance = std::hypot(x - cx, y - cy) / radius;
   return distance >= 1 ? 0 : size * options_.cavity_depth_m * smooth_step((1 - distance) / kWallFraction);
 }
@@ -113,6 +110,8 @@ void TerrainShape::heights(std::span<const double> x, std::span<const double> y,
     relief_.add_to(bz, bx, by);
     add_dunes(bx, by, bz);
     add_ripples(bx, by, bz);
+    cover_.add_heights(bx, by, bz);
+    for (std::size_t k = 0; tracks_ && k < n; ++k) bz[k] -= tracks_->depth(bx[k], by[k]);
   }
 }
 
