@@ -90,7 +90,10 @@ double normalized_motions(const Drive& drive, const std::vector<FrameRecord>& fr
     if (!frame.has_pose || frame.motion.first || frame.motion.covariance.isZero()) continue;
     const auto from = truth_at(drive, frame.motion.from), to = truth_at(drive, frame.motion.to);
     if (!from || !to) continue;
-    const Pose error = (from->inverse() * *to).inverse() * frame.motion.previous_from_current;
+    // Motions are those of the left camera.
+    const Pose body_from_left = drive.rig.body_from_camera(drive.rig.find_pair(frame.pair)->left);
+    const Pose truth = body_from_left.inverse() * from->inverse() * *to * body_from_left;
+    const Pose error = truth.inverse() * frame.motion.previous_from_current;
     add_normalized(log_se3(error), frame.motion.covariance, 6, normalized);
   }
   return median_of(normalized);
@@ -194,7 +197,7 @@ double roughness_of(const TerrainTruth& truth) {
   return median_of(values);
 }
 
-void score_stops(Drive& drive, json& result) {
+void score_stops(Drive& drive, bool same_rig, json& result) {
   auto imager = Imager::create(drive.rig, ImagingOptions(), ThreadPool(2));
   if (!imager || drive.stops.empty()) return;
   StopMapper mapper = StopMapper::create({}, {}, ThreadPool(2)).value();
@@ -212,7 +215,7 @@ void score_stops(Drive& drive, json& result) {
       const std::string name = fmt::format("/{}/{}.png", view.pair, view.stamp.ns);
       const auto disparity = read_disparity(drive.folder + "/truth/disparity" + name);
       const auto mask = read_truth_mask(drive.folder + "/truth/mask" + name);
-      if (disparity && mask) stereo.add(view.disparity, *disparity, *mask);
+      if (same_rig && disparity && mask) stereo.add(view.disparity, *disparity, *mask);
     }
     MapMetricsOptions scoring;
     scoring.viewpoint_m = pose.translation().head<2>();
@@ -221,10 +224,12 @@ void score_stops(Drive& drive, json& result) {
         {map.place, map.elevation_m, class_band(map.kind), visibility.pixels, visibility.lowest_m}, truth, scoring));
     maps.add_cells(map, truth, scoring.viewpoint_m);
   }
-  result["stereo"] = {{"rms_px", number(std::sqrt(stereo.squares / stereo.inside))},
-                      {"bias_px", number(stereo.sum / stereo.inside)},
-                      {"beyond_1_px_percent", number(100 * stereo.beyond_1_px / stereo.matched)},
-                      {"unmatched_percent", number(100 * (1 - stereo.matched / stereo.truth))}};
+  // True disparities refer to the rectification by the recording's own rig.
+  if (same_rig)
+    result["stereo"] = {{"rms_px", number(std::sqrt(stereo.squares / stereo.inside))},
+                        {"bias_px", number(stereo.sum / stereo.inside)},
+                        {"beyond_1_px_percent", number(100 * stereo.beyond_1_px / stereo.matched)},
+                        {"unmatched_percent", number(100 * (1 - stereo.matched / stereo.truth))}};
   const Sums& s = maps.scores;
   result["maps"] = {{"bias_mm", number(1e3 * s.error / s.cells)},
                     {"rms_mm", number(1e3 * std::sqrt(s.squares / s.cells))},
@@ -246,12 +251,16 @@ void score(const std::string& run_folder, const std::string& recording) {
   if (!store) throw std::runtime_error(store.error().message());
   const auto frames = store->frames();
   if (!frames) throw std::runtime_error(frames.error().message());
+  const auto rig = read_rig_yaml(RunFolder{run_folder}.rig());
+  if (!rig) throw std::runtime_error(rig.error().message());
+  const bool same_rig = *rig == drive->rig;
+  drive->rig = *rig;
   json result;
   for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
     if (has_trajectory(*frames, kind)) result[std::string(name_of(kind))] = score_trajectory(*drive, *frames, kind);
   }
   result["odometry"]["normalized_motions"] = number(normalized_motions(*drive, *frames));
-  score_stops(*drive, result);
+  score_stops(*drive, same_rig, result);
   fmt::print("{}\n", result.dump());
 }
 

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kViewBits = 8;  // of MergedRange::views
 constexpr int kClasses = 4;
+constexpr double kBorder_rad = 0.5 * std::numbers::pi / 180;  // height of the margin at the upper border of the views
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 // Reprojection matrix: (u, v, d, 1) → homogeneous point in the axes of the virtual camera.
@@ -31,10 +32,12 @@ double range_sigma(const RectifiedStereo& g, double disparity, double stretch, d
 
 // The nearest surface that one view sees in each cell.
 struct DisparityMerger::Layer {
-  explicit Layer(ImageSize size) : sum_range(size), sum_variance(size), sum_gray(size), count(size), votes(size) {}
+  explicit Layer(ImageSize size)
+      : sum_range(size), sum_variance(size), sum_gray(size), count(size), votes(size), beyond(size) {}
   Image<float> sum_range, sum_variance, sum_gray;
   Image<std::uint16_t> count;
   Image<std::uint32_t> votes;  // pixels of each class, one saturating byte per class
+  Image<std::uint8_t> beyond;  // not 0: a surface beyond the largest range
 
   float range(int x, int y) const { return sum_range(x, y) / static_cast<float>(count(x, y)); }
   // The mean of the pixels' variances, not the variance of their mean: errors of neighbouring disparities are
@@ -87,11 +90,14 @@ void DisparityMerger::rasterize_view(const MergedView& view, Layer& layer) const
       const Eigen::Vector4d h = m * Eigen::Vector4d(u, v, d, 1);
       const Eigen::Vector3d p = h.head<3>() / h.w();
       const double range = p.norm();
-      if (range > options_.max_range_m) continue;
       const auto pixel = camera_.project(p);
       if (!pixel) continue;
       const int column = static_cast<int>(std::lround(pixel->x())), row = static_cast<int>(std::lround(pixel->y()));
       if (column < 0 || row < 0 || column >= width || row >= height) continue;
+      if (range > options_.max_range_m) {
+        layer.beyond(column, row) = 1;
+        continue;
+      }
       const double x = (u - g.centre_px.x()) / g.focal_px;
       const double sigma = range_sigma(g, d, std::sqrt(1 + x * x + y * y), options_.disparity_sigma_px);
       layer.add(column, row, static_cast<float>(range), static_cast<float>(sigma * sigma), view.left(u, v),
@@ -232,6 +238,43 @@ void fill_gaps(MergedRange& merged, float gate, const ThreadPool& workers) {
 
 }  // namespace
 
+Image<std::uint8_t> DisparityMerger::upper_border(std::span<const MergedView> views, std::span<const Layer> layers,
+                                                  const Image<float>& range_m) const {
+  const auto [width, height] = camera_.size();
+  const int step = std::max(1, static_cast<int>(std::lround(kBorder_rad * camera_.per_radian())));
+  // Whether a view looks at the point that is kBorder_rad above a cell and as far away.
+  const auto is_covered_above = [&](int x, int y) {
+    if (y < step) return false;
+    const Eigen::Vector3d point =
+        body_from_centre_ * Eigen::Vector3d(static_cast<double>(range_m(x, y)) * camera_.direction(x, y - step));
+    return std::any_of(views.begin(), views.end(), [&](const MergedView& view) {
+      const RectifiedStereo& g = view.geometry.stereo;
+      const Eigen::Vector3d p = view.geometry.body_from_left.inverse() * point;
+      if (view.disparity.empty() || p.z() <= 0) return false;
+      const Eigen::Vector2d pixel = g.focal_px * p.head<2>() / p.z() + g.centre_px;
+      return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < view.disparity.width() &&
+             pixel.y() < view.disparity.height();
+    });
+  };
+  Image<std::uint8_t> border(width, height);
+  workers_.parallel_for(0, height, 16, [&](int from, int to) {
+    for (int y = from; y < to; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (std::isfinite(range_m(x, y))) border(x, y) = is_covered_above(x, y) ? 0 : 1;
+      }
+    }
+  });
+  for (const Layer& layer : layers) {
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (layer.beyond(x, y) == 0) continue;
+        for (int below = y + 1; below <= std::min(y + step, height - 1); ++below) border(x, below) = 1;
+      }
+    }
+  }
+  return border;
+}
+
 MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
   const ImageSize size = camera_.size();
   std::vector<Layer> layers;
@@ -249,11 +292,13 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
                      Image<float>(size.width, size.height, kNaN),
                      Image<std::uint8_t>(size),
                      Image<std::uint8_t>(size),
-                     Image<std::uint8_t>(size)};
+                     Image<std::uint8_t>(size),
+                     {}};
   workers_.parallel_for(0, size.height, 16, [&](int from, int to) {
     for (int row = from; row < to; ++row) fuse_row(views, layers, row, merged);
   });
   fill_gaps(merged, static_cast<float>(options_.gate_sigmas), workers_);
+  merged.truncated = upper_border(views, layers, merged.range_m);
   return merged;
 }
 

@@ -104,6 +104,9 @@ struct MergedRange {
   Image<std::uint8_t> views;    ///< Bit i: view i, i + 8, i + 16 … contributed.
   Image<std::uint8_t> gray;     ///< Mean gray level, weighted by the ranges' inverse variances.
   Image<std::uint8_t> classes;  ///< Majority GroundClass of the view with the most pixels in the cell.
+  /// Not 0 at the upper border of what the views cover: no view looks half a degree above the cell, or what it sees
+  /// there is beyond the largest range. Empty: nowhere.
+  Image<std::uint8_t> truncated;
 };
 
 /// Fuses the views of one stop. Every pixel of every view is rasterized into the virtual camera by one 4×4 matrix per
@@ -132,6 +135,8 @@ class DisparityMerger {
   struct Layer;
   void rasterize_view(const MergedView& view, Layer& layer) const;
   void fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row, MergedRange& merged) const;
+  Image<std::uint8_t> upper_border(std::span<const MergedView> views, std::span<const Layer> layers,
+                                   const Image<float>& range_m) const;
 
   MergingOptions options_;
   Pose body_from_centre_;

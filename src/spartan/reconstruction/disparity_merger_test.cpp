@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "spartan/numerics/random.h"
@@ -64,6 +65,34 @@ int known(const Image<float>& image) {
     for (int x = 0; x < image.width(); ++x) count += std::isfinite(image(x, y)) ? 1 : 0;
   }
   return count;
+}
+
+// Which cells are truncated follows from where the views look, not from where disparities are known.
+TEST(DisparityMerger, CellsAtTheUpperBorderOfTheViewsAreTruncated) {
+  Stop stop = three_pans([](double, double) { return 0.0; });
+  const MergedRange whole = stop.merge();
+  int truncated = 0, cells = 0;
+  for (int y = 0; y < whole.range_m.height(); ++y) {
+    for (int x = 0; x < whole.range_m.width(); ++x) {
+      if (!std::isfinite(whole.range_m(x, y))) continue;
+      ++cells;
+      truncated += whole.truncated(x, y) != 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(truncated, 0);
+  EXPECT_LT(truncated, cells / 20);
+  // Nothing is matched in the upper half of the middle view: what is left there is not at the border.
+  for (int v = 0; v < kWide.size.height / 2; ++v) {
+    for (int u = 0; u < kWide.size.width; ++u) stop.disparities[1](u, v) = std::numeric_limits<float>::quiet_NaN();
+  }
+  const MergedRange holes = stop.merge();
+  for (int y = 0; y < holes.range_m.height(); ++y) {
+    for (int x = 0; x < holes.range_m.width(); ++x) {
+      if (std::isfinite(holes.range_m(x, y))) {
+        EXPECT_EQ(holes.truncated(x, y), whole.truncated(x, y)) << x << ' ' << y;
+      }
+    }
+  }
 }
 
 TEST(DisparityMerger, RangesMatchTheGroundAndCoverMoreThanAnyView) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "spartan/numerics/connected_components.h"
+#include "spartan/reconstruction/internal/cell_support.h"
 
 namespace spartan {
 namespace {
@@ -14,12 +15,16 @@ namespace {
 constexpr float kNoHeight = std::numeric_limits<float>::quiet_NaN();
 constexpr double kLeastSigma_m = 0.001;  // lower bound of a point's vertical standard deviation; empirical
 constexpr float kMostLogodds = 5;        // saturation of a cell's log-odds: a probability of 0.993
-constexpr double kCut_rad = 0.5 * std::numbers::pi / 180;  // height of the margin at the upper edge of the view
 
-// Sums over the points of a cell.
+constexpr double kOpening = 1.0 / 3;  // of the ground's window: larger pits are part of the ground surface; empirical
+constexpr double kSupportGap = 3;     // in cell sizes: groups of cells stand apart by more than this; empirical
+
+// What the points of a cell say.
 struct Cell {
-  double weights = 0, sum = 0;
-  float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
+  double weights = 0;                // of all points
+  double used_weights = 0, sum = 0;  // of the points between the trimmed ends
+  float lowest = kNoHeight, highest = kNoHeight;
+  Eigen::Vector3f rays = Eigen::Vector3f::Zero();  // sum of the directions from the cameras
   int count = 0, ground = 0;
   bool truncated = false;
 };
@@ -29,9 +34,6 @@ struct Grid {
   int width = 0, height = 0;
   std::vector<Cell> cells;
   const Cell& at(int x, int y) const {
-    return cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
-  }
-  Cell& at(int x, int y) {
     return cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
   }
 };
@@ -45,25 +47,79 @@ Grid make_grid(const MapOptions& options, const Eigen::Vector3d& middle) {
   return grid;
 }
 
-void rasterize_points(std::span<const SurfacePoint> points, const Pose& map_from_body, Grid& grid) {
+// A point in its cell.
+struct CellPoint {
+  float height_m, weight;
+};
+
+// The points of all cells, sorted by cell: those of cell k are [first[k], first[k + 1]).
+struct CellPoints {
+  std::vector<std::size_t> first;
+  std::vector<CellPoint> points;
+};
+
+CellPoints rasterize_points(std::span<const SurfacePoint> points, const Pose& map_from_body, Grid& grid) {
   const Eigen::Matrix3f rotation = map_from_body.rotation_matrix().cast<float>();
   const Eigen::Vector3f translation = map_from_body.translation().cast<float>();
-  for (const SurfacePoint& point : points) {
+  constexpr std::uint32_t kOutside = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> cells(points.size(), kOutside);
+  std::vector<CellPoint> unsorted(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const SurfacePoint& point = points[i];
     const Eigen::Vector3f p = rotation * point.in_body + translation;
     const GridCell at = cell_at(grid.place, p.x(), p.y());
     if (at.column < 0 || at.row < 0 || at.column >= grid.width || at.row >= grid.height) continue;
     const double sigma =
         std::max(std::abs(static_cast<double>(rotation.row(2).dot(point.ray)) * point.sigma_m), kLeastSigma_m);
-    Cell& cell = grid.at(at.column, at.row);
-    const double weight = 1 / (sigma * sigma);
-    cell.weights += weight;
-    cell.sum += weight * p.z();
-    cell.lowest = std::min(cell.lowest, p.z());
-    cell.highest = std::max(cell.highest, p.z());
+    cells[i] = static_cast<std::uint32_t>(at.row) * static_cast<std::uint32_t>(grid.width) +
+               static_cast<std::uint32_t>(at.column);
+    unsorted[i] = {p.z(), static_cast<float>(1 / (sigma * sigma))};
+    Cell& cell = grid.cells[cells[i]];
     ++cell.count;
+    cell.weights += 1 / (sigma * sigma);
+    cell.rays += rotation * point.ray;
     cell.truncated = cell.truncated || point.truncated;
     cell.ground += point.kind == GroundClass::ground ? 1 : 0;
   }
+  CellPoints sorted;
+  sorted.first.assign(grid.cells.size() + 1, 0);
+  for (std::size_t k = 0; k < grid.cells.size(); ++k)
+    sorted.first[k + 1] = sorted.first[k] + static_cast<std::size_t>(grid.cells[k].count);
+  sorted.points.resize(sorted.first.back());
+  std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (cells[i] != kOutside) sorted.points[next[cells[i]]++] = unsorted[i];
+  }
+  return sorted;
+}
+
+// Heights of each cell between the trimmed ends.
+void sum_heights(CellPoints& sorted, double trimmed_fraction, Grid& grid, const ThreadPool& workers) {
+  workers.parallel_for(0, grid.height, 8, [&](int from, int to) {
+    const std::size_t width = static_cast<std::size_t>(grid.width);
+    for (std::size_t k = static_cast<std::size_t>(from) * width; k < static_cast<std::size_t>(to) * width; ++k) {
+      auto begin = sorted.points.begin() + static_cast<std::ptrdiff_t>(sorted.first[k]),
+           end = sorted.points.begin() + static_cast<std::ptrdiff_t>(sorted.first[k + 1]);
+      if (begin == end) continue;
+      const auto trimmed = static_cast<std::ptrdiff_t>(trimmed_fraction * static_cast<double>(end - begin));
+      if (trimmed > 0) {
+        const auto lower = [](const CellPoint& a, const CellPoint& b) { return a.height_m < b.height_m; };
+        std::nth_element(begin, begin + trimmed, end, lower);
+        begin += trimmed;
+        std::nth_element(begin, end - trimmed, end, lower);
+        end -= trimmed;
+      }
+      Cell& cell = grid.cells[k];
+      cell.lowest = cell.highest = begin->height_m;
+      for (auto point = begin; point != end; ++point) {
+        const auto weight = static_cast<double>(point->weight);
+        cell.used_weights += weight;
+        cell.sum += weight * static_cast<double>(point->height_m);
+        cell.lowest = std::min(cell.lowest, point->height_m);
+        cell.highest = std::max(cell.highest, point->height_m);
+      }
+    }
+  });
 }
 
 void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
@@ -87,6 +143,39 @@ void classify(const MapOptions& options, const Grid& grid, LocalMap& map) {
       map.occupancy_logodds(x, y) = std::clamp(static_cast<float>(1.702 * excess), -kMostLogodds, kMostLogodds);
     }
   }
+}
+
+// Cells that v-disparity calls ground; all known ones where there are none.
+Image<std::uint8_t> ground_cells(const Grid& grid, const LocalMap& map) {
+  const auto [w, h] = map.size();
+  Image<std::uint8_t> is_ground(w, h);
+  bool any = false;
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const Cell& cell = grid.at(x, y);
+      is_ground(x, y) = map.count(x, y) > 0 && 2 * cell.ground > cell.count ? 1 : 0;
+      any = any || is_ground(x, y) != 0;
+    }
+  }
+  for (int y = 0; !any && y < h; ++y) {
+    for (int x = 0; x < w; ++x) is_ground(x, y) = map.count(x, y) > 0 ? 1 : 0;
+  }
+  return is_ground;
+}
+
+// Makes cells unknown; returns whether any was known.
+bool leave_out(const Image<std::uint8_t>& cells, LocalMap& map) {
+  bool any = false;
+  for (int y = 0; y < cells.height(); ++y) {
+    for (int x = 0; x < cells.width(); ++x) {
+      if (cells(x, y) == 0 || !(map.count(x, y) > 0)) continue;
+      any = true;
+      for (Image<float>* layer : {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2})
+        (*layer)(x, y) = kNoHeight;
+      map.count(x, y) = 0;
+    }
+  }
+  return any;
 }
 
 // Obstacles are the 8-connected components of obstacle cells.
@@ -119,18 +208,15 @@ void list_obstacles(LocalMap& map) {
 std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
   std::vector<SurfacePoint> points;
   const Eigen::Matrix3d rotation = merged.body_from_centre.rotation_matrix();
-  const int edge = std::max(1, static_cast<int>(std::lround(kCut_rad * merged.camera.per_radian())));
-  std::vector<int> tops(static_cast<std::size_t>(merged.range_m.width()), merged.range_m.height());
   for (int y = 0; y < merged.range_m.height(); ++y) {
     for (int x = 0; x < merged.range_m.width(); ++x) {
       const float range = merged.range_m(x, y);
       if (!std::isfinite(range)) continue;
-      int& top = tops[static_cast<std::size_t>(x)];
-      top = std::min(top, y);
       const Eigen::Vector3d ray = rotation * merged.camera.direction(x, y);
       const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * ray;
       points.push_back({place.cast<float>(), merged.sigma_m(x, y), ray.cast<float>(),
-                        static_cast<GroundClass>(merged.classes(x, y)), y < top + edge});
+                        static_cast<GroundClass>(merged.classes(x, y)),
+                        !merged.truncated.empty() && merged.truncated(x, y) != 0});
     }
   }
   return points;
@@ -143,7 +229,8 @@ Result<MapGenerator> MapGenerator::create(const MapOptions& options, ThreadPool 
 
 LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const {
   Grid grid = make_grid(options_, map_from_body.translation());
-  rasterize_points(points, map_from_body, grid);
+  CellPoints sorted = rasterize_points(points, map_from_body, grid);
+  sum_heights(sorted, options_.trimmed_fraction, grid, workers_);
   LocalMap map;
   map.map_from_body = map_from_body;
   map.place = grid.place;
@@ -153,29 +240,32 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
     *layer = Image<float>(w, h, kNoHeight);
   for (Image<float>* layer : {&map.count, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
   map.kind = Image<GroundClass>(w, h);
-  Image<std::uint8_t> is_ground(w, h);
-  bool any_ground = false;
+  Image<internal::LineOfSight> towards_camera(w, h);
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       const Cell& cell = grid.at(x, y);
-      if (cell.count < options_.min_points) continue;
-      map.elevation_m(x, y) = static_cast<float>(cell.sum / cell.weights);
+      if (cell.count == 0 || cell.count < options_.min_points) continue;
+      map.elevation_m(x, y) = static_cast<float>(cell.sum / cell.used_weights);
       map.elevation_min_m(x, y) = cell.lowest;
       map.elevation_max_m(x, y) = cell.highest;
       map.count(x, y) = static_cast<float>(cell.count);
       // Errors of a cell's points are correlated (disparities are smooth), so the variance of their mean is that of
       // one.
       map.variance_m2(x, y) = static_cast<float>(cell.count / cell.weights);
-      is_ground(x, y) = 2 * cell.ground > cell.count ? 1 : 0;
-      any_ground = any_ground || is_ground(x, y) != 0;
+      const float along = std::max(cell.rays.head<2>().norm(), 1e-6F);
+      towards_camera(x, y) = {-cell.rays.x() / along, -cell.rays.y() / along, -cell.rays.z() / along};
     }
   }
-  if (!any_ground) {
-    for (int y = 0; y < h; ++y) {
-      for (int x = 0; x < w; ++x) is_ground(x, y) = map.count(x, y) > 0 ? 1 : 0;
-    }
-  }
-  map.ground_m = fit_ground(map.elevation_m, is_ground, options_.cell_m, options_.ground, workers_);
+  const internal::CellHeights heights{map.elevation_min_m, map.elevation_max_m};
+  const double margin_m = kSupportGap * options_.cell_m;
+  leave_out(internal::isolated_cells(heights, margin_m, options_.min_support_cells), map);
+  const auto fit = [&] {
+    return fit_ground(map.elevation_m, ground_cells(grid, map), options_.cell_m, options_.ground, workers_);
+  };
+  map.ground_m = fit();
+  const internal::GroundView view{map.ground_m, towards_camera, options_.cell_m, margin_m,
+                                  kOpening * options_.ground.window_m};
+  if (leave_out(internal::cells_seen_through_ground(heights, view), map)) map.ground_m = fit();
   classify(options_, grid, map);
   Traversability shape = compute_traversability(
       {map.elevation_m, map.elevation_max_m, map.ground_m, map.kind, map.place.cell_m}, options_.rover, workers_);

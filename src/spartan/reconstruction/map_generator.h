@@ -112,8 +112,10 @@ struct MapOptions {
   double obstacle_m = 0.1;  ///< Minimum height of an obstacle above the ground surface, m.
   double cavity_m = 0.1;    ///< Minimum depth of a cavity (negative obstacle) below the ground surface, m.
   double truncated_obstacle_factor =
-      0.3;             ///< Factor on obstacle_m where the upper edge of the view truncates an object.
-  int min_points = 1;  ///< Minimum number of points of an observed cell.
+      0.3;                         ///< Factor on obstacle_m where the upper edge of the view truncates an object.
+  int min_points = 1;              ///< Minimum number of points of an observed cell.
+  double trimmed_fraction = 0.05;  ///< Fraction of a cell's points left out at each end of their heights.
+  int min_support_cells = 4;       ///< A smaller group of cells that stands apart is unknown.
   GroundSurfaceOptions ground;
   RoverLimits rover;
 
@@ -145,6 +147,14 @@ struct MapOptions {
     v.renamed("fewest_points", "min_points");
     v.field("min_points", min_points,
             "Minimum number of points of an observed cell; raising it leaves sparsely covered cells unknown.",
+            between(1, 1000));
+    v.field("trimmed_fraction", trimmed_fraction,
+            "Fraction of the points of a cell that is left out at the upper and at the lower end of their heights; "
+            "raising it suppresses more wrong matches and the tips of rocks.",
+            between(0, 0.45));
+    v.field("min_support_cells", min_support_cells,
+            "A group of fewer cells that stands apart from its neighbours by more than three cell sizes in height is "
+            "left unknown, as wrong matches are; 1 retains all.",
             between(1, 1000));
     v.group("ground", ground);
     v.group("rover", rover);

@@ -143,20 +143,44 @@ TEST(MapGenerator, ATruncatedObjectNeedsLessHeightToBeAnObstacle) {
       << "ground at the upper edge of the view is not an obstacle";
 }
 
-// A panorama whose columns start lower from left to right, with a hole.
-TEST(SurfacePoints, TheUpperEndsOfColumnsAreTruncated) {
-  MergedRange merged;
-  merged.camera = PanoramicCamera(PanoramicCamera::Projection::cylinder, {8, 40}, 8 * 180 / std::numbers::pi, 0, -0.2);
-  merged.range_m = Image<float>(8, 40, 3.0F);
-  merged.sigma_m = Image<float>(8, 40, 0.01F);
-  merged.classes = Image<std::uint8_t>(8, 40);
-  for (int x = 0; x < 8; ++x) {
-    for (int y = 0; y < 2 * x; ++y) merged.range_m(x, y) = std::numeric_limits<float>::quiet_NaN();
+// Points of one cell at a place.
+std::vector<SurfacePoint> points_at(double x, double y, double z, int count) {
+  std::vector<SurfacePoint> points;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3f place(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+    points.push_back({place, 0.005F, Eigen::Vector3f(0.9F, 0, -0.44F), GroundClass::ground, false});
   }
-  merged.range_m(0, 20) = std::numeric_limits<float>::quiet_NaN();
-  int truncated = 0;
-  for (const SurfacePoint& p : surface_points(merged)) truncated += p.truncated ? 1 : 0;
-  EXPECT_EQ(truncated, 8 * 4) << "half a degree is four rows; holes are not edges";
+  return points;
+}
+
+TEST(MapGenerator, LeavesOutCellsThatStandApart) {
+  const auto flat = [](double, double) { return 0.0; };
+  std::vector<SurfacePoint> points = points_on(flat);
+  const auto with = [&](const std::vector<SurfacePoint>& more) {
+    std::vector<SurfacePoint> all = points;
+    all.insert(all.end(), more.begin(), more.end());
+    return MapGenerator::create({}, ThreadPool(1))->generate(all, Pose());
+  };
+  // A cell of its own, far outside of what is seen, and metres above the ground.
+  const LocalMap map = with(points_at(3.93, 3.93, 1.5, 9));
+  EXPECT_FALSE(std::isfinite(at(map, map.elevation_m, 3.93, 3.93)));
+  MapOptions all;
+  all.min_support_cells = 1;
+  std::vector<SurfacePoint> alone = points;
+  for (const SurfacePoint& p : points_at(3.93, 3.93, 1.5, 9)) alone.push_back(p);
+  const LocalMap kept = MapGenerator::create(all, ThreadPool(1))->generate(alone, Pose());
+  EXPECT_TRUE(std::isfinite(at(kept, kept.elevation_m, 3.93, 3.93)));
+}
+
+TEST(MapGenerator, FewWrongPointsDoNotMoveACell) {
+  std::vector<SurfacePoint> points = points_on([](double, double) { return 0.0; });
+  for (const SurfacePoint& p : points_at(2, 0.5, 0.02, 38)) points.push_back(p);
+  const LocalMap before = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
+  points.push_back(points_at(2, 0.5, 1.2, 1)[0]);
+  const LocalMap after = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
+  EXPECT_NEAR(at(after, after.elevation_max_m, 2, 0.5), at(before, before.elevation_max_m, 2, 0.5), 0.021);
+  EXPECT_NEAR(at(after, after.elevation_m, 2, 0.5), at(before, before.elevation_m, 2, 0.5), 0.002);
+  EXPECT_EQ(at(after, after.kind, 2, 0.5), GroundClass::ground);
 }
 
 // Rotating the points and correcting the attitude accordingly does not change the map.
@@ -214,10 +238,13 @@ TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
   EXPECT_NEAR(at(map, map.cost, 2, 0), 0.5, 0.05) << "10 of at most 20 degrees";
 }
 
-// Three points far from all others: too few cells for the surface of the ground.
+// Four cells far from all others: too few for the surface of the ground.
 TEST(MapGenerator, AnIslandWithoutGroundIsUnknown) {
   const Eigen::Vector3f ray = Eigen::Vector3f(3.4F, 3.4F, -1).normalized();
-  std::vector<SurfacePoint> points(3, {{3.41F, 3.41F, 0}, 0.005F, ray, GroundClass::ground});
+  std::vector<SurfacePoint> points;
+  for (const float x : {3.41F, 3.46F}) {
+    for (const float y : {3.41F, 3.46F}) points.insert(points.end(), 3, {{x, y, 0}, 0.005F, ray, GroundClass::ground});
+  }
   const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
   EXPECT_EQ(at(map, map.count, 3.41, 3.41), 3);
   EXPECT_NEAR(at(map, map.elevation_m, 3.41, 3.41), 0, 1e-6) << "its elevation is measured all the same";

@@ -6,7 +6,8 @@
 namespace spartan {
 namespace {
 
-constexpr float kMaxLogodds = 10;  // saturation, so that a cell can still change after many observations
+constexpr float kLeastWeight = 0.1F;  // of the newest observation in the mean of the lowest and highest points
+constexpr float kMaxLogodds = 10;     // saturation, so that a cell can still change after many observations
 
 bool agree(const CellSurface& a, const CellSurface& b, const CellFusion& fusion) {
   const double d = static_cast<double>(a.elevation_m) - b.elevation_m;
@@ -22,8 +23,11 @@ CellSurface fused(const CellSurface& a, const CellSurface& b, double least_varia
   CellSurface f = a;
   f.elevation_m = static_cast<float>((vb * a.elevation_m + va * b.elevation_m) / sum);
   f.variance_m2 = std::min(a.variance_m2, static_cast<float>(std::max(va * vb / sum, least_variance)));
-  f.lowest_m = std::min(a.lowest_m, b.lowest_m);
-  f.highest_m = std::max(a.highest_m, b.highest_m);
+  // Running means, not extrema: these would only grow with every wrong point.
+  const float weight =
+      std::max(kLeastWeight, static_cast<float>(b.votes) / static_cast<float>(std::max(a.votes + b.votes, 1)));
+  f.lowest_m = std::min(a.lowest_m + weight * (b.lowest_m - a.lowest_m), f.elevation_m);
+  f.highest_m = std::max(a.highest_m + weight * (b.highest_m - a.highest_m), f.elevation_m);
   f.count = a.count + b.count;
   f.occupancy_logodds = std::clamp(a.occupancy_logodds + b.occupancy_logodds, -kMaxLogodds, kMaxLogodds);
   f.shape = static_cast<std::int16_t>(std::clamp(a.shape + b.shape, -30000, 30000));
@@ -58,6 +62,7 @@ MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, co
     next.alternative = with_one_vote_less(cell.alternative);
   } else if (!cell.alternative.observed()) {
     next.alternative = seen;
+    if (seen.variance_m2 < cell.surface.variance_m2) std::swap(next.surface, next.alternative);
   } else if (agree(cell.alternative, seen, fusion)) {
     next.alternative = fused(cell.alternative, seen, fusion.least_variance_m2);
     if (next.alternative.variance_m2 <= next.surface.variance_m2) std::swap(next.surface, next.alternative);

@@ -28,8 +28,8 @@ TEST(MapCell, FusesByVariance) {
   EXPECT_EQ(cell.surface.count, 10);
   EXPECT_EQ(cell.surface.stop, 0) << "the first stop that observed it";
   EXPECT_EQ(cell.surface.votes, 2);
-  EXPECT_FLOAT_EQ(cell.surface.lowest_m, 0.10F);
-  EXPECT_FLOAT_EQ(cell.surface.highest_m, 0.12F);
+  EXPECT_FLOAT_EQ(cell.surface.lowest_m, 0.11F);
+  EXPECT_FLOAT_EQ(cell.surface.highest_m, cell.surface.elevation_m);
   EXPECT_FLOAT_EQ(cell.surface.occupancy_logodds, -2);
   EXPECT_FALSE(cell.alternative.observed());
 }
@@ -59,6 +59,27 @@ TEST(MapCell, RepeatedContradictionReplacesTheSurface) {
   EXPECT_EQ(needed, 3) << "as many contradictions as there were confirmations";
   EXPECT_EQ(cell.surface.stop, 7);
   EXPECT_FLOAT_EQ(cell.alternative.elevation_m, 0.1F);
+}
+
+TEST(MapCell, TheFirstContradictionWinsWhereItIsKnownBetter) {
+  const MapCell from_afar = fuse_observation({}, seen(0.1F, 25e-4F), {});
+  const MapCell after = fuse_observation(from_afar, seen(0.6F, 4e-6F, 3), {});
+  EXPECT_FLOAT_EQ(after.surface.elevation_m, 0.6F);
+  EXPECT_FLOAT_EQ(after.alternative.elevation_m, 0.1F);
+  MapCell confirmed = from_afar;
+  for (int i = 0; i < 30; ++i) confirmed = fuse_observation(confirmed, seen(0.1F, 25e-4F), {});
+  EXPECT_FLOAT_EQ(fuse_observation(confirmed, seen(0.6F, 4e-4F), {}).surface.elevation_m, 0.1F) << "30 against one";
+}
+
+TEST(MapCell, OneWrongPointDoesNotWidenTheReliefForEver) {
+  MapCell cell;
+  for (int i = 0; i < 20; ++i) cell = fuse_observation(cell, seen(0.1F, 1e-4F), {});
+  CellSurface wrong = seen(0.1F, 1e-4F);
+  wrong.highest_m = 0.4F;
+  cell = fuse_observation(cell, wrong, {});
+  EXPECT_LT(cell.surface.highest_m, 0.14F);
+  for (int i = 0; i < 40; ++i) cell = fuse_observation(cell, seen(0.1F, 1e-4F), {});
+  EXPECT_LT(cell.surface.highest_m, 0.102F);
 }
 
 TEST(MapCell, ReliefWidensTheGate) {

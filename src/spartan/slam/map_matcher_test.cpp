@@ -161,10 +161,13 @@ TEST(MapMatcher, IsEquivariantToMotionsOfTheWorld) {
   }
 }
 
-// Three points that are too far from all others for the ground surface to be fitted there.
+// Four cells that are too far from all others for the ground surface to be fitted there.
 std::vector<SurfacePoint> with_island(std::vector<SurfacePoint> points, const Eigen::Vector3d& in_body) {
   const Eigen::Vector3f along = (in_body - Eigen::Vector3d(0, 0, 1)).normalized().cast<float>();
-  for (int i = 0; i < 3; ++i) points.push_back({in_body.cast<float>(), 0.005F, along, GroundClass::ground});
+  for (const float x : {0.0F, 0.05F}) {
+    for (const float y : {0.0F, 0.05F})
+      points.push_back({in_body.cast<float>() + Eigen::Vector3f(x, y, 0), 0.005F, along, GroundClass::ground});
+  }
   return points;
 }
 

@@ -58,8 +58,10 @@ struct CellFusion {
 /// Fuses one observation into a cell. If it passes the gate of the surface, both are fused with inverse-variance
 /// weights (the variance has a lower bound), and the alternative loses a vote. Otherwise the surface does not change:
 /// if the observation passes the gate of the alternative, it is fused into that; if not, the alternative loses a vote.
-/// An alternative without votes is discarded. When its variance is at most that of the surface, the two are swapped. So
-/// a variance never rises, and repeated contradiction replaces the surface.
+/// An alternative without votes is discarded. When its variance is below that of the surface (where it was confirmed:
+/// at most that of the surface), the two are swapped. So a variance never rises; repeated contradiction, or one that is
+/// known better, replaces the surface. Lowest and highest points are running means, in which the newest observation has
+/// a weight of at least a tenth.
 MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion);
 
 /// Translation in whole cells.
