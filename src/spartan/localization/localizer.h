@@ -50,6 +50,7 @@ enum class HealthReason : std::uint8_t {
   frozen,        ///< identical readings
   out_of_range,  ///< rate or specific force beyond the physical range of a rover
   contradicted,  ///< vision contradicts its prediction
+  outvoted,      ///< vision contradicts the IMU and the wheels, which agree
   lost,          ///< vision could not measure the motion
   never_seen,
   silent,

@@ -130,6 +130,10 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
       health.reason =
           fmt::format("contradicts visual odometry: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
       break;
+    case HealthReason::outvoted:
+      health.reason = fmt::format(
+          "contradicts the IMU and the wheels, which agree: NIS {:.1f} above the gate of {:.1f}", nis, limit);
+      break;
     case HealthReason::lost:
       health.reason = "no motion estimate for the last frame";
       break;

@@ -127,6 +127,8 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
     });
     m.step.has_wheels = seconds_between(wheels.back().stamp, stamp) < options_.health.wheels_timeout_s;
     m.step.wheels = wheels.back();
+    m.vision.has_wheels = m.step.has_wheels;
+    m.vision.wheels = m.step.wheels;
   }
   memory_ = m;
 }

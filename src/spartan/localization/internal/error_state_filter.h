@@ -56,7 +56,7 @@ class ErrorStateFilter {
   bool prediction_contradicted(const Innovation& innovation) const;
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
-  bool wheels_confirm_prediction(const RelativeMotion& motion) const;
+  std::optional<double> outvoted_by_imu_and_wheels(const RelativeMotion& motion) const;
   void compare_gyro(const RelativeMotion& motion);
   void begin_frame(Stamp stamp);
 
@@ -65,7 +65,7 @@ class ErrorStateFilter {
   void end_step_at_frame(Stamp stamp);
   std::optional<WheelSample> wheels_at(Stamp stamp) const;
   void update_by_step(const WheelSample& sample);
-  WheelStep step_to(const WheelSample& sample) const;
+  WheelStep step_between(const WheelSample& from, const WheelSample& to) const;
   void estimate_slip(const WheelStep& step);
   void begin_step(const std::optional<WheelSample>& wheels);
   void update_zero_velocity(bool imu_stationary);

@@ -81,8 +81,12 @@ Innovation wheel_innovation(const NavigationState& s, const WheelStep& step) {
   return i;
 }
 
-StepForward forward_of_step(const NavigationState& s) {
-  const MotionSinceClone m = motion_since_clone(s, error_at::kStepClone);
+double forward_of(const Pose& motion) {
+  return mean_step(motion).displacement.x();
+}
+
+StepForward forward_since(const NavigationState& s, int clone) {
+  const MotionSinceClone m = motion_since_clone(s, clone);
   const MeanStep mean = mean_step(m.clone_from_body);
   return {mean.displacement.x(), mean.displacement_by.row(0) * m.jacobian};
 }

@@ -31,12 +31,14 @@ struct WheelStep {
   double forward_sigma_m = 0, side_sigma_m = 0, up_sigma_m = 0, yaw_sigma_rad = 0;
 };
 Innovation wheel_innovation(const NavigationState& state, const WheelStep& step);
-/// Displacement along body x of the mean attitude of the step, with its Jacobian.
+/// Displacement along body x of the mean attitude of a motion, as wheels measure it.
+double forward_of(const Pose& motion);
+/// The same of the motion since a clone, with its Jacobian.
 struct StepForward {
   double metres = 0;
   Eigen::Matrix<double, 1, error_at::kSize> jacobian;
 };
-StepForward forward_of_step(const NavigationState& state);
+StepForward forward_since(const NavigationState& state, int clone);
 
 /// Heading of body x in the world, counter-clockwise from x.
 double heading_of(const Pose& world_from_body);

@@ -44,10 +44,10 @@ TEST(MeasurementModels, ForwardOfStepMatchesItsJacobian) {
   const NavigationState s = random_navigation_state(random);
   const auto numeric = testing::numeric_jacobian<1, error_at::kSize>(
       [&](const ErrorVector& e) -> Eigen::Matrix<double, 1, 1> {
-        return Eigen::Matrix<double, 1, 1>(forward_of_step(add_error(s, e)).metres);
+        return Eigen::Matrix<double, 1, 1>(forward_since(add_error(s, e), error_at::kStepClone).metres);
       },
       ErrorVector::Zero());
-  EXPECT_LE((forward_of_step(s).jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LE((forward_since(s, error_at::kStepClone).jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 // Far from the mean: the motion measured is that of the true state, X̂ Exp(r) over the clone Ĉ Exp(ξ_c), less the drift.
@@ -84,7 +84,7 @@ TEST(MeasurementModels, WheelsPredictTheChordOfAnArc) {
   s.world_from_body = s.world_from_step_clone * Pose(exp_so3({0, 0, std::numbers::pi / 2}), Eigen::Vector3d(1, 1, 0));
   const Innovation i = wheel_innovation(s, {2 * std::sqrt(2.0), std::numbers::pi / 2, true, 1, 1, 1, 1});
   EXPECT_LE(i.residual.norm(), 1e-12);
-  EXPECT_NEAR(forward_of_step(s).metres, std::sqrt(2.0), 1e-12);
+  EXPECT_NEAR(forward_since(s, error_at::kStepClone).metres, std::sqrt(2.0), 1e-12);
 }
 
 TEST(MeasurementModels, RollAndPitchMatchTheSimulator) {

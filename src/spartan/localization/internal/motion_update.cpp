@@ -21,6 +21,9 @@ constexpr double kMaxPredictionNis = 1;
 /// Correlation length of the constant error of vision, in frames: finite, so that the filter does not become
 /// overconfident; empirical.
 constexpr double kConstantSteps = 5000;
+/// The IMU and the wheels agree where they differ by fewer standard deviations; vision is outvoted by them where it
+/// differs from the IMU by as many and from the mean of both by more than kOutvotedSigmas.
+constexpr double kAgreeSigmas = 3, kOutvotedSigmas = 5;
 /// Added to the variances of a motion (m², rad²), whose covariance may be singular.
 constexpr double kMinVariance = 1e-14;
 
@@ -81,8 +84,12 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
   const double nis = inertial ? normalized_innovation_squared(p, innovation) : 0;
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
-  const bool confirmed = nis > vision_gate_ && wheels_confirm_prediction(motion);
-  if (nis > vision_gate_ && !confirmed) return reset_prediction(innovation, nis, motion);
+  if (const auto outvoted = inertial ? outvoted_by_imu_and_wheels(motion) : std::nullopt) {
+    monitor.accept(*outvoted, kOutvotedSigmas * kOutvotedSigmas, HealthReason::outvoted, options_.health.excluded_after,
+                   options_.health.readmit_after);
+    return false;
+  }
+  if (nis > vision_gate_) return reset_prediction(innovation, nis, motion);
   if (!monitor.accept(nis, vision_gate_, HealthReason::disagrees, options_.health.excluded_after,
                       options_.health.readmit_after))
     return false;
@@ -139,19 +146,33 @@ bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis
   return true;
 }
 
-/// Whether the wheels agree with the prediction and contradict vision.
-bool ErrorStateFilter::wheels_confirm_prediction(const RelativeMotion& motion) const {
+/// Whether the IMU and the wheels agree on how far the rover went since the last frame, and vision contradicts both:
+/// the normalized innovation squared of vision against their mean, else nothing. A repeating texture shifts a visual
+/// motion by its period, with a small covariance.
+std::optional<double> ErrorStateFilter::outvoted_by_imu_and_wheels(const RelativeMotion& motion) const {
+  const VisionMemory& vision = memory_.vision;
   const std::optional<WheelSample> wheels = wheels_at(motion.to);
-  if (!wheels || !memory_.step.has_wheels || memory_.step.from != motion.from) return false;
-  if (memory_.monitor(LocalizationSensor::wheels).state != SensorState::ok) return false;
-  const WheelStep step = step_to(*wheels);
-  const double counted = memory_.estimate.state.wheel_scale * step.counted_m;
-  const double sigma =
-      std::hypot(step.forward_sigma_m,
-                 std::sqrt(memory_.estimate.covariance(error_at::kWheelScale, error_at::kWheelScale)) * step.counted_m);
-  const double predicted = forward_of_step(memory_.estimate.state).metres;
-  return std::abs(counted - predicted) < 3 * sigma &&
-         std::abs(counted - motion.previous_from_current.translation().x()) > 5 * sigma;
+  if (!wheels || !vision.has_wheels || memory_.monitor(LocalizationSensor::wheels).state == SensorState::excluded)
+    return std::nullopt;
+  const NavigationState& s = memory_.estimate.state;
+  const ErrorCovariance& p = memory_.estimate.covariance;
+  const WheelStep step = step_between(vision.wheels, *wheels);
+  const double counted_m = s.wheel_scale * step.counted_m;
+  const double counted_variance = std::pow(step.forward_sigma_m, 2) +
+                                  p(error_at::kWheelScale, error_at::kWheelScale) * step.counted_m * step.counted_m;
+  const StepForward predicted = forward_since(s, error_at::kVisionClone);
+  const double predicted_variance = predicted.jacobian * p * predicted.jacobian.transpose();
+  const double seen_m = forward_of(motion.previous_from_current);
+  const auto square = [](double v) { return v * v; };
+  const bool agree =
+      square(counted_m - predicted.metres) <= square(kAgreeSigmas) * (counted_variance + predicted_variance);
+  const bool contradicts_imu =
+      square(seen_m - predicted.metres) > square(kAgreeSigmas) * (predicted_variance + motion.covariance(0, 0));
+  if (!agree || !contradicts_imu) return std::nullopt;
+  const double weights = 1 / counted_variance + 1 / predicted_variance;
+  const double mean_m = (counted_m / counted_variance + predicted.metres / predicted_variance) / weights;
+  const double nis = square(seen_m - mean_m) / (1 / weights + motion.covariance(0, 0));
+  return nis > square(kOutvotedSigmas) ? std::optional(nis) : std::nullopt;
 }
 
 /// Readmits an IMU that vision contradicted once its gyro agrees with the rotations by vision.
@@ -185,6 +206,9 @@ void ErrorStateFilter::begin_frame(Stamp stamp) {
   memory_.vision.odom_from_clone = odom.pose;
   memory_.vision.odom_covariance = odom.covariance;
   memory_.vision.clone_stamp = stamp;
+  const std::optional<WheelSample> wheels = wheels_at(stamp);
+  memory_.vision.has_wheels = wheels.has_value();
+  if (wheels) memory_.vision.wheels = *wheels;
   memory_.vision.constant_velocity_noise.setZero();
   memory_.vision.constant_velocity_s = 0;
   memory_.imu.gyro_rotation.setIdentity();
