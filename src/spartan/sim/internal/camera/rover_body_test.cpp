@@ -55,6 +55,9 @@ TEST(RoverBody, WheelsAreWhereTheChassisHasThem) {
       const Traced wheel = trace(body, somewhere, {x, 2 * y, 0.1}, {0, -y, 0});
       EXPECT_NEAR(wheel.hits.distance[0], 0.3 - 0.04, 1e-3) << "the outer side of the wheel";
       EXPECT_GT(wheel.albedo[0], 0);
+      const double end = x + std::copysign(0.1, x);
+      EXPECT_GT(trace(body, somewhere, {end - std::copysign(0.005, x), 2 * y, 0.1}, {0, -y, 0}).albedo[0], 0);
+      EXPECT_EQ(trace(body, somewhere, {end + std::copysign(0.005, x), 2 * y, 0.1}, {0, -y, 0}).albedo[0], 0);
       const Eigen::Vector3d normal(wheel.hits.normal_x[0], wheel.hits.normal_y[0], wheel.hits.normal_z[0]);
       EXPECT_LT((somewhere.rotation().conjugate() * normal - Eigen::Vector3d(0, y > 0 ? 1 : -1, 0)).norm(), 1e-4);
     }
