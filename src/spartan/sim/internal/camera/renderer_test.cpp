@@ -449,6 +449,56 @@ TEST(GroundScene, OverlappingScenesAgree) {
   }
 }
 
+// True disparities and occlusions against every triangle, from straight above; the far ground and rocks of the scene
+// are not among the reference's triangles.
+TEST(TrueDisparity, AgreesWithABruteForceReference) {
+  const ThreadPool workers(2);
+  const TerrainShape shape({}, 8);
+  RockFieldOptions pebbly;
+  pebbly.coverage = 0.3;
+  pebbly.largest_m = 0.15;
+  pebbly.height_ratio = 1;
+  pebbly.smallest_m = 0.02;
+  pebbly.pebbles_per_m2 = 0;
+  const RockField rocks(pebbly, 11);
+  const Region region{-0.3, -0.15, 0.3, 0.15};
+  const GroundScene scene(shape, rocks, region, workers);
+  const BruteForce brute(shape, rocks.rocks_in(region.grown(0.1)), scene.region());
+  constexpr double kBaseline_m = 0.12, kFocal_px = 60;
+  const Stereo s = parallel_pair(72, 28, kFocal_px, kBaseline_m);
+  const Pose left(Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX())),
+                  Eigen::Vector3d(-0.02, 0, shape.height(0, 0) + 0.25));
+  const Pose right = left * Pose::from_translation({kBaseline_m, 0, 0});
+  PairPoses poses;
+  poses.world_from_left.top = left;
+  poses.world_from_right.top = right;
+  const TrueDisparity truth = DisparityTruth(s.rig, s.rig, s.rig.pairs[0], s.view).of(scene, poses, workers);
+  int both = 0, hidden = 0, masks_differ = 0, missed = 0;
+  for (int y = 0; y < 28; ++y) {
+    for (int x = 0; x < 72; ++x) {
+      const Eigen::Vector3d direction((x - 35.5) / kFocal_px, (y - 13.5) / kFocal_px, 1);
+      const double depth =
+          brute.first(left.translation(), left.rotation() * direction.normalized(), 0).distance / direction.norm();
+      if (depth > 1) {
+        ++missed;
+        continue;
+      }
+      const double disparity = kFocal_px * kBaseline_m / depth;
+      EXPECT_NEAR(truth.disparity(x, y), disparity, 2e-4) << x << ' ' << y;
+      if (x - disparity < 0) continue;  // outside the right image
+      const Eigen::Vector3d point = left * Eigen::Vector3d(depth * direction), to_point = point - right.translation();
+      const double seen = brute.first(right.translation(), to_point.normalized(), 0).distance;
+      const bool visible = seen > to_point.norm() - 1e-3;
+      (visible ? both : hidden)++;
+      masks_differ += visible != (truth.mask(x, y) == 255) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(both, 300);
+  EXPECT_GT(hidden, 5);
+  EXPECT_LE(missed, 2) << "rays between two triangles of the reference";
+  EXPECT_LE(masks_differ, 1) << "edges of rocks";
+}
+
 // At a low sun the grid of the ground must not show: the power of the shading at the period of its vertices, over that
 // of the neighbouring frequencies.
 TEST(GroundScene, ItsGridDoesNotShowAtALowSun) {
