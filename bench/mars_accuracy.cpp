@@ -225,11 +225,12 @@ void score_stops(Drive& drive, bool same_rig, json& result) {
     maps.add_cells(map, truth, scoring.viewpoint_m);
   }
   // True disparities refer to the rectification by the recording's own rig.
-  if (same_rig)
+  if (same_rig) {
     result["stereo"] = {{"rms_px", number(std::sqrt(stereo.squares / stereo.inside))},
                         {"bias_px", number(stereo.sum / stereo.inside)},
                         {"beyond_1_px_percent", number(100 * stereo.beyond_1_px / stereo.matched)},
                         {"unmatched_percent", number(100 * (1 - stereo.matched / stereo.truth))}};
+  }
   const Sums& s = maps.scores;
   result["maps"] = {{"bias_mm", number(1e3 * s.error / s.cells)},
                     {"rms_mm", number(1e3 * std::sqrt(s.squares / s.cells))},

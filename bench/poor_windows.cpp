@@ -106,8 +106,8 @@ void count_recording(const std::string& folder, const std::string& scenario, con
     const Stamp stamp = stamps[k * stamps.size() / frames];
     const auto frame = (*source)->frame_at(pair_name, stamp);
     const std::string name = fmt::format("/{}/{}.png", pair_name, stamp.ns);
-    const auto truth = read_disparity(recording + "/truth/disparity" + name);
-    const auto mask = read_truth_mask(recording + "/truth/mask" + name);
+    const auto truth = read_disparity(fmt::format("{}/truth/disparity{}", recording, name));
+    const auto mask = read_truth_mask(fmt::format("{}/truth/mask{}", recording, name));
     if (!frame || !truth || !mask) continue;
     const auto view = imager->process(*frame);
     if (view) add(view->left, view->right, *truth, *mask, count);

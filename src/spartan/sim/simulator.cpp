@@ -226,7 +226,7 @@ class Simulation {
       tracks = std::make_shared<const WheelTracks>(request_.drive, request_.drive.frames()[from].time_s,
                                                    scenario_.chassis, region);
     }
-    return {world_, region, std::move(tracks), workers_};
+    return {world_, region, tracks, workers_};
   }
 
   Region region_of(std::size_t from, std::size_t to) const {

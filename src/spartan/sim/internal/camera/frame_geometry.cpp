@@ -47,6 +47,7 @@ FrameGeometry::RowTimes FrameGeometry::row_times(const PlannedFrame& frame, cons
 std::optional<RoverBody> FrameGeometry::visible_rover(const PlannedFrame& frame) const {
   if (!chassis_.visible) return std::nullopt;
   std::vector<MountedCamera> cameras;
+  cameras.reserve(rig_.cameras.size());
   for (const Camera& camera : rig_.cameras)
     cameras.push_back({camera_poses_.body_from_camera(camera.name, frame, frame.time_s), camera.mount != "body"});
   return RoverBody(make_rover_mesh(chassis_, rig_.pan_tilt_units, cameras));

@@ -37,7 +37,7 @@ RoverMesh make_rover_mesh(const ChassisOptions& chassis, const std::vector<PanTi
 class RoverBody {
  public:
   /// Throws std::runtime_error where Embree does not start (no AVX2).
-  explicit RoverBody(const RoverMesh& mesh);
+  explicit RoverBody(const RoverMesh& rover);
   RoverBody(RoverBody&&) noexcept;
   RoverBody& operator=(RoverBody&&) noexcept;
   ~RoverBody();

@@ -17,6 +17,7 @@ Rig shipped() {
 
 std::vector<MountedCamera> mounted(const Rig& rig, double pan_rad, double tilt_rad) {
   std::vector<MountedCamera> cameras;
+  cameras.reserve(rig.cameras.size());
   for (const Camera& camera : rig.cameras)
     cameras.push_back({rig.body_from_camera(camera.name, pan_rad, tilt_rad), camera.mount != "body"});
   return cameras;
@@ -34,9 +35,10 @@ struct Traced {
 Traced trace(const RoverBody& body, const Pose& world_from_body, const Eigen::Vector3d& from,
              const Eigen::Vector3d& towards) {
   RayPacket rays;
-  for (int k = 0; k < kPacket; ++k)
+  for (int k = 0; k < kPacket; ++k) {
     rays.set(k, (world_from_body * from).cast<float>(),
              (world_from_body.rotation() * towards.normalized()).cast<float>(), 100);
+  }
   Traced traced;
   std::fill_n(traced.hits.distance, kPacket, std::numeric_limits<float>::infinity());
   const Pose body_from_world = world_from_body.inverse();

@@ -189,7 +189,7 @@ FrameImage Sensor::expose(const LuminanceImage& luminance, const Exposure& expos
   };
   const auto [w, h] = camera_.size;
   if (format.bits > 8) return develop(Image<std::uint16_t>(w, h));
-  const FrameImage image = develop(Image<std::uint8_t>(w, h));
+  FrameImage image = develop(Image<std::uint8_t>(w, h));
   if (format.layout != PixelLayout::gray) return image;
   if (options_.wavelet_bits > 0) return compressed_by_wavelets(image, options_.wavelet_bits);
   return options_.jpeg_quality > 0 ? compressed_by_jpeg(image, options_.jpeg_quality) : image;
