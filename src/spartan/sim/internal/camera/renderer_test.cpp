@@ -6,13 +6,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <vector>
 
 #include "spartan/core/trajectory.h"
 #include "spartan/numerics/random.h"
+#include "spartan/sim/internal/camera/brute_force_test.h"
 #include "spartan/sim/internal/camera/sensor.h"
 #include "spartan/sim/internal/camera/truth.h"
 #include "spartan/sim/internal/world/rock_shape.h"
@@ -256,83 +256,6 @@ TEST(TrueDisparity, HoldsForARollingShutter) {
   EXPECT_LT(rolling.median, 1.35 * rolling.noise_floor);
 }
 
-// A reference renderer without acceleration structure: every triangle, double precision.
-class BruteForce {
- public:
-  BruteForce(const TerrainShape& shape, const std::vector<Rock>& rocks, const Region& region) : shape_(shape) {
-    constexpr double kStep = GroundScene::kGrid_m;
-    const int nx = static_cast<int>(std::lround((region.x1 - region.x0) / kStep)),
-              ny = static_cast<int>(std::lround((region.y1 - region.y0) / kStep));
-    const auto corner = [&](int i, int j) {
-      const double x = region.x0 + i * kStep, y = region.y0 + j * kStep;
-      return Eigen::Vector3d(x, y, shape.height(x, y));
-    };
-    // Embree splits a cell of a grid along the diagonal from corner (1, 0) to (0, 1).
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        triangles_.push_back({corner(i, j), corner(i + 1, j), corner(i, j + 1), false});
-        triangles_.push_back({corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1), false});
-      }
-    }
-    for (const Rock& rock : rocks) {
-      const TriangleMesh mesh = make_rock(rock, 0.007);
-      const Eigen::Vector3d foot(rock.x, rock.y, shape.height(rock.x, rock.y));
-      for (const auto& [a, b, c] : mesh.triangles) {
-        triangles_.push_back({foot + mesh.vertices[a].cast<double>(), foot + mesh.vertices[b].cast<double>(),
-                              foot + mesh.vertices[c].cast<double>(), true});
-      }
-    }
-  }
-
-  struct Hit {
-    double distance = 1e9;
-    Eigen::Vector3d normal;
-    bool rock = false;
-  };
-  // Möller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997.
-  Hit first(const Eigen::Vector3d& from, const Eigen::Vector3d& d, double nearest) const {
-    Hit hit;
-    for (const Triangle& t : triangles_) {
-      const Eigen::Vector3d e1 = t.b - t.a, e2 = t.c - t.a, p = d.cross(e2);
-      const double det = e1.dot(p);
-      if (std::abs(det) < 1e-15) continue;
-      const Eigen::Vector3d s = from - t.a;
-      const double u = s.dot(p) / det;
-      if (u < 0 || u > 1) continue;
-      const Eigen::Vector3d q = s.cross(e1);
-      const double v = d.dot(q) / det, along = e2.dot(q) / det;
-      if (v < 0 || u + v > 1 || along < nearest || along > hit.distance) continue;
-      hit = {along, e1.cross(e2).normalized(), t.rock};
-    }
-    if (hit.distance < 1e8 && !hit.rock) hit.normal = ground_normal(from + hit.distance * d);
-    if (hit.normal.dot(d) > 0) hit.normal = -hit.normal;
-    return hit;
-  }
-
- private:
-  // Slopes by central differences at the corners of the cell, and bilinear between them.
-  Eigen::Vector3d ground_normal(const Eigen::Vector3d& at) const {
-    constexpr double kStep = GroundScene::kGrid_m;
-    const double u = at.x() / kStep, v = at.y() / kStep;
-    Eigen::Vector3d normal(0, 0, 1);
-    for (const double j : {std::floor(v), std::floor(v) + 1}) {
-      for (const double i : {std::floor(u), std::floor(u) + 1}) {
-        const double weight = (1 - std::abs(u - i)) * (1 - std::abs(v - j)), x = i * kStep, y = j * kStep;
-        normal.x() -= weight * (shape_.height(x + kStep, y) - shape_.height(x - kStep, y)) / (2 * kStep);
-        normal.y() -= weight * (shape_.height(x, y + kStep) - shape_.height(x, y - kStep)) / (2 * kStep);
-      }
-    }
-    return normal.normalized();
-  }
-
-  const TerrainShape& shape_;
-  struct Triangle {
-    Eigen::Vector3d a, b, c;
-    bool rock;
-  };
-  std::vector<Triangle> triangles_;
-};
-
 TEST(Renderer, AgreesWithABruteForceReference) {
   const ThreadPool workers(2);
   const TerrainShape shape({}, 8);
@@ -429,26 +352,6 @@ TEST(Renderer, IsBitIdenticalForAnyNumberOfThreads) {
   }
 }
 
-TEST(GroundScene, OverlappingScenesAgree) {
-  const ThreadPool workers(2);
-  const TerrainShape shape({}, 3);
-  const RockField rocks({.coverage = 0.1}, 3);
-  const GroundScene a(shape, rocks, {-1, -1, 2, 1}, workers), b(shape, rocks, {0.333, -1.2, 3.1, 1.5}, workers);
-  Random random(1);
-  for (int i = 0; i < 500; ++i) {
-    const double x = random.uniform(0.4, 1.9), y = random.uniform(-0.9, 0.9);
-    const auto height = [&](const GroundScene& scene) {
-      RayPacket rays;
-      for (int k = 0; k < kPacket; ++k) {
-        rays.set(k, (Eigen::Vector3d(x, y, 5) - scene.origin()).cast<float>(), -Eigen::Vector3f::UnitZ(),
-                 k == 0 ? 20.0F : -1.0F);
-      }
-      return 5 - static_cast<double>(scene.intersect(rays).distance[0]);
-    };
-    EXPECT_NEAR(height(a), height(b), 2e-5);
-  }
-}
-
 // True disparities and occlusions against every triangle, from straight above; the far ground and rocks of the scene
 // are not among the reference's triangles.
 TEST(TrueDisparity, AgreesWithABruteForceReference) {
@@ -497,65 +400,6 @@ TEST(TrueDisparity, AgreesWithABruteForceReference) {
   EXPECT_GT(hidden, 5);
   EXPECT_LE(missed, 2) << "rays between two triangles of the reference";
   EXPECT_LE(masks_differ, 1) << "edges of rocks";
-}
-
-// At a low sun the grid of the ground must not show: the power of the shading at the period of its vertices, over that
-// of the neighbouring frequencies.
-TEST(GroundScene, ItsGridDoesNotShowAtALowSun) {
-  const ThreadPool workers(2);
-  const TerrainShape shape({}, 8);
-  const GroundScene scene(shape, RockField({.coverage = 0, .pebbles_per_m2 = 0}, 8), {0, 0, 2.2, 0.3}, workers);
-  const Sun sun({.sun_elevation_deg = 8, .sun_azimuth_deg = 20, .sun_diameter_deg = 0.35});
-  constexpr double kStep_m = 0.0005;
-  constexpr int kCount = 4000, kLine = 400;  // kLine: index of the frequency 1/kGrid_m
-  const auto wave = [](int k, int i) {
-    const double phase = 2 * std::numbers::pi * k * i / kCount;
-    return std::complex<double>(std::cos(phase), -std::sin(phase));
-  };
-  constexpr int kSpread = 160, kNear = 24, kFar = 100;  // bins of 0.5/m
-  std::vector<double> power(2 * kSpread + 1);           // around kLine
-  for (int row = 0; row < 24; ++row) {
-    std::vector<double> shade(kCount);
-    for (int first = 0; first < kCount; first += kPacket) {
-      RayPacket rays, shadows;
-      for (int k = 0; k < kPacket; ++k) {
-        const Eigen::Vector3d from(0.1 + kStep_m * (first + k), 0.02 + 0.0113 * row, 5);
-        rays.set(k, (from - scene.origin()).cast<float>(), -Eigen::Vector3f::UnitZ(), 20);
-      }
-      const HitPacket hits = scene.intersect(rays);
-      for (int t = 0; t < Sun::kPoints; ++t) {
-        for (int k = 0; k < kPacket; ++k) {
-          const Eigen::Vector3f n(hits.normal_x[k], hits.normal_y[k], hits.normal_z[k]);
-          const Eigen::Vector3f place(rays.origin_x[k], rays.origin_y[k], rays.origin_z[k] - hits.distance[k]);
-          shadows.set(k, place + 2e-4F * n, sun.direction(t), n.dot(sun.direction(t)) > 0 ? 20 : -1.0F);
-        }
-        const std::uint32_t dark = scene.occluded(shadows);
-        for (int k = 0; k < kPacket; ++k) {
-          const Eigen::Vector3f n(hits.normal_x[k], hits.normal_y[k], hits.normal_z[k]);
-          if (shadows.max_distance[k] > 0 && (dark >> k & 1U) == 0)
-            shade[static_cast<std::size_t>(first + k)] += static_cast<double>(n.dot(sun.direction(t)));
-        }
-      }
-    }
-    // Hann window, so that low frequencies do not leak into these.
-    for (int i = 0; i < kCount; ++i)
-      shade[static_cast<std::size_t>(i)] *= 0.5 - 0.5 * std::cos(2 * std::numbers::pi * i / kCount);
-    for (int k = 0; k < static_cast<int>(power.size()); k += 4) {
-      std::complex<double> sum = 0;
-      for (int i = 0; i < kCount; ++i) sum += shade[static_cast<std::size_t>(i)] * wave(kLine - kSpread + k, i);
-      power[static_cast<std::size_t>(k)] += std::norm(sum);
-    }
-  }
-  double line = 0, around = 0;
-  int lines = 0, arounds = 0;
-  for (int k = 0; k < static_cast<int>(power.size()); k += 4) {
-    const int away = std::abs(k - kSpread);
-    if (away <= kNear) line += power[static_cast<std::size_t>(k)], ++lines;
-    if (away >= kFar) around += power[static_cast<std::size_t>(k)], ++arounds;
-  }
-  const double ratio = line / lines / (around / arounds);
-  fmt::print("shading at 8 degrees: power at the grid's frequency over its surroundings {:.2f}\n", ratio);
-  EXPECT_LT(ratio, 3);
 }
 
 }  // namespace
