@@ -197,13 +197,32 @@ double roughness_of(const TerrainTruth& truth) {
   return median_of(values);
 }
 
-void score_stops(Drive& drive, bool same_rig, json& result) {
+// True disparities refer to the rectification by the recording's own rig, so these disparities are those of the
+// calibration as it is, whatever rig the run aligned.
+json score_disparities(Drive& drive, Imager& imager) {
+  StopMapper mapper = StopMapper::create({}, {}, ThreadPool(2)).value();
+  StereoSums stereo;
+  for (const auto& [position, frames] : drive.stops) {
+    add_views(drive, imager, mapper, frames);
+    for (const StopView& view : mapper.views()) {
+      const std::string name = fmt::format("/{}/{}.png", view.pair, view.stamp.ns);
+      const auto disparity = read_disparity(drive.folder + "/truth/disparity" + name);
+      const auto mask = read_truth_mask(drive.folder + "/truth/mask" + name);
+      if (disparity && mask) stereo.add(view.disparity, *disparity, *mask);
+    }
+  }
+  return {{"rms_px", number(std::sqrt(stereo.squares / stereo.inside))},
+          {"bias_px", number(stereo.sum / stereo.inside)},
+          {"beyond_1_px_percent", number(100 * stereo.beyond_1_px / stereo.matched)},
+          {"unmatched_percent", number(100 * (1 - stereo.matched / stereo.truth))}};
+}
+
+void score_stops(Drive& drive, json& result) {
   auto imager = Imager::create(drive.rig, ImagingOptions(), ThreadPool(2));
   if (!imager || drive.stops.empty()) return;
   StopMapper mapper = StopMapper::create({}, {}, ThreadPool(2)).value();
   const DriveTruth of_drive(drive);
   const TerrainTruth truth = of_drive.view();
-  StereoSums stereo;
   MapSums maps;
   for (const auto& [position, frames] : drive.stops) {
     add_views(drive, *imager, mapper, frames);
@@ -212,10 +231,6 @@ void score_stops(Drive& drive, bool same_rig, json& result) {
     Visibility visibility(map.size());
     for (const StopView& view : mapper.views()) {
       add_true_view(drive, view.pair, view.stamp, view.geometry, pose, map.place, visibility);
-      const std::string name = fmt::format("/{}/{}.png", view.pair, view.stamp.ns);
-      const auto disparity = read_disparity(drive.folder + "/truth/disparity" + name);
-      const auto mask = read_truth_mask(drive.folder + "/truth/mask" + name);
-      if (same_rig && disparity && mask) stereo.add(view.disparity, *disparity, *mask);
     }
     MapMetricsOptions scoring;
     scoring.viewpoint_m = pose.translation().head<2>();
@@ -223,13 +238,6 @@ void score_stops(Drive& drive, bool same_rig, json& result) {
     maps.scores.add(evaluate_map(
         {map.place, map.elevation_m, class_band(map.kind), visibility.pixels, visibility.lowest_m}, truth, scoring));
     maps.add_cells(map, truth, scoring.viewpoint_m);
-  }
-  // True disparities refer to the rectification by the recording's own rig.
-  if (same_rig) {
-    result["stereo"] = {{"rms_px", number(std::sqrt(stereo.squares / stereo.inside))},
-                        {"bias_px", number(stereo.sum / stereo.inside)},
-                        {"beyond_1_px_percent", number(100 * stereo.beyond_1_px / stereo.matched)},
-                        {"unmatched_percent", number(100 * (1 - stereo.matched / stereo.truth))}};
   }
   const Sums& s = maps.scores;
   result["maps"] = {{"bias_mm", number(1e3 * s.error / s.cells)},
@@ -254,14 +262,15 @@ void score(const std::string& run_folder, const std::string& recording) {
   if (!frames) throw std::runtime_error(frames.error().message());
   const auto rig = read_rig_yaml(RunFolder{run_folder}.rig());
   if (!rig) throw std::runtime_error(rig.error().message());
-  const bool same_rig = *rig == drive->rig;
-  drive->rig = *rig;
   json result;
+  auto own_imager = Imager::create(drive->rig, ImagingOptions(), ThreadPool(2));
+  if (own_imager) result["stereo"] = score_disparities(*drive, *own_imager);
+  drive->rig = *rig;
   for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
     if (has_trajectory(*frames, kind)) result[std::string(name_of(kind))] = score_trajectory(*drive, *frames, kind);
   }
   result["odometry"]["normalized_motions"] = number(normalized_motions(*drive, *frames));
-  score_stops(*drive, same_rig, result);
+  score_stops(*drive, result);
   fmt::print("{}\n", result.dump());
 }
 

@@ -36,7 +36,7 @@ MAY_INCLUDE = {
     "eval": BASE,
     "sim": BASE | {"rig", "calibration_io", "camera"},
     "testing": BASE | {"rig", "calibration_io", "camera"},
-    "system": SYSTEM | {"figures"},
+    "system": SYSTEM | {"figures", "calibration"},
     "report": SYSTEM | {"figures", "calibration", "rig_design", "eval", "system"},
     "program": ALL,
     "tests": ALL | {"figures", "testing"},

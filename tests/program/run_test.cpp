@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include "run_results.h"
 #include "small_drive.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/rig/rig.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
@@ -104,6 +106,27 @@ TEST_F(Run, OptionSelectsDenseDisparitiesForTheOdometry) {
       run_program({"evaluate", path("dense"), "--truth", drive(), "--align", "first", "--json"});
   ASSERT_EQ(score.exit_code, 0) << score.err;
   EXPECT_LT(nlohmann::json::parse(score.out)["ate_m"]["rmse"], 0.02);
+}
+
+TEST_F(Run, AlignsTheRowsOfThePairByItsFirstFrames) {
+  Rig rig = read_rig_yaml(testing::small_runs_folder() + "/drive_run/rig.yaml").value();
+  const StereoPair pair = rig.pairs.front();
+  const Pose exact = rig.right_from_left(pair);
+  const auto right = std::find_if(rig.cameras.begin(), rig.cameras.end(),
+                                  [&](const Camera& camera) { return camera.name == pair.right; });
+  right->mount_from_camera = right->mount_from_camera * Pose(exp_so3({0.004, 0, 0}), Eigen::Vector3d::Zero());
+  std::ofstream(path("wrong.yaml")) << to_rig_yaml(rig);
+  const std::vector<std::string> options{"--rig", path("wrong.yaml"), "--odometry-only"};
+  const ProgramResult result = run("out", options);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, ContainsRegex("pair [a-z]+: rows differ by [0-9.]+ px on the mean"));
+  const Rig aligned = read_rig_yaml(path("out/rig.yaml")).value();
+  EXPECT_LT(rotation_angle(exact.inverse() * aligned.right_from_left(pair)), 0.0004);
+  std::vector<std::string> as_given = options;
+  as_given.insert(as_given.end(), {"--set", "align_rows=false"});
+  const ProgramResult kept = run("kept", as_given);
+  EXPECT_THAT(kept.err, ::testing::Not(HasSubstr("rows differ")));
+  EXPECT_EQ(read_rig_yaml(path("kept/rig.yaml")).value(), rig);
 }
 
 TEST_F(Run, GivesTheSameBytesForAnyNumberOfThreads) {

@@ -2,12 +2,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "program.h"
 #include "small_scenario.h"
@@ -129,6 +132,37 @@ TEST_F(Simulate, TheSameSeedGivesTheSameBytesWhateverTheThreads) {
   for (const auto& [name, content] : one) EXPECT_TRUE(two.at(name) == content) << name;
   ASSERT_EQ(simulate("other", {"--seed", "2"}).exit_code, 0);
   EXPECT_NE(files_below(path("other"))["truth/poses.tum"], one.at("truth/poses.tum"));
+}
+
+// Exposure times of the narrow pair, in the order of the frames.
+std::vector<std::string> narrow_exposures(const std::string& frames_csv) {
+  std::istringstream lines(frames_csv);
+  std::vector<std::string> exposures;
+  std::ptrdiff_t column = -1;
+  for (std::string line; std::getline(lines, line);) {
+    std::vector<std::string> words;
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) words.push_back(cell);
+    if (column < 0) {
+      column = std::find(words.begin(), words.end(), "exposure_us") - words.begin();
+    } else if (line.find("narrow") != std::string::npos) {
+      exposures.push_back(words.at(static_cast<std::size_t>(column)));
+    }
+  }
+  return exposures;
+}
+
+TEST_F(Simulate, AMeterThatLagsExposesAsForTheFrameBefore) {
+  write("late.yaml", std::string(kSmallScenario) + "\nsensor: {meter_lags: true}\n");
+  ASSERT_EQ(simulate("rec").exit_code, 0);
+  ASSERT_EQ(run_program({"simulate", path("late.yaml"), "-o", path("late")}).exit_code, 0);
+  const std::vector<std::string> exposures = narrow_exposures(files_below(path("rec"))["frames.csv"]),
+                                 late = narrow_exposures(files_below(path("late"))["frames.csv"]);
+  ASSERT_EQ(exposures.size(), 4U);
+  ASSERT_EQ(late.size(), 4U);
+  EXPECT_NE(exposures[1], exposures[2]);
+  EXPECT_EQ(late[0], exposures[0]) << "there is no frame before";
+  for (std::size_t i = 1; i < late.size(); ++i) EXPECT_EQ(late[i], exposures[i - 1]);
 }
 
 TEST_F(Simulate, AnotherNoiseSeedChangesTheImagesAlone) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "spartan/core/pose.h"
@@ -80,6 +81,45 @@ TEST_F(PairInspectionOfImages, FindsAndCorrectsAPitch) {
   const auto again = inspect_pair(*result->check.corrected, rig.pairs.front(), views_, ThreadPool(1));
   ASSERT_TRUE(again) << again.error().message();
   EXPECT_EQ(name_of(again->check.grade), "good");
+}
+
+// Pitch and roll are removed; a yaw, which rows hardly observe, is kept.
+TEST_F(PairInspectionOfImages, AlignsRowsByPitchAndRollAlone) {
+  const double degree = kRadiansPerDegree;
+  Rig rig = rig_with_pitch(0);
+  const Pose exact = rig.right_from_left(rig.pairs.front()).inverse();
+  const Pose wrong(exact.rotation() * exp_so3({0.1 * degree, 0.05 * degree, -0.2 * degree}), exact.translation());
+  rig.cameras[1].mount_from_camera = rig.cameras[0].mount_from_camera * wrong;
+  const auto aligned = align_rows(rig, rig.pairs.front(), views_, ThreadPool(1));
+  ASSERT_TRUE(aligned) << aligned.error().message();
+  EXPECT_GT(aligned->given.mean_px, 0.7);
+  EXPECT_LT(aligned->aligned.mean_px, 0.3);
+  ASSERT_TRUE(aligned->rig);
+  const Pose corrected = aligned->rig->right_from_left(rig.pairs.front()).inverse();
+  const Eigen::Vector3d left = log_so3((exact.inverse() * corrected).rotation()) / degree;
+  EXPECT_NEAR(left.x(), 0, 0.01);
+  EXPECT_NEAR(left.y(), 0.05, 0.005);
+  EXPECT_NEAR(left.z(), 0, 0.02);
+  EXPECT_EQ(aligned->rig->cameras[0], rig.cameras[0]);
+}
+
+TEST_F(PairInspectionOfImages, KeepsACalibrationWhoseRowsAgree) {
+  for (const double pitch_deg : {0.0, 0.02}) {
+    const Rig rig = rig_with_pitch(pitch_deg * kRadiansPerDegree);
+    const auto aligned = align_rows(rig, rig.pairs.front(), views_, ThreadPool(1));
+    ASSERT_TRUE(aligned) << aligned.error().message();
+    EXPECT_GT(aligned->inliers, 200);
+    EXPECT_FALSE(aligned->rig) << "0.02 degrees are 0.2 px";
+  }
+}
+
+// Frames of which left and right do not belong together.
+TEST_F(PairInspectionOfImages, AlignsNothingByImagesOfDifferentPlaces) {
+  const Rig rig = rig_with_pitch(0.3 * kRadiansPerDegree);
+  std::swap(views_[0].right, views_[1].right);
+  const auto aligned = align_rows(rig, rig.pairs.front(), views_, ThreadPool(1));
+  ASSERT_TRUE(aligned) << aligned.error().message();
+  EXPECT_FALSE(aligned->rig);
 }
 
 TEST_F(PairInspectionOfImages, NeedsNoCalibration) {

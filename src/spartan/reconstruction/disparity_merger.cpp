@@ -182,6 +182,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
     }
     float weights = 0, sum = 0, gray = 0;
     std::uint8_t seen_by = 0;
+    double baseline_m = 0;
     const Candidate* best = &candidates[first];
     for (std::size_t i = first; i < last; ++i) {
       const Candidate& c = candidates[i];
@@ -189,6 +190,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
       sum += c.range / c.variance;
       gray += c.gray / c.variance;
       seen_by = static_cast<std::uint8_t>(seen_by | 1U << c.view % kViewBits);
+      baseline_m = std::max(baseline_m, views[c.view].geometry.stereo.baseline_m);
       if (c.count > best->count) best = &c;
     }
     merged.range_m(x, row) = sum / weights;
@@ -196,6 +198,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
     merged.gray(x, row) = static_cast<std::uint8_t>(std::lround(gray / weights));
     merged.views(x, row) = seen_by;
     merged.classes(x, row) = most_votes(best->votes);
+    merged.baseline_m(x, row) = static_cast<float>(baseline_m);
   }
 }
 
@@ -206,7 +209,8 @@ namespace {
 constexpr int kGap = 2;
 
 void fill_gaps(MergedRange& merged, float gate, const ThreadPool& workers) {
-  const Image<float> range = merged.range_m.clone(), sigma = merged.sigma_m.clone();
+  const Image<float> range = merged.range_m.clone(), sigma = merged.sigma_m.clone(),
+                     baseline = merged.baseline_m.clone();
   const Image<std::uint8_t> views = merged.views.clone(), gray = merged.gray.clone(), classes = merged.classes.clone();
   const auto known = [&](int x, int y) { return range.contains(x, y) && std::isfinite(range(x, y)); };
   const auto fill = [&](int x, int y) {
@@ -223,6 +227,7 @@ void fill_gaps(MergedRange& merged, float gate, const ThreadPool& workers) {
         merged.views(x, y) = views(x0, y0) | views(x1, y1);
         merged.gray(x, y) = static_cast<std::uint8_t>((gray(x0, y0) + gray(x1, y1)) / 2);
         merged.classes(x, y) = classes(x0, y0);
+        merged.baseline_m(x, y) = baseline(x0, y0);
         return;
       }
     }
@@ -293,6 +298,7 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
                      Image<std::uint8_t>(size),
                      Image<std::uint8_t>(size),
                      Image<std::uint8_t>(size),
+                     Image<float>(size.width, size.height, 0.0F),
                      {}};
   workers_.parallel_for(0, size.height, 16, [&](int from, int to) {
     for (int row = from; row < to; ++row) fuse_row(views, layers, row, merged);

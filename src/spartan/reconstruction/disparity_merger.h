@@ -104,6 +104,7 @@ struct MergedRange {
   Image<std::uint8_t> views;    ///< Bit i: view i, i + 8, i + 16 … contributed.
   Image<std::uint8_t> gray;     ///< Mean gray level, weighted by the ranges' inverse variances.
   Image<std::uint8_t> classes;  ///< Majority GroundClass of the view with the most pixels in the cell.
+  Image<float> baseline_m;      ///< Of the pair that sees the cell, the longest of several.
   /// Not 0 at the upper border of what the views cover: no view looks half a degree above the cell, or what it sees
   /// there is beyond the largest range. Empty: nowhere.
   Image<std::uint8_t> truncated;

@@ -47,7 +47,9 @@ struct LocalMap {
   GeoTransform place;
   Image<float> elevation_m, elevation_min_m, elevation_max_m;
   Image<float> variance_m2;  ///< Variance of elevation_m.
-  Image<float> count;        ///< Number of points; 0 where unobserved.
+  /// The part of variance_m2 by errors of the calibration, which cells and further maps have in common. Empty: 0.
+  Image<float> common_variance_m2;
+  Image<float> count;     ///< Number of points; 0 where unobserved.
   Image<float> ground_m;  ///< Elevation of the ground surface beneath obstacles and above cavities; NaN where too few
                           ///< cells are around.
   Image<float> slope_rad, roughness_m, step_m;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "spartan/numerics/connected_components.h"
+#include "spartan/reconstruction/internal/calibration_variance.h"
 #include "spartan/reconstruction/internal/cell_support.h"
 
 namespace spartan {
@@ -25,6 +26,7 @@ struct Cell {
   double used_weights = 0, sum = 0;  // of the points between the trimmed ends
   float lowest = kNoHeight, highest = kNoHeight;
   Eigen::Vector3f rays = Eigen::Vector3f::Zero();  // sum of the directions from the cameras
+  float ranges_m = 0, longest_baseline_m = 0;      // sum of the ranges
   int count = 0, ground = 0;
   bool truncated = false;
 };
@@ -78,6 +80,8 @@ CellPoints rasterize_points(std::span<const SurfacePoint> points, const Pose& ma
     ++cell.count;
     cell.weights += 1 / (sigma * sigma);
     cell.rays += rotation * point.ray;
+    cell.ranges_m += point.range_m;
+    cell.longest_baseline_m = std::max(cell.longest_baseline_m, point.baseline_m);
     cell.truncated = cell.truncated || point.truncated;
     cell.ground += point.kind == GroundClass::ground ? 1 : 0;
   }
@@ -178,6 +182,39 @@ bool leave_out(const Image<std::uint8_t>& cells, LocalMap& map) {
   return any;
 }
 
+// Slope of a surface, by the differences between the neighbours of a cell that are known.
+Eigen::Vector2d slope_at(const Image<float>& surface_m, int x, int y, double cell_m) {
+  const auto along = [&](int dx, int dy) {
+    const auto height = [&](int sign) {
+      const int c = x + sign * dx, r = y - sign * dy;  // rows run south
+      return surface_m.contains(c, r) ? static_cast<double>(surface_m(c, r)) : static_cast<double>(kNoHeight);
+    };
+    const double slope = (height(1) - height(-1)) / (2 * cell_m);
+    return std::isfinite(slope) ? slope : 0;
+  };
+  return {along(1, 0), along(0, 1)};
+}
+
+// Adds the errors of the calibration to the variances.
+void add_calibration_errors(const CalibrationErrorOptions& errors, const Grid& grid, LocalMap& map) {
+  const auto [w, h] = map.size();
+  map.common_variance_m2 = Image<float>(w, h, kNoHeight);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const Cell& cell = grid.at(x, y);
+      if (!(map.count(x, y) > 0)) continue;
+      map.common_variance_m2(x, y) = 0;
+      if (cell.ranges_m == 0) continue;
+      const Eigen::Vector3d arm =
+          (cell.ranges_m / static_cast<float>(cell.count) * cell.rays.normalized()).cast<double>();
+      const internal::CellSight sight{arm, static_cast<double>(cell.longest_baseline_m),
+                                      slope_at(map.ground_m, x, y, map.place.cell_m)};
+      map.common_variance_m2(x, y) = static_cast<float>(internal::calibration_variance_m2(sight, errors));
+      map.variance_m2(x, y) += map.common_variance_m2(x, y);
+    }
+  }
+}
+
 // Obstacles are the 8-connected components of obstacle cells.
 void list_obstacles(LocalMap& map) {
   const auto [w, h] = map.size();
@@ -216,7 +253,8 @@ std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
       const Eigen::Vector3d place = merged.body_from_centre.translation() + static_cast<double>(range) * ray;
       points.push_back({place.cast<float>(), merged.sigma_m(x, y), ray.cast<float>(),
                         static_cast<GroundClass>(merged.classes(x, y)),
-                        !merged.truncated.empty() && merged.truncated(x, y) != 0});
+                        !merged.truncated.empty() && merged.truncated(x, y) != 0, range,
+                        merged.baseline_m.empty() ? 0.0F : merged.baseline_m(x, y)});
     }
   }
   return points;
@@ -227,10 +265,10 @@ Result<MapGenerator> MapGenerator::create(const MapOptions& options, ThreadPool 
   return MapGenerator(options, std::move(workers));
 }
 
-LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const {
-  Grid grid = make_grid(options_, map_from_body.translation());
-  CellPoints sorted = rasterize_points(points, map_from_body, grid);
-  sum_heights(sorted, options_.trimmed_fraction, grid, workers_);
+namespace {
+
+// A map of the elevations of the grid's cells, without ground and classes.
+LocalMap map_of(const Grid& grid, const Pose& map_from_body, int min_points) {
   LocalMap map;
   map.map_from_body = map_from_body;
   map.place = grid.place;
@@ -240,11 +278,10 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
     *layer = Image<float>(w, h, kNoHeight);
   for (Image<float>* layer : {&map.count, &map.occupancy_logodds}) *layer = Image<float>(w, h, 0.0F);
   map.kind = Image<GroundClass>(w, h);
-  Image<internal::LineOfSight> towards_camera(w, h);
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       const Cell& cell = grid.at(x, y);
-      if (cell.count == 0 || cell.count < options_.min_points) continue;
+      if (cell.count == 0 || cell.count < min_points) continue;
       map.elevation_m(x, y) = static_cast<float>(cell.sum / cell.used_weights);
       map.elevation_min_m(x, y) = cell.lowest;
       map.elevation_max_m(x, y) = cell.highest;
@@ -252,21 +289,49 @@ LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose
       // Errors of a cell's points are correlated (disparities are smooth), so the variance of their mean is that of
       // one.
       map.variance_m2(x, y) = static_cast<float>(cell.count / cell.weights);
-      const float along = std::max(cell.rays.head<2>().norm(), 1e-6F);
-      towards_camera(x, y) = {-cell.rays.x() / along, -cell.rays.y() / along, -cell.rays.z() / along};
     }
   }
+  return map;
+}
+
+Image<internal::LineOfSight> lines_of_sight(const Grid& grid) {
+  Image<internal::LineOfSight> towards_camera(grid.width, grid.height);
+  for (int y = 0; y < grid.height; ++y) {
+    for (int x = 0; x < grid.width; ++x) {
+      const Eigen::Vector3f& rays = grid.at(x, y).rays;
+      const float along = std::max(rays.head<2>().norm(), 1e-6F);
+      towards_camera(x, y) = {-rays.x() / along, -rays.y() / along, -rays.z() / along};
+    }
+  }
+  return towards_camera;
+}
+
+// Leaves out the cells that wrong matches have made, and fits the ground to the rest.
+void fit_ground_of_possible_cells(const MapOptions& options, const Grid& grid, const ThreadPool& workers,
+                                  LocalMap& map) {
   const internal::CellHeights heights{map.elevation_min_m, map.elevation_max_m};
-  const double margin_m = kSupportGap * options_.cell_m;
-  leave_out(internal::isolated_cells(heights, margin_m, options_.min_support_cells), map);
+  const double margin_m = kSupportGap * options.cell_m;
+  leave_out(internal::isolated_cells(heights, margin_m, options.min_support_cells), map);
   const auto fit = [&] {
-    return fit_ground(map.elevation_m, ground_cells(grid, map), options_.cell_m, options_.ground, workers_);
+    return fit_ground(map.elevation_m, ground_cells(grid, map), options.cell_m, options.ground, workers);
   };
   map.ground_m = fit();
-  const internal::GroundView view{map.ground_m, towards_camera, options_.cell_m, margin_m,
-                                  kOpening * options_.ground.window_m};
+  const Image<internal::LineOfSight> towards_camera = lines_of_sight(grid);
+  const internal::GroundView view{map.ground_m, towards_camera, options.cell_m, margin_m,
+                                  kOpening * options.ground.window_m};
   if (leave_out(internal::cells_seen_through_ground(heights, view), map)) map.ground_m = fit();
+}
+
+}  // namespace
+
+LocalMap MapGenerator::generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const {
+  Grid grid = make_grid(options_, map_from_body.translation());
+  CellPoints sorted = rasterize_points(points, map_from_body, grid);
+  sum_heights(sorted, options_.trimmed_fraction, grid, workers_);
+  LocalMap map = map_of(grid, map_from_body, options_.min_points);
+  fit_ground_of_possible_cells(options_, grid, workers_, map);
   classify(options_, grid, map);
+  add_calibration_errors(options_.calibration, grid, map);
   Traversability shape = compute_traversability(
       {map.elevation_m, map.elevation_max_m, map.ground_m, map.kind, map.place.cell_m}, options_.rover, workers_);
   map.slope_rad = std::move(shape.slope_rad);

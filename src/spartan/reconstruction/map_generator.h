@@ -106,6 +106,41 @@ struct Traversability {
 Traversability compute_traversability(const TerrainSurface& surface, const RoverLimits& rover,
                                       const ThreadPool& workers);
 
+/// Standard deviations of what calibration and actuators get wrong. Errors of one kind move all points of a view
+/// together, so that neighbouring cells and further observations do not average them. The defaults are those of an
+/// ordinary rover (`rover: ordinary` of the simulator).
+struct CalibrationErrorOptions {
+  double pair_rotation_deg = 0.025;  ///< Between the cameras of a pair, about each axis.
+  double scale_percent = 0.15;       ///< Of ranges: focal length and baseline together.
+  double mount_rotation_deg = 0.15;  ///< Of the mount of the cameras on the body, about each axis.
+  double mount_mm = 2;               ///< The same, along each axis.
+  double pan_tilt_deg = 0.1;         ///< Of the angles that a pan-tilt unit reports.
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("pair_rotation_deg", pair_rotation_deg,
+            "Standard deviation in degrees of the rotation between the cameras of a pair that the calibration leaves; "
+            "it changes all disparities, and raising it raises the variance of distant cells.",
+            between(0, 10));
+    v.field("scale_percent", scale_percent,
+            "Standard deviation in percent of the scale of ranges, from focal length and baseline; raising it raises "
+            "the variance of cells in proportion to the squared range.",
+            between(0, 50));
+    v.field("mount_rotation_deg", mount_rotation_deg,
+            "Standard deviation in degrees of the rotation of the cameras' mount on the body; raising it raises the "
+            "variance of distant cells.",
+            between(0, 45));
+    v.field("mount_mm", mount_mm,
+            "Standard deviation in millimetres of the position of the cameras' mount on the body; it adds to the "
+            "variance of all cells alike.",
+            between(0, 1000));
+    v.field("pan_tilt_deg", pan_tilt_deg,
+            "Standard deviation in degrees of the reported pan and tilt angles; 0 for cameras that are fixed to the "
+            "body. Raising it raises the variance of distant cells.",
+            between(0, 45));
+  }
+};
+
 struct MapOptions {
   double extent_m = 8;      ///< Side of the square map, m.
   double cell_m = 0.05;     ///< Side of a cell, m.
@@ -118,6 +153,7 @@ struct MapOptions {
   int min_support_cells = 4;       ///< A smaller group of cells that stands apart is unknown.
   GroundSurfaceOptions ground;
   RoverLimits rover;
+  CalibrationErrorOptions calibration;
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -158,6 +194,7 @@ struct MapOptions {
             between(1, 1000));
     v.group("ground", ground);
     v.group("rover", rover);
+    v.group("calibration", calibration);
   }
 };
 
@@ -168,6 +205,8 @@ struct SurfacePoint {
   Eigen::Vector3f ray;      ///< Direction of the ray, unit length, body frame.
   GroundClass kind = GroundClass::unknown;
   bool truncated = false;  ///< At the upper edge of the view: the object may continue above.
+  float range_m = 0;       ///< From the camera; 0: unknown, without errors of the calibration.
+  float baseline_m = 0;    ///< Of the pair that saw it; 0: unknown.
 };
 
 /// The points of all known pixels of a merged range image, in the body frame.
@@ -180,7 +219,9 @@ class MapGenerator {
 
   /// `map_from_body`: gravity-aligned; the map is centred on its origin. Cell corners are at integer multiples of the
   /// cell size. A cell's elevation is the inverse-variance weighted mean of its points; its class follows from the
-  /// heights of its points above and below the fitted ground surface. Derivation: docs/math/stereo.md.
+  /// heights of its points above and below the fitted ground surface. Its variance is that of a point by the noise of
+  /// disparities plus that by errors of the calibration, which has no influence on the class. Derivation:
+  /// docs/math/stereo.md.
   LocalMap generate(std::span<const SurfacePoint> points, const Pose& map_from_body) const;
 
  private:

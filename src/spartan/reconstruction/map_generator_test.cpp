@@ -230,6 +230,31 @@ TEST(MapGenerator, MorePointsNeverRaiseTheVariance) {
   }
 }
 
+TEST(MapGenerator, ErrorsOfTheCalibrationRaiseTheVarianceButNotTheClass) {
+  std::vector<SurfacePoint> points = points_on([](double x, double y) { return std::hypot(x - 2, y) < 0.2 ? 0.2 : 0; });
+  const LocalMap exact = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
+  EXPECT_EQ(at(exact, exact.common_variance_m2, 3, 0), 0) << "range and baseline of the points are not known";
+  for (SurfacePoint& p : points) {
+    p.range_m = (p.in_body - Eigen::Vector3f(0, 0, 1)).norm();
+    p.baseline_m = 0.5;
+  }
+  MapOptions options;
+  options.calibration = {0, 0, 0.5, 2, 0};
+  const LocalMap map = MapGenerator::create(options, ThreadPool(1))->generate(points, Pose());
+  for (const double x : {1.02, 3.02}) {
+    const double expected = std::pow(x * 0.5 * kRadiansPerDegree, 2) + 4e-6;
+    EXPECT_NEAR(at(map, map.common_variance_m2, x, 0.02), expected, 0.05 * expected);
+    EXPECT_FLOAT_EQ(at(map, map.variance_m2, x, 0.02),
+                    at(exact, exact.variance_m2, x, 0.02) + at(map, map.common_variance_m2, x, 0.02));
+  }
+  for (int row = 0; row < map.size().height; ++row) {
+    for (int column = 0; column < map.size().width; ++column) {
+      ASSERT_EQ(map.kind(column, row), exact.kind(column, row));
+      ASSERT_EQ(map.occupancy_logodds(column, row), exact.occupancy_logodds(column, row));
+    }
+  }
+}
+
 TEST(MapGenerator, CostOfASlopeIsItsShareOfTheLimit) {
   const double rise = std::tan(10 * kRadiansPerDegree);
   const LocalMap map =

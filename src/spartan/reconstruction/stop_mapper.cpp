@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "spartan/core/stage_clock.h"
+#include "spartan/reconstruction/internal/left_border.h"
 
 namespace spartan {
 namespace {
@@ -75,11 +76,13 @@ Status StopMapper::add(const RectifiedPair& frame, double nearest_m, const Eigen
   const GroundPlane expected{frame.body_from_left.rotation().conjugate() * up_in_body,
                              height > 0.05 ? height : kUnknownHeight_m};
   auto ground = compute_v_disparity(image->disparity, frame.geometry, expected, options_.v_disparity, workers_);
+  Image<float> disparity = Image<float>::copy_of(image->disparity);
+  if (ground) internal::drop_matches_below_ground(ground->plane, frame.geometry, disparity);
   times_.v_disparity += watch.lap();
   views_.push_back({frame.pair,
                     frame.stamp,
                     {frame.geometry, frame.body_from_left},
-                    Image<float>::copy_of(image->disparity),
+                    std::move(disparity),
                     Image<std::uint8_t>::copy_of(frame.left),
                     std::move(ground)});
   return {};

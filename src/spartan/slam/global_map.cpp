@@ -39,6 +39,7 @@ CellSurface surface_of(const LocalMap& local, int column, int row, const Matrix6
   const Vector6d j =
       elevation_jacobian(slope.cast<double>(), {at.x() - body.x(), at.y() - body.y(), s.elevation_m - body.z()});
   s.variance_m2 = static_cast<float>(local.variance_m2(column, row) + j.dot(world_covariance * j));
+  if (!local.common_variance_m2.empty()) s.common_variance_m2 = local.common_variance_m2(column, row);
   return s;
 }
 
@@ -51,8 +52,8 @@ tl::unexpected<Error> damaged_store(const std::string& what) {
 }
 
 bool is_finite(const CellSurface& s) {
-  return std::isfinite(s.elevation_m) && std::isfinite(s.variance_m2) && std::isfinite(s.lowest_m) &&
-         std::isfinite(s.highest_m);
+  return std::isfinite(s.elevation_m) && std::isfinite(s.variance_m2) && std::isfinite(s.common_variance_m2) &&
+         std::isfinite(s.lowest_m) && std::isfinite(s.highest_m);
 }
 
 }  // namespace
@@ -87,12 +88,13 @@ SurfaceGrid MapView::grid() const {
   grid.window = window;
   grid.cell_m = cell_m;
   grid.elevation_m = elevation_m.clone();
-  grid.variance_m2 = variance_m2.clone();
+  grid.variance_m2 = variance_m2.clone();  // of the noise: matching estimates common errors by itself
   grid.relief_m = elevation_max_m.clone();
   grid.occupancy = Image<float>(window.width, window.height, 0.0F);
   for (int r = 0; r < window.height; ++r) {
     for (int c = 0; c < window.width; ++c) {
       grid.relief_m(c, r) -= elevation_min_m(c, r);
+      grid.variance_m2(c, r) -= common_variance_m2(c, r);
       if (count(c, r) > 0) grid.occupancy(c, r) = std::tanh(0.5F * occupancy_logodds(c, r));
     }
   }

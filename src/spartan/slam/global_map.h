@@ -70,6 +70,7 @@ struct MapView {
   LatticeWindow window;
   double cell_m = 0.05;
   Image<float> elevation_m, elevation_min_m, elevation_max_m, variance_m2, count, occupancy_logodds;
+  Image<float> common_variance_m2;  ///< As of LocalMap.
   Image<GroundClass> kind;
   Image<std::int32_t> stop;  ///< The first stop that observed the cell; −1: none.
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "spartan/slam/tile_store.h"
@@ -19,10 +20,16 @@ bool agree(const CellSurface& a, const CellSurface& b, const CellFusion& fusion)
 }
 
 CellSurface fused(const CellSurface& a, const CellSurface& b, double least_variance) {
-  const double va = a.variance_m2, vb = b.variance_m2, sum = va + vb;
+  const double va = a.variance_m2, vb = b.variance_m2, ca = a.common_variance_m2, cb = b.common_variance_m2,
+               k = std::sqrt(ca * cb), sum = va + vb - 2 * k;
+  const double wa = sum > 0 ? std::clamp((vb - k) / sum, 0.0, 1.0) : 1, wb = 1 - wa;
+  const double variance = wa * wa * va + wb * wb * vb + 2 * wa * wb * k,
+               common = wa * wa * ca + wb * wb * cb + 2 * wa * wb * k;
   CellSurface f = a;
-  f.elevation_m = static_cast<float>((vb * a.elevation_m + va * b.elevation_m) / sum);
-  f.variance_m2 = std::min(a.variance_m2, static_cast<float>(std::max(va * vb / sum, least_variance)));
+  f.elevation_m = static_cast<float>(wa * a.elevation_m + wb * b.elevation_m);
+  f.variance_m2 = std::min(a.variance_m2, static_cast<float>(std::max(variance - common, least_variance) + common));
+  f.common_variance_m2 =
+      std::clamp(f.variance_m2 - static_cast<float>(least_variance), 0.0F, static_cast<float>(common));
   // Running means, not extrema: these would only grow with every wrong point.
   const float weight =
       std::max(kLeastWeight, static_cast<float>(b.votes) / static_cast<float>(std::max(a.votes + b.votes, 1)));
@@ -53,7 +60,7 @@ GroundClass MapCell::kind() const {
 MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion) {
   if (!observation.observed()) return cell;
   CellSurface seen = observation;
-  seen.variance_m2 = std::max(seen.variance_m2, static_cast<float>(fusion.least_variance_m2));
+  seen.variance_m2 = std::max(seen.variance_m2, seen.common_variance_m2 + static_cast<float>(fusion.least_variance_m2));
   MapCell next = cell;
   if (!cell.surface.observed()) {
     next.surface = seen;

@@ -34,6 +34,26 @@ TEST(MapCell, FusesByVariance) {
   EXPECT_FALSE(cell.alternative.observed());
 }
 
+// N observations with the independent variance i and the common one c have the mean's variance i/N + c.
+TEST(MapCell, CountingDoesNotShrinkTheCommonPartOfTheVariance) {
+  CellSurface observation = seen(0.1F, 5e-4F);
+  observation.common_variance_m2 = 4e-4F;
+  MapCell cell;
+  for (int i = 0; i < 10; ++i) cell = fuse_observation(cell, observation, {});
+  EXPECT_NEAR(cell.surface.variance_m2, 1e-4 / 10 + 4e-4, 1e-8);
+  EXPECT_NEAR(cell.surface.common_variance_m2, 4e-4, 1e-8);
+}
+
+TEST(MapCell, AnObservationWithALargerCommonErrorHasNoWeight) {
+  CellSurface near = seen(0.1F, 2e-4F), far = seen(0.12F, 30e-4F);
+  near.common_variance_m2 = 1e-4F;
+  far.common_variance_m2 = 29e-4F;
+  const MapCell cell = fuse_observation(fuse_observation({}, near, {}), far, {});
+  EXPECT_FLOAT_EQ(cell.surface.elevation_m, 0.1F);
+  EXPECT_FLOAT_EQ(cell.surface.variance_m2, 2e-4F);
+  EXPECT_FLOAT_EQ(cell.surface.common_variance_m2, 1e-4F);
+}
+
 TEST(MapCell, AnOutlierDoesNotChangeTheSurface) {
   const MapCell before = fuse_observation({}, seen(0.1F, 1e-4F), {});
   const MapCell after = fuse_observation(before, seen(0.4F, 1e-4F), {});

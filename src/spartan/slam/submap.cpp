@@ -5,20 +5,24 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kSubmapVersion = 1;
+// Version 1 has no common variance.
+constexpr std::uint32_t kSubmapVersion = 2, kWithoutCommonVariance = 1;
 
 void put(ArchiveWriter& out, const CellSurface& s) {
-  for (const float value : {s.elevation_m, s.variance_m2, s.lowest_m, s.highest_m, s.count, s.occupancy_logodds})
+  for (const float value :
+       {s.elevation_m, s.variance_m2, s.common_variance_m2, s.lowest_m, s.highest_m, s.count, s.occupancy_logodds})
     out.put(value);
   out.put(s.stop);
   out.put(s.shape);
   out.put(s.votes);
 }
 
-CellSurface get_surface(ArchiveReader& in) {
+CellSurface get_surface(ArchiveReader& in, std::uint32_t version) {
   CellSurface s;
-  for (float* value : {&s.elevation_m, &s.variance_m2, &s.lowest_m, &s.highest_m, &s.count, &s.occupancy_logodds})
-    *value = in.get<float>();
+  s.elevation_m = in.get<float>();
+  s.variance_m2 = in.get<float>();
+  if (version != kWithoutCommonVariance) s.common_variance_m2 = in.get<float>();
+  for (float* value : {&s.lowest_m, &s.highest_m, &s.count, &s.occupancy_logodds}) *value = in.get<float>();
   s.stop = in.get<std::int32_t>();
   s.shape = in.get<std::int16_t>();
   s.votes = in.get<std::uint16_t>();
@@ -33,9 +37,9 @@ CellSurface get_surface(ArchiveReader& in) {
 
 // Ids are bounded as in TileStore.
 bool is_sensible(const CellSurface& s) {
-  return std::isfinite(s.elevation_m) && std::isfinite(s.variance_m2) && std::isfinite(s.lowest_m) &&
-         std::isfinite(s.highest_m) && std::isfinite(s.count) && std::isfinite(s.occupancy_logodds) && s.stop >= -1 &&
-         s.stop <= 1'000'000'000;
+  return std::isfinite(s.elevation_m) && std::isfinite(s.variance_m2) && s.common_variance_m2 >= 0 &&
+         s.common_variance_m2 <= s.variance_m2 && std::isfinite(s.lowest_m) && std::isfinite(s.highest_m) &&
+         std::isfinite(s.count) && std::isfinite(s.occupancy_logodds) && s.stop >= -1 && s.stop <= 1'000'000'000;
 }
 
 }  // namespace
@@ -67,7 +71,9 @@ Bytes to_bytes(const Tile& tile) {
 
 Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
   ArchiveReader in(bytes);
-  if (Status s = in.expect_version(kSubmapVersion, what); !s) return failure(s);
+  const std::uint32_t version = ArchiveReader(bytes).get<std::uint32_t>();
+  if (Status s = in.expect_version(version == kWithoutCommonVariance ? version : kSubmapVersion, what); !s)
+    return failure(s);
   Tile tile;
   const auto seen = in.get<std::uint32_t>();
   if (seen > tile.cells.size())
@@ -77,8 +83,8 @@ Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what) {
     if (index >= tile.cells.size())
       return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder to rebuild the map");
     const bool has_rival = in.get<bool>();
-    tile.cells[index].surface = get_surface(in);
-    if (has_rival) tile.cells[index].alternative = get_surface(in);
+    tile.cells[index].surface = get_surface(in, version);
+    if (has_rival) tile.cells[index].alternative = get_surface(in, version);
     if (!is_sensible(tile.cells[index].surface) || !is_sensible(tile.cells[index].alternative))
       return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder to rebuild the map");
   }

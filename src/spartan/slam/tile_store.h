@@ -22,7 +22,8 @@ namespace spartan {
 /// anchor.
 struct CellSurface {
   float elevation_m = 0;
-  float variance_m2 = 0;  ///< Variance of elevation_m.
+  float variance_m2 = 0;         ///< Variance of elevation_m.
+  float common_variance_m2 = 0;  ///< The part of it that other observations have in common (LocalMap).
   float lowest_m = 0, highest_m = 0;
   float count = 0;              ///< Number of points; 0: not observed.
   float occupancy_logodds = 0;  ///< Log-odds of an obstacle or a cavity.
@@ -55,8 +56,10 @@ struct CellFusion {
   double least_variance_m2 = 4e-6;
 };
 
-/// Fuses one observation into a cell. If it passes the gate of the surface, both are fused with inverse-variance
-/// weights (the variance has a lower bound), and the alternative loses a vote. Otherwise the surface does not change:
+/// Fuses one observation into a cell. If it passes the gate of the surface, both are fused, and the alternative loses a
+/// vote. The weights are those of the best linear unbiased estimate of two values with the variances v and w whose
+/// common parts are fully correlated, k = √(v_common w_common): (w − k) and (v − k) over their sum, at least 0. So
+/// counting does not shrink the common part; the variance has a lower bound. Otherwise the surface does not change:
 /// if the observation passes the gate of the alternative, it is fused into that; if not, the alternative loses a vote.
 /// An alternative without votes is discarded. When its variance is below that of the surface (where it was confirmed:
 /// at most that of the surface), the two are swapped. So a variance never rises; repeated contradiction, or one that is

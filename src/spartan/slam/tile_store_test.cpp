@@ -21,6 +21,7 @@ Tile some_tile(float elevation) {
     CellSurface& s = tile.at(i % 32, 3 * (i / 7)).surface;
     s.elevation_m = elevation + static_cast<float>(i);
     s.variance_m2 = 1e-5F;
+    s.common_variance_m2 = 0.4e-5F;
     s.count = 3;
     s.stop = i;
   }
@@ -88,6 +89,27 @@ TEST(TileStore, ReadsWhatWasWritten) {
   EXPECT_EQ((*stops)[0].world_from_body.covariance, covariance);
   EXPECT_EQ(*store->property("cell_m"), 0.05);
   EXPECT_FALSE(store->property("none")->has_value());
+}
+
+// Version 1 of a tile has no common variance.
+TEST(TileStore, ReadsTilesOfVersion1) {
+  ArchiveWriter out;
+  out.put(std::uint32_t{1});
+  out.put(std::uint32_t{1});
+  out.put(std::uint16_t{33});
+  out.put(false);
+  for (const float value : {1.5F, 0.25F, 1.4F, 1.6F, 7.0F, -2.0F}) out.put(value);
+  out.put(std::int32_t{3});
+  out.put(std::int16_t{0});
+  out.put(std::uint16_t{2});
+  const auto tile = tile_from_bytes(out.take(), "tile");
+  ASSERT_TRUE(tile) << tile.error().message();
+  const CellSurface& surface = tile->at(1, 1).surface;
+  EXPECT_EQ(surface.elevation_m, 1.5F);
+  EXPECT_EQ(surface.variance_m2, 0.25F);
+  EXPECT_EQ(surface.common_variance_m2, 0);
+  EXPECT_EQ(surface.highest_m, 1.6F);
+  EXPECT_EQ(surface.votes, 2);
 }
 
 TEST(TileStore, ReportsDamageWithFileAndTile) {

@@ -16,6 +16,7 @@
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/internal/map_scale.h"
+#include "spartan/system/internal/row_alignment.h"
 #include "spartan/system/internal/run_loop.h"
 #include "spartan/system/internal/summary.h"
 #include "spartan/system/map_files.h"
@@ -160,24 +161,27 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
         with_specified_noise(options.localization, info.noise, request.given.in_group("localization"));
   }
   const ThreadPool workers(request.threads);
-  auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder);
+  auto aligned = options.align_rows && options.imaging.rectify ? align_rows_of(**source, workers)
+                                                               : Result<AlignedRig>(AlignedRig{info.rig, {}});
+  if (!aligned) return failure(aligned);
+  const Rig& rig = aligned->rig;
+  auto pipeline = Pipeline::create(rig, options, workers, mask_folder);
   if (!pipeline) return failure(pipeline);
   if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
   std::string map_text;
   const bool makes_maps = options.maps && !options.odometry_only;
   // A camera without a body frame and an IMU: its axes do not tell where up is. The odometry alone computes no
   // disparity image.
-  const bool unknown_up =
-      info.rig.convention == PoseConvention::left_optical && !info.has_imu && !options.odometry_only;
+  const bool unknown_up = rig.convention == PoseConvention::left_optical && !info.has_imu && !options.odometry_only;
   std::optional<Eigen::Vector3d> ground_up;
   if (makes_maps || unknown_up) {
-    const auto scale = map_scale_of(**source, options, workers, mask_folder);
+    const auto scale = map_scale_of(**source, rig, options, workers, mask_folder);
     if (!scale) return failure(scale);
     if (unknown_up) ground_up = scale->up_in_body;
     if (makes_maps) {
       options = with_map_scale(options, *scale, request.given);
       map_text = to_text(*scale, options);
-      pipeline = Pipeline::create(info.rig, options, workers, mask_folder);
+      pipeline = Pipeline::create(rig, options, workers, mask_folder);
       if (!pipeline) return failure(pipeline);
     }
   }
@@ -189,12 +193,13 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   RunHooks hooks = given_hooks;
   hooks.log = given_hooks.log.with_file(folder.log());
   report_sequence(info, hooks.log);
+  for (const std::string& sentence : aligned->sentences) hooks.log.info(sentence);
   if (!map_text.empty()) hooks.log.info("local maps: " + map_text);
   if (ground_up) hooks.log.info("world: " + level_text(*ground_up));
   if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
   const auto listing = (*source)->listing_hash();
   if (!listing) return failure(listing);
-  const RunIdentity identity{fmt::format("{:016x}", *listing), dump_options(options), to_rig_yaml(info.rig)};
+  const RunIdentity identity{fmt::format("{:016x}", *listing), dump_options(options), to_rig_yaml(rig)};
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
@@ -234,7 +239,7 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   const ElapsedTime elapsed = run_loop.elapsed();
   facts.wall_seconds = elapsed.wall_s;
   facts.cpu_seconds = elapsed.cpu_s;
-  auto outcome = write_results(run_loop, resolved_options(options, info.rig), workers, folder, facts, hooks.log);
+  auto outcome = write_results(run_loop, resolved_options(options, rig), workers, folder, facts, hooks.log);
   if (outcome) outcome->lock = std::move(prepared->lock);
   return outcome;
 }

@@ -97,6 +97,7 @@ struct RunOptions {
   bool use_specified_noise = true;  ///< sensor noise of the recording replaces defaults of `localization`
   std::string odometry_pair;        ///< name of the pair that drives the odometry; empty: the rig's choice
   bool odometry_only = false;       ///< run only the visual odometry
+  bool align_rows = true;           ///< run(): correct pitch and roll between the cameras of a pair where rows differ
   ImagingOptions imaging;
   OdometryOptions odometry;
   DisparityOptions reconstruction;             ///< dense disparities of terrain and stops
@@ -124,6 +125,10 @@ struct RunOptions {
     v.field("odometry_only", odometry_only,
             "True runs the visual odometry alone, without localization, maps, SLAM and terrain (initial roll and "
             "pitch are still taken from the IMU); false runs all stages.");
+    v.field("align_rows", align_rows,
+            "True estimates pitch and roll between the cameras of each stereo pair from the first frames of the "
+            "recording, and corrects the calibration where rows of the two images differ by more than 0.3 px; false "
+            "keeps the calibration as given.");
     v.group("imaging", imaging);
     v.group("odometry", odometry);
     v.group("reconstruction", reconstruction);

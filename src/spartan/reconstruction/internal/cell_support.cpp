@@ -59,8 +59,7 @@ Image<std::uint8_t> cells_seen_through_ground(const CellHeights& heights, const 
       if (!view.ground_m.contains(x, y)) return false;
       const float ground = view.ground_m(x, y);
       if (!std::isfinite(ground)) continue;
-      if (height >= ground - margin) return false;
-      if (++below > limit) return true;
+      if (height < ground - margin && ++below > limit) return true;
     }
   };
   Image<std::uint8_t> hidden(w, h);

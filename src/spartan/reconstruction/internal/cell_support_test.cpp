@@ -61,6 +61,15 @@ TEST_F(GroundViews, ACellCannotBeSeenThroughTheGround) {
   EXPECT_EQ(count(hidden()), 2);
 }
 
+// Where all cells of a place are wrong the surface is fitted to them.
+TEST_F(GroundViews, NorWhereTheSurfaceFollowsIt) {
+  for (int x = 66; x < kSide; ++x) {
+    heights_(x, 40) = ground_(x, 40) = -1.5F;
+    towards_(x, 40).rise = 2.5F / (0.05F * static_cast<float>(x + 1));
+  }
+  EXPECT_EQ(count(hidden()), kSide - 66);
+}
+
 TEST_F(GroundViews, PitsAreSeenThroughTheirOpening) {
   // 0.5 m wide and 0.3 m deep, its far wall seen from the camera.
   for (int x = 40; x < 50; ++x) heights_(x, 40) = -0.3F;

@@ -63,7 +63,7 @@ Status GlobalMap::render_resampled(const Submap& submap, MapView& view, std::vec
         const double u = p.x() / cell_m_ - 0.5, v = p.y() / cell_m_ - 0.5;
         const int x0 = static_cast<int>(std::floor(u)), y0 = static_cast<int>(std::floor(v));
         const double a = u - x0, b = v - y0;
-        double elevation = 0, variance = 0, logodds = 0;
+        double elevation = 0, variance = 0, common = 0, logodds = 0;
         complete = true;
         for (int k = 0; k < 4 && complete; ++k) {
           const int x = x0 + k % 2, y = y0 + k / 2;
@@ -78,6 +78,7 @@ Status GlobalMap::render_resampled(const Submap& submap, MapView& view, std::vec
           if (k == 0 || weight >= 0.25) interpolated = *s;
           elevation += weight * s->elevation_m;
           variance += weight * s->variance_m2;
+          common += weight * s->common_variance_m2;
           logodds += weight * s->occupancy_logodds;
         }
         if (!complete) break;
@@ -85,6 +86,7 @@ Status GlobalMap::render_resampled(const Submap& submap, MapView& view, std::vec
         z = point.z();
         interpolated.shift_elevation(static_cast<float>(z) - interpolated.elevation_m);
         interpolated.variance_m2 = static_cast<float>(variance);
+        interpolated.common_variance_m2 = static_cast<float>(common);
         interpolated.occupancy_logodds = static_cast<float>(logodds);
       }
       if (!complete) continue;
@@ -112,7 +114,8 @@ Result<MapView> GlobalMap::view(const LatticeWindow& window) {
     if (Status s = aligned ? render_aligned(submap, view, cells) : render_resampled(submap, view, cells); !s)
       return failure(s);
   }
-  for (Image<float>* layer : {&view.elevation_m, &view.elevation_min_m, &view.elevation_max_m, &view.variance_m2})
+  for (Image<float>* layer :
+       {&view.elevation_m, &view.elevation_min_m, &view.elevation_max_m, &view.variance_m2, &view.common_variance_m2})
     *layer = Image<float>(window.width, window.height, kNaN);
   for (Image<float>* layer : {&view.count, &view.occupancy_logodds})
     *layer = Image<float>(window.width, window.height, 0.0F);
@@ -127,6 +130,7 @@ Result<MapView> GlobalMap::view(const LatticeWindow& window) {
       view.elevation_min_m(column, row) = s.lowest_m;
       view.elevation_max_m(column, row) = s.highest_m;
       view.variance_m2(column, row) = s.variance_m2;
+      view.common_variance_m2(column, row) = s.common_variance_m2;
       view.count(column, row) = s.count;
       view.kind(column, row) = cells[i].kind();
       view.occupancy_logodds(column, row) = s.occupancy_logodds;

@@ -98,6 +98,7 @@ SurfaceGrid grid_of(const LocalMap& map) {
       if (!(map.count(c, r) > 0)) continue;
       grid.elevation_m(c, r) = map.elevation_m(c, r);
       grid.variance_m2(c, r) = map.variance_m2(c, r);
+      if (!map.common_variance_m2.empty()) grid.variance_m2(c, r) -= map.common_variance_m2(c, r);
       grid.relief_m(c, r) = map.elevation_max_m(c, r) - map.elevation_min_m(c, r);
       grid.occupancy(c, r) = std::tanh(0.5F * map.occupancy_logodds(c, r));
     }

@@ -16,7 +16,7 @@ struct SurfaceGrid {
   LatticeWindow window;
   double cell_m = 0.05;
   Image<float> elevation_m;
-  Image<float> variance_m2;  ///< Variance of the elevation.
+  Image<float> variance_m2;  ///< Variance of the elevation by noise, without errors of the calibration.
   Image<float> relief_m;     ///< Highest minus lowest point in the cell.
   Image<float> occupancy;    ///< Signed occupancy 2p − 1 = tanh(log-odds / 2) of an obstacle or a cavity; 0: unknown.
 

@@ -99,9 +99,8 @@ MapScale map_scale(std::span<const PairOverGround> pairs) {
   return scale;
 }
 
-Result<MapScale> map_scale_of(FrameSource& source, const RunOptions& options, const ThreadPool& workers,
+Result<MapScale> map_scale_of(FrameSource& source, const Rig& rig, const RunOptions& options, const ThreadPool& workers,
                               const std::string& mask_folder) {
-  const Rig& rig = source.info().rig;
   auto imager = Imager::create(rig, options.imaging, workers, mask_folder);
   if (!imager) return failure(imager);
   auto mapper = StopMapper::create(options.reconstruction, options.mapping, workers);

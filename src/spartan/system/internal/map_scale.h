@@ -39,8 +39,9 @@ struct MapScale {
 MapScale map_scale(std::span<const PairOverGround> pairs);
 
 /// map_scale() of a recording: heights are those of the rig where it has a body on the ground, else that of the ground
-/// plane in the disparity images of the first frames. Codes are those of reading frames.
-Result<MapScale> map_scale_of(FrameSource& source, const RunOptions& options, const ThreadPool& workers,
+/// plane in the disparity images of the first frames. `rig`: that of the recording, its rows may be aligned. Codes are
+/// those of reading frames.
+Result<MapScale> map_scale_of(FrameSource& source, const Rig& rig, const RunOptions& options, const ThreadPool& workers,
                               const std::string& mask_folder);
 
 /// Options whose keys were not given and that have their defaults take the scale: side, cell, heights of obstacles and

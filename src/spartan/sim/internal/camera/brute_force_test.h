@@ -30,8 +30,8 @@ class BruteForce {
       }
     }
     for (const Rock& rock : rocks) {
-      const TriangleMesh mesh = make_rock(rock, 0.007);
       const Eigen::Vector3d foot(rock.x, rock.y, shape.height(rock.x, rock.y));
+      const TriangleMesh mesh = place_rock(rock, shape, 0.007, foot);
       for (const auto& [a, b, c] : mesh.triangles) {
         triangles_.push_back({foot + mesh.vertices[a].cast<double>(), foot + mesh.vertices[b].cast<double>(),
                               foot + mesh.vertices[c].cast<double>(), true});

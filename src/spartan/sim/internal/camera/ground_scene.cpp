@@ -150,11 +150,8 @@ void GroundScene::State::add_rocks(const TerrainShape& shape, const std::vector<
   workers.parallel_for(0, static_cast<int>(rocks.size()), 64, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       const Rock& rock = rocks[static_cast<std::size_t>(i)];
-      TriangleMesh& mesh = meshes[static_cast<std::size_t>(i)];
-      mesh = make_rock(rock, region.contains(rock.x, rock.y) ? kRockEdge_m : kFarRockEdge * rock.diameter_m);
-      const Eigen::Vector3f foot =
-          (Eigen::Vector3d(rock.x, rock.y, shape.height(rock.x, rock.y)) - origin).cast<float>();
-      for (Eigen::Vector3f& v : mesh.vertices) v += foot;
+      const double edge_m = region.contains(rock.x, rock.y) ? kRockEdge_m : kFarRockEdge * rock.diameter_m;
+      meshes[static_cast<std::size_t>(i)] = place_rock(rock, shape, edge_m, origin);
     }
   });
   std::size_t vertex_count = 0, triangle_count = 0;

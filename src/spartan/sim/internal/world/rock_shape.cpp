@@ -1,6 +1,7 @@
 #include "spartan/sim/internal/world/rock_shape.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -180,6 +181,16 @@ void add_layers(TriangleMesh& mesh, int layers, float top) {
   }
 }
 
+// Mean slope (∂z/∂x, ∂z/∂y) of the ground under a rock.
+Eigen::Vector2d slope_under(const Rock& rock, const TerrainShape& ground) {
+  const double reach = 0.5 * rock.diameter_m;
+  const std::array<double, 4> x{rock.x + reach, rock.x - reach, rock.x, rock.x},
+      y{rock.y, rock.y, rock.y + reach, rock.y - reach};
+  std::array<double, 4> z{};
+  ground.heights(x, y, z);
+  return Eigen::Vector2d(z[0] - z[1], z[2] - z[3]) / rock.diameter_m;
+}
+
 }  // namespace
 
 TriangleMesh make_rock(const Rock& rock, double edge_m) {
@@ -197,6 +208,18 @@ TriangleMesh make_rock(const Rock& rock, double edge_m) {
   for (Eigen::Vector3f& v : mesh.vertices) {
     const double x = along * v.x(), y = across * v.y();
     v = Eigen::Vector3d(c * x - s * y, s * x + c * y, up * static_cast<double>(v.z() - ground)).cast<float>();
+  }
+  return mesh;
+}
+
+TriangleMesh place_rock(const Rock& rock, const TerrainShape& ground, double edge_m, const Eigen::Vector3d& origin) {
+  TriangleMesh mesh = make_rock(rock, edge_m);
+  const Eigen::Vector3f foot = (Eigen::Vector3d(rock.x, rock.y, ground.height(rock.x, rock.y)) - origin).cast<float>();
+  Eigen::Vector2f slope = Eigen::Vector2f::Zero();
+  if (rock.diameter_m >= kSeatedRock_m) slope = slope_under(rock, ground).cast<float>();
+  for (Eigen::Vector3f& v : mesh.vertices) {
+    v.z() += slope.dot(v.head<2>());
+    v += foot;
   }
   return mesh;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "spartan/sim/internal/world/rock_field.h"
+#include "spartan/sim/internal/world/terrain_shape.h"
 
 namespace spartan::sim::internal {
 
@@ -20,5 +21,11 @@ struct TriangleMesh {
 /// rock.height_m. Seen from above, what stands above the ground covers the area of a circle of rock.diameter_m. It
 /// extends below the ground.
 TriangleMesh make_rock(const Rock& rock, double edge_m);
+
+/// The rock where it lies on the ground, relative to `origin` (world, m). A rock of at least kSeatedRock_m is sheared
+/// by the slope of the ground under it, z' = z + slope · (x, y), so that on a slope no more of it overhangs than on
+/// level ground.
+TriangleMesh place_rock(const Rock& rock, const TerrainShape& ground, double edge_m, const Eigen::Vector3d& origin);
+inline constexpr double kSeatedRock_m = 0.04;
 
 }  // namespace spartan::sim::internal

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 #include <utility>
+#include <vector>
 
 namespace spartan::sim::internal {
 namespace {
@@ -55,6 +56,34 @@ TEST(RockShape, CoversTheAreaOfItsDiameterAndHasItsHeight) {
       }
     }
   }
+}
+
+// On a plane of any slope a placed rock is as high above the plane, everywhere, as on level ground.
+TEST(RockShape, FollowsTheSlopeOfTheGround) {
+  Rock rock;
+  rock.x = 1.5;
+  rock.y = -0.7;
+  rock.diameter_m = 0.6;
+  rock.height_m = 0.3;
+  rock.shape = 3;
+  const auto plane_of = [](double slope_deg) {
+    TerrainShapeOptions options;
+    options.slope_deg = slope_deg;
+    options.slope_heading_deg = 30;
+    options.relief_m = options.ripple_height_m = options.dune_height_m = 0;
+    return TerrainShape(options, 1);
+  };
+  const TerrainShape level = plane_of(0), slope = plane_of(20);
+  const auto heights_above = [&](const TerrainShape& ground) {
+    std::vector<double> heights;
+    for (const Eigen::Vector3f& v : place_rock(rock, ground, 0.02, Eigen::Vector3d::Zero()).vertices)
+      heights.push_back(static_cast<double>(v.z()) -
+                        ground.height(static_cast<double>(v.x()), static_cast<double>(v.y())));
+    return heights;
+  };
+  const std::vector<double> on_level = heights_above(level), on_slope = heights_above(slope);
+  ASSERT_EQ(on_level.size(), on_slope.size());
+  for (std::size_t i = 0; i < on_level.size(); ++i) EXPECT_NEAR(on_slope[i], on_level[i], 1e-5);
 }
 
 }  // namespace
