@@ -53,7 +53,7 @@ Image<std::uint8_t> cells_seen_through_ground(const CellHeights& heights, const 
     if (!(line.rise > 0)) return false;
     float height = heights.highest_m(column, row);
     int below = 0;
-    for (int k = 0;; ++k, height += line.rise * step) {
+    for (int k = 0; k < w + h; ++k, height += line.rise * step) {  // a vertical line does not leave the map
       const int x = column + static_cast<int>(std::lround(line.x * static_cast<float>(k))),
                 y = row - static_cast<int>(std::lround(line.y * static_cast<float>(k)));
       if (!view.ground_m.contains(x, y)) return false;
@@ -61,6 +61,7 @@ Image<std::uint8_t> cells_seen_through_ground(const CellHeights& heights, const 
       if (!std::isfinite(ground)) continue;
       if (height < ground - margin && ++below > limit) return true;
     }
+    return false;
   };
   Image<std::uint8_t> hidden(w, h);
   for (int row = 0; row < h; ++row) {

@@ -70,6 +70,12 @@ TEST_F(GroundViews, NorWhereTheSurfaceFollowsIt) {
   EXPECT_EQ(count(hidden()), kSide - 66);
 }
 
+TEST_F(GroundViews, ACellIsSeenFromStraightAbove) {
+  towards_ = Image<LineOfSight>(kSide, kSide, LineOfSight{0, 0, 1e6F});
+  heights_(30, 30) = -1;
+  EXPECT_EQ(count(hidden()), 0);
+}
+
 TEST_F(GroundViews, PitsAreSeenThroughTheirOpening) {
   // 0.5 m wide and 0.3 m deep, its far wall seen from the camera.
   for (int x = 40; x < 50; ++x) heights_(x, 40) = -0.3F;
