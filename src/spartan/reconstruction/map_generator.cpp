@@ -298,9 +298,12 @@ Image<internal::LineOfSight> lines_of_sight(const Grid& grid) {
   Image<internal::LineOfSight> towards_camera(grid.width, grid.height);
   for (int y = 0; y < grid.height; ++y) {
     for (int x = 0; x < grid.width; ++x) {
-      const Eigen::Vector3f& rays = grid.at(x, y).rays;
+      const Cell& cell = grid.at(x, y);
+      const Eigen::Vector3f& rays = cell.rays;
       const float along = std::max(rays.head<2>().norm(), 1e-6F);
-      towards_camera(x, y) = {-rays.x() / along, -rays.y() / along, -rays.z() / along};
+      internal::LineOfSight& line = towards_camera(x, y);
+      line = {-rays.x() / along, -rays.y() / along, -rays.z() / along};
+      if (cell.ranges_m > 0) line.length_m = cell.ranges_m / static_cast<float>(cell.count) * along / rays.norm();
     }
   }
   return towards_camera;

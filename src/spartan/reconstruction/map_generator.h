@@ -124,7 +124,7 @@ struct CalibrationErrorOptions {
             between(0, 10));
     v.field("scale_percent", scale_percent,
             "Standard deviation in percent of the scale of ranges, from focal length and baseline; raising it raises "
-            "the variance of cells in proportion to the squared range.",
+            "the variance of cells in proportion to the squared height of the camera above them.",
             between(0, 50));
     v.field("mount_rotation_deg", mount_rotation_deg,
             "Standard deviation in degrees of the rotation of the cameras' mount on the body; raising it raises the "
@@ -190,7 +190,7 @@ struct MapOptions {
             between(0, 0.45));
     v.field("min_support_cells", min_support_cells,
             "A group of fewer cells that stands apart from its neighbours by more than three cell sizes in height is "
-            "left unknown, as wrong matches are; 1 retains all.",
+            "left unknown, as wrong matches are, also where all cells around it are unknown; 1 retains all.",
             between(1, 1000));
     v.group("ground", ground);
     v.group("rover", rover);

@@ -292,7 +292,8 @@ class Simulation {
     const PairRenderer& tools = pair_renderers_.at(planned.pair);
     const StereoPair& pair = *rig_.find_pair(planned.pair);
     const std::optional<RoverBody> rover = geometry_.visible_rover(planned);
-    const Exposing metering = geometry_.exposing(metered_frame(i), pair.left, 0, rover);
+    const std::optional<RoverBody> metered_rover = geometry_.visible_rover(metered_frame(i));
+    const Exposing metering = geometry_.exposing(metered_frame(i), pair.left, 0, metered_rover);
     const Exposure exposure = choose_exposure(scenario_.sensor, tools.left.mean_luminance(lit, metering, kMeteredRow));
     const auto seed = static_cast<std::uint64_t>(scenario_.seed) * 1000003 + 2 * i +
                       static_cast<std::uint64_t>(scenario_.sensor.noise_seed) * kNoiseStride;

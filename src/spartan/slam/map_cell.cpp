@@ -42,6 +42,13 @@ CellSurface fused(const CellSurface& a, const CellSurface& b, double least_varia
   return f;
 }
 
+// The part of the variance that counting shrinks. Of two surfaces that contradict each other it says which is known
+// better: errors of the calibration do not make a surface that was confirmed many times less certain than a wrong
+// match.
+float independent_variance(const CellSurface& surface) {
+  return surface.variance_m2 - surface.common_variance_m2;
+}
+
 // Removes one vote; the last one removes the surface.
 CellSurface with_one_vote_less(CellSurface alternative) {
   if (alternative.votes <= 1) return {};
@@ -69,10 +76,11 @@ MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, co
     next.alternative = with_one_vote_less(cell.alternative);
   } else if (!cell.alternative.observed()) {
     next.alternative = seen;
-    if (seen.variance_m2 < cell.surface.variance_m2) std::swap(next.surface, next.alternative);
+    if (independent_variance(seen) < independent_variance(cell.surface)) std::swap(next.surface, next.alternative);
   } else if (agree(cell.alternative, seen, fusion)) {
     next.alternative = fused(cell.alternative, seen, fusion.least_variance_m2);
-    if (next.alternative.variance_m2 <= next.surface.variance_m2) std::swap(next.surface, next.alternative);
+    if (independent_variance(next.alternative) <= independent_variance(next.surface))
+      std::swap(next.surface, next.alternative);
   } else {
     next.alternative = with_one_vote_less(cell.alternative);
   }

@@ -54,6 +54,17 @@ TEST(MapCell, AnObservationWithALargerCommonErrorHasNoWeight) {
   EXPECT_FLOAT_EQ(cell.surface.common_variance_m2, 1e-4F);
 }
 
+// The common part is a floor of the variance of a confirmed surface, which a wrong match from nearby is below.
+TEST(MapCell, AContradictionFromNearbyDoesNotReplaceAConfirmedSurface) {
+  CellSurface far = seen(0.1F, 3e-4F), near = seen(0.6F, 6e-5F);
+  far.common_variance_m2 = 2.3e-4F;
+  near.common_variance_m2 = 5e-5F;
+  MapCell cell;
+  for (int i = 0; i < 30; ++i) cell = fuse_observation(cell, far, {});
+  cell = fuse_observation(cell, near, {});
+  EXPECT_FLOAT_EQ(cell.surface.elevation_m, 0.1F);
+}
+
 TEST(MapCell, AnOutlierDoesNotChangeTheSurface) {
   const MapCell before = fuse_observation({}, seen(0.1F, 1e-4F), {});
   const MapCell after = fuse_observation(before, seen(0.4F, 1e-4F), {});

@@ -61,8 +61,9 @@ struct CellFusion {
 /// common parts are fully correlated, k = √(v_common w_common): (w − k) and (v − k) over their sum, at least 0. So
 /// counting does not shrink the common part; the variance has a lower bound. Otherwise the surface does not change:
 /// if the observation passes the gate of the alternative, it is fused into that; if not, the alternative loses a vote.
-/// An alternative without votes is discarded. When its variance is below that of the surface (where it was confirmed:
-/// at most that of the surface), the two are swapped. So a variance never rises; repeated contradiction, or one that is
+/// An alternative without votes is discarded. When its variance without the common part is below that of the surface
+/// (where it was confirmed: at most that of the surface), the two are swapped. So a variance without common parts never
+/// rises; repeated contradiction, or one that is
 /// known better, replaces the surface. Lowest and highest points are running means, in which the newest observation has
 /// a weight of at least a tenth.
 MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion);

@@ -53,7 +53,9 @@ Image<std::uint8_t> cells_seen_through_ground(const CellHeights& heights, const 
     if (!(line.rise > 0)) return false;
     float height = heights.highest_m(column, row);
     int below = 0;
-    for (int k = 0; k < w + h; ++k, height += line.rise * step) {  // a vertical line does not leave the map
+    // A vertical line does not leave the map.
+    const int last = static_cast<int>(std::min(line.length_m / step, static_cast<float>(w + h)));
+    for (int k = 0; k < last; ++k, height += line.rise * step) {
       const int x = column + static_cast<int>(std::lround(line.x * static_cast<float>(k))),
                 y = row - static_cast<int>(std::lround(line.y * static_cast<float>(k)));
       if (!view.ground_m.contains(x, y)) return false;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "spartan/core/image.h"
 
@@ -20,6 +21,7 @@ Image<std::uint8_t> isolated_cells(const CellHeights& heights, double max_gap_m,
 /// The direction from a cell towards the camera that sees it, per metre along the map: x, y and height.
 struct LineOfSight {
   float x = 0, y = 0, rise = 0;
+  float length_m = std::numeric_limits<float>::infinity();  ///< of the line along the map
 };
 
 /// Lines of sight below the ground.

@@ -70,6 +70,16 @@ TEST_F(GroundViews, NorWhereTheSurfaceFollowsIt) {
   EXPECT_EQ(count(hidden()), kSide - 66);
 }
 
+// A wall behind the camera hides nothing in front of it.
+TEST_F(GroundViews, TheLineOfSightEndsAtTheCamera) {
+  for (int x = 0; x < kSide; ++x) towards_(x, 40) = {-1, 0, 0.25F};
+  for (int x = 0; x < 30; ++x) ground_(x, 40) = 3;
+  EXPECT_GT(count(hidden()), 0);
+  for (int x = 30; x < kSide; ++x) towards_(x, 40).length_m = 0.05F * static_cast<float>(x - 30);
+  for (int x = 0; x < 30; ++x) heights_(x, 40) = kUnseen;
+  EXPECT_EQ(count(hidden()), 0);
+}
+
 TEST_F(GroundViews, ACellIsSeenFromStraightAbove) {
   towards_ = Image<LineOfSight>(kSide, kSide, LineOfSight{0, 0, 1e6F});
   heights_(30, 30) = -1;
