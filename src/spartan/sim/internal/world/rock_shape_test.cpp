@@ -76,9 +76,10 @@ TEST(RockShape, FollowsTheSlopeOfTheGround) {
   const TerrainShape level = plane_of(0), slope = plane_of(20);
   const auto heights_above = [&](const TerrainShape& ground) {
     std::vector<double> heights;
-    for (const Eigen::Vector3f& v : place_rock(rock, ground, 0.02, Eigen::Vector3d::Zero()).vertices)
+    for (const Eigen::Vector3f& v : place_rock(rock, ground, 0.02, Eigen::Vector3d::Zero()).vertices) {
       heights.push_back(static_cast<double>(v.z()) -
                         ground.height(static_cast<double>(v.x()), static_cast<double>(v.y())));
+    }
     return heights;
   };
   const std::vector<double> on_level = heights_above(level), on_slope = heights_above(slope);
