@@ -63,9 +63,8 @@ struct CellFusion {
 /// if the observation passes the gate of the alternative, it is fused into that; if not, the alternative loses a vote.
 /// An alternative without votes is discarded. When its variance without the common part is below that of the surface
 /// (where it was confirmed: at most that of the surface), the two are swapped. So a variance without common parts never
-/// rises; repeated contradiction, or one that is
-/// known better, replaces the surface. Lowest and highest points are running means, in which the newest observation has
-/// a weight of at least a tenth.
+/// rises; repeated contradiction, or one that is known better, replaces the surface. Lowest and highest points are
+/// running means, in which the newest observation has a weight of at least a tenth.
 MapCell fuse_observation(const MapCell& cell, const CellSurface& observation, const CellFusion& fusion);
 
 /// Translation in whole cells.

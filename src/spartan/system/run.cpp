@@ -161,13 +161,15 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
         with_specified_noise(options.localization, info.noise, request.given.in_group("localization"));
   }
   const ThreadPool workers(request.threads);
+  auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder);
+  if (!pipeline) return failure(pipeline);
+  if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
   auto aligned = options.align_rows && options.imaging.rectify ? align_rows_of(**source, workers)
                                                                : Result<AlignedRig>(AlignedRig{info.rig, {}});
   if (!aligned) return failure(aligned);
   const Rig& rig = aligned->rig;
-  auto pipeline = Pipeline::create(rig, options, workers, mask_folder);
+  if (!aligned->sentences.empty()) pipeline = Pipeline::create(rig, options, workers, mask_folder);
   if (!pipeline) return failure(pipeline);
-  if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
   std::string map_text;
   const bool makes_maps = options.maps && !options.odometry_only;
   // A camera without a body frame and an IMU: its axes do not tell where up is. The odometry alone computes no

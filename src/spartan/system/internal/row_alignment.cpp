@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <map>
 #include <utility>
 
 #include "spartan/calibration/pair_check.h"
@@ -54,6 +56,7 @@ Result<AlignedRig> align_rows_of(FrameSource& source, const ThreadPool& workers)
   auto imager = Imager::create(result.rig, options, workers);
   if (!imager) return failure(imager);
   std::vector<CorrectedPair> corrected;
+  std::map<std::string, std::string> sentences;  // by pair
   for (const StereoPair& pair : source.info().rig.pairs) {
     const auto frames = first_frames(source, *imager, pair.name);
     if (!frames) return failure(frames);
@@ -65,9 +68,13 @@ Result<AlignedRig> align_rows_of(FrameSource& source, const ThreadPool& workers)
     if (!alignment) return failure(alignment);
     if (!alignment->rig) continue;
     corrected.push_back({pair.name, *alignment->rig});
-    result.sentences.push_back(to_text(pair.name, *alignment));
+    sentences[pair.name] = to_text(pair.name, *alignment);
   }
-  result.rig = merge_corrections(source.info().rig, corrected).rig;
+  // Pairs that share cameras may contradict each other.
+  const MergedRig merged = merge_corrections(source.info().rig, corrected);
+  for (const std::string& pair : merged.discarded) sentences.erase(pair);
+  for (const auto& [pair, sentence] : sentences) result.sentences.push_back(sentence);
+  result.rig = merged.rig;
   return result;
 }
 
