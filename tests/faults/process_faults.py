@@ -1,4 +1,5 @@
 """Faults of processes: kills, signals, two processes in one folder."""
+import json
 import signal
 import time
 
@@ -120,8 +121,16 @@ def two_processes(lab, trials):
         if not overlap:
             yield Verdict(VOID, what)
         else:
-            yield judge(_one_owner(ends, recording) + lab.resume(folder, recording), what)
+            problems = [] if _one_after_the_other(ends, folder, recording) else _one_owner(ends, recording)
+            yield judge(problems + lab.resume(folder, recording), what)
         lab.clean(folder)
+
+
+def _one_after_the_other(ends, folder, recording):
+    """The first ended before the second, which resumes, had reached the folder: it found every frame processed."""
+    if [end.code for end in ends] != 2 * [recording.code]:
+        return False
+    return json.loads((folder / "summary.json").read_text())["resumed_from_frame"] is None
 
 
 def _one_owner(ends, recording):

@@ -164,6 +164,8 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder);
   if (!pipeline) return failure(pipeline);
   if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
+  // Aligning rows takes seconds.
+  if (Status usable = check_run_folder(folder, request.resume || request.replace); !usable) return failure(usable);
   auto aligned = options.align_rows && options.imaging.rectify ? align_rows_of(**source, workers)
                                                                : Result<AlignedRig>(AlignedRig{info.rig, {}});
   if (!aligned) return failure(aligned);

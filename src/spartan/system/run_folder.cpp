@@ -14,6 +14,29 @@ namespace spartan {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+tl::unexpected<Error> already_exists(const RunFolder& folder) {
+  std::error_code error;
+  const bool is_run = fs::exists(folder.store(), error);
+  return failure(ErrorCode::output,
+                 is_run ? "already exists and is not overwritten" : "already exists, and is not a run", folder.path,
+                 is_run ? "choose another folder with -o, continue the run with --resume, or replace it with --force"
+                        : "choose another folder with -o");
+}
+
+}  // namespace
+
+Status check_run_folder(const RunFolder& folder, bool resume) {
+  std::error_code error;
+  if (!fs::exists(folder.path, error)) return {};
+  if (!fs::is_directory(folder.path, error))
+    return failure(ErrorCode::output, "is not a folder", folder.path, "choose another folder with -o");
+  if (fs::is_empty(folder.path, error)) return {};
+  if (Status free = FolderLock::expect_free(folder.path); !free) return failure(free);
+  return resume ? Status() : already_exists(folder);
+}
+
 Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) {
   const fs::path parent = (fs::path(folder.path) / "").parent_path().parent_path();  // also of "path/"
   if (!parent.empty()) {
@@ -23,25 +46,16 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
   // mkdir: of two processes only one creates the folder.
   const bool created = ::mkdir(folder.path.c_str(), 0777) == 0;
   if (!created && errno != EEXIST) return write_failure(folder.path, errno);
-  std::error_code error;
-  if (!created && !fs::is_directory(folder.path, error)) {
-    return failure(ErrorCode::output, "is not a folder", folder.path, "choose another folder with -o");
-  }
-  const auto exists = [&] {
-    const bool is_run = fs::exists(folder.store(), error);
-    return failure(ErrorCode::output,
-                   is_run ? "already exists and is not overwritten" : "already exists, and is not a run", folder.path,
-                   is_run ? "choose another folder with -o, continue the run with --resume, or replace it with --force"
-                          : "choose another folder with -o");
-  };
-  if (!created && !resume) {
-    if (Status free = FolderLock::expect_free(folder.path); !free) return failure(free);
-    if (!fs::is_empty(folder.path, error)) return exists();
+  if (!created) {
+    // Waits for another process that has created the folder and is about to lock it.
+    if (Status free = resume ? Status() : FolderLock::expect_free(folder.path); !free) return failure(free);
+    if (Status usable = check_run_folder(folder, resume); !usable) return failure(usable);
   }
   auto lock = FolderLock::acquire(folder.path);
   if (!lock) return failure(lock);
   // Another process with --resume may have been the first to lock the folder that this one created.
-  if (!resume && fs::exists(folder.store(), error)) return exists();
+  std::error_code error;
+  if (!resume && fs::exists(folder.store(), error)) return already_exists(folder);
   if (Status synced = sync_folder(parent.empty() ? "." : parent.string()); !synced) return failure(synced);
   for (const std::string& part : {folder.terrain(), folder.maps()}) {
     if (Status made = make_folder(part); !made) return failure(made);

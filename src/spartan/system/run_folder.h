@@ -66,6 +66,10 @@ struct OwnedRunFolder {
   FolderLock lock;
 };
 
+/// Tells early, before anything is computed, what prepare_run_folder() would refuse; nothing is locked or created.
+/// Without `resume` also a folder that is not empty. Code `output`.
+Status check_run_folder(const RunFolder& folder, bool resume);
+
 /// Creates a new folder; with `resume` an existing one is accepted, and temporary files that a killed process left
 /// there are removed. Codes: `output` if it exists and `resume` is false (it stays untouched), if another process works
 /// on it, or if it cannot be created; `resources`.
