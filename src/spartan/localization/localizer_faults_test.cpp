@@ -209,6 +209,23 @@ TEST(LocalizerFaults, ImuAndWheelsThatAgreeOutvoteVision) {
   }
 }
 
+// The same, and the wheels fall silent while vision is excluded and still wrong.
+TEST(LocalizerFaults, ExcludedVisionDoesNotOverruleTheImuAlone) {
+  Samples all = whole_drive(52.5, {}, 46);
+  for (Measurement& m : all) {
+    auto* motion = std::get_if<RelativeMotion>(&m);
+    if (motion != nullptr && within(m, 31.6, 46))
+      motion->previous_from_current = Pose(motion->previous_from_current.rotation(), {0.004, 0, 0});
+  }
+  std::erase_if(all, [](const Measurement& m) { return std::holds_alternative<WheelSample>(m) && within(m, 41, 46); });
+  EXPECT_EQ(health_at(all, 40.9, LocalizationSensor::vision).state, SensorState::excluded);
+  const LocalizationEstimate end = driven(test_options(), all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::imu).rejected, 0);
+  const TestDrive drive;
+  const Pose truth = first_pose_of(all) * drive.at(2.5).inverse() * drive.at(seconds_between(test_stamp(0), end.stamp));
+  EXPECT_LT((end.world_from_body.pose.translation() - truth.translation()).norm(), 0.02 * drive.rolled(52.5));
+}
+
 TEST(LocalizerFaults, BridgesAnOutageOfVision) {
   for (const int mask : {0, 1, 2, 3, 15}) {
     SCOPED_TRACE(mask);

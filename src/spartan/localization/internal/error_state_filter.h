@@ -18,6 +18,13 @@
 
 namespace spartan::internal {
 
+/// Whether IMU, wheels and vision agree on the distance since the last frame.
+struct ForwardComparison {
+  bool imu_and_wheels_agree = false;
+  bool vision_contradicts_imu = false;
+  double vision_nis = 0;  ///< normalized innovation squared of vision against the mean of the IMU and the wheels
+};
+
 class ErrorStateFilter {
  public:
   explicit ErrorStateFilter(const LocalizationOptions& options);
@@ -56,7 +63,7 @@ class ErrorStateFilter {
   bool prediction_contradicted(const Innovation& innovation) const;
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
-  std::optional<double> outvoted_by_imu_and_wheels(const RelativeMotion& motion) const;
+  std::optional<ForwardComparison> compare_forward(const RelativeMotion& motion) const;
   void compare_gyro(const RelativeMotion& motion);
   void begin_frame(Stamp stamp);
 

@@ -46,8 +46,8 @@ struct VisionMemory {
   /// Accumulated noise of the constant-velocity model (position, attitude, velocity), and for how long it was used.
   Matrix9d constant_velocity_noise = Matrix9d::Zero();
   double constant_velocity_s = 0;
-  bool has_wheels = false;
-  WheelSample wheels;  ///< at clone_stamp
+  bool has_wheels = false;  ///< false also once a step of the wheels since clone_stamp has corrected the motion
+  WheelSample wheels;       ///< at clone_stamp
 };
 
 /// The current step of the wheels, or the current stop.

@@ -84,12 +84,20 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
   const double nis = inertial ? normalized_innovation_squared(p, innovation) : 0;
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
-  if (const auto outvoted = inertial ? outvoted_by_imu_and_wheels(motion) : std::nullopt) {
-    monitor.accept(*outvoted, kOutvotedSigmas * kOutvotedSigmas, HealthReason::outvoted, options_.health.excluded_after,
-                   options_.health.readmit_after);
-    return false;
+  const auto reject = [&](double value, double gate, HealthReason reason) {
+    return monitor.accept(value, gate, reason, options_.health.excluded_after, options_.health.readmit_after);
+  };
+  const auto forward = inertial ? compare_forward(motion) : std::nullopt;
+  constexpr double kOutvoted = kOutvotedSigmas * kOutvotedSigmas;
+  if (forward && forward->imu_and_wheels_agree && forward->vision_contradicts_imu && forward->vision_nis > kOutvoted)
+    return reject(forward->vision_nis, kOutvoted, HealthReason::outvoted);
+  if (nis > vision_gate_) {
+    // Vision that is excluded overrules the IMU only where the wheels contradict the IMU, too.
+    const bool wheels_contradict_imu = forward && !forward->imu_and_wheels_agree;
+    if (monitor.state == SensorState::excluded && !wheels_contradict_imu)
+      return reject(nis, vision_gate_, HealthReason::disagrees);
+    return reset_prediction(innovation, nis, motion);
   }
-  if (nis > vision_gate_) return reset_prediction(innovation, nis, motion);
   if (!monitor.accept(nis, vision_gate_, HealthReason::disagrees, options_.health.excluded_after,
                       options_.health.readmit_after))
     return false;
@@ -146,10 +154,10 @@ bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis
   return true;
 }
 
-/// Whether the IMU and the wheels agree on how far the rover went since the last frame, and vision contradicts both:
-/// the normalized innovation squared of vision against their mean, else nothing. A repeating texture shifts a visual
-/// motion by its period, with a small covariance.
-std::optional<double> ErrorStateFilter::outvoted_by_imu_and_wheels(const RelativeMotion& motion) const {
+/// Distance along the body's x since the last frame, by the wheels, by the IMU and by vision. A repeating texture shifts
+/// a visual motion by its period, with a small covariance. None if the wheels cannot tell, or if their counts since the
+/// last frame are in the prediction already.
+std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const RelativeMotion& motion) const {
   const VisionMemory& vision = memory_.vision;
   const std::optional<WheelSample> wheels = wheels_at(motion.to);
   if (!wheels || !vision.has_wheels || memory_.monitor(LocalizationSensor::wheels).state == SensorState::excluded)
@@ -162,17 +170,24 @@ std::optional<double> ErrorStateFilter::outvoted_by_imu_and_wheels(const Relativ
                                   p(error_at::kWheelScale, error_at::kWheelScale) * step.counted_m * step.counted_m;
   const StepForward predicted = forward_since(s, error_at::kVisionClone);
   const double predicted_variance = predicted.jacobian * p * predicted.jacobian.transpose();
-  const double seen_m = forward_of(motion.previous_from_current);
+  // As in relative_motion_innovation(): white noise, and the drift states in units of the motion's standard deviations.
+  const Vector6d sigma = motion.covariance.diagonal().cwiseSqrt();
+  const Vector6d drift = sigma.cwiseProduct(s.vision_drift + s.vision_constant);
+  const double seen_m = forward_of(motion.previous_from_current * exp_se3(drift));
+  const int d = error_at::kVisionDrift, c = error_at::kVisionConstant;
+  const double seen_variance =
+      motion.covariance(0, 0) * (options_.vision.white_noise_factor + p(d, d) + p(c, c) + 2 * p(d, c));
+
   const auto square = [](double v) { return v * v; };
-  const bool agree =
-      square(counted_m - predicted.metres) <= square(kAgreeSigmas) * (counted_variance + predicted_variance);
-  const bool contradicts_imu =
-      square(seen_m - predicted.metres) > square(kAgreeSigmas) * (predicted_variance + motion.covariance(0, 0));
-  if (!agree || !contradicts_imu) return std::nullopt;
   const double weights = 1 / counted_variance + 1 / predicted_variance;
   const double mean_m = (counted_m / counted_variance + predicted.metres / predicted_variance) / weights;
-  const double nis = square(seen_m - mean_m) / (1 / weights + motion.covariance(0, 0));
-  return nis > square(kOutvotedSigmas) ? std::optional(nis) : std::nullopt;
+  ForwardComparison result;
+  result.imu_and_wheels_agree =
+      square(counted_m - predicted.metres) <= square(kAgreeSigmas) * (counted_variance + predicted_variance);
+  result.vision_contradicts_imu =
+      square(seen_m - predicted.metres) > square(kAgreeSigmas) * (predicted_variance + seen_variance);
+  result.vision_nis = square(seen_m - mean_m) / (1 / weights + seen_variance);
+  return result;
 }
 
 /// Readmits an IMU that vision contradicted once its gyro agrees with the rotations by vision.

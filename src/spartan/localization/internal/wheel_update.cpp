@@ -31,7 +31,10 @@ void ErrorStateFilter::update(const WheelSample& sample) {
   if (still_stationary()) return;
   const double seconds = seconds_between(memory_.step.from, sample.stamp);
   if (memory_.step.has_wheels && seconds < options_.wheels.max_step_s) return;
-  if (memory_.step.has_wheels && seconds <= kMaxSteps * options_.wheels.max_step_s) update_by_step(sample);
+  if (memory_.step.has_wheels && seconds <= kMaxSteps * options_.wheels.max_step_s) {
+    update_by_step(sample);
+    memory_.vision.has_wheels = false;  // the prediction of the next visual motion contains this step
+  }
   begin_step(sample);
 }
 
