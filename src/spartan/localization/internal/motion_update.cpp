@@ -154,9 +154,9 @@ bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis
   return true;
 }
 
-/// Distance along the body's x since the last frame, by the wheels, by the IMU and by vision. A repeating texture shifts
-/// a visual motion by its period, with a small covariance. None if the wheels cannot tell, or if their counts since the
-/// last frame are in the prediction already.
+/// Distance along the body's x since the last frame, by the wheels, by the IMU and by vision. A repeating texture
+/// shifts a visual motion by its period, with a small covariance. None if the wheels cannot tell, or if their counts
+/// since the last frame are in the prediction already.
 std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const RelativeMotion& motion) const {
   const VisionMemory& vision = memory_.vision;
   const std::optional<WheelSample> wheels = wheels_at(motion.to);
