@@ -135,8 +135,8 @@ struct CalibrationErrorOptions {
             "variance of all cells alike.",
             between(0, 1000));
     v.field("pan_tilt_deg", pan_tilt_deg,
-            "Standard deviation in degrees of the reported pan and tilt angles; 0 for cameras that are fixed to the "
-            "body. Raising it raises the variance of distant cells.",
+            "Standard deviation in degrees of the reported pan and tilt angles; without effect, unless changed, for "
+            "rigs whose pairs are all fixed to the body. Raising it raises the variance of distant cells.",
             between(0, 45));
   }
 };

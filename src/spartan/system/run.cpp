@@ -15,9 +15,8 @@
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
-#include "spartan/system/internal/map_scale.h"
-#include "spartan/system/internal/row_alignment.h"
 #include "spartan/system/internal/run_loop.h"
+#include "spartan/system/internal/run_setup.h"
 #include "spartan/system/internal/summary.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/pipeline.h"
@@ -76,17 +75,6 @@ std::vector<std::string> disabled_stages(const RunOptions& options) {
   return absent;
 }
 
-// Stops need frames of another pair than that of the odometry.
-MapSource map_source(const FrameSource& source, const RunOptions& options) {
-  const Rig& rig = source.info().rig;
-  const StereoPair* const odometry = odometry_pair_of(rig, options);
-  if (options.maps_from != MapSource::automatic || odometry == nullptr) return options.maps_from;
-  const bool stops = std::any_of(rig.pairs.begin(), rig.pairs.end(), [&](const StereoPair& pair) {
-    return pair.name != odometry->name && !source.listed_stamps(pair.name).empty();
-  });
-  return stops ? MapSource::stops : MapSource::keyframes;
-}
-
 // Says why a run that should make maps has made none.
 void report_missing_maps(const RunOptions& options, bool complete, const Log& log) {
   if (!options.maps || options.odometry_only) return;
@@ -134,14 +122,23 @@ void report_sensor_rows(const FrameSource& source, const Log& log) {
   }
 }
 
-// "z is the normal of the ground in the first images (body pitched 33.6 deg down, rolled 2.8 deg to the left)"
-std::string level_text(const Eigen::Vector3d& up_in_body) {
-  const double pitch = std::atan2(-up_in_body.x(), std::hypot(up_in_body.y(), up_in_body.z())) / kRadiansPerDegree,
-               roll = std::atan2(up_in_body.y(), up_in_body.z()) / kRadiansPerDegree;
-  return fmt::format(
-      "z is the normal of the ground in the first images (body pitched {:.1f} deg {}, rolled {:.1f} deg "
-      "to the {})",
-      std::abs(pitch), pitch >= 0 ? "down" : "up", std::abs(roll), roll >= 0 ? "right" : "left");
+RunFacts facts_of(const RunRequest& request, const FrameSource& source, const RunOptions& options,
+                  const RunLoop& run_loop) {
+  RunFacts facts;
+  facts.version = request.version;
+  facts.input = source.info().path;
+  facts.format = name_of(source.info().format);
+  facts.gravity_measured = run_loop.gravity_measured();
+  facts.heading_east = run_loop.heading_east();
+  facts.threads = request.threads;
+  facts.absent = disabled_stages(options);
+  facts.sensor_rows_reversed = source.sensor_samples_discarded();
+  facts.sensor_rows_unreadable = source.unreadable_sensor_rows().count;
+  facts.resumed_from_frame = run_loop.resumed_from_frame();
+  const ElapsedTime elapsed = run_loop.elapsed();
+  facts.wall_seconds = elapsed.wall_s;
+  facts.cpu_seconds = elapsed.cpu_s;
+  return facts;
 }
 
 Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& given_hooks) {
@@ -151,45 +148,12 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   if (!source) return failure(source);
   const RecordingInfo& info = (*source)->info();
 
-  const RunFolder folder{request.output};
-  const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
-  RunOptions options = request.options;
-  options.maps_from = map_source(**source, options);
-  if (options.gravity_m_s2 == 0) options.gravity_m_s2 = info.gravity_m_s2.value_or(0);
-  if (options.use_specified_noise) {
-    options.localization =
-        with_specified_noise(options.localization, info.noise, request.given.in_group("localization"));
-  }
   const ThreadPool workers(request.threads);
-  auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder);
-  if (!pipeline) return failure(pipeline);
-  if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
-  // Aligning rows takes seconds.
-  if (Status usable = check_run_folder(folder, request.resume || request.replace); !usable) return failure(usable);
-  auto aligned = options.align_rows && options.imaging.rectify ? align_rows_of(**source, workers)
-                                                               : Result<AlignedRig>(AlignedRig{info.rig, {}});
-  if (!aligned) return failure(aligned);
-  const Rig& rig = aligned->rig;
-  if (!aligned->sentences.empty()) pipeline = Pipeline::create(rig, options, workers, mask_folder);
-  if (!pipeline) return failure(pipeline);
-  std::string map_text;
-  const bool makes_maps = options.maps && !options.odometry_only;
-  // A camera without a body frame and an IMU: its axes do not tell where up is. The odometry alone computes no
-  // disparity image.
-  const bool unknown_up = rig.convention == PoseConvention::left_optical && !info.has_imu && !options.odometry_only;
-  std::optional<Eigen::Vector3d> ground_up;
-  if (makes_maps || unknown_up) {
-    const auto scale = map_scale_of(**source, rig, options, workers, mask_folder);
-    if (!scale) return failure(scale);
-    if (unknown_up) ground_up = scale->up_in_body;
-    if (makes_maps) {
-      options = with_map_scale(options, *scale, request.given);
-      map_text = to_text(*scale, options);
-      pipeline = Pipeline::create(rig, options, workers, mask_folder);
-      if (!pipeline) return failure(pipeline);
-    }
-  }
-  if (ground_up) pipeline->align_with_ground(*ground_up);
+  auto setup = set_up_run(**source, request, workers);
+  if (!setup) return failure(setup);
+  const Rig& rig = setup->rig;
+  const RunOptions& options = setup->options;
+  const RunFolder folder{request.output};
   auto replaced = request.replace ? replace_run_folder(folder) : Result<ReplacedFolder>();
   if (!replaced) return failure(replaced);
   auto prepared = prepare_run_folder(folder, request.resume);
@@ -197,9 +161,7 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   RunHooks hooks = given_hooks;
   hooks.log = given_hooks.log.with_file(folder.log());
   report_sequence(info, hooks.log);
-  for (const std::string& sentence : aligned->sentences) hooks.log.info(sentence);
-  if (!map_text.empty()) hooks.log.info("local maps: " + map_text);
-  if (ground_up) hooks.log.info("world: " + level_text(*ground_up));
+  for (const std::string& sentence : setup->sentences) hooks.log.info(sentence);
   if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
   const auto listing = (*source)->listing_hash();
   if (!listing) return failure(listing);
@@ -209,7 +171,7 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
   if (Status s = write_file_atomically(folder.rig(), identity.rig); !s) return failure(s);
 
-  RunLoop run_loop(request, hooks, **source, std::move(*pipeline), std::move(*store), folder, start, start_cpu_s);
+  RunLoop run_loop(request, hooks, **source, std::move(setup->pipeline), std::move(*store), folder, start, start_cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   const Status processed = run_loop.process_samples();
   if (run_loop.usable_frames() > 0) replaced->discard();
@@ -222,28 +184,15 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
                    info.path);
   }
 
-  RunFacts facts;
   if (run_loop.global_map().stops().empty()) report_missing_maps(options, run_loop.complete(), hooks.log);
-  facts.version = request.version;
-  facts.input = info.path;
-  facts.format = name_of(info.format);
-  facts.gravity_measured = run_loop.gravity_measured();
-  facts.level_by_ground = ground_up.has_value();
-  if (!facts.gravity_measured) {
+  if (!run_loop.gravity_measured()) {
     hooks.log.warning(
         "the vertical was not measured: z of the world is the up axis of the body at the start, and maps are tilted "
         "with it");
   }
-  facts.heading_east = run_loop.heading_east();
-  facts.threads = request.threads;
-  facts.absent = disabled_stages(options);
-  facts.sensor_rows_reversed = (*source)->sensor_samples_discarded();
-  facts.sensor_rows_unreadable = (*source)->unreadable_sensor_rows().count;
-  facts.resumed_from_frame = run_loop.resumed_from_frame();
-  const ElapsedTime elapsed = run_loop.elapsed();
-  facts.wall_seconds = elapsed.wall_s;
-  facts.cpu_seconds = elapsed.cpu_s;
-  auto outcome = write_results(run_loop, resolved_options(options, rig), workers, folder, facts, hooks.log);
+  RunFacts facts = facts_of(request, **source, options, run_loop);
+  facts.level_by_ground = setup->ground_up.has_value();
+  auto outcome = write_results(run_loop, resolved_options(options, rig), workers, folder, std::move(facts), hooks.log);
   if (outcome) outcome->lock = std::move(prepared->lock);
   return outcome;
 }

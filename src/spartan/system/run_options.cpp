@@ -46,6 +46,13 @@ constexpr std::array<std::string_view, 30> kBasicOptions{
     "localization.inclinometer.bias_sigma_rad",
 };
 
+bool has_pair_on_pan_tilt_unit(const Rig& rig) {
+  return std::any_of(rig.pairs.begin(), rig.pairs.end(), [&](const StereoPair& pair) {
+    const Camera* const left = rig.find_camera(pair.left);
+    return left != nullptr && left->mount != "body";
+  });
+}
+
 }  // namespace
 
 const StereoPair* odometry_pair_of(const Rig& rig, const RunOptions& options) {
@@ -64,6 +71,10 @@ RunOptions resolved_options(RunOptions options, const Rig& rig) {
   share(rover.track_m, by_default.track_m, rig.rover.track_m);
   share(rover.wheel_radius_m, by_default.wheel_radius_m, rig.rover.wheel_radius_m);
   share(rover.clearance_m, by_default.clearance_m, rig.rover.clearance_m);
+  if (!rig.pairs.empty() && !has_pair_on_pan_tilt_unit(rig)) {
+    double& pan_tilt_deg = options.mapping.map.calibration.pan_tilt_deg;
+    share(pan_tilt_deg, CalibrationErrorOptions().pan_tilt_deg, 0);
+  }
   share(options.localization.wheels.track_m, defaults.localization.wheels.track_m, rig.rover.track_m);
   options.mapping = with_shared_values(options.mapping);
   return options;

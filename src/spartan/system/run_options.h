@@ -148,8 +148,9 @@ struct RunOptions {
 };
 
 /// The options for a rig, with each quantity that is stated once copied to the modules that use it: the geometry of the
-/// rover (Rig::rover) to traversal costs and wheel odometry, and with_shared_values(). Values of the modules that
-/// differ from their defaults (set in code or under a former key) are retained.
+/// rover (Rig::rover) to traversal costs and wheel odometry, and with_shared_values(); no error of pan and tilt where
+/// no pair is on a pan-tilt unit. Values of the modules that differ from their defaults (set in code or under a former
+/// key) are retained.
 RunOptions resolved_options(RunOptions options, const Rig& rig);
 
 /// The stereo pair for visual odometry, borrowed from the rig; null where there is none.

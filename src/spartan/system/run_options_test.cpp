@@ -61,6 +61,20 @@ TEST(ResolvedOptions, ShareObstacleHeightAndDisparitySigma) {
   EXPECT_DOUBLE_EQ(mapping.v_disparity.obstacle_m, 0.04);
 }
 
+TEST(ResolvedOptions, AngleErrorsOfPanTiltUnitsNeedAPairOnOne) {
+  Rig rig;
+  rig.cameras.resize(2);
+  rig.cameras[0].name = "left";
+  rig.cameras[1].name = "right";
+  rig.pairs = {{"front", "left", "right", 0, true}};
+  EXPECT_EQ(resolved_options({}, rig).mapping.map.calibration.pan_tilt_deg, 0);
+  RunOptions given;
+  given.mapping.map.calibration.pan_tilt_deg = 0.3;
+  EXPECT_EQ(resolved_options(given, rig).mapping.map.calibration.pan_tilt_deg, 0.3);
+  rig.cameras[0].mount = rig.cameras[1].mount = "mast";
+  EXPECT_EQ(resolved_options({}, rig).mapping.map.calibration.pan_tilt_deg, 0.1);
+}
+
 // What is stated once is what the modules had before, to the last bit.
 TEST(ResolvedOptions, ChangeNoDefault) {
   const RunOptions defaults, resolved = resolved_options({}, Rig());

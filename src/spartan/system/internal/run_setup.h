@@ -1,0 +1,31 @@
+// What a run computes with, chosen by the recording and its first frames.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/result.h"
+#include "spartan/core/threads.h"
+#include "spartan/rig/rig.h"
+#include "spartan/system/pipeline.h"
+#include "spartan/system/run.h"
+#include "spartan/system/run_options.h"
+
+namespace spartan::internal {
+
+struct RunSetup {
+  Rig rig;             ///< rows of its pairs aligned
+  RunOptions options;  ///< with the noise of the recording and the scale of the maps
+  Pipeline pipeline;
+  std::optional<Eigen::Vector3d> ground_up;  ///< body frame; for recordings that do not tell where up is
+  std::vector<std::string> sentences;        ///< what was chosen, for the log
+};
+
+/// Checks that the run fits into memory and that its folder can be used before anything takes long. Codes: `usage`,
+/// `input`, `output`, `resources`.
+Result<RunSetup> set_up_run(FrameSource& source, const RunRequest& request, const ThreadPool& workers);
+
+}  // namespace spartan::internal
