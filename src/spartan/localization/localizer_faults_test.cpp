@@ -210,7 +210,7 @@ TEST(LocalizerFaults, ImuAndWheelsThatAgreeOutvoteVision) {
 }
 
 // The same, and the wheels fall silent while vision is excluded and still wrong.
-TEST(LocalizerFaults, ExcludedVisionDoesNotOverruleTheImuAlone) {
+TEST(LocalizerFaults, ExcludedVisionAloneDoesNotResetThePrediction) {
   Samples all = whole_drive(52.5, {}, 46);
   for (Measurement& m : all) {
     auto* motion = std::get_if<RelativeMotion>(&m);

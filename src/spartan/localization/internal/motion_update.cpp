@@ -84,23 +84,21 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
   const double nis = inertial ? normalized_innovation_squared(p, innovation) : 0;
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
-  const auto reject = [&](double value, double gate, HealthReason reason) {
+  const auto accept_vision = [&](double value, double gate, HealthReason reason) {
     return monitor.accept(value, gate, reason, options_.health.excluded_after, options_.health.readmit_after);
   };
   const auto forward = inertial ? compare_forward(motion) : std::nullopt;
   constexpr double kOutvoted = kOutvotedSigmas * kOutvotedSigmas;
   if (forward && forward->imu_and_wheels_agree && forward->vision_contradicts_imu && forward->vision_nis > kOutvoted)
-    return reject(forward->vision_nis, kOutvoted, HealthReason::outvoted);
+    return accept_vision(forward->vision_nis, kOutvoted, HealthReason::outvoted);
   if (nis > vision_gate_) {
-    // Vision that is excluded overrules the IMU only where the wheels contradict the IMU, too.
+    // Vision that is excluded resets the prediction only where the wheels contradict the IMU, too.
     const bool wheels_contradict_imu = forward && !forward->imu_and_wheels_agree;
     if (monitor.state == SensorState::excluded && !wheels_contradict_imu)
-      return reject(nis, vision_gate_, HealthReason::disagrees);
+      return accept_vision(nis, vision_gate_, HealthReason::disagrees);
     return reset_prediction(innovation, nis, motion);
   }
-  if (!monitor.accept(nis, vision_gate_, HealthReason::disagrees, options_.health.excluded_after,
-                      options_.health.readmit_after))
-    return false;
+  if (!accept_vision(nis, vision_gate_, HealthReason::disagrees)) return false;
   SensorMonitor& imu = memory_.monitor(LocalizationSensor::imu);
   if (inertial && imu.state == SensorState::suspect) imu.readmit();  // its prediction agrees with vision
   correct_motion(innovation, error_at::kVisionClone);

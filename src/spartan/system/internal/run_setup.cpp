@@ -81,7 +81,7 @@ Result<RunSetup> set_up_run(FrameSource& source, const RunRequest& request, cons
     }
     if (unknown_up) ground_up = scale->up_in_body;
   }
-  pipeline = Pipeline::create(aligned.rig, options, workers, mask_folder);
+  if (!aligned.sentences.empty()) pipeline = Pipeline::create(aligned.rig, options, workers, mask_folder);
   if (!pipeline) return failure(pipeline);
   if (ground_up) {
     pipeline->align_with_ground(*ground_up);
