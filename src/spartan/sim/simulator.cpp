@@ -21,6 +21,7 @@
 #include "spartan/sim/internal/camera/scene_around.h"
 #include "spartan/sim/internal/camera/truth.h"
 #include "spartan/sim/internal/drive/body_motion.h"
+#include "spartan/sim/internal/drive/driven_poses.h"
 #include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/internal/drive/rover_seed.h"
 #include "spartan/sim/internal/world/wheel_tracks.h"
@@ -112,6 +113,7 @@ class Simulation {
         geometry_(rig_, request.scenario,
                   BodyMotion(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers,
                              request.scenario.wheels)) {
+    if (scenario_.chassis.track_depth_m > 0) driven_poses_ = poses_of_wheel_tracks();
     nominal_.rover.track_m = request.scenario.chassis.track_m;
     nominal_.rover.wheel_radius_m = request.scenario.chassis.wheel_radius_m;
     if (scenario_.sensor.vignetting_stated) {
@@ -207,6 +209,14 @@ class Simulation {
     }
   }
 
+  std::vector<DrivenPose> poses_of_wheel_tracks() const {
+    const auto pose_at = [&](double time_s) {
+      const Pose body = geometry_.motion().world_from_body(time_s);
+      return PlanarPose{body.translation().x(), body.translation().y(), geometry_.motion().roll_pitch_yaw(time_s).z()};
+    };
+    return driven_poses(pose_at, geometry_.motion().seconds(), scenario_.chassis, WheelTracks::kStep_m);
+  }
+
   std::size_t end_of_scene(std::size_t from) const {
     const auto& frames = request_.drive.frames();
     const PlanarPose start = request_.drive.at(frames[from].time_s);
@@ -223,7 +233,7 @@ class Simulation {
     const Region region = region_of(from, to);
     std::shared_ptr<const WheelTracks> tracks;
     if (scenario_.chassis.track_depth_m > 0) {
-      tracks = std::make_shared<const WheelTracks>(request_.drive, request_.drive.frames()[from].time_s,
+      tracks = std::make_shared<const WheelTracks>(driven_poses_, request_.drive.frames()[from].time_s,
                                                    scenario_.chassis, region);
     }
     return {world_, region, tracks, workers_};
@@ -365,6 +375,7 @@ class Simulation {
   World world_;
   Rig nominal_, rig_;  // as the recording states it; as it is at the start
   FrameGeometry geometry_;
+  std::vector<DrivenPose> driven_poses_;  // as close as wheel tracks need; empty: there are none
   std::map<std::string, PairRenderer> pair_renderers_;
   Trajectory poses_;
   SimulationReport report_;

@@ -47,7 +47,18 @@ struct Hits {
   std::array<bool, kPacket> hit;
   std::uint32_t lit = 0;
   std::array<float, kPacket> albedo{}, rover_albedo{};  // rover: 0 where a ray does not hit it
+
+  Material material(int k) const {
+    if (rover_albedo[static_cast<std::size_t>(k)] > 0) return Material::rover;
+    return at.rock[k] ? Material::rock : Material::soil;
+  }
 };
+
+// Soil and rocks scatter by the law of SoilOptions; paint and metal of the rover by Lambert's.
+double reflectance(const Soil& soil, Material material, double cos_incidence, double cos_emission) {
+  if (material == Material::rover) return std::max(cos_incidence, 0.0);
+  return soil.reflectance(cos_incidence, cos_emission);
+}
 
 // Albedos of a packet. A footprint is elongated by 1/cos of the emission angle: it is averaged over up to
 // kMaxAlbedoSamples points along it, each filtered to its part.
@@ -240,14 +251,14 @@ void Renderer::shade_row(const LitScene& s, const Exposing& exposing, int row, R
       }
       const Eigen::Vector3f n(h.at.normal_x[k], h.at.normal_y[k], h.at.normal_z[k]);
       const Eigen::Vector3d place = poses.middle + static_cast<double>(h.at.distance[k]) * h.look[i].cast<double>();
-      const bool rock = h.at.rock[k];
+      const Material material = h.material(k);
       const double view_factor = s.sky.view_factor(place, n.z());
       const double emission = -n.dot(h.look[i]);
       const double cos_sun = n.dot(s.sun.direction(sample_index(column, row)));
-      const double sun = (h.lit >> k & 1U) != 0 ? s.sun.lux() * s.soil.reflectance(cos_sun, emission) : 0.0;
+      const double sun = (h.lit >> k & 1U) != 0 ? s.sun.lux() * reflectance(s.soil, material, cos_sun, emission) : 0.0;
       // One bounce: what occludes the sky is ground with the radiance of open level ground.
       const double around = s.sky_lux * view_factor + bounce_lux * (1 - view_factor);
-      out.put(column, rock ? Material::rock : Material::soil, h.albedo[i] * (sun + around) / std::numbers::pi);
+      out.put(column, material, h.albedo[i] * (sun + around) / std::numbers::pi);
     }
   }
 }

@@ -57,15 +57,17 @@ struct Exposing {
 Exposing at_rest(const Pose& world_from_camera);
 
 /// What a sample shows; each material has its own colour.
-enum class Material : std::uint8_t { soil, rock, sky };
-inline constexpr int kMaterials = 3;
+enum class Material : std::uint8_t { soil, rock, sky, rover };
+inline constexpr int kMaterials = 4;
 
 /// Luminance in cd/m²: one plane per material where colour is needed, else all in the first plane.
 struct LuminanceImage {
   std::array<Image<float>, kMaterials> by_material;
   bool split = false;
   float total(int x, int y) const {
-    return split ? by_material[0](x, y) + by_material[1](x, y) + by_material[2](x, y) : by_material[0](x, y);
+    float sum = by_material[0](x, y);
+    for (std::size_t m = 1; split && m < kMaterials; ++m) sum += by_material[m](x, y);
+    return sum;
   }
 };
 

@@ -332,6 +332,34 @@ TEST(Renderer, AgreesWithABruteForceReference) {
   EXPECT_LT(std::sqrt(squares / n), 0.02 * mean);
 }
 
+// Luminance of a level plate of the rover below a camera, without light from the sky.
+LuminanceImage plate_of_the_rover(double sun_elevation_deg) {
+  const ThreadPool workers(1);
+  const TerrainShape shape(flat(), 1);
+  const GroundScene scene(shape, RockField({.coverage = 0, .pebbles_per_m2 = 0}, 1), {-1, -1, 1, 1}, workers);
+  const SkyLight sky(scene, shape, workers);
+  const Sun sun({.sun_elevation_deg = sun_elevation_deg});
+  const Soil soil({}, 1);
+  RoverMesh plate;
+  plate.mesh.vertices = {{-3, -3, 0.5}, {3, -3, 0.5}, {3, 3, 0.5}, {-3, 3, 0.5}};
+  plate.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  plate.albedo = {0.5F, 0.5F};
+  const RoverBody rover(plate);
+  Exposing exposing = at_rest(looking_down(1, 90));
+  exposing.rover = &rover;
+  return Renderer(pinhole(32, 24, 40), Sampling::of(4)).render({scene, sky, sun, soil, 0}, exposing, true, workers);
+}
+
+TEST(Renderer, TheRoverScattersByLambertsLawAndIsAMaterialOfItsOwn) {
+  const LuminanceImage low = plate_of_the_rover(20), high = plate_of_the_rover(70);
+  const double degree = std::numbers::pi / 180;
+  for (const auto& [x, y] : {std::pair{3, 3}, {16, 12}, {30, 20}}) {
+    EXPECT_GT(low.total(x, y), 0);
+    EXPECT_EQ(low.by_material[static_cast<std::size_t>(Material::rover)](x, y), low.total(x, y));
+    EXPECT_NEAR(high.total(x, y) / low.total(x, y), std::sin(70 * degree) / std::sin(20 * degree), 1e-3);
+  }
+}
+
 TEST(Renderer, IsBitIdenticalForAnyNumberOfThreads) {
   const TerrainShape shape({}, 3);
   const RockField rocks({.coverage = 0.1}, 3);

@@ -19,13 +19,13 @@ constexpr double kLumensPerWatt = 683.0;  // at 555 nm
 
 constexpr std::uint64_t kPatternStream = 1U << 20U, kRowStream = 1U << 21U;  // of random numbers; added to the row
 
-// Responses of the red, green and blue filters to soil, rock and sky, relative to luminance: dust is butterscotch,
-// basalt nearly gray, the dusty sky between them. Empirical.
+// Responses of the red, green and blue filters to soil, rock, sky and rover, relative to luminance: dust is
+// butterscotch, basalt nearly gray, the dusty sky between them, the rover gray. Empirical.
 struct Tint {
   std::array<float, 3> rgb;
 };
 constexpr std::array<Tint, kMaterials> kTints{
-    {{{1.45F, 0.93F, 0.60F}}, {{1.18F, 0.98F, 0.83F}}, {{1.20F, 0.97F, 0.80F}}}};
+    {{{1.45F, 0.93F, 0.60F}}, {{1.18F, 0.98F, 0.83F}}, {{1.20F, 0.97F, 0.80F}}, {{1, 1, 1}}}};
 
 // Index into rgb of a pixel in a Bayer mosaic.
 int channel_of(PixelLayout layout, int x, int y) {

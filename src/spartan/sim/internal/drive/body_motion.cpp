@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace spartan::sim::internal {
@@ -51,20 +52,28 @@ Eigen::Vector2d slopes_under(const Vector6d& body) {
   return {-std::tan(body[4]), std::tan(body[3]) / std::cos(body[4])};
 }
 
-// Where the rover is off its path by creep: at rest it moves downhill, driving it steers back within kReturn_m.
-std::vector<Eigen::Vector2d> creep_offsets(const std::vector<PlanarPose>& path, const std::vector<Vector6d>& bodies,
-                                           double creep_m_s) {
+struct Creep {
+  std::vector<Eigen::Vector2d> offsets;   // from the path
+  std::vector<Eigen::Vector2d> distance;  // crept since the start
+};
+
+// At rest the rover creeps downhill, driving it steers back to its path within kReturn_m.
+Creep creep(const std::vector<PlanarPose>& path, const std::vector<Vector6d>& bodies, double creep_m_s) {
   constexpr double kReturn_m = 2, kAtRest_m_s = 1e-3;
-  std::vector<Eigen::Vector2d> offsets(path.size(), Eigen::Vector2d::Zero());
+  Creep result{std::vector<Eigen::Vector2d>(path.size(), Eigen::Vector2d::Zero()), {}};
+  result.distance = result.offsets;
   for (std::size_t i = 1; i < path.size(); ++i) {
     const PlanarPose &before = path[i - 1], &here = path[i];
     const double step_m = std::hypot(here.x - before.x, here.y - before.y);
-    offsets[i] = offsets[i - 1] * std::exp(-step_m / kReturn_m);
+    result.offsets[i] = result.offsets[i - 1] * std::exp(-step_m / kReturn_m);
+    result.distance[i] = result.distance[i - 1];
     if (step_m > kAtRest_m_s * BodyMotion::kKnot_s) continue;
     const Eigen::Vector2d uphill = Eigen::Rotation2Dd(here.heading) * slopes_under(bodies[i]);
-    offsets[i] -= creep_m_s * BodyMotion::kKnot_s * uphill;
+    const Eigen::Vector2d step = -creep_m_s * BodyMotion::kKnot_s * uphill;
+    result.offsets[i] += step;
+    result.distance[i] += step;
   }
-  return offsets;
+  return result;
 }
 
 }  // namespace
@@ -82,19 +91,24 @@ BodyMotion::BodyMotion(const Drive& drive, const WheelGround& ground, const Chas
   };
   fit_all();
   if (wheels.creep_m_s == 0 && wheels.side_slip == 0) return;
-  const std::vector<Eigen::Vector2d> offsets = creep_offsets(path, knots_, wheels.creep_m_s);
+  Creep crept = creep(path, knots_, wheels.creep_m_s);
   for (std::size_t i = 0; i < path.size(); ++i) {
-    path[i].x += offsets[i].x();
-    path[i].y += offsets[i].y();
+    path[i].x += crept.offsets[i].x();
+    path[i].y += crept.offsets[i].y();
     // Heading uphill of the path by the angle at which it slips downhill keeps the rover on the path.
     path[i].heading += std::atan(wheels.side_slip * slopes_under(knots_[i]).y());
   }
   fit_all();
+  creep_ = std::move(crept.distance);
 }
 
+namespace {
+
 // Uniform cubic B-spline of the four knots around the time, or its derivative.
-Vector6d BodyMotion::evaluate_spline(double time_s, int derivative) const {
-  const double knot = std::clamp(time_s / kKnot_s, 0.0, static_cast<double>(knots_.size() - 1) - 1e-9);
+template <class Vector>
+Vector spline(const std::vector<Vector>& knots, double time_s, int derivative) {
+  constexpr double kKnot_s = BodyMotion::kKnot_s;
+  const double knot = std::clamp(time_s / kKnot_s, 0.0, static_cast<double>(knots.size() - 1) - 1e-9);
   const auto i = static_cast<std::ptrdiff_t>(knot);
   const double t = knot - static_cast<double>(i), u = 1 - t;
   std::array<double, 4> w{};
@@ -105,12 +119,18 @@ Vector6d BodyMotion::evaluate_spline(double time_s, int derivative) const {
   } else {
     w = {u, 3 * t - 2, 3 * u - 2, t};
   }
-  Vector6d sum = Vector6d::Zero();
+  Vector sum = Vector::Zero();
   for (std::ptrdiff_t k = 0; k < 4; ++k) {
-    const auto at = std::clamp<std::ptrdiff_t>(i + k - 1, 0, static_cast<std::ptrdiff_t>(knots_.size()) - 1);
-    sum += w[static_cast<std::size_t>(k)] * knots_[static_cast<std::size_t>(at)];
+    const auto at = std::clamp<std::ptrdiff_t>(i + k - 1, 0, static_cast<std::ptrdiff_t>(knots.size()) - 1);
+    sum += w[static_cast<std::size_t>(k)] * knots[static_cast<std::size_t>(at)];
   }
   return sum / std::pow(kKnot_s, derivative);
+}
+
+}  // namespace
+
+Vector6d BodyMotion::evaluate_spline(double time_s, int derivative) const {
+  return spline(knots_, time_s, derivative);
 }
 
 Pose BodyMotion::world_from_body(double time_s) const {
@@ -123,6 +143,12 @@ Pose BodyMotion::world_from_body(double time_s) const {
 
 Eigen::Vector3d BodyMotion::velocity(double time_s) const {
   return evaluate_spline(time_s, 1).head<3>();
+}
+Eigen::Vector3d BodyMotion::creep_velocity(double time_s) const {
+  if (creep_.empty()) return Eigen::Vector3d::Zero();
+  const Eigen::Vector2d level = spline(creep_, time_s, 1);
+  const Eigen::Vector3d up = world_from_body(time_s).rotation() * Eigen::Vector3d::UnitZ();
+  return {level.x(), level.y(), -up.head<2>().dot(level) / up.z()};
 }
 Eigen::Vector3d BodyMotion::acceleration(double time_s) const {
   return evaluate_spline(time_s, 2).head<3>();

@@ -34,6 +34,7 @@ class BodyMotion {
 
   Pose world_from_body(double time_s) const;
   Eigen::Vector3d velocity(double time_s) const;          ///< m/s, world
+  Eigen::Vector3d creep_velocity(double time_s) const;    ///< m/s, world; the part of it by which wheels do not turn
   Eigen::Vector3d acceleration(double time_s) const;      ///< m/s², world
   Eigen::Vector3d angular_velocity(double time_s) const;  ///< rad/s, body
   Eigen::Vector3d roll_pitch_yaw(double time_s) const;    ///< rad
@@ -43,6 +44,7 @@ class BodyMotion {
  private:
   Vector6d evaluate_spline(double time_s, int derivative) const;
   std::vector<Vector6d> knots_;
+  std::vector<Eigen::Vector2d> creep_;  // since the start, m, world x and y; empty: none
 };
 
 /// Pose of the body on the ground at a planar pose, as BodyMotion samples it: x, y, z (m), roll, pitch, yaw (rad).

@@ -266,6 +266,23 @@ TEST(BodyMotion, CreepsDownhillAtRestAndComesBackToThePath) {
   EXPECT_NEAR(left_m(motion.seconds() - 1), 0, 5e-4);
 }
 
+TEST(Wheels, StandStillWhileTheRoverCreeps) {
+  const PathOptions path{.kind = PathKind::straight, .length_m = 2, .initial_stop_s = 20};
+  const auto drive = Drive::plan(path, {}, Rig());
+  TerrainShapeOptions ahead = slope_to_the_left();
+  ahead.slope_heading_deg = 0;
+  const TerrainShape shape(ahead, 4);
+  const WheelOptions wheels{
+      .slip_level = 0, .slip_by_slope = 0, .slip_sand = 0, .creep_m_s = 0.002, .radius_error = 0, .resolution_m = 0};
+  const BodyMotion motion(*drive, {shape, WheelLift()}, {}, ThreadPool(1), wheels);
+  EXPECT_LT(motion.world_from_body(19).translation().x(), -0.009);
+  for (const WheelSample& sample : measure_wheels(motion, {}, wheels, {}, 1)) {
+    if (sample.stamp < stamp_at(19)) {
+      EXPECT_NEAR(sample.left_m, 0, 1e-5);
+    }
+  }
+}
+
 TEST(Wheels, SkidMakesThemRollMoreInTurnsAlone) {
   const auto rolled = [](const PathOptions& path, double skid) {
     const auto drive = Drive::plan(path, {}, Rig());

@@ -55,10 +55,4 @@ Pose CameraPoses::body_from_camera(const std::string& camera, const PlannedFrame
   return drift ? at_start * *drift : at_start;
 }
 
-Pose CameraPoses::right_from_left(const StereoPair& pair, double time_s) const {
-  const Pose at_start = rig_.right_from_left(pair);
-  const auto drift = drift_of(pair.right, time_s);
-  return drift ? drift->inverse() * at_start : at_start;
-}
-
 }  // namespace spartan::sim::internal

@@ -22,9 +22,6 @@ class CameraPoses {
   /// The pose at a time in the exposure of a planned frame.
   Pose body_from_camera(const std::string& camera, const PlannedFrame& frame, double time_s) const;
 
-  /// right_from_left of a pair at a time since the start.
-  Pose right_from_left(const StereoPair& pair, double time_s) const;
-
   /// True angles of a pan-tilt unit in a planned frame.
   struct Angles {
     double pan_rad = 0, tilt_rad = 0;

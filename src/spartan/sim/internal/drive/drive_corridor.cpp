@@ -4,11 +4,14 @@
 
 namespace spartan::sim::internal {
 
-DriveCorridor::DriveCorridor(const std::vector<PlanarPose>& track, double half_width_m, double left_m)
+DriveCorridor::DriveCorridor(const std::vector<PlanarPose>& track, double half_width_m,
+                             const Eigen::Vector2d& follows_m)
     : half_width_m_(half_width_m) {
   for (const PlanarPose& p : track) {
-    const PlanarPose beside{p.x - left_m * std::sin(p.heading), p.y + left_m * std::cos(p.heading), p.heading};
-    track_.add(beside.x, beside.y, beside);
+    const double c = std::cos(p.heading), s = std::sin(p.heading);
+    const PlanarPose at{p.x + c * follows_m.x() - s * follows_m.y(), p.y + s * follows_m.x() + c * follows_m.y(),
+                        p.heading};
+    track_.add(at.x, at.y, at);
   }
 }
 

@@ -146,7 +146,7 @@ std::vector<WheelSample> measure_wheels(const BodyMotion& motion, const ChassisO
     const double middle = 0.5 * (before + t), step = t - before;
     const Pose pose = motion.world_from_body(middle);
     const Eigen::Vector3d ahead = pose.rotation() * Eigen::Vector3d::UnitX();
-    const double forward = motion.velocity(middle).dot(ahead);
+    const double forward = (motion.velocity(middle) - motion.creep_velocity(middle)).dot(ahead);
     const double turning = motion.angular_velocity(middle).z() * chassis.track_m / 2 * (1 + o.turn_skid);
     double slip =
         o.slip_level + o.slip_by_slope * ahead.z() / std::hypot(ahead.x(), ahead.y()) * (forward < 0 ? -1 : 1);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -107,13 +106,24 @@ double RockField::Stratum::diameter_at(double count_fraction) const {
   return diameter_of_step(from_m, to_m, static_cast<double>(i) + std::clamp(part, 0.0, 1.0));
 }
 
-bool RockField::is_removed(const Rock& rock) const {
+// Lowers the rock by the depth d of the dust at its place, where a half ellipsoid of height h has a section of
+// diameter D √(1 − (d/h)²). Returns whether it stands out.
+bool RockField::lower_into_dust(Rock& rock) const {
+  if (cover_.none()) return true;
+  const double depth_m = cover_.dust_depth(rock.x, rock.y);
+  if (rock.height_m <= depth_m) return false;
+  const double covered = depth_m / rock.height_m;
+  rock.diameter_m *= std::sqrt(1 - covered * covered);
+  rock.height_m -= depth_m;
+  return true;
+}
+
+bool RockField::is_in_corridor(const Rock& rock) const {
   const double reach_m = 0.5 * rock.diameter_m * std::sqrt(kMaxElongation) * 1.1;
   const auto blocks = [&](const ClearedCorridor& c) {
     return rock.height_m > c.clearance_m && c.corridor.intersects_disc(rock.x, rock.y, reach_m);
   };
-  return std::any_of(corridors_.begin(), corridors_.end(), blocks) ||
-         (!cover_.none() && rock.height_m < cover_.dust_depth(rock.x, rock.y));
+  return std::any_of(corridors_.begin(), corridors_.end(), blocks);
 }
 
 void RockField::append_cell(const Stratum& stratum, std::int32_t i, std::int32_t j, std::vector<Rock>& rocks) const {
@@ -150,10 +160,10 @@ std::vector<Rock> RockField::rocks_in(const Region& region, double smallest_m) c
       for (std::int32_t i = cell(region.x0); i <= cell(region.x1); ++i) {
         here.clear();
         append_cell(stratum, i, j, here);
-        std::copy_if(here.begin(), here.end(), std::back_inserter(found), [&](const Rock& rock) {
-          return rock.x >= region.x0 && rock.x < region.x1 && rock.y >= region.y0 && rock.y < region.y1 &&
-                 !is_removed(rock);
-        });
+        for (Rock& rock : here) {
+          const bool inside = rock.x >= region.x0 && rock.x < region.x1 && rock.y >= region.y0 && rock.y < region.y1;
+          if (inside && lower_into_dust(rock) && !is_in_corridor(rock)) found.push_back(rock);
+        }
       }
     }
   }

@@ -39,7 +39,8 @@ class RockField {
 
   /// Removes rocks higher than `clearance_m` that reach into the corridor. Of several calls each removes rocks.
   void clear_corridor(DriveCorridor corridor, double clearance_m);
-  /// Removes rocks lower than the dust at their place.
+  /// Lowers the rocks by the depth of the dust at their places, above which their sections are smaller; removes lower
+  /// ones.
   void bury_under_dust(GroundCover cover) { cover_ = std::move(cover); }
 
   /// Rocks whose centre lies in the region; strata without rocks above `smallest_m` are skipped. A rock is the same
@@ -56,7 +57,8 @@ class RockField {
   };
   void add_stratum(double from_m, double to_m, std::uint64_t stream);
   void append_cell(const Stratum& stratum, std::int32_t i, std::int32_t j, std::vector<Rock>& rocks) const;
-  bool is_removed(const Rock& rock) const;
+  bool lower_into_dust(Rock& rock) const;
+  bool is_in_corridor(const Rock& rock) const;
 
   RockFieldOptions options_;
   std::uint64_t seed_ = 0;

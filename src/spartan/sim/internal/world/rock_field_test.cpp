@@ -85,7 +85,7 @@ TEST(RockField, CorridorOfTheWheelsLeavesRocksBetweenThem) {
   std::vector<PlanarPose> track;
   for (int i = 0; i <= 2000; ++i) track.push_back({0.01 * i, 0, 0});
   RockField field({.coverage = 0.2, .pebbles_per_m2 = 0}, 6);
-  for (const double left_m : {0.3, -0.3}) field.clear_corridor(DriveCorridor(track, 0.1, left_m), 0.05);
+  for (const double left_m : {0.3, -0.3}) field.clear_corridor(DriveCorridor(track, 0.1, {0, left_m}), 0.05);
   field.clear_corridor(DriveCorridor(track, 0.3), 0.18);
   int between = 0, high = 0;
   for (const Rock& rock : field.rocks_in({0, -1, 20, 1})) {

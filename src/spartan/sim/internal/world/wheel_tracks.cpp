@@ -10,32 +10,25 @@ namespace {
 constexpr double kCleat_m = 0.04;      // spacing of the prints of cleats
 constexpr double kCleatDepth = 0.35;   // amplitude of the prints over the depth of the track
 constexpr double kSoftEdge_m = 0.012;  // width of the border of a track
-constexpr double kStep_m = 0.5 * WheelTracks::kCell_m, kStep_s = 0.02;
 
 }  // namespace
 
-WheelTracks::WheelTracks(const Drive& drive, double until_s, const ChassisOptions& chassis, const Region& region)
+WheelTracks::WheelTracks(std::span<const DrivenPose> poses, double until_s, const ChassisOptions& chassis,
+                         const Region& region)
     : region_(region),
       depth_(static_cast<int>(std::ceil((region.x1 - region.x0) / kCell_m)) + 1,
              static_cast<int>(std::ceil((region.y1 - region.y0) / kCell_m)) + 1, 0.0F) {
   const double reach = 0.5 * chassis.track_m + chassis.wheel_width_m;
-  PlanarPose before = drive.at(0);
-  double driven_m = 0, pressed_m = -1;
-  for (double t = 0; t <= until_s; t += kStep_s) {
-    const PlanarPose here = drive.at(t);
-    // In turns in place the wheels move by the turn alone.
-    driven_m += std::hypot(here.x - before.x, here.y - before.y) +
-                0.5 * chassis.track_m * std::abs(here.heading - before.heading);
-    before = here;
-    if (driven_m < pressed_m + kStep_m) continue;
-    pressed_m = driven_m;
-    if (region.grown(reach + chassis.wheelbase_m).contains(here.x, here.y)) press(here, driven_m, chassis);
+  for (const DrivenPose& driven : poses) {
+    if (driven.time_s > until_s) break;
+    if (region.grown(reach + chassis.wheelbase_m).contains(driven.pose.x, driven.pose.y)) press(driven, chassis);
   }
 }
 
-void WheelTracks::press(const PlanarPose& at, double driven_m, const ChassisOptions& chassis) {
+void WheelTracks::press(const DrivenPose& driven, const ChassisOptions& chassis) {
+  const PlanarPose& at = driven.pose;
   const double c = std::cos(at.heading), s = std::sin(at.heading), half = 0.5 * chassis.wheel_width_m;
-  const double cleats = 1 + kCleatDepth * std::sin(2 * std::numbers::pi * driven_m / kCleat_m);
+  const double cleats = 1 + kCleatDepth * std::sin(2 * std::numbers::pi * driven.driven_m / kCleat_m);
   for (const double left : {0.5 * chassis.track_m, -0.5 * chassis.track_m}) {
     for (const double ahead : {0.5 * chassis.wheelbase_m, -0.5 * chassis.wheelbase_m}) {
       for (double aside = -half; aside <= half; aside += kStep_m) {
