@@ -50,6 +50,26 @@ std::string unknown_command(const CLI::App& app, const std::vector<std::string>&
   return {};
 }
 
+std::string unknown_option(const CLI::App& app, const std::vector<std::string>& words) {
+  const CLI::App* group = &app;
+  std::string path = "spartan";
+  for (const std::string& word : words) {
+    const auto commands = commands_of(*group);
+    if (commands.empty()) return {};
+    if (word.starts_with('-')) {
+      const std::string name = word.substr(0, word.find('='));
+      if (group->get_option_no_throw(name) != nullptr) continue;
+      return fmt::format("error: '{}' is not an option of {}; see `{} --help`\n", name, path, path);
+    }
+    const auto named = std::find_if(commands.begin(), commands.end(),
+                                    [&](const CLI::App* command) { return command->check_name(word); });
+    if (named == commands.end()) return {};
+    group = *named;
+    path += " " + word;
+  }
+  return {};
+}
+
 std::string command_of(const CLI::App& app) {
   const auto parsed = app.get_subcommands();
   return app.get_name() + (parsed.empty() ? "" : " " + command_of(*parsed.front()));

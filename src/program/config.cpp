@@ -9,9 +9,10 @@ namespace spartan::program {
 namespace {
 
 const std::string kHeading =
-    "# Keep only the lines that you change. Options that a file states are not derived by a run: sizes of maps follow "
-    "the\n"
-    "# height and range of the cameras, noise of sensors the recording.\n";
+    "# A list of all values, not a file to use as it is: keep only the lines that you change. A run derives the sizes "
+    "of maps\n"
+    "# from the height and range of the cameras and the noise of sensors from the recording, unless a file states "
+    "them.\n";
 
 struct ConfigArguments {
   std::string file;
@@ -41,7 +42,8 @@ void add_config(CLI::App& app, Context& context) {
   config->require_subcommand(1);
   const auto add_common = [](CLI::App* command, const std::shared_ptr<ConfigArguments>& a) {
     command->add_option("--set", a->set, "Set one option, as group.key=value. Repeatable; overrides the file.")
-        ->allow_extra_args(false);
+        ->allow_extra_args(false)
+        ->option_text("KEY=VALUE");
   };
   auto to_dump = std::make_shared<ConfigArguments>();
   CLI::App* dump_command =

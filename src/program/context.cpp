@@ -41,7 +41,9 @@ ExitCode exit_code(ErrorCode code) {
 CLI::App* add_command(CLI::App& app, Context& context, const std::string& name, const std::string& summary,
                       const std::string& example, CommandBody body) {
   CLI::App* command = app.add_subcommand(name, summary);
-  command->footer("Example:\n  spartan " + example);
+  std::string footer = "Example:\n  spartan " + example;
+  if (example.find("$SPARTAN_DATA") != std::string::npos) footer += "\n($SPARTAN_DATA is a folder with recordings)";
+  command->footer(footer);
   auto* quiet = command->add_flag("-q,--quiet", context.quiet,
                                   "Print errors and results only: no progress, information or warnings.");
   command->add_flag("-v,--verbose", context.verbose, "Print debug messages, too.")->excludes(quiet);

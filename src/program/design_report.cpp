@@ -11,9 +11,9 @@ namespace spartan::program {
 namespace {
 
 constexpr const char* kHead =
-    "             base [m]   near [m]  hfov [deg]  width [px]  pixel [um]  focal [mm]  range [m]  stereo [deg]  search "
-    "[%]  "
-    "pans [%]  tilt [deg]  ground [m]\n";
+    "                   baseline [m]  nearest [m]  hfov [deg]  width [px]  pixel [um]  focal [mm]  range [m]  stereo "
+    "angle "
+    "[deg]  search range [%]  pan overlap [%]  tilt [deg]  ground seen [m]\n";
 
 std::string percent_or_dash(double value) {
   return std::isnan(value) ? "-" : fmt::format("{:.1f}", value);
@@ -21,7 +21,7 @@ std::string percent_or_dash(double value) {
 
 std::string row(const std::string& name, const PairMetrics& pair) {
   return fmt::format(
-      "{:>14}  {:>6}  {:>8}  {:>10}  {:>10}  {:>10}  {:10.2f}  {:9.3f}  {:12.2f}  {:10.2f}  {:>8}  {:>10}  {:.3f} - "
+      "{:>17}  {:>12}  {:>11}  {:>10}  {:>10}  {:>10}  {:10.2f}  {:9.3f}  {:18.2f}  {:16.2f}  {:>15}  {:>10}  {:.3f} - "
       "{:.3f}\n",
       name, pair.parameters.baseline_m, pair.parameters.nearest_m, pair.parameters.hfov_deg, pair.parameters.width_px,
       pair.parameters.pixel_size_um, pair.focal_length_mm, pair.range_m, pair.stereo_angle_deg, pair.search_percent,
@@ -54,7 +54,7 @@ std::string pair_text(const PairRequirements& required, const PairDesign& design
   std::vector<std::string> order;
   order.reserve(required.order.size());
   for (const DesignCriterion criterion : required.order) order.push_back(name_of(criterion));
-  std::string text = fmt::format("{} pair: {} of {} combinations are feasible", required.name, design.feasible.size(),
+  std::string text = fmt::format("pair {}: {} of {} combinations are feasible", required.name, design.feasible.size(),
                                  design.combinations);
   if (design.with_pan_overlap_count) {
     text += fmt::format("; with neighbouring pans that overlap by at least {} %: {}",
@@ -63,19 +63,19 @@ std::string pair_text(const PairRequirements& required, const PairDesign& design
   text += fmt::format(
       "\nrequired: {} m resolution to {} m at a disparity accuracy of {} px, stereo angle at most {} deg, search range "
       "at most "
-      "{} %, baseline at least {} m, camera height at least {} m (it is {} m)\n",
+      "{} % of the image width, baseline at least {} m, camera height at least {} m (it is {} m)\n",
       required.range_resolution_m, required.range_m, required.disparity_accuracy_px, required.largest_stereo_angle_deg,
       required.largest_search_percent, required.smallest_baseline_m, required.smallest_height_m, required.height_m);
-  text += fmt::format("order: {}; ties keep the order of the lists ({} tie with the best)\n",
+  text += fmt::format("order: {}; equal ones in the order of the requirements file ({} are equal to the best)\n",
                       fmt::join(order, ", then "), design.equally_good);
   text += kHead;
   const std::size_t listed = std::min(rows, design.feasible.size());
   for (std::size_t i = 0; i < listed; ++i) text += row(fmt::format("{}.", i + 1), design.feasible[i]);
   if (listed < design.feasible.size()) {
-    text += fmt::format("{:>14}  {} more; --all lists them, -o writes them\n", "...", design.feasible.size() - listed);
+    text += fmt::format("{:>17}  {} more; --all lists them, -o writes them\n", "...", design.feasible.size() - listed);
   }
   if (const PairMetrics* best = design.best()) text += row("best", *best);
-  if (design.best_with_pan_overlap) text += row("best + overlap", *design.best_with_pan_overlap);
+  if (design.best_with_pan_overlap) text += row("best with overlap", *design.best_with_pan_overlap);
   if (design.nearest) text += row("nearest", *design.nearest);
   if (design.published) text += row("published", *design.published);
   if (const PairMetrics* best = design.best()) text += "margins of the best: " + margins_of(*best) + "\n";
@@ -84,9 +84,10 @@ std::string pair_text(const PairRequirements& required, const PairDesign& design
     text += "margins of the best with enough overlap: " + margins_of(*design.best_with_pan_overlap) + "\n";
   }
   if (design.published) {
-    text +=
-        fmt::format("published pair ({}, {}): margins: {}\n", design.published->feasible ? "feasible" : "not feasible",
-                    design.published_is_candidate ? "in the lists" : "not in the lists", margins_of(*design.published));
+    text += fmt::format("published pair (`published` in the requirements file; {}, {}): margins: {}\n",
+                        design.published->feasible ? "feasible" : "not feasible",
+                        design.published_is_candidate ? "one of the combinations" : "none of the combinations",
+                        margins_of(*design.published));
   }
   return text + "\n";
 }
@@ -114,6 +115,11 @@ std::string design_text(const RigRequirements& requirements, const RigDesign& de
   std::string text;
   for (std::size_t i = 0; i < design.pairs.size(); ++i) text += pair_text(requirements.pairs[i], design.pairs[i], rows);
   text += ground_text(design);
+  text +=
+      "stereo angle: between the lines of sight of both cameras at the nearest distance; search range: the largest "
+      "disparity\nin percent of the image width; range: the farthest distance with the required resolution; ground "
+      "seen: "
+      "in the middle column\n";
   if (!design.warnings.empty()) text += "\nwarnings:\n";
   for (const DesignWarning& warning : design.warnings) text += fmt::format("  {}: {}\n", warning.id, warning.text);
   return text;

@@ -49,7 +49,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done; 1 internal fault; 2 the command line is wrong; 3 the input is missing or unusable; 4 a "
-      "calibration or option file is missing or invalid;\n"
+      "calibration or option file is invalid, or an option names one that is missing;\n"
       "5 the output exists or cannot be written, or memory or file descriptors ran out; 6 done, but the rover was lost "
       "for part of the drive; 7 a bad calibration "
       "(`rig inspect --check`); 130 interrupted.");
@@ -63,6 +63,10 @@ int run(int argc, char** argv) {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them from the end
   } catch (const CLI::ParseError& e) {
     if (const std::string message = unknown_command(app, words); !message.empty()) {
+      std::cerr << message;
+      return kUsage;
+    }
+    if (const std::string message = unknown_option(app, words); !message.empty()) {
       std::cerr << message;
       return kUsage;
     }

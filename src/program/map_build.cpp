@@ -48,7 +48,7 @@ struct Stop {
   std::string mask_folder;
   std::vector<StereoFrame> frames;
   std::optional<Eigen::Vector3d> up_in_body;
-  const char* up_source = "assumed: along the z axis of the body";
+  const char* up_source = "assumed: gravity along the z axis of the body";
 };
 
 Result<std::optional<Eigen::Vector3d>> parse_gravity(const std::string& text) {
@@ -248,7 +248,7 @@ std::string to_text(const Json& json, const std::string& folder) {
       fmt::format("attitude: roll {:.2f} deg, pitch {:.2f} deg ({})\n", json["attitude"]["roll_deg"].get<double>(),
                   json["attitude"]["pitch_deg"].get<double>(), json["attitude"]["source"].get<std::string>());
   for (const Json& view : json["views"]) {
-    text += fmt::format("{:<12} ", view["pair"].get<std::string>());
+    text += fmt::format("{:<17} ", fmt::format("pair {}:", view["pair"].get<std::string>()));
     text += view["rig"].is_null()
                 ? std::string("camera over the ground: unknown (rig); ")
                 : fmt::format("camera height {:.3f} m, pitch {:.2f} deg down (rig); ",
@@ -263,7 +263,7 @@ std::string to_text(const Json& json, const std::string& folder) {
       "disparity {:.0f} ms, v-disparity {:.0f} ms, merging {:.0f} ms, map {:.0f} ms; peak memory {:.0f} MB\n",
       time["disparity"].get<double>(), time["v_disparity"].get<double>(), time["merging"].get<double>(),
       time["map"].get<double>(), 1e-6 * json["peak_memory_bytes"].get<double>());
-  text += fmt::format("{} x {} cells of {} m: {} free, {} obstacle, {} cavity; {} obstacles; results in {}\n",
+  text += fmt::format("{} x {} cells of {} m: {} free, {} obstacle, {} cavity; {} separate obstacles; results in {}\n",
                       json["columns"].get<int>(), json["rows"].get<int>(), json["cell_m"].get<double>(),
                       cells["free"].get<int>(), cells["obstacle"].get<int>(), cells["cavity"].get<int>(),
                       json["obstacles"].get<std::size_t>(), folder);
@@ -383,7 +383,8 @@ void add_map_build(CLI::App& map, Context& context) {
                       "YAML file with options that differ from the defaults (see `spartan config dump`).");
   command
       ->add_option("--set", a->set, "Set one option, e.g. mapping.map.obstacle_m=0.03. Repeatable; overrides --config.")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->option_text("KEY=VALUE");
   add_force_flag(*command, context);
   add_threads_option(*command, context);
   add_memory_option(*command, context);

@@ -102,7 +102,8 @@ void add_map_export(CLI::App& map, Context& context) {
           "Layer to write, for .tif and .asc (one): elevation_m, elevation_min_m, elevation_max_m, variance_m2, "
           "count, slope_rad, roughness_m, step_m, class, occupancy_logodds or cost. class as the only one is a "
           "GeoTIFF of bytes with a colour table. Repeatable (default: all for .tif, elevation_m for .asc).")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->option_text("NAME");
   command
       ->add_option(
           "--window", a->window_m,
@@ -110,7 +111,8 @@ void add_map_export(CLI::App& map, Context& context) {
           "(default: the whole map). It is enlarged to whole cells.")
       ->delimiter(',')
       ->expected(4)
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->option_text("X,Y,X,Y");
   add_force_flag(*command, context);
   add_threads_option(*command, context);
 }

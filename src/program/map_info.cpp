@@ -54,16 +54,16 @@ std::string counted(std::size_t count, const char* what) {
 std::string to_text(const Json& json) {
   const Json& cells = json["cells"];
   std::string text = fmt::format(
-      "{} x {} cells of {} m in {} tiles of {}; smallest x {:.2f} m, largest y {:.2f} m\n"
+      "{} x {} cells of {} m in {} tiles of {}; upper left corner x {:.2f} m, y {:.2f} m\n"
       "{:.1f} m2 mapped: {} cells free, {} obstacle, {} cavity\n"
       "elevation {:.3f} m to {:.3f} m, median standard deviation of a cell {:.1f} mm\n"
-      "{}:\n",
+      "{}, with stamp and pose of the body:\n",
       json["columns"].get<int>(), json["rows"].get<int>(), json["cell_m"].get<double>(),
       json["tiles"].get<std::size_t>(), counted(json["submaps"].get<std::size_t>(), "submap"),
       json["west_m"].get<double>(), json["north_m"].get<double>(), json["known_m2"].get<double>(),
       cells["free"].get<std::int64_t>(), cells["obstacle"].get<std::int64_t>(), cells["cavity"].get<std::int64_t>(),
       json["elevation_m"]["least"].get<double>(), json["elevation_m"]["most"].get<double>(),
-      1e3 * json["sigma_m"]["median"].get<double>(), counted(json["stops"].size(), "stop"));
+      1e3 * json["sigma_m"]["median"].get<double>(), counted(json["stops"].size(), "local map"));
   for (const Json& stop : json["stops"]) {
     text += fmt::format("  {} ns at {:.3f}, {:.3f}, {:.3f} m, yaw {:.1f} deg, standard deviation {:.1f} mm\n",
                         stop["stamp_ns"].get<std::int64_t>(), stop["x_m"].get<double>(), stop["y_m"].get<double>(),
@@ -87,7 +87,7 @@ Result<ExitCode> info(const Context& context, const std::string& path) {
 void add_map_info(CLI::App& map, Context& context) {
   auto path = std::make_shared<std::string>();
   CLI::App* command =
-      add_command(map, context, "info", "Print extent, cell counts, elevations and stops of a global map",
+      add_command(map, context, "info", "Print extent, cell counts, elevations and local maps of a global map",
                   "map info my_run", [&context, path] { return info(context, *path); });
   command->add_option("map", *path, "Saved map (.map) or run folder.")->required();
   add_json_flag(*command, context);

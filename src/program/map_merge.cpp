@@ -88,7 +88,7 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
         fmt::format("the elevations of {} are {:.0f} mm above those of {}: check that both maps share a world frame",
                     arguments.b, 1e3 * agreement->median_m, arguments.a));
   }
-  if (shared > 0) context.log.warning(fmt::format("{} stops are in both maps and count once", shared));
+  if (shared > 0) context.log.warning(fmt::format("{} local maps are in both maps and count once", shared));
   const Json json{{"schema", 1},
                   {"stops", both.stops().size()},
                   {"shared_stops", shared},
@@ -97,8 +97,9 @@ Result<ExitCode> merge(const Context& context, const MergeArguments& arguments) 
                   {"both_know_cells", agreement->cells},
                   {"apart_m", {{"median", agreement->median_m}, {"spread", agreement->spread_m}}}};
   const std::string text = fmt::format(
-      "{} stops, {} submaps, {} tiles in {}\n{} cells are known in both maps; the second is {:.1f} mm above the first "
-      "there (median; spread {:.1f} mm)\n",
+      "{} local maps, {} submaps, {} tiles in {}\n{} cells are known in both maps; the second is {:.1f} mm above the "
+      "first "
+      "there (median; robust standard deviation {:.1f} mm)\n",
       both.stops().size(), both.submaps().size(), both.tiles(), arguments.output, agreement->cells,
       1e3 * agreement->median_m, 1e3 * agreement->spread_m);
   if (Status s = print(context.json ? text_of(json) + "\n" : text); !s) return failure(s);

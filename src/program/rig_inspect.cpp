@@ -157,7 +157,8 @@ std::string inspection_to_text(const InspectedPair& one, bool guessed) {
         pair, check.yaw_sigma_px);
   }
   for (const RigFinding& f : check.findings) text += fmt::format("{}finding {}: {}\n", pair, f.id, f.text);
-  return text + fmt::format("{}calibration: {}\n", pair, name_of(check.grade));
+  if (!one.checked()) return text + pair + "calibration: not verified by these images, see the findings\n";
+  return text + fmt::format("{}{}: {}\n", pair, guessed ? "as rectified images" : "calibration", name_of(check.grade));
 }
 
 // Checks the requested pairs, with images of the recording, or with the given images of one pair.

@@ -143,22 +143,26 @@ void add_run(CLI::App& app, Context& context) {
   command->add_option("--config", a->config,
                       "YAML file with options that differ from the defaults (see `spartan config dump`).");
   command->add_option("--set", a->set, "Set one option, as group.key=value. Repeatable; overrides --config.")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->option_text("KEY=VALUE");
   command->add_option(
       "--truth", a->truth,
       "Ground truth to evaluate the result against, as `spartan evaluate` does: a trajectory file (TUM, KITTI, EuRoC "
       "csv), or a recording with ground truth (default: none).");
   auto* resume = command->add_flag(
       "--resume", a->resume,
-      "Continue an interrupted run in this folder. Trajectories, maps and terrain have the same bytes as without the "
+      "Continue an interrupted run in this folder. Trajectories, maps and point clouds have the same bytes as without "
+      "the "
       "interruption.");
   command
       ->add_option("--max-frames", a->max_frames,
                    "Stop after this many stereo frames of the odometry pair, counted from the start of the recording; "
-                   "frames with missing images count (default 0: all).")
+                   "frames with missing images count (default 0: all). A run that has as many already is not shortened "
+                   "by --resume.")
       ->check(non_negative_number());
   command->add_flag("--odometry-only", a->odometry_only,
-                    "Run the visual odometry alone: no localization, maps, SLAM or terrain.");
+                    "Run the visual odometry alone: no localization, maps, SLAM, disparity images or "
+                    "point clouds.");
   add_force_flag(*command, context)->excludes(resume);
   add_threads_option(*command, context);
   add_memory_option(*command, context);

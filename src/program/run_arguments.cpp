@@ -41,12 +41,22 @@ Result<RunOptions> run_options(const Context& context, const std::string& file,
   return std::move(chosen->options);
 }
 
+namespace {
+
+// The word of the summary for a status of the files.
+std::string status_text(const std::string& status) {
+  if (status == "standing") return "stationary";
+  return status == "missing" ? "image missing" : status;
+}
+
+}  // namespace
+
 RunHooks run_hooks(const Context& context, Progress& progress) {
   RunHooks hooks;
   hooks.log = context.log;
   hooks.should_stop = interrupted;
   hooks.progress = [&progress](const RunProgress& p) {
-    progress.show(p.done, p.total, fmt::format("{}, {:.1f} m", p.status, p.distance_m));
+    progress.show(p.done, p.total, fmt::format("{}, {:.1f} m", status_text(p.status), p.distance_m));
   };
   return hooks;
 }

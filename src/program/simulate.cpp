@@ -28,7 +28,8 @@ void add_simulate(CLI::App& app, Context& context) {
   command->add_option("--seed", a->seed, "Seed of all random numbers (default: that of the scenario).")
       ->check(non_negative_number());
   command->add_option("--set", a->set, "Set one key of the scenario, e.g. rover=ordinary. Repeatable, in this order.")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->option_text("KEY=VALUE");
   auto* resume = command->add_flag(
       "--resume", a->resume,
       "Continue an interrupted simulation in this folder. The files are the same as without the interruption.");

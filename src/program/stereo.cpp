@@ -334,7 +334,8 @@ void add_stereo(CLI::App& app, Context& context) {
   command
       ->add_option("--set", a->set,
                    "Set one option, e.g. imaging.view.policy=all_valid. Repeatable; overrides --config.")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->option_text("KEY=VALUE");
   add_force_flag(*command, context);
   add_threads_option(*command, context);
   add_memory_option(*command, context);

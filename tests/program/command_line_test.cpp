@@ -41,6 +41,14 @@ TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
   EXPECT_THAT(run_program({"rig", "inspekt"}).err, HasSubstr("did you mean `inspect`? see `spartan rig --help`"));
 }
 
+TEST(CommandLine, NamesAnUnknownOptionBeforeTheCommand) {
+  const auto alone = run_program({"--bogus"}), before_run = run_program({"--bogus=1", "run", "x"});
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_THAT(alone.err, HasSubstr("'--bogus' is not an option of spartan; see `spartan --help`"));
+  EXPECT_THAT(before_run.err, HasSubstr("'--bogus' is not an option of spartan"));
+  EXPECT_THAT(run_program({"map", "--bogus"}).err, HasSubstr("'--bogus' is not an option of spartan map"));
+}
+
 TEST(CommandLine, WithoutACommandListsTheCommands) {
   const auto program = run_program({}), group = run_program({"map"});
   EXPECT_EQ(program.exit_code, 2);

@@ -93,9 +93,9 @@ TEST(RigDesign, ListsTheFeasibleSet) {
   EXPECT_THAT(some.out, HasSubstr("12591 other combinations"));
   EXPECT_THAT(some.out, HasSubstr("12582 more"));
   EXPECT_THAT(some.out, HasSubstr("margins of the best: range +1.521 m"));
-  EXPECT_THAT(some.out, HasSubstr("\nnarrow pair: 1 of 2 combinations are feasible"));
-  EXPECT_THAT(some.out, HasSubstr("published pair (feasible, in the lists): margins: range +0.002 m"));
-  EXPECT_THAT(some.out, HasSubstr("published pair (not feasible, in the lists): margins: range -0.515 m"));
+  EXPECT_THAT(some.out, HasSubstr("\npair narrow: 1 of 2 combinations are feasible"));
+  EXPECT_THAT(some.out, HasSubstr("feasible, one of the combinations): margins: range +0.002 m"));
+  EXPECT_THAT(some.out, HasSubstr("not feasible, one of the combinations): margins: range -0.515 m"));
   EXPECT_THAT(some.out, HasSubstr("ground seen by both pairs, middle column: 2.03 m\n"));
   EXPECT_THAT(some.out, HasSubstr("at the far edge: 117.1 deg (one camera), 114.6 deg (both)\n"));
   EXPECT_LT(lines_of(some.out), 70u);

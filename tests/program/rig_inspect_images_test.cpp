@@ -92,7 +92,7 @@ TEST_F(RigInspectImages, WithoutACalibration) {
   const auto result = inspect("-", {image(0), image(1)});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("no calibration"));
-  EXPECT_THAT(result.out, HasSubstr("calibration: good"));
+  EXPECT_THAT(result.out, HasSubstr("as rectified images: good"));
   const auto swapped = inspect("-", {image(1), image(0), "--json"});
   EXPECT_EQ(ids(json::parse(swapped.out)["pairs"].front()), std::vector<std::string>{"swapped_eyes"});
 }
@@ -340,6 +340,9 @@ TEST_F(RigInspectImages, BadInputIsNamed) {
   const auto gray = inspect(rig, {folder_.path() + "/gray.png", folder_.path() + "/gray.png", "--json"});
   ASSERT_EQ(gray.exit_code, 0) << gray.err;
   EXPECT_EQ(ids(json::parse(gray.out)["pairs"].front()), std::vector<std::string>{"not_enough_texture"});
+  const auto text = inspect(rig, {folder_.path() + "/gray.png", folder_.path() + "/gray.png"});
+  EXPECT_THAT(text.out, HasSubstr("calibration: not verified by these images"));
+  EXPECT_THAT(text.out, Not(HasSubstr("calibration: bad")));
 }
 
 }  // namespace

@@ -133,7 +133,7 @@ TEST_F(Stops, TheGlobalMapIsDescribedMergedAndExported) {
   const ProgramResult same =
       run_program({"map", "merge", path("whole"), path("whole"), "-o", path("same.map"), "--json"});
   ASSERT_EQ(same.exit_code, 0) << same.err;
-  EXPECT_NE(same.err.find("2 stops are in both maps"), std::string::npos) << same.err;
+  EXPECT_NE(same.err.find("2 local maps are in both maps"), std::string::npos) << same.err;
   EXPECT_EQ(nlohmann::json::parse(same.out)["stops"], 2);
   EXPECT_EQ(nlohmann::json::parse(same.out)["shared_stops"], 2);
 

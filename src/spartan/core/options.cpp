@@ -38,6 +38,9 @@ class Tree {
 
 namespace {
 
+constexpr const char* kOptionsHint =
+    "`spartan config dump --all` lists the options of a run, docs/reference/scenario.md those of a scenario";
+
 std::string number(double value) {
   return fmt::format("{}", value);
 }
@@ -178,7 +181,7 @@ void Reader::close_list() {
 
 Status Reader::finish() {
   tree_->levels.back().reject_unknown_keys();
-  return tree_->errors.status("`spartan config dump --all` lists every option with its description");
+  return tree_->errors.status(kOptionsHint);
 }
 
 std::vector<std::string> Reader::warnings() const {
@@ -215,8 +218,7 @@ void Validator::field(std::string_view key, const std::vector<double>& value, st
 }
 Status Validator::finish(std::string_view name) const {
   if (errors_.empty()) return {};
-  return failure(ErrorCode::configuration, errors_, std::string(name),
-                 "`spartan config dump --all` lists every option with its description");
+  return failure(ErrorCode::configuration, errors_, std::string(name), kOptionsHint);
 }
 
 void Lister::field(std::string_view key, const bool& value, std::string_view meaning) {

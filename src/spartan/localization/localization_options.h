@@ -157,36 +157,41 @@ struct WheelOdometryOptions {
             "Random walk of that scale, in 1/sqrt(s); raising it lets the scale follow changing soil faster.",
             between(0, 1));
     v.renamed("forward_share", "forward_sigma_ratio");
-    v.field("forward_sigma_ratio", forward_sigma_ratio,
-            "Standard deviation of a step's length as a fraction of it (slip beyond the mean); raising it trusts the "
-            "wheels less and detects slip later.",
-            between(0, 1));
+    v.field(
+        "forward_sigma_ratio", forward_sigma_ratio,
+        "Standard deviation of the distance between two updates by the wheels, as a fraction of it (slip beyond the "
+        "mean); raising it trusts the "
+        "wheels less and detects slip later.",
+        between(0, 1));
     v.renamed("side_share", "side_sigma_ratio");
-    v.field(
-        "side_sigma_ratio", side_sigma_ratio,
-        "Standard deviation of motion to the side as a fraction of the step's length; raising it allows more lateral "
-        "slip.",
-        between(0, 10));
+    v.field("side_sigma_ratio", side_sigma_ratio,
+            "Standard deviation of motion to the side as a fraction of the distance between two updates; raising it "
+            "allows more lateral "
+            "slip.",
+            between(0, 10));
     v.renamed("up_share", "up_sigma_ratio");
-    v.field(
-        "up_sigma_ratio", up_sigma_ratio,
-        "Standard deviation of motion along the body's z axis as a fraction of the step's length; raising it allows "
-        "for rougher ground.",
-        between(0, 10));
+    v.field("up_sigma_ratio", up_sigma_ratio,
+            "Standard deviation of motion along the body's z axis as a fraction of the distance between two updates; "
+            "raising it allows "
+            "for rougher ground.",
+            between(0, 10));
     v.renamed("turn_share", "turn_sigma_ratio");
     v.field("turn_sigma_ratio", turn_sigma_ratio,
-            "Standard deviation of a step's rotation as a fraction of it; raising it trusts the rotation by the wheels "
+            "Standard deviation of the rotation between two updates as a fraction of it; raising it trusts the "
+            "rotation by the wheels "
             "less.",
             between(0, 10));
     v.renamed("floor_m", "min_sigma_m");
     v.field("min_sigma_m", min_sigma_m,
-            "Minimum standard deviation of a step in metres; raising it lowers the weight of short steps.",
+            "Minimum standard deviation of the distance between two updates in metres; raising it lowers the weight of "
+            "short distances.",
             between(1e-6, 1));
     v.renamed("longest_step_s", "max_step_s");
-    v.field("max_step_s", max_step_s,
-            "Longest step of the wheels in seconds where no frame ends it; raising it gives fewer updates over longer "
-            "steps.",
-            between(0.1, 100));
+    v.field(
+        "max_step_s", max_step_s,
+        "Longest interval between two updates by the wheels in seconds (each stereo frame is an update); raising it "
+        "gives fewer updates over longer distances.",
+        between(0.1, 100));
     v.renamed("least_slip_distance_m", "min_slip_distance_m");
     v.field(
         "min_slip_distance_m", min_slip_distance_m,

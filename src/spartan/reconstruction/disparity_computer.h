@@ -113,10 +113,9 @@ struct DisparityOptions {
         "ambiguous pixels, and 0 disables the check.",
         between(0, 100));
     v.field("left_right_px", left_right_px,
-            "Tolerance of the left-right consistency check in pixels: the disparity of a right pixel is that of the "
-            "left pixel of the lowest cost that is matched to it; raising it discards fewer pixels at occlusions, and "
-            "a negative value "
-            "disables the check.");
+            "Tolerance of the left-right consistency check in pixels. Where several left pixels match one right pixel, "
+            "the one with the lowest cost determines its disparity. Raising the tolerance discards fewer pixels at "
+            "occlusions, and a negative value disables the check.");
     v.field("median", median,
             "True applies a 3x3 median filter to the disparities, which removes single outliers and keeps edges; false "
             "keeps "

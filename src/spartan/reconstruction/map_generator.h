@@ -78,15 +78,16 @@ struct RoverLimits {
     v.former("track_m", geometry.track_m, RoverGeometry().track_m, "rover.track_m in the rig file", between(0.05, 10));
     v.renamed("steepest_deg", "max_slope_deg");
     v.field("max_slope_deg", max_slope_deg,
-            "Steepest traversable slope in degrees; a slope that steep has cost 1, and raising it lowers the cost of "
+            "Steepest traversable slope in degrees; at that slope the cost reaches its maximum of 1, and raising it "
+            "lowers the cost of "
             "slopes.",
             between(1, 80));
     v.renamed("highest_step_m", "max_step_m");
-    v.field(
-        "max_step_m", max_step_m,
-        "Highest traversable step between neighbouring cells in metres; a step that high has cost 1, and raising it "
-        "lowers the cost of steps.",
-        between(0.005, 5));
+    v.field("max_step_m", max_step_m,
+            "Highest traversable step between neighbouring cells in metres; at that height the cost reaches its "
+            "maximum of 1, and raising it "
+            "lowers the cost of steps.",
+            between(0.005, 5));
   }
 };
 

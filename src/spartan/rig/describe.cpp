@@ -149,7 +149,7 @@ PairSummary summarize_pair(const Rig& rig, const StereoPair& pair) {
 
 std::vector<std::string> describe_rig(const Rig& rig) {
   std::vector<std::string> lines{
-      fmt::format("rig {}: {} cameras, {} stereo pair{}; poses of the recording are those of {}", rig.name,
+      fmt::format("rig {}: {} cameras, {} stereo pair{}; poses of recordings with this rig are those of {}", rig.name,
                   rig.cameras.size(), rig.pairs.size(), rig.pairs.size() == 1 ? "" : "s",
                   rig.convention == PoseConvention::body ? "the body" : "the left camera, relative to its first pose")};
   for (const PanTiltUnit& unit : rig.pan_tilt_units) {

@@ -50,13 +50,13 @@ struct MatchOptions {
     v.field(
         "max_search_m", max_search_m,
         "Upper bound of the half size of the search window along x and y in metres; raise it where the odometry may "
-        "drift farther between stops.",
+        "drift farther between local maps.",
         between(0.05, 10));
     v.renamed("widest_deg", "max_search_deg");
     v.field(
         "max_search_deg", max_search_deg,
         "Upper bound of the half size of the search window in yaw, in degrees; raise it where the heading may drift "
-        "more between stops.",
+        "more between local maps.",
         between(0.5, 60));
     v.field(
         "step_m", step_m,
@@ -170,8 +170,8 @@ struct GlobalMapOptions {
             "larger submaps.",
             between(1, 10000));
     v.field("memory_mb", memory_mb,
-            "Memory limit of the tiles of the global map in megabytes; tiles beyond it are kept in the run's store "
-            "only, so raising it saves reads.",
+            "Memory limit of the tiles of the global map in megabytes; tiles beyond it are kept in the run's database "
+            "(run.sqlite) only, so raising it saves reads.",
             between(1, 1e6));
     v.field("gate_sigmas", gate_sigmas,
             "Gate on the difference between an observed elevation and that of its cell, in standard "

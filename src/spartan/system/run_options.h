@@ -85,8 +85,8 @@ struct KeyframeOptions {
             between(0.01, 1));
     v.field(
         "delay_frames", delay_frames,
-        "Most frames between a keyframe and the frame whose pose its map corrects. Meanwhile one thread makes the map "
-        "beside the odometry; raising it lets slow cores keep up, and corrects the pose later.",
+        "The map of a keyframe is made by one thread while the odometry goes on; its correction is applied to the pose "
+        "at most so many frames after the keyframe. Raising it lets slow cores keep up, and corrects the pose later.",
         between(0, 100));
   }
 };
@@ -120,8 +120,8 @@ struct RunOptions {
             "True lets the sensor noise and biases that the recording specifies replace the defaults of localization "
             "(not values that are set explicitly); false ignores them.");
     v.field("odometry_pair", odometry_pair,
-            "Name of the stereo pair used for visual odometry; empty selects the first pair of the rig with "
-            "for_odometry.");
+            "Name of the stereo pair used for visual odometry; empty selects the first pair with "
+            "`for_odometry: true` in the rig file.");
     v.field("odometry_only", odometry_only,
             "True runs the visual odometry alone, without localization, maps, SLAM and terrain (initial roll and "
             "pitch are still taken from the IMU); false runs all stages.");

@@ -104,7 +104,10 @@ std::string time_section(const nlohmann::ordered_json& summary) {
              "MB.</p>\n",
              seconds > 0 ? summary["frames"].get<double>() / seconds : 0.0, summary["frames"].get<int>(), seconds,
              summary["cpu_seconds"].get<double>(), summary["threads"].get<int>(),
-             summary["peak_memory_bytes"].get<double>() / 1e6);
+             summary["peak_memory_bytes"].get<double>() / 1e6) +
+         "<p>Stages: camera reads images; reconstruction is dense stereo; mapping makes local maps and slam merges "
+         "them; "
+         "maps and terrain write files.</p>\n";
 }
 
 std::string run_section(const nlohmann::ordered_json& summary, const ReportRequest& request,
