@@ -221,11 +221,9 @@ void time_targets(const std::vector<Pair>& pairs, const Arguments& arguments) {
         image = must(computer.compute(largest->left, largest->right, {0, largest->disparities - 1}));
       });
       const auto& t = image.times;
-      fmt::print(
-          "{:<5} {} threads {:7.1f} ms (cost {:.1f}, aggregate {:.1f}, select {:.1f}, check {:.1f}, filter {:.1f}), "
-          "{:.0f} MB\n",
-          name_of(simd), threads, ms, t.cost, t.aggregate, t.select, t.check, t.filter,
-          static_cast<double>(image.buffer_bytes) / 1e6);
+      fmt::print("{:<5} {} threads {:7.1f} ms (coarse {:.1f}, match {:.1f}, filter {:.1f}, refine {:.1f}), {:.0f} MB\n",
+                 name_of(simd), threads, ms, t.coarse, t.match, t.filter, t.refine,
+                 static_cast<double>(image.buffer_bytes) / 1e6);
     }
   }
 }

@@ -315,7 +315,8 @@ Result<ExitCode> build(const Context& context, const BuildArguments& a) {
   for (const StereoFrame& frame : stop->frames) {
     const RectifiedStereo geometry = imager->geometry(frame.pair);
     const DisparityRange range = disparity_range(geometry, stop->rig.find_pair(frame.pair)->nearest_m);
-    if (Status s = DisparityComputer::check_memory(geometry.size, range, memory_bound(context)); !s) return failure(s);
+    if (Status s = DisparityComputer::check_memory(geometry.size, range, context.threads, memory_bound(context)); !s)
+      return failure(s);
   }
   auto created = StopMapper::create(options->reconstruction, options->mapping, workers);
   if (!created) return failure(created);

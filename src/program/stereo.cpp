@@ -182,8 +182,7 @@ double known_percent(ImageView<const float> disparity) {
 }
 
 Json times_of(const DisparityTimes& t) {
-  return {{"total", t.total},   {"cost", t.cost},   {"aggregate", t.aggregate}, {"select", t.select},
-          {"refine", t.refine}, {"check", t.check}, {"filter", t.filter}};
+  return {{"total", t.total}, {"coarse", t.coarse}, {"match", t.match}, {"filter", t.filter}, {"refine", t.refine}};
 }
 
 Result<std::optional<DisparityMetrics>> score_disparity(const StereoArguments& a, ImageView<const float> disparity) {
@@ -254,7 +253,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (!computer) return failure(computer);
   const auto range = search_range(a, *pair);
   if (!range) return failure(range);
-  if (Status s = DisparityComputer::check_memory(pair->left.size(), *range, memory_bound(context)); !s)
+  if (Status s = DisparityComputer::check_memory(pair->left.size(), *range, context.threads, memory_bound(context)); !s)
     return failure(s);
   if (Status s = expect_not_interrupted(); !s) return failure(s);
   context.log.info(fmt::format("matching {} x {} px, disparities {} to {}", pair->left.width(), pair->left.height(),

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
-#include <new>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -72,6 +72,11 @@ class ImageView {
   std::ptrdiff_t stride_ = 0;
 };
 
+/// Memory for the pixels of an image, 64-byte aligned, to be released by std::free(). Large images begin at the address
+/// of a huge page and ask the system for them, because the first access to each page of 4 KB costs more than the work
+/// on its pixels. Throws std::bad_alloc.
+void* allocate_pixels(std::size_t bytes);
+
 /// An image that owns its pixels: rows are 64-byte aligned and padded to whole 64-byte blocks.
 /// Movable; copied only by clone().
 template <class T>
@@ -95,7 +100,7 @@ class Image {
     stride_ = static_cast<std::ptrdiff_t>(padded / sizeof(T));
     const std::size_t bytes = padded * static_cast<std::size_t>(height);
     if (bytes == 0) return;
-    data_.reset(static_cast<T*>(::operator new(bytes, std::align_val_t{kAlignment})));
+    data_.reset(static_cast<T*>(allocate_pixels(bytes)));
     std::fill_n(data_.get(), bytes / sizeof(T), value);
   }
   Image(Image&& other) noexcept { swap(other); }
@@ -139,7 +144,7 @@ class Image {
 
  private:
   struct Free {
-    void operator()(T* data) const { ::operator delete(data, std::align_val_t{kAlignment}); }
+    void operator()(T* data) const { std::free(data); }
   };
   void swap(Image& other) noexcept {
     std::swap(width_, other.width_);

@@ -7,21 +7,38 @@
 #include <utility>
 
 #include "spartan/core/stage_clock.h"
+#include "spartan/numerics/simd_target.h"
 #include "spartan/reconstruction/internal/disparity_filters.h"
-#include "spartan/reconstruction/internal/semi_global_matcher.h"
+#include "spartan/reconstruction/internal/matching/coarse_to_fine_matcher.h"
+#include "spartan/reconstruction/internal/matching/reliability.h"
+#include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
 
 namespace spartan {
 
 using namespace internal;
 
+namespace {
+
+// Unrelated noise has patches of consistent disparities, too, but hardly pixels as reliable as this.
+constexpr int kReliable_percent = 7;
+
+}  // namespace
+
 struct DisparityComputer::State {
   State(const DisparityOptions& options_in, const ThreadPool& workers_in)
-      : options(options_in), workers(workers_in), matcher(options_in, workers_in) {}
+      : options(options_in),
+        workers(workers_in),
+        kernels(matching::refinement_kernels_for(simd_target_index(options_in.simd))),
+        matcher(options_in, workers_in),
+        refinement(kernels, workers_in) {}
   DisparityOptions options;
   ThreadPool workers;
-  SemiGlobalMatcher matcher;
+  matching::RefinementKernels kernels;
+  matching::CoarseToFineMatcher matcher;
+  matching::SubpixelRefinement refinement;
   SpeckleFilter speckles;
-  Image<float> checked, smoothed;
+  Image<float> disparity, sigma;  // sigma is also the output of the median filter
+  Image<std::uint8_t> outlier_percent;
 };
 
 Result<DisparityComputer> DisparityComputer::create(const DisparityOptions& options, ThreadPool workers) {
@@ -61,38 +78,46 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   if (Status fits = check(left, right, range, left_mask, right_mask); !fits) return failure(fits);
   Stopwatch all, watch;
   State& s = *state_;
-  if (s.checked.size() != left.size()) {
-    s.checked = Image<float>(left.size());
-    s.smoothed = Image<float>(left.size());
+  if (s.disparity.size() != left.size()) {
+    for (Image<float>* image : {&s.disparity, &s.sigma}) *image = Image<float>(left.size());
+    s.outlier_percent = Image<std::uint8_t>(left.size());
   }
   DisparityImage result;
-  const RawDisparity& raw = s.matcher.match(left, right, range);
-  result.times = s.matcher.times();
-  watch.lap();
-  drop_inconsistent(raw, s.options.left_right_px, s.workers, s.checked);
-  apply_masks(left_mask, right_mask, s.checked);
-  result.times.check = watch.lap();
+  DisparityTimes& times = result.times;
+  const matching::IntervalMatches& matches = s.matcher.match(left, right, range);
+  times.coarse = s.matcher.coarse_ms();
+  times.match = watch.lap() - times.coarse;
+  for (int y = 0; y < left.height(); ++y) std::copy_n(matches.disparity.row(y), left.width(), s.disparity.row(y));
+  apply_masks(left_mask, right_mask, s.disparity);
   if (s.options.median) {
-    median_3x3(s.checked, s.workers, s.smoothed);
-  } else {
-    std::swap(s.checked, s.smoothed);
+    median_3x3(s.disparity, s.kernels.median_row, s.workers, s.sigma);
+    std::swap(s.disparity, s.sigma);
   }
-  s.speckles.apply(s.options.speckle_size_px, s.options.speckle_step_px, s.smoothed);
-  result.times.filter = watch.lap();
-  result.times.total = all.lap();
-  result.disparity = s.smoothed.view();
-  result.buffer_bytes = s.matcher.buffer_bytes();
+  times.filter = watch.lap();
+  s.refinement.refine(left, right, s.disparity);
+  matching::assess({s.refinement.information(), matches.right_distance, s.options.max_outlier_percent}, s.workers,
+                   {s.disparity, s.sigma, s.outlier_percent});
+  times.refine = watch.lap();
+  s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, s.outlier_percent, kReliable_percent},
+                   s.disparity);
+  matching::clear_unknown(s.workers, {s.disparity, s.sigma, s.outlier_percent});
+  times.filter += watch.lap();
+  times.total = all.lap();
+  result.disparity = s.disparity.view();
+  result.sigma = s.sigma.view();
+  result.outlier_percent = s.outlier_percent.view();
+  result.buffer_bytes = s.matcher.buffer_bytes() + s.refinement.buffer_bytes();
   return result;
 }
 
-std::int64_t DisparityComputer::memory_bytes(ImageSize size, DisparityRange range) {
-  // Per pixel: the checked and the smoothed disparity (4 bytes each), labels and stack of the speckle filter (12
-  // bytes).
-  return SemiGlobalMatcher::memory_bytes(size, range) + std::int64_t{20} * size.width * size.height;
+std::int64_t DisparityComputer::memory_bytes(ImageSize size, DisparityRange range, int threads) {
+  // Per pixel: two images of 4 bytes and one of 1 byte, and the labels and runs of the speckle filter (16 bytes).
+  return matching::CoarseToFineMatcher::memory_bytes(size, range, threads) +
+         matching::SubpixelRefinement::memory_bytes(size, threads) + std::int64_t{25} * size.width * size.height;
 }
 
-Status DisparityComputer::check_memory(ImageSize size, DisparityRange range, std::int64_t most_bytes) {
-  const std::int64_t needed = memory_bytes(size, range);
+Status DisparityComputer::check_memory(ImageSize size, DisparityRange range, int threads, std::int64_t most_bytes) {
+  const std::int64_t needed = memory_bytes(size, range, threads);
   if (most_bytes <= 0 || needed <= most_bytes) return {};
   return failure(
       ErrorCode::resources,

@@ -22,22 +22,29 @@ struct DisparityRange {
 
 /// Wall-clock milliseconds of each step of one call; for reports only, no result depends on them.
 struct DisparityTimes {
-  double cost = 0, aggregate = 0, select = 0, refine = 0, check = 0, filter = 0, total = 0;
+  double coarse = 0;  ///< matching at a quarter and at half of the resolution
+  double match = 0;   ///< matching at full resolution
+  double filter = 0;  ///< masks, median, speckle filter
+  double refine = 0;  ///< sub-pixel refinement, sigma and outlier probability
+  double total = 0;
 };
 
-/// A disparity image of the rectified left camera: x_left − x_right in pixels, NaN where unknown.
-/// The view borrows the computer's buffer and is valid until its next call.
+/// A disparity image of the rectified left camera: x_left − x_right in pixels, NaN where unknown. The views borrow the
+/// computer's buffers and are valid until its next call.
 struct DisparityImage {
   ImageView<const float> disparity;
+  ImageView<const float> sigma;                   ///< Standard deviation, px; NaN where the disparity is unknown.
+  ImageView<const std::uint8_t> outlier_percent;  ///< Probability of an error above 1 px, percent; 100 where unknown.
   DisparityTimes times;
   std::size_t buffer_bytes = 0;  ///< Bytes of all buffers held for this image size and search range.
 };
 
 struct DisparityOptions;
 
-/// Dense disparities by census matching (Zabih & Woodfill 1994) and semi-global matching (Hirschmüller 2008), followed
-/// by a left-right consistency check, masks, a median filter and a speckle filter. Derivation: docs/math/stereo.md. The
-/// result is the same, bit for bit, for any number of threads and on every SIMD instruction set.
+/// Dense disparities by census matching (Zabih & Woodfill 1994) and semi-global matching (Hirschmüller 2008) from
+/// coarse to fine, a median filter, a sub-pixel refinement by least squares on the intensities, a check of the outlier
+/// probability and a speckle filter. Derivation: docs/math/stereo.md. The result is the same, bit for bit, for any
+/// number of threads and on every SIMD instruction set.
 class DisparityComputer {
  public:
   /// Code `configuration` where an option is out of bounds.
@@ -57,9 +64,9 @@ class DisparityComputer {
                       ImageView<const std::uint8_t> left_mask = {}, ImageView<const std::uint8_t> right_mask = {});
 
   /// Upper bound of the memory that compute() needs for images of this size and this range, bytes.
-  static std::int64_t memory_bytes(ImageSize size, DisparityRange range);
+  static std::int64_t memory_bytes(ImageSize size, DisparityRange range, int threads);
   /// Code `resources`, with both figures, where memory_bytes() exceeds `most_bytes` (0: no bound). Allocates nothing.
-  static Status check_memory(ImageSize size, DisparityRange range, std::int64_t most_bytes);
+  static Status check_memory(ImageSize size, DisparityRange range, int threads, std::int64_t most_bytes);
 
  private:
   struct State;
@@ -67,20 +74,19 @@ class DisparityComputer {
   std::unique_ptr<State> state_;
 };
 
-/// Matching costs are Hamming distances of 62-bit census signatures (0 … 62). Semi-global matching penalizes a
+/// Matching costs are Hamming distances of 32-bit census signatures (0 … 32). Semi-global matching penalizes a
 /// disparity step of one pixel by P1 and a larger step by P2. P2 falls from p2_flat to p2_edge with the gray-level
 /// change ΔI along the path (Hirschmüller 2008):
 ///   P2(ΔI) = max(p2_edge, p2_flat / (1 + |ΔI| / p2_falloff_levels)).
 struct DisparityOptions {
-  int p1 = 36;                    ///< Penalty of a disparity step of one pixel, census bits.
-  int p2_flat = 180;              ///< Penalty of a larger step where the gray level is constant, census bits.
-  int p2_edge = 50;               ///< Lower bound of the penalty of a larger step, census bits.
+  int p1 = 18;                    ///< Penalty of a disparity step of one pixel, census bits.
+  int p2_flat = 90;               ///< Penalty of a larger step where the gray level is constant, census bits.
+  int p2_edge = 25;               ///< Lower bound of the penalty of a larger step, census bits.
   double p2_falloff_levels = 10;  ///< Gray-level change that halves P2, levels of an 8-bit image.
-  int out_of_view_cost = 22;      ///< Matching cost where x − d lies outside of the right image, census bits.
-  double uniqueness_percent = 0;  ///< Required excess of the second-best aggregated cost, percent; 0: no check.
-  double left_right_px = 4;       ///< Tolerance of the left-right consistency check, pixels; negative: no check.
+  int out_of_view_cost = 11;      ///< Matching cost where x − d lies outside of the right image, census bits.
   bool median = true;             ///< Whether to apply a 3×3 median filter.
-  int speckle_size_px = 100;      ///< Minimum size of a connected component, pixels; 0: no speckle filter.
+  int max_outlier_percent = 70;   ///< Largest outlier probability of a disparity that is kept, percent.
+  int speckle_size_px = 100;      ///< Minimum size of a connected component, reliable pixels; 0: no speckle filter.
   double speckle_step_px = 2;     ///< Largest disparity difference within a component, pixels.
   SimdTarget simd = SimdTarget::automatic;  ///< SIMD instruction set
 
@@ -88,47 +94,40 @@ struct DisparityOptions {
   void describe(Visitor& v) {
     v.field("p1", p1,
             "Penalty P1 of semi-global matching for a disparity step of one pixel between neighbouring pixels, in bits "
-            "of the 62-bit census cost; raising it makes slanted surfaces smoother and flatter.",
-            between(0, 60));
+            "of the 32-bit census cost; raising it makes slanted surfaces smoother and flatter.",
+            between(0, 30));
     v.field("p2_flat", p2_flat,
             "Penalty P2 for a disparity step of more than one pixel where the gray level is constant, in census bits; "
             "raising it bridges surfaces with little texture, but smooths over small objects.",
-            between(1, 190));
+            between(1, 95));
     v.field("p2_edge", p2_edge,
             "Lower bound of P2 where the gray level changes, in census bits; raising it allows fewer depth "
             "discontinuities at image edges.",
-            between(1, 190));
-    v.field(
-        "p2_falloff_levels", p2_falloff_levels,
-        "Gray-level change between neighbouring pixels that halves P2, in levels of an 8-bit image; raising it keeps "
-        "P2 high at weak edges.",
-        between(0.1, 1000));
+            between(1, 95));
+    v.field("p2_falloff_levels", p2_falloff_levels,
+            "Gray-level change between neighbouring pixels that halves P2, in levels of an 8-bit image; raising it "
+            "keeps P2 high at weak edges.",
+            between(0.1, 1000));
     v.field("out_of_view_cost", out_of_view_cost,
             "Matching cost of disparities that lead outside of the right image, in census bits; raising it makes such "
             "disparities less likely at the left border.",
-            between(0, 62));
-    v.field(
-        "uniqueness_percent", uniqueness_percent,
-        "Required excess of the second-best aggregated cost over the best one, in percent; raising it discards more "
-        "ambiguous pixels, and 0 disables the check.",
-        between(0, 100));
-    v.field("left_right_px", left_right_px,
-            "Tolerance of the left-right consistency check in pixels. Where several left pixels match one right pixel, "
-            "the one with the lowest cost determines its disparity. Raising the tolerance discards fewer pixels at "
-            "occlusions, and a negative value disables the check.");
+            between(0, 32));
     v.field("median", median,
             "True applies a 3x3 median filter to the disparities, which removes single outliers and keeps edges; false "
-            "keeps "
-            "outliers and thin structures.");
+            "keeps outliers and thin structures.");
+    v.field("max_outlier_percent", max_outlier_percent,
+            "Largest probability of an error above one pixel with which a disparity is kept, in percent. It follows "
+            "from the texture, the smoothness of the surroundings and the left-right check. Raising it keeps more "
+            "disparities, more of them wrong, and 100 keeps all.",
+            between(0, 100));
     v.field("speckle_size_px", speckle_size_px,
-            "Minimum size of a connected component of the disparity image in pixels; smaller components are discarded, "
-            "and 0 disables the speckle filter.",
+            "Minimum size of a connected component of the disparity image, counted in pixels whose outlier probability "
+            "is at most 7 %; smaller components are discarded, and 0 disables the speckle filter.",
             at_least(0));
-    v.field(
-        "speckle_step_px", speckle_step_px,
-        "Largest disparity difference between neighbouring pixels of one component of the speckle filter, in pixels; "
-        "raising it joins more pixels, so that fewer components are discarded.",
-        at_least(0));
+    v.field("speckle_step_px", speckle_step_px,
+            "Largest disparity difference between neighbouring pixels of one component of the speckle filter, in "
+            "pixels; raising it joins more pixels, so that fewer components are discarded.",
+            at_least(0));
     v.field("simd", simd,
             "SIMD instruction set of the matching kernels; avx3 is AVX-512; it affects the speed only, results are the "
             "same bit for bit.");

@@ -142,10 +142,10 @@ TEST(DisparityComputer, AcceptsTinyImages) {
 
 TEST(DisparityComputer, RefusesOptionsOutOfBounds) {
   DisparityOptions options;
-  options.p1 = 61;
+  options.p1 = 31;
   const auto created = DisparityComputer::create(options, ThreadPool(1));
   EXPECT_THAT(testing::error_message(created),
-              ::testing::HasSubstr("disparity options: p1 is 61, must be between 0 and 60"));
+              ::testing::HasSubstr("disparity options: p1 is 31, must be between 0 and 30"));
 }
 
 TEST(DisparityRange, FollowsFromTheNearestDepthOrTheWidth) {

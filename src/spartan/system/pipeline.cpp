@@ -134,7 +134,7 @@ Status Pipeline::check_memory(std::int64_t most_bytes) const {
     if (!s.maps_stops && !((odometry_needs || s.maps_keyframes) && pair.name == s.pair.name)) continue;
     const RectifiedStereo geometry = s.imager.geometry(pair.name);
     const DisparityRange range = disparity_range(geometry, pair.nearest_m);
-    if (Status fits = DisparityComputer::check_memory(geometry.size, range, most_bytes); !fits) {
+    if (Status fits = DisparityComputer::check_memory(geometry.size, range, s.workers.threads(), most_bytes); !fits) {
       Error error = fits.error();
       error.where = "pair '" + pair.name + "'";
       return tl::unexpected(std::move(error));

@@ -13,26 +13,6 @@ constexpr int kRowsAtOnce = 32;  // rows of one work item of a thread
 
 }  // namespace
 
-void drop_inconsistent(const RawDisparity& raw, double tolerance_px, const ThreadPool& workers,
-                       ImageView<float> disparity) {
-  const int w = disparity.width();
-  workers.parallel_for(0, disparity.height(), kRowsAtOnce, [&](int from, int to) {
-    for (int y = from; y < to; ++y) {
-      for (int x = 0; x < w; ++x) {
-        float d = raw.left(x, y);
-        if (raw.unique(x, y) == 0) d = kUnknownDisparity;
-        if (tolerance_px >= 0 && !std::isnan(d)) {
-          const int matched = std::clamp(x - static_cast<int>(std::lround(d)), 0, w - 1);
-          const std::int16_t other = raw.right(matched, y);
-          if (other == RawDisparity::kNoMatch || std::abs(static_cast<double>(d) - other) > tolerance_px + 0.5)
-            d = kUnknownDisparity;
-        }
-        disparity(x, y) = d;
-      }
-    }
-  });
-}
-
 void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::uint8_t> right_mask,
                  ImageView<float> disparity) {
   if (left_mask.empty() && right_mask.empty()) return;
@@ -65,49 +45,22 @@ float median_of_known(ImageView<const float> in, int x, int y) {
   return *middle;
 }
 
-float median_of(float a, float b, float c) {
-  return std::max(std::min(a, b), std::min(std::max(a, b), c));
-}
-
-// The three values of a window column, sorted; all NaN where one of them is NaN.
-struct Column {
-  float low = kUnknownDisparity, middle = kUnknownDisparity, high = kUnknownDisparity;
-};
-Column column_of(float a, float b, float c) {
-  if (std::isnan(a + b + c)) return {};
-  return {std::min({a, b, c}), median_of(a, b, c), std::max({a, b, c})};
-}
-
-// Of nine values in three sorted columns the median is the median of the largest minimum, the median of the medians and
-// the smallest maximum. Each column is sorted once and used for three pixels.
-void median_row(ImageView<const float> in, int y, ImageView<float> out) {
+void median_row(ImageView<const float> in, int y, void (*kernel)(const matching::MedianRow&), ImageView<float> out) {
   const int w = in.width();
   const bool inside = y > 0 && y + 1 < in.height();
-  const auto column = [&](int x) {
-    return inside && x < w ? column_of(in(x, y - 1), in(x, y), in(x, y + 1)) : Column{};
-  };
-  Column left, centre = column(0);
+  std::fill_n(out.row(y), w, kUnknownDisparity);
+  if (inside) kernel({{in.row(y - 1), in.row(y), in.row(y + 1)}, out.row(y), w});
   for (int x = 0; x < w; ++x) {
-    const Column right = column(x + 1);
-    if (std::isnan(in(x, y))) {
-      out(x, y) = kUnknownDisparity;
-    } else if (std::isnan(left.low + centre.low + right.low)) {
-      out(x, y) = median_of_known(in, x, y);
-    } else {
-      out(x, y) =
-          median_of(std::max({left.low, centre.low, right.low}), median_of(left.middle, centre.middle, right.middle),
-                    std::min({left.high, centre.high, right.high}));
-    }
-    left = centre;
-    centre = right;
+    if (std::isnan(out(x, y)) && !std::isnan(in(x, y))) out(x, y) = median_of_known(in, x, y);
   }
 }
 
 }  // namespace
 
-void median_3x3(ImageView<const float> in, const ThreadPool& workers, ImageView<float> out) {
+void median_3x3(ImageView<const float> in, void (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
+                ImageView<float> out) {
   workers.parallel_for(0, in.height(), kRowsAtOnce, [&](int from, int to) {
-    for (int y = from; y < to; ++y) median_row(in, y, out);
+    for (int y = from; y < to; ++y) median_row(in, y, kernel, out);
   });
 }
 
@@ -129,8 +82,9 @@ void SpeckleFilter::join(int one, int other) {
   kept.pixels += gone.pixels;
 }
 
-void SpeckleFilter::find_runs(float step, ImageView<const float> disparity) {
+void SpeckleFilter::find_runs(const SpeckleRule& rule, ImageView<const float> disparity) {
   const int w = disparity.width();
+  const auto step = static_cast<float>(rule.step_px);
   runs_.clear();
   above_.assign(static_cast<std::size_t>(w), -1);
   here_.resize(static_cast<std::size_t>(w));
@@ -143,7 +97,13 @@ void SpeckleFilter::find_runs(float step, ImageView<const float> disparity) {
       const int run = static_cast<int>(runs_.size()), from = x;
       do here_[static_cast<std::size_t>(x++)] = run;
       while (x < w && std::abs(disparity(x, y) - disparity(x - 1, y)) <= step);
-      runs_.push_back({y, from, x, run, x - from});
+      int pixels = x - from;
+      if (!rule.outlier_percent.empty()) {
+        const std::uint8_t* const outlier = rule.outlier_percent.row(y);
+        pixels = static_cast<int>(std::count_if(outlier + from, outlier + x,
+                                                [&](std::uint8_t percent) { return percent <= rule.most_percent; }));
+      }
+      runs_.push_back({y, from, x, run, pixels});
       int joined = -1;
       for (int u = from; u < x; ++u) {
         const int above = above_[static_cast<std::size_t>(u)];
@@ -156,11 +116,11 @@ void SpeckleFilter::find_runs(float step, ImageView<const float> disparity) {
   }
 }
 
-void SpeckleFilter::apply(int size_px, double step_px, ImageView<float> disparity) {
-  if (size_px <= 0) return;
-  find_runs(static_cast<float>(step_px), disparity);
+void SpeckleFilter::apply(const SpeckleRule& rule, ImageView<float> disparity) {
+  if (rule.size_px <= 0) return;
+  find_runs(rule, disparity);
   for (int r = 0; r < static_cast<int>(runs_.size()); ++r) {
-    if (runs_[static_cast<std::size_t>(root_of(r))].pixels >= size_px) continue;
+    if (runs_[static_cast<std::size_t>(root_of(r))].pixels >= rule.size_px) continue;
     const Run& run = runs_[static_cast<std::size_t>(r)];
     std::fill(&disparity(run.from, run.y), &disparity(run.to - 1, run.y) + 1, kUnknownDisparity);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "spartan/numerics/random.h"
+#include "spartan/numerics/simd_target.h"
 
 namespace spartan::internal {
 namespace {
@@ -88,12 +89,15 @@ Image<float> despeckled_by_flooding(ImageView<const float> in, int size_px, doub
 }
 
 TEST(Median, EqualsTheReference) {
-  for (const double holes : {0.0, 0.1, 0.6}) {
-    for (const ImageSize size : {ImageSize{57, 70}, {1, 1}, {1, 9}, {9, 1}, {2, 2}}) {
-      const Image<float> in = blobs(size.width, size.height, holes, 4);
-      Image<float> out(size);
-      median_3x3(in, ThreadPool(2), out);
-      expect_same(out, median_by_sorting(in));
+  for (const SimdTarget simd : available_simd_targets()) {
+    const auto kernel = matching::refinement_kernels_for(simd_target_index(simd)).median_row;
+    for (const double holes : {0.0, 0.1, 0.6}) {
+      for (const ImageSize size : {ImageSize{57, 70}, {18, 5}, {1, 1}, {1, 9}, {9, 1}, {2, 2}}) {
+        const Image<float> in = blobs(size.width, size.height, holes, 4);
+        Image<float> out(size);
+        median_3x3(in, kernel, ThreadPool(2), out);
+        expect_same(out, median_by_sorting(in));
+      }
     }
   }
 }
@@ -104,7 +108,7 @@ TEST(SpeckleFilter, EqualsTheReference) {
     for (const double holes : {0.05, 0.3}) {
       Image<float> image = blobs(83, 61, holes, seed);
       const Image<float> wanted = despeckled_by_flooding(image, 12, 1);
-      filter.apply(12, 1, image);
+      filter.apply({12, 1, {}, 0}, image);
       expect_same(image, wanted);
     }
   }
@@ -116,32 +120,28 @@ TEST(SpeckleFilter, ADifferenceEqualToTheLimitConnects) {
     for (int i = 0; i < 4; ++i)
       image(std::min(i, size.width - 1), std::min(i, size.height - 1)) = 2.0f * static_cast<float>(i);
     Image<float> kept = image.clone();
-    SpeckleFilter().apply(4, 2, kept);
+    SpeckleFilter().apply({4, 2, {}, 0}, kept);
     expect_same(kept, image);
-    SpeckleFilter().apply(4, 1.99, kept);
+    SpeckleFilter().apply({4, 1.99, {}, 0}, kept);
     expect_same(kept, Image<float>(size.width, size.height, kUnknownDisparity));
   }
 }
 
 TEST(SpeckleFilter, KeepsAllPixelsWhenDisabled) {
   Image<float> image(1, 1, 5.0f);
-  SpeckleFilter().apply(0, 1, image);
+  SpeckleFilter().apply({0, 1, {}, 0}, image);
   EXPECT_EQ(image(0, 0), 5.0f);
 }
 
-TEST(LeftRightCheck, ComparesWithTheRightDisparities) {
-  RawDisparity raw;
-  raw.left = Image<float>(8, 1, 2.0f);
-  raw.right = Image<std::int16_t>(8, 1, std::int16_t{2});
-  raw.unique = Image<std::uint8_t>(8, 1, std::uint8_t{1});
-  raw.right(3, 0) = 4;                       // matched by x = 5
-  raw.right(4, 0) = RawDisparity::kNoMatch;  // matched by x = 6
-  raw.unique(7, 0) = 0;
-  Image<float> out(8, 1);
-  drop_inconsistent(raw, 1, ThreadPool(1), out);
-  for (int x = 0; x < 8; ++x) EXPECT_EQ(std::isnan(out(x, 0)), x >= 5) << x;
-  drop_inconsistent(raw, -1, ThreadPool(1), out);
-  for (int x = 0; x < 8; ++x) EXPECT_EQ(std::isnan(out(x, 0)), x == 7) << x;
+TEST(SpeckleFilter, CountsReliablePixels) {
+  Image<float> image(6, 2, kUnknownDisparity);
+  Image<std::uint8_t> outlier(6, 2, std::uint8_t{50});
+  for (int x = 0; x < 6; ++x) {
+    if (x != 3) image(x, 0) = 5;  // components of three and two pixels
+  }
+  for (const int x : {0, 2, 4}) outlier(x, 0) = 5;
+  SpeckleFilter().apply({2, 1, outlier, 5}, image);
+  for (int x = 0; x < 6; ++x) EXPECT_EQ(std::isnan(image(x, 0)), x >= 3) << x;
 }
 
 TEST(Masks, DiscardExcludedPixelsOfEitherImage) {

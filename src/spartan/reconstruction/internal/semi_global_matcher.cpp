@@ -1,12 +1,10 @@
 #include "spartan/reconstruction/internal/semi_global_matcher.h"
 
 #include <algorithm>
-#include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 
-#include "spartan/core/stage_clock.h"
-#include "spartan/numerics/simd_target.h"
 #include "spartan/reconstruction/internal/subpixel.h"
 
 namespace spartan::internal {
@@ -21,13 +19,8 @@ int round_up(int value, int multiple) {
 
 }  // namespace
 
-SemiGlobalMatcher::SemiGlobalMatcher(const DisparityOptions& options, ThreadPool workers)
-    : options_(options), workers_(std::move(workers)), kernels_(sgm::kernels_for(simd_target_index(options.simd))) {
-  // P2 for every gray-level change along a path; see DisparityOptions.
-  for (std::size_t step = 0; step < p2_by_step_.size(); ++step) {
-    const double p2 = options.p2_flat / (1.0 + static_cast<double>(step) / options.p2_falloff_levels);
-    p2_by_step_[step] = static_cast<std::uint8_t>(std::max(options.p2_edge, static_cast<int>(std::lround(p2))));
-  }
+SemiGlobalMatcher::SemiGlobalMatcher(const SemiGlobalPenalties& penalties, sgm::Kernels kernels, ThreadPool workers)
+    : penalties_(penalties), workers_(std::move(workers)), kernels_(kernels) {
   passes_[1].upwards = true;
 }
 
@@ -48,12 +41,9 @@ void SemiGlobalMatcher::resize(ImageSize size, DisparityRange range) {
     pass.minima.assign(static_cast<std::size_t>(slot_count), 0);
     pass.cost_row = Image<std::uint8_t>(w * padded_, 1);
     pass.sum_row = Image<std::uint16_t>(w * padded_, 1);
-    pass.right_costs.assign(static_cast<std::size_t>(w), 0);
   }
   zero_slot_ = Image<std::uint8_t>(slot_size, 1);
-  raw_.left = Image<float>(w, h);
-  raw_.unique = Image<std::uint8_t>(w, h);
-  raw_.right = Image<std::int16_t>(w, h);
+  disparity_ = Image<float>(w, h);
   size_ = size;
 }
 
@@ -73,35 +63,22 @@ std::size_t SemiGlobalMatcher::buffer_bytes() const {
   std::size_t total =
       bytes(framed_, 1) + bytes(left_planes_, 1) + bytes(right_planes_, 1) + bytes(sums_, 2) + bytes(zero_slot_, 1);
   for (const Pass& pass : passes_) {
-    total += bytes(pass.slots, 1) + pass.minima.size() + bytes(pass.cost_row, 1) + bytes(pass.sum_row, 2) +
-             2 * pass.right_costs.size();
+    total += bytes(pass.slots, 1) + pass.minima.size() + bytes(pass.cost_row, 1) + bytes(pass.sum_row, 2);
   }
-  return total + bytes(raw_.left, 4) + bytes(raw_.unique, 1) + bytes(raw_.right, 2);
+  return total + bytes(disparity_, 4);
 }
 
-const RawDisparity& SemiGlobalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                             DisparityRange range) {
-  Stopwatch watch;
-  times_ = {};
+ImageView<const float> SemiGlobalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                                DisparityRange range) {
   resize(left.size(), range);
   gray_ = left;
   compute_census(left, false, left_planes_);
   compute_census(right, true, right_planes_);
-  times_.cost = watch.lap();
-  for (Pass& pass : passes_) pass.cost_ms = pass.aggregate_ms = pass.select_ms = 0;
-
   // Both passes sweep their first halves, then, after a barrier, complete the sums in the half of the other pass.
   const int h = size_.height, upper = h / 2, lower = h - upper;
   workers_.parallel_invoke([&] { sweep(passes_[0], 0, upper, false); }, [&] { sweep(passes_[1], 0, lower, false); });
   workers_.parallel_invoke([&] { sweep(passes_[0], upper, h, true); }, [&] { sweep(passes_[1], lower, h, true); });
-
-  const double per_pass = workers_.threads() > 1 ? 0.5 : 1.0;
-  for (const Pass& pass : passes_) {
-    times_.cost += per_pass * pass.cost_ms;
-    times_.aggregate += per_pass * pass.aggregate_ms;
-    times_.select += per_pass * pass.select_ms;
-  }
-  return raw_;
+  return disparity_;
 }
 
 void SemiGlobalMatcher::compute_census(ImageView<const std::uint8_t> image, bool mirrored,
@@ -133,15 +110,11 @@ void SemiGlobalMatcher::compute_census(ImageView<const std::uint8_t> image, bool
 }
 
 void SemiGlobalMatcher::sweep(Pass& pass, int from_row, int to_row, bool complete) {
-  Stopwatch watch;
   for (int row = from_row; row < to_row; ++row) {
     const int y = pass.upwards ? size_.height - 1 - row : row;
     compute_costs(pass, y);
-    pass.cost_ms += watch.lap();
     aggregate_row(pass, row, y, complete);
-    pass.aggregate_ms += watch.lap();
     if (complete) select_row(pass, y);
-    pass.select_ms += watch.lap();
   }
 }
 
@@ -160,8 +133,8 @@ void SemiGlobalMatcher::compute_costs(Pass& pass, int y) {
     std::uint8_t* const cost = row.cost + static_cast<std::ptrdiff_t>(x) * padded_;
     // Index k is matched to the right column x − min − k: outside of the image for k > x − min and k < x − min − w + 1.
     const int last = std::clamp(x - range_.min + 1, 0, count), first = std::clamp(x - range_.min - w + 1, 0, count);
-    std::memset(cost, options_.out_of_view_cost, static_cast<std::size_t>(first));
-    std::memset(cost + last, options_.out_of_view_cost, static_cast<std::size_t>(count - last));
+    std::memset(cost, penalties_.out_of_view, static_cast<std::size_t>(first));
+    std::memset(cost + last, penalties_.out_of_view, static_cast<std::size_t>(count - last));
     std::memset(cost + count, sgm::kNever, static_cast<std::size_t>(padded_ - count));
   }
 }
@@ -195,9 +168,9 @@ void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete)
       // At the start of a path L' = 0, so that L = C.
       paths.from[r] = begins[i] ? zero : paths.to[r];
       paths.from_min[r] = begins[i] ? std::uint8_t{0} : pass.minima[static_cast<std::size_t>(r * w + indices[i])];
-      paths.p2[r] = p2_by_step_[static_cast<std::size_t>(std::abs(gray[column] - previous[i]))];
+      paths.p2[r] = penalties_.p2[static_cast<std::size_t>(std::abs(gray[column] - previous[i]))];
     }
-    paths.p1 = static_cast<std::uint8_t>(options_.p1);
+    paths.p1 = penalties_.p1;
     paths.padded = padded_;
     const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(column) * padded_;
     paths.cost = pass.cost_row.data() + at;
@@ -214,24 +187,13 @@ void SemiGlobalMatcher::aggregate_row(Pass& pass, int row, int y, bool complete)
 
 void SemiGlobalMatcher::select_row(Pass& pass, int y) {
   const int w = size_.width, count = range_.count();
-  std::fill(pass.right_costs.begin(), pass.right_costs.end(), std::numeric_limits<std::uint16_t>::max());
-  std::int16_t* const right = raw_.right.row(y);
-  std::fill(right, right + w, RawDisparity::kNoMatch);
-  const double uniqueness_ratio = 1.0 + options_.uniqueness_percent / 100.0;
-  float* const disparity = raw_.left.row(y);
-  std::uint8_t* const unique = raw_.unique.row(y);
+  float* const disparity = disparity_.row(y);
   for (int x = 0; x < w; ++x) {
-    std::uint16_t* const sums = pass.sum_row.data() + static_cast<std::ptrdiff_t>(x) * padded_;
-    const sgm::Winner winner = kernels_.find_winner(sums, count, padded_);
-    const int d = range_.min + winner.index, matched = x - d;
+    const std::uint16_t* const sums = pass.sum_row.data() + static_cast<std::ptrdiff_t>(x) * padded_;
+    const int index = kernels_.find_winner(sums, padded_);
+    const int d = range_.min + index, matched = x - d;
     disparity[x] = matched < 0 || matched >= w ? std::numeric_limits<float>::quiet_NaN()
-                                               : static_cast<float>(d) + subpixel_offset(sums, winner.index, count);
-    // The right disparities come from the same sums: of all left pixels matched to a right pixel, the cheapest wins.
-    if (matched >= 0 && matched < w && winner.best < pass.right_costs[static_cast<std::size_t>(matched)]) {
-      pass.right_costs[static_cast<std::size_t>(matched)] = winner.best;
-      right[matched] = static_cast<std::int16_t>(d);
-    }
-    unique[x] = options_.uniqueness_percent <= 0 || winner.runner_up >= uniqueness_ratio * winner.best;
+                                               : static_cast<float>(d) + subpixel_offset(sums, index, count);
   }
 }
 

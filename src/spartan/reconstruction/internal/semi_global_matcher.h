@@ -19,24 +19,22 @@
 
 namespace spartan::internal {
 
-/// Raw matches before any check except the one against the image border.
-struct RawDisparity {
-  Image<float> left;           ///< Pixels, with sub-pixel part; NaN where x − d lies outside of the right image.
-  Image<std::uint8_t> unique;  ///< 1 where the match passes the uniqueness check.
-  Image<std::int16_t> right;   ///< Whole pixels: disparity of the cheapest left pixel matched to it, or kNoMatch.
-  static constexpr std::int16_t kNoMatch = INT16_MIN;
+/// Penalties in bits of the 62-bit census cost; P2 by the gray-level change along the path.
+struct SemiGlobalPenalties {
+  std::uint8_t p1 = 36;
+  std::array<std::uint8_t, 256> p2{};
+  std::uint8_t out_of_view = 22;  ///< Matching cost where x − d lies outside of the right image.
 };
 
 class SemiGlobalMatcher {
  public:
-  SemiGlobalMatcher(const DisparityOptions& options, ThreadPool workers);
+  SemiGlobalMatcher(const SemiGlobalPenalties& penalties, sgm::Kernels kernels, ThreadPool workers);
 
-  /// Both images must have one size, and the range must not be empty. The result is valid until the next call.
-  const RawDisparity& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                            DisparityRange range);
+  /// Disparities in pixels, with sub-pixel part, NaN where x − d lies outside of the right image. Both images must have
+  /// one size, and the range must not be empty. The result is valid until the next call.
+  ImageView<const float> match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                               DisparityRange range);
 
-  /// Times of the last call in milliseconds; for steps that run on two threads, the mean of both.
-  const DisparityTimes& times() const { return times_; }
   std::size_t buffer_bytes() const;
   /// An upper bound of buffer_bytes() for images of this size and this range.
   static std::int64_t memory_bytes(ImageSize size, DisparityRange range);
@@ -48,11 +46,9 @@ class SemiGlobalMatcher {
     // Path costs L(p, ·), one slot a row of the image: a slot per column for each of the three directions that come
     // from the row before, and one slot for the direction along the row.
     Image<std::uint8_t> slots;
-    std::vector<std::uint8_t> minima;        // min L of each slot
-    Image<std::uint8_t> cost_row;            // matching costs of one row, width · padded
-    Image<std::uint16_t> sum_row;            // sums over four or eight paths of one row
-    std::vector<std::uint16_t> right_costs;  // aggregated cost of the cheapest left pixel matched to each right pixel
-    double cost_ms = 0, aggregate_ms = 0, select_ms = 0;
+    std::vector<std::uint8_t> minima;  // min L of each slot
+    Image<std::uint8_t> cost_row;      // matching costs of one row, width · padded
+    Image<std::uint16_t> sum_row;      // sums over four or eight paths of one row
   };
 
   void resize(ImageSize size, DisparityRange range);
@@ -64,10 +60,9 @@ class SemiGlobalMatcher {
 
   std::uint8_t* slot(Pass& pass, int direction, int index) const;
 
-  DisparityOptions options_;
+  SemiGlobalPenalties penalties_;
   ThreadPool workers_;
   sgm::Kernels kernels_;
-  std::array<std::uint8_t, 256> p2_by_step_{};
 
   ImageSize size_;
   DisparityRange range_;
@@ -79,8 +74,7 @@ class SemiGlobalMatcher {
   Image<std::uint16_t> sums_;                       // volume of aggregated costs: row y holds width · padded sums
   std::array<Pass, 2> passes_;
   Image<std::uint8_t> zero_slot_;
-  RawDisparity raw_;
-  DisparityTimes times_;
+  Image<float> disparity_;
 };
 
 }  // namespace spartan::internal

@@ -128,25 +128,13 @@ HWY_INLINE std::uint16_t smallest_sum(D d, const std::uint16_t* sums, int padded
 }
 
 template <class D>
-Winner find_winner_with(D d, std::uint16_t* sums, int count, int padded) {
-  const std::uint16_t best = smallest_sum(d, sums, padded);
-  int index = 0;
+int find_winner_with(D d, const std::uint16_t* sums, int padded) {
+  const auto best = hn::Set(d, smallest_sum(d, sums, padded));
   for (int k = 0; k < padded; k += static_cast<int>(hn::Lanes(d))) {
-    const std::intptr_t found = hn::FindFirstTrue(d, hn::Eq(hn::LoadU(d, sums + k), hn::Set(d, best)));
-    if (found >= 0) {
-      index = k + static_cast<int>(found);
-      break;
-    }
+    const std::intptr_t found = hn::FindFirstTrue(d, hn::Eq(hn::LoadU(d, sums + k), best));
+    if (found >= 0) return k + static_cast<int>(found);
   }
-  const int from = index > 0 ? index - 1 : 0, to = index + 1 < count ? index + 1 : count - 1;
-  std::uint16_t kept[3] = {};
-  for (int k = from; k <= to; ++k) {
-    kept[k - from] = sums[k];
-    sums[k] = 0xFFFF;
-  }
-  const std::uint16_t runner_up = smallest_sum(d, sums, padded);
-  for (int k = from; k <= to; ++k) sums[k] = kept[k - from];
-  return {index, best, runner_up};
+  return 0;
 }
 
 // `padded` is a multiple of 32: uses the widest vectors that divide it.
@@ -163,8 +151,8 @@ void cost_row(const CostRow& r) {
 PathMinima pixel_paths(const PixelPaths& p) {
   return with_widest_bytes(p.padded, [&](auto d) HWY_ATTR { return pixel_paths_with(d, p); });
 }
-Winner find_winner(std::uint16_t* sums, int count, int padded) {
-  return find_winner_with(hn::ScalableTag<std::uint16_t>(), sums, count, padded);
+int find_winner(const std::uint16_t* sums, int padded) {
+  return find_winner_with(hn::ScalableTag<std::uint16_t>(), sums, padded);
 }
 #endif  // HWY_TARGET == HWY_SCALAR
 

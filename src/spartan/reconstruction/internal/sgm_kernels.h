@@ -62,17 +62,11 @@ struct PathMinima {
   std::uint8_t of[kPaths];
 };
 
-/// The smallest of `count` sums (winner takes all), and the smallest of those that are not adjacent to it.
-struct Winner {
-  int index;
-  std::uint16_t best, runner_up;
-};
-
 struct Kernels {
   void (*census_row)(const CensusRow&);
   void (*cost_row)(const CostRow&);
   PathMinima (*pixel_paths)(const PixelPaths&);
-  Winner (*find_winner)(std::uint16_t* sums, int count, int padded);
+  int (*find_winner)(const std::uint16_t* sums, int padded);  ///< Index of the smallest sum, the first of equal ones.
 };
 
 /// The kernels of one instruction set; see simd_target_index().

@@ -114,13 +114,7 @@ TEST_P(KernelsOnEveryTarget, WinnersEqualTheReference) {
               count = padded - static_cast<int>(random.below(31));
     std::vector<std::uint16_t> sums(static_cast<std::size_t>(padded), 2040);
     for (int k = 0; k < count; ++k) sums[static_cast<std::size_t>(k)] = static_cast<std::uint16_t>(random.below(40));
-    auto copy = sums;
-    const Winner a = kernels().find_winner(sums.data(), count, padded);
-    EXPECT_EQ(sums, copy) << "the sums are restored";
-    const Winner b = reference::find_winner(copy.data(), count, padded);
-    ASSERT_EQ(a.index, b.index);
-    ASSERT_EQ(a.best, b.best);
-    ASSERT_EQ(a.runner_up, b.runner_up);
+    ASSERT_EQ(kernels().find_winner(sums.data(), padded), reference::find_winner(sums.data(), padded));
   }
 }
 

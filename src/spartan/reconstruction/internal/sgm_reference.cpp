@@ -53,14 +53,8 @@ PathMinima pixel_paths(const PixelPaths& p) {
   return minima;
 }
 
-Winner find_winner(std::uint16_t* sums, int count, int padded) {
-  const auto best = std::min_element(sums, sums + padded);
-  const int index = static_cast<int>(best - sums);
-  std::uint16_t runner_up = 0xFFFF;
-  for (int k = 0; k < padded; ++k) {
-    if (k < index - 1 || k > std::min(index + 1, count - 1)) runner_up = std::min(runner_up, sums[k]);
-  }
-  return {index, *best, runner_up};
+int find_winner(const std::uint16_t* sums, int padded) {
+  return static_cast<int>(std::min_element(sums, sums + padded) - sums);
 }
 
 }  // namespace spartan::internal::sgm::reference

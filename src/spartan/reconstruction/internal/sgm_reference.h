@@ -9,6 +9,6 @@ namespace spartan::internal::sgm::reference {
 void census_row(const CensusRow& row);
 void cost_row(const CostRow& row);
 PathMinima pixel_paths(const PixelPaths& paths);
-Winner find_winner(std::uint16_t* sums, int count, int padded);
+int find_winner(const std::uint16_t* sums, int padded);
 
 }  // namespace spartan::internal::sgm::reference

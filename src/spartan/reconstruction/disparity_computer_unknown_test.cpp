@@ -1,0 +1,82 @@
+// What cannot be matched is unknown: no texture, no light, nothing in common.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+#include "spartan/numerics/random.h"
+#include "spartan/reconstruction/disparity_computer.h"
+
+namespace spartan {
+namespace {
+
+constexpr ImageSize kSize{320, 240};
+
+using Gray = std::function<double(int x, int y)>;
+
+Image<std::uint8_t> image_of(const Gray& gray) {
+  Image<std::uint8_t> image(kSize);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x)
+      image(x, y) = static_cast<std::uint8_t>(std::lround(std::clamp(gray(x, y), 0.0, 255.0)));
+  }
+  return image;
+}
+
+double known_percent(const Gray& left, const Gray& right, int to_row = kSize.height) {
+  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(1)).value();
+  const auto result = computer.compute(image_of(left), image_of(right), {0, 95});
+  EXPECT_TRUE(result) << result.error().message();
+  int known = 0;
+  for (int y = 0; y < to_row; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      const bool is_known = !std::isnan(result->disparity(x, y));
+      known += is_known;
+      EXPECT_EQ(is_known, !std::isnan(result->sigma(x, y)));
+      if (!is_known) {
+        EXPECT_EQ(result->outlier_percent(x, y), 100);
+      }
+    }
+  }
+  return 100.0 * known / (kSize.width * to_row);
+}
+
+// Independent noise of both images.
+Gray noisy(double level, double sigma, std::uint64_t seed) {
+  return [=, random = std::make_shared<Random>(seed)](int, int) { return random->normal(level, sigma); };
+}
+
+TEST(UnknownDisparity, BlackImages) {
+  EXPECT_LE(known_percent(noisy(0, 0, 1), noisy(0, 0, 2)), 1);
+  EXPECT_LE(known_percent(noisy(0, 0.7, 1), noisy(0, 0.7, 2)), 1) << "with noise of the sensor";
+}
+
+TEST(UnknownDisparity, ConstantImages) {
+  EXPECT_LE(known_percent(noisy(120, 0, 1), noisy(120, 0, 2)), 1);
+  EXPECT_LE(known_percent(noisy(120, 2, 1), noisy(120, 2, 2)), 1) << "with noise of the sensor";
+  const Gray shading = [](int x, int y) { return 40 + 0.5 * x + 0.2 * y; };
+  EXPECT_LE(known_percent(shading, shading), 1) << "a gray-level ramp";
+}
+
+TEST(UnknownDisparity, UnrelatedNoise) {
+  for (const double sigma : {5.0, 20.0, 60.0})
+    EXPECT_LE(known_percent(noisy(128, sigma, 1), noisy(128, sigma, 2)), 1) << sigma;
+}
+
+// A saturated sky above textured ground.
+TEST(UnknownDisparity, SaturatedSky) {
+  Random random(7);
+  Image<std::uint8_t> texture(kSize.width + 20, kSize.height);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < texture.width(); ++x) texture(x, y) = static_cast<std::uint8_t>(60 + random.below(90));
+  }
+  const auto view = [&](int shift) -> Gray {
+    return [&texture, shift](int x, int y) { return y < 100 ? 255.0 : texture(x + shift, y); };
+  };
+  EXPECT_LE(known_percent(view(0), view(20), 92), 1);
+}
+
+}  // namespace
+}  // namespace spartan

@@ -1,0 +1,109 @@
+#include "spartan/reconstruction/internal/matching/coarse_to_fine_matcher.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "spartan/core/stage_clock.h"
+#include "spartan/numerics/simd_target.h"
+
+namespace spartan::internal::matching {
+namespace {
+
+double p2_of(double change, const DisparityOptions& o) {
+  return std::max<double>(o.p2_edge, o.p2_flat / (1 + change / o.p2_falloff_levels));
+}
+
+Penalties interval_penalties(const DisparityOptions& o) {
+  Penalties p;
+  p.p1 = static_cast<std::uint8_t>(o.p1);
+  p.out_of_view = static_cast<std::uint8_t>(o.out_of_view_cost);
+  for (std::size_t bin = 0; bin < p.p2.size(); ++bin)
+    p.p2[bin] = static_cast<std::uint8_t>(std::lround(p2_of(kP2Bin * (static_cast<double>(bin) + 0.5) - 0.5, o)));
+  return p;
+}
+
+// The census of the coarsest level has about twice as many bits.
+SemiGlobalPenalties base_penalties(const DisparityOptions& o) {
+  SemiGlobalPenalties p;
+  p.p1 = static_cast<std::uint8_t>(2 * o.p1);
+  p.out_of_view = static_cast<std::uint8_t>(2 * o.out_of_view_cost);
+  for (std::size_t change = 0; change < p.p2.size(); ++change)
+    p.p2[change] = static_cast<std::uint8_t>(std::lround(2 * p2_of(static_cast<double>(change), o)));
+  return p;
+}
+
+ImageSize halved(ImageSize size) {
+  return {(size.width + 1) / 2, (size.height + 1) / 2};
+}
+
+// Means of 2×2 pixels; the last column and row of an odd size are repeated.
+void halve(ImageView<const std::uint8_t> in, const ThreadPool& workers, Image<std::uint8_t>& out) {
+  const ImageSize size = halved(in.size());
+  if (out.size() != size) out = Image<std::uint8_t>(size);
+  workers.parallel_for(0, size.height, 64, [&](int from, int to) {
+    for (int y = from; y < to; ++y) {
+      const std::uint8_t* const above = in.row(2 * y);
+      const std::uint8_t* const below = in.row(std::min(2 * y + 1, in.height() - 1));
+      std::uint8_t* const row = out.row(y);
+      const int whole = in.width() / 2;
+      for (int x = 0; x < whole; ++x) {
+        const int sum = above[2 * x] + above[2 * x + 1] + below[2 * x] + below[2 * x + 1];
+        row[x] = static_cast<std::uint8_t>((sum + 2) >> 2);
+      }
+      if (whole < size.width) row[whole] = static_cast<std::uint8_t>((above[2 * whole] + below[2 * whole] + 1) >> 1);
+    }
+  });
+}
+
+// The range at half of the resolution, within what an image of this width can hold.
+DisparityRange halved(DisparityRange range, int width) {
+  const auto half = [](int d, bool up) { return static_cast<int>(up ? std::ceil(0.5 * d) : std::floor(0.5 * d)); };
+  return {std::clamp(half(range.min, false), 1 - width, width - 1),
+          std::clamp(half(range.max, true), 1 - width, width - 1)};
+}
+
+}  // namespace
+
+CoarseToFineMatcher::CoarseToFineMatcher(const DisparityOptions& options, const ThreadPool& workers)
+    : workers_(workers),
+      base_(base_penalties(options), sgm::kernels_for(simd_target_index(options.simd)), workers),
+      half_matcher_(interval_penalties(options), kernels_for(simd_target_index(options.simd)), workers),
+      full_matcher_(interval_penalties(options), kernels_for(simd_target_index(options.simd)), workers) {}
+
+const IntervalMatches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> left,
+                                                  ImageView<const std::uint8_t> right, DisparityRange range) {
+  Stopwatch watch;
+  halve(left, workers_, half_.left);
+  halve(right, workers_, half_.right);
+  halve(half_.left, workers_, quarter_.left);
+  halve(half_.right, workers_, quarter_.right);
+  const DisparityRange half_range = halved(range, half_.left.width());
+  const DisparityRange quarter_range = halved(half_range, quarter_.left.width());
+  const ImageView<const float> base = base_.match(quarter_.left, quarter_.right, quarter_range);
+  const auto half_tiles = choose_intervals(base, half_.left.size(), half_range, workers_);
+  const IntervalMatches& half = half_matcher_.match(half_.left, half_.right, half_tiles, half_range, strips_);
+  const auto tiles = choose_intervals(half.disparity, left.size(), range, workers_);
+  coarse_ms_ = watch.lap();
+  return full_matcher_.match(left, right, tiles, range, strips_);
+}
+
+std::int64_t CoarseToFineMatcher::memory_bytes(ImageSize size, DisparityRange range, int threads) {
+  const ImageSize half = halved(size), quarter = halved(half);
+  const DisparityRange half_range = halved(range, half.width), quarter_range = halved(half_range, quarter.width);
+  const auto pixels = [](ImageSize s) { return std::int64_t{s.width + 64} * s.height; };
+  return IntervalMatcher::strip_bytes(size, range, threads) + IntervalMatcher::memory_bytes(size, range) +
+         IntervalMatcher::memory_bytes(half, half_range) + SemiGlobalMatcher::memory_bytes(quarter, quarter_range) +
+         2 * (pixels(half) + pixels(quarter));
+}
+
+std::size_t CoarseToFineMatcher::buffer_bytes() const {
+  const auto bytes = [](const Image<std::uint8_t>& image) {
+    return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height());
+  };
+  std::size_t total = base_.buffer_bytes() + half_matcher_.buffer_bytes() + full_matcher_.buffer_bytes();
+  for (const StripBuffers& strip : strips_) total += strip.bytes();
+  for (const Halved* pair : {&half_, &quarter_}) total += bytes(pair->left) + bytes(pair->right);
+  return total;
+}
+
+}  // namespace spartan::internal::matching

@@ -1,0 +1,370 @@
+#include "spartan/reconstruction/internal/matching/interval_matcher.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "spartan/reconstruction/internal/subpixel.h"
+
+namespace spartan::internal::matching {
+namespace {
+
+constexpr int kWindowColumns = 4, kWindowRows = 3;  // half sizes of the census window
+constexpr int kDirections = 3;                      // paths of a sweep from the row before: from x − 1, x, x + 1
+constexpr int kStripRows = 256;                     // about
+
+// Rows of a strip, a multiple of the tile: at least two strips where the image has enough rows for it.
+int strip_rows(int height) {
+  const int strips = std::max(2, (height + kStripRows / 2) / kStripRows);
+  const int rows = (height + strips - 1) / strips;
+  return std::max(2 * kStripMargin, (rows + kTile - 1) / kTile * kTile);
+}
+
+}  // namespace
+
+// Matches one strip.
+class IntervalMatcher::StripMatching {
+ public:
+  StripMatching(IntervalMatcher& matcher, ImageView<const TileIntervals> tiles, int from_row, int to_row,
+                StripBuffers& strip)
+      : m_(matcher),
+        tiles_(tiles),
+        s_(strip),
+        width_(matcher.size_.width),
+        from_(from_row),
+        to_(to_row),
+        first_(std::max(0, from_row - kStripMargin)),
+        last_(std::min(matcher.size_.height, to_row + kStripMargin)) {
+    resize();
+  }
+
+  void run() {
+    for (int y = first_; y < last_; ++y) compute_costs(y);
+    begin_sweep();
+    for (int y = first_; y < to_; ++y) {
+      sweep_row(y, y - 1, y == first_, false);
+      if (y >= from_ && ((y + 1) % kTile == 0 || y + 1 == to_)) along_rows(y / kTile * kTile, y + 1);
+    }
+    begin_sweep();
+    for (int y = last_ - 1; y >= from_; --y) {
+      sweep_row(y, y + 1, y + 1 == last_, true);
+      if (y < to_) select(y);
+    }
+  }
+
+ private:
+  std::ptrdiff_t row_levels() const { return static_cast<std::ptrdiff_t>(width_) * kLevels; }
+  std::uint8_t* cost(int y) { return s_.costs.data() + (y - first_) * row_levels(); }
+  // Rows of the margin have no sums that anything needs.
+  std::uint16_t* sum(int y) {
+    return y < from_ || y >= to_ ? s_.unused_sums.data() : s_.sums.data() + (y - from_) * row_levels();
+  }
+  std::size_t path_bytes() const { return static_cast<std::size_t>(width_ + 2) * kLevels + kRowPadding; }
+  // Path costs of a direction that were written in the row before (0) and are written in this row (1). Pixel 0 is the
+  // second one, because diagonal paths move by a column.
+  std::uint8_t* path(int direction, int now) {
+    return s_.paths.data() + static_cast<std::size_t>(2 * direction + (turn_ ^ now)) * path_bytes() + kLevels;
+  }
+  std::uint8_t* p2(int index) { return s_.p2.data() + static_cast<std::size_t>(index) * p2_bytes() + kRowPadding; }
+  std::size_t p2_bytes() const { return static_cast<std::size_t>(width_ + 2 * kRowPadding); }
+
+  template <class T>
+  static void at_least(std::size_t size, std::vector<T>& buffer) {
+    if (buffer.size() < size) buffer.resize(size);
+  }
+  template <class T>
+  static void at_least(std::size_t size, Image<T>& buffer) {
+    if (buffer.width() < static_cast<int>(size)) buffer = Image<T>(static_cast<int>(size), 1);
+  }
+  void resize();
+  void compute_costs(int y);
+  void replace_outside(int tile, int start, std::uint8_t* costs) const;
+  void begin_sweep() { std::fill(s_.paths.begin(), s_.paths.end(), std::uint8_t{0}); }
+  void enter_row(int y, int before);
+  void sweep_row(int y, int before, bool begins, bool add);
+  void compute_p2(const std::uint8_t* here, const std::uint8_t* before, int index);
+  void along_rows(int from, int to);
+  void select(int y);
+  void set_starts(int tile_row);
+
+  IntervalMatcher& m_;
+  ImageView<const TileIntervals> tiles_;
+  StripBuffers& s_;
+  int width_, from_, to_, first_, last_;
+  int turn_ = 0;
+  int starts_of_ = -1;  // the row of tiles whose intervals `starts` holds
+};
+
+void IntervalMatcher::StripMatching::resize() {
+  const auto levels = static_cast<std::size_t>(row_levels());
+  at_least(levels * static_cast<std::size_t>(last_ - first_) + kRowPadding, s_.costs);
+  at_least(levels * static_cast<std::size_t>(to_ - from_) + kRowPadding, s_.sums);
+  at_least(levels + kRowPadding, s_.unused_sums);
+  at_least(2 * kDirections * path_bytes(), s_.paths);
+  at_least(2 * kRowsAtOnce * p2_bytes(), s_.p2);
+  at_least(2 * static_cast<std::size_t>(width_), s_.starts);
+  at_least(static_cast<std::size_t>(width_), s_.winners);
+  at_least(static_cast<std::size_t>(width_ + m_.range_.count() + 4 * kInterval), s_.right_best);
+}
+
+void IntervalMatcher::StripMatching::set_starts(int tile_row) {
+  if (starts_of_ == tile_row) return;
+  starts_of_ = tile_row;
+  for (int x = 0; x < width_; ++x) {
+    const TileIntervals& tile = tiles_(x / kTile, tile_row);
+    s_.starts[static_cast<std::size_t>(x)] = tile.first;
+    s_.starts[static_cast<std::size_t>(width_ + x)] = tile.second;
+  }
+}
+
+void IntervalMatcher::StripMatching::compute_costs(int y) {
+  set_starts(y / kTile);
+  CostRow row{};
+  row.width = width_;
+  row.cost = cost(y);
+  row.first = s_.starts.data();
+  row.second = row.first + width_;
+  for (int p = 0; p < kPlanes; ++p) {
+    row.left[p] = m_.left_planes_.row(y * kPlanes + p);
+    row.right[p] = m_.right_planes_.row(y * kPlanes + p) + m_.mirror_pad_ + width_ - 1;
+  }
+  m_.kernels_.cost_row(row);
+  for (int tile = 0; tile < tiles_.width(); ++tile) {
+    const TileIntervals& starts = tiles_(tile, y / kTile);
+    replace_outside(tile, starts.first, row.cost);
+    replace_outside(tile, starts.second, row.cost + kInterval);
+  }
+}
+
+// Levels of a tile outside of the search range, and those whose right pixel is outside of the image.
+void IntervalMatcher::StripMatching::replace_outside(int tile, int start, std::uint8_t* costs) const {
+  const int from = tile * kTile, to = std::min(width_, from + kTile), end = start + kInterval - 1;
+  if (start >= m_.range_.min && end <= m_.range_.max && end <= from && start > to - 1 - width_) return;
+  for (int x = from; x < to; ++x) {
+    for (int d = start; d <= end; ++d) {
+      std::uint8_t& cost = costs[static_cast<std::ptrdiff_t>(x) * kLevels + d - start];
+      if (d < m_.range_.min || d > m_.range_.max) {
+        cost = kNever;
+      } else if (d > x || d <= x - width_) {
+        cost = m_.penalties_.out_of_view;
+      }
+    }
+  }
+}
+
+// Path costs of the row before are re-expressed in the intervals of this row's tiles. Element x of direction 0 comes
+// from column x − 1, of direction 2 from column x + 1.
+void IntervalMatcher::StripMatching::enter_row(int y, int before) {
+  const int row = y / kTile, row_before = before / kTile;
+  const auto apply = [&](int direction, int x, int count, const TileIntervals& old, const TileIntervals& now) {
+    if (count > 0 && old != now)
+      m_.kernels_.apply({path(direction, 0) + static_cast<std::ptrdiff_t>(x) * kLevels, count, transition(old, now)});
+  };
+  for (int t = 0; t < tiles_.width(); ++t) {
+    const TileIntervals& now = tiles_(t, row);
+    const int x0 = t * kTile, x1 = std::min(width_, x0 + kTile);
+    const TileIntervals& above = tiles_(t, row_before);
+    apply(0, x0 + 1, x1 - x0 - 1, above, now);
+    apply(1, x0, x1 - x0, above, now);
+    apply(2, x0, x1 - x0 - 1, above, now);
+    if (t > 0) apply(0, x0, 1, tiles_(t - 1, row_before), now);
+    if (t + 1 < tiles_.width()) apply(2, x1 - 1, 1, tiles_(t + 1, row_before), now);
+  }
+}
+
+void IntervalMatcher::StripMatching::compute_p2(const std::uint8_t* here, const std::uint8_t* before, int index) {
+  m_.kernels_.p2_row({here, before, m_.penalties_.p2.data(), p2(index), width_});
+}
+
+void IntervalMatcher::StripMatching::sweep_row(int y, int before, bool begins, bool add) {
+  if (!begins) enter_row(y, before);
+  const std::uint8_t* const here = m_.left_gray_.row(y) + kRowPadding;
+  const std::uint8_t* const there = begins ? here : m_.left_gray_.row(before) + kRowPadding;
+  VerticalRow row{};
+  row.cost = cost(y);
+  row.sum = sum(y);
+  row.width = width_;
+  row.p1 = m_.penalties_.p1;
+  row.add = add;
+  for (int direction = 0; direction < kDirections; ++direction) {
+    compute_p2(here, there + direction - 1, direction);
+    row.p2[direction] = p2(direction);
+    row.from[direction] = path(direction, 0);
+    row.to[direction] = path(direction, 1) - (direction - 1) * kLevels;
+  }
+  m_.kernels_.vertical_row(row);
+  turn_ ^= 1;
+  // Diagonal paths begin at the left and right border.
+  std::memset(path(0, 0), 0, kLevels);
+  std::memset(path(2, 0) + row_levels() - kLevels, 0, kLevels);
+}
+
+void IntervalMatcher::StripMatching::along_rows(int from, int to) {
+  const int tile_row = from / kTile;
+  s_.runs.clear();
+  for (int t = 0; t < tiles_.width(); ++t) {
+    const int x0 = t * kTile, x1 = std::min(width_, x0 + kTile);
+    if (t > 0 && tiles_(t, tile_row) == tiles_(t - 1, tile_row)) {
+      s_.runs.back().to = x1;
+      continue;
+    }
+    ColumnRun run{x0, x1, {}, {}};
+    if (t > 0) {
+      run.from_left = transition(tiles_(t - 1, tile_row), tiles_(t, tile_row));
+      s_.runs.back().from_right = transition(tiles_(t, tile_row), tiles_(t - 1, tile_row));
+    }
+    s_.runs.push_back(run);
+  }
+  HorizontalRows rows{};
+  rows.runs = s_.runs.data();
+  rows.run_count = static_cast<int>(s_.runs.size());
+  rows.p1 = m_.penalties_.p1;
+  for (int i = 0; i < kRowsAtOnce; ++i) {
+    const int y = std::min(from + i, to - 1);
+    const std::uint8_t* const gray = m_.left_gray_.row(y) + kRowPadding;
+    compute_p2(gray, gray - 1, 2 * i);
+    compute_p2(gray, gray + 1, 2 * i + 1);
+    rows.cost[i] = cost(y);
+    rows.p2_from_left[i] = p2(2 * i);
+    rows.p2_from_right[i] = p2(2 * i + 1);
+    rows.sum[i] = from + i < to ? sum(y) : s_.unused_sums.data();
+  }
+  m_.kernels_.horizontal_rows(rows);
+}
+
+void IntervalMatcher::StripMatching::select(int y) {
+  set_starts(y / kTile);
+  std::fill(s_.right_best.begin(), s_.right_best.end(), std::numeric_limits<std::uint16_t>::max());
+  SelectRow row{};
+  row.sum = sum(y);
+  row.first = s_.starts.data();
+  row.second = row.first + width_;
+  row.winner = s_.winners.data();
+  // The smallest start is at most an interval below the range, see TileIntervals.
+  std::uint16_t* const right = s_.right_best.data() + width_ - 1 - (m_.range_.min - kInterval);
+  row.right_best = right;
+  row.width = width_;
+  m_.kernels_.select_row(row);
+  float* const disparity = m_.matches_.disparity.row(y);
+  std::uint8_t* const right_distance = m_.matches_.right_distance.row(y);
+  for (int x = 0; x < width_; ++x) {
+    const int level = row.winner[x] % kLevels, k = level % kInterval;
+    const int d = (level < kInterval ? row.first[x] : row.second[x]) + k;
+    const int apart = (right[d - x] - x) & (kLevels - 1);  // right_best holds the column modulo kLevels
+    right_distance[x] = static_cast<std::uint8_t>(std::min(apart, kLevels - apart));
+    if (d > x || d <= x - width_) {
+      disparity[x] = std::numeric_limits<float>::quiet_NaN();
+      continue;
+    }
+    float offset = 0;
+    if (k > 0 && k + 1 < kInterval) {
+      const std::uint16_t* const sums = row.sum + static_cast<std::ptrdiff_t>(x) * kLevels;
+      offset = equiangular_offset(sums[sum_index(level - 1)], sums[sum_index(level)], sums[sum_index(level + 1)]);
+    }
+    disparity[x] = static_cast<float>(d) + offset;
+  }
+}
+
+IntervalMatcher::IntervalMatcher(const Penalties& penalties, Kernels kernels, ThreadPool workers)
+    : penalties_(penalties), kernels_(kernels), workers_(std::move(workers)) {}
+
+void IntervalMatcher::resize(ImageSize size, DisparityRange range) {
+  range_ = range;
+  mirror_pad_ = std::max(0, -range.min) + 2 * kInterval;
+  const int right_width = mirror_pad_ + size.width + std::max(0, range.max) + 2 * kInterval + kRowPadding;
+  if (right_planes_.width() < right_width || size != size_) {
+    right_planes_ = Image<std::uint8_t>(right_width, size.height * kPlanes);
+  }
+  if (size == size_) return;
+  size_ = size;
+  left_gray_ = Image<std::uint8_t>(size.width + 3 * kRowPadding, size.height);
+  framed_ = Image<std::uint8_t>(size.width + 2 * kWindowColumns + kRowPadding, size.height + 2 * kWindowRows);
+  left_planes_ = Image<std::uint8_t>(size.width + kRowPadding, size.height * kPlanes);
+  matches_.disparity = Image<float>(size);
+  matches_.right_distance = Image<std::uint8_t>(size);
+}
+
+const IntervalMatches& IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                              ImageView<const TileIntervals> tiles, DisparityRange range,
+                                              std::vector<StripBuffers>& strips) {
+  resize(left.size(), range);
+  compute_census(left, false, left_planes_);
+  compute_census(right, true, right_planes_);
+  // A border of a vector on both sides: the neighbours of the first and last column are their own.
+  for (int y = 0; y < size_.height; ++y) {
+    std::uint8_t* const row = left_gray_.row(y);
+    std::memset(row, left(0, y), kRowPadding);
+    std::memcpy(row + kRowPadding, left.row(y), static_cast<std::size_t>(size_.width));
+    std::memset(row + kRowPadding + size_.width, left(size_.width - 1, y), 2 * kRowPadding);
+  }
+  const int rows = strip_rows(size_.height), count = (size_.height + rows - 1) / rows;
+  // Each thread keeps its buffers and takes the next strip that is left.
+  const int threads = std::min(count, workers_.threads());
+  if (static_cast<int>(strips.size()) < threads) strips.resize(static_cast<std::size_t>(threads));
+  std::atomic<int> next = 0;
+  workers_.parallel_for(0, threads, 1, [&](int thread, int) {
+    for (int i = next++; i < count; i = next++) {
+      StripMatching(*this, tiles, i * rows, std::min(size_.height, (i + 1) * rows),
+                    strips[static_cast<std::size_t>(thread)])
+          .run();
+    }
+  });
+  return matches_;
+}
+
+void IntervalMatcher::compute_census(ImageView<const std::uint8_t> image, bool mirrored, Image<std::uint8_t>& planes) {
+  const int w = size_.width, h = size_.height;
+  for (int y = 0; y < framed_.height(); ++y) {
+    const std::uint8_t* const source = image.row(std::clamp(y - kWindowRows, 0, h - 1));
+    std::uint8_t* const target = framed_.row(y);
+    std::memset(target, source[0], kWindowColumns);
+    std::memcpy(target + kWindowColumns, source, static_cast<std::size_t>(w));
+    std::memset(target + kWindowColumns + w, source[w - 1],
+                static_cast<std::size_t>(framed_.width() - kWindowColumns - w));
+  }
+  workers_.parallel_for(0, h, 32, [&](int from, int to) {
+    Image<std::uint8_t> forward(mirrored ? w + kRowPadding : 0, mirrored ? kPlanes : 0);
+    for (int y = from; y < to; ++y) {
+      CensusRow row{};
+      row.width = w;
+      for (int r = 0; r < 7; ++r) row.rows[r] = framed_.row(y + r) + kWindowColumns;
+      for (int p = 0; p < kPlanes; ++p) row.planes[p] = mirrored ? forward.row(p) : planes.row(y * kPlanes + p);
+      kernels_.census_row(row);
+      if (!mirrored) continue;
+      for (int p = 0; p < kPlanes; ++p)
+        std::reverse_copy(forward.row(p), forward.row(p) + w, planes.row(y * kPlanes + p) + mirror_pad_);
+    }
+  });
+}
+
+std::int64_t IntervalMatcher::strip_bytes(ImageSize size, DisparityRange range, int threads) {
+  const std::int64_t w = size.width + 4, h = size.height, rows = strip_rows(size.height);
+  const std::int64_t own = w * std::min(rows, h), with_margins = w * std::min(rows + 2 * kStripMargin, h);
+  const std::int64_t strip =
+      kLevels * (with_margins + 2 * own + 10 * w) + 26 * (w + 4 * kRowPadding) + 2 * (range.count() + 4 * kInterval);
+  return std::min<std::int64_t>(threads, (h + rows - 1) / rows) * strip;
+}
+
+std::int64_t IntervalMatcher::memory_bytes(ImageSize size, DisparityRange range) {
+  const std::int64_t row = size.width + 4 * kRowPadding;
+  const std::int64_t shift = std::max(0, -range.min) + std::max(0, range.max) + 4 * kInterval;
+  return (kPlanes * (2 * row + shift) + 7 * row) * (size.height + 2 * kWindowRows);
+}
+
+std::size_t IntervalMatcher::buffer_bytes() const {
+  const auto bytes = [](const auto& image) {
+    return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()) * sizeof(*image.data());
+  };
+  return bytes(left_gray_) + bytes(framed_) + bytes(left_planes_) + bytes(right_planes_) + bytes(matches_.disparity) +
+         bytes(matches_.right_distance);
+}
+
+std::size_t StripBuffers::bytes() const {
+  return static_cast<std::size_t>(costs.stride()) + 2 * static_cast<std::size_t>(sums.stride()) + paths.size() +
+         p2.size() + 2 * (unused_sums.size() + winners.size() + right_best.size() + starts.size()) +
+         runs.size() * sizeof(ColumnRun);
+}
+
+}  // namespace spartan::internal::matching

@@ -1,0 +1,90 @@
+// Kernels of the sub-pixel refinement, one version per SIMD instruction set. All arithmetic is integer or single
+// floating-point operations without contraction, so that all versions give the same bits.
+//
+// Rows must be readable and writable for one vector (64 bytes) behind their last pixel.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace spartan::internal::matching {
+
+inline constexpr int kFitRadius = 3;  ///< Half size of the window of the fit on intensities.
+
+/// One row of a smoothing by pairs of opposite neighbours: at ±(step, 0), ±(0, step), ±(step, step), ±(step, −step).
+/// The mean of a pair is an estimate of the disparity that no slope biases. A pair counts where it fits the pixel,
+///   ½ |d₁ + d₂ − 2 d₀| < t,  t = min(tolerance, max(least_tolerance, sigmas · σ₀)),  σ₀ = 1/√w₀,
+/// with weight 2 min(w₁, w₂), where w are informations (1/σ²).
+struct SmoothRow {
+  const float* disparity[3];  ///< Rows y − step, y, y + step, readable for `step` pixels on both sides; NaN: unknown.
+  const float* information[3];  ///< px⁻², above 0 where the disparity is known.
+  float* smoothed;
+  float* smoothed_information;  ///< w₀ + growth · (Σ w of the pairs that count).
+  int width;
+  int step;
+  float tolerance, least_tolerance, sigmas, growth;
+};
+
+/// The right image at x − d, by cubic interpolation (Catmull & Rom), and its derivative by the disparity. Where d is
+/// unknown or x − d is not in [1, width − 2), all values are 0.
+struct WarpRow {
+  const std::uint8_t* left;   ///< Readable from −1 to width.
+  const std::uint8_t* right;  ///< Readable from 0 to width + 2.
+  const float* disparity;
+  std::int16_t* known;     ///< 1 or 0
+  std::int16_t* gray;      ///< Left image, 1/16 gray level.
+  std::int16_t* warped;    ///< Right image, 1/16 gray level.
+  std::int16_t* gradient;  ///< ∂(warped)/∂d, mean of both images, 1/8 gray level per pixel.
+  int width;
+};
+
+/// Sums that the fit needs, of n pixels with gray level l, warped right image r and gradient g.
+enum FitSum { kN, kL, kR, kG, kLL, kLR, kRR, kLG, kRG, kGG, kFitSums };
+
+/// Adds one row to the sums of the columns and subtracts another; null: none.
+struct ColumnUpdate {
+  struct Row {
+    const std::int16_t *known, *gray, *warped, *gradient;
+  };
+  const Row* add;
+  const Row* subtract;
+  std::array<std::int32_t*, kFitSums> columns;
+  int width;
+};
+
+/// Least squares on intensities in the window around each pixel, l ≈ G r + O + k g δ, with gain G and offset O solved
+/// and δ held near 0 by a prior of standard deviation σ_p. k = 2G / (1 + G), because g is the mean gradient of r and l:
+///   h = k² n var(g),  b = k n (cov(g, l) − G cov(g, r)),  δ = b / (h + s²/σ_p²),
+/// where s² is the mean squared residual, at least the squared noise. Adds δ to the disparity. The information is
+///   w = ρ h / s² + 1/σ_p²,  ρ the correlation of l and r,
+/// because noise has gradients too: only the share of the contrast that both images have in common counts.
+struct FitRow {
+  std::array<const std::int32_t*, kFitSums> columns;  ///< Readable for kFitRadius elements on both sides, which are 0.
+  float* disparity;
+  float* information;  ///< w, px⁻²
+  int width;
+  float noise_levels;  ///< Smallest residual, gray levels.
+  float prior_px;      ///< σ_p
+};
+
+/// Median of the 3×3 pixels around the pixels 1 … width − 2 of a row; NaN where one of the nine is NaN. Reads and
+/// writes the row's own pixels only.
+struct MedianRow {
+  const float* rows[3];  ///< Above, at and below the row.
+  float* median;
+  int width;
+};
+
+struct RefinementKernels {
+  void (*median_row)(const MedianRow&);
+  void (*smooth_row)(const SmoothRow&);
+  void (*warp_row)(const WarpRow&);
+  void (*update_columns)(const ColumnUpdate&);
+  void (*fit_row)(const FitRow&);
+};
+
+/// The kernels of one instruction set; see simd_target_index().
+RefinementKernels refinement_kernels_for(std::size_t target_index);
+
+}  // namespace spartan::internal::matching

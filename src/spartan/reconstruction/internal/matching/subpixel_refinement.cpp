@@ -1,0 +1,180 @@
+#include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+namespace spartan::internal::matching {
+namespace {
+
+constexpr int kGrayPad = kRowPadding;  // columns before the first pixel of the gray images
+constexpr int kFitBand = 64;           // rows of one part of the fit
+constexpr int kWindow = 2 * kFitRadius + 1;
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+
+// Noise of gray levels that the fit assumes at least, and standard deviation of disparities before the fit.
+constexpr float kNoise_levels = 1.5F, kPrior_px = 0.5F;
+// Distances of the pairs of each smoothing, and the bounds of SmoothRow. Steps that double reach far at few operations
+// (à trous; Dammertz et al., High Performance Graphics 2010).
+constexpr std::array<int, 2> kStepsBeforeFit{1, 2};
+constexpr std::array<int, 3> kStepsAfterFit{1, 2, 4};
+constexpr float kToleranceBefore_px = 1.5F, kToleranceAfter_px = 0.7F, kLeastTolerance_px = 0.2F, kToleranceSigmas = 3;
+// Pairs raise the information by this share of their own: fits of neighbours share most of their pixels.
+constexpr float kGrowth = 0.3F;
+
+}  // namespace
+
+SubpixelRefinement::SubpixelRefinement(RefinementKernels kernels, const ThreadPool& workers)
+    : kernels_(kernels), workers_(workers) {}
+
+void SubpixelRefinement::resize(ImageSize size) {
+  if (size == size_) return;
+  size_ = {};  // stays so if an allocation fails
+  const int w = size.width, h = size.height, wide = w + 2 * kPad + kRowPadding / 4;
+  left_ = Image<std::uint8_t>(w + 2 * kGrayPad, h);
+  right_ = Image<std::uint8_t>(w + 2 * kGrayPad, h);
+  for (Image<float>& image : disparity_) image = Image<float>(wide, h, kUnknown);
+  for (Image<float>& image : information_) image = Image<float>(wide, h);
+  no_disparity_ = Image<float>(wide, 1, kUnknown);
+  no_information_ = Image<float>(wide, 1);
+  size_ = size;
+}
+
+void SubpixelRefinement::smooth(const Smoothing& by) {
+  workers_.parallel_for(0, size_.height, 32, [&](int from, int to) {
+    for (int y = from; y < to; ++y) {
+      SmoothRow row{};
+      for (int i = 0; i < 3; ++i) {
+        const int source = y + (i - 1) * by.step;
+        const bool inside = source >= 0 && source < size_.height;
+        row.disparity[i] = (inside ? disparity_[0].row(source) : no_disparity_.row(0)) + kPad;
+        row.information[i] = (inside ? information_[0].row(source) : no_information_.row(0)) + kPad;
+      }
+      row.smoothed = disparity_[1].row(y) + kPad;
+      row.smoothed_information = information_[1].row(y) + kPad;
+      row.width = size_.width;
+      row.step = by.step;
+      row.tolerance = by.tolerance;
+      row.least_tolerance = by.least_tolerance;
+      row.sigmas = by.sigmas;
+      row.growth = by.growth;
+      kernels_.smooth_row(row);
+      // The last vector has written behind the last column.
+      std::fill_n(row.smoothed + size_.width, kPad, kUnknown);
+    }
+  });
+  std::swap(disparity_[0], disparity_[1]);
+  std::swap(information_[0], information_[1]);
+}
+
+void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
+  const auto stride = static_cast<std::size_t>(size_.width + kRowPadding);
+  const std::size_t column_stride = stride + 2 * kFitRadius;
+  b.rows.resize(std::max(b.rows.size(), 4 * kWindow * stride));
+  b.columns.assign(std::max(b.columns.size(), kFitSums * column_stride), 0);
+  const auto row_of = [&](int y) {
+    std::int16_t* const first = b.rows.data() + static_cast<std::size_t>(y % kWindow) * 4 * stride;
+    return std::array<std::int16_t*, 4>{first, first + stride, first + 2 * stride, first + 3 * stride};
+  };
+  const auto values_of = [&](int y) {
+    const auto row = row_of(y);
+    return ColumnUpdate::Row{row[0], row[1], row[2], row[3]};
+  };
+  ColumnUpdate update{};
+  FitRow fit{};
+  for (std::size_t i = 0; i < kFitSums; ++i) {
+    update.columns[i] = b.columns.data() + i * column_stride + kFitRadius;
+    fit.columns[i] = update.columns[i];
+  }
+  update.width = fit.width = size_.width;
+  fit.noise_levels = kNoise_levels;
+  fit.prior_px = kPrior_px;
+  const int first = std::max(0, from - kFitRadius), end = std::min(size_.height, to + kFitRadius);
+  for (int y = first; y < to + kFitRadius; ++y) {
+    const int leaves = y - kWindow;
+    const ColumnUpdate::Row out = leaves >= first ? values_of(leaves) : ColumnUpdate::Row{};
+    // The row that leaves has the place of the one that comes: it is subtracted first.
+    update.add = nullptr;
+    update.subtract = leaves >= first ? &out : nullptr;
+    if (update.subtract != nullptr) kernels_.update_columns(update);
+    if (y < end) {
+      const auto to_row = row_of(y);
+      kernels_.warp_row({left_.row(y) + kGrayPad, right_.row(y) + kGrayPad, disparity_[0].row(y) + kPad, to_row[0],
+                         to_row[1], to_row[2], to_row[3], size_.width});
+      const ColumnUpdate::Row in = values_of(y);
+      update.add = &in;
+      update.subtract = nullptr;
+      kernels_.update_columns(update);
+    }
+    // Sums behind the last column belong to no window.
+    for (std::int32_t* const column : update.columns) std::fill_n(column + size_.width, kRowPadding / 4, 0);
+    const int centre = y - kFitRadius;
+    if (centre < from) continue;
+    std::copy_n(disparity_[0].row(centre), disparity_[0].width(), disparity_[1].row(centre));
+    fit.disparity = disparity_[1].row(centre) + kPad;
+    fit.information = information_[1].row(centre) + kPad;
+    kernels_.fit_row(fit);
+    std::fill_n(fit.disparity + size_.width, kPad, kUnknown);
+  }
+}
+
+void SubpixelRefinement::fit(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right) {
+  const auto frame = [&](ImageView<const std::uint8_t> from, Image<std::uint8_t>& to) {
+    for (int y = 0; y < size_.height; ++y) {
+      std::uint8_t* const row = to.row(y);
+      std::memset(row, from(0, y), kGrayPad);
+      std::memcpy(row + kGrayPad, from.row(y), static_cast<std::size_t>(size_.width));
+      std::memset(row + kGrayPad + size_.width, from(size_.width - 1, y), kGrayPad);
+    }
+  };
+  frame(left, left_);
+  frame(right, right_);
+  const int count = (size_.height + kFitBand - 1) / kFitBand, threads = std::min(count, workers_.threads());
+  if (static_cast<int>(buffers_.size()) < threads) buffers_.resize(static_cast<std::size_t>(threads));
+  std::atomic<int> next = 0;
+  workers_.parallel_for(0, threads, 1, [&](int thread, int) {
+    for (int i = next++; i < count; i = next++) {
+      fit_rows(i * kFitBand, std::min(size_.height, (i + 1) * kFitBand), buffers_[static_cast<std::size_t>(thread)]);
+    }
+  });
+  std::swap(disparity_[0], disparity_[1]);
+  std::swap(information_[0], information_[1]);
+}
+
+void SubpixelRefinement::refine(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                ImageView<float> disparity) {
+  resize(disparity.size());
+  const auto row_bytes = static_cast<std::size_t>(size_.width) * sizeof(float);
+  for (int y = 0; y < size_.height; ++y) {
+    std::memcpy(disparity_[0].row(y) + kPad, disparity.row(y), row_bytes);
+    std::fill_n(information_[0].row(y) + kPad, size_.width, 1.0F);
+  }
+  for (const int step : kStepsBeforeFit) smooth({step, kToleranceBefore_px, kToleranceBefore_px, 0, 0});
+  fit(left, right);
+  for (const int step : kStepsAfterFit)
+    smooth({step, kToleranceAfter_px, kLeastTolerance_px, kToleranceSigmas, kGrowth});
+  for (int y = 0; y < size_.height; ++y) std::memcpy(disparity.row(y), disparity_[0].row(y) + kPad, row_bytes);
+}
+
+std::int64_t SubpixelRefinement::memory_bytes(ImageSize size, int threads) {
+  const std::int64_t w = size.width, h = size.height;
+  const std::int64_t images = h * (2 * (w + 3 * kRowPadding) + 4 * 4 * (w + 2 * kPad + kRowPadding));
+  const std::int64_t rows = (2 * 4 * kWindow + 4 * kFitSums) * (w + kRowPadding + 2 * kFitRadius);
+  return images + threads * rows;
+}
+
+std::size_t SubpixelRefinement::buffer_bytes() const {
+  const auto bytes = [](const auto& image) {
+    return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()) * sizeof(*image.data());
+  };
+  std::size_t total = bytes(left_) + bytes(right_);
+  for (int i = 0; i < 2; ++i) {
+    total += bytes(disparity_[static_cast<std::size_t>(i)]) + bytes(information_[static_cast<std::size_t>(i)]);
+  }
+  for (const FitBuffers& b : buffers_) total += 2 * b.rows.size() + 4 * b.columns.size();
+  return total;
+}
+
+}  // namespace spartan::internal::matching

@@ -1,0 +1,60 @@
+// Sub-pixel refinement of a disparity image: smoothing by pairs of neighbours, one step of least squares on the right
+// image warped by the smoothed disparities, and smoothing weighted by the information of the fit. Derivation:
+// docs/math/stereo.md.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "spartan/core/image.h"
+#include "spartan/core/threads.h"
+#include "spartan/reconstruction/internal/matching/refinement_kernels.h"
+#include "spartan/reconstruction/internal/matching/row_padding.h"
+
+namespace spartan::internal::matching {
+
+class SubpixelRefinement {
+ public:
+  SubpixelRefinement(RefinementKernels kernels, const ThreadPool& workers);
+
+  /// Refines `disparity` (px, NaN: unknown) in place. All images have one size.
+  void refine(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, ImageView<float> disparity);
+
+  /// Of the last call: information of each fit, of its prior and of the neighbours that agree with it, px⁻².
+  ImageView<const float> information() const { return padded(information_[0]); }
+  std::size_t buffer_bytes() const;
+  /// An upper bound of buffer_bytes().
+  static std::int64_t memory_bytes(ImageSize size, int threads);
+
+ private:
+  // Rows of the fit of one thread.
+  struct FitBuffers {
+    std::vector<std::int16_t> rows;
+    std::vector<std::int32_t> columns;
+  };
+  struct Smoothing {
+    int step;
+    float tolerance, least_tolerance, sigmas, growth;
+  };
+
+  static constexpr int kPad = 16;  // columns before the first pixel, of which a smoothing reads `step`
+  ImageView<const float> padded(const Image<float>& image) const {
+    return {image.data() + kPad, size_.width, size_.height, image.stride()};
+  }
+  void resize(ImageSize size);
+  void smooth(const Smoothing& by);
+  void fit(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right);
+  void fit_rows(int from, int to, FitBuffers& buffers);
+
+  RefinementKernels kernels_;
+  ThreadPool workers_;
+  ImageSize size_;
+  Image<std::uint8_t> left_, right_;                     // one column before the first, replicated
+  std::array<Image<float>, 2> disparity_, information_;  // current and next
+  Image<float> no_disparity_, no_information_;           // a row outside of the image
+  std::vector<FitBuffers> buffers_;
+};
+
+}  // namespace spartan::internal::matching

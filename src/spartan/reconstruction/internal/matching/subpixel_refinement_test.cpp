@@ -1,0 +1,235 @@
+#include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "spartan/numerics/random.h"
+#include "spartan/numerics/simd_target.h"
+
+namespace spartan::internal::matching {
+namespace {
+
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr int kWidth = 150, kHeight = 90;
+
+// A texture without frequencies that a pixel grid cannot hold, in gray levels around 0.
+class Texture {
+ public:
+  Texture() {
+    Random random(8);
+    for (Wave& wave : waves_) {
+      const double length_px = random.uniform(5, 25), angle = random.uniform(0, 2 * M_PI);
+      wave = {2 * M_PI / length_px * std::cos(angle), 2 * M_PI / length_px * std::sin(angle),
+              random.uniform(0, 2 * M_PI)};
+    }
+  }
+  double operator()(double x, double y) const {
+    double sum = 0;
+    for (const Wave& wave : waves_) sum += std::sin(wave.along_x * x + wave.along_y * y + wave.phase);
+    return 12 * sum;
+  }
+
+ private:
+  struct Wave {
+    double along_x, along_y, phase;
+  };
+  std::array<Wave, 12> waves_{};
+};
+
+std::uint8_t gray(double level) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(level, 0.0, 255.0)));
+}
+
+// A textured plane: disparity offset + along_x · x + along_y · y.
+struct Plane {
+  double offset = 9.3, along_x = 0, along_y = 0;
+  double gain = 1, level = 128;  // of the right image
+  double disparity(int x, int y) const { return offset + along_x * x + along_y * y; }
+};
+
+struct PlanePair {
+  Image<std::uint8_t> left{kWidth, kHeight}, right{kWidth, kHeight};
+};
+
+PlanePair render(const Plane& plane) {
+  const Texture texture;
+  PlanePair pair;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      pair.left(x, y) = gray(128 + texture(x, y));
+      // The left column that the right column x sees: x = x_left − d(x_left, y).
+      const double left_x = (x + plane.offset + plane.along_y * y) / (1 - plane.along_x);
+      pair.right(x, y) = gray(plane.level + plane.gain * texture(left_x, y));
+    }
+  }
+  return pair;
+}
+
+Image<float> true_disparity(const Plane& plane) {
+  Image<float> disparity(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) disparity(x, y) = static_cast<float>(plane.disparity(x, y));
+  }
+  return disparity;
+}
+
+struct Errors {
+  double mean = 0, rms = 0;
+};
+Errors errors_of(const Image<float>& disparity, const Plane& plane) {
+  Errors e;
+  int count = 0;
+  for (int y = 8; y < kHeight - 8; ++y) {
+    for (int x = 30; x < kWidth - 8; ++x) {
+      const double error = disparity(x, y) - plane.disparity(x, y);
+      e.mean += error;
+      e.rms += error * error;
+      ++count;
+    }
+  }
+  return {e.mean / count, std::sqrt(e.rms / count)};
+}
+
+SubpixelRefinement refinement(int threads = 1, SimdTarget simd = SimdTarget::automatic) {
+  return {refinement_kernels_for(simd_target_index(simd)), ThreadPool(threads)};
+}
+
+// Refines the whole-pixel disparities of a plane, as matching finds them.
+Errors errors_from_whole_pixels(const Plane& plane) {
+  const PlanePair pair = render(plane);
+  Image<float> disparity = true_disparity(plane);
+  Random random(3);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x)
+      disparity(x, y) = static_cast<float>(std::round(disparity(x, y) + random.normal(0, 0.1)));
+  }
+  refinement().refine(pair.left, pair.right, disparity);
+  return errors_of(disparity, plane);
+}
+
+TEST(SubpixelRefinement, FindsFractionsOfPixelsWithoutBias) {
+  for (const double fraction : {0.0, 0.2, 0.35, 0.5, 0.65, 0.8}) {
+    const Errors e = errors_from_whole_pixels({.offset = 9 + fraction});
+    EXPECT_LT(std::abs(e.mean), 0.02) << fraction;
+    EXPECT_LT(e.rms, 0.05) << fraction;
+  }
+}
+
+TEST(SubpixelRefinement, FindsTheSlopeOfThePlane) {
+  for (const Plane& plane : {Plane{.along_y = 0.34}, Plane{.along_x = 0.1}, Plane{.along_x = -0.08, .along_y = 0.15}}) {
+    const Errors e = errors_from_whole_pixels(plane);
+    EXPECT_LT(std::abs(e.mean), 0.02);
+    EXPECT_LT(e.rms, 0.06);
+  }
+}
+
+TEST(SubpixelRefinement, SolvesGainAndOffset) {
+  const Errors e = errors_from_whole_pixels({.gain = 0.75, .level = 100});
+  EXPECT_LT(std::abs(e.mean), 0.02);
+  EXPECT_LT(e.rms, 0.05);
+}
+
+TEST(SubpixelRefinement, KeepsADepthEdge) {
+  const Plane plane;
+  const PlanePair pair = render(plane);
+  Image<float> disparity = true_disparity(plane);
+  // A step of 6 px that the images do not contain: neither side may leak into the other.
+  for (int y = 0; y < kHeight; ++y) std::fill(disparity.row(y) + 80, disparity.row(y) + kWidth, 15.3F);
+  refinement().refine(pair.left, pair.right, disparity);
+  for (int y = 10; y < kHeight - 10; ++y) {
+    EXPECT_NEAR(disparity(77, y), 9.3, 0.5);
+    EXPECT_NEAR(disparity(82, y), 15.3, 1.0);
+  }
+}
+
+TEST(SubpixelRefinement, LeavesUnknownPixelsUnknownAndUsesNone) {
+  const Plane plane;
+  const PlanePair pair = render(plane);
+  Image<float> disparity = true_disparity(plane);
+  Random random(5);
+  std::vector<bool> unknown;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      unknown.push_back(random.below(3) == 0);
+      if (unknown.back()) disparity(x, y) = kUnknown;
+    }
+  }
+  refinement().refine(pair.left, pair.right, disparity);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      ASSERT_EQ(std::isnan(disparity(x, y)), unknown[static_cast<std::size_t>(y * kWidth + x)]);
+      if (x > 30 && x < 140 && !std::isnan(disparity(x, y))) {
+        ASSERT_NEAR(disparity(x, y), 9.3, 0.3);
+      }
+    }
+  }
+}
+
+TEST(SubpixelRefinement, KnowsTheTexture) {
+  const PlanePair pair = render({});
+  // Smallest and largest information inside of the image.
+  const auto information_of = [](const Image<std::uint8_t>& left, const Image<std::uint8_t>& right, bool random_start) {
+    SubpixelRefinement refined = refinement();
+    Image<float> disparity(kWidth, kHeight, 9.3F);
+    Random random(4);
+    for (int y = 0; y < kHeight && random_start; ++y) {
+      for (int x = 0; x < kWidth; ++x) disparity(x, y) = static_cast<float>(random.uniform(0, 40));
+    }
+    refined.refine(left, right, disparity);
+    std::pair<double, double> range{1e9, 0};
+    for (int y = 12; y < 78; ++y) {
+      for (int x = 50; x < 138; ++x) {
+        range.first = std::min<double>(range.first, refined.information()(x, y));
+        range.second = std::max<double>(range.second, refined.information()(x, y));
+      }
+    }
+    return range;
+  };
+  EXPECT_GT(information_of(pair.left, pair.right, false).first, 1000) << "px^-2";
+  const Image<std::uint8_t> constant(kWidth, kHeight, std::uint8_t{90});
+  EXPECT_LT(information_of(constant, constant, false).second, 0.1);
+  // Unrelated noise has gradients, but nothing in common.
+  Random random(6);
+  PlanePair noise;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      noise.left(x, y) = gray(random.normal(128, 10));
+      noise.right(x, y) = gray(random.normal(128, 10));
+    }
+  }
+  EXPECT_LT(information_of(noise.left, noise.right, true).second, 60);
+}
+
+TEST(SubpixelRefinement, IsDeterministicOnEveryInstructionSetAndNumberOfThreads) {
+  const Plane plane{.along_x = 0.05, .along_y = 0.2};
+  const PlanePair pair = render(plane);
+  const auto refined = [&](int threads, SimdTarget simd) {
+    Image<float> disparity = true_disparity(plane);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) disparity(x, y) = (x * y) % 11 == 0 ? kUnknown : std::round(disparity(x, y));
+    }
+    SubpixelRefinement r = refinement(threads, simd);
+    r.refine(pair.left, pair.right, disparity);
+    std::vector<float> values;
+    for (int y = 0; y < kHeight; ++y) {
+      values.insert(values.end(), disparity.row(y), disparity.row(y) + kWidth);
+      for (int x = 0; x < kWidth; ++x) values.push_back(r.information()(x, y));
+    }
+    return values;
+  };
+  const auto expected = refined(1, SimdTarget::automatic);
+  const auto same = [&](const std::vector<float>& found) {
+    return std::memcmp(found.data(), expected.data(), expected.size() * sizeof(float)) == 0;
+  };
+  EXPECT_TRUE(same(refined(2, SimdTarget::automatic)));
+  for (const SimdTarget simd : available_simd_targets()) EXPECT_TRUE(same(refined(1, simd))) << name_of(simd);
+}
+
+}  // namespace
+}  // namespace spartan::internal::matching
