@@ -9,26 +9,15 @@
 namespace spartan::internal::matching {
 namespace {
 
-double p2_of(double change, const DisparityOptions& o) {
-  return std::max<double>(o.p2_edge, o.p2_flat / (1 + change / o.p2_falloff_levels));
-}
-
-Penalties interval_penalties(const DisparityOptions& o) {
+Penalties penalties_of(const DisparityOptions& o) {
   Penalties p;
   p.p1 = static_cast<std::uint8_t>(o.p1);
   p.out_of_view = static_cast<std::uint8_t>(o.out_of_view_cost);
-  for (std::size_t bin = 0; bin < p.p2.size(); ++bin)
-    p.p2[bin] = static_cast<std::uint8_t>(std::lround(p2_of(kP2Bin * (static_cast<double>(bin) + 0.5) - 0.5, o)));
-  return p;
-}
-
-// The census of the coarsest level has about twice as many bits.
-SemiGlobalPenalties base_penalties(const DisparityOptions& o) {
-  SemiGlobalPenalties p;
-  p.p1 = static_cast<std::uint8_t>(2 * o.p1);
-  p.out_of_view = static_cast<std::uint8_t>(2 * o.out_of_view_cost);
-  for (std::size_t change = 0; change < p.p2.size(); ++change)
-    p.p2[change] = static_cast<std::uint8_t>(std::lround(2 * p2_of(static_cast<double>(change), o)));
+  for (std::size_t bin = 0; bin < p.p2.size(); ++bin) {
+    const double change = kP2Bin * (static_cast<double>(bin) + 0.5) - 0.5;  // the middle of the bin
+    p.p2[bin] = static_cast<std::uint8_t>(
+        std::lround(std::max<double>(o.p2_edge, o.p2_flat / (1 + change / o.p2_falloff_levels))));
+  }
   return p;
 }
 
@@ -65,10 +54,13 @@ DisparityRange halved(DisparityRange range, int width) {
 }  // namespace
 
 CoarseToFineMatcher::CoarseToFineMatcher(const DisparityOptions& options, const ThreadPool& workers)
+    : CoarseToFineMatcher(penalties_of(options), simd_target_index(options.simd), workers) {}
+
+CoarseToFineMatcher::CoarseToFineMatcher(const Penalties& penalties, std::size_t simd, const ThreadPool& workers)
     : workers_(workers),
-      base_(base_penalties(options), sgm::kernels_for(simd_target_index(options.simd)), workers),
-      half_matcher_(interval_penalties(options), kernels_for(simd_target_index(options.simd)), workers),
-      full_matcher_(interval_penalties(options), kernels_for(simd_target_index(options.simd)), workers) {}
+      base_(penalties, kernels_for(simd), full_range_kernels_for(simd), workers),
+      half_matcher_(penalties, kernels_for(simd), workers),
+      full_matcher_(penalties, kernels_for(simd), workers) {}
 
 const IntervalMatches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> left,
                                                   ImageView<const std::uint8_t> right, DisparityRange range) {
@@ -79,7 +71,7 @@ const IntervalMatches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> 
   halve(half_.right, workers_, quarter_.right);
   const DisparityRange half_range = halved(range, half_.left.width());
   const DisparityRange quarter_range = halved(half_range, quarter_.left.width());
-  const ImageView<const float> base = base_.match(quarter_.left, quarter_.right, quarter_range);
+  const ImageView<const float> base = base_.match(quarter_.left, quarter_.right, quarter_range, strips_);
   const auto half_tiles = choose_intervals(base, half_.left.size(), half_range, workers_);
   const IntervalMatches& half = half_matcher_.match(half_.left, half_.right, half_tiles, half_range, strips_);
   const auto tiles = choose_intervals(half.disparity, left.size(), range, workers_);
@@ -91,9 +83,10 @@ std::int64_t CoarseToFineMatcher::memory_bytes(ImageSize size, DisparityRange ra
   const ImageSize half = halved(size), quarter = halved(half);
   const DisparityRange half_range = halved(range, half.width), quarter_range = halved(half_range, quarter.width);
   const auto pixels = [](ImageSize s) { return std::int64_t{s.width + 64} * s.height; };
-  return IntervalMatcher::strip_bytes(size, range, threads) + IntervalMatcher::memory_bytes(size, range) +
-         IntervalMatcher::memory_bytes(half, half_range) + SemiGlobalMatcher::memory_bytes(quarter, quarter_range) +
-         2 * (pixels(half) + pixels(quarter));
+  const std::int64_t strips = std::max(IntervalMatcher::strip_bytes(size, range, threads),
+                                       FullRangeMatcher::strip_bytes(quarter, quarter_range, threads));
+  return strips + IntervalMatcher::memory_bytes(size, range) + IntervalMatcher::memory_bytes(half, half_range) +
+         FullRangeMatcher::memory_bytes(quarter, quarter_range) + 2 * (pixels(half) + pixels(quarter));
 }
 
 std::size_t CoarseToFineMatcher::buffer_bytes() const {

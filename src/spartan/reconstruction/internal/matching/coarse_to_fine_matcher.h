@@ -10,8 +10,8 @@
 #include "spartan/core/image.h"
 #include "spartan/core/threads.h"
 #include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/reconstruction/internal/matching/full_range_matcher.h"
 #include "spartan/reconstruction/internal/matching/interval_matcher.h"
-#include "spartan/reconstruction/internal/semi_global_matcher.h"
 
 namespace spartan::internal::matching {
 
@@ -28,15 +28,16 @@ class CoarseToFineMatcher {
   static std::int64_t memory_bytes(ImageSize size, DisparityRange range, int threads);
 
  private:
+  CoarseToFineMatcher(const Penalties& penalties, std::size_t simd, const ThreadPool& workers);
   struct Halved {
     Image<std::uint8_t> left, right;
   };
 
   ThreadPool workers_;
   Halved half_, quarter_;
-  SemiGlobalMatcher base_;
+  FullRangeMatcher base_;
   IntervalMatcher half_matcher_, full_matcher_;
-  std::vector<StripBuffers> strips_;  // of both
+  std::vector<StripBuffers> strips_;  // of all levels
   double coarse_ms_ = 0;
 };
 

@@ -1,65 +1,44 @@
 #include "spartan/reconstruction/internal/matching/interval_matcher.h"
 
 #include <algorithm>
-#include <atomic>
-#include <cmath>
 #include <cstring>
 #include <limits>
 
+#include "spartan/reconstruction/internal/matching/row_padding.h"
 #include "spartan/reconstruction/internal/subpixel.h"
 
 namespace spartan::internal::matching {
-namespace {
-
-constexpr int kWindowColumns = 4, kWindowRows = 3;  // half sizes of the census window
-constexpr int kDirections = 3;                      // paths of a sweep from the row before: from x − 1, x, x + 1
-constexpr int kStripRows = 256;                     // about
-
-// Rows of a strip, a multiple of the tile: at least two strips where the image has enough rows for it.
-int strip_rows(int height) {
-  const int strips = std::max(2, (height + kStripRows / 2) / kStripRows);
-  const int rows = (height + strips - 1) / strips;
-  return std::max(2 * kStripMargin, (rows + kTile - 1) / kTile * kTile);
-}
-
-}  // namespace
+namespace {}  // namespace
 
 // Matches one strip.
 class IntervalMatcher::StripMatching {
  public:
-  StripMatching(IntervalMatcher& matcher, ImageView<const TileIntervals> tiles, int from_row, int to_row,
-                StripBuffers& strip)
-      : m_(matcher),
-        tiles_(tiles),
-        s_(strip),
-        width_(matcher.size_.width),
-        from_(from_row),
-        to_(to_row),
-        first_(std::max(0, from_row - kStripMargin)),
-        last_(std::min(matcher.size_.height, to_row + kStripMargin)) {
+  StripMatching(IntervalMatcher& matcher, ImageView<const TileIntervals> tiles, const StripRows& rows,
+                StripBuffers& buffers)
+      : m_(matcher), tiles_(tiles), s_(buffers), width_(matcher.census_.size().width), rows_(rows) {
     resize();
   }
 
   void run() {
-    for (int y = first_; y < last_; ++y) compute_costs(y);
+    for (int y = rows_.first; y < rows_.last; ++y) compute_costs(y);
     begin_sweep();
-    for (int y = first_; y < to_; ++y) {
-      sweep_row(y, y - 1, y == first_, false);
-      if (y >= from_ && ((y + 1) % kTile == 0 || y + 1 == to_)) along_rows(y / kTile * kTile, y + 1);
+    for (int y = rows_.first; y < rows_.to; ++y) {
+      sweep_row(y, y - 1, y == rows_.first, false);
+      if (y >= rows_.from && ((y + 1) % kTile == 0 || y + 1 == rows_.to)) along_rows(y / kTile * kTile, y + 1);
     }
     begin_sweep();
-    for (int y = last_ - 1; y >= from_; --y) {
-      sweep_row(y, y + 1, y + 1 == last_, true);
-      if (y < to_) select(y);
+    for (int y = rows_.last - 1; y >= rows_.from; --y) {
+      sweep_row(y, y + 1, y + 1 == rows_.last, true);
+      if (y < rows_.to) select(y);
     }
   }
 
  private:
   std::ptrdiff_t row_levels() const { return static_cast<std::ptrdiff_t>(width_) * kLevels; }
-  std::uint8_t* cost(int y) { return s_.costs.data() + (y - first_) * row_levels(); }
+  std::uint8_t* cost(int y) { return s_.costs.data() + (y - rows_.first) * row_levels(); }
   // Rows of the margin have no sums that anything needs.
   std::uint16_t* sum(int y) {
-    return y < from_ || y >= to_ ? s_.unused_sums.data() : s_.sums.data() + (y - from_) * row_levels();
+    return y < rows_.from || y >= rows_.to ? s_.unused_sums.data() : s_.sums.data() + (y - rows_.from) * row_levels();
   }
   std::size_t path_bytes() const { return static_cast<std::size_t>(width_ + 2) * kLevels + kRowPadding; }
   // Path costs of a direction that were written in the row before (0) and are written in this row (1). Pixel 0 is the
@@ -70,14 +49,6 @@ class IntervalMatcher::StripMatching {
   std::uint8_t* p2(int index) { return s_.p2.data() + static_cast<std::size_t>(index) * p2_bytes() + kRowPadding; }
   std::size_t p2_bytes() const { return static_cast<std::size_t>(width_ + 2 * kRowPadding); }
 
-  template <class T>
-  static void at_least(std::size_t size, std::vector<T>& buffer) {
-    if (buffer.size() < size) buffer.resize(size);
-  }
-  template <class T>
-  static void at_least(std::size_t size, Image<T>& buffer) {
-    if (buffer.width() < static_cast<int>(size)) buffer = Image<T>(static_cast<int>(size), 1);
-  }
   void resize();
   void compute_costs(int y);
   void replace_outside(int tile, int start, std::uint8_t* costs) const;
@@ -92,15 +63,16 @@ class IntervalMatcher::StripMatching {
   IntervalMatcher& m_;
   ImageView<const TileIntervals> tiles_;
   StripBuffers& s_;
-  int width_, from_, to_, first_, last_;
+  int width_;
+  StripRows rows_;
   int turn_ = 0;
   int starts_of_ = -1;  // the row of tiles whose intervals `starts` holds
 };
 
 void IntervalMatcher::StripMatching::resize() {
   const auto levels = static_cast<std::size_t>(row_levels());
-  at_least(levels * static_cast<std::size_t>(last_ - first_) + kRowPadding, s_.costs);
-  at_least(levels * static_cast<std::size_t>(to_ - from_) + kRowPadding, s_.sums);
+  at_least(levels * static_cast<std::size_t>(rows_.last - rows_.first) + kRowPadding, s_.costs);
+  at_least(levels * static_cast<std::size_t>(rows_.to - rows_.from) + kRowPadding, s_.sums);
   at_least(levels + kRowPadding, s_.unused_sums);
   at_least(2 * kDirections * path_bytes(), s_.paths);
   at_least(2 * kRowsAtOnce * p2_bytes(), s_.p2);
@@ -127,8 +99,8 @@ void IntervalMatcher::StripMatching::compute_costs(int y) {
   row.first = s_.starts.data();
   row.second = row.first + width_;
   for (int p = 0; p < kPlanes; ++p) {
-    row.left[p] = m_.left_planes_.row(y * kPlanes + p);
-    row.right[p] = m_.right_planes_.row(y * kPlanes + p) + m_.mirror_pad_ + width_ - 1;
+    row.left[p] = m_.census_.left_plane(p, y);
+    row.right[p] = m_.census_.right_plane(p, y);
   }
   m_.kernels_.cost_row(row);
   for (int tile = 0; tile < tiles_.width(); ++tile) {
@@ -180,8 +152,8 @@ void IntervalMatcher::StripMatching::compute_p2(const std::uint8_t* here, const 
 
 void IntervalMatcher::StripMatching::sweep_row(int y, int before, bool begins, bool add) {
   if (!begins) enter_row(y, before);
-  const std::uint8_t* const here = m_.left_gray_.row(y) + kRowPadding;
-  const std::uint8_t* const there = begins ? here : m_.left_gray_.row(before) + kRowPadding;
+  const std::uint8_t* const here = m_.census_.gray(y);
+  const std::uint8_t* const there = begins ? here : m_.census_.gray(before);
   VerticalRow row{};
   row.cost = cost(y);
   row.sum = sum(y);
@@ -223,7 +195,7 @@ void IntervalMatcher::StripMatching::along_rows(int from, int to) {
   rows.p1 = m_.penalties_.p1;
   for (int i = 0; i < kRowsAtOnce; ++i) {
     const int y = std::min(from + i, to - 1);
-    const std::uint8_t* const gray = m_.left_gray_.row(y) + kRowPadding;
+    const std::uint8_t* const gray = m_.census_.gray(y);
     compute_p2(gray, gray - 1, 2 * i);
     compute_p2(gray, gray + 1, 2 * i + 1);
     rows.cost[i] = cost(y);
@@ -267,80 +239,29 @@ void IntervalMatcher::StripMatching::select(int y) {
   }
 }
 
-IntervalMatcher::IntervalMatcher(const Penalties& penalties, Kernels kernels, ThreadPool workers)
-    : penalties_(penalties), kernels_(kernels), workers_(std::move(workers)) {}
-
-void IntervalMatcher::resize(ImageSize size, DisparityRange range) {
-  range_ = range;
-  mirror_pad_ = std::max(0, -range.min) + 2 * kInterval;
-  const int right_width = mirror_pad_ + size.width + std::max(0, range.max) + 2 * kInterval + kRowPadding;
-  if (right_planes_.width() < right_width || size != size_) {
-    right_planes_ = Image<std::uint8_t>(right_width, size.height * kPlanes);
-  }
-  if (size == size_) return;
-  size_ = size;
-  left_gray_ = Image<std::uint8_t>(size.width + 3 * kRowPadding, size.height);
-  framed_ = Image<std::uint8_t>(size.width + 2 * kWindowColumns + kRowPadding, size.height + 2 * kWindowRows);
-  left_planes_ = Image<std::uint8_t>(size.width + kRowPadding, size.height * kPlanes);
-  matches_.disparity = Image<float>(size);
-  matches_.right_distance = Image<std::uint8_t>(size);
-}
+IntervalMatcher::IntervalMatcher(const Penalties& penalties, const Kernels& kernels, const ThreadPool& workers)
+    : penalties_(penalties), kernels_(kernels), workers_(workers), census_(kernels.census_row, workers) {}
 
 const IntervalMatches& IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                               ImageView<const TileIntervals> tiles, DisparityRange range,
                                               std::vector<StripBuffers>& strips) {
-  resize(left.size(), range);
-  compute_census(left, false, left_planes_);
-  compute_census(right, true, right_planes_);
-  // A border of a vector on both sides: the neighbours of the first and last column are their own.
-  for (int y = 0; y < size_.height; ++y) {
-    std::uint8_t* const row = left_gray_.row(y);
-    std::memset(row, left(0, y), kRowPadding);
-    std::memcpy(row + kRowPadding, left.row(y), static_cast<std::size_t>(size_.width));
-    std::memset(row + kRowPadding + size_.width, left(size_.width - 1, y), 2 * kRowPadding);
+  range_ = range;
+  // Intervals reach at most an interval beyond the range, see TileIntervals.
+  census_.compute(left, right, {range.min - kInterval, range.max + 2 * kInterval});
+  if (matches_.disparity.size() != left.size()) {
+    matches_.disparity = Image<float>(left.size());
+    matches_.right_distance = Image<std::uint8_t>(left.size());
   }
-  const int rows = strip_rows(size_.height), count = (size_.height + rows - 1) / rows;
-  // Each thread keeps its buffers and takes the next strip that is left.
-  const int threads = std::min(count, workers_.threads());
-  if (static_cast<int>(strips.size()) < threads) strips.resize(static_cast<std::size_t>(threads));
-  std::atomic<int> next = 0;
-  workers_.parallel_for(0, threads, 1, [&](int thread, int) {
-    for (int i = next++; i < count; i = next++) {
-      StripMatching(*this, tiles, i * rows, std::min(size_.height, (i + 1) * rows),
-                    strips[static_cast<std::size_t>(thread)])
-          .run();
-    }
+  const int rows = strip_rows(left.height(), std::int64_t{left.width()} * kLevels);
+  for_each_strip(left.height(), rows, workers_, strips, [&](const StripRows& strip, StripBuffers& buffers) {
+    StripMatching(*this, tiles, strip, buffers).run();
   });
   return matches_;
 }
 
-void IntervalMatcher::compute_census(ImageView<const std::uint8_t> image, bool mirrored, Image<std::uint8_t>& planes) {
-  const int w = size_.width, h = size_.height;
-  for (int y = 0; y < framed_.height(); ++y) {
-    const std::uint8_t* const source = image.row(std::clamp(y - kWindowRows, 0, h - 1));
-    std::uint8_t* const target = framed_.row(y);
-    std::memset(target, source[0], kWindowColumns);
-    std::memcpy(target + kWindowColumns, source, static_cast<std::size_t>(w));
-    std::memset(target + kWindowColumns + w, source[w - 1],
-                static_cast<std::size_t>(framed_.width() - kWindowColumns - w));
-  }
-  workers_.parallel_for(0, h, 32, [&](int from, int to) {
-    Image<std::uint8_t> forward(mirrored ? w + kRowPadding : 0, mirrored ? kPlanes : 0);
-    for (int y = from; y < to; ++y) {
-      CensusRow row{};
-      row.width = w;
-      for (int r = 0; r < 7; ++r) row.rows[r] = framed_.row(y + r) + kWindowColumns;
-      for (int p = 0; p < kPlanes; ++p) row.planes[p] = mirrored ? forward.row(p) : planes.row(y * kPlanes + p);
-      kernels_.census_row(row);
-      if (!mirrored) continue;
-      for (int p = 0; p < kPlanes; ++p)
-        std::reverse_copy(forward.row(p), forward.row(p) + w, planes.row(y * kPlanes + p) + mirror_pad_);
-    }
-  });
-}
-
 std::int64_t IntervalMatcher::strip_bytes(ImageSize size, DisparityRange range, int threads) {
-  const std::int64_t w = size.width + 4, h = size.height, rows = strip_rows(size.height);
+  const std::int64_t w = size.width + 4, h = size.height,
+                     rows = strip_rows(size.height, std::int64_t{size.width} * kLevels);
   const std::int64_t own = w * std::min(rows, h), with_margins = w * std::min(rows + 2 * kStripMargin, h);
   const std::int64_t strip =
       kLevels * (with_margins + 2 * own + 10 * w) + 26 * (w + 4 * kRowPadding) + 2 * (range.count() + 4 * kInterval);
@@ -348,23 +269,14 @@ std::int64_t IntervalMatcher::strip_bytes(ImageSize size, DisparityRange range, 
 }
 
 std::int64_t IntervalMatcher::memory_bytes(ImageSize size, DisparityRange range) {
-  const std::int64_t row = size.width + 4 * kRowPadding;
-  const std::int64_t shift = std::max(0, -range.min) + std::max(0, range.max) + 4 * kInterval;
-  return (kPlanes * (2 * row + shift) + 7 * row) * (size.height + 2 * kWindowRows);
+  return CensusPair::memory_bytes(size, {range.min - kInterval, range.max + 2 * kInterval}) +
+         std::int64_t{5} * (size.width + 64) * size.height;
 }
 
 std::size_t IntervalMatcher::buffer_bytes() const {
-  const auto bytes = [](const auto& image) {
-    return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()) * sizeof(*image.data());
-  };
-  return bytes(left_gray_) + bytes(framed_) + bytes(left_planes_) + bytes(right_planes_) + bytes(matches_.disparity) +
-         bytes(matches_.right_distance);
-}
-
-std::size_t StripBuffers::bytes() const {
-  return static_cast<std::size_t>(costs.stride()) + 2 * static_cast<std::size_t>(sums.stride()) + paths.size() +
-         p2.size() + 2 * (unused_sums.size() + winners.size() + right_best.size() + starts.size()) +
-         runs.size() * sizeof(ColumnRun);
+  return census_.buffer_bytes() +
+         static_cast<std::size_t>(matches_.disparity.height()) *
+             static_cast<std::size_t>(4 * matches_.disparity.stride() + matches_.right_distance.stride());
 }
 
 }  // namespace spartan::internal::matching
