@@ -1,63 +1,40 @@
-// Compares stereo matching with OpenCV on real pairs with ground truth: accuracy, density, time. `make bench-stereo`.
+// Compares stereo matching with OpenCV on real pairs with ground truth, in the light they were taken in and in others,
+// and in time on a rendered pair. `make bench-stereo`.
 //
-//   stereo [--repeat N] [--set key=value]... [--images DIR]
+//   stereo [--repeat N] [--set key=value]... [--images DIR] [--from FOLDER] [--no-rivals]
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <limits>
 #include <map>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
-#include "spartan/core/threads.h"
 #include "spartan/eval/disparity_metrics.h"
-#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/numerics/simd_target.h"
-#include "spartan/reconstruction/disparity_computer.h"
-#include "stereo_pairs.h"
+#include "stereo_speed.h"
+#include "stereo_variants.h"
 
 namespace {
 
-using spartan::Image;
-using spartan::ImageView;
+using namespace spartan;  // NOLINT(google-build-using-namespace): a benchmark
 namespace fs = std::filesystem;
 
-using spartan::must;
-using spartan::Pair;
-
-// OpenCV does not match columns whose search range leaves the image, so the images get a border on the left.
-Image<float> opencv_disparity(const Pair& pair, int mode) {
-  const int n = pair.disparities;
-  cv::Mat left, right, fixed;
-  cv::copyMakeBorder(spartan::as_mat(pair.left), left, 0, 0, n, 0, cv::BORDER_REPLICATE);
-  cv::copyMakeBorder(spartan::as_mat(pair.right), right, 0, 0, n, 0, cv::BORDER_REPLICATE);
-  auto matcher = cv::StereoSGBM::create(0, n, 5, 8 * 25, 32 * 25, 1, 63, 10, 100, 2, mode);
-  matcher->compute(left, right, fixed);
-  Image<float> disparity(pair.left.size());
-  for (int y = 0; y < disparity.height(); ++y) {
-    for (int x = 0; x < disparity.width(); ++x) {
-      const short value = fixed.at<short>(y, x + n);
-      disparity(x, y) = value < 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value) / 16.0F;
-    }
-  }
-  return disparity;
-}
-
+// Percentages of pixels, and px.
 struct Scores {
-  double bad_05 = 0, bad_1 = 0, bad_2 = 0, matched_bad_1 = 0, matched_bad_2 = 0, density = 0, nonocc_bad_1 = 0, rms = 0,
-         ms = 0;
+  double bad_05 = 0, bad_1 = 0, bad_2 = 0, matched_bad_1 = 0, matched_bad_2 = 0, density = 0, nonocc_bad_1 = 0, rms = 0;
+  static constexpr int kCount = 8;
+  std::array<double*, kCount> values() {
+    return {&bad_05, &bad_1, &bad_2, &matched_bad_1, &matched_bad_2, &density, &nonocc_bad_1, &rms};
+  }
 };
 
-Scores score(const Pair& pair, ImageView<const float> disparity, double ms) {
-  const auto metrics = must(spartan::compare_disparities(disparity, pair.truth, pair.mask));
+Scores score(const Pair& pair, ImageView<const float> disparity) {
+  const auto metrics = must(compare_disparities(disparity, pair.truth, pair.mask));
   const auto& all = metrics.all;
   return {all.bad_0_5.value_or(0),
           all.bad_1.value_or(0),
@@ -66,25 +43,12 @@ Scores score(const Pair& pair, ImageView<const float> disparity, double ms) {
           all.matched_bad_2.value_or(0),
           all.density_percent.value_or(0),
           metrics.nonocc ? metrics.nonocc->bad_1.value_or(0) : 0,
-          all.rms_in_1px.value_or(0),
-          ms};
-}
-
-// The median of several runs, in milliseconds.
-double time_of(int repeat, const std::function<void()>& work) {
-  std::vector<double> times;
-  for (int i = 0; i < repeat; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-  }
-  std::nth_element(times.begin(), times.begin() + repeat / 2, times.end());
-  return times[static_cast<std::size_t>(repeat / 2)];
+          all.rms_in_1px.value_or(0)};
 }
 
 void print_line(const std::string& pair, const std::string& method, const Scores& s) {
-  fmt::print("{:<16} {:<14} {:7.2f} {:7.2f} {:7.2f} {:8.2f} {:8.2f} {:8.2f} {:9.2f} {:7.3f} {:8.1f}\n", pair, method,
-             s.bad_05, s.bad_1, s.bad_2, s.matched_bad_1, s.matched_bad_2, s.density, s.nonocc_bad_1, s.rms, s.ms);
+  fmt::print("{:<18} {:<17} {:7.2f} {:7.2f} {:7.2f} {:8.2f} {:8.2f} {:8.2f} {:9.2f} {:7.3f}\n", pair, method, s.bad_05,
+             s.bad_1, s.bad_2, s.matched_bad_1, s.matched_bad_2, s.density, s.nonocc_bad_1, s.rms);
 }
 
 // Green: below 1 px, orange: over 1 px, red: over 2 px, blue: no match, black: no ground truth.
@@ -117,115 +81,114 @@ void write_images(const std::string& folder, const Pair& pair, ImageView<const f
 }
 
 struct Arguments {
-  int repeat = 3;
+  int repeat = 9;
   bool rivals = true;
-  std::string images;
-  spartan::DisparityOptions options;
+  std::string images, recordings;
+  DisparityOptions options;
 };
 
 Arguments parse(int argc, char** argv) {
   Arguments arguments;
+  const char* const home = std::getenv("HOME");
+  arguments.recordings = std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings";
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--no-rivals") arguments.rivals = false;
     if (i + 1 >= argc) continue;
     if (word == "--repeat") arguments.repeat = std::max(1, std::atoi(argv[++i]));
     if (word == "--images") arguments.images = argv[++i];
-    if (word == "--set") arguments.options = must(spartan::set_option(arguments.options, argv[++i]));
+    if (word == "--from") arguments.recordings = argv[++i];
+    if (word == "--set") arguments.options = must(set_option(arguments.options, argv[++i]));
   }
   return arguments;
 }
 
-class Means {
- public:
-  void add(const std::string& method, const Scores& s) {
-    if (!sums_.contains(method)) order_.push_back(method);
-    Scores& t = sums_[method];
-    t.bad_05 += s.bad_05;
-    t.bad_1 += s.bad_1;
-    t.bad_2 += s.bad_2;
-    t.matched_bad_1 += s.matched_bad_1;
-    t.matched_bad_2 += s.matched_bad_2;
-    t.density += s.density;
-    t.nonocc_bad_1 += s.nonocc_bad_1;
-    t.rms += s.rms;
-    t.ms += s.ms;
-  }
-  void print(double count) const {
-    for (const std::string& method : order_) {
-      Scores s = sums_.at(method);
-      for (double* value : {&s.bad_05, &s.bad_1, &s.bad_2, &s.matched_bad_1, &s.matched_bad_2, &s.density,
-                            &s.nonocc_bad_1, &s.rms, &s.ms}) {
-        *value /= count;
-      }
-      print_line("mean", method, s);
-    }
-  }
-
- private:
-  std::vector<std::string> order_;
-  std::map<std::string, Scores> sums_;
+struct Method {
+  std::string name;
+  std::function<Image<float>(const Pair&)> disparity;
 };
 
-Scores run_spartan(const Pair& pair, const spartan::DisparityOptions& options, int threads, int repeat,
-                   const std::string& images) {
-  spartan::DisparityComputer computer =
-      spartan::DisparityComputer::create(options, spartan::ThreadPool(threads)).value();
-  spartan::DisparityImage image;
-  const double ms = time_of(repeat + 1, [&] {
-    image = must(computer.compute(pair.left, pair.right, {0, pair.disparities - 1}));
-  });
-  if (!images.empty()) write_images(images, pair, image.disparity);
-  return score(pair, image.disparity, ms);
-}
-
-void compare_all(const std::vector<Pair>& pairs, const Arguments& arguments) {
-  fmt::print("{:<16} {:<14} {:>7} {:>7} {:>7} {:>8} {:>8} {:>8} {:>9} {:>7} {:>8}\n", "pair", "method", "bad-0.5",
-             "bad-1", "bad-2", "m.bad-1", "m.bad-2", "density", "no.bad-1", "rms<1", "ms");
-  Means means;
-  for (const Pair& pair : pairs) {
-    const auto note = [&](const std::string& method, const Scores& s) {
-      print_line(pair.name, method, s);
-      means.add(method, s);
+// Spartan first, and MODE_HH, of which the ratios are, second and third.
+std::vector<Method> methods(const Arguments& arguments) {
+  const auto spartan = [](const DisparityOptions& options) {
+    return [options](const Pair& pair) {
+      auto computer = must(DisparityComputer::create(options, ThreadPool(1)));
+      return Image<float>::copy_of(must(computer.compute(pair.left, pair.right, {0, pair.disparities - 1})).disparity);
     };
-    note("Spartan 1 thr.", run_spartan(pair, arguments.options, 1, arguments.repeat, arguments.images));
-    note("Spartan 2 thr.", run_spartan(pair, arguments.options, 2, arguments.repeat, ""));
-    if (!arguments.rivals) continue;
-    for (const auto& [name, mode] :
-         {std::pair{"SGBM", cv::StereoSGBM::MODE_SGBM}, std::pair{"SGBM HH", cv::StereoSGBM::MODE_HH}}) {
-      Image<float> disparity;
-      cv::setNumThreads(1);
-      const int m = mode;
-      const double ms = time_of(arguments.repeat, [&] { disparity = opencv_disparity(pair, m); });
-      note(name, score(pair, disparity, ms));
-    }
-  }
-  means.print(static_cast<double>(pairs.size()));
+  };
+  const auto opencv = [](const OpenCvMatcher& rival) {
+    return [rival](const Pair& pair) { return opencv_disparity(pair.left, pair.right, pair.disparities, rival); };
+  };
+  DisparityOptions all = arguments.options;
+  all.max_outlier_percent = 100;
+  all.speckle_size_px = 0;
+  std::vector<Method> list{{"Spartan", spartan(arguments.options)}, {"Spartan, all kept", spartan(all)}};
+  if (!arguments.rivals) return list;
+  list.push_back({"HH uniqueness 10", opencv({"", cv::StereoSGBM::MODE_HH, 10})});
+  list.push_back({"HH uniqueness 0", opencv({"", cv::StereoSGBM::MODE_HH, 0})});
+  list.push_back({"SGBM", opencv({"", cv::StereoSGBM::MODE_SGBM, 10})});
+  return list;
 }
 
-// Times on every instruction set, on the largest pair.
-void time_targets(const std::vector<Pair>& pairs, const Arguments& arguments) {
-  const auto largest = std::max_element(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
-    return a.left.width() * a.left.height() * a.disparities < b.left.width() * b.left.height() * b.disparities;
-  });
-  fmt::print("\n{}: {}x{}, {} disparities\n", largest->name, largest->left.width(), largest->left.height(),
-             largest->disparities);
-  for (const spartan::SimdTarget simd : spartan::available_simd_targets()) {
-    for (const int threads : {1, 2}) {
-      spartan::DisparityOptions options = arguments.options;
-      options.simd = simd;
-      spartan::DisparityComputer computer =
-          spartan::DisparityComputer::create(options, spartan::ThreadPool(threads)).value();
-      spartan::DisparityImage image;
-      const double ms = time_of(arguments.repeat + 2, [&] {
-        image = must(computer.compute(largest->left, largest->right, {0, largest->disparities - 1}));
-      });
-      const auto& t = image.times;
-      fmt::print("{:<5} {} threads {:7.1f} ms (coarse {:.1f}, match {:.1f}, filter {:.1f}, refine {:.1f}), {:.0f} MB\n",
-                 name_of(simd), threads, ms, t.coarse, t.match, t.filter, t.refine,
-                 static_cast<double>(image.buffer_bytes) / 1e6);
+// Scores of all methods (inner index) on some pairs.
+using Table = std::vector<std::vector<Scores>>;
+
+void print_means(const std::string& title, const std::vector<Method>& list, const Table& table) {
+  for (std::size_t m = 0; m < list.size(); ++m) {
+    Scores mean;
+    for (std::vector<Scores> row : table) {
+      for (int i = 0; i < Scores::kCount; ++i) {
+        *mean.values()[static_cast<std::size_t>(i)] +=
+            *row[m].values()[static_cast<std::size_t>(i)] / static_cast<double>(table.size());
+      }
+    }
+    print_line(title, list[m].name, mean);
+  }
+}
+
+void compare_accuracy(const std::vector<Pair>& pairs, const std::vector<Method>& list, const Arguments& arguments) {
+  std::map<std::string, Table> tables;
+  double worst = 0;
+  std::string worst_pair;
+  for (const Pair& pair : pairs) {
+    std::vector<Scores> row;
+    for (const Method& method : list) {
+      const Image<float> disparity = method.disparity(pair);
+      row.push_back(score(pair, disparity));
+      print_line(pair.name, method.name, row.back());
+      if (!arguments.images.empty() && row.size() == 1) write_images(arguments.images, pair, disparity);
+    }
+    tables[pair.folder.parent_path().filename().string()].push_back(row);
+    tables["all"].push_back(row);
+    if (row.size() > 2 && row[0].nonocc_bad_1 / row[2].nonocc_bad_1 > worst) {
+      worst = row[0].nonocc_bad_1 / row[2].nonocc_bad_1;
+      worst_pair = pair.name;
     }
   }
+  for (const auto& [set, table] : tables) print_means("mean, " + set, list, table);
+  if (worst > 0) fmt::print("largest bad-1 (non-occluded) over that of HH: {:.2f} ({})\n", worst, worst_pair);
+}
+
+void time_targets(const SpeedPair& pair, int disparities, const Arguments& arguments) {
+  for (const SimdTarget simd : available_simd_targets()) {
+    DisparityOptions options = arguments.options;
+    options.simd = simd;
+    fmt::print("{:<5} ", name_of(simd));
+    time_spartan(pair, disparities, 1, arguments.repeat, options);
+  }
+}
+
+void compare_times(const Arguments& arguments) {
+  const SpeedPair pair = rendered_pair(arguments.recordings + "/rocky_20pct");
+  if (pair.left.empty()) {
+    fmt::print("\nno times: scripts/recordings makes the recording rocky_20pct\n");
+    return;
+  }
+  compare_speed(pair, 256, arguments.repeat, arguments.options);
+  compare_speed(pair, 384, arguments.repeat, arguments.options);
+  compare_speed(resized(pair, {640, 480}), 192, 3 * arguments.repeat, arguments.options);
+  fmt::print("\nInstruction sets, 256 disparities\n");
+  time_targets(pair, 256, arguments);
 }
 
 }  // namespace
@@ -238,8 +201,17 @@ int main(int argc, char** argv) {
     fmt::print("no stereo pairs: set SPARTAN_DATA to the data folder\n");
     return 0;
   }
-  const std::vector<Pair> pairs = spartan::load_stereo_pairs(folder);
-  compare_all(pairs, arguments);
-  time_targets(pairs, arguments);
+  const std::vector<Pair> pairs = load_stereo_pairs(folder);
+  const std::vector<Method> list = methods(arguments);
+  fmt::print("{:<18} {:<17} {:>7} {:>7} {:>7} {:>8} {:>8} {:>8} {:>9} {:>7}\n", "pair", "method", "bad-0.5", "bad-1",
+             "bad-2", "m.bad-1", "m.bad-2", "density", "no.bad-1", "rms<1");
+  compare_accuracy(pairs, list, arguments);
+  fmt::print("\nUnder other light\n");
+  std::vector<Pair> variants;
+  for (std::size_t i = 0; i < pairs.size(); i += 4) {
+    for (const Light light : kLights) variants.push_back(under(light, pairs[i]));
+  }
+  compare_accuracy(variants, list, arguments);
+  if (arguments.rivals) compare_times(arguments);
   return 0;
 }

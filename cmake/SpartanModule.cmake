@@ -11,6 +11,8 @@ target_compile_options(spartan_flags INTERFACE
   $<$<AND:$<BOOL:${CMAKE_UNITY_BUILD}>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage>
   $<$<BOOL:${SPARTAN_WERROR}>:-Werror>
   $<$<AND:$<BOOL:${SPARTAN_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=array-bounds>)
+# Highway leaves out AVX-512 with VPOPCNTB and VBMI (Ice Lake, Zen 4) unless it is asked for it.
+target_compile_definitions(spartan_flags INTERFACE HWY_WANT_AVX3_DL)
 if(SPARTAN_SANITIZE)
   target_compile_options(spartan_flags INTERFACE -fsanitize=${SPARTAN_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   if(SPARTAN_SANITIZE_EXCEPT)

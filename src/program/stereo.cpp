@@ -151,10 +151,11 @@ Image<std::uint16_t> to_fixed_point(ImageView<const float> disparity) {
   return fixed;
 }
 
-Status write_results(const StereoArguments& a, const Pair& pair, ImageView<const float> disparity,
-                     double disparity_sigma_px, const Log& log) {
+Status write_results(const StereoArguments& a, const Pair& pair, const DisparityImage& image, const Log& log) {
+  const ImageView<const float> disparity = image.disparity;
   if (Status s = make_folder(a.output); !s) return s;
   if (Status s = write_pfm(a.output + "/disparity.pfm", disparity); !s) return s;
+  if (Status s = write_pfm(a.output + "/sigma.pfm", image.sigma); !s) return s;
   if (Status s = write_png(a.output + "/disparity.png", to_fixed_point(disparity)); !s) return s;
   if (Status s = write_png(a.output + "/disparity_colour.png", colour_disparity(disparity)); !s) return s;
   std::error_code ignored;  // files of an earlier pair that this one does not have
@@ -168,9 +169,8 @@ Status write_results(const StereoArguments& a, const Pair& pair, ImageView<const
   }
   CloudSampling sampling;
   sampling.max_range_m = a.max_range_m;
-  sampling.disparity_sigma_px = disparity_sigma_px;
   return write_ply(a.output + "/points.ply",
-                   to_point_cloud(disparity, pair.left, *pair.geometry, Pose(), Stamp(), sampling));
+                   to_point_cloud(disparity, image.sigma, pair.left, *pair.geometry, Pose(), Stamp(), sampling));
 }
 
 double known_percent(ImageView<const float> disparity) {
@@ -276,8 +276,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   if (Status s = check_truth_scale(a, context.log); !s) return failure(s);
   const auto metrics = score_disparity(a, image->disparity);
   if (!metrics) return failure(metrics);
-  if (Status s = write_results(a, *pair, image->disparity, options->mapping.disparity_sigma_px, context.log); !s)
-    return failure(s);
+  if (Status s = write_results(a, *pair, *image, context.log); !s) return failure(s);
 
   Json json{{"schema", 1},
             {"width", image->disparity.width()},

@@ -87,7 +87,9 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   const matching::IntervalMatches& matches = s.matcher.match(left, right, range);
   times.coarse = s.matcher.coarse_ms();
   times.match = watch.lap() - times.coarse;
-  for (int y = 0; y < left.height(); ++y) std::copy_n(matches.disparity.row(y), left.width(), s.disparity.row(y));
+  s.workers.parallel_for(0, left.height(), 64, [&](int from, int to) {
+    for (int y = from; y < to; ++y) std::copy_n(matches.disparity.row(y), left.width(), s.disparity.row(y));
+  });
   apply_masks(left_mask, right_mask, s.disparity);
   if (s.options.median) {
     median_3x3(s.disparity, s.kernels.median_row, s.workers, s.sigma);
@@ -95,11 +97,11 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   }
   times.filter = watch.lap();
   s.refinement.refine(left, right, s.disparity);
-  matching::assess({s.refinement.information(), matches.right_distance, s.options.max_outlier_percent}, s.workers,
-                   {s.disparity, s.sigma, s.outlier_percent});
+  matching::assess({s.refinement.information(), matches.right_distance, s.options.max_outlier_percent}, s.kernels,
+                   s.workers, {s.disparity, s.sigma, s.outlier_percent});
   times.refine = watch.lap();
   s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, s.outlier_percent, kReliable_percent},
-                   s.disparity);
+                   s.workers, s.disparity);
   matching::clear_unknown(s.workers, {s.disparity, s.sigma, s.outlier_percent});
   times.filter += watch.lap();
   times.total = all.lap();

@@ -33,8 +33,10 @@ double range_sigma(const RectifiedStereo& g, double disparity, double stretch, d
 // The nearest surface that one view sees in each cell.
 struct DisparityMerger::Layer {
   explicit Layer(ImageSize size)
-      : sum_range(size), sum_variance(size), sum_gray(size), count(size), votes(size), beyond(size) {}
-  Image<float> sum_range, sum_variance, sum_gray;
+      : sum_range(size), sum_variance(size), sum_gate(size), sum_gray(size), count(size), votes(size), beyond(size) {}
+  Image<float> sum_range, sum_variance;
+  Image<float> sum_gate;  // of the variances that gates use
+  Image<float> sum_gray;
   Image<std::uint16_t> count;
   Image<std::uint32_t> votes;  // pixels of each class, one saturating byte per class
   Image<std::uint8_t> beyond;  // not 0: a surface beyond the largest range
@@ -44,21 +46,29 @@ struct DisparityMerger::Layer {
   // correlated.
   float variance(int x, int y) const { return sum_variance(x, y) / static_cast<float>(count(x, y)); }
 
-  void add(int x, int y, float r, float variance_m2, std::uint8_t level, std::uint8_t kind, float gate) {
+  float gate_variance(int x, int y) const { return sum_gate(x, y) / static_cast<float>(count(x, y)); }
+
+  struct Pixel {
+    float range, variance_m2, gate_m2;
+    std::uint8_t level, kind;
+  };
+  void add(int x, int y, const Pixel& pixel, float gate) {
+    const float r = pixel.range;
     if (count(x, y) > 0) {
-      const float mean = range(x, y), reach = gate * std::sqrt(variance_m2);
+      const float mean = range(x, y), reach = gate * std::sqrt(pixel.gate_m2);
       if (r > mean + reach || count(x, y) == 0xFFFF) return;
       if (r < mean - reach) {
         count(x, y) = 0;
-        sum_range(x, y) = sum_variance(x, y) = sum_gray(x, y) = 0;
+        sum_range(x, y) = sum_variance(x, y) = sum_gate(x, y) = sum_gray(x, y) = 0;
         votes(x, y) = 0;
       }
     }
     ++count(x, y);
     sum_range(x, y) += r;
-    sum_variance(x, y) += variance_m2;
-    sum_gray(x, y) += level;
-    const unsigned shift = 8U * std::min<unsigned>(kind, kClasses - 1);
+    sum_variance(x, y) += pixel.variance_m2;
+    sum_gate(x, y) += pixel.gate_m2;
+    sum_gray(x, y) += pixel.level;
+    const unsigned shift = 8U * std::min<unsigned>(pixel.kind, kClasses - 1);
     if ((votes(x, y) >> shift & 0xFFU) != 0xFFU) votes(x, y) += 1U << shift;
   }
 };
@@ -99,9 +109,14 @@ void DisparityMerger::rasterize_view(const MergedView& view, Layer& layer) const
         continue;
       }
       const double x = (u - g.centre_px.x()) / g.focal_px;
-      const double sigma = range_sigma(g, d, std::sqrt(1 + x * x + y * y), options_.disparity_sigma_px);
-      layer.add(column, row, static_cast<float>(range), static_cast<float>(sigma * sigma), view.left(u, v),
-                view.classes.empty() ? std::uint8_t{0} : view.classes(u, v), gate);
+      const double sigma_px = view.sigma.empty() ? options_.disparity_sigma_px : static_cast<double>(view.sigma(u, v));
+      const double per_px = range_sigma(g, d, std::sqrt(1 + x * x + y * y), 1);
+      const double gate_px = std::max(sigma_px, options_.disparity_sigma_px);
+      layer.add(column, row,
+                {static_cast<float>(range), static_cast<float>(per_px * per_px * sigma_px * sigma_px),
+                 static_cast<float>(per_px * per_px * gate_px * gate_px), view.left(u, v),
+                 view.classes.empty() ? std::uint8_t{0} : view.classes(u, v)},
+                gate);
     }
   }
 }
@@ -111,7 +126,7 @@ namespace {
 // The surface that one view sees in a cell.
 struct Candidate {
   std::size_t view = 0;
-  float range = 0, variance = 0, gray = 0;
+  float range = 0, variance = 0, gate = 0, gray = 0;
   std::uint32_t votes = 0;
   int count = 0;
 };
@@ -139,7 +154,7 @@ std::uint8_t most_votes(std::uint32_t votes) {
 }  // namespace
 
 void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row,
-                               MergedRange& merged) const {
+                               MergedRange& merged, Image<float>& gates_m) const {
   const auto gate = static_cast<float>(options_.gate_sigmas);
   std::vector<Candidate> candidates(views.size());
   for (int x = 0; x < camera_.size().width; ++x) {
@@ -151,6 +166,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
       candidates[count++] = {k,
                              layer.range(x, row),
                              layer.variance(x, row),
+                             layer.gate_variance(x, row),
                              layer.sum_gray(x, row) / static_cast<float>(n),
                              layer.votes(x, row),
                              n};
@@ -165,7 +181,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
     while (true) {
       last = first + 1;
       while (last < count && candidates[last].range - candidates[first].range <
-                                 gate * std::sqrt(candidates[last].variance + candidates[first].variance)) {
+                                 gate * std::sqrt(candidates[last].gate + candidates[first].gate)) {
         ++last;
       }
       if (last == count) break;
@@ -180,13 +196,14 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
       if (free_space_votes <= last - first) break;
       first = last;
     }
-    float weights = 0, sum = 0, gray = 0;
+    float weights = 0, sum = 0, gray = 0, gate_weights = 0;
     std::uint8_t seen_by = 0;
     double baseline_m = 0;
     const Candidate* best = &candidates[first];
     for (std::size_t i = first; i < last; ++i) {
       const Candidate& c = candidates[i];
       weights += 1 / c.variance;
+      gate_weights += 1 / c.gate;
       sum += c.range / c.variance;
       gray += c.gray / c.variance;
       seen_by = static_cast<std::uint8_t>(seen_by | 1U << c.view % kViewBits);
@@ -195,6 +212,7 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
     }
     merged.range_m(x, row) = sum / weights;
     merged.sigma_m(x, row) = std::sqrt(1 / weights);
+    gates_m(x, row) = gate * std::sqrt(1 / gate_weights);
     merged.gray(x, row) = static_cast<std::uint8_t>(std::lround(gray / weights));
     merged.views(x, row) = seen_by;
     merged.classes(x, row) = most_votes(best->votes);
@@ -208,7 +226,7 @@ namespace {
 // virtual camera are smaller than the pixels of a view.
 constexpr int kGap = 2;
 
-void fill_gaps(MergedRange& merged, float gate, const ThreadPool& workers) {
+void fill_gaps(const Image<float>& gates_m, const ThreadPool& workers, MergedRange& merged) {
   const Image<float> range = merged.range_m.clone(), sigma = merged.sigma_m.clone(),
                      baseline = merged.baseline_m.clone();
   const Image<std::uint8_t> views = merged.views.clone(), gray = merged.gray.clone(), classes = merged.classes.clone();
@@ -219,7 +237,7 @@ void fill_gaps(MergedRange& merged, float gate, const ThreadPool& workers) {
         const int a = gap / 2, b = gap - a;
         const int x0 = x - a * dx, y0 = y - a * dy, x1 = x + b * dx, y1 = y + b * dy;
         if (!known(x0, y0) || !known(x1, y1)) continue;
-        const float reach = gate * std::max(sigma(x0, y0), sigma(x1, y1));
+        const float reach = std::max(gates_m(x0, y0), gates_m(x1, y1));
         if (std::abs(range(x0, y0) - range(x1, y1)) > reach) continue;
         const float part = static_cast<float>(a) / static_cast<float>(gap);
         merged.range_m(x, y) = range(x0, y0) + part * (range(x1, y1) - range(x0, y0));
@@ -300,10 +318,11 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
                      Image<std::uint8_t>(size),
                      Image<float>(size.width, size.height, 0.0F),
                      {}};
+  Image<float> gates_m(size);
   workers_.parallel_for(0, size.height, 16, [&](int from, int to) {
-    for (int row = from; row < to; ++row) fuse_row(views, layers, row, merged);
+    for (int row = from; row < to; ++row) fuse_row(views, layers, row, merged, gates_m);
   });
-  fill_gaps(merged, static_cast<float>(options_.gate_sigmas), workers_);
+  fill_gaps(gates_m, workers_, merged);
   merged.truncated = upper_border(views, layers, merged.range_m);
   return merged;
 }

@@ -62,7 +62,7 @@ struct MergingOptions {
   PanoramicCamera::Projection projection = PanoramicCamera::Projection::cylinder;  ///< Of the virtual camera.
   double pixels_per_degree = 12;    ///< Resolution of the virtual camera, pixels per degree of azimuth.
   double max_range_m = 6;           ///< Maximum range of a point from the virtual camera, m.
-  double disparity_sigma_px = 0.3;  ///< Standard deviation of a disparity, pixels.
+  double disparity_sigma_px = 0.3;  ///< Of the gate, at least; pixels.
   double gate_sigmas = 3;           ///< Gate on range differences, standard deviations.
 
   template <class Visitor>
@@ -90,8 +90,9 @@ struct MergingOptions {
 /// One view to be merged. All images are borrowed and of one size.
 struct MergedView {
   ViewGeometry geometry;
-  ImageView<const float> disparity;       ///< Pixels; NaN where unknown.
-  ImageView<const std::uint8_t> left;     ///< Gray levels of the rectified left image.
+  ImageView<const float> disparity;    ///< Pixels; NaN where unknown.
+  ImageView<const float> sigma;        ///< Of the disparities, px; may be empty (MergingOptions::disparity_sigma_px).
+  ImageView<const std::uint8_t> left;  ///< Gray levels of the rectified left image.
   ImageView<const std::uint8_t> classes;  ///< GroundClass of each pixel; may be empty (all 0).
 };
 
@@ -135,7 +136,8 @@ class DisparityMerger {
 
   struct Layer;
   void rasterize_view(const MergedView& view, Layer& layer) const;
-  void fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row, MergedRange& merged) const;
+  void fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row, MergedRange& merged,
+                Image<float>& gates_m) const;
   Image<std::uint8_t> upper_border(std::span<const MergedView> views, std::span<const Layer> layers,
                                    const Image<float>& range_m) const;
 

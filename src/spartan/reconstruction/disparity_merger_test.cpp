@@ -34,7 +34,8 @@ struct Stop {
   }
   std::vector<MergedView> views() const {
     std::vector<MergedView> views;
-    for (std::size_t i = 0; i < geometries.size(); ++i) views.push_back({geometries[i], disparities[i], grays[i], {}});
+    for (std::size_t i = 0; i < geometries.size(); ++i)
+      views.push_back({geometries[i], disparities[i], {}, grays[i], {}});
     return views;
   }
   MergedRange merge(const MergingOptions& options = {}, int threads = 2) const {

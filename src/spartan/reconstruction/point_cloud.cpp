@@ -38,9 +38,9 @@ void append_position(std::string& content, const ColouredPoint& point) {
 
 }  // namespace
 
-PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const std::uint8_t> left,
-                          const RectifiedStereo& geometry, const Pose& target_from_left, const Stamp& stamp,
-                          const CloudSampling& sampling) {
+PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const float> sigma,
+                          ImageView<const std::uint8_t> left, const RectifiedStereo& geometry,
+                          const Pose& target_from_left, const Stamp& stamp, const CloudSampling& sampling) {
   PointCloud cloud;
   for (int y = 0; y < disparity.height(); y += sampling.step_px) {
     for (int x = 0; x < disparity.width(); x += sampling.step_px) {
@@ -53,7 +53,7 @@ PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const std:
       // σ of the range / range = σ of the depth / depth = σ_d / d.
       cloud.push_back({(target_from_left * in_left).cast<float>(),
                        {gray, gray, gray},
-                       static_cast<float>(range * sampling.disparity_sigma_px / d),
+                       static_cast<float>(range) * sigma(x, y) / d,
                        stamp.seconds()});
     }
   }

@@ -27,14 +27,14 @@ struct CloudSampling {
   int step_px = 1;  ///< every step_px-th pixel of every step_px-th row
   double min_disparity_px = 0.5;
   double max_range_m = 0;  ///< distance from the left camera; 0: no limit
-  double disparity_sigma_px = 0.3;
 };
 
-/// Triangulates pixels with a known disparity and transforms the points by `target_from_left`. The colour is the gray
-/// level of the left image; σ of the range is z² σ_d / (f b) times the ratio of range and depth.
-PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const std::uint8_t> left,
-                          const RectifiedStereo& geometry, const Pose& target_from_left, const Stamp& stamp,
-                          const CloudSampling& sampling);
+/// Triangulates pixels with a known disparity and transforms the points by `target_from_left`. `sigma`: standard
+/// deviations σ_d of the disparities, px. The colour is the gray level of the left image; σ of the range is
+/// z² σ_d / (f b) times the ratio of range and depth.
+PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const float> sigma,
+                          ImageView<const std::uint8_t> left, const RectifiedStereo& geometry,
+                          const Pose& target_from_left, const Stamp& stamp, const CloudSampling& sampling);
 
 /// Writes a binary little-endian PLY file with float x, y, z, uchar red, green, blue, float sigma_m and double time_s.
 /// Code `output`.

@@ -83,6 +83,7 @@ Status StopMapper::add(const RectifiedPair& frame, double nearest_m, const Eigen
                     frame.stamp,
                     {frame.geometry, frame.body_from_left},
                     std::move(disparity),
+                    Image<float>::copy_of(image->sigma),
                     Image<std::uint8_t>::copy_of(frame.left),
                     std::move(ground)});
   return {};
@@ -94,7 +95,7 @@ MergedRange StopMapper::merge() {
   std::vector<MergedView> merged_views;
   for (const StopView& view : views_) {
     geometries.push_back(view.geometry);
-    merged_views.push_back({view.geometry, view.disparity, view.left,
+    merged_views.push_back({view.geometry, view.disparity, view.sigma, view.left,
                             view.ground ? view.ground->classes.view() : ImageView<const std::uint8_t>()});
   }
   const auto merger =  // StopMapper::create() has validated the options

@@ -48,6 +48,7 @@ struct StopView {
   Stamp stamp;
   ViewGeometry geometry;
   Image<float> disparity;  ///< Pixels; NaN where unknown.
+  Image<float> sigma;      ///< Standard deviation of the disparities, pixels.
   Image<std::uint8_t> left;
   std::optional<VDisparity> ground;  ///< Empty where no ground was found; the classes of its pixels are then unknown.
 };

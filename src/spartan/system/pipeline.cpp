@@ -87,20 +87,18 @@ Status Pipeline::State::check_disparities(const RectifiedPair& rectified) const 
   return StopMapper::check(rectified, pair.nearest_m);
 }
 
-// The returned view is valid until the next call.
-Result<ImageView<const float>> Pipeline::State::dense_disparity(const RectifiedPair& rectified) {
-  return clock.measure("reconstruction", [&]() -> Result<ImageView<const float>> {
-    const DisparityRange range = disparity_range(rectified.geometry, pair.nearest_m);
-    auto image =
-        disparity_computer.compute(rectified.left, rectified.right, range, rectified.left_mask, rectified.right_mask);
-    if (!image) return failure(image);
-    return image->disparity;
+// The returned views are valid until the next call.
+Result<DisparityImage> Pipeline::State::dense_disparity(const RectifiedPair& rectified) {
+  return clock.measure("reconstruction", [&] {
+    return disparity_computer.compute(rectified.left, rectified.right,
+                                      disparity_range(rectified.geometry, pair.nearest_m), rectified.left_mask,
+                                      rectified.right_mask);
   });
 }
 
 // Empty if the odometry computes the disparities of its landmarks itself.
-Result<ImageView<const float>> Pipeline::State::disparity_for_odometry(const RectifiedPair& rectified) {
-  if (options.odometry.reconstruction.source != DisparitySource::dense) return ImageView<const float>();
+Result<DisparityImage> Pipeline::State::disparity_for_odometry(const RectifiedPair& rectified) {
+  if (options.odometry.reconstruction.source != DisparitySource::dense) return DisparityImage();
   return dense_disparity(rectified);
 }
 
@@ -202,7 +200,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (!s.started) s.start(*rectified);
   s.left_from_body = rectified->body_from_left.inverse();
 
-  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*rectified, {}, *disparity); });
+  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*rectified, {}, disparity->disparity); });
   const RelativeMotion body_motion = s.body_motion(*rectified, result.motion);
   if (!result.motion.first) {
     s.advance(result.motion);
@@ -229,10 +227,10 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   s.update_keyframes(*rectified, result.motion, body_motion);
 
   if (s.terrain_is_due()) {
-    if (disparity->empty()) disparity = s.dense_disparity(*rectified);
+    if (disparity->disparity.empty()) disparity = s.dense_disparity(*rectified);
     if (!disparity) return failure(disparity);
     s.distance_of_last_terrain_m = s.distance_m;
-    result.terrain = TerrainView{*rectified, *disparity, s.world_from_left};
+    result.terrain = TerrainView{*rectified, disparity->disparity, disparity->sigma, s.world_from_left};
   }
   result.times = s.clock.take();
   return result;

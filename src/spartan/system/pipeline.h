@@ -27,6 +27,7 @@ namespace spartan {
 struct TerrainView {
   RectifiedPair pair;
   ImageView<const float> disparity;  ///< px, NaN unknown
+  ImageView<const float> sigma;      ///< standard deviation of the disparity, px
   Pose world_from_left;              ///< rectified left optical frame
 };
 

@@ -4,12 +4,14 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace spartan::internal {
 namespace {
 
 constexpr float kUnknownDisparity = std::numeric_limits<float>::quiet_NaN();
 constexpr int kRowsAtOnce = 32;  // rows of one work item of a thread
+constexpr int kBandRows = 120;   // of the speckle filter
 
 }  // namespace
 
@@ -45,85 +47,131 @@ float median_of_known(ImageView<const float> in, int x, int y) {
   return *middle;
 }
 
-void median_row(ImageView<const float> in, int y, void (*kernel)(const matching::MedianRow&), ImageView<float> out) {
+void median_row(ImageView<const float> in, int y, bool (*kernel)(const matching::MedianRow&), ImageView<float> out) {
   const int w = in.width();
   const bool inside = y > 0 && y + 1 < in.height();
-  std::fill_n(out.row(y), w, kUnknownDisparity);
-  if (inside) kernel({{in.row(y - 1), in.row(y), in.row(y + 1)}, out.row(y), w});
-  for (int x = 0; x < w; ++x) {
-    if (std::isnan(out(x, y)) && !std::isnan(in(x, y))) out(x, y) = median_of_known(in, x, y);
+  const auto replace = [&](int from, int to) {
+    for (int x = from; x < to; ++x) {
+      if (std::isnan(out(x, y)) && !std::isnan(in(x, y))) out(x, y) = median_of_known(in, x, y);
+    }
+  };
+  out(0, y) = out(w - 1, y) = kUnknownDisparity;
+  if (!inside || w < 3) {
+    std::fill_n(out.row(y), w, kUnknownDisparity);
+    return replace(0, w);
   }
+  const bool incomplete = kernel({{in.row(y - 1), in.row(y), in.row(y + 1)}, out.row(y), w});
+  replace(0, incomplete ? w : 1);
+  replace(w - 1, w);
 }
 
 }  // namespace
 
-void median_3x3(ImageView<const float> in, void (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
+void median_3x3(ImageView<const float> in, bool (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
                 ImageView<float> out) {
   workers.parallel_for(0, in.height(), kRowsAtOnce, [&](int from, int to) {
     for (int y = from; y < to; ++y) median_row(in, y, kernel, out);
   });
 }
 
-int SpeckleFilter::root_of(int run) {
-  const auto parent = [&](int r) -> int& { return runs_[static_cast<std::size_t>(r)].parent; };
-  while (parent(run) != run) {
-    parent(run) = parent(parent(run));
-    run = parent(run);
-  }
+int SpeckleFilter::root_of(const std::vector<Run>& runs, int run) {
+  while (runs[static_cast<std::size_t>(run)].parent != run) run = runs[static_cast<std::size_t>(run)].parent;
   return run;
 }
 
-void SpeckleFilter::join(int one, int other) {
-  const int first = root_of(one), second = root_of(other);
+void SpeckleFilter::join(std::vector<Run>& runs, int one, int other) {
+  const int first = root_of(runs, one), second = root_of(runs, other);
+  // Paths to the root are shortened.
+  for (int run : {one, other}) {
+    for (const int root = run == one ? first : second; run != root;)
+      run = std::exchange(runs[static_cast<std::size_t>(run)].parent, root);
+  }
   if (first == second) return;
-  Run& kept = runs_[static_cast<std::size_t>(std::min(first, second))];
-  Run& gone = runs_[static_cast<std::size_t>(std::max(first, second))];
+  Run& kept = runs[static_cast<std::size_t>(std::min(first, second))];
+  Run& gone = runs[static_cast<std::size_t>(std::max(first, second))];
   gone.parent = kept.parent;
   kept.pixels += gone.pixels;
 }
 
-void SpeckleFilter::find_runs(const SpeckleRule& rule, ImageView<const float> disparity) {
+// Joins the runs of row y with those of the row above.
+void SpeckleFilter::join_rows(std::vector<Run>& runs, const SpeckleRule& rule, ImageView<const float> disparity, int y,
+                              const std::vector<int>& above, const std::vector<int>& here) {
+  const auto step = static_cast<float>(rule.step_px);
+  int joined = -1, joined_with = -1;
+  for (int x = 0; x < disparity.width(); ++x) {
+    const int upper = above[static_cast<std::size_t>(x)], run = here[static_cast<std::size_t>(x)];
+    if (run < 0 || upper < 0 || (run == joined && upper == joined_with)) continue;
+    if (std::abs(disparity(x, y) - disparity(x, y - 1)) > step) continue;
+    join(runs, run, upper);
+    joined = run;
+    joined_with = upper;
+  }
+}
+
+void SpeckleFilter::find_runs(const SpeckleRule& rule, ImageView<const float> disparity, int from_row, int to_row,
+                              Band& band) {
   const int w = disparity.width();
   const auto step = static_cast<float>(rule.step_px);
-  runs_.clear();
-  above_.assign(static_cast<std::size_t>(w), -1);
-  here_.resize(static_cast<std::size_t>(w));
-  for (int y = 0; y < disparity.height(); ++y) {
+  band.runs.clear();
+  band.here.resize(static_cast<std::size_t>(w));
+  for (int y = from_row; y < to_row; ++y) {
+    const float* const row = disparity.row(y);
     for (int x = 0; x < w;) {
-      if (std::isnan(disparity(x, y))) {
-        here_[static_cast<std::size_t>(x++)] = -1;
+      if (std::isnan(row[x])) {
+        band.here[static_cast<std::size_t>(x++)] = -1;
         continue;
       }
-      const int run = static_cast<int>(runs_.size()), from = x;
-      do here_[static_cast<std::size_t>(x++)] = run;
-      while (x < w && std::abs(disparity(x, y) - disparity(x - 1, y)) <= step);
+      const int run = static_cast<int>(band.runs.size()), from = x;
+      do band.here[static_cast<std::size_t>(x++)] = run;
+      while (x < w && std::abs(row[x] - row[x - 1]) <= step);
       int pixels = x - from;
       if (!rule.outlier_percent.empty()) {
         const std::uint8_t* const outlier = rule.outlier_percent.row(y);
         pixels = static_cast<int>(std::count_if(outlier + from, outlier + x,
                                                 [&](std::uint8_t percent) { return percent <= rule.most_percent; }));
       }
-      runs_.push_back({y, from, x, run, pixels});
-      int joined = -1;
-      for (int u = from; u < x; ++u) {
-        const int above = above_[static_cast<std::size_t>(u)];
-        if (above < 0 || above == joined || std::abs(disparity(u, y) - disparity(u, y - 1)) > step) continue;
-        join(run, above);
-        joined = above;
-      }
+      band.runs.push_back({y, from, x, run, pixels});
     }
-    std::swap(above_, here_);
+    if (y > from_row) join_rows(band.runs, rule, disparity, y, band.above, band.here);
+    if (y == from_row) band.first = band.here;
+    std::swap(band.above, band.here);
+    band.here.resize(static_cast<std::size_t>(w));
   }
 }
 
-void SpeckleFilter::apply(const SpeckleRule& rule, ImageView<float> disparity) {
-  if (rule.size_px <= 0) return;
-  find_runs(rule, disparity);
-  for (int r = 0; r < static_cast<int>(runs_.size()); ++r) {
-    if (runs_[static_cast<std::size_t>(root_of(r))].pixels >= rule.size_px) continue;
-    const Run& run = runs_[static_cast<std::size_t>(r)];
-    std::fill(&disparity(run.from, run.y), &disparity(run.to - 1, run.y) + 1, kUnknownDisparity);
+void SpeckleFilter::join_bands(const SpeckleRule& rule, ImageView<const float> disparity) {
+  runs_.clear();
+  const std::vector<int>* last = nullptr;  // runs of the last row of the band before
+  int first_row = 0;
+  for (Band& band : bands_) {
+    const int offset = static_cast<int>(runs_.size());
+    const auto shift = [offset](std::vector<int>& row) {
+      for (int& run : row) run += run < 0 ? 0 : offset;
+    };
+    for (Run& run : band.runs) run.parent += offset;
+    runs_.insert(runs_.end(), band.runs.begin(), band.runs.end());
+    shift(band.first);
+    shift(band.above);
+    if (first_row > 0) join_rows(runs_, rule, disparity, first_row, *last, band.first);
+    last = &band.above;
+    first_row += kBandRows;
   }
+}
+
+void SpeckleFilter::apply(const SpeckleRule& rule, const ThreadPool& workers, ImageView<float> disparity) {
+  if (rule.size_px <= 0 || disparity.empty()) return;
+  bands_.resize(static_cast<std::size_t>((disparity.height() + kBandRows - 1) / kBandRows));
+  workers.parallel_for(0, disparity.height(), kBandRows, [&](int from, int to) {
+    find_runs(rule, disparity, from, to, bands_[static_cast<std::size_t>(from / kBandRows)]);
+  });
+  join_bands(rule, disparity);
+  workers.parallel_for(0, static_cast<int>(runs_.size()), 4096, [&](int from, int to) {
+    for (int r = from; r < to; ++r) {
+      if (runs_[static_cast<std::size_t>(root_of(runs_, r))].pixels >= rule.size_px) continue;
+      const Run& run = runs_[static_cast<std::size_t>(r)];
+      std::fill(&disparity(run.from, run.y), &disparity(run.to - 1, run.y) + 1, kUnknownDisparity);
+    }
+  });
 }
 
 }  // namespace spartan::internal

@@ -16,7 +16,7 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
 
 /// Median of the known values in the 3×3 neighbourhood of each known pixel; unknown pixels stay unknown.
 /// `kernel` is RefinementKernels::median_row of an instruction set.
-void median_3x3(ImageView<const float> in, void (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
+void median_3x3(ImageView<const float> in, bool (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
                 ImageView<float> out);
 
 /// A component of a disparity image is kept where it has enough reliable pixels: those whose outlier probability is at
@@ -29,10 +29,10 @@ struct SpeckleRule {
 };
 
 /// Discards the 4-connected components that are too small. Method: connected-component labelling by runs along the rows
-/// and union-find. Buffers are kept from call to call.
+/// and union-find, first in bands of rows, then across their borders. Buffers are kept from call to call.
 class SpeckleFilter {
  public:
-  void apply(const SpeckleRule& rule, ImageView<float> disparity);
+  void apply(const SpeckleRule& rule, const ThreadPool& workers, ImageView<float> disparity);
 
  private:
   struct Run {
@@ -40,12 +40,21 @@ class SpeckleFilter {
     int parent;       ///< Index of another run of the component; its own index at the root.
     int pixels;       ///< Reliable pixels of the whole component, valid at its root.
   };
-  int root_of(int run);
-  void join(int one, int other);
-  void find_runs(const SpeckleRule& rule, ImageView<const float> disparity);
+  struct Band {
+    std::vector<Run> runs;
+    std::vector<int> first, above,
+        here;  ///< Run of each pixel in the first row, the row above and this row; −1: unknown.
+  };
+  static int root_of(const std::vector<Run>& runs, int run);
+  static void join(std::vector<Run>& runs, int one, int other);
+  static void join_rows(std::vector<Run>& runs, const SpeckleRule& rule, ImageView<const float> disparity, int y,
+                        const std::vector<int>& above, const std::vector<int>& here);
+  static void find_runs(const SpeckleRule& rule, ImageView<const float> disparity, int from_row, int to_row,
+                        Band& band);
+  void join_bands(const SpeckleRule& rule, ImageView<const float> disparity);
 
+  std::vector<Band> bands_;
   std::vector<Run> runs_;
-  std::vector<int> above_, here_;  ///< Run of each pixel in the row above and in this row; −1: unknown.
 };
 
 }  // namespace spartan::internal

@@ -97,8 +97,8 @@ struct Pipeline::State {
                         const RelativeMotion& body_motion);
   bool terrain_is_due() const;
   Status check_disparities(const RectifiedPair& rectified) const;
-  Result<ImageView<const float>> dense_disparity(const RectifiedPair& rectified);
-  Result<ImageView<const float>> disparity_for_odometry(const RectifiedPair& rectified);
+  Result<DisparityImage> dense_disparity(const RectifiedPair& rectified);
+  Result<DisparityImage> disparity_for_odometry(const RectifiedPair& rectified);
 
   // The map of the pending keyframe, made by one thread beside the frames that follow it.
   struct KeyframeMap {

@@ -185,10 +185,8 @@ Status RunLoop::process_frame(const StereoFrame& frame) {
     hooks_.log.warning(fmt::format("frame {}: odometry lost: {}", output.frame_id, output.motion.reason));
   }
   if (output.terrain) {
-    auto written = clock_.measure("terrain", [&] {
-      return write_terrain(*output.terrain, request_.options.terrain, request_.options.mapping.disparity_sigma_px,
-                           folder_.terrain());
-    });
+    auto written = clock_.measure(
+        "terrain", [&] { return write_terrain(*output.terrain, request_.options.terrain, folder_.terrain()); });
     if (!written) return failure(written);
     step.terrain = *written;
   }

@@ -15,8 +15,7 @@ namespace spartan::internal {
 /// Writes <folder>/<stamp_ns>.pfm (disparity, px), .png (colour-coded disparity) and .ply (points, metres, world
 /// frame; only those within the maximum range error).
 /// Code `output`.
-Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, double disparity_sigma_px,
-                                    const std::string& folder);
+Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, const std::string& folder);
 
 /// All point clouds of a run. Code `input` (no terrain, or a damaged file).
 Result<PointCloud> terrain_cloud(const std::string& folder, const std::vector<TerrainRecord>& terrain);

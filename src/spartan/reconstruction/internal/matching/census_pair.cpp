@@ -50,10 +50,12 @@ const std::uint8_t* CensusPair::gray(int y) const {
 
 void CensusPair::compute_planes(ImageView<const std::uint8_t> image, bool mirrored, Image<std::uint8_t>& planes) {
   const int w = size_.width, h = size_.height;
-  for (int y = 0; y < framed_.height(); ++y) {
-    copy_row(image.row(std::clamp(y - kWindowRows, 0, h - 1)), w, kWindowColumns, framed_.width() - kWindowColumns - w,
-             framed_.row(y));
-  }
+  workers_.parallel_for(0, framed_.height(), kRowsAtATime, [&](int from, int to) {
+    for (int y = from; y < to; ++y) {
+      copy_row(image.row(std::clamp(y - kWindowRows, 0, h - 1)), w, kWindowColumns,
+               framed_.width() - kWindowColumns - w, framed_.row(y));
+    }
+  });
   workers_.parallel_for(0, h, kRowsAtATime, [&](int from, int to) {
     Image<std::uint8_t> forward(mirrored ? w + kRowPadding : 0, mirrored ? kPlanes : 0);
     for (int y = from; y < to; ++y) {

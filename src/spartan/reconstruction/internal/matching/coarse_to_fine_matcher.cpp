@@ -59,8 +59,8 @@ CoarseToFineMatcher::CoarseToFineMatcher(const DisparityOptions& options, const 
 CoarseToFineMatcher::CoarseToFineMatcher(const Penalties& penalties, std::size_t simd, const ThreadPool& workers)
     : workers_(workers),
       base_(penalties, kernels_for(simd), full_range_kernels_for(simd), workers),
-      half_matcher_(penalties, kernels_for(simd), workers),
-      full_matcher_(penalties, kernels_for(simd), workers) {}
+      half_matcher_(IntervalMatcher::Purpose::search_intervals, penalties, kernels_for(simd), workers),
+      full_matcher_(IntervalMatcher::Purpose::result, penalties, kernels_for(simd), workers) {}
 
 const IntervalMatches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> left,
                                                   ImageView<const std::uint8_t> right, DisparityRange range) {

@@ -175,28 +175,39 @@ HWY_INLINE hn::Vec<D> distances(D d, std::uint8_t left, hn::Vec<D> right) {
   return hn::PopulationCount(hn::Xor(hn::Set(d, left), right));
 }
 
+// Costs of one interval, those of disparities d > x replaced.
+HWY_INLINE hn::Vec<Block> within_view(hn::Vec<Block> cost, int x, int first, hn::Vec<Block> out_of_view) {
+  const Block d;
+  const auto inside = hn::Set(d, static_cast<std::uint8_t>(std::clamp(x + 1 - first, 0, kInterval)));
+  return hn::IfThenElse(hn::Lt(hn::Load(d, kCounting), inside), cost, out_of_view);
+}
+
 template <class Step>
 HWY_INLINE void costs_of_pixel(Step, const CostRow& r, int x, std::uint8_t* cost) {
   const Block d;
+  const int first_start = r.first[x], second_start = r.second[x];
+  auto first = hn::Zero(d), second = first;
   if constexpr (Step::value == 1) {
     const hn::Repartition<std::uint8_t, hn::FixedTag<std::uint8_t, kLevels * Step::value> > both;
     auto sum = hn::Zero(both);
     for (int p = 0; p < kPlanes; ++p) {
       const std::uint8_t* const right = r.right[p] - x;
-      const auto signatures = hn::Combine(both, hn::LoadU(d, right + r.second[x]), hn::LoadU(d, right + r.first[x]));
+      const auto signatures = hn::Combine(both, hn::LoadU(d, right + second_start), hn::LoadU(d, right + first_start));
       sum = hn::Add(sum, distances(both, r.left[p][x], signatures));
     }
-    hn::StoreU(sum, both, cost);
+    if (second_start + kInterval - 1 <= x) return hn::StoreU(sum, both, cost);
+    first = hn::LowerHalf(d, sum);
+    second = hn::UpperHalf(d, sum);
   } else {
-    auto first = hn::Zero(d), second = first;
     for (int p = 0; p < kPlanes; ++p) {
       const std::uint8_t* const right = r.right[p] - x;
-      first = hn::Add(first, distances(d, r.left[p][x], hn::LoadU(d, right + r.first[x])));
-      second = hn::Add(second, distances(d, r.left[p][x], hn::LoadU(d, right + r.second[x])));
+      first = hn::Add(first, distances(d, r.left[p][x], hn::LoadU(d, right + first_start)));
+      second = hn::Add(second, distances(d, r.left[p][x], hn::LoadU(d, right + second_start)));
     }
-    hn::StoreU(first, d, cost);
-    hn::StoreU(second, d, cost + kInterval);
   }
+  const auto out_of_view = hn::Set(d, r.out_of_view);
+  hn::StoreU(within_view(first, x, first_start, out_of_view), d, cost);
+  hn::StoreU(within_view(second, x, second_start, out_of_view), d, cost + kInterval);
 }
 
 void cost_row(const CostRow& r) {
@@ -371,6 +382,7 @@ HWY_INLINE void select_pixel(const SelectRow& r, int x) {
     best = hn::Min(best, hn::Or(shifted[i], hn::Load(d, kLevelOfSum + 8 * i)));
   }
   r.winner[x] = hn::GetLane(hn::MinOfLanes(d, best));
+  if (r.right_best == nullptr) return;
   // Blocks 0 and 2 hold the even and odd levels of the first interval, 1 and 3 those of the second.
   const auto tag = hn::Set(d, static_cast<std::uint16_t>(x & 31));
   std::uint16_t* const first = r.right_best + r.first[x] - x;

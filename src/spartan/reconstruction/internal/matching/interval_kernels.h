@@ -49,7 +49,8 @@ struct CensusRow {
 };
 
 /// Matching costs of one row, kLevels bytes a pixel. right[p] points at the mirrored pixel of x = 0 and disparity 0:
-/// pixel x and disparity d read right[p][d − x].
+/// pixel x and disparity d read right[p][d − x]. Disparities d > x, which lie left of the right image, cost
+/// `out_of_view`.
 struct CostRow {
   const std::uint8_t* left[kPlanes];
   const std::uint8_t* right[kPlanes];
@@ -57,6 +58,7 @@ struct CostRow {
   const std::int16_t* second;  ///< Of the second interval.
   std::uint8_t* cost;
   int width;
+  std::uint8_t out_of_view;
 };
 
 /// Penalty P2 of a step between two pixels by their gray-level change, in bins of 4 levels (the last is open).

@@ -78,6 +78,7 @@ TEST_P(IntervalKernels, CostsEqualTheReference) {
       row.second = second.data();
       row.cost = cost.data();
       row.width = width;
+      row.out_of_view = 11;
       costs(row);
       cost.resize(static_cast<std::size_t>(width) * kLevels);
       return cost;

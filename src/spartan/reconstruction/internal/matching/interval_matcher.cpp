@@ -58,6 +58,11 @@ class IntervalMatcher::StripMatching {
   void compute_p2(const std::uint8_t* here, const std::uint8_t* before, int index);
   void along_rows(int from, int to);
   void select(int y);
+  static int winner(const SelectRow& row, int x) {
+    const int level = row.winner[x] % kLevels;
+    return (level < kInterval ? row.first[x] : row.second[x]) + level % kInterval;
+  }
+  void refine(const SelectRow& row, int y);
   void set_starts(int tile_row);
 
   IntervalMatcher& m_;
@@ -96,6 +101,7 @@ void IntervalMatcher::StripMatching::compute_costs(int y) {
   CostRow row{};
   row.width = width_;
   row.cost = cost(y);
+  row.out_of_view = m_.penalties_.out_of_view;
   row.first = s_.starts.data();
   row.second = row.first + width_;
   for (int p = 0; p < kPlanes; ++p) {
@@ -110,16 +116,16 @@ void IntervalMatcher::StripMatching::compute_costs(int y) {
   }
 }
 
-// Levels of a tile outside of the search range, and those whose right pixel is outside of the image.
+// Levels of a tile outside of the search range, and those whose right pixel lies right of the image.
 void IntervalMatcher::StripMatching::replace_outside(int tile, int start, std::uint8_t* costs) const {
   const int from = tile * kTile, to = std::min(width_, from + kTile), end = start + kInterval - 1;
-  if (start >= m_.range_.min && end <= m_.range_.max && end <= from && start > to - 1 - width_) return;
+  if (start >= m_.range_.min && end <= m_.range_.max && start > to - 1 - width_) return;
   for (int x = from; x < to; ++x) {
     for (int d = start; d <= end; ++d) {
       std::uint8_t& cost = costs[static_cast<std::ptrdiff_t>(x) * kLevels + d - start];
       if (d < m_.range_.min || d > m_.range_.max) {
         cost = kNever;
-      } else if (d > x || d <= x - width_) {
+      } else if (d <= x - width_) {
         cost = m_.penalties_.out_of_view;
       }
     }
@@ -208,39 +214,49 @@ void IntervalMatcher::StripMatching::along_rows(int from, int to) {
 
 void IntervalMatcher::StripMatching::select(int y) {
   set_starts(y / kTile);
-  std::fill(s_.right_best.begin(), s_.right_best.end(), std::numeric_limits<std::uint16_t>::max());
   SelectRow row{};
   row.sum = sum(y);
   row.first = s_.starts.data();
   row.second = row.first + width_;
   row.winner = s_.winners.data();
-  // The smallest start is at most an interval below the range, see TileIntervals.
-  std::uint16_t* const right = s_.right_best.data() + width_ - 1 - (m_.range_.min - kInterval);
-  row.right_best = right;
   row.width = width_;
+  if (m_.purpose_ == Purpose::result) {
+    std::fill(s_.right_best.begin(), s_.right_best.end(), std::numeric_limits<std::uint16_t>::max());
+    // The smallest start is at most an interval below the range, see TileIntervals.
+    row.right_best = s_.right_best.data() + width_ - 1 - (m_.range_.min - kInterval);
+  }
   m_.kernels_.select_row(row);
+  float* const disparity = m_.matches_.disparity.row(y);
+  for (int x = 0; x < width_; ++x) {
+    const int d = winner(row, x);
+    const bool inside = d <= x && d > x - width_;
+    disparity[x] = inside ? static_cast<float>(d) : std::numeric_limits<float>::quiet_NaN();
+  }
+  if (m_.purpose_ == Purpose::result) refine(row, y);
+}
+
+// Sub-pixel part and right distance of the winners.
+void IntervalMatcher::StripMatching::refine(const SelectRow& row, int y) {
   float* const disparity = m_.matches_.disparity.row(y);
   std::uint8_t* const right_distance = m_.matches_.right_distance.row(y);
   for (int x = 0; x < width_; ++x) {
-    const int level = row.winner[x] % kLevels, k = level % kInterval;
-    const int d = (level < kInterval ? row.first[x] : row.second[x]) + k;
-    const int apart = (right[d - x] - x) & (kLevels - 1);  // right_best holds the column modulo kLevels
+    // right_best holds the column modulo kLevels.
+    const int apart = (row.right_best[winner(row, x) - x] - x) & (kLevels - 1);
     right_distance[x] = static_cast<std::uint8_t>(std::min(apart, kLevels - apart));
-    if (d > x || d <= x - width_) {
-      disparity[x] = std::numeric_limits<float>::quiet_NaN();
-      continue;
-    }
-    float offset = 0;
-    if (k > 0 && k + 1 < kInterval) {
-      const std::uint16_t* const sums = row.sum + static_cast<std::ptrdiff_t>(x) * kLevels;
-      offset = equiangular_offset(sums[sum_index(level - 1)], sums[sum_index(level)], sums[sum_index(level + 1)]);
-    }
-    disparity[x] = static_cast<float>(d) + offset;
+    const int level = row.winner[x] % kLevels, k = level % kInterval;
+    if (k == 0 || k + 1 == kInterval) continue;
+    const std::uint16_t* const sums = row.sum + static_cast<std::ptrdiff_t>(x) * kLevels;
+    disparity[x] += equiangular_offset(sums[sum_index(level - 1)], sums[sum_index(level)], sums[sum_index(level + 1)]);
   }
 }
 
-IntervalMatcher::IntervalMatcher(const Penalties& penalties, const Kernels& kernels, const ThreadPool& workers)
-    : penalties_(penalties), kernels_(kernels), workers_(workers), census_(kernels.census_row, workers) {}
+IntervalMatcher::IntervalMatcher(Purpose purpose, const Penalties& penalties, const Kernels& kernels,
+                                 const ThreadPool& workers)
+    : purpose_(purpose),
+      penalties_(penalties),
+      kernels_(kernels),
+      workers_(workers),
+      census_(kernels.census_row, workers) {}
 
 const IntervalMatches& IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                               ImageView<const TileIntervals> tiles, DisparityRange range,

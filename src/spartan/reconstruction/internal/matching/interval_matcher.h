@@ -17,13 +17,16 @@ namespace spartan::internal::matching {
 
 /// Matches before any check except the one against the image border.
 struct IntervalMatches {
-  Image<float> disparity;              ///< px, with sub-pixel part; NaN where x − d lies outside of the right image.
+  Image<float> disparity;              ///< px; NaN where x − d lies outside of the right image.
   Image<std::uint8_t> right_distance;  ///< px, 0 … 16: from x to the left pixel that the matched right pixel prefers.
 };
 
 class IntervalMatcher {
  public:
-  IntervalMatcher(const Penalties& penalties, const Kernels& kernels, const ThreadPool& workers);
+  /// What the matches are for: the search intervals of a finer level need whole pixels and no right distances.
+  enum class Purpose { search_intervals, result };
+
+  IntervalMatcher(Purpose purpose, const Penalties& penalties, const Kernels& kernels, const ThreadPool& workers);
 
   /// Both images must have one size, `tiles` one element for each tile of it. `strips` receives buffers for each
   /// thread. The result is valid until the next call.
@@ -39,6 +42,7 @@ class IntervalMatcher {
  private:
   class StripMatching;
 
+  Purpose purpose_;
   Penalties penalties_;
   Kernels kernels_;
   ThreadPool workers_;

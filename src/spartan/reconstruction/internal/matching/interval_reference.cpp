@@ -59,7 +59,8 @@ void cost_row(const CostRow& row) {
       int distance = 0;
       for (int p = 0; p < kPlanes; ++p)
         distance += std::popcount(static_cast<std::uint8_t>(row.left[p][x] ^ row.right[p][d - x]));
-      row.cost[static_cast<std::ptrdiff_t>(x) * kLevels + level] = static_cast<std::uint8_t>(distance);
+      row.cost[static_cast<std::ptrdiff_t>(x) * kLevels + level] =
+          d > x ? row.out_of_view : static_cast<std::uint8_t>(distance);
     }
   }
 }
@@ -125,6 +126,7 @@ void select_row(const SelectRow& row) {
       const unsigned shifted = static_cast<unsigned>(sum[sum_index(level)]) << 5;
       best = std::min(best, shifted | static_cast<unsigned>(level));
       const int d = level < kInterval ? row.first[x] + level : row.second[x] + level - kInterval;
+      if (row.right_best == nullptr) continue;
       std::uint16_t& right = row.right_best[d - x];
       right = std::min(right, static_cast<std::uint16_t>(shifted | static_cast<unsigned>(x & 31)));
     }

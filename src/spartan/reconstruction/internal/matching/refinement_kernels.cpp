@@ -1,5 +1,7 @@
 #include "spartan/reconstruction/internal/matching/refinement_kernels.h"
 
+#include <limits>
+
 // Compiled once per instruction set: Highway includes this file again for each.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "spartan/reconstruction/internal/matching/refinement_kernels.cpp"
@@ -28,8 +30,9 @@ HWY_INLINE void store_shorts(IntVector v, std::int16_t* to) {
 
 // Of nine values in three sorted columns the median is the median of the largest minimum, the median of the medians and
 // the smallest maximum.
+// Returns whether a lane is NaN.
 template <class D>
-HWY_INLINE void median_at(D d, const MedianRow& r, int x) {
+HWY_INLINE bool median_at(D d, const MedianRow& r, int x) {
   using V = hn::Vec<D>;
   const auto median_of = [](V a, V b, V c) HWY_ATTR { return hn::Max(hn::Min(a, b), hn::Min(hn::Max(a, b), c)); };
   V low[3], middle[3], high[3];
@@ -46,18 +49,22 @@ HWY_INLINE void median_at(D d, const MedianRow& r, int x) {
   const V median = median_of(hn::Max(hn::Max(low[0], low[1]), low[2]), median_of(middle[0], middle[1], middle[2]),
                              hn::Min(hn::Min(high[0], high[1]), high[2]));
   // A sum with NaN is NaN, minima and maxima need not be.
-  hn::StoreU(hn::IfThenElse(hn::Eq(sum, sum), median, sum), d, r.median + x);
+  const auto known = hn::Eq(sum, sum);
+  hn::StoreU(hn::IfThenElse(known, median, sum), d, r.median + x);
+  return !hn::AllTrue(d, known);
 }
 
-void median_row(const MedianRow& r) {
+bool median_row(const MedianRow& r) {
   const Floats d;
   const int lanes = static_cast<int>(hn::Lanes(d)), end = r.width - 1;
   int x = 1;
-  for (; x + lanes <= end; x += lanes) median_at(d, r, x);
+  bool unknown = false;
+  for (; x + lanes <= end; x += lanes) unknown |= median_at(d, r, x);
   // The last vector overlaps the one before; narrow images are processed pixel by pixel.
-  if (x < end && end - 1 >= lanes) return median_at(d, r, end - lanes);
+  if (x < end && end - 1 >= lanes) return median_at(d, r, end - lanes) || unknown;
   const hn::CappedTag<float, 1> one;
-  for (; x < end; ++x) median_at(one, r, x);
+  for (; x < end; ++x) unknown |= median_at(one, r, x);
+  return unknown;
 }
 
 void smooth_row(const SmoothRow& r) {
@@ -225,6 +232,47 @@ void fit_row(const FitRow& r) {
   }
 }
 
+// The number of the bits of a float is about its logarithm, and the float of a number about its power.
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr float kBitsPerOctave = 1 << 23;
+constexpr float kBitsOfOne = 127 * kBitsPerOctave;
+HWY_INLINE FloatVector about_log2(FloatVector v) {
+  const auto bits = hn::ConvertTo(Floats(), hn::BitCast(Ints(), v));
+  return hn::Mul(hn::Sub(bits, constant(kBitsOfOne)), constant(1 / kBitsPerOctave));
+}
+HWY_INLINE FloatVector about_exp2(FloatVector v) {
+  const auto bits = hn::Add(hn::Mul(v, constant(kBitsPerOctave)), constant(kBitsOfOne));
+  return hn::BitCast(Floats(), hn::ConvertTo(Ints(), bits));
+}
+
+void reliability_row(const ReliabilityRow& r) {
+  const Floats d;
+  const Ints di;
+  const hn::Rebind<std::uint8_t, Floats> bytes;
+  const ReliabilityModel& m = r.model;
+  const auto one = constant(1);
+  constexpr float kOctavesPerLogit = 1.44269504F;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  for (int x = 0; x < r.width; x += lanes) {
+    const auto information = hn::LoadU(d, r.information + x);
+    const auto distance = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(bytes, r.right_distance + x)));
+    const auto logit =
+        hn::Add(hn::Add(constant(m.offset), hn::Mul(constant(m.distance), about_log2(hn::Add(one, distance)))),
+                hn::Mul(constant(m.information), about_log2(information)));
+    // p = 1 / (1 + e^−logit)
+    const auto octaves = hn::Min(hn::Max(hn::Mul(logit, constant(-kOctavesPerLogit)), constant(-30)), constant(30));
+    const auto percent = hn::Div(constant(100), hn::Add(one, about_exp2(octaves)));
+    const auto variance =
+        hn::Add(hn::Div(constant(m.scale_px * m.scale_px), information), constant(m.floor_px * m.floor_px));
+    const auto rounded = hn::NearestInt(percent);
+    hn::StoreU(hn::DemoteTo(bytes, rounded), bytes, r.outlier_percent + x);
+    hn::StoreU(hn::Sqrt(variance), d, r.sigma + x);
+    const auto disparity = hn::LoadU(d, r.disparity + x);
+    const auto kept = hn::Le(hn::ConvertTo(d, rounded), constant(r.most_percent));
+    hn::StoreU(hn::IfThenElse(kept, disparity, constant(kUnknown)), d, r.disparity + x);
+  }
+}
+
 }  // namespace spartan::internal::matching::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -236,11 +284,12 @@ HWY_EXPORT(smooth_row);
 HWY_EXPORT(warp_row);
 HWY_EXPORT(update_columns);
 HWY_EXPORT(fit_row);
+HWY_EXPORT(reliability_row);
 
 RefinementKernels refinement_kernels_for(std::size_t target_index) {
   return {HWY_DISPATCH_TABLE(median_row)[target_index], HWY_DISPATCH_TABLE(smooth_row)[target_index],
-          HWY_DISPATCH_TABLE(warp_row)[target_index], HWY_DISPATCH_TABLE(update_columns)[target_index],
-          HWY_DISPATCH_TABLE(fit_row)[target_index]};
+          HWY_DISPATCH_TABLE(warp_row)[target_index],   HWY_DISPATCH_TABLE(update_columns)[target_index],
+          HWY_DISPATCH_TABLE(fit_row)[target_index],    HWY_DISPATCH_TABLE(reliability_row)[target_index]};
 }
 
 }  // namespace spartan::internal::matching

@@ -69,19 +69,38 @@ struct FitRow {
 };
 
 /// Median of the 3×3 pixels around the pixels 1 … width − 2 of a row; NaN where one of the nine is NaN. Reads and
-/// writes the row's own pixels only.
+/// writes the row's own pixels only. Returns whether there is a NaN.
 struct MedianRow {
   const float* rows[3];  ///< Above, at and below the row.
   float* median;
   int width;
 };
 
+/// Outlier probability and sigma of the pixels of a row, from the information w of the fit and the right distance a:
+///   logit p = offset + distance log₂(1 + a) + information log₂ w,   σ² = scale² / w + floor².
+/// log₂ is linear between powers of two (within 0.09), 2ˣ between whole x. Disparities with a probability above
+/// most_percent become NaN. Rows as those of Image: padded to 64 bytes.
+struct ReliabilityModel {
+  float offset, distance, information, scale_px, floor_px;
+};
+struct ReliabilityRow {
+  const float* information;            ///< px⁻²
+  const std::uint8_t* right_distance;  ///< px
+  float* disparity;
+  float* sigma;  ///< px
+  std::uint8_t* outlier_percent;
+  int width;
+  float most_percent;
+  ReliabilityModel model;
+};
+
 struct RefinementKernels {
-  void (*median_row)(const MedianRow&);
+  bool (*median_row)(const MedianRow&);
   void (*smooth_row)(const SmoothRow&);
   void (*warp_row)(const WarpRow&);
   void (*update_columns)(const ColumnUpdate&);
   void (*fit_row)(const FitRow&);
+  void (*reliability_row)(const ReliabilityRow&);
 };
 
 /// The kernels of one instruction set; see simd_target_index().

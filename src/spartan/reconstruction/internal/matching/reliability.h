@@ -1,24 +1,22 @@
-// Standard deviation and outlier probability of refined disparities. The constants were fitted to the errors of
-// simulated and real pairs with truth; see docs/math/stereo.md.
+// Standard deviation and outlier probability of refined disparities; see docs/math/stereo.md.
 #pragma once
 
 #include <cstdint>
 
 #include "spartan/core/image.h"
 #include "spartan/core/threads.h"
+#include "spartan/reconstruction/internal/matching/refinement_kernels.h"
 
 namespace spartan::internal::matching {
 
-/// Probability that a disparity is off by more than one pixel, percent, from the information of its fit (px⁻²) and the
-/// distance between the left pixel and the one that its match prefers (px).
-std::uint8_t outlier_percent(float information, int right_distance);
+/// Logistic regression of |error| > 1 px, and standard deviation of the other errors. Fitted to real pairs (Middlebury,
+/// ETH3D) and simulated ones, which count equally. Neighbouring fits share pixels, which the information does not know:
+/// hence the scale.
+inline constexpr ReliabilityModel kReliability{4.586F, 0.571F, -0.882F, 4.5F, 0.04F};
 
-/// Standard deviation of a disparity that is no outlier, px.
-float disparity_sigma(float information);
-
-/// What the assessment reads and what it writes.
+/// What the assessment reads and what it writes. Rows are padded to 64 bytes, as those of Image.
 struct Evidence {
-  ImageView<const float> information;
+  ImageView<const float> information;  ///< px⁻²
   ImageView<const std::uint8_t> right_distance;
   int most_percent;  ///< Disparities with a larger outlier probability are discarded.
 };
@@ -29,7 +27,7 @@ struct Assessed {
 };
 
 /// Sets sigma and outlier probability of all pixels, and discards the disparities that are too unlikely.
-void assess(const Evidence& evidence, const ThreadPool& workers, const Assessed& to);
+void assess(const Evidence& evidence, const RefinementKernels& kernels, const ThreadPool& workers, const Assessed& to);
 
 /// Sigma NaN and outlier probability 100 % where the disparity is unknown.
 void clear_unknown(const ThreadPool& workers, const Assessed& to);

@@ -4,49 +4,83 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
+
+#include "spartan/numerics/simd_target.h"
 
 namespace spartan::internal::matching {
 namespace {
 
-TEST(OutlierProbability, IsTheLogisticFunctionOfInformationAndRightDistance) {
+struct Result {
+  int outlier_percent;
+  double sigma_px;
+  bool kept;
+};
+
+class Reliability : public ::testing::TestWithParam<SimdTarget> {
+ protected:
+  // Of pixels of one information and the right distances 0, 1, 2 ….
+  static std::vector<Result> assessed(float information, int count, int most_percent = 100) {
+    Image<float> informations(count + 64, 1, information), disparity(count, 1, 7.0F), sigma(count, 1);
+    Image<std::uint8_t> distance(count, 1), percent(count, 1);
+    for (int x = 0; x < count; ++x) distance(x, 0) = static_cast<std::uint8_t>(x);
+    assess({informations.view().crop(0, 0, count, 1), distance, most_percent},
+           refinement_kernels_for(simd_target_index(GetParam())), ThreadPool(1), {disparity, sigma, percent});
+    std::vector<Result> results;
+    for (int x = 0; x < count; ++x)
+      results.push_back({percent(x, 0), static_cast<double>(sigma(x, 0)), !std::isnan(disparity(x, 0))});
+    return results;
+  }
+};
+
+TEST_P(Reliability, IsTheLogisticFunctionOfInformationAndRightDistance) {
   for (const double information : {2.5, 8.0, 40.0, 300.0, 5000.0}) {
+    const auto results = assessed(static_cast<float>(information), 17);
     for (const int distance : {0, 1, 3, 16}) {
       const double logit = 4.586 + 0.571 * std::log2(1.0 + distance) - 0.882 * std::log2(information);
-      EXPECT_NEAR(outlier_percent(static_cast<float>(information), distance), 100 / (1 + std::exp(-logit)), 3.5)
+      EXPECT_NEAR(results[static_cast<std::size_t>(distance)].outlier_percent, 100 / (1 + std::exp(-logit)), 4)
           << information << ", " << distance;
     }
   }
 }
 
-TEST(OutlierProbability, FallsWithTheInformationAndRisesWithTheDistance) {
-  for (float information = 0.001F; information < 1e6F; information *= 1.07F) {
-    EXPECT_GE(outlier_percent(information, 0), outlier_percent(information * 1.07F, 0));
-    for (int distance = 0; distance < 20; ++distance)
-      EXPECT_LE(outlier_percent(information, distance), outlier_percent(information, distance + 1));
+TEST_P(Reliability, OutliersAreLessLikelyWithInformationAndMoreWithDistance) {
+  for (float information = 1e-6F; information < 1e8F; information *= 1.07F) {
+    const auto results = assessed(information, 17), more = assessed(information * 1.07F, 17);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      EXPECT_GE(results[i].outlier_percent, more[i].outlier_percent);
+      if (i > 0) {
+        EXPECT_GE(results[i].outlier_percent, results[i - 1].outlier_percent);
+      }
+    }
   }
 }
 
-TEST(DisparitySigma, FallsToAFloor) {
-  EXPECT_NEAR(disparity_sigma(100), std::sqrt(4.5 * 4.5 / 100 + 0.04 * 0.04), 1e-6);
-  EXPECT_NEAR(disparity_sigma(1e9F), 0.04, 1e-3);
+TEST_P(Reliability, SigmaFallsToAFloor) {
+  EXPECT_NEAR(assessed(100, 1)[0].sigma_px, std::sqrt(4.5 * 4.5 / 100 + 0.04 * 0.04), 1e-6);
+  EXPECT_NEAR(assessed(1e9F, 1)[0].sigma_px, 0.04, 1e-3);
 }
 
-TEST(Reliability, DiscardsWhatIsTooUnlikely) {
-  const float unknown = std::numeric_limits<float>::quiet_NaN();
-  Image<float> information(3, 1, 1000.0F), disparity(3, 1, 7.0F), sigma(3, 1);
-  Image<std::uint8_t> distance(3, 1), percent(3, 1);
-  information(1, 0) = 4;
-  disparity(2, 0) = unknown;
-  assess({information, distance, 70}, ThreadPool(1), {disparity, sigma, percent});
+TEST_P(Reliability, DiscardsWhatIsTooUnlikely) {
+  EXPECT_TRUE(assessed(1000, 1, 70)[0].kept);
+  EXPECT_FALSE(assessed(4, 1, 70)[0].kept);
+  EXPECT_TRUE(assessed(4, 1, 100)[0].kept);
+}
+
+TEST(UnknownReliability, IsUnknown) {
+  Image<float> disparity(2, 1, 7.0F), sigma(2, 1, 0.1F);
+  Image<std::uint8_t> percent(2, 1, std::uint8_t{3});
+  disparity(1, 0) = std::numeric_limits<float>::quiet_NaN();
   clear_unknown(ThreadPool(1), {disparity, sigma, percent});
-  EXPECT_EQ(disparity(0, 0), 7);
-  EXPECT_LT(percent(0, 0), 5);
-  EXPECT_NEAR(sigma(0, 0), 0.148, 0.001);
-  for (const int x : {1, 2}) {
-    EXPECT_TRUE(std::isnan(disparity(x, 0)) && std::isnan(sigma(x, 0))) << x;
-    EXPECT_EQ(percent(x, 0), 100) << x;
-  }
+  EXPECT_EQ(sigma(0, 0), 0.1F);
+  EXPECT_EQ(percent(0, 0), 3);
+  EXPECT_TRUE(std::isnan(sigma(1, 0)));
+  EXPECT_EQ(percent(1, 0), 100);
 }
+
+INSTANTIATE_TEST_SUITE_P(Simd, Reliability, ::testing::ValuesIn(available_simd_targets()),
+                         [](const auto& test) { return std::string(name_of(test.param)); });
 
 }  // namespace
 }  // namespace spartan::internal::matching

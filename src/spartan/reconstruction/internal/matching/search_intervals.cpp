@@ -21,8 +21,7 @@ class Histogram {
     low_ = range_.count();
     high_ = -1;
   }
-  void add(float disparity) {
-    const int d = std::clamp(static_cast<int>(std::floor(disparity + 0.5F)) - range_.min, 0, range_.count() - 1);
+  void add(int d) {
     ++counts_[static_cast<std::size_t>(d)];
     low_ = std::min(low_, d);
     high_ = std::max(high_, d);
@@ -67,12 +66,27 @@ TileIntervals intervals_around(int one, std::optional<int> other, DisparityRange
   return {static_cast<std::int16_t>(a), static_cast<std::int16_t>(b)};
 }
 
-void count(ImageView<const float> coarse, int tile_x, int tile_y, Histogram& histogram) {
-  const int x0 = std::max(0, (tile_x - 1) * kCoarseTile), x1 = std::min(coarse.width(), (tile_x + 2) * kCoarseTile);
-  const int y0 = std::max(0, (tile_y - 1) * kCoarseTile), y1 = std::min(coarse.height(), (tile_y + 2) * kCoarseTile);
+// Disparities of the fine level, relative to the smallest of the range, from those of a row of the coarse level;
+// kUnknownDisparity where it is unknown.
+constexpr std::int16_t kUnknownDisparity = -1;
+void convert_row(const float* coarse, int width, DisparityRange range, std::int16_t* to) {
+  const auto first = static_cast<float>(range.min), last = static_cast<float>(range.count() - 1);
+  for (int x = 0; x < width; ++x) {
+    const float d = std::min(std::max(2 * coarse[x] - first, 0.0F), last);
+    to[x] = std::isnan(coarse[x]) ? kUnknownDisparity : static_cast<std::int16_t>(d + 0.5F);
+  }
+}
+
+// Counts the disparities of every second pixel, as on a checkerboard, of a tile and its neighbours.
+void count(ImageView<const std::int16_t> disparities, int tile_x, int tile_y, Histogram& histogram) {
+  const int x0 = std::max(0, (tile_x - 1) * kCoarseTile),
+            x1 = std::min(disparities.width(), (tile_x + 2) * kCoarseTile);
+  const int y0 = std::max(0, (tile_y - 1) * kCoarseTile),
+            y1 = std::min(disparities.height(), (tile_y + 2) * kCoarseTile);
   for (int y = y0; y < y1; ++y) {
-    for (int x = x0; x < x1; ++x) {
-      if (!std::isnan(coarse(x, y))) histogram.add(2 * coarse(x, y));
+    const std::int16_t* const row = disparities.row(y);
+    for (int x = x0 + ((x0 + y) & 1); x < x1; x += 2) {
+      if (row[x] != kUnknownDisparity) histogram.add(row[x]);
     }
   }
 }
@@ -86,13 +100,17 @@ Transition transition(const TileIntervals& from, const TileIntervals& to) {
 Image<TileIntervals> choose_intervals(ImageView<const float> coarse, ImageSize size, DisparityRange range,
                                       const ThreadPool& workers) {
   Image<TileIntervals> tiles((size.width + kTile - 1) / kTile, (size.height + kTile - 1) / kTile);
+  Image<std::int16_t> disparities(coarse.width(), coarse.height());
+  workers.parallel_for(0, coarse.height(), 64, [&](int from, int to) {
+    for (int y = from; y < to; ++y) convert_row(coarse.row(y), coarse.width(), range, disparities.row(y));
+  });
   workers.parallel_for(0, tiles.height(), 8, [&](int from, int to) {
     Histogram histogram(range);
     for (int y = from; y < to; ++y) {
       TileIntervals last = intervals_around(range.min, std::nullopt, range);
       for (int x = 0; x < tiles.width(); ++x) {
         histogram.clear();
-        count(coarse, x, y, histogram);
+        count(disparities, x, y, histogram);
         if (const auto first = histogram.take_most()) last = intervals_around(*first, histogram.take_most(), range);
         tiles(x, y) = last;
       }

@@ -7,11 +7,11 @@ namespace spartan::internal::matching {
 int strip_rows(int height, std::int64_t costs_per_row) {
   constexpr int kRows = 256;
   constexpr std::int64_t kCosts = 16'000'000;
-  const auto wanted = static_cast<int>(
-      std::clamp<std::int64_t>(kCosts / std::max<std::int64_t>(1, costs_per_row), 2 * kStripMargin, kRows));
+  const auto wanted =
+      static_cast<int>(std::clamp<std::int64_t>(kCosts / std::max<std::int64_t>(1, costs_per_row), 64, kRows));
   const int strips = std::max(2, (height + wanted / 2) / wanted);
   const int rows = (height + strips - 1) / strips;
-  return std::max(2 * kStripMargin, (rows + kTile - 1) / kTile * kTile);
+  return std::max(64, (rows + kTile - 1) / kTile * kTile);
 }
 
 void for_each_strip(int height, int rows_per_strip, const ThreadPool& workers, std::vector<StripBuffers>& buffers,

@@ -16,7 +16,7 @@
 
 namespace spartan::internal::matching {
 
-inline constexpr int kStripMargin = 32;
+inline constexpr int kStripMargin = 16;
 inline constexpr int kDirections = 3;  ///< Paths of a sweep from the row before: from x − 1, x, x + 1.
 
 /// Rows of a strip, a multiple of the tile: about 256, fewer where a row has so many costs that the strip would exceed

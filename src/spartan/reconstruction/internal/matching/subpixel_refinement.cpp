@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -122,12 +123,14 @@ void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
 
 void SubpixelRefinement::fit(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right) {
   const auto frame = [&](ImageView<const std::uint8_t> from, Image<std::uint8_t>& to) {
-    for (int y = 0; y < size_.height; ++y) {
-      std::uint8_t* const row = to.row(y);
-      std::memset(row, from(0, y), kGrayPad);
-      std::memcpy(row + kGrayPad, from.row(y), static_cast<std::size_t>(size_.width));
-      std::memset(row + kGrayPad + size_.width, from(size_.width - 1, y), kGrayPad);
-    }
+    workers_.parallel_for(0, size_.height, 64, [&](int first, int end) {
+      for (int y = first; y < end; ++y) {
+        std::uint8_t* const row = to.row(y);
+        std::memset(row, from(0, y), kGrayPad);
+        std::memcpy(row + kGrayPad, from.row(y), static_cast<std::size_t>(size_.width));
+        std::memset(row + kGrayPad + size_.width, from(size_.width - 1, y), kGrayPad);
+      }
+    });
   };
   frame(left, left_);
   frame(right, right_);
@@ -147,15 +150,20 @@ void SubpixelRefinement::refine(ImageView<const std::uint8_t> left, ImageView<co
                                 ImageView<float> disparity) {
   resize(disparity.size());
   const auto row_bytes = static_cast<std::size_t>(size_.width) * sizeof(float);
-  for (int y = 0; y < size_.height; ++y) {
+  const auto for_rows = [&](const std::function<void(int)>& body) {
+    workers_.parallel_for(0, size_.height, 64, [&](int from, int to) {
+      for (int y = from; y < to; ++y) body(y);
+    });
+  };
+  for_rows([&](int y) {
     std::memcpy(disparity_[0].row(y) + kPad, disparity.row(y), row_bytes);
     std::fill_n(information_[0].row(y) + kPad, size_.width, 1.0F);
-  }
+  });
   for (const int step : kStepsBeforeFit) smooth({step, kToleranceBefore_px, kToleranceBefore_px, 0, 0});
   fit(left, right);
   for (const int step : kStepsAfterFit)
     smooth({step, kToleranceAfter_px, kLeastTolerance_px, kToleranceSigmas, kGrowth});
-  for (int y = 0; y < size_.height; ++y) std::memcpy(disparity.row(y), disparity_[0].row(y) + kPad, row_bytes);
+  for_rows([&](int y) { std::memcpy(disparity.row(y), disparity_[0].row(y) + kPad, row_bytes); });
 }
 
 std::int64_t SubpixelRefinement::memory_bytes(ImageSize size, int threads) {
