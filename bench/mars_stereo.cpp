@@ -10,16 +10,15 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <opencv2/calib3d.hpp>
 #include <string>
 #include <vector>
 
 #include "spartan/camera/frame_source.h"
 #include "spartan/eval/disparity_metrics.h"
-#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "standard_recordings.h"
+#include "stereo_rivals.h"
 
 namespace spartan {
 namespace {
@@ -54,25 +53,6 @@ struct Score {
 };
 using Scores = std::map<std::string, std::array<Score, kBins.size()>>;
 
-Image<float> opencv_disparity(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, int disparities,
-                              int mode) {
-  constexpr int kBlock = 5;
-  const auto matcher = cv::StereoSGBM::create(0, disparities, kBlock, 8 * kBlock * kBlock, 32 * kBlock * kBlock, 1, 63,
-                                              10, 100, 2, mode);
-  cv::Mat l, r, d;
-  cv::copyMakeBorder(as_mat(left), l, 0, 0, disparities, 0, cv::BORDER_REPLICATE);
-  cv::copyMakeBorder(as_mat(right), r, 0, 0, disparities, 0, cv::BORDER_REPLICATE);
-  matcher->compute(l, r, d);
-  Image<float> result(left.width(), left.height());
-  for (int y = 0; y < left.height(); ++y) {
-    for (int x = 0; x < left.width(); ++x) {
-      const short value = d.at<short>(y, x + disparities);
-      result(x, y) = value > 0 ? static_cast<float>(value) / 16 : std::nanf("");
-    }
-  }
-  return result;
-}
-
 void add_scores(ImageView<const float> estimate, ImageView<const float> truth, ImageView<const std::uint8_t> mask,
                 const RectifiedStereo& geometry, std::array<Score, kBins.size()>& scores) {
   const double fb = geometry.focal_px * geometry.baseline_m;
@@ -103,10 +83,11 @@ void compare_pair(FrameSource& source, Imager& imager, const StereoPair& pair, S
   DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(2)).value();
   if (const auto ours = computer.compute(view->left, view->right, range, view->left_mask, view->right_mask))
     add_scores(ours->disparity, *truth, *mask, view->geometry, scores["Spartan"]);
-  add_scores(opencv_disparity(view->left, view->right, disparities, cv::StereoSGBM::MODE_SGBM), *truth, *mask,
-             view->geometry, scores["SGBM"]);
-  add_scores(opencv_disparity(view->left, view->right, disparities, cv::StereoSGBM::MODE_HH), *truth, *mask,
-             view->geometry, scores["HH"]);
+  for (const OpenCvMatcher& rival :
+       {OpenCvMatcher{"SGBM", cv::StereoSGBM::MODE_SGBM}, {"HH", cv::StereoSGBM::MODE_HH}}) {
+    add_scores(opencv_disparity(view->left, view->right, disparities, rival), *truth, *mask, view->geometry,
+               scores[rival.name]);
+  }
 }
 
 void print(const std::string& scenario, const Scores& scores) {

@@ -70,7 +70,7 @@ int known_cells_of(const StopView& view, StopMapper& mapper, const Pose& pose) {
   const std::vector<ViewGeometry> geometry{view.geometry};
   const auto merger =
       DisparityMerger::create({}, Pose::from_translation({0, 0, 1}), geometry, 0.3, ThreadPool(2)).value();
-  const std::vector<MergedView> views{{view.geometry, view.disparity, view.left, {}}};
+  const std::vector<MergedView> views{{view.geometry, view.disparity, view.sigma, view.left, {}}};
   return known_cells(mapper.map(surface_points(merger.merge(views)), pose));
 }
 

@@ -31,41 +31,30 @@ void refuse_empty_arguments(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) refuse_empty_arguments(*command);
 }
 
-std::string unknown_command(const CLI::App& app, const std::vector<std::string>& words) {
+std::string unknown_word(const CLI::App& app, const std::vector<std::string>& words) {
   const CLI::App* group = &app;
   std::string path = "spartan";
-  for (const std::string& word : words) {
-    if (word.starts_with('-')) break;
-    const auto commands = commands_of(*group);
-    if (commands.empty()) return {};
-    const auto named = std::find_if(commands.begin(), commands.end(),
-                                    [&](const CLI::App* command) { return command->check_name(word); });
-    if (named == commands.end()) {
-      return fmt::format("error: '{0}' is not a {1} command; {2}see `{1} --help`\n", word, path,
-                         suggestion(word, commands));
-    }
-    group = *named;
-    path += " " + word;
-  }
-  return {};
-}
-
-std::string unknown_option(const CLI::App& app, const std::vector<std::string>& words) {
-  const CLI::App* group = &app;
-  std::string path = "spartan";
+  bool after_option = false;  // the word may be its value
   for (const std::string& word : words) {
     const auto commands = commands_of(*group);
     if (commands.empty()) return {};
     if (word.starts_with('-')) {
       const std::string name = word.substr(0, word.find('='));
-      if (group->get_option_no_throw(name) != nullptr) continue;
-      return fmt::format("error: '{}' is not an option of {}; see `{} --help`\n", name, path, path);
+      if (group->get_option_no_throw(name) == nullptr)
+        return fmt::format("error: '{}' is not an option of {}; see `{} --help`\n", name, path, path);
+      after_option = true;
+      continue;
     }
     const auto named = std::find_if(commands.begin(), commands.end(),
                                     [&](const CLI::App* command) { return command->check_name(word); });
-    if (named == commands.end()) return {};
+    if (named == commands.end()) {
+      if (after_option) return {};
+      return fmt::format("error: '{0}' is not a {1} command; {2}see `{1} --help`\n", word, path,
+                         suggestion(word, commands));
+    }
     group = *named;
     path += " " + word;
+    after_option = false;
   }
   return {};
 }

@@ -11,11 +11,9 @@ namespace spartan::program {
 /// root folder.
 void refuse_empty_arguments(CLI::App& app);
 
-/// The error text for a word in the place of a command, e.g. `spartan map foo`; empty where every such word is one.
-std::string unknown_command(const CLI::App& app, const std::vector<std::string>& words);
-
-/// The error text for an unknown option in front of a command, e.g. `spartan --foo run`; empty where there is none.
-std::string unknown_option(const CLI::App& app, const std::vector<std::string>& words);
+/// The error text for the first word that is neither a command, e.g. `spartan map foo`, nor an option in front of one,
+/// e.g. `spartan --foo run`; empty where there is none.
+std::string unknown_word(const CLI::App& app, const std::vector<std::string>& words);
 
 /// "spartan rig inspect": the command that was parsed, as far as it was.
 std::string command_of(const CLI::App& app);

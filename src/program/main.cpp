@@ -62,11 +62,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them from the end
   } catch (const CLI::ParseError& e) {
-    if (const std::string message = unknown_command(app, words); !message.empty()) {
-      std::cerr << message;
-      return kUsage;
-    }
-    if (const std::string message = unknown_option(app, words); !message.empty()) {
+    if (const std::string message = unknown_word(app, words); !message.empty()) {
       std::cerr << message;
       return kUsage;
     }
