@@ -1,6 +1,7 @@
 #include "spartan/reconstruction/stop_mapper.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "spartan/core/stage_clock.h"
@@ -28,6 +29,14 @@ Pose centre_of(std::span<const StopView> views) {
     ++count;
   }
   return Pose::from_translation(sum / count);
+}
+
+void discard_unlikely(ImageView<const std::uint8_t> outlier_percent, int most_percent, ImageView<float> disparity) {
+  for (int y = 0; y < disparity.height(); ++y) {
+    for (int x = 0; x < disparity.width(); ++x) {
+      if (outlier_percent(x, y) > most_percent) disparity(x, y) = std::numeric_limits<float>::quiet_NaN();
+    }
+  }
 }
 
 }  // namespace
@@ -72,11 +81,12 @@ Status StopMapper::add(const RectifiedPair& frame, double nearest_m, const Eigen
                                        frame.left_mask, frame.right_mask);
   if (!image) return failure(image);
   times_.disparity += watch.lap();
+  Image<float> disparity = Image<float>::copy_of(image->disparity);
+  discard_unlikely(image->outlier_percent, options_.max_outlier_percent, disparity);
   const double height = frame.body_from_left.translation().dot(up_in_body);
   const GroundPlane expected{frame.body_from_left.rotation().conjugate() * up_in_body,
                              height > 0.05 ? height : kUnknownHeight_m};
-  auto ground = compute_v_disparity(image->disparity, frame.geometry, expected, options_.v_disparity, workers_);
-  Image<float> disparity = Image<float>::copy_of(image->disparity);
+  auto ground = compute_v_disparity(disparity, frame.geometry, expected, options_.v_disparity, workers_);
   if (ground) internal::drop_matches_below_ground(ground->plane, frame.geometry, disparity);
   times_.v_disparity += watch.lap();
   views_.push_back({frame.pair,

@@ -20,6 +20,7 @@ namespace spartan {
 /// Options of the steps from the disparity images of a stop to its local map.
 struct MappingOptions {
   double disparity_sigma_px = 0.3;  ///< standard deviation of a disparity, pixels
+  int max_outlier_percent = 60;     ///< largest outlier probability of a disparity that is mapped, percent
   VDisparityOptions v_disparity;
   MergingOptions merging;
   MapOptions map;
@@ -30,6 +31,10 @@ struct MappingOptions {
             "Standard deviation of a disparity in pixels, from which the variance of ranges and elevations follows; "
             "raising it merges surfaces that are farther apart and tolerates more noise in the ground plane.",
             between(0.01, 5));
+    v.field("max_outlier_percent", max_outlier_percent,
+            "Largest probability of an error above one pixel with which a disparity is mapped, in percent; lower than "
+            "reconstruction.max_outlier_percent, because a wrong disparity becomes an obstacle.",
+            between(0, 100));
     v.group("v_disparity", v_disparity);
     v.group("merging", merging);
     v.group("map", map);
