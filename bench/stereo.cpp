@@ -16,6 +16,7 @@
 
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/numerics/simd_target.h"
+#include "standard_recordings.h"
 #include "stereo_speed.h"
 #include "stereo_variants.h"
 
@@ -87,18 +88,19 @@ struct Arguments {
   DisparityOptions options;
 };
 
-Arguments parse(int argc, char** argv) {
+Arguments parse(const std::vector<std::string>& words) {
   Arguments arguments;
   const char* const home = std::getenv("HOME");
   arguments.recordings = std::string(home != nullptr ? home : "") + "/.cache/spartan/recordings";
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
     if (word == "--no-rivals") arguments.rivals = false;
-    if (i + 1 >= argc) continue;
-    if (word == "--repeat") arguments.repeat = std::max(1, std::atoi(argv[++i]));
-    if (word == "--images") arguments.images = argv[++i];
-    if (word == "--from") arguments.recordings = argv[++i];
-    if (word == "--set") arguments.options = must(set_option(arguments.options, argv[++i]));
+    if (i + 1 >= words.size()) continue;
+    const std::string& value = words[i + 1];
+    if (word == "--repeat") arguments.repeat = std::max(1, std::atoi(value.c_str()));
+    if (word == "--images") arguments.images = value;
+    if (word == "--from") arguments.recordings = value;
+    if (word == "--set") arguments.options = must(set_option(arguments.options, value));
   }
   return arguments;
 }
@@ -191,15 +193,13 @@ void compare_times(const Arguments& arguments) {
   time_targets(pair, 256, arguments);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const Arguments arguments = parse(argc, argv);
+void run(const std::vector<std::string>& words) {
+  const Arguments arguments = parse(words);
   const char* const data = std::getenv("SPARTAN_DATA");
   const fs::path folder = data != nullptr ? data : "../shared/data";
   if (!fs::exists(folder / "middlebury")) {
     fmt::print("no stereo pairs: set SPARTAN_DATA to the data folder\n");
-    return 0;
+    return;
   }
   const std::vector<Pair> pairs = load_stereo_pairs(folder);
   const std::vector<Method> list = methods(arguments);
@@ -213,5 +213,10 @@ int main(int argc, char** argv) {
   }
   compare_accuracy(variants, list, arguments);
   if (arguments.rivals) compare_times(arguments);
-  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return run_benchmark(argc, argv, run);
 }

@@ -20,7 +20,7 @@ namespace spartan {
 /// Options of the steps from the disparity images of a stop to its local map.
 struct MappingOptions {
   double disparity_sigma_px = 0.3;  ///< standard deviation of a disparity, pixels
-  int max_outlier_percent = 60;     ///< largest outlier probability of a disparity that is mapped, percent
+  int max_outlier_percent = 20;     ///< largest outlier probability of a disparity that is mapped, percent
   VDisparityOptions v_disparity;
   MergingOptions merging;
   MapOptions map;

@@ -71,7 +71,7 @@ HWY_INLINE Levels smallest(const Levels& levels) {
   v = hn::Min(v, hn::TableLookupBytes(v, in_every_block(kSwapBytes)));
   if constexpr (kVectors == 1) v = hn::Min(v, hn::SwapAdjacentBlocks(v));
   Levels result;
-  for (int i = 0; i < kVectors; ++i) result.v[i] = v;
+  for (ByteVector& of_step : result.v) of_step = v;
   return result;
 }
 
@@ -320,8 +320,8 @@ struct RowPaths {
     if (transition.none()) return;
     const Lookups by = lookups(transition);
     for (int g = 0; g < kGroups; ++g) store(group[g], bytes[g]);
-    for (int g = 0; g < kGroups; ++g) {
-      for (int i = 0; i < kStepPixels; ++i) move(by, bytes[g] + i * kLevels);
+    for (std::uint8_t* const step : bytes) {
+      for (int i = 0; i < kStepPixels; ++i) move(by, step + i * kLevels);
     }
     for (int g = 0; g < kGroups; ++g) group[g] = load(bytes[g]);
   }

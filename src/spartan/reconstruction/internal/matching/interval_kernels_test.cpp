@@ -39,7 +39,7 @@ TEST_P(IntervalKernels, CensusEqualsTheReference) {
       for (std::size_t p = 0; p < kPlanes; ++p) row.planes[p] = planes.data() + p * stride;
       census(row);
       std::vector<std::uint8_t> used;
-      for (std::size_t p = 0; p < kPlanes; ++p) used.insert(used.end(), row.planes[p], row.planes[p] + width);
+      for (const std::uint8_t* const plane : row.planes) used.insert(used.end(), plane, plane + width);
       return used;
     };
     EXPECT_EQ(planes_by(kernels().census_row), planes_by(reference::census_row)) << width;
@@ -204,7 +204,7 @@ TEST_P(IntervalKernels, SelectionEqualsTheReference) {
   for (const int width : kWidths) {
     const auto size = static_cast<std::size_t>(width);
     std::vector<std::uint16_t> sum(size * kLevels);
-    for (auto& value : sum) value = static_cast<std::uint16_t>(random.below(200 + 1840 * (width % 2)));
+    for (auto& value : sum) value = static_cast<std::uint16_t>(random.below(width % 2 == 0 ? 200 : 2040));
     std::vector<std::int16_t> first(size), second(size);
     for (std::size_t x = 0; x < size; ++x) {
       first[x] = static_cast<std::int16_t>(random.below(40));

@@ -28,6 +28,7 @@ class Reliability : public ::testing::TestWithParam<SimdTarget> {
     assess({informations.view().crop(0, 0, count, 1), distance, most_percent},
            refinement_kernels_for(simd_target_index(GetParam())), ThreadPool(1), {disparity, sigma, percent});
     std::vector<Result> results;
+    results.reserve(static_cast<std::size_t>(count));
     for (int x = 0; x < count; ++x)
       results.push_back({percent(x, 0), static_cast<double>(sigma(x, 0)), !std::isnan(disparity(x, 0))});
     return results;

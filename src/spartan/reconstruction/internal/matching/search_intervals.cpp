@@ -72,8 +72,9 @@ constexpr std::int16_t kUnknownDisparity = -1;
 void convert_row(const float* coarse, int width, DisparityRange range, std::int16_t* to) {
   const auto first = static_cast<float>(range.min), last = static_cast<float>(range.count() - 1);
   for (int x = 0; x < width; ++x) {
-    const float d = std::min(std::max(2 * coarse[x] - first, 0.0F), last);
-    to[x] = std::isnan(coarse[x]) ? kUnknownDisparity : static_cast<std::int16_t>(d + 0.5F);
+    // The nearest whole disparity: cut after half a pixel is added.
+    const float d = std::min(std::max(2 * coarse[x] - first, 0.0F) + 0.5F, last);
+    to[x] = std::isnan(coarse[x]) ? kUnknownDisparity : static_cast<std::int16_t>(d);
   }
 }
 
