@@ -30,47 +30,50 @@ double range_sigma(const RectifiedStereo& g, double disparity, double stretch, d
 
 }  // namespace
 
-// The nearest surface that one view sees in each cell.
+// The nearest surface that one view sees in each cell, as sums over its pixels.
 struct DisparityMerger::Layer {
-  explicit Layer(ImageSize size)
-      : sum_range(size), sum_variance(size), sum_gate(size), sum_gray(size), count(size), votes(size), beyond(size) {}
-  Image<float> sum_range, sum_variance;
-  Image<float> sum_gate;  // of the variances that gates use
-  Image<float> sum_gray;
-  Image<std::uint16_t> count;
-  Image<std::uint32_t> votes;  // pixels of each class, one saturating byte per class
-  Image<std::uint8_t> beyond;  // not 0: a surface beyond the largest range
-
-  float range(int x, int y) const { return sum_range(x, y) / static_cast<float>(count(x, y)); }
-  // The mean of the pixels' variances, not the variance of their mean: errors of neighbouring disparities are
-  // correlated.
-  float variance(int x, int y) const { return sum_variance(x, y) / static_cast<float>(count(x, y)); }
-
-  float gate_variance(int x, int y) const { return sum_gate(x, y) / static_cast<float>(count(x, y)); }
-
   struct Pixel {
-    float range, variance_m2, gate_m2;
+    float range, variance_m2;
+    float gate_m2;  // the variance that gates use
     std::uint8_t level, kind;
   };
-  void add(int x, int y, const Pixel& pixel, float gate) {
-    const float r = pixel.range;
-    if (count(x, y) > 0) {
-      const float mean = range(x, y), reach = gate * std::sqrt(pixel.gate_m2);
-      if (r > mean + reach || count(x, y) == 0xFFFF) return;
-      if (r < mean - reach) {
-        count(x, y) = 0;
-        sum_range(x, y) = sum_variance(x, y) = sum_gate(x, y) = sum_gray(x, y) = 0;
-        votes(x, y) = 0;
+  struct Cell {
+    float sum_range = 0, sum_variance = 0, sum_gate = 0, sum_gray = 0;
+    std::uint32_t votes = 0;  // pixels of each class, one saturating byte per class
+    std::uint16_t count = 0;
+    std::uint8_t beyond = 0;  // not 0: a surface beyond the largest range
+
+    float mean(float sum) const { return sum / static_cast<float>(count); }
+    void add(const Pixel& pixel, float gate) {
+      const float r = pixel.range;
+      if (count > 0) {
+        const float before = mean(sum_range), reach = gate * std::sqrt(pixel.gate_m2);
+        if (r > before + reach || count == 0xFFFF) return;
+        if (r < before - reach) {
+          const std::uint8_t kept = beyond;
+          *this = {};
+          beyond = kept;
+        }
       }
+      ++count;
+      sum_range += r;
+      sum_variance += pixel.variance_m2;
+      sum_gate += pixel.gate_m2;
+      sum_gray += pixel.level;
+      const unsigned shift = 8U * std::min<unsigned>(pixel.kind, kClasses - 1);
+      if ((votes >> shift & 0xFFU) != 0xFFU) votes += 1U << shift;
     }
-    ++count(x, y);
-    sum_range(x, y) += r;
-    sum_variance(x, y) += pixel.variance_m2;
-    sum_gate(x, y) += pixel.gate_m2;
-    sum_gray(x, y) += pixel.level;
-    const unsigned shift = 8U * std::min<unsigned>(pixel.kind, kClasses - 1);
-    if ((votes(x, y) >> shift & 0xFFU) != 0xFFU) votes(x, y) += 1U << shift;
+  };
+
+  explicit Layer(const PanoramaWindow& seen) : window(seen), cells(seen.size) {}
+  PanoramaWindow window;  // of the panorama
+  Image<Cell> cells;
+
+  // A cell of the panorama; null outside of the window.
+  const Cell* at(int x, int y) const {
+    return window.contains(x, y) ? &cells(x - window.left, y - window.top) : nullptr;
   }
+  Cell* at(int x, int y) { return window.contains(x, y) ? &cells(x - window.left, y - window.top) : nullptr; }
 };
 
 Result<DisparityMerger> DisparityMerger::create(const MergingOptions& options, const Pose& body_from_centre,
@@ -82,7 +85,7 @@ Result<DisparityMerger> DisparityMerger::create(const MergingOptions& options, c
 
 DisparityMerger::DisparityMerger(const MergingOptions& options, const Pose& body_from_centre,
                                  std::span<const ViewGeometry> views, double nearest_m, ThreadPool workers)
-    : options_(options), body_from_centre_(body_from_centre), workers_(std::move(workers)) {
+    : options_(options), nearest_m_(nearest_m), body_from_centre_(body_from_centre), workers_(std::move(workers)) {
   camera_ = plan_panorama(options.projection, options.pixels_per_degree * 180 / std::numbers::pi, body_from_centre,
                           views, nearest_m, options.max_range_m);
 }
@@ -91,7 +94,6 @@ void DisparityMerger::rasterize_view(const MergedView& view, Layer& layer) const
   const RectifiedStereo& g = view.geometry.stereo;
   const Eigen::Matrix4d m = reprojection(g, body_from_centre_.inverse() * view.geometry.body_from_left);
   const auto gate = static_cast<float>(options_.gate_sigmas);
-  const auto [width, height] = camera_.size();
   for (int v = 0; v < view.disparity.height(); ++v) {
     const double y = (v - g.centre_px.y()) / g.focal_px;
     for (int u = 0; u < view.disparity.width(); ++u) {
@@ -102,18 +104,18 @@ void DisparityMerger::rasterize_view(const MergedView& view, Layer& layer) const
       const double range = p.norm();
       const auto pixel = camera_.project(p);
       if (!pixel) continue;
-      const int column = static_cast<int>(std::lround(pixel->x())), row = static_cast<int>(std::lround(pixel->y()));
-      if (column < 0 || row < 0 || column >= width || row >= height) continue;
+      Layer::Cell* const cell =
+          layer.at(static_cast<int>(std::lround(pixel->x())), static_cast<int>(std::lround(pixel->y())));
+      if (cell == nullptr) continue;
       if (range > options_.max_range_m) {
-        layer.beyond(column, row) = 1;
+        cell->beyond = 1;
         continue;
       }
       const double x = (u - g.centre_px.x()) / g.focal_px;
       const double sigma_px = view.sigma.empty() ? options_.disparity_sigma_px : static_cast<double>(view.sigma(u, v));
       const double per_px = range_sigma(g, d, std::sqrt(1 + x * x + y * y), 1);
       const double gate_px = std::max(sigma_px, options_.disparity_sigma_px);
-      layer.add(column, row,
-                {static_cast<float>(range), static_cast<float>(per_px * per_px * sigma_px * sigma_px),
+      cell->add({static_cast<float>(range), static_cast<float>(per_px * per_px * sigma_px * sigma_px),
                  static_cast<float>(per_px * per_px * gate_px * gate_px), view.left(u, v),
                  view.classes.empty() ? std::uint8_t{0} : view.classes(u, v)},
                 gate);
@@ -160,16 +162,13 @@ void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<cons
   for (int x = 0; x < camera_.size().width; ++x) {
     std::size_t count = 0;
     for (std::size_t k = 0; k < views.size(); ++k) {
-      const Layer& layer = layers[k];
-      const int n = layer.count(x, row);
-      if (n == 0) continue;
-      candidates[count++] = {k,
-                             layer.range(x, row),
-                             layer.variance(x, row),
-                             layer.gate_variance(x, row),
-                             layer.sum_gray(x, row) / static_cast<float>(n),
-                             layer.votes(x, row),
-                             n};
+      const Layer::Cell* const cell = layers[k].at(x, row);
+      if (cell == nullptr || cell->count == 0) continue;
+      candidates[count++] = {k, cell->mean(cell->sum_range),
+                             // The mean of the pixels' variances, not the variance of their mean: errors of
+                             // neighbouring disparities are correlated.
+                             cell->mean(cell->sum_variance), cell->mean(cell->sum_gate), cell->mean(cell->sum_gray),
+                             cell->votes, cell->count};
     }
     if (count == 0) continue;
     std::sort(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count),
@@ -288,10 +287,12 @@ Image<std::uint8_t> DisparityMerger::upper_border(std::span<const MergedView> vi
     }
   });
   for (const Layer& layer : layers) {
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {
-        if (layer.beyond(x, y) == 0) continue;
-        for (int below = y + 1; below <= std::min(y + step, height - 1); ++below) border(x, below) = 1;
+    const PanoramaWindow& w = layer.window;
+    for (int y = 0; y < w.size.height; ++y) {
+      for (int x = 0; x < w.size.width; ++x) {
+        if (layer.cells(x, y).beyond == 0) continue;
+        const int row = w.top + y;
+        for (int below = row + 1; below <= std::min(row + step, height - 1); ++below) border(w.left + x, below) = 1;
       }
     }
   }
@@ -302,7 +303,11 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
   const ImageSize size = camera_.size();
   std::vector<Layer> layers;
   layers.reserve(views.size());
-  for (std::size_t k = 0; k < views.size(); ++k) layers.emplace_back(size);
+  for (const MergedView& view : views) {
+    // Wider than the panorama, because cells also know of surfaces beyond its ranges.
+    layers.emplace_back(
+        window_of(camera_, body_from_centre_, view.geometry, 0.5 * nearest_m_, 10 * options_.max_range_m));
+  }
   workers_.parallel_for(0, static_cast<int>(views.size()), 1, [&](int from, int to) {
     for (int k = from; k < to; ++k) {
       const MergedView& view = views[static_cast<std::size_t>(k)];

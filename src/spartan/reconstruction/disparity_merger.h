@@ -35,6 +35,8 @@ class PanoramicCamera {
   Projection projection() const { return projection_; }
   ImageSize size() const { return size_; }
   double per_radian() const { return per_radian_; }
+  double left_rad() const { return left_rad_; }
+  double top() const { return top_; }
   /// Pixel of a direction (not zero) in this camera's axes: x forward, y left, z up. It may lie outside of the image.
   /// None for directions straight up or down.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& direction) const;
@@ -52,6 +54,17 @@ struct ViewGeometry {
   RectifiedStereo stereo;
   Pose body_from_left;  ///< Rectified left optical frame.
 };
+
+/// A rectangle of cells of a panoramic camera.
+struct PanoramaWindow {
+  int left = 0, top = 0;
+  ImageSize size;
+  bool contains(int x, int y) const { return x >= left && y >= top && x < left + size.width && y < top + size.height; }
+};
+
+/// The cells of a camera at `body_from_centre` that a view sees at depths between `nearest_m` and `farthest_m`.
+PanoramaWindow window_of(const PanoramicCamera& camera, const Pose& body_from_centre, const ViewGeometry& view,
+                         double nearest_m, double farthest_m);
 
 /// The smallest panoramic camera at `body_from_centre` that contains everything the views see at depths between
 /// `nearest_m` and `farthest_m` from their cameras.
@@ -142,6 +155,7 @@ class DisparityMerger {
                                    const Image<float>& range_m) const;
 
   MergingOptions options_;
+  double nearest_m_;
   Pose body_from_centre_;
   PanoramicCamera camera_;
   ThreadPool workers_;

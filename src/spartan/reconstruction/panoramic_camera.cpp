@@ -33,11 +33,15 @@ Eigen::Vector3d PanoramicCamera::direction(double u, double v) const {
   return {level * std::cos(azimuth), level * std::sin(azimuth), z};
 }
 
-PanoramicCamera plan_panorama(PanoramicCamera::Projection projection, double per_radian, const Pose& body_from_centre,
-                              std::span<const ViewGeometry> views, double nearest_m, double farthest_m) {
-  constexpr int kSteps = 16;
+namespace {
+
+// Azimuths (growing to the left) and elevations of the border of a view at two depths.
+struct AngularBounds {
   double left = -10, right = 10, top = -1e9, bottom = 1e9;
-  for (const ViewGeometry& view : views) {
+
+  void add(PanoramicCamera::Projection projection, const Pose& body_from_centre, const ViewGeometry& view,
+           double nearest_m, double farthest_m) {
+    constexpr int kSteps = 16;
     const Pose centre_from_left = body_from_centre.inverse() * view.body_from_left;
     const auto [w, h] = view.stereo.size;
     for (int j = 0; j <= kSteps; ++j) {
@@ -55,14 +59,39 @@ PanoramicCamera plan_panorama(PanoramicCamera::Projection projection, double per
         }
       }
     }
+    if (projection == PanoramicCamera::Projection::cylinder) {
+      bottom = std::max(bottom, -kSteepest);
+      top = std::min(top, kSteepest);
+    }
   }
-  if (projection == PanoramicCamera::Projection::cylinder) {
-    bottom = std::max(bottom, -kSteepest);
-    top = std::min(top, kSteepest);
-  }
-  const ImageSize size{static_cast<int>(std::ceil((left - right) * per_radian)) + 1,
-                       static_cast<int>(std::ceil((top - bottom) * per_radian)) + 1};
-  return {projection, size, per_radian, left, top};
+};
+
+}  // namespace
+
+PanoramaWindow window_of(const PanoramicCamera& camera, const Pose& body_from_centre, const ViewGeometry& view,
+                         double nearest_m, double farthest_m) {
+  AngularBounds bounds;
+  bounds.add(camera.projection(), body_from_centre, view, nearest_m, farthest_m);
+  const auto column = [&](double azimuth) { return camera.per_radian() * (camera.left_rad() - azimuth); };
+  const auto row = [&](double up) { return camera.per_radian() * (camera.top() - up); };
+  // The border is sampled: a part of the window is added on each side.
+  const auto clamped = [](double from, double to, int size) {
+    const double margin = 2 + 0.05 * (to - from);
+    return std::pair(std::clamp(static_cast<int>(std::floor(from - margin)), 0, size),
+                     std::clamp(static_cast<int>(std::ceil(to + margin)) + 1, 0, size));
+  };
+  const auto [left, right] = clamped(column(bounds.left), column(bounds.right), camera.size().width);
+  const auto [top, bottom] = clamped(row(bounds.top), row(bounds.bottom), camera.size().height);
+  return {left, top, {right - left, bottom - top}};
+}
+
+PanoramicCamera plan_panorama(PanoramicCamera::Projection projection, double per_radian, const Pose& body_from_centre,
+                              std::span<const ViewGeometry> views, double nearest_m, double farthest_m) {
+  AngularBounds bounds;
+  for (const ViewGeometry& view : views) bounds.add(projection, body_from_centre, view, nearest_m, farthest_m);
+  const ImageSize size{static_cast<int>(std::ceil((bounds.left - bounds.right) * per_radian)) + 1,
+                       static_cast<int>(std::ceil((bounds.top - bounds.bottom) * per_radian)) + 1};
+  return {projection, size, per_radian, bounds.left, bounds.top};
 }
 
 }  // namespace spartan
