@@ -20,9 +20,9 @@
 #include "stereo_speed.h"
 #include "stereo_variants.h"
 
+namespace spartan {
 namespace {
 
-using namespace spartan;  // NOLINT(google-build-using-namespace): a benchmark
 namespace fs = std::filesystem;
 
 // Percentages of pixels, and px.
@@ -216,7 +216,8 @@ void run(const std::vector<std::string>& words) {
 }
 
 }  // namespace
+}  // namespace spartan
 
 int main(int argc, char** argv) {
-  return run_benchmark(argc, argv, run);
+  return spartan::run_benchmark(argc, argv, spartan::run);
 }

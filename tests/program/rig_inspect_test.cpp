@@ -116,14 +116,16 @@ TEST(RigInspect, CorrectedK10SeesFlatGroundAndRocks) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "no k10_pair; SPARTAN_DATA says where it is";
   const testing::TemporaryFolder folder;
   // Level is where the ground is: the rover leans forward by 6.8° to it.
-  const auto build = [&](const std::string& rig) {
-    const auto result =
-        run_program({"map", "build", data + "/left4.png", data + "/right4.png", "--rig",
-                     testing::source_folder() + "/config/rigs/" + rig + ".yaml", "-o", folder.path() + "/" + rig,
-                     "--extent-m", "9", "--gravity", "0.118,0,-0.993", "--json"});
+  const auto build = [&](const std::string& rig, const std::string& outlier_percent = "20") {
+    const auto result = run_program({"map", "build", data + "/left4.png", data + "/right4.png", "--rig",
+                                     testing::source_folder() + "/config/rigs/" + rig + ".yaml", "-o",
+                                     folder.path() + "/" + rig, "--extent-m", "9", "--gravity", "0.118,0,-0.993",
+                                     "--json", "--force", "--set", "mapping.max_outlier_percent=" + outlier_percent});
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return json::parse(result.out);
   };
+  // With more disparities kept: more of the ground is free, too.
+  EXPECT_GT(build("k10_corrected", "60")["cells"]["free"], build("k10", "60")["cells"]["free"]);
   const json given = build("k10"), corrected = build("k10_corrected");
   EXPECT_LT(corrected["cells"]["obstacle"], 0.5 * given["cells"]["obstacle"].get<double>());
   const auto free_share = [](const json& map) {

@@ -108,7 +108,9 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   result.disparity = s.disparity.view();
   result.sigma = s.sigma.view();
   result.outlier_percent = s.outlier_percent.view();
-  result.buffer_bytes = s.matcher.buffer_bytes() + s.refinement.buffer_bytes();
+  result.buffer_bytes = s.matcher.buffer_bytes() + s.refinement.buffer_bytes() + s.speckles.buffer_bytes() +
+                        static_cast<std::size_t>(left.height()) *
+                            static_cast<std::size_t>(8 * s.disparity.stride() + s.outlier_percent.stride());
   return result;
 }
 

@@ -17,7 +17,7 @@ TEST(DisparityMemory, TheEstimateIsAnUpperBoundAndNotFarOff) {
       const auto used = static_cast<double>(result->buffer_bytes);
       const auto estimate = static_cast<double>(DisparityComputer::memory_bytes(size, range, 1));
       EXPECT_GE(estimate, used) << size.width << " " << range.min;
-      EXPECT_LE(estimate, 1.8 * used) << size.width << " " << range.min;
+      EXPECT_LE(estimate, 1.6 * used) << size.width << " " << range.min;
     }
   }
 }

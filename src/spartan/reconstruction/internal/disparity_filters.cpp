@@ -174,4 +174,13 @@ void SpeckleFilter::apply(const SpeckleRule& rule, const ThreadPool& workers, Im
   });
 }
 
+std::size_t SpeckleFilter::buffer_bytes() const {
+  std::size_t total = runs_.capacity() * sizeof(Run);
+  for (const Band& band : bands_) {
+    total += band.runs.capacity() * sizeof(Run) +
+             (band.first.capacity() + band.above.capacity() + band.here.capacity()) * sizeof(int);
+  }
+  return total;
+}
+
 }  // namespace spartan::internal

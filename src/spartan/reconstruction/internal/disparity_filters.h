@@ -1,6 +1,7 @@
 // Checks and filters that discard unreliable disparities. Unknown is NaN throughout.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -33,6 +34,7 @@ struct SpeckleRule {
 class SpeckleFilter {
  public:
   void apply(const SpeckleRule& rule, const ThreadPool& workers, ImageView<float> disparity);
+  std::size_t buffer_bytes() const;
 
  private:
   struct Run {
