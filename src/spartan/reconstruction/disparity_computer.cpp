@@ -17,13 +17,6 @@ namespace spartan {
 
 using namespace internal;
 
-namespace {
-
-// Unrelated noise has patches of consistent disparities, too, but hardly pixels as reliable as this.
-constexpr int kReliable_percent = 7;
-
-}  // namespace
-
 struct DisparityComputer::State {
   State(const DisparityOptions& options_in, const ThreadPool& workers_in)
       : options(options_in),
@@ -97,12 +90,13 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   }
   times.filter = watch.lap();
   s.refinement.refine(left, right, s.disparity);
-  matching::assess({s.refinement.information(), matches.right_distance, s.options.max_outlier_percent}, s.kernels,
-                   s.workers, {s.disparity, s.sigma, s.outlier_percent});
+  const matching::Assessed assessed{s.disparity, s.sigma, s.outlier_percent, s.refinement.textured()};
+  matching::assess(
+      {s.refinement.information(), s.refinement.relief(), matches.right_distance, s.options.max_outlier_percent},
+      s.kernels, s.workers, assessed);
   times.refine = watch.lap();
-  s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, s.outlier_percent, kReliable_percent},
-                   s.workers, s.disparity);
-  matching::clear_unknown(s.workers, {s.disparity, s.sigma, s.outlier_percent});
+  s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, assessed.reliable}, s.workers, s.disparity);
+  matching::clear_unknown(s.workers, assessed);
   times.filter += watch.lap();
   times.total = all.lap();
   result.disparity = s.disparity.view();

@@ -85,7 +85,7 @@ struct DisparityOptions {
   double p2_falloff_levels = 10;  ///< Gray-level change that halves P2, levels of an 8-bit image.
   int out_of_view_cost = 11;      ///< Matching cost where x − d lies outside of the right image, census bits.
   bool median = true;             ///< Whether to apply a 3×3 median filter.
-  int max_outlier_percent = 80;   ///< Largest outlier probability of a disparity that is kept, percent.
+  int max_outlier_percent = 88;   ///< Largest outlier probability of a disparity that is kept, percent.
   int speckle_size_px = 100;      ///< Minimum size of a connected component, reliable pixels; 0: no speckle filter.
   double speckle_step_px = 2;     ///< Largest disparity difference within a component, pixels.
   SimdTarget simd = SimdTarget::automatic;  ///< SIMD instruction set

@@ -60,6 +60,18 @@ TEST(UnknownDisparity, ConstantImages) {
   EXPECT_LE(known_percent(shading, shading), 1) << "a gray-level ramp";
 }
 
+// Shading with noise: the images have contrast in common, but nothing that can be matched.
+TEST(UnknownDisparity, NoisyShading) {
+  for (const double slope : {0.13, 0.31, 0.5}) {
+    for (const double sigma : {0.7, 2.0}) {
+      const auto shading = [=](std::uint64_t seed) -> Gray {
+        return [=, noise = noisy(0, sigma, seed)](int x, int y) { return 60 + slope * x + 0.2 * y + noise(x, y); };
+      };
+      EXPECT_LE(known_percent(shading(1), shading(2)), 1) << slope << ", " << sigma;
+    }
+  }
+}
+
 TEST(UnknownDisparity, UnrelatedNoise) {
   for (const double sigma : {5.0, 20.0, 60.0})
     EXPECT_LE(known_percent(noisy(128, sigma, 1), noisy(128, sigma, 2)), 1) << sigma;

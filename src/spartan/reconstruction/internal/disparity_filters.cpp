@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace spartan::internal {
@@ -125,10 +126,9 @@ void SpeckleFilter::find_runs(const SpeckleRule& rule, ImageView<const float> di
       do band.here[static_cast<std::size_t>(x++)] = run;
       while (x < w && std::abs(row[x] - row[x - 1]) <= step);
       int pixels = x - from;
-      if (!rule.outlier_percent.empty()) {
-        const std::uint8_t* const outlier = rule.outlier_percent.row(y);
-        pixels = static_cast<int>(std::count_if(outlier + from, outlier + x,
-                                                [&](std::uint8_t percent) { return percent <= rule.most_percent; }));
+      if (!rule.reliable.empty()) {
+        const std::uint8_t* const reliable = rule.reliable.row(y);
+        pixels = std::accumulate(reliable + from, reliable + x, 0);
       }
       band.runs.push_back({y, from, x, run, pixels});
     }

@@ -20,13 +20,11 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
 void median_3x3(ImageView<const float> in, bool (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
                 ImageView<float> out);
 
-/// A component of a disparity image is kept where it has enough reliable pixels: those whose outlier probability is at
-/// most most_percent; all pixels where `outlier_percent` is empty.
+/// A component of a disparity image is kept where it has enough reliable pixels.
 struct SpeckleRule {
-  int size_px = 0;     ///< Smallest number of reliable pixels; 0: every component is kept.
-  double step_px = 0;  ///< Neighbours are connected where their disparities differ by at most this.
-  ImageView<const std::uint8_t> outlier_percent;
-  int most_percent = 0;
+  int size_px = 0;                         ///< Smallest number of reliable pixels; 0: every component is kept.
+  double step_px = 0;                      ///< Neighbours are connected where their disparities differ by at most this.
+  ImageView<const std::uint8_t> reliable;  ///< 1 or 0; empty: every pixel is.
 };
 
 /// Discards the 4-connected components that are too small. Method: connected-component labelling by runs along the rows

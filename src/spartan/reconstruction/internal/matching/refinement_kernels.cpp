@@ -133,30 +133,30 @@ void warp_row(const WarpRow& r) {
     const auto left = [&](int dx)
                           HWY_ATTR { return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(bytes, r.left + x + dx))); };
     const auto left_slope = hn::Mul(half, hn::Sub(left(1), left(-1)));
-    const auto gradient = hn::Mul(constant(-4), hn::Add(slope, left_slope));
     const auto put = [&](FloatVector v, std::int16_t* to)
                          HWY_ATTR { store_shorts(hn::NearestInt(hn::IfThenElse(known, v, zero)), to + x); };
     put(constant(1), r.known);
     put(hn::Mul(constant(16), left(0)), r.gray);
     put(hn::Mul(constant(16), value), r.warped);
-    put(gradient, r.gradient);
+    put(hn::Mul(constant(-4), hn::Add(slope, left_slope)), r.gradient);
+    put(hn::Mul(constant(-4), hn::Sub(slope, left_slope)), r.difference);
   }
 }
 
 struct FitValues {
-  IntVector n, l, r, g;
+  IntVector n, l, r, g, q;
 };
 HWY_INLINE FitValues load_values(const ColumnUpdate::Row& row, int x) {
   return {load_shorts(row.known + x), load_shorts(row.gray + x), load_shorts(row.warped + x),
-          load_shorts(row.gradient + x)};
+          load_shorts(row.gradient + x), load_shorts(row.difference + x)};
 }
 
 void update_columns(const ColumnUpdate& u) {
   const Ints d;
   for (int x = 0; x < u.width; x += static_cast<int>(hn::Lanes(d))) {
     const auto none = hn::Zero(d);
-    const FitValues in = u.add != nullptr ? load_values(*u.add, x) : FitValues{none, none, none, none};
-    const FitValues out = u.subtract != nullptr ? load_values(*u.subtract, x) : FitValues{none, none, none, none};
+    const FitValues in = u.add != nullptr ? load_values(*u.add, x) : FitValues{none, none, none, none, none};
+    const FitValues out = u.subtract != nullptr ? load_values(*u.subtract, x) : FitValues{none, none, none, none, none};
     const auto change = [&](FitSum sum, IntVector by) HWY_ATTR {
       std::int32_t* const to = u.columns[sum] + x;
       hn::StoreU(hn::Add(hn::LoadU(d, to), by), d, to);
@@ -167,12 +167,14 @@ void update_columns(const ColumnUpdate& u) {
     change(kL, hn::Sub(in.l, out.l));
     change(kR, hn::Sub(in.r, out.r));
     change(kG, hn::Sub(in.g, out.g));
+    change(kQ, hn::Sub(in.q, out.q));
     product(kLL, in.l, in.l, out.l, out.l);
     product(kLR, in.l, in.r, out.l, out.r);
     product(kRR, in.r, in.r, out.r, out.r);
     product(kLG, in.l, in.g, out.l, out.g);
     product(kRG, in.r, in.g, out.r, out.g);
     product(kGG, in.g, in.g, out.g, out.g);
+    product(kQQ, in.q, in.q, out.q, out.q);
   }
 }
 
@@ -190,6 +192,7 @@ constexpr float kLeastInformation = 1e-4F;
 
 void fit_row(const FitRow& r) {
   const Floats d;
+  const hn::Rebind<std::uint8_t, Floats> bytes;
   const auto zero = hn::Zero(d);
   const auto noise2 = constant(r.noise_levels * r.noise_levels);
   const auto prior = constant(1 / (r.prior_px * r.prior_px));
@@ -201,13 +204,15 @@ void fit_row(const FitRow& r) {
     const auto each = hn::Div(constant(1), n);
     // Means and covariances in gray levels.
     const auto level = hn::Mul(each, constant(1.0F / 16)), slope = hn::Mul(each, constant(1.0F / 8));
-    const auto ml = hn::Mul(sum(kL), level), mr = hn::Mul(sum(kR), level), mg = hn::Mul(sum(kG), slope);
+    const auto ml = hn::Mul(sum(kL), level), mr = hn::Mul(sum(kR), level);
+    const auto mg = hn::Mul(sum(kG), slope), mq = hn::Mul(sum(kQ), slope);
     const auto covariance = [&](FitSum which, float scale, FloatVector a, FloatVector b) HWY_ATTR {
       return hn::Sub(hn::Mul(sum(which), hn::Mul(each, constant(scale))), hn::Mul(a, b));
     };
     const auto ll = covariance(kLL, 1.0F / 256, ml, ml), lr = covariance(kLR, 1.0F / 256, ml, mr),
                rr = covariance(kRR, 1.0F / 256, mr, mr), lg = covariance(kLG, 1.0F / 128, ml, mg),
-               rg = covariance(kRG, 1.0F / 128, mr, mg), gg = covariance(kGG, 1.0F / 64, mg, mg);
+               rg = covariance(kRG, 1.0F / 128, mr, mg), gg = covariance(kGG, 1.0F / 64, mg, mg),
+               qq = covariance(kQQ, 1.0F / 64, mq, mq);
     const auto gain = hn::Min(
         hn::Max(hn::Div(hn::Add(lr, contrast), hn::Add(hn::Max(rr, zero), contrast)), constant(0.6F)), constant(1.6F));
     const auto residual =
@@ -217,9 +222,9 @@ void fit_row(const FitRow& r) {
     const auto slope_gain = hn::Div(hn::Mul(constant(2), gain), hn::Add(gain, constant(1)));
     const auto h = hn::Mul(hn::Mul(hn::Mul(slope_gain, slope_gain), n), hn::Max(gg, zero));
     const auto b = hn::Mul(hn::Mul(slope_gain, n), hn::Sub(lg, hn::Mul(gain, rg)));
-    const auto contrasts = hn::Sqrt(hn::Mul(hn::Max(ll, zero), hn::Max(rr, zero)));
-    const auto common = hn::Div(hn::Max(lr, zero), hn::Max(contrasts, constant(1e-3F)));
-    const auto texture = hn::Mul(hn::Div(h, s2), hn::Min(common, constant(1)));
+    // Gradients of noise have nothing in common: cov(g_l, g_r) = var(g) − var(q) with half the difference q.
+    const auto shared = hn::Mul(hn::Mul(hn::Mul(slope_gain, slope_gain), n), hn::Max(hn::Sub(gg, qq), zero));
+    const auto texture = hn::Div(shared, s2);
     const auto information = hn::Add(texture, prior);
     // Too few pixels of the window are known where the fit has no freedom left.
     const auto enough = hn::Ge(n, constant(8));
@@ -229,6 +234,36 @@ void fit_row(const FitRow& r) {
     hn::StoreU(hn::Add(hn::LoadU(d, r.disparity + x), hn::IfThenElseZero(enough, bounded)), d, r.disparity + x);
     hn::StoreU(hn::IfThenElse(blank, constant(kLeastInformation), hn::IfThenElse(enough, information, prior)), d,
                r.information + x);
+    const auto correlated = hn::Ge(hn::Sub(gg, qq), hn::Mul(constant(r.least_correlation), hn::Add(gg, qq)));
+    const auto textured =
+        hn::IfThenElseZero(hn::And(correlated, hn::Ge(texture, constant(r.least_texture))), constant(1));
+    hn::StoreU(hn::DemoteTo(bytes, hn::NearestInt(textured)), bytes, r.textured + x);
+  }
+}
+
+void relief_row(const ReliefRow& r) {
+  const Floats d;
+  const auto one = constant(1);
+  for (int x = 0; x < r.width; x += static_cast<int>(hn::Lanes(d))) {
+    const auto doubled = hn::Mul(constant(2), hn::LoadU(d, r.disparity + x));
+    const auto mean_of = [&](int i) HWY_ATTR {
+      const int s = ReliefRow::kSteps[i];
+      auto sum = hn::Zero(d), count = sum;
+      const auto pair = [&](const float* first, const float* second) HWY_ATTR {
+        const auto change = hn::Sub(hn::Add(hn::LoadU(d, first), hn::LoadU(d, second)), doubled);
+        const auto known = hn::Eq(change, change);
+        const auto bounded = hn::Min(hn::Abs(hn::IfThenElseZero(known, change)), constant(2));
+        sum = hn::Add(sum, hn::Mul(bounded, bounded));
+        count = hn::Add(count, hn::IfThenElseZero(known, one));
+      };
+      pair(r.disparity + x + s, r.disparity + x - s);
+      pair(r.below[i] + x, r.above[i] + x);
+      pair(r.below[i] + x + s, r.above[i] + x - s);
+      pair(r.below[i] + x - s, r.above[i] + x + s);
+      const auto none = hn::Eq(count, hn::Zero(d));
+      return hn::Mul(constant(0.25F), hn::Div(hn::IfThenElse(none, one, sum), hn::Max(count, one)));
+    };
+    hn::StoreU(hn::Add(mean_of(0), hn::Mul(constant(0.25F), mean_of(1))), d, r.relief + x);
   }
 }
 
@@ -245,6 +280,8 @@ HWY_INLINE FloatVector about_exp2(FloatVector v) {
   return hn::BitCast(Floats(), hn::ConvertTo(Ints(), bits));
 }
 
+constexpr float kLeastRelief_px2 = 0.01F;
+
 void reliability_row(const ReliabilityRow& r) {
   const Floats d;
   const Ints di;
@@ -256,16 +293,22 @@ void reliability_row(const ReliabilityRow& r) {
   for (int x = 0; x < r.width; x += lanes) {
     const auto information = hn::LoadU(d, r.information + x);
     const auto distance = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(bytes, r.right_distance + x)));
+    const auto relief = hn::LoadU(d, r.relief + x);
     const auto logit =
         hn::Add(hn::Add(constant(m.offset), hn::Mul(constant(m.distance), about_log2(hn::Add(one, distance)))),
-                hn::Mul(constant(m.information), about_log2(information)));
+                hn::Add(hn::Mul(constant(m.information), about_log2(information)),
+                        hn::Mul(constant(m.relief), about_log2(hn::Add(relief, constant(kLeastRelief_px2))))));
     // p = 1 / (1 + e^−logit)
     const auto octaves = hn::Min(hn::Max(hn::Mul(logit, constant(-kOctavesPerLogit)), constant(-30)), constant(30));
     const auto percent = hn::Div(constant(100), hn::Add(one, about_exp2(octaves)));
-    const auto variance =
+    const auto noise =
         hn::Add(hn::Div(constant(m.scale_px * m.scale_px), information), constant(m.floor_px * m.floor_px));
+    const auto variance = hn::Add(noise, hn::Mul(constant(m.relief_scale * m.relief_scale), relief));
     const auto rounded = hn::NearestInt(percent);
     hn::StoreU(hn::DemoteTo(bytes, rounded), bytes, r.outlier_percent + x);
+    const auto reliable = hn::IfThenElseZero(hn::Le(hn::ConvertTo(d, rounded), constant(m.reliable_percent)),
+                                             hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(bytes, r.reliable + x))));
+    hn::StoreU(hn::DemoteTo(bytes, hn::NearestInt(reliable)), bytes, r.reliable + x);
     hn::StoreU(hn::Sqrt(variance), d, r.sigma + x);
     const auto disparity = hn::LoadU(d, r.disparity + x);
     const auto kept = hn::Le(hn::ConvertTo(d, rounded), constant(r.most_percent));
@@ -284,12 +327,14 @@ HWY_EXPORT(smooth_row);
 HWY_EXPORT(warp_row);
 HWY_EXPORT(update_columns);
 HWY_EXPORT(fit_row);
+HWY_EXPORT(relief_row);
 HWY_EXPORT(reliability_row);
 
 RefinementKernels refinement_kernels_for(std::size_t target_index) {
-  return {HWY_DISPATCH_TABLE(median_row)[target_index], HWY_DISPATCH_TABLE(smooth_row)[target_index],
-          HWY_DISPATCH_TABLE(warp_row)[target_index],   HWY_DISPATCH_TABLE(update_columns)[target_index],
-          HWY_DISPATCH_TABLE(fit_row)[target_index],    HWY_DISPATCH_TABLE(reliability_row)[target_index]};
+  return {HWY_DISPATCH_TABLE(median_row)[target_index],     HWY_DISPATCH_TABLE(smooth_row)[target_index],
+          HWY_DISPATCH_TABLE(warp_row)[target_index],       HWY_DISPATCH_TABLE(update_columns)[target_index],
+          HWY_DISPATCH_TABLE(fit_row)[target_index],        HWY_DISPATCH_TABLE(relief_row)[target_index],
+          HWY_DISPATCH_TABLE(reliability_row)[target_index]};
 }
 
 }  // namespace spartan::internal::matching

@@ -8,9 +8,9 @@ namespace spartan::internal::matching {
 void assess(const Evidence& evidence, const RefinementKernels& kernels, const ThreadPool& workers, const Assessed& to) {
   workers.parallel_for(0, to.disparity.height(), 32, [&](int from, int end) {
     for (int y = from; y < end; ++y) {
-      kernels.reliability_row({evidence.information.row(y), evidence.right_distance.row(y), to.disparity.row(y),
-                               to.sigma.row(y), to.outlier_percent.row(y), to.disparity.width(),
-                               static_cast<float>(evidence.most_percent), kReliability});
+      kernels.reliability_row({evidence.information.row(y), evidence.relief.row(y), evidence.right_distance.row(y),
+                               to.disparity.row(y), to.sigma.row(y), to.outlier_percent.row(y), to.reliable.row(y),
+                               to.disparity.width(), static_cast<float>(evidence.most_percent), kReliability});
     }
   });
 }

@@ -10,13 +10,15 @@
 namespace spartan::internal::matching {
 
 /// Logistic regression of |error| > 1 px, and standard deviation of the other errors. Fitted to real pairs (Middlebury,
-/// ETH3D) and simulated ones, which count equally. Neighbouring fits share pixels, which the information does not know:
-/// hence the scale.
-inline constexpr ReliabilityModel kReliability{4.586F, 0.571F, -0.882F, 4.5F, 0.04F};
+/// ETH3D) and simulated ones, which count equally (sigma to the simulated ones). Neighbouring fits share pixels, which
+/// the information does not know: hence the scale. Unrelated noise has patches of consistent disparities, too, but
+/// hardly pixels with an outlier probability as small as that of reliable ones.
+inline constexpr ReliabilityModel kReliability{2.502F, 0.474F, -0.525F, 0.396F, 7.0F, 2.97F, 0.97F, 0.02F};
 
 /// What the assessment reads and what it writes. Rows are padded to 64 bytes, as those of Image.
 struct Evidence {
   ImageView<const float> information;  ///< px⁻²
+  ImageView<const float> relief;       ///< px²
   ImageView<const std::uint8_t> right_distance;
   int most_percent;  ///< Disparities with a larger outlier probability are discarded.
 };
@@ -24,6 +26,7 @@ struct Assessed {
   ImageView<float> disparity;
   ImageView<float> sigma;  ///< px
   ImageView<std::uint8_t> outlier_percent;
+  ImageView<std::uint8_t> reliable;  ///< 1 or 0; in: whether the window of the fit has texture.
 };
 
 /// Sets sigma and outlier probability of all pixels, and discards the disparities that are too unlikely.

@@ -15,33 +15,39 @@ namespace {
 struct Result {
   int outlier_percent;
   double sigma_px;
-  bool kept;
+  bool kept, reliable;
 };
 
 class Reliability : public ::testing::TestWithParam<SimdTarget> {
  protected:
-  // Of pixels of one information and the right distances 0, 1, 2 ….
-  static std::vector<Result> assessed(float information, int count, int most_percent = 100) {
-    Image<float> informations(count + 64, 1, information), disparity(count, 1, 7.0F), sigma(count, 1);
-    Image<std::uint8_t> distance(count, 1), percent(count, 1);
+  // Of pixels of one information and relief and the right distances 0, 1, 2 ….
+  static std::vector<Result> assessed(float information, int count, int most_percent = 100, float relief = 0,
+                                      bool has_texture = true) {
+    Image<float> informations(count + 64, 1, information), reliefs(count + 64, 1, relief);
+    Image<float> disparity(count, 1, 7.0F), sigma(count, 1);
+    Image<std::uint8_t> distance(count, 1), percent(count, 1), reliable(count, 1, std::uint8_t{has_texture});
     for (int x = 0; x < count; ++x) distance(x, 0) = static_cast<std::uint8_t>(x);
-    assess({informations.view().crop(0, 0, count, 1), distance, most_percent},
-           refinement_kernels_for(simd_target_index(GetParam())), ThreadPool(1), {disparity, sigma, percent});
+    assess({informations.view().crop(0, 0, count, 1), reliefs.view().crop(0, 0, count, 1), distance, most_percent},
+           refinement_kernels_for(simd_target_index(GetParam())), ThreadPool(1), {disparity, sigma, percent, reliable});
     std::vector<Result> results;
     results.reserve(static_cast<std::size_t>(count));
     for (int x = 0; x < count; ++x)
-      results.push_back({percent(x, 0), static_cast<double>(sigma(x, 0)), !std::isnan(disparity(x, 0))});
+      results.push_back(
+          {percent(x, 0), static_cast<double>(sigma(x, 0)), !std::isnan(disparity(x, 0)), reliable(x, 0) == 1});
     return results;
   }
 };
 
-TEST_P(Reliability, IsTheLogisticFunctionOfInformationAndRightDistance) {
+TEST_P(Reliability, IsTheLogisticFunctionOfInformationReliefAndRightDistance) {
   for (const double information : {2.5, 8.0, 40.0, 300.0, 5000.0}) {
-    const auto results = assessed(static_cast<float>(information), 17);
-    for (const int distance : {0, 1, 3, 16}) {
-      const double logit = 4.586 + 0.571 * std::log2(1.0 + distance) - 0.882 * std::log2(information);
-      EXPECT_NEAR(results[static_cast<std::size_t>(distance)].outlier_percent, 100 / (1 + std::exp(-logit)), 4)
-          << information << ", " << distance;
+    for (const double relief : {0.0, 0.02, 0.3, 1.25}) {
+      const auto results = assessed(static_cast<float>(information), 17, 100, static_cast<float>(relief));
+      for (const int distance : {0, 1, 3, 16}) {
+        const double logit = 2.502 + 0.474 * std::log2(1.0 + distance) - 0.525 * std::log2(information) +
+                             0.396 * std::log2(relief + 0.01);
+        EXPECT_NEAR(results[static_cast<std::size_t>(distance)].outlier_percent, 100 / (1 + std::exp(-logit)), 4)
+            << information << ", " << relief << ", " << distance;
+      }
     }
   }
 }
@@ -59,21 +65,31 @@ TEST_P(Reliability, OutliersAreLessLikelyWithInformationAndMoreWithDistance) {
 }
 
 TEST_P(Reliability, SigmaFallsToAFloor) {
-  EXPECT_NEAR(assessed(100, 1)[0].sigma_px, std::sqrt(4.5 * 4.5 / 100 + 0.04 * 0.04), 1e-6);
-  EXPECT_NEAR(assessed(1e9F, 1)[0].sigma_px, 0.04, 1e-3);
+  EXPECT_NEAR(assessed(100, 1)[0].sigma_px, std::sqrt(2.97 * 2.97 / 100 + 0.02 * 0.02), 1e-6);
+  EXPECT_NEAR(assessed(1e9F, 1)[0].sigma_px, 0.02, 1e-3);
+}
+
+TEST_P(Reliability, SigmaHoldsTheRelief) {
+  EXPECT_NEAR(assessed(100, 1, 100, 0.3F)[0].sigma_px, std::sqrt(2.97 * 2.97 / 100 + 0.97 * 0.97 * 0.3 + 0.02 * 0.02), 1e-6);
 }
 
 TEST_P(Reliability, DiscardsWhatIsTooUnlikely) {
   EXPECT_TRUE(assessed(1000, 1, 70)[0].kept);
-  EXPECT_FALSE(assessed(4, 1, 70)[0].kept);
-  EXPECT_TRUE(assessed(4, 1, 100)[0].kept);
+  EXPECT_FALSE(assessed(2, 1, 70, 0.3F)[0].kept);
+  EXPECT_TRUE(assessed(2, 1, 100, 0.3F)[0].kept);
+}
+
+TEST_P(Reliability, APixelIsReliableWithTextureAndASmallProbability) {
+  EXPECT_TRUE(assessed(1e6F, 1)[0].reliable);
+  EXPECT_FALSE(assessed(1e6F, 1, 100, 0, false)[0].reliable);
+  EXPECT_FALSE(assessed(8, 1, 100, 0.1F)[0].reliable);
 }
 
 TEST(UnknownReliability, IsUnknown) {
   Image<float> disparity(2, 1, 7.0F), sigma(2, 1, 0.1F);
   Image<std::uint8_t> percent(2, 1, std::uint8_t{3});
   disparity(1, 0) = std::numeric_limits<float>::quiet_NaN();
-  clear_unknown(ThreadPool(1), {disparity, sigma, percent});
+  clear_unknown(ThreadPool(1), {disparity, sigma, percent, {}});
   EXPECT_EQ(sigma(0, 0), 0.1F);
   EXPECT_EQ(percent(0, 0), 3);
   EXPECT_TRUE(std::isnan(sigma(1, 0)));

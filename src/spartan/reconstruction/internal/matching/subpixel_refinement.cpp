@@ -13,15 +13,19 @@ namespace {
 constexpr int kGrayPad = kRowPadding;  // columns before the first pixel of the gray images
 constexpr int kFitBand = 64;           // rows of one part of the fit
 constexpr int kWindow = 2 * kFitRadius + 1;
+constexpr std::size_t kFitRows = 5;  // of one row of the image: see WarpRow
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 // Noise of gray levels that the fit assumes at least, and standard deviation of disparities before the fit.
-constexpr float kNoise_levels = 1.5F, kPrior_px = 0.5F;
-// Distances of the pairs of each smoothing, and the bounds of SmoothRow. Steps that double reach far at few operations
-// (à trous; Dammertz et al., High Performance Graphics 2010).
+constexpr float kNoise_levels = 1.5F, kPrior_px = 0.7F;
+// Of a window that has texture: information of its own, px⁻², and correlation of the gradients of both images.
+constexpr float kLeastTexture = 1, kLeastCorrelation = 0.3F;
+// Distances of the pairs of each smoothing, and the bounds of SmoothRow. Long steps reach far at few operations (à
+// trous; Dammertz et al., High Performance Graphics 2010). After the fit they begin at half of its window: nearer
+// neighbours have the same pixels.
 constexpr std::array<int, 2> kStepsBeforeFit{1, 2};
-constexpr std::array<int, 3> kStepsAfterFit{1, 2, 4};
-constexpr float kToleranceBefore_px = 1.5F, kToleranceAfter_px = 0.7F, kLeastTolerance_px = 0.2F, kToleranceSigmas = 3;
+constexpr std::array<int, 3> kStepsAfterFit{4, 8, 2};
+constexpr float kToleranceBefore_px = 1.5F, kToleranceAfter_px = 0.7F, kLeastTolerance_px = 0.1F, kToleranceSigmas = 2.5F;
 // Pairs raise the information by this share of their own: fits of neighbours share most of their pixels.
 constexpr float kGrowth = 0.3F;
 
@@ -38,6 +42,7 @@ void SubpixelRefinement::resize(ImageSize size) {
   right_ = Image<std::uint8_t>(w + 2 * kGrayPad, h);
   for (Image<float>& image : disparity_) image = Image<float>(wide, h, kUnknown);
   for (Image<float>& image : information_) image = Image<float>(wide, h);
+  textured_ = Image<std::uint8_t>(w + kRowPadding, h);
   no_disparity_ = Image<float>(wide, 1, kUnknown);
   no_information_ = Image<float>(wide, 1);
   size_ = size;
@@ -70,18 +75,35 @@ void SubpixelRefinement::smooth(const Smoothing& by) {
   std::swap(information_[0], information_[1]);
 }
 
+void SubpixelRefinement::measure_relief() {
+  workers_.parallel_for(0, size_.height, 32, [&](int from, int to) {
+    for (int y = from; y < to; ++y) {
+      const auto row = [&](int at) {
+        return (at >= 0 && at < size_.height ? disparity_[0].row(at) : no_disparity_.row(0)) + kPad;
+      };
+      constexpr auto& step = ReliefRow::kSteps;
+      kernels_.relief_row({{row(y - step[0]), row(y - step[1])},
+                           {row(y + step[0]), row(y + step[1])},
+                           row(y),
+                           information_[1].row(y) + kPad,
+                           size_.width});
+    }
+  });
+}
+
 void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
   const auto stride = static_cast<std::size_t>(size_.width + kRowPadding);
   const std::size_t column_stride = stride + 2 * kFitRadius;
-  b.rows.resize(std::max(b.rows.size(), 4 * kWindow * stride));
+  b.rows.resize(std::max(b.rows.size(), kFitRows * kWindow * stride));
   b.columns.assign(std::max(b.columns.size(), kFitSums * column_stride), 0);
   const auto row_of = [&](int y) {
-    std::int16_t* const first = b.rows.data() + static_cast<std::size_t>(y % kWindow) * 4 * stride;
-    return std::array<std::int16_t*, 4>{first, first + stride, first + 2 * stride, first + 3 * stride};
+    std::int16_t* const first = b.rows.data() + static_cast<std::size_t>(y % kWindow) * kFitRows * stride;
+    return std::array<std::int16_t*, kFitRows>{first, first + stride, first + 2 * stride, first + 3 * stride,
+                                               first + 4 * stride};
   };
   const auto values_of = [&](int y) {
     const auto row = row_of(y);
-    return ColumnUpdate::Row{row[0], row[1], row[2], row[3]};
+    return ColumnUpdate::Row{row[0], row[1], row[2], row[3], row[4]};
   };
   ColumnUpdate update{};
   FitRow fit{};
@@ -92,6 +114,8 @@ void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
   update.width = fit.width = size_.width;
   fit.noise_levels = kNoise_levels;
   fit.prior_px = kPrior_px;
+  fit.least_texture = kLeastTexture;
+  fit.least_correlation = kLeastCorrelation;
   const int first = std::max(0, from - kFitRadius), end = std::min(size_.height, to + kFitRadius);
   for (int y = first; y < to + kFitRadius; ++y) {
     const int leaves = y - kWindow;
@@ -103,7 +127,7 @@ void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
     if (y < end) {
       const auto to_row = row_of(y);
       kernels_.warp_row({left_.row(y) + kGrayPad, right_.row(y) + kGrayPad, disparity_[0].row(y) + kPad, to_row[0],
-                         to_row[1], to_row[2], to_row[3], size_.width});
+                         to_row[1], to_row[2], to_row[3], to_row[4], size_.width});
       const ColumnUpdate::Row in = values_of(y);
       update.add = &in;
       update.subtract = nullptr;
@@ -116,6 +140,7 @@ void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
     std::copy_n(disparity_[0].row(centre), disparity_[0].width(), disparity_[1].row(centre));
     fit.disparity = disparity_[1].row(centre) + kPad;
     fit.information = information_[1].row(centre) + kPad;
+    fit.textured = textured_.row(centre);
     kernels_.fit_row(fit);
     std::fill_n(fit.disparity + size_.width, kPad, kUnknown);
   }
@@ -163,13 +188,14 @@ void SubpixelRefinement::refine(ImageView<const std::uint8_t> left, ImageView<co
   fit(left, right);
   for (const int step : kStepsAfterFit)
     smooth({step, kToleranceAfter_px, kLeastTolerance_px, kToleranceSigmas, kGrowth});
+  measure_relief();
   for_rows([&](int y) { std::memcpy(disparity.row(y), disparity_[0].row(y) + kPad, row_bytes); });
 }
 
 std::int64_t SubpixelRefinement::memory_bytes(ImageSize size, int threads) {
   const std::int64_t w = size.width, h = size.height;
-  const std::int64_t images = h * (2 * (w + 3 * kRowPadding) + 4 * 4 * (w + 2 * kPad + kRowPadding));
-  const std::int64_t rows = (2 * 4 * kWindow + 4 * kFitSums) * (w + kRowPadding + 2 * kFitRadius);
+  const std::int64_t images = h * (3 * (w + 3 * kRowPadding) + 4 * 4 * (w + 2 * kPad + kRowPadding));
+  const std::int64_t rows = (2 * kFitRows * kWindow + 4 * kFitSums) * (w + kRowPadding + 2 * kFitRadius);
   return images + threads * rows;
 }
 
@@ -177,7 +203,7 @@ std::size_t SubpixelRefinement::buffer_bytes() const {
   const auto bytes = [](const auto& image) {
     return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()) * sizeof(*image.data());
   };
-  std::size_t total = bytes(left_) + bytes(right_);
+  std::size_t total = bytes(left_) + bytes(right_) + bytes(textured_);
   for (int i = 0; i < 2; ++i) {
     total += bytes(disparity_[static_cast<std::size_t>(i)]) + bytes(information_[static_cast<std::size_t>(i)]);
   }

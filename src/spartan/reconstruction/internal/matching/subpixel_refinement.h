@@ -24,6 +24,10 @@ class SubpixelRefinement {
 
   /// Of the last call: information of each fit, of its prior and of the neighbours that agree with it, px⁻².
   ImageView<const float> information() const { return padded(information_[0]); }
+  /// Of the last call: the relief of ReliefRow, px².
+  ImageView<const float> relief() const { return padded(information_[1]); }
+  /// Of the last call: 1 where the window of the fit has texture, else 0.
+  ImageView<std::uint8_t> textured() { return textured_.view().crop(0, 0, size_.width, size_.height); }
   std::size_t buffer_bytes() const;
   /// An upper bound of buffer_bytes().
   static std::int64_t memory_bytes(ImageSize size, int threads);
@@ -45,6 +49,7 @@ class SubpixelRefinement {
   }
   void resize(ImageSize size);
   void smooth(const Smoothing& by);
+  void measure_relief();
   void fit(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right);
   void fit_rows(int from, int to, FitBuffers& buffers);
 
@@ -52,8 +57,9 @@ class SubpixelRefinement {
   ThreadPool workers_;
   ImageSize size_;
   Image<std::uint8_t> left_, right_;                     // one column before the first, replicated
-  std::array<Image<float>, 2> disparity_, information_;  // current and next
-  Image<float> no_disparity_, no_information_;           // a row outside of the image
+  std::array<Image<float>, 2> disparity_, information_;  // current and next (in the end: relief)
+  Image<std::uint8_t> textured_;
+  Image<float> no_disparity_, no_information_;  // a row outside of the image
   std::vector<FitBuffers> buffers_;
 };
 

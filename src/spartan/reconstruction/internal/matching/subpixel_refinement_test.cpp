@@ -206,6 +206,31 @@ TEST(SubpixelRefinement, KnowsTheTexture) {
   EXPECT_LT(information_of(noise.left, noise.right, true).second, 60);
 }
 
+TEST(SubpixelRefinement, MeasuresTheRelief) {
+  const Plane plane{.along_x = 0.05, .along_y = 0.2};
+  const PlanePair pair = render(plane);
+  SubpixelRefinement refined = refinement();
+  Image<float> disparity = true_disparity(plane);
+  refined.refine(pair.left, pair.right, disparity);
+  for (int y = 8; y < kHeight - 8; ++y) {
+    for (int x = 30; x < kWidth; ++x) EXPECT_LT(refined.relief()(x, y), 0.15 * 0.15) << "a plane has none";
+  }
+  // A step of 3 px: second differences of at least a pixel count as one.
+  disparity = true_disparity(plane);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 80; x < kWidth; ++x) disparity(x, y) += 3;
+  }
+  refined.refine(pair.left, pair.right, disparity);
+  const auto relief = refined.relief();
+  EXPECT_NEAR(relief(78, 40), 0.75 + 0.25 * 0.75, 0.02) << "three of the four directions cross the edge";
+  EXPECT_NEAR(relief(74, 40), 0.25 * 0.75, 0.02) << "at a distance of 6 px only the longer step";
+  EXPECT_LT(relief(60, 40), 0.01);
+  disparity = Image<float>(kWidth, kHeight, kUnknown);
+  disparity(40, 40) = 9.3F;
+  refined.refine(pair.left, pair.right, disparity);
+  EXPECT_NEAR(refined.relief()(40, 40), 0.25 + 0.25 * 0.25, 1e-6) << "half a pixel where no pair is known";
+}
+
 TEST(SubpixelRefinement, IsDeterministicOnEveryInstructionSetAndNumberOfThreads) {
   const Plane plane{.along_x = 0.05, .along_y = 0.2};
   const PlanePair pair = render(plane);
@@ -220,6 +245,7 @@ TEST(SubpixelRefinement, IsDeterministicOnEveryInstructionSetAndNumberOfThreads)
     for (int y = 0; y < kHeight; ++y) {
       values.insert(values.end(), disparity.row(y), disparity.row(y) + kWidth);
       for (int x = 0; x < kWidth; ++x) values.push_back(r.information()(x, y));
+      for (int x = 0; x < kWidth; ++x) values.push_back(r.relief()(x, y));
     }
     return values;
   };
