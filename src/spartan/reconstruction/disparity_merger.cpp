@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 namespace spartan {
@@ -30,7 +31,17 @@ double range_sigma(const RectifiedStereo& g, double disparity, double stretch, d
 
 }  // namespace
 
-// The nearest surface that one view sees in each cell, as sums over its pixels.
+// Where the pixels of a view fall in the panorama. Kept, so that the panorama can be filled band by band.
+struct DisparityMerger::Projection {
+  struct Cell {
+    std::int16_t column, row;  // row −1: the pixel falls into no cell
+  };
+  Image<Cell> cells;
+  Image<float> range_m;
+  std::vector<std::pair<int, int>> rows;  // first and last row of the panorama that each row of the view reaches
+};
+
+// The nearest surface that one view sees in each cell of a band of rows, as sums over its pixels.
 struct DisparityMerger::Layer {
   struct Pixel {
     float range, variance_m2;
@@ -65,15 +76,22 @@ struct DisparityMerger::Layer {
     }
   };
 
-  explicit Layer(const PanoramaWindow& seen) : window(seen), cells(seen.size) {}
   PanoramaWindow window;  // of the panorama
-  Image<Cell> cells;
+  std::vector<Cell> cells;
 
-  // A cell of the panorama; null outside of the window.
-  const Cell* at(int x, int y) const {
-    return window.contains(x, y) ? &cells(x - window.left, y - window.top) : nullptr;
+  void reset(const PanoramaWindow& to) {
+    window = to;
+    cells.assign(static_cast<std::size_t>(to.size.width) * static_cast<std::size_t>(to.size.height), {});
   }
-  Cell* at(int x, int y) { return window.contains(x, y) ? &cells(x - window.left, y - window.top) : nullptr; }
+  // A cell of the panorama; null outside of the window.
+  const Cell* at(int x, int y) const { return window.contains(x, y) ? &cells[index(x, y)] : nullptr; }
+  Cell* at(int x, int y) { return window.contains(x, y) ? &cells[index(x, y)] : nullptr; }
+
+ private:
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y - window.top) * static_cast<std::size_t>(window.size.width) +
+           static_cast<std::size_t>(x - window.left);
+  }
 };
 
 Result<DisparityMerger> DisparityMerger::create(const MergingOptions& options, const Pose& body_from_centre,
@@ -90,32 +108,59 @@ DisparityMerger::DisparityMerger(const MergingOptions& options, const Pose& body
                           views, nearest_m, options.max_range_m);
 }
 
-void DisparityMerger::rasterize_view(const MergedView& view, Layer& layer) const {
+DisparityMerger::Projection DisparityMerger::project(const MergedView& view) const {
   const RectifiedStereo& g = view.geometry.stereo;
   const Eigen::Matrix4d m = reprojection(g, body_from_centre_.inverse() * view.geometry.body_from_left);
+  const ImageSize size = view.disparity.size(), panorama = camera_.size();
+  Projection to{Image<Projection::Cell>(size), Image<float>(size), {}};
+  to.rows.assign(static_cast<std::size_t>(size.height), {panorama.height, -1});
+  workers_.parallel_for(0, size.height, 32, [&](int from, int end) {
+    for (int v = from; v < end; ++v) {
+      auto& [first, last] = to.rows[static_cast<std::size_t>(v)];
+      for (int u = 0; u < size.width; ++u) {
+        Projection::Cell& cell = to.cells(u, v);
+        cell = {-1, -1};
+        const double d = view.disparity(u, v);
+        if (!(d > 0)) continue;
+        const Eigen::Vector4d h = m * Eigen::Vector4d(u, v, d, 1);
+        const Eigen::Vector3d p = h.head<3>() / h.w();
+        const auto pixel = camera_.project(p);
+        if (!pixel) continue;
+        const auto column = std::lround(pixel->x()), row = std::lround(pixel->y());
+        if (column < 0 || row < 0 || column >= panorama.width || row >= panorama.height) continue;
+        cell = {static_cast<std::int16_t>(column), static_cast<std::int16_t>(row)};
+        to.range_m(u, v) = static_cast<float>(p.norm());
+        first = std::min(first, static_cast<int>(row));
+        last = std::max(last, static_cast<int>(row));
+      }
+    }
+  });
+  return to;
+}
+
+void DisparityMerger::rasterize(const MergedView& view, const Projection& projection, Layer& layer) const {
+  const RectifiedStereo& g = view.geometry.stereo;
   const auto gate = static_cast<float>(options_.gate_sigmas);
+  const int band_first = layer.window.top, band_last = band_first + layer.window.size.height - 1;
   for (int v = 0; v < view.disparity.height(); ++v) {
+    const auto& [first, last] = projection.rows[static_cast<std::size_t>(v)];
+    if (last < band_first || first > band_last) continue;
     const double y = (v - g.centre_px.y()) / g.focal_px;
     for (int u = 0; u < view.disparity.width(); ++u) {
-      const double d = view.disparity(u, v);
-      if (!(d > 0)) continue;
-      const Eigen::Vector4d h = m * Eigen::Vector4d(u, v, d, 1);
-      const Eigen::Vector3d p = h.head<3>() / h.w();
-      const double range = p.norm();
-      const auto pixel = camera_.project(p);
-      if (!pixel) continue;
-      Layer::Cell* const cell =
-          layer.at(static_cast<int>(std::lround(pixel->x())), static_cast<int>(std::lround(pixel->y())));
+      const Projection::Cell to = projection.cells(u, v);
+      if (to.row < band_first) continue;
+      Layer::Cell* const cell = layer.at(to.column, to.row);
       if (cell == nullptr) continue;
-      if (range > options_.max_range_m) {
+      const float range = projection.range_m(u, v);
+      if (range > static_cast<float>(options_.max_range_m)) {
         cell->beyond = 1;
         continue;
       }
-      const double x = (u - g.centre_px.x()) / g.focal_px;
+      const double x = (u - g.centre_px.x()) / g.focal_px, d = view.disparity(u, v);
       const double sigma_px = view.sigma.empty() ? options_.disparity_sigma_px : static_cast<double>(view.sigma(u, v));
       const double per_px = range_sigma(g, d, std::sqrt(1 + x * x + y * y), 1);
       const double gate_px = std::max(sigma_px, options_.disparity_sigma_px);
-      cell->add({static_cast<float>(range), static_cast<float>(per_px * per_px * sigma_px * sigma_px),
+      cell->add({range, static_cast<float>(per_px * per_px * sigma_px * sigma_px),
                  static_cast<float>(per_px * per_px * gate_px * gate_px), view.left(u, v),
                  view.classes.empty() ? std::uint8_t{0} : view.classes(u, v)},
                 gate);
@@ -156,14 +201,17 @@ std::uint8_t most_votes(std::uint32_t votes) {
 }  // namespace
 
 void DisparityMerger::fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row,
-                               MergedRange& merged, Image<float>& gates_m) const {
+                               const Fused& to) const {
+  auto& [merged, gates_m, beyond] = to;
   const auto gate = static_cast<float>(options_.gate_sigmas);
   std::vector<Candidate> candidates(views.size());
   for (int x = 0; x < camera_.size().width; ++x) {
     std::size_t count = 0;
     for (std::size_t k = 0; k < views.size(); ++k) {
       const Layer::Cell* const cell = layers[k].at(x, row);
-      if (cell == nullptr || cell->count == 0) continue;
+      if (cell == nullptr) continue;
+      if (cell->beyond != 0) beyond(x, row) = 1;
+      if (cell->count == 0) continue;
       candidates[count++] = {k, cell->mean(cell->sum_range),
                              // The mean of the pixels' variances, not the variance of their mean: errors of
                              // neighbouring disparities are correlated.
@@ -225,42 +273,66 @@ namespace {
 // virtual camera are smaller than the pixels of a view.
 constexpr int kGap = 2;
 
-void fill_gaps(const Image<float>& gates_m, const ThreadPool& workers, MergedRange& merged) {
-  const Image<float> range = merged.range_m.clone(), sigma = merged.sigma_m.clone(),
-                     baseline = merged.baseline_m.clone();
-  const Image<std::uint8_t> views = merged.views.clone(), gray = merged.gray.clone(), classes = merged.classes.clone();
-  const auto known = [&](int x, int y) { return range.contains(x, y) && std::isfinite(range(x, y)); };
-  const auto fill = [&](int x, int y) {
-    for (int gap = 2; gap <= 2 * kGap; ++gap) {
-      for (const auto& [dx, dy] : {std::pair{0, 1}, std::pair{1, 0}}) {
-        const int a = gap / 2, b = gap - a;
-        const int x0 = x - a * dx, y0 = y - a * dy, x1 = x + b * dx, y1 = y + b * dy;
-        if (!known(x0, y0) || !known(x1, y1)) continue;
-        const float reach = std::max(gates_m(x0, y0), gates_m(x1, y1));
-        if (std::abs(range(x0, y0) - range(x1, y1)) > reach) continue;
-        const float part = static_cast<float>(a) / static_cast<float>(gap);
-        merged.range_m(x, y) = range(x0, y0) + part * (range(x1, y1) - range(x0, y0));
-        merged.sigma_m(x, y) = std::max(sigma(x0, y0), sigma(x1, y1));
-        merged.views(x, y) = views(x0, y0) | views(x1, y1);
-        merged.gray(x, y) = static_cast<std::uint8_t>((gray(x0, y0) + gray(x1, y1)) / 2);
-        merged.classes(x, y) = classes(x0, y0);
-        merged.baseline_m(x, y) = baseline(x0, y0);
-        return;
-      }
+struct FilledCell {
+  int x, y;
+  float range_m, sigma_m, baseline_m;
+  std::uint8_t views, gray, classes;
+};
+
+// The interpolated cell between two known ones, if they belong to one surface.
+std::optional<FilledCell> filled_gap(const MergedRange& merged, const Image<float>& gates_m, int x, int y) {
+  const auto known = [&](int u, int v) { return merged.range_m.contains(u, v) && std::isfinite(merged.range_m(u, v)); };
+  for (int gap = 2; gap <= 2 * kGap; ++gap) {
+    for (const auto& [dx, dy] : {std::pair{0, 1}, std::pair{1, 0}}) {
+      const int a = gap / 2, b = gap - a;
+      const int x0 = x - a * dx, y0 = y - a * dy, x1 = x + b * dx, y1 = y + b * dy;
+      if (!known(x0, y0) || !known(x1, y1)) continue;
+      const float reach = std::max(gates_m(x0, y0), gates_m(x1, y1));
+      const float near = merged.range_m(x0, y0), far = merged.range_m(x1, y1);
+      if (std::abs(near - far) > reach) continue;
+      const float part = static_cast<float>(a) / static_cast<float>(gap);
+      return FilledCell{x,
+                        y,
+                        near + part * (far - near),
+                        std::max(merged.sigma_m(x0, y0), merged.sigma_m(x1, y1)),
+                        merged.baseline_m(x0, y0),
+                        static_cast<std::uint8_t>(merged.views(x0, y0) | merged.views(x1, y1)),
+                        static_cast<std::uint8_t>((merged.gray(x0, y0) + merged.gray(x1, y1)) / 2),
+                        merged.classes(x0, y0)};
     }
-  };
-  workers.parallel_for(0, range.height(), 16, [&](int from, int to) {
+  }
+  return std::nullopt;
+}
+
+// All gaps are found before the first is filled: none is interpolated from another.
+void fill_gaps(const Image<float>& gates_m, const ThreadPool& workers, MergedRange& merged) {
+  constexpr int kRows = 16;
+  const int height = merged.range_m.height(), width = merged.range_m.width();
+  std::vector<std::vector<FilledCell>> found(static_cast<std::size_t>((height + kRows - 1) / kRows));
+  workers.parallel_for(0, height, kRows, [&](int from, int to) {
     for (int y = from; y < to; ++y) {
-      for (int x = 0; x < range.width(); ++x) {
-        if (!std::isfinite(range(x, y))) fill(x, y);
+      for (int x = 0; x < width; ++x) {
+        if (std::isfinite(merged.range_m(x, y))) continue;
+        if (const auto cell = filled_gap(merged, gates_m, x, y))
+          found[static_cast<std::size_t>(from / kRows)].push_back(*cell);
       }
     }
   });
+  for (const auto& cells : found) {
+    for (const FilledCell& cell : cells) {
+      merged.range_m(cell.x, cell.y) = cell.range_m;
+      merged.sigma_m(cell.x, cell.y) = cell.sigma_m;
+      merged.baseline_m(cell.x, cell.y) = cell.baseline_m;
+      merged.views(cell.x, cell.y) = cell.views;
+      merged.gray(cell.x, cell.y) = cell.gray;
+      merged.classes(cell.x, cell.y) = cell.classes;
+    }
+  }
 }
 
 }  // namespace
 
-Image<std::uint8_t> DisparityMerger::upper_border(std::span<const MergedView> views, std::span<const Layer> layers,
+Image<std::uint8_t> DisparityMerger::upper_border(std::span<const MergedView> views, const Image<std::uint8_t>& beyond,
                                                   const Image<float>& range_m) const {
   const auto [width, height] = camera_.size();
   const int step = std::max(1, static_cast<int>(std::lround(kBorder_rad * camera_.per_radian())));
@@ -286,34 +358,41 @@ Image<std::uint8_t> DisparityMerger::upper_border(std::span<const MergedView> vi
       }
     }
   });
-  for (const Layer& layer : layers) {
-    const PanoramaWindow& w = layer.window;
-    for (int y = 0; y < w.size.height; ++y) {
-      for (int x = 0; x < w.size.width; ++x) {
-        if (layer.cells(x, y).beyond == 0) continue;
-        const int row = w.top + y;
-        for (int below = row + 1; below <= std::min(row + step, height - 1); ++below) border(w.left + x, below) = 1;
-      }
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (beyond(x, y) == 0) continue;
+      for (int below = y + 1; below <= std::min(y + step, height - 1); ++below) border(x, below) = 1;
     }
   }
   return border;
 }
 
-MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
-  const ImageSize size = camera_.size();
-  std::vector<Layer> layers;
-  layers.reserve(views.size());
+void DisparityMerger::fill_bands(std::span<const MergedView> views, const Fused& fused) const {
+  constexpr int kBand = 64;  // rows, few enough for the layers of all views to stay in the cache
+  std::vector<Projection> projections;
+  std::vector<PanoramaWindow> windows;
   for (const MergedView& view : views) {
+    projections.push_back(project(view));
     // Wider than the panorama, because cells also know of surfaces beyond its ranges.
-    layers.emplace_back(
+    windows.push_back(
         window_of(camera_, body_from_centre_, view.geometry, 0.5 * nearest_m_, 10 * options_.max_range_m));
   }
-  workers_.parallel_for(0, static_cast<int>(views.size()), 1, [&](int from, int to) {
-    for (int k = from; k < to; ++k) {
-      const MergedView& view = views[static_cast<std::size_t>(k)];
-      if (!view.disparity.empty()) rasterize_view(view, layers[static_cast<std::size_t>(k)]);
+  workers_.parallel_for(0, camera_.size().height, kBand, [&](int from, int to) {
+    std::vector<Layer> layers(views.size());
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      PanoramaWindow window = windows[k];
+      const int first = std::max(from, window.top), last = std::min(to, window.top + window.size.height);
+      window.top = first;
+      window.size.height = std::max(0, last - first);
+      layers[k].reset(window);
+      if (!views[k].disparity.empty()) rasterize(views[k], projections[k], layers[k]);
     }
+    for (int row = from; row < to; ++row) fuse_row(views, layers, row, fused);
   });
+}
+
+MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
+  const ImageSize size = camera_.size();
   MergedRange merged{camera_,
                      body_from_centre_,
                      Image<float>(size.width, size.height, kNaN),
@@ -324,11 +403,10 @@ MergedRange DisparityMerger::merge(std::span<const MergedView> views) const {
                      Image<float>(size.width, size.height, 0.0F),
                      {}};
   Image<float> gates_m(size);
-  workers_.parallel_for(0, size.height, 16, [&](int from, int to) {
-    for (int row = from; row < to; ++row) fuse_row(views, layers, row, merged, gates_m);
-  });
+  Image<std::uint8_t> beyond(size);
+  fill_bands(views, {merged, gates_m, beyond});
   fill_gaps(gates_m, workers_, merged);
-  merged.truncated = upper_border(views, layers, merged.range_m);
+  merged.truncated = upper_border(views, beyond, merged.range_m);
   return merged;
 }
 

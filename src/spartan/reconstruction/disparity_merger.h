@@ -133,7 +133,7 @@ struct MergedRange {
 /// docs/math/stereo.md.
 class DisparityMerger {
  public:
-  /// Any number of views; merge() holds one layer of the panorama's size for each. `nearest_m`: nearest depth that the
+  /// Any number of views. `nearest_m`: nearest depth that the
   /// virtual camera covers. Code `configuration` where an option is out of bounds.
   static Result<DisparityMerger> create(const MergingOptions& options, const Pose& body_from_centre,
                                         std::span<const ViewGeometry> views, double nearest_m, ThreadPool workers);
@@ -147,11 +147,18 @@ class DisparityMerger {
   DisparityMerger(const MergingOptions& options, const Pose& body_from_centre, std::span<const ViewGeometry> views,
                   double nearest_m, ThreadPool workers);
 
+  struct Projection;
   struct Layer;
-  void rasterize_view(const MergedView& view, Layer& layer) const;
-  void fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row, MergedRange& merged,
-                Image<float>& gates_m) const;
-  Image<std::uint8_t> upper_border(std::span<const MergedView> views, std::span<const Layer> layers,
+  struct Fused {
+    MergedRange& range;
+    Image<float>& gates_m;        // largest difference of ranges of one surface
+    Image<std::uint8_t>& beyond;  // 1: a view sees a surface beyond the largest range
+  };
+  Projection project(const MergedView& view) const;
+  void rasterize(const MergedView& view, const Projection& projection, Layer& layer) const;
+  void fuse_row(std::span<const MergedView> views, std::span<const Layer> layers, int row, const Fused& to) const;
+  void fill_bands(std::span<const MergedView> views, const Fused& fused) const;
+  Image<std::uint8_t> upper_border(std::span<const MergedView> views, const Image<std::uint8_t>& beyond,
                                    const Image<float>& range_m) const;
 
   MergingOptions options_;

@@ -70,7 +70,8 @@ TEST_P(Reliability, SigmaFallsToAFloor) {
 }
 
 TEST_P(Reliability, SigmaHoldsTheRelief) {
-  EXPECT_NEAR(assessed(100, 1, 100, 0.3F)[0].sigma_px, std::sqrt(2.97 * 2.97 / 100 + 0.97 * 0.97 * 0.3 + 0.02 * 0.02), 1e-6);
+  EXPECT_NEAR(assessed(100, 1, 100, 0.3F)[0].sigma_px, std::sqrt(2.97 * 2.97 / 100 + 0.97 * 0.97 * 0.3 + 0.02 * 0.02),
+              1e-6);
 }
 
 TEST_P(Reliability, DiscardsWhatIsTooUnlikely) {

@@ -25,7 +25,8 @@ constexpr float kLeastTexture = 1, kLeastCorrelation = 0.3F;
 // neighbours have the same pixels.
 constexpr std::array<int, 2> kStepsBeforeFit{1, 2};
 constexpr std::array<int, 3> kStepsAfterFit{4, 8, 2};
-constexpr float kToleranceBefore_px = 1.5F, kToleranceAfter_px = 0.7F, kLeastTolerance_px = 0.1F, kToleranceSigmas = 2.5F;
+constexpr float kToleranceBefore_px = 1.5F, kToleranceAfter_px = 0.7F, kLeastTolerance_px = 0.1F,
+                kToleranceSigmas = 2.5F;
 // Pairs raise the information by this share of their own: fits of neighbours share most of their pixels.
 constexpr float kGrowth = 0.3F;
 
