@@ -13,6 +13,13 @@ target_compile_options(spartan_flags INTERFACE
   $<$<AND:$<BOOL:${SPARTAN_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=array-bounds>)
 # Highway leaves out AVX-512 with VPOPCNTB and VBMI (Ice Lake, Zen 4) unless it is asked for it.
 target_compile_definitions(spartan_flags INTERFACE HWY_WANT_AVX3_DL)
+# On ARM the kernels are those of NEON: structures of them hold vectors, which SVE does not allow, and GCC inlines the
+# vectors' constructors only where the whole file may use what Highway asks for. It uses no cryptographic instruction.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  target_compile_options(spartan_flags INTERFACE -march=armv8-a+crypto)
+  target_compile_definitions(spartan_flags INTERFACE
+    "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+endif()
 if(SPARTAN_SANITIZE)
   target_compile_options(spartan_flags INTERFACE -fsanitize=${SPARTAN_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   if(SPARTAN_SANITIZE_EXCEPT)
