@@ -124,11 +124,17 @@ std::vector<Method> methods(const Arguments& arguments) {
   DisparityOptions all = arguments.options;
   all.max_outlier_percent = 100;
   all.speckle_size_px = 0;
+  DisparityOptions block = arguments.options;
+  block.method = MatchingMethod::block;
   std::vector<Method> list{{"Spartan", spartan(arguments.options)}, {"Spartan, all kept", spartan(all)}};
-  if (!arguments.rivals) return list;
+  if (!arguments.rivals) {
+    list.push_back({"Spartan, block", spartan(block)});
+    return list;
+  }
   list.push_back({"HH uniqueness 10", opencv({"", cv::StereoSGBM::MODE_HH, 10})});
   list.push_back({"HH uniqueness 0", opencv({"", cv::StereoSGBM::MODE_HH, 0})});
   list.push_back({"SGBM", opencv({"", cv::StereoSGBM::MODE_SGBM, 10})});
+  list.push_back({"Spartan, block", spartan(block)});
   return list;
 }
 
@@ -171,6 +177,60 @@ void compare_accuracy(const std::vector<Pair>& pairs, const std::vector<Method>&
   if (worst > 0) fmt::print("largest bad-1 (non-occluded) over that of HH: {:.2f} ({})\n", worst, worst_pair);
 }
 
+// The penalties that are best on one set of pairs, on the other set. HH has its own penalties on both.
+void cross_validate(const std::vector<Pair>& pairs) {
+  struct Candidate {
+    DisparityOptions options;
+    std::map<std::string, Scores> means;
+  };
+  const auto set_of = [](const Pair& pair) { return pair.folder.parent_path().filename().string(); };
+  std::map<std::string, double> counts;
+  for (const Pair& pair : pairs) counts[set_of(pair)] += 1;
+  const auto means_of = [&](const Method& method) {
+    std::map<std::string, Scores> means;
+    for (const Pair& pair : pairs) {
+      Scores scores = score(pair, method.disparity(pair));
+      for (std::size_t i = 0; i < Scores::kCount; ++i)
+        *means[set_of(pair)].values()[i] += *scores.values()[i] / counts[set_of(pair)];
+    }
+    return means;
+  };
+  std::vector<Candidate> candidates;
+  for (const int p1 : {12, 18, 24}) {
+    for (const int p2_flat : {60, 75, 90}) {
+      for (const int p2_edge : {15, 25, 35}) {
+        for (const int out_of_view : {8, 11, 14}) {
+          Arguments arguments;
+          arguments.rivals = false;
+          arguments.options.p1 = p1;
+          arguments.options.p2_flat = p2_flat;
+          arguments.options.p2_edge = p2_edge;
+          arguments.options.out_of_view_cost = out_of_view;
+          candidates.push_back({arguments.options, means_of(methods(arguments).front())});
+        }
+      }
+    }
+  }
+  const std::vector<Method> all = methods({});
+  const auto ten = means_of(all[2]), none = means_of(all[3]);
+  fmt::print("\nCross-validation: penalties of least bad-1 (non-occluded) on one set of pairs, on the other\n");
+  for (const auto& [chosen_on, reported_on] : {std::pair{"middlebury", "eth3d"}, std::pair{"eth3d", "middlebury"}}) {
+    const auto best = std::min_element(candidates.begin(), candidates.end(), [&](const auto& a, const auto& b) {
+      return a.means.at(chosen_on).nonocc_bad_1 < b.means.at(chosen_on).nonocc_bad_1;
+    });
+    const DisparityOptions& o = best->options;
+    fmt::print("chosen on {}: p1 {}, p2_flat {}, p2_edge {}, out_of_view_cost {}\n", chosen_on, o.p1, o.p2_flat,
+               o.p2_edge, o.out_of_view_cost);
+    const auto line = [&](const std::string& name, const Scores& s) {
+      fmt::print("  {:<11} {:<17} bad-1 non-occluded {:5.2f}, bad-2 of all {:5.2f}\n", reported_on, name,
+                 s.nonocc_bad_1, s.bad_2);
+    };
+    line("Spartan", best->means.at(reported_on));
+    line("HH uniqueness 10", ten.at(reported_on));
+    line("HH uniqueness 0", none.at(reported_on));
+  }
+}
+
 void time_targets(const SpeedPair& pair, int disparities, const Arguments& arguments) {
   for (const SimdTarget simd : available_simd_targets()) {
     DisparityOptions options = arguments.options;
@@ -189,6 +249,10 @@ void compare_times(const Arguments& arguments) {
   compare_speed(pair, 256, arguments.repeat, arguments.options);
   compare_speed(pair, 384, arguments.repeat, arguments.options);
   compare_speed(resized(pair, {640, 480}), 192, 3 * arguments.repeat, arguments.options);
+  fmt::print("\nBlock matching, 256 disparities, 1 and 2 threads\n");
+  DisparityOptions block = arguments.options;
+  block.method = MatchingMethod::block;
+  for (const int threads : {1, 2}) time_spartan(pair, 256, threads, arguments.repeat, block);
   fmt::print("\nInstruction sets, 256 disparities\n");
   time_targets(pair, 256, arguments);
 }
@@ -212,7 +276,9 @@ void run(const std::vector<std::string>& words) {
     for (const Light light : kLights) variants.push_back(under(light, pairs[i]));
   }
   compare_accuracy(variants, list, arguments);
-  if (arguments.rivals) compare_times(arguments);
+  if (!arguments.rivals) return;
+  cross_validate(pairs);
+  compare_times(arguments);
 }
 
 }  // namespace

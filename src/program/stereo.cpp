@@ -34,6 +34,7 @@ struct StereoArguments {
   std::optional<double> truth_scale;
   double max_range_m = 0;
   std::string config;
+  std::string method;
   std::vector<std::string> set;
 };
 
@@ -243,7 +244,9 @@ Status check_truth_scale(const StereoArguments& a, const Log& log) {
 }
 
 Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
-  const auto options = run_options(context, a.config, a.set);
+  std::vector<std::string> set = a.set;
+  if (!a.method.empty()) set.push_back("reconstruction.method=" + a.method);
+  const auto options = run_options(context, a.config, set);
   if (!options) return failure(options);
   if (Status s = expect_new_folder(context, a.output); !s) return failure(s);
   if (Status s = check_images_fit({a.left, a.right}, memory_bound(context)); !s) return failure(s);
@@ -317,6 +320,11 @@ void add_stereo(CLI::App& app, Context& context) {
   command->add_option("--max-disparity", a->max_disparity,
                       "Maximum disparity in pixels (default: of the nearest distance that the rig states, else a "
                       "quarter of the width, rounded up to a multiple of 16, less 1). A larger one costs time.");
+  command
+      ->add_option("--method", a->method,
+                   "How disparities are found: sgm is semi-global matching, block is block matching, as published "
+                   "hardware does it (default: reconstruction.method, which is sgm).")
+      ->check(CLI::IsMember({"sgm", "block"}));
   command
       ->add_option("--max-range-m", a->max_range_m,
                    "Maximum distance of the points of points.ply from the camera in metres (default: no limit).")

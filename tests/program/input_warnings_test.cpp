@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <string>
 #include <vector>
@@ -44,6 +45,22 @@ class InputWarnings : public ::testing::Test {
 
 TEST_F(InputWarnings, StereoOfAGoodPairHasNone) {
   EXPECT_EQ(stereo(image(0), image(1), {"-q"}).err, "");
+}
+
+TEST_F(InputWarnings, StereoHasTwoMethods) {
+  const auto density = [&](const std::string& method) {
+    const ProgramResult result = stereo(image(0), image(1), {"--json", "--method", method});
+    return nlohmann::json::parse(result.out)["density_percent"].get<double>();
+  };
+  const double by_sgm = density("sgm"), by_blocks = density("block");
+  EXPECT_GT(by_sgm, 70);
+  EXPECT_GT(by_blocks, 50);
+  EXPECT_NE(by_sgm, by_blocks);
+  const ProgramResult refused =
+      run_program({"stereo", image(0), image(1), "-o", path("refused"), "--method", "census"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--method"));
+  EXPECT_FALSE(fs::exists(path("refused")));
 }
 
 TEST_F(InputWarnings, StereoNamesExchangedImages) {

@@ -9,6 +9,7 @@
 #include "spartan/core/stage_clock.h"
 #include "spartan/numerics/simd_target.h"
 #include "spartan/reconstruction/internal/disparity_filters.h"
+#include "spartan/reconstruction/internal/matching/block_matcher.h"
 #include "spartan/reconstruction/internal/matching/coarse_to_fine_matcher.h"
 #include "spartan/reconstruction/internal/matching/reliability.h"
 #include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
@@ -23,11 +24,13 @@ struct DisparityComputer::State {
         workers(workers_in),
         kernels(matching::refinement_kernels_for(simd_target_index(options_in.simd))),
         matcher(options_in, workers_in),
+        block_matcher(matching::block_kernels_for(simd_target_index(options_in.simd)), workers_in),
         refinement(kernels, workers_in) {}
   DisparityOptions options;
   ThreadPool workers;
   matching::RefinementKernels kernels;
   matching::CoarseToFineMatcher matcher;
+  matching::BlockMatcher block_matcher;
   matching::SubpixelRefinement refinement;
   SpeckleFilter speckles;
   Image<float> disparity, sigma;  // sigma is also the output of the median filter
@@ -77,8 +80,10 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   }
   DisparityImage result;
   DisparityTimes& times = result.times;
-  const matching::IntervalMatches& matches = s.matcher.match(left, right, range);
-  times.coarse = s.matcher.coarse_ms();
+  const bool by_blocks = s.options.method == MatchingMethod::block;
+  const matching::Matches& matches =
+      by_blocks ? s.block_matcher.match(left, right, range) : s.matcher.match(left, right, range);
+  times.coarse = by_blocks ? 0 : s.matcher.coarse_ms();
   times.match = watch.lap() - times.coarse;
   s.workers.parallel_for(0, left.height(), 64, [&](int from, int to) {
     for (int y = from; y < to; ++y) std::copy_n(matches.disparity.row(y), left.width(), s.disparity.row(y));
@@ -102,7 +107,8 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   result.disparity = s.disparity.view();
   result.sigma = s.sigma.view();
   result.outlier_percent = s.outlier_percent.view();
-  result.buffer_bytes = s.matcher.buffer_bytes() + s.refinement.buffer_bytes() + s.speckles.buffer_bytes() +
+  result.buffer_bytes = s.matcher.buffer_bytes() + s.block_matcher.buffer_bytes() + s.refinement.buffer_bytes() +
+                        s.speckles.buffer_bytes() +
                         static_cast<std::size_t>(left.height()) *
                             static_cast<std::size_t>(8 * s.disparity.stride() + s.outlier_percent.stride());
   return result;
@@ -110,7 +116,8 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
 
 std::int64_t DisparityComputer::memory_bytes(ImageSize size, DisparityRange range, int threads) {
   // Per pixel: two images of 4 bytes and one of 1 byte, and the labels and runs of the speckle filter (16 bytes).
-  return matching::CoarseToFineMatcher::memory_bytes(size, range, threads) +
+  return std::max(matching::CoarseToFineMatcher::memory_bytes(size, range, threads),
+                  matching::BlockMatcher::memory_bytes(size, threads)) +
          matching::SubpixelRefinement::memory_bytes(size, threads) + std::int64_t{25} * size.width * size.height;
 }
 

@@ -1,6 +1,7 @@
 // Dense stereo matching: from a rectified image pair to a disparity image.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 
@@ -74,11 +75,21 @@ class DisparityComputer {
   std::unique_ptr<State> state_;
 };
 
+/// How disparities are found.
+enum class MatchingMethod {
+  sgm,    ///< Semi-global matching, coarse to fine.
+  block,  ///< Block matching: Gaussian-weighted absolute differences, plane sweep over the range.
+};
+constexpr auto enum_names(MatchingMethod) {
+  return std::array{EnumName{MatchingMethod::sgm, "sgm"}, EnumName{MatchingMethod::block, "block"}};
+}
+
 /// Matching costs are Hamming distances of 32-bit census signatures (0 … 32). Semi-global matching penalizes a
 /// disparity step of one pixel by P1 and a larger step by P2. P2 falls from p2_flat to p2_edge with the gray-level
 /// change ΔI along the path (Hirschmüller 2008):
 ///   P2(ΔI) = max(p2_edge, p2_flat / (1 + |ΔI| / p2_falloff_levels)).
 struct DisparityOptions {
+  MatchingMethod method = MatchingMethod::sgm;
   int p1 = 18;                    ///< Penalty of a disparity step of one pixel, census bits.
   int p2_flat = 90;               ///< Penalty of a larger step where the gray level is constant, census bits.
   int p2_edge = 25;               ///< Lower bound of the penalty of a larger step, census bits.
@@ -92,6 +103,9 @@ struct DisparityOptions {
 
   template <class Visitor>
   void describe(Visitor& v) {
+    v.field("method", method,
+            "How disparities are found: sgm is semi-global matching, block is block matching of Gaussian-weighted "
+            "absolute differences as in published hardware, which needs texture and cameras of equal exposure.");
     v.field("p1", p1,
             "Penalty P1 of semi-global matching for a disparity step of one pixel between neighbouring pixels, in bits "
             "of the 32-bit census cost; raising it makes slanted surfaces smoother and flatter.",

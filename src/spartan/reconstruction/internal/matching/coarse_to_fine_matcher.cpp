@@ -62,8 +62,8 @@ CoarseToFineMatcher::CoarseToFineMatcher(const Penalties& penalties, std::size_t
       half_matcher_(IntervalMatcher::Purpose::search_intervals, penalties, kernels_for(simd), workers),
       full_matcher_(IntervalMatcher::Purpose::result, penalties, kernels_for(simd), workers) {}
 
-const IntervalMatches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> left,
-                                                  ImageView<const std::uint8_t> right, DisparityRange range) {
+const Matches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                          DisparityRange range) {
   Stopwatch watch;
   halve(left, workers_, half_.left);
   halve(right, workers_, half_.right);
@@ -73,7 +73,7 @@ const IntervalMatches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> 
   const DisparityRange quarter_range = halved(half_range, quarter_.left.width());
   const ImageView<const float> base = base_.match(quarter_.left, quarter_.right, quarter_range, strips_);
   const auto half_tiles = choose_intervals(base, half_.left.size(), half_range, workers_);
-  const IntervalMatches& half = half_matcher_.match(half_.left, half_.right, half_tiles, half_range, strips_);
+  const Matches& half = half_matcher_.match(half_.left, half_.right, half_tiles, half_range, strips_);
   const auto tiles = choose_intervals(half.disparity, left.size(), range, workers_);
   coarse_ms_ = watch.lap();
   return full_matcher_.match(left, right, tiles, range, strips_);

@@ -20,8 +20,7 @@ class CoarseToFineMatcher {
   CoarseToFineMatcher(const DisparityOptions& options, const ThreadPool& workers);
 
   /// Both images must have one size, and the range must not be empty. The result is valid until the next call.
-  const IntervalMatches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                               DisparityRange range);
+  const Matches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range);
   double coarse_ms() const { return coarse_ms_; }  ///< Of the last call: time before the full resolution.
   std::size_t buffer_bytes() const;
   /// An upper bound of buffer_bytes().

@@ -258,9 +258,9 @@ IntervalMatcher::IntervalMatcher(Purpose purpose, const Penalties& penalties, co
       workers_(workers),
       census_(kernels.census_row, workers) {}
 
-const IntervalMatches& IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                              ImageView<const TileIntervals> tiles, DisparityRange range,
-                                              std::vector<StripBuffers>& strips) {
+const Matches& IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                      ImageView<const TileIntervals> tiles, DisparityRange range,
+                                      std::vector<StripBuffers>& strips) {
   range_ = range;
   // Intervals reach at most an interval beyond the range, see TileIntervals.
   census_.compute(left, right, {range.min - kInterval, range.max + 2 * kInterval});

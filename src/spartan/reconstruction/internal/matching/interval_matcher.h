@@ -9,17 +9,12 @@
 #include "spartan/core/threads.h"
 #include "spartan/reconstruction/internal/matching/census_pair.h"
 #include "spartan/reconstruction/internal/matching/interval_kernels.h"
+#include "spartan/reconstruction/internal/matching/matches.h"
 #include "spartan/reconstruction/internal/matching/penalties.h"
 #include "spartan/reconstruction/internal/matching/search_intervals.h"
 #include "spartan/reconstruction/internal/matching/strips.h"
 
 namespace spartan::internal::matching {
-
-/// Matches before any check except the one against the image border.
-struct IntervalMatches {
-  Image<float> disparity;              ///< px; NaN where x − d lies outside of the right image.
-  Image<std::uint8_t> right_distance;  ///< px, 0 … 16: from x to the left pixel that the matched right pixel prefers.
-};
 
 class IntervalMatcher {
  public:
@@ -30,9 +25,8 @@ class IntervalMatcher {
 
   /// Both images must have one size, `tiles` one element for each tile of it. `strips` receives buffers for each
   /// thread. The result is valid until the next call.
-  const IntervalMatches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                               ImageView<const TileIntervals> tiles, DisparityRange range,
-                               std::vector<StripBuffers>& strips);
+  const Matches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                       ImageView<const TileIntervals> tiles, DisparityRange range, std::vector<StripBuffers>& strips);
   /// Bytes of all buffers but those of the strips.
   std::size_t buffer_bytes() const;
   /// Upper bounds of buffer_bytes() and of the bytes of the strips.
@@ -48,7 +42,7 @@ class IntervalMatcher {
   ThreadPool workers_;
   CensusPair census_;
   DisparityRange range_;
-  IntervalMatches matches_;
+  Matches matches_;
 };
 
 }  // namespace spartan::internal::matching
