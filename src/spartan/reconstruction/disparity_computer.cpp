@@ -102,6 +102,10 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   times.refine = watch.lap();
   s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, assessed.reliable}, s.workers, s.disparity);
   matching::clear_unknown(s.workers, assessed);
+  if (s.options.fill) {
+    fill_unknown(s.workers, s.disparity);
+    apply_masks(left_mask, {}, s.disparity);
+  }
   times.filter += watch.lap();
   times.total = all.lap();
   result.disparity = s.disparity.view();

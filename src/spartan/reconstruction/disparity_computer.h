@@ -34,7 +34,7 @@ struct DisparityTimes {
 /// computer's buffers and are valid until its next call.
 struct DisparityImage {
   ImageView<const float> disparity;
-  ImageView<const float> sigma;                   ///< Standard deviation, px; NaN where the disparity is unknown.
+  ImageView<const float> sigma;  ///< Standard deviation, px; NaN where the disparity is unknown or filled.
   ImageView<const std::uint8_t> outlier_percent;  ///< Probability of an error above 1 px, percent; 100 where unknown.
   DisparityTimes times;
   std::size_t buffer_bytes = 0;  ///< Bytes of all buffers held for this image size and search range.
@@ -99,6 +99,7 @@ struct DisparityOptions {
   int max_outlier_percent = 88;   ///< Largest outlier probability of a disparity that is kept, percent.
   int speckle_size_px = 100;      ///< Minimum size of a connected component, reliable pixels; 0: no speckle filter.
   double speckle_step_px = 2;     ///< Largest disparity difference within a component, pixels.
+  bool fill = false;              ///< Whether unknown pixels are filled from their row, with sigma NaN as the mark.
   SimdTarget simd = SimdTarget::automatic;  ///< SIMD instruction set
 
   template <class Visitor>
@@ -142,6 +143,10 @@ struct DisparityOptions {
             "Largest disparity difference between neighbouring pixels of one component of the speckle filter, in "
             "pixels; raising it joins more pixels, so that fewer components are discarded.",
             at_least(0));
+    v.field(
+        "fill", fill,
+        "True gives unknown pixels the farther one of the nearest known disparities in their row. They are marked by "
+        "a standard deviation of NaN and an outlier probability of 100 %; maps leave them out.");
     v.field("simd", simd,
             "SIMD instruction set of the matching kernels; avx3 is AVX-512; it affects the speed only, results are the "
             "same bit for bit.");

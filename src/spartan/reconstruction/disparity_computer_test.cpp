@@ -117,6 +117,33 @@ TEST(DisparityComputer, DiscardsMaskedPixels) {
   }
 }
 
+TEST(DisparityComputer, FillsUnknownPixelsAndMarksThem) {
+  Image<std::uint8_t> mask(320, 240, 255);
+  for (int y = 0; y < 240; ++y) std::fill(mask.row(y) + 100, mask.row(y) + 140, std::uint8_t{0});
+  DisparityOptions options;
+  DisparityComputer plain = DisparityComputer::create(options, ThreadPool(1)).value();
+  options.fill = true;
+  DisparityComputer filling = DisparityComputer::create(options, ThreadPool(1)).value();
+  const auto known = plain.compute(ground().left, ground().right, {0, 95}, mask, {});
+  const auto filled = filling.compute(ground().left, ground().right, {0, 95}, mask, {});
+  ASSERT_TRUE(known && filled);
+  int count = 0;
+  for (int y = 0; y < 240; ++y) {
+    for (int x = 0; x < 320; ++x) {
+      const bool masked = mask(x, y) == 0, measured = !std::isnan(known->disparity(x, y));
+      ASSERT_EQ(std::isnan(filled->sigma(x, y)), !measured);
+      ASSERT_EQ(std::isnan(filled->disparity(x, y)), masked) << x << ", " << y;
+      if (measured) {
+        ASSERT_EQ(filled->disparity(x, y), known->disparity(x, y));
+      } else {
+        ASSERT_EQ(filled->outlier_percent(x, y), 100);
+        count += !masked;
+      }
+    }
+  }
+  EXPECT_GT(count, 0);
+}
+
 TEST(DisparityComputer, RejectsInvalidSizesAndRanges) {
   DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(1)).value();
   const Image<std::uint8_t> small(40, 30), other(41, 30);

@@ -45,7 +45,7 @@ PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const floa
   for (int y = 0; y < disparity.height(); y += sampling.step_px) {
     for (int x = 0; x < disparity.width(); x += sampling.step_px) {
       const float d = disparity(x, y);
-      if (std::isnan(d) || d <= 0 || d < sampling.min_disparity_px) continue;
+      if (std::isnan(d) || d <= 0 || d < sampling.min_disparity_px || std::isnan(sigma(x, y))) continue;
       const Eigen::Vector3d in_left = geometry.triangulate(x, y, d);
       const double range = in_left.norm();
       if (sampling.max_range_m > 0 && range > sampling.max_range_m) continue;

@@ -30,8 +30,8 @@ struct CloudSampling {
 };
 
 /// Triangulates pixels with a known disparity and transforms the points by `target_from_left`. `sigma`: standard
-/// deviations σ_d of the disparities, px. The colour is the gray level of the left image; σ of the range is
-/// z² σ_d / (f b) times the ratio of range and depth.
+/// deviations σ_d of the disparities, px; pixels without one are left out, as they were filled. The colour is the gray
+/// level of the left image; σ of the range is z² σ_d / (f b) times the ratio of range and depth.
 PointCloud to_point_cloud(ImageView<const float> disparity, ImageView<const float> sigma,
                           ImageView<const std::uint8_t> left, const RectifiedStereo& geometry,
                           const Pose& target_from_left, const Stamp& stamp, const CloudSampling& sampling);

@@ -1,6 +1,7 @@
 #include "spartan/reconstruction/stop_mapper.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -31,10 +32,12 @@ Pose centre_of(std::span<const StopView> views) {
   return Pose::from_translation(sum / count);
 }
 
-void discard_unlikely(ImageView<const std::uint8_t> outlier_percent, int most_percent, ImageView<float> disparity) {
+// Disparities that are too unlikely, and those that were not measured but filled.
+void discard_unlikely(const DisparityImage& image, int most_percent, ImageView<float> disparity) {
   for (int y = 0; y < disparity.height(); ++y) {
     for (int x = 0; x < disparity.width(); ++x) {
-      if (outlier_percent(x, y) > most_percent) disparity(x, y) = std::numeric_limits<float>::quiet_NaN();
+      if (image.outlier_percent(x, y) > most_percent || std::isnan(image.sigma(x, y)))
+        disparity(x, y) = std::numeric_limits<float>::quiet_NaN();
     }
   }
 }
@@ -82,7 +85,7 @@ Status StopMapper::add(const RectifiedPair& frame, double nearest_m, const Eigen
   if (!image) return failure(image);
   times_.disparity += watch.lap();
   Image<float> disparity = Image<float>::copy_of(image->disparity);
-  discard_unlikely(image->outlier_percent, options_.max_outlier_percent, disparity);
+  discard_unlikely(*image, options_.max_outlier_percent, disparity);
   const double height = frame.body_from_left.translation().dot(up_in_body);
   const GroundPlane expected{frame.body_from_left.rotation().conjugate() * up_in_body,
                              height > 0.05 ? height : kUnknownHeight_m};

@@ -68,6 +68,27 @@ void median_row(ImageView<const float> in, int y, bool (*kernel)(const matching:
 
 }  // namespace
 
+void fill_unknown(const ThreadPool& workers, ImageView<float> disparity) {
+  const int w = disparity.width();
+  workers.parallel_for(0, disparity.height(), 32, [&](int from, int to) {
+    for (int y = from; y < to; ++y) {
+      float* const row = disparity.row(y);
+      for (int x = 0; x < w;) {
+        if (!std::isnan(row[x])) {
+          ++x;
+          continue;
+        }
+        int end = x;
+        while (end < w && std::isnan(row[end])) ++end;
+        // std::fmin ignores NaN: at the borders of the image there is one neighbour.
+        const float none = std::numeric_limits<float>::quiet_NaN();
+        std::fill(row + x, row + end, std::fmin(x > 0 ? row[x - 1] : none, end < w ? row[end] : none));
+        x = end;
+      }
+    }
+  });
+}
+
 void median_3x3(ImageView<const float> in, bool (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
                 ImageView<float> out) {
   workers.parallel_for(0, in.height(), kRowsAtOnce, [&](int from, int to) {

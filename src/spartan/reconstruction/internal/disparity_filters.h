@@ -20,6 +20,10 @@ void apply_masks(ImageView<const std::uint8_t> left_mask, ImageView<const std::u
 void median_3x3(ImageView<const float> in, bool (*kernel)(const matching::MedianRow&), const ThreadPool& workers,
                 ImageView<float> out);
 
+/// Gives unknown pixels the smaller one of the nearest known disparities to their left and right in the row, the
+/// farther surface, as what is unknown most often is occluded. Rows without a known disparity stay unknown.
+void fill_unknown(const ThreadPool& workers, ImageView<float> disparity);
+
 /// A component of a disparity image is kept where it has enough reliable pixels.
 struct SpeckleRule {
   int size_px = 0;                         ///< Smallest number of reliable pixels; 0: every component is kept.

@@ -144,6 +144,20 @@ TEST(SpeckleFilter, CountsReliablePixels) {
   for (int x = 0; x < 6; ++x) EXPECT_EQ(std::isnan(image(x, 0)), x >= 3) << x;
 }
 
+TEST(Filling, TakesTheFartherNeighbourOfTheRow) {
+  constexpr float kHole = kUnknownDisparity;
+  Image<float> image(7, 3, kHole);
+  const float holes[] = {kHole, 9, kHole, kHole, 4, 6, kHole}, filled[] = {9, 9, 4, 4, 4, 6, 6};
+  std::copy_n(holes, 7, image.row(0));
+  image(3, 2) = 5;
+  fill_unknown(ThreadPool(2), image);
+  for (int x = 0; x < 7; ++x) {
+    EXPECT_EQ(image(x, 0), filled[x]) << x;
+    EXPECT_TRUE(std::isnan(image(x, 1)));
+    EXPECT_EQ(image(x, 2), 5);
+  }
+}
+
 TEST(Masks, DiscardExcludedPixelsOfEitherImage) {
   Image<float> disparity(6, 1, 2.0f);
   Image<std::uint8_t> left(6, 1, std::uint8_t{255}), right(6, 1, std::uint8_t{255});
