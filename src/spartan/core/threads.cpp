@@ -206,6 +206,13 @@ BackgroundTask ThreadPool::start(std::function<void()> work) const {
   return task;
 }
 
+void ThreadPool::parallel_for_parts(int parts, const std::function<void(int, int)>& body) const {
+  std::atomic<int> next = 0;
+  parallel_for(0, std::min(parts, threads_), 1, [&](int worker, int) {
+    for (int part = next++; part < parts; part = next++) body(part, worker);
+  });
+}
+
 void ThreadPool::parallel_invoke(const std::function<void()>& first, const std::function<void()>& second) const {
   if (!arena_) {
     first();

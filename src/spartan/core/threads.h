@@ -41,6 +41,10 @@ class ThreadPool {
   /// shorter). The parts depend only on `grain`, not on the number of threads, so that results can be independent of
   /// it. Returns when all parts are done; rethrows an exception of a part. Throws std::invalid_argument if grain < 1.
   void parallel_for(int begin, int end, int grain, const std::function<void(int, int)>& body) const;
+  /// Runs body(part, worker) for each part in [0, parts). Each worker takes the next part that is left; `worker` is in
+  /// [0, min(parts, threads())), and no two bodies with one worker run at the same time, so that it can be the index of
+  /// buffers. Which worker has which part differs from run to run.
+  void parallel_for_parts(int parts, const std::function<void(int, int)>& body) const;
   /// Runs both functions, in parallel if there is more than one thread.
   void parallel_invoke(const std::function<void()>& first, const std::function<void()>& second) const;
   /// Lets a worker run `work` while the caller goes on; with one thread it runs in BackgroundTask::wait(). The worker

@@ -55,6 +55,24 @@ RC_GTEST_PROP(ThreadPool, PartsCoverTheRangeOnceForAnyNumberOfThreads, ()) {
   RC_ASSERT(at == begin + length);
 }
 
+TEST(ThreadPool, EachPartRunsOnceAndWorkersDoNotShare) {
+  for (const int threads : {1, 2, 3}) {
+    for (const int parts : {0, 1, 2, 50}) {
+      std::vector<std::atomic<int>> runs(static_cast<std::size_t>(parts));
+      std::vector<std::atomic<int>> inside(static_cast<std::size_t>(threads));
+      std::atomic<bool> shared = false;
+      ThreadPool(threads).parallel_for_parts(parts, [&](int part, int worker) {
+        std::atomic<int>& here = inside.at(static_cast<std::size_t>(worker));
+        if (++here != 1) shared = true;
+        ++runs[static_cast<std::size_t>(part)];
+        --here;
+      });
+      EXPECT_FALSE(shared);
+      for (const std::atomic<int>& count : runs) EXPECT_EQ(count, 1);
+    }
+  }
+}
+
 TEST(ThreadPool, RethrowExceptions) {
   for (const int threads : {1, 2}) {
     const ThreadPool workers(threads);

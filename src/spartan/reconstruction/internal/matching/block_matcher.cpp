@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -191,12 +190,9 @@ const Matches& BlockMatcher::match(ImageView<const std::uint8_t> left, ImageView
   prepare(right, right_);
   const int count = (size_.height + kStripRows - 1) / kStripRows, threads = std::min(count, workers_.threads());
   if (static_cast<int>(strips_.size()) < threads) strips_.resize(static_cast<std::size_t>(threads));
-  std::atomic<int> next = 0;
-  workers_.parallel_for(0, threads, 1, [&](int thread, int) {
-    for (int i = next++; i < count; i = next++) {
-      match_strip({i * kStripRows, std::min(size_.height, (i + 1) * kStripRows)},
-                  strips_[static_cast<std::size_t>(thread)]);
-    }
+  workers_.parallel_for_parts(count, [&](int i, int worker) {
+    match_strip({i * kStripRows, std::min(size_.height, (i + 1) * kStripRows)},
+                strips_[static_cast<std::size_t>(worker)]);
   });
   return matches_;
 }

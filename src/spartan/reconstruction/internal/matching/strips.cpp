@@ -1,7 +1,5 @@
 #include "spartan/reconstruction/internal/matching/strips.h"
 
-#include <atomic>
-
 namespace spartan::internal::matching {
 
 int strip_rows(int height, std::int64_t costs_per_row) {
@@ -18,13 +16,10 @@ void for_each_strip(int height, int rows_per_strip, const ThreadPool& workers, s
                     const std::function<void(const StripRows&, StripBuffers&)>& match) {
   const int count = (height + rows_per_strip - 1) / rows_per_strip, threads = std::min(count, workers.threads());
   if (static_cast<int>(buffers.size()) < threads) buffers.resize(static_cast<std::size_t>(threads));
-  std::atomic<int> next = 0;
-  workers.parallel_for(0, threads, 1, [&](int thread, int) {
-    for (int i = next++; i < count; i = next++) {
-      const int from = i * rows_per_strip, to = std::min(height, from + rows_per_strip);
-      match({from, to, std::max(0, from - kStripMargin), std::min(height, to + kStripMargin)},
-            buffers[static_cast<std::size_t>(thread)]);
-    }
+  workers.parallel_for_parts(count, [&](int i, int worker) {
+    const int from = i * rows_per_strip, to = std::min(height, from + rows_per_strip);
+    match({from, to, std::max(0, from - kStripMargin), std::min(height, to + kStripMargin)},
+          buffers[static_cast<std::size_t>(worker)]);
   });
 }
 

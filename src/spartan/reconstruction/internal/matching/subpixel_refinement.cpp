@@ -1,7 +1,6 @@
 #include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cstring>
 #include <functional>
 #include <limits>
@@ -162,11 +161,8 @@ void SubpixelRefinement::fit(ImageView<const std::uint8_t> left, ImageView<const
   frame(right, right_);
   const int count = (size_.height + kFitBand - 1) / kFitBand, threads = std::min(count, workers_.threads());
   if (static_cast<int>(buffers_.size()) < threads) buffers_.resize(static_cast<std::size_t>(threads));
-  std::atomic<int> next = 0;
-  workers_.parallel_for(0, threads, 1, [&](int thread, int) {
-    for (int i = next++; i < count; i = next++) {
-      fit_rows(i * kFitBand, std::min(size_.height, (i + 1) * kFitBand), buffers_[static_cast<std::size_t>(thread)]);
-    }
+  workers_.parallel_for_parts(count, [&](int i, int worker) {
+    fit_rows(i * kFitBand, std::min(size_.height, (i + 1) * kFitBand), buffers_[static_cast<std::size_t>(worker)]);
   });
   std::swap(disparity_[0], disparity_[1]);
   std::swap(information_[0], information_[1]);
