@@ -31,9 +31,10 @@ class Reliability : public ::testing::TestWithParam<SimdTarget> {
            refinement_kernels_for(simd_target_index(GetParam())), ThreadPool(1), {disparity, sigma, percent, reliable});
     std::vector<Result> results;
     results.reserve(static_cast<std::size_t>(count));
-    for (int x = 0; x < count; ++x)
+    for (int x = 0; x < count; ++x) {
       results.push_back(
           {percent(x, 0), static_cast<double>(sigma(x, 0)), !std::isnan(disparity(x, 0)), reliable(x, 0) == 1});
+    }
     return results;
   }
 };

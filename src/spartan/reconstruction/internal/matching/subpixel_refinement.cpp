@@ -192,7 +192,7 @@ void SubpixelRefinement::refine(ImageView<const std::uint8_t> left, ImageView<co
 std::int64_t SubpixelRefinement::memory_bytes(ImageSize size, int threads) {
   const std::int64_t w = size.width, h = size.height;
   const std::int64_t images = h * (3 * (w + 3 * kRowPadding) + 4 * 4 * (w + 2 * kPad + kRowPadding));
-  const std::int64_t rows = (2 * kFitRows * kWindow + 4 * kFitSums) * (w + kRowPadding + 2 * kFitRadius);
+  const std::int64_t rows = (2 * std::int64_t{kFitRows} * kWindow + 4 * kFitSums) * (w + kRowPadding + 2 * kFitRadius);
   return images + threads * rows;
 }
 
