@@ -268,7 +268,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
     return tl::unexpected<Error>(error);
   }
   if (Status s = expect_not_interrupted(); !s) return failure(s);
-  const double density_percent = known_percent(image->disparity);
+  const double density_percent = known_percent(image->sigma);  // measured pixels, not filled ones
   check_images(a, *pair, density_percent, context);
   if (const std::int64_t saturated = saturated_pixels(image->disparity); saturated > 0) {
     context.log.warning(
@@ -321,9 +321,10 @@ void add_stereo(CLI::App& app, Context& context) {
                       "Maximum disparity in pixels (default: of the nearest distance that the rig states, else a "
                       "quarter of the width, rounded up to a multiple of 16, less 1). A larger one costs time.");
   command
-      ->add_option("--method", a->method,
-                   "How disparities are found: sgm is semi-global matching, block is block matching, as published "
-                   "hardware does it (default: reconstruction.method, which is sgm).")
+      ->add_option(
+          "--method", a->method,
+          "Matching method: sgm is semi-global matching, block is block matching of Gaussian-weighted absolute "
+          "differences (default: reconstruction.method, which is sgm).")
       ->check(CLI::IsMember({"sgm", "block"}));
   command
       ->add_option("--max-range-m", a->max_range_m,

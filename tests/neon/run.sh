@@ -1,7 +1,7 @@
 #!/bin/bash
 # Compiles stereo matching for ARM (NEON), runs it in an emulator and compares its bits with those of this processor.
 #   run.sh STEREO_BITS FOLDER    STEREO_BITS: the program of stereo_bits.cpp for this processor
-# Exit code 77: the compiler or the emulator is not installed (`./setup arm`).
+# Exit code 77: the compiler, the emulator or a library is not installed (`./setup arm`).
 set -euo pipefail
 native=$1
 mkdir -p "$2"
@@ -10,6 +10,7 @@ cd "$(dirname "$0")/../.."
 for tool in aarch64-linux-gnu-g++ qemu-aarch64; do
   command -v $tool >/dev/null || { echo "skipped: no $tool (./setup arm)"; exit 77; }
 done
+[ -e /usr/lib/aarch64-linux-gnu/libhwy.so.1 ] || { echo "skipped: no libraries for ARM (./setup arm)"; exit 77; }
 # As spartan_flags in cmake/SpartanModule.cmake has them for ARM.
 flags=(-std=c++20 -O2 -ffp-contract=off -march=armv8-a+crypto
   '-DHWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)' -DHWY_SHARED_DEFINE -DFMT_SHARED

@@ -63,6 +63,16 @@ TEST_F(InputWarnings, StereoHasTwoMethods) {
   EXPECT_FALSE(fs::exists(path("refused")));
 }
 
+TEST_F(InputWarnings, StereoCountsMeasuredPixelsNotFilledOnes) {
+  const auto density = [&](const std::string& fill) {
+    const ProgramResult result = stereo(image(0), image(1), {"--json", "--set", "reconstruction.fill=" + fill});
+    return nlohmann::json::parse(result.out)["density_percent"].get<double>();
+  };
+  EXPECT_EQ(density("true"), density("false"));
+  EXPECT_THAT(stereo(image(1), image(0), {"--set", "reconstruction.fill=true"}).err,
+              HasSubstr("left and right are exchanged"));
+}
+
 TEST_F(InputWarnings, StereoNamesExchangedImages) {
   EXPECT_THAT(stereo(image(1), image(0)).err, HasSubstr("left and right are exchanged"));
 }

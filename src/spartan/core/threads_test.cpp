@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 #include <sched.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -59,11 +60,12 @@ TEST(ThreadPool, EachPartRunsOnceAndWorkersDoNotShare) {
   for (const int threads : {1, 2, 3}) {
     for (const int parts : {0, 1, 2, 50}) {
       std::vector<std::atomic<int>> runs(static_cast<std::size_t>(parts));
-      std::vector<std::atomic<int>> inside(static_cast<std::size_t>(threads));
+      std::vector<std::atomic<int>> inside(static_cast<std::size_t>(std::min(threads, parts)));
       std::atomic<bool> shared = false;
       ThreadPool(threads).parallel_for_parts(parts, [&](int part, int worker) {
         std::atomic<int>& here = inside.at(static_cast<std::size_t>(worker));
         if (++here != 1) shared = true;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
         ++runs[static_cast<std::size_t>(part)];
         --here;
       });

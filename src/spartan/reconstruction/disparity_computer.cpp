@@ -74,7 +74,8 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   if (Status fits = check(left, right, range, left_mask, right_mask); !fits) return failure(fits);
   Stopwatch all, watch;
   State& s = *state_;
-  if (s.disparity.size() != left.size()) {
+  if (s.outlier_percent.size() != left.size()) {
+    s.outlier_percent = {};  // stays so if an allocation fails
     for (Image<float>* image : {&s.disparity, &s.sigma}) *image = Image<float>(left.size());
     s.outlier_percent = Image<std::uint8_t>(left.size());
   }

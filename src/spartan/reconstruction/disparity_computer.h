@@ -43,9 +43,9 @@ struct DisparityImage {
 struct DisparityOptions;
 
 /// Dense disparities by census matching (Zabih & Woodfill 1994) and semi-global matching (Hirschmüller 2008) from
-/// coarse to fine, a median filter, a sub-pixel refinement by least squares on the intensities, a check of the outlier
-/// probability and a speckle filter. Derivation: docs/math/stereo.md. The result is the same, bit for bit, for any
-/// number of threads and on every SIMD instruction set.
+/// coarse to fine, or by block matching (MatchingMethod), a median filter, a sub-pixel refinement by least squares on
+/// the intensities, a check of the outlier probability and a speckle filter. Derivation: docs/math/stereo.md. The
+/// result is the same, bit for bit, for any number of threads and on every SIMD instruction set.
 class DisparityComputer {
  public:
   /// Code `configuration` where an option is out of bounds.
@@ -84,9 +84,9 @@ constexpr auto enum_names(MatchingMethod) {
   return std::array{EnumName{MatchingMethod::sgm, "sgm"}, EnumName{MatchingMethod::block, "block"}};
 }
 
-/// Matching costs are Hamming distances of 32-bit census signatures (0 … 32). Semi-global matching penalizes a
-/// disparity step of one pixel by P1 and a larger step by P2. P2 falls from p2_flat to p2_edge with the gray-level
-/// change ΔI along the path (Hirschmüller 2008):
+/// With MatchingMethod::sgm, matching costs are Hamming distances of 32-bit census signatures (0 … 32). Semi-global
+/// matching penalizes a disparity step of one pixel by P1 and a larger step by P2. P2 falls from p2_flat to p2_edge
+/// with the gray-level change ΔI along the path (Hirschmüller 2008):
 ///   P2(ΔI) = max(p2_edge, p2_flat / (1 + |ΔI| / p2_falloff_levels)).
 struct DisparityOptions {
   MatchingMethod method = MatchingMethod::sgm;
@@ -105,8 +105,9 @@ struct DisparityOptions {
   template <class Visitor>
   void describe(Visitor& v) {
     v.field("method", method,
-            "How disparities are found: sgm is semi-global matching, block is block matching of Gaussian-weighted "
-            "absolute differences as in published hardware, which needs texture and cameras of equal exposure.");
+            "Matching method: sgm is semi-global matching, block is block matching of Gaussian-weighted absolute "
+            "differences, which needs texture everywhere and cameras of equal contrast. The penalties p1 and p2_* and "
+            "out_of_view_cost belong to sgm.");
     v.field("p1", p1,
             "Penalty P1 of semi-global matching for a disparity step of one pixel between neighbouring pixels, in bits "
             "of the 32-bit census cost; raising it makes slanted surfaces smoother and flatter.",
@@ -135,10 +136,11 @@ struct DisparityOptions {
             "from the texture, the smoothness of the surroundings and the left-right check. Raising it keeps more "
             "disparities, more of them wrong, and 100 keeps all.",
             between(0, 100));
-    v.field("speckle_size_px", speckle_size_px,
-            "Minimum size of a connected component of the disparity image, counted in pixels whose outlier probability "
-            "is at most 7 %; smaller components are discarded, and 0 disables the speckle filter.",
-            at_least(0));
+    v.field(
+        "speckle_size_px", speckle_size_px,
+        "Minimum size of a connected component of the disparity image, counted in pixels with texture and an outlier "
+        "probability of at most 7 %; smaller components are discarded, and 0 disables the speckle filter.",
+        at_least(0));
     v.field("speckle_step_px", speckle_step_px,
             "Largest disparity difference between neighbouring pixels of one component of the speckle filter, in "
             "pixels; raising it joins more pixels, so that fewer components are discarded.",

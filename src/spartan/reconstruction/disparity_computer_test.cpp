@@ -69,23 +69,32 @@ TEST(DisparityComputer, MatchesTheTrueDisparitiesOfASyntheticPair) {
 
 TEST(DisparityComputer, IsDeterministicOnEveryInstructionSetAndNumberOfThreads) {
   for (const int count : {96, 80, 48}) {  // padded to 96, 96 and 64 bytes: vectors of 32 and of 64 bytes
-    DisparityOptions options;
-    const std::vector<float> expected = disparity_of_ground(options, 1, count);
-    EXPECT_TRUE(same_bytes(disparity_of_ground(options, 2, count), expected)) << "two threads";
-    for (const SimdTarget simd : available_simd_targets()) {
-      options.simd = simd;
-      EXPECT_TRUE(same_bytes(disparity_of_ground(options, 1, count), expected))
-          << name_of(simd) << ", " << count << " disparities";
+    for (const MatchingMethod method : {MatchingMethod::sgm, MatchingMethod::block}) {
+      DisparityOptions options;
+      options.method = method;
+      const std::vector<float> expected = disparity_of_ground(options, 1, count);
+      EXPECT_TRUE(same_bytes(disparity_of_ground(options, 2, count), expected)) << "two threads";
+      for (const SimdTarget simd : available_simd_targets()) {
+        options.simd = simd;
+        EXPECT_TRUE(same_bytes(disparity_of_ground(options, 1, count), expected))
+            << name_of(simd) << ", " << count << " disparities";
+      }
     }
   }
 }
 
 TEST(DisparityComputer, DoesNotDependOnThePreviousCall) {
-  DisparityComputer computer = DisparityComputer::create(DisparityOptions{}, ThreadPool(1)).value();
-  const auto first = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
-  ASSERT_TRUE(computer.compute(ground().right, ground().left, {-40, 10}));
-  const auto again = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
-  EXPECT_TRUE(same_bytes(first, again));
+  for (const MatchingMethod method : {MatchingMethod::sgm, MatchingMethod::block}) {
+    DisparityOptions options;
+    options.method = method;
+    DisparityComputer computer = DisparityComputer::create(options, ThreadPool(1)).value();
+    const auto first = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
+    ASSERT_TRUE(computer.compute(ground().right, ground().left, {-40, 10}));
+    const Image<std::uint8_t> small(50, 20, 90);
+    ASSERT_TRUE(computer.compute(small, small, {0, 31}));
+    const auto again = values(computer.compute(ground().left, ground().right, {0, 63})->disparity);
+    EXPECT_TRUE(same_bytes(first, again));
+  }
 }
 
 // With left and right camera swapped, disparities change their sign and nothing else.

@@ -19,7 +19,7 @@ namespace {
 constexpr std::array<int, 3> kSteps{1, 2, 4};
 constexpr int kRadius = 7;                // of all steps
 constexpr int kBlockPad = kRowPadding;    // columns before the first pixel; twice as many behind the last
-constexpr int kStripRows = 64;            // so many that a strip's buffers stay in the second-level cache
+constexpr int kStripRows = 64;            // few enough for a strip's buffers to stay in a cache
 constexpr std::uint8_t kOutOfView = 248;  // cost where x − d lies outside of the right image: the largest difference
 constexpr std::uint8_t kNoCost = 255;
 constexpr std::uint16_t kNoPlane = 0xFFFF;
@@ -46,12 +46,14 @@ void BlockMatcher::resize(ImageSize size) {
 
 void BlockMatcher::resize(StripBuffers& b) const {
   const int wide = size_.width + 3 * kBlockPad;
-  if (b.costs.width() == wide) return;
+  if (b.right_index.width() == wide) return;
+  b.right_index = {};  // stays so if an allocation fails
   for (Image<std::uint8_t>* image : {&b.costs, &b.smoothed})
     *image = Image<std::uint8_t>(wide, kStripRows + 2 * kRadius);
   for (Image<std::uint8_t>* image : {&b.best, &b.before, &b.after, &b.previous, &b.right_best})
     *image = Image<std::uint8_t>(wide, kStripRows);
-  for (Image<std::uint16_t>* image : {&b.index, &b.right_index}) *image = Image<std::uint16_t>(wide, kStripRows);
+  b.index = Image<std::uint16_t>(wide, kStripRows);
+  b.right_index = Image<std::uint16_t>(wide, kStripRows);
 }
 
 // Sums of differences over the window of each pixel, for one disparity: rows of `costs` from kRadius on.
@@ -206,8 +208,8 @@ std::size_t BlockMatcher::StripBuffers::bytes() const {
 }
 
 std::size_t BlockMatcher::buffer_bytes() const {
-  std::size_t total =
-      static_cast<std::size_t>(left_.stride() + right_.stride()) * static_cast<std::size_t>(size_.height);
+  std::size_t total = static_cast<std::size_t>(left_.stride() + right_.stride() + 2 * means_[0].stride()) *
+                      static_cast<std::size_t>(size_.height);
   total += static_cast<std::size_t>(4 * matches_.disparity.stride() + matches_.right_distance.stride()) *
            static_cast<std::size_t>(size_.height);
   for (const StripBuffers& strip : strips_) total += strip.bytes();

@@ -23,7 +23,7 @@ class BlockMatcher {
   /// Both images must have one size, and the range must not be empty. The result is valid until the next call.
   const Matches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range);
   std::size_t buffer_bytes() const;
-  /// An upper bound of buffer_bytes().
+  /// An upper bound of buffer_bytes() of a new object.
   static std::int64_t memory_bytes(ImageSize size, int threads);
 
  private:

@@ -190,7 +190,8 @@ class BlockMatching : public ::testing::TestWithParam<SimdTarget> {
 TEST_P(BlockMatching, EqualsTheReference) {
   BlockMatcher matching = matcher(2);
   for (const ImageSize size : {ImageSize{70, 40}, {131, 75}, {17, 9}, {1, 1}, {40, 3}}) {
-    for (const DisparityRange range : {DisparityRange{0, 23}, {5, 16}, {-9, 6}, {0, 0}, {-5, -1}}) {
+    for (const DisparityRange range :
+         {DisparityRange{0, 23}, {5, 16}, {-9, 6}, {0, 0}, {-5, -1}, {-130, 130}, {60, 69}}) {
       if (range.max >= size.width || range.min <= -size.width) continue;
       SCOPED_TRACE(std::to_string(size.width) + ", " + std::to_string(range.min));
       const GrayPair pair = textured_pair(size, 7, 3);

@@ -20,8 +20,9 @@ constexpr float kNoise_levels = 1.5F, kPrior_px = 0.7F;
 // Of a window that has texture: information of its own, px⁻², and correlation of the gradients of both images.
 constexpr float kLeastTexture = 1, kLeastCorrelation = 0.3F;
 // Distances of the pairs of each smoothing, and the bounds of SmoothRow. Long steps reach far at few operations (à
-// trous; Dammertz et al., High Performance Graphics 2010). After the fit they begin at half of its window: nearer
-// neighbours have the same pixels.
+// trous; Dammertz et al., High Performance Graphics 2010). After the fit they begin at half of its window, because
+// fits of nearer neighbours share most of their pixels; the last one averages what the long steps have left between
+// them.
 constexpr std::array<int, 2> kStepsBeforeFit{1, 2};
 constexpr std::array<int, 3> kStepsAfterFit{4, 8, 2};
 constexpr float kToleranceBefore_px = 1.5F, kToleranceAfter_px = 0.7F, kLeastTolerance_px = 0.1F,

@@ -56,7 +56,7 @@ class SubpixelRefinement {
   RefinementKernels kernels_;
   ThreadPool workers_;
   ImageSize size_;
-  Image<std::uint8_t> left_, right_;                     // one column before the first, replicated
+  Image<std::uint8_t> left_, right_;                     // with replicated columns on both sides
   std::array<Image<float>, 2> disparity_, information_;  // current and next (in the end: relief)
   Image<std::uint8_t> textured_;
   Image<float> no_disparity_, no_information_;  // a row outside of the image
