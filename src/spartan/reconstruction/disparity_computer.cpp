@@ -11,6 +11,7 @@
 #include "spartan/reconstruction/internal/disparity_filters.h"
 #include "spartan/reconstruction/internal/matching/block_matcher.h"
 #include "spartan/reconstruction/internal/matching/coarse_to_fine_matcher.h"
+#include "spartan/reconstruction/internal/matching/image_bytes.h"
 #include "spartan/reconstruction/internal/matching/reliability.h"
 #include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
 
@@ -113,9 +114,8 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   result.sigma = s.sigma.view();
   result.outlier_percent = s.outlier_percent.view();
   result.buffer_bytes = s.matcher.buffer_bytes() + s.block_matcher.buffer_bytes() + s.refinement.buffer_bytes() +
-                        s.speckles.buffer_bytes() +
-                        static_cast<std::size_t>(left.height()) *
-                            static_cast<std::size_t>(8 * s.disparity.stride() + s.outlier_percent.stride());
+                        s.speckles.buffer_bytes() + matching::bytes_of(s.disparity) + matching::bytes_of(s.sigma) +
+                        matching::bytes_of(s.outlier_percent);
   return result;
 }
 

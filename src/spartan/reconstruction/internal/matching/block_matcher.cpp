@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "spartan/reconstruction/internal/matching/image_bytes.h"
 #include "spartan/reconstruction/internal/matching/row_padding.h"
 #include "spartan/reconstruction/internal/subpixel.h"
 
@@ -26,7 +27,7 @@ constexpr std::uint16_t kNoPlane = 0xFFFF;
 constexpr int kMostRightDistance = 16;
 
 void set_all(std::uint8_t value, Image<std::uint8_t>& image) {
-  std::memset(image.data(), value, static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()));
+  std::memset(image.data(), value, bytes_of(image));
 }
 
 }  // namespace
@@ -36,9 +37,8 @@ BlockMatcher::BlockMatcher(BlockKernels kernels, const ThreadPool& workers) : ke
 void BlockMatcher::resize(ImageSize size) {
   if (size == size_) return;
   size_ = {};  // stays so if an allocation fails
-  for (Image<std::uint8_t>* image : {&left_, &right_})
+  for (Image<std::uint8_t>* image : {&left_, &right_, &means_[0], &means_[1]})
     *image = Image<std::uint8_t>(size.width + 3 * kBlockPad, size.height);
-  for (Image<std::uint8_t>& image : means_) image = Image<std::uint8_t>(size.width + kBlockPad, size.height);
   matches_.disparity = Image<float>(size);
   matches_.right_distance = Image<std::uint8_t>(size);
   size_ = size;
@@ -145,19 +145,17 @@ void BlockMatcher::match_strip(const Strip& strip, StripBuffers& b) {
 void BlockMatcher::prepare(ImageView<const std::uint8_t> from, Image<std::uint8_t>& to) {
   const int w = size_.width, h = size_.height;
   workers_.parallel_for(0, h, 64, [&](int first, int end) {
-    std::vector<std::uint8_t> rows(2 * static_cast<std::size_t>(to.stride()));  // wider than a row with its margins
     for (int y = first; y < end; ++y) {
-      std::uint8_t *a = rows.data() + kBlockPad, *b = a + to.stride();
+      std::uint8_t *a = to.row(y) + kBlockPad, *b = means_[0].row(y) + kBlockPad;
       std::memset(a - kBlockPad, from(0, y), kBlockPad);
       std::memcpy(a, from.row(y), static_cast<std::size_t>(w));
       std::memset(a + w, from(w - 1, y), kBlockPad);
       int reach = kRadius;
-      for (const int step : kSteps) {
+      for (const int step : kSteps) {  // three: they end in means_[0]
         reach -= step;
         kernels_.average_row({a - reach - step, a - reach, a - reach + step, b - reach, w + 2 * reach});
         std::swap(a, b);
       }
-      std::memcpy(means_[0].row(y), a, static_cast<std::size_t>(w));
     }
   });
   int current = 0;
@@ -166,15 +164,16 @@ void BlockMatcher::prepare(ImageView<const std::uint8_t> from, Image<std::uint8_
     Image<std::uint8_t>& target = means_[static_cast<std::size_t>(1 - current)];
     workers_.parallel_for(0, h, 64, [&](int first, int end) {
       for (int y = first; y < end; ++y) {
-        kernels_.average_row({source.row(std::max(0, y - step)), source.row(y), source.row(std::min(h - 1, y + step)),
-                              target.row(y), w});
+        const auto row = [&](int at) { return source.row(std::clamp(at, 0, h - 1)) + kBlockPad; };
+        kernels_.average_row({row(y - step), row(y), row(y + step), target.row(y) + kBlockPad, w});
       }
     });
     current = 1 - current;
   }
   workers_.parallel_for(0, h, 64, [&](int first, int end) {
     for (int y = first; y < end; ++y) {
-      const std::uint8_t *const gray = from.row(y), *const mean = means_[static_cast<std::size_t>(current)].row(y);
+      const std::uint8_t *const gray = from.row(y), *const mean =
+                                                        means_[static_cast<std::size_t>(current)].row(y) + kBlockPad;
       std::uint8_t* const row = to.row(y);
       for (int x = 0; x < w; ++x)
         row[kBlockPad + x] = static_cast<std::uint8_t>(std::clamp(gray[x] - mean[x] + 128, 0, 255));
@@ -200,18 +199,13 @@ const Matches& BlockMatcher::match(ImageView<const std::uint8_t> left, ImageView
 }
 
 std::size_t BlockMatcher::StripBuffers::bytes() const {
-  const auto of = [](const auto& image) {
-    return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()) * sizeof(*image.data());
-  };
-  return of(costs) + of(smoothed) + of(best) + of(before) + of(after) + of(previous) + of(right_best) + of(index) +
-         of(right_index);
+  return bytes_of(costs) + bytes_of(smoothed) + bytes_of(best) + bytes_of(before) + bytes_of(after) +
+         bytes_of(previous) + bytes_of(right_best) + bytes_of(index) + bytes_of(right_index);
 }
 
 std::size_t BlockMatcher::buffer_bytes() const {
-  std::size_t total = static_cast<std::size_t>(left_.stride() + right_.stride() + 2 * means_[0].stride()) *
-                      static_cast<std::size_t>(size_.height);
-  total += static_cast<std::size_t>(4 * matches_.disparity.stride() + matches_.right_distance.stride()) *
-           static_cast<std::size_t>(size_.height);
+  std::size_t total = bytes_of(left_) + bytes_of(right_) + bytes_of(means_[0]) + bytes_of(means_[1]) +
+                      bytes_of(matches_.disparity) + bytes_of(matches_.right_distance);
   for (const StripBuffers& strip : strips_) total += strip.bytes();
   return total;
 }

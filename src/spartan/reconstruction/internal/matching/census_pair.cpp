@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "spartan/reconstruction/internal/matching/image_bytes.h"
 #include "spartan/reconstruction/internal/matching/row_padding.h"
 
 namespace spartan::internal::matching {
@@ -73,8 +74,7 @@ void CensusPair::compute_planes(ImageView<const std::uint8_t> image, bool mirror
 
 std::size_t CensusPair::buffer_bytes() const {
   std::size_t total = 0;
-  for (const Image<std::uint8_t>* image : {&gray_, &framed_, &left_planes_, &right_planes_})
-    total += static_cast<std::size_t>(image->stride()) * static_cast<std::size_t>(image->height());
+  for (const Image<std::uint8_t>* image : {&gray_, &framed_, &left_planes_, &right_planes_}) total += bytes_of(*image);
   return total;
 }
 

@@ -5,6 +5,7 @@
 
 #include "spartan/core/stage_clock.h"
 #include "spartan/numerics/simd_target.h"
+#include "spartan/reconstruction/internal/matching/image_bytes.h"
 
 namespace spartan::internal::matching {
 namespace {
@@ -90,12 +91,9 @@ std::int64_t CoarseToFineMatcher::memory_bytes(ImageSize size, DisparityRange ra
 }
 
 std::size_t CoarseToFineMatcher::buffer_bytes() const {
-  const auto bytes = [](const Image<std::uint8_t>& image) {
-    return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height());
-  };
   std::size_t total = base_.buffer_bytes() + half_matcher_.buffer_bytes() + full_matcher_.buffer_bytes();
   for (const StripBuffers& strip : strips_) total += strip.bytes();
-  for (const Halved* pair : {&half_, &quarter_}) total += bytes(pair->left) + bytes(pair->right);
+  for (const Halved* pair : {&half_, &quarter_}) total += bytes_of(pair->left) + bytes_of(pair->right);
   return total;
 }
 

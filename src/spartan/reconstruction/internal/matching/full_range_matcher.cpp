@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 
+#include "spartan/reconstruction/internal/matching/image_bytes.h"
 #include "spartan/reconstruction/internal/matching/row_padding.h"
 #include "spartan/reconstruction/internal/subpixel.h"
 
@@ -197,8 +198,7 @@ ImageView<const float> FullRangeMatcher::match(ImageView<const std::uint8_t> lef
 }
 
 std::size_t FullRangeMatcher::buffer_bytes() const {
-  return census_.buffer_bytes() +
-         sizeof(float) * static_cast<std::size_t>(disparity_.stride()) * static_cast<std::size_t>(disparity_.height());
+  return census_.buffer_bytes() + bytes_of(disparity_);
 }
 
 std::int64_t FullRangeMatcher::memory_bytes(ImageSize size, DisparityRange range) {

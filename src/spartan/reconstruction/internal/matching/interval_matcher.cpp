@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 
+#include "spartan/reconstruction/internal/matching/image_bytes.h"
 #include "spartan/reconstruction/internal/matching/row_padding.h"
 #include "spartan/reconstruction/internal/subpixel.h"
 
@@ -290,9 +291,7 @@ std::int64_t IntervalMatcher::memory_bytes(ImageSize size, DisparityRange range)
 }
 
 std::size_t IntervalMatcher::buffer_bytes() const {
-  return census_.buffer_bytes() +
-         static_cast<std::size_t>(matches_.disparity.height()) *
-             static_cast<std::size_t>(4 * matches_.disparity.stride() + matches_.right_distance.stride());
+  return census_.buffer_bytes() + bytes_of(matches_.disparity) + bytes_of(matches_.right_distance);
 }
 
 }  // namespace spartan::internal::matching

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "spartan/reconstruction/internal/matching/image_bytes.h"
+
 namespace spartan::internal::matching {
 namespace {
 
@@ -198,13 +200,9 @@ std::int64_t SubpixelRefinement::memory_bytes(ImageSize size, int threads) {
 }
 
 std::size_t SubpixelRefinement::buffer_bytes() const {
-  const auto bytes = [](const auto& image) {
-    return static_cast<std::size_t>(image.stride()) * static_cast<std::size_t>(image.height()) * sizeof(*image.data());
-  };
-  std::size_t total = bytes(left_) + bytes(right_) + bytes(textured_);
-  for (int i = 0; i < 2; ++i) {
-    total += bytes(disparity_[static_cast<std::size_t>(i)]) + bytes(information_[static_cast<std::size_t>(i)]);
-  }
+  std::size_t total = bytes_of(left_) + bytes_of(right_) + bytes_of(textured_);
+  for (const Image<float>& image : disparity_) total += bytes_of(image);
+  for (const Image<float>& image : information_) total += bytes_of(image);
   for (const FitBuffers& b : buffers_) total += 2 * b.rows.size() + 4 * b.columns.size();
   return total;
 }
