@@ -72,7 +72,7 @@ PanoramicCamera plan_panorama(PanoramicCamera::Projection projection, double per
                               std::span<const ViewGeometry> views, double nearest_m, double farthest_m);
 
 struct MergingOptions {
-  PanoramicCamera::Projection projection = PanoramicCamera::Projection::cylinder;  ///< Of the virtual camera.
+  PanoramicCamera::Projection projection = PanoramicCamera::Projection::sphere;  ///< Of the virtual camera.
   double pixels_per_degree = 12;    ///< Resolution of the virtual camera, pixels per degree of azimuth.
   double max_range_m = 6;           ///< Maximum range of a point from the virtual camera, m.
   double disparity_sigma_px = 0.3;  ///< Of the gate, at least; pixels.

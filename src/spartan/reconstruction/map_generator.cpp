@@ -63,22 +63,23 @@ struct CellPoints {
 CellPoints rasterize_points(std::span<const SurfacePoint> points, const Pose& map_from_body, Grid& grid) {
   const Eigen::Matrix3f rotation = map_from_body.rotation_matrix().cast<float>();
   const Eigen::Vector3f translation = map_from_body.translation().cast<float>();
+  const auto information_of = [&](const SurfacePoint& point) {  // of its height
+    const double sigma =
+        std::max(std::abs(static_cast<double>(rotation.row(2).dot(point.ray)) * point.sigma_m), kLeastSigma_m);
+    return 1 / (sigma * sigma);
+  };
   constexpr std::uint32_t kOutside = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> cells(points.size(), kOutside);
-  std::vector<CellPoint> unsorted(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SurfacePoint& point = points[i];
     const Eigen::Vector3f p = rotation * point.in_body + translation;
     const GridCell at = cell_at(grid.place, p.x(), p.y());
     if (at.column < 0 || at.row < 0 || at.column >= grid.width || at.row >= grid.height) continue;
-    const double sigma =
-        std::max(std::abs(static_cast<double>(rotation.row(2).dot(point.ray)) * point.sigma_m), kLeastSigma_m);
     cells[i] = static_cast<std::uint32_t>(at.row) * static_cast<std::uint32_t>(grid.width) +
                static_cast<std::uint32_t>(at.column);
-    unsorted[i] = {p.z(), static_cast<float>(1 / (sigma * sigma))};
     Cell& cell = grid.cells[cells[i]];
     ++cell.count;
-    cell.weights += 1 / (sigma * sigma);
+    cell.weights += information_of(point);
     cell.rays += rotation * point.ray;
     cell.ranges_m += point.range_m;
     cell.longest_baseline_m = std::max(cell.longest_baseline_m, point.baseline_m);
@@ -92,7 +93,9 @@ CellPoints rasterize_points(std::span<const SurfacePoint> points, const Pose& ma
   sorted.points.resize(sorted.first.back());
   std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (cells[i] != kOutside) sorted.points[next[cells[i]]++] = unsorted[i];
+    if (cells[i] == kOutside) continue;
+    const float height_m = (rotation * points[i].in_body + translation).z();
+    sorted.points[next[cells[i]]++] = {height_m, static_cast<float>(information_of(points[i]))};
   }
   return sorted;
 }
@@ -243,7 +246,14 @@ void list_obstacles(LocalMap& map) {
 }  // namespace
 
 std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
+  std::size_t known = 0;
+  for (int y = 0; y < merged.range_m.height(); ++y) {
+    const float* const row = merged.range_m.row(y);
+    known += static_cast<std::size_t>(
+        std::count_if(row, row + merged.range_m.width(), [](float range) { return std::isfinite(range); }));
+  }
   std::vector<SurfacePoint> points;
+  points.reserve(known);
   const Eigen::Matrix3d rotation = merged.body_from_centre.rotation_matrix();
   for (int y = 0; y < merged.range_m.height(); ++y) {
     for (int x = 0; x < merged.range_m.width(); ++x) {

@@ -16,10 +16,10 @@
 
 namespace spartan::internal::matching {
 
-inline constexpr int kStripMargin = 16;
+inline constexpr int kStripMargin = 24;
 inline constexpr int kDirections = 3;  ///< Paths of a sweep from the row before: from x − 1, x, x + 1.
 
-/// Rows of a strip, a multiple of the tile: about 256, fewer where a row has so many costs that the strip would exceed
+/// Rows of a strip, a multiple of the tile: about 128, fewer where a row has so many costs that the strip would exceed
 /// about 16 million, and at least two strips where the image has enough rows for it.
 int strip_rows(int height, std::int64_t costs_per_row);
 
