@@ -1,5 +1,6 @@
 // The program `spartan`: reads the command line and runs the command that it names.
 #include <fmt/format.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -114,6 +115,13 @@ int exit_code_of(const std::exception& e) {
   return kInternalFault;
 }
 
+// Images are returned to the system when they are freed. glibc would keep them in the heaps of the threads (its
+// threshold grows to 32 MB), which raises the peak of a run with maps by a tenth; the page faults cost 2 % of its time.
+void return_freed_images() {
+  constexpr int kThreshold_bytes = 4 << 20;
+  mallopt(M_MMAP_THRESHOLD, kThreshold_bytes);
+}
+
 // Memory may also run out in a function that must not throw, e.g. a destructor. The exception then ends here, where
 // nothing may be allocated, and not in main().
 [[noreturn]] void end_by_exception() noexcept {
@@ -139,6 +147,7 @@ int main(int argc, char** argv) {
   spartan::program::reserve_standard_streams();
   spartan::program::ignore_write_signals();
   std::set_terminate(spartan::program::end_by_exception);
+  spartan::program::return_freed_images();
   try {
     return spartan::program::run(argc, argv);
   } catch (const std::exception& e) {

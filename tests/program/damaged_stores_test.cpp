@@ -55,7 +55,7 @@ TEST_F(DamagedStores, OfMapsAreNamed) {
            Damage{"UPDATE map_properties SET value = -1", "the cell size is -1 m"},
            Damage{"UPDATE map_properties SET value = 'wide'", "the cell size is"},
            Damage{"UPDATE map_properties SET value = 1e300", "the cell size is"},
-           Damage{"UPDATE map_tiles SET ix = ix + 9223372036854700000", "table 'map_tiles' has tile 92233720368547"},
+           Damage{"UPDATE map_tiles SET ix = ix + 9223372036854700000", "table 'map_tiles' has tile 9223372036854"},
            Damage{"UPDATE map_tiles SET iy = 2000000000 + iy", "table 'map_tiles' has tile"},
            Damage{"UPDATE map_tiles SET revision = 9223372036854775807", "revision 9223372036854775807"},
            Damage{"UPDATE map_tiles SET cells = x'00'", "checksum mismatch"},

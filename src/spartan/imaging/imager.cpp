@@ -104,6 +104,11 @@ struct Imager::State {
       left.correct_vignetting(workers);
       right.correct_vignetting(workers);
     });
+    const auto rectify = [&] {
+      left.rectify(workers);
+      right.rectify(workers);
+    };
+    step("imaging.rectify", left.rectifies_first(), rectify);
     step("imaging.contrast", true, [&] {
       if (options.contrast) update_mappings(stage, options);
       left.apply_contrast(stage.left_mapping, workers);
@@ -113,10 +118,7 @@ struct Imager::State {
       left.equalise_locally(workers);
       right.equalise_locally(workers);
     });
-    step("imaging.rectify", left.is_resampled(), [&] {
-      left.rectify(workers);
-      right.rectify(workers);
-    });
+    step("imaging.rectify", left.is_resampled() && !left.rectifies_first(), rectify);
   }
 };
 

@@ -308,6 +308,40 @@ TEST(Imager, CompensatesTheGainBetweenTheCameras) {
   }
 }
 
+// An 8-bit image would be rounded before and after the interpolation: up to a whole level from the true one.
+TEST(Imager, DeepImagesAreRoundedTo8BitsOnceAfterTheInterpolation) {
+  const PixelFormat format{PixelLayout::gray, 12};
+  const Rig rig = rig_with(format, {0.03, -0.05, 0.04});
+  ImagingOptions options;
+  options.contrast = false;
+  auto imager = Imager::create(rig, options, ThreadPool(2));
+  ASSERT_TRUE(imager);
+  Image<std::uint16_t> image(kImageSize);
+  for (int y = 0; y < kImageSize.height; ++y) {
+    for (int x = 0; x < kImageSize.width; ++x) image(x, y) = static_cast<std::uint16_t>(41 * x + 13 * y + 100);
+  }
+  const FrameImage frame = FrameImage::own(std::move(image), format);
+  const auto pair = imager->process(frame_of(frame, frame));
+  ASSERT_TRUE(pair);
+  const Eigen::Matrix3d camera_from_rectified =
+      (rig.body_from_camera("left").rotation().inverse() * pair->body_from_left.rotation()).toRotationMatrix();
+  const RectifiedStereo& g = pair->geometry;
+  double worst = 0;
+  int seen = 0;
+  for (int y = 0; y < pair->left.height(); ++y) {
+    for (int x = 0; x < pair->left.width(); ++x) {
+      if (!pair->left_mask.empty() && pair->left_mask(x, y) == 0) continue;
+      const Eigen::Vector3d ray = camera_from_rectified * Eigen::Vector3d((x - g.centre_px.x()) / g.focal_px,
+                                                                          (y - g.centre_px.y()) / g.focal_px, 1);
+      const double u = 60 * ray.x() / ray.z() + 32, v = 60 * ray.y() / ray.z() + 24;
+      worst = std::max(worst, std::abs(pair->left(x, y) - (41 * u + 13 * v + 100) * 255 / 4095));
+      ++seen;
+    }
+  }
+  EXPECT_GT(seen, 1000);
+  EXPECT_LT(worst, 0.6) << "gray levels";
+}
+
 TEST(Imager, AppliesClaheAfterTheStretch) {
   ImagingOptions options;
   const auto image = FrameImage::own(ramp<std::uint8_t>(1), {});

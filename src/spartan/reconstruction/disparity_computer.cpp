@@ -34,8 +34,19 @@ struct DisparityComputer::State {
   matching::BlockMatcher block_matcher;
   matching::SubpixelRefinement refinement;
   SpeckleFilter speckles;
-  Image<float> disparity, sigma;  // sigma is also the output of the median filter
-  Image<std::uint8_t> outlier_percent;
+  Image<std::uint8_t> right_distance, outlier_percent;
+
+  void resize(ImageSize size) {
+    refinement.resize(size);
+    if (outlier_percent.size() == size) return;
+    outlier_percent = {};  // stays so if an allocation fails
+    right_distance = Image<std::uint8_t>(size);
+    outlier_percent = Image<std::uint8_t>(size);
+  }
+  std::size_t buffer_bytes() const {
+    return matcher.buffer_bytes() + block_matcher.buffer_bytes() + refinement.buffer_bytes() + speckles.buffer_bytes() +
+           matching::bytes_of(right_distance) + matching::bytes_of(outlier_percent);
+  }
 };
 
 Result<DisparityComputer> DisparityComputer::create(const DisparityOptions& options, ThreadPool workers) {
@@ -75,55 +86,49 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   if (Status fits = check(left, right, range, left_mask, right_mask); !fits) return failure(fits);
   Stopwatch all, watch;
   State& s = *state_;
-  if (s.outlier_percent.size() != left.size()) {
-    s.outlier_percent = {};  // stays so if an allocation fails
-    for (Image<float>* image : {&s.disparity, &s.sigma}) *image = Image<float>(left.size());
-    s.outlier_percent = Image<std::uint8_t>(left.size());
-  }
+  s.resize(left.size());
+  const ImageView<float> disparity = s.refinement.disparity();
+  const matching::Matches matches{s.options.median ? s.refinement.spare() : disparity, s.right_distance};
   DisparityImage result;
   DisparityTimes& times = result.times;
-  const bool by_blocks = s.options.method == MatchingMethod::block;
-  const matching::Matches& matches =
-      by_blocks ? s.block_matcher.match(left, right, range) : s.matcher.match(left, right, range);
-  times.coarse = by_blocks ? 0 : s.matcher.coarse_ms();
-  times.match = watch.lap() - times.coarse;
-  s.workers.parallel_for(0, left.height(), 64, [&](int from, int to) {
-    for (int y = from; y < to; ++y) std::copy_n(matches.disparity.row(y), left.width(), s.disparity.row(y));
-  });
-  apply_masks(left_mask, right_mask, s.disparity);
-  if (s.options.median) {
-    median_3x3(s.disparity, s.kernels.median_row, s.workers, s.sigma);
-    std::swap(s.disparity, s.sigma);
+  if (s.options.method == MatchingMethod::block) {
+    s.block_matcher.match(left, right, range, matches);
+  } else {
+    s.matcher.match(left, right, range, matches);
+    times.coarse = s.matcher.coarse_ms();
   }
+  times.match = watch.lap() - times.coarse;
+  apply_masks(left_mask, right_mask, matches.disparity);
+  if (s.options.median) median_3x3(matches.disparity, s.kernels.median_row, s.workers, disparity);
   times.filter = watch.lap();
-  s.refinement.refine(left, right, s.disparity);
-  const matching::Assessed assessed{s.disparity, s.sigma, s.outlier_percent, s.refinement.textured()};
-  matching::assess(
-      {s.refinement.information(), s.refinement.relief(), matches.right_distance, s.options.max_outlier_percent},
-      s.kernels, s.workers, assessed);
+  s.refinement.refine(left, right);
+  // Sigma takes the place of the information that it follows from.
+  const ImageView<float> information = s.refinement.information();
+  const matching::Assessed assessed{s.refinement.disparity(), information, s.outlier_percent, s.refinement.textured()};
+  matching::assess({information, s.refinement.relief(), s.right_distance, s.options.max_outlier_percent}, s.kernels,
+                   s.workers, assessed);
   times.refine = watch.lap();
-  s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, assessed.reliable}, s.workers, s.disparity);
+  s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, assessed.reliable}, s.workers,
+                   assessed.disparity);
   matching::clear_unknown(s.workers, assessed);
   if (s.options.fill) {
-    fill_unknown(s.workers, s.disparity);
-    apply_masks(left_mask, {}, s.disparity);
+    fill_unknown(s.workers, assessed.disparity);
+    apply_masks(left_mask, {}, assessed.disparity);
   }
   times.filter += watch.lap();
   times.total = all.lap();
-  result.disparity = s.disparity.view();
-  result.sigma = s.sigma.view();
-  result.outlier_percent = s.outlier_percent.view();
-  result.buffer_bytes = s.matcher.buffer_bytes() + s.block_matcher.buffer_bytes() + s.refinement.buffer_bytes() +
-                        s.speckles.buffer_bytes() + matching::bytes_of(s.disparity) + matching::bytes_of(s.sigma) +
-                        matching::bytes_of(s.outlier_percent);
+  result.disparity = assessed.disparity;
+  result.sigma = assessed.sigma;
+  result.outlier_percent = assessed.outlier_percent;
+  result.buffer_bytes = s.buffer_bytes();
   return result;
 }
 
 std::int64_t DisparityComputer::memory_bytes(ImageSize size, DisparityRange range, int threads) {
-  // Per pixel: two images of 4 bytes and one of 1 byte, and the labels and runs of the speckle filter (16 bytes).
+  // Per pixel: two images of 1 byte, and the labels and runs of the speckle filter (16 bytes).
   return std::max(matching::CoarseToFineMatcher::memory_bytes(size, range, threads),
                   matching::BlockMatcher::memory_bytes(size, threads)) +
-         matching::SubpixelRefinement::memory_bytes(size, threads) + std::int64_t{25} * size.width * size.height;
+         matching::SubpixelRefinement::memory_bytes(size, threads) + std::int64_t{18} * size.width * size.height;
 }
 
 Status DisparityComputer::check_memory(ImageSize size, DisparityRange range, int threads, std::int64_t most_bytes) {

@@ -27,7 +27,7 @@ TEST(DisparityMemory, MoreThanTheBoundIsRefusedWithBothFigures) {
   const Status refused = DisparityComputer::check_memory({11585, 11585}, {0, 2895}, 2, 2'000'000'000);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::resources);
-  EXPECT_NE(refused.error().message().find("11585x11585 px with 2896 disparities need 9"), std::string::npos)
+  EXPECT_NE(refused.error().message().find("11585x11585 px with 2896 disparities need 8"), std::string::npos)
       << refused.error().message();
   EXPECT_NE(refused.error().message().find("2000 MB"), std::string::npos);
 }

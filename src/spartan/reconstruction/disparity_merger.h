@@ -73,16 +73,18 @@ PanoramicCamera plan_panorama(PanoramicCamera::Projection projection, double per
 
 struct MergingOptions {
   PanoramicCamera::Projection projection = PanoramicCamera::Projection::sphere;  ///< Of the virtual camera.
-  double pixels_per_degree = 12;    ///< Resolution of the virtual camera, pixels per degree of azimuth.
+  double pixels_per_degree = 14;    ///< Resolution of the virtual camera, pixels per degree of azimuth.
   double max_range_m = 6;           ///< Maximum range of a point from the virtual camera, m.
   double disparity_sigma_px = 0.3;  ///< Of the gate, at least; pixels.
   double gate_sigmas = 3;           ///< Gate on range differences, standard deviations.
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("projection", projection,
-            "Projection of the virtual panoramic camera: rows of a cylinder are equal steps of slope, rows of a sphere "
-            "equal steps of elevation angle; choose sphere for cameras that look steeply down.");
+    v.field(
+        "projection", projection,
+        "Projection of the virtual panoramic camera: rows of a sphere are equal steps of elevation angle, rows of a "
+        "cylinder equal steps of slope; a cylinder has many more rows for the ground close to the rover and needs "
+        "more memory and time.");
     v.field("pixels_per_degree", pixels_per_degree,
             "Resolution of the virtual panoramic camera in pixels per degree of azimuth; raising it keeps finer detail "
             "and costs memory and time.",

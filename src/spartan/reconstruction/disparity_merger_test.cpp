@@ -192,14 +192,16 @@ TEST(DisparityMerger, ViewsBeyondTheEighthShareTheBitsOfTheFirst) {
 
 // A false surface that only the middle view sees: two other views, or one, see free space through it.
 TEST(DisparityMerger, DiscardsASurfaceThatMoreViewsSeeThrough) {
+  MergingOptions options = coarse();
+  options.projection = PanoramicCamera::Projection::cylinder;  // has more cells at the feet
   Stop stop;
   for (const double pan : {0.3, 0.0, -0.3})
     stop.add(kWide, testing::camera_pose_at(1, pan, 0.68, optical_from_forward()), [](double, double) { return 0; });
-  const MergedRange clean = stop.merge(coarse());
+  const MergedRange clean = stop.merge(options);
   for (int y = 180; y < 200; ++y) {
     for (int x = 0; x < 373; ++x) stop.disparities[1](x, y) *= 1.25F;
   }
-  const MergedRange ghost = stop.merge(coarse());
+  const MergedRange ghost = stop.merge(options);
   int dropped = 0, kept = 0, wrong = 0;
   for (int y = 0; y < clean.range_m.height() / 2; ++y) {
     for (int x = 0; x < clean.range_m.width(); ++x) {

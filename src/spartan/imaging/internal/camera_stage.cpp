@@ -91,6 +91,7 @@ Result<CameraStage> CameraStage::create(const Camera& camera, const Rectificatio
                        plan.depth_m);
   if (Status status = stage.check_mask(where); !status) return failure(status);
   stage.result_ = Image<std::uint8_t>(plan.geometry.size);
+  if (stage.rectifies_first()) stage.rectified16_ = Image<std::uint16_t>(plan.geometry.size);
   stage.histogram_mask_ = view_footprint(camera, plan.geometry, camera_from_rectified, plan.depth_m);
   if (!stage.self_mask_.empty()) keep_where(stage.histogram_mask_, stage.self_mask_);
   return stage;
@@ -167,6 +168,7 @@ void CameraStage::add_to_histogram(GrayHistogram& histogram) const {
 }
 
 void CameraStage::apply_contrast(const ContrastMapping& mapping, const ThreadPool& workers) {
+  if (rectifies_first()) return mapping.apply(rectified16_, result_, workers);
   if (is_deep()) return mapping.apply(gray16_view_, mapped_, workers);
   mapping.apply(gray8_view_, mapped_, workers);
 }
@@ -176,7 +178,11 @@ void CameraStage::equalise_locally(const ThreadPool& workers) {
 }
 
 void CameraStage::rectify(const ThreadPool& workers) {
-  if (table_) table_->apply(working(), result_, workers);
+  if (rectifies_first()) {
+    table_->apply(gray16_view_, rectified16_, workers);
+  } else if (table_) {
+    table_->apply(working(), result_, workers);
+  }
 }
 
 }  // namespace spartan::internal

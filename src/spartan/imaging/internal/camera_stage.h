@@ -19,8 +19,8 @@
 
 namespace spartan::internal {
 
-/// Buffers and lookup tables of one camera. The steps must be called in the order of their declaration; the views of
-/// the result are valid until the next image.
+/// Buffers and lookup tables of one camera. The steps must be called in the order of their declaration, but rectify()
+/// before apply_contrast() where rectifies_first(); the views of the result are valid until the next image.
 class CameraStage {
  public:
   /// Code `configuration` where the self-mask cannot be read, the vignetting correction is out of range or the camera
@@ -36,6 +36,9 @@ class CameraStage {
   bool has_vignetting() const { return vignetting_.has_value(); }
   bool has_local_contrast() const { return local_.has_value(); }
   bool is_resampled() const { return table_.has_value(); }
+  /// Whether the gray image is rectified, not the working image: with more than 8 bits it is interpolated before it is
+  /// rounded to 8. Local contrast needs the whole image of the camera.
+  bool rectifies_first() const { return is_resampled() && is_deep() && !has_local_contrast(); }
 
   /// Raw image → gray image of the same depth.
   void make_gray(const FrameImage& image, const ThreadPool& workers);
@@ -48,7 +51,7 @@ class CameraStage {
   void equalise_locally(const ThreadPool& workers);
   void rectify(const ThreadPool& workers);
 
-  ImageView<const std::uint8_t> result() const { return table_ ? result_.view() : working(); }
+  ImageView<const std::uint8_t> result() const { return is_resampled() ? result_.view() : working(); }
   ImageView<const std::uint8_t> mask() const { return table_ ? table_->mask() : self_mask_.view(); }
 
  private:
@@ -67,7 +70,7 @@ class CameraStage {
   std::optional<RemapTable> table_;
   Image<std::uint8_t> gray8_, mapped_, equalised_, result_;
   Image<std::uint8_t> self_mask_, histogram_mask_;  ///< size of the sensor, 0: excluded; empty: nothing excluded
-  Image<std::uint16_t> gray16_;
+  Image<std::uint16_t> gray16_, rectified16_;
   ImageView<const std::uint8_t> gray8_view_;
   ImageView<const std::uint16_t> gray16_view_;
 };

@@ -39,8 +39,6 @@ void BlockMatcher::resize(ImageSize size) {
   size_ = {};  // stays so if an allocation fails
   for (Image<std::uint8_t>* image : {&left_, &right_, &means_[0], &means_[1]})
     *image = Image<std::uint8_t>(size.width + 3 * kBlockPad, size.height);
-  matches_.disparity = Image<float>(size);
-  matches_.right_distance = Image<std::uint8_t>(size);
   size_ = size;
 }
 
@@ -109,7 +107,7 @@ void BlockMatcher::match_plane(const Strip& strip, int index, StripBuffers& b) c
   }
 }
 
-void BlockMatcher::select(const Strip& strip, const StripBuffers& b) {
+void BlockMatcher::select(const Strip& strip, const StripBuffers& b, const Matches& to) const {
   for (int y = strip.from; y < strip.to; ++y) {
     const int row = y - strip.from;
     const auto at = [&](const auto& image) { return image.row(row) + kBlockPad; };
@@ -117,28 +115,28 @@ void BlockMatcher::select(const Strip& strip, const StripBuffers& b) {
     const auto *const index = at(b.index), *const right_index = at(b.right_index);
     for (int x = 0; x < size_.width; ++x) {
       if (index[x] == kNoPlane) {
-        matches_.disparity(x, y) = std::numeric_limits<float>::quiet_NaN();
-        matches_.right_distance(x, y) = kMostRightDistance;
+        to.disparity(x, y) = std::numeric_limits<float>::quiet_NaN();
+        to.right_distance(x, y) = kMostRightDistance;
         continue;
       }
       const int disparity = range_.min + index[x];
       const bool inner = before[x] != kNoCost && after[x] != kNoCost;
       const float offset = inner ? equiangular_offset(before[x], best[x], after[x]) : 0.0F;
-      matches_.disparity(x, y) = static_cast<float>(disparity) + offset;
+      to.disparity(x, y) = static_cast<float>(disparity) + offset;
       // The right pixel has a plane, because this pixel has one at it.
       const int distance = std::abs(index[x] - right_index[x - disparity]);
-      matches_.right_distance(x, y) = static_cast<std::uint8_t>(std::min(distance, kMostRightDistance));
+      to.right_distance(x, y) = static_cast<std::uint8_t>(std::min(distance, kMostRightDistance));
     }
   }
 }
 
-void BlockMatcher::match_strip(const Strip& strip, StripBuffers& b) {
+void BlockMatcher::match_strip(const Strip& strip, StripBuffers& b, const Matches& to) const {
   resize(b);
   for (Image<std::uint8_t>* image : {&b.best, &b.before, &b.after, &b.previous, &b.right_best})
     set_all(kNoCost, *image);
   for (int row = 0; row < kStripRows; ++row) std::fill_n(b.index.row(row), b.index.width(), kNoPlane);
   for (int index = 0; index < range_.count(); ++index) match_plane(strip, index, b);
-  select(strip, b);
+  select(strip, b, to);
 }
 
 // Gray levels without their mean over the window, around 128: offsets between the cameras and vignetting cancel.
@@ -183,8 +181,8 @@ void BlockMatcher::prepare(ImageView<const std::uint8_t> from, Image<std::uint8_
   });
 }
 
-const Matches& BlockMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                   DisparityRange range) {
+void BlockMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range,
+                         const Matches& to) {
   resize(left.size());
   range_ = range;
   prepare(left, left_);
@@ -193,9 +191,8 @@ const Matches& BlockMatcher::match(ImageView<const std::uint8_t> left, ImageView
   if (static_cast<int>(strips_.size()) < threads) strips_.resize(static_cast<std::size_t>(threads));
   workers_.parallel_for_parts(count, [&](int i, int worker) {
     match_strip({i * kStripRows, std::min(size_.height, (i + 1) * kStripRows)},
-                strips_[static_cast<std::size_t>(worker)]);
+                strips_[static_cast<std::size_t>(worker)], to);
   });
-  return matches_;
 }
 
 std::size_t BlockMatcher::StripBuffers::bytes() const {
@@ -204,15 +201,14 @@ std::size_t BlockMatcher::StripBuffers::bytes() const {
 }
 
 std::size_t BlockMatcher::buffer_bytes() const {
-  std::size_t total = bytes_of(left_) + bytes_of(right_) + bytes_of(means_[0]) + bytes_of(means_[1]) +
-                      bytes_of(matches_.disparity) + bytes_of(matches_.right_distance);
+  std::size_t total = bytes_of(left_) + bytes_of(right_) + bytes_of(means_[0]) + bytes_of(means_[1]);
   for (const StripBuffers& strip : strips_) total += strip.bytes();
   return total;
 }
 
 std::int64_t BlockMatcher::memory_bytes(ImageSize size, int threads) {
   const std::int64_t wide = size.width + 4 * kBlockPad;
-  return (4 + 4 + 1) * wide * size.height + threads * wide * (2 * (kStripRows + 2 * kRadius) + (5 + 4) * kStripRows);
+  return 4 * wide * size.height + threads * wide * (2 * (kStripRows + 2 * kRadius) + (5 + 4) * kStripRows);
 }
 
 }  // namespace spartan::internal::matching

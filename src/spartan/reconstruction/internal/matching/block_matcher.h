@@ -20,8 +20,9 @@ class BlockMatcher {
  public:
   BlockMatcher(BlockKernels kernels, const ThreadPool& workers);
 
-  /// Both images must have one size, and the range must not be empty. The result is valid until the next call.
-  const Matches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range);
+  /// All images must have one size, and the range must not be empty.
+  void match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range,
+             const Matches& to);
   std::size_t buffer_bytes() const;
   /// An upper bound of buffer_bytes() of a new object.
   static std::int64_t memory_bytes(ImageSize size, int threads);
@@ -40,10 +41,10 @@ class BlockMatcher {
   void resize(ImageSize size);
   void resize(StripBuffers& buffers) const;
   void prepare(ImageView<const std::uint8_t> from, Image<std::uint8_t>& to);
-  void match_strip(const Strip& strip, StripBuffers& buffers);
+  void match_strip(const Strip& strip, StripBuffers& buffers, const Matches& to) const;
   void match_plane(const Strip& strip, int index, StripBuffers& buffers) const;
   void sum_costs(const Strip& strip, int disparity, StripBuffers& buffers) const;
-  void select(const Strip& strip, const StripBuffers& buffers);
+  void select(const Strip& strip, const StripBuffers& buffers, const Matches& to) const;
 
   BlockKernels kernels_;
   ThreadPool workers_;
@@ -52,7 +53,6 @@ class BlockMatcher {
   Image<std::uint8_t> left_, right_;  // without their local mean, with replicated columns on both sides
   std::array<Image<std::uint8_t>, 2> means_;
   std::vector<StripBuffers> strips_;
-  Matches matches_;
 };
 
 }  // namespace spartan::internal::matching

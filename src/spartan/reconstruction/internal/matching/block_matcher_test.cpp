@@ -41,15 +41,26 @@ GrayPair textured_pair(ImageSize size, int disparity, std::uint64_t seed) {
   return pair;
 }
 
+struct Found {
+  Image<float> disparity;
+  Gray right_distance;
+};
+
+Found match(BlockMatcher& matcher, const GrayPair& pair, DisparityRange range) {
+  Found found{Image<float>(pair.left.size()), Gray(pair.left.size())};
+  matcher.match(pair.left, pair.right, range, {found.disparity, found.right_distance});
+  return found;
+}
+
 // The same, pixel by pixel over whole images.
 class Reference {
  public:
-  static Matches match(const GrayPair& pair, DisparityRange range) {
+  static Found match(const GrayPair& pair, DisparityRange range) {
     const ImageSize size = pair.left.size();
     const Levels left = without_mean(pair.left), right = without_mean(pair.right);
     std::vector<Levels> costs;
     for (int d = range.min; d <= range.max; ++d) costs.push_back(plane_costs(left, right, size, d));
-    Matches found{Image<float>(size), Gray(size)};
+    Found found{Image<float>(size), Gray(size)};
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) select(costs, range, x, y, size, found);
     }
@@ -134,7 +145,7 @@ class Reference {
     return costs[plane][static_cast<std::size_t>(y + kMargin)][static_cast<std::size_t>(x + kMargin)];
   }
   static void select(const std::vector<Levels>& costs, DisparityRange range, int x, int y, ImageSize size,
-                     Matches& found) {
+                     Found& found) {
     const auto valid = [&](int u, int plane) {
       const int d = range.min + plane;
       return plane >= 0 && plane < range.count() && u >= 0 && u < size.width && u - d >= 0 && u - d < size.width;
@@ -163,7 +174,7 @@ class Reference {
   }
 };
 
-void expect_same(const Matches& found, const Matches& expected) {
+void expect_same(const Found& found, const Found& expected) {
   int wrong = 0;
   for (int y = 0; y < expected.disparity.height(); ++y) {
     for (int x = 0; x < expected.disparity.width(); ++x) {
@@ -195,7 +206,7 @@ TEST_P(BlockMatching, EqualsTheReference) {
       if (range.max >= size.width || range.min <= -size.width) continue;
       SCOPED_TRACE(std::to_string(size.width) + ", " + std::to_string(range.min));
       const GrayPair pair = textured_pair(size, 7, 3);
-      expect_same(matching.match(pair.left, pair.right, range), Reference::match(pair, range));
+      expect_same(match(matching, pair, range), Reference::match(pair, range));
     }
   }
 }
@@ -203,7 +214,7 @@ TEST_P(BlockMatching, EqualsTheReference) {
 TEST_P(BlockMatching, FindsATexturedPlaneInspiteOfAnOffset) {
   const GrayPair pair = textured_pair({160, 120}, 11, 8);
   BlockMatcher matching = matcher();
-  const Matches& found = matching.match(pair.left, pair.right, {0, 47});
+  const Found found = match(matching, pair, {0, 47});
   for (int y = 0; y < 120; ++y) {
     for (int x = 20; x < 160; ++x) {
       EXPECT_NEAR(found.disparity(x, y), 11, 0.4);
@@ -215,7 +226,7 @@ TEST_P(BlockMatching, FindsATexturedPlaneInspiteOfAnOffset) {
 TEST_P(BlockMatching, IsTheSameForAnyNumberOfThreads) {
   const GrayPair pair = textured_pair({90, 200}, 5, 1);
   BlockMatcher one = matcher(1), two = matcher(2);
-  expect_same(two.match(pair.left, pair.right, {0, 31}), one.match(pair.left, pair.right, {0, 31}));
+  expect_same(match(two, pair, {0, 31}), match(one, pair, {0, 31}));
   EXPECT_LE(static_cast<std::int64_t>(two.buffer_bytes()), BlockMatcher::memory_bytes({90, 200}, 2));
 }
 

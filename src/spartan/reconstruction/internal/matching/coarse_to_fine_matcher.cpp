@@ -60,11 +60,11 @@ CoarseToFineMatcher::CoarseToFineMatcher(const DisparityOptions& options, const 
 CoarseToFineMatcher::CoarseToFineMatcher(const Penalties& penalties, std::size_t simd, const ThreadPool& workers)
     : workers_(workers),
       base_(penalties, kernels_for(simd), full_range_kernels_for(simd), workers),
-      half_matcher_(IntervalMatcher::Purpose::search_intervals, penalties, kernels_for(simd), workers),
-      full_matcher_(IntervalMatcher::Purpose::result, penalties, kernels_for(simd), workers) {}
+      half_matcher_(penalties, kernels_for(simd), workers),
+      full_matcher_(penalties, kernels_for(simd), workers) {}
 
-const Matches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                          DisparityRange range) {
+void CoarseToFineMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                DisparityRange range, const Matches& to) {
   Stopwatch watch;
   halve(left, workers_, half_.left);
   halve(right, workers_, half_.right);
@@ -74,10 +74,11 @@ const Matches& CoarseToFineMatcher::match(ImageView<const std::uint8_t> left, Im
   const DisparityRange quarter_range = halved(half_range, quarter_.left.width());
   const ImageView<const float> base = base_.match(quarter_.left, quarter_.right, quarter_range, strips_);
   const auto half_tiles = choose_intervals(base, half_.left.size(), half_range, workers_);
-  const Matches& half = half_matcher_.match(half_.left, half_.right, half_tiles, half_range, strips_);
-  const auto tiles = choose_intervals(half.disparity, left.size(), range, workers_);
+  if (half_disparity_.size() != half_.left.size()) half_disparity_ = Image<float>(half_.left.size());
+  half_matcher_.match(half_.left, half_.right, half_tiles, half_range, strips_, {half_disparity_, {}});
+  const auto tiles = choose_intervals(half_disparity_, left.size(), range, workers_);
   coarse_ms_ = watch.lap();
-  return full_matcher_.match(left, right, tiles, range, strips_);
+  full_matcher_.match(left, right, tiles, range, strips_, to);
 }
 
 std::int64_t CoarseToFineMatcher::memory_bytes(ImageSize size, DisparityRange range, int threads) {
@@ -87,11 +88,12 @@ std::int64_t CoarseToFineMatcher::memory_bytes(ImageSize size, DisparityRange ra
   const std::int64_t strips = std::max(IntervalMatcher::strip_bytes(size, range, threads),
                                        FullRangeMatcher::strip_bytes(quarter, quarter_range, threads));
   return strips + IntervalMatcher::memory_bytes(size, range) + IntervalMatcher::memory_bytes(half, half_range) +
-         FullRangeMatcher::memory_bytes(quarter, quarter_range) + 2 * (pixels(half) + pixels(quarter));
+         FullRangeMatcher::memory_bytes(quarter, quarter_range) + 6 * pixels(half) + 2 * pixels(quarter);
 }
 
 std::size_t CoarseToFineMatcher::buffer_bytes() const {
-  std::size_t total = base_.buffer_bytes() + half_matcher_.buffer_bytes() + full_matcher_.buffer_bytes();
+  std::size_t total =
+      base_.buffer_bytes() + half_matcher_.buffer_bytes() + full_matcher_.buffer_bytes() + bytes_of(half_disparity_);
   for (const StripBuffers& strip : strips_) total += strip.bytes();
   for (const Halved* pair : {&half_, &quarter_}) total += bytes_of(pair->left) + bytes_of(pair->right);
   return total;

@@ -19,8 +19,9 @@ class CoarseToFineMatcher {
  public:
   CoarseToFineMatcher(const DisparityOptions& options, const ThreadPool& workers);
 
-  /// Both images must have one size, and the range must not be empty. The result is valid until the next call.
-  const Matches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range);
+  /// All images must have one size, and the range must not be empty.
+  void match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, DisparityRange range,
+             const Matches& to);
   double coarse_ms() const { return coarse_ms_; }  ///< Of the last call: time before the full resolution.
   std::size_t buffer_bytes() const;
   /// An upper bound of buffer_bytes().
@@ -36,6 +37,7 @@ class CoarseToFineMatcher {
   Halved half_, quarter_;
   FullRangeMatcher base_;
   IntervalMatcher half_matcher_, full_matcher_;
+  Image<float> half_disparity_;
   std::vector<StripBuffers> strips_;  // of all levels
   double coarse_ms_ = 0;
 };

@@ -4,19 +4,16 @@
 #include <cstring>
 #include <limits>
 
-#include "spartan/reconstruction/internal/matching/image_bytes.h"
 #include "spartan/reconstruction/internal/matching/row_padding.h"
 #include "spartan/reconstruction/internal/subpixel.h"
 
 namespace spartan::internal::matching {
-namespace {}  // namespace
-
 // Matches one strip.
 class IntervalMatcher::StripMatching {
  public:
   StripMatching(IntervalMatcher& matcher, ImageView<const TileIntervals> tiles, const StripRows& rows,
-                StripBuffers& buffers)
-      : m_(matcher), tiles_(tiles), s_(buffers), width_(matcher.census_.size().width), rows_(rows) {
+                StripBuffers& buffers, const Matches& to)
+      : m_(matcher), tiles_(tiles), s_(buffers), to_(to), width_(matcher.census_.size().width), rows_(rows) {
     resize();
   }
 
@@ -69,6 +66,7 @@ class IntervalMatcher::StripMatching {
   IntervalMatcher& m_;
   ImageView<const TileIntervals> tiles_;
   StripBuffers& s_;
+  const Matches& to_;
   int width_;
   StripRows rows_;
   int turn_ = 0;
@@ -221,25 +219,26 @@ void IntervalMatcher::StripMatching::select(int y) {
   row.second = row.first + width_;
   row.winner = s_.winners.data();
   row.width = width_;
-  if (m_.purpose_ == Purpose::result) {
+  const bool whole_pixels = to_.right_distance.empty();
+  if (!whole_pixels) {
     std::fill(s_.right_best.begin(), s_.right_best.end(), std::numeric_limits<std::uint16_t>::max());
     // The smallest start is at most an interval below the range, see TileIntervals.
     row.right_best = s_.right_best.data() + width_ - 1 - (m_.range_.min - kInterval);
   }
   m_.kernels_.select_row(row);
-  float* const disparity = m_.matches_.disparity.row(y);
+  float* const disparity = to_.disparity.row(y);
   for (int x = 0; x < width_; ++x) {
     const int d = winner(row, x);
     const bool inside = d <= x && d > x - width_;
     disparity[x] = inside ? static_cast<float>(d) : std::numeric_limits<float>::quiet_NaN();
   }
-  if (m_.purpose_ == Purpose::result) refine(row, y);
+  if (!whole_pixels) refine(row, y);
 }
 
 // Sub-pixel part and right distance of the winners.
 void IntervalMatcher::StripMatching::refine(const SelectRow& row, int y) {
-  float* const disparity = m_.matches_.disparity.row(y);
-  std::uint8_t* const right_distance = m_.matches_.right_distance.row(y);
+  float* const disparity = to_.disparity.row(y);
+  std::uint8_t* const right_distance = to_.right_distance.row(y);
   for (int x = 0; x < width_; ++x) {
     // right_best holds the column modulo kLevels.
     const int apart = (row.right_best[winner(row, x) - x] - x) & (kLevels - 1);
@@ -251,29 +250,19 @@ void IntervalMatcher::StripMatching::refine(const SelectRow& row, int y) {
   }
 }
 
-IntervalMatcher::IntervalMatcher(Purpose purpose, const Penalties& penalties, const Kernels& kernels,
-                                 const ThreadPool& workers)
-    : purpose_(purpose),
-      penalties_(penalties),
-      kernels_(kernels),
-      workers_(workers),
-      census_(kernels.census_row, workers) {}
+IntervalMatcher::IntervalMatcher(const Penalties& penalties, const Kernels& kernels, const ThreadPool& workers)
+    : penalties_(penalties), kernels_(kernels), workers_(workers), census_(kernels.census_row, workers) {}
 
-const Matches& IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                      ImageView<const TileIntervals> tiles, DisparityRange range,
-                                      std::vector<StripBuffers>& strips) {
+void IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                            ImageView<const TileIntervals> tiles, DisparityRange range,
+                            std::vector<StripBuffers>& strips, const Matches& to) {
   range_ = range;
   // Intervals reach at most an interval beyond the range, see TileIntervals.
   census_.compute(left, right, {range.min - kInterval, range.max + 2 * kInterval});
-  if (matches_.disparity.size() != left.size()) {
-    matches_.disparity = Image<float>(left.size());
-    matches_.right_distance = Image<std::uint8_t>(left.size());
-  }
   const int rows = strip_rows(left.height(), std::int64_t{left.width()} * kLevels);
   for_each_strip(left.height(), rows, workers_, strips, [&](const StripRows& strip, StripBuffers& buffers) {
-    StripMatching(*this, tiles, strip, buffers).run();
+    StripMatching(*this, tiles, strip, buffers, to).run();
   });
-  return matches_;
 }
 
 std::int64_t IntervalMatcher::strip_bytes(ImageSize size, DisparityRange range, int threads) {
@@ -286,12 +275,11 @@ std::int64_t IntervalMatcher::strip_bytes(ImageSize size, DisparityRange range, 
 }
 
 std::int64_t IntervalMatcher::memory_bytes(ImageSize size, DisparityRange range) {
-  return CensusPair::memory_bytes(size, {range.min - kInterval, range.max + 2 * kInterval}) +
-         std::int64_t{5} * (size.width + 64) * size.height;
+  return CensusPair::memory_bytes(size, {range.min - kInterval, range.max + 2 * kInterval});
 }
 
 std::size_t IntervalMatcher::buffer_bytes() const {
-  return census_.buffer_bytes() + bytes_of(matches_.disparity) + bytes_of(matches_.right_distance);
+  return census_.buffer_bytes();
 }
 
 }  // namespace spartan::internal::matching

@@ -18,15 +18,13 @@ namespace spartan::internal::matching {
 
 class IntervalMatcher {
  public:
-  /// What the matches are for: the search intervals of a finer level need whole pixels and no right distances.
-  enum class Purpose { search_intervals, result };
-
-  IntervalMatcher(Purpose purpose, const Penalties& penalties, const Kernels& kernels, const ThreadPool& workers);
+  IntervalMatcher(const Penalties& penalties, const Kernels& kernels, const ThreadPool& workers);
 
   /// Both images must have one size, `tiles` one element for each tile of it. `strips` receives buffers for each
-  /// thread. The result is valid until the next call.
-  const Matches& match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                       ImageView<const TileIntervals> tiles, DisparityRange range, std::vector<StripBuffers>& strips);
+  /// thread. Without right distances (an empty image) the disparities are whole pixels.
+  void match(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+             ImageView<const TileIntervals> tiles, DisparityRange range, std::vector<StripBuffers>& strips,
+             const Matches& to);
   /// Bytes of all buffers but those of the strips.
   std::size_t buffer_bytes() const;
   /// Upper bounds of buffer_bytes() and of the bytes of the strips.
@@ -36,13 +34,11 @@ class IntervalMatcher {
  private:
   class StripMatching;
 
-  Purpose purpose_;
   Penalties penalties_;
   Kernels kernels_;
   ThreadPool workers_;
   CensusPair census_;
   DisparityRange range_;
-  Matches matches_;
 };
 
 }  // namespace spartan::internal::matching

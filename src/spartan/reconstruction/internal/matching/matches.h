@@ -7,9 +7,11 @@
 
 namespace spartan::internal::matching {
 
+/// Where a matcher writes its result; both images have the size of the pair.
 struct Matches {
-  Image<float> disparity;              ///< px; NaN where x − d lies outside of the right image.
-  Image<std::uint8_t> right_distance;  ///< px, 0 … 16: from x to the left pixel that the matched right pixel prefers.
+  ImageView<float> disparity;  ///< px; NaN where x − d lies outside of the right image.
+  ImageView<std::uint8_t>
+      right_distance;  ///< px, 0 … 16: from x to the left pixel that the matched right pixel prefers.
 };
 
 }  // namespace spartan::internal::matching

@@ -24,7 +24,7 @@ struct Evidence {
 };
 struct Assessed {
   ImageView<float> disparity;
-  ImageView<float> sigma;  ///< px
+  ImageView<float> sigma;  ///< px; may be the image of the information.
   ImageView<std::uint8_t> outlier_percent;
   ImageView<std::uint8_t> reliable;  ///< 1 or 0; in: whether the window of the fit has texture.
 };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <functional>
 #include <limits>
 #include <utility>
 
@@ -171,25 +170,15 @@ void SubpixelRefinement::fit(ImageView<const std::uint8_t> left, ImageView<const
   std::swap(information_[0], information_[1]);
 }
 
-void SubpixelRefinement::refine(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                ImageView<float> disparity) {
-  resize(disparity.size());
-  const auto row_bytes = static_cast<std::size_t>(size_.width) * sizeof(float);
-  const auto for_rows = [&](const std::function<void(int)>& body) {
-    workers_.parallel_for(0, size_.height, 64, [&](int from, int to) {
-      for (int y = from; y < to; ++y) body(y);
-    });
-  };
-  for_rows([&](int y) {
-    std::memcpy(disparity_[0].row(y) + kPad, disparity.row(y), row_bytes);
-    std::fill_n(information_[0].row(y) + kPad, size_.width, 1.0F);
+void SubpixelRefinement::refine(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right) {
+  workers_.parallel_for(0, size_.height, 64, [&](int from, int to) {
+    for (int y = from; y < to; ++y) std::fill_n(information_[0].row(y) + kPad, size_.width, 1.0F);
   });
   for (const int step : kStepsBeforeFit) smooth({step, kToleranceBefore_px, kToleranceBefore_px, 0, 0});
   fit(left, right);
   for (const int step : kStepsAfterFit)
     smooth({step, kToleranceAfter_px, kLeastTolerance_px, kToleranceSigmas, kGrowth});
   measure_relief();
-  for_rows([&](int y) { std::memcpy(disparity.row(y), disparity_[0].row(y) + kPad, row_bytes); });
 }
 
 std::int64_t SubpixelRefinement::memory_bytes(ImageSize size, int threads) {

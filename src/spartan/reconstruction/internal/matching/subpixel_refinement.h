@@ -19,13 +19,21 @@ class SubpixelRefinement {
  public:
   SubpixelRefinement(RefinementKernels kernels, const ThreadPool& workers);
 
-  /// Refines `disparity` (px, NaN: unknown) in place. All images have one size.
-  void refine(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, ImageView<float> disparity);
+  /// Makes the images below.
+  void resize(ImageSize size);
+  /// Refines disparity() in place. The images have the size of resize().
+  void refine(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right);
 
+  // The images belong to the refinement, but others may write to them, too: they are many bytes. Rows are padded as
+  // those of Image.
+  /// px; NaN: unknown.
+  ImageView<float> disparity() { return padded(disparity_[0]); }
+  /// Of no use between two calls of refine().
+  ImageView<float> spare() { return padded(disparity_[1]); }
   /// Of the last call: information of each fit, of its prior and of the neighbours that agree with it, px⁻².
-  ImageView<const float> information() const { return padded(information_[0]); }
+  ImageView<float> information() { return padded(information_[0]); }
   /// Of the last call: the relief of ReliefRow, px².
-  ImageView<const float> relief() const { return padded(information_[1]); }
+  ImageView<float> relief() { return padded(information_[1]); }
   /// Of the last call: 1 where the window of the fit has texture, else 0.
   ImageView<std::uint8_t> textured() { return textured_.view().crop(0, 0, size_.width, size_.height); }
   std::size_t buffer_bytes() const;
@@ -44,10 +52,9 @@ class SubpixelRefinement {
   };
 
   static constexpr int kPad = 16;  // columns before the first pixel, of which a smoothing reads `step`
-  ImageView<const float> padded(const Image<float>& image) const {
+  ImageView<float> padded(Image<float>& image) const {
     return {image.data() + kPad, size_.width, size_.height, image.stride()};
   }
-  void resize(ImageSize size);
   void smooth(const Smoothing& by);
   void measure_relief();
   void fit(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right);

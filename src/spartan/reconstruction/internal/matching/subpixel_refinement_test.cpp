@@ -100,6 +100,18 @@ SubpixelRefinement refinement(int threads = 1, SimdTarget simd = SimdTarget::aut
   return {refinement_kernels_for(simd_target_index(simd)), ThreadPool(threads)};
 }
 
+// Refines `disparity` in place.
+void refine(const PlanePair& pair, SubpixelRefinement& by, Image<float>& disparity) {
+  by.resize(disparity.size());
+  for (int y = 0; y < disparity.height(); ++y) std::copy_n(disparity.row(y), disparity.width(), by.disparity().row(y));
+  by.refine(pair.left, pair.right);
+  disparity = Image<float>::copy_of(by.disparity());
+}
+void refine(const PlanePair& pair, Image<float>& disparity) {
+  SubpixelRefinement by = refinement();
+  refine(pair, by, disparity);
+}
+
 // Refines the whole-pixel disparities of a plane, as matching finds them.
 Errors errors_from_whole_pixels(const Plane& plane) {
   const PlanePair pair = render(plane);
@@ -109,7 +121,7 @@ Errors errors_from_whole_pixels(const Plane& plane) {
     for (int x = 0; x < kWidth; ++x)
       disparity(x, y) = static_cast<float>(std::round(disparity(x, y) + random.normal(0, 0.1)));
   }
-  refinement().refine(pair.left, pair.right, disparity);
+  refine(pair, disparity);
   return errors_of(disparity, plane);
 }
 
@@ -141,7 +153,7 @@ TEST(SubpixelRefinement, KeepsADepthEdge) {
   Image<float> disparity = true_disparity(plane);
   // A step of 6 px that the images do not contain: neither side may leak into the other.
   for (int y = 0; y < kHeight; ++y) std::fill(disparity.row(y) + 80, disparity.row(y) + kWidth, 15.3F);
-  refinement().refine(pair.left, pair.right, disparity);
+  refine(pair, disparity);
   for (int y = 10; y < kHeight - 10; ++y) {
     EXPECT_NEAR(disparity(77, y), 9.3, 0.5);
     EXPECT_NEAR(disparity(82, y), 15.3, 1.0);
@@ -160,7 +172,7 @@ TEST(SubpixelRefinement, LeavesUnknownPixelsUnknownAndUsesNone) {
       if (unknown.back()) disparity(x, y) = kUnknown;
     }
   }
-  refinement().refine(pair.left, pair.right, disparity);
+  refine(pair, disparity);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       ASSERT_EQ(std::isnan(disparity(x, y)), unknown[static_cast<std::size_t>(y * kWidth + x)]);
@@ -174,14 +186,14 @@ TEST(SubpixelRefinement, LeavesUnknownPixelsUnknownAndUsesNone) {
 TEST(SubpixelRefinement, KnowsTheTexture) {
   const PlanePair pair = render({});
   // Smallest and largest information inside of the image.
-  const auto information_of = [](const Image<std::uint8_t>& left, const Image<std::uint8_t>& right, bool random_start) {
+  const auto information_of = [](const PlanePair& images, bool random_start) {
     SubpixelRefinement refined = refinement();
     Image<float> disparity(kWidth, kHeight, 9.3F);
     Random random(4);
     for (int y = 0; y < kHeight && random_start; ++y) {
       for (int x = 0; x < kWidth; ++x) disparity(x, y) = static_cast<float>(random.uniform(0, 40));
     }
-    refined.refine(left, right, disparity);
+    refine(images, refined, disparity);
     std::pair<double, double> range{1e9, 0};
     for (int y = 12; y < 78; ++y) {
       for (int x = 50; x < 138; ++x) {
@@ -191,9 +203,9 @@ TEST(SubpixelRefinement, KnowsTheTexture) {
     }
     return range;
   };
-  EXPECT_GT(information_of(pair.left, pair.right, false).first, 1000) << "px^-2";
-  const Image<std::uint8_t> constant(kWidth, kHeight, std::uint8_t{90});
-  EXPECT_LT(information_of(constant, constant, false).second, 0.1);
+  EXPECT_GT(information_of(pair, false).first, 1000) << "px^-2";
+  const auto constant = [] { return Image<std::uint8_t>(kWidth, kHeight, std::uint8_t{90}); };
+  EXPECT_LT(information_of({constant(), constant()}, false).second, 0.1);
   // Unrelated noise has gradients, but nothing in common.
   Random random(6);
   PlanePair noise;
@@ -203,7 +215,7 @@ TEST(SubpixelRefinement, KnowsTheTexture) {
       noise.right(x, y) = gray(random.normal(128, 10));
     }
   }
-  EXPECT_LT(information_of(noise.left, noise.right, true).second, 60);
+  EXPECT_LT(information_of(noise, true).second, 60);
 }
 
 TEST(SubpixelRefinement, MeasuresTheRelief) {
@@ -211,7 +223,7 @@ TEST(SubpixelRefinement, MeasuresTheRelief) {
   const PlanePair pair = render(plane);
   SubpixelRefinement refined = refinement();
   Image<float> disparity = true_disparity(plane);
-  refined.refine(pair.left, pair.right, disparity);
+  refine(pair, refined, disparity);
   for (int y = 8; y < kHeight - 8; ++y) {
     for (int x = 30; x < kWidth; ++x) EXPECT_LT(refined.relief()(x, y), 0.15 * 0.15) << "a plane has none";
   }
@@ -220,14 +232,14 @@ TEST(SubpixelRefinement, MeasuresTheRelief) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 80; x < kWidth; ++x) disparity(x, y) += 3;
   }
-  refined.refine(pair.left, pair.right, disparity);
+  refine(pair, refined, disparity);
   const auto relief = refined.relief();
   EXPECT_NEAR(relief(78, 40), 0.75 + 0.25 * 0.75, 0.02) << "three of the four directions cross the edge";
   EXPECT_NEAR(relief(74, 40), 0.25 * 0.75, 0.02) << "at a distance of 6 px only the longer step";
   EXPECT_LT(relief(60, 40), 0.01);
   disparity = Image<float>(kWidth, kHeight, kUnknown);
   disparity(40, 40) = 9.3F;
-  refined.refine(pair.left, pair.right, disparity);
+  refine(pair, refined, disparity);
   EXPECT_NEAR(refined.relief()(40, 40), 0.25 + 0.25 * 0.25, 1e-6) << "half a pixel where no pair is known";
 }
 
@@ -240,7 +252,7 @@ TEST(SubpixelRefinement, IsDeterministicOnEveryInstructionSetAndNumberOfThreads)
       for (int x = 0; x < kWidth; ++x) disparity(x, y) = (x * y) % 11 == 0 ? kUnknown : std::round(disparity(x, y));
     }
     SubpixelRefinement r = refinement(threads, simd);
-    r.refine(pair.left, pair.right, disparity);
+    refine(pair, r, disparity);
     std::vector<float> values;
     for (int y = 0; y < kHeight; ++y) {
       values.insert(values.end(), disparity.row(y), disparity.row(y) + kWidth);
