@@ -89,7 +89,7 @@ Status StopMapper::add(const RectifiedPair& frame, double nearest_m, const Eigen
   const double height = frame.body_from_left.translation().dot(up_in_body);
   const GroundPlane expected{frame.body_from_left.rotation().conjugate() * up_in_body,
                              height > 0.05 ? height : kUnknownHeight_m};
-  auto ground = compute_v_disparity(disparity, frame.geometry, expected, options_.v_disparity, workers_);
+  auto ground = compute_v_disparity(disparity, frame.geometry, expected, options_.v_disparity, workers_, image->sigma);
   if (ground) internal::drop_matches_below_ground(ground->plane, frame.geometry, disparity);
   times_.v_disparity += watch.lap();
   views_.push_back({frame.pair,

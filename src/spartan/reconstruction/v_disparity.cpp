@@ -177,7 +177,7 @@ double GroundProfile::at(double range_m) const {
 
 std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, const RectifiedStereo& geometry,
                                               const GroundPlane& expected, const VDisparityOptions& options,
-                                              const ThreadPool& workers) {
+                                              const ThreadPool& workers, ImageView<const float> sigma) {
   const auto plane = find_ground_plane(disparity, geometry, expected, options.plane);
   if (!plane) return std::nullopt;
   VDisparity result;
@@ -223,7 +223,8 @@ std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, 
         const HeightRange s = height_range.of(x, y, d);
         const double over = s.height - ground_height(result.profiles, x, w, s.range);
         // height = h (1 − d₀/d), so ∂height/∂d = (h − height)/d.
-        const double noise = std::abs(plane->height_m - s.height) / d * options.plane.disparity_sigma_px;
+        const double sigma_px = sigma.empty() ? options.plane.disparity_sigma_px : static_cast<double>(sigma(x, y));
+        const double noise = std::abs(plane->height_m - s.height) / d * sigma_px;
         GroundClass kind = GroundClass::ground;
         if (over > options.obstacle_m + options.tolerance_sigmas * noise) kind = GroundClass::obstacle;
         if (over < -options.cavity_m - options.tolerance_sigmas * noise) kind = GroundClass::cavity;

@@ -114,9 +114,10 @@ struct VDisparity {
 /// estimates the ground correlation line of the v-disparity image (Labayrade, Aubert & Tarel, IV 2002). Relative to
 /// that plane, the profile of the ground is the most populated path through a histogram of range and height whose slope
 /// is bounded (dynamic programming). A pixel of disparity d whose ray meets the plane at disparity d₀ has the height h
-/// (1 − d₀/d) above the plane, h the height of the camera. Derivation: docs/math/stereo.md.
+/// (1 − d₀/d) above the plane, h the height of the camera. `sigma`: standard deviations of the disparities in pixels,
+/// of the same size; empty: options.plane.disparity_sigma_px. Derivation: docs/math/stereo.md.
 std::optional<VDisparity> compute_v_disparity(ImageView<const float> disparity, const RectifiedStereo& geometry,
                                               const GroundPlane& expected, const VDisparityOptions& options,
-                                              const ThreadPool& workers);
+                                              const ThreadPool& workers, ImageView<const float> sigma = {});
 
 }  // namespace spartan

@@ -101,6 +101,20 @@ TEST(VDisparity, RocksAreObstaclesAndPitsAreCavities) {
   }
 }
 
+// A rock of 25 cm is an obstacle where the disparities are that certain, not where their noise may be as large.
+TEST(VDisparity, TheSigmaOfAPixelWidensItsThreshold) {
+  const Height surface = [](double x, double y) { return std::hypot(x - 1.4, y - 0.3) < 0.15 ? 0.25 : 0.0; };
+  const Scene seen = look_at(kFlat, surface);
+  const auto obstacles = [&](float sigma_px) {
+    const Image<float> sigma(373, 373, sigma_px);
+    const auto found = compute_v_disparity(seen.disparity, kGroundView, seen.expected, {}, ThreadPool(1), sigma);
+    EXPECT_TRUE(found);
+    return recall(seen, *found, 2).of();
+  };
+  EXPECT_GT(obstacles(0.15F), 0.97);
+  EXPECT_LT(obstacles(15), 0.01);
+}
+
 // A dip, then a rise of 15 degrees: both are ground, and a rock on them is an obstacle.
 TEST(VDisparity, TheProfileFollowsUnevenGround) {
   const Height hills = [](double x, double) { return 0.08 * std::sin(2.2 * x) + 0.27 * std::max(0.0, x - 2.2); };

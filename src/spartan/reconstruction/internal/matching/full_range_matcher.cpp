@@ -22,39 +22,26 @@ int levels_of(DisparityRange range) {
 class FullRangeMatcher::StripMatching {
  public:
   StripMatching(FullRangeMatcher& matcher, const StripRows& rows, StripBuffers& buffers)
-      : m_(matcher), rows_(rows), s_(buffers), width_(matcher.census_.size().width), levels_(matcher.levels_) {
-    const auto levels = static_cast<std::size_t>(row_levels());
-    at_least(levels * static_cast<std::size_t>(rows.last - rows.first) + kRowPadding, s_.costs);
-    at_least(levels * static_cast<std::size_t>(rows.to - rows.from) + kRowPadding, s_.sums);
-    at_least(levels + kRowPadding, s_.unused_sums);
+      : m_(matcher),
+        s_(buffers),
+        width_(matcher.census_.size().width),
+        levels_(matcher.levels_),
+        costs_{buffers, rows, static_cast<std::ptrdiff_t>(width_) * levels_} {
+    costs_.resize();
     at_least(2 * kDirections * path_bytes(), s_.paths);
     at_least(2 * kDirections * minima_bytes(), s_.minima);
     at_least(2 * kRowsAtOnce * p2_bytes(), s_.p2);
     at_least(2 * kRowsAtOnce * slot_bytes(levels_), s_.slots);
   }
 
-  void run() {
-    for (int y = rows_.first; y < rows_.last; ++y) compute_costs(y);
-    begin_sweep();
-    for (int y = rows_.first; y < rows_.to; ++y) {
-      sweep_row(y, y == rows_.first ? y : y - 1, false);
-      if (y >= rows_.from && ((y + 1) % kRowsAtOnce == 0 || y + 1 == rows_.to))
-        along_rows(y / kRowsAtOnce * kRowsAtOnce, y + 1);
-    }
-    begin_sweep();
-    for (int y = rows_.last - 1; y >= rows_.from; --y) {
-      sweep_row(y, y + 1 == rows_.last ? y : y + 1, true);
-      if (y < rows_.to) select(y);
-    }
-  }
+  // The steps of match_strip().
+  void compute_costs(int y);
+  void begin_sweep();
+  void sweep_row(int y, int before, bool add);
+  void along_rows(int from, int to);
+  void select(int y);
 
  private:
-  std::ptrdiff_t row_levels() const { return static_cast<std::ptrdiff_t>(width_) * levels_; }
-  std::uint8_t* cost(int y) { return s_.costs.data() + (y - rows_.first) * row_levels(); }
-  // Rows of the margin have no sums that anything needs.
-  std::uint16_t* sum(int y) {
-    return y < rows_.from || y >= rows_.to ? s_.unused_sums.data() : s_.sums.data() + (y - rows_.from) * row_levels();
-  }
   // One pixel before the first and one behind the last, where diagonal paths begin.
   std::size_t path_bytes() const { return static_cast<std::size_t>((width_ + 2) * levels_) + 2 * kRowPadding; }
   std::size_t minima_bytes() const { return static_cast<std::size_t>(width_) + 2 * kRowPadding; }
@@ -69,17 +56,12 @@ class FullRangeMatcher::StripMatching {
   }
   std::uint8_t* p2(int index) { return s_.p2.data() + static_cast<std::size_t>(index) * p2_bytes() + kRowPadding; }
 
-  void compute_costs(int y);
-  void begin_sweep();
   void begin_path(std::uint8_t* pixel) const;
-  void sweep_row(int y, int before, bool add);
-  void along_rows(int from, int to);
-  void select(int y);
 
   FullRangeMatcher& m_;
-  StripRows rows_;
   StripBuffers& s_;
   int width_, levels_;
+  StripCosts costs_;
   int turn_ = 0;
 };
 
@@ -87,7 +69,7 @@ void FullRangeMatcher::StripMatching::compute_costs(int y) {
   FullCostRow row{};
   row.width = width_;
   row.levels = levels_;
-  row.cost = cost(y);
+  row.cost = costs_.cost(y);
   for (int p = 0; p < kPlanes; ++p) {
     row.left[p] = m_.census_.left_plane(p, y);
     row.right[p] = m_.census_.right_plane(p, y) + m_.range_.min;
@@ -127,8 +109,8 @@ void FullRangeMatcher::StripMatching::sweep_row(int y, int before, bool add) {
   const std::uint8_t* const here = m_.census_.gray(y);
   const std::uint8_t* const there = m_.census_.gray(before);
   FullVerticalRow row{};
-  row.cost = cost(y);
-  row.sum = sum(y);
+  row.cost = costs_.cost(y);
+  row.sum = costs_.sum(y);
   row.width = width_;
   row.levels = levels_;
   row.p1 = m_.penalties_.p1;
@@ -157,10 +139,10 @@ void FullRangeMatcher::StripMatching::along_rows(int from, int to) {
     const std::uint8_t* const gray = m_.census_.gray(y);
     m_.kernels_.p2_row({gray, gray - 1, m_.penalties_.p2.data(), p2(2 * i), width_});
     m_.kernels_.p2_row({gray, gray + 1, m_.penalties_.p2.data(), p2(2 * i + 1), width_});
-    rows.cost[i] = cost(y);
+    rows.cost[i] = costs_.cost(y);
     rows.p2_from_left[i] = p2(2 * i);
     rows.p2_from_right[i] = p2(2 * i + 1);
-    rows.sum[i] = from + i < to ? sum(y) : s_.unused_sums.data();
+    rows.sum[i] = from + i < to ? costs_.sum(y) : s_.unused_sums.data();
   }
   m_.full_.horizontal_rows(rows);
 }
@@ -168,7 +150,7 @@ void FullRangeMatcher::StripMatching::along_rows(int from, int to) {
 void FullRangeMatcher::StripMatching::select(int y) {
   float* const disparity = m_.disparity_.row(y);
   for (int x = 0; x < width_; ++x) {
-    const std::uint16_t* const sums = sum(y) + static_cast<std::ptrdiff_t>(x) * levels_;
+    const std::uint16_t* const sums = costs_.sum(y) + static_cast<std::ptrdiff_t>(x) * levels_;
     const int level = m_.full_.find_winner(sums, levels_);
     const int d = m_.range_.min + level, matched = x - d;
     disparity[x] = matched < 0 || matched >= width_
@@ -192,8 +174,10 @@ ImageView<const float> FullRangeMatcher::match(ImageView<const std::uint8_t> lef
   census_.compute(left, right, {range.min, range.min + levels_});
   if (disparity_.size() != left.size()) disparity_ = Image<float>(left.size());
   const int rows = strip_rows(left.height(), std::int64_t{left.width()} * levels_);
-  for_each_strip(left.height(), rows, workers_, strips,
-                 [&](const StripRows& strip, StripBuffers& buffers) { StripMatching(*this, strip, buffers).run(); });
+  for_each_strip(left.height(), rows, workers_, strips, [&](const StripRows& strip, StripBuffers& buffers) {
+    StripMatching matching(*this, strip, buffers);
+    match_strip(strip, matching);
+  });
   return disparity_;
 }
 

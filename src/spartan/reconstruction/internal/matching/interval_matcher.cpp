@@ -8,36 +8,30 @@
 #include "spartan/reconstruction/internal/subpixel.h"
 
 namespace spartan::internal::matching {
+static_assert(kTile == kRowsAtOnce);  // rows that are matched together have the same intervals
+
 // Matches one strip.
 class IntervalMatcher::StripMatching {
  public:
   StripMatching(IntervalMatcher& matcher, ImageView<const TileIntervals> tiles, const StripRows& rows,
                 StripBuffers& buffers, const Matches& to)
-      : m_(matcher), tiles_(tiles), s_(buffers), to_(to), width_(matcher.census_.size().width), rows_(rows) {
+      : m_(matcher),
+        tiles_(tiles),
+        s_(buffers),
+        to_(to),
+        width_(matcher.census_.size().width),
+        costs_{buffers, rows, static_cast<std::ptrdiff_t>(width_) * kLevels} {
     resize();
   }
 
-  void run() {
-    for (int y = rows_.first; y < rows_.last; ++y) compute_costs(y);
-    begin_sweep();
-    for (int y = rows_.first; y < rows_.to; ++y) {
-      sweep_row(y, y - 1, y == rows_.first, false);
-      if (y >= rows_.from && ((y + 1) % kTile == 0 || y + 1 == rows_.to)) along_rows(y / kTile * kTile, y + 1);
-    }
-    begin_sweep();
-    for (int y = rows_.last - 1; y >= rows_.from; --y) {
-      sweep_row(y, y + 1, y + 1 == rows_.last, true);
-      if (y < rows_.to) select(y);
-    }
-  }
+  // The steps of match_strip().
+  void compute_costs(int y);
+  void begin_sweep() { std::fill(s_.paths.begin(), s_.paths.end(), std::uint8_t{0}); }
+  void sweep_row(int y, int before, bool add);
+  void along_rows(int from, int to);
+  void select(int y);
 
  private:
-  std::ptrdiff_t row_levels() const { return static_cast<std::ptrdiff_t>(width_) * kLevels; }
-  std::uint8_t* cost(int y) { return s_.costs.data() + (y - rows_.first) * row_levels(); }
-  // Rows of the margin have no sums that anything needs.
-  std::uint16_t* sum(int y) {
-    return y < rows_.from || y >= rows_.to ? s_.unused_sums.data() : s_.sums.data() + (y - rows_.from) * row_levels();
-  }
   std::size_t path_bytes() const { return static_cast<std::size_t>(width_ + 2) * kLevels + kRowPadding; }
   // Path costs of a direction that were written in the row before (0) and are written in this row (1). Pixel 0 is the
   // second one, because diagonal paths move by a column.
@@ -48,14 +42,9 @@ class IntervalMatcher::StripMatching {
   std::size_t p2_bytes() const { return static_cast<std::size_t>(width_ + 2 * kRowPadding); }
 
   void resize();
-  void compute_costs(int y);
   void replace_outside(int tile, int start, std::uint8_t* costs) const;
-  void begin_sweep() { std::fill(s_.paths.begin(), s_.paths.end(), std::uint8_t{0}); }
   void enter_row(int y, int before);
-  void sweep_row(int y, int before, bool begins, bool add);
   void compute_p2(const std::uint8_t* here, const std::uint8_t* before, int index);
-  void along_rows(int from, int to);
-  void select(int y);
   static int winner(const SelectRow& row, int x) {
     const int level = row.winner[x] % kLevels;
     return (level < kInterval ? row.first[x] : row.second[x]) + level % kInterval;
@@ -68,16 +57,13 @@ class IntervalMatcher::StripMatching {
   StripBuffers& s_;
   const Matches& to_;
   int width_;
-  StripRows rows_;
+  StripCosts costs_;
   int turn_ = 0;
   int starts_of_ = -1;  // the row of tiles whose intervals `starts` holds
 };
 
 void IntervalMatcher::StripMatching::resize() {
-  const auto levels = static_cast<std::size_t>(row_levels());
-  at_least(levels * static_cast<std::size_t>(rows_.last - rows_.first) + kRowPadding, s_.costs);
-  at_least(levels * static_cast<std::size_t>(rows_.to - rows_.from) + kRowPadding, s_.sums);
-  at_least(levels + kRowPadding, s_.unused_sums);
+  costs_.resize();
   at_least(2 * kDirections * path_bytes(), s_.paths);
   at_least(2 * kRowsAtOnce * p2_bytes(), s_.p2);
   at_least(2 * static_cast<std::size_t>(width_), s_.starts);
@@ -99,7 +85,7 @@ void IntervalMatcher::StripMatching::compute_costs(int y) {
   set_starts(y / kTile);
   CostRow row{};
   row.width = width_;
-  row.cost = cost(y);
+  row.cost = costs_.cost(y);
   row.out_of_view = m_.penalties_.out_of_view;
   row.first = s_.starts.data();
   row.second = row.first + width_;
@@ -155,13 +141,13 @@ void IntervalMatcher::StripMatching::compute_p2(const std::uint8_t* here, const 
   m_.kernels_.p2_row({here, before, m_.penalties_.p2.data(), p2(index), width_});
 }
 
-void IntervalMatcher::StripMatching::sweep_row(int y, int before, bool begins, bool add) {
-  if (!begins) enter_row(y, before);
+void IntervalMatcher::StripMatching::sweep_row(int y, int before, bool add) {
+  if (before != y) enter_row(y, before);
   const std::uint8_t* const here = m_.census_.gray(y);
-  const std::uint8_t* const there = begins ? here : m_.census_.gray(before);
+  const std::uint8_t* const there = m_.census_.gray(before);
   VerticalRow row{};
-  row.cost = cost(y);
-  row.sum = sum(y);
+  row.cost = costs_.cost(y);
+  row.sum = costs_.sum(y);
   row.width = width_;
   row.p1 = m_.penalties_.p1;
   row.add = add;
@@ -175,7 +161,7 @@ void IntervalMatcher::StripMatching::sweep_row(int y, int before, bool begins, b
   turn_ ^= 1;
   // Diagonal paths begin at the left and right border.
   std::memset(path(0, 0), 0, kLevels);
-  std::memset(path(2, 0) + row_levels() - kLevels, 0, kLevels);
+  std::memset(path(2, 0) + costs_.row_costs - kLevels, 0, kLevels);
 }
 
 void IntervalMatcher::StripMatching::along_rows(int from, int to) {
@@ -203,10 +189,10 @@ void IntervalMatcher::StripMatching::along_rows(int from, int to) {
     const std::uint8_t* const gray = m_.census_.gray(y);
     compute_p2(gray, gray - 1, 2 * i);
     compute_p2(gray, gray + 1, 2 * i + 1);
-    rows.cost[i] = cost(y);
+    rows.cost[i] = costs_.cost(y);
     rows.p2_from_left[i] = p2(2 * i);
     rows.p2_from_right[i] = p2(2 * i + 1);
-    rows.sum[i] = from + i < to ? sum(y) : s_.unused_sums.data();
+    rows.sum[i] = from + i < to ? costs_.sum(y) : s_.unused_sums.data();
   }
   m_.kernels_.horizontal_rows(rows);
 }
@@ -214,7 +200,7 @@ void IntervalMatcher::StripMatching::along_rows(int from, int to) {
 void IntervalMatcher::StripMatching::select(int y) {
   set_starts(y / kTile);
   SelectRow row{};
-  row.sum = sum(y);
+  row.sum = costs_.sum(y);
   row.first = s_.starts.data();
   row.second = row.first + width_;
   row.winner = s_.winners.data();
@@ -261,7 +247,8 @@ void IntervalMatcher::match(ImageView<const std::uint8_t> left, ImageView<const 
   census_.compute(left, right, {range.min - kInterval, range.max + 2 * kInterval});
   const int rows = strip_rows(left.height(), std::int64_t{left.width()} * kLevels);
   for_each_strip(left.height(), rows, workers_, strips, [&](const StripRows& strip, StripBuffers& buffers) {
-    StripMatching(*this, tiles, strip, buffers, to).run();
+    StripMatching matching(*this, tiles, strip, buffers, to);
+    match_strip(strip, matching);
   });
 }
 

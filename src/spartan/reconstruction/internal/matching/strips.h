@@ -12,6 +12,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/threads.h"
 #include "spartan/reconstruction/internal/matching/interval_kernels.h"
+#include "spartan/reconstruction/internal/matching/row_padding.h"
 #include "spartan/reconstruction/internal/matching/search_intervals.h"
 
 namespace spartan::internal::matching {
@@ -46,6 +47,46 @@ void at_least(std::size_t size, std::vector<T>& buffer) {
 template <class T>
 void at_least(std::size_t size, Image<T>& buffer) {
   if (buffer.width() < static_cast<int>(size)) buffer = Image<T>(static_cast<int>(size), 1);
+}
+
+/// The costs and sums of a strip.
+struct StripCosts {
+  StripBuffers& buffers;
+  StripRows rows;
+  std::ptrdiff_t row_costs;  // of one row
+
+  void resize() {
+    const auto costs_of = [&](int count) { return static_cast<std::size_t>(count * row_costs) + kRowPadding; };
+    at_least(costs_of(rows.last - rows.first), buffers.costs);
+    at_least(costs_of(rows.to - rows.from), buffers.sums);
+    at_least(costs_of(1), buffers.unused_sums);
+  }
+  std::uint8_t* cost(int y) const { return buffers.costs.data() + (y - rows.first) * row_costs; }
+  // Rows of the margin have no sums that anything needs.
+  std::uint16_t* sum(int y) const {
+    return y < rows.from || y >= rows.to ? buffers.unused_sums.data()
+                                         : buffers.sums.data() + (y - rows.from) * row_costs;
+  }
+};
+
+/// Matches a strip: its costs, the downward paths and the paths along the rows, then the upward paths and the winners,
+/// as soon as all eight paths of a row are known. `matching` has the steps of one matcher:
+///   compute_costs(y), begin_sweep(), sweep_row(y, row before it on the paths or y itself where they begin, whether to
+///   add to the sums), along_rows(from, to) of at most kRowsAtOnce rows, select(y).
+template <class Matching>
+void match_strip(const StripRows& rows, Matching& matching) {
+  for (int y = rows.first; y < rows.last; ++y) matching.compute_costs(y);
+  matching.begin_sweep();
+  for (int y = rows.first; y < rows.to; ++y) {
+    matching.sweep_row(y, std::max(y - 1, rows.first), false);
+    if (y >= rows.from && ((y + 1) % kRowsAtOnce == 0 || y + 1 == rows.to))
+      matching.along_rows(y / kRowsAtOnce * kRowsAtOnce, y + 1);
+  }
+  matching.begin_sweep();
+  for (int y = rows.last - 1; y >= rows.from; --y) {
+    matching.sweep_row(y, std::min(y + 1, rows.last - 1), true);
+    if (y < rows.to) matching.select(y);
+  }
 }
 
 /// Calls match(rows, buffers) for each strip of an image; each thread keeps its buffers and takes the next strip that
