@@ -301,9 +301,10 @@ void reliability_row(const ReliabilityRow& r) {
     // p = 1 / (1 + e^−logit)
     const auto octaves = hn::Min(hn::Max(hn::Mul(logit, constant(-kOctavesPerLogit)), constant(-30)), constant(30));
     const auto percent = hn::Div(constant(100), hn::Add(one, about_exp2(octaves)));
-    const auto noise =
-        hn::Add(hn::Div(constant(m.scale_px * m.scale_px), information), constant(m.floor_px * m.floor_px));
-    const auto variance = hn::Add(noise, hn::Mul(constant(m.relief_scale * m.relief_scale), relief));
+    const auto noise_px = hn::Div(constant(m.scale), information);
+    const auto unbounded = hn::Add(hn::Add(hn::Mul(noise_px, noise_px), constant(m.floor_px * m.floor_px)),
+                                   hn::Mul(constant(m.relief_scale * m.relief_scale), relief));
+    const auto variance = hn::Div(unbounded, hn::Add(one, hn::Mul(unbounded, constant(1 / (m.most_px * m.most_px)))));
     const auto rounded = hn::NearestInt(percent);
     hn::StoreU(hn::DemoteTo(bytes, rounded), bytes, r.outlier_percent + x);
     const auto reliable = hn::IfThenElseZero(hn::Le(hn::ConvertTo(d, rounded), constant(m.reliable_percent)),

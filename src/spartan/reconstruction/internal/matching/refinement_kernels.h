@@ -96,13 +96,13 @@ struct ReliefRow {
 /// Outlier probability and sigma of the pixels of a row, from the information w of the fit, the relief ρ and the right
 /// distance a:
 ///   logit p = offset + distance log₂(1 + a) + information log₂ w + relief log₂(ρ² + 0.1²),
-///   σ² = scale² / w + relief_scale² ρ² + floor².
+///   σ² = V / (1 + V / most²),  V = (scale / w)² + relief_scale² ρ² + floor².
 /// log₂ is linear between powers of two (within 0.09), 2ˣ between whole x. Disparities with a probability above
 /// most_percent become NaN. Rows as those of Image: padded to 64 bytes.
 struct ReliabilityModel {
   float offset, distance, information, relief;  // logit of the outlier probability
   float reliable_percent;
-  float scale_px, relief_scale, floor_px;  // sigma
+  float scale, relief_scale, floor_px, most_px;  // sigma; the scale in px⁻¹
 };
 struct ReliabilityRow {
   const float* information;            ///< px⁻²

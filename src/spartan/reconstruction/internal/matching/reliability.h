@@ -10,10 +10,11 @@
 namespace spartan::internal::matching {
 
 /// Logistic regression of |error| > 1 px, and standard deviation of the other errors. Fitted to real pairs (Middlebury,
-/// ETH3D) and simulated ones, which count equally (sigma to the simulated ones). Neighbouring fits share pixels, which
-/// the information does not know: hence the scale. Unrelated noise has patches of consistent disparities, too, but
-/// hardly pixels with an outlier probability as small as that of reliable ones.
-inline constexpr ReliabilityModel kReliability{2.502F, 0.474F, -0.525F, 0.396F, 7.0F, 2.97F, 0.97F, 0.02F};
+/// ETH3D) and simulated ones, which count equally (sigma to the simulated ones). The information contains how well the
+/// neighbours agree, so sigma falls faster than with its root; errors inside a pixel have a largest sigma, that of a
+/// uniform distribution, 1/√3. Unrelated noise has patches of consistent disparities, too, but hardly pixels with an
+/// outlier probability as small as that of reliable ones.
+inline constexpr ReliabilityModel kReliability{2.502F, 0.474F, -0.525F, 0.396F, 7.0F, 37.5F, 1.97F, 0.017F, 0.523F};
 
 /// What the assessment reads and what it writes. Rows are padded to 64 bytes, as those of Image.
 struct Evidence {

@@ -65,14 +65,19 @@ TEST_P(Reliability, OutliersAreLessLikelyWithInformationAndMoreWithDistance) {
   }
 }
 
-TEST_P(Reliability, SigmaFallsToAFloor) {
-  EXPECT_NEAR(assessed(100, 1)[0].sigma_px, std::sqrt(2.97 * 2.97 / 100 + 0.02 * 0.02), 1e-6);
-  EXPECT_NEAR(assessed(1e9F, 1)[0].sigma_px, 0.02, 1e-3);
+TEST_P(Reliability, SigmaFollowsFromInformationAndRelief) {
+  for (const double information : {2.5, 40.0, 300.0, 5000.0}) {
+    for (const double relief : {0.0, 0.02, 1.25}) {
+      const double unbounded = std::pow(37.5 / information, 2) + 1.97 * 1.97 * relief + 0.017 * 0.017;
+      EXPECT_NEAR(assessed(static_cast<float>(information), 1, 100, static_cast<float>(relief))[0].sigma_px,
+                  std::sqrt(1 / (1 / unbounded + 1 / (0.523 * 0.523))), 1e-6);
+    }
+  }
 }
 
-TEST_P(Reliability, SigmaHoldsTheRelief) {
-  EXPECT_NEAR(assessed(100, 1, 100, 0.3F)[0].sigma_px, std::sqrt(2.97 * 2.97 / 100 + 0.97 * 0.97 * 0.3 + 0.02 * 0.02),
-              1e-6);
+TEST_P(Reliability, SigmaHasAFloorAndALargestValue) {
+  EXPECT_NEAR(assessed(1e9F, 1)[0].sigma_px, 0.017, 1e-4);
+  EXPECT_NEAR(assessed(1e-3F, 1)[0].sigma_px, 0.523, 1e-4);
 }
 
 TEST_P(Reliability, DiscardsWhatIsTooUnlikely) {
