@@ -219,7 +219,8 @@ class MapGenerator {
   static Result<MapGenerator> create(const MapOptions& options, ThreadPool workers);
 
   /// `map_from_body`: gravity-aligned; the map is centred on its origin. Cell corners are at integer multiples of the
-  /// cell size. A cell's elevation is the inverse-variance weighted mean of its points; its class follows from the
+  /// cell size. A cell's elevation is the inverse-variance weighted mean of its points, moved along the slope of the
+  /// neighbouring cells from the mean position of the points to the centre of the cell; its class follows from the
   /// heights of its points above and below the fitted ground surface. Its variance is that of a point by the noise of
   /// disparities plus that by errors of the calibration, which has no influence on the class. Derivation:
   /// docs/math/stereo.md.

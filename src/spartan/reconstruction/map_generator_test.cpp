@@ -143,6 +143,23 @@ TEST(MapGenerator, ATruncatedObjectNeedsLessHeightToBeAnObstacle) {
       << "ground at the upper edge of the view is not an obstacle";
 }
 
+// Distant cells hold one row of points, and behind a crest only a part of a cell is seen.
+TEST(MapGenerator, ElevationsAreOfTheCentresOfTheCells) {
+  const auto slope = [](double x, double y) { return 0.3 * x - 0.2 * y; };
+  std::vector<SurfacePoint> points = points_on(slope, 0);
+  const auto place_in_cell = [](float x) { return static_cast<double>(x) / 0.05 - std::floor(x / 0.05); };
+  std::erase_if(points, [&](const SurfacePoint& p) { return place_in_cell(p.in_body.x()) > 0.45; });
+  const LocalMap map = MapGenerator::create({}, ThreadPool(1))->generate(points, Pose());
+  int seen = 0;
+  for (double x = 0.625; x < 3.4; x += 0.05) {
+    for (double y = -1.375; y < 1.4; y += 0.05) {
+      EXPECT_NEAR(at(map, map.elevation_m, x, y), slope(x, y), 0.0005) << x << ", " << y;
+      ++seen;
+    }
+  }
+  EXPECT_GT(seen, 1000);
+}
+
 // Points of one cell at a place.
 std::vector<SurfacePoint> points_at(double x, double y, double z, int count) {
   std::vector<SurfacePoint> points;
