@@ -26,8 +26,8 @@ struct Cell {
   double used_weights = 0, sum = 0;  // of the points between the trimmed ends
   float lowest = kNoHeight, highest = kNoHeight;
   Eigen::Vector2d offsets_m = Eigen::Vector2d::Zero();  // weighted sum of the positions relative to the cell's centre
-  Eigen::Vector3f rays = Eigen::Vector3f::Zero();  // sum of the directions from the cameras
-  float ranges_m = 0, longest_baseline_m = 0;      // sum of the ranges
+  Eigen::Vector3f rays = Eigen::Vector3f::Zero();       // sum of the directions from the cameras
+  float ranges_m = 0, longest_baseline_m = 0;           // sum of the ranges
   int count = 0, ground = 0;
   bool truncated = false;
 };
@@ -248,6 +248,31 @@ void list_obstacles(LocalMap& map) {
 
 }  // namespace
 
+Image<float> at_cell_centres(ImageView<const float> means_m, ImageView<const CellOffset> offsets) {
+  const auto [w, h] = means_m.size();
+  const auto at = [&](int x, int y) { return means_m.contains(x, y) ? means_m(x, y) : kNoHeight; };
+  // The smaller one of the differences to both neighbours; 0 where one is unknown or their signs differ.
+  const auto minmod = [](float before, float here, float after) {
+    const float a = here - before, b = after - here;
+    if (!(a * b > 0)) return 0.0F;
+    return std::abs(a) < std::abs(b) ? a : b;
+  };
+  Image<float> elevations(w, h);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const float z = means_m(x, y);
+      if (!std::isfinite(z)) {
+        elevations(x, y) = kNoHeight;
+        continue;
+      }
+      const CellOffset& offset = offsets(x, y);
+      elevations(x, y) = z - offset.east * minmod(at(x - 1, y), z, at(x + 1, y)) -
+                         offset.north * minmod(at(x, y + 1), z, at(x, y - 1));  // rows run south
+    }
+  }
+  return elevations;
+}
+
 std::vector<SurfacePoint> surface_points(const MergedRange& merged) {
   std::size_t known = 0;
   for (int y = 0; y < merged.range_m.height(); ++y) {
@@ -322,32 +347,19 @@ Image<internal::LineOfSight> lines_of_sight(const Grid& grid) {
   return towards_camera;
 }
 
-// The difference of a cell to its two neighbours along an axis that is smaller; 0 where one is unknown or their signs
-// differ (minmod: Roe, Annual Review of Fluid Mechanics 1986).
-double minmod(double before, double here, double after) {
-  const double a = here - before, b = after - here;
-  if (!(a * b > 0)) return 0;
-  return std::abs(a) < std::abs(b) ? a : b;
-}
-
-// The points of a cell have their mean elevation at their mean position: a distant cell may hold a single row of points,
-// and of ground behind a crest only what lies next to it is seen. Moves the elevations to the centres of the cells.
+// The elevations of the cells at the mean positions of their points, moved to the centres.
 void move_to_centres(const Grid& grid, LocalMap& map) {
-  const Image<float> means = map.elevation_m.clone();
-  const auto [w, h] = means.size();
-  const auto at = [&](int x, int y) {
-    return means.contains(x, y) ? static_cast<double>(means(x, y)) : static_cast<double>(kNoHeight);
-  };
+  const auto [w, h] = map.size();
+  Image<CellOffset> offsets(w, h);
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
-      if (!std::isfinite(means(x, y))) continue;
       const Cell& cell = grid.at(x, y);
-      const Eigen::Vector2d offset = cell.offsets_m / (cell.weights * map.place.cell_m);  // in cells
-      const Eigen::Vector2d rise{minmod(at(x - 1, y), at(x, y), at(x + 1, y)),
-                                 minmod(at(x, y + 1), at(x, y), at(x, y - 1))};  // rows run south
-      map.elevation_m(x, y) = static_cast<float>(at(x, y) - rise.dot(offset));
+      if (cell.count == 0) continue;
+      const Eigen::Vector2f offset = (cell.offsets_m / (cell.weights * map.place.cell_m)).cast<float>();
+      offsets(x, y) = {offset.x(), offset.y()};
     }
   }
+  map.elevation_m = at_cell_centres(map.elevation_m, offsets);
 }
 
 // Leaves out the cells that wrong matches have made, and fits the ground to the rest.

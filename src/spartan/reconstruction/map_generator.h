@@ -213,6 +213,18 @@ struct SurfacePoint {
 /// The points of all known pixels of a merged range image, in the body frame.
 std::vector<SurfacePoint> surface_points(const MergedRange& merged);
 
+/// Mean position of the points of a cell relative to its centre, in cells.
+struct CellOffset {
+  float east = 0, north = 0;
+};
+
+/// Elevations of a map's cells at their centres, m. `means_m`: mean elevation of the points of each cell, NaN where
+/// unknown; `offsets` has its size. A distant cell may hold a single row of points, and of ground behind a crest only
+/// what lies next to it is seen. The elevation moves along the slope to the neighbours, the smaller one of both sides
+/// and none where their signs differ (minmod limiter: Roe, "Characteristic-based schemes for the Euler equations",
+/// Annual Review of Fluid Mechanics 1986).
+Image<float> at_cell_centres(ImageView<const float> means_m, ImageView<const CellOffset> offsets);
+
 class MapGenerator {
  public:
   /// Code `configuration` where an option is out of bounds.

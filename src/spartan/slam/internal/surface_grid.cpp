@@ -53,6 +53,8 @@ SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_fr
                       double cell_m, int min_points) {
   struct Cell {
     double weights = 0, sum = 0;
+    Eigen::Vector2d offsets =
+        Eigen::Vector2d::Zero();  // weighted sum of the positions relative to the centre, in cells
     float lowest = std::numeric_limits<float>::infinity(), highest = -std::numeric_limits<float>::infinity();
     int count = 0;
   };
@@ -73,21 +75,27 @@ SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_fr
     const double weight = 1 / (sigma * sigma);
     cell.weights += weight;
     cell.sum += weight * p.z();
+    cell.offsets += weight * Eigen::Vector2d(static_cast<double>(p.x() * per_m) - column - 0.5,
+                                             static_cast<double>(p.y() * per_m) + row + 0.5);
     cell.lowest = std::min(cell.lowest, p.z());
     cell.highest = std::max(cell.highest, p.z());
     ++cell.count;
   }
   SurfaceGrid grid = empty_grid(window, cell_m);
+  Image<CellOffset> offsets(window.width, window.height);
   std::size_t i = 0;
   for (int row = 0; row < window.height; ++row) {
     for (int column = 0; column < window.width; ++column, ++i) {
       const Cell& cell = cells[i];
       if (cell.count < min_points) continue;
       grid.elevation_m(column, row) = static_cast<float>(cell.sum / cell.weights);
+      offsets(column, row) = {static_cast<float>(cell.offsets.x() / cell.weights),
+                              static_cast<float>(cell.offsets.y() / cell.weights)};
       grid.variance_m2(column, row) = static_cast<float>(cell.count / cell.weights);
       grid.relief_m(column, row) = cell.highest - cell.lowest;
     }
   }
+  grid.elevation_m = at_cell_centres(grid.elevation_m, offsets);
   return grid;
 }
 

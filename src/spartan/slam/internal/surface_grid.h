@@ -26,8 +26,8 @@ struct SurfaceGrid {
   float elevation_at(double x_m, double y_m) const;
 };
 
-/// Rasterizes points into cells: inverse-variance weighted means, as the map generator computes them before it moves them
-/// to the centres of the cells. A cell with fewer than `min_points` points is unknown. The occupancy is 0.
+/// Rasterizes points into cells: inverse-variance weighted means at the centres of the cells, as the map generator
+/// computes them. A cell with fewer than `min_points` points is unknown. The occupancy is 0.
 SurfaceGrid rasterize(std::span<const SurfacePoint> points, const Pose& world_from_body, const LatticeWindow& window,
                       double cell_m, int min_points);
 
