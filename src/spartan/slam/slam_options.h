@@ -23,7 +23,7 @@ struct MatchOptions {
   double block_m = 0.3;                ///< Side of a block of cells whose errors are correlated, m.
   double common_error_ratio = 1.1;     ///< Error common to an area, relative to the residuals' standard deviation.
   double common_error_area_m = 1.5;    ///< Side of an area of common range errors, m.
-  double relief_error_ratio = 1;       ///< Fronto-parallel bias, relative to the residuals' standard deviation.
+  double relief_error_ratio = 3;       ///< Fronto-parallel bias, relative to the residuals' standard deviation.
   int min_cells = 200;                 ///< Minimum number of overlapping cells.
   int min_blocks = 12;                 ///< Minimum number of overlapping blocks.
   double max_sigma_m = 0.013;          ///< Largest standard deviation of a determined translation, m.
