@@ -8,34 +8,30 @@
 #include <optional>
 
 #include "spartan/core/image.h"
+#include "spartan/odometry/internal/matching/window_kernels.h"
 
 namespace spartan::internal {
 
-/// Windows are 13×13 pixels; patches carry one more pixel on each side for the gradients.
-inline constexpr int kWindowRadius = 6;
-inline constexpr int kWindowSide = 2 * kWindowRadius + 1;
-inline constexpr int kWindowArea = kWindowSide * kWindowSide;
-inline constexpr int kPatchSide = kWindowSide + 2;
-
-/// Pixels around a pixel of a smoothed image, gray levels times 256, row by row.
-using ImagePatch = std::array<std::uint16_t, kPatchSide * kPatchSide>;
+/// 15×15 pixels around a pixel of a smoothed image, gray levels times 256, row by row; rows of 16, and a sixteenth row,
+/// hold 0 behind them.
+using ImagePatch = std::array<std::uint16_t, static_cast<std::size_t>(kWindowStride* kWindowStride)>;
 
 /// The patch around a whole pixel; std::nullopt where it leaves the image.
 std::optional<ImagePatch> cut_patch(ImageView<const std::uint16_t> image, int x, int y);
 
-/// A window of gray levels and its gradients, the template of an alignment. Offsets run over the window row by row.
-class AlignmentTemplate {
- public:
+/// A window of gray levels and its gradients, the template of an alignment.
+struct AlignmentTemplate {
   explicit AlignmentTemplate(const ImagePatch& patch);
   /// Around a sub-pixel position of a smoothed image; std::nullopt where the window leaves the image.
   static std::optional<AlignmentTemplate> around(ImageView<const std::uint16_t> image, const Eigen::Vector2d& centre);
 
-  /// Gray levels without their weighted mean; `deviation` is the weighted standard deviation.
-  std::array<float, kWindowArea> value, gradient_x, gradient_y;
-  float deviation = 0;
+  Window value;           ///< gray levels without their weighted mean `level`
+  Window weighted_value;  ///< `value` multiplied by the weights of the window
+  Window along_x, along_y;
+  float level = 0, deviation = 0;  ///< weighted mean and standard deviation
 
  private:
-  explicit AlignmentTemplate(const std::array<float, kPatchSide * kPatchSide>& pixels);
+  explicit AlignmentTemplate(const WindowGradients& gradients);
 };
 
 /// Result of an alignment.

@@ -1,0 +1,170 @@
+// Cost of a frame of visual odometry, beside Lucas-Kanade with PnP and SIFT of OpenCV in the same run.
+// `make bench-odometry`.
+//
+//   odometry [--frames N] [--first FRAME] [RECORDING...]
+//
+// RECORDING: a folder; default: kitti_06 and euroc_v101 of SPARTAN_DATA, rocky_20pct of the standard recordings. The
+// rectified images of the first pair are in memory: neither reading nor rectification is timed.
+#include <fmt/format.h>
+
+#include <ctime>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/features2d.hpp>
+#include <string>
+#include <vector>
+
+#include "odometry_rival.h"
+#include "spartan/camera/frame_source.h"
+#include "spartan/core/threads.h"
+#include "spartan/imaging/imager.h"
+#include "spartan/numerics/median.h"
+#include "spartan/odometry/internal/detection/landmark_detector.h"
+#include "spartan/odometry/odometer.h"
+#include "standard_recordings.h"
+#include "timing.h"
+
+namespace spartan {
+namespace {
+
+struct Frame {
+  RectifiedPair pair;
+  Image<std::uint8_t> left, right, left_mask, right_mask;
+};
+
+std::vector<Frame> load(const std::string& recording, int from, int count) {
+  const auto source = open_recording(recording);
+  if (!source) {
+    fmt::print("{}: skipped: {}\n", recording, source.error().message());
+    return {};
+  }
+  const Rig& rig = (*source)->info().rig;
+  auto imager = Imager::create(rig, ImagingOptions(), ThreadPool(2));
+  if (!imager) return {};
+  const auto pair = std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const StereoPair& p) { return p.for_odometry; });
+  if (pair == rig.pairs.end()) return {};
+  std::vector<Frame> frames;
+  const std::vector<Stamp> stamps = (*source)->listed_stamps(pair->name);
+  for (std::size_t i = static_cast<std::size_t>(from); i < stamps.size() && static_cast<int>(frames.size()) < count;
+       ++i) {
+    const auto frame = (*source)->frame_at(pair->name, stamps[i]);
+    if (!frame) continue;
+    const auto rectified = imager->process(*frame);
+    if (!rectified) continue;
+    Frame f{*rectified, Image<std::uint8_t>::copy_of(rectified->left), Image<std::uint8_t>::copy_of(rectified->right),
+            Image<std::uint8_t>::copy_of(rectified->left_mask), Image<std::uint8_t>::copy_of(rectified->right_mask)};
+    frames.push_back(std::move(f));
+    Frame& kept = frames.back();
+    kept.pair.times.clear();
+  }
+  for (Frame& f : frames) {
+    f.pair.left = f.left;
+    f.pair.right = f.right;
+    f.pair.left_mask = f.left_mask;
+    f.pair.right_mask = f.right_mask;
+  }
+  return frames;
+}
+
+double cpu_ms() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+}
+
+struct Costs {
+  std::vector<double> wall, cpu;
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();
+  void print(const std::string& name, int frames) const {
+    fmt::print("  {:<34} wall {:>6.2f} ms (95 % {:>6.2f})  CPU {:>6.2f} ms  of {} frames, end {:.3f} {:.3f} {:.3f} m\n",
+               name, median(wall), quantile(wall, 0.95), median(cpu), frames, end.x(), end.y(), end.z());
+  }
+};
+
+template <class Add>
+Costs time_frames(const std::vector<Frame>& frames, Add add) {
+  Costs costs;
+  Pose pose;
+  for (const Frame& f : frames) {
+    const double before = cpu_ms();
+    costs.wall.push_back(milliseconds([&] { pose = pose * add(f.pair); }));
+    costs.cpu.push_back(cpu_ms() - before);
+  }
+  costs.end = pose.translation();
+  return costs;
+}
+
+void time_odometer(const std::vector<Frame>& frames, int threads) {
+  Odometer odometer = Odometer::create(OdometryOptions(), ThreadPool(threads)).value();
+  std::vector<double> detect, reconstruct, match, estimate;
+  int lost = 0, tracked = 0;
+  const Costs costs = time_frames(frames, [&](const RectifiedPair& pair) {
+    const MotionEstimate e = odometer.add(pair);
+    detect.push_back(e.times.detect);
+    reconstruct.push_back(e.times.reconstruct);
+    match.push_back(e.times.match);
+    estimate.push_back(e.times.estimate);
+    lost += e.status == TrackingStatus::lost ? 1 : 0;
+    tracked += e.inliers;
+    return e.previous_from_current;
+  });
+  costs.print(fmt::format("Spartan, {} thread{}", threads, threads > 1 ? "s" : ""), static_cast<int>(frames.size()));
+  fmt::print("  {:<34} detect {:.2f}, reconstruct {:.2f}, match {:.2f}, estimate {:.2f} ms; {} lost, {} inliers\n", "",
+             median(detect), median(reconstruct), median(match), median(estimate), lost,
+             tracked / static_cast<int>(frames.size()));
+}
+
+void compare(const std::string& recording, int from, int count) {
+  const std::vector<Frame> frames = load(recording, from, count);
+  if (frames.empty()) return;
+  const ImageSize size = frames[0].pair.left.size();
+  fmt::print("{}, {} x {}\n", recording.substr(recording.rfind('/') + 1), size.width, size.height);
+  time_odometer(frames, 2);
+  time_odometer(frames, 1);
+  cv::setNumThreads(1);
+  LucasKanadeOdometry rival;
+  time_frames(frames, [&](const RectifiedPair& pair) {
+    return rival.add(pair);
+  }).print("OpenCV Lucas-Kanade and PnP", static_cast<int>(frames.size()));
+
+  std::vector<double> sift, surf;
+  std::size_t sift_count = 0, surf_count = 0;
+  const auto detector = internal::make_landmark_detector(OdometryOptions().detection, ThreadPool(1));
+  const auto opencv = cv::SIFT::create(OdometryOptions().detection.landmarks);
+  for (std::size_t i = 0; i < std::min<std::size_t>(frames.size(), 11); ++i) {
+    const auto& left = frames[i].left;
+    const cv::Mat image(left.height(), left.width(), CV_8UC1, const_cast<std::uint8_t*>(left.row(0)),
+                        static_cast<std::size_t>(left.stride()));
+    std::vector<cv::KeyPoint> points;
+    cv::Mat descriptors;
+    sift.push_back(milliseconds([&] { opencv->detectAndCompute(image, cv::noArray(), points, descriptors); }));
+    sift_count = points.size();
+    surf.push_back(milliseconds([&] { surf_count = detector->detect(left, {}).size(); }));
+  }
+  fmt::print("  {:<34} {:.2f} ms ({}), OpenCV SIFT {:.2f} ms ({}), one thread: {:.1f} times as fast\n",
+             "SURF, detect and describe", median(surf), surf_count, median(sift), sift_count,
+             median(sift) / median(surf));
+}
+
+void run(const std::vector<std::string>& words) {
+  RecordingArguments arguments = read_arguments(words, {{"--frames", "60"}, {"--first", "0"}});
+  if (arguments.scenarios.empty()) {
+    const char* const data = std::getenv("SPARTAN_DATA");
+    if (data != nullptr) arguments.scenarios = {std::string(data) + "/kitti_06", std::string(data) + "/euroc_v101"};
+    arguments.scenarios.push_back(arguments.folder + "/rocky_20pct");
+  }
+  for (const std::string& recording : arguments.scenarios)
+    compare(recording, arguments.number("--first"), arguments.number("--frames"));
+}
+
+}  // namespace
+}  // namespace spartan
+
+int main(int argc, char** argv) {
+  return spartan::run_benchmark(argc, argv, spartan::run);
+}
