@@ -3,9 +3,15 @@
 #include <algorithm>
 
 namespace spartan::internal {
+namespace {
+
+constexpr int kRoom = 512;  // sums behind the last row that vectors may read
+
+}  // namespace
 
 void IntegralImage::compute(ImageView<const std::uint8_t> image) {
-  const ImageSize size{image.width() + 1, image.height() + 1};
+  size_ = image.size();
+  const ImageSize size{size_.width + 1, size_.height + 2 + kRoom / (size_.width + 1)};
   if (sums_.size() != size) sums_ = Image<std::uint32_t>(size);
   for (int y = 0; y < image.height(); ++y) {
     const std::uint8_t* pixels = image.row(y);

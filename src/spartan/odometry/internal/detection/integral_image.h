@@ -7,15 +7,16 @@
 
 namespace spartan::internal {
 
-/// I(x, y) = Σ of the pixels left of x and above y; one column and one row more than the image. Sums wrap modulo 2³²;
+/// I(x, y) = Σ of the pixels left of x and above y; one column and one row more than the image. Behind the last row
+/// there is room that vectors may read. Sums wrap modulo 2³²;
 /// their differences are exact as long as the true sum fits (always for 8-bit images of up to 16 megapixels).
 class IntegralImage {
  public:
   void compute(ImageView<const std::uint8_t> image);
 
   /// Size of the summed image.
-  int width() const { return sums_.width() - 1; }
-  int height() const { return sums_.height() - 1; }
+  int width() const { return size_.width; }
+  int height() const { return size_.height; }
   const std::uint32_t* row(int y) const { return sums_.row(y); }
 
   /// Sum over x0 ≤ x < x1, y0 ≤ y < y1; the rectangle must lie inside the image.
@@ -27,6 +28,7 @@ class IntegralImage {
   std::uint32_t clipped_box(int x0, int y0, int x1, int y1) const;
 
  private:
+  ImageSize size_;
   Image<std::uint32_t> sums_;
 };
 

@@ -1,9 +1,12 @@
 // Landmark detection, a sub-module of the published odometry; further detectors can be added.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "spartan/core/image.h"
@@ -29,6 +32,12 @@ struct Feature {
   Descriptor descriptor{};
 };
 
+/// Which features are wanted.
+struct WantedFeatures {
+  std::optional<int> count;                 ///< maximum number; without it DetectionOptions::landmarks
+  std::span<const Eigen::Vector2f> taken;  ///< positions that have landmarks already: no feature near them
+};
+
 /// Detects features in order of decreasing strength, spread over the image, identical for any number of threads. A
 /// further detector is one file with a class like this, a value of DetectorType and one case in
 /// make_landmark_detector() (CONTRIBUTING.md, "A detector").
@@ -36,8 +45,11 @@ class LandmarkDetector {
  public:
   virtual ~LandmarkDetector() = default;
   /// `mask`: 255 where features are allowed; empty: everywhere. The result is valid until the next call.
-  virtual const std::vector<Feature>& detect(ImageView<const std::uint8_t> image,
-                                             ImageView<const std::uint8_t> mask) = 0;
+  virtual const std::vector<Feature>& detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask,
+                                             const WantedFeatures& wanted) = 0;
+  const std::vector<Feature>& detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask) {
+    return detect(image, mask, {});
+  }
 };
 
 /// Makes the detector that the options select. Throws std::invalid_argument where the value is none of DetectorType.

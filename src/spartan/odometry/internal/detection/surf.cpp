@@ -5,12 +5,16 @@
 #include <cmath>
 
 #include "spartan/odometry/internal/detection/feature_spread.h"
+#include "spartan/odometry/internal/detection/surf_kernels.h"
 
 namespace spartan::internal {
 namespace {
 
 constexpr int kLayersPerOctave = 4;
-constexpr int kSurfRowsPerPart = 16;
+/// Parts of the image that are searched in parallel.
+constexpr int kSurfParts = 8;
+/// Values behind a row of responses that vectors may write or read.
+constexpr int kRowRoom = 2 * kSurfPadding;
 
 /// Filter sides 9, 15, 21, 27 / 15, 27, 39, 51 / … (§3.3).
 int filter_size(int octave, int layer) {
@@ -20,52 +24,6 @@ int filter_size(int octave, int layer) {
 /// Blob scale of a filter: the 9-px filter approximates Gaussian derivatives of σ = 1.2 px (§3.2).
 float scale_of_filter(float filter_px) {
   return 1.2f * filter_px / 9.0f;
-}
-
-/// One row of determinants at x = x0, x0 + Step, … The row pointers of the integral image are computed once, so that
-/// the loop runs over contiguous memory and can be vectorized.
-template <int Step>
-void hessian_row(const IntegralImage& integral, int y, int x0, int count, int filter_px, float* out) {
-  const int lobe = filter_px / 3, half = filter_px / 2;
-  const float area = 1.0f / static_cast<float>(filter_px * filter_px);
-  const std::uint32_t* xx_top = integral.row(y - lobe + 1) + x0;
-  const std::uint32_t* xx_bottom = integral.row(y + lobe) + x0;
-  const std::uint32_t* yy_top = integral.row(y - half) + x0;
-  const std::uint32_t* yy_upper = integral.row(y - lobe / 2) + x0;
-  const std::uint32_t* yy_lower = integral.row(y + lobe / 2 + 1) + x0;
-  const std::uint32_t* yy_bottom = integral.row(y + half + 1) + x0;
-  const std::uint32_t* xy_top = integral.row(y - lobe) + x0;
-  const std::uint32_t* middle_above = integral.row(y) + x0;
-  const std::uint32_t* middle_below = integral.row(y + 1) + x0;
-  const std::uint32_t* xy_bottom = integral.row(y + lobe + 1) + x0;
-  const int inner = lobe / 2;
-  for (int i = 0; i < count; ++i) {
-    const int x = i * Step;
-    const auto span = [x](const std::uint32_t* top, const std::uint32_t* bottom, int from, int to) {
-      return static_cast<std::int32_t>(bottom[x + to] - bottom[x + from] - top[x + to] + top[x + from]);
-    };
-    const std::int32_t xx = span(xx_top, xx_bottom, -half, half + 1) - 3 * span(xx_top, xx_bottom, -inner, inner + 1);
-    const std::int32_t yy = span(yy_top, yy_bottom, -lobe + 1, lobe) - 3 * span(yy_upper, yy_lower, -lobe + 1, lobe);
-    const std::int32_t xy = span(xy_top, middle_above, 1, lobe + 1) + span(middle_below, xy_bottom, -lobe, 0) -
-                            span(xy_top, middle_above, -lobe, 0) - span(middle_below, xy_bottom, 1, lobe + 1);
-    const BoxHessian h{static_cast<float>(xx) * area, static_cast<float>(yy) * area, static_cast<float>(xy) * area};
-    out[i] = h.determinant();
-  }
-}
-
-void hessian_row(const IntegralImage& integral, int y, int x0, int count, int filter_px, int step, float* out) {
-  switch (step) {
-    case 1:
-      return hessian_row<1>(integral, y, x0, count, filter_px, out);
-    case 2:
-      return hessian_row<2>(integral, y, x0, count, filter_px, out);
-    case 4:
-      return hessian_row<4>(integral, y, x0, count, filter_px, out);
-    case 8:
-      return hessian_row<8>(integral, y, x0, count, filter_px, out);
-    default:
-      return hessian_row<16>(integral, y, x0, count, filter_px, out);
-  }
 }
 
 /// The 3×3×3 neighbourhood of a response: v[scale][y][x].
@@ -160,24 +118,9 @@ float surf_orientation(const IntegralImage& integral, const Feature& feature) {
 }
 
 Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature) {
-  const float s = feature.scale, co = std::cos(feature.angle), si = std::sin(feature.angle);
-  const int half = std::max(1, static_cast<int>(std::lround(s)));
-  std::array<float, 64> v{};
-  for (int j = 0; j < 20; ++j) {
-    for (int i = 0; i < 20; ++i) {
-      const float a = static_cast<float>(i) - 9.5f, b = static_cast<float>(j) - 9.5f;  // in units of s
-      const int x = static_cast<int>(std::lround(feature.x + 0.5f + s * (co * a - si * b)));
-      const int y = static_cast<int>(std::lround(feature.y + 0.5f + s * (si * a + co * b)));
-      const float weight = std::exp(-(a * a + b * b) / (2 * 3.3f * 3.3f));
-      const Eigen::Vector2f d = weight * haar(integral, x, y, half);
-      const float dx = co * d.x() + si * d.y(), dy = co * d.y() - si * d.x();
-      float* subregion = &v[static_cast<std::size_t>(4 * ((j / 5) * 4 + i / 5))];
-      subregion[0] += dx;
-      subregion[1] += std::abs(dx);
-      subregion[2] += dy;
-      subregion[3] += std::abs(dy);
-    }
-  }
+  const int half = std::max(1, static_cast<int>(std::lround(feature.scale)));
+  const std::array<float, 64> v = haar_sums(
+      integral, {feature.x, feature.y, feature.scale, std::cos(feature.angle), std::sin(feature.angle), half});
   float squared = 0;
   for (const float value : v) squared += value * value;
   const float scale = squared > 0 ? 254.0f / std::sqrt(squared) : 0.0f;
@@ -189,82 +132,87 @@ Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature
 }
 
 SurfDetector::SurfDetector(const DetectionOptions& options, ThreadPool workers)
-    : options_(options), workers_(std::move(workers)) {
-  for (int octave = 0; octave < options_.surf.octaves; ++octave) {
-    for (int layer = 0; layer < kLayersPerOctave; ++layer) {
-      layers_.push_back({filter_size(octave, layer), 1 << octave, {}});
-    }
+    : options_(options), workers_(std::move(workers)), parts_(kSurfParts) {}
+
+/// Rows or columns of the grid of an octave at which a filter of a layer lies inside the image, with a margin.
+SurfDetector::Range SurfDetector::range_of(int octave, int layer, int length) {
+  const int step = 1 << octave, margin = filter_size(octave, layer) / 2 + 1;
+  return {(margin + step - 1) / step, length - 1 - margin < 0 ? -1 : (length - 1 - margin) / step};
+}
+
+/// det H of a row of the grid in all layers of an octave, into the ring of three rows of each layer.
+void SurfDetector::compute_row(int octave, int y, ImageSize size, Image<float>& rows) const {
+  const int step = 1 << octave;
+  for (int layer = 0; layer < kLayersPerOctave; ++layer) {
+    const Range column = range_of(octave, layer, size.width);
+    if (!range_of(octave, layer, size.height).contains(y) || column.last < column.first) continue;
+    hessian_row(integral_, y * step, column.first * step, column.last - column.first + 1, filter_size(octave, layer),
+                step, rows.row(3 * layer + y % 3) + column.first);
   }
 }
 
-void SurfDetector::compute_layers(ImageSize size) {
-  for (Layer& layer : layers_) {
-    const int step = layer.step_px, margin = layer.filter_px / 2 + 1;
-    const ImageSize grid{(size.width + step - 1) / step, (size.height + step - 1) / step};
-    if (layer.response.size() != grid) layer.response = Image<float>(grid);
-    const int first = (margin + step - 1) / step;
-    const int columns = (size.width - 1 - margin) / step - first + 1;
-    const int rows = (size.height - 1 - margin) / step - first + 1;
-    if (columns <= 0 || rows <= 0) continue;
-    workers_.parallel_for(first, first + rows, kSurfRowsPerPart, [&](int begin, int end) {
-      for (int r = begin; r < end; ++r) {
-        hessian_row(integral_, r * step, first * step, columns, layer.filter_px, step, layer.response.row(r) + first);
-      }
-    });
-  }
-}
-
-std::vector<Feature> SurfDetector::find_maxima(ImageSize size) const {
-  std::vector<Feature> found;
+/// Maxima at a row of the grid, whose neighbours have been computed.
+void SurfDetector::find_maxima(int octave, int y, ImageSize size, Part& part) const {
   const auto threshold = static_cast<float>(options_.surf.threshold);
-  for (int octave = 0; octave < options_.surf.octaves; ++octave) {
-    for (int middle = 1; middle + 1 < kLayersPerOctave; ++middle) {
-      const Layer* layer = &layers_[static_cast<std::size_t>(octave * kLayersPerOctave + middle)];
-      const int step = layer->step_px, filter_step = layer[1].filter_px - layer[0].filter_px;
-      const int first =
-          (layer[1].filter_px / 2 + 1 + step - 1) / step + 1;  // room for the largest filter and a neighbour
-      const int last_x = (size.width - 1 - layer[1].filter_px / 2 - 1) / step - 1;
-      const int last_y = (size.height - 1 - layer[1].filter_px / 2 - 1) / step - 1;
-      for (int y = first; y <= last_y; ++y) {
-        const float *row = layer->response.row(y), *up = layer->response.row(y - 1), *down = layer->response.row(y + 1);
-        for (int x = first; x <= last_x; ++x) {
-          const float centre = row[x];
-          // Cheap tests first; most pixels fail one of them.
-          if (!(centre > threshold && centre > row[x - 1] && centre > row[x + 1] && centre > up[x] && centre > down[x]))
-            continue;
-          Cube cube;
-          for (int s = 0; s < 3; ++s)
-            for (int j = 0; j < 3; ++j) std::copy_n(layer[s - 1].response.row(y + j - 1) + x - 1, 3, cube.v[s][j]);
-          if (!cube.is_maximum()) continue;
-          const Eigen::Vector3f peak = cube.peak();
-          if (!(peak.cwiseAbs().maxCoeff() <= 1.0f)) continue;
-          Feature f;
-          f.x = (static_cast<float>(x) + peak.x()) * static_cast<float>(step);
-          f.y = (static_cast<float>(y) + peak.y()) * static_cast<float>(step);
-          f.scale = scale_of_filter(static_cast<float>(layer->filter_px) + peak.z() * static_cast<float>(filter_step));
-          f.strength = centre;
-          const BoxHessian h = box_hessian(integral_, x * step, y * step, layer->filter_px);
-          f.sign = h.xx + h.yy >= 0 ? 1 : -1;
-          found.push_back(f);
-        }
-      }
+  const int step = 1 << octave;
+  const auto response = [&](int layer, int row) { return part.rows.row(3 * layer + row % 3); };
+  for (int middle = 1; middle + 1 < kLayersPerOctave; ++middle) {
+    // Room for the largest filter and a neighbour.
+    const Range rows = range_of(octave, middle + 1, size.height), columns = range_of(octave, middle + 1, size.width);
+    if (y <= rows.first || y >= rows.last) continue;
+    part.columns.clear();
+    maxima_of_row(response(middle, y - 1), response(middle, y), response(middle, y + 1), columns.first + 1,
+                  columns.last - 1, threshold, part.columns);
+    const int filter_px = filter_size(octave, middle), filter_step = filter_size(octave, middle + 1) - filter_px;
+    for (const int x : part.columns) {
+      Cube cube;
+      for (int s = 0; s < 3; ++s)
+        for (int j = 0; j < 3; ++j) std::copy_n(response(middle + s - 1, y + j - 1) + x - 1, 3, cube.v[s][j]);
+      if (!cube.is_maximum()) continue;
+      const Eigen::Vector3f peak = cube.peak();
+      if (!(peak.cwiseAbs().maxCoeff() <= 1.0f)) continue;
+      Feature f;
+      f.x = (static_cast<float>(x) + peak.x()) * static_cast<float>(step);
+      f.y = (static_cast<float>(y) + peak.y()) * static_cast<float>(step);
+      f.scale = scale_of_filter(static_cast<float>(filter_px) + peak.z() * static_cast<float>(filter_step));
+      f.strength = cube.v[1][1][1];
+      const BoxHessian h = box_hessian(integral_, x * step, y * step, filter_px);
+      f.sign = h.xx + h.yy >= 0 ? 1 : -1;
+      part.found.push_back(f);
     }
   }
-  return found;
 }
 
-const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> image,
-                                                 ImageView<const std::uint8_t> mask) {
+void SurfDetector::search(int index, ImageSize size, Part& part) const {
+  part.found.clear();
+  if (part.rows.width() < size.width + kRowRoom) part.rows = Image<float>(size.width + kRowRoom, 3 * kLayersPerOctave);
+  for (int octave = 0; octave < options_.surf.octaves; ++octave) {
+    const Range rows = range_of(octave, 0, size.height);
+    const int count = std::max(0, rows.last - rows.first + 1);
+    const int begin = rows.first + count * index / kSurfParts, end = rows.first + count * (index + 1) / kSurfParts;
+    for (int y = begin - 1; y <= end; ++y) {
+      compute_row(octave, y, size, part.rows);
+      if (y > begin) find_maxima(octave, y - 1, size, part);
+    }
+  }
+}
+
+const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask,
+                                                 const WantedFeatures& wanted) {
   integral_.compute(image);
-  compute_layers(image.size());
-  std::vector<Feature> found = find_maxima(image.size());
+  workers_.parallel_for(0, kSurfParts, 1, [&](int begin, int) {
+    search(begin, image.size(), parts_[static_cast<std::size_t>(begin)]);
+  });
+  found_.clear();
+  for (const Part& part : parts_) found_.insert(found_.end(), part.found.begin(), part.found.end());
   if (!mask.empty()) {
-    std::erase_if(found, [&](const Feature& f) {
+    std::erase_if(found_, [&](const Feature& f) {
       const int x = static_cast<int>(std::lround(f.x)), y = static_cast<int>(std::lround(f.y));
       return !mask.contains(x, y) || mask(x, y) == 0;
     });
   }
-  features_ = spread_features(std::move(found), image.size(), options_.landmarks, options_.spacing_px);
+  features_ = spread_features(found_, image.size(), wanted.count.value_or(options_.landmarks), options_.spacing_px,
+                              wanted.taken);
   workers_.parallel_for(0, static_cast<int>(features_.size()), 64, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       Feature& f = features_[static_cast<std::size_t>(i)];

@@ -14,23 +14,31 @@ namespace spartan::internal {
 class SurfDetector final : public LandmarkDetector {
  public:
   SurfDetector(const DetectionOptions& options, ThreadPool workers);
-  const std::vector<Feature>& detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask) override;
+  using LandmarkDetector::detect;
+  const std::vector<Feature>& detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask,
+                                     const WantedFeatures& wanted) override;
 
  private:
-  /// det H for one filter size on the grid of an octave; 0 where the filter leaves the image.
-  struct Layer {
-    int filter_px = 0;  ///< side of the filter
-    int step_px = 1;    ///< grid pitch
-    Image<float> response;
+  struct Range {
+    int first, last;
+    bool contains(int i) const { return i >= first && i <= last; }
   };
-  void compute_layers(ImageSize size);
-  std::vector<Feature> find_maxima(ImageSize size) const;
+  /// A horizontal part of the image, searched row by row.
+  struct Part {
+    Image<float> rows;         ///< det H in three consecutive rows of each layer of the octave
+    std::vector<int> columns;  ///< of the maxima within a row
+    std::vector<Feature> found;
+  };
+  static Range range_of(int octave, int layer, int length);
+  void compute_row(int octave, int y, ImageSize size, Image<float>& rows) const;
+  void find_maxima(int octave, int y, ImageSize size, Part& part) const;
+  void search(int index, ImageSize size, Part& part) const;
 
   DetectionOptions options_;
   ThreadPool workers_;
   IntegralImage integral_;
-  std::vector<Layer> layers_;  ///< four per octave, in order of filter size
-  std::vector<Feature> features_;
+  std::vector<Part> parts_;
+  std::vector<Feature> found_, features_;
 };
 
 /// Box-filter approximation of the Hessian at one pixel, divided by the filter's area (§3.2), with lobes of
