@@ -28,6 +28,8 @@ constexpr int kMinCoarseInliers = 10;
 /// With fewer inliers inside of the gates, the descriptors are matched over the whole image as well; empirical.
 constexpr int kSufficientCoarseInliers = 30;
 
+/// Landmarks are added where more than this fraction of them is missing; empirical.
+constexpr double kMaxMissingFraction = 0.05;
 /// The prediction is kept over so many consecutive frames whose motion may be that of an object; empirical.
 constexpr int kMaxAmbiguousFrames = 3;
 /// A motion that this fraction of all landmarks follows is not that of an object; empirical.
@@ -84,6 +86,7 @@ struct Odometer::State {
   MotionEstimator estimation;
   LandmarkManager manager;
   SmoothedImage left_smooth, right_smooth;
+  ImagePyramid pyramid;  ///< of the current left image
   std::vector<ReconstructedFeature> features;
   OdometerMemory memory;
 
@@ -94,8 +97,9 @@ struct Odometer::State {
     return memory.ambiguous_frames > 0 && memory.ambiguous_frames <= kMaxAmbiguousFrames;
   }
   DisparityOffset predicted_offset() const;
-  void detect(const RectifiedPair& pair);
+  void detect(const StereoImages& images);
   void reconstruct(const StereoImages& images);
+  void add_landmarks(const StereoImages& images, MotionEstimate& estimate, Stopwatch& watch);
   void measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate, Stopwatch& watch);
   struct CoarseMotion {
     Pose previous_from_current;
@@ -104,7 +108,7 @@ struct Odometer::State {
     std::string doubt;            ///< why this may be the motion of an object; empty otherwise
     std::optional<Pose> object;   ///< its motion, where it is known
   };
-  CoarseMotion coarse_motion(const RectifiedStereo& stereo, const Pose& predicted);
+  CoarseMotion coarse_motion(const StereoImages& images, const Pose& predicted);
   std::vector<LandmarkMatch> discard_object(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
                                             const Pose& scene, const Pose& object);
   void add_noise_floor(std::vector<LandmarkMatch>& matches) const;
@@ -135,10 +139,31 @@ DisparityOffset Odometer::State::predicted_offset() const {
   return {memory.offset.value, std::min(memory.offset.variance + drift * drift, sigma * sigma)};
 }
 
-void Odometer::State::detect(const RectifiedPair& pair) {
+/// Features of the whole image with their disparities.
+void Odometer::State::detect(const StereoImages& images) {
   features.clear();
-  for (const Feature& feature : detector->detect(pair.left, pair.left_mask))
+  for (const Feature& feature : detector->detect(images.left, images.left_mask))
     features.push_back({feature, std::nullopt});
+  reconstruct(images);
+}
+
+/// New landmarks where there are none.
+void Odometer::State::add_landmarks(const StereoImages& images, MotionEstimate& estimate, Stopwatch& watch) {
+  const int missing = options.detection.landmarks - static_cast<int>(memory.map.landmarks.size());
+  features.clear();
+  if (missing > kMaxMissingFraction * options.detection.landmarks) {
+    std::vector<Eigen::Vector2f> taken;
+    taken.reserve(memory.map.landmarks.size());
+    for (const Landmark& landmark : memory.map.landmarks) taken.push_back(landmark.pixel.cast<float>());
+    // Some have no disparity.
+    const int count = missing + missing / 4;
+    for (const Feature& feature : detector->detect(images.left, images.left_mask, {count, taken}))
+      features.push_back({feature, std::nullopt});
+  }
+  estimate.times.detect += watch.lap();
+  reconstruct(images);
+  manager.add(memory.map, images, features);
+  estimate.times.reconstruct += watch.lap();
 }
 
 void Odometer::State::reconstruct(const StereoImages& images) {
@@ -151,8 +176,9 @@ void Odometer::State::reconstruct(const StereoImages& images) {
   });
 }
 
-/// Coarse motion from descriptor matches; the prediction where too few of them agree.
-Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedStereo& stereo, const Pose& predicted) {
+/// Coarse motion from some landmarks that are found near their predicted positions, else from descriptors; the
+/// prediction where too few agree.
+Odometer::State::CoarseMotion Odometer::State::coarse_motion(const StereoImages& images, const Pose& predicted) {
   if (!options.matching.descriptors) return {predicted, {}, {}, {}, {}};
   struct Attempt {
     std::vector<int> feature_of;
@@ -160,17 +186,27 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const RectifiedSter
     std::optional<MotionFit> fit;
     int inliers() const { return fit ? fit->inliers : 0; }
   };
-  const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
-    Attempt result;
-    result.feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
-    result.matches = matching.coarse_matches(memory.map, features, result.feature_of);
-    result.fit = estimation.coarse(stereo, result.matches);
-    return result;
-  };
-  Attempt best = attempt(predicted.inverse());
-  if (best.inliers() < kSufficientCoarseInliers) {
-    Attempt ungated = attempt(std::nullopt);
-    if (ungated.inliers() > best.inliers()) best = std::move(ungated);
+  const RectifiedStereo& stereo = images.geometry;
+  Attempt best;
+  if (options.matching.correlation) {
+    best.matches = matching.by_pyramid(memory.map, images, memory.pyramid, pyramid, predicted.inverse());
+    best.fit = estimation.coarse(stereo, best.matches);
+  }
+  if (best.inliers() < kSufficientCoarseInliers || 2 * best.inliers() < static_cast<int>(best.matches.size())) {
+    detect(images);
+    const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
+      Attempt result;
+      result.feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
+      result.matches = matching.coarse_matches(memory.map, features, result.feature_of);
+      result.fit = estimation.coarse(stereo, result.matches);
+      return result;
+    };
+    Attempt described = attempt(predicted.inverse());
+    if (described.inliers() < kSufficientCoarseInliers) {
+      Attempt ungated = attempt(std::nullopt);
+      if (ungated.inliers() > described.inliers()) described = std::move(ungated);
+    }
+    if (described.inliers() > best.inliers()) best = std::move(described);
   }
   std::string doubt;
   std::optional<Pose> object;
@@ -243,7 +279,7 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
 void Odometer::State::measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate,
                               Stopwatch& watch) {
   const std::size_t landmarks = memory.map.landmarks.size();
-  auto [start, coarse_matches, feature_of, doubt, object] = coarse_motion(images.geometry, predicted);
+  auto [start, coarse_matches, feature_of, doubt, object] = coarse_motion(images, predicted);
   std::vector<LandmarkMatch> matches =
       options.matching.correlation ? matching.by_correlation(memory.map, images, start.inverse()) : coarse_matches;
   if (object) {
@@ -305,10 +341,7 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
     s.right_smooth.compute(pair.right, s.workers);
     images.left_smooth = s.left_smooth.view();
     images.right_smooth = s.right_smooth.view();
-    s.detect(pair);
-    estimate.times.detect = watch.lap();
-    s.reconstruct(images);
-    estimate.times.reconstruct = watch.lap();
+    s.pyramid.compute(images.left_smooth);
     if (!estimate.first) {
       if (s.memory.geometry == pair.geometry) {
         s.measure(images, prediction, estimate, watch);
@@ -318,7 +351,8 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
       }
     }
     if (estimate.status == TrackingStatus::lost) s.memory.map = {};
-    s.manager.add(s.memory.map, images, s.features);
+    s.add_landmarks(images, estimate, watch);
+    std::swap(s.memory.pyramid, s.pyramid);
     s.memory.geometry = pair.geometry;
   }
 

@@ -20,6 +20,8 @@ constexpr float kMaxScaleRatio = 2;
 /// Fewer matches than this are too few to outvote an outlier in the rigidity check.
 constexpr std::size_t kMinRigidMatches = 8;
 constexpr int kLandmarksPerPart = 16;
+/// Landmarks that are searched in the pyramids: enough for RANSAC.
+constexpr std::size_t kPyramidLandmarks = 200;
 
 AnchoredPoint point_of(const Landmark& landmark) {
   return {landmark.anchor_pixel, landmark.disparity};
@@ -105,8 +107,8 @@ std::vector<LandmarkMatch> LandmarkMatcher::coarse_matches(const LandmarkMemory&
 }
 
 std::optional<LandmarkMatch> LandmarkMatcher::correlate(const LandmarkMemory& memory, std::size_t index,
-                                                        const StereoImages& images,
-                                                        const Pose& current_from_previous) const {
+                                                        const StereoImages& images, const Pose& current_from_previous,
+                                                        const std::optional<Eigen::Vector2d>& start_px) const {
   const Landmark& landmark = memory.landmarks[index];
   LandmarkMatch match;
   match.landmark = index;
@@ -120,8 +122,8 @@ std::optional<LandmarkMatch> LandmarkMatcher::correlate(const LandmarkMemory& me
   if (!warp.pixels.allFinite() || !warp.slant.allFinite()) return std::nullopt;
 
   const AlignmentTemplate reference(landmark.patch);
-  const auto found = align_translation(reference, images.left_smooth, warp.pixels, predicted->measured.head<2>(),
-                                       options_.correlation_radius_px);
+  const auto found = align_translation(reference, images.left_smooth, warp.pixels,
+                                       start_px.value_or(predicted->measured.head<2>()), options_.correlation_radius_px);
   if (!found || found->correlation < options_.min_correlation) return std::nullopt;
   const int x = static_cast<int>(std::lround(found->position.x())),
             y = static_cast<int>(std::lround(found->position.y()));
@@ -139,19 +141,45 @@ std::optional<LandmarkMatch> LandmarkMatcher::correlate(const LandmarkMemory& me
   return match;
 }
 
-std::vector<LandmarkMatch> LandmarkMatcher::by_correlation(const LandmarkMemory& memory, const StereoImages& images,
-                                                           const Pose& current_from_previous) const {
-  std::vector<std::optional<LandmarkMatch>> found(memory.landmarks.size());
-  workers_.parallel_for(0, static_cast<int>(found.size()), kLandmarksPerPart, [&](int begin, int end) {
-    for (int i = begin; i < end; ++i) {
-      const auto index = static_cast<std::size_t>(i);
-      found[index] = correlate(memory, index, images, current_from_previous);
-    }
+std::vector<LandmarkMatch> LandmarkMatcher::collect(
+    std::size_t count, const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) const {
+  std::vector<std::optional<LandmarkMatch>> found(count);
+  workers_.parallel_for(0, static_cast<int>(count), kLandmarksPerPart, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) found[static_cast<std::size_t>(i)] = measure(static_cast<std::size_t>(i));
   });
   std::vector<LandmarkMatch> matches;
+  matches.reserve(count);
   for (const auto& match : found)
     if (match) matches.push_back(*match);
   return matches;
+}
+
+std::vector<LandmarkMatch> LandmarkMatcher::by_pyramid(const LandmarkMemory& memory, const StereoImages& images,
+                                                       const ImagePyramid& latest, const ImagePyramid& current,
+                                                       const Pose& current_from_previous) const {
+  const std::size_t all = memory.landmarks.size(), count = std::min(all, kPyramidLandmarks);
+  return collect(count, [&](std::size_t k) -> std::optional<LandmarkMatch> {
+    const std::size_t index = k * all / count;
+    const Landmark& landmark = memory.landmarks[index];
+    const Pose& previous_from_anchor = memory.anchor(landmark.anchor_id).latest_from_anchor;
+    const auto before = project_anchored(images.geometry, point_of(landmark), previous_from_anchor);
+    const auto after =
+        project_anchored(images.geometry, point_of(landmark), current_from_previous * previous_from_anchor);
+    if (!before || !after) return std::nullopt;
+    const Eigen::Matrix2d warp =
+        warp_of(*after, landmark.slant).pixels * warp_of(*before, landmark.slant).pixels.inverse();
+    if (!warp.allFinite()) return std::nullopt;
+    const auto found = find_in_pyramid(latest, current, landmark.pixel, warp, after->measured.head<2>(),
+                                       options_.min_correlation);
+    if (!found) return std::nullopt;
+    return correlate(memory, index, images, current_from_previous, *found);
+  });
+}
+
+std::vector<LandmarkMatch> LandmarkMatcher::by_correlation(const LandmarkMemory& memory, const StereoImages& images,
+                                                           const Pose& current_from_previous) const {
+  return collect(memory.landmarks.size(),
+                 [&](std::size_t index) { return correlate(memory, index, images, current_from_previous); });
 }
 
 std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector<LandmarkMatch> matches, int partners) {

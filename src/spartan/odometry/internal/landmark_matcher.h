@@ -2,12 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "spartan/core/threads.h"
 #include "spartan/odometry/internal/landmark_reconstructor.h"
 #include "spartan/odometry/internal/landmarks/landmark.h"
+#include "spartan/odometry/internal/matching/image_pyramid.h"
 #include "spartan/odometry/internal/motion_estimator.h"
 
 namespace spartan::internal {
@@ -36,14 +38,24 @@ class LandmarkMatcher {
                                             const std::vector<ReconstructedFeature>& features,
                                             const std::vector<int>& feature_of) const;
 
+  /// Measures some 200 landmarks, spread over the list, whose predicted positions may be off by 30 px: each is found in
+  /// the pyramids of the latest and the current image, then measured as by_correlation() does.
+  std::vector<LandmarkMatch> by_pyramid(const LandmarkMemory& memory, const StereoImages& images,
+                                        const ImagePyramid& latest, const ImagePyramid& current,
+                                        const Pose& current_from_previous) const;
+
   /// Measures each landmark: its patch, warped by the predicted geometry, is aligned with the left image, and its
   /// disparity is searched near the predicted one. `current_from_previous` must be accurate to a few pixels.
   std::vector<LandmarkMatch> by_correlation(const LandmarkMemory& memory, const StereoImages& images,
                                             const Pose& current_from_previous) const;
 
  private:
+  /// `found`: where the landmark is, to a few pixels; without it where the motion predicts it.
   std::optional<LandmarkMatch> correlate(const LandmarkMemory& memory, std::size_t index, const StereoImages& images,
-                                         const Pose& current_from_previous) const;
+                                         const Pose& current_from_previous,
+                                         const std::optional<Eigen::Vector2d>& found = {}) const;
+  std::vector<LandmarkMatch> collect(
+      std::size_t count, const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) const;
   LandmarkMatchingOptions options_;
   LandmarkReconstructor reconstruction_;
   ThreadPool workers_;

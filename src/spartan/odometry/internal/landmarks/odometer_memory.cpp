@@ -1,11 +1,13 @@
 #include "spartan/odometry/internal/landmarks/odometer_memory.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 namespace spartan::internal {
 namespace {
 
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr const char* kWhat = "saved state of the odometry";
 
 void put(ArchiveWriter& out, const RectifiedStereo& stereo) {
@@ -24,6 +26,27 @@ RectifiedStereo get_stereo(ArchiveReader& in) {
   stereo.centre_px = in.get_vector2();
   stereo.baseline_m = in.get_finite();
   return stereo;
+}
+
+void put(ArchiveWriter& out, ImageView<const std::uint16_t> image) {
+  out.put(image.width());
+  out.put(image.height());
+  for (int y = 0; y < image.height(); ++y)
+    out.put_array(image.row(y), static_cast<std::size_t>(image.width()));
+}
+
+/// None where a row has the wrong length or a side is not possible.
+std::optional<Image<std::uint16_t>> get_image(ArchiveReader& in, std::size_t bytes) {
+  const int width = in.get<int>(), height = in.get<int>();
+  if (width < 0 || height < 0 || static_cast<std::size_t>(width) * static_cast<std::size_t>(height) > bytes)
+    return std::nullopt;
+  Image<std::uint16_t> image(width, height);
+  for (int y = 0; y < height; ++y) {
+    const std::vector<std::uint16_t> row = in.get_array<std::uint16_t>();
+    if (row.size() != static_cast<std::size_t>(width)) return std::nullopt;
+    std::copy(row.begin(), row.end(), image.row(y));
+  }
+  return image;
 }
 
 void put(ArchiveWriter& out, const Landmark& landmark) {
@@ -100,6 +123,7 @@ Bytes OdometerMemory::save() const {
   }
   out.put(static_cast<std::uint32_t>(map.landmarks.size()));
   for (const Landmark& landmark : map.landmarks) put(out, landmark);
+  for (int level = 0; level < ImagePyramid::kLevels; ++level) put(out, pyramid.level(level));
   return out.take();
 }
 
@@ -138,6 +162,11 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
     if (std::none_of(memory.map.anchors.begin(), memory.map.anchors.end(), is_its_anchor))
       return damaged("is damaged: a landmark has no anchor");
     memory.map.landmarks.push_back(landmark);
+  }
+  for (int level = 0; level < ImagePyramid::kLevels; ++level) {
+    auto image = get_image(in, bytes.size());
+    if (!image) return damaged("is damaged: a level of the pyramid is not possible");
+    memory.pyramid.set_level(level, *std::move(image));
   }
   if (Status status = in.finish(kWhat); !status) return failure(status);
   return memory;
