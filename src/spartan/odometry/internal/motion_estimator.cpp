@@ -8,15 +8,13 @@
 #include "spartan/numerics/levenberg_marquardt.h"
 #include "spartan/numerics/random.h"
 #include "spartan/numerics/umeyama.h"
+#include "spartan/odometry/internal/motion/motion_problem.h"
 
 namespace spartan::internal {
 namespace {
 
 /// Seed of the RANSAC samples; any constant makes them reproducible.
 constexpr std::uint64_t kSeed = 0x5157;
-/// c² of the Cauchy loss ρ(s) = c² ln(1 + s/c²) of a squared normalized residual s; empirical. A residual with s = c²
-/// (2.4 standard deviations) has half the weight of a small one.
-constexpr double kCauchy = 6.0;
 /// Median and first quartile of the chi-squared distribution with three degrees of freedom: s of a (u, v, d) residual.
 constexpr double kMedianChi3 = 2.366;
 constexpr double kQuartileChi3 = 1.213;
@@ -24,92 +22,13 @@ constexpr double kQuartileChi3 = 1.213;
 constexpr double kMinFitDisparity_px = 0.5;
 /// RANSAC stops when three inliers have been sampled with this probability of failure.
 constexpr double kRansacFailure = 1e-4;
-/// Cost of a landmark that is predicted behind the camera: the Cauchy loss at s = c² (e¹⁰ − 1), so that no residual in
-/// front of the camera costs more in practice.
-constexpr double kBehindCameraCost = kCauchy * 10;
-/// Information (px⁻²) of an offset that is taken as exact; large against that of any measurement.
-constexpr double kExactInformation = 1e12;
 /// With fewer inliers the motion (6 unknowns) is not determined redundantly.
 constexpr int kMinInliers = 6;
 /// Rounds of minimization and outlier rejection, and Levenberg-Marquardt trials in each; empirical.
 constexpr int kRounds = 3, kTrials = 12;
 
-/// Unknowns: right perturbation of the motion (translation, rotation), then the disparity offset.
-using Vector7d = Eigen::Matrix<double, 7, 1>;
-using Matrix7d = Eigen::Matrix<double, 7, 7>;
-struct MotionState {
-  Pose motion;  ///< previous_from_current
-  double offset = 0;
-};
-
-/// One residual: its squared norm in standard deviations (infinite behind the camera), JᵀS⁻¹J and JᵀS⁻¹r.
-struct Term {
-  double squared = std::numeric_limits<double>::infinity();
-  Matrix7d information = Matrix7d::Zero();
-  Vector7d gradient = Vector7d::Zero();
-  Eigen::Vector3d residual = Eigen::Vector3d::Zero();
-};
-
-Term term_of(const RectifiedStereo& stereo, const LandmarkMatch& match, const Pose& current_from_previous,
-             double offset) {
-  Term term;
-  const AnchoredPoint point{match.point.pixel, match.point.disparity + offset};
-  const auto p = project_anchored(stereo, point, current_from_previous * match.previous_from_anchor);
-  if (!p) return term;
-  const Eigen::Matrix3d spread =
-      match.covariance + match.disparity_variance * p->by_disparity * p->by_disparity.transpose();
-  const Eigen::Matrix3d weight = spread.inverse();
-  term.residual = match.measured + Eigen::Vector3d(0, 0, offset) - p->measured;
-  term.squared = term.residual.dot(weight * term.residual);
-  Eigen::Matrix<double, 3, 7> jacobian;
-  jacobian << p->by_motion, p->by_disparity - Eigen::Vector3d(0, 0, 1);
-  const Eigen::Matrix<double, 7, 3> jw = jacobian.transpose() * weight;
-  term.information = jw * jacobian;
-  term.gradient = jw * term.residual;
-  return term;
-}
-
-using MotionNormal = NormalEquations<Matrix7d, Vector7d>;
-
-/// A robust least-squares problem in the motion and the offset.
-struct Problem {
-  const RectifiedStereo& stereo;
-  const std::vector<LandmarkMatch>& matches;
-  DisparityOffset prior;
-  bool robust;
-};
-
-double information_of(const DisparityOffset& prior) {
-  return prior.variance > 0 ? 1 / prior.variance : kExactInformation;
-}
-
-MotionNormal normal_equations(const Problem& problem, const std::vector<bool>& used, const MotionState& state,
-                              double noise_scale) {
-  MotionNormal normal{0, Matrix7d::Zero(), Vector7d::Zero()};
-  const Pose current_from_previous = state.motion.inverse();
-  const double scale = 1 / (noise_scale * noise_scale);
-  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
-    if (!used[i]) continue;
-    const Term term = term_of(problem.stereo, problem.matches[i], current_from_previous, state.offset);
-    if (!std::isfinite(term.squared)) {
-      normal.cost += kBehindCameraCost;
-      continue;
-    }
-    const double s = term.squared * scale;
-    const double weight = problem.robust ? 1 / (1 + s / kCauchy) : 1;  // ρ'(s)
-    normal.cost += problem.robust ? kCauchy * std::log1p(s / kCauchy) : s;
-    normal.information += weight * scale * term.information;
-    normal.gradient += weight * scale * term.gradient;
-  }
-  const double information = information_of(problem.prior);
-  const double change = problem.prior.value - state.offset;
-  normal.cost += information * change * change;
-  normal.information(6, 6) += information;
-  normal.gradient[6] += information * change;
-  return normal;
-}
-
-MotionState minimize(const Problem& problem, const std::vector<bool>& used, const MotionState& start,
+/// Minimizes with the weights of the start.
+MotionState minimize(MotionProblem& problem, const std::vector<bool>& used, const MotionState& start,
                      double noise_scale) {
   static constexpr LevenbergMarquardtOptions kOptions{.max_trials = kTrials,
                                                       .initial_damping = 1e-6,
@@ -118,17 +37,13 @@ MotionState minimize(const Problem& problem, const std::vector<bool>& used, cons
                                                       .max_damping = 1e6,
                                                       .relative_decrease = 1e-9,
                                                       .step_rule = StepRule::not_increase};
-  // Residuals and Jacobians are computed together, so those of the latest trial are kept.
-  MotionNormal latest = normal_equations(problem, used, start, noise_scale);
-  const auto cost = [&](const MotionState& state) {
-    latest = normal_equations(problem, used, state, noise_scale);
-    return latest.cost;
-  };
-  const auto linearize = [&](const MotionState&) { return latest; };
+  problem.update_weights(start);
   const auto moved = [](const MotionState& state, const Vector7d& step) {
     return MotionState{state.motion * exp_se3(step.head<6>()), state.offset + step[6]};
   };
-  return minimize_levenberg_marquardt(start, kOptions, linearize, cost, moved);
+  return minimize_levenberg_marquardt(
+      start, kOptions, [&](const MotionState& state) { return problem.linearize(used, state, noise_scale); },
+      [&](const MotionState& state) { return problem.cost(used, state, noise_scale); }, moved);
 }
 
 double quantile(std::vector<double> values, double fraction) {
@@ -141,40 +56,14 @@ double quantile(std::vector<double> values, double fraction) {
 /// Ratio of the observed to the specified standard deviation of the residuals, at least 1: in the first round from the
 /// first quartile of all residuals (valid with up to 75 % outliers, and then conservative), then from the median of the
 /// inliers.
-double noise_scale_of(const Problem& problem, const std::vector<bool>& used, const MotionState& state, bool first) {
+double noise_scale_of(const std::vector<double>& squares, const std::vector<bool>& used, bool first) {
   std::vector<double> squared;
-  const Pose current_from_previous = state.motion.inverse();
-  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
-    if (!used[i]) continue;
-    squared.push_back(term_of(problem.stereo, problem.matches[i], current_from_previous, state.offset).squared);
-  }
-  const double excess = first ? quantile(squared, 0.25) / kQuartileChi3 : quantile(squared, 0.5) / kMedianChi3;
+  squared.reserve(squares.size());
+  for (std::size_t i = 0; i < squares.size(); ++i)
+    if (used[i]) squared.push_back(squares[i]);
+  const double excess = first ? quantile(std::move(squared), 0.25) / kQuartileChi3
+                              : quantile(std::move(squared), 0.5) / kMedianChi3;
   return std::sqrt(std::max(1.0, std::isfinite(excess) ? excess : 1.0));
-}
-
-/// Covariance of an M-estimate, A⁻¹ B A⁻¹ (Huber, Robust Statistics, 1981, §6.3), with A = Σ ψ' JᵀS⁻¹J and
-/// B = Σ ψ² JᵀS⁻¹J. The whitened residual has three dimensions and a random direction; averaged over it, with the
-/// weight w(s) of s = rᵀS⁻¹r, ψ' = w + ⅔ s w'(s) and ψ² = w² s/3.
-Matrix7d covariance_of(const Problem& problem, const std::vector<bool>& used, const MotionState& state,
-                       double noise_scale) {
-  Matrix7d a = Matrix7d::Zero(), b = Matrix7d::Zero();
-  const Pose current_from_previous = state.motion.inverse();
-  const double scale = 1 / (noise_scale * noise_scale);
-  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
-    if (!used[i]) continue;
-    const Term term = term_of(problem.stereo, problem.matches[i], current_from_previous, state.offset);
-    if (!std::isfinite(term.squared)) continue;
-    const double s = term.squared * scale;
-    const double weight = problem.robust ? 1 / (1 + s / kCauchy) : 1;
-    const double slope = problem.robust ? -weight * weight / kCauchy : 0;
-    a += scale * (weight + 2.0 / 3.0 * s * slope) * term.information;
-    b += scale * weight * weight * s / 3 * term.information;
-  }
-  a(6, 6) += information_of(problem.prior);
-  b(6, 6) += information_of(problem.prior);
-  const Matrix7d inverse = a.ldlt().solve(Matrix7d::Identity());
-  const Matrix7d covariance = inverse * b * inverse.transpose();
-  return 0.5 * (covariance + covariance.transpose());
 }
 
 /// Number of samples of which one consists of inliers with the probability 1 − kRansacFailure, where `fraction` of the
@@ -185,18 +74,16 @@ int samples_for(double fraction) {
 }
 
 /// Sets `inlier`, `inliers` and `rms_px`: a match is an inlier where its squared normalized residual is within `limit`.
-void classify_inliers(MotionFit& fit, const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
-                      double limit) {
-  const Pose current_from_previous = fit.previous_from_current.inverse();
-  fit.inlier.assign(matches.size(), false);
+void classify_inliers(MotionFit& fit, const MotionProblem& problem, const std::vector<double>& squares,
+                      const MotionState& state, double limit) {
+  fit.inlier.assign(squares.size(), false);
   fit.inliers = 0;
   double sum = 0;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    const Term term = term_of(stereo, matches[i], current_from_previous, fit.offset.value);
-    if (!(term.squared <= limit)) continue;
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    if (!(squares[i] <= limit)) continue;
     fit.inlier[i] = true;
     ++fit.inliers;
-    sum += term.residual.squaredNorm() / 3;
+    sum += problem.residual(i, state).squaredNorm() / 3;
   }
   fit.rms_px = fit.inliers > 0 ? std::sqrt(sum / fit.inliers) : 0;
 }
@@ -288,7 +175,7 @@ std::optional<MotionFit> MotionEstimator::coarse(const RectifiedStereo& stereo,
 
 std::optional<MotionFit> MotionEstimator::fine(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
                                                const Pose& start, const DisparityOffset& offset) const {
-  const Problem problem{stereo, matches, offset, options_.robust};
+  MotionProblem problem(stereo, matches, offset, options_.robust);
   MotionFit fit;
   fit.offset = offset;
   const double limit = options_.inlier_sigmas * options_.inlier_sigmas;
@@ -298,12 +185,14 @@ std::optional<MotionFit> MotionEstimator::fine(const RectifiedStereo& stereo, co
     state = minimize(problem, used, state, fit.noise_scale);
     fit.previous_from_current = state.motion;
     fit.offset.value = state.offset;
-    fit.noise_scale = noise_scale_of(problem, used, state, round == 0);
-    classify_inliers(fit, stereo, matches, limit * fit.noise_scale * fit.noise_scale);
+    problem.update_weights(state);
+    const std::vector<double>& squares = problem.squares(state);
+    fit.noise_scale = noise_scale_of(squares, used, round == 0);
+    classify_inliers(fit, problem, squares, state, limit * fit.noise_scale * fit.noise_scale);
     used = fit.inlier;
     if (fit.inliers < kMinInliers) return std::nullopt;
   }
-  const Matrix7d covariance = covariance_of(problem, used, state, fit.noise_scale);
+  const Matrix7d covariance = problem.covariance(used, state, fit.noise_scale);
   if (!covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0)) return std::nullopt;
   fit.covariance = covariance.topLeftCorner<6, 6>();
   fit.offset.variance = covariance(6, 6);

@@ -3,13 +3,6 @@
 #include <Eigen/Dense>
 
 namespace spartan::internal {
-namespace {
-
-/// Smallest depth relative to the depth in the anchor at which a point counts as in front of the camera; empirical.
-constexpr double kMinRelativeDepth = 0.01;
-
-}  // namespace
-
 std::optional<AnchoredProjection> project_anchored(const RectifiedStereo& stereo, const AnchoredPoint& point,
                                                    const Pose& current_from_anchor) {
   const double f = stereo.focal_px, inverse_fb = 1 / (f * stereo.baseline_m);

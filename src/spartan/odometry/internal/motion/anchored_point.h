@@ -11,6 +11,9 @@
 
 namespace spartan::internal {
 
+/// Smallest depth relative to the depth in the anchor at which a point counts as in front of the camera; empirical.
+inline constexpr double kMinRelativeDepth = 0.01;
+
 /// Pixel and disparity of a point in the left image of its anchor frame.
 struct AnchoredPoint {
   Eigen::Vector2d pixel;
