@@ -28,6 +28,8 @@ constexpr int kMinCoarseInliers = 10;
 /// With fewer inliers inside of the gates, the descriptors are matched over the whole image as well; empirical.
 constexpr int kSufficientCoarseInliers = 30;
 
+/// The latest motion is extrapolated to at most this many times its duration.
+constexpr double kMostSpans = 2;
 /// Landmarks are added where more than this fraction of them is missing; empirical.
 constexpr double kMaxMissingFraction = 0.05;
 /// The prediction is kept over so many consecutive frames whose motion may be that of an object; empirical.
@@ -124,11 +126,12 @@ std::optional<std::string> Odometer::State::defect_of(const RectifiedPair& pair)
   return std::nullopt;
 }
 
-/// Constant-velocity model: the latest measured motion, scaled to the time since then.
+/// Constant-velocity model: the latest measured motion, scaled to the time since then, but at most kMostSpans times: a rover
+/// that was not observed for long has rather stopped than driven on.
 Pose Odometer::State::predict(Stamp now) const {
   const double elapsed_s = seconds_between(memory.stamp, now);
   if (!(memory.velocity_span_s > 0) || !(elapsed_s > 0)) return {};
-  return exp_se3(memory.last_motion * (elapsed_s / memory.velocity_span_s));
+  return exp_se3(memory.last_motion * std::min(elapsed_s / memory.velocity_span_s, kMostSpans));
 }
 
 /// Prior of the disparity offset for the current frame: a random walk, bounded by the prior of the calibration.
@@ -188,11 +191,18 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const StereoImages&
   };
   const RectifiedStereo& stereo = images.geometry;
   Attempt best;
-  if (options.matching.correlation) {
-    best.matches = matching.by_pyramid(memory.map, images, memory.pyramid, pyramid, predicted.inverse());
-    best.fit = estimation.coarse(stereo, best.matches);
+  const auto is_sufficient = [](const Attempt& a) {
+    return a.inliers() >= kSufficientCoarseInliers && 2 * a.inliers() >= static_cast<int>(a.matches.size());
+  };
+  // A rover that moves in steps moves on by one step, however long it has stopped.
+  for (const Pose& start : {predicted, exp_se3(memory.last_motion)}) {
+    if (!options.matching.correlation || is_sufficient(best)) break;
+    Attempt found;
+    found.matches = matching.by_pyramid(memory.map, images, memory.pyramid, pyramid, start.inverse());
+    found.fit = estimation.coarse(stereo, found.matches);
+    if (found.inliers() > best.inliers()) best = std::move(found);
   }
-  if (best.inliers() < kSufficientCoarseInliers || 2 * best.inliers() < static_cast<int>(best.matches.size())) {
+  if (!is_sufficient(best)) {
     detect(images);
     const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
       Attempt result;
