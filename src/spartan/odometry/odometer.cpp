@@ -34,6 +34,8 @@ constexpr double kMostSpans = 2;
 constexpr double kMaxMissingFraction = 0.05;
 /// The prediction is kept over so many consecutive frames whose motion may be that of an object; empirical.
 constexpr int kMaxAmbiguousFrames = 3;
+/// The motion of the scene has at least this fraction of the inliers that an object has; empirical.
+constexpr double kMinSceneFraction = 0.5;
 /// A motion that this fraction of all landmarks follows is not that of an object; empirical.
 constexpr double kMinUndisputedFraction = 0.4;
 
@@ -111,6 +113,7 @@ struct Odometer::State {
     std::optional<Pose> object;   ///< its motion, where it is known
   };
   CoarseMotion coarse_motion(const StereoImages& images, const Pose& predicted);
+  bool is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest) const;
   std::vector<LandmarkMatch> discard_object(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
                                             const Pose& scene, const Pose& object);
   void add_noise_floor(std::vector<LandmarkMatch>& matches) const;
@@ -223,13 +226,29 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const StereoImages&
   if (best.inliers() >= kMinCoarseInliers && memory.velocity_span_s > 0) {
     if (const auto rival = find_rival(estimation, stereo, best.matches, *best.fit, predicted)) {
       ChosenMotion chosen = choose_motion(best.matches, *best.fit, *rival);
-      best.fit = std::move(chosen.fit);
-      doubt = std::move(chosen.reason);
-      object = chosen.object;
+      if (!chosen.object || !is_false_rival(images, chosen.fit.previous_from_current, *chosen.object)) {
+        best.fit = std::move(chosen.fit);
+        doubt = std::move(chosen.reason);
+        object = chosen.object;
+      }
     }
   }
   const Pose motion = best.inliers() >= kMinCoarseInliers ? best.fit->previous_from_current : predicted;
   return {motion, std::move(best.matches), std::move(best.feature_of), std::move(doubt), object};
+}
+
+/// Whether a rival consists of wrong matches: then far fewer landmarks have their patches where it predicts them than where
+/// the largest set does.
+bool Odometer::State::is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest) const {
+  if (!options.matching.correlation) return false;
+  const auto inliers = [&](const Pose& motion) {
+    std::vector<LandmarkMatch> matches = matching.by_correlation(memory.map, images, motion.inverse());
+    matches = keep_rigid(images.geometry, std::move(matches));
+    add_noise_floor(matches);
+    const auto fit = estimation.fine(images.geometry, matches, motion, predicted_offset());
+    return fit ? fit->inliers : 0;
+  };
+  return inliers(rival) < kMinSceneFraction * inliers(largest);
 }
 
 /// The matches of the scene. Landmarks of the object are removed with the next update, because an anchor on it does not

@@ -287,6 +287,33 @@ TEST(Odometer, DoesNotFollowAMovingObject) {
   EXPECT_GE(warned, 4) << "of the 6 motions of the board";
 }
 
+// Tiles of another frame, spread over the view: 15 % of it.
+SyntheticFrame with_tiles_of(const SyntheticFrame& scene, const SyntheticFrame& other) {
+  SyntheticFrame frame{scene.left.clone(), scene.right.clone(), scene.disparity.clone(), scene.mask.clone()};
+  constexpr int kTile = 44, kPitch = 85, kMargin = 3;
+  for (int top = 20; top + kTile < frame.left.height(); top += kPitch) {
+    for (int left = 75; left + kTile + kMargin < frame.left.width(); left += kPitch) {
+      const int disparity = static_cast<int>(std::lround(other.disparity(left + kTile / 2, top + kTile / 2)));
+      for (int y = top; y < top + kTile; ++y) {
+        std::copy_n(other.left.row(y) + left, kTile, frame.left.row(y) + left);
+        const int from = left - disparity - kMargin;
+        std::copy_n(other.right.row(y) + from, kTile + 2 * kMargin, frame.right.row(y) + from);
+      }
+    }
+  }
+  return frame;
+}
+
+// Few matches agree with the prediction, most with another motion: the rover has moved otherwise than before.
+TEST(Odometer, FollowsMostOfTheViewWhereFewMatchesArePredicted) {
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+  for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
+  const SyntheticFrame jumped = with_tiles_of(frame_of(7), frame_of(4));
+  const MotionEstimate estimate = odometer.add(pair_of(jumped, 4));
+  EXPECT_NE(estimate.status, TrackingStatus::lost) << estimate.reason;
+  EXPECT_LT(translation_error(estimate, 3, 7), 0.004) << estimate.reason;
+}
+
 TEST(Odometer, RejectsUnusablePairsWithoutCrashing) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 200}, {12, 12}, {30, 20}, {64, 48}}) {
     Odometer odometer = Odometer::create({}, ThreadPool(2)).value();
