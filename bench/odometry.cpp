@@ -40,7 +40,8 @@ std::vector<Frame> load(const std::string& recording, int from, int count) {
   const Rig& rig = (*source)->info().rig;
   auto imager = Imager::create(rig, ImagingOptions(), ThreadPool(2));
   if (!imager) return {};
-  const auto pair = std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const StereoPair& p) { return p.for_odometry; });
+  const auto pair =
+      std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const StereoPair& p) { return p.for_odometry; });
   if (pair == rig.pairs.end()) return {};
   std::vector<Frame> frames;
   const std::vector<Stamp> stamps = (*source)->listed_stamps(pair->name);

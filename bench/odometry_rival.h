@@ -94,7 +94,7 @@ class LucasKanadeOdometry {
 
   int corners_;
   cv::Mat previous_;
-  std::vector<cv::Point2f> pixels_;   // in the previous left image
+  std::vector<cv::Point2f> pixels_;  // in the previous left image
   std::vector<cv::Point3f> points_;  // in the previous left optical frame
 };
 

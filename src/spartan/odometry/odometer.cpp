@@ -129,8 +129,8 @@ std::optional<std::string> Odometer::State::defect_of(const RectifiedPair& pair)
   return std::nullopt;
 }
 
-/// Constant-velocity model: the latest measured motion, scaled to the time since then, but at most kMostSpans times: a rover
-/// that was not observed for long has rather stopped than driven on.
+/// Constant-velocity model: the latest measured motion, scaled to the time since then, but at most kMostSpans times: a
+/// rover that was not observed for long has rather stopped than driven on.
 Pose Odometer::State::predict(Stamp now) const {
   const double elapsed_s = seconds_between(memory.stamp, now);
   if (!(memory.velocity_span_s > 0) || !(elapsed_s > 0)) return {};
@@ -237,8 +237,8 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const StereoImages&
   return {motion, std::move(best.matches), std::move(best.feature_of), std::move(doubt), object};
 }
 
-/// Whether a rival consists of wrong matches: then far fewer landmarks have their patches where it predicts them than where
-/// the largest set does.
+/// Whether a rival consists of wrong matches: then far fewer landmarks have their patches where it predicts them than
+/// where the largest set does.
 bool Odometer::State::is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest) const {
   if (!options.matching.correlation) return false;
   const auto inliers = [&](const Pose& motion) {

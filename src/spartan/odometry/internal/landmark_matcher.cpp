@@ -122,8 +122,9 @@ std::optional<LandmarkMatch> LandmarkMatcher::correlate(const LandmarkMemory& me
   if (!warp.pixels.allFinite() || !warp.slant.allFinite()) return std::nullopt;
 
   const AlignmentTemplate reference(landmark.patch);
-  const auto found = align_translation(reference, images.left_smooth, warp.pixels,
-                                       start_px.value_or(predicted->measured.head<2>()), options_.correlation_radius_px);
+  const auto found =
+      align_translation(reference, images.left_smooth, warp.pixels, start_px.value_or(predicted->measured.head<2>()),
+                        options_.correlation_radius_px);
   if (!found || found->correlation < options_.min_correlation) return std::nullopt;
   const int x = static_cast<int>(std::lround(found->position.x())),
             y = static_cast<int>(std::lround(found->position.y()));
@@ -169,8 +170,8 @@ std::vector<LandmarkMatch> LandmarkMatcher::by_pyramid(const LandmarkMemory& mem
     const Eigen::Matrix2d warp =
         warp_of(*after, landmark.slant).pixels * warp_of(*before, landmark.slant).pixels.inverse();
     if (!warp.allFinite()) return std::nullopt;
-    const auto found = find_in_pyramid(latest, current, landmark.pixel, warp, after->measured.head<2>(),
-                                       options_.min_correlation);
+    const auto found =
+        find_in_pyramid(latest, current, landmark.pixel, warp, after->measured.head<2>(), options_.min_correlation);
     if (!found) return std::nullopt;
     return correlate(memory, index, images, current_from_previous, *found);
   });

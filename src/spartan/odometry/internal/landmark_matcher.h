@@ -54,8 +54,8 @@ class LandmarkMatcher {
   std::optional<LandmarkMatch> correlate(const LandmarkMemory& memory, std::size_t index, const StereoImages& images,
                                          const Pose& current_from_previous,
                                          const std::optional<Eigen::Vector2d>& found = {}) const;
-  std::vector<LandmarkMatch> collect(
-      std::size_t count, const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) const;
+  std::vector<LandmarkMatch> collect(std::size_t count,
+                                     const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) const;
   LandmarkMatchingOptions options_;
   LandmarkReconstructor reconstruction_;
   ThreadPool workers_;

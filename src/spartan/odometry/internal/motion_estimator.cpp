@@ -61,8 +61,8 @@ double noise_scale_of(const std::vector<double>& squares, const std::vector<bool
   squared.reserve(squares.size());
   for (std::size_t i = 0; i < squares.size(); ++i)
     if (used[i]) squared.push_back(squares[i]);
-  const double excess = first ? quantile(std::move(squared), 0.25) / kQuartileChi3
-                              : quantile(std::move(squared), 0.5) / kMedianChi3;
+  const double excess =
+      first ? quantile(std::move(squared), 0.25) / kQuartileChi3 : quantile(std::move(squared), 0.5) / kMedianChi3;
   return std::sqrt(std::max(1.0, std::isfinite(excess) ? excess : 1.0));
 }
 

@@ -12,8 +12,8 @@ namespace spartan::internal {
 
 /// Selects at most `count` features. The image is divided into about count/4 square cells; the strongest feature of
 /// every cell is taken first, then the second strongest of every cell, and so on. No two selected features are nearer
-/// than `spacing_px`, nor to a position that is `taken`; these count as the strongest of their cells. Result in order of
-/// decreasing strength; ties are broken by y, then x.
+/// than `spacing_px`, nor to a position that is `taken`; these count as the strongest of their cells. Result in order
+/// of decreasing strength; ties are broken by y, then x.
 std::vector<Feature> spread_features(std::span<const Feature> features, ImageSize size, int count, double spacing_px,
                                      std::span<const Eigen::Vector2f> taken = {});
 

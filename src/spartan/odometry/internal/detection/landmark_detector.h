@@ -34,7 +34,7 @@ struct Feature {
 
 /// Which features are wanted.
 struct WantedFeatures {
-  std::optional<int> count;                 ///< maximum number; without it DetectionOptions::landmarks
+  std::optional<int> count;                ///< maximum number; without it DetectionOptions::landmarks
   std::span<const Eigen::Vector2f> taken;  ///< positions that have landmarks already: no feature near them
 };
 

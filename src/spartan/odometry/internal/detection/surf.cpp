@@ -197,12 +197,11 @@ void SurfDetector::search(int index, ImageSize size, Part& part) const {
   }
 }
 
-const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask,
-                                                 const WantedFeatures& wanted) {
+const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> image,
+                                                 ImageView<const std::uint8_t> mask, const WantedFeatures& wanted) {
   integral_.compute(image);
-  workers_.parallel_for(0, kSurfParts, 1, [&](int begin, int) {
-    search(begin, image.size(), parts_[static_cast<std::size_t>(begin)]);
-  });
+  workers_.parallel_for(0, kSurfParts, 1,
+                        [&](int begin, int) { search(begin, image.size(), parts_[static_cast<std::size_t>(begin)]); });
   found_.clear();
   for (const Part& part : parts_) found_.insert(found_.end(), part.found.begin(), part.found.end());
   if (!mask.empty()) {

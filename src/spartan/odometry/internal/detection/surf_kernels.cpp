@@ -17,8 +17,8 @@ constexpr int kSubregions = 16, kSamples = 25;
 /// Standard deviation of the weights of the Haar responses, in units of the scale (Bay et al., §4.2).
 constexpr float kHaarSigma = 3.3f;
 
-/// Positions of the samples of each subregion in units of the scale, and their weights; sample by sample, all subregions
-/// side by side.
+/// Positions of the samples of each subregion in units of the scale, and their weights; sample by sample, all
+/// subregions side by side.
 struct HaarTable {
   alignas(64) float x[kSamples][kSubregions], y[kSamples][kSubregions], weight[kSamples][kSubregions];
 };
@@ -94,9 +94,9 @@ HWY_INLINE void hessian_of(const HessianRows& r, int count, float* out) {
                                    hn::Mul(three, box(r.xx_top, r.xx_bottom, -r.inner, r.inner + 1))));
     const auto yy = scaled(hn::Sub(box(r.yy_top, r.yy_bottom, 1 - r.lobe, r.lobe),
                                    hn::Mul(three, box(r.yy_upper, r.yy_lower, 1 - r.lobe, r.lobe))));
-    const auto xy = scaled(hn::Sub(
-        hn::Add(box(r.xy_top, r.above, 1, r.lobe + 1), box(r.below, r.xy_bottom, -r.lobe, 0)),
-        hn::Add(box(r.xy_top, r.above, -r.lobe, 0), box(r.below, r.xy_bottom, 1, r.lobe + 1))));
+    const auto xy =
+        scaled(hn::Sub(hn::Add(box(r.xy_top, r.above, 1, r.lobe + 1), box(r.below, r.xy_bottom, -r.lobe, 0)),
+                       hn::Add(box(r.xy_top, r.above, -r.lobe, 0), box(r.below, r.xy_bottom, 1, r.lobe + 1))));
     hn::StoreU(hn::Sub(hn::Mul(xx, yy), hn::Mul(cross, hn::Mul(xy, xy))), floats, out + i);
   }
 }
@@ -145,17 +145,15 @@ HWY_INLINE Haar haar(const IntegralImage& integral, hn::Vec<Signed> x, hn::Vec<S
   const Floats floats;
   const auto stride = hn::Set(integers, static_cast<std::int32_t>(integral.row(1) - integral.row(0)));
   const auto clipped = [&](hn::Vec<Signed> v, int offset, int last) HWY_ATTR {
-    return hn::Max(hn::Zero(integers),
-                   hn::Min(hn::Add(v, hn::Set(integers, offset)), hn::Set(integers, last)));
+    return hn::Max(hn::Zero(integers), hn::Min(hn::Add(v, hn::Set(integers, offset)), hn::Set(integers, last)));
   };
   const auto left = clipped(x, -half, integral.width()), column = clipped(x, 0, integral.width()),
              right = clipped(x, half, integral.width());
   const auto top = hn::Mul(clipped(y, -half, integral.height()), stride),
              row = hn::Mul(clipped(y, 0, integral.height()), stride),
              bottom = hn::Mul(clipped(y, half, integral.height()), stride);
-  const auto at = [&](hn::Vec<Signed> r, hn::Vec<Signed> c) HWY_ATTR {
-    return hn::GatherIndex(d, integral.row(0), hn::Add(r, c));
-  };
+  const auto at = [&](hn::Vec<Signed> r, hn::Vec<Signed> c)
+                      HWY_ATTR { return hn::GatherIndex(d, integral.row(0), hn::Add(r, c)); };
   const auto top_left = at(top, left), top_right = at(top, right), bottom_left = at(bottom, left),
              bottom_right = at(bottom, right);
   const auto twice = [](hn::Vec<Sums> v) HWY_ATTR { return hn::Add(v, v); };
@@ -179,10 +177,8 @@ void sum_haar(const IntegralImage& integral, const DescriptorPlace& p, float* ou
       const auto y = hn::Add(hn::Set(d, p.y + 0.5f), hn::Add(hn::Mul(scaled_sine, a), hn::Mul(scaled_cosine, b)));
       const Haar response = haar(integral, hn::NearestInt(x), hn::NearestInt(y), p.half);
       const auto weight = hn::Load(d, table.weight[sample] + region);
-      const auto dx =
-          hn::Mul(weight, hn::Add(hn::Mul(cosine, response.dx), hn::Mul(sine, response.dy)));
-      const auto dy =
-          hn::Mul(weight, hn::Sub(hn::Mul(cosine, response.dy), hn::Mul(sine, response.dx)));
+      const auto dx = hn::Mul(weight, hn::Add(hn::Mul(cosine, response.dx), hn::Mul(sine, response.dy)));
+      const auto dy = hn::Mul(weight, hn::Sub(hn::Mul(cosine, response.dy), hn::Mul(sine, response.dx)));
       sum_x = hn::Add(sum_x, dx);
       sum_abs_x = hn::Add(sum_abs_x, hn::Abs(dx));
       sum_y = hn::Add(sum_y, dy);
@@ -205,20 +201,13 @@ HWY_EXPORT(sum_haar);
 void hessian_row(const IntegralImage& integral, int y, int x0, int count, int filter_px, int step, float* out) {
   const int lobe = filter_px / 3, half = filter_px / 2, inner = lobe / 2;
   const auto row = [&](int offset) { return integral.row(y + offset) + x0; };
-  const HessianRows rows{row(1 - lobe),
-                         row(lobe),
-                         row(-half),
-                         row(-inner),
-                         row(inner + 1),
-                         row(half + 1),
-                         row(-lobe),
-                         row(0),
-                         row(1),
-                         row(lobe + 1),
-                         lobe,
-                         half,
-                         inner,
-                         1.0f / static_cast<float>(filter_px * filter_px)};
+  const HessianRows rows{row(1 - lobe),  row(lobe),
+                         row(-half),     row(-inner),
+                         row(inner + 1), row(half + 1),
+                         row(-lobe),     row(0),
+                         row(1),         row(lobe + 1),
+                         lobe,           half,
+                         inner,          1.0f / static_cast<float>(filter_px * filter_px)};
   HWY_DYNAMIC_DISPATCH(hessian)(rows, count, step, out);
 }
 

@@ -12,8 +12,8 @@ namespace spartan::internal {
 /// Values that hessian_row() may write and maxima_of_row() may read behind a row.
 inline constexpr int kSurfPadding = 16;
 
-/// det H of one filter size at the pixels x0, x0 + step, … of a row: Dxx Dyy − (0.9 Dxy)² by box filters, over the square
-/// of the filter's area (Bay et al., §3.2). The filters must lie inside the image with a margin of one pixel.
+/// det H of one filter size at the pixels x0, x0 + step, … of a row: Dxx Dyy − (0.9 Dxy)² by box filters, over the
+/// square of the filter's area (Bay et al., §3.2). The filters must lie inside the image with a margin of one pixel.
 void hessian_row(const IntegralImage& integral, int y, int x0, int count, int filter_px, int step, float* out);
 
 /// Appends the columns from `first` to `last` where the response exceeds the threshold and its four neighbours.

@@ -59,7 +59,8 @@ TEST(SurfKernels, FindsMaximaWithinARange) {
 TEST(SurfKernels, HaarSumsAreThoseOfBoxes) {
   const IntegralImage integral = integral_of_noise(140, 130);
   // Inside, rotated, and over the corner of the image.
-  const DescriptorPlace places[] = {{70.2f, 61.1f, 1.7f, 1, 0, 2}, {60.4f, 66.3f, 2.6f, 0.8f, 0.6f, 3}, {4, 3, 2, 1, 0, 2}};
+  const DescriptorPlace places[] = {
+      {70.2f, 61.1f, 1.7f, 1, 0, 2}, {60.4f, 66.3f, 2.6f, 0.8f, 0.6f, 3}, {4, 3, 2, 1, 0, 2}};
   with_each_target([&] {
     for (const DescriptorPlace& p : places) {
       std::array<double, 64> expected{};

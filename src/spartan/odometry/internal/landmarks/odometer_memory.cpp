@@ -31,8 +31,7 @@ RectifiedStereo get_stereo(ArchiveReader& in) {
 void put(ArchiveWriter& out, ImageView<const std::uint16_t> image) {
   out.put(image.width());
   out.put(image.height());
-  for (int y = 0; y < image.height(); ++y)
-    out.put_array(image.row(y), static_cast<std::size_t>(image.width()));
+  for (int y = 0; y < image.height(); ++y) out.put_array(image.row(y), static_cast<std::size_t>(image.width()));
 }
 
 /// None where a row has the wrong length or a side is not possible.

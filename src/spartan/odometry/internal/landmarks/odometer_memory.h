@@ -21,7 +21,7 @@ struct OdometerMemory {
   std::int32_t ambiguous_frames = 0;        ///< latest frames with two motions of which neither was clearly the scene's
   DisparityOffset offset;                   ///< variance 0 before the first measured motion
   LandmarkMemory map;
-  ImagePyramid pyramid;                     ///< of the latest left image
+  ImagePyramid pyramid;  ///< of the latest left image
 
   Bytes save() const;
   /// Codes: `configuration` where the bytes are of another version, `store_damaged` where they are damaged.

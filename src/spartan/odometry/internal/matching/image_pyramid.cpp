@@ -69,8 +69,7 @@ void ImagePyramid::compute(ImageView<const std::uint16_t> smooth) {
 std::optional<Eigen::Vector2d> find_in_pyramid(const ImagePyramid& previous, const ImagePyramid& current,
                                                const Eigen::Vector2d& previous_px, const Eigen::Matrix2d& warp,
                                                const Eigen::Vector2d& predicted_px, double min_correlation) {
-  const auto align = [&](int level, const Eigen::Vector2d& start,
-                         double radius_px) -> std::optional<PatchAlignment> {
+  const auto align = [&](int level, const Eigen::Vector2d& start, double radius_px) -> std::optional<PatchAlignment> {
     const double scale = ImagePyramid::kScale[static_cast<std::size_t>(level)];
     const Eigen::Vector2d margin = Eigen::Vector2d::Constant(ImagePyramid::kMargin);
     const auto reference = AlignmentTemplate::around(previous.level(level), previous_px / scale + margin);
@@ -80,8 +79,7 @@ std::optional<Eigen::Vector2d> find_in_pyramid(const ImagePyramid& previous, con
     return found;
   };
   const auto eighth = align(1, predicted_px, kEighthRadius_px);
-  const auto quarter =
-      eighth ? align(0, eighth->position, kQuarterRadius_px) : align(0, predicted_px, kAloneRadius_px);
+  const auto quarter = eighth ? align(0, eighth->position, kQuarterRadius_px) : align(0, predicted_px, kAloneRadius_px);
   if (!quarter || quarter->correlation < min_correlation) return std::nullopt;
   return quarter->position;
 }

@@ -31,9 +31,9 @@ class ImagePyramid {
   std::array<Image<std::uint16_t>, kLevels> levels_;
 };
 
-/// Where a point of the previous image is in the current one, in pixels: its surroundings, deformed by `warp`, are aligned
-/// with the eighth, within 32 px of the prediction, and from there with the quarter. std::nullopt where the alignment
-/// with the quarter fails or its correlation is below `min_correlation`.
+/// Where a point of the previous image is in the current one, in pixels: its surroundings, deformed by `warp`, are
+/// aligned with the eighth, within 32 px of the prediction, and from there with the quarter. std::nullopt where the
+/// alignment with the quarter fails or its correlation is below `min_correlation`.
 std::optional<Eigen::Vector2d> find_in_pyramid(const ImagePyramid& previous, const ImagePyramid& current,
                                                const Eigen::Vector2d& previous_px, const Eigen::Matrix2d& warp,
                                                const Eigen::Vector2d& predicted_px, double min_correlation);

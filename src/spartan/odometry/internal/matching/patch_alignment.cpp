@@ -41,8 +41,8 @@ std::optional<WindowPlace> place_of(ImageView<const std::uint16_t> image, const 
     return std::nullopt;
   }
   const Eigen::Matrix2f a = warp.cast<float>();
-  return WindowPlace{
-      image, static_cast<float>(centre.x()), static_cast<float>(centre.y()), a(0, 0), a(0, 1), a(1, 0), a(1, 1)};
+  return WindowPlace{image,  static_cast<float>(centre.x()), static_cast<float>(centre.y()), a(0, 0), a(0, 1), a(1, 0),
+                     a(1, 1)};
 }
 
 Window negative(Window window) {
@@ -79,7 +79,7 @@ struct Linearization {
 /// Difference of an image window to a template, after matching mean and contrast.
 template <int Unknowns>
 struct WindowDifference {
-  double correlation = 0, variance = 0;            ///< variance: Σ w r²
+  double correlation = 0, variance = 0;         ///< variance: Σ w r²
   Eigen::Matrix<double, Unknowns, 1> gradient;  ///< Σ w Jᵀr
 };
 
@@ -99,8 +99,7 @@ std::optional<WindowDifference<Unknowns>> difference_from(const AlignmentTemplat
   difference.correlation = sums.products[0] / (deviation * reference.deviation);
   difference.variance = 2.0 * reference.deviation * reference.deviation * std::max(0.0, 1 - difference.correlation);
   for (int a = 0; a < Unknowns; ++a) {
-    difference.gradient[a] =
-        contrast * sums.products[static_cast<std::size_t>(a) + 1] - linear.by_template[a];
+    difference.gradient[a] = contrast * sums.products[static_cast<std::size_t>(a) + 1] - linear.by_template[a];
   }
   return difference;
 }
@@ -123,9 +122,9 @@ AlignmentTemplate::AlignmentTemplate(const WindowGradients& gradients)
 }
 
 AlignmentTemplate::AlignmentTemplate(const ImagePatch& patch)
-    : AlignmentTemplate(window_gradients({ImageView<const std::uint16_t>(patch.data(), kWindowStride, kWindowStride,
-                                                                         kWindowStride),
-                                          kWindowRadius + 1, kWindowRadius + 1})) {}
+    : AlignmentTemplate(
+          window_gradients({ImageView<const std::uint16_t>(patch.data(), kWindowStride, kWindowStride, kWindowStride),
+                            kWindowRadius + 1, kWindowRadius + 1})) {}
 
 std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::uint16_t> image,
                                                            const Eigen::Vector2d& centre) {
@@ -134,8 +133,7 @@ std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::
         centre.y() + r < image.height() - 1.01)) {
     return std::nullopt;
   }
-  return AlignmentTemplate(
-      window_gradients({image, static_cast<float>(centre.x()), static_cast<float>(centre.y())}));
+  return AlignmentTemplate(window_gradients({image, static_cast<float>(centre.x()), static_cast<float>(centre.y())}));
 }
 
 std::optional<PatchAlignment> align_translation(const AlignmentTemplate& reference,
@@ -218,9 +216,9 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference
                                               const Eigen::Vector2d& start, double radius_px) {
   if (reference.deviation < kMinDeviation) return std::nullopt;
   // right(c + (ox − s·o, oy)) ≈ template: the derivative by c is the gradient, by the slant −offset ∂x.
-  const Linearization<4> linear(
-      reference, {reference.along_x, reference.along_y, negative(times_offset_x(reference.along_x)),
-                  negative(times_offset_y(reference.along_x))});
+  const Linearization<4> linear(reference,
+                                {reference.along_x, reference.along_y, negative(times_offset_x(reference.along_x)),
+                                 negative(times_offset_y(reference.along_x))});
   Eigen::Matrix4d information = linear.information;
   if (!(information.topLeftCorner<2, 2>().determinant() > kMinDeterminant)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / kEffectivePixels;

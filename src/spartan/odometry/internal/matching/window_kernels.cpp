@@ -122,7 +122,8 @@ HWY_INLINE WindowSums sums_with(const WindowPlace& place, float level, const Win
     }
     sums.mean += hn::GetLane(hn::SumOfLanes(d, mean));
     sums.square += hn::GetLane(hn::SumOfLanes(d, square));
-    for (int k = 0; k < kCount; ++k) sums.products[static_cast<std::size_t>(k)] += hn::GetLane(hn::SumOfLanes(d, products[k]));
+    for (int k = 0; k < kCount; ++k)
+      sums.products[static_cast<std::size_t>(k)] += hn::GetLane(hn::SumOfLanes(d, products[k]));
   }
   return sums;
 }
@@ -186,8 +187,8 @@ float weigh(Window& window, Window& centred) {
   const auto subtracted = hn::Set(d, mean);
   for (std::size_t i = 0; i < window.values.size(); i += hn::Lanes(d)) {
     const auto weight = hn::Load(d, weights.values.data() + i);
-    const auto value = hn::IfThenElseZero(hn::Gt(weight, hn::Zero(d)),
-                                          hn::Sub(hn::Load(d, window.values.data() + i), subtracted));
+    const auto value =
+        hn::IfThenElseZero(hn::Gt(weight, hn::Zero(d)), hn::Sub(hn::Load(d, window.values.data() + i), subtracted));
     hn::Store(value, d, centred.values.data() + i);
     hn::Store(hn::Mul(weight, value), d, window.values.data() + i);
   }

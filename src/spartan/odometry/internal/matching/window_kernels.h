@@ -24,8 +24,8 @@ struct alignas(64) Window {
   std::array<float, static_cast<std::size_t>(kWindowSide* kWindowStride)> values{};
 };
 
-/// Where the pixels of a window lie in a smoothed image (gray levels times 256): an offset (i, j) from the centre of the
-/// window at (x + xx i + xy j, y + yx i + yy j). All of them must lie in [0, width − 1) × [0, height − 1).
+/// Where the pixels of a window lie in a smoothed image (gray levels times 256): an offset (i, j) from the centre of
+/// the window at (x + xx i + xy j, y + yx i + yy j). All of them must lie in [0, width − 1) × [0, height − 1).
 struct WindowPlace {
   ImageView<const std::uint16_t> image;
   float x = 0, y = 0, xx = 1, xy = 0, yx = 0, yy = 1;

@@ -57,7 +57,8 @@ double sum_over_window(const std::function<double(int, int)>& value) {
 TEST(WindowKernels, SumsAreThoseOfBilinearInterpolation) {
   const Image<std::uint16_t> image = noise_image(48, 40);
   // The last place reaches the last pixel that windows may use.
-  const WindowPlace places[] = {{image, 20, 17}, {image, 20.3f, 17.8f, 1.2f, 0.3f, -0.2f, 0.9f}, {image, 40.98f, 32.98f}};
+  const WindowPlace places[] = {
+      {image, 20, 17}, {image, 20.3f, 17.8f, 1.2f, 0.3f, -0.2f, 0.9f}, {image, 40.98f, 32.98f}};
   const double weights = sum_over_window(weight_at);
   with_each_target([&] {
     for (const WindowPlace& place : places) {
@@ -66,7 +67,8 @@ TEST(WindowKernels, SumsAreThoseOfBilinearInterpolation) {
         factors[static_cast<std::size_t>(k)] = window_of([&](int i, int j) { return 0.01 * ((i + k) * j - k); });
       const WindowSums sums = window_sums(place, 100, factors.data(), 4);
       const auto value = [&](int i, int j) { return value_at(place, i, j) - 100; };
-      EXPECT_NEAR(sums.mean, sum_over_window([&](int i, int j) { return weight_at(i, j) * value(i, j); }) / weights, 2e-3);
+      EXPECT_NEAR(sums.mean, sum_over_window([&](int i, int j) { return weight_at(i, j) * value(i, j); }) / weights,
+                  2e-3);
       EXPECT_NEAR(sums.square,
                   sum_over_window([&](int i, int j) { return weight_at(i, j) * value(i, j) * value(i, j); }) / weights,
                   0.1);

@@ -44,7 +44,8 @@ class MotionProblem {
   Matrix7d covariance(const std::vector<bool>& used, const MotionState& state, double noise_scale) const;
 
  private:
-  /// A landmark, divided by its depth in its anchor, in the previous frame: along + w · from_anchor, w the inverse depth.
+  /// A landmark, divided by its depth in its anchor, in the previous frame: along + w · from_anchor, w the inverse
+  /// depth.
   struct Entry {
     Eigen::Vector3d along, from_anchor, measured;
     double disparity;

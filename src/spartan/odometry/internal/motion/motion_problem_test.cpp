@@ -66,8 +66,7 @@ TEST(MotionProblem, AgreesWithTheProjectionOfAnchoredPoints) {
                                     motion.inverse() * m.previous_from_anchor);
     const Eigen::Vector3d r = m.measured + Eigen::Vector3d(0, 0, 0.1) - p->measured;
     EXPECT_LT((problem.residual(i, state) - r).norm(), 1e-9);
-    const Eigen::Matrix3d s =
-        m.covariance + m.disparity_variance * p->by_disparity * p->by_disparity.transpose();
+    const Eigen::Matrix3d s = m.covariance + m.disparity_variance * p->by_disparity * p->by_disparity.transpose();
     EXPECT_NEAR(squares[i], r.dot(s.inverse() * r), 1e-9 * squares[i]);
   }
   // Behind the camera.
