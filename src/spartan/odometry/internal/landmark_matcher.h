@@ -50,10 +50,10 @@ class LandmarkMatcher {
                                             const Pose& current_from_previous) const;
 
  private:
-  /// `found`: where the landmark is, to a few pixels; without it where the motion predicts it.
+  /// `start_px`: where the landmark is, to a few pixels; without it where the motion predicts it.
   std::optional<LandmarkMatch> correlate(const LandmarkMemory& memory, std::size_t index, const StereoImages& images,
                                          const Pose& current_from_previous,
-                                         const std::optional<Eigen::Vector2d>& found = {}) const;
+                                         const std::optional<Eigen::Vector2d>& start_px = {}) const;
   std::vector<LandmarkMatch> collect(std::size_t count,
                                      const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) const;
   LandmarkMatchingOptions options_;

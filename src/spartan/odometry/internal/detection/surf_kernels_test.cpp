@@ -40,7 +40,7 @@ TEST(SurfKernels, RowsHaveTheDeterminantsOfSinglePixels) {
 
 TEST(SurfKernels, FindsMaximaWithinARange) {
   std::vector<float> zero(80, 0.0f), row(80, 0.0f);
-  for (const std::size_t x : {3, 17, 18, 40, 61, 62}) row[x] = 2.0f;
+  for (const std::size_t x : {3UL, 17UL, 18UL, 40UL, 61UL, 62UL}) row[x] = 2.0f;
   row[18] = 3.0f;  // 17 has a larger neighbour
   row[30] = 0.5f;  // below the threshold
   std::vector<float> above = zero;

@@ -31,9 +31,10 @@ void smooth_and_halve(ImageView<const std::uint16_t> image, Image<std::uint16_t>
     const auto row = [&](int offset) { return image.row(std::clamp(2 * y + offset, 0, height - 1)); };
     const std::uint16_t *a = row(-2), *b = row(-1), *c = row(0), *d = row(1), *e = row(2);
     std::uint32_t* const s = sums.data() + kBorder;
-    for (int x = 0; x < width; ++x)
+    for (int x = 0; x < width; ++x) {
       s[x] = static_cast<std::uint32_t>(a[x] + e[x]) + 4U * static_cast<std::uint32_t>(b[x] + d[x]) +
              6U * static_cast<std::uint32_t>(c[x]);
+    }
     std::fill_n(sums.data(), kBorder, s[0]);
     std::fill_n(s + width, kBorder, s[width - 1]);
     std::uint16_t* const to = half.row(y);

@@ -40,9 +40,10 @@ double weight_at(int i, int j) {
 Window window_of(const std::function<double(int, int)>& value) {
   Window window;
   for (int j = -kWindowRadius; j <= kWindowRadius; ++j) {
-    for (int i = -kWindowRadius; i <= kWindowRadius; ++i)
+    for (int i = -kWindowRadius; i <= kWindowRadius; ++i) {
       window.values[static_cast<std::size_t>((j + kWindowRadius) * kWindowStride + i + kWindowRadius)] =
           static_cast<float>(value(i, j));
+    }
   }
   return window;
 }
