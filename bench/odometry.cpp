@@ -7,6 +7,7 @@
 // rectified images of the first pair are in memory: neither reading nor rectification is timed.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
@@ -16,6 +17,7 @@
 #include "odometry_rival.h"
 #include "spartan/camera/frame_source.h"
 #include "spartan/core/threads.h"
+#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/numerics/median.h"
 #include "spartan/odometry/internal/detection/landmark_detector.h"
@@ -54,8 +56,7 @@ std::vector<Frame> load(const std::string& recording, int from, int count) {
     Frame f{*rectified, Image<std::uint8_t>::copy_of(rectified->left), Image<std::uint8_t>::copy_of(rectified->right),
             Image<std::uint8_t>::copy_of(rectified->left_mask), Image<std::uint8_t>::copy_of(rectified->right_mask)};
     frames.push_back(std::move(f));
-    Frame& kept = frames.back();
-    kept.pair.times.clear();
+    frames.back().pair.times.clear();
   }
   for (Frame& f : frames) {
     f.pair.left = f.left;
@@ -139,8 +140,7 @@ void compare(const std::string& recording, int from, int count) {
   const auto opencv = cv::SIFT::create(OdometryOptions().detection.landmarks);
   for (std::size_t i = 0; i < std::min<std::size_t>(frames.size(), 11); ++i) {
     const auto& left = frames[i].left;
-    const cv::Mat image(left.height(), left.width(), CV_8UC1, const_cast<std::uint8_t*>(left.row(0)),
-                        static_cast<std::size_t>(left.stride()));
+    const cv::Mat image = as_mat(left.view());
     std::vector<cv::KeyPoint> points;
     cv::Mat descriptors;
     sift.push_back(milliseconds([&] { opencv->detectAndCompute(image, cv::noArray(), points, descriptors); }));

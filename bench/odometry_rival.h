@@ -2,7 +2,6 @@
 // benchmarks.
 #pragma once
 
-#include <algorithm>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "spartan/core/pose.h"
+#include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"
 
 namespace spartan {
@@ -22,7 +22,7 @@ class LucasKanadeOdometry {
 
   /// previous_from_current; the identity for the first frame and where PnP fails.
   Pose add(const RectifiedPair& pair) {
-    const cv::Mat left = mat(pair.left), right = mat(pair.right);
+    const cv::Mat left = as_mat(pair.left), right = as_mat(pair.right);
     Pose motion;
     std::vector<cv::Point2f> tracked;
     if (!previous_.empty() && pixels_.size() >= 6) motion = track(left, pair.geometry, tracked);
@@ -33,10 +33,6 @@ class LucasKanadeOdometry {
   }
 
  private:
-  static cv::Mat mat(const ImageView<const std::uint8_t>& v) {
-    return {v.height(), v.width(), CV_8UC1, const_cast<std::uint8_t*>(v.row(0)), static_cast<std::size_t>(v.stride())};
-  }
-
   Pose track(const cv::Mat& left, const RectifiedStereo& g, std::vector<cv::Point2f>& tracked) {
     std::vector<cv::Point2f> found;
     std::vector<unsigned char> status;

@@ -243,7 +243,7 @@ bool Odometer::State::is_false_rival(const StereoImages& images, const Pose& riv
   if (!options.matching.correlation) return false;
   const auto inliers = [&](const Pose& motion) {
     std::vector<LandmarkMatch> matches = matching.by_correlation(memory.map, images, motion.inverse());
-    matches = keep_rigid(images.geometry, std::move(matches));
+    if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
     add_noise_floor(matches);
     const auto fit = estimation.fine(images.geometry, matches, motion, predicted_offset());
     return fit ? fit->inliers : 0;

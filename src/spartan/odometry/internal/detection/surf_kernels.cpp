@@ -8,50 +8,6 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#ifndef SPARTAN_HAAR_TABLE
-#define SPARTAN_HAAR_TABLE
-namespace spartan::internal {
-namespace {
-
-constexpr int kSubregions = 16, kSamples = 25;
-/// Standard deviation of the weights of the Haar responses, in units of the scale (Bay et al., §4.2).
-constexpr float kHaarSigma = 3.3f;
-
-/// Positions of the samples of each subregion in units of the scale, and their weights; sample by sample, all
-/// subregions side by side.
-struct HaarTable {
-  alignas(64) float x[kSamples][kSubregions], y[kSamples][kSubregions], weight[kSamples][kSubregions];
-};
-
-const HaarTable& haar_table() {
-  static const HaarTable table = [] {
-    HaarTable t{};
-    for (int sample = 0; sample < kSamples; ++sample) {
-      for (int region = 0; region < kSubregions; ++region) {
-        const float x = static_cast<float>(5 * (region % 4) + sample % 5) - 9.5f,
-                    y = static_cast<float>(5 * (region / 4) + sample / 5) - 9.5f;
-        t.x[sample][region] = x;
-        t.y[sample][region] = y;
-        t.weight[sample][region] = std::exp(-(x * x + y * y) / (2 * kHaarSigma * kHaarSigma));
-      }
-    }
-    return t;
-  }();
-  return table;
-}
-
-/// Rows of the integral image that the boxes of a filter at one row need, at its first pixel.
-struct HessianRows {
-  const std::uint32_t *xx_top, *xx_bottom, *yy_top, *yy_upper, *yy_lower, *yy_bottom, *xy_top, *above, *below,
-      *xy_bottom;
-  int lobe, half, inner;
-  float area;
-};
-
-}  // namespace
-}  // namespace spartan::internal
-#endif
-
 HWY_BEFORE_NAMESPACE();
 namespace spartan::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -169,9 +125,9 @@ void sum_haar(const IntegralImage& integral, const DescriptorPlace& p, float* ou
   const HaarTable& table = haar_table();
   const auto scaled_cosine = hn::Set(d, p.scale * p.cosine), scaled_sine = hn::Set(d, p.scale * p.sine);
   const auto cosine = hn::Set(d, p.cosine), sine = hn::Set(d, p.sine);
-  for (int region = 0; region < kSubregions; region += static_cast<int>(hn::Lanes(d))) {
+  for (int region = 0; region < kHaarRegions; region += static_cast<int>(hn::Lanes(d))) {
     auto sum_x = hn::Zero(d), sum_abs_x = hn::Zero(d), sum_y = hn::Zero(d), sum_abs_y = hn::Zero(d);
-    for (int sample = 0; sample < kSamples; ++sample) {
+    for (int sample = 0; sample < kHaarSamples; ++sample) {
       const auto a = hn::Load(d, table.x[sample] + region), b = hn::Load(d, table.y[sample] + region);
       const auto x = hn::Add(hn::Set(d, p.x + 0.5f), hn::Sub(hn::Mul(scaled_cosine, a), hn::Mul(scaled_sine, b)));
       const auto y = hn::Add(hn::Set(d, p.y + 0.5f), hn::Add(hn::Mul(scaled_sine, a), hn::Mul(scaled_cosine, b)));
@@ -193,6 +149,25 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace spartan::internal {
+
+const HaarTable& haar_table() {
+  static const HaarTable table = [] {
+    // Standard deviation of the weights, in units of the scale (Bay et al., §4.2).
+    constexpr float kHaarSigma = 3.3f;
+    HaarTable t{};
+    for (int sample = 0; sample < kHaarSamples; ++sample) {
+      for (int region = 0; region < kHaarRegions; ++region) {
+        const int column = 5 * (region % 4) + sample % 5, row = 5 * (region / 4) + sample / 5;
+        const float x = static_cast<float>(column) - 9.5f, y = static_cast<float>(row) - 9.5f;
+        t.x[sample][region] = x;
+        t.y[sample][region] = y;
+        t.weight[sample][region] = std::exp(-(x * x + y * y) / (2 * kHaarSigma * kHaarSigma));
+      }
+    }
+    return t;
+  }();
+  return table;
+}
 
 HWY_EXPORT(hessian);
 HWY_EXPORT(maxima);

@@ -20,6 +20,22 @@ void hessian_row(const IntegralImage& integral, int y, int x0, int count, int fi
 void maxima_of_row(const float* above, const float* row, const float* below, int first, int last, float threshold,
                    std::vector<int>& columns);
 
+/// Rows of the integral image that the boxes of a filter at one row of pixels need, at the first pixel.
+struct HessianRows {
+  const std::uint32_t *xx_top, *xx_bottom, *yy_top, *yy_upper, *yy_lower, *yy_bottom, *xy_top, *above, *below,
+      *xy_bottom;
+  int lobe, half, inner;
+  float area;
+};
+
+/// Samples of a descriptor: 5×5 in each of 4×4 subregions. Positions in units of the scale and weights, sample by
+/// sample, all subregions side by side.
+inline constexpr int kHaarRegions = 16, kHaarSamples = 25;
+struct HaarTable {
+  alignas(64) float x[kHaarSamples][kHaarRegions], y[kHaarSamples][kHaarRegions], weight[kHaarSamples][kHaarRegions];
+};
+const HaarTable& haar_table();
+
 /// Where a descriptor is taken: position, scale s, cosine and sine of its orientation, half of the side of a wavelet.
 struct DescriptorPlace {
   float x = 0, y = 0, scale = 0, cosine = 1, sine = 0;

@@ -21,7 +21,6 @@ class ImagePyramid {
 
   /// From an image that is already smoothed by the same filter.
   void compute(ImageView<const std::uint16_t> smooth);
-  bool empty() const { return levels_[0].empty(); }
   ImageView<const std::uint16_t> level(int i) const { return levels_[static_cast<std::size_t>(i)]; }
   /// Replaces a level, to restore a saved pyramid.
   void set_level(int i, Image<std::uint16_t> pixels) { levels_[static_cast<std::size_t>(i)] = std::move(pixels); }

@@ -31,13 +31,16 @@ constexpr double kMaxSlantX = 0.8, kMaxSlantY = 1.5;
 /// Weight of a step of the slant against one of the position in the convergence test: about the extent of the window.
 constexpr double kSlantLever_px = 3;
 
+/// Windows keep this distance from the border of the image, so that rounding of their places does not pass it.
+constexpr double kBorder_px = 0.01;
+
 /// The window around `centre` under a warp; std::nullopt where a corner leaves the image.
 std::optional<WindowPlace> place_of(ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
                                     const Eigen::Vector2d& centre) {
   const double radius_x = kWindowRadius * (std::abs(warp(0, 0)) + std::abs(warp(0, 1)));
   const double radius_y = kWindowRadius * (std::abs(warp(1, 0)) + std::abs(warp(1, 1)));
-  if (!(centre.x() - radius_x >= 0.01 && centre.x() + radius_x < image.width() - 1.01 &&
-        centre.y() - radius_y >= 0.01 && centre.y() + radius_y < image.height() - 1.01)) {
+  if (!(centre.x() - radius_x >= kBorder_px && centre.x() + radius_x < image.width() - 1 - kBorder_px &&
+        centre.y() - radius_y >= kBorder_px && centre.y() + radius_y < image.height() - 1 - kBorder_px)) {
     return std::nullopt;
   }
   const Eigen::Matrix2f a = warp.cast<float>();
@@ -53,6 +56,7 @@ Window negative(Window window) {
 /// Alignment by Gauss-Newton whose Jacobian is that of the template: Σ wJᵀJ and its derivatives by the image.
 template <int Unknowns>
 struct Linearization {
+  static_assert(Unknowns + 1 >= kMinFactors && Unknowns + 1 <= kMaxFactors);
   using Vector = Eigen::Matrix<double, Unknowns, 1>;
   /// The template and the columns of the Jacobian without their weighted means, multiplied by the weights. Subtracting
   /// the means projects out the unknown brightness.

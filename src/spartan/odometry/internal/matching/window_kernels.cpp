@@ -9,36 +9,6 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#ifndef SPARTAN_WINDOW_WEIGHTS
-#define SPARTAN_WINDOW_WEIGHTS
-namespace spartan::internal {
-namespace {
-
-/// Standard deviation of the Gaussian window, pixels.
-constexpr float kWindowSigma_px = 4.0f;
-
-const Window& window_weights() {
-  static const Window weights = [] {
-    Window w;
-    float sum = 0;
-    for (int y = 0; y < kWindowSide; ++y) {
-      for (int x = 0; x < kWindowSide; ++x) {
-        const int dx = x - kWindowRadius, dy = y - kWindowRadius;
-        float& weight = w.values[static_cast<std::size_t>(y * kWindowStride + x)];
-        weight = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2 * kWindowSigma_px * kWindowSigma_px));
-        sum += weight;
-      }
-    }
-    for (float& value : w.values) value /= sum;
-    return w;
-  }();
-  return weights;
-}
-
-}  // namespace
-}  // namespace spartan::internal
-#endif
-
 HWY_BEFORE_NAMESPACE();
 namespace spartan::internal::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -109,7 +79,7 @@ HWY_INLINE WindowSums sums_with(const WindowPlace& place, float level, const Win
   for (int first = 0; first < kWindowStride; first += static_cast<int>(hn::Lanes(d))) {
     const RowSampler sampler(place, kWindowRadius, first);
     auto mean = hn::Zero(d), square = hn::Zero(d);
-    Values products[kCount > 0 ? kCount : 1];
+    Values products[kCount];
     for (int k = 0; k < kCount; ++k) products[k] = hn::Zero(d);
     for (int row = 0; row < kWindowSide; ++row) {
       const auto value = hn::Sub(sampler.row(row - kWindowRadius), hn::Set(d, level));
@@ -129,16 +99,10 @@ HWY_INLINE WindowSums sums_with(const WindowPlace& place, float level, const Win
 }
 
 WindowSums sums(const WindowPlace& place, float level, const Window* factors, int count) {
-  switch (count) {
-    case 3:
-      return sums_with<3>(place, level, factors);
-    case 4:
-      return sums_with<4>(place, level, factors);
-    case 5:
-      return sums_with<5>(place, level, factors);
-    default:
-      return sums_with<0>(place, level, factors);
-  }
+  static_assert(kMinFactors == 3 && kMaxFactors == 5);
+  if (count == 3) return sums_with<3>(place, level, factors);
+  if (count == 4) return sums_with<4>(place, level, factors);
+  return sums_with<5>(place, level, factors);
 }
 
 WindowGradients gradients(const WindowPlace& place) {
@@ -200,6 +164,25 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace spartan::internal {
+
+const Window& window_weights() {
+  static const Window weights = [] {
+    constexpr float kSigma_px = 4.0f;
+    Window w;
+    float sum = 0;
+    for (int y = 0; y < kWindowSide; ++y) {
+      for (int x = 0; x < kWindowSide; ++x) {
+        const int dx = x - kWindowRadius, dy = y - kWindowRadius;
+        float& weight = w.values[static_cast<std::size_t>(y * kWindowStride + x)];
+        weight = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2 * kSigma_px * kSigma_px));
+        sum += weight;
+      }
+    }
+    for (float& value : w.values) value /= sum;
+    return w;
+  }();
+  return weights;
+}
 
 HWY_EXPORT(sums);
 HWY_EXPORT(gradients);

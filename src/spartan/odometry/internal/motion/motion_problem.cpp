@@ -123,23 +123,32 @@ double MotionProblem::cost(const std::vector<bool>& used, const MotionState& sta
   return sum;
 }
 
-NormalEquations<Matrix7d, Vector7d> MotionProblem::linearize(const std::vector<bool>& used, const MotionState& state,
-                                                             double noise_scale) const {
-  NormalEquations<Matrix7d, Vector7d> normal{cost(used, state, noise_scale), Matrix7d::Zero(), Vector7d::Zero()};
+template <class Visit>
+void MotionProblem::for_each_residual(const std::vector<bool>& used, const MotionState& state, double noise_scale,
+                                      const Visit& visit) const {
   const Frame frame(state.motion);
   const double scale = 1 / (noise_scale * noise_scale);
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     if (!used[i]) continue;
-    const Projected p = project(entries_[i], frame, state.offset);
+    const Entry& entry = entries_[i];
+    const Projected p = project(entry, frame, state.offset);
     if (!p.in_front) continue;
-    const Eigen::Vector3d r = residual(entries_[i], p, state.offset);
-    const Jacobian j = jacobian(entries_[i], p, frame, state.offset);
-    const double s = r.dot(entries_[i].weight * r) * scale;
+    const Eigen::Vector3d r = residual(entry, p, state.offset);
+    visit(r, jacobian(entry, p, frame, state.offset), entry.weight, r.dot(entry.weight * r) * scale);
+  }
+}
+
+NormalEquations<Matrix7d, Vector7d> MotionProblem::linearize(const std::vector<bool>& used, const MotionState& state,
+                                                             double noise_scale) const {
+  NormalEquations<Matrix7d, Vector7d> normal{cost(used, state, noise_scale), Matrix7d::Zero(), Vector7d::Zero()};
+  const double scale = 1 / (noise_scale * noise_scale);
+  const auto add = [&](const Eigen::Vector3d& r, const Jacobian& j, const Eigen::Matrix3d& inverse_spread, double s) {
     const double weight = scale * (robust_ ? 1 / (1 + s / kCauchy) : 1);  // ρ'(s)
-    const Jacobian weighted = weight * entries_[i].weight * j;
+    const Jacobian weighted = weight * inverse_spread * j;
     normal.information.noalias() += weighted.transpose() * j;
     normal.gradient.noalias() += weighted.transpose() * r;
-  }
+  };
+  for_each_residual(used, state, noise_scale, add);
   normal.information(6, 6) += prior_information();
   normal.gradient[6] += prior_information() * (prior_.value - state.offset);
   return normal;
@@ -147,20 +156,14 @@ NormalEquations<Matrix7d, Vector7d> MotionProblem::linearize(const std::vector<b
 
 Matrix7d MotionProblem::covariance(const std::vector<bool>& used, const MotionState& state, double noise_scale) const {
   Matrix7d a = Matrix7d::Zero(), b = Matrix7d::Zero();
-  const Frame frame(state.motion);
   const double scale = 1 / (noise_scale * noise_scale);
-  for (std::size_t i = 0; i < entries_.size(); ++i) {
-    if (!used[i]) continue;
-    const Projected p = project(entries_[i], frame, state.offset);
-    if (!p.in_front) continue;
-    const Eigen::Vector3d r = residual(entries_[i], p, state.offset);
-    const Jacobian j = jacobian(entries_[i], p, frame, state.offset);
-    const Matrix7d information = j.transpose() * entries_[i].weight * j;
-    const double s = r.dot(entries_[i].weight * r) * scale;
+  const auto add = [&](const Eigen::Vector3d&, const Jacobian& j, const Eigen::Matrix3d& inverse_spread, double s) {
+    const Matrix7d information = j.transpose() * inverse_spread * j;
     const double weight = robust_ ? 1 / (1 + s / kCauchy) : 1, slope = robust_ ? -weight * weight / kCauchy : 0;
     a += scale * (weight + 2.0 / 3.0 * s * slope) * information;
     b += scale * weight * weight * s / 3 * information;
-  }
+  };
+  for_each_residual(used, state, noise_scale, add);
   a(6, 6) += prior_information();
   b(6, 6) += prior_information();
   const Matrix7d inverse = a.ldlt().solve(Matrix7d::Identity());

@@ -61,6 +61,10 @@ class MotionProblem {
   Eigen::Vector3d residual(const Entry& entry, const Projected& p, double offset) const;
   double square(const Entry& entry, const Frame& frame, double offset) const;
   Eigen::Matrix<double, 3, 7> jacobian(const Entry& entry, const Projected& p, const Frame& frame, double offset) const;
+  /// Calls visit(r, J, S⁻¹, s) for each match that is used and in front of the camera, s in units of `noise_scale`².
+  template <class Visit>
+  void for_each_residual(const std::vector<bool>& used, const MotionState& state, double noise_scale,
+                         const Visit& visit) const;
   double prior_information() const;
 
   const RectifiedStereo& stereo_;
