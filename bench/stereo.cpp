@@ -1,7 +1,8 @@
 // Compares stereo matching with OpenCV on real pairs with ground truth, in the light they were taken in and in others,
 // and in time on a rendered pair. `make bench-stereo`.
 //
-//   stereo [--repeat N] [--set key=value]... [--images DIR] [--from FOLDER] [--no-rivals]
+//   stereo [--repeat N] [--set key=value]... [--images DIR] [--from FOLDER] [--no-rivals | --times]
+//   stereo --first-call MATCHER DISPARITIES [--from FOLDER]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,6 +18,7 @@
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/numerics/simd_target.h"
 #include "standard_recordings.h"
+#include "stereo_first_calls.h"
 #include "stereo_speed.h"
 #include "stereo_variants.h"
 
@@ -83,7 +85,7 @@ void write_images(const std::string& folder, const Pair& pair, ImageView<const f
 
 struct Arguments {
   int repeat = 9;
-  bool rivals = true;
+  bool rivals = true, accuracy = true;
   std::string images, recordings;
   DisparityOptions options;
 };
@@ -95,6 +97,7 @@ Arguments parse(const std::vector<std::string>& words) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     if (word == "--no-rivals") arguments.rivals = false;
+    if (word == "--times") arguments.accuracy = false;
     if (i + 1 >= words.size()) continue;
     const std::string& value = words[i + 1];
     if (word == "--repeat") arguments.repeat = std::max(1, std::atoi(value.c_str()));
@@ -246,6 +249,7 @@ void compare_times(const Arguments& arguments) {
     fmt::print("\nno times: scripts/recordings makes the recording rocky_20pct\n");
     return;
   }
+  compare_first_calls(arguments.recordings, 256, arguments.repeat);
   compare_speed(pair, 256, arguments.repeat, arguments.options);
   compare_speed(pair, 384, arguments.repeat, arguments.options);
   compare_speed(resized(pair, {640, 480}), 192, 3 * arguments.repeat, arguments.options);
@@ -259,6 +263,9 @@ void compare_times(const Arguments& arguments) {
 
 void run(const std::vector<std::string>& words) {
   const Arguments arguments = parse(words);
+  if (words.size() >= 3 && words[0] == kFirstCall)
+    return print_first_call(rendered_pair(arguments.recordings + "/rocky_20pct"), words[1], std::stoi(words[2]));
+  if (!arguments.accuracy) return compare_times(arguments);
   const char* const data = std::getenv("SPARTAN_DATA");
   const fs::path folder = data != nullptr ? data : "../shared/data";
   if (!fs::exists(folder / "middlebury")) {

@@ -14,6 +14,7 @@
 #include "spartan/reconstruction/internal/matching/image_bytes.h"
 #include "spartan/reconstruction/internal/matching/reliability.h"
 #include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
+#include "spartan/reconstruction/internal/matching/texture_support.h"
 
 namespace spartan {
 
@@ -33,6 +34,7 @@ struct DisparityComputer::State {
   matching::CoarseToFineMatcher matcher;
   matching::BlockMatcher block_matcher;
   matching::SubpixelRefinement refinement;
+  matching::TextureSupport texture_support;
   SpeckleFilter speckles;
   Image<std::uint8_t> right_distance, outlier_percent;
 
@@ -45,7 +47,7 @@ struct DisparityComputer::State {
   }
   std::size_t buffer_bytes() const {
     return matcher.buffer_bytes() + block_matcher.buffer_bytes() + refinement.buffer_bytes() + speckles.buffer_bytes() +
-           matching::bytes_of(right_distance) + matching::bytes_of(outlier_percent);
+           texture_support.buffer_bytes() + matching::bytes_of(right_distance) + matching::bytes_of(outlier_percent);
   }
 };
 
@@ -107,6 +109,8 @@ Result<DisparityImage> DisparityComputer::compute(ImageView<const std::uint8_t> 
   const matching::Assessed assessed{s.refinement.disparity(), information, s.outlier_percent, s.refinement.textured()};
   matching::assess({information, s.refinement.relief(), s.right_distance, s.options.max_outlier_percent}, s.kernels,
                    s.workers, assessed);
+  // The right distances are of no more use.
+  s.texture_support.assess(s.refinement.gradients(), left, s.right_distance, s.workers, assessed.outlier_percent);
   times.refine = watch.lap();
   s.speckles.apply({s.options.speckle_size_px, s.options.speckle_step_px, assessed.reliable}, s.workers,
                    assessed.disparity);
@@ -128,7 +132,8 @@ std::int64_t DisparityComputer::memory_bytes(ImageSize size, DisparityRange rang
   // Per pixel: two images of 1 byte, and the labels and runs of the speckle filter (16 bytes).
   return std::max(matching::CoarseToFineMatcher::memory_bytes(size, range, threads),
                   matching::BlockMatcher::memory_bytes(size, threads)) +
-         matching::SubpixelRefinement::memory_bytes(size, threads) + std::int64_t{18} * size.width * size.height;
+         matching::SubpixelRefinement::memory_bytes(size, threads) + matching::TextureSupport::memory_bytes(size) +
+         std::int64_t{18} * size.width * size.height;
 }
 
 Status DisparityComputer::check_memory(ImageSize size, DisparityRange range, int threads, std::int64_t most_bytes) {

@@ -241,6 +241,21 @@ void fit_row(const FitRow& r) {
   }
 }
 
+void gradient_variance_row(const GradientVarianceRow& r) {
+  const Floats d;
+  for (int x = 0; x < r.width; x += static_cast<int>(hn::Lanes(d))) {
+    const auto sum = [&](FitSum which) HWY_ATTR { return window_sum(r.columns[which] + x); };
+    const auto each = hn::Div(constant(1), hn::Max(sum(kN), constant(1)));
+    const auto variance = [&](FitSum squares, FitSum values) HWY_ATTR {
+      const auto mean = hn::Mul(sum(values), hn::Mul(each, constant(1.0F / 8)));
+      const auto square = hn::Mul(sum(squares), hn::Mul(each, constant(1.0F / 64)));
+      return hn::Max(hn::Sub(square, hn::Mul(mean, mean)), hn::Zero(d));
+    };
+    hn::StoreU(variance(kGG, kG), d, r.mean + x);
+    hn::StoreU(variance(kQQ, kQ), d, r.difference + x);
+  }
+}
+
 void relief_row(const ReliefRow& r) {
   const Floats d;
   const auto one = constant(1);
@@ -328,14 +343,15 @@ HWY_EXPORT(smooth_row);
 HWY_EXPORT(warp_row);
 HWY_EXPORT(update_columns);
 HWY_EXPORT(fit_row);
+HWY_EXPORT(gradient_variance_row);
 HWY_EXPORT(relief_row);
 HWY_EXPORT(reliability_row);
 
 RefinementKernels refinement_kernels_for(std::size_t target_index) {
-  return {HWY_DISPATCH_TABLE(median_row)[target_index],     HWY_DISPATCH_TABLE(smooth_row)[target_index],
-          HWY_DISPATCH_TABLE(warp_row)[target_index],       HWY_DISPATCH_TABLE(update_columns)[target_index],
-          HWY_DISPATCH_TABLE(fit_row)[target_index],        HWY_DISPATCH_TABLE(relief_row)[target_index],
-          HWY_DISPATCH_TABLE(reliability_row)[target_index]};
+  return {HWY_DISPATCH_TABLE(median_row)[target_index], HWY_DISPATCH_TABLE(smooth_row)[target_index],
+          HWY_DISPATCH_TABLE(warp_row)[target_index],   HWY_DISPATCH_TABLE(update_columns)[target_index],
+          HWY_DISPATCH_TABLE(fit_row)[target_index],    HWY_DISPATCH_TABLE(gradient_variance_row)[target_index],
+          HWY_DISPATCH_TABLE(relief_row)[target_index], HWY_DISPATCH_TABLE(reliability_row)[target_index]};
 }
 
 }  // namespace spartan::internal::matching

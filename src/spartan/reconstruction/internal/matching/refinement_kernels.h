@@ -73,6 +73,15 @@ struct FitRow {
   float least_correlation;
 };
 
+/// Variances of the gradients in the windows of the fit around the pixels of a row: of the mean g of both images, and
+/// of half of their difference q, (gray levels per pixel)². Texture is in g, noise is in both.
+struct GradientVarianceRow {
+  std::array<const std::int32_t*, kFitSums> columns;  ///< As those of FitRow.
+  float* mean;                                        ///< var(g)
+  float* difference;                                  ///< var(q)
+  int width;
+};
+
 /// Median of the 3×3 pixels around the pixels 1 … width − 2 of a row; NaN where one of the nine is NaN. Reads and
 /// writes the row's own pixels only. Returns whether there is a NaN.
 struct MedianRow {
@@ -123,6 +132,7 @@ struct RefinementKernels {
   void (*warp_row)(const WarpRow&);
   void (*update_columns)(const ColumnUpdate&);
   void (*fit_row)(const FitRow&);
+  void (*gradient_variance_row)(const GradientVarianceRow&);
   void (*relief_row)(const ReliefRow&);
   void (*reliability_row)(const ReliabilityRow&);
 };

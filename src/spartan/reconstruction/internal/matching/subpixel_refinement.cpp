@@ -1,6 +1,7 @@
 #include "spartan/reconstruction/internal/matching/subpixel_refinement.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -45,6 +46,9 @@ void SubpixelRefinement::resize(ImageSize size) {
   for (Image<float>& image : disparity_) image = Image<float>(wide, h, kUnknown);
   for (Image<float>& image : information_) image = Image<float>(wide, h);
   textured_ = Image<std::uint8_t>(w + kRowPadding, h);
+  const auto samples = [](int pixels) { return (pixels + kGradientStep - 1) / kGradientStep; };
+  mean_gradient_ = Image<float>(samples(w), samples(h));
+  gradient_difference_ = Image<float>(samples(w), samples(h));
   no_disparity_ = Image<float>(wide, 1, kUnknown);
   no_information_ = Image<float>(wide, 1);
   size_ = size;
@@ -93,6 +97,21 @@ void SubpixelRefinement::measure_relief() {
   });
 }
 
+void SubpixelRefinement::sample_gradients(int row, const std::array<const std::int32_t*, kFitSums>& columns,
+                                          std::vector<float>& buffer) {
+  const auto stride = static_cast<std::size_t>(size_.width + kRowPadding);
+  buffer.resize(std::max(buffer.size(), 2 * stride));
+  const GradientVarianceRow all{columns, buffer.data(), buffer.data() + stride, size_.width};
+  kernels_.gradient_variance_row(all);
+  const int to = row / kGradientStep;
+  for (int i = 0; i < mean_gradient_.width(); ++i) {
+    const int x = std::min(kGradientStep * i + kGradientStep / 2, size_.width - 1);
+    const bool known = !std::isnan(disparity_[0].row(row)[kPad + x]);
+    mean_gradient_(i, to) = known ? all.mean[x] : kUnknown;
+    gradient_difference_(i, to) = known ? all.difference[x] : kUnknown;
+  }
+}
+
 void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
   const auto stride = static_cast<std::size_t>(size_.width + kRowPadding);
   const std::size_t column_stride = stride + 2 * kFitRadius;
@@ -139,6 +158,10 @@ void SubpixelRefinement::fit_rows(int from, int to, FitBuffers& b) {
     for (std::int32_t* const column : update.columns) std::fill_n(column + size_.width, kRowPadding / 4, 0);
     const int centre = y - kFitRadius;
     if (centre < from) continue;
+    // The last row of samples may have its centre below the image.
+    const int cell = centre / kGradientStep * kGradientStep;
+    if (centre == std::min(cell + kGradientStep / 2, size_.height - 1))
+      sample_gradients(centre, fit.columns, b.gradients);
     std::copy_n(disparity_[0].row(centre), disparity_[0].width(), disparity_[1].row(centre));
     fit.disparity = disparity_[1].row(centre) + kPad;
     fit.information = information_[1].row(centre) + kPad;
@@ -184,15 +207,18 @@ void SubpixelRefinement::refine(ImageView<const std::uint8_t> left, ImageView<co
 std::int64_t SubpixelRefinement::memory_bytes(ImageSize size, int threads) {
   const std::int64_t w = size.width, h = size.height;
   const std::int64_t images = h * (3 * (w + 3 * kRowPadding) + 4 * 4 * (w + 2 * kPad + kRowPadding));
-  const std::int64_t rows = (2 * std::int64_t{kFitRows} * kWindow + 4 * kFitSums) * (w + kRowPadding + 2 * kFitRadius);
-  return images + threads * rows;
+  const std::int64_t grid = 2 * 4 * (w / kGradientStep + kRowPadding) * (h / kGradientStep + 1);
+  const std::int64_t rows =
+      (2 * std::int64_t{kFitRows} * kWindow + 4 * kFitSums + 8) * (w + kRowPadding + 2 * kFitRadius);
+  return images + grid + threads * rows;
 }
 
 std::size_t SubpixelRefinement::buffer_bytes() const {
-  std::size_t total = bytes_of(left_) + bytes_of(right_) + bytes_of(textured_);
+  std::size_t total = bytes_of(left_) + bytes_of(right_) + bytes_of(textured_) + bytes_of(mean_gradient_) +
+                      bytes_of(gradient_difference_);
   for (const Image<float>& image : disparity_) total += bytes_of(image);
   for (const Image<float>& image : information_) total += bytes_of(image);
-  for (const FitBuffers& b : buffers_) total += 2 * b.rows.size() + 4 * b.columns.size();
+  for (const FitBuffers& b : buffers_) total += 2 * b.rows.size() + 4 * (b.columns.size() + b.gradients.size());
   return total;
 }
 

@@ -12,6 +12,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/reconstruction/internal/matching/refinement_kernels.h"
 #include "spartan/reconstruction/internal/matching/row_padding.h"
+#include "spartan/reconstruction/internal/matching/texture_support.h"
 
 namespace spartan::internal::matching {
 
@@ -36,6 +37,8 @@ class SubpixelRefinement {
   ImageView<float> relief() { return padded(information_[1]); }
   /// Of the last call: 1 where the window of the fit has texture, else 0.
   ImageView<std::uint8_t> textured() { return textured_.view().crop(0, 0, size_.width, size_.height); }
+  /// Of the last call: variances of the gradients, sampled.
+  GradientVariances gradients() const { return {mean_gradient_, gradient_difference_}; }
   std::size_t buffer_bytes() const;
   /// An upper bound of buffer_bytes().
   static std::int64_t memory_bytes(ImageSize size, int threads);
@@ -45,6 +48,7 @@ class SubpixelRefinement {
   struct FitBuffers {
     std::vector<std::int16_t> rows;
     std::vector<std::int32_t> columns;
+    std::vector<float> gradients;
   };
   struct Smoothing {
     int step;
@@ -58,6 +62,7 @@ class SubpixelRefinement {
   void smooth(const Smoothing& by);
   void measure_relief();
   void fit(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right);
+  void sample_gradients(int row, const std::array<const std::int32_t*, kFitSums>& columns, std::vector<float>& buffer);
   void fit_rows(int from, int to, FitBuffers& buffers);
 
   RefinementKernels kernels_;
@@ -66,7 +71,8 @@ class SubpixelRefinement {
   Image<std::uint8_t> left_, right_;                     // with replicated columns on both sides
   std::array<Image<float>, 2> disparity_, information_;  // current and next (in the end: relief)
   Image<std::uint8_t> textured_;
-  Image<float> no_disparity_, no_information_;  // a row outside of the image
+  Image<float> mean_gradient_, gradient_difference_;  // variances
+  Image<float> no_disparity_, no_information_;        // a row outside of the image
   std::vector<FitBuffers> buffers_;
 };
 

@@ -243,6 +243,38 @@ TEST(SubpixelRefinement, MeasuresTheRelief) {
   EXPECT_NEAR(refined.relief()(40, 40), 0.25 + 0.25 * 0.25, 1e-6) << "half a pixel where no pair is known";
 }
 
+TEST(SubpixelRefinement, SamplesTheGradients) {
+  // A ramp with noise in both images: var(g) − var(q) is 0, and var(q) that of noise,
+  // (σ²/2 + σ²/2)/4, less what the interpolation takes from the right image.
+  Random random(2);
+  PlanePair pair;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      pair.left(x, y) = gray(20 + x + random.normal(0, 3));
+      pair.right(x, y) = gray(29 + x + random.normal(0, 3));
+    }
+  }
+  SubpixelRefinement refined = refinement();
+  Image<float> disparity(kWidth, kHeight, 9.0F);
+  disparity(4 * 20 + 2, 4 * 10 + 2) = kUnknown;
+  refine(pair, refined, disparity);
+  const GradientVariances gradients = refined.gradients();
+  ASSERT_EQ(gradients.mean.size(), (ImageSize{38, 23}));
+  EXPECT_TRUE(std::isnan(gradients.mean(20, 10)) && std::isnan(gradients.difference(20, 10)));
+  double mean = 0, difference = 0;
+  int count = 0;
+  for (int y = 2; y < 21; ++y) {
+    for (int x = 5; x < 35; ++x) {
+      if (x == 20 && y == 10) continue;
+      mean += gradients.mean(x, y);
+      difference += gradients.difference(x, y);
+      ++count;
+    }
+  }
+  EXPECT_NEAR(difference / count, 9.0 / 4, 0.4);
+  EXPECT_NEAR(mean / count, 9.0 / 4, 0.4);
+}
+
 TEST(SubpixelRefinement, IsDeterministicOnEveryInstructionSetAndNumberOfThreads) {
   const Plane plane{.along_x = 0.05, .along_y = 0.2};
   const PlanePair pair = render(plane);
@@ -258,6 +290,12 @@ TEST(SubpixelRefinement, IsDeterministicOnEveryInstructionSetAndNumberOfThreads)
       values.insert(values.end(), disparity.row(y), disparity.row(y) + kWidth);
       for (int x = 0; x < kWidth; ++x) values.push_back(r.information()(x, y));
       for (int x = 0; x < kWidth; ++x) values.push_back(r.relief()(x, y));
+    }
+    for (int y = 0; y < r.gradients().mean.height(); ++y) {
+      for (int x = 0; x < r.gradients().mean.width(); ++x) {
+        values.push_back(r.gradients().mean(x, y));
+        values.push_back(r.gradients().difference(x, y));
+      }
     }
     return values;
   };
