@@ -3,11 +3,11 @@
 namespace spartan::internal::matching {
 
 int strip_rows(int height, std::int64_t costs_per_row) {
-  constexpr int kRows = 128;
+  constexpr int kRows = 96;
   constexpr std::int64_t kCosts = 16'000'000;
   const auto wanted =
       static_cast<int>(std::clamp<std::int64_t>(kCosts / std::max<std::int64_t>(1, costs_per_row), 64, kRows));
-  const int strips = std::max(2, (height + wanted / 2) / wanted);
+  const int strips = 2 * std::max(1, (height + wanted) / (2 * wanted));
   const int rows = (height + strips - 1) / strips;
   return std::max(64, (rows + kTile - 1) / kTile * kTile);
 }
