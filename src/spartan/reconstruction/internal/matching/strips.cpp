@@ -3,7 +3,7 @@
 namespace spartan::internal::matching {
 
 int strip_rows(int height, std::int64_t costs_per_row) {
-  constexpr int kRows = 96;
+  constexpr int kRows = 128;
   constexpr std::int64_t kCosts = 16'000'000;
   const auto wanted =
       static_cast<int>(std::clamp<std::int64_t>(kCosts / std::max<std::int64_t>(1, costs_per_row), 64, kRows));

@@ -20,7 +20,7 @@ namespace spartan::internal::matching {
 inline constexpr int kStripMargin = 24;
 inline constexpr int kDirections = 3;  ///< Paths of a sweep from the row before: from x − 1, x, x + 1.
 
-/// Rows of a strip, a multiple of the tile: about 96, fewer where a row has so many costs that the strip would exceed
+/// Rows of a strip, a multiple of the tile: about 128, fewer where a row has so many costs that the strip would exceed
 /// about 16 million. The number of strips is even where the image has enough rows, so that two threads have as much to
 /// do.
 int strip_rows(int height, std::int64_t costs_per_row);
