@@ -113,7 +113,7 @@ struct Odometer::State {
     std::optional<Pose> object;   ///< its motion, where it is known
   };
   CoarseMotion coarse_motion(const StereoImages& images, const Pose& predicted);
-  bool is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest) const;
+  bool is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest);
   std::vector<LandmarkMatch> discard_object(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
                                             const Pose& scene, const Pose& object);
   void add_noise_floor(std::vector<LandmarkMatch>& matches) const;
@@ -239,7 +239,7 @@ Odometer::State::CoarseMotion Odometer::State::coarse_motion(const StereoImages&
 
 /// Whether a rival consists of wrong matches: then far fewer landmarks have their patches where it predicts them than
 /// where the largest set does.
-bool Odometer::State::is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest) const {
+bool Odometer::State::is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest) {
   if (!options.matching.correlation) return false;
   const auto inliers = [&](const Pose& motion) {
     std::vector<LandmarkMatch> matches = matching.by_correlation(memory.map, images, motion.inverse());

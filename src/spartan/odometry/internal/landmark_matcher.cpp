@@ -143,21 +143,21 @@ std::optional<LandmarkMatch> LandmarkMatcher::correlate(const LandmarkMemory& me
 }
 
 std::vector<LandmarkMatch> LandmarkMatcher::collect(
-    std::size_t count, const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) const {
-  std::vector<std::optional<LandmarkMatch>> found(count);
+    std::size_t count, const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) {
+  found_.assign(count, std::nullopt);
   workers_.parallel_for(0, static_cast<int>(count), kLandmarksPerPart, [&](int begin, int end) {
-    for (int i = begin; i < end; ++i) found[static_cast<std::size_t>(i)] = measure(static_cast<std::size_t>(i));
+    for (int i = begin; i < end; ++i) found_[static_cast<std::size_t>(i)] = measure(static_cast<std::size_t>(i));
   });
   std::vector<LandmarkMatch> matches;
   matches.reserve(count);
-  for (const auto& match : found)
+  for (const auto& match : found_)
     if (match) matches.push_back(*match);
   return matches;
 }
 
 std::vector<LandmarkMatch> LandmarkMatcher::by_pyramid(const LandmarkMemory& memory, const StereoImages& images,
                                                        const ImagePyramid& latest, const ImagePyramid& current,
-                                                       const Pose& current_from_previous) const {
+                                                       const Pose& current_from_previous) {
   const std::size_t all = memory.landmarks.size(), count = std::min(all, kPyramidLandmarks);
   return collect(count, [&](std::size_t k) -> std::optional<LandmarkMatch> {
     const std::size_t index = k * all / count;
@@ -178,7 +178,7 @@ std::vector<LandmarkMatch> LandmarkMatcher::by_pyramid(const LandmarkMemory& mem
 }
 
 std::vector<LandmarkMatch> LandmarkMatcher::by_correlation(const LandmarkMemory& memory, const StereoImages& images,
-                                                           const Pose& current_from_previous) const {
+                                                           const Pose& current_from_previous) {
   return collect(memory.landmarks.size(),
                  [&](std::size_t index) { return correlate(memory, index, images, current_from_previous); });
 }

@@ -42,12 +42,12 @@ class LandmarkMatcher {
   /// the pyramids of the latest and the current image, then measured as by_correlation() does.
   std::vector<LandmarkMatch> by_pyramid(const LandmarkMemory& memory, const StereoImages& images,
                                         const ImagePyramid& latest, const ImagePyramid& current,
-                                        const Pose& current_from_previous) const;
+                                        const Pose& current_from_previous);
 
   /// Measures each landmark: its patch, warped by the predicted geometry, is aligned with the left image, and its
   /// disparity is searched near the predicted one. `current_from_previous` must be accurate to a few pixels.
   std::vector<LandmarkMatch> by_correlation(const LandmarkMemory& memory, const StereoImages& images,
-                                            const Pose& current_from_previous) const;
+                                            const Pose& current_from_previous);
 
  private:
   /// `start_px`: where the landmark is, to a few pixels; without it where the motion predicts it.
@@ -55,10 +55,11 @@ class LandmarkMatcher {
                                          const Pose& current_from_previous,
                                          const std::optional<Eigen::Vector2d>& start_px = {}) const;
   std::vector<LandmarkMatch> collect(std::size_t count,
-                                     const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure) const;
+                                     const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure);
   LandmarkMatchingOptions options_;
   LandmarkReconstructor reconstruction_;
   ThreadPool workers_;
+  std::vector<std::optional<LandmarkMatch>> found_;  // of each landmark; kept, so that its memory is
 };
 
 /// Rigidity check: discards matches whose 3D distances to most of their partners have changed by more than the noise
