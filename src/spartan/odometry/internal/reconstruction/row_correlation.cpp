@@ -55,7 +55,7 @@ HWY_INLINE hn::Vec<Lanes> window_sum(const std::int32_t* columns) {
 void correlate_block(const SoughtWindow& sought, CorrelationBlock& block) {
   const Lanes d;
   const hn::Rebind<std::uint8_t, Lanes> bytes;
-  const hn::Repartition<std::int16_t, Lanes> halves;
+  [[maybe_unused]] const hn::Repartition<std::int16_t, Lanes> halves;
   const hn::RebindToFloat<Lanes> floats;
   const int lanes = static_cast<int>(hn::Lanes(d));
   HWY_ALIGN std::int32_t sums[kBlockColumns + 16] = {}, squares[kBlockColumns + 16] = {};
