@@ -42,17 +42,26 @@ void Pipeline::State::start(const RectifiedPair& rectified) {
   started = true;
 }
 
-void Pipeline::State::advance(const MotionEstimate& motion) {
+// The motion of the left camera since the last frame, from the rover's velocity and the angles of the mast. Empty for a
+// pair that is fixed to the body: the odometry predicts its motion itself.
+std::optional<Pose> Pipeline::State::predicted_motion(const RectifiedPair& rectified) const {
+  if (!started || rig.find_camera(pair.left)->mount == "body") return std::nullopt;
+  const double seconds = seconds_between(last_stamp, rectified.stamp);
+  return left_from_body * exp_se3(velocity * seconds) * rectified.body_from_left;
+}
+
+void Pipeline::State::advance(const MotionEstimate& motion, const RelativeMotion& body_motion) {
   world_from_left = world_from_left * motion.previous_from_current;
   distance_m += motion.previous_from_current.translation().norm();
   const double seconds = seconds_between(motion.from, motion.to);
-  if (seconds > 0) velocity = log_se3(motion.previous_from_current) / seconds;
+  if (seconds > 0) velocity = log_se3(body_motion.previous_from_current) / seconds;
 }
 
-// Transports the motion M of the left camera to the body, with B = body_from_left:
-// B M Exp(ξ) B⁻¹ = (B M B⁻¹) Exp(Ad_B ξ), so the covariance becomes Ad_B Σ Ad_Bᵀ.
-RelativeMotion Pipeline::State::body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const {
-  const Pose& body_from_left = rectified.body_from_left;
+// Transports the motion M of the left camera to the body, with B₀ and B₁ = body_from_left at its begin and end, which
+// differ where the mast has moved: B₀ M Exp(ξ) B₁⁻¹ = (B₀ M B₁⁻¹) Exp(Ad_B₁ ξ), so the covariance becomes
+// Ad_B₁ Σ Ad_B₁ᵀ.
+RelativeMotion Pipeline::State::body_motion(const Pose& last_body_from_left, const Pose& body_from_left,
+                                            const MotionEstimate& motion) const {
   const Matrix6d ad = adjoint(body_from_left);
   RelativeMotion result;
   result.from = motion.from;
@@ -60,7 +69,7 @@ RelativeMotion Pipeline::State::body_motion(const RectifiedPair& rectified, cons
   result.measured = motion.status != TrackingStatus::lost;
   // The exact identity marks a stationary rover.
   if (motion.status != TrackingStatus::stationary)
-    result.previous_from_current = body_from_left * motion.previous_from_current * body_from_left.inverse();
+    result.previous_from_current = last_body_from_left * motion.previous_from_current * body_from_left.inverse();
   result.covariance = ad * motion.covariance * ad.transpose();
   return result;
 }
@@ -197,13 +206,15 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     return failure(status);
   }
   s.frozen_cameras.remember(pair_index, images);
+  const std::optional<Pose> predicted = s.predicted_motion(*rectified);
+  const Pose last_body_from_left = s.started ? s.left_from_body.inverse() : rectified->body_from_left;
   if (!s.started) s.start(*rectified);
+  result.motion =
+      s.clock.measure("odometry", [&] { return s.odometer.add(*rectified, predicted, disparity->disparity); });
+  const RelativeMotion body_motion = s.body_motion(last_body_from_left, rectified->body_from_left, result.motion);
   s.left_from_body = rectified->body_from_left.inverse();
-
-  result.motion = s.clock.measure("odometry", [&] { return s.odometer.add(*rectified, {}, disparity->disparity); });
-  const RelativeMotion body_motion = s.body_motion(*rectified, result.motion);
   if (!result.motion.first) {
-    s.advance(result.motion);
+    s.advance(result.motion, body_motion);
     if (s.options.odometry_only) s.dead_reckoning.add(body_motion);
   }
   if (!s.options.odometry_only) {
@@ -248,7 +259,7 @@ std::optional<Pose> Pipeline::predict(Stamp stamp) const {
   const State& s = *state_;
   if (!s.started) return std::nullopt;
   const double seconds = seconds_between(s.last_stamp, stamp);
-  return s.world_from_left * exp_se3(s.velocity * seconds) * s.left_from_body;
+  return s.world_from_left * s.left_from_body * exp_se3(s.velocity * seconds);
 }
 
 Result<std::optional<MappedStop>> Pipeline::finish_stop() {

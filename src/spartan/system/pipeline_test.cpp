@@ -99,6 +99,38 @@ TEST(Pipeline, TracksMotionFromImagesInMemory) {
   EXPECT_FALSE(pipeline.gravity_measured());
 }
 
+// The pair of the odometry on a mast that pans while the rover drives. Its angles must not end up in the rover's
+// motion.
+TEST(Pipeline, TracksMotionWithAPanningMast) {
+  Rig rig = rover();
+  PanTiltUnit mast;
+  mast.body_from_base = Pose::from_translation({0.1, 0, kHeight_m});
+  rig.pan_tilt_units = {mast};
+  for (Camera& camera : rig.cameras) {
+    camera.mount = mast.name;
+    camera.mount_from_camera = mast.body_from_base.inverse() * camera.mount_from_camera;
+  }
+  const testing::SyntheticWorld world(testing::SyntheticWorldOptions{});
+  Pipeline pipeline = Pipeline::create(rig, {}, ThreadPool(1)).value();
+  const std::vector<double> pan_rad{0, 0.1, -0.1, 0.25, 0.25};
+  for (std::size_t i = 0; i < pan_rad.size(); ++i) {
+    const int index = static_cast<int>(i);
+    const Pose world_from_left = world_from_body(index) * rig.body_from_camera("left", pan_rad[i], 0);
+    const SyntheticFrame images = world.render(kStereo, world_from_left, i);
+    StereoFrame frame = frame_of(index);
+    frame.pan_rad = pan_rad[i];
+    frame.left = FrameImage::borrow(images.left.view(), {});
+    frame.right = FrameImage::borrow(images.right.view(), {});
+    const FrameResult result = pipeline.add(frame).value().value();
+    if (i == 0) continue;
+    EXPECT_EQ(result.motion.status, TrackingStatus::tracking) << i << ": " << result.motion.reason;
+    for (const Pose& pose : {result.world_from_body.pose, result.localization->world_from_body.pose}) {
+      EXPECT_LT((pose.translation() - world_from_body(index).translation()).norm(), 0.003) << i;
+      EXPECT_LT(log_so3(pose.rotation()).norm(), 0.005) << i;
+    }
+  }
+}
+
 TEST(Pipeline, FirstFrameHasTerrain) {
   Pipeline pipeline = pipeline_of();
   const FrameResult first = push(pipeline, 0);

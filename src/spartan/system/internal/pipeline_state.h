@@ -71,9 +71,9 @@ struct Pipeline::State {
   // State from frame to frame.
   bool started = false;
   Stamp last_stamp;
-  Pose world_from_left;  // by odometry alone
-  Pose left_from_body;
-  Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the left frame, per second
+  Pose world_from_left;                  // by odometry alone
+  Pose left_from_body;                   // of the last frame
+  Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the body frame, per second
   double distance_m = 0;
   double distance_of_last_terrain_m = -1;
 
@@ -81,8 +81,10 @@ struct Pipeline::State {
   Status check_new(const StereoFrame& frame, std::size_t pair_index,
                    const internal::FrozenCameras::Fingerprints& images) const;
   void start(const RectifiedPair& rectified);
-  void advance(const MotionEstimate& motion);
-  RelativeMotion body_motion(const RectifiedPair& rectified, const MotionEstimate& motion) const;
+  std::optional<Pose> predicted_motion(const RectifiedPair& rectified) const;
+  void advance(const MotionEstimate& motion, const RelativeMotion& body_motion);
+  RelativeMotion body_motion(const Pose& last_body_from_left, const Pose& body_from_left,
+                             const MotionEstimate& motion) const;
   void add_sensor_sample(const Measurement& sample);
   void localize(const RelativeMotion& motion);
   Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
