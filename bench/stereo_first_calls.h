@@ -43,7 +43,10 @@ inline void compare_first_calls(const std::string& recordings, int disparities, 
           fmt::format("'{}' {} {} {} --from '{}'", program, kFirstCall, matcher, disparities, recordings);
       const std::unique_ptr<FILE, int (*)(FILE*)> output(popen(command.c_str(), "r"), pclose);
       double ms = 0;
-      if (output == nullptr || std::fscanf(output.get(), "%lf", &ms) != 1) return;
+      if (output == nullptr || std::fscanf(output.get(), "%lf", &ms) != 1) {
+        fmt::print("\nno first calls: {} failed\n", command);
+        return;
+      }
       times[matcher].push_back(ms);
     }
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 
 namespace spartan::internal::matching {
 namespace {
@@ -69,45 +70,39 @@ bool is_near_mark(ImageView<const std::uint8_t> left, ImageView<const std::uint8
 
 }  // namespace
 
-void TextureSupport::weigh(const GradientVariances& gradients, float noise) {
+// w · (correlation − least) of each cell.
+void TextureSupport::score(const GradientVariances& gradients, float noise) {
   const auto [w, h] = gradients.mean.size();
-  const std::size_t count = static_cast<std::size_t>(w) * static_cast<std::size_t>(h);
-  weight_.resize(count);
-  correlation_.resize(count);
+  scores_.resize(static_cast<std::size_t>(w) * static_cast<std::size_t>(h));
   std::size_t i = 0;
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x, ++i) {
       const float mean = gradients.mean(x, y), difference = gradients.difference(x, y);
-      const float both = mean + difference + kLeastGradient2;
-      const float share = std::min(1.0F, 2 * noise / both);
-      weight_[i] = std::isnan(mean) ? 0 : share * share;
-      correlation_[i] = std::isnan(mean) ? 0 : share * share * (mean - difference) / both;
+      const float both = mean + difference + kLeastGradient2, share = std::min(1.0F, 2 * noise / both);
+      const float weight = share * share;
+      scores_[i] = std::isnan(mean) ? 0 : weight * (mean - difference) / both - kLeastSupport * weight;
     }
   }
 }
 
-// Σ (w · correlation − least · w) over the surroundings of each cell, first of columns, then of rows.
+// Whether there is a cell whose scores around it sum up to less than 0, first those of columns, then of rows.
 bool TextureSupport::find_unsupported(ImageSize cells) {
   const auto w = static_cast<std::size_t>(cells.width);
-  for (std::size_t i = 0; i < weight_.size(); ++i) correlation_[i] -= kLeastSupport * weight_[i];
-  // The weights are of no more use: their place is taken by the sums.
   bool any = false;
-  unsupported_.resize(weight_.size());
+  unsupported_.resize(scores_.size());
   for (int y = 0; y < cells.height; ++y) {
-    float* const sum = weight_.data() + static_cast<std::size_t>(y) * w;
-    std::fill_n(sum, w, 0.0F);
+    columns_.assign(w, 0);
     const int last = std::min(y + kSurroundings, cells.height - 1);
     for (int v = std::max(0, y - kSurroundings); v <= last; ++v) {
-      const float* const from = correlation_.data() + static_cast<std::size_t>(v) * w;
-      for (std::size_t x = 0; x < w; ++x) sum[x] += from[x];
+      const float* const from = scores_.data() + static_cast<std::size_t>(v) * w;
+      for (std::size_t x = 0; x < w; ++x) columns_[x] += from[x];
     }
     std::uint8_t* const to = unsupported_.data() + static_cast<std::size_t>(y) * w;
     for (int x = 0; x < cells.width; ++x) {
-      float all = 0;
-      const int right = std::min(x + kSurroundings, cells.width - 1);
-      for (int u = std::max(0, x - kSurroundings); u <= right; ++u) all += sum[u];
-      to[x] = all < 0 ? 1 : 0;
-      any |= all < 0;
+      const auto first = columns_.begin() + std::max(0, x - kSurroundings),
+                 end = columns_.begin() + std::min(x + kSurroundings + 1, cells.width);
+      to[x] = std::accumulate(first, end, 0.0F) < 0 ? 1 : 0;
+      any |= to[x] != 0;
     }
   }
   return any;
@@ -125,7 +120,7 @@ void TextureSupport::assess(const GradientVariances& gradients, ImageView<const 
   }
   if (samples_.empty()) return;
   const float noise2 = std::max(kLeastNoise2, lower_quartile(samples_));
-  weigh(gradients, noise2);
+  score(gradients, noise2);
   if (!find_unsupported({w, h})) return;
   constexpr int kSide = 2 * kFlatRadius + 1;
   const float most_contrast = kFlatContrast * noise2 * (kSide * kSide),
@@ -164,7 +159,7 @@ void TextureSupport::assess(const GradientVariances& gradients, ImageView<const 
 }
 
 std::size_t TextureSupport::buffer_bytes() const {
-  return sizeof(float) * (samples_.capacity() + weight_.capacity() + correlation_.capacity()) + unsupported_.capacity();
+  return sizeof(float) * (samples_.capacity() + scores_.capacity() + columns_.capacity()) + unsupported_.capacity();
 }
 
 std::int64_t TextureSupport::memory_bytes(ImageSize size) {

@@ -37,12 +37,12 @@ class TextureSupport {
   static std::int64_t memory_bytes(ImageSize size);
 
  private:
-  void weigh(const GradientVariances& gradients, float noise);
+  void score(const GradientVariances& gradients, float noise);
   bool find_unsupported(ImageSize cells);
 
-  std::vector<float> samples_;               // of var(q)
-  std::vector<float> weight_, correlation_;  // w and w · correlation of the cells
-  std::vector<std::uint8_t> unsupported_;    // cells: 1 or 0
+  std::vector<float> samples_;             // of var(q)
+  std::vector<float> scores_, columns_;    // of the cells, and sums of their columns
+  std::vector<std::uint8_t> unsupported_;  // cells: 1 or 0
 };
 
 }  // namespace spartan::internal::matching
