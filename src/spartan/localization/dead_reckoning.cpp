@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "spartan/localization/localizer.h"
@@ -6,7 +7,7 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr int kDrift = 6, kConstant = 12;  // where z₁ and z₂ begin
 /// As the filter has it: what stays for a drive falls to 1/e after so many frames.
 constexpr double kConstantSteps = 5000;
@@ -31,6 +32,7 @@ DeadReckoning::DeadReckoning(const VisionOptions& options)
       constant_sigma_ratios_(six_of(options.constant_sigma_ratios)) {
   covariance_.diagonal().segment<6>(kDrift) = drift_sigma_ratios_.cwiseAbs2();
   covariance_.diagonal().segment<6>(kConstant) = constant_sigma_ratios_.cwiseAbs2();
+  at_reference_ = covariance_;
 }
 
 void DeadReckoning::age(int index, const Vector6d& sigmas, double steps) {
@@ -41,6 +43,11 @@ void DeadReckoning::age(int index, const Vector6d& sigmas, double steps) {
 }
 
 void DeadReckoning::add(const RelativeMotion& motion) {
+  // Landmarks of a lost frame may be the only ones that are found again.
+  if (motion.from != reference_ && motion.from == latest_) at_reference_ = covariance_;
+  reference_ = motion.from;
+  latest_ = motion.to;
+  covariance_ = at_reference_;
   const Pose& moved = motion.previous_from_current;
   // The exact identity says that the rover is stationary: lasting errors have no part in it.
   const bool stationary = moved.translation().isZero(1e-12) && moved.rotation().vec().isZero(1e-12);
@@ -60,12 +67,18 @@ void DeadReckoning::add(const RelativeMotion& motion) {
   covariance_ = 0.5 * (propagated + propagated.transpose());
   covariance_.topLeftCorner<6, 6>() +=
       0.5 * (motion.measured ? white_noise_factor_ : 1.0) * (motion.covariance + motion.covariance.transpose());
+  if (motion.keeps_reference) return;
+  at_reference_ = covariance_;
+  reference_ = latest_;
 }
 
 Bytes DeadReckoning::save() const {
   ArchiveWriter out;
   out.put(kVersion);
-  out.put_array(covariance_.data(), static_cast<std::size_t>(covariance_.size()));
+  for (const Covariance* covariance : {&covariance_, &at_reference_})
+    out.put_array(covariance->data(), static_cast<std::size_t>(covariance->size()));
+  out.put(reference_.ns);
+  out.put(latest_.ns);
   return out.take();
 }
 
@@ -73,12 +86,18 @@ Status DeadReckoning::restore(const Bytes& bytes) {
   ArchiveReader in(bytes);
   const std::string what = "saved state of the dead reckoning";
   if (Status s = in.expect_version(kVersion, what); !s) return s;
-  const auto values = in.get_array<double>();
+  const std::array<std::vector<double>, 2> values{in.get_array<double>(), in.get_array<double>()};
+  const Stamp reference = in.get_stamp(), latest = in.get_stamp();
   if (Status s = in.finish(what); !s) return s;
-  const bool finite = std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-  if (!finite || values.size() != static_cast<std::size_t>(covariance_.size()))
-    return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
-  covariance_ = Eigen::Map<const Covariance>(values.data());
+  for (const std::vector<double>& of : values) {
+    const bool finite = std::all_of(of.begin(), of.end(), [](double value) { return std::isfinite(value); });
+    if (!finite || of.size() != static_cast<std::size_t>(covariance_.size()))
+      return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
+  }
+  covariance_ = Eigen::Map<const Covariance>(values[0].data());
+  at_reference_ = Eigen::Map<const Covariance>(values[1].data());
+  reference_ = reference;
+  latest_ = latest;
   return {};
 }
 

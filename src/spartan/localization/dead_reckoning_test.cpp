@@ -59,6 +59,32 @@ TEST(DeadReckoning, LastingErrorsHaveNoPartWhereTheRoverIsStationaryOrVisionIsLo
   }
 }
 
+// A motion over a lost frame, from the frame before it: the lost motion has no part in it.
+TEST(DeadReckoning, ALostMotionThatKeepsItsReferenceCostsNothing) {
+  RelativeMotion before, lost, after;
+  before.from = test_stamp(0);
+  before.to = lost.from = after.from = test_stamp(1);
+  lost.to = test_stamp(2);
+  after.to = test_stamp(3);
+  before.covariance = after.covariance = test_motion_covariance();
+  lost.covariance = Matrix6d::Identity();
+  lost.measured = false;
+  lost.keeps_reference = true;
+  const VisionOptions options;
+  DeadReckoning with = DeadReckoning::create(options).value(), without = with, from_lost = with;
+  for (DeadReckoning* each : {&with, &without, &from_lost}) each->add(before);
+  with.add(lost);
+  EXPECT_GT(with.covariance().diagonal().minCoeff(), 0.9);
+  with.add(after);
+  without.add(after);
+  EXPECT_TRUE(with.covariance().isApprox(without.covariance(), 1e-12));
+  // A motion from the lost frame adds to its uncertainty.
+  from_lost.add(lost);
+  after.from = lost.to;
+  from_lost.add(after);
+  EXPECT_GT(from_lost.covariance().diagonal().minCoeff(), 0.9);
+}
+
 TEST(DeadReckoning, GoesOnFromRestoredMemory) {
   const TestDrive drive;
   const VisionOptions options;

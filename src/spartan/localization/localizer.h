@@ -28,6 +28,7 @@ struct RelativeMotion {
   Pose previous_from_current;              ///< body frames; the exact identity means a stationary rover
   Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²
   bool measured = true;                    ///< false: tracking was lost, the motion is not used
+  bool keeps_reference = false;            ///< the next motion begins at `from`, too, not at `to`
 };
 
 /// The sensors that are monitored: whether one is used, and why not.
@@ -270,7 +271,7 @@ class DeadReckoning {
   /// Code `configuration` where an option is out of bounds.
   static Result<DeadReckoning> create(const VisionOptions& options);
 
-  /// The next motion; each begins where the last one ended.
+  /// The next motion. It begins where the last one ended, or where the last one began if that keeps its reference.
   void add(const RelativeMotion& motion);
   /// Of the right perturbation of the pose since the start, which is exact; order (translation, rotation).
   Matrix6d covariance() const { return covariance_.topLeftCorner<6, 6>(); }
@@ -289,6 +290,8 @@ class DeadReckoning {
   double white_noise_factor_, drift_correlation_frames_;
   Vector6d drift_sigma_ratios_ = Vector6d::Zero(), constant_sigma_ratios_ = Vector6d::Zero();
   Covariance covariance_ = Covariance::Zero();
+  Covariance at_reference_ = Covariance::Zero();  // where the next motion begins
+  Stamp reference_, latest_;
 };
 
 }  // namespace spartan

@@ -36,5 +36,30 @@ TEST(VisionOnlyFilter, ComposesTheMotionsInTheGivenWorld) {
   EXPECT_FALSE(other.restore({}));
 }
 
+// One frame is lost; the next motion begins at the frame before it.
+TEST(VisionOnlyFilter, ALostMotionThatKeepsItsReferenceCostsNothing) {
+  const TestDrive drive;
+  const LocalizationOptions options;
+  VisionOnlyFilter all = VisionOnlyFilter::create(options).value(), bridged = VisionOnlyFilter::create(options).value();
+  for (VisionOnlyFilter* each : {&all, &bridged}) each->start(test_stamp(2.5), drive.at(2.5));
+  const Matrix6d covariance = test_motion_covariance();
+  for (int i = 0; i < 20; ++i) {
+    const double from = 2.5 + i, to = from + 1;
+    EXPECT_TRUE(all.add(drive.motion(from, to, covariance)));
+    if (i == 10) {
+      RelativeMotion lost = drive.motion(from, to, Matrix6d::Identity());
+      lost.previous_from_current = lost.previous_from_current * Pose::from_translation({0.05, 0.02, 0});
+      lost.measured = false;
+      lost.keeps_reference = true;
+      EXPECT_TRUE(bridged.add(lost));
+    } else {
+      EXPECT_TRUE(bridged.add(drive.motion(i == 11 ? from - 1 : from, to, covariance)));
+    }
+  }
+  const UncertainPose pose = bridged.world_from_body();
+  EXPECT_LT(log_se3(pose.pose.inverse() * drive.at(22.5)).norm(), 1e-4);
+  EXPECT_LT(pose.covariance.trace(), 1.05 * all.world_from_body().covariance.trace());
+}
+
 }  // namespace
 }  // namespace spartan

@@ -57,7 +57,8 @@ void ErrorStateFilter::update(const RelativeMotion& motion) {
     }
   }
   end_step_at_frame(motion.to);
-  begin_frame(motion.to);
+  // The clone stays over frames that are lost, as the landmarks of the odometry do.
+  if (!consecutive || !motion.keeps_reference) begin_frame(motion.to);
 }
 
 /// Returns whether the motion was used.

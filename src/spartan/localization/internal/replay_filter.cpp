@@ -46,6 +46,7 @@ void put_measurement(ArchiveWriter& out, const Measurement& m) {
     out.put(motion->previous_from_current);
     out.put(motion->covariance);
     out.put(motion->measured);
+    out.put(motion->keeps_reference);
   } else if (const auto* wheels = std::get_if<WheelSample>(&m)) {
     out.put(wheels->left_m);
     out.put(wheels->right_m);
@@ -79,6 +80,7 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
       motion.previous_from_current = in.get_pose();
       motion.covariance = in.get_matrix6();
       motion.measured = in.get<bool>();
+      motion.keeps_reference = in.get<bool>();
       return motion;
     }
     case 2: {
