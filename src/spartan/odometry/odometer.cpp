@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "spartan/core/stage_clock.h"
+#include "spartan/odometry/internal/coarse_motion.h"
 #include "spartan/odometry/internal/detection/landmark_detector.h"
 #include "spartan/odometry/internal/landmark_manager.h"
 #include "spartan/odometry/internal/landmark_matcher.h"
@@ -23,19 +24,19 @@ namespace {
 
 /// Standard deviations of a motion that was not measured; larger than any motion between two frames of a rover.
 constexpr double kLostTranslation_m = 1.0, kLostRotation_rad = 0.5;
-/// With fewer inliers the coarse motion is replaced by the prediction; empirical.
-constexpr int kMinCoarseInliers = 10;
-/// With fewer inliers inside of the gates, the descriptors are matched over the whole image as well; empirical.
-constexpr int kSufficientCoarseInliers = 30;
-
 /// The latest motion is extrapolated to at most this many times its duration.
 constexpr double kMostSpans = 2;
+/// The reference is kept over so many frames that are lost though they have landmarks.
+constexpr int kMostLostFrames = 10;
+/// Wrong matches, uniformly distributed over the search radius r, have an rms of r/2 in each coordinate; a fit to few
+/// of them lowers it. Empirical.
+constexpr double kChanceRadiusFraction = 0.25;
+/// Wrong matches are not more than this fraction of the landmarks; empirical.
+constexpr double kChanceFraction = 0.1;
 /// Landmarks are added where more than this fraction of them is missing; empirical.
 constexpr double kMaxMissingFraction = 0.05;
 /// The prediction is kept over so many consecutive frames whose motion may be that of an object; empirical.
 constexpr int kMaxAmbiguousFrames = 3;
-/// The motion of the scene has at least this fraction of the inliers that an object has; empirical.
-constexpr double kMinSceneFraction = 0.5;
 /// A motion that this fraction of all landmarks follows is not that of an object; empirical.
 constexpr double kMinUndisputedFraction = 0.4;
 
@@ -80,6 +81,7 @@ struct Odometer::State {
         reconstruction(options.reconstruction),
         matching(options.matching, reconstruction, workers),
         estimation(options.motion),
+        coarse(options, *detector, matching, estimation, workers),
         manager(options) {}
 
   OdometryOptions options;
@@ -88,53 +90,62 @@ struct Odometer::State {
   LandmarkReconstructor reconstruction;
   LandmarkMatcher matching;
   MotionEstimator estimation;
+  CoarseMotionEstimator coarse;
   LandmarkManager manager;
   SmoothedImage left_smooth, right_smooth;
-  ImagePyramid pyramid;  ///< of the current left image
-  std::vector<ReconstructedFeature> features;
+  ImagePyramid pyramid, right_pyramid;  ///< of the current images; that of the right one where it is needed
   OdometerMemory memory;
 
   std::optional<std::string> defect_of(const RectifiedPair& pair) const;
-  Pose predict(Stamp now) const;
+  MotionPrediction predict(Stamp now) const;
   /// Whether the latest motion may be that of an object.
   bool keeps_prediction() const {
     return memory.ambiguous_frames > 0 && memory.ambiguous_frames <= kMaxAmbiguousFrames;
   }
   DisparityOffset predicted_offset() const;
-  void detect(const StereoImages& images);
-  void reconstruct(const StereoImages& images);
-  void add_landmarks(const StereoImages& images, MotionEstimate& estimate, Stopwatch& watch);
-  void measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate, Stopwatch& watch);
-  struct CoarseMotion {
-    Pose previous_from_current;
-    std::vector<LandmarkMatch> matches;
-    std::vector<int> feature_of;  ///< index of the feature of each landmark; −1: none
-    std::string doubt;            ///< why this may be the motion of an object; empty otherwise
-    std::optional<Pose> object;   ///< its motion, where it is known
-  };
-  CoarseMotion coarse_motion(const StereoImages& images, const Pose& predicted);
-  bool is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest);
+  void add_landmarks(const StereoImages& images, LandmarkMemory& map, MotionEstimate& estimate, Stopwatch& watch);
+  bool measure_in_right(const StereoImages& images, const MotionPrediction& prediction, MotionEstimate& estimate,
+                        Stopwatch& watch);
+  bool measure_from_latest(const StereoImages& images, const MotionPrediction& prediction, MotionEstimate& estimate,
+                           Stopwatch& watch);
+  void measure_from_any(const StereoImages& images, const MotionPrediction& prediction, MotionEstimate& estimate,
+                        Stopwatch& watch);
+  void advance(const StereoImages& images, bool usable, bool same_geometry, MotionEstimate& estimate, Stopwatch& watch);
+  void measure(const StereoImages& images, ImageSide side, const MotionPrediction& prediction, MotionEstimate& estimate,
+               Stopwatch& watch);
+  bool may_be_by_chance(const MotionFit& fit) const;
+  std::string doubt_of_age(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                           const MotionFit& fit, const MotionPrediction& prediction) const;
   std::vector<LandmarkMatch> discard_object(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
                                             const Pose& scene, const Pose& object);
-  void add_noise_floor(std::vector<LandmarkMatch>& matches) const;
   void decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
                      const std::string& doubt, MotionEstimate& estimate) const;
 };
 
 /// Why a pair cannot be used; std::nullopt where it can.
 std::optional<std::string> Odometer::State::defect_of(const RectifiedPair& pair) const {
-  if (pair.left.empty() || pair.right.empty()) return "an image is empty";
-  if (pair.left.size() != pair.right.size()) return "left and right image differ in size";
+  if (pair.left.empty() && pair.right.empty()) return "both images are missing";
+  const bool both = !pair.left.empty() && !pair.right.empty();
+  if (both && pair.left.size() != pair.right.size()) return "left and right image differ in size";
   if (!(pair.geometry.focal_px > 0) || !(pair.geometry.baseline_m > 0)) return "the pair has no geometry";
   return std::nullopt;
 }
 
-/// Constant-velocity model: the latest measured motion, scaled to the time since then, but at most kMostSpans times: a
-/// rover that was not observed for long has rather stopped than driven on.
-Pose Odometer::State::predict(Stamp now) const {
-  const double elapsed_s = seconds_between(memory.stamp, now);
-  if (!(memory.velocity_span_s > 0) || !(elapsed_s > 0)) return {};
-  return exp_se3(memory.last_motion * std::min(elapsed_s / memory.velocity_span_s, kMostSpans));
+/// Constant-velocity model: the latest measured motion, scaled to the time since the latest frame, but at most
+/// kMostSpans times: a rover that was not observed for long has rather stopped than driven on.
+MotionPrediction Odometer::State::predict(Stamp now) const {
+  const bool is_reference = memory.frames_since_reference == 0;
+  const Pose reference_from_latest = is_reference ? Pose() : memory.reference_from_latest;
+  const double elapsed_s = seconds_between(is_reference ? memory.reference.stamp : memory.latest.stamp, now);
+  MotionPrediction prediction{reference_from_latest, {}, memory.velocity_span_s > 0, predicted_offset()};
+  if (!(memory.velocity_span_s > 0) || !(elapsed_s > 0)) return prediction;
+  const double spans = elapsed_s / memory.velocity_span_s;
+  const auto moved = [&](double by) { return reference_from_latest * exp_se3(memory.last_motion * by); };
+  prediction.motion = moved(std::min(spans, kMostSpans));
+  // A rover that moves in steps moves on by one step, however long it has stopped; another one has driven on.
+  prediction.other_starts.push_back(moved(1));
+  if (spans > kMostSpans) prediction.other_starts.push_back(moved(spans));
+  return prediction;
 }
 
 /// Prior of the disparity offset for the current frame: a random walk, bounded by the prior of the calibration.
@@ -145,110 +156,47 @@ DisparityOffset Odometer::State::predicted_offset() const {
   return {memory.offset.value, std::min(memory.offset.variance + drift * drift, sigma * sigma)};
 }
 
-/// Features of the whole image with their disparities.
-void Odometer::State::detect(const StereoImages& images) {
-  features.clear();
-  for (const Feature& feature : detector->detect(images.left, images.left_mask))
-    features.push_back({feature, std::nullopt});
-  reconstruct(images);
-}
-
-/// New landmarks where there are none.
-void Odometer::State::add_landmarks(const StereoImages& images, MotionEstimate& estimate, Stopwatch& watch) {
-  const int missing = options.detection.landmarks - static_cast<int>(memory.map.landmarks.size());
-  features.clear();
-  if (missing > kMaxMissingFraction * options.detection.landmarks) {
+/// New landmarks where there are none. Those that were re-anchored get their anchor here, too.
+void Odometer::State::add_landmarks(const StereoImages& images, LandmarkMemory& map, MotionEstimate& estimate,
+                                    Stopwatch& watch) {
+  const int missing = options.detection.landmarks - static_cast<int>(map.landmarks.size());
+  const bool both = !images.left.empty() && !images.right.empty();
+  std::vector<ReconstructedFeature> features;
+  if (both && missing > kMaxMissingFraction * options.detection.landmarks) {
     std::vector<Eigen::Vector2f> taken;
-    taken.reserve(memory.map.landmarks.size());
-    for (const Landmark& landmark : memory.map.landmarks) taken.push_back(landmark.pixel.cast<float>());
+    taken.reserve(map.landmarks.size());
+    for (const Landmark& landmark : map.landmarks) taken.push_back(landmark.pixel.cast<float>());
     // Some have no disparity.
     const int count = missing + missing / 4;
-    for (const Feature& feature : detector->detect(images.left, images.left_mask, {count, taken}))
-      features.push_back({feature, std::nullopt});
+    const std::vector<Feature>& detected = detector->detect(images.left, images.left_mask, {count, taken});
+    estimate.times.detect += watch.lap();
+    features = reconstruction.reconstruct(images, detected, workers);
   }
-  estimate.times.detect += watch.lap();
-  reconstruct(images);
-  manager.add(memory.map, images, features);
+  manager.add(map, images, features);
   estimate.times.reconstruct += watch.lap();
 }
 
-void Odometer::State::reconstruct(const StereoImages& images) {
-  workers.parallel_for(0, static_cast<int>(features.size()), 16, [&](int begin, int end) {
-    for (int i = begin; i < end; ++i) {
-      ReconstructedFeature& f = features[static_cast<std::size_t>(i)];
-      f.stereo = reconstruction.reconstruct(images, static_cast<int>(std::lround(f.feature.x)),
-                                            static_cast<int>(std::lround(f.feature.y)));
-    }
-  });
+/// Whether few landmarks scatter about the motion as wrong matches would, which lie anywhere within the search radius.
+bool Odometer::State::may_be_by_chance(const MotionFit& fit) const {
+  const auto landmarks = static_cast<double>(memory.reference.map.landmarks.size());
+  const double few = std::max<double>(options.motion.min_tracking_inliers, kChanceFraction * landmarks);
+  return options.matching.correlation && fit.inliers < few &&
+         fit.rms_px > kChanceRadiusFraction * options.matching.correlation_radius_px;
 }
 
-/// Coarse motion from some landmarks that are found near their predicted positions, else from descriptors; the
-/// prediction where too few agree.
-Odometer::State::CoarseMotion Odometer::State::coarse_motion(const StereoImages& images, const Pose& predicted) {
-  if (!options.matching.descriptors) return {predicted, {}, {}, {}, {}};
-  struct Attempt {
-    std::vector<int> feature_of;
-    std::vector<LandmarkMatch> matches;
-    std::optional<MotionFit> fit;
-    int inliers() const { return fit ? fit->inliers : 0; }
-  };
-  const RectifiedStereo& stereo = images.geometry;
-  Attempt best;
-  const auto is_sufficient = [](const Attempt& a) {
-    return a.inliers() >= kSufficientCoarseInliers && 2 * a.inliers() >= static_cast<int>(a.matches.size());
-  };
-  // A rover that moves in steps moves on by one step, however long it has stopped.
-  for (const Pose& start : {predicted, exp_se3(memory.last_motion)}) {
-    if (!options.matching.correlation || is_sufficient(best)) break;
-    Attempt found;
-    found.matches = matching.by_pyramid(memory.map, images, memory.pyramid, pyramid, start.inverse());
-    found.fit = estimation.coarse(stereo, found.matches);
-    if (found.inliers() > best.inliers()) best = std::move(found);
-  }
-  if (!is_sufficient(best)) {
-    detect(images);
-    const auto attempt = [&](const std::optional<Pose>& current_from_previous) {
-      Attempt result;
-      result.feature_of = matching.by_descriptor(memory.map, features, stereo, current_from_previous);
-      result.matches = matching.coarse_matches(memory.map, features, result.feature_of);
-      result.fit = estimation.coarse(stereo, result.matches);
-      return result;
-    };
-    Attempt described = attempt(predicted.inverse());
-    if (described.inliers() < kSufficientCoarseInliers) {
-      Attempt ungated = attempt(std::nullopt);
-      if (ungated.inliers() > described.inliers()) described = std::move(ungated);
-    }
-    if (described.inliers() > best.inliers()) best = std::move(described);
-  }
-  std::string doubt;
-  std::optional<Pose> object;
-  if (best.inliers() >= kMinCoarseInliers && memory.velocity_span_s > 0) {
-    if (const auto rival = find_rival(estimation, stereo, best.matches, *best.fit, predicted)) {
-      ChosenMotion chosen = choose_motion(best.matches, *best.fit, *rival);
-      if (!chosen.object || !is_false_rival(images, chosen.fit.previous_from_current, *chosen.object)) {
-        best.fit = std::move(chosen.fit);
-        doubt = std::move(chosen.reason);
-        object = chosen.object;
-      }
-    }
-  }
-  const Pose motion = best.inliers() >= kMinCoarseInliers ? best.fit->previous_from_current : predicted;
-  return {motion, std::move(best.matches), std::move(best.feature_of), std::move(doubt), object};
-}
-
-/// Whether a rival consists of wrong matches: then far fewer landmarks have their patches where it predicts them than
-/// where the largest set does.
-bool Odometer::State::is_false_rival(const StereoImages& images, const Pose& rival, const Pose& largest) {
-  if (!options.matching.correlation) return false;
-  const auto inliers = [&](const Pose& motion) {
-    std::vector<LandmarkMatch> matches = matching.by_correlation(memory.map, images, motion.inverse());
-    if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
-    add_noise_floor(matches);
-    const auto fit = estimation.fine(images.geometry, matches, motion, predicted_offset());
-    return fit ? fit->inliers : 0;
-  };
-  return inliers(rival) < kMinSceneFraction * inliers(largest);
+/// Why a motion may be that of an object that has come into view: established landmarks do not follow it. Empty
+/// otherwise.
+std::string Odometer::State::doubt_of_age(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
+                                          const MotionFit& fit, const MotionPrediction& prediction) const {
+  if (!prediction.from_measured_motion || !is_of_young_landmarks(matches, fit)) return {};
+  const auto& all = memory.reference.map.landmarks;
+  const auto established = std::count_if(all.begin(), all.end(), [](const Landmark& l) { return is_established(l); });
+  if (established < options.motion.min_inliers) return {};
+  std::vector<Pose> starts = prediction.other_starts;
+  starts.push_back(prediction.motion);
+  for (const Pose& start : starts)
+    if (is_as_predicted(stereo, matches, fit, start)) return {};
+  return fmt::format("most of the {} landmarks that agree are new, and their motion was not predicted", fit.inliers);
 }
 
 /// The matches of the scene. Landmarks of the object are removed with the next update, because an anchor on it does not
@@ -260,7 +208,7 @@ std::vector<LandmarkMatch> Odometer::State::discard_object(const RectifiedStereo
   std::vector<LandmarkMatch> kept;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (follows[i]) {
-      discard(memory.map.landmarks[matches[i].landmark]);
+      discard(memory.reference.map.landmarks[matches[i].landmark]);
     } else {
       kept.push_back(matches[i]);
     }
@@ -268,16 +216,9 @@ std::vector<LandmarkMatch> Odometer::State::discard_object(const RectifiedStereo
   return kept;
 }
 
-/// Adds the specified noise, which the residual of a single patch alignment does not show.
-void Odometer::State::add_noise_floor(std::vector<LandmarkMatch>& matches) const {
-  const double pixel = options.motion.pixel_sigma_px, disparity = options.motion.disparity_sigma_px;
-  for (LandmarkMatch& match : matches) {
-    match.covariance.diagonal() += Eigen::Vector3d(pixel * pixel, pixel * pixel, disparity * disparity);
-  }
-}
-
 void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
                                     const MotionFit& fit, const std::string& doubt, MotionEstimate& estimate) const {
+  estimate.reason.clear();
   estimate.previous_from_current = fit.previous_from_current;
   estimate.covariance = fit.covariance;
   if (fit.inliers < options.motion.min_tracking_inliers) {
@@ -288,6 +229,13 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
   if (2 * fit.inliers < static_cast<int>(matches.size())) {
     estimate.status = TrackingStatus::degraded;
     estimate.reason = fmt::format("only {} of {} matches agree on the motion", fit.inliers, matches.size());
+    return;
+  }
+  int both = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) both += fit.inlier[i] && matches[i].cameras == MeasuredIn::both;
+  if (2 * both < fit.inliers) {
+    estimate.status = TrackingStatus::degraded;
+    estimate.reason = fmt::format("only {} of {} landmarks are seen by both cameras", both, fit.inliers);
     return;
   }
   if (!doubt.empty()) {
@@ -305,39 +253,127 @@ void Odometer::State::decide_status(const RectifiedStereo& stereo, const std::ve
   estimate.previous_from_current = Pose();
 }
 
-void Odometer::State::measure(const StereoImages& images, const Pose& predicted, MotionEstimate& estimate,
-                              Stopwatch& watch) {
-  const std::size_t landmarks = memory.map.landmarks.size();
-  auto [start, coarse_matches, feature_of, doubt, object] = coarse_motion(images, predicted);
+/// In the right image, the landmarks stay those of the reference: they need a left image.
+void Odometer::State::measure(const StereoImages& images, ImageSide side, const MotionPrediction& prediction,
+                              MotionEstimate& estimate, Stopwatch& watch) {
+  const bool left = side == ImageSide::left;
+  LandmarkMemory& map = memory.reference.map;
+  const std::size_t landmarks = map.landmarks.size();
+  CoarseMotion start = coarse.estimate(memory.reference, images, left ? pyramid : right_pyramid, side, prediction);
   std::vector<LandmarkMatch> matches =
-      options.matching.correlation ? matching.by_correlation(memory.map, images, start.inverse()) : coarse_matches;
-  if (object) {
-    discard_object(images.geometry, coarse_matches, start, *object);
-    matches = discard_object(images.geometry, matches, start, *object);
+      options.matching.correlation ? matching.by_correlation(map, images, start.previous_from_current.inverse(), side)
+                                   : start.matches;
+  if (start.object) {
+    discard_object(images.geometry, start.matches, start.previous_from_current, *start.object);
+    matches = discard_object(images.geometry, matches, start.previous_from_current, *start.object);
   }
   if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
-  add_noise_floor(matches);
+  add_noise_floor(options.motion, matches);
   estimate.matches = static_cast<int>(matches.size());
-  estimate.times.match = watch.lap();
+  estimate.times.match += watch.lap();
 
-  const std::optional<MotionFit> fit = estimation.fine(images.geometry, matches, start, predicted_offset());
-  if (!fit || fit->inliers < options.motion.min_inliers) {
+  const std::optional<MotionFit> fit =
+      estimation.fine(images.geometry, matches, start.previous_from_current, prediction.offset);
+  if (!fit || fit->inliers < options.motion.min_inliers || may_be_by_chance(*fit)) {
     estimate.status = TrackingStatus::lost;
-    estimate.reason = fmt::format("{} landmarks, {} matches, {} agree on a motion", memory.map.landmarks.size(),
-                                  matches.size(), fit ? fit->inliers : 0);
-    estimate.times.estimate = watch.lap();
+    estimate.reason = fmt::format("{} landmarks, {} matches, {} agree on a motion", landmarks, matches.size(),
+                                  fit ? fit->inliers : 0);
+    estimate.times.estimate += watch.lap();
     return;
   }
   const bool undisputed = fit->inliers >= kMinUndisputedFraction * static_cast<double>(landmarks);
-  if (undisputed && !object) doubt.clear();
-  memory.ambiguous_frames = doubt.empty() || object ? 0 : memory.ambiguous_frames + 1;
+  if (undisputed && !start.object) start.doubt.clear();
+  if (start.doubt.empty()) start.doubt = doubt_of_age(images.geometry, matches, *fit, prediction);
+  const bool ambiguous = !start.doubt.empty() && !start.object;
+  memory.ambiguous_frames = ambiguous ? memory.ambiguous_frames + 1 : 0;
   estimate.inliers = fit->inliers;
   estimate.rms_px = fit->rms_px;
-  decide_status(images.geometry, matches, *fit, doubt, estimate);
+  decide_status(images.geometry, matches, *fit, start.doubt, estimate);
+  if (ambiguous) {
+    // The true motion is this one or the predicted one.
+    const Vector6d off = log_se3(fit->previous_from_current.inverse() * prediction.motion);
+    estimate.covariance += off * off.transpose();
+  }
+  if (!left) return;
   memory.offset = fit->offset;
-  move_anchors(memory.map, estimate.previous_from_current);
-  manager.update(memory.map, images, matches, *fit, features, feature_of);
-  estimate.times.estimate = watch.lap();
+  move_anchors(map, estimate.previous_from_current);
+  const bool moved = estimate.status != TrackingStatus::stationary && !ambiguous;
+  manager.update(map, images, matches, *fit, moved, start.features, start.feature_of);
+  estimate.times.estimate += watch.lap();
+}
+
+/// Measures the motion where the left image is of no use; the landmarks stay those of the reference.
+bool Odometer::State::measure_in_right(const StereoImages& images, const MotionPrediction& prediction,
+                                       MotionEstimate& estimate, Stopwatch& watch) {
+  if (images.right.empty()) return false;
+  right_pyramid.compute(images.right_smooth);
+  MotionEstimate in_right = estimate;
+  measure(images, ImageSide::right, prediction, in_right, watch);
+  if (in_right.status == TrackingStatus::lost) return false;
+  estimate = std::move(in_right);
+  estimate.keeps_reference = true;
+  return true;
+}
+
+/// Measures the motion from the latest frame, which was lost. Where that succeeds it is the reference.
+bool Odometer::State::measure_from_latest(const StereoImages& images, const MotionPrediction& prediction,
+                                          MotionEstimate& estimate, Stopwatch& watch) {
+  if (memory.latest.map.landmarks.empty()) return false;
+  const Pose latest_from_reference = memory.reference_from_latest.inverse();
+  MotionPrediction prediction_from_latest = prediction;
+  prediction_from_latest.motion = latest_from_reference * prediction.motion;
+  for (Pose& start : prediction_from_latest.other_starts) start = latest_from_reference * start;
+  std::swap(memory.reference, memory.latest);
+  MotionEstimate from_latest = estimate;
+  measure(images, ImageSide::left, prediction_from_latest, from_latest, watch);
+  if (from_latest.status == TrackingStatus::lost) {
+    std::swap(memory.reference, memory.latest);
+    return false;
+  }
+  estimate = std::move(from_latest);
+  estimate.from = memory.reference.stamp;
+  return true;
+}
+
+void Odometer::State::measure_from_any(const StereoImages& images, const MotionPrediction& prediction,
+                                       MotionEstimate& estimate, Stopwatch& watch) {
+  if (images.left.empty()) {
+    estimate.status = TrackingStatus::lost;
+    estimate.reason = "the left image is missing";
+  } else {
+    measure(images, ImageSide::left, prediction, estimate, watch);
+  }
+  if (estimate.status != TrackingStatus::lost || measure_in_right(images, prediction, estimate, watch)) return;
+  if (!images.left.empty()) measure_from_latest(images, prediction, estimate, watch);
+}
+
+/// Makes the current frame the reference. Where it is lost the reference stays, and the landmarks of the frame are kept
+/// beside it; where it was measured in the right image the reference stays, too.
+void Odometer::State::advance(const StereoImages& images, bool usable, bool same_geometry, MotionEstimate& estimate,
+                              Stopwatch& watch) {
+  const bool lost = estimate.status == TrackingStatus::lost, in_right = !lost && estimate.keeps_reference;
+  LandmarkFrame& frame = lost || in_right ? memory.latest : memory.reference;
+  frame.stamp = estimate.to;
+  if (lost || in_right) frame.map = {};
+  if (usable) memory.geometry = images.geometry;
+  if (usable && !in_right && !images.left.empty()) {
+    add_landmarks(images, frame.map, estimate, watch);
+    std::swap(frame.pyramid, pyramid);
+  }
+  // An unusable pair says nothing on the geometry. Frames without landmarks, such as dark ones, cannot be a reference.
+  if (lost) {
+    const bool replaced = memory.frames_since_reference >= kMostLostFrames && !frame.map.landmarks.empty();
+    estimate.keeps_reference =
+        !estimate.first && (same_geometry || !usable) && !replaced && !memory.reference.map.landmarks.empty();
+  }
+  if (estimate.keeps_reference) {
+    ++memory.frames_since_reference;
+    memory.reference_from_latest = estimate.previous_from_current;
+    return;
+  }
+  if (lost) std::swap(memory.reference, memory.latest);
+  memory.frames_since_reference = 0;
+  memory.latest = {};
 }
 
 Result<Odometer> Odometer::create(const OdometryOptions& options, ThreadPool workers) {
@@ -357,45 +393,42 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
   MotionEstimate estimate;
   estimate.to = pair.stamp;
   estimate.first = !s.memory.started;
-  estimate.from = s.memory.started ? s.memory.stamp : pair.stamp;
-  const Pose prediction = predicted ? *predicted : s.predict(pair.stamp);
+  estimate.from = s.memory.started ? s.memory.reference.stamp : pair.stamp;
+  MotionPrediction prediction = s.predict(pair.stamp);
+  if (predicted) prediction.motion = *predicted;
 
   const std::optional<std::string> defect = s.defect_of(pair);
+  StereoImages images{pair.geometry, pair.left, pair.right, {}, {}, pair.left_mask, pair.right_mask, disparity};
+  const bool same_geometry = s.memory.geometry == pair.geometry;
   if (defect) {
     estimate.status = TrackingStatus::lost;
     estimate.reason = *defect;
   } else {
-    StereoImages images{pair.geometry, pair.left, pair.right, {}, {}, pair.left_mask, pair.right_mask, disparity};
     s.left_smooth.compute(pair.left, s.workers);
     s.right_smooth.compute(pair.right, s.workers);
     images.left_smooth = s.left_smooth.view();
     images.right_smooth = s.right_smooth.view();
-    s.pyramid.compute(images.left_smooth);
-    if (!estimate.first) {
-      if (s.memory.geometry == pair.geometry) {
-        s.measure(images, prediction, estimate, watch);
-      } else {
-        estimate.status = TrackingStatus::lost;
-        estimate.reason = "the geometry of the pair has changed";
-      }
+    if (!images.left.empty()) s.pyramid.compute(images.left_smooth);
+    if (estimate.first) {
+      // Nothing to measure against.
+    } else if (same_geometry) {
+      s.measure_from_any(images, prediction, estimate, watch);
+    } else {
+      estimate.status = TrackingStatus::lost;
+      estimate.reason = "the geometry of the pair has changed";
     }
-    if (estimate.status == TrackingStatus::lost) s.memory.map = {};
-    s.add_landmarks(images, estimate, watch);
-    std::swap(s.memory.pyramid, s.pyramid);
-    s.memory.geometry = pair.geometry;
   }
-
-  estimate.landmarks = static_cast<int>(s.memory.map.landmarks.size());
   if (estimate.status == TrackingStatus::lost && !estimate.first) {
-    estimate.previous_from_current = prediction;
+    estimate.previous_from_current = prediction.motion;
     estimate.covariance.diagonal() << Eigen::Vector3d::Constant(kLostTranslation_m * kLostTranslation_m),
         Eigen::Vector3d::Constant(kLostRotation_rad * kLostRotation_rad);
   } else if (!estimate.first && !s.keeps_prediction()) {
     s.memory.last_motion = log_se3(estimate.previous_from_current);
     s.memory.velocity_span_s = seconds_between(estimate.from, estimate.to);
   }
+  s.advance(images, !defect, same_geometry, estimate, watch);
   s.memory.started = true;
-  s.memory.stamp = pair.stamp;
+  estimate.landmarks = static_cast<int>(s.memory.reference.map.landmarks.size());
   estimate.times.total = all.lap();
   return estimate;
 }

@@ -287,8 +287,11 @@ struct OdometryTimes {
 
 /// The motion between two stereo frames, in rectified left optical frames.
 struct MotionEstimate {
+  /// `from` is the latest frame whose motion was measured, and that of the frames before it is not needed: landmarks
+  /// survive frames that are lost. After a lost frame it may be that one, where the old landmarks are not found again.
   Stamp from, to;
-  bool first = false;  ///< there was no previous frame: the motion is the identity
+  bool keeps_reference = false;  ///< lost, and the next motion begins at `from`, too
+  bool first = false;            ///< there was no previous frame: the motion is the identity
   Pose previous_from_current;
   Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²
   TrackingStatus status = TrackingStatus::tracking;

@@ -208,20 +208,89 @@ TEST(Odometer, SlowMotionIsNotTakenForStationary) {
   EXPECT_LT(travelled.translation().norm(), 0.0026);
 }
 
-TEST(Odometer, IsLostWithAReasonAndRecoversTwoFramesLater) {
+TEST(Odometer, ABadFrameCostsNothing) {
   Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
   for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
   const Image<std::uint8_t> blank(320, 240, 90);
   const MotionEstimate lost = odometer.add(blank_pair(blank, 4));
   EXPECT_EQ(lost.status, TrackingStatus::lost);
   EXPECT_FALSE(lost.reason.empty());
+  EXPECT_TRUE(lost.keeps_reference);
   // The constant-velocity prediction with a large covariance.
   EXPECT_LT(translation_error(lost, 3, 4), 0.002);
   EXPECT_GT(lost.covariance(0, 0), 0.1);
-  EXPECT_EQ(odometer.add(pair_of(5)).status, TrackingStatus::lost);  // no landmarks yet
-  const MotionEstimate back = odometer.add(pair_of(6));
+  const MotionEstimate back = odometer.add(pair_of(5));
   EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
-  EXPECT_LT(translation_error(back, 5, 6), 0.001);
+  EXPECT_EQ(back.from, pair_of(3).stamp);
+  EXPECT_FALSE(back.keeps_reference);
+  EXPECT_LT(translation_error(back, 3, 5), 0.001);
+  EXPECT_LT(translation_error(odometer.add(pair_of(6)), 5, 6), 0.001);
+}
+
+TEST(Odometer, MeasuresInTheLeftImageWhileTheRightOneIsDarkOrMissing) {
+  const Image<std::uint8_t> dark(320, 240, 2);
+  for (const ImageView<const std::uint8_t> right : {ImageView<const std::uint8_t>(dark), {}}) {
+    Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+    for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
+    for (int i = 4; i < 7; ++i) {
+      RectifiedPair pair = pair_of(i);
+      pair.right = right;
+      const MotionEstimate estimate = odometer.add(pair);
+      EXPECT_EQ(estimate.status, TrackingStatus::degraded);
+      EXPECT_THAT(estimate.reason, ::testing::HasSubstr("seen by both cameras"));
+      EXPECT_EQ(estimate.from, pair_of(i - 1).stamp);
+      EXPECT_LT(translation_error(estimate, i - 1, i), 0.0015) << i;
+    }
+    const MotionEstimate back = odometer.add(pair_of(7));
+    EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
+    EXPECT_LT(translation_error(back, 6, 7), 0.001);
+  }
+}
+
+TEST(Odometer, MeasuresInTheRightImageWhileTheLeftOneIsDarkOrMissing) {
+  const Image<std::uint8_t> dark(320, 240, 2);
+  for (const ImageView<const std::uint8_t> left : {ImageView<const std::uint8_t>(dark), {}}) {
+    Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+    for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
+    for (int i = 4; i < 7; ++i) {
+      RectifiedPair pair = pair_of(i);
+      pair.left = left;
+      const MotionEstimate estimate = odometer.add(pair);
+      EXPECT_EQ(estimate.status, TrackingStatus::degraded) << estimate.reason;
+      EXPECT_TRUE(estimate.keeps_reference);
+      EXPECT_EQ(estimate.from, pair_of(3).stamp);
+      EXPECT_LT(translation_error(estimate, 3, i), 0.002) << i;
+    }
+    const MotionEstimate back = odometer.add(pair_of(7));
+    EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
+    EXPECT_EQ(back.from, pair_of(3).stamp);
+    EXPECT_LT(translation_error(back, 3, 7), 0.002);
+  }
+}
+
+TEST(Odometer, IsLostWithoutImages) {
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+  for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
+  RectifiedPair pair = pair_of(4);
+  pair.left = pair.right = {};
+  const MotionEstimate lost = odometer.add(pair);
+  EXPECT_EQ(lost.status, TrackingStatus::lost);
+  EXPECT_THAT(lost.reason, ::testing::HasSubstr("both images are missing"));
+  EXPECT_EQ(odometer.add(pair_of(5)).status, TrackingStatus::tracking);
+}
+
+// The landmarks of the reference are out of view after some frames of another scene: those of the last frame are used.
+TEST(Odometer, GoesOnFromALostFrameWhereTheOldLandmarksAreGone) {
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+  for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
+  const SyntheticWorld world(testing::SyntheticWorldOptions{});
+  const SyntheticFrame elsewhere = world.render(kCameras, camera_at(30, 20, 0), 300),
+                       beside = world.render(kCameras, camera_at(30.05, 20, 0), 301);
+  EXPECT_EQ(odometer.add(pair_of(elsewhere, 4)).status, TrackingStatus::lost);
+  const MotionEstimate back = odometer.add(pair_of(beside, 5));
+  EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
+  EXPECT_EQ(back.from, pair_of(4).stamp);
+  EXPECT_NEAR(back.previous_from_current.translation().norm(), 0.05, 0.002);
 }
 
 TEST(Odometer, UsesAGivenPrediction) {

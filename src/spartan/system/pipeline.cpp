@@ -39,39 +39,49 @@ void Pipeline::State::start(const RectifiedPair& rectified) {
     slam_filter.start(rectified.stamp, first);
   }
   world_from_left = first * rectified.body_from_left;
+  left_from_body = rectified.body_from_left.inverse();
+  reference = {rectified.stamp, world_from_left, left_from_body};
   started = true;
 }
 
-// The motion of the left camera since the last frame, from the rover's velocity and the angles of the mast. Empty for a
+// The motion of the left camera since the reference, from the rover's velocity and the angles of the mast. Empty for a
 // pair that is fixed to the body: the odometry predicts its motion itself.
 std::optional<Pose> Pipeline::State::predicted_motion(const RectifiedPair& rectified) const {
   if (!started || rig.find_camera(pair.left)->mount == "body") return std::nullopt;
-  const double seconds = seconds_between(last_stamp, rectified.stamp);
-  return left_from_body * exp_se3(velocity * seconds) * rectified.body_from_left;
-}
-
-void Pipeline::State::advance(const MotionEstimate& motion, const RelativeMotion& body_motion) {
-  world_from_left = world_from_left * motion.previous_from_current;
-  distance_m += motion.previous_from_current.translation().norm();
-  const double seconds = seconds_between(motion.from, motion.to);
-  if (seconds > 0) velocity = log_se3(body_motion.previous_from_current) / seconds;
+  const double seconds = seconds_between(reference.stamp, rectified.stamp);
+  return reference.left_from_body * exp_se3(velocity * seconds) * rectified.body_from_left;
 }
 
 // Transports the motion M of the left camera to the body, with B₀ and B₁ = body_from_left at its begin and end, which
 // differ where the mast has moved: B₀ M Exp(ξ) B₁⁻¹ = (B₀ M B₁⁻¹) Exp(Ad_B₁ ξ), so the covariance becomes
 // Ad_B₁ Σ Ad_B₁ᵀ.
-RelativeMotion Pipeline::State::body_motion(const Pose& last_body_from_left, const Pose& body_from_left,
-                                            const MotionEstimate& motion) const {
+RelativeMotion Pipeline::State::body_motion(const Pose& body_from_left, const MotionEstimate& motion) const {
   const Matrix6d ad = adjoint(body_from_left);
   RelativeMotion result;
   result.from = motion.from;
   result.to = motion.to;
   result.measured = motion.status != TrackingStatus::lost;
+  result.keeps_reference = motion.keeps_reference;
   // The exact identity marks a stationary rover.
-  if (motion.status != TrackingStatus::stationary)
-    result.previous_from_current = last_body_from_left * motion.previous_from_current * body_from_left.inverse();
+  if (motion.status != TrackingStatus::stationary) {
+    result.previous_from_current =
+        reference.left_from_body.inverse() * motion.previous_from_current * body_from_left.inverse();
+  }
   result.covariance = ad * motion.covariance * ad.transpose();
   return result;
+}
+
+// Returns the motion of the body since the last frame.
+Pose Pipeline::State::advance(const RectifiedPair& rectified, const MotionEstimate& motion,
+                              const RelativeMotion& body_motion) {
+  const Pose last = world_from_left, last_body = world_from_left * left_from_body;
+  world_from_left = reference.world_from_left * motion.previous_from_current;
+  distance_m += (last.inverse() * world_from_left).translation().norm();
+  left_from_body = rectified.body_from_left.inverse();
+  const double seconds = seconds_between(motion.from, motion.to);
+  if (seconds > 0) velocity = log_se3(body_motion.previous_from_current) / seconds;
+  if (!motion.keeps_reference) reference = {motion.to, world_from_left, left_from_body};
+  return last_body.inverse() * (world_from_left * left_from_body);
 }
 
 // The odometry alone needs sensor samples only to initialize the world frame.
@@ -207,14 +217,16 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   }
   s.frozen_cameras.remember(pair_index, images);
   const std::optional<Pose> predicted = s.predicted_motion(*rectified);
-  const Pose last_body_from_left = s.started ? s.left_from_body.inverse() : rectified->body_from_left;
   if (!s.started) s.start(*rectified);
+
   result.motion =
       s.clock.measure("odometry", [&] { return s.odometer.add(*rectified, predicted, disparity->disparity); });
-  const RelativeMotion body_motion = s.body_motion(last_body_from_left, rectified->body_from_left, result.motion);
-  s.left_from_body = rectified->body_from_left.inverse();
+  // After lost frames the landmarks of the last one may be the only ones that are found.
+  if (result.motion.from == s.last_stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body};
+  const RelativeMotion body_motion = s.body_motion(rectified->body_from_left, result.motion);
+  UncertainPose step;
   if (!result.motion.first) {
-    s.advance(result.motion, body_motion);
+    step = {s.advance(*rectified, result.motion, body_motion), body_motion.covariance};
     if (s.options.odometry_only) s.dead_reckoning.add(body_motion);
   }
   if (!s.options.odometry_only) {
@@ -234,8 +246,8 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     result.localization = s.localizer.estimate();
     result.slam = s.slam_filter.world_from_body();
   }
-  if (Status status = s.add_odometry_frame(frame, *rectified, body_motion); !status) return failure(status);
-  s.update_keyframes(*rectified, result.motion, body_motion);
+  if (Status status = s.add_odometry_frame(frame, *rectified, step); !status) return failure(status);
+  s.update_keyframes(*rectified, result.motion, step);
 
   if (s.terrain_is_due()) {
     if (disparity->disparity.empty()) disparity = s.dense_disparity(*rectified);

@@ -28,11 +28,10 @@ std::vector<StageTime> sums_by_stage(const std::vector<StageTime>& times) {
 }  // namespace
 
 Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified,
-                                           const RelativeMotion& motion) {
+                                           const UncertainPose& step) {
   if (!maps_stops) return {};
   return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
-                                       localizer.estimate().world_from_body,
-                                       {motion.previous_from_current, motion.covariance});
+                                       localizer.estimate().world_from_body, step);
 }
 
 // Adds a frame of another pair to the stop that it belongs to.
@@ -109,11 +108,9 @@ MappedStop Pipeline::State::apply(const StopSurvey& survey, MapMergeResult merge
 
 // A frame whose motion is unknown is no keyframe.
 void Pipeline::State::update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion,
-                                       const RelativeMotion& body_motion) {
+                                       const UncertainPose& step) {
   if (!maps_keyframes) return;
-  if (!motion.first) {
-    keyframe_stage.advance(rectified.stamp, {body_motion.previous_from_current, body_motion.covariance});
-  }
+  if (!motion.first) keyframe_stage.advance(rectified.stamp, step);
   if (motion.status == TrackingStatus::lost || !keyframe_stage.is_due(rectified, world_from_left)) return;
   if (keyframe_stage.is_pending()) {
     keyframe_stage.hurry();

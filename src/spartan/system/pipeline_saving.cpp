@@ -12,7 +12,7 @@ namespace spartan {
 
 namespace {
 
-constexpr std::uint32_t kPipelineVersion = 8;  // of save(); raise it when the saved state changes
+constexpr std::uint32_t kPipelineVersion = 9;  // of save(); raise it when the saved state changes
 
 }  // namespace
 
@@ -26,6 +26,9 @@ Bytes Pipeline::save() const {
   out.put(s.up_in_body.value_or(Eigen::Vector3d::UnitZ()));
   out.put(s.world_from_left);
   out.put(s.left_from_body);
+  out.put(s.reference.stamp.ns);
+  out.put(s.reference.world_from_left);
+  out.put(s.reference.left_from_body);
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
@@ -53,6 +56,9 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   if (!has_up) s.up_in_body.reset();
   s.world_from_left = in.get_pose();
   s.left_from_body = in.get_pose();
+  s.reference.stamp = in.get_stamp();
+  s.reference.world_from_left = in.get_pose();
+  s.reference.left_from_body = in.get_pose();
   const std::vector<double> velocity = in.get_array<double>();
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get_finite();

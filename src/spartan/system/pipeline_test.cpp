@@ -131,6 +131,27 @@ TEST(Pipeline, TracksMotionWithAPanningMast) {
   }
 }
 
+// A dark frame: the poses before and after it are as accurate as without it.
+TEST(Pipeline, ADarkFrameCostsNothing) {
+  const Image<std::uint8_t> dark(320, 240, 2);
+  for (const bool odometry_only : {false, true}) {
+    RunOptions options;
+    options.odometry_only = odometry_only;
+    Pipeline pipeline = pipeline_of(options);
+    for (int i = 0; i < 5; ++i) {
+      StereoFrame frame = frame_of(i);
+      if (i == 3) frame.left = frame.right = FrameImage::borrow(dark.view(), {});
+      const FrameResult result = pipeline.add(frame).value().value();
+      if (i == 0) continue;
+      EXPECT_EQ(result.motion.status, i == 3 ? TrackingStatus::lost : TrackingStatus::tracking) << i;
+      if (i == 3) continue;
+      const UncertainPose pose = odometry_only ? result.world_from_body : result.localization->world_from_body;
+      EXPECT_LT((pose.pose.translation() - world_from_body(i).translation()).norm(), 0.003) << i;
+      EXPECT_LT(pose.covariance.diagonal().head(3).sum(), 1e-4) << i;
+    }
+  }
+}
+
 TEST(Pipeline, FirstFrameHasTerrain) {
   Pipeline pipeline = pipeline_of();
   const FrameResult first = push(pipeline, 0);

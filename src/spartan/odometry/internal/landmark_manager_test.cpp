@@ -31,7 +31,8 @@ class LandmarkManagerTest : public ::testing::Test {
   StereoImages images() const { return {kSmallStereo, image_, image_, smooth_.view(), smooth_.view(), {}, {}, {}}; }
 
   // The rover moves and measures the landmark, whose true disparity in the anchor is `truth`, without noise.
-  void measure(const Pose& previous_from_current, double truth, bool inlier = true, double offset = 0) {
+  void measure(const Pose& previous_from_current, double truth, bool inlier = true, double offset = 0,
+               bool moved = true) {
     LandmarkMatch match;
     match.point = {memory_.landmarks[0].anchor_pixel, memory_.landmarks[0].disparity};
     match.disparity_variance = memory_.landmarks[0].variance;
@@ -45,7 +46,7 @@ class LandmarkManagerTest : public ::testing::Test {
     fit.inlier = {inlier};
     fit.offset.value = offset;
     move_anchors(memory_, previous_from_current);
-    manager_.update(memory_, images(), {match}, fit, {}, {});
+    manager_.update(memory_, images(), {match}, fit, moved, {}, {});
   }
 
   ReconstructedFeature feature_at(float x, float y) const {
@@ -100,6 +101,16 @@ TEST_F(LandmarkManagerTest, RemovesLandmarksThatAreMissedTwice) {
   measure(Pose(), 10, false);
   measure(Pose(), 10, false);
   EXPECT_TRUE(memory_.landmarks.empty());
+}
+
+TEST_F(LandmarkManagerTest, LandmarksAreEstablishedByFollowingTheScene) {
+  EXPECT_FALSE(is_established(memory_.landmarks[0]));
+  measure(Pose(), 10, false);
+  EXPECT_FALSE(is_established(memory_.landmarks[0])) << "an outlier";
+  measure(Pose(), 10, true, 0, false);
+  EXPECT_FALSE(is_established(memory_.landmarks[0])) << "the rover has not moved";
+  measure(Pose::from_translation({0.01, 0, 0}), 10);
+  EXPECT_TRUE(is_established(memory_.landmarks[0]));
 }
 
 TEST_F(LandmarkManagerTest, AddsFeaturesThatAreFarFromLandmarksAndHaveADisparity) {

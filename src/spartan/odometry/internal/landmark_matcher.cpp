@@ -22,9 +22,45 @@ constexpr std::size_t kMinRigidMatches = 8;
 constexpr int kLandmarksPerPart = 16;
 /// Landmarks that are searched in the pyramids: enough for RANSAC.
 constexpr std::size_t kPyramidLandmarks = 200;
-
 AnchoredPoint point_of(const Landmark& landmark) {
   return {landmark.anchor_pixel, landmark.disparity};
+}
+
+/// A match without its measurement.
+LandmarkMatch match_of(const LandmarkMemory& memory, std::size_t index) {
+  const Landmark& landmark = memory.landmarks[index];
+  LandmarkMatch match;
+  match.landmark = index;
+  match.established = is_established(landmark);
+  match.point = point_of(landmark);
+  match.disparity_variance = landmark.variance;
+  match.previous_from_anchor = memory.anchor(landmark.anchor_id).latest_from_anchor;
+  return match;
+}
+
+/// Where a point is in the image of a camera, and how its surroundings are deformed from the left image of the anchor.
+struct PlaceInImage {
+  Eigen::Vector2d position;
+  Eigen::Matrix2d warp;
+  Eigen::Vector2d slant;  // of the disparity in the left image
+};
+
+/// With u_right = u − d the right image is deformed by I − e₁ slantᵀ more than the left one.
+PlaceInImage place_in(ImageSide side, const AnchoredProjection& projection, const Eigen::Vector2d& slant) {
+  const AnchoredWarp warp = warp_of(projection, slant);
+  PlaceInImage place{projection.measured.head<2>(), warp.pixels, warp.slant};
+  if (side == ImageSide::left) return place;
+  place.position.x() -= projection.measured.z();
+  place.warp.row(0) -= warp.slant.transpose() * warp.pixels;
+  return place;
+}
+
+/// Landmarks whose disparity was not found are often half occluded or on a depth edge: they are used only where most
+/// landmarks are of that kind, because the other image is dark or missing.
+void prefer_both_cameras(std::vector<LandmarkMatch>& matches) {
+  const auto in_one = [](const LandmarkMatch& m) { return m.cameras != MeasuredIn::both; };
+  const auto count = static_cast<std::size_t>(std::count_if(matches.begin(), matches.end(), in_one));
+  if (2 * count <= matches.size()) std::erase_if(matches, in_one);
 }
 
 }  // namespace
@@ -93,12 +129,7 @@ std::vector<LandmarkMatch> LandmarkMatcher::coarse_matches(const LandmarkMemory&
     if (feature_of[i] < 0) continue;
     const ReconstructedFeature& f = features[static_cast<std::size_t>(feature_of[i])];
     if (!f.stereo) continue;
-    const Landmark& landmark = memory.landmarks[i];
-    LandmarkMatch match;
-    match.landmark = i;
-    match.point = point_of(landmark);
-    match.disparity_variance = landmark.variance;
-    match.previous_from_anchor = memory.anchor(landmark.anchor_id).latest_from_anchor;
+    LandmarkMatch match = match_of(memory, i);
     match.measured = {f.feature.x, f.feature.y, f.stereo->disparity};
     match.covariance = kFeatureSigma_px * kFeatureSigma_px * Eigen::Matrix3d::Identity();
     matches.push_back(match);
@@ -108,37 +139,37 @@ std::vector<LandmarkMatch> LandmarkMatcher::coarse_matches(const LandmarkMemory&
 
 std::optional<LandmarkMatch> LandmarkMatcher::correlate(const LandmarkMemory& memory, std::size_t index,
                                                         const StereoImages& images, const Pose& current_from_previous,
+                                                        ImageSide side,
                                                         const std::optional<Eigen::Vector2d>& start_px) const {
   const Landmark& landmark = memory.landmarks[index];
-  LandmarkMatch match;
-  match.landmark = index;
-  match.point = point_of(landmark);
-  match.disparity_variance = landmark.variance;
-  match.previous_from_anchor = memory.anchor(landmark.anchor_id).latest_from_anchor;
+  LandmarkMatch match = match_of(memory, index);
   const auto predicted =
       project_anchored(images.geometry, match.point, current_from_previous * match.previous_from_anchor);
   if (!predicted) return std::nullopt;
-  const AnchoredWarp warp = warp_of(*predicted, landmark.slant);
-  if (!warp.pixels.allFinite() || !warp.slant.allFinite()) return std::nullopt;
+  const PlaceInImage place = place_in(side, *predicted, landmark.slant);
+  if (!place.warp.allFinite() || !place.slant.allFinite()) return std::nullopt;
 
+  const bool left = side == ImageSide::left;
   const AlignmentTemplate reference(landmark.patch);
-  const auto found =
-      align_translation(reference, images.left_smooth, warp.pixels, start_px.value_or(predicted->measured.head<2>()),
-                        options_.correlation_radius_px);
+  const auto found = align_translation(reference, left ? images.left_smooth : images.right_smooth, place.warp,
+                                       start_px.value_or(place.position), options_.correlation_radius_px);
   if (!found || found->correlation < options_.min_correlation) return std::nullopt;
   const int x = static_cast<int>(std::lround(found->position.x())),
             y = static_cast<int>(std::lround(found->position.y()));
-  if (!images.left_mask.empty() && images.left_mask(x, y) == 0) return std::nullopt;
+  const ImageView<const std::uint8_t> mask = left ? images.left_mask : images.right_mask;
+  if (!mask.empty() && mask(x, y) == 0) return std::nullopt;
 
   RowAlignment start;
   start.disparity = predicted->measured.z();
-  start.slant = warp.slant;
-  const auto stereo = reconstruction_.refine(images, found->position, start, options_.disparity_radius_px);
-  if (!stereo) return std::nullopt;
-  match.measured << found->position, stereo->disparity;
-  match.covariance.setZero();
-  match.covariance.topLeftCorner<2, 2>() = found->covariance;
-  match.covariance(2, 2) = stereo->sigma_px * stereo->sigma_px;
+  start.slant = place.slant;
+  std::optional<RowAlignment> stereo;
+  if (left) stereo = reconstruction_.refine(images, found->position, start, options_.disparity_radius_px);
+  if (stereo) {
+    match.set_measured(found->position, found->covariance, stereo->disparity, stereo->sigma_px);
+  } else {
+    match.set_measured_in_one(left ? MeasuredIn::left : MeasuredIn::right, found->position, found->covariance,
+                              predicted->measured.z());
+  }
   return match;
 }
 
@@ -152,35 +183,43 @@ std::vector<LandmarkMatch> LandmarkMatcher::collect(
   matches.reserve(count);
   for (const auto& match : found_)
     if (match) matches.push_back(*match);
+  prefer_both_cameras(matches);
   return matches;
 }
 
 std::vector<LandmarkMatch> LandmarkMatcher::by_pyramid(const LandmarkMemory& memory, const StereoImages& images,
                                                        const ImagePyramid& latest, const ImagePyramid& current,
-                                                       const Pose& current_from_previous) {
-  const std::size_t all = memory.landmarks.size(), count = std::min(all, kPyramidLandmarks);
+                                                       const Pose& current_from_previous, ImageSide side,
+                                                       WhichLandmarks which) {
+  std::vector<std::size_t> candidates;
+  candidates.reserve(memory.landmarks.size());
+  for (std::size_t i = 0; i < memory.landmarks.size(); ++i)
+    if (which == WhichLandmarks::all || is_established(memory.landmarks[i])) candidates.push_back(i);
+  const std::size_t count = std::min(candidates.size(), kPyramidLandmarks);
   return collect(count, [&](std::size_t k) -> std::optional<LandmarkMatch> {
-    const std::size_t index = k * all / count;
+    const std::size_t index = candidates[k * candidates.size() / count];
     const Landmark& landmark = memory.landmarks[index];
     const Pose& previous_from_anchor = memory.anchor(landmark.anchor_id).latest_from_anchor;
     const auto before = project_anchored(images.geometry, point_of(landmark), previous_from_anchor);
     const auto after =
         project_anchored(images.geometry, point_of(landmark), current_from_previous * previous_from_anchor);
     if (!before || !after) return std::nullopt;
-    const Eigen::Matrix2d warp =
-        warp_of(*after, landmark.slant).pixels * warp_of(*before, landmark.slant).pixels.inverse();
+    const PlaceInImage place = place_in(side, *after, landmark.slant);
+    const Eigen::Matrix2d warp = place.warp * warp_of(*before, landmark.slant).pixels.inverse();
     if (!warp.allFinite()) return std::nullopt;
-    const auto found =
-        find_in_pyramid(latest, current, landmark.pixel, warp, after->measured.head<2>(), options_.min_correlation);
+    const auto found = find_in_pyramid(latest, current, landmark.pixel, warp, place.position, options_.min_correlation);
     if (!found) return std::nullopt;
-    return correlate(memory, index, images, current_from_previous, *found);
+    return correlate(memory, index, images, current_from_previous, side, *found);
   });
 }
 
 std::vector<LandmarkMatch> LandmarkMatcher::by_correlation(const LandmarkMemory& memory, const StereoImages& images,
-                                                           const Pose& current_from_previous) {
-  return collect(memory.landmarks.size(),
-                 [&](std::size_t index) { return correlate(memory, index, images, current_from_previous); });
+                                                           const Pose& current_from_previous, ImageSide side,
+                                                           WhichLandmarks which) {
+  return collect(memory.landmarks.size(), [&](std::size_t index) -> std::optional<LandmarkMatch> {
+    if (which == WhichLandmarks::established && !is_established(memory.landmarks[index])) return std::nullopt;
+    return correlate(memory, index, images, current_from_previous, side);
+  });
 }
 
 std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector<LandmarkMatch> matches, int partners) {
@@ -193,7 +232,9 @@ std::vector<LandmarkMatch> keep_rigid(const RectifiedStereo& stereo, std::vector
   std::vector<Point> points(count);
   for (std::size_t i = 0; i < count; ++i) {
     const LandmarkMatch& m = matches[i];
-    if (m.point.disparity < kRigidityDisparity_px || m.measured.z() < kRigidityDisparity_px) continue;
+    if (m.cameras != MeasuredIn::both || m.point.disparity < kRigidityDisparity_px ||
+        m.measured.z() < kRigidityDisparity_px)
+      continue;
     Point& p = points[i];
     p.previous = stereo.triangulate(m.point.pixel.x(), m.point.pixel.y(), m.point.disparity);
     p.previous = m.previous_from_anchor * p.previous;

@@ -14,11 +14,11 @@
 
 namespace spartan::internal {
 
-/// A feature of the current frame and its disparity at the nearest whole pixel, where one was found.
-struct ReconstructedFeature {
-  Feature feature;
-  std::optional<RowAlignment> stereo;
-};
+/// The image of the current pair in which landmarks are located first.
+enum class ImageSide : std::uint8_t { left, right };
+
+/// Established landmarks were inliers before.
+enum class WhichLandmarks : std::uint8_t { all, established };
 
 class LandmarkMatcher {
  public:
@@ -39,20 +39,23 @@ class LandmarkMatcher {
                                             const std::vector<int>& feature_of) const;
 
   /// Measures some 200 landmarks, spread over the list, whose predicted positions may be off by 30 px: each is found in
-  /// the pyramids of the latest and the current image, then measured as by_correlation() does.
+  /// the pyramids of the latest left image and the current image of that side, then measured as by_correlation() does.
   std::vector<LandmarkMatch> by_pyramid(const LandmarkMemory& memory, const StereoImages& images,
                                         const ImagePyramid& latest, const ImagePyramid& current,
-                                        const Pose& current_from_previous);
+                                        const Pose& current_from_previous, ImageSide side = ImageSide::left,
+                                        WhichLandmarks which = WhichLandmarks::all);
 
-  /// Measures each landmark: its patch, warped by the predicted geometry, is aligned with the left image, and its
-  /// disparity is searched near the predicted one. `current_from_previous` must be accurate to a few pixels.
+  /// Measures each landmark: its patch, warped by the predicted geometry, is aligned with the image of that side, and,
+  /// from the left image, its disparity is searched near the predicted one; where that fails the landmark is measured
+  /// in the left image alone. `current_from_previous` must be accurate to a few pixels.
   std::vector<LandmarkMatch> by_correlation(const LandmarkMemory& memory, const StereoImages& images,
-                                            const Pose& current_from_previous);
+                                            const Pose& current_from_previous, ImageSide side = ImageSide::left,
+                                            WhichLandmarks which = WhichLandmarks::all);
 
  private:
   /// `start_px`: where the landmark is, to a few pixels; without it where the motion predicts it.
   std::optional<LandmarkMatch> correlate(const LandmarkMemory& memory, std::size_t index, const StereoImages& images,
-                                         const Pose& current_from_previous,
+                                         const Pose& current_from_previous, ImageSide side,
                                          const std::optional<Eigen::Vector2d>& start_px = {}) const;
   std::vector<LandmarkMatch> collect(std::size_t count,
                                      const std::function<std::optional<LandmarkMatch>(std::size_t)>& measure);

@@ -49,6 +49,19 @@ std::optional<RowAlignment> LandmarkReconstructor::reconstruct(const StereoImage
   return align(images, {x, y}, start, kAlignmentRadius_px);
 }
 
+std::vector<ReconstructedFeature> LandmarkReconstructor::reconstruct(const StereoImages& images,
+                                                                     const std::vector<Feature>& features,
+                                                                     ThreadPool& workers) const {
+  std::vector<ReconstructedFeature> result(features.size());
+  workers.parallel_for(0, static_cast<int>(features.size()), 16, [&](int begin, int end) {
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+      const Feature& f = features[i];
+      result[i] = {f, reconstruct(images, static_cast<int>(std::lround(f.x)), static_cast<int>(std::lround(f.y)))};
+    }
+  });
+  return result;
+}
+
 std::optional<double> LandmarkReconstructor::search(const StereoImages& images, int x, int y, int min_disparity,
                                                     int max_disparity) const {
   constexpr int rx = kCorrelationRadiusX, ry = kCorrelationRadiusY;

@@ -4,8 +4,11 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "spartan/core/image.h"
+#include "spartan/core/threads.h"
+#include "spartan/odometry/internal/detection/landmark_detector.h"
 #include "spartan/odometry/internal/matching/patch_alignment.h"
 #include "spartan/odometry/odometer.h"
 #include "spartan/rig/rectified_stereo.h"
@@ -21,6 +24,12 @@ struct StereoImages {
   ImageView<const float> disparity;                          ///< dense, of the left image, NaN unknown; may be empty
 };
 
+/// A feature of the current frame and its disparity at the nearest whole pixel, where one was found.
+struct ReconstructedFeature {
+  Feature feature;
+  std::optional<RowAlignment> stereo;
+};
+
 class LandmarkReconstructor {
  public:
   explicit LandmarkReconstructor(const LandmarkReconstructionOptions& options) : options_(options) {}
@@ -30,6 +39,10 @@ class LandmarkReconstructor {
   /// sub-pixel accuracy. Read from the dense disparity image instead where the options say so and there is one.
   /// std::nullopt where a test fails.
   std::optional<RowAlignment> reconstruct(const StereoImages& images, int x, int y) const;
+
+  /// Each feature with the disparity of its nearest whole pixel.
+  std::vector<ReconstructedFeature> reconstruct(const StereoImages& images, const std::vector<Feature>& features,
+                                                ThreadPool& workers) const;
 
   /// Disparity of a sub-pixel position within `radius_px` of a predicted disparity (and slant).
   std::optional<RowAlignment> refine(const StereoImages& images, const Eigen::Vector2d& pixel,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "spartan/numerics/levenberg_marquardt.h"
 #include "spartan/numerics/random.h"
@@ -15,11 +16,14 @@ namespace {
 
 /// Seed of the RANSAC samples; any constant makes them reproducible.
 constexpr std::uint64_t kSeed = 0x5157;
-/// Median and first quartile of the chi-squared distribution with three degrees of freedom: s of a (u, v, d) residual.
-constexpr double kMedianChi3 = 2.366;
-constexpr double kQuartileChi3 = 1.213;
+/// Median and first quartile of the chi-squared distribution with three degrees of freedom: s of a (u, v, d) residual;
+/// with two: of an image position.
+constexpr double kMedianChi3 = 2.366, kMedianChi2 = 1.386;
+constexpr double kQuartileChi3 = 1.213, kQuartileChi2 = 0.575;
 /// Landmarks with a smaller disparity are too uncertain in depth for a 3D-3D fit; empirical.
 constexpr double kMinFitDisparity_px = 0.5;
+/// Landmarks of a RANSAC sample.
+constexpr std::size_t kSampleSize = 3;
 /// RANSAC stops when three inliers have been sampled with this probability of failure.
 constexpr double kRansacFailure = 1e-4;
 /// With fewer inliers the motion (6 unknowns) is not determined redundantly.
@@ -56,13 +60,17 @@ double quantile(std::vector<double> values, double fraction) {
 /// Ratio of the observed to the specified standard deviation of the residuals, at least 1: in the first round from the
 /// first quartile of all residuals (valid with up to 75 % outliers, and then conservative), then from the median of the
 /// inliers.
-double noise_scale_of(const std::vector<double>& squares, const std::vector<bool>& used, bool first) {
-  std::vector<double> squared;
-  squared.reserve(squares.size());
-  for (std::size_t i = 0; i < squares.size(); ++i)
-    if (used[i]) squared.push_back(squares[i]);
-  const double excess =
-      first ? quantile(std::move(squared), 0.25) / kQuartileChi3 : quantile(std::move(squared), 0.5) / kMedianChi3;
+double noise_scale_of(const std::vector<LandmarkMatch>& matches, const std::vector<double>& squares,
+                      const std::vector<bool>& used, bool first) {
+  std::vector<double> ratios;
+  ratios.reserve(squares.size());
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    if (!used[i]) continue;
+    const bool both = matches[i].cameras == MeasuredIn::both;
+    ratios.push_back(squares[i] /
+                     (first ? (both ? kQuartileChi3 : kQuartileChi2) : (both ? kMedianChi3 : kMedianChi2)));
+  }
+  const double excess = quantile(std::move(ratios), first ? 0.25 : 0.5);
   return std::sqrt(std::max(1.0, std::isfinite(excess) ? excess : 1.0));
 }
 
@@ -74,8 +82,8 @@ int samples_for(double fraction) {
 }
 
 /// Sets `inlier`, `inliers` and `rms_px`: a match is an inlier where its squared normalized residual is within `limit`.
-void classify_inliers(MotionFit& fit, const MotionProblem& problem, const std::vector<double>& squares,
-                      const MotionState& state, double limit) {
+void classify_inliers(MotionFit& fit, const std::vector<LandmarkMatch>& matches, const MotionProblem& problem,
+                      const std::vector<double>& squares, const MotionState& state, double limit) {
   fit.inlier.assign(squares.size(), false);
   fit.inliers = 0;
   double sum = 0;
@@ -83,10 +91,80 @@ void classify_inliers(MotionFit& fit, const MotionProblem& problem, const std::v
     if (!(squares[i] <= limit)) continue;
     fit.inlier[i] = true;
     ++fit.inliers;
-    sum += problem.residual(i, state).squaredNorm() / 3;
+    sum += matches[i].observed(problem.residual(i, state)).squaredNorm() / matches[i].dimensions();
   }
   fit.rms_px = fit.inliers > 0 ? std::sqrt(sum / fit.inliers) : 0;
 }
+
+/// Fits motions to samples of matches: to 3D points before and after, or, where most landmarks were measured in one
+/// camera only, to image positions.
+class SampleFit {
+ public:
+  SampleFit(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const Pose& start)
+      : stereo_(stereo), matches_(matches), start_(start), points_(matches.size()) {
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      const LandmarkMatch& m = matches[i];
+      if (m.cameras != MeasuredIn::both || m.point.disparity < kMinFitDisparity_px ||
+          m.measured.z() < kMinFitDisparity_px)
+        continue;
+      Point& p = points_[i];
+      p.previous = m.previous_from_anchor * stereo.triangulate(m.point.pixel.x(), m.point.pixel.y(), m.point.disparity);
+      p.current = stereo.triangulate(m.measured.x(), m.measured.y(), m.measured.z());
+      // A disparity error moves a point by z²/(f b) along its ray: the weight is the inverse of the variance.
+      p.weight = 1 / std::pow(p.current.z(), 4);
+      usable_.push_back(i);
+    }
+    const auto in_one = std::count_if(matches.begin(), matches.end(),
+                                      [](const LandmarkMatch& m) { return m.cameras != MeasuredIn::both; });
+    by_pixels_ = 2 * static_cast<std::size_t>(in_one) > matches.size();
+    if (!by_pixels_) return;
+    usable_.resize(matches.size());
+    std::iota(usable_.begin(), usable_.end(), std::size_t{0});
+  }
+
+  /// Matches that can be sampled.
+  const std::vector<std::size_t>& usable() const { return usable_; }
+
+  std::optional<Pose> fit(const std::vector<std::size_t>& chosen) const {
+    if (chosen.size() < kSampleSize) return std::nullopt;
+    return by_pixels_ ? fit_pixels(chosen) : fit_points(chosen);
+  }
+
+ private:
+  struct Point {
+    Eigen::Vector3d previous, current;
+    double weight = 0;
+  };
+
+  std::optional<Pose> fit_points(const std::vector<std::size_t>& chosen) const {
+    std::vector<Eigen::Vector3d> a, b;
+    std::vector<double> w;
+    for (const std::size_t i : chosen) {
+      a.push_back(points_[i].previous);
+      b.push_back(points_[i].current);
+      w.push_back(points_[i].weight);
+    }
+    const std::optional<UmeyamaFit> fit = fit_umeyama(a, b, FitScale::fixed, w);
+    if (!fit || !fit->unique) return std::nullopt;
+    return fit->target_from_source.pose;
+  }
+
+  std::optional<Pose> fit_pixels(const std::vector<std::size_t>& chosen) const {
+    std::vector<LandmarkMatch> sample;
+    sample.reserve(chosen.size());
+    for (const std::size_t i : chosen) sample.push_back(matches_[i]);
+    MotionProblem problem(stereo_, sample, {}, false);
+    const Pose motion = minimize(problem, std::vector<bool>(sample.size(), true), {start_, 0}, 1).motion;
+    return motion.translation().allFinite() ? std::optional(motion) : std::nullopt;
+  }
+
+  const RectifiedStereo& stereo_;
+  const std::vector<LandmarkMatch>& matches_;
+  Pose start_;
+  std::vector<Point> points_;
+  std::vector<std::size_t> usable_;
+  bool by_pixels_ = false;
+};
 
 }  // namespace
 
@@ -97,48 +175,27 @@ std::vector<bool> MotionEstimator::agreeing(const RectifiedStereo& stereo, const
   const Pose current_from_previous = previous_from_current.inverse();
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const auto p = project_anchored(stereo, matches[i].point, current_from_previous * matches[i].previous_from_anchor);
-    agrees[i] = p && (p->measured - matches[i].measured).squaredNorm() <= limit;
+    agrees[i] = p && matches[i].observed(p->measured - matches[i].measured).squaredNorm() <= limit;
   }
   return agrees;
 }
 
 std::optional<MotionFit> MotionEstimator::coarse(const RectifiedStereo& stereo,
-                                                 const std::vector<LandmarkMatch>& matches, int least_inliers) const {
-  std::vector<Eigen::Vector3d> previous, current;
-  std::vector<double> weights;
-  std::vector<std::size_t> usable;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    const LandmarkMatch& m = matches[i];
-    if (m.point.disparity < kMinFitDisparity_px || m.measured.z() < kMinFitDisparity_px) continue;
-    usable.push_back(i);
-    previous.push_back(m.previous_from_anchor *
-                       stereo.triangulate(m.point.pixel.x(), m.point.pixel.y(), m.point.disparity));
-    current.push_back(stereo.triangulate(m.measured.x(), m.measured.y(), m.measured.z()));
-    // A disparity error moves a point by z²/(f b) along its ray: the weight is the inverse of the variance.
-    weights.push_back(1 / std::pow(current.back().z(), 4));
-  }
-  if (usable.size() < 3) return std::nullopt;
-
-  const auto inliers_of = [&](const Pose& motion) {
-    std::vector<bool> inlier = agreeing(stereo, matches, motion);
-    const auto count = static_cast<int>(std::count(inlier.begin(), inlier.end(), true));
-    return std::pair(count, std::move(inlier));
-  };
-  const auto fit_of = [&](const std::vector<std::size_t>& chosen) -> std::optional<Pose> {
-    if (chosen.size() < 3) return std::nullopt;
-    std::vector<Eigen::Vector3d> a, b;
-    std::vector<double> w;
-    for (const std::size_t k : chosen) {
-      a.push_back(previous[k]);
-      b.push_back(current[k]);
-      w.push_back(weights[k]);
-    }
-    const std::optional<UmeyamaFit> fit = fit_umeyama(a, b, FitScale::fixed, w);
-    if (!fit || !fit->unique) return std::nullopt;
-    return fit->target_from_source.pose;
-  };
-
+                                                 const std::vector<LandmarkMatch>& matches, int least_inliers,
+                                                 const Pose& start) const {
+  const SampleFit sample(stereo, matches, start);
+  const std::vector<std::size_t>& usable = sample.usable();
+  if (usable.size() < kSampleSize) return std::nullopt;
   MotionFit best;
+  const auto take_if_better = [&](const std::optional<Pose>& motion, int least) {
+    if (!motion) return;
+    std::vector<bool> inlier = agreeing(stereo, matches, *motion);
+    const auto inliers = static_cast<int>(std::count(inlier.begin(), inlier.end(), true));
+    if (inliers < least) return;
+    best.previous_from_current = *motion;
+    best.inliers = inliers;
+    best.inlier = std::move(inlier);
+  };
   Random random(kSeed);
   const auto count = static_cast<std::uint32_t>(usable.size());
   const auto all = static_cast<double>(matches.size());
@@ -147,29 +204,19 @@ std::optional<MotionFit> MotionEstimator::coarse(const RectifiedStereo& stereo,
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const std::size_t i = random.below(count), j = random.below(count), k = random.below(count);
     if (i == j || j == k || i == k) continue;
-    const std::optional<Pose> motion = fit_of({i, j, k});
-    if (!motion) continue;
-    auto [inliers, inlier] = inliers_of(*motion);
-    if (inliers <= best.inliers) continue;
-    best.previous_from_current = *motion;
-    best.inliers = inliers;
-    best.inlier = std::move(inlier);
-    if (std::pow(inliers / all, 3) > 0.999) break;
-    iterations = std::min(iterations, iteration + samples_for(inliers / all));
+    const int before = best.inliers;
+    take_if_better(sample.fit({usable[i], usable[j], usable[k]}), before + 1);
+    if (best.inliers == before) continue;
+    const double fraction = best.inliers / all;
+    if (std::pow(fraction, 3) > 0.999) break;
+    iterations = std::min(iterations, iteration + samples_for(fraction));
   }
-  if (best.inliers < 3) return std::nullopt;
+  if (best.inliers < static_cast<int>(kSampleSize)) return std::nullopt;
 
   std::vector<std::size_t> chosen;
-  for (std::size_t k = 0; k < usable.size(); ++k)
-    if (best.inlier[usable[k]]) chosen.push_back(k);
-  if (const std::optional<Pose> motion = fit_of(chosen)) {
-    auto [inliers, inlier] = inliers_of(*motion);
-    if (inliers >= best.inliers) {
-      best.previous_from_current = *motion;
-      best.inliers = inliers;
-      best.inlier = std::move(inlier);
-    }
-  }
+  for (const std::size_t i : usable)
+    if (best.inlier[i]) chosen.push_back(i);
+  take_if_better(sample.fit(chosen), best.inliers);
   return best;
 }
 
@@ -187,8 +234,8 @@ std::optional<MotionFit> MotionEstimator::fine(const RectifiedStereo& stereo, co
     fit.offset.value = state.offset;
     problem.update_weights(state);
     const std::vector<double>& squares = problem.squares(state);
-    fit.noise_scale = noise_scale_of(squares, used, round == 0);
-    classify_inliers(fit, problem, squares, state, limit * fit.noise_scale * fit.noise_scale);
+    fit.noise_scale = noise_scale_of(matches, squares, used, round == 0);
+    classify_inliers(fit, matches, problem, squares, state, limit * fit.noise_scale * fit.noise_scale);
     used = fit.inlier;
     if (fit.inliers < kMinInliers) return std::nullopt;
   }

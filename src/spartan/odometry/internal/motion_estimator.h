@@ -7,21 +7,11 @@
 #include <vector>
 
 #include "spartan/core/pose.h"
-#include "spartan/odometry/internal/motion/anchored_point.h"
+#include "spartan/odometry/internal/motion/landmark_match.h"
 #include "spartan/odometry/odometer.h"
 #include "spartan/rig/rectified_stereo.h"
 
 namespace spartan::internal {
-
-/// A landmark and its measurement in the current frame.
-struct LandmarkMatch {
-  std::size_t landmark = 0;       ///< index of the landmark, for the caller
-  AnchoredPoint point;            ///< the landmark in its anchor
-  double disparity_variance = 0;  ///< of the disparity in the anchor, pixels²
-  Pose previous_from_anchor;
-  Eigen::Vector3d measured;    ///< (u, v, d) in the current frame, pixels
-  Eigen::Matrix3d covariance;  ///< of `measured`, pixels²
-};
 
 /// Constant that is missing from all disparities of a pair, in pixels: the relative yaw of the cameras is never
 /// calibrated to the last hundredth of a pixel (0.1 px at a focal length of 700 px is half an arc minute). It is
@@ -45,12 +35,13 @@ class MotionEstimator {
  public:
   explicit MotionEstimator(const MotionEstimationOptions& options) : options_(options) {}
 
-  /// Coarse motion without a start value, by RANSAC (Fischler & Bolles, CACM 24, 1981): samples of three landmarks are
-  /// fitted 3D-3D and scored by the reprojection of all (u, v, d); the best sample is refined by a weighted 3D-3D fit
-  /// of its inliers. std::nullopt with fewer than three inliers. Deterministic: the same for the same matches. Where
-  /// only a motion of at least `least_inliers` is of interest, fewer samples are drawn.
+  /// Coarse motion by RANSAC (Fischler & Bolles, CACM 24, 1981): samples of three landmarks are fitted 3D-3D and scored
+  /// by the reprojection of all (u, v, d); the best sample is refined by a weighted 3D-3D fit of its inliers. Where
+  /// most landmarks were measured in one camera only, samples are fitted to image positions instead, from the motion
+  /// `start`. std::nullopt with fewer than three inliers. Deterministic: the same for the same matches. Where only a
+  /// motion of at least `least_inliers` is of interest, fewer samples are drawn.
   std::optional<MotionFit> coarse(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,
-                                  int least_inliers = 0) const;
+                                  int least_inliers = 0, const Pose& start = {}) const;
 
   /// Which matches a motion explains to within `ransac_threshold_px`: the inliers of coarse().
   std::vector<bool> agreeing(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches,

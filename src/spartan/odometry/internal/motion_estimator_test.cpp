@@ -17,6 +17,8 @@ struct World {
   double pixel_sigma = 0, disparity_sigma = 0, anchor_sigma = 0;
   int outliers = 0;
   double offset = 0;  // missing from all measured disparities
+  // Every second landmark is measured in this camera alone; both: none is.
+  MeasuredIn every_second = MeasuredIn::both, others = MeasuredIn::both;
 };
 
 // Landmarks anchored in the previous frame, 1 … 20 m away.
@@ -38,6 +40,11 @@ std::vector<LandmarkMatch> make_matches(const World& world, const Pose& previous
     m.covariance = Eigen::Vector3d(pixel * pixel, pixel * pixel, disparity * disparity).asDiagonal();
     if (static_cast<int>(matches.size()) < world.outliers) {
       m.measured += Eigen::Vector3d(random.uniform(-40, 40), random.uniform(-40, 40), random.uniform(0, 20));
+    }
+    const MeasuredIn camera = matches.size() % 2 == 0 ? world.every_second : world.others;
+    if (camera != MeasuredIn::both) {
+      const double u = m.measured.x() - (camera == MeasuredIn::right ? p->measured.z() : 0);
+      m.set_measured_in_one(camera, {u, m.measured.y()}, m.covariance.topLeftCorner<2, 2>(), p->measured.z() + 1);
     }
     matches.push_back(m);
   }
@@ -108,6 +115,39 @@ TEST(MotionEstimator, CovarianceIsConsistent) {
   EXPECT_NEAR(mean_nees(noisy, plain, {}), 6, 0.9);
   EXPECT_NEAR(mean_nees(noisy, {}, {}), 6, 1.2);  // the Cauchy loss assumes tails that this noise has not
   EXPECT_NEAR(mean_nees(noisy, plain, {0, 0.01}), 6, 0.9);
+}
+
+TEST(MotionEstimator, CovarianceIsConsistentWhereLandmarksAreSeenByOneCamera) {
+  MotionEstimationOptions plain;
+  plain.robust = false;
+  for (const MeasuredIn camera : {MeasuredIn::left, MeasuredIn::right}) {
+    World noisy{.pixel_sigma = 0.2, .disparity_sigma = 0.3, .anchor_sigma = 0.25, .every_second = camera};
+    EXPECT_NEAR(mean_nees(noisy, plain, {}), 6, 0.9);
+    EXPECT_NEAR(mean_nees(noisy, {}, {}), 6, 1.2);
+    noisy.others = camera;
+    EXPECT_NEAR(mean_nees(noisy, plain, {}), 6, 0.9);
+  }
+}
+
+TEST(MotionEstimator, RecoversAMotionFromPositionsInOneImage) {
+  Random random(7);
+  const MotionEstimator estimation{MotionEstimationOptions{}};
+  for (const MeasuredIn camera : {MeasuredIn::left, MeasuredIn::right}) {
+    for (int trial = 0; trial < 10; ++trial) {
+      const Pose truth = some_motion(random);
+      const World world{.pixel_sigma = 0.1, .outliers = 40, .every_second = camera, .others = camera};
+      const auto matches = make_matches(world, truth, random);
+      const auto coarse = estimation.coarse(kStereo, matches);
+      ASSERT_TRUE(coarse.has_value());
+      EXPECT_GE(coarse->inliers, 75);
+      EXPECT_LT((truth.inverse() * coarse->previous_from_current).translation().norm(), 0.05);
+      const auto fine = estimation.fine(kStereo, matches, coarse->previous_from_current);
+      ASSERT_TRUE(fine.has_value());
+      EXPECT_LT((truth.inverse() * fine->previous_from_current).translation().norm(), 0.01);
+      EXPECT_NEAR(fine->inliers, 80, 4);
+      EXPECT_NEAR(fine->rms_px, 0.1, 0.02);
+    }
+  }
 }
 
 TEST(MotionEstimator, NoiseScaleFollowsUnspecifiedNoise) {

@@ -25,6 +25,8 @@ constexpr double kDeviationRatio = 2;
 /// The inliers of an object are not spread over this many times the area of the scene's.
 constexpr double kAreaRatio = 1.3;
 
+/// The motion of the scene has at least this many times the established landmarks that an object has; empirical.
+constexpr int kEstablishedRatio = 2;
 /// Motions among the outliers of the first one that are tried as its rival: an object has several, where landmarks of
 /// different age follow it.
 constexpr int kMostRivals = 3;
@@ -80,28 +82,49 @@ bool is_rival(const MotionEstimator& estimator, const RectifiedStereo& stereo,
   return kDeviationRatio * deviation(other) <= deviation(first);
 }
 
+/// Whether one motion explains both sets: coarse motions of landmarks in different parts of the view differ by more
+/// than their noise.
+bool is_one_motion(const MotionEstimator& estimator, const RectifiedStereo& stereo,
+                   const std::vector<LandmarkMatch>& matches, const MotionFit& first,
+                   const std::vector<LandmarkMatch>& others, const MotionFit& second) {
+  std::vector<LandmarkMatch> both;
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (first.inlier[i]) both.push_back(matches[i]);
+  for (std::size_t i = 0; i < others.size(); ++i)
+    if (second.inlier[i]) both.push_back(others[i]);
+  const auto fit = estimator.fine(stereo, both, second.previous_from_current);
+  if (!fit) return false;
+  const auto end = fit->inlier.begin() + first.inliers;
+  return 2 * std::count(fit->inlier.begin(), end, true) >= first.inliers &&
+         2 * std::count(end, fit->inlier.end(), true) >= second.inliers;
+}
+
 }  // namespace
+
+bool is_as_predicted(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& motion,
+                     const Pose& predicted) {
+  return deviation_from(stereo, matches, motion.inlier, motion.previous_from_current, predicted) < kPredicted_px;
+}
 
 std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const RectifiedStereo& stereo,
                                     const std::vector<LandmarkMatch>& matches, const MotionFit& first,
                                     const Pose& predicted) {
   const int least = std::max(kMinRivalInliers, static_cast<int>(std::ceil(kMinRivalFraction * first.inliers)));
   if (static_cast<int>(matches.size()) - first.inliers < least) return std::nullopt;
-  if (deviation_from(stereo, matches, first.inlier, first.previous_from_current, predicted) < kPredicted_px)
-    return std::nullopt;
+  if (is_as_predicted(stereo, matches, first, predicted)) return std::nullopt;
   std::vector<LandmarkMatch> outliers;
   std::vector<std::size_t> index;
   const Pose by_prediction = predicted.inverse();
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (first.inlier[i]) continue;
     const auto p = project_anchored(stereo, matches[i].point, by_prediction * matches[i].previous_from_anchor);
-    if (!p || (p->measured - matches[i].measured).norm() > kPredictionRadius_px) continue;
+    if (!p || matches[i].observed(p->measured - matches[i].measured).norm() > kPredictionRadius_px) continue;
     outliers.push_back(matches[i]);
     index.push_back(i);
   }
   for (int attempt = 0; attempt < kMostRivals; ++attempt) {
     if (static_cast<int>(outliers.size()) < least) return std::nullopt;
-    std::optional<MotionFit> rival = estimator.coarse(stereo, outliers, least);
+    std::optional<MotionFit> rival = estimator.coarse(stereo, outliers, least, predicted);
     if (!rival || rival->inliers < least) return std::nullopt;
     std::vector<bool> inlier(matches.size(), false);
     std::size_t kept = 0;
@@ -117,6 +140,27 @@ std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const Rect
     if (is_rival(estimator, stereo, matches, first, *rival, predicted)) return rival;
   }
   return std::nullopt;
+}
+
+bool is_of_young_landmarks(const std::vector<LandmarkMatch>& matches, const MotionFit& motion) {
+  int established = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) established += motion.inlier[i] && matches[i].established;
+  return 2 * established < motion.inliers;
+}
+
+std::optional<ChosenMotion> find_established_motion(const MotionEstimator& estimator, const RectifiedStereo& stereo,
+                                                    const std::vector<LandmarkMatch>& established,
+                                                    const std::vector<LandmarkMatch>& matches, const MotionFit& first,
+                                                    const Pose& predicted) {
+  const std::vector<bool> agreeing = estimator.agreeing(stereo, established, first.previous_from_current);
+  const auto with_first = static_cast<int>(std::count(agreeing.begin(), agreeing.end(), true));
+  const int least = std::max(kMinRivalInliers, kEstablishedRatio * with_first);
+  std::optional<MotionFit> scene = estimator.coarse(stereo, established, least, predicted);
+  if (!scene || scene->inliers < least || is_one_motion(estimator, stereo, matches, first, established, *scene))
+    return std::nullopt;
+  std::string reason = fmt::format("{} landmarks of several frames follow one motion, {} another, that of an object",
+                                   scene->inliers, with_first);
+  return ChosenMotion{*std::move(scene), first.previous_from_current, std::move(reason)};
 }
 
 ChosenMotion choose_motion(const std::vector<LandmarkMatch>& matches, const MotionFit& first, const MotionFit& rival) {
@@ -139,8 +183,9 @@ std::vector<bool> follows_object(const RectifiedStereo& stereo, const std::vecto
     const LandmarkMatch& match = matches[i];
     const auto a = project_anchored(stereo, match.point, by_scene * match.previous_from_anchor);
     const auto b = project_anchored(stereo, match.point, by_object * match.previous_from_anchor);
-    if (!a || !b || (a->measured - b->measured).norm() < kSamePlace_px) continue;
-    follows[i] = (b->measured - match.measured).norm() < (a->measured - match.measured).norm();
+    if (!a || !b || match.observed(a->measured - b->measured).norm() < kSamePlace_px) continue;
+    follows[i] =
+        match.observed(b->measured - match.measured).norm() < match.observed(a->measured - match.measured).norm();
   }
   return follows;
 }

@@ -26,6 +26,19 @@ std::optional<MotionFit> find_rival(const MotionEstimator& estimator, const Rect
                                     const std::vector<LandmarkMatch>& matches, const MotionFit& first,
                                     const Pose& predicted);
 
+/// Another motion that most of the established landmarks follow, of which `established` are the measurements near the
+/// prediction, while the largest set of `matches`, that of `first`, consists of young ones: `first` is then the motion
+/// of an object, because its landmarks did not follow the scene before. std::nullopt where there is none.
+std::optional<ChosenMotion> find_established_motion(const MotionEstimator& estimator, const RectifiedStereo& stereo,
+                                                    const std::vector<LandmarkMatch>& established,
+                                                    const std::vector<LandmarkMatch>& matches, const MotionFit& first,
+                                                    const Pose& predicted);
+/// Whether most inliers of a motion are young.
+bool is_of_young_landmarks(const std::vector<LandmarkMatch>& matches, const MotionFit& motion);
+/// Whether a motion deviates so little from the prediction that it is that of the scene.
+bool is_as_predicted(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& motion,
+                     const Pose& predicted);
+
 /// The rival, which is the predicted motion, unless its inliers are compact and those of `first` spread over the image:
 /// then it may be an object that moves with the camera, and `first` is chosen.
 ChosenMotion choose_motion(const std::vector<LandmarkMatch>& matches, const MotionFit& first, const MotionFit& rival);

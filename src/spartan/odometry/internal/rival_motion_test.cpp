@@ -95,6 +95,44 @@ TEST(RivalMotion, AgreesWithThePredictionBetterThanTheFirstMotion) {
   EXPECT_FALSE(search({noisy}, kScene, 2.0).rival);
 }
 
+// 60 landmarks of earlier frames against 150 of an object that has come into view, and 10 of the former that it hides.
+TEST(RivalMotion, EstablishedLandmarksTellTheScene) {
+  const MotionEstimator estimator{MotionEstimationOptions{}};
+  Part earlier = kWholeView, hidden = kCompact;
+  earlier.count = 60;
+  hidden.count = 10;
+  std::vector<LandmarkMatch> established = matches_of({earlier, hidden}), matches = matches_of({earlier, kCompact});
+  for (std::size_t i = 0; i < 60; ++i) matches[i].established = true;
+  const MotionFit object = estimator.coarse(kPair, matches).value();
+  ASSERT_LT(apart(object.previous_from_current, kObject), 0.008);
+  EXPECT_TRUE(is_of_young_landmarks(matches, object));
+  const auto chosen = find_established_motion(estimator, kPair, established, matches, object, kScene);
+  ASSERT_TRUE(chosen);
+  EXPECT_LT(apart(chosen->fit.previous_from_current, kScene), 0.012);
+  EXPECT_LT(apart(chosen->object.value(), kObject), 0.008);
+  EXPECT_EQ(chosen->reason, "60 landmarks of several frames follow one motion, 10 another, that of an object");
+  // Landmarks of the scene follow the largest set: it is the scene.
+  const std::vector<LandmarkMatch> view = matches_of({kWholeView});
+  MotionFit scene = estimator.coarse(kPair, view).value();
+  EXPECT_FALSE(find_established_motion(estimator, kPair, matches_of({earlier}), view, scene, kScene));
+  // A coarse motion may be so inaccurate that few other landmarks agree with it; it is the same motion nevertheless.
+  scene.previous_from_current = kScene * exp_se3((Vector6d() << 0.03, 0, 0, 0, 0, 0).finished());
+  EXPECT_FALSE(find_established_motion(estimator, kPair, matches_of({earlier}), view, scene, kScene));
+  // Too few of them are left.
+  earlier.count = 14;
+  EXPECT_FALSE(find_established_motion(estimator, kPair, matches_of({earlier}), matches, object, kScene));
+  for (LandmarkMatch& match : matches) match.established = true;
+  EXPECT_FALSE(is_of_young_landmarks(matches, object));
+}
+
+TEST(RivalMotion, AMotionIsAsPredictedWithinAFewPixels) {
+  const std::vector<LandmarkMatch> matches = matches_of({kWholeView});
+  const MotionFit fit = MotionEstimator{MotionEstimationOptions{}}.coarse(kPair, matches).value();
+  EXPECT_TRUE(is_as_predicted(kPair, matches, fit, kScene));
+  EXPECT_TRUE(is_as_predicted(kPair, matches, fit, kScene * Pose::from_translation({0.01, 0, 0})));  // 2.5 px
+  EXPECT_FALSE(is_as_predicted(kPair, matches, fit, kScene * Pose::from_translation({0.02, 0, 0})));
+}
+
 // Few points at 25 m leave the translation undetermined: at the distance of the object their motion is farther from the
 // prediction than that of the object.
 TEST(RivalMotion, IsFoundByDistantPoints) {

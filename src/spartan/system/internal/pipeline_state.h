@@ -71,8 +71,14 @@ struct Pipeline::State {
   // State from frame to frame.
   bool started = false;
   Stamp last_stamp;
-  Pose world_from_left;                  // by odometry alone
-  Pose left_from_body;                   // of the last frame
+  Pose world_from_left;  // by odometry alone
+  Pose left_from_body;   // of the last frame
+  // The frame at which the next motion of the odometry begins: the last one whose motion was measured.
+  struct Reference {
+    Stamp stamp;
+    Pose world_from_left, left_from_body;
+  };
+  Reference reference;
   Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the body frame, per second
   double distance_m = 0;
   double distance_of_last_terrain_m = -1;
@@ -82,12 +88,11 @@ struct Pipeline::State {
                    const internal::FrozenCameras::Fingerprints& images) const;
   void start(const RectifiedPair& rectified);
   std::optional<Pose> predicted_motion(const RectifiedPair& rectified) const;
-  void advance(const MotionEstimate& motion, const RelativeMotion& body_motion);
-  RelativeMotion body_motion(const Pose& last_body_from_left, const Pose& body_from_left,
-                             const MotionEstimate& motion) const;
+  RelativeMotion body_motion(const Pose& body_from_left, const MotionEstimate& motion) const;
+  Pose advance(const RectifiedPair& rectified, const MotionEstimate& motion, const RelativeMotion& body_motion);
   void add_sensor_sample(const Measurement& sample);
   void localize(const RelativeMotion& motion);
-  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
+  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const UncertainPose& step);
   void apply_map_constraint(const internal::StopSurvey& survey, const PoseConstraint& constraint);
   Status add_view(const StereoFrame& frame);
   Result<std::optional<MappedStop>> finish_stop();
@@ -95,8 +100,7 @@ struct Pipeline::State {
   void make_keyframe_map(const std::optional<MapExcerpt>& global);
   Result<MappedStop> finish_keyframe();
   MappedStop apply(const internal::StopSurvey& survey, MapMergeResult merged);
-  void update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion,
-                        const RelativeMotion& body_motion);
+  void update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion, const UncertainPose& step);
   bool terrain_is_due() const;
   Status check_disparities(const RectifiedPair& rectified) const;
   Result<DisparityImage> dense_disparity(const RectifiedPair& rectified);

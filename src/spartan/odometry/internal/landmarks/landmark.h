@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "spartan/core/pose.h"
+#include "spartan/core/time.h"
 #include "spartan/odometry/internal/detection/landmark_detector.h"
+#include "spartan/odometry/internal/matching/image_pyramid.h"
 #include "spartan/odometry/internal/matching/patch_alignment.h"
 
 namespace spartan::internal {
@@ -32,8 +34,15 @@ struct Landmark {
   float angle = 0;
   std::int8_t sign = 0;
   Descriptor descriptor{};
-  std::int32_t missed_frames = 0;  ///< consecutive frames without an inlier measurement
+  std::int32_t missed_frames = 0;    ///< consecutive frames without an inlier measurement
+  std::int32_t measured_frames = 0;  ///< frames in which it was an inlier of the scene while the rover moved
 };
+
+/// Whether a landmark has followed the scene in a frame after its first one: one on an object that has just come into
+/// view or begun to move has not.
+inline bool is_established(const Landmark& landmark) {
+  return landmark.measured_frames > 0;
+}
 
 /// The landmarks of t−1: the published "1/z" block of the odometry.
 struct LandmarkMemory {
@@ -45,6 +54,13 @@ struct LandmarkMemory {
   const Anchor& anchor(std::uint32_t id) const;
   /// Removes the anchors that no landmark refers to.
   void drop_unused_anchors();
+};
+
+/// A frame, its landmarks and the pyramid of its left image.
+struct LandmarkFrame {
+  Stamp stamp;
+  LandmarkMemory map;
+  ImagePyramid pyramid;
 };
 
 }  // namespace spartan::internal

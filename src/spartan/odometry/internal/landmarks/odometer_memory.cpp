@@ -7,7 +7,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr std::uint32_t kVersion = 3;
+constexpr std::uint32_t kVersion = 4;
 constexpr const char* kWhat = "saved state of the odometry";
 
 void put(ArchiveWriter& out, const RectifiedStereo& stereo) {
@@ -61,6 +61,7 @@ void put(ArchiveWriter& out, const Landmark& landmark) {
   out.put(landmark.sign);
   out.put_array(landmark.descriptor.data(), landmark.descriptor.size());
   out.put(landmark.missed_frames);
+  out.put(landmark.measured_frames);
 }
 
 template <class T, std::size_t N>
@@ -92,9 +93,55 @@ bool get(ArchiveReader& in, Landmark& landmark) {
   landmark.sign = in.get<std::int8_t>();
   complete = fill(landmark.descriptor, in.get_array<std::int8_t>()) && complete;
   landmark.missed_frames = in.get<std::int32_t>();
+  landmark.measured_frames = in.get<std::int32_t>();
   return complete && landmark.pixel.cwiseAbs().maxCoeff() < kMostPixels &&
          landmark.anchor_pixel.cwiseAbs().maxCoeff() < kMostPixels && landmark.variance >= 0 &&
-         is_count(landmark.missed_frames);
+         is_count(landmark.missed_frames) && is_count(landmark.measured_frames);
+}
+
+void put(ArchiveWriter& out, const LandmarkFrame& frame) {
+  out.put(frame.stamp.ns);
+  out.put(frame.map.next_anchor_id);
+  out.put(static_cast<std::uint32_t>(frame.map.anchors.size()));
+  for (const Anchor& anchor : frame.map.anchors) {
+    out.put(anchor.id);
+    out.put(anchor.latest_from_anchor);
+  }
+  out.put(static_cast<std::uint32_t>(frame.map.landmarks.size()));
+  for (const Landmark& landmark : frame.map.landmarks) put(out, landmark);
+  for (int level = 0; level < ImagePyramid::kLevels; ++level) put(out, frame.pyramid.level(level));
+}
+
+/// What is damaged; empty where nothing is.
+std::string get(ArchiveReader& in, std::size_t bytes, LandmarkFrame& frame) {
+  frame.stamp = in.get_stamp();
+  LandmarkMemory& map = frame.map;
+  map.next_anchor_id = in.get<std::uint32_t>();
+  const auto anchors = in.get<std::uint32_t>();
+  if (anchors > bytes) return "is damaged: more anchors than bytes";
+  for (std::uint32_t i = 0; i < anchors; ++i) {
+    Anchor anchor;
+    anchor.id = in.get<std::uint32_t>();
+    if (!map.anchors.empty() && anchor.id <= map.anchors.back().id)
+      return "is damaged: the anchors are not in the order of their ids";
+    anchor.latest_from_anchor = in.get_pose();
+    map.anchors.push_back(anchor);
+  }
+  const auto landmarks = in.get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < landmarks; ++i) {
+    Landmark landmark;
+    if (!get(in, landmark)) return "is damaged: a landmark is not possible";
+    const auto is_its_anchor = [&](const Anchor& anchor) { return anchor.id == landmark.anchor_id; };
+    if (std::none_of(map.anchors.begin(), map.anchors.end(), is_its_anchor))
+      return "is damaged: a landmark has no anchor";
+    map.landmarks.push_back(landmark);
+  }
+  for (int level = 0; level < ImagePyramid::kLevels; ++level) {
+    auto image = get_image(in, bytes);
+    if (!image) return "is damaged: a level of the pyramid is not possible";
+    frame.pyramid.set_level(level, *std::move(image));
+  }
+  return {};
 }
 
 tl::unexpected<Error> damaged(const std::string& what) {
@@ -107,22 +154,16 @@ Bytes OdometerMemory::save() const {
   ArchiveWriter out;
   out.put(kVersion);
   out.put(started);
-  out.put(stamp.ns);
   put(out, geometry);
   out.put_array(last_motion.data(), 6);
   out.put(velocity_span_s);
   out.put(ambiguous_frames);
   out.put(offset.value);
   out.put(offset.variance);
-  out.put(map.next_anchor_id);
-  out.put(static_cast<std::uint32_t>(map.anchors.size()));
-  for (const Anchor& anchor : map.anchors) {
-    out.put(anchor.id);
-    out.put(anchor.latest_from_anchor);
-  }
-  out.put(static_cast<std::uint32_t>(map.landmarks.size()));
-  for (const Landmark& landmark : map.landmarks) put(out, landmark);
-  for (int level = 0; level < ImagePyramid::kLevels; ++level) put(out, pyramid.level(level));
+  put(out, reference);
+  out.put(frames_since_reference);
+  put(out, latest);
+  out.put(reference_from_latest);
   return out.take();
 }
 
@@ -131,7 +172,6 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   if (Status s = in.expect_version(kVersion, kWhat); !s) return failure(s);
   OdometerMemory memory;
   memory.started = in.get<bool>();
-  memory.stamp = in.get_stamp();
   memory.geometry = get_stereo(in);
   const std::vector<double> motion = in.get_array<double>();
   if (motion.size() != 6) return damaged("is damaged: the latest motion has not 6 entries");
@@ -142,31 +182,11 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   memory.offset.variance = in.get_finite();
   if (!memory.last_motion.allFinite() || !is_count(memory.ambiguous_frames) || !(memory.offset.variance >= 0))
     return damaged("is damaged: the latest motion is not possible");
-  memory.map.next_anchor_id = in.get<std::uint32_t>();
-  const auto anchors = in.get<std::uint32_t>();
-  if (anchors > bytes.size()) return damaged("is damaged: more anchors than bytes");
-  for (std::uint32_t i = 0; i < anchors; ++i) {
-    Anchor anchor;
-    anchor.id = in.get<std::uint32_t>();
-    if (!memory.map.anchors.empty() && anchor.id <= memory.map.anchors.back().id)
-      return damaged("is damaged: the anchors are not in the order of their ids");
-    anchor.latest_from_anchor = in.get_pose();
-    memory.map.anchors.push_back(anchor);
-  }
-  const auto landmarks = in.get<std::uint32_t>();
-  for (std::uint32_t i = 0; i < landmarks; ++i) {
-    Landmark landmark;
-    if (!get(in, landmark)) return damaged("is damaged: a landmark is not possible");
-    const auto is_its_anchor = [&](const Anchor& anchor) { return anchor.id == landmark.anchor_id; };
-    if (std::none_of(memory.map.anchors.begin(), memory.map.anchors.end(), is_its_anchor))
-      return damaged("is damaged: a landmark has no anchor");
-    memory.map.landmarks.push_back(landmark);
-  }
-  for (int level = 0; level < ImagePyramid::kLevels; ++level) {
-    auto image = get_image(in, bytes.size());
-    if (!image) return damaged("is damaged: a level of the pyramid is not possible");
-    memory.pyramid.set_level(level, *std::move(image));
-  }
+  if (std::string what = get(in, bytes.size(), memory.reference); !what.empty()) return damaged(what);
+  memory.frames_since_reference = in.get<std::int32_t>();
+  if (!is_count(memory.frames_since_reference)) return damaged("is damaged: the number of frames is not possible");
+  if (std::string what = get(in, bytes.size(), memory.latest); !what.empty()) return damaged(what);
+  memory.reference_from_latest = in.get_pose();
   if (Status status = in.finish(kWhat); !status) return failure(status);
   return memory;
 }

@@ -10,14 +10,16 @@ namespace {
 OdometerMemory some_memory() {
   OdometerMemory memory;
   memory.started = true;
-  memory.stamp.ns = 1234567890123;
+  memory.reference.stamp.ns = 1234567890123;
+  memory.frames_since_reference = 2;
+  memory.reference_from_latest = Pose::from_translation({0.1, 0, 0});
   memory.geometry = {{640, 480}, 500, {319.5, 239.5}, 0.12};
   memory.last_motion << 1, 2, 3, 0.1, 0.2, 0.3;
   memory.velocity_span_s = 0.1;
   memory.ambiguous_frames = 2;
   memory.offset = {0.07, 0.001};
-  memory.map.next_anchor_id = 9;
-  memory.map.anchors = {{3, exp_se3(memory.last_motion)}, {8, Pose()}};
+  memory.reference.map.next_anchor_id = 9;
+  memory.reference.map.anchors = {{3, exp_se3(memory.last_motion)}, {8, Pose()}};
   for (int i = 0; i < 3; ++i) {
     Landmark l;
     l.anchor_id = i == 0 ? 3 : 8;
@@ -29,8 +31,9 @@ OdometerMemory some_memory() {
     l.pixel = {11.5, 21.25};
     l.descriptor[5] = static_cast<std::int8_t>(-i);
     l.missed_frames = i;
-    memory.map.landmarks.push_back(l);
+    memory.reference.map.landmarks.push_back(l);
   }
+  memory.latest = {Stamp{1234567890999}, memory.reference.map, {}};
   return memory;
 }
 
@@ -39,11 +42,12 @@ TEST(OdometerMemory, RestoresWhatWasSaved) {
   const Result<OdometerMemory> restored = OdometerMemory::restore(bytes);
   ASSERT_TRUE(restored.has_value()) << restored.error().message();
   EXPECT_EQ(restored->save(), bytes);
-  EXPECT_EQ(restored->map.landmarks[2].patch[0], 1002);
-  EXPECT_EQ(restored->map.landmarks[2].disparity, 6.25);
+  EXPECT_EQ(restored->reference.map.landmarks[2].patch[0], 1002);
+  EXPECT_EQ(restored->reference.map.landmarks[2].disparity, 6.25);
+  EXPECT_EQ(restored->latest.map.landmarks.size(), 3U);
   EXPECT_EQ(restored->offset.value, 0.07);
-  EXPECT_EQ(restored->map.anchor(3).latest_from_anchor.translation(),
-            some_memory().map.anchors[0].latest_from_anchor.translation());
+  EXPECT_EQ(restored->reference.map.anchor(3).latest_from_anchor.translation(),
+            some_memory().reference.map.anchors[0].latest_from_anchor.translation());
 }
 
 TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
@@ -72,17 +76,17 @@ TEST(OdometerMemory, RejectsValuesThatAreNotPossible) {
     return !restored && restored.error().code == ErrorCode::store_damaged;
   };
   EXPECT_FALSE(is_rejected([](OdometerMemory&) {}));
-  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].pixel.x() = -1e285; }));
-  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].anchor_pixel.y() = std::nan(""); }));
-  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].variance = -1; }));
-  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.map.landmarks[1].missed_frames = 2'147'483'647; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.map.landmarks[1].pixel.x() = -1e285; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.map.landmarks[1].anchor_pixel.y() = std::nan(""); }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.map.landmarks[1].variance = -1; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.map.landmarks[1].missed_frames = 2'147'483'647; }));
   EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.last_motion[4] = std::nan(""); }));
   EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.ambiguous_frames = -1; }));
-  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.stamp.ns = -9'223'372'036'854'775'807; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.stamp.ns = -9'223'372'036'854'775'807; }));
 }
 
 TEST(LandmarkMemory, DropsUnusedAnchors) {
-  LandmarkMemory memory = some_memory().map;
+  LandmarkMemory memory = some_memory().reference.map;
   std::erase_if(memory.landmarks, [](const Landmark& l) { return l.anchor_id == 3; });
   memory.drop_unused_anchors();
   ASSERT_EQ(memory.anchors.size(), 1u);

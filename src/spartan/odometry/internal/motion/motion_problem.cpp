@@ -15,6 +15,8 @@ constexpr double kCauchy = 6.0;
 constexpr double kBehindCameraCost = kCauchy * 10;
 /// Information (px⁻²) of an offset that is taken as exact; large against that of any measurement.
 constexpr double kExactInformation = 1e12;
+/// Dimensions of a residual that a fit leaves at least; reached only where a motion rests on a few landmarks.
+constexpr double kMinDimensions = 0.5;
 using Jacobian = Eigen::Matrix<double, 3, 7>;
 
 }  // namespace
@@ -134,7 +136,7 @@ void MotionProblem::for_each_residual(const std::vector<bool>& used, const Motio
     const Projected p = project(entry, frame, state.offset);
     if (!p.in_front) continue;
     const Eigen::Vector3d r = residual(entry, p, state.offset);
-    visit(r, jacobian(entry, p, frame, state.offset), entry.weight, r.dot(entry.weight * r) * scale);
+    visit(matches_[i], r, jacobian(entry, p, frame, state.offset), entry.weight, r.dot(entry.weight * r) * scale);
   }
 }
 
@@ -142,7 +144,8 @@ NormalEquations<Matrix7d, Vector7d> MotionProblem::linearize(const std::vector<b
                                                              double noise_scale) const {
   NormalEquations<Matrix7d, Vector7d> normal{cost(used, state, noise_scale), Matrix7d::Zero(), Vector7d::Zero()};
   const double scale = 1 / (noise_scale * noise_scale);
-  const auto add = [&](const Eigen::Vector3d& r, const Jacobian& j, const Eigen::Matrix3d& inverse_spread, double s) {
+  const auto add = [&](const LandmarkMatch&, const Eigen::Vector3d& r, const Jacobian& j,
+                       const Eigen::Matrix3d& inverse_spread, double s) {
     const double weight = scale * (robust_ ? 1 / (1 + s / kCauchy) : 1);  // ρ'(s)
     const Jacobian weighted = weight * inverse_spread * j;
     normal.information.noalias() += weighted.transpose() * j;
@@ -157,16 +160,25 @@ NormalEquations<Matrix7d, Vector7d> MotionProblem::linearize(const std::vector<b
 Matrix7d MotionProblem::covariance(const std::vector<bool>& used, const MotionState& state, double noise_scale) const {
   Matrix7d a = Matrix7d::Zero(), b = Matrix7d::Zero();
   const double scale = 1 / (noise_scale * noise_scale);
-  const auto add = [&](const Eigen::Vector3d&, const Jacobian& j, const Eigen::Matrix3d& inverse_spread, double s) {
-    const Matrix7d information = j.transpose() * inverse_spread * j;
+  const auto add_slope = [&](const LandmarkMatch& match, const Eigen::Vector3d&, const Jacobian& j,
+                             const Eigen::Matrix3d& inverse_spread, double s) {
     const double weight = robust_ ? 1 / (1 + s / kCauchy) : 1, slope = robust_ ? -weight * weight / kCauchy : 0;
-    a += scale * (weight + 2.0 / 3.0 * s * slope) * information;
-    b += scale * weight * weight * s / 3 * information;
+    a += scale * (weight + 2.0 / match.dimensions() * s * slope) * (j.transpose() * inverse_spread * j);
   };
-  for_each_residual(used, state, noise_scale, add);
+  for_each_residual(used, state, noise_scale, add_slope);
   a(6, 6) += prior_information();
-  b(6, 6) += prior_information();
   const Matrix7d inverse = a.ldlt().solve(Matrix7d::Identity());
+  const auto add_score = [&](const LandmarkMatch& match, const Eigen::Vector3d&, const Jacobian& j,
+                             const Eigen::Matrix3d& inverse_spread, double s) {
+    const Matrix7d information = j.transpose() * inverse_spread * j;
+    const double weight = robust_ ? 1 / (1 + s / kCauchy) : 1;
+    // The fit follows each residual by its leverage: so many of its dimensions are left.
+    const double leverage = scale * weight * information.cwiseProduct(inverse).sum();
+    const double dimensions = std::max(match.dimensions() - leverage, kMinDimensions);
+    b += scale * weight * weight * s / dimensions * information;
+  };
+  for_each_residual(used, state, noise_scale, add_score);
+  b(6, 6) += prior_information();
   const Matrix7d covariance = inverse * b * inverse.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }

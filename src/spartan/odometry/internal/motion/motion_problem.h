@@ -39,8 +39,8 @@ class MotionProblem {
   NormalEquations<Matrix7d, Vector7d> linearize(const std::vector<bool>& used, const MotionState& state,
                                                 double noise_scale) const;
   /// Covariance of an M-estimate, A⁻¹ B A⁻¹ (Huber, Robust Statistics, 1981, §6.3), with A = Σ ψ' JᵀS⁻¹J and
-  /// B = Σ ψ² JᵀS⁻¹J. The whitened residual has three dimensions and a random direction; averaged over it, with the
-  /// weight w(s) of s = rᵀS⁻¹r, ψ' = w + ⅔ s w'(s) and ψ² = w² s/3.
+  /// B = Σ ψ² JᵀS⁻¹J. The whitened residual has n dimensions (3, or 2 of one camera) and a random direction; averaged
+  /// over it, with the weight w(s) of s = rᵀS⁻¹r, ψ' = w + 2/n s w'(s) and ψ² = w² s/n.
   Matrix7d covariance(const std::vector<bool>& used, const MotionState& state, double noise_scale) const;
 
  private:
@@ -61,7 +61,8 @@ class MotionProblem {
   Eigen::Vector3d residual(const Entry& entry, const Projected& p, double offset) const;
   double square(const Entry& entry, const Frame& frame, double offset) const;
   Eigen::Matrix<double, 3, 7> jacobian(const Entry& entry, const Projected& p, const Frame& frame, double offset) const;
-  /// Calls visit(r, J, S⁻¹, s) for each match that is used and in front of the camera, s in units of `noise_scale`².
+  /// Calls visit(match, r, J, S⁻¹, s) for each match that is used and in front of the camera, s in units of
+  /// `noise_scale`².
   template <class Visit>
   void for_each_residual(const std::vector<bool>& used, const MotionState& state, double noise_scale,
                          const Visit& visit) const;
