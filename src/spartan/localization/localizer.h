@@ -213,7 +213,7 @@ class Localizer {
   bool started() const;
 
   /// Returns whether the measurement was accepted into the buffer. Add one RelativeMotion for every frame after the
-  /// first, measured or not; `from` must be the stamp of the frame before.
+  /// first, measured or not; `from` must be the frame before, or that of the motion before if it keeps its reference.
   bool add(const Measurement& measurement);
   /// Whether a sample with that stamp is not too late for the buffer.
   bool reaches(Stamp stamp) const;

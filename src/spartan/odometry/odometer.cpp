@@ -387,7 +387,7 @@ Odometer& Odometer::operator=(Odometer&&) noexcept = default;
 Odometer::~Odometer() = default;
 
 MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose>& predicted,
-                             ImageView<const float> disparity) {
+                             ImageView<const float> disparity, const std::optional<Pose>& alternative) {
   State& s = *state_;
   Stopwatch all, watch;
   MotionEstimate estimate;
@@ -396,6 +396,7 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
   estimate.from = s.memory.started ? s.memory.reference.stamp : pair.stamp;
   MotionPrediction prediction = s.predict(pair.stamp);
   if (predicted) prediction.motion = *predicted;
+  if (alternative) prediction.other_starts.insert(prediction.other_starts.begin(), *alternative);
 
   const std::optional<std::string> defect = s.defect_of(pair);
   StereoImages images{pair.geometry, pair.left, pair.right, {}, {}, pair.left_mask, pair.right_mask, disparity};

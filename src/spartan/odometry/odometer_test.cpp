@@ -268,6 +268,24 @@ TEST(Odometer, MeasuresInTheRightImageWhileTheLeftOneIsDarkOrMissing) {
   }
 }
 
+// A turn of 40° on the spot between two frames, of which no other sensor or the IMU knows.
+TEST(Odometer, SearchesLandmarksByTheMotionOfOtherSensors) {
+  const SyntheticWorld world(testing::SyntheticWorldOptions{});
+  const Pose turned = true_pose(3) * true_pose(0).inverse() * camera_at(0.3, 0, 0.7);
+  const SyntheticFrame frame = world.render(kCameras, turned, 500);
+  const Pose truth = true_pose(3).inverse() * turned;
+  const Pose measured = truth * exp_se3((Vector6d() << 0.01, -0.01, 0.01, 0.005, -0.005, 0.01).finished());
+  for (const bool known : {false, true}) {
+    Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+    for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));
+    const MotionEstimate estimate =
+        odometer.add(pair_of(frame, 4), {}, {}, known ? std::optional(measured) : std::nullopt);
+    EXPECT_EQ(estimate.status == TrackingStatus::lost, !known) << estimate.reason;
+    if (!known) continue;
+    EXPECT_LT((truth.inverse() * estimate.previous_from_current).translation().norm(), 0.004);
+  }
+}
+
 TEST(Odometer, IsLostWithoutImages) {
   Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
   for (int i = 0; i < 4; ++i) odometer.add(pair_of(i));

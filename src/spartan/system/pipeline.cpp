@@ -13,6 +13,8 @@ using namespace internal;
 namespace {
 
 constexpr double kGravityOnEarth_m_s2 = 9.81;
+/// The newest sample of the localization is at most this old where it says how the rover has moved.
+constexpr double kLatestSample_s = 0.05;
 
 }  // namespace
 
@@ -40,7 +42,7 @@ void Pipeline::State::start(const RectifiedPair& rectified) {
   }
   world_from_left = first * rectified.body_from_left;
   left_from_body = rectified.body_from_left.inverse();
-  reference = {rectified.stamp, world_from_left, left_from_body};
+  reference = {rectified.stamp, world_from_left, left_from_body, {}};
   started = true;
 }
 
@@ -50,6 +52,15 @@ std::optional<Pose> Pipeline::State::predicted_motion(const RectifiedPair& recti
   if (!started || rig.find_camera(pair.left)->mount == "body") return std::nullopt;
   const double seconds = seconds_between(reference.stamp, rectified.stamp);
   return reference.left_from_body * exp_se3(velocity * seconds) * rectified.body_from_left;
+}
+
+// The same motion by the other sensors, where the localization has samples up to the frame.
+std::optional<Pose> Pipeline::State::motion_by_sensors(const RectifiedPair& rectified) const {
+  if (!started || options.odometry_only) return std::nullopt;
+  const LocalizationEstimate now = localizer.estimate();
+  if (!(std::abs(seconds_between(now.stamp, rectified.stamp)) < kLatestSample_s)) return std::nullopt;
+  const Pose body_motion = reference.odom_from_body.inverse() * now.odom_from_body.pose;
+  return reference.left_from_body * body_motion * rectified.body_from_left;
 }
 
 // Transports the motion M of the left camera to the body, with B₀ and B₁ = body_from_left at its begin and end, which
@@ -80,7 +91,7 @@ Pose Pipeline::State::advance(const RectifiedPair& rectified, const MotionEstima
   left_from_body = rectified.body_from_left.inverse();
   const double seconds = seconds_between(motion.from, motion.to);
   if (seconds > 0) velocity = log_se3(body_motion.previous_from_current) / seconds;
-  if (!motion.keeps_reference) reference = {motion.to, world_from_left, left_from_body};
+  if (!motion.keeps_reference) reference = {motion.to, world_from_left, left_from_body, {}};
   return last_body.inverse() * (world_from_left * left_from_body);
 }
 
@@ -216,13 +227,13 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     return failure(status);
   }
   s.frozen_cameras.remember(pair_index, images);
-  const std::optional<Pose> predicted = s.predicted_motion(*rectified);
+  const std::optional<Pose> predicted = s.predicted_motion(*rectified), by_sensors = s.motion_by_sensors(*rectified);
   if (!s.started) s.start(*rectified);
 
-  result.motion =
-      s.clock.measure("odometry", [&] { return s.odometer.add(*rectified, predicted, disparity->disparity); });
+  result.motion = s.clock.measure(
+      "odometry", [&] { return s.odometer.add(*rectified, predicted, disparity->disparity, by_sensors); });
   // After lost frames the landmarks of the last one may be the only ones that are found.
-  if (result.motion.from == s.last_stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body};
+  if (result.motion.from == s.last_stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body, {}};
   const RelativeMotion body_motion = s.body_motion(rectified->body_from_left, result.motion);
   UncertainPose step;
   if (!result.motion.first) {
@@ -244,6 +255,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   } else {
     result.world_from_body.covariance = s.odometry_filter.world_from_body().covariance;
     result.localization = s.localizer.estimate();
+    if (!result.motion.keeps_reference) s.reference.odom_from_body = result.localization->odom_from_body.pose;
     result.slam = s.slam_filter.world_from_body();
   }
   if (Status status = s.add_odometry_frame(frame, *rectified, step); !status) return failure(status);

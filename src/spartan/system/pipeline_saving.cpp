@@ -12,7 +12,7 @@ namespace spartan {
 
 namespace {
 
-constexpr std::uint32_t kPipelineVersion = 9;  // of save(); raise it when the saved state changes
+constexpr std::uint32_t kPipelineVersion = 10;  // of save(); raise it when the saved state changes
 
 }  // namespace
 
@@ -29,6 +29,7 @@ Bytes Pipeline::save() const {
   out.put(s.reference.stamp.ns);
   out.put(s.reference.world_from_left);
   out.put(s.reference.left_from_body);
+  out.put(s.reference.odom_from_body);
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
@@ -59,6 +60,7 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   s.reference.stamp = in.get_stamp();
   s.reference.world_from_left = in.get_pose();
   s.reference.left_from_body = in.get_pose();
+  s.reference.odom_from_body = in.get_pose();
   const std::vector<double> velocity = in.get_array<double>();
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get_finite();

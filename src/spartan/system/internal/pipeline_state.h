@@ -77,6 +77,7 @@ struct Pipeline::State {
   struct Reference {
     Stamp stamp;
     Pose world_from_left, left_from_body;
+    Pose odom_from_body;  // by the localization
   };
   Reference reference;
   Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the body frame, per second
@@ -88,6 +89,7 @@ struct Pipeline::State {
                    const internal::FrozenCameras::Fingerprints& images) const;
   void start(const RectifiedPair& rectified);
   std::optional<Pose> predicted_motion(const RectifiedPair& rectified) const;
+  std::optional<Pose> motion_by_sensors(const RectifiedPair& rectified) const;
   RelativeMotion body_motion(const Pose& body_from_left, const MotionEstimate& motion) const;
   Pose advance(const RectifiedPair& rectified, const MotionEstimate& motion, const RelativeMotion& body_motion);
   void add_sensor_sample(const Measurement& sample);
