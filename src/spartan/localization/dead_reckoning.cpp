@@ -43,11 +43,15 @@ void DeadReckoning::age(int index, const Vector6d& sigmas, double steps) {
 }
 
 void DeadReckoning::add(const RelativeMotion& motion) {
+  // Landmarks of a lost frame may be the only ones that are found again.
+  if (motion.from != reference_ && motion.from == latest_) at_reference_ = covariance_;
+  reference_ = motion.from;
+  latest_ = motion.to;
   covariance_ = at_reference_;
   const Pose& moved = motion.previous_from_current;
   // The exact identity says that the rover is stationary: lasting errors have no part in it.
   const bool stationary = moved.translation().isZero(1e-12) && moved.rotation().vec().isZero(1e-12);
-  const bool drifts = motion.measured && motion.lasting_errors && !stationary;
+  const bool drifts = motion.measured && !stationary;
   if (drifts) {
     age(kDrift, drift_sigma_ratios_, drift_correlation_frames_);
     age(kConstant, constant_sigma_ratios_, kConstantSteps);
@@ -63,7 +67,9 @@ void DeadReckoning::add(const RelativeMotion& motion) {
   covariance_ = 0.5 * (propagated + propagated.transpose());
   covariance_.topLeftCorner<6, 6>() +=
       0.5 * (motion.measured ? white_noise_factor_ : 1.0) * (motion.covariance + motion.covariance.transpose());
-  if (!motion.keeps_reference) at_reference_ = covariance_;
+  if (motion.keeps_reference) return;
+  at_reference_ = covariance_;
+  reference_ = latest_;
 }
 
 Bytes DeadReckoning::save() const {
@@ -71,6 +77,8 @@ Bytes DeadReckoning::save() const {
   out.put(kVersion);
   for (const Covariance* covariance : {&covariance_, &at_reference_})
     out.put_array(covariance->data(), static_cast<std::size_t>(covariance->size()));
+  out.put(reference_.ns);
+  out.put(latest_.ns);
   return out.take();
 }
 
@@ -79,6 +87,7 @@ Status DeadReckoning::restore(const Bytes& bytes) {
   const std::string what = "saved state of the dead reckoning";
   if (Status s = in.expect_version(kVersion, what); !s) return s;
   const std::array<std::vector<double>, 2> values{in.get_array<double>(), in.get_array<double>()};
+  const Stamp reference = in.get_stamp(), latest = in.get_stamp();
   if (Status s = in.finish(what); !s) return s;
   for (const std::vector<double>& of : values) {
     const bool finite = std::all_of(of.begin(), of.end(), [](double value) { return std::isfinite(value); });
@@ -87,6 +96,8 @@ Status DeadReckoning::restore(const Bytes& bytes) {
   }
   covariance_ = Eigen::Map<const Covariance>(values[0].data());
   at_reference_ = Eigen::Map<const Covariance>(values[1].data());
+  reference_ = reference;
+  latest_ = latest;
   return {};
 }
 

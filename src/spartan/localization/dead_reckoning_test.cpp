@@ -71,13 +71,18 @@ TEST(DeadReckoning, ALostMotionThatKeepsItsReferenceCostsNothing) {
   lost.measured = false;
   lost.keeps_reference = true;
   const VisionOptions options;
-  DeadReckoning with = DeadReckoning::create(options).value(), without = with;
-  for (DeadReckoning* each : {&with, &without}) each->add(before);
+  DeadReckoning with = DeadReckoning::create(options).value(), without = with, from_lost = with;
+  for (DeadReckoning* each : {&with, &without, &from_lost}) each->add(before);
   with.add(lost);
   EXPECT_GT(with.covariance().diagonal().minCoeff(), 0.9);
   with.add(after);
   without.add(after);
   EXPECT_TRUE(with.covariance().isApprox(without.covariance(), 1e-12));
+  // A motion from the lost frame adds to its uncertainty.
+  from_lost.add(lost);
+  after.from = lost.to;
+  from_lost.add(after);
+  EXPECT_GT(from_lost.covariance().diagonal().minCoeff(), 0.9);
 }
 
 TEST(DeadReckoning, GoesOnFromRestoredMemory) {

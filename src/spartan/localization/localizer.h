@@ -29,7 +29,6 @@ struct RelativeMotion {
   Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²
   bool measured = true;                    ///< false: tracking was lost, the motion is not used
   bool keeps_reference = false;            ///< the next motion begins at `from`, too, not at `to`
-  bool lasting_errors = true;              ///< false: errors of vision that last over frames have no part in it
 };
 
 /// The sensors that are monitored: whether one is used, and why not.
@@ -292,6 +291,7 @@ class DeadReckoning {
   Vector6d drift_sigma_ratios_ = Vector6d::Zero(), constant_sigma_ratios_ = Vector6d::Zero();
   Covariance covariance_ = Covariance::Zero();
   Covariance at_reference_ = Covariance::Zero();  // where the next motion begins
+  Stamp reference_, latest_;
 };
 
 }  // namespace spartan

@@ -82,21 +82,6 @@ RelativeMotion Pipeline::State::body_motion(const Pose& body_from_left, const Mo
   return result;
 }
 
-// After lost frames, the landmarks of the last one may be the only ones that are found: the odometry goes on from
-// there. The filters have no clone of that pose, so they get the lost motion, with its large covariance, and this one
-// in one.
-RelativeMotion Pipeline::State::body_motion_from_lost(const Pose& body_from_left, const MotionEstimate& motion) {
-  const Stamp from = reference.stamp;
-  reference = {last_stamp, world_from_left, left_from_body, {}};
-  RelativeMotion result = body_motion(body_from_left, motion);
-  const UncertainPose whole = compose(since_reference, {result.previous_from_current, result.covariance});
-  result.from = from;
-  result.previous_from_current = whole.pose;
-  result.covariance = whole.covariance;
-  result.lasting_errors = false;
-  return result;
-}
-
 // Returns the motion of the body since the last frame.
 Pose Pipeline::State::advance(const RectifiedPair& rectified, const MotionEstimate& motion,
                               const RelativeMotion& body_motion) {
@@ -104,9 +89,8 @@ Pose Pipeline::State::advance(const RectifiedPair& rectified, const MotionEstima
   world_from_left = reference.world_from_left * motion.previous_from_current;
   distance_m += (last.inverse() * world_from_left).translation().norm();
   left_from_body = rectified.body_from_left.inverse();
-  const double seconds = seconds_between(body_motion.from, body_motion.to);
+  const double seconds = seconds_between(motion.from, motion.to);
   if (seconds > 0) velocity = log_se3(body_motion.previous_from_current) / seconds;
-  if (motion.keeps_reference) since_reference = {body_motion.previous_from_current, body_motion.covariance};
   if (!motion.keeps_reference) reference = {motion.to, world_from_left, left_from_body, {}};
   return last_body.inverse() * (world_from_left * left_from_body);
 }
@@ -248,9 +232,9 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
 
   result.motion = s.clock.measure(
       "odometry", [&] { return s.odometer.add(*rectified, predicted, disparity->disparity, by_sensors); });
-  const bool from_lost = result.motion.from == s.last_stamp && s.last_stamp != s.reference.stamp;
-  const RelativeMotion body_motion = from_lost ? s.body_motion_from_lost(rectified->body_from_left, result.motion)
-                                               : s.body_motion(rectified->body_from_left, result.motion);
+  // After lost frames the landmarks of the last one may be the only ones that are found.
+  if (result.motion.from == s.last_stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body, {}};
+  const RelativeMotion body_motion = s.body_motion(rectified->body_from_left, result.motion);
   UncertainPose step;
   if (!result.motion.first) {
     step = {s.advance(*rectified, result.motion, body_motion), body_motion.covariance};

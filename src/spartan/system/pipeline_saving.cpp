@@ -30,8 +30,6 @@ Bytes Pipeline::save() const {
   out.put(s.reference.world_from_left);
   out.put(s.reference.left_from_body);
   out.put(s.reference.odom_from_body);
-  out.put(s.since_reference.pose);
-  out.put(s.since_reference.covariance);
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
   out.put(s.distance_of_last_terrain_m);
@@ -63,8 +61,6 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   s.reference.world_from_left = in.get_pose();
   s.reference.left_from_body = in.get_pose();
   s.reference.odom_from_body = in.get_pose();
-  s.since_reference.pose = in.get_pose();
-  s.since_reference.covariance = in.get_matrix6();
   const std::vector<double> velocity = in.get_array<double>();
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get_finite();

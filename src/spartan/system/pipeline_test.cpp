@@ -152,35 +152,6 @@ TEST(Pipeline, ADarkFrameCostsNothing) {
   }
 }
 
-// The second half is elsewhere: its first frame is lost, and the motion after it begins there.
-TEST(Pipeline, FiltersFollowAMotionFromALostFrame) {
-  const testing::SyntheticWorld world(testing::SyntheticWorldOptions{});
-  std::vector<SyntheticFrame> elsewhere;
-  for (int i = 0; i < 3; ++i) {
-    const Pose body = Pose::from_translation({30 + kStep_m * i, 20, 0});
-    elsewhere.push_back(
-        world.render(kStereo, body * rover().body_from_camera("left"), static_cast<std::uint64_t>(9 + i)));
-  }
-  Pipeline pipeline = pipeline_of();
-  for (int i = 0; i < 3; ++i) push(pipeline, i);
-  Pose lost;
-  for (int i = 0; i < 3; ++i) {
-    StereoFrame frame = frame_of(3);
-    frame.frame_id = 3 + i;
-    frame.left_stamp = frame.right_stamp = Stamp{(3 + i) * 1'000'000'000LL};
-    const SyntheticFrame& images = elsewhere[static_cast<std::size_t>(i)];
-    frame.left = FrameImage::borrow(images.left.view(), {});
-    frame.right = FrameImage::borrow(images.right.view(), {});
-    const FrameResult result = pipeline.add(frame).value().value();
-    EXPECT_EQ(result.motion.status, i == 0 ? TrackingStatus::lost : TrackingStatus::tracking) << i;
-    const UncertainPose& found = result.localization->world_from_body;
-    if (i == 0) lost = found.pose;
-    for (const Pose& pose : {found.pose, result.slam->pose})
-      EXPECT_NEAR((lost.inverse() * pose).translation().x(), kStep_m * i, 0.005) << i;
-    EXPECT_GT(found.covariance(0, 0), 0.01) << "the lost motion stays unknown";
-  }
-}
-
 TEST(Pipeline, FirstFrameHasTerrain) {
   Pipeline pipeline = pipeline_of();
   const FrameResult first = push(pipeline, 0);

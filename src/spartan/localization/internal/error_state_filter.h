@@ -60,7 +60,7 @@ class ErrorStateFilter {
   void update(const RelativeMotion& motion);
   bool update_by_motion(const RelativeMotion& motion);
   void propagate_drift(int index, const Vector6d& sigmas, double steps);
-  bool prediction_has_weight(const Innovation& innovation) const;
+  bool prediction_contradicted(const Innovation& innovation) const;
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
   std::optional<ForwardComparison> compare_forward(const RelativeMotion& motion) const;

@@ -18,9 +18,6 @@ constexpr double kInflationFactor = 10;
 /// A constant-velocity prediction is inflated where the residual exceeds its standard deviation in any direction. With
 /// kPredictionNoiseFactor the expected value is 6/100.
 constexpr double kMaxPredictionNis = 1;
-/// Or where the covariance of vision exceeds this fraction of it, summed over six directions: an uncertain motion is
-/// still the best estimate where no sensor contradicts it.
-constexpr double kMaxNoiseRatio = 0.06;
 /// Correlation length of the constant error of vision, in frames: finite, so that the filter does not become
 /// overconfident; empirical.
 constexpr double kConstantSteps = 5000;
@@ -71,8 +68,7 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   const Pose& measured = motion.previous_from_current;
   vision.stationary = measured.translation().isZero(1e-12) && measured.rotation().vec().isZero(1e-12);
 
-  const bool lasting = !vision.stationary && motion.lasting_errors;
-  if (lasting) {
+  if (!vision.stationary) {
     propagate_drift(error_at::kVisionDrift, drift_sigma_ratios_, options_.vision.drift_correlation_frames);
     propagate_drift(error_at::kVisionConstant, constant_sigma_ratios_, kConstantSteps);
   }
@@ -81,12 +77,12 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
 
   const Matrix6d covariance = usable_covariance(motion.covariance, options_.vision.white_noise_factor);
-  const Vector6d drift = lasting ? motion.covariance.diagonal().cwiseSqrt().eval() : Vector6d::Zero().eval();
+  const Vector6d drift = vision.stationary ? Vector6d::Zero().eval() : motion.covariance.diagonal().cwiseSqrt().eval();
   const Innovation innovation =
       relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, drift);
   // The noise of the constant-velocity model grows with the speed: after a stop it is small, and the update would put
   // the residual of a true motion into the drift of vision.
-  if (!inertial && prediction_has_weight(innovation)) inflate_prediction(innovation, motion);
+  if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
   const double nis = inertial ? normalized_innovation_squared(p, innovation) : 0;
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
   const auto accept_vision = [&](double value, double gate, HealthReason reason) {
@@ -121,17 +117,13 @@ void ErrorStateFilter::propagate_drift(int index, const Vector6d& sigmas, double
   p.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
 }
 
-/// Whether a constant-velocity prediction would draw the motion to itself: where the residual exceeds the predicted
-/// covariance of the motion itself, without the errors of vision, or where vision is uncertain against that covariance.
-bool ErrorStateFilter::prediction_has_weight(const Innovation& innovation) const {
+/// Whether the residual exceeds the predicted covariance of the motion itself, without the errors of vision.
+bool ErrorStateFilter::prediction_contradicted(const Innovation& innovation) const {
   Innovation exact = innovation;
   exact.jacobian.middleCols<6>(error_at::kVisionDrift).setZero();
   exact.jacobian.middleCols<6>(error_at::kVisionConstant).setZero();
   exact.noise = kMinVariance * Matrix6d::Identity();
-  const Matrix6d predicted =
-      exact.jacobian * memory_.estimate.covariance * exact.jacobian.transpose() + Matrix6d(exact.noise);
-  return normalized_innovation_squared(memory_.estimate.covariance, exact) > kMaxPredictionNis ||
-         predicted.ldlt().solve(innovation.noise).trace() > kMaxNoiseRatio;
+  return normalized_innovation_squared(memory_.estimate.covariance, exact) > kMaxPredictionNis;
 }
 
 /// Inflates the covariance of the motion since the last frame until the prediction has no weight against a motion with

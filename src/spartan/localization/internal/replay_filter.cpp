@@ -47,7 +47,6 @@ void put_measurement(ArchiveWriter& out, const Measurement& m) {
     out.put(motion->covariance);
     out.put(motion->measured);
     out.put(motion->keeps_reference);
-    out.put(motion->lasting_errors);
   } else if (const auto* wheels = std::get_if<WheelSample>(&m)) {
     out.put(wheels->left_m);
     out.put(wheels->right_m);
@@ -82,7 +81,6 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
       motion.covariance = in.get_matrix6();
       motion.measured = in.get<bool>();
       motion.keeps_reference = in.get<bool>();
-      motion.lasting_errors = in.get<bool>();
       return motion;
     }
     case 2: {

@@ -80,7 +80,6 @@ struct Pipeline::State {
     Pose odom_from_body;  // by the localization
   };
   Reference reference;
-  UncertainPose since_reference;         // motion of the body to the last frame, where that is another one
   Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the body frame, per second
   double distance_m = 0;
   double distance_of_last_terrain_m = -1;
@@ -92,7 +91,6 @@ struct Pipeline::State {
   std::optional<Pose> predicted_motion(const RectifiedPair& rectified) const;
   std::optional<Pose> motion_by_sensors(const RectifiedPair& rectified) const;
   RelativeMotion body_motion(const Pose& body_from_left, const MotionEstimate& motion) const;
-  RelativeMotion body_motion_from_lost(const Pose& body_from_left, const MotionEstimate& motion);
   Pose advance(const RectifiedPair& rectified, const MotionEstimate& motion, const RelativeMotion& body_motion);
   void add_sensor_sample(const Measurement& sample);
   void localize(const RelativeMotion& motion);
