@@ -289,11 +289,6 @@ void Odometer::State::measure(const StereoImages& images, ImageSide side, const 
   estimate.inliers = fit->inliers;
   estimate.rms_px = fit->rms_px;
   decide_status(images.geometry, matches, *fit, start.doubt, estimate);
-  if (ambiguous) {
-    // The true motion is this one or the predicted one.
-    const Vector6d off = log_se3(fit->previous_from_current.inverse() * prediction.motion);
-    estimate.covariance += off * off.transpose();
-  }
   if (!left) return;
   memory.offset = fit->offset;
   move_anchors(map, estimate.previous_from_current);

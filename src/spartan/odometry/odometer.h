@@ -313,10 +313,10 @@ class Odometer {
   ~Odometer();
 
   /// Processes the next stereo frame. `predicted` (previous_from_current, left optical frames) replaces the
-  /// constant-velocity prediction; by `alternative`, the motion that other sensors measured, landmarks are searched where
-  /// the prediction fails. Both begin at the frame at which the estimate will begin. `disparity` is the dense disparity of the left image (pixels, NaN unknown), used
-  /// where the option reconstruction.source is `dense` and it is not empty. Never fails: a pair that cannot be used
-  /// gives the status `lost` with a reason.
+  /// constant-velocity prediction; by `alternative`, the motion that other sensors measured, landmarks are searched
+  /// where the prediction fails. Both begin at the frame at which the estimate will begin. `disparity` is the dense
+  /// disparity of the left image (pixels, NaN unknown), used where the option reconstruction.source is `dense` and it
+  /// is not empty. Never fails: a pair that cannot be used gives the status `lost` with a reason.
   MotionEstimate add(const RectifiedPair& pair, const std::optional<Pose>& predicted = {},
                      ImageView<const float> disparity = {}, const std::optional<Pose>& alternative = {});
 
