@@ -43,10 +43,9 @@ void DeadReckoning::age(int index, const Vector6d& sigmas, double steps) {
 }
 
 void DeadReckoning::add(const RelativeMotion& motion) {
-  // Landmarks of a lost frame may be the only ones that are found again.
-  if (motion.from != reference_ && motion.from == latest_) at_reference_ = covariance_;
+  // Landmarks of a lost frame may be the only ones that are found again: then the motion begins there.
+  if (motion.from != reference_) at_reference_ = covariance_;
   reference_ = motion.from;
-  latest_ = motion.to;
   covariance_ = at_reference_;
   const Pose& moved = motion.previous_from_current;
   // The exact identity says that the rover is stationary: lasting errors have no part in it.
@@ -69,7 +68,7 @@ void DeadReckoning::add(const RelativeMotion& motion) {
       0.5 * (motion.measured ? white_noise_factor_ : 1.0) * (motion.covariance + motion.covariance.transpose());
   if (motion.keeps_reference) return;
   at_reference_ = covariance_;
-  reference_ = latest_;
+  reference_ = motion.to;
 }
 
 Bytes DeadReckoning::save() const {
@@ -78,7 +77,6 @@ Bytes DeadReckoning::save() const {
   for (const Covariance* covariance : {&covariance_, &at_reference_})
     out.put_array(covariance->data(), static_cast<std::size_t>(covariance->size()));
   out.put(reference_.ns);
-  out.put(latest_.ns);
   return out.take();
 }
 
@@ -87,7 +85,7 @@ Status DeadReckoning::restore(const Bytes& bytes) {
   const std::string what = "saved state of the dead reckoning";
   if (Status s = in.expect_version(kVersion, what); !s) return s;
   const std::array<std::vector<double>, 2> values{in.get_array<double>(), in.get_array<double>()};
-  const Stamp reference = in.get_stamp(), latest = in.get_stamp();
+  const Stamp reference = in.get_stamp();
   if (Status s = in.finish(what); !s) return s;
   for (const std::vector<double>& of : values) {
     const bool finite = std::all_of(of.begin(), of.end(), [](double value) { return std::isfinite(value); });
@@ -97,7 +95,6 @@ Status DeadReckoning::restore(const Bytes& bytes) {
   covariance_ = Eigen::Map<const Covariance>(values[0].data());
   at_reference_ = Eigen::Map<const Covariance>(values[1].data());
   reference_ = reference;
-  latest_ = latest;
   return {};
 }
 

@@ -290,8 +290,9 @@ class DeadReckoning {
   double white_noise_factor_, drift_correlation_frames_;
   Vector6d drift_sigma_ratios_ = Vector6d::Zero(), constant_sigma_ratios_ = Vector6d::Zero();
   Covariance covariance_ = Covariance::Zero();
-  Covariance at_reference_ = Covariance::Zero();  // where the next motion begins
-  Stamp reference_, latest_;
+  // Where the next motion begins, unless the last frame was lost and it begins there.
+  Covariance at_reference_ = Covariance::Zero();
+  Stamp reference_;
 };
 
 }  // namespace spartan

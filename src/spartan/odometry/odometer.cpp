@@ -289,11 +289,12 @@ void Odometer::State::measure(const StereoImages& images, ImageSide side, const 
   estimate.inliers = fit->inliers;
   estimate.rms_px = fit->rms_px;
   decide_status(images.geometry, matches, *fit, start.doubt, estimate);
-  if (!left) return;
-  memory.offset = fit->offset;
-  move_anchors(map, estimate.previous_from_current);
-  const bool moved = estimate.status != TrackingStatus::stationary && !ambiguous;
-  manager.update(map, images, matches, *fit, moved, start.features, start.feature_of);
+  if (left) {
+    memory.offset = fit->offset;
+    move_anchors(map, estimate.previous_from_current);
+    const bool establishes = estimate.status != TrackingStatus::stationary && !ambiguous;
+    manager.update(map, images, matches, *fit, establishes, start.features, start.feature_of);
+  }
   estimate.times.estimate += watch.lap();
 }
 

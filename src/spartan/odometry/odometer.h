@@ -287,10 +287,10 @@ struct OdometryTimes {
 
 /// The motion between two stereo frames, in rectified left optical frames.
 struct MotionEstimate {
-  /// `from` is the latest frame whose motion was measured, and that of the frames before it is not needed: landmarks
-  /// survive frames that are lost. After a lost frame it may be that one, where the old landmarks are not found again.
+  /// `from` is the frame whose landmarks were found: the latest one that was measured, which lost frames do not
+  /// replace, or the frame before where that was lost and the older landmarks are out of view.
   Stamp from, to;
-  bool keeps_reference = false;  ///< lost, and the next motion begins at `from`, too
+  bool keeps_reference = false;  ///< lost or measured in the right image alone: the next motion begins at `from`, too
   bool first = false;            ///< there was no previous frame: the motion is the identity
   Pose previous_from_current;
   Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²

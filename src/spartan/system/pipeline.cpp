@@ -229,11 +229,10 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   s.frozen_cameras.remember(pair_index, images);
   const std::optional<Pose> predicted = s.predicted_motion(*rectified), by_sensors = s.motion_by_sensors(*rectified);
   if (!s.started) s.start(*rectified);
-
   result.motion = s.clock.measure(
       "odometry", [&] { return s.odometer.add(*rectified, predicted, disparity->disparity, by_sensors); });
   // After lost frames the landmarks of the last one may be the only ones that are found.
-  if (result.motion.from == s.last_stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body, {}};
+  if (result.motion.from != s.reference.stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body, {}};
   const RelativeMotion body_motion = s.body_motion(rectified->body_from_left, result.motion);
   UncertainPose step;
   if (!result.motion.first) {

@@ -7,85 +7,13 @@
 #include <limits>
 #include <vector>
 
-#include "spartan/storage/database.h"
-#include "spartan/testing/synthetic_world.h"
-#include "spartan/testing/temporary_folder.h"
+#include "spartan/system/internal/rendered_drive_test.h"
 
 namespace spartan {
+
+using namespace rendered_drive;
+
 namespace {
-
-using testing::SyntheticFrame;
-
-const RectifiedStereo kStereo{{320, 240}, 246.0, {159.5, 119.5}, 0.12};
-constexpr double kHeight_m = 0.5, kTilt_rad = 0.55, kStep_m = 0.05;
-
-Camera camera(const std::string& name) {
-  Camera made;
-  made.name = name;
-  made.size = kStereo.size;
-  made.model = PinholeModel{kStereo.focal_px, kStereo.focal_px, kStereo.centre_px.x(), kStereo.centre_px.y()};
-  return made;
-}
-
-// The narrow pair looks down by kTilt_rad from a height of half a metre; the wide pair is for stops only.
-Rig rover() {
-  const Pose body_from_left =
-      Pose(exp_so3({0, kTilt_rad, 0}), {0.1, 0, kHeight_m}) * Pose(optical_from_forward().inverse());
-  Rig rig;
-  rig.name = "rover";
-  rig.cameras = {camera("left"), camera("right"), camera("wide_left"), camera("wide_right")};
-  for (std::size_t i = 0; i < 4; ++i) {
-    rig.cameras[i].mount_from_camera =
-        body_from_left * Pose::from_translation({i % 2 == 0 ? 0 : kStereo.baseline_m, 0, 0});
-  }
-  rig.pairs = {{"wide", "wide_left", "wide_right", 0, false}, {"narrow", "left", "right", 0.4, true}};
-  return rig;
-}
-
-Pose world_from_body(int index) {
-  return Pose::from_translation({kStep_m * index, 0, 0});
-}
-
-// Rendered once: the rover drives straight ahead over gentle terrain.
-const std::vector<SyntheticFrame>& rendered_frames() {
-  static const std::vector<SyntheticFrame> made = [] {
-    const testing::SyntheticWorld world(testing::SyntheticWorldOptions{});
-    const Pose body_from_left = rover().body_from_camera("left");
-    std::vector<SyntheticFrame> rendered;
-    rendered.reserve(5);
-    for (int i = 0; i < 5; ++i) {
-      rendered.push_back(world.render(kStereo, world_from_body(i) * body_from_left, static_cast<std::uint64_t>(i)));
-    }
-    return rendered;
-  }();
-  return made;
-}
-
-StereoFrame frame_of(int index) {
-  StereoFrame frame;
-  frame.frame_id = index;
-  frame.pair = "narrow";
-  frame.left_stamp = frame.right_stamp = Stamp{index * 1'000'000'000LL};
-  const SyntheticFrame& images = rendered_frames()[static_cast<std::size_t>(index)];
-  frame.left = FrameImage::borrow(images.left.view(), {});
-  frame.right = FrameImage::borrow(images.right.view(), {});
-  return frame;
-}
-
-Pipeline pipeline_of(const RunOptions& options = {}, int threads = 1) {
-  return Pipeline::create(rover(), options, ThreadPool(threads)).value();
-}
-
-// An empty map store.
-struct EmptyMaps {
-  testing::TemporaryFolder folder;
-  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
-  TileStore tiles = TileStore::open(db).value();
-};
-
-FrameResult push(Pipeline& pipeline, int index) {
-  return pipeline.add(frame_of(index)).value().value();
-}
 
 TEST(Pipeline, TracksMotionFromImagesInMemory) {
   Pipeline pipeline = pipeline_of();
@@ -117,7 +45,7 @@ TEST(Pipeline, TracksMotionWithAPanningMast) {
     const int index = static_cast<int>(i);
     const Pose world_from_left = world_from_body(index) * rig.body_from_camera("left", pan_rad[i], 0);
     const SyntheticFrame images = world.render(kStereo, world_from_left, i);
-    StereoFrame frame = frame_of(index);
+    StereoFrame frame = frame_at(index);
     frame.pan_rad = pan_rad[i];
     frame.left = FrameImage::borrow(images.left.view(), {});
     frame.right = FrameImage::borrow(images.right.view(), {});
@@ -127,27 +55,6 @@ TEST(Pipeline, TracksMotionWithAPanningMast) {
     for (const Pose& pose : {result.world_from_body.pose, result.localization->world_from_body.pose}) {
       EXPECT_LT((pose.translation() - world_from_body(index).translation()).norm(), 0.003) << i;
       EXPECT_LT(log_so3(pose.rotation()).norm(), 0.005) << i;
-    }
-  }
-}
-
-// A dark frame: the poses before and after it are as accurate as without it.
-TEST(Pipeline, ADarkFrameCostsNothing) {
-  const Image<std::uint8_t> dark(320, 240, 2);
-  for (const bool odometry_only : {false, true}) {
-    RunOptions options;
-    options.odometry_only = odometry_only;
-    Pipeline pipeline = pipeline_of(options);
-    for (int i = 0; i < 5; ++i) {
-      StereoFrame frame = frame_of(i);
-      if (i == 3) frame.left = frame.right = FrameImage::borrow(dark.view(), {});
-      const FrameResult result = pipeline.add(frame).value().value();
-      if (i == 0) continue;
-      EXPECT_EQ(result.motion.status, i == 3 ? TrackingStatus::lost : TrackingStatus::tracking) << i;
-      if (i == 3) continue;
-      const UncertainPose pose = odometry_only ? result.world_from_body : result.localization->world_from_body;
-      EXPECT_LT((pose.pose.translation() - world_from_body(i).translation()).norm(), 0.003) << i;
-      EXPECT_LT(pose.covariance.diagonal().head(3).sum(), 1e-4) << i;
     }
   }
 }
@@ -304,75 +211,11 @@ TEST(Pipeline, OdometryOnlyGivesTheSamePoses) {
 TEST(Pipeline, FramesOfOtherPairsHaveNoResult) {
   Pipeline pipeline = pipeline_of();
   EXPECT_EQ(pipeline.odometry_pair(), "narrow");
-  StereoFrame wide = frame_of(0);
+  StereoFrame wide = frame_at(0);
   wide.pair = "wide";
   const auto result = pipeline.add(wide);
   ASSERT_TRUE(result);
   EXPECT_FALSE(result->has_value());
-}
-
-TEST(Pipeline, RejectsFramesThatDoNotFitTheRigAndContinues) {
-  Pipeline pipeline = pipeline_of();
-  push(pipeline, 0);
-  StereoFrame unknown_pair = frame_of(1);
-  unknown_pair.pair = "rear";
-  const auto unknown = pipeline.add(unknown_pair);
-  ASSERT_FALSE(unknown);
-  EXPECT_EQ(unknown.error().code, ErrorCode::frame_rejected);
-  EXPECT_NE(unknown.error().message().find("rear"), std::string::npos);
-  StereoFrame small = frame_of(1);
-  const Image<std::uint8_t> cut(100, 100);
-  small.right = FrameImage::borrow(cut.view(), {});
-  const auto unfit = pipeline.add(small);
-  ASSERT_FALSE(unfit);
-  EXPECT_EQ(unfit.error().code, ErrorCode::frame_rejected);
-  EXPECT_EQ(pipeline.fault_of(small), FrameFault::wrong_size);
-  EXPECT_NEAR(push(pipeline, 1).world_from_body.pose.translation().x(), kStep_m, 0.002);
-}
-
-TEST(Pipeline, RejectsImagesThatRepeatBitForBit) {
-  Pipeline pipeline = pipeline_of();
-  push(pipeline, 0);
-  push(pipeline, 1);
-  const Bytes before = pipeline.save();
-  Pipeline resumed = pipeline_of();
-  EmptyMaps maps;
-  ASSERT_TRUE(resumed.restore(before, maps.tiles));
-  const StereoFrame first = frame_of(1), second = frame_of(2);
-  for (const bool left : {true, false}) {
-    for (const bool right : {true, false}) {
-      if (!left && !right) continue;
-      StereoFrame repeated = second;
-      if (left) repeated.left = first.left;
-      if (right) repeated.right = first.right;
-      for (Pipeline* each : {&pipeline, &resumed}) {
-        const auto refused = each->add(repeated);
-        ASSERT_FALSE(refused);
-        EXPECT_EQ(refused.error().code, ErrorCode::frame_rejected);
-        const char* which = left && right ? "left and right image of" : left ? "left image of" : "right image of";
-        EXPECT_TRUE(refused.error().message().find(which) != std::string::npos) << refused.error().message();
-        EXPECT_EQ(each->fault_of(repeated), FrameFault::frozen);
-        EXPECT_EQ(each->save(), before) << "nothing has advanced";
-      }
-    }
-  }
-  // Only the previous image counts: an earlier one may come again.
-  EXPECT_NEAR(push(pipeline, 2).world_from_body.pose.translation().x(), 2 * kStep_m, 0.003);
-  StereoFrame later = first;
-  later.left_stamp = later.right_stamp = Stamp{3'000'000'000LL};
-  const auto back = pipeline.add(later);
-  ASSERT_TRUE(back);
-  EXPECT_NEAR((*back)->world_from_body.pose.translation().x(), kStep_m, 0.003);
-}
-
-TEST(Pipeline, UniformImagesMayRepeat) {
-  Pipeline pipeline = pipeline_of();
-  const Image<std::uint8_t> dark(kStereo.size);
-  for (int i = 0; i < 3; ++i) {
-    StereoFrame frame = frame_of(i);
-    frame.left = frame.right = FrameImage::borrow(dark.view(), {});
-    EXPECT_TRUE(pipeline.add(frame)) << i;
-  }
 }
 
 TEST(Pipeline, RequiresAPairForTheOdometry) {

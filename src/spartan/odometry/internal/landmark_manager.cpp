@@ -52,7 +52,7 @@ void move_anchors(LandmarkMemory& memory, const Pose& previous_from_current) {
 }
 
 void LandmarkManager::update(LandmarkMemory& memory, const StereoImages& images,
-                             const std::vector<LandmarkMatch>& matches, const MotionFit& fit, bool moved,
+                             const std::vector<LandmarkMatch>& matches, const MotionFit& fit, bool establishes,
                              const std::vector<ReconstructedFeature>& features,
                              const std::vector<int>& feature_of) const {
   const double noise = fit.noise_scale * fit.noise_scale, max_scale = options_.matching.max_scale_change;
@@ -70,16 +70,15 @@ void LandmarkManager::update(LandmarkMemory& memory, const StereoImages& images,
     const double variance = 1 / (1 / landmark.variance + weighted.dot(p->by_disparity));
     landmark.disparity += variance * weighted.dot(match.measured + offset - p->measured);
     landmark.variance = std::max(variance, kMinDisparitySigma_px * kMinDisparitySigma_px);
-    const bool both = match.cameras == MeasuredIn::both, left = match.cameras != MeasuredIn::right;
-    landmark.pixel = left ? match.measured.head<2>() : p->measured.head<2>();
+    landmark.pixel = match.measured.head<2>();
     landmark.missed_frames = 0;
-    if (moved) ++landmark.measured_frames;
+    if (establishes) ++landmark.measured_frames;
     const int feature = feature_of.empty() ? -1 : feature_of[match.landmark];
     if (feature >= 0) refresh_descriptor(landmark, features[static_cast<std::size_t>(feature)].feature);
 
     const AnchoredWarp warp = warp_of(*p, landmark.slant);
     const double scale = std::sqrt(std::abs(warp.pixels.determinant()));
-    if (!both || (scale < max_scale && scale * max_scale > 1)) continue;
+    if (match.cameras != MeasuredIn::both || (scale < max_scale && scale * max_scale > 1)) continue;
     const double sigma = std::sqrt(landmark.variance) * std::abs(p->by_disparity.z());
     const RowAlignment stereo{p->measured.z() - fit.offset.value, warp.slant, std::max(sigma, kMinDisparitySigma_px),
                               1};

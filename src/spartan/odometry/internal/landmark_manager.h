@@ -25,10 +25,10 @@ class LandmarkManager {
   /// Applies the inliers' measurements to their landmarks (scalar Kalman update of the anchor's disparity), re-anchors
   /// landmarks whose apparent size has changed too much, and removes those without an inlier measurement in several
   /// consecutive frames. A landmark on which a feature lies (`feature_of`, −1: none; may be empty) takes over its
-  /// descriptor. `moved`: whether the rover has moved; otherwise its own shadow follows the scene, too. Call
-  /// move_anchors() first.
+  /// descriptor. `establishes`: whether to follow this motion shows that a landmark is of the scene; not while the
+  /// rover is stationary, when its own shadow does so, too. Matches need the left image. Call move_anchors() first.
   void update(LandmarkMemory& memory, const StereoImages& images, const std::vector<LandmarkMatch>& matches,
-              const MotionFit& fit, bool moved, const std::vector<ReconstructedFeature>& features,
+              const MotionFit& fit, bool establishes, const std::vector<ReconstructedFeature>& features,
               const std::vector<int>& feature_of) const;
 
   /// Adds features that are far enough from all landmarks and have a disparity as new landmarks, up to the maximum

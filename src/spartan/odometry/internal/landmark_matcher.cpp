@@ -22,6 +22,7 @@ constexpr std::size_t kMinRigidMatches = 8;
 constexpr int kLandmarksPerPart = 16;
 /// Landmarks that are searched in the pyramids: enough for RANSAC.
 constexpr std::size_t kPyramidLandmarks = 200;
+
 AnchoredPoint point_of(const Landmark& landmark) {
   return {landmark.anchor_pixel, landmark.disparity};
 }
