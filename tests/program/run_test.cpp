@@ -185,7 +185,7 @@ TEST_F(Run, CanBeResumedAfterAnInterruption) {
 TEST_F(Run, RetainsCommittedFramesWhenTheDiskIsFull) {
   copy_finished_run("whole");
   ProgramLimits limits;
-  limits.largest_file_bytes = 1'500'000;  // enough for some frames of the store, not for all
+  limits.largest_file_bytes = 900'000;  // enough for the first checkpoint of the store and some frames, not for all
   const ProgramResult full = run("full", {}, limits);
   ASSERT_EQ(full.exit_code, 5) << full.err;
   EXPECT_THAT(full.err, HasSubstr(path("full")));

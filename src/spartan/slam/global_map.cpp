@@ -176,7 +176,9 @@ Result<Tile*> GlobalMap::load_or_make(const TileKey& key) {
   const auto [slot, is_new] = tiles_.try_emplace(key);
   if (is_new) slot->second.tile = std::make_unique<Tile>();
   auto tile = load(key);
-  if (tile) slot->second.changed = true;
+  if (!tile) return tile;
+  slot->second.changed = true;
+  slot->second.revision = static_cast<std::int64_t>(stops_.size());
   return tile;
 }
 
@@ -188,7 +190,7 @@ void GlobalMap::evict_tiles() {
   for (auto& [key, slot] : tiles_) {
     if (!slot.tile) continue;
     ++in_memory;
-    if (!slot.changed && slot.revision > 0) clean.push_back(&slot);
+    if (!slot.changed) clean.push_back(&slot);
   }
   std::sort(clean.begin(), clean.end(), [](const Slot* a, const Slot* b) { return a->used < b->used; });
   for (Slot* slot : clean) {
@@ -322,8 +324,7 @@ Status GlobalMap::flush() {
   }
   for (auto& [key, slot] : tiles_) {
     if (!slot.changed) continue;
-    if (Status s = store_->write({key, slot.revision + 1}, *slot.tile); !s) return s;
-    ++slot.revision;
+    if (Status s = store_->write({key, slot.revision}, *slot.tile); !s) return s;
     slot.changed = false;
   }
   evict_tiles();

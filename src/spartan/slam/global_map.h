@@ -139,7 +139,7 @@ class GlobalMap {
  private:
   GlobalMap(const GlobalMapOptions& options, double cell_m);
   struct Slot {
-    std::int64_t revision = 0;   // 0: not yet in the store
+    std::int64_t revision = 0;   // number of stops in the map at its latest change, whenever it was stored
     std::unique_ptr<Tile> tile;  // null: evicted
     bool changed = false;
     std::uint64_t used = 0;

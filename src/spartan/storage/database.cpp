@@ -217,7 +217,7 @@ Bytes SqlStatement::blob(int column) const {
   return data == nullptr ? Bytes{} : Bytes(data, data + size);
 }
 
-Result<Database> Database::open(const std::string& path, Mode mode) {
+Result<Database> Database::open(const std::string& path, Mode mode, int page_bytes) {
   int flags = SQLITE_OPEN_READWRITE;
   if (mode == Mode::create) flags |= SQLITE_OPEN_CREATE;
   // A name that begins with "file:" would be read as a URI where SQLite was compiled so.
@@ -244,7 +244,8 @@ Result<Database> Database::open(const std::string& path, Mode mode) {
   sqlite3_busy_timeout(handle, 5000);  // ms; waits for short locks of other processes
   // NORMAL: with a write-ahead log, committed data survive when the process is killed.
   if (mode != Mode::read_only) {
-    if (Status status = db.execute("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;"); !status) {
+    const std::string page_size = mode == Mode::create ? fmt::format("PRAGMA page_size={};", page_bytes) : "";
+    if (Status status = db.execute(page_size + "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;"); !status) {
       return failure(status);
     }
   }

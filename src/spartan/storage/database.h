@@ -59,8 +59,9 @@ class Database {
   /// Opens the database, with a write-ahead log unless it is read-only. Files may come from strangers: views, triggers
   /// and functions with side effects are disabled, and a query that needs more than about 10^9 steps for a row ends.
   /// Codes: `input` and `read_error` (an existing file is expected, see read_file()), `output` (cannot be created or
-  /// written), `store_damaged` (damaged or not a database), `resources`.
-  static Result<Database> open(const std::string& path, Mode mode);
+  /// written), `store_damaged` (damaged or not a database), `resources`. `page_bytes`: of a database that is created; a
+  /// transaction writes whole pages, so small ones suit many small transactions.
+  static Result<Database> open(const std::string& path, Mode mode, int page_bytes = 4096);
   Database(Database&&) noexcept;
   Database& operator=(Database&&) noexcept;
   ~Database();

@@ -197,11 +197,20 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   return outcome;
 }
 
+// The last commit cannot notice that the store is removed while SQLite closes it.
+Result<RunOutcome> with_store(Result<RunOutcome> outcome, const std::string& store) {
+  if (!outcome) return outcome;
+  const auto there = RunStore::contains_run(store);
+  if (!there) return failure(there);
+  if (*there) return outcome;
+  return failure(ErrorCode::output, "was removed or replaced during the run", store, "run again into a new folder");
+}
+
 }  // namespace
 
 Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
   try {
-    return run_recording(request, hooks);
+    return with_store(run_recording(request, hooks), RunFolder{request.output}.store());
   } catch (const std::bad_alloc& exception) {
     return tl::unexpected(out_of_memory(exception));
   }

@@ -14,8 +14,12 @@
 namespace spartan {
 namespace {
 
+constexpr int kPageBytes = 512;  // a frame adds about 0.5 kB to each of six tables
+// Pages in the write-ahead log that are copied into the database at once (16 MB): what is written again and again, such
+// as the state of the pipeline, is copied once.
+constexpr int kLogPages = 32768;
 constexpr int kApplicationId = 0x5350544E;  // "SPTN"
-constexpr int kUserVersion = 2;
+constexpr int kUserVersion = 3, kOldestReadableVersion = 2;
 
 // All columns are the same in every run of the same input, except wall_ms and cpu_ms.
 constexpr const char* kSchema = R"(
@@ -33,17 +37,38 @@ CREATE TABLE localization (
   odom_covariance BLOB NOT NULL, slip REAL, slip_sigma REAL);
 CREATE TABLE slam (seq INTEGER PRIMARY KEY, pose BLOB NOT NULL, covariance BLOB NOT NULL);
 CREATE TABLE health (seq INTEGER NOT NULL, sensor TEXT NOT NULL, state TEXT NOT NULL, reason TEXT NOT NULL);
-CREATE INDEX health_of_frame ON health (seq);
 CREATE TABLE maps (
   stamp_ns INTEGER PRIMARY KEY, position_id INTEGER NOT NULL, views INTEGER NOT NULL, pose BLOB NOT NULL,
   covariance BLOB NOT NULL, known_cells INTEGER NOT NULL, obstacles INTEGER NOT NULL, believed_pose BLOB NOT NULL,
   believed_covariance BLOB NOT NULL, verdict TEXT NOT NULL, overlap REAL NOT NULL);
 CREATE TABLE memory (id INTEGER PRIMARY KEY CHECK (id = 1), samples_taken INTEGER NOT NULL, stages BLOB NOT NULL);
 )";
-// Added to stores of version 2 that are without it.
-constexpr const char* kElapsedTable =
-    "CREATE TABLE IF NOT EXISTS elapsed (id INTEGER PRIMARY KEY CHECK (id = 1), wall_ms REAL NOT NULL, "
-    "cpu_ms REAL NOT NULL)";
+// Added to stores that are without them. `counts`: rows of the tables at the checkpoint; stores of version 2 have a
+// checkpoint at the latest frame.
+constexpr const char* kAddedTables = R"(
+CREATE TABLE IF NOT EXISTS elapsed (id INTEGER PRIMARY KEY CHECK (id = 1), wall_ms REAL NOT NULL, cpu_ms REAL NOT NULL);
+CREATE TABLE IF NOT EXISTS counts (
+  id INTEGER PRIMARY KEY CHECK (id = 1), frames INTEGER NOT NULL, terrain INTEGER NOT NULL, maps INTEGER NOT NULL);
+)";
+// Frames are numbered from 1 without gaps; terrain views and maps are committed in the order of their stamps.
+constexpr const char* kReturnToCheckpoint = R"(
+INSERT OR IGNORE INTO counts SELECT 1, 0, 0, 0 WHERE NOT EXISTS (SELECT 1 FROM memory);
+DELETE FROM frames WHERE seq > (SELECT frames FROM counts);
+DELETE FROM stage_times WHERE seq > (SELECT frames FROM counts);
+DELETE FROM localization WHERE seq > (SELECT frames FROM counts);
+DELETE FROM slam WHERE seq > (SELECT frames FROM counts);
+DELETE FROM health WHERE seq > (SELECT frames FROM counts);
+DELETE FROM terrain WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
+  SELECT stamp_ns FROM terrain ORDER BY stamp_ns LIMIT (SELECT terrain FROM counts));
+DELETE FROM maps WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
+  SELECT stamp_ns FROM maps ORDER BY stamp_ns LIMIT (SELECT maps FROM counts));
+)";
+constexpr const char* kReplaceCounts =
+    "INSERT OR REPLACE INTO counts SELECT 1, (SELECT coalesce(max(seq), 0) FROM frames), (SELECT count(*) FROM "
+    "terrain), "
+    "(SELECT count(*) FROM maps)";
+constexpr const char* kSelectProgress =
+    "SELECT (SELECT coalesce(max(seq), 0) FROM frames), (SELECT coalesce(max(samples_taken), -1) FROM memory)";
 
 Bytes bytes_of(const Matrix6d& m) {
   ArchiveWriter out;
@@ -70,7 +95,7 @@ Status check_version(Database& db) {
   const auto version = pragma(db, "user_version");
   if (!version) return failure(version);
   if (*application != kApplicationId) return failure(ErrorCode::input, "is not the database of a run", db.path());
-  if (*version != kUserVersion) {
+  if (*version < kOldestReadableVersion || *version > kUserVersion) {
     return failure(ErrorCode::configuration,
                    fmt::format("has schema version {}, but this program writes version {}", *version, kUserVersion),
                    db.path(), "run again into a new folder");
@@ -110,7 +135,11 @@ Status RunStore::State::prepare() {
   auto opened = TileStore::open_existing(db);
   if (!opened) return failure(opened);
   tiles.emplace(std::move(*opened));
-  if (Status s = db.execute(kElapsedTable); !s) return s;
+  if (Status s =
+          db.execute(fmt::format("{} PRAGMA user_version={}; PRAGMA wal_autocheckpoint={}; PRAGMA secure_delete=0;",
+                                 kAddedTables, kUserVersion, kLogPages));
+      !s)
+    return s;
   const auto make = [&](std::optional<SqlStatement>& statement, const char* sql) -> Status {
     auto prepared = db.prepare(sql);
     if (!prepared) return failure(prepared);
@@ -133,21 +162,29 @@ Status RunStore::State::prepare() {
   if (Status s = make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)"); !s) return s;
   if (Status s = make(replace_content, "INSERT OR REPLACE INTO identity VALUES ('content',?)"); !s) return s;
   if (Status s = make(replace_elapsed, "INSERT OR REPLACE INTO elapsed VALUES (1,?,?)"); !s) return s;
-  if (Status s = make(select_checkpoint, "SELECT samples_taken FROM memory"); !s) return s;
-  const auto stored = stored_samples();
+  if (Status s = make(replace_counts, kReplaceCounts); !s) return s;
+  if (Status s = make(select_progress, kSelectProgress); !s) return s;
+  const auto stored = stored_progress();
   if (!stored) return failure(stored);
-  samples_taken = *stored;
+  progress = *stored;
   return {};
 }
 
-Result<std::optional<std::int64_t>> RunStore::State::stored_samples() {
-  select_checkpoint->reset();
-  const auto row = select_checkpoint->step();
-  std::optional<std::int64_t> samples;
-  if (row && *row) samples = select_checkpoint->integer(0);
-  select_checkpoint->reset();
+Status RunStore::State::return_to_checkpoint() {
+  if (Status s = commit([&] { return db.execute(kReturnToCheckpoint); }); !s) return s;
+  const auto stored = stored_progress();
+  if (!stored) return failure(stored);
+  progress = *stored;
+  return {};
+}
+
+Result<RunStore::State::Progress> RunStore::State::stored_progress() {
+  select_progress->reset();
+  const auto row = select_progress->step();
   if (!row) return failure(row);
-  return samples;
+  const Progress stored{select_progress->integer(0), select_progress->integer(1)};
+  select_progress->reset();
+  return stored;
 }
 
 Status RunStore::State::expect_unchanged() {
@@ -155,15 +192,26 @@ Status RunStore::State::expect_unchanged() {
     return failure(ErrorCode::output, "was removed or replaced during the run", db.path(),
                    "run again into a new folder");
   }
-  const auto stored = stored_samples();
+  const auto stored = stored_progress();
   if (!stored) return failure(stored);
-  if (*stored == samples_taken) return {};
+  if (*stored == progress) return {};
   return failure(ErrorCode::output, "was changed by another process during the run", db.path(),
                  "let one process work on a run folder, then continue with --resume");
 }
 
-Status RunStore::State::write(const Step& step, const std::function<Result<Bytes>()>& save,
-                              const SourcePosition& source, const ElapsedTime& elapsed) {
+Status RunStore::State::commit(const std::function<Status()>& write) {
+  if (Status s = db.execute("BEGIN IMMEDIATE"); !s) return s;
+  Status written = expect_unchanged();
+  if (written) written = write();
+  const auto stored = written ? stored_progress() : Result<Progress>(progress);
+  if (!stored) written = failure(stored);
+  if (written) written = db.execute("COMMIT");
+  if (written) progress = *stored;
+  if (!written) static_cast<void>(db.execute("ROLLBACK"));  // fails if SQLite has already rolled back
+  return written;
+}
+
+Status RunStore::State::write(const Step& step) {
   if (step.frame) {
     if (Status s = write(*step.frame); !s) return s;
   }
@@ -173,13 +221,16 @@ Status RunStore::State::write(const Step& step, const std::function<Result<Bytes
   if (step.map) {
     if (Status s = write(*step.map); !s) return s;
   }
-  if (Status s = write(step.times); !s) return s;
-  const auto pipeline_state = save();
-  if (!pipeline_state) return failure(pipeline_state);
-  Bytes memory = *pipeline_state;
+  return write(step.times);
+}
+
+Status RunStore::State::write_checkpoint(const Bytes& pipeline_state, const SourcePosition& source,
+                                         const ElapsedTime& elapsed) {
+  Bytes memory = pipeline_state;
   append_checksum(memory);
   if (Status s = replace_checkpoint->bind(1, source.samples_taken).bind(2, memory).run(); !s) return s;
   if (Status s = replace_elapsed->bind(1, 1e3 * elapsed.wall_s).bind(2, 1e3 * elapsed.cpu_s).run(); !s) return s;
+  if (Status s = replace_counts->run(); !s) return s;
   return replace_content->bind(1, fmt::format("{:016x}", source.content_hash)).run();
 }
 
@@ -255,7 +306,7 @@ Result<bool> RunStore::contains_run(const std::string& path) {
 }
 
 Result<RunStore> RunStore::create(const std::string& path, const RunIdentity& identity) {
-  auto db = Database::open(path, Database::Mode::create);
+  auto db = Database::open(path, Database::Mode::create, kPageBytes);
   if (!db) return failure(db);
   const std::string header =
       fmt::format("PRAGMA application_id={}; PRAGMA user_version={};", kApplicationId, kUserVersion);
@@ -280,6 +331,7 @@ Result<RunStore> RunStore::resume(const std::string& path, const RunIdentity& id
   if (Status s = expect_identity(*db, "options", identity.options, "other options"); !s) return failure(s);
   auto state = std::make_unique<State>(std::move(*db));
   if (Status s = state->prepare(); !s) return failure(s);
+  if (Status s = state->return_to_checkpoint(); !s) return failure(s);
   return RunStore(std::move(state));
 }
 
@@ -300,13 +352,16 @@ Result<RunStore> RunStore::open_read_only(const std::string& path) {
 
 Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
                         const ElapsedTime& elapsed) {
-  if (Status s = state_->db.execute("BEGIN IMMEDIATE"); !s) return s;
-  Status written = state_->expect_unchanged();
-  if (written) written = state_->write(step, save, source, elapsed);
-  if (written) written = state_->db.execute("COMMIT");
-  if (written) state_->samples_taken = source.samples_taken;
-  if (!written) static_cast<void>(state_->db.execute("ROLLBACK"));  // fails if SQLite has already rolled back
-  return written;
+  return state_->commit([&]() -> Status {
+    if (Status s = state_->write(step); !s) return s;
+    const auto pipeline_state = save();
+    if (!pipeline_state) return failure(pipeline_state);
+    return state_->write_checkpoint(*pipeline_state, source, elapsed);
+  });
+}
+
+Status RunStore::commit(const Step& step) {
+  return state_->commit([&] { return state_->write(step); });
 }
 
 }  // namespace spartan

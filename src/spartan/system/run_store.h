@@ -84,8 +84,9 @@ class RunStore {
   static Result<bool> contains_run(const std::string& path);
   /// Creates a store; replaces a file without a run. Code `output`.
   static Result<RunStore> create(const std::string& path, const RunIdentity& identity);
-  /// Opens a store to resume its run. Codes: `configuration` if it was written with another input, rig or options, or
-  /// by another version of the program; `store_damaged`.
+  /// Opens a store to resume its run from the latest checkpoint: records after it are removed, since the run makes them
+  /// again. Codes: `configuration` if it was written with another input, rig or options, or by another version of the
+  /// program; `store_damaged`.
   static Result<RunStore> resume(const std::string& path, const RunIdentity& identity);
   /// Opens a store to read it. Codes: `input` (missing, or not the store of a run), `configuration` (another version),
   /// `store_damaged`.
@@ -106,9 +107,12 @@ class RunStore {
     std::int64_t samples_taken = 0;  ///< for FrameSource::seek()
     std::uint64_t content_hash = 0;  ///< FrameSource::content_hash()
   };
-  /// Writes in one transaction, completely or not at all: the step; the map tiles that `save` flushes; the pipeline
-  /// state after the step that `save` returns, the position in the recording and the time (only the latest are kept).
-  /// Codes: `output` if the file cannot be written, was removed, or was changed by another process; those of `save`.
+  /// Writes the step in one transaction, completely or not at all. Codes: `output` if the file cannot be written, was
+  /// removed, or was changed by another process.
+  Status commit(const Step& step);
+  /// Writes in one transaction the step and a checkpoint, from which a run is resumed: the map tiles that `save`
+  /// flushes; the pipeline state after the step that `save` returns, the position in the recording and the time (only
+  /// the latest are kept). Codes: as above, and those of `save`.
   Status commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
                 const ElapsedTime& elapsed = {});
 

@@ -69,6 +69,16 @@ TEST_F(RunStoreGuard, ARowIsNotWrittenTwiceByTwoProcesses) {
   ASSERT_TRUE(commit_frame(second, 2));
 }
 
+TEST_F(RunStoreGuard, AFrameIsNotWrittenTwiceByTwoProcesses) {
+  RunStore first = create();
+  ASSERT_TRUE(commit_frame(first, 0));
+  RunStore second = resume();
+  ASSERT_TRUE(second.commit(step_of_frame(1)));
+  const Status late = first.commit(step_of_frame(1));
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, ErrorCode::output);
+}
+
 TEST_F(RunStoreGuard, ARemovedStoreEndsTheRun) {
   RunStore store = create();
   ASSERT_TRUE(commit_frame(store, 0));

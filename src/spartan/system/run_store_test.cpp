@@ -159,6 +159,63 @@ TEST(RunStore, IsResumedWithoutTheElapsedTime) {
   EXPECT_EQ((*store->checkpoint())->elapsed.wall_s, 5);
 }
 
+// What was committed after the latest checkpoint can be read, but is made again by a resumed run.
+TEST(RunStore, ResumesFromTheLatestCheckpoint) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  const auto terrain = [](int i) { return TerrainRecord{some_frame(i).stamp, "narrow", 90.0 + i, i}; };
+  {
+    auto store = RunStore::create(path, kIdentity);
+    ASSERT_TRUE(store) << store.error().message();
+    ASSERT_TRUE(store->commit({some_frame(0), terrain(0), {}, {}}));
+    EXPECT_FALSE(store->checkpoint().value().has_value());
+    ASSERT_TRUE(store->commit({some_frame(1), {}, some_map(0), {}}, [] { return Bytes{1}; }, {10, 0}));
+    ASSERT_TRUE(store->commit({some_frame(2), terrain(2), some_map(1), {}}));
+    ASSERT_TRUE(store->commit({some_frame(3), {}, {}, {}}));
+    auto reader = RunStore::open_read_only(path);
+    ASSERT_TRUE(reader) << reader.error().message();
+    EXPECT_EQ(reader->frames()->size(), 4U);
+    EXPECT_EQ(reader->maps()->size(), 2U);
+  }
+  auto store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  const auto frames = store->frames();
+  ASSERT_TRUE(frames);
+  ASSERT_EQ(frames->size(), 2U);
+  EXPECT_EQ(frames->back().times.size(), 2U);
+  EXPECT_EQ(store->terrain()->size(), 1U);
+  EXPECT_EQ(store->maps()->size(), 1U);
+  EXPECT_EQ((*store->checkpoint())->source.samples_taken, 10);
+  ASSERT_TRUE(store->commit({some_frame(2), terrain(2), some_map(1), {}}));
+  EXPECT_EQ(store->frames()->back().times.size(), 2U);
+  EXPECT_EQ(store->frames()->back().localization->sensors.size(), 2U);
+}
+
+TEST(RunStore, StartsAgainWithoutACheckpoint) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  ASSERT_TRUE(RunStore::create(path, kIdentity)->commit({some_frame(0), {}, some_map(0), {}}));
+  auto store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_TRUE(store->frames()->empty());
+  EXPECT_TRUE(store->maps()->empty());
+  EXPECT_FALSE(store->checkpoint().value().has_value());
+  ASSERT_TRUE(store->commit({some_frame(0), {}, some_map(0), {}}));
+}
+
+// Version 2 had a checkpoint in every transaction and no table of counts.
+TEST(RunStore, ResumesAStoreOfVersion2AtItsLatestFrame) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  ASSERT_TRUE(RunStore::create(path, kIdentity)->commit({some_frame(0), {}, {}, {}}, [] { return Bytes{1}; }, {1, 0}));
+  ASSERT_TRUE(Database::open(path, Database::Mode::open)->execute("DROP TABLE counts; PRAGMA user_version=2"));
+  EXPECT_EQ(RunStore::open_read_only(path)->frames()->size(), 1U);
+  auto store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_EQ(store->frames()->size(), 1U);
+  ASSERT_TRUE(store->commit({some_frame(1), {}, {}, {}}));
+}
+
 // Counts the steps of SQLite's virtual machine in all finished statements of databases that are opened during its
 // lifetime.
 class StepCounter {

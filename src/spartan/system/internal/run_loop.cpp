@@ -17,6 +17,9 @@ namespace {
 // Length of the interval from the first IMU sample that initializes gravity if no sample comes before the first frame:
 // a recording often starts its camera and its IMU together, while the rover is stationary. Empirical.
 constexpr double kAlignmentSeconds = 1;
+// Number of frames from one checkpoint to the next; the first frame has one, too. The state of the pipeline is large
+// (some 1 MB at 1200 landmarks), and to process so many frames again after a crash takes little time.
+constexpr int kFramesPerCheckpoint = 250;
 
 LocalizationRecord localization_record(const LocalizationEstimate& estimate) {
   LocalizationRecord record;
@@ -83,6 +86,12 @@ ElapsedTime RunLoop::elapsed() const {
 }
 
 Status RunLoop::process_samples() {
+  if (Status status = process_until_end(); !status) return status;
+  if (frames_since_checkpoint_ == 0) return {};
+  return checkpoint({});
+}
+
+Status RunLoop::process_until_end() {
   while (request_.max_frames == 0 || frames_ < request_.max_frames) {
     if (hooks_.should_stop && hooks_.should_stop()) {
       stopped_ = true;
@@ -112,7 +121,7 @@ Status RunLoop::finish() {
   }
   step.times = take_stage_times();
   if (frames_ == 0 || (!step.map && step.times.empty())) return {};
-  return commit(step);
+  return checkpoint(step);
 }
 
 std::vector<StageTime> RunLoop::take_stage_times() {
@@ -221,12 +230,9 @@ Status RunLoop::process_missing(const MissingFrame& missing) {
 
 Status RunLoop::commit(const RunStore::Step& step) {
   if (resumed_ && !resumed_from_frame_ && step.frame) resumed_from_frame_ = step.frame->frame_id;
-  const auto save = [&]() -> Result<Bytes> {
-    if (Status flushed = pipeline_.flush_maps(); !flushed) return failure(flushed);
-    return pipeline_.save();
-  };
-  Status status = store_.commit(step, save, {samples_taken_, source_.content_hash()}, elapsed());
-  if (!step.frame) return status;
+  ++frames_since_checkpoint_;
+  const bool due = frames_ == 0 || frames_since_checkpoint_ >= kFramesPerCheckpoint;
+  Status status = due ? checkpoint(step) : store_.commit(step);
   ++frames_;
   if (step.frame->has_pose) {
     const Eigen::Vector3d& position = step.frame->world_from_body.pose.translation();
@@ -234,6 +240,16 @@ Status RunLoop::commit(const RunStore::Step& step) {
     last_position_ = position;
   }
   if (status && hooks_.progress) hooks_.progress({frames_, total_frames_, distance_m_, step.frame->status});
+  return status;
+}
+
+Status RunLoop::checkpoint(const RunStore::Step& step) {
+  const auto save = [&]() -> Result<Bytes> {
+    if (Status flushed = pipeline_.flush_maps(); !flushed) return failure(flushed);
+    return pipeline_.save();
+  };
+  Status status = store_.commit(step, save, {samples_taken_, source_.content_hash()}, elapsed());
+  if (status) frames_since_checkpoint_ = 0;
   return status;
 }
 

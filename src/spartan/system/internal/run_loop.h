@@ -18,7 +18,8 @@
 
 namespace spartan::internal {
 
-/// Feeds the samples of a recording to the pipeline and commits every result to the store.
+/// Feeds the samples of a recording to the pipeline and commits every result to the store, and now and then the state
+/// of the pipeline.
 class RunLoop {
  public:
   /// `start`, `start_cpu_s`: when this execution of the run began (core/stage_clock.h).
@@ -52,12 +53,15 @@ class RunLoop {
   GlobalMap& global_map() { return pipeline_.global_map(); }
 
  private:
+  Status process_until_end();
   Status process(const Sample& sample);
   Status finish();
   Result<MapRecord> write_map_of(const MappedStop& stop);
   Status process_frame(const StereoFrame& frame);
   Status process_missing(const MissingFrame& missing);
+  /// Commits a frame, with a checkpoint where one is due.
   Status commit(const RunStore::Step& step);
+  Status checkpoint(const RunStore::Step& step);
   std::vector<StageTime> take_stage_times();
 
   const RunRequest& request_;
@@ -76,6 +80,7 @@ class RunLoop {
   int total_frames_ = 0;               // listed frames of the odometry pair, at most max_frames
   double distance_m_ = 0;              // path length of the odometry
   std::optional<Eigen::Vector3d> last_position_;
+  int frames_since_checkpoint_ = 0;
   int usable_frames_ = 0;  // frames of the odometry pair that were processed
   std::string first_error_;
   bool stopped_ = false;

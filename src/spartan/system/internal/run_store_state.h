@@ -17,16 +17,24 @@ struct RunStore::State {
   std::optional<TileStore> tiles;
   Database db;
   std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health,
-      insert_terrain, insert_map, select_checkpoint, replace_checkpoint, replace_content, replace_elapsed;
-  std::optional<std::int64_t> samples_taken;  // of the last checkpoint; none before the first
+      insert_terrain, insert_map, select_progress, replace_checkpoint, replace_content, replace_elapsed, replace_counts;
+  /// How far the stored run has come.
+  struct Progress {
+    std::int64_t frames = 0, samples_taken = 0;  ///< committed frames; samples at the latest checkpoint, −1: none
+    bool operator==(const Progress&) const = default;
+  };
+  Progress progress;  ///< as this process wrote it last
 
   Status prepare();
-  /// Number of samples of the stored checkpoint.
-  Result<std::optional<std::int64_t>> stored_samples();
+  /// Removes the records after the latest checkpoint.
+  Status return_to_checkpoint();
+  Result<Progress> stored_progress();
   /// Code `output` if the database is no longer the one that this process wrote last.
   Status expect_unchanged();
-  Status write(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
-               const ElapsedTime& elapsed);
+  /// Calls write() in a transaction.
+  Status commit(const std::function<Status()>& write);
+  Status write(const Step& step);
+  Status write_checkpoint(const Bytes& pipeline_state, const SourcePosition& source, const ElapsedTime& elapsed);
   Status write(const FrameRecord& frame);
   Status write(const LocalizationRecord& localization);
   Status write(const TerrainRecord& terrain);
