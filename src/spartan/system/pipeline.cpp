@@ -82,17 +82,15 @@ RelativeMotion Pipeline::State::body_motion(const Pose& body_from_left, const Mo
   return result;
 }
 
-// Returns the motion of the body since the last frame.
-Pose Pipeline::State::advance(const RectifiedPair& rectified, const MotionEstimate& motion,
+void Pipeline::State::advance(const RectifiedPair& rectified, const MotionEstimate& motion,
                               const RelativeMotion& body_motion) {
-  const Pose last = world_from_left, last_body = world_from_left * left_from_body;
+  const Pose last = world_from_left;
   world_from_left = reference.world_from_left * motion.previous_from_current;
   distance_m += (last.inverse() * world_from_left).translation().norm();
   left_from_body = rectified.body_from_left.inverse();
   const double seconds = seconds_between(motion.from, motion.to);
   if (seconds > 0) velocity = log_se3(body_motion.previous_from_current) / seconds;
   if (!motion.keeps_reference) reference = {motion.to, world_from_left, left_from_body, {}};
-  return last_body.inverse() * (world_from_left * left_from_body);
 }
 
 // The odometry alone needs sensor samples only to initialize the world frame.
@@ -234,9 +232,8 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   // After lost frames the landmarks of the last one may be the only ones that are found.
   if (result.motion.from != s.reference.stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body, {}};
   const RelativeMotion body_motion = s.body_motion(rectified->body_from_left, result.motion);
-  UncertainPose step;
   if (!result.motion.first) {
-    step = {s.advance(*rectified, result.motion, body_motion), body_motion.covariance};
+    s.advance(*rectified, result.motion, body_motion);
     if (s.options.odometry_only) s.dead_reckoning.add(body_motion);
   }
   if (!s.options.odometry_only) {
@@ -257,8 +254,8 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     if (!result.motion.keeps_reference) s.reference.odom_from_body = result.localization->odom_from_body.pose;
     result.slam = s.slam_filter.world_from_body();
   }
-  if (Status status = s.add_odometry_frame(frame, *rectified, step); !status) return failure(status);
-  s.update_keyframes(*rectified, result.motion, step);
+  if (Status status = s.add_odometry_frame(frame, *rectified, body_motion); !status) return failure(status);
+  s.update_keyframes(*rectified, result.motion, body_motion);
 
   if (s.terrain_is_due()) {
     if (disparity->disparity.empty()) disparity = s.dense_disparity(*rectified);

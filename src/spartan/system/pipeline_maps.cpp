@@ -28,10 +28,10 @@ std::vector<StageTime> sums_by_stage(const std::vector<StageTime>& times) {
 }  // namespace
 
 Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified,
-                                           const UncertainPose& step) {
+                                           const RelativeMotion& motion) {
   if (!maps_stops) return {};
   return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
-                                       localizer.estimate().world_from_body, step);
+                                       localizer.estimate().world_from_body, motion);
 }
 
 // Adds a frame of another pair to the stop that it belongs to.
@@ -108,14 +108,14 @@ MappedStop Pipeline::State::apply(const StopSurvey& survey, MapMergeResult merge
 
 // A frame whose motion is unknown is no keyframe.
 void Pipeline::State::update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion,
-                                       const UncertainPose& step) {
+                                       const RelativeMotion& body_motion) {
   if (!maps_keyframes) return;
-  if (!motion.first) keyframe_stage.advance(rectified.stamp, step);
+  if (!motion.first) keyframe_stage.advance(body_motion);
   if (motion.status == TrackingStatus::lost || !keyframe_stage.is_due(rectified, world_from_left)) return;
   if (keyframe_stage.is_pending()) {
     keyframe_stage.hurry();
   } else {
-    keyframe_stage.begin(rectified, world_from_left, localizer.estimate().world_from_body);
+    keyframe_stage.begin(rectified, world_from_left, localizer.estimate().world_from_body, body_motion);
   }
 }
 

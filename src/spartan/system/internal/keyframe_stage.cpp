@@ -62,22 +62,21 @@ bool KeyframeStage::is_due(const RectifiedPair& frame, const Pose& world_from_le
                     ground_sector(frame.geometry, world_from_left_, range_m)) >= options_.new_ground;
 }
 
-void KeyframeStage::begin(const RectifiedPair& frame, const Pose& world_from_left,
-                          const UncertainPose& world_from_body) {
+void KeyframeStage::begin(const RectifiedPair& frame, const Pose& world_from_left, const UncertainPose& world_from_body,
+                          const RelativeMotion& motion) {
   any_ = pending_ = true;
   age_ = 0;
   world_from_left_ = world_from_left;
   world_from_body_ = world_from_body;
-  stamp_ = last_stamp_ = frame.stamp;
-  first_from_last_ = {};
+  stamp_ = frame.stamp;
+  chain_.start(motion);
   frame_.emplace(frame);
 }
 
-void KeyframeStage::advance(Stamp stamp, const UncertainPose& motion) {
+void KeyframeStage::advance(const RelativeMotion& motion) {
   if (!pending_) return;
   if (age_ < options_.delay_frames) ++age_;
-  last_stamp_ = stamp;
-  first_from_last_ = compose(first_from_last_, motion);
+  chain_.add(motion);
 }
 
 Result<std::vector<SurfacePoint>> KeyframeStage::points(double nearest_m) {
@@ -90,8 +89,8 @@ Result<std::vector<SurfacePoint>> KeyframeStage::points(double nearest_m) {
 StopSurvey KeyframeStage::survey() const {
   StopSurvey survey;
   survey.stamp = stamp_;
-  survey.last_stamp = last_stamp_;
-  survey.first_from_last = first_from_last_;
+  survey.last_stamp = chain_.last_stamp();
+  survey.first_from_last = chain_.first_from_last();
   survey.world_from_body = world_from_body_;
   survey.views = 1;
   return survey;
@@ -113,11 +112,9 @@ void KeyframeStage::save(ArchiveWriter& out) const {
   out.put(world_from_left_);
   out.put(age_);
   out.put(stamp_.ns);
-  out.put(last_stamp_.ns);
   out.put(world_from_body_.pose);
   out.put(world_from_body_.covariance);
-  out.put(first_from_last_.pose);
-  out.put(first_from_last_.covariance);
+  chain_.save(out);
 }
 
 void KeyframeStage::restore(ArchiveReader& in) {
@@ -126,11 +123,9 @@ void KeyframeStage::restore(ArchiveReader& in) {
   world_from_left_ = in.get_pose();
   age_ = in.get<std::int32_t>();
   stamp_ = in.get_stamp();
-  last_stamp_ = in.get_stamp();
   world_from_body_.pose = in.get_pose();
   world_from_body_.covariance = in.get_matrix6();
-  first_from_last_.pose = in.get_pose();
-  first_from_last_.covariance = in.get_matrix6();
+  chain_.restore(in);
   mapper_.leave();
   frame_.reset();
 }

@@ -10,6 +10,7 @@
 #include "spartan/core/result.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/stop_mapper.h"
+#include "spartan/system/internal/motion_chain.h"
 #include "spartan/system/internal/stop_stage.h"
 #include "spartan/system/internal/stored_pair.h"
 #include "spartan/system/run_options.h"
@@ -45,13 +46,14 @@ class KeyframeStage {
   /// ground since the last one reach their limits. The first frame is one.
   bool is_due(const RectifiedPair& frame, const Pose& world_from_left) const;
 
-  /// Makes the frame a keyframe; none may be pending. `world_from_body`: prior pose of its map. The frame must be one
-  /// that StopMapper::check() accepts.
-  void begin(const RectifiedPair& frame, const Pose& world_from_left, const UncertainPose& world_from_body);
+  /// Makes the frame a keyframe; none may be pending. `world_from_body`: prior pose of its map; `motion`: of the body,
+  /// up to the frame. The frame must be one that StopMapper::check() accepts.
+  void begin(const RectifiedPair& frame, const Pose& world_from_left, const UncertainPose& world_from_body,
+             const RelativeMotion& motion);
   /// Lets the pending keyframe be ready at the next frame: another one is due.
   void hurry() { age_ = options_.delay_frames; }
-  /// Each frame after it; `motion`: previous_from_current of the body.
-  void advance(Stamp stamp, const UncertainPose& motion);
+  /// Each frame after it; `motion`: of the body, up to the frame.
+  void advance(const RelativeMotion& motion);
 
   /// Whether a map is to be made of the last keyframe.
   bool is_pending() const { return pending_ && frame_; }
@@ -81,8 +83,9 @@ class KeyframeStage {
   bool any_ = false, pending_ = false;  // whether there was a keyframe; whether its map is still to be made
   Pose world_from_left_;                // of the last keyframe
   std::int32_t age_ = 0;                // frames since the pending keyframe
-  Stamp stamp_, last_stamp_;
-  UncertainPose world_from_body_, first_from_last_;
+  Stamp stamp_;
+  UncertainPose world_from_body_;
+  MotionChain chain_;
   std::optional<StoredPair> frame_;
 };
 

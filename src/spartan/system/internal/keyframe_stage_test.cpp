@@ -73,7 +73,7 @@ TEST(KeyframeStage, TakesTheFirstFrameThenByDistanceTurnOrNewGround) {
   by_distance.turn_deg = 180;
   Stage s(by_distance);
   ASSERT_TRUE(s.stage.is_due(s.frame, level_camera(0, 0, 0)));
-  s.stage.begin(s.frame, level_camera(0, 0, 0), {});
+  s.stage.begin(s.frame, level_camera(0, 0, 0), {}, {});
   s.stage.clear();
   EXPECT_FALSE(s.stage.is_due(s.frame, level_camera(4.9, 0, 0)));
   EXPECT_TRUE(s.stage.is_due(s.frame, level_camera(5.1, 0, 0))) << "a quarter of 20 m";
@@ -82,7 +82,7 @@ TEST(KeyframeStage, TakesTheFirstFrameThenByDistanceTurnOrNewGround) {
   by_turn.every_m = 1000;
   by_turn.new_ground = 1;
   Stage t(by_turn);
-  t.stage.begin(t.frame, level_camera(0, 0, 0), {});
+  t.stage.begin(t.frame, level_camera(0, 0, 0), {}, {});
   t.stage.clear();
   EXPECT_FALSE(t.stage.is_due(t.frame, level_camera(0, 0, 19 * kDegree)));
   EXPECT_TRUE(t.stage.is_due(t.frame, level_camera(0, 0, 21 * kDegree)));
@@ -91,7 +91,7 @@ TEST(KeyframeStage, TakesTheFirstFrameThenByDistanceTurnOrNewGround) {
   by_ground.every_m = 1000;
   by_ground.turn_deg = 180;
   Stage g(by_ground);
-  g.stage.begin(g.frame, level_camera(0, 0, 0), {});
+  g.stage.begin(g.frame, level_camera(0, 0, 0), {}, {});
   g.stage.clear();
   EXPECT_FALSE(g.stage.is_due(g.frame, level_camera(0.5, 0, 0)));
   EXPECT_TRUE(g.stage.is_due(g.frame, level_camera(9, 0, 0)));
@@ -101,8 +101,8 @@ TEST(KeyframeStage, IsReadyAfterTheDelayAlsoWhenRestored) {
   KeyframeOptions options;
   options.delay_frames = 2;
   Stage s(options);
-  s.stage.begin(s.frame, level_camera(0, 0, 0), {});
-  s.stage.advance(Stamp{10}, {});
+  s.stage.begin(s.frame, level_camera(0, 0, 0), {}, {});
+  s.stage.advance({});
   EXPECT_FALSE(s.stage.is_ready());
   ArchiveWriter out;
   s.stage.save(out);
@@ -112,7 +112,7 @@ TEST(KeyframeStage, IsReadyAfterTheDelayAlsoWhenRestored) {
   restored.stage.restore(in);
   ASSERT_TRUE(in.finish("state"));
   EXPECT_TRUE(restored.stage.pending_frame()) << "the images are needed again";
-  restored.stage.advance(Stamp{20}, {});
+  restored.stage.advance({});
   EXPECT_FALSE(restored.stage.is_ready()) << "without images";
   restored.stage.restore_frame(restored.frame);
   EXPECT_FALSE(restored.stage.pending_frame());
@@ -123,8 +123,8 @@ TEST(KeyframeStage, IsReadyWhereTheNextOneIsDue) {
   KeyframeOptions options;
   options.delay_frames = 5;
   Stage s(options);
-  s.stage.begin(s.frame, level_camera(0, 0, 0), {});
-  s.stage.advance(Stamp{10}, {});
+  s.stage.begin(s.frame, level_camera(0, 0, 0), {}, {});
+  s.stage.advance({});
   EXPECT_FALSE(s.stage.is_ready());
   s.stage.hurry();
   EXPECT_TRUE(s.stage.is_ready());

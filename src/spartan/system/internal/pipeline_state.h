@@ -91,10 +91,10 @@ struct Pipeline::State {
   std::optional<Pose> predicted_motion(const RectifiedPair& rectified) const;
   std::optional<Pose> motion_by_sensors(const RectifiedPair& rectified) const;
   RelativeMotion body_motion(const Pose& body_from_left, const MotionEstimate& motion) const;
-  Pose advance(const RectifiedPair& rectified, const MotionEstimate& motion, const RelativeMotion& body_motion);
+  void advance(const RectifiedPair& rectified, const MotionEstimate& motion, const RelativeMotion& body_motion);
   void add_sensor_sample(const Measurement& sample);
   void localize(const RelativeMotion& motion);
-  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const UncertainPose& step);
+  Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
   void apply_map_constraint(const internal::StopSurvey& survey, const PoseConstraint& constraint);
   Status add_view(const StereoFrame& frame);
   Result<std::optional<MappedStop>> finish_stop();
@@ -102,7 +102,8 @@ struct Pipeline::State {
   void make_keyframe_map(const std::optional<MapExcerpt>& global);
   Result<MappedStop> finish_keyframe();
   MappedStop apply(const internal::StopSurvey& survey, MapMergeResult merged);
-  void update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion, const UncertainPose& step);
+  void update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion,
+                        const RelativeMotion& body_motion);
   bool terrain_is_due() const;
   Status check_disparities(const RectifiedPair& rectified) const;
   Result<DisparityImage> dense_disparity(const RectifiedPair& rectified);

@@ -5,26 +5,25 @@
 namespace spartan::internal {
 
 Status StopStage::add_odometry_frame(std::int64_t position_id, const RectifiedPair& frame, double nearest_m,
-                                     const UncertainPose& world_from_body, const UncertainPose& motion) {
+                                     const UncertainPose& world_from_body, const RelativeMotion& motion) {
   const bool begins = position_id >= 0 && position_id != position_id_;
   if (begins) {
     if (Status valid = StopMapper::check(frame, nearest_m); !valid) return valid;
   }
   std::erase_if(early_, [&](const EarlyView& view) { return view.position_id != position_id; });
   if (position_id < 0) return {};
-  if (begins) return begin_stop(position_id, frame, nearest_m, world_from_body);
-  last_stamp_ = frame.stamp;
-  first_from_last_ = compose(first_from_last_, motion);
+  if (begins) return begin_stop(position_id, frame, nearest_m, world_from_body, motion);
+  chain_.add(motion);
   return {};
 }
 
 Status StopStage::begin_stop(std::int64_t position_id, const RectifiedPair& frame, double nearest_m,
-                             const UncertainPose& world_from_body) {
+                             const UncertainPose& world_from_body, const RelativeMotion& motion) {
   mapper_.leave();
   position_id_ = position_id;
-  stamp_ = last_stamp_ = frame.stamp;
+  stamp_ = frame.stamp;
   world_from_body_ = world_from_body;
-  first_from_last_ = {};
+  chain_.start(motion);
   views_.clear();
   pending_.clear();
   first_frame_.emplace(frame);
@@ -74,8 +73,8 @@ std::optional<StopSurvey> StopStage::survey() {
   StopSurvey survey;
   survey.position_id = position_id_;
   survey.stamp = stamp_;
-  survey.last_stamp = last_stamp_;
-  survey.first_from_last = first_from_last_;
+  survey.last_stamp = chain_.last_stamp();
+  survey.first_from_last = chain_.first_from_last();
   survey.world_from_body = world_from_body_;
   survey.views = static_cast<int>(mapper_.views().size());
   survey.points = surface_points(mapper_.merge());
@@ -95,9 +94,7 @@ void StopStage::save(ArchiveWriter& out) const {
   out.put(stamp_.ns);
   out.put(world_from_body_.pose);
   out.put(world_from_body_.covariance);
-  out.put(last_stamp_.ns);
-  out.put(first_from_last_.pose);
-  out.put(first_from_last_.covariance);
+  chain_.save(out);
   std::vector<FrameKey> keys = views_;
   for (const EarlyView& view : early_) keys.push_back(view.key);
   std::vector<std::int64_t> stamps;
@@ -112,9 +109,7 @@ void StopStage::restore(ArchiveReader& in) {
   stamp_ = in.get_stamp();
   world_from_body_.pose = in.get_pose();
   world_from_body_.covariance = in.get_matrix6();
-  last_stamp_ = in.get_stamp();
-  first_from_last_.pose = in.get_pose();
-  first_from_last_.covariance = in.get_matrix6();
+  chain_.restore(in);
   early_.clear();
   views_.clear();
   pending_.clear();

@@ -13,6 +13,7 @@
 #include "spartan/core/threads.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/stop_mapper.h"
+#include "spartan/system/internal/motion_chain.h"
 #include "spartan/system/internal/stored_pair.h"
 
 namespace spartan::internal {
@@ -38,10 +39,10 @@ class StopStage {
   explicit StopStage(StopMapper mapper) : mapper_(std::move(mapper)) {}
 
   /// Adds a frame of the odometry pair, at a stop or between stops (position_id < 0); the first frame at a stop is one
-  /// of its views. `world_from_body`: at this frame. `motion`: previous_from_current of the body since the previous
-  /// frame. `nearest_m`: nearest depth of the search range. Codes as add_view().
+  /// of its views. `world_from_body`: at this frame. `motion`: of the body, up to this frame. `nearest_m`: nearest
+  /// depth of the search range. Codes as add_view().
   Status add_odometry_frame(std::int64_t position_id, const RectifiedPair& frame, double nearest_m,
-                            const UncertainPose& world_from_body, const UncertainPose& motion);
+                            const UncertainPose& world_from_body, const RelativeMotion& motion);
   /// Adds a view by another pair. Views of a stop that the odometry pair never reaches are discarded. Code
   /// `frame_rejected` if the view cannot be matched (StopMapper::check); the state is then unchanged.
   Status add_view(std::int64_t position_id, const std::string& pair, const RectifiedPair& frame, double nearest_m);
@@ -74,13 +75,14 @@ class StopStage {
     double nearest_m = 0;
   };
   Status begin_stop(std::int64_t position_id, const RectifiedPair& frame, double nearest_m,
-                    const UncertainPose& world_from_body);
+                    const UncertainPose& world_from_body, const RelativeMotion& motion);
   Status add_to_mapper(const RectifiedPair& frame, double nearest_m);
 
   StopMapper mapper_;
   std::int64_t position_id_ = -1;
-  Stamp stamp_, last_stamp_;
-  UncertainPose world_from_body_, first_from_last_;
+  Stamp stamp_;
+  UncertainPose world_from_body_;
+  MotionChain chain_;
   std::vector<FrameKey> views_;    // added views of other pairs
   std::vector<FrameKey> pending_;  // views to be added again after restore()
   std::vector<EarlyView> early_;
