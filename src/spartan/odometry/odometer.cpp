@@ -268,7 +268,7 @@ void Odometer::State::measure(const StereoImages& images, ImageSide side, const 
     matches = discard_object(images.geometry, matches, start.previous_from_current, *start.object);
   }
   if (options.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
-  add_noise_floor(options.motion, matches);
+  add_noise_floor(options.motion, images.geometry, start.previous_from_current, matches);
   estimate.matches = static_cast<int>(matches.size());
   estimate.times.match += watch.lap();
 

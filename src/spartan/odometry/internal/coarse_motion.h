@@ -63,7 +63,9 @@ class CoarseMotionEstimator {
   ThreadPool workers_;
 };
 
-/// Adds the specified noise, which the residual of a single patch alignment does not show.
-void add_noise_floor(const MotionEstimationOptions& options, std::vector<LandmarkMatch>& matches);
+/// Adds the noise that the residual of a single patch alignment does not show: the specified one, and one that grows
+/// with the change of viewpoint since the anchor, by which shadows and the sides of stones come into view.
+void add_noise_floor(const MotionEstimationOptions& options, const RectifiedStereo& stereo,
+                     const Pose& previous_from_current, std::vector<LandmarkMatch>& matches);
 
 }  // namespace spartan::internal

@@ -20,6 +20,7 @@ struct LandmarkMatch {
   Pose previous_from_anchor;
   Eigen::Vector3d measured;    ///< (u, v, d) in the current frame, pixels; predicted where it was not measured
   Eigen::Matrix3d covariance;  ///< of `measured`, pixels²; large in the direction that was not measured
+  double parallax_px = 0;      ///< by how much the translation since the anchor has moved it in the left image
   MeasuredIn cameras = MeasuredIn::both;
 
   int dimensions() const { return cameras == MeasuredIn::both ? 3 : 2; }

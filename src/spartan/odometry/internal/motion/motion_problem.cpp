@@ -168,6 +168,7 @@ Matrix7d MotionProblem::covariance(const std::vector<bool>& used, const MotionSt
   for_each_residual(used, state, noise_scale, add_slope);
   a(6, 6) += prior_information();
   const Matrix7d inverse = a.ldlt().solve(Matrix7d::Identity());
+  Eigen::Matrix<double, 7, 2> shared = Eigen::Matrix<double, 7, 2>::Zero();  // score of the shared error along u and v
   const auto add_score = [&](const LandmarkMatch& match, const Eigen::Vector3d&, const Jacobian& j,
                              const Eigen::Matrix3d& inverse_spread, double s) {
     const Matrix7d information = j.transpose() * inverse_spread * j;
@@ -176,9 +177,11 @@ Matrix7d MotionProblem::covariance(const std::vector<bool>& used, const MotionSt
     const double leverage = scale * weight * information.cwiseProduct(inverse).sum();
     const double dimensions = std::max(match.dimensions() - leverage, kMinDimensions);
     b += scale * weight * weight * s / dimensions * information;
+    shared += scale * weight * match.parallax_px * (j.transpose() * inverse_spread).leftCols<2>();
   };
   for_each_residual(used, state, noise_scale, add_score);
   b(6, 6) += prior_information();
+  b += kSharedViewpointError * kSharedViewpointError * shared * shared.transpose();
   const Matrix7d covariance = inverse * b * inverse.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }

@@ -53,6 +53,32 @@ TEST(MotionProblem, GradientIsTheDerivativeOfTheCost) {
   }
 }
 
+// By least squares, an error of all positions moves the estimate by the step of Gauss-Newton that it causes.
+TEST(MotionProblem, CovarianceHoldsTheErrorThatAllPositionsShare) {
+  std::vector<LandmarkMatch> matches = random_matches(40);
+  const std::vector<bool> used(matches.size(), true);
+  const MotionState state{Pose::from_translation({0.01, 0, 0.05}), 0};
+  const auto problem_of = [&](const std::vector<LandmarkMatch>& of) {
+    MotionProblem problem(kProblemStereo, of, {0, 0.02}, false);
+    problem.update_weights(state);
+    return problem;
+  };
+  const Matrix7d without = problem_of(matches).covariance(used, state, 1.3);
+  for (std::size_t i = 0; i < matches.size(); ++i) matches[i].parallax_px = 500 + 25 * static_cast<double>(i);
+  const auto normal = problem_of(matches).linearize(used, state, 1.3);
+  Matrix7d expected = Matrix7d::Zero();
+  for (const int axis : {0, 1}) {
+    std::vector<LandmarkMatch> moved = matches;
+    for (LandmarkMatch& match : moved) match.measured[axis] += kSharedViewpointError * match.parallax_px;
+    const Vector7d gradient = problem_of(moved).linearize(used, state, 1.3).gradient - normal.gradient;
+    const Vector7d step = normal.information.ldlt().solve(gradient);
+    expected += step * step.transpose();
+  }
+  const Matrix7d shared = problem_of(matches).covariance(used, state, 1.3) - without;
+  EXPECT_GT(expected.norm(), 1e-4 * without.norm());
+  EXPECT_LT((shared - expected).norm(), 1e-6 * expected.norm());
+}
+
 TEST(MotionProblem, AgreesWithTheProjectionOfAnchoredPoints) {
   const std::vector<LandmarkMatch> matches = random_matches(20);
   MotionProblem problem(kProblemStereo, matches, {}, true);
