@@ -126,7 +126,7 @@ Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature
   const float scale = squared > 0 ? 254.0f / std::sqrt(squared) : 0.0f;
   Descriptor descriptor;
   for (std::size_t i = 0; i < v.size(); ++i) {
-    descriptor[i] = static_cast<std::int8_t>(std::clamp(std::lround(v[i] * scale), -127L, 127L));
+    descriptor.bytes[i] = static_cast<std::int8_t>(std::clamp(std::lround(v[i] * scale), -127L, 127L));
   }
   return descriptor;
 }
@@ -204,12 +204,7 @@ const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> i
                         [&](int begin, int) { search(begin, image.size(), parts_[static_cast<std::size_t>(begin)]); });
   found_.clear();
   for (const Part& part : parts_) found_.insert(found_.end(), part.found.begin(), part.found.end());
-  if (!mask.empty()) {
-    std::erase_if(found_, [&](const Feature& f) {
-      const int x = static_cast<int>(std::lround(f.x)), y = static_cast<int>(std::lround(f.y));
-      return !mask.contains(x, y) || mask(x, y) == 0;
-    });
-  }
+  discard_masked(found_, mask);
   features_ = spread_features(found_, image.size(), wanted.count.value_or(options_.landmarks), options_.spacing_px,
                               wanted.taken);
   workers_.parallel_for(0, static_cast<int>(features_.size()), 64, [&](int begin, int end) {

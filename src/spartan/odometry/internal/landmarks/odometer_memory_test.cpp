@@ -29,7 +29,7 @@ OdometerMemory some_memory() {
     l.slant = {0.1, -0.2};
     l.patch.fill(static_cast<std::uint16_t>(1000 + i));
     l.pixel = {11.5, 21.25};
-    l.descriptor[5] = static_cast<std::int8_t>(-i);
+    l.descriptor.bytes[5] = static_cast<std::int8_t>(-i);
     l.missed_frames = i;
     memory.reference.map.landmarks.push_back(l);
   }
