@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
@@ -121,6 +122,35 @@ void time_odometer(const std::vector<Frame>& frames, int threads) {
              tracked / static_cast<int>(frames.size()));
 }
 
+// SURF as the odometry uses it, and oriented and refined, beside SIFT of OpenCV for as many points.
+void compare_detectors(const std::vector<Frame>& frames) {
+  DetectionOptions plain, refined;
+  refined.surf.upright = false;
+  refined.surf.refine = true;
+  const std::array detectors{internal::make_landmark_detector(plain, ThreadPool(1)),
+                             internal::make_landmark_detector(refined, ThreadPool(1))};
+  std::array<std::vector<double>, 2> surf;
+  std::array<std::size_t, 2> surf_count{};
+  std::vector<double> sift;
+  std::size_t sift_count = 0;
+  const auto opencv = cv::SIFT::create(plain.landmarks, 3, plain.sift.threshold);
+  for (std::size_t i = 0; i < std::min<std::size_t>(frames.size(), 11); ++i) {
+    const auto& left = frames[i].left;
+    const cv::Mat image = as_mat(left.view());
+    std::vector<cv::KeyPoint> points;
+    cv::Mat descriptors;
+    sift.push_back(milliseconds([&] { opencv->detectAndCompute(image, cv::noArray(), points, descriptors); }));
+    sift_count = points.size();
+    for (std::size_t k = 0; k < detectors.size(); ++k)
+      surf[k].push_back(milliseconds([&] { surf_count[k] = detectors[k]->detect(left, {}).size(); }));
+  }
+  for (std::size_t k = 0; k < detectors.size(); ++k) {
+    fmt::print("  {:<34} {:.2f} ms ({}), OpenCV SIFT {:.2f} ms ({}), one thread: {:.1f} times as fast\n",
+               k == 0 ? "SURF, detect and describe" : "SURF, oriented and refined", median(surf[k]), surf_count[k],
+               median(sift), sift_count, median(sift) / median(surf[k]));
+  }
+}
+
 void compare(const std::string& recording, int from, int count) {
   const std::vector<Frame> frames = load(recording, from, count);
   if (frames.empty()) return;
@@ -134,22 +164,7 @@ void compare(const std::string& recording, int from, int count) {
     return rival.add(pair);
   }).print("OpenCV Lucas-Kanade and PnP", static_cast<int>(frames.size()));
 
-  std::vector<double> sift, surf;
-  std::size_t sift_count = 0, surf_count = 0;
-  const auto detector = internal::make_landmark_detector(OdometryOptions().detection, ThreadPool(1));
-  const auto opencv = cv::SIFT::create(OdometryOptions().detection.landmarks);
-  for (std::size_t i = 0; i < std::min<std::size_t>(frames.size(), 11); ++i) {
-    const auto& left = frames[i].left;
-    const cv::Mat image = as_mat(left.view());
-    std::vector<cv::KeyPoint> points;
-    cv::Mat descriptors;
-    sift.push_back(milliseconds([&] { opencv->detectAndCompute(image, cv::noArray(), points, descriptors); }));
-    sift_count = points.size();
-    surf.push_back(milliseconds([&] { surf_count = detector->detect(left, {}).size(); }));
-  }
-  fmt::print("  {:<34} {:.2f} ms ({}), OpenCV SIFT {:.2f} ms ({}), one thread: {:.1f} times as fast\n",
-             "SURF, detect and describe", median(surf), surf_count, median(sift), sift_count,
-             median(sift) / median(surf));
+  compare_detectors(frames);
 }
 
 void run(const std::vector<std::string>& words) {

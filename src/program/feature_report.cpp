@@ -32,10 +32,13 @@ Json to_json(const ComparedDetector& detector) {
 // Pixels of a drawing; sub-pixel bits of cv::line and cv::circle.
 constexpr int kShift = 4;
 
-cv::Point drawn(const Eigen::Vector2f& p, int offset_x) {
-  return {static_cast<int>(std::lround((p.x() + static_cast<float>(offset_x)) * (1 << kShift))),
-          static_cast<int>(std::lround(p.y() * (1 << kShift)))};
+cv::Point drawn(const Eigen::Vector2f& p, const cv::Point& corner) {
+  return {static_cast<int>(std::lround((p.x() + static_cast<float>(corner.x)) * (1 << kShift))),
+          static_cast<int>(std::lround((p.y() + static_cast<float>(corner.y)) * (1 << kShift)))};
 }
+
+// Images that are wider than this times their height are drawn one below the other.
+constexpr double kWide = 1.8;
 
 }  // namespace
 
@@ -82,34 +85,38 @@ std::string comparison_to_text(const ComparisonSettings& settings, const std::ve
 
 Image<Rgb8> draw_comparison(ImageView<const std::uint8_t> first, ImageView<const std::uint8_t> second,
                             const FeatureComparison& comparison) {
-  Image<Rgb8> canvas(first.width() + second.width(), std::max(first.height(), second.height()));
-  const auto paste = [&](ImageView<const std::uint8_t> image, int x0) {
+  const bool below = first.width() > kWide * first.height();
+  const cv::Point corner(below ? 0 : first.width(), below ? first.height() : 0);  // of the second image
+  Image<Rgb8> canvas(std::max(first.width(), corner.x + second.width()),
+                     std::max(first.height(), corner.y + second.height()));
+  const auto paste = [&](ImageView<const std::uint8_t> image, const cv::Point& at) {
     for (int y = 0; y < image.height(); ++y) {
       for (int x = 0; x < image.width(); ++x) {
         // Darker, so that the colours stand out.
         const auto gray = static_cast<std::uint8_t>(image(x, y) * 3 / 4);
-        canvas(x0 + x, y) = {gray, gray, gray};
+        canvas(at.x + x, at.y + y) = {gray, gray, gray};
       }
     }
   };
-  paste(first, 0);
-  paste(second, first.width());
+  paste(first, {});
+  paste(second, corner);
   cv::Mat mat = as_mat(canvas);
   const cv::Scalar green(60, 220, 80), red(255, 60, 50), yellow(250, 220, 70);
-  const auto circles = [&](const std::vector<Eigen::Vector2f>& features, int x0) {
+  const auto circles = [&](const std::vector<Eigen::Vector2f>& features, const cv::Point& at) {
     for (const Eigen::Vector2f& p : features)
-      cv::circle(mat, drawn(p, x0), 2 << kShift, yellow, 1, cv::LINE_AA, kShift);
+      cv::circle(mat, drawn(p, at), 2 << kShift, yellow, 1, cv::LINE_AA, kShift);
   };
-  circles(comparison.first, 0);
-  circles(comparison.second, first.width());
+  circles(comparison.first, {});
+  circles(comparison.second, corner);
   for (const bool correct : {true, false}) {  // the wrong ones on top
     for (const FeatureComparison::Match& match : comparison.matches) {
       if (match.correct != correct) continue;
       const cv::Scalar& colour = correct ? green : red;
-      const cv::Point from = drawn(comparison.first[static_cast<std::size_t>(match.first)], 0),
-                      to = drawn(comparison.second[static_cast<std::size_t>(match.second)], first.width());
+      const cv::Point from = drawn(comparison.first[static_cast<std::size_t>(match.first)], {}),
+                      to = drawn(comparison.second[static_cast<std::size_t>(match.second)], corner);
       cv::line(mat, from, to, colour, 1, cv::LINE_AA, kShift);
-      for (const cv::Point& end : {from, to}) cv::circle(mat, end, 2 << kShift, colour, cv::FILLED, cv::LINE_AA, kShift);
+      for (const cv::Point& end : {from, to})
+        cv::circle(mat, end, 2 << kShift, colour, cv::FILLED, cv::LINE_AA, kShift);
     }
   }
   return canvas;

@@ -35,7 +35,8 @@ struct ComparisonSettings {
 Json comparison_to_json(const ComparisonSettings& settings, const std::vector<ComparedView>& views);
 std::string comparison_to_text(const ComparisonSettings& settings, const std::vector<ComparedView>& views);
 
-/// Both images side by side, with the features (yellow), correct matches (green) and wrong ones (red).
+/// Both images side by side, wide ones one below the other, with the features (yellow), correct matches (green) and
+/// wrong ones (red).
 Image<Rgb8> draw_comparison(ImageView<const std::uint8_t> first, ImageView<const std::uint8_t> second,
                             const FeatureComparison& comparison);
 

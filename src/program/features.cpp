@@ -39,17 +39,21 @@ constexpr double kSmallestSide_px = 16;
 struct NamedDetector {
   std::string_view name;
   DetectorType type;
-  bool oriented;  // SURF with an orientation
+  bool oriented, refined;  // SURF only: surf.upright=false, surf.refine=true
 };
-constexpr std::array kDetectors{
-    NamedDetector{"surf", DetectorType::surf, false},     NamedDetector{"surf_oriented", DetectorType::surf, true},
-    NamedDetector{"harris", DetectorType::harris, false}, NamedDetector{"orb", DetectorType::orb, false},
-    NamedDetector{"sift", DetectorType::sift, false},     NamedDetector{"akaze", DetectorType::akaze, false}};
+constexpr std::array kDetectors{NamedDetector{"surf", DetectorType::surf, false, false},
+                                NamedDetector{"surf_oriented", DetectorType::surf, true, false},
+                                NamedDetector{"surf_refined", DetectorType::surf, true, true},
+                                NamedDetector{"harris", DetectorType::harris, false, false},
+                                NamedDetector{"orb", DetectorType::orb, false, false},
+                                NamedDetector{"sift", DetectorType::sift, false, false},
+                                NamedDetector{"akaze", DetectorType::akaze, false, false}};
 
 DetectionOptions options_of(const NamedDetector& detector, DetectionOptions options, int features) {
   options.detector = detector.type;
   options.landmarks = features;
   if (detector.oriented) options.surf.upright = false;
+  if (detector.refined) options.surf.refine = true;
   return options;
 }
 
@@ -132,9 +136,10 @@ Result<std::vector<ViewAndGeometry>> views_of(const CompareArguments& a, ImageVi
     const double scale = a.scale.value_or(1);
     const double side = std::max(first.width(), first.height()) * scale * std::numbers::sqrt2;
     if (std::min(first.width(), first.height()) * scale < kSmallestSide_px || side >= 32767) {
-      return failure(ErrorCode::usage, fmt::format("an image of {} x {} px cannot be scaled by {:g}", first.width(),
-                                                   first.height(), scale),
-                     "--scale", "the result must have sides from 16 to 32766 px");
+      return failure(
+          ErrorCode::usage,
+          fmt::format("an image of {} x {} px cannot be scaled by {:g}", first.width(), first.height(), scale),
+          "--scale", "the result must have sides from 16 to 32766 px");
     }
     views.push_back(made_view(first, a.rotate_deg.value_or(0), scale));
     return views;
@@ -154,7 +159,6 @@ Status compare_on(const CompareArguments& a, const DetectionOptions& detection, 
     if (Status s = expect_not_interrupted(); !s) return s;
     FeatureComparisonOptions options;
     options.detection = options_of(detector, detection, a.features);
-    options.tolerance_px = a.tolerance_px;
     options.repetitions = a.repetitions;
     comparisons.push_back(
         match_features(first, std::as_const(pair.view.image).view(), pair.geometry, options, workers));
@@ -248,15 +252,16 @@ void add_compare(CLI::App& features, Context& context) {
   for (const NamedDetector& detector : kDetectors) names.emplace_back(detector.name);
   command
       ->add_option("--detectors", a->detectors,
-                   "Detectors to compare, separated by commas: surf (upright, unless an option says otherwise), "
-                   "surf_oriented, harris, orb, sift, akaze (default: all).")
+                   "Detectors to compare, separated by commas: surf (as the options say, by default upright), "
+                   "surf_oriented, surf_refined (oriented and refined), harris, orb, sift, akaze (default: all).")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->check(CLI::IsMember(names))
       ->option_text("NAME,...");
   command
       ->add_option("--features", a->features,
                    "Maximum number of features of an image, spread evenly (default 500). The same for all detectors.")
-      ->check(CLI::Range(20, 100000));
+      ->check(CLI::Range(20, 10000));
   command
       ->add_option("--tolerance-px", a->tolerance_px,
                    "Largest distance in pixels, in either image, of features that correspond (default 2).")

@@ -1,9 +1,8 @@
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <tuple>
-
-#include <Eigen/Dense>
 
 #include "spartan/core/stage_clock.h"
 #include "spartan/numerics/median.h"

@@ -110,7 +110,8 @@ Result<Eigen::Matrix3d> parse_homography(const std::string& text, const std::str
   Eigen::Matrix3d matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
   // It is determined up to a factor: points of the images have a positive third coordinate.
   matrix /= std::copysign(matrix.cwiseAbs().maxCoeff(), matrix(2, 2));
-  if (!matrix.allFinite() || !(std::abs(matrix.determinant()) > kMinHomographyDeterminant)) return bad("is a singular matrix");
+  if (!matrix.allFinite() || !(std::abs(matrix.determinant()) > kMinHomographyDeterminant))
+    return bad("is a singular matrix");
   return matrix;
 }
 
@@ -143,7 +144,7 @@ TransformedView transform_view(ImageView<const std::uint8_t> image, double clock
 }
 
 std::optional<ImageRelation> estimate_epipolar_geometry(std::span<const FeatureComparison> comparisons,
-                                                       double tolerance_px) {
+                                                        double tolerance_px) {
   std::vector<PointPair> pairs;
   for (const FeatureComparison& comparison : comparisons) {
     for (const FeatureComparison::Match& match : comparison.matches) {

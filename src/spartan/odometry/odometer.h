@@ -21,6 +21,7 @@ struct SurfOptions {
   int octaves = 3;         ///< octaves of the scale space
   double threshold = 0.3;  ///< minimum determinant of the Hessian, gray levels²
   bool upright = true;     ///< U-SURF: no orientation is assigned
+  bool refine = false;     ///< places by Gaussian derivatives
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -37,15 +38,18 @@ struct SurfOptions {
     v.field("upright", upright,
             "True skips the orientation assignment (U-SURF): faster and more distinctive, for rovers that do not roll "
             "over; set false where the image rotates by more than about 15 degrees between frames.");
+    v.field("refine", refine,
+            "True finds place and scale of each feature again by Gaussian derivatives, and takes square roots of the "
+            "descriptor's entries: more repeatable under large rotations and changes of scale, at twice the time.");
   }
 };
 
 /// Options of Harris corners, which are described by SURF.
 struct HarrisOptions {
-  int window_px = 5;       ///< side of the window of the structure tensor, pixels
-  double quality = 0.001;  ///< minimum response, fraction of the strongest one of the image
-  double scale_px = 2;     ///< scale of the SURF descriptor, pixels
-  bool upright = true;     ///< no orientation is assigned
+  int window_px = 5;      ///< side of the window of the structure tensor, pixels
+  double quality = 1e-5;  ///< minimum response, fraction of the strongest one of the image
+  double scale_px = 2;    ///< scale of the SURF descriptor, pixels
+  bool upright = true;    ///< no orientation is assigned
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -67,7 +71,7 @@ struct HarrisOptions {
 
 /// Options of FAST corners on a pyramid with ORB descriptors, by OpenCV.
 struct OrbOptions {
-  int threshold = 10;         ///< minimum difference of gray levels of FAST
+  int threshold = 5;          ///< minimum difference of gray levels of FAST
   int levels = 8;             ///< levels of the pyramid
   double scale_factor = 1.2;  ///< ratio of the sizes of two levels
 
@@ -87,9 +91,9 @@ struct OrbOptions {
 
 /// Options of SIFT, by OpenCV.
 struct SiftOptions {
-  int layers = 3;           ///< layers of an octave
-  double threshold = 0.02;  ///< minimum contrast, fraction of the range of gray levels
-  double edge_ratio = 10;   ///< largest ratio of the principal curvatures
+  int layers = 3;            ///< layers of an octave
+  double threshold = 0.005;  ///< minimum contrast, fraction of the range of gray levels
+  double edge_ratio = 10;    ///< largest ratio of the principal curvatures
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -107,9 +111,9 @@ struct SiftOptions {
 
 /// Options of AKAZE, by OpenCV.
 struct AkazeOptions {
-  double threshold = 0.0003;  ///< minimum determinant of the Hessian, gray levels from 0 to 1
-  int octaves = 4;            ///< octaves of the nonlinear scale space
-  int layers = 4;             ///< layers of an octave
+  double threshold = 3e-5;  ///< minimum determinant of the Hessian, gray levels from 0 to 1
+  int octaves = 4;          ///< octaves of the nonlinear scale space
+  int layers = 4;           ///< layers of an octave
 
   template <class Visitor>
   void describe(Visitor& v) {

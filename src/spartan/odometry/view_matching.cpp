@@ -46,8 +46,7 @@ std::vector<ViewMatch> match_views(ImageView<const std::uint8_t> left, ImageView
   right_smooth.compute(right, workers);
 
   std::vector<ViewMatch> matches;
-  for (const DescriptorMatch& pair :
-       mutual_matches(left_features, right_features, options.descriptor_ratio, workers)) {
+  for (const DescriptorMatch& pair : mutual_matches(left_features, right_features, options.descriptor_ratio, workers)) {
     const Feature &left_feature = left_features[static_cast<std::size_t>(pair.first)],
                   &right_feature = right_features[static_cast<std::size_t>(pair.second)];
     if (const auto match = align(left_feature, right_feature, left_smooth.view(), right_smooth.view(), options)) {

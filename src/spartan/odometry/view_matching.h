@@ -57,13 +57,13 @@ struct TransformedView {
   ImageRelation geometry;  ///< from the other one to this
 };
 /// Turns an image clockwise about its centre and scales it, by cubic interpolation; before it is made smaller it is
-/// blurred as by the pixels of a camera (σ = √(1/scale² − 1)/2 px). The result holds all of the image; beyond its borders
-/// it is mirrored. Throws std::invalid_argument where the scale is not positive or the result is 32767 px wide or more.
+/// blurred as by the pixels of a camera (σ = √(1/scale² − 1)/2 px). The result holds all of the image; beyond its
+/// borders it is mirrored. Throws std::invalid_argument where the scale is not positive or the result is 32767 px wide
+/// or more.
 TransformedView transform_view(ImageView<const std::uint8_t> image, double clockwise_rad, double scale);
 
 struct FeatureComparisonOptions {
   DetectionOptions detection;     ///< detector, and the number of features of each image
-  double tolerance_px = 2;        ///< largest distance of corresponding features, in each image, pixels
   double descriptor_ratio = 0.8;  ///< maximum ratio of the nearest to the second nearest descriptor distance
   int repetitions = 5;            ///< runs of which the time is the median
 };
@@ -86,18 +86,20 @@ struct FeatureComparison {
   std::optional<double> matching_score;  ///< correct matches over the smaller number of features; none without features
 };
 
-/// Detects and matches features. With a homography features are detected only where both images show the scene, at least
-/// 32 px (an eighth of small images) from the borders, so that the numbers of features of all detectors are comparable.
+/// Detects and matches features. With a homography features are detected only where both images show the scene, at
+/// least 32 px (an eighth of small images) from the borders, so that the numbers of features of all detectors are
+/// comparable.
 FeatureComparison match_features(ImageView<const std::uint8_t> first, ImageView<const std::uint8_t> second,
                                  const std::optional<ImageRelation>& geometry, const FeatureComparisonOptions& options,
                                  const ThreadPool& workers);
 
-/// Tells which matches are correct: those within the tolerance of the geometry, in both images.
+/// Tells which matches are correct: those whose points are within the tolerance, pixels, of each other (or of their
+/// epipolar lines) in both images.
 void score_features(const ImageRelation& geometry, double tolerance_px, FeatureComparison& comparison);
 
 /// The epipolar geometry that most of the matches of all comparisons agree on, within the tolerance: RANSAC with the
 /// normalized eight-point algorithm (Hartley, IEEE PAMI 19, 1997). None where fewer than 15 agree.
 std::optional<ImageRelation> estimate_epipolar_geometry(std::span<const FeatureComparison> comparisons,
-                                                       double tolerance_px);
+                                                        double tolerance_px);
 
 }  // namespace spartan

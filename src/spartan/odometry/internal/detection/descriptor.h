@@ -41,7 +41,7 @@ struct Descriptor {
 };
 
 /// Squared distance of two descriptors, from 0 to 4; infinite where their kinds differ. SURF: Euclidean distance of the
-/// unit vectors. The others are scaled so that features that do not correspond are as far apart as with SURF
+/// unit vectors. The others are scaled so that features of different scenes are as far apart as with SURF
 /// (docs/math/odometry.md, "Other detectors"): the options for distances then hold for every detector.
 double squared_distance(const Descriptor& a, const Descriptor& b);
 

@@ -50,6 +50,20 @@ TEST(OdometerMemory, RestoresWhatWasSaved) {
             some_memory().reference.map.anchors[0].latest_from_anchor.translation());
 }
 
+TEST(OdometerMemory, KeepsDescriptorsOfEveryKind) {
+  for (const DescriptorKind kind :
+       {DescriptorKind::surf, DescriptorKind::sift, DescriptorKind::orb, DescriptorKind::akaze}) {
+    OdometerMemory memory = some_memory();
+    Descriptor& descriptor = memory.reference.map.landmarks[1].descriptor;
+    descriptor.kind = kind;
+    descriptor.bytes[bytes_of(kind) - 1] = -3;
+    const auto restored = OdometerMemory::restore(memory.save());
+    ASSERT_TRUE(restored.has_value()) << restored.error().message();
+    EXPECT_EQ(restored->reference.map.landmarks[1].descriptor, descriptor);
+    EXPECT_EQ(restored->reference.map.landmarks[0].descriptor.kind, DescriptorKind::surf);
+  }
+}
+
 TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
   const Bytes whole = some_memory().save();
   Bytes other = whole;
