@@ -224,7 +224,7 @@ void add_compare(CLI::App& features, Context& context) {
   auto a = std::make_shared<CompareArguments>();
   CLI::App* command = add_command(features, context, "compare",
                                   "Compare landmark detectors: repeatability, matching precision and time",
-                                  "features compare a.png b.png --homography H_a_to_b.txt -o figures",
+                                  "features compare left.png right.png --rectified -o figures",
                                   [&context, a] { return compare(context, *a); });
   command->add_option("first", a->first, "First image.")->required()->option_text("A REQUIRED");
   command

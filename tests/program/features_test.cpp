@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "program/program.h"
+#include "program.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/odometry/view_matching.h"
 #include "spartan/testing/temporary_folder.h"

@@ -48,7 +48,7 @@ Image<std::uint8_t> drawn_image(int width, int height, const std::function<doubl
 
 const Image<std::uint8_t>& noise_texture() {
   static const Image<std::uint8_t> image = [] {
-    const auto octaves = make_octaves(3, 4, 24, 0.7, 45);
+    const auto octaves = make_octaves(3, 5, 24, 0.8, 45);
     return drawn_image(360, 300, [&](double x, double y) {
       double value = 128;
       for (const auto& octave : octaves) value += octave.value(x, y);
