@@ -222,10 +222,9 @@ Result<ExitCode> compare(const Context& context, const CompareArguments& a) {
 
 void add_compare(CLI::App& features, Context& context) {
   auto a = std::make_shared<CompareArguments>();
-  CLI::App* command = add_command(features, context, "compare",
-                                  "Compare landmark detectors: repeatability, matching precision and time",
-                                  "features compare left.png right.png --rectified -o figures",
-                                  [&context, a] { return compare(context, *a); });
+  CLI::App* command = add_command(
+      features, context, "compare", "Compare landmark detectors: repeatability, matching precision and time",
+      "features compare left.png right.png --rectified -o figures", [&context, a] { return compare(context, *a); });
   command->add_option("first", a->first, "First image.")->required()->option_text("A REQUIRED");
   command
       ->add_option("second", a->second,
