@@ -1,13 +1,15 @@
 // Cost of a frame of visual odometry, beside Lucas-Kanade with PnP and SIFT of OpenCV in the same run.
 // `make bench-odometry`.
 //
-//   odometry [--frames N] [--first FRAME] [RECORDING...]
+//   odometry [--frames N] [--first FRAME] [--points N] [RECORDING...]
 //
+// --points: maximum number of features of an image where detectors are compared (1200).
 // RECORDING: a folder; default: kitti_06 and euroc_v101 of SPARTAN_DATA, rocky_20pct of the standard recordings. The
 // rectified images of the first pair are in memory: neither reading nor rectification is timed.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
@@ -121,7 +123,38 @@ void time_odometer(const std::vector<Frame>& frames, int threads) {
              tracked / static_cast<int>(frames.size()));
 }
 
-void compare(const std::string& recording, int from, int count) {
+// SURF as the odometry uses it, and oriented and refined, beside SIFT of OpenCV for as many points.
+void compare_detectors(const std::vector<Frame>& frames, int points) {
+  DetectionOptions plain;
+  plain.landmarks = points;
+  DetectionOptions refined = plain;
+  refined.surf.upright = false;
+  refined.surf.refine = true;
+  const std::array detectors{internal::make_landmark_detector(plain, ThreadPool(1)),
+                             internal::make_landmark_detector(refined, ThreadPool(1))};
+  std::array<std::vector<double>, 2> surf;
+  std::array<std::size_t, 2> surf_count{};
+  std::vector<double> sift;
+  std::size_t sift_count = 0;
+  const auto opencv = cv::SIFT::create(plain.landmarks, 3, plain.sift.threshold);
+  for (std::size_t i = 0; i < std::min<std::size_t>(frames.size(), 11); ++i) {
+    const auto& left = frames[i].left;
+    const cv::Mat image = as_mat(left.view());
+    std::vector<cv::KeyPoint> keypoints;
+    cv::Mat descriptors;
+    sift.push_back(milliseconds([&] { opencv->detectAndCompute(image, cv::noArray(), keypoints, descriptors); }));
+    sift_count = keypoints.size();
+    for (std::size_t k = 0; k < detectors.size(); ++k)
+      surf[k].push_back(milliseconds([&] { surf_count[k] = detectors[k]->detect(left, {}).size(); }));
+  }
+  for (std::size_t k = 0; k < detectors.size(); ++k) {
+    fmt::print("  {:<34} {:.2f} ms ({}), OpenCV SIFT {:.2f} ms ({}), one thread: {:.1f} times as fast\n",
+               k == 0 ? "SURF, detect and describe" : "SURF, oriented and refined", median(surf[k]), surf_count[k],
+               median(sift), sift_count, median(sift) / median(surf[k]));
+  }
+}
+
+void compare(const std::string& recording, int from, int count, int points) {
   const std::vector<Frame> frames = load(recording, from, count);
   if (frames.empty()) return;
   const ImageSize size = frames[0].pair.left.size();
@@ -134,33 +167,18 @@ void compare(const std::string& recording, int from, int count) {
     return rival.add(pair);
   }).print("OpenCV Lucas-Kanade and PnP", static_cast<int>(frames.size()));
 
-  std::vector<double> sift, surf;
-  std::size_t sift_count = 0, surf_count = 0;
-  const auto detector = internal::make_landmark_detector(OdometryOptions().detection, ThreadPool(1));
-  const auto opencv = cv::SIFT::create(OdometryOptions().detection.landmarks);
-  for (std::size_t i = 0; i < std::min<std::size_t>(frames.size(), 11); ++i) {
-    const auto& left = frames[i].left;
-    const cv::Mat image = as_mat(left.view());
-    std::vector<cv::KeyPoint> points;
-    cv::Mat descriptors;
-    sift.push_back(milliseconds([&] { opencv->detectAndCompute(image, cv::noArray(), points, descriptors); }));
-    sift_count = points.size();
-    surf.push_back(milliseconds([&] { surf_count = detector->detect(left, {}).size(); }));
-  }
-  fmt::print("  {:<34} {:.2f} ms ({}), OpenCV SIFT {:.2f} ms ({}), one thread: {:.1f} times as fast\n",
-             "SURF, detect and describe", median(surf), surf_count, median(sift), sift_count,
-             median(sift) / median(surf));
+  compare_detectors(frames, points);
 }
 
 void run(const std::vector<std::string>& words) {
-  RecordingArguments arguments = read_arguments(words, {{"--frames", "60"}, {"--first", "0"}});
+  RecordingArguments arguments = read_arguments(words, {{"--frames", "60"}, {"--first", "0"}, {"--points", "1200"}});
   if (arguments.scenarios.empty()) {
     const char* const data = std::getenv("SPARTAN_DATA");
     if (data != nullptr) arguments.scenarios = {std::string(data) + "/kitti_06", std::string(data) + "/euroc_v101"};
     arguments.scenarios.push_back(arguments.folder + "/rocky_20pct");
   }
   for (const std::string& recording : arguments.scenarios)
-    compare(recording, arguments.number("--first"), arguments.number("--frames"));
+    compare(recording, arguments.number("--first"), arguments.number("--frames"), arguments.number("--points"));
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ endmacro()
 set(SPARTAN_OPENCV opencv_core opencv_imgproc)
 spartan_package("Eigen3 3.4 NO_MODULE" LIBRARIES Eigen3::Eigen)
 spartan_package("OpenCV 4.6 COMPONENTS core imgproc" LIBRARIES ${SPARTAN_OPENCV})
+spartan_package("OpenCV 4.6 COMPONENTS features2d" LIBRARIES opencv_features2d)  # detectors other than SURF and Harris
 spartan_package("OpenCV 4.6 COMPONENTS imgcodecs" LIBRARIES opencv_imgcodecs)  # the simulator's compression
 spartan_package("PNG" LIBRARIES PNG::PNG)
 spartan_package("libjpeg-turbo CONFIG" LIBRARIES libjpeg-turbo::turbojpeg)

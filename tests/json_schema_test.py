@@ -50,6 +50,8 @@ def outputs(program, source, small_runs, work):
     yield "stereo", output_of(program, "stereo", left, right, "-o", work / "stereo", "--calib", drive / "calib.txt")
     yield "stereo", output_of(program, "stereo", left, right, "-o", work / "scored", "--truth",
                               work / "stereo/disparity.pfm")
+    yield "features_compare", output_of(program, "features", "compare", left, "--repetitions", 1)
+    yield "features_compare", output_of(program, "features", "compare", left, right, "--rectified", "--repetitions", 1)
     yield "map_build", output_of(program, "map", "build", left, right, "-o", work / "map", "--rig", drive / "calib.txt")
     yield "error", output_of(program, "evaluate", work / "missing", "--truth", drive, codes=(3,))
     yield "rig_inspect", output_of(program, "rig", "inspect", rig)

@@ -36,6 +36,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_run(app, context);
   add_stereo(app, context);
   add_map(app, context);
+  add_features(app, context);
   add_evaluate(app, context);
   add_rig(app, context);
   add_config(app, context);

@@ -8,6 +8,7 @@
 
 #include "program/commands.h"
 #include "program/disparity_scores.h"
+#include "program/image_memory.h"
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/run_arguments.h"
@@ -25,6 +26,8 @@
 namespace spartan::program {
 namespace {
 
+// Decoding and rectifying a pixel takes up to four copies of three samples of 16 bits.
+constexpr std::int64_t kBytesOfPixel = 24;
 constexpr double kLowDensity_percent = 50;  // of good pairs of the usual data sets: above 80
 constexpr double kLargestRowError_px = 1;   // mean; of rectified images: below 0.5
 
@@ -67,22 +70,6 @@ Result<Pair> load_rectified(const StereoArguments& a) {
   pair.geometry = RectifiedStereo{camera.size, pinhole->fx, {pinhole->cx, pinhole->cy}, baseline};
   pair.nearest_m = stereo_pair.nearest_m;
   return pair;
-}
-
-// Before anything is decoded: a small file may hold a huge image. Decoding and rectifying a pixel takes up to four
-// copies of three samples of 16 bits.
-Status check_images_fit(const std::vector<std::string>& files, std::int64_t most_bytes) {
-  for (const std::string& file : files) {
-    const auto size = read_image_size(file);
-    const std::int64_t needed = size ? std::int64_t{24} * size->width * size->height : 0;
-    if (needed <= most_bytes) continue;
-    return failure(
-        ErrorCode::resources,
-        fmt::format("an image of {}x{} px needs {:.0f} MB of memory, more than the bound of {:.0f} MB", size->width,
-                    size->height, 1e-6 * static_cast<double>(needed), 1e-6 * static_cast<double>(most_bytes)),
-        file, "use smaller images, or raise --memory");
-  }
-  return {};
 }
 
 Result<Pair> load_and_rectify(const StereoArguments& a, const ImagingOptions& options, int threads) {
@@ -249,7 +236,7 @@ Result<ExitCode> stereo(const Context& context, const StereoArguments& a) {
   const auto options = run_options(context, a.config, set);
   if (!options) return failure(options);
   if (Status s = expect_new_folder(context, a.output); !s) return failure(s);
-  if (Status s = check_images_fit({a.left, a.right}, memory_bound(context)); !s) return failure(s);
+  if (Status s = check_images_fit({a.left, a.right}, kBytesOfPixel, memory_bound(context)); !s) return failure(s);
   auto pair = a.rig.empty() ? load_rectified(a) : load_and_rectify(a, options->imaging, context.threads);
   if (!pair) return failure(pair);
   auto computer = DisparityComputer::create(options->reconstruction, ThreadPool(context.threads));

@@ -21,6 +21,7 @@ struct SurfOptions {
   int octaves = 3;         ///< octaves of the scale space
   double threshold = 0.3;  ///< minimum determinant of the Hessian, gray levels²
   bool upright = true;     ///< U-SURF: no orientation is assigned
+  bool refine = false;     ///< places by Gaussian derivatives
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -37,15 +38,108 @@ struct SurfOptions {
     v.field("upright", upright,
             "True skips the orientation assignment (U-SURF): faster and more distinctive, for rovers that do not roll "
             "over; set false where the image rotates by more than about 15 degrees between frames.");
+    v.field("refine", refine,
+            "True finds place and scale of each feature again by Gaussian derivatives, and takes square roots of the "
+            "descriptor's entries: more repeatable under large rotations and changes of scale, at twice the time.");
+  }
+};
+
+/// Options of Harris corners, which are described by SURF.
+struct HarrisOptions {
+  int window_px = 5;      ///< side of the window of the structure tensor, pixels
+  double quality = 1e-5;  ///< minimum response, fraction of the strongest one of the image
+  double scale_px = 2;    ///< scale of the SURF descriptor, pixels
+  bool upright = true;    ///< no orientation is assigned
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("window_px", window_px,
+            "Side of the window in pixels over which products of gradients are summed; raising it finds larger, fewer "
+            "corners.",
+            between(2, 31));
+    v.field("quality", quality,
+            "Minimum corner response as a fraction of the strongest one in the image; raising it keeps fewer, stronger "
+            "corners.",
+            between(0, 1));
+    v.field("scale_px", scale_px,
+            "Scale of the corners' SURF descriptors in pixels, each of which covers 20 of them; raising it describes "
+            "larger surroundings.",
+            between(1, 20));
+    v.field("upright", upright, "True assigns no orientation to the descriptors, as surf.upright does.");
+  }
+};
+
+/// Options of FAST corners on a pyramid with ORB descriptors, by OpenCV.
+struct OrbOptions {
+  int threshold = 5;          ///< minimum difference of gray levels of FAST
+  int levels = 8;             ///< levels of the pyramid
+  double scale_factor = 1.2;  ///< ratio of the sizes of two levels
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("threshold", threshold,
+            "Minimum difference in gray levels between a FAST corner and the circle around it; raising it keeps fewer, "
+            "stronger corners.",
+            between(1, 254));
+    v.field("levels", levels, "Number of levels of the pyramid; raising it finds larger corners and costs time.",
+            between(1, 16));
+    v.field("scale_factor", scale_factor,
+            "Ratio of the sizes of two consecutive levels; raising it spans more scales with fewer of them.",
+            between(1.05, 2));
+  }
+};
+
+/// Options of SIFT, by OpenCV.
+struct SiftOptions {
+  int layers = 3;            ///< layers of an octave
+  double threshold = 0.005;  ///< minimum contrast, fraction of the range of gray levels
+  double edge_ratio = 10;    ///< largest ratio of the principal curvatures
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("layers", layers, "Number of scales in each octave; raising it samples the scale space more finely.",
+            between(1, 10));
+    v.field("threshold", threshold,
+            "Minimum contrast of a feature, relative to the range of gray levels and divided by the number of layers; "
+            "raising it keeps fewer, stronger features.",
+            between(0, 1));
+    v.field("edge_ratio", edge_ratio,
+            "Largest ratio of the principal curvatures of a feature; raising it keeps more features on edges.",
+            between(1, 1000));
+  }
+};
+
+/// Options of AKAZE, by OpenCV.
+struct AkazeOptions {
+  double threshold = 3e-5;  ///< minimum determinant of the Hessian, gray levels from 0 to 1
+  int octaves = 4;          ///< octaves of the nonlinear scale space
+  int layers = 4;           ///< layers of an octave
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("threshold", threshold,
+            "Minimum determinant of the Hessian for a feature, with gray levels from 0 to 1; raising it keeps fewer, "
+            "stronger features.",
+            between(0, 1));
+    v.field("octaves", octaves, "Number of octaves of the scale space; raising it finds larger features.",
+            between(1, 8));
+    v.field("layers", layers, "Number of scales in each octave; raising it costs time in proportion.", between(1, 10));
   }
 };
 
 /// Which landmark detector runs.
 enum class DetectorType {
-  surf,  ///< SurfDetector
+  surf,    ///< blobs of the Hessian in scale space, SURF descriptors
+  harris,  ///< corners at one scale, SURF descriptors
+  orb,     ///< FAST corners on a pyramid, ORB descriptors
+  sift,    ///< differences of Gaussians, SIFT descriptors
+  akaze,   ///< blobs of the Hessian in a nonlinear scale space, M-LDB descriptors
 };
 constexpr auto enum_names(DetectorType) {
-  return std::array{EnumName<DetectorType>{DetectorType::surf, "surf"}};
+  return std::array{
+      EnumName<DetectorType>{DetectorType::surf, "surf"}, EnumName<DetectorType>{DetectorType::harris, "harris"},
+      EnumName<DetectorType>{DetectorType::orb, "orb"}, EnumName<DetectorType>{DetectorType::sift, "sift"},
+      EnumName<DetectorType>{DetectorType::akaze, "akaze"}};
 }
 
 struct DetectionOptions {
@@ -53,10 +147,16 @@ struct DetectionOptions {
   int landmarks = 1200;                        ///< maximum number of features of an image and of tracked landmarks
   double spacing_px = 5;                       ///< minimum distance between two landmarks, pixels
   SurfOptions surf;
+  HarrisOptions harris;
+  OrbOptions orb;
+  SiftOptions sift;
+  AkazeOptions akaze;
 
   template <class Visitor>
   void describe(Visitor& v) {
-    v.field("detector", detector, "Detector that finds the landmarks.");
+    v.field("detector", detector,
+            "Detector that finds the landmarks: `surf`, `harris` (corners at one scale), `orb` (FAST corners on a "
+            "pyramid), `sift` or `akaze`; docs/benchmarks/odometry.md compares them.");
     v.field("landmarks", landmarks,
             "Maximum number of features detected in an image, and of landmarks tracked, spread evenly over the image; "
             "raising it lowers the noise of the motion and costs time in proportion.",
@@ -65,6 +165,10 @@ struct DetectionOptions {
             "Minimum distance between two landmarks in pixels; raising it spreads them more evenly and keeps fewer.",
             between(0, 100));
     v.group("surf", surf);
+    v.group("harris", harris);
+    v.group("orb", orb);
+    v.group("sift", sift);
+    v.group("akaze", akaze);
   }
 };
 
@@ -144,7 +248,7 @@ struct LandmarkMatchingOptions {
     v.field(
         "max_descriptor_distance", max_descriptor_distance,
         "Maximum Euclidean distance between two descriptors (unit vectors, so 0 to 2); raising it accepts more, less "
-        "similar matches.",
+        "similar matches. Distances of other descriptors than SURF are scaled to the same range.",
         between(0, 2));
     v.field("descriptor_ratio", descriptor_ratio,
             "Maximum ratio of the best to the second best descriptor distance (ratio test); raising it accepts more "

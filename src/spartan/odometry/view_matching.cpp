@@ -1,12 +1,11 @@
 #include "spartan/odometry/view_matching.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include "spartan/odometry/internal/detection/landmark_detector.h"
+#include "spartan/odometry/internal/matching/descriptor_matches.h"
 #include "spartan/odometry/internal/matching/patch_alignment.h"
 #include "spartan/odometry/internal/matching/smoothed_image.h"
 
@@ -15,36 +14,6 @@ namespace spartan {
 using namespace internal;
 
 namespace {
-
-// Nearest of `others` by descriptor distance, with the distance of the second nearest.
-struct Nearest {
-  int index = -1;
-  double distance = std::numeric_limits<double>::infinity();
-  double second = std::numeric_limits<double>::infinity();
-};
-
-std::vector<Nearest> nearest_of(const std::vector<Feature>& features, const std::vector<Feature>& others,
-                                const ThreadPool& workers) {
-  std::vector<Nearest> result(features.size());
-  workers.parallel_for(0, static_cast<int>(features.size()), 64, [&](int begin, int end) {
-    for (int i = begin; i < end; ++i) {
-      const Feature& feature = features[static_cast<std::size_t>(i)];
-      Nearest& best = result[static_cast<std::size_t>(i)];
-      for (std::size_t k = 0; k < others.size(); ++k) {
-        if (others[k].sign != feature.sign) continue;
-        const double distance = squared_distance(feature.descriptor, others[k].descriptor);
-        if (distance < best.distance) {
-          best.second = best.distance;
-          best.distance = distance;
-          best.index = static_cast<int>(k);
-        } else {
-          best.second = std::min(best.second, distance);
-        }
-      }
-    }
-  });
-  return result;
-}
 
 std::optional<ViewMatch> align(const Feature& left, const Feature& right, ImageView<const std::uint16_t> left_smooth,
                                ImageView<const std::uint16_t> right_smooth, const ViewMatchingOptions& options) {
@@ -72,21 +41,15 @@ std::vector<ViewMatch> match_views(ImageView<const std::uint8_t> left, ImageView
   const auto detector = make_landmark_detector(detection, workers);
   const std::vector<Feature> left_features = detector->detect(left, {});
   const std::vector<Feature> right_features = detector->detect(right, {});
-  const auto from_left = nearest_of(left_features, right_features, workers);
-  const auto from_right = nearest_of(right_features, left_features, workers);
   SmoothedImage left_smooth, right_smooth;
   left_smooth.compute(left, workers);
   right_smooth.compute(right, workers);
 
   std::vector<ViewMatch> matches;
-  const double ratio = options.descriptor_ratio * options.descriptor_ratio;  // distances are squared
-  for (std::size_t i = 0; i < left_features.size(); ++i) {
-    const Nearest& best = from_left[i];
-    if (best.index < 0 || !(best.distance < ratio * best.second)) continue;
-    const auto other = static_cast<std::size_t>(best.index);
-    if (from_right[other].index != static_cast<int>(i)) continue;
-    if (const auto match =
-            align(left_features[i], right_features[other], left_smooth.view(), right_smooth.view(), options)) {
+  for (const DescriptorMatch& pair : mutual_matches(left_features, right_features, options.descriptor_ratio, workers)) {
+    const Feature &left_feature = left_features[static_cast<std::size_t>(pair.first)],
+                  &right_feature = right_features[static_cast<std::size_t>(pair.second)];
+    if (const auto match = align(left_feature, right_feature, left_smooth.view(), right_smooth.view(), options)) {
       matches.push_back(*match);
     }
   }

@@ -11,7 +11,7 @@ const RectifiedStereo kMatchingStereo{{640, 480}, 500, {319.5, 239.5}, 0.12};
 
 Descriptor descriptor(int kind) {
   Descriptor d{};
-  d[static_cast<std::size_t>(kind)] = 127;
+  d.bytes[static_cast<std::size_t>(kind)] = 127;
   return d;
 }
 

@@ -42,8 +42,19 @@ void Occupancy::take(double x, double y) {
   first = static_cast<std::int32_t>(points_.size()) - 1;
 }
 
-std::vector<Feature> spread_features(std::span<const Feature> features, ImageSize size, int count, double spacing_px,
-                                     std::span<const Eigen::Vector2f> taken) {
+bool is_allowed(const Feature& feature, ImageView<const std::uint8_t> mask) {
+  if (mask.empty()) return true;
+  const int x = static_cast<int>(std::lround(feature.x)), y = static_cast<int>(std::lround(feature.y));
+  return mask.contains(x, y) && mask(x, y) != 0;
+}
+
+void discard_masked(std::vector<Feature>& features, ImageView<const std::uint8_t> mask) {
+  if (mask.empty()) return;
+  std::erase_if(features, [&](const Feature& f) { return !is_allowed(f, mask); });
+}
+
+std::vector<std::uint32_t> spread_indices(std::span<const Feature> features, ImageSize size, int count,
+                                          double spacing_px, std::span<const Eigen::Vector2f> taken) {
   struct Entry {
     float strength;
     std::uint32_t index;
@@ -86,9 +97,18 @@ std::vector<Feature> spread_features(std::span<const Feature> features, ImageSiz
   if (ranked.size() > static_cast<std::size_t>(std::max(count, 0))) ranked.resize(static_cast<std::size_t>(count));
   std::sort(ranked.begin(), ranked.end(), [](const Ranked& a, const Ranked& b) { return a.order < b.order; });
 
-  std::vector<Feature> kept;
+  std::vector<std::uint32_t> kept;
   kept.reserve(ranked.size());
-  for (const Ranked& r : ranked) kept.push_back(features[r.index]);
+  for (const Ranked& r : ranked) kept.push_back(r.index);
+  return kept;
+}
+
+std::vector<Feature> spread_features(std::span<const Feature> features, ImageSize size, int count, double spacing_px,
+                                     std::span<const Eigen::Vector2f> taken) {
+  const std::vector<std::uint32_t> indices = spread_indices(features, size, count, spacing_px, taken);
+  std::vector<Feature> kept;
+  kept.reserve(indices.size());
+  for (const std::uint32_t index : indices) kept.push_back(features[index]);
   return kept;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -12,15 +11,10 @@
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
+#include "spartan/odometry/internal/detection/descriptor.h"
 #include "spartan/odometry/odometer.h"
 
 namespace spartan::internal {
-
-/// A unit vector with 64 entries, each multiplied by 254 and rounded (entries beyond ±1/2 saturate).
-using Descriptor = std::array<std::int8_t, 64>;
-
-/// Squared Euclidean distance of the two unit vectors that the descriptors encode.
-double squared_distance(const Descriptor& a, const Descriptor& b);
 
 /// A distinctive point of an image.
 struct Feature {
@@ -28,7 +22,7 @@ struct Feature {
   float scale = 0;       ///< standard deviation of the blob, pixels
   float angle = 0;       ///< orientation, rad; 0 where the detector is upright
   float strength = 0;    ///< detector response, comparable within one image
-  std::int8_t sign = 0;  ///< dark (+1) or bright (−1) blob; features of different sign never match
+  std::int8_t sign = 0;  ///< dark (+1) or bright (−1) blob, 0 where unknown; features of different sign never match
   Descriptor descriptor{};
 };
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "spartan/odometry/internal/detection/feature_spread.h"
@@ -13,6 +14,8 @@ namespace {
 constexpr int kLayersPerOctave = 4;
 /// Parts of the image that are searched in parallel.
 constexpr int kSurfParts = 8;
+/// Features are refined beyond those wanted.
+constexpr int kMoreToRefine_percent = 40, kMoreToRefine = 10;
 /// Values behind a row of responses that vectors may write or read.
 constexpr int kRowRoom = 2 * kSurfPadding;
 
@@ -60,13 +63,15 @@ struct Cube {
   }
 };
 
-/// Haar wavelet responses (dx, dy) of side 2·half at a pixel corner.
-Eigen::Vector2f haar(const IntegralImage& integral, int x, int y, int half) {
-  const auto sum = [&](int x0, int y0, int x1, int y1) {
-    return static_cast<float>(static_cast<std::int32_t>(integral.clipped_box(x0, y0, x1, y1)));
-  };
-  const int l = x - half, r = x + half, t = y - half, b = y + half;
-  return {sum(x, t, r, b) - sum(l, t, x, b), sum(l, y, r, b) - sum(l, t, r, y)};
+/// Angle of a vector in turns, 0 … 1, to 0.001: a polynomial for an eighth of the circle (Abramowitz and
+/// Stegun, 4.4.47).
+float turns_of(float x, float y) {
+  const float a = std::abs(x), b = std::abs(y), ratio = std::min(a, b) / std::max({a, b, 1e-20f});
+  const float square = ratio * ratio;
+  float turns = ratio * (0.1588f + square * (-0.0512f + square * 0.0174f));
+  if (b > a) turns = 0.25f - turns;
+  if (x < 0) turns = 0.5f - turns;
+  return y < 0 ? 1 - turns : turns;
 }
 
 }  // namespace
@@ -84,51 +89,53 @@ BoxHessian box_hessian(const IntegralImage& integral, int x, int y, int filter_p
 }
 
 float surf_orientation(const IntegralImage& integral, const Feature& feature) {
-  struct Response {
-    float angle, dx, dy;
-  };
-  std::vector<Response> responses;
-  const float s = feature.scale;
-  const int half = std::max(1, static_cast<int>(std::lround(2 * s)));
-  for (int j = -6; j <= 6; ++j) {
-    for (int i = -6; i <= 6; ++i) {
-      if (i * i + j * j >= 36) continue;
-      const float weight = std::exp(-static_cast<float>(i * i + j * j) / (2 * 2.5f * 2.5f));
-      const int x = static_cast<int>(std::lround(feature.x + static_cast<float>(i) * s));
-      const int y = static_cast<int>(std::lround(feature.y + static_cast<float>(j) * s));
-      const Eigen::Vector2f d = weight * haar(integral, x, y, half);
-      responses.push_back({std::atan2(d.y(), d.x()), d.x(), d.y()});
-    }
+  // Responses are gathered in bins of 5°, of which the window of π/3 has twelve.
+  constexpr int kBins = 72, kWindowBins = kBins / 6;
+  const int half = std::max(1, static_cast<int>(std::lround(2 * feature.scale)));
+  const OrientationResponses responses =
+      orientation_responses(integral, {feature.x, feature.y, feature.scale, 1, 0, half});
+  float dx[kBins] = {}, dy[kBins] = {};
+  for (int i = 0; i < kOrientationSamples; ++i) {
+    const float turns = turns_of(responses.dx[i], responses.dy[i]);
+    const int bin = std::min(static_cast<int>(turns * kBins), kBins - 1);
+    dx[bin] += responses.dx[i];
+    dy[bin] += responses.dy[i];
   }
-  constexpr float kPi = 3.14159265f, kWindow = kPi / 3;
-  float best_length = -1, best_angle = 0;
-  for (float start = -kPi; start < kPi; start += 0.15f) {
-    Eigen::Vector2f sum = Eigen::Vector2f::Zero();
-    for (const Response& r : responses) {
-      float ahead = r.angle - start;
-      if (ahead < 0) ahead += 2 * kPi;
-      if (ahead < kWindow) sum += Eigen::Vector2f(r.dx, r.dy);
+  float best_length = -1, best_x = 0, best_y = 0;
+  for (int start = 0; start < kBins; ++start) {
+    float x = 0, y = 0;
+    for (int i = 0; i < kWindowBins; ++i) {
+      const int bin = start + i < kBins ? start + i : start + i - kBins;
+      x += dx[bin];
+      y += dy[bin];
     }
-    if (sum.squaredNorm() > best_length) {
-      best_length = sum.squaredNorm();
-      best_angle = std::atan2(sum.y(), sum.x());
-    }
+    const float length = x * x + y * y;
+    if (length <= best_length) continue;
+    best_length = length;
+    best_x = x;
+    best_y = y;
   }
-  return best_angle;
+  return std::atan2(best_y, best_x);
 }
 
-Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature) {
+Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature, SurfEntries entries) {
   const int half = std::max(1, static_cast<int>(std::lround(feature.scale)));
-  const std::array<float, 64> v = haar_sums(
+  std::array<float, 64> v = haar_sums(
       integral, {feature.x, feature.y, feature.scale, std::cos(feature.angle), std::sin(feature.angle), half});
+  if (entries == SurfEntries::roots)
+    for (float& value : v) value = std::copysign(std::sqrt(std::abs(value)), value);
   float squared = 0;
   for (const float value : v) squared += value * value;
   const float scale = squared > 0 ? 254.0f / std::sqrt(squared) : 0.0f;
   Descriptor descriptor;
   for (std::size_t i = 0; i < v.size(); ++i) {
-    descriptor[i] = static_cast<std::int8_t>(std::clamp(std::lround(v[i] * scale), -127L, 127L));
+    descriptor.bytes[i] = static_cast<std::int8_t>(std::clamp(std::lround(v[i] * scale), -127L, 127L));
   }
   return descriptor;
+}
+
+Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature) {
+  return surf_descriptor(integral, feature, SurfEntries::sums);
 }
 
 SurfDetector::SurfDetector(const DetectionOptions& options, ThreadPool workers)
@@ -197,6 +204,25 @@ void SurfDetector::search(int index, ImageSize size, Part& part) const {
   }
 }
 
+/// Refines some more features than are wanted, because not all have a maximum, and some share one.
+void SurfDetector::refine(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask, int count,
+                          const WantedFeatures& wanted) {
+  const int more = count + count * kMoreToRefine_percent / 100 + kMoreToRefine;
+  features_ = spread_features(found_, image.size(), more, options_.spacing_px, wanted.taken);
+  refinement_.compute(image);
+  workers_.parallel_for(0, static_cast<int>(features_.size()), 16, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      Feature& f = features_[static_cast<std::size_t>(i)];
+      const std::optional<Feature> refined = refinement_.refined(f);
+      f = refined.value_or(f);
+      if (!refined) f.strength = -1;
+    }
+  });
+  std::erase_if(features_, [](const Feature& f) { return f.strength < 0; });
+  discard_masked(features_, mask);
+  features_ = spread_features(features_, image.size(), count, options_.spacing_px, wanted.taken);
+}
+
 const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> image,
                                                  ImageView<const std::uint8_t> mask, const WantedFeatures& wanted) {
   integral_.compute(image);
@@ -204,19 +230,19 @@ const std::vector<Feature>& SurfDetector::detect(ImageView<const std::uint8_t> i
                         [&](int begin, int) { search(begin, image.size(), parts_[static_cast<std::size_t>(begin)]); });
   found_.clear();
   for (const Part& part : parts_) found_.insert(found_.end(), part.found.begin(), part.found.end());
-  if (!mask.empty()) {
-    std::erase_if(found_, [&](const Feature& f) {
-      const int x = static_cast<int>(std::lround(f.x)), y = static_cast<int>(std::lround(f.y));
-      return !mask.contains(x, y) || mask(x, y) == 0;
-    });
+  discard_masked(found_, mask);
+  const int count = wanted.count.value_or(options_.landmarks);
+  if (options_.surf.refine) {
+    refine(image, mask, count, wanted);
+  } else {
+    features_ = spread_features(found_, image.size(), count, options_.spacing_px, wanted.taken);
   }
-  features_ = spread_features(found_, image.size(), wanted.count.value_or(options_.landmarks), options_.spacing_px,
-                              wanted.taken);
+  const SurfEntries entries = options_.surf.refine ? SurfEntries::roots : SurfEntries::sums;
   workers_.parallel_for(0, static_cast<int>(features_.size()), 64, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       Feature& f = features_[static_cast<std::size_t>(i)];
       if (!options_.surf.upright) f.angle = surf_orientation(integral_, f);
-      f.descriptor = surf_descriptor(integral_, f);
+      f.descriptor = surf_descriptor(integral_, f, entries);
     }
   });
   return features_;

@@ -6,6 +6,7 @@
 
 #include "spartan/odometry/internal/detection/integral_image.h"
 #include "spartan/odometry/internal/detection/landmark_detector.h"
+#include "spartan/odometry/internal/detection/surf_refinement.h"
 
 namespace spartan::internal {
 
@@ -33,10 +34,13 @@ class SurfDetector final : public LandmarkDetector {
   void compute_row(int octave, int y, ImageSize size, Image<float>& rows) const;
   void find_maxima(int octave, int y, ImageSize size, Part& part) const;
   void search(int index, ImageSize size, Part& part) const;
+  void refine(ImageView<const std::uint8_t> image, ImageView<const std::uint8_t> mask, int count,
+              const WantedFeatures& wanted);
 
   DetectionOptions options_;
   ThreadPool workers_;
   IntegralImage integral_;
+  SurfRefinement refinement_;
   std::vector<Part> parts_;
   std::vector<Feature> found_, features_;
 };
@@ -56,5 +60,13 @@ float surf_orientation(const IntegralImage& integral, const Feature& feature);
 /// 4×4 subregions of 5×5 Haar responses over a square of side 20 s, each summed as (Σdx, Σ|dx|, Σdy, Σ|dy|), normalized
 /// to unit length (§4.2).
 Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature);
+
+/// Entries of a SURF descriptor.
+enum class SurfEntries : std::uint8_t {
+  sums,   ///< as published
+  roots,  ///< square roots with the sign of the sums: large sums dominate distances less (as Arandjelović, Zisserman,
+          ///< "Three things everyone should know to improve object retrieval", CVPR 2012, for SIFT)
+};
+Descriptor surf_descriptor(const IntegralImage& integral, const Feature& feature, SurfEntries entries);
 
 }  // namespace spartan::internal

@@ -144,6 +144,47 @@ void sum_haar(const IntegralImage& integral, const DescriptorPlace& p, float* ou
   }
 }
 
+void orient(const IntegralImage& integral, const DescriptorPlace& p, OrientationResponses& out) {
+  const Floats d;
+  const OrientationTable& table = orientation_table();
+  const auto scale = hn::Set(d, p.scale);
+  for (int i = 0; i < kOrientationRoom; i += static_cast<int>(hn::Lanes(d))) {
+    const auto x = hn::Add(hn::Set(d, p.x), hn::Mul(scale, hn::Load(d, table.x + i)));
+    const auto y = hn::Add(hn::Set(d, p.y), hn::Mul(scale, hn::Load(d, table.y + i)));
+    const Haar response = haar(integral, hn::NearestInt(x), hn::NearestInt(y), p.half);
+    const auto weight = hn::Load(d, table.weight + i);
+    hn::Store(hn::Mul(weight, response.dx), d, out.dx + i);
+    hn::Store(hn::Mul(weight, response.dy), d, out.dy + i);
+  }
+}
+
+void smooth(const float* support, const GaussianKernel& kernel, float* smoothed) {
+  const Floats d;
+  const int lanes = static_cast<int>(hn::Lanes(d)), radius = kernel.radius, first = kMaxGaussianRadius - radius;
+  HWY_ALIGN float column[kSupportStride];
+  for (int y = 0; y < kSmoothedSide; ++y) {
+    const float* centre = support + static_cast<std::ptrdiff_t>(y + kMaxGaussianRadius) * kSupportStride;
+    for (int x = first; x < first + kSmoothedSide + 2 * radius; x += lanes) {
+      auto sum = hn::Mul(hn::Set(d, kernel.weights[0]), hn::LoadU(d, centre + x));
+      for (int j = 1; j <= radius; ++j) {
+        const std::ptrdiff_t offset = static_cast<std::ptrdiff_t>(j) * kSupportStride;
+        const auto both = hn::Add(hn::LoadU(d, centre + x - offset), hn::LoadU(d, centre + x + offset));
+        sum = hn::Add(sum, hn::Mul(hn::Set(d, kernel.weights[j]), both));
+      }
+      hn::StoreU(sum, d, column + x);
+    }
+    for (int x = 0; x < kSmoothedSide; x += lanes) {
+      const float* middle = column + x + kMaxGaussianRadius;
+      auto sum = hn::Mul(hn::Set(d, kernel.weights[0]), hn::LoadU(d, middle));
+      for (int j = 1; j <= radius; ++j) {
+        const auto both = hn::Add(hn::LoadU(d, middle - j), hn::LoadU(d, middle + j));
+        sum = hn::Add(sum, hn::Mul(hn::Set(d, kernel.weights[j]), both));
+      }
+      hn::StoreU(sum, d, smoothed + static_cast<std::ptrdiff_t>(y) * kSmoothedStride + x);
+    }
+  }
+}
+
 }  // namespace spartan::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -169,6 +210,26 @@ const HaarTable& haar_table() {
   return table;
 }
 
+const OrientationTable& orientation_table() {
+  static const OrientationTable table = [] {
+    constexpr float kOrientationSigma = 2.5f;
+    OrientationTable t{};
+    int count = 0;
+    for (int j = -5; j <= 5; ++j) {
+      for (int i = -5; i <= 5; ++i) {
+        if (i * i + j * j >= 36) continue;
+        t.x[count] = static_cast<float>(i);
+        t.y[count] = static_cast<float>(j);
+        t.weight[count++] = std::exp(-static_cast<float>(i * i + j * j) / (2 * kOrientationSigma * kOrientationSigma));
+      }
+    }
+    return t;
+  }();
+  return table;
+}
+
+HWY_EXPORT(orient);
+HWY_EXPORT(smooth);
 HWY_EXPORT(hessian);
 HWY_EXPORT(maxima);
 HWY_EXPORT(sum_haar);
@@ -195,6 +256,16 @@ std::array<float, 64> haar_sums(const IntegralImage& integral, const DescriptorP
   std::array<float, 64> sums;
   HWY_DYNAMIC_DISPATCH(sum_haar)(integral, place, sums.data());
   return sums;
+}
+
+OrientationResponses orientation_responses(const IntegralImage& integral, const DescriptorPlace& place) {
+  OrientationResponses responses;
+  HWY_DYNAMIC_DISPATCH(orient)(integral, place, responses);
+  return responses;
+}
+
+void smooth_middle(const float* support, const GaussianKernel& kernel, float* smoothed) {
+  HWY_DYNAMIC_DISPATCH(smooth)(support, kernel, smoothed);
 }
 
 }  // namespace spartan::internal

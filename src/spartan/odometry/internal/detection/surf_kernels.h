@@ -44,4 +44,28 @@ struct DescriptorPlace {
 /// Σdx, Σ|dx|, Σdy, Σ|dy| of the Haar responses in 4×4 subregions (§4.2), by subregion.
 std::array<float, 64> haar_sums(const IntegralImage& integral, const DescriptorPlace& place);
 
+/// Samples of an orientation: within 6 scales of the feature, row by row (§4.1); a multiple of the vectors.
+inline constexpr int kOrientationSamples = 109, kOrientationRoom = 112;
+struct OrientationTable {
+  alignas(64) float x[kOrientationRoom], y[kOrientationRoom], weight[kOrientationRoom];
+};
+const OrientationTable& orientation_table();
+struct OrientationResponses {
+  alignas(64) float dx[kOrientationRoom], dy[kOrientationRoom];  ///< weighted; 0 behind the last one
+};
+/// Haar responses of side 4 s around a place, weighted by a Gaussian of 2.5 s. Its orientation is not used; `half` is
+/// half of the side of the wavelets.
+OrientationResponses orientation_responses(const IntegralImage& integral, const DescriptorPlace& place);
+
+/// Side of a square of pixels that is smoothed, the room of its rows, and the side of the result.
+inline constexpr int kSmoothedSide = 9, kMaxGaussianRadius = 17, kSupportSide = kSmoothedSide + 2 * kMaxGaussianRadius,
+                     kSupportStride = 64, kSmoothedStride = 16;
+/// A Gaussian that is cut off: weights of the middle, of its neighbours, and so on.
+struct GaussianKernel {
+  int radius = 0;
+  float weights[kMaxGaussianRadius + 1] = {};
+};
+/// Smooths the middle of a square of kSupportSide rows of kSupportStride values, of which kSupportSide count.
+void smooth_middle(const float* support, const GaussianKernel& kernel, float* smoothed);
+
 }  // namespace spartan::internal

@@ -93,9 +93,10 @@ TEST(Surf, BoxHessianHasTheSignsOfTheSecondDerivatives) {
 struct Repeatability {
   double found = 0, matched = 0;
 };
-Repeatability repeatability_of(bool upright, double angle, double zoom) {
+Repeatability repeatability_of(bool upright, double angle, double zoom, bool refine = false) {
   DetectionOptions options = few();
   options.surf.upright = upright;
+  options.surf.refine = refine;
   SurfDetector detector(options, ThreadPool(1));
   const std::vector<Feature> a = detector.detect(texture(0, 1), {});
   const std::vector<Feature> b = detector.detect(texture(angle, zoom), {});
@@ -129,6 +130,64 @@ TEST(Surf, IsRepeatableUnderLargeRotationWithOrientation) {
   EXPECT_GT(oriented.found, 0.6);
   EXPECT_GT(oriented.matched, 0.5);
   EXPECT_LT(upright.matched, 0.2);  // without orientation
+}
+
+TEST(Surf, IsMoreRepeatableWithRefinement) {
+  for (const auto& [angle, zoom] : {std::pair(0.785, 1.0), {0.0, 0.7}, {0.0, 1.4}}) {
+    const Repeatability plain = repeatability_of(false, angle, zoom),
+                        refined = repeatability_of(false, angle, zoom, true);
+    EXPECT_GT(refined.found, plain.found) << angle << " " << zoom;
+    EXPECT_GT(refined.matched, plain.matched) << angle << " " << zoom;
+  }
+}
+
+// The determinant of the Hessian of a Gaussian blob of σ, smoothed by a Gaussian of s, is largest at s = σ (Lindeberg).
+TEST(SurfRefinement, FindsPositionAndScaleOfABlobFromAPoorStart) {
+  for (const double sigma : {2.0, 3.0, 4.5, 6.0}) {
+    const Image<std::uint8_t> image = rendered(221, 201, [=](double x, double y) {
+      return 120 + 90 * std::exp(-((x - 110.3) * (x - 110.3) + (y - 99.6) * (y - 99.6)) / (2 * sigma * sigma));
+    });
+    SurfRefinement refinement;
+    refinement.compute(image.view());
+    Feature start;
+    start.x = 110.3F + static_cast<float>(0.7 * sigma);
+    start.y = 99.6F - static_cast<float>(0.5 * sigma);
+    start.scale = static_cast<float>(0.8 * sigma);
+    const std::optional<Feature> refined = refinement.refined(start);
+    ASSERT_TRUE(refined.has_value()) << sigma;
+    EXPECT_NEAR(refined->x, 110.3, 0.04) << sigma;
+    EXPECT_NEAR(refined->y, 99.6, 0.04) << sigma;
+    EXPECT_NEAR(refined->scale / sigma, 1, 0.07) << sigma;
+  }
+}
+
+TEST(SurfRefinement, FindsNothingWhereThereIsNoBlob) {
+  const Image<std::uint8_t> saddle =
+      rendered(121, 101, [](double x, double y) { return 120 + 0.03 * (x - 60) * (y - 50); });
+  SurfRefinement refinement;
+  refinement.compute(saddle.view());
+  Feature start;
+  start.x = 60;
+  start.y = 50;
+  start.scale = 3;
+  EXPECT_FALSE(refinement.refined(start).has_value());
+  const Image<std::uint8_t> at_border = blob(10, 50, 3, 90);
+  refinement.compute(at_border.view());
+  start.x = 10;
+  EXPECT_FALSE(refinement.refined(start).has_value());
+}
+
+TEST(Surf, OrientationFollowsTheImage) {
+  for (const double turn : {0.0, 0.4, 0.785, 1.6, 3.0, -2.0}) {
+    IntegralImage integral;
+    integral.compute(rendered(121, 121, [=](double x, double y) {
+      return 128 + 1.5 * ((x - 60) * std::cos(turn) + (y - 60) * std::sin(turn));
+    }));
+    Feature f;
+    f.x = f.y = 60;
+    f.scale = 2;
+    EXPECT_NEAR(std::remainder(surf_orientation(integral, f) - turn, 2 * 3.14159265), 0, 0.03) << turn;
+  }
 }
 
 TEST(Surf, DescriptorIsInvariantToBrightnessAndContrast) {

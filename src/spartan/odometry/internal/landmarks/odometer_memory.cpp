@@ -59,7 +59,7 @@ void put(ArchiveWriter& out, const Landmark& landmark) {
   out.put(landmark.scale);
   out.put(landmark.angle);
   out.put(landmark.sign);
-  out.put_array(landmark.descriptor.data(), landmark.descriptor.size());
+  out.put_array(landmark.descriptor.bytes.data(), bytes_of(landmark.descriptor.kind));
   out.put(landmark.missed_frames);
   out.put(landmark.measured_frames);
 }
@@ -68,6 +68,15 @@ template <class T, std::size_t N>
 bool fill(std::array<T, N>& array, const std::vector<T>& values) {
   if (values.size() != N) return false;
   std::copy(values.begin(), values.end(), array.begin());
+  return true;
+}
+
+/// The length tells the kind.
+bool fill(Descriptor& descriptor, const std::vector<std::int8_t>& bytes) {
+  const std::optional<DescriptorKind> kind = descriptor_kind_of(bytes.size());
+  if (!kind) return false;
+  descriptor.kind = *kind;
+  std::copy(bytes.begin(), bytes.end(), descriptor.bytes.begin());
   return true;
 }
 

@@ -29,7 +29,7 @@ OdometerMemory some_memory() {
     l.slant = {0.1, -0.2};
     l.patch.fill(static_cast<std::uint16_t>(1000 + i));
     l.pixel = {11.5, 21.25};
-    l.descriptor[5] = static_cast<std::int8_t>(-i);
+    l.descriptor.bytes[5] = static_cast<std::int8_t>(-i);
     l.missed_frames = i;
     memory.reference.map.landmarks.push_back(l);
   }
@@ -48,6 +48,20 @@ TEST(OdometerMemory, RestoresWhatWasSaved) {
   EXPECT_EQ(restored->offset.value, 0.07);
   EXPECT_EQ(restored->reference.map.anchor(3).latest_from_anchor.translation(),
             some_memory().reference.map.anchors[0].latest_from_anchor.translation());
+}
+
+TEST(OdometerMemory, KeepsDescriptorsOfEveryKind) {
+  for (const DescriptorKind kind :
+       {DescriptorKind::surf, DescriptorKind::sift, DescriptorKind::orb, DescriptorKind::akaze}) {
+    OdometerMemory memory = some_memory();
+    Descriptor& descriptor = memory.reference.map.landmarks[1].descriptor;
+    descriptor.kind = kind;
+    descriptor.bytes[bytes_of(kind) - 1] = -3;
+    const auto restored = OdometerMemory::restore(memory.save());
+    ASSERT_TRUE(restored.has_value()) << restored.error().message();
+    EXPECT_EQ(restored->reference.map.landmarks[1].descriptor, descriptor);
+    EXPECT_EQ(restored->reference.map.landmarks[0].descriptor.kind, DescriptorKind::surf);
+  }
 }
 
 TEST(OdometerMemory, RejectsOtherVersionsAndDamagedBytes) {
