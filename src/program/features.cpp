@@ -248,6 +248,7 @@ void add_compare(CLI::App& features, Context& context) {
   command->add_option("-o,--output", a->output,
                       "Folder for a PNG of each detector, with features and matches (default: none is drawn).");
   std::vector<std::string> names;
+  names.reserve(kDetectors.size());
   for (const NamedDetector& detector : kDetectors) names.emplace_back(detector.name);
   command
       ->add_option("--detectors", a->detectors,

@@ -18,9 +18,10 @@ constexpr double kDegree = std::numbers::pi / 180;
 Image<std::uint8_t> smooth_image(int width, int height) {
   Image<std::uint8_t> image(width, height);
   for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x)
-      image(x, y) =
-          static_cast<std::uint8_t>(std::lround(128 + 60 * std::sin(0.09 * x) + 50 * std::cos(0.07 * y + 0.03 * x)));
+    for (int x = 0; x < width; ++x) {
+      const double gray = 128 + 60 * std::sin(0.09 * x) + 50 * std::cos(0.07 * y + 0.03 * x);
+      image(x, y) = static_cast<std::uint8_t>(std::lround(gray));
+    }
   }
   return image;
 }

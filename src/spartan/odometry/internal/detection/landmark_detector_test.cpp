@@ -118,6 +118,7 @@ TEST_P(AnyDetector, KeepsCountSpacingOrderAndMask) {
 TEST_P(AnyDetector, KeepsAwayFromWhatIsTaken) {
   const std::vector<Feature> first = detected(options(40), noise_texture());
   std::vector<Eigen::Vector2f> taken;
+  taken.reserve(first.size());
   for (const Feature& f : first) taken.emplace_back(f.x, f.y);
   const std::vector<Feature> more = detected(options(), noise_texture(), {}, {40, taken});
   ASSERT_GT(more.size(), 10U);
