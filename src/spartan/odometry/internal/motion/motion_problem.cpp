@@ -181,8 +181,10 @@ Matrix7d MotionProblem::covariance(const std::vector<bool>& used, const MotionSt
   };
   for_each_residual(used, state, noise_scale, add_score);
   b(6, 6) += prior_information();
-  b += kSharedViewpointError * kSharedViewpointError * shared * shared.transpose();
-  const Matrix7d covariance = inverse * b * inverse.transpose();
+  Matrix7d covariance = inverse * b * inverse.transpose();
+  // Not of the offset: its random walk covers what lasts over many frames.
+  const Eigen::Matrix<double, 6, 2> moved = kSharedViewpointError * (inverse * shared).topRows<6>();
+  covariance.topLeftCorner<6, 6>() += moved * moved.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 

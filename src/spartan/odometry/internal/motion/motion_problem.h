@@ -45,8 +45,8 @@ class MotionProblem {
                                                 double noise_scale) const;
   /// Covariance of an M-estimate, A⁻¹ B A⁻¹ (Huber, Robust Statistics, 1981, §6.3), with A = Σ ψ' JᵀS⁻¹J and
   /// B = Σ ψ² JᵀS⁻¹J. The whitened residual has n dimensions (3, or 2 of one camera) and a random direction; averaged
-  /// over it, with the weight w(s) of s = rᵀS⁻¹r, ψ' = w + 2/n s w'(s) and ψ² = w² s/n. B also holds the error that
-  /// all positions share.
+  /// over it, with the weight w(s) of s = rᵀS⁻¹r, ψ' = w + 2/n s w'(s) and ψ² = w² s/n. The error that all
+  /// positions share is added to the motion.
   Matrix7d covariance(const std::vector<bool>& used, const MotionState& state, double noise_scale) const;
 
  private:
