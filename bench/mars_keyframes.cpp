@@ -47,7 +47,7 @@ Groups keyframes_of(Drive& drive, Imager& imager) {
     if (!rectified) continue;
     const Pose world_from_left = true_pose(drive, stamp) * rectified->body_from_left;
     if (!stage.is_due(*rectified, world_from_left)) continue;
-    stage.begin(*rectified, world_from_left, {});
+    stage.begin(*rectified, world_from_left, {}, {});
     stage.clear();
     groups.push_back({{kPair, stamp}});
   }
