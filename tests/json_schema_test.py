@@ -47,6 +47,7 @@ def outputs(program, source, small_runs, work):
     yield "run", output_of(program, "run", drive, "-o", work / "odometry", "--odometry-only")
     for align in ("se3", "sim3", "none"):
         yield "evaluate", output_of(program, "evaluate", work / "run", "--truth", drive, "--align", align)
+    yield "evaluate", output_of(program, "evaluate", work / "run", "--truth", drive, "--trajectory", "odometry")
     yield "stereo", output_of(program, "stereo", left, right, "-o", work / "stereo", "--calib", drive / "calib.txt")
     yield "stereo", output_of(program, "stereo", left, right, "-o", work / "scored", "--truth",
                               work / "stereo/disparity.pfm")

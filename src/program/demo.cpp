@@ -62,9 +62,9 @@ Status print_result(const RunRequest& request, const RunOutcome& outcome) {
   if (Status s = say("Result"); !s) return s;
   const auto compared = find_trajectories(request.output, request.input, "");
   if (!compared) return failure(compared);
-  const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
-  if (!metrics) return failure(metrics);
-  return print(run_summary_text(outcome.summary_json, request.output) + "\n" + table_of(*metrics, *compared));
+  const auto scores = score(*compared, {});
+  if (!scores) return failure(scores);
+  return print(run_summary_text(outcome.summary_json, request.output) + "\n" + table_of(*scores, *compared));
 }
 
 // The first frames in the layout of KITTI, in place of those of an earlier demo.

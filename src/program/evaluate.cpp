@@ -25,10 +25,10 @@ Result<ExitCode> evaluate(const Context& context, const Arguments& arguments) {
   TrajectoryMetricsOptions options = arguments.options;
   options.alignment = *alignment_named(arguments.align);
   if (arguments.kitti) options = with_kitti_segments(std::move(options));
-  const auto metrics = compare_trajectories(compared->estimate, compared->truth, options);
-  if (!metrics) return failure(metrics);
+  const auto scores = score(*compared, options);
+  if (!scores) return failure(scores);
   const Status printed =
-      print(context.json ? text_of(to_json(*metrics, *compared)) + "\n" : table_of(*metrics, *compared));
+      print(context.json ? text_of(to_json(*scores, *compared)) + "\n" : table_of(*scores, *compared));
   if (!printed) return failure(printed);
   return kDone;
 }

@@ -34,14 +34,14 @@ struct RunArguments {
 Result<std::string> score_trajectory(const RunArguments& arguments, RunOutcome& outcome) {
   const auto compared = find_trajectories(arguments.output, arguments.truth, "");
   if (!compared) return failure(compared);
-  const auto metrics = compare_trajectories(compared->estimate, compared->truth, {});
-  if (!metrics) return failure(metrics);
+  const auto scores = score(*compared, {});
+  if (!scores) return failure(scores);
   Json summary = Json::parse(outcome.summary_json);
-  summary["truth"] = to_json(*metrics, *compared);
+  summary["truth"] = to_json(*scores, *compared);
   outcome.summary_json = text_of(summary) + "\n";
   if (Status s = write_file_atomically(RunFolder{arguments.output}.summary(), outcome.summary_json); !s)
     return failure(s);
-  return table_of(*metrics, *compared);
+  return table_of(*scores, *compared);
 }
 
 // A failure to write the report does not fail the run.

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
+#include "spartan/system/run_folder.h"
+
 namespace spartan::program {
 namespace {
 
@@ -27,6 +31,21 @@ Json segments_to_json(const std::optional<std::vector<SegmentErrors>>& segments)
   return list;
 }
 
+Json normalized_to_json(const NormalizedErrors& errors) {
+  return {{"count", errors.count}, {"mean", number(errors.mean)}, {"median", number(errors.median)}};
+}
+
+Json consistency_to_json(const std::optional<MotionConsistency>& consistency) {
+  if (!consistency) return nullptr;
+  Json segments = Json::array();
+  for (const NormalizedErrors& segment : consistency->segments) {
+    Json entry = normalized_to_json(segment);
+    entry["length_m"] = segment.length_m;
+    segments.push_back(std::move(entry));
+  }
+  return {{"motions", normalized_to_json(consistency->motions)}, {"segments", std::move(segments)}};
+}
+
 Json similarity_to_json(const Similarity& similarity) {
   const auto& t = similarity.pose.translation();
   const auto& q = similarity.pose.rotation();
@@ -40,9 +59,41 @@ std::string line_of(const std::string& name, const std::optional<ErrorStatistics
   return fmt::format("{:<30}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name, e->rmse, e->mean, e->median, e->max);
 }
 
+std::string table_of(const MotionConsistency& consistency) {
+  std::string text = fmt::format("\n{:<20}{:>10}{:>17}{:>17}\n", "NEES (6 expected)", "count", "mean", "median");
+  const auto add_line = [&](const std::string& name, const NormalizedErrors& errors) {
+    if (errors.count > 0)
+      text += fmt::format("{:<20}{:>10}{:>17.2f}{:>17.2f}\n", name, errors.count, *errors.mean, *errors.median);
+  };
+  add_line("frame to frame", consistency.motions);
+  for (const NormalizedErrors& segment : consistency.segments)
+    add_line(fmt::format("{:g} m", segment.length_m), segment);
+  return text;
+}
+
 }  // namespace
 
-Json to_json(const TrajectoryMetrics& metrics, const ComparedTrajectories& compared) {
+Result<TrajectoryScores> score(const ComparedTrajectories& compared, const TrajectoryMetricsOptions& options) {
+  auto metrics = compare_trajectories(compared.estimate, compared.truth, options);
+  if (!metrics) return failure(metrics);
+  TrajectoryScores scores{std::move(*metrics), std::nullopt};
+  const RunFolder run{std::filesystem::path(compared.estimate_path).parent_path().string()};
+  std::error_code error;
+  if (compared.kind != name_of(TrajectoryKind::odometry) || !std::filesystem::exists(run.store(), error)) {
+    scores.metrics.missing.push_back({"nees", "only of the odometry of a run folder"});
+    return scores;
+  }
+  auto consistency = motion_consistency(run.path, compared.truth, options.max_dt_s, options.segment_lengths_m);
+  if (consistency) {
+    scores.consistency = std::move(*consistency);
+  } else {
+    scores.metrics.missing.push_back({"nees", consistency.error().message()});
+  }
+  return scores;
+}
+
+Json to_json(const TrajectoryScores& scores, const ComparedTrajectories& compared) {
+  const TrajectoryMetrics& metrics = scores.metrics;
   Json reasons = Json::object();
   for (const MissingMetric& missing : metrics.missing) reasons[missing.name] = missing.reason;
   return {{"schema", 1},
@@ -60,12 +111,14 @@ Json to_json(const TrajectoryMetrics& metrics, const ComparedTrajectories& compa
            {{"translation_m", statistics_to_json(metrics.rpe_translation_m)},
             {"rotation_deg", statistics_to_json(metrics.rpe_rotation_deg)},
             {"delta_frames", metrics.rpe_delta_frames}}},
+          {"nees", consistency_to_json(scores.consistency)},
           {"truth_from_estimate", similarity_to_json(metrics.truth_from_estimate)},
           {"axes_rotation_deg", number(metrics.axes_rotation_deg)},
           {"reasons", std::move(reasons)}};
 }
 
-std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectories& compared) {
+std::string table_of(const TrajectoryScores& scores, const ComparedTrajectories& compared) {
+  const TrajectoryMetrics& metrics = scores.metrics;
   std::string text = fmt::format("estimate  {}{}\ntruth     {}\n", compared.estimate_path,
                                  compared.kind == "file" ? "" : " (" + compared.kind + ")", compared.truth_path);
   text += fmt::format("frames    {} of {} compared over {:.2f} m\n", metrics.frames, compared.estimate.size(),
@@ -90,6 +143,7 @@ std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectorie
                           *s.rotation_deg_per_m);
     }
   }
+  if (scores.consistency) text += table_of(*scores.consistency);
   if (metrics.axes_rotation_deg) {
     text += fmt::format(
         "\nnote: the body axes of the trajectories differ by a constant rotation, {:.0f} deg for the motions (x "
@@ -99,7 +153,10 @@ std::string table_of(const TrajectoryMetrics& metrics, const ComparedTrajectorie
         "axes\n",
         *metrics.axes_rotation_deg);
   }
-  for (const MissingMetric& missing : metrics.missing) text += fmt::format("no {}: {}\n", missing.name, missing.reason);
+  for (const MissingMetric& missing : metrics.missing) {
+    if (missing.name != "nees" || compared.kind == name_of(TrajectoryKind::odometry))
+      text += fmt::format("no {}: {}\n", missing.name, missing.reason);
+  }
   return text;
 }
 

@@ -107,6 +107,8 @@ TEST_F(Evaluate, FilesAreComparedAsTheyAre) {
   EXPECT_NEAR(j["ate_m"]["max"].get<double>(), std::sin(0.3), 1e-6);
   EXPECT_EQ(j["segments"].size(), 8U);
   EXPECT_EQ(j["segments"][7]["length_m"], 800.0);
+  EXPECT_TRUE(j["nees"].is_null());
+  EXPECT_THAT(j["reasons"]["nees"].get<std::string>(), HasSubstr("odometry of a run"));
 }
 
 TEST_F(Evaluate, RecordingsOfSpartanAndEuroc) {

@@ -50,6 +50,27 @@ struct ComparedTrajectories {
 Result<ComparedTrajectories> find_trajectories(const std::string& estimate, const std::string& truth,
                                                const std::string& kind);
 
+/// Normalized estimation error squared (NEES), eᵀ Σ⁻¹ e with e = Log(truth⁻¹ estimate), of motions with six degrees of
+/// freedom: 6 on average where the covariance Σ is right, more where it is too small (Bar-Shalom, Li, Kirubarajan,
+/// "Estimation with Applications to Tracking and Navigation", 2001, section 5.4).
+struct NormalizedErrors {
+  double length_m = 0;
+  int count = 0;
+  std::optional<double> mean, median;  ///< none if count is 0
+};
+
+struct MotionConsistency {
+  NormalizedErrors motions;                ///< of the odometry between frames, with their own covariances
+  std::vector<NormalizedErrors> segments;  ///< of the products of motions, with the covariance of DeadReckoning
+};
+
+/// The consistency of the odometry of a run folder with the truth, poses in the convention of the recording. Segments
+/// contain no lost frame that no later motion spans; they end at the first frame at or beyond their length along the
+/// true path. Codes: `input` for a run without frames, or of cameras on a pan-tilt unit; those of RunStore,
+/// read_rig_yaml() and load_options().
+Result<MotionConsistency> motion_consistency(const std::string& run, const Trajectory& truth, double max_dt_s,
+                                             std::vector<double> lengths_m);
+
 /// The file of a truth that is a recording or a file, read to see that it can be: the same errors before a long run.
 Result<std::string> load_truth(const std::string& path);
 
