@@ -85,13 +85,13 @@ struct InertialOptions {
 /// a lasting error z in units of the measured standard deviations D, with a slowly changing and a constant part
 /// (docs/math/localization.md, "Vision").
 struct VisionOptions {
-  double white_noise_factor = 1.1;  ///< factor on the covariance of visual motions
+  double white_noise_factor = 0.83;  ///< factor on the covariance of visual motions
   /// Standard deviations of the slowly changing error (Gauss–Markov), in measured standard deviations: x, y, z, about
   /// x, y, z.
-  std::vector<double> drift_sigma_ratios{0.85, 0.61, 0.33, 0.57, 0.46, 0.35};
+  std::vector<double> drift_sigma_ratios{0.74, 0.53, 0.29, 0.49, 0.4, 0.3};
   double drift_correlation_frames = 57;  ///< frames, correlation length of that error
   /// The same of the error that is constant over a drive.
-  std::vector<double> constant_sigma_ratios{1.05, 0.76, 0.4, 0.7, 0.57, 0.42};
+  std::vector<double> constant_sigma_ratios{0.91, 0.66, 0.35, 0.61, 0.49, 0.36};
   double gate_probability = 0.999999;  ///< fraction of correct motions that pass the chi-square test
 
   template <class Visitor>

@@ -202,7 +202,7 @@ Eigen::Vector2d slope_at(const Image<float>& surface_m, int x, int y, double cel
 }
 
 // Adds the errors of the calibration to the variances.
-void add_calibration_errors(const CalibrationErrorOptions& errors, const Grid& grid, LocalMap& map) {
+void add_calibration_errors(const CalibrationErrors& errors, const Grid& grid, LocalMap& map) {
   const auto [w, h] = map.size();
   map.common_variance_m2 = Image<float>(w, h, kNoHeight);
   for (int y = 0; y < h; ++y) {

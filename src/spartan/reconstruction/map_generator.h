@@ -108,15 +108,8 @@ Traversability compute_traversability(const TerrainSurface& surface, const Rover
                                       const ThreadPool& workers);
 
 /// Standard deviations of what calibration and actuators get wrong. Errors of one kind move all points of a view
-/// together, so that neighbouring cells and further observations do not average them. The defaults are those of an
-/// ordinary rover (`rover: ordinary` of the simulator).
-struct CalibrationErrorOptions {
-  double pair_rotation_deg = 0.025;  ///< Between the cameras of a pair, about each axis.
-  double scale_percent = 0.15;       ///< Of ranges: focal length and baseline together.
-  double mount_rotation_deg = 0.15;  ///< Of the mount of the cameras on the body, about each axis.
-  double mount_mm = 2;               ///< The same, along each axis.
-  double pan_tilt_deg = 0.1;         ///< Of the angles that a pan-tilt unit reports.
-
+/// together, so that neighbouring cells and further observations do not average them.
+struct CalibrationErrorOptions : CalibrationErrors {
   template <class Visitor>
   void describe(Visitor& v) {
     v.field("pair_rotation_deg", pair_rotation_deg,

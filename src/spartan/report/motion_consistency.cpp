@@ -18,7 +18,7 @@ namespace {
 /// At most so many starts of segments, evenly spread over the drive.
 constexpr std::size_t kMaxStarts = 400;
 
-/// A motion of the truth's frame, and where its end is along the true path.
+/// A motion of the body, and where its end is along the true path.
 struct Step {
   RelativeMotion motion;
   Pose true_motion;
@@ -40,20 +40,27 @@ const StampedPose* nearest(const Trajectory& truth, Stamp stamp, double max_dt_s
   return best;
 }
 
-/// The rectified left camera in the frame whose poses the truth of the recording states.
-Pose truth_from_rectified(const Rig& rig, const StereoPair& pair) {
+/// The frames between which motions are transported.
+struct Mounting {
+  Pose body_from_camera;  // the rectified left camera
+  Pose truth_from_body;   // truth: the frame whose poses the truth of the recording states
+};
+
+Mounting mounting_of(const Rig& rig, const StereoPair& pair) {
   const RectifyingAxes axes = rectifying_axes(rig.right_from_left(pair));
-  const Pose left_from_rectified(axes.left_from_rectified, Eigen::Vector3d::Zero());
-  const Pose body_from_rectified = rig.body_from_camera(pair.left) * left_from_rectified;
-  if (rig.convention == PoseConvention::body) return body_from_rectified;
-  return rig.body_from_camera(rig.pairs.front().left).inverse() * body_from_rectified;
+  Mounting mounting;
+  mounting.body_from_camera = rig.body_from_camera(pair.left) * Pose(axes.left_from_rectified, Eigen::Vector3d::Zero());
+  if (rig.convention == PoseConvention::left_optical)
+    mounting.truth_from_body = rig.body_from_camera(rig.pairs.front().left).inverse();
+  return mounting;
 }
 
-/// Motions of the camera as those of the truth's frame, split where a frame was not measured from the one before.
-std::vector<Chain> chains_of(const std::vector<FrameRecord>& frames, const Pose& truth_from_camera,
-                             const Trajectory& truth, double max_dt_s) {
+/// Split where a frame was not measured from the one before.
+std::vector<Chain> chains_of(const std::vector<FrameRecord>& frames, const Mounting& mounting, const Trajectory& truth,
+                             double max_dt_s) {
   std::vector<Chain> chains(1);
-  const Matrix6d adjoint_of_camera = adjoint(truth_from_camera);
+  const Pose &body_from_camera = mounting.body_from_camera, &truth_from_body = mounting.truth_from_body;
+  const Matrix6d to_body = adjoint(body_from_camera);
   double along_m = 0;
   for (const FrameRecord& frame : frames) {
     if (!frame.has_pose || frame.motion.first) continue;
@@ -62,11 +69,10 @@ std::vector<Chain> chains_of(const std::vector<FrameRecord>& frames, const Pose&
     Step step;
     step.motion.from = frame.motion.from;
     step.motion.to = frame.stamp;
-    step.motion.measured = true;
     step.motion.previous_from_current =
-        truth_from_camera * frame.motion.previous_from_current * truth_from_camera.inverse();
-    step.motion.covariance = adjoint_of_camera * frame.motion.covariance * adjoint_of_camera.transpose();
-    step.true_motion = from->pose.inverse() * to->pose;
+        body_from_camera * frame.motion.previous_from_current * body_from_camera.inverse();
+    step.motion.covariance = to_body * frame.motion.covariance * to_body.transpose();
+    step.true_motion = truth_from_body.inverse() * from->pose.inverse() * to->pose * truth_from_body;
     along_m += step.true_motion.translation().norm();
     step.end_m = along_m;
     if (!chains.back().empty() && chains.back().back().motion.to != step.motion.from) chains.emplace_back();
@@ -133,7 +139,7 @@ Result<MotionConsistency> motion_consistency(const std::string& run, const Traje
   auto fresh = DeadReckoning::create(options->localization.vision);
   if (!fresh) return failure(fresh);
 
-  const std::vector<Chain> chains = chains_of(*frames, truth_from_rectified(*rig, *pair), truth, max_dt_s);
+  const std::vector<Chain> chains = chains_of(*frames, mounting_of(*rig, *pair), truth, max_dt_s);
   std::sort(lengths_m.begin(), lengths_m.end());
   std::vector<double> of_motions;
   std::vector<std::vector<double>> of_length(lengths_m.size());

@@ -36,10 +36,9 @@ class Consistency : public ::testing::Test {
  protected:
   Consistency() {
     deviations_ << 4e-4, 2e-4, 3e-4, 1e-4, 2e-4, 5e-5;
-    const Rig rig = pitched_pair();
-    const RectifyingAxes axes = rectifying_axes(rig.right_from_left(rig.pairs[0]));
-    body_from_rectified_ = rig.body_from_camera("left") * Pose(axes.left_from_rectified, Eigen::Vector3d::Zero());
-    folder_.write("rig.yaml", to_rig_yaml(rig));
+    const RectifyingAxes axes = rectifying_axes(rig_.right_from_left(rig_.pairs[0]));
+    body_from_rectified_ = rig_.body_from_camera("left") * Pose(axes.left_from_rectified, Eigen::Vector3d::Zero());
+    folder_.write("rig.yaml", to_rig_yaml(rig_));
     options_.localization.vision.white_noise_factor = 1;
     options_.localization.vision.drift_sigma_ratios =
         options_.localization.vision.constant_sigma_ratios = {0, 0, 0, 0, 0, 0};
@@ -59,7 +58,7 @@ class Consistency : public ::testing::Test {
       truth_.push_back({stamp_of(i), body});
       FrameRecord frame;
       frame.frame_id = i;
-      frame.pair = pitched_pair().pairs[0].name;
+      frame.pair = rig_.pairs[0].name;
       frame.stamp = frame.motion.to = stamp_of(i);
       frame.motion.first = i == 0;
       frame.has_pose = i != lost;
@@ -85,6 +84,7 @@ class Consistency : public ::testing::Test {
   testing::TemporaryFolder folder_;
   RunOptions options_;
   Vector6d deviations_;
+  Rig rig_ = pitched_pair();
   Pose body_from_rectified_;
   Trajectory truth_;
 };

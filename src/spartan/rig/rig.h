@@ -83,6 +83,17 @@ struct RoverGeometry {
   friend bool operator==(const RoverGeometry&, const RoverGeometry&) = default;
 };
 
+/// Standard deviations of the errors that a calibration leaves. The defaults are those of an ordinary rover
+/// (`rover: ordinary` of the simulator).
+struct CalibrationErrors {
+  double pair_rotation_deg = 0.025;  ///< between the cameras of a pair, about each axis
+  double scale_percent = 0.15;       ///< of ranges: focal length and baseline together
+  double mount_rotation_deg = 0.15;  ///< of the mount of the cameras on the body, about each axis
+  double mount_mm = 2;               ///< the same, along each axis
+  double pan_tilt_deg = 0.1;         ///< of the angles that a pan-tilt unit reports
+  friend bool operator==(const CalibrationErrors&, const CalibrationErrors&) = default;
+};
+
 /// One error of a rig, as found by Rig::validation_errors().
 struct RigValidationError {
   std::string key;  ///< as in rig.yaml, "cameras.left.focal_px"
@@ -94,6 +105,7 @@ struct Rig {
   std::string name;
   PoseConvention convention = PoseConvention::body;
   RoverGeometry rover;
+  std::optional<CalibrationErrors> calibration_errors;  ///< none: the calibration does not state how good it is
   std::vector<PanTiltUnit> pan_tilt_units;
   std::vector<Camera> cameras;
   std::vector<StereoPair> pairs;
@@ -138,5 +150,17 @@ Trajectory in_recording_convention(const Rig& rig, Trajectory world_from_body);
 
 /// Converts world_from_body to first_left_from_left of a pair, the convention of KITTI's pose files.
 Trajectory in_left_optical_convention(const Rig& rig, const StereoPair& pair, Trajectory world_from_body);
+
+/// Covariance, right perturbation of previous_from_current of the body (translation, rotation; m², rad²), of a motion M
+/// of the camera that is transported to the body as B = X M X⁻¹ with a calibration X = body_from_left whose errors η
+/// (a shift and a rotation of the mount) are those of `errors`:
+///
+///     e = (I − Ad(B⁻¹)) η,
+///
+/// and of a relative error of the camera's translation (focal length and baseline) and of its rotation (focal length).
+/// A pan-tilt unit adds the errors of its angles to the rotation. Rigs whose body is the camera (`left_optical`) have
+/// no error of the mount.
+Matrix6d calibration_covariance(const Pose& body_motion, const Pose& body_from_left, const Rig& rig,
+                                const StereoPair& pair, const CalibrationErrors& errors);
 
 }  // namespace spartan

@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "spartan/core/files.h"
 #include "spartan/core/pose.h"
@@ -17,6 +19,14 @@ constexpr int kSchema = 1;
 constexpr std::size_t kMaxEntries = 1000;  // cameras, pairs or pan-tilt units of a rig
 constexpr PixelLayout kLayouts[] = {PixelLayout::gray,       PixelLayout::rgb,        PixelLayout::bayer_rggb,
                                     PixelLayout::bayer_grbg, PixelLayout::bayer_gbrg, PixelLayout::bayer_bggr};
+
+std::array<std::pair<const char*, double*>, 5> values_of(CalibrationErrors& errors) {
+  return {{{"pair_rotation_deg", &errors.pair_rotation_deg},
+           {"scale_percent", &errors.scale_percent},
+           {"mount_rotation_deg", &errors.mount_rotation_deg},
+           {"mount_mm", &errors.mount_mm},
+           {"pan_tilt_deg", &errors.pan_tilt_deg}}};
+}
 
 // --- reading ---
 
@@ -181,6 +191,17 @@ RoverGeometry read_rover(YamlMap map) {
   return rover;
 }
 
+CalibrationErrors read_calibration_errors(YamlMap map) {
+  CalibrationErrors errors;
+  for (const auto& [key, value] : values_of(errors)) {
+    if (!map.has(key)) continue;
+    *value = map.number(key).value_or(*value);
+    if (*value < 0) map.add_error(key, "is a standard deviation and must not be negative");
+  }
+  map.reject_unknown_keys();
+  return errors;
+}
+
 Rig read_root(YamlMap root, const std::string& default_name) {
   Rig rig;
   rig.name = default_name;
@@ -192,6 +213,8 @@ Rig read_root(YamlMap root, const std::string& default_name) {
     rig.convention = PoseConvention::left_optical;
   }
   if (const auto rover = root.optional_node("rover")) rig.rover = read_rover(YamlMap(*rover, "rover", root.errors()));
+  if (const auto errors = root.optional_node("calibration_errors"))
+    rig.calibration_errors = read_calibration_errors(YamlMap(*errors, "calibration_errors", root.errors()));
   rig.pan_tilt_units = read_group<PanTiltUnit>(root, "pan_tilt_units", false, read_pan_tilt_unit);
   rig.cameras = read_group<Camera>(root, "cameras", true, read_camera);
   rig.pairs = read_group<StereoPair>(root, "pairs", true, read_pair);
@@ -273,6 +296,11 @@ std::string to_rig_yaml(const Rig& rig) {
   if (rig.rover != RoverGeometry()) {
     text += fmt::format("rover:\n  track_m: {}\n  wheel_radius_m: {}\n  clearance_m: {}\n", rig.rover.track_m,
                         rig.rover.wheel_radius_m, rig.rover.clearance_m);
+  }
+  if (rig.calibration_errors) {
+    CalibrationErrors errors = *rig.calibration_errors;
+    text += "calibration_errors:\n";
+    for (const auto& [key, value] : values_of(errors)) text += fmt::format("  {}: {}\n", key, *value);
   }
   if (!rig.pan_tilt_units.empty()) text += "pan_tilt_units:\n";
   for (const PanTiltUnit& unit : rig.pan_tilt_units) {

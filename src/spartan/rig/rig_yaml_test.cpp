@@ -60,6 +60,20 @@ TEST(RigYaml, ReadsTheGeometryOfTheRover) {
   EXPECT_THAT(fault("{wheelbase_m: 1}"), HasSubstr("wheelbase_m"));
 }
 
+TEST(RigYaml, ReadsTheErrorsOfTheCalibration) {
+  EXPECT_FALSE(parse_rig_yaml(kGood, "my.yaml")->calibration_errors.has_value());
+  const auto rig = parse_rig_yaml(kGood + "calibration_errors: {scale_percent: 0.3, mount_mm: 0}\n", "my.yaml");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->calibration_errors, (CalibrationErrors{0.025, 0.3, 0.15, 0, 0.1}))
+      << "a missing key keeps its default";
+  EXPECT_EQ(parse_rig_yaml(to_rig_yaml(*rig), "again.yaml")->calibration_errors, rig->calibration_errors);
+  const auto fault = [](const std::string& errors) {
+    return testing::error_message(parse_rig_yaml(kGood + "calibration_errors: " + errors + "\n", "my.yaml"));
+  };
+  EXPECT_THAT(fault("{pan_tilt_deg: -1}"), HasSubstr("calibration_errors.pan_tilt_deg: is a standard deviation"));
+  EXPECT_THAT(fault("{mount_cm: 1}"), HasSubstr("calibration_errors.mount_cm"));
+}
+
 TEST(RigYaml, ReadsAMinimalFile) {
   const auto rig = parse_rig_yaml(kGood, "some/my.yaml");
   ASSERT_TRUE(rig) << rig.error().message();

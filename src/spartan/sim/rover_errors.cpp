@@ -159,6 +159,16 @@ Rig nominal_rig(const Rig& rig, const NominalRigOptions& options) {
   return nominal;
 }
 
+CalibrationErrors calibration_errors(const RoverErrorOptions& errors) {
+  CalibrationErrors stated;
+  stated.pair_rotation_deg = std::hypot(errors.pair_rotation_deg, errors.drift_deg);
+  stated.scale_percent = std::hypot(errors.baseline_percent, errors.focal_percent);
+  stated.mount_rotation_deg = errors.mount_rotation_deg;
+  stated.mount_mm = errors.mount_mm;
+  stated.pan_tilt_deg = std::hypot(errors.pan_tilt_bias_deg, errors.pan_tilt_noise_deg);
+  return stated;
+}
+
 Rig true_rig(const Rig& rig, const RoverErrorOptions& errors, int scenario_seed) {
   if (errors == RoverErrorOptions{.seed = errors.seed}) return rig;  // bit for bit
   const std::uint64_t seed = internal::rover_seed(errors, scenario_seed);

@@ -129,6 +129,17 @@ TEST(RoverErrors, GradeSetsWhatIsNotGiven) {
   EXPECT_FALSE(set_scenario_option(Scenario(), "rover=bad"));
 }
 
+TEST(RoverErrors, TheRecordingStatesTheirStandardDeviations) {
+  EXPECT_EQ(calibration_errors({}), (CalibrationErrors{0, 0, 0, 0, 0}));
+  const CalibrationErrors usual,
+      ordinary = calibration_errors(set_scenario_option(Scenario(), "rover=ordinary").value().rover_errors);
+  EXPECT_NEAR(ordinary.pair_rotation_deg, usual.pair_rotation_deg, 0.003);
+  EXPECT_NEAR(ordinary.scale_percent, usual.scale_percent, 0.01);
+  EXPECT_EQ(ordinary.mount_rotation_deg, usual.mount_rotation_deg);
+  EXPECT_EQ(ordinary.mount_mm, usual.mount_mm);
+  EXPECT_NEAR(ordinary.pan_tilt_deg, usual.pan_tilt_deg, 0.01);
+}
+
 TEST(ImuGrades, SetWhatIsNotGiven) {
   const auto scenario = parse_scenario("imu: {grade: mems, rate_hz: 200, gyro_bias_rad_s: 0.001}\n", "s");
   ASSERT_TRUE(scenario) << scenario.error().message();

@@ -180,6 +180,8 @@ Result<Scenario> set_scenario_option(Scenario scenario, const std::string& assig
 
 /// The nominal rig that the recording states: the rig of the scenario with fixed errors.
 Rig nominal_rig(const Rig& rig, const NominalRigOptions& options);
+/// What the recording states about the errors of its calibration: the standard deviations of the draws.
+CalibrationErrors calibration_errors(const RoverErrorOptions& errors);
 /// The rig that takes the images, at the start of the drive: the rig of the scenario with a draw of its errors.
 Rig true_rig(const Rig& rig, const RoverErrorOptions& errors, int scenario_seed);
 /// The drawn response of a camera of the rig to light; 1 without errors.

@@ -112,6 +112,7 @@ struct NominalRigOptions {
     v.field("focal_percent", focal_percent, "Error of both focal lengths in the nominal calibration, in percent.",
             between(-20, 20));
   }
+  friend bool operator==(const NominalRigOptions&, const NominalRigOptions&) = default;
 };
 
 /// How well the rover is built and calibrated: standard deviations of RoverErrorOptions (docs/reference/scenario.md).

@@ -114,6 +114,9 @@ class Simulation {
                   BodyMotion(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers,
                              request.scenario.wheels)) {
     if (scenario_.chassis.track_depth_m > 0) driven_poses_ = poses_of_wheel_tracks();
+    // A calibration that is wrong does not know of it.
+    if (scenario_.nominal_rig == NominalRigOptions())
+      nominal_.calibration_errors = calibration_errors(scenario_.rover_errors);
     nominal_.rover.track_m = request.scenario.chassis.track_m;
     nominal_.rover.wheel_radius_m = request.scenario.chassis.wheel_radius_m;
     if (scenario_.sensor.vignetting_stated) {

@@ -65,7 +65,7 @@ std::optional<Pose> Pipeline::State::motion_by_sensors(const RectifiedPair& rect
 
 // Transports the motion M of the left camera to the body, with B₀ and B₁ = body_from_left at its begin and end, which
 // differ where the mast has moved: B₀ M Exp(ξ) B₁⁻¹ = (B₀ M B₁⁻¹) Exp(Ad_B₁ ξ), so the covariance becomes
-// Ad_B₁ Σ Ad_B₁ᵀ.
+// Ad_B₁ Σ Ad_B₁ᵀ. What the calibration leaves is added.
 RelativeMotion Pipeline::State::body_motion(const Pose& body_from_left, const MotionEstimate& motion) const {
   const Matrix6d ad = adjoint(body_from_left);
   RelativeMotion result;
@@ -79,6 +79,10 @@ RelativeMotion Pipeline::State::body_motion(const Pose& body_from_left, const Mo
         reference.left_from_body.inverse() * motion.previous_from_current * body_from_left.inverse();
   }
   result.covariance = ad * motion.covariance * ad.transpose();
+  if (result.measured) {
+    result.covariance += calibration_covariance(result.previous_from_current, body_from_left, rig, pair,
+                                                options.mapping.map.calibration);
+  }
   return result;
 }
 
@@ -232,6 +236,8 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   // After lost frames the landmarks of the last one may be the only ones that are found.
   if (result.motion.from != s.reference.stamp) s.reference = {s.last_stamp, s.world_from_left, s.left_from_body, {}};
   const RelativeMotion body_motion = s.body_motion(rectified->body_from_left, result.motion);
+  const Matrix6d to_left = adjoint(rectified->body_from_left.inverse());
+  result.motion.covariance = to_left * body_motion.covariance * to_left.transpose();
   if (!result.motion.first) {
     s.advance(*rectified, result.motion, body_motion);
     if (s.options.odometry_only) s.dead_reckoning.add(body_motion);

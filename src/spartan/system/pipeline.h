@@ -46,8 +46,8 @@ struct FrameResult {
   std::int64_t frame_id = 0;
   std::string pair;
   Stamp stamp;
-  UncertainPose world_from_body;  ///< by odometry alone; the covariance includes its constant errors
-  MotionEstimate motion;
+  UncertainPose world_from_body;                     ///< by odometry alone; the covariance includes its constant errors
+  MotionEstimate motion;                             ///< its covariance includes the errors of the calibration
   std::optional<UncertainPose> slam;                 ///< world_from_body: odometry corrected by map matching
   std::optional<LocalizationEstimate> localization;  ///< by all sensors
   std::optional<TerrainView> terrain;                ///< if due, see TerrainOptions::every_m

@@ -71,9 +71,18 @@ RunOptions resolved_options(RunOptions options, const Rig& rig) {
   share(rover.track_m, by_default.track_m, rig.rover.track_m);
   share(rover.wheel_radius_m, by_default.wheel_radius_m, rig.rover.wheel_radius_m);
   share(rover.clearance_m, by_default.clearance_m, rig.rover.clearance_m);
+  if (rig.calibration_errors) {
+    CalibrationErrors& errors = options.mapping.map.calibration;
+    const CalibrationErrors usual, &stated = *rig.calibration_errors;
+    share(errors.pair_rotation_deg, usual.pair_rotation_deg, stated.pair_rotation_deg);
+    share(errors.scale_percent, usual.scale_percent, stated.scale_percent);
+    share(errors.mount_rotation_deg, usual.mount_rotation_deg, stated.mount_rotation_deg);
+    share(errors.mount_mm, usual.mount_mm, stated.mount_mm);
+    share(errors.pan_tilt_deg, usual.pan_tilt_deg, stated.pan_tilt_deg);
+  }
   if (!rig.pairs.empty() && !has_pair_on_pan_tilt_unit(rig)) {
     double& pan_tilt_deg = options.mapping.map.calibration.pan_tilt_deg;
-    share(pan_tilt_deg, CalibrationErrorOptions().pan_tilt_deg, 0);
+    share(pan_tilt_deg, CalibrationErrors().pan_tilt_deg, 0);
   }
   share(options.localization.wheels.track_m, defaults.localization.wheels.track_m, rig.rover.track_m);
   options.mapping = with_shared_values(options.mapping);

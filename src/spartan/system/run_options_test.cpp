@@ -42,6 +42,16 @@ TEST(ResolvedOptions, TakeTheGeometryOfTheRoverFromTheRig) {
   EXPECT_EQ(options.localization.wheels.track_m, 0.35);
 }
 
+TEST(ResolvedOptions, TakeTheErrorsOfTheCalibrationFromTheRig) {
+  Rig rig;
+  EXPECT_EQ(resolved_options({}, rig).mapping.map.calibration, CalibrationErrors());
+  rig.calibration_errors = CalibrationErrors{0.01, 0.02, 0.03, 0.04, 0.05};
+  EXPECT_EQ(resolved_options({}, rig).mapping.map.calibration, *rig.calibration_errors);
+  RunOptions given;
+  given.mapping.map.calibration.mount_mm = 7;
+  EXPECT_EQ(resolved_options(given, rig).mapping.map.calibration, (CalibrationErrors{0.01, 0.02, 0.03, 7, 0.05}));
+}
+
 TEST(ResolvedOptions, KeepWhatWasSetUnderAFormerKey) {
   const auto set = read_assignment<RunOptions>("mapping.map.rover.track_m=0.5");
   ASSERT_TRUE(set) << set.error().message();

@@ -39,7 +39,7 @@ struct FrameRecord {
   std::string message;    ///< reason for the user to read; may be empty
   bool has_pose = false;  ///< false: `world_from_body` is predicted; no covariance
   UncertainPose world_from_body;
-  MotionEstimate motion;
+  MotionEstimate motion;                           ///< its covariance includes the errors of the calibration
   std::optional<UncertainPose> slam;               ///< odometry corrected by map matching; none if missing
   std::optional<LocalizationRecord> localization;  ///< none if the frame is missing
   std::vector<StageTime> times;

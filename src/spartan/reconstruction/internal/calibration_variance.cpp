@@ -14,7 +14,7 @@ double squared(double value) {
 
 }  // namespace
 
-double calibration_variance_m2(const CellSight& cell, const CalibrationErrorOptions& errors) {
+double calibration_variance_m2(const CellSight& cell, const CalibrationErrors& errors) {
   const Eigen::Vector3d& arm = cell.from_camera_m;
   const Eigen::Vector3d normal(-cell.slope.x(), -cell.slope.y(), 1);
   const double rotation =

@@ -19,6 +19,6 @@ struct CellSight {
 /// −∂z/∂y, 1), rises by n · δ, so that the variance of its elevation is
 ///   σω² |a × n|² + σt² |n|² + σε² (a · n)²,  σε² = (σψ |a| / b)² + σs²,
 /// where σψ is the yaw between the cameras, which is an error f σψ of all disparities, b the baseline and σs the scale.
-double calibration_variance_m2(const CellSight& cell, const CalibrationErrorOptions& errors);
+double calibration_variance_m2(const CellSight& cell, const CalibrationErrors& errors);
 
 }  // namespace spartan::internal

@@ -16,7 +16,7 @@ Eigen::Vector3d normal_vector(Random& random, double sigma) {
 }
 
 // Rotates, shifts and stretches the view of a plane and measures by how much its elevation changes at the cell.
-double sampled_variance_m2(const CellSight& cell, const CalibrationErrorOptions& errors) {
+double sampled_variance_m2(const CellSight& cell, const CalibrationErrors& errors) {
   Random random(7);
   constexpr int kSamples = 20000;
   const double degree = kRadiansPerDegree;
@@ -44,11 +44,10 @@ TEST(CalibrationVariance, IsThatOfSampledErrors) {
   for (const Eigen::Vector2d& slope : {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.3, -0.1)}) {
     const CellSight cell{{2.5, 1.0, -1.1}, 0.5, slope};
     for (int part = 0; part < 6; ++part) {
-      const CalibrationErrorOptions all;
+      const CalibrationErrors all;
       const auto only = [&](int index, double value) { return part == 5 || part == index ? value : 0; };
-      const CalibrationErrorOptions errors{only(0, all.pair_rotation_deg), only(1, all.scale_percent),
-                                           only(2, all.mount_rotation_deg), only(3, all.mount_mm),
-                                           only(4, all.pan_tilt_deg)};
+      const CalibrationErrors errors{only(0, all.pair_rotation_deg), only(1, all.scale_percent),
+                                     only(2, all.mount_rotation_deg), only(3, all.mount_mm), only(4, all.pan_tilt_deg)};
       const double expected = sampled_variance_m2(cell, errors);
       EXPECT_NEAR(calibration_variance_m2(cell, errors), expected, 0.05 * expected) << "part " << part;
     }
@@ -58,7 +57,7 @@ TEST(CalibrationVariance, IsThatOfSampledErrors) {
 // On level ground at the distance r in front of a camera at the height h: a rotation about the horizontal axis across
 // the ray raises it by r times the angle.
 TEST(CalibrationVariance, GrowsWithTheSquaredDistanceOnLevelGround) {
-  const CalibrationErrorOptions rotation{0, 0, 1, 0, 0};
+  const CalibrationErrors rotation{0, 0, 1, 0, 0};
   EXPECT_NEAR(std::sqrt(calibration_variance_m2({{3, 0, -1}, 0.5, {0, 0}}, rotation)), 3 * kRadiansPerDegree, 1e-12);
   EXPECT_EQ(calibration_variance_m2({{3, 0, -1}, 0, {0, 0}}, {1, 0, 0, 0, 0}), 0) << "the baseline is not known";
 }
