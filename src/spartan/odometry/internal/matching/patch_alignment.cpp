@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace spartan::internal {
 namespace {
@@ -31,6 +32,8 @@ constexpr double kMaxSlantX = 0.8, kMaxSlantY = 1.5;
 /// Weight of a step of the slant against one of the position in the convergence test: about the extent of the window.
 constexpr double kSlantLever_px = 3;
 
+/// A function whose square is smaller than this fraction after the others are removed depends on them.
+constexpr float kMinIndependent = 1e-4f;
 /// Windows keep this distance from the border of the image, so that rounding of their places does not pass it.
 constexpr double kBorder_px = 0.01;
 
@@ -53,25 +56,82 @@ Window negative(Window window) {
   return window;
 }
 
+/// Derivative of the template by its scale.
+Window by_scale(const AlignmentTemplate& reference) {
+  Window derivative = times_offset_x(reference.along_x);
+  const Window along_y = times_offset_y(reference.along_y);
+  for (std::size_t i = 0; i < derivative.values.size(); ++i) derivative.values[i] += along_y.values[i];
+  return derivative;
+}
+
+/// A linear combination of windows that an image may contain beside its template. Its basis is orthonormal under the
+/// weights of the window; of each function the product with the weights is kept.
+class NuisanceBasis {
+ public:
+  /// Planes of brightness and multiples of the template.
+  explicit NuisanceBasis(const AlignmentTemplate& reference) {
+    const auto& planes = brightness_planes();
+    std::copy(planes.begin(), planes.end(), windows_.begin());
+    count_ = planes.size();
+    add(reference.value);
+  }
+
+  /// Nothing is added where the window is a combination of the others.
+  void add(Window window) {
+    Window centred;
+    weighted(window, centred);
+    const float before = dot(window, centred);
+    remove_from(window, centred);
+    const float square = dot(window, centred);
+    if (!(square > kMinIndependent * before)) return;
+    for (float& value : window.values) value /= std::sqrt(square);
+    windows_[count_++] = window;
+  }
+
+  /// Makes a window orthogonal to the basis; `centred` holds it without the weights.
+  void remove_from(Window& window, const Window& centred) const {
+    for (std::size_t k = 0; k < count_; ++k) {
+      const float share = dot(windows_[k], centred);
+      for (std::size_t i = 0; i < window.values.size(); ++i) window.values[i] -= share * windows_[k].values[i];
+    }
+  }
+
+ private:
+  static const std::array<Window, 2>& brightness_planes() {
+    static const std::array<Window, 2> planes = [] {
+      std::array<Window, 2> p{times_offset_x(window_weights()), times_offset_y(window_weights())};
+      // Σ w x² = Σ w y².
+      const Window square = times_offset_x(p[0]);
+      const float norm = std::sqrt(std::accumulate(square.values.begin(), square.values.end(), 0.0f));
+      for (Window& plane : p)
+        for (float& value : plane.values) value /= norm;
+      return p;
+    }();
+    return planes;
+  }
+
+  std::array<Window, 4> windows_;  // two planes, the template and one that is added
+  std::size_t count_ = 0;
+};
+
 /// Alignment by Gauss-Newton whose Jacobian is that of the template: Σ wJᵀJ and its derivatives by the image.
 template <int Unknowns>
 struct Linearization {
   static_assert(Unknowns + 1 >= kMinFactors && Unknowns + 1 <= kMaxFactors);
-  using Vector = Eigen::Matrix<double, Unknowns, 1>;
-  /// The template and the columns of the Jacobian without their weighted means, multiplied by the weights. Subtracting
-  /// the means projects out the unknown brightness.
+  /// The template and the columns of the Jacobian without their weighted means and without `nuisance`, multiplied by
+  /// the weights: what an image contains of the nuisance does not move the result.
   std::array<Window, static_cast<std::size_t>(Unknowns) + 1> factors;
   Eigen::Matrix<double, Unknowns, Unknowns> information;
-  Vector by_template;
 
-  Linearization(const AlignmentTemplate& reference, const std::array<Window, static_cast<std::size_t>(Unknowns)>& j) {
+  Linearization(const AlignmentTemplate& reference, const std::array<Window, static_cast<std::size_t>(Unknowns)>& j,
+                const NuisanceBasis& nuisance) {
     std::array<Window, static_cast<std::size_t>(Unknowns)> centred;
     factors[0] = reference.weighted_value;
     for (std::size_t a = 0; a < j.size(); ++a) {
       factors[a + 1] = j[a];
       weighted(factors[a + 1], centred[a]);
+      nuisance.remove_from(factors[a + 1], centred[a]);
       const auto row = static_cast<Eigen::Index>(a);
-      by_template[row] = dot(factors[a + 1], reference.value);
       for (std::size_t b = 0; b <= a; ++b) {
         const auto column = static_cast<Eigen::Index>(b);
         information(row, column) = information(column, row) = dot(factors[a + 1], centred[b]);
@@ -103,7 +163,7 @@ std::optional<WindowDifference<Unknowns>> difference_from(const AlignmentTemplat
   difference.correlation = sums.products[0] / (deviation * reference.deviation);
   difference.variance = 2.0 * reference.deviation * reference.deviation * std::max(0.0, 1 - difference.correlation);
   for (int a = 0; a < Unknowns; ++a) {
-    difference.gradient[a] = contrast * sums.products[static_cast<std::size_t>(a) + 1] - linear.by_template[a];
+    difference.gradient[a] = contrast * sums.products[static_cast<std::size_t>(a) + 1];
   }
   return difference;
 }
@@ -146,7 +206,9 @@ std::optional<PatchAlignment> align_translation(const AlignmentTemplate& referen
   if (reference.deviation < kMinDeviation || !(std::abs(warp.determinant()) > kMinWarpDeterminant)) return std::nullopt;
   // At the solution ∇image = warp⁻ᵀ ∇template, so the Jacobian is computed once, from the template.
   const Eigen::Matrix2d to_image = warp.inverse().transpose();
-  const Linearization<2> linear(reference, {reference.along_x, reference.along_y});
+  NuisanceBasis nuisance(reference);
+  nuisance.add(by_scale(reference));
+  const Linearization<2> linear(reference, {reference.along_x, reference.along_y}, nuisance);
   const Eigen::Matrix2d information = to_image * linear.information * to_image.transpose();
   if (!(information.determinant() > kMinDeterminant)) return std::nullopt;
   const Eigen::Matrix2d inverse = information.inverse();
@@ -175,8 +237,10 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, 
                                             bool estimate_slant, double radius_px) {
   if (reference.deviation < kMinDeviation) return std::nullopt;
   // right(x − d − s·offset) ≈ template(x): the derivative by d is −∂x, by the slant −offset ∂x.
-  const Linearization<3> linear(reference, {negative(reference.along_x), negative(times_offset_x(reference.along_x)),
-                                            negative(times_offset_y(reference.along_x))});
+  const Linearization<3> linear(reference,
+                                {negative(reference.along_x), negative(times_offset_x(reference.along_x)),
+                                 negative(times_offset_y(reference.along_x))},
+                                NuisanceBasis(reference));
   Eigen::Matrix3d information = linear.information;
   if (!(information(0, 0) > kMinInformation)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / kEffectivePixels;
@@ -222,7 +286,8 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference
   // right(c + (ox − s·o, oy)) ≈ template: the derivative by c is the gradient, by the slant −offset ∂x.
   const Linearization<4> linear(reference,
                                 {reference.along_x, reference.along_y, negative(times_offset_x(reference.along_x)),
-                                 negative(times_offset_y(reference.along_x))});
+                                 negative(times_offset_y(reference.along_x))},
+                                NuisanceBasis(reference));
   Eigen::Matrix4d information = linear.information;
   if (!(information.topLeftCorner<2, 2>().determinant() > kMinDeterminant)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / kEffectivePixels;

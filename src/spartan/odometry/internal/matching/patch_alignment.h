@@ -41,9 +41,9 @@ struct PatchAlignment {
   double correlation = 0;      ///< normalized cross-correlation at the result
 };
 
-/// Estimates the centre so that image(centre + warp · offset) ≈ template(offset) up to brightness and contrast
-/// (translation only; inverse-compositional Gauss-Newton, Baker & Matthews §3.2). std::nullopt where the window leaves
-/// the image, the iteration does not converge or moves farther than `radius_px` from the start.
+/// Estimates the centre so that image(centre + warp · offset) ≈ template(offset) up to contrast, a plane of brightness
+/// and, to first order, the scale of the warp (inverse-compositional Gauss-Newton, Baker & Matthews §3.2). std::nullopt
+/// where the window leaves the image, the iteration does not converge or moves farther than `radius_px` from the start.
 std::optional<PatchAlignment> align_translation(const AlignmentTemplate& reference,
                                                 ImageView<const std::uint16_t> image, const Eigen::Matrix2d& warp,
                                                 const Eigen::Vector2d& start, double radius_px);
