@@ -14,6 +14,9 @@ constexpr double kConverged_px = 0.005;
 /// Smoothing correlates the noise of neighbouring pixels: the variance of a sum over many of them is the variance of
 /// one pixel divided by Σ kernel² = (70/256)² of the binomial filter [1 4 6 4 1]/16 in two dimensions.
 constexpr double kNoiseCorrelation = 1.0 / ((70.0 / 256.0) * (70.0 / 256.0));
+/// What is left of it without the low frequencies, which are projected out with planes and the scale (Monte Carlo:
+/// PatchAlignment.CovarianceCoversTheErrors).
+constexpr double kHighFrequencyNoise = 0.8;
 /// Effective number of pixels under the Gaussian window: about half of its area.
 constexpr double kEffectivePixels = 0.5 * kWindowArea;
 /// Minimum standard deviation of a window with usable texture, gray levels.
@@ -226,7 +229,7 @@ std::optional<PatchAlignment> align_translation(const AlignmentTemplate& referen
     found.position = position;
     found.correlation = difference->correlation;
     // `information` is a mean over the window; the sum over independent pixels is larger by their number.
-    found.covariance = inverse * (variance * kNoiseCorrelation / kEffectivePixels);
+    found.covariance = inverse * (variance * kHighFrequencyNoise * kNoiseCorrelation / kEffectivePixels);
     return found;
   }
   return std::nullopt;
