@@ -114,6 +114,7 @@ class Simulation {
                   BodyMotion(request.drive, {world_.shape, world_.wheel_lift}, request.scenario.chassis, workers,
                              request.scenario.wheels)) {
     if (scenario_.chassis.track_depth_m > 0) driven_poses_ = poses_of_wheel_tracks();
+    rig_.calibration_errors = CalibrationErrors{0, 0, 0, 0, 0};
     // A calibration that is wrong does not know of it.
     if (scenario_.nominal_rig == NominalRigOptions())
       nominal_.calibration_errors = calibration_errors(scenario_.rover_errors);

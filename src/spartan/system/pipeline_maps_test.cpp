@@ -69,6 +69,25 @@ TEST(PipelineMaps, MapConstraintUpdatesTheLocalization) {
   EXPECT_LT((result.slam->pose.translation() - corrected).norm(), 1e-8) << "the rover has not moved since";
 }
 
+TEST(PipelineMaps, MotionsHoldTheErrorsOfTheCalibration) {
+  Rig uncertain = mapping_rover();
+  uncertain.calibration_errors = CalibrationErrors{0, 1, 2, 3, 0};
+  std::vector<FrameResult> results;
+  for (const Rig& rig : {mapping_rover(), uncertain}) {
+    Pipeline pipeline = Pipeline::create(rig, {}, ThreadPool(2)).value();
+    drive_to(pipeline, 0);
+    results.push_back(drive_to(pipeline, 1));
+  }
+  const Pose body_from_left = uncertain.body_from_camera("narrow_left");
+  const Pose motion = body_from_left * results[0].motion.previous_from_current * body_from_left.inverse();
+  const Matrix6d to_body = adjoint(body_from_left);
+  const Matrix6d added = to_body * (results[1].motion.covariance - results[0].motion.covariance) * to_body.transpose();
+  EXPECT_TRUE(added.isApprox(calibration_covariance(motion, body_from_left, uncertain, *uncertain.find_pair("narrow"),
+                                                    *uncertain.calibration_errors),
+                             1e-6));
+  EXPECT_GT(results[1].world_from_body.covariance(1, 1), 2 * results[0].world_from_body.covariance(1, 1));
+}
+
 // As in recordings whose narrow pair runs at 4 Hz through a stop of minutes, with the pans in between. The rover slides
 // meanwhile and ends one step ahead.
 TEST(PipelineMaps, ConstraintIsAppliedAfterLongStopWithOdometryFrames) {

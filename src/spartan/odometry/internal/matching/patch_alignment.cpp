@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kMaxIterations = 15;
 /// The iteration has converged where a step is smaller than this.
-constexpr double kConverged_px = 0.01;
+constexpr double kConverged_px = 0.005;
 /// Smoothing correlates the noise of neighbouring pixels: the variance of a sum over many of them is the variance of
 /// one pixel divided by Σ kernel² = (70/256)² of the binomial filter [1 4 6 4 1]/16 in two dimensions.
 constexpr double kNoiseCorrelation = 1.0 / ((70.0 / 256.0) * (70.0 / 256.0));
