@@ -1,11 +1,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <map>
-#include <numeric>
 
 #include "spartan/core/options.h"
+#include "spartan/eval/trajectory_metrics.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/report/report.h"
 #include "spartan/rig/rectified_stereo.h"
@@ -94,10 +92,9 @@ NormalizedErrors summary_of(double length_m, std::vector<double> values) {
   result.length_m = length_m;
   result.count = static_cast<int>(values.size());
   if (values.empty()) return result;
-  result.mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  result.median = *middle;
+  const ErrorStatistics statistics = statistics_of(std::move(values));
+  result.mean = statistics.mean;
+  result.median = statistics.median;
   return result;
 }
 

@@ -153,9 +153,9 @@ Trajectory in_left_optical_convention(const Rig& rig, const StereoPair& pair, Tr
 
 /// Covariance, right perturbation of previous_from_current of the body (translation, rotation; m², rad²), of a motion M
 /// of the camera that is transported to the body as B = X M X⁻¹ with a calibration X = body_from_left whose errors η
-/// (a shift and a rotation of the mount) are those of `errors`:
+/// (a shift and a rotation of the mount, right perturbation of X) are those of `errors`:
 ///
-///     e = (I − Ad(B⁻¹)) η,
+///     e = (I − Ad(B⁻¹)) Ad(X) η,
 ///
 /// and of a relative error of the camera's translation (focal length and baseline) and of its rotation (focal length).
 /// A pan-tilt unit adds the errors of its angles to the rotation. Rigs whose body is the camera (`left_optical`) have
