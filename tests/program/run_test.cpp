@@ -52,6 +52,10 @@ class Run : public ::testing::Test {
   std::string image(int side, int i) const {
     return drive() + "/image_" + std::to_string(side) + "/" + number(i) + ".png";
   }
+  void remove_pair(int i) const {
+    fs::remove(image(0, i));
+    fs::remove(image(1, i));
+  }
   ProgramResult run(const std::string& output, std::vector<std::string> more = {},
                     const ProgramLimits& limits = {}) const {
     std::vector<std::string> words{"run", drive(), "-o", path(output)};
@@ -226,23 +230,29 @@ TEST_F(Run, RejectsFoldersThatAreNoRecording) {
 
 TEST_F(Run, SkipsTruncatedImages) {
   cut(image(0, 3), 0.6);
+  cut(image(1, 3), 0.6);
   cut(image(1, 9), 0.95);
   const ProgramResult result = run("out");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr(image(0, 3)));
   EXPECT_THAT(result.err, HasSubstr(image(1, 9)));
   const auto summary = summary_of(path("out"));
-  EXPECT_EQ(summary["skipped"]["unreadable"], 2);
-  EXPECT_EQ(summary["frames"], 12);
-  EXPECT_EQ(summary["predicted_frames"], nlohmann::json::parse("[3, 9]"));
+  EXPECT_EQ(summary["skipped"]["unreadable"], 1);
+  EXPECT_EQ(summary["frames"], 13);
+  EXPECT_EQ(summary["predicted_frames"], nlohmann::json::parse("[3]"));
+  EXPECT_EQ(summary["health"]["odometry"]["degraded"], 1) << "the left image of frame 9 is used alone";
 }
 
-TEST_F(Run, SkipsPairsOfDifferentSize) {
+TEST_F(Run, SkipsImagesOfAnotherSize) {
   ASSERT_EQ(run_program({"stereo", image(0, 0), image(1, 0), "-o", path("stereo")}).exit_code, 0);
   testing::write_gray_png(image(1, 5), 200, 100);
+  testing::write_gray_png(image(0, 9), 200, 100);
+  testing::write_gray_png(image(1, 9), 200, 100);
   const ProgramResult result = run("out");
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(summary_of(path("out"))["skipped"]["wrong_size"], 1);
+  const auto summary = summary_of(path("out"));
+  EXPECT_EQ(summary["skipped"]["wrong_size"], 1);
+  EXPECT_EQ(summary["health"]["odometry"]["degraded"], 1) << "the left image of frame 5 is used alone";
   EXPECT_EQ(run_program({"stereo", image(0, 5), image(1, 5), "-o", path("stereo2")}).exit_code, 3);
 }
 
@@ -307,11 +317,13 @@ TEST_F(Run, FailsWhereNoFrameIsUsable) {
 
 TEST_F(Run, WritesMessagesToTheLogFile) {
   fs::remove(image(1, 4));
+  remove_pair(6);
   ASSERT_EQ(run("out", {"-q"}).exit_code, 0);
   std::ifstream file(path("out/log.txt"));
   const std::string log((std::istreambuf_iterator<char>(file)), {});
   EXPECT_THAT(log, HasSubstr("kitti recording (calib.txt and image_0 found)"));
-  EXPECT_THAT(log, HasSubstr("frame 4 skipped (right_missing)"));
+  EXPECT_THAT(log, HasSubstr("image_1: has no image number 4; the other image is used alone"));
+  EXPECT_THAT(log, HasSubstr("frame 6 skipped (left_missing)"));
 }
 
 TEST_F(Run, EvaluatesAgainstTheTruth) {
@@ -330,16 +342,32 @@ TEST_F(Run, EvaluatesAgainstTheTruth) {
 }
 
 TEST_F(Run, BridgesMissingFramesIfTheViewsOverlap) {
-  for (int i = 3; i < 6; ++i) fs::remove(image(1, i));
+  for (int i = 3; i < 6; ++i) remove_pair(i);
   const ProgramResult result = run("out");
   const auto summary = summary_of(path("out"));
-  EXPECT_EQ(summary["skipped"]["right_missing"], 3);
+  EXPECT_EQ(summary["skipped"]["left_missing"], 3);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
 }
 
-TEST_F(Run, ACameraThatIsDeadForMostOfTheDriveIsALoss) {
-  for (int i = 3; i < 13; ++i) fs::remove(image(1, i));
+TEST_F(Run, MeasuresInOneImageWhereTheOtherIsMissing) {
+  for (const int side : {0, 1}) {
+    for (int i = 3; i < 6; ++i) fs::rename(image(side, i), path(number(i)));
+    const std::string out = "out" + std::to_string(side);
+    const ProgramResult result = run(out, {"--truth", drive()});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    const auto summary = summary_of(path(out));
+    EXPECT_TRUE(summary["skipped"].empty());
+    EXPECT_EQ(summary["frames"], 14);
+    EXPECT_EQ(summary["health"]["odometry"]["degraded"], 3);
+    EXPECT_EQ(summary["health"]["odometry"]["lost"], 0);
+    EXPECT_LT(summary["truth"]["ate_m"]["rmse"], 0.005);
+    for (int i = 3; i < 6; ++i) fs::rename(path(number(i)), image(side, i));
+  }
+}
+
+TEST_F(Run, CamerasThatAreDeadForMostOfTheDriveAreALoss) {
+  for (int i = 3; i < 13; ++i) remove_pair(i);
   const ProgramResult result = run("out");
   EXPECT_EQ(result.exit_code, 6) << result.err;
   const auto summary = summary_of(path("out"));
@@ -347,12 +375,12 @@ TEST_F(Run, ACameraThatIsDeadForMostOfTheDriveIsALoss) {
   ASSERT_EQ(summary["lost_spans"].size(), 1U);
   EXPECT_EQ(summary["lost_spans"][0]["from_ns"], 1'000'000'000);
   EXPECT_EQ(summary["lost_spans"][0]["to_ns"], 6'500'000'000);
-  EXPECT_EQ(summary["lost_spans"][0]["reason"], "10 frames skipped in 5.5 s, the first: right_missing");
+  EXPECT_EQ(summary["lost_spans"][0]["reason"], "10 frames skipped in 5.5 s, the first: left_missing");
 }
 
 TEST_F(Run, ReportsALossIfTheViewsDoNotOverlap) {
   // After the gap the images are upside down, so no landmark matches.
-  for (int i = 3; i < 8; ++i) fs::remove(image(1, i));
+  for (int i = 3; i < 8; ++i) remove_pair(i);
   for (int i = 8; i < 14; ++i) {
     testing::turn_upside_down(image(0, i), image(1, i));
   }
@@ -407,6 +435,7 @@ TEST_F(Run, ReportsWhereItCannotWrite) {
 
 TEST_F(Run, ExportsForOtherTools) {
   cut(image(0, 3), 0.6);
+  cut(image(1, 3), 0.6);
   ASSERT_EQ(run("out").exit_code, 0);
   for (const std::string format : {"tum", "kitti", "euroc", "csv", "ply"}) {
     const ProgramResult result = run_program({"export", path("out"), "--format", format, "-o", path("x." + format)});

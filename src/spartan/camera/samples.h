@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -71,7 +72,8 @@ struct SensorNoise {
   InclinometerNoise inclinometer;
 };
 
-/// One synchronous capture of a stereo pair. The images may borrow memory that the caller keeps (see FrameImage).
+/// One synchronous capture of a stereo pair. The images may borrow memory that the caller keeps (see FrameImage). An
+/// image without pixels is missing (MissingFrame::partial).
 struct StereoFrame {
   std::int64_t frame_id = 0;
   std::int64_t position_id = -1;  ///< id of the stop, shared by its frames; −1: unknown
@@ -127,7 +129,8 @@ struct MissingFrame {
   std::string pair;
   Stamp stamp;
   FrameFault fault = FrameFault::unreadable;
-  std::string message;  ///< file and cause
+  std::string message;                 ///< file and cause
+  std::optional<StereoFrame> partial;  ///< the frame with one image, where the other one alone is at fault
 };
 
 using Sample = std::variant<StereoFrame, ImuSample, WheelSample, CompassSample, InclinometerSample, MissingFrame>;

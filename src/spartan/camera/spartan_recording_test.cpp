@@ -268,6 +268,26 @@ TEST_F(SpartanRecordingFaults, SkipsMissingAndDamagedImages) {
                                                FrameFault::unreadable, FrameFault::wrong_size}));
 }
 
+TEST_F(SpartanRecordingFaults, DeliversTheImageThatIsThere) {
+  std::filesystem::remove(path_ + "/images/front/2000000000_right.png");
+  folder_.write("rec/images/front/4000000000_left.png", "no image");
+  std::filesystem::remove(path_ + "/images/front/6000000000_left.png");
+  std::filesystem::remove(path_ + "/images/front/6000000000_right.png");
+  change("frames.csv", "4,-1,front,8000000000,8000000000", "4,-1,front,8000000000,8100000000");
+  std::string found;
+  for (const Sample& sample : all_samples(*open_recording(path_).value())) {
+    const auto* missing = std::get_if<MissingFrame>(&sample);
+    if (missing == nullptr) continue;
+    found += std::to_string(missing->frame_id) + ":";
+    if (!missing->partial) continue;
+    EXPECT_EQ(missing->partial->frame_id, missing->frame_id);
+    EXPECT_EQ(missing->partial->left_stamp, missing->stamp);
+    if (!missing->partial->left.empty()) found += "left";
+    if (!missing->partial->right.empty()) found += "right";
+  }
+  EXPECT_EQ(found, "1:left2:right3:4:");
+}
+
 TEST_F(SpartanRecordingFaults, DetectsReversedAndUnsynchronizedStamps) {
   change("frames.csv", "2,-1,front,4000000000,4000000000", "2,-1,front,1000000000,1000000000");
   change("frames.csv", "3,-1,front,6000000000,6000000000", "3,-1,front,6000000000,6100000000");

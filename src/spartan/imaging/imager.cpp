@@ -35,13 +35,15 @@ VirtualView virtual_view(const ViewOptions& options, const Camera& left) {
   return view;
 }
 
-/// One contrast mapping for both images, after the gain that matches the right image to the left one.
-void update_mappings(PairStage& stage, const ImagingOptions& options) {
+/// One contrast mapping for both images, after the gain that matches the right image to the left one. A missing image
+/// has no gray levels.
+void update_mappings(PairStage& stage, const ImagingOptions& options, const StereoFrame& frame) {
   stage.left_histogram.clear();
   stage.right_histogram.clear();
-  stage.left.add_to_histogram(stage.left_histogram);
-  stage.right.add_to_histogram(stage.right_histogram);
-  const double gain = options.gain_compensation ? gain_between(stage.left_histogram, stage.right_histogram) : 1;
+  if (!frame.left.empty()) stage.left.add_to_histogram(stage.left_histogram);
+  if (!frame.right.empty()) stage.right.add_to_histogram(stage.right_histogram);
+  const bool compensates = options.gain_compensation && !frame.left.empty() && !frame.right.empty();
+  const double gain = compensates ? gain_between(stage.left_histogram, stage.right_histogram) : 1;
   stage.left_histogram.add(stage.right_histogram, gain);
   stage.left_mapping.stretch(stage.left_histogram, options.contrast_low_percent, options.contrast_high_percent);
   stage.right_mapping.copy_with_gain(stage.left_mapping, gain);
@@ -85,39 +87,39 @@ struct Imager::State {
     return {};
   }
 
-  /// Runs all steps on both images and measures their durations.
+  /// Runs all steps on the images that are there and measures their durations.
   void process(PairStage& stage, const StereoFrame& frame) {
     CameraStage &left = stage.left, &right = stage.right;
+    const bool has_left = !frame.left.empty(), has_right = !frame.right.empty();
     const auto step = [&](const char* name, bool wanted, auto work) {
       if (wanted) clock.measure(name, work);
     };
-    const auto make_gray = [&] {
-      left.make_gray(frame.left, workers);
-      right.make_gray(frame.right, workers);
+    const auto each = [&](auto work) {
+      return [&, work] {
+        if (has_left) work(left, frame.left, stage.left_mapping);
+        if (has_right) work(right, frame.right, stage.right_mapping);
+      };
     };
+    const auto make_gray = each([&](CameraStage& camera, const FrameImage& image, const ContrastMapping&) {
+      camera.make_gray(image, workers);
+    });
     // A raw gray image needs no conversion, so its time is not reported.
     const bool has_colour =
         frame.left.format().layout != PixelLayout::gray || frame.right.format().layout != PixelLayout::gray;
     step("imaging.debayer", has_colour, make_gray);
     if (!has_colour) make_gray();
-    step("imaging.vignetting", left.has_vignetting() || right.has_vignetting(), [&] {
-      left.correct_vignetting(workers);
-      right.correct_vignetting(workers);
-    });
-    const auto rectify = [&] {
-      left.rectify(workers);
-      right.rectify(workers);
-    };
+    step("imaging.vignetting", left.has_vignetting() || right.has_vignetting(),
+         each([&](CameraStage& camera, auto&&...) { camera.correct_vignetting(workers); }));
+    const auto rectify = each([&](CameraStage& camera, auto&&...) { camera.rectify(workers); });
     step("imaging.rectify", left.rectifies_first(), rectify);
     step("imaging.contrast", true, [&] {
-      if (options.contrast) update_mappings(stage, options);
-      left.apply_contrast(stage.left_mapping, workers);
-      right.apply_contrast(stage.right_mapping, workers);
+      if (options.contrast) update_mappings(stage, options, frame);
+      each([&](CameraStage& camera, const FrameImage&, const ContrastMapping& mapping) {
+        camera.apply_contrast(mapping, workers);
+      })();
     });
-    step("imaging.local_contrast", left.has_local_contrast(), [&] {
-      left.equalise_locally(workers);
-      right.equalise_locally(workers);
-    });
+    step("imaging.local_contrast", left.has_local_contrast(),
+         each([&](CameraStage& camera, auto&&...) { camera.equalise_locally(workers); }));
     step("imaging.rectify", left.is_resampled() && !left.rectifies_first(), rectify);
   }
 };
@@ -145,16 +147,18 @@ Result<RectifiedPair> Imager::process(const StereoFrame& frame) {
     return failure(ErrorCode::frame_rejected, fmt::format("the rig has no stereo pair '{}'", frame.pair), where);
   }
   PairStage& stage = found->second;
-  if (Status status = stage.left.check(frame.left, where); !status) return failure(status);
-  if (Status status = stage.right.check(frame.right, where); !status) return failure(status);
+  if (frame.left.empty() && frame.right.empty())
+    return failure(ErrorCode::frame_rejected, "both images are missing", where);
+  if (Status status = stage.left.check(frame.left, where); !frame.left.empty() && !status) return failure(status);
+  if (Status status = stage.right.check(frame.right, where); !frame.right.empty() && !status) return failure(status);
   state_->process(stage, frame);
 
   const Pose body_from_camera = state_->rig.body_from_camera(stage.pair.left, frame.pan_rad, frame.tilt_rad);
   return RectifiedPair{stage.pair.name,
                        frame.left_stamp,
                        stage.plan.geometry,
-                       stage.left.result(),
-                       stage.right.result(),
+                       frame.left.empty() ? ImageView<const std::uint8_t>() : stage.left.result(),
+                       frame.right.empty() ? ImageView<const std::uint8_t>() : stage.right.result(),
                        stage.left.mask(),
                        stage.right.mask(),
                        state_->clock.take(),

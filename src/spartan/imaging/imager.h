@@ -209,8 +209,8 @@ class Imager {
   ~Imager();
 
   /// The image views of the result are valid until the next call for the same pair. Code `frame_rejected` where the
-  /// pair of the frame is unknown or an image has another size or pixel format than its camera in the rig. RGB images
-  /// of a gray camera are converted to gray.
+  /// pair of the frame is unknown, an image has another size or pixel format than its camera in the rig, or both are
+  /// missing. RGB images of a gray camera are converted to gray. Of a missing image the view is empty.
   Result<RectifiedPair> process(const StereoFrame& frame);
 
   /// Geometry of the rectified images of a pair. Throws where there is no such pair.

@@ -64,6 +64,28 @@ TEST(Imager, RejectsFramesThatContradictTheRig) {
   EXPECT_THAT(rejection(unknown), HasSubstr("no stereo pair 'mast'"));
 }
 
+TEST(Imager, ProcessesOneImageWhereTheOtherIsMissing) {
+  ImagingOptions options;
+  options.contrast_low_percent = 0;
+  options.contrast_high_percent = 100;
+  auto imager = Imager::create(rig_with({}), options, ThreadPool(1));
+  ASSERT_TRUE(imager);
+  // Half as bright, so that the gain for a whole pair is 2. Alone, both images are stretched to the full range.
+  const auto bright = FrameImage::own(ramp<std::uint8_t>(2), {}), dark = FrameImage::own(ramp<std::uint8_t>(1), {});
+  const auto left_alone = imager->process(frame_of(bright, {}));
+  ASSERT_TRUE(left_alone) << left_alone.error().message();
+  EXPECT_TRUE(left_alone->right.empty());
+  EXPECT_EQ(left_alone->left(kImageSize.width - 1, kImageSize.height - 1), 255);
+  const auto right_alone = imager->process(frame_of({}, dark));
+  ASSERT_TRUE(right_alone) << right_alone.error().message();
+  EXPECT_TRUE(right_alone->left.empty());
+  EXPECT_EQ(right_alone->right(kImageSize.width - 1, kImageSize.height - 1), 255);
+  const auto none = imager->process(frame_of({}, {}));
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::frame_rejected);
+  EXPECT_THAT(none.error().message(), HasSubstr("both images are missing"));
+}
+
 TEST(Imager, RgbImagesOfAGrayCameraBecomeGray) {
   auto imager = Imager::create(rig_with({}), {}, ThreadPool(1));
   ASSERT_TRUE(imager);

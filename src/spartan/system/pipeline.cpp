@@ -16,6 +16,10 @@ constexpr double kGravityOnEarth_m_s2 = 9.81;
 /// The newest sample of the localization is at most this old where it says how the rover has moved.
 constexpr double kLatestSample_s = 0.05;
 
+bool has_both_images(const RectifiedPair& pair) {
+  return !pair.left.empty() && !pair.right.empty();
+}
+
 }  // namespace
 
 LocalizationOptions internal::with_gravity(const RunOptions& options) {
@@ -115,7 +119,7 @@ bool Pipeline::State::terrain_is_due() const {
 
 // Whether the disparities of this frame can be computed, if terrain or the map of a stop needs them.
 Status Pipeline::State::check_disparities(const RectifiedPair& rectified) const {
-  if (!maps_stops && !maps_keyframes && !computes_terrain) return {};
+  if ((!maps_stops && !maps_keyframes && !computes_terrain) || !has_both_images(rectified)) return {};
   return StopMapper::check(rectified, pair.nearest_m);
 }
 
@@ -130,7 +134,8 @@ Result<DisparityImage> Pipeline::State::dense_disparity(const RectifiedPair& rec
 
 // Empty if the odometry computes the disparities of its landmarks itself.
 Result<DisparityImage> Pipeline::State::disparity_for_odometry(const RectifiedPair& rectified) {
-  if (options.odometry.reconstruction.source != DisparitySource::dense) return DisparityImage();
+  if (options.odometry.reconstruction.source != DisparitySource::dense || !has_both_images(rectified))
+    return DisparityImage();
   return dense_disparity(rectified);
 }
 
@@ -263,7 +268,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (Status status = s.add_odometry_frame(frame, *rectified, body_motion); !status) return failure(status);
   s.update_keyframes(*rectified, result.motion, body_motion);
 
-  if (s.terrain_is_due()) {
+  if (s.terrain_is_due() && has_both_images(*rectified)) {
     if (disparity->disparity.empty()) disparity = s.dense_disparity(*rectified);
     if (!disparity) return failure(disparity);
     s.distance_of_last_terrain_m = s.distance_m;

@@ -80,7 +80,8 @@ class Pipeline {
   void add(const CompassSample& sample);
   void add(const InclinometerSample& sample);
 
-  /// Processes one stereo frame. Only frames of the odometry pair have a result. Frames of other pairs are views of the
+  /// Processes one stereo frame. Only frames of the odometry pair have a result, and only of them one image may be
+  /// missing: the landmarks are then measured in the other one. Frames of other pairs are views of the
   /// stop whose position_id they carry; the stop is mapped when the odometry pair reports another position_id. After an
   /// error the state is as before the call: the next frame, or the same frame again, may be added.
   /// Codes: `frame_rejected` (the images do not fit the rig, the rig has no such pair, or an image equals the previous

@@ -31,6 +31,26 @@ TEST(PipelineFaults, ADarkFrameCostsNothing) {
   }
 }
 
+// A missing image: the motion is measured in the other one, and neither a map nor a view of the terrain is made.
+TEST(PipelineFaults, AMissingImageCostsLittle) {
+  for (const bool left : {false, true}) {
+    RunOptions options;
+    options.keyframes.every_m = 0.04;
+    options.terrain.every_m = 0.01;
+    Pipeline pipeline = pipeline_of(options);
+    for (int i = 0; i < 5; ++i) {
+      StereoFrame frame = frame_at(i);
+      if (i == 3) (left ? frame.left : frame.right) = {};
+      const FrameResult result = pipeline.add(frame).value().value();
+      if (i == 0) continue;
+      EXPECT_EQ(result.motion.status, i == 3 ? TrackingStatus::degraded : TrackingStatus::tracking) << i;
+      EXPECT_EQ(result.terrain.has_value(), i != 3) << i;
+      const UncertainPose& pose = result.localization->world_from_body;
+      EXPECT_LT((pose.pose.translation() - world_from_body(i).translation()).norm(), 0.003) << i;
+    }
+  }
+}
+
 // The rover turns by 46° while a dark frame is lost. Without the IMU the landmarks would not be found again.
 TEST(PipelineFaults, SensorsBridgeALostFrame) {
   constexpr double kRate_rad_s = 0.4;

@@ -30,6 +30,9 @@ std::vector<StageTime> sums_by_stage(const std::vector<StageTime>& times) {
 Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified,
                                            const RelativeMotion& motion) {
   if (!maps_stops) return {};
+  // A stop begins with a pair.
+  const bool begins = frame.position_id != stop_stage.position_id();
+  if (begins && (frame.left.empty() || frame.right.empty())) return {};
   return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
                                        localizer.estimate().world_from_body, motion);
 }
@@ -106,12 +109,13 @@ MappedStop Pipeline::State::apply(const StopSurvey& survey, MapMergeResult merge
   return {survey.position_id, survey.stamp, survey.views, survey.world_from_body, std::move(merged)};
 }
 
-// A frame whose motion is unknown is no keyframe.
+// A frame whose motion is unknown or of which an image is missing is no keyframe.
 void Pipeline::State::update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion,
                                        const RelativeMotion& body_motion) {
   if (!maps_keyframes) return;
   if (!motion.first) keyframe_stage.advance(body_motion);
-  if (motion.status == TrackingStatus::lost || !keyframe_stage.is_due(rectified, world_from_left)) return;
+  const bool usable = motion.status != TrackingStatus::lost && !rectified.left.empty() && !rectified.right.empty();
+  if (!usable || !keyframe_stage.is_due(rectified, world_from_left)) return;
   if (keyframe_stage.is_pending()) {
     keyframe_stage.hurry();
   } else {

@@ -35,7 +35,7 @@ struct FrameRecord {
   std::string pair;
   Stamp stamp;
   std::string status;     ///< name_of(TrackingStatus), or "missing"
-  std::string fault;      ///< why it is missing: name_of(FrameFault); empty otherwise
+  std::string fault;      ///< why it or one of its images is missing: name_of(FrameFault); empty otherwise
   std::string message;    ///< reason for the user to read; may be empty
   bool has_pose = false;  ///< false: `world_from_body` is predicted; no covariance
   UncertainPose world_from_body;

@@ -49,7 +49,7 @@ class SensorHead {
 };
 
 MissingFrame missing(const FrameEntry& entry, FrameFault fault, std::string message) {
-  return {entry.frame_id, entry.pair, entry.left_stamp, fault, std::move(message)};
+  return {entry.frame_id, entry.pair, entry.left_stamp, fault, std::move(message), {}};
 }
 
 // The bytes of the image files of a frame, or why a file has none (code `input`: missing, not a regular file); of a
@@ -270,7 +270,8 @@ class IndexedSource : public FrameSource {
 
   // The frame, or a MissingFrame that says why there is none. Code `resources`: no memory to decode an image.
   Result<Sample> decode(const FrameEntry& entry, const FrameFiles& files) const {
-    if (entry.fault) return missing(entry, *entry.fault, entry.message);
+    const bool not_there = entry.fault == FrameFault::left_missing || entry.fault == FrameFault::right_missing;
+    if (entry.fault && !not_there) return missing(entry, *entry.fault, entry.message);
     const StereoPair* pair = index_.info.rig.find_pair(entry.pair);
     const Camera* left_camera = index_.info.rig.find_camera(pair->left);
     const Camera* right_camera = index_.info.rig.find_camera(pair->right);
@@ -278,11 +279,17 @@ class IndexedSource : public FrameSource {
     if (files.video) return frame_of(entry, (*files.video)->left, (*files.video)->right);
     auto left = decode_image_of(entry, entry.left_file, files.left, *left_camera, FrameFault::left_missing);
     if (!left) return failure(left);
-    if (auto* fault = std::get_if<MissingFrame>(&*left)) return std::move(*fault);
     auto right = decode_image_of(entry, entry.right_file, files.right, *right_camera, FrameFault::right_missing);
     if (!right) return failure(right);
-    if (auto* fault = std::get_if<MissingFrame>(&*right)) return std::move(*fault);
-    return frame_of(entry, std::get<FrameImage>(std::move(*left)), std::get<FrameImage>(std::move(*right)));
+    auto* const left_fault = std::get_if<MissingFrame>(&*left);
+    auto* const right_fault = std::get_if<MissingFrame>(&*right);
+    if (left_fault == nullptr && right_fault == nullptr)
+      return frame_of(entry, std::get<FrameImage>(std::move(*left)), std::get<FrameImage>(std::move(*right)));
+    MissingFrame fault = left_fault != nullptr ? std::move(*left_fault) : std::move(*right_fault);
+    if (entry.fault) fault = missing(entry, *entry.fault, entry.message);
+    if (left_fault == nullptr) fault.partial = frame_of(entry, std::get<FrameImage>(std::move(*left)), {});
+    if (right_fault == nullptr) fault.partial = frame_of(entry, {}, std::get<FrameImage>(std::move(*right)));
+    return fault;
   }
 
   static StereoFrame frame_of(const FrameEntry& entry, FrameImage left, FrameImage right) {

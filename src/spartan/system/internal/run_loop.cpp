@@ -163,14 +163,14 @@ Status RunLoop::process(const Sample& sample) {
   return {};
 }
 
-Status RunLoop::process_frame(const StereoFrame& frame) {
+Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) {
   auto result = pipeline_.add(frame);
   if (!result) {
     // A frame that does not fit the rig or repeats an image is reported, counted and skipped. Any other error ends the
     // run.
     if (result.error().code != ErrorCode::frame_rejected) return failure(result);
     return process_missing(
-        {frame.frame_id, frame.pair, frame.left_stamp, pipeline_.fault_of(frame), result.error().message()});
+        {frame.frame_id, frame.pair, frame.left_stamp, pipeline_.fault_of(frame), result.error().message(), {}});
   }
   if (!*result) {
     view_times_ = take_stage_times();
@@ -184,6 +184,7 @@ Status RunLoop::process_frame(const StereoFrame& frame) {
   record.pair = output.pair;
   record.stamp = output.stamp;
   record.status = name_of(output.motion.status);
+  record.fault = fault;
   record.message = output.motion.reason;
   record.has_pose = output.motion.status != TrackingStatus::lost;
   record.world_from_body = output.world_from_body;
@@ -210,6 +211,11 @@ Status RunLoop::process_frame(const StereoFrame& frame) {
 }
 
 Status RunLoop::process_missing(const MissingFrame& missing) {
+  // Landmarks need a pair.
+  if (missing.partial && usable_frames_ > 0 && missing.pair == pipeline_.odometry_pair()) {
+    hooks_.log.warning(fmt::format("frame {}: {}; the other image is used alone", missing.frame_id, missing.message));
+    return process_frame(*missing.partial, name_of(missing.fault));
+  }
   hooks_.log.warning(
       fmt::format("frame {} skipped ({}): {}", missing.frame_id, name_of(missing.fault), missing.message));
   clock_.take();

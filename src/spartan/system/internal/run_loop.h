@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -57,7 +58,9 @@ class RunLoop {
   Status process(const Sample& sample);
   Status finish();
   Result<MapRecord> write_map_of(const MappedStop& stop);
-  Status process_frame(const StereoFrame& frame);
+  /// `fault`: of the image that is missing; empty where both are there.
+  Status process_frame(const StereoFrame& frame, std::string_view fault = {});
+  /// Of a frame with one image, the motion is measured in it.
   Status process_missing(const MissingFrame& missing);
   /// Commits a frame, with a checkpoint where one is due.
   Status commit(const RunStore::Step& step);
