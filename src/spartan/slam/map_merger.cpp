@@ -10,6 +10,8 @@ namespace spartan {
 namespace {
 
 constexpr std::uint32_t kMergerVersion = 1;
+/// Directions without information have an eigenvalue of 0, determined ones of about 1 and more.
+constexpr double kDetermined = 1e-6;
 
 Matrix6d symmetric(const Matrix6d& m) {
   return 0.5 * (m + m.transpose());
@@ -39,6 +41,20 @@ Correction updated_by_match(const UncertainPose& prior, const Pose& match, const
   return {{prior.pose * exp_se3(step),
            symmetric(jacobian_of_step * (prior.covariance - reduction) * jacobian_of_step.transpose())},
           symmetric(difference - cross - cross.transpose() + reduction)};
+}
+
+// The translation in metres of a tangent without the directions that the match determines. Directions are compared in
+// units of the largest standard deviations that count as determined.
+double undetermined_shift(const Matrix6d& information, const Vector6d& tangent, const MatchOptions& options) {
+  Vector6d unit;
+  unit << Eigen::Vector3d::Constant(options.max_sigma_m),
+      Eigen::Vector3d::Constant(options.max_sigma_deg * std::numbers::pi / 180);
+  const SymmetricEigen axes = eigen_of_symmetric(unit.asDiagonal() * information * unit.asDiagonal());
+  Vector6d rest = tangent.cwiseQuotient(unit);
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    if (axes.values[k] > kDetermined) rest -= axes.vectors.col(k).dot(rest) * axes.vectors.col(k);
+  }
+  return rest.cwiseProduct(unit).head<3>().norm();
 }
 
 // Covariance of the map under the local map: the mean of the covariances of the stops that observed it, weighted by
@@ -117,9 +133,18 @@ MapMergeResult MapMerger::match(std::span<const SurfacePoint> points, const Stam
   if (!global) return result;
   result.match =
       match_map(points, result.local, global->view, world_from_body, map_options_.min_points, options_.match, workers);
-  const MapMatch& match = result.match;
+  MapMatch& match = result.match;
   const Matrix6d of_map = map_covariance(*global, result.local, match.world_from_body);
-  const Correction update = updated_by_match(world_from_body, match.world_from_body, match.information, of_map);
+  Correction update = updated_by_match(world_from_body, match.world_from_body, match.information, of_map);
+  // A match that does not determine all directions holds near the prior only: elsewhere the ground has another height
+  // and slope. So the correction by it stays within the basin of the refinement in directions that it does not
+  // determine.
+  const Vector6d step = log_se3(world_from_body.pose.inverse() * update.corrected.pose);
+  if (match.status == MatchStatus::flat &&
+      undetermined_shift(match.information, step, options_.match) > options_.match.step_m) {
+    match.information.setZero();
+    update = updated_by_match(world_from_body, match.world_from_body, match.information, of_map);
+  }
   result.relative_covariance = update.relative;
   if (!match.information.isZero()) {
     result.constraint = PoseConstraint{stamp, match.world_from_body, match.information, of_map};

@@ -33,7 +33,7 @@ struct MapMatch {
   MatchStatus status = MatchStatus::no_overlap;
   Pose world_from_body;  ///< The best pose found; the prior pose where there is none.
   /// Inverse covariance of its right perturbation relative to the global map. Zero where the match is not accepted; for
-  /// `flat` it has the rank of the determined directions.
+  /// `flat` it has the rank of the determined directions, or is zero where it would move the pose in the others.
   Matrix6d information = Matrix6d::Zero();
   double overlap = 0;              ///< Fraction of the local map's cells that the global map has observed.
   int cells = 0, blocks = 0;       ///< Overlapping cells, and blocks of them.

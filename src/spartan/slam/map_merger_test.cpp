@@ -123,6 +123,23 @@ TEST(MapMerger, UndeterminedDirectionsKeepThePrior) {
   EXPECT_LT(std::sqrt(second->corrected.covariance(0, 0)), 0.02);
 }
 
+// The position along a slope is not what a wrong height says.
+TEST(MapMerger, AFlatMatchDoesNotMoveThePoseInUndeterminedDirections) {
+  const Ground dunes = [](double x, double y) {
+    return 0.06 * std::sin(2.1 * x) + 0.03 * std::sin(5.3 * x + 1) + 0.02 * y;
+  };
+  MapMerger merger = make_merger();
+  const Pose a = pose_on_ground(dunes, 0, 0, 0), b = pose_on_ground(dunes, 1, 0, 0);
+  ASSERT_TRUE(merger.add(points_at(dunes, a, 1), {}, {a, Matrix6d::Zero()}));
+  // 5 cm too high, which is the same as 2.5 m along the slope.
+  UncertainPose prior{Pose::from_translation({0, 0, 0.05}) * b, covariance_of(0.4, 0.01)};
+  prior.covariance(2, 2) = 4e-6;
+  const auto second = merger.add(points_at(dunes, b, 2), {}, prior);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(name_of(second->match.status), "flat");
+  EXPECT_LT(std::abs(second->corrected.pose.translation().y() - b.translation().y()), 0.05);
+}
+
 // All the tables of a store.
 Bytes bytes_of(TileStore& store) {
   ArchiveWriter out;
