@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "spartan/numerics/random.h"
 #include "spartan/odometry/internal/synthetic_drive_test.h"
@@ -91,6 +92,63 @@ TEST(OdometerFaults, SearchesLandmarksByTheMotionOfOtherSensors) {
   }
 }
 
+// Nothing is found near the predictions, and the search of the whole image has no right one.
+TEST(OdometerFaults, IsLostWhereTheRightImageOfAnotherSceneIsMissing) {
+  const SyntheticWorld world(testing::SyntheticWorldOptions{});
+  const SyntheticFrame elsewhere = world.render(kCameras, camera_at(30, 20, 0), 300);
+  Odometer odometer = after_frames(4);
+  RectifiedPair pair = pair_of(elsewhere, 4);
+  pair.right = {};
+  EXPECT_EQ(odometer.add(pair).status, TrackingStatus::lost);
+  const MotionEstimate back = odometer.add(pair_of(5));
+  EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
+  EXPECT_LT(translation_error(back, 3, 5), 0.001);
+}
+
+// Poses relative to the frame at which a drive is disturbed, composed of the motions that begin at earlier frames.
+class Chain {
+ public:
+  explicit Chain(int first) { poses_[pair_of(first).stamp.ns] = Pose(); }
+  /// first_from_current.
+  const Pose& add(const MotionEstimate& motion) {
+    return poses_[motion.to.ns] = poses_.at(motion.from.ns) * motion.previous_from_current;
+  }
+
+ private:
+  std::map<std::int64_t, Pose> poses_;
+};
+
+// Motion blur along the rows.
+Image<std::uint8_t> blurred(ImageView<const std::uint8_t> image) {
+  constexpr int kRadius = 12;
+  Image<std::uint8_t> result(image.width(), image.height());
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      int sum = 0;
+      for (int i = -kRadius; i <= kRadius; ++i) sum += image(std::clamp(x + i, 0, image.width() - 1), y);
+      result(x, y) = static_cast<std::uint8_t>(sum / (2 * kRadius + 1));
+    }
+  }
+  return result;
+}
+
+TEST(OdometerFaults, FindsSharpLandmarksAfterBlurredFrames) {
+  Odometer odometer = after_frames(4);
+  Chain chain(3);
+  for (int i = 4; i < 8; ++i) {
+    RectifiedPair pair = pair_of(i);
+    const Image<std::uint8_t> left = blurred(pair.left), right = blurred(pair.right);
+    pair.left = left;
+    pair.right = right;
+    chain.add(odometer.add(pair));
+  }
+  const MotionEstimate back = odometer.add(pair_of(8));
+  EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
+  // What was measured in the blurred frames does not matter.
+  EXPECT_LT((true_motion(3, 8).inverse() * chain.add(back)).translation().norm(), 0.002);
+  EXPECT_EQ(odometer.add(pair_of(9)).status, TrackingStatus::tracking);
+}
+
 TEST(OdometerFaults, IsLostWithoutImages) {
   Odometer odometer = after_frames(4);
   RectifiedPair pair = pair_of(4);
@@ -114,30 +172,31 @@ TEST(OdometerFaults, GoesOnFromALostFrameWhereTheOldLandmarksAreGone) {
   EXPECT_NEAR(back.previous_from_current.translation().norm(), 0.05, 0.002);
 }
 
-// Pastes a textured board into both images: 31 % of the view, nearer than the ground, its left edge at `left_px`.
-SyntheticFrame with_board(const SyntheticFrame& scene, int left_px) {
+// Pastes a textured board into both images, nearer than the ground, its left edge at `left_px`.
+SyntheticFrame with_board(const SyntheticFrame& scene, int left_px, ImageSize size = {184, 130}, int top_px = 50) {
   SyntheticFrame frame{scene.left.clone(), scene.right.clone(), scene.disparity.clone(), scene.mask.clone()};
-  constexpr int kWidth = 184, kHeight = 130, kTop = 50, kDisparity = 45, kBlob_px = 5;
+  constexpr int kDisparity = 45, kBlob_px = 5;
   Random random(11);
-  Image<float> blobs(kWidth / kBlob_px + 2, kHeight / kBlob_px + 2);
+  Image<float> blobs(size.width / kBlob_px + 2, size.height / kBlob_px + 2);
   for (int y = 0; y < blobs.height(); ++y) {
     for (int x = 0; x < blobs.width(); ++x) blobs(x, y) = static_cast<float>(random.uniform(20, 235));
   }
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
       const int i = x / kBlob_px, j = y / kBlob_px;
       const float a = static_cast<float>(x % kBlob_px) / kBlob_px, b = static_cast<float>(y % kBlob_px) / kBlob_px;
       const float upper = (1 - a) * blobs(i, j) + a * blobs(i + 1, j);
       const float lower = (1 - a) * blobs(i, j + 1) + a * blobs(i + 1, j + 1);
       const auto gray = static_cast<std::uint8_t>((1 - b) * upper + b * lower);
-      frame.left(left_px + x, kTop + y) = gray;
-      frame.right(left_px + x - kDisparity, kTop + y) = gray;
+      frame.left(left_px + x, top_px + y) = gray;
+      frame.right(left_px + x - kDisparity, top_px + y) = gray;
     }
   }
   return frame;
 }
 
-// A board keeps its distance from the rover, so that it moves in the images as no part of the ground does.
+// A board over 31 % of the view keeps its distance from the rover, so that it moves in the images as no part of the
+// ground does.
 TEST(OdometerFaults, DoesNotFollowAMovingObject) {
   constexpr int kFirst = 3;
   Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
@@ -153,6 +212,29 @@ TEST(OdometerFaults, DoesNotFollowAMovingObject) {
   EXPECT_LT(error.translation().norm(), 0.02) << "of 36 cm";
   EXPECT_LT(rotation_angle(error), 0.02);
   EXPECT_GE(warned, 4) << "of the 6 motions of the board";
+}
+
+// A board over 55 % of the view, and then nothing of the scene beside it: the motion is lost rather than that of the
+// board taken for it.
+TEST(OdometerFaults, DoesNotTrustAnObjectWithoutTheScene) {
+  const SyntheticFrame& scene = frame_of(4);
+  const SyntheticFrame dark{Image<std::uint8_t>(320, 240, 90), Image<std::uint8_t>(320, 240, 90),
+                            scene.disparity.clone(), scene.mask.clone()};
+  const auto board_on = [](const SyntheticFrame& behind, int i) {
+    return with_board(behind, 60 + 4 * (i - 4), {220, 190}, 20);
+  };
+  Odometer odometer = after_frames(4);
+  Chain chain(3);
+  chain.add(odometer.add(pair_of(board_on(scene, 4), 4)));
+  for (int i = 5; i < 7; ++i) {
+    const MotionEstimate lost = odometer.add(pair_of(board_on(dark, i), i));
+    EXPECT_EQ(lost.status, TrackingStatus::lost) << i;
+    EXPECT_THAT(lost.reason, HasSubstr("are new, and their motion was not predicted"));
+    EXPECT_LT((true_motion(3, i).inverse() * chain.add(lost)).translation().norm(), 0.01) << "by the prediction";
+  }
+  const MotionEstimate back = odometer.add(pair_of(7));
+  EXPECT_EQ(back.status, TrackingStatus::tracking) << back.reason;
+  EXPECT_LT((true_motion(3, 7).inverse() * chain.add(back)).translation().norm(), 0.002);
 }
 
 // Tiles of another frame, spread over the view: 15 % of it.

@@ -13,17 +13,10 @@
 #include "spartan/odometry/internal/landmarks/landmark.h"
 #include "spartan/odometry/internal/matching/image_pyramid.h"
 #include "spartan/odometry/internal/motion_estimator.h"
+#include "spartan/odometry/internal/motion_prediction.h"
 #include "spartan/odometry/internal/rival_motion.h"
 
 namespace spartan::internal {
-
-/// What is known of a motion before it is measured.
-struct MotionPrediction {
-  Pose motion;                        ///< previous_from_current
-  std::vector<Pose> other_starts;     ///< are tried where landmarks are not found by `motion`
-  bool from_measured_motion = false;  ///< only then a second motion that fits the prediction better is looked for
-  DisparityOffset offset;
-};
 
 struct CoarseMotion {
   Pose previous_from_current;  ///< the prediction where too few landmarks agree

@@ -40,6 +40,7 @@ float second_best(const std::vector<float>& scores, std::size_t best) {
 
 std::optional<RowAlignment> LandmarkReconstructor::reconstruct(const StereoImages& images, int x, int y) const {
   if (options_.source == DisparitySource::dense && !images.disparity.empty()) return from_dense(images, x, y);
+  if (images.right.empty()) return std::nullopt;
   const int min_disparity = static_cast<int>(std::floor(options_.min_disparity_px));
   const int max_disparity = static_cast<int>(std::lround(options_.max_disparity_fraction * images.left.width()));
   const std::optional<double> disparity = search(images, x, y, min_disparity, max_disparity);

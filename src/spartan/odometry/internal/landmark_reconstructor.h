@@ -18,7 +18,7 @@ namespace spartan::internal {
 /// The images of one rectified stereo frame; all views are borrowed.
 struct StereoImages {
   RectifiedStereo geometry;
-  ImageView<const std::uint8_t> left, right;
+  ImageView<const std::uint8_t> left, right;                 ///< one may be empty: it is missing
   ImageView<const std::uint16_t> left_smooth, right_smooth;  ///< SmoothedImage, gray levels times 256
   ImageView<const std::uint8_t> left_mask, right_mask;       ///< 255 valid; empty: everywhere
   ImageView<const float> disparity;                          ///< dense, of the left image, NaN unknown; may be empty
@@ -37,7 +37,7 @@ class LandmarkReconstructor {
   /// Disparity of a whole pixel of the left image, searched over the full range: maximum of the normalized
   /// cross-correlation along the row, with a uniqueness test and a left-right consistency check, then aligned to
   /// sub-pixel accuracy. Read from the dense disparity image instead where the options say so and there is one.
-  /// std::nullopt where a test fails.
+  /// std::nullopt where a test fails or the right image is missing.
   std::optional<RowAlignment> reconstruct(const StereoImages& images, int x, int y) const;
 
   /// Each feature with the disparity of its nearest whole pixel.

@@ -61,6 +61,8 @@ struct LandmarkFrame {
   Stamp stamp;
   LandmarkMemory map;
   ImagePyramid pyramid;
+
+  LandmarkFrame clone() const { return {stamp, map, pyramid.clone()}; }
 };
 
 }  // namespace spartan::internal

@@ -7,7 +7,7 @@
 namespace spartan::internal {
 namespace {
 
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kVersion = 5;
 constexpr const char* kWhat = "saved state of the odometry";
 
 void put(ArchiveWriter& out, const RectifiedStereo& stereo) {
@@ -153,6 +153,41 @@ std::string get(ArchiveReader& in, std::size_t bytes, LandmarkFrame& frame) {
   return {};
 }
 
+void put(ArchiveWriter& out, const MeasuredVelocity& velocity) {
+  out.put_array(velocity.motion.data(), 6);
+  out.put(velocity.span_s);
+}
+
+/// False where it is not possible.
+bool get(ArchiveReader& in, MeasuredVelocity& velocity) {
+  const std::vector<double> motion = in.get_array<double>();
+  velocity.span_s = in.get_finite();
+  if (motion.size() != 6) return false;
+  std::copy(motion.begin(), motion.end(), velocity.motion.data());
+  return velocity.motion.allFinite();
+}
+
+void put(ArchiveWriter& out, const KeptFrame& kept) {
+  put(out, kept.frame);
+  out.put(kept.reference_stamp.ns);
+  out.put(kept.kept_from_reference.pose);
+  out.put(kept.kept_from_reference.covariance);
+  out.put(kept.age);
+  out.put(kept.searches);
+}
+
+/// What is damaged; empty where nothing is.
+std::string get(ArchiveReader& in, std::size_t bytes, KeptFrame& kept) {
+  if (std::string what = get(in, bytes, kept.frame); !what.empty()) return what;
+  kept.reference_stamp = in.get_stamp();
+  kept.kept_from_reference.pose = in.get_pose();
+  kept.kept_from_reference.covariance = in.get_matrix6();
+  kept.age = in.get<std::int32_t>();
+  kept.searches = in.get<std::int32_t>();
+  return is_count(kept.age) && is_count(kept.searches) ? std::string()
+                                                       : "is damaged: the number of frames is not possible";
+}
+
 tl::unexpected<Error> damaged(const std::string& what) {
   return failure(ErrorCode::store_damaged, what, kWhat, "run again into a new folder");
 }
@@ -164,8 +199,8 @@ Bytes OdometerMemory::save() const {
   out.put(kVersion);
   out.put(started);
   put(out, geometry);
-  out.put_array(last_motion.data(), 6);
-  out.put(velocity_span_s);
+  put(out, latest_velocity);
+  put(out, steady_velocity);
   out.put(ambiguous_frames);
   out.put(offset.value);
   out.put(offset.variance);
@@ -173,6 +208,9 @@ Bytes OdometerMemory::save() const {
   out.put(frames_since_reference);
   put(out, latest);
   out.put(reference_from_latest);
+  out.put(sharpness.along_x);
+  out.put(sharpness.along_y);
+  put(out, kept);
   return out.take();
 }
 
@@ -182,20 +220,21 @@ Result<OdometerMemory> OdometerMemory::restore(const Bytes& bytes) {
   OdometerMemory memory;
   memory.started = in.get<bool>();
   memory.geometry = get_stereo(in);
-  const std::vector<double> motion = in.get_array<double>();
-  if (motion.size() != 6) return damaged("is damaged: the latest motion has not 6 entries");
-  std::copy(motion.begin(), motion.end(), memory.last_motion.data());
-  memory.velocity_span_s = in.get_finite();
+  if (!get(in, memory.latest_velocity) || !get(in, memory.steady_velocity))
+    return damaged("is damaged: the latest motion is not possible");
   memory.ambiguous_frames = in.get<std::int32_t>();
   memory.offset.value = in.get_finite();
   memory.offset.variance = in.get_finite();
-  if (!memory.last_motion.allFinite() || !is_count(memory.ambiguous_frames) || !(memory.offset.variance >= 0))
-    return damaged("is damaged: the latest motion is not possible");
+  if (!is_count(memory.ambiguous_frames) || !(memory.offset.variance >= 0))
+    return damaged("is damaged: the disparity offset or a number of frames is not possible");
   if (std::string what = get(in, bytes.size(), memory.reference); !what.empty()) return damaged(what);
   memory.frames_since_reference = in.get<std::int32_t>();
   if (!is_count(memory.frames_since_reference)) return damaged("is damaged: the number of frames is not possible");
   if (std::string what = get(in, bytes.size(), memory.latest); !what.empty()) return damaged(what);
   memory.reference_from_latest = in.get_pose();
+  memory.sharpness.along_x = in.get<float>();
+  memory.sharpness.along_y = in.get<float>();
+  if (std::string what = get(in, bytes.size(), memory.kept); !what.empty()) return damaged(what);
   if (Status status = in.finish(kWhat); !status) return failure(status);
   return memory;
 }

@@ -14,12 +14,13 @@ OdometerMemory some_memory() {
   memory.frames_since_reference = 2;
   memory.reference_from_latest = Pose::from_translation({0.1, 0, 0});
   memory.geometry = {{640, 480}, 500, {319.5, 239.5}, 0.12};
-  memory.last_motion << 1, 2, 3, 0.1, 0.2, 0.3;
-  memory.velocity_span_s = 0.1;
+  memory.latest_velocity.motion << 1, 2, 3, 0.1, 0.2, 0.3;
+  memory.latest_velocity.span_s = 0.1;
+  memory.steady_velocity = {memory.latest_velocity.motion * 0.5, 0.2};
   memory.ambiguous_frames = 2;
   memory.offset = {0.07, 0.001};
   memory.reference.map.next_anchor_id = 9;
-  memory.reference.map.anchors = {{3, exp_se3(memory.last_motion)}, {8, Pose()}};
+  memory.reference.map.anchors = {{3, exp_se3(memory.latest_velocity.motion)}, {8, Pose()}};
   for (int i = 0; i < 3; ++i) {
     Landmark l;
     l.anchor_id = i == 0 ? 3 : 8;
@@ -34,6 +35,12 @@ OdometerMemory some_memory() {
     memory.reference.map.landmarks.push_back(l);
   }
   memory.latest = {Stamp{1234567890999}, memory.reference.map, {}};
+  memory.sharpness = {120, 130};
+  memory.kept = {{Stamp{1234567880000}, memory.reference.map, {}},
+                 memory.reference.stamp,
+                 {Pose::from_translation({0, 0, 0.3}), Matrix6d::Identity()},
+                 4,
+                 2};
   return memory;
 }
 
@@ -46,6 +53,10 @@ TEST(OdometerMemory, RestoresWhatWasSaved) {
   EXPECT_EQ(restored->reference.map.landmarks[2].disparity, 6.25);
   EXPECT_EQ(restored->latest.map.landmarks.size(), 3U);
   EXPECT_EQ(restored->offset.value, 0.07);
+  EXPECT_EQ(restored->steady_velocity.span_s, 0.2);
+  EXPECT_EQ(restored->kept.frame.map.landmarks.size(), 3U);
+  EXPECT_EQ(restored->kept.kept_from_reference.pose.translation().z(), 0.3);
+  EXPECT_EQ(restored->kept.age, 4);
   EXPECT_EQ(restored->reference.map.anchor(3).latest_from_anchor.translation(),
             some_memory().reference.map.anchors[0].latest_from_anchor.translation());
 }
@@ -94,8 +105,10 @@ TEST(OdometerMemory, RejectsValuesThatAreNotPossible) {
   EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.map.landmarks[1].anchor_pixel.y() = std::nan(""); }));
   EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.map.landmarks[1].variance = -1; }));
   EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.map.landmarks[1].missed_frames = 2'147'483'647; }));
-  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.last_motion[4] = std::nan(""); }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.steady_velocity.motion[4] = std::nan(""); }));
   EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.ambiguous_frames = -1; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.kept.age = -1; }));
+  EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.kept.frame.map.landmarks[0].anchor_id = 77; }));
   EXPECT_TRUE(is_rejected([](OdometerMemory& m) { m.reference.stamp.ns = -9'223'372'036'854'775'807; }));
 }
 

@@ -67,6 +67,12 @@ void ImagePyramid::compute(ImageView<const std::uint16_t> smooth) {
   add_margin(eighth_, kMargin, levels_[1]);
 }
 
+ImagePyramid ImagePyramid::clone() const {
+  ImagePyramid copy;
+  for (int i = 0; i < kLevels; ++i) copy.set_level(i, levels_[static_cast<std::size_t>(i)].clone());
+  return copy;
+}
+
 std::optional<Eigen::Vector2d> find_in_pyramid(const ImagePyramid& previous, const ImagePyramid& current,
                                                const Eigen::Vector2d& previous_px, const Eigen::Matrix2d& warp,
                                                const Eigen::Vector2d& predicted_px, double min_correlation) {

@@ -22,6 +22,8 @@ class ImagePyramid {
   /// From an image that is already smoothed by the same filter.
   void compute(ImageView<const std::uint16_t> smooth);
   ImageView<const std::uint16_t> level(int i) const { return levels_[static_cast<std::size_t>(i)]; }
+  /// A copy of the levels.
+  ImagePyramid clone() const;
   /// Replaces a level, to restore a saved pyramid.
   void set_level(int i, Image<std::uint16_t> pixels) { levels_[static_cast<std::size_t>(i)] = std::move(pixels); }
 

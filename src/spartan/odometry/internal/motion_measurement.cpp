@@ -1,0 +1,177 @@
+#include "spartan/odometry/internal/motion_measurement.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "spartan/core/stage_clock.h"
+
+namespace spartan::internal {
+namespace {
+
+/// Wrong matches, uniformly distributed over the search radius r, have an rms of r/2 in each coordinate; a fit to few
+/// of them lowers it. Empirical.
+constexpr double kChanceRadiusFraction = 0.25;
+/// Wrong matches are not more than this fraction of the landmarks; empirical.
+constexpr double kChanceFraction = 0.1;
+/// Of the established landmarks that are in view, at least this fraction follows the motion of the scene; empirical.
+constexpr double kMinAgreeingFraction = 0.25;
+/// A motion that this fraction of all landmarks follows is not that of an object; empirical.
+constexpr double kMinUndisputedFraction = 0.4;
+
+/// Mean image flow in pixels that a motion causes at the inlier landmarks.
+double mean_flow(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit) {
+  const Pose current_from_previous = fit.previous_from_current.inverse();
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!fit.inlier[i]) continue;
+    const auto previous = project_anchored(stereo, matches[i].point, matches[i].previous_from_anchor);
+    const auto current =
+        project_anchored(stereo, matches[i].point, current_from_previous * matches[i].previous_from_anchor);
+    if (!previous || !current) continue;
+    sum += (current->measured - previous->measured).head<2>().norm();
+    ++count;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+/// Number of established landmarks that a motion predicts inside of the left image.
+int established_in_view(const RectifiedStereo& stereo, const LandmarkMemory& map, const Pose& previous_from_current) {
+  const Pose current_from_previous = previous_from_current.inverse();
+  int count = 0;
+  for (const Landmark& landmark : map.landmarks) {
+    if (!is_established(landmark)) continue;
+    const auto p = project_anchored(stereo, {landmark.anchor_pixel, landmark.disparity},
+                                    current_from_previous * map.anchor(landmark.anchor_id).latest_from_anchor);
+    count += p && p->measured.x() > 0 && p->measured.x() < stereo.size.width && p->measured.y() > 0 &&
+             p->measured.y() < stereo.size.height;
+  }
+  return count;
+}
+
+/// Moves the landmarks that follow the object from the matches to `on_object`.
+std::vector<LandmarkMatch> without_object(const RectifiedStereo& stereo, std::vector<LandmarkMatch> matches,
+                                          const Pose& scene, const Pose& object, std::vector<std::size_t>& on_object) {
+  const std::vector<bool> follows = follows_object(stereo, matches, scene, object);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (follows[i]) {
+      on_object.push_back(matches[i].landmark);
+    } else {
+      matches[kept++] = matches[i];
+    }
+  }
+  matches.resize(kept);
+  return matches;
+}
+
+}  // namespace
+
+/// Whether few landmarks scatter about the motion as wrong matches would, which lie anywhere within the search radius.
+bool MotionMeasurer::may_be_by_chance(const MotionFit& fit, std::size_t landmarks) const {
+  const double few =
+      std::max<double>(options_.motion.min_tracking_inliers, kChanceFraction * static_cast<double>(landmarks));
+  return options_.matching.correlation && fit.inliers < few &&
+         fit.rms_px > kChanceRadiusFraction * options_.matching.correlation_radius_px;
+}
+
+/// Why a motion may be that of an object that has come into view: it was not predicted, and established landmarks that
+/// should be in view do not follow it. Empty otherwise.
+std::string MotionMeasurer::doubt_of_age(const RectifiedStereo& stereo, const LandmarkMemory& map,
+                                         const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
+                                         const MotionPrediction& prediction) const {
+  if (!prediction.from_measured_motion || !is_of_young_landmarks(matches, fit)) return {};
+  const int expected = established_in_view(stereo, map, fit.previous_from_current);
+  int agreeing = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) agreeing += fit.inlier[i] && matches[i].established;
+  if (expected < options_.motion.min_inliers || agreeing >= kMinAgreeingFraction * expected) return {};
+  std::vector<Pose> starts = prediction.other_starts;
+  starts.push_back(prediction.motion);
+  for (const Pose& start : starts)
+    if (is_as_predicted(stereo, matches, fit, start)) return {};
+  return fmt::format("most of the {} landmarks that agree are new, and their motion was not predicted", fit.inliers);
+}
+
+void MotionMeasurer::decide_status(const RectifiedStereo& stereo, const std::string& doubt,
+                                   MotionMeasurement& measured) const {
+  const MotionFit& fit = measured.fit;
+  const std::vector<LandmarkMatch>& matches = measured.kept;
+  measured.previous_from_current = {fit.previous_from_current, fit.covariance};
+  measured.status = TrackingStatus::degraded;
+  if (fit.inliers < options_.motion.min_tracking_inliers) {
+    measured.reason = fmt::format("only {} landmarks agree on the motion", fit.inliers);
+    return;
+  }
+  if (2 * fit.inliers < static_cast<int>(matches.size())) {
+    measured.reason = fmt::format("only {} of {} matches agree on the motion", fit.inliers, matches.size());
+    return;
+  }
+  int both = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) both += fit.inlier[i] && matches[i].cameras == MeasuredIn::both;
+  if (2 * both < fit.inliers) {
+    measured.reason = fmt::format("only {} of {} landmarks are seen by both cameras", both, fit.inliers);
+    return;
+  }
+  if (!doubt.empty()) {
+    measured.reason = doubt;
+    return;
+  }
+  measured.status = TrackingStatus::tracking;
+  if (!options_.stationary.detect) return;
+  const double flow = mean_flow(stereo, matches, fit);
+  if (flow > options_.stationary.max_flow_px) return;
+  // The anchors are not moved while the rover is stationary, so a slow creep accumulates until it exceeds the limit.
+  measured.status = TrackingStatus::stationary;
+  measured.reason = fmt::format("the image has shifted by {:.2f} px", flow);
+  measured.previous_from_current.pose = Pose();
+}
+
+MotionMeasurement MotionMeasurer::measure(const LandmarkFrame& previous, const StereoImages& images,
+                                          const ImagePyramid& pyramid, ImageSide side,
+                                          const MotionPrediction& prediction, bool trusts_new) {
+  Stopwatch watch;
+  MotionMeasurement measured;
+  const std::size_t landmarks = previous.map.landmarks.size();
+  CoarseMotion start = coarse_.estimate(previous, images, pyramid, side, prediction);
+  const Pose& motion = start.previous_from_current;
+  std::vector<LandmarkMatch>& matches = measured.kept;
+  matches = options_.matching.correlation ? matcher_.by_correlation(previous.map, images, motion.inverse(), side)
+                                          : start.matches;
+  if (start.object) {
+    without_object(images.geometry, start.matches, motion, *start.object, measured.on_object);
+    matches = without_object(images.geometry, std::move(matches), motion, *start.object, measured.on_object);
+  }
+  if (options_.matching.rigidity) matches = keep_rigid(images.geometry, std::move(matches));
+  add_noise_floor(options_.motion, images.geometry, motion, matches);
+  measured.matches = static_cast<int>(matches.size());
+  measured.times.match = watch.lap();
+
+  std::optional<MotionFit> fit = estimator_.fine(images.geometry, matches, motion, prediction.offset);
+  measured.times.estimate = watch.lap();
+  if (!fit || fit->inliers < options_.motion.min_inliers || may_be_by_chance(*fit, landmarks)) {
+    measured.reason = fmt::format("{} landmarks, {} matches, {} agree on a motion", landmarks, matches.size(),
+                                  fit ? fit->inliers : 0);
+    return measured;
+  }
+  const bool undisputed = fit->inliers >= kMinUndisputedFraction * static_cast<double>(landmarks);
+  if (undisputed && !start.object) start.doubt.clear();
+  if (!start.object) {
+    std::string by_age = doubt_of_age(images.geometry, previous.map, matches, *fit, prediction);
+    measured.untrusted = !by_age.empty() && !trusts_new;
+    if (!by_age.empty()) start.doubt = std::move(by_age);
+    if (measured.untrusted) {
+      measured.reason = std::move(start.doubt);
+      return measured;
+    }
+  }
+  measured.ambiguous = !start.doubt.empty() && !start.object;
+  measured.fit = *std::move(fit);
+  measured.features = std::move(start.features);
+  measured.feature_of = std::move(start.feature_of);
+  decide_status(images.geometry, start.doubt, measured);
+  return measured;
+}
+
+}  // namespace spartan::internal
