@@ -3,7 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+
+#include "spartan/odometry/internal/matching/projected_jacobian.h"
 
 namespace spartan::internal {
 namespace {
@@ -35,8 +36,6 @@ constexpr double kMaxSlantX = 0.8, kMaxSlantY = 1.5;
 /// Weight of a step of the slant against one of the position in the convergence test: about the extent of the window.
 constexpr double kSlantLever_px = 3;
 
-/// A function whose square is smaller than this fraction after the others are removed depends on them.
-constexpr float kMinIndependent = 1e-4f;
 /// Windows keep this distance from the border of the image, so that rounding of their places does not pass it.
 constexpr double kBorder_px = 0.01;
 
@@ -54,95 +53,6 @@ std::optional<WindowPlace> place_of(ImageView<const std::uint16_t> image, const 
                      a(1, 1)};
 }
 
-Window negative(Window window) {
-  for (float& value : window.values) value = -value;
-  return window;
-}
-
-/// Derivative of the template by its scale.
-Window by_scale(const AlignmentTemplate& reference) {
-  Window derivative = times_offset_x(reference.along_x);
-  const Window along_y = times_offset_y(reference.along_y);
-  for (std::size_t i = 0; i < derivative.values.size(); ++i) derivative.values[i] += along_y.values[i];
-  return derivative;
-}
-
-/// A linear combination of windows that an image may contain beside its template. Its basis is orthonormal under the
-/// weights of the window; of each function the product with the weights is kept.
-class NuisanceBasis {
- public:
-  /// Planes of brightness and multiples of the template.
-  explicit NuisanceBasis(const AlignmentTemplate& reference) {
-    const auto& planes = brightness_planes();
-    std::copy(planes.begin(), planes.end(), windows_.begin());
-    count_ = planes.size();
-    add(reference.value);
-  }
-
-  /// Nothing is added where the window is a combination of the others.
-  void add(Window window) {
-    Window centred;
-    weighted(window, centred);
-    const float before = dot(window, centred);
-    remove_from(window, centred);
-    const float square = dot(window, centred);
-    if (!(square > kMinIndependent * before)) return;
-    for (float& value : window.values) value /= std::sqrt(square);
-    windows_[count_++] = window;
-  }
-
-  /// Makes a window orthogonal to the basis; `centred` holds it without the weights.
-  void remove_from(Window& window, const Window& centred) const {
-    for (std::size_t k = 0; k < count_; ++k) {
-      const float share = dot(windows_[k], centred);
-      for (std::size_t i = 0; i < window.values.size(); ++i) window.values[i] -= share * windows_[k].values[i];
-    }
-  }
-
- private:
-  static const std::array<Window, 2>& brightness_planes() {
-    static const std::array<Window, 2> planes = [] {
-      std::array<Window, 2> p{times_offset_x(window_weights()), times_offset_y(window_weights())};
-      // Σ w x² = Σ w y².
-      const Window square = times_offset_x(p[0]);
-      const float norm = std::sqrt(std::accumulate(square.values.begin(), square.values.end(), 0.0f));
-      for (Window& plane : p)
-        for (float& value : plane.values) value /= norm;
-      return p;
-    }();
-    return planes;
-  }
-
-  std::array<Window, 4> windows_;  // two planes, the template and one that is added
-  std::size_t count_ = 0;
-};
-
-/// Alignment by Gauss-Newton whose Jacobian is that of the template: Σ wJᵀJ and its derivatives by the image.
-template <int Unknowns>
-struct Linearization {
-  static_assert(Unknowns + 1 >= kMinFactors && Unknowns + 1 <= kMaxFactors);
-  /// The template and the columns of the Jacobian without their weighted means and without `nuisance`, multiplied by
-  /// the weights: what an image contains of the nuisance does not move the result.
-  std::array<Window, static_cast<std::size_t>(Unknowns) + 1> factors;
-  Eigen::Matrix<double, Unknowns, Unknowns> information;
-
-  Linearization(const AlignmentTemplate& reference, const std::array<Window, static_cast<std::size_t>(Unknowns)>& j,
-                const NuisanceBasis& nuisance) {
-    std::array<Window, static_cast<std::size_t>(Unknowns)> centred;
-    factors[0] = reference.weighted_value;
-    for (std::size_t a = 0; a < j.size(); ++a) {
-      factors[a + 1] = j[a];
-      weighted(factors[a + 1], centred[a]);
-      nuisance.remove_from(factors[a + 1], centred[a]);
-      const auto row = static_cast<Eigen::Index>(a);
-      for (std::size_t b = 0; b <= a; ++b) {
-        const auto column = static_cast<Eigen::Index>(b);
-        information(row, column) = information(column, row) = dot(factors[a + 1], centred[b]);
-      }
-    }
-  }
-};
-
 /// Difference of an image window to a template, after matching mean and contrast.
 template <int Unknowns>
 struct WindowDifference {
@@ -153,12 +63,12 @@ struct WindowDifference {
 /// std::nullopt where the window leaves the image or has no texture.
 template <int Unknowns>
 std::optional<WindowDifference<Unknowns>> difference_from(const AlignmentTemplate& reference,
-                                                          const Linearization<Unknowns>& linear,
+                                                          const ProjectedJacobian& jacobian,
                                                           ImageView<const std::uint16_t> image,
                                                           const Eigen::Matrix2d& warp, const Eigen::Vector2d& centre) {
   const std::optional<WindowPlace> place = place_of(image, warp, centre);
   if (!place) return std::nullopt;
-  const WindowSums sums = window_sums(*place, reference.level, linear.factors.data(), Unknowns + 1);
+  const WindowSums sums = window_sums(*place, reference.level, jacobian.factors.data(), Unknowns + 1);
   const float deviation = std::sqrt(std::max(0.0f, sums.square - sums.mean * sums.mean));
   if (deviation < kMinDeviation) return std::nullopt;
   const double contrast = reference.deviation / deviation;
@@ -182,10 +92,10 @@ std::optional<ImagePatch> cut_patch(ImageView<const std::uint16_t> image, int x,
   return patch;
 }
 
-AlignmentTemplate::AlignmentTemplate(const WindowGradients& gradients)
-    : weighted_value(gradients.value), along_x(gradients.along_x), along_y(gradients.along_y) {
-  level = weighted(weighted_value, value);
-  deviation = std::sqrt(dot(weighted_value, value));
+AlignmentTemplate::AlignmentTemplate(const WindowGradients& gradients) : window(gradients) {
+  const WindowStatistics statistics = subtract_mean(window.value);
+  level = statistics.mean;
+  deviation = std::sqrt(statistics.variance);
 }
 
 AlignmentTemplate::AlignmentTemplate(const ImagePatch& patch)
@@ -209,16 +119,14 @@ std::optional<PatchAlignment> align_translation(const AlignmentTemplate& referen
   if (reference.deviation < kMinDeviation || !(std::abs(warp.determinant()) > kMinWarpDeterminant)) return std::nullopt;
   // At the solution ∇image = warp⁻ᵀ ∇template, so the Jacobian is computed once, from the template.
   const Eigen::Matrix2d to_image = warp.inverse().transpose();
-  NuisanceBasis nuisance(reference);
-  nuisance.add(by_scale(reference));
-  const Linearization<2> linear(reference, {reference.along_x, reference.along_y}, nuisance);
-  const Eigen::Matrix2d information = to_image * linear.information * to_image.transpose();
+  const ProjectedJacobian jacobian(reference.window, AlignmentUnknowns::position);
+  const Eigen::Matrix2d information = to_image * jacobian.information.topLeftCorner<2, 2>() * to_image.transpose();
   if (!(information.determinant() > kMinDeterminant)) return std::nullopt;
   const Eigen::Matrix2d inverse = information.inverse();
 
   Eigen::Vector2d position = start;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    const auto difference = difference_from(reference, linear, image, warp, position);
+    const auto difference = difference_from<2>(reference, jacobian, image, warp, position);
     if (!difference) return std::nullopt;
     const Eigen::Vector2d step = -(inverse * (to_image * difference->gradient));
     position += step;
@@ -240,11 +148,8 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, 
                                             bool estimate_slant, double radius_px) {
   if (reference.deviation < kMinDeviation) return std::nullopt;
   // right(x − d − s·offset) ≈ template(x): the derivative by d is −∂x, by the slant −offset ∂x.
-  const Linearization<3> linear(reference,
-                                {negative(reference.along_x), negative(times_offset_x(reference.along_x)),
-                                 negative(times_offset_y(reference.along_x))},
-                                NuisanceBasis(reference));
-  Eigen::Matrix3d information = linear.information;
+  const ProjectedJacobian jacobian(reference.window, AlignmentUnknowns::disparity_and_slant);
+  Eigen::Matrix3d information = jacobian.information.topLeftCorner<3, 3>();
   if (!(information(0, 0) > kMinInformation)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / kEffectivePixels;
   information(1, 1) += prior;
@@ -259,7 +164,7 @@ std::optional<RowAlignment> align_along_row(const AlignmentTemplate& reference, 
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     Eigen::Matrix2d warp;
     warp << 1 - x[1], -x[2], 0, 1;
-    const auto difference = difference_from(reference, linear, right, warp, centre - Eigen::Vector2d(x[0], 0));
+    const auto difference = difference_from<3>(reference, jacobian, right, warp, centre - Eigen::Vector2d(x[0], 0));
     if (!difference) return std::nullopt;
     Eigen::Vector3d gradient = difference->gradient;
     gradient[1] += prior * (x[1] - start.slant.x());
@@ -287,11 +192,8 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference
                                               const Eigen::Vector2d& start, double radius_px) {
   if (reference.deviation < kMinDeviation) return std::nullopt;
   // right(c + (ox − s·o, oy)) ≈ template: the derivative by c is the gradient, by the slant −offset ∂x.
-  const Linearization<4> linear(reference,
-                                {reference.along_x, reference.along_y, negative(times_offset_x(reference.along_x)),
-                                 negative(times_offset_y(reference.along_x))},
-                                NuisanceBasis(reference));
-  Eigen::Matrix4d information = linear.information;
+  const ProjectedJacobian jacobian(reference.window, AlignmentUnknowns::position_and_slant);
+  Eigen::Matrix4d information = jacobian.information;
   if (!(information.topLeftCorner<2, 2>().determinant() > kMinDeterminant)) return std::nullopt;
   const double prior = kSlantPrior * kNoiseCorrelation / kEffectivePixels;
   information(2, 2) += prior;
@@ -302,7 +204,7 @@ std::optional<SlantedAlignment> align_slanted(const AlignmentTemplate& reference
   for (int iteration = 0; iteration < 2 * kMaxIterations; ++iteration) {
     Eigen::Matrix2d warp;
     warp << 1 - x[2], -x[3], 0, 1;
-    const auto difference = difference_from(reference, linear, right, warp, x.head<2>());
+    const auto difference = difference_from<4>(reference, jacobian, right, warp, x.head<2>());
     if (!difference) return std::nullopt;
     Eigen::Vector4d gradient = difference->gradient;
     gradient.tail<2>() += prior * x.tail<2>();

@@ -25,9 +25,7 @@ struct AlignmentTemplate {
   /// Around a sub-pixel position of a smoothed image; std::nullopt where the window leaves the image.
   static std::optional<AlignmentTemplate> around(ImageView<const std::uint16_t> image, const Eigen::Vector2d& centre);
 
-  Window value;           ///< gray levels without their weighted mean `level`
-  Window weighted_value;  ///< `value` multiplied by the weights of the window
-  Window along_x, along_y;
+  WindowGradients window;          ///< gray levels without their weighted mean `level`
   float level = 0, deviation = 0;  ///< weighted mean and standard deviation
 
  private:

@@ -136,27 +136,24 @@ WindowGradients gradients(const WindowPlace& place) {
   return g;
 }
 
-float dot_of(const Window& a, const Window& b) {
+WindowStatistics without_mean(Window& window) {
   const Floats d;
-  auto sum = hn::Zero(d);
-  for (std::size_t i = 0; i < a.values.size(); i += hn::Lanes(d))
-    sum = hn::MulAdd(hn::Load(d, a.values.data() + i), hn::Load(d, b.values.data() + i), sum);
-  return hn::GetLane(hn::SumOfLanes(d, sum));
-}
-
-float weigh(Window& window, Window& centred) {
-  const Floats d;
-  const Window& weights = window_weights();
-  const float mean = dot_of(window, weights);
-  const auto subtracted = hn::Set(d, mean);
+  const float* const weights = window_weights().values.data();
+  float* const values = window.values.data();
+  WindowStatistics statistics;
+  auto sum = hn::Zero(d), squares = hn::Zero(d);
+  for (std::size_t i = 0; i < window.values.size(); i += hn::Lanes(d))
+    sum = hn::MulAdd(hn::Load(d, weights + i), hn::Load(d, values + i), sum);
+  statistics.mean = hn::GetLane(hn::SumOfLanes(d, sum));
+  const auto mean = hn::Set(d, statistics.mean);
   for (std::size_t i = 0; i < window.values.size(); i += hn::Lanes(d)) {
-    const auto weight = hn::Load(d, weights.values.data() + i);
-    const auto value =
-        hn::IfThenElseZero(hn::Gt(weight, hn::Zero(d)), hn::Sub(hn::Load(d, window.values.data() + i), subtracted));
-    hn::Store(value, d, centred.values.data() + i);
-    hn::Store(hn::Mul(weight, value), d, window.values.data() + i);
+    const auto weight = hn::Load(d, weights + i);
+    const auto value = hn::IfThenElseZero(hn::Gt(weight, hn::Zero(d)), hn::Sub(hn::Load(d, values + i), mean));
+    hn::Store(value, d, values + i);
+    squares = hn::MulAdd(hn::Mul(weight, value), value, squares);
   }
-  return mean;
+  statistics.variance = hn::GetLane(hn::SumOfLanes(d, squares));
+  return statistics;
 }
 
 }  // namespace spartan::internal::HWY_NAMESPACE
@@ -186,8 +183,7 @@ const Window& window_weights() {
 
 HWY_EXPORT(sums);
 HWY_EXPORT(gradients);
-HWY_EXPORT(dot_of);
-HWY_EXPORT(weigh);
+HWY_EXPORT(without_mean);
 
 WindowSums window_sums(const WindowPlace& place, float level, const Window* factors, int count) {
   return HWY_DYNAMIC_DISPATCH(sums)(place, level, factors, count);
@@ -197,35 +193,8 @@ WindowGradients window_gradients(const WindowPlace& place) {
   return HWY_DYNAMIC_DISPATCH(gradients)(place);
 }
 
-float weighted(Window& window, Window& centred) {
-  return HWY_DYNAMIC_DISPATCH(weigh)(window, centred);
-}
-
-float dot(const Window& a, const Window& b) {
-  return HWY_DYNAMIC_DISPATCH(dot_of)(a, b);
-}
-
-Window times_offset_x(const Window& window) {
-  Window product;
-  for (int y = 0; y < kWindowSide; ++y) {
-    for (int x = 0; x < kWindowSide; ++x) {
-      const auto at = static_cast<std::size_t>(y * kWindowStride + x);
-      product.values[at] = window.values[at] * static_cast<float>(x - kWindowRadius);
-    }
-  }
-  return product;
-}
-
-Window times_offset_y(const Window& window) {
-  Window product;
-  for (int y = 0; y < kWindowSide; ++y) {
-    const auto offset = static_cast<float>(y - kWindowRadius);
-    for (int x = 0; x < kWindowSide; ++x) {
-      const auto at = static_cast<std::size_t>(y * kWindowStride + x);
-      product.values[at] = window.values[at] * offset;
-    }
-  }
-  return product;
+WindowStatistics subtract_mean(Window& window) {
+  return HWY_DYNAMIC_DISPATCH(without_mean)(window);
 }
 
 }  // namespace spartan::internal

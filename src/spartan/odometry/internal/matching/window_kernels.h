@@ -51,15 +51,11 @@ struct WindowGradients {
 /// Of the window in an image. The pixels around it must lie in the image as well.
 WindowGradients window_gradients(const WindowPlace& place);
 
-/// Subtracts the weighted mean, which is returned, and multiplies by the weights. `centred`
-/// keeps the values before the multiplication.
-float weighted(Window& window, Window& centred);
-
-/// Σ a b over the window.
-float dot(const Window& a, const Window& b);
-
-/// The window multiplied by the offset along x (or y) of each pixel.
-Window times_offset_x(const Window& window);
-Window times_offset_y(const Window& window);
+/// Mean and variance of a window under its weights.
+struct WindowStatistics {
+  float mean = 0, variance = 0;
+};
+/// Subtracts the weighted mean.
+WindowStatistics subtract_mean(Window& window);
 
 }  // namespace spartan::internal
