@@ -98,10 +98,7 @@ AlignmentTemplate::AlignmentTemplate(const WindowGradients& gradients) : window(
   deviation = std::sqrt(statistics.variance);
 }
 
-AlignmentTemplate::AlignmentTemplate(const ImagePatch& patch)
-    : AlignmentTemplate(
-          window_gradients({ImageView<const std::uint16_t>(patch.data(), kWindowStride, kWindowStride, kWindowStride),
-                            kWindowRadius + 1, kWindowRadius + 1})) {}
+AlignmentTemplate::AlignmentTemplate(const ImagePatch& patch) : AlignmentTemplate(patch_gradients(patch.data())) {}
 
 std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::uint16_t> image,
                                                            const Eigen::Vector2d& centre) {

@@ -1,5 +1,6 @@
 #include "spartan/odometry/internal/matching/window_kernels.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -31,44 +32,102 @@ HWY_INLINE hn::Vec<Integers> gather_pairs(Integers d, const std::uint16_t* pixel
 #endif
 }
 
+/// Neighbouring pixels of an image row as pairs: from a pixel on, as many as two vectors hold.
+struct PairTable {
+  hn::Vec<Integers> even, odd;  // pairs that begin with pixel 0, 2, … and 1, 3, …
+
+  HWY_INLINE explicit PairTable(const std::uint16_t* pixels) {
+    const Integers d;
+    even = hn::LoadU(d, reinterpret_cast<const std::int32_t*>(pixels));
+    odd = hn::LoadU(d, reinterpret_cast<const std::int32_t*>(pixels + 1));
+  }
+  HWY_INLINE hn::Vec<Integers> at(hn::Vec<Integers> pixel) const {
+    const Integers d;
+    const auto half = hn::IndicesFromVec(d, hn::ShiftRight<1>(pixel));
+    const auto is_odd = hn::TestBit(pixel, hn::Set(d, 1));
+    return hn::IfThenElse(is_odd, hn::TableLookupLanes(odd, half), hn::TableLookupLanes(even, half));
+  }
+};
+
 /// Interpolates one row of a window or of a patch: columns `first` to `first` + lanes, of which those behind `last`
 /// repeat it.
-struct RowSampler {
-  const Floats d;
-  const WindowPlace& place;
-  Values from_x, from_y;
-  std::int32_t stride;
-
+class RowSampler {
+ public:
   HWY_INLINE RowSampler(const WindowPlace& p, int radius, int first)
-      : place(p), stride(static_cast<std::int32_t>(p.image.stride())) {
+      : place_(p),
+        stride_(static_cast<std::int32_t>(p.image.stride())),
+        level_(p.yx == 0),
+        has_tables_(kTables && p.image.width() > kTablePixels && p.image.height() >= 3) {
+    const Floats d;
     const auto column =
         hn::Sub(hn::Min(hn::Iota(d, static_cast<float>(first)), hn::Set(d, static_cast<float>(2 * radius))),
                 hn::Set(d, static_cast<float>(radius)));
-    from_x = hn::MulAdd(column, hn::Set(d, p.xx), hn::Set(d, p.x));
-    from_y = hn::MulAdd(column, hn::Set(d, p.yx), hn::Set(d, p.y));
+    from_x_ = hn::MulAdd(column, hn::Set(d, p.xx), hn::Set(d, p.x));
+    from_y_ = hn::MulAdd(column, hn::Set(d, p.yx), hn::Set(d, p.y));
   }
 
   HWY_INLINE Values row(int offset) const {
+    const Floats d;
     const Integers integers;
-    const auto x = hn::Add(from_x, hn::Set(d, place.xy * static_cast<float>(offset))),
-               y = hn::Add(from_y, hn::Set(d, place.yy * static_cast<float>(offset)));
+    const auto x = hn::Add(from_x_, hn::Set(d, place_.xy * static_cast<float>(offset))),
+               y = hn::Add(from_y_, hn::Set(d, place_.yy * static_cast<float>(offset)));
     const auto ix = hn::ConvertTo(integers, x), iy = hn::ConvertTo(integers, y);
     const auto fx = hn::Sub(x, hn::ConvertTo(d, ix)), fy = hn::Sub(y, hn::ConvertTo(d, iy));
-    const auto index = hn::Add(hn::Mul(iy, hn::Set(integers, stride)), ix);
-    const auto top = interpolate(gather_pairs(integers, place.image.row(0), index), fx);
-    const auto bottom =
-        interpolate(gather_pairs(integers, place.image.row(0), hn::Add(index, hn::Set(integers, stride))), fx);
+    const Lines lines = lines_at(ix, iy);
+    const auto top = interpolate(lines.top, fx), bottom = interpolate(lines.bottom, fx);
     return hn::Mul(hn::MulAdd(fy, hn::Sub(bottom, top), top), hn::Set(d, kLevel));
   }
 
  private:
+  /// Gathering is slower than looking up in vectors, where they look up by lanes of 32 bits.
+  static constexpr bool kTables = HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2;
+  static constexpr int kTablePixels = 2 * static_cast<int>(hn::MaxLanes(Integers()));
+
+  /// The pairs of pixels above and below each place.
+  struct Lines {
+    hn::Vec<Integers> top, bottom;
+  };
+
+  HWY_INLINE Lines lines_at(hn::Vec<Integers> ix, hn::Vec<Integers> iy) const {
+    const Integers d;
+    if (has_tables_) {
+      const int column = std::min(hn::GetLane(ix), place_.image.width() - kTablePixels - 1);
+      int line = hn::GetLane(iy);
+      if (!level_) line = std::clamp(line - (place_.yx < 0 ? 1 : 0), 0, place_.image.height() - 3);
+      const auto right = hn::Sub(ix, hn::Set(d, column)), down = hn::Sub(iy, hn::Set(d, line));
+      const auto outside =
+          hn::Or(hn::AndNot(hn::Set(d, kTablePixels - 1), right), hn::AndNot(hn::Set(d, level_ ? 0 : 1), down));
+      if (hn::AllTrue(d, hn::Eq(outside, hn::Zero(d)))) return lines_of_tables(column, line, right, down);
+    }
+    const std::uint16_t* const pixels = place_.image.row(0);
+    const auto index = hn::Add(hn::Mul(iy, hn::Set(d, stride_)), ix);
+    return {gather_pairs(d, pixels, index), gather_pairs(d, pixels, hn::Add(index, hn::Set(d, stride_)))};
+  }
+
+  HWY_INLINE Lines lines_of_tables(int column, int line, hn::Vec<Integers> right, hn::Vec<Integers> down) const {
+    const Integers d;
+    const std::uint16_t* const pixels = place_.image.row(line) + column;
+    const auto first = PairTable(pixels).at(right), second = PairTable(pixels + stride_).at(right);
+    if (level_) return {first, second};
+    const auto third = PairTable(pixels + 2 * stride_).at(right);
+    const auto upper = hn::Eq(down, hn::Zero(d));
+    return {hn::IfThenElse(upper, first, second), hn::IfThenElse(upper, second, third)};
+  }
+
   HWY_INLINE Values interpolate(hn::Vec<Integers> pairs, Values fraction) const {
+    const Floats d;
     const Integers integers;
     const hn::RebindToUnsigned<Integers> bits;
     const auto left = hn::ConvertTo(d, hn::And(pairs, hn::Set(integers, 0xFFFF)));
     const auto right = hn::ConvertTo(d, hn::BitCast(integers, hn::ShiftRight<16>(hn::BitCast(bits, pairs))));
     return hn::MulAdd(fraction, hn::Sub(right, left), left);
   }
+
+  const WindowPlace& place_;
+  Values from_x_, from_y_;
+  std::int32_t stride_;
+  bool level_;       // the rows of the window are rows of the image
+  bool has_tables_;  // the image is large enough for them
 };
 
 template <int kCount>
@@ -105,6 +164,17 @@ WindowSums sums(const WindowPlace& place, float level, const Window* factors, in
   return sums_with<5>(place, level, factors);
 }
 
+/// Stores values and half the differences of their neighbours; 0 behind the window.
+HWY_INLINE void store_gradients(WindowGradients& g, int row, int first, Values value, Values along_x, Values along_y) {
+  const Floats d;
+  const std::size_t at = static_cast<std::size_t>(row * kWindowStride + first);
+  const auto inside = hn::Lt(hn::Iota(d, static_cast<float>(first)), hn::Set(d, static_cast<float>(kWindowSide)));
+  const auto half = hn::Set(d, 0.5f);
+  hn::Store(hn::IfThenElseZero(inside, value), d, g.value.values.data() + at);
+  hn::Store(hn::IfThenElseZero(inside, hn::Mul(half, along_x)), d, g.along_x.values.data() + at);
+  hn::Store(hn::IfThenElseZero(inside, hn::Mul(half, along_y)), d, g.along_y.values.data() + at);
+}
+
 WindowGradients gradients(const WindowPlace& place) {
   const Floats d;
   // Two columns more than a row, which the differences along x read.
@@ -120,17 +190,29 @@ WindowGradients gradients(const WindowPlace& place) {
     }
   }
   WindowGradients g;
-  const auto half = hn::Set(d, 0.5f);
   for (int row = 0; row < kWindowSide; ++row) {
     for (int first = 0; first < kWindowStride; first += static_cast<int>(hn::Lanes(d))) {
       const float* const p = patch + (row + 1) * kRow + first + 1;
-      const std::size_t at = static_cast<std::size_t>(row * kWindowStride + first);
-      const auto inside = hn::Lt(hn::Iota(d, static_cast<float>(first)), hn::Set(d, static_cast<float>(kWindowSide)));
-      hn::Store(hn::IfThenElseZero(inside, hn::LoadU(d, p)), d, g.value.values.data() + at);
-      hn::Store(hn::IfThenElseZero(inside, hn::Mul(half, hn::Sub(hn::LoadU(d, p + 1), hn::LoadU(d, p - 1)))), d,
-                g.along_x.values.data() + at);
-      hn::Store(hn::IfThenElseZero(inside, hn::Mul(half, hn::Sub(hn::LoadU(d, p + kRow), hn::LoadU(d, p - kRow)))), d,
-                g.along_y.values.data() + at);
+      store_gradients(g, row, first, hn::LoadU(d, p), hn::Sub(hn::LoadU(d, p + 1), hn::LoadU(d, p - 1)),
+                      hn::Sub(hn::LoadU(d, p + kRow), hn::LoadU(d, p - kRow)));
+    }
+  }
+  return g;
+}
+
+WindowGradients gradients_of_patch(const std::uint16_t* patch) {
+  const Floats d;
+  const Integers integers;
+  const hn::Rebind<std::uint16_t, Floats> narrow;
+  const auto at = [&](const std::uint16_t* pixels) HWY_ATTR {
+    return hn::Mul(hn::ConvertTo(d, hn::PromoteTo(integers, hn::LoadU(narrow, pixels))), hn::Set(d, kLevel));
+  };
+  WindowGradients g;
+  for (int row = 0; row < kWindowSide; ++row) {
+    for (int first = 0; first < kWindowStride; first += static_cast<int>(hn::Lanes(d))) {
+      const std::uint16_t* const p = patch + (row + 1) * kWindowStride + first + 1;
+      store_gradients(g, row, first, at(p), hn::Sub(at(p + 1), at(p - 1)),
+                      hn::Sub(at(p + kWindowStride), at(p - kWindowStride)));
     }
   }
   return g;
@@ -183,6 +265,7 @@ const Window& window_weights() {
 
 HWY_EXPORT(sums);
 HWY_EXPORT(gradients);
+HWY_EXPORT(gradients_of_patch);
 HWY_EXPORT(without_mean);
 
 WindowSums window_sums(const WindowPlace& place, float level, const Window* factors, int count) {
@@ -191,6 +274,10 @@ WindowSums window_sums(const WindowPlace& place, float level, const Window* fact
 
 WindowGradients window_gradients(const WindowPlace& place) {
   return HWY_DYNAMIC_DISPATCH(gradients)(place);
+}
+
+WindowGradients patch_gradients(const std::uint16_t* patch) {
+  return HWY_DYNAMIC_DISPATCH(gradients_of_patch)(patch);
 }
 
 WindowStatistics subtract_mean(Window& window) {

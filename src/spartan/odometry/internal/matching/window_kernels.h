@@ -50,6 +50,8 @@ struct WindowGradients {
 };
 /// Of the window in an image. The pixels around it must lie in the image as well.
 WindowGradients window_gradients(const WindowPlace& place);
+/// Of the window in the middle of a patch: kPatchSide rows of kWindowStride pixels, and one row behind them.
+WindowGradients patch_gradients(const std::uint16_t* patch);
 
 /// Mean and variance of a window under its weights.
 struct WindowStatistics {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -95,6 +96,20 @@ TEST(WindowKernels, GradientsAreCentralDifferences) {
         EXPECT_NEAR(g.along_y.values[at], 0.5 * (value_at(place, i, j + 1) - value_at(place, i, j - 1)), 1e-3);
       }
     }
+  });
+}
+
+TEST(WindowKernels, GradientsOfAPatchAreThoseOfItsPlace) {
+  const Image<std::uint16_t> image = noise_image(48, 40);
+  constexpr int x = 21, y = 19, r = kWindowRadius + 1;
+  std::array<std::uint16_t, static_cast<std::size_t>(kWindowStride * kWindowStride)> patch{};
+  for (int j = 0; j < kPatchSide; ++j)
+    std::copy_n(image.row(y - r + j) + x - r, kPatchSide, patch.begin() + j * kWindowStride);
+  with_each_target([&] {
+    const WindowGradients g = patch_gradients(patch.data()), expected = window_gradients({image, x, y});
+    EXPECT_EQ(g.value.values, expected.value.values);
+    EXPECT_EQ(g.along_x.values, expected.along_x.values);
+    EXPECT_EQ(g.along_y.values, expected.along_y.values);
   });
 }
 
