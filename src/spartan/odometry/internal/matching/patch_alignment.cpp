@@ -107,7 +107,7 @@ std::optional<AlignmentTemplate> AlignmentTemplate::around(ImageView<const std::
         centre.y() + r < image.height() - 1.01)) {
     return std::nullopt;
   }
-  return AlignmentTemplate(window_gradients({image, static_cast<float>(centre.x()), static_cast<float>(centre.y())}));
+  return AlignmentTemplate(window_gradients(image, static_cast<float>(centre.x()), static_cast<float>(centre.y())));
 }
 
 std::optional<PatchAlignment> align_translation(const AlignmentTemplate& reference,

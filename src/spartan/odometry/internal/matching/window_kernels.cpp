@@ -49,14 +49,35 @@ struct PairTable {
   }
 };
 
-/// Interpolates one row of a window or of a patch: columns `first` to `first` + lanes, of which those behind `last`
-/// repeat it.
+/// ⌊x⌋ and the rest of x, 0 ≤ x < 2²³: cheaper than ConvertTo(), which handles larger values too.
+struct Split {
+  hn::Vec<Integers> whole;
+  Values rest;
+
+  HWY_INLINE explicit Split(Values x) {
+    const Floats d;
+    const Integers integers;
+    // The low bits of 2²³ + n are those of n.
+    const auto floor = hn::Floor(x), bias = hn::Set(d, 8388608.0f);
+    rest = hn::Sub(x, floor);
+    whole = hn::Xor(hn::BitCast(integers, hn::Add(floor, bias)), hn::BitCast(integers, bias));
+  }
+};
+
+/// The pairs of pixels above and below each place.
+struct Lines {
+  hn::Vec<Integers> top, bottom;
+};
+
+/// Interpolates one row of a window or of a patch, less `level`: columns `first` to `first` + lanes, of which those
+/// behind the last repeat it. Where `kAlongRow`, rows of the window are rows of the image (yx = 0).
+template <bool kAlongRow>
 class RowSampler {
  public:
-  HWY_INLINE RowSampler(const WindowPlace& p, int radius, int first)
+  HWY_INLINE RowSampler(const WindowPlace& p, float level, int radius, int first)
       : place_(p),
+        level_(level),
         stride_(static_cast<std::int32_t>(p.image.stride())),
-        level_(p.yx == 0),
         has_tables_(kTables && p.image.width() > kTablePixels && p.image.height() >= 3) {
     const Floats d;
     const auto column =
@@ -68,14 +89,15 @@ class RowSampler {
 
   HWY_INLINE Values row(int offset) const {
     const Floats d;
-    const Integers integers;
-    const auto x = hn::Add(from_x_, hn::Set(d, place_.xy * static_cast<float>(offset))),
-               y = hn::Add(from_y_, hn::Set(d, place_.yy * static_cast<float>(offset)));
-    const auto ix = hn::ConvertTo(integers, x), iy = hn::ConvertTo(integers, y);
-    const auto fx = hn::Sub(x, hn::ConvertTo(d, ix)), fy = hn::Sub(y, hn::ConvertTo(d, iy));
-    const Lines lines = lines_at(ix, iy);
-    const auto top = interpolate(lines.top, fx), bottom = interpolate(lines.bottom, fx);
-    return hn::Mul(hn::MulAdd(fy, hn::Sub(bottom, top), top), hn::Set(d, kLevel));
+    const Split x(hn::Add(from_x_, hn::Set(d, place_.xy * static_cast<float>(offset))));
+    if constexpr (kAlongRow) {
+      const float y = place_.y + place_.yy * static_cast<float>(offset);
+      const int line = static_cast<int>(y);
+      return interpolate(lines_at(x.whole, line), x.rest, hn::Set(d, y - static_cast<float>(line)));
+    } else {
+      const Split y(hn::Add(from_y_, hn::Set(d, place_.yy * static_cast<float>(offset))));
+      return interpolate(lines_at(x.whole, y.whole), x.rest, y.rest);
+    }
   }
 
  private:
@@ -83,38 +105,56 @@ class RowSampler {
   static constexpr bool kTables = HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2;
   static constexpr int kTablePixels = 2 * static_cast<int>(hn::MaxLanes(Integers()));
 
-  /// The pairs of pixels above and below each place.
-  struct Lines {
-    hn::Vec<Integers> top, bottom;
-  };
+  /// Where the table begins that holds the places `ix`, if they are few enough.
+  HWY_INLINE int table_column(hn::Vec<Integers> ix) const {
+    return std::min(hn::GetLane(ix), place_.image.width() - kTablePixels - 1);
+  }
+
+  HWY_INLINE Lines lines_at(hn::Vec<Integers> ix, int line) const {
+    const Integers d;
+    if (has_tables_) {
+      const int column = table_column(ix);
+      const auto right = hn::Sub(ix, hn::Set(d, column));
+      if (hn::AllTrue(d, hn::Eq(hn::AndNot(hn::Set(d, kTablePixels - 1), right), hn::Zero(d)))) {
+        const std::uint16_t* const pixels = place_.image.row(line) + column;
+        return {PairTable(pixels).at(right), PairTable(pixels + stride_).at(right)};
+      }
+    }
+    return gather_lines(ix, hn::Set(d, line));
+  }
 
   HWY_INLINE Lines lines_at(hn::Vec<Integers> ix, hn::Vec<Integers> iy) const {
     const Integers d;
     if (has_tables_) {
-      const int column = std::min(hn::GetLane(ix), place_.image.width() - kTablePixels - 1);
-      int line = hn::GetLane(iy);
-      if (!level_) line = std::clamp(line - (place_.yx < 0 ? 1 : 0), 0, place_.image.height() - 3);
+      const int column = table_column(ix);
+      const int line = std::clamp(hn::GetLane(iy) - (place_.yx < 0 ? 1 : 0), 0, place_.image.height() - 3);
       const auto right = hn::Sub(ix, hn::Set(d, column)), down = hn::Sub(iy, hn::Set(d, line));
-      const auto outside =
-          hn::Or(hn::AndNot(hn::Set(d, kTablePixels - 1), right), hn::AndNot(hn::Set(d, level_ ? 0 : 1), down));
-      if (hn::AllTrue(d, hn::Eq(outside, hn::Zero(d)))) return lines_of_tables(column, line, right, down);
+      const auto outside = hn::Or(hn::AndNot(hn::Set(d, kTablePixels - 1), right), hn::AndNot(hn::Set(d, 1), down));
+      if (hn::AllTrue(d, hn::Eq(outside, hn::Zero(d)))) {
+        const std::uint16_t* const pixels = place_.image.row(line) + column;
+        const auto first = PairTable(pixels).at(right), second = PairTable(pixels + stride_).at(right),
+                   third = PairTable(pixels + 2 * stride_).at(right);
+        const auto upper = hn::Eq(down, hn::Zero(d));
+        return {hn::IfThenElse(upper, first, second), hn::IfThenElse(upper, second, third)};
+      }
     }
+    return gather_lines(ix, iy);
+  }
+
+  HWY_INLINE Lines gather_lines(hn::Vec<Integers> ix, hn::Vec<Integers> iy) const {
+    const Integers d;
     const std::uint16_t* const pixels = place_.image.row(0);
     const auto index = hn::Add(hn::Mul(iy, hn::Set(d, stride_)), ix);
     return {gather_pairs(d, pixels, index), gather_pairs(d, pixels, hn::Add(index, hn::Set(d, stride_)))};
   }
 
-  HWY_INLINE Lines lines_of_tables(int column, int line, hn::Vec<Integers> right, hn::Vec<Integers> down) const {
-    const Integers d;
-    const std::uint16_t* const pixels = place_.image.row(line) + column;
-    const auto first = PairTable(pixels).at(right), second = PairTable(pixels + stride_).at(right);
-    if (level_) return {first, second};
-    const auto third = PairTable(pixels + 2 * stride_).at(right);
-    const auto upper = hn::Eq(down, hn::Zero(d));
-    return {hn::IfThenElse(upper, first, second), hn::IfThenElse(upper, second, third)};
+  HWY_INLINE Values interpolate(const Lines& lines, Values fx, Values fy) const {
+    const Floats d;
+    const auto top = between(lines.top, fx), bottom = between(lines.bottom, fx);
+    return hn::MulSub(hn::MulAdd(fy, hn::Sub(bottom, top), top), hn::Set(d, kLevel), hn::Set(d, level_));
   }
 
-  HWY_INLINE Values interpolate(hn::Vec<Integers> pairs, Values fraction) const {
+  HWY_INLINE Values between(hn::Vec<Integers> pairs, Values fraction) const {
     const Floats d;
     const Integers integers;
     const hn::RebindToUnsigned<Integers> bits;
@@ -124,24 +164,24 @@ class RowSampler {
   }
 
   const WindowPlace& place_;
+  float level_;
   Values from_x_, from_y_;
   std::int32_t stride_;
-  bool level_;       // the rows of the window are rows of the image
   bool has_tables_;  // the image is large enough for them
 };
 
-template <int kCount>
+template <bool kAlongRow, int kCount>
 HWY_INLINE WindowSums sums_with(const WindowPlace& place, float level, const Window* factors) {
   const Floats d;
   WindowSums sums;
   const float* const weights = window_weights().values.data();
   for (int first = 0; first < kWindowStride; first += static_cast<int>(hn::Lanes(d))) {
-    const RowSampler sampler(place, kWindowRadius, first);
+    const RowSampler<kAlongRow> sampler(place, level, kWindowRadius, first);
     auto mean = hn::Zero(d), square = hn::Zero(d);
     Values products[kCount];
     for (int k = 0; k < kCount; ++k) products[k] = hn::Zero(d);
     for (int row = 0; row < kWindowSide; ++row) {
-      const auto value = hn::Sub(sampler.row(row - kWindowRadius), hn::Set(d, level));
+      const auto value = sampler.row(row - kWindowRadius);
       const std::size_t at = static_cast<std::size_t>(row * kWindowStride + first);
       const auto weight = hn::Mul(hn::Load(d, weights + at), value);
       mean = hn::Add(mean, weight);
@@ -157,11 +197,17 @@ HWY_INLINE WindowSums sums_with(const WindowPlace& place, float level, const Win
   return sums;
 }
 
-WindowSums sums(const WindowPlace& place, float level, const Window* factors, int count) {
+template <bool kAlongRow>
+HWY_INLINE WindowSums sums_of(const WindowPlace& place, float level, const Window* factors, int count) {
   static_assert(kMinFactors == 3 && kMaxFactors == 5);
-  if (count == 3) return sums_with<3>(place, level, factors);
-  if (count == 4) return sums_with<4>(place, level, factors);
-  return sums_with<5>(place, level, factors);
+  if (count == 3) return sums_with<kAlongRow, 3>(place, level, factors);
+  if (count == 4) return sums_with<kAlongRow, 4>(place, level, factors);
+  return sums_with<kAlongRow, 5>(place, level, factors);
+}
+
+WindowSums sums(const WindowPlace& place, float level, const Window* factors, int count) {
+  if (place.yx == 0) return sums_of<true>(place, level, factors, count);
+  return sums_of<false>(place, level, factors, count);
 }
 
 /// Stores values and half the differences of their neighbours; 0 behind the window.
@@ -175,13 +221,14 @@ HWY_INLINE void store_gradients(WindowGradients& g, int row, int first, Values v
   hn::Store(hn::IfThenElseZero(inside, hn::Mul(half, along_y)), d, g.along_y.values.data() + at);
 }
 
-WindowGradients gradients(const WindowPlace& place) {
+WindowGradients gradients(ImageView<const std::uint16_t> image, float x, float y) {
   const Floats d;
+  const WindowPlace place{image, x, y};
   // Two columns more than a row, which the differences along x read.
   constexpr int kRow = kWindowStride + static_cast<int>(hn::MaxLanes(Floats()));
   HWY_ALIGN float patch[kPatchSide * kRow];
   for (int first = 0; first < kWindowStride; first += static_cast<int>(hn::Lanes(d))) {
-    const RowSampler sampler(place, kWindowRadius + 1, first);
+    const RowSampler<true> sampler(place, 0, kWindowRadius + 1, first);
     for (int row = 0; row < kPatchSide; ++row) {
       const auto value = sampler.row(row - kWindowRadius - 1);
       hn::StoreU(value, d, patch + row * kRow + first);
@@ -272,8 +319,8 @@ WindowSums window_sums(const WindowPlace& place, float level, const Window* fact
   return HWY_DYNAMIC_DISPATCH(sums)(place, level, factors, count);
 }
 
-WindowGradients window_gradients(const WindowPlace& place) {
-  return HWY_DYNAMIC_DISPATCH(gradients)(place);
+WindowGradients window_gradients(ImageView<const std::uint16_t> image, float x, float y) {
+  return HWY_DYNAMIC_DISPATCH(gradients)(image, x, y);
 }
 
 WindowGradients patch_gradients(const std::uint16_t* patch) {

@@ -48,8 +48,8 @@ WindowSums window_sums(const WindowPlace& place, float level, const Window* fact
 struct WindowGradients {
   Window value, along_x, along_y;
 };
-/// Of the window in an image. The pixels around it must lie in the image as well.
-WindowGradients window_gradients(const WindowPlace& place);
+/// Of the window around (x, y) of an image. The pixels around it must lie in the image as well.
+WindowGradients window_gradients(ImageView<const std::uint16_t> image, float x, float y);
 /// Of the window in the middle of a patch: kPatchSide rows of kWindowStride pixels, and one row behind them.
 WindowGradients patch_gradients(const std::uint16_t* patch);
 

@@ -87,7 +87,7 @@ TEST(WindowKernels, GradientsAreCentralDifferences) {
   const Image<std::uint16_t> image = noise_image(48, 40);
   with_each_target([&] {
     const WindowPlace place{image, 22.25f, 18.5f};
-    const WindowGradients g = window_gradients(place);
+    const WindowGradients g = window_gradients(image, place.x, place.y);
     for (int j = -kWindowRadius; j <= kWindowRadius; ++j) {
       for (int i = -kWindowRadius; i <= kWindowRadius; ++i) {
         const auto at = static_cast<std::size_t>((j + kWindowRadius) * kWindowStride + i + kWindowRadius);
@@ -106,7 +106,7 @@ TEST(WindowKernels, GradientsOfAPatchAreThoseOfItsPlace) {
   for (int j = 0; j < kPatchSide; ++j)
     std::copy_n(image.row(y - r + j) + x - r, kPatchSide, patch.begin() + j * kWindowStride);
   with_each_target([&] {
-    const WindowGradients g = patch_gradients(patch.data()), expected = window_gradients({image, x, y});
+    const WindowGradients g = patch_gradients(patch.data()), expected = window_gradients(image, x, y);
     EXPECT_EQ(g.value.values, expected.value.values);
     EXPECT_EQ(g.along_x.values, expected.along_x.values);
     EXPECT_EQ(g.along_y.values, expected.along_y.values);
