@@ -57,10 +57,21 @@ double sum_over_window(const std::function<double(int, int)>& value) {
 }
 
 TEST(WindowKernels, SumsAreThoseOfBilinearInterpolation) {
-  const Image<std::uint16_t> image = noise_image(48, 40);
-  // The last place reaches the last pixel that windows may use.
+  const Image<std::uint16_t> image = noise_image(48, 40), narrow = noise_image(20, 17);
   const WindowPlace places[] = {
-      {image, 20, 17}, {image, 20.3f, 17.8f, 1.2f, 0.3f, -0.2f, 0.9f}, {image, 40.98f, 32.98f}};
+      {image, 20, 17},
+      {image, 20.3f, 17.8f, 1.2f, 0.3f, -0.2f, 0.9f},
+      {image, 40.98f, 32.98f},  // reaches the last pixel that windows may use
+      // Rows that are nearly those of the image, upwards and downwards, also along the borders.
+      {image, 20.3f, 17.8f, 1.02f, 0.05f, 0.03f, 0.97f},
+      {image, 20.3f, 17.8f, 0.97f, -0.05f, -0.03f, 1.02f},
+      {image, 6, 6.2f, 1, 0, -0.03f, 1},
+      {image, 40.98f, 32.8f, 1, 0, 0.03f, 1},
+      // Wide, mirrored, and in a small image.
+      {image, 23.7f, 18.2f, 1.8f, 0.2f},
+      {image, 23.7f, 18.2f, -1, 0, 0.02f, 1},
+      {narrow, 9.4f, 8.3f, 0.9f, 0.1f},
+      {narrow, 9.4f, 8.3f, 0.9f, 0.1f, 0.02f, 1}};
   const double weights = sum_over_window(weight_at);
   with_each_target([&] {
     for (const WindowPlace& place : places) {
