@@ -78,14 +78,14 @@ struct Odometer::State {
   bool keeps_prediction() const {
     return memory.ambiguous_frames > 0 && memory.ambiguous_frames <= kMaxAmbiguousFrames;
   }
-  void add_landmarks(const StereoImages& images, LandmarkMemory& map, MotionEstimate& estimate, Stopwatch& watch);
+  void add_landmarks(const StereoImages& images, LandmarkMemory& map, MotionEstimate& estimate);
   MotionMeasurement measure(const LandmarkFrame& previous, const StereoImages& images, ImageSide side,
                             const MotionPrediction& prediction, MotionEstimate& estimate);
   void accept(const MotionMeasurement& measured, const StereoImages& images, MotionEstimate& estimate);
   bool measure_from_kept(const StereoImages& images, const MotionPrediction& prediction, MotionEstimate& estimate);
   void measure_from_any(const StereoImages& images, const MotionPrediction& prediction, bool blurred,
                         MotionEstimate& estimate);
-  void advance(const StereoImages& images, bool usable, bool same_geometry, MotionEstimate& estimate, Stopwatch& watch);
+  void advance(const StereoImages& images, bool usable, bool same_geometry, MotionEstimate& estimate);
   void keep(LandmarkFrame frame) { memory.kept = {std::move(frame), memory.reference.stamp, {}, 0, 0}; }
   void follow_kept(const MotionEstimate& estimate, const Sharpness& sharpness, bool blurred);
 };
@@ -100,8 +100,8 @@ std::optional<std::string> Odometer::State::defect_of(const RectifiedPair& pair)
 }
 
 /// New landmarks where there are none. Those that were re-anchored get their anchor here, too.
-void Odometer::State::add_landmarks(const StereoImages& images, LandmarkMemory& map, MotionEstimate& estimate,
-                                    Stopwatch& watch) {
+void Odometer::State::add_landmarks(const StereoImages& images, LandmarkMemory& map, MotionEstimate& estimate) {
+  Stopwatch watch;
   const int missing = options.detection.landmarks - static_cast<int>(map.landmarks.size());
   const bool both = !images.left.empty() && !images.right.empty();
   std::vector<ReconstructedFeature> features;
@@ -210,15 +210,14 @@ void Odometer::State::measure_from_any(const StereoImages& images, const MotionP
 
 /// Makes the current frame the reference. Where it is lost the reference stays, and the landmarks of the frame are kept
 /// beside it; where it was measured in the right image the reference stays, too.
-void Odometer::State::advance(const StereoImages& images, bool usable, bool same_geometry, MotionEstimate& estimate,
-                              Stopwatch& watch) {
+void Odometer::State::advance(const StereoImages& images, bool usable, bool same_geometry, MotionEstimate& estimate) {
   const bool lost = estimate.status == TrackingStatus::lost, in_right = !lost && estimate.keeps_reference;
   LandmarkFrame& frame = lost || in_right ? memory.latest : memory.reference;
   frame.stamp = estimate.to;
   if (lost || in_right) frame.map = {};
   if (usable) memory.geometry = images.geometry;
   if (usable && !in_right && !images.left.empty()) {
-    add_landmarks(images, frame.map, estimate, watch);
+    add_landmarks(images, frame.map, estimate);
     std::swap(frame.pyramid, pyramid);
   }
   // An unusable pair says nothing on the geometry. Frames without landmarks, such as dark ones, cannot be a reference.
@@ -275,7 +274,7 @@ Odometer::~Odometer() = default;
 MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose>& predicted,
                              ImageView<const float> disparity, const std::optional<Pose>& alternative) {
   State& s = *state_;
-  Stopwatch all, watch;
+  Stopwatch all;
   MotionEstimate estimate;
   estimate.to = pair.stamp;
   estimate.first = !s.memory.started;
@@ -317,7 +316,7 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
     s.memory.latest_velocity = {log_se3(estimate.previous_from_current), seconds_between(estimate.from, estimate.to)};
     if (estimate.inliers >= s.options.motion.min_tracking_inliers) s.memory.steady_velocity = s.memory.latest_velocity;
   }
-  s.advance(images, !defect, same_geometry, estimate, watch);
+  s.advance(images, !defect, same_geometry, estimate);
   s.follow_kept(estimate, sharpness, blurred);
   s.memory.started = true;
   estimate.landmarks = static_cast<int>(s.memory.reference.map.landmarks.size());

@@ -37,12 +37,13 @@ double mean_flow(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>
   return count > 0 ? sum / count : 0;
 }
 
-/// Number of established landmarks that a motion predicts inside of the left image.
-int established_in_view(const RectifiedStereo& stereo, const LandmarkMemory& map, const Pose& previous_from_current) {
+/// Number of landmarks that a motion predicts inside of the left image.
+int count_in_view(const RectifiedStereo& stereo, const LandmarkMemory& map, const Pose& previous_from_current,
+                  WhichLandmarks which) {
   const Pose current_from_previous = previous_from_current.inverse();
   int count = 0;
   for (const Landmark& landmark : map.landmarks) {
-    if (!is_established(landmark)) continue;
+    if (which == WhichLandmarks::established && !is_established(landmark)) continue;
     const auto p = project_anchored(stereo, {landmark.anchor_pixel, landmark.disparity},
                                     current_from_previous * map.anchor(landmark.anchor_id).latest_from_anchor);
     count += p && p->measured.x() > 0 && p->measured.x() < stereo.size.width && p->measured.y() > 0 &&
@@ -70,10 +71,16 @@ std::vector<LandmarkMatch> without_object(const RectifiedStereo& stereo, std::ve
 }  // namespace
 
 /// Whether few landmarks scatter about the motion as wrong matches would, which lie anywhere within the search radius.
-bool MotionMeasurer::may_be_by_chance(const MotionFit& fit, std::size_t landmarks) const {
-  const double few =
-      std::max<double>(options_.motion.min_tracking_inliers, kChanceFraction * static_cast<double>(landmarks));
-  return options_.matching.correlation && fit.inliers < few &&
+/// After a gap any motion is possible, so that few wrong ones may agree by chance, too.
+bool MotionMeasurer::may_be_by_chance(const RectifiedStereo& stereo, const LandmarkMemory& map, const MotionFit& fit,
+                                      const MotionPrediction& prediction) const {
+  if (!options_.matching.correlation) return false;
+  const auto is_few = [&](double landmarks) {
+    return fit.inliers < std::max<double>(options_.motion.min_tracking_inliers, kChanceFraction * landmarks);
+  };
+  if (prediction.over_gap && is_few(count_in_view(stereo, map, fit.previous_from_current, WhichLandmarks::all)))
+    return true;
+  return is_few(static_cast<double>(map.landmarks.size())) &&
          fit.rms_px > kChanceRadiusFraction * options_.matching.correlation_radius_px;
 }
 
@@ -83,7 +90,7 @@ std::string MotionMeasurer::doubt_of_age(const RectifiedStereo& stereo, const La
                                          const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
                                          const MotionPrediction& prediction) const {
   if (!prediction.from_measured_motion || !is_of_young_landmarks(matches, fit)) return {};
-  const int expected = established_in_view(stereo, map, fit.previous_from_current);
+  const int expected = count_in_view(stereo, map, fit.previous_from_current, WhichLandmarks::established);
   int agreeing = 0;
   for (std::size_t i = 0; i < matches.size(); ++i) agreeing += fit.inlier[i] && matches[i].established;
   if (expected < options_.motion.min_inliers || agreeing >= kMinAgreeingFraction * expected) return {};
@@ -150,7 +157,8 @@ MotionMeasurement MotionMeasurer::measure(const LandmarkFrame& previous, const S
 
   std::optional<MotionFit> fit = estimator_.fine(images.geometry, matches, motion, prediction.offset);
   measured.times.estimate = watch.lap();
-  if (!fit || fit->inliers < options_.motion.min_inliers || may_be_by_chance(*fit, landmarks)) {
+  if (!fit || fit->inliers < options_.motion.min_inliers ||
+      may_be_by_chance(images.geometry, previous.map, *fit, prediction)) {
     measured.reason = fmt::format("{} landmarks, {} matches, {} agree on a motion", landmarks, matches.size(),
                                   fit ? fit->inliers : 0);
     return measured;

@@ -49,7 +49,8 @@ class MotionMeasurer {
                             ImageSide side, const MotionPrediction& prediction, bool trusts_new);
 
  private:
-  bool may_be_by_chance(const MotionFit& fit, std::size_t landmarks) const;
+  bool may_be_by_chance(const RectifiedStereo& stereo, const LandmarkMemory& map, const MotionFit& fit,
+                        const MotionPrediction& prediction) const;
   std::string doubt_of_age(const RectifiedStereo& stereo, const LandmarkMemory& map,
                            const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
                            const MotionPrediction& prediction) const;

@@ -34,14 +34,18 @@ MotionPrediction predict_motion(const OdometerMemory& memory, const MotionEstima
   const Pose reference_from_latest = is_reference ? Pose() : memory.reference_from_latest;
   const double elapsed_s = seconds_between(is_reference ? memory.reference.stamp : memory.latest.stamp, now);
   const MeasuredVelocity &latest = memory.latest_velocity, &steady = memory.steady_velocity;
-  MotionPrediction prediction{reference_from_latest, {}, latest.is_known(), predict_offset(memory.offset, options)};
+  MotionPrediction prediction;
+  prediction.motion = reference_from_latest;
+  prediction.from_measured_motion = latest.is_known();
+  prediction.offset = predict_offset(memory.offset, options);
   if (!latest.is_known() || !(elapsed_s > 0)) return prediction;
   const double spans = elapsed_s / latest.span_s;
+  prediction.over_gap = spans > kMostSpans;
   const auto moved = [&](const Vector6d& motion) { return reference_from_latest * exp_se3(motion); };
   prediction.motion = moved(latest.motion * std::min(spans, kMostSpans));
   // A rover that moves in steps moves on by one step, however long it has stopped; another one has driven on.
   prediction.other_starts.push_back(moved(latest.motion));
-  if (spans > kMostSpans) prediction.other_starts.push_back(moved(latest.motion * spans));
+  if (prediction.over_gap) prediction.other_starts.push_back(moved(latest.motion * spans));
   if (steady.is_known() && steady.motion != latest.motion)
     prediction.other_starts.push_back(moved(steady.motion * (elapsed_s / steady.span_s)));
   return prediction;

@@ -14,6 +14,7 @@ struct MotionPrediction {
   Pose motion;                        ///< previous_from_current
   std::vector<Pose> other_starts;     ///< are tried where landmarks are not found by `motion`
   bool from_measured_motion = false;  ///< only then a second motion that fits the prediction better is looked for
+  bool over_gap = false;              ///< no images were taken for long, so it is rather a guess
   DisparityOffset offset;
 
   /// The same prediction for the motion from another frame.

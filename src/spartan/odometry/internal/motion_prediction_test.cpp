@@ -31,6 +31,7 @@ TEST(MotionPrediction, IsTheLatestMotionScaledToTheTime) {
 TEST(MotionPrediction, IsAtMostTwoMotionsOverAGapBetweenStamps) {
   const MotionPrediction prediction = predict_motion(moving(0.2), {}, {110 * kSecond});
   EXPECT_NEAR(x_of(prediction.motion), 0.4, 1e-12);
+  EXPECT_TRUE(prediction.over_gap);
   ASSERT_EQ(prediction.other_starts.size(), 2U);
   EXPECT_NEAR(x_of(prediction.other_starts[0]), 0.2, 1e-12);
   EXPECT_NEAR(x_of(prediction.other_starts[1]), 20, 1e-9);
