@@ -7,8 +7,8 @@
 namespace spartan {
 namespace {
 
-constexpr std::uint32_t kVersion = 2;
-constexpr int kDrift = 6, kConstant = 12;  // where z₁ and z₂ begin
+constexpr std::uint32_t kVersion = 3;
+constexpr int kDrift = 6, kConstant = 12, kCalibration = 18;  // where z₁, z₂ and η begin
 /// As the filter has it: what stays for a drive falls to 1/e after so many frames.
 constexpr double kConstantSteps = 5000;
 
@@ -32,6 +32,7 @@ DeadReckoning::DeadReckoning(const VisionOptions& options)
       constant_sigma_ratios_(six_of(options.constant_sigma_ratios)) {
   covariance_.diagonal().segment<6>(kDrift) = drift_sigma_ratios_.cwiseAbs2();
   covariance_.diagonal().segment<6>(kConstant) = constant_sigma_ratios_.cwiseAbs2();
+  covariance_.diagonal().tail<kSize - kCalibration>().setOnes();
   at_reference_ = covariance_;
 }
 
@@ -55,17 +56,19 @@ void DeadReckoning::add(const RelativeMotion& motion) {
     age(kDrift, drift_sigma_ratios_, drift_correlation_frames_);
     age(kConstant, constant_sigma_ratios_, kConstantSteps);
   }
+  const Matrix6d noise = motion.covariance - motion.by_calibration * motion.by_calibration.transpose();
   Covariance by = Covariance::Identity();
   by.topLeftCorner<6, 6>() = adjoint(moved.inverse());
+  by.block<6, kSize - kCalibration>(0, kCalibration) = motion.by_calibration;
   if (drifts) {
-    const Matrix6d deviations = motion.covariance.diagonal().cwiseSqrt().asDiagonal();
+    const Matrix6d deviations = noise.diagonal().cwiseMax(0).cwiseSqrt().asDiagonal();
     by.block<6, 6>(0, kDrift) = deviations;
     by.block<6, 6>(0, kConstant) = deviations;
   }
   const Covariance propagated = by * covariance_ * by.transpose();
   covariance_ = 0.5 * (propagated + propagated.transpose());
   covariance_.topLeftCorner<6, 6>() +=
-      0.5 * (motion.measured ? white_noise_factor_ : 1.0) * (motion.covariance + motion.covariance.transpose());
+      0.5 * (motion.measured ? white_noise_factor_ : 1.0) * (noise + noise.transpose());
   if (motion.keeps_reference) return;
   at_reference_ = covariance_;
   reference_ = motion.to;

@@ -85,6 +85,30 @@ TEST(DeadReckoning, ALostMotionThatKeepsItsReferenceCostsNothing) {
   EXPECT_GT(from_lost.covariance().diagonal().minCoeff(), 0.9);
 }
 
+// A turned mount moves the rover to one side, the more the farther it drives; on the way back it moves it back.
+TEST(DeadReckoning, ErrorsOfTheCalibrationAreTheSameInAllMotions) {
+  VisionOptions vision;
+  vision.drift_sigma_ratios = vision.constant_sigma_ratios = {0, 0, 0, 0, 0, 0};
+  DeadReckoning reckoned = DeadReckoning::create(vision).value();
+  RelativeMotion ahead, back;
+  ahead.previous_from_current = Pose::from_translation({0.1, 0, 0});
+  ahead.by_calibration(1, 5) = 0.1 * 0.003;
+  ahead.covariance = ahead.by_calibration * ahead.by_calibration.transpose();
+  back.previous_from_current = ahead.previous_from_current.inverse();
+  back.by_calibration = -ahead.by_calibration;
+  back.covariance = ahead.covariance;
+  std::int64_t second = 0;
+  const auto add = [&](RelativeMotion motion) {
+    motion.from = test_stamp(static_cast<double>(second));
+    motion.to = test_stamp(static_cast<double>(++second));
+    reckoned.add(motion);
+  };
+  for (int i = 0; i < 50; ++i) add(ahead);
+  EXPECT_NEAR(std::sqrt(reckoned.covariance()(1, 1)), 5 * 0.003, 1e-9);
+  for (int i = 0; i < 50; ++i) add(back);
+  EXPECT_NEAR(reckoned.covariance()(1, 1), 0, 1e-15);
+}
+
 TEST(DeadReckoning, GoesOnFromRestoredMemory) {
   const TestDrive drive;
   const VisionOptions options;

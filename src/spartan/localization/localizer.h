@@ -29,6 +29,9 @@ struct RelativeMotion {
   Matrix6d covariance = Matrix6d::Zero();  ///< of the right perturbation, (translation, rotation), m² rad²
   bool measured = true;                    ///< false: tracking was lost, the motion is not used
   bool keeps_reference = false;            ///< the next motion begins at `from`, too, not at `to`
+  /// E: what each error of the calibration changes, at one standard deviation. Its part E Eᵀ of the covariance is that
+  /// of errors which all motions share.
+  Eigen::Matrix<double, 6, 8> by_calibration = Eigen::Matrix<double, 6, 8>::Zero();
 };
 
 /// The sensors that are monitored: whether one is used, and why not.
@@ -258,14 +261,15 @@ class VisionOnlyFilter {
   Pose world_from_own_;  // between the worlds: the own one always starts level and ahead
 };
 
-/// Propagates the covariance of a pose that is the product of motions, with the errors that last: white noise n and two
-/// first-order Gauss–Markov processes z₁ and z₂ in units of each motion's standard deviations D,
+/// Propagates the covariance of a pose that is the product of motions, with the errors that last: white noise n, two
+/// first-order Gauss–Markov processes z₁ and z₂ in units of each motion's standard deviations D, and the errors η of
+/// the calibration, which are constant,
 ///
-///     ξ' = Ad(M⁻¹) ξ + D (z₁ + z₂) + n
+///     ξ' = Ad(M⁻¹) ξ + D (z₁ + z₂) + n + E η
 ///
-/// (docs/math/localization.md, "Vision"). Nothing is estimated: a fixed amount of arithmetic for each motion. Equals
-/// the covariance of VisionOnlyFilter without constraints to first order; where vision is lost, the motion's own
-/// covariance counts.
+/// (docs/math/localization.md, "Vision"). D and n are without the part of the calibration. Nothing is estimated: a
+/// fixed amount of arithmetic for each motion. Equals the covariance of VisionOnlyFilter without constraints and with
+/// an exact calibration to first order; where vision is lost, the motion's own covariance counts.
 class DeadReckoning {
  public:
   /// Code `configuration` where an option is out of bounds.
@@ -283,7 +287,7 @@ class DeadReckoning {
  private:
   explicit DeadReckoning(const VisionOptions& options);
 
-  static constexpr int kSize = 18;  // ξ, z₁, z₂
+  static constexpr int kSize = 26;  // ξ, z₁, z₂, η
   using Covariance = Eigen::Matrix<double, kSize, kSize>;
   void age(int index, const Vector6d& sigmas, double steps);
 

@@ -157,7 +157,8 @@ bool Odometer::State::measure_from_kept(const StereoImages& images, const Motion
   const UncertainPose kept_from_reference = memory.kept.kept_from_reference;
   const MotionMeasurement measured =
       measure(memory.kept.frame, images, ImageSide::left, prediction.from(kept_from_reference.pose), estimate);
-  if (measured.is_lost() || measured.status == TrackingStatus::degraded) return false;
+  // An object may have been in view already.
+  if (measured.is_lost() || measured.status == TrackingStatus::degraded || measured.is_new) return false;
   std::swap(memory.reference, memory.kept.frame);
   memory.kept = {};
   accept(measured, images, estimate);

@@ -40,13 +40,20 @@ const StampedPose* nearest(const Trajectory& truth, Stamp stamp, double max_dt_s
 
 /// The frames between which motions are transported.
 struct Mounting {
+  const Rig& rig;
+  const StereoPair& pair;
+  CalibrationErrors errors;
   Pose body_from_camera;  // the rectified left camera
   Pose truth_from_body;   // truth: the frame whose poses the truth of the recording states
+
+  CalibrationEffect effect_of_calibration(const Pose& body_motion) const {
+    return calibration_effect(body_motion, body_from_camera, rig, pair, errors);
+  }
 };
 
-Mounting mounting_of(const Rig& rig, const StereoPair& pair) {
+Mounting mounting_of(const Rig& rig, const StereoPair& pair, const CalibrationErrors& errors) {
   const RectifyingAxes axes = rectifying_axes(rig.right_from_left(pair));
-  Mounting mounting;
+  Mounting mounting{rig, pair, errors, {}, {}};
   mounting.body_from_camera = rig.body_from_camera(pair.left) * Pose(axes.left_from_rectified, Eigen::Vector3d::Zero());
   if (rig.convention == PoseConvention::left_optical)
     mounting.truth_from_body = rig.body_from_camera(rig.pairs.front().left).inverse();
@@ -70,6 +77,7 @@ std::vector<Chain> chains_of(const std::vector<FrameRecord>& frames, const Mount
     step.motion.previous_from_current =
         body_from_camera * frame.motion.previous_from_current * body_from_camera.inverse();
     step.motion.covariance = to_body * frame.motion.covariance * to_body.transpose();
+    step.motion.by_calibration = mounting.effect_of_calibration(step.motion.previous_from_current);
     step.true_motion = truth_from_body.inverse() * from->pose.inverse() * to->pose * truth_from_body;
     along_m += step.true_motion.translation().norm();
     step.end_m = along_m;
@@ -136,7 +144,8 @@ Result<MotionConsistency> motion_consistency(const std::string& run, const Traje
   auto fresh = DeadReckoning::create(options->localization.vision);
   if (!fresh) return failure(fresh);
 
-  const std::vector<Chain> chains = chains_of(*frames, mounting_of(*rig, *pair), truth, max_dt_s);
+  const std::vector<Chain> chains = chains_of(
+      *frames, mounting_of(*rig, *pair, resolved_options(*options, *rig).mapping.map.calibration), truth, max_dt_s);
   std::sort(lengths_m.begin(), lengths_m.end());
   std::vector<double> of_motions;
   std::vector<std::vector<double>> of_length(lengths_m.size());

@@ -151,16 +151,20 @@ Trajectory in_recording_convention(const Rig& rig, Trajectory world_from_body);
 /// Converts world_from_body to first_left_from_left of a pair, the convention of KITTI's pose files.
 Trajectory in_left_optical_convention(const Rig& rig, const StereoPair& pair, Trajectory world_from_body);
 
-/// Covariance, right perturbation of previous_from_current of the body (translation, rotation; m², rad²), of a motion M
-/// of the camera that is transported to the body as B = X M X⁻¹ with a calibration X = body_from_left whose errors η
-/// (a shift and a rotation of the mount, right perturbation of X) are those of `errors`:
+/// Columns: by how much each error of the calibration, at one standard deviation, changes a motion.
+using CalibrationEffect = Eigen::Matrix<double, 6, 8>;
+
+/// Of a motion M of the camera that is transported to the body as B = X M X⁻¹ with a calibration X = body_from_left.
+/// Rows: right perturbation of B = previous_from_current (translation, rotation; m, rad). The errors η of the mount (a
+/// shift and a rotation, right perturbation of X), columns 0 to 5, cause
 ///
-///     e = (I − Ad(B⁻¹)) Ad(X) η,
+///     e = (I − Ad(B⁻¹)) Ad(X) η.
 ///
-/// and of a relative error of the camera's translation (focal length and baseline) and of its rotation (focal length).
-/// A pan-tilt unit adds the errors of its angles to the rotation. Rigs whose body is the camera (`left_optical`) have
-/// no error of the mount.
-Matrix6d calibration_covariance(const Pose& body_motion, const Pose& body_from_left, const Rig& rig,
-                                const StereoPair& pair, const CalibrationErrors& errors);
+/// Column 6 is a relative error of the camera's translation (focal length and baseline), column 7 one of its rotation
+/// (focal length). The errors are independent of each other and the same in all motions, so a motion has the covariance
+/// E Eᵀ, and the sum of two (E₁ + E₂)(E₁ + E₂)ᵀ. A pan-tilt unit adds the errors of its angles to the rotation. Rigs
+/// whose body is the camera (`left_optical`) have no error of the mount.
+CalibrationEffect calibration_effect(const Pose& body_motion, const Pose& body_from_left, const Rig& rig,
+                                     const StereoPair& pair, const CalibrationErrors& errors);
 
 }  // namespace spartan

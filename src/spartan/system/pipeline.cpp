@@ -84,8 +84,9 @@ RelativeMotion Pipeline::State::body_motion(const Pose& body_from_left, const Mo
   }
   result.covariance = ad * motion.covariance * ad.transpose();
   if (result.measured) {
-    result.covariance += calibration_covariance(result.previous_from_current, body_from_left, rig, pair,
-                                                options.mapping.map.calibration);
+    result.by_calibration =
+        calibration_effect(result.previous_from_current, body_from_left, rig, pair, options.mapping.map.calibration);
+    result.covariance += result.by_calibration * result.by_calibration.transpose();
   }
   return result;
 }

@@ -82,9 +82,9 @@ TEST(PipelineMaps, MotionsHoldTheErrorsOfTheCalibration) {
   const Pose motion = body_from_left * results[0].motion.previous_from_current * body_from_left.inverse();
   const Matrix6d to_body = adjoint(body_from_left);
   const Matrix6d added = to_body * (results[1].motion.covariance - results[0].motion.covariance) * to_body.transpose();
-  EXPECT_TRUE(added.isApprox(calibration_covariance(motion, body_from_left, uncertain, *uncertain.find_pair("narrow"),
-                                                    *uncertain.calibration_errors),
-                             1e-6));
+  const CalibrationEffect effect = calibration_effect(motion, body_from_left, uncertain, *uncertain.find_pair("narrow"),
+                                                      *uncertain.calibration_errors);
+  EXPECT_TRUE(added.isApprox(effect * effect.transpose(), 1e-6));
   EXPECT_GT(results[1].world_from_body.covariance(1, 1), 2 * results[0].world_from_body.covariance(1, 1));
 }
 

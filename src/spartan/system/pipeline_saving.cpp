@@ -12,7 +12,7 @@ namespace spartan {
 
 namespace {
 
-constexpr std::uint32_t kPipelineVersion = 12;  // of save(); raise it when the saved state changes
+constexpr std::uint32_t kPipelineVersion = 13;  // of save(); raise it when the saved state changes
 
 }  // namespace
 

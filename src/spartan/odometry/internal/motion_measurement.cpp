@@ -68,6 +68,15 @@ std::vector<LandmarkMatch> without_object(const RectifiedStereo& stereo, std::ve
   return matches;
 }
 
+/// Whether most inliers of a motion are new, and it was not predicted.
+bool is_new(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
+            const MotionPrediction& prediction) {
+  if (!prediction.from_measured_motion || !is_of_young_landmarks(matches, fit)) return false;
+  const auto agrees = [&](const Pose& start) { return is_as_predicted(stereo, matches, fit, start); };
+  return !agrees(prediction.motion) &&
+         std::none_of(prediction.other_starts.begin(), prediction.other_starts.end(), agrees);
+}
+
 }  // namespace
 
 /// Whether few landmarks scatter about the motion as wrong matches would, which lie anywhere within the search radius.
@@ -84,21 +93,13 @@ bool MotionMeasurer::may_be_by_chance(const RectifiedStereo& stereo, const Landm
          fit.rms_px > kChanceRadiusFraction * options_.matching.correlation_radius_px;
 }
 
-/// Why a motion may be that of an object that has come into view: it was not predicted, and established landmarks that
-/// should be in view do not follow it. Empty otherwise.
-std::string MotionMeasurer::doubt_of_age(const RectifiedStereo& stereo, const LandmarkMemory& map,
-                                         const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
-                                         const MotionPrediction& prediction) const {
-  if (!prediction.from_measured_motion || !is_of_young_landmarks(matches, fit)) return {};
+/// Whether established landmarks that should be in view do not follow a motion: it may be that of an object.
+bool MotionMeasurer::contradicts_established(const RectifiedStereo& stereo, const LandmarkMemory& map,
+                                             const std::vector<LandmarkMatch>& matches, const MotionFit& fit) const {
   const int expected = count_in_view(stereo, map, fit.previous_from_current, WhichLandmarks::established);
   int agreeing = 0;
   for (std::size_t i = 0; i < matches.size(); ++i) agreeing += fit.inlier[i] && matches[i].established;
-  if (expected < options_.motion.min_inliers || agreeing >= kMinAgreeingFraction * expected) return {};
-  std::vector<Pose> starts = prediction.other_starts;
-  starts.push_back(prediction.motion);
-  for (const Pose& start : starts)
-    if (is_as_predicted(stereo, matches, fit, start)) return {};
-  return fmt::format("most of the {} landmarks that agree are new, and their motion was not predicted", fit.inliers);
+  return expected >= options_.motion.min_inliers && agreeing < kMinAgreeingFraction * expected;
 }
 
 void MotionMeasurer::decide_status(const RectifiedStereo& stereo, const std::string& doubt,
@@ -165,10 +166,11 @@ MotionMeasurement MotionMeasurer::measure(const LandmarkFrame& previous, const S
   }
   const bool undisputed = fit->inliers >= kMinUndisputedFraction * static_cast<double>(landmarks);
   if (undisputed && !start.object) start.doubt.clear();
-  if (!start.object) {
-    std::string by_age = doubt_of_age(images.geometry, previous.map, matches, *fit, prediction);
-    measured.untrusted = !by_age.empty() && !trusts_new;
-    if (!by_age.empty()) start.doubt = std::move(by_age);
+  measured.is_new = is_new(images.geometry, matches, *fit, prediction);
+  if (measured.is_new && !start.object && contradicts_established(images.geometry, previous.map, matches, *fit)) {
+    start.doubt =
+        fmt::format("most of the {} landmarks that agree are new, and their motion was not predicted", fit->inliers);
+    measured.untrusted = !trusts_new;
     if (measured.untrusted) {
       measured.reason = std::move(start.doubt);
       return measured;

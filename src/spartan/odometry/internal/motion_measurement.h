@@ -20,6 +20,7 @@ struct MotionMeasurement {
   UncertainPose previous_from_current;
   int matches = 0;
   MotionFit fit;           ///< of the matches that are kept; only of a motion that was measured
+  bool is_new = false;     ///< most landmarks that agree are new, and their motion was not predicted
   bool untrusted = false;  ///< lost although a motion was found: it is rather that of an object
   bool ambiguous = false;  ///< measured, but it may be that of an object
   OdometryTimes times;
@@ -51,9 +52,8 @@ class MotionMeasurer {
  private:
   bool may_be_by_chance(const RectifiedStereo& stereo, const LandmarkMemory& map, const MotionFit& fit,
                         const MotionPrediction& prediction) const;
-  std::string doubt_of_age(const RectifiedStereo& stereo, const LandmarkMemory& map,
-                           const std::vector<LandmarkMatch>& matches, const MotionFit& fit,
-                           const MotionPrediction& prediction) const;
+  bool contradicts_established(const RectifiedStereo& stereo, const LandmarkMemory& map,
+                               const std::vector<LandmarkMatch>& matches, const MotionFit& fit) const;
   void decide_status(const RectifiedStereo& stereo, const std::string& doubt, MotionMeasurement& measured) const;
 
   OdometryOptions options_;

@@ -4,10 +4,10 @@
 
 namespace spartan {
 
-Matrix6d calibration_covariance(const Pose& body_motion, const Pose& body_from_left, const Rig& rig,
-                                const StereoPair& pair, const CalibrationErrors& errors) {
+CalibrationEffect calibration_effect(const Pose& body_motion, const Pose& body_from_left, const Rig& rig,
+                                     const StereoPair& pair, const CalibrationErrors& errors) {
   const Matrix6d to_body = adjoint(body_from_left);
-  Matrix6d covariance = Matrix6d::Zero();
+  CalibrationEffect effect = CalibrationEffect::Zero();
 
   if (rig.convention == PoseConvention::body) {
     const bool fixed = rig.find_camera(pair.left)->mount == "body";
@@ -17,8 +17,7 @@ Matrix6d calibration_covariance(const Pose& body_motion, const Pose& body_from_l
     Vector6d mount;
     mount.head<3>().setConstant(1e-3 * errors.mount_mm);
     mount.tail<3>().setConstant(rotation_rad);
-    const Matrix6d by_mount = (Matrix6d::Identity() - adjoint(body_motion.inverse())) * to_body;
-    covariance += by_mount * mount.cwiseAbs2().asDiagonal() * by_mount.transpose();
+    effect.leftCols<6>() = (Matrix6d::Identity() - adjoint(body_motion.inverse())) * to_body * mount.asDiagonal();
   }
 
   const Pose motion = body_from_left.inverse() * body_motion * body_from_left;
@@ -26,11 +25,9 @@ Matrix6d calibration_covariance(const Pose& body_motion, const Pose& body_from_l
   moved << motion.rotation().conjugate() * motion.translation(), Eigen::Vector3d::Zero();
   turned << Eigen::Vector3d::Zero(), log_so3(motion.rotation());
   const double scale = 0.01 * errors.scale_percent;
-  for (const Vector6d& along : {moved, turned}) {
-    const Vector6d e = scale * (to_body * along);
-    covariance += e * e.transpose();
-  }
-  return covariance;
+  effect.col(6) = scale * (to_body * moved);
+  effect.col(7) = scale * (to_body * turned);
+  return effect;
 }
 
 }  // namespace spartan

@@ -41,6 +41,11 @@ Matrix6d sampled(const Pose& body_motion, const CalibrationErrors& errors, doubl
   return sum / kSamples;
 }
 
+Matrix6d calibration_covariance(const Pose& motion, const Rig& rig, const CalibrationErrors& errors) {
+  const CalibrationEffect effect = calibration_effect(motion, kBodyFromLeft, rig, rig.pairs[0], errors);
+  return effect * effect.transpose();
+}
+
 void expect_near(const Matrix6d& covariance, const Matrix6d& expected) {
   const Vector6d sigma = expected.diagonal().cwiseSqrt();
   for (int i = 0; i < 6; ++i) {
@@ -49,26 +54,23 @@ void expect_near(const Matrix6d& covariance, const Matrix6d& expected) {
   }
 }
 
-TEST(CalibrationCovariance, IsThatOfSampledErrors) {
+TEST(CalibrationEffect, IsThatOfSampledErrors) {
   const CalibrationErrors errors{0.025, 0.3, 0.15, 2, 0.1};
   for (const Pose& motion :
        {Pose::from_translation({0.1, 0, 0}), Pose(exp_so3({0.02, 0.01, 0.17}), {0.05, -0.02, 0.01})}) {
-    expect_near(calibration_covariance(motion, kBodyFromLeft, one_pair(false), one_pair(false).pairs[0], errors),
-                sampled(motion, errors, 0));
-    expect_near(calibration_covariance(motion, kBodyFromLeft, one_pair(true), one_pair(true).pairs[0], errors),
-                sampled(motion, errors, errors.pan_tilt_deg));
+    expect_near(calibration_covariance(motion, one_pair(false), errors), sampled(motion, errors, 0));
+    expect_near(calibration_covariance(motion, one_pair(true), errors), sampled(motion, errors, errors.pan_tilt_deg));
   }
 }
 
-TEST(CalibrationCovariance, IsZeroAtRestAndOfTheScaleAloneWhereTheBodyIsTheCamera) {
+TEST(CalibrationEffect, IsZeroAtRestAndOfTheScaleAloneWhereTheBodyIsTheCamera) {
   Rig rig = one_pair(false);
   const CalibrationErrors errors;
-  EXPECT_TRUE(calibration_covariance(Pose(), kBodyFromLeft, rig, rig.pairs[0], errors).isZero(1e-30));
+  EXPECT_TRUE(calibration_covariance(Pose(), rig, errors).isZero(1e-30));
   rig.convention = PoseConvention::left_optical;
   Matrix6d expected = Matrix6d::Zero();
   expected(0, 0) = 0.01 * errors.scale_percent * 0.01 * errors.scale_percent;
-  EXPECT_TRUE(calibration_covariance(Pose::from_translation({1, 0, 0}), kBodyFromLeft, rig, rig.pairs[0], errors)
-                  .isApprox(expected, 1e-9));
+  EXPECT_TRUE(calibration_covariance(Pose::from_translation({1, 0, 0}), rig, errors).isApprox(expected, 1e-9));
 }
 
 }  // namespace
