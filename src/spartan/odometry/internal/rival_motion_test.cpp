@@ -172,5 +172,15 @@ TEST(RivalMotion, IsChosenUnlessItIsCompactInAWideScene) {
   EXPECT_FALSE(kept.object);
 }
 
+// Near landmarks that move with the camera would be behind it by a prediction that drives past them.
+TEST(RivalMotion, PointsBehindTheCameraDoNotAgreeWithAPrediction) {
+  const std::vector<LandmarkMatch> matches = matches_of({{60, {220, 140}, {420, 340}, Pose(), 1}});
+  MotionFit fit;
+  fit.inlier.assign(matches.size(), true);
+  fit.inliers = static_cast<int>(matches.size());
+  EXPECT_TRUE(is_as_predicted(kPair, matches, fit, Pose()));
+  EXPECT_FALSE(is_as_predicted(kPair, matches, fit, Pose::from_translation({0, 0, 7})));
+}
+
 }  // namespace
 }  // namespace spartan::internal
