@@ -44,9 +44,9 @@ double deviation_from(const RectifiedStereo& stereo, const std::vector<LandmarkM
     const auto a = project_anchored(stereo, matches[i].point, by_motion * matches[i].previous_from_anchor);
     const auto b = project_anchored(stereo, matches[i].point, by_prediction * matches[i].previous_from_anchor);
     // A point that only one of them has in front of the camera is as far as can be.
-    if (a || b)
-      distances.push_back(a && b ? (a->measured - b->measured).head<2>().norm()
-                                 : std::numeric_limits<double>::infinity());
+    if (!a && !b) continue;
+    distances.push_back(a && b ? (a->measured - b->measured).head<2>().norm()
+                               : std::numeric_limits<double>::infinity());
   }
   if (distances.empty()) return 0;
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
