@@ -233,7 +233,8 @@ void Odometer::State::advance(const StereoImages& images, bool usable, bool same
     return;
   }
   if (lost) {
-    if (!memory.kept.is_kept() && same_geometry) keep(std::move(memory.reference));
+    if (!same_geometry) memory.kept = {};
+    if (same_geometry && !memory.kept.is_kept()) keep(std::move(memory.reference));
     memory.reference = std::move(memory.latest);
   }
   memory.frames_since_reference = 0;

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "spartan/numerics/random.h"
+#include "spartan/odometry/internal/landmarks/odometer_memory.h"
 #include "spartan/odometry/internal/synthetic_drive_test.h"
 #include "spartan/odometry/odometer.h"
 
@@ -147,6 +148,22 @@ TEST(OdometerFaults, FindsSharpLandmarksAfterBlurredFrames) {
   // What was measured in the blurred frames does not matter.
   EXPECT_LT((true_motion(3, 8).inverse() * chain.add(back)).translation().norm(), 0.002);
   EXPECT_EQ(odometer.add(pair_of(9)).status, TrackingStatus::tracking);
+}
+
+// Landmarks of other cameras are not searched.
+TEST(OdometerFaults, AChangeOfTheGeometryDiscardsTheKeptFrame) {
+  Odometer odometer = after_frames(4);
+  RectifiedPair pair = pair_of(4);
+  const Image<std::uint8_t> left = blurred(pair.left), right = blurred(pair.right);
+  pair.left = left;
+  pair.right = right;
+  odometer.add(pair);
+  const auto keeps_frame = [&] { return internal::OdometerMemory::restore(odometer.save()).value().kept.is_kept(); };
+  EXPECT_TRUE(keeps_frame());
+  pair = pair_of(5);
+  pair.geometry.focal_px *= 1.2;
+  EXPECT_EQ(odometer.add(pair).status, TrackingStatus::lost);
+  EXPECT_FALSE(keeps_frame());
 }
 
 TEST(OdometerFaults, IsLostWithoutImages) {
