@@ -153,14 +153,16 @@ TEST(OdometerFaults, FindsSharpLandmarksAfterBlurredFrames) {
 // Landmarks of other cameras are not searched.
 TEST(OdometerFaults, AChangeOfTheGeometryDiscardsTheKeptFrame) {
   Odometer odometer = after_frames(4);
-  RectifiedPair pair = pair_of(4);
-  const Image<std::uint8_t> left = blurred(pair.left), right = blurred(pair.right);
-  pair.left = left;
-  pair.right = right;
-  odometer.add(pair);
+  for (int i = 4; i < 6; ++i) {
+    RectifiedPair pair = pair_of(i);
+    const Image<std::uint8_t> left = blurred(pair.left), right = blurred(pair.right);
+    pair.left = left;
+    pair.right = right;
+    odometer.add(pair);
+  }
   const auto keeps_frame = [&] { return internal::OdometerMemory::restore(odometer.save()).value().kept.is_kept(); };
   EXPECT_TRUE(keeps_frame());
-  pair = pair_of(5);
+  RectifiedPair pair = pair_of(6);
   pair.geometry.focal_px *= 1.2;
   EXPECT_EQ(odometer.add(pair).status, TrackingStatus::lost);
   EXPECT_FALSE(keeps_frame());
