@@ -352,8 +352,9 @@ struct StationaryOptions {
     v.field("detect", detect,
             "True holds the pose exactly while the images show no motion, so that noise does not add up to drift.");
     v.field("max_flow_px", max_flow_px,
-            "Largest mean image flow in pixels, accumulated since the rover stopped, that still counts as stationary; "
-            "raising it tolerates vibration and hides slow motion for longer.",
+            "Largest mean image flow in pixels, accumulated since the rover stopped, that still counts as stationary, "
+            "unless the covariance of the measured motion excludes that; raising it tolerates vibration and hides slow "
+            "motion for longer.",
             between(0, 10));
   }
 };

@@ -39,6 +39,7 @@ class Consistency : public ::testing::Test {
     const RectifyingAxes axes = rectifying_axes(rig_.right_from_left(rig_.pairs[0]));
     body_from_rectified_ = rig_.body_from_camera("left") * Pose(axes.left_from_rectified, Eigen::Vector3d::Zero());
     folder_.write("rig.yaml", to_rig_yaml(rig_));
+    options_.mapping.map.calibration = {{0, 0, 0, 0, 0}};
     options_.localization.vision.white_noise_factor = 1;
     options_.localization.vision.drift_sigma_ratios =
         options_.localization.vision.constant_sigma_ratios = {0, 0, 0, 0, 0, 0};

@@ -15,6 +15,10 @@ namespace {
 constexpr double kChanceRadiusFraction = 0.25;
 /// Wrong matches are not more than this fraction of the landmarks; empirical.
 constexpr double kChanceFraction = 0.1;
+/// χ² of 99.9 % with 6 degrees of freedom, times 2²: at rest standard deviations are too small by up to 2, because the
+/// noise of the anchor's patch is the same in all frames (Odometer.IsStationaryOnImagesThatDifferInNoiseOnly; 73 at
+/// most on rover_sandbox).
+constexpr double kMaxRest = 4 * 22.46;
 /// Of the established landmarks that are in view, at least this fraction follows the motion of the scene; empirical.
 constexpr double kMinAgreeingFraction = 0.25;
 /// A motion that this fraction of all landmarks follows is not that of an object; empirical.
@@ -35,6 +39,12 @@ double mean_flow(const RectifiedStereo& stereo, const std::vector<LandmarkMatch>
     ++count;
   }
   return count > 0 ? sum / count : 0;
+}
+
+/// Whether the covariance of a motion leaves it open whether the rover has moved: χ² test, 6 degrees of freedom.
+bool agrees_with_rest(const MotionFit& fit) {
+  const Vector6d motion = log_se3(fit.previous_from_current);
+  return motion.dot(fit.covariance.ldlt().solve(motion)) <= kMaxRest;
 }
 
 /// Number of landmarks that a motion predicts inside of the left image.
@@ -129,7 +139,7 @@ void MotionMeasurer::decide_status(const RectifiedStereo& stereo, const std::str
   measured.status = TrackingStatus::tracking;
   if (!options_.stationary.detect) return;
   const double flow = mean_flow(stereo, matches, fit);
-  if (flow > options_.stationary.max_flow_px) return;
+  if (flow > options_.stationary.max_flow_px || !agrees_with_rest(fit)) return;
   // The anchors are not moved while the rover is stationary, so a slow creep accumulates until it exceeds the limit.
   measured.status = TrackingStatus::stationary;
   measured.reason = fmt::format("the image has shifted by {:.2f} px", flow);
