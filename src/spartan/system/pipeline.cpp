@@ -16,10 +16,6 @@ constexpr double kGravityOnEarth_m_s2 = 9.81;
 /// The newest sample of the localization is at most this old where it says how the rover has moved.
 constexpr double kLatestSample_s = 0.05;
 
-bool has_both_images(const RectifiedPair& pair) {
-  return !pair.left.empty() && !pair.right.empty();
-}
-
 }  // namespace
 
 LocalizationOptions internal::with_gravity(const RunOptions& options) {

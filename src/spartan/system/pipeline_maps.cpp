@@ -32,7 +32,7 @@ Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const Recti
   if (!maps_stops) return {};
   // A stop begins with a pair.
   const bool begins = frame.position_id != stop_stage.position_id();
-  if (begins && (frame.left.empty() || frame.right.empty())) return {};
+  if (begins && !has_both_images(rectified)) return {};
   return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
                                        localizer.estimate().world_from_body, motion);
 }
@@ -114,7 +114,7 @@ void Pipeline::State::update_keyframes(const RectifiedPair& rectified, const Mot
                                        const RelativeMotion& body_motion) {
   if (!maps_keyframes) return;
   if (!motion.first) keyframe_stage.advance(body_motion);
-  const bool usable = motion.status != TrackingStatus::lost && !rectified.left.empty() && !rectified.right.empty();
+  const bool usable = motion.status != TrackingStatus::lost && has_both_images(rectified);
   if (!usable || !keyframe_stage.is_due(rectified, world_from_left)) return;
   if (keyframe_stage.is_pending()) {
     keyframe_stage.hurry();

@@ -20,6 +20,11 @@ namespace internal {
 /// The localization options with the gravity of the run's options, or that of the Earth if they state none.
 LocalizationOptions with_gravity(const RunOptions& options);
 
+/// Of a frame with one image, only the motion is measured.
+inline bool has_both_images(const RectifiedPair& pair) {
+  return !pair.left.empty() && !pair.right.empty();
+}
+
 }  // namespace internal
 
 struct Pipeline::State {
