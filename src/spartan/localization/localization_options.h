@@ -1,6 +1,8 @@
 // Options of the localization. One set of defaults serves all recordings.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "spartan/camera/samples.h"
@@ -12,16 +14,25 @@ namespace spartan {
 /// random walk.
 struct InertialOptions {
   double gyro_noise_rad_s_sqrt_hz = 1.2e-4;  ///< rad/s/√Hz, white noise of the gyro
-  double gyro_bias_sigma_rad_s = 2e-4;       ///< rad/s, initial standard deviation of the gyro bias
-  double gyro_walk_rad_s2_sqrt_hz = 3e-6;    ///< rad/s²/√Hz, random walk of the gyro bias
+  double gyro_bias_sigma_rad_s = 0.05;       ///< rad/s, initial standard deviation of the gyro bias
+  double gyro_walk_rad_s2_sqrt_hz = 2e-5;    ///< rad/s²/√Hz, random walk of the gyro bias
   double accel_noise_m_s2_sqrt_hz = 1.5e-3;  ///< m/s²/√Hz, white noise of the accelerometer
-  double accel_bias_sigma_m_s2 = 0.02;       ///< m/s², initial standard deviation of the accelerometer bias
-  double accel_walk_m_s3_sqrt_hz = 1e-4;     ///< m/s³/√Hz, random walk of the accelerometer bias
+  double accel_bias_sigma_m_s2 = 0.3;        ///< m/s², initial standard deviation of the accelerometer bias
+  double accel_walk_m_s3_sqrt_hz = 1e-3;     ///< m/s³/√Hz, random walk of the accelerometer bias
+  double accel_scale_sigma = 0.004;          ///< standard deviation of measured over true gravity
   double timeout_s = 0.25;                   ///< s, longest gap that is integrated over
   double frozen_s = 0.5;                     ///< s, identical readings for this long exclude the IMU
-  double alignment_s = 1.0;                  ///< s, gravity alignment of an IMU that starts during the drive
+  double alignment_s = 1.0;                  ///< s, least length of the motions that align an IMU
   double stationary_gyro_rad_s = 0.004;      ///< rad/s, threshold on standard deviation and mean of a stationary gyro
   double stationary_accel_m_s2 = 0.03;  ///< m/s², threshold on the standard deviation of a stationary accelerometer
+
+  /// Largest standard deviations of the readings of a stationary rover, `interval_s` apart.
+  double stationary_gyro(double interval_s) const {
+    return std::max(stationary_gyro_rad_s, 2 * gyro_noise_rad_s_sqrt_hz / std::sqrt(std::max(interval_s, 1e-6)));
+  }
+  double stationary_accel(double interval_s) const {
+    return std::max(stationary_accel_m_s2, 2 * accel_noise_m_s2_sqrt_hz / std::sqrt(std::max(interval_s, 1e-6)));
+  }
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -52,6 +63,11 @@ struct InertialOptions {
         "accel_walk_m_s3_sqrt_hz", accel_walk_m_s3_sqrt_hz,
         "Random walk of the accelerometer bias, in m/s^3/sqrt(Hz); raising it lets the estimated bias change faster.",
         between(0, 10));
+    v.field(
+        "accel_scale_sigma", accel_scale_sigma,
+        "Standard deviation of the accelerometer's scale (and of the stated gravity), as a fraction; raising it lets "
+        "the measured size of gravity be estimated farther from the stated one.",
+        between(0, 0.2));
     v.field("timeout_s", timeout_s,
             "Longest gap between two IMU samples that is integrated over, in seconds; beyond it the constant-velocity "
             "model takes over.",
@@ -63,20 +79,18 @@ struct InertialOptions {
         between(0.01, 100));
     v.renamed("level_after_s", "alignment_s");
     v.field("alignment_s", alignment_s,
-            "An IMU that starts during the drive is aligned to gravity by its mean over this many seconds; raising it "
-            "averages out more of the rover's accelerations.",
+            "An IMU that is not aligned at the start (no rest, or it starts during the drive) is aligned by the visual "
+            "motions of at least this many seconds; raising it averages over more motions.",
             between(0.1, 100));
     v.renamed("still_gyro_rad_s", "stationary_gyro_rad_s");
     v.field("stationary_gyro_rad_s", stationary_gyro_rad_s,
-            "Standard deviation and mean of the gyro rate below which the rover may be stationary, in rad/s; raising "
-            "it triggers "
-            "zero-velocity updates more easily.",
+            "Standard deviation and mean of the gyro rate below which the rover may be stationary, in rad/s (or twice "
+            "the gyro's noise if that is more); raising it triggers zero-velocity updates more easily.",
             between(0, 1));
     v.renamed("still_accel_m_s2", "stationary_accel_m_s2");
     v.field("stationary_accel_m_s2", stationary_accel_m_s2,
-            "Standard deviation of the accelerometer below which the rover may be stationary, in m/s^2; raising it "
-            "triggers zero-velocity "
-            "updates more easily.",
+            "Standard deviation of the accelerometer below which the rover may be stationary, in m/s^2 (or twice its "
+            "noise if that is more); raising it triggers zero-velocity updates more easily.",
             between(0, 10));
   }
 };

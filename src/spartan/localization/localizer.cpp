@@ -13,7 +13,7 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t kStateVersion = 4;
+constexpr std::uint32_t kStateVersion = 5;
 
 }  // namespace
 
@@ -72,8 +72,8 @@ Localizer& Localizer::operator=(Localizer&&) noexcept = default;
 Localizer::~Localizer() = default;
 
 void Localizer::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
-                      const std::optional<Eigen::Vector3d>& up_in_body) {
-  state_->filter.start(stamp, ahead_in_body, up_in_body);
+                      const std::optional<Eigen::Vector3d>& up_in_body, const Eigen::Vector3d& assumed_up_in_body) {
+  state_->filter.start(stamp, ahead_in_body, up_in_body, assumed_up_in_body);
 }
 bool Localizer::started() const {
   return state_->filter.started();
@@ -104,6 +104,8 @@ LocalizationEstimate Localizer::estimate() const {
   e.velocity_m_s = rotation * s.velocity_m_s;
   e.velocity_covariance = by_attitude_and_velocity * p.block<6, 6>(error_at::kAttitude, error_at::kAttitude) *
                           by_attitude_and_velocity.transpose();
+  e.biases = {s.gyro_bias_rad_s, p.diagonal().segment<3>(error_at::kGyroBias).cwiseSqrt(), s.accel_bias_m_s2,
+              p.diagonal().segment<3>(error_at::kAccelBias).cwiseSqrt()};
   if (m.wheels.slip_known) e.slip = WheelSlip{m.wheels.slip_stamp, m.wheels.slip, m.wheels.slip_sigma};
   e.heading.east = m.compass.heading_east;
   if (m.compass.offset_known) {

@@ -32,6 +32,13 @@ struct RelativeMotion {
   /// E: what each error of the calibration changes, at one standard deviation. Its part E Eᵀ of the covariance is that
   /// of errors which all motions share.
   Eigen::Matrix<double, 6, 8> by_calibration = Eigen::Matrix<double, 6, 8>::Zero();
+  /// D: standard deviations to which the errors that last from motion to motion are in proportion. None: those of
+  /// `covariance` without E Eᵀ.
+  std::optional<Vector6d> lasting_sigma{};
+
+  /// `covariance` without the part of the calibration.
+  Matrix6d own_covariance() const;
+  Vector6d drift_scale() const;
 };
 
 /// The sensors that are monitored: whether one is used, and why not.
@@ -54,6 +61,7 @@ enum class HealthReason : std::uint8_t {
   frozen,        ///< identical readings
   out_of_range,  ///< rate or specific force beyond the physical range of a rover
   contradicted,  ///< vision contradicts its prediction
+  not_aligned,   ///< its readings fit the visual motions with no biases and gravity
   outvoted,      ///< vision contradicts the IMU and the wheels, which agree
   lost,          ///< vision could not measure the motion
   never_seen,
@@ -178,6 +186,12 @@ struct WorldHeading {
   double compass_offset_sigma_rad = 0;
 };
 
+/// Biases of the IMU with their standard deviations, body frame.
+struct InertialBiases {
+  Eigen::Vector3d gyro_rad_s = Eigen::Vector3d::Zero(), gyro_sigma_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_m_s2 = Eigen::Vector3d::Zero(), accel_sigma_m_s2 = Eigen::Vector3d::Zero();
+};
+
 struct LocalizationEstimate {
   Stamp stamp;                    ///< of the newest sample
   UncertainPose world_from_body;  ///< best estimate; jumps where map, compass or inclinometer correct it
@@ -185,6 +199,7 @@ struct LocalizationEstimate {
   Pose world_from_odom;
   Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();  ///< world
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
+  InertialBiases biases;
   std::optional<WheelSlip> slip;
   WorldHeading heading;
   bool gravity_measured = false;  ///< z was aligned to measured gravity at the start; else to the start attitude
@@ -211,8 +226,9 @@ class Localizer {
 
   /// Call once, at the first frame. `ahead_in_body`: the first left optical axis. Samples of the last 10 s up to
   /// `stamp` that were added before are used for static alignment only. `up_in_body`: an approximate vertical (1° to
-  /// 2°) that is used if neither IMU nor inclinometer give one.
-  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {});
+  /// 2°) that is used if neither IMU nor inclinometer give one; `assumed_up_in_body`, if nothing else is known.
+  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {},
+             const Eigen::Vector3d& assumed_up_in_body = Eigen::Vector3d::UnitZ());
   bool started() const;
 
   /// Returns whether the measurement was accepted into the buffer. Add one RelativeMotion for every frame after the

@@ -19,8 +19,8 @@ bool valid(const InclinometerSample& s) {
 }
 bool valid(const RelativeMotion& m) {
   if (!m.measured) return true;
-  return m.previous_from_current.all_finite() && m.covariance.allFinite() &&
-         (m.covariance.diagonal().array() >= 0).all();
+  return m.previous_from_current.all_finite() && m.covariance.allFinite() && m.by_calibration.allFinite() &&
+         (!m.lasting_sigma || (m.lasting_sigma->array() >= 0).all()) && (m.covariance.diagonal().array() >= 0).all();
 }
 bool valid(const PoseConstraint& c) {
   return c.world_from_body.all_finite() && c.information.allFinite() && c.map_covariance.allFinite() &&
@@ -31,6 +31,16 @@ bool valid(const LateConstraint& c) {
 }
 
 }  // namespace
+
+Matrix6d RelativeMotion::own_covariance() const {
+  Matrix6d own = covariance - by_calibration * by_calibration.transpose();
+  own.diagonal() = own.diagonal().cwiseMax(0);
+  return own;
+}
+
+Vector6d RelativeMotion::drift_scale() const {
+  return lasting_sigma.value_or(own_covariance().diagonal().cwiseSqrt());
+}
 
 LocalizationSensor sensor_of(const Measurement& m) {
   constexpr LocalizationSensor kOfIndex[] = {LocalizationSensor::imu,          LocalizationSensor::vision,

@@ -130,6 +130,9 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
       health.reason =
           fmt::format("contradicts visual odometry: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
       break;
+    case HealthReason::not_aligned:
+      health.reason = "its readings fit the motions by vision with no biases and direction of gravity";
+      break;
     case HealthReason::outvoted:
       health.reason = fmt::format(
           "contradicts the IMU and the wheels, which agree: NIS {:.1f} above the gate of {:.1f}", nis, limit);

@@ -42,10 +42,11 @@ std::optional<StaticReading> static_reading(std::span<const ImuSample> samples, 
   const double accel_scatter = scatter(accel_squares, r.accel_m_s2), gyro_scatter = scatter(gyro_squares, r.gyro_rad_s);
   if (std::abs(r.accel_m_s2.norm() - o.gravity_m_s2) > kMaxGravityError * o.gravity_m_s2) return std::nullopt;
   if (accel_scatter > kMaxScatter * o.gravity_m_s2) return std::nullopt;
-  r.stationary =
-      accel_scatter < o.imu.stationary_accel_m_s2 && gyro_scatter < o.imu.stationary_gyro_rad_s &&
-      r.gyro_rad_s.norm() < 3 * (o.imu.gyro_bias_sigma_rad_s + o.imu.stationary_gyro_rad_s / std::sqrt(count));
   const double seconds = std::max(seconds_between(samples.front().stamp, samples.back().stamp), 1e-3);
+  const double interval = seconds / count, gyro_limit = o.imu.stationary_gyro(interval);
+  // By the scatter: the mean of a stationary gyro is its bias, which has no limit but its standard deviation.
+  r.stationary = accel_scatter < o.imu.stationary_accel(interval) && gyro_scatter < gyro_limit &&
+                 r.gyro_rad_s.norm() < 3 * (o.imu.gyro_bias_sigma_rad_s + gyro_limit / std::sqrt(count));
   r.gyro_sigma_rad_s = o.imu.gyro_noise_rad_s_sqrt_hz / std::sqrt(seconds) + 1e-7;
   // A moving rover accelerates: the error of its mean is of the order of the scatter.
   r.accel_sigma_m_s2 = o.imu.accel_noise_m_s2_sqrt_hz / std::sqrt(seconds) + (r.stationary ? 0 : accel_scatter);

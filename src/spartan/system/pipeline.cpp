@@ -15,6 +15,16 @@ namespace {
 constexpr double kGravityOnEarth_m_s2 = 9.81;
 /// The newest sample of the localization is at most this old where it says how the rover has moved.
 constexpr double kLatestSample_s = 0.05;
+/// Largest angle between the body's z axis and the image's vertical at which z is taken for the vertical of a body that
+/// nothing else levels.
+constexpr double kMaxBodyTilt_rad = 1;
+
+// What is up in the body of a rig, if no sensor tells: z, unless the camera contradicts it (the body of EuRoC and
+// Kalibr is the IMU, with any axes).
+Eigen::Vector3d assumed_up(const Pose& body_from_left) {
+  const Eigen::Vector3d up_of_image = body_from_left.rotation() * -Eigen::Vector3d::UnitY();
+  return up_of_image.z() > std::cos(kMaxBodyTilt_rad) ? Eigen::Vector3d::UnitZ().eval() : up_of_image;
+}
 
 }  // namespace
 
@@ -34,7 +44,8 @@ Status Pipeline::State::check_new(const StereoFrame& frame, std::size_t pair_ind
 }
 
 void Pipeline::State::start(const RectifiedPair& rectified) {
-  localizer.start(rectified.stamp, rectified.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body);
+  localizer.start(rectified.stamp, rectified.body_from_left.rotation() * Eigen::Vector3d::UnitZ(), up_in_body,
+                  assumed_up(rectified.body_from_left));
   const Pose first = localizer.estimate().world_from_body.pose;
   if (!options.odometry_only) {
     odometry_filter.start(rectified.stamp, first);

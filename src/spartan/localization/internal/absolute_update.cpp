@@ -72,11 +72,11 @@ void ErrorStateFilter::update(const InclinometerSample& sample) {
   const double sigma =
       options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad);
   NavigationState& s = memory_.estimate.state;
-  if (!memory_.imu.aligned) {
+  if (!memory_.gravity_known) {
     const Eigen::Vector3d up = s.world_from_body.rotation() * up_of_roll_pitch(sample.roll_rad, sample.pitch_rad);
     if (up.z() <= 0) return;
     s.gravity_tilt_rad = tilt_of_up(up);
-    memory_.imu.aligned = true;
+    memory_.gravity_known = true;
   }
   const Innovation innovation = inclinometer_innovation(s, sample.roll_rad, sample.pitch_rad, sigma);
   inflate_attitude(innovation);

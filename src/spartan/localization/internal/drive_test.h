@@ -166,10 +166,12 @@ inline NavigationState random_navigation_state(Random& random) {
   s.gyro_bias_rad_s = normal3(random, 0.1);
   s.accel_bias_m_s2 = normal3(random, 0.1);
   s.gravity_tilt_rad = {random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2)};
+  s.gravity_scale = random.uniform(0.9, 1.1);
   s.wheel_scale = random.uniform(0.9, 1.1);
   s.compass_offset_rad = random.uniform(-3, 3);
   s.inclinometer_bias_rad = {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)};
   for (int i = 0; i < 6; ++i) s.vision_drift[i] = random.normal(), s.vision_constant[i] = random.normal();
+  for (int i = 0; i < 8; ++i) s.calibration[i] = random.normal();
   s.world_from_vision_clone = s.world_from_body * exp_se3(tangent(0.3, 0.2));
   s.world_from_step_clone = s.world_from_body * exp_se3(tangent(0.3, 0.2));
   return s;

@@ -11,11 +11,13 @@ NavigationState add_error(const NavigationState& s, const ErrorVector& e) {
   r.gyro_bias_rad_s += e.segment<3>(error_at::kGyroBias);
   r.accel_bias_m_s2 += e.segment<3>(error_at::kAccelBias);
   r.gravity_tilt_rad += e.segment<2>(error_at::kGravityTilt);
+  r.gravity_scale += e[error_at::kGravityScale];
   r.wheel_scale += e[error_at::kWheelScale];
   r.compass_offset_rad += e[error_at::kCompassOffset];
   r.inclinometer_bias_rad += e.segment<2>(error_at::kInclinometerBias);
   r.vision_drift += e.segment<6>(error_at::kVisionDrift);
   r.vision_constant += e.segment<6>(error_at::kVisionConstant);
+  r.calibration += e.segment<8>(error_at::kCalibration);
   r.world_from_vision_clone = s.world_from_vision_clone * exp_se3(e.segment<6>(error_at::kVisionClone));
   r.world_from_step_clone = s.world_from_step_clone * exp_se3(e.segment<6>(error_at::kStepClone));
   return r;
@@ -28,11 +30,13 @@ ErrorVector error_between(const NavigationState& a, const NavigationState& b) {
   e.segment<3>(error_at::kGyroBias) = b.gyro_bias_rad_s - a.gyro_bias_rad_s;
   e.segment<3>(error_at::kAccelBias) = b.accel_bias_m_s2 - a.accel_bias_m_s2;
   e.segment<2>(error_at::kGravityTilt) = b.gravity_tilt_rad - a.gravity_tilt_rad;
+  e[error_at::kGravityScale] = b.gravity_scale - a.gravity_scale;
   e[error_at::kWheelScale] = b.wheel_scale - a.wheel_scale;
   e[error_at::kCompassOffset] = b.compass_offset_rad - a.compass_offset_rad;
   e.segment<2>(error_at::kInclinometerBias) = b.inclinometer_bias_rad - a.inclinometer_bias_rad;
   e.segment<6>(error_at::kVisionDrift) = b.vision_drift - a.vision_drift;
   e.segment<6>(error_at::kVisionConstant) = b.vision_constant - a.vision_constant;
+  e.segment<8>(error_at::kCalibration) = b.calibration - a.calibration;
   e.segment<6>(error_at::kVisionClone) = log_se3(a.world_from_vision_clone.inverse() * b.world_from_vision_clone);
   e.segment<6>(error_at::kStepClone) = log_se3(a.world_from_step_clone.inverse() * b.world_from_step_clone);
   return e;

@@ -18,19 +18,23 @@ inline constexpr int kVelocity = 6;    ///< m/s, body
 inline constexpr int kGyroBias = 9;    ///< rad/s, body
 inline constexpr int kAccelBias = 12;  ///< m/s², body
 inline constexpr int kMoving = 15;     ///< errors before this index are propagated
-inline constexpr int kGravityTilt = 15;
-inline constexpr int kWheelScale = 17;
-inline constexpr int kCompassOffset = 18;
-inline constexpr int kInclinometerBias = 19;
-inline constexpr int kVisionDrift = 21;
-inline constexpr int kVisionConstant = 27;
-inline constexpr int kVisionClone = 33;  ///< of the pose at the last frame
-inline constexpr int kStepClone = 39;    ///< of the pose at the start of the current wheel step
-inline constexpr int kSize = 45;
+inline constexpr int kGravityTilt = kMoving;
+inline constexpr int kGravityScale = kGravityTilt + 2;
+inline constexpr int kWheelScale = kGravityScale + 1;
+inline constexpr int kCompassOffset = kWheelScale + 1;
+inline constexpr int kInclinometerBias = kCompassOffset + 1;
+inline constexpr int kVisionDrift = kInclinometerBias + 2;
+inline constexpr int kVisionConstant = kVisionDrift + 6;
+inline constexpr int kCalibration = kVisionConstant + 6;
+inline constexpr int kVisionClone = kCalibration + 8;  ///< of the pose at the last frame
+inline constexpr int kStepClone = kVisionClone + 6;    ///< of the pose at the start of the current wheel step
+inline constexpr int kSize = kStepClone + 6;
 }  // namespace error_at
 
 using ErrorVector = Eigen::Matrix<double, error_at::kSize, 1>;
 using ErrorCovariance = Eigen::Matrix<double, error_at::kSize, error_at::kSize>;
+
+using Vector8d = Eigen::Matrix<double, 8, 1>;
 
 struct NavigationState {
   Pose world_from_body;
@@ -41,12 +45,16 @@ struct NavigationState {
   /// Rotation vector (x, y) from the world's z axis to the true vertical: the first pose defines the world exactly, so
   /// that the direction of gravity is what is uncertain.
   Eigen::Vector2d gravity_tilt_rad = Eigen::Vector2d::Zero();
+  /// Measured over true gravity: the scale error of the accelerometer where it matters.
+  double gravity_scale = 1;
   double wheel_scale = 1;                                           ///< travelled over counted distance
   double compass_offset_rad = 0;                                    ///< reading − heading in the world
   Eigen::Vector2d inclinometer_bias_rad = Eigen::Vector2d::Zero();  ///< roll, pitch
   /// Drift of vision in standard deviations of a visual motion: a slowly changing part and one that is constant over
   /// the drive.
   Vector6d vision_drift = Vector6d::Zero(), vision_constant = Vector6d::Zero();
+  /// Errors of the calibration of the cameras, in their standard deviations (RelativeMotion::by_calibration).
+  Vector8d calibration = Vector8d::Zero();
   Pose world_from_vision_clone, world_from_step_clone;
 };
 

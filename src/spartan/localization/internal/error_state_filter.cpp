@@ -19,9 +19,13 @@ constexpr double kExact = 1e-6;
 /// Initial standard deviations: of quantities that were not measured, of the velocity of a stationary rover, and of the
 /// vertical before the static alignment corrects it.
 constexpr double kUnknownSpeed_m_s = 20, kRestingSpeed_m_s = 0.01;
-constexpr double kAlignedTilt_rad = 0.2, kUnknownTilt_rad = 0.35, kUnknownHeading_rad = 10;
-/// Standard deviation of a rover's mean acceleration during gravity alignment.
+constexpr double kAlignedTilt_rad = 0.5, kUnknownTilt_rad = 0.35, kUnknownHeading_rad = 10;
+/// Standard deviation of a rover's mean acceleration while its IMU is levelled.
 constexpr double kLevelError_m_s2 = 0.1;
+/// The IMU is used once its biases and the vertical are known this well: errors beyond are not linear any more.
+constexpr double kAlignedGyroBias_rad_s = 0.01, kAlignedUp_rad = 0.2;
+/// An IMU that cannot be aligned for this long is suspect.
+constexpr double kSlowAlignment_s = 10;
 /// Longest step of the constant-velocity model: beyond it the covariance stops growing.
 constexpr double kMaxStep_s = 60;
 
@@ -43,12 +47,6 @@ std::vector<T> only(std::span<const Measurement> all) {
   return some;
 }
 
-ImuSample between(const ImuSample& a, const ImuSample& b, Stamp at) {
-  const double whole = seconds_between(a.stamp, b.stamp);
-  const double part = whole > 0 ? std::clamp(seconds_between(a.stamp, at) / whole, 0.0, 1.0) : 1.0;
-  return {at, a.gyro_rad_s + part * (b.gyro_rad_s - a.gyro_rad_s), a.accel_m_s2 + part * (b.accel_m_s2 - a.accel_m_s2)};
-}
-
 }  // namespace
 
 ErrorStateFilter::ErrorStateFilter(const LocalizationOptions& options) : options_(options) {
@@ -60,7 +58,8 @@ ErrorStateFilter::ErrorStateFilter(const LocalizationOptions& options) : options
 }
 
 void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before,
-                             const std::optional<Eigen::Vector3d>& up_in_body) {
+                             const std::optional<Eigen::Vector3d>& up_in_body,
+                             const Eigen::Vector3d& assumed_up_in_body) {
   const auto imu = only<ImuSample>(before);
   const auto wheels = only<WheelSample>(before);
   const auto rest = static_reading(imu, options_);
@@ -68,13 +67,14 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   const auto heading = consensus_heading(only<CompassSample>(before), options_.compass.min_sigma_rad);
   const Eigen::Vector3d up = rest   ? rest->accel_m_s2.normalized()
                              : tilt ? up_of_roll_pitch(tilt->roll_rad, tilt->pitch_rad)
-                                    : up_in_body.value_or(Eigen::Vector3d::UnitZ());
+                                    : up_in_body.value_or(assumed_up_in_body.normalized());
 
   FilterMemory m;
   m.started = true;
   m.stamp = stamp;
-  m.imu.aligned = rest || tilt;  // up_in_body alone is not accurate enough for inertial integration
-  m.gravity_measured = m.imu.aligned || up_in_body;
+  m.imu.aligned = rest && rest->stationary;  // otherwise its biases and the velocity are unknown
+  m.gravity_known = rest || tilt;
+  m.gravity_measured = m.gravity_known || up_in_body;
   m.compass.heading_east = m.compass.offset_known = heading.has_value();
   NavigationState& s = m.estimate.state;
   s.world_from_body = first_pose(up, ahead_in_body, 0);
@@ -85,7 +85,9 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   set_variance(p, error_at::kVelocity, 3, rest && rest->stationary ? kRestingSpeed_m_s : kUnknownSpeed_m_s);
   set_variance(p, error_at::kGyroBias, 3, std::max(options_.imu.gyro_bias_sigma_rad_s, 1e-9));
   set_variance(p, error_at::kAccelBias, 3, std::max(options_.imu.accel_bias_sigma_m_s2, 1e-9));
-  set_variance(p, error_at::kGravityTilt, 2, m.imu.aligned ? kAlignedTilt_rad : kUnknownTilt_rad);
+  set_variance(p, error_at::kGravityTilt, 2, m.gravity_known ? kAlignedTilt_rad : kUnknownTilt_rad);
+  set_variance(p, error_at::kGravityScale, 1, std::max(options_.imu.accel_scale_sigma, 1e-9));
+  set_variance(p, error_at::kCalibration, 8, 1);
   set_variance(p, error_at::kWheelScale, 1, std::max(options_.wheels.scale_sigma, 1e-6));
   set_variance(p, error_at::kCompassOffset, 1,
                heading ? std::hypot(heading->sigma_rad, options_.compass.offset_sigma_rad) : kUnknownHeading_rad);
@@ -114,9 +116,12 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   for (const Measurement& sample : before) m.monitor(sensor_of(sample)).see(stamp_of_measurement(sample));
   m.monitor(LocalizationSensor::vision).see(stamp);
   if (!imu.empty()) {
-    m.imu.known = m.imu.gyro_rotation_complete = true;
+    m.imu.known = true;
     m.imu.last = imu.back();
-    m.imu.changed = m.imu.block.from = m.imu.align_from = imu.back().stamp;
+    m.imu.changed = m.imu.block.from = m.imu.level_from = imu.back().stamp;
+    for (std::size_t i = 1; i < imu.size(); ++i) m.imu.noise.add(imu[i - 1], imu[i]);
+    if (!m.imu.aligned) m.imu.window.begin(stamp);
+    m.imu.waiting_since = stamp;
   }
   if (!wheels.empty()) {
     m.wheels.known = true;
@@ -151,7 +156,7 @@ void ErrorStateFilter::propagate_to(Stamp stamp, const ImuSample* reached) {
   const ImuSample& last = memory_.imu.last;
   if (inertial_usable() && seconds_between(last.stamp, stamp) <= options_.imu.timeout_s) {
     if (reached != nullptr) {
-      propagate_inertially(seconds, between(last, *reached, memory_.stamp), *reached);
+      propagate_inertially(seconds, interpolate(last, *reached, memory_.stamp), *reached);
     } else {
       propagate_inertially(seconds, last, last);
     }
@@ -164,8 +169,7 @@ void ErrorStateFilter::propagate_to(Stamp stamp, const ImuSample* reached) {
 
 void ErrorStateFilter::propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to) {
   const InertialStep step{from.gyro_rad_s, to.gyro_rad_s, from.accel_m_s2, to.accel_m_s2, seconds};
-  const InertialNoise noise{options_.imu.gyro_noise_rad_s_sqrt_hz, options_.imu.accel_noise_m_s2_sqrt_hz,
-                            options_.imu.gyro_walk_rad_s2_sqrt_hz, options_.imu.accel_walk_m_s3_sqrt_hz};
+  const InertialNoise noise = inertial_noise(options_.imu, memory_.imu.noise);
   propagate_covariance(memory_.estimate.covariance,
                        transition(memory_.estimate.state, step, noise, options_.gravity_m_s2));
   memory_.estimate.state = propagate(memory_.estimate.state, step, options_.gravity_m_s2);
@@ -203,16 +207,21 @@ void ErrorStateFilter::propagate_biases(double seconds) {
 
 void ErrorStateFilter::update(const ImuSample& sample) {
   check_reading(sample);
-  integrate_gyro(sample);
+  InertialMemory& imu = memory_.imu;
+  if (imu.known) {
+    imu.noise.add(imu.last, sample);
+    if (!inertial_usable()) {
+      search_alignment(sample);
+      if (!memory_.gravity_known) level(sample);
+    }
+  }
   propagate_to(sample.stamp, &sample);
   if (inertial_usable()) ++memory_.monitor(LocalizationSensor::imu).used;
-  InertialMemory& imu = memory_.imu;
   if (!imu.known) {
     imu.known = true;
-    imu.changed = imu.block.from = imu.align_from = sample.stamp;
+    imu.changed = imu.block.from = imu.level_from = imu.waiting_since = sample.stamp;
   }
   imu.last = sample;
-  if (!imu.aligned) align_to_gravity(sample);
   detect_stationary(sample);
 }
 
@@ -233,41 +242,92 @@ void ErrorStateFilter::check_reading(const ImuSample& sample) {
   }
 }
 
-void ErrorStateFilter::integrate_gyro(const ImuSample& sample) {
-  InertialMemory& imu = memory_.imu;
-  if (!imu.known) return;
-  const Stamp from = std::max(imu.last.stamp, memory_.vision.clone_stamp);
-  const double seconds = seconds_between(from, sample.stamp);
-  if (seconds_between(imu.last.stamp, sample.stamp) > options_.imu.timeout_s) imu.gyro_rotation_complete = false;
-  if (!(seconds > 0)) return;
-  const Eigen::Vector3d rate = 0.5 * (imu.last.gyro_rad_s + sample.gyro_rad_s) - memory_.estimate.state.gyro_bias_rad_s;
-  imu.gyro_rotation = (imu.gyro_rotation * exp_so3(rate * seconds)).normalized();
-  imu.gyro_rotation_s += seconds;
-}
-
-/// Gravity alignment of an IMU that starts during the drive: the mean specific force points up, but for the rover's
-/// accelerations.
-void ErrorStateFilter::align_to_gravity(const ImuSample& sample) {
+/// The vertical at once, whatever the slope: the mean specific force points up, but for the rover's accelerations.
+void ErrorStateFilter::level(const ImuSample& sample) {
   InertialMemory& imu = memory_.imu;
   NavigationState& s = memory_.estimate.state;
-  imu.align_force_sum += s.world_from_body.rotation() * sample.accel_m_s2;
-  ++imu.align_count;
-  if (seconds_between(imu.align_from, sample.stamp) < options_.imu.alignment_s) return;
-  const Eigen::Vector3d mean = imu.align_force_sum / imu.align_count;
-  imu.align_from = sample.stamp;
-  imu.align_force_sum.setZero();
-  imu.align_count = 0;
-  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::imu);
-  if (std::abs(mean.norm() - options_.gravity_m_s2) > 0.05 * options_.gravity_m_s2 || mean.z() <= 0) {
-    monitor.state = SensorState::suspect;
-    monitor.reason = HealthReason::out_of_range;
-    return;
-  }
+  imu.level_force_sum += s.world_from_body.rotation() * sample.accel_m_s2;
+  ++imu.level_count;
+  if (seconds_between(imu.level_from, sample.stamp) < options_.imu.alignment_s) return;
+  const Eigen::Vector3d mean = imu.level_force_sum / imu.level_count;
+  imu.level_from = sample.stamp;
+  imu.level_force_sum.setZero();
+  imu.level_count = 0;
+  if (std::abs(mean.norm() - options_.gravity_m_s2) > 0.05 * options_.gravity_m_s2) return;
   s.gravity_tilt_rad = tilt_of_up(mean);
   correct_world(
       rest_innovation(s, s.world_from_body.rotation().conjugate() * mean, kLevelError_m_s2, options_.gravity_m_s2));
-  imu.aligned = true;
-  monitor.readmit();
+  memory_.gravity_known = true;
+}
+
+/// Alignment of an IMU that is not in use, by the visual motions of the last frames.
+void ErrorStateFilter::search_alignment(const ImuSample& sample) {
+  InertialMemory& imu = memory_.imu;
+  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::imu);
+  const bool frozen_or_broken = monitor.state == SensorState::excluded && monitor.reason != HealthReason::contradicted;
+  if (!imu.window.add(imu.last, sample, inertial_noise(options_.imu, imu.noise), options_.imu.timeout_s)) return;
+  const bool enough = imu.window.is_full() || imu.window.seconds() >= options_.imu.alignment_s;
+  const auto alignment = frozen_or_broken || !enough ? std::nullopt : imu.window.align(alignment_prior());
+  if (alignment) {
+    const auto sigma = [&](int at) { return std::sqrt(alignment->covariance.diagonal().segment<3>(at).maxCoeff()); };
+    if (sigma(0) <= kAlignedGyroBias_rad_s && (memory_.gravity_known || sigma(9) <= kAlignedUp_rad)) {
+      align(*alignment);
+      return;
+    }
+  }
+  if (monitor.state == SensorState::ok && seconds_between(imu.waiting_since, sample.stamp) > kSlowAlignment_s) {
+    monitor.state = SensorState::suspect;
+    monitor.reason = HealthReason::not_aligned;
+  }
+}
+
+/// The vertical counts little, because it is corrected by what is found; it makes a single motion enough.
+AlignmentPrior ErrorStateFilter::alignment_prior() const {
+  constexpr double kUpFactor = 3;
+  AlignmentPrior prior{options_.imu.gyro_bias_sigma_rad_s, options_.imu.accel_bias_sigma_m_s2, options_.gravity_m_s2,
+                       std::nullopt, 0};
+  if (!memory_.gravity_known) return prior;
+  const UpInBody up = up_in_body(memory_.estimate.state, error_at::kVisionClone);
+  const Eigen::Matrix3d covariance = up.jacobian * memory_.estimate.covariance * up.jacobian.transpose();
+  prior.up = up.up;
+  prior.up_sigma_rad = kUpFactor * std::sqrt(covariance.trace());
+  return prior;
+}
+
+/// Takes over biases and velocity, of which nothing is known. The direction of gravity in the body frame corrects
+/// attitude and tilt, with the noise that it shares with the errors of the biases and the velocity.
+void ErrorStateFilter::align(const InertialAlignment& a) {
+  NavigationState& s = memory_.estimate.state;
+  ErrorCovariance& p = memory_.estimate.covariance;
+  s.velocity_m_s = a.velocity_m_s;
+  s.gyro_bias_rad_s = a.gyro_bias_rad_s;
+  s.accel_bias_m_s2 = a.accel_bias_m_s2;
+  if (!memory_.gravity_known) s.gravity_tilt_rad = tilt_of_up(s.world_from_vision_clone.rotation() * a.up);
+
+  constexpr int kFirst = error_at::kVelocity, kCount = 9;
+  static_assert(error_at::kGyroBias == kFirst + 3 && error_at::kAccelBias == kFirst + 6);
+  Eigen::Matrix<double, kCount, 12> selection = Eigen::Matrix<double, kCount, 12>::Zero();
+  selection.block<3, 3>(0, 6).setIdentity();
+  selection.block<6, 6>(3, 0).setIdentity();
+  p.middleRows<kCount>(kFirst).setZero();
+  p.middleCols<kCount>(kFirst).setZero();
+  p.block<kCount, kCount>(kFirst, kFirst) = selection * a.covariance * selection.transpose();
+
+  const Eigen::Vector3d side = a.up.unitOrthogonal();
+  Eigen::Matrix<double, 2, 3> directions;
+  directions << side.transpose(), a.up.cross(side).transpose();
+  const UpInBody up = up_in_body(s, error_at::kVisionClone);
+  Innovation innovation(2);
+  innovation.residual = directions * (a.up - up.up);
+  innovation.jacobian = directions * up.jacobian;
+  innovation.noise = directions * a.covariance.bottomRightCorner<3, 3>() * directions.transpose();
+  innovation.noise.diagonal().array() += 1e-10;
+  innovation.shared = Eigen::Matrix<double, error_at::kSize, 2>::Zero();
+  innovation.shared.middleRows<kCount>(kFirst) = -selection * a.covariance.rightCols<3>() * directions.transpose();
+  correct_world(innovation);
+  memory_.imu.aligned = memory_.gravity_known = true;
+  memory_.imu.window = {};
+  memory_.monitor(LocalizationSensor::imu).readmit();
 }
 
 void ErrorStateFilter::detect_stationary(const ImuSample& sample) {
@@ -282,9 +342,12 @@ void ErrorStateFilter::detect_stationary(const ImuSample& sample) {
     return std::sqrt((squares / b.count - (sum / b.count).cwiseAbs2()).cwiseMax(0).maxCoeff());
   };
   const Eigen::Vector3d rate = b.gyro / b.count - memory_.estimate.state.gyro_bias_rad_s;
-  const bool stationary = b.count >= 3 && scatter(b.gyro_squares, b.gyro) < options_.imu.stationary_gyro_rad_s &&
-                          scatter(b.accel_squares, b.accel) < options_.imu.stationary_accel_m_s2 &&
-                          rate.norm() < options_.imu.stationary_gyro_rad_s;
+  const double interval = seconds_between(b.from, sample.stamp) / b.count;
+  const double bias_sigma =
+      std::sqrt(memory_.estimate.covariance.diagonal().segment<3>(error_at::kGyroBias).maxCoeff());
+  const bool stationary = b.count >= 3 && scatter(b.gyro_squares, b.gyro) < options_.imu.stationary_gyro(interval) &&
+                          scatter(b.accel_squares, b.accel) < options_.imu.stationary_accel(interval) &&
+                          rate.norm() < options_.imu.stationary_gyro_rad_s + 3 * bias_sigma;
   b = {};
   b.from = sample.stamp;
   update_zero_velocity(stationary);

@@ -32,7 +32,8 @@ class ErrorStateFilter {
   /// Initializes the filter at the origin of the world, whose axes follow from static alignment by the samples `before`
   /// (up to `stamp`, in order of time; motions and constraints among them are ignored).
   void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before,
-             const std::optional<Eigen::Vector3d>& up_in_body = {});
+             const std::optional<Eigen::Vector3d>& up_in_body = {},
+             const Eigen::Vector3d& assumed_up_in_body = Eigen::Vector3d::UnitZ());
 
   /// Measurements must be processed in the order of comes_before().
   void process(const Measurement& measurement);
@@ -52,8 +53,10 @@ class ErrorStateFilter {
   bool inertial_usable() const;
   void update(const ImuSample& sample);
   void check_reading(const ImuSample& sample);
-  void integrate_gyro(const ImuSample& sample);
-  void align_to_gravity(const ImuSample& sample);
+  void level(const ImuSample& sample);
+  void search_alignment(const ImuSample& sample);
+  AlignmentPrior alignment_prior() const;
+  void align(const InertialAlignment& alignment);
   void detect_stationary(const ImuSample& sample);
 
   // Visual motions between frames: motion_update.cpp.
@@ -64,7 +67,6 @@ class ErrorStateFilter {
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
   std::optional<ForwardComparison> compare_forward(const RelativeMotion& motion) const;
-  void compare_gyro(const RelativeMotion& motion);
   void begin_frame(Stamp stamp);
 
   // Wheels and zero-velocity updates: wheel_update.cpp.

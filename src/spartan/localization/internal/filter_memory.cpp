@@ -1,5 +1,6 @@
 #include "spartan/localization/internal/filter_memory.h"
 
+#include <algorithm>
 #include <limits>
 #include <type_traits>
 
@@ -8,6 +9,10 @@ namespace {
 
 struct Put {
   ArchiveWriter& out;
+  template <class T>
+  void size(const std::vector<T>& values) {
+    out.put(static_cast<std::uint32_t>(values.size()));
+  }
   template <class T>
   void operator()(const T& value) {
     if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Pose>) {
@@ -26,6 +31,13 @@ struct Put {
 struct Get {
   ArchiveReader& in;
   bool plausible = true;
+  template <class T>
+  void size(std::vector<T>& values) {
+    constexpr std::uint32_t kMost = 1000;
+    const auto count = in.get<std::uint32_t>();
+    plausible = plausible && count <= kMost;
+    values.resize(std::min(count, kMost));
+  }
   template <class T>
   void operator()(T& value) {
     if constexpr (std::is_same_v<T, double>) {
@@ -50,8 +62,10 @@ struct Get {
 template <class Each, class State>
 void visit_state(Each& each, State& s) {
   each(s.world_from_body), each(s.velocity_m_s), each(s.gyro_bias_rad_s), each(s.accel_bias_m_s2);
-  each(s.gravity_tilt_rad), each(s.wheel_scale), each(s.compass_offset_rad), each(s.inclinometer_bias_rad);
-  each(s.vision_drift), each(s.vision_constant), each(s.world_from_vision_clone), each(s.world_from_step_clone);
+  each(s.gravity_tilt_rad), each(s.gravity_scale), each(s.wheel_scale), each(s.compass_offset_rad),
+      each(s.inclinometer_bias_rad);
+  each(s.vision_drift), each(s.vision_constant), each(s.calibration), each(s.world_from_vision_clone),
+      each(s.world_from_step_clone);
 }
 
 template <class Each, class Wheels>
@@ -59,13 +73,34 @@ void visit_wheels(Each& each, Wheels& w) {
   each(w.stamp), each(w.left_m), each(w.right_m);
 }
 
+template <class Each, class Inertial>
+void visit_preintegration(Each& each, Inertial& p) {
+  each(p.seconds), each(p.gyro_bias_rad_s), each(p.accel_bias_m_s2), each(p.rotation), each(p.velocity);
+  each(p.position), each(p.rotation_by_gyro), each(p.velocity_by_gyro), each(p.velocity_by_accel);
+  each(p.position_by_gyro), each(p.position_by_accel), each(p.covariance);
+}
+
+template <class Each, class Segment>
+void visit_segment(Each& each, Segment& s) {
+  each(s.motion), each(s.covariance), visit_preintegration(each, s.inertial);
+}
+
+template <class Each, class Window>
+void visit_window(Each& each, Window& w) {
+  each(w.open), each(w.begin), each(w.newest), visit_preintegration(each, w.current);
+  each.size(w.segments), each.size(w.frames);
+  for (auto& segment : w.segments) visit_segment(each, segment);
+  for (auto& frame : w.frames) each(frame.stamp), visit_segment(each, frame.segment);
+}
+
 template <class Each, class Imu>
 void visit_imu(Each& each, Imu& m) {
   each(m.known), each(m.last.stamp), each(m.last.gyro_rad_s), each(m.last.accel_m_s2), each(m.changed);
-  each(m.aligned), each(m.align_from), each(m.align_count), each(m.align_force_sum);
+  each(m.noise.gyro_variance), each(m.noise.accel_variance), each(m.noise.seconds), each(m.noise.interval_s);
+  each(m.level_from), each(m.level_count), each(m.level_force_sum);
+  each(m.aligned), each(m.waiting_since), visit_window(each, m.window.state());
   each(m.block.from), each(m.block.count), each(m.block.gyro), each(m.block.accel);
   each(m.block.gyro_squares), each(m.block.accel_squares);
-  each(m.gyro_rotation), each(m.gyro_rotation_s), each(m.gyro_rotation_complete);
 }
 
 template <class Each, class Monitor>
@@ -76,7 +111,8 @@ void visit_monitor(Each& each, Monitor& j) {
 
 template <class Each, class Memory>
 void visit(Each& each, Memory& m) {
-  each(m.started), each(m.stamp), each(m.estimate.covariance), each(m.world_from_odom), each(m.gravity_measured);
+  each(m.started), each(m.stamp), each(m.estimate.covariance), each(m.world_from_odom), each(m.gravity_known),
+      each(m.gravity_measured);
   visit_state(each, m.estimate.state);
   visit_imu(each, m.imu);
   each(m.vision.clone_stamp), each(m.vision.odom_from_clone), each(m.vision.odom_covariance), each(m.vision.stationary);

@@ -7,7 +7,9 @@
 
 #include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
+#include "spartan/localization/internal/alignment_window.h"
 #include "spartan/localization/internal/error_state.h"
+#include "spartan/localization/internal/inertial_noise.h"
 #include "spartan/localization/localizer.h"
 
 namespace spartan::internal {
@@ -26,14 +28,14 @@ struct InertialMemory {
   bool known = false;
   ImuSample last;
   Stamp changed;  ///< when the reading last changed (frozen sensors)
-  bool aligned = false;
+  InertialNoiseEstimate noise;
+  bool aligned = false;  ///< biases, velocity and gravity are known well enough for integration
+  Stamp waiting_since;   ///< begin of the search for the alignment
+  AlignmentWindow window;
+  Stamp level_from;
+  double level_count = 0;
+  Eigen::Vector3d level_force_sum = Eigen::Vector3d::Zero();  ///< world
   StationaryBlock block;
-  Stamp align_from;
-  double align_count = 0;
-  Eigen::Vector3d align_force_sum = Eigen::Vector3d::Zero();          ///< sum, world
-  Eigen::Quaterniond gyro_rotation = Eigen::Quaterniond::Identity();  ///< integrated gyro since the last frame
-  double gyro_rotation_s = 0;
-  bool gyro_rotation_complete = false;
 };
 
 /// Since the last frame.
@@ -81,7 +83,8 @@ struct FilterMemory {
   Stamp stamp;
   StateEstimate estimate;
   Pose world_from_odom;
-  bool gravity_measured = false;
+  bool gravity_known = false;     ///< the tilt of gravity is an estimate by IMU or inclinometer
+  bool gravity_measured = false;  ///< as LocalizationEstimate::gravity_measured
   InertialMemory imu;
   VisionMemory vision;
   StepMemory step;

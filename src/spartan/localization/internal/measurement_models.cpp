@@ -48,18 +48,21 @@ MotionSinceClone motion_since_clone(const NavigationState& s, int clone) {
 }
 
 Innovation relative_motion_innovation(const NavigationState& s, int clone, const Pose& measured,
-                                      const Matrix6d& covariance, const Vector6d& drift_scale) {
+                                      const Matrix6d& covariance, const MotionErrors& errors, LinearizedAt at) {
   const MotionSinceClone m = motion_since_clone(s, clone);
   Innovation i(6);
-  const Vector6d drift = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
+  const Vector6d drift =
+      errors.drift_scale.cwiseProduct(s.vision_drift + s.vision_constant) + errors.by_calibration * s.calibration;
   const Vector6d r = log_se3(m.clone_from_body.inverse() * measured * exp_se3(drift));
   const Matrix6d right = right_jacobian_inverse_se3(r) * right_jacobian_se3(drift),
                  left = right_jacobian_inverse_se3(-r);
   i.residual = r;
   i.jacobian = m.jacobian;
   i.jacobian.middleCols<6>(clone) = left * m.jacobian.middleCols<6>(clone);
-  i.jacobian.middleCols<6>(error_at::kVisionDrift) = -right * drift_scale.asDiagonal();
+  if (at == LinearizedAt::estimate) i.jacobian.middleCols<6>(error_at::kPose) = left;
+  i.jacobian.middleCols<6>(error_at::kVisionDrift) = -right * errors.drift_scale.asDiagonal();
   i.jacobian.middleCols<6>(error_at::kVisionConstant) = i.jacobian.middleCols<6>(error_at::kVisionDrift);
+  i.jacobian.middleCols<8>(error_at::kCalibration) = -right * errors.by_calibration;
   i.noise = right * covariance * right.transpose();
   return i;
 }
@@ -145,13 +148,26 @@ Innovation inclinometer_innovation(const NavigationState& s, double roll, double
   return i;
 }
 
+// u = R̂ᵀ up: δu = [u]× φ + Rᵀ ∂up δτ.
+UpInBody up_in_body(const NavigationState& s, int pose) {
+  const Eigen::Matrix3d to_body = pose_of(s, pose).rotation().conjugate().toRotationMatrix();
+  UpInBody u;
+  u.up = to_body * true_up(s.gravity_tilt_rad);
+  u.jacobian.setZero();
+  u.jacobian.middleCols<3>(pose + 3) = skew(u.up);
+  u.jacobian.middleCols<2>(error_at::kGravityTilt) = to_body * true_up_jacobian(s.gravity_tilt_rad);
+  return u;
+}
+
 Innovation rest_innovation(const NavigationState& s, const Eigen::Vector3d& mean_accel, double sigma, double gravity) {
   const Eigen::Matrix3d to_body = s.world_from_body.rotation().conjugate().toRotationMatrix();
-  const Eigen::Vector3d expected = gravity * (to_body * true_up(s.gravity_tilt_rad));
+  const Eigen::Vector3d unit = gravity * (to_body * true_up(s.gravity_tilt_rad)), expected = s.gravity_scale * unit;
   Innovation i(3);
   i.residual = mean_accel - expected - s.accel_bias_m_s2;
   i.jacobian.middleCols<3>(error_at::kAttitude) = skew(expected);
-  i.jacobian.middleCols<2>(error_at::kGravityTilt) = gravity * to_body * true_up_jacobian(s.gravity_tilt_rad);
+  i.jacobian.middleCols<2>(error_at::kGravityTilt) =
+      s.gravity_scale * gravity * to_body * true_up_jacobian(s.gravity_tilt_rad);
+  i.jacobian.col(error_at::kGravityScale) = unit;
   i.jacobian.middleCols<3>(error_at::kAccelBias).setIdentity();
   i.noise.diagonal().setConstant(sigma * sigma);
   return i;

@@ -8,12 +8,24 @@
 
 namespace spartan::internal {
 
+/// How the errors that last act on a motion (all zero: they do not).
+struct MotionErrors {
+  Vector6d drift_scale = Vector6d::Zero();  ///< diagonal of D
+  /// E (RelativeMotion::by_calibration).
+  Eigen::Matrix<double, 6, 8> by_calibration = Eigen::Matrix<double, 6, 8>::Zero();
+};
+
 /// A motion measured from a clone (`index`: kVisionClone or kStepClone) to the present pose, M = Ĉ⁻¹ X̂ Exp(e) with
-/// noise n and drift z on the right, M = … Exp(−D z − n). After correction by the estimate ẑ,
-///   r = Log(M̂⁻¹ M Exp(D ẑ)) = ξ_x − J_l⁻¹(r) Ad(M̂⁻¹) ξ_c − J_r⁻¹(r) J_r(D ẑ) (D δz + n).
-/// `drift_scale` is the diagonal of D (zero: the motion has no drift).
+/// noise n, drift z and errors of the calibration η on the right, M = … Exp(−d − n) with d = D z + E η. After
+/// correction by the estimate d̂,
+///   r = Log(M̂⁻¹ M Exp(d̂)) = J_l⁻¹(r) (ξ_x − Ad(M̂⁻¹) ξ_c) − J_r⁻¹(r) J_r(d̂) (D δz + E δη + n)
+/// linearized at the estimate. A shift of the whole drive, ξ_x = Ad(M̂⁻¹) ξ_c, has no effect, whatever r: with other
+/// factors before ξ_x and ξ_c the noise of r would seem to measure it (Huang, Mourikis & Roumeliotis, IJRR 2010).
+/// Linearized at the measured motion, for a prediction without weight, r may be large:
+///   r = ξ_x − J_l⁻¹(r) Ad(M̂⁻¹) ξ_c − J_r⁻¹(r) J_r(d̂) (D δz + E δη + n).
+enum class LinearizedAt { estimate, measured_motion };
 Innovation relative_motion_innovation(const NavigationState& state, int clone, const Pose& measured,
-                                      const Matrix6d& covariance, const Vector6d& drift_scale);
+                                      const Matrix6d& covariance, const MotionErrors& errors, LinearizedAt at);
 
 /// The estimated motion since a clone, with the Jacobian of its right perturbation.
 struct MotionSinceClone {
@@ -52,6 +64,13 @@ Innovation compass_innovation(const NavigationState& state, double heading_rad, 
 Eigen::Vector2d roll_pitch_of_up(const Eigen::Vector3d& up_in_body);
 Eigen::Vector3d up_of_roll_pitch(double roll_rad, double pitch_rad);
 Innovation inclinometer_innovation(const NavigationState& state, double roll_rad, double pitch_rad, double sigma_rad);
+
+/// Unit vector opposite to gravity in the body frame of a pose (kPose or a clone), with its Jacobian.
+struct UpInBody {
+  Eigen::Vector3d up;
+  Eigen::Matrix<double, 3, error_at::kSize> jacobian;
+};
+UpInBody up_in_body(const NavigationState& state, int pose);
 
 /// Mean specific force of a body that does not accelerate: R̂ᵀ g up + accel bias.
 Innovation rest_innovation(const NavigationState& state, const Eigen::Vector3d& mean_accel_m_s2, double sigma_m_s2,

@@ -36,6 +36,10 @@ TEST(MeasurementModels, JacobiansMatchFiniteDifferences) {
     expect_derivative<2>(s,
                          [&](const NavigationState& x) { return inclinometer_innovation(x, tilt.x(), tilt.y(), 1); });
     expect_derivative<3>(s, [&](const NavigationState& x) { return rest_innovation(x, {1, 2, 3}, 1, 3.71); });
+    const auto up = testing::numeric_jacobian<3, error_at::kSize>(
+        [&](const ErrorVector& e) -> Eigen::Vector3d { return up_in_body(add_error(s, e), error_at::kVisionClone).up; },
+        ErrorVector::Zero());
+    EXPECT_LE((up_in_body(s, error_at::kVisionClone).jacobian - up).cwiseAbs().maxCoeff(), 1e-6);
   }
 }
 
@@ -55,25 +59,52 @@ TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
   Random random(5);
   for (const int clone : {error_at::kVisionClone, error_at::kStepClone}) {
     const NavigationState s = random_navigation_state(random);
-    Vector6d r, drift_scale;
+    Vector6d r;
     r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
-    drift_scale << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6;
+    MotionErrors errors;
+    errors.drift_scale << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6;
+    for (Eigen::Index i = 0; i < errors.by_calibration.size(); ++i)
+      errors.by_calibration.data()[i] = random.uniform(-0.2, 0.2);
+    const auto lasting = [&](const NavigationState& x) -> Vector6d {
+      return errors.drift_scale.cwiseProduct(x.vision_drift + x.vision_constant) +
+             errors.by_calibration * x.calibration;
+    };
     const Pose mean = motion_since_clone(s, clone).clone_from_body;
-    const Vector6d estimated = drift_scale.cwiseProduct(s.vision_drift + s.vision_constant);
+    const Vector6d estimated = lasting(s);
     const auto seen = [&](const ErrorVector& e) -> Vector6d {
       const NavigationState truth = add_error(s, e);
-      const Pose motion = motion_since_clone(truth, clone).clone_from_body *
-                          exp_se3(-drift_scale.cwiseProduct(truth.vision_drift + truth.vision_constant));
+      const Pose motion = motion_since_clone(truth, clone).clone_from_body * exp_se3(-lasting(truth));
       return log_se3(mean.inverse() * motion * exp_se3(estimated));
     };
     ErrorVector at = ErrorVector::Zero();
     at.segment<6>(error_at::kPose) = r;
     const auto numeric = testing::numeric_jacobian<6, error_at::kSize>(seen, at, 1e-4);
-    const Innovation innovation = relative_motion_innovation(s, clone, mean * exp_se3(r) * exp_se3(-estimated),
-                                                             Matrix6d::Identity(), drift_scale);
+    const Innovation innovation = relative_motion_innovation(
+        s, clone, mean * exp_se3(r) * exp_se3(-estimated), Matrix6d::Identity(), errors, LinearizedAt::measured_motion);
     EXPECT_LE((innovation.residual - r).norm(), 1e-12);
     EXPECT_LE((innovation.jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
   }
+}
+
+// At the estimate: the derivative of the residual, and blind to a shift and a rotation of the whole drive.
+TEST(MeasurementModels, RelativeMotionDoesNotMeasureTheWorld) {
+  Random random(15);
+  const NavigationState s = random_navigation_state(random);
+  Vector6d r;
+  r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
+  const Pose measured = motion_since_clone(s, error_at::kVisionClone).clone_from_body * exp_se3(r);
+  MotionErrors errors;
+  errors.drift_scale.setConstant(0.05);
+  const auto innovation = [&](const NavigationState& x) {
+    return relative_motion_innovation(x, error_at::kVisionClone, measured, Matrix6d::Identity(), errors,
+                                      LinearizedAt::estimate);
+  };
+  expect_derivative<6>(s, innovation);
+  ErrorVector shift = ErrorVector::Zero();
+  const Vector6d world = Vector6d::Random();
+  shift.segment<6>(error_at::kPose) = adjoint(s.world_from_body.inverse()) * world;
+  shift.segment<6>(error_at::kVisionClone) = adjoint(s.world_from_vision_clone.inverse()) * world;
+  EXPECT_LE((innovation(s).jacobian * shift).norm(), 1e-12);
 }
 
 TEST(MeasurementModels, WheelsPredictTheChordOfAnArc) {

@@ -48,7 +48,6 @@ void ErrorStateFilter::update(const RelativeMotion& motion) {
     ++monitor.rejected;
     memory_.vision.stationary = false;
   } else {
-    compare_gyro(motion);
     if (update_by_motion(motion)) {
       const NavigationState& s = memory_.estimate.state;
       const double seconds = seconds_between(motion.from, motion.to);
@@ -56,6 +55,7 @@ void ErrorStateFilter::update(const RelativeMotion& motion) {
           log_so3(motion_since_clone(s, error_at::kVisionClone).clone_from_body.rotation()) / seconds;
     }
   }
+  if (memory_.imu.known && !inertial_usable()) memory_.imu.window.add(motion);
   end_step_at_frame(motion.to);
   // The clone stays over frames that are lost, as the landmarks of the odometry do.
   if (!consecutive || !motion.keeps_reference) begin_frame(motion.to);
@@ -76,10 +76,12 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   const bool inertial = vision.constant_velocity_s == 0;
   p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
 
-  const Matrix6d covariance = usable_covariance(motion.covariance, options_.vision.white_noise_factor);
-  const Vector6d drift = vision.stationary ? Vector6d::Zero().eval() : motion.covariance.diagonal().cwiseSqrt().eval();
+  const Matrix6d covariance = usable_covariance(motion.own_covariance(), options_.vision.white_noise_factor);
+  MotionErrors errors;
+  if (!vision.stationary) errors = {motion.drift_scale(), motion.by_calibration};
   const Innovation innovation =
-      relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, drift);
+      relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, errors,
+                                 inertial ? LinearizedAt::estimate : LinearizedAt::measured_motion);
   // The noise of the constant-velocity model grows with the speed: after a stop it is small, and the update would put
   // the residual of a true motion into the drift of vision.
   if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
@@ -122,6 +124,7 @@ bool ErrorStateFilter::prediction_contradicted(const Innovation& innovation) con
   Innovation exact = innovation;
   exact.jacobian.middleCols<6>(error_at::kVisionDrift).setZero();
   exact.jacobian.middleCols<6>(error_at::kVisionConstant).setZero();
+  exact.jacobian.middleCols<8>(error_at::kCalibration).setZero();
   exact.noise = kMinVariance * Matrix6d::Identity();
   return normalized_innovation_squared(memory_.estimate.covariance, exact) > kMaxPredictionNis;
 }
@@ -170,12 +173,15 @@ std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const Relativ
   const StepForward predicted = forward_since(s, error_at::kVisionClone);
   const double predicted_variance = predicted.jacobian * p * predicted.jacobian.transpose();
   // As in relative_motion_innovation(): white noise, and the drift states in units of the motion's standard deviations.
-  const Vector6d sigma = motion.covariance.diagonal().cwiseSqrt();
-  const Vector6d drift = sigma.cwiseProduct(s.vision_drift + s.vision_constant);
+  const Vector6d scale = motion.drift_scale();
+  const Vector6d drift = scale.cwiseProduct(s.vision_drift + s.vision_constant) + motion.by_calibration * s.calibration;
   const double seen_m = forward_of(motion.previous_from_current * exp_se3(drift));
   const int d = error_at::kVisionDrift, c = error_at::kVisionConstant;
+  const auto by_calibration = motion.by_calibration.row(0);
   const double seen_variance =
-      motion.covariance(0, 0) * (options_.vision.white_noise_factor + p(d, d) + p(c, c) + 2 * p(d, c));
+      options_.vision.white_noise_factor * motion.own_covariance()(0, 0) +
+      scale[0] * scale[0] * (p(d, d) + p(c, c) + 2 * p(d, c)) +
+      by_calibration * p.block<8, 8>(error_at::kCalibration, error_at::kCalibration) * by_calibration.transpose();
 
   const auto square = [](double v) { return v * v; };
   const double weights = 1 / counted_variance + 1 / predicted_variance;
@@ -189,31 +195,6 @@ std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const Relativ
   return result;
 }
 
-/// Readmits an IMU that vision contradicted once its gyro agrees with the rotations by vision.
-void ErrorStateFilter::compare_gyro(const RelativeMotion& motion) {
-  InertialMemory& imu = memory_.imu;
-  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::imu);
-  if (monitor.state != SensorState::excluded || monitor.reason != HealthReason::contradicted) return;
-  if (!imu.gyro_rotation_complete || !(imu.gyro_rotation_s > 0)) return;
-  const Eigen::Quaterniond seen = motion.previous_from_current.rotation();
-  const double off = log_so3(imu.gyro_rotation.conjugate() * seen).norm(), angle = log_so3(seen).norm();
-  const double variance = std::pow(options_.imu.gyro_noise_rad_s_sqrt_hz, 2) * imu.gyro_rotation_s +
-                          std::pow(2 * options_.imu.gyro_bias_sigma_rad_s * imu.gyro_rotation_s, 2) +
-                          motion.covariance.diagonal().tail<3>().maxCoeff() +
-                          std::pow(0.01 * angle, 2);  // 1 %: scale error of the gyro
-  if (off * off > 16 * variance) {                    // 4 σ
-    monitor.passed_in_row = 0;
-    return;
-  }
-  if (++monitor.passed_in_row < options_.health.readmit_after) return;
-  monitor.readmit();
-  ErrorCovariance& p = memory_.estimate.covariance;
-  p.middleRows<6>(error_at::kGyroBias).setZero();
-  p.middleCols<6>(error_at::kGyroBias).setZero();
-  p.diagonal().segment<3>(error_at::kGyroBias).setConstant(std::pow(options_.imu.gyro_bias_sigma_rad_s, 2));
-  p.diagonal().segment<3>(error_at::kAccelBias).setConstant(std::pow(options_.imu.accel_bias_sigma_m_s2, 2));
-}
-
 /// The next visual motion starts at this pose.
 void ErrorStateFilter::begin_frame(Stamp stamp) {
   const UncertainPose odom = odom_from_body();
@@ -225,9 +206,6 @@ void ErrorStateFilter::begin_frame(Stamp stamp) {
   if (wheels) memory_.vision.wheels = *wheels;
   memory_.vision.constant_velocity_noise.setZero();
   memory_.vision.constant_velocity_s = 0;
-  memory_.imu.gyro_rotation.setIdentity();
-  memory_.imu.gyro_rotation_s = 0;
-  memory_.imu.gyro_rotation_complete = memory_.imu.known;
   clone_pose(memory_.estimate, error_at::kVisionClone);
 }
 

@@ -5,20 +5,20 @@ namespace {
 
 // White noise of acceleration and angular rate integrated over the step; the double integral correlates position with
 // velocity.
-void add_white_noise(Transition& t, double accel_variance, double rate_variance, double seconds) {
-  const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
-  t.noise.block<3, 3>(error_at::kPosition, error_at::kPosition) +=
-      identity * (accel_variance * seconds * seconds * seconds / 3);
-  t.noise.block<3, 3>(error_at::kPosition, error_at::kVelocity) += identity * (accel_variance * seconds * seconds / 2);
-  t.noise.block<3, 3>(error_at::kVelocity, error_at::kPosition) += identity * (accel_variance * seconds * seconds / 2);
-  t.noise.block<3, 3>(error_at::kVelocity, error_at::kVelocity) += identity * (accel_variance * seconds);
-  t.noise.block<3, 3>(error_at::kAttitude, error_at::kAttitude) += identity * (rate_variance * seconds);
+void add_white_noise(Transition& t, const Eigen::Vector3d& accel_variance, const Eigen::Vector3d& rate_variance,
+                     double seconds) {
+  t.noise.block<3, 3>(error_at::kPosition, error_at::kPosition).diagonal() +=
+      accel_variance * (seconds * seconds * seconds / 3);
+  t.noise.block<3, 3>(error_at::kPosition, error_at::kVelocity).diagonal() += accel_variance * (seconds * seconds / 2);
+  t.noise.block<3, 3>(error_at::kVelocity, error_at::kPosition).diagonal() += accel_variance * (seconds * seconds / 2);
+  t.noise.block<3, 3>(error_at::kVelocity, error_at::kVelocity).diagonal() += accel_variance * seconds;
+  t.noise.block<3, 3>(error_at::kAttitude, error_at::kAttitude).diagonal() += rate_variance * seconds;
 }
 
 Transition identity_transition() {
   Transition t;
   t.by_moving.setIdentity();
-  t.by_tilt.setZero();
+  t.by_gravity.setZero();
   t.noise.setZero();
   return t;
 }
@@ -37,7 +37,8 @@ Integrated integrate(const NavigationState& s, const InertialStep& step, double 
   i.after = i.before * exp_so3(i.rotation).toRotationMatrix();
   i.force_from = step.accel_from - s.accel_bias_m_s2;
   i.force_to = step.accel_to - s.accel_bias_m_s2;
-  i.acceleration = 0.5 * (i.before * i.force_from + i.after * i.force_to) - gravity * true_up(s.gravity_tilt_rad);
+  i.acceleration =
+      0.5 * (i.before * i.force_from + i.after * i.force_to) - s.gravity_scale * gravity * true_up(s.gravity_tilt_rad);
   return i;
 }
 
@@ -57,7 +58,7 @@ NavigationState propagate(const NavigationState& s, const InertialStep& step, do
 // With δp = R ρ (to first order), v = R w the velocity in the world, a' = a + δa:
 //   φ' = ΔRᵀ φ − J_r t δb_g
 //   δv = R (ν − [w]× φ)
-//   δa = −½ R [f₀]× φ − ½ R' [f₁]× φ' − ½ (R + R') δb_a − g ∂up δτ
+//   δa = −½ R [f₀]× φ − ½ R' [f₁]× φ' − ½ (R + R') δb_a − γ g ∂up δτ − g up δγ
 //   ρ' = ΔRᵀ ρ + R'ᵀ (δv t + ½ δa t²),   ν' = R'ᵀ (δv + δa t) + [w']× φ'
 Transition transition(const NavigationState& s, const InertialStep& step, const InertialNoise& noise, double gravity) {
   const Integrated i = integrate(s, step, gravity);
@@ -75,16 +76,18 @@ Transition transition(const NavigationState& s, const InertialStep& step, const 
   accel = -0.5 * i.after * skew(i.force_to) * rotation;
   accel.middleCols<3>(error_at::kAttitude) -= 0.5 * i.before * skew(i.force_from);
   accel.middleCols<3>(error_at::kAccelBias) = -0.5 * (i.before + i.after);
-  const Eigen::Matrix<double, 3, 2> accel_by_tilt = -gravity * true_up_jacobian(s.gravity_tilt_rad);
+  Eigen::Matrix3d accel_by_gravity;
+  accel_by_gravity << -s.gravity_scale * gravity * true_up_jacobian(s.gravity_tilt_rad),
+      -gravity * true_up(s.gravity_tilt_rad);
 
   r.by_moving.middleRows<3>(error_at::kAttitude) = rotation;
   r.by_moving.middleRows<3>(error_at::kVelocity) = to_body * (velocity + t * accel) + skew(after) * rotation;
   r.by_moving.middleRows<3>(error_at::kPosition) = to_body * (t * velocity + 0.5 * t * t * accel);
   r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
-  r.by_tilt.middleRows<3>(error_at::kVelocity) = t * to_body * accel_by_tilt;
-  r.by_tilt.middleRows<3>(error_at::kPosition) = 0.5 * t * t * to_body * accel_by_tilt;
+  r.by_gravity.middleRows<3>(error_at::kVelocity) = t * to_body * accel_by_gravity;
+  r.by_gravity.middleRows<3>(error_at::kPosition) = 0.5 * t * t * to_body * accel_by_gravity;
 
-  add_white_noise(r, noise.accel * noise.accel, noise.gyro * noise.gyro, t);
+  add_white_noise(r, noise.accel.cwiseAbs2(), noise.gyro.cwiseAbs2(), t);
   r.noise.block<3, 3>(error_at::kGyroBias, error_at::kGyroBias).diagonal().array() +=
       noise.gyro_walk * noise.gyro_walk * t;
   r.noise.block<3, 3>(error_at::kAccelBias, error_at::kAccelBias).diagonal().array() +=
@@ -112,8 +115,8 @@ Transition transition(const NavigationState& s, const ConstantVelocityStep& step
   r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
   r.by_moving.block<3, 3>(error_at::kPosition, error_at::kVelocity) = 0.5 * t * (back + Eigen::Matrix3d::Identity());
   r.by_moving.block<3, 3>(error_at::kPosition, error_at::kAttitude) = -0.5 * t * (back * speed + speed * back);
-  add_white_noise(r, noise.velocity_m_s_sqrt_hz * noise.velocity_m_s_sqrt_hz,
-                  noise.attitude_rad_sqrt_hz * noise.attitude_rad_sqrt_hz, t);
+  add_white_noise(r, Eigen::Vector3d::Constant(noise.velocity_m_s_sqrt_hz * noise.velocity_m_s_sqrt_hz),
+                  Eigen::Vector3d::Constant(noise.attitude_rad_sqrt_hz * noise.attitude_rad_sqrt_hz), t);
   return r;
 }
 
@@ -121,10 +124,10 @@ void propagate_covariance(ErrorCovariance& p, const Transition& t) {
   constexpr int kRest = error_at::kSize - error_at::kMoving;
   Eigen::Matrix<double, error_at::kMoving, error_at::kSize> rows;
   rows.noalias() = t.by_moving * p.topRows<error_at::kMoving>();
-  rows.noalias() += t.by_tilt * p.middleRows<2>(error_at::kGravityTilt);
+  rows.noalias() += t.by_gravity * p.middleRows<3>(error_at::kGravityTilt);
   Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> square =
       rows.leftCols<error_at::kMoving>() * t.by_moving.transpose();
-  square.noalias() += rows.middleCols<2>(error_at::kGravityTilt) * t.by_tilt.transpose();
+  square.noalias() += rows.middleCols<3>(error_at::kGravityTilt) * t.by_gravity.transpose();
   square += t.noise;
   p.topLeftCorner<error_at::kMoving, error_at::kMoving>() = 0.5 * (square + square.transpose());
   p.topRightCorner<error_at::kMoving, kRest>() = rows.rightCols<kRest>();

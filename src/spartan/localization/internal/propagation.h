@@ -14,9 +14,10 @@ struct InertialStep {
   double seconds = 0;
 };
 
-/// Densities of white noise and random walks.
+/// Densities of white noise, for each axis of the body, and of random walks.
 struct InertialNoise {
-  double gyro = 0, accel = 0, gyro_walk = 0, accel_walk = 0;
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = Eigen::Vector3d::Zero();
+  double gyro_walk = 0, accel_walk = 0;
 };
 
 /// Constant-velocity model: velocity and angular rate are constant in the body frame, but for noise.
@@ -28,16 +29,17 @@ struct ConstantVelocityNoise {
   double velocity_m_s_sqrt_hz = 0, attitude_rad_sqrt_hz = 0;
 };
 
-/// The propagated part of the error after a step: by_moving · moving part + by_tilt · gravity tilt + noise of
-/// covariance `noise`.
+/// The propagated part of the error after a step: by_moving · moving part + by_gravity · (gravity tilt, gravity scale)
+/// + noise of covariance `noise`.
 struct Transition {
   Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> by_moving;
-  Eigen::Matrix<double, error_at::kMoving, 2> by_tilt;
+  Eigen::Matrix<double, error_at::kMoving, 3> by_gravity;
   Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> noise;
 };
 
 /// Mid-point integration: rotation by the mean rate, acceleration by the mean of both specific forces, each rotated
-/// into the world. p' = p + v t + ½ a t², v' = v + a t in the world, with a = ½ (R f₀ + R' f₁) − g · up.
+/// into the world. p' = p + v t + ½ a t², v' = v + a t in the world, with a = ½ (R f₀ + R' f₁) − γ g · up and the
+/// gravity scale γ.
 NavigationState propagate(const NavigationState& state, const InertialStep& step, double gravity_m_s2);
 Transition transition(const NavigationState& state, const InertialStep& step, const InertialNoise& noise,
                       double gravity_m_s2);

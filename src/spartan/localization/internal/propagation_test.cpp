@@ -16,7 +16,7 @@ using Full = Eigen::Matrix<double, error_at::kMoving, error_at::kSize>;
 Full whole(const Transition& t) {
   Full f = Full::Zero();
   f.leftCols<error_at::kMoving>() = t.by_moving;
-  f.middleCols<2>(error_at::kGravityTilt) = t.by_tilt;
+  f.middleCols<3>(error_at::kGravityTilt) = t.by_gravity;
   return f;
 }
 
@@ -29,6 +29,10 @@ Full numeric(const NavigationState& s, const Step& move) {
         return difference.head<error_at::kMoving>();
       },
       ErrorVector::Zero(), 1e-3);
+}
+
+InertialNoise noise_of(double gyro, double accel, double gyro_walk, double accel_walk) {
+  return {Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel), gyro_walk, accel_walk};
 }
 
 InertialStep random_step(Random& random) {
@@ -96,7 +100,7 @@ TEST(Propagation, NoiseMatchesItsIntegrals) {
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero(), up = Eigen::Vector3d::UnitZ();
   const InertialStep still{zero, zero, up, up, 0.05};
   for (int i = 0; i < 40; ++i) {
-    propagate_covariance(p, transition(s, still, {0, 0.3, 0, 0}, 1));
+    propagate_covariance(p, transition(s, still, noise_of(0, 0.3, 0, 0), 1));
     s = propagate(s, still, 1);
   }
   EXPECT_NEAR(p(error_at::kPosition, error_at::kPosition), 0.09 * 8 / 3, 1e-9);
@@ -107,7 +111,7 @@ TEST(Propagation, NoiseMatchesItsIntegrals) {
 TEST(Propagation, PropagatesTheCovarianceAsTheFullMatrix) {
   Random random(5);
   const NavigationState s = random_navigation_state(random);
-  const Transition t = transition(s, random_step(random), {0.1, 0.2, 0.3, 0.4}, 3.71);
+  const Transition t = transition(s, random_step(random), noise_of(0.1, 0.2, 0.3, 0.4), 3.71);
   ErrorCovariance root;
   for (Eigen::Index i = 0; i < root.size(); ++i) root.data()[i] = random.normal();
   ErrorCovariance p = root * root.transpose();

@@ -47,6 +47,11 @@ void put_measurement(ArchiveWriter& out, const Measurement& m) {
     out.put(motion->covariance);
     out.put(motion->measured);
     out.put(motion->keeps_reference);
+    out.put(motion->lasting_sigma.has_value());
+    if (motion->lasting_sigma) {
+      for (const double sigma : *motion->lasting_sigma) out.put(sigma);
+    }
+    for (Eigen::Index i = 0; i < motion->by_calibration.size(); ++i) out.put(motion->by_calibration.data()[i]);
   } else if (const auto* wheels = std::get_if<WheelSample>(&m)) {
     out.put(wheels->left_m);
     out.put(wheels->right_m);
@@ -81,6 +86,11 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
       motion.covariance = in.get_matrix6();
       motion.measured = in.get<bool>();
       motion.keeps_reference = in.get<bool>();
+      if (in.get<bool>()) {
+        motion.lasting_sigma.emplace();
+        for (double& sigma : *motion.lasting_sigma) sigma = in.get_finite();
+      }
+      for (Eigen::Index i = 0; i < motion.by_calibration.size(); ++i) motion.by_calibration.data()[i] = in.get_finite();
       return motion;
     }
     case 2: {
@@ -111,13 +121,13 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
 ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(options), filter_(options) {}
 
 void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
-                         const std::optional<Eigen::Vector3d>& up_in_body) {
+                         const std::optional<Eigen::Vector3d>& up_in_body, const Eigen::Vector3d& assumed_up_in_body) {
   if (started()) throw std::logic_error("Localizer::start: called twice");
   std::erase_if(entries_, [&](const Measurement& m) { return std::abs(age(m, stamp)) > kBeforeStart_s; });
   const auto later = std::partition_point(entries_.begin(), entries_.end(),
                                           [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
   filter_.start(stamp, ahead_in_body, std::span(entries_.data(), static_cast<std::size_t>(later - entries_.begin())),
-                up_in_body);
+                up_in_body, assumed_up_in_body);
   entries_.erase(entries_.begin(), later);
   start_ = newest_ = stamp;
   for (const Measurement& m : entries_) newest_ = std::max(newest_, stamp_of_measurement(m));

@@ -18,7 +18,8 @@ class ReplayFilter {
 
   /// Samples up to `stamp` that were added before initialize the world; later ones are processed at once. Throws
   /// std::logic_error if already started.
-  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {});
+  void start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, const std::optional<Eigen::Vector3d>& up_in_body = {},
+             const Eigen::Vector3d& assumed_up_in_body = Eigen::Vector3d::UnitZ());
   bool started() const { return filter_.memory().started; }
 
   /// Returns nothing if the measurement was accepted, else the reason. Whatever the order of arrival, the state is bit

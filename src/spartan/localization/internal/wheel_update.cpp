@@ -163,8 +163,8 @@ void ErrorStateFilter::update_zero_velocity(bool imu_stationary) {
   Matrix6d covariance = Matrix6d::Zero();
   covariance.diagonal().head<3>().setConstant(std::pow(options_.zero_velocity.position_sigma_m, 2));
   covariance.diagonal().tail<3>().setConstant(std::pow(options_.zero_velocity.attitude_sigma_rad, 2));
-  const Innovation innovation =
-      relative_motion_innovation(memory_.estimate.state, error_at::kStepClone, Pose(), covariance, Vector6d::Zero());
+  const Innovation innovation = relative_motion_innovation(memory_.estimate.state, error_at::kStepClone, Pose(),
+                                                           covariance, {}, LinearizedAt::estimate);
   if (normalized_innovation_squared(memory_.estimate.covariance, innovation) > gates_[6]) {
     begin_step(wheels_at(memory_.stamp));
     return;
