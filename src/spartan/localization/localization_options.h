@@ -1,6 +1,7 @@
 // Options of the localization. One set of defaults serves all recordings.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -13,6 +14,9 @@ namespace spartan {
 /// Noise of the IMU as of an Allan deviation: white noise by density, biases by their initial standard deviation and a
 /// random walk.
 struct InertialOptions {
+  /// Position of the IMU on the body, and stamp of the IMU minus stamp of the cameras: of the rig file (Rig::imu).
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  double time_offset_s = 0;
   double gyro_noise_rad_s_sqrt_hz = 1.2e-4;  ///< rad/s/√Hz, white noise of the gyro
   double gyro_bias_sigma_rad_s = 0.05;       ///< rad/s, initial standard deviation of the gyro bias
   double gyro_walk_rad_s2_sqrt_hz = 2e-5;    ///< rad/s²/√Hz, random walk of the gyro bias
@@ -141,7 +145,9 @@ struct VisionOptions {
 };
 
 struct WheelOdometryOptions {
-  double track_m = 0.6;                  ///< m, between left and right wheels, of the rig file (Rig::rover)
+  double track_m = 0.6;  ///< m, between left and right wheels, of the rig file (Rig::rover)
+  /// m, of the rig file (Rig::turning_centre_m).
+  Eigen::Vector3d turning_centre_m = Eigen::Vector3d::Zero();
   bool use_rotation = true;              ///< whether the difference of the wheels measures a rotation
   double scale_sigma = 0.1;              ///< initial standard deviation of travelled over counted distance
   double scale_walk_per_sqrt_s = 0.005;  ///< 1/√s, random walk of that scale

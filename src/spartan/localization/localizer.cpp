@@ -20,8 +20,10 @@ constexpr std::uint32_t kStateVersion = 5;
 struct Localizer::State {
   explicit State(const LocalizationOptions& o) : options(o), filter(o) {}
 
-  bool add(const Measurement& m) {
+  bool add(Measurement m) {
     std::optional<Refusal> refusal;
+    if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && options.imu.time_offset_s != 0)
+      imu->stamp.ns -= std::llround(options.imu.time_offset_s * 1e9);
     const auto* motion = std::get_if<RelativeMotion>(&m);
     if (!is_valid(m)) {
       refusal = Refusal::not_finite;
@@ -93,7 +95,7 @@ LocalizationEstimate Localizer::estimate() const {
   const ErrorCovariance& p = m.estimate.covariance;
   LocalizationEstimate e;
   e.stamp = m.stamp;
-  e.world_from_body = {s.world_from_body, p.block<6, 6>(error_at::kPose, error_at::kPose)};
+  e.world_from_body = state_->filter.filter().world_from_body();
   e.odom_from_body = state_->filter.filter().odom_from_body();
   e.world_from_odom = m.world_from_odom;
   // v = R w, δv = R (ν − [w]× φ).
@@ -101,7 +103,7 @@ LocalizationEstimate Localizer::estimate() const {
   Eigen::Matrix<double, 3, 6> by_attitude_and_velocity;
   by_attitude_and_velocity << -rotation * skew(s.velocity_m_s), rotation;
   static_assert(error_at::kVelocity == error_at::kAttitude + 3);
-  e.velocity_m_s = rotation * s.velocity_m_s;
+  e.velocity_m_s = state_->filter.filter().velocity();
   e.velocity_covariance = by_attitude_and_velocity * p.block<6, 6>(error_at::kAttitude, error_at::kAttitude) *
                           by_attitude_and_velocity.transpose();
   e.biases = {s.gyro_bias_rad_s, p.diagonal().segment<3>(error_at::kGyroBias).cwiseSqrt(), s.accel_bias_m_s2,

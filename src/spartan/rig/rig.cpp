@@ -36,6 +36,7 @@ class FaultFinder {
     check_names("pairs", rig_.pairs);
     if (rig_.pairs.empty()) add("pairs", "there is no stereo pair");
     check(rig_.rover);
+    check_sensors();
     for (const PanTiltUnit& unit : rig_.pan_tilt_units) check(unit);
     for (const Camera& camera : rig_.cameras) check(camera);
     for (const StereoPair& pair : rig_.pairs) check(pair);
@@ -119,6 +120,18 @@ class FaultFinder {
     check_length("clearance_m", rover.clearance_m, 0.01, 5);
   }
 
+  // A lever arm of more than 10 m is one in other units.
+  void check_sensors() {
+    constexpr double kMaxArm_m = 10, kMaxOffset_s = 10;
+    const auto check_point = [&](const char* key, const Eigen::Vector3d& point) {
+      if (!(point.cwiseAbs().maxCoeff() <= kMaxArm_m)) add(key, fmt::format("must be within {} m", kMaxArm_m));
+    };
+    check_point("rover.turning_centre_m", rig_.turning_centre_m);
+    check_point("imu.translation_m", rig_.imu.body_from_imu.translation());
+    if (!(std::abs(rig_.imu.time_offset_s) <= kMaxOffset_s))
+      add("imu.time_offset_s", fmt::format("must be within {} s", kMaxOffset_s));
+  }
+
   void check(const Camera& camera) {
     const std::string key = "cameras." + camera.name;
     const auto [width, height] = camera.size;
@@ -173,6 +186,10 @@ class FaultFinder {
 Pose PanTiltUnit::body_from_head(double pan_rad, double tilt_rad) const {
   return body_from_base * Pose::from_rotation(Eigen::AngleAxisd(pan_rad, Eigen::Vector3d::UnitZ()) *
                                               Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()));
+}
+
+bool operator==(const ImuMount& a, const ImuMount& b) {
+  return equal_bits(a.body_from_imu, b.body_from_imu) && a.time_offset_s == b.time_offset_s;
 }
 
 bool operator==(const PanTiltUnit& a, const PanTiltUnit& b) {

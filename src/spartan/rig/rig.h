@@ -83,6 +83,13 @@ struct RoverGeometry {
   friend bool operator==(const RoverGeometry&, const RoverGeometry&) = default;
 };
 
+/// Where the IMU is, and when.
+struct ImuMount {
+  Pose body_from_imu;        ///< its rotation is that of the axes of the readings in files
+  double time_offset_s = 0;  ///< stamp of the IMU minus stamp of the cameras at the same moment
+  friend bool operator==(const ImuMount&, const ImuMount&);
+};
+
 /// Standard deviations of the errors that a calibration leaves. The defaults are those of an ordinary rover
 /// (`rover: ordinary` of the simulator).
 struct CalibrationErrors {
@@ -105,6 +112,10 @@ struct Rig {
   std::string name;
   PoseConvention convention = PoseConvention::body;
   RoverGeometry rover;
+  /// The point of the body that moves straight ahead when both sides' wheels turn equally, and stays when they turn
+  /// oppositely: between the wheels.
+  Eigen::Vector3d turning_centre_m = Eigen::Vector3d::Zero();
+  ImuMount imu;
   std::optional<CalibrationErrors> calibration_errors;  ///< none: the calibration does not state how good it is
   std::vector<PanTiltUnit> pan_tilt_units;
   std::vector<Camera> cameras;

@@ -30,6 +30,9 @@ class Comparison {
     compare("rover.track_m", "the distance between the wheels", wanted_.rover.track_m, result_.rover.track_m);
     compare("rover.wheel_radius_m", "the wheel radius", wanted_.rover.wheel_radius_m, result_.rover.wheel_radius_m);
     compare("rover.clearance_m", "the ground clearance", wanted_.rover.clearance_m, result_.rover.clearance_m);
+    compare("rover.turning_centre_m", "the turning centre of the wheels", text_of(wanted_.turning_centre_m),
+            text_of(result_.turning_centre_m));
+    if (wanted_.imu != result_.imu) add("imu", "the IMU has another pose or time offset");
     compare_units();
     compare_body();
     for (const Camera& camera : wanted_.cameras) compare_camera(camera);
@@ -44,6 +47,8 @@ class Comparison {
   static std::string text_of(PoseConvention convention) {
     return convention == PoseConvention::body ? "body" : "left camera";
   }
+
+  static std::string text_of(const Eigen::Vector3d& v) { return fmt::format("{}, {}, {} m", v.x(), v.y(), v.z()); }
 
   template <class T>
   void compare(const std::string& key, const std::string& subject, const T& wanted, const T& result) {

@@ -182,13 +182,26 @@ std::vector<T> read_group(YamlMap& root, const char* key, bool required, Read re
   return items;
 }
 
-RoverGeometry read_rover(YamlMap map) {
-  RoverGeometry rover;
+Eigen::Vector3d vector_of(const std::vector<double>& v) {
+  return {v[0], v[1], v[2]};
+}
+
+void read_rover(YamlMap map, Rig& rig) {
+  RoverGeometry& rover = rig.rover;
   if (map.has("track_m")) rover.track_m = map.number("track_m").value_or(rover.track_m);
   if (map.has("wheel_radius_m")) rover.wheel_radius_m = map.number("wheel_radius_m").value_or(rover.wheel_radius_m);
   if (map.has("clearance_m")) rover.clearance_m = map.number("clearance_m").value_or(rover.clearance_m);
+  if (map.has("turning_centre_m")) {
+    if (const auto centre = map.numbers("turning_centre_m", {3})) rig.turning_centre_m = vector_of(*centre);
+  }
   map.reject_unknown_keys();
-  return rover;
+}
+
+ImuMount read_imu(YamlMap map) {
+  ImuMount imu{read_pose(map), 0};
+  if (map.has("time_offset_s")) imu.time_offset_s = map.number("time_offset_s").value_or(0);
+  map.reject_unknown_keys();
+  return imu;
 }
 
 CalibrationErrors read_calibration_errors(YamlMap map) {
@@ -212,7 +225,8 @@ Rig read_root(YamlMap root, const std::string& default_name) {
   if (root.has("pose_convention") && root.choice("pose_convention", {"body", "left_optical"}) == "left_optical") {
     rig.convention = PoseConvention::left_optical;
   }
-  if (const auto rover = root.optional_node("rover")) rig.rover = read_rover(YamlMap(*rover, "rover", root.errors()));
+  if (const auto rover = root.optional_node("rover")) read_rover(YamlMap(*rover, "rover", root.errors()), rig);
+  if (const auto imu = root.optional_node("imu")) rig.imu = read_imu(YamlMap(*imu, "imu", root.errors()));
   if (const auto errors = root.optional_node("calibration_errors"))
     rig.calibration_errors = read_calibration_errors(YamlMap(*errors, "calibration_errors", root.errors()));
   rig.pan_tilt_units = read_group<PanTiltUnit>(root, "pan_tilt_units", false, read_pan_tilt_unit);
@@ -293,9 +307,15 @@ Result<Rig> read_rig_yaml(const std::string& path) {
 std::string to_rig_yaml(const Rig& rig) {
   std::string text = fmt::format("schema: {}\nname: {}\npose_convention: {}\n", kSchema, yaml_quoted(rig.name),
                                  rig.convention == PoseConvention::left_optical ? "left_optical" : "body");
-  if (rig.rover != RoverGeometry()) {
+  if (rig.rover != RoverGeometry() || !rig.turning_centre_m.isZero(0)) {
     text += fmt::format("rover:\n  track_m: {}\n  wheel_radius_m: {}\n  clearance_m: {}\n", rig.rover.track_m,
                         rig.rover.wheel_radius_m, rig.rover.clearance_m);
+    if (!rig.turning_centre_m.isZero(0)) text += fmt::format("  turning_centre_m: {}\n", list(rig.turning_centre_m));
+  }
+  if (rig.imu != ImuMount()) {
+    const Pose& pose = rig.imu.body_from_imu;
+    text += fmt::format("imu:\n  translation_m: {}\n  quaternion_xyzw: {}\n  time_offset_s: {}\n",
+                        list(pose.translation()), list(pose.rotation().coeffs()), rig.imu.time_offset_s);
   }
   if (rig.calibration_errors) {
     CalibrationErrors errors = *rig.calibration_errors;

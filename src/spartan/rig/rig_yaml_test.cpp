@@ -60,6 +60,26 @@ TEST(RigYaml, ReadsTheGeometryOfTheRover) {
   EXPECT_THAT(fault("{wheelbase_m: 1}"), HasSubstr("wheelbase_m"));
 }
 
+TEST(RigYaml, ReadsWhereTheImuAndTheWheelsAre) {
+  EXPECT_EQ(parse_rig_yaml(kGood, "my.yaml")->imu, ImuMount());
+  const auto rig = parse_rig_yaml(kGood +
+                                      "imu: {translation_m: [0.1, 0, 0.4], roll_pitch_yaw_deg: [0, 0, 90], "
+                                      "time_offset_s: -0.02}\nrover: {turning_centre_m: [-0.3, 0, 0.1]}\n",
+                                  "my.yaml");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->imu.body_from_imu.translation(), Eigen::Vector3d(0.1, 0, 0.4));
+  EXPECT_LT((rig->imu.body_from_imu.rotation() * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-12);
+  EXPECT_EQ(rig->imu.time_offset_s, -0.02);
+  EXPECT_EQ(rig->turning_centre_m, Eigen::Vector3d(-0.3, 0, 0.1));
+  EXPECT_EQ(*parse_rig_yaml(to_rig_yaml(*rig), "again.yaml"), *rig);
+  const auto fault = [](const std::string& lines) {
+    return testing::error_message(parse_rig_yaml(kGood + lines + "\n", "my.yaml"));
+  };
+  EXPECT_THAT(fault("imu: {translation_m: [0, 0, 300]}"), HasSubstr("imu.translation_m: must be within 10 m"));
+  EXPECT_THAT(fault("imu: {translation_m: [0, 0, 0], time_offset_s: 20}"), HasSubstr("imu.time_offset_s"));
+  EXPECT_THAT(fault("rover: {turning_centre_m: [.nan, 0, 0]}"), HasSubstr("rover.turning_centre_m"));
+}
+
 TEST(RigYaml, ReadsTheErrorsOfTheCalibration) {
   EXPECT_FALSE(parse_rig_yaml(kGood, "my.yaml")->calibration_errors.has_value());
   const auto rig = parse_rig_yaml(kGood + "calibration_errors: {scale_percent: 0.3, mount_mm: 0}\n", "my.yaml");

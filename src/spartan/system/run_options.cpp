@@ -84,6 +84,11 @@ RunOptions resolved_options(RunOptions options, const Rig& rig) {
     double& pan_tilt_deg = options.mapping.map.calibration.pan_tilt_deg;
     share(pan_tilt_deg, CalibrationErrors().pan_tilt_deg, 0);
   }
+  if (options.localization.imu.position_m.isZero(0))
+    options.localization.imu.position_m = rig.imu.body_from_imu.translation();
+  share(options.localization.imu.time_offset_s, 0, rig.imu.time_offset_s);
+  if (options.localization.wheels.turning_centre_m.isZero(0))
+    options.localization.wheels.turning_centre_m = rig.turning_centre_m;
   share(options.localization.wheels.track_m, defaults.localization.wheels.track_m, rig.rover.track_m);
   options.mapping = with_shared_values(options.mapping);
   return options;

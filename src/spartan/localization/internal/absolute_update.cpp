@@ -113,7 +113,8 @@ void ErrorStateFilter::update(const LateConstraint& constraint) {
     apply_constraint(constraint.at_frame, error_at::kVisionClone);
 }
 
-void ErrorStateFilter::apply_constraint(const PoseConstraint& constraint, int pose) {
+void ErrorStateFilter::apply_constraint(const PoseConstraint& of_body, int pose) {
+  const PoseConstraint constraint = arm_.imu_constraint(of_body);
   const Innovation innovation = map_innovation(memory_.estimate, pose, constraint, options_.map_factor);
   if (innovation.rows() == 0) return;
   const double nis = normalized_innovation_squared(memory_.estimate.covariance, innovation);

@@ -37,7 +37,7 @@ using ErrorCovariance = Eigen::Matrix<double, error_at::kSize, error_at::kSize>;
 using Vector8d = Eigen::Matrix<double, 8, 1>;
 
 struct NavigationState {
-  Pose world_from_body;
+  Pose world_from_body;                                       ///< of the IMU, with the axes of the body (lever_arm.h)
   Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();     ///< body frame: vision and wheels measure it there,
                                                               ///< independently of the attitude
   Eigen::Vector3d gyro_bias_rad_s = Eigen::Vector3d::Zero();  ///< body

@@ -49,7 +49,8 @@ std::vector<T> only(std::span<const Measurement> all) {
 
 }  // namespace
 
-ErrorStateFilter::ErrorStateFilter(const LocalizationOptions& options) : options_(options) {
+ErrorStateFilter::ErrorStateFilter(const LocalizationOptions& options)
+    : options_(options), arm_(options.imu.position_m), wheel_centre_(arm_.from_imu(options.wheels.turning_centre_m)) {
   drift_sigma_ratios_ = six_of(options.vision.drift_sigma_ratios);
   constant_sigma_ratios_ = six_of(options.vision.constant_sigma_ratios);
   for (int rows = 1; rows <= 6; ++rows)
@@ -79,6 +80,7 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   NavigationState& s = m.estimate.state;
   s.world_from_body = first_pose(up, ahead_in_body, 0);
   if (heading) s.world_from_body = first_pose(up, ahead_in_body, heading->radians - heading_of(s.world_from_body));
+  s.world_from_body = arm_.imu_pose(s.world_from_body);
 
   ErrorCovariance& p = m.estimate.covariance;
   set_variance(p, error_at::kPose, 6, kExact);
@@ -387,7 +389,24 @@ void ErrorStateFilter::correct_motion(const Innovation& innovation, int clone) {
   memory_.world_from_odom = s.world_from_body * odom_from_body.inverse();
 }
 
+UncertainPose ErrorStateFilter::world_from_body() const {
+  const StateEstimate& e = memory_.estimate;
+  return arm_.body_pose({e.state.world_from_body, e.covariance.block<6, 6>(error_at::kPose, error_at::kPose)});
+}
+
 UncertainPose ErrorStateFilter::odom_from_body() const {
+  return arm_.body_pose(odom_from_imu());
+}
+
+// v_B = v_N + ω × (p_B − p_N).
+Eigen::Vector3d ErrorStateFilter::velocity() const {
+  const NavigationState& s = memory_.estimate.state;
+  const Eigen::Vector3d rate =
+      inertial_usable() ? memory_.imu.last.gyro_rad_s - s.gyro_bias_rad_s : memory_.vision.rate_rad_s;
+  return s.world_from_body.rotation() * (s.velocity_m_s + rate.cross(arm_.from_imu(Eigen::Vector3d::Zero())));
+}
+
+UncertainPose ErrorStateFilter::odom_from_imu() const {
   const MotionSinceClone motion = motion_since_clone(memory_.estimate.state, error_at::kVisionClone);
   const Matrix6d covariance = motion.jacobian * memory_.estimate.covariance * motion.jacobian.transpose();
   const Pose odom_from_body = memory_.world_from_odom.inverse() * memory_.estimate.state.world_from_body;

@@ -11,6 +11,7 @@
 
 #include "spartan/localization/internal/filter_memory.h"
 #include "spartan/localization/internal/kalman_update.h"
+#include "spartan/localization/internal/lever_arm.h"
 #include "spartan/localization/internal/measurement_models.h"
 #include "spartan/localization/internal/propagation.h"
 #include "spartan/localization/localization_options.h"
@@ -23,6 +24,12 @@ struct ForwardComparison {
   bool imu_and_wheels_agree = false;
   bool vision_contradicts_imu = false;
   double vision_nis = 0;  ///< normalized innovation squared of vision against the mean of the IMU and the wheels
+};
+
+/// A visual motion of the IMU, and how the errors that last act on it.
+struct VisualMotion {
+  RelativeMotion motion;
+  MotionErrors errors;
 };
 
 class ErrorStateFilter {
@@ -41,10 +48,15 @@ class ErrorStateFilter {
   const FilterMemory& memory() const { return memory_; }
   void set_memory(const FilterMemory& memory) { memory_ = memory; }
 
-  /// odom_from_body with the covariance accumulated since the start.
+  UncertainPose world_from_body() const;
+  /// With the covariance accumulated since the start.
   UncertainPose odom_from_body() const;
+  /// Of the body's origin, world.
+  Eigen::Vector3d velocity() const;
 
  private:
+  UncertainPose odom_from_imu() const;
+
   // Propagation and IMU: error_state_filter.cpp.
   void propagate_to(Stamp stamp, const ImuSample* reached);
   void propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to);
@@ -61,12 +73,13 @@ class ErrorStateFilter {
 
   // Visual motions between frames: motion_update.cpp.
   void update(const RelativeMotion& motion);
-  bool update_by_motion(const RelativeMotion& motion);
+  VisualMotion of_imu(const RelativeMotion& motion) const;
+  bool update_by_motion(const VisualMotion& visual);
   void propagate_drift(int index, const Vector6d& sigmas, double steps);
   bool prediction_contradicted(const Innovation& innovation) const;
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
-  std::optional<ForwardComparison> compare_forward(const RelativeMotion& motion) const;
+  std::optional<ForwardComparison> compare_forward(const VisualMotion& visual) const;
   void begin_frame(Stamp stamp);
 
   // Wheels and zero-velocity updates: wheel_update.cpp.
@@ -98,6 +111,8 @@ class ErrorStateFilter {
   bool accept(LocalizationSensor sensor, double nis, int rows, HealthReason why);
 
   LocalizationOptions options_;
+  LeverArm arm_;
+  Eigen::Vector3d wheel_centre_;  ///< relative to the IMU
   Vector6d drift_sigma_ratios_, constant_sigma_ratios_;
   std::array<double, 7> gates_{};  ///< by degrees of freedom
   double vision_gate_ = 0;

@@ -51,8 +51,7 @@ Innovation relative_motion_innovation(const NavigationState& s, int clone, const
                                       const Matrix6d& covariance, const MotionErrors& errors, LinearizedAt at) {
   const MotionSinceClone m = motion_since_clone(s, clone);
   Innovation i(6);
-  const Vector6d drift =
-      errors.drift_scale.cwiseProduct(s.vision_drift + s.vision_constant) + errors.by_calibration * s.calibration;
+  const Vector6d drift = errors.drift * (s.vision_drift + s.vision_constant) + errors.by_calibration * s.calibration;
   const Vector6d r = log_se3(m.clone_from_body.inverse() * measured * exp_se3(drift));
   const Matrix6d right = right_jacobian_inverse_se3(r) * right_jacobian_se3(drift),
                  left = right_jacobian_inverse_se3(-r);
@@ -60,15 +59,25 @@ Innovation relative_motion_innovation(const NavigationState& s, int clone, const
   i.jacobian = m.jacobian;
   i.jacobian.middleCols<6>(clone) = left * m.jacobian.middleCols<6>(clone);
   if (at == LinearizedAt::estimate) i.jacobian.middleCols<6>(error_at::kPose) = left;
-  i.jacobian.middleCols<6>(error_at::kVisionDrift) = -right * errors.drift_scale.asDiagonal();
+  i.jacobian.middleCols<6>(error_at::kVisionDrift) = -right * errors.drift;
   i.jacobian.middleCols<6>(error_at::kVisionConstant) = i.jacobian.middleCols<6>(error_at::kVisionDrift);
   i.jacobian.middleCols<8>(error_at::kCalibration) = -right * errors.by_calibration;
   i.noise = right * covariance * right.transpose();
   return i;
 }
 
-Innovation wheel_innovation(const NavigationState& s, const WheelStep& step) {
-  const MotionSinceClone m = motion_since_clone(s, error_at::kStepClone);
+// The motion W = K⁻¹ M K of the turning centre, K = translation by `centre`: its right perturbation is Ad(K⁻¹) ξ.
+MotionSinceClone motion_of_centre(const NavigationState& s, int clone, const Eigen::Vector3d& centre) {
+  MotionSinceClone m = motion_since_clone(s, clone);
+  if (centre.isZero(0)) return m;
+  const Pose to_centre = Pose::from_translation(centre);
+  m.clone_from_body = to_centre.inverse() * m.clone_from_body * to_centre;
+  m.jacobian = (adjoint(to_centre.inverse()) * m.jacobian).eval();
+  return m;
+}
+
+Innovation wheel_innovation(const NavigationState& s, const WheelStep& step, const Eigen::Vector3d& centre) {
+  const MotionSinceClone m = motion_of_centre(s, error_at::kStepClone, centre);
   const MeanStep mean = mean_step(m.clone_from_body);
   Innovation i(step.yaw_known ? 4 : 3);
   i.residual.head<3>() = Eigen::Vector3d(s.wheel_scale * step.counted_m, 0, 0) - mean.displacement;
@@ -88,8 +97,8 @@ double forward_of(const Pose& motion) {
   return mean_step(motion).displacement.x();
 }
 
-StepForward forward_since(const NavigationState& s, int clone) {
-  const MotionSinceClone m = motion_since_clone(s, clone);
+StepForward forward_since(const NavigationState& s, int clone, const Eigen::Vector3d& centre) {
+  const MotionSinceClone m = motion_of_centre(s, clone, centre);
   const MeanStep mean = mean_step(m.clone_from_body);
   return {mean.displacement.x(), mean.displacement_by.row(0) * m.jacobian};
 }

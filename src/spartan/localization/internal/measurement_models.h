@@ -10,7 +10,7 @@ namespace spartan::internal {
 
 /// How the errors that last act on a motion (all zero: they do not).
 struct MotionErrors {
-  Vector6d drift_scale = Vector6d::Zero();  ///< diagonal of D
+  Matrix6d drift = Matrix6d::Zero();  ///< D
   /// E (RelativeMotion::by_calibration).
   Eigen::Matrix<double, 6, 8> by_calibration = Eigen::Matrix<double, 6, 8>::Zero();
 };
@@ -42,15 +42,16 @@ struct WheelStep {
   bool yaw_known = false;
   double forward_sigma_m = 0, side_sigma_m = 0, up_sigma_m = 0, yaw_sigma_rad = 0;
 };
-Innovation wheel_innovation(const NavigationState& state, const WheelStep& step);
-/// Displacement along body x of the mean attitude of a motion, as wheels measure it.
+/// `centre`: the turning centre of the wheels, relative to the pose of the state.
+Innovation wheel_innovation(const NavigationState& state, const WheelStep& step, const Eigen::Vector3d& centre);
+/// Displacement along body x of the mean attitude of a motion of the turning centre, as wheels measure it.
 double forward_of(const Pose& motion);
 /// The same of the motion since a clone, with its Jacobian.
 struct StepForward {
   double metres = 0;
   Eigen::Matrix<double, 1, error_at::kSize> jacobian;
 };
-StepForward forward_since(const NavigationState& state, int clone);
+StepForward forward_since(const NavigationState& state, int clone, const Eigen::Vector3d& centre);
 
 /// Heading of body x in the world, counter-clockwise from x.
 double heading_of(const Pose& world_from_body);

@@ -21,14 +21,17 @@ void expect_derivative(const NavigationState& s, const std::function<Innovation(
   EXPECT_LE((innovation(s).jacobian + numeric).cwiseAbs().maxCoeff(), 1e-6);
 }
 
+const Eigen::Vector3d kCentre(0.3, -0.1, 0.2);
+
 TEST(MeasurementModels, JacobiansMatchFiniteDifferences) {
   Random random(4);
   for (int round = 0; round < 10; ++round) {
     const NavigationState s = random_navigation_state(random);
+    const Eigen::Vector3d centre = normal3(random, 0.3);
     WheelStep step{0.1, 0.2, true, 1, 1, 1, 1};
-    expect_derivative<4>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
+    expect_derivative<4>(s, [&](const NavigationState& x) { return wheel_innovation(x, step, centre); });
     step.yaw_known = false;
-    expect_derivative<3>(s, [&](const NavigationState& x) { return wheel_innovation(x, step); });
+    expect_derivative<3>(s, [&](const NavigationState& x) { return wheel_innovation(x, step, centre); });
     const double heading = heading_about_up(s) + s.compass_offset_rad + 0.1;
     expect_derivative<1>(s, [&](const NavigationState& x) { return compass_innovation(x, heading, 0.1); });
     const Eigen::Vector2d tilt =
@@ -48,10 +51,10 @@ TEST(MeasurementModels, ForwardOfStepMatchesItsJacobian) {
   const NavigationState s = random_navigation_state(random);
   const auto numeric = testing::numeric_jacobian<1, error_at::kSize>(
       [&](const ErrorVector& e) -> Eigen::Matrix<double, 1, 1> {
-        return Eigen::Matrix<double, 1, 1>(forward_since(add_error(s, e), error_at::kStepClone).metres);
+        return Eigen::Matrix<double, 1, 1>(forward_since(add_error(s, e), error_at::kStepClone, kCentre).metres);
       },
       ErrorVector::Zero());
-  EXPECT_LE((forward_since(s, error_at::kStepClone).jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LE((forward_since(s, error_at::kStepClone, kCentre).jacobian - numeric).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 // Far from the mean: the motion measured is that of the true state, X̂ Exp(r) over the clone Ĉ Exp(ξ_c), less the drift.
@@ -62,12 +65,11 @@ TEST(MeasurementModels, RelativeMotionIsExactAroundALargeResidual) {
     Vector6d r;
     r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
     MotionErrors errors;
-    errors.drift_scale << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6;
+    errors.drift = (Vector6d() << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6).finished().asDiagonal();
     for (Eigen::Index i = 0; i < errors.by_calibration.size(); ++i)
       errors.by_calibration.data()[i] = random.uniform(-0.2, 0.2);
     const auto lasting = [&](const NavigationState& x) -> Vector6d {
-      return errors.drift_scale.cwiseProduct(x.vision_drift + x.vision_constant) +
-             errors.by_calibration * x.calibration;
+      return errors.drift * (x.vision_drift + x.vision_constant) + errors.by_calibration * x.calibration;
     };
     const Pose mean = motion_since_clone(s, clone).clone_from_body;
     const Vector6d estimated = lasting(s);
@@ -94,7 +96,7 @@ TEST(MeasurementModels, RelativeMotionDoesNotMeasureTheWorld) {
   r << 0.4, -0.3, 0.2, 0.3, -0.2, 0.25;
   const Pose measured = motion_since_clone(s, error_at::kVisionClone).clone_from_body * exp_se3(r);
   MotionErrors errors;
-  errors.drift_scale.setConstant(0.05);
+  errors.drift = 0.05 * Matrix6d::Identity();
   const auto innovation = [&](const NavigationState& x) {
     return relative_motion_innovation(x, error_at::kVisionClone, measured, Matrix6d::Identity(), errors,
                                       LinearizedAt::estimate);
@@ -113,9 +115,22 @@ TEST(MeasurementModels, WheelsPredictTheChordOfAnArc) {
   s.wheel_scale = 0.5;
   s.world_from_step_clone = exp_se3((Vector6d() << 1, 2, 3, 0.1, 0.2, 0.3).finished());
   s.world_from_body = s.world_from_step_clone * Pose(exp_so3({0, 0, std::numbers::pi / 2}), Eigen::Vector3d(1, 1, 0));
-  const Innovation i = wheel_innovation(s, {2 * std::sqrt(2.0), std::numbers::pi / 2, true, 1, 1, 1, 1});
+  const Innovation i =
+      wheel_innovation(s, {2 * std::sqrt(2.0), std::numbers::pi / 2, true, 1, 1, 1, 1}, Eigen::Vector3d::Zero());
   EXPECT_LE(i.residual.norm(), 1e-12);
-  EXPECT_NEAR(forward_since(s, error_at::kStepClone).metres, std::sqrt(2.0), 1e-12);
+  EXPECT_NEAR(forward_since(s, error_at::kStepClone, Eigen::Vector3d::Zero()).metres, std::sqrt(2.0), 1e-12);
+}
+
+// A rover that turns on the spot: away from the turning centre its points move sideways, but no wheel slips.
+TEST(MeasurementModels, WheelsMeasureTheTurningCentre) {
+  NavigationState s;
+  const Pose turned = Pose::from_rotation(exp_so3({0, 0, 0.2}));
+  const Pose to_imu = Pose::from_translation(-kCentre);  // the state is at the IMU, the centre at kCentre from it
+  s.world_from_step_clone = to_imu;
+  s.world_from_body = turned * to_imu;
+  const Innovation i = wheel_innovation(s, {0, 0.2, true, 1, 1, 1, 1}, kCentre);
+  EXPECT_LE(i.residual.norm(), 1e-12);
+  EXPECT_GT(wheel_innovation(s, {0, 0.2, true, 1, 1, 1, 1}, Eigen::Vector3d::Zero()).residual.norm(), 0.05);
 }
 
 TEST(MeasurementModels, RollAndPitchMatchTheSimulator) {

@@ -33,12 +33,32 @@ Matrix6d usable_covariance(const Matrix6d& covariance, double factor) {
   return r;
 }
 
+/// Vision states the exact identity for it.
+bool is_stationary(const RelativeMotion& motion) {
+  const Pose& m = motion.previous_from_current;
+  return m.translation().isZero(1e-12) && m.rotation().vec().isZero(1e-12);
+}
+
 // Position, attitude, velocity are the first errors.
 static_assert(error_at::kPosition == 0 && error_at::kAttitude == 3 && error_at::kVelocity == 6);
 
 }  // namespace
 
-void ErrorStateFilter::update(const RelativeMotion& motion) {
+/// The same motion of the IMU.
+VisualMotion ErrorStateFilter::of_imu(const RelativeMotion& motion) const {
+  const Matrix6d& to_imu = arm_.to_imu();
+  VisualMotion m;
+  m.motion = motion;
+  m.motion.previous_from_current = arm_.imu_motion(motion.previous_from_current);
+  m.motion.covariance = to_imu * motion.covariance * to_imu.transpose();
+  m.motion.by_calibration = to_imu * motion.by_calibration;
+  if (!is_stationary(motion)) m.errors = {to_imu * motion.drift_scale().asDiagonal(), m.motion.by_calibration};
+  return m;
+}
+
+void ErrorStateFilter::update(const RelativeMotion& of_body) {
+  const VisualMotion visual = of_imu(of_body);
+  const RelativeMotion& motion = visual.motion;
   propagate_to(motion.to, nullptr);
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
   const bool consecutive = motion.from == memory_.vision.clone_stamp;
@@ -48,7 +68,7 @@ void ErrorStateFilter::update(const RelativeMotion& motion) {
     ++monitor.rejected;
     memory_.vision.stationary = false;
   } else {
-    if (update_by_motion(motion)) {
+    if (update_by_motion(visual)) {
       const NavigationState& s = memory_.estimate.state;
       const double seconds = seconds_between(motion.from, motion.to);
       memory_.vision.rate_rad_s =
@@ -62,11 +82,12 @@ void ErrorStateFilter::update(const RelativeMotion& motion) {
 }
 
 /// Returns whether the motion was used.
-bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
+bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
+  const RelativeMotion& motion = visual.motion;
   VisionMemory& vision = memory_.vision;
   ErrorCovariance& p = memory_.estimate.covariance;
   const Pose& measured = motion.previous_from_current;
-  vision.stationary = measured.translation().isZero(1e-12) && measured.rotation().vec().isZero(1e-12);
+  vision.stationary = is_stationary(motion);
 
   if (!vision.stationary) {
     propagate_drift(error_at::kVisionDrift, drift_sigma_ratios_, options_.vision.drift_correlation_frames);
@@ -77,10 +98,8 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
 
   const Matrix6d covariance = usable_covariance(motion.own_covariance(), options_.vision.white_noise_factor);
-  MotionErrors errors;
-  if (!vision.stationary) errors = {motion.drift_scale(), motion.by_calibration};
   const Innovation innovation =
-      relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, errors,
+      relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, visual.errors,
                                  inertial ? LinearizedAt::estimate : LinearizedAt::measured_motion);
   // The noise of the constant-velocity model grows with the speed: after a stop it is small, and the update would put
   // the residual of a true motion into the drift of vision.
@@ -90,7 +109,7 @@ bool ErrorStateFilter::update_by_motion(const RelativeMotion& motion) {
   const auto accept_vision = [&](double value, double gate, HealthReason reason) {
     return monitor.accept(value, gate, reason, options_.health.excluded_after, options_.health.readmit_after);
   };
-  const auto forward = inertial ? compare_forward(motion) : std::nullopt;
+  const auto forward = inertial ? compare_forward(visual) : std::nullopt;
   constexpr double kOutvoted = kOutvotedSigmas * kOutvotedSigmas;
   if (forward && forward->imu_and_wheels_agree && forward->vision_contradicts_imu && forward->vision_nis > kOutvoted)
     return accept_vision(forward->vision_nis, kOutvoted, HealthReason::outvoted);
@@ -159,7 +178,8 @@ bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis
 /// Distance along the body's x since the last frame, by the wheels, by the IMU and by vision. A repeating texture
 /// shifts a visual motion by its period, with a small covariance. None if the wheels cannot tell, or if their counts
 /// since the last frame are in the prediction already.
-std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const RelativeMotion& motion) const {
+std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const VisualMotion& visual) const {
+  const RelativeMotion& motion = visual.motion;
   const VisionMemory& vision = memory_.vision;
   const std::optional<WheelSample> wheels = wheels_at(motion.to);
   if (!wheels || !vision.has_wheels || memory_.monitor(LocalizationSensor::wheels).state == SensorState::excluded)
@@ -170,18 +190,22 @@ std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const Relativ
   const double counted_m = s.wheel_scale * step.counted_m;
   const double counted_variance = std::pow(step.forward_sigma_m, 2) +
                                   p(error_at::kWheelScale, error_at::kWheelScale) * step.counted_m * step.counted_m;
-  const StepForward predicted = forward_since(s, error_at::kVisionClone);
+  const StepForward predicted = forward_since(s, error_at::kVisionClone, wheel_centre_);
   const double predicted_variance = predicted.jacobian * p * predicted.jacobian.transpose();
-  // As in relative_motion_innovation(): white noise, and the drift states in units of the motion's standard deviations.
-  const Vector6d scale = motion.drift_scale();
-  const Vector6d drift = scale.cwiseProduct(s.vision_drift + s.vision_constant) + motion.by_calibration * s.calibration;
-  const double seen_m = forward_of(motion.previous_from_current * exp_se3(drift));
-  const int d = error_at::kVisionDrift, c = error_at::kVisionConstant;
-  const auto by_calibration = motion.by_calibration.row(0);
-  const double seen_variance =
-      options_.vision.white_noise_factor * motion.own_covariance()(0, 0) +
-      scale[0] * scale[0] * (p(d, d) + p(c, c) + 2 * p(d, c)) +
-      by_calibration * p.block<8, 8>(error_at::kCalibration, error_at::kCalibration) * by_calibration.transpose();
+  // As in relative_motion_innovation(): white noise, and the errors that last.
+  const Vector6d lasting =
+      visual.errors.drift * (s.vision_drift + s.vision_constant) + visual.errors.by_calibration * s.calibration;
+  const Pose to_centre = Pose::from_translation(wheel_centre_);
+  const double seen_m = forward_of(to_centre.inverse() * motion.previous_from_current * exp_se3(lasting) * to_centre);
+  Eigen::Matrix<double, 6, 20> by_lasting;  // z₁, z₂, η
+  static_assert(error_at::kVisionConstant == error_at::kVisionDrift + 6 &&
+                error_at::kCalibration == error_at::kVisionDrift + 12);
+  by_lasting << visual.errors.drift, visual.errors.drift, visual.errors.by_calibration;
+  const Eigen::Matrix<double, 1, 6> along = adjoint(to_centre.inverse()).row(0);
+  const Matrix6d seen_covariance =
+      options_.vision.white_noise_factor * motion.own_covariance() +
+      by_lasting * p.block<20, 20>(error_at::kVisionDrift, error_at::kVisionDrift) * by_lasting.transpose();
+  const double seen_variance = along * seen_covariance * along.transpose();
 
   const auto square = [](double v) { return v * v; };
   const double weights = 1 / counted_variance + 1 / predicted_variance;
@@ -197,7 +221,7 @@ std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const Relativ
 
 /// The next visual motion starts at this pose.
 void ErrorStateFilter::begin_frame(Stamp stamp) {
-  const UncertainPose odom = odom_from_body();
+  const UncertainPose odom = odom_from_imu();
   memory_.vision.odom_from_clone = odom.pose;
   memory_.vision.odom_covariance = odom.covariance;
   memory_.vision.clone_stamp = stamp;

@@ -80,7 +80,7 @@ WheelStep ErrorStateFilter::step_between(const WheelSample& from, const WheelSam
 /// The length of the step is gated first: if it fails, the wheels slip and the whole step is rejected.
 void ErrorStateFilter::update_by_step(const WheelSample& sample) {
   const WheelStep step = step_between(memory_.step.wheels, sample);
-  const Innovation whole = wheel_innovation(memory_.estimate.state, step);
+  const Innovation whole = wheel_innovation(memory_.estimate.state, step, wheel_centre_);
   Innovation forward(1);
   forward.residual[0] = whole.residual[0];
   forward.jacobian = whole.jacobian.topRows<1>();
@@ -90,7 +90,7 @@ void ErrorStateFilter::update_by_step(const WheelSample& sample) {
   const double nis = slips ? length_nis : normalized_innovation_squared(memory_.estimate.covariance, whole);
   const int rows = slips ? 1 : whole.rows();
   if (accept(LocalizationSensor::wheels, nis, rows, slips ? HealthReason::slips : HealthReason::disagrees)) {
-    const StepForward known = forward_since(memory_.estimate.state, error_at::kStepClone);
+    const StepForward known = forward_since(memory_.estimate.state, error_at::kStepClone, wheel_centre_);
     const double variance = known.jacobian * memory_.estimate.covariance * known.jacobian.transpose();
     if (variance < std::pow(kKnownRatio * step.forward_sigma_m, 2)) {
       correct_only(memory_.estimate, forward, error_at::kWheelScale);
@@ -106,7 +106,7 @@ void ErrorStateFilter::estimate_slip(const WheelStep& step) {
   WheelMemory& wheels = memory_.wheels;
   wheels.slip_known = std::abs(step.counted_m) >= options_.wheels.min_slip_distance_m;
   if (!wheels.slip_known) return;
-  const StepForward travelled = forward_since(memory_.estimate.state, error_at::kStepClone);
+  const StepForward travelled = forward_since(memory_.estimate.state, error_at::kStepClone, wheel_centre_);
   const double variance = travelled.jacobian * memory_.estimate.covariance * travelled.jacobian.transpose();
   constexpr double kCount_m = 0.001;  // resolution of a count
   wheels.slip = 1 - travelled.metres / step.counted_m;

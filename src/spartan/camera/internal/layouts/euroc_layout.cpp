@@ -31,14 +31,14 @@ Result<EurocImages> read_images(const fs::path& camera) {
 }
 
 struct EurocImu {
-  Eigen::Quaterniond body_from_imu = Eigen::Quaterniond::Identity();
+  Pose body_from_imu;
   ImuNoise noise;
 };
 
-// The rotation part of T_BS (body from sensor). Two notations are in use: {rows, cols, data: […]} and a plain list.
-std::optional<Eigen::Quaterniond> rotation_of(YamlMap& root) {
+// T_BS (body from sensor). Two notations are in use: {rows, cols, data: […]} and a plain list.
+std::optional<Pose> pose_of(YamlMap& root) {
   const auto node = root.optional_node("T_BS");
-  if (!node) return Eigen::Quaterniond::Identity();
+  if (!node) return Pose();
   const auto data = node->is_map() ? YamlMap(*node, root.path("T_BS"), root.errors()).numbers("data", {16})
                                    : root.numbers("T_BS", {16});
   if (!data) return std::nullopt;
@@ -49,7 +49,7 @@ std::optional<Eigen::Quaterniond> rotation_of(YamlMap& root) {
     root.add_error("T_BS", "its rotation part is not a rotation matrix");
     return std::nullopt;
   }
-  return Eigen::Quaterniond(nearest_rotation(rotation));
+  return Pose(Eigen::Quaterniond(nearest_rotation(rotation)), Eigen::Vector3d(m[3], m[7], m[11]));
 }
 
 // A noise density; 0 (unknown) where the key is missing.
@@ -72,7 +72,7 @@ Result<EurocImu> read_imu(const std::string& path) {
   if (!file) return failure(file);
   YamlErrors errors(path);
   YamlMap root(*file, "", errors);
-  imu.body_from_imu = rotation_of(root).value_or(Eigen::Quaterniond::Identity());
+  imu.body_from_imu = pose_of(root).value_or(Pose());
   imu.noise.gyro_noise_rad_s_sqrt_hz = density(root, "gyroscope_noise_density");
   imu.noise.gyro_walk_rad_s2_sqrt_hz = density(root, "gyroscope_random_walk");
   imu.noise.accel_noise_m_s2_sqrt_hz = density(root, "accelerometer_noise_density");
@@ -145,8 +145,9 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
     const auto about = read_imu((folder / "imu0" / "sensor.yaml").string());
     if (!about) return failure(about);
     index.info.noise.imu = about->noise;
+    if (index.info.rig.imu == ImuMount()) index.info.rig.imu.body_from_imu = about->body_from_imu;
     index.sensor_files.push_back(imu.string());
-    index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(about->body_from_imu));
+    index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(about->body_from_imu.rotation()));
   }
   return index;
 }

@@ -90,7 +90,7 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
     return stream_of_table((sensors / name).string(), {.separator = ',', .header = header, .ends_with_newline = true},
                            fields, reader);
   };
-  index.imu = stream("imu.csv", kImuHeader, 7, read_imu_row(Eigen::Quaterniond::Identity()));
+  index.imu = stream("imu.csv", kImuHeader, 7, read_imu_row(index.info.rig.imu.body_from_imu.rotation()));
   for (SampleStreamFactory other : {stream("wheels.csv", kWheelsHeader, 3, read_wheel_row),
                                     stream("compass.csv", kCompassHeader, 3, read_compass_row),
                                     stream("inclinometer.csv", kInclinometerHeader, 4, read_inclinometer_row)}) {
