@@ -1,6 +1,8 @@
 // Reader and writer of Kalibr's camchain.yaml and camchain-imucam.yaml (Furgale et al.; Kalibr wiki, "Yaml formats").
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_readers.h"
 #include "spartan/calibration_io/internal/calibration_text.h"
@@ -18,6 +20,8 @@ namespace {
 // calibration.
 constexpr double kConsistency = 1e-3;
 constexpr std::size_t kMaxCameras = 100;
+/// Kalibr estimates the offset of each camera: those of one clock differ by less.
+constexpr double kOneClock_s = 0.001;
 
 std::string camera_key(std::size_t i) {
   return fmt::format("cam{}", i);
@@ -47,6 +51,7 @@ struct Chain {
   std::vector<Camera> cameras;
   std::optional<Pose> first_from_imu;
   std::string imu_key;  // the key that gives it
+  double time_offset_s = 0;
   std::vector<RigDifference> ignored;
 };
 
@@ -108,14 +113,22 @@ Chain read_chain(YamlMap& root) {
     camera.size = read_resolution(entry, "resolution");
     camera.model = read_kalibr_model(entry, "distortion_coeffs");
     if (entry.has("timeshift_cam_imu")) {
-      const auto shift = entry.number("timeshift_cam_imu");
-      if (shift && *shift != 0) {
+      // Stamp of the IMU = stamp of the camera + shift. One clock of both cameras is assumed.
+      const double shift = entry.number("timeshift_cam_imu").value_or(0);
+      if (i == 0) chain.time_offset_s = shift;
+      if (std::abs(shift - chain.time_offset_s) > kOneClock_s) {
         chain.ignored.push_back(
-            {camera.name + ".timeshift_cam_imu", fmt::format("the camera's clock is {} s off the IMU's", *shift)});
+            {camera.name + ".timeshift_cam_imu",
+             fmt::format("the camera's clock is {} s off that of cam0", shift - chain.time_offset_s)});
       }
     }
     read_link(entry, chain, camera);
     chain.cameras.push_back(std::move(camera));
+  }
+  if (!chain.first_from_imu && chain.time_offset_s != 0) {
+    chain.ignored.insert(chain.ignored.begin(),
+                         {camera_key(0) + ".timeshift_cam_imu",
+                          fmt::format("the camera's clock is {} s off the IMU's", chain.time_offset_s)});
   }
   return chain;
 }
@@ -146,6 +159,7 @@ Result<LoadedRig> read_kalibr_calib(const std::string& path) {
   rig.name = "kalibr";
   rig.convention = has_imu ? PoseConvention::body : PoseConvention::left_optical;
   rig.cameras = std::move(chain.cameras);
+  if (has_imu) rig.imu.time_offset_s = chain.time_offset_s;
   rig.pairs = {{"stereo", camera_key(0), camera_key(1)}};
   auto valid = validated(std::move(rig), path);
   if (!valid) return failure(std::move(valid));
@@ -171,7 +185,7 @@ Result<CalibrationFiles> internal::write_kalibr_calib(const Rig& rig, const std:
     if (i > 0) text += transform_lines("T_cn_cnm1", body_from_camera.inverse() * body_from_previous);
     text += *model + fmt::format("  resolution: [{}, {}]\n  rostopic: /{}/image_raw\n", cameras[i]->size.width,
                                  cameras[i]->size.height, camera_key(i));
-    if (with_body) text += "  timeshift_cam_imu: 0\n";
+    if (with_body) text += fmt::format("  timeshift_cam_imu: {}\n", rig.imu.time_offset_s);
     body_from_previous = body_from_camera;
   }
   return CalibrationFiles{{path, text}};

@@ -57,12 +57,14 @@ class ErrorStateFilter {
  private:
   UncertainPose odom_from_imu() const;
 
-  // Propagation and IMU: error_state_filter.cpp.
+  // Propagation: error_state_filter.cpp.
   void propagate_to(Stamp stamp, const ImuSample* reached);
   void propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to);
   void propagate_at_constant_velocity(double seconds);
   void propagate_biases(double seconds);
   bool inertial_usable() const;
+
+  // IMU: imu_update.cpp.
   void update(const ImuSample& sample);
   void check_reading(const ImuSample& sample);
   void level(const ImuSample& sample);
@@ -72,7 +74,7 @@ class ErrorStateFilter {
   void detect_stationary(const ImuSample& sample);
 
   // Visual motions between frames: motion_update.cpp.
-  void update(const RelativeMotion& motion);
+  void update(const RelativeMotion& of_body);
   VisualMotion of_imu(const RelativeMotion& motion) const;
   bool update_by_motion(const VisualMotion& visual);
   void propagate_drift(int index, const Vector6d& sigmas, double steps);
@@ -101,7 +103,7 @@ class ErrorStateFilter {
   void inflate_attitude(const Innovation& innovation);
   void update(const PoseConstraint& constraint);
   void update(const LateConstraint& constraint);
-  void apply_constraint(const PoseConstraint& constraint, int pose);
+  void apply_constraint(const PoseConstraint& of_body, int pose);
 
   /// Corrections that preserve odom_from_body, and corrections of the motion since a clone.
   void correct_world(const Innovation& innovation);
