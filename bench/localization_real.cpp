@@ -154,6 +154,38 @@ std::vector<RelativeMotion> with_gap(const RealDrive& d, std::vector<RelativeMot
   return motions;
 }
 
+// Biases of the gyro at a frame, against the reference if there is one.
+std::string gyro_bias_text(const RealDrive& d, const FrameResult& f) {
+  const InertialBiases& b = f.estimate.biases;
+  const double sigma = 1e3 * b.gyro_sigma_rad_s.norm();
+  return d.biases ? fmt::format("{:.2f}, {:.2f}", 1e3 * (b.gyro_rad_s - d.biases->gyro_rad_s).norm(), sigma)
+                  : fmt::format("({:.2f}), {:.2f}", 1e3 * b.gyro_rad_s.norm(), sigma);
+}
+
+void print_result(const RealDrive& d, int seed, const Sensors& sensors, const DriveResult& r) {
+  constexpr double kAfter_s = 5;
+  double squares = 0, up_squares = 0;
+  std::vector<double> up;
+  const FrameResult *end = &r.frames.back(), *after = end;
+  for (const FrameResult& f : r.frames) {
+    squares += f.position_m * f.position_m;
+    if (f.time_s < kAfter_s - 0.01) continue;
+    if (up.empty()) after = &f;
+    up.push_back(f.up_deg);
+    up_squares += f.up_deg * f.up_deg;
+  }
+  if (up.empty()) up = {0};
+  std::sort(up.begin(), up.end());
+  fmt::print(
+      "| {} | vision{}{} | {:.1f}, {:.1f} | {:.1f} | {:.3f}, {:.3f} | {:.3f}, {:.3f}, {:.3f} | {} | {} | {:.2f}, "
+      "{:.2f} |\n",
+      seed, sensors.imu ? "+imu" : "", sensors.wheels ? "+wheels" : "",
+      1e3 * std::sqrt(squares / static_cast<double>(r.frames.size())), 1e3 * end->position_m, 1e3 * end->sigma_m,
+      end->attitude_deg, end->heading_deg, std::sqrt(up_squares / static_cast<double>(up.size())),
+      up[up.size() * 95 / 100], up.back(), sensors.imu ? gyro_bias_text(d, *after) : "",
+      sensors.imu ? r.imu_not_ok() : 0, r.mean(&FrameResult::nees_position), r.mean(&FrameResult::nees_pose));
+}
+
 void print_drive(const RealDrive& d, const OdometryErrors& errors, int seeds, const Sensors& with) {
   const Vector6d odometry = d.covariance.diagonal().cwiseSqrt();
   fmt::print("\n## {}: {:.1f} m, {:.0f} s, {} frames, {} seeds\n\n", d.name, d.length_m,
@@ -164,40 +196,14 @@ void print_drive(const RealDrive& d, const OdometryErrors& errors, int seeds, co
       1e3 * odometry[0], 1e3 * odometry[1], 1e3 * odometry[2], 1e3 * odometry[3], 1e3 * odometry[4], 1e3 * odometry[5],
       1e3 * d.truth_sigma_m, 1e3 * d.truth_sigma_rad);
   fmt::print(
-      "| seed | sensors | ATE, mm | end, mm | 1 sigma | attitude at the end, deg | heading | roll and pitch after 5 s "
-      "| "
-      "largest after 5 s | gyro bias off after 5 s, mrad/s | sigma | IMU not ok, frames | mean NEES position | pose "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "Roll and pitch, gyro bias: after 5 s. Gyro bias: difference to the reference, or the estimate in brackets.\n\n"
+      "| seed | sensors | ATE, end, mm | 1 sigma | attitude, heading at the end, deg | roll and pitch, RMS, 95 %, "
+      "largest, deg | gyro bias, 1 sigma, mrad/s | IMU not ok, frames | mean NEES position, pose |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
   for (int seed = 1; seed <= seeds; ++seed) {
     const auto motions = vision(d, errors, static_cast<std::uint64_t>(seed));
-    for (const Sensors& sensors : {Sensors{false, false}, with}) {
-      const DriveResult r = localize(d, motions, sensors);
-      double squares = 0, largest_up = 0;
-      const FrameResult* five = &r.frames.back();
-      for (const FrameResult& f : r.frames) {
-        squares += f.position_m * f.position_m;
-        if (f.time_s >= 5) {
-          five = std::min(five, &f);
-          largest_up = std::max(largest_up, f.up_deg);
-        }
-      }
-      const FrameResult& end = r.frames.back();
-      std::string bias = "", sigma = "";
-      if (d.biases && sensors.imu) {
-        bias = fmt::format("{:.2f}", 1e3 * (five->estimate.biases.gyro_rad_s - d.biases->gyro_rad_s).norm());
-        sigma = fmt::format("{:.2f}", 1e3 * five->estimate.biases.gyro_sigma_rad_s.norm());
-      } else if (sensors.imu) {
-        bias = fmt::format("({:.2f})", 1e3 * five->estimate.biases.gyro_rad_s.norm());
-        sigma = fmt::format("{:.2f}", 1e3 * five->estimate.biases.gyro_sigma_rad_s.norm());
-      }
-      fmt::print(
-          "| {} | vision{}{} | {:.1f} | {:.1f} | {:.1f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {} | {} | {} | "
-          "{:.2f} | {:.2f} |\n",
-          seed, sensors.imu ? "+imu" : "", sensors.wheels ? "+wheels" : "",
-          1e3 * std::sqrt(squares / static_cast<double>(r.frames.size())), 1e3 * end.position_m, 1e3 * end.sigma_m,
-          end.attitude_deg, end.heading_deg, five->up_deg, largest_up, bias, sigma, sensors.imu ? r.imu_not_ok() : 0,
-          r.mean(&FrameResult::nees_position), r.mean(&FrameResult::nees_pose));
-    }
+    for (const Sensors& sensors : {Sensors{false, false}, with})
+      print_result(d, seed, sensors, localize(d, motions, sensors));
   }
 }
 
@@ -205,7 +211,7 @@ void print_drive(const RealDrive& d, const OdometryErrors& errors, int seeds, co
 void print_gaps(const RealDrive& d, const OdometryErrors& errors, double length_s, double first_s, double every_s) {
   const double seconds = seconds_between(d.frames.front().stamp, d.frames.back().stamp);
   fmt::print(
-      "\n{}, vision lost for {:.0f} s: | from, s | error that the gap adds, mm | sigma at its end, mm | NEES of "
+      "\n{}, vision lost for {:.0f} s:\n\n| from, s | error that the gap adds, mm | sigma at its end, mm | NEES of "
       "the position |\n|---|---|---|---|\n",
       d.name, length_s);
   const auto motions = vision(d, errors, 1);

@@ -30,7 +30,7 @@ struct RealDrive {
   std::vector<MeasuredMotion> measured;
   double truth_sigma_m = 0, truth_sigma_rad = 0;  ///< of a motion by the ground truth, per axis
   Matrix6d covariance = Matrix6d::Zero();         ///< of a visual motion, left camera
-  std::optional<InertialBiases> biases;           ///< mean of the reference
+  std::optional<InertialBiases> biases;           ///< by the reference after 5 s
   double length_m = 0;
 };
 
@@ -114,25 +114,24 @@ inline Trajectory load_truth(const std::string& file) {
   return truth->poses;
 }
 
-// The columns of biases of EuRoC's ground truth, mean over the drive.
-inline InertialBiases mean_biases(const std::string& file) {
+// The columns of biases of EuRoC's ground truth, `seconds` after its begin.
+inline InertialBiases reference_biases(const std::string& file, double seconds) {
   std::ifstream in(file);
-  std::string line;
-  InertialBiases mean;
-  double count = 0;
-  while (std::getline(in, line)) {
+  std::optional<double> first_ns;
+  for (std::string line; std::getline(in, line);) {
     if (line.empty() || line[0] == '#') continue;
     std::vector<double> v;
     std::stringstream cells(line);
     for (std::string cell; std::getline(cells, cell, ',');) v.push_back(std::stod(cell));
     if (v.size() < 17) continue;
-    mean.gyro_rad_s += Eigen::Vector3d(v[11], v[12], v[13]);
-    mean.accel_m_s2 += Eigen::Vector3d(v[14], v[15], v[16]);
-    ++count;
+    if (!first_ns) first_ns = v[0];
+    if (v[0] - *first_ns < 1e9 * seconds) continue;
+    InertialBiases biases;
+    biases.gyro_rad_s = {v[11], v[12], v[13]};
+    biases.accel_m_s2 = {v[14], v[15], v[16]};
+    return biases;
   }
-  mean.gyro_rad_s /= count;
-  mean.accel_m_s2 /= count;
-  return mean;
+  throw std::runtime_error(file + ": is shorter");
 }
 
 inline RealDrive open_euroc(const std::string& folder, const std::string& run) {
@@ -148,7 +147,7 @@ inline RealDrive open_euroc(const std::string& folder, const std::string& run) {
   // Rotations differ from those by the gyro, without its bias, by 0.10 to 0.16 mrad, of which it explains 0.04.
   d.truth_sigma_rad = 1.2e-4;
   d.truth_sigma_m = 2e-4;
-  d.biases = mean_biases(file);
+  d.biases = reference_biases(file, 5);
   return d;
 }
 
@@ -157,6 +156,7 @@ inline RealDrive open_tumvi(const std::string& folder, const std::string& run) {
   const Trajectory truth = load_truth(folder + "/truth.tum");
   add_frames(d, truth, d.measured.front().from, Stamp{truth.back().stamp.ns - 100'000'000}, 0.05, 0.045);
   d.truth_sigma_rad = 1.5e-3;
+  d.truth_sigma_m = 3e-4;
   return d;
 }
 
